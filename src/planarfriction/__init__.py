@@ -1,0 +1,66 @@
+"""planarfriction: friction of contact patches that slide and spin at once.
+
+Describe a contact patch, choose a friction law, get a model; put models into a scene, simulate, look.
+Every public name lives here; the modules behind them load on first use, so that the import stays light.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+
+_HOME = {
+    "Body": "planarfriction.scenes",
+    "Contact": "planarfriction.scenes",
+    "ContactPatch": "planarfriction.patch",
+    "Coulomb": "planarfriction.laws",
+    "DistributedModel": "planarfriction.models",
+    "ElastoPlastic": "planarfriction.laws",
+    "FrictionError": "planarfriction.errors",
+    "LimitSurfaceCells": "planarfriction.limit_surface",
+    "LimitSurfaceEllipsoid": "planarfriction.limit_surface",
+    "LimitSurfaceTable": "planarfriction.limit_surface",
+    "LimitSurfaceTablePublished": "planarfriction.limit_surface",
+    "LuGre": "planarfriction.laws",
+    "ReducedModelPublished": "planarfriction.models",
+    "Scene": "planarfriction.scenes",
+    "Signal": "planarfriction.scenes",
+    "SoftFinger": "planarfriction.patch",
+    "Solution": "planarfriction.scenes",
+    "load": "planarfriction.scenes",
+    "simulate": "planarfriction.scenes",
+}
+_MODULES = ("errors", "formulas", "geometry", "laws", "limit_surface", "models", "patch", "plots", "scenes", "solvers")
+
+__all__ = [*_HOME, *_MODULES]
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOME:
+        value = getattr(importlib.import_module(_HOME[name]), name)
+    elif name in _MODULES:
+        value = importlib.import_module(f"planarfriction.{name}")
+    else:
+        raise AttributeError(f"module 'planarfriction' has no attribute {name!r}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted([*globals(), *__all__])
+
+
+if TYPE_CHECKING:
+    from planarfriction.errors import FrictionError
+    from planarfriction.laws import Coulomb, ElastoPlastic, LuGre
+    from planarfriction.limit_surface import (
+        LimitSurfaceCells,
+        LimitSurfaceEllipsoid,
+        LimitSurfaceTable,
+        LimitSurfaceTablePublished,
+    )
+    from planarfriction.models import DistributedModel, ReducedModelPublished
+    from planarfriction.patch import ContactPatch, SoftFinger
+    from planarfriction.scenes import Body, Contact, Scene, Signal, Solution, load, simulate

@@ -1,0 +1,41 @@
+"""Planar rigid motions: twists `(vx, vy, omega)` and wrenches `(fx, fy, tau)` moved between points and frames.
+
+All functions broadcast over leading axes; the last axis has length 3 (or 2 for points). SI units.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def twist_at(twist, offset) -> np.ndarray:
+    """Twist at the point displaced by `offset` [m] from the reference point.
+
+    `vx' = vx - omega dy`, `vy' = vy + omega dx`, `omega' = omega`; shapes `[..., 3]` and `[..., 2]`.
+    """
+    twist, offset = np.asarray(twist, dtype=float), np.asarray(offset, dtype=float)
+    omega = twist[..., 2]
+    return np.stack(
+        np.broadcast_arrays(twist[..., 0] - omega * offset[..., 1], twist[..., 1] + omega * offset[..., 0], omega), -1
+    )
+
+
+def wrench_at(wrench, offset) -> np.ndarray:
+    """Wrench about the point displaced by `offset` [m] from the reference point.
+
+    `tau' = tau - (dx fy - dy fx)`; forces stay. `wrench . twist` is the same at every point.
+    """
+    wrench, offset = np.asarray(wrench, dtype=float), np.asarray(offset, dtype=float)
+    fx, fy = wrench[..., 0], wrench[..., 1]
+    return np.stack(
+        np.broadcast_arrays(fx, fy, wrench[..., 2] - (offset[..., 0] * fy - offset[..., 1] * fx)), -1
+    )
+
+
+def rotate(vector, angle) -> np.ndarray:
+    """Rotate the first two components of a twist, wrench or point by `angle` [rad], counter-clockwise."""
+    vector, angle = np.asarray(vector, dtype=float), np.asarray(angle, dtype=float)
+    c, s = np.cos(angle), np.sin(angle)
+    x, y = vector[..., 0], vector[..., 1]
+    turned = np.broadcast_arrays(c * x - s * y, s * x + c * y, *(vector[..., i] for i in range(2, vector.shape[-1])))
+    return np.stack(turned, -1)
