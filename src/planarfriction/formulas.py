@@ -1,0 +1,96 @@
+"""The physics, once: every formula as `f(xp, ...)` for scalars and for tensors.
+
+`xp` is the namespace that supplies `exp`, `sin`, `cos`, `power`, `where`, `minimum` and `maximum`: NumPy, torch and
+jax.numpy pass themselves, compiled loops pass `planarfriction.kernels.compiled_math`. A formula is assignments and one
+return; it has no loop and no branch. Symbols as in Waltersson and Karayiannidis 2024 ("the paper").
+
+A bristle is a vector `z` driven by a velocity `u`, of any dimension: two for a cell of the distributed model
+(`u = v`), three for the reduced model (`u = h(V) v_n`). The formulas see only norms and projections:
+
+- `z_norm = |z|`, `speed`, `along = z/|z| . u/|u| speed` (the speed at which the bristle is being stretched).
+"""
+
+from __future__ import annotations
+
+import math
+
+
+def stribeck(xp, speed, mu_c, mu_s, v_s, gamma):
+    """Friction coefficient in steady sliding, `g = mu_c + (mu_s - mu_c) exp(-|v/v_s|^gamma)` [-]."""
+    return mu_c + (mu_s - mu_c) * xp.exp(-xp.power(speed / v_s, gamma))
+
+
+def stribeck_slope(xp, speed, mu_c, mu_s, v_s, gamma):
+    """Derivative `dg/d|v|` [s/m]; at rest the right-hand limit, finite for `gamma >= 1` (zero where it has none)."""
+    ratio = speed / v_s
+    safe = xp.where(ratio > 0.0, ratio, 1.0)
+    at_rest = xp.where(gamma == 1.0, 1.0, 0.0)
+    steepness = xp.where(ratio > 0.0, xp.power(safe, gamma) / safe, at_rest)
+    return -(mu_s - mu_c) * gamma / v_s * steepness * xp.exp(-xp.power(ratio, gamma))
+
+
+def slip_fraction(xp, deflection, breakaway_ratio):
+    """Elasto-plastic `alpha(|z|)` [-] of the relative deflection `|z|/z_max`: 0 below breakaway, 1 at full deflection."""
+    phase = (deflection - 0.5 * (1.0 + breakaway_ratio)) / (1.0 - breakaway_ratio)
+    return 0.5 + 0.5 * xp.sin(math.pi * xp.minimum(xp.maximum(phase, -0.5), 0.5))
+
+
+def slip_fraction_slope(xp, deflection, breakaway_ratio):
+    """Derivative of `alpha` with respect to `|z|/z_max` [-]."""
+    phase = (deflection - 0.5 * (1.0 + breakaway_ratio)) / (1.0 - breakaway_ratio)
+    clipped = xp.minimum(xp.maximum(phase, -0.5), 0.5)
+    return 0.5 * math.pi / (1.0 - breakaway_ratio) * xp.cos(math.pi * clipped)
+
+
+def bristle_decay(xp, z_norm, along, speed, z_max, strength, elasto_plastic, breakaway_ratio):
+    """Rate `k = beta sigma_0 |v| / g` [1/s] of `zdot = u - k z`.
+
+    `beta |v| = alpha (|v| + z.v/|z|) / 2` for elasto-plastic bristles, `|v|` for plain LuGre (`elasto_plastic` is 1.0 or
+    0.0); `z_max` is the largest deflection, `strength` is `g / sigma_0`.
+    """
+    alpha = slip_fraction(xp, z_norm / z_max, breakaway_ratio)
+    return xp.where(elasto_plastic > 0.0, 0.5 * alpha * (speed + along), speed) / strength
+
+
+def bristle_decay_partials(xp, z_norm, along, speed, z_max, strength, elasto_plastic, breakaway_ratio):
+    """`k` and its partial derivatives with respect to `|z|`, `along`, `speed`, `z_max` and `strength`."""
+    deflection = z_norm / z_max
+    alpha = slip_fraction(xp, deflection, breakaway_ratio)
+    slope = slip_fraction_slope(xp, deflection, breakaway_ratio)
+    stretch = 0.5 * (speed + along) / strength
+    k = xp.where(elasto_plastic > 0.0, alpha * stretch, speed / strength)
+    k_z_norm = xp.where(elasto_plastic > 0.0, slope * stretch / z_max, 0.0)
+    k_along = xp.where(elasto_plastic > 0.0, 0.5 * alpha / strength, 0.0)
+    k_speed = xp.where(elasto_plastic > 0.0, 0.5 * alpha / strength, 1.0 / strength)
+    return k, k_z_norm, k_along, k_speed, -k_z_norm * deflection, -k / strength
+
+
+def traction(z, zdot, velocity, sigma_0, sigma_1, sigma_2):
+    """Friction per unit normal load on the moving body, `-(sigma_0 z + sigma_1 zdot + sigma_2 v)`, per component."""
+    return -(sigma_0 * z + sigma_1 * zdot + sigma_2 * velocity)
+
+
+def relaxation(xp, decay_dt):
+    """`exp(-x)` and `(1 - exp(-x))/x` of `x = k dt >= 0`: the exact step of `zdot = u - k z` for a held `k` and `u`.
+
+    Below `x = 1e-3` the quotient is its series, exact to 1e-16 there, where the difference would cancel.
+    """
+    remaining = xp.exp(-decay_dt)
+    safe = xp.where(decay_dt > 1e-3, decay_dt, 1.0)
+    series = 1.0 - decay_dt * (0.5 - decay_dt * (1.0 / 6.0 - decay_dt * (1.0 / 24.0 - decay_dt / 120.0)))
+    return remaining, xp.where(decay_dt > 1e-3, (1.0 - remaining) / safe, series)
+
+
+def reachable_deflection(xp, z_norm, z_max, elasto_plastic):
+    """Largest deflection that a step may end with: an elasto-plastic bristle never grows past `max(|z|, z_max)`.
+
+    The exact solution stays in that ball, so bringing a step back onto it cannot enlarge the error. Plain LuGre needs
+    no bound: its step is exact.
+    """
+    return xp.where(elasto_plastic > 0.0, xp.maximum(z_norm, z_max), math.inf)
+
+
+def cap(xp, z_norm, largest):
+    """Factor `min(1, largest/|z|)` that brings a bristle back onto the ball of radius `largest`, direction kept."""
+    over = z_norm > largest
+    return xp.where(over, largest / xp.where(over, z_norm, 1.0), 1.0)

@@ -1,0 +1,45 @@
+"""Compiled loops: nothing but loops around the formulas, compiled once and cached on disk."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import inspect
+from pathlib import Path
+
+from numba import njit
+from numba.extending import register_jitable
+
+from planarfriction import formulas
+
+_OPTIONS = {"error_model": "numpy", "fastmath": {"reassoc", "contract", "nsz", "arcp"}}
+
+jit = functools.partial(njit, cache=True, **_OPTIONS)
+"""Compile a loop: sums over cells may be reordered, so that they vectorise; NaN and infinity keep their meaning."""
+
+for _name, _formula in inspect.getmembers(formulas, inspect.isfunction):
+    register_jitable(forceinline=True, **_OPTIONS)(_formula)
+
+
+def _forget_stale_code() -> None:
+    """Drop cached machine code when any source it was made from has changed.
+
+    Numba looks only at the file of the cached function itself, not at the formulas and kernels that it calls.
+    """
+    here = Path(__file__).parent
+    sources = [Path(formulas.__file__), *sorted(here.glob("*.py"))]
+    digest = hashlib.sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()
+    stamp = here / "__pycache__" / "kernels.sha256"
+    try:
+        if stamp.exists() and stamp.read_text() == digest:
+            return
+        for pattern in ("*.nbi", "*.nbc"):
+            for cached in stamp.parent.glob(pattern):
+                cached.unlink()
+        stamp.parent.mkdir(exist_ok=True)
+        stamp.write_text(digest)
+    except OSError:  # a read-only installation is compiled into the user's own cache and never edited in place
+        return
+
+
+_forget_stale_code()

@@ -1,0 +1,143 @@
+"""The `xp` of compiled loops: scalar functions without calls and branches, so that loops over cells become vector code.
+
+The C library's `exp` and `sin` keep the compiler from vectorising a loop; these polynomials do not (measured on 317
+cells: a third of the time). Each states its domain and error; the tests check both.
+"""
+
+from __future__ import annotations
+
+import math
+
+from llvmlite import ir
+from numba import njit, types
+from numba.extending import intrinsic
+
+# Not `reassoc`: the two-part constants of the argument reductions rely on the order of operations.
+_inline = njit(error_model="numpy", fastmath={"contract"}, forceinline=True)
+
+_LOG2_E = 1.4426950408889634
+_LN2_HIGH = 6.93147180369123816490e-01  # the first 33 bits of ln 2: k * _LN2_HIGH is exact
+_LN2_LOW = 1.90821492927058770002e-10
+_EXP_LARGEST = 708.0  # beyond it the result leaves the range of normal doubles
+
+
+@intrinsic
+def _bits_to_float(typingctx, bits):
+    """Reinterpret the 64 bits of an integer as a double."""
+    return types.float64(types.int64), lambda context, builder, signature, args: builder.bitcast(
+        args[0], ir.DoubleType()
+    )
+
+
+@intrinsic
+def _float_to_bits(typingctx, x):
+    """Reinterpret the 64 bits of a double as an integer."""
+    return types.int64(types.float64), lambda context, builder, signature, args: builder.bitcast(
+        args[0], ir.IntType(64)
+    )
+
+
+@_inline
+def where(condition, a, b):
+    """`a` where the condition holds, else `b`."""
+    return a if condition else b
+
+
+@_inline
+def minimum(a, b):
+    """The smaller of two numbers."""
+    return a if a < b else b
+
+
+@_inline
+def maximum(a, b):
+    """The larger of two numbers."""
+    return a if a > b else b
+
+
+@_inline
+def exp(x):
+    """`e^x`, relative error below 4e-16, argument limited to +-708."""
+    x = minimum(maximum(x, -_EXP_LARGEST), _EXP_LARGEST)
+    k = math.floor(x * _LOG2_E + 0.5)
+    r = (x - k * _LN2_HIGH) - k * _LN2_LOW
+    p = 1.0 / 6227020800.0
+    p = p * r + 1.0 / 479001600.0
+    p = p * r + 1.0 / 39916800.0
+    p = p * r + 1.0 / 3628800.0
+    p = p * r + 1.0 / 362880.0
+    p = p * r + 1.0 / 40320.0
+    p = p * r + 1.0 / 5040.0
+    p = p * r + 1.0 / 720.0
+    p = p * r + 1.0 / 120.0
+    p = p * r + 1.0 / 24.0
+    p = p * r + 1.0 / 6.0
+    p = p * r + 0.5
+    p = p * r + 1.0
+    p = p * r + 1.0
+    return p * _bits_to_float((types.int64(k) + 1023) << 52)
+
+
+@_inline
+def log(x):
+    """Natural logarithm of a normal double x > 0, relative error below 1e-15; about -709 at x = 0."""
+    bits = _float_to_bits(x)
+    exponent = (bits >> 52) - 1023
+    mantissa = _bits_to_float((bits & 0x000FFFFFFFFFFFFF) | 0x3FF0000000000000)
+    high = mantissa > 1.4142135623730951
+    m = 0.5 * mantissa if high else mantissa
+    k = float(exponent + 1 if high else exponent)
+    s = (m - 1.0) / (m + 1.0)
+    q = s * s
+    p = 1.0 / 21.0
+    p = p * q + 1.0 / 19.0
+    p = p * q + 1.0 / 17.0
+    p = p * q + 1.0 / 15.0
+    p = p * q + 1.0 / 13.0
+    p = p * q + 1.0 / 11.0
+    p = p * q + 1.0 / 9.0
+    p = p * q + 1.0 / 7.0
+    p = p * q + 1.0 / 5.0
+    p = p * q + 1.0 / 3.0
+    return k * _LN2_HIGH + (k * _LN2_LOW + 2.0 * s * (1.0 + q * p))
+
+
+@_inline
+def power(x, exponent):
+    """`x^exponent` for x >= 0; the square, the usual Stribeck exponent, is exact."""
+    if exponent == 2.0:
+        return x * x
+    return exp(exponent * log(x))
+
+
+@_inline
+def sin(x):
+    """Sine for |x| <= pi/2, absolute error below 3e-16."""
+    q = x * x
+    p = -1.0 / 121645100408832000.0
+    p = p * q + 1.0 / 355687428096000.0
+    p = p * q - 1.0 / 1307674368000.0
+    p = p * q + 1.0 / 6227020800.0
+    p = p * q - 1.0 / 39916800.0
+    p = p * q + 1.0 / 362880.0
+    p = p * q - 1.0 / 5040.0
+    p = p * q + 1.0 / 120.0
+    p = p * q - 1.0 / 6.0
+    return x + x * (q * p)
+
+
+@_inline
+def cos(x):
+    """Cosine for |x| <= pi/2, absolute error below 3e-16."""
+    q = x * x
+    p = 1.0 / 2432902008176640000.0
+    p = p * q - 1.0 / 6402373705728000.0
+    p = p * q + 1.0 / 20922789888000.0
+    p = p * q - 1.0 / 87178291200.0
+    p = p * q + 1.0 / 479001600.0
+    p = p * q - 1.0 / 3628800.0
+    p = p * q + 1.0 / 40320.0
+    p = p * q - 1.0 / 720.0
+    p = p * q + 1.0 / 24.0
+    p = p * q - 0.5
+    return 1.0 + q * p

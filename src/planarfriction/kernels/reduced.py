@@ -1,0 +1,200 @@
+"""The reduced model: one bristle in three dimensions, per unit normal load and about the contact frame's origin.
+
+The raw state `z` [m, m, m^2] is `S z_hat` with `S = diag(1, 1, r)`; in scaled coordinates the bristle obeys the equation
+of a cell, `z_hat' = u - k z_hat`, driven by `u = h(V) v_n` instead of `v` and with `z_max = |h| g/sigma_0`:
+
+    d z_hat'/dz_hat = -k I - z_hat (x) k_z,      d z_hat'/dV_S = du/dV_S - z_hat (x) k_V
+
+`shape` is `(cop_x, cop_y, r, <rho^2>)`; `surface` is `(kind, start, size)` of `kernels.surfaces`.
+"""
+
+from __future__ import annotations
+
+import math
+
+from planarfriction import formulas
+from planarfriction.kernels import compiled_math as xp
+from planarfriction.kernels import jit
+from planarfriction.kernels.law import strength, strength_slope
+from planarfriction.kernels.surfaces import sliding, sliding_jacobian
+
+
+@jit
+def _scaled_twist(shape, vx, vy, omega):
+    return vx - omega * shape[1], vy + omega * shape[0], shape[2] * omega
+
+
+@jit
+def _wrench(law, shape, zx, zy, zt, dx, dy, dt, vx, vy, omega):
+    """Wrench about the origin, from raw bristles and rates and the twist at the centre of pressure."""
+    fx = formulas.traction(zx, dx, vx, law.sigma_0, law.sigma_1, law.sigma_2)
+    fy = formulas.traction(zy, dy, vy, law.sigma_0, law.sigma_1, law.sigma_2)
+    tau = formulas.traction(zt, dt, shape[3] * omega, law.sigma_0, law.sigma_1, law.sigma_2)
+    return fx, fy, tau + shape[0] * fy - shape[1] * fx
+
+
+@jit
+def _decay(law, zx, zy, zs, ux, uy, us, v_n):
+    """`k` of the scaled bristle `(zx, zy, zs)` driven by `u`."""
+    u_norm = math.sqrt(ux * ux + uy * uy + us * us)
+    h_norm = u_norm / v_n if v_n > 0.0 else 1.0
+    z_norm = math.sqrt(zx * zx + zy * zy + zs * zs)
+    along = (zx * ux + zy * uy + zs * us) / xp.where(z_norm * h_norm > 0.0, z_norm * h_norm, 1.0)
+    g = strength(law, law.gamma, v_n)
+    return formulas.bristle_decay(xp, z_norm, along, v_n, h_norm * g, g, law.elasto_plastic, law.breakaway_ratio)
+
+
+@jit
+def evaluate(law, z, vx, vy, omega, shape, surface, data, zdot):
+    """Write the raw bristle rates into `zdot` and return the wrench `(fx, fy, tau)`."""
+    x, y, s = _scaled_twist(shape, vx, vy, omega)
+    v_n = math.sqrt(x * x + y * y + s * s)
+    ux, uy, us = sliding(surface[0], data, surface[1], surface[2], x, y, s)
+    k = _decay(law, z[0], z[1], z[2] / shape[2], ux, uy, us, v_n)
+    zdot[0], zdot[1], zdot[2] = ux - k * z[0], uy - k * z[1], shape[2] * us - k * z[2]
+    return _wrench(law, shape, z[0], z[1], z[2], zdot[0], zdot[1], zdot[2], x, y, omega)
+
+
+@jit
+def linearise(law, z, vx, vy, omega, shape, surface, data, lin):
+    """Write into `lin`: `k` (0), `k_z` (1:4), `z_hat` (4:7) and `d z_hat'/dV_S` (7:16, row by row)."""
+    x, y, s = _scaled_twist(shape, vx, vy, omega)
+    v_n = math.sqrt(x * x + y * y + s * s)
+    per_v = 1.0 / v_n if v_n > 0.0 else 0.0
+    ux, uy, us = sliding(surface[0], data, surface[1], surface[2], x, y, s)
+    j = sliding_jacobian(surface[0], data, surface[1], surface[2], x, y, s)
+    zx, zy, zs = z[0], z[1], z[2] / shape[2]
+    u_norm = math.sqrt(ux * ux + uy * uy + us * us)
+    h_norm = u_norm * per_v if u_norm > 0.0 else 1.0
+    z_norm = math.sqrt(zx * zx + zy * zy + zs * zs)
+    per_z = 1.0 / z_norm if z_norm > 0.0 else 0.0
+    per_u = 1.0 / u_norm if u_norm > 0.0 else 0.0
+    per_h = 1.0 / h_norm
+    ex, ey, es = zx * per_z, zy * per_z, zs * per_z
+    qx, qy, qs = ux * per_h, uy * per_h, us * per_h  # v_n times the unit vector of h
+    along = ex * qx + ey * qy + es * qs
+    g, g_slope = strength(law, law.gamma, v_n), strength_slope(law, law.gamma, v_n)
+    k, k_z_norm, k_along, k_speed, k_z_max, k_strength = formulas.bristle_decay_partials(
+        xp, z_norm, along, v_n, h_norm * g, g, law.elasto_plastic, law.breakaway_ratio
+    )
+    lin[0] = k
+    c = k_along * per_z
+    lin[1] = k_z_norm * ex + c * (qx - along * ex)
+    lin[2] = k_z_norm * ey + c * (qy - along * ey)
+    lin[3] = k_z_norm * es + c * (qs - along * es)
+    lin[4], lin[5], lin[6] = zx, zy, zs
+    # gradients with respect to V_S: of v_n, of |h|, and of `along` = e.u/|h|
+    speed_total = k_speed + (k_strength + k_z_max * h_norm) * g_slope
+    for m in range(3):
+        n_m = (x if m == 0 else (y if m == 1 else s)) * per_v
+        u_m = (ux * j[m] + uy * j[3 + m] + us * j[6 + m]) * per_u  # of |u|
+        h_m = (u_m - h_norm * n_m) * per_v
+        along_m = (ex * j[m] + ey * j[3 + m] + es * j[6 + m] - along * h_m) * per_h
+        k_m = speed_total * n_m + k_z_max * g * h_m + k_along * along_m
+        lin[7 + m] = j[m] - zx * k_m
+        lin[10 + m] = j[3 + m] - zy * k_m
+        lin[13 + m] = j[6 + m] - zs * k_m
+
+
+@jit
+def _solve(lin, shift, ax, ay, a_s):
+    """`D^-1 a` in scaled coordinates, `D = (shift + k) I + z_hat (x) k_z`."""
+    diagonal = shift + lin[0]
+    c = (lin[1] * ax + lin[2] * ay + lin[3] * a_s) / (
+        diagonal + lin[1] * lin[4] + lin[2] * lin[5] + lin[3] * lin[6]
+    )
+    return (ax - c * lin[4]) / diagonal, (ay - c * lin[5]) / diagonal, (a_s - c * lin[6]) / diagonal
+
+
+@jit
+def factor(law, shift, shape, lin, stiffness):
+    """Write `d wrench/d twist` with the bristle eliminated: `-(sigma_0 + sigma_1 shift) S D^-1 F S - sigma_2 U`."""
+    pull = law.sigma_0 + law.sigma_1 * shift
+    r = shape[2]
+    for m in range(3):
+        scale = r if m == 2 else 1.0
+        bx, by, bs = _solve(lin, shift, lin[7 + m], lin[10 + m], lin[13 + m])
+        stiffness[0, m] = -pull * scale * bx
+        stiffness[1, m] = -pull * scale * by
+        stiffness[2, m] = -pull * scale * r * bs
+    stiffness[0, 0] -= law.sigma_2
+    stiffness[1, 1] -= law.sigma_2
+    stiffness[2, 2] -= law.sigma_2 * shape[3]
+    # from the centre of pressure to the origin: T' stiffness T
+    cx, cy = shape[0], shape[1]
+    for m in range(3):
+        stiffness[m, 2] += cx * stiffness[m, 1] - cy * stiffness[m, 0]
+    for m in range(3):
+        stiffness[2, m] += cx * stiffness[1, m] - cy * stiffness[0, m]
+
+
+@jit
+def eliminate(law, shift, r, shape, lin):
+    """Wrench about the origin caused by the raw bristle residual `r`."""
+    pull = law.sigma_0 + law.sigma_1 * shift
+    bx, by, bs = _solve(lin, shift, r[0], r[1], r[2] / shape[2])
+    fx, fy = law.sigma_1 * r[0] - pull * bx, law.sigma_1 * r[1] - pull * by
+    tau = law.sigma_1 * r[2] - pull * shape[2] * bs
+    return fx, fy, tau + shape[0] * fy - shape[1] * fx
+
+
+@jit
+def back_substitute(shift, r, vx, vy, omega, shape, lin, out):
+    """Solve `D out = r + d zdot/dV dV` for the change of the twist about the origin."""
+    x, y, s = _scaled_twist(shape, vx, vy, omega)
+    out[0], out[1], bs = _solve(
+        lin,
+        shift,
+        r[0] + lin[7] * x + lin[8] * y + lin[9] * s,
+        r[1] + lin[10] * x + lin[11] * y + lin[12] * s,
+        r[2] / shape[2] + lin[13] * x + lin[14] * y + lin[15] * s,
+    )
+    out[2] = shape[2] * bs
+
+
+@jit
+def step(law, z, vx, vy, omega, shape, surface, data, dt, out):
+    """Advance the bristle by `dt` at a held twist (see `formulas.relaxation`) and return the wrench at the end."""
+    x, y, s = _scaled_twist(shape, vx, vy, omega)
+    r = shape[2]
+    v_n = math.sqrt(x * x + y * y + s * s)
+    ux, uy, us = sliding(surface[0], data, surface[1], surface[2], x, y, s)
+    zx, zy, zs = z[0], z[1], z[2] / r
+    u_norm = math.sqrt(ux * ux + uy * uy + us * us)
+    h_norm = u_norm / v_n if v_n > 0.0 else 1.0
+    per_h = 1.0 / h_norm
+    g = strength(law, law.gamma, v_n)
+    z_max = h_norm * g
+    z_norm = math.sqrt(zx * zx + zy * zy + zs * zs)
+    largest = formulas.reachable_deflection(xp, z_norm, z_max, law.elasto_plastic)
+    along = per_h * (zx * ux + zy * uy + zs * us) / xp.where(z_norm > 0.0, z_norm, 1.0)
+    k0 = formulas.bristle_decay(xp, z_norm, along, v_n, z_max, g, law.elasto_plastic, law.breakaway_ratio)
+    left, mean = formulas.relaxation(xp, k0 * dt)
+    px, py, ps = zx * left + ux * dt * mean, zy * left + uy * dt * mean, zs * left + us * dt * mean
+    p_norm = math.sqrt(px * px + py * py + ps * ps)
+    p_along = per_h * (px * ux + py * uy + ps * us) / xp.where(p_norm > 0.0, p_norm, 1.0)
+    p_norm *= formulas.cap(xp, p_norm, largest)
+    k1 = formulas.bristle_decay(xp, p_norm, p_along, v_n, z_max, g, law.elasto_plastic, law.breakaway_ratio)
+    left, mean = formulas.relaxation(xp, 0.5 * (k0 + k1) * dt)
+    nx, ny, ns = zx * left + ux * dt * mean, zy * left + uy * dt * mean, zs * left + us * dt * mean
+    n_norm = math.sqrt(nx * nx + ny * ny + ns * ns)
+    n_along = per_h * (nx * ux + ny * uy + ns * us) / xp.where(n_norm > 0.0, n_norm, 1.0)
+    back = formulas.cap(xp, n_norm, largest)
+    nx, ny, ns = nx * back, ny * back, ns * back
+    k = formulas.bristle_decay(
+        xp, n_norm * back, n_along, v_n, z_max, g, law.elasto_plastic, law.breakaway_ratio
+    )
+    out[0], out[1], out[2] = nx, ny, r * ns
+    return _wrench(
+        law, shape, nx, ny, r * ns, ux - k * nx, uy - k * ny, r * (us - k * ns), x, y, omega
+    )
+
+
+@jit
+def step_batch(law, z, twist, shape, surface, data, load, dt, out, wrench):
+    """`step` for a batch: `z`, `twist`, `out`, `wrench` [B, 3], `load`, `dt` [B]; one shape and surface for all."""
+    for b in range(z.shape[0]):
+        fx, fy, tau = step(
+            law, z[b], twist[b, 0], twist[b, 1], twist[b, 2], shape, surface, data, dt[b], out[b]
+        )
+        wrench[b, 0], wrench[b, 1], wrench[b, 2] = load[b] * fx, load[b] * fy, load[b] * tau

@@ -1,0 +1,273 @@
+"""Evaluation of limit surfaces in compiled loops: `u = h(V) |V_S|` and its Jacobian for a scaled twist `V_S`.
+
+`V_S = (vx, vy, r omega)` at the centre of pressure; `h` is the direction of the friction wrench with its sign reversed and
+its torque divided by `r`. `u` is homogeneous of degree 1 in `V_S` and zero at rest. A surface is a kind, and numbers in
+a flat array from `start` on; `size` is the number of segments of a quadrant (tables) or of cells:
+
+- `BILINEAR`: nodes `[size + 1, 4 size + 1, 4]` over polar angle (from the spin axis) and azimuth: `h`, and a spare;
+- `POTENTIAL`: nodes of the same shape: `phi`, `d phi/d polar`, `d phi/d azimuth` and the mixed derivative, where the
+  dissipation is `|V_S| phi(direction)`, so that `h` is exactly its gradient;
+- `ELLIPSOID`: no numbers, `u = V_S`;
+- `CELLS`: rows x / r, y / r, w of the cells.
+"""
+
+from __future__ import annotations
+
+import math
+
+from planarfriction.kernels import jit
+
+BILINEAR, POTENTIAL, ELLIPSOID, CELLS = 0, 1, 2, 3
+
+# Nearer to the spin axis [rad], the polar derivatives differ from their limit by less than the interpolation error.
+_AXIS = 1e-8
+
+_IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+
+
+@jit
+def _place(size, x, y, s):
+    """Table coordinates of a direction with `s >= 0`: polar and azimuth cell, position within it, and the angles."""
+    segment = 0.5 * math.pi / size
+    polar = math.atan2(math.sqrt(x * x + y * y), s)
+    azimuth = math.atan2(y, x)
+    if azimuth < 0.0:
+        azimuth += 2.0 * math.pi
+    i = min(int(polar / segment), size - 1)
+    j = min(int(azimuth / segment), 4 * size - 1)
+    return i, j, polar / segment - i, azimuth / segment - j, polar, azimuth
+
+
+@jit
+def _corners(data, p, row, a, b):
+    """Bilinear value of one component and its differences along the polar angle and the azimuth."""
+    low = data[p] + b * (data[p + 4] - data[p])
+    high = data[p + row] + b * (data[p + row + 4] - data[p + row])
+    left = data[p] + a * (data[p + row] - data[p])
+    right = data[p + 4] + a * (data[p + row + 4] - data[p + 4])
+    return low + a * (high - low), high - low, right - left
+
+
+@jit
+def _bilinear(data, start, size, x, y, s, speed):
+    i, j, a, b, _, _ = _place(size, x, y, s)
+    row = 4 * (4 * size + 1)
+    p = start + i * row + 4 * j
+    hx, hy, hs = _corners(data, p, row, a, b)[0], _corners(data, p + 1, row, a, b)[0], _corners(data, p + 2, row, a, b)[0]
+    return hx * speed, hy * speed, hs * speed
+
+
+@jit
+def _bilinear_jacobian(data, start, size, x, y, s, speed):
+    i, j, a, b, polar, azimuth = _place(size, x, y, s)
+    row = 4 * (4 * size + 1)
+    p = start + i * row + 4 * j
+    per_segment = size / (0.5 * math.pi)
+    sin_p, cos_p, sin_a, cos_a = math.sin(polar), math.cos(polar), math.sin(azimuth), math.cos(azimuth)
+    per_azimuth = per_segment / max(sin_p, _AXIS)
+    px, py, ps = per_segment * cos_p * cos_a, per_segment * cos_p * sin_a, -per_segment * sin_p
+    ax, ay = -per_azimuth * sin_a, per_azimuth * cos_a
+    nx, ny, ns = x / speed, y / speed, s / speed
+    hx, p_x, a_x = _corners(data, p, row, a, b)
+    hy, p_y, a_y = _corners(data, p + 1, row, a, b)
+    hs, p_s, a_s = _corners(data, p + 2, row, a, b)
+    return (
+        hx * nx + p_x * px + a_x * ax,
+        hx * ny + p_x * py + a_x * ay,
+        hx * ns + p_x * ps,
+        hy * nx + p_y * px + a_y * ax,
+        hy * ny + p_y * py + a_y * ay,
+        hy * ns + p_y * ps,
+        hs * nx + p_s * px + a_s * ax,
+        hs * ny + p_s * py + a_s * ay,
+        hs * ns + p_s * ps,
+    )
+
+
+@jit
+def _hermite(t):
+    """Cubic Hermite basis on [0, 1]: values, first and second derivatives; order value 0, value 1, slope 0, slope 1."""
+    u = 1.0 - t
+    value = ((1.0 + 2.0 * t) * u * u, t * t * (3.0 - 2.0 * t), t * u * u, -t * t * u)
+    first = (-6.0 * t * u, 6.0 * t * u, u * (1.0 - 3.0 * t), t * (3.0 * t - 2.0))
+    second = (12.0 * t - 6.0, 6.0 - 12.0 * t, 6.0 * t - 4.0, 6.0 * t - 2.0)
+    return value, first, second
+
+
+@jit
+def _blend(data, p, row, segment, a, b):
+    """Bicubic value from the basis `a` along the polar angle and `b` along the azimuth."""
+    total = 0.0
+    for i in range(2):
+        for j in range(2):
+            q = p + i * row + 4 * j
+            total += (
+                a[i] * b[j] * data[q]
+                + a[i + 2] * b[j] * segment * data[q + 1]
+                + a[i] * b[j + 2] * segment * data[q + 2]
+                + a[i + 2] * b[j + 2] * segment * segment * data[q + 3]
+            )
+    return total
+
+
+@jit
+def _potential(data, start, size, x, y, s, speed):
+    i, j, a, b, polar, azimuth = _place(size, x, y, s)
+    row = 4 * (4 * size + 1)
+    p = start + i * row + 4 * j
+    segment = 0.5 * math.pi / size
+    av, af, _ = _hermite(a)
+    bv, bf, _ = _hermite(b)
+    phi = _blend(data, p, row, segment, av, bv)
+    d_polar = _blend(data, p, row, segment, af, bv) / segment
+    d_azimuth = _blend(data, p, row, segment, av, bf) / segment
+    sin_p, cos_p = math.sin(polar), math.cos(polar)
+    sin_a, cos_a = math.sin(azimuth), math.cos(azimuth)
+    across = d_azimuth / max(sin_p, _AXIS)
+    radial = phi * sin_p + d_polar * cos_p
+    return (
+        speed * (radial * cos_a - across * sin_a),
+        speed * (radial * sin_a + across * cos_a),
+        speed * (phi * cos_p - d_polar * sin_p),
+    )
+
+
+@jit
+def _potential_jacobian(data, start, size, x, y, s, speed):
+    i, j, a, b, polar, azimuth = _place(size, x, y, s)
+    row = 4 * (4 * size + 1)
+    p = start + i * row + 4 * j
+    segment = 0.5 * math.pi / size
+    av, af, a2 = _hermite(a)
+    bv, bf, b2 = _hermite(b)
+    phi = _blend(data, p, row, segment, av, bv)
+    d_p = _blend(data, p, row, segment, af, bv) / segment
+    d_a = _blend(data, p, row, segment, av, bf) / segment
+    d_pp = _blend(data, p, row, segment, a2, bv) / segment**2
+    d_pa = _blend(data, p, row, segment, af, bf) / segment**2
+    d_aa = _blend(data, p, row, segment, av, b2) / segment**2
+    sin_p, cos_p = max(math.sin(polar), _AXIS), math.cos(polar)
+    sin_a, cos_a = math.sin(azimuth), math.cos(azimuth)
+    nx, ny, ns = x / speed, y / speed, s / speed
+    px, py, ps = cos_p * cos_a, cos_p * sin_a, -sin_p  # unit vector of growing polar angle
+    ax, ay = -sin_a, cos_a  # unit vector of growing azimuth
+    across = d_a / sin_p
+    hx = phi * nx + d_p * px + across * ax
+    hy = phi * ny + d_p * py + across * ay
+    hs = phi * ns + d_p * ps
+    m_pp = phi + d_pp
+    m_pa = (d_pa - d_a * cos_p / sin_p) / sin_p
+    m_aa = phi + (d_p * cos_p + d_aa / sin_p) / sin_p
+    return (
+        hx * nx + m_pp * px * px + m_pa * (px * ax + ax * px) + m_aa * ax * ax,
+        hx * ny + m_pp * px * py + m_pa * (px * ay + ax * py) + m_aa * ax * ay,
+        hx * ns + m_pp * px * ps + m_pa * ax * ps,
+        hy * nx + m_pp * py * px + m_pa * (py * ax + ay * px) + m_aa * ay * ax,
+        hy * ny + m_pp * py * py + m_pa * (py * ay + ay * py) + m_aa * ay * ay,
+        hy * ns + m_pp * py * ps + m_pa * ay * ps,
+        hs * nx + m_pp * ps * px + m_pa * ps * ax,
+        hs * ny + m_pp * ps * py + m_pa * ps * ay,
+        hs * ns + m_pp * ps * ps,
+    )
+
+
+@jit
+def _cells(data, start, size, x, y, s, speed):
+    hx, hy, hs = 0.0, 0.0, 0.0
+    for i in range(size):
+        px, py, w = data[start + i], data[start + size + i], data[start + 2 * size + i]
+        ux, uy = x - s * py, y + s * px
+        norm = math.sqrt(ux * ux + uy * uy)
+        c = w / norm if norm > 0.0 else 0.0
+        hx += c * ux
+        hy += c * uy
+        hs += c * (px * uy - py * ux)
+    return hx * speed, hy * speed, hs * speed
+
+
+@jit
+def _cells_jacobian(data, start, size, x, y, s, speed):
+    hx, hy, hs = 0.0, 0.0, 0.0
+    xx, xy, xs, yy, ys, ss = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for i in range(size):
+        px, py, w = data[start + i], data[start + size + i], data[start + 2 * size + i]
+        ux, uy = x - s * py, y + s * px
+        norm = math.sqrt(ux * ux + uy * uy)
+        c = 1.0 / norm if norm > 0.0 else 0.0
+        ex, ey = c * ux, c * uy
+        lever = px * ey - py * ex
+        hx += w * ex
+        hy += w * ey
+        hs += w * lever
+        # w/|v| P' (I - e e') P with (I - e e') = t t', t normal to e
+        tx, ty = -ey, ex
+        ts = px * ty - py * tx
+        c *= w
+        xx += c * tx * tx
+        xy += c * tx * ty
+        xs += c * tx * ts
+        yy += c * ty * ty
+        ys += c * ty * ts
+        ss += c * ts * ts
+    nx, ny, ns = x / speed, y / speed, s / speed
+    return (
+        hx * nx + speed * xx,
+        hx * ny + speed * xy,
+        hx * ns + speed * xs,
+        hy * nx + speed * xy,
+        hy * ny + speed * yy,
+        hy * ns + speed * ys,
+        hs * nx + speed * xs,
+        hs * ny + speed * ys,
+        hs * ns + speed * ss,
+    )
+
+
+@jit
+def sliding(kind, data, start, size, x, y, s):
+    """`u = h(V) |V_S|` of the scaled twist `(x, y, s)`; the lower half of the sphere mirrors the upper one."""
+    if kind == ELLIPSOID:
+        return x, y, s
+    speed = math.sqrt(x * x + y * y + s * s)
+    if speed == 0.0:
+        return 0.0, 0.0, 0.0
+    if kind == CELLS:
+        return _cells(data, start, size, x, y, s, speed)
+    mirror = -1.0 if s < 0.0 else 1.0
+    if kind == BILINEAR:
+        u = _bilinear(data, start, size, mirror * x, mirror * y, mirror * s, speed)
+    else:
+        u = _potential(data, start, size, mirror * x, mirror * y, mirror * s, speed)
+    return mirror * u[0], mirror * u[1], mirror * u[2]
+
+
+@jit
+def sliding_jacobian(kind, data, start, size, x, y, s):
+    """`du/dV_S`, nine numbers row by row; at rest, where it has no value, the ellipsoid's, which lies between all."""
+    if kind == ELLIPSOID:
+        return _IDENTITY
+    speed = math.sqrt(x * x + y * y + s * s)
+    if speed == 0.0:
+        return _IDENTITY
+    if kind == CELLS:
+        return _cells_jacobian(data, start, size, x, y, s, speed)
+    mirror = -1.0 if s < 0.0 else 1.0
+    if kind == BILINEAR:
+        return _bilinear_jacobian(data, start, size, mirror * x, mirror * y, mirror * s, speed)
+    return _potential_jacobian(data, start, size, mirror * x, mirror * y, mirror * s, speed)
+
+
+@jit
+def sliding_batch(kind, data, start, size, twist, u):
+    """`sliding` for scaled twists `[M, 3]` into `u [M, 3]`."""
+    for m in range(twist.shape[0]):
+        u[m, 0], u[m, 1], u[m, 2] = sliding(kind, data, start, size, twist[m, 0], twist[m, 1], twist[m, 2])
+
+
+@jit
+def sliding_jacobian_batch(kind, data, start, size, twist, jacobian):
+    """`sliding_jacobian` for scaled twists `[M, 3]` into `jacobian [M, 9]`."""
+    for m in range(twist.shape[0]):
+        values = sliding_jacobian(kind, data, start, size, twist[m, 0], twist[m, 1], twist[m, 2])
+        for i in range(9):
+            jacobian[m, i] = values[i]
