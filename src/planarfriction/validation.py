@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -69,6 +69,15 @@ def array(name: str, value: Any, shape: tuple[int | None, ...]) -> np.ndarray:
     return result
 
 
+def non_negative_array(name: str, value: Any, shape: tuple[int | None, ...]) -> np.ndarray:
+    """Return `value` as a finite float array >= 0; None in `shape` accepts any length on that axis."""
+    result = array(name, value, shape)
+    if (result < 0.0).any():
+        where = tuple(int(i) for i in np.argwhere(result < 0.0)[0])
+        raise InvalidValueError(name, "be >= 0", f"{result[where]} at index {where}")
+    return result
+
+
 def choice(name: str, value: Any, valid: Iterable[str]) -> str:
     """Return `value` if it is one of `valid`, or raise an error that names the nearest valid one."""
     valid = list(valid)
@@ -77,3 +86,15 @@ def choice(name: str, value: Any, valid: Iterable[str]) -> str:
     near = difflib.get_close_matches(str(value), valid, n=1)
     hint = f" (did you mean {near[0]!r}?)" if near else ""
     raise InvalidValueError(name, f"be one of {', '.join(valid)}", f"{value!r}{hint}")
+
+
+def keys(name: str, data: Any, required: Iterable[str], optional: Iterable[str] = ()) -> None:
+    """Raise unless `data` is a mapping with all `required` keys and, beyond them, only `optional` ones."""
+    required = list(required)
+    if not isinstance(data, Mapping):
+        raise InvalidValueError(name, "be a table of keys and values", data)
+    for key in data:
+        choice(f"{name} key", key, dict.fromkeys([*required, *optional]))
+    for key in required:
+        if key not in data:
+            raise InvalidValueError(name, f"have the key {key!r}", f"{', '.join(map(str, data)) or 'none'}")

@@ -1,0 +1,19 @@
+"""Contact patches: cells with areas, and a pressure law that may depend on the normal force."""
+
+from planarfriction.patch.contact_patch import ContactPatch
+from planarfriction.patch.files import read_pressure_map
+from planarfriction.patch.grid import Grid
+from planarfriction.patch.pressure import LinearGradient, PerCell, Pressure, SoftFinger, Uniform
+from planarfriction.patch.published import PUBLISHED_PATCHES
+
+__all__ = [
+    "PUBLISHED_PATCHES",
+    "ContactPatch",
+    "Grid",
+    "LinearGradient",
+    "PerCell",
+    "Pressure",
+    "SoftFinger",
+    "Uniform",
+    "read_pressure_map",
+]

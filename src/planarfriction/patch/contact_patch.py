@@ -1,0 +1,365 @@
+"""The contact patch: where the cells are, how large they are, and how the normal load spreads over them."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.errors import InvalidValueError
+from planarfriction.patch import shapes
+from planarfriction.patch.files import read_pressure_map
+from planarfriction.patch.grid import Grid
+from planarfriction.patch.pressure import Pressure, Uniform, as_law
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ContactPatch:
+    """A flat contact: N cells at `rho_i` with areas `a_i`, and a pressure that gives them their weights.
+
+    `w_i = p_i a_i / sum(p a)`, so that `sum(w) = 1` and cell i carries the normal force `w_i f_N`.
+
+    Frame: the contact frame, x to the right, y up; **row 0 of a grid or map is its top** (largest y). Grids and maps
+    are centred on the origin (a polygon stays where its vertices are) and list their cells row by row from the top
+    left; points keep the order given. Cells that carry no pressure at any load are dropped.
+
+    Make patches with the class methods (`disc`, `rectangle`, `ring`, `line`, `polygon`, `points`, `from_pressure`).
+    Their `pressure` is a law (`Uniform`, `LinearGradient`, `SoftFinger`), a function `p(x, y)` of two floats [m], one
+    number per cell, or None for uniform; it is evaluated at the positions of the cells.
+
+    `normal_force` [N] may be left out where the shape does not depend on it. It may have any shape `[...]`, which
+    then leads the shape of the result. A patch whose shape depends on the load has weights 0, and with them
+    moments 0, at zero load.
+
+    Raises
+    ------
+    InvalidValueError
+        No cells, wrong shapes, numbers that are not finite, negative pressure, zero total pressure, a normal force that
+        is negative or missing where it is needed.
+
+    Source: Waltersson and Karayiannidis 2024, section III.
+    """
+
+    positions: np.ndarray
+    """Positions of the cells (centroids of their parts inside the patch), shape `[N, 2]` [m]."""
+    areas: np.ndarray
+    """Areas of the cells inside the patch, shape `[N]` [m^2]."""
+    pressure: Pressure = field(default_factory=Uniform)
+    """Pressure law."""
+    grid: Grid | None = None
+    """The regular grid that the cells were cut from, or None."""
+    name: str = "patch"
+    """Name for plots and tables."""
+    _fixed_weights: np.ndarray | None = field(init=False, default=None)
+
+    def __post_init__(self) -> None:
+        positions = validation.array("positions", self.positions, (None, 2))
+        if len(positions) == 0:
+            raise InvalidValueError("patch", "have at least one cell", "none")
+        areas = validation.array("areas", self.areas, (len(positions),))
+        if not (areas > 0.0).all():
+            raise InvalidValueError("areas", "be > 0", f"{areas.min()} at index {areas.argmin()}")
+        law = as_law(self.pressure, positions)
+        if not law.depends_on_load:
+            _check_pressure(law.relative(positions), positions)
+        kept = law.ever_loaded(positions)
+        if not kept.any():
+            raise InvalidValueError("pressure", "load at least one cell", "zero pressure on all of them")
+        kept_values = {"positions": positions[kept], "areas": areas[kept], "pressure": law.only(kept)}
+        for name, value in kept_values.items():
+            object.__setattr__(self, name, value)
+        self.positions.setflags(write=False)
+        self.areas.setflags(write=False)
+        if not law.depends_on_load:
+            fixed = self._shares(self.pressure.relative(self.positions))
+            fixed.setflags(write=False)
+            object.__setattr__(self, "_fixed_weights", fixed)
+
+    # ------------------------------------------------------------------ shapes
+
+    @classmethod
+    def disc(cls, radius: float, cells: int = 21, *, pressure: Any = None, name: str = "disc") -> ContactPatch:
+        """Disc of `radius` [m] about the origin on a grid of `cells` x `cells`, its rim cutting the cells.
+
+        Cells at the rim have the area inside it, and the centroid of that part as position.
+        """
+        radius = validation.positive("radius", radius)
+        return cls._clipped([shapes.circle(radius)], _square_grid(2 * radius, cells), pressure, name)
+
+    @classmethod
+    def disc_published(
+        cls, radius: float = 0.01, cells: int = 21, *, pressure: Any = None, name: str = "disc_published"
+    ) -> ContactPatch:
+        """The published disc mask: whole cells of a grid `2 radius` [m] wide, within `cells // 2` cells of the centre.
+
+        Distances are between cell centres and `cells` is odd, so the size of the mask depends on it: 317 of 21 x 21
+        cells have the area of a disc of radius 10.05 cells, not 10.5. To reproduce; `disc` is the true disc.
+        """
+        grid = _square_grid(2 * validation.positive("radius", radius), cells)
+        if grid.columns % 2 == 0:
+            raise InvalidValueError("cells", "be odd (the published mask is centred on a cell)", cells)
+        reach = grid.columns // 2
+        row, column = np.divmod(np.arange(grid.rows * grid.columns), grid.columns)
+        inside = (row - reach) ** 2 + (column - reach) ** 2 <= reach**2
+        positions = grid.centres()[inside]
+        return cls(positions, np.full(len(positions), grid.cell_area), pressure, grid, name)
+
+    @classmethod
+    def rectangle(
+        cls,
+        width: float,
+        height: float | None = None,
+        cells: int | Sequence[int] = 21,
+        *,
+        pressure: Any = None,
+        name: str = "rectangle",
+    ) -> ContactPatch:
+        """Rectangle of `width` x `height` [m] about the origin; without `height` a square.
+
+        `cells` counts along the longer side (cells as square as possible), or is `(columns, rows)`.
+        """
+        width = validation.positive("width", width)
+        height = width if height is None else validation.positive("height", height)
+        grid = Grid.around_origin(width, height, *shapes.columns_and_rows(cells, width, height))
+        positions = grid.centres()
+        return cls(positions, np.full(len(positions), grid.cell_area), pressure, grid, name)
+
+    @classmethod
+    def ring(
+        cls, inner_radius: float, outer_radius: float, cells: int = 21, *, pressure: Any = None, name: str = "ring"
+    ) -> ContactPatch:
+        """Ring between two radii [m] about the origin on a grid of `cells` x `cells`, cut at both rims."""
+        inner = validation.positive("inner_radius", inner_radius)
+        outer = validation.positive("outer_radius", outer_radius)
+        if inner >= outer:
+            raise InvalidValueError("inner_radius", "be < outer_radius", f"{inner} and {outer}")
+        outline = [shapes.circle(outer), shapes.circle(inner)]
+        return cls._clipped(outline, _square_grid(2 * outer, cells), pressure, name)
+
+    @classmethod
+    def line(
+        cls,
+        length: float,
+        cells: int = 21,
+        *,
+        direction: str = "y",
+        profile: Any = None,
+        name: str = "line",
+    ) -> ContactPatch:
+        """Line of `length` [m] along `direction` ("y" or "x") through the origin, one cell wide.
+
+        `profile` holds the relative pressures `[cells]` from the top down (y) or from the left to the right (x), or is
+        a function of the coordinate along the line [m]; None is uniform. The grid is square with the line in its
+        middle column or row (across the line it has one cell more than along it where `cells` is even).
+        """
+        length, cells = validation.positive("length", length), validation.count("cells", cells)
+        along = ["x", "y"].index(validation.choice("direction", direction, ("x", "y")))
+        side, across = length / cells, cells + 1 - cells % 2
+        columns, rows = (cells, across) if along == 0 else (across, cells)
+        grid = Grid.around_origin(columns * side, rows * side, columns, rows)
+        positions = np.zeros((cells, 2))
+        positions[:, along] = (np.arange(cells) - (cells - 1) / 2) * (side if along == 0 else -side)
+        if callable(profile):
+            profile = [profile(coordinate) for coordinate in positions[:, along].tolist()]
+        elif profile is not None:
+            profile = validation.non_negative_array("profile", profile, (cells,))
+        return cls(positions, np.full(cells, grid.cell_area), profile, grid, name)
+
+    @classmethod
+    def polygon(
+        cls, vertices, cells: int | Sequence[int] = 21, *, pressure: Any = None, name: str = "polygon"
+    ) -> ContactPatch:
+        """Polygon with `vertices` `[M, 2]` [m], convex or not, on a grid over its bounding box, cut along its sides.
+
+        `cells` counts along the longer side of the bounding box, or is `(columns, rows)`.
+        """
+        vertices = validation.array("vertices", vertices, (None, 2))
+        if len(vertices) < 3:
+            raise InvalidValueError("vertices", "hold at least 3 points", f"{len(vertices)}")
+        low = vertices.min(axis=0)
+        width, height = vertices.max(axis=0) - low
+        if not (width > 0.0 and height > 0.0):
+            raise InvalidValueError("vertices", "enclose an area", f"a box of {width} x {height} m")
+        columns, rows = shapes.columns_and_rows(cells, width, height)
+        grid = Grid(low[0], low[1], width / columns, height / rows, columns, rows)
+        return cls._clipped([vertices], grid, pressure, name)
+
+    @classmethod
+    def points(cls, positions, weights=None, *, area: float = 1e-6, name: str = "points") -> ContactPatch:
+        """Any set of contact points `[N, 2]` [m] with relative `weights` `[N]` (equal if None), such as feet.
+
+        `area` [m^2] is what each point stands for; only `areas`, `area` and `pressure_values` look at it.
+        """
+        positions = validation.array("positions", positions, (None, 2))
+        if weights is not None:
+            weights = validation.non_negative_array("weights", weights, (len(positions),))
+        return cls(positions, np.full(len(positions), validation.positive("area", area)), weights, None, name)
+
+    @classmethod
+    def from_pressure(cls, pressure, cell_size: float | Sequence[float], *, name: str | None = None) -> ContactPatch:
+        """Patch of a measured pressure map: an array `[rows, columns]`, or the path of a CSV, NPY or grey image file.
+
+        **Row 0 is the top** (largest y), column 0 the left; the middle of the map is the origin. `cell_size` [m] is the
+        side of a cell or `(width, height)`. Only ratios of the pressures matter. Cells without pressure are dropped.
+        """
+        what = "pressure"
+        if isinstance(pressure, (str, Path)):
+            what, name = f"pressure map {pressure}", name or Path(pressure).stem
+            pressure = read_pressure_map(pressure)
+        values = validation.non_negative_array(what, pressure, (None, None))
+        if not values.any():
+            raise InvalidValueError(what, "have a total > 0", "0")
+        size = validation.array("cell_size", cell_size, (2,) if np.ndim(cell_size) else ())
+        width, height = np.broadcast_to([validation.positive("cell_size", side) for side in size.flat], 2)
+        rows, columns = values.shape
+        grid = Grid.around_origin(columns * width, rows * height, columns, rows)
+        areas = np.full(values.size, grid.cell_area)
+        return cls(grid.centres(), areas, values.ravel(), grid, name or "pressure map")
+
+    @classmethod
+    def _clipped(cls, outline: list[np.ndarray], grid: Grid, pressure: Any, name: str) -> ContactPatch:
+        """Patch of the parts of the grid's boxes inside an outline: the outer polygon, then its holes."""
+        import shapely
+
+        polygon = shapely.Polygon(outline[0], outline[1:])
+        if not polygon.is_valid:
+            raise InvalidValueError("vertices", "outline a simple polygon", shapely.is_valid_reason(polygon))
+        return cls(*shapes.clip(polygon, grid), pressure, grid, name)
+
+    # ------------------------------------------------------------------ quantities
+
+    @property
+    def cells(self) -> int:
+        """Number N of cells that can carry load."""
+        return len(self.areas)
+
+    @property
+    def depends_on_load(self) -> bool:
+        """Whether the weights change with the normal force."""
+        return self.pressure.depends_on_load
+
+    def weights(self, normal_force=None) -> np.ndarray:
+        """Share of the normal force on each cell, `w_i = p_i a_i / sum(p a)`, shape `[..., N]` [-]."""
+        if normal_force is None:
+            if self._fixed_weights is None:
+                raise InvalidValueError("normal_force", "be given, the shape of this patch depends on it", "None")
+            return self._fixed_weights
+        load = np.asarray(normal_force, dtype=float)
+        if not ((load >= 0.0) & (load < np.inf)).all():
+            raise InvalidValueError("normal_force", "be finite and >= 0", normal_force)
+        if self._fixed_weights is not None:
+            return np.broadcast_to(self._fixed_weights, (*load.shape, self.cells))
+        loaded = load > 0.0
+        weights = self._shares(self.pressure.relative(self.positions, np.where(loaded, load, 1.0)))
+        return np.where(loaded[..., None], weights, 0.0)
+
+    def centre_of_pressure(self, normal_force=None) -> np.ndarray:
+        """Centre of pressure `sum(w rho)`, shape `[..., 2]` [m]."""
+        weights = self.weights(normal_force)
+        return np.stack([(weights * coordinate).sum(-1) for coordinate in self.positions.T], -1)
+
+    def contact_radius(self, normal_force=None) -> float | np.ndarray:
+        """Contact radius `r = sum(w |rho - CoP|)` [m]: a pure spin about the CoP has the friction torque `mu f_N r`."""
+        weights, dx, dy = self._about_centre_of_pressure(normal_force)
+        return (weights * np.hypot(dx, dy)).sum(-1)
+
+    def second_moment(self, normal_force=None) -> float | np.ndarray:
+        """Second moment `<rho^2> = sum(w |rho - CoP|^2)` [m^2]."""
+        weights, dx, dy = self._about_centre_of_pressure(normal_force)
+        return (weights * (dx**2 + dy**2)).sum(-1)
+
+    def area(self, normal_force=None) -> float | np.ndarray:
+        """Area of the cells under load [m^2]."""
+        return np.where(self.weights(normal_force) > 0.0, self.areas, 0.0).sum(-1)
+
+    def moments(self, degree: int, normal_force=None, *, about=None) -> np.ndarray:
+        """Polynomial moments of the pressure, `M[i, j] = sum(w (x - x0)^i (y - y0)^j)` for `i + j <= degree`.
+
+        Shape `[..., degree + 1, degree + 1]` [m^(i + j)], zero where `i + j > degree`. `about` is the point (x0, y0)
+        [m]: None for the centre of pressure (central moments), `(0, 0)` for the raw ones.
+        """
+        degree = validation.count("degree", degree, at_least=0)
+        weights, dx, dy = self._about_centre_of_pressure(normal_force)
+        if about is not None:
+            dx, dy = (self.positions - validation.vector("about", about, 2)).T
+        result = np.zeros((*weights.shape[:-1], degree + 1, degree + 1))
+        for i in range(degree + 1):
+            for j in range(degree + 1 - i):
+                result[..., i, j] = (weights * dx**i * dy**j).sum(-1)
+        return result
+
+    def pressure_values(self, normal_force) -> np.ndarray:
+        """Pressure on each cell, `w_i f_N / a_i`, shape `[..., N]` [Pa]."""
+        return self.weights(normal_force) * np.asarray(normal_force, dtype=float)[..., None] / self.areas
+
+    def plot(self, *, normal_force=None):
+        """Draw the pressure map with its centre of pressure; returns a matplotlib Figure."""
+        from planarfriction import plots
+
+        return plots.plot_patch(self, normal_force=normal_force)
+
+    def __repr__(self) -> str:
+        grid = "" if self.grid is None else f" of {self.grid.columns} x {self.grid.rows}"
+        law = type(self.pressure).__name__
+        return f"ContactPatch({self.name!r}, {self.cells} cells{grid}, {law} pressure)"
+
+    def _about_centre_of_pressure(self, normal_force) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Weights and both coordinates of the cells relative to the CoP, each of shape `[..., N]`."""
+        weights = self.weights(normal_force)
+        dx, dy = ((x - (weights * x).sum(-1, keepdims=True)) for x in self.positions.T)
+        return weights, dx, dy
+
+    def _shares(self, relative: np.ndarray) -> np.ndarray:
+        """Weights `[..., N]` from relative pressures of the same shape, scaled first so that no sum can overflow."""
+        peak = relative.max(-1, keepdims=True)
+        if not (peak > 0.0).all():
+            raise InvalidValueError("pressure", "load at least one cell at every load", f"a peak of {peak.min()}")
+        load = relative / peak * self.areas
+        return load / load.sum(-1, keepdims=True)
+
+    # ------------------------------------------------------------------ plain data
+
+    def to_dict(self) -> dict[str, Any]:
+        """The patch as numbers, strings and lists, ready for JSON; `from_dict` restores it to the last bit."""
+        data = {
+            "shape": "cells",
+            "name": self.name,
+            "positions": self.positions.tolist(),
+            "areas": self.areas.tolist(),
+            "pressure": self.pressure.to_dict(),
+        }
+        return data if self.grid is None else {**data, "grid": dataclasses.asdict(self.grid)}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> ContactPatch:
+        """The patch that `to_dict` described; unknown and missing keys are errors that name them."""
+        optional = ("shape", "name", "pressure", "grid")
+        validation.keys("patch", data, required=("positions", "areas"), optional=optional)
+        validation.choice("patch shape", data.get("shape", "cells"), ("cells",))
+        pressure, grid = data.get("pressure"), data.get("grid")
+        if isinstance(pressure, Mapping):
+            pressure = Pressure.from_dict(pressure)
+        if grid is not None:
+            validation.keys("grid", grid, required=[entry.name for entry in dataclasses.fields(Grid)])
+            grid = Grid(**grid)
+        return cls(data["positions"], data["areas"], pressure, grid, data.get("name", "patch"))
+
+
+def _square_grid(width: float, cells: int) -> Grid:
+    """Grid of `cells` x `cells` on the square `width` [m] wide about the origin."""
+    cells = validation.count("cells", cells)
+    return Grid.around_origin(width, width, cells, cells)
+
+
+def _check_pressure(values: np.ndarray, positions: np.ndarray) -> None:
+    """Raise where a pressure is not finite or negative, naming the cell."""
+    for rule, broken in (("be finite", ~np.isfinite(values)), ("be >= 0", values < 0.0)):
+        if broken.any():
+            index = int(broken.argmax())
+            x, y = positions[index].tolist()
+            raise InvalidValueError("pressure", rule, f"{values[index]} at index {index}, position ({x:g}, {y:g}) m")

@@ -1,0 +1,89 @@
+"""Pressure maps from files: CSV, NPY, grey images. Row 0 of every map is its top (largest y)."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import numpy as np
+
+from planarfriction.errors import FileError
+
+IMAGE_SUFFIXES = (".png", ".tif", ".tiff", ".bmp", ".pgm", ".jpg", ".jpeg")
+"""Suffixes of the files that are read as grey images."""
+
+GREY_MODES = ("1", "L", "I", "F", "I;16", "I;16B", "I;16L", "I;16N")
+"""Pillow's names for images with one channel of numbers."""
+
+
+def read_pressure_map(path: str | Path) -> np.ndarray:
+    """Read a map of relative pressures, shape `[rows, columns]`, row 0 at the top.
+
+    The suffix tells the kind: `.csv` (numbers separated by commas, no header, lines that begin with # are skipped),
+    `.npy` (a two-dimensional array), or a grey image (brightness is pressure, black is none).
+
+    Raises
+    ------
+    FileError
+        The file is missing, of an unknown kind, or does not hold what its suffix says.
+    """
+    path = Path(path)
+    readers = {".csv": _read_csv, ".npy": _read_npy, **dict.fromkeys(IMAGE_SUFFIXES, _read_image)}
+    reader = readers.get(path.suffix.lower())
+    if reader is None:
+        kinds = ", ".join(IMAGE_SUFFIXES)
+        raise FileError(f"pressure map {path}: unknown kind {path.suffix!r}, use .csv, .npy or a grey image ({kinds})")
+    if not path.is_file():
+        raise FileError(f"pressure map {path}: no such file")
+    try:
+        return reader(path)
+    except FileError:
+        raise
+    # Pillow reports a broken PNG as SyntaxError; an oversized header of an NPY file ends in a MemoryError.
+    except (OSError, ValueError, SyntaxError, EOFError, MemoryError, csv.Error) as error:
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise FileError(f"pressure map {path}: not a readable {path.suffix.lower()} file ({reason})") from error
+
+
+def _read_csv(path: Path) -> np.ndarray:
+    with path.open(newline="", encoding="utf-8-sig") as file:
+        lines = [
+            (number, line)
+            for number, line in enumerate(csv.reader(file), start=1)
+            if any(entry.strip() for entry in line) and not line[0].lstrip().startswith("#")
+        ]
+    if not lines:
+        raise FileError(f"pressure map {path}: the file holds no numbers")
+    rows, width = [], len(lines[0][1])
+    for number, line in lines:
+        if len(line) != width:
+            raise FileError(f"pressure map {path}: line {number} has {len(line)} values, the first row has {width}")
+        row = []
+        for column, entry in enumerate(line, start=1):
+            try:
+                row.append(float(entry))
+            except ValueError:
+                raise FileError(f"pressure map {path}: line {number}, value {column}: {entry!r} is no number") from None
+        rows.append(row)
+    return np.array(rows)
+
+
+def _read_npy(path: Path) -> np.ndarray:
+    values = np.load(path, allow_pickle=False)
+    if not isinstance(values, np.ndarray) or values.dtype.kind not in "biuf":
+        raise FileError(f"pressure map {path}: the file must hold one array of real numbers")
+    return values.astype(float)
+
+
+def _read_image(path: Path) -> np.ndarray:
+    from PIL import Image
+
+    with Image.open(path) as image:
+        if image.mode in GREY_MODES:
+            return np.asarray(image, dtype=float)
+        red, green, blue, alpha = np.moveaxis(np.asarray(image.convert("RGBA"), dtype=float), -1, 0)
+    if not ((red == green).all() and (red == blue).all()):
+        raise FileError(f"pressure map {path}: this is a colour image, brightness means pressure in a grey one only")
+    if not (alpha == 255).all():
+        raise FileError(f"pressure map {path}: the image is partly transparent, save it without transparency")
+    return red

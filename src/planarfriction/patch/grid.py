@@ -1,0 +1,68 @@
+"""The regular grid that the cells of a patch were cut from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planarfriction import validation
+
+
+@dataclass(frozen=True)
+class Grid:
+    """A regular grid of boxes in the contact frame: x to the right, y up, **row 0 is the top row** (largest y)."""
+
+    x_min: float
+    """Left edge [m]."""
+    y_min: float
+    """Bottom edge [m]."""
+    cell_width: float
+    """Width of a cell, along x [m]."""
+    cell_height: float
+    """Height of a cell, along y [m]."""
+    columns: int
+    """Number of cells along x."""
+    rows: int
+    """Number of cells along y."""
+
+    def __post_init__(self) -> None:
+        checks = {
+            "x_min": validation.number,
+            "y_min": validation.number,
+            "cell_width": validation.positive,
+            "cell_height": validation.positive,
+            "columns": validation.count,
+            "rows": validation.count,
+        }
+        for name, check in checks.items():
+            object.__setattr__(self, name, check(name, getattr(self, name)))
+
+    @classmethod
+    def around_origin(cls, width: float, height: float, columns: int, rows: int) -> Grid:
+        """Grid of `columns` x `rows` cells on the box of `width` x `height` [m] whose middle is the origin."""
+        return cls(-width / 2, -height / 2, width / columns, height / rows, columns, rows)
+
+    @property
+    def cell_area(self) -> float:
+        """Area of one cell [m^2]."""
+        return self.cell_width * self.cell_height
+
+    def centres(self) -> np.ndarray:
+        """Centres of all cells, row by row from the top left, shape `[rows * columns, 2]` [m]."""
+        # Counted from the middle, so that a grid around the origin is symmetric to the last digit.
+        x_middle = self.x_min + self.columns * self.cell_width / 2
+        y_middle = self.y_min + self.rows * self.cell_height / 2
+        x = x_middle + (np.arange(self.columns) - (self.columns - 1) / 2) * self.cell_width
+        y = y_middle - (np.arange(self.rows) - (self.rows - 1) / 2) * self.cell_height
+        return np.stack([np.tile(x, self.rows), np.repeat(y, self.columns)], -1)
+
+    def locate(self, positions) -> tuple[np.ndarray, np.ndarray]:
+        """Row and column of the cell that holds each of `positions` `[..., 2]` [m]; row 0 is the top.
+
+        Positions outside the grid get rows or columns outside `0 .. rows - 1` and `0 .. columns - 1`.
+        """
+        positions = np.asarray(positions, dtype=float)
+        from_top = self.rows - (positions[..., 1] - self.y_min) / self.cell_height
+        from_left = (positions[..., 0] - self.x_min) / self.cell_width
+        return np.floor(from_top).astype(int), np.floor(from_left).astype(int)

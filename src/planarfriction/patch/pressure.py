@@ -1,0 +1,193 @@
+"""Pressure laws: how the normal load spreads over a patch. Only ratios matter, the patch scales to the load."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.errors import InvalidValueError
+
+SAME_DISTANCE = 1e-9
+"""Relative difference below which two cells are equally far from the origin (rounding: 1e-16, cells: 1e-2)."""
+
+
+class Pressure:
+    """Base of the pressure laws: a relative pressure at each position, which may depend on the normal force."""
+
+    law: ClassVar[str] = ""
+    """Name of the law in plain data."""
+
+    @property
+    def depends_on_load(self) -> bool:
+        """Whether the shape of the pressure, not only its scale, changes with the normal force."""
+        return False
+
+    def relative(self, positions: np.ndarray, normal_force: np.ndarray | None = None) -> np.ndarray:
+        """Relative pressure at `positions` `[N, 2]` [m], at any scale [-].
+
+        Shape `[N]`; for laws that depend on the load `[..., N]` for `normal_force` `[...]`, all > 0 [N].
+        """
+        raise NotImplementedError
+
+    def ever_loaded(self, positions: np.ndarray) -> np.ndarray:
+        """Which of `positions` `[N, 2]` [m] can carry pressure at any load, `[N]` of bool."""
+        return self.relative(positions) > 0.0
+
+    def only(self, kept: np.ndarray) -> Pressure:
+        """The law for those cells of a patch that are `kept`, `[N]` of bool."""
+        return self
+
+    def to_dict(self) -> dict[str, Any] | list[float]:
+        """The law as plain data: `{"law": name, parameter: value, ...}`, or a list with one pressure per cell."""
+        fields = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        plain = {name: list(value) if isinstance(value, tuple) else value for name, value in fields.items()}
+        return {"law": self.law, **{name: value for name, value in plain.items() if value is not None}}
+
+    @staticmethod
+    def from_dict(data: Mapping[str, Any]) -> Pressure:
+        """The law described by `{"law": "uniform" | "linear_gradient" | "soft_finger", parameter: value, ...}`."""
+        laws = {kind.law: kind for kind in (Uniform, LinearGradient, SoftFinger)}
+        if not isinstance(data, Mapping) or "law" not in data:
+            raise InvalidValueError("pressure", f"be a table with law = {' or '.join(laws)}", data)
+        kind = laws[validation.choice("pressure law", data["law"], laws)]
+        given = {name: value for name, value in data.items() if name != "law"}
+        fields = dataclasses.fields(kind)
+        required = [field.name for field in fields if field.default is dataclasses.MISSING]
+        validation.keys(f"{kind.law} pressure", given, required=required, optional=[field.name for field in fields])
+        return kind(**given)
+
+
+@dataclass(frozen=True)
+class Uniform(Pressure):
+    """The same pressure everywhere on the patch."""
+
+    law = "uniform"
+
+    def relative(self, positions: np.ndarray, normal_force: np.ndarray | None = None) -> np.ndarray:
+        return np.ones(len(positions))
+
+
+@dataclass(frozen=True)
+class LinearGradient(Pressure):
+    """Pressure that grows linearly over the patch: `p ~ 1 + gx x + gy y`.
+
+    A patch on which it would be negative somewhere is refused when it is made.
+    """
+
+    law = "linear_gradient"
+    gradient: tuple[float, float]
+    """(gx, gy): change of the pressure per metre, relative to the pressure at the origin [1/m]."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "gradient", tuple(validation.vector("gradient", self.gradient, 2).tolist()))
+
+    def relative(self, positions: np.ndarray, normal_force: np.ndarray | None = None) -> np.ndarray:
+        gx, gy = self.gradient
+        return 1.0 + gx * positions[:, 0] + gy * positions[:, 1]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SoftFinger(Pressure):
+    """Soft fingertip whose contact grows with the load: `p(s) ~ (1 - (s/R)^k)^(1/k)`, `R = min(c f_N^n, radius_max)`.
+
+    s is the distance from the origin. Give exactly one of `k` and `k_per_newton` (`k = k_per_newton f_N`). With `n = 0`
+    and a constant `k` the shape is fixed. A cell is loaded if its position is inside R; if none is, the cells nearest
+    to the origin share the load.
+
+    Sources: Xydas and Kao 1999; Waltersson and Karayiannidis 2024.
+    """
+
+    law = "soft_finger"
+    c: float
+    """Radius of the contact at 1 N [m]."""
+    n: float = 0.0
+    """Growth of the radius with the load [-]: 1/3 for Hertz contact, 0 for a radius that does not grow."""
+    k: float | None = None
+    """Exponent of the profile [-]: 2 for Hertz contact, the larger the flatter."""
+    k_per_newton: float | None = None
+    """Exponent of the profile per normal force [1/N]."""
+    radius_max: float | None = None
+    """Radius that the contact cannot outgrow [m], or None."""
+
+    def __post_init__(self) -> None:
+        if (self.k is None) == (self.k_per_newton is None):
+            shown = f"k={self.k}, k_per_newton={self.k_per_newton}"
+            raise InvalidValueError("SoftFinger", "have exactly one of k and k_per_newton", shown)
+        object.__setattr__(self, "c", validation.positive("c", self.c))
+        object.__setattr__(self, "n", validation.non_negative("n", self.n))
+        for name in ("k", "k_per_newton", "radius_max"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, validation.positive(name, getattr(self, name)))
+
+    @property
+    def depends_on_load(self) -> bool:
+        return self.n != 0.0 or self.k is None
+
+    def radius(self, normal_force) -> np.ndarray:
+        """Contact radius `R = min(c f_N^n, radius_max)` [m] at `normal_force` `[...]` [N]."""
+        radius = self.c * np.asarray(normal_force, dtype=float) ** self.n
+        return radius if self.radius_max is None else np.minimum(radius, self.radius_max)
+
+    def exponent(self, normal_force) -> np.ndarray:
+        """Exponent `k` of the profile [-] at `normal_force` `[...]` [N]."""
+        load = np.asarray(normal_force, dtype=float)
+        return np.full_like(load, self.k) if self.k_per_newton is None else self.k_per_newton * load
+
+    def relative(self, positions: np.ndarray, normal_force: np.ndarray | None = None) -> np.ndarray:
+        load = np.asarray(1.0 if normal_force is None else normal_force, dtype=float)[..., None]
+        k = self.exponent(load)
+        distance = np.hypot(positions[:, 0], positions[:, 1])
+        ratio = distance / self.radius(load)
+        inside = ratio < 1.0
+        nearest = distance <= distance.min() * (1.0 + SAME_DISTANCE)
+        # In logarithms, relative to the largest value: at small k the profile underflows everywhere but at s = 0.
+        with np.errstate(divide="ignore"):
+            profile = np.log(-np.expm1(k * np.log(np.where(inside, ratio, 0.5))))
+        profile = np.where(inside, profile, -np.inf)
+        profile = np.where(inside.any(-1, keepdims=True), profile, np.where(nearest, 0.0, -np.inf))
+        return np.exp((profile - profile.max(-1, keepdims=True)) / k)
+
+    def ever_loaded(self, positions: np.ndarray) -> np.ndarray:
+        if not self.depends_on_load:
+            return super().ever_loaded(positions)
+        distance = np.hypot(positions[:, 0], positions[:, 1])
+        largest = self.radius(1.0 if self.n == 0.0 else np.inf)
+        return (distance < largest) | (distance <= distance.min() * (1.0 + SAME_DISTANCE))
+
+
+@dataclass(frozen=True, eq=False)
+class PerCell(Pressure):
+    """One relative pressure for each cell of a patch: measured maps, profiles, functions evaluated at the cells."""
+
+    values: np.ndarray
+    """Relative pressures, shape `[N]` [-]."""
+
+    def __post_init__(self) -> None:
+        values = validation.array("pressure", self.values, (None,))
+        values.setflags(write=False)
+        object.__setattr__(self, "values", values)
+
+    def relative(self, positions: np.ndarray, normal_force: np.ndarray | None = None) -> np.ndarray:
+        return validation.array("pressure", self.values, (len(positions),))
+
+    def only(self, kept: np.ndarray) -> PerCell:
+        return PerCell(self.values[kept])
+
+    def to_dict(self) -> list[float]:
+        return self.values.tolist()
+
+
+def as_law(pressure: Any, positions: np.ndarray) -> Pressure:
+    """The pressure law meant by `pressure`: None (uniform), a law, a function `p(x, y)`, or `[N]` numbers."""
+    if pressure is None:
+        return Uniform()
+    if isinstance(pressure, Pressure):
+        return pressure
+    if callable(pressure):
+        return PerCell([pressure(x, y) for x, y in positions.tolist()])
+    return PerCell(validation.array("pressure", pressure, (len(positions),)))

@@ -1,0 +1,72 @@
+"""The seven patches of the published experiments: 21 x 21 cells on a square 0.02 m wide.
+
+Source: Waltersson and Karayiannidis 2024. Another number of cells gives the same shape on another grid (the disc mask
+and the lines follow their own rules, which depend on the number of cells).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from planarfriction.patch.contact_patch import ContactPatch
+
+PUBLISHED_CELLS = 21
+"""Rows and columns of the grid that the published masks are written on."""
+
+
+def square(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
+    """Uniform square, `width` [m] wide."""
+    return ContactPatch.rectangle(width, cells=cells, name="Square")
+
+
+def circle(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
+    """Uniform disc, as the published mask on a grid `width` [m] wide."""
+    return ContactPatch.disc_published(width / 2, cells, name="Circle")
+
+
+def line(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
+    """Uniform line along y, `width` [m] long."""
+    return ContactPatch.line(width, cells, name="Line")
+
+
+def line_grad(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
+    """Line along y, `width` [m] long, with weights cells, ..., 2, 1 from the top."""
+    return ContactPatch.line(width, cells, profile=np.arange(cells, 0, -1), name="LineGrad")
+
+
+def line_grad_x(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
+    """Line along x, `width` [m] long, with weights cells, ..., 2, 1 from the left."""
+    return ContactPatch.line(width, cells, direction="x", profile=np.arange(cells, 0, -1), name="LineGradX")
+
+
+def non_convex_1(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
+    """Two square pads (3 x 3 of 21 x 21 cells) at the left and right ends of the middle rows."""
+    return _masked([(slice(9, 12), slice(0, 3)), (slice(9, 12), slice(18, 21))], cells, width, "NonConvex1")
+
+
+def non_convex_2(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
+    """A lying T of two bars: rows 9..11 x columns 0..13, and rows 4..17 x columns 18..20 (of 21 x 21 cells)."""
+    return _masked([(slice(9, 12), slice(0, 14)), (slice(4, 18), slice(18, 21))], cells, width, "NonConvex2")
+
+
+def _masked(blocks: list[tuple[slice, slice]], cells: int, width: float, name: str) -> ContactPatch:
+    """Uniform pressure on blocks of the published grid; a cell is loaded if its centre is in one of them."""
+    mask = np.zeros((PUBLISHED_CELLS, PUBLISHED_CELLS))
+    for block in blocks:
+        mask[block] = 1.0
+    nearest = ((2 * np.arange(cells) + 1) * PUBLISHED_CELLS) // (2 * cells)
+    return ContactPatch.from_pressure(mask[np.ix_(nearest, nearest)], width / cells, name=name)
+
+
+PUBLISHED_PATCHES: dict[str, Callable[..., ContactPatch]] = {
+    "Square": square,
+    "Circle": circle,
+    "Line": line,
+    "LineGrad": line_grad,
+    "LineGradX": line_grad_x,
+    "NonConvex1": non_convex_1,
+    "NonConvex2": non_convex_2,
+}
+"""Name -> function of `(cells=21, width=0.02)` that makes the published patch."""
