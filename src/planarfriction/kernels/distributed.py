@@ -208,9 +208,14 @@ def step(law, z, vx, vy, omega, x, y, w, dt, out):
 
 @jit
 def step_batch(law, z, twist, x, y, w, load, dt, out, wrench):
-    """`step` for a batch: `z`, `out` [B, 2n], `twist`, `wrench` [B, 3], `w` [B or 1, n], `load`, `dt` [B]."""
+    """`step` for a batch: `z`, `out` [B, 2n], `twist`, `wrench` [B, 3], `w` [B or 1, n], `load`, `dt` [B].
+
+    Without load the bristles are forgotten.
+    """
     for b in range(z.shape[0]):
         fx, fy, tau = step(
             law, z[b], twist[b, 0], twist[b, 1], twist[b, 2], x, y, w[min(b, w.shape[0] - 1)], dt[b], out[b]
         )
         wrench[b, 0], wrench[b, 1], wrench[b, 2] = load[b] * fx, load[b] * fy, load[b] * tau
+        if load[b] == 0.0:
+            out[b] = 0.0

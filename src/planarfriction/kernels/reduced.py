@@ -12,10 +12,12 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from planarfriction import formulas
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import jit
-from planarfriction.kernels.law import strength, strength_slope
+from planarfriction.kernels.law import law_of, strength, strength_slope
 from planarfriction.kernels.surfaces import sliding, sliding_jacobian
 
 
@@ -191,10 +193,24 @@ def step(law, z, vx, vy, omega, shape, surface, data, dt, out):
 
 
 @jit
-def step_batch(law, z, twist, shape, surface, data, load, dt, out, wrench):
-    """`step` for a batch: `z`, `twist`, `out`, `wrench` [B, 3], `load`, `dt` [B]; one shape and surface for all."""
+def step_batch(law_row, shape, surface, data, z, twist, load, dt, out, wrench):
+    """`step` for a batch: `z`, `twist`, `out`, `wrench` [B, 3], `load`, `dt` [B]; without load the bristle is forgotten."""
+    law = law_of(law_row)
     for b in range(z.shape[0]):
         fx, fy, tau = step(
             law, z[b], twist[b, 0], twist[b, 1], twist[b, 2], shape, surface, data, dt[b], out[b]
         )
         wrench[b, 0], wrench[b, 1], wrench[b, 2] = load[b] * fx, load[b] * fy, load[b] * tau
+        if load[b] == 0.0:
+            out[b] = 0.0
+
+
+@jit
+def step_one(law_row, shape, surface, data, z, vx, vy, omega, load, dt):
+    """`step` of one contact for callers in Python: (inputs are valid, new state, wrench)."""
+    out, wrench = np.empty(3), np.empty(3)
+    sane = math.isfinite(vx + vy + omega + load + dt + z[0] + z[1] + z[2]) and load > 0.0 and dt >= 0.0
+    if sane:
+        fx, fy, tau = step(law_of(law_row), z, vx, vy, omega, shape, surface, data, dt, out)
+        wrench[0], wrench[1], wrench[2] = load * fx, load * fy, load * tau
+    return sane, out, wrench

@@ -1,0 +1,147 @@
+"""Contacts of a planar body, as compiled loops see them: where each sits, which model it has, what load and shape.
+
+The twist of contact c is `V = A(pose) u` for the body's velocity `u = (vx, vy, omega)`, and its wrench `W` acts on the
+body as `A' W`, since power is the same at both ends. With `G = d(A u)/d pose` and `H = d(A' W)/d pose` that is all the
+body needs to know of a contact.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from planarfriction.kernels import distributed, jit, reduced
+
+DISTRIBUTED, REDUCED = 0, 1
+WORLD, BODY, BODY_AXES = 0, 1, 2
+"""Fixed to the world; fixed to the body; fixed to a body whose prescribed velocity is given in its own axes."""
+
+
+class Contacts(NamedTuple):
+    """C contacts and the R shapes they take, in flat arrays."""
+
+    kind: np.ndarray
+    """`DISTRIBUTED` or `REDUCED`, int [C]."""
+    law: np.ndarray
+    """Numbers of the law, [C, 9]."""
+    mount: np.ndarray
+    """`WORLD`, `BODY` or `BODY_AXES`, int [C]."""
+    place: np.ndarray
+    """Position and angle of the contact frame on its mount, [C, 3]."""
+    count: np.ndarray
+    """How many identical contacts share the state, [C]."""
+    state: np.ndarray
+    """Where the bristles of each contact begin in the state vector, int [C + 1]."""
+    linear: np.ndarray
+    """Where the linearisation of each contact begins in its workspace, int [C + 1]."""
+    cell: np.ndarray
+    """Where the cells of each contact begin in `x` and `y`, int [C + 1]."""
+    x: np.ndarray
+    y: np.ndarray
+    weights: np.ndarray
+    """Weights of the distributed contacts, one run of cells a shape, flat."""
+    weight_start: np.ndarray
+    """Where the weights of each shape begin, int [R]."""
+    shape: np.ndarray
+    """Reduced contacts: centre of pressure, r, <rho^2> of each shape, [R, 4]."""
+    surface: np.ndarray
+    """Reduced contacts: limit surface (kind, start, size) of each shape, int [R, 3]."""
+    data: np.ndarray
+    """Numbers of the limit surfaces, flat."""
+
+
+@jit
+def contact_map(mount, place, u, pose, a):
+    """Write `A`, with `V = A u`, into `a` [3, 3]."""
+    angle = place[2] + (pose[2] if mount == BODY else 0.0)
+    c, s = math.cos(angle), math.sin(angle)
+    if mount == WORLD:
+        dx, dy = place[0] - pose[0], place[1] - pose[1]
+    elif mount == BODY:
+        ct, st = math.cos(pose[2]), math.sin(pose[2])
+        dx, dy = ct * place[0] - st * place[1], st * place[0] + ct * place[1]
+    else:
+        dx, dy = place[0], place[1]
+    a[0, 0], a[0, 1], a[0, 2] = c, s, s * dx - c * dy
+    a[1, 0], a[1, 1], a[1, 2] = -s, c, s * dy + c * dx
+    a[2, 0], a[2, 1], a[2, 2] = 0.0, 0.0, 1.0
+
+
+@jit
+def contact_map_slopes(mount, a, u, w, g, h):
+    """Write `G = d(A u)/d pose` and `H = d(A' W)/d pose` into `g` and `h` [3, 3]."""
+    g[:] = 0.0
+    h[:] = 0.0
+    if mount == WORLD:
+        # the lever arm shortens as the body moves; world axes of the force
+        fx, fy = a[0, 0] * w[0] + a[1, 0] * w[1], a[0, 1] * w[0] + a[1, 1] * w[1]
+        g[0, 0], g[0, 1] = -u[2] * a[0, 1], u[2] * a[0, 0]
+        g[1, 0], g[1, 1] = -u[2] * a[1, 1], u[2] * a[1, 0]
+        h[2, 0], h[2, 1] = -fy, fx
+    elif mount == BODY:
+        # the contact's axes turn with the body
+        g[0, 2] = a[1, 0] * u[0] + a[1, 1] * u[1]
+        g[1, 2] = -(a[0, 0] * u[0] + a[0, 1] * u[1])
+        h[0, 2] = a[1, 0] * w[0] - a[0, 0] * w[1]
+        h[1, 2] = a[1, 1] * w[0] - a[0, 1] * w[1]
+
+
+@jit
+def evaluate(contacts, c, row, law, z, v, zdot, w):
+    """Bristle rates and wrench per unit load of contact c in shape `row` at the twist `v`."""
+    if contacts.kind[c] == DISTRIBUTED:
+        x, y, weights = _cells(contacts, c, row)
+        w[0], w[1], w[2] = distributed.evaluate(law, z, v[0], v[1], v[2], x, y, weights, zdot)
+    else:
+        w[0], w[1], w[2] = reduced.evaluate(
+            law, z, v[0], v[1], v[2], contacts.shape[row], contacts.surface[row], contacts.data, zdot
+        )
+
+
+@jit
+def linearise(contacts, c, row, law, z, v, lin):
+    """Linearise contact c in shape `row` at the twist `v` into its workspace `lin`."""
+    if contacts.kind[c] == DISTRIBUTED:
+        x, y, _ = _cells(contacts, c, row)
+        distributed.linearise(law, z, v[0], v[1], v[2], x, y, lin.reshape(7, x.shape[0]))
+    else:
+        reduced.linearise(law, z, v[0], v[1], v[2], contacts.shape[row], contacts.surface[row], contacts.data, lin)
+
+
+@jit
+def factor(contacts, c, row, law, z, shift, lin, stiffness):
+    """Prepare the elimination of the bristles of contact c and write its `d wrench / d twist` per unit load."""
+    if contacts.kind[c] == DISTRIBUTED:
+        x, y, weights = _cells(contacts, c, row)
+        distributed.factor(law, z, shift, x, y, weights, lin.reshape(7, x.shape[0]), stiffness)
+    else:
+        reduced.factor(law, shift, contacts.shape[row], lin, stiffness)
+
+
+@jit
+def eliminate(contacts, c, row, law, z, shift, r, lin, w):
+    """Wrench per unit load of contact c caused by its bristle residual `r`."""
+    if contacts.kind[c] == DISTRIBUTED:
+        x, y, weights = _cells(contacts, c, row)
+        w[0], w[1], w[2] = distributed.eliminate(law, z, shift, r, x, y, weights, lin.reshape(7, x.shape[0]))
+    else:
+        w[0], w[1], w[2] = reduced.eliminate(law, shift, r, contacts.shape[row], lin)
+
+
+@jit
+def back_substitute(contacts, c, row, z, shift, r, v, lin, out):
+    """Bristle solution of contact c for the residual `r` and the twist change `v`."""
+    if contacts.kind[c] == DISTRIBUTED:
+        x, y, _ = _cells(contacts, c, row)
+        distributed.back_substitute(z, r, v[0], v[1], v[2], x, y, lin.reshape(7, x.shape[0]), out)
+    else:
+        reduced.back_substitute(shift, r, v[0], v[1], v[2], contacts.shape[row], lin, out)
+
+
+@jit
+def _cells(contacts, c, row):
+    first, last = contacts.cell[c], contacts.cell[c + 1]
+    start = contacts.weight_start[row]
+    return contacts.x[first:last], contacts.y[first:last], contacts.weights[start : start + last - first]

@@ -1,0 +1,15 @@
+"""Limit surfaces: the friction wrench of every sliding twist, per unit `mu f_N`. They know shape, not friction."""
+
+from planarfriction.limit_surface.base import LimitSurface
+from planarfriction.limit_surface.cells import LimitSurfaceCells
+from planarfriction.limit_surface.ellipsoid import LimitSurfaceEllipsoid
+from planarfriction.limit_surface.table import LimitSurfaceTable
+from planarfriction.limit_surface.table_published import LimitSurfaceTablePublished
+
+__all__ = [
+    "LimitSurface",
+    "LimitSurfaceCells",
+    "LimitSurfaceEllipsoid",
+    "LimitSurfaceTable",
+    "LimitSurfaceTablePublished",
+]

@@ -1,0 +1,213 @@
+"""The protocol of all limit surfaces: wrench of a twist, dissipation, Jacobian, and twist of a wrench."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import math
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.errors import InvalidValueError
+from planarfriction.kernels import surfaces as kernels
+from planarfriction.patch import ContactPatch
+
+_FULL_BALANCE = 1e-12
+"""The twist of a wrench is found when its wrench is parallel to the given one to this angle [rad]."""
+
+
+class SurfaceNumbers(NamedTuple):
+    """A limit surface as compiled loops see it: `kernels.surfaces` says what the numbers mean."""
+
+    kind: int
+    size: int
+    data: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class LimitSurface:
+    """Set of friction wrenches of a sliding patch, per unit `mu f_N`: `W(V) = -d Phi/d V`, `Phi(V) = sum w_i |v_i|`.
+
+    Twists `(vx, vy, omega)` [m/s, m/s, rad/s] and wrenches `(fx, fy, tau)` [1, 1, m] are about the contact frame's origin
+    and act on the moving body; leading axes broadcast. `normal_force` [N] fixes the shape of a patch that depends on the
+    load; leave it out otherwise. A patch of one point has no limit surface (its contact radius is zero).
+
+    Source: Goyal, Ruina, Papadopoulos 1991.
+    """
+
+    patch: ContactPatch
+    normal_force: float | None = dataclasses.field(default=None, kw_only=True)
+
+    kind: ClassVar[int]
+    """Kind of `kernels.surfaces`."""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.patch, ContactPatch):
+            raise InvalidValueError("patch", "be a ContactPatch", self.patch)
+        if self.normal_force is not None:
+            object.__setattr__(self, "normal_force", validation.positive("normal_force", self.normal_force))
+        if self.normal_force is not None or not self.patch.depends_on_load:
+            _ = self.contact_radius  # refuses a patch of one point now rather than later
+
+    def at(self, normal_force: float) -> LimitSurface:
+        """The same kind of surface for the shape at another load; itself where the shape does not depend on it."""
+        if not self.patch.depends_on_load:
+            return self
+        return dataclasses.replace(self, normal_force=float(normal_force))
+
+    @functools.cached_property
+    def centre_of_pressure(self) -> np.ndarray:
+        """Centre of pressure `[2]` [m]."""
+        return self.patch.centre_of_pressure(self.normal_force)
+
+    @functools.cached_property
+    def contact_radius(self) -> float:
+        """`r = |tau|` of a spin about the centre of pressure [m]: scales the torque axis."""
+        radius = self._radius()
+        if not radius > 0.0:
+            raise InvalidValueError("patch", "have a contact radius > 0 (more than one point)", f"r={radius}")
+        return radius
+
+    def _radius(self) -> float:
+        return float(self.patch.contact_radius(self.normal_force))
+
+    @functools.cached_property
+    def numbers(self) -> SurfaceNumbers:
+        """The stored surface for compiled loops, built on first use."""
+        raise NotImplementedError
+
+    def _loaded_cells(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Positions about the centre of pressure and weights of the cells that carry load."""
+        weights = self.patch.weights(self.normal_force)
+        loaded = weights > 0.0
+        offset = self.patch.positions[loaded] - self.centre_of_pressure
+        return np.ascontiguousarray(offset[:, 0]), np.ascontiguousarray(offset[:, 1]), weights[loaded]
+
+    # ------------------------------------------------------------------ the protocol
+
+    def wrench(self, twist) -> np.ndarray:
+        """Friction wrench `W(V)` on the moving body, shape `[..., 3]` [1, 1, m]; zero at rest.
+
+        Raises `InvalidValueError` if `twist` is not finite or not of shape `[..., 3]`.
+        """
+        scaled, frame = self._scaled(twist)
+        return -self._direction(scaled) @ frame
+
+    def dissipation(self, twist) -> np.ndarray:
+        """Dissipated power `Phi(V) = -W . V >= 0` per unit `mu f_N`, shape `[...]` [m/s]."""
+        scaled, _ = self._scaled(twist)
+        return np.einsum("...i,...i", self._direction(scaled), scaled)
+
+    def jacobian(self, twist) -> np.ndarray:
+        """`dW/dV`, shape `[..., 3, 3]`; zero along `V` itself and undefined at rest, where it is returned as zero."""
+        scaled, frame = self._scaled(twist)
+        flat = scaled.reshape(-1, 3)
+        return -(frame.T @ self._direction_slope(flat) @ frame).reshape(*scaled.shape[:-1], 3, 3)
+
+    def twist(self, wrench) -> np.ndarray:
+        """Twist normal to the surface where the ray of `wrench` meets it, of unit dissipation, shape `[..., 3]`.
+
+        `argmin Phi(V)` subject to `-W . V = 1`, scaled to `Phi(V) = 1`; the magnitude of `wrench` does not matter.
+
+        Raises `InvalidValueError` if `wrench` is zero, not finite or not of shape `[..., 3]`.
+        """
+        wrench = _rows("wrench", wrench)
+        if not (np.abs(wrench).max(axis=-1) > 0.0).all():
+            raise InvalidValueError("wrench", "not be zero", wrench.tolist())
+        frame = self._frame()
+        # conjugate coordinates: force and torque / r about the centre of pressure; -h balances the wrench
+        balanced = -np.linalg.solve(frame.T, wrench.reshape(-1, 3).T).T
+        balanced /= np.linalg.norm(balanced, axis=1)[:, None]
+        found = np.array([self._scaled_twist_of(target) for target in balanced])
+        found /= np.einsum("ni,ni->n", self._direction(found), found)[:, None]
+        return np.linalg.solve(frame, found.T).T.reshape(wrench.shape)
+
+    # ------------------------------------------------------------------ scaled coordinates
+
+    def _frame(self) -> np.ndarray:
+        """`V_S = frame @ V`: from the origin to the centre of pressure, spin times the contact radius."""
+        return scaling(self.centre_of_pressure, self.contact_radius)
+
+    def _scaled(self, twist) -> tuple[np.ndarray, np.ndarray]:
+        frame = self._frame()
+        return _rows("twist", twist) @ frame.T, frame
+
+    def _direction(self, scaled: np.ndarray) -> np.ndarray:
+        """`h` of scaled twists `[..., 3]`."""
+        flat = np.ascontiguousarray(scaled.reshape(-1, 3))
+        u = np.empty_like(flat)
+        kernels.sliding_batch(self.kind, self.numbers.data, 0, self.numbers.size, flat, u)
+        speed = np.linalg.norm(flat, axis=1)
+        return (u / np.where(speed > 0.0, speed, 1.0)[:, None]).reshape(scaled.shape)
+
+    def _scaled_twist_of(self, target: np.ndarray) -> np.ndarray:
+        """Direction of the scaled twist whose `h` is parallel to the unit vector `target`.
+
+        Minimises the convex `Phi` over the plane `target . V = 1` by damped Newton steps from the ellipsoid's answer.
+        """
+        basis = _plane(target)
+        place = np.zeros(2)
+        value = math.inf
+        for _ in range(60):
+            point = target + place @ basis
+            h = self._direction(point[None])[0]
+            value, slope = float(h @ point), basis @ h
+            if np.linalg.norm(slope) < _FULL_BALANCE:
+                break
+            hessian = basis @ self._direction_slope(point[None])[0] @ basis.T
+            shift = 1e-12 * np.trace(hessian)
+            move = -np.linalg.solve(hessian + shift * np.eye(2), slope)
+            if not np.isfinite(move).all() or move @ slope >= 0.0:
+                move = -slope
+            length = 1.0
+            while length > 1e-14:
+                trial = target + (place + length * move) @ basis
+                if float(self._direction(trial[None])[0] @ trial) < value - 1e-4 * length * abs(move @ slope):
+                    break
+                length *= 0.5
+            else:
+                break
+            place = place + length * move
+        return target + place @ basis
+
+    def _sliding_slope(self, scaled: np.ndarray) -> np.ndarray:
+        """`du/dV_S` of `u = h |V_S|` for scaled twists `[M, 3]`, shape `[M, 3, 3]`."""
+        slopes = np.empty((len(scaled), 9))
+        numbers = self.numbers
+        kernels.sliding_jacobian_batch(
+            self.kind, numbers.data, 0, numbers.size, np.ascontiguousarray(scaled), slopes
+        )
+        return slopes.reshape(-1, 3, 3)
+
+    def _direction_slope(self, scaled: np.ndarray) -> np.ndarray:
+        """`dh/dV_S` for scaled twists `[M, 3]`, shape `[M, 3, 3]`; zero at rest."""
+        speed = np.linalg.norm(scaled, axis=1)
+        safe = np.where(speed > 0.0, speed, 1.0)
+        along = np.einsum("mi,mj->mij", self._direction(scaled), scaled / safe[:, None])
+        slope = (self._sliding_slope(scaled) - along) / safe[:, None, None]
+        return np.where((speed > 0.0)[:, None, None], slope, 0.0)
+
+
+def scaling(centre_of_pressure: np.ndarray, contact_radius: float) -> np.ndarray:
+    """`F` of `V_S = F V`: from the contact frame's origin to the centre of pressure, spin times the contact radius."""
+    x, y = centre_of_pressure
+    return np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, contact_radius]])
+
+
+def _plane(normal: np.ndarray) -> np.ndarray:
+    """Two unit vectors `[2, 3]` that span the plane across the unit vector `normal`."""
+    first = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
+    first /= np.linalg.norm(first)
+    return np.stack([first, np.cross(normal, first)])
+
+
+def _rows(name: str, value) -> np.ndarray:
+    result = np.asarray(value, dtype=float)
+    if result.ndim == 0 or result.shape[-1] != 3:
+        raise InvalidValueError(name, "have shape [..., 3]", f"shape {list(result.shape)}")
+    if not np.isfinite(result).all():
+        raise InvalidValueError(name, "be finite", result.tolist())
+    return result

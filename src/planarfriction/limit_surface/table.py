@@ -1,0 +1,38 @@
+"""A stored limit surface, smooth and exactly passive."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.kernels import surfaces as kernels
+from planarfriction.kernels import tables
+from planarfriction.limit_surface.base import LimitSurface, SurfaceNumbers
+
+
+@dataclass(frozen=True, eq=False)
+class LimitSurfaceTable(LimitSurface):
+    """Stored limit surface: dissipation and its gradient at `segments` x `4 segments` directions, bicubic in between.
+
+    The potential is interpolated and the wrench is its gradient, so that `-W . V = Phi(V) > 0` and the Jacobian is
+    symmetric at every twist; nodes are plain sums over the cells.
+    """
+
+    segments: int = 20
+    """Segments of a quadrant [-]."""
+
+    kind = kernels.POTENTIAL
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "segments", validation.count("segments", self.segments, at_least=2))
+        super().__post_init__()
+
+    @functools.cached_property
+    def numbers(self) -> SurfaceNumbers:
+        """Potential, its derivatives along both angles and the mixed one at the nodes."""
+        nodes = np.empty((self.segments + 1, 4 * self.segments + 1, 4))
+        tables.potential_nodes(*self._loaded_cells(), self.contact_radius, self.segments, nodes)
+        return SurfaceNumbers(self.kind, self.segments, nodes.reshape(-1))

@@ -1,0 +1,89 @@
+"""What every friction model offers, and the checks of its inputs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from planarfriction.errors import InvalidValueError
+from planarfriction.laws import LuGre
+from planarfriction.patch import ContactPatch
+
+
+class ModelJacobians(NamedTuple):
+    """Derivatives of the bristle rates and of the wrench; `[*s]` is the shape of the state without batch axes."""
+
+    rate_state: np.ndarray
+    """d rate / d state: distributed `[..., 2, 2, N]` (cell by cell), reduced `[..., 3, 3]`."""
+    rate_twist: np.ndarray
+    """d rate / d twist: distributed `[..., 2, N, 3]`, reduced `[..., 3, 3]`."""
+    rate_load: np.ndarray
+    """d rate / d normal_force of a fixed shape: zero, `[..., *s]`."""
+    wrench_state: np.ndarray
+    """d wrench / d state: distributed `[..., 3, 2, N]`, reduced `[..., 3, 3]`."""
+    wrench_twist: np.ndarray
+    """d wrench / d twist at a held state, `[..., 3, 3]`."""
+    wrench_load: np.ndarray
+    """d wrench / d normal_force of a fixed shape, `[..., 3]`."""
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionModel:
+    """A patch with a friction law; the caller holds the state.
+
+    Twists and wrenches are about the contact frame's origin; the wrench acts on the moving body. Leading batch axes of
+    state, twist `[..., 3]`, normal_force `[...]` and dt `[...]` broadcast. The bristles of a contact without load
+    (`normal_force == 0`) go on moving while `rate` is integrated, as published; `step` and `simulate` forget them: a
+    contact that loses its load starts again from rest.
+    """
+
+    patch: ContactPatch
+    law: LuGre
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.patch, ContactPatch):
+            raise InvalidValueError("patch", "be a ContactPatch", self.patch)
+        if not isinstance(self.law, LuGre):
+            raise InvalidValueError("law", "be a LuGre law", self.law)
+
+    @property
+    def state_shape(self) -> tuple[int, ...]:
+        """Shape of the state of one contact."""
+        raise NotImplementedError
+
+    def rest(self) -> np.ndarray:
+        """State of a contact at rest: no bristle is deflected."""
+        return np.zeros(self.state_shape)
+
+    def _inputs(self, state, twist, normal_force, **more) -> list[np.ndarray]:
+        """Check the inputs and broadcast their batch axes against each other."""
+        state = np.asarray(state, dtype=float)
+        twist = np.asarray(twist, dtype=float)
+        inner = self.state_shape
+        if state.shape[state.ndim - len(inner) :] != inner:
+            wanted = ", ".join(str(n) for n in inner)
+            raise InvalidValueError("state", f"have shape [..., {wanted}]", f"shape {list(state.shape)}")
+        if twist.shape[-1:] != (3,):
+            raise InvalidValueError("twist", "have shape [..., 3]", f"shape {list(twist.shape)}")
+        scalars = {"normal_force": normal_force, **more}
+        arrays = {name: np.asarray(value, dtype=float) for name, value in scalars.items()}
+        for name, value in {"state": state, "twist": twist, **arrays}.items():
+            if not np.isfinite(value).all():
+                raise InvalidValueError(name, "be finite", value.tolist() if value.size < 10 else "NaN or infinity")
+        for name, value in arrays.items():
+            if (value < 0.0).any():
+                raise InvalidValueError(name, "be >= 0", float(value.min()))
+        try:
+            batch = np.broadcast_shapes(
+                state.shape[: state.ndim - len(inner)], twist.shape[:-1], *(v.shape for v in arrays.values())
+            )
+        except ValueError:
+            shapes = ", ".join(str(list(v.shape)) for v in (state, twist, *arrays.values()))
+            raise InvalidValueError("batch axes", "broadcast", f"shapes {shapes}") from None
+        return [
+            np.broadcast_to(state, batch + inner),
+            np.broadcast_to(twist, (*batch, 3)),
+            *(np.broadcast_to(value, batch) for value in arrays.values()),
+        ]

@@ -1,0 +1,141 @@
+"""The distributed model: one two-dimensional bristle in every cell of the patch."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+
+from planarfriction import formulas
+from planarfriction.kernels import distributed as kernels
+from planarfriction.kernels.law import law_numbers
+from planarfriction.models.base import FrictionModel, ModelJacobians
+
+
+@dataclass(frozen=True, eq=False)
+class DistributedModel(FrictionModel):
+    """Distributed LuGre friction, exact for the patch it is given.
+
+    `zdot_i = v_i - beta sigma_0 |v_i| / g z_i`, `W = sum w_i f_N [t_i ; rho_i x t_i]`,
+    `t_i = -(sigma_0 z_i + sigma_1 zdot_i + sigma_2 v_i)`. State: bristle deflections `[2, N]` [m], x then y.
+
+    Source: Waltersson and Karayiannidis 2024, section III.
+    """
+
+    @property
+    def state_shape(self) -> tuple[int, ...]:
+        """`(2, N)` for the N cells that can carry load."""
+        return (2, len(self.patch.positions))
+
+    def rate(self, state, twist, normal_force) -> np.ndarray:
+        """Bristle rates `zdot`, shape `[..., 2, N]` [m/s]."""
+        state, twist, _ = self._inputs(state, twist, normal_force)
+        return self._rate(state, self._cell_velocity(twist))
+
+    def wrench(self, state, twist, normal_force) -> np.ndarray:
+        """Friction wrench on the moving body, shape `[..., 3]` [N, N, N m]."""
+        state, twist, load = self._inputs(state, twist, normal_force)
+        velocity = self._cell_velocity(twist)
+        law = self.law
+        force = formulas.traction(
+            state, self._rate(state, velocity), velocity, law.sigma_0, law.sigma_1, law.sigma_2
+        )
+        return np.einsum("...cn,dcn->...d", force * (load[..., None] * self.patch.weights(load))[..., None, :], self._lever)
+
+    def step(self, state, twist, normal_force, dt) -> tuple[np.ndarray, np.ndarray]:
+        """Advance by `dt` [s] at a held twist: the new state and the wrench at the end, stable at any `dt`.
+
+        Plain LuGre is linear in z and its step exact. Elasto-plastic: the exponential step with the mean decay of start
+        and predicted end, second order, kept within the largest deflection so that nothing overshoots.
+        """
+        state, twist, load, dt = self._inputs(state, twist, normal_force, dt=dt)
+        batch = load.shape
+        flat = np.ascontiguousarray(state.reshape(-1, 2 * state.shape[-1]))
+        out, wrench = np.empty_like(flat), np.empty((len(flat), 3))
+        weights = np.atleast_2d(self.patch.weights(load.reshape(-1)) if self.patch.depends_on_load else self.patch.weights())
+        x, y = self._xy
+        kernels.step_batch(
+            law_numbers(self.law),
+            flat,
+            np.ascontiguousarray(twist.reshape(-1, 3)),
+            x,
+            y,
+            np.ascontiguousarray(weights),
+            np.ascontiguousarray(load.reshape(-1)),
+            np.ascontiguousarray(dt.reshape(-1)),
+            out,
+            wrench,
+        )
+        return out.reshape(state.shape), wrench.reshape(*batch, 3)
+
+    def jacobians(self, state, twist, normal_force) -> ModelJacobians:
+        """Analytic derivatives of `rate` and `wrench` (see `ModelJacobians`); at kinks a one-sided derivative."""
+        state, twist, load = self._inputs(state, twist, normal_force)
+        law = self.law
+        velocity = self._cell_velocity(twist)
+        k, k_z, k_v = self._decay_slopes(state, velocity)
+        identity = np.eye(2)[:, :, None]
+        rate_state = -k[..., None, None, :] * identity - state[..., :, None, :] * k_z[..., None, :, :]
+        rate_velocity = identity - state[..., :, None, :] * k_v[..., None, :, :]
+        rate_twist = np.einsum("...abn,dbn->...and", rate_velocity, self._lever)
+        share = load[..., None] * self.patch.weights(load)
+        force_state = -(law.sigma_0 * identity + law.sigma_1 * rate_state) * share[..., None, None, :]
+        force_velocity = -(law.sigma_2 * identity + law.sigma_1 * rate_velocity) * share[..., None, None, :]
+        unit = self.wrench(state, twist, np.ones_like(load)) if not self.patch.depends_on_load else np.divide(
+            self.wrench(state, twist, load), load[..., None], out=np.zeros((*load.shape, 3)), where=load[..., None] > 0
+        )
+        return ModelJacobians(
+            rate_state,
+            rate_twist,
+            np.zeros_like(state),
+            np.einsum("dan,...abn->...dbn", self._lever, force_state),
+            np.einsum("dan,...abn,ebn->...de", self._lever, force_velocity, self._lever),
+            unit,
+        )
+
+    # ------------------------------------------------------------------ cells
+
+    @functools.cached_property
+    def _xy(self) -> tuple[np.ndarray, np.ndarray]:
+        return np.ascontiguousarray(self.patch.positions[:, 0]), np.ascontiguousarray(self.patch.positions[:, 1])
+
+    @functools.cached_property
+    def _lever(self) -> np.ndarray:
+        """`P` `[3, 2, N]`: cell velocity is `P' V`, wrench of a cell force `P f`."""
+        x, y = self._xy
+        one, zero = np.ones_like(x), np.zeros_like(x)
+        return np.array([[one, zero], [zero, one], [-y, x]])
+
+    def _cell_velocity(self, twist: np.ndarray) -> np.ndarray:
+        return np.einsum("...d,dcn->...cn", twist, self._lever)
+
+    def _norms(self, state: np.ndarray, velocity: np.ndarray):
+        """`z/|z|`, `|z|`, its projection of the velocity, the speed and `g/sigma_0`, per cell."""
+        law = self.law
+        z_norm, speed = np.hypot(state[..., 0, :], state[..., 1, :]), np.hypot(velocity[..., 0, :], velocity[..., 1, :])
+        unit = state / np.where(z_norm > 0.0, z_norm, 1.0)[..., None, :]
+        strength = formulas.stribeck(np, speed, law.mu_c, law.mu_s, law.v_s, law.gamma) / law.sigma_0
+        return unit, z_norm, (unit * velocity).sum(axis=-2), speed, strength
+
+    def _rate(self, state: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+        numbers = law_numbers(self.law)
+        _, z_norm, along, speed, strength = self._norms(state, velocity)
+        k = formulas.bristle_decay(
+            np, z_norm, along, speed, strength, strength, numbers.elasto_plastic, numbers.breakaway_ratio
+        )
+        return velocity - k[..., None, :] * state
+
+    def _decay_slopes(self, state: np.ndarray, velocity: np.ndarray):
+        """`k` `[..., N]` and its gradients with respect to the cell's bristle and velocity `[..., 2, N]`."""
+        law, numbers = self.law, law_numbers(self.law)
+        unit, z_norm, along, speed, strength = self._norms(state, velocity)
+        k, k_z_norm, k_along, k_speed, k_z_max, k_strength = formulas.bristle_decay_partials(
+            np, z_norm, along, speed, strength, strength, numbers.elasto_plastic, numbers.breakaway_ratio
+        )
+        slope = formulas.stribeck_slope(np, speed, law.mu_c, law.mu_s, law.v_s, law.gamma) / law.sigma_0
+        heading = velocity / np.where(speed > 0.0, speed, 1.0)[..., None, :]
+        turn = (velocity - along[..., None, :] * unit) / np.where(z_norm > 0.0, z_norm, 1.0)[..., None, :]
+        k_z = k_z_norm[..., None, :] * unit + k_along[..., None, :] * turn
+        k_v = k_along[..., None, :] * unit + (k_speed + (k_z_max + k_strength) * slope)[..., None, :] * heading
+        return k, k_z, k_v

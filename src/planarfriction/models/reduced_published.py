@@ -1,0 +1,242 @@
+"""The reduced model as published: three bristles and a limit surface."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from planarfriction import formulas, validation
+from planarfriction.errors import InvalidValueError
+from planarfriction.kernels import reduced as kernels
+from planarfriction.kernels.law import law_numbers, law_row
+from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
+from planarfriction.limit_surface.base import scaling
+from planarfriction.models.base import FrictionModel, ModelJacobians
+
+ON_LOAD_CHANGE = ("rebuild", "rescale", "keep")
+
+
+class ReducedShape(NamedTuple):
+    """What the reduced model knows of its patch at one load."""
+
+    centre_of_pressure: np.ndarray
+    """[2] [m]"""
+    contact_radius: float
+    """r [m]; of the published table as published."""
+    second_moment: float
+    """<rho^2> [m^2]"""
+    surface: LimitSurface
+
+    @property
+    def numbers(self) -> np.ndarray:
+        """The shape as compiled loops see it."""
+        return np.array([*self.centre_of_pressure, self.contact_radius, self.second_moment])
+
+
+@dataclass(frozen=True, eq=False)
+class ReducedModelPublished(FrictionModel):
+    """Reduced LuGre friction: three bristles, conjugate to the wrench at the centre of pressure, and a limit surface.
+
+    With `S = diag(1, 1, r)`, `V_S = S V`, `v_n = |V_S|` and `h(V)` the direction of the sliding wrench:
+    `zdot = S h v_n - beta sigma_0 v_n / g(v_n) z`, `W = -(sigma_0 z + sigma_1 zdot + sigma_2 U V) f_N`,
+    `U = diag(1, 1, <rho^2>)`. State: `(z_x, z_y, z_tau)` [m, m, m^2].
+
+    A patch that depends on the load: `on_load_change="rebuild"` follows the load with everything, `"rescale"` keeps the
+    limit surface and `<rho^2>` of `surface.normal_force` and lets only `r` (and the centre of pressure) follow,
+    `"keep"` keeps all. The raw state is kept when `r` changes.
+
+    Source: Waltersson and Karayiannidis 2024, section IV.
+    """
+
+    surface: LimitSurface | None = None
+    """Limit surface; None takes the published table of the patch."""
+    on_load_change: str = "rebuild"
+    """What follows the load where the patch depends on it: "rebuild", "rescale" or "keep"."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        validation.choice("on_load_change", self.on_load_change, ON_LOAD_CHANGE)
+        if self.surface is None:
+            object.__setattr__(self, "surface", LimitSurfaceTablePublished(self.patch))
+        if not isinstance(self.surface, LimitSurface):
+            raise InvalidValueError("surface", "be a limit surface", self.surface)
+        if self.patch.depends_on_load and self.on_load_change != "rebuild" and self.surface.normal_force is None:
+            raise InvalidValueError("surface", f"have a normal_force when on_load_change={self.on_load_change!r}", "none")
+
+    @property
+    def state_shape(self) -> tuple[int, ...]:
+        """`(3,)`"""
+        return (3,)
+
+    def shape_at(self, normal_force: float) -> ReducedShape:
+        """Centre of pressure, `r`, `<rho^2>` and limit surface at a load [N]; recent loads are remembered."""
+        if not self.patch.depends_on_load or self.on_load_change == "keep":
+            return self._reference
+        return self._recent(float(normal_force))
+
+    def rate(self, state, twist, normal_force) -> np.ndarray:
+        """Bristle rates `zdot`, shape `[..., 3]` [m/s, m/s, m^2/s]."""
+        return self._by_load(self._rate, (3,), *self._inputs(state, twist, normal_force))
+
+    def wrench(self, state, twist, normal_force) -> np.ndarray:
+        """Friction wrench on the moving body, shape `[..., 3]` [N, N, N m]."""
+        return self._by_load(self._wrench, (3,), *self._inputs(state, twist, normal_force))
+
+    def jacobians(self, state, twist, normal_force) -> ModelJacobians:
+        """Analytic derivatives of `rate` and `wrench` (see `ModelJacobians`); at kinks a one-sided derivative."""
+        packed = self._by_load(self._jacobians, (14, 3), *self._inputs(state, twist, normal_force))
+        square = [packed[..., i : i + 3, :] for i in (0, 3, 6, 9)]
+        return ModelJacobians(square[0], square[1], packed[..., 12, :], square[2], square[3], packed[..., 13, :])
+
+    def step(self, state, twist, normal_force, dt) -> tuple[np.ndarray, np.ndarray]:
+        """Advance by `dt` [s] at a held twist: the new state and the wrench at the end, stable at any `dt`.
+
+        Plain LuGre is linear in z and its step exact. Elasto-plastic: the exponential step with the mean decay of start
+        and predicted end, second order, kept within the largest deflection so that nothing overshoots.
+        """
+        if type(state) is np.ndarray and state.shape == (3,) and self._fixed is not None and len(twist) == 3:
+            law, shape, surface, data = self._fixed
+            valid, out, wrench = kernels.step_one(law, shape, surface, data, state, *twist, normal_force, dt)
+            if valid:
+                return out, wrench
+        state, twist, load, dt = self._inputs(state, twist, normal_force, dt=dt)
+        packed = self._by_load(self._step, (6,), state, twist, load, dt)
+        return packed[..., :3], packed[..., 3:]
+
+    # ------------------------------------------------------------------ one shape
+
+    @functools.cached_property
+    def _reference(self) -> ReducedShape:
+        surface = self.surface
+        second_moment = float(self.patch.second_moment(surface.normal_force))
+        return ReducedShape(surface.centre_of_pressure, surface.contact_radius, second_moment, surface)
+
+    @functools.cached_property
+    def _recent(self) -> Callable[[float], ReducedShape]:
+        return functools.lru_cache(maxsize=64)(self._shape_at)
+
+    def _shape_at(self, normal_force: float) -> ReducedShape:
+        validation.positive("normal_force", normal_force)
+        surface = self.surface.at(normal_force)
+        kept = self._reference if self.on_load_change == "rescale" else None
+        return ReducedShape(
+            surface.centre_of_pressure,
+            surface.contact_radius,
+            float(self.patch.second_moment(normal_force)) if kept is None else kept.second_moment,
+            surface if kept is None else kept.surface,
+        )
+
+    @functools.cached_property
+    def _fixed(self) -> tuple | None:
+        """Arrays of the compiled step of a patch that does not depend on the load."""
+        if self.patch.depends_on_load:
+            return None
+        shape = self._reference
+        numbers = shape.surface.numbers
+        return law_row(self.law), shape.numbers, np.array([numbers.kind, 0, numbers.size]), numbers.data
+
+    def _by_load(self, function, inner: tuple[int, ...], state, twist, load, *more) -> np.ndarray:
+        """Apply `function(shape, state, twist, load, ...)` to flat batches, one for each shape that the loads take."""
+        result = np.zeros((*load.shape, *inner))
+        flat = [np.ascontiguousarray(a.reshape(load.size, *a.shape[load.ndim :])) for a in (state, twist, load, *more)]
+        out = result.reshape(load.size, *inner)
+        if not self.patch.depends_on_load or self.on_load_change == "keep":
+            out[:] = function(self._reference, *flat)
+        else:
+            for value in np.unique(flat[2][flat[2] > 0.0]):
+                chosen = flat[2] == value
+                out[chosen] = function(self.shape_at(value), *(a[chosen] for a in flat))
+        return out.reshape(result.shape)
+
+    def _scaled(self, shape: ReducedShape, state, twist):
+        """Scaled state and twist `[B, 3]`, `u = h v_n`, and the arguments of the bristle equation."""
+        law, scale = self.law, np.array([1.0, 1.0, shape.contact_radius])
+        v_s = twist @ scaling(shape.centre_of_pressure, shape.contact_radius).T
+        v_n = np.linalg.norm(v_s, axis=-1)
+        h = shape.surface._direction(v_s)
+        h_norm = np.where(v_n > 0.0, np.linalg.norm(h, axis=-1), 1.0)
+        z = state / scale
+        z_norm = np.linalg.norm(z, axis=-1)
+        unit = z / np.where(z_norm > 0.0, z_norm, 1.0)[:, None]
+        along = (unit * h).sum(axis=-1) * v_n / h_norm
+        strength = formulas.stribeck(np, v_n, law.mu_c, law.mu_s, law.v_s, law.gamma) / law.sigma_0
+        return z, v_s, h, v_n, h_norm, unit, (z_norm, along, v_n, h_norm * strength, strength)
+
+    def _rate(self, shape: ReducedShape, state, twist, load) -> np.ndarray:
+        numbers = law_numbers(self.law)
+        z, _, h, v_n, _, _, arguments = self._scaled(shape, state, twist)
+        k = formulas.bristle_decay(np, *arguments, numbers.elasto_plastic, numbers.breakaway_ratio)
+        return (h * v_n[:, None] - k[:, None] * z) * np.array([1.0, 1.0, shape.contact_radius])
+
+    def _wrench(self, shape: ReducedShape, state, twist, load) -> np.ndarray:
+        law = self.law
+        rate = self._rate(shape, state, twist, load)
+        to_centre, viscous = self._to_centre(shape)
+        velocity = twist @ to_centre.T * viscous
+        centred = formulas.traction(state, rate, velocity, law.sigma_0, law.sigma_1, law.sigma_2)
+        return load[:, None] * centred @ to_centre
+
+    @staticmethod
+    def _to_centre(shape: ReducedShape) -> tuple[np.ndarray, np.ndarray]:
+        """The twist at the centre of pressure is `T V`, the wrench about the origin `T' W`; and the diagonal of U."""
+        x, y = shape.centre_of_pressure
+        return np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]]), np.array([1.0, 1.0, shape.second_moment])
+
+    def _jacobians(self, shape: ReducedShape, state, twist, load) -> np.ndarray:
+        law, numbers = self.law, law_numbers(self.law)
+        scale = np.array([1.0, 1.0, shape.contact_radius])
+        z, v_s, h, v_n, h_norm, unit, arguments = self._scaled(shape, state, twist)
+        z_norm, along = arguments[0], arguments[1]
+        k, k_z_norm, k_along, k_speed, k_z_max, k_strength = (
+            value[:, None]
+            for value in formulas.bristle_decay_partials(
+                np, *arguments, numbers.elasto_plastic, numbers.breakaway_ratio
+            )
+        )
+        u_slope = shape.surface._sliding_slope(v_s)
+        heading = v_s / np.where(v_n > 0.0, v_n, 1.0)[:, None]
+        h_unit = h / h_norm[:, None]
+        h_norm_slope = np.einsum("bi,bij->bj", h_unit, u_slope) - h_norm[:, None] * heading
+        h_norm_slope /= np.where(v_n > 0.0, v_n, 1.0)[:, None]
+        along_slope = (np.einsum("bi,bij->bj", unit, u_slope) - along[:, None] * h_norm_slope) / h_norm[:, None]
+        turn = (h_unit * v_n[:, None] - along[:, None] * unit) / np.where(z_norm > 0.0, z_norm, 1.0)[:, None]
+        k_z = k_z_norm * unit + k_along * turn
+        slope = formulas.stribeck_slope(np, v_n, law.mu_c, law.mu_s, law.v_s, law.gamma)[:, None] / law.sigma_0
+        strength = arguments[4][:, None]
+        k_v = (k_speed + (k_strength + k_z_max * h_norm[:, None]) * slope) * heading
+        k_v += k_z_max * strength * h_norm_slope + k_along * along_slope
+        rate_state = -k[:, :, None] * np.eye(3) - z[:, :, None] * k_z[:, None, :]
+        rate_state = scale[:, None] * rate_state / scale
+        to_centre, viscous = self._to_centre(shape)
+        rate_twist = scale[:, None] * (u_slope - z[:, :, None] * k_v[:, None, :]) * scale @ to_centre
+        pull = law.sigma_0 * np.eye(3) + law.sigma_1 * rate_state
+        push = law.sigma_1 * rate_twist + law.sigma_2 * np.diag(viscous) @ to_centre
+        weight = -load[:, None, None]
+        unit_wrench = self._wrench(shape, state, twist, np.ones_like(load))
+        zero = np.zeros((len(load), 1, 3))
+        return np.concatenate(
+            [rate_state, rate_twist, weight * (to_centre.T @ pull), weight * (to_centre.T @ push), zero,
+             unit_wrench[:, None, :]],
+            axis=1,
+        )  # fmt: skip
+
+    def _step(self, shape: ReducedShape, state, twist, load, dt) -> np.ndarray:
+        numbers = shape.surface.numbers
+        out, wrench = np.empty_like(state), np.empty_like(state)
+        kernels.step_batch(
+            law_row(self.law),
+            shape.numbers,
+            np.array([numbers.kind, 0, numbers.size]),
+            numbers.data,
+            state,
+            twist,
+            load,
+            dt,
+            out,
+            wrench,
+        )
+        return np.concatenate([out, wrench], axis=1)

@@ -1,0 +1,193 @@
+"""From a scene to the flat arrays of the compiled solver."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from planarfriction.kernels import contacts as kernels
+from planarfriction.kernels.contacts import Contacts
+from planarfriction.kernels.law import law_row
+from planarfriction.kernels.rosenbrock import Motion
+from planarfriction.models import DistributedModel, ReducedModelPublished
+
+SHAPE_INTERVAL = 1e-3
+"""Longest time [s] that a patch which depends on a continuously changing load keeps its shape; held loads need no limit."""
+
+
+class PackedScene(NamedTuple):
+    """A scene as the solver sees it."""
+
+    contacts: Contacts
+    motion: Motion
+    state: np.ndarray
+    """Bristles at rest, body velocity, pose."""
+    natural: np.ndarray
+    """Natural scale of each state: mu_c/sigma_0 for deflections and positions, v_s for velocities, over r for angles."""
+    loaded: list[np.ndarray]
+    """Distributed contacts: which cells of the model ever carry load and have bristles here; reduced: empty."""
+
+
+class _Shapes:
+    """Collects the shapes of all contacts, flat."""
+
+    def __init__(self) -> None:
+        self.weights: list[np.ndarray] = []
+        self.weight_start: list[int] = []
+        self.shape: list[np.ndarray] = []
+        self.surface: list[tuple[int, int, int]] = []
+        self.data: list[np.ndarray] = []
+        self._size = {"weights": 0, "data": 0}
+        self._stored: dict[int, int] = {}
+
+    def add_distributed(self, weights: np.ndarray) -> int:
+        self.weight_start.append(self._size["weights"])
+        self.weights.append(weights)
+        self._size["weights"] += len(weights)
+        self.shape.append(np.zeros(4))
+        self.surface.append((0, 0, 0))
+        return len(self.shape) - 1
+
+    def add_reduced(self, shape) -> int:
+        numbers = shape.surface.numbers
+        if id(numbers.data) not in self._stored:
+            self._stored[id(numbers.data)] = self._size["data"]
+            self.data.append(numbers.data)
+            self._size["data"] += len(numbers.data)
+        self.weight_start.append(0)
+        self.shape.append(shape.numbers)
+        self.surface.append((numbers.kind, self._stored[id(numbers.data)], numbers.size))
+        return len(self.shape) - 1
+
+
+def breaks_of(scene, t_end: float) -> np.ndarray:
+    """Times at which an input may jump or bend, from 0 to `t_end`, refined where a shape follows a continuous load."""
+    signals = [contact.normal_force for contact in scene.contacts]
+    signals += [signal for signal in (scene.force, scene.velocity) if signal is not None]
+    inside = np.concatenate([signal.breaks for signal in signals])
+    breaks = np.unique(np.concatenate([[0.0, t_end], inside[(inside > 0.0) & (inside < t_end)]]))
+    if not any(c.model.patch.depends_on_load and c.normal_force.hold == "linear" for c in scene.contacts):
+        return breaks
+    parts = np.maximum(np.ceil(np.diff(breaks) / SHAPE_INTERVAL - 1e-9).astype(int), 1)
+    fine = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(breaks[:-1], breaks[1:], parts, strict=True)]
+    return np.concatenate([*fine, [t_end]])
+
+
+def pack(scene, t_end: float) -> PackedScene:
+    """Flat arrays of the scene from 0 to `t_end` [s]."""
+    breaks = breaks_of(scene, t_end)
+    pieces = len(breaks) - 1
+    middle = 0.5 * (breaks[:-1] + breaks[1:])
+    load = np.empty((pieces, 2, len(scene.contacts)))
+    row = np.empty((pieces, len(scene.contacts)), np.int64)
+    shapes = _Shapes()
+    sizes: list[tuple[int, int, int]] = []  # bristle states, cells, linearisation numbers
+    cells: list[np.ndarray] = []
+    loaded: list[np.ndarray] = []
+    natural: list[np.ndarray] = []
+    radii: list[float] = []
+    for c, contact in enumerate(scene.contacts):
+        load[:, 0, c], load[:, 1, c] = contact.normal_force.pieces(breaks)
+        held = load[:, 0, c] + load[:, 1, c] * (middle - breaks[:-1])
+        values, row_of_value = _distinct_loads(contact.model.patch, held)
+        model = contact.model
+        scale = model.law.mu_c / model.law.sigma_0
+        if isinstance(model, DistributedModel):
+            weights = np.atleast_2d([model.patch.weights(value) for value in values])
+            ever = weights.max(axis=0) > 0.0
+            rows = [shapes.add_distributed(np.ascontiguousarray(w[ever])) for w in weights]
+            count = int(ever.sum())
+            sizes.append((2 * count, count, 7 * count))
+            cells.append(model.patch.positions[ever])
+            loaded.append(ever)
+            natural.append(np.full(2 * count, scale))
+            offset = model.patch.positions[ever] - np.average(model.patch.positions[ever], axis=0)
+            radius = float(np.hypot(*offset.T).mean())
+        else:
+            shapes_here = [model.shape_at(value) for value in values]
+            rows = [shapes.add_reduced(shape) for shape in shapes_here]
+            radius = max(shape.contact_radius for shape in shapes_here)
+            sizes.append((3, 0, 16))
+            cells.append(np.empty((0, 2)))
+            loaded.append(np.empty(0, bool))
+            natural.append(scale * np.array([1.0, 1.0, radius]))
+        row[:, c] = np.array(rows)[row_of_value]
+        radii.append(radius)
+    offsets = np.concatenate([np.zeros((1, 3), np.int64), np.cumsum(sizes, axis=0)])
+    positions = np.concatenate(cells)
+    contacts = Contacts(
+        kind=np.array(
+            [kernels.DISTRIBUTED if isinstance(c.model, DistributedModel) else kernels.REDUCED for c in scene.contacts]
+        ),
+        law=np.array([law_row(c.model.law) for c in scene.contacts]),
+        mount=np.array([_mount(scene, contact) for contact in scene.contacts]),
+        place=np.array([[*contact.position, contact.angle] for contact in scene.contacts], dtype=float),
+        count=np.array([contact.count for contact in scene.contacts], dtype=float),
+        state=np.ascontiguousarray(offsets[:, 0]),
+        linear=np.ascontiguousarray(offsets[:, 2]),
+        cell=np.ascontiguousarray(offsets[:, 1]),
+        x=np.ascontiguousarray(positions[:, 0]),
+        y=np.ascontiguousarray(positions[:, 1]),
+        weights=np.concatenate([np.zeros(0), *shapes.weights]),
+        weight_start=np.array(shapes.weight_start),
+        shape=np.array(shapes.shape),
+        surface=np.array(shapes.surface),
+        data=np.concatenate([np.zeros(0), *shapes.data]),
+    )
+    length = min(c.model.law.mu_c / c.model.law.sigma_0 for c in scene.contacts)
+    speed = min(c.model.law.v_s for c in scene.contacts)
+    radius = max(radii) or 1.0  # a single point has no lever arm: its spin is measured in rad/s
+    arm = np.array([1.0, 1.0, 1.0 / radius])
+    state = np.concatenate([np.zeros(offsets[-1, 0]), scene.body.velocity, scene.body.position, [scene.body.angle]])
+    return PackedScene(
+        contacts,
+        _motion(scene, breaks, load, row, radius),
+        state,
+        np.concatenate([*natural, speed * arm, length * arm]),
+        loaded,
+    )
+
+
+def _distinct_loads(patch, held: np.ndarray) -> tuple[list[float | None], np.ndarray]:
+    """Loads that need a shape of their own, and which of them each piece takes; pieces without load borrow one."""
+    if not patch.depends_on_load:
+        return [None], np.zeros(len(held), np.int64)
+    positive = np.unique(held[held > 0.0])
+    if len(positive) == 0:
+        positive = np.array([1.0])
+    return list(positive), np.minimum(np.searchsorted(positive, held), len(positive) - 1)
+
+
+def _mount(scene, contact) -> int:
+    if scene.velocity is not None:
+        return kernels.BODY_AXES
+    return kernels.WORLD if contact.mounted_on == "world" else kernels.BODY
+
+
+def _motion(scene, breaks: np.ndarray, load: np.ndarray, row: np.ndarray, radius: float) -> Motion:
+    pieces = len(breaks) - 1
+    force = np.zeros((pieces, 2, 3))
+    if scene.force is not None:
+        force[:, 0], force[:, 1] = scene.force.pieces(breaks)
+    body: Any = scene.body
+    if scene.velocity is None:
+        velocity = np.empty((0, 3))
+        acceleration = np.tile([*body.gravity, 0.0], (pieces, 1)).astype(float)
+        inverse_mass = np.array([1.0 / body.mass, 1.0 / body.mass, 1.0 / body.inertia])
+    else:
+        velocity, acceleration = (np.ascontiguousarray(part) for part in scene.velocity.pieces(breaks))
+        inverse_mass = np.zeros(3)
+    return Motion(
+        inverse_mass=inverse_mass,
+        body_axes=scene.velocity is not None,
+        breaks=breaks,
+        load=load,
+        force=force,
+        velocity=velocity,
+        acceleration=acceleration,
+        row=row,
+        stop_speed=float(scene.stop_speed or 0.0),
+        stop_radius=radius,
+        stop_time=max(c.model.law.sigma_1 / c.model.law.sigma_0 for c in scene.contacts),
+    )

@@ -1,0 +1,114 @@
+"""The driver of the structured solver: runs the compiled loop in slices, keeps statistics, names remedies."""
+
+from __future__ import annotations
+
+import dataclasses
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from planarfriction.errors import InvalidValueError
+from planarfriction.kernels import rosenbrock as kernels
+from planarfriction.kernels.contacts import Contacts
+from planarfriction.kernels.rosenbrock import Method, Motion, Output
+
+_STATES_PER_SLICE = 400_000
+"""Steps times states between two looks at the clock and the keyboard: some 20 ms."""
+
+_FIRST_STEP = 1e-6
+"""First trial step [s]: below the relaxation time of a bristle, so that it is hardly ever rejected."""
+
+_MESSAGES = {
+    kernels.DONE: ("success", "reached the end"),
+    kernels.AT_REST: ("at rest", "the body came to rest"),
+    kernels.PAUSED: ("interrupted", "interrupted before the end"),
+    kernels.STEP_TOO_SMALL: (
+        "step too small",
+        "the step size fell below the resolution of time: loosen rtol, or check the scene for extreme parameters",
+    ),
+    kernels.NOT_FINITE: ("not finite", "the state is not finite: check the scene for extreme parameters"),
+}
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """What a run cost."""
+
+    steps: int
+    """Accepted steps."""
+    rejections: int
+    """Steps tried again with a smaller size."""
+    evaluations: int
+    """Evaluations of the right-hand side."""
+    jacobians: int
+    """Linearisations."""
+    wall_time: float
+    """Time in the solver, without compilation [s]."""
+    compile_time: float
+    """Time to compile the solver or to load it from the cache [s]; 0 after the first run of a process."""
+
+    def as_dict(self) -> dict[str, float]:
+        """The numbers by name."""
+        return dataclasses.asdict(self)
+
+
+@dataclass(frozen=True)
+class Integration:
+    """Outcome of `integrate`; the arrays hold the requested times that were reached."""
+
+    output: Output
+    status: str
+    message: str
+    statistics: Statistics
+
+
+def integrate(
+    contacts: Contacts,
+    motion: Motion,
+    output: Output,
+    state: np.ndarray,
+    *,
+    method: Method,
+    rtol: float,
+    atol: np.ndarray,
+    progress: Callable[[float], None] | None = None,
+) -> Integration:
+    """Integrate from `motion.breaks[0]` to its last break and record at `output.time`.
+
+    `state` holds bristles, body velocity and pose; `atol` is the absolute tolerance of each of its entries. `progress` is
+    called with the simulated time now and then. Ctrl-C ends with the status "interrupted".
+
+    Raises `InvalidValueError` for `rtol <= 0`.
+    """
+    if not (np.isfinite(rtol) and rtol > 0.0):
+        raise InvalidValueError("rtol", "be > 0", rtol)
+    if not (np.isfinite(atol).all() and (atol > 0.0).all()):
+        raise InvalidValueError("atol", "be > 0", float(np.min(atol)))
+    y = np.array(state, dtype=float)
+    cursor = np.zeros(2, np.int64)
+    clock = np.array([0.0, _FIRST_STEP, np.inf])
+    counts = np.zeros(4, np.int64)
+    arguments = (contacts, motion, method, output, y, cursor, clock, float(rtol), atol)
+    begin = time.perf_counter()
+    kernels.advance(*arguments, 0, counts)  # compiles, or loads from the cache, and takes no step
+    compile_time = time.perf_counter() - begin
+    cursor[:], clock[:] = 0, (0.0, _FIRST_STEP, np.inf)
+    outcome, wall_time = kernels.PAUSED, 0.0
+    slice_steps = max(20, _STATES_PER_SLICE // len(y))
+    try:
+        while outcome == kernels.PAUSED:
+            begin = time.perf_counter()
+            outcome = kernels.advance(*arguments, slice_steps, counts)
+            wall_time += time.perf_counter() - begin
+            if progress is not None:
+                piece = min(int(cursor[0]), len(motion.breaks) - 1)
+                progress(float(motion.breaks[piece] + clock[0]))
+    except KeyboardInterrupt:
+        outcome = kernels.PAUSED
+    reached = int(cursor[1])
+    kept = Output(*(array[:reached] if len(array) else array for array in output))
+    status, message = _MESSAGES[int(outcome)]
+    statistics = Statistics(*(int(n) for n in counts), wall_time, compile_time)
+    return Integration(kept, status, message, statistics)
