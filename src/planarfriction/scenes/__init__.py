@@ -1,0 +1,39 @@
+"""Scenes: a planar body, its contacts, the signals that drive them, scene files, and what a simulation returns."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from planarfriction.scenes.ready import drift, driven, free_slide, in_hand, in_hand_load, published_velocity
+from planarfriction.scenes.scene import Body, Contact, Scene
+from planarfriction.scenes.signal import Signal
+from planarfriction.scenes.solution import Solution, Statistics, load
+
+if TYPE_CHECKING:
+    from planarfriction.scenes.simulate import simulate
+
+__all__ = [
+    "Body",
+    "Contact",
+    "Scene",
+    "Signal",
+    "Solution",
+    "Statistics",
+    "drift",
+    "driven",
+    "free_slide",
+    "in_hand",
+    "in_hand_load",
+    "load",
+    "published_velocity",
+    "simulate",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "simulate":  # brings the compiled solver with it
+        from planarfriction.scenes.simulate import simulate
+
+        globals()["simulate"] = simulate  # the import above leaves the module of this name here
+        return simulate
+    raise AttributeError(f"module 'planarfriction.scenes' has no attribute {name!r}")

@@ -1,0 +1,144 @@
+"""Scene files: any scene as TOML or JSON, with patches by name and with signals and pressure maps from files.
+
+The layout is that of `Scene.to_dict`. Reading accepts shorter forms too: a number for a constant signal, a path for a
+sampled one, a shape and its size for a patch, a rectangle's `size` for the inertia and the outline of a body.
+"""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.errors import FileError, InvalidValueError
+from planarfriction.scenes.model_files import model_from_dict, model_to_dict
+from planarfriction.scenes.reading import Section, read_text
+from planarfriction.scenes.scene import Body, Contact, Scene
+from planarfriction.scenes.signal import read_signal
+from planarfriction.scenes.toml_writer import to_toml
+
+SCENE_KEYS = ("name", "t_end", "save_every", "stop_speed", "body", "force", "velocity", "contact")
+BODY_KEYS = ("mass", "inertia", "position", "angle", "velocity", "gravity", "outline", "size")
+CONTACT_KEYS = ("name", "mounted_on", "position", "angle", "count", "normal_force", "model", "patch", "law")
+
+
+def rectangle_outline(size) -> np.ndarray:
+    """Corners `[4, 2]` [m] of a rectangle of `size` (width, height) about the origin."""
+    half = [0.5 * validation.positive("size", side) for side in validation.vector("size", size, 2)]
+    return np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * half
+
+
+def rectangle_inertia(mass: float, size) -> float:
+    """Moment of inertia of a uniform rectangle about its centre, `m (w^2 + h^2) / 12` [kg m^2]."""
+    width, height = (validation.positive("size", side) for side in validation.vector("size", size, 2))
+    return validation.positive("mass", mass) / 12.0 * (width**2 + height**2)
+
+
+def scene_to_dict(scene: Scene) -> dict[str, Any]:
+    """The scene as numbers, texts, lists and tables; parts that it does not have are left out."""
+    body = scene.body
+    data: dict[str, Any] = {"name": scene.name, "t_end": scene.t_end, "save_every": scene.save_every}
+    if scene.stop_speed is not None:
+        data["stop_speed"] = scene.stop_speed
+    data["body"] = {"mass": body.mass, "inertia": body.inertia, "position": list(body.position), "angle": body.angle}
+    data["body"] |= {"velocity": list(body.velocity), "gravity": list(body.gravity)}
+    if body.outline is not None:
+        data["body"]["outline"] = body.outline.tolist()
+    for name in ("force", "velocity"):
+        if getattr(scene, name) is not None:
+            data[name] = getattr(scene, name).to_dict()
+    data["contact"] = [_contact_to_dict(contact) for contact in scene.contacts]
+    return data
+
+
+def _contact_to_dict(contact: Contact) -> dict[str, Any]:
+    return {
+        "name": contact.name,
+        "mounted_on": contact.mounted_on,
+        "position": list(contact.position),
+        "angle": contact.angle,
+        "count": contact.count,
+        "normal_force": contact.normal_force.to_dict(),
+        **model_to_dict(contact.model),
+    }
+
+
+def scene_from_dict(data: dict[str, Any], *, folder: str | Path | None = None, source: str = "scene") -> Scene:
+    """Scene of a table; `source` names it in errors, relative paths start from `folder`."""
+    table = Section(data, "", source, Path(folder) if folder else None).only(SCENE_KEYS)
+    contacts = _contacts(table)
+    prescribed = "velocity" in table
+    options = {key: table.get(key) for key in ("save_every", "stop_speed", "name") if key in table}
+    signals = {key: read_signal(table, key) for key in ("force", "velocity") if key in table}
+    # A body that is moved as prescribed needs no mass; whoever leaves it out does not mean to say anything about it.
+    moved = {"mass": 1.0, "inertia": 1.0, "gravity": [0.0, 0.0]}
+    body = _body(table.section("body", moved) if prescribed and "body" not in table else table.section("body"))
+    t_end = table.get("t_end")
+    with table.located():
+        return Scene(body, contacts, t_end, **signals, **options)
+
+
+def _body(table: Section) -> Body:
+    given = dict(table.only(BODY_KEYS).data)
+    table.get("mass")
+    size = given.pop("size", None)
+    with table.located():
+        if size is not None:
+            given.setdefault("inertia", rectangle_inertia(given["mass"], size))
+            given.setdefault("outline", rectangle_outline(size))
+        elif "inertia" not in given:
+            table.fail("missing key 'inertia' (or size = [width, height] of a uniform rectangle)")
+        return Body(**given)
+
+
+def _contacts(scene: Section) -> list[Contact]:
+    tables = scene.get("contact")
+    if isinstance(tables, dict):
+        tables = [tables]
+    if not isinstance(tables, list) or not tables:
+        scene.fail("contact must be one or more tables [[contact]]")
+    contacts: list[Contact] = []
+    for number, data in enumerate(tables, 1):
+        where = "contact" if len(tables) == 1 else f"contact.{number}"
+        table = Section(data, where, scene.source, scene.folder).only(CONTACT_KEYS)
+        options = {key: table.get(key) for key in ("name", "mounted_on", "position", "angle", "count") if key in table}
+        if "name" not in table and len(tables) > 1:
+            options["name"] = f"contact {number}"
+        load, model = read_signal(table, "normal_force"), model_from_dict(table)
+        with table.located():
+            contacts.append(Contact(model, load, **options))
+    return contacts
+
+
+def read_scene(path: str | Path) -> Scene:
+    """Scene of a `.toml` or `.json` file; errors are one line with the name of the file."""
+    path = Path(path)
+    kind = path.suffix.lower()
+    if kind not in (".toml", ".json"):
+        missing = "" if path.exists() else ", and there is no such file"
+        raise FileError(f"{path}: a scene file ends in .toml or .json{missing}")
+    text = read_text(path, "a scene file")
+    try:
+        data = tomllib.loads(text) if kind == ".toml" else json.loads(text)
+    except (tomllib.TOMLDecodeError, json.JSONDecodeError, RecursionError) as error:
+        reason = " ".join(str(error).split())
+        raise FileError(f"{path}: not valid {kind[1:].upper()}: {reason}") from None
+    return scene_from_dict(data, folder=path.parent, source=str(path))
+
+
+def write_scene(scene: Scene, path: str | Path) -> None:
+    """Write a scene to a `.toml` or `.json` file."""
+    path = Path(path)
+    kind = path.suffix.lower()
+    if kind not in (".toml", ".json"):
+        raise InvalidValueError("path of a scene file", "end in .toml or .json", str(path))
+    data = scene.to_dict()
+    text = to_toml(data) if kind == ".toml" else json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    try:
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise FileError(f"{path}: cannot be written: {error.strerror or error}") from None

@@ -1,0 +1,139 @@
+"""Reading of tables from scene files: every mistake becomes one line that says the file, the table and what to write."""
+
+from __future__ import annotations
+
+import contextlib
+import csv
+import difflib
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from planarfriction.errors import FileError, FrictionError
+
+_REQUIRED: Any = object()
+
+
+class Section:
+    """One table of a scene file: knows where it stands, so that its errors do too.
+
+    `where` is the dotted name of the table ("contact.law", "" at the top), `source` names the file in messages and
+    `folder` is the place that relative paths start from.
+    """
+
+    def __init__(self, data: Any, where: str = "", source: str = "scene", folder: Path | None = None):
+        self.where, self.source, self.folder = where, source, folder or Path()
+        if not isinstance(data, dict):
+            self.fail(f"must be a table of keys and values, got {data!r}")
+        self.data: dict[str, Any] = data
+
+    def __contains__(self, key: str) -> bool:
+        return key in self.data
+
+    def error(self, message: str) -> FileError:
+        """The error for this table: `file: [table]: message`."""
+        table = f"[{self.where}]: " if self.where else ""
+        return FileError(f"{self.source}: {table}{message}")
+
+    def fail(self, message: str) -> None:
+        """Raise the error for this table."""
+        raise self.error(message)
+
+    def only(self, keys: Iterable[str]) -> Section:
+        """Return this table if it has no other keys than `keys`, or raise an error with the nearest valid name."""
+        keys = list(keys)
+        for key in self.data:
+            if key not in keys:
+                self.fail(f"unknown key {key!r}{_hint(key, keys)}")
+        return self
+
+    def get(self, key: str, default: Any = _REQUIRED) -> Any:
+        """Value under `key`; without a default the key must be there."""
+        if key not in self.data:
+            if default is _REQUIRED:
+                self.fail(f"missing key {key!r}")
+            return default
+        return self.data[key]
+
+    def name_of(self, key: str) -> str:
+        """Dotted name of the table `key` below this one."""
+        return f"{self.where}.{key}" if self.where else key
+
+    def section(self, key: str, value: Any = _REQUIRED) -> Section:
+        """Table below this one; `value` stands in for a table that was written in a shorter form."""
+        data = self.get(key) if value is _REQUIRED else value
+        return Section(data, self.name_of(key), self.source, self.folder)
+
+    def choice(self, key: str, valid: Iterable[str], default: Any = _REQUIRED) -> str:
+        """Value under `key` if it is one of `valid`, or raise an error that names the nearest valid one."""
+        value, valid = self.get(key, default), list(valid)
+        if value not in valid:
+            self.fail(f"{key} must be one of {', '.join(valid)}, got {value!r}{_hint(value, valid)}")
+        return value
+
+    def path(self, key: str) -> Path:
+        """Path under `key`, taken from the folder of the scene file."""
+        value = self.get(key)
+        if not isinstance(value, str) or not value:
+            self.fail(f"{key} must be the path of a file, got {value!r}")
+        return self.folder / value
+
+    @contextlib.contextmanager
+    def located(self) -> Iterator[None]:
+        """Put file and table in front of the errors raised inside."""
+        try:
+            yield
+        except FrictionError as error:
+            message = str(error)
+            raise (error if message.startswith(f"{self.source}: ") else self.error(message)) from None
+
+
+def _hint(value: Any, valid: Sequence[str]) -> str:
+    near = difflib.get_close_matches(str(value), valid, n=1)
+    return f" (did you mean {near[0]!r}?)" if near else f" (valid: {', '.join(valid)})"
+
+
+def read_text(path: str | Path, kind: str) -> str:
+    """Text of the file at `path`, or one clear line; `kind` says what was expected, as in "a scene file"."""
+    path = Path(path)
+    try:
+        return path.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise FileError(f"{path}: no such file (expected {kind})") from None
+    except IsADirectoryError:
+        raise FileError(f"{path}: is a folder, not {kind}") from None
+    except UnicodeDecodeError:
+        raise FileError(f"{path}: not a text file (expected {kind})") from None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise FileError(f"{path}: cannot be read: {reason}") from None
+
+
+def read_columns(path: str | Path, names: Sequence[str]) -> np.ndarray:
+    """Columns `names` of a CSV file with a header line, shape `[rows, len(names)]`; lines that start with # are comments."""
+    text = read_text(path, "a CSV file with a header line")
+    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
+    lines = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
+    if not lines:
+        raise FileError(f"{path}: is empty (expected a header line and rows of numbers)")
+    rows = [[cell.strip() for cell in row] for row in csv.reader(line for _, line in lines)]
+    header, rows = rows[0], rows[1:]
+    for name in names:
+        if name not in header:
+            raise FileError(f"{path}: no column {name!r}{_hint(name, header)}")
+    if not rows:
+        raise FileError(f"{path}: has a header line but no rows")
+    columns = [header.index(name) for name in names]
+    result = np.empty((len(rows), len(names)))
+    for i, ((number, _), row) in enumerate(zip(lines[1:], rows, strict=True)):
+        if len(row) != len(header):
+            raise FileError(f"{path}: line {number} has {len(row)} columns, the header has {len(header)}")
+        for j, column in enumerate(columns):
+            try:
+                result[i, j] = float(row[column])
+            except ValueError:
+                message = f"{path}: line {number}, column {names[j]!r}: {row[column]!r} is not a number"
+                raise FileError(message) from None
+    return result

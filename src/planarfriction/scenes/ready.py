@@ -1,0 +1,159 @@
+"""Ready scenes: the published experiments and the two everyday ones, made from a friction model and a few numbers."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.errors import InvalidValueError
+from planarfriction.scenes.files import rectangle_inertia, rectangle_outline
+from planarfriction.scenes.scene import Body, Contact, Scene
+from planarfriction.scenes.signal import Signal, sample_times
+
+GRAVITY = 9.81
+"""Acceleration of gravity [m/s^2]."""
+
+SAMPLE_TIME = 0.01
+"""Time over which the published experiments hold their inputs [s]."""
+
+STOP_SPEED = 1e-4
+"""Speed at which a free slide counts as stopped [m/s]: what is left to slide, v^2/(2 mu g), is below 1e-8 m at mu 0.1."""
+
+IN_HAND_LOADS = {(1, 1): (1.73, 0.91), (1, 2): (3.6, 0.9)}
+"""(load, placement) -> offset and amplitude [N] of the sine at 2 Hz."""
+
+IN_HAND_DROPS = {(2, 1): (2.0, 0.84, 33, 50), (2, 2): (4.0, 2.9, 31, 50)}
+"""(load, placement) -> force, force while dropped [N], first dropped sample, first sample after."""
+
+
+def in_hand_load(load: Literal[1, 2], *, placement: Literal[1, 2] = 1, t_end: float = 2.0) -> Signal:
+    """Normal force of one finger in the published in-hand runs [N], held over every 0.01 s.
+
+    Load 1 is a sine at 2 Hz, load 2 is constant with one drop. `placement` 1 is the centre of mass at (0.002, 0) m,
+    2 at (0.025, 0) m.
+
+    Source: Waltersson and Karayiannidis 2024, section VI.
+    """
+    if (load, placement) not in {**IN_HAND_LOADS, **IN_HAND_DROPS}:
+        raise InvalidValueError("load and placement", "each be 1 or 2", f"load={load}, placement={placement}")
+    if load == 1:
+        offset, amplitude = IN_HAND_LOADS[load, placement]
+        return Signal.sine(offset, amplitude, 2.0, t_end=t_end, dt=SAMPLE_TIME)
+    force, dropped, first, after = IN_HAND_DROPS[load, placement]
+    return Signal.sampled([0.0, first * SAMPLE_TIME, after * SAMPLE_TIME], [force, dropped, force])
+
+
+def in_hand(
+    model: Any,
+    *,
+    centre_of_mass=(0.002, 0.0),
+    normal_force: Any = None,
+    fingers: int = 2,
+    mass: float = 0.2,
+    size=(0.15, 0.08),
+    t_end: float = 2.0,
+) -> Scene:
+    """A plate held upright between finger pads that slips and turns under gravity as the grip varies.
+
+    The pads are fixed at the origin of the world and do not turn; the `fingers` share one state, each pressing with the
+    full `normal_force` [N] (a signal or a number; default: `in_hand_load(1)`). `centre_of_mass` [m] is where the
+    centre of the plate of `size` (width, height) [m] and `mass` [kg] starts, at rest.
+
+    Source: Waltersson and Karayiannidis 2024, section VI.
+    """
+    body = Body(
+        mass, rectangle_inertia(mass, size), centre_of_mass, gravity=(0.0, -GRAVITY), outline=rectangle_outline(size)
+    )
+    load = in_hand_load(1, t_end=t_end) if normal_force is None else normal_force
+    return Scene(body, [Contact(model, load, count=fingers, name="fingers")], t_end, name="in-hand")
+
+
+def drift_force(load: Literal["tangential", "normal"], *, t_end: float = 5.0) -> Signal:
+    """Applied wrench `(fx, fy, tau)` of the published drift runs [N, N, N m], held over every 0.01 s."""
+    t = sample_times(t_end, SAMPLE_TIME)
+    wave = np.sin(6.0 * np.pi * t)
+    force = np.zeros((len(t), 3))
+    if load == "tangential":
+        force[:, 0] = np.where(t > 1.0, 1.0 + 0.4 * wave, np.minimum(t / 0.2, 1.0))
+        force[:, 2] = np.where(t > 3.0, 0.03 + 0.01 * wave, 0.03 * np.clip((t - 2.8) / 0.2, 0.0, 1.0))
+    else:
+        ramp = np.minimum(t / 0.2, 1.0)
+        force[:, 0], force[:, 2] = ramp, 0.03 * ramp
+    return Signal.sampled(t, force)
+
+
+def drift(model: Any, *, load: Literal["tangential", "normal"] = "tangential", t_end: float = 5.0) -> Scene:
+    """A disc of 1 kg and radius 0.05 m on a table, pushed by less than friction holds: does it creep?
+
+    `load="tangential"`: the force oscillates, and from 2.8 s on a torque too; `load="normal"`: force and torque stay and
+    the normal force oscillates after 1 s. The contact is fixed to the world.
+
+    Source: Waltersson and Karayiannidis 2024, section VI.
+    """
+    validation.choice("load", load, ("tangential", "normal"))
+    normal_force: Any = GRAVITY
+    if load == "normal":
+        t = sample_times(t_end, SAMPLE_TIME)
+        normal_force = Signal.sampled(t, GRAVITY + np.where(t > 1.0, np.sin(6.0 * np.pi * t), 0.0))
+    mass, radius = 1.0, 0.05
+    around = 2.0 * np.pi * np.arange(64) / 64
+    outline = radius * np.stack([np.cos(around), np.sin(around)], axis=1)
+    body = Body(mass, 0.5 * mass * radius**2, gravity=(0.0, 0.0), outline=outline)
+    contact = Contact(model, normal_force, name="table")
+    return Scene(body, [contact], t_end, force=drift_force(load, t_end=t_end), name=f"drift, {load}")
+
+
+def free_slide(
+    model: Any, *, mass: float, inertia: float, twist, normal_force: Any = None, t_end: float = 5.0
+) -> Scene:
+    """A body thrown onto a level table with the initial `twist` `(vx, vy, omega)`; ends when it has stopped.
+
+    The patch is fixed to the body, its frame's origin at the centre of mass. `mass` [kg], `inertia` about the centre of
+    mass [kg m^2], `normal_force` [N] a signal or a number (default: the weight `9.81 mass`).
+    """
+    body = Body(mass, inertia, velocity=twist, gravity=(0.0, 0.0))
+    load = GRAVITY * body.mass if normal_force is None else normal_force
+    contact = Contact(model, load, mounted_on="body", name="table")
+    return Scene(body, [contact], t_end, stop_speed=STOP_SPEED, name="free slide")
+
+
+def published_velocity(*, speed: float = 0.015, spin: float = 1.0) -> Signal:
+    """Twist `(vx, vy, omega)` of the published velocity-driven runs, held over every 0.01 s [m/s, m/s, rad/s].
+
+    `speed` [m/s] is the peak of vx (vy peaks at 0.4 of it), `spin` [rad/s] that of omega: spin up, slide along x while
+    spinning, slide along y, spin down, stop.
+
+    Source: Waltersson and Karayiannidis 2024, section VI.
+    """
+    speed, spin = validation.number("speed", speed), validation.number("spin", spin)
+    t = sample_times(5.0, SAMPLE_TIME)
+    vx = speed * np.interp(t, [0.8, 1.4, 1.6, 2.2], [0.0, 1.0, 1.0, 0.0])
+    vy = 0.4 * speed * np.interp(t, [2.4, 2.7, 4.3, 4.6], [0.0, 1.0, 1.0, 0.0])
+    omega = spin * np.interp(t, [0.0, 0.6, 3.4, 4.0], [0.0, 1.0, 1.0, 0.0])
+    return Signal.sampled(t, np.stack([vx, vy, omega], axis=1))
+
+
+def driven(
+    model: Any,
+    *,
+    twist: Any = None,
+    normal_force: Any = 1.0,
+    at: Literal["origin", "centre_of_pressure"] = "centre_of_pressure",
+    t_end: float = 5.0,
+) -> Scene:
+    """A patch that is moved with a prescribed `twist` `(vx, vy, omega)` in its own axes, to see the wrench it gives.
+
+    `twist` is a signal `[T, 3]` or a constant (default: `published_velocity()`), `normal_force` [N] a signal or a number.
+    `at` says which point of the patch has the velocity: the origin of the contact frame, or the centre of pressure (of a
+    patch that changes with the load: the one at the load at t = 0). Wrenches are about the contact frame's origin.
+    """
+    validation.choice("at", at, ("origin", "centre_of_pressure"))
+    contact = Contact(model, normal_force, mounted_on="body", name="patch")
+    if at == "centre_of_pressure":
+        x, y = np.asarray(model.patch.centre_of_pressure(float(contact.normal_force(0.0)))).tolist()
+        contact = Contact(model, normal_force, mounted_on="body", position=(-x, -y), name="patch")
+    body = Body(1.0, 1.0, gravity=(0.0, 0.0))  # moved as prescribed: mass and inertia play no part
+    velocity = published_velocity() if twist is None else twist
+    return Scene(body, [contact], t_end, velocity=velocity, name="driven")

@@ -1,0 +1,197 @@
+"""Scenes: a planar rigid body, the contacts it slides on, and everything that drives it, as plain immutable data."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.errors import InvalidValueError
+from planarfriction.scenes.signal import SAME_TIME, Signal, as_signal
+
+
+def _floats(name: str, value: Any, size: int) -> tuple[float, ...]:
+    return tuple(validation.vector(name, value, size).tolist())
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body that moves in the contact plane: inertia, initial state, gravity. World frame: x right, y up."""
+
+    mass: float
+    """Mass [kg]."""
+    inertia: float
+    """Moment of inertia about the centre of mass [kg m^2]."""
+    position: tuple[float, float] = (0.0, 0.0)
+    """Initial position of the centre of mass in the world [m]."""
+    angle: float = 0.0
+    """Initial angle of the body's axes in the world [rad]."""
+    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    """Initial twist `(vx, vy, omega)` of the centre of mass, world axes [m/s, m/s, rad/s]."""
+    gravity: tuple[float, float] = (0.0, -9.81)
+    """Gravity in the plane of motion, world axes [m/s^2]."""
+    outline: np.ndarray | None = field(default=None, compare=False, repr=False)
+    """Polygon for drawings, in body axes with the centre of mass at the origin, shape `[M, 2]` [m], or None."""
+
+    def __post_init__(self) -> None:
+        for name in ("mass", "inertia"):
+            object.__setattr__(self, name, validation.positive(name, getattr(self, name)))
+        for name, size in (("position", 2), ("velocity", 3), ("gravity", 2)):
+            object.__setattr__(self, name, _floats(name, getattr(self, name), size))
+        object.__setattr__(self, "angle", validation.number("angle", self.angle))
+        if self.outline is not None:
+            outline = validation.array("outline", self.outline, (None, 2))
+            if len(outline) < 3:
+                raise InvalidValueError("outline", "have at least 3 points", f"{len(outline)}")
+            outline.setflags(write=False)
+            object.__setattr__(self, "outline", outline)
+
+
+@dataclass(frozen=True, eq=False)
+class Contact:
+    """A contact between body and world: a friction model, where it sits, and how hard it is pressed.
+
+    Contacts fixed to the world (fingers) keep their frame while the body moves past; contacts fixed to the body (a box
+    on a table) carry it along.
+    """
+
+    model: Any = field(repr=False)
+    """Friction model, as `DistributedModel` or `ReducedModelPublished`."""
+    normal_force: Signal
+    """Normal force [N], >= 0: a signal, or a number for a constant one."""
+    mounted_on: Literal["world", "body"] = "world"
+    """What the contact frame is fixed to: "world" or "body"."""
+    position: tuple[float, float] = (0.0, 0.0)
+    """Origin of the contact frame, in the world or in the body's axes from its centre of mass [m]."""
+    angle: float = 0.0
+    """Angle of the contact frame's axes in the world or in the body [rad]."""
+    count: int = 1
+    """Number of identical contacts (same place, same load) that share this one's state."""
+    name: str = "contact"
+    """Name in the results; unique in its scene."""
+
+    def __post_init__(self) -> None:
+        if not (isinstance(self.name, str) and self.name):
+            raise InvalidValueError("name of a contact", "be a text that is not empty", self.name)
+        if not (hasattr(self.model, "patch") and hasattr(self.model, "law")):
+            valid = "be a friction model (DistributedModel, ReducedModelPublished)"
+            raise InvalidValueError(f"model of contact {self.name!r}", valid, self.model)
+        of_contact = f"of contact {self.name!r}"
+        load = as_signal(f"normal_force {of_contact}", self.normal_force, None)
+        load.check_non_negative(f"normal_force {of_contact}")
+        object.__setattr__(self, "normal_force", load)
+        validation.choice(f"mounted_on {of_contact}", self.mounted_on, ("world", "body"))
+        object.__setattr__(self, "position", _floats(f"position {of_contact}", self.position, 2))
+        object.__setattr__(self, "angle", validation.number(f"angle {of_contact}", self.angle))
+        object.__setattr__(self, "count", validation.count(f"count {of_contact}", self.count))
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Everything that a simulation needs: body, contacts, forces or prescribed velocity, duration.
+
+    Raises InvalidValueError, naming the parameter, where the parts do not make a scene.
+    """
+
+    body: Body
+    """The body that moves."""
+    contacts: Sequence[Contact]
+    """The contacts it slides on, at least one."""
+    t_end: float
+    """Duration [s]."""
+    force: Signal | None = None
+    """Applied wrench `(fx, fy, tau)` at the centre of mass, world axes, `[T, 3]` [N, N, N m], or None; may be constant."""
+    velocity: Signal | None = None
+    """Prescribed twist `(vx, vy, omega)` of the body in **body axes**, `[T, 3]` [m/s, m/s, rad/s], or None for a free body.
+
+    With it, mass, inertia, gravity and initial velocity of the body play no part.
+    """
+    stop_speed: float | None = None
+    """Speed [m/s] below which the body counts as at rest, which ends the simulation; None to run until `t_end`."""
+    save_every: float = 0.01
+    """Time between saved samples [s]."""
+    name: str = "scene"
+    """Name of the scene."""
+
+    def __post_init__(self) -> None:
+        if not isinstance(self.body, Body):
+            raise InvalidValueError("body", "be a Body", self.body)
+        contacts = (self.contacts,) if isinstance(self.contacts, Contact) else self.contacts
+        if not isinstance(contacts, (list, tuple)) or not all(isinstance(contact, Contact) for contact in contacts):
+            raise InvalidValueError("contacts", "be a list of Contact", self.contacts)
+        if not contacts:
+            raise InvalidValueError("contacts", "hold at least one contact", "none")
+        names = [contact.name for contact in contacts]
+        for name in names:
+            if names.count(name) > 1:
+                raise InvalidValueError("contacts", "have different names", f"{name!r} {names.count(name)} times")
+        object.__setattr__(self, "contacts", tuple(contacts))
+        for name in ("t_end", "save_every"):
+            object.__setattr__(self, name, validation.positive(name, getattr(self, name)))
+        for name in ("force", "velocity"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, as_signal(name, getattr(self, name), 3))
+        if self.stop_speed is not None:
+            object.__setattr__(self, "stop_speed", validation.positive("stop_speed", self.stop_speed))
+        if self.velocity is not None:
+            for name in ("force", "stop_speed"):
+                if getattr(self, name) is not None:
+                    raise InvalidValueError(name, "be None where the velocity is prescribed", getattr(self, name))
+        if not isinstance(self.name, str):
+            raise InvalidValueError("name", "be a text", self.name)
+
+    def breaks(self, t_end: float | None = None) -> np.ndarray:
+        """Times [s] from 0 to `t_end` (default: the scene's) at which any signal jumps or bends, both ends included.
+
+        Breaks within rounding of each other (`SAME_TIME`) count as one.
+        """
+        t_end = self.t_end if t_end is None else validation.positive("t_end", t_end)
+        signals = [contact.normal_force for contact in self.contacts]
+        signals += [signal for signal in (self.force, self.velocity) if signal is not None]
+        inner = np.unique(np.concatenate([signal.breaks for signal in signals]))
+        inner = inner[(inner > SAME_TIME) & (inner < t_end - SAME_TIME)]
+        inner = inner[np.diff(inner, prepend=0.0) > SAME_TIME]
+        return np.concatenate([[0.0], inner, [t_end]])
+
+    def to_dict(self) -> dict[str, Any]:
+        """The scene as plain numbers, texts, lists and tables; `from_dict` restores it to the last bit."""
+        from planarfriction.scenes.files import scene_to_dict
+
+        return scene_to_dict(self)
+
+    @classmethod
+    def from_dict(cls, data: dict[str, Any], folder: str | Path | None = None) -> Scene:
+        """Scene from a table as in scene files; relative paths in it start from `folder`.
+
+        Raises FileError in one line that says the table and the key.
+        """
+        from planarfriction.scenes.files import scene_from_dict
+
+        return scene_from_dict(data, folder=folder)
+
+    @classmethod
+    def from_file(cls, path: str | Path) -> Scene:
+        """Scene from a TOML or JSON file. Raises FileError in one line that says the file, the table and the key."""
+        from planarfriction.scenes.files import read_scene
+
+        return read_scene(path)
+
+    def to_file(self, path: str | Path) -> None:
+        """Write the scene to `path` (`.toml` or `.json`). Raises FileError where that is not possible."""
+        from planarfriction.scenes.files import write_scene
+
+        write_scene(self, path)
+
+    def to_json(self) -> str:
+        """The scene as one line of JSON, the same for equal scenes."""
+        return json.dumps(self.to_dict(), sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+
+    def digest(self) -> str:
+        """SHA-256 of the content, in hexadecimal: equal scenes have equal digests."""
+        return hashlib.sha256(self.to_json().encode()).hexdigest()

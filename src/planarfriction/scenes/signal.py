@@ -1,0 +1,259 @@
+"""Signals: loads, forces and velocities as sampled data, so that a scene can be stored, hashed and compiled."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.errors import InvalidValueError
+from planarfriction.scenes.reading import Section, read_columns
+
+Hold = Literal["previous", "linear"]
+
+SAME_TIME = 1e-12
+"""Times closer than this [s] count as one: far below any step, far above the rounding of `i * dt`."""
+
+
+def sample_times(t_end: float, dt: float = 0.01) -> np.ndarray:
+    """Times `i dt` [s] from 0 to the last one that is not after `t_end`, each computed as `i * dt` (nothing accumulates)."""
+    t_end, dt = validation.non_negative("t_end", t_end), validation.positive("dt", dt)
+    return np.arange(int(np.floor(t_end / dt + 1e-9)) + 1) * dt  # the 1e-9 keeps t_end itself in spite of rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Signal:
+    """A sampled function of time, `[T]` or `[T, k]` values; constant before the first sample and after the last.
+
+    With `hold="previous"` each value holds until the next sample, with `hold="linear"` straight lines join them.
+    Signals are immutable and compare by content.
+
+    Raises InvalidValueError where times are not increasing, values are not finite or shapes do not match.
+    """
+
+    times: np.ndarray
+    """Sample times [s], shape `[T]`, strictly increasing."""
+    values: np.ndarray
+    """Sample values, shape `[T]` or `[T, k]`."""
+    hold: Hold = "previous"
+    """What happens between the samples: "previous" or "linear"."""
+
+    def __post_init__(self) -> None:
+        times = validation.array("times", self.times, (None,))
+        values = validation.array("values", self.values, (None,) * (2 if np.ndim(self.values) == 2 else 1))
+        if times.size == 0:
+            raise InvalidValueError("times", "have at least one sample", "an empty array")
+        if len(values) != len(times):
+            raise InvalidValueError("values", f"have one row per time ({len(times)})", f"shape {list(values.shape)}")
+        steps = np.diff(times)
+        if (steps <= 0.0).any():
+            i = int(np.argmax(steps <= 0.0))
+            kind = "a duplicate" if steps[i] == 0.0 else "unsorted"
+            raise InvalidValueError(
+                "times", "increase", f"{times[i]:g} s, then {times[i + 1]:g} s at index {i + 1} ({kind})"
+            )
+        validation.choice("hold", self.hold, ("previous", "linear"))
+        times.setflags(write=False)
+        values.setflags(write=False)
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "values", values)
+
+    @classmethod
+    def sampled(cls, times, values, hold: Hold = "previous") -> Signal:
+        """Signal through samples: `times` [s] of shape `[T]`, `values` of shape `[T]` or `[T, k]`."""
+        return cls(times, values, hold)
+
+    @classmethod
+    def constant(cls, value) -> Signal:
+        """Signal that never changes; `value` is a number or a vector `[k]`."""
+        if isinstance(value, str) or np.ndim(value) == 0:
+            return cls(np.zeros(1), np.array([validation.number("value", value)]))
+        return cls(np.zeros(1), validation.array("value", value, (None,))[None])
+
+    @classmethod
+    def sine(
+        cls, offset: float, amplitude: float, frequency: float, *, t_end: float, dt: float = 0.01, phase: float = 0.0
+    ) -> Signal:
+        """`offset + amplitude sin(2 pi frequency t + phase)`, sampled every `dt` [s] up to `t_end` and held in between.
+
+        `frequency` is in Hz, `phase` in rad.
+        """
+        offset, amplitude = validation.number("offset", offset), validation.number("amplitude", amplitude)
+        frequency, phase = validation.non_negative("frequency", frequency), validation.number("phase", phase)
+        times = sample_times(t_end, dt)
+        return cls(times, offset + amplitude * np.sin(2.0 * np.pi * frequency * times + phase))
+
+    @classmethod
+    def from_csv(
+        cls, path: str | Path, *, time: str = "time", value: str | Sequence[str] = "value", hold: Hold = "previous"
+    ) -> Signal:
+        """Signal from a CSV file with a header line: `time` names the column of times, `value` one column or a list.
+
+        Lines that start with # are comments. Raises FileError for a missing file, a missing column or a text among
+        the numbers, and InvalidValueError as the constructor does.
+        """
+        names = [value] if isinstance(value, str) else list(value)
+        table = read_columns(path, [time, *names])
+        try:
+            return cls(table[:, 0], table[:, 1] if isinstance(value, str) else table[:, 1:], hold)
+        except InvalidValueError as error:
+            raise InvalidValueError(f"{path}: {error.name}", error.rule, error.value) from None
+
+    def held(self, dt: float) -> Signal:
+        """The same signal seen by a digital controller: sampled every `dt` [s] from the first time on, and held."""
+        times = self.times[0] + sample_times(self.times[-1] - self.times[0], dt)
+        return Signal(times, self(times))
+
+    def __call__(self, t) -> np.ndarray:
+        """Value at the times `t` [s] (any shape); at a jump the value that begins there."""
+        return self._value(t, "right")
+
+    def left(self, t) -> np.ndarray:
+        """Value just before the times `t` [s] (any shape): at a jump the value that ends there."""
+        return self._value(t, "left")
+
+    @property
+    def columns(self) -> int | None:
+        """Number of columns k of a vector signal, None for a scalar one."""
+        return self.values.shape[1] if self.values.ndim == 2 else None
+
+    @property
+    def breaks(self) -> np.ndarray:
+        """Times [s] at which the value jumps or the slope changes, increasing; samples that change nothing are left out."""
+        if self.hold == "previous":
+            change = np.diff(self.values, axis=0, prepend=self.values[:1])
+        else:
+            before = np.concatenate([np.zeros_like(self.values[:1]), self._slopes[:-1]])
+            change = self._slopes - before
+        return self.times[(change != 0.0).reshape(len(self.times), -1).any(axis=1)]
+
+    def pieces(self, breaks) -> tuple[np.ndarray, np.ndarray]:
+        """Straight pieces of the signal between `breaks` `[S + 1]` [s]: values at their starts and slopes.
+
+        On piece s the signal is `start[s] + slope[s] (t - breaks[s])`; both have shape `[S]` or `[S, k]`, and the
+        slope of a held signal is exactly 0. Raises InvalidValueError where the signal breaks inside a piece.
+        """
+        breaks = validation.array("breaks", breaks, (None,))
+        if len(breaks) < 2 or (np.diff(breaks) <= 0.0).any():
+            raise InvalidValueError("breaks", "be at least two increasing times", f"{breaks}")
+        own = self.breaks
+        piece = np.searchsorted(breaks, own, side="right") - 1
+        inside = (piece >= 0) & (piece < len(breaks) - 1)
+        inside[inside] = (own[inside] - breaks[piece[inside]] > SAME_TIME) & (
+            breaks[piece[inside] + 1] - own[inside] > SAME_TIME
+        )
+        if inside.any():
+            raise InvalidValueError("breaks", "contain the breaks of the signal", f"none at t = {own[inside][0]:g} s")
+        # The middle of a piece finds its interval whatever rounding does to the ends.
+        i = np.searchsorted(self.times, 0.5 * (breaks[:-1] + breaks[1:]), side="right") - 1
+        begun, i = i >= 0, np.maximum(i, 0)
+        slope = np.where(self._spread(begun), self._slopes[i], 0.0)
+        return self.values[i] + slope * self._spread(breaks[:-1] - self.times[i]), slope
+
+    def check_non_negative(self, name: str) -> None:
+        """Raise InvalidValueError with `name`, time and value where the signal is below zero."""
+        below = np.argwhere(self.values < 0.0)
+        if len(below):
+            i = int(below[0][0])
+            value = float(self.values[tuple(below[0])])
+            raise InvalidValueError(name, "be >= 0", f"{value!r} at t = {self.times[i]:g} s")
+
+    def to_dict(self) -> dict[str, Any]:
+        """The signal as plain numbers, lists and strings."""
+        return {"times": self.times.tolist(), "values": self.values.tolist(), "hold": self.hold}
+
+    @classmethod
+    def from_dict(cls, data: Any, folder: str | Path | None = None) -> Signal:
+        """Signal from a number, a list of numbers (constants) or a table as in scene files (see `read_signal`)."""
+        where = Section({"signal": data}, folder=Path(folder) if folder else None)
+        return read_signal(where, "signal")
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Signal):
+            return NotImplemented
+        return (
+            self.hold == other.hold
+            and np.array_equal(self.times, other.times)
+            and np.array_equal(self.values, other.values)
+        )
+
+    def __hash__(self) -> int:
+        # Adding 0.0 turns -0.0 into 0.0, which equals it.
+        return hash((self.hold, (self.times + 0.0).tobytes(), (self.values + 0.0).tobytes()))
+
+    @property
+    def _slopes(self) -> np.ndarray:
+        """Slope on the interval that begins at each sample; 0 after the last one."""
+        if self.hold == "previous":
+            return np.zeros_like(self.values)
+        slopes = np.diff(self.values, axis=0) / self._spread(np.diff(self.times))
+        return np.concatenate([slopes, np.zeros_like(self.values[:1])])
+
+    def _spread(self, array: np.ndarray) -> np.ndarray:
+        """`array` over time, ready to meet values `[..., k]`."""
+        return array[..., None] if self.values.ndim == 2 else array
+
+    def _value(self, t, side: Literal["left", "right"]) -> np.ndarray:
+        t = np.asarray(t, dtype=float)
+        if self.hold == "linear":  # continuous: both limits agree, and at a sample the sample itself is exact
+            side = "right"
+        i = np.searchsorted(self.times, t, side=side) - 1
+        begun, i = i >= 0, np.maximum(i, 0)
+        slope = np.where(self._spread(begun), self._slopes[i], 0.0)
+        return self.values[i] + slope * self._spread(t - self.times[i])
+
+
+def as_signal(name: str, value: Any, columns: int | None) -> Signal:
+    """`value` as a signal with `columns` columns (None: scalar); numbers and vectors become constants."""
+    try:
+        signal = value if isinstance(value, Signal) else Signal.constant(value)
+    except InvalidValueError as error:
+        raise InvalidValueError(name, f"be a signal or a constant that can {error.rule}", error.value) from None
+    if signal.columns != columns:
+        wanted = "be a signal of plain numbers" if columns is None else f"have {columns} columns"
+        raise InvalidValueError(name, wanted, f"a signal with values of shape {list(signal.values.shape)}")
+    return signal
+
+
+def read_signal(parent: Section, key: str) -> Signal:
+    """Signal under `key` of a table: a number, a list of numbers (a constant vector) or one of three tables.
+
+    `{times, values, hold, dt}`, `{csv, time, value, hold, dt}` with a path that starts from the scene file's folder, or
+    `{sine = {offset, amplitude, frequency, t_end, dt, phase}}`. `dt` holds a signal over steps of `dt` (`Signal.held`).
+    """
+    data = parent.get(key)
+    if not isinstance(data, dict):
+        here = Section({}, parent.name_of(key), parent.source, parent.folder)
+        if isinstance(data, (str, bool)):
+            here.fail(f"must be a number, a list of numbers or a table, got {data!r}")
+        with here.located():
+            return Signal.constant(data)
+    here = parent.section(key)
+    with here.located():
+        if "sine" in here:
+            sine = (
+                here.only(["sine"]).section("sine").only(["offset", "amplitude", "frequency", "t_end", "dt", "phase"])
+            )
+            required = {name: sine.get(name) for name in ("offset", "amplitude", "frequency", "t_end")}
+            with sine.located():
+                return Signal.sine(**{**sine.data, **required})
+        if "csv" in here:
+            here.only(["csv", "time", "value", "hold", "dt"])
+            time, value = here.get("time", "time"), here.get("value", "value")
+            if not isinstance(time, str) or not (isinstance(value, str) or _is_texts(value)):
+                here.fail("time must be the name of a column, value a name or a list of names")
+            signal = Signal.from_csv(here.path("csv"), time=time, value=value, hold=here.get("hold", "previous"))
+        else:
+            here.only(
+                ["times", "values", "hold", "dt", *(() if "times" in here or "values" in here else ("csv", "sine"))]
+            )
+            signal = Signal.sampled(here.get("times"), here.get("values"), here.get("hold", "previous"))
+        return signal.held(here.get("dt")) if "dt" in here else signal
+
+
+def _is_texts(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(item, str) for item in value)

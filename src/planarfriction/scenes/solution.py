@@ -1,0 +1,161 @@
+"""Solutions: what a simulation returns, how it is stored, and how it comes back with its scene."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import json
+import os
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from planarfriction.errors import FileError, FrictionError
+from planarfriction.scenes.scene import Scene
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+_META = ("scene", "statistics", "status", "message")
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """What a simulation took."""
+
+    steps: int = 0
+    """Accepted steps."""
+    rejections: int = 0
+    """Steps that were tried and repeated with a smaller size."""
+    evaluations: int = 0
+    """Evaluations of the right-hand side."""
+    jacobians: int = 0
+    """Evaluations of the Jacobian."""
+    wall_time: float = 0.0
+    """Time of the run without compilation [s]."""
+    compile_time: float = 0.0
+    """Time spent compiling before it [s]."""
+
+    def as_dict(self) -> dict[str, int | float]:
+        """The numbers by name."""
+        return dataclasses.asdict(self)
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Result of a simulation: histories, statistics, and the scene they belong to."""
+
+    data: xr.Dataset
+    """Histories over `time` [s] and `contact`, each with its unit in `attrs["units"]`.
+
+    Body (world axes, centre of mass): x, y [m], theta [rad], vx, vy [m/s], omega [rad/s]. Each contact: fx, fy [N], tau
+    [N m], the friction wrench on the body about the contact frame's origin in its axes, of **one** of `count` identical
+    contacts, and normal_force [N]; at a jump the left limit.
+    """
+    statistics: Statistics
+    """What the simulation took."""
+    status: str
+    """"done", or a word for what ended the simulation early."""
+    message: str
+    """What happened, in one sentence; the remedy where the solver gave up."""
+    scene: Scene
+    """The scene that was simulated."""
+
+    def plot(self) -> Any:
+        """Draw the motion of the body and the time histories; returns a matplotlib Figure."""
+        from planarfriction.plots import plot_solution
+
+        return plot_solution(self)
+
+    def save(self, path: str | Path) -> Path:
+        """Write everything, scene included, to the NetCDF file `path`; `load` brings it back.
+
+        Raises FileError where the file cannot be written.
+        """
+        path = check_writable(path)
+        attributes = {
+            "scene": self.scene.to_json(),
+            "statistics": json.dumps(self.statistics.as_dict()),
+            "status": self.status,
+            "message": self.message,
+        }
+        # Written beside the target first: a crash half-way leaves an older result as it was.
+        part = path.with_name(f"{path.name}.part")
+        try:
+            with _quiet():
+                self.data.assign_attrs(attributes).to_netcdf(part, engine="scipy")
+            os.replace(part, path)
+        except OSError as error:
+            raise FileError(f"{path}: cannot be written: {error.strerror or error}") from None
+        finally:
+            part.unlink(missing_ok=True)
+        return path
+
+
+def load(path: str | Path) -> Solution:
+    """Read a solution that `Solution.save` wrote, with its scene and the models in it.
+
+    Raises FileError for a missing file and for a file that holds anything else.
+    """
+    import xarray as xr
+
+    path = Path(path)
+    if not path.exists():
+        raise FileError(f"{path}: no such file (expected a saved solution)")
+    if path.is_dir():
+        raise FileError(f"{path}: is a folder, not a saved solution")
+    try:
+        with path.open("rb") as file, _quiet():
+            if file.read(3) != b"CDF":
+                raise FileError(f"{path}: not a saved solution (not a NetCDF 3 file)")
+            data = xr.load_dataset(path, engine="scipy")
+    except FrictionError:
+        raise
+    except Exception as error:  # a broken file can fail anywhere in the reader, with any exception
+        reason = " ".join(str(error).split()) or type(error).__name__
+        raise FileError(f"{path}: not a saved solution ({reason})") from None
+    missing = [name for name in _META if name not in data.attrs]
+    if missing:
+        raise FileError(f"{path}: not a saved solution of planarfriction (no attribute {missing[0]!r})")
+    meta = {name: str(data.attrs[name]) for name in _META}
+    for name in ("statistics", "status", "message"):
+        del data.attrs[name]
+    try:
+        scene = Scene.from_dict(json.loads(meta["scene"]))
+        statistics = Statistics(**json.loads(meta["statistics"]))
+    except (ValueError, TypeError, FrictionError) as error:
+        reason = " ".join(str(error).split())
+        raise FileError(f"{path}: the scene in this file cannot be read: {reason}") from None
+    return Solution(data, statistics, meta["status"], meta["message"], scene)
+
+
+def check_writable(path: str | Path) -> Path:
+    """Return `path` if a file can be written there, or raise FileError: ask before a long run, not after it.
+
+    The file is really opened, since permissions alone do not tell; what it holds stays as it is.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise FileError(f"{path}: cannot be written: it is a folder, give the name of a file in it")
+    if not path.parent.is_dir():
+        raise FileError(f"{path}: cannot be written: there is no folder {path.parent}")
+    existed = path.exists()
+    try:
+        with path.open("ab"):
+            pass
+        if not existed:
+            path.unlink()
+    except (OSError, ValueError) as error:
+        raise FileError(f"{path}: cannot be written: {getattr(error, 'strerror', None) or error}") from None
+    return path
+
+
+@contextlib.contextmanager
+def _quiet() -> Iterator[None]:
+    """Keep the notices of xarray and SciPy about their own future to themselves; errors pass."""
+    with warnings.catch_warnings():
+        for category in (FutureWarning, DeprecationWarning, RuntimeWarning):
+            warnings.simplefilter("ignore", category)
+        yield
