@@ -1,4 +1,4 @@
-"""Reading of tables from scene files: every mistake becomes one line that says the file, the table and what to write."""
+"""Reading of tables from scene files: every mistake becomes one line with the file, the table and what to write."""
 
 from __future__ import annotations
 
@@ -112,7 +112,10 @@ def read_text(path: str | Path, kind: str) -> str:
 
 
 def read_columns(path: str | Path, names: Sequence[str]) -> np.ndarray:
-    """Columns `names` of a CSV file with a header line, shape `[rows, len(names)]`; lines that start with # are comments."""
+    """Columns `names` of a CSV file with a header line, shape `[rows, len(names)]`.
+
+    Lines that start with # are comments.
+    """
     text = read_text(path, "a CSV file with a header line")
     lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
     lines = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]

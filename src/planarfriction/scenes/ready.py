@@ -19,7 +19,7 @@ SAMPLE_TIME = 0.01
 """Time over which the published experiments hold their inputs [s]."""
 
 STOP_SPEED = 1e-4
-"""Speed at which a free slide counts as stopped [m/s]: what is left to slide, v^2/(2 mu g), is below 1e-8 m at mu 0.1."""
+"""Speed at which a free slide counts as stopped [m/s]: what is left, v^2/(2 mu g), is below 1e-8 m for mu > 0.1."""
 
 IN_HAND_LOADS = {(1, 1): (1.73, 0.91), (1, 2): (3.6, 0.9)}
 """(load, placement) -> offset and amplitude [N] of the sine at 2 Hz."""
@@ -87,8 +87,8 @@ def drift_force(load: Literal["tangential", "normal"], *, t_end: float = 5.0) ->
 def drift(model: Any, *, load: Literal["tangential", "normal"] = "tangential", t_end: float = 5.0) -> Scene:
     """A disc of 1 kg and radius 0.05 m on a table, pushed by less than friction holds: does it creep?
 
-    `load="tangential"`: the force oscillates, and from 2.8 s on a torque too; `load="normal"`: force and torque stay and
-    the normal force oscillates after 1 s. The contact is fixed to the world.
+    `load="tangential"`: the force oscillates, and from 2.8 s on a torque too; `load="normal"`: force and torque stay
+    and the normal force oscillates after 1 s. The contact is fixed to the world.
 
     Source: Waltersson and Karayiannidis 2024, section VI.
     """
@@ -145,9 +145,9 @@ def driven(
 ) -> Scene:
     """A patch that is moved with a prescribed `twist` `(vx, vy, omega)` in its own axes, to see the wrench it gives.
 
-    `twist` is a signal `[T, 3]` or a constant (default: `published_velocity()`), `normal_force` [N] a signal or a number.
-    `at` says which point of the patch has the velocity: the origin of the contact frame, or the centre of pressure (of a
-    patch that changes with the load: the one at the load at t = 0). Wrenches are about the contact frame's origin.
+    `twist` is a signal `[T, 3]` or a constant (default: `published_velocity()`), `normal_force` [N] a signal or a
+    number. `at` says which point of the patch has the velocity: the origin of the contact frame, or the centre of
+    pressure (of a patch that changes with the load: the one at t = 0). Wrenches are about the contact frame's origin.
     """
     validation.choice("at", at, ("origin", "centre_of_pressure"))
     contact = Contact(model, normal_force, mounted_on="body", name="patch")

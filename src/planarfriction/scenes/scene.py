@@ -106,11 +106,12 @@ class Scene:
     t_end: float
     """Duration [s]."""
     force: Signal | None = None
-    """Applied wrench `(fx, fy, tau)` at the centre of mass, world axes, `[T, 3]` [N, N, N m], or None; may be constant."""
+    """Applied wrench `(fx, fy, tau)` at the centre of mass, world axes, `[T, 3]` [N, N, N m], or None."""
     velocity: Signal | None = None
-    """Prescribed twist `(vx, vy, omega)` of the body in **body axes**, `[T, 3]` [m/s, m/s, rad/s], or None for a free body.
+    """Prescribed twist `(vx, vy, omega)` in **body axes**, `[T, 3]` [m/s, m/s, rad/s], or None for a free body.
 
-    With it, mass, inertia, gravity and initial velocity of the body play no part.
+    It is the velocity of the origin of the body's axes. With it, mass, inertia, gravity and initial velocity of the body
+    play no part.
     """
     stop_speed: float | None = None
     """Speed [m/s] below which the body counts as at rest, which ends the simulation; None to run until `t_end`."""

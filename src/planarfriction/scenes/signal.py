@@ -20,7 +20,7 @@ SAME_TIME = 1e-12
 
 
 def sample_times(t_end: float, dt: float = 0.01) -> np.ndarray:
-    """Times `i dt` [s] from 0 to the last one that is not after `t_end`, each computed as `i * dt` (nothing accumulates)."""
+    """Times `i dt` [s] from 0 to the last one not after `t_end`, each computed as `i * dt` (nothing accumulates)."""
     t_end, dt = validation.non_negative("t_end", t_end), validation.positive("dt", dt)
     return np.arange(int(np.floor(t_end / dt + 1e-9)) + 1) * dt  # the 1e-9 keeps t_end itself in spite of rounding
 
@@ -123,7 +123,7 @@ class Signal:
 
     @property
     def breaks(self) -> np.ndarray:
-        """Times [s] at which the value jumps or the slope changes, increasing; samples that change nothing are left out."""
+        """Times [s] at which the value jumps or the slope changes, increasing; samples that change nothing are none."""
         if self.hold == "previous":
             change = np.diff(self.values, axis=0, prepend=self.values[:1])
         else:
