@@ -1,0 +1,189 @@
+"""Pressure maps from arrays and files: orientation, kinds of files, and what is said about broken ones."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+from PIL import Image
+
+import planarfriction as pf
+from planarfriction.errors import FileError, InvalidValueError
+
+ROUNDING = 1e-15
+"""Relative: a handful of operations, each rounded at 1e-16."""
+
+MAP = np.array([[0, 0, 0, 9], [0, 0, 0, 0], [1, 0, 0, 0]])
+"""Heavy at the top right, light at the bottom left, nothing else."""
+
+
+def test_row_0_is_the_top_and_column_0_the_left():
+    patch = pf.ContactPatch.from_pressure(MAP, 0.001)
+    assert patch.positions == pytest.approx(np.array([[0.0015, 0.001], [-0.0015, -0.001]]))
+    assert patch.weights() == pytest.approx([0.9, 0.1], rel=ROUNDING)
+    assert patch.centre_of_pressure() == pytest.approx((0.0012, 0.0008))
+    assert (patch.grid.columns, patch.grid.rows) == (4, 3)
+    assert (patch.grid.x_min, patch.grid.y_min) == pytest.approx((-0.002, -0.0015))
+
+
+def test_cells_may_be_oblong():
+    patch = pf.ContactPatch.from_pressure(MAP, (0.002, 0.001))
+    assert patch.positions[0] == pytest.approx((0.003, 0.001))
+    assert patch.areas == pytest.approx([2e-6, 2e-6])
+
+
+@settings(deadline=None, max_examples=25)
+@given(
+    hnp.arrays(
+        float, hnp.array_shapes(min_dims=2, max_dims=2, max_side=8), elements=st.floats(0, 100, width=32)
+    ).filter(np.any)
+)
+def test_any_map_comes_back(values):
+    patch = pf.ContactPatch.from_pressure(values, 0.001)
+    again = np.zeros_like(values)
+    again[patch.grid.locate(patch.positions)] = patch.pressure_values(values.sum() * 1e-6)
+    # A map in pascals and its own total load: the same pascals (weights below 1e-300 of the peak may be lost).
+    assert again == pytest.approx(values, rel=1e-12, abs=1e-290)
+
+
+@settings(deadline=None, max_examples=25)
+@given(hnp.arrays(float, (4, 5), elements=st.floats(0.01, 100)))
+def test_flipping_a_map_mirrors_the_centre(values):
+    x, y = pf.ContactPatch.from_pressure(values, 0.001).centre_of_pressure()
+    # Coordinates of a few millimetres, rounded.
+    assert pf.ContactPatch.from_pressure(values[::-1], 0.001).centre_of_pressure() == pytest.approx((x, -y), abs=1e-17)
+    assert pf.ContactPatch.from_pressure(values[:, ::-1], 0.001).centre_of_pressure() == pytest.approx(
+        (-x, y), abs=1e-17
+    )
+
+
+def write_csv(path, values):
+    path.write_text("# kPa\n" + "\n".join(",".join(str(value) for value in row) for row in values) + "\n\n")
+
+
+def write_image(path, values, mode="L"):
+    Image.fromarray(np.asarray(values, dtype={"L": np.uint8, "I;16": np.uint16, "F": np.float32}[mode])).save(path)
+
+
+@pytest.mark.parametrize(
+    ("file", "write"),
+    [
+        ("pad.csv", write_csv),
+        ("pad.npy", np.save),
+        ("pad.png", write_image),
+        ("PAD.PNG", write_image),
+        ("pad.bmp", write_image),
+        ("pad.pgm", write_image),
+        ("sixteen bits.png", lambda path, values: write_image(path, 7000 * values, "I;16")),
+        ("floats.tiff", lambda path, values: write_image(path, values / 64, "F")),
+        ("palette.png", lambda path, values: Image.fromarray(values.astype(np.uint8)).convert("P").save(path)),
+        (
+            "grey in colours.png",
+            lambda path, values: Image.fromarray(values.astype(np.uint8)).convert("RGB").save(path),
+        ),
+        ("opaque.png", lambda path, values: Image.fromarray(values.astype(np.uint8)).convert("LA").save(path)),
+    ],
+    ids=lambda value: value if isinstance(value, str) else "",
+)
+def test_every_kind_of_file_gives_the_same_patch(tmp_path, file, write):
+    path = tmp_path / file
+    write(path, MAP)
+    for given_path in (path, str(path)):
+        patch = pf.ContactPatch.from_pressure(given_path, 0.001)
+        assert patch.name == path.stem
+        assert patch.weights() == pytest.approx([0.9, 0.1], rel=ROUNDING)
+        assert patch.centre_of_pressure() == pytest.approx((0.0012, 0.0008))
+
+
+def test_black_and_white_image_is_a_mask(tmp_path):
+    Image.fromarray((MAP > 0).astype(np.uint8) * 255).convert("1").save(tmp_path / "mask.png")
+    assert pf.ContactPatch.from_pressure(tmp_path / "mask.png", 0.001).weights().tolist() == [0.5, 0.5]
+
+
+@pytest.mark.parametrize(
+    ("values", "cell_size", "message"),
+    [
+        ([[1, 2], [3, -4]], 0.001, r"pressure must be >= 0, got -4.0 at index \(1, 1\)"),
+        ([[1, np.nan]], 0.001, r"pressure must be finite, got nan at index \(0, 1\)"),
+        ([[0, 0]], 0.001, "pressure must have a total > 0"),
+        ([1, 2], 0.001, r"pressure must have shape \[any, any\], got shape \[2\]"),
+        ([[1, 2], [3]], 0.001, "pressure must be an array of numbers"),
+        (np.empty((0, 3)), 0.001, "pressure must have a total > 0"),
+        ([[1, 2]], 0.0, "cell_size must be > 0, got 0.0"),
+        ([[1, 2]], (1, 2, 3), r"cell_size must have shape \[2\]"),
+        ([[1, 2]], "1 mm", "cell_size must be an array of numbers"),
+    ],
+)
+def test_broken_arrays(values, cell_size, message):
+    with pytest.raises(InvalidValueError, match=message) as caught:
+        pf.ContactPatch.from_pressure(values, cell_size)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("file", "content", "message"),
+    [
+        ("pad.csv", "1,2\n3\n", "line 2 has 1 values, the first row has 2"),
+        ("pad.csv", "# kPa\n1,2\n3,x\n", "line 3, value 2: 'x' is no number"),
+        ("pad.csv", "1;2\n3;4\n", "line 1, value 1: '1;2' is no number"),
+        ("pad.csv", "", "the file holds no numbers"),
+        ("pad.csv", b"\x89PNG\r\n\x1a\n", "not a readable .csv file"),
+        ("pad.npy", "1,2\n3,4\n", "not a readable .npy file"),
+        ("pad.npy", "", "not a readable .npy file"),
+        ("pad.png", "1,2\n3,4\n", "not a readable .png file"),
+        ("pad.png", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR", "not a readable .png file"),
+        ("pad.txt", "1,2\n3,4\n", "unknown kind '.txt', use .csv, .npy or a grey image"),
+        ("pad", "1,2\n3,4\n", "unknown kind ''"),
+    ],
+)
+def test_broken_files(tmp_path, file, content, message):
+    path = tmp_path / file
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    with pytest.raises(FileError) as caught:
+        pf.ContactPatch.from_pressure(path, 0.001)
+    assert message in str(caught.value) and str(path) in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_missing_file_and_folder(tmp_path):
+    (tmp_path / "folder.csv").mkdir()
+    for name in ("missing.csv", "folder.csv"):
+        with pytest.raises(FileError, match="no such file"):
+            pf.ContactPatch.from_pressure(tmp_path / name, 0.001)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [("1,2\n3,nan\n", r"finite, got nan at index \(1, 1\)"), ("1,-2\n", r">= 0, got -2.0 at index \(0, 1\)")],
+)
+def test_broken_numbers_in_a_file_name_the_file(tmp_path, text, message):
+    (tmp_path / "pad.csv").write_text(text)
+    with pytest.raises(InvalidValueError, match=rf"pressure map .*pad.csv must be {message}"):
+        pf.ContactPatch.from_pressure(tmp_path / "pad.csv", 0.001)
+
+
+def test_npy_files_that_hold_something_else(tmp_path):
+    np.save(tmp_path / "objects.npy", np.array([None, {}], dtype=object))
+    np.save(tmp_path / "complex.npy", np.array([[1j]]))
+    np.save(tmp_path / "row.npy", np.array([1.0, 2.0]))
+    np.savez(tmp_path / "several.npz", a=MAP)
+    (tmp_path / "several.npz").rename(tmp_path / "several.npy")
+    for name, error in (
+        ("objects.npy", FileError),
+        ("complex.npy", FileError),
+        ("several.npy", FileError),
+        ("row.npy", InvalidValueError),
+    ):
+        with pytest.raises(error, match=name):
+            pf.ContactPatch.from_pressure(tmp_path / name, 0.001)
+
+
+def test_colours_and_transparency_are_refused(tmp_path):
+    Image.new("RGB", (2, 2), (255, 0, 0)).save(tmp_path / "colour.png")
+    Image.new("LA", (2, 2), (255, 100)).save(tmp_path / "clear.png")
+    with pytest.raises(FileError, match="colour image"):
+        pf.ContactPatch.from_pressure(tmp_path / "colour.png", 0.001)
+    with pytest.raises(FileError, match="partly transparent"):
+        pf.ContactPatch.from_pressure(tmp_path / "clear.png", 0.001)
