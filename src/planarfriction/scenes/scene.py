@@ -110,8 +110,8 @@ class Scene:
     velocity: Signal | None = None
     """Prescribed twist `(vx, vy, omega)` in **body axes**, `[T, 3]` [m/s, m/s, rad/s], or None for a free body.
 
-    It is the velocity of the origin of the body's axes. With it, mass, inertia, gravity and initial velocity of the body
-    play no part.
+    It is the velocity of the origin of the body's axes. With it, mass, inertia, gravity and initial velocity play no
+    part.
     """
     stop_speed: float | None = None
     """Speed [m/s] below which the body counts as at rest, which ends the simulation; None to run until `t_end`."""

@@ -25,7 +25,7 @@ def sample_times(t_end: float, dt: float = 0.01) -> np.ndarray:
     return np.arange(int(np.floor(t_end / dt + 1e-9)) + 1) * dt  # the 1e-9 keeps t_end itself in spite of rounding
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Signal:
     """A sampled function of time, `[T]` or `[T, k]` values; constant before the first sample and after the last.
 
@@ -180,6 +180,12 @@ class Signal:
             and np.array_equal(self.times, other.times)
             and np.array_equal(self.values, other.values)
         )
+
+    def __repr__(self) -> str:
+        if len(self.times) == 1:
+            return f"Signal.constant({self.values[0].tolist()})"
+        columns = "" if self.columns is None else f" of {self.columns} values"
+        return f"Signal({len(self.times)} samples{columns}, {self.times[0]:g} to {self.times[-1]:g} s, hold={self.hold!r})"
 
     def __hash__(self) -> int:
         # Adding 0.0 turns -0.0 into 0.0, which equals it.
