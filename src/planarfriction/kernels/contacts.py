@@ -12,7 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction.kernels import distributed, jit, reduced
+from planarfriction.kernels import distributed, kernel, reduced
+from planarfriction.kernels.law import law_of
 
 DISTRIBUTED, REDUCED = 0, 1
 WORLD, BODY, BODY_AXES = 0, 1, 2
@@ -52,8 +53,8 @@ class Contacts(NamedTuple):
     """Numbers of the limit surfaces, flat."""
 
 
-@jit
-def contact_map(mount, place, u, pose, a):
+@kernel
+def contact_map(mount, place, pose, a):
     """Write `A`, with `V = A u`, into `a` [3, 3]."""
     angle = place[2] + (pose[2] if mount == BODY else 0.0)
     c, s = math.cos(angle), math.sin(angle)
@@ -69,7 +70,7 @@ def contact_map(mount, place, u, pose, a):
     a[2, 0], a[2, 1], a[2, 2] = 0.0, 0.0, 1.0
 
 
-@jit
+@kernel
 def contact_map_slopes(mount, a, u, w, g, h):
     """Write `G = d(A u)/d pose` and `H = d(A' W)/d pose` into `g` and `h` [3, 3]."""
     g[:] = 0.0
@@ -88,9 +89,10 @@ def contact_map_slopes(mount, a, u, w, g, h):
         h[1, 2] = a[1, 1] * w[0] - a[0, 1] * w[1]
 
 
-@jit
-def evaluate(contacts, c, row, law, z, v, zdot, w):
+@kernel
+def evaluate(contacts, c, row, z, v, zdot, w):
     """Bristle rates and wrench per unit load of contact c in shape `row` at the twist `v`."""
+    law = law_of(contacts.law[c])
     if contacts.kind[c] == DISTRIBUTED:
         x, y, weights = _cells(contacts, c, row)
         w[0], w[1], w[2] = distributed.evaluate(law, z, v[0], v[1], v[2], x, y, weights, zdot)
@@ -100,9 +102,10 @@ def evaluate(contacts, c, row, law, z, v, zdot, w):
         )
 
 
-@jit
-def linearise(contacts, c, row, law, z, v, lin):
+@kernel
+def linearise(contacts, c, row, z, v, lin):
     """Linearise contact c in shape `row` at the twist `v` into its workspace `lin`."""
+    law = law_of(contacts.law[c])
     if contacts.kind[c] == DISTRIBUTED:
         x, y, _ = _cells(contacts, c, row)
         distributed.linearise(law, z, v[0], v[1], v[2], x, y, lin.reshape(7, x.shape[0]))
@@ -110,9 +113,10 @@ def linearise(contacts, c, row, law, z, v, lin):
         reduced.linearise(law, z, v[0], v[1], v[2], contacts.shape[row], contacts.surface[row], contacts.data, lin)
 
 
-@jit
-def factor(contacts, c, row, law, z, shift, lin, stiffness):
+@kernel
+def factor(contacts, c, row, z, shift, lin, stiffness):
     """Prepare the elimination of the bristles of contact c and write its `d wrench / d twist` per unit load."""
+    law = law_of(contacts.law[c])
     if contacts.kind[c] == DISTRIBUTED:
         x, y, weights = _cells(contacts, c, row)
         distributed.factor(law, z, shift, x, y, weights, lin.reshape(7, x.shape[0]), stiffness)
@@ -120,9 +124,10 @@ def factor(contacts, c, row, law, z, shift, lin, stiffness):
         reduced.factor(law, shift, contacts.shape[row], lin, stiffness)
 
 
-@jit
-def eliminate(contacts, c, row, law, z, shift, r, lin, w):
+@kernel
+def eliminate(contacts, c, row, z, shift, r, lin, w):
     """Wrench per unit load of contact c caused by its bristle residual `r`."""
+    law = law_of(contacts.law[c])
     if contacts.kind[c] == DISTRIBUTED:
         x, y, weights = _cells(contacts, c, row)
         w[0], w[1], w[2] = distributed.eliminate(law, z, shift, r, x, y, weights, lin.reshape(7, x.shape[0]))
@@ -130,7 +135,7 @@ def eliminate(contacts, c, row, law, z, shift, r, lin, w):
         w[0], w[1], w[2] = reduced.eliminate(law, shift, r, contacts.shape[row], lin)
 
 
-@jit
+@kernel
 def back_substitute(contacts, c, row, z, shift, r, v, lin, out):
     """Bristle solution of contact c for the residual `r` and the twist change `v`."""
     if contacts.kind[c] == DISTRIBUTED:
@@ -140,7 +145,7 @@ def back_substitute(contacts, c, row, z, shift, r, v, lin, out):
         reduced.back_substitute(shift, r, v[0], v[1], v[2], contacts.shape[row], lin, out)
 
 
-@jit
+@kernel
 def _cells(contacts, c, row):
     first, last = contacts.cell[c], contacts.cell[c + 1]
     start = contacts.weight_start[row]

@@ -14,17 +14,13 @@ from __future__ import annotations
 
 import math
 
-from numba import njit
-
 from planarfriction import formulas
-from planarfriction.kernels import _OPTIONS, jit
 from planarfriction.kernels import compiled_math as xp
+from planarfriction.kernels import inlined, jit, kernel
 from planarfriction.kernels.law import strength, strength_slope
 
-_inline = njit(forceinline=True, **_OPTIONS)
 
-
-@_inline
+@inlined
 def _evaluate(gamma, law, z, vx, vy, omega, x, y, w, zdot):
     n = x.shape[0]
     zx, zy, dx, dy = z[:n], z[n:], zdot[:n], zdot[n:]
@@ -35,9 +31,7 @@ def _evaluate(gamma, law, z, vx, vy, omega, x, y, w, zdot):
         z_norm = math.sqrt(zx[i] * zx[i] + zy[i] * zy[i])
         along = (zx[i] * ux + zy[i] * uy) / xp.where(z_norm > 0.0, z_norm, 1.0)
         z_max = strength(law, gamma, speed)
-        k = formulas.bristle_decay(
-            xp, z_norm, along, speed, z_max, z_max, law.elasto_plastic, law.breakaway_ratio
-        )
+        k = formulas.bristle_decay(xp, z_norm, along, speed, z_max, z_max, law.elasto_plastic, law.breakaway_ratio)
         dx[i] = ux - k * zx[i]
         dy[i] = uy - k * zy[i]
         tx = w[i] * formulas.traction(zx[i], dx[i], ux, law.sigma_0, law.sigma_1, law.sigma_2)
@@ -48,7 +42,7 @@ def _evaluate(gamma, law, z, vx, vy, omega, x, y, w, zdot):
     return fx, fy, tau
 
 
-@jit
+@kernel
 def evaluate(law, z, vx, vy, omega, x, y, w, zdot):
     """Write the bristle rates into `zdot` and return the wrench `(fx, fy, tau)`."""
     if law.gamma == 2.0:
@@ -56,7 +50,7 @@ def evaluate(law, z, vx, vy, omega, x, y, w, zdot):
     return _evaluate(law.gamma, law, z, vx, vy, omega, x, y, w, zdot)
 
 
-@_inline
+@inlined
 def _linearise(gamma, law, z, vx, vy, omega, x, y, k, kzx, kzy, kvx, kvy):
     n = x.shape[0]
     zx, zy = z[:n], z[n:]
@@ -80,7 +74,7 @@ def _linearise(gamma, law, z, vx, vy, omega, x, y, k, kzx, kzy, kvx, kvy):
         kvy[i] = k_along * ey + k_speed_total * uy
 
 
-@jit
+@kernel
 def linearise(law, z, vx, vy, omega, x, y, lin):
     """Write `k`, `k_z` and `k_v` of each cell into the rows 0 to 4 of `lin`."""
     if law.gamma == 2.0:
@@ -89,7 +83,7 @@ def linearise(law, z, vx, vy, omega, x, y, lin):
         _linearise(law.gamma, law, z, vx, vy, omega, x, y, lin[0], lin[1], lin[2], lin[3], lin[4])
 
 
-@jit
+@kernel
 def factor(law, z, shift, x, y, w, lin, stiffness):
     """Prepare `D = shift I - d zdot/dz` (rows 5 and 6 of `lin`) and write `d wrench/d twist` with the bristles eliminated.
 
@@ -126,7 +120,7 @@ def factor(law, z, shift, x, y, w, lin, stiffness):
     stiffness[2, 0], stiffness[2, 1], stiffness[2, 2] = tx, ty, tt
 
 
-@jit
+@kernel
 def eliminate(law, z, shift, r, x, y, w, lin):
     """Wrench caused by the bristle residual `r`: `sum w P' [-(sigma_0 + sigma_1 shift) D^-1 r + sigma_1 r]`."""
     n = x.shape[0]
@@ -144,7 +138,7 @@ def eliminate(law, z, shift, r, x, y, w, lin):
     return fx, fy, tau
 
 
-@jit
+@kernel
 def back_substitute(z, r, vx, vy, omega, x, y, lin, out):
     """Solve `D out = r + d zdot/dv dv` for the change of the twist `(vx, vy, omega)`."""
     n = x.shape[0]
@@ -159,7 +153,7 @@ def back_substitute(z, r, vx, vy, omega, x, y, lin, out):
         oy[i] = (ay - zy[i] * b) * per_diagonal[i]
 
 
-@_inline
+@inlined
 def _step(gamma, law, z, vx, vy, omega, x, y, w, dt, out):
     n = x.shape[0]
     zx, zy, ox, oy = z[:n], z[n:], out[:n], out[n:]
@@ -198,7 +192,7 @@ def _step(gamma, law, z, vx, vy, omega, x, y, w, dt, out):
     return fx, fy, tau
 
 
-@jit
+@kernel
 def step(law, z, vx, vy, omega, x, y, w, dt, out):
     """Advance the bristles by `dt` at a held twist (see `formulas.relaxation`) and return the wrench at the end."""
     if law.gamma == 2.0:

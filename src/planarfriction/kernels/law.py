@@ -8,7 +8,7 @@ import numpy as np
 
 from planarfriction import formulas
 from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import jit
+from planarfriction.kernels import kernel
 
 
 class LawNumbers(NamedTuple):
@@ -46,19 +46,19 @@ def law_row(law) -> np.ndarray:
     return np.array(law_numbers(law), dtype=float)
 
 
-@jit
+@kernel
 def law_of(row):
     """Read a law from a row."""
     return LawNumbers(row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8])
 
 
-@jit
+@kernel
 def strength(law, gamma, speed):
     """`g(v)/sigma_0` [m]: the steady deflection of a bristle."""
     return formulas.stribeck(xp, speed, law.mu_c, law.mu_s, law.v_s, gamma) / law.sigma_0
 
 
-@jit
+@kernel
 def strength_slope(law, gamma, speed):
     """Derivative of `g(v)/sigma_0` with respect to the speed [s]."""
     return formulas.stribeck_slope(xp, speed, law.mu_c, law.mu_s, law.v_s, gamma) / law.sigma_0

@@ -16,17 +16,17 @@ import numpy as np
 
 from planarfriction import formulas
 from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import jit
+from planarfriction.kernels import jit, kernel
 from planarfriction.kernels.law import law_of, strength, strength_slope
 from planarfriction.kernels.surfaces import sliding, sliding_jacobian
 
 
-@jit
+@kernel
 def _scaled_twist(shape, vx, vy, omega):
     return vx - omega * shape[1], vy + omega * shape[0], shape[2] * omega
 
 
-@jit
+@kernel
 def _wrench(law, shape, zx, zy, zt, dx, dy, dt, vx, vy, omega):
     """Wrench about the origin, from raw bristles and rates and the twist at the centre of pressure."""
     fx = formulas.traction(zx, dx, vx, law.sigma_0, law.sigma_1, law.sigma_2)
@@ -35,7 +35,7 @@ def _wrench(law, shape, zx, zy, zt, dx, dy, dt, vx, vy, omega):
     return fx, fy, tau + shape[0] * fy - shape[1] * fx
 
 
-@jit
+@kernel
 def _decay(law, zx, zy, zs, ux, uy, us, v_n):
     """`k` of the scaled bristle `(zx, zy, zs)` driven by `u`."""
     u_norm = math.sqrt(ux * ux + uy * uy + us * us)
@@ -46,7 +46,7 @@ def _decay(law, zx, zy, zs, ux, uy, us, v_n):
     return formulas.bristle_decay(xp, z_norm, along, v_n, h_norm * g, g, law.elasto_plastic, law.breakaway_ratio)
 
 
-@jit
+@kernel
 def evaluate(law, z, vx, vy, omega, shape, surface, data, zdot):
     """Write the raw bristle rates into `zdot` and return the wrench `(fx, fy, tau)`."""
     x, y, s = _scaled_twist(shape, vx, vy, omega)
@@ -57,7 +57,7 @@ def evaluate(law, z, vx, vy, omega, shape, surface, data, zdot):
     return _wrench(law, shape, z[0], z[1], z[2], zdot[0], zdot[1], zdot[2], x, y, omega)
 
 
-@jit
+@kernel
 def linearise(law, z, vx, vy, omega, shape, surface, data, lin):
     """Write into `lin`: `k` (0), `k_z` (1:4), `z_hat` (4:7) and `d z_hat'/dV_S` (7:16, row by row)."""
     x, y, s = _scaled_twist(shape, vx, vy, omega)
@@ -98,17 +98,15 @@ def linearise(law, z, vx, vy, omega, shape, surface, data, lin):
         lin[13 + m] = j[6 + m] - zs * k_m
 
 
-@jit
+@kernel
 def _solve(lin, shift, ax, ay, a_s):
     """`D^-1 a` in scaled coordinates, `D = (shift + k) I + z_hat (x) k_z`."""
     diagonal = shift + lin[0]
-    c = (lin[1] * ax + lin[2] * ay + lin[3] * a_s) / (
-        diagonal + lin[1] * lin[4] + lin[2] * lin[5] + lin[3] * lin[6]
-    )
+    c = (lin[1] * ax + lin[2] * ay + lin[3] * a_s) / (diagonal + lin[1] * lin[4] + lin[2] * lin[5] + lin[3] * lin[6])
     return (ax - c * lin[4]) / diagonal, (ay - c * lin[5]) / diagonal, (a_s - c * lin[6]) / diagonal
 
 
-@jit
+@kernel
 def factor(law, shift, shape, lin, stiffness):
     """Write `d wrench/d twist` with the bristle eliminated: `-(sigma_0 + sigma_1 shift) S D^-1 F S - sigma_2 U`."""
     pull = law.sigma_0 + law.sigma_1 * shift
@@ -130,7 +128,7 @@ def factor(law, shift, shape, lin, stiffness):
         stiffness[2, m] += cx * stiffness[1, m] - cy * stiffness[0, m]
 
 
-@jit
+@kernel
 def eliminate(law, shift, r, shape, lin):
     """Wrench about the origin caused by the raw bristle residual `r`."""
     pull = law.sigma_0 + law.sigma_1 * shift
@@ -140,7 +138,7 @@ def eliminate(law, shift, r, shape, lin):
     return fx, fy, tau + shape[0] * fy - shape[1] * fx
 
 
-@jit
+@kernel
 def back_substitute(shift, r, vx, vy, omega, shape, lin, out):
     """Solve `D out = r + d zdot/dV dV` for the change of the twist about the origin."""
     x, y, s = _scaled_twist(shape, vx, vy, omega)
@@ -154,7 +152,7 @@ def back_substitute(shift, r, vx, vy, omega, shape, lin, out):
     out[2] = shape[2] * bs
 
 
-@jit
+@kernel
 def step(law, z, vx, vy, omega, shape, surface, data, dt, out):
     """Advance the bristle by `dt` at a held twist (see `formulas.relaxation`) and return the wrench at the end."""
     x, y, s = _scaled_twist(shape, vx, vy, omega)
@@ -183,13 +181,9 @@ def step(law, z, vx, vy, omega, shape, surface, data, dt, out):
     n_along = per_h * (nx * ux + ny * uy + ns * us) / xp.where(n_norm > 0.0, n_norm, 1.0)
     back = formulas.cap(xp, n_norm, largest)
     nx, ny, ns = nx * back, ny * back, ns * back
-    k = formulas.bristle_decay(
-        xp, n_norm * back, n_along, v_n, z_max, g, law.elasto_plastic, law.breakaway_ratio
-    )
+    k = formulas.bristle_decay(xp, n_norm * back, n_along, v_n, z_max, g, law.elasto_plastic, law.breakaway_ratio)
     out[0], out[1], out[2] = nx, ny, r * ns
-    return _wrench(
-        law, shape, nx, ny, r * ns, ux - k * nx, uy - k * ny, r * (us - k * ns), x, y, omega
-    )
+    return _wrench(law, shape, nx, ny, r * ns, ux - k * nx, uy - k * ny, r * (us - k * ns), x, y, omega)
 
 
 @jit
@@ -197,9 +191,7 @@ def step_batch(law_row, shape, surface, data, z, twist, load, dt, out, wrench):
     """`step` for a batch: `z`, `twist`, `out`, `wrench` [B, 3], `load`, `dt` [B]; without load the bristle is forgotten."""
     law = law_of(law_row)
     for b in range(z.shape[0]):
-        fx, fy, tau = step(
-            law, z[b], twist[b, 0], twist[b, 1], twist[b, 2], shape, surface, data, dt[b], out[b]
-        )
+        fx, fy, tau = step(law, z[b], twist[b, 0], twist[b, 1], twist[b, 2], shape, surface, data, dt[b], out[b])
         wrench[b, 0], wrench[b, 1], wrench[b, 2] = load[b] * fx, load[b] * fy, load[b] * tau
         if load[b] == 0.0:
             out[b] = 0.0

@@ -1,9 +1,4 @@
-"""The structured Rosenbrock step: linear cost in cells, because bristles meet only in the body's three accelerations.
-
-State vector: bristles of every contact, body velocity `u = (vx, vy, omega)`, pose `(x, y, theta)`. One stage solves
-`(shift I - J) k = rhs` with `shift = 1/(h gamma)`: the bristles are eliminated contact by contact, which leaves a 6 x 6
-system for the body, and are recovered from its solution. Loads and forces are linear in time within a piece.
-"""
+"""Rosenbrock methods on the structured body system: adaptive steps, exact stops at breaks, dense output."""
 
 from __future__ import annotations
 
@@ -12,42 +7,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction.kernels import contacts as ct
-from planarfriction.kernels import jit
-from planarfriction.kernels.law import law_of
+from planarfriction.kernels import jit, kernel
+from planarfriction.kernels.body import factor, linearise, rates, solve, workspace
 
-DONE, PAUSED, STEP_TOO_SMALL, NOT_FINITE, AT_REST = 0, 1, 2, 3, 4
+DONE, PAUSED, STEP_TOO_SMALL, AT_REST = 0, 1, 2, 3
 """Outcomes of `advance`."""
 
 STEPS, REJECTIONS, EVALUATIONS, JACOBIANS = 0, 1, 2, 3
 """Rows of the statistics."""
-
-
-class Motion(NamedTuple):
-    """A planar body and its inputs on the S pieces between breaks, each linear in the time since the piece began."""
-
-    inverse_mass: np.ndarray
-    """1/m, 1/m, 1/I; zeros where the velocity is prescribed, [3]."""
-    body_axes: bool
-    """The velocity is prescribed, in body axes."""
-    breaks: np.ndarray
-    """Times [S + 1]."""
-    load: np.ndarray
-    """Normal force per contact, at the start of the piece and its slope, [S, 2, C]."""
-    force: np.ndarray
-    """Applied force and torque at the centre of mass, start and slope, [S, 2, 3]."""
-    velocity: np.ndarray
-    """Prescribed velocity at the start of each piece, [S, 3]; empty [0, 3] for a free body."""
-    acceleration: np.ndarray
-    """Gravity, or the slope of the prescribed velocity, [S, 3]."""
-    row: np.ndarray
-    """Shape of each contact on each piece, int [S, C]."""
-    stop_speed: float
-    """End when the body's speed and its change within the bristles' time are below this [m/s]; 0: never."""
-    stop_radius: float
-    """Lever arm that turns spin into speed for that test [m]."""
-    stop_time: float
-    """The bristles' time, sigma_1/sigma_0 [s]."""
 
 
 class Method(NamedTuple):
@@ -87,173 +54,7 @@ class Output(NamedTuple):
     """[M, number of bristle states], or [0, 0] when they are not wanted."""
 
 
-@jit
-def _contact_twist(a, u, v):
-    for i in range(3):
-        v[i] = a[i, 0] * u[0] + a[i, 1] * u[1] + a[i, 2] * u[2]
-
-
-@jit
-def rates(contacts, motion, laws, piece, since, y, dy, w, a):
-    """Right-hand side `dy` at `since` seconds into a piece; wrenches per unit load into `w` [C, 3]."""
-    o = y.shape[0] - 6
-    u, pose = y[o : o + 3], y[o + 3 :]
-    v = np.empty(3)
-    fx, fy, tau = 0.0, 0.0, 0.0
-    for c in range(contacts.kind.shape[0]):
-        first, last = contacts.state[c], contacts.state[c + 1]
-        ct.contact_map(contacts.mount[c], contacts.place[c], u, pose, a)
-        _contact_twist(a, u, v)
-        ct.evaluate(contacts, c, motion.row[piece, c], laws[c], y[first:last], v, dy[first:last], w[c])
-        load = contacts.count[c] * (motion.load[piece, 0, c] + since * motion.load[piece, 1, c])
-        fx += load * (a[0, 0] * w[c, 0] + a[1, 0] * w[c, 1])
-        fy += load * (a[0, 1] * w[c, 0] + a[1, 1] * w[c, 1])
-        tau += load * (a[0, 2] * w[c, 0] + a[1, 2] * w[c, 1] + w[c, 2])
-    force = motion.force[piece]
-    gravity = motion.acceleration[piece]
-    dy[o] = gravity[0] + motion.inverse_mass[0] * (force[0, 0] + since * force[1, 0] + fx)
-    dy[o + 1] = gravity[1] + motion.inverse_mass[1] * (force[0, 1] + since * force[1, 1] + fy)
-    dy[o + 2] = gravity[2] + motion.inverse_mass[2] * (force[0, 2] + since * force[1, 2] + tau)
-    if motion.body_axes:
-        cos, sin = math.cos(pose[2]), math.sin(pose[2])
-        dy[o + 3] = cos * u[0] - sin * u[1]
-        dy[o + 4] = sin * u[0] + cos * u[1]
-    else:
-        dy[o + 3] = u[0]
-        dy[o + 4] = u[1]
-    dy[o + 5] = u[2]
-
-
-@jit
-def _linearise(contacts, motion, laws, piece, since, y, w, lin, maps):
-    """Linearise every contact; maps [C, 3, 3, 3] receives A, G, H."""
-    o = y.shape[0] - 6
-    u, pose = y[o : o + 3], y[o + 3 :]
-    v = np.empty(3)
-    for c in range(contacts.kind.shape[0]):
-        ct.contact_map(contacts.mount[c], contacts.place[c], u, pose, maps[c, 0])
-        ct.contact_map_slopes(contacts.mount[c], maps[c, 0], u, w[c], maps[c, 1], maps[c, 2])
-        _contact_twist(maps[c, 0], u, v)
-        ct.linearise(
-            contacts,
-            c,
-            motion.row[piece, c],
-            laws[c],
-            y[contacts.state[c] : contacts.state[c + 1]],
-            v,
-            lin[contacts.linear[c] : contacts.linear[c + 1]],
-        )
-
-
-@jit
-def _factor(contacts, motion, laws, piece, since, y, shift, lin, maps, matrix, pivot):
-    """Eliminate the bristles and factor the 6 x 6 body matrix."""
-    o = y.shape[0] - 6
-    stiffness = np.empty((3, 3))
-    matrix[:] = 0.0
-    for c in range(contacts.kind.shape[0]):
-        ct.factor(
-            contacts,
-            c,
-            motion.row[piece, c],
-            laws[c],
-            y[contacts.state[c] : contacts.state[c + 1]],
-            shift,
-            lin[contacts.linear[c] : contacts.linear[c + 1]],
-            stiffness,
-        )
-        load = contacts.count[c] * (motion.load[piece, 0, c] + since * motion.load[piece, 1, c])
-        a, g, h = maps[c, 0], maps[c, 1], maps[c, 2]
-        for i in range(3):
-            for j in range(3):
-                to_velocity, to_pose = 0.0, h[i, j]
-                for p in range(3):
-                    for q in range(3):
-                        to_velocity += a[p, i] * stiffness[p, q] * a[q, j]
-                        to_pose += a[p, i] * stiffness[p, q] * g[q, j]
-                matrix[i, j] -= motion.inverse_mass[i] * load * to_velocity
-                matrix[i, 3 + j] -= motion.inverse_mass[i] * load * to_pose
-    if motion.body_axes:
-        cos, sin = math.cos(y[o + 5]), math.sin(y[o + 5])
-        matrix[3, 0], matrix[3, 1], matrix[4, 0], matrix[4, 1] = -cos, sin, -sin, -cos
-        matrix[3, 5] = sin * y[o] + cos * y[o + 1]
-        matrix[4, 5] = sin * y[o + 1] - cos * y[o]
-    else:
-        matrix[3, 0] = -1.0
-        matrix[4, 1] = -1.0
-    matrix[5, 2] = -1.0
-    for i in range(6):
-        matrix[i, i] += shift
-    for k in range(6):
-        best = k
-        for i in range(k + 1, 6):
-            if abs(matrix[i, k]) > abs(matrix[best, k]):
-                best = i
-        pivot[k] = best
-        if best != k:
-            for j in range(6):
-                matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
-        for i in range(k + 1, 6):
-            matrix[i, k] /= matrix[k, k]
-            for j in range(k + 1, 6):
-                matrix[i, j] -= matrix[i, k] * matrix[k, j]
-
-
-@jit
-def _solve(contacts, motion, laws, piece, since, y, shift, lin, maps, matrix, pivot, r, out):
-    """Solve `(shift I - J) out = r`."""
-    o = y.shape[0] - 6
-    w, v, b = np.empty(3), np.empty(3), np.empty(6)
-    for i in range(6):
-        b[i] = r[o + i]
-    for c in range(contacts.kind.shape[0]):
-        first, last = contacts.state[c], contacts.state[c + 1]
-        ct.eliminate(
-            contacts,
-            c,
-            motion.row[piece, c],
-            laws[c],
-            y[first:last],
-            shift,
-            r[first:last],
-            lin[contacts.linear[c] : contacts.linear[c + 1]],
-            w,
-        )
-        load = contacts.count[c] * (motion.load[piece, 0, c] + since * motion.load[piece, 1, c])
-        a = maps[c, 0]
-        for i in range(3):
-            b[i] += motion.inverse_mass[i] * load * (a[0, i] * w[0] + a[1, i] * w[1] + a[2, i] * w[2])
-    for k in range(6):
-        p = pivot[k]
-        b[k], b[p] = b[p], b[k]
-        for i in range(k + 1, 6):
-            b[i] -= matrix[i, k] * b[k]
-    for i in range(5, -1, -1):
-        for j in range(i + 1, 6):
-            b[i] -= matrix[i, j] * b[j]
-        b[i] /= matrix[i, i]
-        out[o + i] = b[i]
-    for c in range(contacts.kind.shape[0]):
-        first, last = contacts.state[c], contacts.state[c + 1]
-        a, g = maps[c, 0], maps[c, 1]
-        for i in range(3):
-            v[i] = 0.0
-            for j in range(3):
-                v[i] += a[i, j] * b[j] + g[i, j] * b[3 + j]
-        ct.back_substitute(
-            contacts,
-            c,
-            motion.row[piece, c],
-            y[first:last],
-            shift,
-            r[first:last],
-            v,
-            lin[contacts.linear[c] : contacts.linear[c + 1]],
-            out[first:last],
-        )
-
-
-@jit
+@kernel
 def _error_norm(contacts, y, new, error, rtol, atol):
     """Largest of the body's components and of each contact's mean over its bristles, in units of the tolerance."""
     largest = 0.0
@@ -273,21 +74,35 @@ def _error_norm(contacts, y, new, error, rtol, atol):
     return largest if math.isfinite(largest) else math.inf
 
 
-@jit
-def _record(contacts, motion, laws, piece, since, y, output, m, dy, w, a):
-    rates(contacts, motion, laws, piece, since, y, dy, w, a)
+@kernel
+def _record(contacts, motion, piece, since, y, output, m, dy, work):
+    rates(contacts, motion, piece, since, y, dy, work)
     o = y.shape[0] - 6
-    output.body[m, :] = y[o:]
+    for i in range(6):
+        output.body[m, i] = y[o + i]
     for c in range(contacts.kind.shape[0]):
         load = motion.load[piece, 0, c] + since * motion.load[piece, 1, c]
         output.load[m, c] = load
         for i in range(3):
-            output.wrench[m, c, i] = load * w[c, i]
+            output.wrench[m, c, i] = load * work.wrench[c, i]
     if output.bristles.shape[0] > 0:
-        output.bristles[m, :] = y[:o]
+        for i in range(o):
+            output.bristles[m, i] = y[i]
 
 
-@jit
+@kernel
+def _time_slope(contacts, motion, piece, work, slope):
+    """`df/dt` of the body's accelerations [3]: forces and loads are linear in time."""
+    for i in range(3):
+        total = motion.force[piece, 1, i]
+        for c in range(contacts.kind.shape[0]):
+            load = contacts.count[c] * motion.load[piece, 1, c]
+            for p in range(3):
+                total += load * work.maps[c, 0, p, i] * work.wrench[c, p]
+        slope[i] = motion.inverse_mass[i] * total
+
+
+@kernel
 def _combine(coefficients, stages, count, base, out):
     """`out = base + sum coefficients_j stages_j` over the first `count` stages."""
     n = base.shape[0]
@@ -299,6 +114,15 @@ def _combine(coefficients, stages, count, base, out):
             stage = stages[j]
             for i in range(n):
                 out[i] += c * stage[i]
+
+
+@kernel
+def _forget_unloaded(contacts, motion, piece, y):
+    """A contact without load on the whole piece keeps no memory: it starts again from rest."""
+    for c in range(contacts.kind.shape[0]):
+        if motion.load[piece, 0, c] == 0.0 and motion.load[piece, 1, c] == 0.0:
+            for i in range(contacts.state[c], contacts.state[c + 1]):
+                y[i] = 0.0
 
 
 @jit
@@ -317,17 +141,12 @@ def advance(contacts, motion, method, output, y, cursor, clock, rtol, atol, max_
     )  # fmt: skip
     couplings = np.empty(s)
     n_contacts = contacts.kind.shape[0]
-    w, w0 = np.empty((n_contacts, 3)), np.empty((n_contacts, 3))
-    a = np.empty((3, 3))
-    maps = np.zeros((n_contacts, 3, 3, 3))
-    lin = np.empty(contacts.linear[n_contacts])
-    matrix, pivot = np.empty((6, 6)), np.empty(6, np.int64)
-    laws = [law_of(contacts.law[c]) for c in range(n_contacts)]
+    work = workspace(contacts)
     zeros = np.zeros(n)
     piece, m = cursor[0], cursor[1]
     since, h, first_step = clock[0], clock[1], clock[2]
     taken = 0
-    fresh = True  # f0 and the linearisation belong to y
+    fresh = True  # the linearisation is yet to be made at y
     pieces = motion.breaks.shape[0] - 1
     outcome = DONE
     while piece < pieces:
@@ -338,7 +157,7 @@ def advance(contacts, motion, method, output, y, cursor, clock, rtol, atol, max_
                 y[n - 6 : n - 3] = motion.velocity[piece]
             h = min(h, first_step)
         while m < output.time.shape[0] and output.time[m] <= begin and since == 0.0 and piece == 0:
-            _record(contacts, motion, laws, piece, 0.0, y, output, m, f, w, a)
+            _record(contacts, motion, piece, 0.0, y, output, m, f, work)
             m += 1
         starting = since == 0.0
         while since < length:
@@ -353,19 +172,13 @@ def advance(contacts, motion, method, output, y, cursor, clock, rtol, atol, max_
                 outcome = STEP_TOO_SMALL
                 break
             if fresh:
-                rates(contacts, motion, laws, piece, since, y, f0, w0, a)
-                _linearise(contacts, motion, laws, piece, since, y, w0, lin, maps)
+                rates(contacts, motion, piece, since, y, f0, work)
+                linearise(contacts, motion, piece, y, work)
                 statistics[EVALUATIONS] += 1
                 statistics[JACOBIANS] += 1
-                for i in range(3):
-                    total = motion.force[piece, 1, i]
-                    for c in range(n_contacts):
-                        slope = contacts.count[c] * motion.load[piece, 1, c]
-                        for p in range(3):
-                            total += slope * maps[c, 0, p, i] * w0[c, p]
-                    ft[i] = motion.inverse_mass[i] * total
+                _time_slope(contacts, motion, piece, work, ft)
             shift = 1.0 / (step * method.gamma)
-            _factor(contacts, motion, laws, piece, since, y, shift, lin, maps, matrix, pivot)
+            factor(contacts, motion, piece, since, y, shift, work)
             for i in range(s):
                 for j in range(i):
                     couplings[j] = method.c[i, j] / step
@@ -373,20 +186,20 @@ def advance(contacts, motion, method, output, y, cursor, clock, rtol, atol, max_
                     _combine(couplings, k, 0, f0, r)
                 else:
                     _combine(method.a[i], k, i, y, arg)
-                    rates(contacts, motion, laws, piece, since + method.alpha[i] * step, arg, f, w, a)
+                    rates(contacts, motion, piece, since + method.alpha[i] * step, arg, f, work)
                     _combine(couplings, k, i, f, r)
                     statistics[EVALUATIONS] += 1
                 for p in range(3):
                     r[n - 6 + p] += method.time_gamma[i] * step * ft[p]
-                _solve(contacts, motion, laws, piece, since, y, shift, lin, maps, matrix, pivot, r, k[i])
+                solve(contacts, motion, piece, since, y, shift, r, k[i], work)
             _combine(method.m, k, s, y, new)
             _combine(method.e, k, s, zeros, error)
             norm = _error_norm(contacts, y, new, error, rtol, atol)
             taken += 1
-            factor = min(6.0, max(0.1, 0.9 * max(norm, 1e-10) ** (-1.0 / method.order)))
+            scale = min(6.0, max(0.1, 0.9 * max(norm, 1e-10) ** (-1.0 / method.order)))
             if norm > 1.0:
                 statistics[REJECTIONS] += 1
-                h = step * (factor if math.isfinite(norm) else 0.1)
+                h = step * (scale if math.isfinite(norm) else 0.1)
                 fresh = False
                 continue
             statistics[STEPS] += 1
@@ -398,14 +211,14 @@ def advance(contacts, motion, method, output, y, cursor, clock, rtol, atol, max_
                 else:
                     at = output.time[m] - begin
                     _interpolate(method, k, y, new, (at - since) / step, arg)
-                _record(contacts, motion, laws, piece, at, arg, output, m, f, w, a)
+                _record(contacts, motion, piece, at, arg, output, m, f, work)
                 m += 1
             if starting:
-                first_step = step * factor if step < remaining else first_step
+                first_step = step * scale
                 starting = False
             y[:] = new
             since = length if last else since + step
-            h = max(step * factor, h) if last else step * factor
+            h = max(step * scale, h) if last else step * scale
             fresh = True
             if motion.stop_speed > 0.0:
                 speed, change = 0.0, 0.0
@@ -418,6 +231,7 @@ def advance(contacts, motion, method, output, y, cursor, clock, rtol, atol, max_
                     break
         if outcome != DONE:
             break
+        _forget_unloaded(contacts, motion, piece, y)
         piece += 1
         since = 0.0
         fresh = True
@@ -426,7 +240,7 @@ def advance(contacts, motion, method, output, y, cursor, clock, rtol, atol, max_
     return outcome
 
 
-@jit
+@kernel
 def _interpolate(method, k, y, new, s, out):
     """Continuous extension at the fraction `s` of a step: `(1 - s) y + s (new + (1 - s) (d_1 + s (d_2 + ...)))`."""
     q = method.dense.shape[0]

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 
-from planarfriction.kernels import jit
+from planarfriction.kernels import jit, kernel
 
 BILINEAR, POTENTIAL, ELLIPSOID, CELLS = 0, 1, 2, 3
 
@@ -25,7 +25,7 @@ _AXIS = 1e-8
 _IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
-@jit
+@kernel
 def _place(size, x, y, s):
     """Table coordinates of a direction with `s >= 0`: polar and azimuth cell, position within it, and the angles."""
     segment = 0.5 * math.pi / size
@@ -38,7 +38,7 @@ def _place(size, x, y, s):
     return i, j, polar / segment - i, azimuth / segment - j, polar, azimuth
 
 
-@jit
+@kernel
 def _corners(data, p, row, a, b):
     """Bilinear value of one component and its differences along the polar angle and the azimuth."""
     low = data[p] + b * (data[p + 4] - data[p])
@@ -48,16 +48,20 @@ def _corners(data, p, row, a, b):
     return low + a * (high - low), high - low, right - left
 
 
-@jit
+@kernel
 def _bilinear(data, start, size, x, y, s, speed):
     i, j, a, b, _, _ = _place(size, x, y, s)
     row = 4 * (4 * size + 1)
     p = start + i * row + 4 * j
-    hx, hy, hs = _corners(data, p, row, a, b)[0], _corners(data, p + 1, row, a, b)[0], _corners(data, p + 2, row, a, b)[0]
+    hx, hy, hs = (
+        _corners(data, p, row, a, b)[0],
+        _corners(data, p + 1, row, a, b)[0],
+        _corners(data, p + 2, row, a, b)[0],
+    )
     return hx * speed, hy * speed, hs * speed
 
 
-@jit
+@kernel
 def _bilinear_jacobian(data, start, size, x, y, s, speed):
     i, j, a, b, polar, azimuth = _place(size, x, y, s)
     row = 4 * (4 * size + 1)
@@ -84,7 +88,7 @@ def _bilinear_jacobian(data, start, size, x, y, s, speed):
     )
 
 
-@jit
+@kernel
 def _hermite(t):
     """Cubic Hermite basis on [0, 1]: values, first and second derivatives; order value 0, value 1, slope 0, slope 1."""
     u = 1.0 - t
@@ -94,7 +98,7 @@ def _hermite(t):
     return value, first, second
 
 
-@jit
+@kernel
 def _blend(data, p, row, segment, a, b):
     """Bicubic value from the basis `a` along the polar angle and `b` along the azimuth."""
     total = 0.0
@@ -110,7 +114,7 @@ def _blend(data, p, row, segment, a, b):
     return total
 
 
-@jit
+@kernel
 def _potential(data, start, size, x, y, s, speed):
     i, j, a, b, polar, azimuth = _place(size, x, y, s)
     row = 4 * (4 * size + 1)
@@ -132,7 +136,7 @@ def _potential(data, start, size, x, y, s, speed):
     )
 
 
-@jit
+@kernel
 def _potential_jacobian(data, start, size, x, y, s, speed):
     i, j, a, b, polar, azimuth = _place(size, x, y, s)
     row = 4 * (4 * size + 1)
@@ -171,7 +175,7 @@ def _potential_jacobian(data, start, size, x, y, s, speed):
     )
 
 
-@jit
+@kernel
 def _cells(data, start, size, x, y, s, speed):
     hx, hy, hs = 0.0, 0.0, 0.0
     for i in range(size):
@@ -185,7 +189,7 @@ def _cells(data, start, size, x, y, s, speed):
     return hx * speed, hy * speed, hs * speed
 
 
-@jit
+@kernel
 def _cells_jacobian(data, start, size, x, y, s, speed):
     hx, hy, hs = 0.0, 0.0, 0.0
     xx, xy, xs, yy, ys, ss = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -223,7 +227,7 @@ def _cells_jacobian(data, start, size, x, y, s, speed):
     )
 
 
-@jit
+@kernel
 def sliding(kind, data, start, size, x, y, s):
     """`u = h(V) |V_S|` of the scaled twist `(x, y, s)`; the lower half of the sphere mirrors the upper one."""
     if kind == ELLIPSOID:
@@ -241,7 +245,7 @@ def sliding(kind, data, start, size, x, y, s):
     return mirror * u[0], mirror * u[1], mirror * u[2]
 
 
-@jit
+@kernel
 def sliding_jacobian(kind, data, start, size, x, y, s):
     """`du/dV_S`, nine numbers row by row; at rest, where it has no value, the ellipsoid's, which lies between all."""
     if kind == ELLIPSOID:

@@ -177,9 +177,7 @@ class LimitSurface:
         """`du/dV_S` of `u = h |V_S|` for scaled twists `[M, 3]`, shape `[M, 3, 3]`."""
         slopes = np.empty((len(scaled), 9))
         numbers = self.numbers
-        kernels.sliding_jacobian_batch(
-            self.kind, numbers.data, 0, numbers.size, np.ascontiguousarray(scaled), slopes
-        )
+        kernels.sliding_jacobian_batch(self.kind, numbers.data, 0, numbers.size, np.ascontiguousarray(scaled), slopes)
         return slopes.reshape(-1, 3, 3)
 
     def _direction_slope(self, scaled: np.ndarray) -> np.ndarray:

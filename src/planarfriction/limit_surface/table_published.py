@@ -66,9 +66,7 @@ class LimitSurfaceTablePublished(LimitSurface):
 
         def direction(angles: np.ndarray) -> np.ndarray:
             polar, azimuth = angles
-            return side * np.array(
-                [np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)]
-            )
+            return side * np.array([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)])
 
         def mismatch(angles: np.ndarray) -> np.ndarray:
             h = self._direction(direction(angles)[None])[0]

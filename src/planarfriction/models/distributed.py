@@ -38,10 +38,10 @@ class DistributedModel(FrictionModel):
         state, twist, load = self._inputs(state, twist, normal_force)
         velocity = self._cell_velocity(twist)
         law = self.law
-        force = formulas.traction(
-            state, self._rate(state, velocity), velocity, law.sigma_0, law.sigma_1, law.sigma_2
+        force = formulas.traction(state, self._rate(state, velocity), velocity, law.sigma_0, law.sigma_1, law.sigma_2)
+        return np.einsum(
+            "...cn,dcn->...d", force * (load[..., None] * self.patch.weights(load))[..., None, :], self._lever
         )
-        return np.einsum("...cn,dcn->...d", force * (load[..., None] * self.patch.weights(load))[..., None, :], self._lever)
 
     def step(self, state, twist, normal_force, dt) -> tuple[np.ndarray, np.ndarray]:
         """Advance by `dt` [s] at a held twist: the new state and the wrench at the end, stable at any `dt`.
@@ -53,7 +53,9 @@ class DistributedModel(FrictionModel):
         batch = load.shape
         flat = np.ascontiguousarray(state.reshape(-1, 2 * state.shape[-1]))
         out, wrench = np.empty_like(flat), np.empty((len(flat), 3))
-        weights = np.atleast_2d(self.patch.weights(load.reshape(-1)) if self.patch.depends_on_load else self.patch.weights())
+        weights = np.atleast_2d(
+            self.patch.weights(load.reshape(-1)) if self.patch.depends_on_load else self.patch.weights()
+        )
         x, y = self._xy
         kernels.step_batch(
             law_numbers(self.law),
@@ -82,8 +84,15 @@ class DistributedModel(FrictionModel):
         share = load[..., None] * self.patch.weights(load)
         force_state = -(law.sigma_0 * identity + law.sigma_1 * rate_state) * share[..., None, None, :]
         force_velocity = -(law.sigma_2 * identity + law.sigma_1 * rate_velocity) * share[..., None, None, :]
-        unit = self.wrench(state, twist, np.ones_like(load)) if not self.patch.depends_on_load else np.divide(
-            self.wrench(state, twist, load), load[..., None], out=np.zeros((*load.shape, 3)), where=load[..., None] > 0
+        unit = (
+            self.wrench(state, twist, np.ones_like(load))
+            if not self.patch.depends_on_load
+            else np.divide(
+                self.wrench(state, twist, load),
+                load[..., None],
+                out=np.zeros((*load.shape, 3)),
+                where=load[..., None] > 0,
+            )
         )
         return ModelJacobians(
             rate_state,

@@ -65,7 +65,9 @@ class ReducedModelPublished(FrictionModel):
         if not isinstance(self.surface, LimitSurface):
             raise InvalidValueError("surface", "be a limit surface", self.surface)
         if self.patch.depends_on_load and self.on_load_change != "rebuild" and self.surface.normal_force is None:
-            raise InvalidValueError("surface", f"have a normal_force when on_load_change={self.on_load_change!r}", "none")
+            raise InvalidValueError(
+                "surface", f"have a normal_force when on_load_change={self.on_load_change!r}", "none"
+            )
 
     @property
     def state_shape(self) -> tuple[int, ...]:

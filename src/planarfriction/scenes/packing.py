@@ -9,7 +9,7 @@ import numpy as np
 from planarfriction.kernels import contacts as kernels
 from planarfriction.kernels.contacts import Contacts
 from planarfriction.kernels.law import law_row
-from planarfriction.kernels.rosenbrock import Motion
+from planarfriction.kernels.body import Motion
 from planarfriction.models import DistributedModel, ReducedModelPublished
 
 SHAPE_INTERVAL = 1e-3

@@ -11,8 +11,9 @@ import numpy as np
 
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels import rosenbrock as kernels
+from planarfriction.kernels.body import Motion
 from planarfriction.kernels.contacts import Contacts
-from planarfriction.kernels.rosenbrock import Method, Motion, Output
+from planarfriction.kernels.rosenbrock import Method, Output
 
 _STATES_PER_SLICE = 400_000
 """Steps times states between two looks at the clock and the keyboard: some 20 ms."""
@@ -28,7 +29,6 @@ _MESSAGES = {
         "step too small",
         "the step size fell below the resolution of time: loosen rtol, or check the scene for extreme parameters",
     ),
-    kernels.NOT_FINITE: ("not finite", "the state is not finite: check the scene for extreme parameters"),
 }
 
 
