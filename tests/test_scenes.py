@@ -64,7 +64,10 @@ def test_a_scene_keeps_its_parts_and_makes_signals_of_numbers():
             lambda: Contact(stand_in(), Signal.sampled([0, 0.5], [1.0, -0.1]), name="toe"),
             "normal_force of contact 'toe' must be >= 0, got -0.1 at t = 0.5 s",
         ),
-        (lambda: Contact(stand_in(), [1.0, 2.0]), "normal_force of contact 'contact' must be a signal of plain numbers"),
+        (
+            lambda: Contact(stand_in(), [1.0, 2.0]),
+            "normal_force of contact 'contact' must be a signal of plain numbers",
+        ),
         (lambda: Contact(stand_in(), "heavy"), "normal_force of contact 'contact' must be a signal or a constant"),
         (lambda: Contact(stand_in(), 1.0, mounted_on="wrld"), "(did you mean 'world'?)"),
         (lambda: Contact(stand_in(), 1.0, count=0), "count of contact 'contact' must be an integer >= 1, got 0"),

@@ -7,6 +7,7 @@ sampled one, a shape and its size for a patch, a rectangle's `size` for the iner
 from __future__ import annotations
 
 import json
+import os
 import tomllib
 from pathlib import Path
 from typing import Any
@@ -119,7 +120,7 @@ def read_scene(path: str | Path) -> Scene:
     path = Path(path)
     kind = path.suffix.lower()
     if kind not in (".toml", ".json"):
-        missing = "" if path.exists() else ", and there is no such file"
+        missing = "" if os.path.exists(path) else ", and there is no such file"
         raise FileError(f"{path}: a scene file ends in .toml or .json{missing}")
     text = read_text(path, "a scene file")
     try:

@@ -97,10 +97,9 @@ def drift(model: Any, *, load: Literal["tangential", "normal"] = "tangential", t
     if load == "normal":
         t = sample_times(t_end, SAMPLE_TIME)
         normal_force = Signal.sampled(t, GRAVITY + np.where(t > 1.0, np.sin(6.0 * np.pi * t), 0.0))
-    mass, radius = 1.0, 0.05
     around = 2.0 * np.pi * np.arange(64) / 64
-    outline = radius * np.stack([np.cos(around), np.sin(around)], axis=1)
-    body = Body(mass, 0.5 * mass * radius**2, gravity=(0.0, 0.0), outline=outline)
+    outline = 0.05 * np.stack([np.cos(around), np.sin(around)], axis=1)
+    body = Body(1.0, 1.25e-3, gravity=(0.0, 0.0), outline=outline)  # inertia of a disc, m R^2 / 2
     contact = Contact(model, normal_force, name="table")
     return Scene(body, [contact], t_end, force=drift_force(load, t_end=t_end), name=f"drift, {load}")
 

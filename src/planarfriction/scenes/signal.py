@@ -185,7 +185,9 @@ class Signal:
         if len(self.times) == 1:
             return f"Signal.constant({self.values[0].tolist()})"
         columns = "" if self.columns is None else f" of {self.columns} values"
-        return f"Signal({len(self.times)} samples{columns}, {self.times[0]:g} to {self.times[-1]:g} s, hold={self.hold!r})"
+        return (
+            f"Signal({len(self.times)} samples{columns}, {self.times[0]:g} to {self.times[-1]:g} s, hold={self.hold!r})"
+        )
 
     def __hash__(self) -> int:
         # Adding 0.0 turns -0.0 into 0.0, which equals it.

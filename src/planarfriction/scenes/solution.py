@@ -75,6 +75,7 @@ class Solution:
         Raises FileError where the file cannot be written.
         """
         path = check_writable(path)
+        target = Path(os.path.realpath(path))  # a link stays one
         attributes = {
             "scene": self.scene.to_json(),
             "statistics": json.dumps(self.statistics.as_dict()),
@@ -82,11 +83,11 @@ class Solution:
             "message": self.message,
         }
         # Written beside the target first: a crash half-way leaves an older result as it was.
-        part = path.with_name(f"{path.name}.part")
+        part = _part(target)
         try:
             with _quiet():
                 self.data.assign_attrs(attributes).to_netcdf(part, engine="scipy")
-            os.replace(part, path)
+            os.replace(part, target)
         except OSError as error:
             raise FileError(f"{path}: cannot be written: {error.strerror or error}") from None
         finally:
@@ -102,7 +103,7 @@ def load(path: str | Path) -> Solution:
     import xarray as xr
 
     path = Path(path)
-    if not path.exists():
+    if not os.path.exists(path):
         raise FileError(f"{path}: no such file (expected a saved solution)")
     if path.is_dir():
         raise FileError(f"{path}: is a folder, not a saved solution")
@@ -134,22 +135,30 @@ def load(path: str | Path) -> Solution:
 def check_writable(path: str | Path) -> Path:
     """Return `path` if a file can be written there, or raise FileError: ask before a long run, not after it.
 
-    The file is really opened, since permissions alone do not tell; what it holds stays as it is.
+    A file is really opened there, since permissions alone do not tell; what `path` holds stays as it is.
     """
     path = Path(path)
-    if path.is_dir():
+    target = Path(os.path.realpath(path))
+    if os.path.isdir(target):
         raise FileError(f"{path}: cannot be written: it is a folder, give the name of a file in it")
-    if not path.parent.is_dir():
-        raise FileError(f"{path}: cannot be written: there is no folder {path.parent}")
-    existed = path.exists()
+    if not os.path.isdir(target.parent):
+        raise FileError(f"{path}: cannot be written: there is no folder {target.parent}")
+    existing = os.path.exists(target)
+    if existing and not os.path.isfile(target):
+        raise FileError(f"{path}: cannot be written: it is a device, not a file")
     try:
-        with path.open("ab"):
-            pass
-        if not existed:
-            path.unlink()
+        if existing:
+            target.open("ab").close()
+        _part(target).open("ab").close()
+        _part(target).unlink()
     except (OSError, ValueError) as error:
         raise FileError(f"{path}: cannot be written: {getattr(error, 'strerror', None) or error}") from None
     return path
+
+
+def _part(target: Path) -> Path:
+    """Where a file is written before it takes the place of `target`."""
+    return target.with_name(f"{target.name}.part")
 
 
 @contextlib.contextmanager

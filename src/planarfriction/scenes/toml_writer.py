@@ -9,7 +9,7 @@ from typing import Any
 def to_toml(data: dict[str, Any]) -> str:
     """TOML text of a table of numbers, texts, lists and tables; floats keep every bit.
 
-    Lists that hold tables only become `[[name]]`; None has no TOML form and must not occur.
+    Lists of tables become `[[name]]`; None has no TOML form and must not occur.
     """
     return "\n".join(_lines(data, ())) + "\n"
 
@@ -48,6 +48,8 @@ def _value(value: Any) -> str:
         return "true" if value else "false"
     if isinstance(value, str):
         return _text(value)
+    if isinstance(value, dict):
+        return "{" + ", ".join(f"{_key(key)} = {_value(item)}" for key, item in value.items()) + "}"
     if isinstance(value, list):
         return "[" + ", ".join(_value(item) for item in value) + "]"
     return repr(value)

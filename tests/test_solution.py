@@ -1,0 +1,128 @@
+"""Solutions: saved and loaded to the bit, with their scene; paths that cannot be written are found out before."""
+
+import dataclasses
+import os
+
+import numpy as np
+import pytest
+import xarray as xr
+
+import planarfriction as pf
+from planarfriction import FrictionError, Solution
+from planarfriction.scenes import Statistics, in_hand, load
+from planarfriction.scenes.solution import check_writable
+
+UNITS = {"fx": "N", "fy": "N", "tau": "N m", "normal_force": "N"}
+
+
+def a_solution(name="fingers"):
+    """What a simulation returns, without one."""
+    patch = pf.ContactPatch.disc(0.01, 5)
+    scene = in_hand(pf.ReducedModelPublished(patch, pf.LuGre(), surface=pf.LimitSurfaceEllipsoid(patch)))
+    scene = dataclasses.replace(scene, contacts=[dataclasses.replace(scene.contacts[0], name=name)])
+    time = np.arange(5) * 0.01
+    variables = {"x": ("time", time / 3.0, {"units": "m"})}
+    random = np.random.default_rng(0)
+    variables |= {key: (("time", "contact"), random.normal(size=(5, 1)), {"units": u}) for key, u in UNITS.items()}
+    data = xr.Dataset(variables, coords={"time": ("time", time, {"units": "s"}), "contact": [name]})
+    return Solution(data, Statistics(steps=12, wall_time=0.1 / 3), "done", "reached t_end", scene)
+
+
+def test_a_saved_solution_comes_back_to_the_bit(tmp_path):
+    solution = a_solution()
+    assert solution.save(tmp_path / "run.nc") == tmp_path / "run.nc"
+    again = load(tmp_path / "run.nc")
+    xr.testing.assert_identical(again.data.drop_attrs(deep=False), solution.data)
+    assert {name: again.data[name].attrs["units"] for name in UNITS} == UNITS
+    assert again.statistics == solution.statistics
+    assert (again.status, again.message) == ("done", "reached t_end")
+    assert again.scene.digest() == solution.scene.digest()
+    assert isinstance(again.scene.contacts[0].model, pf.ReducedModelPublished)
+    again.save(tmp_path / "twice.nc")
+    assert load(tmp_path / "twice.nc").data.identical(again.data)
+    assert pf.load is load
+
+
+def test_saving_overwrites_and_leaves_nothing_else(tmp_path):
+    for _ in range(2):
+        a_solution().save(tmp_path / "run.nc")
+    assert os.listdir(tmp_path) == ["run.nc"]
+
+
+def test_saving_through_a_link_keeps_the_link(tmp_path):
+    (tmp_path / "link.nc").symlink_to(tmp_path / "run.nc")
+    a_solution().save(tmp_path / "link.nc")
+    assert (tmp_path / "link.nc").is_symlink()
+    assert load(tmp_path / "run.nc").status == "done"
+
+
+def test_names_outside_ascii_and_empty_messages_survive(tmp_path):
+    solution = dataclasses.replace(a_solution("Prüffinger µ"), message="")
+    solution.save(tmp_path / "run.nc")
+    again = load(tmp_path / "run.nc")
+    assert again.data["contact"].values.tolist() == ["Prüffinger µ"]
+    assert again.scene.contacts[0].name == "Prüffinger µ"
+    assert again.message == ""
+
+
+def test_statistics_by_name():
+    assert Statistics(steps=3).as_dict() == {
+        "steps": 3,
+        "rejections": 0,
+        "evaluations": 0,
+        "jacobians": 0,
+        "wall_time": 0.0,
+        "compile_time": 0.0,
+    }
+
+
+def test_paths_that_cannot_be_written_are_found_out_without_writing(tmp_path):
+    kept = tmp_path / "kept.nc"
+    kept.write_bytes(b"old")
+    assert check_writable(kept) == kept
+    assert kept.read_bytes() == b"old"
+    check_writable(tmp_path / "new.nc")
+    assert not (tmp_path / "new.nc").exists()
+    (tmp_path / "file").write_text("")
+    for path, reason in (
+        (tmp_path, "it is a folder"),
+        (tmp_path / "nowhere" / "run.nc", "there is no folder"),
+        (tmp_path / "file" / "run.nc", "there is no folder"),
+        (tmp_path / ("n" * 300), "name too long"),
+        ("/proc/run.nc", "cannot be written"),
+        ("/dev/null", "it is a device"),
+    ):
+        with pytest.raises(FrictionError) as caught:
+            check_writable(path)
+        assert reason in str(caught.value).lower()
+        assert "\n" not in str(caught.value)
+        with pytest.raises(FrictionError, match="cannot be written"):
+            a_solution().save(path)
+
+
+def test_files_that_are_no_solutions_get_one_line(tmp_path):
+    a_solution().save(tmp_path / "good.nc")
+    good = (tmp_path / "good.nc").read_bytes()
+    (tmp_path / "cut.nc").write_bytes(good[:200])
+    (tmp_path / "text.nc").write_text("time,x\n0,1\n")
+    (tmp_path / "empty.nc").write_bytes(b"")
+    (tmp_path / "hdf.nc").write_bytes(b"\x89HDF\r\n")
+    xr.Dataset({"a": ("x", [1.0])}).to_netcdf(tmp_path / "other.nc", engine="scipy")
+    strange = load(tmp_path / "good.nc").data.assign_attrs(scene="{}", statistics="{}", status="", message="")
+    strange.to_netcdf(tmp_path / "strange.nc", engine="scipy")
+    (tmp_path / "folder.nc").mkdir()
+    for name, reason in {
+        "none.nc": "no such file",
+        "folder.nc": "is a folder",
+        "cut.nc": "not a saved solution",
+        "text.nc": "not a saved solution",
+        "empty.nc": "not a saved solution",
+        "hdf.nc": "not a saved solution",
+        "other.nc": "not a saved solution of planarfriction",
+        "strange.nc": "the scene in this file cannot be read: scene: missing key",
+    }.items():
+        with pytest.raises(FrictionError) as caught:
+            load(tmp_path / name)
+        assert name in str(caught.value)
+        assert reason in str(caught.value)
+        assert "\n" not in str(caught.value)
