@@ -54,6 +54,7 @@ def test_samples_that_change_nothing_are_no_breaks():
 @settings(deadline=None, max_examples=50)
 def test_pieces_give_the_signal_back(values, hold, extra, start):
     signal = Signal.sampled(start + 0.1 * np.arange(len(values)), values, hold)
+    assert signal(signal.times).tolist() == signal.values.tolist()  # exact at the samples, held or linear
     own = signal.breaks
     extra = [t for t in extra if all(abs(t - other) > 1e-6 for other in own)]  # no pieces too short to tell apart
     breaks = np.unique(np.concatenate([own, extra, [-2.0, 3.0]]))

@@ -113,7 +113,7 @@ def free_slide(
     mass [kg m^2], `normal_force` [N] a signal or a number (default: the weight `9.81 mass`).
     """
     body = Body(mass, inertia, velocity=twist, gravity=(0.0, 0.0))
-    load = GRAVITY * body.mass if normal_force is None else normal_force
+    load: Any = GRAVITY * body.mass if normal_force is None else normal_force
     contact = Contact(model, load, mounted_on="body", name="table")
     return Scene(body, [contact], t_end, stop_speed=STOP_SPEED, name="free slide")
 
