@@ -1,0 +1,101 @@
+"""Time histories of one or several solutions, overlaid for comparison."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from planarfriction.plots import style
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from planarfriction.scenes import Solution
+
+# Panels of the body and of the contacts: title, kind of unit, and how to get the values from the dataset.
+_BODY = (
+    ("x", "length", lambda data: data["x"]),
+    ("y", "length", lambda data: data["y"]),
+    ("θ", "angle", lambda data: data["theta"]),
+    ("speed", "speed", lambda data: np.hypot(data["vx"], data["vy"])),
+)
+_CONTACT = (
+    ("fx", "force", lambda data: data["fx"]),
+    ("fy", "force", lambda data: data["fy"]),
+    ("τ", "torque", lambda data: data["tau"]),
+    ("normal force", "force", lambda data: data["normal_force"]),
+)
+
+
+def plot_histories(solutions: Solution | Mapping[str, Solution]) -> style.PlotFigure:
+    """Draw position, angle, speed, forces, torque and normal force over time.
+
+    `solutions` is one solution or a mapping from label to solution; several are overlaid. Colour tells the runs apart,
+    line style their contacts. Left the body (world axes, centre of mass), right the contacts: the friction wrench on
+    the body about the origin of the contact frame and the normal force.
+    """
+    figure = style.new_figure(9.6, 8.0)
+    draw_histories(figure, solutions)
+    return figure
+
+
+def draw_histories(figure: Any, solutions: Solution | Mapping[str, Solution]) -> None:
+    """Draw the eight panels of `plot_histories` into a figure or subfigure."""
+    runs = {label: each.data for label, each in as_runs(solutions).items()}
+    panels = figure.subplots(4, 2, sharex=True)
+    for row, (title, kind, get) in enumerate(_BODY):
+        series = [(index, 0, data["time"], get(data)) for index, data in enumerate(runs.values())]
+        _draw_panel(panels[row, 0], title, kind, series)
+    for row, (title, kind, get) in enumerate(_CONTACT):
+        series = [
+            (index, contact, data["time"], get(data).isel(contact=contact))
+            for index, data in enumerate(runs.values())
+            for contact in range(data.sizes["contact"])
+        ]
+        _draw_panel(panels[row, 1], title, kind, series)
+    for axes in panels[-1]:
+        axes.set_xlabel("time [s]")
+    panels[0, 0].set_title("body: position, angle, speed", fontsize="medium")
+    panels[0, 1].set_title("contacts: friction on the body, normal force", fontsize="medium")
+    figure.align_ylabels(panels)
+    _legend(figure, panels[0, 1], runs)
+
+
+def as_runs(solutions: Solution | Mapping[str, Solution]) -> dict[str, Solution]:
+    """The solutions by label; a single one is labelled with the name of its scene."""
+    return dict(solutions) if isinstance(solutions, Mapping) else {str(solutions.scene.name): solutions}
+
+
+def _draw_panel(axes: Any, title: str, kind: str, series: list) -> None:
+    unit = style.unit_for(kind, *(values for *_, values in series))
+    for run, contact, time, values in series:
+        axes.plot(time, unit.factor * np.asarray(values), **_look(run, contact))
+    axes.set_ylabel(f"{title} [{unit.label}]")
+    axes.ticklabel_format(axis="y", useOffset=False)
+    axes.margins(x=0.01)
+    style.tidy(axes)
+
+
+def _look(run: int, contact: int) -> dict[str, Any]:
+    # Later runs are drawn dashed over the earlier ones, so that curves that coincide are both seen.
+    line_style = style.LINE_STYLES[(run + contact) % len(style.LINE_STYLES)]
+    return {"color": style.PALETTE[run % len(style.PALETTE)], "linestyle": line_style, "linewidth": 1.4}
+
+
+def _legend(figure: Any, axes: Any, runs: dict[str, xr.Dataset]) -> None:
+    """One entry for each line of a contact panel, a row for each run; none where there is a single line."""
+    lines = iter(axes.get_lines())
+    table = [
+        [(next(lines), label if data.sizes["contact"] == 1 else f"{label}, {name}") for name in data["contact"].values]
+        for label, data in runs.items()
+    ]
+    columns = max(len(row) for row in table)
+    if columns == 1:
+        entries = [row[0] for row in table]
+    else:  # matplotlib fills a legend column by column: runs of the same contact stand below each other
+        entries = [row[column] for column in range(columns) for row in table if column < len(row)]
+    if len(entries) > 1:
+        ncols = min(4, len(entries) if columns == 1 else columns)
+        figure.legend(*zip(*entries, strict=True), loc="outside upper center", ncols=ncols, frameon=False)

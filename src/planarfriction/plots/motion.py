@@ -1,0 +1,195 @@
+"""Motion of the body in the plane: a strobe of its outline with the contact patches, and an animation."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.artist import Artist
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.lines import Line2D
+from matplotlib.patches import PathPatch
+from matplotlib.path import Path as Outline
+from matplotlib.transforms import Affine2D
+
+from planarfriction import geometry
+from planarfriction.errors import FileError
+from planarfriction.plots import style
+from planarfriction.plots.patch import cell_boxes
+
+if TYPE_CHECKING:
+    from planarfriction.scenes import Contact, Solution
+
+INSTANTS = 12
+"""Number of outlines in a strobe."""
+
+FRAMES_PER_SECOND = 25
+"""Frame rate of animations [1/s]."""
+
+LARGEST_FRAME_COUNT = 100
+"""Longest animation [frames]; longer motions are shown faster than they are."""
+
+_TIME_COLOURS = ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.92, 256)))  # the last yellow is lost on white
+
+
+def plot_motion(solution: Solution) -> style.PlotFigure:
+    """Draw the outline of the body at 12 instants, evenly spaced in time and coloured by it, with the contact patches.
+
+    World axes in mm, equal scales. Patches fixed to the world are drawn once, patches on the body with each outline; a
+    body without an outline is drawn as a cross with a longer arm along its x axis. The thin line is the path of the
+    centre of mass.
+    """
+    figure = style.new_figure(6.4, 5.2)
+    draw_motion(figure, solution)
+    return figure
+
+
+def draw_motion(figure: Any, solution: Solution) -> None:
+    """Draw `plot_motion` into a figure or subfigure."""
+    axes = figure.subplots()
+    time, poses = np.asarray(solution.data["time"], dtype=float), _poses(solution)
+    chosen = np.unique(np.linspace(0, len(time) - 1, min(INSTANTS, len(time))).round().astype(int))
+    scale = Normalize(time[0], time[-1] if time[-1] > time[0] else time[0] + 1.0)
+    for index in chosen:
+        _move(_draw_mount(axes, solution, "body", _TIME_COLOURS(scale(time[index]))), axes, poses[index])
+    _draw_mount(axes, solution, "world", style.PAD_COLOUR)
+    _finish(axes, _limits(solution, poses[chosen]))
+    axes.plot(*(1e3 * poses[:, :2].T), color="0.3", linewidth=0.9, zorder=4)
+    dots = {"s": 14, "edgecolor": "white", "linewidth": 0.5, "zorder": 5}
+    axes.scatter(*(1e3 * poses[chosen, :2].T), color=_TIME_COLOURS(scale(time[chosen])), **dots)
+    figure.colorbar(ScalarMappable(scale, _TIME_COLOURS), ax=axes, label="time [s]", aspect=30)
+
+
+def animate_motion(solution: Solution, path: str | Path) -> Path:
+    """Write an animation of the motion to `path`, a `.gif` (or `.mp4` where ffmpeg is installed); returns the path.
+
+    25 frames a second, in real time up to 100 frames; longer motions are shown faster.
+
+    Raises
+    ------
+    FileError
+        The file is of another kind, cannot be written, or needs ffmpeg and there is none.
+    """
+    path = Path(path)
+    writer = _writer(path)
+    time, poses = np.asarray(solution.data["time"], dtype=float), _poses(solution)
+    count = int(np.clip(round(FRAMES_PER_SECOND * (time[-1] - time[0])), 2, LARGEST_FRAME_COUNT))
+    figure = style.new_figure(6.0, 5.0)
+    axes = figure.subplots()
+    _draw_mount(axes, solution, "world", style.PAD_COLOUR)
+    body = _draw_mount(axes, solution, "body", style.PALETTE[0])
+    _finish(axes, _limits(solution, poses))
+    (track,) = axes.plot([], [], color="0.3", linewidth=0.9)
+    clock = axes.set_title(f"t = {time[-1]:.2f} s", fontsize="medium")
+    figure.draw_without_rendering()
+    figure.set_layout_engine("none")  # laid out once, so that the frames do not jitter
+    try:
+        with writer.saving(figure, str(path), dpi=100):
+            for instant in np.linspace(time[0], time[-1], count):
+                index = int(np.abs(time - instant).argmin())
+                _move(body, axes, poses[index])
+                track.set_data(*(1e3 * poses[: index + 1, :2].T))
+                clock.set_text(f"t = {time[index]:.2f} s")
+                writer.grab_frame()
+    except OSError as error:
+        raise FileError(f"cannot write {path}: {error.strerror or error}") from error
+    return path
+
+
+def _writer(path: Path) -> Any:
+    from matplotlib.animation import FFMpegWriter, PillowWriter
+
+    kind = path.suffix.lower()
+    if kind == ".gif":
+        return PillowWriter(fps=FRAMES_PER_SECOND)
+    if kind != ".mp4":
+        raise FileError(f"cannot write {path}: animations are .gif or .mp4 files")
+    if shutil.which("ffmpeg") is None:
+        raise FileError(f"cannot write {path}: ffmpeg is not installed, write a .gif instead")
+    return FFMpegWriter(fps=FRAMES_PER_SECOND)
+
+
+def _poses(solution: Solution) -> np.ndarray:
+    """Pose (x, y, theta) of the body over time, `[T, 3]` [m, m, rad]."""
+    return np.stack([np.asarray(solution.data[name], dtype=float) for name in ("x", "y", "theta")], -1)
+
+
+def _placed(points: np.ndarray, pose: np.ndarray) -> np.ndarray:
+    """Points `[..., 2]` [m] of a frame at `pose` (x, y, angle), seen from the frame that the pose is in."""
+    return pose[:2] + geometry.rotate(points, pose[2])
+
+
+def _draw_mount(axes: Any, solution: Solution, mounted_on: str, colour: Any) -> list[Artist]:
+    """Draw what belongs to the world or to the body, with its frame on that of the axes [mm]; returns the artists."""
+    shapes = [1e3 * _on_mount(contact) for contact in solution.scene.contacts if contact.mounted_on == mounted_on]
+    artists: list[Artist] = []
+    for shape in shapes:
+        if shape.ndim == 3:
+            artists.append(PathPatch(_one_path(shape), facecolor=colour, edgecolor="none", alpha=0.45, zorder=2))
+        else:
+            look = {"marker": "o", "markersize": 4.5, "markeredgewidth": 0.0, "linestyle": "none"}
+            artists.append(Line2D(*shape.T, **look, color=colour, alpha=0.8, zorder=2))
+    if mounted_on == "body":
+        artists += [Line2D(*(1e3 * line.T), color=colour, linewidth=1.3, zorder=3) for line in _body_lines(solution)]
+    for artist in artists:
+        axes.add_artist(artist)
+    return artists
+
+
+def _move(artists: list[Artist], axes: Any, pose: np.ndarray) -> None:
+    """Put the frame of the artists at `pose` (x, y, angle) [m, m, rad] in the plane of the axes."""
+    transform = Affine2D().rotate(pose[2]).translate(*(1e3 * pose[:2])) + axes.transData
+    for artist in artists:
+        artist.set_transform(transform)
+
+
+def _body_lines(solution: Solution) -> list[np.ndarray]:
+    """What stands for the body, as lines `[M, 2]` [m] in its frame: the closed outline, or a cross."""
+    outline = solution.scene.body.outline
+    if outline is not None:
+        outline = np.asarray(outline, dtype=float)
+        return [np.concatenate([outline, outline[:1]])]
+    arm = max(float(np.abs(_pad_shape(contact).reshape(-1, 2)).max()) for contact in solution.scene.contacts)
+    return [np.array([(-0.5 * arm, 0.0), (1.5 * arm, 0.0)]), np.array([(0.0, -0.5 * arm), (0.0, 0.5 * arm)])]
+
+
+def _pad_shape(contact: Contact) -> np.ndarray:
+    """Cells of a contact's patch as polygons `[N, 4, 2]`, or its points `[N, 2]` [m], in its frame."""
+    patch = contact.model.patch
+    return patch.positions if patch.grid is None else cell_boxes(patch)
+
+
+def _one_path(boxes: np.ndarray) -> Outline:
+    """All boxes `[N, 4, 2]` as one path, so that no seams show between neighbours."""
+    closed = np.concatenate([boxes, boxes[:, :1]], axis=1)
+    codes = [Outline.MOVETO, Outline.LINETO, Outline.LINETO, Outline.LINETO, Outline.CLOSEPOLY]
+    return Outline(closed.reshape(-1, 2), np.tile(codes, len(boxes)))
+
+
+def _on_mount(contact: Contact) -> np.ndarray:
+    """The patch of a contact in the frame that it is mounted on (world or body) [m]."""
+    return _placed(_pad_shape(contact), np.array([*contact.position, contact.angle], dtype=float))
+
+
+def _limits(solution: Solution, poses: np.ndarray) -> np.ndarray:
+    """Limits of both axes, `[2, 2]` [mm], that hold everything drawn at `poses` `[T, 3]`."""
+    points = [_placed(line, pose) for pose in poses for line in _body_lines(solution)]
+    for contact in solution.scene.contacts:
+        shape = _on_mount(contact).reshape(-1, 2)
+        points += [shape] if contact.mounted_on == "world" else [_placed(shape, pose) for pose in poses]
+    everything = 1e3 * np.concatenate(points)
+    low, high = everything.min(axis=0), everything.max(axis=0)
+    margin = 0.04 * float((high - low).max())
+    return np.stack([low - margin, high + margin], -1)
+
+
+def _finish(axes: Any, limits: np.ndarray) -> None:
+    axes.set(xlabel="x [mm]", ylabel="y [mm]")
+    axes.update_datalim(limits.T)
+    axes.margins(0.0)
+    axes.set_aspect("equal", adjustable="datalim")  # narrow motions fill the panel too
+    style.tidy(axes)

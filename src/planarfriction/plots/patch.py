@@ -1,0 +1,101 @@
+"""Pressure map of a contact patch."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.collections import PolyCollection
+
+from planarfriction.plots import style
+
+if TYPE_CHECKING:
+    from planarfriction.patch import ContactPatch
+
+_CORNERS = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
+
+
+def plot_patch(patch: ContactPatch, *, normal_force: float | None = None) -> style.PlotFigure:
+    """Draw where a patch carries load, and its centre of pressure.
+
+    Cells of a grid are drawn in their true area at their true centroid and coloured by their pressure `w f_N / a`; a
+    patch without a grid is drawn as points coloured by the force on them, `w f_N`. Without `normal_force` [N] the
+    colours show both per newton of load. Lengths in mm.
+    """
+    weights = patch.weights(normal_force)
+    load = 1.0 if normal_force is None else float(normal_force)
+    centre = 1e3 * patch.centre_of_pressure(normal_force)
+    figure = style.new_figure(5.6, _height(patch))
+    axes = figure.add_subplot()
+    if patch.grid is None:
+        drawn, label = _draw_points(axes, patch, weights * load, normal_force)
+    else:
+        drawn, label = _draw_cells(axes, patch, weights * load / patch.areas, normal_force)
+    figure.colorbar(drawn, ax=axes, label=label)
+    mark = {"marker": "+", "markersize": 13, "linestyle": "none"}
+    axes.plot(*centre, **mark, markeredgewidth=4.0, color="white")
+    axes.plot(*centre, **mark, markeredgewidth=1.8, color=style.PAD_COLOUR, label="centre of pressure")
+    axes.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
+    axes.locator_params(nbins=6)
+    figure.suptitle(_title(patch, weights, normal_force), fontsize="medium")
+    figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", frameon=False, fontsize="small")
+    style.tidy(axes)
+    return figure
+
+
+def cell_boxes(patch: ContactPatch) -> np.ndarray:
+    """Corners of the cells of a patch on a grid, `[N, 4, 2]` [m], contact frame.
+
+    A cell cut by the rim is drawn as a smaller box of the area and at the centroid of the part inside.
+    """
+    grid = patch.grid
+    box = _CORNERS * (grid.cell_width, grid.cell_height)
+    scale = np.sqrt(patch.areas / grid.cell_area)
+    return patch.positions[:, None, :] + scale[:, None, None] * box
+
+
+def _height(patch: ContactPatch) -> float:
+    """Height of the figure [inch] that fits the proportions of the patch."""
+    if patch.grid is None:
+        return 4.6
+    ratio = patch.grid.rows * patch.grid.cell_height / (patch.grid.columns * patch.grid.cell_width)
+    return float(np.clip(1.2 + 3.4 * ratio, 2.4, 5.6))
+
+
+def _draw_cells(axes, patch: ContactPatch, pressure: np.ndarray, normal_force: float | None):
+    unit = style.unit_for("pressure", pressure)
+    cells = PolyCollection(list(1e3 * cell_boxes(patch)), cmap=style.PRESSURE_MAP, edgecolor="white", linewidth=0.25)
+    cells.set_array(unit.factor * pressure)
+    cells.set_clim(0.0, unit.factor * float(pressure.max()) or 1.0)
+    axes.add_collection(cells)
+    grid = patch.grid
+    width, height = 1e3 * grid.columns * grid.cell_width, 1e3 * grid.rows * grid.cell_height
+    margin = 0.03 * max(width, height)
+    axes.set_xlim(1e3 * grid.x_min - margin, 1e3 * grid.x_min + width + margin)
+    axes.set_ylim(1e3 * grid.y_min - margin, 1e3 * grid.y_min + height + margin)
+    return cells, f"pressure [{unit.label}]" if normal_force is not None else f"pressure per load [{unit.label}/N]"
+
+
+def _draw_points(axes, patch: ContactPatch, force: np.ndarray, normal_force: float | None):
+    share = force / force.max() if force.any() else np.zeros_like(force)
+    unit = style.unit_for("force", force) if normal_force is not None else style.Unit(1.0, "-")
+    points = axes.scatter(
+        *(1e3 * patch.positions.T),
+        s=30 + 170 * share,
+        c=unit.factor * force,
+        cmap=style.PRESSURE_MAP,
+        vmin=0.0,
+        edgecolor="0.3",
+        linewidth=0.6,
+    )
+    axes.margins(0.2)
+    name = "share of the normal force" if normal_force is None else "normal force"
+    return points, f"{name} [{unit.label}]"
+
+
+def _title(patch: ContactPatch, weights: np.ndarray, normal_force: float | None) -> str:
+    loaded = int((weights > 0.0).sum())
+    radius = style.unit_for("length", patch.contact_radius(normal_force))
+    text = f"{patch.name}: {loaded} loaded cells, r = {radius.factor * patch.contact_radius(normal_force):.3g} "
+    text += radius.label
+    return text if normal_force is None else f"{text}, load {normal_force:g} N"

@@ -1,0 +1,73 @@
+"""What all plots share: the figure class, the palette, and the units on the axes."""
+
+from __future__ import annotations
+
+import io
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.figure import Figure
+
+PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
+"""Line colours that colour-blind readers tell apart (Okabe and Ito), the most distinct first."""
+
+LINE_STYLES = ("-", (0, (5, 1.5)), (0, (1, 1.2)), (0, (5, 1.5, 1, 1.5)))
+"""Line styles that tell contacts, or overlaid runs, apart in print."""
+
+PRESSURE_MAP = "cividis"
+"""Colour map of loads and pressures: even in lightness, the same for colour-blind readers."""
+
+PAD_COLOUR = "#D55E00"
+"""Colour of contact patches in the plane."""
+
+
+class PlotFigure(Figure):
+    """A matplotlib figure without pyplot that notebooks show by themselves."""
+
+    def _repr_png_(self) -> bytes:
+        buffer = io.BytesIO()
+        self.savefig(buffer, format="png")
+        return buffer.getvalue()
+
+
+def new_figure(width: float, height: float) -> PlotFigure:
+    """Empty figure of `width` x `height` inches with constrained layout, 120 dots per inch."""
+    return PlotFigure(figsize=(width, height), layout="constrained", dpi=120)
+
+
+@dataclass(frozen=True)
+class Unit:
+    """How an SI quantity is shown: `shown = factor * value`, labelled `label`."""
+
+    factor: float
+    label: str
+
+
+# Each row: the largest absolute SI value from which on the unit is used, then the unit; the last row is the rest.
+_UNITS = {
+    "length": ((2.0, 1.0, "m"), (2e-5, 1e3, "mm"), (2e-8, 1e6, "µm"), (0.0, 1e9, "nm")),
+    "speed": ((2.0, 1.0, "m/s"), (2e-5, 1e3, "mm/s"), (2e-8, 1e6, "µm/s"), (0.0, 1e9, "nm/s")),
+    "angle": ((2e-3, 180 / np.pi, "deg"), (0.0, 1e6, "µrad")),
+    "force": ((2e3, 1e-3, "kN"), (1e-2, 1.0, "N"), (0.0, 1e3, "mN")),
+    "torque": ((2.0, 1.0, "N m"), (2e-5, 1e3, "N mm"), (0.0, 1e6, "N µm")),
+    "pressure": ((2e6, 1e-6, "MPa"), (2e2, 1e-3, "kPa"), (0.0, 1.0, "Pa")),
+}
+
+# What fills no axis of its own (all zero) is shown in the unit that the reader expects.
+_USUAL = {"length": "mm", "speed": "mm/s", "angle": "deg", "force": "N", "torque": "N mm", "pressure": "kPa"}
+
+
+def unit_for(kind: str, *values) -> Unit:
+    """Unit in which the arrays `values` of one `kind` (length, speed, angle, force, torque, pressure) read well."""
+    largest = max((float(np.max(np.abs(value))) for value in values if np.size(value)), default=0.0)
+    rows = _UNITS[kind]
+    if largest == 0.0:
+        return next(Unit(factor, label) for _, factor, label in rows if label == _USUAL[kind])
+    return next(Unit(factor, label) for least, factor, label in rows if largest >= least)
+
+
+def tidy(axes) -> None:
+    """Light grid below the data, no box around it."""
+    axes.grid(True, color="0.88", linewidth=0.6)
+    axes.set_axisbelow(True)
+    axes.spines[["top", "right"]].set_visible(False)

@@ -1,0 +1,322 @@
+"""Plots: what is drawn is what the numbers say, with units, and no label is cut off."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_hex
+from PIL import Image
+
+import planarfriction as pf
+import synthetic
+from planarfriction import plots
+from planarfriction.errors import FileError, InvalidValueError
+from planarfriction.patch import PUBLISHED_PATCHES
+from planarfriction.plots import motion, style
+from planarfriction.plots.limit_surface import sample_limit_surface, scaled_samples
+
+DRAWING = 1e-9  # [mm], [N], ...: coordinates are scaled once on their way to the axes, so only rounding may differ
+CUT = 1.0  # [pixel]: the box of a letter is rounded up to whole pixels
+
+
+def overhang(figure) -> float:
+    """How far the labels and other parts of a figure stick out of it [pixel], 0 if they do not."""
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    drawn = figure.get_tightbbox(canvas.get_renderer())
+    width, height = figure.get_size_inches()
+    return figure.dpi * max(0.0, -drawn.x0, -drawn.y0, drawn.x1 - width, drawn.y1 - height)
+
+
+def labels(axes) -> set[str]:
+    return {axes.get_xlabel(), axes.get_ylabel()}
+
+
+# ---------------------------------------------------------------------- patch
+
+
+def patch_axes(figure):
+    return figure.axes[0]
+
+
+@pytest.mark.parametrize("patch", [pf.ContactPatch.disc(0.01, 11), pf.ContactPatch.rectangle(0.04, 0.01, 12)])
+def test_cells_are_drawn_in_their_true_size(patch):
+    (cells,) = patch_axes(plots.plot_patch(patch)).collections
+    drawn = np.array([polygon.vertices[:4] for polygon in cells.get_paths()])
+    x, y = np.moveaxis(drawn, -1, 0)
+    area = 0.5 * np.abs((x * np.roll(y, -1, 1) - y * np.roll(x, -1, 1)).sum(1))
+    assert area == pytest.approx(1e6 * patch.areas, rel=1e-9)
+    assert drawn.mean(axis=1) == pytest.approx(1e3 * patch.positions, abs=DRAWING)
+
+
+def test_pressure_map_has_the_heavy_end_at_the_top_and_its_numbers_in_kilopascal():
+    patch = PUBLISHED_PATCHES["LineGrad"]()
+    figure = plots.plot_patch(patch, normal_force=2.0)
+    (cells,) = patch_axes(figure).collections
+    assert np.asarray(cells.get_array()) == pytest.approx(1e-3 * patch.pressure_values(2.0), rel=1e-12)
+    top = np.argmax([polygon.vertices[:, 1].max() for polygon in cells.get_paths()])
+    assert np.argmax(cells.get_array()) == top
+    assert figure.axes[1].get_ylabel() == "pressure [kPa]"
+    assert labels(patch_axes(figure)) == {"x [mm]", "y [mm]"}
+
+
+def test_centre_of_pressure_is_marked():
+    patch = PUBLISHED_PATCHES["LineGrad"]()
+    for line in patch_axes(plots.plot_patch(patch)).get_lines():
+        # 3.174603 mm: the published centre of pressure, given to 1e-6 mm
+        assert (line.get_xdata()[0], line.get_ydata()[0]) == pytest.approx((0.0, 3.174603), abs=1e-6)
+
+
+def test_points_show_the_force_on_each():
+    patch = pf.ContactPatch.points([(0.0, 0.1), (-0.1, -0.05), (0.1, -0.05)], [1, 2, 3], name="three legs")
+    figure = plots.plot_patch(patch, normal_force=6.0)
+    (points,) = patch_axes(figure).collections
+    assert np.asarray(points.get_offsets()) == pytest.approx(1e3 * patch.positions, abs=DRAWING)
+    assert np.asarray(points.get_array()) == pytest.approx([1.0, 2.0, 3.0], rel=1e-12)
+    assert figure.axes[1].get_ylabel() == "normal force [N]"
+
+
+def test_a_patch_that_depends_on_the_load_needs_one():
+    patch = pf.ContactPatch.rectangle(0.02, cells=7, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0, radius_max=0.01))
+    with pytest.raises(InvalidValueError, match="normal_force"):
+        plots.plot_patch(patch)
+    few, many = (
+        (patch_axes(plots.plot_patch(patch, normal_force=load)).collections[0].get_array() > 0).sum()
+        for load in (0.1, 3.0)
+    )
+    assert few < many
+
+
+# ---------------------------------------------------------------------- limit surface
+
+
+@pytest.mark.parametrize("name", ["Circle", "LineGrad", "NonConvex2"])
+def test_samples_have_spin_and_slide_where_they_belong(name):
+    surface = pf.LimitSurfaceCells(PUBLISHED_PATCHES[name]())
+    directions, points = scaled_samples(surface, np.array([0.0, np.pi]), np.zeros(2))
+    assert directions == pytest.approx(np.array([[0, 0, 1], [0, 0, -1]]), abs=1e-15)
+    # A spin about the centre of pressure has the torque -mu f_N r there, by the definition of r; only summation errors
+    # remain.
+    assert points[:, 2] == pytest.approx([-1.0, 1.0], abs=1e-12)
+    _, slide = scaled_samples(surface, np.array([np.pi / 2]), np.array([0.0]))
+    assert slide == pytest.approx(np.array([[-1.0, 0.0, 0.0]]), abs=1e-12)
+
+
+def test_samples_are_about_the_origin_of_the_contact_frame():
+    surface = pf.LimitSurfaceCells(PUBLISHED_PATCHES["LineGrad"]())
+    twists, wrenches = sample_limit_surface(surface, np.array([1.0, 2.0]), np.array([0.5, 4.0]))
+    assert wrenches == pytest.approx(surface.wrench(twists), abs=1e-15)
+    power = -np.einsum("ni,ni->n", wrenches, twists)
+    assert power == pytest.approx(surface.dissipation(twists), rel=1e-12)
+
+
+def test_the_ellipsoid_beside_the_surface_is_the_unit_sphere_in_the_same_limits(monkeypatch):
+    from planarfriction.plots import limit_surface
+
+    monkeypatch.setattr(limit_surface, "POLAR_SEGMENTS", 16)
+    monkeypatch.setattr(limit_surface, "AZIMUTH_SEGMENTS", 24)
+    surface = pf.LimitSurfaceCells(PUBLISHED_PATCHES["LineGrad"]())
+    figure = plots.plot_limit_surface(surface)
+    own, ellipsoid = figure.axes
+    for axes in figure.axes:
+        assert (axes.get_xlim(), axes.get_ylim(), axes.get_zlim()) == (own.get_xlim(),) * 3
+        assert axes.get_zlabel() == "$\\tau/r$ [-]"
+    corners = ellipsoid.collections[0]._faces.reshape(-1, 3)
+    assert np.linalg.norm(corners, axis=1) == pytest.approx(1.0, abs=1e-9)
+    corners = own.collections[0]._faces.reshape(-1, 3)
+    assert np.linalg.norm(corners, axis=1).max() < np.sqrt(2) + 1e-9
+    assert np.abs(np.linalg.norm(corners, axis=1) - 1.0).max() > 0.1  # the line is not an ellipsoid
+    assert overhang(figure) <= CUT
+
+
+# ---------------------------------------------------------------------- histories
+
+
+def test_histories_show_the_data_in_the_units_of_their_labels():
+    run = synthetic.solution()
+    figure = plots.plot_histories(run)
+    shown = {axes.get_ylabel(): axes.get_lines()[0].get_ydata() for axes in figure.axes}
+    expected = {
+        "x [mm]": 1e3 * run.data["x"],
+        "y [mm]": 1e3 * run.data["y"],
+        "θ [deg]": np.degrees(run.data["theta"]),
+        "speed [mm/s]": 1e3 * np.hypot(run.data["vx"], run.data["vy"]),
+        "fx [N]": run.data["fx"][:, 0],
+        "fy [N]": run.data["fy"][:, 0],
+        "τ [N mm]": 1e3 * run.data["tau"][:, 0],
+        "normal force [N]": run.data["normal_force"][:, 0],
+    }
+    assert shown.keys() == expected.keys()
+    for label, values in expected.items():
+        assert shown[label] == pytest.approx(np.asarray(values), abs=DRAWING), label
+    assert figure.legends == []
+
+
+def test_runs_are_overlaid_and_told_apart():
+    figure = plots.plot_histories({"distributed": synthetic.solution(), "reduced": synthetic.solution(scale=1.1)})
+    for axes in figure.axes:
+        first, second = axes.get_lines()
+        assert to_hex(first.get_color()) != to_hex(second.get_color())
+        assert first.get_linestyle() != second.get_linestyle()
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == ["distributed", "reduced"]
+
+
+def test_every_contact_has_its_line_and_its_entry():
+    run = synthetic.solution(synthetic.scene(contacts=3))
+    figure = plots.plot_histories({"a": run, "b": run})
+    force = figure.axes[1].get_lines()
+    assert len(force) == 6
+    for line, factor in zip(force, [1, 2, 3, 1, 2, 3], strict=True):
+        assert line.get_ydata() == pytest.approx(factor * np.asarray(run.data["fx"][:, 0]), abs=DRAWING)
+    (legend,) = figure.legends
+    entries = dict(zip((text.get_text() for text in legend.get_texts()), legend.get_lines(), strict=True))
+    assert set(entries) == {f"{run}, pad {number}" for run in "ab" for number in (1, 2, 3)}
+    assert to_hex(entries["b, pad 3"].get_color()) == to_hex(force[5].get_color())
+    assert entries["b, pad 3"].get_linestyle() == force[5].get_linestyle()
+
+
+# ---------------------------------------------------------------------- motion
+
+
+def outlines(figure) -> list[np.ndarray]:
+    """Closed lines of five corners, in mm: the outlines of the plate."""
+    axes = figure.axes[0]
+    drawn = [line for line in axes.lines if len(line.get_xdata()) == 5]
+    return [(line.get_transform() - axes.transData).transform(line.get_xydata()) for line in drawn]
+
+
+def test_strobe_shows_the_outline_where_the_body_is():
+    run = synthetic.solution()
+    figure = plots.plot_motion(run)
+    drawn = outlines(figure)
+    assert len(drawn) == motion.INSTANTS
+    plate = 1e3 * np.vstack([synthetic.PLATE, synthetic.PLATE[:1]])
+    assert drawn[0] == pytest.approx(plate + np.array([2.0, 0.0]), abs=1e-6)
+    angle = -0.3 * 4.0
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    # 1e-6 mm: the way through pixels and back loses a few digits
+    assert drawn[-1] == pytest.approx(plate @ turn.T + np.array([2.0, -20.0]), abs=1e-6)
+    assert labels(figure.axes[0]) == {"x [mm]", "y [mm]"}
+    assert figure.axes[0].get_aspect() == 1.0
+
+
+@pytest.mark.parametrize(("mounted_on", "times"), [("world", 1), ("body", motion.INSTANTS)])
+def test_pads_are_drawn_with_what_they_are_fixed_to(mounted_on, times):
+    figure = plots.plot_motion(synthetic.solution(synthetic.scene(mounted_on=mounted_on)))
+    axes = figure.axes[0]
+    assert len(axes.patches) == times
+    path = axes.patches[-1].get_path().vertices.reshape(317, 5, 2)
+    assert path[:, :4].mean(axis=(0, 1)) == pytest.approx([0.0, 0.0], abs=1e-6)
+    assert np.ptp(path[..., 0]) == pytest.approx(20.0, abs=1e-6)
+
+
+def test_everything_drawn_is_within_the_view():
+    run = synthetic.solution(synthetic.scene(contacts=3, mounted_on="body"), scale=3.0)
+    figure = plots.plot_motion(run)
+    figure.draw_without_rendering()
+    axes = figure.axes[0]
+    corners = np.concatenate(outlines(figure))
+    for values, (low, high) in zip(corners.T, (axes.get_xlim(), axes.get_ylim()), strict=True):
+        assert low < values.min() and values.max() < high
+
+
+def test_a_body_without_outline_is_a_cross_and_points_are_dots():
+    legs = pf.ContactPatch.points([(0.0, 0.1), (-0.1, -0.05), (0.1, -0.05)])
+    run = synthetic.solution(synthetic.scene(mounted_on="body", patch=legs, outline=None))
+    lines = plots.plot_motion(run).axes[0].lines
+    crosses = [line for line in lines if len(line.get_xdata()) == 2]
+    dots = [line for line in lines if line.get_marker() == "o"]
+    assert (len(crosses), len(dots)) == (2 * motion.INSTANTS, motion.INSTANTS)
+
+
+def test_a_run_of_one_sample_can_be_drawn():
+    run = synthetic.solution()
+    short = pf.Solution(run.data.isel(time=slice(1)), run.statistics, "done", "", run.scene)
+    assert len(outlines(plots.plot_motion(short))) == 1
+    assert overhang(plots.plot_histories(short)) <= CUT
+
+
+def test_animation_has_25_frames_a_second(tmp_path):
+    run = synthetic.solution(t_end=0.4)
+    path = plots.animate_motion(run, tmp_path / "motion.gif")
+    with Image.open(path) as image:
+        assert (image.n_frames, image.info["duration"]) == (10, 40)
+        first = np.asarray(image.convert("L"), dtype=float)
+        image.seek(9)
+        assert np.abs(np.asarray(image.convert("L"), dtype=float) - first).max() > 100  # something moves
+
+
+def test_animations_that_cannot_be_written_say_why(tmp_path, monkeypatch):
+    run = synthetic.solution(t_end=0.1)
+    with pytest.raises(FileError, match=r"\.gif or \.mp4"):
+        plots.animate_motion(run, tmp_path / "motion.avi")
+    monkeypatch.setattr(motion.shutil, "which", lambda name: None)
+    with pytest.raises(FileError, match="ffmpeg"):
+        plots.animate_motion(run, tmp_path / "motion.mp4")
+    with pytest.raises(FileError, match="cannot write"):
+        plots.animate_motion(run, tmp_path / "missing" / "motion.gif")
+
+
+# ---------------------------------------------------------------------- all of them
+
+
+FIGURES = {
+    "patch": lambda: plots.plot_patch(PUBLISHED_PATCHES["LineGradX"](), normal_force=2.0),
+    "patch, wide": lambda: plots.plot_patch(pf.ContactPatch.rectangle(0.2, 0.01, 30)),
+    "patch, points": lambda: plots.plot_patch(pf.ContactPatch.points([(0.0, 0.1), (-0.1, 0.0)], name="two")),
+    "histories": lambda: plots.plot_histories({"distributed": synthetic.solution(), "reduced": synthetic.solution()}),
+    "histories, contacts": lambda: plots.plot_histories(synthetic.solution(synthetic.scene(contacts=4))),
+    "motion": lambda: plots.plot_motion(synthetic.solution()),
+    "solution": lambda: synthetic.solution().plot(),
+}
+
+
+@pytest.mark.parametrize("name", FIGURES)
+def test_no_label_is_cut_off(name):
+    figure = FIGURES[name]()
+    assert overhang(figure) <= CUT
+    assert all(axes.has_data() for axes in figure.axes)
+
+
+def test_a_label_that_is_cut_off_is_found():
+    figure = style.new_figure(2.0, 2.0)
+    figure.text(0.9, 0.5, "far too long for the room there is")
+    assert overhang(figure) > 10
+
+
+def test_notebooks_show_figures():
+    assert plots.plot_patch(pf.ContactPatch.rectangle(0.02, cells=3))._repr_png_().startswith(b"\x89PNG")
+
+
+def test_pyplot_is_left_alone():
+    code = (
+        "import sys, planarfriction as pf\nfrom planarfriction import plots\n"
+        "patch = pf.ContactPatch.rectangle(0.02, cells=3)\nplots.plot_patch(patch)\n"
+        "plots.plot_limit_surface(pf.LimitSurfaceEllipsoid(patch))\n"
+        "assert 'matplotlib.pyplot' not in sys.modules"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
+
+
+@settings(deadline=None, max_examples=25)
+@given(kind=st.sampled_from(sorted(style._UNITS)), exponent=st.floats(-8.0, 4.0), sign=st.sampled_from([-1.0, 1.0]))
+def test_units_suit_the_numbers(kind, exponent, sign):
+    value = sign * 10.0**exponent
+    unit = style.unit_for(kind, np.array([0.0, value]), np.array([0.5 * value]))
+    assert unit == style.unit_for(kind, np.array([value]))
+    names = {"N mm": 1e3, "N µm": 1e6, "mm/s": 1e3, "µm/s": 1e6, "nm/s": 1e9, "deg": 180 / np.pi, "µrad": 1e6}
+    names |= {"m": 1, "mm": 1e3, "µm": 1e6, "nm": 1e9, "m/s": 1, "N": 1, "kN": 1e-3, "mN": 1e3, "N m": 1}
+    names |= {"MPa": 1e-6, "kPa": 1e-3, "Pa": 1}
+    assert unit.factor == pytest.approx(names[unit.label])
+
+
+def test_zero_is_shown_in_the_usual_unit():
+    assert style.unit_for("length", np.zeros(3)).label == "mm"
+    assert style.unit_for("torque").label == "N mm"
