@@ -1,0 +1,59 @@
+"""What the commands share on the terminal: progress on stderr, tables on stdout."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+
+@contextmanager
+def simulation_progress(label: str, t_end: float) -> Iterator[Callable[[float], None]]:
+    """Progress bar over simulated time [s]; a spinner until the first report, while kernels are compiled."""
+    with _bar() as bar:
+        task = bar.add_task(f"{label}: preparing (compiles once after installation)", total=None)
+
+        def report(time: float) -> None:
+            bar.update(task, completed=time, total=t_end, description=f"{label}: {time:.2f} of {t_end:g} s")
+
+        yield report
+
+
+@contextmanager
+def work_progress(label: str) -> Iterator[Callable[[str], None]]:
+    """Spinner that names what is being worked on."""
+    with _bar() as bar:
+        task = bar.add_task(label, total=None)
+        yield lambda name: bar.update(task, description=f"{label}: {name}")
+
+
+def _bar() -> Progress:
+    console = Console(stderr=True)
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description}", markup=False),
+        BarColumn(bar_width=30),
+        TimeElapsedColumn(),
+    )
+    return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+
+
+def note(text: str) -> None:
+    """Say something beside the results: on stderr, one line."""
+    print(text, file=sys.stderr, flush=True)
+
+
+def print_table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print a table on stdout; the first column holds names, the others numbers."""
+    table = Table(title=title, title_justify="left", title_style="bold", header_style="bold")
+    for number, heading in enumerate(headings):
+        table.add_column(heading, justify="left" if number == 0 else "right", overflow="fold")
+    for row in rows:
+        table.add_row(*row)
+    console = Console(markup=False, highlight=False)  # units in brackets are no markup
+    # A pipe has no width of its own: never fold what another program may read.
+    console.print(table, width=None if console.is_terminal else 200, soft_wrap=False)

@@ -1,0 +1,89 @@
+"""`planarfriction limit-surface`: numbers, picture and samples of the limit surface of a patch."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from planarfriction.cli.console import note, print_table
+from planarfriction.cli.output import check_picture, check_table, write_csv
+from planarfriction.cli.patches import find_patch, pressure_map
+from planarfriction.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from planarfriction.patch import ContactPatch
+
+POLAR_SAMPLES, AZIMUTH_SAMPLES = 37, 72
+"""Samples of the direction sphere in the CSV: every five degrees."""
+
+SURFACES = {
+    "cells": "LimitSurfaceCells",
+    "table": "LimitSurfaceTable",
+    "table-published": "LimitSurfaceTablePublished",
+    "ellipsoid": "LimitSurfaceEllipsoid",
+}
+"""Name on the command line -> class in `planarfriction.limit_surface`."""
+
+
+def choose_patch(patch: str | None, pressure: Path | None, cell_size: float | None) -> ContactPatch:
+    """The patch of `--patch` or of `--pressure`, of which at most one is given; Circle without either."""
+    if patch is not None and pressure is not None:
+        raise InvalidValueError("--patch", "not be given together with --pressure", patch)
+    if pressure is not None:
+        return pressure_map(pressure, cell_size)
+    return find_patch("Circle" if patch is None else patch, cell_size=cell_size)
+
+
+def show(patch: ContactPatch, kind: str, *, picture: Path | None, table: Path | None) -> None:
+    """Print the numbers of a limit surface; write its picture and its samples where asked for."""
+    from planarfriction import limit_surface
+
+    if picture is not None:
+        check_picture(picture)
+    if table is not None:
+        check_table(table)
+    surface = getattr(limit_surface, SURFACES[kind])(patch)
+    centre = np.round(1e3 * surface.centre_of_pressure, 9) + 0.0  # no -0 and no rounding errors of symmetric patches
+    rows = [
+        ["loaded cells", f"{patch.cells}"],
+        ["centre of pressure [mm]", f"{centre[0]:.6g}, {centre[1]:.6g}"],
+        ["contact radius r [mm]", f"{1e3 * surface.contact_radius:.8g}"],
+        ["second moment <rho^2> [mm^2]", f"{1e6 * float(patch.second_moment()):.8g}"],
+        ["largest distance from the ellipsoid [-]", f"{_distance_from_ellipsoid(surface):.4f}"],
+    ]
+    print_table(f"Limit surface of {patch.name} ({kind})", ["mu f_N = 1", "value"], rows)
+    if table is not None:
+        from planarfriction.plots.limit_surface import sample_limit_surface
+
+        twists, wrenches = sample_limit_surface(surface, *_directions())
+        write_csv(
+            table, dict(zip(("vx", "vy", "omega", "fx", "fy", "tau"), np.hstack([twists, wrenches]).T, strict=True))
+        )
+        note(f"wrote {table}")
+    if picture is not None:
+        from planarfriction import plots
+
+        plots.plot_limit_surface(surface).savefig(picture)
+        note(f"wrote {picture}")
+
+
+def _directions() -> tuple[np.ndarray, np.ndarray]:
+    """Polar angle and azimuth [rad] of the samples, `[M]`: every direction once."""
+    polar, azimuth = np.meshgrid(
+        np.linspace(0.0, np.pi, POLAR_SAMPLES)[1:-1],
+        np.linspace(0.0, 2 * np.pi, AZIMUTH_SAMPLES, endpoint=False),
+        indexing="ij",
+    )
+    return np.concatenate([[0.0], polar.ravel(), [np.pi]]), np.concatenate([[0.0], azimuth.ravel(), [0.0]])
+
+
+def _distance_from_ellipsoid(surface: Any) -> float:
+    """Largest distance between (fx, fy, tau/r) of the surface and of the ellipsoid at the same direction of sliding."""
+    from planarfriction.limit_surface import LimitSurfaceEllipsoid
+    from planarfriction.plots.limit_surface import scaled_samples
+
+    ellipsoid = LimitSurfaceEllipsoid(surface.patch, normal_force=surface.normal_force)
+    points, others = (scaled_samples(each, *_directions())[1] for each in (surface, ellipsoid))
+    return float(np.linalg.norm(points - others, axis=1).max())

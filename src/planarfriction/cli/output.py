@@ -1,0 +1,84 @@
+"""Files that the commands write: asked for before the work, written after it."""
+
+from __future__ import annotations
+
+import re
+import tempfile
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from planarfriction.errors import FileError
+from planarfriction.scenes.solution import check_writable
+
+if TYPE_CHECKING:
+    from planarfriction.scenes import Solution
+
+PICTURES = (".png", ".pdf", ".svg")
+"""Kinds of pictures."""
+
+
+def prepare_folder(folder: Path) -> Path:
+    """Make the folder if need be and try to write in it; raises FileError where that is not possible."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise FileError(f"cannot write to folder {folder}: {error.strerror or error}") from error
+    return folder
+
+
+def check_picture(path: Path) -> Path:
+    """Return `path` if a picture can be written there, or raise FileError."""
+    return _check_kind(path, PICTURES, "a picture")
+
+
+def check_table(path: Path) -> Path:
+    """Return `path` if a CSV file can be written there, or raise FileError."""
+    return _check_kind(path, (".csv",), "a table")
+
+
+def _check_kind(path: Path, kinds: tuple[str, ...], what: str) -> Path:
+    if path.suffix.lower() not in kinds:
+        raise FileError(f"{path}: {what} ends in {' or '.join(kinds)}")
+    return check_writable(path)
+
+
+def write_csv(path: Path, columns: Mapping[str, np.ndarray]) -> None:
+    """Write columns of numbers with their names in the first line, exact to the last bit."""
+    lines = [",".join(columns)]
+    lines += [
+        ",".join(map(repr, row)) for row in zip(*(np.asarray(each).tolist() for each in columns.values()), strict=True)
+    ]
+    try:
+        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise FileError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def write_solution(solution: Solution, folder: Path, label: str) -> list[Path]:
+    """Write a solution as NetCDF (with its scene, `planarfriction.load` reads it) and as CSV; returns the paths."""
+    stem = f"{slug(solution.scene.name)}-{slug(label)}"
+    stored, table = folder / f"{stem}.nc", folder / f"{stem}.csv"
+    solution.save(stored)
+    write_csv(table, history_columns(solution))
+    return [stored, table]
+
+
+def history_columns(solution: Solution) -> dict[str, np.ndarray]:
+    """Histories as columns [SI]: time, the body, then each contact (`fx`, or `name.fx` where there are several)."""
+    data = solution.data
+    columns = {name: np.asarray(data[name]) for name in ("time", "x", "y", "theta", "vx", "vy", "omega")}
+    for index, contact in enumerate(data["contact"].values):
+        prefix = "" if data.sizes["contact"] == 1 else f"{slug(str(contact))}."
+        for name in ("fx", "fy", "tau", "normal_force"):
+            columns[prefix + name] = np.asarray(data[name].isel(contact=index))
+    return columns
+
+
+def slug(text: str) -> str:
+    """`text` as part of a file name: letters, digits, dots and hyphens."""
+    return re.sub(r"[^\w.]+", "-", text).strip("-.") or "unnamed"

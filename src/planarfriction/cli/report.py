@@ -1,0 +1,62 @@
+"""Numbers of one or several solutions side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from planarfriction.scenes import Solution
+
+FINISHED = "done"
+"""Status of a simulation that reached its end."""
+
+
+def comparison(solutions: Mapping[str, Solution]) -> list[list[str]]:
+    """Rows of text for a table with one column for each solution; differences are those from the first."""
+    every = list(solutions.values())
+    rows = [
+        ["final x [mm]", *(f"{1e3 * _last(each, 'x'):.6g}" for each in every)],
+        ["final y [mm]", *(f"{1e3 * _last(each, 'y'):.6g}" for each in every)],
+        ["final angle [deg]", *(f"{np.degrees(_last(each, 'theta')):.6g}" for each in every)],
+    ]
+    if len(every) > 1:
+        differences = [largest_differences(each, every[0]) for each in every[1:]]
+        rows.append(["largest difference, position [mm]", "", *(f"{1e3 * each[0]:.4g}" for each in differences)])
+        rows.append(["largest difference, angle [deg]", "", *(f"{np.degrees(each[1]):.4g}" for each in differences)])
+    statistics = [each.statistics for each in every]
+    rows += [
+        ["simulated time [s]", *(f"{_last(each, 'time'):g}" for each in every)],
+        ["steps", *(f"{each.steps}" for each in statistics)],
+        ["rejected steps", *(f"{each.rejections}" for each in statistics)],
+        ["wall time [s]", *(f"{each.wall_time:.3g}" for each in statistics)],
+        ["times faster than real time", *(_speed(each) for each in every)],
+    ]
+    if any(each.compile_time > 0.1 for each in statistics):
+        rows.append(["loading or compiling before it [s]", *(f"{each.compile_time:.3g}" for each in statistics)])
+    if any(each.status != FINISHED for each in every):
+        rows.append(["ended", *(each.message if each.status != FINISHED else FINISHED for each in every)])
+    return rows
+
+
+def largest_differences(solution: Solution, reference: Solution) -> tuple[float, float]:
+    """Largest distance of the positions [m] and largest difference of the angles [rad] over the time both cover."""
+    time = np.asarray(reference.data["time"])
+    own = np.asarray(solution.data["time"])
+    time = time[time <= own[-1]]
+    dx, dy, dtheta = (
+        np.interp(time, own, np.asarray(solution.data[name])) - np.asarray(reference.data[name])[: len(time)]
+        for name in ("x", "y", "theta")
+    )
+    return float(np.hypot(dx, dy).max()), float(np.abs(dtheta).max())
+
+
+def _last(solution: Solution, name: str) -> float:
+    return float(solution.data[name][-1])
+
+
+def _speed(solution: Solution) -> str:
+    wall = solution.statistics.wall_time
+    return f"{_last(solution, 'time') / wall:.3g}" if wall > 0.0 else ""

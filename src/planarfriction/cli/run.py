@@ -1,0 +1,185 @@
+"""`planarfriction run`: simulate a scene with one or several models, compare, write and draw."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from planarfriction import validation
+from planarfriction.cli import INTERRUPTED, output
+from planarfriction.cli.console import note, print_table, simulation_progress
+from planarfriction.cli.patches import WIDTH, find_patch
+from planarfriction.cli.report import comparison
+from planarfriction.errors import SimulationInterrupted, SolverError
+
+if TYPE_CHECKING:
+    from planarfriction.patch import ContactPatch
+    from planarfriction.scenes import Scene, Solution
+
+READY = ("in-hand", "drift", "free-slide", "driven")
+"""Ready scenes by their names on the command line."""
+
+DRIFT_WIDTH = 0.05
+"""Width of the patch in the published drift experiment [m]."""
+
+SLIDE_MASS, SLIDE_TWIST = 0.2, (0.5, 0.0, 60.0)
+"""Mass [kg] and initial twist [m/s, m/s, rad/s] of the puck in the free slide: it slides and spins about equally."""
+
+KINDS = {"distributed": "DistributedModel", "reduced": "ReducedModelPublished"}
+"""Model on the command line -> class in `planarfriction.models`."""
+
+
+def build_scenes(
+    name: str,
+    models: Sequence[str],
+    *,
+    patch: str | None = None,
+    cell_size: float | None = None,
+    t_end: float | None = None,
+) -> dict[str, Scene]:
+    """The scenes to simulate, by the label of their model."""
+    if t_end is not None:
+        validation.positive("--t-end", t_end)
+    kinds = list(dict.fromkeys(kind for each in models for kind in (KINDS if each == "both" else [each])))
+    if Path(name).suffix.lower() in (".toml", ".json"):
+        return _scenes_from_file(name, kinds, patch, cell_size)
+    validation.choice("scene", name, [*READY, "a scene file (.toml, .json)"])
+    width = DRIFT_WIDTH if name == "drift" else WIDTH
+    contact_patch = find_patch(patch or "Circle", cell_size=cell_size, width=width)
+    kinds = kinds or (list(KINDS) if name == "in-hand" else ["distributed"])
+    return {kind: _ready_scene(name, _model(kind, contact_patch, _law()), t_end) for kind in kinds}
+
+
+def _law() -> Any:
+    from planarfriction.laws import ElastoPlastic, LuGre
+
+    return LuGre(elasto_plastic=ElastoPlastic(0.9))
+
+
+def _model(kind: str, patch: ContactPatch, law: Any) -> Any:
+    from planarfriction import models
+
+    return getattr(models, KINDS[kind])(patch, law)
+
+
+def _ready_scene(name: str, model: Any, t_end: float | None) -> Scene:
+    from planarfriction import scenes
+
+    options = {} if t_end is None else {"t_end": t_end}
+    if name == "free-slide":
+        # A puck whose mass is spread like its contact pressure.
+        inertia = SLIDE_MASS * float(model.patch.second_moment(9.81 * SLIDE_MASS))
+        return scenes.free_slide(model, mass=SLIDE_MASS, inertia=inertia, twist=SLIDE_TWIST, **options)
+    return {"in-hand": scenes.in_hand, "drift": scenes.drift, "driven": scenes.driven}[name](model, **options)
+
+
+def _scenes_from_file(path: str, kinds: Sequence[str], patch: str | None, cell_size: float | None) -> dict[str, Scene]:
+    from planarfriction.scenes import Scene
+
+    scene = Scene.from_file(path)
+    contact_patch = None if patch is None else find_patch(patch, cell_size=cell_size)
+    if not kinds and contact_patch is None:
+        return {_label(scene): scene}
+    return {kind: _with_models(scene, kind, contact_patch) for kind in kinds or [_label(scene)]}
+
+
+def _label(scene: Scene) -> str:
+    """The kind of model that all contacts of a scene have, or "mixed"."""
+    classes = {type(contact.model).__name__ for contact in scene.contacts}
+    return next((kind for kind, name in KINDS.items() if classes == {name}), "mixed")
+
+
+def _with_models(scene: Scene, kind: str, patch: ContactPatch | None) -> Scene:
+    """The scene with models of one kind ("mixed": each as it is) on its own patches or on `patch`, laws as they are."""
+    contacts = []
+    for contact in scene.contacts:
+        model = contact.model
+        of_kind = kind == "mixed" or type(model).__name__ == KINDS[kind]
+        if patch is not None or not of_kind:
+            name = next(key for key, value in KINDS.items() if value == type(model).__name__) if of_kind else kind
+            model = _model(name, model.patch if patch is None else patch, model.law)
+        contacts.append(dataclasses.replace(contact, model=model))
+    return dataclasses.replace(scene, contacts=tuple(contacts))
+
+
+def run(
+    scenes: dict[str, Scene],
+    *,
+    rtol: float | None,
+    t_end: float | None,
+    folder: Path | None,
+    pictures: Sequence[str],
+) -> int:
+    """Simulate each scene, save as soon as it is done, print the comparison, draw; returns the exit code."""
+    options: dict[str, Any] = {} if t_end is None else {"t_end": t_end}
+    if rtol is not None:
+        options["rtol"] = validation.positive("--rtol", rtol)
+    if folder is not None:
+        output.prepare_folder(folder)
+    solutions: dict[str, Solution] = {}
+    try:
+        for label, scene in scenes.items():
+            solutions[label] = _simulate(label, scene, options)
+            _save(solutions[label], folder, label)
+    except SimulationInterrupted as stop:
+        return _keep_part(stop.solution, solutions, label, folder)
+    except SolverError as error:
+        if error.solution is not None:
+            _keep_part(error.solution, solutions, label, folder)
+        raise
+    _print(solutions)
+    if folder is not None:
+        _draw(solutions, folder, pictures)
+    return 0
+
+
+def _simulate(label: str, scene: Scene, options: dict[str, Any]) -> Solution:
+    from planarfriction.scenes import simulate
+
+    with simulation_progress(label, options.get("t_end", scene.t_end)) as progress:
+        return simulate(scene, progress=progress, **options)
+
+
+def _keep_part(part: Solution, solutions: dict[str, Solution], label: str, folder: Path | None) -> int:
+    note(f"stopped at t = {float(part.data['time'][-1]):g} s of the {label} run")
+    solutions[label] = part
+    _save(part, folder, label)
+    _print(solutions)
+    return INTERRUPTED
+
+
+def _save(solution: Solution, folder: Path | None, label: str) -> None:
+    if folder is not None:
+        for path in output.write_solution(solution, folder, label):
+            note(f"wrote {path}")
+
+
+def _print(solutions: dict[str, Solution]) -> None:
+    name = next(iter(solutions.values())).scene.name
+    print_table(name, ["", *solutions], comparison(solutions))
+
+
+def _draw(solutions: dict[str, Solution], folder: Path, pictures: Sequence[str]) -> None:
+    """Draw the histories of all runs, the motion of each, and the patch; animate each."""
+    from planarfriction import plots
+
+    first = next(iter(solutions.values()))
+    name = output.slug(first.scene.name)
+    with simulation_progress("drawing", 1.0):
+        if "plot" in pictures:
+            figures = {f"{name}-histories": plots.plot_histories(solutions)}
+            figures |= {f"{name}-motion-{output.slug(each)}": plots.plot_motion(solutions[each]) for each in solutions}
+            contact = first.scene.contacts[0]
+            figures[f"{name}-patch"] = plots.plot_patch(contact.model.patch, normal_force=_first_load(contact))
+            for stem, figure in figures.items():
+                figure.savefig(folder / f"{stem}.png")
+                note(f"wrote {folder / stem}.png")
+        if "animate" in pictures:
+            for label, solution in solutions.items():
+                note(f"wrote {plots.animate_motion(solution, folder / f'{name}-motion-{output.slug(label)}.gif')}")
+
+
+def _first_load(contact: Any) -> float:
+    return float(contact.normal_force(0.0))
