@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
 
 from planarfriction import geometry
 from planarfriction.plots import style
-
-if TYPE_CHECKING:
-    from mpl_toolkits.mplot3d import Axes3D
 
 POLAR_SEGMENTS, AZIMUTH_SEGMENTS = 90, 180
 """Mesh of the direction sphere: fine enough that the facets of a 21 x 21 patch look as they are."""
@@ -75,7 +72,7 @@ def _kind(surface: Any) -> str:
     return words.get(type(surface).__name__, type(surface).__name__)
 
 
-def _draw(axes: Axes3D, mesh: np.ndarray, directions: np.ndarray, limit: float) -> None:
+def _draw(axes: Any, mesh: np.ndarray, directions: np.ndarray, limit: float) -> None:
     # The outward normal of a limit surface is the twist itself: shading needs no differences of the mesh.
     normal = -directions[:-1, :-1]
     lightness = 0.62 + 0.38 * np.clip(normal @ (_LIGHT / np.linalg.norm(_LIGHT)), -0.6, 1.0)

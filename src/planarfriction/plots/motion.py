@@ -160,7 +160,7 @@ def _body_lines(solution: Solution) -> list[np.ndarray]:
 def _pad_shape(contact: Contact) -> np.ndarray:
     """Cells of a contact's patch as polygons `[N, 4, 2]`, or its points `[N, 2]` [m], in its frame."""
     patch = contact.model.patch
-    return patch.positions if patch.grid is None else cell_boxes(patch)
+    return patch.positions if patch.grid is None else cell_boxes(patch, patch.grid)
 
 
 def _one_path(boxes: np.ndarray) -> Outline:

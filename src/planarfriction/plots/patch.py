@@ -10,7 +10,7 @@ from matplotlib.collections import PolyCollection
 from planarfriction.plots import style
 
 if TYPE_CHECKING:
-    from planarfriction.patch import ContactPatch
+    from planarfriction.patch import ContactPatch, Grid
 
 _CORNERS = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
 
@@ -30,7 +30,7 @@ def plot_patch(patch: ContactPatch, *, normal_force: float | None = None) -> sty
     if patch.grid is None:
         drawn, label = _draw_points(axes, patch, weights * load, normal_force)
     else:
-        drawn, label = _draw_cells(axes, patch, weights * load / patch.areas, normal_force)
+        drawn, label = _draw_cells(axes, patch, patch.grid, weights * load / patch.areas, normal_force)
     figure.colorbar(drawn, ax=axes, label=label)
     mark = {"marker": "+", "markersize": 13, "linestyle": "none"}
     axes.plot(*centre, **mark, markeredgewidth=4.0, color="white")
@@ -43,12 +43,11 @@ def plot_patch(patch: ContactPatch, *, normal_force: float | None = None) -> sty
     return figure
 
 
-def cell_boxes(patch: ContactPatch) -> np.ndarray:
+def cell_boxes(patch: ContactPatch, grid: Grid) -> np.ndarray:
     """Corners of the cells of a patch on a grid, `[N, 4, 2]` [m], contact frame.
 
     A cell cut by the rim is drawn as a smaller box of the area and at the centroid of the part inside.
     """
-    grid = patch.grid
     box = _CORNERS * (grid.cell_width, grid.cell_height)
     scale = np.sqrt(patch.areas / grid.cell_area)
     return patch.positions[:, None, :] + scale[:, None, None] * box
@@ -62,13 +61,14 @@ def _height(patch: ContactPatch) -> float:
     return float(np.clip(1.2 + 3.4 * ratio, 2.4, 5.6))
 
 
-def _draw_cells(axes, patch: ContactPatch, pressure: np.ndarray, normal_force: float | None):
+def _draw_cells(axes, patch: ContactPatch, grid: Grid, pressure: np.ndarray, normal_force: float | None):
     unit = style.unit_for("pressure", pressure)
-    cells = PolyCollection(list(1e3 * cell_boxes(patch)), cmap=style.PRESSURE_MAP, edgecolor="white", linewidth=0.25)
+    cells = PolyCollection(
+        list(1e3 * cell_boxes(patch, grid)), cmap=style.PRESSURE_MAP, edgecolor="white", linewidth=0.25
+    )
     cells.set_array(unit.factor * pressure)
     cells.set_clim(0.0, unit.factor * float(pressure.max()) or 1.0)
     axes.add_collection(cells)
-    grid = patch.grid
     width, height = 1e3 * grid.columns * grid.cell_width, 1e3 * grid.rows * grid.cell_height
     margin = 0.03 * max(width, height)
     axes.set_xlim(1e3 * grid.x_min - margin, 1e3 * grid.x_min + width + margin)
