@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from planarfriction.plots import style
 from planarfriction.plots.histories import draw_histories
@@ -17,7 +15,8 @@ if TYPE_CHECKING:
 def plot_solution(solution: Solution) -> style.PlotFigure:
     """Draw the motion of the body (left) and the time histories of body and contacts (right)."""
     figure = style.new_figure(14.0, 6.8)
-    motion, histories = np.ravel(figure.subfigures(1, 2, width_ratios=(1.0, 1.45)))
+    parts: Any = figure.subfigures(1, 2, width_ratios=(1.0, 1.45))
+    motion, histories = parts
     draw_motion(motion, solution)
     draw_histories(histories, solution)
     figure.suptitle(f"{solution.scene.name}", fontsize="large")
