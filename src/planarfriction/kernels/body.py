@@ -2,7 +2,7 @@
 
 State vector: bristles of every contact, body velocity `u = (vx, vy, omega)`, pose `(x, y, theta)`. Bristles of different
 cells do not see each other, they meet in the body's three accelerations: `(shift I - J) k = r` is solved by eliminating
-the bristles contact by contact, which leaves a 6 x 6 system for the body. Loads and forces are linear in time on a piece.
+the bristles contact by contact, which leaves a 3 x 3 system for the body. Loads and forces are linear in time on a piece.
 """
 
 from __future__ import annotations
@@ -57,11 +57,11 @@ class Work(NamedTuple):
     stiffness: np.ndarray
     """d wrench / d twist of one contact, [3, 3]."""
     matrix: np.ndarray
-    """Factors of the body's matrix, [6, 6]."""
-    pivot: np.ndarray
-    """Its row exchanges, [6]."""
-    right: np.ndarray
-    """Its right-hand side, [6]."""
+    """Inverse of the body's matrix, [3, 3]."""
+    to_pose: np.ndarray
+    """Acceleration per residual of the pose, [3, 3]."""
+    body: np.ndarray
+    """A vector of the body, [3]."""
 
 
 @jit
@@ -74,9 +74,9 @@ def workspace(contacts):
         np.zeros((n, 3)),
         np.zeros(3),
         np.zeros((3, 3)),
-        np.zeros((6, 6)),
-        np.zeros(6, np.int64),
-        np.zeros(6),
+        np.zeros((3, 3)),
+        np.zeros((3, 3)),
+        np.zeros(3),
     )
 
 
@@ -139,10 +139,16 @@ def linearise(contacts, motion, piece, y, work):
 
 @kernel
 def factor(contacts, motion, piece, since, y, shift, work):
-    """Eliminate the bristles from `shift I - J` and factor the 6 x 6 matrix of the body."""
-    o = y.shape[0] - 6
-    lin, maps, stiffness, matrix, pivot = work.linear, work.maps, work.stiffness, work.matrix, work.pivot
-    matrix[:] = 0.0
+    """Eliminate bristles and pose from `shift I - J`, and invert the 3 x 3 matrix that is left for the velocity.
+
+    A free body's pose follows from its velocity, `pose = (r_pose + u)/shift`, so that the twist of a contact changes by
+    `(A + G/shift) u + G r_pose/shift`. (A prescribed velocity does not see the pose at all.)
+    """
+    lin, stiffness, m = work.linear, work.stiffness, work.matrix
+    for i in range(3):
+        for j in range(3):
+            m[i, j] = shift if i == j else 0.0
+            work.to_pose[i, j] = 0.0
     for c in range(contacts.kind.shape[0]):
         ct.factor(
             contacts,
@@ -154,50 +160,47 @@ def factor(contacts, motion, piece, since, y, shift, work):
             stiffness,
         )
         load = contacts.count[c] * (motion.load[piece, 0, c] + since * motion.load[piece, 1, c])
-        a, g, h = maps[c, 0], maps[c, 1], maps[c, 2]
-        for i in range(3):
-            for j in range(3):
-                to_velocity, to_pose = 0.0, h[i, j]
-                for p in range(3):
-                    for q in range(3):
-                        to_velocity += a[p, i] * stiffness[p, q] * a[q, j]
-                        to_pose += a[p, i] * stiffness[p, q] * g[q, j]
-                matrix[i, j] -= motion.inverse_mass[i] * load * to_velocity
-                matrix[i, 3 + j] -= motion.inverse_mass[i] * load * to_pose
-    if motion.body_axes:
-        cos, sin = math.cos(y[o + 5]), math.sin(y[o + 5])
-        matrix[3, 0], matrix[3, 1], matrix[4, 0], matrix[4, 1] = -cos, sin, -sin, -cos
-        matrix[3, 5] = sin * y[o] + cos * y[o + 1]
-        matrix[4, 5] = sin * y[o + 1] - cos * y[o]
-    else:
-        matrix[3, 0] = -1.0
-        matrix[4, 1] = -1.0
-    matrix[5, 2] = -1.0
-    for i in range(6):
-        matrix[i, i] += shift
-    for k in range(6):
-        best = k
-        for i in range(k + 1, 6):
-            if abs(matrix[i, k]) > abs(matrix[best, k]):
-                best = i
-        pivot[k] = best
-        if best != k:
-            for j in range(6):
-                matrix[k, j], matrix[best, j] = matrix[best, j], matrix[k, j]
-        for i in range(k + 1, 6):
-            matrix[i, k] /= matrix[k, k]
-            for j in range(k + 1, 6):
-                matrix[i, j] -= matrix[i, k] * matrix[k, j]
+        a, g, h = work.maps[c, 0], work.maps[c, 1], work.maps[c, 2]
+        for j in range(3):
+            for p in range(3):
+                work.body[p] = stiffness[p, 0] * a[0, j] + stiffness[p, 1] * a[1, j] + stiffness[p, 2] * a[2, j]
+                work.twist[p] = stiffness[p, 0] * g[0, j] + stiffness[p, 1] * g[1, j] + stiffness[p, 2] * g[2, j]
+            for i in range(3):
+                weight = motion.inverse_mass[i] * load
+                per_pose = a[0, i] * work.twist[0] + a[1, i] * work.twist[1] + a[2, i] * work.twist[2] + h[i, j]
+                per_velocity = a[0, i] * work.body[0] + a[1, i] * work.body[1] + a[2, i] * work.body[2]
+                work.to_pose[i, j] += weight * per_pose / shift
+                m[i, j] -= weight * (per_velocity + per_pose / shift)
+    c00, c01, c02 = (
+        m[1, 1] * m[2, 2] - m[1, 2] * m[2, 1],
+        m[1, 2] * m[2, 0] - m[1, 0] * m[2, 2],
+        m[1, 0] * m[2, 1] - m[1, 1] * m[2, 0],
+    )
+    per_determinant = 1.0 / (m[0, 0] * c00 + m[0, 1] * c01 + m[0, 2] * c02)
+    c10, c11, c12 = (
+        m[0, 2] * m[2, 1] - m[0, 1] * m[2, 2],
+        m[0, 0] * m[2, 2] - m[0, 2] * m[2, 0],
+        m[0, 1] * m[2, 0] - m[0, 0] * m[2, 1],
+    )
+    c20, c21, c22 = (
+        m[0, 1] * m[1, 2] - m[0, 2] * m[1, 1],
+        m[0, 2] * m[1, 0] - m[0, 0] * m[1, 2],
+        m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0],
+    )
+    m[0, 0], m[0, 1], m[0, 2] = per_determinant * c00, per_determinant * c10, per_determinant * c20
+    m[1, 0], m[1, 1], m[1, 2] = per_determinant * c01, per_determinant * c11, per_determinant * c21
+    m[2, 0], m[2, 1], m[2, 2] = per_determinant * c02, per_determinant * c12, per_determinant * c22
 
 
 @kernel
 def solve(contacts, motion, piece, since, y, shift, r, out, work):
     """Solve `(shift I - J) out = r` with the matrix that `factor` prepared."""
     o = y.shape[0] - 6
-    lin, maps, matrix, pivot = work.linear, work.maps, work.matrix, work.pivot
-    w, v, b = work.stiffness[0], work.twist, work.right
-    for i in range(6):
-        b[i] = r[o + i]
+    lin, m, w, v, b = work.linear, work.matrix, work.stiffness[0], work.twist, work.body
+    r_pose = r[o + 3 :]
+    for i in range(3):
+        to_pose = work.to_pose[i]
+        b[i] = r[o + i] + to_pose[0] * r_pose[0] + to_pose[1] * r_pose[1] + to_pose[2] * r_pose[2]
     for c in range(contacts.kind.shape[0]):
         first, last = contacts.state[c], contacts.state[c + 1]
         ct.eliminate(
@@ -211,32 +214,32 @@ def solve(contacts, motion, piece, since, y, shift, r, out, work):
             w,
         )
         load = contacts.count[c] * (motion.load[piece, 0, c] + since * motion.load[piece, 1, c])
-        a = maps[c, 0]
+        a = work.maps[c, 0]
         for i in range(3):
             b[i] += motion.inverse_mass[i] * load * (a[0, i] * w[0] + a[1, i] * w[1] + a[2, i] * w[2])
-    for k in range(6):
-        p = pivot[k]
-        b[k], b[p] = b[p], b[k]
-        for i in range(k + 1, 6):
-            b[i] -= matrix[i, k] * b[k]
-    for i in range(5, -1, -1):
-        for j in range(i + 1, 6):
-            b[i] -= matrix[i, j] * b[j]
-        b[i] /= matrix[i, i]
-        out[o + i] = b[i]
+    u, pose = out[o : o + 3], out[o + 3 :]
+    for i in range(3):
+        u[i] = m[i, 0] * b[0] + m[i, 1] * b[1] + m[i, 2] * b[2]
+    per_shift = 1.0 / shift
+    pose[2] = per_shift * (r_pose[2] + u[2])
+    if motion.body_axes:
+        cos, sin = math.cos(y[o + 5]), math.sin(y[o + 5])
+        pose[0] = per_shift * (r_pose[0] + cos * u[0] - sin * u[1] - (sin * y[o] + cos * y[o + 1]) * pose[2])
+        pose[1] = per_shift * (r_pose[1] + sin * u[0] + cos * u[1] + (cos * y[o] - sin * y[o + 1]) * pose[2])
+    else:
+        pose[0] = per_shift * (r_pose[0] + u[0])
+        pose[1] = per_shift * (r_pose[1] + u[1])
     for c in range(contacts.kind.shape[0]):
         first, last = contacts.state[c], contacts.state[c + 1]
-        a, g = maps[c, 0], maps[c, 1]
+        a, g = work.maps[c, 0], work.maps[c, 1]
         for i in range(3):
-            v[i] = 0.0
-            for j in range(3):
-                v[i] += a[i, j] * b[j] + g[i, j] * b[3 + j]
+            v[i] = a[i, 0] * u[0] + a[i, 1] * u[1] + a[i, 2] * u[2]
+            v[i] += g[i, 0] * pose[0] + g[i, 1] * pose[1] + g[i, 2] * pose[2]
         ct.back_substitute(
             contacts,
             c,
             motion.row[piece, c],
             y[first:last],
-            shift,
             r[first:last],
             v,
             lin[contacts.linear[c] : contacts.linear[c + 1]],

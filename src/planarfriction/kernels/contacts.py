@@ -30,7 +30,7 @@ class Contacts(NamedTuple):
     mount: np.ndarray
     """`WORLD`, `BODY` or `BODY_AXES`, int [C]."""
     place: np.ndarray
-    """Position and angle of the contact frame on its mount, [C, 3]."""
+    """Position of the contact frame on its mount, cosine and sine of its angle, [C, 4]."""
     count: np.ndarray
     """How many identical contacts share the state, [C]."""
     state: np.ndarray
@@ -56,15 +56,13 @@ class Contacts(NamedTuple):
 @kernel
 def contact_map(mount, place, pose, a):
     """Write `A`, with `V = A u`, into `a` [3, 3]."""
-    angle = place[2] + (pose[2] if mount == BODY else 0.0)
-    c, s = math.cos(angle), math.sin(angle)
+    dx, dy, c, s = place[0], place[1], place[2], place[3]
     if mount == WORLD:
-        dx, dy = place[0] - pose[0], place[1] - pose[1]
+        dx, dy = dx - pose[0], dy - pose[1]
     elif mount == BODY:
         ct, st = math.cos(pose[2]), math.sin(pose[2])
-        dx, dy = ct * place[0] - st * place[1], st * place[0] + ct * place[1]
-    else:
-        dx, dy = place[0], place[1]
+        dx, dy = ct * dx - st * dy, st * dx + ct * dy
+        c, s = c * ct - s * st, s * ct + c * st
     a[0, 0], a[0, 1], a[0, 2] = c, s, s * dx - c * dy
     a[1, 0], a[1, 1], a[1, 2] = -s, c, s * dy + c * dx
     a[2, 0], a[2, 1], a[2, 2] = 0.0, 0.0, 1.0
@@ -136,13 +134,13 @@ def eliminate(contacts, c, row, z, shift, r, lin, w):
 
 
 @kernel
-def back_substitute(contacts, c, row, z, shift, r, v, lin, out):
+def back_substitute(contacts, c, row, z, r, v, lin, out):
     """Bristle solution of contact c for the residual `r` and the twist change `v`."""
     if contacts.kind[c] == DISTRIBUTED:
         x, y, _ = _cells(contacts, c, row)
         distributed.back_substitute(z, r, v[0], v[1], v[2], x, y, lin.reshape(7, x.shape[0]), out)
     else:
-        reduced.back_substitute(shift, r, v[0], v[1], v[2], contacts.shape[row], lin, out)
+        reduced.back_substitute(r, v[0], v[1], v[2], contacts.shape[row], lin, out)
 
 
 @kernel

@@ -51,7 +51,7 @@ def evaluate(law, z, vx, vy, omega, shape, surface, data, zdot):
     """Write the raw bristle rates into `zdot` and return the wrench `(fx, fy, tau)`."""
     x, y, s = _scaled_twist(shape, vx, vy, omega)
     v_n = math.sqrt(x * x + y * y + s * s)
-    ux, uy, us = sliding(surface[0], data, surface[1], surface[2], x, y, s)
+    ux, uy, us = sliding(surface[0], data, surface[1], surface[2], x, y, s, v_n)
     k = _decay(law, z[0], z[1], z[2] / shape[2], ux, uy, us, v_n)
     zdot[0], zdot[1], zdot[2] = ux - k * z[0], uy - k * z[1], shape[2] * us - k * z[2]
     return _wrench(law, shape, z[0], z[1], z[2], zdot[0], zdot[1], zdot[2], x, y, omega)
@@ -63,8 +63,8 @@ def linearise(law, z, vx, vy, omega, shape, surface, data, lin):
     x, y, s = _scaled_twist(shape, vx, vy, omega)
     v_n = math.sqrt(x * x + y * y + s * s)
     per_v = 1.0 / v_n if v_n > 0.0 else 0.0
-    ux, uy, us = sliding(surface[0], data, surface[1], surface[2], x, y, s)
-    j = sliding_jacobian(surface[0], data, surface[1], surface[2], x, y, s)
+    j = sliding_jacobian(surface[0], data, surface[1], surface[2], x, y, s, v_n)
+    ux, uy, us = j[0] * x + j[1] * y + j[2] * s, j[3] * x + j[4] * y + j[5] * s, j[6] * x + j[7] * y + j[8] * s
     zx, zy, zs = z[0], z[1], z[2] / shape[2]
     u_norm = math.sqrt(ux * ux + uy * uy + us * us)
     h_norm = u_norm * per_v if u_norm > 0.0 else 1.0
@@ -99,21 +99,22 @@ def linearise(law, z, vx, vy, omega, shape, surface, data, lin):
 
 
 @kernel
-def _solve(lin, shift, ax, ay, a_s):
-    """`D^-1 a` in scaled coordinates, `D = (shift + k) I + z_hat (x) k_z`."""
-    diagonal = shift + lin[0]
-    c = (lin[1] * ax + lin[2] * ay + lin[3] * a_s) / (diagonal + lin[1] * lin[4] + lin[2] * lin[5] + lin[3] * lin[6])
-    return (ax - c * lin[4]) / diagonal, (ay - c * lin[5]) / diagonal, (a_s - c * lin[6]) / diagonal
+def _solve(lin, ax, ay, a_s):
+    """`D^-1 a` in scaled coordinates, `D = (shift + k) I + z_hat (x) k_z`, once `factor` has prepared it."""
+    c = (lin[1] * ax + lin[2] * ay + lin[3] * a_s) * lin[17]
+    return (ax - c * lin[4]) * lin[16], (ay - c * lin[5]) * lin[16], (a_s - c * lin[6]) * lin[16]
 
 
 @kernel
 def factor(law, shift, shape, lin, stiffness):
-    """Write `d wrench/d twist` with the bristle eliminated: `-(sigma_0 + sigma_1 shift) S D^-1 F S - sigma_2 U`."""
+    """Prepare `D` (16, 17 of `lin`) and write `d wrench/d twist` with the bristle eliminated: `-(sigma_0 + sigma_1 shift) S D^-1 F S - sigma_2 U`."""
+    lin[16] = 1.0 / (shift + lin[0])
+    lin[17] = 1.0 / (shift + lin[0] + lin[1] * lin[4] + lin[2] * lin[5] + lin[3] * lin[6])
     pull = law.sigma_0 + law.sigma_1 * shift
     r = shape[2]
     for m in range(3):
         scale = r if m == 2 else 1.0
-        bx, by, bs = _solve(lin, shift, lin[7 + m], lin[10 + m], lin[13 + m])
+        bx, by, bs = _solve(lin, lin[7 + m], lin[10 + m], lin[13 + m])
         stiffness[0, m] = -pull * scale * bx
         stiffness[1, m] = -pull * scale * by
         stiffness[2, m] = -pull * scale * r * bs
@@ -132,19 +133,18 @@ def factor(law, shift, shape, lin, stiffness):
 def eliminate(law, shift, r, shape, lin):
     """Wrench about the origin caused by the raw bristle residual `r`."""
     pull = law.sigma_0 + law.sigma_1 * shift
-    bx, by, bs = _solve(lin, shift, r[0], r[1], r[2] / shape[2])
+    bx, by, bs = _solve(lin, r[0], r[1], r[2] / shape[2])
     fx, fy = law.sigma_1 * r[0] - pull * bx, law.sigma_1 * r[1] - pull * by
     tau = law.sigma_1 * r[2] - pull * shape[2] * bs
     return fx, fy, tau + shape[0] * fy - shape[1] * fx
 
 
 @kernel
-def back_substitute(shift, r, vx, vy, omega, shape, lin, out):
+def back_substitute(r, vx, vy, omega, shape, lin, out):
     """Solve `D out = r + d zdot/dV dV` for the change of the twist about the origin."""
     x, y, s = _scaled_twist(shape, vx, vy, omega)
     out[0], out[1], bs = _solve(
         lin,
-        shift,
         r[0] + lin[7] * x + lin[8] * y + lin[9] * s,
         r[1] + lin[10] * x + lin[11] * y + lin[12] * s,
         r[2] / shape[2] + lin[13] * x + lin[14] * y + lin[15] * s,
@@ -158,7 +158,7 @@ def step(law, z, vx, vy, omega, shape, surface, data, dt, out):
     x, y, s = _scaled_twist(shape, vx, vy, omega)
     r = shape[2]
     v_n = math.sqrt(x * x + y * y + s * s)
-    ux, uy, us = sliding(surface[0], data, surface[1], surface[2], x, y, s)
+    ux, uy, us = sliding(surface[0], data, surface[1], surface[2], x, y, s, v_n)
     zx, zy, zs = z[0], z[1], z[2] / r
     u_norm = math.sqrt(ux * ux + uy * uy + us * us)
     h_norm = u_norm / v_n if v_n > 0.0 else 1.0

@@ -104,16 +104,19 @@ def _time_slope(contacts, motion, piece, work, slope):
 
 @kernel
 def _combine(coefficients, stages, count, base, out):
-    """`out = base + sum coefficients_j stages_j` over the first `count` stages."""
+    """`out = base + sum coefficients_j stages_j` over the first `count` stages, two at a time."""
     n = base.shape[0]
-    for i in range(n):
-        out[i] = base[i]
-    for j in range(count):
-        c = coefficients[j]
-        if c != 0.0:
-            stage = stages[j]
-            for i in range(n):
-                out[i] += c * stage[i]
+    if count % 2 == 1:
+        a, first = coefficients[0], stages[0]
+        for i in range(n):
+            out[i] = base[i] + a * first[i]
+    else:
+        for i in range(n):
+            out[i] = base[i]
+    for j in range(count % 2, count, 2):
+        a, b, first, second = coefficients[j], coefficients[j + 1], stages[j], stages[j + 1]
+        for i in range(n):
+            out[i] += a * first[i] + b * second[i]
 
 
 @kernel
@@ -140,7 +143,6 @@ def advance(contacts, motion, method, output, y, cursor, clock, rtol, atol, max_
         np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.zeros(3)
     )  # fmt: skip
     couplings = np.empty(s)
-    n_contacts = contacts.kind.shape[0]
     work = workspace(contacts)
     zeros = np.zeros(n)
     piece, m = cursor[0], cursor[1]
@@ -196,7 +198,8 @@ def advance(contacts, motion, method, output, y, cursor, clock, rtol, atol, max_
             _combine(method.e, k, s, zeros, error)
             norm = _error_norm(contacts, y, new, error, rtol, atol)
             taken += 1
-            scale = min(6.0, max(0.1, 0.9 * max(norm, 1e-10) ** (-1.0 / method.order)))
+            # no growth right after a rejection: the reason for it is still near
+            scale = min(6.0 if fresh else 1.0, max(0.1, 0.8 * max(norm, 1e-10) ** (-1.0 / method.order)))
             if norm > 1.0:
                 statistics[REJECTIONS] += 1
                 h = step * (scale if math.isfinite(norm) else 0.1)

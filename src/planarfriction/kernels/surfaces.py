@@ -28,14 +28,14 @@ _IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 @kernel
 def _place(size, x, y, s):
     """Table coordinates of a direction with `s >= 0`: polar and azimuth cell, position within it, and the angles."""
-    segment = 0.5 * math.pi / size
+    per_segment = size / (0.5 * math.pi)
     polar = math.atan2(math.sqrt(x * x + y * y), s)
     azimuth = math.atan2(y, x)
     if azimuth < 0.0:
         azimuth += 2.0 * math.pi
-    i = min(int(polar / segment), size - 1)
-    j = min(int(azimuth / segment), 4 * size - 1)
-    return i, j, polar / segment - i, azimuth / segment - j, polar, azimuth
+    a, b = polar * per_segment, azimuth * per_segment
+    i, j = min(int(a), size - 1), min(int(b), 4 * size - 1)
+    return i, j, a - i, b - j, polar, azimuth
 
 
 @kernel
@@ -228,11 +228,10 @@ def _cells_jacobian(data, start, size, x, y, s, speed):
 
 
 @kernel
-def sliding(kind, data, start, size, x, y, s):
-    """`u = h(V) |V_S|` of the scaled twist `(x, y, s)`; the lower half of the sphere mirrors the upper one."""
+def sliding(kind, data, start, size, x, y, s, speed):
+    """`u = h(V) |V_S|` of the scaled twist `(x, y, s)` of norm `speed`; the lower half of the sphere mirrors the upper."""
     if kind == ELLIPSOID:
         return x, y, s
-    speed = math.sqrt(x * x + y * y + s * s)
     if speed == 0.0:
         return 0.0, 0.0, 0.0
     if kind == CELLS:
@@ -246,12 +245,12 @@ def sliding(kind, data, start, size, x, y, s):
 
 
 @kernel
-def sliding_jacobian(kind, data, start, size, x, y, s):
-    """`du/dV_S`, nine numbers row by row; at rest, where it has no value, the ellipsoid's, which lies between all."""
-    if kind == ELLIPSOID:
-        return _IDENTITY
-    speed = math.sqrt(x * x + y * y + s * s)
-    if speed == 0.0:
+def sliding_jacobian(kind, data, start, size, x, y, s, speed):
+    """`du/dV_S`, nine numbers row by row; at rest, where it has no value, the ellipsoid's, which lies between all.
+
+    `u` is homogeneous, so that `u = du/dV_S V_S`.
+    """
+    if kind == ELLIPSOID or speed == 0.0:
         return _IDENTITY
     if kind == CELLS:
         return _cells_jacobian(data, start, size, x, y, s, speed)
@@ -261,17 +260,24 @@ def sliding_jacobian(kind, data, start, size, x, y, s):
     return _potential_jacobian(data, start, size, mirror * x, mirror * y, mirror * s, speed)
 
 
+@kernel
+def _norm(twist):
+    return math.sqrt(twist[0] * twist[0] + twist[1] * twist[1] + twist[2] * twist[2])
+
+
 @jit
 def sliding_batch(kind, data, start, size, twist, u):
     """`sliding` for scaled twists `[M, 3]` into `u [M, 3]`."""
     for m in range(twist.shape[0]):
-        u[m, 0], u[m, 1], u[m, 2] = sliding(kind, data, start, size, twist[m, 0], twist[m, 1], twist[m, 2])
+        v = twist[m]
+        u[m, 0], u[m, 1], u[m, 2] = sliding(kind, data, start, size, v[0], v[1], v[2], _norm(v))
 
 
 @jit
 def sliding_jacobian_batch(kind, data, start, size, twist, jacobian):
     """`sliding_jacobian` for scaled twists `[M, 3]` into `jacobian [M, 9]`."""
     for m in range(twist.shape[0]):
-        values = sliding_jacobian(kind, data, start, size, twist[m, 0], twist[m, 1], twist[m, 2])
+        v = twist[m]
+        values = sliding_jacobian(kind, data, start, size, v[0], v[1], v[2], _norm(v))
         for i in range(9):
             jacobian[m, i] = values[i]

@@ -6,7 +6,6 @@ import functools
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import optimize
 
 from planarfriction.kernels import surfaces as kernels
 from planarfriction.limit_surface.base import LimitSurface, SurfaceNumbers, _plane
@@ -35,6 +34,8 @@ class LimitSurfaceCells(LimitSurface):
         The minimum often lies on a kink (a wrench inside a flat facet of the surface: the body turns about one cell), where
         the plain Newton method stalls.
         """
+        from scipy import optimize
+
         x, y, weights = self.numbers.data.reshape(3, -1)
         basis = _plane(target)
         lever = np.stack([-y, x])  # cell velocity = V_S[:2] + V_S[2] * lever

@@ -6,7 +6,6 @@ import functools
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import optimize
 
 from planarfriction import validation
 from planarfriction.kernels import surfaces as kernels
@@ -58,6 +57,8 @@ class LimitSurfaceTablePublished(LimitSurface):
 
     def _scaled_twist_of(self, target: np.ndarray) -> np.ndarray:
         """The direction whose stored `h` is parallel to `target`: from the best node, by least squares."""
+        from scipy import optimize
+
         nodes = self.numbers.data.reshape(self.segments + 1, -1, 4)[..., :3]
         side = -1.0 if target[2] < 0.0 else 1.0
         match = side * nodes @ target / np.linalg.norm(nodes, axis=-1)

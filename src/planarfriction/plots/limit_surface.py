@@ -23,7 +23,9 @@ def sample_limit_surface(surface: Any, polar: np.ndarray, azimuth: np.ndarray) -
     `(vx, vy, r omega) = (sin p cos a, sin p sin a, cos p)`; `polar` and `azimuth` [rad] broadcast to `[...]`, the
     results have shape `[..., 3]` [m/s, m/s, rad/s] and [1, 1, m].
     """
-    x, y, z = np.broadcast_arrays(np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar))
+    z = np.cos(polar)
+    sine = np.where(np.abs(z) < 1.0, np.sin(polar), 0.0)  # sin(pi) is not quite 0, and a spin about a cell must be exact
+    x, y, z = np.broadcast_arrays(sine * np.cos(azimuth), sine * np.sin(azimuth), z)
     twists = geometry.twist_at(np.stack([x, y, z / surface.contact_radius], -1), -surface.centre_of_pressure)
     return twists, surface.wrench(twists)
 

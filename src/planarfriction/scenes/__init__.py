@@ -10,7 +10,7 @@ from planarfriction.scenes.signal import Signal
 from planarfriction.scenes.solution import Solution, Statistics, load
 
 if TYPE_CHECKING:
-    from planarfriction.scenes.simulate import simulate
+    from planarfriction.scenes.simulation import simulate
 
 __all__ = [
     "Body",
@@ -32,8 +32,8 @@ __all__ = [
 
 def __getattr__(name: str) -> Any:
     if name == "simulate":  # brings the compiled solver with it
-        from planarfriction.scenes.simulate import simulate
+        from planarfriction.scenes.simulation import simulate
 
-        globals()["simulate"] = simulate  # the import above leaves the module of this name here
+        globals()["simulate"] = simulate
         return simulate
     raise AttributeError(f"module 'planarfriction.scenes' has no attribute {name!r}")

@@ -63,10 +63,7 @@ class _Shapes:
 
 def breaks_of(scene, t_end: float) -> np.ndarray:
     """Times at which an input may jump or bend, from 0 to `t_end`, refined where a shape follows a continuous load."""
-    signals = [contact.normal_force for contact in scene.contacts]
-    signals += [signal for signal in (scene.force, scene.velocity) if signal is not None]
-    inside = np.concatenate([signal.breaks for signal in signals])
-    breaks = np.unique(np.concatenate([[0.0, t_end], inside[(inside > 0.0) & (inside < t_end)]]))
+    breaks = scene.breaks(t_end)
     if not any(c.model.patch.depends_on_load and c.normal_force.hold == "linear" for c in scene.contacts):
         return breaks
     parts = np.maximum(np.ceil(np.diff(breaks) / SHAPE_INTERVAL - 1e-9).astype(int), 1)
@@ -108,7 +105,7 @@ def pack(scene, t_end: float) -> PackedScene:
             shapes_here = [model.shape_at(value) for value in values]
             rows = [shapes.add_reduced(shape) for shape in shapes_here]
             radius = max(shape.contact_radius for shape in shapes_here)
-            sizes.append((3, 0, 16))
+            sizes.append((3, 0, 18))
             cells.append(np.empty((0, 2)))
             loaded.append(np.empty(0, bool))
             natural.append(scale * np.array([1.0, 1.0, radius]))
@@ -122,7 +119,7 @@ def pack(scene, t_end: float) -> PackedScene:
         ),
         law=np.array([law_row(c.model.law) for c in scene.contacts]),
         mount=np.array([_mount(scene, contact) for contact in scene.contacts]),
-        place=np.array([[*contact.position, contact.angle] for contact in scene.contacts], dtype=float),
+        place=np.array([[*c.position, np.cos(c.angle), np.sin(c.angle)] for c in scene.contacts], dtype=float),
         count=np.array([contact.count for contact in scene.contacts], dtype=float),
         state=np.ascontiguousarray(offsets[:, 0]),
         linear=np.ascontiguousarray(offsets[:, 2]),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import json
 import os
 import warnings
@@ -14,33 +13,12 @@ from typing import TYPE_CHECKING, Any
 
 from planarfriction.errors import FileError, FrictionError
 from planarfriction.scenes.scene import Scene
+from planarfriction.solvers.statistics import Statistics
 
 if TYPE_CHECKING:
     import xarray as xr
 
 _META = ("scene", "statistics", "status", "message")
-
-
-@dataclass(frozen=True)
-class Statistics:
-    """What a simulation took."""
-
-    steps: int = 0
-    """Accepted steps."""
-    rejections: int = 0
-    """Steps that were tried and repeated with a smaller size."""
-    evaluations: int = 0
-    """Evaluations of the right-hand side."""
-    jacobians: int = 0
-    """Evaluations of the Jacobian."""
-    wall_time: float = 0.0
-    """Time of the run without compilation [s]."""
-    compile_time: float = 0.0
-    """Time spent compiling before it [s]."""
-
-    def as_dict(self) -> dict[str, int | float]:
-        """The numbers by name."""
-        return dataclasses.asdict(self)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +35,7 @@ class Solution:
     statistics: Statistics
     """What the simulation took."""
     status: str
-    """"done", or a word for what ended the simulation early."""
+    """"success", "at rest", or what ended the simulation early: "interrupted", "step too small"."""
     message: str
     """What happened, in one sentence; the remedy where the solver gave up."""
     scene: Scene

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,6 +13,7 @@ from planarfriction.kernels import rosenbrock as kernels
 from planarfriction.kernels.body import Motion
 from planarfriction.kernels.contacts import Contacts
 from planarfriction.kernels.rosenbrock import Method, Output
+from planarfriction.solvers.statistics import Statistics
 
 _STATES_PER_SLICE = 400_000
 """Steps times states between two looks at the clock and the keyboard: some 20 ms."""
@@ -30,28 +30,6 @@ _MESSAGES = {
         "the step size fell below the resolution of time: loosen rtol, or check the scene for extreme parameters",
     ),
 }
-
-
-@dataclass(frozen=True)
-class Statistics:
-    """What a run cost."""
-
-    steps: int
-    """Accepted steps."""
-    rejections: int
-    """Steps tried again with a smaller size."""
-    evaluations: int
-    """Evaluations of the right-hand side."""
-    jacobians: int
-    """Linearisations."""
-    wall_time: float
-    """Time in the solver, without compilation [s]."""
-    compile_time: float
-    """Time to compile the solver or to load it from the cache [s]; 0 after the first run of a process."""
-
-    def as_dict(self) -> dict[str, float]:
-        """The numbers by name."""
-        return dataclasses.asdict(self)
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,163 @@
+"""`simulate`: run a scene with the structured solver."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.errors import InvalidValueError, SimulationInterrupted, SolverError
+from planarfriction.kernels.rosenbrock import Method, Output
+from planarfriction.scenes.packing import PackedScene, pack
+from planarfriction.scenes.scene import Scene
+from planarfriction.scenes.signal import SAME_TIME
+from planarfriction.scenes.solution import Solution
+from planarfriction.solvers import RODAS4, integrate
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+RTOL, ATOL = 1e-5, 3e-4
+"""Default tolerances: on the published in-hand runs, within 1e-6 m and 3e-6 rad of converged solutions."""
+
+BRISTLES = ("none", "all")
+"""What `simulate(..., bristles=)` records."""
+
+_BODY = {"vx": "m/s", "vy": "m/s", "omega": "rad/s", "x": "m", "y": "m", "theta": "rad"}
+_WRENCH = {"fx": "N", "fy": "N", "tau": "N m"}
+_LONG_NAMES = {
+    "vx": "velocity of the centre of mass, world x",
+    "vy": "velocity of the centre of mass, world y",
+    "omega": "spin, counter-clockwise",
+    "x": "position of the centre of mass, world x",
+    "y": "position of the centre of mass, world y",
+    "theta": "orientation, counter-clockwise",
+    "fx": "friction on the body along x of the contact frame, one of the identical contacts",
+    "fy": "friction on the body along y of the contact frame, one of the identical contacts",
+    "tau": "friction torque on the body about the contact frame's origin, one of the identical contacts",
+    "normal_force": "normal force of one of the identical contacts",
+}
+
+
+def simulate(
+    scene: Scene,
+    *,
+    t_end: float | None = None,
+    rtol: float = RTOL,
+    atol: float = ATOL,
+    save_every: float | None = None,
+    bristles: str = "none",
+    method: Method = RODAS4,
+    progress: Callable[[float], None] | None = None,
+) -> Solution:
+    """Simulate a scene from rest bristles at t = 0 and record it every `save_every` [s]; returns a `Solution`.
+
+    Each step keeps its error below `rtol |y| + atol y_0`, for every component of the body's motion and for the mean over
+    each contact's bristles. The natural scales `y_0` are mu_c/sigma_0 for bristles and positions and v_s for velocities (both
+    over the contact radius for angles), so that `atol` is a share of a full bristle deflection. The solver stops exactly
+    at every break of a signal.
+
+    Parameters
+    ----------
+    scene
+        Body, contacts and signals.
+    t_end
+        End [s], at most the scene's own.
+    rtol, atol
+        Relative and natural-scale tolerances [-], > 0.
+    save_every
+        Recording interval [s]; the scene's own by default. The end is always recorded.
+    bristles
+        "all" also records the state of each contact, as variables `bristles_<contact>`.
+    method
+        `planarfriction.solvers.RODAS4` (default) or `RODAS3`.
+    progress
+        Called with the simulated time [s] now and then.
+
+    Raises
+    ------
+    InvalidValueError
+        A parameter breaks its rule.
+    SolverError
+        The solver gave up; carries the solution so far and says the remedy.
+    SimulationInterrupted
+        Ctrl-C; carries the solution so far.
+    """
+    end = scene.t_end if t_end is None else validation.positive("t_end", t_end)
+    if end > scene.t_end:
+        raise InvalidValueError("t_end", f"be at most the scene's {scene.t_end:g} s", end)
+    rtol, atol = validation.positive("rtol", rtol), validation.positive("atol", atol)
+    every = scene.save_every if save_every is None else validation.positive("save_every", save_every)
+    validation.choice("bristles", bristles, BRISTLES)
+    packed = pack(scene, end)
+    output = _output(_times(end, every, packed.motion.breaks), packed, bristles)
+    run = integrate(
+        packed.contacts,
+        packed.motion,
+        output,
+        packed.state,
+        method=method,
+        rtol=rtol,
+        atol=atol * packed.natural,
+        progress=progress,
+    )
+    solution = Solution(_dataset(scene, packed, run.output), run.statistics, run.status, run.message, scene)
+    if run.status == "interrupted":
+        raise SimulationInterrupted(solution)
+    if run.status not in ("success", "at rest"):
+        raise SolverError(f"at t = {float(solution.data.time[-1]):g} s: {run.message}", solution)
+    return solution
+
+
+def _times(end: float, every: float, breaks: np.ndarray) -> np.ndarray:
+    """Recording times; one that equals a break up to rounding is that break, so that it records the left limit."""
+    count = int(np.floor(end / every * (1.0 + 1e-12)))
+    times = np.arange(count + 1) * every
+    if end - times[-1] > SAME_TIME:
+        times = np.append(times, end)
+    near = breaks[np.clip(np.searchsorted(breaks, times - SAME_TIME), 0, len(breaks) - 1)]
+    return np.where(np.abs(near - times) <= SAME_TIME, near, times)
+
+
+def _output(times: np.ndarray, packed: PackedScene, bristles: str) -> Output:
+    count, contacts = len(times), len(packed.contacts.kind)
+    states = int(packed.contacts.state[-1])
+    return Output(
+        times.copy(),
+        np.empty((count, 6)),
+        np.empty((count, contacts, 3)),
+        np.empty((count, contacts)),
+        np.empty((count, states) if bristles == "all" else (0, 0)),
+    )
+
+
+def _dataset(scene: Scene, packed: PackedScene, output: Output) -> xr.Dataset:
+    """Histories with units, the whole scene in the attributes."""
+    import xarray as xr
+
+    variables: dict = {name: ("time", output.body[:, i]) for i, name in enumerate(_BODY)}
+    variables |= {name: (("time", "contact"), output.wrench[:, :, i]) for i, name in enumerate(_WRENCH)}
+    variables["normal_force"] = (("time", "contact"), output.load)
+    units = {**_BODY, **_WRENCH, "normal_force": "N"}
+    names = [contact.name for contact in scene.contacts]
+    if len(output.bristles):
+        for c, contact in enumerate(scene.contacts):
+            part = output.bristles[:, packed.contacts.state[c] : packed.contacts.state[c + 1]]
+            name = f"bristles_{contact.name}"
+            if len(packed.loaded[c]):
+                full = np.zeros((len(part), 2, len(packed.loaded[c])))
+                full[:, :, packed.loaded[c]] = part.reshape(len(part), 2, -1)
+                variables[name] = (("time", "axis", f"cell_{contact.name}"), full)
+                units[name] = "m"
+            else:
+                variables[name] = (("time", "component"), part)
+                units[name] = "m, m, m^2"
+    data = xr.Dataset(variables, coords={"time": output.time, "contact": names}, attrs={"scene": scene.to_json()})
+    data.time.attrs = {"units": "s", "long_name": "time"}
+    for name, unit in units.items():
+        data[name].attrs["units"] = unit
+        if name in _LONG_NAMES:
+            data[name].attrs["long_name"] = _LONG_NAMES[name]
+    return data

@@ -1,0 +1,28 @@
+"""What a run cost."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """What a run cost."""
+
+    steps: int = 0
+    """Accepted steps."""
+    rejections: int = 0
+    """Steps that were tried and repeated with a smaller size."""
+    evaluations: int = 0
+    """Evaluations of the right-hand side."""
+    jacobians: int = 0
+    """Linearisations."""
+    wall_time: float = 0.0
+    """Time in the solver, without compilation [s]."""
+    compile_time: float = 0.0
+    """Time to compile the solver or to load it from the cache [s]; almost 0 after the first run of a process."""
+
+    def as_dict(self) -> dict[str, int | float]:
+        """The numbers by name."""
+        return dataclasses.asdict(self)
