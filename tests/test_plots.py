@@ -108,6 +108,16 @@ def test_samples_have_spin_and_slide_where_they_belong(name):
     assert slide == pytest.approx(np.array([[-1.0, 0.0, 0.0]]), abs=1e-12)
 
 
+def test_the_poles_close_over_a_cell_in_the_centre_of_pressure():
+    # Friction jumps where the centre of rotation crosses a cell: a pole off by rounding would leave a hole in the mesh.
+    surface = pf.LimitSurfaceCells(PUBLISHED_PATCHES["Line"]())
+    _, points = scaled_samples(surface, np.array([[0.0], [np.pi]]), np.linspace(0.0, 2 * np.pi, 7)[None, :])
+    assert (points == points[:, :1]).all()
+    assert (
+        np.abs(points[..., :2]).max() <= 1 / 21 + 1e-12
+    )  # anywhere on the facet of the middle cell, whose weight it is
+
+
 def test_samples_are_about_the_origin_of_the_contact_frame():
     surface = pf.LimitSurfaceCells(PUBLISHED_PATCHES["LineGrad"]())
     twists, wrenches = sample_limit_surface(surface, np.array([1.0, 2.0]), np.array([0.5, 4.0]))
