@@ -27,9 +27,7 @@ def wrench_at(wrench, offset) -> np.ndarray:
     """
     wrench, offset = np.asarray(wrench, dtype=float), np.asarray(offset, dtype=float)
     fx, fy = wrench[..., 0], wrench[..., 1]
-    return np.stack(
-        np.broadcast_arrays(fx, fy, wrench[..., 2] - (offset[..., 0] * fy - offset[..., 1] * fx)), -1
-    )
+    return np.stack(np.broadcast_arrays(fx, fy, wrench[..., 2] - (offset[..., 0] * fy - offset[..., 1] * fx)), -1)
 
 
 def rotate(vector, angle) -> np.ndarray:

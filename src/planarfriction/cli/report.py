@@ -10,8 +10,8 @@ import numpy as np
 if TYPE_CHECKING:
     from planarfriction.scenes import Solution
 
-FINISHED = "done"
-"""Status of a simulation that reached its end."""
+FINISHED = "success"
+"""Status of a simulation that ran until its last time."""
 
 
 def comparison(solutions: Mapping[str, Solution]) -> list[list[str]]:
@@ -37,7 +37,7 @@ def comparison(solutions: Mapping[str, Solution]) -> list[list[str]]:
     if any(each.compile_time > 0.1 for each in statistics):
         rows.append(["loading or compiling before it [s]", *(f"{each.compile_time:.3g}" for each in statistics)])
     if any(each.status != FINISHED for each in every):
-        rows.append(["ended", *(each.message if each.status != FINISHED else FINISHED for each in every)])
+        rows.append(["ended", *(each.status for each in every)])
     return rows
 
 

@@ -24,8 +24,8 @@ READY = ("in-hand", "drift", "free-slide", "driven")
 DRIFT_WIDTH = 0.05
 """Width of the patch in the published drift experiment [m]."""
 
-SLIDE_MASS, SLIDE_TWIST = 0.2, (0.5, 0.0, 60.0)
-"""Mass [kg] and initial twist [m/s, m/s, rad/s] of the puck in the free slide: it slides and spins about equally."""
+SLIDE_MASS, SLIDE_TWIST, SLIDE_SAMPLING = 0.2, (1.0, 0.0, 100.0), 1e-3
+"""Mass [kg], initial twist [m/s, m/s, rad/s] and time between samples [s] of the puck in the free slide."""
 
 KINDS = {"distributed": "DistributedModel", "reduced": "ReducedModelPublished"}
 """Model on the command line -> class in `planarfriction.models`."""
@@ -71,7 +71,8 @@ def _ready_scene(name: str, model: Any, t_end: float | None) -> Scene:
     if name == "free-slide":
         # A puck whose mass is spread like its contact pressure.
         inertia = SLIDE_MASS * float(model.patch.second_moment(9.81 * SLIDE_MASS))
-        return scenes.free_slide(model, mass=SLIDE_MASS, inertia=inertia, twist=SLIDE_TWIST, **options)
+        scene = scenes.free_slide(model, mass=SLIDE_MASS, inertia=inertia, twist=SLIDE_TWIST, **options)
+        return dataclasses.replace(scene, save_every=SLIDE_SAMPLING)
     return {"in-hand": scenes.in_hand, "drift": scenes.drift, "driven": scenes.driven}[name](model, **options)
 
 

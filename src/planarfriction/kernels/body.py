@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planarfriction.kernels import contacts as ct
-from planarfriction.kernels import jit, kernel
+from planarfriction.kernels import inlined, jit, kernel
 
 
 class Motion(NamedTuple):
@@ -80,7 +80,7 @@ def workspace(contacts):
     )
 
 
-@kernel
+@inlined
 def _contact_twist(a, u, v):
     for i in range(3):
         v[i] = a[i, 0] * u[0] + a[i, 1] * u[1] + a[i, 2] * u[2]
@@ -117,7 +117,7 @@ def rates(contacts, motion, piece, since, y, dy, work):
     dy[o + 5] = u[2]
 
 
-@kernel
+@inlined
 def linearise(contacts, motion, piece, y, work):
     """Linearise every contact about `y`, whose `rates` were evaluated last."""
     o = y.shape[0] - 6
@@ -137,7 +137,7 @@ def linearise(contacts, motion, piece, y, work):
         )
 
 
-@kernel
+@inlined
 def factor(contacts, motion, piece, since, y, shift, work):
     """Eliminate bristles and pose from `shift I - J`, and invert the 3 x 3 matrix that is left for the velocity.
 
@@ -192,7 +192,7 @@ def factor(contacts, motion, piece, since, y, shift, work):
     m[2, 0], m[2, 1], m[2, 2] = per_determinant * c02, per_determinant * c12, per_determinant * c22
 
 
-@kernel
+@inlined
 def solve(contacts, motion, piece, since, y, shift, r, out, work):
     """Solve `(shift I - J) out = r` with the matrix that `factor` prepared."""
     o = y.shape[0] - 6

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction.kernels import distributed, kernel, reduced
+from planarfriction.kernels import distributed, inlined, reduced
 from planarfriction.kernels.law import law_of
 
 DISTRIBUTED, REDUCED = 0, 1
@@ -53,7 +53,7 @@ class Contacts(NamedTuple):
     """Numbers of the limit surfaces, flat."""
 
 
-@kernel
+@inlined
 def contact_map(mount, place, pose, a):
     """Write `A`, with `V = A u`, into `a` [3, 3]."""
     dx, dy, c, s = place[0], place[1], place[2], place[3]
@@ -68,7 +68,7 @@ def contact_map(mount, place, pose, a):
     a[2, 0], a[2, 1], a[2, 2] = 0.0, 0.0, 1.0
 
 
-@kernel
+@inlined
 def contact_map_slopes(mount, a, u, w, g, h):
     """Write `G = d(A u)/d pose` and `H = d(A' W)/d pose` into `g` and `h` [3, 3]."""
     g[:] = 0.0
@@ -87,7 +87,7 @@ def contact_map_slopes(mount, a, u, w, g, h):
         h[1, 2] = a[1, 1] * w[0] - a[0, 1] * w[1]
 
 
-@kernel
+@inlined
 def evaluate(contacts, c, row, z, v, zdot, w):
     """Bristle rates and wrench per unit load of contact c in shape `row` at the twist `v`."""
     law = law_of(contacts.law[c])
@@ -100,7 +100,7 @@ def evaluate(contacts, c, row, z, v, zdot, w):
         )
 
 
-@kernel
+@inlined
 def linearise(contacts, c, row, z, v, lin):
     """Linearise contact c in shape `row` at the twist `v` into its workspace `lin`."""
     law = law_of(contacts.law[c])
@@ -111,7 +111,7 @@ def linearise(contacts, c, row, z, v, lin):
         reduced.linearise(law, z, v[0], v[1], v[2], contacts.shape[row], contacts.surface[row], contacts.data, lin)
 
 
-@kernel
+@inlined
 def factor(contacts, c, row, z, shift, lin, stiffness):
     """Prepare the elimination of the bristles of contact c and write its `d wrench / d twist` per unit load."""
     law = law_of(contacts.law[c])
@@ -122,7 +122,7 @@ def factor(contacts, c, row, z, shift, lin, stiffness):
         reduced.factor(law, shift, contacts.shape[row], lin, stiffness)
 
 
-@kernel
+@inlined
 def eliminate(contacts, c, row, z, shift, r, lin, w):
     """Wrench per unit load of contact c caused by its bristle residual `r`."""
     law = law_of(contacts.law[c])
@@ -133,7 +133,7 @@ def eliminate(contacts, c, row, z, shift, r, lin, w):
         w[0], w[1], w[2] = reduced.eliminate(law, shift, r, contacts.shape[row], lin)
 
 
-@kernel
+@inlined
 def back_substitute(contacts, c, row, z, r, v, lin, out):
     """Bristle solution of contact c for the residual `r` and the twist change `v`."""
     if contacts.kind[c] == DISTRIBUTED:
@@ -143,7 +143,7 @@ def back_substitute(contacts, c, row, z, r, v, lin, out):
         reduced.back_substitute(r, v[0], v[1], v[2], contacts.shape[row], lin, out)
 
 
-@kernel
+@inlined
 def _cells(contacts, c, row):
     first, last = contacts.cell[c], contacts.cell[c + 1]
     start = contacts.weight_start[row]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -13,6 +13,12 @@ if TYPE_CHECKING:
     import xarray as xr
 
     from planarfriction.scenes import Solution
+
+LEAST_SPAN = 0.02
+"""Least height of a panel, as a share of the largest value of its kind: what is nearly nothing looks like it."""
+
+KICK = 5.0
+"""A first sample this many times larger than all others does not set the height of its panel."""
 
 # Panels of the body and of the contacts: title, kind of unit, and how to get the values from the dataset.
 _BODY = (
@@ -45,16 +51,11 @@ def draw_histories(figure: Any, solutions: Solution | Mapping[str, Solution]) ->
     """Draw the eight panels of `plot_histories` into a figure or subfigure."""
     runs = {label: each.data for label, each in as_runs(solutions).items()}
     panels = figure.subplots(4, 2, sharex=True)
-    for row, (title, kind, get) in enumerate(_BODY):
-        series = [(index, 0, data["time"], get(data)) for index, data in enumerate(runs.values())]
-        _draw_panel(panels[row, 0], title, kind, series)
-    for row, (title, kind, get) in enumerate(_CONTACT):
-        series = [
-            (index, contact, data["time"], get(data).isel(contact=contact))
-            for index, data in enumerate(runs.values())
-            for contact in range(data.sizes["contact"])
-        ]
-        _draw_panel(panels[row, 1], title, kind, series)
+    for column, quantities in enumerate((_BODY, _CONTACT)):
+        lines = [_lines(runs, get) for *_, get in quantities]
+        for row, (title, kind, _) in enumerate(quantities):
+            alike = [line.shown for other, each in enumerate(lines) if quantities[other][1] == kind for line in each]
+            _draw_panel(panels[row, column], title, kind, lines[row], alike)
     for axes in panels[-1]:
         axes.set_xlabel("time [s]")
     panels[0, 0].set_title("body: position, angle, speed", fontsize="medium")
@@ -68,10 +69,41 @@ def as_runs(solutions: Solution | Mapping[str, Solution]) -> dict[str, Solution]
     return dict(solutions) if isinstance(solutions, Mapping) else {str(solutions.scene.name): solutions}
 
 
-def _draw_panel(axes: Any, title: str, kind: str, series: list) -> None:
-    unit = style.unit_for(kind, *(values for *_, values in series))
-    for run, contact, time, values in series:
-        axes.plot(time, unit.factor * np.asarray(values), **_look(run, contact))
+class _Line(NamedTuple):
+    run: int
+    contact: int
+    time: np.ndarray
+    values: np.ndarray
+
+    @property
+    def shown(self) -> np.ndarray:
+        """The values that the axes must hold: all, or all but a first one that dwarfs the others.
+
+        Bristles that start at rest under a moving body kick once (`sigma_1 v f_N`), for microseconds.
+        """
+        rest = self.values[1:]
+        return rest if len(rest) > 1 and abs(self.values[0]) > KICK * np.abs(rest).max() > 0.0 else self.values
+
+
+def _lines(runs: Mapping[str, xr.Dataset], get: Callable) -> list[_Line]:
+    """One line for each run, or for each contact of each run."""
+    lines = []
+    for run, data in enumerate(runs.values()):
+        values = np.asarray(get(data), dtype=float).reshape(data.sizes["time"], -1)
+        lines += [_Line(run, contact, np.asarray(data["time"]), each) for contact, each in enumerate(values.T)]
+    return lines
+
+
+def _draw_panel(axes: Any, title: str, kind: str, lines: list[_Line], alike: list[np.ndarray]) -> None:
+    """Draw one panel; `alike` are the values of all panels of its kind in this column, which share their unit."""
+    unit = style.unit_for(kind, *alike)
+    for line in lines:
+        axes.plot(line.time, unit.factor * line.values, **_look(line.run, line.contact))
+    low = unit.factor * min(line.shown.min() for line in lines)
+    high = unit.factor * max(line.shown.max() for line in lines)
+    least = LEAST_SPAN * unit.factor * max(np.abs(values).max() for values in alike)
+    span = max(1.1 * (high - low), least) or 1.0
+    axes.set_ylim(0.5 * (low + high - span), 0.5 * (low + high + span))
     axes.set_ylabel(f"{title} [{unit.label}]")
     axes.ticklabel_format(axis="y", useOffset=False)
     axes.margins(x=0.01)

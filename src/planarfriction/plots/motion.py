@@ -33,6 +33,9 @@ FRAMES_PER_SECOND = 25
 LARGEST_FRAME_COUNT = 100
 """Longest animation [frames]; longer motions are shown faster than they are."""
 
+PAD_OPACITY = 0.35
+"""Opacity of contact patches, so that those of a strobe show through each other."""
+
 _TIME_COLOURS = ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.92, 256)))  # the last yellow is lost on white
 
 
@@ -40,8 +43,8 @@ def plot_motion(solution: Solution) -> style.PlotFigure:
     """Draw the outline of the body at 12 instants, evenly spaced in time and coloured by it, with the contact patches.
 
     World axes in mm, equal scales. Patches fixed to the world are drawn once, patches on the body with each outline; a
-    body without an outline is drawn as a cross with a longer arm along its x axis. The thin line is the path of the
-    centre of mass.
+    body without an outline is drawn as a line from its centre of mass along its x axis. The thin line is the path of
+    the centre of mass.
     """
     figure = style.new_figure(6.4, 5.2)
     draw_motion(figure, solution)
@@ -129,7 +132,7 @@ def _draw_mount(axes: Any, solution: Solution, mounted_on: str, colour: Any) -> 
     artists: list[Artist] = []
     for shape in shapes:
         if shape.ndim == 3:
-            artists.append(PathPatch(_one_path(shape), facecolor=colour, edgecolor="none", alpha=0.45, zorder=2))
+            artists.append(PathPatch(_one_path(shape), facecolor=colour, edgecolor="none", alpha=PAD_OPACITY, zorder=2))
         else:
             look = {"marker": "o", "markersize": 4.5, "markeredgewidth": 0.0, "linestyle": "none"}
             artists.append(Line2D(*shape.T, **look, color=colour, alpha=0.8, zorder=2))
@@ -148,13 +151,13 @@ def _move(artists: list[Artist], axes: Any, pose: np.ndarray) -> None:
 
 
 def _body_lines(solution: Solution) -> list[np.ndarray]:
-    """What stands for the body, as lines `[M, 2]` [m] in its frame: the closed outline, or a cross."""
+    """What stands for the body, as lines `[M, 2]` [m] in its frame: the closed outline, or its x axis."""
     outline = solution.scene.body.outline
     if outline is not None:
         outline = np.asarray(outline, dtype=float)
         return [np.concatenate([outline, outline[:1]])]
     arm = max(float(np.abs(_pad_shape(contact).reshape(-1, 2)).max()) for contact in solution.scene.contacts)
-    return [np.array([(-0.5 * arm, 0.0), (1.5 * arm, 0.0)]), np.array([(0.0, -0.5 * arm), (0.0, 0.5 * arm)])]
+    return [np.array([(0.0, 0.0), (arm, 0.0)])]
 
 
 def _pad_shape(contact: Contact) -> np.ndarray:

@@ -22,7 +22,7 @@ from planarfriction.scenes.scene import Body, Contact, Scene
 from planarfriction.scenes.signal import read_signal
 from planarfriction.scenes.toml_writer import to_toml
 
-SCENE_KEYS = ("name", "t_end", "save_every", "stop_speed", "body", "force", "velocity", "contact")
+SCENE_KEYS = ("name", "t_end", "save_every", "stop_speed", "rtol", "atol", "body", "force", "velocity", "contact")
 BODY_KEYS = ("mass", "inertia", "position", "angle", "velocity", "gravity", "outline", "size")
 CONTACT_KEYS = ("name", "mounted_on", "position", "angle", "count", "normal_force", "model", "patch", "law")
 
@@ -42,7 +42,7 @@ def rectangle_inertia(mass: float, size) -> float:
 def scene_to_dict(scene: Scene) -> dict[str, Any]:
     """The scene as numbers, texts, lists and tables; parts that it does not have are left out."""
     body = scene.body
-    data: dict[str, Any] = {"name": scene.name, "t_end": scene.t_end, "save_every": scene.save_every}
+    data: dict[str, Any] = {key: getattr(scene, key) for key in ("name", "t_end", "save_every", "rtol", "atol")}
     if scene.stop_speed is not None:
         data["stop_speed"] = scene.stop_speed
     data["body"] = {"mass": body.mass, "inertia": body.inertia, "position": list(body.position), "angle": body.angle}
@@ -73,7 +73,7 @@ def scene_from_dict(data: dict[str, Any], *, folder: str | Path | None = None, s
     table = Section(data, "", source, Path(folder) if folder else None).only(SCENE_KEYS)
     contacts = _contacts(table)
     prescribed = "velocity" in table
-    options = {key: table.get(key) for key in ("save_every", "stop_speed", "name") if key in table}
+    options = {key: table.get(key) for key in ("save_every", "stop_speed", "rtol", "atol", "name") if key in table}
     signals = {key: read_signal(table, key) for key in ("force", "velocity") if key in table}
     # A body that is moved as prescribed needs no mass; whoever leaves it out does not mean to say anything about it.
     moved = {"mass": 1.0, "inertia": 1.0, "gravity": [0.0, 0.0]}

@@ -7,10 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction.kernels import contacts as kernels
+from planarfriction.kernels.body import Motion
 from planarfriction.kernels.contacts import Contacts
 from planarfriction.kernels.law import law_row
-from planarfriction.kernels.body import Motion
-from planarfriction.models import DistributedModel, ReducedModelPublished
+from planarfriction.models import DistributedModel
 
 SHAPE_INTERVAL = 1e-3
 """Longest time [s] that a patch which depends on a continuously changing load keeps its shape; held loads need no limit."""

@@ -28,6 +28,10 @@ IN_HAND_DROPS = {(2, 1): (2.0, 0.84, 33, 50), (2, 2): (4.0, 2.9, 31, 50)}
 """(load, placement) -> force, force while dropped [N], first dropped sample, first sample after."""
 
 
+FINE = {"rtol": 1e-6, "atol": 3e-6}
+"""Tolerances of scenes that look at small things: wrenches to 1e-5 of the load, motions of nanometres."""
+
+
 def in_hand_load(load: Literal[1, 2], *, placement: Literal[1, 2] = 1, t_end: float = 2.0) -> Signal:
     """Normal force of one finger in the published in-hand runs [N], held over every 0.01 s.
 
@@ -101,7 +105,7 @@ def drift(model: Any, *, load: Literal["tangential", "normal"] = "tangential", t
     outline = 0.05 * np.stack([np.cos(around), np.sin(around)], axis=1)
     body = Body(1.0, 1.25e-3, gravity=(0.0, 0.0), outline=outline)  # inertia of a disc, m R^2 / 2
     contact = Contact(model, normal_force, name="table")
-    return Scene(body, [contact], t_end, force=drift_force(load, t_end=t_end), name=f"drift, {load}")
+    return Scene(body, [contact], t_end, force=drift_force(load, t_end=t_end), **FINE, name=f"drift, {load}")
 
 
 def free_slide(
@@ -155,4 +159,4 @@ def driven(
         contact = Contact(model, normal_force, mounted_on="body", position=(-x, -y), name="patch")
     body = Body(1.0, 1.0, gravity=(0.0, 0.0))  # moved as prescribed: mass and inertia play no part
     velocity = published_velocity() if twist is None else twist
-    return Scene(body, [contact], t_end, velocity=velocity, name="driven")
+    return Scene(body, [contact], t_end, velocity=velocity, **FINE, name="driven")

@@ -19,9 +19,6 @@ from planarfriction.solvers import RODAS4, integrate
 if TYPE_CHECKING:
     import xarray as xr
 
-RTOL, ATOL = 1e-5, 3e-4
-"""Default tolerances: on the published in-hand runs, within 1e-6 m and 3e-6 rad of converged solutions."""
-
 BRISTLES = ("none", "all")
 """What `simulate(..., bristles=)` records."""
 
@@ -45,8 +42,8 @@ def simulate(
     scene: Scene,
     *,
     t_end: float | None = None,
-    rtol: float = RTOL,
-    atol: float = ATOL,
+    rtol: float | None = None,
+    atol: float | None = None,
     save_every: float | None = None,
     bristles: str = "none",
     method: Method = RODAS4,
@@ -66,7 +63,7 @@ def simulate(
     t_end
         End [s], at most the scene's own.
     rtol, atol
-        Relative and natural-scale tolerances [-], > 0.
+        Relative and natural-scale tolerances [-], > 0; the scene's own by default.
     save_every
         Recording interval [s]; the scene's own by default. The end is always recorded.
     bristles
@@ -88,7 +85,8 @@ def simulate(
     end = scene.t_end if t_end is None else validation.positive("t_end", t_end)
     if end > scene.t_end:
         raise InvalidValueError("t_end", f"be at most the scene's {scene.t_end:g} s", end)
-    rtol, atol = validation.positive("rtol", rtol), validation.positive("atol", atol)
+    rtol = scene.rtol if rtol is None else validation.positive("rtol", rtol)
+    atol = scene.atol if atol is None else validation.positive("atol", atol)
     every = scene.save_every if save_every is None else validation.positive("save_every", save_every)
     validation.choice("bristles", bristles, BRISTLES)
     packed = pack(scene, end)
