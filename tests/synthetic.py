@@ -51,4 +51,4 @@ def solution(of: pf.Scene | None = None, *, scale: float = 1.0, t_end: float = 2
         },
         coords={"time": ("time", time, {"units": "s"}), "contact": [contact.name for contact in of.contacts]},
     )
-    return pf.Solution(data, Statistics(steps=1234, rejections=56, wall_time=0.25), "done", "reached the end", of)
+    return pf.Solution(data, Statistics(steps=1234, rejections=56, wall_time=0.25), "success", "reached the end", of)

@@ -1,7 +1,8 @@
-"""Command line: what it builds, writes, prints and says when the input is wrong. Simulations are stand-ins here."""
+"""Command line: what it builds, writes, prints and says when the input is wrong."""
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import dataclasses
 import json
@@ -273,6 +274,59 @@ def test_differences_cover_the_time_that_both_runs_have():
     full, short = synthetic.solution(), synthetic.solution(scale=2.0, t_end=1.0)
     for pair in ((full, short), (short, full)):
         assert largest_differences(*pair) == pytest.approx((5e-3, 0.3), rel=1e-12)
+
+
+# ---------------------------------------------------------------------- run, with the real solver
+
+
+def test_a_run_is_what_simulate_gives(capsys, tmp_path):
+    arguments = ["run", "in-hand", "--model", "reduced", "--patch", "Square", "--t-end", "0.5", "--out", str(tmp_path)]
+    assert main(arguments) == 0
+    model = pf.ReducedModelPublished(PUBLISHED_PATCHES["Square"](), pf.LuGre(elasto_plastic=pf.ElastoPlastic(0.9)))
+    expected = pf.simulate(scenes.in_hand(model, t_end=0.5))
+    columns = read_csv(tmp_path / "in-hand-reduced.csv")
+    for name, values in columns.items():
+        assert np.array_equal(values, np.asarray(expected.data[name]).ravel()), name
+    rows = {row[0]: row[1] for row in table_rows(capsys.readouterr().out)}
+    assert rows["final y [mm]"] == f"{1e3 * columns['y'][-1]:.6g}"
+    assert rows["steps"] == str(expected.statistics.steps)
+    assert "ended" not in rows
+
+
+def test_a_slide_ends_when_the_puck_has_stopped(capsys):
+    assert main(["run", "free-slide", "--model", "both"]) == 0
+    rows = {row[0]: row[1:] for row in table_rows(capsys.readouterr().out)}
+    assert rows["ended"] == ["at rest"] * 2
+    # Coulomb friction without spin would stop it after v^2/(2 mu g) = 51 mm; spin lets it go further, Stribeck and
+    # viscous friction hold it back a little
+    assert 48.0 < float(rows["final x [mm]"][0]) < 65.0
+
+
+@pytest.mark.parametrize(
+    "path", sorted((Path(__file__).parents[1] / "examples").glob("*.toml")), ids=lambda path: path.stem
+)
+def test_example_scene_files_run(path, tmp_path):
+    assert main(["run", str(path), "--t-end", "0.02", "--out", str(tmp_path)]) == 0
+    (stored,) = tmp_path.glob("*.nc")
+    assert pf.load(stored).data["time"][-1] == 0.02
+
+
+def test_ctrl_c_in_the_solver_keeps_what_is_done(capsys, tmp_path, monkeypatch):
+    from planarfriction.cli import run as command
+
+    @contextlib.contextmanager
+    def impatient(label, t_end):
+        def report(time):
+            raise KeyboardInterrupt
+
+        yield report
+
+    monkeypatch.setattr(command, "simulation_progress", impatient)
+    assert main(["run", "in-hand", "--out", str(tmp_path)]) == 130
+    assert "stopped at t = " in capsys.readouterr().err
+    part = pf.load(tmp_path / "in-hand-distributed.nc")
+    assert part.status == "interrupted"
+    assert 0.0 < part.data["time"][-1] < 2.0
 
 
 # ---------------------------------------------------------------------- limit-surface

@@ -194,6 +194,35 @@ def test_every_contact_has_its_line_and_its_entry():
     assert entries["b, pad 3"].get_linestyle() == force[5].get_linestyle()
 
 
+def with_values(run: pf.Solution, **values) -> pf.Solution:
+    """The solution with other values of some of its variables."""
+    data = run.data.assign({name: (run.data[name].dims, each) for name, each in values.items()})
+    return pf.Solution(data, run.statistics, run.status, run.message, run.scene)
+
+
+def panels(figure) -> dict:
+    return {axes.get_ylabel().split(" [")[0]: axes for axes in figure.axes}
+
+
+def test_what_is_nearly_nothing_looks_like_it():
+    run = synthetic.solution()
+    noise = 1e-10 * np.sin(50 * run.data["time"].values)
+    shown = panels(plots.plot_histories(with_values(run, fy=noise[:, None])))
+    # 2 % of the largest force of the panels beside it, the normal force of 2 N
+    assert np.ptp(shown["fy"].get_ylim()) == pytest.approx(0.04)
+    assert shown["fy"].get_ylabel() == "fy [N]"
+
+
+def test_the_kick_at_the_start_does_not_hide_the_rest():
+    run = synthetic.solution()
+    force = run.data["fx"].values.copy()
+    force[0] = -800.0
+    shown = panels(plots.plot_histories(with_values(run, fx=force)))["fx"]
+    # sines of amplitude 0.1 N and 5 % of their height above and below
+    assert shown.get_ylim() == pytest.approx((-0.11, 0.11), abs=2e-3)
+    assert shown.get_lines()[0].get_ydata()[0] == pytest.approx(-800.0)
+
+
 # ---------------------------------------------------------------------- motion
 
 
@@ -242,18 +271,18 @@ def test_everything_drawn_is_within_the_view(mounted_on):
         assert low < values.min() and values.max() < high
 
 
-def test_a_body_without_outline_is_a_cross_and_points_are_dots():
+def test_a_body_without_outline_is_its_x_axis_and_points_are_dots():
     legs = pf.ContactPatch.points([(0.0, 0.1), (-0.1, -0.05), (0.1, -0.05)])
     run = synthetic.solution(synthetic.scene(mounted_on="body", patch=legs, outline=None))
     lines = plots.plot_motion(run).axes[0].lines
-    crosses = [line for line in lines if len(line.get_xdata()) == 2]
+    hands = [line for line in lines if len(line.get_xdata()) == 2]
     dots = [line for line in lines if line.get_marker() == "o"]
-    assert (len(crosses), len(dots)) == (2 * motion.INSTANTS, motion.INSTANTS)
+    assert (len(hands), len(dots)) == (motion.INSTANTS, motion.INSTANTS)
 
 
 def test_a_run_of_one_sample_can_be_drawn():
     run = synthetic.solution()
-    short = pf.Solution(run.data.isel(time=slice(1)), run.statistics, "done", "", run.scene)
+    short = pf.Solution(run.data.isel(time=slice(1)), run.statistics, "success", "", run.scene)
     assert len(outlines(plots.plot_motion(short))) == 1
     assert overhang(plots.plot_histories(short)) <= CUT
 
