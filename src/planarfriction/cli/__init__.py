@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import sys
 from collections.abc import Sequence
 
@@ -29,6 +30,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if not hasattr(error, "format_message"):  # what typer raises for wrong usage has it, whatever class it is
             raise
         return _fail(error.format_message())  # pyright: ignore[reportAttributeAccessIssue]
+    finally:
+        gc.enable()
     return code if isinstance(code, int) else 0
 
 
