@@ -17,52 +17,50 @@ import math
 
 def stribeck(xp, speed, mu_c, mu_s, v_s, gamma):
     """Friction coefficient in steady sliding, `g = mu_c + (mu_s - mu_c) exp(-|v/v_s|^gamma)` [-]."""
-    return mu_c + (mu_s - mu_c) * xp.exp(-xp.power(speed / v_s, gamma))
+    return mu_c + (mu_s - mu_c) * xp.exp(-xp.power(speed * (1.0 / v_s), gamma))
 
 
 def stribeck_slope(xp, speed, mu_c, mu_s, v_s, gamma):
     """Derivative `dg/d|v|` [s/m]; at rest the right-hand limit, finite for `gamma >= 1` (zero where it has none)."""
-    ratio = speed / v_s
+    ratio = speed * (1.0 / v_s)
     safe = xp.where(ratio > 0.0, ratio, 1.0)
     at_rest = xp.where(gamma == 1.0, 1.0, 0.0)
     steepness = xp.where(ratio > 0.0, xp.power(safe, gamma) / safe, at_rest)
-    return -(mu_s - mu_c) * gamma / v_s * steepness * xp.exp(-xp.power(ratio, gamma))
+    return -(mu_s - mu_c) * gamma * (1.0 / v_s) * steepness * xp.exp(-xp.power(ratio, gamma))
 
 
 def slip_fraction(xp, deflection, breakaway_ratio):
-    """Elasto-plastic `alpha(|z|)` [-] of the relative deflection `|z|/z_max`: 0 below breakaway, 1 at full deflection."""
-    phase = (deflection - 0.5 * (1.0 + breakaway_ratio)) / (1.0 - breakaway_ratio)
+    """Elasto-plastic `alpha` [-] of the relative deflection `|z|/z_max`: 0 below breakaway, 1 at full deflection."""
+    phase = (deflection - 0.5 * (1.0 + breakaway_ratio)) * (1.0 / (1.0 - breakaway_ratio))
     return 0.5 + 0.5 * xp.sin(math.pi * xp.minimum(xp.maximum(phase, -0.5), 0.5))
 
 
 def slip_fraction_slope(xp, deflection, breakaway_ratio):
     """Derivative of `alpha` with respect to `|z|/z_max` [-]."""
-    phase = (deflection - 0.5 * (1.0 + breakaway_ratio)) / (1.0 - breakaway_ratio)
-    clipped = xp.minimum(xp.maximum(phase, -0.5), 0.5)
-    return 0.5 * math.pi / (1.0 - breakaway_ratio) * xp.cos(math.pi * clipped)
+    per_width = 1.0 / (1.0 - breakaway_ratio)
+    phase = (deflection - 0.5 * (1.0 + breakaway_ratio)) * per_width
+    return 0.5 * math.pi * per_width * xp.cos(math.pi * xp.minimum(xp.maximum(phase, -0.5), 0.5))
 
 
-def bristle_decay(xp, z_norm, along, speed, z_max, strength, elasto_plastic, breakaway_ratio):
-    """Rate `k = beta sigma_0 |v| / g` [1/s] of `zdot = u - k z`.
+def bristle_decay(xp, deflection, along, speed, grip, elasto_plastic, breakaway_ratio):
+    """Rate `k = beta |v| sigma_0 / g` [1/s] of `zdot = u - k z`.
 
     `beta |v| = alpha (|v| + z.v/|z|) / 2` for elasto-plastic bristles, `|v|` for plain LuGre (`elasto_plastic` is 1.0 or
-    0.0); `z_max` is the largest deflection, `strength` is `g / sigma_0`.
+    0.0); `deflection = |z|/z_max`, `grip = sigma_0 / g` [1/m].
     """
-    alpha = slip_fraction(xp, z_norm / z_max, breakaway_ratio)
-    return xp.where(elasto_plastic > 0.0, 0.5 * alpha * (speed + along), speed) / strength
+    alpha = slip_fraction(xp, deflection, breakaway_ratio)
+    return xp.where(elasto_plastic > 0.0, 0.5 * alpha * (speed + along), speed) * grip
 
 
-def bristle_decay_partials(xp, z_norm, along, speed, z_max, strength, elasto_plastic, breakaway_ratio):
-    """`k` and its partial derivatives with respect to `|z|`, `along`, `speed`, `z_max` and `strength`."""
-    deflection = z_norm / z_max
+def bristle_decay_partials(xp, deflection, along, speed, grip, elasto_plastic, breakaway_ratio):
+    """`k` and its partial derivatives with respect to `deflection`, `along` and `speed` (with respect to `grip`: k/grip)."""
     alpha = slip_fraction(xp, deflection, breakaway_ratio)
     slope = slip_fraction_slope(xp, deflection, breakaway_ratio)
-    stretch = 0.5 * (speed + along) / strength
-    k = xp.where(elasto_plastic > 0.0, alpha * stretch, speed / strength)
-    k_z_norm = xp.where(elasto_plastic > 0.0, slope * stretch / z_max, 0.0)
-    k_along = xp.where(elasto_plastic > 0.0, 0.5 * alpha / strength, 0.0)
-    k_speed = xp.where(elasto_plastic > 0.0, 0.5 * alpha / strength, 1.0 / strength)
-    return k, k_z_norm, k_along, k_speed, -k_z_norm * deflection, -k / strength
+    stretch = 0.5 * (speed + along) * grip
+    half = 0.5 * alpha * grip
+    elastic = elasto_plastic > 0.0
+    k = xp.where(elastic, alpha * stretch, speed * grip)
+    return k, xp.where(elastic, slope * stretch, 0.0), xp.where(elastic, half, 0.0), xp.where(elastic, half, grip)
 
 
 def traction(z, zdot, velocity, sigma_0, sigma_1, sigma_2):
@@ -73,24 +71,26 @@ def traction(z, zdot, velocity, sigma_0, sigma_1, sigma_2):
 def relaxation(xp, decay_dt):
     """`exp(-x)` and `(1 - exp(-x))/x` of `x = k dt >= 0`: the exact step of `zdot = u - k z` for a held `k` and `u`.
 
+    `z(dt) = exp(-x) z + (1 - exp(-x))/x u dt`. Plain LuGre has a constant k and this is its step. Elasto-plastic bristles
+    take the mean of k at the start and at a predicted end, `z_p = (z + u dt)/(1 + k dt)`: second order, stable at any dt.
     Below `x = 1e-3` the quotient is its series, exact to 1e-16 there, where the difference would cancel.
     """
     remaining = xp.exp(-decay_dt)
     safe = xp.where(decay_dt > 1e-3, decay_dt, 1.0)
-    series = 1.0 - decay_dt * (0.5 - decay_dt * (1.0 / 6.0 - decay_dt * (1.0 / 24.0 - decay_dt / 120.0)))
+    series = 1.0 - decay_dt * (0.5 - decay_dt * (1.0 / 6.0 - decay_dt * (1.0 / 24.0 - decay_dt * (1.0 / 120.0))))
     return remaining, xp.where(decay_dt > 1e-3, (1.0 - remaining) / safe, series)
 
 
-def reachable_deflection(xp, z_norm, z_max, elasto_plastic):
-    """Largest deflection that a step may end with: an elasto-plastic bristle never grows past `max(|z|, z_max)`.
+def reachable_deflection(xp, deflection, elasto_plastic):
+    """Largest `|z|/z_max` that a step may end with: an elasto-plastic bristle never grows past `max(|z|, z_max)`.
 
     The exact solution stays in that ball, so bringing a step back onto it cannot enlarge the error. Plain LuGre needs
     no bound: its step is exact.
     """
-    return xp.where(elasto_plastic > 0.0, xp.maximum(z_norm, z_max), math.inf)
+    return xp.where(elasto_plastic > 0.0, xp.maximum(deflection, 1.0), math.inf)
 
 
-def cap(xp, z_norm, largest):
-    """Factor `min(1, largest/|z|)` that brings a bristle back onto the ball of radius `largest`, direction kept."""
-    over = z_norm > largest
-    return xp.where(over, largest / xp.where(over, z_norm, 1.0), 1.0)
+def cap(xp, deflection, largest):
+    """Factor `min(1, largest/deflection)` that brings a bristle back onto the ball of that radius, direction kept."""
+    over = deflection > largest
+    return xp.where(over, largest / xp.where(over, deflection, 1.0), 1.0)

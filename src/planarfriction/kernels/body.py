@@ -245,3 +245,11 @@ def solve(contacts, motion, piece, since, y, shift, r, out, work):
             lin[contacts.linear[c] : contacts.linear[c + 1]],
             out[first:last],
         )
+
+
+@jit
+def right_hand_side(contacts, motion, piece, since, y, work):
+    """`rates` for callers in Python, as an explicit or a general implicit solver needs it."""
+    dy = np.empty(y.shape[0])
+    rates(contacts, motion, piece, since, y, dy, work)
+    return dy

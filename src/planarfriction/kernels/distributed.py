@@ -17,7 +17,7 @@ import math
 from planarfriction import formulas
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import inlined, jit, kernel
-from planarfriction.kernels.law import strength, strength_slope
+from planarfriction.kernels.law import grip, grip_slope
 
 
 @inlined
@@ -30,8 +30,8 @@ def _evaluate(gamma, law, z, vx, vy, omega, x, y, w, zdot):
         speed = math.sqrt(ux * ux + uy * uy)
         z_norm = math.sqrt(zx[i] * zx[i] + zy[i] * zy[i])
         along = (zx[i] * ux + zy[i] * uy) / xp.where(z_norm > 0.0, z_norm, 1.0)
-        z_max = strength(law, gamma, speed)
-        k = formulas.bristle_decay(xp, z_norm, along, speed, z_max, z_max, law.elasto_plastic, law.breakaway_ratio)
+        q = grip(law, gamma, speed)
+        k = formulas.bristle_decay(xp, z_norm * q, along, speed, q, law.elasto_plastic, law.breakaway_ratio)
         dx[i] = ux - k * zx[i]
         dy[i] = uy - k * zy[i]
         tx = w[i] * formulas.traction(zx[i], dx[i], ux, law.sigma_0, law.sigma_1, law.sigma_2)
@@ -62,11 +62,13 @@ def _linearise(gamma, law, z, vx, vy, omega, x, y, k, kzx, kzy, kvx, kvy):
         per_speed = 1.0 / xp.where(speed > 0.0, speed, 1.0)
         ex, ey = zx[i] * per_z, zy[i] * per_z
         along = ex * ux + ey * uy
-        z_max = strength(law, gamma, speed)
-        decay, k_z_norm, k_along, k_speed, k_z_max, k_strength = formulas.bristle_decay_partials(
-            xp, z_norm, along, speed, z_max, z_max, law.elasto_plastic, law.breakaway_ratio
+        q = grip(law, gamma, speed)
+        decay, k_deflection, k_along, k_speed = formulas.bristle_decay_partials(
+            xp, z_norm * q, along, speed, q, law.elasto_plastic, law.breakaway_ratio
         )
-        k_speed_total = (k_speed + (k_z_max + k_strength) * strength_slope(law, gamma, speed)) * per_speed
+        k_grip = k_deflection * z_norm + decay / q
+        k_z_norm = k_deflection * q
+        k_speed_total = (k_speed + k_grip * grip_slope(law, gamma, speed, q)) * per_speed
         k[i] = decay
         kzx[i] = k_z_norm * ex + k_along * per_z * (ux - along * ex)
         kzy[i] = k_z_norm * ey + k_along * per_z * (uy - along * ey)
@@ -158,31 +160,34 @@ def _step(gamma, law, z, vx, vy, omega, x, y, w, dt, out):
     n = x.shape[0]
     zx, zy, ox, oy = z[:n], z[n:], out[:n], out[n:]
     fx, fy, tau = 0.0, 0.0, 0.0
+    for i in range(n):  # predicted end, and the mean decay into ox
+        ux, uy = vx - omega * y[i], vy + omega * x[i]
+        speed = math.sqrt(ux * ux + uy * uy)
+        q = grip(law, gamma, speed)
+        z_norm = math.sqrt(zx[i] * zx[i] + zy[i] * zy[i])
+        along = (zx[i] * ux + zy[i] * uy) / xp.where(z_norm > 0.0, z_norm, 1.0)
+        start = formulas.bristle_decay(xp, z_norm * q, along, speed, q, law.elasto_plastic, law.breakaway_ratio)
+        px, py = zx[i] + ux * dt, zy[i] + uy * dt  # times 1/(1 + k dt), which leaves the direction
+        p_norm = math.sqrt(px * px + py * py)
+        along = (px * ux + py * uy) / xp.where(p_norm > 0.0, p_norm, 1.0)
+        deflection = xp.minimum(p_norm * q / (1.0 + start * dt), xp.maximum(z_norm * q, 1.0))
+        end = formulas.bristle_decay(xp, deflection, along, speed, q, law.elasto_plastic, law.breakaway_ratio)
+        ox[i] = 0.5 * (start + end)
+    for i in range(n):
+        ux, uy = vx - omega * y[i], vy + omega * x[i]
+        left, mean = formulas.relaxation(xp, ox[i] * dt)
+        ox[i] = zx[i] * left + ux * dt * mean
+        oy[i] = zy[i] * left + uy * dt * mean
     for i in range(n):
         ux, uy = vx - omega * y[i], vy + omega * x[i]
         speed = math.sqrt(ux * ux + uy * uy)
-        z_max = strength(law, gamma, speed)
-        z_norm = math.sqrt(zx[i] * zx[i] + zy[i] * zy[i])
-        along = (zx[i] * ux + zy[i] * uy) / xp.where(z_norm > 0.0, z_norm, 1.0)
-        k0 = formulas.bristle_decay(xp, z_norm, along, speed, z_max, z_max, law.elasto_plastic, law.breakaway_ratio)
-        largest = formulas.reachable_deflection(xp, z_norm, z_max, law.elasto_plastic)
-        left, mean = formulas.relaxation(xp, k0 * dt)
-        px, py = zx[i] * left + ux * dt * mean, zy[i] * left + uy * dt * mean
-        p_norm = math.sqrt(px * px + py * py)
-        back = formulas.cap(xp, p_norm, largest)
-        p_along = (px * ux + py * uy) / xp.where(p_norm > 0.0, p_norm, 1.0)
-        k1 = formulas.bristle_decay(
-            xp, p_norm * back, p_along, speed, z_max, z_max, law.elasto_plastic, law.breakaway_ratio
-        )
-        left, mean = formulas.relaxation(xp, 0.5 * (k0 + k1) * dt)
-        nx, ny = zx[i] * left + ux * dt * mean, zy[i] * left + uy * dt * mean
-        n_norm = math.sqrt(nx * nx + ny * ny)
-        back = formulas.cap(xp, n_norm, largest)
-        n_along = (nx * ux + ny * uy) / xp.where(n_norm > 0.0, n_norm, 1.0)
-        nx, ny = nx * back, ny * back
-        k = formulas.bristle_decay(
-            xp, n_norm * back, n_along, speed, z_max, z_max, law.elasto_plastic, law.breakaway_ratio
-        )
+        q = grip(law, gamma, speed)
+        largest = formulas.reachable_deflection(xp, math.sqrt(zx[i] * zx[i] + zy[i] * zy[i]) * q, law.elasto_plastic)
+        norm = math.sqrt(ox[i] * ox[i] + oy[i] * oy[i])
+        along = (ox[i] * ux + oy[i] * uy) / xp.where(norm > 0.0, norm, 1.0)
+        back = formulas.cap(xp, norm * q, largest)
+        nx, ny = ox[i] * back, oy[i] * back
+        k = formulas.bristle_decay(xp, norm * q * back, along, speed, q, law.elasto_plastic, law.breakaway_ratio)
         ox[i], oy[i] = nx, ny
         tx = w[i] * formulas.traction(nx, ux - k * nx, ux, law.sigma_0, law.sigma_1, law.sigma_2)
         ty = w[i] * formulas.traction(ny, uy - k * ny, uy, law.sigma_0, law.sigma_1, law.sigma_2)
@@ -213,3 +218,14 @@ def step_batch(law, z, twist, x, y, w, load, dt, out, wrench):
         wrench[b, 0], wrench[b, 1], wrench[b, 2] = load[b] * fx, load[b] * fy, load[b] * tau
         if load[b] == 0.0:
             out[b] = 0.0
+
+
+@jit
+def step_sequence(law, z, twist, x, y, w, load, dt, out, wrench):
+    """`step` through the twists [T, 3] of one contact, `z` in place (`out` is scratch), wrenches into `wrench` [T, 3]."""
+    n = z.shape[0]
+    for t in range(twist.shape[0]):
+        fx, fy, tau = step(law, z, twist[t, 0], twist[t, 1], twist[t, 2], x, y, w, dt, out)
+        wrench[t, 0], wrench[t, 1], wrench[t, 2] = load * fx, load * fy, load * tau
+        for i in range(n):
+            z[i] = out[i]

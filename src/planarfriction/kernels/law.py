@@ -8,7 +8,7 @@ import numpy as np
 
 from planarfriction import formulas
 from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import kernel
+from planarfriction.kernels import inlined, kernel
 
 
 class LawNumbers(NamedTuple):
@@ -52,13 +52,14 @@ def law_of(row):
     return LawNumbers(row[0], row[1], row[2], row[3], row[4], row[5], row[6], row[7], row[8])
 
 
-@kernel
-def strength(law, gamma, speed):
-    """`g(v)/sigma_0` [m]: the steady deflection of a bristle."""
-    return formulas.stribeck(xp, speed, law.mu_c, law.mu_s, law.v_s, gamma) / law.sigma_0
+@inlined
+def grip(law, gamma, speed):
+    """`sigma_0/g(v)` [1/m]: one over the steady deflection of a bristle."""
+    return law.sigma_0 / formulas.stribeck(xp, speed, law.mu_c, law.mu_s, law.v_s, gamma)
 
 
-@kernel
-def strength_slope(law, gamma, speed):
-    """Derivative of `g(v)/sigma_0` with respect to the speed [s]."""
-    return formulas.stribeck_slope(xp, speed, law.mu_c, law.mu_s, law.v_s, gamma) / law.sigma_0
+@inlined
+def grip_slope(law, gamma, speed, grip):
+    """Derivative of `sigma_0/g(v)` with respect to the speed [s/m^2]."""
+    slope = formulas.stribeck_slope(xp, speed, law.mu_c, law.mu_s, law.v_s, gamma)
+    return -grip * grip * (1.0 / law.sigma_0) * slope

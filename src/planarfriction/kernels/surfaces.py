@@ -15,7 +15,8 @@ from __future__ import annotations
 
 import math
 
-from planarfriction.kernels import jit, kernel
+from planarfriction.kernels import compiled_math as xp
+from planarfriction.kernels import inlined, jit, kernel
 
 BILINEAR, POTENTIAL, ELLIPSOID, CELLS = 0, 1, 2, 3
 
@@ -25,12 +26,12 @@ _AXIS = 1e-8
 _IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
-@kernel
+@inlined
 def _place(size, x, y, s):
     """Table coordinates of a direction with `s >= 0`: polar and azimuth cell, position within it, and the angles."""
     per_segment = size / (0.5 * math.pi)
-    polar = math.atan2(math.sqrt(x * x + y * y), s)
-    azimuth = math.atan2(y, x)
+    polar = xp.atan2(math.sqrt(x * x + y * y), s)
+    azimuth = xp.atan2(y, x)
     if azimuth < 0.0:
         azimuth += 2.0 * math.pi
     a, b = polar * per_segment, azimuth * per_segment
@@ -38,7 +39,7 @@ def _place(size, x, y, s):
     return i, j, a - i, b - j, polar, azimuth
 
 
-@kernel
+@inlined
 def _corners(data, p, row, a, b):
     """Bilinear value of one component and its differences along the polar angle and the azimuth."""
     low = data[p] + b * (data[p + 4] - data[p])
@@ -48,7 +49,7 @@ def _corners(data, p, row, a, b):
     return low + a * (high - low), high - low, right - left
 
 
-@kernel
+@inlined
 def _bilinear(data, start, size, x, y, s, speed):
     i, j, a, b, _, _ = _place(size, x, y, s)
     row = 4 * (4 * size + 1)
@@ -227,7 +228,7 @@ def _cells_jacobian(data, start, size, x, y, s, speed):
     )
 
 
-@kernel
+@inlined
 def sliding(kind, data, start, size, x, y, s, speed):
     """`u = h(V) |V_S|` of the scaled twist `(x, y, s)` of norm `speed`; the lower half of the sphere mirrors the upper."""
     if kind == ELLIPSOID:

@@ -119,32 +119,33 @@ class DistributedModel(FrictionModel):
     def _cell_velocity(self, twist: np.ndarray) -> np.ndarray:
         return np.einsum("...d,dcn->...cn", twist, self._lever)
 
-    def _norms(self, state: np.ndarray, velocity: np.ndarray):
-        """`z/|z|`, `|z|`, its projection of the velocity, the speed and `g/sigma_0`, per cell."""
+    def _arguments(self, state: np.ndarray, velocity: np.ndarray):
+        """`z/|z|`, `|z|`, and the arguments of the bristle formulas, per cell."""
         law = self.law
         z_norm, speed = np.hypot(state[..., 0, :], state[..., 1, :]), np.hypot(velocity[..., 0, :], velocity[..., 1, :])
         unit = state / np.where(z_norm > 0.0, z_norm, 1.0)[..., None, :]
-        strength = formulas.stribeck(np, speed, law.mu_c, law.mu_s, law.v_s, law.gamma) / law.sigma_0
-        return unit, z_norm, (unit * velocity).sum(axis=-2), speed, strength
+        grip = law.sigma_0 / formulas.stribeck(np, speed, law.mu_c, law.mu_s, law.v_s, law.gamma)
+        return unit, z_norm, (z_norm * grip, (unit * velocity).sum(axis=-2), speed, grip)
 
     def _rate(self, state: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         numbers = law_numbers(self.law)
-        _, z_norm, along, speed, strength = self._norms(state, velocity)
-        k = formulas.bristle_decay(
-            np, z_norm, along, speed, strength, strength, numbers.elasto_plastic, numbers.breakaway_ratio
-        )
+        _, _, arguments = self._arguments(state, velocity)
+        k = formulas.bristle_decay(np, *arguments, numbers.elasto_plastic, numbers.breakaway_ratio)
         return velocity - k[..., None, :] * state
 
     def _decay_slopes(self, state: np.ndarray, velocity: np.ndarray):
         """`k` `[..., N]` and its gradients with respect to the cell's bristle and velocity `[..., 2, N]`."""
         law, numbers = self.law, law_numbers(self.law)
-        unit, z_norm, along, speed, strength = self._norms(state, velocity)
-        k, k_z_norm, k_along, k_speed, k_z_max, k_strength = formulas.bristle_decay_partials(
-            np, z_norm, along, speed, strength, strength, numbers.elasto_plastic, numbers.breakaway_ratio
+        unit, z_norm, arguments = self._arguments(state, velocity)
+        _, along, speed, grip = arguments
+        k, k_deflection, k_along, k_speed = formulas.bristle_decay_partials(
+            np, *arguments, numbers.elasto_plastic, numbers.breakaway_ratio
         )
-        slope = formulas.stribeck_slope(np, speed, law.mu_c, law.mu_s, law.v_s, law.gamma) / law.sigma_0
+        stribeck_slope = formulas.stribeck_slope(np, speed, law.mu_c, law.mu_s, law.v_s, law.gamma)
+        k_grip = k_deflection * z_norm + k / grip
+        k_speed = k_speed - k_grip * grip**2 * stribeck_slope / law.sigma_0
         heading = velocity / np.where(speed > 0.0, speed, 1.0)[..., None, :]
         turn = (velocity - along[..., None, :] * unit) / np.where(z_norm > 0.0, z_norm, 1.0)[..., None, :]
-        k_z = k_z_norm[..., None, :] * unit + k_along[..., None, :] * turn
-        k_v = k_along[..., None, :] * unit + (k_speed + (k_z_max + k_strength) * slope)[..., None, :] * heading
+        k_z = (k_deflection * grip)[..., None, :] * unit + k_along[..., None, :] * turn
+        k_v = k_along[..., None, :] * unit + k_speed[..., None, :] * heading
         return k, k_z, k_v

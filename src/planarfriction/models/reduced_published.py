@@ -100,11 +100,16 @@ class ReducedModelPublished(FrictionModel):
         Plain LuGre is linear in z and its step exact. Elasto-plastic: the exponential step with the mean decay of start
         and predicted end, second order, kept within the largest deflection so that nothing overshoots.
         """
-        if type(state) is np.ndarray and state.shape == (3,) and self._fixed is not None and len(twist) == 3:
-            law, shape, surface, data = self._fixed
-            valid, out, wrench = kernels.step_one(law, shape, surface, data, state, *twist, normal_force, dt)
-            if valid:
-                return out, wrench
+        if type(state) is np.ndarray and state.shape == (3,) and len(twist) == 3 and self._fixed is not None:
+            vx, vy, omega = twist
+            try:
+                result = kernels.step_one(
+                    *self._fixed, state, float(vx), float(vy), float(omega), float(normal_force), float(dt)
+                )
+            except TypeError:  # not numbers, or a batch: the checks below decide
+                result = ()
+            if len(result):
+                return result[:3], result[3:]
         state, twist, load, dt = self._inputs(state, twist, normal_force, dt=dt)
         packed = self._by_load(self._step, (6,), state, twist, load, dt)
         return packed[..., :3], packed[..., 3:]
@@ -133,13 +138,13 @@ class ReducedModelPublished(FrictionModel):
         )
 
     @functools.cached_property
-    def _fixed(self) -> tuple | None:
-        """Arrays of the compiled step of a patch that does not depend on the load."""
+    def _fixed(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Numbers of law, shape and surface for `step_one`, where the patch does not depend on the load."""
         if self.patch.depends_on_load:
             return None
         shape = self._reference
         numbers = shape.surface.numbers
-        return law_row(self.law), shape.numbers, np.array([numbers.kind, 0, numbers.size]), numbers.data
+        return np.array([*law_numbers(self.law), *shape.numbers, numbers.kind, 0, numbers.size]), numbers.data
 
     def _by_load(self, function, inner: tuple[int, ...], state, twist, load, *more) -> np.ndarray:
         """Apply `function(shape, state, twist, load, ...)` to flat batches, one for each shape that the loads take."""
@@ -165,12 +170,12 @@ class ReducedModelPublished(FrictionModel):
         z_norm = np.linalg.norm(z, axis=-1)
         unit = z / np.where(z_norm > 0.0, z_norm, 1.0)[:, None]
         along = (unit * h).sum(axis=-1) * v_n / h_norm
-        strength = formulas.stribeck(np, v_n, law.mu_c, law.mu_s, law.v_s, law.gamma) / law.sigma_0
-        return z, v_s, h, v_n, h_norm, unit, (z_norm, along, v_n, h_norm * strength, strength)
+        grip = law.sigma_0 / formulas.stribeck(np, v_n, law.mu_c, law.mu_s, law.v_s, law.gamma)
+        return z, v_s, h, v_n, h_norm, unit, z_norm, (z_norm * grip / h_norm, along, v_n, grip)
 
     def _rate(self, shape: ReducedShape, state, twist, load) -> np.ndarray:
         numbers = law_numbers(self.law)
-        z, _, h, v_n, _, _, arguments = self._scaled(shape, state, twist)
+        z, _, h, v_n, _, _, _, arguments = self._scaled(shape, state, twist)
         k = formulas.bristle_decay(np, *arguments, numbers.elasto_plastic, numbers.breakaway_ratio)
         return (h * v_n[:, None] - k[:, None] * z) * np.array([1.0, 1.0, shape.contact_radius])
 
@@ -191,9 +196,9 @@ class ReducedModelPublished(FrictionModel):
     def _jacobians(self, shape: ReducedShape, state, twist, load) -> np.ndarray:
         law, numbers = self.law, law_numbers(self.law)
         scale = np.array([1.0, 1.0, shape.contact_radius])
-        z, v_s, h, v_n, h_norm, unit, arguments = self._scaled(shape, state, twist)
-        z_norm, along = arguments[0], arguments[1]
-        k, k_z_norm, k_along, k_speed, k_z_max, k_strength = (
+        z, v_s, h, v_n, h_norm, unit, z_norm, arguments = self._scaled(shape, state, twist)
+        along, grip = arguments[1], arguments[3][:, None]
+        k, k_deflection, k_along, k_speed = (
             value[:, None]
             for value in formulas.bristle_decay_partials(
                 np, *arguments, numbers.elasto_plastic, numbers.breakaway_ratio
@@ -206,11 +211,12 @@ class ReducedModelPublished(FrictionModel):
         h_norm_slope /= np.where(v_n > 0.0, v_n, 1.0)[:, None]
         along_slope = (np.einsum("bi,bij->bj", unit, u_slope) - along[:, None] * h_norm_slope) / h_norm[:, None]
         turn = (h_unit * v_n[:, None] - along[:, None] * unit) / np.where(z_norm > 0.0, z_norm, 1.0)[:, None]
-        k_z = k_z_norm * unit + k_along * turn
-        slope = formulas.stribeck_slope(np, v_n, law.mu_c, law.mu_s, law.v_s, law.gamma)[:, None] / law.sigma_0
-        strength = arguments[4][:, None]
-        k_v = (k_speed + (k_strength + k_z_max * h_norm[:, None]) * slope) * heading
-        k_v += k_z_max * strength * h_norm_slope + k_along * along_slope
+        per_h = 1.0 / h_norm[:, None]
+        k_z = k_deflection * grip * per_h * unit + k_along * turn
+        stribeck_slope = formulas.stribeck_slope(np, v_n, law.mu_c, law.mu_s, law.v_s, law.gamma)[:, None]
+        k_grip = k_deflection * z_norm[:, None] * per_h + k / grip
+        k_v = (k_speed - k_grip * grip**2 * stribeck_slope / law.sigma_0) * heading
+        k_v += k_along * along_slope - k_deflection * arguments[0][:, None] * per_h * h_norm_slope
         rate_state = -k[:, :, None] * np.eye(3) - z[:, :, None] * k_z[:, None, :]
         rate_state = scale[:, None] * rate_state / scale
         to_centre, viscous = self._to_centre(shape)

@@ -1,0 +1,252 @@
+"""`planarfriction bench`: what things cost, each beside a baseline measured in the same run, without compile time.
+
+Machines are shared and noisy: every value is a median, and `ratio` (baseline over value) says more than either.
+"""
+
+from __future__ import annotations
+
+import statistics
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.laws import ElastoPlastic, LuGre
+from planarfriction.limit_surface import LimitSurfaceTablePublished
+from planarfriction.models import DistributedModel, ReducedModelPublished
+from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch, SoftFinger
+from planarfriction.scenes import Scene, Solution, in_hand, in_hand_load, simulate
+
+WINDOW = 0.1
+"""Part of the in-hand run [s] that the general solver is given where the whole run would take it minutes."""
+
+LSODA = {"method": "LSODA", "rtol": 1e-6, "atol": 1e-8, "max_step": 1e-3}
+"""Settings of the general solver, as published; restarted at every jump of the load."""
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """One line of the benchmark."""
+
+    name: str
+    value: float
+    """Median."""
+    unit: str
+    baseline: str
+    """What it is compared with, in words."""
+    baseline_value: float
+    """Median of the baseline, same unit."""
+    ratio: float
+    """How many times cheaper than the baseline for the same work: baseline over value, unless `baseline` says otherwise."""
+
+
+def run(
+    names: Sequence[str] | None = None, *, full: bool = False, progress: Callable[[str], None] | None = None
+) -> list[Measurement]:
+    """Measure the benchmarks `names` (all by default); `full` also runs the baselines that take minutes.
+
+    Raises `InvalidValueError` for an unknown name.
+    """
+    chosen = list(BENCHMARKS) if names is None else [validation.choice("name", name, BENCHMARKS) for name in names]
+    results = []
+    for name in chosen:
+        if progress is not None:
+            progress(name)
+        results.append(BENCHMARKS[name](name, full))
+    return results
+
+
+def _line(name: str, value: float, unit: str, baseline: str, baseline_value: float) -> Measurement:
+    return Measurement(name, value, unit, baseline, baseline_value, baseline_value / value)
+
+
+def _median(action: Callable[[], Any], repeats: int, inner: int = 1) -> float:
+    """Median time of `action` [s] over `repeats` rounds of `inner` calls, after one call that does not count."""
+    action()
+    times = []
+    for _ in range(repeats):
+        begin = time.perf_counter()
+        for _ in range(inner):
+            action()
+        times.append((time.perf_counter() - begin) / inner)
+    return statistics.median(times)
+
+
+def _solver_time(scene: Scene, repeats: int, **options: Any) -> tuple[float, Solution]:
+    """Median time in the solver [s], and the last solution."""
+    simulate(scene, **{**options, "t_end": 0.02})
+    solutions = [simulate(scene, **options) for _ in range(repeats)]
+    return statistics.median(s.statistics.wall_time for s in solutions), solutions[-1]
+
+
+# ---------------------------------------------------------------------- workloads
+
+
+def _law() -> LuGre:
+    return LuGre(elasto_plastic=ElastoPlastic(0.9))
+
+
+def _disc(cells: int = 21) -> ContactPatch:
+    return PUBLISHED_PATCHES["Circle"](cells=cells)
+
+
+def _mixed_twists(count: int) -> np.ndarray:
+    """Twists that slide and spin at all speeds around the Stribeck speed, in random directions."""
+    generator = np.random.default_rng(7)
+    directions = generator.normal(size=(count, 3)) * [1.0, 1.0, 150.0]
+    return directions * 10.0 ** generator.uniform(-4.0, -1.5, size=(count, 1))
+
+
+def _lsoda_time(scene: Scene, t_end: float) -> float:
+    """Time of SciPy's LSODA over the scene from 0 to `t_end` on the compiled right-hand side [s]."""
+    from scipy.integrate import solve_ivp
+
+    from planarfriction.kernels.body import right_hand_side, workspace
+    from planarfriction.scenes.packing import pack
+
+    packed = pack(scene, t_end)
+    work, y = workspace(packed.contacts), packed.state.copy()
+    right_hand_side(packed.contacts, packed.motion, 0, 0.0, y, work)
+    begin = time.perf_counter()
+    for piece, length in enumerate(np.diff(packed.motion.breaks)):
+        solution = solve_ivp(
+            lambda t, y, piece=piece: right_hand_side(packed.contacts, packed.motion, piece, t, y, work),
+            (0.0, length),
+            y,
+            t_eval=[length],
+            **LSODA,
+        )
+        y = solution.y[:, -1]
+    return time.perf_counter() - begin
+
+
+def _in_hand_distributed(name: str, full: bool) -> Measurement:
+    scene = in_hand(DistributedModel(_disc(), _law()))
+    value, _ = _solver_time(scene, 5)
+    if full:
+        return _line(name, value, "s", "SciPy LSODA over the whole run", _lsoda_time(scene, scene.t_end))
+    ours, _ = _solver_time(scene, 5, t_end=WINDOW)
+    theirs = _lsoda_time(scene, WINDOW)
+    words = f"SciPy LSODA over the first {WINDOW} s; the ratio is to the {ours * 1e3:.2g} ms needed here for the same window"
+    return Measurement(name, value, "s", words, theirs, theirs / ours)
+
+
+def _in_hand_distributed_101(name: str, full: bool) -> Measurement:
+    costs = {}
+    for cells in (101, 21):
+        patch = _disc(cells)
+        value, solution = _solver_time(in_hand(DistributedModel(patch, _law())), 3, t_end=WINDOW)
+        trials = solution.statistics.steps + solution.statistics.rejections
+        costs[cells] = value / trials / patch.cells * 1e9
+    return _line(name, costs[101], "ns per loaded cell and step", "the same on 21 x 21 cells", costs[21])
+
+
+def _in_hand_reduced(name: str, full: bool, load: int = 1) -> Measurement:
+    scene = in_hand(ReducedModelPublished(_disc(), _law()), normal_force=in_hand_load(load))
+    value, _ = _solver_time(scene, 9)
+    return _line(name, value, "s", "SciPy LSODA over the whole run", _lsoda_time(scene, scene.t_end))
+
+
+def _in_hand_load_dependent(name: str, full: bool) -> Measurement:
+    width = 0.02
+    finger = SoftFinger(c=6.0 * width / 21, n=1.0 / 3.0, k_per_newton=2.0, radius_max=0.5 * width)
+    soft = ContactPatch.rectangle(width, cells=21, pressure=finger)
+    rebuilt = _median(lambda: simulate(in_hand(ReducedModelPublished(soft, _law()))), 3)
+    fixed = _median(lambda: simulate(in_hand(ReducedModelPublished(_disc(), _law()))), 3)
+    return _line(name, rebuilt, "s", "the same with a fixed shape (both: all of simulate)", fixed)
+
+
+def _table_build(name: str, full: bool) -> Measurement:
+    patch = _disc()
+    value = _median(lambda: LimitSurfaceTablePublished(patch).numbers, 31)
+    return _line(name, value, "s", "the same nodes by NumPy, node by node", _median(lambda: _numpy_table(patch), 3))
+
+
+def _numpy_table(patch: ContactPatch, segments: int = 20) -> np.ndarray:
+    """Smoothed nodes as one would write them: four sums over the cells at every node."""
+    grid, radius, weights = patch.grid, patch.contact_radius(), patch.weights()
+    x, y = (patch.positions - patch.centre_of_pressure()).T
+    nodes = np.zeros((segments + 1, 4 * segments, 3))
+    for i in range(segments):
+        for j in range(4 * segments):
+            azimuth, distance = 0.5 * np.pi * j / segments, radius * np.tan(0.5 * np.pi * i / segments)
+            centre = np.array([-distance * np.sin(azimuth), distance * np.cos(azimuth)])
+            a, b = (centre - (grid.x_min, grid.y_min)) / (grid.cell_width, grid.cell_height)
+            for corner in range(4):
+                p, q = int(a) + corner % 2, int(b) + corner // 2
+                share = (1.0 - abs(a - p)) * (1.0 - abs(b - q))
+                dx = x - (grid.x_min + p * grid.cell_width)
+                dy = y - (grid.y_min + q * grid.cell_height)
+                scale = share * weights / np.hypot(dx, dy)
+                nodes[i, j] += -(scale @ dy), scale @ dx, scale @ (x * dx + y * dy) / radius
+    return nodes
+
+
+def _step_reduced_loop(name: str, full: bool) -> Measurement:
+    from planarfriction.kernels import reduced as kernels
+    from planarfriction.kernels.law import law_row
+
+    model, twists = ReducedModelPublished(_disc(), _law()), _mixed_twists(20_000)
+    shape = model.shape_at(1.0)
+    surface = np.array([shape.surface.numbers.kind, 0, shape.surface.numbers.size])
+    arguments = law_row(model.law), shape.numbers, surface, shape.surface.numbers.data
+    z, wrench = model.rest(), np.empty_like(twists)
+    loop = _median(lambda: kernels.step_sequence(*arguments, z, twists, 1.0, 1e-4, wrench), 9)
+    call = _python_step(model, 1000)
+    return _line(name, loop / len(twists) * 1e6, "us", "one Python call of the same step", call * 1e6)
+
+
+def _step_distributed_loop(name: str, full: bool) -> Measurement:
+    from planarfriction.kernels import distributed as kernels
+    from planarfriction.kernels.law import law_numbers
+
+    model, twists = DistributedModel(_disc(), _law()), _mixed_twists(1000)
+    x, y = (np.ascontiguousarray(column) for column in model.patch.positions.T)
+    z = model.rest().reshape(-1)
+    scratch, wrench = np.empty_like(z), np.empty_like(twists)
+    arguments = x, y, model.patch.weights(), 1.0, 1e-4, scratch, wrench
+    loop = _median(lambda: kernels.step_sequence(law_numbers(model.law), z, twists, *arguments), 9)
+    call = _python_step(model, 100)
+    return _line(name, loop / len(twists) * 1e6, "us", "one Python call of the same step", call * 1e6)
+
+
+def _python_step(model: Any, inner: int) -> float:
+    state, twist = model.rest(), (0.01, 0.0, 1.0)
+    return _median(lambda: model.step(state, twist, 1.0, 1e-3), 9, inner)
+
+
+def _step_reduced_call(name: str, full: bool) -> Measurement:
+    model = ReducedModelPublished(_disc(), _law())
+    state, twist = model.rest(), np.array([0.01, 0.0, 1.0])
+    rate = _median(lambda: model.rate(state, twist, 1.0), 9, 100)
+    return _line(name, _python_step(model, 2000) * 1e6, "us", "one Python call of rate (NumPy)", rate * 1e6)
+
+
+def _import(name: str, full: bool) -> Measurement:
+    def seconds(module: str) -> float:
+        code = f"import time; t = time.perf_counter(); import {module}; print(time.perf_counter() - t)"
+        command = [sys.executable, "-c", code]
+        return float(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+
+    ours, theirs = (statistics.median(seconds(module) for _ in range(7)) for module in ("planarfriction", "numpy"))
+    return _line(name, ours, "s", "import numpy", theirs)
+
+
+BENCHMARKS: dict[str, Callable[[str, bool], Measurement]] = {
+    "in_hand.distributed": _in_hand_distributed,
+    "in_hand.distributed.101": _in_hand_distributed_101,
+    "in_hand.reduced": _in_hand_reduced,
+    "in_hand.reduced.load_2": lambda name, full: _in_hand_reduced(name, full, load=2),
+    "in_hand.reduced.load_dependent": _in_hand_load_dependent,
+    "table.build": _table_build,
+    "step.reduced.loop": _step_reduced_loop,
+    "step.distributed.loop": _step_distributed_loop,
+    "step.reduced.call": _step_reduced_call,
+    "import": _import,
+}
+"""Benchmarks by name."""
