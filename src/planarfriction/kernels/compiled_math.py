@@ -99,10 +99,10 @@ def log(x):
 
 @_inline
 def power(x, exponent):
-    """`x^exponent` for x >= 0; the square, the usual Stribeck exponent, is exact."""
+    """`x^exponent` for x >= 0 and exponent > 0; the square, the usual Stribeck exponent, is exact."""
     if exponent == 2.0:
         return x * x
-    return exp(exponent * log(x))
+    return where(x > 0.0, exp(exponent * log(x)), 0.0)
 
 
 @_inline

@@ -5,8 +5,8 @@ its torque divided by `r`. `u` is homogeneous of degree 1 in `V_S` and zero at r
 a flat array from `start` on; `size` is the number of segments of a quadrant (tables) or of cells:
 
 - `BILINEAR`: nodes `[size + 1, 4 size + 1, 4]` over polar angle (from the spin axis) and azimuth: `h`, and a spare;
-- `POTENTIAL`: nodes of the same shape: `phi`, `d phi/d polar`, `d phi/d azimuth` and the mixed derivative, where the
-  dissipation is `|V_S| phi(direction)`, so that `h` is exactly its gradient;
+- `POTENTIAL`: nodes of the same shape: `phi`, `d phi/d polar`, `d phi/d azimuth` and the mixed derivative, then the two
+  numbers of a `_tilt`. The dissipation is `|V_S| (phi + tilt)(direction)`, so that `h` is exactly its gradient;
 - `ELLIPSOID`: no numbers, `u = V_S`;
 - `CELLS`: rows x / r, y / r, w of the cells.
 """
@@ -20,8 +20,9 @@ from planarfriction.kernels import inlined, jit, kernel
 
 BILINEAR, POTENTIAL, ELLIPSOID, CELLS = 0, 1, 2, 3
 
-# Nearer to the spin axis [rad], the polar derivatives differ from their limit by less than the interpolation error.
-_AXIS = 1e-8
+# Nearer to the spin axis [rad] the azimuth's slopes are taken at this polar angle: they differ from their limit by about
+# as much, and rounding, which the Jacobian divides by its square, stays below 1e-5 too.
+_AXIS = 1e-5
 
 _IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
@@ -63,16 +64,18 @@ def _bilinear(data, start, size, x, y, s, speed):
 
 
 @kernel
-def _bilinear_jacobian(data, start, size, x, y, s, speed):
+def _bilinear_jacobian(data, start, size, x, y, s):
     i, j, a, b, polar, azimuth = _place(size, x, y, s)
     row = 4 * (4 * size + 1)
     p = start + i * row + 4 * j
     per_segment = size / (0.5 * math.pi)
+    if polar < _AXIS:
+        polar, a = _AXIS, _AXIS * per_segment
     sin_p, cos_p, sin_a, cos_a = math.sin(polar), math.cos(polar), math.sin(azimuth), math.cos(azimuth)
-    per_azimuth = per_segment / max(sin_p, _AXIS)
+    per_azimuth = per_segment / sin_p
     px, py, ps = per_segment * cos_p * cos_a, per_segment * cos_p * sin_a, -per_segment * sin_p
     ax, ay = -per_azimuth * sin_a, per_azimuth * cos_a
-    nx, ny, ns = x / speed, y / speed, s / speed
+    nx, ny, ns = sin_p * cos_a, sin_p * sin_a, cos_p
     hx, p_x, a_x = _corners(data, p, row, a, b)
     hy, p_y, a_y = _corners(data, p + 1, row, a, b)
     hs, p_s, a_s = _corners(data, p + 2, row, a, b)
@@ -116,6 +119,29 @@ def _blend(data, p, row, segment, a, b):
 
 
 @kernel
+def _tilt(ax, ay, x, y, s):
+    """Gradient and Hessian (xx, xy, xs, yy, ys, ss) of `(ax x + ay y) s^2/|V|^2` at a unit vector with `s >= 0`.
+
+    The force in a pure spin tilts the dissipation about the spin axis, where polar coordinates cannot hold a slope: an
+    error of its azimuth derivatives, divided by the distance, would grow without bound. This function has that slope,
+    is smooth there, and vanishes with its gradient at the equator, where the two halves of the surface meet.
+    """
+    lean = ax * x + ay * y
+    c = lean * s * s
+    nx, ny, ns = ax * s * s, ay * s * s, 2.0 * lean * s
+    gradient = (nx - 2.0 * c * x, ny - 2.0 * c * y, ns - 2.0 * c * s)
+    hessian = (
+        8.0 * c * x * x - 4.0 * nx * x - 2.0 * c,
+        8.0 * c * x * y - 2.0 * (nx * y + ny * x),
+        8.0 * c * x * s - 2.0 * (nx * s + ns * x) + 2.0 * s * ax,
+        8.0 * c * y * y - 4.0 * ny * y - 2.0 * c,
+        8.0 * c * y * s - 2.0 * (ny * s + ns * y) + 2.0 * s * ay,
+        8.0 * c * s * s - 4.0 * ns * s - 2.0 * c + 2.0 * lean,
+    )
+    return gradient, hessian
+
+
+@kernel
 def _potential(data, start, size, x, y, s, speed):
     i, j, a, b, polar, azimuth = _place(size, x, y, s)
     row = 4 * (4 * size + 1)
@@ -130,19 +156,23 @@ def _potential(data, start, size, x, y, s, speed):
     sin_a, cos_a = math.sin(azimuth), math.cos(azimuth)
     across = d_azimuth / max(sin_p, _AXIS)
     radial = phi * sin_p + d_polar * cos_p
+    end = start + (size + 1) * row
+    tilt, _ = _tilt(data[end], data[end + 1], x / speed, y / speed, s / speed)
     return (
-        speed * (radial * cos_a - across * sin_a),
-        speed * (radial * sin_a + across * cos_a),
-        speed * (phi * cos_p - d_polar * sin_p),
+        speed * (tilt[0] + radial * cos_a - across * sin_a),
+        speed * (tilt[1] + radial * sin_a + across * cos_a),
+        speed * (tilt[2] + phi * cos_p - d_polar * sin_p),
     )
 
 
 @kernel
-def _potential_jacobian(data, start, size, x, y, s, speed):
+def _potential_jacobian(data, start, size, x, y, s):
     i, j, a, b, polar, azimuth = _place(size, x, y, s)
     row = 4 * (4 * size + 1)
     p = start + i * row + 4 * j
     segment = 0.5 * math.pi / size
+    if polar < _AXIS:
+        polar, a = _AXIS, _AXIS / segment
     av, af, a2 = _hermite(a)
     bv, bf, b2 = _hermite(b)
     phi = _blend(data, p, row, segment, av, bv)
@@ -151,28 +181,30 @@ def _potential_jacobian(data, start, size, x, y, s, speed):
     d_pp = _blend(data, p, row, segment, a2, bv) / segment**2
     d_pa = _blend(data, p, row, segment, af, bf) / segment**2
     d_aa = _blend(data, p, row, segment, av, b2) / segment**2
-    sin_p, cos_p = max(math.sin(polar), _AXIS), math.cos(polar)
+    sin_p, cos_p = math.sin(polar), math.cos(polar)
     sin_a, cos_a = math.sin(azimuth), math.cos(azimuth)
-    nx, ny, ns = x / speed, y / speed, s / speed
+    nx, ny, ns = sin_p * cos_a, sin_p * sin_a, cos_p
     px, py, ps = cos_p * cos_a, cos_p * sin_a, -sin_p  # unit vector of growing polar angle
     ax, ay = -sin_a, cos_a  # unit vector of growing azimuth
+    end = start + (size + 1) * row
+    tilt, t = _tilt(data[end], data[end + 1], nx, ny, ns)
     across = d_a / sin_p
-    hx = phi * nx + d_p * px + across * ax
-    hy = phi * ny + d_p * py + across * ay
-    hs = phi * ns + d_p * ps
+    hx = tilt[0] + phi * nx + d_p * px + across * ax
+    hy = tilt[1] + phi * ny + d_p * py + across * ay
+    hs = tilt[2] + phi * ns + d_p * ps
     m_pp = phi + d_pp
     m_pa = (d_pa - d_a * cos_p / sin_p) / sin_p
     m_aa = phi + (d_p * cos_p + d_aa / sin_p) / sin_p
     return (
-        hx * nx + m_pp * px * px + m_pa * (px * ax + ax * px) + m_aa * ax * ax,
-        hx * ny + m_pp * px * py + m_pa * (px * ay + ax * py) + m_aa * ax * ay,
-        hx * ns + m_pp * px * ps + m_pa * ax * ps,
-        hy * nx + m_pp * py * px + m_pa * (py * ax + ay * px) + m_aa * ay * ax,
-        hy * ny + m_pp * py * py + m_pa * (py * ay + ay * py) + m_aa * ay * ay,
-        hy * ns + m_pp * py * ps + m_pa * ay * ps,
-        hs * nx + m_pp * ps * px + m_pa * ps * ax,
-        hs * ny + m_pp * ps * py + m_pa * ps * ay,
-        hs * ns + m_pp * ps * ps,
+        hx * nx + t[0] + m_pp * px * px + m_pa * (px * ax + ax * px) + m_aa * ax * ax,
+        hx * ny + t[1] + m_pp * px * py + m_pa * (px * ay + ax * py) + m_aa * ax * ay,
+        hx * ns + t[2] + m_pp * px * ps + m_pa * ax * ps,
+        hy * nx + t[1] + m_pp * py * px + m_pa * (py * ax + ay * px) + m_aa * ay * ax,
+        hy * ny + t[3] + m_pp * py * py + m_pa * (py * ay + ay * py) + m_aa * ay * ay,
+        hy * ns + t[4] + m_pp * py * ps + m_pa * ay * ps,
+        hs * nx + t[2] + m_pp * ps * px + m_pa * ps * ax,
+        hs * ny + t[4] + m_pp * ps * py + m_pa * ps * ay,
+        hs * ns + t[5] + m_pp * ps * ps,
     )
 
 
@@ -257,8 +289,8 @@ def sliding_jacobian(kind, data, start, size, x, y, s, speed):
         return _cells_jacobian(data, start, size, x, y, s, speed)
     mirror = -1.0 if s < 0.0 else 1.0
     if kind == BILINEAR:
-        return _bilinear_jacobian(data, start, size, mirror * x, mirror * y, mirror * s, speed)
-    return _potential_jacobian(data, start, size, mirror * x, mirror * y, mirror * s, speed)
+        return _bilinear_jacobian(data, start, size, mirror * x, mirror * y, mirror * s)
+    return _potential_jacobian(data, start, size, mirror * x, mirror * y, mirror * s)
 
 
 @kernel

@@ -32,7 +32,20 @@ class LimitSurfaceTable(LimitSurface):
 
     @functools.cached_property
     def numbers(self) -> SurfaceNumbers:
-        """Potential, its derivatives along both angles and the mixed one at the nodes."""
+        """Potential, its derivatives along both angles and the mixed one at the nodes; the force in a pure spin."""
         nodes = np.empty((self.segments + 1, 4 * self.segments + 1, 4))
-        tables.potential_nodes(*self._loaded_cells(), self.contact_radius, self.segments, nodes)
-        return SurfaceNumbers(self.kind, self.segments, nodes.reshape(-1))
+        tilt = tables.potential_nodes(*self._loaded_cells(), self.contact_radius, self.segments, nodes)
+        return SurfaceNumbers(self.kind, self.segments, np.append(nodes, tilt))
+
+    def _first_guess(self, target: np.ndarray) -> np.ndarray:
+        """The node of least dissipation per unit of power that `target` would have."""
+        segment = 0.5 * np.pi / self.segments
+        polar, azimuth = np.meshgrid(
+            np.arange(self.segments + 1) * segment, np.arange(4 * self.segments) * segment, indexing="ij"
+        )
+        upper = np.stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], -1)
+        upper = upper.reshape(-1, 3)
+        h, power = self._direction(upper), upper @ target
+        cost = np.einsum("ni,ni->n", h, upper) / np.maximum(np.abs(power), 1e-300)
+        best = int(np.argmin(cost))
+        return np.sign(power[best]) * upper[best]
