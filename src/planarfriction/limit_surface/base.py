@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import math
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
@@ -146,17 +145,17 @@ class LimitSurface:
     def _scaled_twist_of(self, target: np.ndarray) -> np.ndarray:
         """Direction of the scaled twist whose `h` is parallel to the unit vector `target`.
 
-        Minimises the convex `Phi` over the plane `target . V = 1` by damped Newton steps from the ellipsoid's answer.
+        Minimises the convex `Phi` over the plane `target . V = 1` by damped Newton steps from `_first_guess`.
         """
         basis = _plane(target)
-        place = np.zeros(2)
-        value = math.inf
+        guess = self._first_guess(target)
+        place = basis @ guess / (target @ guess)
+        value, slope = self._dissipation_over(target, basis, place)
         for _ in range(60):
-            point = target + place @ basis
-            h = self._direction(point[None])[0]
-            value, slope = float(h @ point), basis @ h
-            if np.linalg.norm(slope) < _FULL_BALANCE:
+            balance = np.linalg.norm(slope)
+            if balance < _FULL_BALANCE:
                 break
+            point = target + place @ basis
             hessian = basis @ self._direction_slope(point[None])[0] @ basis.T
             shift = 1e-12 * np.trace(hessian)
             move = -np.linalg.solve(hessian + shift * np.eye(2), slope)
@@ -164,14 +163,27 @@ class LimitSurface:
                 move = -slope
             length = 1.0
             while length > 1e-14:
-                trial = target + (place + length * move) @ basis
-                if float(self._direction(trial[None])[0] @ trial) < value - 1e-4 * length * abs(move @ slope):
+                trial, trial_slope = self._dissipation_over(target, basis, place + length * move)
+                gain = value - trial
+                # near the minimum the gain drowns in rounding; there a better balance shows progress
+                flat = abs(gain) < 1e-14 * value and np.linalg.norm(trial_slope) < 0.5 * balance
+                if flat or gain > 1e-4 * length * abs(move @ slope):
                     break
                 length *= 0.5
             else:
                 break
-            place = place + length * move
+            place, value, slope = place + length * move, trial, trial_slope
         return target + place @ basis
+
+    def _first_guess(self, target: np.ndarray) -> np.ndarray:
+        """A scaled twist near the one whose `h` is parallel to `target`: the ellipsoid's."""
+        return target
+
+    def _dissipation_over(self, target: np.ndarray, basis: np.ndarray, place: np.ndarray) -> tuple[float, np.ndarray]:
+        """`Phi` and its slope `[2]` at a place in the plane `target . V = 1`."""
+        point = target + place @ basis
+        h = self._direction(point[None])[0]
+        return float(h @ point), basis @ h
 
     def _sliding_slope(self, scaled: np.ndarray) -> np.ndarray:
         """`du/dV_S` of `u = h |V_S|` for scaled twists `[M, 3]`, shape `[M, 3, 3]`."""
@@ -203,7 +215,7 @@ def _plane(normal: np.ndarray) -> np.ndarray:
 
 
 def _rows(name: str, value) -> np.ndarray:
-    result = np.asarray(value, dtype=float)
+    result = validation.numbers(name, value)
     if result.ndim == 0 or result.shape[-1] != 3:
         raise InvalidValueError(name, "have shape [..., 3]", f"shape {list(result.shape)}")
     if not np.isfinite(result).all():

@@ -10,7 +10,10 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.kernels import surfaces as kernels
 from planarfriction.kernels import tables
-from planarfriction.limit_surface.base import LimitSurface, SurfaceNumbers
+from planarfriction.limit_surface.base import LimitSurface, SurfaceNumbers, _plane
+
+_SAME_ANSWER = 1e-12
+"""Angle [rad] between a stored wrench and the wanted one below which a direction answers: rounding of the quadratic."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,22 +59,40 @@ class LimitSurfaceTablePublished(LimitSurface):
         return SurfaceNumbers(self.kind, self.segments, nodes.reshape(-1))
 
     def _scaled_twist_of(self, target: np.ndarray) -> np.ndarray:
-        """The direction whose stored `h` is parallel to `target`: from the best node, by least squares."""
-        from scipy import optimize
+        """The direction whose stored `h` is parallel to `target`, exactly: two bilinear equations in each table cell.
 
+        Where the stored map folds and several directions answer, the one of least dissipation.
+        """
         nodes = self.numbers.data.reshape(self.segments + 1, -1, 4)[..., :3]
-        side = -1.0 if target[2] < 0.0 else 1.0
-        match = side * nodes @ target / np.linalg.norm(nodes, axis=-1)
-        i, j = np.unravel_index(int(np.argmax(match)), match.shape)
-        segment = 0.5 * np.pi / self.segments
+        across = nodes @ _plane(target).T  # [i, j, 2]: zero where h is parallel to the target
+        corner = across[:-1, :-1]
+        along_a, along_b = across[1:, :-1] - corner, across[:-1, 1:] - corner
+        twisted = across[1:, 1:] - across[1:, :-1] - along_b
+        # (corner + along_b b) x (along_a + twisted b) = 0 for the position b along the azimuth: q2 b^2 + q1 b + q0 = 0
+        q2, q0 = _cross(along_b, twisted), _cross(corner, along_a)
+        q1 = _cross(corner, twisted) + _cross(along_b, along_a)
+        root = np.sqrt(np.maximum(q1 * q1 - 4.0 * q2 * q0, 0.0))
+        half = -0.5 * (q1 + np.where(q1 < 0.0, -root, root))
+        b = np.clip(np.stack([_quotient(half, q2), _quotient(q0, half), np.zeros_like(q0)]), 0.0, 1.0)[..., None]
+        step, start = along_a + twisted * b, corner + along_b * b
+        a = np.clip(_quotient(-(start * step).sum(-1), (step * step).sum(-1)), 0.0, 1.0)[..., None]
+        place = np.stack(np.broadcast_arrays(np.arange(self.segments)[:, None], np.arange(4 * self.segments)), -1)
+        polar, azimuth = np.moveaxis(0.5 * np.pi / self.segments * (place + np.concatenate([a, b], -1)), -1, 0)
+        upper = np.stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], -1)
+        upper = upper.reshape(-1, 3)
+        best = np.argsort(np.linalg.norm(start + step * a, axis=-1), axis=None)[:8]
+        h = self._direction(upper[best])
+        side, size = np.sign(h @ target), np.abs(h @ target)
+        miss = np.linalg.norm(np.cross(h, target), axis=-1)
+        answers = miss <= max(_SAME_ANSWER, miss.min())
+        chosen = np.flatnonzero(answers)[np.argmin(size[answers])]
+        return side[chosen] * upper[best[chosen]]
 
-        def direction(angles: np.ndarray) -> np.ndarray:
-            polar, azimuth = angles
-            return side * np.array([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)])
 
-        def mismatch(angles: np.ndarray) -> np.ndarray:
-            h = self._direction(direction(angles)[None])[0]
-            return h / np.linalg.norm(h) - target
+def _cross(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    return first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
 
-        start = np.array([i * segment, j * segment])
-        return direction(optimize.least_squares(mismatch, start, xtol=1e-15, ftol=1e-15, gtol=1e-15).x)
+
+def _quotient(numerator: np.ndarray, denominator: np.ndarray) -> np.ndarray:
+    """The quotient; zero where there is none."""
+    return np.divide(numerator, denominator, out=np.zeros_like(numerator), where=denominator != 0.0)
