@@ -86,7 +86,12 @@ class Coulomb:
         `surface` is any limit surface, `twist` has shape `[..., 3]` [m/s, m/s, rad/s], `normal_force` `[...]` [N].
         A body at rest gets a zero wrench: Coulomb's law alone cannot tell the force of a stuck contact.
         """
-        load = np.asarray(normal_force, dtype=float)
+        load = validation.numbers("normal_force", normal_force)
         if not (np.isfinite(load).all() and (load >= 0.0).all()):
             raise InvalidValueError("normal_force", "be finite and >= 0", normal_force)
-        return self.mu * load[..., None] * surface.wrench(twist)
+        direction = surface.wrench(twist)
+        try:
+            return self.mu * load[..., None] * direction
+        except ValueError:
+            shapes = f"shapes {list(load.shape)} and {list(direction.shape[:-1])}"
+            raise InvalidValueError("normal_force", "broadcast with the twist", shapes) from None

@@ -51,12 +51,17 @@ def vector(name: str, value: Any, size: int) -> np.ndarray:
     return array(name, value, (size,))
 
 
-def array(name: str, value: Any, shape: tuple[int | None, ...]) -> np.ndarray:
-    """Return `value` as a finite float array; None in `shape` accepts any length on that axis."""
+def numbers(name: str, value: Any) -> np.ndarray:
+    """Return `value` as a float array of any shape (no copy where it is one), or raise."""
     try:
-        result = np.array(value, dtype=float)
+        return np.asarray(value, dtype=float)
     except (TypeError, ValueError):
         raise InvalidValueError(name, "be an array of numbers", value) from None
+
+
+def array(name: str, value: Any, shape: tuple[int | None, ...]) -> np.ndarray:
+    """Return `value` as a finite float array; None in `shape` accepts any length on that axis."""
+    result = numbers(name, value).copy()
     matches = result.ndim == len(shape) and all(
         wanted in (None, length) for wanted, length in zip(shape, result.shape, strict=True)
     )

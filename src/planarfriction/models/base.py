@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.laws import LuGre
 from planarfriction.patch import ContactPatch
@@ -59,8 +60,7 @@ class FrictionModel:
 
     def _inputs(self, state, twist, normal_force, **more) -> list[np.ndarray]:
         """Check the inputs and broadcast their batch axes against each other."""
-        state = np.asarray(state, dtype=float)
-        twist = np.asarray(twist, dtype=float)
+        state, twist = validation.numbers("state", state), validation.numbers("twist", twist)
         inner = self.state_shape
         if state.shape[state.ndim - len(inner) :] != inner:
             wanted = ", ".join(str(n) for n in inner)
@@ -68,7 +68,7 @@ class FrictionModel:
         if twist.shape[-1:] != (3,):
             raise InvalidValueError("twist", "have shape [..., 3]", f"shape {list(twist.shape)}")
         scalars = {"normal_force": normal_force, **more}
-        arrays = {name: np.asarray(value, dtype=float) for name, value in scalars.items()}
+        arrays = {name: validation.numbers(name, value) for name, value in scalars.items()}
         for name, value in {"state": state, "twist": twist, **arrays}.items():
             if not np.isfinite(value).all():
                 raise InvalidValueError(name, "be finite", value.tolist() if value.size < 10 else "NaN or infinity")

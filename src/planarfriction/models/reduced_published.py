@@ -100,13 +100,19 @@ class ReducedModelPublished(FrictionModel):
         Plain LuGre is linear in z and its step exact. Elasto-plastic: the exponential step with the mean decay of start
         and predicted end, second order, kept within the largest deflection so that nothing overshoots.
         """
-        if type(state) is np.ndarray and state.shape == (3,) and len(twist) == 3 and self._fixed is not None:
-            vx, vy, omega = twist
+        if (
+            type(state) is np.ndarray
+            and state.shape == (3,)
+            and self._fixed is not None
+            and np.ndarray not in (type(normal_force), type(dt))
+            and (type(twist) is not np.ndarray or twist.shape == (3,))
+        ):
             try:
+                vx, vy, omega = twist
                 result = kernels.step_one(
                     *self._fixed, state, float(vx), float(vy), float(omega), float(normal_force), float(dt)
                 )
-            except TypeError:  # not numbers, or a batch: the checks below decide
+            except (TypeError, ValueError):  # not numbers, or a batch: the checks below decide
                 result = ()
             if len(result):
                 return result[:3], result[3:]
