@@ -111,16 +111,16 @@ def _lsoda_time(scene: Scene, t_end: float) -> float:
 
     packed = pack(scene, t_end)
     work, y = workspace(packed.contacts), packed.state.copy()
-    right_hand_side(packed.contacts, packed.motion, 0, 0.0, y, work)
+
+    def rate(since: float, y: np.ndarray, piece: int) -> np.ndarray:
+        dy = np.empty_like(y)
+        right_hand_side(packed.contacts, packed.motion, piece, since, y, dy, work)
+        return dy
+
+    rate(0.0, y, 0)
     begin = time.perf_counter()
     for piece, length in enumerate(np.diff(packed.motion.breaks)):
-        solution = solve_ivp(
-            lambda t, y, piece=piece: right_hand_side(packed.contacts, packed.motion, piece, t, y, work),
-            (0.0, length),
-            y,
-            t_eval=[length],
-            **LSODA,
-        )
+        solution = solve_ivp(rate, (0.0, length), y, t_eval=[length], args=(piece,), **LSODA)
         y = solution.y[:, -1]
     return time.perf_counter() - begin
 

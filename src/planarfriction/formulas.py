@@ -30,9 +30,14 @@ def stribeck_slope(xp, speed, mu_c, mu_s, v_s, gamma):
 
 
 def slip_fraction(xp, deflection, breakaway_ratio):
-    """Elasto-plastic `alpha` [-] of the relative deflection `|z|/z_max`: 0 below breakaway, 1 at full deflection."""
-    phase = (deflection - 0.5 * (1.0 + breakaway_ratio)) * (1.0 / (1.0 - breakaway_ratio))
-    return 0.5 + 0.5 * xp.sin(math.pi * xp.minimum(xp.maximum(phase, -0.5), 0.5))
+    """Elasto-plastic `alpha` [-] of the relative deflection `|z|/z_max`: 0 below breakaway, 1 at full deflection.
+
+    `1/2 + 1/2 sin(pi (share - 1/2)) = sin^2(pi share/2)` of the share of the way from breakaway to full deflection: in
+    this form exactly zero below breakaway, so that rounding cannot creep.
+    """
+    share = (deflection - breakaway_ratio) * (1.0 / (1.0 - breakaway_ratio))
+    root = xp.sin(0.5 * math.pi * xp.minimum(xp.maximum(share, 0.0), 1.0))
+    return root * root
 
 
 def slip_fraction_slope(xp, deflection, breakaway_ratio):

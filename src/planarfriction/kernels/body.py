@@ -64,18 +64,18 @@ class Work(NamedTuple):
     """A vector of the body, [3]."""
 
 
-@jit
-def workspace(contacts):
-    """Workspace for a set of contacts."""
-    n = contacts.kind.shape[0]
+def workspace(contacts: ct.Contacts) -> Work:
+    """Workspace for a set of contacts (made outside compiled code, where an allocation costs compile time)."""
+    n = len(contacts.kind)
+    square = (3, 3)
     return Work(
-        np.empty(contacts.linear[n]),
+        np.zeros(contacts.linear[n]),
         np.zeros((n, 3, 3, 3)),
         np.zeros((n, 3)),
         np.zeros(3),
-        np.zeros((3, 3)),
-        np.zeros((3, 3)),
-        np.zeros((3, 3)),
+        np.zeros(square),
+        np.zeros(square),
+        np.zeros(square),
         np.zeros(3),
     )
 
@@ -248,8 +248,6 @@ def solve(contacts, motion, piece, since, y, shift, r, out, work):
 
 
 @jit
-def right_hand_side(contacts, motion, piece, since, y, work):
+def right_hand_side(contacts, motion, piece, since, y, dy, work):
     """`rates` for callers in Python, as an explicit or a general implicit solver needs it."""
-    dy = np.empty(y.shape[0])
     rates(contacts, motion, piece, since, y, dy, work)
-    return dy

@@ -71,8 +71,10 @@ def contact_map(mount, place, pose, a):
 @inlined
 def contact_map_slopes(mount, a, u, w, g, h):
     """Write `G = d(A u)/d pose` and `H = d(A' W)/d pose` into `g` and `h` [3, 3]."""
-    g[:] = 0.0
-    h[:] = 0.0
+    for i in range(3):
+        for j in range(3):
+            g[i, j] = 0.0
+            h[i, j] = 0.0
     if mount == WORLD:
         # the lever arm shortens as the body moves; world axes of the force
         fx, fy = a[0, 0] * w[0] + a[1, 0] * w[1], a[0, 1] * w[0] + a[1, 1] * w[1]

@@ -7,8 +7,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction.kernels import jit, kernel
-from planarfriction.kernels.body import factor, linearise, rates, solve, workspace
+from planarfriction.kernels import compiled_math as xp
+from planarfriction.kernels import inlined, jit, kernel
+from planarfriction.kernels.body import factor, linearise, rates, solve
 
 DONE, PAUSED, STEP_TOO_SMALL, AT_REST = 0, 1, 2, 3
 """Outcomes of `advance`."""
@@ -19,6 +20,9 @@ STEPS, REJECTIONS, EVALUATIONS, JACOBIANS = 0, 1, 2, 3
 # Step control. A decaying transient is followed through all its scales only if the steps do not grow too fast: a factor of
 # 2.5 needs 8 % fewer steps than 6 for the same error of the in-hand runs.
 _SAFETY, _GROWTH, _SHRINKAGE = 0.8, 2.5, 0.1
+
+# Smallest step relative to the time (at least 1 s): a few units in the last place of the clock.
+_RESOLUTION = 1e-15
 
 
 class Method(NamedTuple):
@@ -58,6 +62,37 @@ class Output(NamedTuple):
     """[M, number of bristle states], or [0, 0] when they are not wanted."""
 
 
+class Stages(NamedTuple):
+    """Workspace of a method with s stages for n states."""
+
+    k: np.ndarray
+    """Stages, [s, n]."""
+    rate: np.ndarray
+    """Right-hand side at a stage, [n]."""
+    start_rate: np.ndarray
+    """Right-hand side at the start of the step, [n]."""
+    right: np.ndarray
+    """Right-hand side of the linear system, [n]."""
+    argument: np.ndarray
+    """Argument of a stage, or a state to record, [n]."""
+    new: np.ndarray
+    """Solution at the end of the step, [n]."""
+    error: np.ndarray
+    """Its error estimate, [n]."""
+    zero: np.ndarray
+    """Zeros, [n]."""
+    time_slope: np.ndarray
+    """`df/dt` of the accelerations, [3]."""
+    coupling: np.ndarray
+    """Coefficients of the current stage, [s]."""
+
+
+def stages_for(method: Method, n: int) -> Stages:
+    """Workspace of a method for n states (made outside compiled code, where an allocation costs compile time)."""
+    s = len(method.m)
+    return Stages(np.zeros((s, n)), *np.zeros((7, n)), np.zeros(3), np.zeros(s))
+
+
 @kernel
 def _error_norm(contacts, y, new, error, rtol, atol):
     """Largest of the body's components and of each contact's mean over its bristles, in units of the tolerance."""
@@ -66,13 +101,13 @@ def _error_norm(contacts, y, new, error, rtol, atol):
         first, last = contacts.state[c], contacts.state[c + 1]
         total = 0.0
         for i in range(first, last):
-            e = error[i] / (atol[i] + rtol * max(abs(y[i]), abs(new[i])))
+            e = error[i] / (atol[i] + rtol * xp.maximum(abs(y[i]), abs(new[i])))
             total += e * e
         if last > first:
-            largest = max(largest, math.sqrt(total / (last - first)))
+            largest = xp.maximum(largest, math.sqrt(total / (last - first)))
     n = y.shape[0]
     for i in range(n - 6, n):
-        largest = max(largest, abs(error[i]) / (atol[i] + rtol * max(abs(y[i]), abs(new[i]))))
+        largest = xp.maximum(largest, abs(error[i]) / (atol[i] + rtol * xp.maximum(abs(y[i]), abs(new[i]))))
         if not math.isfinite(error[i]):
             return math.inf
     return largest if math.isfinite(largest) else math.inf
@@ -94,7 +129,7 @@ def _record(contacts, motion, piece, since, y, output, m, dy, work):
             output.bristles[m, i] = y[i]
 
 
-@kernel
+@inlined
 def _time_slope(contacts, motion, piece, work, slope):
     """`df/dt` of the body's accelerations [3]: forces and loads are linear in time."""
     for i in range(3):
@@ -132,122 +167,6 @@ def _forget_unloaded(contacts, motion, piece, y):
                 y[i] = 0.0
 
 
-@jit
-def advance(contacts, motion, method, output, y, cursor, clock, rtol, atol, max_steps, statistics):
-    """Integrate from where `cursor` and `clock` stand until the last break, or for `max_steps` steps; return an outcome.
-
-    `cursor` is (piece, next output), `clock` is (seconds into the piece, next step size, first step size of a piece):
-    both are updated, so that the next call goes on. `y` is the state; at a break it is first updated with the step that
-    ends there and recorded (left limit), then the next piece begins.
-    """
-    n = y.shape[0]
-    s = method.m.shape[0]
-    k = np.empty((s, n))
-    f, f0, r, arg, new, error, ft = (
-        np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.zeros(3)
-    )  # fmt: skip
-    couplings = np.empty(s)
-    work = workspace(contacts)
-    zeros = np.zeros(n)
-    piece, m = cursor[0], cursor[1]
-    since, h, first_step = clock[0], clock[1], clock[2]
-    taken = 0
-    fresh = True  # the linearisation is yet to be made at y
-    pieces = motion.breaks.shape[0] - 1
-    outcome = DONE
-    while piece < pieces:
-        begin = motion.breaks[piece]
-        length = motion.breaks[piece + 1] - begin
-        if since == 0.0:
-            if motion.velocity.shape[0] > 0:
-                y[n - 6 : n - 3] = motion.velocity[piece]
-            h = min(h, first_step)
-        while m < output.time.shape[0] and output.time[m] <= begin and since == 0.0 and piece == 0:
-            _record(contacts, motion, piece, 0.0, y, output, m, f, work)
-            m += 1
-        starting = since == 0.0
-        while since < length:
-            if taken >= max_steps:
-                outcome = PAUSED
-                break
-            # stretch the last step to the break, or halve what is left, so that no sliver of a step remains
-            remaining = length - since
-            step = remaining if h >= remaining else min(h, 0.5 * remaining) if 2.0 * h > remaining else h
-            last = step == remaining
-            if step <= 1e-15 * max(1.0, abs(begin)):
-                outcome = STEP_TOO_SMALL
-                break
-            if fresh:
-                rates(contacts, motion, piece, since, y, f0, work)
-                linearise(contacts, motion, piece, y, work)
-                statistics[EVALUATIONS] += 1
-                statistics[JACOBIANS] += 1
-                _time_slope(contacts, motion, piece, work, ft)
-            shift = 1.0 / (step * method.gamma)
-            factor(contacts, motion, piece, since, y, shift, work)
-            for i in range(s):
-                for j in range(i):
-                    couplings[j] = method.c[i, j] / step
-                if i == 0:
-                    _combine(couplings, k, 0, f0, r)
-                else:
-                    _combine(method.a[i], k, i, y, arg)
-                    rates(contacts, motion, piece, since + method.alpha[i] * step, arg, f, work)
-                    _combine(couplings, k, i, f, r)
-                    statistics[EVALUATIONS] += 1
-                for p in range(3):
-                    r[n - 6 + p] += method.time_gamma[i] * step * ft[p]
-                solve(contacts, motion, piece, since, y, shift, r, k[i], work)
-            _combine(method.m, k, s, y, new)
-            _combine(method.e, k, s, zeros, error)
-            norm = _error_norm(contacts, y, new, error, rtol, atol)
-            taken += 1
-            # no growth right after a rejection, whose reason is still near
-            growth = _GROWTH if fresh else 1.0
-            scale = min(growth, max(_SHRINKAGE, _SAFETY * max(norm, 1e-10) ** (-1.0 / method.order)))
-            if norm > 1.0:
-                statistics[REJECTIONS] += 1
-                h = step * (scale if math.isfinite(norm) else _SHRINKAGE)
-                fresh = False
-                continue
-            statistics[STEPS] += 1
-            end = motion.breaks[piece + 1] if last else begin + since + step
-            while m < output.time.shape[0] and output.time[m] <= end:
-                if output.time[m] == end:
-                    arg[:] = new
-                    at = length if last else since + step
-                else:
-                    at = output.time[m] - begin
-                    _interpolate(method, k, y, new, (at - since) / step, arg)
-                _record(contacts, motion, piece, at, arg, output, m, f, work)
-                m += 1
-            if starting:
-                first_step = step * scale
-                starting = False
-            y[:] = new
-            since = length if last else since + step
-            h = max(step * scale, h) if last else step * scale
-            fresh = True
-            if motion.stop_speed > 0.0:
-                speed, change = 0.0, 0.0
-                for i in range(3):
-                    arm = motion.stop_radius if i == 2 else 1.0
-                    speed += (arm * y[n - 6 + i]) ** 2
-                    change += (arm * f0[n - 6 + i]) ** 2
-                if math.sqrt(speed) + motion.stop_time * math.sqrt(change) < motion.stop_speed:
-                    outcome = AT_REST
-                    break
-        if outcome != DONE:
-            break
-        _forget_unloaded(contacts, motion, piece, y)
-        piece += 1
-        since = 0.0
-        fresh = True
-    cursor[0], cursor[1] = piece, m
-    clock[0], clock[1], clock[2] = since, h, first_step
-    return outcome
-
-
 @kernel
 def _interpolate(method, k, y, new, s, out):
     """Continuous extension at the fraction `s` of a step: `(1 - s) y + s (new + (1 - s) (d_1 + s (d_2 + ...)))`."""
@@ -260,3 +179,130 @@ def _interpolate(method, k, y, new, s, out):
                 row += method.dense[p, j] * k[j, i]
             inner = row + s * inner
         out[i] = (1.0 - s) * y[i] + s * (new[i] + (1.0 - s) * inner)
+
+
+@inlined
+def _prepare(contacts, motion, piece, since, y, stages, work):
+    """Evaluate and linearise at the start of a step."""
+    rates(contacts, motion, piece, since, y, stages.start_rate, work)
+    linearise(contacts, motion, piece, y, work)
+    _time_slope(contacts, motion, piece, work, stages.time_slope)
+
+
+@kernel
+def _step(contacts, motion, method, piece, since, step, y, stages, work):
+    """The stages of one step from `y`: solution into `stages.new`, its error estimate into `stages.error`."""
+    n, s = y.shape[0], method.m.shape[0]
+    k, argument, right, coupling = stages.k, stages.argument, stages.right, stages.coupling
+    shift = 1.0 / (step * method.gamma)
+    factor(contacts, motion, piece, since, y, shift, work)
+    for i in range(s):
+        for j in range(i):
+            coupling[j] = method.c[i, j] / step
+        if i == 0:
+            _combine(coupling, k, 0, stages.start_rate, right)
+        else:
+            _combine(method.a[i], k, i, y, argument)
+            rates(contacts, motion, piece, since + method.alpha[i] * step, argument, stages.rate, work)
+            _combine(coupling, k, i, stages.rate, right)
+        for p in range(3):
+            right[n - 6 + p] += method.time_gamma[i] * step * stages.time_slope[p]
+        solve(contacts, motion, piece, since, y, shift, right, k[i], work)
+    _combine(method.m, k, s, y, stages.new)
+    _combine(method.e, k, s, stages.zero, stages.error)
+
+
+@inlined
+def _at_rest(motion, y, rate):
+    """Body speed, and its change within the bristles' time, are below the speed that counts as rest."""
+    n = y.shape[0]
+    speed, change = 0.0, 0.0
+    for i in range(3):
+        arm = motion.stop_radius if i == 2 else 1.0
+        speed += (arm * y[n - 6 + i]) ** 2
+        change += (arm * rate[n - 6 + i]) ** 2
+    return math.sqrt(speed) + motion.stop_time * math.sqrt(change) < motion.stop_speed
+
+
+@jit
+def advance(contacts, motion, method, output, y, cursor, clock, rtol, atol, max_steps, statistics, stages, work):
+    """Integrate from where `cursor` and `clock` stand until the last break, or for `max_steps` trials; return an outcome.
+
+    `cursor` is (piece, next output), `clock` is (seconds into the piece, next step size, first step size of a piece):
+    both are updated, so that the next call goes on. `y` is the state; the step that ends at a break is recorded (left
+    limit) before the next piece begins.
+    """
+    n = y.shape[0]
+    piece, m = cursor[0], cursor[1]
+    since, h, first_step = clock[0], clock[1], clock[2]
+    taken = 0
+    fresh = True  # the linearisation is yet to be made at y
+    outcome = DONE
+    while piece < motion.breaks.shape[0] - 1 and outcome == DONE:
+        begin, end = motion.breaks[piece], motion.breaks[piece + 1]
+        starting = since == 0.0
+        if starting:
+            if motion.velocity.shape[0] > 0:
+                for i in range(3):
+                    y[n - 6 + i] = motion.velocity[piece, i]
+            h = xp.minimum(h, first_step)
+            if piece == 0 and m == 0 and output.time[0] == begin:
+                _record(contacts, motion, piece, 0.0, y, output, m, stages.rate, work)
+                m += 1
+        while since < end - begin:
+            # stretch the last step to the break, or halve what is left, so that no sliver of a step remains
+            remaining = end - begin - since
+            step = h
+            if 2.0 * h > remaining:
+                step = remaining if h >= remaining else 0.5 * remaining
+            last = step == remaining
+            if taken >= max_steps or step <= _RESOLUTION * xp.maximum(1.0, abs(begin)):
+                outcome = PAUSED if taken >= max_steps else STEP_TOO_SMALL
+                break
+            if fresh:
+                _prepare(contacts, motion, piece, since, y, stages, work)
+                statistics[JACOBIANS] += 1
+            _step(contacts, motion, method, piece, since, step, y, stages, work)
+            taken += 1
+            statistics[EVALUATIONS] += method.m.shape[0] if fresh else method.m.shape[0] - 1
+            norm = _error_norm(contacts, y, stages.new, stages.error, rtol, atol)
+            # no growth right after a rejection, whose reason is still near
+            growth = _GROWTH if fresh else 1.0
+            scale = _SHRINKAGE
+            if math.isfinite(norm):
+                ideal = _SAFETY * xp.maximum(norm, 1e-10) ** (-1.0 / method.order)
+                scale = xp.minimum(growth, xp.maximum(_SHRINKAGE, ideal))
+            fresh = norm <= 1.0
+            if not fresh:
+                statistics[REJECTIONS] += 1
+                h = step * scale
+                continue
+            statistics[STEPS] += 1
+            reached = end - begin if last else since + step
+            time = end if last else begin + reached
+            while m < output.time.shape[0] and output.time[m] <= time:
+                at = reached if output.time[m] == time else output.time[m] - begin
+                _interpolate(method, stages.k, y, stages.new, (at - since) / step, stages.argument)
+                _record(contacts, motion, piece, at, stages.argument, output, m, stages.rate, work)
+                m += 1
+            if starting:
+                first_step = step * scale
+                starting = False
+            for i in range(n):
+                y[i] = stages.new[i]
+            since = reached
+            h = xp.maximum(step * scale, h) if last else step * scale
+            if motion.stop_speed > 0.0 and _at_rest(motion, y, stages.start_rate):
+                outcome = AT_REST
+                if m < output.time.shape[0]:
+                    output.time[m] = time
+                    _record(contacts, motion, piece, since, y, output, m, stages.rate, work)
+                    m += 1
+                break
+        if outcome == DONE:
+            _forget_unloaded(contacts, motion, piece, y)
+            piece += 1
+            since = 0.0
+    cursor[0], cursor[1] = piece, m
+    clock[0], clock[1], clock[2] = since, h, first_step
+    return outcome

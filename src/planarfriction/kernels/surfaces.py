@@ -36,7 +36,7 @@ def _place(size, x, y, s):
     if azimuth < 0.0:
         azimuth += 2.0 * math.pi
     a, b = polar * per_segment, azimuth * per_segment
-    i, j = min(int(a), size - 1), min(int(b), 4 * size - 1)
+    i, j = xp.minimum(int(a), size - 1), xp.minimum(int(b), 4 * size - 1)
     return i, j, a - i, b - j, polar, azimuth
 
 
@@ -154,7 +154,7 @@ def _potential(data, start, size, x, y, s, speed):
     d_azimuth = _blend(data, p, row, segment, av, bf) / segment
     sin_p, cos_p = math.sin(polar), math.cos(polar)
     sin_a, cos_a = math.sin(azimuth), math.cos(azimuth)
-    across = d_azimuth / max(sin_p, _AXIS)
+    across = d_azimuth / xp.maximum(sin_p, _AXIS)
     radial = phi * sin_p + d_polar * cos_p
     end = start + (size + 1) * row
     tilt, _ = _tilt(data[end], data[end + 1], x / speed, y / speed, s / speed)

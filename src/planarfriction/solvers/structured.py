@@ -10,7 +10,7 @@ import numpy as np
 
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels import rosenbrock as kernels
-from planarfriction.kernels.body import Motion
+from planarfriction.kernels.body import Motion, workspace
 from planarfriction.kernels.contacts import Contacts
 from planarfriction.kernels.rosenbrock import Method, Output
 from planarfriction.solvers.statistics import Statistics
@@ -68,9 +68,15 @@ def integrate(
     cursor = np.zeros(2, np.int64)
     clock = np.array([0.0, _FIRST_STEP, np.inf])
     counts = np.zeros(4, np.int64)
-    arguments = (contacts, motion, method, output, y, cursor, clock, float(rtol), atol)
+    stages, work = kernels.stages_for(method, len(y)), workspace(contacts)
+
+    def advance(max_steps: int) -> int:
+        return kernels.advance(
+            contacts, motion, method, output, y, cursor, clock, float(rtol), atol, max_steps, counts, stages, work
+        )
+
     begin = time.perf_counter()
-    kernels.advance(*arguments, 0, counts)  # compiles, or loads from the cache, and takes no step
+    advance(0)  # compiles, or loads from the cache, and takes no step
     compile_time = time.perf_counter() - begin
     cursor[:], clock[:] = 0, (0.0, _FIRST_STEP, np.inf)
     outcome, wall_time = kernels.PAUSED, 0.0
@@ -78,7 +84,7 @@ def integrate(
     try:
         while outcome == kernels.PAUSED:
             begin = time.perf_counter()
-            outcome = kernels.advance(*arguments, slice_steps, counts)
+            outcome = advance(slice_steps)
             wall_time += time.perf_counter() - begin
             if progress is not None:
                 piece = min(int(cursor[0]), len(motion.breaks) - 1)
