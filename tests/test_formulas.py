@@ -1,0 +1,225 @@
+"""The formulas: slopes against differences, limits, and the same number from NumPy and from compiled loops."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numba import njit
+
+from planarfriction import formulas
+from planarfriction.kernels import compiled_math
+
+LAW = {"mu_c": 0.7, "mu_s": 1.1, "v_s": 2e-3}
+GAMMAS = (1.0, 1.5, 2.0, 3.0)
+
+speeds = st.floats(0.0, 10.0) | st.floats(1e-12, 1e-2)
+ratios = st.floats(0.0, 0.99)
+deflections = st.floats(0.0, 3.0)
+checked = settings(deadline=None, max_examples=100)
+
+
+def slope(function, x, step):
+    """Central difference of fourth order; its error is step^4/30 of the fifth derivative."""
+    near, far = function(x + step) - function(x - step), function(x + 2 * step) - function(x - 2 * step)
+    return (8.0 * near - far) / (12.0 * step)
+
+
+# ---------------------------------------------------------------------- Stribeck curve
+
+
+@pytest.mark.parametrize("gamma", GAMMAS)
+def test_stribeck_falls_from_static_to_coulomb_friction(gamma):
+    g = formulas.stribeck(np, np.linspace(0.0, 1.0, 1000), **LAW, gamma=gamma)
+    assert g[0] == LAW["mu_s"]
+    assert g[-1] == LAW["mu_c"]  # exp(-500) is far below rounding
+    assert (np.diff(g) <= 0.0).all()
+    at_v_s = formulas.stribeck(np, LAW["v_s"], **LAW, gamma=gamma)
+    assert at_v_s == pytest.approx(0.7 + 0.4 / math.e, rel=1e-15)  # rounding
+
+
+@pytest.mark.parametrize("gamma", GAMMAS)
+def test_stribeck_slope_is_the_slope(gamma):
+    speed = LAW["v_s"] * np.linspace(0.2, 4.0, 300)
+    expected = slope(lambda v: formulas.stribeck(np, v, **LAW, gamma=gamma), speed, 1e-3 * LAW["v_s"])
+    # Largest slope 300 s/m; rounding of g over the step 1e-16/2e-6, truncation (1e-3)^4 of that of the curve.
+    assert formulas.stribeck_slope(np, speed, **LAW, gamma=gamma) == pytest.approx(expected, abs=1e-9 * 300)
+
+
+def test_stribeck_slope_at_rest_is_the_limit_from_the_right():
+    at_rest = [formulas.stribeck_slope(np, 0.0, **LAW, gamma=gamma) for gamma in GAMMAS]
+    assert at_rest == pytest.approx([-0.4 / 2e-3, 0.0, 0.0, 0.0])  # finite for gamma >= 1
+    nearby = [formulas.stribeck_slope(np, 1e-30, **LAW, gamma=gamma) for gamma in GAMMAS]
+    assert nearby == pytest.approx(at_rest, abs=1e-9)  # gamma = 1.5: sqrt(1e-27) of 200 s/m
+    # Below 1 the limit is infinite: documented as zero.
+    assert formulas.stribeck_slope(np, 0.0, **LAW, gamma=0.5) == 0.0
+
+
+# ---------------------------------------------------------------------- slip fraction
+
+
+@given(ratios)
+@checked
+def test_slip_fraction_limits(ratio):
+    below = ratio * np.array([0.0, 0.5, 0.999, 1.0])
+    assert np.array_equal(formulas.slip_fraction(np, below, ratio), np.zeros(4))  # exactly: nothing may creep
+    assert np.array_equal(formulas.slip_fraction(np, np.array([1.0, 1.001, 7.0]), ratio), np.ones(3))
+    middle = formulas.slip_fraction(np, 0.5 * (1.0 + ratio), ratio)
+    assert middle == pytest.approx(0.5, abs=1e-13)  # 1e-16 of the deflection over a width of 0.01 or more
+    rising = formulas.slip_fraction(np, np.linspace(0.0, 1.2, 200), ratio)
+    assert (np.diff(rising) >= 0.0).all()
+
+
+@given(ratios, st.floats(0.01, 0.99))
+@checked
+def test_slip_fraction_is_the_published_sine(ratio, share):
+    deflection = ratio + share * (1.0 - ratio)
+    published = 0.5 + 0.5 * math.sin(math.pi * (deflection - 0.5 * (1.0 + ratio)) / (1.0 - ratio))
+    assert formulas.slip_fraction(np, deflection, ratio) == pytest.approx(published, abs=1e-13)  # as above
+
+
+@pytest.mark.parametrize("ratio", [0.0, 0.5, 0.9])
+def test_slip_fraction_slope_is_the_slope(ratio):
+    width = 1.0 - ratio
+    inside = ratio + width * np.linspace(0.02, 0.98, 97)  # two steps away from the ends, where the curvature jumps
+    expected = slope(lambda d: formulas.slip_fraction(np, d, ratio), inside, 5e-3 * width)
+    # Truncation: step^4/30 of the fifth derivative, pi^5/2/width^5: 3e-9 of 1/width.
+    assert formulas.slip_fraction_slope(np, inside, ratio) == pytest.approx(expected, abs=4e-9 / width)
+    outside = np.array([0.0, 0.5 * ratio, ratio, 1.0, 2.0])
+    # cos(pi/2 + rounding of the deflection over the width), over the width.
+    assert formulas.slip_fraction_slope(np, outside, ratio) == pytest.approx(np.zeros(5), abs=1e-15 / width**2)
+
+
+# ---------------------------------------------------------------------- bristle decay
+
+
+@given(deflections, st.floats(-1.0, 1.0), st.floats(1e-6, 1.0), ratios)
+@checked
+def test_decay_bounds(deflection, cosine, speed, ratio):
+    grip = 1e6
+    plain = formulas.bristle_decay(np, deflection, cosine * speed, speed, grip, 0.0, ratio)
+    elastic = formulas.bristle_decay(np, deflection, cosine * speed, speed, grip, 1.0, ratio)
+    assert plain == speed * grip
+    assert 0.0 <= elastic <= plain * (1 + 1e-15)  # beta lies in [0, 1]; rounding
+    if deflection <= ratio or cosine == -1.0:  # elastic, or the bristle is being relaxed
+        assert elastic == 0.0
+    if deflection >= 1.0 and cosine == 1.0:
+        assert elastic == pytest.approx(plain, rel=1e-15)  # rounding
+
+
+@pytest.mark.parametrize("elasto_plastic", [0.0, 1.0])
+def test_decay_partials_are_the_slopes(elasto_plastic):
+    ratio, random = 0.6, np.random.default_rng(3)
+    deflection, speed = random.uniform(0.62, 0.98, 50), random.uniform(0.1, 1.0, 50)
+    along, grip = random.uniform(-1.0, 1.0, 50) * speed, random.uniform(1.0, 3.0, 50)
+
+    def decay(d=deflection, a=along, v=speed, q=grip):
+        return formulas.bristle_decay(np, d, a, v, q, elasto_plastic, ratio)
+
+    k, *partials = formulas.bristle_decay_partials(np, deflection, along, speed, grip, elasto_plastic, ratio)
+    assert k == pytest.approx(decay(), rel=1e-15)  # rounding
+    step = 1e-3
+    expected = (
+        slope(lambda d: decay(d=d), deflection, step),
+        slope(lambda a: decay(a=a), along, step),
+        slope(lambda v: decay(v=v), speed, step),
+    )
+    for partial, difference in zip(partials, expected, strict=True):
+        # Truncation (1e-3)^4/30 of the fifth derivative, 3 pi^5/2/0.4^5 = 4e4; rounding 1e-16/1e-3.
+        assert partial == pytest.approx(difference, abs=2e-9)
+    assert k / grip == pytest.approx(slope(lambda q: decay(q=q), grip, step), abs=1e-12)  # linear: rounding alone
+
+
+def test_traction_opposes_the_bristle_its_rate_and_the_velocity():
+    assert formulas.traction(2.0, 3.0, 5.0, 7.0, 11.0, 13.0) == -(14.0 + 33.0 + 65.0)
+
+
+# ---------------------------------------------------------------------- the step
+
+
+@given(st.floats(0.0, 50.0) | st.floats(0.0, 2e-3))
+@checked
+def test_relaxation(x):
+    remaining, mean = formulas.relaxation(np, x)
+    assert remaining == pytest.approx(math.exp(-x), rel=1e-15)
+    exact = -math.expm1(-x) / x if x > 0.0 else 1.0
+    # Above 1e-3 the difference 1 - exp(-x) loses 1e-16/x; below, the series is exact.
+    assert mean == pytest.approx(exact, rel=3e-16 * (1.0 + (1.0 / x if x > 1e-3 else 0.0)))
+
+
+def test_relaxation_of_endless_steps():
+    remaining, mean = formulas.relaxation(np, np.array([1e3, 1e9, 1e30]))
+    assert np.array_equal(remaining, np.zeros(3))
+    assert mean == pytest.approx([1e-3, 1e-9, 1e-30], rel=1e-15)
+
+
+@given(deflections, deflections)
+@checked
+def test_a_step_ends_within_reach(start, end):
+    largest = formulas.reachable_deflection(np, start, 1.0)
+    assert largest == max(start, 1.0)
+    assert end * formulas.cap(np, end, largest) == pytest.approx(min(end, largest), rel=1e-15)  # rounding
+    assert formulas.cap(np, end, formulas.reachable_deflection(np, start, 0.0)) == 1.0  # plain LuGre is not capped
+
+
+# ---------------------------------------------------------------------- NumPy against compiled loops
+
+
+@njit(error_model="numpy")
+def compiled(speed, deflection, along, mu_c, mu_s, v_s, gamma, grip, elasto_plastic, ratio, decay_dt, out):
+    """Every formula for every row, in compiled loops."""
+    for i in range(speed.shape[0]):
+        v, d, a, q, e, s = speed[i], deflection[i], along[i], grip[i], elasto_plastic[i], ratio[i]
+        out[i, 0] = formulas.stribeck(compiled_math, v, mu_c[i], mu_s[i], v_s[i], gamma[i])
+        out[i, 1] = formulas.stribeck_slope(compiled_math, v, mu_c[i], mu_s[i], v_s[i], gamma[i])
+        out[i, 2] = formulas.slip_fraction(compiled_math, d, s)
+        out[i, 3] = formulas.slip_fraction_slope(compiled_math, d, s)
+        out[i, 4] = formulas.bristle_decay(compiled_math, d, a, v, q, e, s)
+        k = formulas.bristle_decay_partials(compiled_math, d, a, v, q, e, s)
+        out[i, 5], out[i, 6], out[i, 7], out[i, 8] = k
+        out[i, 9] = formulas.traction(d, a, v, q, e, s)
+        left = formulas.relaxation(compiled_math, decay_dt[i])
+        out[i, 10], out[i, 11] = left
+        out[i, 12] = formulas.reachable_deflection(compiled_math, d, e)
+        out[i, 13] = formulas.cap(compiled_math, d, 0.5)
+
+
+def test_every_formula_gives_the_same_number_in_compiled_loops():
+    random, n = np.random.default_rng(11), 20_000
+    v_s = random.uniform(1e-4, 1e-2, n)
+    speed = random.choice([0.0, 0.1, 1.0, 3.0], n) * v_s * random.uniform(0.5, 1.5, n)
+    mu_c = random.uniform(0.1, 1.0, n)
+    mu_s = mu_c + random.uniform(0.0, 1.0, n)
+    gamma = random.choice([0.5, 1.0, 1.5, 2.0, 3.0], n)
+    ratio = random.uniform(0.0, 0.95, n)
+    deflection, grip = random.uniform(0.0, 1.3, n), random.uniform(1.0, 10.0, n)
+    along = random.uniform(-1.0, 1.0, n) * speed
+    elasto_plastic = random.choice([0.0, 1.0], n)
+    decay_dt = 10.0 ** random.uniform(-6, 2.5, n)
+    out = np.empty((n, 14))
+    compiled(speed, deflection, along, mu_c, mu_s, v_s, gamma, grip, elasto_plastic, ratio, decay_dt, out)
+    bristle = (deflection, along, speed, grip, elasto_plastic, ratio)
+    expected = [
+        formulas.stribeck(np, speed, mu_c, mu_s, v_s, gamma),
+        formulas.stribeck_slope(np, speed, mu_c, mu_s, v_s, gamma),
+        formulas.slip_fraction(np, deflection, ratio),
+        formulas.slip_fraction_slope(np, deflection, ratio),
+        formulas.bristle_decay(np, *bristle),
+        *formulas.bristle_decay_partials(np, *bristle),
+        formulas.traction(*bristle),
+        *formulas.relaxation(np, decay_dt),
+        formulas.reachable_deflection(np, deflection, elasto_plastic),
+        formulas.cap(np, deflection, 0.5),
+    ]
+    # Each formula is some ten roundings of 1e-16. Where a number passes through zero (the sine's ends, which alpha and
+    # its slope divide by a width of 0.05 or more; exp of large arguments) its rounding is a share of its largest value.
+    for column, (got, wanted) in enumerate(zip(out.T, expected, strict=True)):
+        finite = np.isfinite(wanted)
+        assert np.array_equal(finite, np.isfinite(got)), column
+        allowed = 1e-14 * np.abs(wanted[finite]) + 1e-15 * np.abs(wanted[finite]).max()
+        if column == 11:  # (1 - exp(-x))/x just above 1e-3 amplifies the last place of exp by 1/x
+            allowed = allowed + 6e-16 / np.maximum(decay_dt, 1e-3)
+        assert (np.abs(got[finite] - wanted[finite]) <= allowed).all(), column
