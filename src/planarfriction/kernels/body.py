@@ -57,7 +57,9 @@ class Work(NamedTuple):
     stiffness: np.ndarray
     """d wrench / d twist of one contact, [3, 3]."""
     matrix: np.ndarray
-    """Inverse of the body's matrix, [3, 3]."""
+    """The body's matrix, [3, 3]."""
+    inverse: np.ndarray
+    """Its inverse, [3, 3]."""
     to_pose: np.ndarray
     """Acceleration per residual of the pose, [3, 3]."""
     body: np.ndarray
@@ -73,6 +75,7 @@ def workspace(contacts: ct.Contacts) -> Work:
         np.zeros((n, 3, 3, 3)),
         np.zeros((n, 3)),
         np.zeros(3),
+        np.zeros(square),
         np.zeros(square),
         np.zeros(square),
         np.zeros(square),
@@ -171,32 +174,28 @@ def factor(contacts, motion, piece, since, y, shift, work):
                 per_velocity = a[0, i] * work.body[0] + a[1, i] * work.body[1] + a[2, i] * work.body[2]
                 work.to_pose[i, j] += weight * per_pose / shift
                 m[i, j] -= weight * (per_velocity + per_pose / shift)
-    c00, c01, c02 = (
-        m[1, 1] * m[2, 2] - m[1, 2] * m[2, 1],
-        m[1, 2] * m[2, 0] - m[1, 0] * m[2, 2],
-        m[1, 0] * m[2, 1] - m[1, 1] * m[2, 0],
-    )
-    per_determinant = 1.0 / (m[0, 0] * c00 + m[0, 1] * c01 + m[0, 2] * c02)
-    c10, c11, c12 = (
-        m[0, 2] * m[2, 1] - m[0, 1] * m[2, 2],
-        m[0, 0] * m[2, 2] - m[0, 2] * m[2, 0],
-        m[0, 1] * m[2, 0] - m[0, 0] * m[2, 1],
-    )
-    c20, c21, c22 = (
-        m[0, 1] * m[1, 2] - m[0, 2] * m[1, 1],
-        m[0, 2] * m[1, 0] - m[0, 0] * m[1, 2],
-        m[0, 0] * m[1, 1] - m[0, 1] * m[1, 0],
-    )
-    m[0, 0], m[0, 1], m[0, 2] = per_determinant * c00, per_determinant * c10, per_determinant * c20
-    m[1, 0], m[1, 1], m[1, 2] = per_determinant * c01, per_determinant * c11, per_determinant * c21
-    m[2, 0], m[2, 1], m[2, 2] = per_determinant * c02, per_determinant * c12, per_determinant * c22
+    determinant = 0.0
+    for i in range(3):
+        work.body[i] = _cofactor(m, 0, i)
+        determinant += m[0, i] * work.body[i]
+    inverse = work.inverse
+    for i in range(3):
+        for j in range(3):
+            inverse[i, j] = _cofactor(m, j, i) / determinant
+
+
+@inlined
+def _cofactor(m, i, j):
+    """Signed cofactor of a 3 x 3 matrix; cyclic neighbours carry the sign."""
+    i1, i2, j1, j2 = (i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3
+    return m[i1, j1] * m[i2, j2] - m[i1, j2] * m[i2, j1]
 
 
 @inlined
 def solve(contacts, motion, piece, since, y, shift, r, out, work):
     """Solve `(shift I - J) out = r` with the matrix that `factor` prepared."""
     o = y.shape[0] - 6
-    lin, m, w, v, b = work.linear, work.matrix, work.stiffness[0], work.twist, work.body
+    lin, m, w, v, b = work.linear, work.inverse, work.stiffness[0], work.twist, work.body
     r_pose = r[o + 3 :]
     for i in range(3):
         to_pose = work.to_pose[i]

@@ -63,7 +63,8 @@ def linearise(law, z, vx, vy, omega, shape, surface, data, lin):
     x, y, s = _scaled_twist(shape, vx, vy, omega)
     v_n = math.sqrt(x * x + y * y + s * s)
     per_v = 1.0 / v_n if v_n > 0.0 else 0.0
-    j = sliding_jacobian(surface[0], data, surface[1], surface[2], x, y, s, v_n)
+    j = lin[18:27]
+    sliding_jacobian(surface[0], data, surface[1], surface[2], x, y, s, v_n, j)
     ux, uy, us = j[0] * x + j[1] * y + j[2] * s, j[3] * x + j[4] * y + j[5] * s, j[6] * x + j[7] * y + j[8] * s
     zx, zy, zs = z[0], z[1], z[2] / shape[2]
     u_norm = math.sqrt(ux * ux + uy * uy + us * us)

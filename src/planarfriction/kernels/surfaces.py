@@ -24,8 +24,6 @@ BILINEAR, POTENTIAL, ELLIPSOID, CELLS = 0, 1, 2, 3
 # as much, and rounding, which the Jacobian divides by its square, stays below 1e-5 too.
 _AXIS = 1e-5
 
-_IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-
 
 @inlined
 def _place(size, x, y, s):
@@ -64,32 +62,24 @@ def _bilinear(data, start, size, x, y, s, speed):
 
 
 @kernel
-def _bilinear_jacobian(data, start, size, x, y, s):
+def _bilinear_jacobian(data, start, size, x, y, s, out):
     i, j, a, b, polar, azimuth = _place(size, x, y, s)
     row = 4 * (4 * size + 1)
     p = start + i * row + 4 * j
     per_segment = size / (0.5 * math.pi)
     if polar < _AXIS:
         polar, a = _AXIS, _AXIS * per_segment
+    if polar < _AXIS:
+        polar, a = _AXIS, _AXIS * per_segment
     sin_p, cos_p, sin_a, cos_a = math.sin(polar), math.cos(polar), math.sin(azimuth), math.cos(azimuth)
     per_azimuth = per_segment / sin_p
-    px, py, ps = per_segment * cos_p * cos_a, per_segment * cos_p * sin_a, -per_segment * sin_p
-    ax, ay = -per_azimuth * sin_a, per_azimuth * cos_a
-    nx, ny, ns = sin_p * cos_a, sin_p * sin_a, cos_p
-    hx, p_x, a_x = _corners(data, p, row, a, b)
-    hy, p_y, a_y = _corners(data, p + 1, row, a, b)
-    hs, p_s, a_s = _corners(data, p + 2, row, a, b)
-    return (
-        hx * nx + p_x * px + a_x * ax,
-        hx * ny + p_x * py + a_x * ay,
-        hx * ns + p_x * ps,
-        hy * nx + p_y * px + a_y * ax,
-        hy * ny + p_y * py + a_y * ay,
-        hy * ns + p_y * ps,
-        hs * nx + p_s * px + a_s * ax,
-        hs * ny + p_s * py + a_s * ay,
-        hs * ns + p_s * ps,
-    )
+    radial = (sin_p * cos_a, sin_p * sin_a, cos_p)
+    polar_slope = (per_segment * cos_p * cos_a, per_segment * cos_p * sin_a, -per_segment * sin_p)
+    azimuth_slope = (-per_azimuth * sin_a, per_azimuth * cos_a, 0.0)
+    for i in range(3):
+        h, h_polar, h_azimuth = _corners(data, p + i, row, a, b)
+        for j in range(3):
+            out[3 * i + j] = h * radial[j] + h_polar * polar_slope[j] + h_azimuth * azimuth_slope[j]
 
 
 @kernel
@@ -120,25 +110,14 @@ def _blend(data, p, row, segment, a, b):
 
 @kernel
 def _tilt(ax, ay, x, y, s):
-    """Gradient and Hessian (xx, xy, xs, yy, ys, ss) of `(ax x + ay y) s^2/|V|^2` at a unit vector with `s >= 0`.
+    """`c = (a . V) s^2/|V|^2` at a unit vector with `s >= 0`, and the gradient `n` of its numerator; that of c is `n - 2 c V`.
 
     The force in a pure spin tilts the dissipation about the spin axis, where polar coordinates cannot hold a slope: an
     error of its azimuth derivatives, divided by the distance, would grow without bound. This function has that slope,
     is smooth there, and vanishes with its gradient at the equator, where the two halves of the surface meet.
     """
     lean = ax * x + ay * y
-    c = lean * s * s
-    nx, ny, ns = ax * s * s, ay * s * s, 2.0 * lean * s
-    gradient = (nx - 2.0 * c * x, ny - 2.0 * c * y, ns - 2.0 * c * s)
-    hessian = (
-        8.0 * c * x * x - 4.0 * nx * x - 2.0 * c,
-        8.0 * c * x * y - 2.0 * (nx * y + ny * x),
-        8.0 * c * x * s - 2.0 * (nx * s + ns * x) + 2.0 * s * ax,
-        8.0 * c * y * y - 4.0 * ny * y - 2.0 * c,
-        8.0 * c * y * s - 2.0 * (ny * s + ns * y) + 2.0 * s * ay,
-        8.0 * c * s * s - 4.0 * ns * s - 2.0 * c + 2.0 * lean,
-    )
-    return gradient, hessian
+    return lean * s * s, (ax * s * s, ay * s * s, 2.0 * lean * s)
 
 
 @kernel
@@ -157,19 +136,21 @@ def _potential(data, start, size, x, y, s, speed):
     across = d_azimuth / xp.maximum(sin_p, _AXIS)
     radial = phi * sin_p + d_polar * cos_p
     end = start + (size + 1) * row
-    tilt, _ = _tilt(data[end], data[end + 1], x / speed, y / speed, s / speed)
+    nx, ny, ns = x / speed, y / speed, s / speed
+    c, tilt = _tilt(data[end], data[end + 1], nx, ny, ns)
     return (
-        speed * (tilt[0] + radial * cos_a - across * sin_a),
-        speed * (tilt[1] + radial * sin_a + across * cos_a),
-        speed * (tilt[2] + phi * cos_p - d_polar * sin_p),
+        speed * (tilt[0] - 2.0 * c * nx + radial * cos_a - across * sin_a),
+        speed * (tilt[1] - 2.0 * c * ny + radial * sin_a + across * cos_a),
+        speed * (tilt[2] - 2.0 * c * ns + phi * cos_p - d_polar * sin_p),
     )
 
 
 @kernel
-def _potential_jacobian(data, start, size, x, y, s):
+def _potential_jacobian(data, start, size, x, y, s, out):
     i, j, a, b, polar, azimuth = _place(size, x, y, s)
     row = 4 * (4 * size + 1)
     p = start + i * row + 4 * j
+    end = start + (size + 1) * row
     segment = 0.5 * math.pi / size
     if polar < _AXIS:
         polar, a = _AXIS, _AXIS / segment
@@ -181,31 +162,25 @@ def _potential_jacobian(data, start, size, x, y, s):
     d_pp = _blend(data, p, row, segment, a2, bv) / segment**2
     d_pa = _blend(data, p, row, segment, af, bf) / segment**2
     d_aa = _blend(data, p, row, segment, av, b2) / segment**2
-    sin_p, cos_p = math.sin(polar), math.cos(polar)
-    sin_a, cos_a = math.sin(azimuth), math.cos(azimuth)
-    nx, ny, ns = sin_p * cos_a, sin_p * sin_a, cos_p
-    px, py, ps = cos_p * cos_a, cos_p * sin_a, -sin_p  # unit vector of growing polar angle
-    ax, ay = -sin_a, cos_a  # unit vector of growing azimuth
-    end = start + (size + 1) * row
-    tilt, t = _tilt(data[end], data[end + 1], nx, ny, ns)
-    across = d_a / sin_p
-    hx = tilt[0] + phi * nx + d_p * px + across * ax
-    hy = tilt[1] + phi * ny + d_p * py + across * ay
-    hs = tilt[2] + phi * ns + d_p * ps
+    sin_p, cos_p, sin_a, cos_a = math.sin(polar), math.cos(polar), math.sin(azimuth), math.cos(azimuth)
+    radial = (sin_p * cos_a, sin_p * sin_a, cos_p)
+    along = (cos_p * cos_a, cos_p * sin_a, -sin_p)  # unit vector of growing polar angle
+    across = (-sin_a, cos_a, 0.0)  # unit vector of growing azimuth
+    axis, lean = (0.0, 0.0, 1.0), (data[end], data[end + 1], 0.0)
+    c, n = _tilt(lean[0], lean[1], radial[0], radial[1], radial[2])
+    h_across = d_a / sin_p
     m_pp = phi + d_pp
     m_pa = (d_pa - d_a * cos_p / sin_p) / sin_p
     m_aa = phi + (d_p * cos_p + d_aa / sin_p) / sin_p
-    return (
-        hx * nx + t[0] + m_pp * px * px + m_pa * (px * ax + ax * px) + m_aa * ax * ax,
-        hx * ny + t[1] + m_pp * px * py + m_pa * (px * ay + ax * py) + m_aa * ax * ay,
-        hx * ns + t[2] + m_pp * px * ps + m_pa * ax * ps,
-        hy * nx + t[1] + m_pp * py * px + m_pa * (py * ax + ay * px) + m_aa * ay * ax,
-        hy * ny + t[3] + m_pp * py * py + m_pa * (py * ay + ay * py) + m_aa * ay * ay,
-        hy * ns + t[4] + m_pp * py * ps + m_pa * ay * ps,
-        hs * nx + t[2] + m_pp * ps * px + m_pa * ps * ax,
-        hs * ny + t[4] + m_pp * ps * py + m_pa * ps * ay,
-        hs * ns + t[5] + m_pp * ps * ps,
-    )
+    for i in range(3):
+        h = phi * radial[i] + d_p * along[i] + h_across * across[i] + n[i] - 2.0 * c * radial[i]
+        to_radial = h + 8.0 * c * radial[i] - 2.0 * n[i]
+        to_along, to_across = m_pp * along[i] + m_pa * across[i], m_pa * along[i] + m_aa * across[i]
+        to_axis = 2.0 * cos_p * lean[i] + n[2] / cos_p * axis[i] if cos_p > 0.0 else 0.0
+        for j in range(3):
+            out[3 * i + j] = to_radial * radial[j] + to_along * along[j] + to_across * across[j]
+            out[3 * i + j] += to_axis * axis[j] - 2.0 * radial[i] * n[j] + 2.0 * cos_p * axis[i] * lean[j]
+        out[4 * i] -= 2.0 * c
 
 
 @kernel
@@ -223,41 +198,22 @@ def _cells(data, start, size, x, y, s, speed):
 
 
 @kernel
-def _cells_jacobian(data, start, size, x, y, s, speed):
-    hx, hy, hs = 0.0, 0.0, 0.0
-    xx, xy, xs, yy, ys, ss = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(size):
-        px, py, w = data[start + i], data[start + size + i], data[start + 2 * size + i]
+def _cells_jacobian(data, start, size, x, y, s, speed, out):
+    radial = (x / speed, y / speed, s / speed)
+    for i in range(9):
+        out[i] = 0.0
+    for m in range(size):
+        px, py, w = data[start + m], data[start + size + m], data[start + 2 * size + m]
         ux, uy = x - s * py, y + s * px
         norm = math.sqrt(ux * ux + uy * uy)
-        c = 1.0 / norm if norm > 0.0 else 0.0
-        ex, ey = c * ux, c * uy
-        lever = px * ey - py * ex
-        hx += w * ex
-        hy += w * ey
-        hs += w * lever
-        # w/|v| P' (I - e e') P with (I - e e') = t t', t normal to e
-        tx, ty = -ey, ex
-        ts = px * ty - py * tx
-        c *= w
-        xx += c * tx * tx
-        xy += c * tx * ty
-        xs += c * tx * ts
-        yy += c * ty * ty
-        ys += c * ty * ts
-        ss += c * ts * ts
-    nx, ny, ns = x / speed, y / speed, s / speed
-    return (
-        hx * nx + speed * xx,
-        hx * ny + speed * xy,
-        hx * ns + speed * xs,
-        hy * nx + speed * xy,
-        hy * ny + speed * yy,
-        hy * ns + speed * ys,
-        hs * nx + speed * xs,
-        hs * ny + speed * ys,
-        hs * ns + speed * ss,
-    )
+        per_norm = 1.0 / norm if norm > 0.0 else 0.0
+        ex, ey = per_norm * ux, per_norm * uy
+        # the velocity turns across e only: d e/dV = t t' P / |v| with t normal to e
+        along, across = (ex, ey, px * ey - py * ex), (-ey, ex, px * ex + py * ey)
+        turn = speed * per_norm
+        for i in range(3):
+            for j in range(3):
+                out[3 * i + j] += w * (along[i] * radial[j] + turn * across[i] * across[j])
 
 
 @inlined
@@ -278,19 +234,21 @@ def sliding(kind, data, start, size, x, y, s, speed):
 
 
 @kernel
-def sliding_jacobian(kind, data, start, size, x, y, s, speed):
-    """`du/dV_S`, nine numbers row by row; at rest, where it has no value, the ellipsoid's, which lies between all.
+def sliding_jacobian(kind, data, start, size, x, y, s, speed, out):
+    """Write `du/dV_S`, nine numbers row by row; at rest, where it has no value, the ellipsoid's, which lies between all.
 
     `u` is homogeneous, so that `u = du/dV_S V_S`.
     """
-    if kind == ELLIPSOID or speed == 0.0:
-        return _IDENTITY
-    if kind == CELLS:
-        return _cells_jacobian(data, start, size, x, y, s, speed)
     mirror = -1.0 if s < 0.0 else 1.0
-    if kind == BILINEAR:
-        return _bilinear_jacobian(data, start, size, mirror * x, mirror * y, mirror * s)
-    return _potential_jacobian(data, start, size, mirror * x, mirror * y, mirror * s)
+    if kind == ELLIPSOID or speed == 0.0:
+        for i in range(9):
+            out[i] = 1.0 if i % 4 == 0 else 0.0
+    elif kind == CELLS:
+        _cells_jacobian(data, start, size, x, y, s, speed, out)
+    elif kind == BILINEAR:
+        _bilinear_jacobian(data, start, size, mirror * x, mirror * y, mirror * s, out)
+    else:
+        _potential_jacobian(data, start, size, mirror * x, mirror * y, mirror * s, out)
 
 
 @kernel
@@ -311,6 +269,4 @@ def sliding_jacobian_batch(kind, data, start, size, twist, jacobian):
     """`sliding_jacobian` for scaled twists `[M, 3]` into `jacobian [M, 9]`."""
     for m in range(twist.shape[0]):
         v = twist[m]
-        values = sliding_jacobian(kind, data, start, size, v[0], v[1], v[2], _norm(v))
-        for i in range(9):
-            jacobian[m, i] = values[i]
+        sliding_jacobian(kind, data, start, size, v[0], v[1], v[2], _norm(v), jacobian[m])

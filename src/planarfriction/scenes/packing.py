@@ -105,7 +105,7 @@ def pack(scene, t_end: float) -> PackedScene:
             shapes_here = [model.shape_at(value) for value in values]
             rows = [shapes.add_reduced(shape) for shape in shapes_here]
             radius = max(shape.contact_radius for shape in shapes_here)
-            sizes.append((3, 0, 18))
+            sizes.append((3, 0, 27))
             cells.append(np.empty((0, 2)))
             loaded.append(np.empty(0, bool))
             natural.append(scale * np.array([1.0, 1.0, radius]))
