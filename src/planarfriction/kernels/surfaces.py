@@ -24,6 +24,9 @@ BILINEAR, POTENTIAL, ELLIPSOID, CELLS = 0, 1, 2, 3
 # as much, and rounding, which the Jacobian divides by its square, stays below 1e-5 too.
 _AXIS = 1e-5
 
+# A cell slower than this share of the twist stands in the centre of rotation: what is left of its speed is rounding.
+_AT_REST = 1e-14
+
 
 @inlined
 def _place(size, x, y, s):
@@ -190,7 +193,7 @@ def _cells(data, start, size, x, y, s, speed):
         px, py, w = data[start + i], data[start + size + i], data[start + 2 * size + i]
         ux, uy = x - s * py, y + s * px
         norm = math.sqrt(ux * ux + uy * uy)
-        c = w / norm if norm > 0.0 else 0.0
+        c = w / norm if norm > _AT_REST * speed else 0.0
         hx += c * ux
         hy += c * uy
         hs += c * (px * uy - py * ux)
@@ -206,7 +209,7 @@ def _cells_jacobian(data, start, size, x, y, s, speed, out):
         px, py, w = data[start + m], data[start + size + m], data[start + 2 * size + m]
         ux, uy = x - s * py, y + s * px
         norm = math.sqrt(ux * ux + uy * uy)
-        per_norm = 1.0 / norm if norm > 0.0 else 0.0
+        per_norm = 1.0 / norm if norm > _AT_REST * speed else 0.0
         ex, ey = per_norm * ux, per_norm * uy
         # the velocity turns across e only: d e/dV = t t' P / |v| with t normal to e
         along, across = (ex, ey, px * ey - py * ex), (-ey, ex, px * ex + py * ey)

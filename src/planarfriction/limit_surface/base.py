@@ -17,6 +17,9 @@ from planarfriction.patch import ContactPatch
 _FULL_BALANCE = 1e-12
 """The twist of a wrench is found when its wrench is parallel to the given one to this angle [rad]."""
 
+_ROUNDING = 16.0 * np.finfo(float).eps
+"""Share of the positions by which the centre of pressure, a sum over the cells, may be off."""
+
 
 class SurfaceNumbers(NamedTuple):
     """A limit surface as compiled loops see it: `kernels.surfaces` says what the numbers mean."""
@@ -82,7 +85,10 @@ class LimitSurface:
         """Positions about the centre of pressure and weights of the cells that carry load."""
         weights = self.patch.weights(self.normal_force)
         loaded = weights > 0.0
-        offset = self.patch.positions[loaded] - self.centre_of_pressure
+        positions = self.patch.positions[loaded]
+        offset = positions - self.centre_of_pressure
+        # the centre of pressure is a sum with rounding; a cell that stands on it stands on it exactly
+        offset[np.abs(offset).max(axis=1) < _ROUNDING * np.abs(positions).max()] = 0.0
         return np.ascontiguousarray(offset[:, 0]), np.ascontiguousarray(offset[:, 1]), weights[loaded]
 
     # ------------------------------------------------------------------ the protocol
