@@ -1,0 +1,57 @@
+"""Make the pictures of README and docs from the library itself: `python docs/make_images.py [FOLDER]`.
+
+They go to `docs/images` unless a folder is named. Each stays below 150 kB.
+"""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import numpy as np
+
+import planarfriction as pf
+from planarfriction import plots
+from planarfriction.patch import PUBLISHED_PATCHES
+
+LARGEST = 150_000
+"""Largest size of a picture [bytes]."""
+
+LAW = pf.LuGre(elasto_plastic=pf.ElastoPlastic(0.9))
+"""The published law."""
+
+
+def fingertip() -> pf.ContactPatch:
+    """A made-up measured pressure map: a fingertip that presses harder with one side, 24 x 16 cells of 1 mm."""
+    y, x = np.mgrid[0:16, 0:24] - np.array([7.5, 11.5])[:, None, None]
+    pressure = np.clip(1.0 - (x / 11.0) ** 2 - (y / 7.0) ** 2, 0.0, None) ** 0.5 * (1.0 + 0.045 * x - 0.04 * y)
+    return pf.ContactPatch.from_pressure(pressure, cell_size=1e-3, name="fingertip")
+
+
+def figures() -> dict[str, plots.style.PlotFigure]:
+    """The figures by the names of their files."""
+    circle, pads = PUBLISHED_PATCHES["Circle"](), PUBLISHED_PATCHES["NonConvex1"]()
+    models = {"distributed": pf.DistributedModel(circle, LAW), "reduced": pf.ReducedModelPublished(circle, LAW)}
+    in_hand = {name: pf.simulate(pf.scenes.in_hand(model)) for name, model in models.items()}
+    return {
+        "in-hand-motion": plots.plot_motion(in_hand["distributed"]),
+        "in-hand-histories": plots.plot_histories(in_hand),
+        "limit-surface": plots.plot_limit_surface(pf.LimitSurfaceCells(pads)),
+        "pressure-map": plots.plot_patch(fingertip(), normal_force=5.0),
+    }
+
+
+def main(folder: Path) -> None:
+    """Write every picture and say how large it is."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, figure in figures().items():
+        path = folder / f"{name}.png"
+        figure.savefig(path, dpi=90, facecolor="white", metadata={"Software": None})
+        size = path.stat().st_size
+        print(f"{name}.png: {size / 1000:.0f} kB")
+        if size > LARGEST:
+            sys.exit(f"{name}.png is larger than {LARGEST / 1000:.0f} kB")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "images")

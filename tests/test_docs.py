@@ -1,0 +1,152 @@
+"""README and docs: their Python runs and prints what they say, their links lead somewhere, their names exist."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import importlib
+import io
+import pkgutil
+import re
+from pathlib import Path
+from typing import NamedTuple
+
+import matplotlib
+import pytest
+
+import planarfriction
+
+ROOT = Path(__file__).parent.parent
+PAGES = [ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")] + sorted(
+    (ROOT / "docs").glob("*.md")
+)
+MODULES = {module.name for module in pkgutil.iter_modules(planarfriction.__path__)}
+
+FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
+LINK = re.compile(r"\]\(([^)\s]+)\)")
+NAME = re.compile(r"`([A-Za-z_]\w*(?:\.\w+)+)(?:\([^`]*\))?`")
+
+pytestmark = pytest.mark.skipif(not (ROOT / "docs").is_dir(), reason="no docs beside these tests")
+
+
+class Block(NamedTuple):
+    """A fenced block of a page."""
+
+    language: str
+    text: str
+    line: int
+    follows_python: bool
+    """Nothing but blank lines is between this block and the Python before it."""
+
+
+def blocks(page: Path) -> list[Block]:
+    text, result, end, before = page.read_text(encoding="utf-8"), [], 0, ""
+    for match in FENCE.finditer(text):
+        line = text.count("\n", 0, match.start()) + 2
+        result.append(Block(match[1], match[2], line, before == "python" and not text[end : match.start()].strip()))
+        end, before = match.end(), match[1]
+    return result
+
+
+def prose(page: Path) -> str:
+    return FENCE.sub("", page.read_text(encoding="utf-8"))
+
+
+def anchors(page: Path) -> set[str]:
+    headings = re.findall(r"^#+ (.*)$", prose(page), re.MULTILINE)
+    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+
+
+def ids(page: Path) -> str:
+    return page.name
+
+
+@pytest.mark.parametrize("page", [page for page in PAGES if any(b.language == "python" for b in blocks(page))], ids=ids)
+def test_the_python_of_a_page_runs_and_prints_what_the_page_says(page, tmp_path, monkeypatch):
+    """In order, in one namespace, in an empty folder.
+
+    A block whose first line is `# name.toml` (or .csv) is written to that file; a `text` block right after Python is
+    what the Python prints, to the last character.
+    """
+    monkeypatch.chdir(tmp_path)
+    namespace: dict = {"__name__": page.stem}
+    printed = ""
+    backend = matplotlib.get_backend()
+    matplotlib.use("Agg")
+    try:
+        for block in blocks(page):
+            if block.language == "python":
+                output = io.StringIO()
+                code = compile("\n" * (block.line - 1) + block.text, str(page), "exec")
+                with contextlib.redirect_stdout(output):
+                    exec(code, namespace)
+                printed = output.getvalue()
+            elif block.language == "text" and block.follows_python:
+                assert printed == block.text, f"{page.name}, line {block.line}: prints\n{printed}"
+            elif match := re.match(r"# ([\w-]+\.(?:toml|csv))\n", block.text):
+                Path(match[1]).write_text(block.text, encoding="utf-8")
+    finally:
+        matplotlib.use(backend)
+
+
+@pytest.mark.parametrize("page", PAGES, ids=ids)
+def test_links_lead_somewhere(page):
+    for link in LINK.findall(prose(page)):
+        if link.startswith(("http://", "https://")):
+            continue
+        path, _, anchor = link.partition("#")
+        target = (page.parent / path).resolve() if path else page
+        assert target.exists(), f"{page.name}: {link}"
+        if anchor:
+            assert anchor in anchors(target), f"{page.name}: {link} (headings: {sorted(anchors(target))})"
+
+
+def resolve(name: str) -> bool:
+    """Whether a dotted name exists in the package: modules, functions, classes and the fields of classes."""
+    parts = name.split(".")
+    value = planarfriction
+    for i, part in enumerate(parts):
+        fields = getattr(value, "__dataclass_fields__", None) or dict.fromkeys(getattr(value, "_fields", ()))
+        if hasattr(value, part):
+            value = getattr(value, part)
+        elif part in fields:
+            return i == len(parts) - 1
+        else:
+            try:
+                value = importlib.import_module(".".join(["planarfriction", *parts[: i + 1]]))
+            except ImportError:
+                return False
+    return True
+
+
+@pytest.mark.parametrize("page", PAGES, ids=ids)
+def test_names_exist(page):
+    """`formulas.stribeck`, `LuGre.mu_c` and the like: names that begin with a module or with a public name."""
+    for name in NAME.findall(page.read_text(encoding="utf-8")):
+        first, _, rest = name.partition(".")
+        if first in ("pf", "planarfriction"):
+            assert resolve(rest), f"{page.name}: {name}"
+        elif (first in MODULES or first in planarfriction.__all__) and not name.endswith((".py", ".md")):
+            assert resolve(name), f"{page.name}: {name}"
+
+
+def test_scenes_page_names_every_key():
+    from planarfriction import ContactPatch, LuGre, SoftFinger
+    from planarfriction.scenes import files, model_files
+
+    page = (ROOT / "docs" / "scenes.md").read_text(encoding="utf-8")
+    keys = {*files.SCENE_KEYS, *files.BODY_KEYS, *files.CONTACT_KEYS}
+    keys |= {*model_files.MODELS, *model_files.SURFACES, *model_files.SHAPES, *model_files.OTHER_SHAPES}
+    keys |= {field.name for kind in (LuGre, SoftFinger) for field in dataclasses.fields(kind)}
+    for shape in model_files.SHAPES:
+        code = getattr(ContactPatch, shape).__func__.__code__
+        keys |= set(code.co_varnames[1 : code.co_argcount + code.co_kwonlyargcount])
+    missing = {key for key in keys if f"`{key}`" not in page}
+    assert not missing
+
+
+def test_pictures_are_small_and_used():
+    used = "".join(page.read_text(encoding="utf-8") for page in PAGES)
+    for picture in (ROOT / "docs" / "images").glob("*"):
+        assert picture.stat().st_size < 200_000, picture.name
+        assert f"images/{picture.name}" in used, picture.name
