@@ -55,5 +55,6 @@ def print_table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str
     for row in rows:
         table.add_row(*row)
     console = Console(markup=False, highlight=False)  # units in brackets are no markup
-    # A pipe has no width of its own: never fold what another program may read.
-    console.print(table, width=None if console.is_terminal else 200, soft_wrap=False)
+    if not console.is_terminal:
+        console = Console(markup=False, highlight=False, width=200)  # never fold what another program may read
+    console.print(table)

@@ -109,14 +109,24 @@ def drift(model: Any, *, load: Literal["tangential", "normal"] = "tangential", t
 
 
 def free_slide(
-    model: Any, *, mass: float, inertia: float, twist, normal_force: Any = None, t_end: float = 5.0
+    model: Any,
+    *,
+    mass: float,
+    inertia: float,
+    twist,
+    position=(0.0, 0.0),
+    angle: float = 0.0,
+    normal_force: Any = None,
+    outline=None,
+    t_end: float = 5.0,
 ) -> Scene:
     """A body thrown onto a level table with the initial `twist` `(vx, vy, omega)`; ends when it has stopped.
 
     The patch is fixed to the body, its frame's origin at the centre of mass. `mass` [kg], `inertia` about the centre of
-    mass [kg m^2], `normal_force` [N] a signal or a number (default: the weight `9.81 mass`).
+    mass [kg m^2], initial `position` [m] and `angle` [rad], `normal_force` [N] a signal or a number (default: the weight
+    `9.81 mass`), `outline` `[M, 2]` [m] for drawing.
     """
-    body = Body(mass, inertia, velocity=twist, gravity=(0.0, 0.0))
+    body = Body(mass, inertia, position, angle, twist, gravity=(0.0, 0.0), outline=outline)
     load: Any = GRAVITY * body.mass if normal_force is None else normal_force
     contact = Contact(model, load, mounted_on="body", name="table")
     return Scene(body, [contact], t_end, stop_speed=STOP_SPEED, name="free slide")

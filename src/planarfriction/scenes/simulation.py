@@ -135,11 +135,17 @@ def _dataset(scene: Scene, packed: PackedScene, output: Output) -> xr.Dataset:
     """Histories with units, the whole scene in the attributes."""
     import xarray as xr
 
-    variables: dict = {name: ("time", output.body[:, i]) for i, name in enumerate(_BODY)}
-    variables |= {name: (("time", "contact"), output.wrench[:, :, i]) for i, name in enumerate(_WRENCH)}
-    variables["normal_force"] = (("time", "contact"), output.load)
-    units = {**_BODY, **_WRENCH, "normal_force": "N"}
-    names = [contact.name for contact in scene.contacts]
+    def described(name: str, unit: str) -> dict[str, str]:
+        return {"units": unit, **({"long_name": _LONG_NAMES[name]} if name in _LONG_NAMES else {})}
+
+    variables: dict = {
+        name: ("time", output.body[:, i], described(name, unit)) for i, (name, unit) in enumerate(_BODY.items())
+    }
+    variables |= {
+        name: (("time", "contact"), output.wrench[:, :, i], described(name, unit))
+        for i, (name, unit) in enumerate(_WRENCH.items())
+    }
+    variables["normal_force"] = (("time", "contact"), output.load, described("normal_force", "N"))
     if len(output.bristles):
         for c, contact in enumerate(scene.contacts):
             part = output.bristles[:, packed.contacts.state[c] : packed.contacts.state[c + 1]]
@@ -147,15 +153,11 @@ def _dataset(scene: Scene, packed: PackedScene, output: Output) -> xr.Dataset:
             if len(packed.loaded[c]):
                 full = np.zeros((len(part), 2, len(packed.loaded[c])))
                 full[:, :, packed.loaded[c]] = part.reshape(len(part), 2, -1)
-                variables[name] = (("time", "axis", f"cell_{contact.name}"), full)
-                units[name] = "m"
+                variables[name] = (("time", "axis", f"cell_{contact.name}"), full, {"units": "m"})
             else:
-                variables[name] = (("time", "component"), part)
-                units[name] = "m, m, m^2"
-    data = xr.Dataset(variables, coords={"time": output.time, "contact": names}, attrs={"scene": scene.to_json()})
-    data.time.attrs = {"units": "s", "long_name": "time"}
-    for name, unit in units.items():
-        data[name].attrs["units"] = unit
-        if name in _LONG_NAMES:
-            data[name].attrs["long_name"] = _LONG_NAMES[name]
-    return data
+                variables[name] = (("time", "component"), part, {"units": "m, m, m^2"})
+    coordinates = {
+        "time": ("time", output.time, {"units": "s", "long_name": "time"}),
+        "contact": [contact.name for contact in scene.contacts],
+    }
+    return xr.Dataset(variables, coords=coordinates, attrs={"scene": scene.to_json()})
