@@ -25,6 +25,7 @@ MODULES = {module.name for module in pkgutil.iter_modules(planarfriction.__path_
 FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 NAME = re.compile(r"`([A-Za-z_]\w*(?:\.\w+)+)(?:\([^`]*\))?`")
+BARE_NAME = re.compile(r"\b[A-Za-z_]\w*(?:\.\w+)+")
 
 pytestmark = pytest.mark.skipif(not (ROOT / "docs").is_dir(), reason="no docs beside these tests")
 
@@ -122,7 +123,8 @@ def resolve(name: str) -> bool:
 @pytest.mark.parametrize("page", PAGES, ids=ids)
 def test_names_exist(page):
     """`formulas.stribeck`, `LuGre.mu_c` and the like: names that begin with a module or with a public name."""
-    for name in NAME.findall(page.read_text(encoding="utf-8")):
+    equations = "".join(block.text for block in blocks(page) if not block.language)
+    for name in NAME.findall(prose(page)) + BARE_NAME.findall(equations):
         first, _, rest = name.partition(".")
         if first in ("pf", "planarfriction"):
             assert resolve(rest), f"{page.name}: {name}"
