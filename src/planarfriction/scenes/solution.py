@@ -29,9 +29,9 @@ class Solution:
     """Histories over `time` [s] and `contact`, each with its unit in `attrs["units"]`.
 
     Body (world axes, centre of mass): x, y [m], theta [rad], vx, vy [m/s], omega [rad/s]; a prescribed velocity is
-    recorded as it was given, in body axes. Each contact: fx, fy [N], tau [N m], the friction wrench on the body about the
-    contact frame's origin in its axes, of **one** of `count` identical contacts, and normal_force [N]; at a jump the
-    left limit.
+    recorded as it was given, in body axes. Each contact: fx, fy [N], tau [N m], the friction wrench on the body about
+    the contact frame's origin in its axes, of **one** of `count` identical contacts, and normal_force [N]; at a jump
+    the left limit.
     """
     statistics: Statistics
     """What the simulation took."""
