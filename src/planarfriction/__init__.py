@@ -23,12 +23,14 @@ _HOME = {
     "LimitSurfaceEllipsoid": "planarfriction.limit_surface",
     "LimitSurfaceTable": "planarfriction.limit_surface",
     "LimitSurfaceTablePublished": "planarfriction.limit_surface",
+    "LinearGradient": "planarfriction.patch",
     "LuGre": "planarfriction.laws",
     "ReducedModelPublished": "planarfriction.models",
     "Scene": "planarfriction.scenes",
     "Signal": "planarfriction.scenes",
     "SoftFinger": "planarfriction.patch",
     "Solution": "planarfriction.scenes",
+    "Uniform": "planarfriction.patch",
     "load": "planarfriction.scenes",
     "simulate": "planarfriction.scenes",
 }
@@ -62,5 +64,5 @@ if TYPE_CHECKING:
         LimitSurfaceTablePublished,
     )
     from planarfriction.models import DistributedModel, ReducedModelPublished
-    from planarfriction.patch import ContactPatch, SoftFinger
+    from planarfriction.patch import ContactPatch, LinearGradient, SoftFinger, Uniform
     from planarfriction.scenes import Body, Contact, Scene, Signal, Solution, load, simulate

@@ -73,11 +73,21 @@ def traction(z, zdot, velocity, sigma_0, sigma_1, sigma_2):
     return -(sigma_0 * z + sigma_1 * zdot + sigma_2 * velocity)
 
 
+def mean_decay(start, end, dt):
+    """Mean of k over a step [1/s] from its values at the start and at the predicted end.
+
+    Half and half for short steps (second order), all on the end for steps much longer than the bristle's memory, whose
+    result is then the steady state of k at the end; the share of the start, `1/(2 + x + x^2)` of `x = k dt`, leads over.
+    """
+    x = 0.5 * (start + end) * dt
+    return end + (start - end) / (2.0 + x + x * x)
+
+
 def relaxation(xp, decay_dt):
     """`exp(-x)` and `(1 - exp(-x))/x` of `x = k dt >= 0`: the exact step of `zdot = u - k z` for a held `k` and `u`.
 
     `z(dt) = exp(-x) z + (1 - exp(-x))/x u dt`. Plain LuGre has a constant k and this is its step. Elasto-plastic bristles
-    take the mean of k at the start and at a predicted end, `z_p = (z + u dt)/(1 + k dt)`: second order, stable at any dt.
+    take `mean_decay` of k at the start and at a predicted end, `z_p = (z + u dt)/(1 + k dt)`: second order, stable at any dt.
     Below `x = 1e-3` the quotient is its series, exact to 1e-16 there, where the difference would cancel.
     """
     remaining = xp.exp(-decay_dt)

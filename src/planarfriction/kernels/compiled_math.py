@@ -46,6 +46,12 @@ def where(condition, a, b):
 
 
 @_inline
+def is_finite(x):
+    """Neither NaN nor infinite. (`math.isfinite` takes x - x, which reordering turns into 0.)"""
+    return abs(x) <= 1.7976931348623157e308
+
+
+@_inline
 def minimum(a, b):
     """The smaller of two numbers."""
     return a if a < b else b

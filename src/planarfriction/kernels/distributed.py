@@ -172,7 +172,7 @@ def _step(gamma, law, z, vx, vy, omega, x, y, w, dt, out):
         along = (px * ux + py * uy) / xp.where(p_norm > 0.0, p_norm, 1.0)
         deflection = xp.minimum(p_norm * q / (1.0 + start * dt), xp.maximum(z_norm * q, 1.0))
         end = formulas.bristle_decay(xp, deflection, along, speed, q, law.elasto_plastic, law.breakaway_ratio)
-        ox[i] = 0.5 * (start + end)
+        ox[i] = formulas.mean_decay(start, end, dt)
     for i in range(n):
         ux, uy = vx - omega * y[i], vy + omega * x[i]
         left, mean = formulas.relaxation(xp, ox[i] * dt)

@@ -95,7 +95,10 @@ def stages_for(method: Method, n: int) -> Stages:
 
 @kernel
 def _error_norm(contacts, y, new, error, rtol, atol):
-    """Largest of the body's components and of each contact's mean over its bristles, in units of the tolerance."""
+    """Largest of the body's components and of each contact's mean over its bristles, in units of the tolerance.
+
+    Infinite where anything is not finite.
+    """
     largest = 0.0
     for c in range(contacts.kind.shape[0]):
         first, last = contacts.state[c], contacts.state[c + 1]
@@ -103,14 +106,17 @@ def _error_norm(contacts, y, new, error, rtol, atol):
         for i in range(first, last):
             e = error[i] / (atol[i] + rtol * xp.maximum(abs(y[i]), abs(new[i])))
             total += e * e
+        if not xp.is_finite(total):
+            return math.inf
         if last > first:
             largest = xp.maximum(largest, math.sqrt(total / (last - first)))
     n = y.shape[0]
     for i in range(n - 6, n):
-        largest = xp.maximum(largest, abs(error[i]) / (atol[i] + rtol * xp.maximum(abs(y[i]), abs(new[i]))))
-        if not math.isfinite(error[i]):
+        e = abs(error[i]) / (atol[i] + rtol * xp.maximum(abs(y[i]), abs(new[i])))
+        if not xp.is_finite(e):
             return math.inf
-    return largest if math.isfinite(largest) else math.inf
+        largest = xp.maximum(largest, e)
+    return largest
 
 
 @kernel
@@ -269,7 +275,7 @@ def advance(contacts, motion, method, output, y, cursor, clock, rtol, atol, max_
             # no growth right after a rejection, whose reason is still near
             growth = _GROWTH if fresh else 1.0
             scale = _SHRINKAGE
-            if math.isfinite(norm):
+            if xp.is_finite(norm):
                 ideal = _SAFETY * xp.maximum(norm, 1e-10) ** (-1.0 / method.order)
                 scale = xp.minimum(growth, xp.maximum(_SHRINKAGE, ideal))
             fresh = norm <= 1.0

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -16,6 +15,9 @@ from planarfriction.kernels.law import law_numbers, law_row
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
 from planarfriction.limit_surface.base import scaling
 from planarfriction.models.base import FrictionModel, ModelJacobians
+
+_REMEMBERED = 64
+"""Loads whose shapes a model remembers."""
 
 ON_LOAD_CHANGE = ("rebuild", "rescale", "keep")
 
@@ -78,7 +80,12 @@ class ReducedModelPublished(FrictionModel):
         """Centre of pressure, `r`, `<rho^2>` and limit surface at a load [N]; recent loads are remembered."""
         if not self.patch.depends_on_load or self.on_load_change == "keep":
             return self._reference
-        return self._recent(float(normal_force))
+        load = validation.positive("normal_force", normal_force)
+        if load not in self._recent:
+            while len(self._recent) >= _REMEMBERED:
+                self._recent.pop(next(iter(self._recent)))
+            self._recent[load] = self._shape_at(load)
+        return self._recent[load]
 
     def rate(self, state, twist, normal_force) -> np.ndarray:
         """Bristle rates `zdot`, shape `[..., 3]` [m/s, m/s, m^2/s]."""
@@ -129,11 +136,10 @@ class ReducedModelPublished(FrictionModel):
         return ReducedShape(surface.centre_of_pressure, surface.contact_radius, second_moment, surface)
 
     @functools.cached_property
-    def _recent(self) -> Callable[[float], ReducedShape]:
-        return functools.lru_cache(maxsize=64)(self._shape_at)
+    def _recent(self) -> dict[float, ReducedShape]:
+        return {}
 
     def _shape_at(self, normal_force: float) -> ReducedShape:
-        validation.positive("normal_force", normal_force)
         surface = self.surface.at(normal_force)
         kept = self._reference if self.on_load_change == "rescale" else None
         return ReducedShape(
