@@ -82,8 +82,6 @@ class FrictionModel:
         except ValueError:
             shapes = ", ".join(str(list(v.shape)) for v in (state, twist, *arrays.values()))
             raise InvalidValueError("batch axes", "broadcast", f"shapes {shapes}") from None
-        return [
-            np.broadcast_to(state, batch + inner),
-            np.broadcast_to(twist, (*batch, 3)),
-            *(np.broadcast_to(value, batch) for value in arrays.values()),
-        ]
+        wanted = [batch + inner, (*batch, 3), *(batch for _ in arrays)]
+        given = [state, twist, *arrays.values()]
+        return [a if a.shape == shape else np.broadcast_to(a, shape) for a, shape in zip(given, wanted, strict=True)]
