@@ -156,6 +156,19 @@ def test_relaxation_of_endless_steps():
     assert mean == pytest.approx([1e-3, 1e-9, 1e-30], rel=1e-15)
 
 
+@given(st.floats(0.0, 1e6), st.floats(0.0, 1e6), st.floats(-12.0, 9.0))
+@checked
+def test_mean_decay(start, end, log_dt):
+    dt = 10.0**log_dt
+    k = formulas.mean_decay(start, end, dt)
+    assert min(start, end) * (1 - 1e-12) <= k <= max(start, end) * (1 + 1e-12)  # a mean; rounding
+    half, x = 0.5 * (start + end), 0.5 * (start + end) * dt
+    if x < 1.0:  # second order: the half-way mean but for a share of x
+        assert abs(k - half) <= 0.5 * x * abs(start - end) + 1e-12 * half
+    if x > 10.0:  # long steps: the end's, and what is left of the start less than its share of the step
+        assert abs(k - end) * dt <= 2.0 * abs(start - end) / half / x + 1e-12 * end * dt
+
+
 @given(deflections, deflections)
 @checked
 def test_a_step_ends_within_reach(start, end):
@@ -185,6 +198,7 @@ def compiled(speed, deflection, along, mu_c, mu_s, v_s, gamma, grip, elasto_plas
         out[i, 10], out[i, 11] = left
         out[i, 12] = formulas.reachable_deflection(compiled_math, d, e)
         out[i, 13] = formulas.cap(compiled_math, d, 0.5)
+        out[i, 14] = formulas.mean_decay(v, q, decay_dt[i])
 
 
 def test_every_formula_gives_the_same_number_in_compiled_loops():
@@ -199,7 +213,7 @@ def test_every_formula_gives_the_same_number_in_compiled_loops():
     along = random.uniform(-1.0, 1.0, n) * speed
     elasto_plastic = random.choice([0.0, 1.0], n)
     decay_dt = 10.0 ** random.uniform(-6, 2.5, n)
-    out = np.empty((n, 14))
+    out = np.empty((n, 15))
     compiled(speed, deflection, along, mu_c, mu_s, v_s, gamma, grip, elasto_plastic, ratio, decay_dt, out)
     bristle = (deflection, along, speed, grip, elasto_plastic, ratio)
     expected = [
@@ -213,6 +227,7 @@ def test_every_formula_gives_the_same_number_in_compiled_loops():
         *formulas.relaxation(np, decay_dt),
         formulas.reachable_deflection(np, deflection, elasto_plastic),
         formulas.cap(np, deflection, 0.5),
+        formulas.mean_decay(speed, grip, decay_dt),
     ]
     # Each formula is some ten roundings of 1e-16. Where a number passes through zero (the sine's ends, which alpha and
     # its slope divide by a width of 0.05 or more; exp of large arguments) its rounding is a share of its largest value.

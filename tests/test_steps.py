@@ -1,0 +1,383 @@
+"""The step for hosts with a fixed time step: exact, second order, stable; batches; loads that change the shape."""
+
+from __future__ import annotations
+
+import functools
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy import integrate
+
+import planarfriction as pf
+from planarfriction.errors import InvalidValueError
+
+PLAIN = pf.LuGre()
+ELASTIC = pf.LuGre(elasto_plastic=pf.ElastoPlastic(0.9))
+WIDE = pf.LuGre(gamma=1.5, elasto_plastic=pf.ElastoPlastic(0.3))
+"""A wide elasto-plastic range: smooth at the steps of an order test."""
+LAWS = {"plain": PLAIN, "elasto-plastic": ELASTIC, "wide": WIDE}
+SURFACES = {
+    "cells": pf.LimitSurfaceCells,
+    "table": pf.LimitSurfaceTable,
+    "published": pf.LimitSurfaceTablePublished,
+    "ellipsoid": pf.LimitSurfaceEllipsoid,
+}
+PATCH = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
+LOAD = 2.0
+TWIST = np.array([2e-3, -1e-3, 0.3])
+
+every_model = pytest.mark.parametrize("kind", ["distributed", *SURFACES])
+every_law = pytest.mark.parametrize("law", LAWS)
+
+
+@functools.cache
+def model_of(kind: str, law: str = "elasto-plastic"):
+    """A model by name: "distributed" or the reduced one with a kind of limit surface."""
+    if kind == "distributed":
+        return pf.DistributedModel(PATCH, LAWS[law])
+    return pf.ReducedModelPublished(PATCH, LAWS[law], surface=SURFACES[kind](PATCH))
+
+
+def scaled(model, state):
+    """Deflections [m]: the reduced model's third one over the contact radius."""
+    return state / (1.0, 1.0, model.surface.contact_radius) if model.state_shape == (3,) else state
+
+
+def norms(model, state):
+    """Deflection |z| of each bristle [m]."""
+    return np.linalg.norm(scaled(model, state), axis=-1 if model.state_shape == (3,) else -2)
+
+
+def some_state(model, seed: int, size: float):
+    """A random state of that deflection."""
+    state = np.random.default_rng(seed).normal(size=model.state_shape) * size
+    return state * (1.0, 1.0, model.surface.contact_radius) if model.state_shape == (3,) else state
+
+
+def reference(model, state, twist, time):
+    """The state after `time` at a held twist, from `rate` by a Runge-Kutta method of order 8."""
+    units = np.ones(model.state_shape) * 1e-6
+    if model.state_shape == (3,):
+        units = units * (1.0, 1.0, model.surface.contact_radius)
+
+    def slope(_, z):
+        return (model.rate(z.reshape(model.state_shape) * units, twist, LOAD) / units).ravel()
+
+    found = integrate.solve_ivp(slope, (0.0, time), (state / units).ravel(), method="DOP853", rtol=3e-14, atol=1e-14)
+    assert found.success
+    return found.y[:, -1].reshape(model.state_shape) * units
+
+
+# ---------------------------------------------------------------------- accuracy
+
+
+@every_model
+@pytest.mark.parametrize("time", [1e-5, 3e-4, 2e-3])
+def test_plain_steps_are_exact(kind, time):
+    model = model_of(kind, "plain")
+    start = some_state(model, 1, 5e-7)
+    end, wrench = model.step(start, TWIST, LOAD, time)
+    expected = reference(model, start, TWIST, time)
+    # Deflections of 1e-6 m; the reference's own error, 3e-14 in each of some hundred steps.
+    assert scaled(model, end) == pytest.approx(scaled(model, expected), abs=1e-6 * 1e-11)
+    # The wrench is that of the end of the step: sigma_0 times the above, and rounding.
+    assert wrench == pytest.approx(model.wrench(end, TWIST, LOAD), abs=1e-10)
+
+
+@every_model
+@pytest.mark.parametrize("law", ["elasto-plastic", "wide"])
+def test_wrench_of_a_step_is_that_of_its_end(kind, law):
+    model = model_of(kind, law)
+    for seed in range(5):
+        end, wrench = model.step(some_state(model, seed, 7e-7), TWIST, LOAD, 1e-4)
+        assert wrench == pytest.approx(model.wrench(end, TWIST, LOAD), abs=1e-10)  # rounding
+
+
+@every_model
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_elasto_plastic_steps_are_of_second_order(kind, direction):
+    model, time = model_of(kind, "wide"), 3e-4
+    # Deflected into the elasto-plastic range (0.3 to 1 micrometre), and from there onwards or back.
+    start, _ = model.step(model.rest(), TWIST, LOAD, 2.5e-4)
+    twist = direction * TWIST + (5e-4, 4e-4, 0.1)
+    expected, errors = reference(model, start, twist, time), []
+    for steps in (20, 40, 80, 160):
+        state = start
+        for _ in range(steps):
+            state, _ = model.step(state, twist, LOAD, time / steps)
+        errors.append(np.abs(scaled(model, state - expected)).max())
+    orders = -np.diff(np.log2(errors))
+    # Second order, where no bristle crosses an end of its range within the last halvings.
+    assert orders[-1] == pytest.approx(2.0, abs=0.25), errors
+    assert errors[-1] < 1e-10  # of 1e-6 m
+
+
+@every_model
+@every_law
+def test_short_steps_follow_the_rate(kind, law):
+    """Compiled steps against the rate in NumPy: `(step(dt) - z)/dt -> rate`."""
+    model = model_of(kind, law)
+    for seed, size in enumerate((1e-7, 6e-7, 1e-6)):
+        state = some_state(model, seed, size)
+        for twist in (TWIST, -TWIST, (0.0, 0.0, 1.0), (1e-5, 0.0, 0.0)):
+            rate = scaled(model, model.rate(state, twist, LOAD))
+            dt = 1e-6 * 1e-6 / np.abs(rate).max()  # a millionth of full deflection
+            end, _ = model.step(state, twist, LOAD, dt)
+            # Truncation: dt k/2 = 1e-6; rounding of z: 1e-16 of 1e-6 over 1e-12.
+            assert scaled(model, end - state) / dt == pytest.approx(rate, abs=1e-5 * np.abs(rate).max())
+
+
+# ---------------------------------------------------------------------- stability
+
+
+@every_model
+@every_law
+def test_any_step_is_stable_and_does_not_overshoot(kind, law):
+    model = model_of(kind, law)
+
+    @given(
+        st.floats(-9.0, 3.0),
+        st.integers(0, 1000),
+        st.floats(-8.0, -4.0),
+        st.tuples(*3 * [st.floats(-1.0, 1.0)]),
+        st.floats(-6.0, 1.0),
+    )
+    @settings(deadline=None, max_examples=50)
+    def check(log_dt, seed, log_size, direction, log_speed):
+        start = some_state(model, seed, 10.0**log_size)
+        twist = np.array(direction) * 10.0**log_speed * (1.0, 1.0, 200.0)
+        end, wrench = model.step(start, twist, LOAD, 10.0**log_dt)
+        assert np.isfinite(end).all() and np.isfinite(wrench).all()
+        # Never past the larger of where it was and the steady deflection |h| g/sigma_0 of each bristle; rounding.
+        steady, _ = model.step(model.rest(), twist, LOAD, 1e40)
+        reach = np.maximum(norms(model, start), norms(model, steady))
+        assert (norms(model, end) <= reach * (1 + 1e-12)).all()
+
+    check()
+
+
+@every_model
+@every_law
+@pytest.mark.parametrize("start", ["rest", "opposite", "far"])
+def test_long_steps_end_in_the_steady_state(kind, law, start):
+    model = model_of(kind, law)
+    begin = {"rest": model.rest(), "opposite": some_state(model, 2, 5e-7), "far": some_state(model, 3, 1e-4)}[start]
+    for twist in (TWIST, 50.0 * TWIST, 1e-3 * TWIST):
+        # What is left of the start is its share of the way, squared: (1e-4 m/2e-6 m/s/1e8 s)^2 and less.
+        end, wrench = model.step(begin, twist, LOAD, 1e8)
+        at_end = model.rate(end, twist, LOAD)
+        assert at_end == pytest.approx(np.zeros(model.state_shape), abs=1e-11 * np.abs(twist).max())
+        again, wrench_again = model.step(end, twist, LOAD, 1e8)
+        assert scaled(model, again) == pytest.approx(scaled(model, end), abs=1e-6 * 1e-11)
+        assert wrench == pytest.approx(wrench_again, rel=1e-9)
+
+
+@every_model
+@every_law
+def test_nothing_moves_without_time_or_without_velocity(kind, law):
+    model = model_of(kind, law)
+    state = some_state(model, 4, 4e-7)
+    # Rounding of exp(0) and of the scaling by r.
+    assert model.step(state, TWIST, LOAD, 0.0)[0] == pytest.approx(state, rel=1e-15)
+    assert model.step(state, (0, 0, 0), LOAD, 1e3)[0] == pytest.approx(state, rel=1e-15)
+
+
+@every_model
+def test_no_creep_below_breakaway(kind):
+    """Elasto-plastic bristles are springs below breakaway: they come back exactly; plain ones creep."""
+    for law, allowed in (("elasto-plastic", 1e-19), ("plain", None)):
+        model, state = model_of(kind, law), None
+        state = model.rest()
+        # 50 cycles of pushing there and back, up to a fifth of full deflection.
+        for _ in range(50):
+            for sign in (1.0, -1.0):
+                state, _ = model.step(state, sign * TWIST, LOAD, 5e-5)
+        rest = np.abs(scaled(model, state)).max()
+        assert rest < allowed if allowed else rest > 1e-9
+
+
+# ---------------------------------------------------------------------- batches
+
+
+@every_model
+@every_law
+def test_batch_axes_broadcast_and_equal_single_calls(kind, law):
+    model, random = model_of(kind, law), np.random.default_rng(9)
+    states = np.stack([some_state(model, seed, 6e-7) for seed in range(2)])  # [2]
+    twists = random.normal(size=(3, 1, 3)) * (1e-2, 1e-2, 2.0)  # [3, 1]
+    loads, times = np.array([0.0, 1.5]), np.array([[1e-5], [1e-4], [1e-2]])  # [2], [3, 1]
+    ends, wrenches = model.step(states, twists, loads, times)
+    assert ends.shape == (3, 2, *model.state_shape) and wrenches.shape == (3, 2, 3)
+    assert model.rate(states, twists, loads).shape == (3, 2, *model.state_shape)
+    for i, j in np.ndindex(3, 2):
+        end, wrench = model.step(states[j], twists[i, 0], loads[j], times[i, 0])
+        # The same compiled code; sums over cells may be ordered differently, inlined copies rounded differently.
+        assert ends[i, j] == pytest.approx(end, rel=1e-12, abs=1e-21)
+        assert wrenches[i, j] == pytest.approx(wrench, rel=1e-12, abs=1e-15)
+        for function in (model.rate, model.wrench):
+            single = function(states[j], twists[i, 0], loads[j])
+            assert function(states, twists, loads)[i, j] == pytest.approx(single, rel=1e-12, abs=1e-15)
+
+
+@pytest.mark.parametrize("kind", ["distributed", "published"])
+def test_one_state_with_many_twists_loads_or_times(kind):
+    """A batch of three, which must not be taken for the three components of one twist."""
+    model = model_of(kind)
+    rest, twists = model.rest(), np.stack([TWIST, 2 * TWIST, 3 * TWIST])
+    ends, wrenches = model.step(rest, twists, LOAD, 1e-4)
+    assert ends.shape == (3, *model.state_shape) and wrenches.shape == (3, 3)
+    assert ends[1] == pytest.approx(model.step(rest, twists[1], LOAD, 1e-4)[0], rel=1e-12)
+    assert model.step(rest, TWIST, [1.0, 2.0], 1e-4)[1].shape == (2, 3)
+    assert model.step(rest, TWIST, np.array([1.0]), 1e-4)[1].shape == (1, 3)
+    assert model.step(rest, TWIST, LOAD, np.array([1e-4]))[1].shape == (1, 3)
+    assert model.step(rest, TWIST[None], LOAD, 1e-4)[1].shape == (1, 3)
+
+
+@pytest.mark.parametrize("kind", ["distributed", "published"])
+def test_plain_numbers_tuples_and_arrays_are_the_same(kind):
+    model = model_of(kind)
+    rest = model.rest()
+    expected = model.step(rest, TWIST, LOAD, 1e-4)
+    for twist in (tuple(TWIST), list(TWIST), tuple(map(np.float64, TWIST))):
+        for load, dt in ((2, 1e-4), (np.float64(2.0), np.float64(1e-4)), (np.array(2.0), np.array(1e-4))):
+            for got, wanted in zip(model.step(rest.tolist(), twist, load, dt), expected, strict=True):
+                assert got == pytest.approx(wanted, rel=1e-12)
+            for got, wanted in zip(model.step(rest, twist, load, dt), expected, strict=True):
+                assert got.shape == wanted.shape and got == pytest.approx(wanted, rel=1e-12)
+    assert not rest.any()  # the caller's state is left alone
+
+
+# ---------------------------------------------------------------------- loads
+
+
+@every_model
+def test_a_fixed_shape_is_proportional_to_the_load(kind):
+    model = model_of(kind)
+    state = some_state(model, 6, 6e-7)
+    assert model.wrench(state, TWIST, 6.0) == pytest.approx(3.0 * model.wrench(state, TWIST, 2.0), rel=1e-12)
+    assert model.rate(state, TWIST, 6.0) == pytest.approx(model.rate(state, TWIST, 2.0), rel=1e-15)
+
+
+@every_model
+def test_a_contact_without_load_forgets(kind):
+    model = model_of(kind)
+    state = some_state(model, 7, 6e-7)
+    end, wrench = model.step(state, TWIST, 0.0, 1e-4)
+    assert not end.any() and not wrench.any()
+    assert not model.wrench(state, TWIST, 0.0).any()
+
+
+FINGER = pf.ContactPatch.rectangle(
+    0.02, cells=21, pressure=pf.SoftFinger(c=6 * 0.02 / 21, n=1 / 3, k=2.0, radius_max=0.01)
+)
+
+
+def soft(on_load_change: str = "rebuild", kind=pf.LimitSurfaceTablePublished, normal_force=None):
+    """Reduced model of the soft finger."""
+    surface = kind(FINGER, normal_force=normal_force)
+    return pf.ReducedModelPublished(FINGER, PLAIN, surface=surface, on_load_change=on_load_change)
+
+
+def fixed_at(load: float) -> pf.ContactPatch:
+    """The soft finger's shape at a load, as a patch that keeps it."""
+    positions, weights = FINGER.positions, FINGER.weights(load)
+    return pf.ContactPatch(
+        positions[weights > 0.0], np.full((weights > 0).sum(), 1e-6), weights[weights > 0], FINGER.grid
+    )
+
+
+@pytest.mark.parametrize("kind", SURFACES.values())
+def test_rebuild_follows_the_load_with_everything(kind):
+    model = soft(kind=kind)
+    state, loads = np.array([3e-7, -2e-7, 1e-9]), np.array([0.5, 1.0, 3.0])
+    ends, wrenches = model.step(state, TWIST, loads, 1e-4)
+    for load, end, wrench in zip(loads, ends, wrenches, strict=True):
+        patch = fixed_at(load)
+        other = pf.ReducedModelPublished(patch, PLAIN, surface=kind(patch))
+        expected_end, expected_wrench = other.step(state, TWIST, load, 1e-4)
+        # The same numbers by another way: rounding.
+        assert end == pytest.approx(expected_end, rel=1e-9)
+        assert wrench == pytest.approx(expected_wrench, rel=1e-9)
+        assert model.rate(state, TWIST, load) == pytest.approx(other.rate(state, TWIST, load), rel=1e-9)
+        for got, wanted in zip(model.jacobians(state, TWIST, load), other.jacobians(state, TWIST, load), strict=True):
+            assert got == pytest.approx(wanted, rel=1e-9, abs=1e-9 * np.abs(wanted).max())
+        assert model.shape_at(load).contact_radius == pytest.approx(other.surface.contact_radius, rel=1e-12)
+        assert model.shape_at(load).second_moment == pytest.approx(patch.second_moment(), rel=1e-12)
+
+
+def test_rescale_lets_only_the_radius_follow():
+    model, reference_load = soft("rescale", normal_force=2.0), 2.0
+    built, small = model.shape_at(reference_load), model.shape_at(0.5)
+    assert small.contact_radius < 0.7 * built.contact_radius  # R ~ f_N^(1/3): 0.63
+    assert small.contact_radius == pytest.approx(soft().shape_at(0.5).contact_radius, rel=1e-12)
+    assert small.second_moment == built.second_moment == FINGER.second_moment(reference_load)
+    assert small.surface is model.surface
+    # A spin, elastic: torque sigma_0 r^2 theta of the radius that follows.
+    state, _ = model.step(model.rest(), (0, 0, 1.0), 0.5, 1e-9)
+    torque = model.wrench(state, (0, 0, 0), 0.5)[2]
+    assert torque == pytest.approx(-0.5 * 1e6 * small.contact_radius**2 * 1e-9, rel=1e-4)  # decay over 1e-9 s: 1e6 r dt
+
+
+def test_keep_keeps_all():
+    model = soft("keep", normal_force=2.0)
+    assert model.shape_at(0.5) is model.shape_at(2.0)
+    patch = fixed_at(2.0)
+    other = pf.ReducedModelPublished(patch, PLAIN)
+    state = np.array([3e-7, -2e-7, 1e-9])
+    for load in (0.5, 2.0, 7.0):
+        assert model.step(state, TWIST, load, 1e-4)[1] == pytest.approx(
+            other.step(state, TWIST, load, 1e-4)[1], rel=1e-9
+        )
+
+
+@pytest.mark.parametrize("on_load_change", ["rescale", "keep"])
+def test_a_reference_load_is_needed_to_keep_something(on_load_change):
+    with pytest.raises(
+        InvalidValueError, match=f"surface must have a normal_force when on_load_change='{on_load_change}'"
+    ):
+        soft(on_load_change)
+
+
+def test_distributed_weights_follow_the_load():
+    model = pf.DistributedModel(FINGER, ELASTIC)
+    state = np.random.default_rng(3).normal(size=model.state_shape) * 3e-7
+    loads = np.array([0.0, 0.5, 3.0])
+    ends, wrenches = model.step(state, TWIST, loads, 1e-4)
+    for load, end, wrench in zip(loads, ends, wrenches, strict=True):
+        single_end, single_wrench = model.step(state, TWIST, load, 1e-4)
+        assert end == pytest.approx(single_end, rel=1e-12) and wrench == pytest.approx(single_wrench, rel=1e-12)
+        assert wrench == pytest.approx(model.wrench(end, TWIST, load), abs=1e-10)
+    loaded = FINGER.weights(0.5) > 0.0
+    other = pf.DistributedModel(fixed_at(0.5), ELASTIC)
+    assert wrenches[1] == pytest.approx(other.step(state[:, loaded], TWIST, 0.5, 1e-4)[1], rel=1e-9)
+    # Bristles of cells without load go on moving, as published: the rate does not look at the load.
+    assert np.array_equal(model.rate(state, TWIST, 0.5), model.rate(state, TWIST, 3.0))
+    got = model.jacobians(state, TWIST, loads)
+    assert not got.wrench_load[0].any() and np.isfinite(got.wrench_load).all()
+    assert got.wrench_load[1] * 0.5 == pytest.approx(model.wrench(state, TWIST, 0.5), rel=1e-12)
+
+
+def test_zero_load_of_a_soft_finger():
+    for model in (
+        pf.DistributedModel(FINGER, ELASTIC),
+        soft(),
+        soft("keep", normal_force=2.0),
+        soft("rescale", normal_force=2.0),
+    ):
+        state = np.full(model.state_shape, 1e-7)
+        end, wrench = model.step(state, TWIST, 0.0, 1e-3)
+        assert not end.any() and not wrench.any()
+        assert not model.wrench(state, TWIST, 0.0).any()
+        assert np.isfinite(model.rate(state, TWIST, 0.0)).all()
+        assert all(np.isfinite(block).all() for block in model.jacobians(state, TWIST, 0.0))
+
+
+def test_a_reduced_soft_finger_needs_more_than_one_loaded_cell():
+    """The load at which a single cell is left has no contact radius: one clear line, not NaN."""
+    with pytest.raises(InvalidValueError, match="contact radius > 0"):
+        soft().step(np.zeros(3), TWIST, 1e-6, 1e-3)
+    _, wrench = pf.DistributedModel(FINGER, PLAIN).step(np.zeros((2, FINGER.cells)), TWIST, 1e-6, 1.0)
+    assert math.isfinite(wrench[2])
