@@ -17,19 +17,19 @@ BAD_INPUT = 2
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code; what the user got wrong is one line on stderr, exit code 2."""
+    import click
+
     from planarfriction.cli.app import app
 
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        code = app(args=given or ["--help"], prog_name="planarfriction", standalone_mode=False)
+        code = app.main(given or ["--help"], prog_name="planarfriction", standalone_mode=False)
     except FrictionError as error:
         return _fail(str(error))
-    except KeyboardInterrupt:
+    except click.ClickException as error:
+        return _fail(error.format_message())
+    except (KeyboardInterrupt, click.Abort):  # click turns the one into the other where its own code runs
         return INTERRUPTED
-    except Exception as error:
-        if not hasattr(error, "format_message"):  # what typer raises for wrong usage has it, whatever class it is
-            raise
-        return _fail(error.format_message())  # pyright: ignore[reportAttributeAccessIssue]
     finally:
         gc.enable()
     return code if isinstance(code, int) else 0
