@@ -18,6 +18,7 @@ ROOT = Path(__file__).parents[1]
 PACKAGE = ROOT / "src" / "planarfriction"
 HEAVY = (
     "PIL",
+    "click",
     "jax",
     "llvmlite",
     "matplotlib",
@@ -27,12 +28,11 @@ HEAVY = (
     "scipy",
     "shapely",
     "torch",
-    "typer",
     "xarray",
 )
 """Packages that `import planarfriction` must not load."""
 
-HOMES = {"numba": "kernels", "llvmlite": "kernels", "matplotlib": "plots", "rich": "cli", "typer": "cli"}
+HOMES = {"numba": "kernels", "llvmlite": "kernels", "matplotlib": "plots", "rich": "cli", "click": "cli"}
 """Package -> the floor whose modules may import it when they load; no floor may load the rest of HEAVY that way."""
 
 
@@ -156,7 +156,15 @@ def test_describing_a_patch_and_a_scene_loads_no_heavy_package():
 def test_the_help_of_the_command_line_loads_no_numerics():
     code = "import contextlib, io\nwith contextlib.redirect_stdout(io.StringIO()):\n    main(['--help'])"
     loaded = _loaded_after(f"from planarfriction.cli import main\n{code}")
-    assert not loaded & (set(HEAVY) - {"rich", "typer"})
+    assert not loaded & (set(HEAVY) - {"click"})
+
+
+def test_a_run_that_writes_nothing_loads_no_datasets_and_no_pictures():
+    # half a second of three; SciPy comes with Numba
+    code = "import contextlib, io\nwith contextlib.redirect_stdout(io.StringIO()):\n    main(['run', 'in-hand'])"
+    loaded = _loaded_after(f"from planarfriction.cli import main\n{code}")
+    assert "numba" in loaded
+    assert not loaded & {"PIL", "matplotlib", "pandas", "shapely", "xarray"}
 
 
 def test_files_stay_short():

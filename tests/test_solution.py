@@ -10,7 +10,7 @@ import xarray as xr
 import planarfriction as pf
 from planarfriction import FrictionError, Solution
 from planarfriction.scenes import Statistics, in_hand, load
-from planarfriction.scenes.solution import check_writable
+from planarfriction.scenes.solution import History, check_writable
 
 UNITS = {"fx": "N", "fy": "N", "tau": "N m", "normal_force": "N"}
 
@@ -32,7 +32,7 @@ def test_a_saved_solution_comes_back_to_the_bit(tmp_path):
     solution = a_solution()
     assert solution.save(tmp_path / "run.nc") == tmp_path / "run.nc"
     again = load(tmp_path / "run.nc")
-    xr.testing.assert_identical(again.data.drop_attrs(deep=False), solution.data)
+    xr.testing.assert_identical(again.data, solution.data)
     assert {name: again.data[name].attrs["units"] for name in UNITS} == UNITS
     assert again.statistics == solution.statistics
     assert (again.status, again.message) == ("done", "reached t_end")
@@ -41,6 +41,24 @@ def test_a_saved_solution_comes_back_to_the_bit(tmp_path):
     again.save(tmp_path / "twice.nc")
     assert load(tmp_path / "twice.nc").data.identical(again.data)
     assert pf.load is load
+
+
+def test_the_dataset_is_made_once_and_is_what_the_arrays_say():
+    full = a_solution()
+    arrays = {name: History(each.dims, each.values, each.attrs) for name, each in full.data.variables.items()}
+    solution = dataclasses.replace(full, histories=arrays)
+    assert solution.data is solution.data
+    xr.testing.assert_identical(solution.data, full.data)
+    assert set(solution.data.coords) == {"time", "contact"}
+    assert solution.data.attrs == {"scene": solution.scene.to_json()}
+
+
+def test_what_is_added_to_the_data_is_saved(tmp_path):
+    solution = a_solution()
+    solution.data["power"] = solution.data.x * 2.0
+    solution.data.attrs["note"] = "third attempt"
+    again = load(solution.save(tmp_path / "run.nc"))
+    xr.testing.assert_identical(again.data, solution.data)
 
 
 def test_saving_overwrites_and_leaves_nothing_else(tmp_path):

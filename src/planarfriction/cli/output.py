@@ -70,12 +70,16 @@ def write_solution(solution: Solution, folder: Path, label: str) -> list[Path]:
 
 def history_columns(solution: Solution) -> dict[str, np.ndarray]:
     """Histories as columns [SI]: time, the body, then each contact (`fx`, or `name.fx` where there are several)."""
-    data = solution.data
-    columns = {name: np.asarray(data[name]) for name in ("time", "x", "y", "theta", "vx", "vy", "omega")}
-    for index, contact in enumerate(data["contact"].values):
-        prefix = "" if data.sizes["contact"] == 1 else f"{slug(str(contact))}."
+
+    def values(name: str) -> np.ndarray:
+        return solution.histories[name].values
+
+    columns = {name: values(name) for name in ("time", "x", "y", "theta", "vx", "vy", "omega")}
+    contacts = [str(name) for name in values("contact")]
+    for index, contact in enumerate(contacts):
+        prefix = "" if len(contacts) == 1 else f"{slug(contact)}."
         for name in ("fx", "fy", "tau", "normal_force"):
-            columns[prefix + name] = np.asarray(data[name].isel(contact=index))
+            columns[prefix + name] = values(name)[:, index]
     return columns
 
 

@@ -43,18 +43,17 @@ def comparison(solutions: Mapping[str, Solution]) -> list[list[str]]:
 
 def largest_differences(solution: Solution, reference: Solution) -> tuple[float, float]:
     """Largest distance of the positions [m] and largest difference of the angles [rad] over the time both cover."""
-    time = np.asarray(reference.data["time"])
-    own = np.asarray(solution.data["time"])
+    time, own = reference.histories["time"].values, solution.histories["time"].values
     time = time[time <= own[-1]]
     dx, dy, dtheta = (
-        np.interp(time, own, np.asarray(solution.data[name])) - np.asarray(reference.data[name])[: len(time)]
+        np.interp(time, own, solution.histories[name].values) - reference.histories[name].values[: len(time)]
         for name in ("x", "y", "theta")
     )
     return float(np.hypot(dx, dy).max()), float(np.abs(dtheta).max())
 
 
 def _last(solution: Solution, name: str) -> float:
-    return float(solution.data[name][-1])
+    return float(solution.histories[name].values[-1])
 
 
 def _speed(solution: Solution) -> str:

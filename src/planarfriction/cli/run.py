@@ -144,7 +144,7 @@ def _simulate(label: str, scene: Scene, options: dict[str, Any]) -> Solution:
 
 
 def _keep_part(part: Solution, solutions: dict[str, Solution], label: str, folder: Path | None) -> int:
-    note(f"stopped at t = {float(part.data['time'][-1]):g} s of the {label} run")
+    note(f"stopped at t = {part.histories['time'].values[-1]:g} s of the {label} run")
     solutions[label] = part
     _save(part, folder, label)
     _print(solutions)

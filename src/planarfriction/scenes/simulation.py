@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -13,11 +12,8 @@ from planarfriction.kernels.rosenbrock import Method, Output
 from planarfriction.scenes.packing import PackedScene, pack
 from planarfriction.scenes.scene import Scene
 from planarfriction.scenes.signal import SAME_TIME
-from planarfriction.scenes.solution import Solution
+from planarfriction.scenes.solution import History, Solution
 from planarfriction.solvers import RODAS4, integrate
-
-if TYPE_CHECKING:
-    import xarray as xr
 
 BRISTLES = ("none", "all")
 """What `simulate(..., bristles=)` records."""
@@ -25,6 +21,7 @@ BRISTLES = ("none", "all")
 _BODY = {"vx": "m/s", "vy": "m/s", "omega": "rad/s", "x": "m", "y": "m", "theta": "rad"}
 _WRENCH = {"fx": "N", "fy": "N", "tau": "N m"}
 _LONG_NAMES = {
+    "time": "time",
     "vx": "velocity of the centre of mass, world x",
     "vy": "velocity of the centre of mass, world y",
     "omega": "spin, counter-clockwise",
@@ -51,10 +48,10 @@ def simulate(
 ) -> Solution:
     """Simulate a scene from rest bristles at t = 0 and record it every `save_every` [s]; returns a `Solution`.
 
-    Each step keeps its error below `rtol |y| + atol y_0`, for every component of the body's motion and for the mean over
-    each contact's bristles. The natural scales `y_0` are mu_c/sigma_0 for bristles and positions and v_s for velocities (both
-    over the contact radius for angles), so that `atol` is a share of a full bristle deflection. The solver stops exactly
-    at every break of a signal.
+    Each step keeps its error below `rtol |y| + atol y_0`, for every component of the body's motion and for the mean
+    over each contact's bristles. The natural scales `y_0` are mu_c/sigma_0 for bristles and positions and v_s for
+    velocities (both over the contact radius for angles), so that `atol` is a share of a full bristle deflection. The
+    solver stops exactly at every break of a signal.
 
     Parameters
     ----------
@@ -101,11 +98,11 @@ def simulate(
         atol=atol * packed.natural,
         progress=progress,
     )
-    solution = Solution(_dataset(scene, packed, run.output), run.statistics, run.status, run.message, scene)
+    solution = Solution(_histories(scene, packed, run.output), run.statistics, run.status, run.message, scene)
     if run.status == "interrupted":
         raise SimulationInterrupted(solution)
     if run.status not in ("success", "at rest"):
-        raise SolverError(f"at t = {float(solution.data.time[-1]):g} s: {run.message}", solution)
+        raise SolverError(f"at t = {run.output.time[-1]:g} s: {run.message}", solution)
     return solution
 
 
@@ -131,21 +128,18 @@ def _output(times: np.ndarray, packed: PackedScene, bristles: str) -> Output:
     )
 
 
-def _dataset(scene: Scene, packed: PackedScene, output: Output) -> xr.Dataset:
-    """Histories with units, the whole scene in the attributes."""
-    import xarray as xr
+def _histories(scene: Scene, packed: PackedScene, output: Output) -> dict[str, History]:
+    """What was recorded, by name, with units."""
 
-    def described(name: str, unit: str) -> dict[str, str]:
-        return {"units": unit, **({"long_name": _LONG_NAMES[name]} if name in _LONG_NAMES else {})}
+    def history(name: str, dims: tuple[str, ...], values: np.ndarray, unit: str) -> History:
+        return History(dims, values, {"units": unit, "long_name": _LONG_NAMES[name]})
 
-    variables: dict = {
-        name: ("time", output.body[:, i], described(name, unit)) for i, (name, unit) in enumerate(_BODY.items())
+    histories = {
+        name: history(name, ("time",), output.body[:, i], unit) for i, (name, unit) in enumerate(_BODY.items())
     }
-    variables |= {
-        name: (("time", "contact"), output.wrench[:, :, i], described(name, unit))
-        for i, (name, unit) in enumerate(_WRENCH.items())
-    }
-    variables["normal_force"] = (("time", "contact"), output.load, described("normal_force", "N"))
+    for i, (name, unit) in enumerate(_WRENCH.items()):
+        histories[name] = history(name, ("time", "contact"), output.wrench[:, :, i], unit)
+    histories["normal_force"] = history("normal_force", ("time", "contact"), output.load, "N")
     if len(output.bristles):
         for c, contact in enumerate(scene.contacts):
             part = output.bristles[:, packed.contacts.state[c] : packed.contacts.state[c + 1]]
@@ -153,11 +147,9 @@ def _dataset(scene: Scene, packed: PackedScene, output: Output) -> xr.Dataset:
             if len(packed.loaded[c]):
                 full = np.zeros((len(part), 2, len(packed.loaded[c])))
                 full[:, :, packed.loaded[c]] = part.reshape(len(part), 2, -1)
-                variables[name] = (("time", "axis", f"cell_{contact.name}"), full, {"units": "m"})
+                histories[name] = History(("time", "axis", f"cell_{contact.name}"), full, {"units": "m"})
             else:
-                variables[name] = (("time", "component"), part, {"units": "m, m, m^2"})
-    coordinates = {
-        "time": ("time", output.time, {"units": "s", "long_name": "time"}),
-        "contact": [contact.name for contact in scene.contacts],
-    }
-    return xr.Dataset(variables, coords=coordinates, attrs={"scene": scene.to_json()})
+                histories[name] = History(("time", "component"), part, {"units": "m, m, m^2"})
+    histories["time"] = history("time", ("time",), output.time, "s")
+    histories["contact"] = History(("contact",), np.array([contact.name for contact in scene.contacts]), {})
+    return histories

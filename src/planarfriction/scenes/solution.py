@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import json
 import os
 import warnings
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
 
 from planarfriction.errors import FileError, FrictionError
 from planarfriction.scenes.scene import Scene
@@ -21,18 +24,23 @@ if TYPE_CHECKING:
 _META = ("scene", "statistics", "status", "message")
 
 
+class History(NamedTuple):
+    """One quantity over time, ready for a dataset."""
+
+    dims: tuple[str, ...]
+    """Names of the dimensions of `values`."""
+    values: np.ndarray
+    """Numbers (names, for `contact`)."""
+    attrs: dict[str, str]
+    """Its unit in "units", what it is in "long_name"."""
+
+
 @dataclass(frozen=True, eq=False)
 class Solution:
     """Result of a simulation: histories, statistics, and the scene they belong to."""
 
-    data: xr.Dataset
-    """Histories over `time` [s] and `contact`, each with its unit in `attrs["units"]`.
-
-    Body (world axes, centre of mass): x, y [m], theta [rad], vx, vy [m/s], omega [rad/s]; a prescribed velocity is
-    recorded as it was given, in body axes. Each contact: fx, fy [N], tau [N m], the friction wrench on the body about
-    the contact frame's origin in its axes, of **one** of `count` identical contacts, and normal_force [N]; at a jump
-    the left limit.
-    """
+    histories: Mapping[Any, History | xr.DataArray] = field(repr=False)
+    """What `data` is made of, by name, coordinates included: plain arrays, or a dataset that is there already."""
     statistics: Statistics
     """What the simulation took."""
     status: str
@@ -41,6 +49,18 @@ class Solution:
     """What happened, in one sentence; the remedy where the solver gave up."""
     scene: Scene
     """The scene that was simulated."""
+
+    @functools.cached_property
+    def data(self) -> xr.Dataset:
+        """Histories over `time` [s] and `contact`, each with its unit in `attrs["units"]`; made on first use.
+
+        Body (world axes, centre of mass): x, y [m], theta [rad], vx, vy [m/s], omega [rad/s]. Each contact: fx, fy [N],
+        tau [N m], the friction wrench on the body about the contact frame's origin in its axes, of **one** of `count`
+        identical contacts, and normal_force [N]; at a jump the left limit.
+        """
+        import xarray as xr
+
+        return xr.Dataset(dict(self.histories), attrs={"scene": self.scene.to_json()})
 
     def plot(self) -> Any:
         """Draw the motion of the body and the time histories; returns a matplotlib Figure."""
@@ -108,7 +128,9 @@ def load(path: str | Path) -> Solution:
     except (ValueError, TypeError, FrictionError) as error:
         reason = " ".join(str(error).split())
         raise FileError(f"{path}: the scene in this file cannot be read: {reason}") from None
-    return Solution(data, statistics, meta["status"], meta["message"], scene)
+    solution = Solution(data, statistics, meta["status"], meta["message"], scene)
+    solution.data.attrs.update(data.attrs)  # notes that someone added before it was saved
+    return solution
 
 
 def check_writable(path: str | Path) -> Path:
