@@ -13,7 +13,7 @@ from planarfriction.kernels.law import law_row
 from planarfriction.models import DistributedModel
 
 SHAPE_INTERVAL = 1e-3
-"""Longest time [s] that a patch which depends on a continuously changing load keeps its shape; held loads need no limit."""
+"""Longest time [s] that a patch keeps its shape while the load it depends on changes; held loads need no limit."""
 
 
 class PackedScene(NamedTuple):
@@ -24,7 +24,7 @@ class PackedScene(NamedTuple):
     state: np.ndarray
     """Bristles at rest, body velocity, pose."""
     natural: np.ndarray
-    """Natural scale of each state: mu_c/sigma_0 for deflections and positions, v_s for velocities, over r for angles."""
+    """Natural scale of each state: mu_c/sigma_0 for deflections and positions, v_s for velocities, angles over r."""
     loaded: list[np.ndarray]
     """Distributed contacts: which cells of the model ever carry load and have bristles here; reduced: empty."""
 

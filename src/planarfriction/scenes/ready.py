@@ -28,7 +28,7 @@ IN_HAND_DROPS = {(2, 1): (2.0, 0.84, 33, 50), (2, 2): (4.0, 2.9, 31, 50)}
 """(load, placement) -> force, force while dropped [N], first dropped sample, first sample after."""
 
 
-FINE = {"rtol": 1e-6, "atol": 3e-6}
+FINE: dict[str, Any] = {"rtol": 1e-6, "atol": 3e-6}
 """Tolerances of scenes that look at small things: wrenches to 1e-5 of the load, motions of nanometres."""
 
 
@@ -123,8 +123,8 @@ def free_slide(
     """A body thrown onto a level table with the initial `twist` `(vx, vy, omega)`; ends when it has stopped.
 
     The patch is fixed to the body, its frame's origin at the centre of mass. `mass` [kg], `inertia` about the centre of
-    mass [kg m^2], initial `position` [m] and `angle` [rad], `normal_force` [N] a signal or a number (default: the weight
-    `9.81 mass`), `outline` `[M, 2]` [m] for drawing.
+    mass [kg m^2], initial `position` [m] and `angle` [rad], `normal_force` [N] a signal or a number (default: the
+    weight `9.81 mass`), `outline` `[M, 2]` [m] for drawing.
     """
     body = Body(mass, inertia, position, angle, twist, gravity=(0.0, 0.0), outline=outline)
     load: Any = GRAVITY * body.mass if normal_force is None else normal_force
