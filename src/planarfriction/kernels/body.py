@@ -84,9 +84,18 @@ def workspace(contacts: ct.Contacts) -> Work:
 
 
 @inlined
-def _contact_twist(a, u, v):
+def _times(a, u, v):
+    """`v = a u` for a 3 x 3 matrix."""
     for i in range(3):
-        v[i] = a[i, 0] * u[0] + a[i, 1] * u[1] + a[i, 2] * u[2]
+        v[i] = 0.0
+        for j in range(3):
+            v[i] += a[i, j] * u[j]
+
+
+@inlined
+def _load(contacts, motion, piece, since, c):
+    """Normal force of all the identical contacts that contact c stands for."""
+    return contacts.count[c] * (motion.load[piece, 0, c] + since * motion.load[piece, 1, c])
 
 
 @kernel
@@ -94,22 +103,21 @@ def rates(contacts, motion, piece, since, y, dy, work):
     """Right-hand side `dy` at `since` seconds into a piece; wrenches per unit load into `work.wrench`."""
     o = y.shape[0] - 6
     u, pose = y[o : o + 3], y[o + 3 :]
-    v, w, a = work.twist, work.wrench, work.stiffness
-    fx, fy, tau = 0.0, 0.0, 0.0
+    v, a, total = work.twist, work.stiffness, work.body
+    for i in range(3):
+        total[i] = motion.force[piece, 0, i] + since * motion.force[piece, 1, i]
     for c in range(contacts.kind.shape[0]):
         first, last = contacts.state[c], contacts.state[c + 1]
+        w = work.wrench[c]
         ct.contact_map(contacts.mount[c], contacts.place[c], pose, a)
-        _contact_twist(a, u, v)
-        ct.evaluate(contacts, c, motion.row[piece, c], y[first:last], v, dy[first:last], w[c])
-        load = contacts.count[c] * (motion.load[piece, 0, c] + since * motion.load[piece, 1, c])
-        fx += load * (a[0, 0] * w[c, 0] + a[1, 0] * w[c, 1])
-        fy += load * (a[0, 1] * w[c, 0] + a[1, 1] * w[c, 1])
-        tau += load * (a[0, 2] * w[c, 0] + a[1, 2] * w[c, 1] + w[c, 2])
-    force = motion.force[piece]
-    gravity = motion.acceleration[piece]
-    dy[o] = gravity[0] + motion.inverse_mass[0] * (force[0, 0] + since * force[1, 0] + fx)
-    dy[o + 1] = gravity[1] + motion.inverse_mass[1] * (force[0, 1] + since * force[1, 1] + fy)
-    dy[o + 2] = gravity[2] + motion.inverse_mass[2] * (force[0, 2] + since * force[1, 2] + tau)
+        _times(a, u, v)
+        ct.evaluate(contacts, c, motion.row[piece, c], y[first:last], v, dy[first:last], w)
+        load = _load(contacts, motion, piece, since, c)
+        for i in range(3):
+            for p in range(3):
+                total[i] += load * a[p, i] * w[p]
+    for i in range(3):
+        dy[o + i] = motion.acceleration[piece, i] + motion.inverse_mass[i] * total[i]
     if motion.body_axes:
         cos, sin = math.cos(pose[2]), math.sin(pose[2])
         dy[o + 3] = cos * u[0] - sin * u[1]
@@ -129,7 +137,7 @@ def linearise(contacts, motion, piece, y, work):
     for c in range(contacts.kind.shape[0]):
         ct.contact_map(contacts.mount[c], contacts.place[c], pose, maps[c, 0])
         ct.contact_map_slopes(contacts.mount[c], maps[c, 0], u, w[c], maps[c, 1], maps[c, 2])
-        _contact_twist(maps[c, 0], u, v)
+        _times(maps[c, 0], u, v)
         ct.linearise(
             contacts,
             c,
@@ -162,16 +170,20 @@ def factor(contacts, motion, piece, since, y, shift, work):
             lin[contacts.linear[c] : contacts.linear[c + 1]],
             stiffness,
         )
-        load = contacts.count[c] * (motion.load[piece, 0, c] + since * motion.load[piece, 1, c])
+        load = _load(contacts, motion, piece, since, c)
         a, g, h = work.maps[c, 0], work.maps[c, 1], work.maps[c, 2]
         for j in range(3):
             for p in range(3):
-                work.body[p] = stiffness[p, 0] * a[0, j] + stiffness[p, 1] * a[1, j] + stiffness[p, 2] * a[2, j]
-                work.twist[p] = stiffness[p, 0] * g[0, j] + stiffness[p, 1] * g[1, j] + stiffness[p, 2] * g[2, j]
+                work.body[p], work.twist[p] = 0.0, 0.0
+                for q in range(3):
+                    work.body[p] += stiffness[p, q] * a[q, j]
+                    work.twist[p] += stiffness[p, q] * g[q, j]
             for i in range(3):
+                per_velocity, per_pose = 0.0, h[i, j]
+                for p in range(3):
+                    per_velocity += a[p, i] * work.body[p]
+                    per_pose += a[p, i] * work.twist[p]
                 weight = motion.inverse_mass[i] * load
-                per_pose = a[0, i] * work.twist[0] + a[1, i] * work.twist[1] + a[2, i] * work.twist[2] + h[i, j]
-                per_velocity = a[0, i] * work.body[0] + a[1, i] * work.body[1] + a[2, i] * work.body[2]
                 work.to_pose[i, j] += weight * per_pose / shift
                 m[i, j] -= weight * (per_velocity + per_pose / shift)
     determinant = 0.0
@@ -198,8 +210,9 @@ def solve(contacts, motion, piece, since, y, shift, r, out, work):
     lin, m, w, v, b = work.linear, work.inverse, work.stiffness[0], work.twist, work.body
     r_pose = r[o + 3 :]
     for i in range(3):
-        to_pose = work.to_pose[i]
-        b[i] = r[o + i] + to_pose[0] * r_pose[0] + to_pose[1] * r_pose[1] + to_pose[2] * r_pose[2]
+        b[i] = r[o + i]
+        for j in range(3):
+            b[i] += work.to_pose[i, j] * r_pose[j]
     for c in range(contacts.kind.shape[0]):
         first, last = contacts.state[c], contacts.state[c + 1]
         ct.eliminate(
@@ -212,13 +225,13 @@ def solve(contacts, motion, piece, since, y, shift, r, out, work):
             lin[contacts.linear[c] : contacts.linear[c + 1]],
             w,
         )
-        load = contacts.count[c] * (motion.load[piece, 0, c] + since * motion.load[piece, 1, c])
+        load = _load(contacts, motion, piece, since, c)
         a = work.maps[c, 0]
         for i in range(3):
-            b[i] += motion.inverse_mass[i] * load * (a[0, i] * w[0] + a[1, i] * w[1] + a[2, i] * w[2])
+            for p in range(3):
+                b[i] += motion.inverse_mass[i] * load * a[p, i] * w[p]
     u, pose = out[o : o + 3], out[o + 3 :]
-    for i in range(3):
-        u[i] = m[i, 0] * b[0] + m[i, 1] * b[1] + m[i, 2] * b[2]
+    _times(m, b, u)
     per_shift = 1.0 / shift
     pose[2] = per_shift * (r_pose[2] + u[2])
     if motion.body_axes:
@@ -232,8 +245,9 @@ def solve(contacts, motion, piece, since, y, shift, r, out, work):
         first, last = contacts.state[c], contacts.state[c + 1]
         a, g = work.maps[c, 0], work.maps[c, 1]
         for i in range(3):
-            v[i] = a[i, 0] * u[0] + a[i, 1] * u[1] + a[i, 2] * u[2]
-            v[i] += g[i, 0] * pose[0] + g[i, 1] * pose[1] + g[i, 2] * pose[2]
+            v[i] = 0.0
+            for j in range(3):
+                v[i] += a[i, j] * u[j] + g[i, j] * pose[j]
         ct.back_substitute(
             contacts,
             c,
