@@ -1,6 +1,7 @@
 """The published experiments at the default tolerances, against converged solutions of the same equations.
 
-`data/converged.json` restates sampled numbers of those solutions with their source; they are good to about 1e-6 of span.
+`data/converged.json` restates sampled numbers of those solutions with their source; they are good to about 1e-6 of
+span.
 """
 
 from __future__ import annotations

@@ -54,7 +54,7 @@ def __dir__() -> list[str]:
     return sorted([*globals(), *__all__])
 
 
-if TYPE_CHECKING:
+if TYPE_CHECKING:  # for editors and type checkers: the same names as above
     from planarfriction.errors import FrictionError
     from planarfriction.laws import Coulomb, ElastoPlastic, LuGre
     from planarfriction.limit_surface import (

@@ -42,7 +42,7 @@ class Measurement:
     baseline_value: float
     """Median of the baseline, same unit."""
     ratio: float
-    """How many times cheaper than the baseline for the same work: baseline over value, unless `baseline` says otherwise."""
+    """How many times cheaper than the baseline: baseline over value, unless `baseline` says otherwise."""
 
 
 def run(
@@ -132,7 +132,7 @@ def _in_hand_distributed(name: str, full: bool) -> Measurement:
         return _line(name, value, "s", "SciPy LSODA over the whole run", _lsoda_time(scene, scene.t_end))
     ours, _ = _solver_time(scene, 5, t_end=WINDOW)
     theirs = _lsoda_time(scene, WINDOW)
-    words = f"SciPy LSODA over the first {WINDOW} s; the ratio is to the {ours * 1e3:.2g} ms needed here for the same window"
+    words = f"SciPy LSODA over the first {WINDOW} s (the ratio is to the {ours * 1e3:.2g} ms of that window here)"
     return Measurement(name, value, "s", words, theirs, theirs / ours)
 
 

@@ -1,4 +1,4 @@
-"""Errors of the library: every one derives from `FrictionError`, carries its facts as attributes and reads as one line."""
+"""Errors of the library: each derives from `FrictionError`, carries its facts as attributes and reads as one line."""
 
 from __future__ import annotations
 

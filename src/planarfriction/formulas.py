@@ -50,15 +50,15 @@ def slip_fraction_slope(xp, deflection, breakaway_ratio):
 def bristle_decay(xp, deflection, along, speed, grip, elasto_plastic, breakaway_ratio):
     """Rate `k = beta |v| sigma_0 / g` [1/s] of `zdot = u - k z`.
 
-    `beta |v| = alpha (|v| + z.v/|z|) / 2` for elasto-plastic bristles, `|v|` for plain LuGre (`elasto_plastic` is 1.0 or
-    0.0); `deflection = |z|/z_max`, `grip = sigma_0 / g` [1/m].
+    `beta |v| = alpha (|v| + z.v/|z|) / 2` for elasto-plastic bristles, `|v|` for plain LuGre (`elasto_plastic` is 1.0
+    or 0.0); `deflection = |z|/z_max`, `grip = sigma_0 / g` [1/m].
     """
     alpha = slip_fraction(xp, deflection, breakaway_ratio)
     return xp.where(elasto_plastic > 0.0, 0.5 * alpha * (speed + along), speed) * grip
 
 
 def bristle_decay_partials(xp, deflection, along, speed, grip, elasto_plastic, breakaway_ratio):
-    """`k` and its partial derivatives with respect to `deflection`, `along` and `speed` (with respect to `grip`: k/grip)."""
+    """`k` and its partial derivatives with respect to `deflection`, `along` and `speed` (to `grip`: k/grip)."""
     alpha = slip_fraction(xp, deflection, breakaway_ratio)
     slope = slip_fraction_slope(xp, deflection, breakaway_ratio)
     stretch = 0.5 * (speed + along) * grip
@@ -76,8 +76,9 @@ def traction(z, zdot, velocity, sigma_0, sigma_1, sigma_2):
 def mean_decay(start, end, dt):
     """Mean of k over a step [1/s] from its values at the start and at the predicted end.
 
-    Half and half for short steps (second order), all on the end for steps much longer than the bristle's memory, whose
-    result is then the steady state of k at the end; the share of the start, `1/(2 + x + x^2)` of `x = k dt`, leads over.
+    Half and half for short steps (second order), all on the end for steps much longer than the bristle's memory,
+    whose result is then the steady state of k at the end; the share of the start, `1/(2 + x + x^2)` of `x = k dt`,
+    leads over.
     """
     x = 0.5 * (start + end) * dt
     return end + (start - end) / (2.0 + x + x * x)
@@ -86,9 +87,10 @@ def mean_decay(start, end, dt):
 def relaxation(xp, decay_dt):
     """`exp(-x)` and `(1 - exp(-x))/x` of `x = k dt >= 0`: the exact step of `zdot = u - k z` for a held `k` and `u`.
 
-    `z(dt) = exp(-x) z + (1 - exp(-x))/x u dt`. Plain LuGre has a constant k and this is its step. Elasto-plastic bristles
-    take `mean_decay` of k at the start and at a predicted end, `z_p = (z + u dt)/(1 + k dt)`: second order, stable at any dt.
-    Below `x = 1e-3` the quotient is its series, exact to 1e-16 there, where the difference would cancel.
+    `z(dt) = exp(-x) z + (1 - exp(-x))/x u dt`. Plain LuGre has a constant k and this is its step. Elasto-plastic
+    bristles take `mean_decay` of k at the start and at a predicted end, `z_p = (z + u dt)/(1 + k dt)`: second order,
+    stable at any dt. Below `x = 1e-3` the quotient is its series, exact to 1e-16 there, where the difference would
+    cancel.
     """
     remaining = xp.exp(-decay_dt)
     safe = xp.where(decay_dt > 1e-3, decay_dt, 1.0)

@@ -17,8 +17,8 @@ _OPTIONS = {"error_model": "numpy", "fastmath": {"reassoc", "contract", "nsz", "
 jit = functools.partial(njit, cache=True, **_OPTIONS)
 """Compile an entry point, callable from Python. Sums over cells may be reordered, so that they vectorise."""
 
-# Counting references to arrays is atomic: in a step of the reduced model it costs four times the physics. Inner functions
-# allocate nothing and keep no array, so they need no counting; they are called from compiled code only.
+# Counting references to arrays is atomic: in a step of the reduced model it costs four times the physics. Inner
+# functions allocate nothing and keep no array, so they need no counting; they are called from compiled code only.
 _INNER = {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 kernel = functools.partial(njit, **_INNER, **_OPTIONS)

@@ -1,8 +1,9 @@
 """A planar body on its contacts: right-hand side, linearisation, and the solve that costs no more than either.
 
-State vector: bristles of every contact, body velocity `u = (vx, vy, omega)`, pose `(x, y, theta)`. Bristles of different
-cells do not see each other, they meet in the body's three accelerations: `(shift I - J) k = r` is solved by eliminating
-the bristles contact by contact, which leaves a 3 x 3 system for the body. Loads and forces are linear in time on a piece.
+State vector: bristles of every contact, body velocity `u = (vx, vy, omega)`, pose `(x, y, theta)`. Bristles of
+different cells do not see each other, they meet in the body's three accelerations: `(shift I - J) k = r` is solved by
+eliminating the bristles contact by contact, which leaves a 3 x 3 system for the body. Loads and forces are linear in
+time on a piece.
 """
 
 from __future__ import annotations

@@ -87,7 +87,7 @@ def linearise(law, z, vx, vy, omega, x, y, lin):
 
 @kernel
 def factor(law, z, shift, x, y, w, lin, stiffness):
-    """Prepare `D = shift I - d zdot/dz` (rows 5 and 6 of `lin`) and write `d wrench/d twist` with the bristles eliminated.
+    """Prepare `D = shift I - d zdot/dz` (rows 5, 6 of `lin`); write `d wrench/d twist` with the bristles eliminated.
 
     Per cell `-(sigma_0 + sigma_1 shift) D^-1 d zdot/dv - sigma_2 I`, with
     `D^-1 d zdot/dv = (I - z (x) m)/(shift + k)` and `m = ((shift + k) k_v + k_z)/(shift + k + k_z.z)`.
@@ -222,7 +222,7 @@ def step_batch(law, z, twist, x, y, w, load, dt, out, wrench):
 
 @jit
 def step_sequence(law, z, twist, x, y, w, load, dt, out, wrench):
-    """`step` through the twists [T, 3] of one contact, `z` in place (`out` is scratch), wrenches into `wrench` [T, 3]."""
+    """`step` through the twists [T, 3] of one contact, `z` in place (`out`: scratch), wrenches into `wrench` [T, 3]."""
     n = z.shape[0]
     for t in range(twist.shape[0]):
         fx, fy, tau = step(law, z, twist[t, 0], twist[t, 1], twist[t, 2], x, y, w, dt, out)

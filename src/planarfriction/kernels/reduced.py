@@ -1,7 +1,7 @@
 """The reduced model: one bristle in three dimensions, per unit normal load and about the contact frame's origin.
 
-The raw state `z` [m, m, m^2] is `S z_hat` with `S = diag(1, 1, r)`; in scaled coordinates the bristle obeys the equation
-of a cell, `z_hat' = u - k z_hat`, driven by `u = h(V) v_n` instead of `v` and with `z_max = |h| g/sigma_0`:
+The raw state `z` [m, m, m^2] is `S z_hat` with `S = diag(1, 1, r)`; in scaled coordinates the bristle obeys the
+equation of a cell, `z_hat' = u - k z_hat`, driven by `u = h(V) v_n` instead of `v` and with `z_max = |h| g/sigma_0`:
 
     d z_hat'/dz_hat = -k I - z_hat (x) k_z,      d z_hat'/dV_S = du/dV_S - z_hat (x) k_V
 
@@ -111,7 +111,10 @@ def _solve(lin, ax, ay, a_s):
 
 @kernel
 def factor(law, shift, shape, lin, stiffness):
-    """Prepare `D` (16, 17 of `lin`) and write `d wrench/d twist` with the bristle eliminated: `-(sigma_0 + sigma_1 shift) S D^-1 F S - sigma_2 U`."""
+    """Prepare `D` (16, 17 of `lin`) and write `d wrench/d twist` with the bristle eliminated.
+
+    It is `-(sigma_0 + sigma_1 shift) S D^-1 F S - sigma_2 U` about the centre of pressure.
+    """
     lin[16] = 1.0 / (shift + lin[0])
     lin[17] = 1.0 / (shift + lin[0] + lin[1] * lin[4] + lin[2] * lin[5] + lin[3] * lin[6])
     pull = law.sigma_0 + law.sigma_1 * shift
@@ -193,7 +196,7 @@ def step(law, z, vx, vy, omega, shape, surface, data, dt, out):
 
 @jit
 def step_batch(law_row, shape, surface, data, z, twist, load, dt, out, wrench):
-    """`step` for a batch: `z`, `twist`, `out`, `wrench` [B, 3], `load`, `dt` [B]; without load the bristle is forgotten."""
+    """`step` for a batch: `z`, `twist`, `out`, `wrench` [B, 3], `load`, `dt` [B]; without load z is forgotten."""
     law = law_of(law_row)
     for b in range(z.shape[0]):
         fx, fy, tau = step(law, z[b], twist[b, 0], twist[b, 1], twist[b, 2], shape, surface, data, dt[b], out[b])
@@ -206,7 +209,8 @@ def step_batch(law_row, shape, surface, data, z, twist, load, dt, out, wrench):
 def step_one(numbers, data, z, vx, vy, omega, load, dt):
     """`step` of one contact for callers in Python: new state and wrench in one array [6], or [0] for invalid inputs.
 
-    `numbers` holds law (9), shape (4) and surface (3), since every argument costs a quarter of a microsecond on the way in.
+    `numbers` holds law (9), shape (4) and surface (3), since every argument costs a quarter of a microsecond on the
+    way in.
     """
     finite = xp.is_finite(vx) and xp.is_finite(vy) and xp.is_finite(omega) and xp.is_finite(load) and xp.is_finite(dt)
     finite = finite and xp.is_finite(z[0]) and xp.is_finite(z[1]) and xp.is_finite(z[2])

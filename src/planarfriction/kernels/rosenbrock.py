@@ -17,8 +17,8 @@ DONE, PAUSED, STEP_TOO_SMALL, AT_REST = 0, 1, 2, 3
 STEPS, REJECTIONS, EVALUATIONS, JACOBIANS = 0, 1, 2, 3
 """Rows of the statistics."""
 
-# Step control. A decaying transient is followed through all its scales only if the steps do not grow too fast: a factor of
-# 2.5 needs 8 % fewer steps than 6 for the same error of the in-hand runs.
+# Step control. A decaying transient is followed through all its scales only if the steps do not grow too fast: a
+# factor of 2.5 needs 8 % fewer steps than 6 for the same error of the in-hand runs.
 _SAFETY, _GROWTH, _SHRINKAGE = 0.8, 2.5, 0.1
 
 # Smallest step relative to the time (at least 1 s): a few units in the last place of the clock.
@@ -232,7 +232,7 @@ def _at_rest(motion, y, rate):
 
 @jit
 def advance(contacts, motion, method, output, y, cursor, clock, rtol, atol, max_steps, statistics, stages, work):
-    """Integrate from where `cursor` and `clock` stand until the last break, or for `max_steps` trials; return an outcome.
+    """Integrate from where `cursor` and `clock` stand to the last break, or for `max_steps` trials; return an outcome.
 
     `cursor` is (piece, next output), `clock` is (seconds into the piece, next step size, first step size of a piece):
     both are updated, so that the next call goes on. `y` is the state; the step that ends at a break is recorded (left

@@ -1,8 +1,8 @@
 """Evaluation of limit surfaces in compiled loops: `u = h(V) |V_S|` and its Jacobian for a scaled twist `V_S`.
 
-`V_S = (vx, vy, r omega)` at the centre of pressure; `h` is the direction of the friction wrench with its sign reversed and
-its torque divided by `r`. `u` is homogeneous of degree 1 in `V_S` and zero at rest. A surface is a kind, and numbers in
-a flat array from `start` on; `size` is the number of segments of a quadrant (tables) or of cells:
+`V_S = (vx, vy, r omega)` at the centre of pressure; `h` is the direction of the friction wrench with its sign
+reversed and its torque divided by `r`. `u` is homogeneous of degree 1 in `V_S` and zero at rest. A surface is a kind,
+and numbers in a flat array from `start` on; `size` is the number of segments of a quadrant (tables) or of cells:
 
 - `BILINEAR`: nodes `[size + 1, 4 size + 1, 4]` over polar angle (from the spin axis) and azimuth: `h`, and a spare;
 - `POTENTIAL`: nodes of the same shape: `phi`, `d phi/d polar`, `d phi/d azimuth` and the mixed derivative, then the two
@@ -20,8 +20,8 @@ from planarfriction.kernels import inlined, jit, kernel
 
 BILINEAR, POTENTIAL, ELLIPSOID, CELLS = 0, 1, 2, 3
 
-# Nearer to the spin axis [rad] the azimuth's slopes are taken at this polar angle: they differ from their limit by about
-# as much, and rounding, which the Jacobian divides by its square, stays below 1e-5 too.
+# Nearer to the spin axis [rad] the azimuth's slopes are taken at this polar angle: they differ from their limit by
+# about as much, and rounding, which the Jacobian divides by its square, stays below 1e-5 too.
 _AXIS = 1e-5
 
 # A cell slower than this share of the twist stands in the centre of rotation: what is left of its speed is rounding.
@@ -113,7 +113,7 @@ def _blend(data, p, row, segment, a, b):
 
 @kernel
 def _tilt(ax, ay, x, y, s):
-    """`c = (a . V) s^2/|V|^2` at a unit vector with `s >= 0`, and the gradient `n` of its numerator; that of c is `n - 2 c V`.
+    """`c = (a . V) s^2/|V|^2` at a unit vector with `s >= 0`, and `n`: the gradient of c is `n - 2 c V`.
 
     The force in a pure spin tilts the dissipation about the spin axis, where polar coordinates cannot hold a slope: an
     error of its azimuth derivatives, divided by the distance, would grow without bound. This function has that slope,
@@ -221,7 +221,7 @@ def _cells_jacobian(data, start, size, x, y, s, speed, out):
 
 @inlined
 def sliding(kind, data, start, size, x, y, s, speed):
-    """`u = h(V) |V_S|` of the scaled twist `(x, y, s)` of norm `speed`; the lower half of the sphere mirrors the upper."""
+    """`u = h(V) |V_S|` of the scaled twist `(x, y, s)` of norm `speed`; the lower half sphere mirrors the upper."""
     if kind == ELLIPSOID:
         return x, y, s
     if speed == 0.0:
@@ -238,7 +238,7 @@ def sliding(kind, data, start, size, x, y, s, speed):
 
 @kernel
 def sliding_jacobian(kind, data, start, size, x, y, s, speed, out):
-    """Write `du/dV_S`, nine numbers row by row; at rest, where it has no value, the ellipsoid's, which lies between all.
+    """Write `du/dV_S`, nine numbers row by row; at rest, where it has no value, the ellipsoid's.
 
     `u` is homogeneous, so that `u = du/dV_S V_S`.
     """

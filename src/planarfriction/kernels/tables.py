@@ -25,9 +25,10 @@ def spin_sum(x, y, w, cx, cy):
 def smoothed_spin_sum(corners, grid, x, y, w, cx, cy):
     """`spin_sum` blended bilinearly over the corners of the grid cell that holds the centre of rotation.
 
-    As published: the cell index is truncated toward zero, so up to one cell outside the low edges the first cell is used
-    and its weights extrapolate; further outside the grid the plain sum is taken. `grid` is `(x_min, y_min, width, height)`
-    of its cells relative to the centre of pressure; `corners` `[columns + 1, rows + 1, 3]` caches the sums (NaN: not yet).
+    As published: the cell index is truncated toward zero, so up to one cell outside the low edges the first cell is
+    used and its weights extrapolate; further outside the grid the plain sum is taken. `grid` is `(x_min, y_min,
+    width, height)` of its cells relative to the centre of pressure; `corners` `[columns + 1, rows + 1, 3]` caches the
+    sums (NaN: not yet).
     """
     columns, rows = corners.shape[0] - 1, corners.shape[1] - 1
     a, b = (cx - grid[0]) / grid[2], (cy - grid[1]) / grid[3]

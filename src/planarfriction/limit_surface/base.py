@@ -33,9 +33,10 @@ class SurfaceNumbers(NamedTuple):
 class LimitSurface:
     """Set of friction wrenches of a sliding patch, per unit `mu f_N`: `W(V) = -d Phi/d V`, `Phi(V) = sum w_i |v_i|`.
 
-    Twists `(vx, vy, omega)` [m/s, m/s, rad/s] and wrenches `(fx, fy, tau)` [1, 1, m] are about the contact frame's origin
-    and act on the moving body; leading axes broadcast. `normal_force` [N] fixes the shape of a patch that depends on the
-    load; leave it out otherwise. A patch of one point has no limit surface (its contact radius is zero).
+    Twists `(vx, vy, omega)` [m/s, m/s, rad/s] and wrenches `(fx, fy, tau)` [1, 1, m] are about the contact frame's
+    origin and act on the moving body; leading axes broadcast. `normal_force` [N] fixes the shape of a patch that
+    depends on the load; leave it out otherwise. A patch of one point has no limit surface (its contact radius is
+    zero).
 
     Source: Goyal, Ruina, Papadopoulos 1991.
     """

@@ -31,8 +31,8 @@ class LimitSurfaceCells(LimitSurface):
     def _scaled_twist_of(self, target: np.ndarray) -> np.ndarray:
         """As the base class, with the kinks of `|v_i|` rounded off by a radius that shrinks to nothing.
 
-        The minimum often lies on a kink (a wrench inside a flat facet of the surface: the body turns about one cell), where
-        the plain Newton method stalls.
+        The minimum often lies on a kink (a wrench inside a flat facet of the surface: the body turns about one cell),
+        where the plain Newton method stalls.
         """
         from scipy import optimize
 

@@ -79,6 +79,8 @@ def simulate(
     SimulationInterrupted
         Ctrl-C; carries the solution so far.
     """
+    if not isinstance(scene, Scene):
+        raise InvalidValueError("scene", "be a Scene", type(scene).__name__)
     end = scene.t_end if t_end is None else validation.positive("t_end", t_end)
     if end > scene.t_end:
         raise InvalidValueError("t_end", f"be at most the scene's {scene.t_end:g} s", end)
@@ -132,7 +134,10 @@ def _histories(scene: Scene, packed: PackedScene, output: Output) -> dict[str, H
     """What was recorded, by name, with units."""
 
     def history(name: str, dims: tuple[str, ...], values: np.ndarray, unit: str) -> History:
-        return History(dims, values, {"units": unit, "long_name": _LONG_NAMES[name]})
+        long_name = _LONG_NAMES[name]
+        if scene.velocity is not None and name in ("vx", "vy"):
+            long_name = long_name.replace("centre of mass, world", "origin of the body's axes, body")
+        return History(dims, values, {"units": unit, "long_name": long_name})
 
     histories = {
         name: history(name, ("time",), output.body[:, i], unit) for i, (name, unit) in enumerate(_BODY.items())

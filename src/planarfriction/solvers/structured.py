@@ -55,8 +55,8 @@ def integrate(
 ) -> Integration:
     """Integrate from `motion.breaks[0]` to its last break and record at `output.time`.
 
-    `state` holds bristles, body velocity and pose; `atol` is the absolute tolerance of each of its entries. `progress` is
-    called with the simulated time now and then. Ctrl-C ends with the status "interrupted".
+    `state` holds bristles, body velocity and pose; `atol` is the absolute tolerance of each of its entries.
+    `progress` is called with the simulated time now and then. Ctrl-C ends with the status "interrupted".
 
     Raises `InvalidValueError` for `rtol <= 0`.
     """
