@@ -143,16 +143,15 @@ def test_reduced_steady_state(kind, polar, azimuth, speed):
     """`W = g(v_n) W(V) f_N` of the surface, and the viscous term `sigma_2 U V`."""
     model = model_of(kind)
     twist = twist_towards(PATCH, polar, azimuth, speed)
-    _, wrench = steady(model, twist)
+    state, wrench = steady(model, twist)
     surface, centre = model.surface, PATCH.centre_of_pressure()
     at_centre = geometry.twist_at(twist, centre)
     v_n = np.linalg.norm(at_centre * (1.0, 1.0, surface.contact_radius))
     viscous = geometry.wrench_at(0.2 * at_centre * (1.0, 1.0, PATCH.second_moment()), -centre)
     g = formulas.stribeck(np, v_n, 1.0, 1.2, 1e-3, 2.0)
     expected = (g * surface.wrench(twist) - viscous) * LOAD
-    assert wrench == pytest.approx(
-        expected, abs=1e-11 + 1e-12 * speed
-    )  # rounding, as above, through the frame's offset
+    for got in (wrench, model.wrench(state, twist, LOAD)):  # of compiled loops and of NumPy
+        assert got == pytest.approx(expected, abs=1e-11 + 1e-12 * speed)  # rounding, as above, through the offset
 
 
 def test_pre_sliding_stiffness():
