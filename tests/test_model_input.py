@@ -1,0 +1,75 @@
+"""What wrong input to a model is answered with: one clear line."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import planarfriction as pf
+from planarfriction.errors import InvalidValueError
+
+FEET = pf.ContactPatch.points([(0.01, 0.03), (0.11, -0.02), (0.05, 0.09)], [1.0, 2.0, 3.0])
+PLAIN = pf.LuGre()
+MODELS = {"distributed": pf.DistributedModel(FEET, PLAIN), "reduced": pf.ReducedModelPublished(FEET, PLAIN)}
+
+every_model = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((np.zeros(4), (0, 0, 0), 1.0), r"state must have shape \[..., .*3\], got shape \[4\]"),
+        ((0.0, (0, 0, 0), 1.0), "state must have shape"),
+        (("soft", (0, 0, 0), 1.0), "state must be an array of numbers, got soft"),
+        ((None, (0, 0), 1.0), r"twist must have shape \[..., 3\], got shape \[2\]"),
+        ((None, 0.1, 1.0), r"twist must have shape \[..., 3\], got shape \[\]"),
+        ((None, ("x", 0, 0), 1.0), "twist must be an array of numbers"),
+        ((None, (math.nan, 0, 0), 1.0), "twist must be finite"),
+        ((None, (0, 0, 0), -1.0), "normal_force must be >= 0, got -1.0"),
+        ((None, (0, 0, 0), math.inf), "normal_force must be finite, got inf"),
+        ((None, (0, 0, 0), "heavy"), "normal_force must be an array of numbers, got heavy"),
+        ((None, np.zeros((4, 3)), np.ones(5)), "batch axes must broadcast, got shapes"),
+    ],
+)
+@every_model
+def test_wrong_input_gets_one_line(model, arguments, message):
+    arguments = (model.rest(), *arguments[1:]) if arguments[0] is None else arguments
+    for call in (model.rate, model.wrench, model.jacobians, lambda *a: model.step(*a, 1e-3)):
+        with pytest.raises(InvalidValueError, match=message) as caught:
+            call(*arguments)
+        assert "\n" not in str(caught.value)
+
+
+@every_model
+def test_wrong_states_and_steps(model):
+    broken = model.rest()
+    broken.flat[1] = math.nan
+    with pytest.raises(InvalidValueError, match="state must be finite"):
+        model.step(broken, (1, 0, 0), 1.0, 1e-3)
+    for dt, message in (
+        (-1e-3, "dt must be >= 0, got -0.001"),
+        (math.nan, "dt must be finite"),
+        ("now", "dt must be an"),
+    ):
+        with pytest.raises(InvalidValueError, match=message):
+            model.step(model.rest(), (1, 0, 0), 1.0, dt)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: pf.DistributedModel([1, 2], PLAIN), "patch must be a ContactPatch"),
+        (lambda: pf.ReducedModelPublished(FEET, 0.5), "law must be a LuGre law, got 0.5"),
+        (lambda: pf.ReducedModelPublished(FEET, PLAIN, surface="table"), "surface must be a limit surface, got table"),
+        (lambda: pf.ReducedModelPublished(FEET, PLAIN, on_load_change="kep"), r"did you mean 'keep'"),
+        (
+            lambda: pf.ReducedModelPublished(pf.ContactPatch.points([(0, 0)]), PLAIN),
+            r"patch must have a contact radius > 0 \(more than one point\)",
+        ),
+    ],
+)
+def test_wrong_models(call, message):
+    with pytest.raises(InvalidValueError, match=message):
+        call()
