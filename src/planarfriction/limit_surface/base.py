@@ -164,10 +164,12 @@ class LimitSurface:
                 break
             point = target + place @ basis
             hessian = basis @ self._direction_slope(point[None])[0] @ basis.T
-            shift = 1e-12 * np.trace(hessian)
-            move = -np.linalg.solve(hessian + shift * np.eye(2), slope)
-            if not np.isfinite(move).all() or move @ slope >= 0.0:
-                move = -slope
+            # where a table curves downwards, the same step along that direction, but downhill
+            curvature, across = np.linalg.eigh(hessian)
+            curvature = np.maximum(np.abs(curvature), 1e-12 * np.abs(curvature).max())
+            if not curvature.max() > 0.0:
+                break
+            move = -across @ ((across.T @ slope) / curvature)
             length = 1.0
             while length > 1e-14:
                 trial, trial_slope = self._dissipation_over(target, basis, place + length * move)
