@@ -337,4 +337,4 @@ def test_the_written_json_is_plain(tmp_path):
     scene.to_file(tmp_path / "again.json")
     data = json.loads((tmp_path / "again.json").read_text())
     assert data == scene.to_dict()
-    assert list(data) == ["name", "t_end", "save_every", "body", "contact"]
+    assert list(data) == ["name", "t_end", "save_every", "rtol", "atol", "body", "contact"]

@@ -11,7 +11,7 @@ import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -146,7 +146,7 @@ def _in_hand_distributed_101(name: str, full: bool) -> Measurement:
     return _line(name, costs[101], "ns per loaded cell and step", "the same on 21 x 21 cells", costs[21])
 
 
-def _in_hand_reduced(name: str, full: bool, load: int = 1) -> Measurement:
+def _in_hand_reduced(name: str, full: bool, load: Literal[1, 2] = 1) -> Measurement:
     scene = in_hand(ReducedModelPublished(_disc(), _law()), normal_force=in_hand_load(load))
     value, _ = _solver_time(scene, 9)
     return _line(name, value, "s", "SciPy LSODA over the whole run", _lsoda_time(scene, scene.t_end))
@@ -170,6 +170,7 @@ def _table_build(name: str, full: bool) -> Measurement:
 def _numpy_table(patch: ContactPatch, segments: int = 20) -> np.ndarray:
     """Smoothed nodes as one would write them: four sums over the cells at every node."""
     grid, radius, weights = patch.grid, patch.contact_radius(), patch.weights()
+    assert grid is not None
     x, y = (patch.positions - patch.centre_of_pressure()).T
     nodes = np.zeros((segments + 1, 4 * segments, 3))
     for i in range(segments):

@@ -6,6 +6,7 @@ import functools
 import hashlib
 import inspect
 from pathlib import Path
+from typing import Any
 
 from numba import njit
 from numba.extending import register_jitable
@@ -14,17 +15,17 @@ from planarfriction import formulas
 
 _OPTIONS = {"error_model": "numpy", "fastmath": {"reassoc", "contract", "nsz", "arcp"}}
 
-jit = functools.partial(njit, cache=True, **_OPTIONS)
+jit: Any = functools.partial(njit, cache=True, no_cfunc_wrapper=True, **_OPTIONS)
 """Compile an entry point, callable from Python. Sums over cells may be reordered, so that they vectorise."""
 
 # Counting references to arrays is atomic: in a step of the reduced model it costs four times the physics. Inner
 # functions allocate nothing and keep no array, so they need no counting; they are called from compiled code only.
 _INNER = {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
-kernel = functools.partial(njit, **_INNER, **_OPTIONS)
+kernel: Any = functools.partial(njit, **_INNER, **_OPTIONS)
 """Compile an inner function: no allocation, no array assignments that might need a copy."""
 
-inlined = functools.partial(kernel, forceinline=True)
+inlined: Any = functools.partial(kernel, forceinline=True)
 """Compile an inner function into each of its callers."""
 
 for _name, _formula in inspect.getmembers(formulas, inspect.isfunction):

@@ -15,7 +15,14 @@ from numba import njit, types
 from numba.extending import intrinsic
 
 # Not `reassoc`: the two-part constants of the argument reductions rely on the order of operations.
-_inline = njit(error_model="numpy", fastmath={"contract"}, forceinline=True, _nrt=False)
+_inline = njit(
+    error_model="numpy",
+    fastmath={"contract"},
+    forceinline=True,
+    _nrt=False,
+    no_cpython_wrapper=True,
+    no_cfunc_wrapper=True,
+)
 
 _LOG2_E = 1.4426950408889634
 _LN2_HIGH = 6.93147180369123816490e-01  # the first 33 bits of ln 2: k * _LN2_HIGH is exact

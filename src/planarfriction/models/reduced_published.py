@@ -54,7 +54,7 @@ class ReducedModelPublished(FrictionModel):
     Source: Waltersson and Karayiannidis 2024, section IV.
     """
 
-    surface: LimitSurface | None = None
+    surface: LimitSurface = None  # pyright: ignore[reportAssignmentType]
     """Limit surface; None takes the published table of the patch."""
     on_load_change: str = "rebuild"
     """What follows the load where the patch depends on it: "rebuild", "rescale" or "keep"."""
@@ -120,7 +120,7 @@ class ReducedModelPublished(FrictionModel):
                     *self._fixed, state, float(vx), float(vy), float(omega), float(normal_force), float(dt)
                 )
             except (TypeError, ValueError):  # not numbers, or a batch: the checks below decide
-                result = ()
+                result = np.empty(0)
             if len(result):
                 return result[:3], result[3:]
         state, twist, load, dt = self._inputs(state, twist, normal_force, dt=dt)

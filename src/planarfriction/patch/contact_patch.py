@@ -49,7 +49,7 @@ class ContactPatch:
     """Positions of the cells (centroids of their parts inside the patch), shape `[N, 2]` [m]."""
     areas: np.ndarray
     """Areas of the cells inside the patch, shape `[N]` [m^2]."""
-    pressure: Pressure = field(default_factory=Uniform)
+    pressure: Any = field(default_factory=Uniform)
     """Pressure law."""
     grid: Grid | None = None
     """The regular grid that the cells were cut from, or None."""

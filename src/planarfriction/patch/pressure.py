@@ -44,7 +44,7 @@ class Pressure:
 
     def to_dict(self) -> dict[str, Any] | list[float]:
         """The law as plain data: `{"law": name, parameter: value, ...}`, or a list with one pressure per cell."""
-        fields = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        fields = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}  # pyright: ignore
         plain = {name: list(value) if isinstance(value, tuple) else value for name, value in fields.items()}
         return {"law": self.law, **{name: value for name, value in plain.items() if value is not None}}
 
@@ -189,5 +189,5 @@ def as_law(pressure: Any, positions: np.ndarray) -> Pressure:
     if isinstance(pressure, Pressure):
         return pressure
     if callable(pressure):
-        return PerCell([pressure(x, y) for x, y in positions.tolist()])
+        return PerCell([pressure(x, y) for x, y in positions.tolist()])  # pyright: ignore
     return PerCell(validation.array("pressure", pressure, (len(positions),)))

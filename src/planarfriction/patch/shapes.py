@@ -76,4 +76,4 @@ def _rows(grid: Grid) -> np.ndarray:
     y = grid.centres()[:: grid.columns, 1]
     left = grid.x_min - grid.cell_width
     right = grid.x_min + (grid.columns + 1) * grid.cell_width
-    return shapely.box(left, y - grid.cell_height / 2, right, y + grid.cell_height / 2)
+    return shapely.box(left, y - grid.cell_height / 2, right, y + grid.cell_height / 2)  # pyright: ignore

@@ -94,5 +94,5 @@ def integrate(
     reached = int(cursor[1])
     kept = Output(*(array[:reached] if len(array) else array for array in output))
     status, message = _MESSAGES[int(outcome)]
-    statistics = Statistics(*(int(n) for n in counts), wall_time, compile_time)
+    statistics = Statistics(*counts.tolist(), wall_time=wall_time, compile_time=compile_time)
     return Integration(kept, status, message, statistics)
