@@ -12,8 +12,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from planarfriction import formulas
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import inlined, jit, kernel
@@ -206,21 +204,19 @@ def step_batch(law_row, shape, surface, data, z, twist, load, dt, out, wrench):
 
 
 @jit
-def step_one(numbers, data, z, vx, vy, omega, load, dt):
-    """`step` of one contact for callers in Python: new state and wrench in one array [6], or [0] for invalid inputs.
+def step_one(numbers, data, z, vx, vy, omega, load, dt, result):
+    """`step` of one contact for callers in Python: new state and wrench into `result` [6]; false for invalid inputs.
 
-    `numbers` holds law (9), shape (4) and surface (3), since every argument costs a quarter of a microsecond on the
-    way in.
+    `numbers` holds law (9), shape (4) and surface (3): every argument costs a quarter of a microsecond on the way in.
     """
     finite = xp.is_finite(vx) and xp.is_finite(vy) and xp.is_finite(omega) and xp.is_finite(load) and xp.is_finite(dt)
     finite = finite and xp.is_finite(z[0]) and xp.is_finite(z[1]) and xp.is_finite(z[2])
     if not (finite and load > 0.0 and dt >= 0.0):
-        return np.empty(0)
-    result = np.empty(6)
+        return False
     surface = (int(numbers[13]), int(numbers[14]), int(numbers[15]))
     wrench = step(law_of(numbers), z, vx, vy, omega, numbers[9:13], surface, data, dt, result)
     result[3], result[4], result[5] = load * wrench[0], load * wrench[1], load * wrench[2]
-    return result
+    return True
 
 
 @jit

@@ -107,21 +107,25 @@ class ReducedModelPublished(FrictionModel):
         Plain LuGre is linear in z and its step exact. Elasto-plastic: the exponential step with the mean decay of start
         and predicted end, second order, kept within the largest deflection so that nothing overshoots.
         """
+        array = np.ndarray
         if (
-            type(state) is np.ndarray
+            type(state) is array
             and state.shape == (3,)
+            and type(normal_force) is not array
+            and type(dt) is not array
+            and (type(twist) is not array or twist.ndim == 1)
             and self._fixed is not None
-            and np.ndarray not in (type(normal_force), type(dt))
-            and (type(twist) is not np.ndarray or twist.shape == (3,))
-        ):
+        ):  # one contact: no batch to broadcast, and the compiled step checks the numbers
+            numbers, data = self._fixed
+            result = np.empty(6)
             try:
                 vx, vy, omega = twist
-                result = kernels.step_one(
-                    *self._fixed, state, float(vx), float(vy), float(omega), float(normal_force), float(dt)
+                valid = kernels.step_one(
+                    numbers, data, state, float(vx), float(vy), float(omega), float(normal_force), float(dt), result
                 )
             except (TypeError, ValueError):  # not numbers, or a batch: the checks below decide
-                result = np.empty(0)
-            if len(result):
+                valid = False
+            if valid:
                 return result[:3], result[3:]
         state, twist, load, dt = self._inputs(state, twist, normal_force, dt=dt)
         packed = self._by_load(self._step, (6,), state, twist, load, dt)
