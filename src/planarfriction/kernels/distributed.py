@@ -218,6 +218,7 @@ def step_batch(law, z, twist, x, y, w, load, dt, out, wrench):
         wrench[b, 0], wrench[b, 1], wrench[b, 2] = load[b] * fx, load[b] * fy, load[b] * tau
         if load[b] == 0.0:
             out[b] = 0.0
+            wrench[b] = 0.0
 
 
 @jit
