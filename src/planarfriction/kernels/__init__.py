@@ -15,8 +15,11 @@ from planarfriction import formulas
 
 _OPTIONS = {"error_model": "numpy", "fastmath": {"reassoc", "contract", "nsz", "arcp"}}
 
-jit: Any = functools.partial(njit, cache=True, no_cfunc_wrapper=True, **_OPTIONS)
-"""Compile an entry point, callable from Python. Sums over cells may be reordered, so that they vectorise."""
+jit: Any = functools.partial(njit, cache=True, nogil=True, no_cfunc_wrapper=True, **_OPTIONS)
+"""Compile an entry point, callable from Python and from several threads at once.
+
+Sums over cells may be reordered, so that they vectorise.
+"""
 
 # Counting references to arrays is atomic: in a step of the reduced model it costs four times the physics. Inner
 # functions allocate nothing and keep no array, so they need no counting; they are called from compiled code only.

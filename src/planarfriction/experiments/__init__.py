@@ -1,0 +1,50 @@
+"""The experiments of the source paper, each with its data, its figures and its numbers beside the published ones.
+
+`EXPERIMENTS` lists them by name; each lives in a module of its own with a function `run(work) -> Result`.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from planarfriction import validation
+
+if TYPE_CHECKING:
+    from planarfriction.experiments.experiment import Result, Work
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """An entry of the list: its name, its title, and the module that holds it."""
+
+    name: str
+    title: str
+
+    @property
+    def run(self) -> Callable[[Work], Result]:
+        """The function that carries it out."""
+        return importlib.import_module(f"{__name__}.{self.name.replace('-', '_')}").run
+
+
+EXPERIMENTS = {
+    name: Experiment(name, title)
+    for name, title in (
+        ("limit-surfaces", "Limit surfaces, and where the ellipsoid goes wrong"),
+        ("staircase", "The staircase of a grid's steady state, and what smoothing does to it"),
+        ("velocity-driven", "Moved with a given velocity: distributed, reduced and ellipsoid"),
+        ("drift", "Drift under a load that friction holds"),
+        ("in-hand", "A plate that slips and sticks between two fingers"),
+        ("load-dependent", "A contact pressure that follows the load"),
+        ("convergence", "Convergence in the number of cells and of table segments"),
+        ("timing", "Time, and work against precision"),
+    )
+}
+"""Experiment by name, in the order of the paper."""
+
+
+def experiment(name: str) -> Experiment:
+    """The experiment called `name`; raises `InvalidValueError` for an unknown one."""
+    return EXPERIMENTS[validation.choice("experiment", name, EXPERIMENTS)]

@@ -1,0 +1,195 @@
+"""What an experiment is: a function of `Work` that returns a `Result` of data, figures and numbers."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from planarfriction.experiments import facts
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+THREADS = 2
+"""Pieces computed at once by `Work.pieces`."""
+
+Arrays = dict[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One of our numbers or curves beside a reference, with the tolerance that the reference supports."""
+
+    quantity: str
+    """What is compared, in words."""
+    reference: Literal["published", "converged", "closed form"]
+    difference: float
+    """Largest absolute difference over all samples."""
+    tolerance: float
+    unit: str
+    samples: int
+    cause: str
+    """Where the difference comes from, one sentence."""
+    ours: float | None = None
+    """Our value, where it is a single number."""
+    theirs: float | None = None
+    """The reference's value, where it is a single number."""
+
+    @property
+    def holds(self) -> bool:
+        """Whether the difference is within the tolerance."""
+        return bool(self.difference <= self.tolerance)
+
+
+def compare_curve(
+    quantity: str, time: np.ndarray, values: np.ndarray, name: str, *, allowance: float, cause: str
+) -> Comparison:
+    """Our curve (`values` at `time`) beside the published curve `name`, at the times of its vertices only.
+
+    The tolerance is the error of the figure's solver, plus that of reading it, plus `allowance`, which is our own
+    error (or, where the figure's solver error is unknown, an estimate that `cause` explains).
+    """
+    curve = facts.published_curve(name)
+    inside = curve.time <= time[-1] + 1e-9  # a run may be shorter than the figure
+    difference = np.abs(_at(curve.time[inside], time, values) - curve.values[inside])
+    tolerance = (curve.deviation or 0.0) + curve.reading + allowance
+    return Comparison(quantity, "published", float(difference.max()), tolerance, curve.unit, int(inside.sum()), cause)
+
+
+def compare_converged(
+    quantity: str, time: np.ndarray, values: np.ndarray, name: str, *, unit: str, allowance: float, cause: str
+) -> Comparison:
+    """Our curve beside the column `name` of a converged solution, such as `in_hand/Circle/d1/x`, at all its times."""
+    solution, _, column = name.rpartition("/")
+    reference = facts.converged(solution)
+    inside = reference["time"] <= time[-1] + 1e-9
+    expected = reference[column][inside]
+    difference = np.abs(_at(reference["time"][inside], time, values) - expected)
+    tolerance = allowance + facts.CONVERGED_SHARE * float(np.ptp(reference[column]))
+    return Comparison(quantity, "converged", float(difference.max()), tolerance, unit, int(inside.sum()), cause)
+
+
+def compare_number(
+    quantity: str,
+    ours: float,
+    theirs: float,
+    *,
+    reference: Literal["published", "converged", "closed form"],
+    tolerance: float,
+    unit: str,
+    cause: str,
+) -> Comparison:
+    """One number beside its reference."""
+    ours, theirs = float(ours), float(theirs)
+    return Comparison(quantity, reference, abs(ours - theirs), tolerance, unit, 1, cause, ours, theirs)
+
+
+def _at(wanted: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Recorded values at `wanted` times; each must be a recorded time, for between samples lie jumps."""
+    index = np.clip(np.searchsorted(time, wanted - 1e-7), 0, len(time) - 1)
+    assert np.abs(time[index] - wanted).max() < 1e-6, "the reference has times that were not recorded"
+    return values[index]
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure of the report."""
+
+    name: str
+    """File name without its ending."""
+    caption: str
+    """What to see, one or two sentences."""
+    figure: Any
+    """The matplotlib figure."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of the report; the first column names the rows."""
+
+    title: str
+    headings: Sequence[str]
+    rows: Sequence[Sequence[str | float]]
+    note: str = ""
+
+
+@dataclass(frozen=True)
+class Result:
+    """What an experiment found."""
+
+    findings: Sequence[str]
+    """Paragraphs in plain words: what was done, what it shows, with the numbers measured in this run."""
+    pictures: Sequence[Picture]
+    comparisons: Sequence[Comparison]
+    numbers: Mapping[str, Any]
+    """Every number worth keeping, in nested dictionaries and lists."""
+    tables: Sequence[Table] = ()
+    data: Mapping[str, xr.Dataset] = field(default_factory=dict)
+    """Curves by name, with units; written as NetCDF."""
+
+
+@dataclass(frozen=True)
+class Work:
+    """How to work: how much, where finished pieces are kept, whom to tell.
+
+    An experiment wraps what takes long in pieces. A piece that an interrupted run has finished is read from its file.
+    """
+
+    quick: bool = False
+    """A small part of everything, to see that it works."""
+    full: bool = False
+    """Also what takes more than minutes."""
+    folder: Path | None = None
+    """Where finished pieces are kept; None: nowhere."""
+    fingerprint: str = ""
+    """Of the code and the options: pieces with another one are computed again."""
+    progress: Callable[[str], None] | None = None
+
+    def piece(self, label: str, compute: Callable[[], Mapping[str, Any]]) -> Arrays:
+        """What `compute` returns, numbers and arrays by name, from the kept file if there is one."""
+        if self.progress is not None:
+            self.progress(label)
+        path = None if self.folder is None else self.folder / f"{_slug(label)}.npz"
+        kept = None if path is None else _read_piece(path, self.fingerprint)
+        if kept is not None:
+            return kept
+        arrays = {name: np.asarray(values) for name, values in compute().items()}
+        if path is not None:
+            _write_piece(path, self.fingerprint, arrays)
+        return arrays
+
+    def pieces(self, computes: Mapping[str, Callable[[], Mapping[str, Any]]]) -> dict[str, Arrays]:
+        """Independent pieces by label, two at a time: compiled code runs beside other compiled code."""
+        pool = ThreadPoolExecutor(THREADS)
+        try:
+            futures = {label: pool.submit(self.piece, label, compute) for label, compute in computes.items()}
+            return {label: future.result() for label, future in futures.items()}
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def _slug(label: str) -> str:
+    return re.sub(r"[^\w.]+", "-", label).strip("-")
+
+
+def _read_piece(path: Path, fingerprint: str) -> Arrays | None:
+    try:
+        with np.load(path) as file:
+            arrays = dict(file)
+    except (OSError, ValueError, EOFError):  # none, or cut off while it was written
+        return None
+    return arrays if str(arrays.pop("fingerprint", "")) == fingerprint else None
+
+
+def _write_piece(path: Path, fingerprint: str, arrays: Arrays) -> None:
+    path.parent.mkdir(parents=True, exist_ok=True)
+    part = path.with_suffix(".part")
+    with part.open("wb") as file:
+        np.savez_compressed(file, fingerprint=np.array(fingerprint), **arrays)
+    part.replace(path)

@@ -1,0 +1,59 @@
+"""What the experiments share: the published parameters, the models by their letters in the paper, sampled results."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+
+from planarfriction.geometry import wrench_at
+from planarfriction.laws import ElastoPlastic, LuGre
+from planarfriction.limit_surface import LimitSurfaceEllipsoid
+from planarfriction.models import DistributedModel, ReducedModelPublished
+from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
+from planarfriction.scenes import Solution
+
+LAW = LuGre(elasto_plastic=ElastoPlastic(0.9))
+"""The published friction parameters with elasto-plastic bristles."""
+
+PLAIN = LuGre()
+"""The same with plain bristles."""
+
+Kind = Literal["d", "r", "e"]
+
+NAMES: dict[str, str] = {"d": "distributed", "r": "reduced", "e": "ellipsoid"}
+"""Letter of a model in the names of curves -> the model in words."""
+
+SIX_SHAPES = ("Circle", "Square", "Line", "LineGrad", "NonConvex1", "NonConvex2")
+"""The shapes of the velocity-driven experiment."""
+
+IN_WORDS = {
+    "Circle": "disc",
+    "Square": "square",
+    "Line": "line",
+    "LineGrad": "line, linear pressure",
+    "LineGradX": "line along x, linear pressure",
+    "NonConvex1": "two pads",
+    "NonConvex2": "T",
+}
+"""Published patch -> how figures call it."""
+
+
+def published_model(kind: Kind, shape: str | ContactPatch, law: LuGre = LAW, *, width: float = 0.02) -> Any:
+    """The distributed model ("d"), the published reduced one ("r"), or that on the ellipsoid ("e") of a patch."""
+    patch = PUBLISHED_PATCHES[shape](width=width) if isinstance(shape, str) else shape
+    if kind == "d":
+        return DistributedModel(patch, law)
+    return ReducedModelPublished(patch, law, surface=LimitSurfaceEllipsoid(patch) if kind == "e" else None)
+
+
+def columns(solution: Solution) -> dict[str, np.ndarray]:
+    """Time, motion and the friction wrench of the first contact (about the contact frame's origin), as arrays [SI]."""
+    values = {name: history.values for name, history in solution.histories.items()}
+    body = {name: values[name] for name in ("time", "x", "y", "theta", "vx", "vy", "omega")}
+    return body | {name: values[name][:, 0] for name in ("fx", "fy", "tau", "normal_force")}
+
+
+def at_centre_of_pressure(run: dict[str, np.ndarray], patch: ContactPatch) -> np.ndarray:
+    """Friction wrench `[T, 3]` of a run about the centre of pressure of the patch."""
+    return wrench_at(np.stack([run[name] for name in ("fx", "fy", "tau")], axis=-1), patch.centre_of_pressure())
