@@ -1,4 +1,4 @@
-"""Command line: `planarfriction run`, `planarfriction limit-surface`, `planarfriction bench`."""
+"""Command line: `planarfriction run`, `limit-surface`, `reproduce`, `bench`."""
 
 from __future__ import annotations
 
@@ -13,6 +13,9 @@ INTERRUPTED = 130
 
 BAD_INPUT = 2
 """Exit code where the input is wrong."""
+
+OUT_OF_TOLERANCE = 1
+"""Exit code where a reproduced number misses its reference."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

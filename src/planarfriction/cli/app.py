@@ -140,3 +140,35 @@ def bench(only: tuple[str, ...], full: bool, json: bool) -> None:
 
     show = command.show_json if json else command.show_table
     show(command.measure(only, full=full))
+
+
+@app.command(
+    short_help="Reproduce the published experiments in one report.",
+    help="""Reproduce the experiments of the source paper: one HTML report, ours beside the published numbers.
+
+    Writes report.html (figures inside), numbers.json, and for each experiment its figures (PNG, SVG) and curves
+    (NetCDF) to --out. Interrupted and started again, it goes on where it was; what is finished is not done again.
+    The exit code is 1 where a number is out of its tolerance.
+
+    \b
+    Examples:
+      planarfriction reproduce
+      planarfriction reproduce --list
+      planarfriction reproduce --only drift --only in-hand --out results/
+      planarfriction reproduce --quick
+    """,
+)
+@click.option("--only", metavar="NAME", multiple=True, help="Only this experiment; may be repeated.")
+@click.option("--list", "list_only", is_flag=True, help="List the experiments.")
+@click.option("--out", type=FILE, default=Path("reproduction"), show_default=True, help="Folder for the report.")
+@click.option("--quick", is_flag=True, help="A small part of everything, in seconds.")
+@click.option("--full", is_flag=True, help="Also what takes many minutes: published solvers, long baselines.")
+@click.option("--again", is_flag=True, help="Do everything anew.")
+def reproduce(only: tuple[str, ...], list_only: bool, out: Path, quick: bool, full: bool, again: bool) -> int:
+    """Reproduce the paper (the help above is what users see)."""
+    from planarfriction.cli import reproduce as command
+
+    if list_only:
+        command.show_list()
+        return 0
+    return command.reproduce(only, out, quick=quick, full=full, again=again)

@@ -45,6 +45,6 @@ EXPERIMENTS = {
 """Experiment by name, in the order of the paper."""
 
 
-def experiment(name: str) -> Experiment:
+def find_experiment(name: str) -> Experiment:
     """The experiment called `name`; raises `InvalidValueError` for an unknown one."""
     return EXPERIMENTS[validation.choice("experiment", name, EXPERIMENTS)]

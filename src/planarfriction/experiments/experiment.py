@@ -8,6 +8,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -180,9 +181,9 @@ def _slug(label: str) -> str:
 
 def _read_piece(path: Path, fingerprint: str) -> Arrays | None:
     try:
-        with np.load(path) as file:
-            arrays = dict(file)
-    except (OSError, ValueError, EOFError):  # none, or cut off while it was written
+        with path.open("rb") as file, np.load(file) as stored:
+            arrays = dict(stored)
+    except (OSError, ValueError, EOFError, BadZipFile):  # none, or cut off while it was written
         return None
     return arrays if str(arrays.pop("fingerprint", "")) == fingerprint else None
 

@@ -73,25 +73,30 @@ class Solution:
 
         Raises FileError where the file cannot be written.
         """
-        path = check_writable(path)
-        target = Path(os.path.realpath(path))  # a link stays one
         attributes = {
             "scene": self.scene.to_json(),
             "statistics": json.dumps(self.statistics.as_dict()),
             "status": self.status,
             "message": self.message,
         }
-        # Written beside the target first: a crash half-way leaves an older result as it was.
-        part = _part(target)
-        try:
-            with _quiet():
-                self.data.assign_attrs(attributes).to_netcdf(part, engine="scipy")
-            os.replace(part, target)
-        except OSError as error:
-            raise FileError(f"{path}: cannot be written: {error.strerror or error}") from None
-        finally:
-            part.unlink(missing_ok=True)
-        return path
+        return write_dataset(self.data.assign_attrs(attributes), path)
+
+
+def write_dataset(data: xr.Dataset, path: str | Path) -> Path:
+    """Write a dataset to the NetCDF file `path`, all or nothing; raises FileError where it cannot be written."""
+    path = check_writable(path)
+    target = Path(os.path.realpath(path))  # a link stays one
+    # Written beside the target first: a crash half-way leaves an older result as it was.
+    part = _part(target)
+    try:
+        with _quiet():
+            data.to_netcdf(part, engine="scipy")
+        os.replace(part, target)
+    except OSError as error:
+        raise FileError(f"{path}: cannot be written: {error.strerror or error}") from None
+    finally:
+        part.unlink(missing_ok=True)
+    return path
 
 
 def load(path: str | Path) -> Solution:

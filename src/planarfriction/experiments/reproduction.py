@@ -1,0 +1,162 @@
+"""Carry out experiments one after the other and keep what they find in a folder, so that nothing is done twice.
+
+DIR/report.html              everything, figures inside
+DIR/numbers.json             every number
+DIR/<experiment>/            its figures (PNG, SVG), its curves (NetCDF), and `result.json`
+DIR/<experiment>/pieces/     what an interrupted experiment has finished; gone when it is done
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import hashlib
+import json
+import os
+import platform
+import shutil
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+from planarfriction import __version__
+from planarfriction.errors import FileError
+from planarfriction.experiments import EXPERIMENTS, Experiment, find_experiment
+from planarfriction.experiments.experiment import Result, Work
+from planarfriction.scenes.solution import write_dataset
+
+Record = dict[str, Any]
+"""A result as it is stored: what `result.json` holds."""
+
+
+@dataclass(frozen=True)
+class Reproduction:
+    """Where results are kept, and how much is done."""
+
+    folder: Path
+    quick: bool = False
+    full: bool = False
+
+    @property
+    def fingerprint(self) -> str:
+        """Of the code, the packages beneath it and the options: results with another one are not reused."""
+        return hashlib.sha256(f"{_code()} {self.quick} {self.full}".encode()).hexdigest()
+
+    def kept(self, name: str) -> Record | None:
+        """The result of an experiment that an earlier run with the same code and options has finished."""
+        try:
+            record = json.loads((self.folder / name / "result.json").read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return None
+        return record if isinstance(record, dict) and record.get("fingerprint") == self.fingerprint else None
+
+    def records(self) -> list[Record]:
+        """All results kept in the folder, in the order of the paper."""
+        return [record for name in EXPERIMENTS if (record := self.kept(name)) is not None]
+
+    def run(
+        self,
+        names: Sequence[str] | None = None,
+        *,
+        again: bool = False,
+        progress: Callable[[str], None] | None = None,
+    ) -> Iterator[Record]:
+        """Carry out the experiments `names` (all by default) and yield each result as it is stored.
+
+        What is kept is not done again, unless `again` asks for it. `progress` is told the piece in work. Ctrl-C passes
+        through; what is finished by then, pieces included, stays.
+
+        Raises `InvalidValueError` for an unknown name, `FileError` where nothing can be written.
+        """
+        chosen = [find_experiment(name) for name in (EXPERIMENTS if names is None else names)]
+        for each in chosen:
+            record = None if again else self.kept(each.name)
+            yield self._carry_out(each, again, progress) if record is None else record
+
+    def _carry_out(self, each: Experiment, again: bool, progress: Callable[[str], None] | None) -> Record:
+        home = self.folder / each.name
+        pieces = home / "pieces"
+        if again:
+            shutil.rmtree(pieces, ignore_errors=True)
+        begin = time.perf_counter()
+        work = Work(self.quick, self.full, pieces, self.fingerprint, progress)
+        result = each.run(work)
+        if progress is not None:
+            progress("drawing and writing")
+        record = _record(each, result) | {"fingerprint": self.fingerprint}
+        try:
+            home.mkdir(parents=True, exist_ok=True)
+            for picture in result.pictures:
+                picture.figure.savefig(home / f"{picture.name}.png", dpi=150)
+                picture.figure.savefig(home / f"{picture.name}.svg", metadata={"Date": None})
+        except OSError as error:
+            raise FileError(f"{home}: cannot be written: {error.strerror or error}") from error
+        for name, dataset in result.data.items():
+            write_dataset(dataset, home / f"{name}.nc")
+        record["seconds"] = round(time.perf_counter() - begin, 2)
+        write_text(home / "result.json", json.dumps(record, indent=1, allow_nan=False))
+        shutil.rmtree(pieces, ignore_errors=True)
+        return record
+
+    def numbers(self) -> Record:
+        """Every number of the kept results, with what they were measured on."""
+        keys = ("title", "seconds", "numbers", "comparisons")
+        every = {record["name"]: {key: record[key] for key in keys} for record in self.records()}
+        options = {"quick": self.quick, "full": self.full}
+        return {"version": __version__, "options": options, "machine": machine(), "experiments": every}
+
+
+def machine() -> dict[str, Any]:
+    """What the numbers were computed on."""
+    packages = {name: metadata.version(name) for name in ("numpy", "scipy", "numba", "matplotlib")}
+    return {
+        "processors": os.cpu_count(),
+        "platform": platform.platform(),
+        "python": platform.python_version(),
+        **packages,
+    }
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a file, all or nothing; raises FileError where that is not possible."""
+    part = path.with_name(f"{path.name}.part")
+    try:
+        part.write_text(text, encoding="utf-8")
+        part.replace(path)
+    except OSError as error:
+        raise FileError(f"{path}: cannot be written: {error.strerror or error}") from error
+
+
+def _record(each: Experiment, result: Result) -> Record:
+    return {
+        "name": each.name,
+        "title": each.title,
+        "findings": list(result.findings),
+        "pictures": [{"name": picture.name, "caption": picture.caption} for picture in result.pictures],
+        "tables": [_plain(dataclasses.asdict(table)) for table in result.tables],
+        "comparisons": [_plain(dataclasses.asdict(row)) | {"holds": row.holds} for row in result.comparisons],
+        "numbers": _plain(result.numbers),
+        "data": [f"{name}.nc" for name in result.data],
+    }
+
+
+def _plain(value: Any) -> Any:
+    """The value with mappings, lists and Python's own numbers only, as JSON wants it."""
+    if isinstance(value, dict):
+        return {str(key): _plain(each) for key, each in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(each) for each in value]
+    return _plain(value.tolist()) if hasattr(value, "tolist") else value
+
+
+@functools.cache
+def _code() -> str:
+    home = Path(__file__).parents[1]
+    digest = hashlib.sha256(f"{sys.version} {machine()}".encode())
+    for path in sorted(path for path in home.rglob("*") if path.suffix in (".py", ".json", ".npz")):
+        digest.update(path.read_bytes())
+    return digest.hexdigest()

@@ -1,0 +1,227 @@
+"""`planarfriction reproduce`: what is kept, what is done again, what the report holds.
+
+The experiments here are made up; the real ones have tests of their own.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+from planarfriction import experiments
+from planarfriction.cli import main
+from planarfriction.errors import InvalidValueError
+from planarfriction.experiments import facts
+from planarfriction.experiments.experiment import (
+    Picture,
+    Result,
+    Table,
+    Work,
+    compare_converged,
+    compare_curve,
+    compare_number,
+)
+from planarfriction.experiments.report import number, write_report
+from planarfriction.experiments.reproduction import Reproduction
+
+
+class Made:
+    """An experiment that counts what it does, can be interrupted once, and can miss its reference."""
+
+    def __init__(self, name: str, *, interrupt_at: str = "", theirs: float = 2.0):
+        self.name, self.title, self.interrupt_at, self.theirs = name, f"About <{name}>", interrupt_at, theirs
+        self.done: list[str] = []
+
+    def run(self, work: Work) -> Result:
+        import xarray as xr
+
+        from planarfriction.plots.style import new_figure
+
+        values = work.pieces({f"{self.name} {letter}": lambda letter=letter: self.compute(letter) for letter in "ab"})
+        figure = new_figure(3.0, 2.0)
+        figure.subplots().plot([0.0, 1.0], [0.0, 1.0])
+        ours = float(values[f"{self.name} b"]["value"])
+        row = compare_number(
+            "one", ours, self.theirs, reference="published", tolerance=1e-3, unit="m", cause="none & all"
+        )
+        table = Table("Some", ["name", "value"], [["first", np.float64(0.123456)], ["second", 3]], note="a note")
+        data = {"curves": xr.Dataset({"x": ("time", np.arange(3.0))})}
+        return Result(
+            ["Found."], [Picture("line", "A line.", figure)], [row], {"value": np.float64(ours)}, [table], data
+        )
+
+    def compute(self, letter: str) -> dict[str, float]:
+        if letter == self.interrupt_at:
+            self.interrupt_at = ""
+            raise KeyboardInterrupt
+        self.done.append(letter)
+        return {"value": 2.0}
+
+
+@pytest.fixture
+def made(monkeypatch):
+    """Two made-up experiments in the place of the real ones."""
+    for name in list(experiments.EXPERIMENTS):
+        monkeypatch.delitem(experiments.EXPERIMENTS, name)
+    pair = Made("first"), Made("second")
+    for each in pair:
+        monkeypatch.setitem(experiments.EXPERIMENTS, each.name, each)
+    return pair
+
+
+def test_results_are_stored_and_not_done_again(made, tmp_path):
+    reproduction = Reproduction(tmp_path)
+    assert [record["name"] for record in reproduction.run()] == ["first", "second"]
+    assert sorted(made[0].done) == ["a", "b"]
+    files = {path.name for path in (tmp_path / "first").iterdir()}
+    assert files == {"line.png", "line.svg", "curves.nc", "result.json"}  # pieces are gone
+    assert len(list(reproduction.run())) == 2
+    assert sorted(made[0].done) == ["a", "b"]
+    list(reproduction.run(["first"], again=True))
+    assert sorted(made[0].done) == ["a", "a", "b", "b"]
+
+
+def test_other_options_and_broken_files_are_not_reused(made, tmp_path):
+    list(Reproduction(tmp_path).run(["first"]))
+    assert Reproduction(tmp_path, quick=True).kept("first") is None
+    (tmp_path / "first" / "result.json").write_text("{")
+    assert Reproduction(tmp_path).kept("first") is None
+
+
+def test_an_interrupted_run_goes_on_where_it_was(made, tmp_path, capsys):
+    made[0].interrupt_at = "b"
+    assert main(["reproduce", "--out", str(tmp_path)]) == 130
+    assert "goes on from there" in capsys.readouterr().err
+    assert made[0].done == ["a"] and not made[1].done
+    assert main(["reproduce", "--out", str(tmp_path)]) == 0
+    assert made[0].done == ["a", "b"]  # a was read from its piece
+    assert main(["reproduce", "--out", str(tmp_path)]) == 0
+    assert made[0].done == ["a", "b"]
+    assert "kept from an earlier run" in capsys.readouterr().err
+
+
+def test_a_piece_that_was_cut_off_or_is_of_other_code_is_computed_again(tmp_path):
+    calls = []
+    work = Work(folder=tmp_path, fingerprint="one")
+
+    def compute():
+        calls.append(1)
+        return {"x": np.arange(3)}
+
+    for _ in range(2):
+        np.testing.assert_array_equal(work.piece("a piece", compute)["x"], np.arange(3))
+    assert len(calls) == 1
+    (path,) = tmp_path.iterdir()
+    path.write_bytes(path.read_bytes()[:40])
+    work.piece("a piece", compute)
+    Work(folder=tmp_path, fingerprint="two").piece("a piece", compute)
+    assert len(calls) == 3
+    Work().piece("a piece", compute)  # kept nowhere
+    assert len(calls) == 4
+
+
+def test_the_command_writes_a_report_and_all_numbers(made, tmp_path, capsys):
+    assert main(["reproduce", "--out", str(tmp_path)]) == 0
+    out, err = capsys.readouterr()
+    assert "first" in out and "report.html" in err
+    numbers = json.loads((tmp_path / "numbers.json").read_text())
+    assert numbers["experiments"]["first"]["numbers"] == {"value": 2.0}
+    assert numbers["experiments"]["second"]["comparisons"][0]["holds"] is True
+    page = (tmp_path / "report.html").read_text()
+    assert "About &lt;first&gt;" in page and "none &amp; all" in page and "0.1235" in page and "a note" in page
+    # self-contained: each figure is inside, nothing is loaded from elsewhere
+    sources = re.findall(r'(?:src|href)="([^"]*)"', page)
+    assert sum(source.startswith("data:image/png;base64,") for source in sources) == 2
+    assert all(source.startswith(("data:image/png;base64,", "#")) for source in sources)
+
+
+def test_a_number_out_of_tolerance_is_shown_and_sets_the_exit_code(made, tmp_path, capsys):
+    made[1].theirs = 2.1
+    assert main(["reproduce", "--out", str(tmp_path)]) == 1
+    assert "out of tolerance: one" in capsys.readouterr().err
+    assert 'class="missed"' in (tmp_path / "report.html").read_text()
+
+
+def test_a_report_survives_a_removed_picture(made, tmp_path):
+    reproduction = Reproduction(tmp_path)
+    list(reproduction.run(["first"]))
+    (tmp_path / "first" / "line.png").unlink()
+    assert "A line." in write_report(reproduction).read_text()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--only", "nothing"], "experiment must be one of"),
+        (["--quick", "--full"], "--quick must not be given together with --full"),
+        (["--out", "{file}"], "cannot write to folder"),
+    ],
+)
+def test_wrong_input_is_one_line(arguments, words, tmp_path, capsys):
+    file = tmp_path / "taken"
+    file.write_text("")
+    assert main(["reproduce", *(each.format(file=file) for each in arguments)]) == 2
+    err = capsys.readouterr().err
+    assert words in err and err.count("\n") == 1 and err.startswith("error: ")
+    assert file.read_text() == ""
+
+
+def test_the_list_names_every_experiment_and_each_has_its_module(capsys):
+    assert main(["reproduce", "--list"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == list(experiments.EXPERIMENTS)
+    for name in experiments.EXPERIMENTS:
+        assert callable(experiments.find_experiment(name).run)
+
+
+def test_numbers_as_text():
+    assert [number(value) for value in (None, 3, 0.123456, "x", True)] == ["", "3", "0.1235", "x", "True"]
+
+
+# ---------------------------------------------------------------------- comparisons and facts
+
+
+def test_a_curve_is_compared_at_the_vertices_of_the_figure_only():
+    curve = facts.published_curve("in_hand/Circle/d1/x")
+    time = np.round(np.arange(201) * 0.01, 6)
+    values = np.full_like(time, 7.0)
+    values[np.rint(curve.time / 0.01).astype(int)] = curve.values
+    row = compare_curve("x", time, values, "in_hand/Circle/d1/x", allowance=1e-9, cause="")
+    assert row.difference == 0.0 and row.samples == len(curve.time) and row.holds
+    assert row.tolerance == pytest.approx(curve.deviation + curve.reading + 1e-9)
+    values[np.rint(curve.time[3] / 0.01).astype(int)] += 1e-3
+    assert not compare_curve("x", time, values, "in_hand/Circle/d1/x", allowance=1e-9, cause="").holds
+
+
+def test_a_converged_solution_is_compared_at_all_its_times():
+    reference = facts.converged("in_hand/Circle/d1")
+    row = compare_converged(
+        "y", reference["time"], reference["y"] + 1e-4, "in_hand/Circle/d1/y", unit="m", allowance=1e-6, cause=""
+    )
+    assert row.difference == pytest.approx(1e-4) and not row.holds and row.samples == 200
+
+
+def test_unknown_facts_are_named():
+    for call in (facts.published_curve, facts.published_table, facts.converged):
+        with pytest.raises(InvalidValueError, match="nothing"):
+            call("nothing")
+
+
+def test_published_and_converged_agree_to_the_stated_deviation():
+    """The two files hold what they say: each published curve is within its deviation of the converged one."""
+    checked = 0
+    for name in facts._published()["curves"]:
+        solution, _, column = name.rpartition("/")
+        curve = facts.published_curve(name)
+        if curve.deviation is None or "," in solution:
+            continue
+        reference = facts.converged(solution)
+        index = np.rint(curve.time / 0.01).astype(int) - 1
+        inside = index < len(reference["time"])
+        difference = np.abs(reference[column][index[inside]] - curve.values[inside]).max()
+        assert difference <= 1.02 * curve.deviation + 2.0 * curve.reading + 1e-7 * np.ptp(curve.values), name
+        checked += 1
+    assert checked > 60
