@@ -20,6 +20,7 @@ HEAVY = (
     "PIL",
     "click",
     "jax",
+    "jinja2",
     "llvmlite",
     "matplotlib",
     "numba",
