@@ -1,0 +1,79 @@
+"""Figures of the staircase: the whole profile, and its telling parts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from planarfriction.experiments import facts
+from planarfriction.experiments.experiment import Arrays
+from planarfriction.plots.style import LINE_STYLES, PALETTE, PlotFigure, new_figure, tidy
+
+PANELS = (("fx", "$f_x$ [N]", 1.0), ("fy", "$f_y$ [N]", 1.0), ("tau", "$\\tau$ [N mm]", 1e3))
+LINES = (
+    ("plain", "plain sum", "-", 1.3),
+    ("bilinear", "bilinear smoothing", "-", 1.3),
+    ("rod", "rod, exact", LINE_STYLES[1], 1.1),
+)
+COLOURS = {"plain": PALETTE[0], "bilinear": PALETTE[1], "rod": PALETTE[6]}
+
+
+def overview(time: np.ndarray, found: Arrays) -> PlotFigure:
+    """Force [N] and torque [N mm] over the whole profile."""
+    figure = new_figure(9.0, 7.2)
+    panels = figure.subplots(3, 1, sharex=True)
+    for axes, column in zip(panels, range(3), strict=True):
+        _draw(axes, time, found, column, (0.0, 5.0), size=3.0)
+    panels[-1].set_xlabel("time [s]")
+    _legend(figure, panels[0])
+    return figure
+
+
+def zoom(time: np.ndarray, found: Arrays, edge: dict[str, dict[str, float]]) -> PlotFigure:
+    """The first steps of fx and of the torque; where the smoothing ends, at the times that `edge` holds."""
+    figure = new_figure(9.6, 6.4)
+    panels = figure.subplots(2, 2)
+    high, low = edge["high"]["time"], edge["low"]["time"]
+    parts = (
+        (0, (0.79, 0.97), "first steps, force"),
+        (2, (0.79, 0.97), "first steps, torque"),
+        (0, (high - 0.045, high + 0.03), "centre of rotation leaves at the high edge"),
+        (1, (low - 0.06, low + 0.04), "centre of rotation leaves at the low edge"),
+    )
+    for axes, (column, limits, title) in zip(panels.flat, parts, strict=True):
+        _draw(axes, time, found, column, limits)
+        axes.set(title=title, xlabel="time [s]")
+        axes.title.set_fontsize("medium")
+    _legend(figure, panels[0, 0])
+    return figure
+
+
+def _draw(
+    axes: Any, time: np.ndarray, found: Arrays, column: int, limits: tuple[float, float], *, size: float = 4.0
+) -> None:
+    component, label, factor = PANELS[column]
+    part = (time >= limits[0]) & (time <= limits[1])
+    for name, words, line, width in LINES:
+        axes.plot(time[part], factor * found[name][part, column], ls=line, lw=width, color=COLOURS[name], label=words)
+    for name, marker in (("plain", "o"), ("bilinear", "s")):
+        curve = facts.published_curve(f"staircase/{name}/{component}")
+        inside = (curve.time >= limits[0]) & (curve.time <= limits[1])
+        axes.plot(
+            curve.time[inside],
+            factor * curve.values[inside],
+            ls="",
+            marker=marker,
+            ms=size,
+            mfc="white",
+            mec=COLOURS[name],
+            mew=0.9,
+            label=f"published, {name}",
+        )
+    axes.set(ylabel=label, xlim=limits)
+    tidy(axes)
+
+
+def _legend(figure: PlotFigure, axes: Any) -> None:
+    handles, labels = axes.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=5, frameon=False)
