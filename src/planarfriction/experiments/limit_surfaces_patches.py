@@ -1,0 +1,150 @@
+"""The table of patches beside ours, the size of the disc mask, and moments with closed forms."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from planarfriction.experiments import facts
+from planarfriction.experiments.experiment import Comparison, compare_number
+from planarfriction.limit_surface import LimitSurfaceTablePublished
+from planarfriction.patch import ContactPatch
+
+WIDTH, CELLS = 0.02, 21
+"""Width [m] of the published patches and cells along it."""
+
+Numbers = dict[str, Any]
+
+LAST_DIGIT = {
+    "loaded cells": (0.0, "1", "A count."),
+    "centre of pressure x [m]": (6e-10, "m", "Printed to 1e-9 m: rounding."),
+    "centre of pressure y [m]": (6e-10, "m", "Printed to 1e-9 m: rounding."),
+    "contact radius, plain sum [m]": (6e-12, "m", "Printed to 1e-11 m: rounding."),
+    "contact radius, as published [m]": (6e-12, "m", "Printed to 1e-11 m: rounding."),
+    "second moment [m^2]": (6e-12, "m^2", "Printed to 1e-11 m^2: rounding."),
+}
+"""Column of the table of patches -> half a unit of its last digit and a little, unit, cause."""
+
+
+def patch_numbers(patches: Mapping[str, ContactPatch]) -> dict[str, Numbers]:
+    """The columns of the published table of patches, as ours."""
+    result = {}
+    for name, patch in patches.items():
+        x, y = patch.centre_of_pressure()
+        values = (
+            int((patch.weights() > 0.0).sum()),
+            float(x),
+            float(y),
+            float(patch.contact_radius()),
+            LimitSurfaceTablePublished(patch).contact_radius,
+            float(patch.second_moment()),
+        )
+        result[name] = dict(zip(LAST_DIGIT, values, strict=True))
+    return result
+
+
+def patch_comparisons(ours: Mapping[str, Numbers]) -> list[Comparison]:
+    """Each column of the table of patches over all its rows."""
+    published = facts.published_table("patches")
+    rows = []
+    for column, (tolerance, unit, cause) in LAST_DIGIT.items():
+        difference = max(abs(ours[name][column] - row[column]) for name, row in published.items())
+        quantity = f"table of patches, {column.partition(' [')[0]}"
+        rows.append(Comparison(quantity, "published", difference, tolerance, unit, len(published), cause))
+    return rows
+
+
+def disc_numbers(mask: ContactPatch) -> Numbers:
+    """Size of the published disc mask [m], and the moments of a true disc on the same grid."""
+    disc = ContactPatch.disc(0.5 * WIDTH, CELLS)
+    grid = mask.grid
+    assert grid is not None, "the mask is cut from a grid"
+    return {
+        "cell": grid.cell_width,
+        "equal-area radius": math.sqrt(float(mask.area()) / math.pi),
+        "equal-area radius in cells": math.sqrt(float(mask.area()) / math.pi) / grid.cell_width,
+        "half width in cells": 0.5 * grid.columns,
+        "radius": 0.5 * WIDTH,
+        "contact radius on the grid": float(disc.contact_radius()),
+        "second moment on the grid": float(disc.second_moment()),
+    }
+
+
+def shape_comparisons(numbers: Numbers) -> list[Comparison]:
+    """Moments of discs, square and lines beside closed forms; the ellipsoid's largest error on the lines too."""
+    rows = [*_disc_rows(numbers), *_grid_rows(numbers["patches"]), *_line_rows(numbers)]
+    return [
+        compare_number(name, found, expected, reference="closed form", tolerance=tolerance, unit=unit, cause=cause)
+        for name, found, expected, tolerance, unit, cause in rows
+    ]
+
+
+_Row = tuple[str, float, float, float, str, str]
+
+_LUMPED = "Each cell's load stands at its middle: the mean distance lacks about cell^2/(24 distance)."
+
+
+def _disc_rows(numbers: Numbers) -> list[_Row]:
+    """`r = 2 R/3` and `<rho^2> = R^2/2`: of the mask with the radius of equal area, of a disc cut by its rim."""
+    disc, mask = numbers["disc"], numbers["patches"]["Circle"]
+    cell = disc["cell"]
+    lost = cell**2 / 6.0
+    ragged = "Its cells stand in whole rows: the rim is ragged, and each cell's load stands at its middle."
+    lumped = "Each cell's load stands at its middle: a whole cell's own second moment, cell^2/6, is missing."
+    rows: list[_Row] = []
+    for name, radius, found, causes in (
+        ("mask of 317 cells", disc["equal-area radius"], _moments(mask), (ragged, ragged)),
+        (
+            "disc cut by its rim",
+            disc["radius"],
+            (disc["contact radius on the grid"], disc["second moment on the grid"]),
+            (_LUMPED, lumped),
+        ),
+    ):
+        rows.append(
+            (f"contact radius, {name}", found[0], 2.0 * radius / 3.0, cell**2 / (12.0 * found[0]), "m", causes[0])
+        )
+        rows.append((f"second moment, {name}", found[1], 0.5 * radius**2, lost, "m^2", causes[1]))
+    return rows
+
+
+def _moments(row: Numbers) -> tuple[float, float]:
+    return row["contact radius, plain sum [m]"], row["second moment [m^2]"]
+
+
+def _grid_rows(patches: Mapping[str, Numbers]) -> list[_Row]:
+    """Second moments of regular grids, exactly; contact radii of the square and the rod, whose cells lack a little."""
+    cell = WIDTH / CELLS
+    square = WIDTH * (math.sqrt(2.0) + math.asinh(1.0)) / 6.0
+    exact = "Sums of squares of whole numbers: rounding."
+    second = {
+        "Square": (CELLS**2 - 1) * cell**2 / 6.0,
+        "Line": (CELLS**2 - 1) * cell**2 / 12.0,
+        "LineGrad": (CELLS - 1) * (CELLS + 2) * cell**2 / 18.0,
+    }
+    rows: list[_Row] = [
+        (f"second moment, {name}", _moments(patches[name])[1], value, 1e-17, "m^2", exact)
+        for name, value in second.items()
+    ]
+    for name, value in (("Square", square), ("Line", 0.25 * WIDTH)):
+        found = _moments(patches[name])[0]
+        rows.append((f"contact radius, {name}, without cells", found, value, cell**2 / (12.0 * found), "m", _LUMPED))
+    return rows
+
+
+def _line_rows(numbers: Numbers) -> list[_Row]:
+    """Largest distance of corresponding points: the whole line slides one way, the ellipsoid still sees a spin."""
+    cell = WIDTH / CELLS
+    rows: list[_Row] = []
+    for name in ("Line", "LineGrad"):
+        row = numbers["patches"][name]
+        middle, radius = row["centre of pressure y [m]"], row["contact radius, plain sum [m]"]
+        end = 0.5 * (CELLS - 1) * cell - middle  # the nearer one, at the heavy end
+        expected = math.sqrt(2.0 - 2.0 * end / math.hypot(end, radius))
+        found = numbers["ellipsoid"][name]["points, max"]
+        cause = (
+            "Centre of rotation just beyond the last cell: the force is 1 and the torque 0, of what the search finds."
+        )
+        rows.append((f"ellipsoid, largest distance of corresponding points, {name}", found, expected, 1e-5, "1", cause))
+    return rows
