@@ -9,7 +9,7 @@ import pytest
 
 from planarfriction.experiments import facts
 from planarfriction.experiments.experiment import Result, Work
-from planarfriction.experiments.in_hand import CASES, LESS, MORE, REDUCED, run
+from planarfriction.experiments.in_hand import CASES, KINDS, LESS, MORE, REDUCED, run
 from planarfriction.experiments.in_hand_runs import (
     Case,
     compare_with_converged,
@@ -39,7 +39,7 @@ def test_every_reference_of_the_disc_is_compared(result):
 
 
 def test_the_full_run_covers_every_case_with_references():
-    keys = {case.key(kind) for case in CASES if case.has_references for kind in "dr"}
+    keys = {case.key(kind) for case in CASES if case.has_references for kind in KINDS}
     of_facts = {name.rpartition("/")[0] for name in facts._published()["curves"] if name.startswith("in_hand/")}
     assert keys == {name for name in of_facts if name != "in_hand/load"}
 
