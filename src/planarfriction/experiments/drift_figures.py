@@ -1,0 +1,121 @@
+"""Figures of the drift experiment: motion under both loads, and the deflections before the oscillation."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import numpy as np
+
+from planarfriction.experiments import facts
+from planarfriction.experiments.experiment import Arrays
+from planarfriction.plots.style import LINE_STYLES, PALETTE, PlotFigure, new_figure, tidy
+from planarfriction.scenes.ready import drift_force
+
+WORDS = {
+    "d": "distributed, plain",
+    "d_ep": "distributed, elasto-plastic",
+    "r": "reduced, plain",
+    "r_ep": "reduced, elasto-plastic",
+    "e_ep": "ellipsoid, elasto-plastic",
+    "straight": "reduced, straight ramp",
+}
+"""Model in the names of curves -> words."""
+
+ROWS = (("x", "$x$ [nm]", 1e9), ("theta", "$\\theta$ [µrad]", 1e6))
+LAW_COLOURS = {"": PALETTE[1], "_ep": PALETTE[0]}
+LAW_WORDS = {"": "plain", "_ep": "elasto-plastic"}
+LOAD_COLOURS = {"fx": PALETTE[6], "tau": PALETTE[3], "normal": PALETTE[2]}
+
+
+def motion(load: Literal["tangential", "normal"], found: dict[tuple[str, str], Arrays]) -> PlotFigure:
+    """Applied load, x [nm] and theta [µrad] over time: left the distributed model, right the reduced one."""
+    figure = new_figure(9.6, 7.0)
+    panels = figure.subplots(3, 2, sharex=True, sharey="row")
+    for column, (kind, title) in enumerate((("d", "distributed"), ("r", "reduced"))):
+        _draw_load(panels[0, column], load, found[load, kind], last=column == 1)
+        panels[0, column].set_title(title, fontsize="medium")
+        for axes, (name, label, factor) in zip(panels[1:, column], ROWS, strict=True):
+            for law, colour in LAW_COLOURS.items():
+                run = found[load, kind + law]
+                axes.plot(run["time"], factor * run[name], color=colour, lw=1.3, label=LAW_WORDS[law])
+                if load == "tangential":
+                    _vertices(axes, f"drift/{kind}{law}/{name}", factor, colour)
+            if column == 0:
+                axes.set_ylabel(label)
+            tidy(axes)
+    for axes in panels[-1]:
+        axes.set(xlabel="time [s]", xlim=(0.0, 5.0))
+    figure.align_ylabels(panels[:, 0])
+    figure.legend(handles=_key(load), loc="outside upper center", ncols=6, frameon=False, fontsize=9)
+    return figure
+
+
+def plateaus(found: dict[tuple[str, str], Arrays], straight: Arrays, numbers: dict[str, Any]) -> PlotFigure:
+    """Deflections x [nm] and theta [µrad] in the first second of the normal-load run, elasto-plastic bristles."""
+    figure = new_figure(9.6, 3.9)
+    looks = {
+        "d_ep": (PALETTE[0], "-", 3.4, 0.5),
+        "r_ep": (PALETTE[1], "-", 3.4, 0.5),
+        "e_ep": (PALETTE[2], LINE_STYLES[1], 1.4, 1.0),
+        "straight": (PALETTE[6], LINE_STYLES[3], 1.1, 1.0),
+    }
+    for axes, (name, label, factor) in zip(figure.subplots(1, 2), ROWS, strict=True):
+        for model, (colour, line, width, opacity) in looks.items():
+            run = straight if model == "straight" else found["normal", model]
+            part = run["time"] <= 1.0
+            look = {"color": colour, "linestyle": line, "linewidth": width, "alpha": opacity}
+            axes.plot(run["time"][part], factor * run[name][part], label=WORDS[model], **look)
+            closed = numbers["closed form"].get(model)
+            if closed is not None:
+                axes.axhline(factor * closed[name], color=colour, ls=LINE_STYLES[2], lw=1.0, zorder=1)
+        axes.set(xlabel="time [s]", ylabel=label, xlim=(0.0, 1.0), ylim=(0.0, None))
+        tidy(axes)
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=4, frameon=False, fontsize=9)
+    return figure
+
+
+def _draw_load(axes: Any, load: Literal["tangential", "normal"], run: Arrays, *, last: bool) -> None:
+    """Applied force [N] and torque [N mm], or under the normal load force and normal force."""
+    time = np.arange(0.0, 5.0, 0.001)
+    applied = drift_force(load)(time)
+    axes.plot(time, applied[:, 0], color=LOAD_COLOURS["fx"], lw=1.0)
+    other = axes.twinx()
+    if load == "tangential":
+        other.plot(time, 1e3 * applied[:, 2], color=LOAD_COLOURS["tau"], lw=1.0)
+        _vertices(axes, "drift/applied/fx", 1.0, LOAD_COLOURS["fx"], every=4)
+        _vertices(other, "drift/applied/tau", 1e3, LOAD_COLOURS["tau"], every=4)
+        other.set_ylim(0.0, 120.0)
+        label = "$\\tau$ [N mm]"
+    else:
+        other.plot(run["time"], run["normal_force"], color=LOAD_COLOURS["normal"], lw=1.0)
+        other.set_ylim(0.0, 13.0)
+        label = "$f_N$ [N]"
+    axes.set_ylim(0.0, 1.6)
+    if last:
+        other.set_ylabel(label)
+    else:
+        axes.set_ylabel("$f_x$ [N]")
+        other.tick_params(labelright=False)
+    tidy(axes)
+    other.spines["top"].set_visible(False)
+
+
+def _vertices(axes: Any, name: str, factor: float, colour: str, *, every: int = 1) -> None:
+    curve = facts.published_curve(name)
+    time, values = curve.time[::every], factor * curve.values[::every]
+    axes.plot(time, values, ls="", marker="o", ms=2.4, mfc="white", mec=colour, mew=0.6, zorder=3)
+
+
+def _key(load: str) -> list[Any]:
+    from matplotlib.lines import Line2D
+
+    lines = [(LAW_COLOURS[law], words) for law, words in LAW_WORDS.items()] + [(LOAD_COLOURS["fx"], "applied $f_x$")]
+    if load == "tangential":
+        lines.append((LOAD_COLOURS["tau"], "applied $\\tau$"))
+    else:
+        lines.append((LOAD_COLOURS["normal"], "normal force"))
+    handles = [Line2D([], [], color=colour, lw=1.4, label=words) for colour, words in lines]
+    if load == "tangential":
+        handles.append(Line2D([], [], ls="", marker="o", ms=3, mfc="white", mec="0.3", label="published"))
+    return handles
