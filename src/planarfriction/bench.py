@@ -16,6 +16,7 @@ from typing import Any, Literal
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.experiments.baselines import lsoda_time
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.limit_surface import LimitSurfaceTablePublished
 from planarfriction.models import DistributedModel, ReducedModelPublished
@@ -24,9 +25,6 @@ from planarfriction.scenes import Scene, Solution, in_hand, in_hand_load, simula
 
 WINDOW = 0.1
 """Part of the in-hand run [s] that the general solver is given where the whole run would take it minutes."""
-
-LSODA = {"method": "LSODA", "rtol": 1e-6, "atol": 1e-8, "max_step": 1e-3}
-"""Settings of the general solver, as published; restarted at every jump of the load."""
 
 
 @dataclass(frozen=True)
@@ -102,36 +100,13 @@ def _mixed_twists(count: int) -> np.ndarray:
     return directions * 10.0 ** generator.uniform(-4.0, -1.5, size=(count, 1))
 
 
-def _lsoda_time(scene: Scene, t_end: float) -> float:
-    """Time of SciPy's LSODA over the scene from 0 to `t_end` on the compiled right-hand side [s]."""
-    from scipy.integrate import solve_ivp
-
-    from planarfriction.kernels.body import right_hand_side, workspace
-    from planarfriction.scenes.packing import pack
-
-    packed = pack(scene, t_end)
-    work, y = workspace(packed.contacts), packed.state.copy()
-
-    def rate(since: float, y: np.ndarray, piece: int) -> np.ndarray:
-        dy = np.empty_like(y)
-        right_hand_side(packed.contacts, packed.motion, piece, since, y, dy, work)
-        return dy
-
-    rate(0.0, y, 0)
-    begin = time.perf_counter()
-    for piece, length in enumerate(np.diff(packed.motion.breaks)):
-        solution = solve_ivp(rate, (0.0, length), y, t_eval=[length], args=(piece,), **LSODA)
-        y = solution.y[:, -1]
-    return time.perf_counter() - begin
-
-
 def _in_hand_distributed(name: str, full: bool) -> Measurement:
     scene = in_hand(DistributedModel(_disc(), _law()))
     value, _ = _solver_time(scene, 5)
     if full:
-        return _line(name, value, "s", "SciPy LSODA over the whole run", _lsoda_time(scene, scene.t_end))
+        return _line(name, value, "s", "SciPy LSODA over the whole run", lsoda_time(scene, scene.t_end))
     ours, _ = _solver_time(scene, 5, t_end=WINDOW)
-    theirs = _lsoda_time(scene, WINDOW)
+    theirs = lsoda_time(scene, WINDOW)
     words = f"SciPy LSODA over the first {WINDOW} s (the ratio is to the {ours * 1e3:.2g} ms of that window here)"
     return Measurement(name, value, "s", words, theirs, theirs / ours)
 
@@ -149,7 +124,7 @@ def _in_hand_distributed_101(name: str, full: bool) -> Measurement:
 def _in_hand_reduced(name: str, full: bool, load: Literal[1, 2] = 1) -> Measurement:
     scene = in_hand(ReducedModelPublished(_disc(), _law()), normal_force=in_hand_load(load))
     value, _ = _solver_time(scene, 9)
-    return _line(name, value, "s", "SciPy LSODA over the whole run", _lsoda_time(scene, scene.t_end))
+    return _line(name, value, "s", "SciPy LSODA over the whole run", lsoda_time(scene, scene.t_end))
 
 
 def _in_hand_load_dependent(name: str, full: bool) -> Measurement:
