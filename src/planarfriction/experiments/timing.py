@@ -13,7 +13,7 @@ import numpy as np
 from planarfriction.experiments import facts
 from planarfriction.experiments import timing_runs as runs
 from planarfriction.experiments.experiment import Arrays, Comparison, Picture, Result, Table, Work
-from planarfriction.experiments.timing_runs import BREAKAWAY, CIRCLE, QUICK_WINDOW, ROWS, Problem
+from planarfriction.experiments.timing_runs import BREAKAWAY, CIRCLE, ROWS, Problem
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -85,7 +85,7 @@ def _machine() -> dict[str, Any]:
 def _baselines(work: Work) -> dict[str, dict[str, Arrays]]:
     """Row -> kind -> LSODA beside ours; the distributed model over a window unless all is wanted."""
     if work.quick:
-        return {CIRCLE: {kind: runs.beside_lsoda(CIRCLE, kind, *QUICK_WINDOW, work) for kind in KINDS}}
+        return {CIRCLE: {kind: runs.beside_lsoda(CIRCLE, kind, *work) for kind in KINDS}}
     spans = {"distributed": (0.0, 2.0) if work.full else BREAKAWAY, "reduced": (0.0, 2.0)}
     return {row: {kind: runs.beside_lsoda(row, kind, *spans[kind], work) for kind in KINDS} for row in ROWS}
 
