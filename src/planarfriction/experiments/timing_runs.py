@@ -114,15 +114,16 @@ def work_precision(problem: Problem, work: Work) -> dict[tuple[str, float], Arra
     for solver, tolerances in problem.tolerances.items():
         for tolerance in tolerances:
             label = f"timing, {problem.name}, {solver} at {tolerance:.0e}"
-            compute = functools.partial(_repeated, functools.partial(solve, problem, solver, tolerance))
+            action = functools.partial(solve, problem, solver, tolerance)
+            compute = functools.partial(_repeated, action, 1 if work.quick else MOST_REPEATS)
             found[solver, tolerance] = work.piece(label, compute)
     return found
 
 
-def _repeated(action: Callable[[], Poses]) -> dict[str, Any]:
+def _repeated(action: Callable[[], Poses], repeats: int) -> dict[str, Any]:
     poses = action()
     times = [poses.wall_time]
-    while sum(times) < ENOUGH and len(times) < MOST_REPEATS:
+    while sum(times) < ENOUGH and len(times) < repeats:
         times.append(action().wall_time)
     median = statistics.median(times)
     return {"time": median, "poses": poses.poses, "evaluations": poses.evaluations, "repeats": len(times)}
