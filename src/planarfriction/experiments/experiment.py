@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import re
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -176,7 +177,8 @@ class Work:
 
 
 def _slug(label: str) -> str:
-    return re.sub(r"[^\w.]+", "-", label).strip("-")
+    """The label as a file name; its digest tells labels apart that differ only in what a file name cannot hold."""
+    return re.sub(r"[^\w.]+", "-", label).strip("-") + "-" + hashlib.sha256(label.encode()).hexdigest()[:8]
 
 
 def _read_piece(path: Path, fingerprint: str) -> Arrays | None:
@@ -192,5 +194,6 @@ def _write_piece(path: Path, fingerprint: str, arrays: Arrays) -> None:
     path.parent.mkdir(parents=True, exist_ok=True)
     part = path.with_suffix(".part")
     with part.open("wb") as file:
-        np.savez_compressed(file, fingerprint=np.array(fingerprint), **arrays)
+        contents: dict[str, Any] = {"fingerprint": np.array(fingerprint), **arrays}
+        np.savez_compressed(file, **contents)
     part.replace(path)

@@ -2,7 +2,8 @@
 
 `data/published.json` restates the vertices of the paper's vector figures, exact to `reading`, and its tables.
 `data/converged.npz` holds solutions of the same equations that were computed independently: fine-step Runge-Kutta for
-the distributed model, tight tolerances for the reduced one, good to about 1e-6 of span.
+the distributed model, tight tolerances for the reduced one, good to about 1e-6 of span. Its box rows of the ellipsoid
+are an exception: they carry the solver error of the figure.
 
 Source: Waltersson and Karayiannidis 2024 (IEEE T-RO, arXiv 2308.01123).
 """

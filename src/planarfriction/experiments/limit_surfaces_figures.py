@@ -10,8 +10,7 @@ import numpy as np
 from planarfriction import geometry
 from planarfriction.experiments.runs import IN_WORDS
 from planarfriction.limit_surface import LimitSurfaceCells, LimitSurfaceEllipsoid
-from planarfriction.plots.limit_surface import _draw as draw_surface
-from planarfriction.plots.limit_surface import scaled_samples
+from planarfriction.plots.limit_surface import draw_surface, scaled_samples
 from planarfriction.plots.style import LINE_STYLES, PALETTE, PlotFigure, new_figure, tidy
 
 EXACT, BESIDE, LINK = PALETTE[0], PALETTE[1], "0.45"

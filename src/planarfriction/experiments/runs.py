@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
 from planarfriction.geometry import wrench_at
 from planarfriction.laws import ElastoPlastic, LuGre
-from planarfriction.limit_surface import LimitSurfaceEllipsoid
+from planarfriction.limit_surface import LimitSurfaceEllipsoid, LimitSurfaceTablePublished
 from planarfriction.models import DistributedModel, ReducedModelPublished
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
 from planarfriction.scenes import Solution
@@ -39,12 +40,22 @@ IN_WORDS = {
 """Published patch -> how figures call it."""
 
 
+@dataclass(frozen=True, eq=False)
+class PublishedEllipsoid(LimitSurfaceEllipsoid):
+    """The ellipsoid with the contact radius of the published table, which is a smoothed sum."""
+
+    def _radius(self) -> float:
+        return LimitSurfaceTablePublished(self.patch).contact_radius
+
+
 def published_model(kind: Kind, shape: str | ContactPatch, law: LuGre = LAW, *, width: float = 0.02) -> Any:
     """The distributed model ("d"), the published reduced one ("r"), or that on the ellipsoid ("e") of a patch."""
     patch = PUBLISHED_PATCHES[shape](width=width) if isinstance(shape, str) else shape
     if kind == "d":
         return DistributedModel(patch, law)
-    return ReducedModelPublished(patch, law, surface=LimitSurfaceEllipsoid(patch) if kind == "e" else None)
+    if kind == "r":
+        return ReducedModelPublished(patch, law)
+    return ReducedModelPublished(patch, law, surface=PublishedEllipsoid(patch))
 
 
 def columns(solution: Solution) -> dict[str, np.ndarray]:

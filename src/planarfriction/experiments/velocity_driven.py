@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -21,8 +20,6 @@ from planarfriction.experiments.experiment import (
     compare_number,
 )
 from planarfriction.experiments.velocity_driven_words import error_table, findings
-from planarfriction.limit_surface import LimitSurfaceEllipsoid, LimitSurfaceTablePublished
-from planarfriction.models import DistributedModel, ReducedModelPublished
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction.scenes import simulate
 from planarfriction.scenes.ready import driven, published_velocity
@@ -58,25 +55,12 @@ CONVERGED = ("Circle", "Square", "Line", "NonConvex1")
 """Shapes with converged solutions, distributed and reduced."""
 
 
-@dataclass(frozen=True, eq=False)
-class PublishedEllipsoid(LimitSurfaceEllipsoid):
-    """The ellipsoid with the contact radius of the published table, which is a smoothed sum."""
-
-    def _radius(self) -> float:
-        return LimitSurfaceTablePublished(self.patch).contact_radius
-
-
 def drive(shape: str) -> Arrays:
     """Time [s], and the wrench `[T, 3]` [N, N, N m] about the centre of pressure with each model of a patch."""
     patch = PUBLISHED_PATCHES[shape](width=boxes.WIDTH)
-    models = {
-        "d": DistributedModel(patch, runs.LAW),
-        "r": ReducedModelPublished(patch, runs.LAW),
-        "e": ReducedModelPublished(patch, runs.LAW, surface=PublishedEllipsoid(patch)),
-    }
     result = {}
-    for kind, model in models.items():
-        columns = runs.columns(simulate(driven(model), rtol=RTOL, atol=ATOL))
+    for kind in ("d", "r", "e"):
+        columns = runs.columns(simulate(driven(runs.published_model(kind, patch)), rtol=RTOL, atol=ATOL))
         result |= {"time": columns["time"], kind: runs.at_centre_of_pressure(columns, patch)}
     return result
 

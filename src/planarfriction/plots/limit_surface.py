@@ -51,7 +51,7 @@ def plot_limit_surface(surface: Any, *, ellipsoid: Any = None) -> style.PlotFigu
     names = (f"{surface.patch.name}: {_kind(surface)}", _kind(beside))
     for column, ((directions, mesh), name) in enumerate(zip(scaled, names, strict=True)):
         axes = figure.add_subplot(1, 2, column + 1, projection="3d")
-        _draw(axes, mesh, directions, limit)
+        draw_surface(axes, mesh, directions, limit)
         axes.set_title(name, fontsize="medium")
     return figure
 
@@ -76,7 +76,8 @@ def _kind(surface: Any) -> str:
     return words.get(type(surface).__name__, type(surface).__name__)
 
 
-def _draw(axes: Any, mesh: np.ndarray, directions: np.ndarray, limit: float) -> None:
+def draw_surface(axes: Any, mesh: np.ndarray, directions: np.ndarray, limit: float) -> None:
+    """Draw a limit surface, points `mesh` `[P, A, 3]` with their `directions`, into 3-D axes up to `limit`."""
     # The outward normal of a limit surface is the twist itself: shading needs no differences of the mesh.
     normal = -directions[:-1, :-1]
     lightness = 0.62 + 0.38 * np.clip(normal @ (_LIGHT / np.linalg.norm(_LIGHT)), -0.6, 1.0)
