@@ -182,6 +182,8 @@ def test_without_load_nothing_passes_but_the_load(kind):
     gradient = autodiff.rollout_gradient(
         model, state, twists, loads, DT, bar * (np.arange(T) >= 6)[:, None], np.ones(3)
     )
+    wrenches, _ = autodiff.rollout(model, state, twists, loads, DT)
+    assert str(wrenches[6]) == "[0. 0. 0.]"  # not even a negative zero
     assert not gradient.state.any() and not gradient.twists[:7].any() and not gradient.loads[:6].any()
     assert gradient.twists[7:].all()
     # The slope to the load: the wrench per newton that a small load would have.
@@ -307,7 +309,7 @@ def test_the_adjoint_is_the_transpose_of_the_sensitivities(kind, law):
     state, twists, loads = drive(model, seed=5)
     bar = np.random.default_rng(2).normal(size=(T, 3)) / (1.0, 1.0, radius(model))
     wrenches, slopes = autodiff.rollout_sensitivities(model, state, twists, loads, DT)
-    assert np.array_equal(wrenches, autodiff.rollout(model, state, twists, loads, DT).wrenches)
+    assert wrenches == pytest.approx(autodiff.rollout(model, state, twists, loads, DT).wrenches, rel=1e-12, abs=1e-14)
     terms = np.einsum("ti,tip->tip", bar, slopes)
     gradient = autodiff.rollout_gradient(model, state, twists, loads, DT, bar)
     # Sums in another order.
@@ -366,7 +368,9 @@ def test_a_batch_is_a_loop():
     for i, j in np.ndindex(3, 2):
         one = states[i, 0], twists[j], loads, dt
         single = autodiff.rollout(model, *one, parameters[i, 0])
-        assert np.array_equal(wrenches[i, j], single.wrenches) and np.array_equal(ends[i, j], single.state)
+        # Contacts abreast go through vector code, which rounds differently.
+        assert wrenches[i, j] == pytest.approx(single.wrenches, rel=1e-12, abs=1e-14)
+        assert ends[i, j] == pytest.approx(single.state, rel=1e-12, abs=1e-20)
         alone = autodiff.rollout_gradient(model, *one, bar[i, j], end_bar[i, j], parameters[i, 0])
         for sum_of, where, g in zip(total, ((i, 0), j, ..., (i, 0)), alone, strict=True):
             sum_of[where] += g
@@ -388,7 +392,7 @@ def test_kept_states_and_several_threads_change_nothing():
     for first, second in zip(kept, again, strict=True):
         assert np.array_equal(first, second)
     last = autodiff.rollout_gradient(model, state, scales[-1] * twists, loads, DT, bar)
-    assert np.array_equal(kept.twists[-1], last.twists)
+    assert kept.twists[-1] == pytest.approx(last.twists, rel=1e-9, abs=1e-9 * np.abs(last.twists).max())  # rounding
 
 
 def test_one_load_for_all_steps_gets_the_sum():
