@@ -299,6 +299,22 @@ def test_jacobians_of_a_step_are_those_of_differences(kind, law):
         assert pulled == pytest.approx(expected_wrench, rel=1e-6, abs=1e-6 * np.abs(expected_wrench[:2]).max() * 0.01)
 
 
+@pytest.mark.parametrize("kind", ["distributed", "published"])
+def test_jacobians_of_a_batch_of_steps_are_those_of_each(kind):
+    model, random = model_of(kind), np.random.default_rng(9)
+    states = random.normal(size=(3, 1, *model.state_shape)) * 1e-7
+    twists, loads = random.normal(size=(2, 3)) * (1e-2, 1e-2, 2.0), np.array([0.0, 2.0])
+    batch = model.step_jacobians(states, twists, loads, DT)
+    for i, j in np.ndindex(3, 2):
+        one = model.step_jacobians(states[i, 0].tolist(), tuple(twists[j]), float(loads[j]), DT)
+        for name, value in one._asdict().items():
+            assert np.array_equal(getattr(batch, name)[i, j], value), name
+    for bad in ({"normal_force": -1.0}, {"dt": np.nan}, {"twist": (0.0, 1.0)}, {"state": [0.0, 0.0, np.inf]}):
+        inputs = {"state": model.rest(), "twist": np.zeros(3), "normal_force": 1.0, "dt": DT, **bad}
+        with pytest.raises(InvalidValueError, match=next(iter(bad))):
+            model.step_jacobians(**inputs)
+
+
 # ---------------------------------------------------------------------- backwards against forwards
 
 
