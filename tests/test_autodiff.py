@@ -299,6 +299,23 @@ def test_jacobians_of_a_step_are_those_of_differences(kind, law):
         assert pulled == pytest.approx(expected_wrench, rel=1e-6, abs=1e-6 * np.abs(expected_wrench[:2]).max() * 0.01)
 
 
+def test_a_bristle_brought_back_to_full_deflection_slides_along_the_cap():
+    model = model_of("ellipsoid")
+    scale = np.array([1.0, 1.0, radius(model)])
+    state, dt = np.array([-2.52e-8, -4.02e-7, 8.58e-7]) * scale, 5.53e-7
+    twist = np.array([-4.2e-2, -3.4e-2, 202.0])
+    end, _ = model.step(state, twist, LOAD, dt)
+    v = np.linalg.norm(model.surface._frame() @ twist)
+    assert np.linalg.norm(end / scale) == pytest.approx(_friction(model.law, v) / model.law.sigma_0, rel=1e-14)
+    j = model.step_jacobians(state, twist, LOAD, dt)
+    # Along the cap only: the length of the new bristle is full deflection whatever the old one was.
+    assert (end / scale) @ (j.state_state / scale[:, None] * scale) == pytest.approx(np.zeros(3), abs=1e-6 * 1e-12)
+    for move in np.eye(3):
+        change = 1e-5 * move * scale * 1e-6
+        difference = model.step(state + change, twist, LOAD, dt)[0] - model.step(state - change, twist, LOAD, dt)[0]
+        assert 2.0 * j.state_state @ change / scale == pytest.approx(difference / scale, rel=1e-5, abs=1e-19)
+
+
 @pytest.mark.parametrize("kind", ["distributed", "published"])
 def test_jacobians_of_a_batch_of_steps_are_those_of_each(kind):
     model, random = model_of(kind), np.random.default_rng(9)
