@@ -11,10 +11,11 @@ import numpy as np
 from planarfriction import formulas, validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels import reduced as kernels
+from planarfriction.kernels import reduced_adjoint
 from planarfriction.kernels.law import law_numbers, law_row
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
 from planarfriction.limit_surface.base import scaling
-from planarfriction.models.base import FrictionModel, ModelJacobians
+from planarfriction.models.base import FrictionModel, ModelJacobians, StepJacobians
 
 _REMEMBERED = 64
 """Loads whose shapes a model remembers."""
@@ -130,6 +131,15 @@ class ReducedModelPublished(FrictionModel):
         state, twist, load, dt = self._inputs(state, twist, normal_force, dt=dt)
         packed = self._by_load(self._step, (6,), state, twist, load, dt)
         return packed[..., :3], packed[..., 3:]
+
+    def step_jacobians(self, state, twist, normal_force, dt) -> StepJacobians:
+        """Analytic derivatives of `step` (see `StepJacobians`); at kinks a one-sided derivative."""
+        packed = self._one_step_jacobians(state, twist, normal_force, dt)
+        if packed is None:
+            state, twist, load, dt = self._inputs(state, twist, normal_force, dt=dt)
+            packed = self._by_load(self._step_jacobians, (6, 7), state, twist, load, dt)
+        wrench, new = packed[..., :3, :], packed[..., 3:, :]
+        return StepJacobians(new[..., :3], new[..., 3:6], wrench[..., :3], wrench[..., 3:6], wrench[..., 6])
 
     # ------------------------------------------------------------------ one shape
 
@@ -264,3 +274,28 @@ class ReducedModelPublished(FrictionModel):
             wrench,
         )
         return np.concatenate([out, wrench], axis=1)
+
+    def _one_step_jacobians(self, state, twist, normal_force, dt) -> np.ndarray | None:
+        """`_step_jacobians` `[6, 7]` of one contact of fixed shape, checked quickly; None where that is not it."""
+        if self.patch.depends_on_load or [np.ndim(a) for a in (state, twist, normal_force, dt)] != [1, 1, 0, 0]:
+            return None
+        if len(state) != 3 or len(twist) != 3:
+            return None
+        try:
+            given = np.array([*state, *twist, normal_force, dt], dtype=float)
+        except (TypeError, ValueError):  # not numbers: the checks of `_inputs` say which
+            return None
+        if not (np.isfinite(given).all() and given[6] >= 0.0 and given[7] >= 0.0):
+            return None
+        return self._step_jacobians(self._reference, given[None, :3], given[None, 3:6], given[6:7], given[7:])[0]
+
+    def _step_jacobians(self, shape: ReducedShape, state, twist, load, dt) -> np.ndarray:
+        slopes = np.empty((len(load), 6, 7 + reduced_adjoint.NUMBERS))
+        if self._fixed is not None:
+            numbers, data = self._fixed
+            row, surface = numbers[None, :13], numbers[13:].astype(int)
+        else:
+            kind, size, data = shape.surface.numbers
+            row, surface = np.array([[*law_numbers(self.law), *shape.numbers]]), np.array([kind, 0, size])
+        reduced_adjoint.jacobians(row, surface, data, state, twist, load, dt, slopes)
+        return slopes[:, :, :7]
