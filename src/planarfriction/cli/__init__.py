@@ -1,4 +1,4 @@
-"""Command line: `planarfriction run`, `planarfriction limit-surface`, `planarfriction bench`."""
+"""Command line: `planarfriction run`, `limit-surface`, `identify`, `bench`."""
 
 from __future__ import annotations
 
