@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 import planarfriction as pf
+from planarfriction.autodiff import parameters_of
 from planarfriction.identify import Log
 from planarfriction.identify.prediction import Prediction
-from planarfriction.identify.problem import base_vector
 
 LAW = pf.LuGre(
     mu_c=0.5,
@@ -38,7 +38,7 @@ def clean_log(time, twist, *, law=LAW, patch=PATCH, load=LOAD, name="log") -> Lo
     """The log of a contact without noise."""
     model = pf.ReducedModelPublished(patch, law)
     empty = Log(time, twist, np.zeros_like(twist), load, name)
-    wrench = Prediction(model, empty, refine=16).wrenches(base_vector(model))
+    wrench = Prediction(model, empty, refine=16).wrenches(parameters_of(model))
     return Log(time, twist, wrench, load, name)
 
 

@@ -35,6 +35,7 @@ _HOME = {
     "simulate": "planarfriction.scenes",
 }
 _MODULES = (
+    "autodiff",
     "errors",
     "formulas",
     "geometry",

@@ -6,12 +6,12 @@ import dataclasses
 
 import numpy as np
 
+from planarfriction.autodiff import PARAMETERS
 from planarfriction.identify import parameters as known
 from planarfriction.identify.least_squares import Minimum, correlations, covariance
 from planarfriction.identify.parameters import Coordinates
 from planarfriction.identify.problem import Problem, mean_load
 from planarfriction.identify.result import Identification
-from planarfriction.identify.sensitivities import PARAMETERS
 from planarfriction.identify.verdicts import Evidence, judge
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.models import ReducedModelPublished

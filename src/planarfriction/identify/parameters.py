@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.autodiff import PARAMETERS
 from planarfriction.errors import InvalidValueError
-from planarfriction.identify.sensitivities import PARAMETERS
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from planarfriction.autodiff import rollout, rollout_sensitivities
 from planarfriction.identify.logs import Log
-from planarfriction.identify.sensitivities import sensitivities, wrenches
 
 STEADY_STEPS = 400
 """Steps with the first twist before a log that begins in steady sliding."""
@@ -37,7 +37,7 @@ class Prediction:
         order = np.repeat(np.arange(steps + 1), 2)[1:-1]  # 0, 1, 1, 2, 2, ..., steps
         before = np.zeros(STEADY_STEPS if begins == "steady" else 1, dtype=int)
         order = np.concatenate([before, order])
-        self._twists, self._loads = np.ascontiguousarray(twists[order]), np.ascontiguousarray(loads[order])
+        self._arguments = model, model.rest(), twists[order], loads[order], self._half
         # the node before sample i, in steps, and how far behind it the sample lies
         place = np.clip((log.time - grid[0]) / (2.0 * self._half), 0.0, steps)
         node = np.minimum(place.astype(int), steps - 1)
@@ -47,11 +47,11 @@ class Prediction:
 
     def wrenches(self, vector: np.ndarray) -> np.ndarray:
         """Wrenches `[T, 3]` at the samples."""
-        return self._at_samples(wrenches(self.model, self._twists, self._loads, self._half, vector))
+        return self._at_samples(rollout(*self._arguments, vector).wrenches)
 
     def sensitivities(self, vector: np.ndarray, names: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
         """Wrenches `[T, 3]` at the samples and their derivatives `[T, 3, len(names)]`."""
-        values, slopes = sensitivities(self.model, self._twists, self._loads, self._half, vector, names)
+        values, slopes = rollout_sensitivities(*self._arguments, names, vector)
         return self._at_samples(values), self._at_samples(slopes)
 
     def _at_samples(self, values: np.ndarray) -> np.ndarray:

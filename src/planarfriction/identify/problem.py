@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.autodiff import PARAMETERS, parameters_of
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify import parameters as known
 from planarfriction.identify.logs import Log
 from planarfriction.identify.parameters import Coordinates, Shape
 from planarfriction.identify.prediction import Prediction
-from planarfriction.identify.sensitivities import PARAMETERS
 from planarfriction.laws import LuGre
 from planarfriction.limit_surface import LimitSurface
 from planarfriction.limit_surface.base import scaling
@@ -46,7 +46,7 @@ class Problem:
             _check_constant(logs, loads)
         self.reference = float(np.median(loads))
         self.model = fixed_model(patch, law, surface, self.reference)
-        base = base_vector(self.model)
+        base = parameters_of(self.model)
         self.shapes = [Shape(names, base, patch, load) for load in loads]
         if patch.depends_on_load and not finger:
             for shape, load in zip(self.shapes, loads, strict=True):
@@ -78,7 +78,7 @@ class Problem:
 
     def start_values(self, law: LuGre) -> np.ndarray:
         """Values `[F]` of the names in a law, a patch and its pressure."""
-        base = dict(zip(PARAMETERS, base_vector(self.model), strict=True))
+        base = dict(zip(PARAMETERS, parameters_of(self.model), strict=True))
         values = {**base, **{name: getattr(law, name) for name in known.LAW if name != "breakaway_ratio"}}
         if any(name in known.SOFT_FINGER for name in self.names):
             values |= {name: getattr(self.patch.pressure, name) for name in known.SOFT_FINGER}
@@ -130,16 +130,6 @@ class Problem:
             scaled = log.twist @ scaling(centre, vector["contact_radius"]).T
             result.append((np.linalg.norm(scaled, axis=1), np.abs(scaled[:, 2])))
         return result
-
-
-def base_vector(model: Any) -> np.ndarray:
-    """The vector of `PARAMETERS` of a reduced model."""
-    law, shape = model.law, model._reference
-    ratio = 0.5 if law.elasto_plastic is None else law.elasto_plastic.breakaway_ratio
-    numbers = {name: getattr(law, name) for name in known.LAW if name != "breakaway_ratio"}
-    numbers |= {"breakaway_ratio": ratio, "contact_radius": shape.contact_radius, "second_moment": shape.second_moment}
-    numbers |= {"centre_x": shape.centre_of_pressure[0], "centre_y": shape.centre_of_pressure[1]}
-    return np.array([float(numbers[name]) for name in PARAMETERS])
 
 
 def fixed_model(patch: ContactPatch, law: LuGre, surface: Any, load: float) -> ReducedModelPublished:
