@@ -10,8 +10,8 @@ import numpy as np
 SAME_COST = 1e-3
 """Starts whose costs agree to this share found the same minimum."""
 
-XTOL, FTOL = 1e-9, 1e-9
-"""The search ends when coordinates or cost change by less than these shares."""
+TOLERANCE = 1e-9
+"""The search ends when coordinates or cost change by less than this share."""
 
 MOST_EVALUATIONS = 100
 """Evaluations of one start."""
@@ -39,6 +39,7 @@ def minimise(
     starts: Sequence[np.ndarray],
     bounds: tuple[np.ndarray, np.ndarray],
     *,
+    tolerance: float = TOLERANCE,
     progress: Callable[[str], None] | None = None,
 ) -> Minimum:
     """Least squares within bounds from every start; the residuals are evaluated once for each point."""
@@ -63,8 +64,8 @@ def minimise(
             jac=lambda x: evaluate(x)[1],  # pyright: ignore
             bounds=bounds,
             x_scale="jac",
-            xtol=XTOL,
-            ftol=FTOL,
+            xtol=tolerance,
+            ftol=tolerance,
             gtol=1e-12,
             max_nfev=MOST_EVALUATIONS,
         )

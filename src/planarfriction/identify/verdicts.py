@@ -22,6 +22,9 @@ UNSEEN = 1.0
 GAP = 3.0
 """Sliding speeds with this ratio and no sample between leave a gap."""
 
+NARROW = 10.0
+"""Ratio of the fastest to the slowest sliding (but for 2 % at either end) below which no Stribeck curve shows."""
+
 NO_SPIN = 0.02
 """Share of the sliding speed that comes from spin below which there is none."""
 
@@ -156,6 +159,11 @@ def _partner(evidence: Evidence, i: int) -> tuple[str, float] | None:
 def speed_gap(speeds: np.ndarray, around: float) -> str:
     """Text that names the range of sliding speeds about `around` [m/s] without a sample, or nothing."""
     moving = speeds[speeds > 0.0]
+    if not len(moving):
+        return "nothing moves"
+    slow, fast = np.quantile(moving, [0.02, 0.98])
+    if fast < NARROW * slow:
+        return f"no sample below {1e3 * slow:.2g} and above {1e3 * fast:.2g} mm/s"
     below, above = moving[moving <= around], moving[moving > around]
     low = float(below.max()) if len(below) else 0.0
     high = float(above.min()) if len(above) else np.inf
