@@ -96,7 +96,7 @@ def test_speed_gaps():
     assert speed_gap(speeds, 1e-3) == "no sample between 0.1 and 5 mm/s"
     assert speed_gap(speeds, 0.02) == ""
     assert speed_gap(speeds, 1.0) == "no sample above 1e+02 mm/s"
-    assert "no sample below 20" in speed_gap(np.linspace(0.02, 0.1, 50), 1e-3)
+    assert "no sample below 22 and above 98" in speed_gap(np.linspace(0.02, 0.1, 50), 1e-3)
 
 
 # ------------------------------------------------------------------------------------------------ what comes out
@@ -155,7 +155,7 @@ def test_stiff_bristles_get_finer_steps():
 
 
 def test_soft_finger_constants_from_three_loads():
-    """c and n from logs at three loads; the grid of the patch has the moments of the disc to 1 %."""
+    """c and n from logs at three loads; the grid of the patch has the moments of the disc to 2 %."""
     time, twist = excitation(duration=0.6)
     patch = pf.ContactPatch.disc(0.012, cells=31, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0))
     start = dataclasses.replace(LAW)
@@ -165,8 +165,8 @@ def test_soft_finger_constants_from_three_loads():
         logs.append(noisy(clean_log(time, twist, patch=fixed, load=load, name=f"{load:g} N"), int(load)))
     guess = pf.ContactPatch.disc(0.012, cells=31, pressure=pf.SoftFinger(c=0.0045, n=0.2, k=2.0))
     found = identify_lugre(logs, guess, parameters=("mu_c", "c", "n"), start=start, starts=1)
-    assert found.estimates["c"] == pytest.approx(0.006, rel=0.01)
-    assert found.estimates["n"] == pytest.approx(1 / 3, abs=0.01)
+    assert found.estimates["c"] == pytest.approx(0.006, rel=0.02)
+    assert found.estimates["n"] == pytest.approx(1 / 3, abs=0.02)
     assert found.model.patch.pressure.c == found.estimates["c"]
     one = identify_lugre(logs[0], guess, parameters=("c", "n"), start=start, starts=1)
     assert not one.identifiable("n")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 
@@ -75,7 +76,7 @@ def _spread(jacobian: np.ndarray, slopes: np.ndarray, free: np.ndarray) -> np.nd
     return result
 
 
-def _history(problem: Problem, i: int, values: np.ndarray, speed: np.ndarray) -> dict[str, object]:
+def _history(problem: Problem, i: int, values: np.ndarray, speed: np.ndarray) -> dict[str, Any]:
     """What was measured and predicted of log i, with its sliding speeds."""
     log, vector = problem.logs[i], problem.shapes[i].vector(values)
     radius = vector[PARAMETERS.index("contact_radius")]

@@ -13,7 +13,15 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.identify.least_squares import correlations, covariance, minimise
 from planarfriction.identify.parameters import Coordinates
 from planarfriction.identify.result import Identification, Verdict
-from planarfriction.identify.slides import Slide, SlidingBody, as_slides, improve_start, slide_poses, start_slopes
+from planarfriction.identify.slides import (
+    Slide,
+    SlidingBody,
+    as_slides,
+    improve_start,
+    slide_poses,
+    start_of,
+    start_slopes,
+)
 from planarfriction.identify.verdicts import NO_SPIN, TOGETHER, VAGUE
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.models import ReducedModelPublished
@@ -39,7 +47,8 @@ TOLERANCE = 1e-4
 CHANGE = 0.01
 """Share of a parameter that derivatives are taken over (at least of its start)."""
 
-Build = Callable[[ContactPatch, LuGre], Any]
+Build = Callable[..., Any]
+"""Makes a friction model from a patch and a law."""
 
 
 def identify_motion(
@@ -126,7 +135,7 @@ class _Fit:
         self.slides, self.patch, self.body, self.names = slides, patch, body, names
         self.law, self.build, self.samples = law, build, samples
         self.say = (lambda text: None) if progress is None else progress
-        self.starts: list[np.ndarray] = [np.concatenate([slide.pose[0], slide.twist]) for slide in slides]
+        self.starts: list[np.ndarray] = [start_of(slide) for slide in slides]
         self._turns = 3  # of the first evaluation; later ones begin where the last one ended
 
     def start_values(self) -> np.ndarray:

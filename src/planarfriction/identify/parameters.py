@@ -201,7 +201,7 @@ class Shape:
         return float(vector[PARAMETERS.index(name)])
 
 
-def soft_finger_moments(finger: Any, normal_force: float, given: dict[str, float]):
+def soft_finger_moments(finger: Any, normal_force: float, given: dict[str, Any]):
     """Contact radius and `<rho^2>` of a soft finger at a load, each with its slopes: `((r, {name: dr}), (m, {...}))`.
 
     Of the profile `p ~ (1 - (s/R)^k)^(1/k)` on the continuous disc: `<s^j> = R^j B((j+2)/k, 1+1/k) / B(2/k, 1+1/k)`.
@@ -209,12 +209,13 @@ def soft_finger_moments(finger: Any, normal_force: float, given: dict[str, float
     """
     from scipy.special import betaln
 
-    c, n = given.get("c", finger.c), given.get("n", finger.n)
+    c: Any = given.get("c", finger.c)
+    n: Any = given.get("n", finger.n)
     per_newton = finger.k is None
-    k = given.get("k_per_newton", finger.k_per_newton) * normal_force if per_newton else given.get("k", finger.k)
-    grown = c * normal_force**n
+    k: Any = given.get("k_per_newton", finger.k_per_newton) * normal_force if per_newton else given.get("k", finger.k)
+    grown: Any = c * normal_force**n
     free = finger.radius_max is None or grown < finger.radius_max
-    size = grown if free else finger.radius_max
+    size: Any = grown if free else finger.radius_max
     results = []
     for power in (1, 2):
         value = size**power * np.exp(betaln((power + 2) / k, 1 + 1 / k) - betaln(2 / k, 1 + 1 / k))

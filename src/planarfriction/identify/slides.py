@@ -13,7 +13,7 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.scenes import simulate
 from planarfriction.scenes.ready import free_slide
 
-TOLERANCES = {"rtol": 1e-5, "atol": 0.05}
+TOLERANCES: dict[str, Any] = {"rtol": 1e-5, "atol": 0.05}
 """Of the solver: ends exact to a few um, so that differences of two simulations are derivatives."""
 
 CHANGES = np.array([2e-3, 2e-3, 2e-2])
@@ -136,7 +136,12 @@ def fit_start(
     Least squares, a few Gauss-Newton steps from the measured start; `noise` `[3]` weighs metres against radians.
     """
     part = slide if samples is None else slide.first(validation.count("samples", samples, at_least=5))
-    return improve_start(model, body, part, np.concatenate([slide.pose[0], slide.twist]), np.asarray(noise), 3)
+    return improve_start(model, body, part, start_of(slide), np.asarray(noise), 3)
+
+
+def start_of(slide: Slide) -> np.ndarray:
+    """Measured start pose and twist `[6]`."""
+    return np.concatenate([slide.pose[0], np.asarray(slide.twist)])
 
 
 def improve_start(model: Any, body: SlidingBody, slide: Slide, start: np.ndarray, noise: np.ndarray, turns: int):

@@ -34,6 +34,9 @@ ONE_LOAD = 1.05
 SLIPPED = 12.0
 """Growth of the cost (half the sum of squares) without slip below which the data hold none: 5 standard errors."""
 
+SMALL = 0.5
+"""Residuals smaller than this share of the noise do no harm, whatever their pattern."""
+
 CORRELATED = 0.3
 """Correlation of neighbouring residuals above which they are no noise."""
 
@@ -72,7 +75,8 @@ def judge(evidence: Evidence, residuals: Sequence[np.ndarray]) -> tuple[Verdict,
     """The verdicts on all parameters and on the residuals `[T, C]` of each log."""
     verdicts = [verdict for i in range(len(evidence.names)) if (verdict := _parameter(evidence, i)) is not None]
     neighbours = _neighbour_correlation(residuals)
-    if neighbours > CORRELATED:
+    size = np.sqrt(np.mean(np.concatenate([each.ravel() for each in residuals]) ** 2))
+    if neighbours > CORRELATED and size > SMALL:
         factor = np.sqrt((1.0 + neighbours) / (1.0 - min(neighbours, 0.999)))
         text = f"neighbouring residuals are correlated ({neighbours:.2f}), so the model or the measurement is off in a "
         verdicts.append(
