@@ -7,9 +7,9 @@ import sys
 from pathlib import Path
 
 import pytest
-from test_measured_slides import MU, slides
 
 import planarfriction as pf
+from test_measured_slides import MU, slides
 
 SCRIPT = Path(__file__).parents[1] / "examples" / "identify_slides.py"
 

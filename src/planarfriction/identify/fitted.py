@@ -111,6 +111,16 @@ def _model(problem: Problem, values: np.ndarray, law: LuGre) -> ReducedModelPubl
         centre = patch.centre_of_pressure()
         scale = given.get("contact_radius", problem.model.surface.contact_radius) / problem.model.surface.contact_radius
         to = np.array([given.get("centre_x", centre[0]), given.get("centre_y", centre[1])])
-        positions = to + scale * (patch.positions - centre)
-        patch = ContactPatch(positions, scale**2 * patch.areas, patch.weights() / patch.areas, None, patch.name)
+        patch = moved_patch(patch, centre, to, scale)
     return ReducedModelPublished(patch, law, surface=surface(patch))
+
+
+def moved_patch(patch: ContactPatch, centre: np.ndarray, to: np.ndarray, scale: float) -> ContactPatch:
+    """The patch with its point `centre` moved to `to` and everything scaled about it, its grid too."""
+    grid = patch.grid
+    if grid is not None:
+        x, y = to + scale * (np.array([grid.x_min, grid.y_min]) - centre)
+        size = {"cell_width": scale * grid.cell_width, "cell_height": scale * grid.cell_height}
+        grid = dataclasses.replace(grid, x_min=float(x), y_min=float(y), **size)
+    positions = to + scale * (patch.positions - centre)
+    return ContactPatch(positions, scale**2 * patch.areas, patch.weights() / patch.areas, grid, patch.name)

@@ -11,6 +11,7 @@ from planarfriction import validation
 from planarfriction.autodiff import PARAMETERS, parameters_of
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify import parameters as known
+from planarfriction.identify.least_squares import covariance
 from planarfriction.identify.logs import Log
 from planarfriction.identify.parameters import Coordinates, Shape
 from planarfriction.identify.prediction import Prediction
@@ -21,7 +22,10 @@ from planarfriction.models import ReducedModelPublished
 from planarfriction.patch import ContactPatch, SoftFinger
 
 COARSE = 0.2
-"""Error of the steps, as a share of the noise, above which they are halved."""
+"""Error that the steps make, as a share of a standard error, above which they are halved."""
+
+TOLD = 0.3
+"""Standard error, as a share of an estimate, up to which that estimate has a say in this."""
 
 FINEST = 32
 """Most steps between two samples."""
@@ -65,16 +69,19 @@ class Problem:
         self.predictions = self._predictions(self.refine)
 
     def coarse(self, values: np.ndarray, noise: np.ndarray) -> bool:
-        """Whether twice as many steps move the wrenches by more than `COARSE` of the noise, in the mean square."""
+        """Whether twice as many steps would move an estimate by more than `COARSE` of its standard error."""
         if self.refine >= FINEST:
             return False
-        for finer, wrench, shape in zip(
-            self._predictions(2 * self.refine), self.wrenches(values), self.shapes, strict=True
-        ):
-            off = (finer.wrenches(shape.vector(values)) - wrench) / noise
-            if np.sqrt(np.mean(off**2, axis=0)).max() > COARSE:
-                return True
-        return False
+        off, jacobian = self.linearised(values, noise)
+        finer = [
+            p.wrenches(s.vector(values)) for p, s in zip(self._predictions(2 * self.refine), self.shapes, strict=True)
+        ]
+        change = self._scaled(finer, noise) - off
+        spread = covariance(jacobian, np.full(len(values), True))
+        errors = np.sqrt(np.diag(spread))
+        told = errors < TOLD * np.abs(values)
+        moved = spread @ (jacobian.T @ change)
+        return bool((np.abs(moved)[told] > COARSE * errors[told]).any())
 
     def start_values(self, law: LuGre) -> np.ndarray:
         """Values `[F]` of the names in a law, a patch and its pressure."""
@@ -112,7 +119,11 @@ class Problem:
 
     def off(self, values: np.ndarray, noise: np.ndarray) -> np.ndarray:
         """Scaled residuals `[M]`."""
-        both = zip(self.wrenches(values), self.logs, self.used, strict=True)
+        return self._scaled(self.wrenches(values), noise)
+
+    def _scaled(self, wrenches: Sequence[np.ndarray], noise: np.ndarray) -> np.ndarray:
+        """Wrenches minus the measured ones over the noise, all used samples flat."""
+        both = zip(wrenches, self.logs, self.used, strict=True)
         return np.concatenate([((wrench - log.wrench) / noise)[used].ravel() for wrench, log, used in both])
 
     def noise(self, values: np.ndarray) -> np.ndarray:

@@ -68,7 +68,7 @@ def identify_lugre(
     begins
         "rest": every log begins with relaxed bristles. "steady": with those of long sliding at its first twist.
     refine
-        Steps between two samples; None doubles them until more move the wrenches by less than a fifth of the noise.
+        Steps between two samples; None doubles them until more move no estimate by a fifth of its error.
     starts, seed
         Number of starts, and the seed that scatters them.
     progress
