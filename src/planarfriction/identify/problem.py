@@ -80,7 +80,7 @@ class Problem:
         spread = covariance(jacobian, np.full(len(values), True))
         errors = np.sqrt(np.diag(spread))
         told = errors < TOLD * np.abs(values)
-        moved = spread @ (jacobian.T @ change)
+        moved = np.where(np.isfinite(spread), spread, 0.0) @ (jacobian.T @ change)
         return bool((np.abs(moved)[told] > COARSE * errors[told]).any())
 
     def start_values(self, law: LuGre) -> np.ndarray:
