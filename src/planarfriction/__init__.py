@@ -39,6 +39,7 @@ _MODULES = (
     "errors",
     "formulas",
     "geometry",
+    "identify",
     "laws",
     "limit_surface",
     "models",

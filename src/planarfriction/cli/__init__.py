@@ -1,4 +1,4 @@
-"""Command line: `planarfriction run`, `limit-surface`, `reproduce`, `bench`."""
+"""Command line: `planarfriction run`, `limit-surface`, `reproduce`, `identify`, `bench`."""
 
 from __future__ import annotations
 

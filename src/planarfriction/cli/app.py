@@ -121,6 +121,70 @@ def limit_surface(
 
 
 @app.command(
+    short_help="Estimate friction parameters from measured logs.",
+    help="""Estimate friction parameters of a contact from logs of its motion and its friction wrench.
+
+    Each LOG is a CSV file with a heading and the columns t, vx, vy, omega (or x, y, theta), fx, fy, tau, normal_force
+    in s, m/s, rad/s, N and N m: twist and wrench about the origin of the contact frame, in its axes, the wrench on the
+    moving body. Prints estimates, their errors, and what the data cannot tell.
+
+    \b
+    Examples:
+      planarfriction identify log.csv --patch disc --out out/
+      planarfriction identify slow.csv fast.csv --patch pad.csv --cell-size 0.001
+      planarfriction identify log.csv --parameters mu_c,mu_s,v_s --start sigma_0=1e5 --start sigma_1=100
+    """,
+)
+@click.argument("logs", metavar="LOG...", type=FILE, nargs=-1, required=True)
+@click.option("--patch", help=f"Contact patch: {PATCH_HELP} Default: Circle.")
+@click.option("--cell-size", type=float, help="Side of a cell of a pressure map in m.")
+@click.option("--width", type=float, help="Width of a patch that is given by name in m. Default: 0.02.")
+@click.option("--parameters", metavar="NAMES", help="What to estimate, separated by commas. Default: the law and r.")
+@click.option("--start", metavar="NAME=VALUE", multiple=True, help="Where to begin, or the value of what is held.")
+@click.option("--normal-force", type=float, help="Normal force in N, where the logs have no such column.")
+@click.option("--noise", metavar="FX,FY,TAU", help="Spread of the measured wrench in N and N m. Default: estimated.")
+@click.option("--plain", is_flag=True, help="Plain LuGre bristles in place of elasto-plastic ones.")
+@click.option("--steady", is_flag=True, help="The logs begin in steady sliding, not at rest.")
+@click.option("--starts", type=int, default=4, show_default=True, help="Number of starts of the search.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Seed that scatters the starts.")
+@click.option("--out", type=FILE, help="Folder for the estimates (JSON) and the residual plot (PNG).")
+def identify(
+    logs: tuple[Path, ...],
+    patch: str | None,
+    cell_size: float | None,
+    width: float | None,
+    parameters: str | None,
+    start: tuple[str, ...],
+    normal_force: float | None,
+    noise: str | None,
+    plain: bool,
+    steady: bool,
+    starts: int,
+    seed: int,
+    out: Path | None,
+) -> int:
+    """Identify (the help above is what users see)."""
+    from planarfriction.cli import identify as command
+    from planarfriction.cli.patches import WIDTH, find_patch
+    from planarfriction.laws import ElastoPlastic
+
+    chosen = find_patch(patch or "Circle", cell_size=cell_size, width=WIDTH if width is None else width)
+    return command.identify(
+        logs,
+        chosen,
+        folder=out,
+        normal_force=normal_force,
+        parameters=command.parse_names(parameters),
+        start=command.parse_start(start),
+        noise=command.parse_noise(noise),
+        elasto_plastic=None if plain else ElastoPlastic(),
+        begins="steady" if steady else "rest",
+        starts=starts,
+        seed=seed,
+    )
+
+
+@app.command(
     short_help="Measure the speed of this installation.",
     help="""Measure the speed of this installation; every line stands beside its baseline from the same run.
 

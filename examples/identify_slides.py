@@ -1,0 +1,144 @@
+"""Friction of a cube from measured slides, without a force sensor: fitted on half of the tosses, tested on the other.
+
+The file is that of measured_slides.py: motion capture of a cube that was tossed, landed flat, and slid and spun until
+it stopped (ContactNets: Pfrommer, Halm, Posa, CoRL 2020).
+
+    python examples/identify_slides.py contactnets_slides.csv.gz --splits 3 --out out/
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+from measured_slides import CORNERS, INERTIA, MASS, SQUARE, Toss, read_tosses, split
+from measured_slides_report import print_table, rms
+
+import planarfriction as pf
+from planarfriction.errors import FrictionError
+from planarfriction.identify import Slide, SlidingBody, identify_motion, predict_slide
+
+BODY = SlidingBody(MASS, INERTIA)
+
+WINDOW = 8
+"""First poses that the start of a slide is estimated from: 47 ms of some 290 ms."""
+
+START = pf.LuGre(
+    mu_c=0.22, mu_s=0.22, v_s=1e-3, sigma_0=1e6, sigma_1=20.0, sigma_2=0.02, elasto_plastic=pf.ElastoPlastic(0.9)
+)
+"""Dry friction that may grow with the speed, on bristles so stiff that only the coefficient counts."""
+
+
+def ellipsoid(patch: pf.ContactPatch, law: pf.LuGre) -> pf.ReducedModelPublished:
+    """The reduced model with an ellipsoid for its limit surface."""
+    return pf.ReducedModelPublished(patch, law, surface=pf.LimitSurfaceEllipsoid(patch))
+
+
+@dataclass(frozen=True)
+class Case:
+    """What is fitted: a contact, a model of it, the parameters, and where a slide's start comes from."""
+
+    name: str
+    patch: pf.ContactPatch
+    build: object
+    parameters: tuple[str, ...]
+
+
+CASES = (
+    Case("square, mu alone", SQUARE, pf.ReducedModelPublished, ("mu_c",)),
+    Case("square, mu and r", SQUARE, pf.ReducedModelPublished, ("mu_c", "contact_radius")),
+    Case("square, mu(v) and r", SQUARE, pf.ReducedModelPublished, ("mu_c", "sigma_2", "contact_radius")),
+    Case("corners, mu(v) and r", CORNERS, pf.DistributedModel, ("mu_c", "sigma_2", "contact_radius")),
+    Case("ellipsoid, mu(v) and r", SQUARE, ellipsoid, ("mu_c", "sigma_2", "contact_radius")),
+)
+
+
+def as_slide(toss: Toss) -> Slide:
+    """A toss as the library takes it."""
+    return Slide(toss.time, toss.pose, toss.twist, f"toss {toss.number}")
+
+
+def errors(predicted: np.ndarray, slide: Slide, skipped: int) -> list[float]:
+    """Position [mm] and yaw error [deg] at the last sample, then their RMS over the samples after the `skipped`."""
+    off = (predicted - slide.pose)[skipped:]
+    position, yaw = 1e3 * np.hypot(off[:, 0], off[:, 1]), np.degrees(np.abs(off[:, 2]))
+    return [position[-1], yaw[-1], rms(position), rms(yaw)]
+
+
+def run(fit: Sequence[Slide], test: Sequence[Slide], cases: Sequence[Case], seed: int) -> list[tuple[str, ...]]:
+    """Fit every case on one half and predict the other, from the measured twist and from the first poses."""
+    rows = []
+    for case in cases:
+        found = identify_motion(
+            fit, case.patch, BODY, parameters=case.parameters, start=_start(case), model=case.build, samples=WINDOW
+        )
+        told = ", ".join(f"{n} {v:.4g} ± {found.errors[n]:.1g}" for n, v in found.estimates.items())
+        for name, samples in (("measured twist", None), (f"first {WINDOW} poses", WINDOW)):
+            all_errors = [errors(predict_slide(found.model, BODY, s, samples=samples), s, samples or 0) for s in test]
+            rows.append((str(seed), case.name, name, told, *(f"{e:.2f}" for e in rms(np.array(all_errors), axis=0))))
+        print(" | ".join(rows[-2]), "\n", " | ".join(rows[-1]), file=sys.stderr, flush=True)
+    return rows
+
+
+def _start(case: Case) -> pf.LuGre:
+    """The start; without a viscous term where it is not asked for."""
+    from dataclasses import replace
+
+    return START if "sigma_2" in case.parameters else replace(START, sigma_2=0.0)
+
+
+def friction_of_each(slides: Sequence[Slide]) -> tuple[np.ndarray, np.ndarray]:
+    """Initial speeds [m/s] and friction coefficients of the slides, each identified from one slide alone."""
+    found = [identify_motion(s, SQUARE, BODY, parameters=("mu_c",), start=_start(CASES[0])) for s in slides]
+    starts = np.array([each.histories[0]["start"] for each in found])
+    return np.hypot(starts[:, 3], starts[:, 4]), np.array([each.estimates["mu_c"] for each in found])
+
+
+def draw(speed: np.ndarray, mu: np.ndarray) -> Figure:
+    """Friction of every slide over its initial speed."""
+    figure = Figure(figsize=(6.0, 3.6), dpi=110, layout="constrained")
+    axes = figure.add_subplot()
+    axes.plot(speed, mu, ".", color="#0072B2", markersize=5)
+    axes.axhline(np.median(mu), color="0.4", linewidth=1.0, label=f"median {np.median(mu):.3f}")
+    axes.set(xlabel="initial speed [m/s]", ylabel="friction coefficient of the slide")
+    axes.legend(frameon=False)
+    axes.grid(True, color="0.9", linewidth=0.6)
+    axes.spines[["top", "right"]].set_visible(False)
+    return figure
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("path", type=Path, help="file of measured slides")
+    parser.add_argument("--splits", type=int, default=1, help="number of splits")
+    parser.add_argument("--tosses", type=int, help="at most so many different tosses")
+    parser.add_argument("--out", type=Path, help="folder for the picture of every slide's friction")
+    options = parser.parse_args(arguments)
+    try:
+        tosses = read_tosses(options.path)
+        rows = []
+        for seed in range(options.splits):
+            fit, test = ([as_slide(toss) for toss in half] for half in split(tosses, seed, options.tosses))
+            rows += run(fit, test, CASES, seed)
+        headings = ["split", "model", "start from", "fitted", "end [mm]", "end [deg]", "way [mm]", "way [deg]"]
+        print_table("RMS errors on the test half: at the end, and along the way", headings, rows)
+        if options.out is not None:
+            options.out.mkdir(parents=True, exist_ok=True)
+            chosen = tosses if options.tosses is None else tosses[: options.tosses]
+            speed, mu = friction_of_each([as_slide(toss) for toss in chosen])
+            print(f"friction of single slides: median {np.median(mu):.4f}, spread {mu.std():.4f}")
+            draw(speed, mu).savefig(options.out / "identify_slides.png")
+    except (FrictionError, OSError) as error:
+        print(f"error: {error}", file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,74 @@
+"""`planarfriction identify`: parameters of a contact from logs of its motion and its wrench."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from planarfriction import validation
+from planarfriction.cli import output
+from planarfriction.cli.console import note, print_table, work_progress
+from planarfriction.errors import FileError, InvalidValueError
+
+if TYPE_CHECKING:
+    from planarfriction.identify import Identification
+    from planarfriction.patch import ContactPatch
+
+
+def identify(
+    paths: Sequence[Path], patch: ContactPatch, *, folder: Path | None, normal_force: float | None, **options: Any
+) -> int:
+    """Estimate the parameters from the logs, print them, and write JSON and picture into `folder`."""
+    from planarfriction.identify import Log, identify_lugre
+
+    if folder is not None:
+        output.prepare_folder(folder)
+    logs = [Log.from_csv(path, normal_force=normal_force) for path in paths]
+    with work_progress("identifying") as progress:
+        found = identify_lugre(logs, patch, progress=progress, **options)
+    samples = sum(len(log.time) for log in logs)
+    title = f"{', '.join(log.name for log in logs)}: {samples} samples, {patch.name}"
+    print_table(title, ["parameter", "estimate", "std. error", "95 % interval", "unit", "verdict"], found.rows())
+    for verdict in found.verdicts:
+        if verdict.parameter == "fit":
+            note(str(verdict))
+    note(f"{found.starts[0]} of {found.starts[1]} starts ended here")
+    if folder is not None:
+        _write(found, folder, output.slug(logs[0].name))
+    return 0
+
+
+def parse_start(entries: Sequence[str]) -> dict[str, float]:
+    """Values of `--start NAME=VALUE` by name."""
+    start = {}
+    for entry in entries:
+        name, equals, value = entry.partition("=")
+        if not equals:
+            raise InvalidValueError("--start", "be NAME=VALUE, as mu_c=0.4", entry)
+        start[name.strip()] = validation.number(f"--start {name.strip()}", value)
+    return start
+
+
+def parse_names(text: str | None) -> tuple[str, ...]:
+    """Names of `--parameters`, separated by commas; the usual ones without it."""
+    from planarfriction.identify.parameters import USUAL, check_names
+
+    return USUAL if text is None else check_names([name.strip() for name in text.split(",") if name.strip()])
+
+
+def parse_noise(text: str | None) -> list[float] | None:
+    """The three numbers of `--noise`."""
+    return None if text is None else [validation.number("--noise", part) for part in text.split(",")]
+
+
+def _write(found: Identification, folder: Path, stem: str) -> None:
+    table, picture = folder / f"{stem}-identification.json", folder / f"{stem}-residuals.png"
+    try:
+        table.write_text(json.dumps(found.to_dict(), indent=2) + "\n", encoding="utf-8")
+        found.plot().savefig(picture)
+    except OSError as error:
+        raise FileError(f"cannot write to folder {folder}: {error.strerror or error}") from error
+    note(f"wrote {table}")
+    note(f"wrote {picture}")

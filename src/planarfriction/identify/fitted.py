@@ -1,0 +1,126 @@
+"""From a minimum to an `Identification`: standard errors, verdicts, histories, the fitted law and model."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import Any
+
+import numpy as np
+
+from planarfriction.autodiff import PARAMETERS
+from planarfriction.identify import parameters as known
+from planarfriction.identify.least_squares import Minimum, correlations, covariance
+from planarfriction.identify.parameters import Coordinates
+from planarfriction.identify.problem import Problem, mean_load
+from planarfriction.identify.result import Identification
+from planarfriction.identify.verdicts import Evidence, judge
+from planarfriction.laws import ElastoPlastic, LuGre
+from planarfriction.models import ReducedModelPublished
+from planarfriction.patch import ContactPatch
+
+CHANNELS = (("fx", "N"), ("fy", "N"), ("tau", "N m"))
+
+NO_SLIP = 50.0
+"""Factor on the friction coefficients that keeps any contact from slipping."""
+
+HUGE = 1e200
+"""Variance that stands for an infinite one while it is turned into other coordinates."""
+
+
+def assemble(problem: Problem, coordinates: Coordinates, minimum: Minimum, noise, agreement) -> Identification:
+    values = coordinates.values(minimum.x)
+    off, jacobian = problem.linearised(values, noise)
+    still = values * np.where(np.isin(problem.names, ("mu_c", "mu_s")), NO_SLIP, 1.0)
+    spread = _spread(jacobian, coordinates.slopes(minimum.x), ~minimum.at_bound)
+    errors = np.sqrt(np.diag(spread))
+    sliding = problem.sliding(values)
+    histories = [_history(problem, i, values, speed) for i, (speed, _) in enumerate(sliding)]
+    evidence = Evidence(
+        names=problem.names,
+        values=values,
+        errors=errors,
+        correlations=correlations(spread),
+        at_bound=minimum.at_bound,
+        jacobian=jacobian,
+        speeds=np.concatenate([each[0] for each in sliding]),
+        spins=np.concatenate([each[1] for each in sliding]),
+        loads=np.array([mean_load(log) for log in problem.logs]),
+        without_slip=0.5 * float((problem.off(still, noise) ** 2).sum() - (off**2).sum()),
+        largest_coefficient=max(float(np.nanquantile(each["coefficient"], 0.99)) for each in histories),
+    )
+    residuals = [
+        ((h["measured"] - h["predicted"]) / noise)[used] for h, used in zip(histories, problem.used, strict=True)
+    ]
+    law = _law(problem, values)
+    return Identification(
+        names=problem.names,
+        values=values,
+        standard_errors=errors,
+        correlations=evidence.correlations,
+        verdicts=judge(evidence, residuals),
+        noise=noise,
+        channels=CHANNELS,
+        histories=tuple(histories),
+        law=law,
+        model=_model(problem, values, law),
+        starts=agreement,
+    )
+
+
+def _spread(jacobian: np.ndarray, slopes: np.ndarray, free: np.ndarray) -> np.ndarray:
+    """Covariance `[F, F]` of the values from derivatives with respect to them and their slopes over the coordinates."""
+    of_coordinates = np.minimum(covariance(jacobian @ slopes, free), HUGE)
+    result = slopes @ of_coordinates @ slopes.T
+    diagonal = np.diag(result)
+    result[np.diag_indices(len(result))] = np.where(diagonal >= 1e-50 * HUGE, np.inf, diagonal)
+    return result
+
+
+def _history(problem: Problem, i: int, values: np.ndarray, speed: np.ndarray) -> dict[str, Any]:
+    """What was measured and predicted of log i, with its sliding speeds."""
+    log, vector = problem.logs[i], problem.shapes[i].vector(values)
+    radius = vector[PARAMETERS.index("contact_radius")]
+    force = np.linalg.norm(log.wrench / [1.0, 1.0, radius], axis=1)
+    coefficient = force / np.where(log.normal_force > 0.0, log.normal_force, np.nan)
+    predicted = problem.predictions[i].wrenches(vector)
+    history = {"name": log.name, "time": log.time, "measured": log.wrench, "predicted": predicted}
+    return {**history, "speed": speed, "coefficient": coefficient}
+
+
+def _law(problem: Problem, values: np.ndarray) -> LuGre:
+    given = dict(zip(problem.names, values.tolist(), strict=True))
+    fields = {name: given[name] for name in known.LAW if name in given and name != "breakaway_ratio"}
+    mu_c, mu_s = fields.get("mu_c", problem.law.mu_c), fields.get("mu_s", problem.law.mu_s)
+    if mu_s < mu_c:  # mu_s was held, and mu_c grew past it
+        fields["mu_s"] = mu_c
+    if "breakaway_ratio" in given:
+        fields["elasto_plastic"] = ElastoPlastic(given["breakaway_ratio"])
+    return dataclasses.replace(problem.law, **fields)
+
+
+def _model(problem: Problem, values: np.ndarray, law: LuGre) -> ReducedModelPublished:
+    """The fitted model: the patch scaled about its centre of pressure, or with the fitted soft-finger constants."""
+    given = dict(zip(problem.names, values.tolist(), strict=True))
+    patch, surface = problem.model.patch, type(problem.model.surface)
+    finger = {name: given[name] for name in known.SOFT_FINGER if name in given}
+    if finger:
+        pressure = dataclasses.replace(problem.patch.pressure, **finger)
+        fitted = ContactPatch(problem.patch.positions, problem.patch.areas, pressure, problem.patch.grid, patch.name)
+        return ReducedModelPublished(fitted, law, surface=surface(fitted, normal_force=problem.reference))
+    if any(name in known.SHAPE for name in given):
+        centre = patch.centre_of_pressure()
+        scale = given.get("contact_radius", problem.model.surface.contact_radius) / problem.model.surface.contact_radius
+        to = np.array([given.get("centre_x", centre[0]), given.get("centre_y", centre[1])])
+        patch = moved_patch(patch, centre, to, scale)
+    return ReducedModelPublished(patch, law, surface=surface(patch))
+
+
+def moved_patch(patch: ContactPatch, centre: np.ndarray, to: np.ndarray, scale: float) -> ContactPatch:
+    """The patch with its point `centre` moved to `to` and everything scaled about it, its grid too."""
+    grid = patch.grid
+    if grid is not None:
+        x, y = to + scale * (np.array([grid.x_min, grid.y_min]) - centre)
+        size = {"cell_width": scale * grid.cell_width, "cell_height": scale * grid.cell_height}
+        grid = dataclasses.replace(grid, x_min=float(x), y_min=float(y), **size)
+    positions = to + scale * (patch.positions - centre)
+    return ContactPatch(positions, scale**2 * patch.areas, patch.weights() / patch.areas, grid, patch.name)

@@ -1,0 +1,234 @@
+"""What can be identified: names, units, bounds, and how each parameter enters the reduced model.
+
+A *vector* below is the model's own: `autodiff.PARAMETERS` in order. *Values* are what is asked for, by name; the
+optimiser sees *coordinates*, in which a factor counts the same up and down (a logarithm) wherever a value must be > 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.autodiff import PARAMETERS
+from planarfriction.errors import InvalidValueError
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One quantity that can be identified."""
+
+    unit: str
+    """SI unit."""
+    low: float
+    """Smallest value that the fit may try [unit]."""
+    high: float
+    """Largest value that the fit may try [unit]."""
+    logarithmic: bool = True
+    """Whether the optimiser sees its logarithm."""
+
+
+LAW = {
+    "mu_c": Parameter("-", 1e-3, 20.0),
+    "mu_s": Parameter("-", 1e-3, 40.0),
+    "v_s": Parameter("m/s", 1e-7, 10.0),
+    "gamma": Parameter("-", 0.2, 8.0),
+    "sigma_0": Parameter("1/m", 1.0, 1e9),
+    "sigma_1": Parameter("s/m", 0.0, 1e6, logarithmic=False),
+    "sigma_2": Parameter("s/m", 0.0, 1e3, logarithmic=False),
+    "breakaway_ratio": Parameter("-", 0.0, 0.99, logarithmic=False),
+}
+"""Parameters of the friction law."""
+
+SHAPE = {
+    "contact_radius": Parameter("m", 1e-6, 10.0),
+    "centre_x": Parameter("m", -10.0, 10.0, logarithmic=False),
+    "centre_y": Parameter("m", -10.0, 10.0, logarithmic=False),
+}
+"""Parameters of the shape of the contact; `<rho^2>` follows the square of the contact radius."""
+
+SOFT_FINGER = {
+    "c": Parameter("m", 1e-6, 10.0),
+    "n": Parameter("-", 0.0, 2.0, logarithmic=False),
+    "k": Parameter("-", 0.1, 50.0),
+    "k_per_newton": Parameter("1/N", 1e-3, 50.0),
+}
+"""Constants of a `SoftFinger`: its radius `c f_N^n`, the exponent `k` of its profile."""
+
+ALL = {**LAW, **SHAPE, **SOFT_FINGER}
+
+USUAL = ("mu_c", "mu_s", "v_s", "gamma", "sigma_0", "sigma_1", "sigma_2", "contact_radius")
+"""What `identify_lugre` estimates unless told otherwise."""
+
+
+PRIOR = 3.0
+"""Spread of the logarithms that the search takes for granted: a factor of 20."""
+
+SHAPE_PRIOR = 1.0
+"""That of the Stribeck exponent's logarithm and of `mu_s/mu_c - 1`."""
+
+
+def check_names(names: Sequence[str]) -> tuple[str, ...]:
+    """The names, each known and given once."""
+    names = (names,) if isinstance(names, str) else tuple(names)
+    for name in names:
+        validation.choice("parameters", name, ALL)
+        if names.count(name) > 1:
+            raise InvalidValueError("parameters", "hold each name once", f"{name!r} {names.count(name)} times")
+    if not names:
+        raise InvalidValueError("parameters", "hold at least one name", "none")
+    if any(name in SOFT_FINGER for name in names) and "contact_radius" in names:
+        raise InvalidValueError(
+            "parameters", "hold contact_radius or soft-finger constants, not both", ", ".join(names)
+        )
+    return names
+
+
+class Coordinates:
+    """Between values `[F]` of the chosen parameters and the optimiser's coordinates `[F]`.
+
+    `mu_s` becomes its excess `mu_s/mu_c - 1 >= 0`, so that no step can bring it below `mu_c`; other parameters > 0
+    become the logarithm of their ratio to the start, the rest multiples of their scale.
+    """
+
+    def __init__(self, names: Sequence[str], start: np.ndarray, held_mu_c: float):
+        self.names = tuple(names)
+        self.start = np.asarray(start, dtype=float)
+        self._held_mu_c = held_mu_c
+        self._excess = self.names.index("mu_s") if "mu_s" in self.names else None
+        self._mu_c = self.names.index("mu_c") if "mu_c" in self.names else None
+        self.logarithmic = np.array([ALL[name].logarithmic and name != "mu_s" for name in self.names])
+        scale = np.where(self.start != 0.0, np.abs(self.start), 1.0)
+        self.scale = np.where([name == "mu_s" for name in self.names], 1.0, scale)
+
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Bounds of the coordinates."""
+        low = np.array([ALL[name].low for name in self.names])
+        high = np.array([ALL[name].high for name in self.names])
+        bounds = []
+        for edge in (low, high):
+            bound = edge / self.scale
+            bound[self.logarithmic] = np.log(bound[self.logarithmic])
+            bounds.append(bound)
+        if self._excess is not None:
+            bounds[0][self._excess], bounds[1][self._excess] = 0.0, 5.0
+        return bounds[0], bounds[1]
+
+    def of(self, values: np.ndarray) -> np.ndarray:
+        """Coordinates of values, moved inside the bounds."""
+        result = np.asarray(values, dtype=float) / self.scale
+        result[self.logarithmic] = np.log(np.maximum(result[self.logarithmic], 1e-300))
+        if self._excess is not None:
+            result[self._excess] = values[self._excess] / self._mu(values) - 1.0
+        return np.clip(result, *self.bounds())
+
+    def prior(self, coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Weak pull to the start, `[F]` and its derivatives `[F, F]`: keeps what the data do not tell where it began.
+
+        In units of the noise of one residual, one for every factor of `PRIOR`: what the data tell to 10 % is moved by
+        a thousandth of its error. The linear coordinates, whose scale is a guess, are left alone.
+        """
+        width = np.where(self.logarithmic, PRIOR, np.inf)
+        for name, value in (("gamma", SHAPE_PRIOR), ("mu_s", SHAPE_PRIOR)):
+            if name in self.names:
+                width[self.names.index(name)] = value
+        return (coordinates - self.of(self.start)) / width, np.diag(1.0 / width)
+
+    def values(self, coordinates: np.ndarray) -> np.ndarray:
+        """Values `[F]` of coordinates."""
+        result = self.scale * np.where(
+            self.logarithmic, np.exp(np.where(self.logarithmic, coordinates, 0.0)), coordinates
+        )
+        if self._excess is not None:
+            result[self._excess] = self._mu(result) * (1.0 + coordinates[self._excess])
+        return result
+
+    def slopes(self, coordinates: np.ndarray) -> np.ndarray:
+        """`d values / d coordinates`, `[F, F]`."""
+        values = self.values(coordinates)
+        result = np.diag(np.where(self.logarithmic, values, self.scale))
+        if self._excess is not None:
+            result[self._excess, self._excess] = self._mu(values)
+            if self._mu_c is not None:
+                result[self._excess, self._mu_c] = (1.0 + coordinates[self._excess]) * values[self._mu_c]
+        return result
+
+    def _mu(self, values: np.ndarray) -> float:
+        return self._held_mu_c if self._mu_c is None else float(values[self._mu_c])
+
+
+class Shape:
+    """How the values enter the vector of the model at one load: the law directly, the shape through its constants."""
+
+    def __init__(self, names: Sequence[str], base: np.ndarray, patch: Any, normal_force: float):
+        self.names, self.base = tuple(names), np.array(base, dtype=float)
+        self.load = normal_force
+        self._ratio = self._get(base, "second_moment") / self._get(base, "contact_radius") ** 2
+        self._finger = patch.pressure if any(name in SOFT_FINGER for name in names) else None
+
+    def vector(self, values: np.ndarray) -> np.ndarray:
+        """Vector `[P]` of the model for values `[F]`."""
+        return self._evaluate(values)[0]
+
+    def slopes(self, values: np.ndarray) -> np.ndarray:
+        """`d vector / d values`, `[P, F]`."""
+        return self._evaluate(values)[1]
+
+    def _evaluate(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        vector, slopes = self.base.copy(), np.zeros((len(PARAMETERS), len(self.names)))
+        radius, second = PARAMETERS.index("contact_radius"), PARAMETERS.index("second_moment")
+        for i, name in enumerate(self.names):
+            if name in SOFT_FINGER:
+                continue
+            row = PARAMETERS.index(name)
+            vector[row], slopes[row, i] = values[i], 1.0
+            if name == "contact_radius":
+                vector[second], slopes[second, i] = self._ratio * values[i] ** 2, 2.0 * self._ratio * values[i]
+        if self._finger is not None:
+            given = dict(zip(self.names, values, strict=True))
+            moments = soft_finger_moments(self._finger, self.load, given)
+            (vector[radius], of_radius), (vector[second], of_second) = moments
+            for i, name in enumerate(self.names):
+                slopes[radius, i] += of_radius.get(name, 0.0)
+                slopes[second, i] += of_second.get(name, 0.0)
+        return vector, slopes
+
+    @staticmethod
+    def _get(vector: np.ndarray, name: str) -> float:
+        return float(vector[PARAMETERS.index(name)])
+
+
+def soft_finger_moments(finger: Any, normal_force: float, given: dict[str, Any]):
+    """Contact radius and `<rho^2>` of a soft finger at a load, each with its slopes: `((r, {name: dr}), (m, {...}))`.
+
+    Of the profile `p ~ (1 - (s/R)^k)^(1/k)` on the continuous disc: `<s^j> = R^j B((j+2)/k, 1+1/k) / B(2/k, 1+1/k)`.
+    `given` replaces constants of the `finger` by name.
+    """
+    from scipy.special import betaln
+
+    c: Any = given.get("c", finger.c)
+    n: Any = given.get("n", finger.n)
+    per_newton = finger.k is None
+    k: Any = given.get("k_per_newton", finger.k_per_newton) * normal_force if per_newton else given.get("k", finger.k)
+    grown: Any = c * normal_force**n
+    free = finger.radius_max is None or grown < finger.radius_max
+    size: Any = grown if free else finger.radius_max
+    results = []
+    for power in (1, 2):
+        value = size**power * np.exp(betaln((power + 2) / k, 1 + 1 / k) - betaln(2 / k, 1 + 1 / k))
+        of_k = value * (_log_beta_slope(power + 2, k) - _log_beta_slope(2, k))
+        slopes = {"c": power * value / c, "n": power * value * np.log(normal_force)} if free else {}
+        slopes["k_per_newton" if per_newton else "k"] = of_k * (normal_force if per_newton else 1.0)
+        results.append((float(value), slopes))
+    return results[0], results[1]
+
+
+def _log_beta_slope(a: float, k: float) -> float:
+    """`d/dk log B(a/k, 1 + 1/k)`."""
+    from scipy.special import digamma
+
+    both = digamma((a + 1) / k + 1)
+    return float(-(a * (digamma(a / k) - both) + (digamma(1 + 1 / k) - both)) / k**2)

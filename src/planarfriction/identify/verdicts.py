@@ -1,0 +1,185 @@
+"""What the data cannot tell, and why: each rule names the parameter and what is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from planarfriction.identify.parameters import ALL, SOFT_FINGER
+from planarfriction.identify.result import Verdict
+
+VAGUE = 0.3
+"""Standard error, as a share of the estimate, above which a parameter that must be > 0 counts as not told."""
+
+TOGETHER = 0.98
+"""Correlation above which two parameters are told only together."""
+
+UNSEEN = 1.0
+"""A parameter whose whole size moves no sample by this many spreads of the noise is not seen."""
+
+GAP = 3.0
+"""Sliding speeds with this ratio and no sample between leave a gap."""
+
+NARROW = 10.0
+"""Ratio of the fastest to the slowest sliding (but for 2 % at either end) below which no Stribeck curve shows."""
+
+NO_SPIN = 0.02
+"""Share of the sliding speed that comes from spin below which there is none."""
+
+ONE_LOAD = 1.05
+"""Ratio of the largest and the smallest load below which there is one load only."""
+
+SLIPPED = 12.0
+"""Growth of the cost (half the sum of squares) without slip below which the data hold none: 5 standard errors."""
+
+SMALL = 0.5
+"""Residuals smaller than this share of the noise do no harm, whatever their pattern."""
+
+CORRELATED = 0.3
+"""Correlation of neighbouring residuals above which they are no noise."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What the rules look at."""
+
+    names: tuple[str, ...]
+    values: np.ndarray
+    errors: np.ndarray
+    """Standard errors, `[F]`."""
+    correlations: np.ndarray
+    """`[F, F]`."""
+    at_bound: np.ndarray
+    """`[F]` of bool."""
+    jacobian: np.ndarray
+    """Derivatives of the scaled residuals, `[M, F]`."""
+    speeds: np.ndarray
+    """Sliding speeds `|V_S|` of all samples [m/s]."""
+    spins: np.ndarray
+    """Their part from spin, `r |omega|` [m/s]."""
+    loads: np.ndarray
+    """Normal force of each log [N]."""
+    without_slip: float
+    """How much the cost grows if the contact may not slip at all."""
+    largest_coefficient: float
+    """Largest friction over load that was fitted [-]."""
+
+    def value(self, name: str, otherwise: float) -> float:
+        """The estimate of a parameter, or `otherwise` if it was not estimated."""
+        return float(self.values[self.names.index(name)]) if name in self.names else otherwise
+
+
+def judge(evidence: Evidence, residuals: Sequence[np.ndarray]) -> tuple[Verdict, ...]:
+    """The verdicts on all parameters and on the residuals `[T, C]` of each log."""
+    verdicts = [verdict for i in range(len(evidence.names)) if (verdict := _parameter(evidence, i)) is not None]
+    neighbours = _neighbour_correlation(residuals)
+    size = np.sqrt(np.mean(np.concatenate([each.ravel() for each in residuals]) ** 2))
+    if neighbours > CORRELATED and size > SMALL:
+        factor = np.sqrt((1.0 + neighbours) / (1.0 - min(neighbours, 0.999)))
+        text = f"neighbouring residuals are correlated ({neighbours:.2f}), so the model or the measurement is off in a "
+        verdicts.append(
+            Verdict("fit", False, f"{text}regular way and the true errors are some {factor:.1f} times larger")
+        )
+    return tuple(verdicts)
+
+
+def _parameter(evidence: Evidence, i: int) -> Verdict | None:
+    name, value, error = evidence.names[i], float(evidence.values[i]), float(evidence.errors[i])
+    kind = ALL[name]
+    if name in ("mu_c", "mu_s", "v_s", "gamma") and evidence.without_slip < SLIPPED:
+        return Verdict(
+            name, False, f"the contact never slips, friction reaches {evidence.largest_coefficient:.2g} of the load"
+        )
+    if evidence.at_bound[i]:
+        return _on_bound(evidence, i)
+    size = abs(value)
+    seen = np.abs(evidence.jacobian[:, i]).max() * size
+    if name in ("v_s", "gamma") and (reason := _no_stribeck(evidence)):
+        return Verdict(name, False, reason)
+    if kind.logarithmic and not error < VAGUE * size:
+        return Verdict(name, False, _why(evidence, i, seen))
+    if not kind.logarithmic and not np.isfinite(error):
+        return Verdict(name, False, _why(evidence, i, seen))
+    if kind.low == 0.0 and value < 1.96 * error:
+        return Verdict(name, True, f"not told from 0, at most {value + 1.96 * error:.3g} {kind.unit}")
+    if (partner := _partner(evidence, i)) is not None:
+        other, correlation = partner
+        return Verdict(name, True, f"hangs together with {other} (correlation {correlation:.2f})")
+    return None
+
+
+def _why(evidence: Evidence, i: int, seen: float) -> str:
+    """The reason why a parameter is vague: what the data do not cover, else another parameter, else the noise."""
+    name = evidence.names[i]
+    if name in ("v_s", "gamma", "mu_s") and (gap := speed_gap(evidence.speeds, evidence.value("v_s", 1e-3))):
+        return gap
+    spin = np.sqrt(np.mean(evidence.spins**2)) / max(np.sqrt(np.mean(evidence.speeds**2)), 1e-300)
+    if name in ("contact_radius", *SOFT_FINGER) and spin < NO_SPIN:
+        return "no spin"
+    if name in SOFT_FINGER and name != "c" and evidence.loads.max() < ONE_LOAD * evidence.loads.min():
+        return "one load only"
+    if seen < UNSEEN:
+        return f"moves no sample by more than {seen:.2g} times the noise"
+    if (partner := _partner(evidence, i)) is not None:
+        return f"told only together with {partner[0]} (correlation {partner[1]:.2f})"
+    return f"its standard error is {100 * evidence.errors[i] / abs(evidence.values[i]):.0f} % of it"
+
+
+def _no_stribeck(evidence: Evidence) -> str:
+    """Why the Stribeck curve has no shape: mu_s is not told from mu_c."""
+    if "mu_s" not in evidence.names or "mu_c" not in evidence.names:
+        return ""
+    s, c = evidence.names.index("mu_s"), evidence.names.index("mu_c")
+    excess = evidence.values[s] - evidence.values[c]
+    spread = np.inf
+    if np.isfinite(evidence.errors[[s, c]]).all():
+        both = evidence.correlations[s, c] * evidence.errors[s] * evidence.errors[c]
+        spread = np.sqrt(max(evidence.errors[s] ** 2 + evidence.errors[c] ** 2 - 2.0 * both, 0.0))
+    if evidence.at_bound[s] or not excess > 1.96 * spread:
+        gap = speed_gap(evidence.speeds, evidence.value("v_s", 1e-3))
+        return gap or "mu_s cannot be told from mu_c"
+    return ""
+
+
+def _on_bound(evidence: Evidence, i: int) -> Verdict:
+    name = evidence.names[i]
+    if name == "mu_s":
+        reason = speed_gap(evidence.speeds, evidence.value("v_s", 1e-3)) or "no friction above mu_c was seen"
+        return Verdict(name, False, f"{reason}: equal to mu_c")
+    if ALL[name].low == 0.0 and evidence.values[i] <= 1e-6:
+        return Verdict(name, True, f"0 fits best, at most {1.96 * evidence.errors[i]:.3g} {ALL[name].unit}")
+    return Verdict(name, False, f"the fit ran into the bound {evidence.values[i]:.3g} {ALL[name].unit}")
+
+
+def _partner(evidence: Evidence, i: int) -> tuple[str, float] | None:
+    row = evidence.correlations[i].copy()
+    row[i] = 0.0
+    j = int(np.argmax(np.abs(row)))
+    return (evidence.names[j], float(row[j])) if abs(row[j]) > TOGETHER else None
+
+
+def speed_gap(speeds: np.ndarray, around: float) -> str:
+    """Text that names the range of sliding speeds about `around` [m/s] without a sample, or nothing."""
+    moving = speeds[speeds > 0.0]
+    if not len(moving):
+        return "nothing moves"
+    slow, fast = np.quantile(moving, [0.02, 0.98])
+    if fast < NARROW * slow:
+        return f"no sample below {1e3 * slow:.2g} and above {1e3 * fast:.2g} mm/s"
+    below, above = moving[moving <= around], moving[moving > around]
+    low = float(below.max()) if len(below) else 0.0
+    high = float(above.min()) if len(above) else np.inf
+    if high < GAP * low:
+        return ""
+    if not np.isfinite(high):
+        return f"no sample above {1e3 * low:.2g} mm/s"
+    return f"no sample between {1e3 * low:.2g} and {1e3 * high:.2g} mm/s"
+
+
+def _neighbour_correlation(residuals: Sequence[np.ndarray]) -> float:
+    """Correlation of residuals one sample apart, over all logs and channels."""
+    products = sum(float((each[1:] * each[:-1]).sum()) for each in residuals)
+    squares = sum(float((each[1:] ** 2 + each[:-1] ** 2).sum()) / 2 for each in residuals)
+    return products / squares if squares > 0.0 else 0.0

@@ -1,0 +1,103 @@
+"""Residual plot of an identification: measured and fitted channels, what is left, and the speeds that were covered."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from planarfriction import formulas
+from planarfriction.plots import style
+
+if TYPE_CHECKING:
+    from planarfriction.identify import Identification
+
+KINDS = {"N": "force", "N m": "torque", "m": "length", "rad": "angle"}
+"""Unit of a channel -> kind of quantity."""
+
+MOST_POINTS = 4000
+"""Samples that are drawn; of more, evenly chosen ones."""
+
+
+def plot_identification(result: Identification) -> style.PlotFigure:
+    """Draw each measured channel with its fit (left) and the residual over the noise (right), logs one after another.
+
+    Residuals of a good fit fill the band of two spreads of the noise and show no pattern. With wrenches, the friction
+    coefficient over the sliding speed is drawn below with the fitted Stribeck curve: where it has no samples, the data
+    tell nothing.
+    """
+    with_speed = "speed" in result.histories[0]
+    rows = len(result.channels)
+    figure = style.new_figure(9.6, 1.75 * rows + (3.0 if with_speed else 0.6))
+    grid = figure.add_gridspec(rows + with_speed, 2, height_ratios=[1.0] * rows + [1.5] * with_speed)
+    place = _places(result)
+    left = right = None
+    for i in range(rows):
+        left = figure.add_subplot(grid[i, 0], sharex=left)
+        right = figure.add_subplot(grid[i, 1], sharex=left, sharey=right)
+        _draw_channel(left, right, result, i, place)
+    assert left is not None and right is not None
+    several = len(result.histories) > 1
+    for axes in (left, right):
+        axes.set_xlabel("time, one after another [s]" if several else "time [s]")
+    figure.axes[1].set_title("(measured - fitted) / noise", fontsize="medium")
+    if with_speed:
+        _draw_speeds(figure.add_subplot(grid[rows, :]), result)
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper left", ncols=2, frameon=False, fontsize="small")
+    return figure
+
+
+def _places(result: Identification) -> list[np.ndarray]:
+    """Times of each log [s], shifted so that the logs follow each other with a gap."""
+    total = sum(each["time"][-1] - each["time"][0] for each in result.histories)
+    gap, at, places = 0.01 * total, 0.0, []
+    for each in result.histories:
+        time = np.asarray(each["time"])
+        places.append(time if len(result.histories) == 1 else time - time[0] + at)
+        at += time[-1] - time[0] + gap
+    return places
+
+
+def _draw_channel(left: Any, right: Any, result: Identification, i: int, places: list[np.ndarray]) -> None:
+    name, unit = result.channels[i]
+    shown = style.unit_for(KINDS[unit], *(each["measured"][:, i] for each in result.histories))
+    for number, (each, time) in enumerate(zip(result.histories, places, strict=True)):
+        label = number == 0
+        left.plot(
+            time, shown.factor * each["measured"][:, i], color="0.6", linewidth=2.2, label="measured" if label else None
+        )
+        left.plot(
+            time,
+            shown.factor * each["predicted"][:, i],
+            color=style.PALETTE[0],
+            linewidth=0.9,
+            label="fitted" if label else None,
+        )
+        off = (each["measured"][:, i] - each["predicted"][:, i]) / result.noise[i]
+        every = max(1, len(time) // MOST_POINTS)
+        right.plot(time[::every], off[::every], ".", color=style.PALETTE[0], markersize=1.5)
+    right.axhspan(-2.0, 2.0, color="0.92", zorder=0)
+    left.set_ylabel(f"{name} [{shown.label}]")
+    for axes in (left, right):
+        style.tidy(axes)
+    right.set_ylim(-5.0, 5.0)
+
+
+def _draw_speeds(axes: Any, result: Identification) -> None:
+    """Measured friction over load against the sliding speed, beside the fitted steady friction of pure sliding."""
+    speed = np.concatenate([each["speed"] for each in result.histories])
+    coefficient = np.concatenate([each["coefficient"] for each in result.histories])
+    usable = (speed > 0.0) & np.isfinite(coefficient)
+    speed, coefficient = speed[usable], coefficient[usable]
+    if not len(speed):
+        return
+    every = max(1, len(speed) // MOST_POINTS)
+    axes.plot(1e3 * speed[::every], coefficient[::every], ".", color="0.6", markersize=2.0, label="measured")
+    law, grid = result.law, np.geomspace(max(speed.min(), 1e-4 * speed.max()), speed.max(), 200)
+    steady = formulas.stribeck(np, grid, law.mu_c, law.mu_s, law.v_s, law.gamma) + law.sigma_2 * grid
+    axes.plot(1e3 * grid, steady, color=style.PALETTE[1], label="fitted law, steady sliding")
+    axes.set(xscale="log", xlabel="sliding speed [mm/s]", ylabel="friction / load [-]")
+    axes.set_ylim(0.0, 1.1 * max(steady.max(), np.quantile(coefficient, 0.995)))
+    axes.legend(frameon=False, fontsize="small", loc="lower right")
+    style.tidy(axes)

@@ -1,0 +1,103 @@
+"""Identification from slides that stop: friction and contact radius come out of motion alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import planarfriction as pf
+from planarfriction.errors import InvalidValueError
+from planarfriction.identify import Slide, SlidingBody, fit_start, identify_motion, predict_slide
+from planarfriction.identify.slides import slide_poses
+
+BODY = SlidingBody(0.37, 8.1e-4)
+PATCH = pf.ContactPatch.disc(0.05, cells=9)
+MU = 0.3
+LAW = pf.LuGre(mu_c=MU, mu_s=MU, v_s=1e-3, sigma_0=1e6, sigma_1=20.0, sigma_2=0.0, elasto_plastic=pf.ElastoPlastic(0.9))
+
+
+def ellipsoid(patch, law):
+    return pf.ReducedModelPublished(patch, law, surface=pf.LimitSurfaceEllipsoid(patch))
+
+
+def slides(count: int, noise: float = 1e-4, spin: float = 3.0, seed: int = 0) -> list[Slide]:
+    """Slides at 150 samples a second, places off by `noise` [m], angles by `noise` over 3 cm, first twists by a lot."""
+    random, model = np.random.default_rng(seed), ellipsoid(PATCH, LAW)
+    result = []
+    for number in range(count):
+        heading, speed = random.uniform(-np.pi, np.pi), random.uniform(0.3, 0.7)
+        twist = np.array([speed * np.cos(heading), speed * np.sin(heading), random.uniform(-spin, spin)])
+        time = np.arange(45) / 150.0
+        pose = slide_poses(model, BODY, time, np.array([0.1, 0.2, heading]), twist)
+        off = noise * random.standard_normal(pose.shape) / [1.0, 1.0, 0.03]
+        rough = twist + [0.03, -0.03, 0.3] * random.standard_normal(3)
+        result.append(Slide(time, pose + off, rough, f"slide {number}"))
+    return result
+
+
+def test_simulated_slide_in_closed_form():
+    """v t - mu g t^2/2 until v/(mu g); the spin alone stops after omega I/(mu m g r)."""
+    time = np.linspace(0.0, 0.3, 31)
+    poses = slide_poses(ellipsoid(PATCH, LAW), BODY, time, np.zeros(3), np.array([0.5, 0.0, 0.0]))
+    moving = np.minimum(time, 0.5 / (MU * 9.81))
+    # Relaxed bristles let the first 2 mm/s ... of mu g sigma_1/sigma_0 go: 0.1 mm over the way.
+    assert poses[:, 0] == pytest.approx(0.5 * moving - 0.5 * MU * 9.81 * moving**2, abs=1e-4)
+    spun = slide_poses(ellipsoid(PATCH, LAW), BODY, time, np.zeros(3), np.array([0.0, 0.0, 4.0]))
+    braking = MU * BODY.mass * 9.81 * PATCH.contact_radius() / BODY.inertia
+    assert spun[-1, 2] == pytest.approx(4.0**2 / (2.0 * braking), rel=5e-3)
+
+
+def test_friction_and_radius_come_out():
+    """Twelve noisy slides, started 25 % too high and 25 % too small: both within three standard errors."""
+    guess = pf.ContactPatch.disc(0.0375, cells=9)
+    start = pf.LuGre(mu_c=0.36, mu_s=0.36, v_s=1e-3, sigma_0=1e6, sigma_1=20.0, sigma_2=0.0)
+    found = identify_motion(slides(12), guess, BODY, start=start, model=ellipsoid)
+    assert abs(found.estimates["mu_c"] - MU) < 3.0 * found.errors["mu_c"] < 0.01 * MU
+    radius = PATCH.contact_radius()
+    assert abs(found.estimates["contact_radius"] - radius) < 3.0 * found.errors["contact_radius"] < 0.1 * radius
+    assert found.law.mu_s == found.law.mu_c
+    assert found.model.surface.contact_radius == pytest.approx(found.estimates["contact_radius"], rel=1e-9)
+    assert found.noise[:2] == pytest.approx(1e-4, rel=0.15)
+    assert len(found.plot().axes) == 6
+
+
+def test_start_comes_out_of_the_first_poses():
+    """Rough first twists, 3 cm/s off; ten poses of 10 um noise give the speed to 1 mm/s."""
+    model = ellipsoid(PATCH, LAW)
+    for slide in slides(3, noise=1e-5):
+        start = fit_start(model, BODY, slide, samples=10)
+        best = fit_start(model, BODY, slide)
+        assert start[3:5] == pytest.approx(best[3:5], abs=1e-3)
+        off = predict_slide(model, BODY, slide, samples=10) - slide.pose
+        assert np.hypot(*off[-1, :2]) < 1e-3
+        assert np.hypot(*(predict_slide(model, BODY, slide) - slide.pose)[-1, :2]) > 1e-3
+
+
+def test_prediction_from_first_poses():
+    found = identify_motion(slides(6, noise=2e-5), PATCH, BODY, start=LAW, model=ellipsoid, samples=10)
+    assert found.estimates["mu_c"] == pytest.approx(MU, rel=0.02)
+
+
+def test_what_slides_cannot_tell():
+    found = identify_motion(slides(3, spin=0.0), PATCH, BODY, start=LAW, model=ellipsoid)
+    assert not found.identifiable("contact_radius")
+    assert "no spin" in found.table()
+    assert "3 slides only" in found.table()
+
+
+def test_bad_input_is_named():
+    good = slides(1)[0]
+    with pytest.raises(InvalidValueError, match="slides must be a Slide"):
+        identify_motion([], PATCH, BODY)
+    with pytest.raises(InvalidValueError, match="parameters must be one of mu_c"):
+        identify_motion(good, PATCH, BODY, parameters=("sigma_0",))
+    with pytest.raises(InvalidValueError, match="body must be a SlidingBody"):
+        identify_motion(good, PATCH, 0.37)
+    with pytest.raises(InvalidValueError, match="samples must be an integer >= 5"):
+        identify_motion(good, PATCH, BODY, samples=2)
+    with pytest.raises(InvalidValueError, match="mass must be > 0"):
+        SlidingBody(0.0, 1.0)
+    with pytest.raises(InvalidValueError, match="increase"):
+        Slide(good.time[::-1], good.pose)
+    with pytest.raises(InvalidValueError, match="pose must have shape"):
+        Slide(good.time, good.pose[:, :2])
