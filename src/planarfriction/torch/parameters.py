@@ -1,0 +1,123 @@
+"""Physical parameters as trainable numbers without a scale, which cannot leave their valid range.
+
+An optimiser moves a raw number `w`; the physical value follows from it:
+
+    positive            p = p_0 exp(w), from w = 0         sigma_0, mu_c, v_s, gamma, contact_radius, second_moment
+    zero or more        p = scale |w|                      sigma_1, sigma_2
+    mu_s >= mu_c        mu_s = mu_c (1 + |w|)
+    breakaway in [0, 1) s = 1 - exp(-|w|)
+    free                p = p_0 + r w, from w = 0          centre_x, centre_y
+
+A step of `w` is a relative change, so that one learning rate suits all. `|w|` has the slope 1 at `w = 0`: a value on
+its bound can leave it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import torch
+from torch import Tensor, nn
+
+from planarfriction import validation
+from planarfriction.errors import InvalidValueError
+
+LAW = ("sigma_0", "sigma_1", "sigma_2", "mu_c", "mu_s", "v_s", "gamma", "breakaway_ratio")
+"""Parameters of the friction law, in the order of the vector."""
+
+SHAPE = ("contact_radius", "second_moment", "centre_x", "centre_y")
+"""What the reduced model knows of the patch, in the order of the vector."""
+
+_POSITIVE = ("sigma_0", "mu_c", "v_s", "gamma", "contact_radius", "second_moment")
+_LARGEST_EXPONENT = 30.0
+"""A positive value stays within a factor e^30 = 1e13 of where it started, so that none overflows or becomes zero."""
+
+
+def _magnitude(raw: Tensor) -> Tensor:
+    """`|w|`, with the slope 1 at 0."""
+    return torch.where(raw >= 0.0, raw, -raw)
+
+
+class PhysicalParameters(nn.Module):
+    """Named physical values: those in `trainable` are `nn.Parameter`s in `raw`, the rest are fixed."""
+
+    values: Tensor
+    """The values as last set, `[P]`."""
+    scale: Tensor
+    """Physical size of a raw step of 1, where it has one, `[P]`."""
+
+    def __init__(self, values: Mapping[str, float], trainable: Iterable[str], **kind):
+        super().__init__()
+        self.names = tuple(values)
+        chosen = [validation.choice("trainable", name, self.names) for name in trainable]
+        self.register_buffer("values", torch.zeros(len(self.names), **kind))
+        self.register_buffer("scale", torch.ones(len(self.names), **kind))
+        self.raw = nn.ParameterDict({name: nn.Parameter(torch.zeros((), **kind)) for name in chosen})
+        self.set(values)
+
+    @torch.no_grad()
+    def set(self, values: Mapping[str, float]) -> None:
+        """Set physical values by name; raises InvalidValueError for one out of its range."""
+        for name in values:
+            validation.choice("parameter", name, self.names)
+        new = {**dict(zip(self.names, self().tolist(), strict=True)), **values}
+        _check(new)
+        for i, name in enumerate(self.names):
+            scale, raw = _raw(name, new, fixed_static="mu_s" not in self.raw)
+            self.values[i], self.scale[i] = new[name], scale
+            if name in self.raw:
+                self.raw[name].fill_(raw)
+
+    def forward(self) -> Tensor:
+        """The physical values `[P]`, in the order of `names`."""
+        fixed = dict(zip(self.names, self.values.unbind(), strict=True))
+        scale = dict(zip(self.names, self.scale.unbind(), strict=True))
+        now = {name: self._value(name, fixed, scale) for name in self.names}
+        if "mu_s" in self.raw:
+            now["mu_s"] = now["mu_c"] * (1.0 + scale["mu_s"] * _magnitude(self.raw["mu_s"]))
+        elif "mu_c" in self.raw:  # below the fixed mu_s
+            now["mu_c"] = fixed["mu_s"] / (1.0 + scale["mu_c"] * _magnitude(self.raw["mu_c"]))
+        return torch.stack(list(now.values()))
+
+    def _value(self, name: str, fixed: dict[str, Tensor], scale: dict[str, Tensor]) -> Tensor:
+        if name not in self.raw:
+            return fixed[name]
+        raw = self.raw[name]
+        if name in _POSITIVE:
+            return fixed[name] * torch.exp(raw.clamp(-_LARGEST_EXPONENT, _LARGEST_EXPONENT))
+        if name == "breakaway_ratio":
+            below_one = 1.0 - 16.0 * torch.finfo(raw.dtype).eps
+            return (1.0 - torch.exp(-scale[name] * _magnitude(raw))).clamp(max=below_one)
+        if name.startswith("centre"):
+            return fixed[name] + scale[name] * raw
+        return scale[name] * _magnitude(raw)
+
+
+def _raw(name: str, values: Mapping[str, float], *, fixed_static: bool) -> tuple[float, float]:
+    """Scale and raw number of a value; a value of zero takes a natural size as its scale."""
+    value, mu_c = values[name], values["mu_c"]
+    if name == "mu_s" or (name == "mu_c" and fixed_static):
+        excess = (values["mu_s"] - mu_c) / mu_c
+        return 1.0 + excess, excess / (1.0 + excess)
+    if name in _POSITIVE:
+        return 1.0, 0.0
+    if name == "breakaway_ratio":
+        return 1.0, -float(torch.log1p(torch.tensor(-value, dtype=torch.float64)))
+    if name.startswith("centre"):
+        return values["contact_radius"], 0.0
+    natural = mu_c / values["v_s"] if name == "sigma_1" else mu_c  # of mu_c at the Stribeck speed, or at 1 m/s
+    return (value, 1.0) if value > 0.0 else (natural, 0.0)
+
+
+def _check(values: Mapping[str, float]) -> None:
+    for name, value in values.items():
+        if name in _POSITIVE:
+            validation.positive(name, value)
+        elif name.startswith("centre"):
+            validation.number(name, value)
+        else:
+            validation.non_negative(name, value)
+    if values["mu_s"] < values["mu_c"]:
+        raise InvalidValueError("mu_s", "be >= mu_c", f"mu_s={values['mu_s']}, mu_c={values['mu_c']}")
+    if values["breakaway_ratio"] >= 1.0:
+        raise InvalidValueError("breakaway_ratio", "be in [0, 1)", values["breakaway_ratio"])
