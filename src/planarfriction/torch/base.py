@@ -13,6 +13,7 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.kernels.law import law_numbers
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.patch import ContactPatch
+from planarfriction.torch import bristle
 from planarfriction.torch.bristle import Law
 from planarfriction.torch.parameters import LAW, PhysicalParameters
 
@@ -88,15 +89,17 @@ class PlanarLuGre(nn.Module):
 
     def forward(self, z: Tensor, v: Tensor, f_n: Tensor | float, *, parameters: Tensor | None = None):
         """Bristle rates `z_dot` and wrench."""
-        prepared = self.prepare(parameters)
+        prepared = self.prepare(self._vector(parameters))
         z, v, load = self._inputs(z, v, f_n)
-        return self._evaluate(prepared, z, v, load)
+        by, velocity = self._drive(prepared, v)
+        rate = self._raw(prepared, bristle.rate(prepared.law, self._scaled(prepared, z), by, self.axis))
+        return rate, load[..., None] * self._wrench(prepared, z, rate, velocity)
 
     def step(
         self, z: Tensor, v: Tensor, f_n: Tensor | float, dt: Tensor | float, *, parameters: Tensor | None = None
     ) -> tuple[Tensor, Tensor]:
         """Bristles after `dt` [s] of a held twist, and the wrench at the end; a contact without load forgets."""
-        prepared = self.prepare(parameters)
+        prepared = self.prepare(self._vector(parameters))
         z, v, load = self._inputs(z, v, f_n)
         return self.advance(prepared, z, v, load, self._number(dt))
 
@@ -105,25 +108,63 @@ class PlanarLuGre(nn.Module):
         """Contact radius of the patch [m]: torques are to forces as it is to 1."""
         raise NotImplementedError
 
-    def prepare(self, parameters: Tensor | None) -> Prepared:
-        """The numbers of the model, of the given parameters or its own."""
+    def prepare(self, parameters: Tensor) -> Prepared:
+        """The numbers of the model at given physical parameters `[..., P]`."""
         raise NotImplementedError
 
-    def advance(
-        self, prepared: Prepared, z: Tensor, v: Tensor, load: Tensor, dt: Tensor
-    ) -> tuple[Tensor, Tensor]:
+    def advance(self, prepared: Prepared, z: Tensor, v: Tensor, load: Tensor, dt: Tensor) -> tuple[Tensor, Tensor]:
         """`step` of checked inputs."""
-        dt = dt.reshape(dt.shape + (1,) * len(self.components))
-        new, wrench = self._advance(prepared, z, v, dt)
-        loaded = (load > 0.0).reshape(load.shape + (1,) * len(self.components))
-        return torch.where(loaded, new, 0.0), load[..., None] * wrench
+        by, velocity = self._drive(prepared, v)
+        new, zdot = self._advance(prepared, z, by, load, dt)
+        return new, load[..., None] * self._wrench(prepared, new, zdot, velocity)
 
-    def _evaluate(self, prepared: Prepared, z: Tensor, v: Tensor, load: Tensor) -> tuple[Tensor, Tensor]:
+    def roll_out(
+        self, parameters: Tensor | None, z: Tensor, v: Tensor, load: Tensor, dt: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """`advance` through the twists `[..., T, 3]`: all wrenches `[..., T, 3]` and the last state.
+
+        Only the bristles go step by step; what drives them and what they cause is worked out for all steps at once.
+        """
+        values = self._vector(parameters)
+        once, steps = self.prepare(values), self.prepare(values[..., None, :])
+        by, velocity = self._drive(steps, v)
+        inner = len(self.components)
+        drives = zip(*(part.unbind(part.ndim - inner - 1) for part in by), strict=True)
+        loads = load.expand(torch.broadcast_shapes(load.shape, v.shape[-2:-1]))
+        states, rates = [], []
+        for drive, f_n in zip(drives, loads.unbind(-1), strict=True):
+            z, zdot = self._advance(once, z, bristle.Drive(*drive), f_n, dt)
+            states.append(z)
+            rates.append(zdot)
+        along = -inner - 1
+        wrenches = self._wrench(steps, torch.stack(states, along), torch.stack(rates, along), velocity)
+        return load[..., None] * wrenches, z
+
+    def _advance(
+        self, prepared: Prepared, z: Tensor, by: bristle.Drive, load: Tensor, dt: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """Bristles and their rates after a step; those of a contact without load are forgotten."""
+        trailing = (1,) * len(self.components)
+        loaded = (load > 0.0).reshape(load.shape + trailing)
+        z = self._scaled(prepared, z)
+        new, zdot = bristle.step(prepared.law, z, by, dt.reshape(dt.shape + trailing), self.axis)
+        return self._raw(prepared, torch.where(loaded, new, 0.0)), self._raw(prepared, zdot)
+
+    def _drive(self, prepared: Prepared, v: Tensor) -> tuple[bristle.Drive, Tensor]:
+        """What drives the bristles, and the velocity that viscous friction sees."""
         raise NotImplementedError
 
-    def _advance(self, prepared: Prepared, z: Tensor, v: Tensor, dt: Tensor) -> tuple[Tensor, Tensor]:
-        """New bristles, and the wrench per unit load."""
+    def _wrench(self, prepared: Prepared, z: Tensor, zdot: Tensor, velocity: Tensor) -> Tensor:
+        """Wrench about the origin, per unit load."""
         raise NotImplementedError
+
+    def _scaled(self, prepared: Prepared, z: Tensor) -> Tensor:
+        """Bristles in the coordinates that the equation of a bristle holds in."""
+        return z
+
+    def _raw(self, prepared: Prepared, z: Tensor) -> Tensor:
+        """Inverse of `_scaled`."""
+        return z
 
     # ------------------------------------------------------------------ inputs
 
@@ -151,4 +192,6 @@ class PlanarLuGre(nn.Module):
     def _law(self, parameters: Tensor) -> Law:
         """The law's parameters, broadcasting with norms of bristles."""
         trailing = (1,) * len(self.components)
-        return Law(*(p.reshape(p.shape + trailing) for p in parameters[..., : len(LAW)].unbind(-1)), self.elasto_plastic)
+        return Law(
+            *(p.reshape(p.shape + trailing) for p in parameters[..., : len(LAW)].unbind(-1)), self.elasto_plastic
+        )

@@ -43,13 +43,13 @@ class Drive(NamedTuple):
     """`u`: velocity of a cell, `h(V) v_n` in the reduced model [m/s]."""
     speed: Tensor
     """`|v|` of a cell, `v_n` in the reduced model [m/s]."""
-    size: Tensor | float
+    size: Tensor
     """`|u|/speed`: 1 for a cell, `|h|` in the reduced model [-]."""
     grip: Tensor
     """`sigma_0/g(speed)` [1/m]."""
 
 
-def drive(law: Law, velocity: Tensor, speed: Tensor, size: Tensor | float) -> Drive:
+def drive(law: Law, velocity: Tensor, speed: Tensor, size: Tensor) -> Drive:
     """The drive of bristles, with the grip at its speed."""
     return Drive(
         velocity, speed, size, law.sigma_0 / formulas.stribeck(xp, speed, law.mu_c, law.mu_s, law.v_s, law.gamma)
@@ -90,9 +90,7 @@ def traction(law: Law, z: Tensor, zdot: Tensor, velocity: Tensor) -> Tensor:
 
 
 def _decay(law: Law, deflection: Tensor, along: Tensor, by: Drive) -> Tensor:
-    return formulas.bristle_decay(
-        xp, deflection, along, by.speed, by.grip, law.elasto_plastic, law.breakaway_ratio
-    )
+    return formulas.bristle_decay(xp, deflection, along, by.speed, by.grip, law.elasto_plastic, law.breakaway_ratio)
 
 
 def _along(z: Tensor, z_norm: Tensor, by: Drive, axis: int) -> Tensor:

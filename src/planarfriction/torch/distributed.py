@@ -66,28 +66,20 @@ class DistributedPlanarLuGre(PlanarLuGre):
         """Contact radius of the patch [m]."""
         return float(self.patch.contact_radius())
 
-    def prepare(self, parameters: Tensor | None) -> Prepared:
+    def prepare(self, parameters: Tensor) -> Prepared:
         """The law and the weights of the cells."""
-        return Prepared(self._law(self._vector(parameters)), (self.weights,))
+        return Prepared(self._law(parameters), (self.weights,))
 
-    def _drive(self, prepared: Prepared, v: Tensor) -> bristle.Drive:
+    def _drive(self, prepared: Prepared, v: Tensor) -> tuple[bristle.Drive, Tensor]:
+        """What drives the bristles, and the velocities of the cells."""
         x, y = self.positions
         vx, vy, omega = v.split(1, -1)
         velocity = torch.stack([vx - omega * y, vy + omega * x], -2)
-        return bristle.drive(prepared.law, velocity, xp.norm(velocity, self.axis), 1.0)
+        speed = xp.norm(velocity, self.axis)
+        return bristle.drive(prepared.law, velocity, speed, torch.ones_like(speed)), velocity
 
     def _wrench(self, prepared: Prepared, z: Tensor, zdot: Tensor, velocity: Tensor) -> Tensor:
         """Wrench about the origin, per unit load."""
         x, y = self.positions
         fx, fy = (bristle.traction(prepared.law, z, zdot, velocity) * prepared.shape[0]).unbind(-2)
         return torch.stack([fx.sum(-1), fy.sum(-1), (x * fy - y * fx).sum(-1)], -1)
-
-    def _evaluate(self, prepared: Prepared, z: Tensor, v: Tensor, load: Tensor) -> tuple[Tensor, Tensor]:
-        by = self._drive(prepared, v)
-        zdot = bristle.rate(prepared.law, z, by, self.axis)
-        return zdot, load[..., None] * self._wrench(prepared, z, zdot, by.velocity)
-
-    def _advance(self, prepared: Prepared, z: Tensor, v: Tensor, dt: Tensor) -> tuple[Tensor, Tensor]:
-        by = self._drive(prepared, v)
-        new, zdot = bristle.step(prepared.law, z, by, dt, self.axis)
-        return new, self._wrench(prepared, new, zdot, by.velocity)

@@ -64,15 +64,14 @@ class ReducedPlanarLuGre(PlanarLuGre):
         """Contact radius of the patch [m]."""
         return float(self.reference._reference.contact_radius)
 
-    def prepare(self, parameters: Tensor | None) -> Prepared:
-        """The law, `S` as a vector, `<rho^2>` and the centre of pressure."""
-        values = self._vector(parameters)
-        radius, second_moment, x, y = values[..., len(LAW) :].split(1, -1)
+    def prepare(self, parameters: Tensor) -> Prepared:
+        """The law, `S` as a vector, `r`, `<rho^2>` and the centre of pressure."""
+        radius, second_moment, x, y = parameters[..., len(LAW) :].split(1, -1)
         scale = torch.cat([torch.ones_like(radius), torch.ones_like(radius), radius], -1)
-        return Prepared(self._law(values), (scale, radius, second_moment, x, y))
+        return Prepared(self._law(parameters), (scale, radius, second_moment, x, y))
 
     def _drive(self, prepared: Prepared, v: Tensor) -> tuple[bristle.Drive, Tensor]:
-        """What drives the scaled bristle, and the velocity that viscous friction sees, `U V`."""
+        """What drives the scaled bristle, and `U V`."""
         _, radius, second_moment, x, y = prepared.shape
         vx, vy, omega = v.split(1, -1)
         vx, vy = vx - omega * y, vy + omega * x
@@ -90,18 +89,11 @@ class ReducedPlanarLuGre(PlanarLuGre):
         fx, fy, tau = bristle.traction(prepared.law, z, zdot, velocity).split(1, -1)
         return _joined(fx, fy, tau + x * fy - y * fx)
 
-    def _evaluate(self, prepared: Prepared, z: Tensor, v: Tensor, load: Tensor) -> tuple[Tensor, Tensor]:
-        scale = prepared.shape[0]
-        by, velocity = self._drive(prepared, v)
-        zdot = scale * bristle.rate(prepared.law, z / scale, by, self.axis)
-        return zdot, load[..., None] * self._wrench(prepared, z, zdot, velocity)
+    def _scaled(self, prepared: Prepared, z: Tensor) -> Tensor:
+        return z / prepared.shape[0]
 
-    def _advance(self, prepared: Prepared, z: Tensor, v: Tensor, dt: Tensor) -> tuple[Tensor, Tensor]:
-        scale = prepared.shape[0]
-        by, velocity = self._drive(prepared, v)
-        new, zdot = bristle.step(prepared.law, z / scale, by, dt, self.axis)
-        new = scale * new
-        return new, self._wrench(prepared, new, scale * zdot, velocity)
+    def _raw(self, prepared: Prepared, z: Tensor) -> Tensor:
+        return z * prepared.shape[0]
 
 
 def _joined(*components: Tensor) -> Tensor:

@@ -55,21 +55,11 @@ def rollout(
     """
     validation.choice("method", method or "eager", METHODS)
     v_profile = model._number(v_profile)
-    if v_profile.ndim < 2 or v_profile.shape[-1] != 3:
-        raise InvalidValueError("v_profile", "have shape [..., T, 3]", f"shape {list(v_profile.shape)}")
+    if v_profile.ndim < 2 or v_profile.shape[-1] != 3 or v_profile.shape[-2] == 0:
+        raise InvalidValueError("v_profile", "have shape [..., T, 3] with T > 0", f"shape {list(v_profile.shape)}")
     loads = model._number(f_n)
     start = model.rest() if z is None else z
-    return _eager(model, start, v_profile, loads, model._number(dt), parameters)
-
-
-def _eager(model, z, v_profile, loads, dt, parameters) -> Rollout:
-    prepared = model.prepare(parameters)
-    loads = loads.expand(torch.broadcast_shapes(loads.shape, v_profile.shape[-2:-1]))
-    wrenches = []
-    for v, load in zip(v_profile.unbind(-2), loads.unbind(-1), strict=True):
-        z, wrench = model.advance(prepared, z, v, load, dt)
-        wrenches.append(wrench)
-    return Rollout(torch.stack(wrenches, -2), z)
+    return Rollout(*model.roll_out(parameters, start, v_profile, loads, model._number(dt)))
 
 
 def tracking_loss(
@@ -85,5 +75,5 @@ def tracking_loss(
     loaded = load > 0.0
     lever = load.new_tensor([1.0, 1.0, model.lever])
     error = torch.where(loaded, (wrenches - reference) / (torch.where(loaded, load, 1.0) * lever), 0.0)
-    count = loaded.expand(torch.broadcast_shapes(loaded.shape, error.shape[:-1] + (1,))).sum()
+    count = loaded.expand(torch.broadcast_shapes(loaded.shape, (*error.shape[:-1], 1))).sum()
     return (error * error).sum() / count.clamp(min=1)

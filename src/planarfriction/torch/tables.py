@@ -1,7 +1,7 @@
 """Lookup in stored limit surfaces, with the analytic derivative of `kernels.surfaces` as its backward pass.
 
-A direction `V_S/|V_S|` with `s >= 0` has a polar angle from the spin axis and an azimuth; `u` is homogeneous of degree 1
-in `V_S`, so that `du/dV_S = h (x) radial + dh/dpolar (x) along + dh/dazimuth/sin(polar) (x) across`.
+A direction `V_S/|V_S|` with `s >= 0` has a polar angle from the spin axis and an azimuth; `u` is homogeneous of degree
+1 in `V_S`, so that `du/dV_S = h (x) radial + dh/dpolar (x) along + dh/dazimuth/sin(polar) (x) across`.
 """
 
 from __future__ import annotations
@@ -79,7 +79,6 @@ class _Lookup(torch.autograd.Function):
     @staticmethod
     def setup_context(ctx, inputs, output):
         ctx.save_for_backward(*inputs)
-        ctx.save_for_forward(*inputs)
 
     @classmethod
     def slope(cls, scaled: Tensor, nodes: Tensor, tilt: Tensor) -> Tensor:
@@ -120,11 +119,6 @@ class Bilinear(_Lookup):
     def backward(ctx, *bars):
         """Vector-Jacobian product."""
         return (bars[0][..., None, :] @ Bilinear.slope(*ctx.saved_tensors))[..., 0, :], None, None
-
-    @staticmethod
-    def jvp(ctx, *tangents):
-        """Jacobian-vector product."""
-        return (Bilinear.slope(*ctx.saved_tensors) @ tangents[0][..., None])[..., 0]
 
 
 class Potential(_Lookup):
@@ -172,11 +166,6 @@ class Potential(_Lookup):
     def backward(ctx, *bars):
         """Vector-Jacobian product."""
         return (bars[0][..., None, :] @ Potential.slope(*ctx.saved_tensors))[..., 0, :], None, None
-
-    @staticmethod
-    def jvp(ctx, *tangents):
-        """Jacobian-vector product."""
-        return (Potential.slope(*ctx.saved_tensors) @ tangents[0][..., None])[..., 0]
 
 
 def _tilt(tilt: Tensor, unit: Tensor) -> tuple[Tensor, Tensor]:
