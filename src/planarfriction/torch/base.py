@@ -115,13 +115,13 @@ class PlanarLuGre(nn.Module):
     def advance(self, prepared: Prepared, z: Tensor, v: Tensor, load: Tensor, dt: Tensor) -> tuple[Tensor, Tensor]:
         """`step` of checked inputs."""
         by, velocity = self._drive(prepared, v)
-        new, zdot = self._advance(prepared, z, by, load, dt)
-        return new, load[..., None] * self._wrench(prepared, new, zdot, velocity)
+        new, zdot = self._advance(prepared, z, by, dt)
+        return self._kept(new, load), load[..., None] * self._wrench(prepared, new, zdot, velocity)
 
     def roll_out(
         self, parameters: Tensor | None, z: Tensor, v: Tensor, load: Tensor, dt: Tensor
     ) -> tuple[Tensor, Tensor]:
-        """`advance` through the twists `[..., T, 3]`: all wrenches `[..., T, 3]` and the last state.
+        """`advance` through twists `[..., T, 3]` and loads `[..., T]`: all wrenches `[..., T, 3]` and the last state.
 
         Only the bristles go step by step; what drives them and what they cause is worked out for all steps at once.
         """
@@ -130,25 +130,25 @@ class PlanarLuGre(nn.Module):
         by, velocity = self._drive(steps, v)
         inner = len(self.components)
         drives = zip(*(part.unbind(part.ndim - inner - 1) for part in by), strict=True)
-        loads = load.expand(torch.broadcast_shapes(load.shape, v.shape[-2:-1]))
         states, rates = [], []
-        for drive, f_n in zip(drives, loads.unbind(-1), strict=True):
-            z, zdot = self._advance(once, z, bristle.Drive(*drive), f_n, dt)
-            states.append(z)
+        for drive, f_n in zip(drives, load.unbind(-1), strict=True):
+            new, zdot = self._advance(once, z, bristle.Drive(*drive), dt)
+            states.append(new)
             rates.append(zdot)
+            z = self._kept(new, f_n)
         along = -inner - 1
         wrenches = self._wrench(steps, torch.stack(states, along), torch.stack(rates, along), velocity)
         return load[..., None] * wrenches, z
 
-    def _advance(
-        self, prepared: Prepared, z: Tensor, by: bristle.Drive, load: Tensor, dt: Tensor
-    ) -> tuple[Tensor, Tensor]:
-        """Bristles and their rates after a step; those of a contact without load are forgotten."""
-        trailing = (1,) * len(self.components)
-        loaded = (load > 0.0).reshape(load.shape + trailing)
-        z = self._scaled(prepared, z)
-        new, zdot = bristle.step(prepared.law, z, by, dt.reshape(dt.shape + trailing), self.axis)
-        return self._raw(prepared, torch.where(loaded, new, 0.0)), self._raw(prepared, zdot)
+    def _advance(self, prepared: Prepared, z: Tensor, by: bristle.Drive, dt: Tensor) -> tuple[Tensor, Tensor]:
+        """Bristles and their rates after a step."""
+        dt = dt.reshape(dt.shape + (1,) * len(self.components))
+        new, zdot = bristle.step(prepared.law, self._scaled(prepared, z), by, dt, self.axis)
+        return self._raw(prepared, new), self._raw(prepared, zdot)
+
+    def _kept(self, z: Tensor, load: Tensor) -> Tensor:
+        """Bristles that a contact keeps: one without load forgets them."""
+        return torch.where((load > 0.0).reshape(load.shape + (1,) * len(self.components)), z, 0.0)
 
     def _drive(self, prepared: Prepared, v: Tensor) -> tuple[bristle.Drive, Tensor]:
         """What drives the bristles, and the velocity that viscous friction sees."""

@@ -20,13 +20,11 @@ import torch
 from torch import Tensor, nn
 
 from planarfriction import validation
+from planarfriction.autodiff import PARAMETERS
 from planarfriction.errors import InvalidValueError
 
-LAW = ("sigma_0", "sigma_1", "sigma_2", "mu_c", "mu_s", "v_s", "gamma", "breakaway_ratio")
-"""Parameters of the friction law, in the order of the vector."""
-
-SHAPE = ("contact_radius", "second_moment", "centre_x", "centre_y")
-"""What the reduced model knows of the patch, in the order of the vector."""
+LAW = PARAMETERS[:8]
+"""Parameters of the friction law; the others describe the shape of the patch."""
 
 _POSITIVE = ("sigma_0", "mu_c", "v_s", "gamma", "contact_radius", "second_moment")
 _LARGEST_EXPONENT = 30.0

@@ -176,19 +176,23 @@ def _tilt(tilt: Tensor, unit: Tensor) -> tuple[Tensor, Tensor]:
 
 
 def _hermite(t: Tensor) -> Tensor:
-    """Cubic Hermite basis on [0, 1] `[..., derivative, 4]`: order value 0, value 1, slope 0, slope 1."""
-    u = 1.0 - t
-    value = ((1.0 + 2.0 * t) * u * u, t * t * (3.0 - 2.0 * t), t * u * u, -t * t * u)
-    first = (-6.0 * t * u, 6.0 * t * u, u * (1.0 - 3.0 * t), t * (3.0 * t - 2.0))
-    second = (12.0 * t - 6.0, 6.0 - 12.0 * t, 6.0 * t - 4.0, 6.0 * t - 2.0)
+    """Cubic Hermite basis on [0, 1] `[..., derivative, 4]`: of value 0, of value 1 less value 0, of slope 0 and 1."""
+    u, one = 1.0 - t, torch.ones_like(t)
+    value = (one, t * t * (3.0 - 2.0 * t), t * u * u, -t * t * u)
+    first = (0.0 * one, 6.0 * t * u, u * (1.0 - 3.0 * t), t * (3.0 * t - 2.0))
+    second = (0.0 * one, 6.0 - 12.0 * t, 6.0 * t - 4.0, 6.0 * t - 2.0)
     return torch.stack([torch.stack(basis, -1) for basis in (value, first, second)], -2)
 
 
 def _blends(place: Place, orders: tuple[tuple[int, int], ...]) -> list[Tensor]:
     """Derivatives `[...]` of the bicubic patch, of the given orders along polar angle and azimuth."""
     segment = place.segment
-    by_slope = place.corners.unflatten(-1, (2, 2))  # [..., i, j, azimuth slope, polar slope]
-    by_slope = by_slope.movedim((-1, -4, -2, -3), (-4, -3, -2, -1)).flatten(-4, -3).flatten(-2, -1)
-    scale = by_slope.new_tensor([1.0, 1.0, segment, segment])
-    patch = _hermite(place.a) @ (by_slope * scale * scale[:, None]) @ _hermite(place.b).mT
+    patch = place.corners.unflatten(-1, (2, 2))  # [..., i, j, azimuth slope, polar slope]
+    patch = patch.movedim((-1, -4, -2, -3), (-4, -3, -2, -1)).flatten(-4, -3).flatten(-2, -1)
+    scale = patch.new_tensor([1.0, 1.0, segment, segment])
+    first, second, *slopes = (patch * scale * scale[:, None]).unbind(-1)
+    patch = torch.stack([first, second - first, *slopes], -1)
+    first, second, *slopes = patch.unbind(-2)
+    patch = torch.stack([first, second - first, *slopes], -2)
+    patch = _hermite(place.a) @ patch @ _hermite(place.b).mT
     return [patch[..., i, j] / segment ** (i + j) for i, j in orders]
