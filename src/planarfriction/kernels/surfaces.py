@@ -192,7 +192,7 @@ def _potential_jacobian(data, start, size, x, y, s, out):
         h = phi * radial[i] + d_p * along[i] + h_across * across[i] + n[i] - 2.0 * c * radial[i]
         to_radial = h + 8.0 * c * radial[i] - 2.0 * n[i]
         to_along, to_across = m_pp * along[i] + m_pa * across[i], m_pa * along[i] + m_aa * across[i]
-        to_axis = 2.0 * cos_p * lean[i] + n[2] / cos_p * axis[i] if cos_p > 0.0 else 0.0
+        to_axis = 2.0 * cos_p * lean[i] + 2.0 * (lean[0] * radial[0] + lean[1] * radial[1]) * axis[i]
         for j in range(3):
             out[3 * i + j] = to_radial * radial[j] + to_along * along[j] + to_across * across[j]
             out[3 * i + j] += to_axis * axis[j] - 2.0 * radial[i] * n[j] + 2.0 * cos_p * axis[i] * lean[j]

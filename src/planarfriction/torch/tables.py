@@ -154,9 +154,7 @@ class Potential(_Lookup):
         m_pp = phi + d_pp
         m_pa = (d_pa - d_a * cos_p / sin_p) / sin_p
         m_aa = phi + (d_p * cos_p + d_aa / sin_p) / sin_p
-        upper = cos_p > 0.0
-        bend = torch.where(upper, n[..., 2:] / torch.where(upper, cos_p, 1.0), 0.0) * axis[2]
-        to_axis = torch.where(upper, 2.0 * cos_p * lean + bend, 0.0)
+        to_axis = 2.0 * cos_p * lean + 2.0 * (radial @ lean)[..., None] * axis[2]
         result = _outer(h + 8.0 * c * radial - 2.0 * n, radial)
         result = result + _outer(m_pp * along + m_pa * across, along) + _outer(m_pa * along + m_aa * across, across)
         result = result + _outer(to_axis, axis[2]) - 2.0 * _outer(radial, n) + 2.0 * _outer(cos_p * axis[2], lean)
