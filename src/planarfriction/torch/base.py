@@ -12,6 +12,7 @@ from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels.law import law_numbers
 from planarfriction.laws import ElastoPlastic, LuGre
+from planarfriction.models.base import FrictionModel
 from planarfriction.patch import ContactPatch
 from planarfriction.torch import bristle
 from planarfriction.torch.bristle import Law
@@ -42,6 +43,8 @@ class PlanarLuGre(nn.Module):
     axis: int
     """Axis of the components of a bristle."""
     physical: PhysicalParameters
+    reference: FrictionModel
+    """The same model in NumPy, with the parameters that this one started with."""
 
     def __init__(self, patch: ContactPatch, law: LuGre) -> None:
         super().__init__()

@@ -5,7 +5,7 @@ One code for both models: a bristle lies along `axis`, three components of the r
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor
@@ -100,7 +100,7 @@ def _along(z: Tensor, z_norm: Tensor, by: Drive, axis: int) -> Tensor:
     return torch.where(deflected, stretch, 0.0)
 
 
-def _back(deflection: Tensor, largest: Tensor) -> Tensor:
+def _back(deflection: Tensor, largest: Any) -> Any:
     """Factor that brings bristles back onto the ball they may not leave; rounding is no excess."""
     margin = 1.0 + ROUNDING * torch.finfo(deflection.dtype).eps
     return formulas.cap(xp, torch.where(deflection > margin * largest, deflection, 0.0), largest)

@@ -10,6 +10,7 @@ from torch import Tensor, nn
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels.law import law_numbers
 from planarfriction.laws import LuGre
+from planarfriction.models import DistributedModel
 from planarfriction.patch import ContactPatch
 from planarfriction.torch import bristle
 from planarfriction.torch import namespace as xp
@@ -45,6 +46,7 @@ class DistributedPlanarLuGre(PlanarLuGre):
         super().__init__(patch, law)
         if patch.depends_on_load:
             raise InvalidValueError("patch", "have a shape that does not depend on the load", patch.name)
+        self.reference = DistributedModel(patch, law)
         self.components = (2, patch.cells)
         kind = {"dtype": dtype or torch.get_default_dtype(), "device": device}
         numbers, chosen = law_numbers(law)._asdict(), tuple(trainable)

@@ -36,6 +36,7 @@ class ReducedPlanarLuGre(PlanarLuGre):
 
     components = (3,)
     axis = -1
+    reference: ReducedModelPublished
 
     def __init__(
         self,

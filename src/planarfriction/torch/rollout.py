@@ -81,7 +81,6 @@ def rollout(
         raise InvalidValueError("method", f"be 'eager' {obstacle}", repr(method))
     if method == "eager" or obstacle:
         return Rollout(*model.roll_out(parameters, start, v_profile, loads, step))
-    assert isinstance(model, ReducedPlanarLuGre)
     return Rollout(*adjoint.roll_out(model.reference, float(step), start, v_profile, loads, model._vector(parameters)))
 
 

@@ -51,10 +51,10 @@ class Cells(Surface):
     def sliding(self, scaled: Tensor, speed: Tensor) -> Tensor:
         """A cell that stands in the centre of rotation adds nothing."""
         x, y, weights = self.cells
-        vx, vy, spin = scaled.split(1, -1)
+        vx, vy, spin = (scaled / speed).split(1, -1)
         ux, uy = vx - spin * y, vy + spin * x
         square = ux * ux + uy * uy
-        slides = square > (_at_rest(square.dtype) * speed) ** 2
+        slides = square > _at_rest(square.dtype) ** 2
         share = torch.where(slides, weights / torch.sqrt(torch.where(slides, square, 1.0)), 0.0)
         sums = [(share * part).sum(-1) for part in (ux, uy, x * uy - y * ux)]
         return torch.stack(sums, -1) * speed
