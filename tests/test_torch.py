@@ -128,7 +128,7 @@ def test_one_contact_and_batches_that_broadcast():
 
 
 def test_a_patch_whose_shape_follows_the_load_keeps_the_shape_of_its_surface():
-    patch = pf.ContactPatch.disc(0.01, cells=9, pressure=pf.SoftFinger(0.005, n=1 / 3, k=2.0))
+    patch = pf.ContactPatch.disc(0.01, cells=9, pressure=pf.SoftFinger(c=0.005, n=1 / 3, k=2.0))
     surface = pf.LimitSurfaceTable(patch, normal_force=2.0)
     model = ReducedPlanarLuGre(patch, PLAIN, surface, dtype=torch.float64)
     reference = pf.ReducedModelPublished(patch, PLAIN, surface, on_load_change="keep")
@@ -147,9 +147,7 @@ def test_float32_is_as_close_as_its_digits(surface):
     z, wrench = single.step(*(tensor(a).float() for a in (state, twist, load)), 1e-4)
     assert z.dtype == wrench.dtype == torch.float32
     exact = reduced(surface=surface).step(tensor(state), tensor(twist), tensor(load), 1e-4)[1]
-    assert (
-        (wrench - exact).abs().max() / exact.abs().max()
-    ).item() < 2e-4  # 1e-7, times the slope of the slip fraction
+    assert ((wrench - exact).abs().max() / exact.abs().max()).item() < 2e-4  # 1e-7 times steep slopes
 
 
 # ---------------------------------------------------------------------------------------- parameters
