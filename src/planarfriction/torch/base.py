@@ -195,6 +195,5 @@ class PlanarLuGre(nn.Module):
     def _law(self, parameters: Tensor) -> Law:
         """The law's parameters, broadcasting with norms of bristles."""
         trailing = (1,) * len(self.components)
-        return Law(
-            *(p.reshape(p.shape + trailing) for p in parameters[..., : len(LAW)].unbind(-1)), self.elasto_plastic
-        )
+        values = [value.reshape(value.shape + trailing) for value in parameters[..., : len(LAW)].unbind(-1)]
+        return Law(*values, elasto_plastic=self.elasto_plastic)  # pyright: ignore[reportCallIssue]

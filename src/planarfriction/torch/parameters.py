@@ -31,11 +31,6 @@ _LARGEST_EXPONENT = 30.0
 """A positive value stays within a factor e^30 = 1e13 of where it started, so that none overflows or becomes zero."""
 
 
-def _magnitude(raw: Tensor) -> Tensor:
-    """`|w|`, with the slope 1 at 0."""
-    return torch.where(raw >= 0.0, raw, -raw)
-
-
 class PhysicalParameters(nn.Module):
     """Named physical values: those in `trainable` are `nn.Parameter`s in `raw`, the rest are fixed."""
 
@@ -43,14 +38,33 @@ class PhysicalParameters(nn.Module):
     """The values as last set, `[P]`."""
     scale: Tensor
     """Physical size of a raw step of 1, where it has one, `[P]`."""
+    places: Tensor
+    """Where the raw numbers stand in the vector, `[number of trainable ones]`."""
+    grows: Tensor
+    """Which values are `p_0 exp(w)`, bool `[P]`."""
+    moves: Tensor
+    """Which values are `p_0 + scale w`, bool `[P]`."""
+    folds: Tensor
+    """Which values are `scale |w|`, bool `[P]`."""
 
     def __init__(self, values: Mapping[str, float], trainable: Iterable[str], **kind):
         super().__init__()
         self.names = tuple(values)
-        chosen = [validation.choice("trainable", name, self.names) for name in trainable]
+        chosen = dict.fromkeys(validation.choice("trainable", name, self.names) for name in trainable)
         self.register_buffer("values", torch.zeros(len(self.names), **kind))
         self.register_buffer("scale", torch.ones(len(self.names), **kind))
         self.raw = nn.ParameterDict({name: nn.Parameter(torch.zeros((), **kind)) for name in chosen})
+        device = self.values.device
+        places = torch.tensor([self.names.index(name) for name in self.raw], dtype=torch.long, device=device)
+        self.register_buffer("places", places, persistent=False)
+        bounded = "mu_c" if "mu_s" not in chosen else ""  # a mu_c below a fixed mu_s has a rule of its own
+        for rule, members in {
+            "grows": set(_POSITIVE) - {bounded},
+            "moves": {"centre_x", "centre_y"},
+            "folds": {"sigma_1", "sigma_2"},
+        }.items():
+            mask = torch.tensor([name in chosen and name in members for name in self.names], device=device)
+            self.register_buffer(rule, mask, persistent=False)
         self.set(values)
 
     @torch.no_grad()
@@ -68,27 +82,29 @@ class PhysicalParameters(nn.Module):
 
     def forward(self) -> Tensor:
         """The physical values `[P]`, in the order of `names`."""
-        fixed = dict(zip(self.names, self.values.unbind(), strict=True))
-        scale = dict(zip(self.names, self.scale.unbind(), strict=True))
-        now = {name: self._value(name, fixed, scale) for name in self.names}
+        if not self.raw:
+            return self.values
+        raw = torch.zeros_like(self.values).index_copy(0, self.places, torch.stack(list(self.raw.values())))
+        size = self.scale * torch.where(raw >= 0.0, raw, -raw)  # |w| with the slope 1 at 0
+        exponent = torch.where(self.grows, raw.clamp(-_LARGEST_EXPONENT, _LARGEST_EXPONENT), 0.0)
+        now = self.values * torch.exp(exponent)
+        now = torch.where(self.folds, size, now + torch.where(self.moves, self.scale * raw, 0.0))
         if "mu_s" in self.raw:
-            now["mu_s"] = now["mu_c"] * (1.0 + scale["mu_s"] * _magnitude(self.raw["mu_s"]))
+            now = self._with(now, "mu_s", self._of(now, "mu_c") * (1.0 + self._of(size, "mu_s")))
         elif "mu_c" in self.raw:  # below the fixed mu_s
-            now["mu_c"] = fixed["mu_s"] / (1.0 + scale["mu_c"] * _magnitude(self.raw["mu_c"]))
-        return torch.stack(list(now.values()))
+            now = self._with(now, "mu_c", self._of(now, "mu_s") / (1.0 + self._of(size, "mu_c")))
+        if "breakaway_ratio" in self.raw:
+            below_one = 1.0 - 16.0 * torch.finfo(now.dtype).eps
+            ratio = (1.0 - torch.exp(-self._of(size, "breakaway_ratio"))).clamp(max=below_one)
+            now = self._with(now, "breakaway_ratio", ratio)
+        return now
 
-    def _value(self, name: str, fixed: dict[str, Tensor], scale: dict[str, Tensor]) -> Tensor:
-        if name not in self.raw:
-            return fixed[name]
-        raw = self.raw[name]
-        if name in _POSITIVE:
-            return fixed[name] * torch.exp(raw.clamp(-_LARGEST_EXPONENT, _LARGEST_EXPONENT))
-        if name == "breakaway_ratio":
-            below_one = 1.0 - 16.0 * torch.finfo(raw.dtype).eps
-            return (1.0 - torch.exp(-scale[name] * _magnitude(raw))).clamp(max=below_one)
-        if name.startswith("centre"):
-            return fixed[name] + scale[name] * raw
-        return scale[name] * _magnitude(raw)
+    def _of(self, vector: Tensor, name: str) -> Tensor:
+        return vector[self.names.index(name)]
+
+    def _with(self, vector: Tensor, name: str, value: Tensor) -> Tensor:
+        i = self.names.index(name)
+        return torch.cat([vector[:i], value[None], vector[i + 1 :]])
 
 
 def _raw(name: str, values: Mapping[str, float], *, fixed_static: bool) -> tuple[float, float]:
