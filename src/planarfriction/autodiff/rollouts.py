@@ -12,7 +12,7 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.autodiff.parameters import COLUMNS, PARAMETERS, Packed, pack
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels import reduced_adjoint as kernels
+from planarfriction.kernels import reduced_adjoint, reduced_rollout
 
 _WORTH_A_THREAD = 20_000
 """Steps [-] below which starting a thread costs more than it saves."""
@@ -115,10 +115,12 @@ def rollout_gradient(
     if state_bar is not None:
         z_bar[:] = _rows("state_bar", state_bar, (3,), inputs.batch)
     twists_bar, loads_bar = np.empty((count, steps, 3)), np.empty((count, steps))
-    rows_bar = np.zeros((count, kernels.NUMBERS))
+    rows_bar = np.zeros((count, reduced_adjoint.NUMBERS))
     arguments = inputs.rows, inputs.packed.surface, inputs.packed.data, on_the_way, inputs.twists, inputs.loads
     results = z_bar, twists_bar, loads_bar, rows_bar
-    _share(inputs, lambda first, last: kernels.gradient(*arguments, inputs.dt, cotangents, first, last, *results))
+    _share(
+        inputs, lambda first, last: reduced_rollout.gradient(*arguments, inputs.dt, cotangents, first, last, *results)
+    )
     given = parameters if parameters is not None else inputs.packed.rows[..., COLUMNS]
     return RolloutGradient(
         *(
@@ -153,7 +155,9 @@ def rollout_sensitivities(
     slopes = np.empty((*wrenches.shape, len(columns)))
     end = inputs.state.copy()
     arguments = inputs.rows, inputs.packed.surface, inputs.packed.data, end, inputs.twists, inputs.loads, inputs.dt
-    _share(inputs, lambda first, last: kernels.sensitivities(*arguments, columns, first, last, wrenches, slopes))
+    _share(
+        inputs, lambda first, last: reduced_adjoint.sensitivities(*arguments, columns, first, last, wrenches, slopes)
+    )
     return wrenches.reshape(*inputs.batch, *wrenches.shape[1:]), slopes.reshape(*inputs.batch, *slopes.shape[1:])
 
 
@@ -162,7 +166,7 @@ def _roll(inputs: _Inputs, kept: int) -> tuple[np.ndarray, np.ndarray, np.ndarra
     count, end = len(inputs.state), inputs.state.copy()
     wrenches, states = np.empty((count, len(inputs.dt), 3)), np.empty((count, kept, 3))
     arguments = inputs.rows, inputs.packed.surface, inputs.packed.data, end, inputs.twists, inputs.loads, inputs.dt
-    _share(inputs, lambda first, last: kernels.rollout(*arguments, first, last, wrenches, states))
+    _share(inputs, lambda first, last: reduced_rollout.rollout(*arguments, first, last, wrenches, states))
     return wrenches, end, states
 
 
@@ -198,7 +202,7 @@ def _checked(model: Any, state: Any, twists: Any, loads: Any, dt: Any, parameter
     count = int(np.prod(batch))
     return _Inputs(
         packed,
-        _rows("parameters", packed.rows, (kernels.NUMBERS,), batch),
+        _rows("parameters", packed.rows, (reduced_adjoint.NUMBERS,), batch),
         np.broadcast_to(state, (*batch, 3)).reshape(count, 3),
         _rows("twists", twists, (steps, 3), batch),
         _rows("loads", loads, (steps,), batch),
