@@ -86,6 +86,8 @@ def _stage(law, place, deflection, v, q):
     k, k_deflection, k_along, k_speed = formulas.bristle_decay_partials(
         xp, deflection, place[5], v, q, law.elasto_plastic, law.breakaway_ratio
     )
+    # exactly zero at full deflection: the prediction multiplies it by how far it would have gone, 1e9 in a long step
+    k_deflection = xp.where(deflection < 1.0, k_deflection, 0.0)
     k_breakaway = formulas.bristle_decay_by_breakaway(xp, k_deflection, deflection, law.breakaway_ratio)
     return Stage(
         place[0], place[1], place[2], place[3], place[4], place[5],
