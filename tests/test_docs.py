@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
-import importlib
+import importlib.util
 import io
 import pkgutil
 import re
@@ -20,6 +20,8 @@ ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")] + sorted(
     (ROOT / "docs").glob("*.md")
 )
+OPTIONAL = ("torch", "jax")
+"""Packages behind an extra; `planarfriction.torch` and `planarfriction.jax` carry their names."""
 MODULES = {module.name for module in pkgutil.iter_modules(planarfriction.__path__)}
 
 FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -38,15 +40,29 @@ class Block(NamedTuple):
     line: int
     follows_python: bool
     """Nothing but blank lines is between this block and the Python before it."""
+    section: int
+    """Number of `##` headings before it."""
 
 
 def blocks(page: Path) -> list[Block]:
     text, result, end, before = page.read_text(encoding="utf-8"), [], 0, ""
     for match in FENCE.finditer(text):
         line = text.count("\n", 0, match.start()) + 2
-        result.append(Block(match[1], match[2], line, before == "python" and not text[end : match.start()].strip()))
+        follows = before == "python" and not text[end : match.start()].strip()
+        result.append(Block(match[1], match[2], line, follows, text.count("\n## ", 0, match.start())))
         end, before = match.end(), match[1]
     return result
+
+
+def missing_packages(page: Path) -> dict[int, str]:
+    """Sections whose Python needs an optional package that is not installed, and which."""
+    return {
+        block.section: package
+        for block in blocks(page)
+        for package in OPTIONAL
+        if re.search(rf"^(import|from) (planarfriction\.)?{package}\b", block.text, re.MULTILINE)
+        and importlib.util.find_spec(package) is None
+    }
 
 
 def prose(page: Path) -> str:
@@ -67,8 +83,9 @@ def test_the_python_of_a_page_runs_and_prints_what_the_page_says(page, tmp_path,
     """In order, in one namespace, in an empty folder.
 
     A block whose first line is `# name.toml` (or .csv) is written to that file; a `text` block right after Python is
-    what the Python prints, to the last character.
+    what the Python prints, to the last character. Sections that need an optional package are left out without it.
     """
+    missing = missing_packages(page)
     monkeypatch.chdir(tmp_path)
     namespace: dict = {"__name__": page.stem}
     printed = ""
@@ -76,6 +93,8 @@ def test_the_python_of_a_page_runs_and_prints_what_the_page_says(page, tmp_path,
     matplotlib.use("Agg")
     try:
         for block in blocks(page):
+            if block.section in missing:
+                continue
             if block.language == "python":
                 output = io.StringIO()
                 code = compile("\n" * (block.line - 1) + block.text, str(page), "exec")
@@ -88,6 +107,8 @@ def test_the_python_of_a_page_runs_and_prints_what_the_page_says(page, tmp_path,
                 Path(match[1]).write_text(block.text, encoding="utf-8")
     finally:
         matplotlib.use(backend)
+    if missing:
+        pytest.skip(f"sections that need {', '.join(sorted(set(missing.values())))}, which is not installed")
 
 
 @pytest.mark.parametrize("page", PAGES, ids=ids)
@@ -126,6 +147,9 @@ def test_names_exist(page):
     equations = "".join(block.text for block in blocks(page) if not block.language)
     for name in NAME.findall(prose(page)) + BARE_NAME.findall(equations):
         first, _, rest = name.partition(".")
+        package = rest.partition(".")[0] if first in ("pf", "planarfriction") else first
+        if package in OPTIONAL and (package == first or importlib.util.find_spec(package) is None):
+            continue  # a name of that package itself, or one that cannot be looked up without it
         if first in ("pf", "planarfriction"):
             assert resolve(rest), f"{page.name}: {name}"
         elif (first in MODULES or first in planarfriction.__all__) and not name.endswith((".py", ".md")):

@@ -10,7 +10,8 @@ A bristle `z` driven by `u` (three components; a cell of the distributed model l
 its `k` into those of `z`, `u`, `v`, `h`, `q` and the breakaway ratio.
 
 At the kinks: the slope of a norm at zero is zero, and `along` of no bristle is constant. A minimum or maximum of equal
-numbers has the slope of its first argument. A bristle that the cap just touches counts as not capped.
+numbers has the slope of its first argument. A bristle that the cap just touches counts as not capped: steady sliding
+sits on the cap to the last bit, and whether rounding lifts it over must not decide about its slope.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from typing import NamedTuple
 from planarfriction import formulas
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import inlined
+
+_ROUNDING = 1.0 + 256.0 * 2.220446049250313e-16
 
 
 class Stage(NamedTuple):
@@ -83,6 +86,8 @@ def _stage(law, place, deflection, v, q):
     k, k_deflection, k_along, k_speed = formulas.bristle_decay_partials(
         xp, deflection, place[5], v, q, law.elasto_plastic, law.breakaway_ratio
     )
+    # exactly zero at full deflection: the prediction multiplies it by how far it would have gone, 1e9 in a long step
+    k_deflection = xp.where(deflection < 1.0, k_deflection, 0.0)
     k_breakaway = formulas.bristle_decay_by_breakaway(xp, k_deflection, deflection, law.breakaway_ratio)
     return Stage(
         place[0], place[1], place[2], place[3], place[4], place[5],
@@ -110,7 +115,7 @@ def linearise(law, zx, zy, zs, ux, uy, us, v, per_h, q, dt):
     nx, ny, ns = left * zx + push * ux, left * zy + push * uy, left * zs + push * us
     place = _place(nx, ny, ns, ux, uy, us, per_h)
     largest = formulas.reachable_deflection(xp, deflection, law.elasto_plastic)
-    capped = place[3] * to_deflection > largest
+    capped = place[3] * to_deflection > _ROUNDING * largest
     back = formulas.cap(xp, place[3] * to_deflection, largest)
     end = _stage(law, place, place[3] * back * to_deflection, v, q)
     return BristleStep(

@@ -1,0 +1,24 @@
+"""The friction models for PyTorch: modules with trainable physical parameters, and differentiable roll-outs.
+
+Needs PyTorch: `pip install 'planarfriction[torch]'`.
+"""
+
+try:
+    import torch as _torch  # noqa: F401
+except ImportError:
+    from planarfriction.errors import MissingExtraError
+
+    raise MissingExtraError("torch", "torch") from None
+
+from planarfriction.torch.distributed import DistributedPlanarLuGre
+from planarfriction.torch.reduced import ReducedPlanarLuGre
+from planarfriction.torch.rollout import Rollout, rollout, simulate, tracking_loss
+
+__all__ = [
+    "DistributedPlanarLuGre",
+    "ReducedPlanarLuGre",
+    "Rollout",
+    "rollout",
+    "simulate",
+    "tracking_loss",
+]

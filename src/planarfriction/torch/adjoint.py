@@ -1,0 +1,101 @@
+"""The compiled roll-out and its discrete adjoint as functions of PyTorch: processor tensors, first derivatives."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import torch
+from torch import Tensor
+
+from planarfriction import autodiff
+from planarfriction.errors import FrictionError
+
+_INNER = (1, 2, 1, 1)
+"""Axes of state `[3]`, twists `[T, 3]`, loads `[T]` and parameters `[P]` behind the batch axes."""
+
+
+def roll_out(reference: Any, dt: float, *inputs: Tensor) -> tuple[Tensor, Tensor]:
+    """Wrenches `[..., T, 3]` and the last state `[..., 3]` of `autodiff.rollout`.
+
+    `reference` is the NumPy model; `inputs` are state `[..., 3]`, twists `[..., T, 3]`, loads `[..., T]` and parameters
+    `[..., P]`, whose batch axes broadcast.
+    """
+    return _Rollout.apply(reference, dt, *inputs)  # pyright: ignore[reportReturnType]
+
+
+class _Rollout(torch.autograd.Function):
+    @staticmethod
+    def forward(reference, dt, *inputs):
+        state, twists, loads, parameters = map(_to_numpy, inputs)
+        result = autodiff.rollout(reference, state, twists, loads, dt, parameters)
+        return tuple(_like(array, inputs) for array in result)
+
+    @staticmethod
+    def setup_context(ctx, inputs, output):
+        ctx.reference, ctx.dt = inputs[:2]
+        ctx.save_for_backward(*inputs[2:])
+
+    @staticmethod
+    def backward(ctx, *bars):
+        return (None, None, *_Gradient.apply(ctx.reference, ctx.dt, *ctx.saved_tensors, *bars))  # pyright: ignore
+
+    @staticmethod
+    def vmap(info, in_dims, reference, dt, *inputs):
+        return _Rollout.apply(reference, dt, *_aligned(info.batch_size, in_dims[2:], inputs, _INNER)), (0, 0)
+
+
+class _Gradient(torch.autograd.Function):
+    """Cotangents of the inputs from those of wrenches and last state; itself without derivative."""
+
+    @staticmethod
+    def forward(reference, dt, *tensors):
+        state, twists, loads, parameters, wrenches_bar, state_bar = map(_to_numpy, tensors)
+        gradient = autodiff.rollout_gradient(
+            reference, state, twists, loads, dt, wrenches_bar, state_bar, parameters
+        )  # fmt: skip
+        return tuple(_like(array, (tensor,)) for array, tensor in zip(gradient, tensors[:4], strict=True))
+
+    @staticmethod
+    def setup_context(ctx, inputs, output):
+        pass
+
+    @staticmethod
+    def backward(ctx, *bars):
+        raise FrictionError("the adjoint gives first derivatives: take method='eager' to differentiate twice")
+
+    @staticmethod
+    def vmap(info, in_dims, reference, dt, *tensors):
+        size = info.batch_size
+        aligned = _aligned(size, in_dims[2:], tensors, (*_INNER, 2, 1))
+        shapes = [_logical(tensor, dim) for tensor, dim in zip(tensors[:4], in_dims[2:6], strict=True)]
+        gradients: Any = _Gradient.apply(reference, dt, *aligned)
+        return tuple(g.reshape(size, *shape) for g, shape in zip(gradients, shapes, strict=True)), (0,) * 4
+
+
+def _to_numpy(tensor: Tensor):
+    return tensor.detach().to(torch.float64).numpy()
+
+
+def _like(array, tensors: tuple[Tensor, ...]) -> Tensor:
+    kind = tensors[0].dtype
+    for tensor in tensors[1:]:
+        kind = torch.promote_types(kind, tensor.dtype)
+    return torch.from_numpy(array).to(kind)
+
+
+def _logical(tensor: Tensor, dim: int | None) -> list[int]:
+    """Shape as the mapped function sees it."""
+    return [length for axis, length in enumerate(tensor.shape) if axis != dim]
+
+
+def _aligned(size: int, dims, tensors, inner: tuple[int, ...]) -> list[Tensor]:
+    """Put the mapped axis in front of every tensor, and axes of length 1 behind it until the batch axes match."""
+    fronted = [
+        tensor[None].expand(size, *tensor.shape) if dim is None else tensor.movedim(dim, 0)
+        for tensor, dim in zip(tensors, dims, strict=True)
+    ]
+    rank = max(tensor.ndim - axes for tensor, axes in zip(fronted, inner, strict=True))
+    return [
+        tensor.reshape(size, *(1,) * (rank - (tensor.ndim - axes)), *tensor.shape[1:])
+        for tensor, axes in zip(fronted, inner, strict=True)
+    ]

@@ -1,0 +1,46 @@
+"""The `xp` of tensors: what the formulas need, with derivatives that stay finite at every kink.
+
+At a tie `minimum` and `maximum` pass the derivative of their first argument. `power` has the derivative 0 at 0.
+"""
+
+from __future__ import annotations
+
+import math
+
+import torch
+from torch import Tensor
+
+exp, sin, cos = torch.exp, torch.sin, torch.cos
+
+
+def where(condition, a, b):
+    """`a` where the condition holds, else `b`."""
+    if isinstance(condition, bool):
+        return a if condition else b
+    return torch.where(condition, a, b)
+
+
+def minimum(a, b):
+    """The smaller of two numbers, `a` at a tie."""
+    return torch.where(a <= b, a, b)
+
+
+def maximum(a, b):
+    """The larger of two numbers, `a` at a tie."""
+    return torch.where(a >= b, a, b)
+
+
+def power(x: Tensor, exponent: Tensor) -> Tensor:
+    """`x^exponent` for x >= 0 and exponent > 0; held constant where it would leave the range of the number type."""
+    limit = math.log(torch.finfo(x.dtype).max) - 1.0
+    moving = x > 0.0
+    usual = moving & (exponent * torch.log(torch.where(moving, x, 1.0)) < limit)
+    largest = torch.where(moving, torch.full_like(x, math.exp(limit)), 0.0)
+    return torch.where(usual, torch.pow(torch.where(usual, x, 1.0), exponent), largest)
+
+
+def norm(vector: Tensor, axis: int) -> Tensor:
+    """`|vector|` along an axis, which stays with length 1; its derivative at 0 is 0."""
+    square = (vector * vector).sum(axis, keepdim=True)
+    moving = square > 0.0
+    return torch.where(moving, torch.sqrt(torch.where(moving, square, 1.0)), 0.0)

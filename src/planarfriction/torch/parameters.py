@@ -1,0 +1,137 @@
+"""Physical parameters as trainable numbers without a scale, which cannot leave their valid range.
+
+An optimiser moves a raw number `w`; the physical value follows from it:
+
+    positive            p = p_0 exp(w), from w = 0         sigma_0, mu_c, v_s, gamma, contact_radius, second_moment
+    zero or more        p = scale |w|                      sigma_1, sigma_2
+    mu_s >= mu_c        mu_s = mu_c (1 + |w|)
+    breakaway in [0, 1) s = 1 - exp(-|w|)
+    free                p = p_0 + r w, from w = 0          centre_x, centre_y
+
+A step of `w` is a relative change, so that one learning rate suits all. `|w|` has the slope 1 at `w = 0`: a value on
+its bound can leave it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import torch
+from torch import Tensor, nn
+
+from planarfriction import validation
+from planarfriction.autodiff import PARAMETERS
+from planarfriction.errors import InvalidValueError
+
+LAW = PARAMETERS[:8]
+"""Parameters of the friction law; the others describe the shape of the patch."""
+
+_POSITIVE = ("sigma_0", "mu_c", "v_s", "gamma", "contact_radius", "second_moment")
+_LARGEST_EXPONENT = 30.0
+"""A positive value stays within a factor e^30 = 1e13 of where it started, so that none overflows or becomes zero."""
+
+
+class PhysicalParameters(nn.Module):
+    """Named physical values: those in `trainable` are `nn.Parameter`s in `raw`, the rest are fixed."""
+
+    values: Tensor
+    """The values as last set, `[P]`."""
+    scale: Tensor
+    """Physical size of a raw step of 1, where it has one, `[P]`."""
+    places: Tensor
+    """Where the raw numbers stand in the vector, `[number of trainable ones]`."""
+    grows: Tensor
+    """Which values are `p_0 exp(w)`, bool `[P]`."""
+    moves: Tensor
+    """Which values are `p_0 + scale w`, bool `[P]`."""
+    folds: Tensor
+    """Which values are `scale |w|`, bool `[P]`."""
+
+    def __init__(self, values: Mapping[str, float], trainable: Iterable[str], **kind):
+        super().__init__()
+        self.names = tuple(values)
+        chosen = dict.fromkeys(validation.choice("trainable", name, self.names) for name in trainable)
+        self.register_buffer("values", torch.zeros(len(self.names), **kind))
+        self.register_buffer("scale", torch.ones(len(self.names), **kind))
+        self.raw = nn.ParameterDict({name: nn.Parameter(torch.zeros((), **kind)) for name in chosen})
+        device = self.values.device
+        places = torch.tensor([self.names.index(name) for name in self.raw], dtype=torch.long, device=device)
+        self.register_buffer("places", places, persistent=False)
+        bounded = "mu_c" if "mu_s" not in chosen else ""  # a mu_c below a fixed mu_s has a rule of its own
+        for rule, members in {
+            "grows": set(_POSITIVE) - {bounded},
+            "moves": {"centre_x", "centre_y"},
+            "folds": {"sigma_1", "sigma_2"},
+        }.items():
+            mask = torch.tensor([name in chosen and name in members for name in self.names], device=device)
+            self.register_buffer(rule, mask, persistent=False)
+        self.set(values)
+
+    @torch.no_grad()
+    def set(self, values: Mapping[str, float]) -> None:
+        """Set physical values by name; raises InvalidValueError for one out of its range."""
+        for name in values:
+            validation.choice("parameter", name, self.names)
+        new = {**dict(zip(self.names, self().tolist(), strict=True)), **values}
+        _check(new)
+        for i, name in enumerate(self.names):
+            scale, raw = _raw(name, new, fixed_static="mu_s" not in self.raw)
+            self.values[i], self.scale[i] = new[name], scale
+            if name in self.raw:
+                self.raw[name].fill_(raw)
+
+    def forward(self) -> Tensor:
+        """The physical values `[P]`, in the order of `names`."""
+        if not self.raw:
+            return self.values
+        raw = torch.zeros_like(self.values).index_copy(0, self.places, torch.stack(list(self.raw.values())))
+        size = self.scale * torch.where(raw >= 0.0, raw, -raw)  # |w| with the slope 1 at 0
+        exponent = torch.where(self.grows, raw.clamp(-_LARGEST_EXPONENT, _LARGEST_EXPONENT), 0.0)
+        now = self.values * torch.exp(exponent)
+        now = torch.where(self.folds, size, now + torch.where(self.moves, self.scale * raw, 0.0))
+        if "mu_s" in self.raw:
+            now = self._with(now, "mu_s", self._of(now, "mu_c") * (1.0 + self._of(size, "mu_s")))
+        elif "mu_c" in self.raw:  # below the fixed mu_s
+            now = self._with(now, "mu_c", self._of(now, "mu_s") / (1.0 + self._of(size, "mu_c")))
+        if "breakaway_ratio" in self.raw:
+            below_one = 1.0 - 16.0 * torch.finfo(now.dtype).eps
+            ratio = (1.0 - torch.exp(-self._of(size, "breakaway_ratio"))).clamp(max=below_one)
+            now = self._with(now, "breakaway_ratio", ratio)
+        return now
+
+    def _of(self, vector: Tensor, name: str) -> Tensor:
+        return vector[self.names.index(name)]
+
+    def _with(self, vector: Tensor, name: str, value: Tensor) -> Tensor:
+        i = self.names.index(name)
+        return torch.cat([vector[:i], value[None], vector[i + 1 :]])
+
+
+def _raw(name: str, values: Mapping[str, float], *, fixed_static: bool) -> tuple[float, float]:
+    """Scale and raw number of a value; a value of zero takes a natural size as its scale."""
+    value, mu_c = values[name], values["mu_c"]
+    if name == "mu_s" or (name == "mu_c" and fixed_static):
+        excess = (values["mu_s"] - mu_c) / mu_c
+        return 1.0 + excess, excess / (1.0 + excess)
+    if name in _POSITIVE:
+        return 1.0, 0.0
+    if name == "breakaway_ratio":
+        return 1.0, -float(torch.log1p(torch.tensor(-value, dtype=torch.float64)))
+    if name.startswith("centre"):
+        return values["contact_radius"], 0.0
+    natural = mu_c / values["v_s"] if name == "sigma_1" else mu_c  # of mu_c at the Stribeck speed, or at 1 m/s
+    return (value, 1.0) if value > 0.0 else (natural, 0.0)
+
+
+def _check(values: Mapping[str, float]) -> None:
+    for name, value in values.items():
+        if name in _POSITIVE:
+            validation.positive(name, value)
+        elif name.startswith("centre"):
+            validation.number(name, value)
+        else:
+            validation.non_negative(name, value)
+    if values["mu_s"] < values["mu_c"]:
+        raise InvalidValueError("mu_s", "be >= mu_c", f"mu_s={values['mu_s']}, mu_c={values['mu_c']}")
+    if values["breakaway_ratio"] >= 1.0:
+        raise InvalidValueError("breakaway_ratio", "be in [0, 1)", values["breakaway_ratio"])
