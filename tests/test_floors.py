@@ -32,7 +32,14 @@ HEAVY = (
 )
 """Packages that `import planarfriction` must not load."""
 
-HOMES = {"numba": "kernels", "llvmlite": "kernels", "matplotlib": "plots", "rich": "cli", "click": "cli"}
+HOMES = {
+    "numba": "kernels",
+    "llvmlite": "kernels",
+    "matplotlib": "plots",
+    "rich": "cli",
+    "click": "cli",
+    "jax": "jax",
+}
 """Package -> the floor whose modules may import it when they load; no floor may load the rest of HEAVY that way."""
 
 
