@@ -34,7 +34,19 @@ _HOME = {
     "load": "planarfriction.scenes",
     "simulate": "planarfriction.scenes",
 }
-_MODULES = ("errors", "formulas", "geometry", "laws", "limit_surface", "models", "patch", "plots", "scenes", "solvers")
+_MODULES = (
+    "autodiff",
+    "errors",
+    "formulas",
+    "geometry",
+    "laws",
+    "limit_surface",
+    "models",
+    "patch",
+    "plots",
+    "scenes",
+    "solvers",
+)
 
 __all__ = [*_HOME, *_MODULES]
 

@@ -111,3 +111,43 @@ def cap(xp, deflection, largest):
     """Factor `min(1, largest/deflection)` that brings a bristle back onto the ball of that radius, direction kept."""
     over = deflection > largest
     return xp.where(over, largest / xp.where(over, deflection, 1.0), 1.0)
+
+
+# ---------------------------------------------------------------------- derivatives of a step
+
+
+def stribeck_partials(xp, speed, mu_c, mu_s, v_s, gamma):
+    """`g` and its partial derivatives with respect to `speed` (as `stribeck_slope`), `mu_c`, `mu_s`, `v_s`, `gamma`."""
+    ratio = speed * (1.0 / v_s)
+    raised = xp.power(ratio, gamma)
+    share = xp.exp(-raised)
+    by_raised = -(mu_s - mu_c) * share
+    safe = xp.where(ratio > 0.0, ratio, 1.0)
+    steepness = xp.where(ratio > 0.0, raised / safe, xp.where(gamma == 1.0, 1.0, 0.0))
+    by_speed = by_raised * gamma * (1.0 / v_s) * steepness
+    return mu_c - by_raised, by_speed, 1.0 - share, share, -by_speed * ratio, by_raised * raised * xp.log(safe)
+
+
+def bristle_decay_by_breakaway(xp, k_deflection, deflection, breakaway_ratio):
+    """Derivative of `k` with respect to the breakaway ratio, from that with respect to the deflection."""
+    return -k_deflection * xp.maximum(1.0 - deflection, 0.0) * (1.0 / (1.0 - breakaway_ratio))
+
+
+def mean_decay_partials(start, end, dt):
+    """Partial derivatives of `mean_decay` with respect to `start` and `end`."""
+    x = 0.5 * (start + end) * dt
+    share = 1.0 / (2.0 + x + x * x)
+    lead = 0.5 * dt * (start - end) * share * share * (1.0 + 2.0 * x)
+    return share - lead, 1.0 - share - lead
+
+
+def relaxation_slope(xp, decay_dt, remaining, mean):
+    """Derivative of `(1 - exp(-x))/x`, the second result of `relaxation`; that of the first is `-exp(-x)`.
+
+    Below `x = 0.1` its series, exact to 1e-16 there, where the difference would cancel.
+    """
+    x = decay_dt
+    series = 1.0 / 5760.0 - x * (1.0 / 45360.0 - x * (1.0 / 403200.0 - x * (1.0 / 3991680.0)))
+    series = 1.0 / 8.0 - x * (1.0 / 30.0 - x * (1.0 / 144.0 - x * (1.0 / 840.0 - x * series)))
+    series = -0.5 + x * (1.0 / 3.0 - x * series)
+    return xp.where(x > 0.1, (remaining - mean) / xp.where(x > 0.1, x, 1.0), series)

@@ -1,0 +1,25 @@
+"""Roll-outs of a reduced model with their exact derivatives: what the tensor front ends and identification build on.
+
+`rollout` steps a model through a sequence of twists and loads; `rollout_gradient` is its discrete adjoint and
+`rollout_sensitivities` its forward derivatives. Both are derivatives of the steps themselves, not of the continuous
+model, so that they agree with differences of `rollout` to rounding. Kinks: `planarfriction.kernels.bristle_step`.
+"""
+
+from planarfriction.autodiff.parameters import PARAMETERS, parameters_of
+from planarfriction.autodiff.rollouts import (
+    Rollout,
+    RolloutGradient,
+    rollout,
+    rollout_gradient,
+    rollout_sensitivities,
+)
+
+__all__ = [
+    "PARAMETERS",
+    "Rollout",
+    "RolloutGradient",
+    "parameters_of",
+    "rollout",
+    "rollout_gradient",
+    "rollout_sensitivities",
+]

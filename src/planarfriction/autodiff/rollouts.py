@@ -1,0 +1,217 @@
+"""Roll-outs with a fixed step, and their derivatives backwards and forwards."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.autodiff.parameters import COLUMNS, PARAMETERS, Packed, pack
+from planarfriction.errors import InvalidValueError
+from planarfriction.kernels import reduced_adjoint as kernels
+
+_WORTH_A_THREAD = 20_000
+"""Steps [-] below which starting a thread costs more than it saves."""
+
+
+class Rollout(NamedTuple):
+    """A model stepped through T twists and loads."""
+
+    wrenches: np.ndarray
+    """Wrench on the moving body at the end of each step, `[..., T, 3]` [N, N, N m]."""
+    state: np.ndarray
+    """State after the last step, `[..., 3]`."""
+
+
+class RolloutGradient(NamedTuple):
+    """Gradient of a number with respect to the inputs of a roll-out, each of the shape of that input."""
+
+    state: np.ndarray
+    twists: np.ndarray
+    loads: np.ndarray
+    parameters: np.ndarray
+
+
+class _Inputs(NamedTuple):
+    """Checked inputs; B contacts in all, one row where all contacts share an input."""
+
+    packed: Packed
+    rows: np.ndarray
+    """[B or 1, 13]"""
+    state: np.ndarray
+    """[B, 3]"""
+    twists: np.ndarray
+    """[B or 1, T, 3]"""
+    loads: np.ndarray
+    """[B or 1, T]"""
+    dt: np.ndarray
+    """[T]"""
+    batch: tuple[int, ...]
+
+
+def rollout(model: Any, state: Any, twists: Any, loads: Any, dt: Any, parameters: Any = None) -> Rollout:
+    """Step a reduced model through `twists` `[..., T, 3]` and `loads` `[..., T]`, each held for `dt` [s].
+
+    The steps are those of `model.step`. `state` `[..., 3]`; `loads` may be one number; `dt` is one number or `[T]`;
+    leading axes broadcast. `parameters` `[..., 12]` (see `PARAMETERS`) take the place of the model's own; the limit
+    surface stays as it is, in scaled coordinates. Batches run on all processors.
+
+    Raises `InvalidValueError` for wrong shapes, for numbers out of range, and for a model whose shape follows the load.
+    """
+    inputs = _checked(model, state, twists, loads, dt, parameters)
+    end, wrenches = inputs.state.copy(), np.empty((*inputs.state.shape[:1], *_steps(inputs), 3))
+    arguments = inputs.rows, inputs.packed.surface, inputs.packed.data, end, inputs.twists, inputs.loads, inputs.dt
+    _share(inputs, lambda first, last: kernels.rollout(*arguments, first, last, wrenches))
+    return Rollout(wrenches.reshape(*inputs.batch, *wrenches.shape[1:]), end.reshape(*inputs.batch, 3))
+
+
+def rollout_gradient(
+    model: Any,
+    state: Any,
+    twists: Any,
+    loads: Any,
+    dt: Any,
+    wrenches_bar: Any,
+    state_bar: Any = None,
+    parameters: Any = None,
+) -> RolloutGradient:
+    """Gradient of `sum(wrenches_bar wrenches) + sum(state_bar state)` of a `rollout` with respect to its inputs.
+
+    The discrete adjoint: exact for the steps taken, at some three times the cost of the roll-out whatever the number
+    of inputs. `wrenches_bar` `[..., T, 3]` and `state_bar` `[..., 3]` (None: zero) broadcast. An input that several
+    contacts share gets the sum of theirs. At zero load the gradient with respect to that load is the one-sided one.
+    """
+    inputs = _checked(model, state, twists, loads, dt, parameters)
+    count, steps = len(inputs.state), len(inputs.dt)
+    cotangents = _rows("wrenches_bar", wrenches_bar, (steps, 3), inputs.batch)
+    z_bar = np.zeros((count, 3))
+    if state_bar is not None:
+        z_bar[:] = _rows("state_bar", state_bar, (3,), inputs.batch)
+    twists_bar, loads_bar = np.empty((count, steps, 3)), np.empty((count, steps))
+    rows_bar = np.zeros((count, kernels.NUMBERS))
+    arguments = inputs.rows, inputs.packed.surface, inputs.packed.data, inputs.state, inputs.twists, inputs.loads
+
+    def adjoint(first: int, last: int) -> None:
+        tape = np.empty((steps + 5, 3))
+        kernels.gradient(
+            *arguments, inputs.dt, cotangents, first, last, tape, z_bar, twists_bar, loads_bar, rows_bar
+        )  # fmt: skip
+
+    _share(inputs, adjoint)
+    given = parameters if parameters is not None else inputs.packed.rows[..., COLUMNS]
+    return RolloutGradient(
+        *(
+            _sum_to(np.shape(value), gradient.reshape(*inputs.batch, *gradient.shape[1:]))
+            for value, gradient in (
+                (state, z_bar),
+                (twists, twists_bar),
+                (loads, loads_bar),
+                (given, rows_bar[:, COLUMNS]),
+            )
+        )
+    )
+
+
+def rollout_sensitivities(
+    model: Any,
+    state: Any,
+    twists: Any,
+    loads: Any,
+    dt: Any,
+    names: Sequence[str] = PARAMETERS,
+    parameters: Any = None,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Wrenches `[..., T, 3]` of a `rollout` and their derivatives `[..., T, 3, P]` to the parameters `names`.
+
+    Forward in time, for least squares, which wants each wrench's own derivatives; the initial state is held.
+    """
+    inputs = _checked(model, state, twists, loads, dt, parameters)
+    chosen = [PARAMETERS.index(validation.choice("names", name, PARAMETERS)) for name in names]
+    columns = COLUMNS[np.array(chosen, dtype=int)]
+    wrenches = np.empty((len(inputs.state), len(inputs.dt), 3))
+    slopes = np.empty((*wrenches.shape, len(columns)))
+    end = inputs.state.copy()
+    arguments = inputs.rows, inputs.packed.surface, inputs.packed.data, end, inputs.twists, inputs.loads, inputs.dt
+    _share(inputs, lambda first, last: kernels.sensitivities(*arguments, columns, first, last, wrenches, slopes))
+    return wrenches.reshape(*inputs.batch, *wrenches.shape[1:]), slopes.reshape(*inputs.batch, *slopes.shape[1:])
+
+
+# ---------------------------------------------------------------------- shapes and threads
+
+
+def _steps(inputs: _Inputs) -> tuple[int]:
+    return (len(inputs.dt),)
+
+
+def _checked(model: Any, state: Any, twists: Any, loads: Any, dt: Any, parameters: Any) -> _Inputs:
+    packed = pack(model, parameters)
+    state, twists = validation.numbers("state", state), validation.numbers("twists", twists)
+    loads, dt = validation.numbers("loads", loads), validation.numbers("dt", dt)
+    if state.shape[-1:] != (3,):
+        raise InvalidValueError("state", "have shape [..., 3]", f"shape {list(state.shape)}")
+    if twists.ndim < 2 or twists.shape[-1] != 3:
+        raise InvalidValueError("twists", "have shape [..., T, 3]", f"shape {list(twists.shape)}")
+    steps = twists.shape[-2]
+    if loads.ndim and loads.shape[-1] != steps:
+        raise InvalidValueError("loads", f"be one number or have shape [..., {steps}]", f"shape {list(loads.shape)}")
+    if dt.ndim and dt.shape != (steps,):
+        raise InvalidValueError("dt", f"be one number or have shape [{steps}]", f"shape {list(dt.shape)}")
+    for name, value in {"state": state, "twists": twists, "loads": loads, "dt": dt}.items():
+        if not np.isfinite(value).all():
+            raise InvalidValueError(name, "be finite", "NaN or infinity")
+    for name, value in {"loads": loads, "dt": dt}.items():
+        if (value < 0.0).any():
+            raise InvalidValueError(name, "be >= 0", float(value.min()))
+    if not loads.ndim:
+        loads = np.full(steps, loads)
+    axes = state.shape[:-1], twists.shape[:-2], loads.shape[:-1], packed.rows.shape[:-1]
+    try:
+        batch = np.broadcast_shapes(*axes)
+    except ValueError:
+        raise InvalidValueError("batch axes", "broadcast", f"shapes {', '.join(str(list(a)) for a in axes)}") from None
+    count = int(np.prod(batch))
+    return _Inputs(
+        packed,
+        _rows("parameters", packed.rows, (kernels.NUMBERS,), batch),
+        np.broadcast_to(state, (*batch, 3)).reshape(count, 3),
+        _rows("twists", twists, (steps, 3), batch),
+        _rows("loads", loads, (steps,), batch),
+        np.full(steps, dt) if dt.ndim == 0 else np.require(dt, float, ["C", "W"]),
+        batch,
+    )
+
+
+def _rows(name: str, value: Any, inner: tuple[int, ...], batch: tuple[int, ...]) -> np.ndarray:
+    """`value` `[..., *inner]` as `[B, *inner]`, or as one row where the contacts share it."""
+    value = validation.numbers(name, value)
+    if value.size != np.prod(inner) or value.shape[value.ndim - len(inner) :] != inner:
+        try:
+            value = np.broadcast_to(value, (*batch, *inner))
+        except ValueError:
+            wanted = ", ".join(str(n) for n in inner)
+            raise InvalidValueError(name, f"have shape [..., {wanted}]", f"shape {list(value.shape)}") from None
+    return np.require(value.reshape(-1, *inner), float, ["C", "W"])
+
+
+def _sum_to(shape: tuple[int, ...], gradient: np.ndarray) -> np.ndarray:
+    """Sum a gradient over the axes along which its input was broadcast."""
+    gradient = gradient.sum(axis=tuple(range(gradient.ndim - len(shape))))
+    kept = tuple(i for i, n in enumerate(shape) if n == 1 and gradient.shape[i] != 1)
+    return gradient.sum(axis=kept, keepdims=True) if kept else gradient
+
+
+def _share(inputs: _Inputs, work: Callable[[int, int], None]) -> None:
+    """Run `work(first, last)` over all contacts, on several threads where that pays."""
+    count = len(inputs.state)
+    available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    threads = max(1, min(available, count, count * len(inputs.dt) // _WORTH_A_THREAD))
+    if threads == 1:
+        work(0, count)
+        return
+    bounds = [count * i // threads for i in range(threads + 1)]
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(work, bounds[:-1], bounds[1:]))
