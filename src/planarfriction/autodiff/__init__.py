@@ -9,17 +9,21 @@ from planarfriction.autodiff.parameters import PARAMETERS, parameters_of
 from planarfriction.autodiff.rollouts import (
     Rollout,
     RolloutGradient,
+    RolloutStates,
     rollout,
     rollout_gradient,
     rollout_sensitivities,
+    rollout_states,
 )
 
 __all__ = [
     "PARAMETERS",
     "Rollout",
     "RolloutGradient",
+    "RolloutStates",
     "parameters_of",
     "rollout",
     "rollout_gradient",
     "rollout_sensitivities",
+    "rollout_states",
 ]

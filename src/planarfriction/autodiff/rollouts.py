@@ -27,6 +27,17 @@ class Rollout(NamedTuple):
     """State after the last step, `[..., 3]`."""
 
 
+class RolloutStates(NamedTuple):
+    """A roll-out with its states on the way."""
+
+    wrenches: np.ndarray
+    """As in `Rollout`."""
+    state: np.ndarray
+    """As in `Rollout`."""
+    states: np.ndarray
+    """State before each step, `[..., T, 3]`."""
+
+
 class RolloutGradient(NamedTuple):
     """Gradient of a number with respect to the inputs of a roll-out, each of the shape of that input."""
 
@@ -63,10 +74,18 @@ def rollout(model: Any, state: Any, twists: Any, loads: Any, dt: Any, parameters
     Raises `InvalidValueError` for wrong shapes, for numbers out of range, and for a model whose shape follows the load.
     """
     inputs = _checked(model, state, twists, loads, dt, parameters)
-    end, wrenches = inputs.state.copy(), np.empty((*inputs.state.shape[:1], *_steps(inputs), 3))
-    arguments = inputs.rows, inputs.packed.surface, inputs.packed.data, end, inputs.twists, inputs.loads, inputs.dt
-    _share(inputs, lambda first, last: kernels.rollout(*arguments, first, last, wrenches))
+    wrenches, end, _ = _roll(inputs, 0)
     return Rollout(wrenches.reshape(*inputs.batch, *wrenches.shape[1:]), end.reshape(*inputs.batch, 3))
+
+
+def rollout_states(model: Any, state: Any, twists: Any, loads: Any, dt: Any, parameters: Any = None) -> RolloutStates:
+    """`rollout` that keeps the state before each step: given to `rollout_gradient`, it saves walking there again."""
+    inputs = _checked(model, state, twists, loads, dt, parameters)
+    wrenches, end, states = _roll(inputs, len(inputs.dt))
+    batch = inputs.batch
+    return RolloutStates(
+        wrenches.reshape(*batch, *wrenches.shape[1:]), end.reshape(*batch, 3), states.reshape(*batch, *states.shape[1:])
+    )
 
 
 def rollout_gradient(
@@ -78,30 +97,28 @@ def rollout_gradient(
     wrenches_bar: Any,
     state_bar: Any = None,
     parameters: Any = None,
+    *,
+    states: Any = None,
 ) -> RolloutGradient:
     """Gradient of `sum(wrenches_bar wrenches) + sum(state_bar state)` of a `rollout` with respect to its inputs.
 
-    The discrete adjoint: exact for the steps taken, at some three times the cost of the roll-out whatever the number
-    of inputs. `wrenches_bar` `[..., T, 3]` and `state_bar` `[..., 3]` (None: zero) broadcast. An input that several
-    contacts share gets the sum of theirs. At zero load the gradient with respect to that load is the one-sided one.
+    The discrete adjoint: exact for the steps taken, at some two or three times the cost of the roll-out whatever the
+    number of inputs. `wrenches_bar` `[..., T, 3]` and `state_bar` `[..., 3]` (None: zero) broadcast. An input that
+    several contacts share gets the sum of theirs. `states`: those of `rollout_states`, if kept. At zero load the
+    gradient with respect to that load is the one-sided one.
     """
     inputs = _checked(model, state, twists, loads, dt, parameters)
     count, steps = len(inputs.state), len(inputs.dt)
     cotangents = _rows("wrenches_bar", wrenches_bar, (steps, 3), inputs.batch)
+    on_the_way = _roll(inputs, steps)[2] if states is None else _rows("states", states, (steps, 3), inputs.batch)
     z_bar = np.zeros((count, 3))
     if state_bar is not None:
         z_bar[:] = _rows("state_bar", state_bar, (3,), inputs.batch)
     twists_bar, loads_bar = np.empty((count, steps, 3)), np.empty((count, steps))
     rows_bar = np.zeros((count, kernels.NUMBERS))
-    arguments = inputs.rows, inputs.packed.surface, inputs.packed.data, inputs.state, inputs.twists, inputs.loads
-
-    def adjoint(first: int, last: int) -> None:
-        tape = np.empty((steps + 5, 3))
-        kernels.gradient(
-            *arguments, inputs.dt, cotangents, first, last, tape, z_bar, twists_bar, loads_bar, rows_bar
-        )  # fmt: skip
-
-    _share(inputs, adjoint)
+    arguments = inputs.rows, inputs.packed.surface, inputs.packed.data, on_the_way, inputs.twists, inputs.loads
+    results = z_bar, twists_bar, loads_bar, rows_bar
+    _share(inputs, lambda first, last: kernels.gradient(*arguments, inputs.dt, cotangents, first, last, *results))
     given = parameters if parameters is not None else inputs.packed.rows[..., COLUMNS]
     return RolloutGradient(
         *(
@@ -140,11 +157,16 @@ def rollout_sensitivities(
     return wrenches.reshape(*inputs.batch, *wrenches.shape[1:]), slopes.reshape(*inputs.batch, *slopes.shape[1:])
 
 
+def _roll(inputs: _Inputs, kept: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Wrenches `[B, T, 3]`, states at the end `[B, 3]` and, with `kept = T` rather than 0, before each step."""
+    count, end = len(inputs.state), inputs.state.copy()
+    wrenches, states = np.empty((count, len(inputs.dt), 3)), np.empty((count, kept, 3))
+    arguments = inputs.rows, inputs.packed.surface, inputs.packed.data, end, inputs.twists, inputs.loads, inputs.dt
+    _share(inputs, lambda first, last: kernels.rollout(*arguments, first, last, wrenches, states))
+    return wrenches, end, states
+
+
 # ---------------------------------------------------------------------- shapes and threads
-
-
-def _steps(inputs: _Inputs) -> tuple[int]:
-    return (len(inputs.dt),)
 
 
 def _checked(model: Any, state: Any, twists: Any, loads: Any, dt: Any, parameters: Any) -> _Inputs:

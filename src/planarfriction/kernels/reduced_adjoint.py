@@ -30,6 +30,10 @@ from planarfriction.kernels.surfaces import sliding, sliding_jacobian
 NUMBERS = 13
 """Numbers of a contact."""
 
+# Nearer to the spin axis (sine of the angle, squared) u is looked up: the product of its Jacobian with V_S, which is
+# the same and costs less, loses digits to the large slopes there, and the Jacobian is not quite that of this place.
+_NEAR_AXIS = 1e-6
+
 
 class Step(NamedTuple):
     """A step with all that its cotangents need."""
@@ -44,6 +48,9 @@ class Step(NamedTuple):
     us: float
     per_h: float
     q: float
+    """Grip."""
+    stribeck: tuple
+    """Friction coefficient and its partial derivatives."""
     zx: float
     """Scaled bristle before the step."""
     zy: float
@@ -57,14 +64,20 @@ def _linearise(row, surface, data, z, twist, dt, slope):
     law = law_of(row)
     x, y, s = twist[0] - twist[2] * row[10], twist[1] + twist[2] * row[9], row[11] * twist[2]
     v = math.sqrt(x * x + y * y + s * s)
-    ux, uy, us = sliding(surface[0], data, surface[1], surface[2], x, y, s, v)
     sliding_jacobian(surface[0], data, surface[1], surface[2], x, y, s, v, slope)
+    if x * x + y * y > _NEAR_AXIS * s * s:
+        ux = slope[0] * x + slope[1] * y + slope[2] * s
+        uy = slope[3] * x + slope[4] * y + slope[5] * s
+        us = slope[6] * x + slope[7] * y + slope[8] * s
+    else:
+        ux, uy, us = sliding(surface[0], data, surface[1], surface[2], x, y, s, v)
     h = math.sqrt(ux * ux + uy * uy + us * us) / v if v > 0.0 else 1.0
     per_h = 1.0 / h
-    q = law.sigma_0 / formulas.stribeck(xp, v, law.mu_c, law.mu_s, law.v_s, law.gamma)
+    curve = formulas.stribeck_partials(xp, v, law.mu_c, law.mu_s, law.v_s, law.gamma)
+    q = law.sigma_0 / curve[0]
     zx, zy, zs = z[0], z[1], z[2] / row[11]
     bristle = bristle_step.linearise(law, zx, zy, zs, ux, uy, us, v, per_h, q, dt)
-    return Step(x, y, s, v, ux, uy, us, per_h, q, zx, zy, zs, bristle)
+    return Step(x, y, s, v, ux, uy, us, per_h, q, curve, zx, zy, zs, bristle)
 
 
 @inlined
@@ -108,9 +121,7 @@ def _pull_back(row, step, twist, load, dt, slope, w, out, z_bar, twist_bar, row_
     u_norm_bar = h_bar * per_v * per_v * step.per_h  # per |u|: its gradient is u/|u|
     ux, uy, us = ux - law.sigma_1 * gx, uy - law.sigma_1 * gy, us - law.sigma_1 * gs
     ux, uy, us = ux + u_norm_bar * step.ux, uy + u_norm_bar * step.uy, us + u_norm_bar * step.us
-    g, by_speed, by_mu_c, by_mu_s, by_v_s, by_gamma = formulas.stribeck_partials(
-        xp, step.v, law.mu_c, law.mu_s, law.v_s, law.gamma
-    )
+    g, by_speed, by_mu_c, by_mu_s, by_v_s, by_gamma = step.stribeck
     row_bar[0] += q_bar / g
     g_bar = -q_bar * step.q / g
     row_bar[3] += g_bar * by_mu_c
@@ -130,7 +141,7 @@ def _pull_back(row, step, twist, load, dt, slope, w, out, z_bar, twist_bar, row_
     return load_bar
 
 
-@kernel
+@inlined
 def _advance(row, shape, surface, data, z, twist, load, dt, wrench):
     fx, fy, tau = reduced.step(law_of(row), z, twist[0], twist[1], twist[2], shape, surface, data, dt, z)
     wrench[0], wrench[1], wrench[2] = load * fx, load * fy, load * tau
@@ -146,36 +157,34 @@ def _of(b, count):
 
 
 @jit
-def rollout(rows, surface, data, z, twist, load, dt, first, last, wrench):
+def rollout(rows, surface, data, z, twist, load, dt, first, last, wrench, states):
     """Steps of the contacts `first` to `last`: `z` [B, 3] in place, wrenches into `wrench` [B, T, 3].
 
-    `rows` [B or 1, 13], `twist` [B or 1, T, 3], `load` [B or 1, T], `dt` [T].
+    `rows` [B or 1, 13], `twist` [B or 1, T, 3], `load` [B or 1, T], `dt` [T]. The state before each step goes into
+    `states` [B, T, 3], unless that is empty.
     """
     for b in range(first, last):
         row, twists, loads = rows[_of(b, len(rows))], twist[_of(b, len(twist))], load[_of(b, len(load))]
         for t in range(dt.shape[0]):
+            if states.shape[1] > 0:
+                states[b, t, 0], states[b, t, 1], states[b, t, 2] = z[b, 0], z[b, 1], z[b, 2]
             _advance(row, row[9:], surface, data, z[b], twists[t], loads[t], dt[t], wrench[b, t])
 
 
 @jit
 def gradient(
-    rows, surface, data, z, twist, load, dt, wrench_bar, first, last, tape, z_bar, twist_bar, load_bar, row_bar
+    rows, surface, data, states, twist, load, dt, wrench_bar, first, last, z_bar, twist_bar, load_bar, row_bar
 ):
-    """Adjoint of `rollout`: `z` [B, 3] is the state before it, `z_bar` comes in as the cotangent of that after it.
+    """Adjoint of `rollout` with its `states`; `z_bar` [B, 3] comes in as the cotangent of the state at the end.
 
-    `twist_bar` [B, T, 3] and `load_bar` [B, T] are written, `row_bar` [B, 13] added to; `tape` [T + 5, 3]: scratch.
+    `wrench_bar` [B or 1, T, 3]; `twist_bar` [B, T, 3] and `load_bar` [B, T] are written, `row_bar` [B, 13] is added to.
     """
-    slope = tape[dt.shape[0] :].reshape(-1)
+    slope = np.empty(9)
     for b in range(first, last):
         row, twists, loads = rows[_of(b, len(rows))], twist[_of(b, len(twist))], load[_of(b, len(load))]
         cotangents = wrench_bar[_of(b, len(wrench_bar))]
-        state, scratch = slope[9:12], slope[12:15]
-        state[:] = z[b]
-        for t in range(dt.shape[0]):
-            tape[t] = state
-            _advance(row, row[9:], surface, data, state, twists[t], loads[t], dt[t], scratch)
         for t in range(dt.shape[0] - 1, -1, -1):
-            step = _linearise(row, surface, data, tape[t], twists[t], dt[t], slope)
+            step = _linearise(row, surface, data, states[b, t], twists[t], dt[t], slope)
             load_bar[b, t] = _pull_back(
                 row, step, twists[t], loads[t], dt[t], slope, cotangents[t], z_bar[b], z_bar[b], twist_bar[b, t],
                 row_bar[b],

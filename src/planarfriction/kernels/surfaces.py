@@ -42,6 +42,18 @@ def _place(size, x, y, s):
 
 
 @inlined
+def _sines(x, y, s, polar):
+    """Sine and cosine of the polar angle, which stays `_AXIS` away from the axis, and of the azimuth."""
+    across = math.sqrt(x * x + y * y)
+    per_across = 1.0 / across if across > 0.0 else 0.0
+    sin_a, cos_a = y * per_across, x * per_across if across > 0.0 else 1.0
+    if polar < _AXIS:
+        return math.sin(_AXIS), math.cos(_AXIS), sin_a, cos_a
+    per_norm = 1.0 / math.sqrt(x * x + y * y + s * s)
+    return across * per_norm, s * per_norm, sin_a, cos_a
+
+
+@inlined
 def _corners(data, p, row, a, b):
     """Bilinear value of one component and its differences along the polar angle and the azimuth."""
     low = data[p] + b * (data[p + 4] - data[p])
@@ -66,15 +78,13 @@ def _bilinear(data, start, size, x, y, s, speed):
 
 @kernel
 def _bilinear_jacobian(data, start, size, x, y, s, out):
-    i, j, a, b, polar, azimuth = _place(size, x, y, s)
+    i, j, a, b, polar, _ = _place(size, x, y, s)
     row = 4 * (4 * size + 1)
     p = start + i * row + 4 * j
     per_segment = size / (0.5 * math.pi)
     if polar < _AXIS:
-        polar, a = _AXIS, _AXIS * per_segment
-    if polar < _AXIS:
-        polar, a = _AXIS, _AXIS * per_segment
-    sin_p, cos_p, sin_a, cos_a = math.sin(polar), math.cos(polar), math.sin(azimuth), math.cos(azimuth)
+        a = _AXIS * per_segment
+    sin_p, cos_p, sin_a, cos_a = _sines(x, y, s, polar)
     per_azimuth = per_segment / sin_p
     radial = (sin_p * cos_a, sin_p * sin_a, cos_p)
     polar_slope = (per_segment * cos_p * cos_a, per_segment * cos_p * sin_a, -per_segment * sin_p)
@@ -150,13 +160,13 @@ def _potential(data, start, size, x, y, s, speed):
 
 @kernel
 def _potential_jacobian(data, start, size, x, y, s, out):
-    i, j, a, b, polar, azimuth = _place(size, x, y, s)
+    i, j, a, b, polar, _ = _place(size, x, y, s)
     row = 4 * (4 * size + 1)
     p = start + i * row + 4 * j
     end = start + (size + 1) * row
     segment = 0.5 * math.pi / size
     if polar < _AXIS:
-        polar, a = _AXIS, _AXIS / segment
+        a = _AXIS / segment
     av, af, a2 = _hermite(a)
     bv, bf, b2 = _hermite(b)
     phi = _blend(data, p, row, segment, av, bv)
@@ -165,7 +175,7 @@ def _potential_jacobian(data, start, size, x, y, s, out):
     d_pp = _blend(data, p, row, segment, a2, bv) / segment**2
     d_pa = _blend(data, p, row, segment, af, bf) / segment**2
     d_aa = _blend(data, p, row, segment, av, b2) / segment**2
-    sin_p, cos_p, sin_a, cos_a = math.sin(polar), math.cos(polar), math.sin(azimuth), math.cos(azimuth)
+    sin_p, cos_p, sin_a, cos_a = _sines(x, y, s, polar)
     radial = (sin_p * cos_a, sin_p * sin_a, cos_p)
     along = (cos_p * cos_a, cos_p * sin_a, -sin_p)  # unit vector of growing polar angle
     across = (-sin_a, cos_a, 0.0)  # unit vector of growing azimuth

@@ -1,7 +1,7 @@
 """Friction models of a contact patch: parameters, and pure functions of (state, twist, load)."""
 
-from planarfriction.models.base import FrictionModel, ModelJacobians
+from planarfriction.models.base import FrictionModel, ModelJacobians, StepJacobians
 from planarfriction.models.distributed import DistributedModel
 from planarfriction.models.reduced_published import ReducedModelPublished
 
-__all__ = ["DistributedModel", "FrictionModel", "ModelJacobians", "ReducedModelPublished"]
+__all__ = ["DistributedModel", "FrictionModel", "ModelJacobians", "ReducedModelPublished", "StepJacobians"]

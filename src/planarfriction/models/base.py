@@ -30,6 +30,25 @@ class ModelJacobians(NamedTuple):
     """d wrench / d normal_force of a fixed shape, `[..., 3]`."""
 
 
+class StepJacobians(NamedTuple):
+    """Derivatives of the results of `step`: the new state, and the wrench at the end of the step.
+
+    The shape of the patch is held fixed. Without load a step forgets its bristles: all is zero but `wrench_load`, the
+    wrench per unit load that the smallest load would have.
+    """
+
+    state_state: np.ndarray
+    """d new state / d state: distributed `[..., 2, 2, N]` (cell by cell), reduced `[..., 3, 3]`."""
+    state_twist: np.ndarray
+    """d new state / d twist: distributed `[..., 2, N, 3]`, reduced `[..., 3, 3]`."""
+    wrench_state: np.ndarray
+    """d wrench / d state: distributed `[..., 3, 2, N]`, reduced `[..., 3, 3]`."""
+    wrench_twist: np.ndarray
+    """d wrench / d twist, `[..., 3, 3]`: what an implicit host adds to its mass over `dt`."""
+    wrench_load: np.ndarray
+    """d wrench / d normal_force, `[..., 3]`."""
+
+
 @dataclass(frozen=True, eq=False)
 class FrictionModel:
     """A patch with a friction law; the caller holds the state.

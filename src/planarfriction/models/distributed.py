@@ -9,8 +9,9 @@ import numpy as np
 
 from planarfriction import formulas
 from planarfriction.kernels import distributed as kernels
-from planarfriction.kernels.law import law_numbers
-from planarfriction.models.base import FrictionModel, ModelJacobians
+from planarfriction.kernels import distributed_adjoint
+from planarfriction.kernels.law import law_numbers, law_row
+from planarfriction.models.base import FrictionModel, ModelJacobians, StepJacobians
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,9 +54,6 @@ class DistributedModel(FrictionModel):
         batch = load.shape
         flat = np.ascontiguousarray(state.reshape(-1, 2 * state.shape[-1]))
         out, wrench = np.empty_like(flat), np.empty((len(flat), 3))
-        weights = np.atleast_2d(
-            self.patch.weights(load.reshape(-1)) if self.patch.depends_on_load else self.patch.weights()
-        )
         x, y = self._xy
         kernels.step_batch(
             law_numbers(self.law),
@@ -63,7 +61,7 @@ class DistributedModel(FrictionModel):
             np.ascontiguousarray(twist.reshape(-1, 3)),
             x,
             y,
-            np.ascontiguousarray(weights),
+            self._weights(load),
             np.ascontiguousarray(load.reshape(-1)),
             np.ascontiguousarray(dt.reshape(-1)),
             out,
@@ -103,7 +101,32 @@ class DistributedModel(FrictionModel):
             unit,
         )
 
+    def step_jacobians(self, state, twist, normal_force, dt) -> StepJacobians:
+        """Analytic derivatives of `step` (see `StepJacobians`); at kinks a one-sided derivative."""
+        state, twist, load, dt = self._inputs(state, twist, normal_force, dt=dt)
+        batch, cells = load.shape, state.shape[-1]
+        shapes = (2, 2, cells), (2, cells, 3), (3, 2, cells), (3, 3), (3,)
+        results = [np.zeros((load.size, *shape)) for shape in shapes]
+        x, y = self._xy
+        distributed_adjoint.jacobians(
+            law_row(self.law),
+            np.ascontiguousarray(state.reshape(-1, 2, cells)),
+            np.ascontiguousarray(twist.reshape(-1, 3)),
+            x,
+            y,
+            self._weights(load),
+            np.ascontiguousarray(load.reshape(-1)),
+            np.ascontiguousarray(dt.reshape(-1)),
+            *results,
+        )
+        return StepJacobians(*(a.reshape(*batch, *shape) for a, shape in zip(results, shapes, strict=True)))
+
     # ------------------------------------------------------------------ cells
+
+    def _weights(self, load: np.ndarray) -> np.ndarray:
+        """Weights of the cells, one row `[1, N]` or one for each load `[B, N]`."""
+        weights = self.patch.weights(load.reshape(-1)) if self.patch.depends_on_load else self.patch.weights()
+        return np.ascontiguousarray(np.atleast_2d(weights))
 
     @functools.cached_property
     def _xy(self) -> tuple[np.ndarray, np.ndarray]:

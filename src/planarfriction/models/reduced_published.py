@@ -11,10 +11,11 @@ import numpy as np
 from planarfriction import formulas, validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels import reduced as kernels
+from planarfriction.kernels import reduced_adjoint
 from planarfriction.kernels.law import law_numbers, law_row
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
 from planarfriction.limit_surface.base import scaling
-from planarfriction.models.base import FrictionModel, ModelJacobians
+from planarfriction.models.base import FrictionModel, ModelJacobians, StepJacobians
 
 _REMEMBERED = 64
 """Loads whose shapes a model remembers."""
@@ -130,6 +131,13 @@ class ReducedModelPublished(FrictionModel):
         state, twist, load, dt = self._inputs(state, twist, normal_force, dt=dt)
         packed = self._by_load(self._step, (6,), state, twist, load, dt)
         return packed[..., :3], packed[..., 3:]
+
+    def step_jacobians(self, state, twist, normal_force, dt) -> StepJacobians:
+        """Analytic derivatives of `step` (see `StepJacobians`); at kinks a one-sided derivative."""
+        state, twist, load, dt = self._inputs(state, twist, normal_force, dt=dt)
+        packed = self._by_load(self._step_jacobians, (6, 7), state, twist, load, dt)
+        wrench, new = packed[..., :3, :], packed[..., 3:, :]
+        return StepJacobians(new[..., :3], new[..., 3:6], wrench[..., :3], wrench[..., 3:6], wrench[..., 6])
 
     # ------------------------------------------------------------------ one shape
 
@@ -264,3 +272,11 @@ class ReducedModelPublished(FrictionModel):
             wrench,
         )
         return np.concatenate([out, wrench], axis=1)
+
+    def _step_jacobians(self, shape: ReducedShape, state, twist, load, dt) -> np.ndarray:
+        numbers = shape.surface.numbers
+        row = np.array([[*law_numbers(self.law), *shape.numbers]])
+        slopes = np.empty((len(load), 6, 7 + reduced_adjoint.NUMBERS))
+        surface = np.array([numbers.kind, 0, numbers.size])
+        reduced_adjoint.jacobians(row, surface, numbers.data, state, twist, load, dt, slopes)
+        return slopes[:, :, :7]
