@@ -72,5 +72,7 @@ def simulate(model: Model, twists, loads, dt, z0=None, *, method: str = "scan") 
     def one(z, inputs):
         return model.step(z, *inputs, dt)
 
+    # Only the states are kept for the way back; to step again costs less than to store all that a step computes.
+    one = jax.checkpoint(one, prevent_cse=False)  # pyright: ignore[reportPrivateImportUsage]
     z, wrenches = jax.lax.scan(one, z0, (jnp.moveaxis(twists, -2, 0), jnp.moveaxis(loads, -1, 0)))
     return Rollout(jnp.moveaxis(wrenches, 0, -2), z)
