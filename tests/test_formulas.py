@@ -178,6 +178,69 @@ def test_a_step_ends_within_reach(start, end):
     assert formulas.cap(np, end, formulas.reachable_deflection(np, start, 0.0)) == 1.0  # plain LuGre is not capped
 
 
+# ---------------------------------------------------------------------- derivatives of a step
+
+
+@pytest.mark.parametrize("gamma", [1.5, 2.0, 3.0])
+def test_stribeck_partials_are_the_slopes(gamma):
+    speed = LAW["v_s"] * np.linspace(0.2, 4.0, 50)
+    values = {"speed": speed, **LAW, "gamma": gamma}
+    g, *partials = formulas.stribeck_partials(np, **values)
+    assert np.array_equal(g, formulas.stribeck(np, **values))
+    assert partials[0] == pytest.approx(formulas.stribeck_slope(np, **values), rel=1e-14)  # rounding
+    for name, partial in zip(list(values)[1:], partials[1:], strict=True):
+        value = values[name]
+        expected = slope(lambda p, n=name: formulas.stribeck(np, **{**values, n: p}), value, 1e-3 * value)
+        # Truncation (1e-3)^4 of the curve's fifth derivative, a few hundred of g; rounding of g over the step.
+        assert partial * value == pytest.approx(expected * value, abs=1e-9)
+
+
+def test_stribeck_partials_at_rest():
+    for gamma in (0.5, *GAMMAS):
+        g, _, by_mu_c, by_mu_s, by_v_s, by_gamma = formulas.stribeck_partials(np, 0.0, **LAW, gamma=gamma)
+        assert (g, by_mu_c, by_mu_s, by_v_s, by_gamma) == (LAW["mu_s"], 0.0, 1.0, 0.0, 0.0)
+
+
+@pytest.mark.parametrize("ratio", [0.1, 0.5, 0.9])
+def test_decay_by_breakaway_is_the_slope(ratio):
+    deflection = ratio + (1.0 - ratio) * np.linspace(0.05, 0.95, 50)
+
+    def decay(s):
+        return formulas.bristle_decay(np, deflection, 0.3, 0.7, 2.0, 1.0, s)
+
+    partial = formulas.bristle_decay_partials(np, deflection, 0.3, 0.7, 2.0, 1.0, ratio)[1]
+    got = formulas.bristle_decay_by_breakaway(np, partial, deflection, ratio)
+    expected = slope(decay, ratio, 1e-3 * (1.0 - ratio))
+    # Truncation (1e-3)^4 of the fifth derivative, some 1e3, over the width; rounding.
+    assert got == pytest.approx(expected, abs=1e-8 / (1.0 - ratio))
+    assert formulas.bristle_decay_by_breakaway(np, 1e-16, 1e6, ratio) == 0.0  # beyond full deflection nothing moves
+
+
+@given(st.floats(0.1, 10.0), st.floats(0.1, 10.0), st.floats(-3.0, 1.0))
+@checked
+def test_mean_decay_partials_are_the_slopes(start, end, log_dt):
+    dt = 10.0**log_dt
+    got = formulas.mean_decay_partials(start, end, dt)
+    expected = (
+        slope(lambda k: formulas.mean_decay(k, end, dt), start, 1e-3 * start),
+        slope(lambda k: formulas.mean_decay(start, k, dt), end, 1e-3 * end),
+    )
+    # Truncation (1e-3)^4 of the fifth derivative; rounding of k over the step, relative to the other argument.
+    assert got == pytest.approx(expected, abs=1e-8)
+
+
+def test_relaxation_slope_is_the_slope():
+    x = 10.0 ** np.linspace(-5.0, 2.0, 300)
+    got = formulas.relaxation_slope(np, x, *formulas.relaxation(np, x))
+    # The slope is ((1 + x) exp(-x) - 1)/x^2, for small x as a series.
+    series = -sum((n + 1) * (-x) ** n / math.factorial(n + 2) for n in range(40))
+    closed = -(-np.expm1(-x) - x * np.exp(-x)) / x**2
+    assert got == pytest.approx(
+        np.where(x < 2.0, series, closed), rel=1e-13
+    )  # above 0.1 a difference loses 1e-16/0.1^2
+    assert formulas.relaxation_slope(np, 0.0, 1.0, 1.0) == -0.5
+
+
 # ---------------------------------------------------------------------- NumPy against compiled loops
 
 
@@ -199,6 +262,11 @@ def compiled(speed, deflection, along, mu_c, mu_s, v_s, gamma, grip, elasto_plas
         out[i, 12] = formulas.reachable_deflection(compiled_math, d, e)
         out[i, 13] = formulas.cap(compiled_math, d, 0.5)
         out[i, 14] = formulas.mean_decay(v, q, decay_dt[i])
+        g = formulas.stribeck_partials(compiled_math, v, mu_c[i], mu_s[i], v_s[i], gamma[i])
+        out[i, 15], out[i, 16], out[i, 17], out[i, 18], out[i, 19], out[i, 20] = g
+        out[i, 21] = formulas.bristle_decay_by_breakaway(compiled_math, q, d, s)
+        out[i, 22], out[i, 23] = formulas.mean_decay_partials(v, q, decay_dt[i])
+        out[i, 24] = formulas.relaxation_slope(compiled_math, decay_dt[i], left[0], left[1])
 
 
 def test_every_formula_gives_the_same_number_in_compiled_loops():
@@ -213,7 +281,7 @@ def test_every_formula_gives_the_same_number_in_compiled_loops():
     along = random.uniform(-1.0, 1.0, n) * speed
     elasto_plastic = random.choice([0.0, 1.0], n)
     decay_dt = 10.0 ** random.uniform(-6, 2.5, n)
-    out = np.empty((n, 15))
+    out = np.empty((n, 25))
     compiled(speed, deflection, along, mu_c, mu_s, v_s, gamma, grip, elasto_plastic, ratio, decay_dt, out)
     bristle = (deflection, along, speed, grip, elasto_plastic, ratio)
     expected = [
@@ -228,6 +296,10 @@ def test_every_formula_gives_the_same_number_in_compiled_loops():
         formulas.reachable_deflection(np, deflection, elasto_plastic),
         formulas.cap(np, deflection, 0.5),
         formulas.mean_decay(speed, grip, decay_dt),
+        *formulas.stribeck_partials(np, speed, mu_c, mu_s, v_s, gamma),
+        formulas.bristle_decay_by_breakaway(np, grip, deflection, ratio),
+        *formulas.mean_decay_partials(speed, grip, decay_dt),
+        formulas.relaxation_slope(np, decay_dt, *formulas.relaxation(np, decay_dt)),
     ]
     # Each formula is some ten roundings of 1e-16. Where a number passes through zero (the sine's ends, which alpha and
     # its slope divide by a width of 0.05 or more; exp of large arguments) its rounding is a share of its largest value.
@@ -237,4 +309,6 @@ def test_every_formula_gives_the_same_number_in_compiled_loops():
         allowed = 1e-14 * np.abs(wanted[finite]) + 1e-15 * np.abs(wanted[finite]).max()
         if column == 11:  # (1 - exp(-x))/x just above 1e-3 amplifies the last place of exp by 1/x
             allowed = allowed + 6e-16 / np.maximum(decay_dt, 1e-3)
+        if column == 24:  # and its slope, above 0.1, by 1/x^2
+            allowed = allowed + 6e-16 / np.maximum(decay_dt, 0.1) ** 2
         assert (np.abs(got[finite] - wanted[finite]) <= allowed).all(), column

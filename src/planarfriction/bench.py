@@ -5,6 +5,7 @@ Machines are shared and noisy: every value is a median, and `ratio` (baseline ov
 
 from __future__ import annotations
 
+import importlib
 import statistics
 import subprocess
 import sys
@@ -228,6 +229,62 @@ def _step_reduced_call(name: str, full: bool) -> Measurement:
     return _line(name, _python_step(model, 2000) * 1e6, "us", "one Python call of rate (NumPy)", rate * 1e6)
 
 
+def _gradient_reduced(name: str, full: bool) -> Measurement:
+    """Half the squared wrenches of a roll-out, with its gradient to all parameters, twists, loads and the state."""
+    from planarfriction import autodiff
+
+    model, twists, dt = ReducedModelPublished(_disc(), _law()), _mixed_twists(2000), 1e-4
+    loads = np.full(len(twists), 2.0)
+
+    def value_and_gradient() -> None:
+        wrenches, _, states = autodiff.rollout_states(model, model.rest(), twists, loads, dt)
+        autodiff.rollout_gradient(model, model.rest(), twists, loads, dt, wrenches, states=states)
+
+    value = _median(value_and_gradient, 15)
+    try:
+        return _line(name, value, "s", "PyTorch, eager, the same roll-out", _eager_gradient(model, twists, dt, full))
+    except ImportError:
+        inputs = len(autodiff.PARAMETERS) + 3 + 4 * len(twists)
+        once = _median(lambda: autodiff.rollout(model, model.rest(), twists, loads, dt), 15)
+        words = f"central differences, 2 x {inputs} roll-outs of {once * 1e3:.2g} ms (PyTorch is not installed)"
+        return _line(name, value, "s", words, 2 * inputs * once)
+
+
+def _eager_gradient(model: ReducedModelPublished, twists: np.ndarray, dt: float, full: bool) -> float:
+    """Time of the same value and gradient, step by step through `planarfriction.torch` and autograd [s]."""
+    import torch
+
+    module = importlib.import_module("planarfriction.torch").ReducedPlanarLuGre(model.patch, model.law).double()
+    profile = torch.tensor(twists, requires_grad=True)
+    loads = torch.full((len(twists),), 2.0, dtype=torch.float64, requires_grad=True)
+
+    def value_and_gradient() -> None:
+        z, loss = torch.zeros(3, dtype=torch.float64, requires_grad=True), torch.zeros((), dtype=torch.float64)
+        for twist, load in zip(profile, loads, strict=True):
+            z, wrench = module.step(z, twist, load, dt)
+            loss = loss + 0.5 * (wrench * wrench).sum()
+        loss.backward()
+
+    return _median(value_and_gradient, 3 if full else 1)
+
+
+def _gradient_reduced_batch(name: str, full: bool) -> Measurement:
+    from planarfriction import autodiff
+
+    model, contacts, steps, dt = ReducedModelPublished(_disc(), _law()), 1000, 1000, 1e-4
+    twists = _mixed_twists(contacts * steps).reshape(contacts, steps, 3)
+    loads = np.full((contacts, steps), 2.0)
+
+    def value_and_gradient() -> None:
+        wrenches, _, states = autodiff.rollout_states(model, model.rest(), twists, loads, dt)
+        autodiff.rollout_gradient(model, model.rest(), twists, loads, dt, wrenches, states=states)
+
+    both = 1e-6 * contacts * steps / _median(value_and_gradient, 5)
+    once = 1e-6 * contacts * steps / _median(lambda: autodiff.rollout(model, model.rest(), twists, loads, dt), 5)
+    words = "the roll-out alone (the ratio is the share of its speed)"
+    return Measurement(name, both, "million contact-steps/s", words, once, both / once)
+
+
 def _import(name: str, full: bool) -> Measurement:
     def seconds(module: str) -> float:
         code = f"import time; t = time.perf_counter(); import {module}; print(time.perf_counter() - t)"
@@ -248,6 +305,8 @@ BENCHMARKS: dict[str, Callable[[str, bool], Measurement]] = {
     "step.reduced.loop": _step_reduced_loop,
     "step.distributed.loop": _step_distributed_loop,
     "step.reduced.call": _step_reduced_call,
+    "gradient.reduced": _gradient_reduced,
+    "gradient.reduced.batch": _gradient_reduced_batch,
     "import": _import,
 }
 """Benchmarks by name."""

@@ -1,0 +1,456 @@
+"""Derivatives of steps and roll-outs: closed forms, kinks, differences, and backwards against forwards."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import planarfriction as pf
+from planarfriction import autodiff
+from planarfriction.autodiff import PARAMETERS
+from planarfriction.errors import InvalidValueError
+
+PLAIN = pf.LuGre()
+ELASTIC = pf.LuGre(elasto_plastic=pf.ElastoPlastic(0.9))
+WIDE = pf.LuGre(gamma=1.5, elasto_plastic=pf.ElastoPlastic(0.3))
+LAWS = {"plain": PLAIN, "elasto-plastic": ELASTIC, "wide": WIDE}
+SURFACES = {
+    "cells": pf.LimitSurfaceCells,
+    "table": pf.LimitSurfaceTable,
+    "published": pf.LimitSurfaceTablePublished,
+    "ellipsoid": pf.LimitSurfaceEllipsoid,
+}
+PATCH = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
+LOAD, DT, T = 2.0, 1e-4, 12
+
+every_surface = pytest.mark.parametrize("kind", SURFACES)
+every_law = pytest.mark.parametrize("law", LAWS)
+
+
+@functools.cache
+def model_of(kind: str, law: str = "elasto-plastic"):
+    """A model by name: "distributed" or the reduced one with a kind of limit surface."""
+    if kind == "distributed":
+        return pf.DistributedModel(PATCH, LAWS[law])
+    return pf.ReducedModelPublished(PATCH, LAWS[law], surface=SURFACES[kind](PATCH))
+
+
+def radius(model) -> float:
+    return model.shape_at(LOAD).contact_radius
+
+
+def drive(model, seed: int = 0, steps: int = T):
+    """A random walk in the space of twists that starts, slides, spins, turns back; loads; a state."""
+    random = np.random.default_rng(seed)
+    scale = np.array([1.0, 1.0, 1.0 / radius(model)])
+    twists = np.cumsum(random.normal(size=(steps, 3)), axis=0) * 3e-3 * scale
+    loads = random.uniform(1.0, 3.0, steps)
+    return random.normal(size=3) * 4e-7 / scale, twists, loads
+
+
+def inputs_of(model, seed: int = 0):
+    state, twists, loads = drive(model, seed)
+    return {"state": state, "twists": twists, "loads": loads, "parameters": autodiff.parameters_of(model)}
+
+
+def units_of(model) -> dict:
+    """The natural size of each input."""
+    r = radius(model)
+    parameters = np.abs(autodiff.parameters_of(model)) + (np.arange(12) >= 10) * r
+    return {
+        "state": 1e-6 * np.array([1.0, 1.0, r]),
+        "twists": 3e-3 * np.array([1.0, 1.0, 1.0 / r]),
+        "loads": 1.0,
+        "parameters": parameters * (np.arange(12) != 7) + 0.1 * (np.arange(12) == 7),
+    }
+
+
+def rolled(model, inputs) -> autodiff.Rollout:
+    return autodiff.rollout(model, inputs["state"], inputs["twists"], inputs["loads"], DT, inputs["parameters"])
+
+
+# ---------------------------------------------------------------------- the roll-out
+
+
+@every_surface
+@every_law
+def test_a_rollout_takes_the_steps_of_the_model(kind, law):
+    model = model_of(kind, law)
+    state, twists, loads = drive(model)
+    loads[5] = 0.0
+    wrenches, end = autodiff.rollout(model, state, twists, loads, DT)
+    on_the_way = autodiff.rollout_states(model, state, twists, loads, DT)
+    assert np.array_equal(on_the_way.wrenches, wrenches) and np.array_equal(on_the_way.state, end)
+    for t in range(T):
+        # The same code, inlined elsewhere: sums may be ordered differently.
+        assert on_the_way.states[t] == pytest.approx(state, rel=1e-12, abs=1e-20)
+        state, wrench = model.step(state, twists[t], loads[t], DT)
+        assert wrenches[t] == pytest.approx(wrench, rel=1e-12, abs=1e-14)
+    assert end == pytest.approx(state, rel=1e-12, abs=1e-20)
+
+
+def test_parameters_take_the_place_of_the_models_own():
+    model, other = model_of("ellipsoid"), pf.LuGre(0.4, 0.9, 2e-3, 3e5, 50.0, 0.7, 1.3, pf.ElastoPlastic(0.5))
+    changed = pf.ReducedModelPublished(PATCH, other, surface=pf.LimitSurfaceEllipsoid(PATCH))
+    state, twists, loads = drive(model)
+    got = autodiff.rollout(model, state, twists, loads, DT, autodiff.parameters_of(changed))
+    assert np.array_equal(got.wrenches, autodiff.rollout(changed, state, twists, loads, DT).wrenches)
+
+
+# ---------------------------------------------------------------------- closed forms
+
+
+@pytest.mark.parametrize("law", ["plain", "elasto-plastic"])
+def test_a_contact_at_rest_is_a_spring_and_two_dampers(law):
+    """From rest at zero twist `W = -(sigma_0 u dt + sigma_1 u + sigma_2 U V) f_N` to first order."""
+    model = model_of("ellipsoid", law)
+    j, numbers = model.step_jacobians(model.rest(), np.zeros(3), LOAD, DT), model.law
+    (x, y), r = model.shape_at(LOAD).centre_of_pressure, radius(model)
+    to_centre = np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]])
+    bristle = (numbers.sigma_0 * DT + numbers.sigma_1) * np.diag([1.0, 1.0, r * r])
+    viscous = numbers.sigma_2 * np.diag([1.0, 1.0, model.shape_at(LOAD).second_moment])
+    # Rounding of ten operations.
+    assert j.wrench_twist == pytest.approx(-LOAD * to_centre.T @ (bristle + viscous) @ to_centre, rel=1e-13, abs=1e-15)
+    assert j.state_state == pytest.approx(np.eye(3), rel=1e-13)
+
+
+@every_surface
+@every_law
+def test_a_long_step_ends_in_the_steady_state_of_its_parameters(kind, law):
+    """`W = -(g(v) S h + sigma_2 U V) f_N`: neither stiffness nor damping nor the start matter."""
+    model, twist = model_of(kind, law), np.array([2e-3, -1e-3, 0.3])
+    wrenches, slopes = autodiff.rollout_sensitivities(model, model.rest(), twist[None], LOAD, 1e6)
+    by = dict(zip(PARAMETERS, slopes[0].T, strict=True))
+    numbers, shape = model.law, model.shape_at(LOAD)
+    unit = LOAD * model.surface.wrench(twist)
+    v = np.hypot(
+        np.hypot(*(twist[:2] + twist[2] * shape.centre_of_pressure[::-1] * (-1, 1))), shape.contact_radius * 0.3
+    )
+    share = np.exp(-((v / numbers.v_s) ** numbers.gamma))
+    # What the bristle remembers: 1e-9 of the step. Rounding of g over h.
+    assert by["mu_c"] == pytest.approx((1.0 - share) * unit, rel=1e-8)
+    assert by["mu_s"] == pytest.approx(share * unit, rel=1e-8, abs=1e-12)
+    for name in ("sigma_0", "sigma_1", "breakaway_ratio"):
+        assert by[name] * max(getattr(numbers, name, 1.0), 1.0) == pytest.approx(np.zeros(3), abs=1e-8), name
+    assert by["sigma_2"][:2] == pytest.approx(
+        (wrenches[0] - unit * _friction(numbers, v))[:2] / numbers.sigma_2, rel=1e-6
+    )
+
+
+def _friction(law, v):
+    from planarfriction import formulas
+
+    return formulas.stribeck(np, v, law.mu_c, law.mu_s, law.v_s, law.gamma)
+
+
+# ---------------------------------------------------------------------- kinks
+
+
+@every_surface
+@every_law
+def test_gradients_are_finite_at_every_kink(kind, law):
+    model = model_of(kind, law)
+    r = radius(model)
+    z = np.array([4e-7, -3e-7, 2e-7 * r])
+    rotation, (x, y) = 0.5, model.shape_at(LOAD).centre_of_pressure
+    spin = np.array([rotation * y, -rotation * x, rotation])  # about the centre of pressure: the axis of the tables
+    twists = [np.zeros(3), spin, -spin, 1e-300 * spin, 1e-160 * spin, [1e-3, 0, 0], [0, 1e-3, 0], [1e-3, 1e-3, 0]]
+    back = -z / DT / np.array([1.0, 1.0, r * r])  # takes the ellipsoid's bristle exactly to zero
+    twists.append([back[0] + y * back[2], back[1] - x * back[2], back[2]])
+    states = [np.zeros(3), z, 1e-300 * z, 1e-160 * z, -z, 1e4 * z]
+    for state in states:
+        for twist in twists:
+            for load in (0.0, LOAD):
+                for dt in (0.0, 1e-12, DT, 1e9):
+                    gradient = autodiff.rollout_gradient(
+                        model, state, np.tile(twist, (2, 1)), load, dt, np.ones((2, 3)), np.ones(3)
+                    )
+                    for name, value in gradient._asdict().items():
+                        assert np.isfinite(value).all(), (name, state, twist, load, dt)
+
+
+@every_surface
+def test_without_load_nothing_passes_but_the_load(kind):
+    model = model_of(kind)
+    state, twists, loads = drive(model)
+    loads[6] = 0.0
+    bar = np.ones((T, 3))
+    gradient = autodiff.rollout_gradient(
+        model, state, twists, loads, DT, bar * (np.arange(T) >= 6)[:, None], np.ones(3)
+    )
+    assert not gradient.state.any() and not gradient.twists[:7].any() and not gradient.loads[:6].any()
+    assert gradient.twists[7:].all()
+    # The slope to the load: the wrench per newton that a small load would have.
+    before = autodiff.rollout_states(model, state, twists, loads, DT).states[6]
+    assert gradient.loads[6] == pytest.approx(model.step(before, twists[6], 1e-3, DT)[1].sum() / 1e-3, rel=1e-10)
+
+
+# ---------------------------------------------------------------------- against differences
+
+
+@every_surface
+@every_law
+def test_the_gradient_of_a_rollout_is_that_of_differences(kind, law):
+    model = model_of(kind, law)
+    inputs, units = inputs_of(model, seed=3), units_of(model)
+    random = np.random.default_rng(1)
+    bars = random.normal(size=(T, 3)) / (1.0, 1.0, radius(model)), random.normal(size=3) / units["state"]
+
+    def value(changed):
+        wrenches, end = rolled(model, changed)
+        return (bars[0] * wrenches).sum() + (bars[1] * end).sum()
+
+    gradient = autodiff.rollout_gradient(
+        model, inputs["state"], inputs["twists"], inputs["loads"], DT, *bars, inputs["parameters"]
+    )
+    for name, of in gradient._asdict().items():
+        scaled = of * units[name]
+        expected = np.empty_like(scaled)
+        for index in np.ndindex(scaled.shape):
+            step = np.zeros_like(scaled)
+            step[index] = 1e-6
+            low, high = ({**inputs, name: inputs[name] + sign * step * units[name]} for sign in (-1.0, 1.0))
+            expected[index] = (value(high) - value(low)) / 2e-6
+        # Differences lose 1e-16/1e-6 to rounding of a value near 10 and (1e-6)^2 to truncation, but 1e-5 or so of the
+        # largest slope where a bristle passes an end of its elasto-plastic range, whose curvature jumps.
+        assert scaled == pytest.approx(expected, rel=1e-5, abs=1e-7 * np.abs(scaled).max() + 1e-8), name
+
+
+sliding_or_stuck = {
+    "log_dt": st.floats(-9.0, 3.0),
+    "seed": st.integers(0, 1000),
+    "log_size": st.floats(-9.0, -5.0),
+    "log_speed": st.floats(-7.0, 0.0),
+    "turn": st.sampled_from([-1.0, 0.0, 1.0]),
+}
+
+
+@every_surface
+@every_law
+def test_slopes_of_a_step_lie_between_those_of_its_sides(kind, law):
+    """In stick, slip and reversal, for short and long steps; across a kink, anything between the two sides."""
+    model = model_of(kind, law)
+    scale = np.array([1.0, 1.0, radius(model)])
+
+    @given(**sliding_or_stuck)
+    @settings(deadline=None, max_examples=30)
+    def check(log_dt, seed, log_size, log_speed, turn):
+        random, dt = np.random.default_rng(seed), 10.0**log_dt
+        direction = random.normal(size=3)
+        state = direction * 10.0**log_size * scale
+        twist = (turn * direction + 0.3 * random.normal(size=3)) * 10.0**log_speed / scale
+        move, turned = random.normal(size=3), random.normal(size=3)
+        moves = move * 10.0**log_size * scale, turned * 10.0**log_speed / scale, 1.0
+        j = model.step_jacobians(state, twist, LOAD, dt)
+        got = j.wrench_state @ moves[0] + j.wrench_twist @ moves[1] + j.wrench_load * moves[2]
+        got_state = j.state_state @ moves[0] + j.state_twist @ moves[1]
+
+        def at(length):
+            return model.step(state + length * moves[0], twist + length * moves[1], LOAD + length * moves[2], dt)
+
+        h, (here_state, here) = 1e-6, at(0.0)
+        (high_state, high), (low_state, low) = at(h), at(-h)
+        for slope, right, left, value in (
+            (got / scale, (high - here) / h / scale, (here - low) / h / scale, here / scale),
+            (
+                got_state / scale,
+                (high_state - here_state) / h / scale,
+                (here_state - low_state) / h / scale,
+                state / scale,
+            ),
+        ):
+            # Rounding of the values over the step, and half the difference of the sides (curvature, or a kink).
+            size = np.abs(value).max() + np.abs(here_state / scale).max() * (1.0 if value is not here else 0.0)
+            allowed = 2e-9 * size + 1e-5 * np.abs(slope).max() + 0.51 * np.abs(right - left)
+            assert (np.abs(slope - 0.5 * (right + left)) <= allowed).all()
+
+    check()
+
+
+@pytest.mark.parametrize("kind", ["distributed", *SURFACES])
+@every_law
+def test_jacobians_of_a_step_are_those_of_differences(kind, law):
+    model = model_of(kind, law)
+    for seed, size in enumerate((2e-7, 6e-7, 1.1e-6, 3e-6)):
+        random = np.random.default_rng(seed)
+        units = np.ones(model.state_shape) if kind == "distributed" else np.array([1.0, 1.0, radius(model)])
+        state = random.normal(size=model.state_shape) * size * units
+        twist = random.normal(size=3) * (5e-3, 5e-3, 1.0)
+        moves = random.normal(size=model.state_shape) * size * units, random.normal(size=3) * (5e-3, 5e-3, 1.0), 0.7
+        j = model.step_jacobians(state, twist, LOAD, DT)
+        if kind == "distributed":
+            got = np.einsum("abn,bn->an", j.state_state, moves[0]) + j.state_twist @ moves[1]
+            pulled = np.einsum("dbn,bn->d", j.wrench_state, moves[0])
+        else:
+            got, pulled = j.state_state @ moves[0] + j.state_twist @ moves[1], j.wrench_state @ moves[0]
+        pulled = pulled + j.wrench_twist @ moves[1] + j.wrench_load * moves[2]
+        high, low = (
+            model.step(state + h * moves[0], twist + h * moves[1], LOAD + h * moves[2], DT) for h in (1e-6, -1e-6)
+        )
+        # Rounding 1e-16/1e-6 of the values; truncation 1e-12 of the curvature, 1e-6 where that jumps.
+        expected, expected_wrench = (high[0] - low[0]) / 2e-6, (high[1] - low[1]) / 2e-6
+        assert got / units == pytest.approx(expected / units, abs=1e-6 * np.abs(expected / units).max())
+        assert pulled == pytest.approx(expected_wrench, rel=1e-6, abs=1e-6 * np.abs(expected_wrench[:2]).max() * 0.01)
+
+
+# ---------------------------------------------------------------------- backwards against forwards
+
+
+@every_surface
+@every_law
+def test_the_adjoint_is_the_transpose_of_the_sensitivities(kind, law):
+    model = model_of(kind, law)
+    state, twists, loads = drive(model, seed=5)
+    bar = np.random.default_rng(2).normal(size=(T, 3)) / (1.0, 1.0, radius(model))
+    wrenches, slopes = autodiff.rollout_sensitivities(model, state, twists, loads, DT)
+    assert np.array_equal(wrenches, autodiff.rollout(model, state, twists, loads, DT).wrenches)
+    terms = np.einsum("ti,tip->tip", bar, slopes)
+    gradient = autodiff.rollout_gradient(model, state, twists, loads, DT, bar)
+    # Sums in another order.
+    assert (np.abs(gradient.parameters - terms.sum((0, 1))) <= 1e-12 * np.abs(terms).sum((0, 1))).all()
+    if law == "plain":
+        assert gradient.parameters[PARAMETERS.index("breakaway_ratio")] == 0.0
+
+
+@every_surface
+@every_law
+def test_the_adjoint_is_the_transpose_of_the_jacobians(kind, law):
+    """`<bar, J dx> = <J' bar, dx>` for changes of state, twists and loads, `J` step by step."""
+    model, random = model_of(kind, law), np.random.default_rng(4)
+    state, twists, loads = drive(model, seed=6)
+    units = units_of(model)
+    bar, end_bar = random.normal(size=(T, 3)) / (1.0, 1.0, radius(model)), random.normal(size=3) / units["state"]
+    change = random.normal(size=3) * units["state"]
+    turns, pushes = random.normal(size=(T, 3)) * units["twists"], random.normal(size=T)
+    gradient = autodiff.rollout_gradient(model, state, twists, loads, DT, bar, end_bar)
+    backwards = [(gradient.state * change).sum(), (gradient.twists * turns).sum(), (gradient.loads * pushes).sum()]
+    forwards = []
+    for before, twist, load, turn, push, w_bar in zip(
+        autodiff.rollout_states(model, state, twists, loads, DT).states, twists, loads, turns, pushes, bar, strict=True
+    ):
+        j = model.step_jacobians(before, twist, load, DT)
+        forwards.append(w_bar @ (j.wrench_state @ change + j.wrench_twist @ turn + j.wrench_load * push))
+        change = j.state_state @ change + j.state_twist @ turn
+    forwards.append(end_bar @ change)
+    assert sum(backwards) == pytest.approx(sum(forwards), abs=1e-12 * np.abs(forwards).sum())
+
+
+def test_sensitivities_of_chosen_parameters():
+    model = model_of("published")
+    state, twists, loads = drive(model)
+    _, slopes = autodiff.rollout_sensitivities(model, state, twists, loads, DT)
+    _, chosen = autodiff.rollout_sensitivities(model, state, twists, loads, DT, ("v_s", "mu_c"))
+    assert np.array_equal(chosen, slopes[..., [PARAMETERS.index("v_s"), PARAMETERS.index("mu_c")]])
+
+
+# ---------------------------------------------------------------------- batches
+
+
+def test_a_batch_is_a_loop():
+    model, random = model_of("published"), np.random.default_rng(8)
+    states = np.stack([drive(model, seed)[0] for seed in range(3)])[:, None]  # [3, 1]
+    twists = np.stack([drive(model, seed)[1] for seed in range(2)])  # [2]
+    loads, dt = drive(model)[2], random.uniform(0.5e-4, 1e-4, T)
+    parameters = autodiff.parameters_of(model) * random.uniform(0.9, 1.0, (3, 1, 12))
+    bar, end_bar = random.normal(size=(3, 2, T, 3)), random.normal(size=(3, 2, 3))
+    wrenches, ends = autodiff.rollout(model, states, twists, loads, dt, parameters)
+    gradient = autodiff.rollout_gradient(model, states, twists, loads, dt, bar, end_bar, parameters)
+    slopes = autodiff.rollout_sensitivities(model, states, twists, loads, dt, PARAMETERS, parameters)[1]
+    assert wrenches.shape == (3, 2, T, 3) and ends.shape == (3, 2, 3) and slopes.shape == (3, 2, T, 3, 12)
+    assert [g.shape for g in gradient] == [a.shape for a in (states, twists, loads, parameters)]
+    total = [np.zeros_like(g) for g in gradient]
+    for i, j in np.ndindex(3, 2):
+        one = states[i, 0], twists[j], loads, dt
+        single = autodiff.rollout(model, *one, parameters[i, 0])
+        assert np.array_equal(wrenches[i, j], single.wrenches) and np.array_equal(ends[i, j], single.state)
+        alone = autodiff.rollout_gradient(model, *one, bar[i, j], end_bar[i, j], parameters[i, 0])
+        for sum_of, where, g in zip(total, ((i, 0), j, ..., (i, 0)), alone, strict=True):
+            sum_of[where] += g
+        assert np.array_equal(
+            slopes[i, j], autodiff.rollout_sensitivities(model, *one, PARAMETERS, parameters[i, 0])[1]
+        )
+    for got, wanted in zip(gradient, total, strict=True):
+        assert got == pytest.approx(wanted, rel=1e-11)  # sums in another order
+
+
+def test_kept_states_and_several_threads_change_nothing():
+    model = model_of("ellipsoid")
+    state, twists, loads = drive(model, steps=500)
+    scales = np.linspace(0.5, 1.0, 150)[:, None, None]  # 75,000 steps: enough for more than one thread
+    bar = np.ones((500, 3))
+    states = autodiff.rollout_states(model, state, scales * twists, loads, DT).states
+    kept = autodiff.rollout_gradient(model, state, scales * twists, loads, DT, bar, states=states)
+    again = autodiff.rollout_gradient(model, state, scales * twists, loads, DT, bar)
+    for first, second in zip(kept, again, strict=True):
+        assert np.array_equal(first, second)
+    last = autodiff.rollout_gradient(model, state, scales[-1] * twists, loads, DT, bar)
+    assert np.array_equal(kept.twists[-1], last.twists)
+
+
+def test_one_load_for_all_steps_gets_the_sum():
+    model = model_of("ellipsoid")
+    state, twists, _ = drive(model)
+    whole = autodiff.rollout_gradient(model, state, twists, LOAD, DT, np.ones((T, 3)))
+    each = autodiff.rollout_gradient(model, state, twists, np.full(T, LOAD), DT, np.ones((T, 3)))
+    assert whole.loads.shape == () and float(whole.loads) == pytest.approx(each.loads.sum(), rel=1e-13)
+
+
+# ---------------------------------------------------------------------- errors
+
+FINGER = pf.ContactPatch.rectangle(
+    0.02, cells=21, pressure=pf.SoftFinger(c=6 * 0.02 / 21, n=1 / 3, k=2.0, radius_max=0.01)
+)
+
+
+def test_a_shape_that_follows_the_load_is_refused_and_a_kept_one_is_not():
+    surface = pf.LimitSurfaceEllipsoid(FINGER, normal_force=1.0)
+    kept = pf.ReducedModelPublished(FINGER, ELASTIC, surface=surface, on_load_change="keep")
+    _, twists, loads = drive(kept)
+    wrenches, _ = autodiff.rollout(kept, kept.rest(), twists, loads, DT)
+    assert wrenches[0] == pytest.approx(kept.step(kept.rest(), twists[0], loads[0], DT)[1], rel=1e-12)
+    for how in ("rebuild", "rescale"):
+        model = pf.ReducedModelPublished(FINGER, ELASTIC, surface=surface, on_load_change=how)
+        with pytest.raises(InvalidValueError, match=f"shape that does not follow the load.*on_load_change='{how}'"):
+            autodiff.rollout(model, model.rest(), twists, loads, DT)
+
+
+@pytest.mark.parametrize(
+    ("changed", "message"),
+    [
+        ({"state": np.zeros(2)}, r"state must have shape \[..., 3\]"),
+        ({"twists": np.zeros(3)}, r"twists must have shape \[..., T, 3\]"),
+        ({"twists": np.full((T, 3), np.nan)}, "twists must be finite"),
+        ({"loads": np.ones(T - 1)}, rf"loads must be one number or have shape \[..., {T}\]"),
+        ({"loads": -1.0}, "loads must be >= 0, got -1.0"),
+        ({"dt": np.ones((T, 1))}, rf"dt must be one number or have shape \[{T}\]"),
+        ({"parameters": np.ones(11)}, r"parameters must have shape \[..., 12\]"),
+        ({"parameters": np.zeros(12)}, "sigma_0 must be > 0, got 0.0"),
+        ({"parameters": np.ones(12)}, r"breakaway_ratio must be in \[0, 1\), got 1.0"),
+        ({"state": np.zeros((2, 3)), "twists": np.zeros((3, T, 3))}, "batch axes must broadcast"),
+        ({"wrenches_bar": np.ones((T + 1, 3))}, rf"wrenches_bar must have shape \[..., {T}, 3\]"),
+        ({"model": "a"}, "model must be a ReducedModelPublished, got str"),
+    ],
+)
+def test_wrong_input_is_one_clear_line(changed, message):
+    model = model_of("ellipsoid")
+    state, twists, loads = drive(model)
+    inputs = {
+        "model": model,
+        "state": state,
+        "twists": twists,
+        "loads": loads,
+        "dt": DT,
+        "wrenches_bar": np.ones((T, 3)),
+    }
+    with pytest.raises(InvalidValueError, match=message):
+        autodiff.rollout_gradient(**{**inputs, **changed})
+
+
+def test_unknown_names_are_refused():
+    model = model_of("ellipsoid")
+    with pytest.raises(InvalidValueError, match="did you mean 'mu_s'"):
+        autodiff.rollout_sensitivities(model, *drive(model), DT, names=["mu_k"])
