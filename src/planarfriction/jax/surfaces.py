@@ -137,9 +137,9 @@ def _potential(size: int, data, twist):
     cell, a, b, polar, azimuth = _place(size, data, x, y, s)
     segment = 0.5 * math.pi / size
     (av, af, _), (bv, bf, _) = _hermite(a), _hermite(b)
-    phi = _blend(cell, 0, _ROW, segment, av, bv)
-    d_polar = _blend(cell, 0, _ROW, segment, af, bv) / segment
-    d_azimuth = _blend(cell, 0, _ROW, segment, av, bf) / segment
+    phi = _blend(cell, 0, _ROW, segment, av, bv, 1.0)
+    d_polar = _blend(cell, 0, _ROW, segment, af, bv, 1.0) / segment
+    d_azimuth = _blend(cell, 0, _ROW, segment, av, bf, 0.0) / segment
     sin_p, cos_p, sin_a, cos_a = jnp.sin(polar), jnp.cos(polar), jnp.sin(azimuth), jnp.cos(azimuth)
     # directions moved out to that angle keep their own sine, which is smaller by 2e-11 of itself
     across = d_azimuth / jnp.where(sin_p > (1.0 - 1e-10) * kernels._AXIS, sin_p, kernels._AXIS)

@@ -11,7 +11,7 @@ its `k` into those of `z`, `u`, `v`, `h`, `q` and the breakaway ratio.
 
 At the kinks: the slope of a norm at zero is zero, and `along` of no bristle is constant. A minimum or maximum of equal
 numbers has the slope of its first argument. A bristle that the cap just touches counts as not capped: steady sliding
-sits on the cap to the last bit, and rounding must not decide which derivative it has.
+sits on the cap to the last bit, and whether rounding lifts it over must not decide about its slope.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from planarfriction import formulas
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import inlined
 
-_MORE_THAN_ROUNDING = 1.0 + 256.0 * 2.0**-52
+_ROUNDING = 1.0 + 256.0 * 2.220446049250313e-16
 
 
 class Stage(NamedTuple):
@@ -113,7 +113,7 @@ def linearise(law, zx, zy, zs, ux, uy, us, v, per_h, q, dt):
     nx, ny, ns = left * zx + push * ux, left * zy + push * uy, left * zs + push * us
     place = _place(nx, ny, ns, ux, uy, us, per_h)
     largest = formulas.reachable_deflection(xp, deflection, law.elasto_plastic)
-    capped = place[3] * to_deflection > largest * _MORE_THAN_ROUNDING
+    capped = place[3] * to_deflection > _ROUNDING * largest
     back = formulas.cap(xp, place[3] * to_deflection, largest)
     end = _stage(law, place, place[3] * back * to_deflection, v, q)
     return BristleStep(

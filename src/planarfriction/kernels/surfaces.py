@@ -106,18 +106,21 @@ def _hermite(t):
 
 
 @kernel
-def _blend(data, p, row, segment, a, b):
-    """Bicubic value from the basis `a` along the polar angle and `b` along the azimuth."""
+def _blend(data, p, row, segment, a, b, whole):
+    """Bicubic value from the basis `a` along the polar angle and `b` along the azimuth.
+
+    Azimuth's neighbours enter by their differences: near the spin axis, where they are equal but for little, its second
+    derivative is divided by the square of the distance, and the rounding of two large terms would be too. `whole` is
+    `b[0] + b[1]` without rounding: 1 for the value, 0 for a derivative along the azimuth.
+    """
     total = 0.0
     for i in range(2):
+        q = p + i * row
+        low = a[i] * data[q] + a[i + 2] * segment * data[q + 1]
+        change = a[i] * (data[q + 4] - data[q]) + a[i + 2] * segment * (data[q + 5] - data[q + 1])
+        total += whole * low + b[1] * change
         for j in range(2):
-            q = p + i * row + 4 * j
-            total += (
-                a[i] * b[j] * data[q]
-                + a[i + 2] * b[j] * segment * data[q + 1]
-                + a[i] * b[j + 2] * segment * data[q + 2]
-                + a[i + 2] * b[j + 2] * segment * segment * data[q + 3]
-            )
+            total += segment * b[j + 2] * (a[i] * data[q + 4 * j + 2] + a[i + 2] * segment * data[q + 4 * j + 3])
     return total
 
 
@@ -141,9 +144,9 @@ def _potential(data, start, size, x, y, s, speed):
     segment = 0.5 * math.pi / size
     av, af, _ = _hermite(a)
     bv, bf, _ = _hermite(b)
-    phi = _blend(data, p, row, segment, av, bv)
-    d_polar = _blend(data, p, row, segment, af, bv) / segment
-    d_azimuth = _blend(data, p, row, segment, av, bf) / segment
+    phi = _blend(data, p, row, segment, av, bv, 1.0)
+    d_polar = _blend(data, p, row, segment, af, bv, 1.0) / segment
+    d_azimuth = _blend(data, p, row, segment, av, bf, 0.0) / segment
     sin_p, cos_p = math.sin(polar), math.cos(polar)
     sin_a, cos_a = math.sin(azimuth), math.cos(azimuth)
     across = d_azimuth / xp.maximum(sin_p, _AXIS)
@@ -169,12 +172,12 @@ def _potential_jacobian(data, start, size, x, y, s, out):
         a = _AXIS / segment
     av, af, a2 = _hermite(a)
     bv, bf, b2 = _hermite(b)
-    phi = _blend(data, p, row, segment, av, bv)
-    d_p = _blend(data, p, row, segment, af, bv) / segment
-    d_a = _blend(data, p, row, segment, av, bf) / segment
-    d_pp = _blend(data, p, row, segment, a2, bv) / segment**2
-    d_pa = _blend(data, p, row, segment, af, bf) / segment**2
-    d_aa = _blend(data, p, row, segment, av, b2) / segment**2
+    phi = _blend(data, p, row, segment, av, bv, 1.0)
+    d_p = _blend(data, p, row, segment, af, bv, 1.0) / segment
+    d_a = _blend(data, p, row, segment, av, bf, 0.0) / segment
+    d_pp = _blend(data, p, row, segment, a2, bv, 1.0) / segment**2
+    d_pa = _blend(data, p, row, segment, af, bf, 0.0) / segment**2
+    d_aa = _blend(data, p, row, segment, av, b2, 0.0) / segment**2
     sin_p, cos_p, sin_a, cos_a = _sines(x, y, s, polar)
     radial = (sin_p * cos_a, sin_p * sin_a, cos_p)
     along = (cos_p * cos_a, cos_p * sin_a, -sin_p)  # unit vector of growing polar angle
@@ -189,7 +192,7 @@ def _potential_jacobian(data, start, size, x, y, s, out):
         h = phi * radial[i] + d_p * along[i] + h_across * across[i] + n[i] - 2.0 * c * radial[i]
         to_radial = h + 8.0 * c * radial[i] - 2.0 * n[i]
         to_along, to_across = m_pp * along[i] + m_pa * across[i], m_pa * along[i] + m_aa * across[i]
-        to_axis = 2.0 * cos_p * lean[i] + n[2] / cos_p * axis[i] if cos_p > 0.0 else 0.0
+        to_axis = 2.0 * cos_p * lean[i] + 2.0 * (lean[0] * radial[0] + lean[1] * radial[1]) * axis[i]
         for j in range(3):
             out[3 * i + j] = to_radial * radial[j] + to_along * along[j] + to_across * across[j]
             out[3 * i + j] += to_axis * axis[j] - 2.0 * radial[i] * n[j] + 2.0 * cos_p * axis[i] * lean[j]
