@@ -20,7 +20,7 @@ ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")] + sorted(
     (ROOT / "docs").glob("*.md")
 )
-MODULES = {module.name for module in pkgutil.iter_modules(planarfriction.__path__)}
+MODULES = {module.name for module in pkgutil.iter_modules(planarfriction.__path__)} - {"jax", "torch"}
 
 FENCE = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
@@ -67,7 +67,7 @@ def test_the_python_of_a_page_runs_and_prints_what_the_page_says(page, tmp_path,
     """In order, in one namespace, in an empty folder.
 
     A block whose first line is `# name.toml` (or .csv) is written to that file; a `text` block right after Python is
-    what the Python prints, to the last character.
+    what the Python prints, to the last character. A page whose block begins with `# needs package` is skipped without.
     """
     monkeypatch.chdir(tmp_path)
     namespace: dict = {"__name__": page.stem}
@@ -77,6 +77,8 @@ def test_the_python_of_a_page_runs_and_prints_what_the_page_says(page, tmp_path,
     try:
         for block in blocks(page):
             if block.language == "python":
+                if needed := re.match(r"# needs (\w+)\n", block.text):
+                    pytest.importorskip(needed[1])
                 output = io.StringIO()
                 code = compile("\n" * (block.line - 1) + block.text, str(page), "exec")
                 with contextlib.redirect_stdout(output):
