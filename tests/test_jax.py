@@ -209,7 +209,7 @@ def test_gradients_are_central_differences(kind, law):
     for direction in directions:
         h = 1e-5  # error of the difference: 1e-10 of curvature, 1e-11 of rounding
         expected = (loss(h * direction) - loss(-h * direction)) / (2.0 * h)
-        assert gradient @ direction == pytest.approx(expected, rel=1e-5, abs=1e-7 * np.linalg.norm(gradient))
+        assert float(gradient @ direction) == pytest.approx(float(expected), rel=1e-5, abs=1e-7 * np.linalg.norm(gradient))
 
 
 # ---------------------------------------------------------------------- kinks
@@ -266,7 +266,7 @@ def test_scan_and_adjoint_agree_at_kinks_too(kind, law):
         (value, scan), (same, adjoint) = (
             slopes(model.parameters, state, twist, load, method) for method in ("scan", "adjoint")
         )
-        assert value == pytest.approx(same, rel=1e-11)
+        assert float(value) == pytest.approx(float(same), rel=1e-11)
         sizes = [*(abs(p) for p in model.parameters), 1e-6, 1e-3, 1.0]
         for size, first, second in zip(sizes, jax.tree.leaves(scan), jax.tree.leaves(adjoint), strict=True):
             assert np.isfinite(first).all() and np.isfinite(second).all()
@@ -296,7 +296,7 @@ def test_adjoint_under_vmap_and_in_single_precision():
         close(by_method[0], by_method[1], 1e-9)
     pair = np.stack([motion, 2.0 * motion])
     slopes = [jax.grad(loss)(0.8, 1e-4, 1.0, pair, method) for method in ("scan", "adjoint")]
-    assert slopes[0] == pytest.approx(slopes[1], rel=1e-9)
+    assert float(slopes[0]) == pytest.approx(float(slopes[1]), rel=1e-9)
     single = jax.tree.map(lambda leaf: leaf.astype(jnp.float32), model)
     run = pj.simulate(single, motion.astype(np.float32), np.float32(1.0), np.float32(1e-4), method="adjoint")
     assert run.wrenches.dtype == run.state.dtype == jnp.float32
@@ -378,7 +378,7 @@ def test_single_precision_stays_single(kind):
     for part in jax.tree.leaves(slopes):
         assert part.dtype == jnp.float32 and np.isfinite(part).all()
     expected = pj.simulate(model, sway(50, 1e-4), 1.0, 1e-4).wrenches.sum()
-    assert run == pytest.approx(expected, rel=1e-3)  # 1e-7 in z is 0.1 of rounding times sigma_0
+    assert float(run) == pytest.approx(float(expected), rel=1e-3)  # 1e-7 in z is 0.1 of rounding times sigma_0
 
 
 def test_wrong_input_is_named():
