@@ -58,7 +58,8 @@ def _rollout_fwd(kind: _Kind, data, dt, *inputs):
 def _rollout_bwd(kind: _Kind, values, cotangents):
     _, _, parameters, state, twists, loads = values
     shapes = [jax.ShapeDtypeStruct(value.shape, value.dtype) for value in (parameters, state, twists, loads)]
-    bars = [jnp.zeros(c.aval.shape, c.aval.dtype) if isinstance(c, SymbolicZero) else c for c in cotangents]
+    results = (twists, state)
+    bars = [jnp.zeros_like(r) if isinstance(c, SymbolicZero) else c for c, r in zip(cotangents, results, strict=True)]
     slopes = jax.pure_callback(functools.partial(_backward, kind), shapes, *values, *bars, vmap_method="expand_dims")
     return jnp.zeros_like(values[0]), jnp.zeros_like(values[1]), *slopes
 
@@ -71,15 +72,17 @@ _rollout.defvjp(_rollout_fwd, _rollout_bwd, symbolic_zeros=True)
 
 def _forward(kind: _Kind, *arrays):
     def run(data, dt, parameters, *inputs):
-        return autodiff.rollout(_packed(kind, data), *inputs, dt, _beside(parameters, inputs[0]))
+        state, twists, loads = inputs
+        return autodiff.rollout(_packed(kind, data), state, twists, loads, dt, _beside(parameters, state))
 
     return _by_contact(run, arrays, arrays[4].dtype)
 
 
 def _backward(kind: _Kind, *arrays):
     def run(data, dt, parameters, *inputs):
-        wide = _beside(parameters, inputs[0])
-        found = autodiff.rollout_gradient(_packed(kind, data), *inputs[:3], dt, *inputs[3:], parameters=wide)
+        state, twists, loads, *bars = inputs
+        wide = _beside(parameters, state)
+        found = autodiff.rollout_gradient(_packed(kind, data), state, twists, loads, dt, *bars, parameters=wide)
         return found.parameters.reshape(parameters.shape), found.state, found.twists, found.loads
 
     return _by_contact(run, arrays, arrays[4].dtype)

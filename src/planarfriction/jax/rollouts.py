@@ -70,7 +70,8 @@ def simulate(model: Model, twists, loads, dt, z0=None, *, method: str = "scan") 
         return Rollout(*rollout(model, z0, twists, loads, dt))
 
     def one(z, inputs):
-        return model.step(z, *inputs, dt)
+        twist, load = inputs
+        return model.step(z, twist, load, dt)
 
     # Only the states are kept for the way back; to step again costs less than to store all that a step computes.
     one = jax.checkpoint(one, prevent_cse=False)  # pyright: ignore[reportPrivateImportUsage]
