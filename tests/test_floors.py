@@ -40,6 +40,7 @@ HOMES = {
     "rich": "cli",
     "click": "cli",
     "torch": "torch",
+    "jax": "jax",
 }
 """Package -> the floor whose modules may import it when they load; no floor may load the rest of HEAVY that way."""
 

@@ -15,15 +15,19 @@ from planarfriction.autodiff.rollouts import (
     rollout_sensitivities,
     rollout_states,
 )
+from planarfriction.autodiff.scene import SCENE_PARAMETERS, SceneSensitivities, scene_sensitivities
 
 __all__ = [
     "PARAMETERS",
+    "SCENE_PARAMETERS",
     "Rollout",
     "RolloutGradient",
     "RolloutStates",
+    "SceneSensitivities",
     "parameters_of",
     "rollout",
     "rollout_gradient",
     "rollout_sensitivities",
     "rollout_states",
+    "scene_sensitivities",
 ]

@@ -54,14 +54,18 @@ def pack(model: Any, parameters: Any = None) -> Packed:
     """The model as compiled loops see it, with `parameters` `[..., 12]` instead of its own if given.
 
     A friction coefficient `mu_s` below `mu_c`, which a law refuses, is let through: the formulas are smooth there.
+    A model that is packed already, as the tensor front ends hold them, is taken as it is.
     """
-    row = _model_row(model)
-    numbers = model.shape_at(1.0).surface.numbers
+    if isinstance(model, Packed):
+        row, surface, data = model
+    else:
+        row, numbers = _model_row(model), model.shape_at(1.0).surface.numbers
+        surface, data = np.array([numbers.kind, 0, numbers.size]), numbers.data
     if parameters is not None:
         values = _checked(parameters)
         row = np.broadcast_to(row, (*values.shape[:-1], len(row))).copy()
         row[..., COLUMNS] = values
-    return Packed(row, np.array([numbers.kind, 0, numbers.size]), numbers.data)
+    return Packed(row, surface, data)
 
 
 def _model_row(model: Any) -> np.ndarray:

@@ -89,7 +89,7 @@ def simulate(
     every = scene.save_every if save_every is None else validation.positive("save_every", save_every)
     validation.choice("bristles", bristles, BRISTLES)
     packed = pack(scene, end)
-    output = _output(_times(end, every, packed.motion.breaks), packed, bristles)
+    output = _output(recording_times(end, every, packed.motion.breaks), packed, bristles)
     run = integrate(
         packed.contacts,
         packed.motion,
@@ -108,7 +108,7 @@ def simulate(
     return solution
 
 
-def _times(end: float, every: float, breaks: np.ndarray) -> np.ndarray:
+def recording_times(end: float, every: float, breaks: np.ndarray) -> np.ndarray:
     """Recording times; one that equals a break up to rounding is that break, so that it records the left limit."""
     count = int(np.floor(end / every * (1.0 + 1e-12)))
     times = np.arange(count + 1) * every

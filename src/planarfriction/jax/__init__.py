@@ -1,0 +1,32 @@
+"""JAX front end: models as pytrees, pure functions that `jit`, `vmap` and `grad` go through.
+
+Needs the extra `[jax]`. Set `jax.config.update("jax_enable_x64", True)` for float64, as everywhere in JAX.
+"""
+
+from __future__ import annotations
+
+from planarfriction.errors import MissingExtraError
+
+try:
+    import jax as _jax  # noqa: F401
+except ImportError as error:
+    raise MissingExtraError("jax", "jax") from error
+
+from planarfriction.jax.distributed import DistributedPlanarLuGre, distributed
+from planarfriction.jax.reduced import Parameters, ReducedPlanarLuGre, Surface, reduced
+from planarfriction.jax.rollouts import Rollout, rate, rest, simulate, step, wrench
+
+__all__ = [
+    "DistributedPlanarLuGre",
+    "Parameters",
+    "ReducedPlanarLuGre",
+    "Rollout",
+    "Surface",
+    "distributed",
+    "rate",
+    "reduced",
+    "rest",
+    "simulate",
+    "step",
+    "wrench",
+]
