@@ -12,7 +12,7 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.autodiff.parameters import COLUMNS, PARAMETERS, Packed, pack
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels import reduced_adjoint as kernels
+from planarfriction.kernels import reduced_adjoint, reduced_rollout
 
 _WORTH_A_THREAD = 20_000
 """Steps [-] below which starting a thread costs more than it saves."""
@@ -115,10 +115,12 @@ def rollout_gradient(
     if state_bar is not None:
         z_bar[:] = _rows("state_bar", state_bar, (3,), inputs.batch)
     twists_bar, loads_bar = np.empty((count, steps, 3)), np.empty((count, steps))
-    rows_bar = np.zeros((count, kernels.NUMBERS))
+    rows_bar = np.zeros((count, reduced_adjoint.NUMBERS))
     arguments = inputs.rows, inputs.packed.surface, inputs.packed.data, on_the_way, inputs.twists, inputs.loads
     results = z_bar, twists_bar, loads_bar, rows_bar
-    _share(inputs, lambda first, last: kernels.gradient(*arguments, inputs.dt, cotangents, first, last, *results))
+    _share(
+        inputs, lambda first, last: reduced_rollout.gradient(*arguments, inputs.dt, cotangents, first, last, *results)
+    )
     given = parameters if parameters is not None else inputs.packed.rows[..., COLUMNS]
     return RolloutGradient(
         *(
@@ -153,7 +155,9 @@ def rollout_sensitivities(
     slopes = np.empty((*wrenches.shape, len(columns)))
     end = inputs.state.copy()
     arguments = inputs.rows, inputs.packed.surface, inputs.packed.data, end, inputs.twists, inputs.loads, inputs.dt
-    _share(inputs, lambda first, last: kernels.sensitivities(*arguments, columns, first, last, wrenches, slopes))
+    _share(
+        inputs, lambda first, last: reduced_adjoint.sensitivities(*arguments, columns, first, last, wrenches, slopes)
+    )
     return wrenches.reshape(*inputs.batch, *wrenches.shape[1:]), slopes.reshape(*inputs.batch, *slopes.shape[1:])
 
 
@@ -162,7 +166,7 @@ def _roll(inputs: _Inputs, kept: int) -> tuple[np.ndarray, np.ndarray, np.ndarra
     count, end = len(inputs.state), inputs.state.copy()
     wrenches, states = np.empty((count, len(inputs.dt), 3)), np.empty((count, kept, 3))
     arguments = inputs.rows, inputs.packed.surface, inputs.packed.data, end, inputs.twists, inputs.loads, inputs.dt
-    _share(inputs, lambda first, last: kernels.rollout(*arguments, first, last, wrenches, states))
+    _share(inputs, lambda first, last: reduced_rollout.rollout(*arguments, first, last, wrenches, states))
     return wrenches, end, states
 
 
@@ -183,10 +187,10 @@ def _checked(model: Any, state: Any, twists: Any, loads: Any, dt: Any, parameter
     if dt.ndim and dt.shape != (steps,):
         raise InvalidValueError("dt", f"be one number or have shape [{steps}]", f"shape {list(dt.shape)}")
     for name, value in {"state": state, "twists": twists, "loads": loads, "dt": dt}.items():
-        if not np.isfinite(value).all():
+        if not (np.isfinite(value.sum()) or np.isfinite(value).all()):  # a sum is quicker, but may overflow
             raise InvalidValueError(name, "be finite", "NaN or infinity")
     for name, value in {"loads": loads, "dt": dt}.items():
-        if (value < 0.0).any():
+        if value.min(initial=0.0) < 0.0:
             raise InvalidValueError(name, "be >= 0", float(value.min()))
     if not loads.ndim:
         loads = np.full(steps, loads)
@@ -198,7 +202,7 @@ def _checked(model: Any, state: Any, twists: Any, loads: Any, dt: Any, parameter
     count = int(np.prod(batch))
     return _Inputs(
         packed,
-        _rows("parameters", packed.rows, (kernels.NUMBERS,), batch),
+        _rows("parameters", packed.rows, (reduced_adjoint.NUMBERS,), batch),
         np.broadcast_to(state, (*batch, 3)).reshape(count, 3),
         _rows("twists", twists, (steps, 3), batch),
         _rows("loads", loads, (steps,), batch),
@@ -221,7 +225,8 @@ def _rows(name: str, value: Any, inner: tuple[int, ...], batch: tuple[int, ...])
 
 def _sum_to(shape: tuple[int, ...], gradient: np.ndarray) -> np.ndarray:
     """Sum a gradient over the axes along which its input was broadcast."""
-    gradient = gradient.sum(axis=tuple(range(gradient.ndim - len(shape))))
+    extra = tuple(range(gradient.ndim - len(shape)))
+    gradient = gradient.sum(axis=extra) if extra else gradient
     kept = tuple(i for i, n in enumerate(shape) if n == 1 and gradient.shape[i] != 1)
     return gradient.sum(axis=kept, keepdims=True) if kept else gradient
 

@@ -70,7 +70,7 @@ class BristleStep(NamedTuple):
     back: float
     capped: bool
     grown: bool
-    """The bristle began beyond full deflection, which is then its cap."""
+    """The bristle began beyond full deflection, which is then its cap. (Rounding apart, no step grows it further.)"""
 
 
 @inlined

@@ -23,13 +23,14 @@ BILINEAR, POTENTIAL, ELLIPSOID, CELLS = 0, 1, 2, 3
 # Nearer to the spin axis [rad] the azimuth's slopes are taken at this polar angle: they differ from their limit by
 # about as much, and rounding, which the Jacobian divides by its square, stays below 1e-5 too.
 _AXIS = 1e-5
+_SIN_AXIS, _COS_AXIS = math.sin(_AXIS), math.cos(_AXIS)
 
 # A cell slower than this share of the twist stands in the centre of rotation: what is left of its speed is rounding.
 _AT_REST = 1e-14
 
 
 @inlined
-def _place(size, x, y, s):
+def place(size, x, y, s):
     """Table coordinates of a direction with `s >= 0`: polar and azimuth cell, position within it, and the angles."""
     per_segment = size / (0.5 * math.pi)
     polar = xp.atan2(math.sqrt(x * x + y * y), s)
@@ -45,27 +46,33 @@ def _place(size, x, y, s):
 def _sines(x, y, s, polar):
     """Sine and cosine of the polar angle, which stays `_AXIS` away from the axis, and of the azimuth."""
     across = math.sqrt(x * x + y * y)
-    per_across = 1.0 / across if across > 0.0 else 0.0
-    sin_a, cos_a = y * per_across, x * per_across if across > 0.0 else 1.0
-    if polar < _AXIS:
-        return math.sin(_AXIS), math.cos(_AXIS), sin_a, cos_a
-    per_norm = 1.0 / math.sqrt(x * x + y * y + s * s)
-    return across * per_norm, s * per_norm, sin_a, cos_a
+    per_across = 1.0 / xp.where(across > 0.0, across, 1.0)
+    norm = math.sqrt(x * x + y * y + s * s)
+    per_norm = 1.0 / xp.where(norm > 0.0, norm, 1.0)
+    inside = polar < _AXIS
+    sin_p, cos_p = xp.where(inside, _SIN_AXIS, across * per_norm), xp.where(inside, _COS_AXIS, s * per_norm)
+    return sin_p, cos_p, y * per_across, xp.where(across > 0.0, x * per_across, 1.0)
 
 
 @inlined
-def _corners(data, p, row, a, b):
-    """Bilinear value of one component and its differences along the polar angle and the azimuth."""
-    low = data[p] + b * (data[p + 4] - data[p])
-    high = data[p + row] + b * (data[p + row + 4] - data[p + row])
-    left = data[p] + a * (data[p + row] - data[p])
-    right = data[p + 4] + a * (data[p + row + 4] - data[p + 4])
+def bilinear_blend(low_left, low_right, high_left, high_right, a, b):
+    """Bilinear value from four corners and its differences along the polar angle and the azimuth."""
+    low = low_left + b * (low_right - low_left)
+    high = high_left + b * (high_right - high_left)
+    left = low_left + a * (high_left - low_left)
+    right = low_right + a * (high_right - low_right)
     return low + a * (high - low), high - low, right - left
 
 
 @inlined
+def _corners(data, p, row, a, b):
+    """`bilinear_blend` of one component at a place in a table."""
+    return bilinear_blend(data[p], data[p + 4], data[p + row], data[p + row + 4], a, b)
+
+
+@inlined
 def _bilinear(data, start, size, x, y, s, speed):
-    i, j, a, b, _, _ = _place(size, x, y, s)
+    i, j, a, b, _, _ = place(size, x, y, s)
     row = 4 * (4 * size + 1)
     p = start + i * row + 4 * j
     hx, hy, hs = (
@@ -76,19 +83,30 @@ def _bilinear(data, start, size, x, y, s, speed):
     return hx * speed, hy * speed, hs * speed
 
 
-@kernel
-def _bilinear_jacobian(data, start, size, x, y, s, out):
-    i, j, a, b, polar, _ = _place(size, x, y, s)
-    row = 4 * (4 * size + 1)
-    p = start + i * row + 4 * j
+@inlined
+def bilinear_frame(size, x, y, s, polar):
+    """Radial direction, and the slopes of the table coordinates in space, for the Jacobian of `_bilinear`."""
     per_segment = size / (0.5 * math.pi)
-    if polar < _AXIS:
-        a = _AXIS * per_segment
     sin_p, cos_p, sin_a, cos_a = _sines(x, y, s, polar)
     per_azimuth = per_segment / sin_p
     radial = (sin_p * cos_a, sin_p * sin_a, cos_p)
     polar_slope = (per_segment * cos_p * cos_a, per_segment * cos_p * sin_a, -per_segment * sin_p)
-    azimuth_slope = (-per_azimuth * sin_a, per_azimuth * cos_a, 0.0)
+    return radial, polar_slope, (-per_azimuth * sin_a, per_azimuth * cos_a, 0.0)
+
+
+@inlined
+def bilinear_inset(size, a, polar):
+    """Position within the polar cell at which the Jacobian is taken: the axis has none."""
+    return xp.where(polar < _AXIS, _AXIS * size / (0.5 * math.pi), a)
+
+
+@kernel
+def _bilinear_jacobian(data, start, size, x, y, s, out):
+    i, j, a, b, polar, _ = place(size, x, y, s)
+    row = 4 * (4 * size + 1)
+    p = start + i * row + 4 * j
+    radial, polar_slope, azimuth_slope = bilinear_frame(size, x, y, s, polar)
+    a = bilinear_inset(size, a, polar)
     for i in range(3):
         h, h_polar, h_azimuth = _corners(data, p + i, row, a, b)
         for j in range(3):
@@ -138,7 +156,7 @@ def _tilt(ax, ay, x, y, s):
 
 @kernel
 def _potential(data, start, size, x, y, s, speed):
-    i, j, a, b, polar, azimuth = _place(size, x, y, s)
+    i, j, a, b, polar, azimuth = place(size, x, y, s)
     row = 4 * (4 * size + 1)
     p = start + i * row + 4 * j
     segment = 0.5 * math.pi / size
@@ -163,7 +181,7 @@ def _potential(data, start, size, x, y, s, speed):
 
 @kernel
 def _potential_jacobian(data, start, size, x, y, s, out):
-    i, j, a, b, polar, _ = _place(size, x, y, s)
+    i, j, a, b, polar, _ = place(size, x, y, s)
     row = 4 * (4 * size + 1)
     p = start + i * row + 4 * j
     end = start + (size + 1) * row

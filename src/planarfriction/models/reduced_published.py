@@ -134,8 +134,10 @@ class ReducedModelPublished(FrictionModel):
 
     def step_jacobians(self, state, twist, normal_force, dt) -> StepJacobians:
         """Analytic derivatives of `step` (see `StepJacobians`); at kinks a one-sided derivative."""
-        state, twist, load, dt = self._inputs(state, twist, normal_force, dt=dt)
-        packed = self._by_load(self._step_jacobians, (6, 7), state, twist, load, dt)
+        packed = self._one_step_jacobians(state, twist, normal_force, dt)
+        if packed is None:
+            state, twist, load, dt = self._inputs(state, twist, normal_force, dt=dt)
+            packed = self._by_load(self._step_jacobians, (6, 7), state, twist, load, dt)
         wrench, new = packed[..., :3, :], packed[..., 3:, :]
         return StepJacobians(new[..., :3], new[..., 3:6], wrench[..., :3], wrench[..., 3:6], wrench[..., 6])
 
@@ -273,10 +275,27 @@ class ReducedModelPublished(FrictionModel):
         )
         return np.concatenate([out, wrench], axis=1)
 
+    def _one_step_jacobians(self, state, twist, normal_force, dt) -> np.ndarray | None:
+        """`_step_jacobians` `[6, 7]` of one contact of fixed shape, checked quickly; None where that is not it."""
+        if self.patch.depends_on_load or [np.ndim(a) for a in (state, twist, normal_force, dt)] != [1, 1, 0, 0]:
+            return None
+        if len(state) != 3 or len(twist) != 3:
+            return None
+        try:
+            given = np.array([*state, *twist, normal_force, dt], dtype=float)
+        except (TypeError, ValueError):  # not numbers: the checks of `_inputs` say which
+            return None
+        if not (np.isfinite(given).all() and given[6] >= 0.0 and given[7] >= 0.0):
+            return None
+        return self._step_jacobians(self._reference, given[None, :3], given[None, 3:6], given[6:7], given[7:])[0]
+
     def _step_jacobians(self, shape: ReducedShape, state, twist, load, dt) -> np.ndarray:
-        numbers = shape.surface.numbers
-        row = np.array([[*law_numbers(self.law), *shape.numbers]])
         slopes = np.empty((len(load), 6, 7 + reduced_adjoint.NUMBERS))
-        surface = np.array([numbers.kind, 0, numbers.size])
-        reduced_adjoint.jacobians(row, surface, numbers.data, state, twist, load, dt, slopes)
+        if self._fixed is not None:
+            numbers, data = self._fixed
+            row, surface = numbers[None, :13], numbers[13:].astype(int)
+        else:
+            kind, size, data = shape.surface.numbers
+            row, surface = np.array([[*law_numbers(self.law), *shape.numbers]]), np.array([kind, 0, size])
+        reduced_adjoint.jacobians(row, surface, data, state, twist, load, dt, slopes)
         return slopes[:, :, :7]
