@@ -113,10 +113,10 @@ def draw(times, states: State, forces: np.ndarray, file: Path) -> None:
     figure.savefig(file)
 
 
-def run(duration: float = 8.0, cells: int = 11) -> tuple[np.ndarray, State, np.ndarray]:
+def run(duration: float = 8.0, surface: type = pf.LimitSurfaceTable) -> tuple[np.ndarray, State, np.ndarray]:
     """Times `[T]`, states and wrenches of the spring `[T, 3]`."""
-    patch = pf.ContactPatch.rectangle(SIDE, cells=cells)
-    model = pj.reduced(patch, LAW, pf.LimitSurfaceTable(patch))
+    patch = pf.ContactPatch.rectangle(SIDE, cells=11)
+    model = pj.reduced(patch, LAW, surface(patch))
     times = jnp.linspace(0.0, duration, round(400 * duration) + 1)
     states = drag(model, times)
     return np.asarray(times), states, np.asarray(jax.vmap(pull)(times, states.pose))

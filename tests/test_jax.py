@@ -413,12 +413,14 @@ def test_the_example_with_diffrax_sticks_slips_and_turns(tmp_path):
     specification = importlib.util.spec_from_file_location(path.stem, path)
     example = importlib.util.module_from_spec(specification)
     specification.loader.exec_module(example)
-    times, states, forces = example.run(duration=2.0, cells=5)
-    strength = np.hypot(forces[:, 0], forces[:, 1]) / (example.LAW.mu_s * example.LOAD)
-    # The hook is off the middle: the block gives way by turning, before the spring reaches mu_s f_N, and only once.
+    times, states, forces = example.run(duration=1.6, surface=pf.LimitSurfaceEllipsoid)  # compiles soonest
+    # The hook is off the middle. On the ellipsoid f^2 + (tau/r)^2 = (mu_s f_N)^2 the block gives way, turning, at
+    arm, radius = float(example.HOOK[1]), float(pf.ContactPatch.rectangle(example.SIDE, cells=11).contact_radius())
+    breakaway = example.LAW.mu_s * example.LOAD / np.hypot(1.0, arm / radius)
+    # and the spring goes on pulling until the block has gathered speed: 2 % more.
+    assert np.hypot(forces[:, 0], forces[:, 1]).max() == pytest.approx(1.02 * breakaway, rel=0.01)
     slipping = np.abs(states.twist[:, 0]) > 1e-3
     assert np.count_nonzero(np.diff(slipping.astype(int)) == 1) == 1
-    assert strength.max() == pytest.approx(0.806, abs=0.01)
-    assert -10.0 < np.degrees(states.pose[-1, 2]) < -3.0
+    assert -8.0 < np.degrees(states.pose[-1, 2]) < -4.0
     example.draw(times, states, forces, tmp_path / "picture.png")
     assert (tmp_path / "picture.png").stat().st_size > 10_000
