@@ -92,6 +92,7 @@ class Reproduction:
             home.mkdir(parents=True, exist_ok=True)
             for picture in result.pictures:
                 picture.figure.savefig(home / f"{picture.name}.png", dpi=150)
+                picture.figure.set_layout_engine("none")  # laid out once is enough for both
                 picture.figure.savefig(home / f"{picture.name}.svg", metadata={"Date": None})
         except OSError as error:
             raise FileError(f"{home}: cannot be written: {error.strerror or error}") from error
