@@ -21,12 +21,12 @@ from planarfriction.kernels import surfaces as kernels
 
 
 def _arithmetic(kernel: Any) -> Callable:
-    """The Python function behind a kernel that is plain arithmetic, and so takes arrays of JAX as well."""
+    """The Python behind a kernel of plain arithmetic (it calls no other kernel), which takes arrays as well."""
     return getattr(kernel, "py_func", kernel)
 
 
-_corners, _blend, _hermite, _tilt = map(
-    _arithmetic, (kernels._corners, kernels._blend, kernels._hermite, kernels._tilt)
+_bilinear_blend, _blend, _hermite, _tilt = map(
+    _arithmetic, (kernels.bilinear_blend, kernels._blend, kernels._hermite, kernels._tilt)
 )
 
 
@@ -127,7 +127,7 @@ _ROW = 8
 def _bilinear(size: int, data, twist):
     mirror, x, y, s = _mirrored(twist)
     cell, a, b, _, _ = _place(size, data, x, y, s)
-    h = jnp.stack([_corners(cell, i, _ROW, a, b)[0] for i in range(3)], axis=-1)
+    h = jnp.stack([_bilinear_blend(*cell[i::4], a, b)[0] for i in range(3)], axis=-1)
     return h * (mirror * jnp.sqrt(x * x + y * y + s * s))[..., None]
 
 
