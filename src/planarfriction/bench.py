@@ -229,16 +229,15 @@ def _eager_gradient(model: ReducedModelPublished, twists: np.ndarray, dt: float,
     """Time of the same value and gradient, step by step through `planarfriction.torch` and autograd [s]."""
     import torch
 
-    module = importlib.import_module("planarfriction.torch").ReducedPlanarLuGre(model.patch, model.law).double()
+    front = importlib.import_module("planarfriction.torch")
+    module = front.ReducedPlanarLuGre(model.patch, model.law, dtype=torch.float64)
     profile = torch.tensor(twists, requires_grad=True)
     loads = torch.full((len(twists),), 2.0, dtype=torch.float64, requires_grad=True)
 
     def value_and_gradient() -> None:
-        z, loss = torch.zeros(3, dtype=torch.float64, requires_grad=True), torch.zeros((), dtype=torch.float64)
-        for twist, load in zip(profile, loads, strict=True):
-            z, wrench = module.step(z, twist, load, dt)
-            loss = loss + 0.5 * (wrench * wrench).sum()
-        loss.backward()
+        start = torch.zeros(3, dtype=torch.float64, requires_grad=True)
+        wrenches = front.simulate(module, profile, loads, dt, z=start, method="eager")
+        (0.5 * wrenches * wrenches).sum().backward()
 
     return _median(value_and_gradient, 3 if full else 1)
 
