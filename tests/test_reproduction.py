@@ -142,7 +142,10 @@ def test_a_number_out_of_tolerance_is_shown_and_sets_the_exit_code(made, tmp_pat
     made[1].theirs = 2.1
     assert main(["reproduce", "--out", str(tmp_path)]) == 1
     assert "out of tolerance: one" in capsys.readouterr().err
-    assert 'class="missed"' in (tmp_path / "report.html").read_text()
+    summary, good, bad = re.split("<section", (tmp_path / "report.html").read_text())
+    assert '<tr class="missed"><td><a href="#second">' in summary
+    assert 'class="missed"' in bad and "<details open>" in bad
+    assert 'class="missed"' not in good and "<details>" in good
 
 
 def test_a_report_survives_a_removed_picture(made, tmp_path):

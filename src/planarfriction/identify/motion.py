@@ -11,7 +11,7 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify.least_squares import correlations, covariance, minimise
-from planarfriction.identify.parameters import Coordinates
+from planarfriction.identify.parameters import Coordinates, check_names
 from planarfriction.identify.result import Identification, Verdict
 from planarfriction.identify.slides import (
     Slide,
@@ -98,7 +98,7 @@ def identify_motion(
         A parameter breaks its rule.
     """
     slides = as_slides(slides)
-    names = _check_names(parameters)
+    names = check_names(parameters, MOTION_PARAMETERS)
     if not isinstance(body, SlidingBody):
         raise InvalidValueError("body", "be a SlidingBody", body)
     if not isinstance(start, LuGre):
@@ -115,17 +115,6 @@ def identify_motion(
         minimum = minimise(fit.residuals(coordinates, noise), [x], coordinates.bounds(), tolerance=TOLERANCE)
         x = minimum.x
     return fit.result(coordinates, minimum, noise)
-
-
-def _check_names(parameters: Sequence[str]) -> tuple[str, ...]:
-    names = (parameters,) if isinstance(parameters, str) else tuple(parameters)
-    for name in names:
-        validation.choice("parameters", name, MOTION_PARAMETERS)
-        if names.count(name) > 1:
-            raise InvalidValueError("parameters", "hold each name once", f"{name!r} {names.count(name)} times")
-    if not names:
-        raise InvalidValueError("parameters", "hold at least one name", "none")
-    return names
 
 
 class _Fit:

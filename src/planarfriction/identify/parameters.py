@@ -6,7 +6,7 @@ optimiser sees *coordinates*, in which a factor counts the same up and down (a l
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -71,11 +71,11 @@ SHAPE_PRIOR = 1.0
 """That of the Stribeck exponent's logarithm and of `mu_s/mu_c - 1`."""
 
 
-def check_names(names: Sequence[str]) -> tuple[str, ...]:
-    """The names, each known and given once."""
+def check_names(names: Sequence[str], known: Collection[str] = tuple(ALL)) -> tuple[str, ...]:
+    """The names, each one of the `known` and given once."""
     names = (names,) if isinstance(names, str) else tuple(names)
     for name in names:
-        validation.choice("parameters", name, ALL)
+        validation.choice("parameters", name, known)
         if names.count(name) > 1:
             raise InvalidValueError("parameters", "hold each name once", f"{name!r} {names.count(name)} times")
     if not names:
