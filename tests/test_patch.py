@@ -152,3 +152,24 @@ def test_replace_and_pickle():
     assert (patch.name, patch.cells, patch.depends_on_load) == ("finger", 349, True)
     assert np.array_equal(pickle.loads(pickle.dumps(patch)).weights(1.0), patch.weights(1.0))
     assert repr(patch) == "ContactPatch('finger', 349 cells of 21 x 21, SoftFinger pressure)"
+
+
+def test_refined_patches_keep_their_load_and_come_closer_to_the_continuum():
+    square, line = pf.ContactPatch.rectangle(0.02, cells=7), pf.ContactPatch.line(0.02, 7)
+    exact = {"square": 0.02**2 / 6, "line": 0.02**2 / 12}
+    for name, patch in {"square": square, "line": line}.items():
+        fine = patch.refined(3)
+        assert fine.cells == patch.cells * (9 if name == "square" else 3)
+        assert fine.area() == pytest.approx(patch.area(), rel=1e-12)
+        error = [exact[name] - p.second_moment() for p in (patch, fine)]
+        assert error[0] / error[1] == pytest.approx(9.0, rel=1e-6)  # the midpoint rule is of second order
+    assert (line.refined(3).positions[:, 0] == 0.0).all()
+
+
+def test_refined_maps_repeat_their_pressures_and_points_stay_points():
+    patch = pf.ContactPatch.from_pressure([[1.0, 0.0], [2.0, 5.0]], 1e-3)
+    fine = patch.refined(2)
+    np.testing.assert_allclose(fine.weights().reshape(3, 4).sum(axis=1), patch.weights(), rtol=1e-14)
+    np.testing.assert_allclose(fine.centre_of_pressure(), patch.centre_of_pressure(), atol=1e-18)
+    feet = pf.ContactPatch.points([[0.0, 0.0], [0.1, 0.0]])
+    assert feet.refined(4) is feet

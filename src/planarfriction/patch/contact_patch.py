@@ -55,12 +55,21 @@ class ContactPatch:
     """The regular grid that the cells were cut from, or None."""
     name: str = "patch"
     """Name for plots and tables."""
+    cell_size: tuple[float, float] | None = None
+    """Width and height of a whole cell [m], over which its load is spread evenly; None for points (a line has one 0)."""
     _fixed_weights: np.ndarray | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
         positions = validation.array("positions", self.positions, (None, 2))
         if len(positions) == 0:
             raise InvalidValueError("patch", "have at least one cell", "none")
+        if self.cell_size is not None:
+            size = validation.vector("cell_size", self.cell_size, 2)
+            if not (size >= 0.0).all():
+                raise InvalidValueError("cell_size", "be >= 0", float(size.min()))
+            object.__setattr__(self, "cell_size", tuple(size.tolist()))
+        elif self.grid is not None:
+            object.__setattr__(self, "cell_size", (self.grid.cell_width, self.grid.cell_height))
         areas = validation.array("areas", self.areas, (len(positions),))
         if not (areas > 0.0).all():
             raise InvalidValueError("areas", "be > 0", f"{areas.min()} at index {areas.argmin()}")
@@ -168,7 +177,8 @@ class ContactPatch:
             profile = [profile(coordinate) for coordinate in positions[:, along].tolist()]
         elif profile is not None:
             profile = validation.non_negative_array("profile", profile, (cells,))
-        return cls(positions, np.full(cells, grid.cell_area), profile, grid, name)
+        size = (side, 0.0) if along == 0 else (0.0, side)
+        return cls(positions, np.full(cells, grid.cell_area), profile, grid, name, size)
 
     @classmethod
     def polygon(
@@ -231,7 +241,26 @@ class ContactPatch:
             raise InvalidValueError("vertices", "outline a simple polygon", shapely.is_valid_reason(polygon))
         return cls(*shapes.clip(polygon, grid), pressure, grid, name)
 
+    def refined(self, parts: int) -> ContactPatch:
+        """The same patch with every cell cut into `parts` x `parts` (a cell of a line into `parts`).
+
+        Pressure laws are evaluated at the new cells, numbers per cell are repeated. Cells that a rim cuts are replaced
+        by cells of the same area and centroid. Points stay points.
+        """
+        from planarfriction.patch.refinement import refined
+
+        return refined(self, validation.count("parts", parts))
+
     # ------------------------------------------------------------------ quantities
+
+    def cell_extents(self) -> np.ndarray:
+        """Width and height over which the load of each cell is spread, `[N, 2]` [m]; a cut cell's are smaller."""
+        if self.cell_size is None:
+            return np.zeros((self.cells, 2))
+        width, height = self.cell_size
+        if width == 0.0 or height == 0.0:
+            return np.tile([width, height], (self.cells, 1))
+        return np.sqrt(self.areas / (width * height))[:, None] * np.array([width, height])
 
     @property
     def cells(self) -> int:
@@ -333,12 +362,14 @@ class ContactPatch:
             "areas": self.areas.tolist(),
             "pressure": self.pressure.to_dict(),
         }
+        if self.cell_size is not None:
+            data["cell_size"] = list(self.cell_size)
         return data if self.grid is None else {**data, "grid": dataclasses.asdict(self.grid)}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> ContactPatch:
         """The patch that `to_dict` described; unknown and missing keys are errors that name them."""
-        optional = ("shape", "name", "pressure", "grid")
+        optional = ("shape", "name", "pressure", "grid", "cell_size")
         validation.keys("patch", data, required=("positions", "areas"), optional=optional)
         validation.choice("patch shape", data.get("shape", "cells"), ("cells",))
         pressure, grid = data.get("pressure"), data.get("grid")
@@ -347,7 +378,7 @@ class ContactPatch:
         if grid is not None:
             validation.keys("grid", grid, required=[entry.name for entry in dataclasses.fields(Grid)])
             grid = Grid(**grid)
-        return cls(data["positions"], data["areas"], pressure, grid, data.get("name", "patch"))
+        return cls(data["positions"], data["areas"], pressure, grid, data.get("name", "patch"), data.get("cell_size"))
 
 
 def _square_grid(width: float, cells: int) -> Grid:

@@ -1,0 +1,24 @@
+"""The same patch on finer cells."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planarfriction.patch.contact_patch import ContactPatch
+from planarfriction.patch.pressure import PerCell
+
+
+def refined(patch: ContactPatch, parts: int) -> ContactPatch:
+    """See `ContactPatch.refined`."""
+    extent = patch.cell_extents()
+    if parts == 1 or not extent.any():
+        return patch
+    fine = (np.arange(parts) - (parts - 1) / 2) / parts
+    offsets = [fine if side else np.zeros(1) for side in extent.max(axis=0)]
+    inside = np.stack([axis.ravel() for axis in np.meshgrid(*offsets)], -1)
+    positions = (patch.positions[:, None] + inside * extent[:, None]).reshape(-1, 2)
+    per_cell = isinstance(patch.pressure, PerCell)
+    pressure = PerCell(np.repeat(patch.pressure.values, len(inside))) if per_cell else patch.pressure
+    areas = np.repeat(patch.areas / len(inside), len(inside))
+    width, height = patch.cell_size or (0.0, 0.0)
+    return ContactPatch(positions, areas, pressure, None, patch.name, (width / parts, height / parts))
