@@ -56,7 +56,7 @@ class ContactPatch:
     name: str = "patch"
     """Name for plots and tables."""
     cell_size: tuple[float, float] | None = None
-    """Width and height of a whole cell [m], over which its load is spread evenly; None for points (a line has one 0)."""
+    """Width and height of a whole cell [m], its load spread evenly over it; None for points (lines: one is 0)."""
     _fixed_weights: np.ndarray | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
