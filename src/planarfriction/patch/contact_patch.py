@@ -12,6 +12,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
+from planarfriction.patch import outline as outlines
 from planarfriction.patch import shapes
 from planarfriction.patch.files import read_pressure_map
 from planarfriction.patch.grid import Grid
@@ -57,6 +58,8 @@ class ContactPatch:
     """Name for plots and tables."""
     cell_size: tuple[float, float] | None = None
     """Width and height of a whole cell [m], its load spread evenly over it; None for points (lines: one is 0)."""
+    outline: outlines.Outline | None = field(init=False, default=None)
+    """Outline that the class methods cut the cells from; None for other cells."""
     _fixed_weights: np.ndarray | None = field(init=False, default=None)
 
     def __post_init__(self) -> None:
@@ -98,7 +101,8 @@ class ContactPatch:
         Cells at the rim have the area inside it, and the centroid of that part as position.
         """
         radius = validation.positive("radius", radius)
-        return cls._clipped([shapes.circle(radius)], _square_grid(2 * radius, cells), pressure, name)
+        outline = outlines.RoundOutline(0.0, radius)
+        return cls._clipped([shapes.circle(radius)], _square_grid(2 * radius, cells), pressure, name, outline)
 
     @classmethod
     def disc_published(
@@ -136,7 +140,8 @@ class ContactPatch:
         height = width if height is None else validation.positive("height", height)
         grid = Grid.around_origin(width, height, *shapes.columns_and_rows(cells, width, height))
         positions = grid.centres()
-        return cls(positions, np.full(len(positions), grid.cell_area), pressure, grid, name)
+        patch = cls(positions, np.full(len(positions), grid.cell_area), pressure, grid, name)
+        return outlines.with_outline(patch, outlines.box_outline(width, height))
 
     @classmethod
     def ring(
@@ -147,8 +152,8 @@ class ContactPatch:
         outer = validation.positive("outer_radius", outer_radius)
         if inner >= outer:
             raise InvalidValueError("inner_radius", "be < outer_radius", f"{inner} and {outer}")
-        outline = [shapes.circle(outer), shapes.circle(inner)]
-        return cls._clipped(outline, _square_grid(2 * outer, cells), pressure, name)
+        rims = [shapes.circle(outer), shapes.circle(inner)]
+        return cls._clipped(rims, _square_grid(2 * outer, cells), pressure, name, outlines.RoundOutline(inner, outer))
 
     @classmethod
     def line(
@@ -188,16 +193,15 @@ class ContactPatch:
 
         `cells` counts along the longer side of the bounding box, or is `(columns, rows)`.
         """
-        vertices = validation.array("vertices", vertices, (None, 2))
-        if len(vertices) < 3:
-            raise InvalidValueError("vertices", "hold at least 3 points", f"{len(vertices)}")
+        outline = outlines.polygon_outline(vertices)
+        vertices = outline.vertices
         low = vertices.min(axis=0)
         width, height = vertices.max(axis=0) - low
         if not (width > 0.0 and height > 0.0):
             raise InvalidValueError("vertices", "enclose an area", f"a box of {width} x {height} m")
         columns, rows = shapes.columns_and_rows(cells, width, height)
         grid = Grid(low[0], low[1], width / columns, height / rows, columns, rows)
-        return cls._clipped([vertices], grid, pressure, name)
+        return cls._clipped([vertices], grid, pressure, name, outline)
 
     @classmethod
     def points(cls, positions, weights=None, *, area: float = 1e-6, name: str = "points") -> ContactPatch:
@@ -232,14 +236,14 @@ class ContactPatch:
         return cls(grid.centres(), areas, values.ravel(), grid, name or "pressure map")
 
     @classmethod
-    def _clipped(cls, outline: list[np.ndarray], grid: Grid, pressure: Any, name: str) -> ContactPatch:
-        """Patch of the parts of the grid's boxes inside an outline: the outer polygon, then its holes."""
+    def _clipped(cls, rims: list[np.ndarray], grid: Grid, pressure: Any, name: str, outline: Any) -> ContactPatch:
+        """Patch of the parts of the grid's boxes inside an outline: `rims` are its outer polygon, then its holes."""
         import shapely
 
-        polygon = shapely.Polygon(outline[0], outline[1:])
+        polygon = shapely.Polygon(rims[0], rims[1:])
         if not polygon.is_valid:
             raise InvalidValueError("vertices", "outline a simple polygon", shapely.is_valid_reason(polygon))
-        return cls(*shapes.clip(polygon, grid), pressure, grid, name)
+        return outlines.with_outline(cls(*shapes.clip(polygon, grid), pressure, grid, name), outline)
 
     def refined(self, parts: int) -> ContactPatch:
         """The same patch with every cell cut into `parts` x `parts` (a cell of a line into `parts`).
@@ -364,12 +368,14 @@ class ContactPatch:
         }
         if self.cell_size is not None:
             data["cell_size"] = list(self.cell_size)
+        if self.outline is not None:
+            data["outline"] = self.outline.to_dict()
         return data if self.grid is None else {**data, "grid": dataclasses.asdict(self.grid)}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> ContactPatch:
         """The patch that `to_dict` described; unknown and missing keys are errors that name them."""
-        optional = ("shape", "name", "pressure", "grid", "cell_size")
+        optional = ("shape", "name", "pressure", "grid", "cell_size", "outline")
         validation.keys("patch", data, required=("positions", "areas"), optional=optional)
         validation.choice("patch shape", data.get("shape", "cells"), ("cells",))
         pressure, grid = data.get("pressure"), data.get("grid")
@@ -378,7 +384,8 @@ class ContactPatch:
         if grid is not None:
             validation.keys("grid", grid, required=[entry.name for entry in dataclasses.fields(Grid)])
             grid = Grid(**grid)
-        return cls(data["positions"], data["areas"], pressure, grid, data.get("name", "patch"), data.get("cell_size"))
+        patch = cls(data["positions"], data["areas"], pressure, grid, data.get("name", "patch"), data.get("cell_size"))
+        return outlines.with_outline(patch, outlines.outline_from_dict(data.get("outline")))
 
 
 def _square_grid(width: float, cells: int) -> Grid:

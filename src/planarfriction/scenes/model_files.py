@@ -117,7 +117,7 @@ def patch_from_dict(table: Section) -> Any:
     shape = table.choice("shape", (*SHAPES, *OTHER_SHAPES))
     given = {key: value for key, value in table.data.items() if key != "shape"}
     if shape == "cells":
-        table.only(["shape", "name", "positions", "areas", "pressure", "grid", "cell_size"])
+        table.only(["shape", "name", "positions", "areas", "pressure", "grid", "cell_size", "outline"])
         with table.located():
             return ContactPatch.from_dict(table.data)
     if shape == "published":

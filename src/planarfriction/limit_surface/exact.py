@@ -1,0 +1,228 @@
+"""The limit surface of evenly loaded cells, segments, polygons, discs and rings, integrated and not summed."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol
+
+import numpy as np
+
+from planarfriction.errors import InvalidValueError
+from planarfriction.kernels import exact as kernels
+from planarfriction.limit_surface.base import LimitSurface, SurfaceNumbers
+from planarfriction.limit_surface.cells import LimitSurfaceCells
+from planarfriction.patch import Pressure, SoftFinger, Uniform
+from planarfriction.patch.outline import PolygonOutline, RoundOutline
+
+_GAUSS = ((4.0, 8), (8.0, 6), (16.0, 5), (40.0, 4), (300.0, 3))
+"""Distance of the centre of rotation from an element, in radii of the element, from which on how many Gauss points a
+side take over from the closed form. Measured against long double: at each switch the rule errs by at most 2e-15 of the
+element's wrench and 2e-13 of its second derivatives (a side ratio of 4; 4e-14 for squares); the closed form loses about
+distance/radius times 2e-16, 2e-15 and 6e-15 at the first switch, and has lost 1e-14 and 1e-13 at 30."""
+
+_ENDS, _RADII = 3.3, 64
+"""Double-exponential rule over radii: it ends where a share of 3e-19 of the way is left, and has so many points between
+kinks. Error of the wrench at most 3e-13 and of its slope 3e-12 (pressures that end in a step, k > 8), else 1e-14."""
+
+
+class _Parts(Protocol):
+    """What a surface is integrated over: sums `[M, 9]` at unit twists `[M, 3]`, in the unit of length `unit` [m]."""
+
+    def sums(self, twists: np.ndarray, unit: float) -> np.ndarray: ...
+
+
+class _Elements(NamedTuple):
+    """Points, segments or quads about the centre of pressure, the load of each spread evenly."""
+
+    corners: np.ndarray
+    """Corners `[N, 1, 2, or 4, 2]` [m]; a triangle has two corners in one place."""
+    weights: np.ndarray
+    """Share of the load of each, `[N]` [-]; negative where the corners run clockwise and are to be subtracted."""
+
+    def sums(self, twists: np.ndarray, unit: float) -> np.ndarray:
+        corners = self.corners / unit
+        shape = _shape(corners, self.weights)
+        rules, points = _gauss_rules(corners.shape[1])
+        reach = np.array([distance for distance, _ in _GAUSS])
+        sums = np.empty((len(twists), 9))
+        kernels.element_sums(corners, shape, rules, points, reach, twists, sums)
+        return sums
+
+
+class _Rings(NamedTuple):
+    """A disc or ring about the centre of pressure under a pressure that depends on the radius alone."""
+
+    inner: float
+    outer: float
+    pressure: Pressure
+    normal_force: float | None
+
+    def sums(self, twists: np.ndarray, unit: float) -> np.ndarray:
+        spin = np.abs(twists[:, 2])
+        with np.errstate(divide="ignore"):
+            kink = unit * np.hypot(twists[:, 0], twists[:, 1]) / spin  # where the rim runs as fast as the ring slides
+        kink = np.clip(np.where(spin > 0.0, kink, np.inf), self.inner, self.outer)[:, None]
+        share, weight = _double_exponential()
+        radii = np.hstack([self.inner + (kink - self.inner) * share, kink + (self.outer - kink) * share])
+        load = radii * np.hstack([(kink - self.inner) * weight, (self.outer - kink) * weight])
+        places = np.stack([radii.ravel(), np.zeros(radii.size)], -1)
+        force = None if self.normal_force is None else np.array(self.normal_force)
+        load *= self.pressure.relative(places, force).reshape(radii.shape)
+        sums = np.empty((len(twists), 9))
+        kernels.ring_sums(radii / unit, load / load.sum(axis=1, keepdims=True), twists, sums)
+        return sums
+
+
+@dataclass(frozen=True, eq=False)
+class LimitSurfaceExact(LimitSurface):
+    """Limit surface of the continuous patch: `W = -dPhi/dV`, `Phi = int p |v| dA`, in closed form.
+
+    Integrated over the patch's outline where the pressure is uniform on it (polygons), or depends on the radius alone
+    (discs and rings, `Uniform` or `SoftFinger`); else over its cells, each a rectangle (on lines a segment) of uniform
+    pressure. Points stay points. The wrench is continuous in the twist, the Jacobian exact; on lines the Jacobian grows
+    without bound (as a logarithm) where the centre of rotation meets the line, and is cut off at 1e-15 of a cell.
+
+    Costs more than a sum over cells, and compiled loops do not know it: `LimitSurfaceTable` stores it for models.
+    """
+
+    @functools.cached_property
+    def numbers(self) -> SurfaceNumbers:
+        """None: models take a stored surface."""
+        raise InvalidValueError(
+            "surface", "be one that compiled loops know; store it: LimitSurfaceTable(patch)", type(self).__name__
+        )
+
+    @functools.cached_property
+    def centre_of_pressure(self) -> np.ndarray:
+        """Centre of pressure `[2]` of what is integrated [m]."""
+        if isinstance(self._outline, PolygonOutline):
+            triangles = self._outline.triangles()
+            areas = _area(triangles)
+            # from the first vertex, so that a polygon far from the origin keeps its digits
+            offset = np.einsum("n,nkx->x", areas / areas.sum(), triangles - triangles[0, 0]) / 3.0
+            return triangles[0, 0] + offset
+        if isinstance(self._outline, RoundOutline):
+            return np.zeros(2)
+        return super().centre_of_pressure
+
+    @functools.cached_property
+    def _outline(self) -> PolygonOutline | RoundOutline | None:
+        """The patch's outline, if the pressure can be integrated over it."""
+        outline, pressure = self.patch.outline, self.patch.pressure
+        laws = (Uniform, SoftFinger) if isinstance(outline, RoundOutline) else (Uniform,)
+        return outline if isinstance(pressure, laws) else None
+
+    @functools.cached_property
+    def _parts(self) -> _Parts:
+        """What is integrated over."""
+        outline, pressure = self._outline, self.patch.pressure
+        self.patch.weights(self.normal_force)  # refuses a missing normal force
+        if isinstance(outline, RoundOutline):
+            reach = float(pressure.radius(self.normal_force or 1.0)) if isinstance(pressure, SoftFinger) else np.inf
+            return _Rings(outline.inner, min(outline.outer, reach), pressure, self.normal_force)
+        if isinstance(outline, PolygonOutline):
+            triangles = outline.triangles()
+            areas = _area(triangles)
+            corners = triangles[:, [0, 1, 2, 2]] - self.centre_of_pressure
+            return _Elements(corners, np.abs(areas) / np.abs(areas.sum()))
+        x, y, weights = self._loaded_cells()
+        extents = self.patch.cell_extents()[self.patch.weights(self.normal_force) > 0.0]
+        count = 2 ** int((extents > 0.0).any(axis=0).sum())
+        turns = {1: [(0.0, 0.0)], 2: [(-0.5, -0.5), (0.5, 0.5)], 4: [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]}
+        corners = np.stack([x, y], -1)[:, None] + extents[:, None] * np.array(turns[count])
+        return _Elements(corners, weights)
+
+    def _radius(self) -> float:
+        return float(self._parts.sums(np.array([[0.0, 0.0, 1.0]]), 1.0)[0, 2])
+
+    def _sums(self, scaled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Gradient `[M, 3]` and second derivatives `[M, 3, 3]` of the dissipation, for scaled twists `[M, 3]`."""
+        speed = np.linalg.norm(scaled, axis=1)
+        moving = speed > 0.0
+        sums = np.zeros((len(scaled), 9))
+        if moving.any():
+            sums[moving] = self._parts.sums(scaled[moving] / speed[moving, None], self.contact_radius)
+        per_speed = np.where(moving, 1.0 / np.where(moving, speed, 1.0), 0.0)
+        slopes = sums[:, [3, 4, 5, 4, 6, 7, 5, 7, 8]] * per_speed[:, None]
+        return sums[:, :3], slopes.reshape(-1, 3, 3)
+
+    def _direction(self, scaled: np.ndarray) -> np.ndarray:
+        return self._sums(scaled.reshape(-1, 3))[0].reshape(scaled.shape)
+
+    def _direction_slope(self, scaled: np.ndarray) -> np.ndarray:
+        return self._sums(scaled)[1]
+
+    def _sliding_slope(self, scaled: np.ndarray) -> np.ndarray:
+        h, slopes = self._sums(scaled)
+        speed = np.linalg.norm(scaled, axis=1)[:, None, None]
+        unit = scaled[:, None, :] / np.where(speed > 0.0, speed, 1.0)
+        # at rest, where it has no value, the ellipsoid's
+        return np.where(speed > 0.0, speed * slopes + h[:, :, None] * unit, np.eye(3))
+
+    def _scaled_twist_of(self, target: np.ndarray) -> np.ndarray:
+        if isinstance(self._parts, _Elements) and self._parts.corners.shape[1] == kernels.POINTS:
+            return LimitSurfaceCells(self.patch, normal_force=self.normal_force)._scaled_twist_of(target)
+        return super()._scaled_twist_of(target)
+
+
+def _area(triangles: np.ndarray) -> np.ndarray:
+    """Signed areas `[N]` [m^2] of triangles `[N, 3, 2]` [m]."""
+    first, second = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
+    return 0.5 * _cross(first, second)
+
+
+def _cross(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    return first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0]
+
+
+def _shape(corners: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """The coefficients `[N, 13]` that `kernels.exact` wants of elements and their weights."""
+    count = corners.shape[1]
+    signs = {
+        kernels.POINTS: [[1.0], [0.0], [0.0], [0.0]],
+        kernels.SEGMENTS: [[0.5, 0.5], [-0.5, 0.5], [0.0, 0.0], [0.0, 0.0]],
+        kernels.QUADS: [
+            [0.25, 0.25, 0.25, 0.25],
+            [-0.25, 0.25, 0.25, -0.25],
+            [-0.25, -0.25, 0.25, 0.25],
+            [0.25, -0.25, 0.25, -0.25],
+        ],
+    }
+    centre, a, b, c = np.einsum("fk,nkx->fnx", np.array(signs[count]), corners)
+    shape = np.zeros((len(corners), 13))
+    shape[:, :8] = np.hstack([centre, a, b, c])
+    if count == kernels.QUADS:
+        shape[:, 8:11] = np.stack([_cross(a, b), _cross(a, c), _cross(c, b)], -1)
+    else:
+        shape[:, 8] = np.hypot(*a.T) if count == kernels.SEGMENTS else 1.0
+    shape[:, 11] = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)
+    shape[:, 12] = weights / (shape[:, 8] * count)
+    shape[:, 8:11] *= shape[:, 12:]
+    return shape
+
+
+@functools.cache
+def _gauss_rules(count: int) -> tuple[np.ndarray, np.ndarray]:
+    """All rules of `_GAUSS` for elements of so many corners, `[J, 3, K]` (xi, eta, weight), and their points `[J]`."""
+    if count == kernels.POINTS:
+        return np.array([[[0.0], [0.0], [1.0]]]), np.array([1])
+    rules = np.zeros((len(_GAUSS), 3, max(points for _, points in _GAUSS) ** 2))
+    points = np.array([points if count == kernels.SEGMENTS else points**2 for _, points in _GAUSS])
+    for rule, (_, side) in zip(rules, _GAUSS, strict=True):
+        x, w = np.polynomial.legendre.leggauss(side)
+        if count == kernels.SEGMENTS:
+            rule[[0, 2], :side] = x, w
+        else:
+            rule[:, : side**2] = np.repeat(x, side), np.tile(x, side), np.outer(w, w).ravel()
+    return rules, points
+
+
+@functools.cache
+def _double_exponential() -> tuple[np.ndarray, np.ndarray]:
+    """Nodes in (0, 1) and weights of the double-exponential rule: any singularity at the ends may be integrated."""
+    t = np.linspace(-_ENDS, _ENDS, _RADII)
+    step = np.exp(-np.pi * np.abs(np.sinh(t)))
+    share = np.where(t < 0.0, step, 1.0) / (1.0 + step)
+    weight = step / (1.0 + step) ** 2 * np.pi * np.cosh(t) * (t[1] - t[0])
+    return share, weight

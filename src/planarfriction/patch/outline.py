@@ -1,0 +1,83 @@
+"""The true outline that a patch's cells were cut from: what an exact limit surface of uniform pressure integrates over."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from planarfriction.patch.contact_patch import ContactPatch
+
+
+@dataclass(frozen=True, eq=False)
+class PolygonOutline:
+    """A simple polygon, convex or not."""
+
+    vertices: np.ndarray
+    """Vertices in either sense, shape `[M, 2]` [m]."""
+
+    def triangles(self) -> np.ndarray:
+        """Triangles `[M - 2, 3, 2]` [m] from the first vertex; their signed sum is the polygon."""
+        others = self.vertices[1:]
+        return np.stack([np.broadcast_to(self.vertices[0], others[1:].shape), others[:-1], others[1:]], 1)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data, as `outline_from_dict` reads it."""
+        return {"vertices": self.vertices.tolist()}
+
+
+@dataclass(frozen=True)
+class RoundOutline:
+    """A disc (inner radius 0) or a ring about the origin."""
+
+    inner: float
+    """Inner radius [m]."""
+    outer: float
+    """Outer radius [m]."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """Plain data, as `outline_from_dict` reads it."""
+        return {"radii": [self.inner, self.outer]}
+
+
+Outline = PolygonOutline | RoundOutline
+
+
+def outline_from_dict(data: Any) -> Outline | None:
+    """The outline of `{"vertices": [[x, y], ...]}` or `{"radii": [inner, outer]}`; None of None."""
+    if data is None:
+        return None
+    if not isinstance(data, Mapping) or list(data) not in (["vertices"], ["radii"]):
+        raise InvalidValueError("outline", "be a table with either vertices or radii", data)
+    if "vertices" in data:
+        return polygon_outline(data["vertices"])
+    inner, outer = validation.vector("radii", data["radii"], 2).tolist()
+    if not 0.0 <= inner < outer:
+        raise InvalidValueError("radii", "grow from >= 0", f"{inner} and {outer}")
+    return RoundOutline(inner, outer)
+
+
+def polygon_outline(vertices: Any) -> PolygonOutline:
+    """The outline with those `vertices` `[M, 2]` [m]."""
+    vertices = validation.array("vertices", vertices, (None, 2))
+    if len(vertices) < 3:
+        raise InvalidValueError("vertices", "hold at least 3 points", f"{len(vertices)}")
+    vertices.setflags(write=False)
+    return PolygonOutline(vertices)
+
+
+def box_outline(width: float, height: float) -> PolygonOutline:
+    """Rectangle of that size [m] about the origin."""
+    return polygon_outline(np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]) * (0.5 * width, 0.5 * height))
+
+
+def with_outline(patch: ContactPatch, outline: Outline | None) -> ContactPatch:
+    """The new `patch`, knowing that its cells were cut from that outline."""
+    object.__setattr__(patch, "outline", outline)
+    return patch
