@@ -19,6 +19,7 @@ POLAR_SAMPLES, AZIMUTH_SAMPLES = 37, 72
 """Samples of the direction sphere in the CSV: every five degrees."""
 
 SURFACES = {
+    "exact": "LimitSurfaceExact",
     "cells": "LimitSurfaceCells",
     "table": "LimitSurfaceTable",
     "table-published": "LimitSurfaceTablePublished",

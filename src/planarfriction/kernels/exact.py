@@ -1,13 +1,14 @@
 """Closed forms of `Phi(V) = int |v|` over segments, triangles, rectangles and rings: gradient and second derivatives.
 
-`V = (x, y, s)` at the centre of pressure in any scale of lengths; the velocity of a place p is `v = (x - s py, y + s px)`
-= `s J d`, `d = p - c` with the centre of rotation `c = (-y, x)/s` and J a quarter turn. So three integrals suffice,
+`V = (x, y, s)` at the centre of pressure in any scale of lengths; the velocity of a place p is
+`v = (x - s py, y + s px) = s J d`, `d = p - c`, with the centre of rotation `c = (-y, x)/s` and J a quarter turn. So
+three integrals suffice,
 
     f = int |d|,   G = int d/|d|,   M = int d d'/|d|^3,
     dPhi/d(x, y) = sign(s) J G,   dPhi/ds = sign(s) (f + c . G),   d2Phi/dV2 = T' M T/|s|,   T = [1 0 -cy; 0 1 cx],
 
-each homogeneous in d: over the triangle between c and a segment at height h they are h/3, h/2 and h times those along the
-segment, and any polygon is a signed sum of such triangles.
+each homogeneous in d: over the triangle between c and a segment at height h they are h/3, h/2 and h times those along
+the segment, and any polygon is a signed sum of such triangles.
 
 Far from the centre of rotation that sum loses digits (about distance/size of them times 1e-16) and c runs away; there a
 Gauss rule on the velocities takes over, and it has no trouble with s = 0.
@@ -40,8 +41,8 @@ _AT_REST = 1e-14
 def _segment(ax, ay, bx, by):
     """Height h of the origin over the line from a to b (> 0 to the left), and f, G, M of the segment.
 
-    `d = h n + t tau`: with `S = |a| + |b|` and length L, `int 1/|d| = log((S + L)/(S - L))`; differences between the two
-    ends are written without cancellation.
+    `d = h n + t tau`: with `S = |a| + |b|` and length L, `int 1/|d| = log((S + L)/(S - L))`; differences between the
+    two ends are written without cancellation.
     """
     ex, ey = bx - ax, by - ay
     length = math.sqrt(ex * ex + ey * ey)
@@ -165,8 +166,9 @@ def element_sums(corners, shape, rules, points, reach, twist, sums):
     """Gradient and second derivatives of `Phi` at unit twists `[M, 3]` into `sums [M, 9]`.
 
     Elements: `corners [N, count, 2]`, and `shape [N, 13]`: the coefficients P, A, B, C of `_far`, those of its Jacobian
-    determinant times the weight per length or area, and the radius about P, and that weight itself. Gauss rules `rules [J, 3, K]` (xi, eta,
-    weight), of which rule j has `points[j]` points and is used from the distance `reach[j]` radii on.
+    determinant times the weight per length or area, the radius about P, and that weight itself. Gauss rules
+    `rules [J, 3, K]` (xi, eta, weight), of which rule j has `points[j]` points and is used from the distance `reach[j]`
+    radii on.
     """
     number, count = corners.shape[0], corners.shape[1]
     tiers = points.shape[0]

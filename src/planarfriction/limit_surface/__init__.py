@@ -3,6 +3,7 @@
 from planarfriction.limit_surface.base import LimitSurface
 from planarfriction.limit_surface.cells import LimitSurfaceCells
 from planarfriction.limit_surface.ellipsoid import LimitSurfaceEllipsoid
+from planarfriction.limit_surface.exact import LimitSurfaceExact
 from planarfriction.limit_surface.table import LimitSurfaceTable
 from planarfriction.limit_surface.table_published import LimitSurfaceTablePublished
 
@@ -10,6 +11,7 @@ __all__ = [
     "LimitSurface",
     "LimitSurfaceCells",
     "LimitSurfaceEllipsoid",
+    "LimitSurfaceExact",
     "LimitSurfaceTable",
     "LimitSurfaceTablePublished",
 ]

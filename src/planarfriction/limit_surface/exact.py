@@ -15,21 +15,35 @@ from planarfriction.limit_surface.cells import LimitSurfaceCells
 from planarfriction.patch import Pressure, SoftFinger, Uniform
 from planarfriction.patch.outline import PolygonOutline, RoundOutline
 
-_GAUSS = ((4.0, 8), (8.0, 6), (16.0, 5), (40.0, 4), (300.0, 3))
-"""Distance of the centre of rotation from an element, in radii of the element, from which on how many Gauss points a
-side take over from the closed form. Measured against long double: at each switch the rule errs by at most 2e-15 of the
-element's wrench and 2e-13 of its second derivatives (a side ratio of 4; 4e-14 for squares); the closed form loses about
-distance/radius times 2e-16, 2e-15 and 6e-15 at the first switch, and has lost 1e-14 and 1e-13 at 30."""
+EXACT_RULES = ((4.0, 8), (8.0, 6), (16.0, 5), (50.0, 4), (400.0, 3))
+"""Distance of the centre of rotation from an element, in its radii, from which on how many Gauss points a side serve.
+
+Measured against long double on squares, rectangles 4:1, triangles and segments that are the whole patch: the closed
+form loses digits in proportion to the distance, 4e-15 of the wrench (1e-14 at 4:1) at the first switch; the rules err
+by at most 1e-14 at their switches. Of the second derivatives: 1e-13 and 2e-12."""
+
+STORED_RULES = ((3.0, 6), (6.0, 4), (12.0, 3), (100.0, 2))
+"""The same for stored surfaces, whose nodes are many: 1e-7 of an element's wrench, 1e-8 of that of 441 cells."""
+
+_CORNERS = (
+    np.zeros((1, 2)),
+    np.array([(-0.5, -0.5), (0.5, 0.5)]),
+    np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]),
+)
+"""Corners of a cell that extends in no direction (a point), in one (a segment), in two."""
 
 _ENDS, _RADII = 3.3, 64
 """Double-exponential rule over radii: it ends where a share of 3e-19 of the way is left, and has so many points between
 kinks. Error of the wrench at most 3e-13 and of its slope 3e-12 (pressures that end in a step, k > 8), else 1e-14."""
 
 
+Rules = tuple[tuple[float, int], ...]
+
+
 class _Parts(Protocol):
     """What a surface is integrated over: sums `[M, 9]` at unit twists `[M, 3]`, in the unit of length `unit` [m]."""
 
-    def sums(self, twists: np.ndarray, unit: float) -> np.ndarray: ...
+    def sums(self, twists: np.ndarray, unit: float, rules: Rules) -> np.ndarray: ...
 
 
 class _Elements(NamedTuple):
@@ -40,13 +54,12 @@ class _Elements(NamedTuple):
     weights: np.ndarray
     """Share of the load of each, `[N]` [-]; negative where the corners run clockwise and are to be subtracted."""
 
-    def sums(self, twists: np.ndarray, unit: float) -> np.ndarray:
+    def sums(self, twists: np.ndarray, unit: float, rules: Rules) -> np.ndarray:
         corners = self.corners / unit
         shape = _shape(corners, self.weights)
-        rules, points = _gauss_rules(corners.shape[1])
-        reach = np.array([distance for distance, _ in _GAUSS])
+        nodes, points, reach = _gauss_rules(corners.shape[1], rules)
         sums = np.empty((len(twists), 9))
-        kernels.element_sums(corners, shape, rules, points, reach, twists, sums)
+        kernels.element_sums(corners, shape, nodes, points, reach, twists, sums)
         return sums
 
 
@@ -58,7 +71,7 @@ class _Rings(NamedTuple):
     pressure: Pressure
     normal_force: float | None
 
-    def sums(self, twists: np.ndarray, unit: float) -> np.ndarray:
+    def sums(self, twists: np.ndarray, unit: float, rules: Rules) -> np.ndarray:
         spin = np.abs(twists[:, 2])
         with np.errstate(divide="ignore"):
             kink = unit * np.hypot(twists[:, 0], twists[:, 1]) / spin  # where the rim runs as fast as the ring slides
@@ -128,33 +141,32 @@ class LimitSurfaceExact(LimitSurface):
             return _Elements(corners, np.abs(areas) / np.abs(areas.sum()))
         x, y, weights = self._loaded_cells()
         extents = self.patch.cell_extents()[self.patch.weights(self.normal_force) > 0.0]
-        count = 2 ** int((extents > 0.0).any(axis=0).sum())
-        turns = {1: [(0.0, 0.0)], 2: [(-0.5, -0.5), (0.5, 0.5)], 4: [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)]}
-        corners = np.stack([x, y], -1)[:, None] + extents[:, None] * np.array(turns[count])
+        sides = int((extents > 0.0).any(axis=0).sum())
+        corners = np.stack([x, y], -1)[:, None] + extents[:, None] * _CORNERS[sides]
         return _Elements(corners, weights)
 
     def _radius(self) -> float:
-        return float(self._parts.sums(np.array([[0.0, 0.0, 1.0]]), 1.0)[0, 2])
+        return float(self._parts.sums(np.array([[0.0, 0.0, 1.0]]), 1.0, EXACT_RULES)[0, 2])
 
-    def _sums(self, scaled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def sums(self, scaled: np.ndarray, rules: Rules = EXACT_RULES) -> tuple[np.ndarray, np.ndarray]:
         """Gradient `[M, 3]` and second derivatives `[M, 3, 3]` of the dissipation, for scaled twists `[M, 3]`."""
         speed = np.linalg.norm(scaled, axis=1)
         moving = speed > 0.0
         sums = np.zeros((len(scaled), 9))
         if moving.any():
-            sums[moving] = self._parts.sums(scaled[moving] / speed[moving, None], self.contact_radius)
+            sums[moving] = self._parts.sums(scaled[moving] / speed[moving, None], self.contact_radius, rules)
         per_speed = np.where(moving, 1.0 / np.where(moving, speed, 1.0), 0.0)
         slopes = sums[:, [3, 4, 5, 4, 6, 7, 5, 7, 8]] * per_speed[:, None]
         return sums[:, :3], slopes.reshape(-1, 3, 3)
 
     def _direction(self, scaled: np.ndarray) -> np.ndarray:
-        return self._sums(scaled.reshape(-1, 3))[0].reshape(scaled.shape)
+        return self.sums(scaled.reshape(-1, 3))[0].reshape(scaled.shape)
 
     def _direction_slope(self, scaled: np.ndarray) -> np.ndarray:
-        return self._sums(scaled)[1]
+        return self.sums(scaled)[1]
 
     def _sliding_slope(self, scaled: np.ndarray) -> np.ndarray:
-        h, slopes = self._sums(scaled)
+        h, slopes = self.sums(scaled)
         speed = np.linalg.norm(scaled, axis=1)[:, None, None]
         unit = scaled[:, None, :] / np.where(speed > 0.0, speed, 1.0)
         # at rest, where it has no value, the ellipsoid's
@@ -203,19 +215,19 @@ def _shape(corners: np.ndarray, weights: np.ndarray) -> np.ndarray:
 
 
 @functools.cache
-def _gauss_rules(count: int) -> tuple[np.ndarray, np.ndarray]:
-    """All rules of `_GAUSS` for elements of so many corners, `[J, 3, K]` (xi, eta, weight), and their points `[J]`."""
+def _gauss_rules(count: int, rules: Rules) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The rules for elements of so many corners: nodes `[J, 3, K]` (xi, eta, weight), numbers `[J]`, distances `[J]`."""
     if count == kernels.POINTS:
-        return np.array([[[0.0], [0.0], [1.0]]]), np.array([1])
-    rules = np.zeros((len(_GAUSS), 3, max(points for _, points in _GAUSS) ** 2))
-    points = np.array([points if count == kernels.SEGMENTS else points**2 for _, points in _GAUSS])
-    for rule, (_, side) in zip(rules, _GAUSS, strict=True):
+        return np.array([[[0.0], [0.0], [1.0]]]), np.array([1]), np.zeros(1)
+    nodes = np.zeros((len(rules), 3, max(side for _, side in rules) ** 2))
+    points = np.array([side if count == kernels.SEGMENTS else side**2 for _, side in rules])
+    for rule, (_, side) in zip(nodes, rules, strict=True):
         x, w = np.polynomial.legendre.leggauss(side)
         if count == kernels.SEGMENTS:
             rule[[0, 2], :side] = x, w
         else:
             rule[:, : side**2] = np.repeat(x, side), np.tile(x, side), np.outer(w, w).ravel()
-    return rules, points
+    return nodes, points, np.array([reach for reach, _ in rules])
 
 
 @functools.cache

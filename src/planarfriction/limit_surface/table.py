@@ -9,8 +9,8 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.kernels import surfaces as kernels
-from planarfriction.kernels import tables
 from planarfriction.limit_surface.base import LimitSurface, SurfaceNumbers
+from planarfriction.limit_surface.exact import STORED_RULES, LimitSurfaceExact
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,7 +18,7 @@ class LimitSurfaceTable(LimitSurface):
     """Stored limit surface: dissipation and its gradient at `segments` x `4 segments` directions, bicubic in between.
 
     The potential is interpolated and the wrench is its gradient, so that `-W . V = Phi(V) > 0` and the Jacobian is
-    symmetric at every twist; nodes are plain sums over the cells.
+    symmetric at every twist; the nodes are those of `LimitSurfaceExact` (to 1e-7), mixed derivatives included.
     """
 
     segments: int = 20
@@ -31,11 +31,21 @@ class LimitSurfaceTable(LimitSurface):
         super().__post_init__()
 
     @functools.cached_property
+    def _exact(self) -> LimitSurfaceExact:
+        return LimitSurfaceExact(self.patch, normal_force=self.normal_force)
+
+    @functools.cached_property
+    def centre_of_pressure(self) -> np.ndarray:
+        """Centre of pressure `[2]` of the exact surface [m]."""
+        return self._exact.centre_of_pressure
+
+    def _radius(self) -> float:
+        return self._exact.contact_radius
+
+    @functools.cached_property
     def numbers(self) -> SurfaceNumbers:
         """Potential, its derivatives along both angles and the mixed one at the nodes; the force in a pure spin."""
-        nodes = np.empty((self.segments + 1, 4 * self.segments + 1, 4))
-        tilt = tables.potential_nodes(*self._loaded_cells(), self.contact_radius, self.segments, nodes)
-        return SurfaceNumbers(self.kind, self.segments, np.append(nodes, tilt))
+        return SurfaceNumbers(self.kind, self.segments, _nodes(self._exact, self.segments))
 
     def _first_guess(self, target: np.ndarray) -> np.ndarray:
         """The node of least dissipation per unit of power that `target` would have."""
@@ -49,3 +59,35 @@ class LimitSurfaceTable(LimitSurface):
         cost = np.einsum("ni,ni->n", h, upper) / np.maximum(np.abs(power), 1e-300)
         best = int(np.argmin(cost))
         return np.sign(power[best]) * upper[best]
+
+
+def _nodes(exact: LimitSurfaceExact, segments: int) -> np.ndarray:
+    """The numbers of `kernels.surfaces.POTENTIAL`: `phi` less the tilt and its derivatives at the nodes, and the tilt.
+
+    With the unit vectors `n` of a direction, `e` and `t` of growing polar angle p and azimuth:
+    `dphi/dp = h . e`, `dphi/da = sin p (h . t)`, `d2phi/dp da = sin p (t . dh/dn e) + cos p (h . t)`.
+    """
+    polar = 0.5 * np.pi / segments * np.arange(segments + 1)[:, None]
+    azimuth = 0.5 * np.pi / segments * np.arange(4 * segments)[None, :]
+    sin_p, cos_p = np.sin(polar), np.cos(polar)
+    cos_p[-1] = 0.0  # the equator is a translation, not nearly one
+    sin_a, cos_a = np.sin(azimuth), np.cos(azimuth)
+    flat = np.zeros_like(polar * azimuth)
+    direction = np.stack([sin_p * cos_a, sin_p * sin_a, cos_p + flat], -1)
+    along = np.stack([cos_p * cos_a, cos_p * sin_a, flat - sin_p], -1)
+    across = np.stack([flat - sin_a, flat + cos_a, flat], -1)
+    h, slope = exact.sums(direction.reshape(-1, 3), STORED_RULES)
+    h, slope = h.reshape(direction.shape), slope.reshape(*direction.shape, 3)
+    h_across = np.einsum("pai,pai->pa", h, across)
+    ax, ay, _ = h[0, 0]
+    lean, lean_slope = ax * cos_a + ay * sin_a, ay * cos_a - ax * sin_a
+    tilt, tilt_slope = sin_p * cos_p**2, cos_p * (cos_p**2 - 2.0 * sin_p**2)
+    nodes = np.empty((segments + 1, 4 * segments + 1, 4))
+    nodes[:, :-1, 0] = np.einsum("pai,pai->pa", h, direction) - tilt * lean
+    nodes[:, :-1, 1] = np.einsum("pai,pai->pa", h, along) - tilt_slope * lean
+    nodes[:, :-1, 2] = sin_p * h_across - tilt * lean_slope
+    mixed = sin_p * np.einsum("pai,paij,paj->pa", across, slope, along) + cos_p * h_across
+    nodes[:, :-1, 3] = mixed - tilt_slope * lean_slope
+    nodes[0, :, 3] = 0.0  # at the axis, where only the tilt has a slope
+    nodes[:, -1] = nodes[:, 0]
+    return np.append(nodes, (ax, ay))

@@ -101,8 +101,7 @@ class ContactPatch:
         Cells at the rim have the area inside it, and the centroid of that part as position.
         """
         radius = validation.positive("radius", radius)
-        outline = outlines.RoundOutline(0.0, radius)
-        return cls._clipped([shapes.circle(radius)], _square_grid(2 * radius, cells), pressure, name, outline)
+        return cls._clipped(outlines.RoundOutline(0.0, radius), _square_grid(2 * radius, cells), pressure, name)
 
     @classmethod
     def disc_published(
@@ -152,8 +151,7 @@ class ContactPatch:
         outer = validation.positive("outer_radius", outer_radius)
         if inner >= outer:
             raise InvalidValueError("inner_radius", "be < outer_radius", f"{inner} and {outer}")
-        rims = [shapes.circle(outer), shapes.circle(inner)]
-        return cls._clipped(rims, _square_grid(2 * outer, cells), pressure, name, outlines.RoundOutline(inner, outer))
+        return cls._clipped(outlines.RoundOutline(inner, outer), _square_grid(2 * outer, cells), pressure, name)
 
     @classmethod
     def line(
@@ -201,7 +199,7 @@ class ContactPatch:
             raise InvalidValueError("vertices", "enclose an area", f"a box of {width} x {height} m")
         columns, rows = shapes.columns_and_rows(cells, width, height)
         grid = Grid(low[0], low[1], width / columns, height / rows, columns, rows)
-        return cls._clipped([vertices], grid, pressure, name, outline)
+        return cls._clipped(outline, grid, pressure, name)
 
     @classmethod
     def points(cls, positions, weights=None, *, area: float = 1e-6, name: str = "points") -> ContactPatch:
@@ -236,11 +234,11 @@ class ContactPatch:
         return cls(grid.centres(), areas, values.ravel(), grid, name or "pressure map")
 
     @classmethod
-    def _clipped(cls, rims: list[np.ndarray], grid: Grid, pressure: Any, name: str, outline: Any) -> ContactPatch:
-        """Patch of the parts of the grid's boxes inside an outline: `rims` are its outer polygon, then its holes."""
+    def _clipped(cls, outline: outlines.Outline, grid: Grid, pressure: Any, name: str) -> ContactPatch:
+        """Patch of the parts of the grid's boxes inside an outline."""
         import shapely
 
-        polygon = shapely.Polygon(rims[0], rims[1:])
+        polygon = shapely.Polygon(*outline.rims())
         if not polygon.is_valid:
             raise InvalidValueError("vertices", "outline a simple polygon", shapely.is_valid_reason(polygon))
         return outlines.with_outline(cls(*shapes.clip(polygon, grid), pressure, grid, name), outline)
@@ -365,11 +363,10 @@ class ContactPatch:
             "positions": self.positions.tolist(),
             "areas": self.areas.tolist(),
             "pressure": self.pressure.to_dict(),
+            **outlines.outline_to_dict(self.outline),
         }
         if self.cell_size is not None:
             data["cell_size"] = list(self.cell_size)
-        if self.outline is not None:
-            data["outline"] = self.outline.to_dict()
         return data if self.grid is None else {**data, "grid": dataclasses.asdict(self.grid)}
 
     @classmethod

@@ -1,4 +1,4 @@
-"""The true outline that a patch's cells were cut from: what an exact limit surface of uniform pressure integrates over."""
+"""The true outline that a patch's cells were cut from: what an exact limit surface integrates over."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
+from planarfriction.patch import shapes
 
 if TYPE_CHECKING:
     from planarfriction.patch.contact_patch import ContactPatch
@@ -21,6 +22,10 @@ class PolygonOutline:
 
     vertices: np.ndarray
     """Vertices in either sense, shape `[M, 2]` [m]."""
+
+    def rims(self) -> tuple[np.ndarray, list[np.ndarray]]:
+        """The polygon that bounds it, and its holes (none), `[M, 2]` [m] each."""
+        return self.vertices, []
 
     def triangles(self) -> np.ndarray:
         """Triangles `[M - 2, 3, 2]` [m] from the first vertex; their signed sum is the polygon."""
@@ -41,12 +46,21 @@ class RoundOutline:
     outer: float
     """Outer radius [m]."""
 
+    def rims(self) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Polygons of the same areas as its outer circle and its hole, if any, `[shapes.CIRCLE_SIDES, 2]` [m] each."""
+        return shapes.circle(self.outer), [shapes.circle(self.inner)] if self.inner > 0.0 else []
+
     def to_dict(self) -> dict[str, Any]:
         """Plain data, as `outline_from_dict` reads it."""
         return {"radii": [self.inner, self.outer]}
 
 
 Outline = PolygonOutline | RoundOutline
+
+
+def outline_to_dict(outline: Outline | None) -> dict[str, Any]:
+    """The entry `outline` of a patch's plain data, none without an outline."""
+    return {} if outline is None else {"outline": outline.to_dict()}
 
 
 def outline_from_dict(data: Any) -> Outline | None:

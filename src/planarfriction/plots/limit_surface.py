@@ -69,6 +69,7 @@ def scaled_samples(surface: Any, polar: np.ndarray, azimuth: np.ndarray) -> tupl
 def _kind(surface: Any) -> str:
     words = {
         "LimitSurfaceCells": "sum over the cells",
+        "LimitSurfaceExact": "exact",
         "LimitSurfaceTable": "table, smooth",
         "LimitSurfaceTablePublished": "table, as published",
         "LimitSurfaceEllipsoid": "ellipsoid",
