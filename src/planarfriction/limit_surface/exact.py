@@ -52,7 +52,7 @@ class _Elements(NamedTuple):
     corners: np.ndarray
     """Corners `[N, 1, 2, or 4, 2]` [m]; a triangle has two corners in one place."""
     weights: np.ndarray
-    """Share of the load of each, `[N]` [-]; negative where the corners run clockwise and are to be subtracted."""
+    """Share of the load of each, `[N]` [-]; negative for the triangles that a polygon subtracts."""
 
     def sums(self, twists: np.ndarray, unit: float, rules: Rules) -> np.ndarray:
         corners = self.corners / unit
@@ -99,6 +99,8 @@ class LimitSurfaceExact(LimitSurface):
     Costs more than a sum over cells, and compiled loops do not know it: `LimitSurfaceTable` stores it for models.
     """
 
+    kind = -1  # no kind of compiled loops
+
     @functools.cached_property
     def numbers(self) -> SurfaceNumbers:
         """None: models take a stored surface."""
@@ -138,7 +140,7 @@ class LimitSurfaceExact(LimitSurface):
             triangles = outline.triangles()
             areas = _area(triangles)
             corners = triangles[:, [0, 1, 2, 2]] - self.centre_of_pressure
-            return _Elements(corners, np.abs(areas) / np.abs(areas.sum()))
+            return _Elements(corners, areas / areas.sum())
         x, y, weights = self._loaded_cells()
         extents = self.patch.cell_extents()[self.patch.weights(self.normal_force) > 0.0]
         sides = int((extents > 0.0).any(axis=0).sum())
@@ -150,7 +152,7 @@ class LimitSurfaceExact(LimitSurface):
 
     def sums(self, scaled: np.ndarray, rules: Rules = EXACT_RULES) -> tuple[np.ndarray, np.ndarray]:
         """Gradient `[M, 3]` and second derivatives `[M, 3, 3]` of the dissipation, for scaled twists `[M, 3]`."""
-        speed = np.linalg.norm(scaled, axis=1)
+        speed = _norm(scaled)
         moving = speed > 0.0
         sums = np.zeros((len(scaled), 9))
         if moving.any():
@@ -167,7 +169,7 @@ class LimitSurfaceExact(LimitSurface):
 
     def _sliding_slope(self, scaled: np.ndarray) -> np.ndarray:
         h, slopes = self.sums(scaled)
-        speed = np.linalg.norm(scaled, axis=1)[:, None, None]
+        speed = _norm(scaled)[:, None, None]
         unit = scaled[:, None, :] / np.where(speed > 0.0, speed, 1.0)
         # at rest, where it has no value, the ellipsoid's
         return np.where(speed > 0.0, speed * slopes + h[:, :, None] * unit, np.eye(3))
@@ -176,6 +178,11 @@ class LimitSurfaceExact(LimitSurface):
         if isinstance(self._parts, _Elements) and self._parts.corners.shape[1] == kernels.POINTS:
             return LimitSurfaceCells(self.patch, normal_force=self.normal_force)._scaled_twist_of(target)
         return super()._scaled_twist_of(target)
+
+
+def _norm(scaled: np.ndarray) -> np.ndarray:
+    """Lengths `[M]` of scaled twists `[M, 3]`, however large or small."""
+    return np.hypot(np.hypot(scaled[:, 0], scaled[:, 1]), scaled[:, 2])
 
 
 def _area(triangles: np.ndarray) -> np.ndarray:
@@ -216,7 +223,7 @@ def _shape(corners: np.ndarray, weights: np.ndarray) -> np.ndarray:
 
 @functools.cache
 def _gauss_rules(count: int, rules: Rules) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The rules for elements of so many corners: nodes `[J, 3, K]` (xi, eta, weight), numbers `[J]`, distances `[J]`."""
+    """The rules for elements of so many corners: nodes `[J, 3, K]` (xi, eta, weight), numbers and distances `[J]`."""
     if count == kernels.POINTS:
         return np.array([[[0.0], [0.0], [1.0]]]), np.array([1]), np.zeros(1)
     nodes = np.zeros((len(rules), 3, max(side for _, side in rules) ** 2))
