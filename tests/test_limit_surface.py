@@ -239,7 +239,7 @@ def some_twists(count: int = 300) -> np.ndarray:
 
 def test_tables_converge():
     patch, twist = smooth_disc(), some_twists()
-    surface, cells = pf.LimitSurfaceExact(patch), pf.LimitSurfaceCells(smooth_disc(401))
+    surface, cells = pf.LimitSurfaceExact(patch), pf.LimitSurfaceCells(smooth_disc(201))
     exact_phi, exact = surface.dissipation(twist), surface.wrench(twist) / (1.0, 1.0, surface.contact_radius)
     summed = cells.wrench(twist) / (1.0, 1.0, cells.contact_radius)
     phi_errors, smooth, published = [], [], []
@@ -247,7 +247,7 @@ def test_tables_converge():
         table = pf.LimitSurfaceTable(patch, segments)
         phi_errors.append(np.abs(table.dissipation(twist) / exact_phi - 1.0).mean())
         smooth.append(np.abs(table.wrench(twist) / (1.0, 1.0, table.contact_radius) - exact).mean())
-        table = pf.LimitSurfaceTablePublished(smooth_disc(401), segments)
+        table = pf.LimitSurfaceTablePublished(smooth_disc(201), segments)
         published.append(np.abs(table.wrench(twist) / (1.0, 1.0, table.contact_radius) - summed).mean())
     # Bicubic potential: fourth order, its gradient third; bilinear: second order.
     assert order(phi_errors) > 3.7

