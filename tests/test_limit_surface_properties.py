@@ -148,7 +148,7 @@ def test_covariance_when_the_patch_moves(kind, name):
         assume(kind not in SUMS or lowest_speed(at_home, twist) > 1e-3)
         expected = geometry.wrench_at(geometry.rotate(at_home.wrench(twist), turn), (-dx, -dy))
         got = moved.wrench(geometry.twist_at(geometry.rotate(twist, turn), (-dx, -dy)))
-        # Rounding of positions (1e-16 of 0.3 m against r of 4 mm), over the lowest speed or the distance to the axis; in
+        # Rounding of positions (1e-16 of 0.3 m against r of 4 mm), over the lowest speed or distance to the axis; in
         # the second derivatives that a table stores, over the square of a node's distance from a point (1e-4).
         tolerance = 1e-6 if kind is TABLE else 1e-9
         assert got / scales(surface) == pytest.approx(expected / scales(surface), abs=tolerance)
