@@ -11,6 +11,7 @@ from planarfriction import validation
 from planarfriction.kernels import surfaces as kernels
 from planarfriction.kernels import tables
 from planarfriction.limit_surface.base import LimitSurface, SurfaceNumbers
+from planarfriction.limit_surface.cell_metrics import potential_table
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +26,7 @@ class LimitSurfaceTable(LimitSurface):
     """Segments of a quadrant [-]."""
 
     kind = kernels.POTENTIAL
+    anisotropy = "any"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "segments", validation.count("segments", self.segments, at_least=2))
@@ -33,6 +35,8 @@ class LimitSurfaceTable(LimitSurface):
     @functools.cached_property
     def numbers(self) -> SurfaceNumbers:
         """Potential, its derivatives along both angles and the mixed one at the nodes; the force in a pure spin."""
+        if not self._one_metric:
+            return SurfaceNumbers(self.kind, self.segments, potential_table(*self._scaled_levers, self.segments))
         nodes = np.empty((self.segments + 1, 4 * self.segments + 1, 4))
         tilt = tables.potential_nodes(*self._loaded_cells(), self.contact_radius, self.segments, nodes)
         return SurfaceNumbers(self.kind, self.segments, np.append(nodes, tilt))
@@ -45,7 +49,7 @@ class LimitSurfaceTable(LimitSurface):
         )
         upper = np.stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], -1)
         upper = upper.reshape(-1, 3)
-        h, power = self._direction(upper), upper @ target
-        cost = np.einsum("ni,ni->n", h, upper) / np.maximum(np.abs(power), 1e-300)
-        best = int(np.argmin(cost))
-        return np.sign(power[best]) * upper[best]
+        power = upper @ target
+        upper *= np.where(power < 0.0, -1.0, 1.0)[:, None]
+        cost = np.einsum("ni,ni->n", self._direction(upper), upper) / np.maximum(np.abs(power), 1e-300)
+        return upper[int(np.argmin(cost))]

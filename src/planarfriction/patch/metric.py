@@ -86,8 +86,7 @@ class Anisotropy:
         """Symmetric root `L` of the metric: `[2, 2]` where it is one for all cells, `[N, 2, 2]`, or None."""
         if self.metric is None or (self.metric == np.eye(2)).all():
             return None
-        values, axes = np.linalg.eigh(self.metric)
-        root = _symmetric((axes * np.sqrt(values)[..., None, :]) @ np.swapaxes(axes, -1, -2))
+        root = symmetric_root(self.metric)
         return root[0] if root.ndim == 3 and (root == root[0]).all() else root
 
     def lever_coordinates(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -117,6 +116,12 @@ class Anisotropy:
         """Plain data of what there is."""
         both = {"metric": self.metric, "asymmetry": self.asymmetry}
         return {name: value.tolist() for name, value in both.items() if value is not None}
+
+
+def symmetric_root(metric: np.ndarray) -> np.ndarray:
+    """`L` with `L L = M`, symmetric and positive definite, for metrics `[..., 2, 2]`."""
+    values, axes = np.linalg.eigh(metric)
+    return _symmetric((axes * np.sqrt(values)[..., None, :]) @ np.swapaxes(axes, -1, -2))
 
 
 def refuse_anisotropy(patch: Anisotropy, by: str) -> None:
