@@ -1,7 +1,7 @@
 """Friction that depends on the direction: a metric for each cell (grain, grooves) and an asymmetry (a brushed surface).
 
 A cell with the metric `M`, whose symmetric root is `L`, sees `u = L v` and pulls with `L` times the traction that a
-cell without a metric would have: in steady sliding `-g L (u/|u| + a)`, so that the dissipated power is `g (|u| + a . u)`.
+cell without a metric would have: in steady sliding `-g L (u/|u| + a)`. It then dissipates the power `g (|u| + a . u)`.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ class Anisotropy:
         return root[0] if root.ndim == 3 and (root == root[0]).all() else root
 
     def lever_coordinates(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """`(x', y')` `[..., N]` with `L (-y, x) = (-y', x')`: a spin moves the cells as it would without a metric there.
+        """`(x', y')` `[..., N]` with `L (-y, x) = (-y', x')`: what a cell sees of a spin is that of a cell there.
 
         For a metric per cell the last axis of `x` and `y` runs over all cells of the patch.
         """
@@ -135,6 +135,13 @@ def refuse_cell_metrics(patch: Anisotropy, by: str) -> None:
     different = patch.asymmetry is not None and (patch.asymmetries() != patch.asymmetries()[0]).any()
     if different or (patch.root is not None and patch.root.ndim == 3):
         raise InvalidValueError("patch", f"have one friction metric and asymmetry for all cells for {by}", "one a cell")
+
+
+def same_metric(one: Anisotropy, other: Anisotropy) -> bool:
+    """Whether two patches have the same metric for all cells."""
+    if one.root is None or other.root is None:
+        return one.root is other.root
+    return bool(np.array_equal(one.root, other.root))
 
 
 def _symmetric(matrix: np.ndarray) -> np.ndarray:
