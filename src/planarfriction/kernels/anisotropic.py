@@ -6,8 +6,8 @@ As `kernels.distributed`, but each cell sees `u = B V` through its own map `B = 
     z_hat = z - a/q,      zdot = u - k z_hat,      d zdot/dz = -A = -k I - z_hat (x) k_z
     d zdot/du = I - z_hat (x) k_v + A a d(1/q)/du,      t = -(sigma_0 z + sigma_1 zdot + sigma_2 u)
 
-`cells` holds L_xx, L_xy, L_yy, (L J rho)_x, (L J rho)_y, a_x, a_y of each cell, [7, n]. `lin` [12, n] holds A, d zdot/du
-and the inverse of `shift I + A`, each row by row.
+`cells` holds L_xx, L_xy, L_yy, (L J rho)_x, (L J rho)_y, a_x, a_y of each cell, [7, n]. `lin` [12, n] holds A,
+d zdot/du and the inverse of `shift I + A`, each row by row.
 """
 
 from __future__ import annotations

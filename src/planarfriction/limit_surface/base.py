@@ -171,7 +171,7 @@ class LimitSurface:
     def _frame(self) -> np.ndarray:
         """`V_S = frame @ V`: from the origin to the centre of pressure, spin times the contact radius.
 
-        With a friction metric the velocity there is `L v`; cells with metrics of their own share the root of their mean.
+        With a friction metric the velocity there is `L v`; metrics per cell share the root of their mean.
         """
         frame, root = scaling(self.centre_of_pressure, self.contact_radius), self.patch.root
         if root is not None:
