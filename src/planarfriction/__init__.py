@@ -32,6 +32,7 @@ _HOME = {
     "SoftFinger": "planarfriction.patch",
     "Solution": "planarfriction.scenes",
     "Uniform": "planarfriction.patch",
+    "grain": "planarfriction.patch",
     "load": "planarfriction.scenes",
     "simulate": "planarfriction.scenes",
 }
@@ -79,5 +80,5 @@ if TYPE_CHECKING:  # for editors and type checkers: the same names as above
         LimitSurfaceTablePublished,
     )
     from planarfriction.models import DistributedModel, ReducedModelPublished
-    from planarfriction.patch import ContactPatch, LinearGradient, SoftFinger, Uniform
+    from planarfriction.patch import ContactPatch, LinearGradient, SoftFinger, Uniform, grain
     from planarfriction.scenes import Body, Contact, Scene, Signal, Solution, load, simulate

@@ -10,6 +10,7 @@ from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels.law import law_numbers
 from planarfriction.models import ReducedModelPublished
+from planarfriction.patch.metric import refuse_anisotropy
 
 PARAMETERS = (
     "sigma_0",
@@ -77,6 +78,7 @@ def _model_row(model: Any) -> np.ndarray:
             "have a shape that does not follow the load: a patch of fixed shape, or on_load_change='keep'",
             f"on_load_change={model.on_load_change!r}",
         )
+    refuse_anisotropy(model.patch, "derivatives of roll-outs")
     return np.array([*law_numbers(model.law), *model.shape_at(1.0).numbers])
 
 

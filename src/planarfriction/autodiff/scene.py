@@ -13,6 +13,7 @@ from planarfriction.kernels import rosenbrock, tangent
 from planarfriction.kernels.body import workspace
 from planarfriction.kernels.rosenbrock import Output
 from planarfriction.kernels.tangent import Path
+from planarfriction.patch.metric import refuse_anisotropy
 from planarfriction.scenes.packing import PackedScene, pack
 from planarfriction.scenes.scene import Scene
 from planarfriction.scenes.simulation import recording_times
@@ -96,6 +97,8 @@ def scene_sensitivities(
     if end > scene.t_end:
         raise InvalidValueError("t_end", f"be at most the scene's {scene.t_end:g} s", end)
     every = scene.save_every if save_every is None else validation.positive("save_every", save_every)
+    for contact in scene.contacts:
+        refuse_anisotropy(contact.model.patch, "scene_sensitivities")
     packed = pack(scene, end)
     times = recording_times(end, every, packed.motion.breaks)
     absolute = (

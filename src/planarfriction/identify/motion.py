@@ -26,6 +26,7 @@ from planarfriction.identify.verdicts import NO_SPIN, TOGETHER, VAGUE
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.models import ReducedModelPublished
 from planarfriction.patch import ContactPatch
+from planarfriction.patch.metric import refuse_anisotropy
 
 MOTION_PARAMETERS = ("mu_c", "mu_s", "v_s", "gamma", "sigma_2", "contact_radius")
 """What slides can tell; `mu_s` follows `mu_c` where it is not asked for."""
@@ -103,6 +104,7 @@ def identify_motion(
         raise InvalidValueError("body", "be a SlidingBody", body)
     if not isinstance(start, LuGre):
         raise InvalidValueError("start", "be a LuGre law", start)
+    refuse_anisotropy(patch, "identify_motion")
     if samples is not None:
         samples = validation.count("samples", samples, at_least=5)
     fit = _Fit(slides, patch, body, names, start, model, samples, progress)

@@ -19,6 +19,7 @@ from planarfriction.identify.result import Identification
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
 from planarfriction.patch import ContactPatch
+from planarfriction.patch.metric import refuse_anisotropy
 
 BEGINS = ("rest", "steady")
 
@@ -80,6 +81,7 @@ def identify_lugre(
         A parameter breaks its rule.
     """
     logs, names = as_logs(log), known.check_names(parameters)
+    refuse_anisotropy(patch, "identify_lugre")
     validation.choice("begins", begins, BEGINS)
     starts = validation.count("starts", starts)
     law, given = _start_law(start, elasto_plastic)

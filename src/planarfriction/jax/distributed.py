@@ -17,6 +17,7 @@ from planarfriction.jax import namespace as xp
 from planarfriction.kernels.law import law_numbers
 from planarfriction.laws import LuGre
 from planarfriction.patch import ContactPatch
+from planarfriction.patch.metric import refuse_anisotropy
 
 
 class LawParameters(NamedTuple):
@@ -100,6 +101,7 @@ def distributed(patch: ContactPatch, law: LuGre, normal_force: float | None = No
         raise InvalidValueError("patch", "be a ContactPatch", patch)
     if not isinstance(law, LuGre):
         raise InvalidValueError("law", "be a LuGre law", law)
+    refuse_anisotropy(patch, "jax.distributed")
     numbers = law_numbers(law)
     parameters = LawParameters(*(jnp.asarray(getattr(numbers, name), dtype=float) for name in LawParameters._fields))
     weights = np.asarray(patch.weights(normal_force))

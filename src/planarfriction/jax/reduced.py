@@ -18,6 +18,7 @@ from planarfriction.laws import LuGre
 from planarfriction.limit_surface import LimitSurface
 from planarfriction.models import ReducedModelPublished
 from planarfriction.patch import ContactPatch
+from planarfriction.patch.metric import refuse_anisotropy
 
 
 class Parameters(NamedTuple):
@@ -129,6 +130,7 @@ def reduced(patch: ContactPatch, law: LuGre, surface: LimitSurface | None = None
 
 def of_model(model: ReducedModelPublished) -> ReducedPlanarLuGre:
     """A model of NumPy as a pytree, in the default precision of JAX."""
+    refuse_anisotropy(model.patch, "jax.reduced")
     shape, law = model._reference, law_numbers(model.law)
     kind, size, data = shape.surface.numbers
     centre_x, centre_y = shape.centre_of_pressure

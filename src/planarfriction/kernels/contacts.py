@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction.kernels import distributed, inlined, reduced
+from planarfriction.kernels import anisotropic, distributed, inlined, reduced
 from planarfriction.kernels.law import law_of
 
-DISTRIBUTED, REDUCED = 0, 1
+DISTRIBUTED, REDUCED, ANISOTROPIC = 0, 1, 2
 WORLD, BODY, BODY_AXES = 0, 1, 2
 """Fixed to the world; fixed to the body; fixed to a body whose prescribed velocity is given in its own axes."""
 
@@ -24,7 +24,7 @@ class Contacts(NamedTuple):
     """C contacts and the R shapes they take, in flat arrays."""
 
     kind: np.ndarray
-    """`DISTRIBUTED` or `REDUCED`, int [C]."""
+    """`DISTRIBUTED`, `REDUCED` or `ANISOTROPIC` (distributed), int [C]."""
     law: np.ndarray
     """Numbers of the law, [C, 9]."""
     mount: np.ndarray
@@ -42,15 +42,15 @@ class Contacts(NamedTuple):
     x: np.ndarray
     y: np.ndarray
     weights: np.ndarray
-    """Weights of the distributed contacts, one run of cells a shape, flat."""
+    """Weights of the distributed and anisotropic contacts, one run of cells a shape, flat."""
     weight_start: np.ndarray
     """Where the weights of each shape begin, int [R]."""
     shape: np.ndarray
-    """Reduced contacts: centre of pressure, r, <rho^2> of each shape, [R, 4]."""
+    """Reduced contacts: centre of pressure, r, <rho^2> and root of the metric (xx, xy, yy) of each shape, [R, 7]."""
     surface: np.ndarray
-    """Reduced contacts: limit surface (kind, start, size) of each shape, int [R, 3]."""
+    """Reduced contacts: limit surface (kind, start, size) of each shape; anisotropic: (0, start, n), int [R, 3]."""
     data: np.ndarray
-    """Numbers of the limit surfaces, flat."""
+    """Numbers of the limit surfaces, and of the anisotropic cells (see `kernels.anisotropic`), flat."""
 
 
 @inlined
@@ -96,10 +96,14 @@ def evaluate(contacts, c, row, z, v, zdot, w):
     if contacts.kind[c] == DISTRIBUTED:
         x, y, weights = _cells(contacts, c, row)
         w[0], w[1], w[2] = distributed.evaluate(law, z, v[0], v[1], v[2], x, y, weights, zdot)
+    elif contacts.kind[c] == ANISOTROPIC:
+        cells, weights = _anisotropic_cells(contacts, c, row)
+        w[0], w[1], w[2] = anisotropic.evaluate(law, z, v[0], v[1], v[2], cells, weights, zdot)
     else:
-        w[0], w[1], w[2] = reduced.evaluate(
-            law, z, v[0], v[1], v[2], contacts.shape[row], contacts.surface[row], contacts.data, zdot
-        )
+        shape = contacts.shape[row]
+        vx, vy = _through_root(shape, v[0], v[1])
+        fx, fy, w[2] = reduced.evaluate(law, z, vx, vy, v[2], shape, contacts.surface[row], contacts.data, zdot)
+        w[0], w[1] = _through_root(shape, fx, fy)
 
 
 @inlined
@@ -109,8 +113,14 @@ def linearise(contacts, c, row, z, v, lin):
     if contacts.kind[c] == DISTRIBUTED:
         x, y, _ = _cells(contacts, c, row)
         distributed.linearise(law, z, v[0], v[1], v[2], x, y, lin.reshape(7, x.shape[0]))
+    elif contacts.kind[c] == ANISOTROPIC:
+        cells, weights = _anisotropic_cells(contacts, c, row)
+        rows = lin.reshape(anisotropic.LINEAR_NUMBERS, weights.shape[0])
+        anisotropic.linearise(law, z, v[0], v[1], v[2], cells, rows)
     else:
-        reduced.linearise(law, z, v[0], v[1], v[2], contacts.shape[row], contacts.surface[row], contacts.data, lin)
+        shape = contacts.shape[row]
+        vx, vy = _through_root(shape, v[0], v[1])
+        reduced.linearise(law, z, vx, vy, v[2], shape, contacts.surface[row], contacts.data, lin)
 
 
 @inlined
@@ -120,8 +130,17 @@ def factor(contacts, c, row, z, shift, lin, stiffness):
     if contacts.kind[c] == DISTRIBUTED:
         x, y, weights = _cells(contacts, c, row)
         distributed.factor(law, z, shift, x, y, weights, lin.reshape(7, x.shape[0]), stiffness)
+    elif contacts.kind[c] == ANISOTROPIC:
+        cells, weights = _anisotropic_cells(contacts, c, row)
+        rows = lin.reshape(anisotropic.LINEAR_NUMBERS, weights.shape[0])
+        anisotropic.factor(law, shift, cells, weights, rows, stiffness)
     else:
-        reduced.factor(law, shift, contacts.shape[row], lin, stiffness)
+        shape = contacts.shape[row]
+        reduced.factor(law, shift, shape, lin, stiffness)
+        for i in range(3):
+            stiffness[i, 0], stiffness[i, 1] = _through_root(shape, stiffness[i, 0], stiffness[i, 1])
+        for i in range(3):
+            stiffness[0, i], stiffness[1, i] = _through_root(shape, stiffness[0, i], stiffness[1, i])
 
 
 @inlined
@@ -131,8 +150,14 @@ def eliminate(contacts, c, row, z, shift, r, lin, w):
     if contacts.kind[c] == DISTRIBUTED:
         x, y, weights = _cells(contacts, c, row)
         w[0], w[1], w[2] = distributed.eliminate(law, z, shift, r, x, y, weights, lin.reshape(7, x.shape[0]))
+    elif contacts.kind[c] == ANISOTROPIC:
+        cells, weights = _anisotropic_cells(contacts, c, row)
+        rows = lin.reshape(anisotropic.LINEAR_NUMBERS, weights.shape[0])
+        w[0], w[1], w[2] = anisotropic.eliminate(law, shift, r, cells, weights, rows)
     else:
-        w[0], w[1], w[2] = reduced.eliminate(law, shift, r, contacts.shape[row], lin)
+        shape = contacts.shape[row]
+        fx, fy, w[2] = reduced.eliminate(law, shift, r, shape, lin)
+        w[0], w[1] = _through_root(shape, fx, fy)
 
 
 @inlined
@@ -141,8 +166,14 @@ def back_substitute(contacts, c, row, z, r, v, lin, out):
     if contacts.kind[c] == DISTRIBUTED:
         x, y, _ = _cells(contacts, c, row)
         distributed.back_substitute(z, r, v[0], v[1], v[2], x, y, lin.reshape(7, x.shape[0]), out)
+    elif contacts.kind[c] == ANISOTROPIC:
+        cells, weights = _anisotropic_cells(contacts, c, row)
+        rows = lin.reshape(anisotropic.LINEAR_NUMBERS, weights.shape[0])
+        anisotropic.back_substitute(r, v[0], v[1], v[2], cells, rows, out)
     else:
-        reduced.back_substitute(r, v[0], v[1], v[2], contacts.shape[row], lin, out)
+        shape = contacts.shape[row]
+        vx, vy = _through_root(shape, v[0], v[1])
+        reduced.back_substitute(r, vx, vy, v[2], shape, lin, out)
 
 
 @inlined
@@ -150,3 +181,16 @@ def _cells(contacts, c, row):
     first, last = contacts.cell[c], contacts.cell[c + 1]
     start = contacts.weight_start[row]
     return contacts.x[first:last], contacts.y[first:last], contacts.weights[start : start + last - first]
+
+
+@inlined
+def _anisotropic_cells(contacts, c, row):
+    n, start, first = contacts.surface[row, 2], contacts.weight_start[row], contacts.surface[row, 1]
+    cells = contacts.data[first : first + anisotropic.CELL_NUMBERS * n].reshape(anisotropic.CELL_NUMBERS, n)
+    return cells, contacts.weights[start : start + n]
+
+
+@inlined
+def _through_root(shape, x, y):
+    """A velocity in the axes of a reduced contact's metric, or a force out of them: times the symmetric root."""
+    return shape[4] * x + shape[5] * y, shape[5] * x + shape[6] * y

@@ -12,7 +12,9 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels import surfaces as kernels
+from planarfriction.limit_surface.cell_metrics import scaled_levers
 from planarfriction.patch import ContactPatch
+from planarfriction.patch.metric import refuse_anisotropy, refuse_cell_metrics, symmetric_root
 
 _FULL_BALANCE = 1e-12
 """The twist of a wrench is found when its wrench is parallel to the given one to this angle [rad]."""
@@ -38,6 +40,10 @@ class LimitSurface:
     depends on the load; leave it out otherwise. A patch of one point has no limit surface (its contact radius is
     zero).
 
+    A patch with a friction metric and an asymmetry: `Phi(V) = sum w_i (|u_i| + a_i . u_i)` with `u_i = L_i v_i`. The
+    metric leaves `h(-V) = -h(V)`. The asymmetric part is linear in V, its wrench the same for all twists: a surface
+    stored for half of all directions and three numbers more are exact for all of them.
+
     Source: Goyal, Ruina, Papadopoulos 1991.
     """
 
@@ -46,10 +52,15 @@ class LimitSurface:
 
     kind: ClassVar[int]
     """Kind of `kernels.surfaces`."""
+    anisotropy: ClassVar[str] = "none"
+    """Patches with direction-dependent friction that it takes: "none", "uniform" (all cells alike), "any"."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.patch, ContactPatch):
             raise InvalidValueError("patch", "be a ContactPatch", self.patch)
+        if self.anisotropy != "any":
+            refuse = refuse_anisotropy if self.anisotropy == "none" else refuse_cell_metrics
+            refuse(self.patch, f"{type(self).__name__} (LimitSurfaceTable takes any)")
         if self.normal_force is not None:
             object.__setattr__(self, "normal_force", validation.positive("normal_force", self.normal_force))
         if self.normal_force is not None or not self.patch.depends_on_load:
@@ -83,14 +94,38 @@ class LimitSurface:
         raise NotImplementedError
 
     def _loaded_cells(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Positions about the centre of pressure and weights of the cells that carry load."""
+        """Positions about the centre of pressure (see `lever_coordinates`) and weights of the cells that carry load."""
         weights = self.patch.weights(self.normal_force)
         loaded = weights > 0.0
-        positions = self.patch.positions[loaded]
-        offset = positions - self.centre_of_pressure
+        offset = self.patch.positions - self.centre_of_pressure
         # the centre of pressure is a sum with rounding; a cell that stands on it stands on it exactly
-        offset[np.abs(offset).max(axis=1) < _ROUNDING * np.abs(positions).max()] = 0.0
-        return np.ascontiguousarray(offset[:, 0]), np.ascontiguousarray(offset[:, 1]), weights[loaded]
+        offset[np.abs(offset).max(axis=1) < _ROUNDING * np.abs(self.patch.positions[loaded]).max()] = 0.0
+        x, y = self.patch.lever_coordinates(*offset.T)
+        return np.ascontiguousarray(x[loaded]), np.ascontiguousarray(y[loaded]), weights[loaded]
+
+    @property
+    def _one_metric(self) -> bool:
+        """Whether the cells have one metric, which lever coordinates and frame then take care of."""
+        return self.patch.root is None or self.patch.root.ndim == 2
+
+    @functools.cached_property
+    def _scaled_levers(self) -> tuple[np.ndarray, np.ndarray]:
+        """Maps from scaled twists to what the loaded cells see, `[n, 2, 3]`, and their weights."""
+        x, y, weights = self._loaded_cells()
+        if self._one_metric:
+            root = None
+        else:
+            root = self.patch.root[self.patch.weights(self.normal_force) > 0.0]  # pyright: ignore
+        return scaled_levers(x / self.contact_radius, y / self.contact_radius, root, self._frame()[:2, :2]), weights
+
+    @functools.cached_property
+    def _lean(self) -> np.ndarray | None:
+        """What the asymmetry adds to `h`, `[3]`, or None."""
+        if not self.patch.asymmetric:
+            return None
+        weights = self.patch.weights(self.normal_force)
+        wrench = np.einsum("n,nij,ni->j", weights, self.patch.levers(), self.patch.asymmetries())
+        return np.linalg.solve(self._frame().T, wrench)
 
     # ------------------------------------------------------------------ the protocol
 
@@ -134,20 +169,34 @@ class LimitSurface:
     # ------------------------------------------------------------------ scaled coordinates
 
     def _frame(self) -> np.ndarray:
-        """`V_S = frame @ V`: from the origin to the centre of pressure, spin times the contact radius."""
-        return scaling(self.centre_of_pressure, self.contact_radius)
+        """`V_S = frame @ V`: from the origin to the centre of pressure, spin times the contact radius.
+
+        With a friction metric the velocity there is `L v`; metrics per cell share the root of their mean.
+        """
+        frame, root = scaling(self.centre_of_pressure, self.contact_radius), self.patch.root
+        if root is not None:
+            if root.ndim == 3:
+                root = symmetric_root(np.einsum("n,nij->ij", self.patch.weights(self.normal_force), self.patch.metric))
+            frame[:2] = root @ frame[:2]
+        return frame
 
     def _scaled(self, twist) -> tuple[np.ndarray, np.ndarray]:
         frame = self._frame()
         return _rows("twist", twist) @ frame.T, frame
 
     def _direction(self, scaled: np.ndarray) -> np.ndarray:
-        """`h` of scaled twists `[..., 3]`."""
+        """`h` of scaled twists `[..., 3]`; zero at rest."""
         flat = np.ascontiguousarray(scaled.reshape(-1, 3))
-        u = np.empty_like(flat)
-        kernels.sliding_batch(self.kind, self.numbers.data, 0, self.numbers.size, flat, u)
-        speed = np.linalg.norm(flat, axis=1)
+        u, speed = self._sliding(flat), np.linalg.norm(flat, axis=1)
+        if self._lean is not None:
+            u += speed[:, None] * self._lean
         return (u / np.where(speed > 0.0, speed, 1.0)[:, None]).reshape(scaled.shape)
+
+    def _sliding(self, scaled: np.ndarray) -> np.ndarray:
+        """`u = h |V_S|` for scaled twists `[M, 3]`, without what the asymmetry adds."""
+        u, numbers = np.empty_like(scaled), self.numbers
+        kernels.sliding_batch(self.kind, numbers.data, 0, numbers.size, scaled, u)
+        return u
 
     def _scaled_twist_of(self, target: np.ndarray) -> np.ndarray:
         """Direction of the scaled twist whose `h` is parallel to the unit vector `target`.
@@ -195,7 +244,7 @@ class LimitSurface:
         return float(h @ point), basis @ h
 
     def _sliding_slope(self, scaled: np.ndarray) -> np.ndarray:
-        """`du/dV_S` of `u = h |V_S|` for scaled twists `[M, 3]`, shape `[M, 3, 3]`."""
+        """`du/dV_S` of `_sliding` for scaled twists `[M, 3]`, shape `[M, 3, 3]`."""
         slopes = np.empty((len(scaled), 9))
         numbers = self.numbers
         kernels.sliding_jacobian_batch(self.kind, numbers.data, 0, numbers.size, np.ascontiguousarray(scaled), slopes)
@@ -205,7 +254,8 @@ class LimitSurface:
         """`dh/dV_S` for scaled twists `[M, 3]`, shape `[M, 3, 3]`; zero at rest."""
         speed = np.linalg.norm(scaled, axis=1)
         safe = np.where(speed > 0.0, speed, 1.0)
-        along = np.einsum("mi,mj->mij", self._direction(scaled), scaled / safe[:, None])
+        h = self._direction(scaled) if self._lean is None else self._direction(scaled) - self._lean
+        along = np.einsum("mi,mj->mij", h, scaled / safe[:, None])
         slope = (self._sliding_slope(scaled) - along) / safe[:, None, None]
         return np.where((speed > 0.0)[:, None, None], slope, 0.0)
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from planarfriction.kernels import surfaces as kernels
 from planarfriction.limit_surface.base import LimitSurface, SurfaceNumbers, _plane
+from planarfriction.limit_surface.cell_metrics import cell_slopes, cell_sums
 
 
 @dataclass(frozen=True, eq=False)
@@ -16,10 +17,11 @@ class LimitSurfaceCells(LimitSurface):
     """Limit surface summed over the cells: `W = -sum w_i [v_i/|v_i| ; rho_i x v_i/|v_i|]`.
 
     Exact for point contacts; for a grid it jumps in small steps as the centre of rotation crosses cells (a cell at the
-    centre of rotation adds nothing).
+    centre of rotation adds nothing). Takes any friction metric and asymmetry of the cells.
     """
 
     kind = kernels.CELLS
+    anisotropy = "any"
 
     @functools.cached_property
     def numbers(self) -> SurfaceNumbers:
@@ -27,6 +29,12 @@ class LimitSurfaceCells(LimitSurface):
         x, y, weights = self._loaded_cells()
         radius = self.contact_radius
         return SurfaceNumbers(self.kind, len(weights), np.concatenate([x / radius, y / radius, weights]))
+
+    def _sliding(self, scaled: np.ndarray) -> np.ndarray:
+        return super()._sliding(scaled) if self._one_metric else cell_sums(*self._scaled_levers, scaled)
+
+    def _sliding_slope(self, scaled: np.ndarray) -> np.ndarray:
+        return super()._sliding_slope(scaled) if self._one_metric else cell_slopes(*self._scaled_levers, scaled)
 
     def _scaled_twist_of(self, target: np.ndarray) -> np.ndarray:
         """As the base class, with the kinks of `|v_i|` rounded off by a radius that shrinks to nothing.
@@ -36,20 +44,18 @@ class LimitSurfaceCells(LimitSurface):
         """
         from scipy import optimize
 
-        x, y, weights = self.numbers.data.reshape(3, -1)
-        basis = _plane(target)
-        lever = np.stack([-y, x])  # cell velocity = V_S[:2] + V_S[2] * lever
+        basis, lean = _plane(target), np.zeros(3) if self._lean is None else self._lean
+        levers, weights = self._scaled_levers
+        maps = np.einsum("ad,icd->aci", basis, levers)  # [2, 2, n]
 
         def potential(place: np.ndarray, rounding: float):
             point = target + place @ basis
-            velocity = point[:2, None] + point[2] * lever
-            speed = np.sqrt((velocity**2).sum(axis=0) + rounding**2)
-            unit = velocity / speed
-            maps = np.stack([basis[:, :2, None] + basis[:, 2:, None] * lever], axis=0)[0]  # [2, 2, n]
-            along = np.einsum("aci,ci->ai", maps, unit)
+            velocity = levers @ point
+            speed = np.sqrt((velocity**2).sum(axis=1) + rounding**2)
+            along = np.einsum("aci,ic->ai", maps, velocity / speed[:, None])
             hessian = np.einsum("i,aci,bci->ab", weights / speed, maps, maps)
             hessian -= np.einsum("i,ai,bi->ab", weights / speed, along, along)
-            return float(weights @ speed), along @ weights, hessian
+            return float(weights @ speed + lean @ point), along @ weights + basis @ lean, hessian
 
         place = np.zeros(2)
         for rounding in 10.0 ** -np.arange(1.0, 11.0):

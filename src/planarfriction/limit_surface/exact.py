@@ -100,6 +100,7 @@ class LimitSurfaceExact(LimitSurface):
     """
 
     kind = -1  # no kind of compiled loops
+    anisotropy = "uniform"
 
     @functools.cached_property
     def numbers(self) -> SurfaceNumbers:
@@ -126,6 +127,8 @@ class LimitSurfaceExact(LimitSurface):
         """The patch's outline, if the pressure can be integrated over it."""
         outline, pressure = self.patch.outline, self.patch.pressure
         laws = (Uniform, SoftFinger) if isinstance(outline, RoundOutline) else (Uniform,)
+        if isinstance(outline, RoundOutline) and self.patch.root is not None and (self.patch.root != np.eye(2)).any():
+            return None  # a metric makes the rings ellipses
         return outline if isinstance(pressure, laws) else None
 
     @functools.cached_property
@@ -140,12 +143,16 @@ class LimitSurfaceExact(LimitSurface):
             triangles = outline.triangles()
             areas = _area(triangles)
             corners = triangles[:, [0, 1, 2, 2]] - self.centre_of_pressure
-            return _Elements(corners, areas / areas.sum())
+            return _Elements(self._lever_corners(corners), areas / areas.sum())
         x, y, weights = self._loaded_cells()
         extents = self.patch.cell_extents()[self.patch.weights(self.normal_force) > 0.0]
         sides = int((extents > 0.0).any(axis=0).sum())
-        corners = np.stack([x, y], -1)[:, None] + extents[:, None] * _CORNERS[sides]
+        corners = np.stack([x, y], -1)[:, None] + self._lever_corners(extents[:, None] * _CORNERS[sides])
         return _Elements(corners, weights)
+
+    def _lever_corners(self, corners: np.ndarray) -> np.ndarray:
+        """Corners `[..., 2]` in the lever coordinates of a friction metric, which maps quads to quads."""
+        return np.stack(self.patch.lever_coordinates(corners[..., 0], corners[..., 1]), -1)
 
     def _radius(self) -> float:
         return float(self._parts.sums(np.array([[0.0, 0.0, 1.0]]), 1.0, EXACT_RULES)[0, 2])
@@ -162,7 +169,10 @@ class LimitSurfaceExact(LimitSurface):
         return sums[:, :3], slopes.reshape(-1, 3, 3)
 
     def _direction(self, scaled: np.ndarray) -> np.ndarray:
-        return self.sums(scaled.reshape(-1, 3))[0].reshape(scaled.shape)
+        h = self.sums(scaled.reshape(-1, 3))[0].reshape(scaled.shape)
+        if self._lean is not None:
+            h += (_norm(scaled.reshape(-1, 3)) > 0.0).reshape(scaled.shape[:-1])[..., None] * self._lean
+        return h
 
     def _direction_slope(self, scaled: np.ndarray) -> np.ndarray:
         return self.sums(scaled)[1]

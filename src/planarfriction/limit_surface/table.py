@@ -10,6 +10,7 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.kernels import surfaces as kernels
 from planarfriction.limit_surface.base import LimitSurface, SurfaceNumbers
+from planarfriction.limit_surface.cell_metrics import potential_table
 from planarfriction.limit_surface.exact import STORED_RULES, LimitSurfaceExact
 
 
@@ -18,13 +19,15 @@ class LimitSurfaceTable(LimitSurface):
     """Stored limit surface: dissipation and its gradient at `segments` x `4 segments` directions, bicubic in between.
 
     The potential is interpolated and the wrench is its gradient, so that `-W . V = Phi(V) > 0` and the Jacobian is
-    symmetric at every twist; the nodes are those of `LimitSurfaceExact` (to 1e-7), mixed derivatives included.
+    symmetric at every twist; the nodes are those of `LimitSurfaceExact` (to 1e-7), mixed derivatives included
+    (where cells have friction metrics of their own, plain sums over the cells).
     """
 
     segments: int = 20
     """Segments of a quadrant [-]."""
 
     kind = kernels.POTENTIAL
+    anisotropy = "any"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "segments", validation.count("segments", self.segments, at_least=2))
@@ -37,14 +40,16 @@ class LimitSurfaceTable(LimitSurface):
     @functools.cached_property
     def centre_of_pressure(self) -> np.ndarray:
         """Centre of pressure `[2]` of the exact surface [m]."""
-        return self._exact.centre_of_pressure
+        return self._exact.centre_of_pressure if self._one_metric else super().centre_of_pressure
 
     def _radius(self) -> float:
-        return self._exact.contact_radius
+        return self._exact.contact_radius if self._one_metric else super()._radius()
 
     @functools.cached_property
     def numbers(self) -> SurfaceNumbers:
         """Potential, its derivatives along both angles and the mixed one at the nodes; the force in a pure spin."""
+        if not self._one_metric:
+            return SurfaceNumbers(self.kind, self.segments, potential_table(*self._scaled_levers, self.segments))
         return SurfaceNumbers(self.kind, self.segments, _nodes(self._exact, self.segments))
 
     def _first_guess(self, target: np.ndarray) -> np.ndarray:
@@ -55,10 +60,10 @@ class LimitSurfaceTable(LimitSurface):
         )
         upper = np.stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], -1)
         upper = upper.reshape(-1, 3)
-        h, power = self._direction(upper), upper @ target
-        cost = np.einsum("ni,ni->n", h, upper) / np.maximum(np.abs(power), 1e-300)
-        best = int(np.argmin(cost))
-        return np.sign(power[best]) * upper[best]
+        power = upper @ target
+        upper *= np.where(power < 0.0, -1.0, 1.0)[:, None]
+        cost = np.einsum("ni,ni->n", self._direction(upper), upper) / np.maximum(np.abs(power), 1e-300)
+        return upper[int(np.argmin(cost))]
 
 
 def _nodes(exact: LimitSurfaceExact, segments: int) -> np.ndarray:

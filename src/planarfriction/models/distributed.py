@@ -11,6 +11,7 @@ from planarfriction import formulas
 from planarfriction.kernels import distributed as kernels
 from planarfriction.kernels import distributed_adjoint
 from planarfriction.kernels.law import law_numbers, law_row
+from planarfriction.models import anisotropic
 from planarfriction.models.base import FrictionModel, ModelJacobians, StepJacobians
 
 
@@ -20,6 +21,10 @@ class DistributedModel(FrictionModel):
 
     `zdot_i = v_i - beta sigma_0 |v_i| / g z_i`, `W = sum w_i f_N [t_i ; rho_i x t_i]`,
     `t_i = -(sigma_0 z_i + sigma_1 zdot_i + sigma_2 v_i)`. State: bristle deflections `[2, N]` [m], x then y.
+
+    A patch with a friction metric: `u_i = L_i v_i` takes the place of `v_i`, and `L_i t_i` that of `t_i`. Asymmetric
+    friction: the bristle decays towards `a_i g/sigma_0` instead of zero,
+    `zdot_i = u_i - k_i (z_i - a_i g/sigma_0)`, `k_i = beta sigma_0 |u_i|/g`, beta that of the bristle seen from there.
 
     Source: Waltersson and Karayiannidis 2024, section III.
     """
@@ -51,6 +56,8 @@ class DistributedModel(FrictionModel):
         and predicted end, second order, kept within the largest deflection so that nothing overshoots.
         """
         state, twist, load, dt = self._inputs(state, twist, normal_force, dt=dt)
+        if self.patch.anisotropic:
+            return anisotropic.step(self, state, self._cell_velocity(twist), load, dt)
         batch = load.shape
         flat = np.ascontiguousarray(state.reshape(-1, 2 * state.shape[-1]))
         out, wrench = np.empty_like(flat), np.empty((len(flat), 3))
@@ -74,10 +81,16 @@ class DistributedModel(FrictionModel):
         state, twist, load = self._inputs(state, twist, normal_force)
         law = self.law
         velocity = self._cell_velocity(twist)
-        k, k_z, k_v = self._decay_slopes(state, velocity)
+        shifted = state
+        if self._asymmetry is not None:
+            centre, centre_velocity = anisotropic.centres(law, self._asymmetry, velocity)
+            shifted = state - centre
+        k, k_z, k_v = self._decay_slopes(shifted, velocity)
         identity = np.eye(2)[:, :, None]
-        rate_state = -k[..., None, None, :] * identity - state[..., :, None, :] * k_z[..., None, :, :]
-        rate_velocity = identity - state[..., :, None, :] * k_v[..., None, :, :]
+        rate_state = -k[..., None, None, :] * identity - shifted[..., :, None, :] * k_z[..., None, :, :]
+        rate_velocity = identity - shifted[..., :, None, :] * k_v[..., None, :, :]
+        if self._asymmetry is not None:
+            rate_velocity = rate_velocity - np.einsum("...abn,...bcn->...acn", rate_state, centre_velocity)
         rate_twist = np.einsum("...abn,dbn->...and", rate_velocity, self._lever)
         share = load[..., None] * self.patch.weights(load)
         force_state = -(law.sigma_0 * identity + law.sigma_1 * rate_state) * share[..., None, None, :]
@@ -104,6 +117,8 @@ class DistributedModel(FrictionModel):
     def step_jacobians(self, state, twist, normal_force, dt) -> StepJacobians:
         """Analytic derivatives of `step` (see `StepJacobians`); at kinks a one-sided derivative."""
         state, twist, load, dt = self._inputs(state, twist, normal_force, dt=dt)
+        if self.patch.anisotropic:
+            return anisotropic.step_jacobians(self, state, self._cell_velocity(twist), load, dt)
         batch, cells = load.shape, state.shape[-1]
         shapes = (2, 2, cells), (2, cells, 3), (3, 2, cells), (3, 3), (3,)
         results = [np.zeros((load.size, *shape)) for shape in shapes]
@@ -134,10 +149,17 @@ class DistributedModel(FrictionModel):
 
     @functools.cached_property
     def _lever(self) -> np.ndarray:
-        """`P` `[3, 2, N]`: cell velocity is `P' V`, wrench of a cell force `P f`."""
+        """`P` `[3, 2, N]`: cell velocity (of `u_i`) is `P' V`, wrench of a cell force `P f`."""
+        if self.patch.anisotropic:
+            return np.ascontiguousarray(self.patch.levers().T)
         x, y = self._xy
         one, zero = np.ones_like(x), np.zeros_like(x)
         return np.array([[one, zero], [zero, one], [-y, x]])
+
+    @functools.cached_property
+    def _asymmetry(self) -> np.ndarray | None:
+        """`a_i` `[2, N]`, or None."""
+        return np.ascontiguousarray(self.patch.asymmetries().T) if self.patch.asymmetric else None
 
     def _cell_velocity(self, twist: np.ndarray) -> np.ndarray:
         return np.einsum("...d,dcn->...cn", twist, self._lever)
@@ -152,6 +174,8 @@ class DistributedModel(FrictionModel):
 
     def _rate(self, state: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         numbers = law_numbers(self.law)
+        if self._asymmetry is not None:
+            state = state - anisotropic.centres(self.law, self._asymmetry, velocity)[0]
         _, _, arguments = self._arguments(state, velocity)
         k = formulas.bristle_decay(np, *arguments, numbers.elasto_plastic, numbers.breakaway_ratio)
         return velocity - k[..., None, :] * state

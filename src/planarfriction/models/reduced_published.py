@@ -16,6 +16,7 @@ from planarfriction.kernels.law import law_numbers, law_row
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
 from planarfriction.limit_surface.base import scaling
 from planarfriction.models.base import FrictionModel, ModelJacobians, StepJacobians
+from planarfriction.patch.metric import refuse_cell_metrics, same_metric
 
 _REMEMBERED = 64
 """Loads whose shapes a model remembers."""
@@ -27,12 +28,14 @@ class ReducedShape(NamedTuple):
     """What the reduced model knows of its patch at one load."""
 
     centre_of_pressure: np.ndarray
-    """[2] [m]"""
+    """[2] [m]; of a patch with a friction metric its `lever_coordinates`."""
     contact_radius: float
     """r [m]; of the published table as published."""
     second_moment: float
     """<rho^2> [m^2]"""
     surface: LimitSurface
+    root: np.ndarray = np.eye(2)
+    """Symmetric root of the friction metric, [2, 2] [-]."""
 
     @property
     def numbers(self) -> np.ndarray:
@@ -67,6 +70,7 @@ class ReducedModelPublished(FrictionModel):
             object.__setattr__(self, "surface", LimitSurfaceTablePublished(self.patch))
         if not isinstance(self.surface, LimitSurface):
             raise InvalidValueError("surface", "be a limit surface", self.surface)
+        self._check_directions()
         if self.patch.depends_on_load and self.on_load_change != "rebuild" and self.surface.normal_force is None:
             raise InvalidValueError(
                 "surface", f"have a normal_force when on_load_change={self.on_load_change!r}", "none"
@@ -94,13 +98,22 @@ class ReducedModelPublished(FrictionModel):
 
     def wrench(self, state, twist, normal_force) -> np.ndarray:
         """Friction wrench on the moving body, shape `[..., 3]` [N, N, N m]."""
-        return self._by_load(self._wrench, (3,), *self._inputs(state, twist, normal_force))
+        return self._out(self._by_load(self._wrench, (3,), *self._inputs(state, twist, normal_force)))
 
     def jacobians(self, state, twist, normal_force) -> ModelJacobians:
         """Analytic derivatives of `rate` and `wrench` (see `ModelJacobians`); at kinks a one-sided derivative."""
         packed = self._by_load(self._jacobians, (14, 3), *self._inputs(state, twist, normal_force))
         square = [packed[..., i : i + 3, :] for i in (0, 3, 6, 9)]
-        return ModelJacobians(square[0], square[1], packed[..., 12, :], square[2], square[3], packed[..., 13, :])
+        slopes = ModelJacobians(square[0], square[1], packed[..., 12, :], square[2], square[3], packed[..., 13, :])
+        if self._axes is None:
+            return slopes
+        axes = self._axes
+        return slopes._replace(
+            rate_twist=slopes.rate_twist @ axes,
+            wrench_state=axes @ slopes.wrench_state,
+            wrench_twist=axes @ slopes.wrench_twist @ axes,
+            wrench_load=slopes.wrench_load @ axes,
+        )
 
     def step(self, state, twist, normal_force, dt) -> tuple[np.ndarray, np.ndarray]:
         """Advance by `dt` [s] at a held twist: the new state and the wrench at the end, stable at any `dt`.
@@ -130,7 +143,7 @@ class ReducedModelPublished(FrictionModel):
                 return result[:3], result[3:]
         state, twist, load, dt = self._inputs(state, twist, normal_force, dt=dt)
         packed = self._by_load(self._step, (6,), state, twist, load, dt)
-        return packed[..., :3], packed[..., 3:]
+        return packed[..., :3], self._out(packed[..., 3:])
 
     def step_jacobians(self, state, twist, normal_force, dt) -> StepJacobians:
         """Analytic derivatives of `step` (see `StepJacobians`); at kinks a one-sided derivative."""
@@ -139,7 +152,43 @@ class ReducedModelPublished(FrictionModel):
             state, twist, load, dt = self._inputs(state, twist, normal_force, dt=dt)
             packed = self._by_load(self._step_jacobians, (6, 7), state, twist, load, dt)
         wrench, new = packed[..., :3, :], packed[..., 3:, :]
-        return StepJacobians(new[..., :3], new[..., 3:6], wrench[..., :3], wrench[..., 3:6], wrench[..., 6])
+        slopes = StepJacobians(new[..., :3], new[..., 3:6], wrench[..., :3], wrench[..., 3:6], wrench[..., 6])
+        if self._axes is None:
+            return slopes
+        axes = self._axes
+        return slopes._replace(
+            state_twist=slopes.state_twist @ axes,
+            wrench_state=axes @ slopes.wrench_state,
+            wrench_twist=axes @ slopes.wrench_twist @ axes,
+            wrench_load=slopes.wrench_load @ axes,
+        )
+
+    # ------------------------------------------------------------------ axes of the friction metric
+
+    @functools.cached_property
+    def _axes(self) -> np.ndarray | None:
+        """`diag(L, 1)` `[3, 3]`, or None: twists go in through it, wrenches come out."""
+        if self.patch.root is None:
+            return None
+        axes = np.eye(3)
+        axes[:2, :2] = self.patch.root
+        return axes
+
+    def _check_directions(self) -> None:
+        by = type(self).__name__
+        refuse_cell_metrics(self.patch, by)
+        for patch in (self.patch, self.surface.patch):
+            if patch.asymmetric:
+                raise InvalidValueError("patch", f"have the same friction forwards and backwards for {by}", "asymmetry")
+        if not same_metric(self.patch, self.surface.patch):
+            raise InvalidValueError("surface", "have the friction metric of the patch", self.surface.patch.name)
+
+    def _inputs(self, state, twist, normal_force, **more) -> list[np.ndarray]:
+        state, twist, *rest = super()._inputs(state, twist, normal_force, **more)
+        return [state, twist if self._axes is None else twist @ self._axes, *rest]
+
+    def _out(self, wrench: np.ndarray) -> np.ndarray:
+        return wrench if self._axes is None else wrench @ self._axes
 
     # ------------------------------------------------------------------ one shape
 
@@ -147,7 +196,7 @@ class ReducedModelPublished(FrictionModel):
     def _reference(self) -> ReducedShape:
         surface = self.surface
         second_moment = float(self.patch.second_moment(surface.normal_force))
-        return ReducedShape(surface.centre_of_pressure, surface.contact_radius, second_moment, surface)
+        return ReducedShape(self._centre(surface), surface.contact_radius, second_moment, surface, self._root)
 
     @functools.cached_property
     def _recent(self) -> dict[float, ReducedShape]:
@@ -157,16 +206,24 @@ class ReducedModelPublished(FrictionModel):
         surface = self.surface.at(normal_force)
         kept = self._reference if self.on_load_change == "rescale" else None
         return ReducedShape(
-            surface.centre_of_pressure,
+            self._centre(surface),
             surface.contact_radius,
             float(self.patch.second_moment(normal_force)) if kept is None else kept.second_moment,
             surface if kept is None else kept.surface,
+            self._root,
         )
+
+    def _centre(self, surface: LimitSurface) -> np.ndarray:
+        return np.array(self.patch.lever_coordinates(*surface.centre_of_pressure))
+
+    @property
+    def _root(self) -> np.ndarray:
+        return np.eye(2) if self.patch.root is None else self.patch.root
 
     @functools.cached_property
     def _fixed(self) -> tuple[np.ndarray, np.ndarray] | None:
         """Numbers of law, shape and surface for `step_one`, where the patch does not depend on the load."""
-        if self.patch.depends_on_load:
+        if self.patch.depends_on_load or self.patch.anisotropic:
             return None
         shape = self._reference
         numbers = shape.surface.numbers
@@ -277,7 +334,11 @@ class ReducedModelPublished(FrictionModel):
 
     def _one_step_jacobians(self, state, twist, normal_force, dt) -> np.ndarray | None:
         """`_step_jacobians` `[6, 7]` of one contact of fixed shape, checked quickly; None where that is not it."""
-        if self.patch.depends_on_load or [np.ndim(a) for a in (state, twist, normal_force, dt)] != [1, 1, 0, 0]:
+        if (
+            self.patch.depends_on_load
+            or self.patch.anisotropic
+            or [np.ndim(a) for a in (state, twist, normal_force, dt)] != [1, 1, 0, 0]
+        ):
             return None
         if len(state) != 3 or len(twist) != 3:
             return None

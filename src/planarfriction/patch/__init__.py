@@ -3,6 +3,7 @@
 from planarfriction.patch.contact_patch import ContactPatch
 from planarfriction.patch.files import read_pressure_map
 from planarfriction.patch.grid import Grid
+from planarfriction.patch.metric import grain
 from planarfriction.patch.pressure import LinearGradient, PerCell, Pressure, SoftFinger, Uniform
 from planarfriction.patch.published import PUBLISHED_PATCHES
 
@@ -15,5 +16,6 @@ __all__ = [
     "Pressure",
     "SoftFinger",
     "Uniform",
+    "grain",
     "read_pressure_map",
 ]

@@ -16,11 +16,12 @@ from planarfriction.patch import outline as outlines
 from planarfriction.patch import shapes
 from planarfriction.patch.files import read_pressure_map
 from planarfriction.patch.grid import Grid
-from planarfriction.patch.pressure import Pressure, Uniform, as_law
+from planarfriction.patch.metric import Anisotropy
+from planarfriction.patch.pressure import Pressure, Uniform, as_law, check_pressure
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ContactPatch:
+class ContactPatch(Anisotropy):
     """A flat contact: N cells at `rho_i` with areas `a_i`, and a pressure that gives them their weights.
 
     `w_i = p_i a_i / sum(p a)`, so that `sum(w) = 1` and cell i carries the normal force `w_i f_N`.
@@ -78,10 +79,11 @@ class ContactPatch:
             raise InvalidValueError("areas", "be > 0", f"{areas.min()} at index {areas.argmin()}")
         law = as_law(self.pressure, positions)
         if not law.depends_on_load:
-            _check_pressure(law.relative(positions), positions)
+            check_pressure(law.relative(positions), positions)
         kept = law.ever_loaded(positions)
         if not kept.any():
             raise InvalidValueError("pressure", "load at least one cell", "zero pressure on all of them")
+        self._check_anisotropy(kept)
         kept_values = {"positions": positions[kept], "areas": areas[kept], "pressure": law.only(kept)}
         for name, value in kept_values.items():
             object.__setattr__(self, name, value)
@@ -295,13 +297,17 @@ class ContactPatch:
         return np.stack([(weights * coordinate).sum(-1) for coordinate in self.positions.T], -1)
 
     def contact_radius(self, normal_force=None) -> float | np.ndarray:
-        """Contact radius `r = sum(w |rho - CoP|)` [m]: a pure spin about the CoP has the friction torque `mu f_N r`."""
-        weights, dx, dy = self._about_centre_of_pressure(normal_force)
-        return (weights * np.hypot(dx, dy)).sum(-1)
+        """Contact radius `r = sum(w |rho - CoP|)` [m]: a pure spin about the CoP has the friction torque `mu f_N r`.
+
+        With a friction metric `sum(w |L J (rho - CoP)|)`, J a quarter turn; the second moment alike.
+        """
+        weights, *offset = self._about_centre_of_pressure(normal_force)
+        return (weights * np.hypot(*self.lever_coordinates(*offset))).sum(-1)
 
     def second_moment(self, normal_force=None) -> float | np.ndarray:
         """Second moment `<rho^2> = sum(w |rho - CoP|^2)` [m^2]."""
-        weights, dx, dy = self._about_centre_of_pressure(normal_force)
+        weights, *offset = self._about_centre_of_pressure(normal_force)
+        dx, dy = self.lever_coordinates(*offset)
         return (weights * (dx**2 + dy**2)).sum(-1)
 
     def area(self, normal_force=None) -> float | np.ndarray:
@@ -363,6 +369,7 @@ class ContactPatch:
             "positions": self.positions.tolist(),
             "areas": self.areas.tolist(),
             "pressure": self.pressure.to_dict(),
+            **self._anisotropy_to_dict(),
             **outlines.outline_to_dict(self.outline),
         }
         if self.cell_size is not None:
@@ -372,7 +379,7 @@ class ContactPatch:
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> ContactPatch:
         """The patch that `to_dict` described; unknown and missing keys are errors that name them."""
-        optional = ("shape", "name", "pressure", "grid", "cell_size", "outline")
+        optional = ("shape", "name", "pressure", "grid", "cell_size", "metric", "asymmetry", "outline")
         validation.keys("patch", data, required=("positions", "areas"), optional=optional)
         validation.choice("patch shape", data.get("shape", "cells"), ("cells",))
         pressure, grid = data.get("pressure"), data.get("grid")
@@ -381,7 +388,8 @@ class ContactPatch:
         if grid is not None:
             validation.keys("grid", grid, required=[entry.name for entry in dataclasses.fields(Grid)])
             grid = Grid(**grid)
-        patch = cls(data["positions"], data["areas"], pressure, grid, data.get("name", "patch"), data.get("cell_size"))
+        name, options = data.get("name", "patch"), {key: data.get(key) for key in ("cell_size", "metric", "asymmetry")}
+        patch = cls(data["positions"], data["areas"], pressure, grid, name, **options)
         return outlines.with_outline(patch, outlines.outline_from_dict(data.get("outline")))
 
 
@@ -389,12 +397,3 @@ def _square_grid(width: float, cells: int) -> Grid:
     """Grid of `cells` x `cells` on the square `width` [m] wide about the origin."""
     cells = validation.count("cells", cells)
     return Grid.around_origin(width, width, cells, cells)
-
-
-def _check_pressure(values: np.ndarray, positions: np.ndarray) -> None:
-    """Raise where a pressure is not finite or negative, naming the cell."""
-    for rule, broken in (("be finite", ~np.isfinite(values)), ("be >= 0", values < 0.0)):
-        if broken.any():
-            index = int(broken.argmax())
-            x, y = positions[index].tolist()
-            raise InvalidValueError("pressure", rule, f"{values[index]} at index {index}, position ({x:g}, {y:g}) m")

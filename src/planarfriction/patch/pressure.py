@@ -191,3 +191,12 @@ def as_law(pressure: Any, positions: np.ndarray) -> Pressure:
     if callable(pressure):
         return PerCell([pressure(x, y) for x, y in positions.tolist()])  # pyright: ignore
     return PerCell(validation.array("pressure", pressure, (len(positions),)))
+
+
+def check_pressure(values: np.ndarray, positions: np.ndarray) -> None:
+    """Raise where a pressure is not finite or negative, naming the cell."""
+    for rule, broken in (("be finite", ~np.isfinite(values)), ("be >= 0", values < 0.0)):
+        if broken.any():
+            index = int(broken.argmax())
+            x, y = positions[index].tolist()
+            raise InvalidValueError("pressure", rule, f"{values[index]} at index {index}, position ({x:g}, {y:g}) m")

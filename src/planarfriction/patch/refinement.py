@@ -21,4 +21,11 @@ def refined(patch: ContactPatch, parts: int) -> ContactPatch:
     pressure = PerCell(np.repeat(patch.pressure.values, len(inside))) if per_cell else patch.pressure
     areas = np.repeat(patch.areas / len(inside), len(inside))
     width, height = patch.cell_size or (0.0, 0.0)
-    return ContactPatch(positions, areas, pressure, None, patch.name, (width / parts, height / parts))
+    metric, asymmetry = (_repeated(each, size, len(inside)) for each, size in ((patch.metric, 2), (patch.asymmetry, 1)))
+    size = (width / parts, height / parts)
+    return ContactPatch(positions, areas, pressure, None, patch.name, size, metric=metric, asymmetry=asymmetry)
+
+
+def _repeated(value: np.ndarray | None, size: int, times: int) -> np.ndarray | None:
+    """A metric or an asymmetry for the new cells: what each cell has for itself is repeated."""
+    return value if value is None or value.ndim == size else np.repeat(value, times, axis=0)

@@ -111,7 +111,26 @@ def patch_from_dict(table: Section) -> Any:
 
     `shape = "pressure_map"` takes `file` (a path) or `values` (rows from the top), `cell_size` and `name`;
     `shape = "published"` takes `name`, `cells` and `width`; `shape = "cells"` is what `ContactPatch.to_dict` writes.
+
+    Every shape takes `metric` and `asymmetry` as `ContactPatch.with_friction_metric` does; `metric` may also be a table
+    with the parameters of `grain`: `along`, `across` and `angle` [rad], 0 if left out.
     """
+    directions = {key: table.get(key) for key in ("metric", "asymmetry") if key in table}
+    if not directions:
+        return _patch_from_dict(table)
+    rest = {key: value for key, value in table.data.items() if key not in directions}
+    patch = _patch_from_dict(Section(rest, table.where, table.source, table.folder))
+    if isinstance(directions.get("metric"), dict):
+        from planarfriction.patch import grain
+
+        metric = table.section("metric").only(["angle", "along", "across"])
+        with metric.located():
+            directions["metric"] = grain(metric.get("angle", 0.0), metric.get("along"), metric.get("across"))
+    with table.located():
+        return patch.with_friction_metric(directions.get("metric"), directions.get("asymmetry"))
+
+
+def _patch_from_dict(table: Section) -> Any:
     from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
 
     shape = table.choice("shape", (*SHAPES, *OTHER_SHAPES))

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from planarfriction.kernels import anisotropic
 from planarfriction.kernels import contacts as kernels
 from planarfriction.kernels.body import Motion
 from planarfriction.kernels.contacts import Contacts
@@ -41,24 +42,29 @@ class _Shapes:
         self._size = {"weights": 0, "data": 0}
         self._stored: dict[int, int] = {}
 
-    def add_distributed(self, weights: np.ndarray) -> int:
+    def add_distributed(self, weights: np.ndarray, cells: np.ndarray | None) -> int:
+        """`cells`: numbers of anisotropic cells, the same array for all shapes of a contact."""
         self.weight_start.append(self._size["weights"])
         self.weights.append(weights)
         self._size["weights"] += len(weights)
-        self.shape.append(np.zeros(4))
-        self.surface.append((0, 0, 0))
+        self.shape.append(np.zeros(7))
+        self.surface.append((0, 0 if cells is None else self._start_of(cells), len(weights)))
         return len(self.shape) - 1
 
     def add_reduced(self, shape) -> int:
-        numbers = shape.surface.numbers
-        if id(numbers.data) not in self._stored:
-            self._stored[id(numbers.data)] = self._size["data"]
-            self.data.append(numbers.data)
-            self._size["data"] += len(numbers.data)
+        numbers, root = shape.surface.numbers, shape.root
         self.weight_start.append(0)
-        self.shape.append(shape.numbers)
-        self.surface.append((numbers.kind, self._stored[id(numbers.data)], numbers.size))
+        self.shape.append(np.array([*shape.numbers, root[0, 0], root[0, 1], root[1, 1]]))
+        self.surface.append((numbers.kind, self._start_of(numbers.data), numbers.size))
         return len(self.shape) - 1
+
+    def _start_of(self, data: np.ndarray) -> int:
+        """Where an array begins in `data`, each stored once."""
+        if id(data) not in self._stored:
+            self._stored[id(data)] = self._size["data"]
+            self.data.append(data)
+            self._size["data"] += len(data)
+        return self._stored[id(data)]
 
 
 def breaks_of(scene, t_end: float) -> np.ndarray:
@@ -93,9 +99,10 @@ def pack(scene, t_end: float) -> PackedScene:
         if isinstance(model, DistributedModel):
             weights = np.atleast_2d([model.patch.weights(value) for value in values])
             ever = weights.max(axis=0) > 0.0
-            rows = [shapes.add_distributed(np.ascontiguousarray(w[ever])) for w in weights]
+            numbers = _anisotropic_cells(model.patch, ever)
+            rows = [shapes.add_distributed(np.ascontiguousarray(w[ever]), numbers) for w in weights]
             count = int(ever.sum())
-            sizes.append((2 * count, count, 7 * count))
+            sizes.append((2 * count, count, (7 if numbers is None else anisotropic.LINEAR_NUMBERS) * count))
             cells.append(model.patch.positions[ever])
             loaded.append(ever)
             natural.append(np.full(2 * count, scale))
@@ -114,9 +121,7 @@ def pack(scene, t_end: float) -> PackedScene:
     offsets = np.concatenate([np.zeros((1, 3), np.int64), np.cumsum(sizes, axis=0)])
     positions = np.concatenate(cells)
     contacts = Contacts(
-        kind=np.array(
-            [kernels.DISTRIBUTED if isinstance(c.model, DistributedModel) else kernels.REDUCED for c in scene.contacts]
-        ),
+        kind=np.array([_kind(contact.model) for contact in scene.contacts]),
         law=np.array([law_row(c.model.law) for c in scene.contacts]),
         mount=np.array([_mount(scene, contact) for contact in scene.contacts]),
         place=np.array([[*c.position, np.cos(c.angle), np.sin(c.angle)] for c in scene.contacts], dtype=float),
@@ -154,6 +159,21 @@ def _distinct_loads(patch, held: np.ndarray) -> tuple[list[float | None], np.nda
     if len(positive) == 0:
         positive = np.array([1.0])
     return list(positive), np.minimum(np.searchsorted(positive, held), len(positive) - 1)
+
+
+def _kind(model) -> int:
+    if not isinstance(model, DistributedModel):
+        return kernels.REDUCED
+    return kernels.ANISOTROPIC if model.patch.anisotropic else kernels.DISTRIBUTED
+
+
+def _anisotropic_cells(patch, ever: np.ndarray) -> np.ndarray | None:
+    """The cells' numbers of `kernels.anisotropic`, flat; None where friction is the same in all directions."""
+    if not patch.anisotropic:
+        return None
+    levers, asymmetry = patch.levers()[ever], patch.asymmetries()[ever]
+    numbers = [*(levers[:, i, j] for i, j in ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2))), *asymmetry.T]
+    return np.concatenate(numbers)
 
 
 def _mount(scene, contact) -> int:

@@ -14,6 +14,7 @@ from planarfriction.kernels.law import law_numbers
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.models.base import FrictionModel
 from planarfriction.patch import ContactPatch
+from planarfriction.patch.metric import refuse_anisotropy
 from planarfriction.torch import bristle
 from planarfriction.torch.bristle import Law
 from planarfriction.torch.parameters import LAW, PhysicalParameters
@@ -52,6 +53,7 @@ class PlanarLuGre(nn.Module):
             raise InvalidValueError("patch", "be a ContactPatch", patch)
         if not isinstance(law, LuGre):
             raise InvalidValueError("law", "be a LuGre law", law)
+        refuse_anisotropy(patch, type(self).__name__)
         self.patch = patch
         self.elasto_plastic = law_numbers(law).elasto_plastic
 

@@ -1,0 +1,91 @@
+"""Steps of the distributed model where friction depends on the direction: cell by cell what one cell alone would do.
+
+In a step the twist is held, and with it the place `c = a g/sigma_0` that a bristle decays towards: `z - c` steps as the
+bristle of an isotropic cell driven by `u = L v`, and its traction is that cell's less `sigma_0 c = g a`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from planarfriction import formulas
+from planarfriction.kernels import distributed as kernels
+from planarfriction.kernels import distributed_adjoint
+from planarfriction.kernels.law import law_numbers, law_row
+from planarfriction.laws import LuGre
+from planarfriction.models.base import StepJacobians
+
+_ORIGIN, _WHOLE = np.zeros(1), np.ones((1, 1))
+
+
+def centres(law: LuGre, asymmetry: np.ndarray, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """`c = a g(|u|)/sigma_0` `[..., 2, N]` of `a` `[2, N]` and `u` `[..., 2, N]`, and `dc/du` `[..., 2, 2, N]`."""
+    speed = np.hypot(velocity[..., 0, :], velocity[..., 1, :])
+    arguments = speed, law.mu_c, law.mu_s, law.v_s, law.gamma
+    g, slope = formulas.stribeck(np, *arguments), formulas.stribeck_slope(np, *arguments)
+    heading = velocity / np.where(speed > 0.0, speed, 1.0)[..., None, :]
+    along = asymmetry[:, None, :] * heading[..., None, :, :]
+    return asymmetry * (g / law.sigma_0)[..., None, :], along * (slope / law.sigma_0)[..., None, None, :]
+
+
+def step(model: Any, state: np.ndarray, velocity: np.ndarray, load: np.ndarray, dt: np.ndarray):
+    """`DistributedModel.step` for checked inputs; `velocity` is `u` `[..., 2, N]`."""
+    law = model.law
+    centre = 0.0 if model._asymmetry is None else centres(law, model._asymmetry, velocity)[0]
+    z, u, steps = _alone(state - centre, velocity, dt)
+    new, pull = np.empty_like(z), np.empty_like(u)
+    ones = np.ones(len(z))
+    kernels.step_batch(law_numbers(law), z, u, _ORIGIN, _ORIGIN, _WHOLE, ones, steps, new, pull)
+    loaded = (load > 0.0)[..., None, None]
+    traction = _together(pull[:, :2], state) - law.sigma_0 * centre
+    share = load[..., None] * model.patch.weights(load)
+    wrench = np.einsum("...cn,dcn->...d", traction * share[..., None, :], model._lever)
+    return np.where(loaded, _together(new, state) + centre, 0.0), wrench
+
+
+def step_jacobians(model: Any, state: np.ndarray, velocity: np.ndarray, load: np.ndarray, dt: np.ndarray):
+    """`DistributedModel.step_jacobians` for checked inputs; `velocity` is `u` `[..., 2, N]`."""
+    law, lever = model.law, model._lever
+    centre, centre_u = 0.0, None
+    if model._asymmetry is not None:
+        centre, centre_u = centres(law, model._asymmetry, velocity)
+    z, u, steps = _alone(state - centre, velocity, dt)
+    count = len(z)
+    new_z, new_u, pull_z = np.zeros((count, 2, 2, 1)), np.zeros((count, 2, 1, 3)), np.zeros((count, 3, 2, 1))
+    pull_u, pull = np.zeros((count, 3, 3)), np.zeros((count, 3))
+    distributed_adjoint.jacobians(
+        law_row(law), z.reshape(-1, 2, 1), u, _ORIGIN, _ORIGIN, _WHOLE, np.ones(count), steps,
+        new_z, new_u, pull_z, pull_u, pull,
+    )  # fmt: skip
+    new_z, new_u = _together(new_z[..., 0], state), _together(new_u[:, :, 0, :2], state)
+    pull_z, pull_u = _together(pull_z[:, :2, :, 0], state), _together(pull_u[:, :2, :2], state)
+    if centre_u is not None:
+        new_u = new_u + centre_u - np.einsum("...abn,...bcn->...acn", new_z, centre_u)
+        pull_u = pull_u - law.sigma_0 * centre_u - np.einsum("...abn,...bcn->...acn", pull_z, centre_u)
+    weights, loaded = model.patch.weights(load), (load > 0.0)[..., None, None, None]
+    share = (load[..., None] * weights)[..., None, None, :]
+    traction = (_together(pull[:, :2], state) - law.sigma_0 * centre) * weights[..., None, :]
+    return StepJacobians(
+        np.where(loaded, new_z, 0.0),
+        np.where(loaded, np.einsum("...abn,dbn->...and", new_u, lever), 0.0),
+        np.einsum("dan,...abn->...dbn", lever, pull_z * share),
+        np.einsum("dan,...abn,ebn->...de", lever, pull_u * share, lever, optimize=True),
+        np.einsum("...cn,dcn->...d", traction, lever),
+    )
+
+
+def _alone(state: np.ndarray, velocity: np.ndarray, dt: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Bristles `[K, 2]`, twists `[K, 3]` and step lengths `[K]` of all cells of a batch, each as a contact alone."""
+    z = np.ascontiguousarray(np.moveaxis(state, -2, -1).reshape(-1, 2))
+    u = np.zeros((len(z), 3))
+    u[:, :2] = np.moveaxis(velocity, -2, -1).reshape(-1, 2)
+    return z, u, np.ascontiguousarray(np.broadcast_to(dt[..., None], (*dt.shape, state.shape[-1])).reshape(-1))
+
+
+def _together(values: np.ndarray, state: np.ndarray) -> np.ndarray:
+    """`[K, ...]` of all cells of a batch as `[batch, ..., N]`."""
+    inner = values.shape[1:]
+    apart = values.reshape(*state.shape[:-2], state.shape[-1], *inner)
+    return np.moveaxis(apart, state.ndim - 2, -1)

@@ -1,0 +1,167 @@
+"""Friction that depends on the direction: a metric for each cell (grain, grooves) and an asymmetry (a brushed surface).
+
+A cell with the metric `M`, whose symmetric root is `L`, sees `u = L v` and pulls with `L` times the traction that a
+cell without a metric would have: in steady sliding `-g L (u/|u| + a)`. It then dissipates the power `g (|u| + a . u)`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.errors import InvalidValueError
+from planarfriction.patch.outline import with_outline
+
+_SAME = 1e-12
+"""Relative difference of the two entries off the diagonal that still counts as symmetric."""
+
+_PatchT = TypeVar("_PatchT", bound="Anisotropy")
+
+
+def grain(angle: float, along: float, across: float) -> np.ndarray:
+    """Metric `[2, 2]` of a surface with a grain: `R diag(along^2, across^2) R'` with R the rotation by `angle` [rad].
+
+    `along` and `across` are the friction coefficients along and across the grain relative to those of the law, > 0;
+    `angle` is that of the grain from the contact frame's x axis. Oblique sliding in a direction `e` dissipates
+    `sqrt(e' M e)`.
+    """
+    angle = validation.number("angle", angle)
+    squares = [validation.positive("along", along) ** 2, validation.positive("across", across) ** 2]
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    return _symmetric((turn * squares) @ turn.T)
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Anisotropy:
+    """What a patch knows of directions; see `with_friction_metric`."""
+
+    metric: Any = None
+    """Metric of the friction, `[2, 2]` or one per cell `[N, 2, 2]` [-]; None: the same in all directions."""
+    asymmetry: Any = None
+    """Asymmetry `a`, `[2]` or one per cell `[N, 2]` [-], `|a| < 1`; None: the same forwards and backwards."""
+
+    def with_friction_metric(self: _PatchT, metric: Any, asymmetry: Any = None) -> _PatchT:
+        """The same patch with friction that depends on the direction; None and None for friction that does not.
+
+        `metric` `M`: sliding along a unit vector e meets the coefficient `mu sqrt(e' M e)`; see `grain`. `asymmetry`
+        `a`: sliding along e, a principal axis of M, meets `1 + a . e` times that, so that it is easiest against a. Both
+        are in the axes of the contact frame and turn with it: the grain belongs to the patch.
+
+        Raises `InvalidValueError` unless every metric is symmetric and positive definite and every `|a| < 1`.
+        """
+        patch = dataclasses.replace(self, metric=metric, asymmetry=asymmetry)  # pyright: ignore
+        return with_outline(patch, self.outline)  # pyright: ignore
+
+    @functools.cached_property
+    def anisotropic(self) -> bool:
+        """Whether friction depends on the direction; metrics of ones and asymmetries of zero do not make it so."""
+        same = self.metric is None or (self.metric == np.eye(2)).all()
+        return not same or self.asymmetric
+
+    @functools.cached_property
+    def asymmetric(self) -> bool:
+        """Whether friction differs forwards and backwards."""
+        return self.asymmetry is not None and bool(self.asymmetry.any())
+
+    def levers(self) -> np.ndarray:
+        """`B` with `u_i = B_i V` for the twist V about the contact frame's origin, shape `[N, 2, 3]`.
+
+        `B_i = L_i [[1, 0, -y_i], [0, 1, x_i]]`; the wrench of a traction `t` of cell i is `B_i' t`.
+        """
+        x, y = self.positions.T  # pyright: ignore[reportAttributeAccessIssue]
+        one, zero = np.ones_like(x), np.zeros_like(x)
+        plain = np.moveaxis(np.array([[one, zero, -y], [zero, one, x]]), -1, 0)
+        return plain if self.root is None else self.root @ plain
+
+    def asymmetries(self) -> np.ndarray:
+        """Asymmetry `a_i` of each cell, shape `[N, 2]`; zeros where there is none."""
+        shape = self.positions.shape  # pyright: ignore[reportAttributeAccessIssue]
+        return np.zeros(shape) if self.asymmetry is None else np.broadcast_to(self.asymmetry, shape).copy()
+
+    @functools.cached_property
+    def root(self) -> np.ndarray | None:
+        """Symmetric root `L` of the metric: `[2, 2]` where it is one for all cells, `[N, 2, 2]`, or None."""
+        if self.metric is None or (self.metric == np.eye(2)).all():
+            return None
+        root = symmetric_root(self.metric)
+        return root[0] if root.ndim == 3 and (root == root[0]).all() else root
+
+    def lever_coordinates(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """`(x', y')` `[..., N]` with `L (-y, x) = (-y', x')`: what a cell sees of a spin is that of a cell there.
+
+        For a metric per cell the last axis of `x` and `y` runs over all cells of the patch.
+        """
+        if self.root is None:
+            return x, y
+        xx, xy, yy = self.root[..., 0, 0], self.root[..., 0, 1], self.root[..., 1, 1]
+        return yy * x - xy * y, xx * y - xy * x
+
+    def _check_anisotropy(self, kept: np.ndarray) -> None:
+        """Check both fields against the cells given, and drop those of cells that are not `kept` `[n]`."""
+        for name, size in (("metric", 2), ("asymmetry", 1)):
+            value = getattr(self, name)
+            if value is None:
+                continue
+            per_cell = np.ndim(value) == size + 1
+            value = validation.array(name, value, (len(kept),) * per_cell + (2,) * size)
+            value = (_positive_definite if name == "metric" else _less_than_one)(value)
+            value = value[kept] if per_cell else value
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+
+    def _anisotropy_to_dict(self) -> dict[str, list]:
+        """Plain data of what there is."""
+        both = {"metric": self.metric, "asymmetry": self.asymmetry}
+        return {name: value.tolist() for name, value in both.items() if value is not None}
+
+
+def symmetric_root(metric: np.ndarray) -> np.ndarray:
+    """`L` with `L L = M`, symmetric and positive definite, for metrics `[..., 2, 2]`."""
+    values, axes = np.linalg.eigh(metric)
+    return _symmetric((axes * np.sqrt(values)[..., None, :]) @ np.swapaxes(axes, -1, -2))
+
+
+def refuse_anisotropy(patch: Anisotropy, by: str) -> None:
+    """Raise where `by`, which knows only friction that is the same in all directions, is given other friction."""
+    if patch.anisotropic:
+        raise InvalidValueError("patch", f"have the same friction in all directions for {by}", "a friction metric")
+
+
+def refuse_cell_metrics(patch: Anisotropy, by: str) -> None:
+    """Raise where `by`, which knows one metric and one asymmetry for all cells, is given one for each cell."""
+    different = patch.asymmetry is not None and (patch.asymmetries() != patch.asymmetries()[0]).any()
+    if different or (patch.root is not None and patch.root.ndim == 3):
+        raise InvalidValueError("patch", f"have one friction metric and asymmetry for all cells for {by}", "one a cell")
+
+
+def same_metric(one: Anisotropy, other: Anisotropy) -> bool:
+    """Whether two patches have the same metric for all cells."""
+    if one.root is None or other.root is None:
+        return one.root is other.root
+    return bool(np.array_equal(one.root, other.root))
+
+
+def _symmetric(matrix: np.ndarray) -> np.ndarray:
+    return 0.5 * (matrix + np.swapaxes(matrix, -1, -2))
+
+
+def _positive_definite(metric: np.ndarray) -> np.ndarray:
+    """The metrics `[..., 2, 2]`, exactly symmetric, or an error that shows the first that cannot be one."""
+    skew = np.abs(metric[..., 0, 1] - metric[..., 1, 0]) > _SAME * np.abs(metric).max(axis=(-1, -2))
+    lowest = np.linalg.eigvalsh(_symmetric(metric))[..., 0]
+    bad = skew | ~(lowest > 0.0)
+    if bad.any():
+        raise InvalidValueError("metric", "be symmetric and positive definite", metric[bad][0].tolist())
+    return _symmetric(metric)
+
+
+def _less_than_one(asymmetry: np.ndarray) -> np.ndarray:
+    size = np.hypot(asymmetry[..., 0], asymmetry[..., 1])
+    if not (size < 1.0).all():
+        raise InvalidValueError("asymmetry", "be shorter than 1 (friction must oppose sliding)", float(size.max()))
+    return asymmetry
