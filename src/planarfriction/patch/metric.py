@@ -128,7 +128,7 @@ def symmetric_root(metric: np.ndarray) -> np.ndarray:
 
 def refuse_anisotropy(patch: Anisotropy, by: str) -> None:
     """Raise where `by`, which knows only friction that is the same in all directions, is given other friction."""
-    if patch.anisotropic:
+    if isinstance(patch, Anisotropy) and patch.anisotropic:  # what is no patch at all has its own error
         raise InvalidValueError("patch", f"have the same friction in all directions for {by}", "a friction metric")
 
 
