@@ -127,7 +127,7 @@ class LimitSurface:
         # conjugate coordinates: force and torque / r about the centre of pressure; -h balances the wrench
         balanced = -np.linalg.solve(frame.T, wrench.reshape(-1, 3).T).T
         balanced /= np.linalg.norm(balanced, axis=1)[:, None]
-        found = np.array([self._scaled_twist_of(target) for target in balanced])
+        found = self._scaled_twists_of(balanced)
         found /= np.einsum("ni,ni->n", self._direction(found), found)[:, None]
         return np.linalg.solve(frame, found.T).T.reshape(wrench.shape)
 
@@ -148,6 +148,10 @@ class LimitSurface:
         kernels.sliding_batch(self.kind, self.numbers.data, 0, self.numbers.size, flat, u)
         speed = np.linalg.norm(flat, axis=1)
         return (u / np.where(speed > 0.0, speed, 1.0)[:, None]).reshape(scaled.shape)
+
+    def _scaled_twists_of(self, targets: np.ndarray) -> np.ndarray:
+        """`_scaled_twist_of` for unit vectors `[M, 3]`."""
+        return np.array([self._scaled_twist_of(target) for target in targets]).reshape(-1, 3)
 
     def _scaled_twist_of(self, target: np.ndarray) -> np.ndarray:
         """Direction of the scaled twist whose `h` is parallel to the unit vector `target`.
