@@ -21,6 +21,7 @@ _HOME = {
     "FrictionError": "planarfriction.errors",
     "LimitSurfaceCells": "planarfriction.limit_surface",
     "LimitSurfaceEllipsoid": "planarfriction.limit_surface",
+    "LimitSurfaceQuartic": "planarfriction.limit_surface",
     "LimitSurfaceTable": "planarfriction.limit_surface",
     "LimitSurfaceTablePublished": "planarfriction.limit_surface",
     "LinearGradient": "planarfriction.patch",
@@ -73,6 +74,7 @@ if TYPE_CHECKING:  # for editors and type checkers: the same names as above
     from planarfriction.limit_surface import (
         LimitSurfaceCells,
         LimitSurfaceEllipsoid,
+        LimitSurfaceQuartic,
         LimitSurfaceTable,
         LimitSurfaceTablePublished,
     )

@@ -2,7 +2,9 @@
 
 from planarfriction.limit_surface.base import LimitSurface
 from planarfriction.limit_surface.cells import LimitSurfaceCells
+from planarfriction.limit_surface.comparison import SurfaceComparison
 from planarfriction.limit_surface.ellipsoid import LimitSurfaceEllipsoid
+from planarfriction.limit_surface.quartic import LimitSurfaceQuartic
 from planarfriction.limit_surface.table import LimitSurfaceTable
 from planarfriction.limit_surface.table_published import LimitSurfaceTablePublished
 
@@ -10,6 +12,8 @@ __all__ = [
     "LimitSurface",
     "LimitSurfaceCells",
     "LimitSurfaceEllipsoid",
+    "LimitSurfaceQuartic",
     "LimitSurfaceTable",
     "LimitSurfaceTablePublished",
+    "SurfaceComparison",
 ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -13,6 +13,9 @@ from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels import surfaces as kernels
 from planarfriction.patch import ContactPatch
+
+if TYPE_CHECKING:
+    from planarfriction.limit_surface.comparison import SurfaceComparison
 
 _FULL_BALANCE = 1e-12
 """The twist of a wrench is found when its wrench is parallel to the given one to this angle [rad]."""
@@ -130,6 +133,17 @@ class LimitSurface:
         found = self._scaled_twists_of(balanced)
         found /= np.einsum("ni,ni->n", self._direction(found), found)[:, None]
         return np.linalg.solve(frame, found.T).T.reshape(wrench.shape)
+
+    def compare(self, reference: LimitSurface, *, samples: int = 200) -> SurfaceComparison:
+        """Differences from another surface: wrenches of the same twists, and twists of the same wrenches.
+
+        Both at `samples` directions, spread evenly over the sphere of the reference's scaled coordinates.
+
+        Raises `InvalidValueError` if `reference` is no limit surface or `samples` not an integer >= 2.
+        """
+        from planarfriction.limit_surface import comparison
+
+        return comparison.compare(self, reference, samples)
 
     # ------------------------------------------------------------------ scaled coordinates
 
