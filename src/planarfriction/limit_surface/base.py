@@ -235,10 +235,10 @@ def scaling(centre_of_pressure: np.ndarray, contact_radius: float) -> np.ndarray
 
 
 def _plane(normal: np.ndarray) -> np.ndarray:
-    """Two unit vectors `[2, 3]` that span the plane across the unit vector `normal`."""
-    first = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-    first /= np.linalg.norm(first)
-    return np.stack([first, np.cross(normal, first)])
+    """Two unit vectors `[..., 2, 3]` that span the plane across the unit vector `normal` `[..., 3]`."""
+    first = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal), axis=-1)])
+    first /= np.linalg.norm(first, axis=-1)[..., None]
+    return np.stack([first, np.cross(normal, first)], axis=-2)
 
 
 def _rows(name: str, value) -> np.ndarray:
