@@ -30,8 +30,9 @@ class LimitSurfaceQuartic(LimitSurface):
     """Limit surface `H(fx, fy, tau/r) = 1` about the centre of pressure, H a convex homogeneous quartic.
 
     The twist of a wrench is along the gradient of H, in closed form. Convexity is certified by a sum of squares:
-    `z' H''(x) z = y' Q y` with `y = (x_i z_j)` and positive definite `Q`. The 15 coefficients are fitted by least squares
-    under that constraint to the surface of the patch, or by `LimitSurfaceQuartic.fit` to measured pairs.
+    `z' H''(x) z = y' Q y` with `y = (x_i z_j)` and positive definite `Q` (every convex quartic of three variables has
+    such a Q). The 15 coefficients are fitted by least squares under that constraint to the surface of the patch, or by
+    `LimitSurfaceQuartic.fit` to measured pairs.
 
     Compiled models use it as a table of `segments`, like `LimitSurfaceTable`. Needs the extra `quartic` (cvxpy).
 
@@ -67,9 +68,9 @@ class LimitSurfaceQuartic(LimitSurface):
         """The convex quartic nearest to measured pairs: `H(W) = 1`, and the gradient of H along the twist.
 
         `wrenches` `[M, 3]` are friction wrenches per unit `mu f_N` on the moving body, `twists` `[M, 3]` its twists,
-        whose magnitude does not matter; both about the origin of the contact frame. The patch gives centre and radius of
-        the scaled coordinates, not the shape: a guess will do. `velocity_weight` weighs the squares of the gradients'
-        parts across the twists against those of `H - 1`.
+        whose magnitude does not matter; both about the origin of the contact frame. The patch gives centre and radius
+        of the scaled coordinates, not the shape: a guess will do. `velocity_weight` weighs the squares of the
+        gradients' parts across the twists against those of `H - 1`.
 
         Raises `InvalidValueError` for pairs of the wrong shape, fewer than 5, not finite or zero.
         """
@@ -125,7 +126,10 @@ class LimitSurfaceQuartic(LimitSurface):
         return self._gradient(targets)
 
     def _conjugate(self, units: np.ndarray) -> np.ndarray:
-        """`x` with `grad H(x) = 4 V` for unit vectors `[M, 3]`: minimises the convex `H(x)/4 - V . x` by Newton steps."""
+        """`x` with `grad H(x) = 4 V` for unit vectors `[M, 3]`: the least of the convex `H(x)/4 - V . x`.
+
+        By damped Newton steps.
+        """
         x = units / np.cbrt(self._value(units))[:, None]  # the minimum along V itself
         active = np.arange(len(units))
         for _ in range(100):

@@ -14,8 +14,8 @@ POWERS = np.array([powers for powers in itertools.product(range(4, -1, -1), repe
 """Powers of `fx, fy, tau/r` in the 15 monomials, `[15, 3]`: x^4, x^3 y, x^3 z, x^2 y^2, ..."""
 
 MARGIN = 1e-4
-"""Least eigenvalue of the certificate: the Hessian is at least this times `|x|^2`, so that the surface has no facets and
-no corners to rounding (the unit sphere's is 4)."""
+"""Least eigenvalue of the certificate: the Hessian is at least this times `|x|^2`, so that the surface has no facets
+and no corners (the unit sphere's is 4)."""
 
 ELLIPSOID = np.zeros(15)
 """Coefficients of `(x^2 + y^2 + z^2)^2`."""
@@ -60,12 +60,12 @@ def _certificate_equations() -> tuple[np.ndarray, np.ndarray]:
     row = {pair: number for number, pair in enumerate(itertools.product(pairs, pairs))}
     of_coefficients, of_matrix = np.zeros((36, 15)), np.zeros((36, 9, 9))
     factors, powers = _differentiated(2)
-    for m, k, l in itertools.product(range(15), range(3), range(3)):
-        if factors[m, k, l] != 0.0:
-            i, j = np.repeat(range(3), powers[m, k, l].astype(int)).tolist()
-            of_coefficients[row[(i, j), (min(k, l), max(k, l))], m] += factors[m, k, l]
-    for i, k, j, l in itertools.product(range(3), repeat=4):  # (x_i z_k) (x_j z_l)
-        of_matrix[row[(min(i, j), max(i, j)), (min(k, l), max(k, l))], 3 * i + k, 3 * j + l] += 1.0
+    for m, k, n in itertools.product(range(15), range(3), range(3)):
+        if factors[m, k, n] != 0.0:
+            i, j = np.repeat(range(3), powers[m, k, n].astype(int)).tolist()
+            of_coefficients[row[(i, j), (min(k, n), max(k, n))], m] += factors[m, k, n]
+    for i, k, j, n in itertools.product(range(3), repeat=4):  # (x_i z_k) (x_j z_n)
+        of_matrix[row[(min(i, j), max(i, j)), (min(k, n), max(k, n))], 3 * i + k, 3 * j + n] += 1.0
     return of_coefficients, of_matrix.reshape(36, 81)
 
 
