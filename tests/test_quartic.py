@@ -178,6 +178,18 @@ def test_a_known_quartic_comes_back_from_pairs(velocity_weight):
     assert found.wrench(twist) == pytest.approx(known.wrench(twist), rel=1e-7, abs=1e-9)
 
 
+def test_twists_count():
+    """Twists of another surface pull the fit away from the wrenches; with weight 0 they do not."""
+    known, ellipsoid = pf.LimitSurfaceQuartic(FEET, coefficients=KNOWN), pf.LimitSurfaceEllipsoid(FEET)
+    wrench = known.wrench(samples(known, 40))
+    pulled, free = (
+        pf.LimitSurfaceQuartic.fit(wrench, ellipsoid.twist(wrench), patch=FEET, velocity_weight=weight).quartic
+        for weight in (1.0, 0.0)
+    )
+    assert free == pytest.approx(KNOWN, rel=1e-9, abs=1e-9)
+    assert np.abs(pulled - KNOWN).max() > 0.05
+
+
 def test_noise_and_few_pairs_leave_it_convex():
     """Six pairs for 15 numbers, with noise of 20 %: plain least squares is not convex, the fit is."""
     random = np.random.default_rng(9)
