@@ -2,7 +2,7 @@
 
 The files hold the mean wrench of a pusher and the way that the object went, 50 pushes in each of 10 layouts of feet
 (Zhou, Paolini, Bagnell, Mason, ICRA 2016). The twist of a push is normal to the limit surface where the wrench is: it
-is predicted from the places of the feet and their loads, with nothing fitted, and then with two or three parameters
+is predicted from the places of the feet and their loads, with nothing fitted, and then with two parameters
 fitted on 30 pushes:
 
     python examples/measured_pushes.py FOLDER --out out/
@@ -27,7 +27,6 @@ from scipy.optimize import minimize
 import planarfriction as pf
 from planarfriction import validation
 from planarfriction.errors import FileError
-from planarfriction.scenes.ready import GRAVITY
 from planarfriction.scenes.solution import check_writable
 
 LENGTH = 0.05  # rho of the metric: angles are between (vx, vy, rho omega) [m]
@@ -51,8 +50,6 @@ class Layout:
     """The same of the triangle that touches, or that the feet span."""
     shares: np.ndarray
     """Shares of the load on the feet `[3]`."""
-    weight: float
-    """Weight of the object [N]."""
     friction: float
     """`mu f_N` as the authors measured it [N]: only a fit of a whole surface needs it."""
     wrenches: np.ndarray
@@ -98,7 +95,7 @@ def check_finite(path: Path, found: pd.DataFrame, columns: Sequence[str]) -> Non
 def read_layouts(folder: Path) -> list[Layout]:
     """All layouts of the pushes and the feet in a folder; raises FileError in one line that says what is wrong."""
     motion = ["fx_N", "fy_N", "tau_Nm", "dx_m", "dy_m", "dtheta_rad", "world_theta0_rad"]
-    places = ["x_m", "y_m", "load_fraction", "mass_kg", "muN_authors_N"]
+    places = ["x_m", "y_m", "load_fraction", "muN_authors_N"]
     path, beside = folder / f"{PREFIX}pushes.csv", folder / f"{PREFIX}supports.csv"
     pushes, feet = table(path, motion, ["config", "surface"]), table(beside, places, ["config", "kind"])
     check_finite(path, pushes, motion)
@@ -115,7 +112,6 @@ def read_layouts(folder: Path) -> list[Layout]:
         corners, flat = here[["x_m", "y_m"]].to_numpy(), here["kind"].iloc[0] != "point"
         if not flat:
             check_finite(beside, here, ["load_fraction"])
-        first = here.iloc[0]
         layouts.append(
             Layout(
                 name=str(name),
@@ -123,8 +119,7 @@ def read_layouts(folder: Path) -> list[Layout]:
                 feet=None if flat else corners,
                 corners=corners,
                 shares=np.full(3, 1 / 3) if flat else here["load_fraction"].to_numpy() / here["load_fraction"].sum(),
-                weight=float(first["mass_kg"]) * GRAVITY,
-                friction=float(first["muN_authors_N"]),
+                friction=float(here["muN_authors_N"].iloc[0]),
                 wrenches=wrenches,
                 twists=twists / size[:, None],
                 headings=(rows["world_theta0_rad"] + 0.5 * rows["dtheta_rad"]).to_numpy(),
@@ -205,18 +200,6 @@ def with_grain(layout: Layout, which: np.ndarray, values: np.ndarray) -> np.ndar
     return unit(np.array(found))
 
 
-def with_height(layout: Layout, which: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """`with_shares`, and a pusher at the height `values[2]` [m], which loads the feet ahead and lifts those behind."""
-    shares = np.array([values[0], values[1], 1.0 - values[0] - values[1]])
-    balance = np.vstack([np.ones(3), layout.feet.T])
-    found = []
-    for push in which:
-        moment = values[2] / layout.weight * layout.wrenches[push, :2]
-        moved = np.maximum(shares + np.linalg.solve(balance, [0.0, *moment]), 1e-3)
-        found.append(feet_twists(layout.feet, moved, layout.wrenches[push][None])[0])
-    return unit(np.array(found))
-
-
 # ------------------------------------------------------------------------------------------------ fitted
 
 Predict = Callable[[Layout, np.ndarray, np.ndarray], np.ndarray]
@@ -225,7 +208,6 @@ Predict = Callable[[Layout, np.ndarray, np.ndarray], np.ndarray]
 FITS: dict[str, tuple[Predict, Callable[[Layout], list[float]], tuple[float, ...]]] = {
     "load fractions (2)": (with_shares, lambda layout: [*layout.shares[:2]], (0.05, 0.05)),
     "grain (2)": (with_grain, lambda layout: [0.0, 0.0], (0.15, 0.15)),
-    "fractions, height (3)": (with_height, lambda layout: [*layout.shares[:2], 0.0], (0.05, 0.05, 0.02)),
 }
 """What is fitted -> its prediction, where the search starts, and its first steps."""
 
@@ -241,7 +223,7 @@ def fit(predict: Predict, start: Sequence[float], steps: Sequence[float], layout
     """The parameters with the least mean angle on the pushes `which`, by the simplex method."""
     simplex = np.array(start) + np.vstack([np.zeros(len(start)), np.diag(steps)])
     # angles of a degree or so are kinked functions of the parameters: 0.01 deg is far below their noise
-    options = {"initial_simplex": simplex, "maxfev": 60, "xatol": 2e-3, "fatol": 1e-2}
+    options = {"initial_simplex": simplex, "maxfev": 50, "xatol": 2e-3, "fatol": 1e-2}
     misfit = lambda values: float(error(predict(layout, which, values), layout.twists[which]).mean())  # noqa: E731
     return minimize(misfit, start, method="Nelder-Mead", options=options).x
 

@@ -106,7 +106,7 @@ def least_squares(rows: np.ndarray, values: np.ndarray) -> np.ndarray:
     coefficients, matrix = cp.Variable(15), cp.Variable((9, 9), symmetric=True)
     of_coefficients, of_matrix = _certificate_equations()
     # the same least squares in 15 rows, whatever the number of samples
-    triangle = np.linalg.qr(np.column_stack([rows, values]), mode="r")
+    triangle = np.asarray(np.linalg.qr(np.column_stack([rows, values]), mode="r"))
     scale = np.abs(triangle).max()
     problem = cp.Problem(
         cp.Minimize(cp.sum_squares((triangle[:, :15] @ coefficients - triangle[:, 15]) / scale)),
