@@ -22,6 +22,7 @@ _HOME = {
     "LimitSurfaceCells": "planarfriction.limit_surface",
     "LimitSurfaceEllipsoid": "planarfriction.limit_surface",
     "LimitSurfaceExact": "planarfriction.limit_surface",
+    "LimitSurfaceQuartic": "planarfriction.limit_surface",
     "LimitSurfaceTable": "planarfriction.limit_surface",
     "LimitSurfaceTablePublished": "planarfriction.limit_surface",
     "LinearGradient": "planarfriction.patch",
@@ -76,6 +77,7 @@ if TYPE_CHECKING:  # for editors and type checkers: the same names as above
         LimitSurfaceCells,
         LimitSurfaceEllipsoid,
         LimitSurfaceExact,
+        LimitSurfaceQuartic,
         LimitSurfaceTable,
         LimitSurfaceTablePublished,
     )

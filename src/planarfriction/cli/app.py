@@ -98,7 +98,7 @@ def run(
 @click.option("--cell-size", type=float, help="Side of a cell of the pressure map in m.")
 @click.option(
     "--surface",
-    type=click.Choice(["cells", "exact", "table", "table-published", "ellipsoid"]),
+    type=click.Choice(["cells", "exact", "table", "table-published", "ellipsoid", "quartic"]),
     default="cells",
     show_default=True,
     help="How the surface is represented.",

@@ -24,6 +24,7 @@ SURFACES = {
     "table": "LimitSurfaceTable",
     "table-published": "LimitSurfaceTablePublished",
     "ellipsoid": "LimitSurfaceEllipsoid",
+    "quartic": "LimitSurfaceQuartic",
 }
 """Name on the command line -> class in `planarfriction.limit_surface`."""
 

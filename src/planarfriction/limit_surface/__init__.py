@@ -2,8 +2,10 @@
 
 from planarfriction.limit_surface.base import LimitSurface
 from planarfriction.limit_surface.cells import LimitSurfaceCells
+from planarfriction.limit_surface.comparison import SurfaceComparison
 from planarfriction.limit_surface.ellipsoid import LimitSurfaceEllipsoid
 from planarfriction.limit_surface.exact import LimitSurfaceExact
+from planarfriction.limit_surface.quartic import LimitSurfaceQuartic
 from planarfriction.limit_surface.table import LimitSurfaceTable
 from planarfriction.limit_surface.table_published import LimitSurfaceTablePublished
 
@@ -12,6 +14,8 @@ __all__ = [
     "LimitSurfaceCells",
     "LimitSurfaceEllipsoid",
     "LimitSurfaceExact",
+    "LimitSurfaceQuartic",
     "LimitSurfaceTable",
     "LimitSurfaceTablePublished",
+    "SurfaceComparison",
 ]

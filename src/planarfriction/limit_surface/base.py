@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from planarfriction.kernels import surfaces as kernels
 from planarfriction.limit_surface.cell_metrics import scaled_levers
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.metric import refuse_anisotropy, refuse_cell_metrics, symmetric_root
+
+if TYPE_CHECKING:
+    from planarfriction.limit_surface.comparison import SurfaceComparison
 
 _FULL_BALANCE = 1e-12
 """The twist of a wrench is found when its wrench is parallel to the given one to this angle [rad]."""
@@ -162,9 +165,20 @@ class LimitSurface:
         # conjugate coordinates: force and torque / r about the centre of pressure; -h balances the wrench
         balanced = -np.linalg.solve(frame.T, wrench.reshape(-1, 3).T).T
         balanced /= np.linalg.norm(balanced, axis=1)[:, None]
-        found = np.array([self._scaled_twist_of(target) for target in balanced])
+        found = self._scaled_twists_of(balanced)
         found /= np.einsum("ni,ni->n", self._direction(found), found)[:, None]
         return np.linalg.solve(frame, found.T).T.reshape(wrench.shape)
+
+    def compare(self, reference: LimitSurface, *, samples: int = 200) -> SurfaceComparison:
+        """Differences from another surface: wrenches of the same twists, and twists of the same wrenches.
+
+        Both at `samples` directions, spread evenly over the sphere of the reference's scaled coordinates.
+
+        Raises `InvalidValueError` if `reference` is no limit surface or `samples` not an integer >= 2.
+        """
+        from planarfriction.limit_surface import comparison
+
+        return comparison.compare(self, reference, samples)
 
     # ------------------------------------------------------------------ scaled coordinates
 
@@ -197,6 +211,10 @@ class LimitSurface:
         u, numbers = np.empty_like(scaled), self.numbers
         kernels.sliding_batch(self.kind, numbers.data, 0, numbers.size, scaled, u)
         return u
+
+    def _scaled_twists_of(self, targets: np.ndarray) -> np.ndarray:
+        """`_scaled_twist_of` for unit vectors `[M, 3]`."""
+        return np.array([self._scaled_twist_of(target) for target in targets]).reshape(-1, 3)
 
     def _scaled_twist_of(self, target: np.ndarray) -> np.ndarray:
         """Direction of the scaled twist whose `h` is parallel to the unit vector `target`.
@@ -267,10 +285,10 @@ def scaling(centre_of_pressure: np.ndarray, contact_radius: float) -> np.ndarray
 
 
 def _plane(normal: np.ndarray) -> np.ndarray:
-    """Two unit vectors `[2, 3]` that span the plane across the unit vector `normal`."""
-    first = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal))])
-    first /= np.linalg.norm(first)
-    return np.stack([first, np.cross(normal, first)])
+    """Two unit vectors `[..., 2, 3]` that span the plane across the unit vector `normal` `[..., 3]`."""
+    first = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal), axis=-1)])
+    first /= np.linalg.norm(first, axis=-1)[..., None]
+    return np.stack([first, np.cross(normal, first)], axis=-2)
 
 
 def _rows(name: str, value) -> np.ndarray:

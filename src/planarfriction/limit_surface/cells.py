@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from planarfriction.kernels import surfaces as kernels
+from planarfriction.kernels.twists import least_dissipation
 from planarfriction.limit_surface.base import LimitSurface, SurfaceNumbers, _plane
-from planarfriction.limit_surface.cell_metrics import cell_slopes, cell_sums
+from planarfriction.limit_surface.cell_metrics import cell_slopes, cell_sums, cell_twist
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,36 +37,16 @@ class LimitSurfaceCells(LimitSurface):
     def _sliding_slope(self, scaled: np.ndarray) -> np.ndarray:
         return super()._sliding_slope(scaled) if self._one_metric else cell_slopes(*self._scaled_levers, scaled)
 
-    def _scaled_twist_of(self, target: np.ndarray) -> np.ndarray:
-        """As the base class, with the kinks of `|v_i|` rounded off by a radius that shrinks to nothing.
+    def _scaled_twists_of(self, targets: np.ndarray) -> np.ndarray:
+        """As the base class, all at once, with the kinks of `|v_i|` rounded off by a radius that shrinks to nothing.
 
         The minimum often lies on a kink (a wrench inside a flat facet of the surface: the body turns about one cell),
         where the plain Newton method stalls.
         """
-        from scipy import optimize
-
-        basis, lean = _plane(target), np.zeros(3) if self._lean is None else self._lean
-        levers, weights = self._scaled_levers
-        maps = np.einsum("ad,icd->aci", basis, levers)  # [2, 2, n]
-
-        def potential(place: np.ndarray, rounding: float):
-            point = target + place @ basis
-            velocity = levers @ point
-            speed = np.sqrt((velocity**2).sum(axis=1) + rounding**2)
-            along = np.einsum("aci,ic->ai", maps, velocity / speed[:, None])
-            hessian = np.einsum("i,aci,bci->ab", weights / speed, maps, maps)
-            hessian -= np.einsum("i,ai,bi->ab", weights / speed, along, along)
-            return float(weights @ speed + lean @ point), along @ weights + basis @ lean, hessian
-
-        place = np.zeros(2)
-        for rounding in 10.0 ** -np.arange(1.0, 11.0):
-            solution = optimize.minimize(
-                lambda p, e=rounding: potential(p, e)[:2],
-                place,
-                jac=True,
-                hess=lambda p, e=rounding: potential(p, e)[2],
-                method="trust-exact",
-                options={"gtol": 1e-13, "initial_trust_radius": max(10.0 * rounding, 1e-9)},
-            )
-            place = solution.x
-        return target + place @ basis
+        if self._lean is not None or not self._one_metric:
+            lean = np.zeros(3) if self._lean is None else self._lean
+            found = [cell_twist(*self._scaled_levers, lean, target, _plane(target)) for target in targets]
+            return np.array(found).reshape(-1, 3)
+        found = np.empty_like(targets)
+        least_dissipation(*self.numbers.data.reshape(3, -1), targets, _plane(targets), found)
+        return found

@@ -184,10 +184,10 @@ class LimitSurfaceExact(LimitSurface):
         # at rest, where it has no value, the ellipsoid's
         return np.where(speed > 0.0, speed * slopes + h[:, :, None] * unit, np.eye(3))
 
-    def _scaled_twist_of(self, target: np.ndarray) -> np.ndarray:
+    def _scaled_twists_of(self, targets: np.ndarray) -> np.ndarray:
         if isinstance(self._parts, _Elements) and self._parts.corners.shape[1] == kernels.POINTS:
-            return LimitSurfaceCells(self.patch, normal_force=self.normal_force)._scaled_twist_of(target)
-        return super()._scaled_twist_of(target)
+            return LimitSurfaceCells(self.patch, normal_force=self.normal_force)._scaled_twists_of(targets)
+        return super()._scaled_twists_of(targets)
 
 
 def _norm(scaled: np.ndarray) -> np.ndarray:

@@ -73,6 +73,7 @@ def _kind(surface: Any) -> str:
         "LimitSurfaceTable": "table, smooth",
         "LimitSurfaceTablePublished": "table, as published",
         "LimitSurfaceEllipsoid": "ellipsoid",
+        "LimitSurfaceQuartic": "convex quartic",
     }
     return words.get(type(surface).__name__, type(surface).__name__)
 

@@ -1,0 +1,93 @@
+"""How far two limit surfaces are apart: in force, and in which twist belongs to which wrench."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.errors import InvalidValueError
+
+if TYPE_CHECKING:
+    from planarfriction.limit_surface.base import LimitSurface
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Statistics of an error over the samples."""
+
+    largest: float
+    mean: float
+    rms: float
+
+    @classmethod
+    def of(cls, values: np.ndarray) -> Spread:
+        """Those of values `[M]`."""
+        size = np.abs(values)
+        return cls(float(size.max()), float(size.mean()), float(np.sqrt(np.mean(size**2))))
+
+
+@dataclass(frozen=True)
+class SurfaceComparison:
+    """Differences of a limit surface from a reference, in the reference's scaled coordinates; `print` shows a table."""
+
+    force: Spread
+    """Difference of the forces of the same twists, per unit `mu f_N` [-]."""
+    torque: Spread
+    """Difference of their torques about the reference's centre of pressure, over its contact radius [-]."""
+    radius: Spread
+    """How much further out the surface is along the same wrench, relative to the reference [-]."""
+    angle: Spread
+    """Angle between the twists `(vx, vy, r omega)` of the same wrench [deg]."""
+    samples: int
+    """Number of twists, and of wrenches."""
+
+    def __str__(self) -> str:
+        units = {"force": "-", "torque": "torque / r [-]", "radius": "-", "angle": "deg"}
+        rows = [f"{'difference':<16}{'largest':>10}{'mean':>10}{'rms':>10}"]
+        for name, unit in units.items():
+            words = unit if "[" in unit else f"{name} [{unit}]"
+            spread = getattr(self, name)
+            rows.append(f"{words:<16}" + "".join(f"{value:>10.4g}" for value in dataclasses.astuple(spread)))
+        return "\n".join(rows)
+
+
+def directions(count: int) -> np.ndarray:
+    """`count` unit vectors spread evenly over the sphere, always the same, `[count, 3]`.
+
+    Points of a golden spiral: heights at equal steps, each turned from the last by the golden angle.
+    """
+    height = 1.0 - (2.0 * np.arange(count) + 1.0) / count
+    azimuth = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count)
+    across = np.sqrt(1.0 - height**2)
+    return np.stack([across * np.cos(azimuth), across * np.sin(azimuth), height], axis=1)
+
+
+def compare(surface: LimitSurface, reference: LimitSurface, samples: int) -> SurfaceComparison:
+    """See `LimitSurface.compare`."""
+    from planarfriction.limit_surface.base import LimitSurface
+
+    if not isinstance(reference, LimitSurface):
+        raise InvalidValueError("reference", "be a limit surface", reference)
+    units = directions(validation.count("samples", samples, at_least=2))
+    frame = reference._frame()  # V_S = frame V, and so W = frame' W_S
+    twists, wrenches = np.linalg.solve(frame, units.T).T, units @ frame
+    apart = np.linalg.solve(frame.T, (surface.wrench(twists) - reference.wrench(twists)).T).T
+    found, wanted = surface.twist(wrenches), reference.twist(wrenches)  # of dissipation 1: -W . V = 1/radius
+    further = np.einsum("mi,mi->m", wanted, wrenches) / np.einsum("mi,mi->m", found, wrenches) - 1.0
+    return SurfaceComparison(
+        force=Spread.of(np.hypot(apart[:, 0], apart[:, 1])),
+        torque=Spread.of(apart[:, 2]),
+        radius=Spread.of(further),
+        angle=Spread.of(angles(found @ frame.T, wanted @ frame.T)),
+        samples=len(units),
+    )
+
+
+def angles(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Angles between vectors `[..., 3]` [deg]."""
+    across = np.linalg.norm(np.cross(first, second), axis=-1)
+    return np.degrees(np.arctan2(across, np.einsum("...i,...i", first, second)))

@@ -1,0 +1,185 @@
+"""A convex quartic in the place of a limit surface."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.errors import InvalidValueError
+from planarfriction.kernels import surfaces as kernels
+from planarfriction.limit_surface import quartic_fit
+from planarfriction.limit_surface.base import LimitSurface, SurfaceNumbers, _rows, scaling
+from planarfriction.limit_surface.cells import LimitSurfaceCells
+from planarfriction.limit_surface.comparison import directions
+from planarfriction.limit_surface.stored import stored_potential
+from planarfriction.patch import ContactPatch
+
+_SLOPE_LEFT = 1e-14
+"""Slope at which the wrench of a unit twist is found, relative to the twist [-]."""
+
+_SAMPLES = 400
+"""Directions at which a patch's own surface is fitted: 1600 residuals for 15 numbers."""
+
+
+@dataclass(frozen=True, eq=False)
+class LimitSurfaceQuartic(LimitSurface):
+    """Limit surface `H(fx, fy, tau/r) = 1` about the centre of pressure, H a convex homogeneous quartic.
+
+    The twist of a wrench is along the gradient of H, in closed form. Convexity is certified by a sum of squares:
+    `z' H''(x) z = y' Q y` with `y = (x_i z_j)` and positive definite `Q` (every convex quartic of three variables has
+    such a Q). The 15 coefficients are fitted by least squares under that constraint to the surface of the patch, or by
+    `LimitSurfaceQuartic.fit` to measured pairs.
+
+    Compiled models use it as a table of `segments`, like `LimitSurfaceTable`. Needs the extra `quartic` (cvxpy).
+
+    Source: Zhou, Paolini, Bagnell, Mason 2016.
+    """
+
+    surface: LimitSurface | None = dataclasses.field(default=None, kw_only=True)
+    """Surface to which it is fitted; by default `LimitSurfaceCells(patch)`."""
+
+    coefficients: np.ndarray | None = dataclasses.field(default=None, kw_only=True)
+    """Coefficients of the 15 monomials `quartic_fit.POWERS`, `[15]`; by default fitted to `surface`, for each load."""
+
+    segments: int = dataclasses.field(default=20, kw_only=True)
+    """Segments of a quadrant of the table for compiled loops [-]."""
+
+    kind = kernels.POTENTIAL
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "segments", validation.count("segments", self.segments, at_least=2))
+        if self.surface is not None and not isinstance(self.surface, LimitSurface):
+            raise InvalidValueError("surface", "be a limit surface", self.surface)
+        super().__post_init__()
+        if self.coefficients is not None:
+            given = validation.array("coefficients", self.coefficients, (15,))
+            if not np.linalg.eigvalsh(quartic_fit.certificate(given))[0] > 0.0:
+                raise InvalidValueError("coefficients", "be those of a convex quartic", given.tolist())
+            object.__setattr__(self, "coefficients", given)
+
+    @classmethod
+    def fit(
+        cls, wrenches, twists, *, patch: ContactPatch, normal_force: float | None = None, velocity_weight: float = 1.0
+    ) -> LimitSurfaceQuartic:
+        """The convex quartic nearest to measured pairs: `H(W) = 1`, and the gradient of H along the twist.
+
+        `wrenches` `[M, 3]` are friction wrenches per unit `mu f_N` on the moving body, `twists` `[M, 3]` its twists,
+        whose magnitude does not matter; both about the origin of the contact frame. The patch gives centre and radius
+        of the scaled coordinates, not the shape: a guess will do. `velocity_weight` weighs the squares of the
+        gradients' parts across the twists against those of `H - 1`.
+
+        Raises `InvalidValueError` for pairs of the wrong shape, fewer than 5, not finite or zero.
+        """
+        wrenches, twists = _rows("wrenches", wrenches), _rows("twists", twists)
+        if wrenches.ndim != 2 or wrenches.shape != twists.shape or len(wrenches) < 5:
+            raise InvalidValueError(
+                "twists", "have as many rows as wrenches, five or more", f"{list(wrenches.shape)}, {list(twists.shape)}"
+            )
+        for name, rows in (("wrenches", wrenches), ("twists", twists)):
+            if not (np.abs(rows).max(axis=1) > 0.0).all():
+                raise InvalidValueError(name, "not be zero in any row", rows.tolist())
+        frame = scaling(patch.centre_of_pressure(normal_force), float(patch.contact_radius(normal_force)))
+        points = -np.linalg.solve(frame.T, wrenches.T).T
+        weight = validation.non_negative("velocity_weight", velocity_weight)
+        coefficients = _fitted(points, twists @ frame.T, weight)
+        return cls(patch, normal_force=normal_force, coefficients=coefficients)
+
+    @functools.cached_property
+    def quartic(self) -> np.ndarray:
+        """The 15 coefficients in use."""
+        if self.coefficients is not None:
+            return self.coefficients
+        surface = self.surface or LimitSurfaceCells(self.patch, normal_force=self.normal_force)
+        if self.normal_force is not None:
+            surface = surface.at(self.normal_force)
+        scaled = directions(_SAMPLES)
+        frame = self._frame()
+        points = -np.linalg.solve(frame.T, surface.wrench(np.linalg.solve(frame, scaled.T).T).T).T
+        return _fitted(points, scaled, 1.0)
+
+    @functools.cached_property
+    def convexity(self) -> float:
+        """Smallest eigenvalue of the certificate `Q`: the surface is convex, proven, where this is not negative."""
+        return float(np.linalg.eigvalsh(quartic_fit.certificate(self.quartic))[0])
+
+    @functools.cached_property
+    def numbers(self) -> SurfaceNumbers:
+        """Potential and its derivatives at the nodes of a table, as `LimitSurfaceTable` stores them."""
+        return SurfaceNumbers(self.kind, self.segments, stored_potential(self._direction, self.segments))
+
+    # ------------------------------------------------------------------ the protocol
+
+    def _value(self, points: np.ndarray) -> np.ndarray:
+        return quartic_fit.monomials(points) @ self.quartic
+
+    def _gradient(self, points: np.ndarray) -> np.ndarray:
+        return np.einsum("mci,c->mi", quartic_fit.gradients(points), self.quartic)
+
+    def _hessian(self, points: np.ndarray) -> np.ndarray:
+        return np.einsum("mcij,c->mij", quartic_fit.hessians(points), self.quartic)
+
+    def _scaled_twists_of(self, targets: np.ndarray) -> np.ndarray:
+        return self._gradient(targets)
+
+    def _conjugate(self, units: np.ndarray) -> np.ndarray:
+        """`x` with `grad H(x) = 4 V` for unit vectors `[M, 3]`: the least of the convex `H(x)/4 - V . x`.
+
+        By damped Newton steps.
+        """
+        x = units / np.cbrt(self._value(units))[:, None]  # the minimum along V itself
+        active = np.arange(len(units))
+        for _ in range(100):
+            slope = 0.25 * self._gradient(x[active]) - units[active]
+            left = np.linalg.norm(slope, axis=1) > _SLOPE_LEFT
+            active, slope = active[left], slope[left]
+            if not active.size:
+                break
+            move = -np.linalg.solve(0.25 * self._hessian(x[active]), slope[..., None])[..., 0]
+            value = 0.25 * self._value(x[active]) - np.einsum("mi,mi->m", units[active], x[active])
+            downhill = np.einsum("mi,mi->m", slope, move)
+            trying, length = np.arange(len(active)), 1.0
+            while trying.size and length > 1e-6:
+                who = active[trying]
+                trial = x[who] + length * move[trying]
+                reached = 0.25 * self._value(trial) - np.einsum("mi,mi->m", units[who], trial)
+                good = reached <= value[trying] + 0.1 * length * downhill[trying] + 1e-15
+                x[who[good]] = trial[good]
+                trying, length = trying[~good], 0.5 * length
+            size = np.linalg.norm(0.25 * self._gradient(x[active]) - units[active], axis=1)
+            moved = size < 0.5 * np.linalg.norm(slope, axis=1)  # else at rounding, or far and still damped
+            active = active[moved | (size > 1e-10)]
+        return x
+
+    def _direction(self, scaled: np.ndarray) -> np.ndarray:
+        """`h` with `H(h) = 1` and its gradient along the twist."""
+        flat = scaled.reshape(-1, 3)
+        speed = np.linalg.norm(flat, axis=1)
+        moving = speed > 0.0
+        h = np.zeros_like(flat)
+        x = self._conjugate(flat[moving] / speed[moving, None])
+        h[moving] = x / self._value(x)[:, None] ** 0.25
+        return h.reshape(scaled.shape)
+
+    def _sliding_slope(self, scaled: np.ndarray) -> np.ndarray:
+        """`du/dV_S`, from `x(V) = Phi^(1/3) h` and `dx/dV = (H''(x)/4)^-1`, Phi the dissipation of the unit twist."""
+        speed = np.linalg.norm(scaled, axis=1)
+        units = np.where(speed[:, None] > 0.0, scaled, [0.0, 0.0, 1.0]) / np.where(speed > 0.0, speed, 1.0)[:, None]
+        x = self._conjugate(units)
+        root = self._value(x) ** 0.25  # Phi^(1/3)
+        h = x / root[:, None]
+        slope = np.linalg.inv(0.25 * self._hessian(x)) / root[:, None, None]
+        slope -= np.einsum("mi,mj->mij", h, h) / (3.0 * root**3)[:, None, None]
+        return slope + np.einsum("mi,mj->mij", h, units)
+
+
+def _fitted(points: np.ndarray, twists: np.ndarray, velocity_weight: float) -> np.ndarray:
+    """Coefficients with `H = 1` at `points` `[M, 3]` and gradients, 4 times as long, along `twists` `[M, 3]`."""
+    units = twists / np.linalg.norm(twists, axis=1)[:, None]
+    across = np.eye(3) - np.einsum("mi,mj->mij", units, units)
+    parts = 0.25 * np.sqrt(velocity_weight) * np.einsum("mij,mcj->mic", across, quartic_fit.gradients(points))
+    rows = np.concatenate([quartic_fit.monomials(points), parts.reshape(-1, 15)])
+    return quartic_fit.least_squares(rows, np.append(np.ones(len(points)), np.zeros(3 * len(points))))

@@ -1,0 +1,134 @@
+"""Fit of a convex homogeneous quartic: least squares with a certificate of convexity."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from typing import Any
+
+import numpy as np
+
+from planarfriction.errors import FrictionError, MissingExtraError
+
+POWERS = np.array([powers for powers in itertools.product(range(4, -1, -1), repeat=3) if sum(powers) == 4])
+"""Powers of `fx, fy, tau/r` in the 15 monomials, `[15, 3]`: x^4, x^3 y, x^3 z, x^2 y^2, ..."""
+
+MARGIN = 1e-4
+"""Least eigenvalue of the certificate: the Hessian is at least this times `|x|^2`, so that the surface has no facets
+and no corners (the unit sphere's is 4)."""
+
+ELLIPSOID = np.zeros(15)
+"""Coefficients of `(x^2 + y^2 + z^2)^2`."""
+for _row, _powers in enumerate(POWERS):
+    ELLIPSOID[_row] = {4: 1.0, 2: 2.0}.get(_powers.max(), 0.0) if (_powers % 2 == 0).all() else 0.0
+
+
+def monomials(points: np.ndarray) -> np.ndarray:
+    """The 15 monomials at points `[M, 3]`, shape `[M, 15]`."""
+    return np.prod(points[:, None, :] ** POWERS, axis=-1)
+
+
+@functools.cache
+def _differentiated(order: int) -> tuple[np.ndarray, np.ndarray]:
+    """Factors `[15, 3, ...]` and powers `[15, 3, ..., 3]` of the monomials' derivatives of first or second order."""
+    factors, powers = np.ones(15), POWERS.astype(float)
+    for _ in range(order):
+        factors = factors[..., None] * powers
+        powers = np.maximum(powers[..., None, :] - np.eye(3), 0.0)
+    return factors, powers
+
+
+def gradients(points: np.ndarray) -> np.ndarray:
+    """Gradients of the monomials, shape `[M, 15, 3]`."""
+    factors, powers = _differentiated(1)
+    return factors * np.prod(points[:, None, None, :] ** powers, axis=-1)
+
+
+def hessians(points: np.ndarray) -> np.ndarray:
+    """Second derivatives of the monomials, shape `[M, 15, 3, 3]`."""
+    factors, powers = _differentiated(2)
+    return factors * np.prod(points[:, None, None, None, :] ** powers, axis=-1)
+
+
+@functools.cache
+def _certificate_equations() -> tuple[np.ndarray, np.ndarray]:
+    """`C [36, 15]` and `Y [36, 81]` of `z' H(x) z = y' Q y` as `C c = Y vec(Q)`, `y = (x_i z_j)`.
+
+    One row for each monomial `x_i x_j z_k z_l`, i <= j, k <= l.
+    """
+    pairs = list(itertools.combinations_with_replacement(range(3), 2))
+    row = {pair: number for number, pair in enumerate(itertools.product(pairs, pairs))}
+    of_coefficients, of_matrix = np.zeros((36, 15)), np.zeros((36, 9, 9))
+    factors, powers = _differentiated(2)
+    for m, k, n in itertools.product(range(15), range(3), range(3)):
+        if factors[m, k, n] != 0.0:
+            i, j = np.repeat(range(3), powers[m, k, n].astype(int)).tolist()
+            of_coefficients[row[(i, j), (min(k, n), max(k, n))], m] += factors[m, k, n]
+    for i, k, j, n in itertools.product(range(3), repeat=4):  # (x_i z_k) (x_j z_n)
+        of_matrix[row[(min(i, j), max(i, j)), (min(k, n), max(k, n))], 3 * i + k, 3 * j + n] += 1.0
+    return of_coefficients, of_matrix.reshape(36, 81)
+
+
+def certificate(coefficients: np.ndarray) -> np.ndarray:
+    """Matrix `Q [9, 9]` of the quartic with the largest smallest eigenvalue, exact in its equations.
+
+    Positive semidefinite: the quartic is convex, as `z' H(x) z = y' Q y >= 0` for all x, z.
+    """
+    cp = _cvxpy()
+    matrix, least = cp.Variable((9, 9), symmetric=True), cp.Variable()
+    of_coefficients, of_matrix = _certificate_equations()
+    scale = np.abs(coefficients).max()
+    wanted = of_coefficients @ (coefficients / scale)
+    problem = cp.Problem(
+        cp.Maximize(least), [of_matrix @ cp.vec(matrix, order="C") == wanted, matrix - least * np.eye(9) >> 0]
+    )
+    _solve(problem)
+    return scale * _exactly(matrix.value, wanted)
+
+
+def _exactly(matrix: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """The nearest symmetric matrix that fulfils the equations to rounding."""
+    _, of_matrix = _certificate_equations()
+    matrix = 0.5 * (matrix + matrix.T)
+    missing = wanted - of_matrix @ matrix.reshape(81)
+    return matrix + np.linalg.lstsq(of_matrix, missing, rcond=None)[0].reshape(9, 9)
+
+
+def least_squares(rows: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Coefficients `[15]` of the convex quartic with the least `|rows c - values|`; rows `[M, 15]`, values `[M]`.
+
+    Without the constraint where that is convex anyway: then to rounding, otherwise to the solver's tolerance.
+    """
+    free = np.linalg.lstsq(rows, values, rcond=None)[0]
+    if np.linalg.matrix_rank(rows) == 15 and np.linalg.eigvalsh(certificate(free))[0] >= MARGIN:
+        return free
+    cp = _cvxpy()
+    coefficients, matrix = cp.Variable(15), cp.Variable((9, 9), symmetric=True)
+    of_coefficients, of_matrix = _certificate_equations()
+    # the same least squares in 15 rows, whatever the number of samples
+    triangle = np.asarray(np.linalg.qr(np.column_stack([rows, values]), mode="r"))
+    scale = np.abs(triangle).max()
+    problem = cp.Problem(
+        cp.Minimize(cp.sum_squares((triangle[:, :15] @ coefficients - triangle[:, 15]) / scale)),
+        [of_coefficients @ coefficients == of_matrix @ cp.vec(matrix, order="C"), matrix >> MARGIN * np.eye(9)],
+    )
+    _solve(problem)
+    return coefficients.value
+
+
+def _solve(problem: Any) -> None:
+    cp = _cvxpy()
+    try:
+        problem.solve(solver=cp.CLARABEL)
+    except cp.error.SolverError as error:
+        raise FrictionError(f"the fit of the quartic failed: {error}") from None
+    if problem.status not in ("optimal", "optimal_inaccurate"):
+        raise FrictionError(f"the fit of the quartic failed: {problem.status}")
+
+
+def _cvxpy() -> Any:
+    try:
+        import cvxpy
+    except ImportError:
+        raise MissingExtraError("cvxpy", "quartic") from None
+    return cvxpy
