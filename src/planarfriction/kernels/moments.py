@@ -1,0 +1,410 @@
+"""Moments of the bristles of a patch: three states, per unit normal load, twists about the contact frame's origin.
+
+In scaled coordinates `V_G = F V` (F upper triangular, `F'F` the patch's second moments of slip, so that `|V_G|` is the
+root mean square of the cells' speeds) the state z [3] [m], conjugate to V_G, obeys
+
+    z' = V_G - beta (lambda z + s m),   s = z . z_ss / |z_ss|^2,   lambda = |V_G|^2 / (V_G . z_ss),
+    m = V_G - lambda z_ss,   W = -F' (sigma_0 z + sigma_1 z' + sigma_2 V_G)
+
+`shape` is `(F_00, F_01, F_02, F_11, F_12, F_22, blend)`; `surface` is `(start, other)`, where in `data` the map of the
+shape begins and, if `blend > 0`, that of the other shape which has this share in the steady state.
+
+A map is eight numbers (faces, n, n of the Stribeck part, its levels, knee, least dissipation, 0, 0), then two maps of
+`kernels.cube`: `h_0`, steady sliding at `g = 1`, and the rest r of that at `g = e = exp(-|v/v_s|^gamma)`,
+
+    sigma_0 z_ss = (mu_s - (mu_s - mu_c) t) h_0 + (mu_s - mu_c) r(t),   t = |V_G| / (|V_G| + knee v_s)
+"""
+
+from __future__ import annotations
+
+import math
+
+from planarfriction import formulas
+from planarfriction.kernels import compiled_math as xp
+from planarfriction.kernels import cube, inlined, jit, kernel
+from planarfriction.kernels.law import law_of
+
+HEADER = 8
+"""Numbers in front of a map."""
+
+LINEAR = 40
+"""Numbers of a linearisation: `beta`, dz'/dz (1:10), dz'/dV_G (10:19), the inverse of D (19:28), dz_ss/dV_G (28:37)."""
+
+
+@inlined
+def _scaled(shape, vx, vy, omega):
+    return shape[0] * vx + shape[1] * vy + shape[2] * omega, shape[3] * vy + shape[4] * omega, shape[5] * omega
+
+
+@inlined
+def _wrench(law, shape, zx, zy, zs, dx, dy, ds, x, y, s):
+    """Wrench about the origin from state, rate and twist in scaled coordinates."""
+    gx = formulas.traction(zx, dx, x, law.sigma_0, law.sigma_1, law.sigma_2)
+    gy = formulas.traction(zy, dy, y, law.sigma_0, law.sigma_1, law.sigma_2)
+    gs = formulas.traction(zs, ds, s, law.sigma_0, law.sigma_1, law.sigma_2)
+    return _to_origin(shape, gx, gy, gs)
+
+
+@inlined
+def _to_origin(shape, gx, gy, gs):
+    return shape[0] * gx, shape[1] * gx + shape[3] * gy, shape[2] * gx + shape[4] * gy + shape[5] * gs
+
+
+# ---------------------------------------------------------------------- steady sliding
+
+
+@kernel
+def _sliding(law, data, start, x, y, s, v):
+    """`sigma_0 z_ss` of one map, and its least dissipation."""
+    n, m, count, knee = int(data[start + 1]), int(data[start + 2]), int(data[start + 3]), data[start + 4]
+    faces = int(data[start])
+    spot = cube.locate(x, y, s, faces)
+    t = v / (v + knee * law.v_s)
+    drop = law.mu_s - law.mu_c
+    outer = (law.mu_s - drop * t) * spot.sign
+    inner = drop * spot.sign
+    first = start + HEADER
+    second = first + faces * (2 * n + 1) * (2 * n + 1) * 12
+    p, q = cube.square(spot, n), cube.square(spot, m)
+    level, w = cube.levels(t, count)
+    return (
+        outer * cube.read(data, first, n, 3, 0, p) + inner * cube.read_level(data, second, m, 3, count, 0, q, level, w),
+        outer * cube.read(data, first, n, 3, 1, p) + inner * cube.read_level(data, second, m, 3, count, 1, q, level, w),
+        outer * cube.read(data, first, n, 3, 2, p) + inner * cube.read_level(data, second, m, 3, count, 2, q, level, w),
+        data[start + 5],
+    )
+
+
+@inlined
+def steady(law, shape, surface, data, x, y, s, v):
+    """`z_ss` [m] at the scaled twist, which moves at `v > 0`; its dissipation is never below the least."""
+    qx, qy, qs, least = _sliding(law, data, surface[0], x, y, s, v)
+    if shape[6] > 0.0:
+        ox, oy, o_s, other = _sliding(law, data, surface[1], x, y, s, v)
+        qx, qy, qs = qx + shape[6] * (ox - qx), qy + shape[6] * (oy - qy), qs + shape[6] * (o_s - qs)
+        least += shape[6] * (other - least)
+    per_v = 1.0 / v
+    power = (qx * x + qy * y + qs * s) * per_v
+    raised = (formulas.floored(xp, power, law.mu_c * least) - power) * per_v
+    per = 1.0 / law.sigma_0
+    return (qx + raised * x) * per, (qy + raised * y) * per, (qs + raised * s) * per
+
+
+@kernel
+def _sliding_slopes(law, data, start, x, y, s, v, share, j):
+    """Add `share` of the slopes of `_sliding` by the scaled twist to `j` [9], row by row; `j[9:12]` is scratch."""
+    n, m, count, knee = int(data[start + 1]), int(data[start + 2]), int(data[start + 3]), data[start + 4]
+    faces = int(data[start])
+    spot = cube.locate(x, y, s, faces)
+    per = 1.0 / (v + knee * law.v_s)
+    t = v * per
+    by_v = knee * law.v_s * per * per / v  # dt/dV_G = by_v V_G
+    drop = law.mu_s - law.mu_c
+    outer = law.mu_s - drop * t
+    first = start + HEADER
+    second = first + faces * (2 * n + 1) * (2 * n + 1) * 12
+    p, p_a, p_b = cube.squares(spot, n)
+    q, q_a, q_b = cube.squares(spot, m)
+    level, w = cube.levels(t, count)
+    w_t = cube.level_slopes(t, count)
+    for i in range(3):
+        by_t = drop * spot.sign * (
+            cube.read_level(data, second, m, 3, count, i, q, level, w_t) - cube.read(data, first, n, 3, i, p)
+        )
+        by_a = outer * cube.read(data, first, n, 3, i, p_a)
+        by_a += drop * cube.read_level(data, second, m, 3, count, i, q_a, level, w)
+        by_b = outer * cube.read(data, first, n, 3, i, p_b)
+        by_b += drop * cube.read_level(data, second, m, 3, count, i, q_b, level, w)
+        cube.gradient(spot, by_a, by_b, j, 9, 1)
+        j[3 * i] += share * (j[9] + by_t * by_v * x)
+        j[3 * i + 1] += share * (j[10] + by_t * by_v * y)
+        j[3 * i + 2] += share * (j[11] + by_t * by_v * s)
+
+
+@kernel
+def steady_slopes(law, shape, surface, data, x, y, s, v, j):
+    """`dz_ss/dV_G` [s] into `j` [9], row by row; `j[9:12]` is scratch. Returns `z_ss`."""
+    for i in range(9):
+        j[i] = 0.0
+    blend = shape[6]
+    qx, qy, qs, least = _sliding(law, data, surface[0], x, y, s, v)
+    _sliding_slopes(law, data, surface[0], x, y, s, v, 1.0 - blend, j)
+    if blend > 0.0:
+        ox, oy, o_s, other = _sliding(law, data, surface[1], x, y, s, v)
+        _sliding_slopes(law, data, surface[1], x, y, s, v, blend, j)
+        qx, qy, qs = qx + blend * (ox - qx), qy + blend * (oy - qy), qs + blend * (o_s - qs)
+        least += blend * (other - least)
+    per_v = 1.0 / v
+    nx, ny, ns = x * per_v, y * per_v, s * per_v
+    power = qx * nx + qy * ny + qs * ns
+    raised = formulas.floored(xp, power, law.mu_c * least) - power
+    stays = 1.0 - formulas.floored_slope(xp, power, law.mu_c * least)
+    per = 1.0 / law.sigma_0
+    if raised != 0.0:
+        for i in range(3):
+            n_i = nx if i == 0 else (ny if i == 1 else ns)
+            q_i = qx if i == 0 else (qy if i == 1 else qs)
+            # of the power by V_G, component i
+            j[9 + i] = nx * j[i] + ny * j[3 + i] + ns * j[6 + i] + (q_i - power * n_i) * per_v
+        for i in range(3):
+            n_i = nx if i == 0 else (ny if i == 1 else ns)
+            for k in range(3):
+                n_k = nx if k == 0 else (ny if k == 1 else ns)
+                turn = ((1.0 if i == k else 0.0) - n_i * n_k) * per_v
+                j[3 * i + k] += raised * turn - stays * n_i * j[9 + k]
+    for i in range(9):
+        j[i] *= per
+    return (qx + raised * nx) * per, (qy + raised * ny) * per, (qs + raised * ns) * per
+
+
+# ---------------------------------------------------------------------- the closure
+
+
+@inlined
+def closure(law, zx, zy, zs, qx, qy, qs):
+    """`beta` of the state z whose steady state is q."""
+    z2, q2 = zx * zx + zy * zy + zs * zs, qx * qx + qy * qy + qs * qs
+    size = math.sqrt(z2 * q2)
+    cosine = (zx * qx + zy * qy + zs * qs) / xp.where(size > 0.0, size, 1.0)
+    return formulas.slip_share(xp, math.sqrt(z2 / q2), cosine, law.elasto_plastic, law.breakaway_ratio)
+
+
+@inlined
+def closure_slopes(law, zx, zy, zs, qx, qy, qs):
+    """`beta` and its gradients by z and by q."""
+    z2, q2 = zx * zx + zy * zy + zs * zs, qx * qx + qy * qy + qs * qs
+    z_norm, q_norm = math.sqrt(z2), math.sqrt(q2)
+    per_z, per_q = 1.0 / z_norm if z_norm > 0.0 else 0.0, 1.0 / q_norm
+    ex, ey, es = zx * per_z, zy * per_z, zs * per_z
+    fx, fy, fs = qx * per_q, qy * per_q, qs * per_q
+    cosine = ex * fx + ey * fy + es * fs
+    deflection = z_norm * per_q
+    beta, by_deflection, by_cosine = formulas.slip_share_partials(
+        xp, deflection, cosine, law.elasto_plastic, law.breakaway_ratio
+    )
+    grow, turn = by_deflection * per_q, by_cosine * per_z
+    shrink, back = -by_deflection * deflection * per_q, by_cosine * per_q
+    return (
+        beta,
+        (grow * ex + turn * (fx - cosine * ex), grow * ey + turn * (fy - cosine * ey), grow * es + turn * (fs - cosine * es)),
+        (shrink * fx + back * (ex - cosine * fx), shrink * fy + back * (ey - cosine * fy), shrink * fs + back * (es - cosine * fs)),
+    )  # fmt: skip
+
+
+@inlined
+def _rate(law, zx, zy, zs, x, y, s, v, qx, qy, qs):
+    """`z'` from the state, the scaled twist and its steady state q."""
+    decay = v * v / (x * qx + y * qy + s * qs)
+    share = (zx * qx + zy * qy + zs * qs) / (qx * qx + qy * qy + qs * qs)
+    beta = closure(law, zx, zy, zs, qx, qy, qs)
+    return (
+        x - beta * (decay * zx + share * (x - decay * qx)),
+        y - beta * (decay * zy + share * (y - decay * qy)),
+        s - beta * (decay * zs + share * (s - decay * qs)),
+    )
+
+
+@kernel
+def evaluate(law, z, vx, vy, omega, shape, surface, data, zdot):
+    """Write the rates of the moments into `zdot` and return the wrench `(fx, fy, tau)`."""
+    x, y, s = _scaled(shape, vx, vy, omega)
+    v = math.sqrt(x * x + y * y + s * s)
+    if v > 0.0:
+        qx, qy, qs = steady(law, shape, surface, data, x, y, s, v)
+        zdot[0], zdot[1], zdot[2] = _rate(law, z[0], z[1], z[2], x, y, s, v, qx, qy, qs)
+    else:
+        zdot[0], zdot[1], zdot[2] = 0.0, 0.0, 0.0
+    return _wrench(law, shape, z[0], z[1], z[2], zdot[0], zdot[1], zdot[2], x, y, s)
+
+
+# ---------------------------------------------------------------------- the linearised equation
+
+
+@kernel
+def slopes(law, z, x, y, s, v, q, j, by_z, by_v):
+    """`dz'/dz` and `dz'/dV_G` [9] at the scaled twist, from `q = z_ss` and its slopes `j`. Returns `beta`."""
+    qx, qy, qs = q
+    zx, zy, zs = z[0], z[1], z[2]
+    beta, b_z, b_q = closure_slopes(law, zx, zy, zs, qx, qy, qs)
+    per_power = 1.0 / (x * qx + y * qy + s * qs)
+    per_q2 = 1.0 / (qx * qx + qy * qy + qs * qs)
+    decay = v * v * per_power
+    share = (zx * qx + zy * qy + zs * qs) * per_q2
+    for i in range(3):
+        z_i = zx if i == 0 else (zy if i == 1 else zs)
+        q_i = qx if i == 0 else (qy if i == 1 else qs)
+        v_i = x if i == 0 else (y if i == 1 else s)
+        m_i = v_i - decay * q_i
+        g_i = decay * z_i + share * m_i
+        for k in range(3):
+            q_k = qx if k == 0 else (qy if k == 1 else qs)
+            v_k = x if k == 0 else (y if k == 1 else s)
+            same = 1.0 if i == k else 0.0
+            j0, j1, j2 = j[k], j[3 + k], j[6 + k]
+            by_z[3 * i + k] = -beta * (decay * same + m_i * q_k * per_q2) - g_i * b_z[k]
+            decay_k = 2.0 * v_k * per_power - decay * per_power * (q_k + x * j0 + y * j1 + s * j2)
+            share_k = (zx * j0 + zy * j1 + zs * j2 - 2.0 * share * (qx * j0 + qy * j1 + qs * j2)) * per_q2
+            beta_k = b_q[0] * j0 + b_q[1] * j1 + b_q[2] * j2
+            g_k = (z_i - share * q_i) * decay_k + m_i * share_k + share * (same - decay * j[3 * i + k])
+            by_v[3 * i + k] = same - g_i * beta_k - beta * g_k
+    return beta
+
+
+@kernel
+def linearise(law, z, vx, vy, omega, shape, surface, data, lin):
+    """Linearise the rates into `lin` [40] (see `LINEAR`); at rest they do not depend on z and follow the twist."""
+    x, y, s = _scaled(shape, vx, vy, omega)
+    v = math.sqrt(x * x + y * y + s * s)
+    if v > 0.0:
+        q = steady_slopes(law, shape, surface, data, x, y, s, v, lin[28:40])
+        lin[0] = slopes(law, z, x, y, s, v, q, lin[28:37], lin[1:10], lin[10:19])
+    else:
+        for i in range(19):
+            lin[i] = 0.0
+        lin[10], lin[14], lin[18] = 1.0, 1.0, 1.0
+
+
+@inlined
+def _solve(lin, a, b, c):
+    """`D^-1 (a, b, c)` with `D = shift I - dz'/dz`, once `factor` has prepared it."""
+    return (
+        lin[19] * a + lin[20] * b + lin[21] * c,
+        lin[22] * a + lin[23] * b + lin[24] * c,
+        lin[25] * a + lin[26] * b + lin[27] * c,
+    )
+
+
+@kernel
+def factor(law, shift, shape, lin, stiffness):
+    """Prepare `D^-1` in `lin` and write `d wrench/d twist` with the moments eliminated.
+
+    It is `-F' ((sigma_0 + sigma_1 shift) D^-1 dz'/dV_G + sigma_2) F`.
+    """
+    a, b, c = shift - lin[1], -lin[2], -lin[3]
+    d, e, f = -lin[4], shift - lin[5], -lin[6]
+    g, h, i = -lin[7], -lin[8], shift - lin[9]
+    r, p, w = e * i - f * h, f * g - d * i, d * h - e * g
+    per = 1.0 / (a * r + b * p + c * w)
+    lin[19], lin[20], lin[21] = r * per, (c * h - b * i) * per, (b * f - c * e) * per
+    lin[22], lin[23], lin[24] = p * per, (a * i - c * g) * per, (c * d - a * f) * per
+    lin[25], lin[26], lin[27] = w * per, (b * g - a * h) * per, (a * e - b * d) * per
+    pull = law.sigma_0 + law.sigma_1 * shift
+    for m in range(3):
+        # column m of F
+        x, y, s = shape[m], (0.0 if m == 0 else shape[2 + m]), (shape[5] if m == 2 else 0.0)
+        nx, ny, ns = _solve(
+            lin,
+            lin[10] * x + lin[11] * y + lin[12] * s,
+            lin[13] * x + lin[14] * y + lin[15] * s,
+            lin[16] * x + lin[17] * y + lin[18] * s,
+        )
+        stiffness[0, m], stiffness[1, m], stiffness[2, m] = _to_origin(
+            shape, -pull * nx - law.sigma_2 * x, -pull * ny - law.sigma_2 * y, -pull * ns - law.sigma_2 * s
+        )
+
+
+@kernel
+def eliminate(law, shift, r, shape, lin):
+    """Wrench about the origin caused by the residual `r` of the moments."""
+    pull = law.sigma_0 + law.sigma_1 * shift
+    x, y, s = _solve(lin, r[0], r[1], r[2])
+    return _to_origin(
+        shape, law.sigma_1 * r[0] - pull * x, law.sigma_1 * r[1] - pull * y, law.sigma_1 * r[2] - pull * s
+    )
+
+
+@kernel
+def back_substitute(r, vx, vy, omega, shape, lin, out):
+    """Solve `D out = r + dz'/dV_G F dV` for the change of the twist about the origin."""
+    x, y, s = _scaled(shape, vx, vy, omega)
+    out[0], out[1], out[2] = _solve(
+        lin,
+        r[0] + lin[10] * x + lin[11] * y + lin[12] * s,
+        r[1] + lin[13] * x + lin[14] * y + lin[15] * s,
+        r[2] + lin[16] * x + lin[17] * y + lin[18] * s,
+    )
+
+
+# ---------------------------------------------------------------------- the step
+
+
+@inlined
+def step(law, z, vx, vy, omega, shape, surface, data, dt, out):
+    """Advance the moments by `dt` at a held twist and return the wrench at the end.
+
+    With beta held the equation is linear, its matrix `lambda I + m (x) z_ss/|z_ss|^2`, and this is its exponential: of
+    s with the rate `mu = lambda cos^2(V_G, z_ss)` and of the rest with lambda. Plain LuGre is exact; elasto-plastic
+    moments take the mean of beta at the start and at an end predicted by an implicit Euler step, which is second order.
+    """
+    x, y, s = _scaled(shape, vx, vy, omega)
+    v = math.sqrt(x * x + y * y + s * s)
+    zx, zy, zs = z[0], z[1], z[2]
+    if v == 0.0:
+        out[0], out[1], out[2] = zx, zy, zs
+        return _wrench(law, shape, zx, zy, zs, 0.0, 0.0, 0.0, x, y, s)
+    qx, qy, qs = steady(law, shape, surface, data, x, y, s, v)
+    per_q2 = 1.0 / (qx * qx + qy * qy + qs * qs)
+    power = x * qx + y * qy + s * qs
+    decay = v * v / power
+    slow = power * per_q2  # the rate of s
+    mx, my, ms = x - decay * qx, y - decay * qy, s - decay * qs
+    share = (zx * qx + zy * qy + zs * qs) * per_q2
+    start = closure(law, zx, zy, zs, qx, qy, qs)
+    # predicted end: implicit Euler
+    per = 1.0 / (1.0 + start * decay * dt)
+    pull = dt * start * (share + slow * dt) / (1.0 + start * slow * dt)
+    px, py, ps = (zx + dt * x - pull * mx) * per, (zy + dt * y - pull * my) * per, (zs + dt * s - pull * ms) * per
+    end = closure(law, px, py, ps, qx, qy, qs)
+    beta = formulas.mean_decay(start * decay, end * decay, dt) / decay
+    left_slow, mean_slow = formulas.relaxation(xp, beta * slow * dt)
+    gap = beta * (decay - slow) * dt
+    left_gap, mean_gap = formulas.relaxation(xp, gap)
+    left = left_slow * left_gap
+    total = beta * decay * dt
+    mean = (beta * slow * dt * mean_slow + gap * mean_gap * left_slow) / xp.where(total > 0.0, total, 1.0)
+    along = xp.where(total > 0.0, mean, 1.0) * decay * dt
+    across = (1.0 - beta * share) * dt * left_slow * mean_gap
+    nx, ny, ns = left * zx + along * qx + across * mx, left * zy + along * qy + across * my, left * zs + along * qs + across * ms
+    size = math.sqrt((zx * zx + zy * zy + zs * zs) * per_q2)
+    new = math.sqrt((nx * nx + ny * ny + ns * ns) * per_q2)
+    back = formulas.cap(xp, new, formulas.reachable_deflection(xp, size, law.elasto_plastic))
+    nx, ny, ns = nx * back, ny * back, ns * back
+    dx, dy, ds = _rate(law, nx, ny, ns, x, y, s, v, qx, qy, qs)
+    out[0], out[1], out[2] = nx, ny, ns
+    return _wrench(law, shape, nx, ny, ns, dx, dy, ds, x, y, s)
+
+
+@jit
+def step_batch(law_row, shape, surface, data, z, twist, load, dt, out, wrench):
+    """`step` for a batch: `z`, `twist`, `out`, `wrench` [B, 3], `load`, `dt` [B]; without load z is forgotten."""
+    law = law_of(law_row)
+    for b in range(z.shape[0]):
+        fx, fy, tau = step(law, z[b], twist[b, 0], twist[b, 1], twist[b, 2], shape, surface, data, dt[b], out[b])
+        wrench[b, 0], wrench[b, 1], wrench[b, 2] = load[b] * fx, load[b] * fy, load[b] * tau
+        if load[b] == 0.0:
+            out[b] = 0.0
+            wrench[b] = 0.0
+
+
+@jit
+def step_one(numbers, data, z, vx, vy, omega, load, dt, result):
+    """`step` of one contact for callers in Python: new state and wrench into `result` [6]; false for invalid inputs.
+
+    `numbers` holds law (9) and shape (7); its map begins `data`.
+    """
+    finite = xp.is_finite(vx) and xp.is_finite(vy) and xp.is_finite(omega) and xp.is_finite(load) and xp.is_finite(dt)
+    finite = finite and xp.is_finite(z[0]) and xp.is_finite(z[1]) and xp.is_finite(z[2])
+    if not (finite and load > 0.0 and dt >= 0.0):
+        return False
+    wrench = step(law_of(numbers), z, vx, vy, omega, numbers[9:16], (0, 0), data, dt, result)
+    result[3], result[4], result[5] = load * wrench[0], load * wrench[1], load * wrench[2]
+    return True
+
+
+@jit
+def step_sequence(law_row, shape, surface, data, z, twist, load, dt, wrench):
+    """`step` through the twists [T, 3] of one contact, `z` in place, wrenches into `wrench` [T, 3]."""
+    law = law_of(law_row)
+    for t in range(twist.shape[0]):
+        fx, fy, tau = step(law, z, twist[t, 0], twist[t, 1], twist[t, 2], shape, surface, data, dt, z)
+        wrench[t, 0], wrench[t, 1], wrench[t, 2] = load * fx, load * fy, load * tau
