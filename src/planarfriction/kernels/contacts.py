@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction.kernels import distributed, inlined, reduced
+from planarfriction.kernels import distributed, inlined, moments, reduced
 from planarfriction.kernels.law import law_of
 
-DISTRIBUTED, REDUCED = 0, 1
+DISTRIBUTED, REDUCED, MOMENTS = 0, 1, 2
 WORLD, BODY, BODY_AXES = 0, 1, 2
 """Fixed to the world; fixed to the body; fixed to a body whose prescribed velocity is given in its own axes."""
 
@@ -24,7 +24,7 @@ class Contacts(NamedTuple):
     """C contacts and the R shapes they take, in flat arrays."""
 
     kind: np.ndarray
-    """`DISTRIBUTED` or `REDUCED`, int [C]."""
+    """`DISTRIBUTED`, `REDUCED` or `MOMENTS`, int [C]."""
     law: np.ndarray
     """Numbers of the law, [C, 9]."""
     mount: np.ndarray
@@ -46,11 +46,11 @@ class Contacts(NamedTuple):
     weight_start: np.ndarray
     """Where the weights of each shape begin, int [R]."""
     shape: np.ndarray
-    """Reduced contacts: centre of pressure, r, <rho^2> of each shape, [R, 4]."""
+    """Numbers of each shape, [R, 7], as `kernels.reduced` (4 of them) and `kernels.moments` read them."""
     surface: np.ndarray
-    """Reduced contacts: limit surface (kind, start, size) of each shape, int [R, 3]."""
+    """Of each shape, int [R, 3]: limit surface (kind, start, size), or the maps of `kernels.moments` (start, other)."""
     data: np.ndarray
-    """Numbers of the limit surfaces, flat."""
+    """Numbers of the limit surfaces and maps, flat."""
 
 
 @inlined
@@ -96,6 +96,10 @@ def evaluate(contacts, c, row, z, v, zdot, w):
     if contacts.kind[c] == DISTRIBUTED:
         x, y, weights = _cells(contacts, c, row)
         w[0], w[1], w[2] = distributed.evaluate(law, z, v[0], v[1], v[2], x, y, weights, zdot)
+    elif contacts.kind[c] == MOMENTS:
+        w[0], w[1], w[2] = moments.evaluate(
+            law, z, v[0], v[1], v[2], contacts.shape[row], contacts.surface[row], contacts.data, zdot
+        )
     else:
         w[0], w[1], w[2] = reduced.evaluate(
             law, z, v[0], v[1], v[2], contacts.shape[row], contacts.surface[row], contacts.data, zdot
@@ -109,6 +113,8 @@ def linearise(contacts, c, row, z, v, lin):
     if contacts.kind[c] == DISTRIBUTED:
         x, y, _ = _cells(contacts, c, row)
         distributed.linearise(law, z, v[0], v[1], v[2], x, y, lin.reshape(7, x.shape[0]))
+    elif contacts.kind[c] == MOMENTS:
+        moments.linearise(law, z, v[0], v[1], v[2], contacts.shape[row], contacts.surface[row], contacts.data, lin)
     else:
         reduced.linearise(law, z, v[0], v[1], v[2], contacts.shape[row], contacts.surface[row], contacts.data, lin)
 
@@ -120,6 +126,8 @@ def factor(contacts, c, row, z, shift, lin, stiffness):
     if contacts.kind[c] == DISTRIBUTED:
         x, y, weights = _cells(contacts, c, row)
         distributed.factor(law, z, shift, x, y, weights, lin.reshape(7, x.shape[0]), stiffness)
+    elif contacts.kind[c] == MOMENTS:
+        moments.factor(law, shift, contacts.shape[row], lin, stiffness)
     else:
         reduced.factor(law, shift, contacts.shape[row], lin, stiffness)
 
@@ -131,6 +139,8 @@ def eliminate(contacts, c, row, z, shift, r, lin, w):
     if contacts.kind[c] == DISTRIBUTED:
         x, y, weights = _cells(contacts, c, row)
         w[0], w[1], w[2] = distributed.eliminate(law, z, shift, r, x, y, weights, lin.reshape(7, x.shape[0]))
+    elif contacts.kind[c] == MOMENTS:
+        w[0], w[1], w[2] = moments.eliminate(law, shift, r, contacts.shape[row], lin)
     else:
         w[0], w[1], w[2] = reduced.eliminate(law, shift, r, contacts.shape[row], lin)
 
@@ -141,6 +151,8 @@ def back_substitute(contacts, c, row, z, r, v, lin, out):
     if contacts.kind[c] == DISTRIBUTED:
         x, y, _ = _cells(contacts, c, row)
         distributed.back_substitute(z, r, v[0], v[1], v[2], x, y, lin.reshape(7, x.shape[0]), out)
+    elif contacts.kind[c] == MOMENTS:
+        moments.back_substitute(r, v[0], v[1], v[2], contacts.shape[row], lin, out)
     else:
         reduced.back_substitute(r, v[0], v[1], v[2], contacts.shape[row], lin, out)
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from planarfriction.kernels import inlined
+from planarfriction.kernels.four import four_nodes, four_nodes_levels
 
 
 class Spot(NamedTuple):
@@ -140,28 +141,11 @@ def level_slopes(t, count):
 
 
 @inlined
-def _dot(data, at, w):
-    return data[at] * w[0] + data[at + 1] * w[1] + data[at + 2] * w[2] + data[at + 3] * w[3]
-
-
-@inlined
 def read(data, start, n, components, m, q):
     """Component m of a map of one level."""
     node = 4 * components
     at, row = start + q.at * node + 4 * m, (2 * n + 1) * node
-    return (_dot(data, at, q.w00) + _dot(data, at + node, q.w01)) + (
-        _dot(data, at + row, q.w10) + _dot(data, at + row + node, q.w11)
-    )
-
-
-@inlined
-def _deep(data, at, step, t, w):
-    b, c, d = at + step, at + 2 * step, at + 3 * step
-    r0 = data[at] * t[0] + data[b] * t[1] + data[c] * t[2] + data[d] * t[3]
-    r1 = data[at + 1] * t[0] + data[b + 1] * t[1] + data[c + 1] * t[2] + data[d + 1] * t[3]
-    r2 = data[at + 2] * t[0] + data[b + 2] * t[1] + data[c + 2] * t[2] + data[d + 2] * t[3]
-    r3 = data[at + 3] * t[0] + data[b + 3] * t[1] + data[c + 3] * t[2] + data[d + 3] * t[3]
-    return r0 * w[0] + r1 * w[1] + r2 * w[2] + r3 * w[3]
+    return four_nodes(data, at, node, row, q.w00, q.w01, q.w10, q.w11)
 
 
 @inlined
@@ -170,9 +154,7 @@ def read_level(data, start, n, components, count, m, q, level, t):
     step = 4 * components
     node = count * step
     at, row = start + q.at * node + level * step + 4 * m, (2 * n + 1) * node
-    return (_deep(data, at, step, t, q.w00) + _deep(data, at + node, step, t, q.w01)) + (
-        _deep(data, at + row, step, t, q.w10) + _deep(data, at + row + node, step, t, q.w11)
-    )
+    return four_nodes_levels(data, at, node, row, step, t, q.w00, q.w01, q.w10, q.w11)
 
 
 @inlined

@@ -32,7 +32,8 @@ LINEAR = 40
 
 
 @inlined
-def _scaled(shape, vx, vy, omega):
+def scaled_twist(shape, vx, vy, omega):
+    """`V_G = F V`."""
     return shape[0] * vx + shape[1] * vy + shape[2] * omega, shape[3] * vy + shape[4] * omega, shape[5] * omega
 
 
@@ -42,11 +43,12 @@ def _wrench(law, shape, zx, zy, zs, dx, dy, ds, x, y, s):
     gx = formulas.traction(zx, dx, x, law.sigma_0, law.sigma_1, law.sigma_2)
     gy = formulas.traction(zy, dy, y, law.sigma_0, law.sigma_1, law.sigma_2)
     gs = formulas.traction(zs, ds, s, law.sigma_0, law.sigma_1, law.sigma_2)
-    return _to_origin(shape, gx, gy, gs)
+    return to_origin(shape, gx, gy, gs)
 
 
 @inlined
-def _to_origin(shape, gx, gy, gs):
+def to_origin(shape, gx, gy, gs):
+    """`F' g`."""
     return shape[0] * gx, shape[1] * gx + shape[3] * gy, shape[2] * gx + shape[4] * gy + shape[5] * gs
 
 
@@ -108,13 +110,9 @@ def _sliding_slopes(law, data, start, x, y, s, v, share, j):
     level, w = cube.levels(t, count)
     w_t = cube.level_slopes(t, count)
     for i in range(3):
-        by_t = drop * spot.sign * (
-            cube.read_level(data, second, m, 3, count, i, q, level, w_t) - cube.read(data, first, n, 3, i, p)
-        )
-        by_a = outer * cube.read(data, first, n, 3, i, p_a)
-        by_a += drop * cube.read_level(data, second, m, 3, count, i, q_a, level, w)
-        by_b = outer * cube.read(data, first, n, 3, i, p_b)
-        by_b += drop * cube.read_level(data, second, m, 3, count, i, q_b, level, w)
+        by_t = drop * spot.sign * (cube.read_level(data, second, m, 3, count, i, q, level, w_t) - cube.read(data, first, n, 3, i, p))
+        by_a = outer * cube.read(data, first, n, 3, i, p_a) + drop * cube.read_level(data, second, m, 3, count, i, q_a, level, w)
+        by_b = outer * cube.read(data, first, n, 3, i, p_b) + drop * cube.read_level(data, second, m, 3, count, i, q_b, level, w)
         cube.gradient(spot, by_a, by_b, j, 9, 1)
         j[3 * i] += share * (j[9] + by_t * by_v * x)
         j[3 * i + 1] += share * (j[10] + by_t * by_v * y)
@@ -157,63 +155,54 @@ def steady_slopes(law, shape, surface, data, x, y, s, v, j):
     return (qx + raised * nx) * per, (qy + raised * ny) * per, (qs + raised * ns) * per
 
 
+@inlined
+def sliding(law, vx, vy, omega, shape, surface, data):
+    """Scaled twist, its norm, and its steady state (any where the patch is at rest): what `advance` holds."""
+    x, y, s = scaled_twist(shape, vx, vy, omega)
+    v = math.sqrt(x * x + y * y + s * s)
+    if v > 0.0:
+        qx, qy, qs = steady(law, shape, surface, data, x, y, s, v)
+        return x, y, s, v, qx, qy, qs
+    return 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0
+
+
 # ---------------------------------------------------------------------- the closure
 
 
 @inlined
-def closure(law, zx, zy, zs, qx, qy, qs):
-    """`beta` of the state z whose steady state is q."""
-    z2, q2 = zx * zx + zy * zy + zs * zs, qx * qx + qy * qy + qs * qs
-    size = math.sqrt(z2 * q2)
-    cosine = (zx * qx + zy * qy + zs * qs) / xp.where(size > 0.0, size, 1.0)
-    return formulas.slip_share(xp, math.sqrt(z2 / q2), cosine, law.elasto_plastic, law.breakaway_ratio)
+def closure(law, deflection, share):
+    """`beta` of a state z: `deflection = |z|/|z_ss|`, `share` = s."""
+    cosine = share / xp.where(deflection > 0.0, deflection, 1.0)
+    return formulas.slip_share(xp, deflection, cosine, law.elasto_plastic, law.breakaway_ratio)
 
 
 @inlined
-def closure_slopes(law, zx, zy, zs, qx, qy, qs):
-    """`beta` and its gradients by z and by q."""
-    z2, q2 = zx * zx + zy * zy + zs * zs, qx * qx + qy * qy + qs * qs
-    z_norm, q_norm = math.sqrt(z2), math.sqrt(q2)
-    per_z, per_q = 1.0 / z_norm if z_norm > 0.0 else 0.0, 1.0 / q_norm
-    ex, ey, es = zx * per_z, zy * per_z, zs * per_z
-    fx, fy, fs = qx * per_q, qy * per_q, qs * per_q
-    cosine = ex * fx + ey * fy + es * fs
-    deflection = z_norm * per_q
+def closure_partials(law, deflection, share):
+    """`beta` and its partial derivatives with respect to `deflection` and `share`."""
+    per = xp.where(deflection > 0.0, 1.0 / xp.where(deflection > 0.0, deflection, 1.0), 0.0)
     beta, by_deflection, by_cosine = formulas.slip_share_partials(
-        xp, deflection, cosine, law.elasto_plastic, law.breakaway_ratio
+        xp, deflection, share * per, law.elasto_plastic, law.breakaway_ratio
     )
-    grow, turn = by_deflection * per_q, by_cosine * per_z
-    shrink, back = -by_deflection * deflection * per_q, by_cosine * per_q
-    return (
-        beta,
-        (grow * ex + turn * (fx - cosine * ex), grow * ey + turn * (fy - cosine * ey), grow * es + turn * (fs - cosine * es)),
-        (shrink * fx + back * (ex - cosine * fx), shrink * fy + back * (ey - cosine * fy), shrink * fs + back * (es - cosine * fs)),
-    )  # fmt: skip
+    return beta, by_deflection - by_cosine * share * per * per, by_cosine * per
 
 
 @inlined
-def _rate(law, zx, zy, zs, x, y, s, v, qx, qy, qs):
-    """`z'` from the state, the scaled twist and its steady state q."""
-    decay = v * v / (x * qx + y * qy + s * qs)
-    share = (zx * qx + zy * qy + zs * qs) / (qx * qx + qy * qy + qs * qs)
-    beta = closure(law, zx, zy, zs, qx, qy, qs)
-    return (
-        x - beta * (decay * zx + share * (x - decay * qx)),
-        y - beta * (decay * zy + share * (y - decay * qy)),
-        s - beta * (decay * zs + share * (s - decay * qs)),
-    )
+def _rate(beta, share, decay, z, u, q):
+    """One component of `z'`."""
+    return u - beta * (decay * z + share * (u - decay * q))
 
 
 @kernel
 def evaluate(law, z, vx, vy, omega, shape, surface, data, zdot):
     """Write the rates of the moments into `zdot` and return the wrench `(fx, fy, tau)`."""
-    x, y, s = _scaled(shape, vx, vy, omega)
-    v = math.sqrt(x * x + y * y + s * s)
-    if v > 0.0:
-        qx, qy, qs = steady(law, shape, surface, data, x, y, s, v)
-        zdot[0], zdot[1], zdot[2] = _rate(law, z[0], z[1], z[2], x, y, s, v, qx, qy, qs)
-    else:
-        zdot[0], zdot[1], zdot[2] = 0.0, 0.0, 0.0
+    x, y, s, v, qx, qy, qs = sliding(law, vx, vy, omega, shape, surface, data)
+    power, per_q2 = x * qx + y * qy + s * qs, 1.0 / (qx * qx + qy * qy + qs * qs)
+    decay = v * v / xp.where(power > 0.0, power, 1.0)
+    share = (z[0] * qx + z[1] * qy + z[2] * qs) * per_q2
+    beta = closure(law, math.sqrt((z[0] * z[0] + z[1] * z[1] + z[2] * z[2]) * per_q2), share)
+    zdot[0] = _rate(beta, share, decay, z[0], x, qx)
+    zdot[1] = _rate(beta, share, decay, z[1], y, qy)
+    zdot[2] = _rate(beta, share, decay, z[2], s, qs)
     return _wrench(law, shape, z[0], z[1], z[2], zdot[0], zdot[1], zdot[2], x, y, s)
 
 
@@ -221,31 +210,30 @@ def evaluate(law, z, vx, vy, omega, shape, surface, data, zdot):
 
 
 @kernel
-def slopes(law, z, x, y, s, v, q, j, by_z, by_v):
-    """`dz'/dz` and `dz'/dV_G` [9] at the scaled twist, from `q = z_ss` and its slopes `j`. Returns `beta`."""
-    qx, qy, qs = q
+def slopes(law, z, u, v, q, j, by_z, by_v):
+    """`dz'/dz` and `dz'/dV_G` [9] at the scaled twist `u`, from `q = z_ss` and its slopes `j`. Returns `beta`."""
     zx, zy, zs = z[0], z[1], z[2]
-    beta, b_z, b_q = closure_slopes(law, zx, zy, zs, qx, qy, qs)
-    per_power = 1.0 / (x * qx + y * qy + s * qs)
-    per_q2 = 1.0 / (qx * qx + qy * qy + qs * qs)
+    per_power = 1.0 / (u[0] * q[0] + u[1] * q[1] + u[2] * q[2])
+    per_q2 = 1.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2])
     decay = v * v * per_power
-    share = (zx * qx + zy * qy + zs * qs) * per_q2
+    share = (zx * q[0] + zy * q[1] + zs * q[2]) * per_q2
+    deflection = math.sqrt((zx * zx + zy * zy + zs * zs) * per_q2)
+    per_deflection = 1.0 / deflection if deflection > 0.0 else 0.0
+    beta, by_deflection, by_share = closure_partials(law, deflection, share)
     for i in range(3):
-        z_i = zx if i == 0 else (zy if i == 1 else zs)
-        q_i = qx if i == 0 else (qy if i == 1 else qs)
-        v_i = x if i == 0 else (y if i == 1 else s)
-        m_i = v_i - decay * q_i
-        g_i = decay * z_i + share * m_i
+        m_i = u[i] - decay * q[i]
+        g_i = decay * z[i] + share * m_i
         for k in range(3):
-            q_k = qx if k == 0 else (qy if k == 1 else qs)
-            v_k = x if k == 0 else (y if k == 1 else s)
             same = 1.0 if i == k else 0.0
-            j0, j1, j2 = j[k], j[3 + k], j[6 + k]
-            by_z[3 * i + k] = -beta * (decay * same + m_i * q_k * per_q2) - g_i * b_z[k]
-            decay_k = 2.0 * v_k * per_power - decay * per_power * (q_k + x * j0 + y * j1 + s * j2)
-            share_k = (zx * j0 + zy * j1 + zs * j2 - 2.0 * share * (qx * j0 + qy * j1 + qs * j2)) * per_q2
-            beta_k = b_q[0] * j0 + b_q[1] * j1 + b_q[2] * j2
-            g_k = (z_i - share * q_i) * decay_k + m_i * share_k + share * (same - decay * j[3 * i + k])
+            beta_k = (by_deflection * per_deflection * z[k] + by_share * q[k]) * per_q2
+            by_z[3 * i + k] = -beta * (decay * same + m_i * q[k] * per_q2) - g_i * beta_k
+            z_j = zx * j[k] + zy * j[3 + k] + zs * j[6 + k]
+            q_j = (q[0] * j[k] + q[1] * j[3 + k] + q[2] * j[6 + k]) * per_q2
+            u_j = u[0] * j[k] + u[1] * j[3 + k] + u[2] * j[6 + k]
+            decay_k = (2.0 * u[k] - decay * (q[k] + u_j)) * per_power
+            share_k = z_j * per_q2 - 2.0 * share * q_j
+            beta_k = by_share * share_k - by_deflection * deflection * q_j
+            g_k = (z[i] - share * q[i]) * decay_k + m_i * share_k + share * (same - decay * j[3 * i + k])
             by_v[3 * i + k] = same - g_i * beta_k - beta * g_k
     return beta
 
@@ -253,11 +241,11 @@ def slopes(law, z, x, y, s, v, q, j, by_z, by_v):
 @kernel
 def linearise(law, z, vx, vy, omega, shape, surface, data, lin):
     """Linearise the rates into `lin` [40] (see `LINEAR`); at rest they do not depend on z and follow the twist."""
-    x, y, s = _scaled(shape, vx, vy, omega)
+    x, y, s = scaled_twist(shape, vx, vy, omega)
     v = math.sqrt(x * x + y * y + s * s)
     if v > 0.0:
         q = steady_slopes(law, shape, surface, data, x, y, s, v, lin[28:40])
-        lin[0] = slopes(law, z, x, y, s, v, q, lin[28:37], lin[1:10], lin[10:19])
+        lin[0] = slopes(law, z, (x, y, s), v, q, lin[28:37], lin[1:10], lin[10:19])
     else:
         for i in range(19):
             lin[i] = 0.0
@@ -298,7 +286,7 @@ def factor(law, shift, shape, lin, stiffness):
             lin[13] * x + lin[14] * y + lin[15] * s,
             lin[16] * x + lin[17] * y + lin[18] * s,
         )
-        stiffness[0, m], stiffness[1, m], stiffness[2, m] = _to_origin(
+        stiffness[0, m], stiffness[1, m], stiffness[2, m] = to_origin(
             shape, -pull * nx - law.sigma_2 * x, -pull * ny - law.sigma_2 * y, -pull * ns - law.sigma_2 * s
         )
 
@@ -308,7 +296,7 @@ def eliminate(law, shift, r, shape, lin):
     """Wrench about the origin caused by the residual `r` of the moments."""
     pull = law.sigma_0 + law.sigma_1 * shift
     x, y, s = _solve(lin, r[0], r[1], r[2])
-    return _to_origin(
+    return to_origin(
         shape, law.sigma_1 * r[0] - pull * x, law.sigma_1 * r[1] - pull * y, law.sigma_1 * r[2] - pull * s
     )
 
@@ -316,7 +304,7 @@ def eliminate(law, shift, r, shape, lin):
 @kernel
 def back_substitute(r, vx, vy, omega, shape, lin, out):
     """Solve `D out = r + dz'/dV_G F dV` for the change of the twist about the origin."""
-    x, y, s = _scaled(shape, vx, vy, omega)
+    x, y, s = scaled_twist(shape, vx, vy, omega)
     out[0], out[1], out[2] = _solve(
         lin,
         r[0] + lin[10] * x + lin[11] * y + lin[12] * s,
@@ -329,49 +317,75 @@ def back_substitute(r, vx, vy, omega, shape, lin, out):
 
 
 @inlined
-def step(law, z, vx, vy, omega, shape, surface, data, dt, out):
-    """Advance the moments by `dt` at a held twist and return the wrench at the end.
+def advance(law, z, held, shape, dt, out):
+    """Advance the moments by `dt` at a held twist (see `sliding`) and return the wrench at the end.
 
     With beta held the equation is linear, its matrix `lambda I + m (x) z_ss/|z_ss|^2`, and this is its exponential: of
     s with the rate `mu = lambda cos^2(V_G, z_ss)` and of the rest with lambda. Plain LuGre is exact; elasto-plastic
     moments take the mean of beta at the start and at an end predicted by an implicit Euler step, which is second order.
     """
-    x, y, s = _scaled(shape, vx, vy, omega)
-    v = math.sqrt(x * x + y * y + s * s)
+    x, y, s, v, qx, qy, qs = held
     zx, zy, zs = z[0], z[1], z[2]
-    if v == 0.0:
-        out[0], out[1], out[2] = zx, zy, zs
-        return _wrench(law, shape, zx, zy, zs, 0.0, 0.0, 0.0, x, y, s)
-    qx, qy, qs = steady(law, shape, surface, data, x, y, s, v)
     per_q2 = 1.0 / (qx * qx + qy * qy + qs * qs)
     power = x * qx + y * qy + s * qs
-    decay = v * v / power
-    slow = power * per_q2  # the rate of s
+    moves = power > 0.0
+    safe = xp.where(moves, power, 1.0)
+    decay = v * v / safe
+    slow = power * per_q2
     mx, my, ms = x - decay * qx, y - decay * qy, s - decay * qs
     share = (zx * qx + zy * qy + zs * qs) * per_q2
-    start = closure(law, zx, zy, zs, qx, qy, qs)
-    # predicted end: implicit Euler
+    size = math.sqrt((zx * zx + zy * zy + zs * zs) * per_q2)
+    start = closure(law, size, share)
     per = 1.0 / (1.0 + start * decay * dt)
     pull = dt * start * (share + slow * dt) / (1.0 + start * slow * dt)
-    px, py, ps = (zx + dt * x - pull * mx) * per, (zy + dt * y - pull * my) * per, (zs + dt * s - pull * ms) * per
-    end = closure(law, px, py, ps, qx, qy, qs)
-    beta = formulas.mean_decay(start * decay, end * decay, dt) / decay
-    left_slow, mean_slow = formulas.relaxation(xp, beta * slow * dt)
-    gap = beta * (decay - slow) * dt
-    left_gap, mean_gap = formulas.relaxation(xp, gap)
+    px, py, ps = zx + dt * x - pull * mx, zy + dt * y - pull * my, zs + dt * s - pull * ms
+    predicted = per * math.sqrt((px * px + py * py + ps * ps) * per_q2)
+    end = closure(law, predicted, (share + slow * dt) / (1.0 + start * slow * dt))
+    beta = formulas.mean_decay(start, end, decay * dt)
+    rate = beta * decay * dt
+    slow_rate = beta * slow * dt
+    left_slow, mean_slow = formulas.relaxation(xp, slow_rate)
+    left_gap, mean_gap = formulas.relaxation(xp, rate - slow_rate)
     left = left_slow * left_gap
-    total = beta * decay * dt
-    mean = (beta * slow * dt * mean_slow + gap * mean_gap * left_slow) / xp.where(total > 0.0, total, 1.0)
-    along = xp.where(total > 0.0, mean, 1.0) * decay * dt
+    mean = (slow_rate * mean_slow + (rate - slow_rate) * mean_gap * left_slow) / xp.where(rate > 0.0, rate, 1.0)
+    along = xp.where(rate > 0.0, mean, 1.0) * decay * dt
     across = (1.0 - beta * share) * dt * left_slow * mean_gap
-    nx, ny, ns = left * zx + along * qx + across * mx, left * zy + along * qy + across * my, left * zs + along * qs + across * ms
-    size = math.sqrt((zx * zx + zy * zy + zs * zs) * per_q2)
+    nx = left * zx + along * qx + across * mx
+    ny = left * zy + along * qy + across * my
+    ns = left * zs + along * qs + across * ms
     new = math.sqrt((nx * nx + ny * ny + ns * ns) * per_q2)
     back = formulas.cap(xp, new, formulas.reachable_deflection(xp, size, law.elasto_plastic))
+    back = xp.where(moves, back, 1.0)
+    share = (nx * qx + ny * qy + ns * qs) * per_q2 * back
+    beta = closure(law, new * back, share)
     nx, ny, ns = nx * back, ny * back, ns * back
-    dx, dy, ds = _rate(law, nx, ny, ns, x, y, s, v, qx, qy, qs)
     out[0], out[1], out[2] = nx, ny, ns
-    return _wrench(law, shape, nx, ny, ns, dx, dy, ds, x, y, s)
+    dx, dy = _rate(beta, share, decay, nx, x, qx), _rate(beta, share, decay, ny, y, qy)
+    return _wrench(law, shape, nx, ny, ns, dx, dy, _rate(beta, share, decay, ns, s, qs), x, y, s)
+
+
+@inlined
+def step(law, z, vx, vy, omega, shape, surface, data, dt, out):
+    """`advance` from a twist."""
+    return advance(law, z, sliding(law, vx, vy, omega, shape, surface, data), shape, dt, out)
+
+
+@jit
+def evaluate_batch(law_row, shape, surface, data, z, twist, zdot, wrench):
+    """`evaluate` for a batch: all [B, 3], the wrench per unit load."""
+    law = law_of(law_row)
+    for b in range(z.shape[0]):
+        wrench[b, 0], wrench[b, 1], wrench[b, 2] = evaluate(
+            law, z[b], twist[b, 0], twist[b, 1], twist[b, 2], shape, surface, data, zdot[b]
+        )
+
+
+@jit
+def linearise_batch(law_row, shape, surface, data, z, twist, lin):
+    """`linearise` for a batch: `z`, `twist` [B, 3], `lin` [B, LINEAR]."""
+    law = law_of(law_row)
+    for b in range(z.shape[0]):
+        linearise(law, z[b], twist[b, 0], twist[b, 1], twist[b, 2], shape, surface, data, lin[b])
 
 
 @jit
@@ -403,8 +417,18 @@ def step_one(numbers, data, z, vx, vy, omega, load, dt, result):
 
 @jit
 def step_sequence(law_row, shape, surface, data, z, twist, load, dt, wrench):
-    """`step` through the twists [T, 3] of one contact, `z` in place, wrenches into `wrench` [T, 3]."""
-    law = law_of(law_row)
-    for t in range(twist.shape[0]):
-        fx, fy, tau = step(law, z, twist[t, 0], twist[t, 1], twist[t, 2], shape, surface, data, dt, z)
+    """`step` through the twists [T, 3] of one contact, `z` in place, wrenches into `wrench` [T, 3].
+
+    The steady state of the next twist is read before this one's step, which waits for the last one's state: the
+    processor does both at once.
+    """
+    law, last = law_of(law_row), twist.shape[0] - 1
+    if last < 0:
+        return
+    held = sliding(law, twist[0, 0], twist[0, 1], twist[0, 2], shape, surface, data)
+    for t in range(last + 1):
+        n = min(t + 1, last)
+        following = sliding(law, twist[n, 0], twist[n, 1], twist[n, 2], shape, surface, data)
+        fx, fy, tau = advance(law, z, held, shape, dt, z)
         wrench[t, 0], wrench[t, 1], wrench[t, 2] = load * fx, load * fy, load * tau
+        held = following

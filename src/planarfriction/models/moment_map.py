@@ -43,10 +43,12 @@ class MomentShape(NamedTuple):
         return float(self.factor[2, 2])
 
 
-def moment_shape(patch: ContactPatch, normal_force: float | None, gamma: float, sizes: tuple[int, int, int]):
-    """`MomentShape` of a patch at a load; `sizes` as the fields of `ReducedModel`."""
+def moment_shape(
+    patch: ContactPatch, normal_force: float | None, gamma: float, segments: int, speeds: int
+) -> MomentShape:
+    """What a patch is at a load; `segments` and `speeds` as in `ReducedModel`."""
     factor = slip_factor(patch, normal_force)
-    return MomentShape(factor, moment_map(scaled_cells(patch, normal_force, factor), gamma, sizes))
+    return MomentShape(factor, moment_map(scaled_cells(patch, normal_force, factor), gamma, segments, speeds))
 
 
 def slip_factor(patch: ContactPatch, normal_force: float | None) -> np.ndarray:
@@ -67,13 +69,13 @@ def scaled_cells(patch: ContactPatch, normal_force: float | None, factor: np.nda
     return np.ascontiguousarray(np.concatenate([lengths, weights[loaded, None]], axis=1))
 
 
-def moment_map(cells: np.ndarray, gamma: float, sizes: tuple[int, int, int]) -> np.ndarray:
+def moment_map(cells: np.ndarray, gamma: float, segments: int, speeds: int) -> np.ndarray:
     """Numbers of the map of `cells` `[N, 5]`, as `kernels.moments` reads them.
 
-    `h_0`, which has the kinks, takes `sizes[0]` squares each way on a quarter of a face, and the rest
-    `r = h_1 - (1 - t) h_0` of the Stribeck part, which is smooth, `sizes[1]`, with `sizes[2]` nodes in t.
+    `h_0`, which has the kinks, takes `segments` squares each way on a quarter of a face; the rest
+    `r = h_1 - (1 - t) h_0` of the Stribeck part, which is smooth, a third of them, with `speeds` nodes in t.
     """
-    segments, coarse, speeds = sizes
+    coarse = max(segments // 3, 2)
     steady = _sums(cells, segments, np.empty(0), gamma)
     directions = cube_map.face_nodes(segments)[:3]
     unit = directions / np.linalg.norm(directions, axis=-1, keepdims=True)

@@ -10,10 +10,14 @@ from planarfriction.kernels import contacts as kernels
 from planarfriction.kernels.body import Motion
 from planarfriction.kernels.contacts import Contacts
 from planarfriction.kernels.law import law_row
-from planarfriction.models import DistributedModel
+from planarfriction.kernels.moments import LINEAR
+from planarfriction.models import DistributedModel, ReducedModel
 
 SHAPE_INTERVAL = 1e-3
 """Longest time [s] that a patch keeps its shape while the load it depends on changes; held loads need no limit."""
+
+SHAPE_NUMBERS = 7
+"""Numbers of a shape: those of the moment model, which has the most."""
 
 
 class PackedScene(NamedTuple):
@@ -45,20 +49,34 @@ class _Shapes:
         self.weight_start.append(self._size["weights"])
         self.weights.append(weights)
         self._size["weights"] += len(weights)
-        self.shape.append(np.zeros(4))
-        self.surface.append((0, 0, 0))
-        return len(self.shape) - 1
+        return self._add(np.zeros(0), (0, 0, 0))
 
     def add_reduced(self, shape) -> int:
         numbers = shape.surface.numbers
-        if id(numbers.data) not in self._stored:
-            self._stored[id(numbers.data)] = self._size["data"]
-            self.data.append(numbers.data)
-            self._size["data"] += len(numbers.data)
+        start = self._store(numbers.data)
         self.weight_start.append(0)
-        self.shape.append(shape.numbers)
-        self.surface.append((numbers.kind, self._stored[id(numbers.data)], numbers.size))
+        return self._add(shape.numbers, (numbers.kind, start, numbers.size))
+
+    def add_moments(self, shape) -> int:
+        start = self._store(shape.data)
+        other = start if shape.other is None else self._store(shape.other)
+        self.weight_start.append(0)
+        return self._add(shape.numbers, (start, other, 0))
+
+    def _add(self, numbers: np.ndarray, surface: tuple[int, int, int]) -> int:
+        row = np.zeros(SHAPE_NUMBERS)
+        row[: len(numbers)] = numbers
+        self.shape.append(row)
+        self.surface.append(surface)
         return len(self.shape) - 1
+
+    def _store(self, data: np.ndarray) -> int:
+        """Where these numbers begin; the same array is stored once."""
+        if id(data) not in self._stored:
+            self._stored[id(data)] = self._size["data"]
+            self.data.append(data)
+            self._size["data"] += len(data)
+        return self._stored[id(data)]
 
 
 def breaks_of(scene, t_end: float) -> np.ndarray:
@@ -103,20 +121,19 @@ def pack(scene, t_end: float) -> PackedScene:
             radius = float(np.hypot(*offset.T).mean())
         else:
             shapes_here = [model.shape_at(value) for value in values]
-            rows = [shapes.add_reduced(shape) for shape in shapes_here]
+            moments = isinstance(model, ReducedModel)
+            rows = [shapes.add_moments(shape) if moments else shapes.add_reduced(shape) for shape in shapes_here]
             radius = max(shape.contact_radius for shape in shapes_here)
-            sizes.append((3, 0, 27))
+            sizes.append((3, 0, LINEAR if moments else 27))
             cells.append(np.empty((0, 2)))
             loaded.append(np.empty(0, bool))
-            natural.append(scale * np.array([1.0, 1.0, radius]))
+            natural.append(scale * np.array([1.0, 1.0, 1.0 if moments else radius]))
         row[:, c] = np.array(rows)[row_of_value]
         radii.append(radius)
     offsets = np.concatenate([np.zeros((1, 3), np.int64), np.cumsum(sizes, axis=0)])
     positions = np.concatenate(cells)
     contacts = Contacts(
-        kind=np.array(
-            [kernels.DISTRIBUTED if isinstance(c.model, DistributedModel) else kernels.REDUCED for c in scene.contacts]
-        ),
+        kind=np.array([_kind(c.model) for c in scene.contacts]),
         law=np.array([law_row(c.model.law) for c in scene.contacts]),
         mount=np.array([_mount(scene, contact) for contact in scene.contacts]),
         place=np.array([[*c.position, np.cos(c.angle), np.sin(c.angle)] for c in scene.contacts], dtype=float),
@@ -154,6 +171,12 @@ def _distinct_loads(patch, held: np.ndarray) -> tuple[list[float | None], np.nda
     if len(positive) == 0:
         positive = np.array([1.0])
     return list(positive), np.minimum(np.searchsorted(positive, held), len(positive) - 1)
+
+
+def _kind(model) -> int:
+    if isinstance(model, DistributedModel):
+        return kernels.DISTRIBUTED
+    return kernels.MOMENTS if isinstance(model, ReducedModel) else kernels.REDUCED
 
 
 def _mount(scene, contact) -> int:
