@@ -2,10 +2,11 @@
 
 A direction `(x, y, s)` lies on the face of its largest component k; its place there is `a`, `b`, the next two
 components (in cyclic order) over that one. A face has `2 n + 1` nodes each way over [-1, 1]; a node holds, for each
-component, four numbers (value, its slopes by a and by b and its mixed slope, per spacing of the nodes), at one level or
-at several: the coefficients of a cubic B-spline in a third coordinate in [0, 1]. Number c of component m at level t of a
-node is at `node + (t * components + m) * 4 + c`. Odd maps, `f(-V) = -f(V)`, store three faces, others six (positive
-ones first). `planarfriction.models.cube_map` makes maps whose slopes are continuous across the edges of the cube too.
+component, four numbers (value, its slopes by a and by b and its mixed slope, per spacing of the nodes), at one level
+or at several: the coefficients of a cubic B-spline in a third coordinate in [0, 1]. Number c of component m at level t
+of a node is at `node + (t * components + m) * 4 + c`. Odd maps, `f(-V) = -f(V)`, store three faces, others six
+(positive ones first). `planarfriction.models.cube_map` makes maps whose slopes are continuous across the edges of the
+cube too.
 """
 
 from __future__ import annotations

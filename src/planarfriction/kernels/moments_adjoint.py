@@ -17,6 +17,7 @@ from planarfriction import formulas
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import inlined, jit, kernel, moments
 from planarfriction.kernels.law import law_of
+from planarfriction.kernels.steady import scaled_twist, steady_slopes
 
 _ROUNDING = 1.0 + 256.0 * 2.220446049250313e-16
 
@@ -152,9 +153,13 @@ def tangent(law, s, dt, dz, du, dq):
     d_slow_rate = dt * (d_beta * s.slow + s.beta * d_slow)
     d_rate = dt * (d_beta * s.decay + s.beta * d_decay)
     unused = 1.0 - s.beta * start.share
-    across = dt * s.left_slow * (
-        -(d_beta * start.share + s.beta * d_share) * s.mean_gap
-        + unused * (s.gap_slope * (d_rate - d_slow_rate) - s.mean_gap * d_slow_rate)
+    across = (
+        dt
+        * s.left_slow
+        * (
+            -(d_beta * start.share + s.beta * d_share) * s.mean_gap
+            + unused * (s.gap_slope * (d_rate - d_slow_rate) - s.mean_gap * d_slow_rate)
+        )
     )
     dn = _sum(s.left, dz, s.mean * s.decay * dt, dq, unused * dt * s.left_slow * s.mean_gap, dm)
     d_along = dt * (s.mean_slope * d_rate * s.decay + s.mean * d_decay)
@@ -210,10 +215,10 @@ def jacobians(law_row, shape, surface, data, z, twist, dt, out):
     """Changes of new state and scaled traction with z and V_G, for B steps, into `out` [B, 6, 6]."""
     law, j = law_of(law_row), np.empty(12)
     for b in range(z.shape[0]):
-        x, y, s = moments.scaled_twist(shape, twist[b, 0], twist[b, 1], twist[b, 2])
+        x, y, s = scaled_twist(shape, twist[b, 0], twist[b, 1], twist[b, 2])
         v = math.sqrt(x * x + y * y + s * s)
         if v > 0.0:
-            q = moments.steady_slopes(law, shape, surface, data, x, y, s, v, j)
+            q = steady_slopes(law, shape, surface, data, x, y, s, v, j)
             _jacobian(law, z[b], x, y, s, v, q, j, dt[b], out[b])
         else:
             _jacobian_at_rest(law, dt[b], out[b])

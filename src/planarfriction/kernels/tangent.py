@@ -25,6 +25,7 @@ from planarfriction.kernels import jit, kernel, moments
 from planarfriction.kernels.body import _load, _times, factor, linearise, rates, solve
 from planarfriction.kernels.law import law_of
 from planarfriction.kernels.rosenbrock import _error_norm, _forget_unloaded
+from planarfriction.kernels.steady import scaled_twist
 
 FRICTION, SIZE, MASS, INERTIA, LOAD = 0, 1, 2, 3, 4
 """Parameters; each is a factor, 1 as the scene is."""
@@ -87,7 +88,7 @@ def _reduced(law, shape, v, zdot, w, lin, dz, dv, d_friction, d_size, dzdot, dw)
 @kernel
 def _moments(law, shape, v, w, lin, z, dz, dv, d_friction, d_size, dzdot, dw):
     vx, vy, omega = dv[0], dv[1], dv[2] + d_size * v[2]
-    x, y, s = moments.scaled_twist(shape, vx, vy, omega)
+    x, y, s = scaled_twist(shape, vx, vy, omega)
     ax, ay, a_s = dz[0] - d_friction * z[0], dz[1] - d_friction * z[1], dz[2] - d_friction * z[2]
     for i in range(3):
         a, b = 1 + 3 * i, 10 + 3 * i

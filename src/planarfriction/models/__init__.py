@@ -5,4 +5,11 @@ from planarfriction.models.distributed import DistributedModel
 from planarfriction.models.reduced import ReducedModel
 from planarfriction.models.reduced_published import ReducedModelPublished
 
-__all__ = ["DistributedModel", "FrictionModel", "ModelJacobians", "ReducedModel", "ReducedModelPublished", "StepJacobians"]
+__all__ = [
+    "DistributedModel",
+    "FrictionModel",
+    "ModelJacobians",
+    "ReducedModel",
+    "ReducedModelPublished",
+    "StepJacobians",
+]

@@ -1,11 +1,12 @@
 """Maps over all directions with continuous slopes: from values on the faces of a cube to what `kernels.cube` reads.
 
-A function of the direction alone, constant along rays, is known at the nodes of the six faces, `P = +-e_k + a e_i + b e_j`
-with k, i, j in cyclic order. Within a face a cubic Hermite patch has continuous slopes by itself. Across the edge
-between two faces k and i, at `s e_k + q e_i + z e_j`, it has them if both faces share the value F and the slope F_j at
-the nodes there, and if at the nodes
+A function of the direction alone, constant along rays, is known at the nodes of the six faces, which are `P = +-e_k +
+a e_i + b e_j` with k, i, j in cyclic order. Within a face a cubic Hermite patch has continuous slopes by itself.
+Across the edge between two faces k and i, at `s e_k + q e_i + z e_j`, it has them if both faces share the value F and
+the slope F_j at the nodes there, and if at the nodes
 
-    s F_k + q F_i + z F_j = 0   (constant along rays),   s F_kj + q F_ij + F_j + z F_jj = 0   (its slope along the edge),
+    s F_k + q F_i + z F_j = 0   (constant along rays),
+    s F_kj + q F_ij + F_j + z F_jj = 0   (the same, along the edge),
 
 where F_i, F_ij are slopes of face k and F_k, F_kj of face i, and F_jj is that of a cubic spline along the edge, which
 alone has one value of it on both sides of a node. At a corner three such relations fix the three mixed slopes.

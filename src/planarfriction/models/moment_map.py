@@ -8,12 +8,12 @@ import numpy as np
 
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels.cell_sums import steady_sums
-from planarfriction.kernels.moments import HEADER
+from planarfriction.kernels.steady import HEADER
 from planarfriction.models import cube_map
 from planarfriction.patch import ContactPatch
 
 KNEE = 1.5
-"""`|V_G|/v_s` at the middle of the third coordinate of the Stribeck part: the best of 0.5..3 on the published patches."""
+"""`|V_G|/v_s` at the middle of the Stribeck part's third coordinate: the best of 0.5..3 on the published patches."""
 
 LEAST_SHARE = 0.25
 """The floor of the dissipation, over the least dissipation of all stored directions."""
@@ -25,7 +25,7 @@ class MomentShape(NamedTuple):
     factor: np.ndarray
     """F [3, 3], upper triangular: `|F V|` is the root mean square of the cells' speeds."""
     data: np.ndarray
-    """Steady sliding, as `kernels.moments` reads it."""
+    """Steady sliding, as `kernels.steady` reads it."""
     other: np.ndarray | None = None
     """Steady sliding of another shape to blend with, or None."""
     blend: float = 0.0
@@ -70,7 +70,7 @@ def scaled_cells(patch: ContactPatch, normal_force: float | None, factor: np.nda
 
 
 def moment_map(cells: np.ndarray, gamma: float, segments: int, speeds: int) -> np.ndarray:
-    """Numbers of the map of `cells` `[N, 5]`, as `kernels.moments` reads them.
+    """Numbers of the map of `cells` `[N, 5]`, as `kernels.steady` reads them.
 
     `h_0`, which has the kinks, takes `segments` squares each way on a quarter of a face; the rest
     `r = h_1 - (1 - t) h_0` of the Stribeck part, which is smooth, a third of them, with `speeds` nodes in t.

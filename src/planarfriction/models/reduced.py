@@ -111,7 +111,7 @@ class ReducedModel(FrictionModel):
         """Analytic derivatives of `step` (see `StepJacobians`); at kinks a one-sided derivative."""
         packed = self._by_load(self._step_jacobians, (13, 3), *self._inputs(state, twist, normal_force, dt=dt))
         square = [packed[..., i : i + 3, :] for i in (0, 3, 6, 9)]
-        return StepJacobians(*square, packed[..., 12, :])
+        return StepJacobians(square[0], square[1], square[2], square[3], packed[..., 12, :])
 
     # ------------------------------------------------------------------ one shape
 
@@ -163,16 +163,12 @@ class ReducedModel(FrictionModel):
 
     def _step(self, shape: MomentShape, state, twist, load, dt) -> np.ndarray:
         out, wrench = np.empty_like(state), np.empty_like(state)
-        kernels.step_batch(
-            law_row(self.law), shape.numbers, _SURFACE, shape.data, state, twist, load, dt, out, wrench
-        )
+        kernels.step_batch(law_row(self.law), shape.numbers, _SURFACE, shape.data, state, twist, load, dt, out, wrench)
         return np.concatenate([out, wrench], axis=1)
 
     def _step_jacobians(self, shape: MomentShape, state, twist, load, dt) -> np.ndarray:
         slopes = np.empty((len(load), 6, 6))
-        moments_adjoint.jacobians(
-            law_row(self.law), shape.numbers, _SURFACE, shape.data, state, twist, dt, slopes
-        )
+        moments_adjoint.jacobians(law_row(self.law), shape.numbers, _SURFACE, shape.data, state, twist, dt, slopes)
         factor, weight = shape.factor, load[:, None, None]
         loaded = np.where(weight > 0.0, 1.0, 0.0)
         new_state, new_twist = loaded * slopes[:, :3, :3], loaded * slopes[:, :3, 3:] @ factor
