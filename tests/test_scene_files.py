@@ -266,7 +266,8 @@ def test_unusual_names_survive(tmp_path):
         (
             "normal_force = 2.0",
             "normal_force = 2.0\nmodel = 'distribted'",
-            "scene.toml: [contact.model]: kind must be one of distributed, reduced_published, got 'distribted'",
+            "scene.toml: [contact.model]: kind must be one of distributed, reduced, reduced_published, "
+            "got 'distribted'",
         ),
         (
             "normal_force = 2.0",

@@ -27,6 +27,7 @@ _HOME = {
     "LimitSurfaceTablePublished": "planarfriction.limit_surface",
     "LinearGradient": "planarfriction.patch",
     "LuGre": "planarfriction.laws",
+    "ReducedModel": "planarfriction.models",
     "ReducedModelPublished": "planarfriction.models",
     "Scene": "planarfriction.scenes",
     "Signal": "planarfriction.scenes",
@@ -81,6 +82,6 @@ if TYPE_CHECKING:  # for editors and type checkers: the same names as above
         LimitSurfaceTable,
         LimitSurfaceTablePublished,
     )
-    from planarfriction.models import DistributedModel, ReducedModelPublished
+    from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
     from planarfriction.patch import ContactPatch, LinearGradient, SoftFinger, Uniform, grain
     from planarfriction.scenes import Body, Contact, Scene, Signal, Solution, load, simulate

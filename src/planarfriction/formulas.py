@@ -113,6 +113,42 @@ def cap(xp, deflection, largest):
     return xp.where(over, largest / xp.where(over, deflection, 1.0), 1.0)
 
 
+# ---------------------------------------------------------------------- moments of the bristles
+
+
+def slip_share(xp, deflection, cosine, elasto_plastic, breakaway_ratio):
+    """Closure `beta` [-] of the moment equation, from `|z|/|z_ss|` and the cosine of the angle between z and z_ss.
+
+    `alpha (1 + cos)/2` for elasto-plastic bristles, 1 for plain LuGre: that of a single bristle.
+    """
+    alpha = slip_fraction(xp, deflection, breakaway_ratio)
+    return xp.where(elasto_plastic > 0.0, 0.5 * alpha * (1.0 + cosine), 1.0)
+
+
+def slip_share_partials(xp, deflection, cosine, elasto_plastic, breakaway_ratio):
+    """`slip_share` and its partial derivatives with respect to `deflection` and `cosine`."""
+    alpha = slip_fraction(xp, deflection, breakaway_ratio)
+    slope = slip_fraction_slope(xp, deflection, breakaway_ratio)
+    half = 0.5 * (1.0 + cosine)
+    elastic = elasto_plastic > 0.0
+    return (
+        xp.where(elastic, alpha * half, 1.0),
+        xp.where(elastic, slope * half, 0.0),
+        xp.where(elastic, 0.5 * alpha, 0.0),
+    )
+
+
+def floored(xp, value, least):
+    """`value` where it is at least `2 least`, and from there smoothly to `least`: `least (1 + (value/2 least)^2)`."""
+    share = xp.maximum(value, 0.0) * (0.5 / least)
+    return xp.where(share < 1.0, least * (1.0 + share * share), value)
+
+
+def floored_slope(xp, value, least):
+    """Derivative of `floored` with respect to `value`."""
+    return xp.minimum(xp.maximum(value, 0.0) * (0.5 / least), 1.0)
+
+
 # ---------------------------------------------------------------------- derivatives of a step
 
 

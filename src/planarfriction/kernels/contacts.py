@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction.kernels import anisotropic, distributed, inlined, reduced
+from planarfriction.kernels import anisotropic, distributed, inlined, moments, reduced
 from planarfriction.kernels.law import law_of
 
-DISTRIBUTED, REDUCED, ANISOTROPIC = 0, 1, 2
+DISTRIBUTED, REDUCED, ANISOTROPIC, MOMENTS = 0, 1, 2, 3
 WORLD, BODY, BODY_AXES = 0, 1, 2
 """Fixed to the world; fixed to the body; fixed to a body whose prescribed velocity is given in its own axes."""
 
@@ -24,7 +24,7 @@ class Contacts(NamedTuple):
     """C contacts and the R shapes they take, in flat arrays."""
 
     kind: np.ndarray
-    """`DISTRIBUTED`, `REDUCED` or `ANISOTROPIC` (distributed), int [C]."""
+    """`DISTRIBUTED`, `REDUCED`, `ANISOTROPIC` (distributed) or `MOMENTS`, int [C]."""
     law: np.ndarray
     """Numbers of the law, [C, 9]."""
     mount: np.ndarray
@@ -46,11 +46,13 @@ class Contacts(NamedTuple):
     weight_start: np.ndarray
     """Where the weights of each shape begin, int [R]."""
     shape: np.ndarray
-    """Reduced contacts: centre of pressure, r, <rho^2> and root of the metric (xx, xy, yy) of each shape, [R, 7]."""
+    """Numbers of each shape, [R, 7]: as `kernels.moments` reads them, or as `kernels.reduced` (4) with the root of
+    the metric (xx, xy, yy)."""
     surface: np.ndarray
-    """Reduced contacts: limit surface (kind, start, size) of each shape; anisotropic: (0, start, n), int [R, 3]."""
+    """Of each shape, int [R, 3]: limit surface (kind, start, size), maps of `kernels.moments` (start, other), or the
+    anisotropic cells (0, start, n)."""
     data: np.ndarray
-    """Numbers of the limit surfaces, and of the anisotropic cells (see `kernels.anisotropic`), flat."""
+    """Numbers of the limit surfaces and maps, and of the anisotropic cells (see `kernels.anisotropic`), flat."""
 
 
 @inlined
@@ -99,6 +101,10 @@ def evaluate(contacts, c, row, z, v, zdot, w):
     elif contacts.kind[c] == ANISOTROPIC:
         cells, weights = _anisotropic_cells(contacts, c, row)
         w[0], w[1], w[2] = anisotropic.evaluate(law, z, v[0], v[1], v[2], cells, weights, zdot)
+    elif contacts.kind[c] == MOMENTS:
+        w[0], w[1], w[2] = moments.evaluate(
+            law, z, v[0], v[1], v[2], contacts.shape[row], contacts.surface[row], contacts.data, zdot
+        )
     else:
         shape = contacts.shape[row]
         vx, vy = _through_root(shape, v[0], v[1])
@@ -117,6 +123,8 @@ def linearise(contacts, c, row, z, v, lin):
         cells, weights = _anisotropic_cells(contacts, c, row)
         rows = lin.reshape(anisotropic.LINEAR_NUMBERS, weights.shape[0])
         anisotropic.linearise(law, z, v[0], v[1], v[2], cells, rows)
+    elif contacts.kind[c] == MOMENTS:
+        moments.linearise(law, z, v[0], v[1], v[2], contacts.shape[row], contacts.surface[row], contacts.data, lin)
     else:
         shape = contacts.shape[row]
         vx, vy = _through_root(shape, v[0], v[1])
@@ -134,6 +142,8 @@ def factor(contacts, c, row, z, shift, lin, stiffness):
         cells, weights = _anisotropic_cells(contacts, c, row)
         rows = lin.reshape(anisotropic.LINEAR_NUMBERS, weights.shape[0])
         anisotropic.factor(law, shift, cells, weights, rows, stiffness)
+    elif contacts.kind[c] == MOMENTS:
+        moments.factor(law, shift, contacts.shape[row], lin, stiffness)
     else:
         shape = contacts.shape[row]
         reduced.factor(law, shift, shape, lin, stiffness)
@@ -154,6 +164,8 @@ def eliminate(contacts, c, row, z, shift, r, lin, w):
         cells, weights = _anisotropic_cells(contacts, c, row)
         rows = lin.reshape(anisotropic.LINEAR_NUMBERS, weights.shape[0])
         w[0], w[1], w[2] = anisotropic.eliminate(law, shift, r, cells, weights, rows)
+    elif contacts.kind[c] == MOMENTS:
+        w[0], w[1], w[2] = moments.eliminate(law, shift, r, contacts.shape[row], lin)
     else:
         shape = contacts.shape[row]
         fx, fy, w[2] = reduced.eliminate(law, shift, r, shape, lin)
@@ -170,6 +182,8 @@ def back_substitute(contacts, c, row, z, r, v, lin, out):
         cells, weights = _anisotropic_cells(contacts, c, row)
         rows = lin.reshape(anisotropic.LINEAR_NUMBERS, weights.shape[0])
         anisotropic.back_substitute(r, v[0], v[1], v[2], cells, rows, out)
+    elif contacts.kind[c] == MOMENTS:
+        moments.back_substitute(r, v[0], v[1], v[2], contacts.shape[row], lin, out)
     else:
         shape = contacts.shape[row]
         vx, vy = _through_root(shape, v[0], v[1])

@@ -21,10 +21,11 @@ import numpy as np
 
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import contacts as ct
-from planarfriction.kernels import jit, kernel
+from planarfriction.kernels import jit, kernel, moments
 from planarfriction.kernels.body import _load, _times, factor, linearise, rates, solve
 from planarfriction.kernels.law import law_of
 from planarfriction.kernels.rosenbrock import _error_norm, _forget_unloaded
+from planarfriction.kernels.steady import scaled_twist
 
 FRICTION, SIZE, MASS, INERTIA, LOAD = 0, 1, 2, 3, 4
 """Parameters; each is a factor, 1 as the scene is."""
@@ -85,6 +86,21 @@ def _reduced(law, shape, v, zdot, w, lin, dz, dv, d_friction, d_size, dzdot, dw)
 
 
 @kernel
+def _moments(law, shape, v, w, lin, z, dz, dv, d_friction, d_size, dzdot, dw):
+    vx, vy, omega = dv[0], dv[1], dv[2] + d_size * v[2]
+    x, y, s = scaled_twist(shape, vx, vy, omega)
+    ax, ay, a_s = dz[0] - d_friction * z[0], dz[1] - d_friction * z[1], dz[2] - d_friction * z[2]
+    for i in range(3):
+        a, b = 1 + 3 * i, 10 + 3 * i
+        dzdot[i] = lin[a] * ax + lin[a + 1] * ay + lin[a + 2] * a_s + lin[b] * x + lin[b + 1] * y + lin[b + 2] * s
+    gx = -(law.sigma_0 * dz[0] + law.sigma_1 * dzdot[0] + law.sigma_2 * x)
+    gy = -(law.sigma_0 * dz[1] + law.sigma_1 * dzdot[1] + law.sigma_2 * y)
+    gs = -(law.sigma_0 * dz[2] + law.sigma_1 * dzdot[2] + law.sigma_2 * s)
+    dw[0], dw[1], tau = moments.to_origin(shape, gx, gy, gs)
+    dw[2] = tau + d_size * w[2]
+
+
+@kernel
 def _change(contacts, motion, piece, c, y, dy, dz, dv, parameter, dzdot, dw, work):
     """Change of the bristle rates and of the wrench per unit load of contact c with bristles, twist and parameter.
 
@@ -99,6 +115,11 @@ def _change(contacts, motion, piece, c, y, dy, dz, dv, parameter, dzdot, dw, wor
         _distributed(
             law, y[first:last], work.twist, work.wrench[c], x, y_cells, weights, lin.reshape(7, x.shape[0]),
             dz[first:last], dv, d_friction, d_size, dzdot[first:last], dw,
+        )  # fmt: skip
+    elif contacts.kind[c] == ct.MOMENTS:
+        _moments(
+            law, contacts.shape[row], work.twist, work.wrench[c], lin, y[first:last], dz[first:last], dv,
+            d_friction, d_size, dzdot[first:last], dw,
         )  # fmt: skip
     else:
         _reduced(

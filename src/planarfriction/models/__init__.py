@@ -2,6 +2,14 @@
 
 from planarfriction.models.base import FrictionModel, ModelJacobians, StepJacobians
 from planarfriction.models.distributed import DistributedModel
+from planarfriction.models.reduced import ReducedModel
 from planarfriction.models.reduced_published import ReducedModelPublished
 
-__all__ = ["DistributedModel", "FrictionModel", "ModelJacobians", "ReducedModelPublished", "StepJacobians"]
+__all__ = [
+    "DistributedModel",
+    "FrictionModel",
+    "ModelJacobians",
+    "ReducedModel",
+    "ReducedModelPublished",
+    "StepJacobians",
+]

@@ -11,8 +11,14 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.scenes.reading import Section
 
-MODELS = {"distributed": "DistributedModel", "reduced_published": "ReducedModelPublished"}
+MODELS = {
+    "distributed": "DistributedModel",
+    "reduced": "ReducedModel",
+    "reduced_published": "ReducedModelPublished",
+}
 """Name in scene files -> class in `planarfriction.models`."""
+
+_MAP_SIZES = ("segments", "speeds")
 
 SURFACES = {
     "table_published": "LimitSurfaceTablePublished",
@@ -33,7 +39,9 @@ def model_to_dict(model: Any) -> dict[str, Any]:
     """`{"model": ..., "patch": ..., "law": ...}` of a model, as numbers, texts, lists and tables."""
     kind = _name_of(model, MODELS, "planarfriction.models", "model")
     table: dict[str, Any] = {"kind": kind}
-    if kind != "distributed":
+    if kind == "reduced":
+        table |= {name: getattr(model, name) for name in _MAP_SIZES}
+    if kind == "reduced_published":
         table |= {"surface": _surface_to_dict(model), "on_load_change": model.on_load_change}
     return {"model": table, "patch": model.patch.to_dict(), "law": law_to_dict(model.law)}
 
@@ -41,8 +49,9 @@ def model_to_dict(model: Any) -> dict[str, Any]:
 def model_from_dict(contact: Section) -> Any:
     """Model of the table of a contact: `patch` and `law` are tables, `model` is a name or a table.
 
-    The table of a model holds `kind`, and for "reduced_published" also `on_load_change` and `surface`: a name, or a
-    table with `kind`, `segments` (tables), `normal_force` and `patch` (where they are not those of the model).
+    The table of a model holds `kind`, for "reduced" also `segments` and `speeds`, and for "reduced_published" also
+    `on_load_change` and `surface`: a name, or a table with `kind`, `segments` (tables), `normal_force` and `patch`
+    (where they are not those of the model).
     """
     patch = patch_from_dict(contact.section("patch"))
     law = law_from_dict(contact.section("law"))
@@ -54,6 +63,10 @@ def model_from_dict(contact: Section) -> Any:
         table.only(["kind"])
         with table.located():
             return make(patch, law)
+    if kind == "reduced":
+        table.only(["kind", *_MAP_SIZES])
+        with table.located():
+            return make(patch, law, **{name: table.get(name) for name in _MAP_SIZES if name in table})
     table.only(["kind", "surface", "on_load_change"])
     options = {key: table.get(key) for key in ("on_load_change",) if key in table}
     if "surface" in table:

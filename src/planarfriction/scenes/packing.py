@@ -11,10 +11,14 @@ from planarfriction.kernels import contacts as kernels
 from planarfriction.kernels.body import Motion
 from planarfriction.kernels.contacts import Contacts
 from planarfriction.kernels.law import law_row
-from planarfriction.models import DistributedModel
+from planarfriction.kernels.moments import LINEAR
+from planarfriction.models import DistributedModel, ReducedModel
 
 SHAPE_INTERVAL = 1e-3
 """Longest time [s] that a patch keeps its shape while the load it depends on changes; held loads need no limit."""
+
+SHAPE_NUMBERS = 7
+"""Numbers of a shape: those of the moment model, which has the most."""
 
 
 class PackedScene(NamedTuple):
@@ -47,15 +51,27 @@ class _Shapes:
         self.weight_start.append(self._size["weights"])
         self.weights.append(weights)
         self._size["weights"] += len(weights)
-        self.shape.append(np.zeros(7))
-        self.surface.append((0, 0 if cells is None else self._start_of(cells), len(weights)))
-        return len(self.shape) - 1
+        start = 0 if cells is None else self._start_of(cells)
+        return self._add(np.zeros(0), (0, start, len(weights)))
 
     def add_reduced(self, shape) -> int:
         numbers, root = shape.surface.numbers, shape.root
+        start = self._start_of(numbers.data)
         self.weight_start.append(0)
-        self.shape.append(np.array([*shape.numbers, root[0, 0], root[0, 1], root[1, 1]]))
-        self.surface.append((numbers.kind, self._start_of(numbers.data), numbers.size))
+        metric = (root[0, 0], root[0, 1], root[1, 1])
+        return self._add(np.array([*shape.numbers, *metric]), (numbers.kind, start, numbers.size))
+
+    def add_moments(self, shape) -> int:
+        start = self._start_of(shape.data)
+        other = start if shape.other is None else self._start_of(shape.other)
+        self.weight_start.append(0)
+        return self._add(shape.numbers, (start, other, 0))
+
+    def _add(self, numbers: np.ndarray, surface: tuple[int, int, int]) -> int:
+        row = np.zeros(SHAPE_NUMBERS)
+        row[: len(numbers)] = numbers
+        self.shape.append(row)
+        self.surface.append(surface)
         return len(self.shape) - 1
 
     def _start_of(self, data: np.ndarray) -> int:
@@ -110,12 +126,13 @@ def pack(scene, t_end: float) -> PackedScene:
             radius = float(np.hypot(*offset.T).mean())
         else:
             shapes_here = [model.shape_at(value) for value in values]
-            rows = [shapes.add_reduced(shape) for shape in shapes_here]
+            moments = isinstance(model, ReducedModel)
+            rows = [shapes.add_moments(shape) if moments else shapes.add_reduced(shape) for shape in shapes_here]
             radius = max(shape.contact_radius for shape in shapes_here)
-            sizes.append((3, 0, 27))
+            sizes.append((3, 0, LINEAR if moments else 27))
             cells.append(np.empty((0, 2)))
             loaded.append(np.empty(0, bool))
-            natural.append(scale * np.array([1.0, 1.0, radius]))
+            natural.append(scale * np.array([1.0, 1.0, 1.0 if moments else radius]))
         row[:, c] = np.array(rows)[row_of_value]
         radii.append(radius)
     offsets = np.concatenate([np.zeros((1, 3), np.int64), np.cumsum(sizes, axis=0)])
@@ -162,6 +179,8 @@ def _distinct_loads(patch, held: np.ndarray) -> tuple[list[float | None], np.nda
 
 
 def _kind(model) -> int:
+    if isinstance(model, ReducedModel):
+        return kernels.MOMENTS
     if not isinstance(model, DistributedModel):
         return kernels.REDUCED
     return kernels.ANISOTROPIC if model.patch.anisotropic else kernels.DISTRIBUTED

@@ -1,0 +1,136 @@
+"""Steady sliding summed over the cells of a patch, for many directions of the twist at once.
+
+A cell is a rectangle (or a segment, or a point) of uniform pressure. One near the centre of rotation, where the sliding
+direction turns within it, is halved both ways until its parts are far from it or `DEPTH` times halved; every part is
+then a 2 x 2 Gauss rule.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from planarfriction.kernels import compiled_math as xp
+from planarfriction.kernels import inlined, jit, kernel
+
+DEPTH = 6
+"""How often a cell at the centre of rotation is halved: its last parts hold 1/4096 of its load (of a segment 1/64)."""
+
+NEAR = 1.5
+"""Distance from the centre of rotation in widths below which a cell is cut; the Gauss rule errs by 1e-4 of it there."""
+
+_BLOCK = 512
+_GAUSS = 0.5 / math.sqrt(3.0)
+_GONE = 40.0
+"""`exp(-40)` is nothing beside 1."""
+
+
+@kernel
+def _flush(count, points, ux, uy, power, exponents, gamma, out):
+    """Add `count` points (rows of `points`: x, y, weight) that slide at `u` to the sums of a direction."""
+    x, y, w = points[0], points[1], points[2]
+    ox, oy, o_s, least = 0.0, 0.0, 0.0, 1e300
+    for i in range(count):
+        square = ux[i] * ux[i] + uy[i] * uy[i]
+        scale = w[i] / math.sqrt(square) if square > 0.0 else 0.0
+        fx, fy = scale * ux[i], scale * uy[i]
+        ux[i], uy[i] = fx, fy
+        ox += fx
+        oy += fy
+        o_s += x[i] * fy - y[i] * fx
+        power[i] = square
+        least = min(least, square)
+    out[0, 0] += ox
+    out[0, 1] += oy
+    out[0, 2] += o_s
+    if gamma != 2.0:
+        least = least ** (0.5 * gamma)
+        for i in range(count):
+            power[i] = xp.power(power[i], 0.5 * gamma)
+    for k in range(exponents.shape[0]):
+        if least * exponents[k] > _GONE:
+            break
+        ox, oy, o_s = 0.0, 0.0, 0.0
+        for i in range(count):
+            e = xp.exp(-power[i] * exponents[k])
+            fx, fy = e * ux[i], e * uy[i]
+            ox += fx
+            oy += fy
+            o_s += x[i] * fy - y[i] * fx
+        out[k + 1, 0] += ox
+        out[k + 1, 1] += oy
+        out[k + 1, 2] += o_s
+
+
+@inlined
+def _push(count, points, ux, uy, x, y, w, vx, vy, spin):
+    points[0, count], points[1, count], points[2, count] = x, y, w
+    ux[count], uy[count] = vx - spin * y, vy + spin * x
+    return count + 1
+
+
+@inlined
+def _cut(stack, top, x, y, width, height, weight, level):
+    """Replace a cell by its halves: four of a rectangle, two of a segment."""
+    parts = 4 if width > 0.0 and height > 0.0 else 2
+    for p in range(parts):
+        right = 0.25 if p & 1 else -0.25
+        up = (0.25 if p & 2 else -0.25) if parts == 4 else right
+        stack[top, 0], stack[top, 1] = x + right * width, y + up * height
+        stack[top, 2], stack[top, 3] = 0.5 * width, 0.5 * height
+        stack[top, 4], stack[top, 5] = weight / parts, level + 1.0
+        top += 1
+    return top
+
+
+@kernel
+def _sum(vx, vy, spin, cells, exponents, gamma, stack, points, ux, uy, power, out):
+    count = 0
+    for c in range(cells.shape[0]):
+        for i in range(5):
+            stack[0, i] = cells[c, i]
+        stack[0, 5] = 0.0
+        top = 1
+        while top > 0:
+            top -= 1
+            x, y, width, height = stack[top, 0], stack[top, 1], stack[top, 2], stack[top, 3]
+            weight, level = stack[top, 4], stack[top, 5]
+            reach = NEAR * spin * max(width, height)
+            sx, sy = vx - spin * y, vy + spin * x
+            if sx * sx + sy * sy < reach * reach and level < DEPTH:
+                top = _cut(stack, top, x, y, width, height, weight, level)
+                continue
+            if count + 4 > _BLOCK:
+                _flush(count, points, ux, uy, power, exponents, gamma, out)
+                count = 0
+            gx, gy = _GAUSS * width, _GAUSS * height
+            if width > 0.0 and height > 0.0:
+                w = 0.25 * weight
+                count = _push(count, points, ux, uy, x - gx, y - gy, w, vx, vy, spin)
+                count = _push(count, points, ux, uy, x + gx, y - gy, w, vx, vy, spin)
+                count = _push(count, points, ux, uy, x - gx, y + gy, w, vx, vy, spin)
+                count = _push(count, points, ux, uy, x + gx, y + gy, w, vx, vy, spin)
+            elif width > 0.0 or height > 0.0:
+                count = _push(count, points, ux, uy, x - gx, y - gy, 0.5 * weight, vx, vy, spin)
+                count = _push(count, points, ux, uy, x + gx, y + gy, 0.5 * weight, vx, vy, spin)
+            else:
+                count = _push(count, points, ux, uy, x, y, weight, vx, vy, spin)
+    _flush(count, points, ux, uy, power, exponents, gamma, out)
+
+
+@jit
+def steady_sums(directions, cells, exponents, gamma, out):
+    """`sum w e u/|u|` and its moment of M scaled twists into `out` [M, 1 + E, 3].
+
+    `directions` [M, 3] need not be unit vectors; `cells` [N, 5]: x, y, width, height over the radius of gyration, and
+    the weight. `e` is 1 in row 0 and `exp(-exponents[k] |u|^gamma)` of the unit direction in row 1 + k; `exponents`
+    [E] ascend.
+    """
+    stack, points = np.empty((4 * DEPTH + 4, 6)), np.empty((3, _BLOCK))
+    ux, uy, power = np.empty(_BLOCK), np.empty(_BLOCK), np.empty(_BLOCK)
+    for m in range(directions.shape[0]):
+        d = directions[m]
+        per = 1.0 / math.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
+        out[m] = 0.0
+        _sum(d[0] * per, d[1] * per, d[2] * per, cells, exponents, gamma, stack, points, ux, uy, power, out[m])

@@ -1,0 +1,224 @@
+"""The step of the moment model, differentiated.
+
+`moments.advance` is a function of the state z, the scaled twist u and its steady state q. `linearise` walks through it
+and keeps the partial derivatives; `tangent` takes a direction `(z', u', q')` through them, and nine of them make the
+Jacobian, whose transpose takes cotangents back. At the kinks: a state that the cap just touches counts as not capped
+(steady sliding sits on it to the last bit); at rest the step is that of a vanishing twist, `z + u dt`.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from planarfriction import formulas
+from planarfriction.kernels import compiled_math as xp
+from planarfriction.kernels import inlined, jit, kernel, moments
+from planarfriction.kernels.law import law_of
+from planarfriction.kernels.steady import scaled_twist, steady_slopes
+
+_ROUNDING = 1.0 + 256.0 * 2.220446049250313e-16
+
+
+class Stage(NamedTuple):
+    """A state z relative to `q = z_ss`, and the closure there."""
+
+    z: tuple
+    deflection: float
+    share: float
+    beta: float
+    by_deflection: float
+    by_share: float
+
+
+class Step(NamedTuple):
+    """A step with its partial derivatives; names as in `moments.advance`."""
+
+    u: tuple
+    q: tuple
+    m: tuple
+    per_q2: float
+    per_power: float
+    decay: float
+    slow: float
+    start: Stage
+    per_slow: float
+    """1/(1 + beta mu dt) of the predicted share."""
+    per: float
+    """1/(1 + beta lambda dt) of the predicted state."""
+    predicted: Stage
+    """Its z before the factor `per`."""
+    beta: float
+    by_start: float
+    by_end: float
+    by_decay: float
+    """d beta/d (lambda dt)"""
+    left_slow: float
+    left: float
+    mean_gap: float
+    gap_slope: float
+    mean: float
+    mean_slope: float
+    end: Stage
+    free: tuple
+    """New state before the cap."""
+    size: float
+    """Its deflection."""
+    back: float
+    capped: bool
+    grown: bool
+
+
+@inlined
+def _dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@inlined
+def _sum(a, x, b, y, c, z):
+    return a * x[0] + b * y[0] + c * z[0], a * x[1] + b * y[1] + c * z[1], a * x[2] + b * y[2] + c * z[2]
+
+
+@inlined
+def _stage(law, z, q, per_q2, factor, share):
+    deflection = factor * math.sqrt(_dot(z, z) * per_q2)
+    return Stage(z, deflection, share, *moments.closure_partials(law, deflection, share))
+
+
+@kernel
+def linearise(law, z, u, v, q, dt):
+    """`Step` from z at the scaled twist u, which moves at `v > 0` and has the steady state q."""
+    per_q2, power = 1.0 / _dot(q, q), _dot(u, q)
+    decay, slow = v * v / power, power * per_q2
+    m = _sum(1.0, u, -decay, q, 0.0, q)
+    start = _stage(law, z, q, per_q2, 1.0, _dot(z, q) * per_q2)
+    per_slow, per = 1.0 / (1.0 + start.beta * slow * dt), 1.0 / (1.0 + start.beta * decay * dt)
+    share = (start.share + slow * dt) * per_slow
+    predicted = _stage(law, _sum(1.0, z, dt, u, -dt * start.beta * share, m), q, per_q2, per, share)
+    beta = formulas.mean_decay(start.beta, predicted.beta, decay * dt)
+    by_start, by_end = formulas.mean_decay_partials(start.beta, predicted.beta, decay * dt)
+    half = 0.5 * (start.beta + predicted.beta)
+    x = half * decay * dt
+    part = 1.0 / (2.0 + x + x * x)
+    by_decay = -(start.beta - predicted.beta) * part * part * (1.0 + 2.0 * x) * half
+    slow_rate, gap, rate = beta * slow * dt, beta * (decay - slow) * dt, beta * decay * dt
+    left_slow, _ = formulas.relaxation(xp, slow_rate)
+    left_gap, mean_gap = formulas.relaxation(xp, gap)
+    left, mean = formulas.relaxation(xp, rate)
+    across = (1.0 - beta * start.share) * dt * left_slow * mean_gap
+    free = _sum(left, z, mean * decay * dt, q, across, m)
+    size = math.sqrt(_dot(free, free) * per_q2)
+    largest = formulas.reachable_deflection(xp, start.deflection, law.elasto_plastic)
+    capped = size > largest * _ROUNDING
+    back = formulas.cap(xp, size, largest)
+    new = _sum(back, free, 0.0, q, 0.0, q)
+    return Step(
+        u, q, m, per_q2, 1.0 / power, decay, slow, start, per_slow, per, predicted, beta, by_start, by_end, by_decay,
+        left_slow, left, mean_gap, formulas.relaxation_slope(xp, gap, left_gap, mean_gap),
+        mean, formulas.relaxation_slope(xp, rate, left, mean),
+        _stage(law, new, q, per_q2, 1.0, _dot(new, q) * per_q2), free, size, back, capped, start.deflection > 1.0,
+    )  # fmt: skip
+
+
+@inlined
+def _relative(stage, factor, per_q2, q, dz, q_dq):
+    """Changes of the deflection and of `z . q/|q|^2` but for its part `z . dq`."""
+    per = factor * factor * per_q2 / stage.deflection if stage.deflection > 0.0 else 0.0
+    return per * _dot(stage.z, dz) - stage.deflection * q_dq, _dot(q, dz) * per_q2 - 2.0 * stage.share * q_dq
+
+
+@kernel
+def tangent(law, s, dt, dz, du, dq):
+    """Changes of the new state and of the scaled traction (per unit load) with those of z, u and q."""
+    q_dq = _dot(s.q, dq) * s.per_q2
+    power = _dot(du, s.q) + _dot(s.u, dq)
+    d_decay = (2.0 * _dot(s.u, du) - s.decay * power) * s.per_power
+    d_slow = power * s.per_q2 - 2.0 * s.slow * q_dq
+    dm = _sum(1.0, du, -d_decay, s.q, -s.decay, dq)
+    start, predicted = s.start, s.predicted
+    d_size, d_share = _relative(start, 1.0, s.per_q2, s.q, dz, q_dq)
+    d_share += _dot(start.z, dq) * s.per_q2
+    d_start = start.by_deflection * d_size + start.by_share * d_share
+    # predicted end
+    ahead = (d_share + d_slow * dt - predicted.share * dt * (d_start * s.slow + start.beta * d_slow)) * s.per_slow
+    dp = _sum(1.0, dz, dt, du, -dt * start.beta * predicted.share, dm)
+    dp = _sum(1.0, dp, -dt * (d_start * predicted.share + start.beta * ahead), s.m, 0.0, dq)
+    d_predicted, _ = _relative(predicted, s.per, s.per_q2, s.q, dp, q_dq)
+    d_predicted -= predicted.deflection * s.per * dt * (d_start * s.decay + start.beta * d_decay)
+    d_end = predicted.by_deflection * d_predicted + predicted.by_share * ahead
+    d_beta = s.by_start * d_start + s.by_end * d_end + s.by_decay * d_decay * dt
+    # the exponential
+    d_slow_rate = dt * (d_beta * s.slow + s.beta * d_slow)
+    d_rate = dt * (d_beta * s.decay + s.beta * d_decay)
+    unused = 1.0 - s.beta * start.share
+    across = (
+        dt
+        * s.left_slow
+        * (
+            -(d_beta * start.share + s.beta * d_share) * s.mean_gap
+            + unused * (s.gap_slope * (d_rate - d_slow_rate) - s.mean_gap * d_slow_rate)
+        )
+    )
+    dn = _sum(s.left, dz, s.mean * s.decay * dt, dq, unused * dt * s.left_slow * s.mean_gap, dm)
+    d_along = dt * (s.mean_slope * d_rate * s.decay + s.mean * d_decay)
+    dn = _sum(1.0, dn, d_along, s.q, across, s.m)
+    dn = _sum(1.0, dn, -s.left * d_rate, start.z, 0.0, dq)
+    if s.capped:
+        per = s.per_q2 / s.size
+        grow = per * _dot(s.free, dn) - s.size * q_dq
+        d_back = ((d_size if s.grown else 0.0) - s.back * grow) / s.size
+        dn = _sum(s.back, dn, d_back, s.free, 0.0, dq)
+    end = s.end
+    d_final, d_share = _relative(end, 1.0, s.per_q2, s.q, dn, q_dq)
+    d_share += _dot(end.z, dq) * s.per_q2
+    d_beta = end.by_deflection * d_final + end.by_share * d_share
+    held = _sum(s.decay, end.z, end.share, s.m, 0.0, dq)
+    d_held = _sum(s.decay, dn, d_decay, end.z, end.share, dm)
+    d_held = _sum(1.0, d_held, d_share, s.m, 0.0, dq)
+    rate = _sum(1.0, du, -d_beta, held, -end.beta, d_held)
+    return dn, _sum(-law.sigma_0, dn, -law.sigma_1, rate, -law.sigma_2, du)
+
+
+@inlined
+def _unit(i):
+    return (1.0 if i == 0 else 0.0), (1.0 if i == 1 else 0.0), (1.0 if i == 2 else 0.0)
+
+
+@kernel
+def _jacobian(law, z, x, y, s, v, q, j, dt, out):
+    """Changes of the new state (rows 0..2) and the scaled traction (3..5) with z (columns 0..2) and V_G (3..5)."""
+    zero = (0.0, 0.0, 0.0)
+    held = linearise(law, (z[0], z[1], z[2]), (x, y, s), v, q, dt)
+    for i in range(3):
+        new, pull = tangent(law, held, dt, _unit(i), zero, zero)
+        for k in range(3):
+            out[k, i], out[3 + k, i] = new[k], pull[k]
+        new, pull = tangent(law, held, dt, zero, _unit(i), (j[i], j[3 + i], j[6 + i]))
+        for k in range(3):
+            out[k, 3 + i], out[3 + k, 3 + i] = new[k], pull[k]
+
+
+@kernel
+def _jacobian_at_rest(law, dt, out):
+    for i in range(6):
+        for k in range(6):
+            out[i, k] = 0.0
+    for i in range(3):
+        out[i, i], out[i, 3 + i] = 1.0, dt
+        out[3 + i, i], out[3 + i, 3 + i] = -law.sigma_0, -(law.sigma_0 * dt + law.sigma_1 + law.sigma_2)
+
+
+@jit
+def jacobians(law_row, shape, surface, data, z, twist, dt, out):
+    """Changes of new state and scaled traction with z and V_G, for B steps, into `out` [B, 6, 6]."""
+    law, j = law_of(law_row), np.empty(12)
+    for b in range(z.shape[0]):
+        x, y, s = scaled_twist(shape, twist[b, 0], twist[b, 1], twist[b, 2])
+        v = math.sqrt(x * x + y * y + s * s)
+        if v > 0.0:
+            q = steady_slopes(law, shape, surface, data, x, y, s, v, j)
+            _jacobian(law, z[b], x, y, s, v, q, j, dt[b], out[b])
+        else:
+            _jacobian_at_rest(law, dt[b], out[b])

@@ -1,0 +1,143 @@
+"""Steady sliding of a patch from a stored map, in scaled coordinates `V_G = F V` (see `kernels.moments`).
+
+A map is eight numbers (faces, n, n of the Stribeck part, its levels, knee, least dissipation, 0, 0), then two maps of
+`kernels.cube`: `h_0`, steady sliding at `g = 1`, and the rest r of that at `g = e = exp(-|v/v_s|^gamma)`,
+
+    sigma_0 z_ss = (mu_s - (mu_s - mu_c) t) h_0 + (mu_s - mu_c) r(t),   t = |V_G| / (|V_G| + knee v_s)
+"""
+
+from __future__ import annotations
+
+import math
+
+from planarfriction import formulas
+from planarfriction.kernels import compiled_math as xp
+from planarfriction.kernels import cube, inlined, kernel
+
+HEADER = 8
+"""Numbers in front of a map."""
+
+
+@inlined
+def scaled_twist(shape, vx, vy, omega):
+    """`V_G = F V`."""
+    return shape[0] * vx + shape[1] * vy + shape[2] * omega, shape[3] * vy + shape[4] * omega, shape[5] * omega
+
+
+@kernel
+def _sliding(law, data, start, x, y, s, v):
+    """`sigma_0 z_ss` of one map, and its least dissipation."""
+    n, m, count, knee = int(data[start + 1]), int(data[start + 2]), int(data[start + 3]), data[start + 4]
+    faces = int(data[start])
+    spot = cube.locate(x, y, s, faces)
+    t = v / (v + knee * law.v_s)
+    drop = law.mu_s - law.mu_c
+    outer = (law.mu_s - drop * t) * spot.sign
+    inner = drop * spot.sign
+    first = start + HEADER
+    second = first + faces * (2 * n + 1) * (2 * n + 1) * 12
+    p, q = cube.square(spot, n), cube.square(spot, m)
+    level, w = cube.levels(t, count)
+    return (
+        outer * cube.read(data, first, n, 3, 0, p) + inner * cube.read_level(data, second, m, 3, count, 0, q, level, w),
+        outer * cube.read(data, first, n, 3, 1, p) + inner * cube.read_level(data, second, m, 3, count, 1, q, level, w),
+        outer * cube.read(data, first, n, 3, 2, p) + inner * cube.read_level(data, second, m, 3, count, 2, q, level, w),
+        data[start + 5],
+    )
+
+
+@inlined
+def steady(law, shape, surface, data, x, y, s, v):
+    """`z_ss` [m] at the scaled twist, which moves at `v > 0`; its dissipation is never below the least."""
+    qx, qy, qs, least = _sliding(law, data, surface[0], x, y, s, v)
+    if shape[6] > 0.0:
+        ox, oy, o_s, other = _sliding(law, data, surface[1], x, y, s, v)
+        qx, qy, qs = qx + shape[6] * (ox - qx), qy + shape[6] * (oy - qy), qs + shape[6] * (o_s - qs)
+        least += shape[6] * (other - least)
+    per_v = 1.0 / v
+    power = (qx * x + qy * y + qs * s) * per_v
+    raised = (formulas.floored(xp, power, law.mu_c * least) - power) * per_v
+    per = 1.0 / law.sigma_0
+    return (qx + raised * x) * per, (qy + raised * y) * per, (qs + raised * s) * per
+
+
+@kernel
+def _sliding_slopes(law, data, start, x, y, s, v, share, j):
+    """Add `share` of the slopes of `_sliding` by the scaled twist to `j` [9], row by row; `j[9:12]` is scratch."""
+    n, m, count, knee = int(data[start + 1]), int(data[start + 2]), int(data[start + 3]), data[start + 4]
+    faces = int(data[start])
+    spot = cube.locate(x, y, s, faces)
+    per = 1.0 / (v + knee * law.v_s)
+    t = v * per
+    by_v = knee * law.v_s * per * per / v  # dt/dV_G = by_v V_G
+    drop = law.mu_s - law.mu_c
+    outer = law.mu_s - drop * t
+    first = start + HEADER
+    second = first + faces * (2 * n + 1) * (2 * n + 1) * 12
+    p, p_a, p_b = cube.squares(spot, n)
+    q, q_a, q_b = cube.squares(spot, m)
+    level, w = cube.levels(t, count)
+    w_t = cube.level_slopes(t, count)
+    for i in range(3):
+        by_t = (
+            drop
+            * spot.sign
+            * (cube.read_level(data, second, m, 3, count, i, q, level, w_t) - cube.read(data, first, n, 3, i, p))
+        )
+        by_a = outer * cube.read(data, first, n, 3, i, p_a) + drop * cube.read_level(
+            data, second, m, 3, count, i, q_a, level, w
+        )
+        by_b = outer * cube.read(data, first, n, 3, i, p_b) + drop * cube.read_level(
+            data, second, m, 3, count, i, q_b, level, w
+        )
+        cube.gradient(spot, by_a, by_b, j, 9, 1)
+        j[3 * i] += share * (j[9] + by_t * by_v * x)
+        j[3 * i + 1] += share * (j[10] + by_t * by_v * y)
+        j[3 * i + 2] += share * (j[11] + by_t * by_v * s)
+
+
+@kernel
+def steady_slopes(law, shape, surface, data, x, y, s, v, j):
+    """`dz_ss/dV_G` [s] into `j` [9], row by row; `j[9:12]` is scratch. Returns `z_ss`."""
+    for i in range(9):
+        j[i] = 0.0
+    blend = shape[6]
+    qx, qy, qs, least = _sliding(law, data, surface[0], x, y, s, v)
+    _sliding_slopes(law, data, surface[0], x, y, s, v, 1.0 - blend, j)
+    if blend > 0.0:
+        ox, oy, o_s, other = _sliding(law, data, surface[1], x, y, s, v)
+        _sliding_slopes(law, data, surface[1], x, y, s, v, blend, j)
+        qx, qy, qs = qx + blend * (ox - qx), qy + blend * (oy - qy), qs + blend * (o_s - qs)
+        least += blend * (other - least)
+    per_v = 1.0 / v
+    nx, ny, ns = x * per_v, y * per_v, s * per_v
+    power = qx * nx + qy * ny + qs * ns
+    raised = formulas.floored(xp, power, law.mu_c * least) - power
+    stays = 1.0 - formulas.floored_slope(xp, power, law.mu_c * least)
+    per = 1.0 / law.sigma_0
+    if raised != 0.0:
+        for i in range(3):
+            n_i = nx if i == 0 else (ny if i == 1 else ns)
+            q_i = qx if i == 0 else (qy if i == 1 else qs)
+            # of the power by V_G, component i
+            j[9 + i] = nx * j[i] + ny * j[3 + i] + ns * j[6 + i] + (q_i - power * n_i) * per_v
+        for i in range(3):
+            n_i = nx if i == 0 else (ny if i == 1 else ns)
+            for k in range(3):
+                n_k = nx if k == 0 else (ny if k == 1 else ns)
+                turn = ((1.0 if i == k else 0.0) - n_i * n_k) * per_v
+                j[3 * i + k] += raised * turn - stays * n_i * j[9 + k]
+    for i in range(9):
+        j[i] *= per
+    return (qx + raised * nx) * per, (qy + raised * ny) * per, (qs + raised * ns) * per
+
+
+@inlined
+def sliding(law, vx, vy, omega, shape, surface, data):
+    """Scaled twist, its norm, and its steady state (any where the patch is at rest): what `advance` holds."""
+    x, y, s = scaled_twist(shape, vx, vy, omega)
+    v = math.sqrt(x * x + y * y + s * s)
+    if v > 0.0:
+        qx, qy, qs = steady(law, shape, surface, data, x, y, s, v)
+        return x, y, s, v, qx, qy, qs
+    return 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0

@@ -1,0 +1,162 @@
+"""Maps over all directions with continuous slopes: from values on the faces of a cube to what `kernels.cube` reads.
+
+A function of the direction alone, constant along rays, is known at the nodes of the six faces, which are `P = +-e_k +
+a e_i + b e_j` with k, i, j in cyclic order. Within a face a cubic Hermite patch has continuous slopes by itself.
+Across the edge between two faces k and i, at `s e_k + q e_i + z e_j`, it has them if both faces share the value F and
+the slope F_j at the nodes there, and if at the nodes
+
+    s F_k + q F_i + z F_j = 0   (constant along rays),
+    s F_kj + q F_ij + F_j + z F_jj = 0   (the same, along the edge),
+
+where F_i, F_ij are slopes of face k and F_k, F_kj of face i, and F_jj is that of a cubic spline along the edge, which
+alone has one value of it on both sides of a node. At a corner three such relations fix the three mixed slopes.
+"""
+
+from __future__ import annotations
+
+import itertools
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+GHOSTS = 3
+"""Nodes beyond each edge of a face that its own spline sees, so that slopes at edges are as good as inside."""
+
+_INNER = slice(GHOSTS, -GHOSTS)
+
+
+def face_nodes(n: int) -> np.ndarray:
+    """Directions of the nodes of the six faces with their ghosts, `[6, K, K, 3]`, `K = 2 n + 1 + 2 GHOSTS`."""
+    a, b = np.meshgrid(_coordinates(n, GHOSTS), _coordinates(n, GHOSTS), indexing="ij")
+    result = np.empty((6, *a.shape, 3))
+    for face in range(6):
+        k = face % 3
+        result[face, ..., k] = 1.0 if face < 3 else -1.0
+        result[face, ..., (k + 1) % 3], result[face, ..., (k + 2) % 3] = a, b
+    return result
+
+
+def mirrored(values: np.ndarray) -> np.ndarray:
+    """Values `[6, K, K, ...]` of an odd function from those on the positive faces `[3, K, K, ...]`."""
+    return np.concatenate([values, -values[:, ::-1, ::-1]])
+
+
+def hermite(values: np.ndarray) -> np.ndarray:
+    """Numbers of the nodes of all faces, `[6, 2 n + 1, 2 n + 1, 4, M]`, from values `[6, K, K, M]` at `face_nodes(n)`.
+
+    The four numbers are the value, its slopes by a and b and the mixed slope, per coordinate of the face.
+    """
+    n = (values.shape[1] - 1) // 2 - GHOSTS
+    slope = _spline_slope(_coordinates(n, GHOSTS))[_INNER]
+    by_a = np.einsum("ri,fijm->frjm", slope, values, optimize=True)
+    result = np.empty((6, 2 * n + 1, 2 * n + 1, 4, values.shape[-1]))
+    result[:, :, :, 0], result[:, :, :, 1] = values[:, _INNER, _INNER], by_a[:, :, _INNER]
+    result[:, :, :, 2] = np.einsum("rj,fijm->firm", slope, values[:, _INNER], optimize=True)
+    result[:, :, :, 3] = np.einsum("rj,fijm->firm", slope, by_a, optimize=True)
+    gradients = _match_corners(result)
+    bends = _match_edges(result, gradients)
+    _mix_corners(result, bends)
+    return result
+
+
+def level_matrix(count: int) -> np.ndarray:
+    """`[count + 2, count]`: coefficients of the uniform cubic B-spline through `count` values over [0, 1].
+
+    The fourth differences at both ends vanish, so that the first two and the last two pieces are one polynomial each.
+    """
+    system = np.zeros((count + 2, count + 2))
+    for i in range(count):
+        system[i, i : i + 3] = 1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0
+    system[count, :5] = system[count + 1, -5:] = 1.0, -4.0, 6.0, -4.0, 1.0
+    return np.linalg.inv(system)[:, :count]
+
+
+def flat(numbers: np.ndarray, components: int, faces: int) -> np.ndarray:
+    """`hermite`'s numbers, M = levels x components, as `kernels.cube` reads them, slopes per spacing of the nodes."""
+    nodes = numbers.shape[1]
+    per = 2.0 / (nodes - 1)
+    scaled = numbers[:faces] * np.array([1.0, per, per, per * per])[:, None]
+    levels = scaled.shape[-1] // components
+    return scaled.reshape(faces, nodes, nodes, 4, levels, components).transpose(0, 1, 2, 4, 5, 3).ravel()
+
+
+def _coordinates(n: int, ghosts: int = 0) -> np.ndarray:
+    return np.arange(-n - ghosts, n + ghosts + 1) / n
+
+
+def _spline_slope(nodes: np.ndarray) -> np.ndarray:
+    """Matrix from values at nodes to the slopes of the cubic spline through them, there."""
+    return CubicSpline(nodes, np.eye(len(nodes)))(nodes, 1)
+
+
+def _nodes_at(numbers: np.ndarray, k: int, point: tuple) -> np.ndarray:
+    """Nodes of the face of axis k at a point on the cube: a coordinate is 1, -1 or a slice."""
+    place = [p if isinstance(p, slice) else (-1 if p > 0 else 0) for p in (point[(k + 1) % 3], point[(k + 2) % 3])]
+    return numbers[k if point[k] > 0 else k + 3][tuple(place)]
+
+
+def _entry(k: int, axis: int) -> int:
+    """Which number of a node on a face of axis k is the slope along `axis`."""
+    return 1 if axis == (k + 1) % 3 else 2
+
+
+_CORNERS = tuple(itertools.product((1.0, -1.0), repeat=3))
+
+
+def _match_corners(numbers: np.ndarray) -> dict[tuple, np.ndarray]:
+    """One value and one gradient at each corner: the means of its three faces. Returns the gradients `[3, M]`."""
+    result = {}
+    for p in _CORNERS:
+        nodes = [_nodes_at(numbers, k, p) for k in range(3)]
+        gradient = np.zeros((3, numbers.shape[-1]))
+        for k, node in enumerate(nodes):
+            i, j = (k + 1) % 3, (k + 2) % 3
+            gradient[i] += node[1] / 3.0
+            gradient[j] += node[2] / 3.0
+            gradient[k] -= p[k] * (p[i] * node[1] + p[j] * node[2]) / 3.0
+        value = (nodes[0][0] + nodes[1][0] + nodes[2][0]) / 3.0
+        for k, node in enumerate(nodes):
+            node[0], node[1], node[2] = value, gradient[(k + 1) % 3], gradient[(k + 2) % 3]
+        result[p] = gradient
+    return result
+
+
+def _match_edges(numbers: np.ndarray, gradients: dict[tuple, np.ndarray]) -> dict[tuple, np.ndarray]:
+    """Values and slopes along the edges, at their inner nodes; returns `z F_j + F_jj` at each corner, by edge."""
+    nodes = _coordinates((numbers.shape[1] - 1) // 2)
+    slope, z, inner = _spline_slope(nodes), nodes[:, None], slice(1, -1)
+    bends = {}
+    for j, s, q in itertools.product(range(3), (1.0, -1.0), (1.0, -1.0)):
+        k, i = (j + 1) % 3, (j + 2) % 3
+        point: list = [None] * 3
+        point[k], point[i], point[j] = s, q, slice(None)
+        one, two = _nodes_at(numbers, k, tuple(point)), _nodes_at(numbers, i, tuple(point))
+        corners = []
+        for end in (-1.0, 1.0):
+            point[j] = end
+            corners.append(tuple(point))
+        ends = [(1, gradients[corner][j]) for corner in corners]
+        spline = CubicSpline(nodes, 0.5 * (one[:, 0] + two[:, 0]), bc_type=tuple(ends))  # pyright: ignore
+        along, bend = spline(nodes, 1), spline(nodes, 2)
+        one[:, 0] = two[:, 0] = spline(nodes)
+        one[:, _entry(k, j)] = two[:, _entry(i, j)] = along
+        across, back = one[:, _entry(k, i)], two[:, _entry(i, k)]
+        miss = (s * back + q * across + z * along)[inner]
+        across[inner] -= 0.5 * q * miss
+        back[inner] -= 0.5 * s * miss
+        mixed, mixed_back = slope @ across, slope @ back
+        miss = s * mixed_back + q * mixed + along + z * bend
+        one[inner, 3] = (mixed - 0.5 * q * miss)[inner]
+        two[inner, 3] = (mixed_back - 0.5 * s * miss)[inner]
+        for corner, m in zip(corners, (0, -1), strict=True):
+            bends[corner, j] = corner[j] * along[m] + bend[m]
+    return bends
+
+
+def _mix_corners(numbers: np.ndarray, bends: dict[tuple, np.ndarray]) -> None:
+    """Mixed slopes at the corners: N_k = p_i p_j F_ij of face k obeys N_i + N_k = -(p_j F_j + F_jj) for each edge j."""
+    for p in _CORNERS:
+        for k in range(3):
+            i, j = (k + 1) % 3, (k + 2) % 3
+            twice = bends[p, k] - bends[p, i] - bends[p, j]
+            _nodes_at(numbers, k, p)[3] = 0.5 * p[i] * p[j] * twice
