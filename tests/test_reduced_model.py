@@ -159,6 +159,7 @@ def test_a_map_is_small_and_finer_maps_are_closer():
 @settings(max_examples=40, deadline=None)
 @given(arrays(float, (3, 4), elements=st.floats(0.0, 1.0)), st.integers(0, 10**6))
 def test_sliding_always_dissipates(pressure, seed):
+    pressure = np.where(pressure < 1e-3, 0.0, pressure)  # a single loaded cell has no radius of gyration
     if np.count_nonzero(pressure) < 2:
         pressure[0, 0], pressure[2, 3] = 1.0, 1e-3
     patch = pf.ContactPatch.from_pressure(pressure, 0.005)

@@ -26,8 +26,10 @@ def model_of(kind: str, mu: float = 1.0, r: float = 1.0, law: pf.LuGre = LAW):
     law = dataclasses.replace(law, mu_c=mu * law.mu_c, mu_s=mu * law.mu_s)
     positions = np.array([[0.01, 0.0], [-0.008, 0.009], [-0.006, -0.01], [0.002, 0.004]])
     patch = pf.ContactPatch.points(r * positions, [1.0, 2.0, 1.5, 0.5])
-    if kind == "table":  # of a smooth limit surface: that of four points has facets
+    if kind in ("table", "moments"):  # of a smooth limit surface: that of four points has facets
         patch = pf.ContactPatch.disc(r * 0.012, cells=9)
+    if kind == "moments":
+        return pf.ReducedModel(patch, law, segments=12, speeds=8)
     return (
         pf.DistributedModel(patch, law)
         if kind == "distributed"
@@ -118,7 +120,8 @@ def test_motion_and_wrenches_are_those_of_simulate(kind):
 
 
 @pytest.mark.parametrize(
-    ("kind", "h", "rtol"), [("distributed", 1e-4, 1e-5), ("ellipsoid", 1e-4, 1e-5), ("table", 1e-5, 1e-4)]
+    ("kind", "h", "rtol"),
+    [("distributed", 1e-4, 1e-5), ("ellipsoid", 1e-4, 1e-5), ("table", 1e-5, 1e-4), ("moments", 1e-4, 1e-5)],
 )
 def test_derivatives_are_central_differences(kind, h, rtol):
     """Through sliding, a stop, a contact that loses its load, and a new slip.

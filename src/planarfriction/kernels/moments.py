@@ -20,7 +20,7 @@ from planarfriction.kernels import inlined, jit, kernel
 from planarfriction.kernels.law import law_of
 from planarfriction.kernels.steady import scaled_twist, sliding, steady_slopes
 
-LINEAR = 40
+LINEAR = 43
 """Numbers of a linearisation: `beta`, dz'/dz (1:10), dz'/dV_G (10:19), the inverse of D (19:28), dz_ss/dV_G (28:37)."""
 
 
@@ -113,11 +113,11 @@ def slopes(law, z, u, v, q, j, by_z, by_v):
 
 @kernel
 def linearise(law, z, vx, vy, omega, shape, surface, data, lin):
-    """Linearise the rates into `lin` [40] (see `LINEAR`); at rest they do not depend on z and follow the twist."""
+    """Linearise the rates into `lin` [43] (see `LINEAR`); at rest they do not depend on z and follow the twist."""
     x, y, s = scaled_twist(shape, vx, vy, omega)
     v = math.sqrt(x * x + y * y + s * s)
     if v > 0.0:
-        q = steady_slopes(law, shape, surface, data, x, y, s, v, lin[28:40])
+        q = steady_slopes(law, shape, surface, data, x, y, s, v, lin[28:43])
         lin[0] = slopes(law, z, (x, y, s), v, q, lin[28:37], lin[1:10], lin[10:19])
     else:
         for i in range(19):

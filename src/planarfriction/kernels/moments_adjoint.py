@@ -213,7 +213,7 @@ def _jacobian_at_rest(law, dt, out):
 @jit
 def jacobians(law_row, shape, surface, data, z, twist, dt, out):
     """Changes of new state and scaled traction with z and V_G, for B steps, into `out` [B, 6, 6]."""
-    law, j = law_of(law_row), np.empty(12)
+    law, j = law_of(law_row), np.empty(15)
     for b in range(z.shape[0]):
         x, y, s = scaled_twist(shape, twist[b, 0], twist[b, 1], twist[b, 2])
         v = math.sqrt(x * x + y * y + s * s)

@@ -49,11 +49,11 @@ def _sliding(law, data, start, x, y, s, v):
 @inlined
 def steady(law, shape, surface, data, x, y, s, v):
     """`z_ss` [m] at the scaled twist, which moves at `v > 0`; its dissipation is never below the least."""
-    qx, qy, qs, least = _sliding(law, data, surface[0], x, y, s, v)
-    if shape[6] > 0.0:
-        ox, oy, o_s, other = _sliding(law, data, surface[1], x, y, s, v)
-        qx, qy, qs = qx + shape[6] * (ox - qx), qy + shape[6] * (oy - qy), qs + shape[6] * (o_s - qs)
-        least += shape[6] * (other - least)
+    qx, qy, qs, least = 0.0, 0.0, 0.0, 0.0
+    for i in range(2 if shape[6] > 0.0 else 1):
+        share = shape[6] if i == 1 else 1.0 - shape[6]
+        hx, hy, hs, floor = _sliding(law, data, surface[i], x, y, s, v)
+        qx, qy, qs, least = qx + share * hx, qy + share * hy, qs + share * hs, least + share * floor
     per_v = 1.0 / v
     power = (qx * x + qy * y + qs * s) * per_v
     raised = (formulas.floored(xp, power, law.mu_c * least) - power) * per_v
@@ -63,7 +63,7 @@ def steady(law, shape, surface, data, x, y, s, v):
 
 @kernel
 def _sliding_slopes(law, data, start, x, y, s, v, share, j):
-    """Add `share` of the slopes of `_sliding` by the scaled twist to `j` [9], row by row; `j[9:12]` is scratch."""
+    """`_sliding`; adds `share` of its slopes by the scaled twist to `j` [9], row by row; `j[9:15]` is scratch."""
     n, m, count, knee = int(data[start + 1]), int(data[start + 2]), int(data[start + 3]), data[start + 4]
     faces = int(data[start])
     spot = cube.locate(x, y, s, faces)
@@ -79,36 +79,29 @@ def _sliding_slopes(law, data, start, x, y, s, v, share, j):
     level, w = cube.levels(t, count)
     w_t = cube.level_slopes(t, count)
     for i in range(3):
-        by_t = (
-            drop
-            * spot.sign
-            * (cube.read_level(data, second, m, 3, count, i, q, level, w_t) - cube.read(data, first, n, 3, i, p))
-        )
-        by_a = outer * cube.read(data, first, n, 3, i, p_a) + drop * cube.read_level(
-            data, second, m, 3, count, i, q_a, level, w
-        )
-        by_b = outer * cube.read(data, first, n, 3, i, p_b) + drop * cube.read_level(
-            data, second, m, 3, count, i, q_b, level, w
-        )
-        cube.gradient(spot, by_a, by_b, j, 9, 1)
+        flat, rest = cube.read(data, first, n, 3, i, p), cube.read_level(data, second, m, 3, count, i, q, level, w)
+        flat_a, flat_b = cube.read(data, first, n, 3, i, p_a), cube.read(data, first, n, 3, i, p_b)
+        rest_a = cube.read_level(data, second, m, 3, count, i, q_a, level, w)
+        rest_b = cube.read_level(data, second, m, 3, count, i, q_b, level, w)
+        by_t = drop * spot.sign * (cube.read_level(data, second, m, 3, count, i, q, level, w_t) - flat)
+        cube.gradient(spot, outer * flat_a + drop * rest_a, outer * flat_b + drop * rest_b, j, 9, 1)
+        j[12 + i] = spot.sign * (outer * flat + drop * rest)
         j[3 * i] += share * (j[9] + by_t * by_v * x)
         j[3 * i + 1] += share * (j[10] + by_t * by_v * y)
         j[3 * i + 2] += share * (j[11] + by_t * by_v * s)
+    return j[12], j[13], j[14], data[start + 5]
 
 
 @kernel
 def steady_slopes(law, shape, surface, data, x, y, s, v, j):
-    """`dz_ss/dV_G` [s] into `j` [9], row by row; `j[9:12]` is scratch. Returns `z_ss`."""
+    """`dz_ss/dV_G` [s] into `j` [9], row by row; `j[9:15]` is scratch. Returns `z_ss`."""
     for i in range(9):
         j[i] = 0.0
-    blend = shape[6]
-    qx, qy, qs, least = _sliding(law, data, surface[0], x, y, s, v)
-    _sliding_slopes(law, data, surface[0], x, y, s, v, 1.0 - blend, j)
-    if blend > 0.0:
-        ox, oy, o_s, other = _sliding(law, data, surface[1], x, y, s, v)
-        _sliding_slopes(law, data, surface[1], x, y, s, v, blend, j)
-        qx, qy, qs = qx + blend * (ox - qx), qy + blend * (oy - qy), qs + blend * (o_s - qs)
-        least += blend * (other - least)
+    qx, qy, qs, least = 0.0, 0.0, 0.0, 0.0
+    for i in range(2 if shape[6] > 0.0 else 1):
+        share = shape[6] if i == 1 else 1.0 - shape[6]
+        hx, hy, hs, floor = _sliding_slopes(law, data, surface[i], x, y, s, v, share, j)
+        qx, qy, qs, least = qx + share * hx, qy + share * hy, qs + share * hs, least + share * floor
     per_v = 1.0 / v
     nx, ny, ns = x * per_v, y * per_v, s * per_v
     power = qx * nx + qy * ny + qs * ns

@@ -17,7 +17,6 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 GHOSTS = 3
 """Nodes beyond each edge of a face that its own spline sees, so that slopes at edges are as good as inside."""
@@ -86,6 +85,8 @@ def _coordinates(n: int, ghosts: int = 0) -> np.ndarray:
 
 def _spline_slope(nodes: np.ndarray) -> np.ndarray:
     """Matrix from values at nodes to the slopes of the cubic spline through them, there."""
+    from scipy.interpolate import CubicSpline
+
     return CubicSpline(nodes, np.eye(len(nodes)))(nodes, 1)
 
 
@@ -123,6 +124,8 @@ def _match_corners(numbers: np.ndarray) -> dict[tuple, np.ndarray]:
 
 def _match_edges(numbers: np.ndarray, gradients: dict[tuple, np.ndarray]) -> dict[tuple, np.ndarray]:
     """Values and slopes along the edges, at their inner nodes; returns `z F_j + F_jj` at each corner, by edge."""
+    from scipy.interpolate import CubicSpline
+
     nodes = _coordinates((numbers.shape[1] - 1) // 2)
     slope, z, inner = _spline_slope(nodes), nodes[:, None], slice(1, -1)
     bends = {}
