@@ -1,0 +1,396 @@
+"""Few cells that stand for many: same moments of the pressure, nearly the same limit surface.
+
+Start from all cells and drop those with the least weight, a tenth at a time. After each round the weights x that are
+left are found anew, as near as possible to the limit surface of the weights w of all cells:
+
+    minimise sum_k (Phi_k(x)/Phi_k(w) - 1)^2   subject to   sum x p(rho) = sum w p(rho) for all p up to the degree
+
+with `Phi_k(x) = sum x |v|` the dissipation of K twists spread evenly over the sphere of directions. Cells whose weight
+comes out negative are dropped too. Cells that mirror each other in the axes through the centre of pressure stay or go
+together. Tchakaloff's theorem says that as many cells as moments suffice.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.errors import InvalidValueError
+from planarfriction.patch.pressure import PerCell, Tabulated
+
+if TYPE_CHECKING:
+    from planarfriction.patch.contact_patch import ContactPatch
+
+SURPLUS = 2
+"""Cells by default: as many as there are moments of that many degrees more."""
+
+DIRECTIONS = 600
+"""Twists at which the limit surface is fitted."""
+
+CHECKED = 3001
+"""Twists at which its error is measured."""
+
+SHARE_DROPPED = 0.1
+"""Share of the cells that are dropped in a round."""
+
+REGULARISATION = 1e-9
+"""Pull of the weights towards zero beside the fit of the limit surface: decides where that leaves them open."""
+
+SAME_PLACE = 1e-6
+"""Share of the patch's size by which mirrored cells may be off (rounding: 1e-16, cells: 1e-3)."""
+
+SAME_WEIGHT = 1e-9
+"""Relative difference of the weights of mirrored cells."""
+
+SCORE_DIGITS = 5
+"""Digits of the weights that decide what is dropped: mirrored cells tie, and rounding must not decide."""
+
+GOLDEN = 0.5 * (5.0**0.5 - 1.0)
+"""Multiples of it, less their whole parts, are spread evenly: the order in which ties are dropped."""
+
+MOST_CORRECTIONS = 10
+"""Times that cells with negative weights are dropped in a round."""
+
+POSITIVE_FIT = 150
+"""Groups of cells up to which a fit with no negative weights is quick."""
+
+MOMENTS_FIRST = 1e4
+"""Weight of the moments in that fit beside the limit surface."""
+
+NEARLY_KEPT = 1e-4
+"""Miss of the moments after it that can be put right."""
+
+INDEPENDENT = 1e-10
+"""Relative singular value below which moments count as dependent on the others (on a line, or on few points)."""
+
+KEPT = 1e-7
+"""Miss of the moments above which a round has dropped too much; the last step takes what is left off."""
+
+MOST_CANDIDATES = 600
+"""Cells (mirrored ones counted once) that a compression starts from; of larger patches, one in each box of a grid."""
+
+NODES_PER_OCTAVE = 8
+"""Loads at which the weights of a patch that depends on the load are fitted, for each factor of 2."""
+
+HIGHEST_DEGREE = 16
+"""Degree at which the search for a given error gives up."""
+
+ROWS_AT_ONCE = 4096
+"""Cells whose dissipation is summed at once: bounds the memory."""
+
+SYMMETRIES = tuple(
+    np.array(matrix)
+    for matrix in (
+        [[-1, 0], [0, 1]], [[1, 0], [0, -1]], [[-1, 0], [0, -1]],
+        [[0, 1], [1, 0]], [[0, -1], [-1, 0]], [[0, -1], [1, 0]], [[0, 1], [-1, 0]],
+    )
+)  # fmt: skip
+"""Symmetries of a square: those of the patch are kept."""
+
+
+def number_of_moments(degree: int) -> int:
+    """Number of monomials in x and y up to `degree`: `(degree + 1)(degree + 2)/2`."""
+    return (degree + 1) * (degree + 2) // 2
+
+
+def compressed(
+    patch: ContactPatch, degree: int = 6, *, cells: int | None = None, error: float | None = None, loads: Any = None
+) -> ContactPatch:
+    """See `ContactPatch.compressed`."""
+    degree = validation.count("degree", degree)
+    if error is not None:
+        return _to_error(patch, degree, cells, validation.positive("error", error), loads)
+    most = number_of_moments(degree + SURPLUS) if cells is None else validation.count("cells", cells)
+    nodes = _nodes(patch, loads)
+    if patch.cells <= most:
+        return patch
+    weights = patch.weights(nodes) if nodes is not None else patch.weights()[None]
+    found = np.zeros_like(weights)
+    for index in np.argsort(np.abs(np.arange(len(weights)) - (len(weights) - 1) / 2), kind="stable"):
+        found[index] = _Problem.of(patch.positions, weights[index], degree).solution(most, (found > 0.0).any(axis=0))
+    return _few(patch, found, nodes)
+
+
+def surface_error(patch: ContactPatch, few: ContactPatch, normal_force=None) -> float:
+    """Largest relative error of the dissipation of `few` against that of `patch`, over twists of all directions [-].
+
+    Twists are spread evenly over the sphere of `(vx, vy, omega r)` about the centre of pressure.
+    """
+    weights = patch.weights(normal_force)
+    scaled, twists = _scaled(patch.positions, weights)
+    whole = _dissipation(scaled, weights, twists(CHECKED))
+    centre, radius = weights @ patch.positions, patch.contact_radius(normal_force)
+    part = _dissipation((few.positions - centre) / radius, few.weights(normal_force), twists(CHECKED))
+    return float(np.abs(part / whole - 1.0).max())
+
+
+def _to_error(patch: ContactPatch, degree: int, cells: int | None, error: float, loads: Any) -> ContactPatch:
+    """The compressed patch of the lowest degree from `degree` on that meets the error at every node."""
+    if cells is not None:
+        raise InvalidValueError("compressed", "have only one of cells and error", f"cells={cells}, error={error}")
+    nodes = _nodes(patch, loads)
+    for trial in range(degree, HIGHEST_DEGREE + 1):
+        few = compressed(patch, trial, loads=loads)
+        checked = (None,) if nodes is None else nodes[:: max(1, len(nodes) // 4)]
+        if few is patch or max(surface_error(patch, few, load) for load in checked) <= error:
+            return few
+    return patch
+
+
+def _nodes(patch: ContactPatch, loads: Any) -> np.ndarray | None:
+    """Loads at which weights are fitted [N]; None for a patch of fixed shape."""
+    if not patch.depends_on_load:
+        if loads is not None:
+            raise InvalidValueError("loads", "be left out, the shape of this patch does not depend on them", loads)
+        return None
+    if loads is None:
+        raise InvalidValueError("loads", "be (lowest, highest) [N], the shape of this patch depends on the load", None)
+    low, high = validation.vector("loads", loads, 2).tolist()
+    if not 0.0 < low < high:
+        raise InvalidValueError("loads", "be (lowest, highest) with 0 < lowest < highest", (low, high))
+    return np.geomspace(low, high, 1 + math.ceil(NODES_PER_OCTAVE * math.log2(high / low)))
+
+
+def _few(patch: ContactPatch, weights: np.ndarray, nodes: np.ndarray | None) -> ContactPatch:
+    """The patch of those cells that have weight at a node; each stands for the same area."""
+    from planarfriction.patch.contact_patch import ContactPatch
+
+    kept = (weights > 0.0).any(axis=0)
+    count = int(kept.sum())
+    values = weights[:, kept]
+    law = PerCell(values[0]) if nodes is None else Tabulated(nodes, values)
+    return ContactPatch(patch.positions[kept], np.full(count, patch.areas.sum() / count), law, None, patch.name)
+
+
+# ---------------------------------------------------------------------- one set of weights
+
+
+class _Problem(NamedTuple):
+    """What is kept, over groups of cells that mirror each other."""
+
+    group: np.ndarray
+    """Group of each cell, `[N]`; -1 for cells that are not candidates."""
+    size: np.ndarray
+    """Cells in each group, `[G]`."""
+    moments: np.ndarray
+    """Independent moments of one unit of weight on each cell of a group, `[M, G]`."""
+    moments_wanted: np.ndarray
+    surface: np.ndarray
+    """Relative dissipations of the same, `[K, G]`, times `1/sqrt(K)`."""
+    surface_wanted: np.ndarray
+
+    @classmethod
+    def of(cls, positions: np.ndarray, weights: np.ndarray, degree: int) -> _Problem:
+        """The problem of compressing `weights` `[N]` at `positions` `[N, 2]`."""
+        loaded = np.flatnonzero(weights > 0.0)
+        scaled, twists = _scaled(positions[loaded], weights[loaded])
+        group = _thinned(scaled, _groups(scaled, weights[loaded]))
+        chosen = group >= 0
+        size = np.bincount(group[chosen]).astype(float)
+        polynomials = _polynomials(scaled, degree)
+        whole = _dissipation(scaled, weights[loaded], twists(DIRECTIONS))
+        speeds = _speeds(scaled[chosen], twists(DIRECTIONS)) / (whole[:, None] * math.sqrt(DIRECTIONS))
+        moments, turn = _independent(_summed(polynomials[:, chosen], group[chosen], len(size)))
+        everywhere = np.full(len(positions), -1)
+        everywhere[loaded] = group
+        return cls(
+            everywhere, size, moments, turn @ (polynomials @ weights[loaded]),
+            _summed(speeds, group[chosen], len(size)), np.full(DIRECTIONS, 1.0 / math.sqrt(DIRECTIONS)),
+        )  # fmt: skip
+
+    def solution(self, most: int, favoured: np.ndarray) -> np.ndarray:
+        """Weights `[N]` with at most `most` cells, where it can be those `favoured` `[N]`."""
+        if most < len(self.moments):
+            raise InvalidValueError("cells", f"be at least the number of moments, {len(self.moments)}", most)
+        kept = np.ones(len(self.size), dtype=bool)
+        liked = np.zeros(len(self.size), dtype=bool)
+        liked[self.group[favoured & (self.group >= 0)]] = True
+        weights, share = self._weights(kept), SHARE_DROPPED
+        while weights is not None and (over := self.size[kept].sum() - most) > 0:
+            order = self._by_weight(kept, weights, liked)
+            drop = max(1, min(int(share * len(order)), int(over / self.size[order[0]])))
+            fewer = self._without(kept, order[:drop])
+            if fewer is not None:
+                kept, weights = fewer
+            elif drop == 1 or len(order) <= POSITIVE_FIT:
+                fewer = self._positive(kept, order[:drop]) if kept.sum() > len(self.moments) else None
+                kept, weights = fewer or self._vertex(kept)
+                if fewer is None:
+                    break
+            else:
+                share = 0.5 * drop / len(order)
+        if weights is None:
+            kept, weights = self._vertex(kept)
+        result = np.zeros(len(self.size))
+        result[kept] = self._polished(kept, weights)
+        return np.where(self.group >= 0, result[self.group], 0.0)
+
+    def _weights(self, kept: np.ndarray) -> np.ndarray | None:
+        """Weights of the groups `kept` that fit the surface best and have the moments; None where none have them."""
+        moments, surface = self.moments[:, kept], self.surface[:, kept]
+        count, conditions = moments.shape[1], len(moments)
+        if count < conditions:
+            return None
+        matrix = np.zeros((count + conditions,) * 2)
+        matrix[:count, :count] = surface.T @ surface + REGULARISATION * np.diag(self.size[kept])
+        matrix[:count, count:], matrix[count:, :count] = moments.T, moments
+        try:
+            found = np.linalg.solve(matrix, np.concatenate([surface.T @ self.surface_wanted, self.moments_wanted]))
+        except np.linalg.LinAlgError:
+            return None
+        weights = found[:count]
+        return weights if np.abs(moments @ weights - self.moments_wanted).max() < KEPT else None
+
+    def _by_weight(self, kept: np.ndarray, weights: np.ndarray, liked: np.ndarray) -> np.ndarray:
+        """The groups `kept`, those with the least weight in a cell for the number of their cells first."""
+        score = np.round(weights / self.size[kept] / weights.max(), SCORE_DIGITS) + liked[kept]
+        groups = np.flatnonzero(kept)
+        return groups[np.lexsort([(groups * GOLDEN) % 1.0, score])]
+
+    def _without(self, kept: np.ndarray, dropped: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        """What is left without the groups `dropped` and the few more whose weights then are negative; None if many."""
+        fewer = kept.copy()
+        fewer[dropped] = False
+        for _ in range(MOST_CORRECTIONS):
+            weights = self._weights(fewer)
+            if weights is None:
+                return None
+            negative = np.flatnonzero(fewer)[weights <= 0.0]
+            if len(negative) == 0:
+                return fewer, weights
+            if len(negative) > len(dropped):
+                return None
+            fewer[negative] = False
+        return None
+
+    def _positive(self, kept: np.ndarray, dropped: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        """What is left without `dropped` and those whose weights vanish under a fit with no negative ones."""
+        from scipy import optimize
+
+        for count in (len(dropped), 1):
+            fewer = kept.copy()
+            fewer[dropped[:count]] = False
+            moments, surface = self.moments[:, fewer], self.surface[:, fewer]
+            pull = np.sqrt(REGULARISATION * self.size[fewer])
+            rows = np.vstack([MOMENTS_FIRST * moments, surface, np.diag(pull)])
+            wanted = np.concatenate([MOMENTS_FIRST * self.moments_wanted, self.surface_wanted, np.zeros(len(pull))])
+            turned, triangle = np.linalg.qr(rows)
+            found, _ = optimize.nnls(triangle, turned.T @ wanted, maxiter=100 * len(self.size))
+            if np.abs(moments @ found - self.moments_wanted).max() < NEARLY_KEPT:
+                fewer[np.flatnonzero(fewer)[found <= 0.0]] = False
+                found = found[found > 0.0]
+                polished = self._polished(fewer, found)
+                if (polished > 0.0).all() and np.abs(self.moments[:, fewer] @ polished - self.moments_wanted).max() < KEPT:
+                    return fewer, polished
+        return None
+
+    def _vertex(self, kept: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Weights of as few of the groups `kept` as there are moments."""
+        from scipy import optimize
+
+        found, _ = optimize.nnls(self.moments[:, kept], self.moments_wanted, maxiter=100 * len(self.size))
+        kept = kept.copy()
+        kept[np.flatnonzero(kept)[found <= 0.0]] = False
+        return kept, found[found > 0.0]
+
+    def _polished(self, kept: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """The weights with the last digits of the moments put right."""
+        moments = self.moments[:, kept]
+        for _ in range(2):
+            weights = weights - np.linalg.lstsq(moments, moments @ weights - self.moments_wanted, rcond=None)[0]
+        return weights
+
+
+# ---------------------------------------------------------------------- rows
+
+
+def _scaled(positions: np.ndarray, weights: np.ndarray):
+    """Positions about the centre of pressure in contact radii, and the function that makes twists for them."""
+    offset = positions - weights @ positions
+    radius = float(weights @ np.hypot(*offset.T))
+    return offset / (radius or 1.0), _directions
+
+
+def _directions(count: int) -> np.ndarray:
+    """Directions of `(vx, vy, omega r)` spread evenly over half the sphere, on a Fibonacci spiral, `[count, 3]`."""
+    step = np.arange(count) + 0.5
+    z, turn = step / count, math.pi * (1.0 + math.sqrt(5.0)) * step
+    level = np.sqrt(1.0 - z**2)
+    return np.stack([level * np.cos(turn), level * np.sin(turn), z], axis=-1)
+
+
+def _speeds(scaled: np.ndarray, twists: np.ndarray) -> np.ndarray:
+    """Speed of each cell at each twist, `[K, N]`."""
+    vx, vy, spin = twists.T[:, :, None]
+    return np.hypot(vx - spin * scaled[:, 1], vy + spin * scaled[:, 0])
+
+
+def _dissipation(scaled: np.ndarray, weights: np.ndarray, twists: np.ndarray) -> np.ndarray:
+    """`Phi = sum w |v|` at each twist, `[K]`."""
+    parts = range(0, len(scaled), ROWS_AT_ONCE)
+    return sum(
+        (_speeds(scaled[i : i + ROWS_AT_ONCE], twists) @ weights[i : i + ROWS_AT_ONCE] for i in parts),
+        start=np.zeros(len(twists)),
+    )
+
+
+def _polynomials(scaled: np.ndarray, degree: int) -> np.ndarray:
+    """Chebyshev products `T_i(x) T_j(y)`, `i + j <= degree`, over the box around the cells, `[M, N]`."""
+    low, high = scaled.min(axis=0), scaled.max(axis=0)
+    half = (high - low) / 2
+    unit = (scaled - (low + high) / 2) / np.where(half > 0.0, half, 1.0)
+    x, y = (np.polynomial.chebyshev.chebvander(column, degree).T for column in unit.T)
+    return np.array([x[i] * y[j] for i in range(degree + 1) for j in range(degree + 1 - i)])
+
+
+def _summed(rows: np.ndarray, group: np.ndarray, groups: int) -> np.ndarray:
+    """Sums of the columns of `rows` `[M, N]` over the groups, `[M, G]`."""
+    result = np.zeros((groups, len(rows)))
+    np.add.at(result, group, rows.T)
+    return np.ascontiguousarray(result.T)
+
+
+def _independent(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Orthonormal rows that span those of `rows` `[M, G]`, and the matrix that makes them from it."""
+    left, values, right = np.linalg.svd(rows, full_matrices=False)
+    rank = int((values > INDEPENDENT * values[0]).sum())
+    return right[:rank], left[:, :rank].T / values[:rank, None]
+
+
+def _groups(scaled: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Number of the group of each cell `[N]`: cells that mirror each other, where the whole patch does."""
+    places = np.rint(scaled / (SAME_PLACE * np.abs(scaled).max())).astype(np.int64)
+    keys, names = _key(places), np.arange(len(scaled))
+    order = np.argsort(keys, kind="stable")
+    for symmetry in SYMMETRIES:
+        wanted = _key(places @ symmetry)
+        found = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), len(keys) - 1)]
+        if (keys[found] == wanted).all() and np.allclose(weights[found], weights, rtol=SAME_WEIGHT, atol=0.0):
+            names = np.minimum(names, names[found])
+    return np.unique(names, return_inverse=True)[1]
+
+
+def _key(places: np.ndarray) -> np.ndarray:
+    """One number for each place `[N, 2]` of the fine grid."""
+    return places[:, 0] * 2**31 + places[:, 1]
+
+
+def _thinned(scaled: np.ndarray, group: np.ndarray) -> np.ndarray:
+    """The groups with at most about `MOST_CANDIDATES` of them left, the others -1: one in each box of a grid."""
+    first = np.unique(group, return_index=True)[1]
+    if len(first) <= MOST_CANDIDATES:
+        return group
+    place = scaled[first]
+    extent = np.ptp(place, axis=0)
+    thin = extent < 1e-9 * extent.max()
+    side = extent.max() / MOST_CANDIDATES if thin.any() else math.sqrt(extent.prod() / MOST_CANDIDATES)
+    box = np.floor((place - place.min(axis=0)) / side)
+    middle = np.abs((place - place.min(axis=0)) / side - box - 0.5).max(axis=1)
+    order = np.lexsort([np.arange(len(place)), np.round(middle, SCORE_DIGITS), *box.T])
+    new_box = np.r_[True, (np.diff(box[order], axis=0) != 0).any(axis=1)]
+    chosen = np.full(len(first), -1)
+    chosen[np.sort(order[new_box])] = np.arange(int(new_box.sum()))
+    return chosen[group]
