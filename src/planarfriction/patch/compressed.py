@@ -19,12 +19,13 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
+from planarfriction.patch import compressed_rows as rows
 from planarfriction.patch.pressure import PerCell, Tabulated
 
 if TYPE_CHECKING:
     from planarfriction.patch.contact_patch import ContactPatch
 
-SURPLUS = 2
+SURPLUS = 3
 """Cells by default: as many as there are moments of that many degrees more."""
 
 DIRECTIONS = 600
@@ -38,15 +39,6 @@ SHARE_DROPPED = 0.1
 
 REGULARISATION = 1e-9
 """Pull of the weights towards zero beside the fit of the limit surface: decides where that leaves them open."""
-
-SAME_PLACE = 1e-6
-"""Share of the patch's size by which mirrored cells may be off (rounding: 1e-16, cells: 1e-3)."""
-
-SAME_WEIGHT = 1e-9
-"""Relative difference of the weights of mirrored cells."""
-
-SCORE_DIGITS = 5
-"""Digits of the weights that decide what is dropped: mirrored cells tie, and rounding must not decide."""
 
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
 """Multiples of it, less their whole parts, are spread evenly: the order in which ties are dropped."""
@@ -63,32 +55,17 @@ MOMENTS_FIRST = 1e4
 NEARLY_KEPT = 1e-4
 """Miss of the moments after it that can be put right."""
 
-INDEPENDENT = 1e-10
-"""Relative singular value below which moments count as dependent on the others (on a line, or on few points)."""
-
 KEPT = 1e-7
 """Miss of the moments above which a round has dropped too much; the last step takes what is left off."""
 
-MOST_CANDIDATES = 600
-"""Cells (mirrored ones counted once) that a compression starts from; of larger patches, one in each box of a grid."""
-
-NODES_PER_OCTAVE = 8
+NODES_PER_OCTAVE = 32
 """Loads at which the weights of a patch that depends on the load are fitted, for each factor of 2."""
+
+CHOSEN_EVERY = 16
+"""Cells are chosen at every so many of them; the others make do with these cells where they can."""
 
 HIGHEST_DEGREE = 16
 """Degree at which the search for a given error gives up."""
-
-ROWS_AT_ONCE = 4096
-"""Cells whose dissipation is summed at once: bounds the memory."""
-
-SYMMETRIES = tuple(
-    np.array(matrix)
-    for matrix in (
-        [[-1, 0], [0, 1]], [[1, 0], [0, -1]], [[-1, 0], [0, -1]],
-        [[0, 1], [1, 0]], [[0, -1], [-1, 0]], [[0, -1], [1, 0]], [[0, 1], [-1, 0]],
-    )
-)  # fmt: skip
-"""Symmetries of a square: those of the patch are kept."""
 
 
 def number_of_moments(degree: int) -> int:
@@ -97,7 +74,7 @@ def number_of_moments(degree: int) -> int:
 
 
 def compressed(
-    patch: ContactPatch, degree: int = 6, *, cells: int | None = None, error: float | None = None, loads: Any = None
+    patch: ContactPatch, degree: int = 5, *, cells: int | None = None, error: float | None = None, loads: Any = None
 ) -> ContactPatch:
     """See `ContactPatch.compressed`."""
     degree = validation.count("degree", degree)
@@ -109,8 +86,13 @@ def compressed(
         return patch
     weights = patch.weights(nodes) if nodes is not None else patch.weights()[None]
     found = np.zeros_like(weights)
-    for index in np.argsort(np.abs(np.arange(len(weights)) - (len(weights) - 1) / 2), kind="stable"):
-        found[index] = _Problem.of(patch.positions, weights[index], degree).solution(most, (found > 0.0).any(axis=0))
+    chosen = np.arange(0, len(weights), CHOSEN_EVERY)
+    for index in [*chosen, *np.setdiff1d(np.arange(len(weights)), chosen)]:
+        favoured = np.any(found > 0.0, axis=0)
+        refit = None if index in chosen else _Problem.of(patch.positions, weights[index], degree, True).refit(favoured)
+        if refit is None:
+            refit = _one(patch.positions, weights[index], degree, most, favoured)
+        found[index] = refit
     return _few(patch, found, nodes)
 
 
@@ -120,10 +102,10 @@ def surface_error(patch: ContactPatch, few: ContactPatch, normal_force=None) -> 
     Twists are spread evenly over the sphere of `(vx, vy, omega r)` about the centre of pressure.
     """
     weights = patch.weights(normal_force)
-    scaled, twists = _scaled(patch.positions, weights)
-    whole = _dissipation(scaled, weights, twists(CHECKED))
+    scaled = rows.scaled_positions(patch.positions, weights)
+    whole = rows.dissipation(scaled, weights, rows.directions(CHECKED))
     centre, radius = weights @ patch.positions, patch.contact_radius(normal_force)
-    part = _dissipation((few.positions - centre) / radius, few.weights(normal_force), twists(CHECKED))
+    part = rows.dissipation((few.positions - centre) / radius, few.weights(normal_force), rows.directions(CHECKED))
     return float(np.abs(part / whole - 1.0).max())
 
 
@@ -165,6 +147,15 @@ def _few(patch: ContactPatch, weights: np.ndarray, nodes: np.ndarray | None) -> 
     return ContactPatch(patch.positions[kept], np.full(count, patch.areas.sum() / count), law, None, patch.name)
 
 
+def _one(positions: np.ndarray, weights: np.ndarray, degree: int, most: int, favoured: np.ndarray) -> np.ndarray:
+    """New weights `[N]` for one set of weights; without the symmetry of the patch where that takes too many cells."""
+    for symmetric in (True, False):
+        result = _Problem.of(positions, weights, degree, symmetric).solution(most, favoured)
+        if (result > 0.0).sum() <= most:
+            break
+    return result
+
+
 # ---------------------------------------------------------------------- one set of weights
 
 
@@ -183,22 +174,24 @@ class _Problem(NamedTuple):
     surface_wanted: np.ndarray
 
     @classmethod
-    def of(cls, positions: np.ndarray, weights: np.ndarray, degree: int) -> _Problem:
+    def of(cls, positions: np.ndarray, weights: np.ndarray, degree: int, symmetric: bool) -> _Problem:
         """The problem of compressing `weights` `[N]` at `positions` `[N, 2]`."""
         loaded = np.flatnonzero(weights > 0.0)
-        scaled, twists = _scaled(positions[loaded], weights[loaded])
-        group = _thinned(scaled, _groups(scaled, weights[loaded]))
+        scaled = rows.scaled_positions(positions[loaded], weights[loaded])
+        group = rows.thinned(
+            scaled, rows.mirrored_groups(scaled, weights[loaded]) if symmetric else np.arange(len(loaded))
+        )
         chosen = group >= 0
         size = np.bincount(group[chosen]).astype(float)
-        polynomials = _polynomials(scaled, degree)
-        whole = _dissipation(scaled, weights[loaded], twists(DIRECTIONS))
-        speeds = _speeds(scaled[chosen], twists(DIRECTIONS)) / (whole[:, None] * math.sqrt(DIRECTIONS))
-        moments, turn = _independent(_summed(polynomials[:, chosen], group[chosen], len(size)))
+        polynomials = rows.polynomials(scaled, degree)
+        whole = rows.dissipation(scaled, weights[loaded], rows.directions(DIRECTIONS))
+        speeds = rows.speeds(scaled[chosen], rows.directions(DIRECTIONS)) / (whole[:, None] * math.sqrt(DIRECTIONS))
+        moments, turn = rows.independent(rows.summed(polynomials[:, chosen], group[chosen], len(size)))
         everywhere = np.full(len(positions), -1)
         everywhere[loaded] = group
         return cls(
             everywhere, size, moments, turn @ (polynomials @ weights[loaded]),
-            _summed(speeds, group[chosen], len(size)), np.full(DIRECTIONS, 1.0 / math.sqrt(DIRECTIONS)),
+            rows.summed(speeds, group[chosen], len(size)), np.full(DIRECTIONS, 1.0 / math.sqrt(DIRECTIONS)),
         )  # fmt: skip
 
     def solution(self, most: int, favoured: np.ndarray) -> np.ndarray:
@@ -228,6 +221,17 @@ class _Problem(NamedTuple):
         result[kept] = self._polished(kept, weights)
         return np.where(self.group >= 0, result[self.group], 0.0)
 
+    def refit(self, chosen: np.ndarray) -> np.ndarray | None:
+        """Weights `[N]` of the cells `chosen` `[N]` alone, or None where they cannot have the moments."""
+        kept = np.zeros(len(self.size), dtype=bool)
+        kept[self.group[chosen & (self.group >= 0)]] = True
+        found = self._positive(kept, np.empty(0, dtype=int))
+        if found is None:
+            return None
+        result = np.zeros(len(self.size))
+        result[found[0]] = found[1]
+        return np.where(self.group >= 0, result[self.group], 0.0)
+
     def _weights(self, kept: np.ndarray) -> np.ndarray | None:
         """Weights of the groups `kept` that fit the surface best and have the moments; None where none have them."""
         moments, surface = self.moments[:, kept], self.surface[:, kept]
@@ -246,7 +250,7 @@ class _Problem(NamedTuple):
 
     def _by_weight(self, kept: np.ndarray, weights: np.ndarray, liked: np.ndarray) -> np.ndarray:
         """The groups `kept`, those with the least weight in a cell for the number of their cells first."""
-        score = np.round(weights / self.size[kept] / weights.max(), SCORE_DIGITS) + liked[kept]
+        score = np.round(weights / self.size[kept] / weights.max(), rows.SCORE_DIGITS) + liked[kept]
         groups = np.flatnonzero(kept)
         return groups[np.lexsort([(groups * GOLDEN) % 1.0, score])]
 
@@ -270,20 +274,22 @@ class _Problem(NamedTuple):
         """What is left without `dropped` and those whose weights vanish under a fit with no negative ones."""
         from scipy import optimize
 
-        for count in (len(dropped), 1):
+        for count in dict.fromkeys((len(dropped), min(1, len(dropped)))):
             fewer = kept.copy()
             fewer[dropped[:count]] = False
             moments, surface = self.moments[:, fewer], self.surface[:, fewer]
             pull = np.sqrt(REGULARISATION * self.size[fewer])
-            rows = np.vstack([MOMENTS_FIRST * moments, surface, np.diag(pull)])
+            stacked = np.vstack([MOMENTS_FIRST * moments, surface, np.diag(pull)])
             wanted = np.concatenate([MOMENTS_FIRST * self.moments_wanted, self.surface_wanted, np.zeros(len(pull))])
-            turned, triangle = np.linalg.qr(rows)
+            turned, triangle = np.linalg.qr(stacked)
             found, _ = optimize.nnls(triangle, turned.T @ wanted, maxiter=100 * len(self.size))
             if np.abs(moments @ found - self.moments_wanted).max() < NEARLY_KEPT:
                 fewer[np.flatnonzero(fewer)[found <= 0.0]] = False
                 found = found[found > 0.0]
                 polished = self._polished(fewer, found)
-                if (polished > 0.0).all() and np.abs(self.moments[:, fewer] @ polished - self.moments_wanted).max() < KEPT:
+                if (polished > 0.0).all() and np.abs(
+                    self.moments[:, fewer] @ polished - self.moments_wanted
+                ).max() < KEPT:
                     return fewer, polished
         return None
 
@@ -302,95 +308,3 @@ class _Problem(NamedTuple):
         for _ in range(2):
             weights = weights - np.linalg.lstsq(moments, moments @ weights - self.moments_wanted, rcond=None)[0]
         return weights
-
-
-# ---------------------------------------------------------------------- rows
-
-
-def _scaled(positions: np.ndarray, weights: np.ndarray):
-    """Positions about the centre of pressure in contact radii, and the function that makes twists for them."""
-    offset = positions - weights @ positions
-    radius = float(weights @ np.hypot(*offset.T))
-    return offset / (radius or 1.0), _directions
-
-
-def _directions(count: int) -> np.ndarray:
-    """Directions of `(vx, vy, omega r)` spread evenly over half the sphere, on a Fibonacci spiral, `[count, 3]`."""
-    step = np.arange(count) + 0.5
-    z, turn = step / count, math.pi * (1.0 + math.sqrt(5.0)) * step
-    level = np.sqrt(1.0 - z**2)
-    return np.stack([level * np.cos(turn), level * np.sin(turn), z], axis=-1)
-
-
-def _speeds(scaled: np.ndarray, twists: np.ndarray) -> np.ndarray:
-    """Speed of each cell at each twist, `[K, N]`."""
-    vx, vy, spin = twists.T[:, :, None]
-    return np.hypot(vx - spin * scaled[:, 1], vy + spin * scaled[:, 0])
-
-
-def _dissipation(scaled: np.ndarray, weights: np.ndarray, twists: np.ndarray) -> np.ndarray:
-    """`Phi = sum w |v|` at each twist, `[K]`."""
-    parts = range(0, len(scaled), ROWS_AT_ONCE)
-    return sum(
-        (_speeds(scaled[i : i + ROWS_AT_ONCE], twists) @ weights[i : i + ROWS_AT_ONCE] for i in parts),
-        start=np.zeros(len(twists)),
-    )
-
-
-def _polynomials(scaled: np.ndarray, degree: int) -> np.ndarray:
-    """Chebyshev products `T_i(x) T_j(y)`, `i + j <= degree`, over the box around the cells, `[M, N]`."""
-    low, high = scaled.min(axis=0), scaled.max(axis=0)
-    half = (high - low) / 2
-    unit = (scaled - (low + high) / 2) / np.where(half > 0.0, half, 1.0)
-    x, y = (np.polynomial.chebyshev.chebvander(column, degree).T for column in unit.T)
-    return np.array([x[i] * y[j] for i in range(degree + 1) for j in range(degree + 1 - i)])
-
-
-def _summed(rows: np.ndarray, group: np.ndarray, groups: int) -> np.ndarray:
-    """Sums of the columns of `rows` `[M, N]` over the groups, `[M, G]`."""
-    result = np.zeros((groups, len(rows)))
-    np.add.at(result, group, rows.T)
-    return np.ascontiguousarray(result.T)
-
-
-def _independent(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Orthonormal rows that span those of `rows` `[M, G]`, and the matrix that makes them from it."""
-    left, values, right = np.linalg.svd(rows, full_matrices=False)
-    rank = int((values > INDEPENDENT * values[0]).sum())
-    return right[:rank], left[:, :rank].T / values[:rank, None]
-
-
-def _groups(scaled: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Number of the group of each cell `[N]`: cells that mirror each other, where the whole patch does."""
-    places = np.rint(scaled / (SAME_PLACE * np.abs(scaled).max())).astype(np.int64)
-    keys, names = _key(places), np.arange(len(scaled))
-    order = np.argsort(keys, kind="stable")
-    for symmetry in SYMMETRIES:
-        wanted = _key(places @ symmetry)
-        found = order[np.minimum(np.searchsorted(keys, wanted, sorter=order), len(keys) - 1)]
-        if (keys[found] == wanted).all() and np.allclose(weights[found], weights, rtol=SAME_WEIGHT, atol=0.0):
-            names = np.minimum(names, names[found])
-    return np.unique(names, return_inverse=True)[1]
-
-
-def _key(places: np.ndarray) -> np.ndarray:
-    """One number for each place `[N, 2]` of the fine grid."""
-    return places[:, 0] * 2**31 + places[:, 1]
-
-
-def _thinned(scaled: np.ndarray, group: np.ndarray) -> np.ndarray:
-    """The groups with at most about `MOST_CANDIDATES` of them left, the others -1: one in each box of a grid."""
-    first = np.unique(group, return_index=True)[1]
-    if len(first) <= MOST_CANDIDATES:
-        return group
-    place = scaled[first]
-    extent = np.ptp(place, axis=0)
-    thin = extent < 1e-9 * extent.max()
-    side = extent.max() / MOST_CANDIDATES if thin.any() else math.sqrt(extent.prod() / MOST_CANDIDATES)
-    box = np.floor((place - place.min(axis=0)) / side)
-    middle = np.abs((place - place.min(axis=0)) / side - box - 0.5).max(axis=1)
-    order = np.lexsort([np.arange(len(place)), np.round(middle, SCORE_DIGITS), *box.T])
-    new_box = np.r_[True, (np.diff(box[order], axis=0) != 0).any(axis=1)]
-    chosen = np.full(len(first), -1)
-    chosen[np.sort(order[new_box])] = np.arange(int(new_box.sum()))
-    return chosen[group]

@@ -15,7 +15,7 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.patch import shapes
 from planarfriction.patch.files import read_pressure_map
 from planarfriction.patch.grid import Grid
-from planarfriction.patch.pressure import Pressure, Uniform, as_law
+from planarfriction.patch.pressure import Pressure, Uniform, as_law, check_pressure
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -75,7 +75,7 @@ class ContactPatch:
             raise InvalidValueError("areas", "be > 0", f"{areas.min()} at index {areas.argmin()}")
         law = as_law(self.pressure, positions)
         if not law.depends_on_load:
-            _check_pressure(law.relative(positions), positions)
+            check_pressure(law.relative(positions), positions)
         kept = law.ever_loaded(positions)
         if not kept.any():
             raise InvalidValueError("pressure", "load at least one cell", "zero pressure on all of them")
@@ -252,13 +252,13 @@ class ContactPatch:
         return refined(self, validation.count("parts", parts))
 
     def compressed(
-        self, degree: int = 6, *, cells: int | None = None, error: float | None = None, loads: Any = None
+        self, degree: int = 5, *, cells: int | None = None, error: float | None = None, loads: Any = None
     ) -> ContactPatch:
         """A few of the cells with new weights: all moments up to `degree` kept, the limit surface nearly.
 
-        At most `cells` (default: as many as moments of `degree + 2`); the patch itself where it has no more. `error`
-        raises the degree until no dissipation is off by more than that share. Shapes that depend on the load need
-        `loads`, (lowest, highest) [N]: moments are kept at 8 loads per octave (more cells), between them interpolated.
+        At most `cells` (default: 45, as many as moments of `degree + 3`); the patch itself where it has no more.
+        `error` raises the degree until no dissipation is off by more than that share. Shapes that depend on the load
+        need `loads`, (lowest, highest) [N]; see `patch.compressed`.
         """
         from planarfriction.patch.compressed import compressed
 
@@ -398,12 +398,3 @@ def _square_grid(width: float, cells: int) -> Grid:
     """Grid of `cells` x `cells` on the square `width` [m] wide about the origin."""
     cells = validation.count("cells", cells)
     return Grid.around_origin(width, width, cells, cells)
-
-
-def _check_pressure(values: np.ndarray, positions: np.ndarray) -> None:
-    """Raise where a pressure is not finite or negative, naming the cell."""
-    for rule, broken in (("be finite", ~np.isfinite(values)), ("be >= 0", values < 0.0)):
-        if broken.any():
-            index = int(broken.argmax())
-            x, y = positions[index].tolist()
-            raise InvalidValueError("pressure", rule, f"{values[index]} at index {index}, position ({x:g}, {y:g}) m")

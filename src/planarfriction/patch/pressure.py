@@ -222,7 +222,7 @@ class Tabulated(Pressure):
         return (1.0 - share) * self.values[below] + share * self.values[below + 1]
 
     def ever_loaded(self, positions: np.ndarray) -> np.ndarray:
-        return (self.values > 0.0).any(axis=0)
+        return np.greater(self.values.max(axis=0), 0.0)
 
     def only(self, kept: np.ndarray) -> Tabulated:
         return Tabulated(self.loads, self.values[:, kept])
@@ -240,3 +240,12 @@ def as_law(pressure: Any, positions: np.ndarray) -> Pressure:
     if callable(pressure):
         return PerCell([pressure(x, y) for x, y in positions.tolist()])  # pyright: ignore
     return PerCell(validation.array("pressure", pressure, (len(positions),)))
+
+
+def check_pressure(values: np.ndarray, positions: np.ndarray) -> None:
+    """Raise where a pressure is not finite or negative, naming the cell."""
+    for rule, broken in (("be finite", ~np.isfinite(values)), ("be >= 0", values < 0.0)):
+        if broken.any():
+            index = int(broken.argmax())
+            x, y = positions[index].tolist()
+            raise InvalidValueError("pressure", rule, f"{values[index]} at index {index}, position ({x:g}, {y:g}) m")
