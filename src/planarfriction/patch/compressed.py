@@ -6,8 +6,7 @@ left are found anew, as near as possible to the limit surface of the weights w o
     minimise sum_k (Phi_k(x)/Phi_k(w) - 1)^2   subject to   sum x p(rho) = sum w p(rho) for all p up to the degree
 
 with `Phi_k(x) = sum x |v|` the dissipation of K twists spread evenly over the sphere of directions. Cells whose weight
-comes out negative are dropped too. Cells that mirror each other in the axes through the centre of pressure stay or go
-together. Tchakaloff's theorem says that as many cells as moments suffice.
+comes out negative are dropped too. Tchakaloff's theorem says that as many cells as moments suffice.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ CHECKED = 3001
 SHARE_DROPPED = 0.1
 """Share of the cells that are dropped in a round."""
 
-REGULARISATION = 1e-9
+REGULARISATION = 1e-6
 """Pull of the weights towards zero beside the fit of the limit surface: decides where that leaves them open."""
 
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)
@@ -47,7 +46,7 @@ MOST_CORRECTIONS = 10
 """Times that cells with negative weights are dropped in a round."""
 
 POSITIVE_FIT = 150
-"""Groups of cells up to which a fit with no negative weights is quick."""
+"""Cells up to which a fit with no negative weights is quick."""
 
 MOMENTS_FIRST = 1e4
 """Weight of the moments in that fit beside the limit surface."""
@@ -89,9 +88,10 @@ def compressed(
     chosen = np.arange(0, len(weights), CHOSEN_EVERY)
     for index in [*chosen, *np.setdiff1d(np.arange(len(weights)), chosen)]:
         favoured = np.any(found > 0.0, axis=0)
-        refit = None if index in chosen else _Problem.of(patch.positions, weights[index], degree, True).refit(favoured)
+        problem = _Problem.of(patch.positions, weights[index], degree)
+        refit = None if index in chosen else problem.refit(favoured)
         if refit is None:
-            refit = _one(patch.positions, weights[index], degree, most, favoured)
+            refit = problem.solution(most, favoured)
         found[index] = refit
     return _few(patch, found, nodes)
 
@@ -147,64 +147,47 @@ def _few(patch: ContactPatch, weights: np.ndarray, nodes: np.ndarray | None) -> 
     return ContactPatch(patch.positions[kept], np.full(count, patch.areas.sum() / count), law, None, patch.name)
 
 
-def _one(positions: np.ndarray, weights: np.ndarray, degree: int, most: int, favoured: np.ndarray) -> np.ndarray:
-    """New weights `[N]` for one set of weights; without the symmetry of the patch where that takes too many cells."""
-    for symmetric in (True, False):
-        result = _Problem.of(positions, weights, degree, symmetric).solution(most, favoured)
-        if (result > 0.0).sum() <= most:
-            break
-    return result
-
-
 # ---------------------------------------------------------------------- one set of weights
 
 
 class _Problem(NamedTuple):
-    """What is kept, over groups of cells that mirror each other."""
+    """What is kept, over the C cells that may be chosen (`cells`) out of N."""
 
-    group: np.ndarray
-    """Group of each cell, `[N]`; -1 for cells that are not candidates."""
-    size: np.ndarray
-    """Cells in each group, `[G]`."""
+    every: int
+    """N."""
+    cells: np.ndarray
+    """Their indices `[C]`."""
     moments: np.ndarray
-    """Independent moments of one unit of weight on each cell of a group, `[M, G]`."""
+    """Independent moments of one unit of weight on each cell, `[M, C]`."""
     moments_wanted: np.ndarray
     surface: np.ndarray
-    """Relative dissipations of the same, `[K, G]`, times `1/sqrt(K)`."""
+    """Relative dissipations of the same, `[K, C]`, times `1/sqrt(K)`."""
     surface_wanted: np.ndarray
 
     @classmethod
-    def of(cls, positions: np.ndarray, weights: np.ndarray, degree: int, symmetric: bool) -> _Problem:
+    def of(cls, positions: np.ndarray, weights: np.ndarray, degree: int) -> _Problem:
         """The problem of compressing `weights` `[N]` at `positions` `[N, 2]`."""
         loaded = np.flatnonzero(weights > 0.0)
-        scaled = rows.scaled_positions(positions[loaded], weights[loaded])
-        group = rows.thinned(
-            scaled, rows.mirrored_groups(scaled, weights[loaded]) if symmetric else np.arange(len(loaded))
-        )
-        chosen = group >= 0
-        size = np.bincount(group[chosen]).astype(float)
+        scaled, twists = rows.scaled_positions(positions[loaded], weights[loaded]), rows.directions(DIRECTIONS)
+        chosen = rows.thinned(scaled)
+        whole = rows.dissipation(scaled, weights[loaded], twists)
+        speeds = rows.speeds(scaled[chosen], twists) / (whole[:, None] * math.sqrt(DIRECTIONS))
         polynomials = rows.polynomials(scaled, degree)
-        whole = rows.dissipation(scaled, weights[loaded], rows.directions(DIRECTIONS))
-        speeds = rows.speeds(scaled[chosen], rows.directions(DIRECTIONS)) / (whole[:, None] * math.sqrt(DIRECTIONS))
-        moments, turn = rows.independent(rows.summed(polynomials[:, chosen], group[chosen], len(size)))
-        everywhere = np.full(len(positions), -1)
-        everywhere[loaded] = group
-        return cls(
-            everywhere, size, moments, turn @ (polynomials @ weights[loaded]),
-            rows.summed(speeds, group[chosen], len(size)), np.full(DIRECTIONS, 1.0 / math.sqrt(DIRECTIONS)),
-        )  # fmt: skip
+        moments, turn = rows.independent(polynomials[:, chosen])
+        wanted = turn @ (polynomials @ weights[loaded])
+        surface_wanted = np.full(DIRECTIONS, 1.0 / math.sqrt(DIRECTIONS))
+        return cls(len(positions), loaded[chosen], moments, wanted, speeds, surface_wanted)
 
     def solution(self, most: int, favoured: np.ndarray) -> np.ndarray:
         """Weights `[N]` with at most `most` cells, where it can be those `favoured` `[N]`."""
         if most < len(self.moments):
             raise InvalidValueError("cells", f"be at least the number of moments, {len(self.moments)}", most)
-        kept = np.ones(len(self.size), dtype=bool)
-        liked = np.zeros(len(self.size), dtype=bool)
-        liked[self.group[favoured & (self.group >= 0)]] = True
+        kept = np.ones(len(self.cells), dtype=bool)
+        liked = favoured[self.cells]
         weights, share = self._weights(kept), SHARE_DROPPED
-        while weights is not None and (over := self.size[kept].sum() - most) > 0:
+        while weights is not None and (over := int(kept.sum()) - most) > 0:
             order = self._by_weight(kept, weights, liked)
-            drop = max(1, min(int(share * len(order)), int(over / self.size[order[0]])))
+            drop = max(1, min(int(share * len(order)), over))
             fewer = self._without(kept, order[:drop])
             if fewer is not None:
                 kept, weights = fewer
@@ -217,29 +200,28 @@ class _Problem(NamedTuple):
                 share = 0.5 * drop / len(order)
         if weights is None:
             kept, weights = self._vertex(kept)
-        result = np.zeros(len(self.size))
-        result[kept] = self._polished(kept, weights)
-        return np.where(self.group >= 0, result[self.group], 0.0)
+        return self._everywhere(kept, self._polished(kept, weights))
 
     def refit(self, chosen: np.ndarray) -> np.ndarray | None:
         """Weights `[N]` of the cells `chosen` `[N]` alone, or None where they cannot have the moments."""
-        kept = np.zeros(len(self.size), dtype=bool)
-        kept[self.group[chosen & (self.group >= 0)]] = True
+        kept = chosen[self.cells]
         found = self._positive(kept, np.empty(0, dtype=int))
-        if found is None:
-            return None
-        result = np.zeros(len(self.size))
-        result[found[0]] = found[1]
-        return np.where(self.group >= 0, result[self.group], 0.0)
+        return None if found is None else self._everywhere(*found)
+
+    def _everywhere(self, kept: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """The weights of the cells `kept` among zeros, `[N]`."""
+        result = np.zeros(self.every)
+        result[self.cells[kept]] = weights
+        return result
 
     def _weights(self, kept: np.ndarray) -> np.ndarray | None:
-        """Weights of the groups `kept` that fit the surface best and have the moments; None where none have them."""
+        """Weights of the cells `kept` that fit the surface best and have the moments; None where none have them."""
         moments, surface = self.moments[:, kept], self.surface[:, kept]
         count, conditions = moments.shape[1], len(moments)
         if count < conditions:
             return None
         matrix = np.zeros((count + conditions,) * 2)
-        matrix[:count, :count] = surface.T @ surface + REGULARISATION * np.diag(self.size[kept])
+        matrix[:count, :count] = surface.T @ surface + REGULARISATION * np.eye(count)
         matrix[:count, count:], matrix[count:, :count] = moments.T, moments
         try:
             found = np.linalg.solve(matrix, np.concatenate([surface.T @ self.surface_wanted, self.moments_wanted]))
@@ -249,13 +231,13 @@ class _Problem(NamedTuple):
         return weights if np.abs(moments @ weights - self.moments_wanted).max() < KEPT else None
 
     def _by_weight(self, kept: np.ndarray, weights: np.ndarray, liked: np.ndarray) -> np.ndarray:
-        """The groups `kept`, those with the least weight in a cell for the number of their cells first."""
-        score = np.round(weights / self.size[kept] / weights.max(), rows.SCORE_DIGITS) + liked[kept]
-        groups = np.flatnonzero(kept)
-        return groups[np.lexsort([(groups * GOLDEN) % 1.0, score])]
+        """The cells `kept`, those with the least weight first."""
+        score = np.round(weights / weights.max(), rows.SCORE_DIGITS) + liked[kept]
+        cells = np.flatnonzero(kept)
+        return cells[np.lexsort([(cells * GOLDEN) % 1.0, score])]
 
     def _without(self, kept: np.ndarray, dropped: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-        """What is left without the groups `dropped` and the few more whose weights then are negative; None if many."""
+        """What is left without the cells `dropped` and the few more whose weights then are negative; None if many."""
         fewer = kept.copy()
         fewer[dropped] = False
         for _ in range(MOST_CORRECTIONS):
@@ -278,11 +260,11 @@ class _Problem(NamedTuple):
             fewer = kept.copy()
             fewer[dropped[:count]] = False
             moments, surface = self.moments[:, fewer], self.surface[:, fewer]
-            pull = np.sqrt(REGULARISATION * self.size[fewer])
+            pull = np.full(moments.shape[1], math.sqrt(REGULARISATION))
             stacked = np.vstack([MOMENTS_FIRST * moments, surface, np.diag(pull)])
             wanted = np.concatenate([MOMENTS_FIRST * self.moments_wanted, self.surface_wanted, np.zeros(len(pull))])
             turned, triangle = np.linalg.qr(stacked)
-            found, _ = optimize.nnls(triangle, turned.T @ wanted, maxiter=100 * len(self.size))
+            found, _ = optimize.nnls(triangle, turned.T @ wanted, maxiter=100 * len(self.cells))
             if np.abs(moments @ found - self.moments_wanted).max() < NEARLY_KEPT:
                 fewer[np.flatnonzero(fewer)[found <= 0.0]] = False
                 found = found[found > 0.0]
@@ -294,10 +276,10 @@ class _Problem(NamedTuple):
         return None
 
     def _vertex(self, kept: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Weights of as few of the groups `kept` as there are moments."""
+        """Weights of as few of the cells `kept` as there are moments."""
         from scipy import optimize
 
-        found, _ = optimize.nnls(self.moments[:, kept], self.moments_wanted, maxiter=100 * len(self.size))
+        found, _ = optimize.nnls(self.moments[:, kept], self.moments_wanted, maxiter=100 * len(self.cells))
         kept = kept.copy()
         kept[np.flatnonzero(kept)[found <= 0.0]] = False
         return kept, found[found > 0.0]
