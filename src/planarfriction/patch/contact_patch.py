@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,11 +12,11 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch import outline as outlines
-from planarfriction.patch import shapes
+from planarfriction.patch import plain_data, shapes
 from planarfriction.patch.files import read_pressure_map
 from planarfriction.patch.grid import Grid
 from planarfriction.patch.metric import Anisotropy
-from planarfriction.patch.pressure import Pressure, Uniform, as_law, check_pressure
+from planarfriction.patch.pressure import Uniform, as_law, check_pressure
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -255,6 +254,19 @@ class ContactPatch(Anisotropy):
 
         return refined(self, validation.count("parts", parts))
 
+    def compressed(
+        self, degree: int = 5, *, cells: int | None = None, error: float | None = None, loads: Any = None
+    ) -> ContactPatch:
+        """A few of the cells with new weights: all moments up to `degree` kept, the limit surface nearly.
+
+        At most `cells` (default: 45, as many as moments of `degree + 3`); the patch itself where it has no more.
+        `error` raises the degree until no dissipation is off by more than that share. Shapes that depend on the load
+        need `loads`, (lowest, highest) [N]; see `patch.compressed`.
+        """
+        from planarfriction.patch.compressed import compressed
+
+        return compressed(self, degree, cells=cells, error=error, loads=loads)
+
     # ------------------------------------------------------------------ quantities
 
     def cell_extents(self) -> np.ndarray:
@@ -363,34 +375,12 @@ class ContactPatch(Anisotropy):
 
     def to_dict(self) -> dict[str, Any]:
         """The patch as numbers, strings and lists, ready for JSON; `from_dict` restores it to the last bit."""
-        data = {
-            "shape": "cells",
-            "name": self.name,
-            "positions": self.positions.tolist(),
-            "areas": self.areas.tolist(),
-            "pressure": self.pressure.to_dict(),
-            **self._anisotropy_to_dict(),
-            **outlines.outline_to_dict(self.outline),
-        }
-        if self.cell_size is not None:
-            data["cell_size"] = list(self.cell_size)
-        return data if self.grid is None else {**data, "grid": dataclasses.asdict(self.grid)}
+        return plain_data.to_dict(self)
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> ContactPatch:
         """The patch that `to_dict` described; unknown and missing keys are errors that name them."""
-        optional = ("shape", "name", "pressure", "grid", "cell_size", "metric", "asymmetry", "outline")
-        validation.keys("patch", data, required=("positions", "areas"), optional=optional)
-        validation.choice("patch shape", data.get("shape", "cells"), ("cells",))
-        pressure, grid = data.get("pressure"), data.get("grid")
-        if isinstance(pressure, Mapping):
-            pressure = Pressure.from_dict(pressure)
-        if grid is not None:
-            validation.keys("grid", grid, required=[entry.name for entry in dataclasses.fields(Grid)])
-            grid = Grid(**grid)
-        name, options = data.get("name", "patch"), {key: data.get(key) for key in ("cell_size", "metric", "asymmetry")}
-        patch = cls(data["positions"], data["areas"], pressure, grid, name, **options)
-        return outlines.with_outline(patch, outlines.outline_from_dict(data.get("outline")))
+        return plain_data.from_dict(cls, data)
 
 
 def _square_grid(width: float, cells: int) -> Grid:
