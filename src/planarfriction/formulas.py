@@ -116,25 +116,29 @@ def cap(xp, deflection, largest):
 # ---------------------------------------------------------------------- moments of the bristles
 
 
-def slip_share(xp, deflection, cosine, elasto_plastic, breakaway_ratio):
+def slip_share(xp, deflection, cosine, evenness, elasto_plastic, breakaway_ratio):
     """Closure `beta` [-] of the moment equation, from `|z|/|z_ss|` and the cosine of the angle between z and z_ss.
 
-    `alpha (1 + cos)/2` for elasto-plastic bristles, 1 for plain LuGre: that of a single bristle.
+    `alpha (1 + cos)/2` for elasto-plastic bristles, 1 for plain LuGre: that of a single bristle, but for an earlier
+    breakaway `s_ba evenness`. `evenness = <v^2>/sqrt(<v^4>)`, over the cells' speeds, is 1 in translation; the less
+    even, the further the fastest cells are ahead of the mean and the earlier they slip.
     """
-    alpha = slip_fraction(xp, deflection, breakaway_ratio)
+    alpha = slip_fraction(xp, deflection, breakaway_ratio * evenness)
     return xp.where(elasto_plastic > 0.0, 0.5 * alpha * (1.0 + cosine), 1.0)
 
 
-def slip_share_partials(xp, deflection, cosine, elasto_plastic, breakaway_ratio):
-    """`slip_share` and its partial derivatives with respect to `deflection` and `cosine`."""
-    alpha = slip_fraction(xp, deflection, breakaway_ratio)
-    slope = slip_fraction_slope(xp, deflection, breakaway_ratio)
+def slip_share_partials(xp, deflection, cosine, evenness, elasto_plastic, breakaway_ratio):
+    """`slip_share` and its partial derivatives with respect to `deflection`, `cosine` and `evenness`."""
+    breakaway = breakaway_ratio * evenness
+    alpha = slip_fraction(xp, deflection, breakaway)
     half = 0.5 * (1.0 + cosine)
     elastic = elasto_plastic > 0.0
+    slope = xp.where(elastic, slip_fraction_slope(xp, deflection, breakaway) * half, 0.0)
     return (
         xp.where(elastic, alpha * half, 1.0),
-        xp.where(elastic, slope * half, 0.0),
+        slope,
         xp.where(elastic, 0.5 * alpha, 0.0),
+        breakaway_ratio * bristle_decay_by_breakaway(xp, slope, deflection, breakaway),
     )
 
 

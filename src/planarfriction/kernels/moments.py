@@ -18,10 +18,11 @@ from planarfriction import formulas
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import inlined, jit, kernel
 from planarfriction.kernels.law import law_of
-from planarfriction.kernels.steady import scaled_twist, sliding, steady_slopes
+from planarfriction.kernels.steady import evenness, scaled_twist, sliding, steady_slopes
 
 LINEAR = 43
-"""Numbers of a linearisation: `beta`, dz'/dz (1:10), dz'/dV_G (10:19), the inverse of D (19:28), dz_ss/dV_G (28:37)."""
+"""Numbers of a linearisation: `beta`, dz'/dz (1:10), dz'/dV_G (10:19), the inverse of D (19:28), dz_ss/dV_G (28:37),
+and the slopes of the evenness (37:40)."""
 
 
 @inlined
@@ -43,20 +44,20 @@ def to_origin(shape, gx, gy, gs):
 
 
 @inlined
-def closure(law, deflection, share):
-    """`beta` of a state z: `deflection = |z|/|z_ss|`, `share` = s."""
+def closure(law, deflection, share, even):
+    """`beta` of a state z: `deflection = |z|/|z_ss|`, `share` = s, `even` as in `steady.evenness`."""
     cosine = share / xp.where(deflection > 0.0, deflection, 1.0)
-    return formulas.slip_share(xp, deflection, cosine, law.elasto_plastic, law.breakaway_ratio)
+    return formulas.slip_share(xp, deflection, cosine, even, law.elasto_plastic, law.breakaway_ratio)
 
 
 @inlined
-def closure_partials(law, deflection, share):
-    """`beta` and its partial derivatives with respect to `deflection` and `share`."""
+def closure_partials(law, deflection, share, even):
+    """`beta` and its partial derivatives with respect to `deflection`, `share` and `even`."""
     per = xp.where(deflection > 0.0, 1.0 / xp.where(deflection > 0.0, deflection, 1.0), 0.0)
-    beta, by_deflection, by_cosine = formulas.slip_share_partials(
-        xp, deflection, share * per, law.elasto_plastic, law.breakaway_ratio
+    beta, by_deflection, by_cosine, by_even = formulas.slip_share_partials(
+        xp, deflection, share * per, even, law.elasto_plastic, law.breakaway_ratio
     )
-    return beta, by_deflection - by_cosine * share * per * per, by_cosine * per
+    return beta, by_deflection - by_cosine * share * per * per, by_cosine * per, by_even
 
 
 @inlined
@@ -68,11 +69,11 @@ def _rate(beta, share, decay, z, u, q):
 @kernel
 def evaluate(law, z, vx, vy, omega, shape, surface, data, zdot):
     """Write the rates of the moments into `zdot` and return the wrench `(fx, fy, tau)`."""
-    x, y, s, v, qx, qy, qs = sliding(law, vx, vy, omega, shape, surface, data)
+    x, y, s, v, qx, qy, qs, even = sliding(law, vx, vy, omega, shape, surface, data)
     power, per_q2 = x * qx + y * qy + s * qs, 1.0 / (qx * qx + qy * qy + qs * qs)
     decay = v * v / xp.where(power > 0.0, power, 1.0)
     share = (z[0] * qx + z[1] * qy + z[2] * qs) * per_q2
-    beta = closure(law, math.sqrt((z[0] * z[0] + z[1] * z[1] + z[2] * z[2]) * per_q2), share)
+    beta = closure(law, math.sqrt((z[0] * z[0] + z[1] * z[1] + z[2] * z[2]) * per_q2), share, even)
     zdot[0] = _rate(beta, share, decay, z[0], x, qx)
     zdot[1] = _rate(beta, share, decay, z[1], y, qy)
     zdot[2] = _rate(beta, share, decay, z[2], s, qs)
@@ -83,8 +84,11 @@ def evaluate(law, z, vx, vy, omega, shape, surface, data, zdot):
 
 
 @kernel
-def slopes(law, z, u, v, q, j, by_z, by_v):
-    """`dz'/dz` and `dz'/dV_G` [9] at the scaled twist `u`, from `q = z_ss` and its slopes `j`. Returns `beta`."""
+def slopes(law, z, u, v, q, j, even, j_even, by_z, by_v):
+    """`dz'/dz` and `dz'/dV_G` [9] at the scaled twist `u`, from `q = z_ss`, the evenness and their slopes.
+
+    Returns `beta`.
+    """
     zx, zy, zs = z[0], z[1], z[2]
     per_power = 1.0 / (u[0] * q[0] + u[1] * q[1] + u[2] * q[2])
     per_q2 = 1.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2])
@@ -92,7 +96,7 @@ def slopes(law, z, u, v, q, j, by_z, by_v):
     share = (zx * q[0] + zy * q[1] + zs * q[2]) * per_q2
     deflection = math.sqrt((zx * zx + zy * zy + zs * zs) * per_q2)
     per_deflection = 1.0 / deflection if deflection > 0.0 else 0.0
-    beta, by_deflection, by_share = closure_partials(law, deflection, share)
+    beta, by_deflection, by_share, by_even = closure_partials(law, deflection, share, even)
     for i in range(3):
         m_i = u[i] - decay * q[i]
         g_i = decay * z[i] + share * m_i
@@ -105,7 +109,7 @@ def slopes(law, z, u, v, q, j, by_z, by_v):
             u_j = u[0] * j[k] + u[1] * j[3 + k] + u[2] * j[6 + k]
             decay_k = (2.0 * u[k] - decay * (q[k] + u_j)) * per_power
             share_k = z_j * per_q2 - 2.0 * share * q_j
-            beta_k = by_share * share_k - by_deflection * deflection * q_j
+            beta_k = by_share * share_k - by_deflection * deflection * q_j + by_even * j_even[k]
             g_k = (z[i] - share * q[i]) * decay_k + m_i * share_k + share * (same - decay * j[3 * i + k])
             by_v[3 * i + k] = same - g_i * beta_k - beta * g_k
     return beta
@@ -118,7 +122,8 @@ def linearise(law, z, vx, vy, omega, shape, surface, data, lin):
     v = math.sqrt(x * x + y * y + s * s)
     if v > 0.0:
         q = steady_slopes(law, shape, surface, data, x, y, s, v, lin[28:43])
-        lin[0] = slopes(law, z, (x, y, s), v, q, lin[28:37], lin[1:10], lin[10:19])
+        even, lin[37], lin[38], lin[39] = evenness(shape, surface, data, x, y, s, v)
+        lin[0] = slopes(law, z, (x, y, s), v, q, lin[28:37], even, lin[37:40], lin[1:10], lin[10:19])
     else:
         for i in range(19):
             lin[i] = 0.0
@@ -195,7 +200,7 @@ def advance(law, z, held, shape, dt, out):
     s with the rate `mu = lambda cos^2(V_G, z_ss)` and of the rest with lambda. Plain LuGre is exact; elasto-plastic
     moments take the mean of beta at the start and at an end predicted by an implicit Euler step, which is second order.
     """
-    x, y, s, v, qx, qy, qs = held
+    x, y, s, v, qx, qy, qs, even = held
     zx, zy, zs = z[0], z[1], z[2]
     per_q2 = 1.0 / (qx * qx + qy * qy + qs * qs)
     power = x * qx + y * qy + s * qs
@@ -206,12 +211,12 @@ def advance(law, z, held, shape, dt, out):
     mx, my, ms = x - decay * qx, y - decay * qy, s - decay * qs
     share = (zx * qx + zy * qy + zs * qs) * per_q2
     size = math.sqrt((zx * zx + zy * zy + zs * zs) * per_q2)
-    start = closure(law, size, share)
+    start = closure(law, size, share, even)
     per = 1.0 / (1.0 + start * decay * dt)
     pull = dt * start * (share + slow * dt) / (1.0 + start * slow * dt)
     px, py, ps = zx + dt * x - pull * mx, zy + dt * y - pull * my, zs + dt * s - pull * ms
     predicted = per * math.sqrt((px * px + py * py + ps * ps) * per_q2)
-    end = closure(law, predicted, (share + slow * dt) / (1.0 + start * slow * dt))
+    end = closure(law, predicted, (share + slow * dt) / (1.0 + start * slow * dt), even)
     beta = formulas.mean_decay(start, end, decay * dt)
     rate = beta * decay * dt
     slow_rate = beta * slow * dt
@@ -228,7 +233,7 @@ def advance(law, z, held, shape, dt, out):
     back = formulas.cap(xp, new, formulas.reachable_deflection(xp, size, law.elasto_plastic))
     back = xp.where(moves, back, 1.0)
     share = (nx * qx + ny * qy + ns * qs) * per_q2 * back
-    beta = closure(law, new * back, share)
+    beta = closure(law, new * back, share, even)
     nx, ny, ns = nx * back, ny * back, ns * back
     out[0], out[1], out[2] = nx, ny, ns
     dx, dy = _rate(beta, share, decay, nx, x, qx), _rate(beta, share, decay, ny, y, qy)

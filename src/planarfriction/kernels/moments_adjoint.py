@@ -17,7 +17,7 @@ from planarfriction import formulas
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import inlined, jit, kernel, moments
 from planarfriction.kernels.law import law_of
-from planarfriction.kernels.steady import scaled_twist, steady_slopes
+from planarfriction.kernels.steady import evenness, scaled_twist, steady_slopes
 
 _ROUNDING = 1.0 + 256.0 * 2.220446049250313e-16
 
@@ -31,6 +31,7 @@ class Stage(NamedTuple):
     beta: float
     by_deflection: float
     by_share: float
+    by_even: float
 
 
 class Step(NamedTuple):
@@ -82,21 +83,21 @@ def _sum(a, x, b, y, c, z):
 
 
 @inlined
-def _stage(law, z, q, per_q2, factor, share):
+def _stage(law, z, q, per_q2, factor, share, even):
     deflection = factor * math.sqrt(_dot(z, z) * per_q2)
-    return Stage(z, deflection, share, *moments.closure_partials(law, deflection, share))
+    return Stage(z, deflection, share, *moments.closure_partials(law, deflection, share, even))
 
 
 @kernel
-def linearise(law, z, u, v, q, dt):
-    """`Step` from z at the scaled twist u, which moves at `v > 0` and has the steady state q."""
+def linearise(law, z, u, v, q, even, dt):
+    """`Step` from z at the scaled twist u, which moves at `v > 0` and has the steady state q and that evenness."""
     per_q2, power = 1.0 / _dot(q, q), _dot(u, q)
     decay, slow = v * v / power, power * per_q2
     m = _sum(1.0, u, -decay, q, 0.0, q)
-    start = _stage(law, z, q, per_q2, 1.0, _dot(z, q) * per_q2)
+    start = _stage(law, z, q, per_q2, 1.0, _dot(z, q) * per_q2, even)
     per_slow, per = 1.0 / (1.0 + start.beta * slow * dt), 1.0 / (1.0 + start.beta * decay * dt)
     share = (start.share + slow * dt) * per_slow
-    predicted = _stage(law, _sum(1.0, z, dt, u, -dt * start.beta * share, m), q, per_q2, per, share)
+    predicted = _stage(law, _sum(1.0, z, dt, u, -dt * start.beta * share, m), q, per_q2, per, share, even)
     beta = formulas.mean_decay(start.beta, predicted.beta, decay * dt)
     by_start, by_end = formulas.mean_decay_partials(start.beta, predicted.beta, decay * dt)
     half = 0.5 * (start.beta + predicted.beta)
@@ -118,7 +119,7 @@ def linearise(law, z, u, v, q, dt):
         u, q, m, per_q2, 1.0 / power, decay, slow, start, per_slow, per, predicted, beta, by_start, by_end, by_decay,
         left_slow, left, mean_gap, formulas.relaxation_slope(xp, gap, left_gap, mean_gap),
         mean, formulas.relaxation_slope(xp, rate, left, mean),
-        _stage(law, new, q, per_q2, 1.0, _dot(new, q) * per_q2), free, size, back, capped, start.deflection > 1.0,
+        _stage(law, new, q, per_q2, 1.0, _dot(new, q) * per_q2, even), free, size, back, capped, start.deflection > 1.0,
     )  # fmt: skip
 
 
@@ -130,8 +131,8 @@ def _relative(stage, factor, per_q2, q, dz, q_dq):
 
 
 @kernel
-def tangent(law, s, dt, dz, du, dq):
-    """Changes of the new state and of the scaled traction (per unit load) with those of z, u and q."""
+def tangent(law, s, dt, dz, du, dq, d_even):
+    """Changes of the new state and of the scaled traction (per unit load) with those of z, u, q and the evenness."""
     q_dq = _dot(s.q, dq) * s.per_q2
     power = _dot(du, s.q) + _dot(s.u, dq)
     d_decay = (2.0 * _dot(s.u, du) - s.decay * power) * s.per_power
@@ -140,14 +141,14 @@ def tangent(law, s, dt, dz, du, dq):
     start, predicted = s.start, s.predicted
     d_size, d_share = _relative(start, 1.0, s.per_q2, s.q, dz, q_dq)
     d_share += _dot(start.z, dq) * s.per_q2
-    d_start = start.by_deflection * d_size + start.by_share * d_share
+    d_start = start.by_deflection * d_size + start.by_share * d_share + start.by_even * d_even
     # predicted end
     ahead = (d_share + d_slow * dt - predicted.share * dt * (d_start * s.slow + start.beta * d_slow)) * s.per_slow
     dp = _sum(1.0, dz, dt, du, -dt * start.beta * predicted.share, dm)
     dp = _sum(1.0, dp, -dt * (d_start * predicted.share + start.beta * ahead), s.m, 0.0, dq)
     d_predicted, _ = _relative(predicted, s.per, s.per_q2, s.q, dp, q_dq)
     d_predicted -= predicted.deflection * s.per * dt * (d_start * s.decay + start.beta * d_decay)
-    d_end = predicted.by_deflection * d_predicted + predicted.by_share * ahead
+    d_end = predicted.by_deflection * d_predicted + predicted.by_share * ahead + predicted.by_even * d_even
     d_beta = s.by_start * d_start + s.by_end * d_end + s.by_decay * d_decay * dt
     # the exponential
     d_slow_rate = dt * (d_beta * s.slow + s.beta * d_slow)
@@ -173,7 +174,7 @@ def tangent(law, s, dt, dz, du, dq):
     end = s.end
     d_final, d_share = _relative(end, 1.0, s.per_q2, s.q, dn, q_dq)
     d_share += _dot(end.z, dq) * s.per_q2
-    d_beta = end.by_deflection * d_final + end.by_share * d_share
+    d_beta = end.by_deflection * d_final + end.by_share * d_share + end.by_even * d_even
     held = _sum(s.decay, end.z, end.share, s.m, 0.0, dq)
     d_held = _sum(s.decay, dn, d_decay, end.z, end.share, dm)
     d_held = _sum(1.0, d_held, d_share, s.m, 0.0, dq)
@@ -187,15 +188,15 @@ def _unit(i):
 
 
 @kernel
-def _jacobian(law, z, x, y, s, v, q, j, dt, out):
+def _jacobian(law, z, x, y, s, v, q, j, even, dt, out):
     """Changes of the new state (rows 0..2) and the scaled traction (3..5) with z (columns 0..2) and V_G (3..5)."""
     zero = (0.0, 0.0, 0.0)
-    held = linearise(law, (z[0], z[1], z[2]), (x, y, s), v, q, dt)
+    held = linearise(law, (z[0], z[1], z[2]), (x, y, s), v, q, even[0], dt)
     for i in range(3):
-        new, pull = tangent(law, held, dt, _unit(i), zero, zero)
+        new, pull = tangent(law, held, dt, _unit(i), zero, zero, 0.0)
         for k in range(3):
             out[k, i], out[3 + k, i] = new[k], pull[k]
-        new, pull = tangent(law, held, dt, zero, _unit(i), (j[i], j[3 + i], j[6 + i]))
+        new, pull = tangent(law, held, dt, zero, _unit(i), (j[i], j[3 + i], j[6 + i]), even[1 + i])
         for k in range(3):
             out[k, 3 + i], out[3 + k, 3 + i] = new[k], pull[k]
 
@@ -219,6 +220,7 @@ def jacobians(law_row, shape, surface, data, z, twist, dt, out):
         v = math.sqrt(x * x + y * y + s * s)
         if v > 0.0:
             q = steady_slopes(law, shape, surface, data, x, y, s, v, j)
-            _jacobian(law, z[b], x, y, s, v, q, j, dt[b], out[b])
+            even = evenness(shape, surface, data, x, y, s, v)
+            _jacobian(law, z[b], x, y, s, v, q, j, even, dt[b], out[b])
         else:
             _jacobian_at_rest(law, dt[b], out[b])

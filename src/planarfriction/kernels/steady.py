@@ -1,7 +1,8 @@
 """Steady sliding of a patch from a stored map, in scaled coordinates `V_G = F V` (see `kernels.moments`).
 
-A map is eight numbers (faces, n, n of the Stribeck part, its levels, knee, least dissipation, 0, 0), then two maps of
-`kernels.cube`: `h_0`, steady sliding at `g = 1`, and the rest r of that at `g = e = exp(-|v/v_s|^gamma)`,
+A map is eight numbers (faces, n, n of the Stribeck part, its levels, knee, least dissipation, 0, 0), the matrix K
+[6, 6] of `<v^4> = m' K m` with `m = (x^2, y^2, s^2, x y, x s, y s)` of V_G, then two maps of `kernels.cube`: `h_0`,
+steady sliding at `g = 1`, and the rest r of that at `g = e = exp(-|v/v_s|^gamma)`,
 
     sigma_0 z_ss = (mu_s - (mu_s - mu_c) t) h_0 + (mu_s - mu_c) r(t),   t = |V_G| / (|V_G| + knee v_s)
 """
@@ -14,7 +15,10 @@ from planarfriction import formulas
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import cube, inlined, kernel
 
-HEADER = 8
+QUARTIC = 8
+"""Where K begins."""
+
+HEADER = QUARTIC + 36
 """Numbers in front of a map."""
 
 
@@ -126,11 +130,62 @@ def steady_slopes(law, shape, surface, data, x, y, s, v, j):
 
 
 @inlined
+def _fourth(data, start, m):
+    """`K m`."""
+    k = start + QUARTIC
+    return (
+        _row(data, k, m),
+        _row(data, k + 6, m),
+        _row(data, k + 12, m),
+        _row(data, k + 18, m),
+        _row(data, k + 24, m),
+        _row(data, k + 30, m),
+    )
+
+
+@inlined
+def _row(data, k, m):
+    low = data[k] * m[0] + data[k + 1] * m[1] + data[k + 2] * m[2]
+    return low + data[k + 3] * m[3] + data[k + 4] * m[4] + data[k + 5] * m[5]
+
+
+@inlined
+def _blended(one, other, share):
+    return (
+        one[0] + share * (other[0] - one[0]),
+        one[1] + share * (other[1] - one[1]),
+        one[2] + share * (other[2] - one[2]),
+        one[3] + share * (other[3] - one[3]),
+        one[4] + share * (other[4] - one[4]),
+        one[5] + share * (other[5] - one[5]),
+    )
+
+
+@inlined
+def evenness(shape, surface, data, x, y, s, v):
+    """`<v^2>/sqrt(<v^4>)` of the cells' speeds at the scaled twist, and its slopes by that, for `v > 0`."""
+    per = 1.0 / v
+    x, y, s = x * per, y * per, s * per
+    m = (x * x, y * y, s * s, x * y, x * s, y * s)
+    k = _fourth(data, surface[0], m)
+    if shape[6] > 0.0:
+        k = _blended(k, _fourth(data, surface[1], m), shape[6])
+    square = 1.0 / (k[0] * m[0] + k[1] * m[1] + k[2] * m[2] + k[3] * m[3] + k[4] * m[4] + k[5] * m[5])
+    even = math.sqrt(square)
+    c = 2.0 * even * per
+    by_x = x - square * (k[0] * x + 0.5 * (k[3] * y + k[4] * s))
+    by_y = y - square * (k[1] * y + 0.5 * (k[3] * x + k[5] * s))
+    by_s = s - square * (k[2] * s + 0.5 * (k[4] * x + k[5] * y))
+    return even, c * by_x, c * by_y, c * by_s
+
+
+@inlined
 def sliding(law, vx, vy, omega, shape, surface, data):
-    """Scaled twist, its norm, and its steady state (any where the patch is at rest): what `advance` holds."""
+    """Scaled twist, its norm, its steady state and evenness (any where the patch is at rest): what `advance` holds."""
     x, y, s = scaled_twist(shape, vx, vy, omega)
     v = math.sqrt(x * x + y * y + s * s)
     if v > 0.0:
         qx, qy, qs = steady(law, shape, surface, data, x, y, s, v)
-        return x, y, s, v, qx, qy, qs
-    return 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0
+        even = evenness(shape, surface, data, x, y, s, v)[0] if law.elasto_plastic > 0.0 else 1.0
+        return x, y, s, v, qx, qy, qs, even
+    return 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0

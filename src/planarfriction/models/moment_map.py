@@ -8,7 +8,7 @@ import numpy as np
 
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels.cell_sums import steady_sums
-from planarfriction.kernels.steady import HEADER
+from planarfriction.kernels.steady import HEADER, QUARTIC
 from planarfriction.models import cube_map
 from planarfriction.patch import ContactPatch
 
@@ -88,7 +88,16 @@ def moment_map(cells: np.ndarray, gamma: float, segments: int, speeds: int) -> n
     levels = np.einsum("lt,fijtc->fijlc", cube_map.level_matrix(speeds), rest, optimize=True)
     header = np.zeros(HEADER)
     header[:6] = 3, segments, coarse, speeds + 2, KNEE, LEAST_SHARE * least
+    header[QUARTIC:] = fourth_moments(cells).ravel()
     return np.concatenate([header, *(_numbers(values) for values in (steady, levels))])
+
+
+def fourth_moments(cells: np.ndarray) -> np.ndarray:
+    """K [6, 6] of `<v^4> = m' K m`, m the products of a scaled twist (see `kernels.steady`), of `cells` `[N, 5]`."""
+    x, y, weights = cells[:, 0], cells[:, 1], cells[:, 4]
+    zero, one = np.zeros_like(x), np.ones_like(x)
+    squares = np.stack([one, one, x * x + y * y, zero, -2.0 * y, 2.0 * x])  # |u|^2 = squares . m
+    return np.einsum("n,in,jn->ij", weights, squares, squares)
 
 
 def _sums(cells: np.ndarray, n: int, exponents: np.ndarray, gamma: float) -> np.ndarray:

@@ -148,7 +148,8 @@ def _few(patch: ContactPatch, weights: np.ndarray, nodes: np.ndarray | None) -> 
     law = PerCell(values[0]) if nodes is None else Tabulated(nodes, values)
     few = ContactPatch(patch.positions[kept], np.full(count, patch.areas.sum() / count), law, None, patch.name)
     asymmetry = None if patch.asymmetry is None else patch.asymmetries()[0]
-    return few if patch.root is None and asymmetry is None else few.with_friction_metric(patch.metric, asymmetry)
+    metric = None if patch.root is None else np.reshape(patch.metric, (-1, 2, 2))[0]
+    return few if metric is None and asymmetry is None else few.with_friction_metric(metric, asymmetry)
 
 
 # ---------------------------------------------------------------------- one set of weights
