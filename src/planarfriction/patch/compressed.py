@@ -1,12 +1,14 @@
-"""Few cells that stand for many: same moments of the pressure, nearly the same limit surface.
+"""Few cells that stand for many: same moments of the pressure, same wrench of a spin, nearly the same limit surface.
 
 Start from all cells and drop those with the least weight, a tenth at a time. After each round the weights x that are
 left are found anew, as near as possible to the limit surface of the weights w of all cells:
 
     minimise sum_k (Phi_k(x)/Phi_k(w) - 1)^2   subject to   sum x p(rho) = sum w p(rho) for all p up to the degree
 
+and to the same wrench of a spin about the centre of pressure, `sum x |rho|` (the contact radius) and `sum x rho/|rho|`,
 with `Phi_k(x) = sum x |v|` the dissipation of K twists spread evenly over the sphere of directions. Cells whose weight
-comes out negative are dropped too. Tchakaloff's theorem says that as many cells as moments suffice.
+comes out negative are dropped too. Tchakaloff's theorem says that as many
+cells as sums kept suffice.
 """
 
 from __future__ import annotations
@@ -163,7 +165,7 @@ class _Problem(NamedTuple):
     cells: np.ndarray
     """Their indices `[C]`."""
     moments: np.ndarray
-    """Independent moments of one unit of weight on each cell, `[M, C]`."""
+    """Independent moments and spin wrench of one unit of weight on each cell, `[M, C]`."""
     moments_wanted: np.ndarray
     surface: np.ndarray
     """Relative dissipations of the same, `[K, C]`, times `1/sqrt(K)`."""
@@ -177,7 +179,7 @@ class _Problem(NamedTuple):
         chosen = rows.thinned(scaled)
         whole = rows.dissipation(scaled, weights[loaded], twists)
         speeds = rows.speeds(scaled[chosen], twists) / (whole[:, None] * math.sqrt(DIRECTIONS))
-        polynomials = rows.polynomials(scaled, degree)
+        polynomials = np.vstack([rows.polynomials(scaled, degree), rows.spin(scaled)])
         moments, turn = rows.independent(polynomials[:, chosen])
         wanted = turn @ (polynomials @ weights[loaded])
         surface_wanted = np.full(DIRECTIONS, 1.0 / math.sqrt(DIRECTIONS))
@@ -186,7 +188,7 @@ class _Problem(NamedTuple):
     def solution(self, most: int, favoured: np.ndarray) -> np.ndarray:
         """Weights `[N]` with at most `most` cells, where it can be those `favoured` `[N]`."""
         if most < len(self.moments):
-            raise InvalidValueError("cells", f"be at least the number of moments, {len(self.moments)}", most)
+            raise InvalidValueError("cells", f"be at least the number of kept sums, {len(self.moments)}", most)
         kept = np.ones(len(self.cells), dtype=bool)
         liked = favoured[self.cells]
         weights, share = self._weights(kept), SHARE_DROPPED

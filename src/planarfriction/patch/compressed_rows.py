@@ -6,6 +6,9 @@ import math
 
 import numpy as np
 
+NO_DISTANCE = 1e-12
+"""Distance from the centre of pressure that is rounding, in contact radii."""
+
 INDEPENDENT = 1e-10
 """Relative singular value below which moments count as dependent on the others (on a line, or on few points)."""
 
@@ -56,6 +59,16 @@ def polynomials(scaled: np.ndarray, degree: int) -> np.ndarray:
     unit = (scaled - (low + high) / 2) / np.where(half > 0.0, half, 1.0)
     x, y = (np.polynomial.chebyshev.chebvander(column, degree).T for column in unit.T)
     return np.array([x[i] * y[j] for i in range(degree + 1) for j in range(degree + 1 - i)])
+
+
+def spin(scaled: np.ndarray) -> np.ndarray:
+    """Wrench of each cell in a spin about the centre of pressure, `|rho|`, `x/|rho|`, `y/|rho|`, `[3, N]`.
+
+    A cell nearer than rounding to the centre has no direction.
+    """
+    distance = np.hypot(*scaled.T)
+    away = distance > NO_DISTANCE
+    return np.stack([distance, *np.where(away, scaled.T / np.where(away, distance, 1.0), 0.0)])
 
 
 def independent(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
