@@ -285,7 +285,7 @@ def fixed_at(load: float) -> pf.ContactPatch:
     """The soft finger's shape at a load, as a patch that keeps it."""
     positions, weights = FINGER.positions, FINGER.weights(load)
     return pf.ContactPatch(
-        positions[weights > 0.0], np.full((weights > 0).sum(), 1e-6), weights[weights > 0], FINGER.grid
+        positions[weights > 0.0], FINGER.areas[weights > 0.0], weights[weights > 0], FINGER.grid
     )
 
 
