@@ -5,6 +5,7 @@ from planarfriction.patch.files import read_pressure_map
 from planarfriction.patch.grid import Grid
 from planarfriction.patch.metric import grain
 from planarfriction.patch.pressure import LinearGradient, PerCell, Pressure, SoftFinger, Uniform
+from planarfriction.patch.pressure_maps import PressureMaps
 from planarfriction.patch.published import PUBLISHED_PATCHES
 
 __all__ = [
@@ -14,6 +15,7 @@ __all__ = [
     "LinearGradient",
     "PerCell",
     "Pressure",
+    "PressureMaps",
     "SoftFinger",
     "Uniform",
     "grain",

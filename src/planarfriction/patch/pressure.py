@@ -42,6 +42,10 @@ class Pressure:
         """The law for those cells of a patch that are `kept`, `[N]` of bool."""
         return self
 
+    def repeated(self, times: int) -> Pressure:
+        """The law for a patch whose cells are each cut into `times` new ones."""
+        return self
+
     def to_dict(self) -> dict[str, Any] | list[float]:
         """The law as plain data: `{"law": name, parameter: value, ...}`, or a list with one pressure per cell."""
         fields = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}  # pyright: ignore
@@ -50,8 +54,10 @@ class Pressure:
 
     @staticmethod
     def from_dict(data: Mapping[str, Any]) -> Pressure:
-        """The law described by `{"law": "uniform" | "linear_gradient" | "soft_finger", parameter: value, ...}`."""
-        laws = {kind.law: kind for kind in (Uniform, LinearGradient, SoftFinger)}
+        """The law described by `{"law": name, parameter: value, ...}`."""
+        from planarfriction.patch.pressure_maps import PressureMaps
+
+        laws = {kind.law: kind for kind in (Uniform, LinearGradient, SoftFinger, PressureMaps)}
         if not isinstance(data, Mapping) or "law" not in data:
             raise InvalidValueError("pressure", f"be a table with law = {' or '.join(laws)}", data)
         kind = laws[validation.choice("pressure law", data["law"], laws)]
@@ -177,6 +183,9 @@ class PerCell(Pressure):
 
     def only(self, kept: np.ndarray) -> PerCell:
         return PerCell(self.values[kept])
+
+    def repeated(self, times: int) -> PerCell:
+        return PerCell(np.repeat(self.values, times))
 
     def to_dict(self) -> list[float]:
         return self.values.tolist()
