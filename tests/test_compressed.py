@@ -151,14 +151,6 @@ def test_bad_loads(loads):
         SOFT.compressed(loads=loads)
 
 
-@pytest.mark.parametrize(
-    ("loads", "values"), [([1.0], [[1.0]]), ([1.0, 1.0], [[1.0], [1.0]]), ([1.0, 2.0], [[1.0, 0.0], [0.0, 0.0]])]
-)
-def test_bad_tables(loads, values):
-    with pytest.raises(InvalidValueError):
-        pf.patch.Tabulated(loads, values)
-
-
 def end_error(case):
     """Largest distance of the centre of mass from the full model's [m]."""
     patch = PUBLISHED_PATCHES[case.shape]()

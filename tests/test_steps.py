@@ -284,9 +284,7 @@ def soft(on_load_change: str = "rebuild", kind=pf.LimitSurfaceTablePublished, no
 def fixed_at(load: float) -> pf.ContactPatch:
     """The soft finger's shape at a load, as a patch that keeps it."""
     positions, weights = FINGER.positions, FINGER.weights(load)
-    return pf.ContactPatch(
-        positions[weights > 0.0], FINGER.areas[weights > 0.0], weights[weights > 0], FINGER.grid
-    )
+    return pf.ContactPatch(positions[weights > 0.0], FINGER.areas[weights > 0.0], weights[weights > 0], FINGER.grid)
 
 
 @pytest.mark.parametrize("kind", SURFACES.values())

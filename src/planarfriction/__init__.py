@@ -27,6 +27,7 @@ _HOME = {
     "LimitSurfaceTablePublished": "planarfriction.limit_surface",
     "LinearGradient": "planarfriction.patch",
     "LuGre": "planarfriction.laws",
+    "PressureMaps": "planarfriction.patch",
     "ReducedModel": "planarfriction.models",
     "ReducedModelPublished": "planarfriction.models",
     "Scene": "planarfriction.scenes",
@@ -83,5 +84,5 @@ if TYPE_CHECKING:  # for editors and type checkers: the same names as above
         LimitSurfaceTablePublished,
     )
     from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
-    from planarfriction.patch import ContactPatch, LinearGradient, SoftFinger, Uniform, grain
+    from planarfriction.patch import ContactPatch, LinearGradient, PressureMaps, SoftFinger, Uniform, grain
     from planarfriction.scenes import Body, Contact, Scene, Signal, Solution, load, simulate

@@ -1,6 +1,6 @@
 """Steady sliding summed over the cells of a patch, for many directions of the twist at once.
 
-A cell is a rectangle (or a segment, or a point) of uniform pressure. One near the centre of rotation, where the sliding
+A cell is a parallelogram (or a segment, or a point) of uniform pressure. One near the centre of rotation, where the sliding
 direction turns within it, is halved both ways until its parts are far from it or `DEPTH` times halved; every part is
 then a 2 x 2 Gauss rule.
 """
@@ -18,7 +18,7 @@ DEPTH = 6
 """How often a cell at the centre of rotation is halved: its last parts hold 1/4096 of its load (of a segment 1/64)."""
 
 NEAR = 1.5
-"""Distance from the centre of rotation in widths below which a cell is cut; the Gauss rule errs by 1e-4 of it there."""
+"""Distance from the centre of rotation in longer edges below which a cell is cut; the Gauss rule errs by 1e-4 of it there."""
 
 _BLOCK = 512
 _GAUSS = 0.5 / math.sqrt(3.0)
@@ -71,15 +71,14 @@ def _push(count, points, ux, uy, x, y, w, vx, vy, spin):
 
 
 @inlined
-def _cut(stack, top, x, y, width, height, weight, level):
-    """Replace a cell by its halves: four of a rectangle, two of a segment."""
-    parts = 4 if width > 0.0 and height > 0.0 else 2
+def _cut(stack, top, x, y, ax, ay, bx, by, weight, level, parts):
+    """Replace a cell by its halves: four of a parallelogram, two of a segment."""
     for p in range(parts):
-        right = 0.25 if p & 1 else -0.25
-        up = (0.25 if p & 2 else -0.25) if parts == 4 else right
-        stack[top, 0], stack[top, 1] = x + right * width, y + up * height
-        stack[top, 2], stack[top, 3] = 0.5 * width, 0.5 * height
-        stack[top, 4], stack[top, 5] = weight / parts, level + 1.0
+        along = 0.25 if p & 1 else -0.25
+        across = (0.25 if p & 2 else -0.25) if parts == 4 else along
+        stack[top, 0], stack[top, 1] = x + along * ax + across * bx, y + along * ay + across * by
+        stack[top, 2], stack[top, 3], stack[top, 4], stack[top, 5] = 0.5 * ax, 0.5 * ay, 0.5 * bx, 0.5 * by
+        stack[top, 6], stack[top, 7] = weight / parts, level + 1.0
         top += 1
     return top
 
@@ -88,30 +87,32 @@ def _cut(stack, top, x, y, width, height, weight, level):
 def _sum(vx, vy, spin, cells, exponents, gamma, stack, points, ux, uy, power, out):
     count = 0
     for c in range(cells.shape[0]):
-        for i in range(5):
+        for i in range(7):
             stack[0, i] = cells[c, i]
-        stack[0, 5] = 0.0
+        stack[0, 7] = 0.0
         top = 1
         while top > 0:
             top -= 1
-            x, y, width, height = stack[top, 0], stack[top, 1], stack[top, 2], stack[top, 3]
-            weight, level = stack[top, 4], stack[top, 5]
-            reach = NEAR * spin * max(width, height)
+            x, y, weight, level = stack[top, 0], stack[top, 1], stack[top, 6], stack[top, 7]
+            ax, ay, bx, by = stack[top, 2], stack[top, 3], stack[top, 4], stack[top, 5]
+            a, b = math.sqrt(ax * ax + ay * ay), math.sqrt(bx * bx + by * by)
+            reach = NEAR * spin * max(a, b)
             sx, sy = vx - spin * y, vy + spin * x
             if sx * sx + sy * sy < reach * reach and level < DEPTH:
-                top = _cut(stack, top, x, y, width, height, weight, level)
+                top = _cut(stack, top, x, y, ax, ay, bx, by, weight, level, 4 if a > 0.0 and b > 0.0 else 2)
                 continue
             if count + 4 > _BLOCK:
                 _flush(count, points, ux, uy, power, exponents, gamma, out)
                 count = 0
-            gx, gy = _GAUSS * width, _GAUSS * height
-            if width > 0.0 and height > 0.0:
+            gx, gy, hx, hy = _GAUSS * ax, _GAUSS * ay, _GAUSS * bx, _GAUSS * by
+            if a > 0.0 and b > 0.0:
                 w = 0.25 * weight
-                count = _push(count, points, ux, uy, x - gx, y - gy, w, vx, vy, spin)
-                count = _push(count, points, ux, uy, x + gx, y - gy, w, vx, vy, spin)
-                count = _push(count, points, ux, uy, x - gx, y + gy, w, vx, vy, spin)
-                count = _push(count, points, ux, uy, x + gx, y + gy, w, vx, vy, spin)
-            elif width > 0.0 or height > 0.0:
+                count = _push(count, points, ux, uy, x - gx - hx, y - gy - hy, w, vx, vy, spin)
+                count = _push(count, points, ux, uy, x + gx - hx, y + gy - hy, w, vx, vy, spin)
+                count = _push(count, points, ux, uy, x - gx + hx, y - gy + hy, w, vx, vy, spin)
+                count = _push(count, points, ux, uy, x + gx + hx, y + gy + hy, w, vx, vy, spin)
+            elif a > 0.0 or b > 0.0:
+                gx, gy = gx + hx, gy + hy
                 count = _push(count, points, ux, uy, x - gx, y - gy, 0.5 * weight, vx, vy, spin)
                 count = _push(count, points, ux, uy, x + gx, y + gy, 0.5 * weight, vx, vy, spin)
             else:
@@ -123,11 +124,11 @@ def _sum(vx, vy, spin, cells, exponents, gamma, stack, points, ux, uy, power, ou
 def steady_sums(directions, cells, exponents, gamma, out):
     """`sum w e u/|u|` and its moment of M scaled twists into `out` [M, 1 + E, 3].
 
-    `directions` [M, 3] need not be unit vectors; `cells` [N, 5]: x, y, width, height over the radius of gyration, and
-    the weight. `e` is 1 in row 0 and `exp(-exponents[k] |u|^gamma)` of the unit direction in row 1 + k; `exponents`
+    `directions` [M, 3] need not be unit vectors; `cells` [N, 7]: centre (x, y) and the two edges (x, y, x, y) over
+    the radius of gyration, and the weight. `e` is 1 in row 0 and `exp(-exponents[k] |u|^gamma)` of the unit direction in row 1 + k; `exponents`
     [E] ascend.
     """
-    stack, points = np.empty((4 * DEPTH + 4, 6)), np.empty((3, _BLOCK))
+    stack, points = np.empty((4 * DEPTH + 4, 8)), np.empty((3, _BLOCK))
     ux, uy, power = np.empty(_BLOCK), np.empty(_BLOCK), np.empty(_BLOCK)
     for m in range(directions.shape[0]):
         d = directions[m]

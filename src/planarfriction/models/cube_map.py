@@ -14,6 +14,7 @@ alone has one value of it on both sides of a node. At a corner three such relati
 
 from __future__ import annotations
 
+import functools
 import itertools
 
 import numpy as np
@@ -46,7 +47,7 @@ def hermite(values: np.ndarray) -> np.ndarray:
     The four numbers are the value, its slopes by a and b and the mixed slope, per coordinate of the face.
     """
     n = (values.shape[1] - 1) // 2 - GHOSTS
-    slope = _spline_slope(_coordinates(n, GHOSTS))[_INNER]
+    slope = _spline_slope(n, GHOSTS)[_INNER]
     by_a = np.einsum("ri,fijm->frjm", slope, values, optimize=True)
     result = np.empty((6, 2 * n + 1, 2 * n + 1, 4, values.shape[-1]))
     result[:, :, :, 0], result[:, :, :, 1] = values[:, _INNER, _INNER], by_a[:, :, _INNER]
@@ -83,11 +84,25 @@ def _coordinates(n: int, ghosts: int = 0) -> np.ndarray:
     return np.arange(-n - ghosts, n + ghosts + 1) / n
 
 
-def _spline_slope(nodes: np.ndarray) -> np.ndarray:
-    """Matrix from values at nodes to the slopes of the cubic spline through them, there."""
+@functools.lru_cache(maxsize=16)
+def _spline_slope(n: int, ghosts: int = 0) -> np.ndarray:
+    """Matrix from values at the nodes to the slopes of the cubic spline through them, there."""
     from scipy.interpolate import CubicSpline
 
+    nodes = _coordinates(n, ghosts)
     return CubicSpline(nodes, np.eye(len(nodes)))(nodes, 1)
+
+
+@functools.lru_cache(maxsize=16)
+def _clamped_spline(n: int) -> tuple[np.ndarray, np.ndarray]:
+    """Matrices from values at the nodes and the slopes at both ends to slopes and second derivatives at the nodes."""
+    from scipy.interpolate import CubicSpline
+
+    nodes, count = _coordinates(n), 2 * n + 1
+    basis = np.eye(count + 2)
+    ends = ((1, basis[count]), (1, basis[count + 1]))
+    spline = CubicSpline(nodes, basis[:count], bc_type=ends)  # pyright: ignore
+    return spline(nodes, 1), spline(nodes, 2)
 
 
 def _nodes_at(numbers: np.ndarray, k: int, point: tuple) -> np.ndarray:
@@ -124,10 +139,9 @@ def _match_corners(numbers: np.ndarray) -> dict[tuple, np.ndarray]:
 
 def _match_edges(numbers: np.ndarray, gradients: dict[tuple, np.ndarray]) -> dict[tuple, np.ndarray]:
     """Values and slopes along the edges, at their inner nodes; returns `z F_j + F_jj` at each corner, by edge."""
-    from scipy.interpolate import CubicSpline
-
-    nodes = _coordinates((numbers.shape[1] - 1) // 2)
-    slope, z, inner = _spline_slope(nodes), nodes[:, None], slice(1, -1)
+    n = (numbers.shape[1] - 1) // 2
+    slope, z, inner = _spline_slope(n), _coordinates(n)[:, None], slice(1, -1)
+    to_slope, to_bend = _clamped_spline(n)
     bends = {}
     for j, s, q in itertools.product(range(3), (1.0, -1.0), (1.0, -1.0)):
         k, i = (j + 1) % 3, (j + 2) % 3
@@ -138,10 +152,10 @@ def _match_edges(numbers: np.ndarray, gradients: dict[tuple, np.ndarray]) -> dic
         for end in (-1.0, 1.0):
             point[j] = end
             corners.append(tuple(point))
-        ends = [(1, gradients[corner][j]) for corner in corners]
-        spline = CubicSpline(nodes, 0.5 * (one[:, 0] + two[:, 0]), bc_type=tuple(ends))  # pyright: ignore
-        along, bend = spline(nodes, 1), spline(nodes, 2)
-        one[:, 0] = two[:, 0] = spline(nodes)
+        shared = 0.5 * (one[:, 0] + two[:, 0])
+        known = np.concatenate([shared, [gradients[corner][j] for corner in corners]])
+        along, bend = to_slope @ known, to_bend @ known
+        one[:, 0] = two[:, 0] = shared
         one[:, _entry(k, j)] = two[:, _entry(i, j)] = along
         across, back = one[:, _entry(k, i)], two[:, _entry(i, k)]
         miss = (s * back + q * across + z * along)[inner]

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels.cell_sums import steady_sums
 from planarfriction.kernels.steady import HEADER, QUARTIC
 from planarfriction.models import cube_map
+from planarfriction.models.steady_sums import ScaledCells
 from planarfriction.patch import ContactPatch
 
 KNEE = 1.5
@@ -48,67 +48,71 @@ def moment_shape(
 ) -> MomentShape:
     """What a patch is at a load; `segments` and `speeds` as in `ReducedModel`."""
     factor = slip_factor(patch, normal_force)
-    return MomentShape(factor, moment_map(scaled_cells(patch, normal_force, factor), gamma, segments, speeds))
+    return MomentShape(factor, moment_map(ScaledCells(patch, normal_force, factor), gamma, segments, speeds))
 
 
-def slip_factor(patch: ContactPatch, normal_force: float | None) -> np.ndarray:
-    """F [3, 3], upper triangular, with `F'F = sum(w B'B)`: the cells' velocities are `B V`."""
-    x, y = patch.centre_of_pressure(normal_force)
-    gyration = float(np.sqrt(patch.second_moment(normal_force)))
-    if not gyration > 0.0:
-        raise InvalidValueError("patch", "have more than one loaded point", f"a radius of gyration of {gyration} m")
-    return np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, gyration]])
+def owner(data: np.ndarray) -> tuple[np.ndarray, int]:
+    """The flat array that `data` is a piece of, and where in it the piece begins; itself and 0 if it is no piece."""
+    base = data.base
+    if not (isinstance(base, np.ndarray) and base.ndim == 1 and base.dtype == data.dtype and base.flags.c_contiguous):
+        return data, 0
+    return base, (data.ctypes.data - base.ctypes.data) // data.itemsize
 
 
-def scaled_cells(patch: ContactPatch, normal_force: float | None, factor: np.ndarray) -> np.ndarray:
-    """Loaded cells `[N, 5]`: position about the centre of pressure and extents over rho_g, weight."""
+def slip_factor(patch: ContactPatch, normal_force=None) -> np.ndarray:
+    """F `[..., 3, 3]`, upper triangular, with `F'F = sum(w B'B)`: what the cells see of a twist V is `B V`.
+
+    `normal_force` `[...]` [N], all > 0 where the patch depends on it. Raises `InvalidValueError` for one loaded point.
+    """
     weights = patch.weights(normal_force)
-    loaded = weights > 0.0
-    offset = patch.positions[loaded] - patch.centre_of_pressure(normal_force)
-    lengths = np.concatenate([offset, patch.cell_extents()[loaded]], axis=1) / factor[2, 2]
-    return np.ascontiguousarray(np.concatenate([lengths, weights[loaded, None]], axis=1))
+    x, y = ((weights * coordinate).sum(-1) for coordinate in patch.positions.T)
+    dx, dy = (p - c[..., None] for p, c in zip(patch.positions.T, (x, y), strict=True))
+    gyration = np.sqrt((weights * (dx**2 + dy**2)).sum(-1))
+    if not np.all(gyration > 0.0):
+        shown = f"a radius of gyration of {np.min(gyration)} m"
+        raise InvalidValueError("patch", "have more than one loaded point", shown)
+    if patch.root is not None:
+        return _metric_factor(patch, weights)
+    factor = np.zeros((*np.shape(x), 3, 3))
+    factor[..., 0, 0] = factor[..., 1, 1] = 1.0
+    factor[..., 0, 2], factor[..., 1, 2], factor[..., 2, 2] = -y, x, gyration
+    return factor
 
 
-def moment_map(cells: np.ndarray, gamma: float, segments: int, speeds: int) -> np.ndarray:
-    """Numbers of the map of `cells` `[N, 5]`, as `kernels.steady` reads them.
+def _metric_factor(patch: ContactPatch, weights: np.ndarray) -> np.ndarray:
+    """F from Cholesky's factor of the second moments about the middle of the cells, which cancels no digits."""
+    x, y = patch.positions.mean(axis=0)
+    shift = np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]])
+    levers = patch.levers() @ np.linalg.inv(shift)
+    second = np.einsum("...n,nij->...ij", weights, np.swapaxes(levers, 1, 2) @ levers)
+    return np.swapaxes(np.linalg.cholesky(second), -1, -2) @ shift
+
+
+def moment_map(cells: ScaledCells, gamma: float, segments: int, speeds: int) -> np.ndarray:
+    """Numbers of the map of `cells`, as `kernels.steady` reads them; with an asymmetry for all six faces.
 
     `h_0`, which has the kinks, takes `segments` squares each way on a quarter of a face; the rest
     `r = h_1 - (1 - t) h_0` of the Stribeck part, which is smooth, a third of them, with `speeds` nodes in t.
     """
-    coarse = max(segments // 3, 2)
-    steady = _sums(cells, segments, np.empty(0), gamma)
-    directions = cube_map.face_nodes(segments)[:3]
+    coarse, faces = max(segments // 3, 2), 6 if cells.asymmetric else 3
+    directions = cube_map.face_nodes(segments)[:faces]
+    steady = cells.sums(directions, np.empty(0), gamma)
     unit = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
     least = float(np.einsum("fijc,fijc->fij", steady[..., 0, :], unit).min())
     t = np.linspace(0.0, 1.0, speeds)
     relative = KNEE * t[1:-1] / (1.0 - t[1:-1])
-    sums = _sums(cells, coarse, relative**gamma, gamma)
+    sums = cells.sums(cube_map.face_nodes(coarse)[:faces], relative**gamma, gamma)
     rest = np.zeros((*sums.shape[:-2], speeds, 3))
     rest[..., 1:-1, :] = sums[..., 1:, :] - (1.0 - t[1:-1, None]) * sums[..., :1, :]
     levels = np.einsum("lt,fijtc->fijlc", cube_map.level_matrix(speeds), rest, optimize=True)
     header = np.zeros(HEADER)
-    header[:6] = 3, segments, coarse, speeds + 2, KNEE, LEAST_SHARE * least
-    header[QUARTIC:] = fourth_moments(cells).ravel()
+    header[:6] = faces, segments, coarse, speeds + 2, KNEE, LEAST_SHARE * least
+    header[QUARTIC:] = cells.fourth_moments().ravel()
     return np.concatenate([header, *(_numbers(values) for values in (steady, levels))])
 
 
-def fourth_moments(cells: np.ndarray) -> np.ndarray:
-    """K [6, 6] of `<v^4> = m' K m`, m the products of a scaled twist (see `kernels.steady`), of `cells` `[N, 5]`."""
-    x, y, weights = cells[:, 0], cells[:, 1], cells[:, 4]
-    zero, one = np.zeros_like(x), np.ones_like(x)
-    squares = np.stack([one, one, x * x + y * y, zero, -2.0 * y, 2.0 * x])  # |u|^2 = squares . m
-    return np.einsum("n,in,jn->ij", weights, squares, squares)
-
-
-def _sums(cells: np.ndarray, n: int, exponents: np.ndarray, gamma: float) -> np.ndarray:
-    """`steady_sums` at the nodes of the three positive faces, `[3, K, K, 1 + E, 3]`."""
-    directions = np.ascontiguousarray(cube_map.face_nodes(n)[:3])
-    out = np.empty((directions.size // 3, 1 + len(exponents), 3))
-    steady_sums(directions.reshape(-1, 3), cells, np.ascontiguousarray(exponents), gamma, out)
-    return out.reshape(*directions.shape[:3], -1, 3)
-
-
 def _numbers(values: np.ndarray) -> np.ndarray:
-    """Stored numbers of an odd map from its values `[3, K, K, levels, 3]`."""
-    every = cube_map.mirrored(values.reshape(*values.shape[:3], -1))
-    return cube_map.flat(cube_map.hermite(every), 3, 3)
+    """Stored numbers of a map from its values `[faces, K, K, levels, 3]`; an odd one has three faces."""
+    faces = len(values)
+    flat = values.reshape(*values.shape[:3], -1)
+    return cube_map.flat(cube_map.hermite(flat if faces == 6 else cube_map.mirrored(flat)), 3, faces)

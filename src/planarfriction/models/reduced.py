@@ -12,13 +12,11 @@ from planarfriction.kernels import moments as kernels
 from planarfriction.kernels import moments_adjoint
 from planarfriction.kernels.law import law_numbers, law_row
 from planarfriction.models.base import FrictionModel, ModelJacobians, StepJacobians
-from planarfriction.models.moment_map import MomentShape, moment_shape
+from planarfriction.models.load_family import LoadFamily
+from planarfriction.models.moment_map import MomentShape, moment_shape, owner
 
 _REMEMBERED = 64
-"""Loads whose shapes a model remembers."""
-
-_SURFACE = np.array([0, 0, 0])
-"""The map of a shape begins its data."""
+"""Loads whose shapes a model remembers that builds each."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,19 +29,26 @@ class ReducedModel(FrictionModel):
     `|z|/|z_ss|` and the angle between z and z_ss. Exact: pre-sliding stiffness, viscous friction, steady sliding, and
     translation. State: `(z_x, z_y, z_theta)` [m]; the third is the moment over the radius of gyration of the pressure.
 
-    `z_ss` comes from a stored map over direction and speed with continuous slopes, built once for each shape that the
-    loads give the patch. The state is kept when the shape changes.
+    `z_ss` comes from a stored map over direction and speed with continuous slopes. A patch that depends on the load has
+    maps at a ladder of loads, blended in between; they are built where loads are asked for (see `LoadFamily`). The
+    state is kept when the shape changes.
+
+    Friction that depends on the direction: `|V_G|` is the root mean square of `|B_i V|` (see `ContactPatch.levers`), and
+    `z_ss` sums `u/|u| + a`; an asymmetry takes maps of twice the size.
     """
 
     segments: int = 24
     """Squares of the map along a quarter of a face of its cube; 24 leave errors of 1e-5 (median) of z_ss."""
     speeds: int = 14
     """Nodes of the map over the speed, for the Stribeck part."""
+    load_error: float = 2e-3
+    """Largest relative error of z_ss from blending maps over the load; 0 builds a map for each load, which is slow."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "segments", validation.count("segments", self.segments, at_least=4))
         object.__setattr__(self, "speeds", validation.count("speeds", self.speeds, at_least=5))
+        object.__setattr__(self, "load_error", validation.non_negative("load_error", self.load_error))
         if not self.patch.depends_on_load:
             _ = self._reference  # refuses a patch of one point now rather than later
 
@@ -54,14 +59,17 @@ class ReducedModel(FrictionModel):
 
     def shape_at(self, normal_force: float | None) -> MomentShape:
         """Second moments of slip and stored steady state at a load [N]; recent loads are remembered."""
+        return self.shapes_at([normal_force])[0]
+
+    def shapes_at(self, loads) -> list[MomentShape]:
+        """`shape_at` of many loads [N], which costs less than one by one."""
         if not self.patch.depends_on_load:
-            return self._reference
-        load = validation.positive("normal_force", normal_force)
-        if load not in self._recent:
-            while len(self._recent) >= _REMEMBERED:
-                self._recent.pop(next(iter(self._recent)))
-            self._recent[load] = moment_shape(self.patch, load, self.law.gamma, self.segments, self.speeds)
-        return self._recent[load]
+            return [self._reference for _ in loads]
+        if isinstance(loads, np.ndarray) and (loads > 0.0).all() and (loads < np.inf).all():
+            loads = loads.tolist()  # one by one takes longer than all else
+        else:
+            loads = [validation.positive("normal_force", load) for load in loads]
+        return self._family.shapes(loads) if self.load_error > 0.0 else [self._built_at(load) for load in loads]
 
     def rate(self, state, twist, normal_force) -> np.ndarray:
         """Rates of the moments `zdot`, shape `[..., 3]` [m/s]."""
@@ -120,8 +128,19 @@ class ReducedModel(FrictionModel):
         return moment_shape(self.patch, None, self.law.gamma, self.segments, self.speeds)
 
     @functools.cached_property
+    def _family(self) -> LoadFamily:
+        return LoadFamily(self.patch, self.law.gamma, self.segments, self.speeds, self.load_error)
+
+    @functools.cached_property
     def _recent(self) -> dict[float, MomentShape]:
         return {}
+
+    def _built_at(self, load: float) -> MomentShape:
+        if load not in self._recent:
+            while len(self._recent) >= _REMEMBERED:
+                self._recent.pop(next(iter(self._recent)))
+            self._recent[load] = moment_shape(self.patch, load, self.law.gamma, self.segments, self.speeds)
+        return self._recent[load]
 
     @functools.cached_property
     def _fixed(self) -> tuple[np.ndarray, np.ndarray] | None:
@@ -137,21 +156,24 @@ class ReducedModel(FrictionModel):
         out = result.reshape(load.size, *inner)
         if not self.patch.depends_on_load:
             out[:] = function(self._reference, *flat)
-        else:
-            for value in np.unique(flat[2][flat[2] > 0.0]):
-                chosen = flat[2] == value
-                out[chosen] = function(self.shape_at(value), *(a[chosen] for a in flat))
+            return out.reshape(result.shape)
+        values = np.unique(flat[2][flat[2] > 0.0])
+        if self.load_error > 0.0:
+            self.shapes_at(values)  # all at once
+        for value in values:
+            chosen = flat[2] == value
+            out[chosen] = function(self.shape_at(value), *(a[chosen] for a in flat))
         return out.reshape(result.shape)
 
     def _evaluate(self, shape: MomentShape, state, twist, load) -> np.ndarray:
         rate, wrench = np.empty_like(state), np.empty_like(state)
-        kernels.evaluate_batch(law_row(self.law), shape.numbers, _SURFACE, shape.data, state, twist, rate, wrench)
+        kernels.evaluate_batch(law_row(self.law), shape.numbers, *_maps(shape), state, twist, rate, wrench)
         return np.concatenate([rate, load[:, None] * wrench], axis=1)
 
     def _jacobians(self, shape: MomentShape, state, twist, load) -> np.ndarray:
         law, factor = self.law, shape.factor
         lin = np.empty((len(load), kernels.LINEAR))
-        kernels.linearise_batch(law_row(law), shape.numbers, _SURFACE, shape.data, state, twist, lin)
+        kernels.linearise_batch(law_row(law), shape.numbers, *_maps(shape), state, twist, lin)
         rate_state, rate_twist = lin[:, 1:10].reshape(-1, 3, 3), lin[:, 10:19].reshape(-1, 3, 3) @ factor
         weight = -load[:, None, None]
         pull = law.sigma_0 * np.eye(3) + law.sigma_1 * rate_state
@@ -163,15 +185,23 @@ class ReducedModel(FrictionModel):
 
     def _step(self, shape: MomentShape, state, twist, load, dt) -> np.ndarray:
         out, wrench = np.empty_like(state), np.empty_like(state)
-        kernels.step_batch(law_row(self.law), shape.numbers, _SURFACE, shape.data, state, twist, load, dt, out, wrench)
+        kernels.step_batch(law_row(self.law), shape.numbers, *_maps(shape), state, twist, load, dt, out, wrench)
         return np.concatenate([out, wrench], axis=1)
 
     def _step_jacobians(self, shape: MomentShape, state, twist, load, dt) -> np.ndarray:
         slopes = np.empty((len(load), 6, 6))
-        moments_adjoint.jacobians(law_row(self.law), shape.numbers, _SURFACE, shape.data, state, twist, dt, slopes)
+        moments_adjoint.jacobians(law_row(self.law), shape.numbers, *_maps(shape), state, twist, dt, slopes)
         factor, weight = shape.factor, load[:, None, None]
         loaded = np.where(weight > 0.0, 1.0, 0.0)
         new_state, new_twist = loaded * slopes[:, :3, :3], loaded * slopes[:, :3, 3:] @ factor
         pull, push = weight * (factor.T @ slopes[:, 3:, :3]), weight * (factor.T @ slopes[:, 3:, 3:] @ factor)
         unit = self._step(shape, state, twist, np.ones_like(load), dt)[:, None, 3:]
         return np.concatenate([new_state, new_twist, pull, push, unit], axis=1)
+
+
+def _maps(shape: MomentShape) -> tuple[np.ndarray, np.ndarray]:
+    """Where the maps of a shape begin, and the numbers that hold them."""
+    if shape.other is None:
+        return np.array([0, 0, 0]), shape.data
+    store, start = owner(shape.data)
+    return np.array([start, owner(shape.other)[1], 0]), store

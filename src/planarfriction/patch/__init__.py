@@ -5,7 +5,8 @@ from planarfriction.patch.contact_patch import ContactPatch
 from planarfriction.patch.files import read_pressure_map
 from planarfriction.patch.grid import Grid
 from planarfriction.patch.metric import grain
-from planarfriction.patch.pressure import LinearGradient, PerCell, Pressure, SoftFinger, Tabulated, Uniform
+from planarfriction.patch.pressure import LinearGradient, PerCell, Pressure, SoftFinger, Uniform
+from planarfriction.patch.pressure_maps import PressureMaps
 from planarfriction.patch.published import PUBLISHED_PATCHES
 
 __all__ = [
@@ -15,8 +16,8 @@ __all__ = [
     "LinearGradient",
     "PerCell",
     "Pressure",
+    "PressureMaps",
     "SoftFinger",
-    "Tabulated",
     "Uniform",
     "grain",
     "read_pressure_map",

@@ -22,7 +22,8 @@ from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch import compressed_rows as rows
 from planarfriction.patch.metric import refuse_cell_metrics
-from planarfriction.patch.pressure import PerCell, Tabulated
+from planarfriction.patch.pressure import PerCell
+from planarfriction.patch.pressure_maps import PressureMaps
 
 if TYPE_CHECKING:
     from planarfriction.patch.contact_patch import ContactPatch
@@ -147,7 +148,7 @@ def _few(patch: ContactPatch, weights: np.ndarray, nodes: np.ndarray | None) -> 
     kept = (weights > 0.0).any(axis=0)
     count = int(kept.sum())
     values = weights[:, kept]
-    law = PerCell(values[0]) if nodes is None else Tabulated(nodes, values)
+    law = PerCell(values[0]) if nodes is None else PressureMaps(nodes, values)
     few = ContactPatch(patch.positions[kept], np.full(count, patch.areas.sum() / count), law, None, patch.name)
     asymmetry = None if patch.asymmetry is None else patch.asymmetries()[0]
     metric = None if patch.root is None else np.reshape(patch.metric, (-1, 2, 2))[0]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,10 +12,10 @@ from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch import outline as outlines
 from planarfriction.patch import plain_data, shapes
-from planarfriction.patch.files import read_pressure_map
 from planarfriction.patch.grid import Grid
 from planarfriction.patch.metric import Anisotropy
 from planarfriction.patch.pressure import Uniform, as_law, check_pressure
+from planarfriction.patch.pressure_maps import read_maps
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -214,25 +213,22 @@ class ContactPatch(Anisotropy):
         return cls(positions, np.full(len(positions), validation.positive("area", area)), weights, None, name)
 
     @classmethod
-    def from_pressure(cls, pressure, cell_size: float | Sequence[float], *, name: str | None = None) -> ContactPatch:
+    def from_pressure(
+        cls, pressure, cell_size: float | Sequence[float], *, loads=None, name: str | None = None
+    ) -> ContactPatch:
         """Patch of a measured pressure map: an array `[rows, columns]`, or the path of a CSV, NPY or grey image file.
 
         **Row 0 is the top** (largest y), column 0 the left; the middle of the map is the origin. `cell_size` [m] is the
         side of a cell or `(width, height)`. Only ratios of the pressures matter. Cells without pressure are dropped.
+
+        Maps measured at several loads: a mapping `{load [N]: map}`, or a list of maps (a stack `[L, rows, columns]`)
+        with their `loads` `[L]`; see `PressureMaps`.
         """
-        what = "pressure"
-        if isinstance(pressure, (str, Path)):
-            what, name = f"pressure map {pressure}", name or Path(pressure).stem
-            pressure = read_pressure_map(pressure)
-        values = validation.non_negative_array(what, pressure, (None, None))
-        if not values.any():
-            raise InvalidValueError(what, "have a total > 0", "0")
+        law, (rows, columns), file = read_maps(pressure, loads)
         size = validation.array("cell_size", cell_size, (2,) if np.ndim(cell_size) else ())
         width, height = np.broadcast_to([validation.positive("cell_size", side) for side in size.flat], 2)
-        rows, columns = values.shape
         grid = Grid.around_origin(columns * width, rows * height, columns, rows)
-        areas = np.full(values.size, grid.cell_area)
-        return cls(grid.centres(), areas, values.ravel(), grid, name or "pressure map")
+        return cls(grid.centres(), np.full(rows * columns, grid.cell_area), law, grid, name or file or "pressure map")
 
     @classmethod
     def _clipped(cls, outline: outlines.Outline, grid: Grid, pressure: Any, name: str) -> ContactPatch:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from planarfriction.patch.contact_patch import ContactPatch
-from planarfriction.patch.pressure import PerCell
 
 
 def refined(patch: ContactPatch, parts: int) -> ContactPatch:
@@ -17,8 +16,7 @@ def refined(patch: ContactPatch, parts: int) -> ContactPatch:
     offsets = [fine if side else np.zeros(1) for side in extent.max(axis=0)]
     inside = np.stack([axis.ravel() for axis in np.meshgrid(*offsets)], -1)
     positions = (patch.positions[:, None] + inside * extent[:, None]).reshape(-1, 2)
-    per_cell = isinstance(patch.pressure, PerCell)
-    pressure = PerCell(np.repeat(patch.pressure.values, len(inside))) if per_cell else patch.pressure
+    pressure = patch.pressure.repeated(len(inside))
     areas = np.repeat(patch.areas / len(inside), len(inside))
     width, height = patch.cell_size or (0.0, 0.0)
     metric, asymmetry = (_repeated(each, size, len(inside)) for each, size in ((patch.metric, 2), (patch.asymmetry, 1)))

@@ -18,7 +18,7 @@ MODELS = {
 }
 """Name in scene files -> class in `planarfriction.models`."""
 
-_MAP_SIZES = ("segments", "speeds")
+_MAP_SIZES = ("segments", "speeds", "load_error")
 
 SURFACES = {
     "table_published": "LimitSurfaceTablePublished",
@@ -49,7 +49,7 @@ def model_to_dict(model: Any) -> dict[str, Any]:
 def model_from_dict(contact: Section) -> Any:
     """Model of the table of a contact: `patch` and `law` are tables, `model` is a name or a table.
 
-    The table of a model holds `kind`, for "reduced" also `segments` and `speeds`, and for "reduced_published" also
+    The table of a model holds `kind`, for "reduced" also `segments`, `speeds` and `load_error`, and for "reduced_published" also
     `on_load_change` and `surface`: a name, or a table with `kind`, `segments` (tables), `normal_force` and `patch`
     (where they are not those of the model).
     """
@@ -122,7 +122,8 @@ def law_from_dict(table: Section) -> LuGre:
 def patch_from_dict(table: Section) -> Any:
     """Contact patch of a table: `shape` names the constructor, the other keys are its parameters.
 
-    `shape = "pressure_map"` takes `file` (a path) or `values` (rows from the top), `cell_size` and `name`;
+    `shape = "pressure_map"` takes `file` (a path) or `values` (rows from the top), `cell_size` and `name`, and for maps
+    measured at several loads `loads` with `files` or with `values` of each;
     `shape = "published"` takes `name`, `cells` and `width`; `shape = "cells"` is what `ContactPatch.to_dict` writes.
 
     Every shape takes `metric` and `asymmetry` as `ContactPatch.with_friction_metric` does; `metric` may also be a table
@@ -158,13 +159,14 @@ def _patch_from_dict(table: Section) -> Any:
         with table.located():
             return PUBLISHED_PATCHES[name](**{key: value for key, value in given.items() if key != "name"})
     if shape == "pressure_map":
-        table.only(["shape", "file", "values", "cell_size", "name"])
-        if ("file" in table) == ("values" in table):
-            table.fail("must have either file or values")
-        cell_size = table.get("cell_size")
+        table.only(["shape", "file", "files", "values", "loads", "cell_size", "name"])
+        if sum(key in table for key in ("file", "files", "values")) != 1:
+            table.fail("must have either file or values (or files, one for each of the loads)")
+        cell_size, options = table.get("cell_size"), {key: table.get(key, None) for key in ("name", "loads")}
+        if "files" in table and "loads" not in table:
+            table.fail("missing key 'loads', the normal force of each of the files")
         with table.located():
-            source = table.path("file") if "file" in table else table.get("values")
-            return ContactPatch.from_pressure(source, cell_size, name=table.get("name", None))
+            return ContactPatch.from_pressure(_maps_of(table), cell_size, **options)
     make = getattr(ContactPatch, shape)
     parameters = inspect.signature(make).parameters
     table.only(["shape", *parameters])
@@ -175,6 +177,19 @@ def _patch_from_dict(table: Section) -> Any:
         given["pressure"] = pressure_from_dict(table)
     with table.located():
         return make(**given)
+
+
+def _maps_of(table: Section) -> Any:
+    """Numbers or paths of the pressure maps that a table names."""
+    if "values" in table:
+        return table.get("values")
+    if "file" in table:
+        return table.path("file")
+    files = table.get("files")
+    if not isinstance(files, list):
+        table.fail(f"files must be a list of paths, got {files!r}")
+    one = [Section({"files": name}, table.where, table.source, table.folder) for name in files]
+    return [section.path("files") for section in one]
 
 
 def pressure_from_dict(patch: Section) -> Any:

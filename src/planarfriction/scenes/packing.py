@@ -13,6 +13,7 @@ from planarfriction.kernels.contacts import Contacts
 from planarfriction.kernels.law import law_row
 from planarfriction.kernels.moments import LINEAR
 from planarfriction.models import DistributedModel, ReducedModel
+from planarfriction.models.moment_map import MomentShape, owner
 
 SHAPE_INTERVAL = 1e-3
 """Longest time [s] that a patch keeps its shape while the load it depends on changes; held loads need no limit."""
@@ -61,25 +62,33 @@ class _Shapes:
         metric = (root[0, 0], root[0, 1], root[1, 1])
         return self._add(np.array([*shape.numbers, *metric]), (numbers.kind, start, numbers.size))
 
-    def add_moments(self, shape) -> int:
-        start = self._start_of(shape.data)
-        other = start if shape.other is None else self._start_of(shape.other)
-        self.weight_start.append(0)
-        return self._add(shape.numbers, (start, other, 0))
+    def add_moments(self, shapes: list[MomentShape]) -> list[int]:
+        """All shapes of a contact at once: there may be hundreds."""
+        first = len(self.surface)
+        factors = np.array([shape.factor for shape in shapes])[:, *np.triu_indices(3)]
+        self.shape.append(np.column_stack([factors, [shape.blend for shape in shapes]]))
+        for shape in shapes:
+            start = self._start_of(shape.data)
+            self.surface.append((start, start if shape.other is None else self._start_of(shape.other), 0))
+        self.weight_start += [0] * len(shapes)
+        return list(range(first, len(self.surface)))
 
     def _add(self, numbers: np.ndarray, surface: tuple[int, int, int]) -> int:
-        row = np.zeros(SHAPE_NUMBERS)
-        row[: len(numbers)] = numbers
+        row = np.zeros((1, SHAPE_NUMBERS))
+        row[0, : len(numbers)] = numbers
         self.shape.append(row)
         self.surface.append(surface)
-        return len(self.shape) - 1
+        return len(self.surface) - 1
 
     def _start_of(self, data: np.ndarray) -> int:
-        """Where an array begins in `data`, each stored once."""
+        """Where an array begins in `data`, each stored once, pieces of one array with all of it."""
         if id(data) not in self._stored:
-            self._stored[id(data)] = self._size["data"]
-            self.data.append(data)
-            self._size["data"] += len(data)
+            whole, start = owner(data)
+            if id(whole) not in self._stored:
+                self._stored[id(whole)] = self._size["data"]
+                self.data.append(whole)
+                self._size["data"] += len(whole)
+            self._stored[id(data)] = self._stored[id(whole)] + start
         return self._stored[id(data)]
 
 
@@ -125,9 +134,10 @@ def pack(scene, t_end: float) -> PackedScene:
             offset = model.patch.positions[ever] - np.average(model.patch.positions[ever], axis=0)
             radius = float(np.hypot(*offset.T).mean())
         else:
-            shapes_here = [model.shape_at(value) for value in values]
             moments = isinstance(model, ReducedModel)
-            rows = [shapes.add_moments(shape) if moments else shapes.add_reduced(shape) for shape in shapes_here]
+            shapes_here = model.shapes_at(values) if moments else [model.shape_at(value) for value in values]
+            add = shapes.add_moments if moments else lambda each: [shapes.add_reduced(shape) for shape in each]
+            rows = add(shapes_here)
             radius = max(shape.contact_radius for shape in shapes_here)
             sizes.append((3, 0, LINEAR if moments else 27))
             cells.append(np.empty((0, 2)))
@@ -150,9 +160,9 @@ def pack(scene, t_end: float) -> PackedScene:
         y=np.ascontiguousarray(positions[:, 1]),
         weights=np.concatenate([np.zeros(0), *shapes.weights]),
         weight_start=np.array(shapes.weight_start),
-        shape=np.array(shapes.shape),
+        shape=np.concatenate(shapes.shape),
         surface=np.array(shapes.surface),
-        data=np.concatenate([np.zeros(0), *shapes.data]),
+        data=shapes.data[0] if len(shapes.data) == 1 else np.concatenate([np.zeros(0), *shapes.data]),
     )
     length = min(c.model.law.mu_c / c.model.law.sigma_0 for c in scene.contacts)
     speed = min(c.model.law.v_s for c in scene.contacts)
@@ -168,14 +178,14 @@ def pack(scene, t_end: float) -> PackedScene:
     )
 
 
-def _distinct_loads(patch, held: np.ndarray) -> tuple[list[float | None], np.ndarray]:
+def _distinct_loads(patch, held: np.ndarray) -> tuple[list[None] | np.ndarray, np.ndarray]:
     """Loads that need a shape of their own, and which of them each piece takes; pieces without load borrow one."""
     if not patch.depends_on_load:
         return [None], np.zeros(len(held), np.int64)
     positive = np.unique(held[held > 0.0])
     if len(positive) == 0:
         positive = np.array([1.0])
-    return list(positive), np.minimum(np.searchsorted(positive, held), len(positive) - 1)
+    return positive, np.minimum(np.searchsorted(positive, held), len(positive) - 1)
 
 
 def _kind(model) -> int:

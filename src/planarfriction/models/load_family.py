@@ -1,0 +1,161 @@
+"""Stored shapes of a patch that depends on the load: maps at a ladder of loads, two neighbours blended in between."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+
+from planarfriction.errors import InvalidValueError
+from planarfriction.models.moment_map import MomentShape, moment_map, moment_shape, slip_factor
+from planarfriction.models.steady_sums import ScaledCells
+from planarfriction.patch import ContactPatch
+
+HALVINGS = 6
+"""How often an octave of the load is halved at most: the closest rungs are 0.8 to 1.6 % apart."""
+
+CHECKED = 64
+"""Directions at which the blend of two rungs is compared with the sum over the cells."""
+
+_WITHIN = (0.25, 0.5, 0.75)
+"""Where between two rungs: a cell that gets its first load beside the middle leaves no trace in the middle."""
+
+REMEMBERED = 4096
+"""Loads whose shapes a family remembers."""
+
+
+class LoadFamily:
+    """Shapes of a patch at any load, from maps that are built where loads are asked for.
+
+    Rungs stand at the powers of 2 [N] and, where `z_ss/|V_G|` blended linearly in the load is off by more than `error`
+    (relative, the worst of `CHECKED` directions a quarter, half and three quarters of the way), at the middle between
+    them, and so on: where they stand depends on patch and error alone. Maps are in scaled coordinates, `F V`, and F is
+    that of the very load, so that a contact that only grows needs hardly any.
+
+    On a grid the shape jumps or bends where a cell gets its first load. There `HALVINGS` ends the search: within these
+    last intervals the error may be larger than `error` (soft fingers 12 cells across: 1e-3).
+    """
+
+    def __init__(self, patch: ContactPatch, gamma: float, segments: int, speeds: int, error: float) -> None:
+        self._patch, self._error = patch, error
+        self._map = gamma, segments, speeds
+        self._sums: dict[float, np.ndarray | None] = {}
+        self._good: dict[tuple[float, float], bool] = {}
+        self._gaps: dict[tuple[float, float], float] = {}
+        self._store = np.empty(0)
+        self._maps: dict[float, np.ndarray] = {}
+        self._shapes: dict[float, MomentShape] = {}
+
+    @property
+    def rungs(self) -> list[float]:
+        """Loads [N] whose maps have been built, ascending."""
+        return sorted(self._maps)
+
+    def shapes(self, loads: list[float]) -> list[MomentShape]:
+        """Shapes at loads > 0 [N]: F of each load, and references to the maps of its two neighbours.
+
+        Where a neighbour is so light that one point carries it, the shape is built at the load itself.
+        """
+        if any(load not in self._shapes for load in loads):
+            self._add(sorted(set(loads)))
+        return [self._shapes[load] for load in loads]
+
+    def _add(self, loads: list[float]) -> None:
+        if len(self._shapes) + len(loads) > REMEMBERED:
+            self._shapes.clear()
+        between = [self._neighbours(load) for load in loads]
+        for rungs in between:
+            for rung in rungs or ():
+                self._build(rung)
+        for load, factor, rungs in zip(loads, slip_factor(self._patch, np.array(loads)), between, strict=True):
+            if rungs is None:
+                self._shapes[load] = moment_shape(self._patch, load, *self._map)
+            else:
+                self._shapes[load] = self._blend(load, factor, *rungs)
+
+    def _blend(self, load: float, factor: np.ndarray, low: float, high: float) -> MomentShape:
+        """Two rungs blended linearly in the load, or one alone where that is as close as wanted."""
+        share = (load - low) / (high - low)
+        apart = self._apart(low, high)
+        if share * apart <= 0.5 * self._error:
+            return MomentShape(factor, self._maps[low])
+        if (1.0 - share) * apart <= 0.5 * self._error:
+            return MomentShape(factor, self._maps[high])
+        return MomentShape(factor, self._maps[low], self._maps[high], share)
+
+    def _neighbours(self, load: float) -> tuple[float, float] | None:
+        """The two rungs around a load, None if one of them has no map."""
+        low = float(np.ldexp(0.5, np.frexp(load)[1]))  # the power of 2 below
+        high = 2.0 * low
+        for _ in range(HALVINGS):
+            if self._is_good(low, high):
+                break
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if load < middle else (middle, high)
+        return None if self._sum(low) is None or self._sum(high) is None else (low, high)
+
+    def _is_good(self, low: float, high: float) -> bool:
+        """Whether the blend of two rungs is as close as wanted."""
+        if (low, high) not in self._good:
+            worst = np.inf
+            first, last = self._sum(low), self._sum(high)
+            if first is not None and last is not None:
+                errors = []
+                for share in _WITHIN:
+                    true = self._cell_sums(low + share * (high - low))
+                    errors.append(_largest(first + share * (last - first) - true, true))
+                worst = max(errors)
+            self._good[low, high] = bool(worst <= 0.5 * self._error)
+        return self._good[low, high]
+
+    def _apart(self, low: float, high: float) -> float:
+        """Largest relative difference of two rungs."""
+        if (low, high) not in self._gaps:
+            self._gaps[low, high] = _largest(self._sum(high) - self._sum(low), self._sum(low))
+        return self._gaps[low, high]
+
+    def _sum(self, load: float) -> np.ndarray | None:
+        """Steady sliding at a rung in the checked directions, None where one point carries the load."""
+        if load not in self._sums:
+            try:
+                self._sums[load] = self._cell_sums(load)
+            except InvalidValueError:
+                self._sums[load] = None
+        return self._sums[load]
+
+    def _cell_sums(self, load: float) -> np.ndarray:
+        cells = ScaledCells(self._patch, load, slip_factor(self._patch, load))
+        return cells.sums(_directions(), np.empty(0), self._map[0])[:, 0]
+
+    def _build(self, rung: float) -> None:
+        """Build the map of a rung into the store, one array for all maps, so that nothing is copied to simulate."""
+        if rung in self._maps:
+            return
+        data = moment_map(ScaledCells(self._patch, rung, slip_factor(self._patch, rung)), *self._map)
+        used = len(self._maps) * len(data)
+        if used + len(data) > len(self._store):
+            store = np.empty(max(2 * len(self._store), 8 * len(data)))
+            store[:used] = self._store[:used]
+            self._store = store
+            self._maps = {load: store[i * len(data) : (i + 1) * len(data)] for i, load in enumerate(self._maps)}
+            self._shapes.clear()  # they refer to the old store
+        view = self._store[used : used + len(data)]
+        view[:] = data
+        self._maps[rung] = view
+
+
+def _largest(error: np.ndarray, of: np.ndarray) -> float:
+    """The largest relative length of vectors `[M, 3]`."""
+    return float((np.linalg.norm(error, axis=1) / np.linalg.norm(of, axis=1)).max())
+
+
+@functools.lru_cache(maxsize=1)
+def _directions() -> np.ndarray:
+    """Directions `[CHECKED, 3]` spread evenly over the half of the sphere that spins counter-clockwise.
+
+    They are on a golden spiral; both halves of an asymmetric patch differ by what is the same for all directions.
+    """
+    i = np.arange(CHECKED) + 0.5
+    height, angle = i / CHECKED, np.pi * (1.0 + np.sqrt(5.0)) * i
+    flat = np.sqrt(1.0 - height**2)
+    return np.stack([flat * np.cos(angle), flat * np.sin(angle), height], -1)

@@ -1,0 +1,113 @@
+"""Pressure maps of one contact measured at several loads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.errors import InvalidValueError
+from planarfriction.patch.files import read_pressure_map
+from planarfriction.patch.pressure import Pressure
+
+
+@dataclass(frozen=True, eq=False)
+class PressureMaps(Pressure):
+    """Relative pressures of the cells measured at several loads, each map brought to the same total.
+
+    Between two measured loads the relative pressure of each cell is linear in the load; below the first and above the
+    last the map stays as it is. Raises `InvalidValueError` unless the loads ascend and are > 0 and each map has one
+    pressure >= 0 for each cell and a total > 0.
+    """
+
+    law = "pressure_maps"
+    loads: np.ndarray
+    """Normal forces of the measurements, ascending, shape `[L]` [N]."""
+    values: np.ndarray
+    """Relative pressures, shape `[L, N]` [-]."""
+
+    def __post_init__(self) -> None:
+        loads = validation.array("loads", self.loads, (None,))
+        if len(loads) == 0 or not (loads[0] > 0.0 and (np.diff(loads) > 0.0).all()):
+            raise InvalidValueError("loads", "ascend and be > 0", loads.tolist())
+        values = validation.non_negative_array("pressure", self.values, (len(loads), None))
+        peak = values.max(axis=1, initial=0.0, keepdims=True)
+        if not (peak > 0.0).all():
+            raise InvalidValueError("pressure", "have a total > 0 at every load", f"0 at {loads[peak.argmin()]:g} N")
+        values /= peak  # first, so that no sum can overflow
+        values /= values.sum(axis=1, keepdims=True)
+        for name, array in (("loads", loads), ("values", values)):
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+    @property
+    def depends_on_load(self) -> bool:
+        return len(self.loads) > 1
+
+    def relative(self, positions: np.ndarray, normal_force: np.ndarray | None = None) -> np.ndarray:
+        if self.values.shape[1] != len(positions):
+            raise InvalidValueError("pressure", f"have shape [L, {len(positions)}]", f"shape {list(self.values.shape)}")
+        if not self.depends_on_load:
+            return self.values[0]
+        load = np.asarray(self.loads[0] if normal_force is None else normal_force, dtype=float)
+        place = np.interp(load, self.loads, np.arange(len(self.loads)))
+        below = np.minimum(place.astype(int), len(self.loads) - 2)
+        share = (place - below)[..., None]
+        return (1.0 - share) * self.values[below] + share * self.values[below + 1]
+
+    def ever_loaded(self, positions: np.ndarray) -> np.ndarray:
+        self.relative(positions)
+        return (self.values > 0.0).any(axis=0)
+
+    def only(self, kept: np.ndarray) -> PressureMaps:
+        return PressureMaps(self.loads, self.values[:, kept])
+
+    def repeated(self, times: int) -> PressureMaps:
+        return PressureMaps(self.loads, np.repeat(self.values, times, axis=1))
+
+    def to_dict(self) -> dict[str, Any]:
+        return {"law": self.law, "loads": self.loads.tolist(), "values": self.values.tolist()}
+
+
+def read_maps(pressure: Any, loads: Any = None) -> tuple[Any, tuple[int, int], str | None]:
+    """Pressure law or numbers, `(rows, columns)` and the name of one map, or of several with `loads` [N].
+
+    A map is an array `[rows, columns]` or the path of a file; several are a stack or list of them, or a mapping from
+    load to map.
+    """
+    if isinstance(pressure, Mapping):
+        if loads is not None:
+            raise InvalidValueError("loads", "be left out, the mapping has them", loads)
+        loads = sorted(pressure, key=lambda load: validation.positive("load of a pressure map", load))
+        pressure = [pressure[load] for load in loads]
+    if loads is None:
+        values, name = _one_map(pressure)
+        if not values.any():
+            raise InvalidValueError(_what(pressure), "have a total > 0", "0")
+        return values.ravel(), values.shape, name
+    loads = validation.array("loads", loads, (None,))
+    if isinstance(pressure, (str, Path)) or np.ndim(loads) != 1 or len(pressure) != len(loads):
+        count = 1 if isinstance(pressure, (str, Path)) else len(pressure)
+        raise InvalidValueError("pressure", f"have one map for each of {len(loads)} loads", count)
+    maps = [_one_map(each) for each in pressure]
+    shape = maps[0][0].shape if maps else (0, 0)
+    for each, (values, _) in zip(pressure, maps, strict=True):
+        if values.shape != shape:
+            raise InvalidValueError(_what(each), f"have the shape of the first, {list(shape)}", list(values.shape))
+    stack = np.array([values.ravel() for values, _ in maps]).reshape(len(maps), -1)
+    return PressureMaps(loads, stack), shape, maps[0][1]
+
+
+def _what(pressure: Any) -> str:
+    return f"pressure map {pressure}" if isinstance(pressure, (str, Path)) else "pressure"
+
+
+def _one_map(pressure: Any) -> tuple[np.ndarray, str | None]:
+    """Values `[rows, columns]` of an array or a file, and the name of the file."""
+    named = isinstance(pressure, (str, Path))
+    values = read_pressure_map(pressure) if named else pressure
+    return validation.non_negative_array(_what(pressure), values, (None, None)), Path(pressure).stem if named else None
