@@ -20,9 +20,10 @@ from planarfriction import validation
 from planarfriction.experiments.baselines import lsoda_time
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.limit_surface import LimitSurfaceTablePublished
-from planarfriction.models import DistributedModel, ReducedModelPublished
+from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch, SoftFinger
 from planarfriction.scenes import Scene, Solution, in_hand, in_hand_load, simulate
+from planarfriction.scenes.ready import IN_HAND_LOADS
 
 WINDOW = 0.1
 """Part of the in-hand run [s] that the general solver is given where the whole run would take it minutes."""
@@ -128,10 +129,39 @@ def _in_hand_reduced(name: str, full: bool, load: Literal[1, 2] = 1) -> Measurem
     return _line(name, value, "s", "SciPy LSODA over the whole run", lsoda_time(scene, scene.t_end))
 
 
-def _in_hand_load_dependent(name: str, full: bool) -> Measurement:
+def _soft() -> ContactPatch:
+    """The published soft finger whose profile follows the load."""
     width = 0.02
     finger = SoftFinger(c=6.0 * width / 21, n=1.0 / 3.0, k_per_newton=2.0, radius_max=0.5 * width)
-    soft = ContactPatch.rectangle(width, cells=21, pressure=finger)
+    return ContactPatch.rectangle(width, cells=21, pressure=finger)
+
+
+def _in_hand_load_family(name: str, full: bool) -> Measurement:
+    """Runs in turn, so that a noisy machine disturbs both alike; what is built is built before."""
+    soft = _soft()
+    fixed = ContactPatch(soft.positions, soft.areas, soft.weights(IN_HAND_LOADS[1, 1][0]), soft.grid)
+    family, rebuilt = ReducedModel(soft, _law()), ReducedModel(soft, _law(), load_error=0.0)
+    scenes = [in_hand(family), in_hand(ReducedModel(fixed, _law()))]
+    simulate(scenes[1], t_end=0.02)
+    built = _once(lambda: simulate(scenes[0]))
+    every = _once(lambda: simulate(in_hand(rebuilt)))
+    times = np.array([[_once(lambda scene=scene: simulate(scene)) for scene in scenes] for _ in range(25)])
+    value, theirs = np.median(times, axis=0).tolist()
+    words = (
+        f"the same with a fixed shape (both: all of simulate); the family's {len(family.load_rungs)} maps took "
+        f"{built:.2g} s before, a map for every load in place of them takes {every:.2g} s"
+    )
+    return _line(name, value, "s", words, theirs)
+
+
+def _once(action: Callable[[], Any]) -> float:
+    begin = time.perf_counter()
+    action()
+    return time.perf_counter() - begin
+
+
+def _in_hand_load_dependent(name: str, full: bool) -> Measurement:
+    soft = _soft()
     rebuilt = _median(lambda: simulate(in_hand(ReducedModelPublished(soft, _law()))), 3)
     fixed = _median(lambda: simulate(in_hand(ReducedModelPublished(_disc(), _law()))), 3)
     return _line(name, rebuilt, "s", "the same with a fixed shape (both: all of simulate)", fixed)
@@ -275,6 +305,7 @@ BENCHMARKS: dict[str, Callable[[str, bool], Measurement]] = {
     "in_hand.reduced": _in_hand_reduced,
     "in_hand.reduced.load_2": lambda name, full: _in_hand_reduced(name, full, load=2),
     "in_hand.reduced.load_dependent": _in_hand_load_dependent,
+    "in_hand.reduced.load_family": _in_hand_load_family,
     "table.build": _table_build,
     "step.reduced.loop": _step_reduced_loop,
     "step.distributed.loop": _step_distributed_loop,

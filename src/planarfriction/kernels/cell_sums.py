@@ -1,8 +1,8 @@
 """Steady sliding summed over the cells of a patch, for many directions of the twist at once.
 
-A cell is a parallelogram (or a segment, or a point) of uniform pressure. One near the centre of rotation, where the sliding
-direction turns within it, is halved both ways until its parts are far from it or `DEPTH` times halved; every part is
-then a 2 x 2 Gauss rule.
+A cell is a parallelogram (or a segment, or a point) of uniform pressure. One near the centre of rotation, where the
+sliding direction turns within it, is halved both ways until its parts are far from it or `DEPTH` times halved; every
+part is then a 2 x 2 Gauss rule.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ DEPTH = 6
 """How often a cell at the centre of rotation is halved: its last parts hold 1/4096 of its load (of a segment 1/64)."""
 
 NEAR = 1.5
-"""Distance from the centre of rotation in longer edges below which a cell is cut; the Gauss rule errs by 1e-4 of it there."""
+"""Distance from the centre of rotation, in longer edges, below which a cell is cut; the Gauss rule errs by 1e-4 there."""
 
 _BLOCK = 512
 _GAUSS = 0.5 / math.sqrt(3.0)
@@ -124,9 +124,9 @@ def _sum(vx, vy, spin, cells, exponents, gamma, stack, points, ux, uy, power, ou
 def steady_sums(directions, cells, exponents, gamma, out):
     """`sum w e u/|u|` and its moment of M scaled twists into `out` [M, 1 + E, 3].
 
-    `directions` [M, 3] need not be unit vectors; `cells` [N, 7]: centre (x, y) and the two edges (x, y, x, y) over
-    the radius of gyration, and the weight. `e` is 1 in row 0 and `exp(-exponents[k] |u|^gamma)` of the unit direction in row 1 + k; `exponents`
-    [E] ascend.
+    `directions` [M, 3] need not be unit vectors; `cells` [N, 7]: centre (x, y) and the two edges (x, y, x, y) over the
+    radius of gyration, and the weight. `e` is 1 in row 0 and `exp(-exponents[k] |u|^gamma)` of the unit direction in
+    row 1 + k; `exponents` [E] ascend.
     """
     stack, points = np.empty((4 * DEPTH + 4, 8)), np.empty((3, _BLOCK))
     ux, uy, power = np.empty(_BLOCK), np.empty(_BLOCK), np.empty(_BLOCK)

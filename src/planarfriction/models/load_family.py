@@ -28,9 +28,10 @@ class LoadFamily:
     """Shapes of a patch at any load, from maps that are built where loads are asked for.
 
     Rungs stand at the powers of 2 [N] and, where `z_ss/|V_G|` blended linearly in the load is off by more than `error`
-    (relative, the worst of `CHECKED` directions a quarter, half and three quarters of the way), at the middle between
-    them, and so on: where they stand depends on patch and error alone. Maps are in scaled coordinates, `F V`, and F is
-    that of the very load, so that a contact that only grows needs hardly any.
+    / 2 (relative, the worst of `CHECKED` directions a quarter, half and three quarters of the way), at the middle
+    between them, and so on: where they stand depends on patch and error alone. A load within `error` / 2 of one of its
+    two rungs is served by that rung alone, which is faster to read than two. Maps are in scaled coordinates, `F V`, and
+    F is that of the very load, so that a contact that only grows needs hardly any.
 
     On a grid the shape jumps or bends where a cell gets its first load. There `HALVINGS` ends the search: within these
     last intervals the error may be larger than `error` (soft fingers 12 cells across: 1e-3).
@@ -111,7 +112,9 @@ class LoadFamily:
     def _apart(self, low: float, high: float) -> float:
         """Largest relative difference of two rungs."""
         if (low, high) not in self._gaps:
-            self._gaps[low, high] = _largest(self._sum(high) - self._sum(low), self._sum(low))
+            first, last = self._sum(low), self._sum(high)
+            assert first is not None and last is not None
+            self._gaps[low, high] = _largest(last - first, first)
         return self._gaps[low, high]
 
     def _sum(self, load: float) -> np.ndarray | None:

@@ -33,8 +33,9 @@ class ReducedModel(FrictionModel):
     maps at a ladder of loads, blended in between; they are built where loads are asked for (see `LoadFamily`). The
     state is kept when the shape changes.
 
-    Friction that depends on the direction: `|V_G|` is the root mean square of `|B_i V|` (see `ContactPatch.levers`), and
-    `z_ss` sums `u/|u| + a`; an asymmetry takes maps of twice the size.
+    Friction that depends on the direction: `|V_G|` is the root mean square of `|B_i V|` (see `ContactPatch.levers`),
+    and `z_ss` sums `u/|u| + a`; an asymmetry takes maps of twice the size. It enters z_ss alone: bristles are measured
+    from z = 0, and not from `a g/sigma_0` as those of the distributed model are.
     """
 
     segments: int = 24
@@ -70,6 +71,11 @@ class ReducedModel(FrictionModel):
         else:
             loads = [validation.positive("normal_force", load) for load in loads]
         return self._family.shapes(loads) if self.load_error > 0.0 else [self._built_at(load) for load in loads]
+
+    @property
+    def load_rungs(self) -> list[float]:
+        """Loads [N] at which maps have been built so far, of a patch that depends on the load."""
+        return self._family.rungs
 
     def rate(self, state, twist, normal_force) -> np.ndarray:
         """Rates of the moments `zdot`, shape `[..., 3]` [m/s]."""

@@ -25,9 +25,9 @@ class PressureMaps(Pressure):
     """
 
     law = "pressure_maps"
-    loads: np.ndarray
+    loads: Any
     """Normal forces of the measurements, ascending, shape `[L]` [N]."""
-    values: np.ndarray
+    values: Any
     """Relative pressures, shape `[L, N]` [-]."""
 
     def __post_init__(self) -> None:
@@ -90,7 +90,7 @@ def read_maps(pressure: Any, loads: Any = None) -> tuple[Any, tuple[int, int], s
             raise InvalidValueError(_what(pressure), "have a total > 0", "0")
         return values.ravel(), values.shape, name
     loads = validation.array("loads", loads, (None,))
-    if isinstance(pressure, (str, Path)) or np.ndim(loads) != 1 or len(pressure) != len(loads):
+    if isinstance(pressure, (str, Path)) or len(pressure) != len(loads):
         count = 1 if isinstance(pressure, (str, Path)) else len(pressure)
         raise InvalidValueError("pressure", f"have one map for each of {len(loads)} loads", count)
     maps = [_one_map(each) for each in pressure]
@@ -98,8 +98,8 @@ def read_maps(pressure: Any, loads: Any = None) -> tuple[Any, tuple[int, int], s
     for each, (values, _) in zip(pressure, maps, strict=True):
         if values.shape != shape:
             raise InvalidValueError(_what(each), f"have the shape of the first, {list(shape)}", list(values.shape))
-    stack = np.array([values.ravel() for values, _ in maps]).reshape(len(maps), -1)
-    return PressureMaps(loads, stack), shape, maps[0][1]
+    stack = [values.ravel() for values, _ in maps]
+    return PressureMaps(loads, stack if stack else np.empty((0, 0))), shape, maps[0][1]
 
 
 def _what(pressure: Any) -> str:

@@ -49,9 +49,9 @@ def model_to_dict(model: Any) -> dict[str, Any]:
 def model_from_dict(contact: Section) -> Any:
     """Model of the table of a contact: `patch` and `law` are tables, `model` is a name or a table.
 
-    The table of a model holds `kind`, for "reduced" also `segments`, `speeds` and `load_error`, and for "reduced_published" also
-    `on_load_change` and `surface`: a name, or a table with `kind`, `segments` (tables), `normal_force` and `patch`
-    (where they are not those of the model).
+    The table of a model holds `kind`, for "reduced" also `segments`, `speeds` and `load_error`, and for
+    "reduced_published" also `on_load_change` and `surface`: a name, or a table with `kind`, `segments` (tables),
+    `normal_force` and `patch` (where they are not those of the model).
     """
     patch = patch_from_dict(contact.section("patch"))
     law = law_from_dict(contact.section("law"))
