@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -68,7 +69,7 @@ def rollout(model: Any, state: Any, twists: Any, loads: Any, dt: Any, parameters
 
     The steps are those of `model.step`. `state` `[..., 3]`; `loads` may be one number; `dt` is one number or `[T]`;
     leading axes broadcast. `parameters` `[..., P]` (see `parameter_names`) take the place of the model's own; the limit
-    surface stays as it is, in scaled coordinates, as does the stored map of a `ReducedModel`. Batches run on all processors.
+    surface, or the map of a `ReducedModel`, stays as it is, in scaled coordinates. Batches run on all processors.
 
     Raises `InvalidValueError` for wrong shapes, for numbers out of range, and for a model whose shape follows the load.
     """
@@ -219,7 +220,8 @@ def _rows(name: str, value: Any, inner: tuple[int, ...], batch: tuple[int, ...])
         except ValueError:
             wanted = ", ".join(str(n) for n in inner)
             raise InvalidValueError(name, f"have shape [..., {wanted}]", f"shape {list(value.shape)}") from None
-    return np.require(value.reshape(-1, *inner), float, ["C", "W"])
+    outer = value.shape[: value.ndim - len(inner)]
+    return np.require(value.reshape(math.prod(outer), *inner), float, ["C", "W"])
 
 
 def _sum_to(shape: tuple[int, ...], gradient: np.ndarray) -> np.ndarray:
