@@ -469,7 +469,7 @@ def test_a_shape_that_follows_the_load_is_refused_and_a_kept_one_is_not():
         ({"parameters": np.ones(12)}, r"breakaway_ratio must be in \[0, 1\), got 1.0"),
         ({"state": np.zeros((2, 3)), "twists": np.zeros((3, T, 3))}, "batch axes must broadcast"),
         ({"wrenches_bar": np.ones((T + 1, 3))}, rf"wrenches_bar must have shape \[..., {T}, 3\]"),
-        ({"model": "a"}, "model must be a ReducedModelPublished, got str"),
+        ({"model": "a"}, "model must be a ReducedModel or a ReducedModelPublished, got str"),
     ],
 )
 def test_wrong_input_is_one_clear_line(changed, message):

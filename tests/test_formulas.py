@@ -229,6 +229,32 @@ def test_mean_decay_partials_are_the_slopes(start, end, log_dt):
     assert got == pytest.approx(expected, abs=1e-8)
 
 
+@pytest.mark.parametrize("least", [0.2, 1.0])
+def test_floor_slopes_are_the_slopes(least):
+    value = np.linspace(-1.0, 3.0, 41) * least + 1e-2
+    by_value = slope(lambda v: formulas.floored(np, v, least), value, 1e-4)
+    by_least = slope(lambda e: formulas.floored(np, value, e), least, 1e-4)
+    # Quadratic: rounding of 1e-16/1e-4.
+    assert formulas.floored_slope(np, value, least) == pytest.approx(by_value, abs=1e-11)
+    assert formulas.floored_by_least(np, value, least) == pytest.approx(by_least, abs=1e-11)
+
+
+@checked
+@given(deflections, st.floats(-1.0, 1.0), st.floats(0.5, 1.0), st.floats(0.0, 0.8))
+def test_slip_share_partials_are_the_slopes(deflection, cosine, evenness, ratio):
+    found = formulas.slip_share_partials(np, deflection, cosine, evenness, 1.0, ratio)
+    assert found[0] == formulas.slip_share(np, deflection, cosine, evenness, 1.0, ratio)
+    # The ratio times evenness is what counts: evenness 1 for its own slope.
+    functions = (
+        lambda d: formulas.slip_share(np, d, cosine, evenness, 1.0, ratio),
+        lambda c: formulas.slip_share(np, deflection, c, evenness, 1.0, ratio),
+        lambda b: formulas.slip_share(np, deflection, cosine, 1.0, 1.0, b),
+    )
+    for partial, function, x in zip(found[1:], functions, (deflection, cosine, ratio * evenness), strict=True):
+        # Curvature jumps at both ends, by pi^2/2 over the width squared, 0.2 or more.
+        assert partial == pytest.approx(slope(function, x, 1e-6), abs=2e-4)
+
+
 def test_relaxation_slope_is_the_slope():
     x = 10.0 ** np.linspace(-5.0, 2.0, 300)
     got = formulas.relaxation_slope(np, x, *formulas.relaxation(np, x))

@@ -28,6 +28,8 @@ from planarfriction.scenes.ready import IN_HAND_LOADS
 WINDOW = 0.1
 """Part of the in-hand run [s] that the general solver is given where the whole run would take it minutes."""
 
+_AGAINST_PUBLISHED = "the same of ReducedModelPublished"
+
 
 @dataclass(frozen=True)
 class Measurement:
@@ -194,17 +196,22 @@ def _numpy_table(patch: ContactPatch, segments: int = 20) -> np.ndarray:
     return nodes
 
 
-def _step_reduced_loop(name: str, full: bool) -> Measurement:
+def _published_loop(twists: np.ndarray) -> float:
+    """Time of the published reduced model's steps through `twists`, compiled [s]."""
     from planarfriction.kernels import reduced as kernels
     from planarfriction.kernels.law import law_row
 
-    model, twists = ReducedModelPublished(_disc(), _law()), _mixed_twists(20_000)
+    model = ReducedModelPublished(_disc(), _law())
     shape = model.shape_at(1.0)
     surface = np.array([shape.surface.numbers.kind, 0, shape.surface.numbers.size])
     arguments = law_row(model.law), shape.numbers, surface, shape.surface.numbers.data
     z, wrench = model.rest(), np.empty_like(twists)
-    loop = _median(lambda: kernels.step_sequence(*arguments, z, twists, 1.0, 1e-4, wrench), 9)
-    call = _python_step(model, 1000)
+    return _median(lambda: kernels.step_sequence(*arguments, z, twists, 1.0, 1e-4, wrench), 9)
+
+
+def _step_reduced_loop(name: str, full: bool) -> Measurement:
+    twists = _mixed_twists(20_000)
+    loop, call = _published_loop(twists), _python_step(ReducedModelPublished(_disc(), _law()), 1000)
     return _line(name, loop / len(twists) * 1e6, "us", "one Python call of the same step", call * 1e6)
 
 
@@ -234,18 +241,53 @@ def _step_reduced_call(name: str, full: bool) -> Measurement:
     return _line(name, _python_step(model, 2000) * 1e6, "us", "one Python call of rate (NumPy)", rate * 1e6)
 
 
-def _gradient_reduced(name: str, full: bool) -> Measurement:
-    """Half the squared wrenches of a roll-out, with its gradient to all parameters, twists, loads and the state."""
+def _moments_loop(model: ReducedModel, twists: np.ndarray) -> float:
+    from planarfriction.kernels import moments as kernels
+    from planarfriction.kernels.law import law_row
+
+    shape, z, wrench = model.shape_at(1.0), model.rest(), np.empty_like(twists)
+    arguments = law_row(model.law), shape.numbers, np.zeros(3, dtype=int), shape.data
+    return _median(lambda: kernels.step_sequence(*arguments, z, twists, 1.0, 1e-4, wrench), 9)
+
+
+def _step_moments_loop(name: str, full: bool) -> Measurement:
+    twists = _mixed_twists(20_000)
+    ours, theirs = _moments_loop(ReducedModel(_disc(), _law()), twists), _published_loop(twists)
+    return _line(name, ours / len(twists) * 1e6, "us", _AGAINST_PUBLISHED, theirs / len(twists) * 1e6)
+
+
+def _step_moments_call(name: str, full: bool) -> Measurement:
+    ours, theirs = (_python_step(model(_disc(), _law()), 2000) for model in (ReducedModel, ReducedModelPublished))
+    return _line(name, ours * 1e6, "us", _AGAINST_PUBLISHED, theirs * 1e6)
+
+
+def _gradient_moments(name: str, full: bool) -> Measurement:
+    """A roll-out with its gradient, as `gradient.reduced`."""
+    ours, theirs = (_value_and_gradient(model(_disc(), _law())) for model in (ReducedModel, ReducedModelPublished))
+    return _line(name, ours, "s", _AGAINST_PUBLISHED, theirs)
+
+
+def _value_and_gradient(model: ReducedModel | ReducedModelPublished) -> float:
+    """Time of half the squared wrenches of a roll-out with their gradient to all its inputs [s]."""
     from planarfriction import autodiff
 
-    model, twists, dt = ReducedModelPublished(_disc(), _law()), _mixed_twists(2000), 1e-4
+    twists, dt = _mixed_twists(2000), 1e-4
     loads = np.full(len(twists), 2.0)
 
     def value_and_gradient() -> None:
         wrenches, _, states = autodiff.rollout_states(model, model.rest(), twists, loads, dt)
         autodiff.rollout_gradient(model, model.rest(), twists, loads, dt, wrenches, states=states)
 
-    value = _median(value_and_gradient, 15)
+    return _median(value_and_gradient, 15)
+
+
+def _gradient_reduced(name: str, full: bool) -> Measurement:
+    """Half the squared wrenches of a roll-out, with its gradient to all parameters, twists, loads and the state."""
+    from planarfriction import autodiff
+
+    model, twists, dt = ReducedModelPublished(_disc(), _law()), _mixed_twists(2000), 1e-4
+    loads = np.full(len(twists), 2.0)
+    value = _value_and_gradient(model)
     try:
         return _line(name, value, "s", "PyTorch, eager, the same roll-out", _eager_gradient(model, twists, dt, full))
     except ImportError:
@@ -310,8 +352,11 @@ BENCHMARKS: dict[str, Callable[[str, bool], Measurement]] = {
     "step.reduced.loop": _step_reduced_loop,
     "step.distributed.loop": _step_distributed_loop,
     "step.reduced.call": _step_reduced_call,
+    "step.moments.loop": _step_moments_loop,
+    "step.moments.call": _step_moments_call,
     "gradient.reduced": _gradient_reduced,
     "gradient.reduced.batch": _gradient_reduced_batch,
+    "gradient.moments": _gradient_moments,
     "import": _import,
 }
 """Benchmarks by name."""

@@ -128,7 +128,7 @@ def slip_share(xp, deflection, cosine, evenness, elasto_plastic, breakaway_ratio
 
 
 def slip_share_partials(xp, deflection, cosine, evenness, elasto_plastic, breakaway_ratio):
-    """`slip_share` and its partial derivatives with respect to `deflection`, `cosine` and `evenness`."""
+    """`slip_share` and its partial derivatives by `deflection`, `cosine` and the breakaway `s_ba evenness`."""
     breakaway = breakaway_ratio * evenness
     alpha = slip_fraction(xp, deflection, breakaway)
     half = 0.5 * (1.0 + cosine)
@@ -138,7 +138,7 @@ def slip_share_partials(xp, deflection, cosine, evenness, elasto_plastic, breaka
         xp.where(elastic, alpha * half, 1.0),
         slope,
         xp.where(elastic, 0.5 * alpha, 0.0),
-        breakaway_ratio * bristle_decay_by_breakaway(xp, slope, deflection, breakaway),
+        bristle_decay_by_breakaway(xp, slope, deflection, breakaway),
     )
 
 
@@ -151,6 +151,12 @@ def floored(xp, value, least):
 def floored_slope(xp, value, least):
     """Derivative of `floored` with respect to `value`."""
     return xp.minimum(xp.maximum(value, 0.0) * (0.5 / least), 1.0)
+
+
+def floored_by_least(xp, value, least):
+    """Derivative of `floored` with respect to `least`."""
+    slope = floored_slope(xp, value, least)
+    return 1.0 - slope * slope
 
 
 # ---------------------------------------------------------------------- derivatives of a step

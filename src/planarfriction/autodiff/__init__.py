@@ -5,7 +5,7 @@
 model, so that they agree with differences of `rollout` to rounding. Kinks: `planarfriction.kernels.bristle_step`.
 """
 
-from planarfriction.autodiff.parameters import PARAMETERS, parameters_of
+from planarfriction.autodiff.parameters import PARAMETERS, parameter_names, parameters_of
 from planarfriction.autodiff.rollouts import (
     Rollout,
     RolloutGradient,
@@ -24,6 +24,7 @@ __all__ = [
     "RolloutGradient",
     "RolloutStates",
     "SceneSensitivities",
+    "parameter_names",
     "parameters_of",
     "rollout",
     "rollout_gradient",

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
+from planarfriction.kernels import moments_rollout, reduced_adjoint, reduced_rollout
 from planarfriction.kernels.law import law_numbers
-from planarfriction.models import ReducedModelPublished
+from planarfriction.models import ReducedModel, ReducedModelPublished
 from planarfriction.patch.metric import refuse_anisotropy
 
 PARAMETERS = (
@@ -26,67 +28,118 @@ PARAMETERS = (
     "centre_x",
     "centre_y",
 )
-"""Names of the parameters, in the order of their vector; units as in `LuGre`, [m], [m^2], [m], [m]."""
+"""Parameters of `ReducedModelPublished`, in the order of their vector; units as in `LuGre`, [m], [m^2], [m], [m]."""
 
 _POSITIVE = ("sigma_0", "mu_c", "mu_s", "v_s", "gamma", "contact_radius")
 _NON_NEGATIVE = ("sigma_1", "sigma_2", "second_moment")
 
-COLUMNS = np.array([0, 1, 2, 3, 4, 5, 6, 8, 11, 12, 9, 10])
-"""Where each parameter stands in a row of `kernels.reduced_adjoint`; column 7 says which bristles these are."""
+
+class Family(NamedTuple):
+    """What the roll-outs of one kind of model need to know of it."""
+
+    names: tuple[str, ...]
+    """Its parameters."""
+    columns: np.ndarray
+    """Where each parameter stands in a row."""
+    rollout: Callable[..., None]
+    gradient: Callable[..., None]
+    sensitivities: Callable[..., None]
+    """Compiled loops."""
+
+
+PUBLISHED = Family(
+    PARAMETERS,
+    np.array([0, 1, 2, 3, 4, 5, 6, 8, 11, 12, 9, 10]),  # 7 says which bristles these are
+    reduced_rollout.rollout,
+    reduced_rollout.gradient,
+    reduced_adjoint.sensitivities,
+)
+"""`ReducedModelPublished`, rows as in `kernels.reduced_adjoint`."""
+
+MOMENTS = Family(
+    tuple(name for name in PARAMETERS[:8] if name != "gamma"),
+    np.array([0, 1, 2, 3, 4, 5, 8]),
+    moments_rollout.rollout,
+    moments_rollout.gradient,
+    moments_rollout.sensitivities,
+)
+"""`ReducedModel`, rows as in `kernels.moments_rollout`; gamma and the shape are built into its stored map."""
 
 
 class Packed(NamedTuple):
     """A reduced model as compiled loops see it."""
 
     rows: np.ndarray
-    """`[..., 13]`, batch axes as those of the parameters."""
+    """`[..., N]`, batch axes as those of the parameters."""
     surface: np.ndarray
-    """Kind, start and size of the limit surface, int [3]."""
+    """Kind, start and size of the limit surface, int [3]; where the maps of a shape begin."""
     data: np.ndarray
-    """Numbers of the limit surface, flat."""
+    """Numbers of the limit surface or of the map, flat."""
+    family: Family = PUBLISHED
+
+
+def parameter_names(model: Any) -> tuple[str, ...]:
+    """Names of the P parameters of a reduced model, in the order of their vector.
+
+    Those of `ReducedModelPublished` are `PARAMETERS`. `ReducedModel` has those of the law but gamma, which is built
+    into its stored map as the shape of the patch is.
+    """
+    return _family(model).names
 
 
 def parameters_of(model: Any) -> np.ndarray:
-    """Parameters of a reduced model, shape `[12]`; plain bristles have a breakaway ratio without effect."""
-    return _model_row(model)[COLUMNS]
+    """Parameters of a reduced model, shape `[P]`; plain bristles have a breakaway ratio without effect."""
+    packed = pack(model)
+    return packed.rows[packed.family.columns]
 
 
 def pack(model: Any, parameters: Any = None) -> Packed:
-    """The model as compiled loops see it, with `parameters` `[..., 12]` instead of its own if given.
+    """The model as compiled loops see it, with `parameters` `[..., P]` instead of its own if given.
 
     A friction coefficient `mu_s` below `mu_c`, which a law refuses, is let through: the formulas are smooth there.
     A model that is packed already, as the tensor front ends hold them, is taken as it is.
     """
-    if isinstance(model, Packed):
-        row, surface, data = model
-    else:
-        row, numbers = _model_row(model), model.shape_at(1.0).surface.numbers
-        surface, data = np.array([numbers.kind, 0, numbers.size]), numbers.data
-    if parameters is not None:
-        values = _checked(parameters)
-        row = np.broadcast_to(row, (*values.shape[:-1], len(row))).copy()
-        row[..., COLUMNS] = values
-    return Packed(row, surface, data)
+    packed = model if isinstance(model, Packed) else _packed(model)
+    if parameters is None:
+        return packed
+    values = _checked(parameters, packed.family.names)
+    row = np.broadcast_to(packed.rows, (*values.shape[:-1], packed.rows.shape[-1])).copy()
+    row[..., packed.family.columns] = values
+    return packed._replace(rows=row)
 
 
-def _model_row(model: Any) -> np.ndarray:
-    if not isinstance(model, ReducedModelPublished):
-        raise InvalidValueError("model", "be a ReducedModelPublished", type(model).__name__)
-    if model.patch.depends_on_load and model.on_load_change != "keep":
+def _family(model: Any) -> Family:
+    if isinstance(model, ReducedModel):
+        return MOMENTS
+    if isinstance(model, ReducedModelPublished):
+        return PUBLISHED
+    raise InvalidValueError("model", "be a ReducedModel or a ReducedModelPublished", type(model).__name__)
+
+
+def _packed(model: Any) -> Packed:
+    family = _family(model)
+    how = getattr(model, "on_load_change", None)
+    if model.patch.depends_on_load and how != "keep":
         raise InvalidValueError(
             "model",
-            "have a shape that does not follow the load: a patch of fixed shape, or on_load_change='keep'",
-            f"on_load_change={model.on_load_change!r}",
+            "have a shape that does not follow the load: a patch of fixed shape"
+            + (", or on_load_change='keep'" if how else ""),
+            f"on_load_change={how!r}" if how else "a patch that depends on the load",
         )
     refuse_anisotropy(model.patch, "derivatives of roll-outs")
-    return np.array([*law_numbers(model.law), *model.shape_at(1.0).numbers])
+    shape = model.shape_at(1.0)
+    row = np.array([*law_numbers(model.law), *shape.numbers])
+    if family is MOMENTS:
+        return Packed(row, np.zeros(3, dtype=int), shape.data, family)
+    numbers = shape.surface.numbers
+    return Packed(row, np.array([numbers.kind, 0, numbers.size]), numbers.data, family)
 
 
-def _checked(parameters: Any) -> np.ndarray:
+def _checked(parameters: Any, names: tuple[str, ...]) -> np.ndarray:
     values = validation.numbers("parameters", parameters)
-    if values.shape[-1:] != (len(PARAMETERS),):
-        raise InvalidValueError("parameters", f"have shape [..., {len(PARAMETERS)}]", f"shape {list(values.shape)}")
-    for name, column in zip(PARAMETERS, np.moveaxis(values, -1, 0), strict=True):
+    if values.shape[-1:] != (len(names),):
+        raise InvalidValueError("parameters", f"have shape [..., {len(names)}]", f"shape {list(values.shape)}")
+    for name, column in zip(names, np.moveaxis(values, -1, 0), strict=True):
         low, high = float(column.min(initial=np.inf)), float(column.max(initial=-np.inf))
         if not np.isfinite(column).all():
             raise InvalidValueError(name, "be finite", "NaN or infinity")

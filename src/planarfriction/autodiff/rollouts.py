@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -10,9 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.autodiff.parameters import COLUMNS, PARAMETERS, Packed, pack
+from planarfriction.autodiff.parameters import Packed, pack
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels import reduced_adjoint, reduced_rollout
 
 _WORTH_A_THREAD = 20_000
 """Steps [-] below which starting a thread costs more than it saves."""
@@ -52,7 +52,7 @@ class _Inputs(NamedTuple):
 
     packed: Packed
     rows: np.ndarray
-    """[B or 1, 13]"""
+    """[B or 1, N]"""
     state: np.ndarray
     """[B, 3]"""
     twists: np.ndarray
@@ -68,8 +68,8 @@ def rollout(model: Any, state: Any, twists: Any, loads: Any, dt: Any, parameters
     """Step a reduced model through `twists` `[..., T, 3]` and `loads` `[..., T]`, each held for `dt` [s].
 
     The steps are those of `model.step`. `state` `[..., 3]`; `loads` may be one number; `dt` is one number or `[T]`;
-    leading axes broadcast. `parameters` `[..., 12]` (see `PARAMETERS`) take the place of the model's own; the limit
-    surface stays as it is, in scaled coordinates. Batches run on all processors.
+    leading axes broadcast. `parameters` `[..., P]` (see `parameter_names`) take the place of the model's own; the limit
+    surface, or the map of a `ReducedModel`, stays as it is, in scaled coordinates. Batches run on all processors.
 
     Raises `InvalidValueError` for wrong shapes, for numbers out of range, and for a model whose shape follows the load.
     """
@@ -102,10 +102,10 @@ def rollout_gradient(
 ) -> RolloutGradient:
     """Gradient of `sum(wrenches_bar wrenches) + sum(state_bar state)` of a `rollout` with respect to its inputs.
 
-    The discrete adjoint: exact for the steps taken, at some two or three times the cost of the roll-out whatever the
-    number of inputs. `wrenches_bar` `[..., T, 3]` and `state_bar` `[..., 3]` (None: zero) broadcast. An input that
-    several contacts share gets the sum of theirs. `states`: those of `rollout_states`, if kept. At zero load the
-    gradient with respect to that load is the one-sided one.
+    The discrete adjoint: exact for the steps taken, at a few times the cost of the roll-out whatever the number of
+    inputs. `wrenches_bar` `[..., T, 3]` and `state_bar` `[..., 3]` (None: zero) broadcast. An input that several
+    contacts share gets the sum of theirs. `states`: those of `rollout_states`, if kept. At zero load the gradient with
+    respect to that load is the one-sided one.
     """
     inputs = _checked(model, state, twists, loads, dt, parameters)
     count, steps = len(inputs.state), len(inputs.dt)
@@ -115,13 +115,12 @@ def rollout_gradient(
     if state_bar is not None:
         z_bar[:] = _rows("state_bar", state_bar, (3,), inputs.batch)
     twists_bar, loads_bar = np.empty((count, steps, 3)), np.empty((count, steps))
-    rows_bar = np.zeros((count, reduced_adjoint.NUMBERS))
+    rows_bar = np.zeros((count, inputs.packed.rows.shape[-1]))
+    family = inputs.packed.family
     arguments = inputs.rows, inputs.packed.surface, inputs.packed.data, on_the_way, inputs.twists, inputs.loads
     results = z_bar, twists_bar, loads_bar, rows_bar
-    _share(
-        inputs, lambda first, last: reduced_rollout.gradient(*arguments, inputs.dt, cotangents, first, last, *results)
-    )
-    given = parameters if parameters is not None else inputs.packed.rows[..., COLUMNS]
+    _share(inputs, lambda first, last: family.gradient(*arguments, inputs.dt, cotangents, first, last, *results))
+    given = parameters if parameters is not None else inputs.packed.rows[..., family.columns]
     return RolloutGradient(
         *(
             _sum_to(np.shape(value), gradient.reshape(*inputs.batch, *gradient.shape[1:]))
@@ -129,7 +128,7 @@ def rollout_gradient(
                 (state, z_bar),
                 (twists, twists_bar),
                 (loads, loads_bar),
-                (given, rows_bar[:, COLUMNS]),
+                (given, rows_bar[:, family.columns]),
             )
         )
     )
@@ -141,23 +140,24 @@ def rollout_sensitivities(
     twists: Any,
     loads: Any,
     dt: Any,
-    names: Sequence[str] = PARAMETERS,
+    names: Sequence[str] | None = None,
     parameters: Any = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Wrenches `[..., T, 3]` of a `rollout` and their derivatives `[..., T, 3, P]` to the parameters `names`.
 
-    Forward in time, for least squares, which wants each wrench's own derivatives; the initial state is held.
+    Forward in time, for least squares, which wants each wrench's own derivatives; the initial state is held. `names`:
+    of `parameter_names`, None for all.
     """
     inputs = _checked(model, state, twists, loads, dt, parameters)
-    chosen = [PARAMETERS.index(validation.choice("names", name, PARAMETERS)) for name in names]
-    columns = COLUMNS[np.array(chosen, dtype=int)]
+    family = inputs.packed.family
+    known = family.names
+    chosen = [known.index(validation.choice("names", name, known)) for name in (known if names is None else names)]
+    columns = family.columns[np.array(chosen, dtype=int)]
     wrenches = np.empty((len(inputs.state), len(inputs.dt), 3))
     slopes = np.empty((*wrenches.shape, len(columns)))
     end = inputs.state.copy()
     arguments = inputs.rows, inputs.packed.surface, inputs.packed.data, end, inputs.twists, inputs.loads, inputs.dt
-    _share(
-        inputs, lambda first, last: reduced_adjoint.sensitivities(*arguments, columns, first, last, wrenches, slopes)
-    )
+    _share(inputs, lambda first, last: family.sensitivities(*arguments, columns, first, last, wrenches, slopes))
     return wrenches.reshape(*inputs.batch, *wrenches.shape[1:]), slopes.reshape(*inputs.batch, *slopes.shape[1:])
 
 
@@ -166,7 +166,7 @@ def _roll(inputs: _Inputs, kept: int) -> tuple[np.ndarray, np.ndarray, np.ndarra
     count, end = len(inputs.state), inputs.state.copy()
     wrenches, states = np.empty((count, len(inputs.dt), 3)), np.empty((count, kept, 3))
     arguments = inputs.rows, inputs.packed.surface, inputs.packed.data, end, inputs.twists, inputs.loads, inputs.dt
-    _share(inputs, lambda first, last: reduced_rollout.rollout(*arguments, first, last, wrenches, states))
+    _share(inputs, lambda first, last: inputs.packed.family.rollout(*arguments, first, last, wrenches, states))
     return wrenches, end, states
 
 
@@ -202,7 +202,7 @@ def _checked(model: Any, state: Any, twists: Any, loads: Any, dt: Any, parameter
     count = int(np.prod(batch))
     return _Inputs(
         packed,
-        _rows("parameters", packed.rows, (reduced_adjoint.NUMBERS,), batch),
+        _rows("parameters", packed.rows, packed.rows.shape[-1:], batch),
         np.broadcast_to(state, (*batch, 3)).reshape(count, 3),
         _rows("twists", twists, (steps, 3), batch),
         _rows("loads", loads, (steps,), batch),
@@ -220,7 +220,8 @@ def _rows(name: str, value: Any, inner: tuple[int, ...], batch: tuple[int, ...])
         except ValueError:
             wanted = ", ".join(str(n) for n in inner)
             raise InvalidValueError(name, f"have shape [..., {wanted}]", f"shape {list(value.shape)}") from None
-    return np.require(value.reshape(-1, *inner), float, ["C", "W"])
+    outer = value.shape[: value.ndim - len(inner)]
+    return np.require(value.reshape(math.prod(outer), *inner), float, ["C", "W"])
 
 
 def _sum_to(shape: tuple[int, ...], gradient: np.ndarray) -> np.ndarray:

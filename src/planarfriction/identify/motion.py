@@ -104,6 +104,8 @@ def identify_motion(
         raise InvalidValueError("body", "be a SlidingBody", body)
     if not isinstance(start, LuGre):
         raise InvalidValueError("start", "be a LuGre law", start)
+    if not isinstance(patch, ContactPatch):
+        raise InvalidValueError("patch", "be a ContactPatch", type(patch).__name__)
     refuse_anisotropy(patch, "identify_motion")
     if samples is not None:
         samples = validation.count("samples", samples, at_least=5)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.errors import InvalidValueError
 from planarfriction.identify import parameters as known
 from planarfriction.identify.fitted import assemble
 from planarfriction.identify.guess import guess_starts
@@ -81,6 +82,8 @@ def identify_lugre(
         A parameter breaks its rule.
     """
     logs, names = as_logs(log), known.check_names(parameters)
+    if not isinstance(patch, ContactPatch):
+        raise InvalidValueError("patch", "be a ContactPatch", type(patch).__name__)
     refuse_anisotropy(patch, "identify_lugre")
     validation.choice("begins", begins, BEGINS)
     starts = validation.count("starts", starts)

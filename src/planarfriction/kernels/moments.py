@@ -52,12 +52,12 @@ def closure(law, deflection, share, even):
 
 @inlined
 def closure_partials(law, deflection, share, even):
-    """`beta` and its partial derivatives with respect to `deflection`, `share` and `even`."""
+    """`beta` and its partial derivatives with respect to `deflection`, `share` and the breakaway `s_ba even`."""
     per = xp.where(deflection > 0.0, 1.0 / xp.where(deflection > 0.0, deflection, 1.0), 0.0)
-    beta, by_deflection, by_cosine, by_even = formulas.slip_share_partials(
+    beta, by_deflection, by_cosine, by_breakaway = formulas.slip_share_partials(
         xp, deflection, share * per, even, law.elasto_plastic, law.breakaway_ratio
     )
-    return beta, by_deflection - by_cosine * share * per * per, by_cosine * per, by_even
+    return beta, by_deflection - by_cosine * share * per * per, by_cosine * per, by_breakaway
 
 
 @inlined
@@ -96,7 +96,8 @@ def slopes(law, z, u, v, q, j, even, j_even, by_z, by_v):
     share = (zx * q[0] + zy * q[1] + zs * q[2]) * per_q2
     deflection = math.sqrt((zx * zx + zy * zy + zs * zs) * per_q2)
     per_deflection = 1.0 / deflection if deflection > 0.0 else 0.0
-    beta, by_deflection, by_share, by_even = closure_partials(law, deflection, share, even)
+    beta, by_deflection, by_share, by_breakaway = closure_partials(law, deflection, share, even)
+    by_even = law.breakaway_ratio * by_breakaway
     for i in range(3):
         m_i = u[i] - decay * q[i]
         g_i = decay * z[i] + share * m_i

@@ -129,6 +129,52 @@ def steady_slopes(law, shape, surface, data, x, y, s, v, j):
     return (qx + raised * nx) * per, (qy + raised * ny) * per, (qs + raised * ns) * per
 
 
+@kernel
+def _sliding_by_law(law, data, start, x, y, s, v, share, out):
+    """Adds `share` of the slopes of `_sliding` by mu_c, mu_s and v_s to `out` [9], a row each."""
+    n, m, count, knee = int(data[start + 1]), int(data[start + 2]), int(data[start + 3]), data[start + 4]
+    faces = int(data[start])
+    spot = cube.locate(x, y, s, faces)
+    per = 1.0 / (v + knee * law.v_s)
+    t = v * per
+    first = start + HEADER
+    second = first + faces * (2 * n + 1) * (2 * n + 1) * 12
+    p, q = cube.square(spot, n), cube.square(spot, m)
+    level, w = cube.levels(t, count)
+    w_t = cube.level_slopes(t, count)
+    part, drop = share * spot.sign, law.mu_s - law.mu_c
+    by_v_s = -drop * knee * t * per
+    for i in range(3):
+        flat, rest = cube.read(data, first, n, 3, i, p), cube.read_level(data, second, m, 3, count, i, q, level, w)
+        out[i] += part * (t * flat - rest)
+        out[3 + i] += part * ((1.0 - t) * flat + rest)
+        out[6 + i] += part * by_v_s * (cube.read_level(data, second, m, 3, count, i, q, level, w_t) - flat)
+        out[9 + i] += part * ((law.mu_s - drop * t) * flat + drop * rest)
+    return data[start + 5]
+
+
+@kernel
+def steady_by_law(law, shape, surface, data, x, y, s, v, out):
+    """Slopes of `z_ss` by mu_c, mu_s and v_s into `out` [9], a row each; `out[9:12]` is scratch."""
+    for i in range(12):
+        out[i] = 0.0
+    least = 0.0
+    for i in range(2 if shape[6] > 0.0 else 1):
+        share = shape[6] if i == 1 else 1.0 - shape[6]
+        least += share * _sliding_by_law(law, data, surface[i], x, y, s, v, share, out)
+    per_v, per = 1.0 / v, 1.0 / law.sigma_0
+    nx, ny, ns = x * per_v, y * per_v, s * per_v
+    power = out[9] * nx + out[10] * ny + out[11] * ns
+    stays = 1.0 - formulas.floored_slope(xp, power, law.mu_c * least)
+    for i in range(3):
+        raised = -stays * (out[3 * i] * nx + out[3 * i + 1] * ny + out[3 * i + 2] * ns)
+        if i == 0:
+            raised += formulas.floored_by_least(xp, power, law.mu_c * least) * least
+        out[3 * i] = (out[3 * i] + raised * nx) * per
+        out[3 * i + 1] = (out[3 * i + 1] + raised * ny) * per
+        out[3 * i + 2] = (out[3 * i + 2] + raised * ns) * per
+
+
 @inlined
 def _fourth(data, start, m):
     """`K m`."""
