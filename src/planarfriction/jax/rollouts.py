@@ -49,7 +49,7 @@ def simulate(model: Model, twists, loads, dt, z0=None, *, method: str = "scan") 
     """Steps of `dt` [s] through twists `[..., T, 3]` and loads (`[..., T]` or a number), from `z0` or from rest.
 
     Method "scan" differentiates through `lax.scan`, on any device and with respect to everything; "adjoint"
-    (`ReducedPlanarLuGre`, CPU) runs the compiled roll-out and its discrete adjoint, much faster there, in float64 inside.
+    (`ReducedPlanarLuGre`, CPU) runs the compiled roll-out and its discrete adjoint, much faster, in float64 inside.
     """
     validation.choice("method", method, ("scan", "adjoint"))
     twists = jnp.asarray(twists)

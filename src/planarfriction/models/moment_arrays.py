@@ -103,7 +103,7 @@ def _spot(xp, direction, faces: int):
 
 
 def _interval(xp, a, nodes: int):
-    """Nodes at both ends of the interval that holds `a`, `[..., 2]`, their weights of value and slope, `[..., 2, 2]`."""
+    """Both ends of the interval that holds `a`, `[..., 2]`, and their weights of value and slope, `[..., 2, 2]`."""
     n = (nodes - 1) // 2
     t = (a + 1.0) * n
     i = xp.whole(t, 2 * n - 1)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable
 
 import torch
@@ -78,7 +77,8 @@ class MomentPlanarLuGre(PlanarLuGre):
 
     def prepare(self, parameters: Tensor) -> Prepared:
         """The law; the shape is fixed."""
-        return Prepared(MomentLaw(*parameters[..., None].unbind(-2), self.elasto_plastic), ())  # pyright: ignore
+        law = MomentLaw(*parameters[..., None].unbind(-2), elasto_plastic=self.elasto_plastic)  # pyright: ignore
+        return Prepared(law, ())
 
     def forward(self, z: Tensor, v: Tensor, f_n: Tensor | float, *, parameters: Tensor | None = None):
         """Rates `z_dot` of the moments and wrench."""
