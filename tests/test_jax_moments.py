@@ -30,7 +30,7 @@ WEIGHTS = np.array([1.0, 1.0, 100.0])
 
 @pytest.fixture(autouse=True, scope="module")
 def double_precision():
-    before = {name: getattr(jax.config, name) for name in ("jax_enable_x64", "jax_disable_most_optimizations")}
+    before = {name: jax.config.read(name) for name in ("jax_enable_x64", "jax_disable_most_optimizations")}
     for name in before:
         jax.config.update(name, True)  # without optimisations compilation is quicker
     pair.cache_clear()
