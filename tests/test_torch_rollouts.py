@@ -256,7 +256,7 @@ def test_a_gradient_to_the_time_step_is_eager():
         ({"f_n": tensor([1.0, 2.0])}, r"f_n must broadcast with \[..., 4\]"),
         ({"f_n": -1.0}, "loads must be >= 0"),
         ({"v_profile": tensor([[0.0, np.nan, 0.0]] * 4)}, "twists must be finite"),
-        ({"model": DistributedPlanarLuGre(PATCH, LAWS["plain"]), "method": "adjoint"}, "for the distributed model"),
+        ({"model": DistributedPlanarLuGre(PATCH, LAWS["plain"]), "method": "adjoint"}, "for DistributedPlanarLuGre"),
     ],
 )
 def test_wrong_input_is_one_line(change, message):

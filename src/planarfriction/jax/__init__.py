@@ -13,16 +13,20 @@ except ImportError as error:
     raise MissingExtraError("jax", "jax") from error
 
 from planarfriction.jax.distributed import DistributedPlanarLuGre, distributed
+from planarfriction.jax.moments import MomentParameters, MomentPlanarLuGre, moments
 from planarfriction.jax.reduced import Parameters, ReducedPlanarLuGre, Surface, reduced
 from planarfriction.jax.rollouts import Rollout, rate, rest, simulate, step, wrench
 
 __all__ = [
     "DistributedPlanarLuGre",
+    "MomentParameters",
+    "MomentPlanarLuGre",
     "Parameters",
     "ReducedPlanarLuGre",
     "Rollout",
     "Surface",
     "distributed",
+    "moments",
     "rate",
     "reduced",
     "rest",

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
+import jax
 import jax.numpy as jnp
 
-exp, sin, cos = jnp.exp, jnp.sin, jnp.cos
+exp, sin, cos, stack = jnp.exp, jnp.sin, jnp.cos, jnp.stack
 
 
 def where(condition, a, b):
@@ -34,9 +35,7 @@ def power(x, exponent):
 
 def norm(x, axis: int):
     """Length along an axis; at the zero vector its derivative is 0."""
-    square = jnp.sum(x * x, axis=axis)
-    nonzero = square > 0.0
-    return jnp.where(nonzero, jnp.sqrt(jnp.where(nonzero, square, 1.0)), 0.0)
+    return root(jnp.sum(x * x, axis=axis))
 
 
 def unit(x, length, axis: int):
@@ -44,3 +43,14 @@ def unit(x, length, axis: int):
     length = jnp.expand_dims(length, axis)
     nonzero = length > 0.0
     return jnp.where(nonzero, x / jnp.where(nonzero, length, 1.0), 0.0)
+
+
+def root(x):
+    """Square root of `x >= 0`; its derivative at 0 is 0."""
+    positive = x > 0.0
+    return jnp.where(positive, jnp.sqrt(jnp.where(positive, x, 1.0)), 0.0)
+
+
+def whole(x, most: int):
+    """Integer part, from 0 to `most`."""
+    return jnp.clip(jax.lax.stop_gradient(x).astype(jnp.int32), 0, most)

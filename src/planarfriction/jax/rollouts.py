@@ -10,9 +10,10 @@ import jax.numpy as jnp
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.jax.distributed import DistributedPlanarLuGre
+from planarfriction.jax.moments import MomentPlanarLuGre
 from planarfriction.jax.reduced import ReducedPlanarLuGre
 
-Model = ReducedPlanarLuGre | DistributedPlanarLuGre
+Model = MomentPlanarLuGre | ReducedPlanarLuGre | DistributedPlanarLuGre
 
 
 class Rollout(NamedTuple):
@@ -47,8 +48,8 @@ def step(model: Model, z, twist, load, dt) -> tuple[jax.Array, jax.Array]:
 def simulate(model: Model, twists, loads, dt, z0=None, *, method: str = "scan") -> Rollout:
     """Steps of `dt` [s] through twists `[..., T, 3]` and loads (`[..., T]` or a number), from `z0` or from rest.
 
-    Method "scan" differentiates through `lax.scan`, on any device and with respect to everything; "adjoint" (reduced
-    model, CPU) runs the compiled roll-out and its discrete adjoint, much faster there, in float64 inside.
+    Method "scan" differentiates through `lax.scan`, on any device and with respect to everything; "adjoint"
+    (`ReducedPlanarLuGre`, CPU) runs the compiled roll-out and its discrete adjoint, much faster, in float64 inside.
     """
     validation.choice("method", method, ("scan", "adjoint"))
     twists = jnp.asarray(twists)

@@ -26,7 +26,8 @@ TRAINABLE = LAW[:-1]
 class Prepared(NamedTuple):
     """A model's numbers, ready for one evaluation or for all steps of a roll-out."""
 
-    law: Law
+    law: Any
+    """A record of the law's parameters, `Law` for bristles."""
     shape: tuple[Tensor, ...]
     """Of the patch; the model knows what they are."""
 

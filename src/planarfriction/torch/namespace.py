@@ -10,7 +10,7 @@ import math
 import torch
 from torch import Tensor
 
-exp, sin, cos = torch.exp, torch.sin, torch.cos
+exp, sin, cos, stack = torch.exp, torch.sin, torch.cos, torch.stack
 
 
 def where(condition, a, b):
@@ -41,6 +41,15 @@ def power(x: Tensor, exponent: Tensor) -> Tensor:
 
 def norm(vector: Tensor, axis: int) -> Tensor:
     """`|vector|` along an axis, which stays with length 1; its derivative at 0 is 0."""
-    square = (vector * vector).sum(axis, keepdim=True)
-    moving = square > 0.0
-    return torch.where(moving, torch.sqrt(torch.where(moving, square, 1.0)), 0.0)
+    return root((vector * vector).sum(axis, keepdim=True))
+
+
+def root(x: Tensor) -> Tensor:
+    """Square root of `x >= 0`; its derivative at 0 is 0."""
+    positive = x > 0.0
+    return torch.where(positive, torch.sqrt(torch.where(positive, x, 1.0)), 0.0)
+
+
+def whole(x: Tensor, most: int) -> Tensor:
+    """Integer part, from 0 to `most`."""
+    return x.detach().long().clamp(0, most)

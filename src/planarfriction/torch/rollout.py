@@ -87,7 +87,7 @@ def rollout(
 def _obstacle(model: PlanarLuGre, *tensors: Tensor) -> str:
     """Why the adjoint cannot be used, or nothing."""
     if not isinstance(model, ReducedPlanarLuGre):
-        return "for the distributed model"
+        return f"for {type(model).__name__}"
     if any(tensor.device.type != "cpu" for tensor in (*tensors, model.physical.values)):
         return "for tensors that are not on the processor"
     if tensors[-1].requires_grad:

@@ -1,0 +1,196 @@
+"""The moment model in JAX: closed forms, agreement with the compiled one and with PyTorch, gradients."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import itertools
+
+import numpy as np
+import pytest
+
+import planarfriction as pf
+
+jax = pytest.importorskip("jax", reason="needs the extra [jax]")
+import jax.numpy as jnp  # noqa: E402
+
+import planarfriction.jax as pj  # noqa: E402
+
+pytestmark = pytest.mark.jax
+
+PATCH = pf.ContactPatch.from_pressure(np.random.default_rng(4).uniform(0.0, 1.0, (5, 6)), 0.002, name="lopsided")
+LAWS = {
+    "plain": pf.LuGre(sigma_1=30.0, gamma=1.7),
+    "elasto-plastic": pf.LuGre(sigma_1=30.0, gamma=1.7, elasto_plastic=pf.ElastoPlastic(0.7)),
+}
+SMALL = {"segments": 8, "speeds": 8}
+STATE_SIZE, TWIST_SIZE = 1e-6, np.array([1e-3, 1e-3, 0.2])
+WEIGHTS = np.array([1.0, 1.0, 100.0])
+
+
+@pytest.fixture(autouse=True, scope="module")
+def double_precision():
+    before = {name: jax.config.read(name) for name in ("jax_enable_x64", "jax_disable_most_optimizations")}
+    for name in before:
+        jax.config.update(name, True)  # without optimisations compilation is quicker
+    pair.cache_clear()
+    yield
+    for name, value in before.items():
+        jax.config.update(name, value)
+
+
+@functools.cache
+def pair(law: str):
+    """The same model in NumPy and in JAX."""
+    model = pf.ReducedModel(PATCH, LAWS[law], **SMALL)
+    return model, pj.moments(model)
+
+
+def samples(model: pf.ReducedModel, seed: int = 1):
+    """States in stick and slip, twists at kinks, on the edges and corners of the cube, and of all speeds; loads."""
+    rng = np.random.default_rng(seed)
+    directions = np.array([d for d in itertools.product((-1.0, 0.0, 1.0), repeat=3) if any(d)])
+    count = len(directions) + 60
+    state = rng.normal(size=(count, 3)) * STATE_SIZE * 10.0 ** rng.uniform(-2, 0.3, (count, 1))
+    twist = rng.normal(size=(count, 3)) * TWIST_SIZE * 10.0 ** rng.uniform(-2, 2, (count, 1))
+    load = rng.uniform(0.2, 3.0, count)
+    twist[: len(directions)] = 1e-3 * directions @ np.linalg.inv(model.shape_at(None).factor).T
+    state[:5], load[5], load[-3], twist[4], twist[-1], twist[-2] = 0.0, 0.0, 0.0, 0.0, 0.0, [0.0, 0.0, 0.3]
+    return state, twist, load
+
+
+def sway(count: int) -> np.ndarray:
+    t = 1e-4 * np.arange(count)
+    return np.stack([2e-3 * np.sin(300 * t) + 1e-4, 1e-3 * np.cos(200 * t), 0.3 * np.sin(150 * t)], -1)
+
+
+def close(actual, expected, tolerance: float = 1e-12):
+    """Each component to `tolerance` of its largest value."""
+    actual, expected = np.asarray(actual), np.asarray(expected)
+    assert actual.shape == expected.shape
+    assert (np.abs(actual - expected) <= tolerance * np.abs(expected).max(axis=0)).all()
+
+
+@functools.cache
+def slopes():
+    """Derivatives of a step of the elasto-plastic model by state, twist, load and law, for a batch."""
+
+    def step(z, v, f_n, parameters, dt):
+        return pj.step(dataclasses.replace(pair("elasto-plastic")[1], parameters=parameters), z, v, f_n, dt)
+
+    return jax.jit(jax.vmap(jax.jacrev(step, (0, 1, 2, 3)), (0, 0, 0, None, None)))
+
+
+@functools.cache
+def loss_and_slopes():
+    """Loss of a roll-out of the elasto-plastic model with its derivatives by law and twists, and the roll-out."""
+
+    def loss(parameters, twists):
+        run = pj.simulate(dataclasses.replace(pair("elasto-plastic")[1], parameters=parameters), twists, 2.0, 1e-4)
+        return jnp.sum(jnp.square(run.wrenches * WEIGHTS)), run
+
+    return jax.jit(jax.value_and_grad(loss, (0, 1), has_aux=True))
+
+
+# ---------------------------------------------------------------------- closed forms
+
+
+def test_a_stuck_patch_is_a_spring():
+    numpy_model, model = pair("elasto-plastic")
+    state, twist, load = samples(numpy_model)
+    by_state = slopes()(1e-3 * state, 0.0 * twist, np.full_like(load, 2.0), model.parameters, 1e-3)[1][0]
+    exact = np.broadcast_to(-2.0 * 1e6 * numpy_model.shape_at(None).factor.T, by_state.shape)
+    np.testing.assert_allclose(by_state, exact, rtol=1e-13, atol=1e-6)
+
+
+# ---------------------------------------------------------------------- the compiled model
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_it_equals_the_compiled_model(law):
+    numpy_model, model = pair(law)
+    inputs = samples(numpy_model)
+
+    @jax.jit
+    def evaluate(z, v, f_n, dt):
+        return pj.rate(model, z, v, f_n), pj.wrench(model, z, v, f_n), pj.step(model, z, v, f_n, dt)
+
+    for dt in (1e-6, 1e-4, 1e-2, 1e3):
+        rate, wrench, step = evaluate(*inputs, dt)
+        close(rate, numpy_model.rate(*inputs))
+        close(wrench, numpy_model.wrench(*inputs))
+        for got, wanted in zip(step, numpy_model.step(*inputs, dt), strict=True):
+            close(got, wanted)
+
+
+def test_gradients_are_the_analytic_jacobians():
+    numpy_model, model = pair("elasto-plastic")
+    inputs = samples(numpy_model)
+    loaded = inputs[2] > 0.0  # without load: to the load alone
+    for dt in (1e-6, 1e-4, 1e-2):
+        new, wrench = slopes()(*inputs, model.parameters, dt)
+        exact = numpy_model.step_jacobians(*inputs, dt)
+        for got, wanted in zip((*new[:2], *wrench[:3]), exact, strict=True):
+            assert np.abs(got - wanted)[loaded].max() <= 2e-11 * np.abs(wanted).max()
+
+
+def test_gradients_at_kinks_are_finite():
+    numpy_model, model = pair("elasto-plastic")
+    z, v, f_n = samples(numpy_model)
+    states = [[0, 0, 0], [1e-6, 0, 0], [0, 0, 1e-6], [2e-6, 0, 0]]
+    twists = [[0, 0, 0], [0, 0, 0.3], [0, 0, -0.3], [2e-3, 0, 0], [0, -2e-3, 0], [1e-160, 0, 0]]
+    kinks = list(itertools.product(states, twists, (0.0, 1.0)))
+    z[: len(kinks)], v[: len(kinks)], f_n[: len(kinks)] = zip(*kinks, strict=True)
+    for dt in (0.0, 3e-4):
+        found = slopes()(z, v, f_n, model.parameters, dt)
+        assert all(np.isfinite(slope).all() for slope in jax.tree.leaves(found))
+
+
+def test_a_roll_out_is_that_of_numpy_and_its_gradient_that_of_differences():
+    numpy_model, model = pair("elasto-plastic")
+    (_, run), (by_law, _) = loss_and_slopes()(model.parameters, sway(40))
+    z = numpy_model.rest()
+    for twist in sway(40):
+        z, wrench = numpy_model.step(z, twist, 2.0, 1e-4)
+    np.testing.assert_allclose(run.state, z, rtol=1e-10, atol=1e-18)
+    np.testing.assert_allclose(run.wrenches[-1], wrench, rtol=1e-10)
+    for name, now in model.parameters._asdict().items():
+        ends = [
+            loss_and_slopes()(model.parameters._replace(**{name: now * (1.0 + h)}), sway(40))[0][0]
+            for h in (1e-6, -1e-6)
+        ]
+        difference = (ends[0] - ends[1]) / 2e-6
+        assert float(getattr(by_law, name) * now) == pytest.approx(float(difference), rel=1e-5, abs=1e-7), name
+
+
+# ---------------------------------------------------------------------- PyTorch
+
+
+@pytest.mark.torch
+def test_gradients_of_roll_outs_are_those_of_pytorch():
+    torch = pytest.importorskip("torch", reason="needs PyTorch: pip install 'planarfriction[torch]'")
+    from planarfriction.torch import MomentPlanarLuGre, simulate
+
+    model = MomentPlanarLuGre(PATCH, LAWS["elasto-plastic"], dtype=torch.float64, **SMALL)
+    parameters, twists = model.physical().detach().requires_grad_(), torch.tensor(sway(40), requires_grad=True)
+    wrenches = simulate(model, twists, 2.0, 1e-4, parameters=parameters)
+    theirs = torch.autograd.grad((wrenches * torch.tensor(WEIGHTS)).square().sum(), [parameters, twists])
+    _, (by_law, by_twist) = loss_and_slopes()(pair("elasto-plastic")[1].parameters, sway(40))
+    np.testing.assert_allclose(np.stack(by_law), theirs[0], rtol=1e-9, atol=0.0)
+    close(by_twist, theirs[1], 1e-9)
+
+
+# ---------------------------------------------------------------------- use
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: pj.moments(pf.ReducedModelPublished(PATCH, LAWS["plain"])), "model must be a ReducedModel"),
+        (lambda: pj.simulate(pair("plain")[1], sway(4), 1.0, 1e-4, method="adjoint"), "model must be a ReducedPlanar"),
+    ],
+)
+def test_wrong_input_is_one_line(make, message):
+    with pytest.raises(pf.FrictionError, match=message) as caught:
+        make()
+    assert "\n" not in str(caught.value)
