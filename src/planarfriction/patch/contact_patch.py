@@ -255,6 +255,19 @@ class ContactPatch(Anisotropy):
 
         return refined(self, validation.count("parts", parts))
 
+    def compressed(
+        self, degree: int = 5, *, cells: int | None = None, error: float | None = None, loads: Any = None
+    ) -> ContactPatch:
+        """A few of the cells with new weights: all moments up to `degree` kept, the limit surface nearly.
+
+        At most `cells` (default: 45, as many as moments of `degree + 3`); the patch itself where it has no more.
+        `error` raises the degree until no dissipation is off by more than that share. Shapes that depend on the load
+        need `loads`, (lowest, highest) [N]; see `patch.compressed`.
+        """
+        from planarfriction.patch.compressed import compressed
+
+        return compressed(self, degree, cells=cells, error=error, loads=loads)
+
     # ------------------------------------------------------------------ quantities
 
     def cell_extents(self) -> np.ndarray:

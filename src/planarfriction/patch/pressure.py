@@ -51,7 +51,7 @@ class Pressure:
     @staticmethod
     def from_dict(data: Mapping[str, Any]) -> Pressure:
         """The law described by `{"law": "uniform" | "linear_gradient" | "soft_finger", parameter: value, ...}`."""
-        laws = {kind.law: kind for kind in (Uniform, LinearGradient, SoftFinger)}
+        laws = {kind.law: kind for kind in (Uniform, LinearGradient, SoftFinger, Tabulated)}
         if not isinstance(data, Mapping) or "law" not in data:
             raise InvalidValueError("pressure", f"be a table with law = {' or '.join(laws)}", data)
         kind = laws[validation.choice("pressure law", data["law"], laws)]
@@ -180,6 +180,55 @@ class PerCell(Pressure):
 
     def to_dict(self) -> list[float]:
         return self.values.tolist()
+
+
+@dataclass(frozen=True, eq=False)
+class Tabulated(Pressure):
+    """One relative pressure for each cell at each of several loads, linear in the logarithm of the load between them.
+
+    Each row is scaled to its sum, so that only its ratios matter. Below the first load and above the last the pressure
+    keeps its shape.
+    """
+
+    law = "tabulated"
+    loads: np.ndarray
+    """Normal forces, increasing, shape `[K]`, K >= 2 [N]."""
+    values: np.ndarray
+    """Relative pressures at each load, shape `[K, N]` [-]."""
+
+    def __post_init__(self) -> None:
+        loads = validation.array("loads", self.loads, (None,))
+        if len(loads) < 2 or not (loads > 0.0).all() or not (np.diff(loads) > 0.0).all():
+            raise InvalidValueError("loads", "be two or more increasing numbers > 0", loads.tolist())
+        values = validation.non_negative_array("values", self.values, (len(loads), None))
+        if not values.any(axis=1).all():
+            raise InvalidValueError("values", "load at least one cell at every load", "a row of zeros")
+        values = values / values.max(axis=1, keepdims=True)
+        values /= values.sum(axis=1, keepdims=True)
+        for name, value in (("loads", loads), ("values", values)):
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+
+    @property
+    def depends_on_load(self) -> bool:
+        return True
+
+    def relative(self, positions: np.ndarray, normal_force: np.ndarray | None = None) -> np.ndarray:
+        validation.array("values", self.values[0], (len(positions),))
+        load = np.asarray(self.loads[0] if normal_force is None else normal_force, dtype=float)
+        place = np.interp(np.log(load), np.log(self.loads), np.arange(len(self.loads)))
+        below = np.minimum(place.astype(int), len(self.loads) - 2)
+        share = (place - below)[..., None]
+        return (1.0 - share) * self.values[below] + share * self.values[below + 1]
+
+    def ever_loaded(self, positions: np.ndarray) -> np.ndarray:
+        return np.greater(self.values.max(axis=0), 0.0)
+
+    def only(self, kept: np.ndarray) -> Tabulated:
+        return Tabulated(self.loads, self.values[:, kept])
+
+    def to_dict(self) -> dict[str, Any]:
+        return {"law": self.law, "loads": self.loads.tolist(), "values": self.values.tolist()}
 
 
 def as_law(pressure: Any, positions: np.ndarray) -> Pressure:
