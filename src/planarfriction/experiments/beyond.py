@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable
 from typing import Any
 
@@ -45,6 +46,8 @@ def run(work: Work) -> Result:
     }
     pieces = work.pieces(single)
     # one after the other: these are measured with a clock
+    times = work.piece("time of runs", lambda: _times_of(shapes))
+    rows = [dataclasses.replace(row, time=float(times[f"{row.case}|{row.model}"])) for row in rows]
     costs = {name: float(value) for name, value in work.piece("cost of a step", driven.step_costs).items()}
     family = work.piece("soft finger", lambda: others.load_family(work.quick))
     grooved = {name: values.tolist() for name, values in pieces["grooves"].items()}
@@ -105,11 +108,16 @@ def _runs_of(shape: str) -> Callable[[], dict[str, Any]]:
             rows += ladder.driven_rows((shape,), DEGREES)
         result: dict[str, Any] = {f"shift|{case.words}": in_hand.friction_shift(case) for case in cases}
         for row in rows:
-            values = {"states": row.states, "time": row.time, **row.errors}
+            values = {"states": row.states, **row.errors}
             result |= {f"{row.case}|{row.model}|{name}": value for name, value in values.items()}
         return result
 
     return compute
+
+
+def _times_of(shapes: tuple[str, ...]) -> dict[str, float]:
+    measured = (ladder.run_times(shape, DEGREES) for shape in shapes)
+    return {f"{case}|{model}": value for each in measured for (case, model), value in each.items()}
 
 
 def _rows_of(piece: Arrays) -> list[ladder.Row]:
@@ -119,10 +127,7 @@ def _rows_of(piece: Arrays) -> list[ladder.Row]:
         parts = key.split("|")
         if len(parts) == 3:
             runs.setdefault((parts[0], parts[1]), {})[parts[2]] = float(value)
-    return [
-        ladder.Row(case, model, int(values.pop("states")), time=values.pop("time"), errors=values)
-        for (case, model), values in runs.items()
-    ]
+    return [ladder.Row(case, model, int(values.pop("states")), values) for (case, model), values in runs.items()]
 
 
 def _numbers(rows: list[ladder.Row], found: dict[str, Arrays], errors: dict[str, Arrays]) -> dict[str, Any]:

@@ -156,7 +156,7 @@ def ladder_map(rows: list[Row]) -> PlotFigure:
     panels[1].set_ylabel("end, from the distributed model [mm]")
     panels[1].axvline(1.0, color="0.6", lw=1.0, ls=":")
     handles = [_marker(markers[model], PALETTE[i % len(PALETTE)], model_words(model)) for i, model in enumerate(models)]
-    figure.legend(handles=handles, loc="outside upper center", ncols=4, frameon=False, fontsize="small")
+    figure.legend(handles=handles, loc="outside upper center", ncols=3, frameon=False, fontsize="small")
     return figure
 
 
