@@ -1,4 +1,4 @@
-"""Beyond the paper: exact surfaces, `ReducedModel`, few cells, loads and grooves, each against a reference of our own."""
+"""Beyond the paper: exact surfaces, `ReducedModel`, few cells, loads and grooves, each against our own reference."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ import numpy as np
 from planarfriction.experiments import velocity_driven_boxes as boxes
 from planarfriction.experiments.beyond_driven import MODELS, Errors
 from planarfriction.experiments.beyond_ladder import Row
-from planarfriction.experiments.beyond_others import closed_drift
+from planarfriction.experiments.beyond_others import GROOVED_MODELS, closed_drift
 from planarfriction.experiments.beyond_surfaces import KINDS
 from planarfriction.experiments.beyond_tables import model_words
 from planarfriction.experiments.experiment import Arrays
@@ -132,7 +132,7 @@ def ladder_map(rows: list[Row]) -> PlotFigure:
     figure = new_figure(9.8, 4.9)
     panels: Any = figure.subplots(1, 2)
     models = list(dict.fromkeys(row.model for row in rows))
-    markers = dict(zip(models, "D^vsoP*X", strict=False))
+    markers = dict(zip(models, "D^vsoPhX", strict=False))
     for axes, quantity, title in (
         (panels[0], "third quartile", "velocity-driven"),
         (panels[1], "end", "in hand"),
@@ -173,7 +173,7 @@ def grooves(numbers: dict[str, Any]) -> PlotFigure:
     slopes = np.array(numbers["slope"])
     fine = np.linspace(slopes[0], slopes[-1], 100)
     axes.plot(np.degrees(fine), np.degrees([closed_drift(s) for s in fine]), color=PALETTE[1], label="closed form")
-    for kind, marker, colour in (("distributed", "o", PALETTE[0]), ("reduced", "x", PALETTE[6])):
+    for kind, marker, colour in zip(GROOVED_MODELS, "ox", (PALETTE[0], PALETTE[6]), strict=True):
         axes.plot(
             np.degrees(slopes), np.degrees(numbers[kind]), marker, color=colour, label=kind, fillstyle="none", ms=7
         )

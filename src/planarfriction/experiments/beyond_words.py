@@ -6,6 +6,7 @@ from typing import Any
 
 from planarfriction.experiments.beyond_driven import STEP_TARGET, TARGETS
 from planarfriction.experiments.beyond_in_hand import SHIFT
+from planarfriction.experiments.beyond_others import GROOVED_MODELS
 from planarfriction.experiments.beyond_surfaces import QUARTIC_SHAPES
 from planarfriction.experiments.runs import IN_WORDS
 
@@ -86,7 +87,8 @@ def _driven(ratios: dict[str, dict[str, float]], step: dict[str, float], costs: 
         "model as published sees the grid's table, `ReducedModel` the moments of the bristle field. Its error of the "
         f"force, over the published model's on {len(ratios)} shapes: {aimed}; of the torque, median: {min(torque):.3f} "
         f"to {max(torque):.3f}, but its largest error of the torque, just after the velocity jumps, is up to "
-        f"{max(each['torque maximum'] for each in ratios.values()):.1f} times the published model's. A step costs {step['ratio']:.2f} times a published one in a compiled loop "
+        f"{max(each['torque maximum'] for each in ratios.values()):.1f} times the published model's. "
+        f"A step costs {step['ratio']:.2f} times a published one in a compiled loop "
         f"({1e6 * step['moments [s]']:.2f} µs; {verdict} the {STEP_TARGET:g} aimed at); a whole run "
         f"{costs['moments'] / costs['reduced']:.2f} times, for the solver picks its own steps. The distributed model "
         "of 21 x 21 cells is no reference here: its own staircase is often the largest error of the three. Much of the "
@@ -158,9 +160,7 @@ def _family(numbers: dict[str, float]) -> str:
 
 def _grooves(numbers: dict[str, list[float]]) -> str:
     miss = max(
-        abs(a - b)
-        for kind in ("distributed", "reduced")
-        for a, b in zip(numbers[kind], numbers["closed form"], strict=True)
+        abs(a - b) for kind in GROOVED_MODELS for a, b in zip(numbers[kind], numbers["closed form"], strict=True)
     )
     return (
         "Friction with a grain: a block with a grooved sole, released on inclines, drifts sideways as the closed form "
