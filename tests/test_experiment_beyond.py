@@ -102,8 +102,8 @@ def test_a_drift_a_tenth_of_a_degree_off_would_be_noticed(result):
 def test_soft_finger(result):
     family = result.numbers["load family"]
     assert family["ratio to a fixed shape"] > 1.0
-    assert family["force from rebuilding [N]"] < 1e-3
-    assert family["torque from rebuilding [N m]"] < 1e-5
+    assert family["force from rebuilding [N]"] < 4e-3
+    assert family["torque from rebuilding [N m]"] < 4e-5
 
 
 def test_in_hand_ends_are_those_of_two_simulations(result):
