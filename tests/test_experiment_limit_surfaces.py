@@ -92,6 +92,21 @@ def test_ellipsoid_is_farther_point_by_point_than_as_a_surface(result):
         assert errors["points, max"] >= errors["surfaces, max"]
 
 
+def test_tables_are_measured_against_the_exact_surface(result):
+    for errors in result.numbers["tables"].values():
+        # nodes on the exact surface: neither the staircase of the sum nor the smoothing of the published table
+        for other in ("published", "sum over cells"):
+            assert errors["smooth"]["force, mean [N]"] < 0.3 * errors[other]["force, mean [N]"]
+            assert errors["smooth"]["torque, mean [N m]"] < 0.3 * errors[other]["torque, mean [N m]"]
+        assert errors["smooth"]["force, max [N]"] < 0.02
+
+
+def test_points_have_no_staircase():
+    # the sum over two points is exact; what is left of a table is its interpolation
+    patch = ContactPatch.points([[-0.01, 0.0], [0.01, 0.0]])
+    assert limit_surfaces.table_errors(patch, (40, 80))["sum over cells/force, max [N]"] < 1e-12
+
+
 def test_an_ellipsoid_has_no_error_against_itself():
     surface = LimitSurfaceEllipsoid(PUBLISHED_PATCHES["Circle"]())
     errors = limit_surfaces.ellipsoid_errors(surface, (10, 20))

@@ -1,5 +1,7 @@
 """The experiments of the source paper, each with its data, its figures and its numbers beside the published ones.
 
+One more, `beyond`, goes beyond it and has our own converged references.
+
 `EXPERIMENTS` lists them by name; each lives in a module of its own with a function `run(work) -> Result`.
 """
 
@@ -40,9 +42,10 @@ EXPERIMENTS = {
         ("load-dependent", "A contact pressure that follows the load"),
         ("convergence", "Convergence in the number of cells and of table segments"),
         ("timing", "Time, and work against precision"),
+        ("beyond", "Beyond the paper: exact surfaces, moments, few cells, loads and grooves"),
     )
 }
-"""Experiment by name, in the order of the paper."""
+"""Experiment by name, in the order of the paper, and what goes beyond it."""
 
 
 def find_experiment(name: str) -> Experiment:

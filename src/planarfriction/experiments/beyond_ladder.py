@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import functools
 import statistics
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from planarfriction.experiments import velocity_driven_boxes as boxes
 from planarfriction.experiments.in_hand_runs import CENTRES_OF_MASS, TIGHT, Case, distance
 from planarfriction.experiments.runs import LAW, SIX_SHAPES, at_centre_of_pressure, columns
-from planarfriction.models import DistributedModel, ReducedModelPublished
+from planarfriction.limit_surface import LimitSurfaceEllipsoid, LimitSurfaceTable
+from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
 from planarfriction.scenes import Scene, simulate
 from planarfriction.scenes.ready import driven, in_hand, in_hand_load
@@ -26,10 +28,13 @@ CASES = (
 )
 """In-hand runs."""
 
-REFINED = 3
-"""Parts along each side into which the cells of the converged reference are cut."""
+REFERENCE_CELLS = 2100
+"""Most cells of a reference grid; its own staircase must be well below the errors that are measured."""
 
-REPEATS = 3
+LEAST_PARTS, MOST_PARTS = 3, 63
+
+REPEATS, LONG, SHORT = 2, 0.05, 0.02
+"""A run is timed once and, if it takes less than LONG [s], so many times more; a short one before does not count."""
 
 
 @dataclass(frozen=True)
@@ -38,19 +43,26 @@ class Row:
 
     case: str
     model: str
-    """"reduced", "full", or "degree d"."""
+    """"reduced" (as published), the same with another surface, "moments", "full", or "degree d"."""
     states: int
     """Bristle states."""
     errors: dict[str, float]
-    """In-hand: largest distance "position" and distance at the "end" [m] from the full model. Velocity-driven: "median"
-    and "maximum" of the error of the force [N] and of the torque ("torque median", "torque maximum") [N m]."""
-    time: float
-    """Median wall time of a run over that of the full model."""
+    """In-hand: largest distance "position" and distance at the "end" [m] from the full model. Velocity-driven: the
+    statistics of a box plot (`boxes.COLUMNS`) of the error of the force [N] and, as "torque median" and so on, of the
+    torque [N m] at the centre of pressure, from a finer grid."""
+    time: float = float("nan")
+    """Median time in the solver at the default tolerances over that of the full model; `run_times` measures it."""
 
 
 def models(patch: ContactPatch, degrees: tuple[int, ...] = DEGREES) -> dict[str, Any]:
     """The models of a patch by name, each number of cells once."""
-    result: dict[str, Any] = {"full": DistributedModel(patch, LAW), "reduced": ReducedModelPublished(patch, LAW)}
+    result: dict[str, Any] = {
+        "full": DistributedModel(patch, LAW),
+        "reduced": ReducedModelPublished(patch, LAW),
+        "reduced, smooth": ReducedModelPublished(patch, LAW, surface=LimitSurfaceTable(patch)),
+        "reduced, ellipsoid": ReducedModelPublished(patch, LAW, surface=LimitSurfaceEllipsoid(patch)),
+        "moments": ReducedModel(patch, LAW),
+    }
     sizes = {patch.cells}
     for degree in degrees:
         few = patch.compressed(degree)
@@ -60,25 +72,45 @@ def models(patch: ContactPatch, degrees: tuple[int, ...] = DEGREES) -> dict[str,
     return result
 
 
+@functools.lru_cache(maxsize=8)
+def _models_of(shape: str, degrees: tuple[int, ...]) -> dict[str, Any]:
+    """`models` of a published patch, once for all its runs: fitting the few cells takes seconds."""
+    return models(PUBLISHED_PATCHES[shape](), degrees)
+
+
+def _scenes(shape: str) -> dict[str, Callable[[Any], Scene]]:
+    """What makes the scenes of a shape from a model, by case."""
+    result: dict[str, Callable[[Any], Scene]] = {}
+    for case in CASES:
+        if case.shape == shape:
+            result[case.words] = functools.partial(
+                in_hand,
+                normal_force=in_hand_load(case.load, placement=case.placement),
+                centre_of_mass=CENTRES_OF_MASS[case.placement],
+            )
+    return result | ({f"driven, {shape}": driven} if shape in SIX_SHAPES else {})
+
+
 def in_hand_rows(cases: tuple[Case, ...] = CASES, degrees: tuple[int, ...] = DEGREES) -> list[Row]:
     """Every model in every in-hand run, against the full distributed model of the same grid."""
     rows = []
     for case in cases:
-        load = in_hand_load(case.load, placement=case.placement)
-        centre = CENTRES_OF_MASS[case.placement]
+        scene = _scenes(case.shape)[case.words]
         whole: dict[str, np.ndarray] = {}
-
-        def scene(model: Any, load=load, centre=centre) -> Scene:
-            return in_hand(model, normal_force=load, centre_of_mass=centre)
-
-        def errors(run: dict[str, np.ndarray], whole=whole) -> dict[str, float]:
-            if not whole:
-                whole.update(run)
+        for name, model in _models_of(case.shape, degrees).items():
+            run = columns(simulate(scene(model), **TIGHT))
+            whole = whole or run
             apart = distance(run, whole)
-            return {"position": float(apart.max()), "end": float(apart[-1])}
-
-        rows += _rows(case.words, models(PUBLISHED_PATCHES[case.shape](), degrees), scene, errors, TIGHT)
+            errors = {"position": float(apart.max()), "end": float(apart[-1])}
+            rows.append(Row(case.words, name, int(np.prod(model.state_shape)), errors))
     return rows
+
+
+def reference(patch: ContactPatch) -> ContactPatch:
+    """The patch with each cell cut along its sides into an odd number of parts, as many as `REFERENCE_CELLS` allow."""
+    sides = int((patch.cell_extents() > 0.0).any(axis=0).sum())
+    most = (REFERENCE_CELLS / patch.cells) ** (1.0 / sides)
+    return patch.refined(int(np.clip((int(most) - 1) // 2 * 2 + 1, LEAST_PARTS, MOST_PARTS)))
 
 
 def driven_rows(shapes: tuple[str, ...] = SIX_SHAPES, degrees: tuple[int, ...] = DEGREES) -> list[Row]:
@@ -86,41 +118,31 @@ def driven_rows(shapes: tuple[str, ...] = SIX_SHAPES, degrees: tuple[int, ...] =
     rows = []
     for shape in shapes:
         patch = PUBLISHED_PATCHES[shape]()
-        fine = columns(simulate(driven(DistributedModel(patch.refined(REFINED), LAW))))
+        fine = columns(simulate(driven(DistributedModel(reference(patch), LAW))))
         wanted = at_centre_of_pressure(fine, patch)
-
-        def errors(run: dict[str, np.ndarray], patch=patch, wanted=wanted) -> dict[str, float]:
-            miss = (at_centre_of_pressure(run, patch) - wanted)[1:]
-            force, torque = np.hypot(miss[:, 0], miss[:, 1]), np.abs(miss[:, 2])
-            named = {"": force, "torque ": torque}
-            return {
-                before + name: float(how(values))
+        for name, model in _models_of(shape, degrees).items():
+            miss = (at_centre_of_pressure(columns(simulate(driven(model))), patch) - wanted)[1:]
+            named = {"": np.hypot(miss[:, 0], miss[:, 1]), "torque ": np.abs(miss[:, 2])}
+            errors = {
+                before + statistic: value
                 for before, values in named.items()
-                for name, how in (("median", np.median), ("maximum", np.max))
+                for statistic, value in boxes.statistics(values).items()
             }
-
-        rows += _rows(f"driven, {shape}", models(patch, degrees), driven, errors, {})
+            rows.append(Row(f"driven, {shape}", name, int(np.prod(model.state_shape)), errors))
     return rows
 
 
-def _rows(
-    case: str, named: dict[str, Any], scene: Callable[[Any], Scene], errors: Callable, tolerances: dict[str, Any]
-) -> list[Row]:
-    rows, whole = [], 0.0
-    for name, model in named.items():
-        run, seconds = _timed(scene(model), tolerances)
-        whole = whole or seconds
-        rows.append(Row(case, name, int(np.prod(model.state_shape)), errors(columns(run)), seconds / whole))
-    return rows
+def run_times(shape: str, degrees: tuple[int, ...] = DEGREES) -> dict[tuple[str, str], float]:
+    """Median time in the solver over that of the full model, by case and model; nothing else should run beside it."""
+    result = {}
+    for case, scene in _scenes(shape).items():
+        times = {name: _time(scene(model)) for name, model in _models_of(shape, degrees).items()}
+        result |= {(case, name): value / times["full"] for name, value in times.items()}
+    return result
 
 
-def _timed(scene: Scene, tolerances: dict[str, Any]) -> tuple[Any, float]:
-    """A run at the given tolerances, and the median wall time of runs at the default ones [s]."""
-    times = []
-    for _ in range(REPEATS):
-        start = time.perf_counter()
-        solution = simulate(scene)
-        times.append(time.perf_counter() - start)
-    if tolerances:
-        solution = simulate(scene, **tolerances)
-    return solution, statistics.median(times)
+def _time(scene: Scene) -> float:
+    """Median time in the solver [s]."""
+    simulate(scene, t_end=SHORT)
+    first = simulate(scene).statistics.wall_time
+    return statistics.median([first, *(simulate(scene).statistics.wall_time for _ in range(REPEATS * (first < LONG)))])

@@ -1,4 +1,4 @@
-"""Limit surfaces of the published patches, the ellipsoid beside them, and the error of stored tables."""
+"""Limit surfaces of the published patches, the ellipsoid beside them, and stored tables beside the exact surfaces."""
 
 from __future__ import annotations
 
@@ -23,10 +23,11 @@ from planarfriction.limit_surface import (
     LimitSurface,
     LimitSurfaceCells,
     LimitSurfaceEllipsoid,
+    LimitSurfaceExact,
     LimitSurfaceTable,
     LimitSurfaceTablePublished,
 )
-from planarfriction.patch import PUBLISHED_PATCHES
+from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
 from planarfriction.plots.limit_surface import sample_limit_surface, scaled_samples
 
 if TYPE_CHECKING:
@@ -38,7 +39,11 @@ DIRECTIONS = (200, 400)
 REFINEMENTS, REFINED = 30, 0.5
 """How often the neighbourhood of a largest distance is searched again, each time over this share of its width."""
 
-STORED = {"published": LimitSurfaceTablePublished, "smooth": LimitSurfaceTable}
+STORED = {"published": LimitSurfaceTablePublished, "smooth": LimitSurfaceTable, "sum over cells": LimitSurfaceCells}
+"""What is measured beside the exact surface."""
+
+COARSER = 2
+"""The tables are measured at so many times fewer angles, and never at a node: an exact surface costs more."""
 
 
 def run(work: Work) -> Result:
@@ -55,7 +60,6 @@ def run(work: Work) -> Result:
         "ellipsoid": {name: each["ellipsoid"] for name, each in errors.items()},
         "tables": {name: {key: each[key] for key in STORED} for name, each in errors.items()},
         "gradient": gradient,
-        "first node to cell": node_to_cell(surfaces["LineGrad"]),
     }
     return Result(
         findings=words.findings(numbers),
@@ -76,7 +80,7 @@ def run(work: Work) -> Result:
 
 
 def _measured(surface: LimitSurfaceCells, count: tuple[int, int]) -> Callable[[], dict[str, float]]:
-    return lambda: ellipsoid_errors(surface, count) | table_errors(surface, count)
+    return lambda: ellipsoid_errors(surface, count) | table_errors(surface.patch, count)
 
 
 def _by_name(arrays: dict[str, np.ndarray]) -> dict[str, dict[str, float]]:
@@ -145,27 +149,22 @@ def _largest(distance: Callable[..., np.ndarray], polar: float, azimuth: float, 
     return largest
 
 
-def table_errors(surface: LimitSurfaceCells, count: tuple[int, int]) -> dict[str, float]:
-    """Error of the stored tables of 20 segments, in the wrench at the centre of pressure for mu f_N = 1 N."""
-    polar, azimuth, share = _mesh(count)
+def table_errors(patch: ContactPatch, count: tuple[int, int]) -> dict[str, float]:
+    """Error of the tables of 20 segments, and of the sum over the cells, from the exact surface of the patch.
+
+    In the wrench at the centre of pressure for mu f_N = 1 N, over directions of the twist.
+    """
+    polar, azimuth, share = _mesh((max(count[0] // COARSER, 1), max(count[1] // COARSER, 1)))
+    surface = LimitSurfaceExact(patch)
     twists, exact = sample_limit_surface(surface, polar, azimuth)
     result = {}
     for name, kind in STORED.items():
-        miss = geometry.wrench_at(kind(surface.patch).wrench(twists) - exact, surface.centre_of_pressure)
+        miss = geometry.wrench_at(kind(patch).wrench(twists) - exact, surface.centre_of_pressure)
         force, torque = np.hypot(miss[..., 0], miss[..., 1]), np.abs(miss[..., 2])
         for quantity, unit, values in (("force", "N", force), ("torque", "N m", torque)):
             result[f"{name}/{quantity}, max [{unit}]"] = float(values.max())
             result[f"{name}/{quantity}, mean [{unit}]"] = float((share * values).sum())
     return result
-
-
-def node_to_cell(surface: LimitSurfaceCells) -> float:
-    """Least distance [m] of a cell from the centres of rotation of the smooth table's nodes next to the spin axis."""
-    segments = LimitSurfaceTable(surface.patch).segments
-    azimuth = 0.5 * np.pi * np.arange(4 * segments) / segments
-    twists, _ = sample_limit_surface(surface, np.full_like(azimuth, 0.5 * np.pi / segments), azimuth)
-    centres = np.stack([-twists[:, 1], twists[:, 0]], -1) / twists[:, 2:]
-    return float(np.linalg.norm(centres[:, None] - surface.patch.positions, axis=-1).min())
 
 
 def _dataset(surfaces: dict[str, LimitSurfaceCells]) -> xr.Dataset:

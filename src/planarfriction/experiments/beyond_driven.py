@@ -1,0 +1,101 @@
+"""Reduced models in the velocity-driven runs: error from a finer grid, beside targets, and what a step costs."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from typing import Any
+
+import numpy as np
+
+from planarfriction.experiments.beyond_ladder import Row
+from planarfriction.experiments.experiment import Comparison
+from planarfriction.experiments.runs import IN_WORDS, LAW
+from planarfriction.experiments.velocity_driven_boxes import SAMPLES
+from planarfriction.models import ReducedModel, ReducedModelPublished
+from planarfriction.patch import PUBLISHED_PATCHES
+
+MODELS = {"reduced": "published reduced", "moments": "ReducedModel", "full": "distributed, 21 x 21"}
+"""Model of the ladder -> its name in the report."""
+
+TARGETS = {"median": 0.25, "third quartile": 0.8, "maximum": 1.0}
+"""Statistic of the force error -> the share of the published reduced model's that `ReducedModel` shall stay below."""
+
+STEP_TARGET = 1.5
+"""How many times the cost of a published reduced step a step of `ReducedModel` may have."""
+
+ROUNDS, STEPS = 15, 20_000
+
+Errors = dict[str, dict[str, dict[str, float]]]
+"""Shape -> model of the ladder -> statistic of the error."""
+
+
+def driven_errors(rows: list[Row]) -> Errors:
+    """The rows of the velocity-driven runs by shape and model."""
+    result: Errors = {}
+    for row in rows:
+        before, _, shape = row.case.partition(", ")
+        if before == "driven":
+            result.setdefault(shape, {})[row.model] = row.errors
+    return result
+
+
+def ratios(errors: Errors) -> dict[str, dict[str, float]]:
+    """Error of `ReducedModel` over that of the published reduced model, by shape and statistic, force and torque."""
+    names = [f"{before}{name}" for before in ("", "torque ") for name in TARGETS]
+    return {
+        shape: {name: each["moments"][name] / each["reduced"][name] for name in names} for shape, each in errors.items()
+    }
+
+
+def step_costs(shape: str = "Circle") -> dict[str, Any]:
+    """Median time of a step in a compiled loop [s] of both reduced models, in turns, and the median of their ratios."""
+    from planarfriction.kernels import moments, reduced
+    from planarfriction.kernels.law import law_row
+
+    patch = PUBLISHED_PATCHES[shape]()
+    directions = np.random.default_rng(7).normal(size=(STEPS, 3)) * [1.0, 1.0, 150.0]
+    twists = directions * 10.0 ** np.random.default_rng(8).uniform(-4.0, -1.5, size=(STEPS, 1))
+    wrench, fixed = np.empty_like(twists), (twists, 1.0, 1e-4)
+    published, ours = ReducedModelPublished(patch, LAW), ReducedModel(patch, LAW)
+    numbers, shape_now = published.shape_at(1.0).surface.numbers, published.shape_at(1.0)
+    stored = np.array([numbers.kind, 0, numbers.size])
+    loops = {
+        "reduced": lambda z: reduced.step_sequence(
+            law_row(LAW), shape_now.numbers, stored, numbers.data, z, *fixed, wrench
+        ),
+        "moments": lambda z: moments.step_sequence(
+            law_row(LAW), ours.shape_at(1.0).numbers, np.zeros(3, int), ours.shape_at(1.0).data, z, *fixed, wrench
+        ),
+    }
+    times: dict[str, list[float]] = {name: [] for name in loops}
+    for _ in range(ROUNDS + 1):
+        for name, loop in loops.items():
+            state = np.zeros(3)
+            begin = time.perf_counter()
+            loop(state)
+            times[name].append((time.perf_counter() - begin) / STEPS)
+    share = [ours / theirs for ours, theirs in zip(times["moments"][1:], times["reduced"][1:], strict=True)]
+    return {
+        **{f"{name} [s]": statistics.median(values[1:]) for name, values in times.items()},
+        "ratio": statistics.median(share),
+    }
+
+
+def comparisons(errors: Errors) -> list[Comparison]:
+    """The error of `ReducedModel` from the finer grid, at most a share of the published reduced model's."""
+    return [
+        Comparison(
+            f"driven, {IN_WORDS[shape]}: ReducedModel, {name} of the error of the force, against {share:g} times the "
+            "published model's",
+            "converged",
+            each["moments"][name],
+            share * each["reduced"][name],
+            "N",
+            SAMPLES,
+            "Three states keep the first moments of the bristle field alone. The reference: the distributed model with "
+            "its cells cut finely.",
+        )
+        for shape, each in errors.items()
+        for name, share in TARGETS.items()
+    ]

@@ -1,0 +1,59 @@
+"""Reduced models in the in-hand runs: how far the end is from the distributed model's, and what friction does there."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from planarfriction.experiments.beyond_ladder import CASES, Row
+from planarfriction.experiments.experiment import Comparison
+from planarfriction.experiments.in_hand_runs import FRICTION_CHANGE, Case, columns, end_distance, with_friction
+from planarfriction.scenes import simulate
+from planarfriction.scenes.ready import FINE
+
+ENDS = {"reduced": "published reduced", "moments": "ReducedModel"}
+"""Model of the ladder -> its name in the report."""
+
+SHIFT = "friction"
+"""Column of the numbers that holds the shift of the end by friction."""
+
+
+def cases_of(shape: str) -> tuple[Case, ...]:
+    """The in-hand runs of a shape."""
+    return tuple(case for case in CASES if case.shape == shape)
+
+
+def friction_shift(case: Case) -> float:
+    """Distance [m] by which 0.1 % more and 0.1 % less friction move the end of the distributed model, their mean."""
+    base = columns(simulate(case.scene("d"), **FINE))
+    changed = (columns(simulate(case.scene("d", with_friction(s * FRICTION_CHANGE)), **FINE)) for s in (1.0, -1.0))
+    return 0.5 * sum(end_distance(run, base) for run in changed)
+
+
+def end_distances(rows: list[Row], shifts: dict[str, float]) -> dict[str, dict[str, float]]:
+    """By case: distance of the end [m] from the distributed model's by model, and the shift by friction."""
+    result: dict[str, dict[str, float]] = {}
+    for row in rows:
+        if "end" in row.errors and row.model != "full":
+            result.setdefault(row.case, {})[row.model] = row.errors["end"]
+    return {case: each | {SHIFT: shifts[case]} for case, each in result.items()}
+
+
+def score(ends: dict[str, dict[str, float]], load: int) -> dict[str, Any]:
+    """In how many runs under a load `ReducedModel` ends nearer than the published model, and the ratios."""
+    ratios = {case: each["moments"] / each["reduced"] for case, each in ends.items() if case.endswith(f"load {load}")}
+    return {"runs": len(ratios), "nearer": sum(ratio < 1.0 for ratio in ratios.values()), "ratios": ratios}
+
+
+def comparisons(ends: dict[str, dict[str, float]]) -> list[Comparison]:
+    """What the reduced models and the few cells miss, in units of friction: 2 % of friction, and 0.1 %."""
+    rows = []
+    for model, share, words in (
+        ("moments", 2e-2, "Three states do not hold the history of a patch that breaks away section by section."),
+        ("degree 5", FRICTION_CHANGE, "A few cells keep the moments of the patch, not its rim."),
+    ):
+        for case, each in ends.items():
+            if model in each and each[SHIFT] > 0.0:
+                quantity = f"{case}: {ENDS.get(model, '45 cells')}, end, against {share:.1%} of friction"
+                tolerance = share / FRICTION_CHANGE * each[SHIFT]
+                rows.append(Comparison(quantity, "converged", each[model], tolerance, "m", 1, words))
+    return rows

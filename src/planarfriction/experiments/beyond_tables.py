@@ -1,0 +1,127 @@
+"""Tables beyond the paper."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from planarfriction.experiments.beyond_driven import MODELS, TARGETS
+from planarfriction.experiments.beyond_in_hand import ENDS, SHIFT
+from planarfriction.experiments.beyond_ladder import Row
+from planarfriction.experiments.beyond_surfaces import KINDS
+from planarfriction.experiments.experiment import Table
+from planarfriction.experiments.runs import IN_WORDS, SIX_SHAPES
+
+Numbers = dict[str, Any]
+
+MODEL_WORDS = {
+    "full": "distributed, 21 x 21 cells",
+    "reduced": "published reduced, published table",
+    "reduced, smooth": "published reduced, LimitSurfaceTable",
+    "reduced, ellipsoid": "published reduced, ellipsoid",
+    "moments": "ReducedModel",
+    "degree 3": "distributed, 28 compressed cells",
+    "degree 5": "distributed, 45 compressed cells",
+}
+"""Model of the ladder -> model and surface, in words."""
+
+
+def model_words(model: str) -> str:
+    """The model in words."""
+    return MODEL_WORDS[model]
+
+
+def tables(rows: list[Row], numbers: Numbers) -> tuple[Table, ...]:
+    """Surfaces, models in both kinds of runs, every combination, plateaus, and the soft finger."""
+    return (
+        _surfaces(numbers["surfaces"]),
+        _driven(numbers["driven"]),
+        _ratios(numbers["driven ratios"]),
+        _in_hand(numbers["in hand"]),
+        _combinations(rows, "third quartile", "driven", 1e3, "error of the force, third quartile [mN]"),
+        _combinations(rows, "end", "load 2", 1e3, "in hand, load 2: end from the distributed model [mm]"),
+        _combinations(rows, "end", "load 1", 1e3, "in hand, load 1: end from the distributed model [mm]"),
+        _plateaus(numbers["plateaus"]),
+    )
+
+
+def _surfaces(errors: dict[str, Any]) -> Table:
+    kinds = [kind for kind in KINDS if any(f"{kind}/force" in each for each in errors.values())]
+    rows = [
+        (
+            IN_WORDS[shape],
+            *(
+                f"{1e3 * each[f'{kind}/force']['mean']:.2g} / {1e3 * each[f'{kind}/force']['max']:.2g}"
+                if f"{kind}/force" in each
+                else ""
+                for kind in kinds
+            ),
+        )
+        for shape, each in errors.items()
+    ]
+    note = "Same random twists, mu f_N = 1 N. The exact surface: each cell a rectangle (on lines a segment)."
+    return Table("Error of the force from the exact surface, mean / largest [mN]", ("patch", *kinds), rows, note)
+
+
+def _driven(errors: dict[str, Any]) -> Table:
+    headings = [f"{before}{name}" for before in ("", "torque ") for name in TARGETS]
+    rows = [
+        (f"{IN_WORDS[shape]}, {words}", *(1e3 * each[model][name] for name in headings))
+        for shape, each in errors.items()
+        for model, words in MODELS.items()
+    ]
+    units = [f"{name} [{'N mm' if name.startswith('torque') else 'mN'}]" for name in headings]
+    return Table("Velocity-driven: error from a converged grid, at the centre of pressure", ("run", *units), rows)
+
+
+def _ratios(ratios: dict[str, dict[str, float]]) -> Table:
+    names = list(next(iter(ratios.values())))
+    rows = [(IN_WORDS[shape], *each.values()) for shape, each in ratios.items()]
+    rows.append(("target, force", *TARGETS.values(), "", "", ""))
+    return Table("Error of ReducedModel over the published reduced model's", ("patch", *names), rows)
+
+
+def _in_hand(ends: dict[str, dict[str, float]]) -> Table:
+    rows = [
+        (case, *(1e3 * each[name] for name in (*ENDS, SHIFT)), each["moments"] / each["reduced"])
+        for case, each in ends.items()
+    ]
+    headings = ("run", *(f"{words} [mm]" for words in ENDS.values()), "0.1 % of friction [mm]", "ratio")
+    return Table("In hand: distance of the end from the distributed model's", headings, rows)
+
+
+def _combinations(rows: list[Row], quantity: str, run: str, factor: float, title: str) -> Table:
+    """Every model on the six shapes: one statistic of one kind of run, and what the runs cost."""
+    chosen = [row for row in rows if run in row.case and quantity in row.errors and "far" not in row.case]
+    shapes = [shape for shape in SIX_SHAPES if any(_shape_of(row) == IN_WORDS[shape] for row in chosen)]
+    result = []
+    for model in (model for model in MODEL_WORDS if any(row.model == model for row in chosen)):
+        own = [row for row in chosen if row.model == model]
+        by_shape = {_shape_of(row): row for row in own}
+        values = (by_shape.get(IN_WORDS[shape]) for shape in shapes)
+        cells = ["as full" if row is None else f"{factor * row.errors[quantity]:.2g}" for row in values]
+        costs, states = [row.time for row in own], [row.states for row in own]
+        result.append((model_words(model), _span(states, "d"), _span(costs, ".2g"), *cells))
+    words = [IN_WORDS[shape] for shape in shapes]
+    note = (
+        "Time: in the solver, over that of the distributed model of the same patch. "
+        "'As full': the patch has no more cells than asked for."
+    )
+    return Table(f"Every combination, {title}", ("model and surface", "bristles", "time", *words), result, note)
+
+
+def _shape_of(row: Row) -> str:
+    """The shape of a row in words."""
+    if row.case.startswith("driven, "):
+        return IN_WORDS[row.case.removeprefix("driven, ")]
+    return row.case.rpartition(", load")[0]
+
+
+def _span(values: list[Any], style: str) -> str:
+    low, high = format(min(values), style), format(max(values), style)
+    return low if low == high else f"{low} to {high}"
+
+
+def _plateaus(angles: dict[str, float]) -> Table:
+    exact = angles["closed form"]
+    rows = [(name, 1e6 * angle, f"{angle / exact - 1.0:+.3%}") for name, angle in angles.items()]
+    return Table("Angle of the disc under a torque that friction holds", ("model", "angle [µrad]", "off"), rows)

@@ -1,0 +1,162 @@
+"""Beyond the paper: exact surfaces, `ReducedModel`, few cells, loads and grooves, each against our own reference."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from planarfriction.experiments import EXPERIMENTS, beyond, beyond_driven, beyond_others, beyond_surfaces
+from planarfriction.experiments import beyond_in_hand as in_hand
+from planarfriction.experiments import beyond_ladder as ladder
+from planarfriction.experiments.experiment import Work
+from planarfriction.experiments.in_hand_runs import Case
+from planarfriction.experiments.runs import IN_WORDS
+from planarfriction.limit_surface import LimitSurfaceCells, LimitSurfaceExact
+from planarfriction.patch import PUBLISHED_PATCHES
+
+
+@pytest.fixture(scope="module")
+def result():
+    return beyond.run(Work(quick=True))
+
+
+# ------------------------------------------------------------------ closed forms
+
+
+def test_a_drift_without_a_grain_is_straight_down(monkeypatch):
+    monkeypatch.setitem(beyond_others.GROOVES, "along", 1.0)
+    assert abs(beyond_others.closed_drift(np.radians(40.0))) < 1e-6
+
+
+def test_the_staircase_of_a_line_has_steps_of_two_cells(result):
+    jumps = result.numbers["jumps"]
+    assert jumps["Line/sum"] == pytest.approx(2.0 / 21.0, rel=1e-9)  # a cell of 1/21 of the load turns its force round
+    assert jumps["Line/exact"] < 2.0 / beyond_surfaces.STAIRS
+
+
+def test_random_twists_are_even_in_the_scaled_coordinates():
+    surface = LimitSurfaceExact(PUBLISHED_PATCHES["LineGrad"]())
+    twists = beyond_surfaces.random_twists(surface, 4000)
+    x, y = surface.centre_of_pressure
+    velocity = twists[:, :2] + twists[:, 2:] * [-y, x]
+    scaled = np.column_stack([velocity, surface.contact_radius * twists[:, 2]])
+    np.testing.assert_allclose(np.linalg.norm(scaled, axis=1), 1.0, rtol=1e-12)
+    np.testing.assert_allclose(np.cov(scaled.T), np.eye(3) / 3.0, atol=0.03)
+
+
+# ------------------------------------------------------------------ the experiment
+
+
+def test_it_is_registered_last():
+    assert list(EXPERIMENTS)[-1] == "beyond"
+
+
+def test_all_comparisons_hold(result):
+    assert [row.quantity for row in result.comparisons if not row.holds] == []
+    kinds = {row.reference for row in result.comparisons}
+    assert kinds == {"closed form", "converged"}  # nothing here is published
+
+
+def test_the_exact_surface_is_the_limit_of_ever_finer_sums():
+    patch = PUBLISHED_PATCHES["NonConvex2"]()
+    exact = LimitSurfaceExact(patch)
+    twists = beyond_surfaces.random_twists(exact, 300)
+    misses = [
+        beyond_surfaces.difference(LimitSurfaceCells(patch.refined(parts)), exact, twists)[0].mean()
+        for parts in (1, 3, 9)
+    ]
+    assert misses[1] < misses[0] / 2.0 and misses[2] < misses[1] / 2.0
+
+
+def test_reduced_model_stays_below_the_targets_and_the_published_one_would_not(result):
+    driven = result.numbers["driven"]
+    assert set(driven) == set(beyond.QUICK_SHAPES)
+    swapped = {shape: each | {"moments": each["reduced"]} for shape, each in driven.items()}
+    broken = [row for row in beyond_driven.comparisons(swapped) if not row.holds]
+    assert len(broken) == 2 * len(driven)  # the median and the third quartile; its maximum is its own
+    for ratios in result.numbers["driven ratios"].values():
+        assert ratios["torque median"] < 0.05
+
+
+def test_plateaus(result):
+    angles = result.numbers["plateaus"]
+    patch = PUBLISHED_PATCHES["Circle"](width=0.05)
+    radius, moment = patch.contact_radius(), patch.second_moment()
+    # the published torsional stiffness is sigma_0 r^2
+    expected = angles["closed form"] * moment / radius**2
+    assert angles["published reduced"] == pytest.approx(expected, rel=0.03)
+    swapped = angles | {"ReducedModel": angles["published reduced"]}
+    rows = beyond_others.comparisons(swapped, result.numbers["grooves"])
+    assert [row.holds for row in rows] == [False, False, True, True]
+
+
+def test_a_drift_a_tenth_of_a_degree_off_would_be_noticed(result):
+    grooves = result.numbers["grooves"]
+    wrong = grooves | {"distributed": [angle + np.radians(0.1) for angle in grooves["distributed"]]}
+    rows = beyond_others.comparisons(result.numbers["plateaus"], wrong)
+    assert [row.quantity for row in rows if not row.holds] == ["drift on grooves, distributed, all slopes"]
+
+
+def test_soft_finger(result):
+    family = result.numbers["load family"]
+    assert family["ratio to a fixed shape"] > 1.0
+    assert family["force from rebuilding [N]"] < 4e-3
+    assert family["torque from rebuilding [N m]"] < 4e-5
+
+
+def test_in_hand_ends_are_those_of_two_simulations(result):
+    case = Case("LineGrad", 2)
+    ends = result.numbers["in hand"][case.words]
+    assert 0.0 < ends["moments"] < ends["reduced"]
+    rows = ladder.in_hand_rows((case,), ())
+    assert {row.model: row.errors["end"] for row in rows}["moments"] == pytest.approx(ends["moments"], rel=1e-9)
+    assert ends[in_hand.SHIFT] == pytest.approx(in_hand.friction_shift(case), rel=1e-9)
+
+
+def test_every_published_in_hand_run_is_there():
+    assert {(case.shape, case.placement) for case in ladder.CASES} == {
+        *((shape, 1) for shape in beyond.SHAPES),
+        ("Circle", 2),
+    }
+    assert all(len(in_hand.cases_of(shape)) % 2 == 0 for shape in beyond.SHAPES)
+
+
+def test_few_cells_are_a_rung_between_three_bristles_and_the_grid(result):
+    ends = result.numbers["in hand"][f"{IN_WORDS['NonConvex2']}, load 1"]
+    assert ends["degree 5"] < 0.1 * min(ends["moments"], ends["reduced"])
+    far = {"a": ends | {"degree 5": 2.0 * ends[in_hand.SHIFT]}}
+    assert [row.holds for row in in_hand.comparisons(far)] == [True, False]
+
+
+def test_score_counts_by_load():
+    ends = {"a, load 1": {"moments": 2.0, "reduced": 1.0}, "a, load 2": {"moments": 1.0, "reduced": 4.0}}
+    assert in_hand.score(ends, 1)["nearer"] == 0
+    assert in_hand.score(ends, 2) == {"runs": 1, "nearer": 1, "ratios": {"a, load 2": 0.25}}
+
+
+def test_references_are_finer_than_the_grids():
+    for shape in beyond.SHAPES:
+        patch = PUBLISHED_PATCHES[shape]()
+        fine = ladder.reference(patch)
+        assert fine.cells >= 9 * patch.cells
+        assert fine.cells <= max(ladder.REFERENCE_CELLS, 9 * patch.cells)
+
+
+def test_tables_and_pictures_are_complete(result):
+    assert len(result.pictures) == 6
+    for table in result.tables:
+        assert {len(row) for row in table.rows} == {len(table.headings)}, table.title
+    assert all("nan" not in paragraph for paragraph in result.findings)
+
+
+def test_a_piece_can_be_stored_and_read():
+    rows = [ladder.Row("driven, Line", "moments", 3, {"median": 1.0, "maximum": 2.0})]
+    stored = {
+        f"{row.case}|{row.model}|{name}": np.asarray(value)
+        for row in rows
+        for name, value in {"states": row.states, **row.errors}.items()
+    }
+    read = [dataclasses.replace(row, time=0.0) for row in beyond._rows_of(stored)]
+    assert read == [dataclasses.replace(row, time=0.0) for row in rows]
