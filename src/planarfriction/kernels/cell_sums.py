@@ -18,7 +18,7 @@ DEPTH = 6
 """How often a cell at the centre of rotation is halved: its last parts hold 1/4096 of its load (of a segment 1/64)."""
 
 NEAR = 1.5
-"""Distance from the centre of rotation in longer edges below which a cell is cut; there the Gauss rule errs by 1e-4."""
+"""Distance from the centre of rotation, in longer edges, below which a cell is cut; Gauss errs by 1e-4 of it there."""
 
 _BLOCK = 512
 _GAUSS = 0.5 / math.sqrt(3.0)

@@ -66,7 +66,8 @@ class _Shapes:
         """All shapes of a contact at once: there may be hundreds."""
         first = len(self.surface)
         factors = np.array([shape.factor for shape in shapes])[:, *np.triu_indices(3)]
-        self.shape.append(np.column_stack([factors, [shape.blend for shape in shapes]]))
+        rows = np.column_stack([factors, [shape.blend for shape in shapes]])
+        self.shape.append(np.ascontiguousarray(rows))  # else the solver is compiled once more
         for shape in shapes:
             start = self._start_of(shape.data)
             self.surface.append((start, start if shape.other is None else self._start_of(shape.other), 0))
