@@ -114,7 +114,7 @@ def driven_boxes(errors: Errors) -> PlotFigure:
         for place, each in enumerate(errors.values()):
             for offset, (model, colour) in zip((-0.22, 0.0, 0.22), MODEL_COLOURS.items(), strict=True):
                 values = [factor * each[model][before + name] for name in boxes.COLUMNS]
-                box = dict(zip(("whislo", "q1", "med", "q3", "whishi"), values[:5], strict=True))
+                box: dict[str, float] = dict(zip(("whislo", "q1", "med", "q3", "whishi"), values[:5], strict=True))
                 _box(axes, place + offset, box, colour, 0.17)
                 axes.plot(place + offset, values[5], marker="x", ms=5, mew=1.4, color=colour)
         axes.set(ylabel=label, ylim=(0.0, None))

@@ -6,7 +6,6 @@ import time
 from typing import Any
 
 import numpy as np
-from scipy.optimize import brentq
 
 from planarfriction import scenes
 from planarfriction.experiments.drift_runs import TORQUE, WIDTH
@@ -122,6 +121,8 @@ def closed_drift(slope: float) -> float:
 
     With M the metric, d the fall line and e the direction: `e x (tan(slope) d - mu M e/sqrt(e'Me)) = 0`.
     """
+    from scipy.optimize import brentq
+
     m, down = metric(), np.array([0.0, -1.0])
 
     def turning(angle: float) -> float:

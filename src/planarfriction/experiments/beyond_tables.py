@@ -75,7 +75,7 @@ def _driven(errors: dict[str, Any]) -> Table:
 
 def _ratios(ratios: dict[str, dict[str, float]]) -> Table:
     names = list(next(iter(ratios.values())))
-    rows = [(IN_WORDS[shape], *each.values()) for shape, each in ratios.items()]
+    rows: list[tuple[str | float, ...]] = [(IN_WORDS[shape], *each.values()) for shape, each in ratios.items()]
     rows.append(("target, force", *TARGETS.values(), "", "", ""))
     return Table("Error of ReducedModel over the published reduced model's", ("patch", *names), rows)
 
