@@ -161,7 +161,7 @@ def test_scene_files_keep_their_models_unless_told_otherwise(scene_file):
     built = build_scenes(str(scene_file), [])
     assert [type(contact.model) for contact in built["distributed"].contacts] == [pf.DistributedModel] * 2
     built = build_scenes(str(scene_file), ["both"])
-    assert [type(contact.model) for contact in built["reduced"].contacts] == [pf.ReducedModelPublished] * 2
+    assert [type(contact.model) for contact in built["reduced"].contacts] == [pf.ReducedModel] * 2
     assert built["reduced"].contacts[1].position == (0.03, 0.0)
     assert built["reduced"].contacts[0].model.law == pf.LuGre()
     built = build_scenes(str(scene_file), [], patch="Line")

@@ -45,7 +45,7 @@ def app() -> None:
 @click.argument("scene")
 @click.option(
     "--model",
-    type=click.Choice(["distributed", "reduced", "both"]),
+    type=click.Choice(["distributed", "reduced", "reduced-published", "both"]),
     multiple=True,
     help="Friction model, may be repeated. Default: both for in-hand, else distributed or the file's.",
 )

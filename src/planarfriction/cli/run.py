@@ -27,8 +27,11 @@ DRIFT_WIDTH = 0.05
 SLIDE_MASS, SLIDE_TWIST, SLIDE_SAMPLING = 0.2, (1.0, 0.0, 100.0), 1e-3
 """Mass [kg], initial twist [m/s, m/s, rad/s] and time between samples [s] of the puck in the free slide."""
 
-KINDS = {"distributed": "DistributedModel", "reduced": "ReducedModelPublished"}
+KINDS = {"distributed": "DistributedModel", "reduced": "ReducedModel", "reduced-published": "ReducedModelPublished"}
 """Model on the command line -> class in `planarfriction.models`."""
+
+BOTH = ("distributed", "reduced")
+"""What "both" means."""
 
 
 def build_scenes(
@@ -42,13 +45,13 @@ def build_scenes(
     """The scenes to simulate, by the label of their model."""
     if t_end is not None:
         validation.positive("--t-end", t_end)
-    kinds = list(dict.fromkeys(kind for each in models for kind in (KINDS if each == "both" else [each])))
+    kinds = list(dict.fromkeys(kind for each in models for kind in (BOTH if each == "both" else [each])))
     if Path(name).suffix.lower() in (".toml", ".json"):
         return _scenes_from_file(name, kinds, patch, cell_size)
     validation.choice("scene", name, [*READY, "a scene file (.toml, .json)"])
     width = DRIFT_WIDTH if name == "drift" else WIDTH
     contact_patch = find_patch(patch or "Circle", cell_size=cell_size, width=width)
-    kinds = kinds or (list(KINDS) if name == "in-hand" else ["distributed"])
+    kinds = kinds or (list(BOTH) if name == "in-hand" else ["distributed"])
     return {kind: _ready_scene(name, _model(kind, contact_patch, _law()), t_end) for kind in kinds}
 
 
