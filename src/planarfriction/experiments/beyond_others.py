@@ -26,7 +26,7 @@ PLATEAU_SHARE = 1e-3
 
 PLATEAU: dict[str, Any] = {"t_end": 1.0, "tolerances": {"rtol": 1e-7, "atol": 3e-7}}
 
-FINGER_TIME = {False: 0.5, True: 0.05}
+FINGER_TIME = {False: 2.0, True: 0.05}
 """Quick or not -> end of the in-hand run with the soft finger [s]: the load changes every 0.01 s."""
 
 FINGER_LOADS = (0.83, 1.37)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import statistics
 from typing import Any
 
 from planarfriction.experiments.beyond_driven import STEP_TARGET, TARGETS
@@ -113,8 +114,8 @@ def _in_hand(ends: dict[str, dict[str, float]], score: Numbers) -> str:
 
 def _spread(ratios: dict[str, float]) -> str:
     """Least, middle and largest ratio."""
-    least, *_, most = ordered = sorted(ratios.values())
-    return f"{least:.2g} to {most:.2g}, median {ordered[len(ordered) // 2]:.2g}"
+    values = list(ratios.values())
+    return f"{min(values):.2f} to {max(values):.2f}, median {statistics.median(values):.2f}"
 
 
 def _friction_shares(ends: dict[str, dict[str, float]], model: str) -> tuple[float, float]:
