@@ -77,7 +77,7 @@ def test_reduced_model_stays_below_the_targets_and_the_published_one_would_not(r
     broken = [row for row in beyond_driven.comparisons(swapped) if not row.holds]
     assert len(broken) == 2 * len(driven)  # the median and the third quartile; its maximum is its own
     for ratios in result.numbers["driven ratios"].values():
-        assert ratios["torque median"] < 0.05
+        assert ratios["torque median"] < 0.05 and ratios["torque maximum"] < 1.0
 
 
 def test_plateaus(result):
@@ -89,7 +89,7 @@ def test_plateaus(result):
     assert angles["published reduced"] == pytest.approx(expected, rel=0.03)
     swapped = angles | {"ReducedModel": angles["published reduced"]}
     rows = beyond_others.comparisons(swapped, result.numbers["grooves"])
-    assert [row.holds for row in rows] == [False, False, True, True]
+    assert [row.holds for row in rows] == [False, False, True, True, True]
 
 
 def test_a_drift_a_tenth_of_a_degree_off_would_be_noticed(result):
@@ -101,7 +101,8 @@ def test_a_drift_a_tenth_of_a_degree_off_would_be_noticed(result):
 
 def test_soft_finger(result):
     family = result.numbers["load family"]
-    assert family["ratio to a fixed shape"] > 1.0
+    assert family["time [s]"] < family["first time [s]"]
+    assert family["maps"] > 3
     assert family["force from rebuilding [N]"] < 4e-3
     assert family["torque from rebuilding [N m]"] < 4e-5
 

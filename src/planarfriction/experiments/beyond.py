@@ -24,9 +24,6 @@ SHAPES = (*SIX_SHAPES, "LineGradX")
 
 QUICK_SHAPES = ("LineGrad", "NonConvex2")
 
-DEGREES = (3, 5)
-"""Degrees of the compressed patches: 28 and 45 cells."""
-
 QUICK_TWISTS = 500
 
 
@@ -103,9 +100,9 @@ def _runs_of(shape: str) -> Callable[[], dict[str, Any]]:
 
     def compute() -> dict[str, Any]:
         cases = in_hand.cases_of(shape)
-        rows = ladder.in_hand_rows(cases, DEGREES)
+        rows = ladder.in_hand_rows(cases)
         if shape in SIX_SHAPES:
-            rows += ladder.driven_rows((shape,), DEGREES)
+            rows += ladder.driven_rows((shape,))
         result: dict[str, Any] = {f"shift|{case.words}": in_hand.friction_shift(case) for case in cases}
         for row in rows:
             values = {"states": row.states, **row.errors}
@@ -116,7 +113,7 @@ def _runs_of(shape: str) -> Callable[[], dict[str, Any]]:
 
 
 def _times_of(shapes: tuple[str, ...]) -> dict[str, float]:
-    measured = (ladder.run_times(shape, DEGREES) for shape in shapes)
+    measured = (ladder.run_times(shape) for shape in shapes)
     return {f"{case}|{model}": value for each in measured for (case, model), value in each.items()}
 
 

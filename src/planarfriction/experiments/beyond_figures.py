@@ -173,7 +173,7 @@ def grooves(numbers: dict[str, Any]) -> PlotFigure:
     slopes = np.array(numbers["slope"])
     fine = np.linspace(slopes[0], slopes[-1], 100)
     axes.plot(np.degrees(fine), np.degrees([closed_drift(s) for s in fine]), color=PALETTE[1], label="closed form")
-    for kind, marker, colour in zip(GROOVED_MODELS, "ox", (PALETTE[0], PALETTE[6]), strict=True):
+    for kind, marker, colour in zip(GROOVED_MODELS, "ox+", (PALETTE[0], PALETTE[4], PALETTE[6]), strict=True):
         axes.plot(
             np.degrees(slopes), np.degrees(numbers[kind]), marker, color=colour, label=kind, fillstyle="none", ms=7
         )

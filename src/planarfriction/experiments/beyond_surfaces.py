@@ -20,7 +20,7 @@ from planarfriction.limit_surface import (
 )
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
 
-TWISTS = 4000
+TWISTS = 2000
 """Random twists, their directions even over the sphere of (vx, vy, r omega) about the centre of pressure."""
 
 WIDTH = 0.02

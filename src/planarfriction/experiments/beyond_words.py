@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import statistics
 from typing import Any
 
 from planarfriction.experiments.beyond_driven import STEP_TARGET, TARGETS
-from planarfriction.experiments.beyond_in_hand import SHIFT
+from planarfriction.experiments.beyond_in_hand import SHIFT, depends_on_friction
 from planarfriction.experiments.beyond_others import GROOVED_MODELS
 from planarfriction.experiments.beyond_surfaces import QUARTIC_SHAPES
 from planarfriction.experiments.runs import IN_WORDS
@@ -80,14 +81,13 @@ def _driven(ratios: dict[str, dict[str, float]], step: dict[str, float], costs: 
     aimed = ", ".join(
         f"{name} {best[name]:.2f} to {worst[name]:.2f} (aimed at {share:g} or less)" for name, share in TARGETS.items()
     )
-    torque = [each["torque median"] for each in ratios.values()]
+    torque, peak = ([each[f"torque {name}"] for each in ratios.values()] for name in ("median", "maximum"))
     verdict = "within" if step["ratio"] <= STEP_TARGET else "above"
     return (
         "Moved with a given velocity. The reference is the distributed model with its cells cut finely; the reduced "
         "model as published sees the grid's table, `ReducedModel` the moments of the bristle field. Its error of the "
         f"force, over the published model's on {len(ratios)} shapes: {aimed}; of the torque, median: {min(torque):.3f} "
-        f"to {max(torque):.3f}, but its largest error of the torque, just after the velocity jumps, is up to "
-        f"{max(each['torque maximum'] for each in ratios.values()):.1f} times the published model's. "
+        f"to {max(torque):.3f}; its largest, just after the velocity jumps: {min(peak):.2f} to {max(peak):.2f}. "
         f"A step costs {step['ratio']:.2f} times a published one in a compiled loop "
         f"({1e6 * step['moments [s]']:.2f} µs; {verdict} the {STEP_TARGET:g} aimed at); a whole run "
         f"{costs['moments'] / costs['reduced']:.2f} times, for the solver picks its own steps. The distributed model "
@@ -103,21 +103,24 @@ def _in_hand(ends: dict[str, dict[str, float]], score: Numbers) -> str:
     shares = {name: _friction_shares(ends, name) for name in ("moments", "reduced")}
     return (
         f"In hand, `ReducedModel` ends nearer to the distributed model than the published one in {second['nearer']} of "
-        f"{second['runs']} runs under load 2{except_for}, and in {first['nearer']} of {first['runs']} under load 1, "
-        "where it is no improvement. There the grip passes the threshold by 0.3 %: sections of the patch creep before "
-        "the whole slips, and three states do not hold that. In units of friction, over the runs that depend on it, "
+        f"{second['runs']} runs under load 2{except_for}; ratios of the distances {_spread(second['ratios'])}. Under "
+        f"load 1 it is nearer in {first['nearer']} of {first['runs']}, ratios {_spread(first['ratios'])}: there the "
+        "grip barely passes the threshold, sections of the patch creep before the whole slips, and three states do not "
+        "hold that. In units of friction, over the runs that depend on it, "
         f"`ReducedModel` is off by what {shares['moments'][0]:.2%} (median) to {shares['moments'][1]:.2%} (most) of "
         f"friction would do, the published model by {shares['reduced'][0]:.2%} to {shares['reduced'][1]:.2%}."
     )
 
 
-LEAST_SHIFT = 1e-5
-"""Runs whose end 0.1 % of friction moves by less than this do not count in units of friction [m]."""
+def _spread(ratios: dict[str, float]) -> str:
+    """Least, middle and largest ratio."""
+    values = list(ratios.values())
+    return f"{min(values):.2f} to {max(values):.2f}, median {statistics.median(values):.2f}"
 
 
 def _friction_shares(ends: dict[str, dict[str, float]], model: str) -> tuple[float, float]:
     """Median and largest distance of an end, as the share of friction that does the same."""
-    shares = sorted(1e-3 * each[model] / each[SHIFT] for each in ends.values() if each[SHIFT] > LEAST_SHIFT)
+    shares = sorted(1e-3 * each[model] / each[SHIFT] for each in ends.values() if depends_on_friction(each))
     return shares[len(shares) // 2], shares[-1]
 
 
@@ -148,13 +151,14 @@ def _ladder(costs: dict[str, float], driven: Numbers, ends: dict[str, dict[str, 
 
 def _family(numbers: dict[str, float]) -> str:
     return (
-        "A contact whose pressure flattens with the load (k = 2 f_N), in hand: over the first "
-        f"{numbers['end [s]']:g} s, with a new load every 0.01 s, `ReducedModel` takes "
-        f"{numbers['ratio to a fixed shape']:.0f} times as long as on a fixed shape (published reduced: "
-        f"{numbers['published, ratio to a fixed shape']:.0f}; all of `simulate`, with what is built for new loads). "
-        "Its steady wrench is within "
-        f"{numbers['force from rebuilding [N]']:.1e} N and {numbers['torque from rebuilding [N m]']:.1e} N m of models "
-        "built for one load, per newton."
+        f"A contact whose pressure flattens with the load (k = 2 f_N), in hand, {numbers['end [s]']:g} s with a new "
+        f"load every 0.01 s: `ReducedModel` builds {numbers['maps']:.0f} maps and takes "
+        f"{numbers['first time [s]']:.2g} s, once they are there {1e3 * numbers['time [s]']:.2g} ms (published "
+        f"reduced: {numbers['published, first time [s]']:.2g} s and "
+        f"{1e3 * numbers['published, time [s]']:.0f} ms; `ReducedModel` on a square of fixed shape: "
+        f"{1e3 * numbers['fixed shape, time [s]']:.2g} ms; all of `simulate`). From a map built at every load, its "
+        f"steady wrenches are off by {numbers['force from rebuilding [N]']:.1e} N and "
+        f"{numbers['torque from rebuilding [N m]']:.1e} N m per newton at most."
     )
 
 
@@ -164,5 +168,6 @@ def _grooves(numbers: dict[str, list[float]]) -> str:
     )
     return (
         "Friction with a grain: a block with a grooved sole, released on inclines, drifts sideways as the closed form "
-        f"says, within {miss:.1e} rad with both models; the published theory has friction alike in all directions."
+        f"says, within {miss:.1e} rad with all {len(GROOVED_MODELS)} models; the published theory has friction alike "
+        "in all directions."
     )
