@@ -146,6 +146,7 @@ def test_gradients_at_kinks_are_finite():
         assert all(np.isfinite(slope).all() for slope in jax.tree.leaves(found))
 
 
+@pytest.mark.slow
 def test_a_roll_out_is_that_of_numpy_and_its_gradient_that_of_differences():
     numpy_model, model = pair("elasto-plastic")
     (_, run), (by_law, _) = loss_and_slopes()(model.parameters, sway(40))
@@ -167,6 +168,7 @@ def test_a_roll_out_is_that_of_numpy_and_its_gradient_that_of_differences():
 
 
 @pytest.mark.torch
+@pytest.mark.slow
 def test_gradients_of_roll_outs_are_those_of_pytorch():
     torch = pytest.importorskip("torch", reason="needs PyTorch: pip install 'planarfriction[torch]'")
     from planarfriction.torch import MomentPlanarLuGre, simulate

@@ -145,6 +145,7 @@ def test_jacobians_of_a_blend_are_its_derivatives():
 # ---------------------------------------------------------------------- scenes
 
 
+@pytest.mark.slow
 def test_a_run_is_that_of_shapes_rebuilt_at_every_load():
     scenes = [pf.scenes.in_hand(model(load_error=error), t_end=0.45) for error in (2e-3, 0.0)]
     ours, theirs = (pf.simulate(scene, rtol=1e-6, atol=1e-5).data for scene in scenes)
