@@ -122,7 +122,12 @@ def test_ready_scenes_by_name(name):
 
 
 def run_models() -> tuple[str, str]:
-    return "DistributedModel", "ReducedModelPublished"
+    return "DistributedModel", "ReducedModel"
+
+
+def test_the_published_model_has_its_own_name():
+    (scene,) = build_scenes("in-hand", ["reduced-published"]).values()
+    assert type(scene.contacts[0].model) is pf.ReducedModelPublished
 
 
 def test_default_models():
