@@ -287,7 +287,7 @@ def test_differences_cover_the_time_that_both_runs_have():
 def test_a_run_is_what_simulate_gives(capsys, tmp_path):
     arguments = ["run", "in-hand", "--model", "reduced", "--patch", "Square", "--t-end", "0.5", "--out", str(tmp_path)]
     assert main(arguments) == 0
-    model = pf.ReducedModelPublished(PUBLISHED_PATCHES["Square"](), pf.LuGre(elasto_plastic=pf.ElastoPlastic(0.9)))
+    model = pf.ReducedModel(PUBLISHED_PATCHES["Square"](), pf.LuGre(elasto_plastic=pf.ElastoPlastic(0.9)))
     expected = pf.simulate(scenes.in_hand(model, t_end=0.5))
     columns = read_csv(tmp_path / "in-hand-reduced.csv")
     for name, values in columns.items():
