@@ -278,6 +278,7 @@ def test_scan_and_adjoint_agree_at_kinks_too(kind, law):
             assert np.abs(first - second).max() <= 1e-9 * scale
 
 
+@pytest.mark.slow
 def test_adjoint_under_vmap_and_in_single_precision():
     model = pairs("published", "wide")[1]
     motion = sway(60, 1e-4)
@@ -407,6 +408,7 @@ def test_a_missing_package_names_its_extra(monkeypatch):
         importlib.import_module("planarfriction.jax")
 
 
+@pytest.mark.slow
 def test_the_example_with_diffrax_sticks_slips_and_turns(tmp_path):
     pytest.importorskip("diffrax", reason="needs diffrax")
     path = Path(__file__).parents[1] / "examples" / "diffrax_contact.py"
