@@ -42,7 +42,7 @@ class ReducedModel(FrictionModel):
     """Squares of the map along a quarter of a face of its cube; 24 leave errors of 1e-5 (median) of z_ss."""
     speeds: int = 14
     """Nodes of the map over the speed, for the Stribeck part."""
-    load_error: float = 2e-3
+    load_error: float = 4e-3
     """Largest relative error of z_ss from blending maps over the load; 0 builds a map for each load, which is slow."""
 
     def __post_init__(self) -> None:
