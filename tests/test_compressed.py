@@ -185,3 +185,11 @@ def test_in_hand_position():
 def test_in_hand_positions_of_every_shape(case):
     assert PUBLISHED_PATCHES[case.shape]().compressed().cells <= 45
     assert end_error(case) < 1e-4  # at most 0.051 mm measured
+
+
+def test_a_friction_metric_is_kept():
+    patch = pf.ContactPatch.rectangle(0.02).with_friction_metric(pf.grain(0.3, 1.0, 0.5), [0.1, 0.2])
+    few = patch.compressed()
+    assert few.cells < patch.cells
+    np.testing.assert_array_equal(few.metric, patch.metric)
+    np.testing.assert_array_equal(few.asymmetry, patch.asymmetry)

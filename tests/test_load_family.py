@@ -177,3 +177,14 @@ def test_files_keep_the_stated_error(tmp_path):
     assert pf.Scene.from_file(tmp_path / "scene.toml").contacts[0].model.load_error == 0.01
     with pytest.raises(pf.FrictionError, match="load_error must be >= 0"):
         model(load_error=-1.0)
+
+
+def test_a_blend_is_nearer_to_the_nearer_rung():
+    family, loads = model(), np.linspace(0.9, 2.7, 37).tolist()
+    shapes = family.shapes_at(loads)
+    rungs = np.array(family.load_rungs)
+    blends = [(load, shape.blend) for load, shape in zip(loads, shapes, strict=True) if shape.other is not None]
+    assert blends
+    for load, blend in blends:
+        low, high = rungs[rungs <= load].max(), rungs[rungs > load].min()
+        assert blend == pytest.approx((load - low) / (high - low), abs=1e-12)

@@ -359,3 +359,16 @@ def test_driven_it_is_closer_to_the_converged_model_than_the_published_one(shape
     runs = [pf.simulate(pf.scenes.driven(m, twist=twist, t_end=0.4), rtol=1e-6, atol=1e-6).data for m in models]
     errors = [np.median(np.hypot(run.fx - runs[0].fx, run.fy - runs[0].fy)) for run in runs[1:]]
     assert errors[0] < 0.25 * errors[1]
+
+
+def test_the_stored_fourth_moments_are_those_of_the_cells_speeds():
+    from planarfriction.models.moment_map import slip_factor
+    from planarfriction.models.steady_sums import ScaledCells
+
+    patch = pf.ContactPatch.rectangle(0.02, 0.01, (4, 3), pressure=lambda x, y: 1.0 + 20.0 * x + 30.0 * y)
+    factor = slip_factor(patch)
+    stored = ScaledCells(patch, None, factor).fourth_moments()
+    for x, y, s in np.random.default_rng(3).normal(size=(20, 3)):
+        seen = patch.levers() @ np.linalg.solve(factor, [x, y, s])
+        m = np.array([x * x, y * y, s * s, x * y, x * s, y * s])
+        assert m @ stored @ m == pytest.approx(patch.weights() @ (seen**2).sum(axis=1) ** 2, rel=1e-12)
