@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.models.moment_map import slip_factor
+from planarfriction.models.reduced_map import slip_factor
 from planarfriction.models.steady_sums import ScaledCells
 from planarfriction.patch import PUBLISHED_PATCHES
 

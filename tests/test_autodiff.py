@@ -144,7 +144,7 @@ def test_a_long_step_ends_in_the_steady_state_of_its_parameters(kind, law):
 def _friction(law, v):
     from planarfriction import formulas
 
-    return formulas.stribeck(np, v, law.mu_c, law.mu_s, law.v_s, law.gamma)
+    return formulas.stribeck(np, v, law)
 
 
 # ---------------------------------------------------------------------- kinks

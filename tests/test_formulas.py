@@ -11,7 +11,9 @@ from hypothesis import strategies as st
 from numba import njit
 
 from planarfriction import formulas
+from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import compiled_math
+from planarfriction.kernels.law import law_of as read_law
 
 LAW = {"mu_c": 0.7, "mu_s": 1.1, "v_s": 2e-3}
 GAMMAS = (1.0, 1.5, 2.0, 3.0)
@@ -20,6 +22,16 @@ speeds = st.floats(0.0, 10.0) | st.floats(1e-12, 1e-2)
 ratios = st.floats(0.0, 0.99)
 deflections = st.floats(0.0, 3.0)
 checked = settings(deadline=None, max_examples=100)
+
+
+def law_of(**numbers):
+    """A law with these numbers; the others stand for nothing here."""
+    others = {"sigma_0": 1.0, "sigma_1": 0.0, "sigma_2": 0.0, "gamma": 2.0, "elasto_plastic": 0.0}
+    return LawNumbers(**{**others, "breakaway_ratio": 0.5, **LAW, **numbers})
+
+
+def bristles_of(elasto_plastic, breakaway_ratio):
+    return law_of(elasto_plastic=elasto_plastic, breakaway_ratio=breakaway_ratio)
 
 
 def slope(function, x, step):
@@ -33,29 +45,29 @@ def slope(function, x, step):
 
 @pytest.mark.parametrize("gamma", GAMMAS)
 def test_stribeck_falls_from_static_to_coulomb_friction(gamma):
-    g = formulas.stribeck(np, np.linspace(0.0, 1.0, 1000), **LAW, gamma=gamma)
+    g = formulas.stribeck(np, np.linspace(0.0, 1.0, 1000), law_of(gamma=gamma))
     assert g[0] == LAW["mu_s"]
     assert g[-1] == LAW["mu_c"]  # exp(-500) is far below rounding
     assert (np.diff(g) <= 0.0).all()
-    at_v_s = formulas.stribeck(np, LAW["v_s"], **LAW, gamma=gamma)
+    at_v_s = formulas.stribeck(np, LAW["v_s"], law_of(gamma=gamma))
     assert at_v_s == pytest.approx(0.7 + 0.4 / math.e, rel=1e-15)  # rounding
 
 
 @pytest.mark.parametrize("gamma", GAMMAS)
 def test_stribeck_slope_is_the_slope(gamma):
     speed = LAW["v_s"] * np.linspace(0.2, 4.0, 300)
-    expected = slope(lambda v: formulas.stribeck(np, v, **LAW, gamma=gamma), speed, 1e-3 * LAW["v_s"])
+    expected = slope(lambda v: formulas.stribeck(np, v, law_of(gamma=gamma)), speed, 1e-3 * LAW["v_s"])
     # Largest slope 300 s/m; rounding of g over the step 1e-16/2e-6, truncation (1e-3)^4 of that of the curve.
-    assert formulas.stribeck_slope(np, speed, **LAW, gamma=gamma) == pytest.approx(expected, abs=1e-9 * 300)
+    assert formulas.stribeck_slope(np, speed, law_of(gamma=gamma)) == pytest.approx(expected, abs=1e-9 * 300)
 
 
 def test_stribeck_slope_at_rest_is_the_limit_from_the_right():
-    at_rest = [formulas.stribeck_slope(np, 0.0, **LAW, gamma=gamma) for gamma in GAMMAS]
+    at_rest = [formulas.stribeck_slope(np, 0.0, law_of(gamma=gamma)) for gamma in GAMMAS]
     assert at_rest == pytest.approx([-0.4 / 2e-3, 0.0, 0.0, 0.0])  # finite for gamma >= 1
-    nearby = [formulas.stribeck_slope(np, 1e-30, **LAW, gamma=gamma) for gamma in GAMMAS]
+    nearby = [formulas.stribeck_slope(np, 1e-30, law_of(gamma=gamma)) for gamma in GAMMAS]
     assert nearby == pytest.approx(at_rest, abs=1e-9)  # gamma = 1.5: sqrt(1e-27) of 200 s/m
     # Below 1 the limit is infinite: documented as zero.
-    assert formulas.stribeck_slope(np, 0.0, **LAW, gamma=0.5) == 0.0
+    assert formulas.stribeck_slope(np, 0.0, law_of(gamma=0.5)) == 0.0
 
 
 # ---------------------------------------------------------------------- slip fraction
@@ -100,8 +112,8 @@ def test_slip_fraction_slope_is_the_slope(ratio):
 @checked
 def test_decay_bounds(deflection, cosine, speed, ratio):
     grip = 1e6
-    plain = formulas.bristle_decay(np, deflection, cosine * speed, speed, grip, 0.0, ratio)
-    elastic = formulas.bristle_decay(np, deflection, cosine * speed, speed, grip, 1.0, ratio)
+    plain = formulas.bristle_decay(np, deflection, cosine * speed, speed, grip, bristles_of(0.0, ratio))
+    elastic = formulas.bristle_decay(np, deflection, cosine * speed, speed, grip, bristles_of(1.0, ratio))
     assert plain == speed * grip
     assert 0.0 <= elastic <= plain * (1 + 1e-15)  # beta lies in [0, 1]; rounding
     if deflection <= ratio or cosine == -1.0:  # elastic, or the bristle is being relaxed
@@ -117,9 +129,11 @@ def test_decay_partials_are_the_slopes(elasto_plastic):
     along, grip = random.uniform(-1.0, 1.0, 50) * speed, random.uniform(1.0, 3.0, 50)
 
     def decay(d=deflection, a=along, v=speed, q=grip):
-        return formulas.bristle_decay(np, d, a, v, q, elasto_plastic, ratio)
+        return formulas.bristle_decay(np, d, a, v, q, bristles_of(elasto_plastic, ratio))
 
-    k, *partials = formulas.bristle_decay_partials(np, deflection, along, speed, grip, elasto_plastic, ratio)
+    k, *partials = formulas.bristle_decay_partials(
+        np, deflection, along, speed, grip, bristles_of(elasto_plastic, ratio)
+    )
     assert k == pytest.approx(decay(), rel=1e-15)  # rounding
     step = 1e-3
     expected = (
@@ -134,7 +148,7 @@ def test_decay_partials_are_the_slopes(elasto_plastic):
 
 
 def test_traction_opposes_the_bristle_its_rate_and_the_velocity():
-    assert formulas.traction(2.0, 3.0, 5.0, 7.0, 11.0, 13.0) == -(14.0 + 33.0 + 65.0)
+    assert formulas.traction(2.0, 3.0, 5.0, law_of(sigma_0=7.0, sigma_1=11.0, sigma_2=13.0)) == -(14.0 + 33.0 + 65.0)
 
 
 # ---------------------------------------------------------------------- the step
@@ -172,10 +186,12 @@ def test_mean_decay(start, end, log_dt):
 @given(deflections, deflections)
 @checked
 def test_a_step_ends_within_reach(start, end):
-    largest = formulas.reachable_deflection(np, start, 1.0)
+    largest = formulas.reachable_deflection(np, start, bristles_of(1.0, 0.5))
     assert largest == max(start, 1.0)
     assert end * formulas.cap(np, end, largest) == pytest.approx(min(end, largest), rel=1e-15)  # rounding
-    assert formulas.cap(np, end, formulas.reachable_deflection(np, start, 0.0)) == 1.0  # plain LuGre is not capped
+    assert (
+        formulas.cap(np, end, formulas.reachable_deflection(np, start, bristles_of(0.0, 0.5))) == 1.0
+    )  # plain LuGre is not capped
 
 
 # ---------------------------------------------------------------------- derivatives of a step
@@ -184,20 +200,22 @@ def test_a_step_ends_within_reach(start, end):
 @pytest.mark.parametrize("gamma", [1.5, 2.0, 3.0])
 def test_stribeck_partials_are_the_slopes(gamma):
     speed = LAW["v_s"] * np.linspace(0.2, 4.0, 50)
-    values = {"speed": speed, **LAW, "gamma": gamma}
-    g, *partials = formulas.stribeck_partials(np, **values)
-    assert np.array_equal(g, formulas.stribeck(np, **values))
-    assert partials[0] == pytest.approx(formulas.stribeck_slope(np, **values), rel=1e-14)  # rounding
-    for name, partial in zip(list(values)[1:], partials[1:], strict=True):
+    values = {**LAW, "gamma": gamma}
+    g, *partials = formulas.stribeck_partials(np, speed, law_of(**values))
+    assert np.array_equal(g, formulas.stribeck(np, speed, law_of(**values)))
+    assert partials[0] == pytest.approx(formulas.stribeck_slope(np, speed, law_of(**values)), rel=1e-14)  # rounding
+    for name, partial in zip(values, partials[1:], strict=True):
         value = values[name]
-        expected = slope(lambda p, n=name: formulas.stribeck(np, **{**values, n: p}), value, 1e-3 * value)
+        expected = slope(
+            lambda p, n=name: formulas.stribeck(np, speed, law_of(**{**values, n: p})), value, 1e-3 * value
+        )
         # Truncation (1e-3)^4 of the curve's fifth derivative, a few hundred of g; rounding of g over the step.
         assert partial * value == pytest.approx(expected * value, abs=1e-9)
 
 
 def test_stribeck_partials_at_rest():
     for gamma in (0.5, *GAMMAS):
-        g, _, by_mu_c, by_mu_s, by_v_s, by_gamma = formulas.stribeck_partials(np, 0.0, **LAW, gamma=gamma)
+        g, _, by_mu_c, by_mu_s, by_v_s, by_gamma = formulas.stribeck_partials(np, 0.0, law_of(gamma=gamma))
         assert (g, by_mu_c, by_mu_s, by_v_s, by_gamma) == (LAW["mu_s"], 0.0, 1.0, 0.0, 0.0)
 
 
@@ -206,9 +224,9 @@ def test_decay_by_breakaway_is_the_slope(ratio):
     deflection = ratio + (1.0 - ratio) * np.linspace(0.05, 0.95, 50)
 
     def decay(s):
-        return formulas.bristle_decay(np, deflection, 0.3, 0.7, 2.0, 1.0, s)
+        return formulas.bristle_decay(np, deflection, 0.3, 0.7, 2.0, bristles_of(1.0, s))
 
-    partial = formulas.bristle_decay_partials(np, deflection, 0.3, 0.7, 2.0, 1.0, ratio)[1]
+    partial = formulas.bristle_decay_partials(np, deflection, 0.3, 0.7, 2.0, bristles_of(1.0, ratio))[1]
     got = formulas.bristle_decay_by_breakaway(np, partial, deflection, ratio)
     expected = slope(decay, ratio, 1e-3 * (1.0 - ratio))
     # Truncation (1e-3)^4 of the fifth derivative, some 1e3, over the width; rounding.
@@ -242,13 +260,13 @@ def test_floor_slopes_are_the_slopes(least):
 @checked
 @given(deflections, st.floats(-1.0, 1.0), st.floats(0.5, 1.0), st.floats(0.0, 0.8))
 def test_slip_share_partials_are_the_slopes(deflection, cosine, evenness, ratio):
-    found = formulas.slip_share_partials(np, deflection, cosine, evenness, 1.0, ratio)
-    assert found[0] == formulas.slip_share(np, deflection, cosine, evenness, 1.0, ratio)
+    found = formulas.slip_share_partials(np, deflection, cosine, evenness, bristles_of(1.0, ratio))
+    assert found[0] == formulas.slip_share(np, deflection, cosine, evenness, bristles_of(1.0, ratio))
     # The ratio times evenness is what counts: evenness 1 for its own slope.
     functions = (
-        lambda d: formulas.slip_share(np, d, cosine, evenness, 1.0, ratio),
-        lambda c: formulas.slip_share(np, deflection, c, evenness, 1.0, ratio),
-        lambda b: formulas.slip_share(np, deflection, cosine, 1.0, 1.0, b),
+        lambda d: formulas.slip_share(np, d, cosine, evenness, bristles_of(1.0, ratio)),
+        lambda c: formulas.slip_share(np, deflection, c, evenness, bristles_of(1.0, ratio)),
+        lambda b: formulas.slip_share(np, deflection, cosine, 1.0, bristles_of(1.0, b)),
     )
     for partial, function, x in zip(found[1:], functions, (deflection, cosine, ratio * evenness), strict=True):
         # Curvature jumps at both ends, by pi^2/2 over the width squared, 0.2 or more.
@@ -271,24 +289,25 @@ def test_relaxation_slope_is_the_slope():
 
 
 @njit(error_model="numpy")
-def compiled(speed, deflection, along, mu_c, mu_s, v_s, gamma, grip, elasto_plastic, ratio, decay_dt, out):
+def compiled(speed, deflection, along, grip, laws, decay_dt, out):
     """Every formula for every row, in compiled loops."""
     for i in range(speed.shape[0]):
-        v, d, a, q, e, s = speed[i], deflection[i], along[i], grip[i], elasto_plastic[i], ratio[i]
-        out[i, 0] = formulas.stribeck(compiled_math, v, mu_c[i], mu_s[i], v_s[i], gamma[i])
-        out[i, 1] = formulas.stribeck_slope(compiled_math, v, mu_c[i], mu_s[i], v_s[i], gamma[i])
+        v, d, a, q, law = speed[i], deflection[i], along[i], grip[i], read_law(laws[i])
+        s = law.breakaway_ratio
+        out[i, 0] = formulas.stribeck(compiled_math, v, law)
+        out[i, 1] = formulas.stribeck_slope(compiled_math, v, law)
         out[i, 2] = formulas.slip_fraction(compiled_math, d, s)
         out[i, 3] = formulas.slip_fraction_slope(compiled_math, d, s)
-        out[i, 4] = formulas.bristle_decay(compiled_math, d, a, v, q, e, s)
-        k = formulas.bristle_decay_partials(compiled_math, d, a, v, q, e, s)
+        out[i, 4] = formulas.bristle_decay(compiled_math, d, a, v, q, law)
+        k = formulas.bristle_decay_partials(compiled_math, d, a, v, q, law)
         out[i, 5], out[i, 6], out[i, 7], out[i, 8] = k
-        out[i, 9] = formulas.traction(d, a, v, q, e, s)
+        out[i, 9] = formulas.traction(d, a, v, law)
         left = formulas.relaxation(compiled_math, decay_dt[i])
         out[i, 10], out[i, 11] = left
-        out[i, 12] = formulas.reachable_deflection(compiled_math, d, e)
+        out[i, 12] = formulas.reachable_deflection(compiled_math, d, law)
         out[i, 13] = formulas.cap(compiled_math, d, 0.5)
         out[i, 14] = formulas.mean_decay(v, q, decay_dt[i])
-        g = formulas.stribeck_partials(compiled_math, v, mu_c[i], mu_s[i], v_s[i], gamma[i])
+        g = formulas.stribeck_partials(compiled_math, v, law)
         out[i, 15], out[i, 16], out[i, 17], out[i, 18], out[i, 19], out[i, 20] = g
         out[i, 21] = formulas.bristle_decay_by_breakaway(compiled_math, q, d, s)
         out[i, 22], out[i, 23] = formulas.mean_decay_partials(v, q, decay_dt[i])
@@ -307,22 +326,23 @@ def test_every_formula_gives_the_same_number_in_compiled_loops():
     along = random.uniform(-1.0, 1.0, n) * speed
     elasto_plastic = random.choice([0.0, 1.0], n)
     decay_dt = 10.0 ** random.uniform(-6, 2.5, n)
-    out = np.empty((n, 25))
-    compiled(speed, deflection, along, mu_c, mu_s, v_s, gamma, grip, elasto_plastic, ratio, decay_dt, out)
-    bristle = (deflection, along, speed, grip, elasto_plastic, ratio)
+    out, sigma = np.empty((n, 25)), random.uniform(0.0, 10.0, (3, n))
+    law = LawNumbers(*sigma, mu_c, mu_s, v_s, gamma, elasto_plastic, ratio, random.choice([0.0, 1e-3], n))
+    compiled(speed, deflection, along, grip, np.stack(law, -1), decay_dt, out)
+    bristle = (deflection, along, speed, grip, law)
     expected = [
-        formulas.stribeck(np, speed, mu_c, mu_s, v_s, gamma),
-        formulas.stribeck_slope(np, speed, mu_c, mu_s, v_s, gamma),
+        formulas.stribeck(np, speed, law),
+        formulas.stribeck_slope(np, speed, law),
         formulas.slip_fraction(np, deflection, ratio),
         formulas.slip_fraction_slope(np, deflection, ratio),
         formulas.bristle_decay(np, *bristle),
         *formulas.bristle_decay_partials(np, *bristle),
-        formulas.traction(*bristle),
+        formulas.traction(deflection, along, speed, law),
         *formulas.relaxation(np, decay_dt),
-        formulas.reachable_deflection(np, deflection, elasto_plastic),
+        formulas.reachable_deflection(np, deflection, law),
         formulas.cap(np, deflection, 0.5),
         formulas.mean_decay(speed, grip, decay_dt),
-        *formulas.stribeck_partials(np, speed, mu_c, mu_s, v_s, gamma),
+        *formulas.stribeck_partials(np, speed, law),
         formulas.bristle_decay_by_breakaway(np, grip, deflection, ratio),
         *formulas.mean_decay_partials(speed, grip, decay_dt),
         formulas.relaxation_slope(np, decay_dt, *formulas.relaxation(np, decay_dt)),

@@ -208,7 +208,10 @@ SURFACE = pf.LimitSurfaceCells(pf.ContactPatch.rectangle(0.02, cells=3))
             "normal_force must broadcast with the twist, got shapes [3] and [2]",
         ),
         (lambda: pf.DistributedModel("disc", pf.LuGre()), "patch must be a ContactPatch, got disc"),
-        (lambda: pf.DistributedModel(POINT, pf.Coulomb(0.3)), "law must be a LuGre law, got Coulomb(mu=0.3)"),
+        (
+            lambda: pf.DistributedModel(POINT, pf.Coulomb(0.3)),
+            "law must be a friction law of bristles, such as LuGre, got Coulomb(mu=0.3)",
+        ),
     ],
 )
 def test_wrong_input_gets_one_line_with_name_rule_and_value(call, message):

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import planarfriction as pf
 from planarfriction.models import load_family
-from planarfriction.models.moment_map import slip_factor
+from planarfriction.models.reduced_map import slip_factor
 from planarfriction.scenes.packing import pack
 
 LAW = pf.LuGre(elasto_plastic=pf.ElastoPlastic(0.9))

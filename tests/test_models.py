@@ -119,7 +119,7 @@ def test_distributed_steady_state_is_coulomb_of_every_cell(polar, azimuth, speed
     x, y = PATCH.positions.T
     v = np.stack([twist[0] - twist[2] * y, twist[1] + twist[2] * x])
     size = np.hypot(*v)
-    g = formulas.stribeck(np, size, 1.0, 1.2, 1e-3, 2.0)
+    g = formulas.stribeck(np, size, model.law)
     force = -(g * v / size + 0.2 * v) * PATCH.weights() * LOAD
     expected = [*force.sum(axis=1), (x * force[1] - y * force[0]).sum()]
     # Rounding of zdot times sigma_1 = 8e2.
@@ -149,7 +149,7 @@ def test_reduced_steady_state(kind, polar, azimuth, speed):
     at_centre = geometry.twist_at(twist, centre)
     v_n = np.linalg.norm(at_centre * (1.0, 1.0, surface.contact_radius))
     viscous = geometry.wrench_at(0.2 * at_centre * (1.0, 1.0, PATCH.second_moment()), -centre)
-    g = formulas.stribeck(np, v_n, 1.0, 1.2, 1e-3, 2.0)
+    g = formulas.stribeck(np, v_n, model.law)
     expected = (g * surface.wrench(twist) - viscous) * LOAD
     for got in (wrench, model.wrench(state, twist, LOAD)):  # of compiled loops and of NumPy
         assert got == pytest.approx(expected, abs=1e-11 + 1e-12 * speed)  # rounding, as above, through the offset

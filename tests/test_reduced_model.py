@@ -93,7 +93,7 @@ def _smooth(v: np.ndarray) -> np.ndarray:
 
 
 def _map_of(function, n: int, faces: int) -> np.ndarray:
-    """Data of a map of one level, as `kernels.moments` expects it around its numbers."""
+    """Data of a map of one level, as `kernels.reduced` expects it around its numbers."""
     return cube_map.flat(cube_map.hermite(function(cube_map.face_nodes(n))), 3, faces)
 
 
@@ -362,7 +362,7 @@ def test_driven_it_is_closer_to_the_converged_model_than_the_published_one(shape
 
 
 def test_the_stored_fourth_moments_are_those_of_the_cells_speeds():
-    from planarfriction.models.moment_map import slip_factor
+    from planarfriction.models.reduced_map import slip_factor
     from planarfriction.models.steady_sums import ScaledCells
 
     patch = pf.ContactPatch.rectangle(0.02, 0.01, (4, 3), pressure=lambda x, y: 1.0 + 20.0 * x + 30.0 * y)

@@ -198,13 +198,12 @@ def _numpy_table(patch: ContactPatch, segments: int = 20) -> np.ndarray:
 
 def _published_loop(twists: np.ndarray) -> float:
     """Time of the published reduced model's steps through `twists`, compiled [s]."""
-    from planarfriction.kernels import reduced as kernels
-    from planarfriction.kernels.law import law_row
+    from planarfriction.kernels import published as kernels
 
     model = ReducedModelPublished(_disc(), _law())
     shape = model.shape_at(1.0)
     surface = np.array([shape.surface.numbers.kind, 0, shape.surface.numbers.size])
-    arguments = law_row(model.law), shape.numbers, surface, shape.surface.numbers.data
+    arguments = np.array(model.law.numbers), shape.numbers, surface, shape.surface.numbers.data
     z, wrench = model.rest(), np.empty_like(twists)
     return _median(lambda: kernels.step_sequence(*arguments, z, twists, 1.0, 1e-4, wrench), 9)
 
@@ -217,14 +216,13 @@ def _step_reduced_loop(name: str, full: bool) -> Measurement:
 
 def _step_distributed_loop(name: str, full: bool) -> Measurement:
     from planarfriction.kernels import distributed as kernels
-    from planarfriction.kernels.law import law_numbers
 
     model, twists = DistributedModel(_disc(), _law()), _mixed_twists(1000)
     x, y = (np.ascontiguousarray(column) for column in model.patch.positions.T)
     z = model.rest().reshape(-1)
     scratch, wrench = np.empty_like(z), np.empty_like(twists)
     arguments = x, y, model.patch.weights(), 1.0, 1e-4, scratch, wrench
-    loop = _median(lambda: kernels.step_sequence(law_numbers(model.law), z, twists, *arguments), 9)
+    loop = _median(lambda: kernels.step_sequence(model.law.numbers, z, twists, *arguments), 9)
     call = _python_step(model, 100)
     return _line(name, loop / len(twists) * 1e6, "us", "one Python call of the same step", call * 1e6)
 
@@ -242,11 +240,10 @@ def _step_reduced_call(name: str, full: bool) -> Measurement:
 
 
 def _moments_loop(model: ReducedModel, twists: np.ndarray) -> float:
-    from planarfriction.kernels import moments as kernels
-    from planarfriction.kernels.law import law_row
+    from planarfriction.kernels import reduced as kernels
 
     shape, z, wrench = model.shape_at(1.0), model.rest(), np.empty_like(twists)
-    arguments = law_row(model.law), shape.numbers, np.zeros(3, dtype=int), shape.data
+    arguments = np.array(model.law.numbers), shape.numbers, np.zeros(3, dtype=int), shape.data
     return _median(lambda: kernels.step_sequence(*arguments, z, twists, 1.0, 1e-4, wrench), 9)
 
 
@@ -344,19 +341,19 @@ def _import(name: str, full: bool) -> Measurement:
 BENCHMARKS: dict[str, Callable[[str, bool], Measurement]] = {
     "in_hand.distributed": _in_hand_distributed,
     "in_hand.distributed.101": _in_hand_distributed_101,
-    "in_hand.reduced": _in_hand_reduced,
-    "in_hand.reduced.load_2": lambda name, full: _in_hand_reduced(name, full, load=2),
-    "in_hand.reduced.load_dependent": _in_hand_load_dependent,
+    "in_hand.published": _in_hand_reduced,
+    "in_hand.published.load_2": lambda name, full: _in_hand_reduced(name, full, load=2),
+    "in_hand.published.load_dependent": _in_hand_load_dependent,
     "in_hand.reduced.load_family": _in_hand_load_family,
     "table.build": _table_build,
-    "step.reduced.loop": _step_reduced_loop,
+    "step.published.loop": _step_reduced_loop,
     "step.distributed.loop": _step_distributed_loop,
-    "step.reduced.call": _step_reduced_call,
-    "step.moments.loop": _step_moments_loop,
-    "step.moments.call": _step_moments_call,
-    "gradient.reduced": _gradient_reduced,
-    "gradient.reduced.batch": _gradient_reduced_batch,
-    "gradient.moments": _gradient_moments,
+    "step.published.call": _step_reduced_call,
+    "step.reduced.loop": _step_moments_loop,
+    "step.reduced.call": _step_moments_call,
+    "gradient.published": _gradient_reduced,
+    "gradient.published.batch": _gradient_reduced_batch,
+    "gradient.reduced": _gradient_moments,
     "import": _import,
 }
 """Benchmarks by name."""

@@ -13,20 +13,46 @@ A bristle is a vector `z` driven by a velocity `u`, of any dimension: two for a 
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 
-def stribeck(xp, speed, mu_c, mu_s, v_s, gamma):
+class LawNumbers(NamedTuple):
+    """What the formulas ask of a friction law, read by name: numbers, or arrays that broadcast with the bristles."""
+
+    sigma_0: Any
+    """Bristle stiffness per unit normal load [1/m]."""
+    sigma_1: Any
+    """Bristle damping per unit normal load [s/m]."""
+    sigma_2: Any
+    """Viscous friction per unit normal load [s/m]."""
+    mu_c: Any
+    """Coulomb coefficient [-]."""
+    mu_s: Any
+    """Static coefficient [-]."""
+    v_s: Any
+    """Stribeck speed [m/s]."""
+    gamma: Any
+    """Stribeck exponent [-]."""
+    elasto_plastic: Any
+    """1.0 for elasto-plastic bristles, else 0.0."""
+    breakaway_ratio: Any
+    """s_ba [-]; unused by plain bristles."""
+    creep_speed: Any = 0.0
+    """v_c [m/s]: plain bristles relax as if they slid faster by this speed; 0 keeps what sticks where it is."""
+
+
+def stribeck(xp, speed, law):
     """Friction coefficient in steady sliding, `g = mu_c + (mu_s - mu_c) exp(-|v/v_s|^gamma)` [-]."""
-    return mu_c + (mu_s - mu_c) * xp.exp(-xp.power(speed * (1.0 / v_s), gamma))
+    return law.mu_c + (law.mu_s - law.mu_c) * xp.exp(-xp.power(speed * (1.0 / law.v_s), law.gamma))
 
 
-def stribeck_slope(xp, speed, mu_c, mu_s, v_s, gamma):
+def stribeck_slope(xp, speed, law):
     """Derivative `dg/d|v|` [s/m]; at rest the right-hand limit, finite for `gamma >= 1` (zero where it has none)."""
-    ratio = speed * (1.0 / v_s)
+    ratio = speed * (1.0 / law.v_s)
     safe = xp.where(ratio > 0.0, ratio, 1.0)
-    at_rest = xp.where(gamma == 1.0, 1.0, 0.0)
-    steepness = xp.where(ratio > 0.0, xp.power(safe, gamma) / safe, at_rest)
-    return -(mu_s - mu_c) * gamma * (1.0 / v_s) * steepness * xp.exp(-xp.power(ratio, gamma))
+    at_rest = xp.where(law.gamma == 1.0, 1.0, 0.0)
+    steepness = xp.where(ratio > 0.0, xp.power(safe, law.gamma) / safe, at_rest)
+    return -(law.mu_s - law.mu_c) * law.gamma * (1.0 / law.v_s) * steepness * xp.exp(-xp.power(ratio, law.gamma))
 
 
 def slip_fraction(xp, deflection, breakaway_ratio):
@@ -47,30 +73,30 @@ def slip_fraction_slope(xp, deflection, breakaway_ratio):
     return 0.5 * math.pi * per_width * xp.cos(math.pi * xp.minimum(xp.maximum(phase, -0.5), 0.5))
 
 
-def bristle_decay(xp, deflection, along, speed, grip, elasto_plastic, breakaway_ratio):
+def bristle_decay(xp, deflection, along, speed, grip, law):
     """Rate `k = beta |v| sigma_0 / g` [1/s] of `zdot = u - k z`.
 
-    `beta |v| = alpha (|v| + z.v/|z|) / 2` for elasto-plastic bristles, `|v|` for plain LuGre (`elasto_plastic` is 1.0
-    or 0.0); `deflection = |z|/z_max`, `grip = sigma_0 / g` [1/m].
+    `beta |v| = alpha (|v| + z.v/|z|) / 2` for elasto-plastic bristles, `|v| + v_c` for plain ones (LuGre: v_c = 0);
+    `deflection = |z|/z_max`, `grip = sigma_0 / g` [1/m].
     """
-    alpha = slip_fraction(xp, deflection, breakaway_ratio)
-    return xp.where(elasto_plastic > 0.0, 0.5 * alpha * (speed + along), speed) * grip
+    alpha = slip_fraction(xp, deflection, law.breakaway_ratio)
+    return xp.where(law.elasto_plastic > 0.0, 0.5 * alpha * (speed + along), speed + law.creep_speed) * grip
 
 
-def bristle_decay_partials(xp, deflection, along, speed, grip, elasto_plastic, breakaway_ratio):
+def bristle_decay_partials(xp, deflection, along, speed, grip, law):
     """`k` and its partial derivatives with respect to `deflection`, `along` and `speed` (to `grip`: k/grip)."""
-    alpha = slip_fraction(xp, deflection, breakaway_ratio)
-    slope = slip_fraction_slope(xp, deflection, breakaway_ratio)
+    alpha = slip_fraction(xp, deflection, law.breakaway_ratio)
+    slope = slip_fraction_slope(xp, deflection, law.breakaway_ratio)
     stretch = 0.5 * (speed + along) * grip
     half = 0.5 * alpha * grip
-    elastic = elasto_plastic > 0.0
-    k = xp.where(elastic, alpha * stretch, speed * grip)
+    elastic = law.elasto_plastic > 0.0
+    k = xp.where(elastic, alpha * stretch, (speed + law.creep_speed) * grip)
     return k, xp.where(elastic, slope * stretch, 0.0), xp.where(elastic, half, 0.0), xp.where(elastic, half, grip)
 
 
-def traction(z, zdot, velocity, sigma_0, sigma_1, sigma_2):
+def traction(z, zdot, velocity, law):
     """Friction per unit normal load on the moving body, `-(sigma_0 z + sigma_1 zdot + sigma_2 v)`, per component."""
-    return -(sigma_0 * z + sigma_1 * zdot + sigma_2 * velocity)
+    return -(law.sigma_0 * z + law.sigma_1 * zdot + law.sigma_2 * velocity)
 
 
 def mean_decay(start, end, dt):
@@ -98,13 +124,13 @@ def relaxation(xp, decay_dt):
     return remaining, xp.where(decay_dt > 1e-3, (1.0 - remaining) / safe, series)
 
 
-def reachable_deflection(xp, deflection, elasto_plastic):
+def reachable_deflection(xp, deflection, law):
     """Largest `|z|/z_max` that a step may end with: an elasto-plastic bristle never grows past `max(|z|, z_max)`.
 
     The exact solution stays in that ball, so bringing a step back onto it cannot enlarge the error. Plain LuGre needs
     no bound: its step is exact.
     """
-    return xp.where(elasto_plastic > 0.0, xp.maximum(deflection, 1.0), math.inf)
+    return xp.where(law.elasto_plastic > 0.0, xp.maximum(deflection, 1.0), math.inf)
 
 
 def cap(xp, deflection, largest):
@@ -116,23 +142,23 @@ def cap(xp, deflection, largest):
 # ---------------------------------------------------------------------- moments of the bristles
 
 
-def slip_share(xp, deflection, cosine, evenness, elasto_plastic, breakaway_ratio):
+def slip_share(xp, deflection, cosine, evenness, law):
     """Closure `beta` [-] of the moment equation, from `|z|/|z_ss|` and the cosine of the angle between z and z_ss.
 
     `alpha (1 + cos)/2` for elasto-plastic bristles, 1 for plain LuGre: that of a single bristle, but for an earlier
     breakaway `s_ba evenness`. `evenness = <v^2>/sqrt(<v^4>)`, over the cells' speeds, is 1 in translation; the less
     even, the further the fastest cells are ahead of the mean and the earlier they slip.
     """
-    alpha = slip_fraction(xp, deflection, breakaway_ratio * evenness)
-    return xp.where(elasto_plastic > 0.0, 0.5 * alpha * (1.0 + cosine), 1.0)
+    alpha = slip_fraction(xp, deflection, law.breakaway_ratio * evenness)
+    return xp.where(law.elasto_plastic > 0.0, 0.5 * alpha * (1.0 + cosine), 1.0)
 
 
-def slip_share_partials(xp, deflection, cosine, evenness, elasto_plastic, breakaway_ratio):
+def slip_share_partials(xp, deflection, cosine, evenness, law):
     """`slip_share` and its partial derivatives by `deflection`, `cosine` and the breakaway `s_ba evenness`."""
-    breakaway = breakaway_ratio * evenness
+    breakaway = law.breakaway_ratio * evenness
     alpha = slip_fraction(xp, deflection, breakaway)
     half = 0.5 * (1.0 + cosine)
-    elastic = elasto_plastic > 0.0
+    elastic = law.elasto_plastic > 0.0
     slope = xp.where(elastic, slip_fraction_slope(xp, deflection, breakaway) * half, 0.0)
     return (
         xp.where(elastic, alpha * half, 1.0),
@@ -162,16 +188,16 @@ def floored_by_least(xp, value, least):
 # ---------------------------------------------------------------------- derivatives of a step
 
 
-def stribeck_partials(xp, speed, mu_c, mu_s, v_s, gamma):
+def stribeck_partials(xp, speed, law):
     """`g` and its partial derivatives with respect to `speed` (as `stribeck_slope`), `mu_c`, `mu_s`, `v_s`, `gamma`."""
-    ratio = speed * (1.0 / v_s)
-    raised = xp.power(ratio, gamma)
+    ratio = speed * (1.0 / law.v_s)
+    raised = xp.power(ratio, law.gamma)
     share = xp.exp(-raised)
-    by_raised = -(mu_s - mu_c) * share
+    by_raised = -(law.mu_s - law.mu_c) * share
     safe = xp.where(ratio > 0.0, ratio, 1.0)
-    steepness = xp.where(ratio > 0.0, raised / safe, xp.where(gamma == 1.0, 1.0, 0.0))
-    by_speed = by_raised * gamma * (1.0 / v_s) * steepness
-    return mu_c - by_raised, by_speed, 1.0 - share, share, -by_speed * ratio, by_raised * raised * xp.log(safe)
+    steepness = xp.where(ratio > 0.0, raised / safe, xp.where(law.gamma == 1.0, 1.0, 0.0))
+    by_speed = by_raised * law.gamma * (1.0 / law.v_s) * steepness
+    return law.mu_c - by_raised, by_speed, 1.0 - share, share, -by_speed * ratio, by_raised * raised * xp.log(safe)
 
 
 def bristle_decay_by_breakaway(xp, k_deflection, deflection, breakaway_ratio):

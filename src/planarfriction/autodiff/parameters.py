@@ -9,8 +9,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels import moments_rollout, reduced_adjoint, reduced_rollout
-from planarfriction.kernels.law import law_numbers
+from planarfriction.kernels import published_adjoint, published_rollout, reduced_rollout
 from planarfriction.models import ReducedModel, ReducedModelPublished
 from planarfriction.patch.metric import refuse_anisotropy
 
@@ -49,21 +48,21 @@ class Family(NamedTuple):
 
 PUBLISHED = Family(
     PARAMETERS,
-    np.array([0, 1, 2, 3, 4, 5, 6, 8, 11, 12, 9, 10]),  # 7 says which bristles these are
-    reduced_rollout.rollout,
-    reduced_rollout.gradient,
-    reduced_adjoint.sensitivities,
+    np.array([0, 1, 2, 3, 4, 5, 6, 8, 12, 13, 10, 11]),  # 7 says which bristles these are, 9 is no parameter
+    published_rollout.rollout,
+    published_rollout.gradient,
+    published_adjoint.sensitivities,
 )
-"""`ReducedModelPublished`, rows as in `kernels.reduced_adjoint`."""
+"""`ReducedModelPublished`, rows as in `kernels.published_adjoint`."""
 
 MOMENTS = Family(
     tuple(name for name in PARAMETERS[:8] if name != "gamma"),
     np.array([0, 1, 2, 3, 4, 5, 8]),
-    moments_rollout.rollout,
-    moments_rollout.gradient,
-    moments_rollout.sensitivities,
+    reduced_rollout.rollout,
+    reduced_rollout.gradient,
+    reduced_rollout.sensitivities,
 )
-"""`ReducedModel`, rows as in `kernels.moments_rollout`; gamma and the shape are built into its stored map."""
+"""`ReducedModel`, rows as in `kernels.reduced_rollout`; gamma and the shape are built into its stored map."""
 
 
 class Packed(NamedTuple):
@@ -128,7 +127,7 @@ def _packed(model: Any) -> Packed:
         )
     refuse_anisotropy(model.patch, "derivatives of roll-outs")
     shape = model.shape_at(1.0)
-    row = np.array([*law_numbers(model.law), *shape.numbers])
+    row = np.array([*model.law.numbers, *shape.numbers])
     if family is MOMENTS:
         return Packed(row, np.zeros(3, dtype=int), shape.data, family)
     numbers = shape.surface.numbers

@@ -53,22 +53,25 @@ def ratios(errors: Errors) -> dict[str, dict[str, float]]:
 
 def step_costs(shape: str = "Circle") -> dict[str, Any]:
     """Median time of a step in a compiled loop [s] of both reduced models, in turns, and the median of their ratios."""
-    from planarfriction.kernels import moments, reduced
-    from planarfriction.kernels.law import law_row
+    from planarfriction.kernels import published, reduced
 
     patch = PUBLISHED_PATCHES[shape]()
     directions = np.random.default_rng(7).normal(size=(STEPS, 3)) * [1.0, 1.0, 150.0]
     twists = directions * 10.0 ** np.random.default_rng(8).uniform(-4.0, -1.5, size=(STEPS, 1))
     wrench, fixed = np.empty_like(twists), (twists, 1.0, 1e-4)
-    published, ours = ReducedModelPublished(patch, LAW), ReducedModel(patch, LAW)
-    numbers, shape_now = published.shape_at(1.0).surface.numbers, published.shape_at(1.0)
+    theirs, ours = ReducedModelPublished(patch, LAW).shape_at(1.0), ReducedModel(patch, LAW).shape_at(1.0)
+    numbers, law = theirs.surface.numbers, np.array(LAW.numbers)
     stored = np.array([numbers.kind, 0, numbers.size])
     loops = {
-        "reduced": lambda z: reduced.step_sequence(
-            law_row(LAW), shape_now.numbers, stored, numbers.data, z, *fixed, wrench
-        ),
-        "moments": lambda z: moments.step_sequence(
-            law_row(LAW), ours.shape_at(1.0).numbers, np.zeros(3, int), ours.shape_at(1.0).data, z, *fixed, wrench
+        "reduced": lambda z: published.step_sequence(law, theirs.numbers, stored, numbers.data, z, *fixed, wrench),
+        "moments": lambda z: reduced.step_sequence(
+            np.array(LAW.numbers),
+            ours.shape_at(1.0).numbers,
+            np.zeros(3, int),
+            ours.shape_at(1.0).data,
+            z,
+            *fixed,
+            wrench,
         ),
     }
     times: dict[str, list[float]] = {name: [] for name in loops}

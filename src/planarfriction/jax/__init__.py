@@ -13,8 +13,8 @@ except ImportError as error:
     raise MissingExtraError("jax", "jax") from error
 
 from planarfriction.jax.distributed import DistributedPlanarLuGre, distributed
-from planarfriction.jax.moments import MomentParameters, MomentPlanarLuGre, moments
-from planarfriction.jax.reduced import Parameters, ReducedPlanarLuGre, Surface, reduced
+from planarfriction.jax.published import Parameters, ReducedPlanarLuGre, Surface, reduced
+from planarfriction.jax.reduced import MomentParameters, MomentPlanarLuGre, moments
 from planarfriction.jax.rollouts import Rollout, rate, rest, simulate, step, wrench
 
 __all__ = [

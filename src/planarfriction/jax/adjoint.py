@@ -13,7 +13,8 @@ from jax.custom_derivatives import SymbolicZero
 from planarfriction import autodiff
 from planarfriction.autodiff.parameters import Packed
 from planarfriction.errors import InvalidValueError
-from planarfriction.jax.reduced import ReducedPlanarLuGre
+from planarfriction.jax.published import ReducedPlanarLuGre
+from planarfriction.kernels.published_adjoint import NUMBERS
 
 
 class _Kind(NamedTuple):
@@ -107,7 +108,7 @@ def _by_contact(run, arrays, dtype):
 
 
 def _packed(kind: _Kind, data: np.ndarray) -> Packed:
-    row = np.zeros(13)
+    row = np.zeros(NUMBERS)
     row[7] = float(kind.elasto_plastic)
     return Packed(row, np.array([kind.surface, 0, kind.size]), np.ascontiguousarray(data))
 

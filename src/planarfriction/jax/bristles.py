@@ -11,6 +11,7 @@ from typing import NamedTuple
 import jax.numpy as jnp
 
 from planarfriction import formulas
+from planarfriction.formulas import LawNumbers
 from planarfriction.jax import namespace as xp
 
 ROUNDING = 256.0
@@ -33,15 +34,21 @@ class Drive(NamedTuple):
     """`sigma_0/g(speed)` [1/m]."""
 
 
-def grip(law, speed):
-    """`sigma_0/g(v)` [1/m] for any record with the parameters of `LuGre`."""
-    return law.sigma_0 / formulas.stribeck(xp, speed, law.mu_c, law.mu_s, law.v_s, law.gamma)
+def law_of(parameters, elasto_plastic: bool) -> LawNumbers:
+    """The law of a record that has its parameters by name."""
+    named = {name: getattr(parameters, name) for name in LawNumbers._fields[:7]}
+    return LawNumbers(**named, elasto_plastic=float(elasto_plastic), breakaway_ratio=parameters.breakaway_ratio)
 
 
-def decay(law, elasto_plastic: bool, z, drive: Drive, axis: int):
+def grip(law: LawNumbers, speed):
+    """`sigma_0/g(v)` [1/m]."""
+    return law.sigma_0 / formulas.stribeck(xp, speed, law)
+
+
+def decay(law: LawNumbers, z, drive: Drive, axis: int):
     """Rate `k` [1/s] of `zdot = u - k z`."""
     length = xp.norm(z, axis)
-    return _decay(law, elasto_plastic, length * drive.grip / drive.h_norm, _along(z, length, drive, axis), drive)
+    return _decay(law, length * drive.grip / drive.h_norm, _along(z, length, drive, axis), drive)
 
 
 def _along(z, length, drive: Drive, axis: int):
@@ -49,30 +56,28 @@ def _along(z, length, drive: Drive, axis: int):
     return jnp.sum(xp.unit(z, length, axis) * drive.u, axis=axis) / drive.h_norm
 
 
-def _decay(law, elasto_plastic: bool, deflection, along, drive: Drive):
-    elastic = 1.0 if elasto_plastic else 0.0
-    return formulas.bristle_decay(xp, deflection, along, drive.speed, drive.grip, elastic, law.breakaway_ratio)
+def _decay(law: LawNumbers, deflection, along, drive: Drive):
+    return formulas.bristle_decay(xp, deflection, along, drive.speed, drive.grip, law)
 
 
-def advance(law, elasto_plastic: bool, z, drive: Drive, dt, axis: int):
+def advance(law: LawNumbers, z, drive: Drive, dt, axis: int):
     """The bristle after `dt` [s] at a held drive (see `formulas.relaxation`), and `k` there."""
-    elastic = 1.0 if elasto_plastic else 0.0
     to_deflection = drive.grip / drive.h_norm
 
     def wide(value):
         return jnp.expand_dims(value, axis)
 
     start_deflection = xp.norm(z, axis) * to_deflection
-    start = decay(law, elasto_plastic, z, drive, axis)
+    start = decay(law, z, drive, axis)
     predicted = z + drive.u * wide(dt)  # times 1/(1 + k dt), which leaves the direction
     length = xp.norm(predicted, axis)
     deflection = xp.minimum(length * to_deflection / (1.0 + start * dt), xp.maximum(start_deflection, 1.0))
-    end = _decay(law, elasto_plastic, deflection, _along(predicted, length, drive, axis), drive)
+    end = _decay(law, deflection, _along(predicted, length, drive, axis), drive)
     left, mean = formulas.relaxation(xp, formulas.mean_decay(start, end, dt) * dt)
     z = z * wide(left) + drive.u * wide(dt * mean)
-    largest = formulas.reachable_deflection(xp, start_deflection, elastic)
+    largest = formulas.reachable_deflection(xp, start_deflection, law)
     z = z * wide(_back(xp.norm(z, axis) * to_deflection, largest))
-    return z, decay(law, elasto_plastic, z, drive, axis)
+    return z, decay(law, z, drive, axis)
 
 
 def _back(deflection, largest):

@@ -14,7 +14,6 @@ from planarfriction import formulas
 from planarfriction.errors import InvalidValueError
 from planarfriction.jax import bristles
 from planarfriction.jax import namespace as xp
-from planarfriction.kernels.law import law_numbers
 from planarfriction.laws import LuGre
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.metric import refuse_anisotropy
@@ -60,7 +59,7 @@ class DistributedPlanarLuGre:
     def rate(self, z, twist, load) -> jax.Array:
         """Bristle rates `[..., 2, N]` [m/s]; they do not depend on the load."""
         drive = self._drive(twist)
-        return drive.u - bristles.decay(self.parameters, self.elasto_plastic, z, drive, -2)[..., None, :] * z
+        return drive.u - bristles.decay(self._law, z, drive, -2)[..., None, :] * z
 
     def wrench(self, z, twist, load) -> jax.Array:
         """Friction wrench on the moving body about the contact frame's origin, `[..., 3]` [N, N, N m]."""
@@ -71,7 +70,7 @@ class DistributedPlanarLuGre:
         """State and wrench after `dt` [s] at a held twist; a contact without load forgets its state."""
         drive = self._drive(twist)
         load, dt = jnp.asarray(load), jnp.asarray(dt)
-        z, k = bristles.advance(self.parameters, self.elasto_plastic, z, drive, dt[..., None], -2)
+        z, k = bristles.advance(self._law, z, drive, dt[..., None], -2)
         wrench = self._unit_wrench(z, drive.u - k[..., None, :] * z, drive.u)
         return jnp.where(load[..., None, None] > 0.0, z, 0.0), load[..., None] * wrench
 
@@ -82,15 +81,19 @@ class DistributedPlanarLuGre:
         vx, vy, omega = (twist[..., i, None] for i in range(3))
         return jnp.stack([vx - omega * self.positions[1], vy + omega * self.positions[0]], axis=-2)
 
+    @property
+    def _law(self):
+        return bristles.law_of(self.parameters, self.elasto_plastic)
+
     def _drive(self, twist) -> bristles.Drive:
         u = self._velocity(twist)
         speed = xp.norm(u, -2)
-        return bristles.Drive(u, speed, 1.0, bristles.grip(self.parameters, speed))
+        return bristles.Drive(u, speed, 1.0, bristles.grip(self._law, speed))
 
     def _unit_wrench(self, z, rate, velocity):
         """Wrench per unit load."""
-        p, (x, y) = self.parameters, self.positions
-        force = self.weights * formulas.traction(z, rate, velocity, p.sigma_0, p.sigma_1, p.sigma_2)
+        x, y = self.positions
+        force = self.weights * formulas.traction(z, rate, velocity, self._law)
         fx, fy = force[..., 0, :], force[..., 1, :]
         return jnp.stack([fx.sum(-1), fy.sum(-1), (x * fy - y * fx).sum(-1)], axis=-1)
 
@@ -102,7 +105,7 @@ def distributed(patch: ContactPatch, law: LuGre, normal_force: float | None = No
     if not isinstance(law, LuGre):
         raise InvalidValueError("law", "be a LuGre law", law)
     refuse_anisotropy(patch, "jax.distributed")
-    numbers = law_numbers(law)
+    numbers = law.numbers
     parameters = LawParameters(*(jnp.asarray(getattr(numbers, name), dtype=float) for name in LawParameters._fields))
     weights = np.asarray(patch.weights(normal_force))
     return DistributedPlanarLuGre(

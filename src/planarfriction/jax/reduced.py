@@ -1,28 +1,25 @@
-"""The reduced model as a pytree: three bristles and a limit surface."""
+"""The reduced model of bristle moments as a pytree."""
 
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 
-from planarfriction import formulas
-from planarfriction.jax import bristles
+from planarfriction.errors import InvalidValueError
+from planarfriction.formulas import LawNumbers
 from planarfriction.jax import namespace as xp
-from planarfriction.jax.surfaces import sliding
-from planarfriction.kernels.law import law_numbers
-from planarfriction.laws import LuGre
-from planarfriction.limit_surface import LimitSurface
-from planarfriction.models import ReducedModelPublished
-from planarfriction.patch import ContactPatch
+from planarfriction.models import ReducedModel, reduced_arrays
+from planarfriction.models.reduced_arrays import ReducedNumbers
 from planarfriction.patch.metric import refuse_anisotropy
 
 
-class Parameters(NamedTuple):
-    """Physical parameters of the reduced model, scalars: names and units as in `LuGre` and `ReducedShape`."""
+class MomentParameters(NamedTuple):
+    """Parameters of the law, scalars: names and units as in `LuGre`; not gamma, for which the map is made."""
 
     sigma_0: jax.Array
     sigma_1: jax.Array
@@ -30,42 +27,23 @@ class Parameters(NamedTuple):
     mu_c: jax.Array
     mu_s: jax.Array
     v_s: jax.Array
-    gamma: jax.Array
     breakaway_ratio: jax.Array
     """Unused by plain bristles."""
-    contact_radius: jax.Array
-    """r [m]"""
-    second_moment: jax.Array
-    """<rho^2> [m^2]"""
-    centre_x: jax.Array
-    """Centre of pressure [m]."""
-    centre_y: jax.Array
-
-
-@functools.partial(jax.tree_util.register_dataclass, data_fields=["data"], meta_fields=["kind", "size"])
-@dataclass(frozen=True)
-class Surface:
-    """The numbers of a limit surface over scaled twists (see `planarfriction.kernels.surfaces`)."""
-
-    kind: int
-    size: int
-    data: jax.Array
 
 
 @functools.partial(
-    jax.tree_util.register_dataclass, data_fields=["parameters", "surface"], meta_fields=["elasto_plastic"]
+    jax.tree_util.register_dataclass, data_fields=["parameters", "shape"], meta_fields=["elasto_plastic"]
 )
 @dataclass(frozen=True)
-class ReducedPlanarLuGre:
-    """Reduced LuGre friction (`planarfriction.ReducedModelPublished`) as a pytree.
+class MomentPlanarLuGre:
+    """Reduced LuGre friction of bristle moments (`planarfriction.ReducedModel`) as a pytree.
 
-    `zdot = S h v_n - k z`, `W = -(sigma_0 z + sigma_1 zdot + sigma_2 U V) f_N`. State `(z_x, z_y, z_tau)` [m, m, m^2].
-    Leaves: the parameters and the numbers of the surface, which stay as they are when `contact_radius` changes.
-    Leading axes of state `[..., 3]`, twist `[..., 3]`, load `[...]` and dt broadcast.
+    State `(z_x, z_y, z_theta)` [m]. Leaves: the law's parameters, and the numbers of the patch with its map of steady
+    sliding. Leading axes of state `[..., 3]`, twist `[..., 3]`, load `[...]` and dt broadcast.
     """
 
-    parameters: Parameters
-    surface: Surface
+    parameters: MomentParameters
+    shape: ReducedNumbers
     elasto_plastic: bool = field(default=False)
 
     def rest(self) -> jax.Array:
@@ -73,73 +51,41 @@ class ReducedPlanarLuGre:
         return jnp.zeros(3, self.parameters.sigma_0.dtype)
 
     def rate(self, z, twist, load) -> jax.Array:
-        """Bristle rates `[..., 3]` [m/s, m/s, m^2/s]; they do not depend on the load."""
-        drive, scale, _ = self._drive(twist)
-        z = z / scale
-        k = bristles.decay(self.parameters, self.elasto_plastic, z, drive, -1)
-        return scale * (drive.u - k[..., None] * z)
+        """Rates of the moments `[..., 3]` [m/s]; they do not depend on the load."""
+        return reduced_arrays.rate(xp, self._law, z, self._held(twist))
 
     def wrench(self, z, twist, load) -> jax.Array:
         """Friction wrench on the moving body about the contact frame's origin, `[..., 3]` [N, N, N m]."""
-        drive, scale, centred = self._drive(twist)
-        k = bristles.decay(self.parameters, self.elasto_plastic, z / scale, drive, -1)
-        return jnp.asarray(load)[..., None] * self._unit_wrench(z, scale * drive.u - k[..., None] * z, centred)
+        by = self._held(twist)
+        rate = reduced_arrays.rate(xp, self._law, z, by)
+        return jnp.asarray(load)[..., None] * reduced_arrays.wrench(xp, self._law, self.shape, z, rate, by.u)
 
     def step(self, z, twist, load, dt) -> tuple[jax.Array, jax.Array]:
         """State and wrench after `dt` [s] at a held twist; a contact without load forgets its state."""
-        drive, scale, centred = self._drive(twist)
-        load, dt = jnp.asarray(load), jnp.asarray(dt)
-        z, k = bristles.advance(self.parameters, self.elasto_plastic, z / scale, drive, dt, -1)
-        wrench = self._unit_wrench(scale * z, scale * (drive.u - k[..., None] * z), centred)
-        loaded = load[..., None] > 0.0
-        return jnp.where(loaded, scale * z, 0.0), load[..., None] * wrench
+        by = self._held(twist)
+        load, dt = jnp.asarray(load)[..., None], jnp.asarray(dt)[..., None]
+        new, rate = reduced_arrays.advance(xp, self._law, z, by, dt, float(jnp.finfo(by.u.dtype).eps))
+        wrench = reduced_arrays.wrench(xp, self._law, self.shape, new, rate, by.u)
+        return jnp.where(load > 0.0, new, 0.0), load * wrench
 
-    # ------------------------------------------------------------------ inside
+    @property
+    def _law(self) -> LawNumbers:
+        elastic = float(self.elasto_plastic)
+        return LawNumbers(**self.parameters._asdict(), gamma=math.nan, elasto_plastic=elastic)
 
-    def _drive(self, twist):
-        """Drive, diagonal of S, and the twist at the centre of pressure."""
-        p = self.parameters
-        vx, vy, omega = twist[..., 0], twist[..., 1], twist[..., 2]
-        centred = jnp.stack([vx - omega * p.centre_y, vy + omega * p.centre_x, omega], axis=-1)
-        one = jnp.ones_like(p.contact_radius)
-        scale = jnp.stack([one, one, p.contact_radius])
-        scaled = scale * centred
-        speed = xp.norm(scaled, -1)
-        u = sliding(self.surface.kind, self.surface.size, self.surface.data, scaled)
-        moving = speed > 0.0
-        h_norm = jnp.where(moving, xp.norm(u, -1) / jnp.where(moving, speed, 1.0), 1.0)
-        return bristles.Drive(u, speed, h_norm, bristles.grip(p, speed)), scale, centred
-
-    def _unit_wrench(self, z, rate, centred):
-        """Wrench per unit load about the origin."""
-        p = self.parameters
-        one = jnp.ones_like(p.second_moment)
-        velocity = centred * jnp.stack([one, one, p.second_moment])
-        fx, fy, tau = jnp.moveaxis(formulas.traction(z, rate, velocity, p.sigma_0, p.sigma_1, p.sigma_2), -1, 0)
-        return jnp.stack([fx, fy, tau + p.centre_x * fy - p.centre_y * fx], axis=-1)
+    def _held(self, twist) -> reduced_arrays.Held:
+        return reduced_arrays.held(xp, self._law, self.shape, twist)
 
 
-def reduced(patch: ContactPatch, law: LuGre, surface: LimitSurface | None = None) -> ReducedPlanarLuGre:
-    """The reduced model of a patch; `surface` None takes the published table.
+def moments(model: ReducedModel, normal_force: float | None = None) -> MomentPlanarLuGre:
+    """A `ReducedModel` as a pytree, in the default precision of JAX.
 
-    A patch whose shape depends on the load needs a surface with its `normal_force`, and keeps that shape.
+    One whose shape depends on the load keeps that of `normal_force` [N].
     """
-    model = ReducedModelPublished(patch, law) if surface is None else ReducedModelPublished(patch, law, surface=surface)
-    return of_model(model)
-
-
-def of_model(model: ReducedModelPublished) -> ReducedPlanarLuGre:
-    """A model of NumPy as a pytree, in the default precision of JAX."""
+    if not isinstance(model, ReducedModel):
+        raise InvalidValueError("model", "be a ReducedModel", type(model).__name__)
     refuse_anisotropy(model.patch, "jax.reduced")
-    shape, law = model._reference, law_numbers(model.law)
-    kind, size, data = shape.surface.numbers
-    centre_x, centre_y = shape.centre_of_pressure
-    values = {
-        **law._asdict(),
-        "contact_radius": shape.contact_radius,
-        "second_moment": shape.second_moment,
-        "centre_x": centre_x,
-        "centre_y": centre_y,
-    }
-    parameters = Parameters(*(jnp.asarray(values[name], dtype=float) for name in Parameters._fields))
-    return ReducedPlanarLuGre(parameters, Surface(kind, size, jnp.asarray(data)), law.elasto_plastic > 0.0)
+    law = model.law.numbers
+    parameters = MomentParameters(*(jnp.asarray(getattr(law, n), dtype=float) for n in MomentParameters._fields))
+    shape = reduced_arrays.numbers_of(model.shape_at(normal_force))
+    return MomentPlanarLuGre(parameters, ReducedNumbers(*map(jnp.asarray, shape)), law.elasto_plastic > 0.0)

@@ -10,8 +10,8 @@ import jax.numpy as jnp
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.jax.distributed import DistributedPlanarLuGre
-from planarfriction.jax.moments import MomentPlanarLuGre
-from planarfriction.jax.reduced import ReducedPlanarLuGre
+from planarfriction.jax.published import ReducedPlanarLuGre
+from planarfriction.jax.reduced import MomentPlanarLuGre
 
 Model = MomentPlanarLuGre | ReducedPlanarLuGre | DistributedPlanarLuGre
 

@@ -44,15 +44,15 @@ def evaluate(law, z, vx, vy, omega, cells, w, zdot):
     for i in range(n):
         ux, uy = _seen(cells, i, vx, vy, omega)
         speed = math.sqrt(ux * ux + uy * uy)
-        q = grip(law, law.gamma, speed)
+        q = grip(law, speed)
         hx, hy = z[i] - cells[5, i] / q, z[n + i] - cells[6, i] / q
         norm = math.sqrt(hx * hx + hy * hy)
         along = (hx * ux + hy * uy) / xp.where(norm > 0.0, norm, 1.0)
-        k = formulas.bristle_decay(xp, norm * q, along, speed, q, law.elasto_plastic, law.breakaway_ratio)
+        k = formulas.bristle_decay(xp, norm * q, along, speed, q, law)
         zdot[i] = ux - k * hx
         zdot[n + i] = uy - k * hy
-        tx = w[i] * formulas.traction(z[i], zdot[i], ux, law.sigma_0, law.sigma_1, law.sigma_2)
-        ty = w[i] * formulas.traction(z[n + i], zdot[n + i], uy, law.sigma_0, law.sigma_1, law.sigma_2)
+        tx = w[i] * formulas.traction(z[i], zdot[i], ux, law)
+        ty = w[i] * formulas.traction(z[n + i], zdot[n + i], uy, law)
         wx, wy, wt = _wrench(cells, i, tx, ty)
         fx += wx
         fy += wy
@@ -68,17 +68,15 @@ def linearise(law, z, vx, vy, omega, cells, lin):
         ux, uy = _seen(cells, i, vx, vy, omega)
         speed = math.sqrt(ux * ux + uy * uy)
         per_speed = 1.0 / xp.where(speed > 0.0, speed, 1.0)
-        q = grip(law, law.gamma, speed)
-        q_slope = grip_slope(law, law.gamma, speed, q)
+        q = grip(law, speed)
+        q_slope = grip_slope(law, speed, q)
         ax, ay = cells[5, i] / q, cells[6, i] / q
         hx, hy = z[i] - ax, z[n + i] - ay
         norm = math.sqrt(hx * hx + hy * hy)
         per_norm = 1.0 / xp.where(norm > 0.0, norm, 1.0)
         ex, ey = hx * per_norm, hy * per_norm
         along = ex * ux + ey * uy
-        k, k_deflection, k_along, k_speed = formulas.bristle_decay_partials(
-            xp, norm * q, along, speed, q, law.elasto_plastic, law.breakaway_ratio
-        )
+        k, k_deflection, k_along, k_speed = formulas.bristle_decay_partials(xp, norm * q, along, speed, q, law)
         k_grip = k_deflection * norm + k / q
         turn = k_along * per_norm
         kzx = k_deflection * q * ex + turn * (ux - along * ex)

@@ -1,4 +1,4 @@
-"""One step of one bristle, differentiated: what `reduced.step` and `distributed.step` do with a bristle, backwards.
+"""One step of one bristle, differentiated: what `published.step` and `distributed.step` do with a bristle, backwards.
 
 A bristle `z` driven by `u` (three components; a cell of the distributed model leaves the third zero) steps by
 
@@ -83,9 +83,7 @@ def _place(zx, zy, zs, ux, uy, us, per_h):
 
 @inlined
 def _stage(law, place, deflection, v, q):
-    k, k_deflection, k_along, k_speed = formulas.bristle_decay_partials(
-        xp, deflection, place[5], v, q, law.elasto_plastic, law.breakaway_ratio
-    )
+    k, k_deflection, k_along, k_speed = formulas.bristle_decay_partials(xp, deflection, place[5], v, q, law)
     # exactly zero at full deflection: the prediction multiplies it by how far it would have gone, 1e9 in a long step
     k_deflection = xp.where(deflection < 1.0, k_deflection, 0.0)
     k_breakaway = formulas.bristle_decay_by_breakaway(xp, k_deflection, deflection, law.breakaway_ratio)
@@ -114,7 +112,7 @@ def linearise(law, zx, zy, zs, ux, uy, us, v, per_h, q, dt):
     push = dt * mean
     nx, ny, ns = left * zx + push * ux, left * zy + push * uy, left * zs + push * us
     place = _place(nx, ny, ns, ux, uy, us, per_h)
-    largest = formulas.reachable_deflection(xp, deflection, law.elasto_plastic)
+    largest = formulas.reachable_deflection(xp, deflection, law)
     capped = place[3] * to_deflection > _ROUNDING * largest
     back = formulas.cap(xp, place[3] * to_deflection, largest)
     end = _stage(law, place, place[3] * back * to_deflection, v, q)

@@ -12,10 +12,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction.kernels import anisotropic, distributed, inlined, moments, reduced
+from planarfriction.kernels import anisotropic, distributed, inlined, published, reduced
 from planarfriction.kernels.law import law_of
 
-DISTRIBUTED, REDUCED, ANISOTROPIC, MOMENTS = 0, 1, 2, 3
+DISTRIBUTED, PUBLISHED, ANISOTROPIC, REDUCED = 0, 1, 2, 3
 WORLD, BODY, BODY_AXES = 0, 1, 2
 """Fixed to the world; fixed to the body; fixed to a body whose prescribed velocity is given in its own axes."""
 
@@ -24,9 +24,9 @@ class Contacts(NamedTuple):
     """C contacts and the R shapes they take, in flat arrays."""
 
     kind: np.ndarray
-    """`DISTRIBUTED`, `REDUCED`, `ANISOTROPIC` (distributed) or `MOMENTS`, int [C]."""
+    """`DISTRIBUTED`, `PUBLISHED`, `ANISOTROPIC` (distributed) or `REDUCED`, int [C]."""
     law: np.ndarray
-    """Numbers of the law, [C, 9]."""
+    """Numbers of the law, a row each."""
     mount: np.ndarray
     """`WORLD`, `BODY` or `BODY_AXES`, int [C]."""
     place: np.ndarray
@@ -46,10 +46,10 @@ class Contacts(NamedTuple):
     weight_start: np.ndarray
     """Where the weights of each shape begin, int [R]."""
     shape: np.ndarray
-    """Numbers of each shape, [R, 7]: as `kernels.moments` reads them, or as `kernels.reduced` (4) with the root of
+    """Numbers of each shape, [R, 7]: as `kernels.reduced` reads them, or as `kernels.published` (4) with the root of
     the metric (xx, xy, yy)."""
     surface: np.ndarray
-    """Of each shape, int [R, 3]: limit surface (kind, start, size), maps of `kernels.moments` (start, other), or the
+    """Of each shape, int [R, 3]: limit surface (kind, start, size), maps of `kernels.reduced` (start, other), or the
     anisotropic cells (0, start, n)."""
     data: np.ndarray
     """Numbers of the limit surfaces and maps, and of the anisotropic cells (see `kernels.anisotropic`), flat."""
@@ -101,14 +101,14 @@ def evaluate(contacts, c, row, z, v, zdot, w):
     elif contacts.kind[c] == ANISOTROPIC:
         cells, weights = _anisotropic_cells(contacts, c, row)
         w[0], w[1], w[2] = anisotropic.evaluate(law, z, v[0], v[1], v[2], cells, weights, zdot)
-    elif contacts.kind[c] == MOMENTS:
-        w[0], w[1], w[2] = moments.evaluate(
+    elif contacts.kind[c] == REDUCED:
+        w[0], w[1], w[2] = reduced.evaluate(
             law, z, v[0], v[1], v[2], contacts.shape[row], contacts.surface[row], contacts.data, zdot
         )
     else:
         shape = contacts.shape[row]
         vx, vy = _through_root(shape, v[0], v[1])
-        fx, fy, w[2] = reduced.evaluate(law, z, vx, vy, v[2], shape, contacts.surface[row], contacts.data, zdot)
+        fx, fy, w[2] = published.evaluate(law, z, vx, vy, v[2], shape, contacts.surface[row], contacts.data, zdot)
         w[0], w[1] = _through_root(shape, fx, fy)
 
 
@@ -123,12 +123,12 @@ def linearise(contacts, c, row, z, v, lin):
         cells, weights = _anisotropic_cells(contacts, c, row)
         rows = lin.reshape(anisotropic.LINEAR_NUMBERS, weights.shape[0])
         anisotropic.linearise(law, z, v[0], v[1], v[2], cells, rows)
-    elif contacts.kind[c] == MOMENTS:
-        moments.linearise(law, z, v[0], v[1], v[2], contacts.shape[row], contacts.surface[row], contacts.data, lin)
+    elif contacts.kind[c] == REDUCED:
+        reduced.linearise(law, z, v[0], v[1], v[2], contacts.shape[row], contacts.surface[row], contacts.data, lin)
     else:
         shape = contacts.shape[row]
         vx, vy = _through_root(shape, v[0], v[1])
-        reduced.linearise(law, z, vx, vy, v[2], shape, contacts.surface[row], contacts.data, lin)
+        published.linearise(law, z, vx, vy, v[2], shape, contacts.surface[row], contacts.data, lin)
 
 
 @inlined
@@ -142,11 +142,11 @@ def factor(contacts, c, row, z, shift, lin, stiffness):
         cells, weights = _anisotropic_cells(contacts, c, row)
         rows = lin.reshape(anisotropic.LINEAR_NUMBERS, weights.shape[0])
         anisotropic.factor(law, shift, cells, weights, rows, stiffness)
-    elif contacts.kind[c] == MOMENTS:
-        moments.factor(law, shift, contacts.shape[row], lin, stiffness)
+    elif contacts.kind[c] == REDUCED:
+        reduced.factor(law, shift, contacts.shape[row], lin, stiffness)
     else:
         shape = contacts.shape[row]
-        reduced.factor(law, shift, shape, lin, stiffness)
+        published.factor(law, shift, shape, lin, stiffness)
         for i in range(3):
             stiffness[i, 0], stiffness[i, 1] = _through_root(shape, stiffness[i, 0], stiffness[i, 1])
         for i in range(3):
@@ -164,11 +164,11 @@ def eliminate(contacts, c, row, z, shift, r, lin, w):
         cells, weights = _anisotropic_cells(contacts, c, row)
         rows = lin.reshape(anisotropic.LINEAR_NUMBERS, weights.shape[0])
         w[0], w[1], w[2] = anisotropic.eliminate(law, shift, r, cells, weights, rows)
-    elif contacts.kind[c] == MOMENTS:
-        w[0], w[1], w[2] = moments.eliminate(law, shift, r, contacts.shape[row], lin)
+    elif contacts.kind[c] == REDUCED:
+        w[0], w[1], w[2] = reduced.eliminate(law, shift, r, contacts.shape[row], lin)
     else:
         shape = contacts.shape[row]
-        fx, fy, w[2] = reduced.eliminate(law, shift, r, shape, lin)
+        fx, fy, w[2] = published.eliminate(law, shift, r, shape, lin)
         w[0], w[1] = _through_root(shape, fx, fy)
 
 
@@ -182,12 +182,12 @@ def back_substitute(contacts, c, row, z, r, v, lin, out):
         cells, weights = _anisotropic_cells(contacts, c, row)
         rows = lin.reshape(anisotropic.LINEAR_NUMBERS, weights.shape[0])
         anisotropic.back_substitute(r, v[0], v[1], v[2], cells, rows, out)
-    elif contacts.kind[c] == MOMENTS:
-        moments.back_substitute(r, v[0], v[1], v[2], contacts.shape[row], lin, out)
+    elif contacts.kind[c] == REDUCED:
+        reduced.back_substitute(r, v[0], v[1], v[2], contacts.shape[row], lin, out)
     else:
         shape = contacts.shape[row]
         vx, vy = _through_root(shape, v[0], v[1])
-        reduced.back_substitute(r, vx, vy, v[2], shape, lin, out)
+        published.back_substitute(r, vx, vy, v[2], shape, lin, out)
 
 
 @inlined

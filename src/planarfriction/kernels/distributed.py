@@ -6,8 +6,7 @@ twist. The bristle equation and its linearisation, with `k = bristle_decay`:
     zdot = v - k z,      d zdot/dz = -k I - z (x) k_z,      d zdot/dv = I - z (x) k_v
 
 so that `D = 1/(h gamma) I - d zdot/dz` is a multiple of the identity plus a rank-one term and has a closed inverse.
-Every function is linear in the number of cells. The law's exponent is passed apart, as a constant where it is 2: the
-compiler then drops the general power from the loop.
+Every function is linear in the number of cells.
 """
 
 from __future__ import annotations
@@ -17,11 +16,11 @@ import math
 from planarfriction import formulas
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import inlined, jit, kernel
-from planarfriction.kernels.law import grip, grip_slope
+from planarfriction.kernels.law import grip, grip_slope, squared
 
 
 @inlined
-def _evaluate(gamma, law, z, vx, vy, omega, x, y, w, zdot):
+def _evaluate(law, z, vx, vy, omega, x, y, w, zdot):
     n = x.shape[0]
     zx, zy, dx, dy = z[:n], z[n:], zdot[:n], zdot[n:]
     fx, fy, tau = 0.0, 0.0, 0.0
@@ -30,12 +29,12 @@ def _evaluate(gamma, law, z, vx, vy, omega, x, y, w, zdot):
         speed = math.sqrt(ux * ux + uy * uy)
         z_norm = math.sqrt(zx[i] * zx[i] + zy[i] * zy[i])
         along = (zx[i] * ux + zy[i] * uy) / xp.where(z_norm > 0.0, z_norm, 1.0)
-        q = grip(law, gamma, speed)
-        k = formulas.bristle_decay(xp, z_norm * q, along, speed, q, law.elasto_plastic, law.breakaway_ratio)
+        q = grip(law, speed)
+        k = formulas.bristle_decay(xp, z_norm * q, along, speed, q, law)
         dx[i] = ux - k * zx[i]
         dy[i] = uy - k * zy[i]
-        tx = w[i] * formulas.traction(zx[i], dx[i], ux, law.sigma_0, law.sigma_1, law.sigma_2)
-        ty = w[i] * formulas.traction(zy[i], dy[i], uy, law.sigma_0, law.sigma_1, law.sigma_2)
+        tx = w[i] * formulas.traction(zx[i], dx[i], ux, law)
+        ty = w[i] * formulas.traction(zy[i], dy[i], uy, law)
         fx += tx
         fy += ty
         tau += x[i] * ty - y[i] * tx
@@ -46,12 +45,12 @@ def _evaluate(gamma, law, z, vx, vy, omega, x, y, w, zdot):
 def evaluate(law, z, vx, vy, omega, x, y, w, zdot):
     """Write the bristle rates into `zdot` and return the wrench `(fx, fy, tau)`."""
     if law.gamma == 2.0:
-        return _evaluate(2.0, law, z, vx, vy, omega, x, y, w, zdot)
-    return _evaluate(law.gamma, law, z, vx, vy, omega, x, y, w, zdot)
+        return _evaluate(squared(law), z, vx, vy, omega, x, y, w, zdot)
+    return _evaluate(law, z, vx, vy, omega, x, y, w, zdot)
 
 
 @inlined
-def _linearise(gamma, law, z, vx, vy, omega, x, y, k, kzx, kzy, kvx, kvy):
+def _linearise(law, z, vx, vy, omega, x, y, k, kzx, kzy, kvx, kvy):
     n = x.shape[0]
     zx, zy = z[:n], z[n:]
     for i in range(n):
@@ -62,13 +61,11 @@ def _linearise(gamma, law, z, vx, vy, omega, x, y, k, kzx, kzy, kvx, kvy):
         per_speed = 1.0 / xp.where(speed > 0.0, speed, 1.0)
         ex, ey = zx[i] * per_z, zy[i] * per_z
         along = ex * ux + ey * uy
-        q = grip(law, gamma, speed)
-        decay, k_deflection, k_along, k_speed = formulas.bristle_decay_partials(
-            xp, z_norm * q, along, speed, q, law.elasto_plastic, law.breakaway_ratio
-        )
+        q = grip(law, speed)
+        decay, k_deflection, k_along, k_speed = formulas.bristle_decay_partials(xp, z_norm * q, along, speed, q, law)
         k_grip = k_deflection * z_norm + decay / q
         k_z_norm = k_deflection * q
-        k_speed_total = (k_speed + k_grip * grip_slope(law, gamma, speed, q)) * per_speed
+        k_speed_total = (k_speed + k_grip * grip_slope(law, speed, q)) * per_speed
         k[i] = decay
         kzx[i] = k_z_norm * ex + k_along * per_z * (ux - along * ex)
         kzy[i] = k_z_norm * ey + k_along * per_z * (uy - along * ey)
@@ -80,9 +77,9 @@ def _linearise(gamma, law, z, vx, vy, omega, x, y, k, kzx, kzy, kvx, kvy):
 def linearise(law, z, vx, vy, omega, x, y, lin):
     """Write `k`, `k_z` and `k_v` of each cell into the rows 0 to 4 of `lin`."""
     if law.gamma == 2.0:
-        _linearise(2.0, law, z, vx, vy, omega, x, y, lin[0], lin[1], lin[2], lin[3], lin[4])
+        _linearise(squared(law), z, vx, vy, omega, x, y, lin[0], lin[1], lin[2], lin[3], lin[4])
     else:
-        _linearise(law.gamma, law, z, vx, vy, omega, x, y, lin[0], lin[1], lin[2], lin[3], lin[4])
+        _linearise(law, z, vx, vy, omega, x, y, lin[0], lin[1], lin[2], lin[3], lin[4])
 
 
 @kernel
@@ -156,22 +153,22 @@ def back_substitute(z, r, vx, vy, omega, x, y, lin, out):
 
 
 @inlined
-def _step(gamma, law, z, vx, vy, omega, x, y, w, dt, out):
+def _step(law, z, vx, vy, omega, x, y, w, dt, out):
     n = x.shape[0]
     zx, zy, ox, oy = z[:n], z[n:], out[:n], out[n:]
     fx, fy, tau = 0.0, 0.0, 0.0
     for i in range(n):  # predicted end, and the mean decay into ox
         ux, uy = vx - omega * y[i], vy + omega * x[i]
         speed = math.sqrt(ux * ux + uy * uy)
-        q = grip(law, gamma, speed)
+        q = grip(law, speed)
         z_norm = math.sqrt(zx[i] * zx[i] + zy[i] * zy[i])
         along = (zx[i] * ux + zy[i] * uy) / xp.where(z_norm > 0.0, z_norm, 1.0)
-        start = formulas.bristle_decay(xp, z_norm * q, along, speed, q, law.elasto_plastic, law.breakaway_ratio)
+        start = formulas.bristle_decay(xp, z_norm * q, along, speed, q, law)
         px, py = zx[i] + ux * dt, zy[i] + uy * dt  # times 1/(1 + k dt), which leaves the direction
         p_norm = math.sqrt(px * px + py * py)
         along = (px * ux + py * uy) / xp.where(p_norm > 0.0, p_norm, 1.0)
         deflection = xp.minimum(p_norm * q / (1.0 + start * dt), xp.maximum(z_norm * q, 1.0))
-        end = formulas.bristle_decay(xp, deflection, along, speed, q, law.elasto_plastic, law.breakaway_ratio)
+        end = formulas.bristle_decay(xp, deflection, along, speed, q, law)
         ox[i] = formulas.mean_decay(start, end, dt)
     for i in range(n):
         ux, uy = vx - omega * y[i], vy + omega * x[i]
@@ -181,16 +178,16 @@ def _step(gamma, law, z, vx, vy, omega, x, y, w, dt, out):
     for i in range(n):
         ux, uy = vx - omega * y[i], vy + omega * x[i]
         speed = math.sqrt(ux * ux + uy * uy)
-        q = grip(law, gamma, speed)
-        largest = formulas.reachable_deflection(xp, math.sqrt(zx[i] * zx[i] + zy[i] * zy[i]) * q, law.elasto_plastic)
+        q = grip(law, speed)
+        largest = formulas.reachable_deflection(xp, math.sqrt(zx[i] * zx[i] + zy[i] * zy[i]) * q, law)
         norm = math.sqrt(ox[i] * ox[i] + oy[i] * oy[i])
         along = (ox[i] * ux + oy[i] * uy) / xp.where(norm > 0.0, norm, 1.0)
         back = formulas.cap(xp, norm * q, largest)
         nx, ny = ox[i] * back, oy[i] * back
-        k = formulas.bristle_decay(xp, norm * q * back, along, speed, q, law.elasto_plastic, law.breakaway_ratio)
+        k = formulas.bristle_decay(xp, norm * q * back, along, speed, q, law)
         ox[i], oy[i] = nx, ny
-        tx = w[i] * formulas.traction(nx, ux - k * nx, ux, law.sigma_0, law.sigma_1, law.sigma_2)
-        ty = w[i] * formulas.traction(ny, uy - k * ny, uy, law.sigma_0, law.sigma_1, law.sigma_2)
+        tx = w[i] * formulas.traction(nx, ux - k * nx, ux, law)
+        ty = w[i] * formulas.traction(ny, uy - k * ny, uy, law)
         fx += tx
         fy += ty
         tau += x[i] * ty - y[i] * tx
@@ -201,8 +198,8 @@ def _step(gamma, law, z, vx, vy, omega, x, y, w, dt, out):
 def step(law, z, vx, vy, omega, x, y, w, dt, out):
     """Advance the bristles by `dt` at a held twist (see `formulas.relaxation`) and return the wrench at the end."""
     if law.gamma == 2.0:
-        return _step(2.0, law, z, vx, vy, omega, x, y, w, dt, out)
-    return _step(law.gamma, law, z, vx, vy, omega, x, y, w, dt, out)
+        return _step(squared(law), z, vx, vy, omega, x, y, w, dt, out)
+    return _step(law, z, vx, vy, omega, x, y, w, dt, out)
 
 
 @jit

@@ -14,7 +14,7 @@ from planarfriction.kernels.law import law_of
 def _cell(law, zx, zy, ux, uy, dt):
     """Linearised step of a cell's bristle; one over its speed; one over its grip; and the slope of the grip."""
     v = math.sqrt(ux * ux + uy * uy)
-    g, by_speed, _, _, _, _ = formulas.stribeck_partials(xp, v, law.mu_c, law.mu_s, law.v_s, law.gamma)
+    g, by_speed, _, _, _, _ = formulas.stribeck_partials(xp, v, law)
     q = law.sigma_0 / g
     step = bristle_step.linearise(law, zx, zy, 0.0, ux, uy, 0.0, v, 1.0, q, dt)
     return step, q, -q / g * by_speed, 1.0 / v if v > 0.0 else 0.0

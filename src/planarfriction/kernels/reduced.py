@@ -1,11 +1,13 @@
-"""The reduced model: one bristle in three dimensions, per unit normal load and about the contact frame's origin.
+"""Moments of the bristles of a patch: three states, per unit normal load, twists about the contact frame's origin.
 
-The raw state `z` [m, m, m^2] is `S z_hat` with `S = diag(1, 1, r)`; in scaled coordinates the bristle obeys the
-equation of a cell, `z_hat' = u - k z_hat`, driven by `u = h(V) v_n` instead of `v` and with `z_max = |h| g/sigma_0`:
+In scaled coordinates `V_G = F V` (F upper triangular, `F'F` the patch's second moments of slip, so that `|V_G|` is the
+root mean square of the cells' speeds) the state z [3] [m], conjugate to V_G, obeys
 
-    d z_hat'/dz_hat = -k I - z_hat (x) k_z,      d z_hat'/dV_S = du/dV_S - z_hat (x) k_V
+    z' = V_G - beta (lambda z + s m),   s = z . z_ss / |z_ss|^2,   lambda = |V_G|^2 / (V_G . z_ss),
+    m = V_G - lambda z_ss,   W = -F' (sigma_0 z + sigma_1 z' + sigma_2 V_G)
 
-`shape` is `(cop_x, cop_y, r, <rho^2>)`; `surface` is `(kind, start, size)` of `kernels.surfaces`.
+`shape` is `(F_00, F_01, F_02, F_11, F_12, F_22, blend)`; `surface` is `(start, other)`, where in `data` the map of the
+shape begins and, if `blend > 0`, that of the other shape which has this share in the steady state.
 """
 
 from __future__ import annotations
@@ -15,181 +17,250 @@ import math
 from planarfriction import formulas
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import inlined, jit, kernel
-from planarfriction.kernels.law import grip, grip_slope, law_of
-from planarfriction.kernels.surfaces import sliding, sliding_jacobian
+from planarfriction.kernels.law import LAW, law_of
+from planarfriction.kernels.steady import evenness, scaled_twist, sliding, steady_slopes
+
+LINEAR = 43
+"""Numbers of a linearisation: `beta`, dz'/dz (1:10), dz'/dV_G (10:19), the inverse of D (19:28), dz_ss/dV_G (28:37),
+and the slopes of the evenness (37:40)."""
 
 
 @inlined
-def _scaled_twist(shape, vx, vy, omega):
-    return vx - omega * shape[1], vy + omega * shape[0], shape[2] * omega
+def _wrench(law, shape, zx, zy, zs, dx, dy, ds, x, y, s):
+    """Wrench about the origin from state, rate and twist in scaled coordinates."""
+    gx = formulas.traction(zx, dx, x, law)
+    gy = formulas.traction(zy, dy, y, law)
+    gs = formulas.traction(zs, ds, s, law)
+    return to_origin(shape, gx, gy, gs)
 
 
 @inlined
-def _wrench(law, shape, zx, zy, zt, dx, dy, dt, vx, vy, omega):
-    """Wrench about the origin, from raw bristles and rates and the twist at the centre of pressure."""
-    fx = formulas.traction(zx, dx, vx, law.sigma_0, law.sigma_1, law.sigma_2)
-    fy = formulas.traction(zy, dy, vy, law.sigma_0, law.sigma_1, law.sigma_2)
-    tau = formulas.traction(zt, dt, shape[3] * omega, law.sigma_0, law.sigma_1, law.sigma_2)
-    return fx, fy, tau + shape[0] * fy - shape[1] * fx
+def to_origin(shape, gx, gy, gs):
+    """`F' g`."""
+    return shape[0] * gx, shape[1] * gx + shape[3] * gy, shape[2] * gx + shape[4] * gy + shape[5] * gs
+
+
+# ---------------------------------------------------------------------- the closure
 
 
 @inlined
-def _decay(law, zx, zy, zs, ux, uy, us, v_n):
-    """`k` of the scaled bristle `(zx, zy, zs)` driven by `u`."""
-    u_norm = math.sqrt(ux * ux + uy * uy + us * us)
-    h_norm = u_norm / v_n if v_n > 0.0 else 1.0
-    z_norm = math.sqrt(zx * zx + zy * zy + zs * zs)
-    along = (zx * ux + zy * uy + zs * us) / xp.where(z_norm * h_norm > 0.0, z_norm * h_norm, 1.0)
-    q = grip(law, law.gamma, v_n)
-    return formulas.bristle_decay(xp, z_norm * q / h_norm, along, v_n, q, law.elasto_plastic, law.breakaway_ratio)
+def closure(law, deflection, share, even):
+    """`beta` of a state z: `deflection = |z|/|z_ss|`, `share` = s, `even` as in `steady.evenness`."""
+    cosine = share / xp.where(deflection > 0.0, deflection, 1.0)
+    return formulas.slip_share(xp, deflection, cosine, even, law)
+
+
+@inlined
+def closure_partials(law, deflection, share, even):
+    """`beta` and its partial derivatives with respect to `deflection`, `share` and the breakaway `s_ba even`."""
+    per = xp.where(deflection > 0.0, 1.0 / xp.where(deflection > 0.0, deflection, 1.0), 0.0)
+    beta, by_deflection, by_cosine, by_breakaway = formulas.slip_share_partials(xp, deflection, share * per, even, law)
+    return beta, by_deflection - by_cosine * share * per * per, by_cosine * per, by_breakaway
+
+
+@inlined
+def _rate(beta, share, decay, z, u, q):
+    """One component of `z'`."""
+    return u - beta * (decay * z + share * (u - decay * q))
 
 
 @kernel
 def evaluate(law, z, vx, vy, omega, shape, surface, data, zdot):
-    """Write the raw bristle rates into `zdot` and return the wrench `(fx, fy, tau)`."""
-    x, y, s = _scaled_twist(shape, vx, vy, omega)
-    v_n = math.sqrt(x * x + y * y + s * s)
-    ux, uy, us = sliding(surface[0], data, surface[1], surface[2], x, y, s, v_n)
-    k = _decay(law, z[0], z[1], z[2] / shape[2], ux, uy, us, v_n)
-    zdot[0], zdot[1], zdot[2] = ux - k * z[0], uy - k * z[1], shape[2] * us - k * z[2]
-    return _wrench(law, shape, z[0], z[1], z[2], zdot[0], zdot[1], zdot[2], x, y, omega)
+    """Write the rates of the moments into `zdot` and return the wrench `(fx, fy, tau)`."""
+    x, y, s, v, qx, qy, qs, even = sliding(law, vx, vy, omega, shape, surface, data)
+    power, per_q2 = x * qx + y * qy + s * qs, 1.0 / (qx * qx + qy * qy + qs * qs)
+    decay = v * v / xp.where(power > 0.0, power, 1.0)
+    share = (z[0] * qx + z[1] * qy + z[2] * qs) * per_q2
+    beta = closure(law, math.sqrt((z[0] * z[0] + z[1] * z[1] + z[2] * z[2]) * per_q2), share, even)
+    zdot[0] = _rate(beta, share, decay, z[0], x, qx)
+    zdot[1] = _rate(beta, share, decay, z[1], y, qy)
+    zdot[2] = _rate(beta, share, decay, z[2], s, qs)
+    return _wrench(law, shape, z[0], z[1], z[2], zdot[0], zdot[1], zdot[2], x, y, s)
+
+
+# ---------------------------------------------------------------------- the linearised equation
+
+
+@kernel
+def slopes(law, z, u, v, q, j, even, j_even, by_z, by_v):
+    """`dz'/dz` and `dz'/dV_G` [9] at the scaled twist `u`, from `q = z_ss`, the evenness and their slopes.
+
+    Returns `beta`.
+    """
+    zx, zy, zs = z[0], z[1], z[2]
+    per_power = 1.0 / (u[0] * q[0] + u[1] * q[1] + u[2] * q[2])
+    per_q2 = 1.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2])
+    decay = v * v * per_power
+    share = (zx * q[0] + zy * q[1] + zs * q[2]) * per_q2
+    deflection = math.sqrt((zx * zx + zy * zy + zs * zs) * per_q2)
+    per_deflection = 1.0 / deflection if deflection > 0.0 else 0.0
+    beta, by_deflection, by_share, by_breakaway = closure_partials(law, deflection, share, even)
+    by_even = law.breakaway_ratio * by_breakaway
+    for i in range(3):
+        m_i = u[i] - decay * q[i]
+        g_i = decay * z[i] + share * m_i
+        for k in range(3):
+            same = 1.0 if i == k else 0.0
+            beta_k = (by_deflection * per_deflection * z[k] + by_share * q[k]) * per_q2
+            by_z[3 * i + k] = -beta * (decay * same + m_i * q[k] * per_q2) - g_i * beta_k
+            z_j = zx * j[k] + zy * j[3 + k] + zs * j[6 + k]
+            q_j = (q[0] * j[k] + q[1] * j[3 + k] + q[2] * j[6 + k]) * per_q2
+            u_j = u[0] * j[k] + u[1] * j[3 + k] + u[2] * j[6 + k]
+            decay_k = (2.0 * u[k] - decay * (q[k] + u_j)) * per_power
+            share_k = z_j * per_q2 - 2.0 * share * q_j
+            beta_k = by_share * share_k - by_deflection * deflection * q_j + by_even * j_even[k]
+            g_k = (z[i] - share * q[i]) * decay_k + m_i * share_k + share * (same - decay * j[3 * i + k])
+            by_v[3 * i + k] = same - g_i * beta_k - beta * g_k
+    return beta
 
 
 @kernel
 def linearise(law, z, vx, vy, omega, shape, surface, data, lin):
-    """Write into `lin`: `k` (0), `k_z` (1:4), `z_hat` (4:7) and `d z_hat'/dV_S` (7:16, row by row)."""
-    x, y, s = _scaled_twist(shape, vx, vy, omega)
-    v_n = math.sqrt(x * x + y * y + s * s)
-    per_v = 1.0 / v_n if v_n > 0.0 else 0.0
-    j = lin[18:27]
-    sliding_jacobian(surface[0], data, surface[1], surface[2], x, y, s, v_n, j)
-    ux, uy, us = j[0] * x + j[1] * y + j[2] * s, j[3] * x + j[4] * y + j[5] * s, j[6] * x + j[7] * y + j[8] * s
-    zx, zy, zs = z[0], z[1], z[2] / shape[2]
-    u_norm = math.sqrt(ux * ux + uy * uy + us * us)
-    h_norm = u_norm * per_v if u_norm > 0.0 else 1.0
-    z_norm = math.sqrt(zx * zx + zy * zy + zs * zs)
-    per_z = 1.0 / z_norm if z_norm > 0.0 else 0.0
-    per_u = 1.0 / u_norm if u_norm > 0.0 else 0.0
-    per_h = 1.0 / h_norm
-    ex, ey, es = zx * per_z, zy * per_z, zs * per_z
-    qx, qy, qs = ux * per_h, uy * per_h, us * per_h  # v_n times the unit vector of h
-    along = ex * qx + ey * qy + es * qs
-    q = grip(law, law.gamma, v_n)
-    deflection = z_norm * q * per_h
-    k, k_deflection, k_along, k_speed = formulas.bristle_decay_partials(
-        xp, deflection, along, v_n, q, law.elasto_plastic, law.breakaway_ratio
-    )
-    k_z_norm = k_deflection * q * per_h
-    lin[0] = k
-    c = k_along * per_z
-    lin[1] = k_z_norm * ex + c * (qx - along * ex)
-    lin[2] = k_z_norm * ey + c * (qy - along * ey)
-    lin[3] = k_z_norm * es + c * (qs - along * es)
-    lin[4], lin[5], lin[6] = zx, zy, zs
-    # gradients with respect to V_S: of v_n, of |h|, and of `along` = e.u/|h|
-    k_grip = k_deflection * z_norm * per_h + k / q
-    speed_total = k_speed + k_grip * grip_slope(law, law.gamma, v_n, q)
-    for m in range(3):
-        n_m = (x if m == 0 else (y if m == 1 else s)) * per_v
-        u_m = (ux * j[m] + uy * j[3 + m] + us * j[6 + m]) * per_u  # of |u|
-        h_m = (u_m - h_norm * n_m) * per_v
-        along_m = (ex * j[m] + ey * j[3 + m] + es * j[6 + m] - along * h_m) * per_h
-        k_m = speed_total * n_m - k_deflection * deflection * per_h * h_m + k_along * along_m
-        lin[7 + m] = j[m] - zx * k_m
-        lin[10 + m] = j[3 + m] - zy * k_m
-        lin[13 + m] = j[6 + m] - zs * k_m
+    """Linearise the rates into `lin` [43] (see `LINEAR`); at rest they do not depend on z and follow the twist."""
+    x, y, s = scaled_twist(shape, vx, vy, omega)
+    v = math.sqrt(x * x + y * y + s * s)
+    if v > 0.0:
+        q = steady_slopes(law, shape, surface, data, x, y, s, v, lin[28:43])
+        even, lin[37], lin[38], lin[39] = evenness(shape, surface, data, x, y, s, v)
+        lin[0] = slopes(law, z, (x, y, s), v, q, lin[28:37], even, lin[37:40], lin[1:10], lin[10:19])
+    else:
+        for i in range(19):
+            lin[i] = 0.0
+        lin[10], lin[14], lin[18] = 1.0, 1.0, 1.0
 
 
 @inlined
-def _solve(lin, ax, ay, a_s):
-    """`D^-1 a` in scaled coordinates, `D = (shift + k) I + z_hat (x) k_z`, once `factor` has prepared it."""
-    c = (lin[1] * ax + lin[2] * ay + lin[3] * a_s) * lin[17]
-    return (ax - c * lin[4]) * lin[16], (ay - c * lin[5]) * lin[16], (a_s - c * lin[6]) * lin[16]
+def _solve(lin, a, b, c):
+    """`D^-1 (a, b, c)` with `D = shift I - dz'/dz`, once `factor` has prepared it."""
+    return (
+        lin[19] * a + lin[20] * b + lin[21] * c,
+        lin[22] * a + lin[23] * b + lin[24] * c,
+        lin[25] * a + lin[26] * b + lin[27] * c,
+    )
 
 
 @kernel
 def factor(law, shift, shape, lin, stiffness):
-    """Prepare `D` (16, 17 of `lin`) and write `d wrench/d twist` with the bristle eliminated.
+    """Prepare `D^-1` in `lin` and write `d wrench/d twist` with the moments eliminated.
 
-    It is `-(sigma_0 + sigma_1 shift) S D^-1 F S - sigma_2 U` about the centre of pressure.
+    It is `-F' ((sigma_0 + sigma_1 shift) D^-1 dz'/dV_G + sigma_2) F`.
     """
-    lin[16] = 1.0 / (shift + lin[0])
-    lin[17] = 1.0 / (shift + lin[0] + lin[1] * lin[4] + lin[2] * lin[5] + lin[3] * lin[6])
+    a, b, c = shift - lin[1], -lin[2], -lin[3]
+    d, e, f = -lin[4], shift - lin[5], -lin[6]
+    g, h, i = -lin[7], -lin[8], shift - lin[9]
+    r, p, w = e * i - f * h, f * g - d * i, d * h - e * g
+    per = 1.0 / (a * r + b * p + c * w)
+    lin[19], lin[20], lin[21] = r * per, (c * h - b * i) * per, (b * f - c * e) * per
+    lin[22], lin[23], lin[24] = p * per, (a * i - c * g) * per, (c * d - a * f) * per
+    lin[25], lin[26], lin[27] = w * per, (b * g - a * h) * per, (a * e - b * d) * per
     pull = law.sigma_0 + law.sigma_1 * shift
-    r = shape[2]
     for m in range(3):
-        scale = r if m == 2 else 1.0
-        bx, by, bs = _solve(lin, lin[7 + m], lin[10 + m], lin[13 + m])
-        stiffness[0, m] = -pull * scale * bx
-        stiffness[1, m] = -pull * scale * by
-        stiffness[2, m] = -pull * scale * r * bs
-    stiffness[0, 0] -= law.sigma_2
-    stiffness[1, 1] -= law.sigma_2
-    stiffness[2, 2] -= law.sigma_2 * shape[3]
-    # from the centre of pressure to the origin: T' stiffness T
-    cx, cy = shape[0], shape[1]
-    for m in range(3):
-        stiffness[m, 2] += cx * stiffness[m, 1] - cy * stiffness[m, 0]
-    for m in range(3):
-        stiffness[2, m] += cx * stiffness[1, m] - cy * stiffness[0, m]
+        # column m of F
+        x, y, s = shape[m], (0.0 if m == 0 else shape[2 + m]), (shape[5] if m == 2 else 0.0)
+        nx, ny, ns = _solve(
+            lin,
+            lin[10] * x + lin[11] * y + lin[12] * s,
+            lin[13] * x + lin[14] * y + lin[15] * s,
+            lin[16] * x + lin[17] * y + lin[18] * s,
+        )
+        stiffness[0, m], stiffness[1, m], stiffness[2, m] = to_origin(
+            shape, -pull * nx - law.sigma_2 * x, -pull * ny - law.sigma_2 * y, -pull * ns - law.sigma_2 * s
+        )
 
 
 @kernel
 def eliminate(law, shift, r, shape, lin):
-    """Wrench about the origin caused by the raw bristle residual `r`."""
+    """Wrench about the origin caused by the residual `r` of the moments."""
     pull = law.sigma_0 + law.sigma_1 * shift
-    bx, by, bs = _solve(lin, r[0], r[1], r[2] / shape[2])
-    fx, fy = law.sigma_1 * r[0] - pull * bx, law.sigma_1 * r[1] - pull * by
-    tau = law.sigma_1 * r[2] - pull * shape[2] * bs
-    return fx, fy, tau + shape[0] * fy - shape[1] * fx
+    x, y, s = _solve(lin, r[0], r[1], r[2])
+    return to_origin(shape, law.sigma_1 * r[0] - pull * x, law.sigma_1 * r[1] - pull * y, law.sigma_1 * r[2] - pull * s)
 
 
 @kernel
 def back_substitute(r, vx, vy, omega, shape, lin, out):
-    """Solve `D out = r + d zdot/dV dV` for the change of the twist about the origin."""
-    x, y, s = _scaled_twist(shape, vx, vy, omega)
-    out[0], out[1], bs = _solve(
+    """Solve `D out = r + dz'/dV_G F dV` for the change of the twist about the origin."""
+    x, y, s = scaled_twist(shape, vx, vy, omega)
+    out[0], out[1], out[2] = _solve(
         lin,
-        r[0] + lin[7] * x + lin[8] * y + lin[9] * s,
-        r[1] + lin[10] * x + lin[11] * y + lin[12] * s,
-        r[2] / shape[2] + lin[13] * x + lin[14] * y + lin[15] * s,
+        r[0] + lin[10] * x + lin[11] * y + lin[12] * s,
+        r[1] + lin[13] * x + lin[14] * y + lin[15] * s,
+        r[2] + lin[16] * x + lin[17] * y + lin[18] * s,
     )
-    out[2] = shape[2] * bs
+
+
+# ---------------------------------------------------------------------- the step
+
+
+@inlined
+def advance(law, z, held, shape, dt, out):
+    """Advance the moments by `dt` at a held twist (see `sliding`) and return the wrench at the end.
+
+    With beta held the equation is linear, its matrix `lambda I + m (x) z_ss/|z_ss|^2`, and this is its exponential: of
+    s with the rate `mu = lambda cos^2(V_G, z_ss)` and of the rest with lambda. Plain LuGre is exact; elasto-plastic
+    moments take the mean of beta at the start and at an end predicted by an implicit Euler step, which is second order.
+    """
+    x, y, s, v, qx, qy, qs, even = held
+    zx, zy, zs = z[0], z[1], z[2]
+    per_q2 = 1.0 / (qx * qx + qy * qy + qs * qs)
+    power = x * qx + y * qy + s * qs
+    moves = power > 0.0
+    safe = xp.where(moves, power, 1.0)
+    decay = v * v / safe
+    slow = power * per_q2
+    mx, my, ms = x - decay * qx, y - decay * qy, s - decay * qs
+    share = (zx * qx + zy * qy + zs * qs) * per_q2
+    size = math.sqrt((zx * zx + zy * zy + zs * zs) * per_q2)
+    start = closure(law, size, share, even)
+    per = 1.0 / (1.0 + start * decay * dt)
+    pull = dt * start * (share + slow * dt) / (1.0 + start * slow * dt)
+    px, py, ps = zx + dt * x - pull * mx, zy + dt * y - pull * my, zs + dt * s - pull * ms
+    predicted = per * math.sqrt((px * px + py * py + ps * ps) * per_q2)
+    end = closure(law, predicted, (share + slow * dt) / (1.0 + start * slow * dt), even)
+    beta = formulas.mean_decay(start, end, decay * dt)
+    rate = beta * decay * dt
+    slow_rate = beta * slow * dt
+    left_slow, mean_slow = formulas.relaxation(xp, slow_rate)
+    left_gap, mean_gap = formulas.relaxation(xp, rate - slow_rate)
+    left = left_slow * left_gap
+    mean = (slow_rate * mean_slow + (rate - slow_rate) * mean_gap * left_slow) / xp.where(rate > 0.0, rate, 1.0)
+    along = xp.where(rate > 0.0, mean, 1.0) * decay * dt
+    across = (1.0 - beta * share) * dt * left_slow * mean_gap
+    nx = left * zx + along * qx + across * mx
+    ny = left * zy + along * qy + across * my
+    ns = left * zs + along * qs + across * ms
+    new = math.sqrt((nx * nx + ny * ny + ns * ns) * per_q2)
+    back = formulas.cap(xp, new, formulas.reachable_deflection(xp, size, law))
+    back = xp.where(moves, back, 1.0)
+    share = (nx * qx + ny * qy + ns * qs) * per_q2 * back
+    beta = closure(law, new * back, share, even)
+    nx, ny, ns = nx * back, ny * back, ns * back
+    out[0], out[1], out[2] = nx, ny, ns
+    dx, dy = _rate(beta, share, decay, nx, x, qx), _rate(beta, share, decay, ny, y, qy)
+    return _wrench(law, shape, nx, ny, ns, dx, dy, _rate(beta, share, decay, ns, s, qs), x, y, s)
 
 
 @inlined
 def step(law, z, vx, vy, omega, shape, surface, data, dt, out):
-    """Advance the bristle by `dt` at a held twist (see `formulas.relaxation`) and return the wrench at the end."""
-    x, y, s = _scaled_twist(shape, vx, vy, omega)
-    r = shape[2]
-    v_n = math.sqrt(x * x + y * y + s * s)
-    ux, uy, us = sliding(surface[0], data, surface[1], surface[2], x, y, s, v_n)
-    zx, zy, zs = z[0], z[1], z[2] / r
-    u_norm = math.sqrt(ux * ux + uy * uy + us * us)
-    h_norm = u_norm / v_n if v_n > 0.0 else 1.0
-    per_h = 1.0 / h_norm
-    q = grip(law, law.gamma, v_n)
-    to_deflection = q * per_h
-    z_norm = math.sqrt(zx * zx + zy * zy + zs * zs)
-    along = per_h * (zx * ux + zy * uy + zs * us) / xp.where(z_norm > 0.0, z_norm, 1.0)
-    start = formulas.bristle_decay(xp, z_norm * to_deflection, along, v_n, q, law.elasto_plastic, law.breakaway_ratio)
-    px, py, ps = zx + ux * dt, zy + uy * dt, zs + us * dt  # times 1/(1 + k dt), which leaves the direction
-    p_norm = math.sqrt(px * px + py * py + ps * ps)
-    along = per_h * (px * ux + py * uy + ps * us) / xp.where(p_norm > 0.0, p_norm, 1.0)
-    deflection = xp.minimum(p_norm * to_deflection / (1.0 + start * dt), xp.maximum(z_norm * to_deflection, 1.0))
-    end = formulas.bristle_decay(xp, deflection, along, v_n, q, law.elasto_plastic, law.breakaway_ratio)
-    left, mean = formulas.relaxation(xp, formulas.mean_decay(start, end, dt) * dt)
-    nx, ny, ns = zx * left + ux * dt * mean, zy * left + uy * dt * mean, zs * left + us * dt * mean
-    n_norm = math.sqrt(nx * nx + ny * ny + ns * ns)
-    along = per_h * (nx * ux + ny * uy + ns * us) / xp.where(n_norm > 0.0, n_norm, 1.0)
-    largest = formulas.reachable_deflection(xp, z_norm * to_deflection, law.elasto_plastic)
-    back = formulas.cap(xp, n_norm * to_deflection, largest)
-    nx, ny, ns = nx * back, ny * back, ns * back
-    k = formulas.bristle_decay(
-        xp, n_norm * back * to_deflection, along, v_n, q, law.elasto_plastic, law.breakaway_ratio
-    )
-    out[0], out[1], out[2] = nx, ny, r * ns
-    return _wrench(law, shape, nx, ny, r * ns, ux - k * nx, uy - k * ny, r * (us - k * ns), x, y, omega)
+    """`advance` from a twist."""
+    return advance(law, z, sliding(law, vx, vy, omega, shape, surface, data), shape, dt, out)
+
+
+@jit
+def evaluate_batch(law_row, shape, surface, data, z, twist, zdot, wrench):
+    """`evaluate` for a batch: all [B, 3], the wrench per unit load."""
+    law = law_of(law_row)
+    for b in range(z.shape[0]):
+        wrench[b, 0], wrench[b, 1], wrench[b, 2] = evaluate(
+            law, z[b], twist[b, 0], twist[b, 1], twist[b, 2], shape, surface, data, zdot[b]
+        )
+
+
+@jit
+def linearise_batch(law_row, shape, surface, data, z, twist, lin):
+    """`linearise` for a batch: `z`, `twist` [B, 3], `lin` [B, LINEAR]."""
+    law = law_of(law_row)
+    for b in range(z.shape[0]):
+        linearise(law, z[b], twist[b, 0], twist[b, 1], twist[b, 2], shape, surface, data, lin[b])
 
 
 @jit
@@ -208,22 +279,31 @@ def step_batch(law_row, shape, surface, data, z, twist, load, dt, out, wrench):
 def step_one(numbers, data, z, vx, vy, omega, load, dt, result):
     """`step` of one contact for callers in Python: new state and wrench into `result` [6]; false for invalid inputs.
 
-    `numbers` holds law (9), shape (4) and surface (3): every argument costs a quarter of a microsecond on the way in.
+    `numbers` holds law and shape (7); its map begins `data`.
     """
     finite = xp.is_finite(vx) and xp.is_finite(vy) and xp.is_finite(omega) and xp.is_finite(load) and xp.is_finite(dt)
     finite = finite and xp.is_finite(z[0]) and xp.is_finite(z[1]) and xp.is_finite(z[2])
     if not (finite and load > 0.0 and dt >= 0.0):
         return False
-    surface = (int(numbers[13]), int(numbers[14]), int(numbers[15]))
-    wrench = step(law_of(numbers), z, vx, vy, omega, numbers[9:13], surface, data, dt, result)
+    wrench = step(law_of(numbers), z, vx, vy, omega, numbers[LAW:], (0, 0), data, dt, result)
     result[3], result[4], result[5] = load * wrench[0], load * wrench[1], load * wrench[2]
     return True
 
 
 @jit
 def step_sequence(law_row, shape, surface, data, z, twist, load, dt, wrench):
-    """`step` through the twists [T, 3] of one contact, `z` in place, wrenches into `wrench` [T, 3]."""
-    law = law_of(law_row)
-    for t in range(twist.shape[0]):
-        fx, fy, tau = step(law, z, twist[t, 0], twist[t, 1], twist[t, 2], shape, surface, data, dt, z)
+    """`step` through the twists [T, 3] of one contact, `z` in place, wrenches into `wrench` [T, 3].
+
+    The steady state of the next twist is read before this one's step, which waits for the last one's state: the
+    processor does both at once.
+    """
+    law, last = law_of(law_row), twist.shape[0] - 1
+    if last < 0:
+        return
+    held = sliding(law, twist[0, 0], twist[0, 1], twist[0, 2], shape, surface, data)
+    for t in range(last + 1):
+        n = min(t + 1, last)
+        following = sliding(law, twist[n, 0], twist[n, 1], twist[n, 2], shape, surface, data)
+        fx, fy, tau = advance(law, z, held, shape, dt, z)
         wrench[t, 0], wrench[t, 1], wrench[t, 2] = load * fx, load * fy, load * tau
+        held = following

@@ -1,13 +1,11 @@
-"""Roll-outs of the reduced model and their discrete adjoint, `LANES` contacts abreast in vector code.
+"""Roll-outs of the moment model with their discrete adjoint and their forward derivatives, one contact after another.
 
-Contacts advance together, a chunk of steps at a time. All numbers of a chunk lie in one flat array `w`: field after
-field of `SLOTS` numbers, a slot for each step and contact. What belongs to a contact alone lies likewise in `own`, in
-fields of `LANES` numbers. That lets the compiler vectorise: offsets between fields are constants, so that it sees that
-no two fields meet, and indices are sums of constants and a counter, so that it sees that none is negative. What does
-not depend on the bristles (the limit surface) is done for all slots of a chunk first.
-
-`rows` [B or 1, 13] (see `reduced_adjoint`), `twist` [B or 1, T, 3], `load` [B or 1, T] and `dt` [T], each held over its
-step.
+`rows` [B or 1, NUMBERS] holds law (`kernels.law`) and shape (7, `kernels.reduced`) of each contact, `twist`
+[B or 1, T, 3], `load` [B or 1, T] and `dt` [T] what is held over each step. With cotangents `W'` of the wrench, that of
+the scaled traction is `f_N F W'` (see `reduced_adjoint.pull_back`). The steady state depends on the friction
+coefficients and v_s, the traction on the stiffness and the dampings too, the closure on the breakaway ratio; gamma and
+the shape are held. A step without load forgets its state: it passes on no gradient but that of the load, the wrench per
+unit load that the smallest load would have.
 """
 
 from __future__ import annotations
@@ -18,304 +16,125 @@ import numpy as np
 
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import inlined, jit, kernel
-from planarfriction.kernels.law import LawNumbers
-from planarfriction.kernels.reduced_adjoint import NUMBERS, Shape, linearise, pull_back, row_of, scaled_twist, wrench
-from planarfriction.kernels.surfaces import (
-    BILINEAR,
-    bilinear_blend,
-    bilinear_frame,
-    bilinear_inset,
-    place,
-    sliding,
-    sliding_jacobian,
-)
+from planarfriction.kernels.law import LAW, law_of
+from planarfriction.kernels.reduced import advance, to_origin
+from planarfriction.kernels.reduced_adjoint import linearise, pull_back, rate, tangent
+from planarfriction.kernels.steady import evenness, scaled_twist, sliding, steady_by_law, steady_slopes
 
-LANES = 8
-SLOTS = 128
+NUMBERS = LAW + 7
+"""Numbers of a contact."""
 
-# Nearer to the spin axis (tangent of the angle, squared) u is looked up: the product of its Jacobian with V_S, which is
-# the same and costs less, loses digits to the large slopes there, and the Jacobian is not quite that of this place.
-_NEAR_AXIS = 1e-6
-
-# Fields of `w`. The table's place and corners lie where the sliding and its Jacobian come to lie.
-TWIST, SLIDING = 0, 3 * SLOTS
-SLOPE_X, SLOPE_Y, SLOPE_S = 6 * SLOTS, 9 * SLOTS, 12 * SLOTS
-OMEGA, LOAD, WRENCH, STATE = 15 * SLOTS, 16 * SLOTS, 17 * SLOTS, 20 * SLOTS
-TWIST_BAR, LOAD_BAR, PLACE = 23 * SLOTS, 26 * SLOTS, 27 * SLOTS
-FIELDS = 31 * SLOTS
-
-# Fields of `own`: numbers of the contact and their gradient, and what one step hands to the next.
-ROW, ROW_BAR, CARRY = 0, NUMBERS * LANES, 2 * NUMBERS * LANES
-OWN = (2 * NUMBERS + 3) * LANES
-
-
-# ---------------------------------------------------------------------- limit surface, for all slots
-
-
-@kernel
-def _places(w, count, size):
-    """Corner and position in the bilinear table of each twist, and its polar angle."""
-    row = 4 * (4 * size + 1)
-    for i in range(count):
-        x, y, s = w[TWIST + i], w[TWIST + SLOTS + i], w[TWIST + 2 * SLOTS + i]
-        mirror = xp.where(s < 0.0, -1.0, 1.0)
-        p, q, a, b, polar, _ = place(size, mirror * x, mirror * y, mirror * s)
-        w[PLACE + i], w[PLACE + SLOTS + i] = float(p * row + 4 * q), a
-        w[PLACE + 2 * SLOTS + i], w[PLACE + 3 * SLOTS + i] = b, polar
-
-
-@kernel
-def _corners(w, count, data, start, size):
-    """The four corners of `h`, where `u` and its Jacobian will lie."""
-    row = 4 * (4 * size + 1)
-    for i in range(count):
-        p = start + int(w[PLACE + i])
-        for c in range(3):
-            w[SLIDING + 4 * c * SLOTS + i] = data[p + c]
-            w[SLIDING + (4 * c + 1) * SLOTS + i] = data[p + c + 4]
-            w[SLIDING + (4 * c + 2) * SLOTS + i] = data[p + c + row]
-            w[SLIDING + (4 * c + 3) * SLOTS + i] = data[p + c + row + 4]
+_SCRATCH = 27
+"""Slopes of the steady state by the scaled twist (15) and by the law (12)."""
 
 
 @inlined
-def _corner(w, c, i, a, b):
-    at = SLIDING + 4 * c * SLOTS + i
-    return bilinear_blend(w[at], w[at + SLOTS], w[at + 2 * SLOTS], w[at + 3 * SLOTS], a, b)
+def _row_of(b, count):
+    return b if count > 1 else 0
 
 
 @inlined
-def _slot(w, field, i):
-    return w[field + i], w[field + SLOTS + i], w[field + 2 * SLOTS + i]
+def _three(a):
+    return a[0], a[1], a[2]
 
 
 @inlined
-def _put(w, field, i, a, b, c):
-    w[field + i], w[field + SLOTS + i], w[field + 2 * SLOTS + i] = a, b, c
-
-
-@kernel
-def _bilinear(w, count):
-    for i in range(count):
-        x, y, s = _slot(w, TWIST, i)
-        a, b = w[PLACE + SLOTS + i], w[PLACE + 2 * SLOTS + i]
-        scale = xp.where(s < 0.0, -1.0, 1.0) * math.sqrt(x * x + y * y + s * s)
-        hx, hy, hs = _corner(w, 0, i, a, b)[0], _corner(w, 1, i, a, b)[0], _corner(w, 2, i, a, b)[0]
-        _put(w, SLIDING, i, scale * hx, scale * hy, scale * hs)
+def _put(out, a):
+    out[0], out[1], out[2] = a[0], a[1], a[2]
 
 
 @inlined
-def _slope_row(corner, frame, moving, c):
-    """A row of `du/dV_S`; that of the ellipsoid at rest."""
-    radial, polar, azimuth = frame
-    x = corner[0] * radial[0] + corner[1] * polar[0] + corner[2] * azimuth[0]
-    y = corner[0] * radial[1] + corner[1] * polar[1] + corner[2] * azimuth[1]
-    s = corner[0] * radial[2] + corner[1] * polar[2] + corner[2] * azimuth[2]
+def _dot(a, b):
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@inlined
+def _traction(law, z, slip, u):
+    """Scaled traction per unit load."""
     return (
-        xp.where(moving, x, 1.0 if c == 0 else 0.0),
-        xp.where(moving, y, 1.0 if c == 1 else 0.0),
-        xp.where(moving, s, 1.0 if c == 2 else 0.0),
+        -(law.sigma_0 * z[0] + law.sigma_1 * slip[0] + law.sigma_2 * u[0]),
+        -(law.sigma_0 * z[1] + law.sigma_1 * slip[1] + law.sigma_2 * u[1]),
+        -(law.sigma_0 * z[2] + law.sigma_1 * slip[2] + law.sigma_2 * u[2]),
     )
-
-
-@kernel
-def _bilinear_slopes(w, count, size):
-    for i in range(count):
-        x, y, s = _slot(w, TWIST, i)
-        a, b, polar = w[PLACE + SLOTS + i], w[PLACE + 2 * SLOTS + i], w[PLACE + 3 * SLOTS + i]
-        v = math.sqrt(x * x + y * y + s * s)
-        mirror = xp.where(s < 0.0, -1.0, 1.0)
-        frame = bilinear_frame(size, mirror * x, mirror * y, mirror * s, polar)
-        inset = bilinear_inset(size, a, polar)
-        hx, hy, hs = _corner(w, 0, i, a, b)[0], _corner(w, 1, i, a, b)[0], _corner(w, 2, i, a, b)[0]
-        jx = _slope_row(_corner(w, 0, i, inset, b), frame, v > 0.0, 0)
-        jy = _slope_row(_corner(w, 1, i, inset, b), frame, v > 0.0, 1)
-        js = _slope_row(_corner(w, 2, i, inset, b), frame, v > 0.0, 2)
-        _put(w, SLIDING, i, mirror * v * hx, mirror * v * hy, mirror * v * hs)
-        _put(w, SLOPE_X, i, jx[0], jx[1], jx[2])
-        _put(w, SLOPE_Y, i, jy[0], jy[1], jy[2])
-        _put(w, SLOPE_S, i, js[0], js[1], js[2])
-
-
-@kernel
-def _surface(w, count, surface, data, slopes, j):
-    """`u` and, with `slopes`, its Jacobian for all slots; `j` [9]: scratch."""
-    kind, start, size = surface[0], surface[1], surface[2]
-    if kind == BILINEAR:
-        _places(w, count, size)
-        _corners(w, count, data, start, size)
-        if slopes:
-            _bilinear_slopes(w, count, size)
-        else:
-            _bilinear(w, count)
-        return
-    for i in range(count):
-        x, y, s = _slot(w, TWIST, i)
-        v = math.sqrt(x * x + y * y + s * s)
-        if slopes:
-            sliding_jacobian(kind, data, start, size, x, y, s, v, j)
-            for m in range(9):
-                w[SLOPE_X + m * SLOTS + i] = j[m]
-        if slopes and x * x + y * y > _NEAR_AXIS * s * s:
-            ux, uy, us = j[0] * x + j[1] * y + j[2] * s, j[3] * x + j[4] * y + j[5] * s, j[6] * x + j[7] * y + j[8] * s
-        else:
-            ux, uy, us = sliding(kind, data, start, size, x, y, s, v)
-        _put(w, SLIDING, i, ux, uy, us)
-
-
-# ---------------------------------------------------------------------- steps, for the contacts abreast
-
-
-@inlined
-def _law(own, c):
-    return LawNumbers(
-        own[ROW + c], own[ROW + LANES + c], own[ROW + 2 * LANES + c],
-        own[ROW + 3 * LANES + c], own[ROW + 4 * LANES + c], own[ROW + 5 * LANES + c],
-        own[ROW + 6 * LANES + c], own[ROW + 7 * LANES + c], own[ROW + 8 * LANES + c],
-    )  # fmt: skip
-
-
-@inlined
-def _shape(own, c):
-    return Shape(
-        own[ROW + 9 * LANES + c], own[ROW + 10 * LANES + c], own[ROW + 11 * LANES + c], own[ROW + 12 * LANES + c]
-    )
-
-
-@inlined
-def _carried(own, c):
-    return own[CARRY + c], own[CARRY + LANES + c], own[CARRY + 2 * LANES + c]
-
-
-@inlined
-def _carry(own, c, x, y, t):
-    own[CARRY + c], own[CARRY + LANES + c], own[CARRY + 2 * LANES + c] = x, y, t
-
-
-@inlined
-def _forward_one(w, own, c, dt):
-    law, shape = _law(own, c), _shape(own, c)
-    x, y, s = _slot(w, TWIST, c)
-    ux, uy, us = _slot(w, SLIDING, c)
-    zx, zy, zt = _carried(own, c)
-    load = w[LOAD + c]
-    step = linearise(law, shape, x, y, s, ux, uy, us, zx, zy, zt, dt)
-    fx, fy, tau = wrench(law, shape, step, w[OMEGA + c])
-    _put(w, STATE, c, zx, zy, zt)
-    b, none = step.bristle, load == 0.0
-    _put(w, WRENCH, c, xp.where(none, 0.0, load * fx), xp.where(none, 0.0, load * fy), xp.where(none, 0.0, load * tau))
-    _carry(own, c, xp.where(none, 0.0, b.nx), xp.where(none, 0.0, b.ny), xp.where(none, 0.0, shape.r * b.ns))
-
-
-@kernel
-def _forward(w, own, lanes, dt):
-    """One step of the contacts, whose slots begin at the start of `w`."""
-    for c in range(lanes):  # the body apart: inlined later, it leaves the compiler a loop that it can count
-        _forward_one(w, own, c, dt)
-
-
-@inlined
-def _backward_one(w, own, c, dt):
-    law, shape = _law(own, c), _shape(own, c)
-    x, y, s = _slot(w, TWIST, c)
-    ux, uy, us = _slot(w, SLIDING, c)
-    zx, zy, zt = _slot(w, STATE, c)
-    wx, wy, wt = _slot(w, WRENCH, c)
-    step = linearise(law, shape, x, y, s, ux, uy, us, zx, zy, zt, dt)
-    zx, zy, zt = _carried(own, c)
-    jx, jy, js = _slot(w, SLOPE_X, c), _slot(w, SLOPE_Y, c), _slot(w, SLOPE_S, c)
-    slope = (jx[0], jx[1], jx[2], jy[0], jy[1], jy[2], js[0], js[1], js[2])
-    bar = pull_back(law, shape, step, slope, w[OMEGA + c], w[LOAD + c], dt, wx, wy, wt, zx, zy, zt)
-    _carry(own, c, bar.zx, bar.zy, bar.zt)
-    _put(w, TWIST_BAR, c, bar.vx, bar.vy, bar.omega)
-    w[LOAD_BAR + c] = bar.load
-    own[ROW_BAR + c] += bar.sigma_0
-    own[ROW_BAR + LANES + c] += bar.sigma_1
-    own[ROW_BAR + 2 * LANES + c] += bar.sigma_2
-    own[ROW_BAR + 3 * LANES + c] += bar.mu_c
-    own[ROW_BAR + 4 * LANES + c] += bar.mu_s
-    own[ROW_BAR + 5 * LANES + c] += bar.v_s
-    own[ROW_BAR + 6 * LANES + c] += bar.gamma
-    own[ROW_BAR + 8 * LANES + c] += bar.breakaway_ratio
-    own[ROW_BAR + 9 * LANES + c] += bar.centre_x
-    own[ROW_BAR + 10 * LANES + c] += bar.centre_y
-    own[ROW_BAR + 11 * LANES + c] += bar.contact_radius
-    own[ROW_BAR + 12 * LANES + c] += bar.second_moment
-
-
-@kernel
-def _backward(w, own, lanes, dt):
-    """One step of the contacts backwards: carries the cotangent of the state."""
-    for c in range(lanes):
-        _backward_one(w, own, c, dt)
-
-
-# ---------------------------------------------------------------------- roll-outs
-
-
-@kernel
-def _begin(own, rows, carried, first, lanes):
-    """Rows of the contacts from `first` on, and what they carry; no gradient yet."""
-    for c in range(lanes):
-        row = rows[row_of(first + c, len(rows))]
-        for m in range(NUMBERS):
-            own[ROW + m * LANES + c] = row[m]
-            own[ROW_BAR + m * LANES + c] = 0.0
-        _carry(own, c, carried[first + c, 0], carried[first + c, 1], carried[first + c, 2])
-
-
-@kernel
-def _read(w, own, twist, load, first, lanes, begin, end):
-    """Scaled twists, spins and loads of the steps from `begin` to `end`."""
-    for c in range(lanes):
-        shape = _shape(own, c)
-        twists, loads = twist[row_of(first + c, len(twist))], load[row_of(first + c, len(load))]
-        for t in range(begin, end):
-            i = (t - begin) * lanes + c
-            x, y, s = scaled_twist(shape, twists[t, 0], twists[t, 1], twists[t, 2])
-            _put(w, TWIST, i, x, y, s)
-            w[OMEGA + i], w[LOAD + i] = twists[t, 2], loads[t]
-
-
-@kernel
-def _copy_in(w, field, values, first, lanes, begin, end):
-    """Three components of each step into a field."""
-    for c in range(lanes):
-        own = values[row_of(first + c, len(values))]
-        for t in range(begin, end):
-            _put(w, field, (t - begin) * lanes + c, own[t, 0], own[t, 1], own[t, 2])
-
-
-@kernel
-def _copy_out(w, field, values, first, lanes, begin, end):
-    """A field into three components of each step."""
-    for c in range(lanes):
-        own = values[first + c]
-        for t in range(begin, end):
-            own[t, 0], own[t, 1], own[t, 2] = _slot(w, field, (t - begin) * lanes + c)
 
 
 @jit
 def rollout(rows, surface, data, z, twist, load, dt, first, last, wrench, states):
     """Steps of the contacts `first` to `last`: `z` [B, 3] in place, wrenches into `wrench` [B, T, 3].
 
-    The state before each step goes into `states` [B, T, 3], unless that is empty.
+    The state before each step goes into `states` [B, T, 3], unless that is empty. As in `reduced.step_sequence` the
+    next twist's steady state is read ahead.
     """
-    w, own, scratch, steps = np.empty(FIELDS), np.empty(OWN), np.empty(9), dt.shape[0]
-    for b in range(first, last, LANES):
-        lanes = min(LANES, last - b)
-        chunk = SLOTS // lanes
-        _begin(own, rows, z, b, lanes)
-        for begin in range(0, steps, chunk):
-            end = min(begin + chunk, steps)
-            _read(w, own, twist, load, b, lanes, begin, end)
-            _surface(w, (end - begin) * lanes, surface, data, False, scratch)
-            for t in range(begin, end):
-                _forward(w[(t - begin) * lanes :], own, lanes, dt[t])
-            _copy_out(w, WRENCH, wrench, b, lanes, begin, end)
-            if states.shape[1] > 0:
-                _copy_out(w, STATE, states, b, lanes, begin, end)
-        for c in range(lanes):
-            z[b + c, 0], z[b + c, 1], z[b + c, 2] = _carried(own, c)
+    steps, kept = dt.shape[0], states.shape[1] > 0
+    for b in range(first, last if steps > 0 else first):
+        row, twists, loads = rows[_row_of(b, len(rows))], twist[_row_of(b, len(twist))], load[_row_of(b, len(load))]
+        law, shape, own = law_of(row), row[LAW:], z[b]
+        held = sliding(law, twists[0, 0], twists[0, 1], twists[0, 2], shape, surface, data)
+        for t in range(steps):
+            n = min(t + 1, steps - 1)
+            following = sliding(law, twists[n, 0], twists[n, 1], twists[n, 2], shape, surface, data)
+            if kept:
+                _put(states[b, t], own)
+            fx, fy, tau = advance(law, own, held, shape, dt[t], own)
+            none, weight = loads[t] == 0.0, loads[t]
+            _put(wrench[b, t], (xp.where(none, 0.0, weight * fx), xp.where(none, 0.0, weight * fy), weight * tau))
+            if none:
+                wrench[b, t, 2] = 0.0
+                _put(own, (0.0, 0.0, 0.0))
+            held = following
+
+
+# ---------------------------------------------------------------------- backwards
+
+
+@kernel
+def _back_at_rest(law, shape, dt, load, z, wrench_bar, new, pull, twist_bar, row_bar):
+    """One step at rest backwards, `z + u dt`; returns the cotangents of z and load."""
+    push = law.sigma_0 * dt + law.sigma_1 + law.sigma_2
+    _put(
+        twist_bar,
+        to_origin(shape, dt * new[0] - push * pull[0], dt * new[1] - push * pull[1], dt * new[2] - push * pull[2]),
+    )
+    row_bar[0] -= _dot(z, pull)
+    unit = to_origin(shape, -law.sigma_0 * z[0], -law.sigma_0 * z[1], -law.sigma_0 * z[2])
+    z_bar = (new[0] - law.sigma_0 * pull[0], new[1] - law.sigma_0 * pull[1], new[2] - law.sigma_0 * pull[2])
+    return z_bar, _dot(wrench_bar, unit)
+
+
+@kernel
+def _back(law, shape, surface, data, z, twist, load, dt, wrench_bar, new, twist_bar, row_bar, work):
+    """One step backwards, from the cotangents of its wrench and new state; returns those of z and of the load.
+
+    That of the twist is written to `twist_bar` [3], those of the law are added to `row_bar`.
+    """
+    x, y, s = scaled_twist(shape, twist[0], twist[1], twist[2])
+    v = math.sqrt(x * x + y * y + s * s)
+    loaded = xp.where(load == 0.0, 0.0, 1.0)
+    new = (loaded * new[0], loaded * new[1], loaded * new[2])
+    px, py, ps = scaled_twist(shape, wrench_bar[0], wrench_bar[1], wrench_bar[2])
+    pull = (load * px, load * py, load * ps)
+    if not v > 0.0:
+        return _back_at_rest(law, shape, dt, load, z, wrench_bar, new, pull, twist_bar, row_bar)
+    j, by_law = work[:15], work[15:]
+    q = steady_slopes(law, shape, surface, data, x, y, s, v, j)
+    even = evenness(shape, surface, data, x, y, s, v)
+    step = linearise(law, z, (x, y, s), v, q, even[0], dt)
+    slip = rate(step)
+    unit = _traction(law, step.end.z, slip, step.u)
+    bar = pull_back(law, step, dt, new, pull)
+    steady_by_law(law, shape, surface, data, x, y, s, v, by_law)
+    row_bar[0] -= _dot(step.end.z, pull) + _dot(q, bar.q) / law.sigma_0
+    row_bar[1] -= _dot(slip, pull)
+    row_bar[2] -= _dot(step.u, pull)
+    for i in range(3):
+        row_bar[3 + i] += by_law[3 * i] * bar.q[0] + by_law[3 * i + 1] * bar.q[1] + by_law[3 * i + 2] * bar.q[2]
+    row_bar[8] += even[0] * bar.breakaway
+    ahead = law.breakaway_ratio * bar.breakaway
+    ux = bar.u[0] + j[0] * bar.q[0] + j[3] * bar.q[1] + j[6] * bar.q[2] + ahead * even[1]
+    uy = bar.u[1] + j[1] * bar.q[0] + j[4] * bar.q[1] + j[7] * bar.q[2] + ahead * even[2]
+    us = bar.u[2] + j[2] * bar.q[0] + j[5] * bar.q[1] + j[8] * bar.q[2] + ahead * even[3]
+    _put(twist_bar, to_origin(shape, ux, uy, us))
+    return bar.z, _dot(wrench_bar, to_origin(shape, unit[0], unit[1], unit[2]))
 
 
 @jit
@@ -324,26 +143,99 @@ def gradient(
 ):
     """Adjoint of `rollout` with its `states`; `z_bar` [B, 3] comes in as the cotangent of the state at the end.
 
-    `wrench_bar` [B or 1, T, 3]; `twist_bar` [B, T, 3], `load_bar` [B, T] and `row_bar` [B, 13] are written.
+    `wrench_bar` [B or 1, T, 3]; `twist_bar` [B, T, 3], `load_bar` [B, T] and `row_bar` [B, NUMBERS] are written.
     """
-    w, own, scratch, steps = np.empty(FIELDS), np.empty(OWN), np.empty(9), dt.shape[0]
-    for b in range(first, last, LANES):
-        lanes = min(LANES, last - b)
-        chunk = SLOTS // lanes
-        _begin(own, rows, z_bar, b, lanes)
-        for end in range(steps, 0, -chunk):
-            begin = max(end - chunk, 0)
-            _read(w, own, twist, load, b, lanes, begin, end)
-            _copy_in(w, STATE, states, b, lanes, begin, end)
-            _copy_in(w, WRENCH, wrench_bar, b, lanes, begin, end)
-            _surface(w, (end - begin) * lanes, surface, data, True, scratch)
-            for t in range(end - 1, begin - 1, -1):
-                _backward(w[(t - begin) * lanes :], own, lanes, dt[t])
-            _copy_out(w, TWIST_BAR, twist_bar, b, lanes, begin, end)
-            for c in range(lanes):
-                for t in range(begin, end):
-                    load_bar[b + c, t] = w[LOAD_BAR + (t - begin) * lanes + c]
-        for c in range(lanes):
-            z_bar[b + c, 0], z_bar[b + c, 1], z_bar[b + c, 2] = _carried(own, c)
-            for m in range(NUMBERS):
-                row_bar[b + c, m] = own[ROW_BAR + m * LANES + c]
+    work = np.empty(_SCRATCH)
+    for b in range(first, last):
+        row, twists, loads = rows[_row_of(b, len(rows))], twist[_row_of(b, len(twist))], load[_row_of(b, len(load))]
+        bars, before = wrench_bar[_row_of(b, len(wrench_bar))], states[_row_of(b, len(states))]
+        law, shape, new, law_bar = law_of(row), row[LAW:], _three(z_bar[b]), row_bar[b]
+        for i in range(row_bar.shape[1]):
+            law_bar[i] = 0.0
+        for t in range(dt.shape[0] - 1, -1, -1):
+            new, load_bar[b, t] = _back(
+                law, shape, surface, data, _three(before[t]), twists[t], loads[t], dt[t], _three(bars[t]), new,
+                twist_bar[b, t], law_bar, work,
+            )  # fmt: skip
+        _put(z_bar[b], new)
+
+
+# ---------------------------------------------------------------------- forwards
+
+
+@kernel
+def _forward_at_rest(law, shape, load, z, columns, d_z, d_wrench):
+    """One step at rest: the state stays, the wrench follows it; returns the traction."""
+    for p in range(len(columns)):
+        own = 1.0 if columns[p] == 0 else 0.0
+        gx = -load * (law.sigma_0 * d_z[0, p] + own * z[0])
+        gy = -load * (law.sigma_0 * d_z[1, p] + own * z[1])
+        gs = -load * (law.sigma_0 * d_z[2, p] + own * z[2])
+        d_wrench[0, p], d_wrench[1, p], d_wrench[2, p] = to_origin(shape, gx, gy, gs)
+    return z, (-law.sigma_0 * z[0], -law.sigma_0 * z[1], -law.sigma_0 * z[2])
+
+
+@inlined
+def _direction(law, column, q, even, by_law):
+    """Change of the steady state and of the breakaway with a number of the law."""
+    if column == 0:
+        per = -1.0 / law.sigma_0
+        return (per * q[0], per * q[1], per * q[2]), 0.0
+    if 3 <= column <= 5:
+        i = 3 * (column - 3)
+        return (by_law[i], by_law[i + 1], by_law[i + 2]), 0.0
+    return (0.0, 0.0, 0.0), (even if column == 8 else 0.0)
+
+
+@kernel
+def _forward(law, shape, surface, data, z, twist, load, dt, columns, d_z, d_wrench, work):
+    """One step with the changes `d_z` [3, P] of the state, in place, and `d_wrench` [3, P] of the wrench.
+
+    Returns the new state and the scaled traction.
+    """
+    x, y, s = scaled_twist(shape, twist[0], twist[1], twist[2])
+    v = math.sqrt(x * x + y * y + s * s)
+    if not v > 0.0:
+        return _forward_at_rest(law, shape, load, z, columns, d_z, d_wrench)
+    q = steady_slopes(law, shape, surface, data, x, y, s, v, work[:15])
+    even, by_law = evenness(shape, surface, data, x, y, s, v)[0], work[15:]
+    steady_by_law(law, shape, surface, data, x, y, s, v, by_law)
+    step = linearise(law, z, (x, y, s), v, q, even, dt)
+    slip, end = rate(step), step.end.z
+    for p in range(len(columns)):
+        column = columns[p]
+        dq, d_breakaway = _direction(law, column, q, even, by_law)
+        before = (d_z[0, p], d_z[1, p], d_z[2, p])
+        new, g = tangent(law, step, dt, before, (0.0, 0.0, 0.0), dq, d_breakaway)
+        d_z[0, p], d_z[1, p], d_z[2, p] = new
+        own = (1.0 if column == 0 else 0.0, 1.0 if column == 1 else 0.0, 1.0 if column == 2 else 0.0)
+        gx = load * (g[0] - own[0] * end[0] - own[1] * slip[0] - own[2] * x)
+        gy = load * (g[1] - own[0] * end[1] - own[1] * slip[1] - own[2] * y)
+        gs = load * (g[2] - own[0] * end[2] - own[1] * slip[2] - own[2] * s)
+        d_wrench[0, p], d_wrench[1, p], d_wrench[2, p] = to_origin(shape, gx, gy, gs)
+    return end, _traction(law, end, slip, step.u)
+
+
+@jit
+def sensitivities(rows, surface, data, z, twist, load, dt, columns, first, last, wrenches, d_wrench):
+    """Roll-outs with the derivatives of the wrenches to the numbers `columns` [P] into `d_wrench` [B, T, 3, P].
+
+    Arguments as those of `rollout`.
+    """
+    work, d_z = np.empty(_SCRATCH), np.empty((3, columns.shape[0]))
+    for b in range(first, last):
+        row, twists, loads = rows[_row_of(b, len(rows))], twist[_row_of(b, len(twist))], load[_row_of(b, len(load))]
+        law, shape, own = law_of(row), row[LAW:], _three(z[b])
+        d_z[:] = 0.0
+        for t in range(dt.shape[0]):
+            own, g = _forward(
+                law, shape, surface, data, own, twists[t], loads[t], dt[t], columns, d_z, d_wrench[b, t], work
+            )
+            if loads[t] == 0.0:
+                own = (0.0, 0.0, 0.0)
+                d_z[:] = 0.0
+                d_wrench[b, t] = 0.0
+                wrenches[b, t] = 0.0
+            else:
+                _put(wrenches[b, t], to_origin(shape, loads[t] * g[0], loads[t] * g[1], loads[t] * g[2]))
+        _put(z[b], own)

@@ -21,7 +21,7 @@ import numpy as np
 
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import contacts as ct
-from planarfriction.kernels import jit, kernel, moments
+from planarfriction.kernels import jit, kernel, reduced
 from planarfriction.kernels.body import _load, _times, factor, linearise, rates, solve
 from planarfriction.kernels.law import law_of
 from planarfriction.kernels.rosenbrock import _error_norm, _forget_unloaded
@@ -69,7 +69,7 @@ def _distributed(law, z, v, w, x, y, weights, lin, dz, dv, d_friction, d_size, d
 
 
 @kernel
-def _reduced(law, shape, v, zdot, w, lin, dz, dv, d_friction, d_size, dzdot, dw):
+def _published(law, shape, v, zdot, w, lin, dz, dv, d_friction, d_size, dzdot, dw):
     cx, cy, r = shape[0], shape[1], shape[2]
     spin = dv[2] + d_size * v[2]
     ux, uy, us = dv[0] - spin * cy, dv[1] + spin * cx, r * spin
@@ -86,7 +86,7 @@ def _reduced(law, shape, v, zdot, w, lin, dz, dv, d_friction, d_size, dzdot, dw)
 
 
 @kernel
-def _moments(law, shape, v, w, lin, z, dz, dv, d_friction, d_size, dzdot, dw):
+def _reduced(law, shape, v, w, lin, z, dz, dv, d_friction, d_size, dzdot, dw):
     vx, vy, omega = dv[0], dv[1], dv[2] + d_size * v[2]
     x, y, s = scaled_twist(shape, vx, vy, omega)
     ax, ay, a_s = dz[0] - d_friction * z[0], dz[1] - d_friction * z[1], dz[2] - d_friction * z[2]
@@ -96,7 +96,7 @@ def _moments(law, shape, v, w, lin, z, dz, dv, d_friction, d_size, dzdot, dw):
     gx = -(law.sigma_0 * dz[0] + law.sigma_1 * dzdot[0] + law.sigma_2 * x)
     gy = -(law.sigma_0 * dz[1] + law.sigma_1 * dzdot[1] + law.sigma_2 * y)
     gs = -(law.sigma_0 * dz[2] + law.sigma_1 * dzdot[2] + law.sigma_2 * s)
-    dw[0], dw[1], tau = moments.to_origin(shape, gx, gy, gs)
+    dw[0], dw[1], tau = reduced.to_origin(shape, gx, gy, gs)
     dw[2] = tau + d_size * w[2]
 
 
@@ -116,13 +116,13 @@ def _change(contacts, motion, piece, c, y, dy, dz, dv, parameter, dzdot, dw, wor
             law, y[first:last], work.twist, work.wrench[c], x, y_cells, weights, lin.reshape(7, x.shape[0]),
             dz[first:last], dv, d_friction, d_size, dzdot[first:last], dw,
         )  # fmt: skip
-    elif contacts.kind[c] == ct.MOMENTS:
-        _moments(
+    elif contacts.kind[c] == ct.REDUCED:
+        _reduced(
             law, contacts.shape[row], work.twist, work.wrench[c], lin, y[first:last], dz[first:last], dv,
             d_friction, d_size, dzdot[first:last], dw,
         )  # fmt: skip
     else:
-        _reduced(
+        _published(
             law, contacts.shape[row], work.twist, dy[first:last], work.wrench[c], lin, dz[first:last], dv,
             d_friction, d_size, dzdot[first:last], dw,
         )  # fmt: skip

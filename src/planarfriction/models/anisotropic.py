@@ -13,7 +13,6 @@ import numpy as np
 from planarfriction import formulas
 from planarfriction.kernels import distributed as kernels
 from planarfriction.kernels import distributed_adjoint
-from planarfriction.kernels.law import law_numbers, law_row
 from planarfriction.laws import LuGre
 from planarfriction.models.base import StepJacobians
 
@@ -23,8 +22,7 @@ _ORIGIN, _WHOLE = np.zeros(1), np.ones((1, 1))
 def centres(law: LuGre, asymmetry: np.ndarray, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """`c = a g(|u|)/sigma_0` `[..., 2, N]` of `a` `[2, N]` and `u` `[..., 2, N]`, and `dc/du` `[..., 2, 2, N]`."""
     speed = np.hypot(velocity[..., 0, :], velocity[..., 1, :])
-    arguments = speed, law.mu_c, law.mu_s, law.v_s, law.gamma
-    g, slope = formulas.stribeck(np, *arguments), formulas.stribeck_slope(np, *arguments)
+    g, slope = formulas.stribeck(np, speed, law.numbers), formulas.stribeck_slope(np, speed, law.numbers)
     heading = velocity / np.where(speed > 0.0, speed, 1.0)[..., None, :]
     along = asymmetry[:, None, :] * heading[..., None, :, :]
     return asymmetry * (g / law.sigma_0)[..., None, :], along * (slope / law.sigma_0)[..., None, None, :]
@@ -37,7 +35,7 @@ def step(model: Any, state: np.ndarray, velocity: np.ndarray, load: np.ndarray, 
     z, u, steps = _alone(state - centre, velocity, dt)
     new, pull = np.empty_like(z), np.empty_like(u)
     ones = np.ones(len(z))
-    kernels.step_batch(law_numbers(law), z, u, _ORIGIN, _ORIGIN, _WHOLE, ones, steps, new, pull)
+    kernels.step_batch(law.numbers, z, u, _ORIGIN, _ORIGIN, _WHOLE, ones, steps, new, pull)
     loaded = (load > 0.0)[..., None, None]
     traction = _together(pull[:, :2], state) - law.sigma_0 * centre
     share = load[..., None] * model.patch.weights(load)
@@ -56,7 +54,7 @@ def step_jacobians(model: Any, state: np.ndarray, velocity: np.ndarray, load: np
     new_z, new_u, pull_z = np.zeros((count, 2, 2, 1)), np.zeros((count, 2, 1, 3)), np.zeros((count, 3, 2, 1))
     pull_u, pull = np.zeros((count, 3, 3)), np.zeros((count, 3))
     distributed_adjoint.jacobians(
-        law_row(law), z.reshape(-1, 2, 1), u, _ORIGIN, _ORIGIN, _WHOLE, np.ones(count), steps,
+        np.array(law.numbers), z.reshape(-1, 2, 1), u, _ORIGIN, _ORIGIN, _WHOLE, np.ones(count), steps,
         new_z, new_u, pull_z, pull_u, pull,
     )  # fmt: skip
     new_z, new_u = _together(new_z[..., 0], state), _together(new_u[:, :, 0, :2], state)

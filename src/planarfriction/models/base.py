@@ -9,7 +9,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
-from planarfriction.laws import LuGre
+from planarfriction.laws import FrictionLaw
 from planarfriction.patch import ContactPatch
 
 
@@ -60,13 +60,13 @@ class FrictionModel:
     """
 
     patch: ContactPatch
-    law: LuGre
+    law: FrictionLaw
 
     def __post_init__(self) -> None:
         if not isinstance(self.patch, ContactPatch):
             raise InvalidValueError("patch", "be a ContactPatch", self.patch)
-        if not isinstance(self.law, LuGre):
-            raise InvalidValueError("law", "be a LuGre law", self.law)
+        if not isinstance(self.law, FrictionLaw):
+            raise InvalidValueError("law", "be a friction law of bristles, such as LuGre", self.law)
 
     @property
     def state_shape(self) -> tuple[int, ...]:

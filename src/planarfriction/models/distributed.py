@@ -10,7 +10,6 @@ import numpy as np
 from planarfriction import formulas
 from planarfriction.kernels import distributed as kernels
 from planarfriction.kernels import distributed_adjoint
-from planarfriction.kernels.law import law_numbers, law_row
 from planarfriction.models import anisotropic
 from planarfriction.models.base import FrictionModel, ModelJacobians, StepJacobians
 
@@ -44,7 +43,7 @@ class DistributedModel(FrictionModel):
         state, twist, load = self._inputs(state, twist, normal_force)
         velocity = self._cell_velocity(twist)
         law = self.law
-        force = formulas.traction(state, self._rate(state, velocity), velocity, law.sigma_0, law.sigma_1, law.sigma_2)
+        force = formulas.traction(state, self._rate(state, velocity), velocity, law)
         return np.einsum(
             "...cn,dcn->...d", force * (load[..., None] * self.patch.weights(load))[..., None, :], self._lever
         )
@@ -63,7 +62,7 @@ class DistributedModel(FrictionModel):
         out, wrench = np.empty_like(flat), np.empty((len(flat), 3))
         x, y = self._xy
         kernels.step_batch(
-            law_numbers(self.law),
+            self.law.numbers,
             flat,
             np.ascontiguousarray(twist.reshape(-1, 3)),
             x,
@@ -124,7 +123,7 @@ class DistributedModel(FrictionModel):
         results = [np.zeros((load.size, *shape)) for shape in shapes]
         x, y = self._xy
         distributed_adjoint.jacobians(
-            law_row(self.law),
+            np.array(self.law.numbers),
             np.ascontiguousarray(state.reshape(-1, 2, cells)),
             np.ascontiguousarray(twist.reshape(-1, 3)),
             x,
@@ -169,26 +168,23 @@ class DistributedModel(FrictionModel):
         law = self.law
         z_norm, speed = np.hypot(state[..., 0, :], state[..., 1, :]), np.hypot(velocity[..., 0, :], velocity[..., 1, :])
         unit = state / np.where(z_norm > 0.0, z_norm, 1.0)[..., None, :]
-        grip = law.sigma_0 / formulas.stribeck(np, speed, law.mu_c, law.mu_s, law.v_s, law.gamma)
+        grip = law.sigma_0 / formulas.stribeck(np, speed, law.numbers)
         return unit, z_norm, (z_norm * grip, (unit * velocity).sum(axis=-2), speed, grip)
 
     def _rate(self, state: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        numbers = law_numbers(self.law)
         if self._asymmetry is not None:
             state = state - anisotropic.centres(self.law, self._asymmetry, velocity)[0]
         _, _, arguments = self._arguments(state, velocity)
-        k = formulas.bristle_decay(np, *arguments, numbers.elasto_plastic, numbers.breakaway_ratio)
+        k = formulas.bristle_decay(np, *arguments, self.law.numbers)
         return velocity - k[..., None, :] * state
 
     def _decay_slopes(self, state: np.ndarray, velocity: np.ndarray):
         """`k` `[..., N]` and its gradients with respect to the cell's bristle and velocity `[..., 2, N]`."""
-        law, numbers = self.law, law_numbers(self.law)
+        law = self.law.numbers
         unit, z_norm, arguments = self._arguments(state, velocity)
         _, along, speed, grip = arguments
-        k, k_deflection, k_along, k_speed = formulas.bristle_decay_partials(
-            np, *arguments, numbers.elasto_plastic, numbers.breakaway_ratio
-        )
-        stribeck_slope = formulas.stribeck_slope(np, speed, law.mu_c, law.mu_s, law.v_s, law.gamma)
+        k, k_deflection, k_along, k_speed = formulas.bristle_decay_partials(np, *arguments, law)
+        stribeck_slope = formulas.stribeck_slope(np, speed, law)
         k_grip = k_deflection * z_norm + k / grip
         k_speed = k_speed - k_grip * grip**2 * stribeck_slope / law.sigma_0
         heading = velocity / np.where(speed > 0.0, speed, 1.0)[..., None, :]

@@ -7,7 +7,7 @@ import functools
 import numpy as np
 
 from planarfriction.errors import InvalidValueError
-from planarfriction.models.moment_map import MomentShape, moment_map, moment_shape, slip_factor
+from planarfriction.models.reduced_map import ReducedShape, reduced_map, reduced_shape, slip_factor
 from planarfriction.models.steady_sums import ScaledCells
 from planarfriction.patch import ContactPatch
 
@@ -45,14 +45,14 @@ class LoadFamily:
         self._gaps: dict[tuple[float, float], float] = {}
         self._store = np.empty(0)
         self._maps: dict[float, np.ndarray] = {}
-        self._shapes: dict[float, MomentShape] = {}
+        self._shapes: dict[float, ReducedShape] = {}
 
     @property
     def rungs(self) -> list[float]:
         """Loads [N] whose maps have been built, ascending."""
         return sorted(self._maps)
 
-    def shapes(self, loads: list[float]) -> list[MomentShape]:
+    def shapes(self, loads: list[float]) -> list[ReducedShape]:
         """Shapes at loads > 0 [N]: F of each load, and references to the maps of its two neighbours.
 
         Where a neighbour is so light that one point carries it, the shape is built at the load itself.
@@ -70,19 +70,19 @@ class LoadFamily:
                 self._build(rung)
         for load, factor, rungs in zip(loads, slip_factor(self._patch, np.array(loads)), between, strict=True):
             if rungs is None:
-                self._shapes[load] = moment_shape(self._patch, load, *self._map)
+                self._shapes[load] = reduced_shape(self._patch, load, *self._map)
             else:
                 self._shapes[load] = self._blend(load, factor, *rungs)
 
-    def _blend(self, load: float, factor: np.ndarray, low: float, high: float) -> MomentShape:
+    def _blend(self, load: float, factor: np.ndarray, low: float, high: float) -> ReducedShape:
         """Two rungs blended linearly in the load, or one alone where that is as close as wanted."""
         share = (load - low) / (high - low)
         apart = self._apart(low, high)
         if share * apart <= 0.5 * self._error:
-            return MomentShape(factor, self._maps[low])
+            return ReducedShape(factor, self._maps[low])
         if (1.0 - share) * apart <= 0.5 * self._error:
-            return MomentShape(factor, self._maps[high])
-        return MomentShape(factor, self._maps[low], self._maps[high], share)
+            return ReducedShape(factor, self._maps[high])
+        return ReducedShape(factor, self._maps[low], self._maps[high], share)
 
     def _neighbours(self, load: float) -> tuple[float, float] | None:
         """The two rungs around a load, None if one of them has no map."""
@@ -134,7 +134,7 @@ class LoadFamily:
         """Build the map of a rung into the store, one array for all maps, so that nothing is copied to simulate."""
         if rung in self._maps:
             return
-        data = moment_map(ScaledCells(self._patch, rung, slip_factor(self._patch, rung)), *self._map)
+        data = reduced_map(ScaledCells(self._patch, rung, slip_factor(self._patch, rung)), *self._map)
         used = len(self._maps) * len(data)
         if used + len(data) > len(self._store):
             store = np.empty(max(2 * len(self._store), 8 * len(data)))

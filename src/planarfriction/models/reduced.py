@@ -8,12 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.kernels import moments as kernels
-from planarfriction.kernels import moments_adjoint
-from planarfriction.kernels.law import law_numbers, law_row
+from planarfriction.kernels import reduced as kernels
+from planarfriction.kernels import reduced_adjoint
 from planarfriction.models.base import FrictionModel, ModelJacobians, StepJacobians
 from planarfriction.models.load_family import LoadFamily
-from planarfriction.models.moment_map import MomentShape, moment_shape, owner
+from planarfriction.models.reduced_map import ReducedShape, owner, reduced_shape
 
 _REMEMBERED = 64
 """Loads whose shapes a model remembers that builds each."""
@@ -58,11 +57,11 @@ class ReducedModel(FrictionModel):
         """`(3,)`"""
         return (3,)
 
-    def shape_at(self, normal_force: float | None) -> MomentShape:
+    def shape_at(self, normal_force: float | None) -> ReducedShape:
         """Second moments of slip and stored steady state at a load [N]; recent loads are remembered."""
         return self.shapes_at([normal_force])[0]
 
-    def shapes_at(self, loads) -> list[MomentShape]:
+    def shapes_at(self, loads) -> list[ReducedShape]:
         """`shape_at` of many loads [N], which costs less than one by one."""
         if not self.patch.depends_on_load:
             return [self._reference for _ in loads]
@@ -130,22 +129,22 @@ class ReducedModel(FrictionModel):
     # ------------------------------------------------------------------ one shape
 
     @functools.cached_property
-    def _reference(self) -> MomentShape:
-        return moment_shape(self.patch, None, self.law.gamma, self.segments, self.speeds)
+    def _reference(self) -> ReducedShape:
+        return reduced_shape(self.patch, None, self.law.gamma, self.segments, self.speeds)
 
     @functools.cached_property
     def _family(self) -> LoadFamily:
         return LoadFamily(self.patch, self.law.gamma, self.segments, self.speeds, self.load_error)
 
     @functools.cached_property
-    def _recent(self) -> dict[float, MomentShape]:
+    def _recent(self) -> dict[float, ReducedShape]:
         return {}
 
-    def _built_at(self, load: float) -> MomentShape:
+    def _built_at(self, load: float) -> ReducedShape:
         if load not in self._recent:
             while len(self._recent) >= _REMEMBERED:
                 self._recent.pop(next(iter(self._recent)))
-            self._recent[load] = moment_shape(self.patch, load, self.law.gamma, self.segments, self.speeds)
+            self._recent[load] = reduced_shape(self.patch, load, self.law.gamma, self.segments, self.speeds)
         return self._recent[load]
 
     @functools.cached_property
@@ -153,7 +152,7 @@ class ReducedModel(FrictionModel):
         """Numbers of law and shape for `step_one`, where the patch does not depend on the load."""
         if self.patch.depends_on_load:
             return None
-        return np.array([*law_numbers(self.law), *self._reference.numbers]), self._reference.data
+        return np.array([*self.law.numbers, *self._reference.numbers]), self._reference.data
 
     def _by_load(self, function, inner: tuple[int, ...], state, twist, load, *more) -> np.ndarray:
         """Apply `function(shape, state, twist, load, ...)` to flat batches, one for each shape that the loads take."""
@@ -171,15 +170,15 @@ class ReducedModel(FrictionModel):
             out[chosen] = function(self.shape_at(value), *(a[chosen] for a in flat))
         return out.reshape(result.shape)
 
-    def _evaluate(self, shape: MomentShape, state, twist, load) -> np.ndarray:
+    def _evaluate(self, shape: ReducedShape, state, twist, load) -> np.ndarray:
         rate, wrench = np.empty_like(state), np.empty_like(state)
-        kernels.evaluate_batch(law_row(self.law), shape.numbers, *_maps(shape), state, twist, rate, wrench)
+        kernels.evaluate_batch(np.array(self.law.numbers), shape.numbers, *_maps(shape), state, twist, rate, wrench)
         return np.concatenate([rate, load[:, None] * wrench], axis=1)
 
-    def _jacobians(self, shape: MomentShape, state, twist, load) -> np.ndarray:
+    def _jacobians(self, shape: ReducedShape, state, twist, load) -> np.ndarray:
         law, factor = self.law, shape.factor
         lin = np.empty((len(load), kernels.LINEAR))
-        kernels.linearise_batch(law_row(law), shape.numbers, *_maps(shape), state, twist, lin)
+        kernels.linearise_batch(np.array(law.numbers), shape.numbers, *_maps(shape), state, twist, lin)
         rate_state, rate_twist = lin[:, 1:10].reshape(-1, 3, 3), lin[:, 10:19].reshape(-1, 3, 3) @ factor
         weight = -load[:, None, None]
         pull = law.sigma_0 * np.eye(3) + law.sigma_1 * rate_state
@@ -189,14 +188,15 @@ class ReducedModel(FrictionModel):
             [rate_state, rate_twist, weight * (factor.T @ pull), weight * (factor.T @ push), unit], axis=1
         )
 
-    def _step(self, shape: MomentShape, state, twist, load, dt) -> np.ndarray:
+    def _step(self, shape: ReducedShape, state, twist, load, dt) -> np.ndarray:
         out, wrench = np.empty_like(state), np.empty_like(state)
-        kernels.step_batch(law_row(self.law), shape.numbers, *_maps(shape), state, twist, load, dt, out, wrench)
+        law = np.array(self.law.numbers)
+        kernels.step_batch(law, shape.numbers, *_maps(shape), state, twist, load, dt, out, wrench)
         return np.concatenate([out, wrench], axis=1)
 
-    def _step_jacobians(self, shape: MomentShape, state, twist, load, dt) -> np.ndarray:
+    def _step_jacobians(self, shape: ReducedShape, state, twist, load, dt) -> np.ndarray:
         slopes = np.empty((len(load), 6, 6))
-        moments_adjoint.jacobians(law_row(self.law), shape.numbers, *_maps(shape), state, twist, dt, slopes)
+        reduced_adjoint.jacobians(np.array(self.law.numbers), shape.numbers, *_maps(shape), state, twist, dt, slopes)
         factor, weight = shape.factor, load[:, None, None]
         loaded = np.where(weight > 0.0, 1.0, 0.0)
         new_state, new_twist = loaded * slopes[:, :3, :3], loaded * slopes[:, :3, 3:] @ factor
@@ -205,7 +205,7 @@ class ReducedModel(FrictionModel):
         return np.concatenate([new_state, new_twist, pull, push, unit], axis=1)
 
 
-def _maps(shape: MomentShape) -> tuple[np.ndarray, np.ndarray]:
+def _maps(shape: ReducedShape) -> tuple[np.ndarray, np.ndarray]:
     """Where the maps of a shape begin, and the numbers that hold them."""
     if shape.other is None:
         return np.array([0, 0, 0]), shape.data

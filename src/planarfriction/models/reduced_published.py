@@ -10,9 +10,8 @@ import numpy as np
 
 from planarfriction import formulas, validation
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels import reduced as kernels
-from planarfriction.kernels import reduced_adjoint
-from planarfriction.kernels.law import law_numbers, law_row
+from planarfriction.kernels import published as kernels
+from planarfriction.kernels import published_adjoint
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
 from planarfriction.limit_surface.base import scaling
 from planarfriction.models.base import FrictionModel, ModelJacobians, StepJacobians
@@ -24,7 +23,7 @@ _REMEMBERED = 64
 ON_LOAD_CHANGE = ("rebuild", "rescale", "keep")
 
 
-class ReducedShape(NamedTuple):
+class PublishedShape(NamedTuple):
     """What the reduced model knows of its patch at one load."""
 
     centre_of_pressure: np.ndarray
@@ -81,7 +80,7 @@ class ReducedModelPublished(FrictionModel):
         """`(3,)`"""
         return (3,)
 
-    def shape_at(self, normal_force: float) -> ReducedShape:
+    def shape_at(self, normal_force: float) -> PublishedShape:
         """Centre of pressure, `r`, `<rho^2>` and limit surface at a load [N]; recent loads are remembered."""
         if not self.patch.depends_on_load or self.on_load_change == "keep":
             return self._reference
@@ -193,19 +192,19 @@ class ReducedModelPublished(FrictionModel):
     # ------------------------------------------------------------------ one shape
 
     @functools.cached_property
-    def _reference(self) -> ReducedShape:
+    def _reference(self) -> PublishedShape:
         surface = self.surface
         second_moment = float(self.patch.second_moment(surface.normal_force))
-        return ReducedShape(self._centre(surface), surface.contact_radius, second_moment, surface, self._root)
+        return PublishedShape(self._centre(surface), surface.contact_radius, second_moment, surface, self._root)
 
     @functools.cached_property
-    def _recent(self) -> dict[float, ReducedShape]:
+    def _recent(self) -> dict[float, PublishedShape]:
         return {}
 
-    def _shape_at(self, normal_force: float) -> ReducedShape:
+    def _shape_at(self, normal_force: float) -> PublishedShape:
         surface = self.surface.at(normal_force)
         kept = self._reference if self.on_load_change == "rescale" else None
-        return ReducedShape(
+        return PublishedShape(
             self._centre(surface),
             surface.contact_radius,
             float(self.patch.second_moment(normal_force)) if kept is None else kept.second_moment,
@@ -227,7 +226,7 @@ class ReducedModelPublished(FrictionModel):
             return None
         shape = self._reference
         numbers = shape.surface.numbers
-        return np.array([*law_numbers(self.law), *shape.numbers, numbers.kind, 0, numbers.size]), numbers.data
+        return np.array([*self.law.numbers, *shape.numbers, numbers.kind, 0, numbers.size]), numbers.data
 
     def _by_load(self, function, inner: tuple[int, ...], state, twist, load, *more) -> np.ndarray:
         """Apply `function(shape, state, twist, load, ...)` to flat batches, one for each shape that the loads take."""
@@ -242,9 +241,9 @@ class ReducedModelPublished(FrictionModel):
                 out[chosen] = function(self.shape_at(value), *(a[chosen] for a in flat))
         return out.reshape(result.shape)
 
-    def _scaled(self, shape: ReducedShape, state, twist):
+    def _scaled(self, shape: PublishedShape, state, twist):
         """Scaled state and twist `[B, 3]`, `u = h v_n`, and the arguments of the bristle equation."""
-        law, scale = self.law, np.array([1.0, 1.0, shape.contact_radius])
+        law, scale = self.law.numbers, np.array([1.0, 1.0, shape.contact_radius])
         v_s = twist @ scaling(shape.centre_of_pressure, shape.contact_radius).T
         v_n = np.linalg.norm(v_s, axis=-1)
         h = shape.surface._direction(v_s)
@@ -253,39 +252,35 @@ class ReducedModelPublished(FrictionModel):
         z_norm = np.linalg.norm(z, axis=-1)
         unit = z / np.where(z_norm > 0.0, z_norm, 1.0)[:, None]
         along = (unit * h).sum(axis=-1) * v_n / h_norm
-        grip = law.sigma_0 / formulas.stribeck(np, v_n, law.mu_c, law.mu_s, law.v_s, law.gamma)
+        grip = law.sigma_0 / formulas.stribeck(np, v_n, law)
         return z, v_s, h, v_n, h_norm, unit, z_norm, (z_norm * grip / h_norm, along, v_n, grip)
 
-    def _rate(self, shape: ReducedShape, state, twist, load) -> np.ndarray:
-        numbers = law_numbers(self.law)
+    def _rate(self, shape: PublishedShape, state, twist, load) -> np.ndarray:
         z, _, h, v_n, _, _, _, arguments = self._scaled(shape, state, twist)
-        k = formulas.bristle_decay(np, *arguments, numbers.elasto_plastic, numbers.breakaway_ratio)
+        k = formulas.bristle_decay(np, *arguments, self.law.numbers)
         return (h * v_n[:, None] - k[:, None] * z) * np.array([1.0, 1.0, shape.contact_radius])
 
-    def _wrench(self, shape: ReducedShape, state, twist, load) -> np.ndarray:
+    def _wrench(self, shape: PublishedShape, state, twist, load) -> np.ndarray:
         law = self.law
         rate = self._rate(shape, state, twist, load)
         to_centre, viscous = self._to_centre(shape)
         velocity = twist @ to_centre.T * viscous
-        centred = formulas.traction(state, rate, velocity, law.sigma_0, law.sigma_1, law.sigma_2)
+        centred = formulas.traction(state, rate, velocity, law)
         return load[:, None] * centred @ to_centre
 
     @staticmethod
-    def _to_centre(shape: ReducedShape) -> tuple[np.ndarray, np.ndarray]:
+    def _to_centre(shape: PublishedShape) -> tuple[np.ndarray, np.ndarray]:
         """The twist at the centre of pressure is `T V`, the wrench about the origin `T' W`; and the diagonal of U."""
         x, y = shape.centre_of_pressure
         return np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]]), np.array([1.0, 1.0, shape.second_moment])
 
-    def _jacobians(self, shape: ReducedShape, state, twist, load) -> np.ndarray:
-        law, numbers = self.law, law_numbers(self.law)
+    def _jacobians(self, shape: PublishedShape, state, twist, load) -> np.ndarray:
+        law = self.law.numbers
         scale = np.array([1.0, 1.0, shape.contact_radius])
         z, v_s, h, v_n, h_norm, unit, z_norm, arguments = self._scaled(shape, state, twist)
         along, grip = arguments[1], arguments[3][:, None]
         k, k_deflection, k_along, k_speed = (
-            value[:, None]
-            for value in formulas.bristle_decay_partials(
-                np, *arguments, numbers.elasto_plastic, numbers.breakaway_ratio
-            )
+            value[:, None] for value in formulas.bristle_decay_partials(np, *arguments, law)
         )
         u_slope = shape.surface._sliding_slope(v_s)
         heading = v_s / np.where(v_n > 0.0, v_n, 1.0)[:, None]
@@ -296,7 +291,7 @@ class ReducedModelPublished(FrictionModel):
         turn = (h_unit * v_n[:, None] - along[:, None] * unit) / np.where(z_norm > 0.0, z_norm, 1.0)[:, None]
         per_h = 1.0 / h_norm[:, None]
         k_z = k_deflection * grip * per_h * unit + k_along * turn
-        stribeck_slope = formulas.stribeck_slope(np, v_n, law.mu_c, law.mu_s, law.v_s, law.gamma)[:, None]
+        stribeck_slope = formulas.stribeck_slope(np, v_n, law)[:, None]
         k_grip = k_deflection * z_norm[:, None] * per_h + k / grip
         k_v = (k_speed - k_grip * grip**2 * stribeck_slope / law.sigma_0) * heading
         k_v += k_along * along_slope - k_deflection * arguments[0][:, None] * per_h * h_norm_slope
@@ -315,11 +310,11 @@ class ReducedModelPublished(FrictionModel):
             axis=1,
         )  # fmt: skip
 
-    def _step(self, shape: ReducedShape, state, twist, load, dt) -> np.ndarray:
+    def _step(self, shape: PublishedShape, state, twist, load, dt) -> np.ndarray:
         numbers = shape.surface.numbers
         out, wrench = np.empty_like(state), np.empty_like(state)
         kernels.step_batch(
-            law_row(self.law),
+            np.array(self.law.numbers),
             shape.numbers,
             np.array([numbers.kind, 0, numbers.size]),
             numbers.data,
@@ -350,13 +345,13 @@ class ReducedModelPublished(FrictionModel):
             return None
         return self._step_jacobians(self._reference, given[None, :3], given[None, 3:6], given[6:7], given[7:])[0]
 
-    def _step_jacobians(self, shape: ReducedShape, state, twist, load, dt) -> np.ndarray:
-        slopes = np.empty((len(load), 6, 7 + reduced_adjoint.NUMBERS))
+    def _step_jacobians(self, shape: PublishedShape, state, twist, load, dt) -> np.ndarray:
+        slopes = np.empty((len(load), 6, 7 + published_adjoint.NUMBERS))
         if self._fixed is not None:
             numbers, data = self._fixed
-            row, surface = numbers[None, :13], numbers[13:].astype(int)
+            row, surface = numbers[None, :-3], numbers[-3:].astype(int)
         else:
             kind, size, data = shape.surface.numbers
-            row, surface = np.array([[*law_numbers(self.law), *shape.numbers]]), np.array([kind, 0, size])
-        reduced_adjoint.jacobians(row, surface, data, state, twist, load, dt, slopes)
+            row, surface = np.array([[*self.law.numbers, *shape.numbers]]), np.array([kind, 0, size])
+        published_adjoint.jacobians(row, surface, data, state, twist, load, dt, slopes)
         return slopes[:, :, :7]

@@ -95,7 +95,7 @@ def _draw_speeds(axes: Any, result: Identification) -> None:
     every = max(1, len(speed) // MOST_POINTS)
     axes.plot(1e3 * speed[::every], coefficient[::every], ".", color="0.6", markersize=2.0, label="measured")
     law, grid = result.law, np.geomspace(max(speed.min(), 1e-4 * speed.max()), speed.max(), 200)
-    steady = formulas.stribeck(np, grid, law.mu_c, law.mu_s, law.v_s, law.gamma) + law.sigma_2 * grid
+    steady = formulas.stribeck(np, grid, law) + law.sigma_2 * grid
     axes.plot(1e3 * grid, steady, color=style.PALETTE[1], label="fitted law, steady sliding")
     axes.set(xscale="log", xlabel="sliding speed [mm/s]", ylabel="friction / load [-]")
     axes.set_ylim(0.0, 1.1 * max(steady.max(), np.quantile(coefficient, 0.995)))

@@ -10,10 +10,9 @@ from planarfriction.kernels import anisotropic
 from planarfriction.kernels import contacts as kernels
 from planarfriction.kernels.body import Motion
 from planarfriction.kernels.contacts import Contacts
-from planarfriction.kernels.law import law_row
-from planarfriction.kernels.moments import LINEAR
+from planarfriction.kernels.reduced import LINEAR
 from planarfriction.models import DistributedModel, ReducedModel
-from planarfriction.models.moment_map import MomentShape, owner
+from planarfriction.models.reduced_map import ReducedShape, owner
 
 SHAPE_INTERVAL = 1e-3
 """Longest time [s] that a patch keeps its shape while the load it depends on changes; held loads need no limit."""
@@ -62,7 +61,7 @@ class _Shapes:
         metric = (root[0, 0], root[0, 1], root[1, 1])
         return self._add(np.array([*shape.numbers, *metric]), (numbers.kind, start, numbers.size))
 
-    def add_moments(self, shapes: list[MomentShape]) -> list[int]:
+    def add_moments(self, shapes: list[ReducedShape]) -> list[int]:
         """All shapes of a contact at once: there may be hundreds."""
         first = len(self.surface)
         factors = np.array([shape.factor for shape in shapes])[:, *np.triu_indices(3)]
@@ -150,7 +149,7 @@ def pack(scene, t_end: float) -> PackedScene:
     positions = np.concatenate(cells)
     contacts = Contacts(
         kind=np.array([_kind(contact.model) for contact in scene.contacts]),
-        law=np.array([law_row(c.model.law) for c in scene.contacts]),
+        law=np.array([np.array(c.model.law.numbers) for c in scene.contacts]),
         mount=np.array([_mount(scene, contact) for contact in scene.contacts]),
         place=np.array([[*c.position, np.cos(c.angle), np.sin(c.angle)] for c in scene.contacts], dtype=float),
         count=np.array([contact.count for contact in scene.contacts], dtype=float),
@@ -191,9 +190,9 @@ def _distinct_loads(patch, held: np.ndarray) -> tuple[list[None] | np.ndarray, n
 
 def _kind(model) -> int:
     if isinstance(model, ReducedModel):
-        return kernels.MOMENTS
-    if not isinstance(model, DistributedModel):
         return kernels.REDUCED
+    if not isinstance(model, DistributedModel):
+        return kernels.PUBLISHED
     return kernels.ANISOTROPIC if model.patch.anisotropic else kernels.DISTRIBUTED
 
 

@@ -11,8 +11,8 @@ except ImportError:
     raise MissingExtraError("torch", "torch") from None
 
 from planarfriction.torch.distributed import DistributedPlanarLuGre
-from planarfriction.torch.moments import MomentPlanarLuGre
-from planarfriction.torch.reduced import ReducedPlanarLuGre
+from planarfriction.torch.published import ReducedPlanarLuGre
+from planarfriction.torch.reduced import MomentPlanarLuGre
 from planarfriction.torch.rollout import Rollout, rollout, simulate, tracking_loss
 
 __all__ = [

@@ -10,13 +10,12 @@ from torch import Tensor, nn
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels.law import law_numbers
+from planarfriction.formulas import LawNumbers
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.models.base import FrictionModel
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.metric import refuse_anisotropy
 from planarfriction.torch import bristle
-from planarfriction.torch.bristle import Law
 from planarfriction.torch.parameters import LAW, PhysicalParameters
 
 TRAINABLE = LAW[:-1]
@@ -56,7 +55,7 @@ class PlanarLuGre(nn.Module):
             raise InvalidValueError("law", "be a LuGre law", law)
         refuse_anisotropy(patch, type(self).__name__)
         self.patch = patch
-        self.elasto_plastic = law_numbers(law).elasto_plastic
+        self.elasto_plastic = law.numbers.elasto_plastic
 
     def _adopt(self, values: dict[str, float], trainable: Iterable[str], **kind: Any) -> None:
         trainable = tuple(trainable)
@@ -195,8 +194,8 @@ class PlanarLuGre(nn.Module):
             raise InvalidValueError("parameters", rule, f"shape {list(parameters.shape)}")
         return parameters
 
-    def _law(self, parameters: Tensor) -> Law:
+    def _law(self, parameters: Tensor) -> LawNumbers:
         """The law's parameters, broadcasting with norms of bristles."""
         trailing = (1,) * len(self.components)
         values = [value.reshape(value.shape + trailing) for value in parameters[..., : len(LAW)].unbind(-1)]
-        return Law(*values, elasto_plastic=self.elasto_plastic)  # pyright: ignore[reportCallIssue]
+        return LawNumbers(**dict(zip(LAW, values, strict=True)), elasto_plastic=self.elasto_plastic)

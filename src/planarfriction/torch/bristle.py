@@ -11,6 +11,7 @@ import torch
 from torch import Tensor
 
 from planarfriction import formulas
+from planarfriction.formulas import LawNumbers
 from planarfriction.torch import namespace as xp
 
 ROUNDING = 256.0
@@ -19,21 +20,6 @@ ROUNDING = 256.0
 Steady sliding sits on the largest deflection to the last bit. Whether rounding lifts a bristle over it must not decide
 about a derivative.
 """
-
-
-class Law(NamedTuple):
-    """Parameters of `LuGre` as tensors that broadcast with the bristles' norms."""
-
-    sigma_0: Tensor
-    sigma_1: Tensor
-    sigma_2: Tensor
-    mu_c: Tensor
-    mu_s: Tensor
-    v_s: Tensor
-    gamma: Tensor
-    breakaway_ratio: Tensor
-    elasto_plastic: float
-    """1.0 or 0.0."""
 
 
 class Drive(NamedTuple):
@@ -49,20 +35,18 @@ class Drive(NamedTuple):
     """`sigma_0/g(speed)` [1/m]."""
 
 
-def drive(law: Law, velocity: Tensor, speed: Tensor, size: Tensor) -> Drive:
+def drive(law: LawNumbers, velocity: Tensor, speed: Tensor, size: Tensor) -> Drive:
     """The drive of bristles, with the grip at its speed."""
-    return Drive(
-        velocity, speed, size, law.sigma_0 / formulas.stribeck(xp, speed, law.mu_c, law.mu_s, law.v_s, law.gamma)
-    )
+    return Drive(velocity, speed, size, law.sigma_0 / formulas.stribeck(xp, speed, law))
 
 
-def rate(law: Law, z: Tensor, by: Drive, axis: int) -> Tensor:
+def rate(law: LawNumbers, z: Tensor, by: Drive, axis: int) -> Tensor:
     """`zdot = u - k z`."""
     z_norm = xp.norm(z, axis)
     return by.velocity - _decay(law, z_norm * (by.grip / by.size), _along(z, z_norm, by, axis), by) * z
 
 
-def step(law: Law, z: Tensor, by: Drive, dt: Tensor, axis: int) -> tuple[Tensor, Tensor]:
+def step(law: LawNumbers, z: Tensor, by: Drive, dt: Tensor, axis: int) -> tuple[Tensor, Tensor]:
     """Bristles and their rates after `dt` of a held drive (see `formulas.relaxation`)."""
     u, to_deflection = by.velocity, by.grip / by.size
     z_norm = xp.norm(z, axis)
@@ -79,18 +63,18 @@ def step(law: Law, z: Tensor, by: Drive, dt: Tensor, axis: int) -> tuple[Tensor,
     norm = xp.norm(new, axis)
     along = _along(new, norm, by, axis)
     if law.elasto_plastic:
-        back = _back(norm * to_deflection, formulas.reachable_deflection(xp, deflection, law.elasto_plastic))
+        back = _back(norm * to_deflection, formulas.reachable_deflection(xp, deflection, law))
         new, norm = new * back, norm * back
     return new, u - _decay(law, norm * to_deflection, along, by) * new
 
 
-def traction(law: Law, z: Tensor, zdot: Tensor, velocity: Tensor) -> Tensor:
+def traction(law: LawNumbers, z: Tensor, zdot: Tensor, velocity: Tensor) -> Tensor:
     """Friction per unit normal load, per component."""
-    return formulas.traction(z, zdot, velocity, law.sigma_0, law.sigma_1, law.sigma_2)
+    return formulas.traction(z, zdot, velocity, law)
 
 
-def _decay(law: Law, deflection: Tensor, along: Tensor, by: Drive) -> Tensor:
-    return formulas.bristle_decay(xp, deflection, along, by.speed, by.grip, law.elasto_plastic, law.breakaway_ratio)
+def _decay(law: LawNumbers, deflection: Tensor, along: Tensor, by: Drive) -> Tensor:
+    return formulas.bristle_decay(xp, deflection, along, by.speed, by.grip, law)
 
 
 def _along(z: Tensor, z_norm: Tensor, by: Drive, axis: int) -> Tensor:

@@ -8,7 +8,6 @@ import torch
 from torch import Tensor, nn
 
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels.law import law_numbers
 from planarfriction.laws import LuGre
 from planarfriction.models import DistributedModel
 from planarfriction.patch import ContactPatch
@@ -49,7 +48,7 @@ class DistributedPlanarLuGre(PlanarLuGre):
         self.reference = DistributedModel(patch, law)
         self.components = (2, patch.cells)
         kind = {"dtype": dtype or torch.get_default_dtype(), "device": device}
-        numbers, chosen = law_numbers(law)._asdict(), tuple(trainable)
+        numbers, chosen = law.numbers._asdict(), tuple(trainable)
         self._adopt({name: numbers[name] for name in LAW}, [name for name in chosen if name != "weights"], **kind)
         self.register_buffer("positions", torch.as_tensor(patch.positions.T.copy(), **kind))
         raw = torch.as_tensor(patch.weights().copy(), **kind).log()

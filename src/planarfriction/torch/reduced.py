@@ -1,4 +1,4 @@
-"""The reduced model as a PyTorch module."""
+"""The reduced model of bristle moments as a PyTorch module."""
 
 from __future__ import annotations
 
@@ -7,95 +7,129 @@ from collections.abc import Iterable
 import torch
 from torch import Tensor
 
-from planarfriction.kernels.law import law_numbers
-from planarfriction.laws import LuGre
-from planarfriction.limit_surface import LimitSurface
-from planarfriction.models import ReducedModelPublished
+from planarfriction.errors import InvalidValueError
+from planarfriction.formulas import LawNumbers
+from planarfriction.laws import ElastoPlastic, LuGre
+from planarfriction.models import ReducedModel, reduced_arrays
+from planarfriction.models.reduced_arrays import Held, ReducedNumbers
 from planarfriction.patch import ContactPatch
-from planarfriction.torch import bristle
 from planarfriction.torch import namespace as xp
-from planarfriction.torch.base import TRAINABLE, PlanarLuGre, Prepared
+from planarfriction.torch.base import PlanarLuGre, Prepared
 from planarfriction.torch.parameters import LAW
-from planarfriction.torch.surfaces import surface_of
+
+PARAMETERS = tuple(name for name in LAW if name != "gamma")
+"""Physical parameters, in the order of their vector: the law but gamma, for which the map is made."""
 
 
-class ReducedPlanarLuGre(PlanarLuGre):
-    """Reduced LuGre friction, differentiable: three bristles `z = (z_x, z_y, z_tau)` [m, m, m^2] and a limit surface.
+class MomentPlanarLuGre(PlanarLuGre):
+    """Reduced LuGre friction of bristle moments, differentiable: three states `(z_x, z_y, z_theta)` [m].
 
-    With `S = diag(1, 1, r)`, `V_S = S V`, `v_n = |V_S|`: `zdot = S h(V) v_n - beta sigma_0 v_n/g(v_n) z`,
-    `W = -(sigma_0 z + sigma_1 zdot + sigma_2 U V) f_N`; the same numbers as `ReducedModelPublished`.
-
-    `surface` is any limit surface (None: the published table). `trainable` names the physical parameters that are
-    `nn.Parameter`s, of the law or of the shape (`contact_radius`, `second_moment`, `centre_x`, `centre_y`); the limit
-    surface and all other parameters are buffers. A new contact radius scales the torque and leaves the form of the
-    limit surface as it is. The shape does not follow the load: of a patch that depends on it, `surface` fixes the shape
-    by its `normal_force`.
-
-    Source: Waltersson and Karayiannidis 2024, section IV.
+    The equations and the numbers of `ReducedModel`; its patch, the map of steady sliding included, is held in buffers.
+    `trainable` names the parameters of the law that are `nn.Parameter`s; `gamma` cannot be one, the map is made for it.
+    A patch whose shape depends on the load keeps that of `normal_force` [N]; `segments` and `speeds` as in
+    `ReducedModel`.
     """
 
     components = (3,)
     axis = -1
-    reference: ReducedModelPublished
+    reference: ReducedModel
+    factor: Tensor
+    quartic: Tensor
+    scale: Tensor
+    flat: Tensor
+    rest_part: Tensor
 
     def __init__(
         self,
         patch: ContactPatch,
         law: LuGre,
-        surface: LimitSurface | None = None,
+        normal_force: float | None = None,
         *,
-        trainable: Iterable[str] = TRAINABLE,
+        segments: int = 24,
+        speeds: int = 14,
+        trainable: Iterable[str] = PARAMETERS[:-1],
         dtype: torch.dtype | None = None,
         device: torch.device | str | None = None,
     ):
         super().__init__(patch, law)
-        when = "keep" if surface is not None else "rebuild"
-        self.reference = ReducedModelPublished(patch, law, surface, on_load_change=when)  # pyright: ignore
-        shape = self.reference._reference
+        trainable = tuple(trainable)
+        if "gamma" in trainable:
+            raise InvalidValueError("trainable", "not name gamma: the map of steady sliding is made for it", trainable)
         kind = {"dtype": dtype or torch.get_default_dtype(), "device": device}
-        self.surface = surface_of(shape.surface, **kind)
-        x, y = shape.centre_of_pressure.tolist()
-        numbers = law_numbers(law)._asdict()
-        values = {name: numbers[name] for name in LAW}
-        values |= {"contact_radius": shape.contact_radius, "second_moment": shape.second_moment}
-        self._adopt(values | {"centre_x": x, "centre_y": y}, trainable, **kind)
+        self.gamma = law.gamma
+        self.reference = ReducedModel(patch, law, segments=segments, speeds=speeds)
+        shape = self.reference.shape_at(normal_force)
+        self._lever = shape.contact_radius
+        for name, values in zip(_BUFFERS, reduced_arrays.numbers_of(shape), strict=True):
+            self.register_buffer(name, torch.as_tensor(values, **kind).clone())
+        numbers = law.numbers._asdict()
+        self._adopt({name: numbers[name] for name in PARAMETERS}, trainable, **kind)
 
     @property
     def lever(self) -> float:
-        """Contact radius of the patch [m]."""
-        return float(self.reference._reference.contact_radius)
+        """Radius of gyration of the pressure [m]."""
+        return self._lever
+
+    def law(self) -> LuGre:
+        """The law with the present values."""
+        now = dict(zip(self.names, self.physical().tolist(), strict=True))
+        breakaway = now.pop("breakaway_ratio")
+        return LuGre(**now, gamma=self.gamma, elasto_plastic=ElastoPlastic(breakaway) if self.elasto_plastic else None)
 
     def prepare(self, parameters: Tensor) -> Prepared:
-        """The law, `S` as a vector, `r`, `<rho^2>` and the centre of pressure."""
-        radius, second_moment, x, y = parameters[..., len(LAW) :].split(1, -1)
-        scale = torch.cat([torch.ones_like(radius), torch.ones_like(radius), radius], -1)
-        return Prepared(self._law(parameters), (scale, radius, second_moment, x, y))
+        """The law; the shape is fixed."""
+        values = dict(zip(PARAMETERS, parameters[..., None].unbind(-2), strict=True))
+        return Prepared(LawNumbers(**values, gamma=self.gamma, elasto_plastic=self.elasto_plastic), ())
 
-    def _drive(self, prepared: Prepared, v: Tensor) -> tuple[bristle.Drive, Tensor]:
-        """What drives the scaled bristle, and `U V`."""
-        _, radius, second_moment, x, y = prepared.shape
-        vx, vy, omega = v.split(1, -1)
-        vx, vy = vx - omega * y, vy + omega * x
-        scaled = _joined(vx, vy, radius * omega)
-        speed = xp.norm(scaled, -1)
-        u = self.surface(scaled, speed)
-        u_norm = xp.norm(u, -1)
-        slides = u_norm > 0.0
-        size = torch.where(slides, u_norm / torch.where(slides, speed, 1.0), 1.0)
-        return bristle.drive(prepared.law, u, speed, size), _joined(vx, vy, second_moment * omega)
+    def forward(self, z: Tensor, v: Tensor, f_n: Tensor | float, *, parameters: Tensor | None = None):
+        """Rates `z_dot` of the moments and wrench."""
+        law = self.prepare(self._vector(parameters)).law
+        z, v, load = self._inputs(z, v, f_n)
+        by = self._held(law, v)
+        rate = reduced_arrays.rate(xp, law, z, by)
+        return rate, load[..., None] * reduced_arrays.wrench(xp, law, self._shape, z, rate, by.u)
 
-    def _wrench(self, prepared: Prepared, z: Tensor, zdot: Tensor, velocity: Tensor) -> Tensor:
-        """Wrench about the origin, per unit load."""
-        _, _, _, x, y = prepared.shape
-        fx, fy, tau = bristle.traction(prepared.law, z, zdot, velocity).split(1, -1)
-        return _joined(fx, fy, tau + x * fy - y * fx)
+    def advance(self, prepared: Prepared, z: Tensor, v: Tensor, load: Tensor, dt: Tensor) -> tuple[Tensor, Tensor]:
+        """`step` of checked inputs."""
+        by = self._held(prepared.law, v)
+        new, zdot = self._next(prepared.law, z, by, dt)
+        wrench = reduced_arrays.wrench(xp, prepared.law, self._shape, new, zdot, by.u)
+        return self._kept(new, load), load[..., None] * wrench
 
-    def _scaled(self, prepared: Prepared, z: Tensor) -> Tensor:
-        return z / prepared.shape[0]
+    def roll_out(
+        self, parameters: Tensor | None, z: Tensor, v: Tensor, load: Tensor, dt: Tensor
+    ) -> tuple[Tensor, Tensor]:
+        """`advance` through twists `[..., T, 3]` and loads `[..., T]`: all wrenches `[..., T, 3]` and the last state.
 
-    def _raw(self, prepared: Prepared, z: Tensor) -> Tensor:
-        return z * prepared.shape[0]
+        Only the moments go step by step; the steady states are read, and the wrenches made, for all steps at once.
+        """
+        values = self._vector(parameters)
+        once, steps = self.prepare(values).law, self.prepare(values[..., None, :]).law
+        by = self._held(steps, v)
+        along = zip(*(_steps(part, v.shape[-2]) for part in by), strict=True)
+        states, rates = [], []
+        for now, f_n in zip(along, load.unbind(-1), strict=True):
+            new, zdot = self._next(once, z, Held(*now), dt)
+            states.append(new)
+            rates.append(zdot)
+            z = self._kept(new, f_n)
+        wrenches = reduced_arrays.wrench(xp, steps, self._shape, torch.stack(states, -2), torch.stack(rates, -2), by.u)
+        return load[..., None] * wrenches, z
+
+    @property
+    def _shape(self) -> ReducedNumbers:
+        return ReducedNumbers(*(getattr(self, name) for name in _BUFFERS))
+
+    def _held(self, law, v: Tensor) -> Held:
+        return reduced_arrays.held(xp, law, self._shape, v)
+
+    def _next(self, law, z: Tensor, by: Held, dt: Tensor) -> tuple[Tensor, Tensor]:
+        return reduced_arrays.advance(xp, law, z, by, dt[..., None], torch.finfo(z.dtype).eps)
 
 
-def _joined(*components: Tensor) -> Tensor:
-    return torch.cat(torch.broadcast_tensors(*components), -1)
+_BUFFERS = ("factor", "quartic", "scale", "flat", "rest_part")
+
+
+def _steps(part: Tensor | float, count: int) -> Iterable[Tensor | float]:
+    """What a step holds, for each of the steps."""
+    return part.unbind(-2) if isinstance(part, Tensor) else [part] * count

@@ -11,7 +11,7 @@ from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.torch import adjoint
 from planarfriction.torch.base import PlanarLuGre
-from planarfriction.torch.reduced import ReducedPlanarLuGre
+from planarfriction.torch.published import ReducedPlanarLuGre
 
 METHODS = ("adjoint", "eager")
 """Compiled roll-out with its discrete adjoint; every step an operation of PyTorch, recorded by autograd."""

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.models import moment_arrays
+from planarfriction.models import reduced_arrays
 
 torch = pytest.importorskip("torch", reason="needs PyTorch: pip install 'planarfriction[torch]'")
 
 from planarfriction.torch import MomentPlanarLuGre, rollout, simulate, tracking_loss  # noqa: E402
 from planarfriction.torch import namespace as xp  # noqa: E402
-from planarfriction.torch.moments import PARAMETERS  # noqa: E402
+from planarfriction.torch.reduced import PARAMETERS  # noqa: E402
 
 pytestmark = pytest.mark.torch
 
@@ -95,7 +95,7 @@ def test_a_map_of_six_faces_is_read_as_the_odd_one_that_it_repeats():
     flat, rest = (torch.cat([part, part.flip(1, 2) * signs]) for part in (three.flat, three.rest))
     law = model.prepare(model.physical()).law
     twist = tensor(samples(reference)[1])
-    odd, other = (moment_arrays.held(xp, law, s, twist).q for s in (three, three._replace(flat=flat, rest=rest)))
+    odd, other = (reduced_arrays.held(xp, law, s, twist).q for s in (three, three._replace(flat=flat, rest=rest)))
     torch.testing.assert_close(odd, other, rtol=1e-12, atol=1e-20)
 
 

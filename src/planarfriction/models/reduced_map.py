@@ -19,7 +19,7 @@ LEAST_SHARE = 0.25
 """The floor of the dissipation, over the least dissipation of all stored directions."""
 
 
-class MomentShape(NamedTuple):
+class ReducedShape(NamedTuple):
     """What the moment model knows of its patch at one load."""
 
     factor: np.ndarray
@@ -43,12 +43,12 @@ class MomentShape(NamedTuple):
         return float(self.factor[2, 2])
 
 
-def moment_shape(
+def reduced_shape(
     patch: ContactPatch, normal_force: float | None, gamma: float, segments: int, speeds: int
-) -> MomentShape:
+) -> ReducedShape:
     """What a patch is at a load; `segments` and `speeds` as in `ReducedModel`."""
     factor = slip_factor(patch, normal_force)
-    return MomentShape(factor, moment_map(ScaledCells(patch, normal_force, factor), gamma, segments, speeds))
+    return ReducedShape(factor, reduced_map(ScaledCells(patch, normal_force, factor), gamma, segments, speeds))
 
 
 def owner(data: np.ndarray) -> tuple[np.ndarray, int]:
@@ -88,7 +88,7 @@ def _metric_factor(patch: ContactPatch, weights: np.ndarray) -> np.ndarray:
     return np.swapaxes(np.linalg.cholesky(second), -1, -2) @ shift
 
 
-def moment_map(cells: ScaledCells, gamma: float, segments: int, speeds: int) -> np.ndarray:
+def reduced_map(cells: ScaledCells, gamma: float, segments: int, speeds: int) -> np.ndarray:
     """Numbers of the map of `cells`, as `kernels.steady` reads them; with an asymmetry for all six faces.
 
     `h_0`, which has the kinks, takes `segments` squares each way on a quarter of a face; the rest

@@ -1,13 +1,13 @@
-"""Friction laws: frozen parameters with validation (the equations are in `planarfriction.formulas`)."""
+"""LuGre: bristles that bend, slip and are damped, with Stribeck and viscous terms."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
+from planarfriction.formulas import LawNumbers
+from planarfriction.laws.base import FrictionLaw
 
 
 @dataclass(frozen=True)
@@ -28,7 +28,7 @@ class ElastoPlastic:
 
 
 @dataclass(frozen=True)
-class LuGre:
+class LuGre(FrictionLaw):
     """LuGre friction per unit normal load, with Stribeck and viscous terms.
 
     `g(v) = mu_c + (mu_s - mu_c) exp(-|v/v_s|^gamma)`, `zdot = v - beta sigma_0 |v| / g z`,
@@ -65,33 +65,17 @@ class LuGre:
             raise InvalidValueError("elasto_plastic", "be an ElastoPlastic or None", self.elasto_plastic)
 
     @property
-    def largest_deflection(self) -> float:
-        """Steady-state deflection at high speed, `mu_c / sigma_0` [m]: the natural scale of a bristle."""
-        return self.mu_c / self.sigma_0
-
-
-@dataclass(frozen=True)
-class Coulomb:
-    """Coulomb friction: the wrench lies on the limit surface scaled by `mu f_N`."""
-
-    mu: float
-    """Friction coefficient [-]."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "mu", validation.positive("mu", self.mu))
-
-    def wrench(self, surface, twist, normal_force) -> np.ndarray:
-        """Friction wrench `mu f_N W(V)` on the sliding body about the contact frame's origin [N, N, N m].
-
-        `surface` is any limit surface, `twist` has shape `[..., 3]` [m/s, m/s, rad/s], `normal_force` `[...]` [N].
-        A body at rest gets a zero wrench: Coulomb's law alone cannot tell the force of a stuck contact.
-        """
-        load = validation.numbers("normal_force", normal_force)
-        if not (np.isfinite(load).all() and (load >= 0.0).all()):
-            raise InvalidValueError("normal_force", "be finite and >= 0", normal_force)
-        direction = surface.wrench(twist)
-        try:
-            return self.mu * load[..., None] * direction
-        except ValueError:
-            shapes = f"shapes {list(load.shape)} and {list(direction.shape[:-1])}"
-            raise InvalidValueError("normal_force", "broadcast with the twist", shapes) from None
+    def numbers(self) -> LawNumbers:
+        """The law as the formulas see it."""
+        elastic = self.elasto_plastic
+        return LawNumbers(
+            self.sigma_0,
+            self.sigma_1,
+            self.sigma_2,
+            self.mu_c,
+            self.mu_s,
+            self.v_s,
+            self.gamma,
+            0.0 if elastic is None else 1.0,
+            0.5 if elastic is None else elastic.breakaway_ratio,  # unused by plain bristles, but 1 - it is divided by
+        )

@@ -1,8 +1,8 @@
-"""The moment model for arrays of PyTorch and JAX: `kernels.steady` and `kernels.moments` as `f(xp, ...)`.
+"""The moment model for arrays of PyTorch and JAX: `kernels.steady` and `kernels.reduced` as `f(xp, ...)`.
 
 `xp` is the namespace of the formulas with `stack`, `root` (square root, slope 0 at 0) and `whole` (integer part within
 bounds). Vectors are `[..., 3]`, scalars and the law's parameters `[..., 1]` or plain numbers. Derivatives are finite
-everywhere and those of `kernels.moments_adjoint`: at rest the step is that of a vanishing twist, `z + u dt`.
+everywhere and those of `kernels.reduced_adjoint`: at rest the step is that of a vanishing twist, `z + u dt`.
 """
 
 from __future__ import annotations
@@ -12,30 +12,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction import formulas
+from planarfriction.formulas import LawNumbers
 from planarfriction.kernels.steady import HEADER, QUARTIC
-from planarfriction.models.moment_map import MomentShape
+from planarfriction.models.reduced_map import ReducedShape
 
 ROUNDING = 256.0
 """Excess over the largest deflection, in units of the rounding error, that counts as rounding."""
 
 
-class MomentLaw(NamedTuple):
-    """Parameters of `LuGre` but gamma, for which the map was made."""
-
-    sigma_0: Any
-    sigma_1: Any
-    sigma_2: Any
-    mu_c: Any
-    mu_s: Any
-    v_s: Any
-    breakaway_ratio: Any
-    """Unused by plain bristles."""
-    elasto_plastic: float
-    """1.0 or 0.0."""
-
-
-class MomentNumbers(NamedTuple):
-    """A `MomentShape` as arrays."""
+class ReducedNumbers(NamedTuple):
+    """A `ReducedShape` as arrays."""
 
     factor: Any
     """F `[3, 3]`, upper triangular."""
@@ -67,12 +53,12 @@ class Held(NamedTuple):
     moves: Any
 
 
-def numbers_of(shape: MomentShape) -> MomentNumbers:
+def numbers_of(shape: ReducedShape) -> ReducedNumbers:
     """The numbers of a shape, in NumPy."""
     data = shape.data
     faces, n, m, levels = (int(value) for value in data[:4])
     middle = HEADER + faces * (2 * n + 1) ** 2 * 12
-    return MomentNumbers(
+    return ReducedNumbers(
         shape.factor,
         data[QUARTIC:HEADER].reshape(6, 6),
         data[4:6],
@@ -132,7 +118,7 @@ def _levels(xp, t, count: int):
     return xp.stack([i, i + 1, i + 2, i + 3], -1), xp.stack(weights, -1) * (1.0 / 6.0)
 
 
-def _sliding(xp, law: MomentLaw, shape: MomentNumbers, n, t):
+def _sliding(xp, law: LawNumbers, shape: ReducedNumbers, n, t):
     """`sigma_0 z_ss` of unit vectors n at `t` `[..., 1]`."""
     face, a, b, sign = _spot(xp, n, shape.flat.shape[0])
     face = face[..., None, None]
@@ -146,7 +132,7 @@ def _sliding(xp, law: MomentLaw, shape: MomentNumbers, n, t):
     return sign[..., None] * ((law.mu_s - drop * t) * flat + drop * rest)
 
 
-def _evenness(xp, shape: MomentNumbers, n):
+def _evenness(xp, shape: ReducedNumbers, n):
     """`<v^2>/sqrt(<v^4>)` of the cells' speeds at unit vectors n."""
     x, y, s = n[..., 0], n[..., 1], n[..., 2]
     m = xp.stack([x * x, y * y, s * s, x * y, x * s, y * s], -1)
@@ -156,7 +142,7 @@ def _evenness(xp, shape: MomentNumbers, n):
 # ---------------------------------------------------------------------- a twist
 
 
-def held(xp, law: MomentLaw, shape: MomentNumbers, twist) -> Held:
+def held(xp, law: LawNumbers, shape: ReducedNumbers, twist) -> Held:
     """The scaled twist, its steady state and what follows from both."""
     f = shape.factor
     vx, vy, omega = twist[..., 0], twist[..., 1], twist[..., 2]
@@ -176,11 +162,11 @@ def held(xp, law: MomentLaw, shape: MomentNumbers, twist) -> Held:
     return Held(u, q, safe - decay * q, decay, v * power * per_q2, per_q2, even, moves)
 
 
-def _closure(xp, law: MomentLaw, deflection, share, even):
-    """`beta` (see `kernels.moments.closure`)."""
+def _closure(xp, law: LawNumbers, deflection, share, even):
+    """`beta` (see `kernels.reduced.closure`)."""
     deflected = deflection > 0.0
     cosine = xp.where(deflected, share / xp.where(deflected, deflection, 1.0), 0.0)
-    return formulas.slip_share(xp, deflection, cosine, even, law.elasto_plastic, law.breakaway_ratio)
+    return formulas.slip_share(xp, deflection, cosine, even, law)
 
 
 def _place(xp, z, by: Held):
@@ -188,22 +174,22 @@ def _place(xp, z, by: Held):
     return xp.root(dot(z, z) * by.per_q2), dot(z, by.q) * by.per_q2
 
 
-def rate(xp, law: MomentLaw, z, by: Held):
+def rate(xp, law: LawNumbers, z, by: Held):
     """`zdot = V_G - beta (lambda z + s m)`."""
     deflection, share = _place(xp, z, by)
     beta = _closure(xp, law, deflection, share, by.even)
     return by.u - xp.where(by.moves, beta * (by.decay * z + share * by.m), 0.0)
 
 
-def wrench(xp, law: MomentLaw, shape: MomentNumbers, z, zdot, u):
+def wrench(xp, law: LawNumbers, shape: ReducedNumbers, z, zdot, u):
     """Wrench about the origin per unit load, `F' g`."""
-    g = formulas.traction(z, zdot, u, law.sigma_0, law.sigma_1, law.sigma_2)
+    g = formulas.traction(z, zdot, u, law)
     f, x, y, s = shape.factor, g[..., 0], g[..., 1], g[..., 2]
     return xp.stack([f[0, 0] * x, f[0, 1] * x + f[1, 1] * y, f[0, 2] * x + f[1, 2] * y + f[2, 2] * s], -1)
 
 
-def advance(xp, law: MomentLaw, z, by: Held, dt, epsilon: float):
-    """Moments and their rates after `dt` of a held twist (see `kernels.moments.advance`).
+def advance(xp, law: LawNumbers, z, by: Held, dt, epsilon: float):
+    """Moments and their rates after `dt` of a held twist (see `kernels.reduced.advance`).
 
     `epsilon` is the rounding error of the numbers.
     """
@@ -223,7 +209,7 @@ def advance(xp, law: MomentLaw, z, by: Held, dt, epsilon: float):
     new = left * z + (mean * by.decay * dt) * by.q + across * by.m
     if law.elasto_plastic:
         reached = xp.root(dot(new, new) * by.per_q2)
-        largest = formulas.reachable_deflection(xp, size, law.elasto_plastic)
+        largest = formulas.reachable_deflection(xp, size, law)
         over = reached > (1.0 + ROUNDING * epsilon) * largest
         new = new * formulas.cap(xp, xp.where(over, reached, 0.0), largest)
     new = xp.where(by.moves, new, z + dt * by.u)

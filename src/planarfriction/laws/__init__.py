@@ -1,0 +1,7 @@
+"""Friction laws: frozen parameters with validation (the equations are in `planarfriction.formulas`)."""
+
+from planarfriction.laws.base import FrictionLaw
+from planarfriction.laws.coulomb import Coulomb
+from planarfriction.laws.lugre import ElastoPlastic, LuGre
+
+__all__ = ["Coulomb", "ElastoPlastic", "FrictionLaw", "LuGre"]

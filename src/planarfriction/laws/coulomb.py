@@ -1,0 +1,37 @@
+"""Coulomb: friction of a sliding patch, without memory and without a value at rest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.errors import InvalidValueError
+
+
+@dataclass(frozen=True)
+class Coulomb:
+    """Coulomb friction: the wrench lies on the limit surface scaled by `mu f_N`."""
+
+    mu: float
+    """Friction coefficient [-]."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "mu", validation.positive("mu", self.mu))
+
+    def wrench(self, surface, twist, normal_force) -> np.ndarray:
+        """Friction wrench `mu f_N W(V)` on the sliding body about the contact frame's origin [N, N, N m].
+
+        `surface` is any limit surface, `twist` has shape `[..., 3]` [m/s, m/s, rad/s], `normal_force` `[...]` [N].
+        A body at rest gets a zero wrench: Coulomb's law alone cannot tell the force of a stuck contact.
+        """
+        load = validation.numbers("normal_force", normal_force)
+        if not (np.isfinite(load).all() and (load >= 0.0).all()):
+            raise InvalidValueError("normal_force", "be finite and >= 0", normal_force)
+        direction = surface.wrench(twist)
+        try:
+            return self.mu * load[..., None] * direction
+        except ValueError:
+            shapes = f"shapes {list(load.shape)} and {list(direction.shape[:-1])}"
+            raise InvalidValueError("normal_force", "broadcast with the twist", shapes) from None
