@@ -46,12 +46,8 @@ def jacobians(law_row, z, twist, x, y, w, load, dt, new_z, new_twist, wrench_z, 
             ux, uy = twist[b, 0] - twist[b, 2] * py, twist[b, 1] + twist[b, 2] * px
             cell = _cell(law, zx, zy, ux, uy, dt[b])
             step = cell[0]
-            fx = weights[m] * formulas.traction(
-                step.nx, ux - step.k * step.nx, ux, law.sigma_0, law.sigma_1, law.sigma_2
-            )
-            fy = weights[m] * formulas.traction(
-                step.ny, uy - step.k * step.ny, uy, law.sigma_0, law.sigma_1, law.sigma_2
-            )
+            fx = weights[m] * formulas.traction(step.nx, ux - step.k * step.nx, ux, law)
+            fy = weights[m] * formulas.traction(step.ny, uy - step.k * step.ny, uy, law)
             wrench_load[b, 0] += fx
             wrench_load[b, 1] += fy
             wrench_load[b, 2] += px * fy - py * fx
