@@ -6,11 +6,14 @@ is predicted from the places of the feet and their loads, with nothing fitted, a
 fitted on 30 pushes:
 
     python examples/measured_pushes.py FOLDER --out out/
+
+The convex quartic needs an extra, `pip install 'planarfriction[quartic]'`; without it the rest runs.
 """
 
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -161,9 +164,15 @@ SURFACES: dict[str, Callable[[pf.ContactPatch], pf.limit_surface.LimitSurface]] 
 """The patch itself, and what is often put in its place: both made of the patch, not of pushes."""
 
 
+def has_quartic() -> bool:
+    """Whether the package that fits the quartic is installed."""
+    return importlib.util.find_spec("cvxpy") is not None
+
+
 def predictions(layout: Layout) -> dict[str, np.ndarray]:
     """Unit twists of all pushes by each of SURFACES, with nothing fitted; friction is minus the pusher's wrench."""
-    return {name: unit(kind(layout.patch()).twist(-layout.wrenches)) for name, kind in SURFACES.items()}
+    kinds = {name: kind for name, kind in SURFACES.items() if name != "quartic" or has_quartic()}
+    return {name: unit(kind(layout.patch()).twist(-layout.wrenches)) for name, kind in kinds.items()}
 
 
 def feet_twists(feet: np.ndarray, shares: np.ndarray, wrenches: np.ndarray) -> np.ndarray:
@@ -247,16 +256,20 @@ class Fitted:
     """Parameters of each split, `[splits, P]`."""
 
 
+def fits_of(layout: Layout) -> list[str]:
+    """What can be fitted to a layout: FITS of feet, and the refitted quartic."""
+    return [*(FITS if layout.feet is not None else ()), *(["quartic (15)"] if has_quartic() else ())]
+
+
 def fit_all(layout: Layout, plain: np.ndarray, sets: Sequence, tell: Callable[[], None]) -> dict[str, Fitted]:
-    """Each of FITS and the refitted quartic in each split, after the errors without any fit on the same pushes."""
+    """Each of `fits_of` in each split, after the errors without any fit on the same pushes."""
     tested = np.array([test for _, test in sets])
     results = {"nothing": Fitted(tested, plain[tested], np.zeros((len(sets), 0)))}
-    methods: dict = dict(FITS) if layout.feet is not None else {}
-    for name in [*methods, "quartic (15)"]:
+    for name in fits_of(layout):
         errors, values = [], []
         for chosen, test in sets:
-            if name in methods:
-                predict, start, steps = methods[name]
+            if name in FITS:
+                predict, start, steps = FITS[name]
                 values.append(fit(predict, start(layout), steps, layout, chosen))
                 found = predict(layout, test, values[-1])
             else:
@@ -273,7 +286,7 @@ def run(layouts: Sequence[Layout], count: int, seed: int, errors: dict, fits: di
     """Predict and fit layout after layout, into `errors` and `fits`: what is done stays when it is interrupted."""
     for layout in layouts:
         errors[layout.name] = {name: error(found, layout.twists) for name, found in predictions(layout).items()}
-    with progress(len(layouts) * count * (len(FITS) + 1) if count else 0) as tell:
+    with progress(count * sum(len(fits_of(layout)) for layout in layouts)) as tell:
         for layout in layouts if count else []:
             sets = splits(count, len(layout.twists), seed)
             fits[layout.name] = fit_all(layout, errors[layout.name]["patch"], sets, lambda at=layout: tell(at.name))
@@ -330,6 +343,8 @@ def compare(path: Path, out: Path | None, count: int, seed: int) -> int:
         print(f"interrupted: {len(fits)} of {len(layouts)} layouts are fitted", file=sys.stderr)
         code = 130
     done = [layout for layout in layouts if layout.name in errors]
+    if not has_quartic():
+        print("Left out: the quartic, and its fit. It needs cvxpy: pip install 'planarfriction[quartic]'\n")
     if done:
         show_predictions(done, errors, published, seed)
         show_fits([layout for layout in done if layout.name in fits], fits, seed)

@@ -66,19 +66,19 @@ def number(value: float) -> str:
 
 def show_predictions(layouts: Sequence[Any], errors: Mapping, published: pd.DataFrame, seed: int) -> None:
     """Print mean angles without any fit beside the authors' after a fit, then means over the layouts of a board."""
-    rows = []
+    kinds, rows = list(errors[layouts[0].name]), []
     for layout in layouts:
         ours = [f"{e.mean():.1f} ± {e.std(ddof=1) / np.sqrt(len(e)):.1f}" for e in errors[layout.name].values()]
         median = f"{np.median(errors[layout.name]['patch']):.1f}"
         rows.append(
             (layout.name, *ours, median, *(number(published_mean(published, [layout.name], m)) for m in THEIRS))
         )
-    headings = ["layout", "patch", "quartic of it", "ellipsoid of it", "patch, median"]
+    headings = ["layout", *(kind if kind == "patch" else f"{kind} of it" for kind in kinds), "patch, median"]
     headings += [f"theirs:\n{name}" for name in THEIRS.values()]
     print_table("Angle to the measured twist [deg]: mean ± standard error, nothing fitted", headings, rows)
     rows = []
     for board, names in boards(layouts).items():
-        ours = [[errors[name][kind] for name in names] for kind in STYLES]
+        ours = [[errors[name][kind] for name in names] for kind in kinds]
         ends = [np.percentile(drawings(each, seed), [2.5, 97.5]) for each in ours]
         cells = [
             f"{np.mean([e.mean() for e in each]):.1f}\n{a:.1f} .. {b:.1f}"
@@ -88,7 +88,7 @@ def show_predictions(layouts: Sequence[Any], errors: Mapping, published: pd.Data
         again = [number(published_mean(published, names, m, 16)) for m in THEIRS]
         if set(again) != {"-"}:
             rows.append((f"{board}, their second run", *[""] * len(ours), *again))
-    headings = ["feet on", *STYLES, *(f"theirs:\n{name}" for name in THEIRS.values())]
+    headings = ["feet on", *kinds, *(f"theirs:\n{name}" for name in THEIRS.values())]
     print_table("Mean over the layouts with feet [deg], 95 % interval below (bootstrap over pushes)", headings, rows)
 
 
@@ -151,7 +151,9 @@ def draw(layouts: Sequence[Any], errors: Mapping, published: pd.DataFrame, predi
     figure = Figure(figsize=(10.0, 4.6), dpi=100, layout="constrained")
     left, right = figure.subplots(1, 2, width_ratios=(1.25, 1.0))
     rows = -np.arange(len(layouts))
-    for shift, (name, (colour, marker)) in zip((0.2, 0.0, -0.2), STYLES.items(), strict=True):
+    kinds = list(errors[layouts[0].name])
+    for shift, name in zip(np.linspace(0.2, -0.2, len(kinds)), kinds, strict=True):
+        colour, marker = STYLES[name]
         each = [errors[layout.name][name] for layout in layouts]
         ends = np.array([np.percentile(drawings([e], seed), [2.5, 97.5]) for e in each]).T
         mean = np.array([e.mean() for e in each])

@@ -14,8 +14,8 @@ import pytest
 
 import planarfriction as pf
 
-pytest.importorskip("cvxpy", reason="cvxpy is not installed: the example compares with the convex quartic, an extra")
-pytestmark = pytest.mark.quartic
+without_quartic = importlib.util.find_spec("cvxpy") is None
+needs_quartic = pytest.mark.skipif(without_quartic, reason="cvxpy is not installed: the convex quartic is an extra")
 
 SCRIPT = Path(__file__).parents[1] / "examples" / "measured_pushes.py"
 FEET = np.array([[-0.04, -0.04], [0.08, -0.04], [-0.04, 0.08]])
@@ -106,6 +106,8 @@ def folder(tmp_path_factory):
     return written(tmp_path_factory.mktemp("pushes") / "data")
 
 
+@needs_quartic
+@pytest.mark.quartic
 def test_the_patch_explains_its_pushes_to_the_noise(example, folder, tmp_path, capsys):
     assert example.main([str(folder), "--splits", "0", "--out", str(tmp_path / "new" / "folder")]) == 0
     errors = pd.read_csv(tmp_path / "new" / "folder" / "measured_pushes.csv").groupby("config").mean()
@@ -160,11 +162,26 @@ def test_splits_hold_out_and_repeat(example):
     assert all((a == c).all() and (b == d).all() for (a, b), (c, d) in zip(sets, again, strict=True))
 
 
+@needs_quartic
+@pytest.mark.quartic
 def test_fits_are_shown(example, folder, capsys, monkeypatch):
     monkeypatch.setattr(example, "FITS", {"load fractions (2)": example.FITS["load fractions (2)"]})
     assert example.main([str(folder / "zhou_icra16_pushes.csv"), "--splits", "2"]) == 0  # a file stands for its folder
     printed = capsys.readouterr().out
     assert "load fractions (2)" in printed and "quartic (15)" in printed and "95 % interval" in printed
+
+
+def test_without_cvxpy_all_but_the_quartic_runs_and_the_rest_is_named(example, folder, tmp_path, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "cvxpy", None)  # an import of it raises
+    monkeypatch.setattr(example, "FITS", {"load fractions (2)": example.FITS["load fractions (2)"]})
+    assert example.main([str(folder), "--splits", "1", "--out", str(tmp_path)]) == 0
+    printed = capsys.readouterr().out
+    first, tables = printed.split("\n", 1)
+    assert "quartic" in first and "pip install 'planarfriction[quartic]'" in first
+    assert "quartic of it" not in tables and "quartic (15)" not in tables  # that of the authors stays
+    assert "ellipsoid of it" in tables and "load fractions (2)" in tables
+    assert list(pd.read_csv(tmp_path / "measured_pushes.csv")) == ["config", "push", "patch", "ellipsoid"]
+    assert (tmp_path / "measured_pushes.png").exists()
 
 
 def test_interrupt_keeps_what_is_done(example, folder, capsys, monkeypatch):
