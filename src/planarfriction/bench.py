@@ -198,7 +198,7 @@ def _numpy_table(patch: ContactPatch, segments: int = 20) -> np.ndarray:
 
 def _published_loop(twists: np.ndarray) -> float:
     """Time of the published reduced model's steps through `twists`, compiled [s]."""
-    from planarfriction.kernels import published as kernels
+    from planarfriction.kernels import published_step as kernels
 
     model = ReducedModelPublished(_disc(), _law())
     shape = model.shape_at(1.0)
@@ -215,7 +215,7 @@ def _step_reduced_loop(name: str, full: bool) -> Measurement:
 
 
 def _step_distributed_loop(name: str, full: bool) -> Measurement:
-    from planarfriction.kernels import distributed as kernels
+    from planarfriction.kernels import distributed_step as kernels
 
     model, twists = DistributedModel(_disc(), _law()), _mixed_twists(1000)
     x, y = (np.ascontiguousarray(column) for column in model.patch.positions.T)
@@ -240,7 +240,7 @@ def _step_reduced_call(name: str, full: bool) -> Measurement:
 
 
 def _moments_loop(model: ReducedModel, twists: np.ndarray) -> float:
-    from planarfriction.kernels import reduced as kernels
+    from planarfriction.kernels import reduced_step as kernels
 
     shape, z, wrench = model.shape_at(1.0), model.rest(), np.empty_like(twists)
     arguments = np.array(model.law.numbers), shape.numbers, np.zeros(3, dtype=int), shape.data

@@ -53,7 +53,7 @@ def ratios(errors: Errors) -> dict[str, dict[str, float]]:
 
 def step_costs(shape: str = "Circle") -> dict[str, Any]:
     """Median time of a step in a compiled loop [s] of both reduced models, in turns, and the median of their ratios."""
-    from planarfriction.kernels import published, reduced
+    from planarfriction.kernels import published_step, reduced_step
 
     patch = PUBLISHED_PATCHES[shape]()
     directions = np.random.default_rng(7).normal(size=(STEPS, 3)) * [1.0, 1.0, 150.0]
@@ -63,15 +63,9 @@ def step_costs(shape: str = "Circle") -> dict[str, Any]:
     numbers, law = theirs.surface.numbers, np.array(LAW.numbers)
     stored = np.array([numbers.kind, 0, numbers.size])
     loops = {
-        "reduced": lambda z: published.step_sequence(law, theirs.numbers, stored, numbers.data, z, *fixed, wrench),
-        "moments": lambda z: reduced.step_sequence(
-            np.array(LAW.numbers),
-            ours.shape_at(1.0).numbers,
-            np.zeros(3, int),
-            ours.shape_at(1.0).data,
-            z,
-            *fixed,
-            wrench,
+        "reduced": lambda z: published_step.step_sequence(law, theirs.numbers, stored, numbers.data, z, *fixed, wrench),
+        "moments": lambda z: reduced_step.step_sequence(
+            law, ours.numbers, np.zeros(3, int), ours.data, z, *fixed, wrench
         ),
     }
     times: dict[str, list[float]] = {name: [] for name in loops}

@@ -1,4 +1,4 @@
-"""One step of one bristle, differentiated: what `published.step` and `distributed.step` do with a bristle, backwards.
+"""One step of one bristle, differentiated: what both bristle models do with one, backwards.
 
 A bristle `z` driven by `u` (three components; a cell of the distributed model leaves the third zero) steps by
 

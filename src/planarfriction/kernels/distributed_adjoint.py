@@ -33,7 +33,7 @@ def _pull_back(cell, zx, zy, ux, uy, dt, bx, by, k_bar):
 
 @jit
 def jacobians(law_row, z, twist, x, y, w, load, dt, new_z, new_twist, wrench_z, wrench_twist, wrench_load):
-    """Derivatives of `distributed.step` for a batch: `z` [B, 2, n], `twist` [B, 3], `w` [B or 1, n], `load`, `dt` [B].
+    """Derivatives of a step for a batch: `z` [B, 2, n], `twist` [B, 3], `w` [B or 1, n], `load`, `dt` [B].
 
     Of the new bristles to the old `new_z` [B, 2, 2, n] and to the twist `new_twist` [B, 2, n, 3]; of the wrench
     `wrench_z` [B, 3, 2, n], `wrench_twist` [B, 3, 3] and `wrench_load` [B, 3]. All come in as zeros.

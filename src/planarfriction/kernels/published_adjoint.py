@@ -1,8 +1,8 @@
 """The step of the reduced model, differentiated, and what needs its derivatives one contact at a time.
 
 One contact has a row of numbers: the law (`kernels.law`) and the shape (cop_x, cop_y, r, <rho^2>), as in
-`published.step_one`; its gradients have the same order. `surface` is `(kind, start, size)` of `kernels.surfaces`, whose
-numbers are held fixed: `r` acts through `V_S` alone.
+`published_step.step_one`; its gradients have the same order. `surface` is `(kind, start, size)` of `kernels.surfaces`,
+whose numbers are held fixed: `r` acts through `V_S` alone.
 
 With cotangents `W'` of the wrench and `z'` of the new state, one step backwards is
 

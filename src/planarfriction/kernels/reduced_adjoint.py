@@ -1,10 +1,10 @@
 """The step of the moment model, differentiated.
 
-`reduced.advance` is a function of the state z, the scaled twist u, its steady state q and the breakaway b, the law's
-ratio times the evenness. `linearise` walks through it and keeps the partial derivatives; `tangent` takes a direction
-`(z', u', q', b')` through them and `pull_back`, its transpose, cotangents back. At the kinks: a state that the cap just
-touches counts as not capped (steady sliding sits on it to the last bit); at rest the step is that of a vanishing twist,
-`z + u dt`.
+`reduced_step.advance` is a function of the state z, the scaled twist u, its steady state q and the breakaway b, the
+law's ratio times the evenness. `linearise` walks through it and keeps the partial derivatives; `tangent` takes a
+direction `(z', u', q', b')` through them and `pull_back`, its transpose, cotangents back. At the kinks: a state that
+the cap just touches counts as not capped (steady sliding sits on it to the last bit); at rest the step is that of a
+vanishing twist, `z + u dt`.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Stage(NamedTuple):
 
 
 class Step(NamedTuple):
-    """A step with its partial derivatives; names as in `reduced.advance`."""
+    """A step with its partial derivatives; names as in `reduced_step.advance`."""
 
     u: tuple
     q: tuple

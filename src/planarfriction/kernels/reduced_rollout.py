@@ -17,8 +17,9 @@ import numpy as np
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import inlined, jit, kernel
 from planarfriction.kernels.law import LAW, law_of
-from planarfriction.kernels.reduced import advance, to_origin
+from planarfriction.kernels.reduced import to_origin
 from planarfriction.kernels.reduced_adjoint import linearise, pull_back, rate, tangent
+from planarfriction.kernels.reduced_step import advance
 from planarfriction.kernels.steady import evenness, scaled_twist, sliding, steady_by_law, steady_slopes
 
 NUMBERS = LAW + 7
@@ -62,7 +63,7 @@ def _traction(law, z, slip, u):
 def rollout(rows, surface, data, z, twist, load, dt, first, last, wrench, states):
     """Steps of the contacts `first` to `last`: `z` [B, 3] in place, wrenches into `wrench` [B, T, 3].
 
-    The state before each step goes into `states` [B, T, 3], unless that is empty. As in `reduced.step_sequence` the
+    The state before each step goes into `states` [B, T, 3], unless that is empty. The
     next twist's steady state is read ahead.
     """
     steps, kept = dt.shape[0], states.shape[1] > 0

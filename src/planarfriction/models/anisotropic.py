@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from planarfriction import formulas
-from planarfriction.kernels import distributed as kernels
 from planarfriction.kernels import distributed_adjoint
+from planarfriction.kernels import distributed_step as kernels
 from planarfriction.laws import LuGre
 from planarfriction.models.base import StepJacobians
 

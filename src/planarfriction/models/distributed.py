@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from planarfriction import formulas
-from planarfriction.kernels import distributed as kernels
 from planarfriction.kernels import distributed_adjoint
+from planarfriction.kernels import distributed_step as kernels
 from planarfriction.models import anisotropic
 from planarfriction.models.base import FrictionModel, ModelJacobians, StepJacobians
 

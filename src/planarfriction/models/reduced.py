@@ -8,8 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.kernels import reduced as kernels
 from planarfriction.kernels import reduced_adjoint
+from planarfriction.kernels import reduced_step as kernels
+from planarfriction.kernels.reduced import LINEAR
 from planarfriction.models.base import FrictionModel, ModelJacobians, StepJacobians
 from planarfriction.models.load_family import LoadFamily
 from planarfriction.models.reduced_map import ReducedShape, owner, reduced_shape
@@ -177,7 +178,7 @@ class ReducedModel(FrictionModel):
 
     def _jacobians(self, shape: ReducedShape, state, twist, load) -> np.ndarray:
         law, factor = self.law, shape.factor
-        lin = np.empty((len(load), kernels.LINEAR))
+        lin = np.empty((len(load), LINEAR))
         kernels.linearise_batch(np.array(law.numbers), shape.numbers, *_maps(shape), state, twist, lin)
         rate_state, rate_twist = lin[:, 1:10].reshape(-1, 3, 3), lin[:, 10:19].reshape(-1, 3, 3) @ factor
         weight = -load[:, None, None]

@@ -10,8 +10,8 @@ import numpy as np
 
 from planarfriction import formulas, validation
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels import published as kernels
 from planarfriction.kernels import published_adjoint
+from planarfriction.kernels import published_step as kernels
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
 from planarfriction.limit_surface.base import scaling
 from planarfriction.models.base import FrictionModel, ModelJacobians, StepJacobians
