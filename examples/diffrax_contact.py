@@ -60,7 +60,7 @@ def pull(time, pose) -> jax.Array:
     return jnp.array([force[0], force[1], arm[0] * force[1] - arm[1] * force[0]])
 
 
-def slope(time, state: State, model: pj.ReducedPlanarLuGre) -> State:
+def slope(time, state: State, model: pj.ReducedModelPublished) -> State:
     """Right-hand side: the block and its bristles."""
     to_table = turn(state.pose[2])
     twist, z = to_table.T @ state.twist, state.bristles * DEFLECTION
@@ -70,7 +70,7 @@ def slope(time, state: State, model: pj.ReducedPlanarLuGre) -> State:
 
 
 @jax.jit
-def drag(model: pj.ReducedPlanarLuGre, times) -> State:
+def drag(model: pj.ReducedModelPublished, times) -> State:
     """States at `times` [s], from rest with the spring slack."""
     rest = State(jnp.zeros(3), jnp.zeros(3), jnp.zeros(3))
     return diffrax.diffeqsolve(
@@ -116,7 +116,7 @@ def draw(times, states: State, forces: np.ndarray, file: Path) -> None:
 def run(duration: float = 8.0, surface: type = pf.LimitSurfaceTable) -> tuple[np.ndarray, State, np.ndarray]:
     """Times `[T]`, states and wrenches of the spring `[T, 3]`."""
     patch = pf.ContactPatch.rectangle(SIDE, cells=11)
-    model = pj.reduced(patch, LAW, surface(patch))
+    model = pj.ReducedModelPublished(patch, LAW, surface(patch))
     times = jnp.linspace(0.0, duration, round(400 * duration) + 1)
     states = drag(model, times)
     return np.asarray(times), states, np.asarray(jax.vmap(pull)(times, states.pose))

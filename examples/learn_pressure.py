@@ -29,7 +29,7 @@ import torch
 
 import planarfriction as pf
 from planarfriction.plots.style import PALETTE, PRESSURE_MAP, new_figure, tidy
-from planarfriction.torch import DistributedPlanarLuGre, simulate, tracking_loss
+from planarfriction.torch import DistributedModel, simulate, tracking_loss
 
 CELLS, CELL = 8, 3e-3  # cells of a side, side of a cell [m]
 LAW = pf.LuGre(mu_c=0.7, mu_s=0.7, sigma_0=1e5, sigma_1=10.0, sigma_2=0.0)
@@ -75,7 +75,7 @@ def held(twists: np.ndarray) -> torch.Tensor:
 
 def measure(patch: pf.ContactPatch, twists: torch.Tensor, rng: np.random.Generator) -> torch.Tensor:
     """Wrenches of the true patch, with noise."""
-    model = DistributedPlanarLuGre(patch, LAW, trainable=(), dtype=torch.float64)
+    model = DistributedModel(patch, LAW, trainable=(), dtype=torch.float64)
     wrenches = simulate(model, twists, LOAD, DT)
     size = NOISE * LAW.mu_c * LOAD * np.array([1.0, 1.0, float(patch.contact_radius())])
     return wrenches + torch.tensor(rng.normal(size=wrenches.shape) * size)
@@ -87,7 +87,7 @@ def measure(patch: pf.ContactPatch, twists: torch.Tensor, rng: np.random.Generat
 def learn(twists: torch.Tensor, wrenches: torch.Tensor, steps: int) -> Learnt:
     """Weights of the cells, from equal ones, by Adam on the misfit of all wrenches."""
     flat = pf.ContactPatch.from_pressure(np.ones((CELLS, CELLS)), CELL)
-    model = DistributedPlanarLuGre(flat, LAW, trainable=("weights",), dtype=torch.float64)
+    model = DistributedModel(flat, LAW, trainable=("weights",), dtype=torch.float64)
     optimiser = torch.optim.Adam(model.parameters(), lr=0.1)
     schedule = torch.optim.lr_scheduler.CosineAnnealingLR(optimiser, steps)
     losses = []

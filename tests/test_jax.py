@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import importlib
 import importlib.util
@@ -56,9 +55,11 @@ def double_precision():
 def pairs(kind: str, law: str):
     """The same model in NumPy and in JAX."""
     if kind == "distributed":
-        return pf.DistributedModel(PATCH, LAWS[law]), pj.distributed(PATCH, LAWS[law])
+        return pf.DistributedModel(PATCH, LAWS[law]), pj.DistributedModel(PATCH, LAWS[law])
     surface = SURFACES[kind](PATCH)
-    return pf.ReducedModelPublished(PATCH, LAWS[law], surface=surface), pj.reduced(PATCH, LAWS[law], surface)
+    return pf.ReducedModelPublished(PATCH, LAWS[law], surface=surface), pj.ReducedModelPublished(
+        PATCH, LAWS[law], surface
+    )
 
 
 def states(model, count: int, seed: int = 0) -> np.ndarray:
@@ -102,7 +103,7 @@ def test_steady_sliding_depends_on_mu_c_and_the_load_alone():
 
     def force(parameters, twist, load):
         slide = jnp.tile(twist, (20, 1))
-        return pj.simulate(dataclasses.replace(model, parameters=parameters), slide, load, 1e-2).wrenches[-1, 0]
+        return pj.simulate(model.replace(parameters=parameters), slide, load, 1e-2).wrenches[-1, 0]
 
     slopes = jax.jit(jax.grad(force, argnums=(0, 1, 2)))(model.parameters, jnp.array([speed, 0.0, 0.0]), load)
     by_parameter = slopes[0]._asdict()
@@ -121,7 +122,7 @@ def test_a_stuck_contact_is_a_spring():
     slow = np.tile([1e-5, 0.0, 0.0], (count, 1))
 
     def force(parameters):
-        return pj.simulate(dataclasses.replace(model, parameters=parameters), slow, load, dt).wrenches[-1, 0]
+        return pj.simulate(model.replace(parameters=parameters), slow, load, dt).wrenches[-1, 0]
 
     slopes = jax.jit(jax.grad(force))(model.parameters)
     assert slopes.sigma_0 == pytest.approx(-1e-5 * count * dt * load, rel=1e-12)
@@ -136,7 +137,7 @@ def test_wrench_is_linear_in_the_weights_of_the_cells():
     @jax.jit
     @jax.jacobian
     def slope(weights):
-        return dataclasses.replace(model, weights=weights).wrench(state, twist, 2.0)
+        return model.replace(weights=weights).wrench(state, twist, 2.0)
 
     slopes = slope(model.weights)
     close(slopes @ model.weights, numpy_model.wrench(state, twist, 2.0))
@@ -202,7 +203,7 @@ def test_gradients_are_central_differences(kind, law):
     @jax.jit
     def loss(change):
         parameters, state, twist, load = unravel(start + flat_sizes * change)
-        run = pj.simulate(dataclasses.replace(model, parameters=parameters), twist, load, dt, state)
+        run = pj.simulate(model.replace(parameters=parameters), twist, load, dt, state)
         return (run.wrenches * weights).sum() + (run.state / sizes[1]).sum()
 
     gradient = jax.jit(jax.grad(loss))(np.zeros_like(start))
@@ -221,7 +222,7 @@ def test_gradients_are_central_differences(kind, law):
 def hard(model) -> tuple[np.ndarray, np.ndarray]:
     """Twists and loads that meet every kink: rest, no load, edges and corners of table cells, steady sliding."""
     x, y, r = 0.0, 0.0, 0.005
-    if isinstance(model, pj.ReducedPlanarLuGre):
+    if isinstance(model, pj.ReducedModelPublished):
         x, y, r = (float(getattr(model.parameters, name)) for name in ("centre_x", "centre_y", "contact_radius"))
     edges = np.array([*EDGES, *NEAR_THE_AXIS]) * (1.0, 1.0, 1.0 / r)
     edges[:, :2] += edges[:, 2:] * (y, -x)  # these twists are scaled ones about the centre of pressure
@@ -257,7 +258,7 @@ def test_scan_and_adjoint_agree_at_kinks_too(kind, law):
     sides = np.random.default_rng(0).normal(size=motion.shape) * (1.0, 1.0, 100.0)
 
     def loss(parameters, state, motion, loads, method):
-        changed = dataclasses.replace(model, parameters=parameters)
+        changed = model.replace(parameters=parameters)
         run = pj.simulate(changed, motion, loads, 1e-4, state, method=method)
         return (run.wrenches * sides).sum() + (run.state * jnp.array([1e6, 1e6, 1e8])).sum()
 
@@ -284,7 +285,7 @@ def test_adjoint_under_vmap_and_in_single_precision():
     motion = sway(60, 1e-4)
 
     def loss(mu, dt, load, motion, method):
-        changed = dataclasses.replace(model, parameters=model.parameters._replace(mu_c=mu))
+        changed = model.replace(parameters=model.parameters._replace(mu_c=mu))
         return (pj.simulate(changed, motion, load, dt, method=method).wrenches ** 2).sum()
 
     several = jnp.linspace(0.5, 1.1, 3)
@@ -313,7 +314,7 @@ def test_adjoint_says_what_it_cannot_differentiate():
     motion = sway(5, 1e-4)
     with pytest.raises(InvalidValueError, match="surface must be held fixed with method='adjoint'"):
         jax.grad(lambda m: pj.simulate(m, motion, 1.0, 1e-4, method="adjoint").wrenches.sum())(model)
-    with pytest.raises(InvalidValueError, match="model must be a ReducedPlanarLuGre"):
+    with pytest.raises(InvalidValueError, match="model must be a ReducedModelPublished"):
         pj.simulate(pairs("distributed", "wide")[1], motion, 1.0, 1e-4, method="adjoint")
 
 
@@ -354,7 +355,7 @@ def test_vmap_over_models_states_and_loads():
     loads = jnp.linspace(0.5, 2.0, 4)
 
     def last(mu, load):
-        changed = dataclasses.replace(model, parameters=model.parameters._replace(mu_c=mu))
+        changed = model.replace(parameters=model.parameters._replace(mu_c=mu))
         return pj.simulate(changed, motion, load, 1e-4).wrenches[-1]
 
     together = jax.jit(jax.vmap(last))(frictions, loads)
@@ -397,7 +398,7 @@ def test_wrong_input_is_named():
     with pytest.raises(InvalidValueError, match="method must be one of scan, adjoint"):
         pj.simulate(model, np.zeros((4, 3)), 1.0, 1e-3, method="adjont")
     with pytest.raises(InvalidValueError, match="patch must be a ContactPatch"):
-        pj.distributed("disc", PLAIN)
+        pj.DistributedModel("disc", PLAIN)
 
 
 def test_a_missing_package_names_its_extra(monkeypatch):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import functools
 import itertools
 
@@ -43,7 +42,7 @@ def double_precision():
 def pair(law: str):
     """The same model in NumPy and in JAX."""
     model = pf.ReducedModel(PATCH, LAWS[law], **SMALL)
-    return model, pj.moments(model)
+    return model, pj.ReducedModel(PATCH, LAWS[law], **SMALL)
 
 
 def samples(model: pf.ReducedModel, seed: int = 1):
@@ -76,7 +75,7 @@ def slopes():
     """Derivatives of a step of the elasto-plastic model by state, twist, load and law, for a batch."""
 
     def step(z, v, f_n, parameters, dt):
-        return pj.step(dataclasses.replace(pair("elasto-plastic")[1], parameters=parameters), z, v, f_n, dt)
+        return pj.step(pair("elasto-plastic")[1].replace(parameters=parameters), z, v, f_n, dt)
 
     return jax.jit(jax.vmap(jax.jacrev(step, (0, 1, 2, 3)), (0, 0, 0, None, None)))
 
@@ -86,7 +85,7 @@ def loss_and_slopes():
     """Loss of a roll-out of the elasto-plastic model with its derivatives by law and twists, and the roll-out."""
 
     def loss(parameters, twists):
-        run = pj.simulate(dataclasses.replace(pair("elasto-plastic")[1], parameters=parameters), twists, 2.0, 1e-4)
+        run = pj.simulate(pair("elasto-plastic")[1].replace(parameters=parameters), twists, 2.0, 1e-4)
         return jnp.sum(jnp.square(run.wrenches * WEIGHTS)), run
 
     return jax.jit(jax.value_and_grad(loss, (0, 1), has_aux=True))
@@ -171,9 +170,9 @@ def test_a_roll_out_is_that_of_numpy_and_its_gradient_that_of_differences():
 @pytest.mark.slow
 def test_gradients_of_roll_outs_are_those_of_pytorch():
     torch = pytest.importorskip("torch", reason="needs PyTorch: pip install 'planarfriction[torch]'")
-    from planarfriction.torch import MomentPlanarLuGre, simulate
+    from planarfriction.torch import ReducedModel, simulate
 
-    model = MomentPlanarLuGre(PATCH, LAWS["elasto-plastic"], dtype=torch.float64, **SMALL)
+    model = ReducedModel(PATCH, LAWS["elasto-plastic"], dtype=torch.float64, **SMALL)
     parameters, twists = model.physical().detach().requires_grad_(), torch.tensor(sway(40), requires_grad=True)
     wrenches = simulate(model, twists, 2.0, 1e-4, parameters=parameters)
     theirs = torch.autograd.grad((wrenches * torch.tensor(WEIGHTS)).square().sum(), [parameters, twists])
@@ -188,8 +187,12 @@ def test_gradients_of_roll_outs_are_those_of_pytorch():
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: pj.moments(pf.ReducedModelPublished(PATCH, LAWS["plain"])), "model must be a ReducedModel"),
-        (lambda: pj.simulate(pair("plain")[1], sway(4), 1.0, 1e-4, method="adjoint"), "model must be a ReducedPlanar"),
+        (lambda: pj.ReducedModel("disc", LAWS["plain"]), "patch must be a ContactPatch"),
+        (lambda: pair("plain")[1].replace(weights=1.0), "leaf must be one of parameters, shape, got 'weights'"),
+        (
+            lambda: pj.simulate(pair("plain")[1], sway(4), 1.0, 1e-4, method="adjoint"),
+            "model must be a ReducedModelPublished",
+        ),
     ],
 )
 def test_wrong_input_is_one_line(make, message):

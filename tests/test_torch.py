@@ -10,7 +10,7 @@ from planarfriction.autodiff import PARAMETERS
 
 torch = pytest.importorskip("torch", reason="needs PyTorch: pip install 'planarfriction[torch]'")
 
-from planarfriction.torch import DistributedPlanarLuGre, ReducedPlanarLuGre  # noqa: E402
+from planarfriction.torch import DistributedModel, ReducedModelPublished  # noqa: E402
 
 pytestmark = pytest.mark.torch
 
@@ -36,11 +36,11 @@ def tensor(value):
 
 
 def reduced(law=ELASTIC, surface=None, **options):
-    return ReducedPlanarLuGre(PATCH, law, surface, **{"dtype": torch.float64, **options})
+    return ReducedModelPublished(PATCH, law, surface, **{"dtype": torch.float64, **options})
 
 
 def distributed(law=ELASTIC, **options):
-    return DistributedPlanarLuGre(PATCH, law, **{"dtype": torch.float64, **options})
+    return DistributedModel(PATCH, law, **{"dtype": torch.float64, **options})
 
 
 def samples(count, rng):
@@ -130,13 +130,13 @@ def test_one_contact_and_batches_that_broadcast():
 def test_a_patch_whose_shape_follows_the_load_keeps_the_shape_of_its_surface():
     patch = pf.ContactPatch.disc(0.01, cells=9, pressure=pf.SoftFinger(c=0.005, n=1 / 3, k=2.0))
     surface = pf.LimitSurfaceTable(patch, normal_force=2.0)
-    model = ReducedPlanarLuGre(patch, PLAIN, surface, dtype=torch.float64)
+    model = ReducedModelPublished(patch, PLAIN, surface, dtype=torch.float64)
     reference = pf.ReducedModelPublished(patch, PLAIN, surface, on_load_change="keep")
     state, twist, load = samples(10, np.random.default_rng(3))
     assert_equal([model.step(tensor(state), tensor(twist), tensor(load), 1e-4)[1]],
                  [reference.step(state, twist, load, 1e-4)[1]])  # fmt: skip
     with pytest.raises(pf.FrictionError, match="shape that does not depend on the load"):
-        DistributedPlanarLuGre(patch, PLAIN)
+        DistributedModel(patch, PLAIN)
 
 
 @every_surface
@@ -210,7 +210,7 @@ def test_weights_stay_a_pressure_distribution():
         (lambda: reduced(PLAIN, trainable=("breakaway_ratio",)), "not name breakaway_ratio for plain bristles"),
         (lambda: distributed(trainable=("contact_radius",)), "trainable must be one of"),
         (lambda: reduced("lugre"), "law must be a LuGre law"),
-        (lambda: ReducedPlanarLuGre("disc", PLAIN), "patch must be a ContactPatch"),
+        (lambda: ReducedModelPublished("disc", PLAIN), "patch must be a ContactPatch"),
         (lambda: reduced().set(mu_s=0.1), "mu_s must be >= mu_c"),
         (lambda: reduced().set(mu=0.1), "parameter must be one of"),
         (lambda: reduced().set(sigma_0=-1.0), "sigma_0 must be > 0"),

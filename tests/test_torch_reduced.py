@@ -12,7 +12,7 @@ from planarfriction.models import reduced_arrays
 
 torch = pytest.importorskip("torch", reason="needs PyTorch: pip install 'planarfriction[torch]'")
 
-from planarfriction.torch import MomentPlanarLuGre, rollout, simulate, tracking_loss  # noqa: E402
+from planarfriction.torch import ReducedModel, rollout, simulate, tracking_loss  # noqa: E402
 from planarfriction.torch import namespace as xp  # noqa: E402
 from planarfriction.torch.reduced import PARAMETERS  # noqa: E402
 
@@ -35,7 +35,7 @@ def tensor(value):
 
 
 def module(law="elasto-plastic", **options):
-    return MomentPlanarLuGre(PATCH, LAWS[law], **{"dtype": torch.float64, **SMALL, **options})
+    return ReducedModel(PATCH, LAWS[law], **{"dtype": torch.float64, **SMALL, **options})
 
 
 def compiled(law):
@@ -118,13 +118,13 @@ def test_it_equals_the_compiled_model(law):
 def test_a_patch_whose_shape_follows_the_load_keeps_that_of_one_load():
     patch = pf.ContactPatch.disc(0.01, cells=9, pressure=pf.SoftFinger(c=0.005, n=1 / 3, k=2.0))
     law = LAWS["plain"]
-    model = MomentPlanarLuGre(patch, law, 2.0, dtype=torch.float64, **SMALL)
+    model = ReducedModel(patch, law, 2.0, dtype=torch.float64, **SMALL)
     state, twist = [1e-7, 0.0, 2e-7], [1e-3, 0.0, 0.1]
     wanted = pf.ReducedModel(patch, law, **SMALL).step(state, twist, 2.0, 1e-4)
     for got, want in zip(model.step(tensor(state), tensor(twist), 2.0, 1e-4), wanted, strict=True):
         np.testing.assert_allclose(got.detach().numpy(), want, rtol=1e-12)
     with pytest.raises(pf.FrictionError, match="normal_force must be"):
-        MomentPlanarLuGre(patch, law)
+        ReducedModel(patch, law)
 
 
 def test_float32_is_as_close_as_its_digits():
@@ -257,8 +257,8 @@ def test_state_dicts_travel():
         (lambda: module("plain", trainable=("breakaway_ratio",)), "not name breakaway_ratio for plain bristles"),
         (lambda: module().set(gamma=1.0), "parameter must be one of"),
         (lambda: module()(tensor([0.0]), tensor([0.0] * 3), 1.0), r"z must have shape \[..., 3\]"),
-        (lambda: simulate(module(), sway(4), 1.0, 1e-4, method="adjoint"), "be 'eager' for MomentPlanarLuGre"),
-        (lambda: MomentPlanarLuGre("disc", LAWS["plain"]), "patch must be a ContactPatch"),
+        (lambda: simulate(module(), sway(4), 1.0, 1e-4, method="adjoint"), "be 'eager' for ReducedModel"),
+        (lambda: ReducedModel("disc", LAWS["plain"]), "patch must be a ContactPatch"),
     ],
 )
 def test_wrong_input_is_one_line(make, message):

@@ -10,8 +10,8 @@ import planarfriction as pf
 torch = pytest.importorskip("torch", reason="needs PyTorch: pip install 'planarfriction[torch]'")
 
 from planarfriction.torch import (  # noqa: E402
-    DistributedPlanarLuGre,
-    ReducedPlanarLuGre,
+    DistributedModel,
+    ReducedModelPublished,
     rollout,
     simulate,
     tracking_loss,
@@ -39,7 +39,7 @@ def tensor(value):
 
 
 def reduced(law="elasto-plastic", surface="published", **options):
-    return ReducedPlanarLuGre(PATCH, LAWS[law], SURFACES[surface], **{"dtype": torch.float64, **options})
+    return ReducedModelPublished(PATCH, LAWS[law], SURFACES[surface], **{"dtype": torch.float64, **options})
 
 
 def profile(steps):
@@ -96,7 +96,7 @@ def test_wrenches_are_those_of_the_steps():
 
 def test_distributed_wrenches_are_those_of_the_steps():
     law = LAWS["elasto-plastic"]
-    model = DistributedPlanarLuGre(PATCH, law, dtype=torch.float64)
+    model = DistributedModel(PATCH, law, dtype=torch.float64)
     v, loads = profile(40)
     wrenches = simulate(model, tensor(v), tensor(loads), DT)
     reference, state = pf.DistributedModel(PATCH, law), np.zeros((2, PATCH.cells))
@@ -196,7 +196,7 @@ def test_training_finds_the_friction(kind):
         pf.LuGre(mu_c=0.6, mu_s=0.7, sigma_0=1e5, sigma_1=10.0),
         pf.LuGre(mu_c=0.5, mu_s=0.5, sigma_0=8e4, sigma_1=10.0),
     )
-    model_type = ReducedPlanarLuGre if kind == "reduced" else DistributedPlanarLuGre
+    model_type = ReducedModelPublished if kind == "reduced" else DistributedModel
     steps = 80 if kind == "reduced" else 20
     v, _ = profile(steps)
     reference = simulate(model_type(PATCH, truth, dtype=torch.float64), tensor(v), 2.0, 1e-3).detach()
@@ -256,7 +256,7 @@ def test_a_gradient_to_the_time_step_is_eager():
         ({"f_n": tensor([1.0, 2.0])}, r"f_n must broadcast with \[..., 4\]"),
         ({"f_n": -1.0}, "loads must be >= 0"),
         ({"v_profile": tensor([[0.0, np.nan, 0.0]] * 4)}, "twists must be finite"),
-        ({"model": DistributedPlanarLuGre(PATCH, LAWS["plain"]), "method": "adjoint"}, "for DistributedPlanarLuGre"),
+        ({"model": DistributedModel(PATCH, LAWS["plain"]), "method": "adjoint"}, "for DistributedModel"),
     ],
 )
 def test_wrong_input_is_one_line(change, message):

@@ -299,7 +299,7 @@ def _eager_gradient(model: ReducedModelPublished, twists: np.ndarray, dt: float,
     import torch
 
     front = importlib.import_module("planarfriction.torch")
-    module = front.ReducedPlanarLuGre(model.patch, model.law, dtype=torch.float64)
+    module = front.ReducedModelPublished(model.patch, model.law, dtype=torch.float64)
     profile = torch.tensor(twists, requires_grad=True)
     loads = torch.full((len(twists),), 2.0, dtype=torch.float64, requires_grad=True)
 

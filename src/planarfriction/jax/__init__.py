@@ -12,23 +12,21 @@ try:
 except ImportError as error:
     raise MissingExtraError("jax", "jax") from error
 
-from planarfriction.jax.distributed import DistributedPlanarLuGre, distributed
-from planarfriction.jax.published import Parameters, ReducedPlanarLuGre, Surface, reduced
-from planarfriction.jax.reduced import MomentParameters, MomentPlanarLuGre, moments
+from planarfriction.jax.distributed import DistributedModel, LawParameters
+from planarfriction.jax.published import PublishedParameters, ReducedModelPublished, Surface
+from planarfriction.jax.reduced import ReducedModel, ReducedParameters
 from planarfriction.jax.rollouts import Rollout, rate, rest, simulate, step, wrench
 
 __all__ = [
-    "DistributedPlanarLuGre",
-    "MomentParameters",
-    "MomentPlanarLuGre",
-    "Parameters",
-    "ReducedPlanarLuGre",
+    "DistributedModel",
+    "LawParameters",
+    "PublishedParameters",
+    "ReducedModel",
+    "ReducedModelPublished",
+    "ReducedParameters",
     "Rollout",
     "Surface",
-    "distributed",
-    "moments",
     "rate",
-    "reduced",
     "rest",
     "simulate",
     "step",

@@ -13,7 +13,7 @@ from jax.custom_derivatives import SymbolicZero
 from planarfriction import autodiff
 from planarfriction.autodiff.parameters import Packed
 from planarfriction.errors import InvalidValueError
-from planarfriction.jax.published import ReducedPlanarLuGre
+from planarfriction.jax.published import ReducedModelPublished
 from planarfriction.kernels.published_adjoint import NUMBERS
 
 
@@ -27,8 +27,8 @@ class _Kind(NamedTuple):
 
 def rollout(model, state, twists, loads, dt) -> tuple[jax.Array, jax.Array]:
     """Wrenches `[..., T, 3]` and last state `[..., 3]`; state, twists and loads have the same batch axes."""
-    if not isinstance(model, ReducedPlanarLuGre):
-        raise InvalidValueError("model", "be a ReducedPlanarLuGre for method='adjoint'", type(model).__name__)
+    if not isinstance(model, ReducedModelPublished):
+        raise InvalidValueError("model", "be a ReducedModelPublished for method='adjoint'", type(model).__name__)
     surface = model.surface
     kind = _Kind(surface.kind, surface.size, model.elasto_plastic)
     parameters = jnp.stack(model.parameters)

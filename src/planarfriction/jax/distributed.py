@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import functools
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 
 from planarfriction import formulas
-from planarfriction.errors import InvalidValueError
 from planarfriction.jax import bristles
 from planarfriction.jax import namespace as xp
+from planarfriction.jax.base import FrictionModel
 from planarfriction.laws import LuGre
 from planarfriction.patch import ContactPatch
-from planarfriction.patch.metric import refuse_anisotropy
 
 
 class LawParameters(NamedTuple):
@@ -32,25 +28,26 @@ class LawParameters(NamedTuple):
     breakaway_ratio: jax.Array
 
 
-@functools.partial(
-    jax.tree_util.register_dataclass,
-    data_fields=["parameters", "positions", "weights"],
-    meta_fields=["elasto_plastic"],
-)
-@dataclass(frozen=True)
-class DistributedPlanarLuGre:
-    """Distributed LuGre friction (`planarfriction.DistributedModel`) as a pytree, for small patches.
+class DistributedModel(FrictionModel):
+    """The distributed model (`planarfriction.DistributedModel`) as a pytree, for small patches.
 
     `W = sum w_i f_N [t_i ; rho_i x t_i]`. State: deflections `[2, N]` [m]. Leaves: the law's parameters, the cells'
-    positions and weights. Leading axes of state `[..., 2, N]`, twist `[..., 3]`, load `[...]` and dt broadcast.
+    positions and weights. A patch whose shape depends on the load keeps that of `normal_force` [N].
     """
 
+    leaves = ("parameters", "positions", "weights")
     parameters: LawParameters
     positions: jax.Array
     """Cells, x then y [m], `[2, N]`."""
     weights: jax.Array
     """Share of the load that each cell carries [-], `[N]`."""
-    elasto_plastic: bool = field(default=False)
+
+    def __init__(self, patch: ContactPatch, law: LuGre, normal_force: float | None = None) -> None:
+        super().__init__(patch, law)
+        numbers, names = law.numbers, LawParameters._fields
+        self.parameters = LawParameters(*(jnp.asarray(getattr(numbers, name), dtype=float) for name in names))
+        self.positions = jnp.asarray(patch.positions.T)
+        self.weights = jnp.asarray(patch.weights(normal_force))
 
     def rest(self) -> jax.Array:
         """State of a contact at rest, `[2, N]`."""
@@ -96,18 +93,3 @@ class DistributedPlanarLuGre:
         force = self.weights * formulas.traction(z, rate, velocity, self._law)
         fx, fy = force[..., 0, :], force[..., 1, :]
         return jnp.stack([fx.sum(-1), fy.sum(-1), (x * fy - y * fx).sum(-1)], axis=-1)
-
-
-def distributed(patch: ContactPatch, law: LuGre, normal_force: float | None = None) -> DistributedPlanarLuGre:
-    """The distributed model of a patch; one whose shape depends on the load keeps that of `normal_force` [N]."""
-    if not isinstance(patch, ContactPatch):
-        raise InvalidValueError("patch", "be a ContactPatch", patch)
-    if not isinstance(law, LuGre):
-        raise InvalidValueError("law", "be a LuGre law", law)
-    refuse_anisotropy(patch, "jax.distributed")
-    numbers = law.numbers
-    parameters = LawParameters(*(jnp.asarray(getattr(numbers, name), dtype=float) for name in LawParameters._fields))
-    weights = np.asarray(patch.weights(normal_force))
-    return DistributedPlanarLuGre(
-        parameters, jnp.asarray(patch.positions.T), jnp.asarray(weights), numbers.elasto_plastic > 0.0
-    )

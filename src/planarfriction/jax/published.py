@@ -1,27 +1,26 @@
-"""The reduced model as a pytree: three bristles and a limit surface."""
+"""The published reduced model as a pytree: three bristles and a limit surface."""
 
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 
-from planarfriction import formulas
+from planarfriction import formulas, models
 from planarfriction.jax import bristles
 from planarfriction.jax import namespace as xp
+from planarfriction.jax.base import FrictionModel
 from planarfriction.jax.surfaces import sliding
 from planarfriction.laws import LuGre
 from planarfriction.limit_surface import LimitSurface
-from planarfriction.models import ReducedModelPublished
 from planarfriction.patch import ContactPatch
-from planarfriction.patch.metric import refuse_anisotropy
 
 
-class Parameters(NamedTuple):
-    """Physical parameters of the reduced model, scalars: names and units as in `LuGre` and `PublishedShape`."""
+class PublishedParameters(NamedTuple):
+    """Parameters of the published reduced model, scalars: names and units as in `LuGre` and `PublishedShape`."""
 
     sigma_0: jax.Array
     sigma_1: jax.Array
@@ -51,21 +50,36 @@ class Surface:
     data: jax.Array
 
 
-@functools.partial(
-    jax.tree_util.register_dataclass, data_fields=["parameters", "surface"], meta_fields=["elasto_plastic"]
-)
-@dataclass(frozen=True)
-class ReducedPlanarLuGre:
-    """Reduced LuGre friction (`planarfriction.ReducedModelPublished`) as a pytree.
+class ReducedModelPublished(FrictionModel):
+    """The published reduced model (`planarfriction.ReducedModelPublished`) as a pytree.
 
     `zdot = S h v_n - k z`, `W = -(sigma_0 z + sigma_1 zdot + sigma_2 U V) f_N`. State `(z_x, z_y, z_tau)` [m, m, m^2].
     Leaves: the parameters and the numbers of the surface, which stay as they are when `contact_radius` changes.
-    Leading axes of state `[..., 3]`, twist `[..., 3]`, load `[...]` and dt broadcast.
+
+    `surface` None takes the published table. A patch whose shape depends on the load needs a surface with its
+    `normal_force`, and keeps that shape.
     """
 
-    parameters: Parameters
+    leaves = ("parameters", "surface")
+    parameters: PublishedParameters
     surface: Surface
-    elasto_plastic: bool = field(default=False)
+
+    def __init__(self, patch: ContactPatch, law: LuGre, surface: LimitSurface | None = None) -> None:
+        super().__init__(patch, law)
+        when = "keep" if surface is not None else "rebuild"
+        shape = models.ReducedModelPublished(patch, law, surface, on_load_change=when)._reference  # pyright: ignore
+        kind, size, data = shape.surface.numbers
+        centre_x, centre_y = shape.centre_of_pressure
+        values = {
+            **law.numbers._asdict(),
+            "contact_radius": shape.contact_radius,
+            "second_moment": shape.second_moment,
+            "centre_x": centre_x,
+            "centre_y": centre_y,
+        }
+        names = PublishedParameters._fields
+        self.parameters = PublishedParameters(*(jnp.asarray(values[name], dtype=float) for name in names))
+        self.surface = Surface(kind, size, jnp.asarray(data))
 
     def rest(self) -> jax.Array:
         """State of a contact at rest, `[3]`."""
@@ -120,29 +134,3 @@ class ReducedPlanarLuGre:
         velocity = centred * jnp.stack([one, one, p.second_moment])
         fx, fy, tau = jnp.moveaxis(formulas.traction(z, rate, velocity, self._law), -1, 0)
         return jnp.stack([fx, fy, tau + p.centre_x * fy - p.centre_y * fx], axis=-1)
-
-
-def reduced(patch: ContactPatch, law: LuGre, surface: LimitSurface | None = None) -> ReducedPlanarLuGre:
-    """The reduced model of a patch; `surface` None takes the published table.
-
-    A patch whose shape depends on the load needs a surface with its `normal_force`, and keeps that shape.
-    """
-    model = ReducedModelPublished(patch, law) if surface is None else ReducedModelPublished(patch, law, surface=surface)
-    return of_model(model)
-
-
-def of_model(model: ReducedModelPublished) -> ReducedPlanarLuGre:
-    """A model of NumPy as a pytree, in the default precision of JAX."""
-    refuse_anisotropy(model.patch, "jax.published")
-    shape, law = model._reference, model.law.numbers
-    kind, size, data = shape.surface.numbers
-    centre_x, centre_y = shape.centre_of_pressure
-    values = {
-        **law._asdict(),
-        "contact_radius": shape.contact_radius,
-        "second_moment": shape.second_moment,
-        "centre_x": centre_x,
-        "centre_y": centre_y,
-    }
-    parameters = Parameters(*(jnp.asarray(values[name], dtype=float) for name in Parameters._fields))
-    return ReducedPlanarLuGre(parameters, Surface(kind, size, jnp.asarray(data)), law.elasto_plastic > 0.0)

@@ -2,23 +2,23 @@
 
 from __future__ import annotations
 
-import functools
 import math
-from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 
-from planarfriction.errors import InvalidValueError
+from planarfriction import models
 from planarfriction.formulas import LawNumbers
 from planarfriction.jax import namespace as xp
-from planarfriction.models import ReducedModel, reduced_arrays
+from planarfriction.jax.base import FrictionModel
+from planarfriction.laws import LuGre
+from planarfriction.models import reduced_arrays
 from planarfriction.models.reduced_arrays import ReducedNumbers
-from planarfriction.patch.metric import refuse_anisotropy
+from planarfriction.patch import ContactPatch
 
 
-class MomentParameters(NamedTuple):
+class ReducedParameters(NamedTuple):
     """Parameters of the law, scalars: names and units as in `LuGre`; not gamma, for which the map is made."""
 
     sigma_0: jax.Array
@@ -31,20 +31,32 @@ class MomentParameters(NamedTuple):
     """Unused by plain bristles."""
 
 
-@functools.partial(
-    jax.tree_util.register_dataclass, data_fields=["parameters", "shape"], meta_fields=["elasto_plastic"]
-)
-@dataclass(frozen=True)
-class MomentPlanarLuGre:
-    """Reduced LuGre friction of bristle moments (`planarfriction.ReducedModel`) as a pytree.
+class ReducedModel(FrictionModel):
+    """The reduced model of bristle moments (`planarfriction.ReducedModel`) as a pytree.
 
     State `(z_x, z_y, z_theta)` [m]. Leaves: the law's parameters, and the numbers of the patch with its map of steady
-    sliding. Leading axes of state `[..., 3]`, twist `[..., 3]`, load `[...]` and dt broadcast.
+    sliding. A patch whose shape depends on the load keeps that of `normal_force` [N]; `segments` and `speeds` as in
+    `planarfriction.ReducedModel`.
     """
 
-    parameters: MomentParameters
+    leaves = ("parameters", "shape")
+    parameters: ReducedParameters
     shape: ReducedNumbers
-    elasto_plastic: bool = field(default=False)
+
+    def __init__(
+        self,
+        patch: ContactPatch,
+        law: LuGre,
+        normal_force: float | None = None,
+        *,
+        segments: int = 24,
+        speeds: int = 14,
+    ) -> None:
+        super().__init__(patch, law)
+        numbers, names = law.numbers, ReducedParameters._fields
+        self.parameters = ReducedParameters(*(jnp.asarray(getattr(numbers, name), dtype=float) for name in names))
+        shape = models.ReducedModel(patch, law, segments=segments, speeds=speeds).shape_at(normal_force)
+        self.shape = ReducedNumbers(*map(jnp.asarray, reduced_arrays.numbers_of(shape)))
 
     def rest(self) -> jax.Array:
         """State of a contact at rest, `[3]`."""
@@ -75,17 +87,3 @@ class MomentPlanarLuGre:
 
     def _held(self, twist) -> reduced_arrays.Held:
         return reduced_arrays.held(xp, self._law, self.shape, twist)
-
-
-def moments(model: ReducedModel, normal_force: float | None = None) -> MomentPlanarLuGre:
-    """A `ReducedModel` as a pytree, in the default precision of JAX.
-
-    One whose shape depends on the load keeps that of `normal_force` [N].
-    """
-    if not isinstance(model, ReducedModel):
-        raise InvalidValueError("model", "be a ReducedModel", type(model).__name__)
-    refuse_anisotropy(model.patch, "jax.reduced")
-    law = model.law.numbers
-    parameters = MomentParameters(*(jnp.asarray(getattr(law, n), dtype=float) for n in MomentParameters._fields))
-    shape = reduced_arrays.numbers_of(model.shape_at(normal_force))
-    return MomentPlanarLuGre(parameters, ReducedNumbers(*map(jnp.asarray, shape)), law.elasto_plastic > 0.0)

@@ -9,11 +9,7 @@ import jax.numpy as jnp
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
-from planarfriction.jax.distributed import DistributedPlanarLuGre
-from planarfriction.jax.published import ReducedPlanarLuGre
-from planarfriction.jax.reduced import MomentPlanarLuGre
-
-Model = MomentPlanarLuGre | ReducedPlanarLuGre | DistributedPlanarLuGre
+from planarfriction.jax.base import FrictionModel
 
 
 class Rollout(NamedTuple):
@@ -25,31 +21,31 @@ class Rollout(NamedTuple):
     """State after the last step."""
 
 
-def rest(model: Model) -> jax.Array:
+def rest(model: FrictionModel) -> jax.Array:
     """State of a contact at rest: no bristle is deflected."""
     return model.rest()
 
 
-def rate(model: Model, z, twist, load) -> jax.Array:
+def rate(model: FrictionModel, z, twist, load) -> jax.Array:
     """Bristle rates `zdot`, of the shape of the state [m/s; m^2/s for the third bristle of the reduced model]."""
     return model.rate(jnp.asarray(z), jnp.asarray(twist), load)
 
 
-def wrench(model: Model, z, twist, load) -> jax.Array:
+def wrench(model: FrictionModel, z, twist, load) -> jax.Array:
     """Friction wrench on the moving body, `[..., 3]` [N, N, N m]."""
     return model.wrench(jnp.asarray(z), jnp.asarray(twist), load)
 
 
-def step(model: Model, z, twist, load, dt) -> tuple[jax.Array, jax.Array]:
+def step(model: FrictionModel, z, twist, load, dt) -> tuple[jax.Array, jax.Array]:
     """Advance by `dt` [s] at a held twist: the new state and the wrench at the end, stable at any `dt`."""
     return model.step(jnp.asarray(z), jnp.asarray(twist), load, dt)
 
 
-def simulate(model: Model, twists, loads, dt, z0=None, *, method: str = "scan") -> Rollout:
+def simulate(model: FrictionModel, twists, loads, dt, z0=None, *, method: str = "scan") -> Rollout:
     """Steps of `dt` [s] through twists `[..., T, 3]` and loads (`[..., T]` or a number), from `z0` or from rest.
 
     Method "scan" differentiates through `lax.scan`, on any device and with respect to everything; "adjoint"
-    (`ReducedPlanarLuGre`, CPU) runs the compiled roll-out and its discrete adjoint, much faster, in float64 inside.
+    (`ReducedModelPublished`, CPU) runs the compiled roll-out and its discrete adjoint, much faster, in float64 inside.
     """
     validation.choice("method", method, ("scan", "adjoint"))
     twists = jnp.asarray(twists)

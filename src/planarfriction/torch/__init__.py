@@ -10,15 +10,15 @@ except ImportError:
 
     raise MissingExtraError("torch", "torch") from None
 
-from planarfriction.torch.distributed import DistributedPlanarLuGre
-from planarfriction.torch.published import ReducedPlanarLuGre
-from planarfriction.torch.reduced import MomentPlanarLuGre
+from planarfriction.torch.distributed import DistributedModel
+from planarfriction.torch.published import ReducedModelPublished
+from planarfriction.torch.reduced import ReducedModel
 from planarfriction.torch.rollout import Rollout, rollout, simulate, tracking_loss
 
 __all__ = [
-    "DistributedPlanarLuGre",
-    "MomentPlanarLuGre",
-    "ReducedPlanarLuGre",
+    "DistributedModel",
+    "ReducedModel",
+    "ReducedModelPublished",
     "Rollout",
     "rollout",
     "simulate",

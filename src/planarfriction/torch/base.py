@@ -8,11 +8,10 @@ from typing import Any, NamedTuple
 import torch
 from torch import Tensor, nn
 
-from planarfriction import validation
+from planarfriction import models, validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.laws import ElastoPlastic, LuGre
-from planarfriction.models.base import FrictionModel
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.metric import refuse_anisotropy
 from planarfriction.torch import bristle
@@ -31,7 +30,7 @@ class Prepared(NamedTuple):
     """Of the patch; the model knows what they are."""
 
 
-class PlanarLuGre(nn.Module):
+class FrictionModel(nn.Module):
     """A friction model of PyTorch: the caller holds the state `z`; everything is about the contact frame's origin.
 
     Twists `v` `[..., 3]` are `(vx, vy, omega)` of the moving body, wrenches `(fx, fy, tau)` act on it, loads `f_n`
@@ -44,7 +43,7 @@ class PlanarLuGre(nn.Module):
     axis: int
     """Axis of the components of a bristle."""
     physical: PhysicalParameters
-    reference: FrictionModel
+    reference: models.FrictionModel
     """The same model in NumPy, with the parameters that this one started with."""
 
     def __init__(self, patch: ContactPatch, law: LuGre) -> None:

@@ -7,21 +7,21 @@ from collections.abc import Iterable
 import torch
 from torch import Tensor, nn
 
+from planarfriction import models
 from planarfriction.errors import InvalidValueError
 from planarfriction.laws import LuGre
-from planarfriction.models import DistributedModel
 from planarfriction.patch import ContactPatch
 from planarfriction.torch import bristle
 from planarfriction.torch import namespace as xp
-from planarfriction.torch.base import TRAINABLE, PlanarLuGre, Prepared
+from planarfriction.torch.base import TRAINABLE, FrictionModel, Prepared
 from planarfriction.torch.parameters import LAW
 
 
-class DistributedPlanarLuGre(PlanarLuGre):
+class DistributedModel(FrictionModel):
     """Distributed LuGre friction, differentiable: a bristle `z_i` [m] in every cell, state `[2, N]`; for small patches.
 
     `zdot_i = v_i - beta sigma_0 |v_i|/g z_i`, `W = sum w_i f_N [t_i ; rho_i x t_i]`,
-    `t_i = -(sigma_0 z_i + sigma_1 zdot_i + sigma_2 v_i)`; the same numbers as `DistributedModel`.
+    `t_i = -(sigma_0 z_i + sigma_1 zdot_i + sigma_2 v_i)`; the same numbers as `planarfriction.DistributedModel`.
 
     `trainable` names the parameters of the law that are `nn.Parameter`s, and `"weights"` for the pressure: the weights
     `w_i` of the cells are the softmax of a raw parameter, so that they stay positive and add up to 1.
@@ -45,7 +45,7 @@ class DistributedPlanarLuGre(PlanarLuGre):
         super().__init__(patch, law)
         if patch.depends_on_load:
             raise InvalidValueError("patch", "have a shape that does not depend on the load", patch.name)
-        self.reference = DistributedModel(patch, law)
+        self.reference = models.DistributedModel(patch, law)
         self.components = (2, patch.cells)
         kind = {"dtype": dtype or torch.get_default_dtype(), "device": device}
         numbers, chosen = law.numbers._asdict(), tuple(trainable)

@@ -1,4 +1,4 @@
-"""The reduced model as a PyTorch module."""
+"""The published reduced model as a PyTorch module."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ from collections.abc import Iterable
 import torch
 from torch import Tensor
 
+from planarfriction import models
 from planarfriction.laws import LuGre
 from planarfriction.limit_surface import LimitSurface
-from planarfriction.models import ReducedModelPublished
 from planarfriction.patch import ContactPatch
 from planarfriction.torch import bristle
 from planarfriction.torch import namespace as xp
-from planarfriction.torch.base import TRAINABLE, PlanarLuGre, Prepared
+from planarfriction.torch.base import TRAINABLE, FrictionModel, Prepared
 from planarfriction.torch.parameters import LAW
 from planarfriction.torch.surfaces import surface_of
 
 
-class ReducedPlanarLuGre(PlanarLuGre):
+class ReducedModelPublished(FrictionModel):
     """Reduced LuGre friction, differentiable: three bristles `z = (z_x, z_y, z_tau)` [m, m, m^2] and a limit surface.
 
     With `S = diag(1, 1, r)`, `V_S = S V`, `v_n = |V_S|`: `zdot = S h(V) v_n - beta sigma_0 v_n/g(v_n) z`,
-    `W = -(sigma_0 z + sigma_1 zdot + sigma_2 U V) f_N`; the same numbers as `ReducedModelPublished`.
+    `W = -(sigma_0 z + sigma_1 zdot + sigma_2 U V) f_N`; the same numbers as `planarfriction.ReducedModelPublished`.
 
     `surface` is any limit surface (None: the published table). `trainable` names the physical parameters that are
     `nn.Parameter`s, of the law or of the shape (`contact_radius`, `second_moment`, `centre_x`, `centre_y`); the limit
@@ -35,7 +35,7 @@ class ReducedPlanarLuGre(PlanarLuGre):
 
     components = (3,)
     axis = -1
-    reference: ReducedModelPublished
+    reference: models.ReducedModelPublished
 
     def __init__(
         self,
@@ -49,7 +49,7 @@ class ReducedPlanarLuGre(PlanarLuGre):
     ):
         super().__init__(patch, law)
         when = "keep" if surface is not None else "rebuild"
-        self.reference = ReducedModelPublished(patch, law, surface, on_load_change=when)  # pyright: ignore
+        self.reference = models.ReducedModelPublished(patch, law, surface, on_load_change=when)  # pyright: ignore
         shape = self.reference._reference
         kind = {"dtype": dtype or torch.get_default_dtype(), "device": device}
         self.surface = surface_of(shape.surface, **kind)

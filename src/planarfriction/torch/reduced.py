@@ -7,32 +7,33 @@ from collections.abc import Iterable
 import torch
 from torch import Tensor
 
+from planarfriction import models
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.laws import ElastoPlastic, LuGre
-from planarfriction.models import ReducedModel, reduced_arrays
+from planarfriction.models import reduced_arrays
 from planarfriction.models.reduced_arrays import Held, ReducedNumbers
 from planarfriction.patch import ContactPatch
 from planarfriction.torch import namespace as xp
-from planarfriction.torch.base import PlanarLuGre, Prepared
+from planarfriction.torch.base import FrictionModel, Prepared
 from planarfriction.torch.parameters import LAW
 
 PARAMETERS = tuple(name for name in LAW if name != "gamma")
 """Physical parameters, in the order of their vector: the law but gamma, for which the map is made."""
 
 
-class MomentPlanarLuGre(PlanarLuGre):
+class ReducedModel(FrictionModel):
     """Reduced LuGre friction of bristle moments, differentiable: three states `(z_x, z_y, z_theta)` [m].
 
-    The equations and the numbers of `ReducedModel`; its patch, the map of steady sliding included, is held in buffers.
-    `trainable` names the parameters of the law that are `nn.Parameter`s; `gamma` cannot be one, the map is made for it.
-    A patch whose shape depends on the load keeps that of `normal_force` [N]; `segments` and `speeds` as in
-    `ReducedModel`.
+    The equations and the numbers of `planarfriction.ReducedModel`; buffers hold its patch with the map of steady
+    sliding. `trainable` names the parameters of the law that are `nn.Parameter`s; `gamma` cannot be one, the map is
+    made for it. A patch whose shape depends on the load keeps that of `normal_force` [N]; `segments` and `speeds` as in
+    `planarfriction.ReducedModel`.
     """
 
     components = (3,)
     axis = -1
-    reference: ReducedModel
+    reference: models.ReducedModel
     factor: Tensor
     quartic: Tensor
     scale: Tensor
@@ -57,7 +58,7 @@ class MomentPlanarLuGre(PlanarLuGre):
             raise InvalidValueError("trainable", "not name gamma: the map of steady sliding is made for it", trainable)
         kind = {"dtype": dtype or torch.get_default_dtype(), "device": device}
         self.gamma = law.gamma
-        self.reference = ReducedModel(patch, law, segments=segments, speeds=speeds)
+        self.reference = models.ReducedModel(patch, law, segments=segments, speeds=speeds)
         shape = self.reference.shape_at(normal_force)
         self._lever = shape.contact_radius
         for name, values in zip(_BUFFERS, reduced_arrays.numbers_of(shape), strict=True):

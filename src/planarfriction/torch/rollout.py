@@ -10,8 +10,8 @@ from torch import Tensor
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.torch import adjoint
-from planarfriction.torch.base import PlanarLuGre
-from planarfriction.torch.published import ReducedPlanarLuGre
+from planarfriction.torch.base import FrictionModel
+from planarfriction.torch.published import ReducedModelPublished
 
 METHODS = ("adjoint", "eager")
 """Compiled roll-out with its discrete adjoint; every step an operation of PyTorch, recorded by autograd."""
@@ -27,7 +27,7 @@ class Rollout(NamedTuple):
 
 
 def simulate(
-    model: PlanarLuGre,
+    model: FrictionModel,
     v_profile: Tensor,
     f_n: Tensor | float,
     dt: Tensor | float,
@@ -41,7 +41,7 @@ def simulate(
 
 
 def rollout(
-    model: PlanarLuGre,
+    model: FrictionModel,
     v_profile: Tensor,
     f_n: Tensor | float,
     dt: Tensor | float,
@@ -84,9 +84,9 @@ def rollout(
     return Rollout(*adjoint.roll_out(model.reference, float(step), start, v_profile, loads, model._vector(parameters)))
 
 
-def _obstacle(model: PlanarLuGre, *tensors: Tensor) -> str:
+def _obstacle(model: FrictionModel, *tensors: Tensor) -> str:
     """Why the adjoint cannot be used, or nothing."""
-    if not isinstance(model, ReducedPlanarLuGre):
+    if not isinstance(model, ReducedModelPublished):
         return f"for {type(model).__name__}"
     if any(tensor.device.type != "cpu" for tensor in (*tensors, model.physical.values)):
         return "for tensors that are not on the processor"
@@ -96,7 +96,7 @@ def _obstacle(model: PlanarLuGre, *tensors: Tensor) -> str:
 
 
 def tracking_loss(
-    model: PlanarLuGre, v_profile: Tensor, reference: Tensor, f_n: Tensor | float, dt: float, **options
+    model: FrictionModel, v_profile: Tensor, reference: Tensor, f_n: Tensor | float, dt: float, **options
 ) -> Tensor:
     """Mean squared error of the wrench against `reference` `[..., T, 3]`: forces by the load, torque by load times r.
 

@@ -1,0 +1,70 @@
+"""What the models of JAX share: they are pytrees, made of a patch and a law as those of NumPy."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar, Self
+
+import jax
+
+from planarfriction.errors import InvalidValueError
+from planarfriction.laws import LuGre
+from planarfriction.patch import ContactPatch
+from planarfriction.patch.metric import refuse_anisotropy
+
+
+class FrictionModel:
+    """A friction model as a pytree; everything is about the contact frame's origin, the caller holds the state.
+
+    Leading axes of state, twist `[..., 3]`, normal_force `[...]` and dt broadcast. `replace` makes a changed model.
+    """
+
+    leaves: ClassVar[tuple[str, ...]]
+    """Attributes that JAX maps over and differentiates; `elasto_plastic` is fixed when a function is compiled."""
+    parameters: Any
+    """Physical parameters by name, scalars."""
+    elasto_plastic: bool
+
+    def __init_subclass__(cls) -> None:
+        super().__init_subclass__()
+        jax.tree_util.register_pytree_with_keys(cls, cls._flatten, cls._unflatten)
+
+    def __init__(self, patch: ContactPatch, law: LuGre) -> None:
+        if not isinstance(patch, ContactPatch):
+            raise InvalidValueError("patch", "be a ContactPatch", patch)
+        if not isinstance(law, LuGre):
+            raise InvalidValueError("law", "be a LuGre law", law)
+        refuse_anisotropy(patch, f"jax.{type(self).__name__}")
+        self.elasto_plastic = law.numbers.elasto_plastic > 0.0
+
+    def replace(self, **leaves: Any) -> Self:
+        """A model with other `parameters`, or other leaves by name."""
+        for name in leaves:
+            if name not in self.leaves:
+                raise InvalidValueError("leaf", f"be one of {', '.join(self.leaves)}", repr(name))
+        return self._unflatten(self.elasto_plastic, [leaves.get(name, getattr(self, name)) for name in self.leaves])
+
+    def _flatten(self):
+        keys = map(jax.tree_util.GetAttrKey, self.leaves)
+        return [(key, getattr(self, key.name)) for key in keys], self.elasto_plastic
+
+    @classmethod
+    def _unflatten(cls, elasto_plastic: bool, leaves) -> Self:
+        model = object.__new__(cls)  # JAX also puts in what a model cannot be made of
+        vars(model).update(zip(cls.leaves, leaves, strict=True), elasto_plastic=elasto_plastic)
+        return model
+
+    def rest(self) -> jax.Array:
+        """State of a contact at rest."""
+        raise NotImplementedError
+
+    def rate(self, state, twist, normal_force) -> jax.Array:
+        """Rate of the state, of its shape."""
+        raise NotImplementedError
+
+    def wrench(self, state, twist, normal_force) -> jax.Array:
+        """Friction wrench on the moving body, `[..., 3]` [N, N, N m]."""
+        raise NotImplementedError
+
+    def step(self, state, twist, normal_force, dt) -> tuple[jax.Array, jax.Array]:
+        """State and wrench after `dt` [s] at a held twist, stable at any `dt`; a contact without load forgets."""
+        raise NotImplementedError
