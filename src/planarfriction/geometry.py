@@ -30,6 +30,16 @@ def wrench_at(wrench, offset) -> np.ndarray:
     return np.stack(np.broadcast_arrays(fx, fy, wrench[..., 2] - (offset[..., 0] * fy - offset[..., 1] * fx)), -1)
 
 
+def transformed(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """`matrix @ v` for each v of `vectors` `[..., 3]`, rounded alike for one and for many, in any order in memory.
+
+    Only products and sums of single numbers are rounded the same everywhere; those of BLAS depend on the number of rows
+    and on the processor.
+    """
+    x, y, z = (vectors[..., i, None] for i in range(3))
+    return np.ascontiguousarray(x * matrix[:, 0] + y * matrix[:, 1] + z * matrix[:, 2])
+
+
 def rotate(vector, angle) -> np.ndarray:
     """Rotate the first two components of a twist, wrench or point by `angle` [rad], counter-clockwise."""
     vector, angle = np.asarray(vector, dtype=float), np.asarray(angle, dtype=float)

@@ -11,6 +11,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
+from planarfriction.geometry import transformed
 from planarfriction.kernels import surfaces as kernels
 from planarfriction.limit_surface.cell_metrics import scaled_levers
 from planarfriction.patch import ContactPatch
@@ -138,7 +139,7 @@ class LimitSurface:
         Raises `InvalidValueError` if `twist` is not finite or not of shape `[..., 3]`.
         """
         scaled, frame = self._scaled(twist)
-        return -self._direction(scaled) @ frame
+        return -transformed(frame.T, self._direction(scaled))
 
     def dissipation(self, twist) -> np.ndarray:
         """Dissipated power `Phi(V) = -W . V >= 0` per unit `mu f_N`, shape `[...]` [m/s]."""
@@ -163,11 +164,11 @@ class LimitSurface:
             raise InvalidValueError("wrench", "not be zero", wrench.tolist())
         frame = self._frame()
         # conjugate coordinates: force and torque / r about the centre of pressure; -h balances the wrench
-        balanced = -np.linalg.solve(frame.T, wrench.reshape(-1, 3).T).T
+        balanced = -_solved(frame.T, wrench.reshape(-1, 3))
         balanced /= np.linalg.norm(balanced, axis=1)[:, None]
         found = self._scaled_twists_of(balanced)
         found /= np.einsum("ni,ni->n", self._direction(found), found)[:, None]
-        return np.linalg.solve(frame, found.T).T.reshape(wrench.shape)
+        return _solved(frame, found).reshape(wrench.shape)
 
     def compare(self, reference: LimitSurface, *, samples: int = 200) -> SurfaceComparison:
         """Differences from another surface: wrenches of the same twists, and twists of the same wrenches.
@@ -196,7 +197,7 @@ class LimitSurface:
 
     def _scaled(self, twist) -> tuple[np.ndarray, np.ndarray]:
         frame = self._frame()
-        return _rows("twist", twist) @ frame.T, frame
+        return transformed(frame, _rows("twist", twist)), frame
 
     def _direction(self, scaled: np.ndarray) -> np.ndarray:
         """`h` of scaled twists `[..., 3]`; zero at rest."""
@@ -282,6 +283,11 @@ def scaling(centre_of_pressure: np.ndarray, contact_radius: float) -> np.ndarray
     """`F` of `V_S = F V`: from the contact frame's origin to the centre of pressure, spin times the contact radius."""
     x, y = centre_of_pressure
     return np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, contact_radius]])
+
+
+def _solved(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
+    """`matrix^-1 v` for each v of `vectors` `[M, 3]`, one by one: LAPACK rounds many at once differently."""
+    return np.linalg.solve(matrix, vectors[..., None])[..., 0]
 
 
 def _plane(normal: np.ndarray) -> np.ndarray:

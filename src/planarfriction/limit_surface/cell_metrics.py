@@ -26,8 +26,8 @@ def cell_sums(levers: np.ndarray, weights: np.ndarray, scaled: np.ndarray) -> np
     """`u = h |V_S|` for scaled twists `[M, 3]`, shape `[M, 3]`."""
     result = np.empty((len(scaled), 3))
     for part in _parts(scaled, levers):
-        speed, unit = _headings(levers, scaled[part])
-        result[part] = np.einsum("n,ncd,mnc->md", weights, levers, unit, optimize=True) * speed
+        speed, _, unit = _headings(levers, scaled[part])
+        result[part] = _direction(levers, weights, unit) * speed
     return result
 
 
@@ -36,14 +36,12 @@ def cell_slopes(levers: np.ndarray, weights: np.ndarray, scaled: np.ndarray) -> 
     result = np.empty((len(scaled), 3, 3))
     for part in _parts(scaled, levers):
         twist = scaled[part]
-        speed, unit = _headings(levers, twist)
-        across = np.stack([-unit[..., 1], unit[..., 0]], -1)
-        turn = np.einsum("mnc,ncd->mnd", across, levers)
-        size = np.einsum("mnc,ncd,md->mn", unit, levers, twist, optimize=True)  # |u_i|, 0 where the cell is at rest
+        speed, size, unit = _headings(levers, twist)
+        turn = unit[:, None, :, 0] * levers[:, 1].T - unit[:, None, :, 1] * levers[:, 0].T  # [m, 3, n]
         share = np.divide(weights * speed, size, out=np.zeros_like(size), where=size > 0.0)
-        h = np.einsum("n,ncd,mnc->md", weights, levers, unit, optimize=True)
+        h = _direction(levers, weights, unit)
         along = np.einsum("mi,mj->mij", h, twist / np.where(speed > 0.0, speed, 1.0))
-        result[part] = along + np.einsum("mn,mni,mnj->mij", share, turn, turn, optimize=True)
+        result[part] = along + np.einsum("min,mjn->mij", share[:, None] * turn, turn)
         result[part][speed[:, 0] == 0.0] = np.eye(3)
     return result
 
@@ -113,10 +111,16 @@ def _parts(scaled: np.ndarray, levers: np.ndarray) -> list[slice]:
     return [slice(start, start + rows) for start in range(0, len(scaled), rows)]
 
 
-def _headings(levers: np.ndarray, scaled: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """`|V_S|` `[m, 1]`, and `u_i/|u_i|` `[m, n, 2]`, zero for cells at rest."""
+def _direction(levers: np.ndarray, weights: np.ndarray, unit: np.ndarray) -> np.ndarray:
+    """`h` `[m, 3]` of `u_i/|u_i|` `[m, n, 2]`: sums that run over the cells alike for one twist and for many."""
+    pull = np.ascontiguousarray((weights[:, None, None] * levers).reshape(-1, 3).T)
+    return np.einsum("mk,dk->md", unit.reshape(len(unit), -1), pull)
+
+
+def _headings(levers: np.ndarray, scaled: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """`|V_S|` `[m, 1]`, and `|u_i|` `[m, n]` and `u_i/|u_i|` `[m, n, 2]`, both zero for cells at rest."""
     speed = np.linalg.norm(scaled, axis=1)[:, None]
     seen = np.einsum("ncd,md->mnc", levers, scaled)
     size = np.hypot(seen[..., 0], seen[..., 1])
-    moving = size > _AT_REST * speed
-    return speed, seen * np.divide(1.0, size, out=np.zeros_like(size), where=moving)[..., None]
+    size[size <= _AT_REST * speed] = 0.0
+    return speed, size, seen * np.divide(1.0, size, out=np.zeros_like(size), where=size > 0.0)[..., None]

@@ -69,7 +69,7 @@ def step_jacobians(model: Any, state: np.ndarray, velocity: np.ndarray, load: np
         np.where(loaded, new_z, 0.0),
         np.where(loaded, np.einsum("...abn,dbn->...and", new_u, lever), 0.0),
         np.einsum("dan,...abn->...dbn", lever, pull_z * share),
-        np.einsum("dan,...abn,ebn->...de", lever, pull_u * share, lever, optimize=True),
+        np.einsum("dan,...abn,ebn->...de", lever, pull_u * share, lever),
         np.einsum("...cn,dcn->...d", traction, lever),
     )
 

@@ -78,7 +78,10 @@ class FrictionModel:
         return np.zeros(self.state_shape)
 
     def _inputs(self, state, twist, normal_force, **more) -> list[np.ndarray]:
-        """Check the inputs and broadcast their batch axes against each other."""
+        """Check the inputs and broadcast their batch axes against each other.
+
+        All come out in C order and writable: compiled loops know no other arrays, and sums run the same way.
+        """
         state, twist = validation.numbers("state", state), validation.numbers("twist", twist)
         inner = self.state_shape
         if state.shape[state.ndim - len(inner) :] != inner:
@@ -103,4 +106,7 @@ class FrictionModel:
             raise InvalidValueError("batch axes", "broadcast", f"shapes {shapes}") from None
         wanted = [batch + inner, (*batch, 3), *(batch for _ in arrays)]
         given = [state, twist, *arrays.values()]
-        return [a if a.shape == shape else np.broadcast_to(a, shape) for a, shape in zip(given, wanted, strict=True)]
+        return [
+            a if a.shape == shape and a.flags.carray else np.broadcast_to(a, shape).copy()
+            for a, shape in zip(given, wanted, strict=True)
+        ]

@@ -10,6 +10,7 @@ import numpy as np
 
 from planarfriction import formulas, validation
 from planarfriction.errors import InvalidValueError
+from planarfriction.geometry import transformed
 from planarfriction.kernels import published_adjoint
 from planarfriction.kernels import published_step as kernels
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
@@ -111,7 +112,7 @@ class ReducedModelPublished(FrictionModel):
             rate_twist=slopes.rate_twist @ axes,
             wrench_state=axes @ slopes.wrench_state,
             wrench_twist=axes @ slopes.wrench_twist @ axes,
-            wrench_load=slopes.wrench_load @ axes,
+            wrench_load=transformed(axes, slopes.wrench_load),
         )
 
     def step(self, state, twist, normal_force, dt) -> tuple[np.ndarray, np.ndarray]:
@@ -159,7 +160,7 @@ class ReducedModelPublished(FrictionModel):
             state_twist=slopes.state_twist @ axes,
             wrench_state=axes @ slopes.wrench_state,
             wrench_twist=axes @ slopes.wrench_twist @ axes,
-            wrench_load=slopes.wrench_load @ axes,
+            wrench_load=transformed(axes, slopes.wrench_load),
         )
 
     # ------------------------------------------------------------------ axes of the friction metric
@@ -184,10 +185,10 @@ class ReducedModelPublished(FrictionModel):
 
     def _inputs(self, state, twist, normal_force, **more) -> list[np.ndarray]:
         state, twist, *rest = super()._inputs(state, twist, normal_force, **more)
-        return [state, twist if self._axes is None else twist @ self._axes, *rest]
+        return [state, twist if self._axes is None else transformed(self._axes, twist), *rest]
 
     def _out(self, wrench: np.ndarray) -> np.ndarray:
-        return wrench if self._axes is None else wrench @ self._axes
+        return wrench if self._axes is None else transformed(self._axes, wrench)
 
     # ------------------------------------------------------------------ one shape
 
@@ -244,7 +245,7 @@ class ReducedModelPublished(FrictionModel):
     def _scaled(self, shape: PublishedShape, state, twist):
         """Scaled state and twist `[B, 3]`, `u = h v_n`, and the arguments of the bristle equation."""
         law, scale = self.law.numbers, np.array([1.0, 1.0, shape.contact_radius])
-        v_s = twist @ scaling(shape.centre_of_pressure, shape.contact_radius).T
+        v_s = transformed(scaling(shape.centre_of_pressure, shape.contact_radius), twist)
         v_n = np.linalg.norm(v_s, axis=-1)
         h = shape.surface._direction(v_s)
         h_norm = np.where(v_n > 0.0, np.linalg.norm(h, axis=-1), 1.0)
@@ -264,9 +265,9 @@ class ReducedModelPublished(FrictionModel):
         law = self.law
         rate = self._rate(shape, state, twist, load)
         to_centre, viscous = self._to_centre(shape)
-        velocity = twist @ to_centre.T * viscous
+        velocity = transformed(to_centre, twist) * viscous
         centred = formulas.traction(state, rate, velocity, law)
-        return load[:, None] * centred @ to_centre
+        return transformed(to_centre.T, load[:, None] * centred)
 
     @staticmethod
     def _to_centre(shape: PublishedShape) -> tuple[np.ndarray, np.ndarray]:
