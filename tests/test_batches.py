@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from anisotropic import PATCHES as ANISOTROPIC
 
 import planarfriction as pf
+from anisotropic import PATCHES as ANISOTROPIC
 
 MAP = pf.ContactPatch.from_pressure(np.random.default_rng(1).uniform(size=(5, 4)) ** 3, (0.002, 0.0015), name="map")
 FEET = pf.ContactPatch.points([(0.01, 0.03), (0.11, -0.02), (0.05, 0.09)], [1.0, 2.0, 3.0], name="feet")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,32 +18,36 @@ from planarfriction.patch.pressure import Pressure
 
 @dataclass(frozen=True, eq=False)
 class PressureMaps(Pressure):
-    """Relative pressures of the cells measured at several loads, each map brought to the same total.
+    """Relative pressures of the cells measured at several loads; only ratios within a map matter.
 
-    Between two measured loads the relative pressure of each cell is linear in the load; below the first and above the
-    last the map stays as it is. Raises `InvalidValueError` unless the loads ascend and are > 0 and each map has one
-    pressure >= 0 for each cell and a total > 0.
+    Between two measured loads the share of each cell in the total of its map is linear in the load; below the first and
+    above the last the map stays as it is. Raises `InvalidValueError` unless the loads ascend and are > 0 and each map
+    has one pressure >= 0 for each cell and a total > 0.
     """
 
     law = "pressure_maps"
     loads: Any
     """Normal forces of the measurements, ascending, shape `[L]` [N]."""
     values: Any
-    """Relative pressures, shape `[L, N]` [-]."""
+    """Pressures as given, each map at its own scale, shape `[L, N]`: kept as they are, so that files restore them."""
 
     def __post_init__(self) -> None:
         loads = validation.array("loads", self.loads, (None,))
         if len(loads) == 0 or not (loads[0] > 0.0 and (np.diff(loads) > 0.0).all()):
             raise InvalidValueError("loads", "ascend and be > 0", loads.tolist())
         values = validation.non_negative_array("pressure", self.values, (len(loads), None))
-        peak = values.max(axis=1, initial=0.0, keepdims=True)
+        peak = values.max(axis=1, initial=0.0)
         if not (peak > 0.0).all():
             raise InvalidValueError("pressure", "have a total > 0 at every load", f"0 at {loads[peak.argmin()]:g} N")
-        values /= peak  # first, so that no sum can overflow
-        values /= values.sum(axis=1, keepdims=True)
         for name, array in (("loads", loads), ("values", values)):
             array.setflags(write=False)
             object.__setattr__(self, name, array)
+
+    @functools.cached_property
+    def _shares(self) -> np.ndarray:
+        """Share of each cell in the total of its map, `[L, N]`."""
+        shares = self.values / self.values.max(axis=1, keepdims=True)  # first, so that no sum can overflow
+        return shares / shares.sum(axis=1, keepdims=True)
 
     @property
     def depends_on_load(self) -> bool:
@@ -52,12 +57,12 @@ class PressureMaps(Pressure):
         if self.values.shape[1] != len(positions):
             raise InvalidValueError("pressure", f"have shape [L, {len(positions)}]", f"shape {list(self.values.shape)}")
         if not self.depends_on_load:
-            return self.values[0]
+            return self._shares[0]
         load = np.asarray(self.loads[0] if normal_force is None else normal_force, dtype=float)
         place = np.interp(load, self.loads, np.arange(len(self.loads)))
         below = np.minimum(place.astype(int), len(self.loads) - 2)
         share = (place - below)[..., None]
-        return (1.0 - share) * self.values[below] + share * self.values[below + 1]
+        return (1.0 - share) * self._shares[below] + share * self._shares[below + 1]
 
     def ever_loaded(self, positions: np.ndarray) -> np.ndarray:
         self.relative(positions)
