@@ -13,12 +13,14 @@ except ImportError:
 from planarfriction.torch.distributed import DistributedModel
 from planarfriction.torch.published import ReducedModelPublished
 from planarfriction.torch.reduced import ReducedModel
+from planarfriction.torch.reduced_planar import ReducedPlanarLuGre
 from planarfriction.torch.rollout import Rollout, rollout, simulate, tracking_loss
 
 __all__ = [
     "DistributedModel",
     "ReducedModel",
     "ReducedModelPublished",
+    "ReducedPlanarLuGre",
     "Rollout",
     "rollout",
     "simulate",
