@@ -52,10 +52,7 @@ def drift(slope: float) -> float:
 def slide(slope: float, kind: str = "distributed", t_end: float = 0.55) -> pf.Solution:
     """The block from rest, on an incline of `slope` [rad]; the plane of motion is the incline."""
     patch = pf.ContactPatch.rectangle(WIDTH, HEIGHT, 15).with_friction_metric(METRIC)
-    if kind == "distributed":
-        model = pf.DistributedModel(patch, LAW)
-    else:
-        model = pf.ReducedModelPublished(patch, LAW, surface=pf.LimitSurfaceTable(patch))
+    model = {"distributed": pf.DistributedModel, "reduced": pf.ReducedModel}[kind](patch, LAW)
     half = 0.5 * np.array([WIDTH, HEIGHT])
     outline = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * half
     inertia = MASS / 12.0 * (WIDTH**2 + HEIGHT**2)
