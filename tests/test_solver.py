@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 
 import planarfriction as pf
 from planarfriction.kernels import body
-from planarfriction.kernels.body import right_hand_side, workspace
+from planarfriction.kernels.body import right_hand_side
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction.scenes.packing import pack
 from planarfriction.solvers import RODAS3, RODAS4
@@ -19,11 +19,11 @@ SMALL = pf.ContactPatch.rectangle(0.02, 0.01, cells=(4, 2), pressure=pf.patch.Li
 
 
 @njit
-def _solve(contacts, motion, piece, since, y, shift, r, dy, out, work):
-    body.rates(contacts, motion, piece, since, y, dy, work)
-    body.linearise(contacts, motion, piece, y, work)
-    body.factor(contacts, motion, piece, since, y, shift, work)
-    body.solve(contacts, motion, piece, since, y, shift, r, out, work)
+def _solve(system, piece, since, y, shift, r, dy, out):
+    body.rates(system, piece, since, y, dy)
+    body.linearise(system, piece, y)
+    body.factor(system, piece, since, y, shift)
+    body.solve(system, piece, since, y, shift, r, out)
 
 
 def free_scene() -> pf.Scene:
@@ -52,11 +52,11 @@ def test_structured_solve_is_the_solve_with_the_full_jacobian(scene):
     y = packed.state + 0.8 * packed.natural * generator.normal(size=len(packed.state))
     if scene.velocity is not None:
         y[-6:-3] = scene.velocity(0.0)
-    work, dy = workspace(packed.contacts), np.empty_like(y)
+    dy = np.empty_like(y)
 
     def rate(state: np.ndarray) -> np.ndarray:
         out = np.empty_like(state)
-        right_hand_side(packed.contacts, packed.motion, 0, 0.3, state, out, work)
+        right_hand_side(packed.system, 0, 0.3, state, out)
         return out
 
     steps = 1e-5 * packed.natural
@@ -64,7 +64,7 @@ def test_structured_solve_is_the_solve_with_the_full_jacobian(scene):
     r = rate(y) * generator.normal(size=len(y))
     for shift in (1e2, 1e5):
         out = np.empty_like(y)
-        _solve(packed.contacts, packed.motion, 0, 0.3, y, shift, r, dy, out, work)
+        _solve(packed.system, 0, 0.3, y, shift, r, dy, out)
         expected = np.linalg.solve(shift * np.eye(len(y)) - jacobian, r)
         scale = np.maximum(np.abs(expected), 1e-3 * np.abs(expected).max() * packed.natural / packed.natural.max())
         # central differences with steps of 1e-5 of the natural scale leave 1e-6; kinks of the tables are not met here
@@ -113,11 +113,10 @@ def test_order_left_across_stick_and_slip():
 def test_agrees_with_another_integrator():
     scene = free_scene()
     packed = pack(scene, 0.02)
-    work = workspace(packed.contacts)
 
     def rate(t: float, y: np.ndarray) -> np.ndarray:
         out = np.empty_like(y)
-        right_hand_side(packed.contacts, packed.motion, 0, t, y, out, work)
+        right_hand_side(packed.system, 0, t, y, out)
         return out
 
     atol = 1e-9 * packed.natural

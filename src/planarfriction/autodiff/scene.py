@@ -10,14 +10,14 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError, SolverError
 from planarfriction.kernels import rosenbrock, tangent
-from planarfriction.kernels.body import workspace
-from planarfriction.kernels.rosenbrock import Output
+from planarfriction.kernels.rosenbrock import Output, Tolerance
 from planarfriction.kernels.tangent import Path
 from planarfriction.patch.metric import refuse_anisotropy
 from planarfriction.scenes.packing import PackedScene, pack
 from planarfriction.scenes.scene import Scene
 from planarfriction.scenes.simulation import recording_times
 from planarfriction.solvers import RODAS4
+from planarfriction.solvers.structured import start_of
 
 SCENE_PARAMETERS = {
     "mu": tangent.FRICTION,
@@ -33,9 +33,6 @@ SCENE_PARAMETERS = {
 - `mass`, `inertia`: of the body, forces held (gravity pulls in proportion to the mass);
 - `load`: every normal force, patches keeping the shape that they have.
 """
-
-_FIRST_STEP = 1e-6
-"""First trial step [s], as in `solvers.structured`."""
 
 _ACCURACY = 1e-7
 """Accuracy of each step of the derivatives, relative and in natural scales."""
@@ -99,8 +96,8 @@ def scene_sensitivities(
     every = scene.save_every if save_every is None else validation.positive("save_every", save_every)
     for contact in scene.contacts:
         refuse_anisotropy(contact.model.patch, "scene_sensitivities")
-    packed = pack(scene, end)
-    times = recording_times(end, every, packed.motion.breaks)
+    packed = pack(scene, end, sensitivities=True)
+    times = recording_times(end, every, packed.system.motion.breaks)
     absolute = (
         validation.positive("rtol", rtol) if atol is None else validation.positive("atol", atol)
     ) * packed.natural
@@ -112,10 +109,10 @@ def _run(
     packed: PackedScene, times: np.ndarray, rtol: float, atol: np.ndarray, parameters: np.ndarray
 ) -> tuple[Path, np.ndarray]:
     """The accepted steps, one of which ends at each recording time, and how many steps lead to each time."""
-    contacts, motion, y = packed.contacts, packed.motion, packed.state.copy()
-    stages, work = rosenbrock.stages_for(RODAS4, len(y)), workspace(contacts)
-    cursor, clock, counts = np.zeros(2, np.int64), np.array([0.0, _FIRST_STEP, np.inf]), np.zeros(4, np.int64)
-    many = len(contacts.kind)
+    system, motion, progress = packed.system, packed.system.motion, start_of(packed.state)
+    y, cursor, clock, counts = progress
+    stages, tolerance = rosenbrock.stages_for(RODAS4, len(y)), Tolerance(rtol, atol)
+    many = len(packed.models)
     nothing = Output(
         np.array([np.inf]), np.empty((1, 6)), np.empty((1, many, 3)), np.empty((1, many)), np.empty((0, 0))
     )
@@ -129,9 +126,7 @@ def _run(
         room = times[len(until)] - begin - since if times[len(until)] < breaks[piece + 1] else np.inf
         if 2.0 * proposed > room:  # end there, or halve what is left, as before a break
             clock[1] = room if proposed >= room else 0.5 * room
-        outcome = rosenbrock.advance(
-            contacts, motion, RODAS4, nothing, y, cursor, clock, rtol, atol, 1, counts, stages, work
-        )
+        outcome = rosenbrock.advance(system, RODAS4, nothing, progress, tolerance, 1, stages)
         if int(counts[rosenbrock.STEPS]) == accepted:
             continue
         ended = int(cursor[0]) != piece
@@ -154,23 +149,20 @@ def _run(
 
 def _carry(packed: PackedScene, path: Path, until: np.ndarray, names: tuple[str, ...]) -> SceneSensitivities:
     """Solve the variational equation along the steps, and evaluate it where `until` says."""
-    contacts, motion = packed.contacts, packed.motion
-    n, count, many, instants = len(packed.state), len(names), len(contacts.kind), len(until)
-    work, space = workspace(contacts), tangent.slopes_for(count, n)
+    system = packed.system
+    n, count, many, instants = len(packed.state), len(names), len(packed.models), len(until)
+    space, tolerance = tangent.slopes_for(count, n), Tolerance(_ACCURACY, _ACCURACY * packed.natural)
     slope, times = np.zeros((count, n)), np.empty(instants)
     bodies, wrenches = np.empty((instants, 6)), np.empty((instants, many, 3))
     d_bodies, d_wrenches = np.zeros((instants, 6, count)), np.zeros((instants, many, 3, count))
-    atol = _ACCURACY * packed.natural
     for m in range(instants):
         last, done = max(until[m] - 1, 0), 1.0
         if m:
-            tangent.propagate(contacts, motion, path, until[m - 1], until[m], slope, _ACCURACY, atol, space, work)
+            tangent.propagate(system, path, until[m - 1], until[m], slope, tolerance, space)
         else:
             done = 0.0
         piece, at = int(path.piece[last]), float(path.since[last] + done * path.step[last])
         state = path.end[last] if m else path.start[0]
-        tangent.wrench_slopes(
-            contacts, motion, piece, at, state, path.parameters, slope, wrenches[m], d_wrenches[m], space, work
-        )
-        times[m], bodies[m], d_bodies[m] = motion.breaks[piece] + at, state[-6:], slope[:, -6:].T
+        tangent.wrench_slopes(system, piece, at, state, path.parameters, slope, wrenches[m], d_wrenches[m], space)
+        times[m], bodies[m], d_bodies[m] = system.motion.breaks[piece] + at, state[-6:], slope[:, -6:].T
     return SceneSensitivities(names, times, bodies, wrenches, d_bodies, d_wrenches)

@@ -42,7 +42,7 @@ class Window:
     def of(cls, scene: Scene, begin: float, end: float) -> Window:
         """From `begin` to `end` [s]: 0 or jumps of a signal, or the end of the scene."""
         packed = pack(scene, end)
-        breaks = packed.motion.breaks
+        breaks = packed.system.motion.breaks
         first = int(np.argmin(np.abs(breaks - begin)))
         assert abs(breaks[first] - begin) < 1e-9, f"no jump at {begin} s"
         if first == 0:
@@ -50,9 +50,7 @@ class Window:
         before = _pieces(packed, slice(0, first))
         output = _output(before, breaks[first : first + 1], bristles=True)
         tolerance = START_TOLERANCE * before.natural
-        run = integrate(
-            before.contacts, before.motion, output, before.state, method=RODAS4, rtol=START_TOLERANCE, atol=tolerance
-        )
+        run = integrate(before.system, output, before.state, method=RODAS4, rtol=START_TOLERANCE, atol=tolerance)
         assert run.status == "success", run.message
         state = np.concatenate([run.output.bristles[-1], run.output.body[-1]])
         return cls(_pieces(packed._replace(state=state), slice(first, len(breaks) - 1)))
@@ -60,7 +58,7 @@ class Window:
     @property
     def ends(self) -> np.ndarray:
         """Ends of the pieces between jumps [s], [S]."""
-        return self.packed.motion.breaks[1:]
+        return self.packed.system.motion.breaks[1:]
 
     @property
     def states(self) -> int:
@@ -71,9 +69,7 @@ class Window:
         """Solve with the structured solver; `atol` is a share of the natural scales."""
         packed = self.packed
         output = _output(packed, self.ends, bristles=False)
-        run = integrate(
-            packed.contacts, packed.motion, output, packed.state, method=method, rtol=rtol, atol=atol * packed.natural
-        )
+        run = integrate(packed.system, output, packed.state, method=method, rtol=rtol, atol=atol * packed.natural)
         assert run.status == "success", run.message
         return Poses(run.statistics.wall_time, run.output.body[:, 3:], run.statistics.evaluations), run.statistics
 
@@ -81,23 +77,22 @@ class Window:
         """Solve with a method of SciPy's `solve_ivp`, restarted at every jump; `atol` in the units of the states."""
         from scipy.integrate import solve_ivp
 
-        from planarfriction.kernels.body import right_hand_side, workspace
+        from planarfriction.kernels.body import right_hand_side
 
-        contacts, motion, state, *_ = self.packed
-        work, y = workspace(contacts), state.copy()
+        system, y = self.packed.system, self.packed.state.copy()
 
         def rate(since: float, y: np.ndarray, piece: int) -> np.ndarray:
             nonlocal evaluations
             evaluations += 1  # SciPy's own count leaves out what Radau's Jacobians need
             dy = np.empty_like(y)
-            right_hand_side(contacts, motion, piece, since, y, dy, work)
+            right_hand_side(system, piece, since, y, dy)
             return dy
 
         options = {"method": method, "rtol": rtol, "atol": atol, "max_step": max_step}
         poses, evaluations = [], -1
         rate(0.0, y, 0)  # compiles
         begin = time.perf_counter()
-        for piece, length in enumerate(np.diff(motion.breaks)):
+        for piece, length in enumerate(np.diff(system.motion.breaks)):
             solution = solve_ivp(rate, (0.0, length), y, t_eval=[length], args=(piece,), **options)
             assert solution.success, solution.message
             y = solution.y[:, -1]
@@ -112,15 +107,16 @@ def lsoda_time(scene: Scene, t_end: float) -> float:
 
 def _pieces(packed: PackedScene, kept: slice) -> PackedScene:
     """The pieces `kept` of the motion."""
-    motion = packed.motion
+    motion = packed.system.motion
     per_piece = {name: getattr(motion, name)[kept] for name in ("load", "force", "acceleration", "row")}
     velocity = motion.velocity[kept] if len(motion.velocity) else motion.velocity
     breaks = motion.breaks[kept.start : kept.stop + 1]
-    return packed._replace(motion=motion._replace(breaks=breaks, velocity=velocity, **per_piece))
+    motion = motion._replace(breaks=breaks, velocity=velocity, **per_piece)
+    return packed._replace(system=packed.system._replace(motion=motion))
 
 
 def _output(packed: PackedScene, times: np.ndarray, *, bristles: bool) -> Output:
-    count, contacts = len(times), len(packed.contacts.kind)
+    count, contacts = len(times), len(packed.models)
     states = (count, len(packed.state) - 6) if bristles else (0, 0)
     return Output(
         times.copy(),

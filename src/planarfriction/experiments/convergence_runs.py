@@ -186,11 +186,11 @@ def _euler(case: Case, counts: Sequence[int], label: str, work: Work) -> dict[st
 
 def _euler_part(contacts: Sequence[Contact], part: int, state: np.ndarray | None) -> dict[str, np.ndarray]:
     """One of `_EULER_PARTS` equal parts: wrenches `[T, contacts, 3]` before the step at each sample, and the state."""
-    from planarfriction.kernels.body import right_hand_side, workspace
+    from planarfriction.kernels.body import right_hand_side
     from planarfriction.scenes.packing import pack
 
     packed = pack(scene(contacts), T_END)
-    work, y = workspace(packed.contacts), packed.state.copy() if state is None else state.copy()
+    y = packed.state.copy() if state is None else state.copy()
     rate, bristles = np.empty_like(y), len(y) - 6
     steps = round(T_END / EULER_STEP) // _EULER_PARTS
     twists = profile()((part * steps + np.arange(steps)) * EULER_STEP)
@@ -198,9 +198,9 @@ def _euler_part(contacts: Sequence[Contact], part: int, state: np.ndarray | None
     samples = []
     for k in range(steps):
         y[bristles : bristles + 3] = twists[k]
-        right_hand_side(packed.contacts, packed.motion, 0, 0.0, y, rate, work)
+        right_hand_side(packed.system, 0, 0.0, y, rate)
         if k % stride == 0:
-            samples.append(work.wrench.copy())
+            samples.append(packed.system.work.wrench.copy())
             y[:bristles][np.abs(y[:bristles]) < _NOTHING] = 0.0
         y[:bristles] += EULER_STEP * rate[:bristles]
     return {"wrench": np.array(samples), "state": y}

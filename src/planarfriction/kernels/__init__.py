@@ -25,11 +25,16 @@ Sums over cells may be reordered, so that they vectorise.
 # functions allocate nothing and keep no array, so they need no counting; they are called from compiled code only.
 _INNER = {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
-kernel: Any = functools.partial(njit, **_INNER, **_OPTIONS)
-"""Compile an inner function: no allocation, no array assignments that might need a copy."""
+# Inlined everywhere: a function left standing alone is optimised once by itself and once more in the module of each
+# caller. In the process that compiles, the first of these copies is called, and from the cache another: they differ in
+# the last bits. It is faster too, a third in the solver on three states.
+kernel: Any = functools.partial(njit, forceinline=True, **_INNER, **_OPTIONS)
+"""Compile an inner function into each of its callers: no allocation, no array assignments that might need a copy."""
 
-inlined: Any = functools.partial(kernel, forceinline=True)
-"""Compile an inner function into each of its callers."""
+inlined = kernel
+
+entry: Any = functools.partial(njit, cache=True, **_INNER, **_OPTIONS)
+"""Compile a function that compiled code calls by its address (see `kernels.pointers`)."""
 
 for _name, _formula in inspect.getmembers(formulas, inspect.isfunction):
     register_jitable(forceinline=True, **_INNER, **_OPTIONS)(_formula)

@@ -13,8 +13,18 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction.kernels import contacts as ct
 from planarfriction.kernels import inlined, jit, kernel
+from planarfriction.kernels.contacts import (
+    BACK_SUBSTITUTE,
+    ELIMINATE,
+    EVALUATE,
+    FACTOR,
+    LINEARISE,
+    Contacts,
+    contact_map,
+    contact_map_slopes,
+)
+from planarfriction.kernels.pointers import call, place
 
 
 class Motion(NamedTuple):
@@ -65,13 +75,22 @@ class Work(NamedTuple):
     """Acceleration per residual of the pose, [3, 3]."""
     body: np.ndarray
     """A vector of the body, [3]."""
+    rows: np.ndarray
+    """Twist and wrench of one contact and their changes, [4, 3] (see `contacts.ModelFunctions`)."""
 
 
-def workspace(contacts: ct.Contacts) -> Work:
-    """Workspace for a set of contacts (made outside compiled code, where an allocation costs compile time)."""
-    n = len(contacts.kind)
-    square = (3, 3)
-    return Work(
+class System(NamedTuple):
+    """A body on its contacts, with what its linear algebra works in."""
+
+    contacts: Contacts
+    motion: Motion
+    work: Work
+
+
+def system_of(contacts: Contacts, motion: Motion) -> System:
+    """A system with its workspace (made outside compiled code, where an allocation costs compile time)."""
+    n, square = len(contacts.count), (3, 3)
+    work = Work(
         np.zeros(contacts.linear[n]),
         np.zeros((n, 3, 3, 3)),
         np.zeros((n, 3)),
@@ -81,11 +100,13 @@ def workspace(contacts: ct.Contacts) -> Work:
         np.zeros(square),
         np.zeros(square),
         np.zeros(3),
+        np.zeros((4, 3)),
     )
+    return System(contacts, motion, work)
 
 
 @inlined
-def _times(a, u, v):
+def times(a, u, v):
     """`v = a u` for a 3 x 3 matrix."""
     for i in range(3):
         v[i] = 0.0
@@ -94,26 +115,28 @@ def _times(a, u, v):
 
 
 @inlined
-def _load(contacts, motion, piece, since, c):
+def load_of(system, piece, since, c):
     """Normal force of all the identical contacts that contact c stands for."""
-    return contacts.count[c] * (motion.load[piece, 0, c] + since * motion.load[piece, 1, c])
+    load = system.motion.load
+    return system.contacts.count[c] * (load[piece, 0, c] + since * load[piece, 1, c])
 
 
 @kernel
-def rates(contacts, motion, piece, since, y, dy, work):
+def rates(system, piece, since, y, dy):
     """Right-hand side `dy` at `since` seconds into a piece; wrenches per unit load into `work.wrench`."""
+    contacts, motion, work = system
     o = y.shape[0] - 6
     u, pose = y[o : o + 3], y[o + 3 :]
     v, a, total = work.twist, work.stiffness, work.body
     for i in range(3):
         total[i] = motion.force[piece, 0, i] + since * motion.force[piece, 1, i]
-    for c in range(contacts.kind.shape[0]):
-        first, last = contacts.state[c], contacts.state[c + 1]
-        w = work.wrench[c]
-        ct.contact_map(contacts.mount[c], contacts.place[c], pose, a)
-        _times(a, u, v)
-        ct.evaluate(contacts, c, motion.row[piece, c], y[first:last], v, dy[first:last], w)
-        load = _load(contacts, motion, piece, since, c)
+    for c in range(contacts.count.shape[0]):
+        first, w = contacts.state[c], work.wrench[c]
+        contact_map(contacts.mount[c], contacts.place[c], pose, a)
+        times(a, u, v)
+        record = contacts.record[motion.row[piece, c]]
+        call(contacts.calls[c, EVALUATE], (record, place(y, first), v, place(dy, first), w))
+        load = load_of(system, piece, since, c)
         for i in range(3):
             for p in range(3):
                 total[i] += load * a[p, i] * w[p]
@@ -129,49 +152,38 @@ def rates(contacts, motion, piece, since, y, dy, work):
     dy[o + 5] = u[2]
 
 
-@inlined
-def linearise(contacts, motion, piece, y, work):
+@kernel
+def linearise(system, piece, y):
     """Linearise every contact about `y`, whose `rates` were evaluated last."""
+    contacts, motion, work = system
     o = y.shape[0] - 6
     u, pose = y[o : o + 3], y[o + 3 :]
-    v, w, lin, maps = work.twist, work.wrench, work.linear, work.maps
-    for c in range(contacts.kind.shape[0]):
-        ct.contact_map(contacts.mount[c], contacts.place[c], pose, maps[c, 0])
-        ct.contact_map_slopes(contacts.mount[c], maps[c, 0], u, w[c], maps[c, 1], maps[c, 2])
-        _times(maps[c, 0], u, v)
-        ct.linearise(
-            contacts,
-            c,
-            motion.row[piece, c],
-            y[contacts.state[c] : contacts.state[c + 1]],
-            v,
-            lin[contacts.linear[c] : contacts.linear[c + 1]],
-        )
+    v, w, maps = work.twist, work.wrench, work.maps
+    for c in range(contacts.count.shape[0]):
+        contact_map(contacts.mount[c], contacts.place[c], pose, maps[c, 0])
+        contact_map_slopes(contacts.mount[c], maps[c, 0], u, w[c], maps[c, 1], maps[c, 2])
+        times(maps[c, 0], u, v)
+        record, lin = contacts.record[motion.row[piece, c]], place(work.linear, contacts.linear[c])
+        call(contacts.calls[c, LINEARISE], (record, place(y, contacts.state[c]), v, lin))
 
 
-@inlined
-def factor(contacts, motion, piece, since, y, shift, work):
+@kernel
+def factor(system, piece, since, y, shift):
     """Eliminate bristles and pose from `shift I - J`, and invert the 3 x 3 matrix that is left for the velocity.
 
     A free body's pose follows from its velocity, `pose = (r_pose + u)/shift`, so that the twist of a contact changes by
     `(A + G/shift) u + G r_pose/shift`. (A prescribed velocity does not see the pose at all.)
     """
-    lin, stiffness, m = work.linear, work.stiffness, work.matrix
+    contacts, motion, work = system
+    stiffness, m = work.stiffness, work.matrix
     for i in range(3):
         for j in range(3):
             m[i, j] = shift if i == j else 0.0
             work.to_pose[i, j] = 0.0
-    for c in range(contacts.kind.shape[0]):
-        ct.factor(
-            contacts,
-            c,
-            motion.row[piece, c],
-            y[contacts.state[c] : contacts.state[c + 1]],
-            shift,
-            lin[contacts.linear[c] : contacts.linear[c + 1]],
-            stiffness,
-        )
-        load = _load(contacts, motion, piece, since, c)
+    for c in range(contacts.count.shape[0]):
+        record, lin = contacts.record[motion.row[piece, c]], place(work.linear, contacts.linear[c])
+        call(contacts.calls[c, FACTOR], (record, place(y, contacts.state[c]), shift, lin, stiffness))
+        load = load_of(system, piece, since, c)
         a, g, h = work.maps[c, 0], work.maps[c, 1], work.maps[c, 2]
         for j in range(3):
             for p in range(3):
@@ -191,10 +203,9 @@ def factor(contacts, motion, piece, since, y, shift, work):
     for i in range(3):
         work.body[i] = _cofactor(m, 0, i)
         determinant += m[0, i] * work.body[i]
-    inverse = work.inverse
     for i in range(3):
         for j in range(3):
-            inverse[i, j] = _cofactor(m, j, i) / determinant
+            work.inverse[i, j] = _cofactor(m, j, i) / determinant
 
 
 @inlined
@@ -204,35 +215,28 @@ def _cofactor(m, i, j):
     return m[i1, j1] * m[i2, j2] - m[i1, j2] * m[i2, j1]
 
 
-@inlined
-def solve(contacts, motion, piece, since, y, shift, r, out, work):
+@kernel
+def solve(system, piece, since, y, shift, r, out):
     """Solve `(shift I - J) out = r` with the matrix that `factor` prepared."""
+    contacts, motion, work = system
     o = y.shape[0] - 6
-    lin, m, w, v, b = work.linear, work.inverse, work.stiffness[0], work.twist, work.body
+    w, v, b = work.stiffness[0], work.twist, work.body
     r_pose = r[o + 3 :]
     for i in range(3):
         b[i] = r[o + i]
         for j in range(3):
             b[i] += work.to_pose[i, j] * r_pose[j]
-    for c in range(contacts.kind.shape[0]):
-        first, last = contacts.state[c], contacts.state[c + 1]
-        ct.eliminate(
-            contacts,
-            c,
-            motion.row[piece, c],
-            y[first:last],
-            shift,
-            r[first:last],
-            lin[contacts.linear[c] : contacts.linear[c + 1]],
-            w,
-        )
-        load = _load(contacts, motion, piece, since, c)
+    for c in range(contacts.count.shape[0]):
+        first, lin = contacts.state[c], place(work.linear, contacts.linear[c])
+        record = contacts.record[motion.row[piece, c]]
+        call(contacts.calls[c, ELIMINATE], (record, place(y, first), shift, place(r, first), lin, w))
+        load = load_of(system, piece, since, c)
         a = work.maps[c, 0]
         for i in range(3):
             for p in range(3):
                 b[i] += motion.inverse_mass[i] * load * a[p, i] * w[p]
     u, pose = out[o : o + 3], out[o + 3 :]
-    _times(m, b, u)
+    times(work.inverse, b, u)
     per_shift = 1.0 / shift
     pose[2] = per_shift * (r_pose[2] + u[2])
     if motion.body_axes:
@@ -242,26 +246,18 @@ def solve(contacts, motion, piece, since, y, shift, r, out, work):
     else:
         pose[0] = per_shift * (r_pose[0] + u[0])
         pose[1] = per_shift * (r_pose[1] + u[1])
-    for c in range(contacts.kind.shape[0]):
-        first, last = contacts.state[c], contacts.state[c + 1]
+    for c in range(contacts.count.shape[0]):
+        first, lin = contacts.state[c], place(work.linear, contacts.linear[c])
         a, g = work.maps[c, 0], work.maps[c, 1]
         for i in range(3):
             v[i] = 0.0
             for j in range(3):
                 v[i] += a[i, j] * u[j] + g[i, j] * pose[j]
-        ct.back_substitute(
-            contacts,
-            c,
-            motion.row[piece, c],
-            y[first:last],
-            r[first:last],
-            v,
-            lin[contacts.linear[c] : contacts.linear[c + 1]],
-            out[first:last],
-        )
+        record = contacts.record[motion.row[piece, c]]
+        call(contacts.calls[c, BACK_SUBSTITUTE], (record, place(y, first), place(r, first), v, lin, place(out, first)))
 
 
 @jit
-def right_hand_side(contacts, motion, piece, since, y, dy, work):
+def right_hand_side(system, piece, since, y, dy):
     """`rates` for callers in Python, as an explicit or a general implicit solver needs it."""
-    rates(contacts, motion, piece, since, y, dy, work)
+    rates(system, piece, since, y, dy)

@@ -2,31 +2,68 @@
 
 The twist of contact c is `V = A(pose) u` for the body's velocity `u = (vx, vy, omega)`, and its wrench `W` acts on the
 body as `A' W`, since power is the same at both ends. With `G = d(A u)/d pose` and `H = d(A' W)/d pose` that is all the
-body needs to know of a contact.
+body needs to know of a contact; what is behind its wrench is called by address (see `ModelFunctions`).
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction.kernels import anisotropic, distributed, inlined, published, reduced
-from planarfriction.kernels.law import law_of
+from planarfriction.kernels import inlined
+from planarfriction.kernels.pointers import address_of
 
-DISTRIBUTED, PUBLISHED, ANISOTROPIC, REDUCED = 0, 1, 2, 3
 WORLD, BODY, BODY_AXES = 0, 1, 2
 """Fixed to the world; fixed to the body; fixed to a body whose prescribed velocity is given in its own axes."""
 
+EVALUATE, LINEARISE, FACTOR, ELIMINATE, BACK_SUBSTITUTE, CHANGE = range(6)
+"""Columns of `Contacts.calls`."""
+
+
+class ModelFunctions(NamedTuple):
+    """The compiled functions of a kind of model, for the bristles z of one contact, per unit normal load.
+
+    Their first argument is the address of the contact's record, the others are addresses of doubles but for `shift`
+    and the two changes. With `z' = f(z, V)`, `D = shift I - df/dz` and the wrench `W(z, V)`:
+    """
+
+    evaluate: Any
+    """`(contact, z, V, z', W)`: write z' and W."""
+    linearise: Any
+    """`(contact, z, V, lin)`: write the derivatives of f into the workspace `lin` of the contact."""
+    factor: Any
+    """`(contact, z, shift, lin, S)`: prepare D in `lin`, write S [3, 3] = dW/dV with z eliminated."""
+    eliminate: Any
+    """`(contact, z, shift, r, lin, W)`: write the wrench that the residual r of z' causes."""
+    back_substitute: Any
+    """`(contact, z, r, dV, lin, out)`: solve `D out = r + df/dV dV`."""
+    change: Any
+    """`(contact, z, z', lin, dz, dz', rows, friction, size)`: write the change `dz'` of z' and that of the wrench.
+
+    `rows` [4, 3] holds V, W, dV and takes dW. The changes come from `dz`, `dV` and from relative changes of all
+    coefficients of friction and of the size of the patch."""
+
+
+WORDS = ("ppppp", "pppp", "ppfpp", "ppfppp", "pppppp", "pppppppff")
+"""Arguments of `ModelFunctions` (see `pointers.address_of`)."""
+
+
+def calls_of(functions: ModelFunctions, *, change: bool = False) -> np.ndarray:
+    """Addresses of the functions of a model, compiled or read from the cache, [6]; that of `change` only if asked."""
+    count = len(functions) if change else CHANGE
+    addresses = [address_of(function, words) for function, words in zip(functions[:count], WORDS, strict=False)]
+    return np.array(addresses + [0] * (len(functions) - count), np.int64)
+
 
 class Contacts(NamedTuple):
-    """C contacts and the R shapes they take, in flat arrays."""
+    """C contacts and the R shapes they take."""
 
-    kind: np.ndarray
-    """`DISTRIBUTED`, `PUBLISHED`, `ANISOTROPIC` (distributed) or `REDUCED`, int [C]."""
-    law: np.ndarray
-    """Numbers of the law, a row each."""
+    calls: np.ndarray
+    """Addresses of each contact's `ModelFunctions`, int [C, 6]."""
+    record: np.ndarray
+    """Addresses of the records of contacts, one for each shape, int [R]."""
     mount: np.ndarray
     """`WORLD`, `BODY` or `BODY_AXES`, int [C]."""
     place: np.ndarray
@@ -37,22 +74,6 @@ class Contacts(NamedTuple):
     """Where the bristles of each contact begin in the state vector, int [C + 1]."""
     linear: np.ndarray
     """Where the linearisation of each contact begins in its workspace, int [C + 1]."""
-    cell: np.ndarray
-    """Where the cells of each contact begin in `x` and `y`, int [C + 1]."""
-    x: np.ndarray
-    y: np.ndarray
-    weights: np.ndarray
-    """Weights of the distributed and anisotropic contacts, one run of cells a shape, flat."""
-    weight_start: np.ndarray
-    """Where the weights of each shape begin, int [R]."""
-    shape: np.ndarray
-    """Numbers of each shape, [R, 7]: as `kernels.reduced` reads them, or as `kernels.published` (4) with the root of
-    the metric (xx, xy, yy)."""
-    surface: np.ndarray
-    """Of each shape, int [R, 3]: limit surface (kind, start, size), maps of `kernels.reduced` (start, other), or the
-    anisotropic cells (0, start, n)."""
-    data: np.ndarray
-    """Numbers of the limit surfaces and maps, and of the anisotropic cells (see `kernels.anisotropic`), flat."""
 
 
 @inlined
@@ -89,122 +110,3 @@ def contact_map_slopes(mount, a, u, w, g, h):
         g[1, 2] = -(a[0, 0] * u[0] + a[0, 1] * u[1])
         h[0, 2] = a[1, 0] * w[0] - a[0, 0] * w[1]
         h[1, 2] = a[1, 1] * w[0] - a[0, 1] * w[1]
-
-
-@inlined
-def evaluate(contacts, c, row, z, v, zdot, w):
-    """Bristle rates and wrench per unit load of contact c in shape `row` at the twist `v`."""
-    law = law_of(contacts.law[c])
-    if contacts.kind[c] == DISTRIBUTED:
-        x, y, weights = _cells(contacts, c, row)
-        w[0], w[1], w[2] = distributed.evaluate(law, z, v[0], v[1], v[2], x, y, weights, zdot)
-    elif contacts.kind[c] == ANISOTROPIC:
-        cells, weights = _anisotropic_cells(contacts, c, row)
-        w[0], w[1], w[2] = anisotropic.evaluate(law, z, v[0], v[1], v[2], cells, weights, zdot)
-    elif contacts.kind[c] == REDUCED:
-        w[0], w[1], w[2] = reduced.evaluate(
-            law, z, v[0], v[1], v[2], contacts.shape[row], contacts.surface[row], contacts.data, zdot
-        )
-    else:
-        shape = contacts.shape[row]
-        vx, vy = _through_root(shape, v[0], v[1])
-        fx, fy, w[2] = published.evaluate(law, z, vx, vy, v[2], shape, contacts.surface[row], contacts.data, zdot)
-        w[0], w[1] = _through_root(shape, fx, fy)
-
-
-@inlined
-def linearise(contacts, c, row, z, v, lin):
-    """Linearise contact c in shape `row` at the twist `v` into its workspace `lin`."""
-    law = law_of(contacts.law[c])
-    if contacts.kind[c] == DISTRIBUTED:
-        x, y, _ = _cells(contacts, c, row)
-        distributed.linearise(law, z, v[0], v[1], v[2], x, y, lin.reshape(7, x.shape[0]))
-    elif contacts.kind[c] == ANISOTROPIC:
-        cells, weights = _anisotropic_cells(contacts, c, row)
-        rows = lin.reshape(anisotropic.LINEAR_NUMBERS, weights.shape[0])
-        anisotropic.linearise(law, z, v[0], v[1], v[2], cells, rows)
-    elif contacts.kind[c] == REDUCED:
-        reduced.linearise(law, z, v[0], v[1], v[2], contacts.shape[row], contacts.surface[row], contacts.data, lin)
-    else:
-        shape = contacts.shape[row]
-        vx, vy = _through_root(shape, v[0], v[1])
-        published.linearise(law, z, vx, vy, v[2], shape, contacts.surface[row], contacts.data, lin)
-
-
-@inlined
-def factor(contacts, c, row, z, shift, lin, stiffness):
-    """Prepare the elimination of the bristles of contact c and write its `d wrench / d twist` per unit load."""
-    law = law_of(contacts.law[c])
-    if contacts.kind[c] == DISTRIBUTED:
-        x, y, weights = _cells(contacts, c, row)
-        distributed.factor(law, z, shift, x, y, weights, lin.reshape(7, x.shape[0]), stiffness)
-    elif contacts.kind[c] == ANISOTROPIC:
-        cells, weights = _anisotropic_cells(contacts, c, row)
-        rows = lin.reshape(anisotropic.LINEAR_NUMBERS, weights.shape[0])
-        anisotropic.factor(law, shift, cells, weights, rows, stiffness)
-    elif contacts.kind[c] == REDUCED:
-        reduced.factor(law, shift, contacts.shape[row], lin, stiffness)
-    else:
-        shape = contacts.shape[row]
-        published.factor(law, shift, shape, lin, stiffness)
-        for i in range(3):
-            stiffness[i, 0], stiffness[i, 1] = _through_root(shape, stiffness[i, 0], stiffness[i, 1])
-        for i in range(3):
-            stiffness[0, i], stiffness[1, i] = _through_root(shape, stiffness[0, i], stiffness[1, i])
-
-
-@inlined
-def eliminate(contacts, c, row, z, shift, r, lin, w):
-    """Wrench per unit load of contact c caused by its bristle residual `r`."""
-    law = law_of(contacts.law[c])
-    if contacts.kind[c] == DISTRIBUTED:
-        x, y, weights = _cells(contacts, c, row)
-        w[0], w[1], w[2] = distributed.eliminate(law, z, shift, r, x, y, weights, lin.reshape(7, x.shape[0]))
-    elif contacts.kind[c] == ANISOTROPIC:
-        cells, weights = _anisotropic_cells(contacts, c, row)
-        rows = lin.reshape(anisotropic.LINEAR_NUMBERS, weights.shape[0])
-        w[0], w[1], w[2] = anisotropic.eliminate(law, shift, r, cells, weights, rows)
-    elif contacts.kind[c] == REDUCED:
-        w[0], w[1], w[2] = reduced.eliminate(law, shift, r, contacts.shape[row], lin)
-    else:
-        shape = contacts.shape[row]
-        fx, fy, w[2] = published.eliminate(law, shift, r, shape, lin)
-        w[0], w[1] = _through_root(shape, fx, fy)
-
-
-@inlined
-def back_substitute(contacts, c, row, z, r, v, lin, out):
-    """Bristle solution of contact c for the residual `r` and the twist change `v`."""
-    if contacts.kind[c] == DISTRIBUTED:
-        x, y, _ = _cells(contacts, c, row)
-        distributed.back_substitute(z, r, v[0], v[1], v[2], x, y, lin.reshape(7, x.shape[0]), out)
-    elif contacts.kind[c] == ANISOTROPIC:
-        cells, weights = _anisotropic_cells(contacts, c, row)
-        rows = lin.reshape(anisotropic.LINEAR_NUMBERS, weights.shape[0])
-        anisotropic.back_substitute(r, v[0], v[1], v[2], cells, rows, out)
-    elif contacts.kind[c] == REDUCED:
-        reduced.back_substitute(r, v[0], v[1], v[2], contacts.shape[row], lin, out)
-    else:
-        shape = contacts.shape[row]
-        vx, vy = _through_root(shape, v[0], v[1])
-        published.back_substitute(r, vx, vy, v[2], shape, lin, out)
-
-
-@inlined
-def _cells(contacts, c, row):
-    first, last = contacts.cell[c], contacts.cell[c + 1]
-    start = contacts.weight_start[row]
-    return contacts.x[first:last], contacts.y[first:last], contacts.weights[start : start + last - first]
-
-
-@inlined
-def _anisotropic_cells(contacts, c, row):
-    n, start, first = contacts.surface[row, 2], contacts.weight_start[row], contacts.surface[row, 1]
-    cells = contacts.data[first : first + anisotropic.CELL_NUMBERS * n].reshape(anisotropic.CELL_NUMBERS, n)
-    return cells, contacts.weights[start : start + n]
-
-
-@inlined
-def _through_root(shape, x, y):
-    """A velocity in the axes of a reduced contact's metric, or a force out of them: times the symmetric root."""
-    return shape[4] * x + shape[5] * y, shape[5] * x + shape[6] * y

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from llvmlite import ir
 from numba import types
-from numba.core import cgutils
 from numba.extending import intrinsic
 
 _FLAGS = ("contract", "reassoc", "nsz")
@@ -25,7 +24,9 @@ def _vector(builder, numbers):
 
 
 def _load(context, builder, array_type, array, at):
-    base = cgutils.create_struct_proxy(array_type)(context, builder, value=array).data
+    base = (
+        context.make_array(array_type)(context, builder, array).data if isinstance(array_type, types.Array) else array
+    )
     place = builder.bitcast(builder.gep(base, [at]), _VECTOR.as_pointer())
     return builder.load(place, align=8)
 

@@ -62,6 +62,27 @@ class Output(NamedTuple):
     """[M, number of bristle states], or [0, 0] when they are not wanted."""
 
 
+class Progress(NamedTuple):
+    """How far an integration is; `advance` goes on from here and updates it."""
+
+    y: np.ndarray
+    """The state, [n]."""
+    cursor: np.ndarray
+    """Piece and next output, int [2]."""
+    clock: np.ndarray
+    """Seconds into the piece, next step size, first step size of a piece, [3]."""
+    statistics: np.ndarray
+    """Counts of `STEPS`, `REJECTIONS`, `EVALUATIONS`, `JACOBIANS`, int [4]."""
+
+
+class Tolerance(NamedTuple):
+    """What the error of a step is measured by."""
+
+    rtol: float
+    atol: np.ndarray
+    """[n]"""
+
+
 class Stages(NamedTuple):
     """Workspace of a method with s stages for n states."""
 
@@ -94,13 +115,13 @@ def stages_for(method: Method, n: int) -> Stages:
 
 
 @kernel
-def _error_norm(contacts, y, new, error, rtol, atol):
+def error_norm(contacts, y, new, error, tolerance):
     """Largest of the body's components and of each contact's mean over its bristles, in units of the tolerance.
 
     Infinite where anything is not finite.
     """
-    largest = 0.0
-    for c in range(contacts.kind.shape[0]):
+    largest, rtol, atol = 0.0, tolerance.rtol, tolerance.atol
+    for c in range(contacts.count.shape[0]):
         first, last = contacts.state[c], contacts.state[c + 1]
         total = 0.0
         for i in range(first, last):
@@ -120,12 +141,13 @@ def _error_norm(contacts, y, new, error, rtol, atol):
 
 
 @kernel
-def _record(contacts, motion, piece, since, y, output, m, dy, work):
-    rates(contacts, motion, piece, since, y, dy, work)
+def _record(system, piece, since, y, output, m, dy):
+    contacts, motion, work = system
+    rates(system, piece, since, y, dy)
     o = y.shape[0] - 6
     for i in range(6):
         output.body[m, i] = y[o + i]
-    for c in range(contacts.kind.shape[0]):
+    for c in range(contacts.count.shape[0]):
         load = motion.load[piece, 0, c] + since * motion.load[piece, 1, c]
         output.load[m, c] = load
         for i in range(3):
@@ -136,11 +158,12 @@ def _record(contacts, motion, piece, since, y, output, m, dy, work):
 
 
 @inlined
-def _time_slope(contacts, motion, piece, work, slope):
+def _time_slope(system, piece, slope):
     """`df/dt` of the body's accelerations [3]: forces and loads are linear in time."""
+    contacts, motion, work = system
     for i in range(3):
         total = motion.force[piece, 1, i]
-        for c in range(contacts.kind.shape[0]):
+        for c in range(contacts.count.shape[0]):
             load = contacts.count[c] * motion.load[piece, 1, c]
             for p in range(3):
                 total += load * work.maps[c, 0, p, i] * work.wrench[c, p]
@@ -165,9 +188,9 @@ def _combine(coefficients, stages, count, base, out):
 
 
 @kernel
-def _forget_unloaded(contacts, motion, piece, y):
+def forget_unloaded(contacts, motion, piece, y):
     """A contact without load on the whole piece keeps no memory: it starts again from rest."""
-    for c in range(contacts.kind.shape[0]):
+    for c in range(contacts.count.shape[0]):
         if motion.load[piece, 0, c] == 0.0 and motion.load[piece, 1, c] == 0.0:
             for i in range(contacts.state[c], contacts.state[c + 1]):
                 y[i] = 0.0
@@ -187,33 +210,31 @@ def _interpolate(method, k, y, new, s, out):
         out[i] = (1.0 - s) * y[i] + s * (new[i] + (1.0 - s) * inner)
 
 
-@inlined
-def _prepare(contacts, motion, piece, since, y, stages, work):
+@kernel
+def _prepare(system, piece, since, y, stages):
     """Evaluate and linearise at the start of a step."""
-    rates(contacts, motion, piece, since, y, stages.start_rate, work)
-    linearise(contacts, motion, piece, y, work)
-    _time_slope(contacts, motion, piece, work, stages.time_slope)
+    rates(system, piece, since, y, stages.start_rate)
+    linearise(system, piece, y)
+    _time_slope(system, piece, stages.time_slope)
 
 
 @kernel
-def _step(contacts, motion, method, piece, since, step, y, stages, work):
+def _step(system, method, piece, since, step, y, stages):
     """The stages of one step from `y`: solution into `stages.new`, its error estimate into `stages.error`."""
     n, s = y.shape[0], method.m.shape[0]
     k, argument, right, coupling = stages.k, stages.argument, stages.right, stages.coupling
     shift = 1.0 / (step * method.gamma)
-    factor(contacts, motion, piece, since, y, shift, work)
+    factor(system, piece, since, y, shift)
     for i in range(s):
         for j in range(i):
             coupling[j] = method.c[i, j] / step
-        if i == 0:
-            _combine(coupling, k, 0, stages.start_rate, right)
-        else:
+        if i > 0:
             _combine(method.a[i], k, i, y, argument)
-            rates(contacts, motion, piece, since + method.alpha[i] * step, argument, stages.rate, work)
-            _combine(coupling, k, i, stages.rate, right)
+            rates(system, piece, since + method.alpha[i] * step, argument, stages.rate)
+        _combine(coupling, k, i, stages.rate if i > 0 else stages.start_rate, right)
         for p in range(3):
             right[n - 6 + p] += method.time_gamma[i] * step * stages.time_slope[p]
-        solve(contacts, motion, piece, since, y, shift, right, k[i], work)
+        solve(system, piece, since, y, shift, right, k[i])
     _combine(method.m, k, s, y, stages.new)
     _combine(method.e, k, s, stages.zero, stages.error)
 
@@ -231,13 +252,12 @@ def _at_rest(motion, y, rate):
 
 
 @jit
-def advance(contacts, motion, method, output, y, cursor, clock, rtol, atol, max_steps, statistics, stages, work):
-    """Integrate from where `cursor` and `clock` stand to the last break, or for `max_steps` trials; return an outcome.
+def advance(system, method, output, progress, tolerance, max_steps, stages):
+    """Integrate from where `progress` stands to the last break, or for `max_steps` trials; return an outcome.
 
-    `cursor` is (piece, next output), `clock` is (seconds into the piece, next step size, first step size of a piece):
-    both are updated, so that the next call goes on. `y` is the state; the step that ends at a break is recorded (left
-    limit) before the next piece begins.
+    The step that ends at a break is recorded (left limit) before the next piece begins.
     """
+    motion, (y, cursor, clock, statistics) = system.motion, progress
     n = y.shape[0]
     piece, m = cursor[0], cursor[1]
     since, h, first_step = clock[0], clock[1], clock[2]
@@ -253,7 +273,7 @@ def advance(contacts, motion, method, output, y, cursor, clock, rtol, atol, max_
                     y[n - 6 + i] = motion.velocity[piece, i]
             h = xp.minimum(h, first_step)
             if piece == 0 and m == 0 and output.time[0] == begin:
-                _record(contacts, motion, piece, 0.0, y, output, m, stages.rate, work)
+                _record(system, piece, 0.0, y, output, m, stages.rate)
                 m += 1
         while since < end - begin:
             # stretch the last step to the break, or halve what is left, so that no sliver of a step remains
@@ -266,12 +286,12 @@ def advance(contacts, motion, method, output, y, cursor, clock, rtol, atol, max_
                 outcome = PAUSED if taken >= max_steps else STEP_TOO_SMALL
                 break
             if fresh:
-                _prepare(contacts, motion, piece, since, y, stages, work)
+                _prepare(system, piece, since, y, stages)
                 statistics[JACOBIANS] += 1
-            _step(contacts, motion, method, piece, since, step, y, stages, work)
+            _step(system, method, piece, since, step, y, stages)
             taken += 1
             statistics[EVALUATIONS] += method.m.shape[0] if fresh else method.m.shape[0] - 1
-            norm = _error_norm(contacts, y, stages.new, stages.error, rtol, atol)
+            norm = error_norm(system.contacts, y, stages.new, stages.error, tolerance)
             # no growth right after a rejection, whose reason is still near
             growth = _GROWTH if fresh else 1.0
             scale = _SHRINKAGE
@@ -289,7 +309,7 @@ def advance(contacts, motion, method, output, y, cursor, clock, rtol, atol, max_
             while m < output.time.shape[0] and output.time[m] <= time:
                 at = reached if output.time[m] == time else output.time[m] - begin
                 _interpolate(method, stages.k, y, stages.new, (at - since) / step, stages.argument)
-                _record(contacts, motion, piece, at, stages.argument, output, m, stages.rate, work)
+                _record(system, piece, at, stages.argument, output, m, stages.rate)
                 m += 1
             if starting:
                 first_step = step * scale
@@ -302,11 +322,11 @@ def advance(contacts, motion, method, output, y, cursor, clock, rtol, atol, max_
                 outcome = AT_REST
                 if m < output.time.shape[0]:
                     output.time[m] = time
-                    _record(contacts, motion, piece, since, y, output, m, stages.rate, work)
+                    _record(system, piece, since, y, output, m, stages.rate)
                     m += 1
                 break
         if outcome == DONE:
-            _forget_unloaded(contacts, motion, piece, y)
+            forget_unloaded(system.contacts, motion, piece, y)
             piece += 1
             since = 0.0
     cursor[0], cursor[1] = piece, m

@@ -15,8 +15,15 @@ from planarfriction.kernels import distributed_adjoint
 from planarfriction.kernels import distributed_step as kernels
 from planarfriction.laws import LuGre
 from planarfriction.models.base import StepJacobians
+from planarfriction.patch import ContactPatch
 
 _ORIGIN, _WHOLE = np.zeros(1), np.ones((1, 1))
+
+
+def cell_numbers(patch: ContactPatch, cells: np.ndarray) -> np.ndarray:
+    """The numbers of the chosen cells, `[7, n]`, as `kernels.anisotropic` reads them."""
+    levers, asymmetry = patch.levers()[cells], patch.asymmetries()[cells]
+    return np.array([*(levers[:, i, j] for i, j in ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2))), *asymmetry.T])
 
 
 def centres(law: LuGre, asymmetry: np.ndarray, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

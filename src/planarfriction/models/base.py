@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -49,6 +50,27 @@ class StepJacobians(NamedTuple):
     """d wrench / d normal_force, `[..., 3]`."""
 
 
+class PackedModel(NamedTuple):
+    """A model at R loads as the compiled solver sees it."""
+
+    functions: Any
+    """Its `kernels.contacts.ModelFunctions`."""
+    records: np.ndarray
+    """What the functions are given of the contact, a row of words for each load, `[R, words]` (`kernels.records`)."""
+    states: int
+    """Bristle states of a contact."""
+    workspace: int
+    """Numbers that a linearisation takes."""
+    natural: np.ndarray
+    """Natural scale of each state, `[states]`: that of a full deflection."""
+    radius: float
+    """Lever arm [m] that turns the spin of the patch into a speed."""
+    kept: tuple[np.ndarray, ...]
+    """Arrays whose addresses are in the records: they live as long as this does."""
+    cells: np.ndarray | None = None
+    """Which cells of the model have bristles here, bool `[N]`, where states are those of cells."""
+
+
 @dataclass(frozen=True, eq=False)
 class FrictionModel:
     """A patch with a friction law; the caller holds the state.
@@ -76,6 +98,14 @@ class FrictionModel:
     def rest(self) -> np.ndarray:
         """State of a contact at rest: no bristle is deflected."""
         return np.zeros(self.state_shape)
+
+    def packed(self, loads: Sequence[float | None]) -> PackedModel:
+        """The model at the distinct `loads` [N] of a run, `[None]` where the patch does not depend on the load.
+
+        What a model needs to be simulated in a scene; the solver calls its functions by address.
+        """
+        rule = "be one that can be simulated in a scene: it has no packed(loads)"
+        raise InvalidValueError("model", rule, type(self).__name__)
 
     def _inputs(self, state, twist, normal_force, **more) -> list[np.ndarray]:
         """Check the inputs and broadcast their batch axes against each other.

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from planarfriction import formulas
-from planarfriction.kernels import distributed_adjoint
+from planarfriction.kernels import anisotropic_contact, distributed_adjoint, distributed_contact
 from planarfriction.kernels import distributed_step as kernels
+from planarfriction.kernels.anisotropic_contact import AnisotropicContact
+from planarfriction.kernels.distributed_contact import DistributedContact
+from planarfriction.kernels.pointers import place_of
+from planarfriction.kernels.records import rows_of
 from planarfriction.models import anisotropic
-from planarfriction.models.base import FrictionModel, ModelJacobians, StepJacobians
+from planarfriction.models.base import FrictionModel, ModelJacobians, PackedModel, StepJacobians
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,6 +139,32 @@ class DistributedModel(FrictionModel):
             *results,
         )
         return StepJacobians(*(a.reshape(*batch, *shape) for a, shape in zip(results, shapes, strict=True)))
+
+    def packed(self, loads: Sequence[float | None]) -> PackedModel:
+        """See `FrictionModel.packed`; only cells that carry load at one of the loads have bristles."""
+        weights = np.atleast_2d([self.patch.weights(load) for load in loads])
+        ever = weights.max(axis=0) > 0.0
+        weights, positions = np.ascontiguousarray(weights[:, ever]), self.patch.positions[ever]
+        count, law = len(positions), self.law.numbers
+        at = place_of(weights) + weights.strides[0] * np.arange(len(weights))
+        if self.patch.anisotropic:
+            cells = anisotropic.cell_numbers(self.patch, ever)
+            record = AnisotropicContact(law, count, place_of(cells), 0)
+            functions, numbers, kept = anisotropic_contact.FUNCTIONS, anisotropic_contact.LINEAR_NUMBERS, (cells,)
+        else:
+            x, y = np.ascontiguousarray(positions[:, 0]), np.ascontiguousarray(positions[:, 1])
+            record = DistributedContact(law, count, place_of(x), place_of(y), 0)
+            functions, numbers, kept = distributed_contact.FUNCTIONS, distributed_contact.LINEAR, (x, y)
+        return PackedModel(
+            functions,
+            rows_of(record, len(weights), weights=at),
+            2 * count,
+            numbers * count,
+            np.full(2 * count, self.law.largest_deflection),
+            float(np.hypot(*(positions - positions.mean(axis=0)).T).mean()),
+            (weights, *kept),
+            ever,
+        )
 
     # ------------------------------------------------------------------ cells
 

@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.kernels import reduced_adjoint
+from planarfriction.kernels import reduced_adjoint, reduced_contact
 from planarfriction.kernels import reduced_step as kernels
+from planarfriction.kernels.pointers import place_of
+from planarfriction.kernels.records import rows_of
 from planarfriction.kernels.reduced import LINEAR
-from planarfriction.models.base import FrictionModel, ModelJacobians, StepJacobians
+from planarfriction.kernels.reduced_contact import ReducedContact, Shape
+from planarfriction.models.base import FrictionModel, ModelJacobians, PackedModel, StepJacobians
 from planarfriction.models.load_family import LoadFamily
 from planarfriction.models.reduced_map import ReducedShape, owner, reduced_shape
 
@@ -126,6 +130,22 @@ class ReducedModel(FrictionModel):
         packed = self._by_load(self._step_jacobians, (13, 3), *self._inputs(state, twist, normal_force, dt=dt))
         square = [packed[..., i : i + 3, :] for i in (0, 3, 6, 9)]
         return StepJacobians(square[0], square[1], square[2], square[3], packed[..., 12, :])
+
+    def packed(self, loads: Sequence[float | None]) -> PackedModel:
+        """See `FrictionModel.packed`; a family's maps stay where they are, its shapes refer to them."""
+        shapes = self.shapes_at(loads)
+        maps = {id(data): data for shape in shapes for data in (shape.data, shape.other) if data is not None}
+        at = {name: place_of(data) for name, data in maps.items()}
+        data = np.array([at[id(shape.data)] for shape in shapes])
+        other = np.array([at[id(shape.data if shape.other is None else shape.other)] for shape in shapes])
+        factors = np.array([shape.factor for shape in shapes])[:, *np.triu_indices(3)]
+        numbers = np.column_stack([factors, [shape.blend for shape in shapes]])
+        record = ReducedContact(self.law.numbers, Shape(*numbers[0]), 0, 0)
+        rows = rows_of(record, len(shapes), shape=numbers, data=data, other=(other - data) // 8)
+        radius = max(shape.contact_radius for shape in shapes)
+        natural = np.full(3, self.law.largest_deflection)
+        kept = tuple(maps.values())
+        return PackedModel(reduced_contact.FUNCTIONS, rows, 3, reduced_contact.LINEAR, natural, radius, kept)
 
     # ------------------------------------------------------------------ one shape
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -11,11 +12,14 @@ import numpy as np
 from planarfriction import formulas, validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.geometry import transformed
-from planarfriction.kernels import published_adjoint
+from planarfriction.kernels import published_adjoint, published_contact
 from planarfriction.kernels import published_step as kernels
+from planarfriction.kernels.pointers import place_of
+from planarfriction.kernels.published_contact import PublishedContact, Root, Shape
+from planarfriction.kernels.records import rows_of
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
 from planarfriction.limit_surface.base import scaling
-from planarfriction.models.base import FrictionModel, ModelJacobians, StepJacobians
+from planarfriction.models.base import FrictionModel, ModelJacobians, PackedModel, StepJacobians
 from planarfriction.patch.metric import refuse_cell_metrics, same_metric
 
 _REMEMBERED = 64
@@ -162,6 +166,30 @@ class ReducedModelPublished(FrictionModel):
             wrench_twist=axes @ slopes.wrench_twist @ axes,
             wrench_load=transformed(axes, slopes.wrench_load),
         )
+
+    def packed(self, loads: Sequence[float | None]) -> PackedModel:
+        """See `FrictionModel.packed`."""
+        shapes = [self._reference if load is None else self.shape_at(load) for load in loads]
+        data = [np.ascontiguousarray(shape.surface.numbers.data, dtype=float) for shape in shapes]
+        numbers, root = shapes[0].surface.numbers, shapes[0].root
+        record = PublishedContact(
+            self.law.numbers,
+            Shape(*shapes[0].numbers),
+            Root(root[0, 0], root[0, 1], root[1, 1]),
+            numbers.kind,
+            numbers.size,
+            0,
+        )
+        rows = rows_of(
+            record,
+            len(shapes),
+            shape=np.array([shape.numbers for shape in shapes]),
+            size=np.array([shape.surface.numbers.size for shape in shapes]),
+            data=np.array([place_of(each) for each in data]),
+        )
+        radius = max(shape.contact_radius for shape in shapes)
+        natural = self.law.largest_deflection * np.array([1.0, 1.0, radius])
+        return PackedModel(published_contact.FUNCTIONS, rows, 3, published_contact.LINEAR, natural, radius, tuple(data))
 
     # ------------------------------------------------------------------ axes of the friction metric
 

@@ -89,10 +89,9 @@ def simulate(
     every = scene.save_every if save_every is None else validation.positive("save_every", save_every)
     validation.choice("bristles", bristles, BRISTLES)
     packed = pack(scene, end)
-    output = _output(recording_times(end, every, packed.motion.breaks), packed, bristles)
+    output = _output(recording_times(end, every, packed.system.motion.breaks), packed, bristles)
     run = integrate(
-        packed.contacts,
-        packed.motion,
+        packed.system,
         output,
         packed.state,
         method=method,
@@ -119,8 +118,8 @@ def recording_times(end: float, every: float, breaks: np.ndarray) -> np.ndarray:
 
 
 def _output(times: np.ndarray, packed: PackedScene, bristles: str) -> Output:
-    count, contacts = len(times), len(packed.contacts.kind)
-    states = int(packed.contacts.state[-1])
+    count, contacts = len(times), len(packed.models)
+    states = int(packed.system.contacts.state[-1])
     return Output(
         times.copy(),
         np.empty((count, 6)),
@@ -147,11 +146,12 @@ def _histories(scene: Scene, packed: PackedScene, output: Output) -> dict[str, H
     histories["normal_force"] = history("normal_force", ("time", "contact"), output.load, "N")
     if len(output.bristles):
         for c, contact in enumerate(scene.contacts):
-            part = output.bristles[:, packed.contacts.state[c] : packed.contacts.state[c + 1]]
+            first, cells = packed.system.contacts.state, packed.models[c].cells
+            part = output.bristles[:, first[c] : first[c + 1]]
             name = f"bristles_{contact.name}"
-            if len(packed.loaded[c]):
-                full = np.zeros((len(part), 2, len(packed.loaded[c])))
-                full[:, :, packed.loaded[c]] = part.reshape(len(part), 2, -1)
+            if cells is not None:
+                full = np.zeros((len(part), 2, len(cells)))
+                full[:, :, cells] = part.reshape(len(part), 2, -1)
                 histories[name] = History(("time", "axis", f"cell_{contact.name}"), full, {"units": "m"})
             else:
                 histories[name] = History(("time", "component"), part, {"units": "m, m, m^2"})

@@ -10,9 +10,8 @@ import numpy as np
 
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels import rosenbrock as kernels
-from planarfriction.kernels.body import Motion, workspace
-from planarfriction.kernels.contacts import Contacts
-from planarfriction.kernels.rosenbrock import Method, Output
+from planarfriction.kernels.body import System
+from planarfriction.kernels.rosenbrock import Method, Output, Progress, Tolerance
 from planarfriction.solvers.statistics import Statistics
 
 _STATES_PER_SLICE = 400_000
@@ -32,6 +31,12 @@ _MESSAGES = {
 }
 
 
+def start_of(state: np.ndarray) -> Progress:
+    """An integration that has yet to begin."""
+    clock = np.array([0.0, _FIRST_STEP, np.inf])
+    return Progress(np.array(state, dtype=float), np.zeros(2, np.int64), clock, np.zeros(4, np.int64))
+
+
 @dataclass(frozen=True)
 class Integration:
     """Outcome of `integrate`; the arrays hold the requested times that were reached."""
@@ -43,8 +48,7 @@ class Integration:
 
 
 def integrate(
-    contacts: Contacts,
-    motion: Motion,
+    system: System,
     output: Output,
     state: np.ndarray,
     *,
@@ -53,7 +57,7 @@ def integrate(
     atol: np.ndarray,
     progress: Callable[[float], None] | None = None,
 ) -> Integration:
-    """Integrate from `motion.breaks[0]` to its last break and record at `output.time`.
+    """Integrate from the first break of the system's motion to its last and record at `output.time`.
 
     `state` holds bristles, body velocity and pose; `atol` is the absolute tolerance of each of its entries.
     `progress` is called with the simulated time now and then. Ctrl-C ends with the status "interrupted".
@@ -64,31 +68,27 @@ def integrate(
         raise InvalidValueError("rtol", "be > 0", rtol)
     if not (np.isfinite(atol).all() and (atol > 0.0).all()):
         raise InvalidValueError("atol", "be > 0", float(np.min(atol)))
-    y = np.array(state, dtype=float)
-    cursor = np.zeros(2, np.int64)
-    clock = np.array([0.0, _FIRST_STEP, np.inf])
-    counts = np.zeros(4, np.int64)
-    stages, work = kernels.stages_for(method, len(y)), workspace(contacts)
+    progressed = start_of(state)
+    tolerance, stages = Tolerance(float(rtol), atol), kernels.stages_for(method, len(state))
 
     def advance(max_steps: int) -> int:
-        return kernels.advance(
-            contacts, motion, method, output, y, cursor, clock, float(rtol), atol, max_steps, counts, stages, work
-        )
+        return kernels.advance(system, method, output, progressed, tolerance, max_steps, stages)
 
     begin = time.perf_counter()
     advance(0)  # compiles, or loads from the cache, and takes no step
     compile_time = time.perf_counter() - begin
-    cursor[:], clock[:] = 0, (0.0, _FIRST_STEP, np.inf)
+    progressed = start_of(state)
+    (_, cursor, clock, counts), breaks = progressed, system.motion.breaks
     outcome, wall_time = kernels.PAUSED, 0.0
-    slice_steps = max(20, _STATES_PER_SLICE // len(y))
+    slice_steps = max(20, _STATES_PER_SLICE // len(state))
     try:
         while outcome == kernels.PAUSED:
             begin = time.perf_counter()
             outcome = advance(slice_steps)
             wall_time += time.perf_counter() - begin
             if progress is not None:
-                piece = min(int(cursor[0]), len(motion.breaks) - 1)
-                progress(float(motion.breaks[piece] + clock[0]))
+                piece = min(int(cursor[0]), len(breaks) - 1)
+                progress(float(breaks[piece] + clock[0]))
     except KeyboardInterrupt:
         outcome = kernels.PAUSED
     reached = int(cursor[1])
