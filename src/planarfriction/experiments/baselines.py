@@ -84,8 +84,8 @@ class Window:
         def rate(since: float, y: np.ndarray, piece: int) -> np.ndarray:
             nonlocal evaluations
             evaluations += 1  # SciPy's own count leaves out what Radau's Jacobians need
-            dy = np.empty_like(y)
-            right_hand_side(system, piece, since, y, dy)
+            dy = np.empty(len(y))
+            right_hand_side(system, piece, since, np.ascontiguousarray(y), dy)
             return dy
 
         options = {"method": method, "rtol": rtol, "atol": atol, "max_step": max_step}
