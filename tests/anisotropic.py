@@ -6,7 +6,7 @@ import numpy as np
 
 import planarfriction as pf
 
-STRIBECK = pf.LuGre(elasto_plastic=pf.ElastoPlastic(0.9))
+STRIBECK = pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
 PLAIN = pf.ContactPatch.rectangle(0.02, 0.01, (4, 3), pressure=lambda x, y: 1.0 + 20.0 * x + 30.0 * y)
 GRAIN, LEAN = pf.grain(0.4, 1.3, 0.6), np.array([0.3, -0.2])
 _RANDOM = np.random.default_rng(5)

@@ -15,7 +15,7 @@ CONTACT_UNITS = {"fx": "N", "fy": "N", "tau": "N m", "normal_force": "N"}
 
 def scene(contacts: int = 1, mounted_on: str = "world", patch=None, outline=PLATE, name: str = "in-hand") -> pf.Scene:
     """A plate with `contacts` pads in a row, 0.03 m apart."""
-    model = pf.DistributedModel(patch or pf.ContactPatch.disc_published(0.01), pf.LuGre())
+    model = pf.DistributedModel(patch or pf.ContactPatch.disc_published(0.01), pf.LuGre(mu_s=1.2))
     names = ["pad"] if contacts == 1 else [f"pad {number + 1}" for number in range(contacts)]
     pads = [
         pf.Contact(model, 2.0, mounted_on=mounted_on, position=(0.03 * number, 0.0), name=each)

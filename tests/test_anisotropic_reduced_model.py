@@ -10,7 +10,7 @@ from planarfriction.models.reduced_map import slip_factor
 from planarfriction.models.steady_sums import ScaledCells
 from planarfriction.patch import PUBLISHED_PATCHES
 
-LAW = pf.LuGre()
+LAW = pf.LuGre(mu_s=1.2)
 PLAIN = PUBLISHED_PATCHES["NonConvex2"](cells=11)
 GRAIN = pf.grain(0.4, 1.3, 0.6)
 _RANDOM = np.random.default_rng(1)

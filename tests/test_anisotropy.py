@@ -18,7 +18,7 @@ from planarfriction.scenes import in_hand
 
 DRY = pf.LuGre(mu_c=1.0, mu_s=1.0, sigma_2=0.0)
 """Friction coefficient 1 in steady sliding: wrenches are those of limit surfaces."""
-LAWS = {"plain": pf.LuGre(), "elasto-plastic": STRIBECK, "gamma 1": dataclasses.replace(STRIBECK, gamma=1.0)}
+LAWS = {"plain": pf.LuGre(mu_s=1.2), "elasto-plastic": STRIBECK, "gamma 1": dataclasses.replace(STRIBECK, gamma=1.0)}
 RANDOM = np.random.default_rng(6)
 UNIT_TWIST = np.array([1e-8, 1e-8, 1e-6])
 

@@ -14,9 +14,9 @@ from planarfriction import autodiff
 from planarfriction.autodiff import PARAMETERS
 from planarfriction.errors import InvalidValueError
 
-PLAIN = pf.LuGre()
-ELASTIC = pf.LuGre(elasto_plastic=pf.ElastoPlastic(0.9))
-WIDE = pf.LuGre(gamma=1.5, elasto_plastic=pf.ElastoPlastic(0.3))
+PLAIN = pf.LuGre(mu_s=1.2)
+ELASTIC = pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
+WIDE = pf.LuGre(mu_s=1.2, gamma=1.5, elasto_plastic=pf.ElastoPlastic(0.3))
 LAWS = {"plain": PLAIN, "elasto-plastic": ELASTIC, "wide": WIDE}
 SURFACES = {
     "cells": pf.LimitSurfaceCells,

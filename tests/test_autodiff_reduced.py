@@ -12,9 +12,9 @@ from planarfriction import autodiff
 from planarfriction.errors import InvalidValueError
 
 LAWS = {
-    "plain": pf.LuGre(),
-    "elasto-plastic": pf.LuGre(elasto_plastic=pf.ElastoPlastic(0.9)),
-    "early": pf.LuGre(mu_c=0.7, gamma=1.5, elasto_plastic=pf.ElastoPlastic(0.3)),
+    "plain": pf.LuGre(mu_s=1.2),
+    "elasto-plastic": pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9)),
+    "early": pf.LuGre(mu_c=0.7, mu_s=1.2, gamma=1.5, elasto_plastic=pf.ElastoPlastic(0.3)),
 }
 PATCH = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
 LOAD, DT, T = 2.0, 1e-4, 12

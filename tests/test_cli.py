@@ -117,7 +117,7 @@ def test_ready_scenes_by_name(name):
     assert list(built) == ["distributed", "reduced"]
     for scene in built.values():
         assert scene.t_end == 1.5
-        assert scene.contacts[0].model.law == pf.LuGre(elasto_plastic=pf.ElastoPlastic(0.9))
+        assert scene.contacts[0].model.law == pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
         assert scene.contacts[0].model.patch.cells == 317
 
 
@@ -168,7 +168,7 @@ def test_scene_files_keep_their_models_unless_told_otherwise(scene_file):
     built = build_scenes(str(scene_file), ["both"])
     assert [type(contact.model) for contact in built["reduced"].contacts] == [pf.ReducedModel] * 2
     assert built["reduced"].contacts[1].position == (0.03, 0.0)
-    assert built["reduced"].contacts[0].model.law == pf.LuGre()
+    assert built["reduced"].contacts[0].model.law == pf.LuGre(mu_s=1.2)
     built = build_scenes(str(scene_file), [], patch="Line")
     assert [contact.model.patch.name for contact in built["distributed"].contacts] == ["Line"] * 2
 
@@ -287,7 +287,7 @@ def test_differences_cover_the_time_that_both_runs_have():
 def test_a_run_is_what_simulate_gives(capsys, tmp_path):
     arguments = ["run", "in-hand", "--model", "reduced", "--patch", "Square", "--t-end", "0.5", "--out", str(tmp_path)]
     assert main(arguments) == 0
-    model = pf.ReducedModel(PUBLISHED_PATCHES["Square"](), pf.LuGre(elasto_plastic=pf.ElastoPlastic(0.9)))
+    model = pf.ReducedModel(PUBLISHED_PATCHES["Square"](), pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9)))
     expected = pf.simulate(scenes.in_hand(model, t_end=0.5))
     columns = read_csv(tmp_path / "in-hand-reduced.csv")
     for name, values in columns.items():

@@ -25,9 +25,9 @@ from planarfriction.jax.surfaces import sliding  # noqa: E402
 
 pytestmark = pytest.mark.jax
 
-PLAIN = pf.LuGre(gamma=1.0)
-ELASTIC = pf.LuGre(elasto_plastic=pf.ElastoPlastic(0.9))
-WIDE = pf.LuGre(gamma=1.5, elasto_plastic=pf.ElastoPlastic(0.3))
+PLAIN = pf.LuGre(mu_s=1.2, gamma=1.0)
+ELASTIC = pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
+WIDE = pf.LuGre(mu_s=1.2, gamma=1.5, elasto_plastic=pf.ElastoPlastic(0.3))
 """A wide elasto-plastic range: smooth for central differences."""
 LAWS = {"plain": PLAIN, "elasto-plastic": ELASTIC, "wide": WIDE}
 SURFACES = {

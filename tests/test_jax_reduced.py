@@ -19,8 +19,8 @@ pytestmark = pytest.mark.jax
 
 PATCH = pf.ContactPatch.from_pressure(np.random.default_rng(4).uniform(0.0, 1.0, (5, 6)), 0.002, name="lopsided")
 LAWS = {
-    "plain": pf.LuGre(sigma_1=30.0, gamma=1.7),
-    "elasto-plastic": pf.LuGre(sigma_1=30.0, gamma=1.7, elasto_plastic=pf.ElastoPlastic(0.7)),
+    "plain": pf.LuGre(mu_s=1.2, sigma_1=30.0, gamma=1.7),
+    "elasto-plastic": pf.LuGre(mu_s=1.2, sigma_1=30.0, gamma=1.7, elasto_plastic=pf.ElastoPlastic(0.7)),
 }
 SMALL = {"segments": 8, "speeds": 8}
 STATE_SIZE, TWIST_SIZE = 1e-6, np.array([1e-3, 1e-3, 0.2])

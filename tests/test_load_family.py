@@ -12,7 +12,7 @@ from planarfriction.models import load_family
 from planarfriction.models.reduced_map import slip_factor
 from planarfriction.scenes.packing import pack
 
-LAW = pf.LuGre(elasto_plastic=pf.ElastoPlastic(0.9))
+LAW = pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
 SMALL = {"segments": 8, "speeds": 6}
 PUBLISHED = pf.SoftFinger(c=6 * 0.02 / 21, n=1 / 3, k_per_newton=2.0, radius_max=0.01)
 SOFT = pf.ContactPatch.rectangle(0.02, cells=21, pressure=PUBLISHED)

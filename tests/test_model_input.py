@@ -11,7 +11,7 @@ import planarfriction as pf
 from planarfriction.errors import InvalidValueError
 
 FEET = pf.ContactPatch.points([(0.01, 0.03), (0.11, -0.02), (0.05, 0.09)], [1.0, 2.0, 3.0])
-PLAIN = pf.LuGre()
+PLAIN = pf.LuGre(mu_s=1.2)
 MODELS = {"distributed": pf.DistributedModel(FEET, PLAIN), "reduced": pf.ReducedModelPublished(FEET, PLAIN)}
 
 every_model = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)

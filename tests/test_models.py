@@ -14,12 +14,12 @@ import planarfriction as pf
 from planarfriction import formulas, geometry
 from planarfriction.patch import PUBLISHED_PATCHES
 
-PLAIN = pf.LuGre()
-ELASTIC = pf.LuGre(elasto_plastic=pf.ElastoPlastic(0.9))
+PLAIN = pf.LuGre(mu_s=1.2)
+ELASTIC = pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
 LAWS = {
     "plain": PLAIN,
     "elasto-plastic": ELASTIC,
-    "gamma 1.5": pf.LuGre(gamma=1.5, elasto_plastic=pf.ElastoPlastic(0.5)),
+    "gamma 1.5": pf.LuGre(mu_s=1.2, gamma=1.5, elasto_plastic=pf.ElastoPlastic(0.5)),
 }
 SURFACES = {
     "cells": pf.LimitSurfaceCells,

@@ -82,7 +82,7 @@ def test_every_model_and_surface_follows_the_maps():
 def test_scene_files(tmp_path):
     np.save(tmp_path / "light.npy", LIGHT)
     np.save(tmp_path / "heavy.npy", HEAVY)
-    model = pf.DistributedModel(both(), pf.LuGre())
+    model = pf.DistributedModel(both(), pf.LuGre(mu_s=1.2))
     pf.scenes.in_hand(model).to_file(tmp_path / "written.toml")
     again = pf.Scene.from_file(tmp_path / "written.toml").contacts[0].model.patch
     np.testing.assert_array_equal(again.weights(3.0), both().weights(3.0))

@@ -12,8 +12,8 @@ from planarfriction.experiments.facts import converged
 from planarfriction.geometry import wrench_at
 from planarfriction.patch import PUBLISHED_PATCHES
 
-ELASTIC = pf.LuGre(elasto_plastic=pf.ElastoPlastic(0.9))
-PLAIN = pf.LuGre()
+ELASTIC = pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
+PLAIN = pf.LuGre(mu_s=1.2)
 MODELS = {"d": pf.DistributedModel, "r": pf.ReducedModelPublished}
 CELL = 0.02 / 21
 

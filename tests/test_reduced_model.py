@@ -14,7 +14,7 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.models import cube_map
 from planarfriction.patch import PUBLISHED_PATCHES
 
-PLAIN, ELASTIC = pf.LuGre(), pf.LuGre(elasto_plastic=pf.ElastoPlastic(0.9))
+PLAIN, ELASTIC = pf.LuGre(mu_s=1.2), pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
 LAWS = {"plain": PLAIN, "elasto-plastic": ELASTIC}
 PATCH = PUBLISHED_PATCHES["NonConvex2"]()
 FEET = pf.ContactPatch.points([(0.01, 0.0), (-0.01, 0.002), (0.0, 0.012)], [1.0, 2.0, 3.0])
@@ -73,8 +73,8 @@ def test_steady_sliding_is_the_sum_over_the_cells():
 
 
 def test_viscous_friction_is_that_of_the_cells():
-    law = pf.LuGre(sigma_2=5.0)
-    without = pf.LuGre(sigma_2=0.0)
+    law = pf.LuGre(mu_s=1.2, sigma_2=5.0)
+    without = pf.LuGre(mu_s=1.2, sigma_2=0.0)
     twist = np.array([0.1, -0.2, 20.0])
     for kind in (pf.ReducedModel, pf.DistributedModel):
         model, other = kind(PATCH, law), kind(PATCH, without)

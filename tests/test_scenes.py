@@ -16,7 +16,9 @@ ROUNDING = 1e-14  # a few roundings of numbers of order one
 
 def stand_in(patch=None):
     """What a scene needs to know of a model: nothing but its parts."""
-    return SimpleNamespace(patch=patch or ContactPatch.points([[0.0, 0.0], [1.0, 0.0]]), law=LuGre(), surface=None)
+    return SimpleNamespace(
+        patch=patch or ContactPatch.points([[0.0, 0.0], [1.0, 0.0]]), law=LuGre(mu_s=1.2), surface=None
+    )
 
 
 def a_scene(**changes):
@@ -218,12 +220,12 @@ def test_driven_puts_the_named_point_where_the_velocity_is():
 
 
 def every_model():
-    patch, law = ContactPatch.disc(0.01, 7), LuGre(elasto_plastic=pf.ElastoPlastic(0.9))
+    patch, law = ContactPatch.disc(0.01, 7), LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
     soft = ContactPatch.disc(0.01, 7, pressure=pf.SoftFinger(c=0.005, n=1 / 3, k=2.0, radius_max=0.01))
     fixed = ContactPatch.disc(0.01, 7, pressure=pf.SoftFinger(c=0.01, k=2.0))
     return {
         "distributed": pf.DistributedModel(patch, law),
-        "plain": pf.DistributedModel(ContactPatch.from_pressure([[1.0, 2.0], [0.1, 0.0]], 1 / 3), LuGre()),
+        "plain": pf.DistributedModel(ContactPatch.from_pressure([[1.0, 2.0], [0.1, 0.0]], 1 / 3), LuGre(mu_s=1.2)),
         "published": pf.ReducedModelPublished(patch, law),
         "table": pf.ReducedModelPublished(patch, law, surface=pf.LimitSurfaceTable(patch, segments=8)),
         "ellipsoid": pf.ReducedModelPublished(patch, law, surface=pf.LimitSurfaceEllipsoid(patch)),
@@ -260,7 +262,7 @@ def test_digests_tell_scenes_apart():
         in_hand(model),
         in_hand(model, normal_force=2.0),
         in_hand(model, centre_of_mass=(0.002, 1e-17)),
-        in_hand(dataclasses.replace(model, law=LuGre())),
+        in_hand(dataclasses.replace(model, law=LuGre(mu_s=1.2))),
         drift(model),
     ]
     assert len({scene.digest() for scene in scenes}) == len(scenes)

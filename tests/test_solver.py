@@ -14,7 +14,7 @@ from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction.scenes.packing import pack
 from planarfriction.solvers import RODAS3, RODAS4
 
-ELASTIC = pf.LuGre(elasto_plastic=pf.ElastoPlastic(0.9))
+ELASTIC = pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
 SMALL = pf.ContactPatch.rectangle(0.02, 0.01, cells=(4, 2), pressure=pf.patch.LinearGradient((20.0, -30.0)))
 
 

@@ -14,9 +14,9 @@ from scipy import integrate
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
 
-PLAIN = pf.LuGre()
-ELASTIC = pf.LuGre(elasto_plastic=pf.ElastoPlastic(0.9))
-WIDE = pf.LuGre(gamma=1.5, elasto_plastic=pf.ElastoPlastic(0.3))
+PLAIN = pf.LuGre(mu_s=1.2)
+ELASTIC = pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
+WIDE = pf.LuGre(mu_s=1.2, gamma=1.5, elasto_plastic=pf.ElastoPlastic(0.3))
 """A wide elasto-plastic range: smooth at the steps of an order test."""
 LAWS = {"plain": PLAIN, "elasto-plastic": ELASTIC, "wide": WIDE}
 SURFACES = {

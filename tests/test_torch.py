@@ -16,8 +16,8 @@ pytestmark = pytest.mark.torch
 
 RNG = np.random.default_rng(4)
 PATCH = pf.ContactPatch.from_pressure(RNG.uniform(0.0, 1.0, (5, 6)), 0.002, name="lopsided")
-PLAIN = pf.LuGre(sigma_1=30.0, gamma=1.7)
-ELASTIC = pf.LuGre(sigma_1=30.0, gamma=1.7, elasto_plastic=pf.ElastoPlastic(0.7))
+PLAIN = pf.LuGre(mu_s=1.2, sigma_1=30.0, gamma=1.7)
+ELASTIC = pf.LuGre(mu_s=1.2, sigma_1=30.0, gamma=1.7, elasto_plastic=pf.ElastoPlastic(0.7))
 LAWS = {"plain": PLAIN, "elasto-plastic": ELASTIC}
 SURFACES = {
     "published": None,

@@ -22,8 +22,8 @@ pytestmark = pytest.mark.torch
 RNG = np.random.default_rng(4)
 PATCH = pf.ContactPatch.from_pressure(RNG.uniform(0.0, 1.0, (5, 6)), 0.002, name="lopsided")
 LAWS = {
-    "plain": pf.LuGre(sigma_1=30.0),
-    "elasto-plastic": pf.LuGre(sigma_1=30.0, elasto_plastic=pf.ElastoPlastic(0.9)),
+    "plain": pf.LuGre(mu_s=1.2, sigma_1=30.0),
+    "elasto-plastic": pf.LuGre(mu_s=1.2, sigma_1=30.0, elasto_plastic=pf.ElastoPlastic(0.9)),
 }
 SURFACES = {
     "published": None,

@@ -16,6 +16,8 @@ _HOME = {
     "Contact": "planarfriction.scenes",
     "ContactPatch": "planarfriction.patch",
     "Coulomb": "planarfriction.laws",
+    "CoulombStribeck": "planarfriction.laws",
+    "Dahl": "planarfriction.laws",
     "DistributedModel": "planarfriction.models",
     "ElastoPlastic": "planarfriction.laws",
     "FrictionError": "planarfriction.errors",
@@ -74,7 +76,7 @@ def __dir__() -> list[str]:
 
 if TYPE_CHECKING:  # for editors and type checkers: the same names as above
     from planarfriction.errors import FrictionError
-    from planarfriction.laws import Coulomb, ElastoPlastic, LuGre
+    from planarfriction.laws import Coulomb, CoulombStribeck, Dahl, ElastoPlastic, LuGre
     from planarfriction.limit_surface import (
         LimitSurfaceCells,
         LimitSurfaceEllipsoid,

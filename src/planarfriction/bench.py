@@ -90,7 +90,7 @@ def _solver_time(scene: Scene, repeats: int, **options: Any) -> tuple[float, Sol
 
 
 def _law() -> LuGre:
-    return LuGre(elasto_plastic=ElastoPlastic(0.9))
+    return LuGre(mu_s=1.2, elasto_plastic=ElastoPlastic(0.9))
 
 
 def _disc(cells: int = 21) -> ContactPatch:

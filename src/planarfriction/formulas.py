@@ -33,10 +33,10 @@ class LawNumbers(NamedTuple):
     """Stribeck speed [m/s]."""
     gamma: Any
     """Stribeck exponent [-]."""
-    elasto_plastic: Any
+    elasto_plastic: Any = 0.0
     """1.0 for elasto-plastic bristles, else 0.0."""
-    breakaway_ratio: Any
-    """s_ba [-]; unused by plain bristles."""
+    breakaway_ratio: Any = 0.5
+    """s_ba [-]; unused by plain bristles, but 1 - s_ba is divided by."""
     creep_speed: Any = 0.0
     """v_c [m/s]: plain bristles relax as if they slid faster by this speed; 0 keeps what sticks where it is."""
 

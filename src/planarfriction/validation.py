@@ -59,6 +59,14 @@ def numbers(name: str, value: Any) -> np.ndarray:
         raise InvalidValueError(name, "be an array of numbers", value) from None
 
 
+def non_negative_numbers(name: str, value: Any) -> np.ndarray:
+    """Return `value` as a finite float array >= 0 of any shape, or raise."""
+    result = numbers(name, value)
+    if not (np.isfinite(result).all() and (result >= 0.0).all()):
+        raise InvalidValueError(name, "be finite and >= 0", value)
+    return result
+
+
 def array(name: str, value: Any, shape: tuple[int | None, ...]) -> np.ndarray:
     """Return `value` as a finite float array; None in `shape` accepts any length on that axis."""
     result = numbers(name, value).copy()

@@ -58,7 +58,7 @@ def build_scenes(
 def _law() -> Any:
     from planarfriction.laws import ElastoPlastic, LuGre
 
-    return LuGre(elasto_plastic=ElastoPlastic(0.9))
+    return LuGre(mu_s=1.2, elasto_plastic=ElastoPlastic(0.9))
 
 
 def _model(kind: str, patch: ContactPatch, law: Any) -> Any:

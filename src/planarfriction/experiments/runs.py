@@ -14,10 +14,10 @@ from planarfriction.models import DistributedModel, ReducedModelPublished
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
 from planarfriction.scenes import Solution
 
-LAW = LuGre(elasto_plastic=ElastoPlastic(0.9))
+LAW = LuGre(mu_s=1.2, elasto_plastic=ElastoPlastic(0.9))
 """The published friction parameters with elasto-plastic bristles."""
 
-PLAIN = LuGre()
+PLAIN = LuGre(mu_s=1.2)
 """The same with plain bristles."""
 
 Kind = Literal["d", "r", "e"]

@@ -102,7 +102,7 @@ def identify_motion(
     names = check_names(parameters, MOTION_PARAMETERS)
     if not isinstance(body, SlidingBody):
         raise InvalidValueError("body", "be a SlidingBody", body)
-    if not isinstance(start, LuGre):
+    if type(start) is not LuGre:  # a subclass may compute something else from the parameters that are fitted
         raise InvalidValueError("start", "be a LuGre law", start)
     if not isinstance(patch, ContactPatch):
         raise InvalidValueError("patch", "be a ContactPatch", type(patch).__name__)

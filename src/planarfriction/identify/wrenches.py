@@ -24,6 +24,9 @@ from planarfriction.patch.metric import refuse_anisotropy
 
 BEGINS = ("rest", "steady")
 
+START_MU_S = 1.2
+"""Static coefficient that a search starts with unless it is told otherwise: above `mu_c`, free to move."""
+
 NOISE_ROUNDS = 2
 """Times that the noise is estimated from the residuals, each with a fit after it."""
 
@@ -118,8 +121,10 @@ def _settled(problem, coordinates, minimum, noise, unknown: bool) -> tuple[Minim
 
 def _start_law(start: Any, elasto_plastic: ElastoPlastic | None) -> tuple[LuGre, dict[str, float] | None]:
     """The law that holds what is not estimated, and the values given by name (None: a whole law was given)."""
-    if isinstance(start, LuGre):
+    if type(start) is LuGre:
         return start, None
+    if not isinstance(start, Mapping | None):
+        raise InvalidValueError("start", "be a LuGre law or a table of its parameters", start)
     given = {} if start is None else dict(start)
     for name, value in given.items():
         validation.choice("start", name, known.LAW)
@@ -127,8 +132,8 @@ def _start_law(start: Any, elasto_plastic: ElastoPlastic | None) -> tuple[LuGre,
     if "breakaway_ratio" in given:
         elasto_plastic = ElastoPlastic(given["breakaway_ratio"])
     fields = {name: value for name, value in given.items() if name != "breakaway_ratio"}
-    if "mu_c" in fields and "mu_s" not in fields:
-        fields["mu_s"] = max(LuGre.mu_s, fields["mu_c"])
+    if "mu_s" not in fields:
+        fields["mu_s"] = max(START_MU_S, fields.get("mu_c", LuGre.mu_c))
     if "mu_s" in fields and "mu_c" not in fields:
         fields["mu_c"] = min(LuGre.mu_c, fields["mu_s"])
     return LuGre(**fields, elasto_plastic=elasto_plastic), given

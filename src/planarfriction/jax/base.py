@@ -7,7 +7,8 @@ from typing import Any, ClassVar, Self
 import jax
 
 from planarfriction.errors import InvalidValueError
-from planarfriction.laws import LuGre
+from planarfriction.laws import FrictionLaw
+from planarfriction.laws.base import refuse_creep
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.metric import refuse_anisotropy
 
@@ -28,11 +29,10 @@ class FrictionModel:
         super().__init_subclass__()
         jax.tree_util.register_pytree_with_keys(cls, cls._flatten, cls._unflatten)
 
-    def __init__(self, patch: ContactPatch, law: LuGre) -> None:
+    def __init__(self, patch: ContactPatch, law: FrictionLaw) -> None:
         if not isinstance(patch, ContactPatch):
             raise InvalidValueError("patch", "be a ContactPatch", patch)
-        if not isinstance(law, LuGre):
-            raise InvalidValueError("law", "be a LuGre law", law)
+        refuse_creep(law, f"jax.{type(self).__name__}")
         refuse_anisotropy(patch, f"jax.{type(self).__name__}")
         self.elasto_plastic = law.numbers.elasto_plastic > 0.0
 

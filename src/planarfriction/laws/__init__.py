@@ -2,6 +2,8 @@
 
 from planarfriction.laws.base import FrictionLaw
 from planarfriction.laws.coulomb import Coulomb
+from planarfriction.laws.coulomb_stribeck import CoulombStribeck
+from planarfriction.laws.dahl import Dahl
 from planarfriction.laws.lugre import ElastoPlastic, LuGre
 
-__all__ = ["Coulomb", "ElastoPlastic", "FrictionLaw", "LuGre"]
+__all__ = ["Coulomb", "CoulombStribeck", "Dahl", "ElastoPlastic", "FrictionLaw", "LuGre"]

@@ -2,6 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import numpy as np
+
+from planarfriction import formulas, validation
+from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 
 
@@ -9,15 +15,57 @@ class FrictionLaw:
     """A friction law per unit normal load: frozen parameters, which it gives to the formulas by name.
 
     `zdot = v - k z`, `f = -(sigma_0 z + sigma_1 zdot + sigma_2 v) f_N`, with the decay k of `formulas.bristle_decay`
-    and the steady friction `g(v)` of `formulas.stribeck`. A member of the family says what its numbers in them are.
+    and the steady friction `g(v)` of `formulas.stribeck`. A member of the family says what its numbers in them are;
+    models ask for nothing else.
+
+    `rate` and `force` are those of one bristle without a patch: along a line for arrays of any shape, in more
+    dimensions where `axis` says which axis holds the components.
     """
 
     @property
     def numbers(self) -> LawNumbers:
-        """The law as the formulas see it."""
+        """The law as the formulas see it: the one thing that a new law has to say."""
         raise NotImplementedError
 
     @property
     def largest_deflection(self) -> float:
         """Steady-state deflection at high speed, `mu_c / sigma_0` [m]: the natural scale of a bristle."""
         return self.numbers.mu_c / self.numbers.sigma_0
+
+    def steady_friction(self, speed) -> np.ndarray:
+        """Friction force over normal force [-] in steady sliding at `speed` >= 0 `[...]` [m/s].
+
+        `g(v) v/(v + v_c) + sigma_2 v`; laws without creep (v_c = 0) have `g(0)` at rest.
+        """
+        law, speed = self.numbers, np.abs(validation.numbers("speed", speed))
+        share = speed / (speed + law.creep_speed) if law.creep_speed > 0.0 else 1.0
+        return formulas.stribeck(np, speed, law) * share + law.sigma_2 * speed
+
+    def rate(self, state, velocity, *, axis: int | None = None) -> np.ndarray:
+        """Rate `zdot = v - k z` [m/s] of bristles with deflection `state` [m]; both broadcast."""
+        z, v = validation.numbers("state", state), validation.numbers("velocity", velocity)
+        law, length, speed = self.numbers, _norm(z, axis), _norm(v, axis)
+        product = z * v if axis is None else (z * v).sum(axis=axis, keepdims=True)
+        along = product / np.where(length > 0.0, length, 1.0)
+        grip = law.sigma_0 / formulas.stribeck(np, speed, law)
+        return v - formulas.bristle_decay(np, length * grip, along, speed, grip, law) * z
+
+    def force(self, state, velocity, normal_force, *, axis: int | None = None) -> np.ndarray:
+        """Friction force [N] on the moving body; `normal_force` [N] broadcasts with bristles, not with components."""
+        z, v = validation.numbers("state", state), validation.numbers("velocity", velocity)
+        load = validation.non_negative_numbers("normal_force", normal_force)
+        if axis is not None:
+            load = np.expand_dims(load, axis)
+        return load * formulas.traction(z, self.rate(z, v, axis=axis), v, self.numbers)
+
+
+def refuse_creep(law: Any, by: str) -> None:
+    """Raise unless `law` is a law of bristles that keeps what sticks where it is."""
+    if not isinstance(law, FrictionLaw):
+        raise InvalidValueError("law", "be a friction law of bristles, such as LuGre", law)
+    if law.numbers.creep_speed > 0.0:
+        raise InvalidValueError("law", f"have no creep_speed for {by} (DistributedModel takes any law)", law)
+
+
+def _norm(vector: np.ndarray, axis: int | None) -> np.ndarray:
+    return np.abs(vector) if axis is None else np.linalg.norm(vector, axis=axis, keepdims=True)

@@ -26,9 +26,7 @@ class Coulomb:
         `surface` is any limit surface, `twist` has shape `[..., 3]` [m/s, m/s, rad/s], `normal_force` `[...]` [N].
         A body at rest gets a zero wrench: Coulomb's law alone cannot tell the force of a stuck contact.
         """
-        load = validation.numbers("normal_force", normal_force)
-        if not (np.isfinite(load).all() and (load >= 0.0).all()):
-            raise InvalidValueError("normal_force", "be finite and >= 0", normal_force)
+        load = validation.non_negative_numbers("normal_force", normal_force)
         direction = surface.wrench(twist)
         try:
             return self.mu * load[..., None] * direction

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from numbers import Real
+from typing import Any
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
@@ -39,8 +42,8 @@ class LuGre(FrictionLaw):
 
     mu_c: float = 1.0
     """Coulomb coefficient [-]."""
-    mu_s: float = 1.2
-    """Static (breakaway) coefficient [-], at least `mu_c`."""
+    mu_s: float = None  # pyright: ignore[reportAssignmentType]
+    """Static (breakaway) coefficient [-], at least `mu_c`, which it is where it is left out."""
     v_s: float = 1e-3
     """Stribeck speed [m/s]."""
     sigma_0: float = 1e6
@@ -52,30 +55,35 @@ class LuGre(FrictionLaw):
     gamma: float = 2.0
     """Stribeck exponent [-]."""
     elasto_plastic: ElastoPlastic | None = None
-    """Elasto-plastic extension, or None for plain LuGre."""
+    """Elasto-plastic extension; a number is taken as its breakaway ratio, None means plain LuGre."""
 
     def __post_init__(self) -> None:
+        if self.mu_s is None:
+            object.__setattr__(self, "mu_s", self.mu_c)
         for name in ("mu_c", "mu_s", "v_s", "sigma_0", "gamma"):
             object.__setattr__(self, name, validation.positive(name, getattr(self, name)))
         for name in ("sigma_1", "sigma_2"):
             object.__setattr__(self, name, validation.non_negative(name, getattr(self, name)))
         if self.mu_s < self.mu_c:
             raise InvalidValueError("mu_s", "be >= mu_c", f"mu_s={self.mu_s}, mu_c={self.mu_c}")
-        if self.elasto_plastic is not None and not isinstance(self.elasto_plastic, ElastoPlastic):
-            raise InvalidValueError("elasto_plastic", "be an ElastoPlastic or None", self.elasto_plastic)
+        object.__setattr__(self, "elasto_plastic", _elasto_plastic(self.elasto_plastic))
 
     @property
     def numbers(self) -> LawNumbers:
         """The law as the formulas see it."""
-        elastic = self.elasto_plastic
-        return LawNumbers(
-            self.sigma_0,
-            self.sigma_1,
-            self.sigma_2,
-            self.mu_c,
-            self.mu_s,
-            self.v_s,
-            self.gamma,
-            0.0 if elastic is None else 1.0,
-            0.5 if elastic is None else elastic.breakaway_ratio,  # unused by plain bristles, but 1 - it is divided by
-        )
+        plain = LawNumbers(self.sigma_0, self.sigma_1, self.sigma_2, self.mu_c, self.mu_s, self.v_s, self.gamma)
+        if self.elasto_plastic is None:
+            return plain
+        return plain._replace(elasto_plastic=1.0, breakaway_ratio=self.elasto_plastic.breakaway_ratio)
+
+
+def _elasto_plastic(value: Any) -> ElastoPlastic | None:
+    """The extension as given: itself, its breakaway ratio, or the table that holds it."""
+    if value is None or isinstance(value, ElastoPlastic):
+        return value
+    if isinstance(value, Mapping):
+        validation.keys("elasto_plastic", value, ["breakaway_ratio"])
+        value = value["breakaway_ratio"]
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise InvalidValueError("elasto_plastic", "be a breakaway ratio, an ElastoPlastic or None", value)
+    return ElastoPlastic(float(value))

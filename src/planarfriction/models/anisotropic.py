@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 
 from planarfriction import formulas
+from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import distributed_adjoint
 from planarfriction.kernels import distributed_step as kernels
-from planarfriction.laws import LuGre
 from planarfriction.models.base import StepJacobians
 from planarfriction.patch import ContactPatch
 
@@ -26,10 +26,10 @@ def cell_numbers(patch: ContactPatch, cells: np.ndarray) -> np.ndarray:
     return np.array([*(levers[:, i, j] for i, j in ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2))), *asymmetry.T])
 
 
-def centres(law: LuGre, asymmetry: np.ndarray, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def centres(law: LawNumbers, asymmetry: np.ndarray, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """`c = a g(|u|)/sigma_0` `[..., 2, N]` of `a` `[2, N]` and `u` `[..., 2, N]`, and `dc/du` `[..., 2, 2, N]`."""
     speed = np.hypot(velocity[..., 0, :], velocity[..., 1, :])
-    g, slope = formulas.stribeck(np, speed, law.numbers), formulas.stribeck_slope(np, speed, law.numbers)
+    g, slope = formulas.stribeck(np, speed, law), formulas.stribeck_slope(np, speed, law)
     heading = velocity / np.where(speed > 0.0, speed, 1.0)[..., None, :]
     along = asymmetry[:, None, :] * heading[..., None, :, :]
     return asymmetry * (g / law.sigma_0)[..., None, :], along * (slope / law.sigma_0)[..., None, None, :]
@@ -37,12 +37,12 @@ def centres(law: LuGre, asymmetry: np.ndarray, velocity: np.ndarray) -> tuple[np
 
 def step(model: Any, state: np.ndarray, velocity: np.ndarray, load: np.ndarray, dt: np.ndarray):
     """`DistributedModel.step` for checked inputs; `velocity` is `u` `[..., 2, N]`."""
-    law = model.law
+    law = model.law.numbers
     centre = 0.0 if model._asymmetry is None else centres(law, model._asymmetry, velocity)[0]
     z, u, steps = _alone(state - centre, velocity, dt)
     new, pull = np.empty_like(z), np.empty_like(u)
     ones = np.ones(len(z))
-    kernels.step_batch(law.numbers, z, u, _ORIGIN, _ORIGIN, _WHOLE, ones, steps, new, pull)
+    kernels.step_batch(law, z, u, _ORIGIN, _ORIGIN, _WHOLE, ones, steps, new, pull)
     loaded = (load > 0.0)[..., None, None]
     traction = _together(pull[:, :2], state) - law.sigma_0 * centre
     share = load[..., None] * model.patch.weights(load)
@@ -52,7 +52,7 @@ def step(model: Any, state: np.ndarray, velocity: np.ndarray, load: np.ndarray, 
 
 def step_jacobians(model: Any, state: np.ndarray, velocity: np.ndarray, load: np.ndarray, dt: np.ndarray):
     """`DistributedModel.step_jacobians` for checked inputs; `velocity` is `u` `[..., 2, N]`."""
-    law, lever = model.law, model._lever
+    law, lever = model.law.numbers, model._lever
     centre, centre_u = 0.0, None
     if model._asymmetry is not None:
         centre, centre_u = centres(law, model._asymmetry, velocity)
@@ -61,7 +61,7 @@ def step_jacobians(model: Any, state: np.ndarray, velocity: np.ndarray, load: np
     new_z, new_u, pull_z = np.zeros((count, 2, 2, 1)), np.zeros((count, 2, 1, 3)), np.zeros((count, 3, 2, 1))
     pull_u, pull = np.zeros((count, 3, 3)), np.zeros((count, 3))
     distributed_adjoint.jacobians(
-        np.array(law.numbers), z.reshape(-1, 2, 1), u, _ORIGIN, _ORIGIN, _WHOLE, np.ones(count), steps,
+        np.array(law), z.reshape(-1, 2, 1), u, _ORIGIN, _ORIGIN, _WHOLE, np.ones(count), steps,
         new_z, new_u, pull_z, pull_u, pull,
     )  # fmt: skip
     new_z, new_u = _together(new_z[..., 0], state), _together(new_u[:, :, 0, :2], state)

@@ -15,6 +15,7 @@ from planarfriction.kernels.anisotropic_contact import AnisotropicContact
 from planarfriction.kernels.distributed_contact import DistributedContact
 from planarfriction.kernels.pointers import place_of
 from planarfriction.kernels.records import rows_of
+from planarfriction.laws.base import refuse_creep
 from planarfriction.models import anisotropic
 from planarfriction.models.base import FrictionModel, ModelJacobians, PackedModel, StepJacobians
 
@@ -33,6 +34,11 @@ class DistributedModel(FrictionModel):
     Source: Waltersson and Karayiannidis 2024, section III.
     """
 
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.patch.asymmetric:
+            refuse_creep(self.law, "patches with an asymmetry")  # at rest they would push
+
     @property
     def state_shape(self) -> tuple[int, ...]:
         """`(2, N)` for the N cells that can carry load."""
@@ -47,7 +53,7 @@ class DistributedModel(FrictionModel):
         """Friction wrench on the moving body, shape `[..., 3]` [N, N, N m]."""
         state, twist, load = self._inputs(state, twist, normal_force)
         velocity = self._cell_velocity(twist)
-        law = self.law
+        law = self.law.numbers
         force = formulas.traction(state, self._rate(state, velocity), velocity, law)
         return np.einsum(
             "...cn,dcn->...d", force * (load[..., None] * self.patch.weights(load))[..., None, :], self._lever
@@ -83,7 +89,7 @@ class DistributedModel(FrictionModel):
     def jacobians(self, state, twist, normal_force) -> ModelJacobians:
         """Analytic derivatives of `rate` and `wrench` (see `ModelJacobians`); at kinks a one-sided derivative."""
         state, twist, load = self._inputs(state, twist, normal_force)
-        law = self.law
+        law = self.law.numbers
         velocity = self._cell_velocity(twist)
         shifted = state
         if self._asymmetry is not None:
@@ -196,15 +202,15 @@ class DistributedModel(FrictionModel):
 
     def _arguments(self, state: np.ndarray, velocity: np.ndarray):
         """`z/|z|`, `|z|`, and the arguments of the bristle formulas, per cell."""
-        law = self.law
+        law = self.law.numbers
         z_norm, speed = np.hypot(state[..., 0, :], state[..., 1, :]), np.hypot(velocity[..., 0, :], velocity[..., 1, :])
         unit = state / np.where(z_norm > 0.0, z_norm, 1.0)[..., None, :]
-        grip = law.sigma_0 / formulas.stribeck(np, speed, law.numbers)
+        grip = law.sigma_0 / formulas.stribeck(np, speed, law)
         return unit, z_norm, (z_norm * grip, (unit * velocity).sum(axis=-2), speed, grip)
 
     def _rate(self, state: np.ndarray, velocity: np.ndarray) -> np.ndarray:
         if self._asymmetry is not None:
-            state = state - anisotropic.centres(self.law, self._asymmetry, velocity)[0]
+            state = state - anisotropic.centres(self.law.numbers, self._asymmetry, velocity)[0]
         _, _, arguments = self._arguments(state, velocity)
         k = formulas.bristle_decay(np, *arguments, self.law.numbers)
         return velocity - k[..., None, :] * state

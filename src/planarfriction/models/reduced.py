@@ -15,6 +15,7 @@ from planarfriction.kernels.pointers import place_of
 from planarfriction.kernels.records import rows_of
 from planarfriction.kernels.reduced import LINEAR
 from planarfriction.kernels.reduced_contact import ReducedContact, Shape
+from planarfriction.laws.base import refuse_creep
 from planarfriction.models.base import FrictionModel, ModelJacobians, PackedModel, StepJacobians
 from planarfriction.models.load_family import LoadFamily
 from planarfriction.models.reduced_map import ReducedShape, owner, reduced_shape
@@ -51,6 +52,7 @@ class ReducedModel(FrictionModel):
 
     def __post_init__(self) -> None:
         super().__post_init__()
+        refuse_creep(self.law, "ReducedModel")  # its stored steady state is that of bristles without creep
         object.__setattr__(self, "segments", validation.count("segments", self.segments, at_least=4))
         object.__setattr__(self, "speeds", validation.count("speeds", self.speeds, at_least=5))
         object.__setattr__(self, "load_error", validation.non_negative("load_error", self.load_error))
@@ -151,11 +153,11 @@ class ReducedModel(FrictionModel):
 
     @functools.cached_property
     def _reference(self) -> ReducedShape:
-        return reduced_shape(self.patch, None, self.law.gamma, self.segments, self.speeds)
+        return reduced_shape(self.patch, None, self.law.numbers.gamma, self.segments, self.speeds)
 
     @functools.cached_property
     def _family(self) -> LoadFamily:
-        return LoadFamily(self.patch, self.law.gamma, self.segments, self.speeds, self.load_error)
+        return LoadFamily(self.patch, self.law.numbers.gamma, self.segments, self.speeds, self.load_error)
 
     @functools.cached_property
     def _recent(self) -> dict[float, ReducedShape]:
@@ -165,7 +167,7 @@ class ReducedModel(FrictionModel):
         if load not in self._recent:
             while len(self._recent) >= _REMEMBERED:
                 self._recent.pop(next(iter(self._recent)))
-            self._recent[load] = reduced_shape(self.patch, load, self.law.gamma, self.segments, self.speeds)
+            self._recent[load] = reduced_shape(self.patch, load, self.law.numbers.gamma, self.segments, self.speeds)
         return self._recent[load]
 
     @functools.cached_property
@@ -197,9 +199,9 @@ class ReducedModel(FrictionModel):
         return np.concatenate([rate, load[:, None] * wrench], axis=1)
 
     def _jacobians(self, shape: ReducedShape, state, twist, load) -> np.ndarray:
-        law, factor = self.law, shape.factor
+        law, factor = self.law.numbers, shape.factor
         lin = np.empty((len(load), LINEAR))
-        kernels.linearise_batch(np.array(law.numbers), shape.numbers, *_maps(shape), state, twist, lin)
+        kernels.linearise_batch(np.array(law), shape.numbers, *_maps(shape), state, twist, lin)
         rate_state, rate_twist = lin[:, 1:10].reshape(-1, 3, 3), lin[:, 10:19].reshape(-1, 3, 3) @ factor
         weight = -load[:, None, None]
         pull = law.sigma_0 * np.eye(3) + law.sigma_1 * rate_state

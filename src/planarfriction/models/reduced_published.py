@@ -290,7 +290,7 @@ class ReducedModelPublished(FrictionModel):
         return (h * v_n[:, None] - k[:, None] * z) * np.array([1.0, 1.0, shape.contact_radius])
 
     def _wrench(self, shape: PublishedShape, state, twist, load) -> np.ndarray:
-        law = self.law
+        law = self.law.numbers
         rate = self._rate(shape, state, twist, load)
         to_centre, viscous = self._to_centre(shape)
         velocity = transformed(to_centre, twist) * viscous

@@ -11,7 +11,8 @@ from torch import Tensor, nn
 from planarfriction import models, validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
-from planarfriction.laws import ElastoPlastic, LuGre
+from planarfriction.laws import ElastoPlastic, FrictionLaw, LuGre
+from planarfriction.laws.base import refuse_creep
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.metric import refuse_anisotropy
 from planarfriction.torch import bristle
@@ -46,12 +47,11 @@ class FrictionModel(nn.Module):
     reference: models.FrictionModel
     """The same model in NumPy, with the parameters that this one started with."""
 
-    def __init__(self, patch: ContactPatch, law: LuGre) -> None:
+    def __init__(self, patch: ContactPatch, law: FrictionLaw) -> None:
         super().__init__()
         if not isinstance(patch, ContactPatch):
             raise InvalidValueError("patch", "be a ContactPatch", patch)
-        if not isinstance(law, LuGre):
-            raise InvalidValueError("law", "be a LuGre law", law)
+        refuse_creep(law, f"torch.{type(self).__name__}")
         refuse_anisotropy(patch, type(self).__name__)
         self.patch = patch
         self.elasto_plastic = law.numbers.elasto_plastic

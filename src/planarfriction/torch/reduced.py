@@ -57,7 +57,7 @@ class ReducedModel(FrictionModel):
         if "gamma" in trainable:
             raise InvalidValueError("trainable", "not name gamma: the map of steady sliding is made for it", trainable)
         kind = {"dtype": dtype or torch.get_default_dtype(), "device": device}
-        self.gamma = law.gamma
+        self.gamma = law.numbers.gamma
         self.reference = models.ReducedModel(patch, law, segments=segments, speeds=speeds)
         shape = self.reference.shape_at(normal_force)
         self._lever = shape.contact_radius

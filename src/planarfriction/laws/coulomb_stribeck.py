@@ -1,0 +1,67 @@
+"""Coulomb with Stribeck effect, regularised: a curve of friction over speed, followed within a relaxation time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from planarfriction import validation
+from planarfriction.errors import InvalidValueError
+from planarfriction.formulas import LawNumbers
+from planarfriction.laws.base import FrictionLaw
+
+
+@dataclass(frozen=True)
+class CoulombStribeck(FrictionLaw):
+    """Coulomb friction with Stribeck and viscous terms, regularised by a creep speed.
+
+    In steady sliding, with `g(v) = mu_c + (mu_s - mu_c) exp(-|v/v_s|^gamma)`,
+
+        f = -(g(v) v/(|v| + v_c) + sigma_2 v) f_N,
+
+    and the first part p of f follows a change of the speed by `pdot = -((|v| + v_c) p / g(v) + v f_N) mu_s/(v_c tau)`:
+    at rest it decays as `exp(-t/tau)`. So a contact under a held force `F < mu_s f_N` does not stand still but creeps,
+    without Stribeck and viscous terms at `v = v_c F/(mu_c f_N - F)`. The smaller `creep_speed`, the closer to Coulomb;
+    the shorter `relaxation_time`, the closer to a function of the speed alone. A contact that shall stick takes `LuGre`
+    with `elasto_plastic`.
+
+    Sources: Stribeck 1902; the curve as in Armstrong-Helouvry, Dupont, Canudas de Wit 1994, table 1; of the limit
+    `tau -> 0`, the regularisation `v/(|v| + v_c)`.
+    """
+
+    mu_c: float = 1.0
+    """Coulomb coefficient [-]."""
+    mu_s: float = None  # pyright: ignore[reportAssignmentType]
+    """Static coefficient [-], at least `mu_c`, which it is where it is left out."""
+    v_s: float = 1e-3
+    """Stribeck speed [m/s]."""
+    gamma: float = 2.0
+    """Stribeck exponent [-]."""
+    sigma_2: float = 0.0
+    """Viscous friction per unit normal load [s/m]."""
+    creep_speed: float = 1e-5
+    """v_c [m/s]: at this speed friction is half of what it is in fast sliding."""
+    relaxation_time: float = 1e-2
+    """tau [s]: time in which the force at rest falls to 1/e."""
+
+    def __post_init__(self) -> None:
+        if self.mu_s is None:
+            object.__setattr__(self, "mu_s", self.mu_c)
+        for name in ("mu_c", "mu_s", "v_s", "gamma", "creep_speed", "relaxation_time"):
+            object.__setattr__(self, name, validation.positive(name, getattr(self, name)))
+        object.__setattr__(self, "sigma_2", validation.non_negative("sigma_2", self.sigma_2))
+        if self.mu_s < self.mu_c:
+            raise InvalidValueError("mu_s", "be >= mu_c", f"mu_s={self.mu_s}, mu_c={self.mu_c}")
+
+    @property
+    def numbers(self) -> LawNumbers:
+        """The law as the formulas see it: plain bristles of `sigma_0 = mu_s/(v_c tau)` that relax."""
+        return LawNumbers(
+            sigma_0=self.mu_s / (self.creep_speed * self.relaxation_time),
+            sigma_1=0.0,
+            sigma_2=self.sigma_2,
+            mu_c=self.mu_c,
+            mu_s=self.mu_s,
+            v_s=self.v_s,
+            gamma=self.gamma,
+            creep_speed=self.creep_speed,
+        )

@@ -1,0 +1,278 @@
+"""Laws beside LuGre: closed forms of one bristle, with a patch and without; what models take and what they refuse."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import planarfriction as pf
+from planarfriction.autodiff import rollout_sensitivities
+from planarfriction.errors import InvalidValueError
+from planarfriction.formulas import LawNumbers
+
+POINT = pf.ContactPatch.points([(0.0, 0.0)])
+DISC = pf.ContactPatch.disc(0.01, 7)
+LOAD = 3.0
+DAHL = pf.Dahl(mu_c=0.4, sigma_0=2e4)
+CREEPING = pf.CoulombStribeck(
+    mu_c=0.5, mu_s=0.7, v_s=2e-3, gamma=1.5, sigma_2=0.3, creep_speed=1e-4, relaxation_time=5e-3
+)
+SIMPLE = pf.CoulombStribeck(mu_c=0.5, creep_speed=1e-4, relaxation_time=5e-3)
+LAWS = {
+    "LuGre": pf.LuGre(mu_c=0.6, mu_s=0.9, v_s=2e-3, sigma_0=1e5, sigma_1=300.0, sigma_2=0.4),
+    "elasto-plastic": pf.LuGre(mu_c=0.6, sigma_0=1e5, sigma_1=300.0, elasto_plastic=0.8),
+    "Dahl": DAHL,
+    "CoulombStribeck": CREEPING,
+}
+every_law = pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+
+
+def held(model, velocity, time, steps, state=None):
+    """State and wrench after `time` [s] at a held velocity along x."""
+    state = model.rest() if state is None else state
+    for _ in range(steps):
+        state, wrench = model.step(state, (velocity, 0.0, 0.0), LOAD, time / steps)
+    return state, wrench
+
+
+# ---------------------------------------------------------------------- defaults
+
+
+def test_static_friction_is_that_of_sliding_unless_given():
+    assert pf.LuGre(mu_c=0.3).mu_s == 0.3 and pf.LuGre().mu_s == 1.0
+    assert pf.CoulombStribeck(mu_c=0.3).mu_s == 0.3
+    assert pf.LuGre(mu_c=0.3) == pf.LuGre(mu_c=0.3, mu_s=0.3)
+
+
+def test_a_number_is_a_breakaway_ratio():
+    assert pf.LuGre(elasto_plastic=0.9) == pf.LuGre(elasto_plastic=pf.ElastoPlastic(0.9))
+    assert pf.LuGre(elasto_plastic=0).elasto_plastic == pf.ElastoPlastic(0.0)
+
+
+# ---------------------------------------------------------------------- closed forms
+
+
+@pytest.mark.parametrize("steps", [1, 7])
+def test_dahl_from_rest_is_an_exponential_of_the_way(steps):
+    """`f = mu (1 - exp(-sigma_0 x / mu))`, however fast."""
+    for speed in (1e-6, 1.0):
+        for way in (1e-6, 2e-5, 1e-3):
+            _, wrench = held(pf.DistributedModel(POINT, DAHL), speed, way / speed, steps)
+            expected = 0.4 * LOAD * -math.expm1(-2e4 * way / 0.4)
+            assert -wrench[0] == pytest.approx(expected, rel=1e-13)  # rounding
+
+
+def test_dahl_moved_to_and_fro_closes_its_loop():
+    """After a way back of x from full deflection: `f = mu (2 exp(-sigma_0 x / mu) - 1)`."""
+    model = pf.DistributedModel(POINT, DAHL)
+    state, _ = held(model, 0.1, 1.0, 1)
+    _, wrench = held(model, -0.1, 1e-4, 3, state)
+    assert -wrench[0] == pytest.approx(0.4 * LOAD * (2.0 * math.exp(-2e4 * 1e-5 / 0.4) - 1.0), rel=1e-12)  # rounding
+
+
+def test_regularised_coulomb_is_the_curve_over_speed():
+    speed = np.array([1e-6, 1e-4, 1e-3, 1e-2, 1.0])
+    g = 0.5 + 0.2 * np.exp(-((speed / 2e-3) ** 1.5))
+    expected = g * speed / (speed + 1e-4) + 0.3 * speed
+    assert CREEPING.steady_friction(speed) == pytest.approx(expected, rel=1e-15)
+    for v, friction in zip(speed, expected, strict=True):
+        _, wrench = held(pf.DistributedModel(POINT, CREEPING), v, 1.0, 1)  # 200 relaxation times
+        assert -wrench[0] == pytest.approx(friction * LOAD, rel=1e-12)  # rounding
+
+
+def test_regularised_coulomb_relaxes_at_rest_within_its_time():
+    model = pf.DistributedModel(POINT, CREEPING)
+    state, before = held(model, 0.1, 1.0, 1)
+    _, after = held(model, 0.0, 5e-3, 4, state)
+    viscous = 0.3 * 0.1 * LOAD
+    assert after[0] / (before[0] + viscous) == pytest.approx(math.exp(-1.0), rel=1e-13)  # rounding
+
+
+def test_regularised_coulomb_creeps_under_a_held_force():
+    """`v = v_c F/(mu f_N - F)`, in a scene: a block pushed with 60 % of what it can hold."""
+    share, mass = 0.6, 0.1
+    force = share * 0.5 * LOAD
+    body = pf.Body(mass, 1e-5, gravity=(0.0, 0.0))
+    model = pf.DistributedModel(DISC, SIMPLE)
+    scene = pf.Scene(
+        body, [pf.Contact(model, LOAD, mounted_on="body")], 0.2, force=pf.Signal.constant([force, 0.0, 0.0])
+    )
+    data = pf.simulate(scene, rtol=1e-8).data
+    assert float(data.vx[-1]) == pytest.approx(1e-4 * share / (1.0 - share), rel=1e-4)  # of the solver
+
+
+# ---------------------------------------------------------------------- one bristle without a patch
+
+
+@every_law
+def test_a_single_bristle_is_a_patch_of_one_cell(law):
+    model, rng = pf.DistributedModel(POINT, law), np.random.default_rng(0)
+    z = law.largest_deflection * rng.normal(size=(20, 2))
+    v = 1e-3 * rng.normal(size=(20, 2))
+    twist = np.concatenate([v, np.zeros((20, 1))], axis=1)
+    wide = z[..., None]
+    assert law.rate(z, v, axis=-1) == pytest.approx(model.rate(wide, twist, LOAD)[..., 0], rel=1e-12)  # rounding
+    assert law.force(z, v, LOAD, axis=-1) == pytest.approx(model.wrench(wide, twist, LOAD)[:, :2], rel=1e-12)
+
+
+@every_law
+def test_a_bristle_on_a_line_is_one_in_the_plane_that_keeps_to_it(law):
+    z, v = law.largest_deflection * np.array([-0.9, 0.0, 0.5, 0.95]), np.array([1e-3, 1e-4, -2e-3, 5e-2])
+    flat = np.zeros(4)
+    plane = law.force(np.stack([z, flat]), np.stack([v, flat]), np.full(4, LOAD), axis=0)
+    assert law.force(z, v, LOAD) == pytest.approx(plane[0], rel=1e-13) and not plane[1].any()  # rounding
+    assert law.rate(z, v) == pytest.approx(law.rate(np.stack([z, flat]), np.stack([v, flat]), axis=0)[0], rel=1e-13)
+
+
+@every_law
+def test_steady_friction_is_where_the_bristle_stays(law):
+    speed = np.array([1e-5, 1e-3, 0.1])
+    deflection = (law.steady_friction(speed) - law.numbers.sigma_2 * speed) / law.numbers.sigma_0
+    assert np.abs(law.rate(deflection, speed)).max() < 1e-13  # rounding of speeds up to 0.1 m/s
+    assert law.force(deflection, speed, LOAD) == pytest.approx(-LOAD * law.steady_friction(speed), rel=1e-9)
+
+
+# ---------------------------------------------------------------------- models
+
+
+@pytest.mark.parametrize("law", [DAHL, CREEPING], ids=["Dahl", "CoulombStribeck"])
+@pytest.mark.parametrize("kind", ["distributed", "reduced-published"])
+def test_models_of_other_laws_have_the_slopes_of_their_differences(kind, law):
+    surface = {} if kind == "distributed" else {"surface": pf.LimitSurfaceEllipsoid(DISC)}
+    make = pf.DistributedModel if kind == "distributed" else pf.ReducedModelPublished
+    model, rng = make(DISC, law, **surface), np.random.default_rng(1)
+    state = 0.5 * law.largest_deflection * rng.normal(size=model.state_shape)
+    if kind != "distributed":
+        state[2] *= 0.005  # the third is a moment
+    twist, dt = np.array([1e-3, -5e-4, 0.2]), 2e-3
+    slopes, step = model.jacobians(state, twist, LOAD), model.step_jacobians(state, twist, LOAD, dt)
+    ahead = rng.normal(size=3) * np.array([1e-3, 1e-3, 0.1])
+    sideways = law.largest_deflection * rng.normal(size=model.state_shape)
+    if kind != "distributed":
+        sideways[2] *= 0.005
+    h = 1e-5  # central differences of the second order: 1e-10 of the third derivative, above 1e-16/1e-5 of rounding
+
+    def difference(function):
+        return (function(h) - function(-h)) / (2.0 * h)
+
+    def close(found, expected):
+        assert found == pytest.approx(expected, rel=1e-6, abs=1e-7 * np.abs(expected).max())
+
+    inner = "cdn,dn->cn" if kind == "distributed" else "cd,d->c"
+    close(
+        np.einsum(inner, slopes.rate_state, sideways),
+        difference(lambda e: model.rate(state + e * sideways, twist, LOAD)),
+    )
+    close(slopes.rate_twist @ ahead, difference(lambda e: model.rate(state, twist + e * ahead, LOAD)))
+    close(slopes.wrench_twist @ ahead, difference(lambda e: model.wrench(state, twist + e * ahead, LOAD)))
+    close(step.wrench_twist @ ahead, difference(lambda e: model.step(state, twist + e * ahead, LOAD, dt)[1]))
+    close(step.state_twist @ ahead, difference(lambda e: model.step(state, twist + e * ahead, LOAD, dt)[0]))
+
+
+@pytest.mark.parametrize("law", [DAHL, CREEPING], ids=["Dahl", "CoulombStribeck"])
+def test_a_disc_that_slides_straight_has_the_friction_of_its_law(law):
+    for model in (
+        pf.DistributedModel(DISC, law),
+        pf.ReducedModelPublished(DISC, law, surface=pf.LimitSurfaceEllipsoid(DISC)),
+    ):
+        scene = pf.scenes.driven(model, twist=(3e-3, 4e-3, 0.0), normal_force=LOAD, t_end=0.2)
+        data = pf.simulate(scene, rtol=1e-8).data
+        friction = LOAD * float(law.steady_friction(5e-3))
+        end = [float(data[name][-1, 0]) for name in ("fx", "fy")]
+        assert end == pytest.approx([-0.6 * friction, -0.8 * friction], rel=1e-6)  # of the solver
+
+
+def test_the_reduced_model_takes_dahl_and_refuses_creep():
+    small = {"segments": 8, "speeds": 5}
+    reduced, same = (
+        pf.ReducedModel(DISC, law, **small) for law in (DAHL, pf.LuGre(mu_c=0.4, sigma_0=2e4, sigma_1=0.0, sigma_2=0.0))
+    )
+    twist = (1e-3, 2e-3, 0.3)
+    assert reduced.step(reduced.rest(), twist, LOAD, 1e-2)[1] == pytest.approx(
+        same.step(same.rest(), twist, LOAD, 1e-2)[1], rel=1e-12
+    )
+    with pytest.raises(InvalidValueError, match=r"^law must have no creep_speed for ReducedModel .*got Coulomb[^\n]*$"):
+        pf.ReducedModel(DISC, CREEPING)
+    leaning = DISC.with_friction_metric(None, (0.1, 0.0))
+    with pytest.raises(InvalidValueError, match="no creep_speed for patches with an asymmetry"):
+        pf.DistributedModel(leaning, CREEPING)
+
+
+@pytest.mark.parametrize("law", [DAHL, CREEPING], ids=["Dahl", "CoulombStribeck"])
+def test_sensitivities_of_other_laws_are_those_of_differences(law):
+    model = pf.ReducedModelPublished(DISC, law, surface=pf.LimitSurfaceEllipsoid(DISC))
+    twists = np.array([[1e-3, 2e-4, 0.1]] * 12)
+    loads, dt = np.full(12, LOAD), np.full(12, 1e-3)
+    names = pf.autodiff.parameter_names(model)
+    base = pf.autodiff.parameters_of(model)
+    _, slopes = rollout_sensitivities(model, model.rest(), twists, loads, dt)[:2]
+    for name in ("sigma_0", "mu_c"):
+        i = names.index(name)
+        ends = []
+        for sign in (1.0, -1.0):
+            values = base.copy()
+            values[i] *= 1.0 + sign * 1e-6
+            ends.append(rollout_sensitivities(model, model.rest(), twists, loads, dt, parameters=values)[0])
+        expected = (ends[0] - ends[1]) / (2e-6 * base[i])
+        assert slopes[..., i] == pytest.approx(expected, rel=1e-5, abs=1e-6 * np.abs(expected).max())
+
+
+class Halved(pf.LuGre):
+    """LuGre with half of its friction: what a user may derive."""
+
+    @property
+    def numbers(self) -> LawNumbers:
+        full = super().numbers
+        return full._replace(mu_c=0.5 * full.mu_c, mu_s=0.5 * full.mu_s)
+
+
+def test_a_subclass_is_what_its_numbers_say():
+    halved, plain = Halved(mu_c=0.8, mu_s=1.0), pf.LuGre(mu_c=0.4, mu_s=0.5)
+    twist, small = (1e-2, 2e-3, 0.3), {"segments": 8, "speeds": 5}
+    for make in (
+        lambda law: pf.DistributedModel(DISC, law),
+        lambda law: pf.ReducedModel(DISC, law, **small),
+        lambda law: pf.ReducedModelPublished(DISC, law),
+    ):
+        of_halved, of_plain = make(halved), make(plain)
+        state, wrench = of_plain.step(of_plain.rest(), twist, LOAD, 1e-2)
+        assert of_halved.step(of_halved.rest(), twist, LOAD, 1e-2)[1] == pytest.approx(wrench, rel=1e-14)
+        assert of_halved.wrench(state, twist, LOAD) == pytest.approx(of_plain.wrench(state, twist, LOAD), rel=1e-12)
+    assert halved.force(1e-6, 1e-3, LOAD) == pytest.approx(plain.force(1e-6, 1e-3, LOAD), rel=1e-14)
+    with pytest.raises(InvalidValueError, match="start must be a LuGre law"):
+        pf.identify.identify_lugre(
+            pf.identify.Log(np.arange(5.0), np.ones((5, 3)), np.ones((5, 3)), 1.0), DISC, start=halved
+        )
+
+
+@pytest.mark.torch
+def test_torch_takes_a_law_by_its_numbers_and_refuses_creep():
+    torch = pytest.importorskip("torch")
+    import planarfriction.torch as pt
+
+    for law in (Halved(mu_c=0.8, mu_s=1.0), DAHL):
+        model = pt.DistributedModel(DISC, law, dtype=torch.float64)
+        twist, reference = (1e-2, 2e-3, 0.3), pf.DistributedModel(DISC, law)
+        _, wrench = model.step(model.rest(), torch.tensor(twist, dtype=torch.float64), LOAD, 1e-2)
+        assert wrench.numpy(force=True) == pytest.approx(
+            reference.step(reference.rest(), twist, LOAD, 1e-2)[1], rel=1e-9
+        )
+    with pytest.raises(InvalidValueError, match="law must have no creep_speed"):
+        pt.DistributedModel(DISC, CREEPING)
+
+
+@pytest.mark.jax
+def test_jax_takes_a_law_by_its_numbers_and_refuses_creep():
+    jax = pytest.importorskip("jax")
+    import planarfriction.jax as pj
+
+    for law in (Halved(mu_c=0.8, mu_s=1.0), DAHL):
+        model = pj.DistributedModel(DISC, law)
+        twist, reference = (1e-2, 2e-3, 0.3), pf.DistributedModel(DISC, law)
+        _, wrench = model.step(model.rest(), jax.numpy.asarray(twist), LOAD, 1e-2)
+        expected = reference.step(reference.rest(), twist, LOAD, 1e-2)[1]
+        assert np.asarray(wrench) == pytest.approx(expected, rel=1e-4, abs=1e-6)  # single precision
+    with pytest.raises(InvalidValueError, match="law must have no creep_speed"):
+        pj.DistributedModel(DISC, CREEPING)
