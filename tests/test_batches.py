@@ -19,7 +19,7 @@ LOADED = pf.ContactPatch.from_pressure({0.5: np.eye(4) + 0.1, 2.0: np.ones((4, 4
 METRIC, CELLS = ANISOTROPIC["both"], ANISOTROPIC["cells"]
 ONE_METRIC = ANISOTROPIC["metric"]
 
-LAWS = {"plain": pf.LuGre(), "elasto-plastic": pf.LuGre(elasto_plastic=pf.ElastoPlastic(0.9))}
+LAWS = {"plain": pf.LuGre(mu_s=1.2), "elasto-plastic": pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))}
 
 SURFACES = {
     "cells": pf.LimitSurfaceCells(MAP),

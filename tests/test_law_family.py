@@ -243,7 +243,7 @@ def test_a_subclass_is_what_its_numbers_say():
     assert halved.force(1e-6, 1e-3, LOAD) == pytest.approx(plain.force(1e-6, 1e-3, LOAD), rel=1e-14)
     with pytest.raises(InvalidValueError, match="start must be a LuGre law"):
         pf.identify.identify_lugre(
-            pf.identify.Log(np.arange(5.0), np.ones((5, 3)), np.ones((5, 3)), 1.0), DISC, start=halved
+            pf.identify.Log(np.arange(20.0), np.ones((20, 3)), np.ones((20, 3)), 1.0), DISC, start=halved
         )
 
 

@@ -61,7 +61,7 @@ def test_wrong_states_and_steps(model):
     ("call", "message"),
     [
         (lambda: pf.DistributedModel([1, 2], PLAIN), "patch must be a ContactPatch"),
-        (lambda: pf.ReducedModelPublished(FEET, 0.5), "law must be a LuGre law, got 0.5"),
+        (lambda: pf.ReducedModelPublished(FEET, 0.5), "law must be a friction law of bristles, such as LuGre, got 0.5"),
         (lambda: pf.ReducedModelPublished(FEET, PLAIN, surface="table"), "surface must be a limit surface, got table"),
         (lambda: pf.ReducedModelPublished(FEET, PLAIN, on_load_change="kep"), r"did you mean 'keep'"),
         (

@@ -209,7 +209,7 @@ def test_weights_stay_a_pressure_distribution():
         (lambda: reduced(trainable=("mu_x",)), "trainable must be one of"),
         (lambda: reduced(PLAIN, trainable=("breakaway_ratio",)), "not name breakaway_ratio for plain bristles"),
         (lambda: distributed(trainable=("contact_radius",)), "trainable must be one of"),
-        (lambda: reduced("lugre"), "law must be a LuGre law"),
+        (lambda: reduced("lugre"), "law must be a friction law of bristles"),
         (lambda: ReducedModelPublished("disc", PLAIN), "patch must be a ContactPatch"),
         (lambda: reduced().set(mu_s=0.1), "mu_s must be >= mu_c"),
         (lambda: reduced().set(mu=0.1), "parameter must be one of"),
