@@ -87,7 +87,7 @@ def test_scene_files(tmp_path):
     again = pf.Scene.from_file(tmp_path / "written.toml").contacts[0].model.patch
     np.testing.assert_array_equal(again.weights(3.0), both().weights(3.0))
     for source in ('files = ["light.npy", "heavy.npy"]', f"values = {[LIGHT.tolist(), HEAVY.tolist()]}"):
-        patch = f'[contact.patch]\nshape = "pressure_map"\ncell_size = 0.001\nloads = [2.0, 6.0]\n{source}\n'
+        patch = f'[contact.patch]\nshape = "pressure-map"\ncell_size = 0.001\nloads = [2.0, 6.0]\n{source}\n'
         (tmp_path / "own.toml").write_text(
             f"t_end = 1.0\n[body]\nmass = 1.0\ninertia = 1.0\n[contact]\nnormal_force = 3.0\n{patch}[contact.law]\n"
         )

@@ -84,8 +84,8 @@ def test_the_size_of_a_rectangle_gives_inertia_and_outline(tmp_path):
         ('shape = "polygon"\nvertices = [[0, 0], [1, 0], [0, 1]]\ncells = 4', {"name": "polygon"}),
         ('shape = "points"\npositions = [[0, 0], [1, 0], [0, 1]]\nweights = [1, 2, 3]', {"cells": 3}),
         ('shape = "published"\nname = "NonConvex1"', {"cells": 18}),
-        ('shape = "pressure_map"\nvalues = [[1, 2], [0, 3]]\ncell_size = 0.001', {"cells": 3}),
-        ('shape = "pressure_map"\nfile = "map.csv"\ncell_size = [0.001, 0.002]', {"name": "map"}),
+        ('shape = "pressure-map"\nvalues = [[1, 2], [0, 3]]\ncell_size = 0.001', {"cells": 3}),
+        ('shape = "pressure-map"\nfile = "map.csv"\ncell_size = [0.001, 0.002]', {"name": "map"}),
         ('shape = "disc"\nradius = 1.0\ncells = 5\npressure = "uniform"', {"depends_on_load": False}),
         ('shape = "disc"\nradius = 1.0\npressure = { law = "soft_finger", c = 0.3, n = 0.3, k = 2 }', {}),
         ('shape = "disc"\nradius = 1.0\npressure = { law = "linear_gradient", gradient = [0.5, 0.1] }', {}),
@@ -103,7 +103,7 @@ def test_every_shape_by_name(tmp_path, table, patch):
 def test_a_map_in_a_file_has_its_top_row_first(tmp_path):
     (tmp_path / "map.csv").write_text("3,3\n1,1\n")
     start, end = GOOD.index('shape = "disc"'), GOOD.index("[contact.law]")
-    table = 'shape = "pressure_map"\nfile = "map.csv"\ncell_size = 0.002\n'
+    table = 'shape = "pressure-map"\nfile = "map.csv"\ncell_size = 0.002\n'
     patch = read(tmp_path, GOOD[:start] + table + GOOD[end:]).contacts[0].model.patch
     assert patch.centre_of_pressure() == pytest.approx([0.0, 0.0005], abs=1e-18)  # (3 - 1)/4 of 1 mm, upwards
 
@@ -112,17 +112,17 @@ def test_a_map_in_a_file_has_its_top_row_first(tmp_path):
     ("line", "check"),
     [
         ('model = "distributed"', lambda model: isinstance(model, pf.DistributedModel)),
-        ('model = "reduced_published"', lambda model: isinstance(model.surface, pf.LimitSurfaceTablePublished)),
+        ('model = "reduced-published"', lambda model: isinstance(model.surface, pf.LimitSurfaceTablePublished)),
         (
-            'model = { kind = "reduced_published", surface = "ellipsoid" }',
+            'model = { kind = "reduced-published", surface = "ellipsoid" }',
             lambda model: isinstance(model.surface, pf.LimitSurfaceEllipsoid),
         ),
         (
-            'model = { kind = "reduced_published", surface = { kind = "table", segments = 7 } }',
+            'model = { kind = "reduced-published", surface = { kind = "table", segments = 7 } }',
             lambda model: isinstance(model.surface, pf.LimitSurfaceTable) and model.surface.segments == 7,
         ),
         (
-            'model = { kind = "reduced_published", on_load_change = "keep" }',
+            'model = { kind = "reduced-published", on_load_change = "keep" }',
             lambda model: model.on_load_change == "keep",
         ),
     ],
@@ -223,7 +223,7 @@ def test_unusual_names_survive(tmp_path):
         ("t_end = 1.0", "t_end = 1.0\nforce = [1, 2]", "scene.toml: force must have 3 columns"),
         ("mu_s = 0.6", "mu_s = 0.4", "scene.toml: [contact.law]: mu_s must be >= mu_c, got mu_s=0.4, mu_c=0.5"),
         ("mu_s = 0.6", "mu_s = nan", "scene.toml: [contact.law]: mu_s must be finite, got nan"),
-        ("mu_s = 0.6", "elasto_plastic = 2", "scene.toml: [contact.law.elasto_plastic]: breakaway_ratio must be in"),
+        ("mu_s = 0.6", "elasto_plastic = 2", "scene.toml: [contact.law]: breakaway_ratio must be in"),
         ("radius = 0.01", "radius = -1", "scene.toml: [contact.patch]: radius must be > 0, got -1.0"),
         ("radius = 0.01", "", "scene.toml: [contact.patch]: missing key 'radius'"),
         ("radius", "raduis", "scene.toml: [contact.patch]: unknown key 'raduis' (did you mean 'radius'?)"),
@@ -266,12 +266,12 @@ def test_unusual_names_survive(tmp_path):
         (
             "normal_force = 2.0",
             "normal_force = 2.0\nmodel = 'distribted'",
-            "scene.toml: [contact.model]: kind must be one of distributed, reduced, reduced_published, "
+            "scene.toml: [contact.model]: kind must be one of distributed, reduced, reduced-published, "
             "got 'distribted'",
         ),
         (
             "normal_force = 2.0",
-            "normal_force = 2.0\nmodel = { kind = 'reduced_published', surface = { kind = 'cells', segments = 3 } }",
+            "normal_force = 2.0\nmodel = { kind = 'reduced-published', surface = { kind = 'cells', segments = 3 } }",
             "scene.toml: [contact.model.surface]: unknown key 'segments'",
         ),
         ("normal_force = 2.0", "normal_force = 2.0\ncount = 0", "scene.toml: [contact]: count of contact 'contact'"),
@@ -298,7 +298,7 @@ def test_bad_pressure_maps_say_scene_and_map(tmp_path):
     for name, content in (("none.csv", None), ("zero.csv", "0,0\n0,0\n"), ("below.csv", "1,-1\n"), ("map.txt", "1")):
         if content is not None:
             (tmp_path / name).write_text(content)
-        table = f'shape = "pressure_map"\nfile = "{name}"\ncell_size = 0.001\n'
+        table = f'shape = "pressure-map"\nfile = "{name}"\ncell_size = 0.001\n'
         message = one_line(tmp_path, GOOD[:start] + table + GOOD[end:])
         assert message.startswith("scene.toml: [contact.patch]: ")
         assert name in message

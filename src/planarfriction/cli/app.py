@@ -6,13 +6,39 @@ import gc
 from pathlib import Path
 
 import click
+from click.shell_completion import CompletionItem
 
 from planarfriction import __version__
+from planarfriction.families import MODELS, PUBLISHED_PATCHES, SCENES, SURFACES, Family
 
 PATCH_HELP = (
-    "Square, Circle, Line, LineGrad, LineGradX, NonConvex1, NonConvex2, disc, rectangle, or a pressure map "
+    f"{', '.join(PUBLISHED_PATCHES)}, another shape that its width describes (disc, rectangle), or a pressure map "
     "(.csv, .npy, grey image; row 0 is the top) with --cell-size."
 )
+
+
+class MemberOf(click.Choice):
+    """A choice among the members of a family, those that are registered later too, and a few words more."""
+
+    def __init__(self, family: Family, *more: str):
+        self.family, self.more = family, more
+        super().__init__([*family, *more])
+
+    @property
+    def choices(self) -> tuple[str, ...]:
+        """The names, as they are now."""
+        return (*self.family, *self.more)
+
+    @choices.setter
+    def choices(self, value: object) -> None:
+        """Nothing to keep."""
+
+
+def complete_scene(context: object, parameter: object, incomplete: str) -> list[CompletionItem]:
+    """Ready scenes that begin so, and files."""
+    names = [CompletionItem(name, help=SCENES.words(name)) for name in SCENES if name.startswith(incomplete)]
+    return [*names, CompletionItem(incomplete, type="file")]
+
 
 FILE = click.Path(path_type=Path)
 """A path that the commands check themselves."""
@@ -30,9 +56,9 @@ def app() -> None:
 
 @app.command(
     short_help="Simulate a ready scene or a scene file.",
-    help="""Simulate a ready scene or a scene file, with one friction model or with several side by side.
+    help=f"""Simulate a ready scene or a scene file, with one friction model or with several side by side.
 
-    SCENE is in-hand, drift, free-slide, driven, or a file (.toml, .json).
+    SCENE is {", ".join(SCENES)}, or a file (.toml, .json).
 
     \b
     Examples:
@@ -42,10 +68,10 @@ def app() -> None:
       planarfriction run scene.toml --rtol 1e-7 --out results/
     """,
 )
-@click.argument("scene")
+@click.argument("scene", shell_complete=complete_scene)
 @click.option(
     "--model",
-    type=click.Choice(["distributed", "reduced", "reduced-published", "both"]),
+    type=MemberOf(MODELS, "both"),
     multiple=True,
     help="Friction model, may be repeated. Default: both for in-hand, else distributed or the file's.",
 )
@@ -98,7 +124,7 @@ def run(
 @click.option("--cell-size", type=float, help="Side of a cell of the pressure map in m.")
 @click.option(
     "--surface",
-    type=click.Choice(["cells", "exact", "table", "table-published", "ellipsoid", "quartic"]),
+    type=MemberOf(SURFACES),
     default="cells",
     show_default=True,
     help="How the surface is represented.",

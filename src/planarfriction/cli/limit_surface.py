@@ -11,22 +11,13 @@ from planarfriction.cli.console import note, print_table
 from planarfriction.cli.output import check_picture, check_table, write_csv
 from planarfriction.cli.patches import find_patch, pressure_map
 from planarfriction.errors import InvalidValueError
+from planarfriction.families import SURFACES
 
 if TYPE_CHECKING:
     from planarfriction.patch import ContactPatch
 
 POLAR_SAMPLES, AZIMUTH_SAMPLES = 37, 72
 """Samples of the direction sphere in the CSV: every five degrees."""
-
-SURFACES = {
-    "exact": "LimitSurfaceExact",
-    "cells": "LimitSurfaceCells",
-    "table": "LimitSurfaceTable",
-    "table-published": "LimitSurfaceTablePublished",
-    "ellipsoid": "LimitSurfaceEllipsoid",
-    "quartic": "LimitSurfaceQuartic",
-}
-"""Name on the command line -> class in `planarfriction.limit_surface`."""
 
 
 def choose_patch(patch: str | None, pressure: Path | None, cell_size: float | None) -> ContactPatch:
@@ -40,13 +31,11 @@ def choose_patch(patch: str | None, pressure: Path | None, cell_size: float | No
 
 def show(patch: ContactPatch, kind: str, *, picture: Path | None, table: Path | None) -> None:
     """Print the numbers of a limit surface; write its picture and its samples where asked for."""
-    from planarfriction import limit_surface
-
     if picture is not None:
         check_picture(picture)
     if table is not None:
         check_table(table)
-    surface = getattr(limit_surface, SURFACES[kind])(patch)
+    surface = SURFACES[kind](patch)
     centre = np.round(1e3 * surface.centre_of_pressure, 9) + 0.0  # no -0 and no rounding errors of symmetric patches
     rows = [
         ["loaded cells", f"{patch.cells}"],

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+import functools
+import inspect
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
+from planarfriction.families import PUBLISHED_PATCHES, SHAPES
 
 if TYPE_CHECKING:
     from planarfriction.patch import ContactPatch
 
 WIDTH = 0.02
 """Width of named patches [m], that of the published experiments."""
+
+_PER_WIDTH = {"width": 1.0, "length": 1.0, "radius": 0.5}
+"""First parameters of shapes that a width decides, and how large they are for a width of 1."""
 
 
 def find_patch(text: str, *, cell_size: float | None, width: float = WIDTH) -> ContactPatch:
@@ -25,18 +32,26 @@ def find_patch(text: str, *, cell_size: float | None, width: float = WIDTH) -> C
     FileError
         The pressure map cannot be read.
     """
-    from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
-
-    makers = {name.lower(): make for name, make in PUBLISHED_PATCHES.items()}
-    makers["disc"] = lambda width: ContactPatch.disc(width / 2)
-    makers["rectangle"] = lambda width: ContactPatch.rectangle(width)
+    makers = _shapes(width)
+    makers |= {name.lower(): functools.partial(make, width=width) for name, make in PUBLISHED_PATCHES.items()}
     if make := makers.get(text.lower()):
         if cell_size is not None:
             raise InvalidValueError("--cell-size", "come with a pressure map", f"{cell_size} for the patch {text}")
-        return make(width=width)
+        return make()
     if not (Path(text).suffix or Path(text).exists()):
-        validation.choice("patch", text, [*PUBLISHED_PATCHES, "disc", "rectangle", "a pressure map file"])
+        shapes = [name for name in _shapes(width) if name.title() not in PUBLISHED_PATCHES]
+        validation.choice("patch", text, [*PUBLISHED_PATCHES, *shapes, "a pressure map file"])
     return pressure_map(text, cell_size)
+
+
+def _shapes(width: float) -> dict[str, Callable[[], ContactPatch]]:
+    """The shapes that their width alone describes, by name."""
+    makers = {}
+    for name, make in SHAPES.items():
+        first, *others = inspect.signature(make).parameters.values()
+        if first.name in _PER_WIDTH and all(other.default is not other.empty for other in others):
+            makers[name] = functools.partial(make, _PER_WIDTH[first.name] * width)
+    return makers
 
 
 def pressure_map(path: str | Path, cell_size: float | None) -> ContactPatch:

@@ -13,22 +13,17 @@ from planarfriction.cli.console import note, print_table, simulation_progress
 from planarfriction.cli.patches import WIDTH, find_patch
 from planarfriction.cli.report import comparison
 from planarfriction.errors import SimulationInterrupted, SolverError
+from planarfriction.families import MODELS, SCENES
 
 if TYPE_CHECKING:
     from planarfriction.patch import ContactPatch
     from planarfriction.scenes import Scene, Solution
 
-READY = ("in-hand", "drift", "free-slide", "driven")
-"""Ready scenes by their names on the command line."""
-
 DRIFT_WIDTH = 0.05
 """Width of the patch in the published drift experiment [m]."""
 
-SLIDE_MASS, SLIDE_TWIST, SLIDE_SAMPLING = 0.2, (1.0, 0.0, 100.0), 1e-3
-"""Mass [kg], initial twist [m/s, m/s, rad/s] and time between samples [s] of the puck in the free slide."""
-
-KINDS = {"distributed": "DistributedModel", "reduced": "ReducedModel", "reduced-published": "ReducedModelPublished"}
-"""Model on the command line -> class in `planarfriction.models`."""
+SLIDE_SAMPLING = 1e-3
+"""Time between samples of the free slide [s], which lasts a tenth of a second."""
 
 BOTH = ("distributed", "reduced")
 """What "both" means."""
@@ -48,35 +43,20 @@ def build_scenes(
     kinds = list(dict.fromkeys(kind for each in models for kind in (BOTH if each == "both" else [each])))
     if Path(name).suffix.lower() in (".toml", ".json"):
         return _scenes_from_file(name, kinds, patch, cell_size)
-    validation.choice("scene", name, [*READY, "a scene file (.toml, .json)"])
+    validation.choice("scene", name, [*SCENES, "a scene file (.toml, .json)"])
     width = DRIFT_WIDTH if name == "drift" else WIDTH
     contact_patch = find_patch(patch or "Circle", cell_size=cell_size, width=width)
     kinds = kinds or (list(BOTH) if name == "in-hand" else ["distributed"])
-    return {kind: _ready_scene(name, _model(kind, contact_patch, _law()), t_end) for kind in kinds}
+    options: dict[str, Any] = {} if t_end is None else {"t_end": t_end}
+    if name == "free-slide":
+        options["save_every"] = SLIDE_SAMPLING
+    return {kind: SCENES[name](MODELS[kind](contact_patch, _law()), **options) for kind in kinds}
 
 
 def _law() -> Any:
     from planarfriction.laws import ElastoPlastic, LuGre
 
     return LuGre(mu_s=1.2, elasto_plastic=ElastoPlastic(0.9))
-
-
-def _model(kind: str, patch: ContactPatch, law: Any) -> Any:
-    from planarfriction import models
-
-    return getattr(models, KINDS[kind])(patch, law)
-
-
-def _ready_scene(name: str, model: Any, t_end: float | None) -> Scene:
-    from planarfriction import scenes
-
-    options = {} if t_end is None else {"t_end": t_end}
-    if name == "free-slide":
-        # A puck whose mass is spread like its contact pressure.
-        inertia = SLIDE_MASS * float(model.patch.second_moment(9.81 * SLIDE_MASS))
-        scene = scenes.free_slide(model, mass=SLIDE_MASS, inertia=inertia, twist=SLIDE_TWIST, **options)
-        return dataclasses.replace(scene, save_every=SLIDE_SAMPLING)
-    return {"in-hand": scenes.in_hand, "drift": scenes.drift, "driven": scenes.driven}[name](model, **options)
 
 
 def _scenes_from_file(path: str, kinds: Sequence[str], patch: str | None, cell_size: float | None) -> dict[str, Scene]:
@@ -91,8 +71,8 @@ def _scenes_from_file(path: str, kinds: Sequence[str], patch: str | None, cell_s
 
 def _label(scene: Scene) -> str:
     """The kind of model that all contacts of a scene have, or "mixed"."""
-    classes = {type(contact.model).__name__ for contact in scene.contacts}
-    return next((kind for kind, name in KINDS.items() if classes == {name}), "mixed")
+    kinds = {MODELS.name_of(contact.model) for contact in scene.contacts}
+    return (kinds.pop() if len(kinds) == 1 else None) or "mixed"
 
 
 def _with_models(scene: Scene, kind: str, patch: ContactPatch | None) -> Scene:
@@ -100,10 +80,10 @@ def _with_models(scene: Scene, kind: str, patch: ContactPatch | None) -> Scene:
     contacts = []
     for contact in scene.contacts:
         model = contact.model
-        of_kind = kind == "mixed" or type(model).__name__ == KINDS[kind]
-        if patch is not None or not of_kind:
-            name = next(key for key, value in KINDS.items() if value == type(model).__name__) if of_kind else kind
-            model = _model(name, model.patch if patch is None else patch, model.law)
+        own = MODELS.name_of(model)
+        if patch is not None or kind not in ("mixed", own):
+            make = type(model) if kind == "mixed" else MODELS[kind]
+            model = make(model.patch if patch is None else patch, model.law)
         contacts.append(dataclasses.replace(contact, model=model))
     return dataclasses.replace(scene, contacts=tuple(contacts))
 

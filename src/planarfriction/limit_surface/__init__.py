@@ -1,5 +1,6 @@
 """Limit surfaces: the friction wrench of every sliding twist, per unit `mu f_N`. They know shape, not friction."""
 
+from planarfriction.families import SURFACES
 from planarfriction.limit_surface.base import LimitSurface
 from planarfriction.limit_surface.cells import LimitSurfaceCells
 from planarfriction.limit_surface.comparison import SurfaceComparison
@@ -10,6 +11,7 @@ from planarfriction.limit_surface.table import LimitSurfaceTable
 from planarfriction.limit_surface.table_published import LimitSurfaceTablePublished
 
 __all__ = [
+    "SURFACES",
     "LimitSurface",
     "LimitSurfaceCells",
     "LimitSurfaceEllipsoid",
@@ -18,4 +20,7 @@ __all__ = [
     "LimitSurfaceTable",
     "LimitSurfaceTablePublished",
     "SurfaceComparison",
+    "register",
 ]
+
+register = SURFACES.register

@@ -1,15 +1,20 @@
 """Friction models of a contact patch: parameters, and pure functions of (state, twist, load)."""
 
+from planarfriction.families import MODELS
 from planarfriction.models.base import FrictionModel, ModelJacobians, StepJacobians
 from planarfriction.models.distributed import DistributedModel
 from planarfriction.models.reduced import ReducedModel
 from planarfriction.models.reduced_published import ReducedModelPublished
 
 __all__ = [
+    "MODELS",
     "DistributedModel",
     "FrictionModel",
     "ModelJacobians",
     "ReducedModel",
     "ReducedModelPublished",
     "StepJacobians",
+    "register",
 ]
+
+register = MODELS.register

@@ -1,5 +1,6 @@
 """Contact patches: cells with areas, and a pressure law that may depend on the normal force."""
 
+from planarfriction.families import PUBLISHED_PATCHES, SHAPES
 from planarfriction.patch.compressed import surface_error
 from planarfriction.patch.contact_patch import ContactPatch
 from planarfriction.patch.files import read_pressure_map
@@ -7,10 +8,10 @@ from planarfriction.patch.grid import Grid
 from planarfriction.patch.metric import grain
 from planarfriction.patch.pressure import LinearGradient, PerCell, Pressure, SoftFinger, Uniform
 from planarfriction.patch.pressure_maps import PressureMaps
-from planarfriction.patch.published import PUBLISHED_PATCHES
 
 __all__ = [
     "PUBLISHED_PATCHES",
+    "SHAPES",
     "ContactPatch",
     "Grid",
     "LinearGradient",
@@ -21,5 +22,8 @@ __all__ = [
     "Uniform",
     "grain",
     "read_pressure_map",
+    "register",
     "surface_error",
 ]
+
+register = SHAPES.register

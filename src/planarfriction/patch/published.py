@@ -6,8 +6,6 @@ and the lines follow their own rules, which depend on the number of cells).
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
 from planarfriction.patch.contact_patch import ContactPatch
@@ -58,15 +56,3 @@ def _masked(blocks: list[tuple[slice, slice]], cells: int, width: float, name: s
         mask[block] = 1.0
     nearest = ((2 * np.arange(cells) + 1) * PUBLISHED_CELLS) // (2 * cells)
     return ContactPatch.from_pressure(mask[np.ix_(nearest, nearest)], width / cells, name=name)
-
-
-PUBLISHED_PATCHES: dict[str, Callable[..., ContactPatch]] = {
-    "Square": square,
-    "Circle": circle,
-    "Line": line,
-    "LineGrad": line_grad,
-    "LineGradX": line_grad_x,
-    "NonConvex1": non_convex_1,
-    "NonConvex2": non_convex_2,
-}
-"""Name -> function of `(cells=21, width=0.02)` that makes the published patch."""

@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib import colormaps
 
 from planarfriction import geometry
+from planarfriction.families import SURFACES
 from planarfriction.plots import style
 
 POLAR_SEGMENTS, AZIMUTH_SEGMENTS = 90, 180
@@ -67,15 +68,8 @@ def scaled_samples(surface: Any, polar: np.ndarray, azimuth: np.ndarray) -> tupl
 
 
 def _kind(surface: Any) -> str:
-    words = {
-        "LimitSurfaceCells": "sum over the cells",
-        "LimitSurfaceExact": "exact",
-        "LimitSurfaceTable": "table, smooth",
-        "LimitSurfaceTablePublished": "table, as published",
-        "LimitSurfaceEllipsoid": "ellipsoid",
-        "LimitSurfaceQuartic": "convex quartic",
-    }
-    return words.get(type(surface).__name__, type(surface).__name__)
+    name = SURFACES.name_of(surface)
+    return (name and SURFACES.words(name)) or type(surface).__name__
 
 
 def draw_surface(axes: Any, mesh: np.ndarray, directions: np.ndarray, limit: float) -> None:

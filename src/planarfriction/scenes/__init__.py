@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from planarfriction.families import SCENES
 from planarfriction.scenes.ready import drift, driven, free_slide, in_hand, in_hand_load, published_velocity
 from planarfriction.scenes.scene import Body, Contact, Scene
 from planarfriction.scenes.signal import Signal
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
     from planarfriction.scenes.simulation import simulate
 
 __all__ = [
+    "SCENES",
     "Body",
     "Contact",
     "Scene",
@@ -26,8 +28,11 @@ __all__ = [
     "in_hand_load",
     "load",
     "published_velocity",
+    "register",
     "simulate",
 ]
+
+register = SCENES.register
 
 
 def __getattr__(name: str) -> Any:

@@ -1,139 +1,72 @@
-"""Friction models as plain data: the entries `model`, `patch` and `law` of a contact in a scene file."""
+"""Friction models as plain data: the entries `model`, `patch` and `law` of a contact in a scene file.
+
+Members of a family are written and read alike: `kind` is the name in `planarfriction.families`, the other keys are the
+parameters of what makes the member.
+"""
 
 from __future__ import annotations
 
 import dataclasses
-import importlib
 import inspect
+from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
 from planarfriction.errors import InvalidValueError
-from planarfriction.laws import ElastoPlastic, LuGre
+from planarfriction.families import LAWS, MODELS, SHAPES, SURFACES, Family
+from planarfriction.laws import ElastoPlastic
 from planarfriction.scenes.reading import Section
 
-MODELS = {
-    "distributed": "DistributedModel",
-    "reduced": "ReducedModel",
-    "reduced_published": "ReducedModelPublished",
-}
-"""Name in scene files -> class in `planarfriction.models`."""
+_GIVEN = ("patch", "law")
+"""Parameters of models and surfaces that are not keys of their tables."""
 
-_MAP_SIZES = ("segments", "speeds", "load_error")
-
-SURFACES = {
-    "table_published": "LimitSurfaceTablePublished",
-    "table": "LimitSurfaceTable",
-    "ellipsoid": "LimitSurfaceEllipsoid",
-    "cells": "LimitSurfaceCells",
-}
-"""Name in scene files -> class in `planarfriction.limit_surface`."""
-
-SHAPES = ("disc", "disc_published", "rectangle", "ring", "line", "polygon", "points")
-"""Shapes that are made by the class method of `ContactPatch` with the same name, and take its parameters as keys."""
-
-OTHER_SHAPES = ("pressure_map", "published", "cells")
-"""Shapes with their own keys: a measured map, one of the published patches, the cells themselves."""
+_MISSING = object()
 
 
 def model_to_dict(model: Any) -> dict[str, Any]:
     """`{"model": ..., "patch": ..., "law": ...}` of a model, as numbers, texts, lists and tables."""
-    kind = _name_of(model, MODELS, "planarfriction.models", "model")
-    table: dict[str, Any] = {"kind": kind}
-    if kind == "reduced":
-        table |= {name: getattr(model, name) for name in _MAP_SIZES}
-    if kind == "reduced_published":
-        table |= {"surface": _surface_to_dict(model), "on_load_change": model.on_load_change}
-    return {"model": table, "patch": model.patch.to_dict(), "law": law_to_dict(model.law)}
+    table = _described(MODELS, model)
+    if "surface" in table:
+        table["surface"] = _surface_to_dict(model.surface, model.patch)
+    return {"model": table, "patch": model.patch.to_dict(), "law": _described(LAWS, model.law)}
+
+
+def _surface_to_dict(surface: Any, patch: Any) -> dict[str, Any]:
+    table = _described(SURFACES, surface)
+    if "surface" in table:
+        table["surface"] = _surface_to_dict(surface.surface, surface.patch)
+    return table if surface.patch is patch else {**table, "patch": surface.patch.to_dict()}
 
 
 def model_from_dict(contact: Section) -> Any:
     """Model of the table of a contact: `patch` and `law` are tables, `model` is a name or a table.
 
-    The table of a model holds `kind`, for "reduced" also `segments`, `speeds` and `load_error`, and for
-    "reduced_published" also `on_load_change` and `surface`: a name, or a table with `kind`, `segments` (tables),
-    `normal_force` and `patch` (where they are not those of the model).
+    The table of a model or of a law holds its `kind` and its parameters; `surface` is a name, or a table with `kind`,
+    its parameters, and `patch` where that is not the model's.
     """
     patch = patch_from_dict(contact.section("patch"))
     law = law_from_dict(contact.section("law"))
-    value = contact.get("model", "distributed")
-    table = contact.section("model", {"kind": value} if isinstance(value, str) else value)
-    kind = table.choice("kind", MODELS)
-    make = _class(MODELS, kind, "planarfriction.models")
-    if kind == "distributed":
-        table.only(["kind"])
-        with table.located():
-            return make(patch, law)
-    if kind == "reduced":
-        table.only(["kind", *_MAP_SIZES])
-        with table.located():
-            return make(patch, law, **{name: table.get(name) for name in _MAP_SIZES if name in table})
-    table.only(["kind", "surface", "on_load_change"])
-    options = {key: table.get(key) for key in ("on_load_change",) if key in table}
-    if "surface" in table:
-        options["surface"] = _surface_from_dict(table, patch)
-    with table.located():
-        return make(patch, law, **options)
+    table, make = _member(MODELS, contact, "model", "distributed")
+    return _made(table, make, (patch, law))
 
 
-def _surface_to_dict(model: Any) -> dict[str, Any]:
-    surface = model.surface
-    table = {"kind": _name_of(surface, SURFACES, "planarfriction.limit_surface", "surface")}
-    parameters = {name: getattr(surface, name) for name in _surface_parameters(type(surface))}
-    table |= {name: value for name, value in parameters.items() if value is not None}
-    if surface.patch is not model.patch:
-        table["patch"] = surface.patch.to_dict()
-    return table
-
-
-def _surface_from_dict(model: Section, patch: Any) -> Any:
-    value = model.get("surface")
-    table = model.section("surface", {"kind": value} if isinstance(value, str) else value)
-    make = _class(SURFACES, table.choice("kind", SURFACES), "planarfriction.limit_surface")
-    names = _surface_parameters(make)
-    table.only(["kind", *names, "patch"])
-    of = patch_from_dict(table.section("patch")) if "patch" in table else patch
-    with table.located():
-        return make(of, **{name: table.get(name) for name in names if name in table})
-
-
-def _surface_parameters(surface_class: Any) -> list[str]:
-    return [field.name for field in dataclasses.fields(surface_class) if field.init and field.name != "patch"]
-
-
-def law_to_dict(law: LuGre) -> dict[str, Any]:
-    """Parameters of a law by name; `elasto_plastic` is left out where there is none."""
-    if type(law) is not LuGre:
-        raise InvalidValueError("law", "be a LuGre to be written to a file", law)
-    return {name: value for name, value in dataclasses.asdict(law).items() if value is not None}
-
-
-def law_from_dict(table: Section) -> LuGre:
-    """Law of a table with the parameters of `LuGre`; `elasto_plastic` is a breakaway ratio or a table that holds it."""
-    given = dict(table.only([field.name for field in dataclasses.fields(LuGre)]).data)
-    if "elasto_plastic" in given:
-        value = given["elasto_plastic"]
-        bristles = table.section("elasto_plastic", value if isinstance(value, dict) else {"breakaway_ratio": value})
-        with bristles.only(["breakaway_ratio"]).located():
-            given["elasto_plastic"] = ElastoPlastic(**bristles.data)
-    with table.located():
-        return LuGre(**given)
+def law_from_dict(table: Section) -> Any:
+    """Law of a table with its `kind`, "lugre" if left out, and its parameters."""
+    return _made(table, LAWS[table.choice("kind", LAWS, "lugre")], ())
 
 
 def patch_from_dict(table: Section) -> Any:
-    """Contact patch of a table: `shape` names the constructor, the other keys are its parameters.
-
-    `shape = "pressure_map"` takes `file` (a path) or `values` (rows from the top), `cell_size` and `name`, and for maps
-    measured at several loads `loads` with `files` or with `values` of each;
-    `shape = "published"` takes `name`, `cells` and `width`; `shape = "cells"` is what `ContactPatch.to_dict` writes.
+    """Contact patch of a table: `shape` names what makes it, the other keys are its parameters; files are paths.
 
     Every shape takes `metric` and `asymmetry` as `ContactPatch.with_friction_metric` does; `metric` may also be a table
     with the parameters of `grain`: `along`, `across` and `angle` [rad], 0 if left out.
     """
     directions = {key: table.get(key) for key in ("metric", "asymmetry") if key in table}
-    if not directions:
-        return _patch_from_dict(table)
     rest = {key: value for key, value in table.data.items() if key not in directions}
-    patch = _patch_from_dict(Section(rest, table.where, table.source, table.folder))
+    patch = _shape_from_dict(Section(rest, table.where, table.source, table.folder))
+    if not directions:
+        return patch
     if isinstance(directions.get("metric"), dict):
         from planarfriction.patch import grain
 
@@ -144,52 +77,17 @@ def patch_from_dict(table: Section) -> Any:
         return patch.with_friction_metric(directions.get("metric"), directions.get("asymmetry"))
 
 
-def _patch_from_dict(table: Section) -> Any:
-    from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
-
-    shape = table.choice("shape", (*SHAPES, *OTHER_SHAPES))
-    given = {key: value for key, value in table.data.items() if key != "shape"}
-    if shape == "cells":
-        table.only(["shape", "name", "positions", "areas", "pressure", "grid", "cell_size", "outline"])
-        with table.located():
-            return ContactPatch.from_dict(table.data)
-    if shape == "published":
-        table.only(["shape", "name", "cells", "width"])
-        name = table.choice("name", PUBLISHED_PATCHES)
-        with table.located():
-            return PUBLISHED_PATCHES[name](**{key: value for key, value in given.items() if key != "name"})
-    if shape == "pressure_map":
-        table.only(["shape", "file", "files", "values", "loads", "cell_size", "name"])
-        if sum(key in table for key in ("file", "files", "values")) != 1:
-            table.fail("must have either file or values (or files, one for each of the loads)")
-        cell_size, options = table.get("cell_size"), {key: table.get(key, None) for key in ("name", "loads")}
-        if "files" in table and "loads" not in table:
-            table.fail("missing key 'loads', the normal force of each of the files")
-        with table.located():
-            return ContactPatch.from_pressure(_maps_of(table), cell_size, **options)
-    make = getattr(ContactPatch, shape)
-    parameters = inspect.signature(make).parameters
-    table.only(["shape", *parameters])
-    for name, parameter in parameters.items():
-        if parameter.default is parameter.empty:
-            table.get(name)
-    if "pressure" in given:
+def _shape_from_dict(table: Section) -> Any:
+    shape = table.choice("shape", SHAPES)
+    given = _arguments(table, SHAPES[shape], "shape")
+    if "pressure" in given and shape != "cells":
         given["pressure"] = pressure_from_dict(table)
+    if "file" in given:
+        given["file"] = table.path("file")
+    if "files" in given:
+        given["files"] = table.paths("files")
     with table.located():
-        return make(**given)
-
-
-def _maps_of(table: Section) -> Any:
-    """Numbers or paths of the pressure maps that a table names."""
-    if "values" in table:
-        return table.get("values")
-    if "file" in table:
-        return table.path("file")
-    files = table.get("files")
-    if not isinstance(files, list):
-        table.fail(f"files must be a list of paths, got {files!r}")
-    one = [Section({"files": name}, table.where, table.source, table.folder) for name in files]
-    return [section.path("files") for section in one]
+        return SHAPES[shape](**given)
 
 
 def pressure_from_dict(patch: Section) -> Any:
@@ -204,14 +102,64 @@ def pressure_from_dict(patch: Section) -> Any:
         return Pressure.from_dict(table.data)
 
 
-def _class(names: dict[str, str], name: str, module: str) -> Any:
-    return getattr(importlib.import_module(module), names[name])
+# ---------------------------------------------------------------------- members of any family
 
 
-def _name_of(value: Any, names: dict[str, str], module: str, what: str) -> str:
-    for name in names:
-        if type(value) is _class(names, name, module):
-            return name
-    raise InvalidValueError(
-        what, f"be one of {', '.join(names.values())} to be written to a file", type(value).__name__
-    )
+def _parameters(make: Callable[..., Any]) -> dict[str, inspect.Parameter]:
+    """Parameters that are keys of the table of a member."""
+    parameters = inspect.signature(make).parameters
+    return {name: each for name, each in parameters.items() if name not in _GIVEN}
+
+
+def _described(family: Family, member: Any) -> dict[str, Any]:
+    """Kind and parameters of a member; a limit surface stays as it is."""
+    kind = family.name_of(member)
+    if kind is None:
+        rule = f"be one of {', '.join(family)}, or registered, to be written to a file"
+        raise InvalidValueError(family.what, rule, type(member).__name__)
+    values = {name: _plain(member, name) for name in _parameters(family[kind])}
+    return {"kind": kind, **{name: value for name, value in values.items() if value is not None}}
+
+
+def _plain(member: Any, name: str) -> Any:
+    value = getattr(member, name, _MISSING)
+    if isinstance(value, ElastoPlastic):
+        return dataclasses.asdict(value)
+    if isinstance(value, np.ndarray | np.generic):
+        return value.tolist()
+    if name == "surface" or value is None or isinstance(value, bool | int | float | str | list | tuple | dict):
+        return value
+    rule = f"be an attribute of {type(member).__name__} and plain data to be written to a file"
+    raise InvalidValueError(name, rule, "no attribute" if value is _MISSING else type(value).__name__)
+
+
+def _member(family: Family, parent: Section, key: str, default: Any = None) -> tuple[Section, Callable[..., Any]]:
+    """Table of a member under `key`, where its name alone will do too, and what makes it."""
+    value = parent.get(key) if default is None else parent.get(key, default)
+    table = parent.section(key, {"kind": value} if isinstance(value, str) else value)
+    return table, family[table.choice("kind", family)]
+
+
+def _made(table: Section, make: Callable[..., Any], given: tuple[Any, ...], *others: str) -> Any:
+    """The member that `table` describes, with the keys `others` beside its own; `given` begins with its patch."""
+    options = _arguments(table, make, "kind", *others)
+    if "surface" in options:
+        options["surface"] = _surface_from_dict(table, given[0])
+    with table.located():
+        return make(*given, **options)
+
+
+def _surface_from_dict(parent: Section, patch: Any) -> Any:
+    table, make = _member(SURFACES, parent, "surface")
+    patch = patch_from_dict(table.section("patch")) if "patch" in table else patch
+    return _made(table, make, (patch,), "patch")
+
+
+def _arguments(table: Section, make: Callable[..., Any], *others: str) -> dict[str, Any]:
+    """Values of a table for the parameters of `make`, checked to be neither unknown nor missing."""
+    parameters = _parameters(make)
+    table.only([*others, *parameters])
+    for name, parameter in parameters.items():
+        if parameter.default is parameter.empty:
+            table.get(name)
+    return {name: value for name, value in table.data.items() if name in parameters}

@@ -75,7 +75,16 @@ class Section:
 
     def path(self, key: str) -> Path:
         """Path under `key`, taken from the folder of the scene file."""
+        return self._path(key, self.get(key))
+
+    def paths(self, key: str) -> list[Path]:
+        """List of paths under `key`, taken from the folder of the scene file."""
         value = self.get(key)
+        if not isinstance(value, list):
+            self.fail(f"{key} must be a list of paths, got {value!r}")
+        return [self._path(key, each) for each in value]
+
+    def _path(self, key: str, value: Any) -> Path:
         if not isinstance(value, str) or not value:
             self.fail(f"{key} must be the path of a file, got {value!r}")
         return self.folder / value

@@ -111,25 +111,29 @@ def drift(model: Any, *, load: Literal["tangential", "normal"] = "tangential", t
 def free_slide(
     model: Any,
     *,
-    mass: float,
-    inertia: float,
-    twist,
+    mass: float = 0.2,
+    inertia: float | None = None,
+    twist=(1.0, 0.0, 100.0),
     position=(0.0, 0.0),
     angle: float = 0.0,
     normal_force: Any = None,
     outline=None,
     t_end: float = 5.0,
+    save_every: float = 0.01,
 ) -> Scene:
     """A body thrown onto a level table with the initial `twist` `(vx, vy, omega)`; ends when it has stopped.
 
     The patch is fixed to the body, its frame's origin at the centre of mass. `mass` [kg], `inertia` about the centre of
-    mass [kg m^2], initial `position` [m] and `angle` [rad], `normal_force` [N] a signal or a number (default: the
-    weight `9.81 mass`), `outline` `[M, 2]` [m] for drawing.
+    mass [kg m^2] (default: that of a puck whose mass is spread like its contact pressure), initial `position` [m] and
+    `angle` [rad], `normal_force` [N] a signal or a number (default: the weight `9.81 mass`), `outline` `[M, 2]` [m] for
+    drawing, `save_every` [s] the time between samples.
     """
+    if inertia is None:
+        inertia = mass * float(model.patch.second_moment(GRAVITY * mass))
     body = Body(mass, inertia, position, angle, twist, gravity=(0.0, 0.0), outline=outline)
     load: Any = GRAVITY * body.mass if normal_force is None else normal_force
     contact = Contact(model, load, mounted_on="body", name="table")
-    return Scene(body, [contact], t_end, stop_speed=STOP_SPEED, name="free slide")
+    return Scene(body, [contact], t_end, stop_speed=STOP_SPEED, save_every=save_every, name="free slide")
 
 
 def published_velocity(*, speed: float = 0.015, spin: float = 1.0) -> Signal:

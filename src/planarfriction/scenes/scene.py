@@ -13,6 +13,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
+from planarfriction.families import MODELS
 from planarfriction.scenes.signal import SAME_TIME, Signal, as_signal
 
 RTOL, ATOL = 1e-5, 5e-4
@@ -65,7 +66,7 @@ class Contact:
     """
 
     model: Any = field(repr=False)
-    """Friction model, as `DistributedModel` or `ReducedModelPublished`."""
+    """Friction model, as those of `planarfriction.models`."""
     normal_force: Signal
     """Normal force [N], >= 0: a signal, or a number for a constant one."""
     mounted_on: Literal["world", "body"] = "world"
@@ -83,7 +84,7 @@ class Contact:
         if not (isinstance(self.name, str) and self.name):
             raise InvalidValueError("name of a contact", "be a text that is not empty", self.name)
         if not (hasattr(self.model, "patch") and hasattr(self.model, "law")):
-            valid = "be a friction model (DistributedModel, ReducedModelPublished)"
+            valid = f"be a friction model ({', '.join(make.__name__ for make in MODELS.values())})"
             raise InvalidValueError(f"model of contact {self.name!r}", valid, self.model)
         of_contact = f"of contact {self.name!r}"
         load = as_signal(f"normal_force {of_contact}", self.normal_force, None)

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 
 _META = ("scene", "statistics", "status", "message")
 
+_LEFT_OUT = "scene_left_out"
+"""Attribute that says why the scene is not in the data."""
+
 
 class History(NamedTuple):
     """One quantity over time, ready for a dataset."""
@@ -48,7 +51,7 @@ class Solution:
     message: str
     """What happened, in one sentence; the remedy where the solver gave up."""
     scene: Scene
-    """The scene that was simulated."""
+    """The scene that was simulated; None in a solution that was loaded from a file without it."""
 
     @functools.cached_property
     def data(self) -> xr.Dataset:
@@ -56,14 +59,21 @@ class Solution:
 
         Body (world axes, centre of mass): x, y [m], theta [rad], vx, vy [m/s], omega [rad/s]. Each contact: fx, fy [N],
         tau [N m], the friction wrench on the body about the contact frame's origin in its axes, of **one** of `count`
-        identical contacts, and normal_force [N]; at a jump the left limit.
+        identical contacts, and normal_force [N]; at a jump the left limit. `attrs["scene"]` is the scene as JSON; empty
+        where it cannot be written, as with a model of your own that is not registered: `attrs["scene_left_out"]` says
+        why.
         """
         import xarray as xr
 
-        return xr.Dataset(dict(self.histories), attrs={"scene": self.scene.to_json()})
+        return xr.Dataset(dict(self.histories), attrs=_scene_attributes(self.scene))
 
     def plot(self) -> Any:
-        """Draw the motion of the body and the time histories; returns a matplotlib Figure."""
+        """Draw the motion of the body and the time histories; returns a matplotlib Figure.
+
+        Raises FileError for a solution that was loaded from a file without its scene.
+        """
+        if self.scene is None:
+            raise FileError(f"the file has no scene, which the plot needs: {self.data.attrs[_LEFT_OUT]}")
         from planarfriction.plots import plot_solution
 
         return plot_solution(self)
@@ -71,15 +81,26 @@ class Solution:
     def save(self, path: str | Path) -> Path:
         """Write everything, scene included, to the NetCDF file `path`; `load` brings it back.
 
+        A scene that cannot be written is left out; the attribute `scene_left_out` of the data says why.
+
         Raises FileError where the file cannot be written.
         """
         attributes = {
-            "scene": self.scene.to_json(),
+            **({} if self.scene is None else _scene_attributes(self.scene)),
             "statistics": json.dumps(self.statistics.as_dict()),
             "status": self.status,
             "message": self.message,
         }
         return write_dataset(self.data.assign_attrs(attributes), path)
+
+
+def _scene_attributes(scene: Scene | None) -> dict[str, str]:
+    if scene is None:
+        return {"scene": ""}
+    try:
+        return {"scene": scene.to_json()}
+    except FrictionError as reason:
+        return {"scene": "", _LEFT_OUT: str(reason)}
 
 
 def write_dataset(data: xr.Dataset, path: str | Path) -> Path:
@@ -128,13 +149,13 @@ def load(path: str | Path) -> Solution:
     for name in ("statistics", "status", "message"):
         del data.attrs[name]
     try:
-        scene = Scene.from_dict(json.loads(meta["scene"]))
+        scene: Any = Scene.from_dict(json.loads(meta["scene"])) if meta["scene"] else None
         statistics = Statistics(**json.loads(meta["statistics"]))
     except (ValueError, TypeError, FrictionError) as error:
         reason = " ".join(str(error).split())
         raise FileError(f"{path}: the scene in this file cannot be read: {reason}") from None
     solution = Solution(data, statistics, meta["status"], meta["message"], scene)
-    solution.data.attrs.update(data.attrs)  # notes that someone added before it was saved
+    solution.data.attrs.update(data.attrs)  # as they were, with notes that someone added before it was saved
     return solution
 
 

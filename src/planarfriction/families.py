@@ -1,0 +1,159 @@
+"""The families and their members: a name for files and command line, a class loaded on first use, a line of words.
+
+Nothing else lists members: a new one is one file and one line here, or a call of `register` at run time.
+"""
+
+from __future__ import annotations
+
+import importlib
+import re
+from collections.abc import Callable, Iterator, Mapping
+from typing import Any, NamedTuple
+
+from planarfriction import validation
+from planarfriction.errors import InvalidValueError
+
+
+class Member(NamedTuple):
+    """A member of a family."""
+
+    words: str
+    """What it is, in one line."""
+    make: Any
+    """Its class or function, or where that is: "module:name"."""
+
+
+class Family(Mapping[str, Any]):
+    """Names of a family, in order; `family[name]` is what makes the member, loaded on first use."""
+
+    def __init__(self, what: str, members: Mapping[str, tuple[str, str]]):
+        self.what = what
+        """What a member is called in messages."""
+        self._members = {name: Member(words, make) for name, (words, make) in members.items()}
+
+    def __getitem__(self, name: str) -> Any:
+        make = self._members[name].make
+        if not isinstance(make, str):
+            return make
+        module, _, path = make.partition(":")
+        found = importlib.import_module(f"planarfriction.{module}")
+        for part in path.split("."):
+            found = getattr(found, part)
+        return found
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._members)
+
+    def __len__(self) -> int:
+        return len(self._members)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._members
+
+    def words(self, name: str) -> str:
+        """What a member is, in one line."""
+        return self._members[name].words
+
+    def choose(self, name: str) -> Any:
+        """What makes the member `name`. Raises `InvalidValueError` that names all of them."""
+        return self[validation.choice(self.what, name, self)]
+
+    def name_of(self, member: Any) -> str | None:
+        """Name of the class of `member`; None where it is no member. Loads nothing."""
+        kind = type(member)
+        path = f"{kind.__module__.removeprefix('planarfriction.')}:{kind.__qualname__}"
+        return next((name for name, each in self._members.items() if each.make in (kind, path)), None)
+
+    def register(self, name: str, make: Callable[..., Any], words: str = "") -> None:
+        """Add a member of your own: files and command line of this process then know it by `name`.
+
+        `words` say what it is, in one line. A member that was registered before is replaced.
+
+        Raises `InvalidValueError` if the name is not of lower-case letters, digits and hyphens, or that of a member of
+        the library, and if `make` cannot be called.
+        """
+        called = f"name of a {self.what}"
+        if not (isinstance(name, str) and re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", name)):
+            raise InvalidValueError(called, "be of lower-case letters, digits and hyphens", repr(name))
+        if name in self and isinstance(self._members[name].make, str):
+            raise InvalidValueError(called, "not be that of a member of the library", name)
+        if not callable(make):
+            raise InvalidValueError(self.what, "be a class, or a function that makes one", make)
+        self._members[name] = Member(words, make)
+
+
+LAWS = Family(
+    "law",
+    {
+        "lugre": ("LuGre bristles, plain or elasto-plastic, with Stribeck and viscous terms", "laws.lugre:LuGre"),
+        "dahl": ("Dahl's bristles: a force that depends on the way, not on the speed", "laws.dahl:Dahl"),
+        "coulomb-stribeck": (
+            "Coulomb with Stribeck and viscous terms, regularised by a creep speed",
+            "laws.coulomb_stribeck:CoulombStribeck",
+        ),
+    },
+)
+
+SURFACES = Family(
+    "limit surface",
+    {
+        "cells": ("sum over the cells", "limit_surface.cells:LimitSurfaceCells"),
+        "exact": ("exact", "limit_surface.exact:LimitSurfaceExact"),
+        "table": ("table, smooth", "limit_surface.table:LimitSurfaceTable"),
+        "table-published": ("table, as published", "limit_surface.table_published:LimitSurfaceTablePublished"),
+        "ellipsoid": ("ellipsoid", "limit_surface.ellipsoid:LimitSurfaceEllipsoid"),
+        "quartic": ("convex quartic", "limit_surface.quartic:LimitSurfaceQuartic"),
+    },
+)
+
+MODELS = Family(
+    "model",
+    {
+        "distributed": ("a bristle in every cell", "models.distributed:DistributedModel"),
+        "reduced": ("the moments of the bristles, three states", "models.reduced:ReducedModel"),
+        "reduced-published": (
+            "three bristles and a limit surface, as published",
+            "models.reduced_published:ReducedModelPublished",
+        ),
+    },
+)
+
+SHAPES = Family(
+    "shape",
+    {
+        "disc": ("a disc", "patch:ContactPatch.disc"),
+        "disc-published": ("whole cells within a radius, as published", "patch:ContactPatch.disc_published"),
+        "rectangle": ("a rectangle or a square", "patch:ContactPatch.rectangle"),
+        "ring": ("a disc with a hole", "patch:ContactPatch.ring"),
+        "line": ("a line", "patch:ContactPatch.line"),
+        "polygon": ("a simple polygon", "patch:ContactPatch.polygon"),
+        "points": ("points", "patch:ContactPatch.points"),
+        "pressure-map": ("a measured pressure map, or several", "patch.named:pressure_map"),
+        "published": ("a patch of the published experiments", "patch.named:published"),
+        "cells": ("the cells themselves", "patch.named:cells"),
+    },
+)
+
+PUBLISHED_PATCHES = Family(
+    "published patch",
+    {
+        "Square": ("a square", "patch.published:square"),
+        "Circle": ("a disc", "patch.published:circle"),
+        "Line": ("a line along y", "patch.published:line"),
+        "LineGrad": ("a line along y, pressed harder at its top", "patch.published:line_grad"),
+        "LineGradX": ("a line along x, pressed harder at its left", "patch.published:line_grad_x"),
+        "NonConvex1": ("two square pads", "patch.published:non_convex_1"),
+        "NonConvex2": ("a lying T of two bars", "patch.published:non_convex_2"),
+    },
+)
+"""Name -> function of `(cells=21, width=0.02)` that makes the published patch."""
+
+SCENES = Family(
+    "scene",
+    {
+        "in-hand": ("a plate that slips and turns between finger pads", "scenes.ready:in_hand"),
+        "drift": ("a loaded puck whose elastic patch must not drift", "scenes.ready:drift"),
+        "free-slide": ("a puck thrown onto a table", "scenes.ready:free_slide"),
+        "driven": ("a patch moved with a prescribed velocity", "scenes.ready:driven"),
+    },
+)
