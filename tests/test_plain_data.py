@@ -76,7 +76,7 @@ def test_patches(seed):
 def test_scenes_and_their_digests(seed):
     random = np.random.default_rng(seed)
     patch = patches(seed)[seed % 13]
-    law = pf.LuGre(mu_s=1.2 * (random.uniform(0.5, 1.0) * np.array([1.0, 1.3, 1e-3, 2.0, 1e6, 8e2, 0.2])))
+    law = pf.LuGre(*(random.uniform(0.5, 1.0) * np.array([1.0, 1.3, 1e-3, 2.0, 1e6, 8e2, 0.2])))
     force = pf.Signal(np.cumsum(random.random(6)), random.normal(size=(6, 3)), random.choice(["previous", "linear"]))
     body = pf.Body(random.random() + 0.1, random.random() + 0.1, random.normal(size=2), random.normal())
     contact = pf.Contact(pf.DistributedModel(patch, law), pf.Signal.sine(2.0, random.random(), 3.0, t_end=0.3))
@@ -91,6 +91,6 @@ def test_scenes_and_their_digests(seed):
 def test_files(tmp_path_factory, suffix, seed):
     path = tmp_path_factory.mktemp("scene") / f"scene{suffix}"
     for patch in patches(seed):
-        scene = pf.scenes.in_hand(pf.DistributedModel(patch, pf.LuGre(mu_s=1.2)))
+        scene = pf.scenes.in_hand(pf.DistributedModel(patch, pf.LuGre()))
         scene.to_file(path)
         assert pf.Scene.from_file(path).digest() == scene.digest()

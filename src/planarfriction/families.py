@@ -10,7 +10,6 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, NamedTuple
 
-from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 
 
@@ -56,6 +55,8 @@ class Family(Mapping[str, Any]):
 
     def choose(self, name: str) -> Any:
         """What makes the member `name`. Raises `InvalidValueError` that names all of them."""
+        from planarfriction import validation  # brings NumPy with it, which names alone do not need
+
         return self[validation.choice(self.what, name, self)]
 
     def name_of(self, member: Any) -> str | None:
