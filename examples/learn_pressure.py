@@ -29,7 +29,7 @@ import torch
 
 import planarfriction as pf
 from planarfriction.plots.style import PALETTE, PRESSURE_MAP, new_figure, tidy
-from planarfriction.torch import DistributedModel, simulate, tracking_loss
+from planarfriction.torch import DistributedModel, rollout, tracking_loss
 
 CELLS, CELL = 8, 3e-3  # cells of a side, side of a cell [m]
 LAW = pf.LuGre(mu_c=0.7, mu_s=0.7, sigma_0=1e5, sigma_1=10.0, sigma_2=0.0)
@@ -76,7 +76,7 @@ def held(twists: np.ndarray) -> torch.Tensor:
 def measure(patch: pf.ContactPatch, twists: torch.Tensor, rng: np.random.Generator) -> torch.Tensor:
     """Wrenches of the true patch, with noise."""
     model = DistributedModel(patch, LAW, trainable=(), dtype=torch.float64)
-    wrenches = simulate(model, twists, LOAD, DT)
+    wrenches = rollout(model, None, twists, LOAD, DT).wrenches
     size = NOISE * LAW.mu_c * LOAD * np.array([1.0, 1.0, float(patch.contact_radius())])
     return wrenches + torch.tensor(rng.normal(size=wrenches.shape) * size)
 
@@ -93,7 +93,7 @@ def learn(twists: torch.Tensor, wrenches: torch.Tensor, steps: int) -> Learnt:
     losses = []
     for _ in range(steps):
         optimiser.zero_grad()
-        loss = tracking_loss(model, twists, wrenches, LOAD, DT)
+        loss = tracking_loss(model, None, twists, LOAD, DT, wrenches)
         loss.backward()
         optimiser.step()
         schedule.step()

@@ -54,7 +54,7 @@ def drive(model, seed: int = 0, steps: int = T):
 
 def inputs_of(model, seed: int = 0):
     state, twists, loads = drive(model, seed)
-    return {"state": state, "twists": twists, "loads": loads, "parameters": autodiff.parameters_of(model)}
+    return {"state": state, "twist": twists, "normal_force": loads, "parameters": autodiff.parameters_of(model)}
 
 
 def units_of(model) -> dict:
@@ -63,14 +63,16 @@ def units_of(model) -> dict:
     parameters = np.abs(autodiff.parameters_of(model)) + (np.arange(12) >= 10) * r
     return {
         "state": 1e-6 * np.array([1.0, 1.0, r]),
-        "twists": 3e-3 * np.array([1.0, 1.0, 1.0 / r]),
-        "loads": 1.0,
+        "twist": 3e-3 * np.array([1.0, 1.0, 1.0 / r]),
+        "normal_force": 1.0,
         "parameters": parameters * (np.arange(12) != 7) + 0.1 * (np.arange(12) == 7),
     }
 
 
 def rolled(model, inputs) -> autodiff.Rollout:
-    return autodiff.rollout(model, inputs["state"], inputs["twists"], inputs["loads"], DT, inputs["parameters"])
+    return autodiff.rollout(
+        model, inputs["state"], inputs["twist"], inputs["normal_force"], DT, parameters=inputs["parameters"]
+    )
 
 
 # ---------------------------------------------------------------------- the roll-out
@@ -82,7 +84,7 @@ def test_a_rollout_takes_the_steps_of_the_model(kind, law):
     model = model_of(kind, law)
     state, twists, loads = drive(model)
     loads[5] = 0.0
-    wrenches, end = autodiff.rollout(model, state, twists, loads, DT)
+    end, wrenches = autodiff.rollout(model, state, twists, loads, DT)
     on_the_way = autodiff.rollout_states(model, state, twists, loads, DT)
     assert np.array_equal(on_the_way.wrenches, wrenches) and np.array_equal(on_the_way.state, end)
     for t in range(T):
@@ -97,7 +99,7 @@ def test_parameters_take_the_place_of_the_models_own():
     model, other = model_of("ellipsoid"), pf.LuGre(0.4, 0.9, 2e-3, 3e5, 50.0, 0.7, 1.3, pf.ElastoPlastic(0.5))
     changed = pf.ReducedModelPublished(PATCH, other, surface=pf.LimitSurfaceEllipsoid(PATCH))
     state, twists, loads = drive(model)
-    got = autodiff.rollout(model, state, twists, loads, DT, autodiff.parameters_of(changed))
+    got = autodiff.rollout(model, state, twists, loads, DT, parameters=autodiff.parameters_of(changed))
     assert np.array_equal(got.wrenches, autodiff.rollout(changed, state, twists, loads, DT).wrenches)
 
 
@@ -123,7 +125,7 @@ def test_a_contact_at_rest_is_a_spring_and_two_dampers(law):
 def test_a_long_step_ends_in_the_steady_state_of_its_parameters(kind, law):
     """`W = -(g(v) S h + sigma_2 U V) f_N`: neither stiffness nor damping nor the start matter."""
     model, twist = model_of(kind, law), np.array([2e-3, -1e-3, 0.3])
-    wrenches, slopes = autodiff.rollout_sensitivities(model, model.rest(), twist[None], LOAD, 1e6)
+    _, wrenches, slopes = autodiff.rollout_sensitivities(model, model.rest(), twist[None], LOAD, 1e6)
     by = dict(zip(PARAMETERS, slopes[0].T, strict=True))
     numbers, shape = model.law, model.shape_at(LOAD)
     unit = LOAD * model.surface.wrench(twist)
@@ -182,13 +184,13 @@ def test_without_load_nothing_passes_but_the_load(kind):
     gradient = autodiff.rollout_gradient(
         model, state, twists, loads, DT, bar * (np.arange(T) >= 6)[:, None], np.ones(3)
     )
-    wrenches, _ = autodiff.rollout(model, state, twists, loads, DT)
+    _, wrenches = autodiff.rollout(model, state, twists, loads, DT)
     assert str(wrenches[6]) == "[0. 0. 0.]"  # not even a negative zero
-    assert not gradient.state.any() and not gradient.twists[:7].any() and not gradient.loads[:6].any()
-    assert gradient.twists[7:].all()
+    assert not gradient.state.any() and not gradient.twist[:7].any() and not gradient.normal_force[:6].any()
+    assert gradient.twist[7:].all()
     # The slope to the load: the wrench per newton that a small load would have.
     before = autodiff.rollout_states(model, state, twists, loads, DT).states[6]
-    assert gradient.loads[6] == pytest.approx(model.step(before, twists[6], 1e-3, DT)[1].sum() / 1e-3, rel=1e-10)
+    assert gradient.normal_force[6] == pytest.approx(model.step(before, twists[6], 1e-3, DT)[1].sum() / 1e-3, rel=1e-10)
 
 
 # ---------------------------------------------------------------------- against differences
@@ -203,11 +205,11 @@ def test_the_gradient_of_a_rollout_is_that_of_differences(kind, law):
     bars = random.normal(size=(T, 3)) / (1.0, 1.0, radius(model)), random.normal(size=3) / units["state"]
 
     def value(changed):
-        wrenches, end = rolled(model, changed)
+        end, wrenches = rolled(model, changed)
         return (bars[0] * wrenches).sum() + (bars[1] * end).sum()
 
     gradient = autodiff.rollout_gradient(
-        model, inputs["state"], inputs["twists"], inputs["loads"], DT, *bars, inputs["parameters"]
+        model, inputs["state"], inputs["twist"], inputs["normal_force"], DT, *bars, parameters=inputs["parameters"]
     )
     for name, of in gradient._asdict().items():
         scaled = of * units[name]
@@ -341,7 +343,7 @@ def test_the_adjoint_is_the_transpose_of_the_sensitivities(kind, law):
     model = model_of(kind, law)
     state, twists, loads = drive(model, seed=5)
     bar = np.random.default_rng(2).normal(size=(T, 3)) / (1.0, 1.0, radius(model))
-    wrenches, slopes = autodiff.rollout_sensitivities(model, state, twists, loads, DT)
+    _, wrenches, slopes = autodiff.rollout_sensitivities(model, state, twists, loads, DT)
     assert wrenches == pytest.approx(autodiff.rollout(model, state, twists, loads, DT).wrenches, rel=1e-12, abs=1e-14)
     terms = np.einsum("ti,tip->tip", bar, slopes)
     gradient = autodiff.rollout_gradient(model, state, twists, loads, DT, bar)
@@ -360,9 +362,13 @@ def test_the_adjoint_is_the_transpose_of_the_jacobians(kind, law):
     units = units_of(model)
     bar, end_bar = random.normal(size=(T, 3)) / (1.0, 1.0, radius(model)), random.normal(size=3) / units["state"]
     change = random.normal(size=3) * units["state"]
-    turns, pushes = random.normal(size=(T, 3)) * units["twists"], random.normal(size=T)
+    turns, pushes = random.normal(size=(T, 3)) * units["twist"], random.normal(size=T)
     gradient = autodiff.rollout_gradient(model, state, twists, loads, DT, bar, end_bar)
-    backwards = [(gradient.state * change).sum(), (gradient.twists * turns).sum(), (gradient.loads * pushes).sum()]
+    backwards = [
+        (gradient.state * change).sum(),
+        (gradient.twist * turns).sum(),
+        (gradient.normal_force * pushes).sum(),
+    ]
     forwards = []
     for before, twist, load, turn, push, w_bar in zip(
         autodiff.rollout_states(model, state, twists, loads, DT).states, twists, loads, turns, pushes, bar, strict=True
@@ -377,8 +383,8 @@ def test_the_adjoint_is_the_transpose_of_the_jacobians(kind, law):
 def test_sensitivities_of_chosen_parameters():
     model = model_of("published")
     state, twists, loads = drive(model)
-    _, slopes = autodiff.rollout_sensitivities(model, state, twists, loads, DT)
-    _, chosen = autodiff.rollout_sensitivities(model, state, twists, loads, DT, ("v_s", "mu_c"))
+    *_, slopes = autodiff.rollout_sensitivities(model, state, twists, loads, DT)
+    *_, chosen = autodiff.rollout_sensitivities(model, state, twists, loads, DT, ("v_s", "mu_c"))
     assert np.array_equal(chosen, slopes[..., [PARAMETERS.index("v_s"), PARAMETERS.index("mu_c")]])
 
 
@@ -392,23 +398,26 @@ def test_a_batch_is_a_loop():
     loads, dt = drive(model)[2], random.uniform(0.5e-4, 1e-4, T)
     parameters = autodiff.parameters_of(model) * random.uniform(0.9, 1.0, (3, 1, 12))
     bar, end_bar = random.normal(size=(3, 2, T, 3)), random.normal(size=(3, 2, 3))
-    wrenches, ends = autodiff.rollout(model, states, twists, loads, dt, parameters)
-    gradient = autodiff.rollout_gradient(model, states, twists, loads, dt, bar, end_bar, parameters)
-    slopes = autodiff.rollout_sensitivities(model, states, twists, loads, dt, PARAMETERS, parameters)[1]
+    ends, wrenches = autodiff.rollout(model, states, twists, loads, dt, parameters=parameters)
+    gradient = autodiff.rollout_gradient(model, states, twists, loads, dt, bar, end_bar, parameters=parameters)
+    slopes = autodiff.rollout_sensitivities(
+        model, states, twists, loads, dt, PARAMETERS, parameters=parameters
+    ).d_wrenches
     assert wrenches.shape == (3, 2, T, 3) and ends.shape == (3, 2, 3) and slopes.shape == (3, 2, T, 3, 12)
     assert [g.shape for g in gradient] == [a.shape for a in (states, twists, loads, parameters)]
     total = [np.zeros_like(g) for g in gradient]
     for i, j in np.ndindex(3, 2):
         one = states[i, 0], twists[j], loads, dt
-        single = autodiff.rollout(model, *one, parameters[i, 0])
+        single = autodiff.rollout(model, *one, parameters=parameters[i, 0])
         # Contacts abreast go through vector code, which rounds differently.
         assert wrenches[i, j] == pytest.approx(single.wrenches, rel=1e-12, abs=1e-14)
         assert ends[i, j] == pytest.approx(single.state, rel=1e-12, abs=1e-20)
-        alone = autodiff.rollout_gradient(model, *one, bar[i, j], end_bar[i, j], parameters[i, 0])
+        alone = autodiff.rollout_gradient(model, *one, bar[i, j], end_bar[i, j], parameters=parameters[i, 0])
         for sum_of, where, g in zip(total, ((i, 0), j, ..., (i, 0)), alone, strict=True):
             sum_of[where] += g
         assert np.array_equal(
-            slopes[i, j], autodiff.rollout_sensitivities(model, *one, PARAMETERS, parameters[i, 0])[1]
+            slopes[i, j],
+            autodiff.rollout_sensitivities(model, *one, PARAMETERS, parameters=parameters[i, 0]).d_wrenches,
         )
     for got, wanted in zip(gradient, total, strict=True):
         assert got == pytest.approx(wanted, rel=1e-11)  # sums in another order
@@ -425,7 +434,7 @@ def test_kept_states_and_several_threads_change_nothing():
     for first, second in zip(kept, again, strict=True):
         assert np.array_equal(first, second)
     last = autodiff.rollout_gradient(model, state, scales[-1] * twists, loads, DT, bar)
-    assert kept.twists[-1] == pytest.approx(last.twists, rel=1e-9, abs=1e-9 * np.abs(last.twists).max())  # rounding
+    assert kept.twist[-1] == pytest.approx(last.twist, rel=1e-9, abs=1e-9 * np.abs(last.twist).max())  # rounding
 
 
 def test_one_load_for_all_steps_gets_the_sum():
@@ -433,7 +442,50 @@ def test_one_load_for_all_steps_gets_the_sum():
     state, twists, _ = drive(model)
     whole = autodiff.rollout_gradient(model, state, twists, LOAD, DT, np.ones((T, 3)))
     each = autodiff.rollout_gradient(model, state, twists, np.full(T, LOAD), DT, np.ones((T, 3)))
-    assert whole.loads.shape == () and float(whole.loads) == pytest.approx(each.loads.sum(), rel=1e-13)
+    assert whole.normal_force.shape == () and float(whole.normal_force) == pytest.approx(
+        each.normal_force.sum(), rel=1e-13
+    )
+
+
+def test_one_load_for_each_contact_and_rest():
+    model = model_of("ellipsoid")
+    _, twists, _ = drive(model)
+    each = autodiff.rollout(model, None, twists, [[1.0], [2.0]], DT)
+    assert each.wrenches.shape == (2, T, 3)
+    # Contacts abreast go through vector code, which rounds differently.
+    assert each.wrenches[1] == pytest.approx(autodiff.rollout(model, model.rest(), twists, 2.0, DT).wrenches, rel=1e-12)
+    gradient = autodiff.rollout_gradient(model, None, twists, [[1.0], [2.0]], DT, np.ones((T, 3)))
+    assert gradient.state.shape == (3,) and gradient.normal_force.shape == (2, 1)
+
+
+# ---------------------------------------------------------------------- other models
+
+
+@pytest.mark.parametrize("kind", ["distributed", "follows the load", "with a grain"])
+def test_a_rollout_of_any_model_takes_its_steps(kind):
+    model = {
+        "distributed": lambda: pf.DistributedModel(PATCH, ELASTIC),
+        "follows the load": lambda: pf.ReducedModel(FINGER, ELASTIC, segments=8, speeds=8),
+        "with a grain": lambda: pf.ReducedModel(
+            PATCH.with_friction_metric(pf.grain(0.3, 0.6, 1.0)), ELASTIC, segments=8, speeds=8
+        ),
+    }[kind]()
+    twists = np.random.default_rng(3).normal(size=(2, 5, 3)) * (1e-3, 1e-3, 0.3)
+    loads, steps = np.linspace(0.5, 1.5, 5), np.linspace(1e-4, 2e-4, 5)
+    end, wrenches = pf.rollout(model, None, twists, loads, steps)
+    state = model.rest()
+    for t in range(5):
+        state, wrench = model.step(state, twists[:, t], loads[t], steps[t])
+        assert np.array_equal(wrenches[:, t], wrench)
+    assert np.array_equal(end, state)
+    end, wrenches = pf.rollout(model, state[0], np.zeros((0, 3)), 1.0, 1e-4)
+    assert wrenches.shape == (0, 3) and np.array_equal(end, state[0])
+    with pytest.raises(InvalidValueError, match=r"twist must have shape \[..., T, 3\]"):
+        pf.rollout(model, None, np.zeros(3), 1.0, 1e-4)
+    with pytest.raises(InvalidValueError, match="state, twist and normal_force must broadcast"):
+        pf.rollout(model, None, twists, np.ones((3, 5)), 1e-4)
+    with pytest.raises(InvalidValueError, match=r"(model|patch) must"):
+        pf.rollout(model, None, twists, loads, steps, parameters=np.ones(7))
 
 
 # ---------------------------------------------------------------------- errors
@@ -447,27 +499,27 @@ def test_a_shape_that_follows_the_load_is_refused_and_a_kept_one_is_not():
     surface = pf.LimitSurfaceEllipsoid(FINGER, normal_force=1.0)
     kept = pf.ReducedModelPublished(FINGER, ELASTIC, surface=surface, on_load_change="keep")
     _, twists, loads = drive(kept)
-    wrenches, _ = autodiff.rollout(kept, kept.rest(), twists, loads, DT)
+    _, wrenches = autodiff.rollout(kept, kept.rest(), twists, loads, DT)
     assert wrenches[0] == pytest.approx(kept.step(kept.rest(), twists[0], loads[0], DT)[1], rel=1e-12)
     for how in ("rebuild", "rescale"):
         model = pf.ReducedModelPublished(FINGER, ELASTIC, surface=surface, on_load_change=how)
         with pytest.raises(InvalidValueError, match=f"shape that does not follow the load.*on_load_change='{how}'"):
-            autodiff.rollout(model, model.rest(), twists, loads, DT)
+            autodiff.rollout_states(model, model.rest(), twists, loads, DT)
 
 
 @pytest.mark.parametrize(
     ("changed", "message"),
     [
         ({"state": np.zeros(2)}, r"state must have shape \[..., 3\]"),
-        ({"twists": np.zeros(3)}, r"twists must have shape \[..., T, 3\]"),
-        ({"twists": np.full((T, 3), np.nan)}, "twists must be finite"),
-        ({"loads": np.ones(T - 1)}, rf"loads must be one number or have shape \[..., {T}\]"),
-        ({"loads": -1.0}, "loads must be >= 0, got -1.0"),
+        ({"twist": np.zeros(3)}, r"twist must have shape \[..., T, 3\]"),
+        ({"twist": np.full((T, 3), np.nan)}, "twist must be finite"),
+        ({"normal_force": np.ones(T - 1)}, rf"normal_force must broadcast with \[..., {T}\]"),
+        ({"normal_force": -1.0}, "normal_force must be >= 0, got -1.0"),
         ({"dt": np.ones((T, 1))}, rf"dt must be one number or have shape \[{T}\]"),
         ({"parameters": np.ones(11)}, r"parameters must have shape \[..., 12\]"),
         ({"parameters": np.zeros(12)}, "sigma_0 must be > 0, got 0.0"),
         ({"parameters": np.ones(12)}, r"breakaway_ratio must be in \[0, 1\), got 1.0"),
-        ({"state": np.zeros((2, 3)), "twists": np.zeros((3, T, 3))}, "batch axes must broadcast"),
+        ({"state": np.zeros((2, 3)), "twist": np.zeros((3, T, 3))}, "batch axes must broadcast"),
         ({"wrenches_bar": np.ones((T + 1, 3))}, rf"wrenches_bar must have shape \[..., {T}, 3\]"),
         ({"model": "a"}, "model must be a ReducedModel or a ReducedModelPublished, got str"),
     ],
@@ -478,8 +530,8 @@ def test_wrong_input_is_one_clear_line(changed, message):
     inputs = {
         "model": model,
         "state": state,
-        "twists": twists,
-        "loads": loads,
+        "twist": twists,
+        "normal_force": loads,
         "dt": DT,
         "wrenches_bar": np.ones((T, 3)),
     }

@@ -57,7 +57,7 @@ def test_a_rollout_takes_the_steps_of_the_model(law):
     model = model_of(law)
     state, twists, loads = drive(model)
     loads[5], twists[8] = 0.0, 0.0
-    wrenches, end = autodiff.rollout(model, state, twists, loads, DT)
+    end, wrenches = autodiff.rollout(model, state, twists, loads, DT)
     on_the_way = autodiff.rollout_states(model, state, twists, loads, DT)
     assert np.array_equal(on_the_way.wrenches, wrenches) and np.array_equal(on_the_way.state, end)
     for t in range(T):
@@ -74,7 +74,7 @@ def test_parameters_take_the_place_of_the_models_own():
     assert autodiff.parameters_of(model_of("early")).tolist() == [1e6, 800.0, 0.2, 0.7, 1.2, 1e-3, 0.3]
     other = pf.LuGre(0.4, 0.9, 2e-3, 3e5, 50.0, 0.7, elasto_plastic=pf.ElastoPlastic(0.5))
     changed, (state, twists, loads) = pf.ReducedModel(PATCH, other, segments=8, speeds=8), drive(model_of())
-    got = autodiff.rollout(model_of(), state, twists, loads, DT, autodiff.parameters_of(changed))
+    got = autodiff.rollout(model_of(), state, twists, loads, DT, parameters=autodiff.parameters_of(changed))
     assert np.array_equal(got.wrenches, autodiff.rollout(changed, state, twists, loads, DT).wrenches)
 
 
@@ -85,7 +85,7 @@ def test_parameters_take_the_place_of_the_models_own():
 def test_steady_sliding_scales_with_the_friction_and_with_the_speed(law):
     """`W_d` dry, `W_v` viscous: `mu_c W_c + mu_s W_s = W_d` and `W_V V = W_v - v_s W_vs`; bristles leave no trace."""
     model, twist = model_of(law), np.array([2e-3, -1e-3, 0.3])
-    wrenches, slopes = autodiff.rollout_sensitivities(model, model.rest(), twist[None], LOAD, 1e6)
+    _, wrenches, slopes = autodiff.rollout_sensitivities(model, model.rest(), twist[None], LOAD, 1e6)
     by, numbers = dict(zip(NAMES, slopes[0].T, strict=True)), model.law
     factor = model.shape_at(LOAD).factor
     viscous = -LOAD * numbers.sigma_2 * factor.T @ factor @ twist
@@ -109,10 +109,10 @@ def test_at_rest_the_state_stays_and_pulls_as_a_spring(law):
     got = autodiff.rollout_gradient(model, state, np.zeros((1, 3)), LOAD, DT, bar, state_bar)
     push = numbers.sigma_0 * DT + numbers.sigma_1 + numbers.sigma_2
     assert got.state == pytest.approx(state_bar - numbers.sigma_0 * LOAD * factor @ bar[0], rel=1e-13)
-    assert got.twists[0] == pytest.approx(factor.T @ (DT * state_bar - push * LOAD * factor @ bar[0]), rel=1e-12)
+    assert got.twist[0] == pytest.approx(factor.T @ (DT * state_bar - push * LOAD * factor @ bar[0]), rel=1e-12)
     assert got.parameters == pytest.approx([-LOAD * bar[0] @ factor.T @ state, 0, 0, 0, 0, 0, 0], rel=1e-13)
-    assert float(got.loads) == pytest.approx(got.parameters[0] * numbers.sigma_0 / LOAD, rel=1e-13)
-    wrenches, slopes = autodiff.rollout_sensitivities(model, state, np.zeros((2, 3)), LOAD, DT)
+    assert float(got.normal_force) == pytest.approx(got.parameters[0] * numbers.sigma_0 / LOAD, rel=1e-13)
+    _, wrenches, slopes = autodiff.rollout_sensitivities(model, state, np.zeros((2, 3)), LOAD, DT)
     assert wrenches[1] == pytest.approx(-LOAD * numbers.sigma_0 * factor.T @ state, rel=1e-13)
     assert slopes[1, :, 0] == pytest.approx(wrenches[1] / numbers.sigma_0, rel=1e-13)
     assert not slopes[..., 1:].any()
@@ -145,14 +145,14 @@ def test_without_load_nothing_passes_but_the_load():
     loads[6] = 0.0
     bar = np.ones((T, 3)) * (np.arange(T) >= 6)[:, None]
     gradient = autodiff.rollout_gradient(model, state, twists, loads, DT, bar, np.ones(3))
-    wrenches, slopes = autodiff.rollout_sensitivities(model, state, twists, loads, DT)
+    _, wrenches, slopes = autodiff.rollout_sensitivities(model, state, twists, loads, DT)
     assert str(wrenches[6]) == "[0. 0. 0.]" == str(autodiff.rollout(model, state, twists, loads, DT).wrenches[6])
     assert not slopes[6].any() and slopes[5].any()
-    assert not gradient.state.any() and not gradient.twists[:7].any() and not gradient.loads[:6].any()
-    assert gradient.twists[7:].all()
+    assert not gradient.state.any() and not gradient.twist[:7].any() and not gradient.normal_force[:6].any()
+    assert gradient.twist[7:].all()
     # The slope to the load: the wrench per newton that a small load would have.
     before = autodiff.rollout_states(model, state, twists, loads, DT).states[6]
-    assert gradient.loads[6] == pytest.approx(model.step(before, twists[6], 1e-3, DT)[1].sum() / 1e-3, rel=1e-10)
+    assert gradient.normal_force[6] == pytest.approx(model.step(before, twists[6], 1e-3, DT)[1].sum() / 1e-3, rel=1e-10)
 
 
 # ---------------------------------------------------------------------- against differences
@@ -163,7 +163,9 @@ def differences(model, inputs: dict, units: dict, bars, name: str) -> np.ndarray
 
     def value(change: np.ndarray) -> float:
         of = {**inputs, name: inputs[name] + change * units[name]}
-        wrenches, end = autodiff.rollout(model, of["state"], of["twists"], of["loads"], DT, of["parameters"])
+        end, wrenches = autodiff.rollout(
+            model, of["state"], of["twist"], of["normal_force"], DT, parameters=of["parameters"]
+        )
         return float((bars[0] * wrenches).sum() + (bars[1] * end).sum())
 
     found = np.empty_like(inputs[name])
@@ -175,10 +177,15 @@ def differences(model, inputs: dict, units: dict, bars, name: str) -> np.ndarray
 
 
 def compare_with_differences(model, state, twists, loads, speed, parameters) -> None:
-    inputs = {"state": state, "twists": twists, "loads": loads, "parameters": parameters}
-    units = {"state": 1e-6, "twists": speed * scale_of(model), "loads": 1.0, "parameters": np.maximum(parameters, 1e-3)}
+    inputs = {"state": state, "twist": twists, "normal_force": loads, "parameters": parameters}
+    units = {
+        "state": 1e-6,
+        "twist": speed * scale_of(model),
+        "normal_force": 1.0,
+        "parameters": np.maximum(parameters, 1e-3),
+    }
     bars = bars_of(model)
-    gradient = autodiff.rollout_gradient(model, state, twists, loads, DT, *bars, parameters)
+    gradient = autodiff.rollout_gradient(model, state, twists, loads, DT, *bars, parameters=parameters)
     for name, of in gradient._asdict().items():
         scaled, expected = of * units[name], differences(model, inputs, units, bars, name)
         # Differences lose 1e-16/1e-5 to rounding of numbers near 100 and (1e-5)^2 to truncation, but 1e-6 or so of the
@@ -200,7 +207,9 @@ def test_the_gradient_holds_where_the_floor_carries_the_steady_state():
     parameters[4] = 0.1 * parameters[3]
     state, twists, loads = drive(model, 3, 2e-4)
     compare_with_differences(model, state, twists, loads, 2e-4, parameters)
-    slopes = autodiff.rollout_sensitivities(model, state, twists[:1], LOAD, 1e6, ["mu_c"], parameters)[1]
+    slopes = autodiff.rollout_sensitivities(
+        model, state, twists[:1], LOAD, 1e6, ["mu_c"], parameters=parameters
+    ).d_wrenches
     assert np.abs(slopes).max() > 0.1 * LOAD  # the floor is a share of mu_c
 
 
@@ -208,9 +217,12 @@ def test_the_slope_to_a_breakaway_at_once_is_that_of_its_right_side():
     model, parameters = model_of("early"), autodiff.parameters_of(model_of("early"))
     parameters[-1] = 0.0
     state, twists, loads = drive(model, 3)
-    slopes = autodiff.rollout_sensitivities(model, state, twists, loads, DT, ["breakaway_ratio"], parameters)[1]
+    slopes = autodiff.rollout_sensitivities(
+        model, state, twists, loads, DT, ["breakaway_ratio"], parameters=parameters
+    ).d_wrenches
     values = [
-        autodiff.rollout(model, state, twists, loads, DT, [*parameters[:-1], b]).wrenches for b in (0.0, 1e-5, 2e-5)
+        autodiff.rollout(model, state, twists, loads, DT, parameters=[*parameters[:-1], b]).wrenches
+        for b in (0.0, 1e-5, 2e-5)
     ]
     expected = (4.0 * values[1] - 3.0 * values[0] - values[2]) / 2e-5
     assert slopes[..., 0] * [1.0, 1.0, 200.0] == pytest.approx(expected * [1.0, 1.0, 200.0], rel=1e-4, abs=1e-5)
@@ -226,7 +238,7 @@ def test_the_adjoint_is_the_transpose_of_the_sensitivities(law):
     state, twists, loads = drive(model, seed=5)
     twists[4] = 0.0
     bar, _ = bars_of(model, 2)
-    wrenches, slopes = autodiff.rollout_sensitivities(model, state, twists, loads, DT)
+    _, wrenches, slopes = autodiff.rollout_sensitivities(model, state, twists, loads, DT)
     assert wrenches == pytest.approx(autodiff.rollout(model, state, twists, loads, DT).wrenches, rel=1e-11, abs=1e-13)
     terms = np.einsum("ti,tip->tip", bar, slopes)
     gradient = autodiff.rollout_gradient(model, state, twists, loads, DT, bar)
@@ -234,7 +246,7 @@ def test_the_adjoint_is_the_transpose_of_the_sensitivities(law):
     assert (np.abs(gradient.parameters - terms.sum((0, 1))) <= 1e-11 * np.abs(terms).sum((0, 1))).all()
     if law == "plain":
         assert gradient.parameters[-1] == 0.0
-    _, chosen = autodiff.rollout_sensitivities(model, state, twists, loads, DT, ("v_s", "mu_c"))
+    *_, chosen = autodiff.rollout_sensitivities(model, state, twists, loads, DT, ("v_s", "mu_c"))
     assert np.array_equal(chosen, slopes[..., [5, 3]])
 
 
@@ -249,7 +261,11 @@ def test_the_adjoint_is_the_transpose_of_the_jacobians(law, regime):
     change = random.normal(size=3) * 1e-6
     turns, pushes = random.normal(size=(T, 3)) * speed * scale_of(model), random.normal(size=T)
     gradient = autodiff.rollout_gradient(model, state, twists, loads, DT, bar, end_bar)
-    backwards = [(gradient.state * change).sum(), (gradient.twists * turns).sum(), (gradient.loads * pushes).sum()]
+    backwards = [
+        (gradient.state * change).sum(),
+        (gradient.twist * turns).sum(),
+        (gradient.normal_force * pushes).sum(),
+    ]
     forwards = []
     for before, twist, load, turn, push, w_bar in zip(
         autodiff.rollout_states(model, state, twists, loads, DT).states, twists, loads, turns, pushes, bar, strict=True
@@ -271,20 +287,22 @@ def test_a_batch_is_a_loop():
     loads, dt = drive(model)[2], random.uniform(0.5e-4, 1e-4, T)
     parameters = autodiff.parameters_of(model) * random.uniform(0.9, 1.0, (3, 1, 7))
     bar, end_bar = random.normal(size=(3, 2, T, 3)), random.normal(size=(3, 2, 3))
-    wrenches, ends = autodiff.rollout(model, states, twists, loads, dt, parameters)
-    gradient = autodiff.rollout_gradient(model, states, twists, loads, dt, bar, end_bar, parameters)
-    slopes = autodiff.rollout_sensitivities(model, states, twists, loads, dt, NAMES, parameters)[1]
+    ends, wrenches = autodiff.rollout(model, states, twists, loads, dt, parameters=parameters)
+    gradient = autodiff.rollout_gradient(model, states, twists, loads, dt, bar, end_bar, parameters=parameters)
+    slopes = autodiff.rollout_sensitivities(model, states, twists, loads, dt, NAMES, parameters=parameters).d_wrenches
     assert wrenches.shape == (3, 2, T, 3) and ends.shape == (3, 2, 3) and slopes.shape == (3, 2, T, 3, 7)
     assert [g.shape for g in gradient] == [a.shape for a in (states, twists, loads, parameters)]
     total = [np.zeros_like(g) for g in gradient]
     for i, j in np.ndindex(3, 2):
         one = states[i, 0], twists[j], loads, dt
-        single = autodiff.rollout(model, *one, parameters[i, 0])
+        single = autodiff.rollout(model, *one, parameters=parameters[i, 0])
         assert np.array_equal(wrenches[i, j], single.wrenches) and np.array_equal(ends[i, j], single.state)
-        alone = autodiff.rollout_gradient(model, *one, bar[i, j], end_bar[i, j], parameters[i, 0])
+        alone = autodiff.rollout_gradient(model, *one, bar[i, j], end_bar[i, j], parameters=parameters[i, 0])
         for sum_of, where, g in zip(total, ((i, 0), j, ..., (i, 0)), alone, strict=True):
             sum_of[where] += g
-        assert np.array_equal(slopes[i, j], autodiff.rollout_sensitivities(model, *one, NAMES, parameters[i, 0])[1])
+        assert np.array_equal(
+            slopes[i, j], autodiff.rollout_sensitivities(model, *one, NAMES, parameters=parameters[i, 0]).d_wrenches
+        )
     for got, wanted in zip(gradient, total, strict=True):
         assert got == pytest.approx(wanted, rel=1e-11)  # sums in another order
 
@@ -300,8 +318,8 @@ def test_kept_states_several_threads_and_no_steps():
     for first, second in zip(kept, again, strict=True):
         assert np.array_equal(first, second)
     last = autodiff.rollout_gradient(model, state, scales[-1] * twists, loads, DT, bar)
-    assert np.array_equal(kept.twists[-1], last.twists)
-    wrenches, end = autodiff.rollout(model, state, np.empty((0, 3)), LOAD, DT)
+    assert np.array_equal(kept.twist[-1], last.twist)
+    end, wrenches = autodiff.rollout(model, state, np.empty((0, 3)), LOAD, DT)
     assert wrenches.shape == (0, 3) and np.array_equal(end, state)
     nothing = autodiff.rollout_gradient(model, state, np.empty((0, 3)), LOAD, DT, np.empty((0, 3)), np.ones(3))
     assert np.array_equal(nothing.state, np.ones(3)) and not nothing.parameters.any()
@@ -318,8 +336,8 @@ FINGER = pf.ContactPatch.rectangle(
     ("changed", "message"),
     [
         ({"state": np.zeros(2)}, r"state must have shape \[..., 3\]"),
-        ({"twists": np.full((T, 3), np.nan)}, "twists must be finite"),
-        ({"loads": -1.0}, "loads must be >= 0, got -1.0"),
+        ({"twist": np.full((T, 3), np.nan)}, "twist must be finite"),
+        ({"normal_force": -1.0}, "normal_force must be >= 0, got -1.0"),
         ({"parameters": np.ones(12)}, r"parameters must have shape \[..., 7\], got shape \[12\]"),
         ({"parameters": np.ones(7)}, r"breakaway_ratio must be in \[0, 1\), got 1.0"),
         ({"parameters": np.zeros(7)}, "sigma_0 must be > 0, got 0.0"),
@@ -329,7 +347,7 @@ FINGER = pf.ContactPatch.rectangle(
 )
 def test_wrong_input_is_one_clear_line(changed, message):
     state, twists, loads = drive(model_of())
-    inputs = {"model": model_of(), "state": state, "twists": twists, "loads": loads, "dt": DT}
+    inputs = {"model": model_of(), "state": state, "twist": twists, "normal_force": loads, "dt": DT}
     with pytest.raises(InvalidValueError, match=message) as caught:
         autodiff.rollout_gradient(**{**inputs, "wrenches_bar": np.ones((T, 3)), **changed})
     assert "\n" not in str(caught.value)

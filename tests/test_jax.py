@@ -21,7 +21,8 @@ import jax.numpy as jnp  # noqa: E402
 from jax.flatten_util import ravel_pytree  # noqa: E402
 
 import planarfriction.jax as pj  # noqa: E402
-from planarfriction.jax.surfaces import sliding  # noqa: E402
+from planarfriction.jax import namespace as xp  # noqa: E402
+from planarfriction.limit_surface import surface_arrays  # noqa: E402
 
 pytestmark = pytest.mark.jax
 
@@ -103,7 +104,7 @@ def test_steady_sliding_depends_on_mu_c_and_the_load_alone():
 
     def force(parameters, twist, load):
         slide = jnp.tile(twist, (20, 1))
-        return pj.simulate(model.replace(parameters=parameters), slide, load, 1e-2).wrenches[-1, 0]
+        return pj.rollout(model.replace(parameters=parameters), None, slide, load, 1e-2).wrenches[-1, 0]
 
     slopes = jax.jit(jax.grad(force, argnums=(0, 1, 2)))(model.parameters, jnp.array([speed, 0.0, 0.0]), load)
     by_parameter = slopes[0]._asdict()
@@ -122,7 +123,7 @@ def test_a_stuck_contact_is_a_spring():
     slow = np.tile([1e-5, 0.0, 0.0], (count, 1))
 
     def force(parameters):
-        return pj.simulate(model.replace(parameters=parameters), slow, load, dt).wrenches[-1, 0]
+        return pj.rollout(model.replace(parameters=parameters), None, slow, load, dt).wrenches[-1, 0]
 
     slopes = jax.jit(jax.grad(force))(model.parameters)
     assert slopes.sigma_0 == pytest.approx(-1e-5 * count * dt * load, rel=1e-12)
@@ -169,7 +170,7 @@ def test_roll_outs_are_those_of_numpy(kind):
     for twist, load in zip(motion, loads, strict=True):
         state, wrench = numpy_model.step(state, twist, load, 1e-4)
         expected.append(wrench)
-    actual = jax.jit(pj.simulate)(model, motion, loads, 1e-4)
+    actual = jax.jit(pj.rollout)(model, None, motion, loads, 1e-4)
     close(actual.wrenches, expected)
     close(actual.state, state, 1e-11)  # 300 steps of rounding
 
@@ -182,7 +183,8 @@ NEAR_THE_AXIS = [[1e-6, 0.0, 1.0], [2e-6, -1e-6, -1.0], [-1e-7, 1e-9, -1.0]]
 def test_derivative_of_sliding_is_that_of_the_kernel(kind):
     numpy_model, model = pairs(kind, "plain")
     surface = model.surface
-    slope = jax.jit(jax.vmap(jax.jacrev(lambda twist: sliding(surface.kind, surface.size, surface.data, twist))))
+    sliding = functools.partial(surface_arrays.sliding, xp, surface.kind, surface.size, surface.data)
+    slope = jax.jit(jax.vmap(jax.jacrev(lambda twist: sliding(twist, xp.norm(twist, -1)))))
     scaled = np.concatenate([twists(60)[20:] * (1.0, 1.0, 0.005), EDGES, NEAR_THE_AXIS])
     assert np.abs(slope(scaled) - numpy_model.surface._sliding_slope(scaled)).max() < 1e-11
 
@@ -203,7 +205,7 @@ def test_gradients_are_central_differences(kind, law):
     @jax.jit
     def loss(change):
         parameters, state, twist, load = unravel(start + flat_sizes * change)
-        run = pj.simulate(model.replace(parameters=parameters), twist, load, dt, state)
+        run = pj.rollout(model.replace(parameters=parameters), state, twist, load, dt)
         return (run.wrenches * weights).sum() + (run.state / sizes[1]).sum()
 
     gradient = jax.jit(jax.grad(loss))(np.zeros_like(start))
@@ -238,7 +240,7 @@ def test_gradients_are_finite_at_kinks(kind, law):
     model = pairs(kind, law)[1]
 
     def loss(model, state, motion, loads):
-        run = pj.simulate(model, motion, loads, 1e-4, state)
+        run = pj.rollout(model, state, motion, loads, 1e-4)
         return run.wrenches.sum() + run.state.sum()
 
     full = jnp.zeros_like(model.rest()).at[0].set(1e-6)  # largest deflection of a slide far above v_s
@@ -252,14 +254,14 @@ def test_gradients_are_finite_at_kinks(kind, law):
     ("kind", "law"),
     [("ellipsoid", "plain"), ("published", "elasto-plastic"), ("table", "wide"), ("cells", "elasto-plastic")],
 )
-def test_scan_and_adjoint_agree_at_kinks_too(kind, law):
+def test_eager_and_adjoint_agree_at_kinks_too(kind, law):
     model = pairs(kind, law)[1]
     motion, loads = hard(model)
     sides = np.random.default_rng(0).normal(size=motion.shape) * (1.0, 1.0, 100.0)
 
     def loss(parameters, state, motion, loads, method):
         changed = model.replace(parameters=parameters)
-        run = pj.simulate(changed, motion, loads, 1e-4, state, method=method)
+        run = pj.rollout(changed, state, motion, loads, 1e-4, method=method)
         return (run.wrenches * sides).sum() + (run.state * jnp.array([1e6, 1e6, 1e8])).sum()
 
     slopes = jax.jit(jax.value_and_grad(loss, argnums=(0, 1, 2, 3)), static_argnums=4)
@@ -267,12 +269,12 @@ def test_scan_and_adjoint_agree_at_kinks_too(kind, law):
         (np.array([1e-6, 0.0, 0.0]), motion, loads),
         (np.zeros(3), np.resize(sway(300, 1e-4), motion.shape), np.linspace(0.5, 2.0, len(loads))),
     ):
-        (value, scan), (same, adjoint) = (
-            slopes(model.parameters, state, twist, load, method) for method in ("scan", "adjoint")
+        (value, eager), (same, adjoint) = (
+            slopes(model.parameters, state, twist, load, method) for method in ("eager", "adjoint")
         )
         assert float(value) == pytest.approx(float(same), rel=1e-11)
         sizes = [*(abs(p) for p in model.parameters), 1e-6, 1e-3, 1.0]
-        for size, first, second in zip(sizes, jax.tree.leaves(scan), jax.tree.leaves(adjoint), strict=True):
+        for size, first, second in zip(sizes, jax.tree.leaves(eager), jax.tree.leaves(adjoint), strict=True):
             assert np.isfinite(first).all() and np.isfinite(second).all()
             # 1e-9 of the gradient, or where it is zero 1e-12 of the value per share of the parameter
             scale = np.abs(second).max() + 1e-3 * abs(same) / (size + 1e-3)
@@ -286,7 +288,7 @@ def test_adjoint_under_vmap_and_in_single_precision():
 
     def loss(mu, dt, load, motion, method):
         changed = model.replace(parameters=model.parameters._replace(mu_c=mu))
-        return (pj.simulate(changed, motion, load, dt, method=method).wrenches ** 2).sum()
+        return (pj.rollout(changed, None, motion, load, dt, method=method).wrenches ** 2).sum()
 
     several = jnp.linspace(0.5, 1.1, 3)
     for axes in ((0, None, None, None), (0, None, 0, None), (0, 0, None, None), (None, None, None, 0)):
@@ -296,26 +298,26 @@ def test_adjoint_under_vmap_and_in_single_precision():
         ]
         by_method = [
             jax.jit(jax.vmap(jax.grad(functools.partial(loss, method=method)), axes))(*arguments)
-            for method in ("scan", "adjoint")
+            for method in ("eager", "adjoint")
         ]
         close(by_method[0], by_method[1], 1e-9)
     pair = np.stack([motion, 2.0 * motion])
     slope = jax.jit(jax.grad(loss), static_argnums=4)
-    slopes = [slope(0.8, 1e-4, 1.0, pair, method) for method in ("scan", "adjoint")]
+    slopes = [slope(0.8, 1e-4, 1.0, pair, method) for method in ("eager", "adjoint")]
     assert float(slopes[0]) == pytest.approx(float(slopes[1]), rel=1e-9)
     single = jax.tree.map(lambda leaf: leaf.astype(jnp.float32), model)
-    run = pj.simulate(single, motion.astype(np.float32), np.float32(1.0), np.float32(1e-4), method="adjoint")
+    run = pj.rollout(single, None, motion.astype(np.float32), np.float32(1.0), np.float32(1e-4), method="adjoint")
     assert run.wrenches.dtype == run.state.dtype == jnp.float32
-    close(run.wrenches, pj.simulate(model, motion, 1.0, 1e-4).wrenches, 1e-4)
+    close(run.wrenches, pj.rollout(model, None, motion, 1.0, 1e-4).wrenches, 1e-4)
 
 
 def test_adjoint_says_what_it_cannot_differentiate():
     model = pairs("published", "wide")[1]
     motion = sway(5, 1e-4)
     with pytest.raises(InvalidValueError, match="surface must be held fixed with method='adjoint'"):
-        jax.grad(lambda m: pj.simulate(m, motion, 1.0, 1e-4, method="adjoint").wrenches.sum())(model)
-    with pytest.raises(InvalidValueError, match="model must be a ReducedModelPublished"):
-        pj.simulate(pairs("distributed", "wide")[1], motion, 1.0, 1e-4, method="adjoint")
+        jax.grad(lambda m: pj.rollout(m, None, motion, 1.0, 1e-4, method="adjoint").wrenches.sum())(model)
+    with pytest.raises(InvalidValueError, match="method must be 'eager' for DistributedModel"):
+        pj.rollout(pairs("distributed", "wide")[1], None, motion, 1.0, 1e-4, method="adjoint")
 
 
 @given(
@@ -356,7 +358,7 @@ def test_vmap_over_models_states_and_loads():
 
     def last(mu, load):
         changed = model.replace(parameters=model.parameters._replace(mu_c=mu))
-        return pj.simulate(changed, motion, load, 1e-4).wrenches[-1]
+        return pj.rollout(changed, None, motion, load, 1e-4).wrenches[-1]
 
     together = jax.jit(jax.vmap(last))(frictions, loads)
     one = jax.jit(last)
@@ -368,10 +370,10 @@ def test_vmap_over_models_states_and_loads():
 def test_leading_axes_broadcast():
     model = pairs("ellipsoid", "wide")[1]
     motion = np.stack([sway(20, 1e-4), 2.0 * sway(20, 1e-4)])
-    simulate = jax.jit(pj.simulate)
-    run = simulate(model, motion, np.array([[1.0], [2.0]]), 1e-4, np.full(3, 1e-7))
+    roll_out = jax.jit(pj.rollout)
+    run = roll_out(model, np.full(3, 1e-7), motion, np.array([[1.0], [2.0]]), 1e-4)
     assert run.wrenches.shape == (2, 20, 3) and run.state.shape == (2, 3)
-    close(run.wrenches[1], simulate(model, motion[1], 2.0, 1e-4, np.full(3, 1e-7)).wrenches)
+    close(run.wrenches[1], roll_out(model, np.full(3, 1e-7), motion[1], 2.0, 1e-4).wrenches)
 
 
 @pytest.mark.parametrize("kind", ["table", "distributed"])
@@ -380,23 +382,23 @@ def test_single_precision_stays_single(kind):
     single = jax.tree.map(lambda leaf: leaf.astype(jnp.float32), model)
     motion = sway(50, 1e-4).astype(np.float32)
     run, slopes = jax.jit(
-        jax.value_and_grad(lambda m: pj.simulate(m, motion, np.float32(1.0), np.float32(1e-4)).wrenches.sum())
+        jax.value_and_grad(lambda m: pj.rollout(m, None, motion, np.float32(1.0), np.float32(1e-4)).wrenches.sum())
     )(single)
     assert run.dtype == jnp.float32
     for part in jax.tree.leaves(slopes):
         assert part.dtype == jnp.float32 and np.isfinite(part).all()
-    expected = pj.simulate(model, sway(50, 1e-4), 1.0, 1e-4).wrenches.sum()
+    expected = pj.rollout(model, None, sway(50, 1e-4), 1.0, 1e-4).wrenches.sum()
     assert float(run) == pytest.approx(float(expected), rel=1e-3)  # 1e-7 in z is 0.1 of rounding times sigma_0
 
 
 def test_wrong_input_is_named():
     model = pairs("ellipsoid", "plain")[1]
-    with pytest.raises(InvalidValueError, match=r"twists must have shape \[\.\.\., T, 3\]"):
-        pj.simulate(model, np.zeros(3), 1.0, 1e-3)
+    with pytest.raises(InvalidValueError, match=r"twist must have shape \[\.\.\., T, 3\]"):
+        pj.rollout(model, None, np.zeros(3), 1.0, 1e-3)
     with pytest.raises(InvalidValueError, match="broadcast"):
-        pj.simulate(model, np.zeros((4, 3)), np.ones(3), 1e-3)
-    with pytest.raises(InvalidValueError, match="method must be one of scan, adjoint"):
-        pj.simulate(model, np.zeros((4, 3)), 1.0, 1e-3, method="adjont")
+        pj.rollout(model, None, np.zeros((4, 3)), np.ones(3), 1e-3)
+    with pytest.raises(InvalidValueError, match="method must be one of adjoint, eager"):
+        pj.rollout(model, None, np.zeros((4, 3)), 1.0, 1e-3, method="adjont")
     with pytest.raises(InvalidValueError, match="patch must be a ContactPatch"):
         pj.DistributedModel("disc", PLAIN)
 

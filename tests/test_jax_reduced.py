@@ -85,7 +85,7 @@ def loss_and_slopes():
     """Loss of a roll-out of the elasto-plastic model with its derivatives by law and twists, and the roll-out."""
 
     def loss(parameters, twists):
-        run = pj.simulate(pair("elasto-plastic")[1].replace(parameters=parameters), twists, 2.0, 1e-4)
+        run = pj.rollout(pair("elasto-plastic")[1].replace(parameters=parameters), None, twists, 2.0, 1e-4)
         return jnp.sum(jnp.square(run.wrenches * WEIGHTS)), run
 
     return jax.jit(jax.value_and_grad(loss, (0, 1), has_aux=True))
@@ -170,11 +170,11 @@ def test_a_roll_out_is_that_of_numpy_and_its_gradient_that_of_differences():
 @pytest.mark.slow
 def test_gradients_of_roll_outs_are_those_of_pytorch():
     torch = pytest.importorskip("torch", reason="needs PyTorch: pip install 'planarfriction[torch]'")
-    from planarfriction.torch import ReducedModel, simulate
+    from planarfriction.torch import ReducedModel, rollout
 
     model = ReducedModel(PATCH, LAWS["elasto-plastic"], dtype=torch.float64, **SMALL)
     parameters, twists = model.physical().detach().requires_grad_(), torch.tensor(sway(40), requires_grad=True)
-    wrenches = simulate(model, twists, 2.0, 1e-4, parameters=parameters)
+    wrenches = rollout(model, None, twists, 2.0, 1e-4, parameters=parameters).wrenches
     theirs = torch.autograd.grad((wrenches * torch.tensor(WEIGHTS)).square().sum(), [parameters, twists])
     _, (by_law, by_twist) = loss_and_slopes()(pair("elasto-plastic")[1].parameters, sway(40))
     np.testing.assert_allclose(np.stack(by_law), theirs[0], rtol=1e-9, atol=0.0)
@@ -190,8 +190,8 @@ def test_gradients_of_roll_outs_are_those_of_pytorch():
         (lambda: pj.ReducedModel("disc", LAWS["plain"]), "patch must be a ContactPatch"),
         (lambda: pair("plain")[1].replace(weights=1.0), "leaf must be one of parameters, shape, got 'weights'"),
         (
-            lambda: pj.simulate(pair("plain")[1], sway(4), 1.0, 1e-4, method="adjoint"),
-            "model must be a ReducedModelPublished",
+            lambda: pj.rollout(pair("plain")[1], None, sway(4), 1.0, 1e-4, method="adjoint"),
+            "method must be 'eager' for ReducedModel",
         ),
     ],
 )

@@ -135,7 +135,10 @@ def test_a_patch_whose_shape_follows_the_load_keeps_the_shape_of_its_surface():
     state, twist, load = samples(10, np.random.default_rng(3))
     assert_equal([model.step(tensor(state), tensor(twist), tensor(load), 1e-4)[1]],
                  [reference.step(state, twist, load, 1e-4)[1]])  # fmt: skip
-    with pytest.raises(pf.FrictionError, match="shape that does not depend on the load"):
+    model, reference = DistributedModel(patch, PLAIN, 2.0, dtype=torch.float64), pf.DistributedModel(patch, PLAIN)
+    inputs = 1e-7 * np.ones((2, patch.cells)), twist[9], 2.0, 1e-4
+    assert_equal(model.step(tensor(inputs[0]), tensor(inputs[1]), 2.0, 1e-4), reference.step(*inputs))
+    with pytest.raises(pf.FrictionError, match="normal_force must be"):
         DistributedModel(patch, PLAIN)
 
 
@@ -214,8 +217,8 @@ def test_weights_stay_a_pressure_distribution():
         (lambda: reduced().set(mu_s=0.1), "mu_s must be >= mu_c"),
         (lambda: reduced().set(mu=0.1), "parameter must be one of"),
         (lambda: reduced().set(sigma_0=-1.0), "sigma_0 must be > 0"),
-        (lambda: reduced()(tensor([0.0]), tensor([0.0] * 3), 1.0), r"z must have shape \[..., 3\]"),
-        (lambda: reduced()(tensor([0.0] * 3), tensor([0.0]), 1.0), r"v must have shape \[..., 3\]"),
+        (lambda: reduced()(tensor([0.0]), tensor([0.0] * 3), 1.0), r"state must have shape \[..., 3\]"),
+        (lambda: reduced()(tensor([0.0] * 3), tensor([0.0]), 1.0), r"twist must have shape \[..., 3\]"),
         (lambda: reduced()(*[tensor([0.0] * 3)] * 2, 1.0, parameters=tensor([1.0])), "parameters must have shape"),
     ],
 )

@@ -12,7 +12,7 @@ from planarfriction.models import reduced_arrays
 
 torch = pytest.importorskip("torch", reason="needs PyTorch: pip install 'planarfriction[torch]'")
 
-from planarfriction.torch import ReducedModel, rollout, simulate, tracking_loss  # noqa: E402
+from planarfriction.torch import ReducedModel, rollout, tracking_loss  # noqa: E402
 from planarfriction.torch import namespace as xp  # noqa: E402
 from planarfriction.torch.reduced import PARAMETERS  # noqa: E402
 
@@ -206,12 +206,12 @@ def test_a_roll_out_is_its_steps_and_its_gradient_that_of_differences(law):
     for v, f_n in zip(twists, loads, strict=True):
         z, wrench = model.step(z, v, f_n, 1e-4)
         wrenches.append(wrench)
-    run = rollout(model, twists, loads, 1e-4)
+    run = rollout(model, None, twists, loads, 1e-4)
     torch.testing.assert_close(run.wrenches, torch.stack(wrenches), rtol=1e-12, atol=1e-15)
     torch.testing.assert_close(run.state, z, rtol=1e-12, atol=1e-20)
 
     def value(parameters):
-        wrenches = simulate(model, twists, loads, 1e-4, parameters=parameters)
+        wrenches = rollout(model, None, twists, loads, 1e-4, parameters=parameters).wrenches
         return (wrenches * tensor([1.0, 1.0, 100.0])).square().sum((-2, -1))
 
     now = model.physical().detach()
@@ -224,14 +224,14 @@ def test_a_roll_out_is_its_steps_and_its_gradient_that_of_differences(law):
 
 def test_it_learns_the_law():
     twists = sway(15)
-    truth = simulate(module(), twists, 2.0, 1e-3).detach()
+    truth = rollout(module(), None, twists, 2.0, 1e-3).wrenches.detach()
     model = module(trainable=("mu_c", "mu_s"))
     model.set(mu_c=0.8, mu_s=0.9)
     optimiser = torch.optim.Adam(model.parameters(), lr=0.1)
     losses = []
     for _ in range(4):
         optimiser.zero_grad()
-        losses.append(tracking_loss(model, twists, truth, 2.0, 1e-3))
+        losses.append(tracking_loss(model, None, twists, 2.0, 1e-3, truth))
         losses[-1].backward()
         optimiser.step()
     assert min(losses) < 0.02 * losses[0]
@@ -256,8 +256,8 @@ def test_state_dicts_travel():
         (lambda: module(trainable=("gamma",)), "trainable must not name gamma: the map of steady sliding is made for"),
         (lambda: module("plain", trainable=("breakaway_ratio",)), "not name breakaway_ratio for plain bristles"),
         (lambda: module().set(gamma=1.0), "parameter must be one of"),
-        (lambda: module()(tensor([0.0]), tensor([0.0] * 3), 1.0), r"z must have shape \[..., 3\]"),
-        (lambda: simulate(module(), sway(4), 1.0, 1e-4, method="adjoint"), "be 'eager' for ReducedModel"),
+        (lambda: module()(tensor([0.0]), tensor([0.0] * 3), 1.0), r"state must have shape \[..., 3\]"),
+        (lambda: rollout(module(), None, sway(4), 1.0, 1e-4, method="adjoint").wrenches, "be 'eager' for ReducedModel"),
         (lambda: ReducedModel("disc", LAWS["plain"]), "patch must be a ContactPatch"),
     ],
 )

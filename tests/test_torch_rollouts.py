@@ -13,7 +13,6 @@ from planarfriction.torch import (  # noqa: E402
     DistributedModel,
     ReducedModelPublished,
     rollout,
-    simulate,
     tracking_loss,
 )
 
@@ -62,7 +61,7 @@ def gradients(model, method, *, centred=False):
         parameters[-2:] = 0.0  # a pure spin is then about the centre of pressure: on the pole of the table
     inputs = [tensor([1e-7, 2e-7, 1e-9]), tensor(v), tensor(loads), parameters]
     inputs = [value.requires_grad_() for value in inputs]
-    result = rollout(model, inputs[1], inputs[2], DT, z=inputs[0], parameters=inputs[3], method=method)
+    result = rollout(model, *inputs[:3], DT, parameters=inputs[3], method=method)
     weights = tensor(rng.normal(size=v.shape) * [1.0, 1.0, 100.0])
     value = (weights * result.wrenches).sum() + (result.state * tensor([1e6, 2e6, 1e8])).sum()
     return result, torch.autograd.grad(value, inputs)
@@ -87,7 +86,7 @@ def test_wrenches_are_those_of_the_steps():
     model = reduced()
     reference = pf.ReducedModelPublished(PATCH, LAWS["elasto-plastic"])
     v, loads = profile(80)
-    wrenches = simulate(model, tensor(v), tensor(loads), DT)
+    wrenches = rollout(model, None, tensor(v), tensor(loads), DT).wrenches
     state = reference.rest()
     for t in range(80):
         state, wrench = reference.step(state, v[t], loads[t], DT)
@@ -98,7 +97,7 @@ def test_distributed_wrenches_are_those_of_the_steps():
     law = LAWS["elasto-plastic"]
     model = DistributedModel(PATCH, law, dtype=torch.float64)
     v, loads = profile(40)
-    wrenches = simulate(model, tensor(v), tensor(loads), DT)
+    wrenches = rollout(model, None, tensor(v), tensor(loads), DT).wrenches
     reference, state = pf.DistributedModel(PATCH, law), np.zeros((2, PATCH.cells))
     for t in range(40):
         state, wrench = reference.step(state, v[t], loads[t], DT)
@@ -110,8 +109,8 @@ def test_the_gradient_of_a_load_at_zero_is_one_sided(method):
     # The wrench per unit load that the smallest load would have; nothing else passes a step without load.
     model, v = reduced(), tensor([[1e-3, 0.0, 0.1]] * 3)
     load = tensor([1.0, 0.0, 1.0]).requires_grad_()
-    (gradient,) = torch.autograd.grad(simulate(model, v, load, DT, method=method)[1].sum(), load)
-    small = simulate(model, v, tensor([1.0, 1e-9, 1.0]), DT, method=method)[1].sum().item() / 1e-9
+    (gradient,) = torch.autograd.grad(rollout(model, None, v, load, DT, method=method).wrenches[1].sum(), load)
+    small = rollout(model, None, v, tensor([1.0, 1e-9, 1.0]), DT, method=method).wrenches[1].sum().item() / 1e-9
     assert gradient[1].item() == pytest.approx(small, rel=1e-7)
     assert gradient[0] == gradient[2] == 0.0
 
@@ -123,14 +122,14 @@ def test_batches_broadcast(method):
     twists = tensor(v * RNG.uniform(0.5, 2.0, (4, 1, 1)))
     z = tensor(RNG.normal(size=(5, 1, 3)) * [1e-7, 1e-7, 1e-9])
     for load in (1.5, tensor(loads), tensor(loads).expand(4, 24), tensor([[1.0], [2.0], [0.0], [0.5]])):
-        wrenches = simulate(model, twists, load, DT, z=z, method=method)
+        wrenches = rollout(model, z, twists, load, DT, method=method).wrenches
         assert wrenches.shape == (5, 4, 24, 3)
         rows = torch.broadcast_to(tensor(load) if isinstance(load, float) else load, (4, 24))
-        alone = simulate(model, twists[2], rows[2], DT, z=z[3, 0], method="eager")
+        alone = rollout(model, z[3, 0], twists[2], rows[2], DT, method="eager").wrenches
         torch.testing.assert_close(wrenches[3, 2], alone, rtol=1e-12, atol=1e-14)
     parameters = model.physical().detach() * tensor(RNG.uniform(1.0, 1.02, (4, 12)))
-    wrenches = simulate(model, twists, 1.5, DT, parameters=parameters, method=method)
-    alone = simulate(model, twists[1], 1.5, DT, parameters=parameters[1], method="eager")
+    wrenches = rollout(model, None, twists, 1.5, DT, parameters=parameters, method=method).wrenches
+    alone = rollout(model, None, twists[1], 1.5, DT, parameters=parameters[1], method="eager").wrenches
     torch.testing.assert_close(wrenches[1], alone, rtol=1e-12, atol=1e-14)
 
 
@@ -142,7 +141,7 @@ def test_vmap(method):
     parameters = model.physical().detach()
 
     def loss(twist, load, p):
-        return simulate(model, twist, load, DT, parameters=p, method=method).square().sum()
+        return rollout(model, None, twist, load, DT, parameters=p, method=method).wrenches.square().sum()
 
     together = torch.func.vmap(torch.func.grad(loss, argnums=2), in_dims=(0, None, None))(twists, 2.0, parameters)
     load = tensor([1.0, 2.0, 3.0])
@@ -154,21 +153,26 @@ def test_vmap(method):
         alone = load[i].clone().requires_grad_()
         loss(twists[0], alone, parameters).backward()
         torch.testing.assert_close(by_load[i], alone.grad, rtol=1e-9, atol=1e-15)
-    jacobian = torch.func.jacrev(lambda p: simulate(model, twists, 1.0, DT, parameters=p, method=method))(parameters)
+
+    def wrenches(p):
+        return rollout(model, None, twists, 1.0, DT, parameters=p, method=method).wrenches
+
+    jacobian = torch.func.jacrev(wrenches)(parameters)
     assert jacobian.shape == (3, 16, 3, 12)
     rows = parameters.clone().requires_grad_()
-    simulate(model, twists, 1.0, DT, parameters=rows, method=method)[1, 5, 2].backward()
+    wrenches(rows)[1, 5, 2].backward()
     torch.testing.assert_close(jacobian[1, 5, 2], rows.grad, rtol=1e-9, atol=1e-15)
 
 
 def test_float32_goes_through_the_adjoint():
     single, double = reduced(dtype=torch.float32), reduced()
     v, _ = profile(40)
-    wrenches = simulate(single, tensor(v).float(), 1.0, DT)
+    wrenches = rollout(single, None, tensor(v).float(), 1.0, DT).wrenches
     assert wrenches.dtype == torch.float32
-    torch.testing.assert_close(wrenches.double(), simulate(double, tensor(v), 1.0, DT), rtol=1e-4, atol=1e-4)
+    exact = rollout(double, None, tensor(v), 1.0, DT).wrenches
+    torch.testing.assert_close(wrenches.double(), exact, rtol=1e-4, atol=1e-4)
     wrenches.square().sum().backward()
-    simulate(double, tensor(v), 1.0, DT).square().sum().backward()
+    exact.square().sum().backward()
     for a, b in zip(single.parameters(), double.parameters(), strict=True):
         assert a.grad.dtype == torch.float32
         assert a.grad.item() == pytest.approx(b.grad.item(), rel=1e-2, abs=1e-3)
@@ -178,7 +182,7 @@ def test_gradients_to_raw_parameters_agree_with_central_differences():
     model = reduced(trainable=("mu_c", "mu_s", "sigma_0", "sigma_2", "v_s", "breakaway_ratio", "contact_radius"))
     t = np.linspace(0.0, 1.0, 50)
     v = tensor(np.stack([3e-3 * np.sin(6 * t + 0.3), 2e-3 * np.cos(5 * t), 0.4 * np.sin(9 * t + 1.0)], -1))
-    value = lambda: (simulate(model, v, 2.0, DT) * tensor([1.0, 0.7, 150.0])).sum()  # noqa: E731
+    value = lambda: (rollout(model, None, v, 2.0, DT).wrenches * tensor([1.0, 0.7, 150.0])).sum()  # noqa: E731
     gradients = torch.autograd.grad(value(), list(model.parameters()))
     for parameter, gradient in zip(model.parameters(), gradients, strict=True):
         ends = []
@@ -199,13 +203,13 @@ def test_training_finds_the_friction(kind):
     model_type = ReducedModelPublished if kind == "reduced" else DistributedModel
     steps = 80 if kind == "reduced" else 20
     v, _ = profile(steps)
-    reference = simulate(model_type(PATCH, truth, dtype=torch.float64), tensor(v), 2.0, 1e-3).detach()
+    reference = rollout(model_type(PATCH, truth, dtype=torch.float64), None, tensor(v), 2.0, 1e-3).wrenches.detach()
     model = model_type(PATCH, start, trainable=("mu_c", "mu_s", "sigma_0"), dtype=torch.float64)
     optimiser = torch.optim.Adam(model.parameters(), lr=0.02)
     losses = []
     for _ in range(60):
         optimiser.zero_grad()
-        loss = tracking_loss(model, tensor(v), reference, 2.0, 1e-3)
+        loss = tracking_loss(model, None, tensor(v), 2.0, 1e-3, reference)
         loss.backward()
         optimiser.step()
         losses.append(loss.item())
@@ -216,33 +220,33 @@ def test_training_finds_the_friction(kind):
 def test_the_tracking_loss_is_a_mean_over_the_samples_with_load():
     model, v = reduced(), tensor([[0.01, 0.0, 0.0]] * 4)
     load = tensor([1.0, 2.0, 0.0, 4.0])
-    wrenches = simulate(model, v, load, DT).detach()
+    wrenches = rollout(model, None, v, load, DT).wrenches.detach()
     off = wrenches + tensor([0.3, 0.0, 0.4 * model.lever]) * load[:, None]
     off[2] = 7.0  # a sensor's offset without load says nothing about friction
-    assert tracking_loss(model, v, wrenches, load, DT).item() == 0.0
-    assert tracking_loss(model, v, off, load, DT).item() == pytest.approx(0.25, rel=1e-12)
+    assert tracking_loss(model, None, v, load, DT, wrenches).item() == 0.0
+    assert tracking_loss(model, None, v, load, DT, off).item() == pytest.approx(0.25, rel=1e-12)
     assert model.lever == pytest.approx(PATCH.contact_radius(), rel=0.05)  # the published table smooths it
 
 
 def test_second_derivatives_need_the_eager_roll_out():
     model, v = reduced(), tensor(profile(8)[0])
-    (first,) = torch.autograd.grad(
-        simulate(model, v, 1.0, DT).square().sum(), [model.physical.raw["mu_c"]], create_graph=True
-    )
+    raw = model.physical.raw["mu_c"]
+
+    def slope(method):
+        wrenches = rollout(model, None, v, 1.0, DT, method=method).wrenches
+        return torch.autograd.grad(wrenches.square().sum(), [raw], create_graph=True)[0]
+
     with pytest.raises(pf.FrictionError, match="method='eager'"):
-        first.backward()
-    (first,) = torch.autograd.grad(
-        simulate(model, v, 1.0, DT, method="eager").square().sum(), [model.physical.raw["mu_c"]], create_graph=True
-    )
-    first.backward()
-    assert model.physical.raw["mu_c"].grad.isfinite()
+        slope("adjoint").backward()
+    slope("eager").backward()
+    assert raw.grad.isfinite()
 
 
 def test_a_gradient_to_the_time_step_is_eager():
     model, v = reduced("plain", "ellipsoid"), tensor([[1e-3, 0.0, 0.0]] * 3)
     dt = tensor(1e-4).requires_grad_()
-    simulate(model, v, 1.0, dt)[:, 0].sum().backward()
-    ends = [simulate(model, v, 1.0, 1e-4 + h)[:, 0].sum().item() for h in (1e-9, -1e-9)]
+    rollout(model, None, v, 1.0, dt).wrenches[:, 0].sum().backward()
+    ends = [rollout(model, None, v, 1.0, 1e-4 + h).wrenches[:, 0].sum().item() for h in (1e-9, -1e-9)]
     assert dt.grad.item() == pytest.approx((ends[0] - ends[1]) / 2e-9, rel=1e-5)
 
 
@@ -252,17 +256,18 @@ def test_a_gradient_to_the_time_step_is_eager():
         ({"method": "adjont"}, r"method must be one of adjoint, eager, got 'adjont' \(did you mean 'adjoint'\?\)"),
         ({"method": "adjoint", "dt": torch.tensor(1e-4, requires_grad=True)}, "be 'eager' for a gradient to dt"),
         ({"dt": tensor([1e-4, 1e-4])}, "dt must be one number"),
-        ({"v_profile": tensor([0.0, 0.0, 0.0])}, r"v_profile must have shape \[..., T, 3\]"),
-        ({"f_n": tensor([1.0, 2.0])}, r"f_n must broadcast with \[..., 4\]"),
-        ({"f_n": -1.0}, "loads must be >= 0"),
-        ({"v_profile": tensor([[0.0, np.nan, 0.0]] * 4)}, "twists must be finite"),
+        ({"state": tensor([0.0, 0.0])}, r"state must have shape \[..., 3\]"),
+        ({"twist": tensor([0.0, 0.0, 0.0])}, r"twist must have shape \[..., T, 3\]"),
+        ({"normal_force": tensor([1.0, 2.0])}, r"normal_force must broadcast with \[..., 4\]"),
+        ({"normal_force": -1.0}, "normal_force must be >= 0"),
+        ({"twist": tensor([[0.0, np.nan, 0.0]] * 4)}, "twist must be finite"),
         ({"model": DistributedModel(PATCH, LAWS["plain"]), "method": "adjoint"}, "for DistributedModel"),
     ],
 )
 def test_wrong_input_is_one_line(change, message):
-    given = {"model": reduced(), "v_profile": tensor([[0.0] * 3] * 4), "f_n": 1.0, "dt": DT, **change}
+    given = {"model": reduced(), "state": None, "twist": tensor([[0.0] * 3] * 4), "normal_force": 1.0, "dt": DT}
     with pytest.raises(pf.FrictionError, match=message) as caught:
-        simulate(given.pop("model"), given.pop("v_profile"), given.pop("f_n"), given.pop("dt"), **given)
+        rollout(**{**given, **change})
     assert "\n" not in str(caught.value)
 
 

@@ -39,6 +39,7 @@ _HOME = {
     "Uniform": "planarfriction.patch",
     "grain": "planarfriction.patch",
     "load": "planarfriction.scenes",
+    "rollout": "planarfriction.autodiff",
     "simulate": "planarfriction.scenes",
 }
 _MODULES = (
@@ -75,6 +76,7 @@ def __dir__() -> list[str]:
 
 
 if TYPE_CHECKING:  # for editors and type checkers: the same names as above
+    from planarfriction.autodiff import rollout
     from planarfriction.errors import FrictionError
     from planarfriction.laws import Coulomb, CoulombStribeck, Dahl, ElastoPlastic, LuGre
     from planarfriction.limit_surface import (

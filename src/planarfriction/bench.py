@@ -272,7 +272,7 @@ def _value_and_gradient(model: ReducedModel | ReducedModelPublished) -> float:
     loads = np.full(len(twists), 2.0)
 
     def value_and_gradient() -> None:
-        wrenches, _, states = autodiff.rollout_states(model, model.rest(), twists, loads, dt)
+        _, wrenches, states = autodiff.rollout_states(model, model.rest(), twists, loads, dt)
         autodiff.rollout_gradient(model, model.rest(), twists, loads, dt, wrenches, states=states)
 
     return _median(value_and_gradient, 15)
@@ -305,7 +305,7 @@ def _eager_gradient(model: ReducedModelPublished, twists: np.ndarray, dt: float,
 
     def value_and_gradient() -> None:
         start = torch.zeros(3, dtype=torch.float64, requires_grad=True)
-        wrenches = front.simulate(module, profile, loads, dt, z=start, method="eager")
+        wrenches = front.rollout(module, start, profile, loads, dt, method="eager").wrenches
         (0.5 * wrenches * wrenches).sum().backward()
 
     return _median(value_and_gradient, 3 if full else 1)
@@ -319,7 +319,7 @@ def _gradient_reduced_batch(name: str, full: bool) -> Measurement:
     loads = np.full((contacts, steps), 2.0)
 
     def value_and_gradient() -> None:
-        wrenches, _, states = autodiff.rollout_states(model, model.rest(), twists, loads, dt)
+        _, wrenches, states = autodiff.rollout_states(model, model.rest(), twists, loads, dt)
         autodiff.rollout_gradient(model, model.rest(), twists, loads, dt, wrenches, states=states)
 
     both = 1e-6 * contacts * steps / _median(value_and_gradient, 5)

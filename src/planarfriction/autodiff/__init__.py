@@ -1,7 +1,7 @@
-"""Roll-outs of a reduced model with their exact derivatives: what the tensor front ends and identification build on.
+"""Roll-outs with their exact derivatives: what the tensor front ends and identification build on.
 
-`rollout` steps a model through a sequence of twists and loads; `rollout_gradient` is its discrete adjoint and
-`rollout_sensitivities` its forward derivatives. Both are derivatives of the steps themselves, not of the continuous
+`rollout` steps a model through given twists and loads; of a reduced model, `rollout_gradient` is its discrete adjoint
+and `rollout_sensitivities` its forward derivatives. Both are derivatives of the steps themselves, not of the continuous
 model, so that they agree with differences of `rollout` to rounding. Kinks: `planarfriction.kernels.bristle_step`.
 """
 
@@ -9,6 +9,7 @@ from planarfriction.autodiff.parameters import PARAMETERS, parameter_names, para
 from planarfriction.autodiff.rollouts import (
     Rollout,
     RolloutGradient,
+    RolloutSensitivities,
     RolloutStates,
     rollout,
     rollout_gradient,
@@ -22,6 +23,7 @@ __all__ = [
     "SCENE_PARAMETERS",
     "Rollout",
     "RolloutGradient",
+    "RolloutSensitivities",
     "RolloutStates",
     "SceneSensitivities",
     "parameter_names",

@@ -55,7 +55,7 @@ PUBLISHED = Family(
 )
 """`ReducedModelPublished`, rows as in `kernels.published_adjoint`."""
 
-MOMENTS = Family(
+REDUCED = Family(
     tuple(name for name in PARAMETERS[:8] if name != "gamma"),
     np.array([0, 1, 2, 3, 4, 5, 8]),
     reduced_rollout.rollout,
@@ -109,10 +109,17 @@ def pack(model: Any, parameters: Any = None) -> Packed:
 
 def _family(model: Any) -> Family:
     if isinstance(model, ReducedModel):
-        return MOMENTS
+        return REDUCED
     if isinstance(model, ReducedModelPublished):
         return PUBLISHED
     raise InvalidValueError("model", "be a ReducedModel or a ReducedModelPublished", type(model).__name__)
+
+
+def has_one_shape(model: Any) -> bool:
+    """Whether a model is a reduced one that compiled roll-outs know: isotropic, and with one shape for all loads."""
+    if not isinstance(model, ReducedModel | ReducedModelPublished) or model.patch.anisotropic:
+        return False
+    return not model.patch.depends_on_load or getattr(model, "on_load_change", None) == "keep"
 
 
 def _packed(model: Any) -> Packed:
@@ -128,7 +135,7 @@ def _packed(model: Any) -> Packed:
     refuse_anisotropy(model.patch, "derivatives of roll-outs")
     shape = model.shape_at(1.0)
     row = np.array([*model.law.numbers, *shape.numbers])
-    if family is MOMENTS:
+    if family is REDUCED:
         return Packed(row, np.zeros(3, dtype=int), shape.data, family)
     numbers = shape.surface.numbers
     return Packed(row, np.array([numbers.kind, 0, numbers.size]), numbers.data, family)

@@ -11,8 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.autodiff.parameters import Packed, pack
+from planarfriction.autodiff.parameters import Packed, has_one_shape, pack
 from planarfriction.errors import InvalidValueError
+from planarfriction.models import FrictionModel
 
 _WORTH_A_THREAD = 20_000
 """Steps [-] below which starting a thread costs more than it saves."""
@@ -21,29 +22,40 @@ _WORTH_A_THREAD = 20_000
 class Rollout(NamedTuple):
     """A model stepped through T twists and loads."""
 
+    state: np.ndarray
+    """State after the last step, `[..., *state_shape]`."""
     wrenches: np.ndarray
     """Wrench on the moving body at the end of each step, `[..., T, 3]` [N, N, N m]."""
-    state: np.ndarray
-    """State after the last step, `[..., 3]`."""
 
 
 class RolloutStates(NamedTuple):
     """A roll-out with its states on the way."""
 
-    wrenches: np.ndarray
-    """As in `Rollout`."""
     state: np.ndarray
+    """As in `Rollout`."""
+    wrenches: np.ndarray
     """As in `Rollout`."""
     states: np.ndarray
     """State before each step, `[..., T, 3]`."""
+
+
+class RolloutSensitivities(NamedTuple):
+    """A roll-out with the derivatives of its wrenches by P parameters."""
+
+    state: np.ndarray
+    """As in `Rollout`."""
+    wrenches: np.ndarray
+    """As in `Rollout`."""
+    d_wrenches: np.ndarray
+    """`[..., T, 3, P]`"""
 
 
 class RolloutGradient(NamedTuple):
     """Gradient of a number with respect to the inputs of a roll-out, each of the shape of that input."""
 
     state: np.ndarray
-    twists: np.ndarray
-    loads: np.ndarray
+    twist: np.ndarray
+    normal_force: np.ndarray
     parameters: np.ndarray
 
 
@@ -55,49 +67,56 @@ class _Inputs(NamedTuple):
     """[B or 1, N]"""
     state: np.ndarray
     """[B, 3]"""
-    twists: np.ndarray
+    twist: np.ndarray
     """[B or 1, T, 3]"""
-    loads: np.ndarray
+    normal_force: np.ndarray
     """[B or 1, T]"""
     dt: np.ndarray
     """[T]"""
     batch: tuple[int, ...]
 
 
-def rollout(model: Any, state: Any, twists: Any, loads: Any, dt: Any, parameters: Any = None) -> Rollout:
-    """Step a reduced model through `twists` `[..., T, 3]` and `loads` `[..., T]`, each held for `dt` [s].
+def rollout(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, *, parameters: Any = None) -> Rollout:
+    """Step a model from `state` (None: at rest) through `twist` `[..., T, 3]`, each held for `dt` [s].
 
-    The steps are those of `model.step`. `state` `[..., 3]`; `loads` may be one number; `dt` is one number or `[T]`;
-    leading axes broadcast. `parameters` `[..., P]` (see `parameter_names`) take the place of the model's own; the limit
-    surface, or the map of a `ReducedModel`, stays as it is, in scaled coordinates. Batches run on all processors.
+    The steps are those of `model.step`. `normal_force` broadcasts with `[..., T]`: one number, one for each step, or
+    one for each contact `[..., 1]`; `dt` is one number or `[T]`; leading axes broadcast. `parameters` `[..., P]` of a
+    reduced model (see `parameter_names`) take the place of its own; the limit surface, or the map of a `ReducedModel`,
+    stays as it is, in scaled coordinates. Reduced models of a fixed shape run compiled, batches on all processors; any
+    other model steps in Python.
 
-    Raises `InvalidValueError` for wrong shapes, for numbers out of range, and for a model whose shape follows the load.
+    Raises `InvalidValueError` for wrong shapes, for numbers out of range, and for `parameters` of a model that cannot
+    take them.
     """
-    inputs = _checked(model, state, twists, loads, dt, parameters)
-    wrenches, end, _ = _roll(inputs, 0)
-    return Rollout(wrenches.reshape(*inputs.batch, *wrenches.shape[1:]), end.reshape(*inputs.batch, 3))
+    if parameters is None and isinstance(model, FrictionModel) and not has_one_shape(model):
+        return _stepped(model, state, twist, normal_force, dt)
+    inputs = _checked(model, state, twist, normal_force, dt, parameters)
+    end, wrenches, _ = _roll(inputs, 0)
+    return Rollout(end.reshape(*inputs.batch, 3), wrenches.reshape(*inputs.batch, *wrenches.shape[1:]))
 
 
-def rollout_states(model: Any, state: Any, twists: Any, loads: Any, dt: Any, parameters: Any = None) -> RolloutStates:
-    """`rollout` that keeps the state before each step: given to `rollout_gradient`, it saves walking there again."""
-    inputs = _checked(model, state, twists, loads, dt, parameters)
-    wrenches, end, states = _roll(inputs, len(inputs.dt))
+def rollout_states(
+    model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, *, parameters: Any = None
+) -> RolloutStates:
+    """`rollout` of a reduced model with the state before each step, which saves `rollout_gradient` half of its way."""
+    inputs = _checked(model, state, twist, normal_force, dt, parameters)
+    end, wrenches, states = _roll(inputs, len(inputs.dt))
     batch = inputs.batch
     return RolloutStates(
-        wrenches.reshape(*batch, *wrenches.shape[1:]), end.reshape(*batch, 3), states.reshape(*batch, *states.shape[1:])
+        end.reshape(*batch, 3), wrenches.reshape(*batch, *wrenches.shape[1:]), states.reshape(*batch, *states.shape[1:])
     )
 
 
 def rollout_gradient(
     model: Any,
     state: Any,
-    twists: Any,
-    loads: Any,
+    twist: Any,
+    normal_force: Any,
     dt: Any,
     wrenches_bar: Any,
     state_bar: Any = None,
-    parameters: Any = None,
     *,
+    parameters: Any = None,
     states: Any = None,
 ) -> RolloutGradient:
     """Gradient of `sum(wrenches_bar wrenches) + sum(state_bar state)` of a `rollout` with respect to its inputs.
@@ -106,28 +125,30 @@ def rollout_gradient(
     inputs. `wrenches_bar` `[..., T, 3]` and `state_bar` `[..., 3]` (None: zero) broadcast. An input that several
     contacts share gets the sum of theirs. `states`: those of `rollout_states`, if kept. At zero load the gradient with
     respect to that load is the one-sided one.
+
+    Raises `InvalidValueError` as `rollout` does, and for a model that is not a reduced one of fixed shape.
     """
-    inputs = _checked(model, state, twists, loads, dt, parameters)
+    inputs = _checked(model, state, twist, normal_force, dt, parameters)
     count, steps = len(inputs.state), len(inputs.dt)
     cotangents = _rows("wrenches_bar", wrenches_bar, (steps, 3), inputs.batch)
     on_the_way = _roll(inputs, steps)[2] if states is None else _rows("states", states, (steps, 3), inputs.batch)
     z_bar = np.zeros((count, 3))
     if state_bar is not None:
         z_bar[:] = _rows("state_bar", state_bar, (3,), inputs.batch)
-    twists_bar, loads_bar = np.empty((count, steps, 3)), np.empty((count, steps))
+    twist_bar, load_bar = np.empty((count, steps, 3)), np.empty((count, steps))
     rows_bar = np.zeros((count, inputs.packed.rows.shape[-1]))
     family = inputs.packed.family
-    arguments = inputs.rows, inputs.packed.surface, inputs.packed.data, on_the_way, inputs.twists, inputs.loads
-    results = z_bar, twists_bar, loads_bar, rows_bar
+    arguments = inputs.rows, inputs.packed.surface, inputs.packed.data, on_the_way, inputs.twist, inputs.normal_force
+    results = z_bar, twist_bar, load_bar, rows_bar
     _share(inputs, lambda first, last: family.gradient(*arguments, inputs.dt, cotangents, first, last, *results))
     given = parameters if parameters is not None else inputs.packed.rows[..., family.columns]
     return RolloutGradient(
         *(
             _sum_to(np.shape(value), gradient.reshape(*inputs.batch, *gradient.shape[1:]))
             for value, gradient in (
-                (state, z_bar),
-                (twists, twists_bar),
-                (loads, loads_bar),
+                (np.empty(3) if state is None else state, z_bar),
+                (twist, twist_bar),
+                (normal_force, load_bar),
                 (given, rows_bar[:, family.columns]),
             )
         )
@@ -137,18 +158,19 @@ def rollout_gradient(
 def rollout_sensitivities(
     model: Any,
     state: Any,
-    twists: Any,
-    loads: Any,
+    twist: Any,
+    normal_force: Any,
     dt: Any,
     names: Sequence[str] | None = None,
+    *,
     parameters: Any = None,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Wrenches `[..., T, 3]` of a `rollout` and their derivatives `[..., T, 3, P]` to the parameters `names`.
+) -> RolloutSensitivities:
+    """A `rollout` of a reduced model with the derivatives of its wrenches by the parameters `names`.
 
     Forward in time, for least squares, which wants each wrench's own derivatives; the initial state is held. `names`:
     of `parameter_names`, None for all.
     """
-    inputs = _checked(model, state, twists, loads, dt, parameters)
+    inputs = _checked(model, state, twist, normal_force, dt, parameters)
     family = inputs.packed.family
     known = family.names
     chosen = [known.index(validation.choice("names", name, known)) for name in (known if names is None else names)]
@@ -156,45 +178,86 @@ def rollout_sensitivities(
     wrenches = np.empty((len(inputs.state), len(inputs.dt), 3))
     slopes = np.empty((*wrenches.shape, len(columns)))
     end = inputs.state.copy()
-    arguments = inputs.rows, inputs.packed.surface, inputs.packed.data, end, inputs.twists, inputs.loads, inputs.dt
+    arguments = (
+        inputs.rows,
+        inputs.packed.surface,
+        inputs.packed.data,
+        end,
+        inputs.twist,
+        inputs.normal_force,
+        inputs.dt,
+    )
     _share(inputs, lambda first, last: family.sensitivities(*arguments, columns, first, last, wrenches, slopes))
-    return wrenches.reshape(*inputs.batch, *wrenches.shape[1:]), slopes.reshape(*inputs.batch, *slopes.shape[1:])
+    shaped = (array.reshape(*inputs.batch, *array.shape[1:]) for array in (end, wrenches, slopes))
+    return RolloutSensitivities(*shaped)
 
 
 def _roll(inputs: _Inputs, kept: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Wrenches `[B, T, 3]`, states at the end `[B, 3]` and, with `kept = T` rather than 0, before each step."""
+    """States at the end `[B, 3]`, wrenches `[B, T, 3]` and, with `kept = T` rather than 0, states before each step."""
     count, end = len(inputs.state), inputs.state.copy()
     wrenches, states = np.empty((count, len(inputs.dt), 3)), np.empty((count, kept, 3))
-    arguments = inputs.rows, inputs.packed.surface, inputs.packed.data, end, inputs.twists, inputs.loads, inputs.dt
+    arguments = (
+        inputs.rows,
+        inputs.packed.surface,
+        inputs.packed.data,
+        end,
+        inputs.twist,
+        inputs.normal_force,
+        inputs.dt,
+    )
     _share(inputs, lambda first, last: inputs.packed.family.rollout(*arguments, first, last, wrenches, states))
-    return wrenches, end, states
+    return end, wrenches, states
+
+
+def _stepped(model: FrictionModel, state: Any, twist: Any, normal_force: Any, dt: Any) -> Rollout:
+    """The steps of any model; it checks their numbers itself."""
+    state = model.rest() if state is None else validation.numbers("state", state)
+    twist, load, dt = _sequences(twist, normal_force, dt)
+    inner = model.state_shape
+    try:
+        batch = np.broadcast_shapes(state.shape[: -len(inner)], twist.shape[:-2], load.shape[:-1])
+        state = np.broadcast_to(state, (*batch, *inner))
+    except ValueError:
+        shapes = ", ".join(str(list(a.shape)) for a in (state, twist, load))
+        raise InvalidValueError("state, twist and normal_force", "broadcast", f"shapes {shapes}") from None
+    wrenches = np.empty((*batch, len(dt), 3))
+    for t, held in enumerate(dt):
+        state, wrenches[..., t, :] = model.step(state, twist[..., t, :], load[..., t], held)
+    return Rollout(np.array(state), wrenches)
 
 
 # ---------------------------------------------------------------------- shapes and threads
 
 
-def _checked(model: Any, state: Any, twists: Any, loads: Any, dt: Any, parameters: Any) -> _Inputs:
-    packed = pack(model, parameters)
-    state, twists = validation.numbers("state", state), validation.numbers("twists", twists)
-    loads, dt = validation.numbers("loads", loads), validation.numbers("dt", dt)
-    if state.shape[-1:] != (3,):
-        raise InvalidValueError("state", "have shape [..., 3]", f"shape {list(state.shape)}")
-    if twists.ndim < 2 or twists.shape[-1] != 3:
-        raise InvalidValueError("twists", "have shape [..., T, 3]", f"shape {list(twists.shape)}")
-    steps = twists.shape[-2]
-    if loads.ndim and loads.shape[-1] != steps:
-        raise InvalidValueError("loads", f"be one number or have shape [..., {steps}]", f"shape {list(loads.shape)}")
+def _sequences(twist: Any, normal_force: Any, dt: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Twists `[..., T, 3]`, loads `[..., T]` and steps `[T]`."""
+    twist, load, dt = (
+        validation.numbers(n, v) for n, v in (("twist", twist), ("normal_force", normal_force), ("dt", dt))
+    )
+    if twist.ndim < 2 or twist.shape[-1] != 3:
+        raise InvalidValueError("twist", "have shape [..., T, 3]", f"shape {list(twist.shape)}")
+    steps = twist.shape[-2]
+    if load.ndim and load.shape[-1] not in (1, steps):
+        raise InvalidValueError("normal_force", f"broadcast with [..., {steps}]", f"shape {list(load.shape)}")
     if dt.ndim and dt.shape != (steps,):
         raise InvalidValueError("dt", f"be one number or have shape [{steps}]", f"shape {list(dt.shape)}")
-    for name, value in {"state": state, "twists": twists, "loads": loads, "dt": dt}.items():
+    return twist, np.broadcast_to(load, (*load.shape[:-1], steps)), np.broadcast_to(dt, steps)
+
+
+def _checked(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, parameters: Any) -> _Inputs:
+    packed = pack(model, parameters)
+    state = np.zeros(3) if state is None else validation.numbers("state", state)
+    if state.shape[-1:] != (3,):
+        raise InvalidValueError("state", "have shape [..., 3]", f"shape {list(state.shape)}")
+    twist, load, dt = _sequences(twist, normal_force, dt)
+    steps = len(dt)
+    for name, value in {"state": state, "twist": twist, "normal_force": load, "dt": dt}.items():
         if not (np.isfinite(value.sum()) or np.isfinite(value).all()):  # a sum is quicker, but may overflow
             raise InvalidValueError(name, "be finite", "NaN or infinity")
-    for name, value in {"loads": loads, "dt": dt}.items():
+    for name, value in {"normal_force": load, "dt": dt}.items():
         if value.min(initial=0.0) < 0.0:
             raise InvalidValueError(name, "be >= 0", float(value.min()))
-    if not loads.ndim:
-        loads = np.full(steps, loads)
-    axes = state.shape[:-1], twists.shape[:-2], loads.shape[:-1], packed.rows.shape[:-1]
+    axes = state.shape[:-1], twist.shape[:-2], load.shape[:-1], packed.rows.shape[:-1]
     try:
         batch = np.broadcast_shapes(*axes)
     except ValueError:
@@ -204,9 +267,9 @@ def _checked(model: Any, state: Any, twists: Any, loads: Any, dt: Any, parameter
         packed,
         _rows("parameters", packed.rows, packed.rows.shape[-1:], batch),
         np.broadcast_to(state, (*batch, 3)).reshape(count, 3),
-        _rows("twists", twists, (steps, 3), batch),
-        _rows("loads", loads, (steps,), batch),
-        np.full(steps, dt) if dt.ndim == 0 else np.require(dt, float, ["C", "W"]),
+        _rows("twist", twist, (steps, 3), batch),
+        _rows("normal_force", load, (steps,), batch),
+        np.require(dt, float, ["C", "W"]),
         batch,
     )
 

@@ -47,11 +47,11 @@ class Prediction:
 
     def wrenches(self, vector: np.ndarray) -> np.ndarray:
         """Wrenches `[T, 3]` at the samples."""
-        return self._at_samples(rollout(*self._arguments, vector).wrenches)
+        return self._at_samples(rollout(*self._arguments, parameters=vector).wrenches)
 
     def sensitivities(self, vector: np.ndarray, names: Sequence[str]) -> tuple[np.ndarray, np.ndarray]:
         """Wrenches `[T, 3]` at the samples and their derivatives `[T, 3, len(names)]`."""
-        values, slopes = rollout_sensitivities(*self._arguments, names, vector)
+        _, values, slopes = rollout_sensitivities(*self._arguments, names, parameters=vector)
         return self._at_samples(values), self._at_samples(slopes)
 
     def _at_samples(self, values: np.ndarray) -> np.ndarray:

@@ -15,7 +15,7 @@ except ImportError as error:
 from planarfriction.jax.distributed import DistributedModel, LawParameters
 from planarfriction.jax.published import PublishedParameters, ReducedModelPublished, Surface
 from planarfriction.jax.reduced import ReducedModel, ReducedParameters
-from planarfriction.jax.rollouts import Rollout, rate, rest, simulate, step, wrench
+from planarfriction.jax.rollouts import Rollout, rate, rest, rollout, step, wrench
 
 __all__ = [
     "DistributedModel",
@@ -28,7 +28,7 @@ __all__ = [
     "Surface",
     "rate",
     "rest",
-    "simulate",
+    "rollout",
     "step",
     "wrench",
 ]

@@ -25,21 +25,21 @@ class _Kind(NamedTuple):
     elasto_plastic: bool
 
 
-def rollout(model, state, twists, loads, dt) -> tuple[jax.Array, jax.Array]:
-    """Wrenches `[..., T, 3]` and last state `[..., 3]`; state, twists and loads have the same batch axes."""
+def rollout(model, state, twist, normal_force, dt) -> tuple[jax.Array, jax.Array]:
+    """Last state `[..., 3]` and wrenches `[..., T, 3]`; state, twist and normal_force have the same batch axes."""
     if not isinstance(model, ReducedModelPublished):
-        raise InvalidValueError("model", "be a ReducedModelPublished for method='adjoint'", type(model).__name__)
+        raise InvalidValueError("method", f"be 'eager' for {type(model).__name__}", "'adjoint'")
     surface = model.surface
     kind = _Kind(surface.kind, surface.size, model.elasto_plastic)
     parameters = jnp.stack(model.parameters)
-    return _rollout(kind, surface.data, jnp.asarray(dt), parameters, state, twists, loads)
+    return _rollout(kind, surface.data, jnp.asarray(dt), parameters, state, twist, normal_force)
 
 
 @functools.partial(jax.custom_vjp, nondiff_argnums=(0,))
-def _rollout(kind: _Kind, data, dt, parameters, state, twists, loads):
-    shapes = jax.ShapeDtypeStruct(twists.shape, twists.dtype), jax.ShapeDtypeStruct(state.shape, twists.dtype)
+def _rollout(kind: _Kind, data, dt, parameters, state, twist, load):
+    shapes = jax.ShapeDtypeStruct(state.shape, twist.dtype), jax.ShapeDtypeStruct(twist.shape, twist.dtype)
     return jax.pure_callback(
-        functools.partial(_forward, kind), shapes, data, dt, parameters, state, twists, loads, vmap_method="expand_dims"
+        functools.partial(_forward, kind), shapes, data, dt, parameters, state, twist, load, vmap_method="expand_dims"
     )
 
 
@@ -48,8 +48,8 @@ def _rollout_fwd(kind: _Kind, data, dt, *inputs):
         if value.perturbed:
             raise InvalidValueError(
                 name,
-                "be held fixed with method='adjoint': differentiate with respect to model.parameters, z0, twists and "
-                "loads, or take method='scan'",
+                "be held fixed with method='adjoint': differentiate with respect to the parameters, state, twist and "
+                "normal_force, or take method='eager'",
                 "a derivative of it",
             )
     values = (data.value, dt.value, *(entry.value for entry in inputs))
@@ -57,9 +57,9 @@ def _rollout_fwd(kind: _Kind, data, dt, *inputs):
 
 
 def _rollout_bwd(kind: _Kind, values, cotangents):
-    _, _, parameters, state, twists, loads = values
-    shapes = [jax.ShapeDtypeStruct(value.shape, value.dtype) for value in (parameters, state, twists, loads)]
-    results = (twists, state)
+    _, _, parameters, state, twist, load = values
+    shapes = [jax.ShapeDtypeStruct(value.shape, value.dtype) for value in (parameters, state, twist, load)]
+    results = (state, twist)
     bars = [jnp.zeros_like(r) if isinstance(c, SymbolicZero) else c for c, r in zip(cotangents, results, strict=True)]
     slopes = jax.pure_callback(functools.partial(_backward, kind), shapes, *values, *bars, vmap_method="expand_dims")
     return jnp.zeros_like(values[0]), jnp.zeros_like(values[1]), *slopes
@@ -73,18 +73,18 @@ _rollout.defvjp(_rollout_fwd, _rollout_bwd, symbolic_zeros=True)
 
 def _forward(kind: _Kind, *arrays):
     def run(data, dt, parameters, *inputs):
-        state, twists, loads = inputs
-        return autodiff.rollout(_packed(kind, data), state, twists, loads, dt, _beside(parameters, state))
+        wide = _beside(parameters, inputs[0])
+        return autodiff.rollout(_packed(kind, data), *inputs, dt, parameters=wide)
 
     return _by_contact(run, arrays, arrays[4].dtype)
 
 
 def _backward(kind: _Kind, *arrays):
     def run(data, dt, parameters, *inputs):
-        state, twists, loads, *bars = inputs
-        wide = _beside(parameters, state)
-        found = autodiff.rollout_gradient(_packed(kind, data), state, twists, loads, dt, *bars, parameters=wide)
-        return found.parameters.reshape(parameters.shape), found.state, found.twists, found.loads
+        *inputs, state_bar, wrenches_bar = inputs
+        wide = _beside(parameters, inputs[0])
+        found = autodiff.rollout_gradient(_packed(kind, data), *inputs, dt, wrenches_bar, state_bar, parameters=wide)
+        return found.parameters.reshape(parameters.shape), found.state, found.twist, found.normal_force
 
     return _by_contact(run, arrays, arrays[4].dtype)
 

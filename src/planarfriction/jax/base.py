@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import math
+from types import ModuleType
 from typing import Any, ClassVar, Self
 
 import jax
+import jax.numpy as jnp
 
 from planarfriction.errors import InvalidValueError
+from planarfriction.formulas import LawNumbers
+from planarfriction.jax import namespace as xp
 from planarfriction.laws import FrictionLaw
 from planarfriction.laws.base import refuse_creep
 from planarfriction.patch import ContactPatch
@@ -19,6 +24,8 @@ class FrictionModel:
     Leading axes of state, twist `[..., 3]`, normal_force `[...]` and dt broadcast. `replace` makes a changed model.
     """
 
+    arrays: ClassVar[ModuleType]
+    """The model as `f(xp, ...)`: `held`, `rate`, `advance` and `wrench` of arrays."""
     leaves: ClassVar[tuple[str, ...]]
     """Attributes that JAX maps over and differentiates; `elasto_plastic` is fixed when a function is compiled."""
     parameters: Any
@@ -58,13 +65,37 @@ class FrictionModel:
         raise NotImplementedError
 
     def rate(self, state, twist, normal_force) -> jax.Array:
-        """Rate of the state, of its shape."""
-        raise NotImplementedError
+        """Rate of the state, of its shape; it does not depend on the load."""
+        numbers = self._numbers()
+        by = self.arrays.held(xp, *numbers, jnp.asarray(twist))
+        return self.arrays.rate(xp, *numbers, jnp.asarray(state), by)
 
     def wrench(self, state, twist, normal_force) -> jax.Array:
         """Friction wrench on the moving body, `[..., 3]` [N, N, N m]."""
-        raise NotImplementedError
+        numbers, state = self._numbers(), jnp.asarray(state)
+        by = self.arrays.held(xp, *numbers, jnp.asarray(twist))
+        rate = self.arrays.rate(xp, *numbers, state, by)
+        return jnp.asarray(normal_force)[..., None] * self.arrays.wrench(xp, *numbers, state, rate, by)
 
     def step(self, state, twist, normal_force, dt) -> tuple[jax.Array, jax.Array]:
         """State and wrench after `dt` [s] at a held twist, stable at any `dt`; a contact without load forgets."""
+        numbers, load = self._numbers(), jnp.asarray(normal_force)
+        by = self.arrays.held(xp, *numbers, jnp.asarray(twist))
+        new, rate = self.arrays.advance(xp, *numbers, jnp.asarray(state), by, self._inner(jnp.asarray(dt)))
+        wrench = self.arrays.wrench(xp, *numbers, new, rate, by)
+        return jnp.where(self._inner(load) > 0.0, new, 0.0), load[..., None] * wrench
+
+    # ------------------------------------------------------------------ inside
+
+    def _shape(self) -> Any:
+        """Numbers of the patch as the model's arrays know them."""
         raise NotImplementedError
+
+    def _numbers(self) -> tuple[LawNumbers, Any]:
+        named = {"gamma": math.nan, **self.parameters._asdict()}  # a map of steady sliding holds its gamma
+        law = {name: named[name] for name in LawNumbers._fields if name in named}
+        return LawNumbers(**law, elasto_plastic=float(self.elasto_plastic)), self._shape()
+
+    def _inner(self, value: jax.Array) -> jax.Array:
+        """One value for each contact beside the components of a state."""
+        return value.reshape(value.shape + (1,) * self.rest().ndim)

@@ -7,7 +7,8 @@ import math
 import jax
 import jax.numpy as jnp
 
-exp, sin, cos, stack = jnp.exp, jnp.sin, jnp.cos, jnp.stack
+exp, sin, cos, stack, ones_like = jnp.exp, jnp.sin, jnp.cos, jnp.stack, jnp.ones_like
+atan2, moveaxis, concatenate, broadcast_arrays = jnp.arctan2, jnp.moveaxis, jnp.concatenate, jnp.broadcast_arrays
 
 
 def where(condition, a, b):
@@ -33,16 +34,14 @@ def power(x, exponent):
     return jnp.where(within, jnp.power(jnp.where(within, x, 1.0), exponent), jnp.where(moving, math.exp(limit), 0.0))
 
 
-def norm(x, axis: int):
-    """Length along an axis; at the zero vector its derivative is 0."""
-    return root(jnp.sum(x * x, axis=axis))
+def dot(a, b, axis: int):
+    """`a . b` along an axis, which stays with length 1."""
+    return jnp.sum(a * b, axis=axis, keepdims=True)
 
 
-def unit(x, length, axis: int):
-    """`x/length` along an axis; zero, with derivative 0, where the length is."""
-    length = jnp.expand_dims(length, axis)
-    nonzero = length > 0.0
-    return jnp.where(nonzero, x / jnp.where(nonzero, length, 1.0), 0.0)
+def norm(vector, axis: int):
+    """`|vector|` along an axis, which stays with length 1; its derivative at 0 is 0."""
+    return root(dot(vector, vector, axis))
 
 
 def root(x):
@@ -54,3 +53,13 @@ def root(x):
 def whole(x, most: int):
     """Integer part, from 0 to `most`."""
     return jnp.clip(jax.lax.stop_gradient(x).astype(jnp.int32), 0, most)
+
+
+def held(x):
+    """The value, without its derivative."""
+    return jax.lax.stop_gradient(x)
+
+
+def epsilon(x) -> float:
+    """Rounding error of the numbers."""
+    return float(jnp.finfo(x.dtype).eps)

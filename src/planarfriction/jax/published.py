@@ -9,13 +9,13 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
-from planarfriction import formulas, models
-from planarfriction.jax import bristles
+from planarfriction import models
 from planarfriction.jax import namespace as xp
 from planarfriction.jax.base import FrictionModel
-from planarfriction.jax.surfaces import sliding
-from planarfriction.laws import LuGre
-from planarfriction.limit_surface import LimitSurface
+from planarfriction.laws import FrictionLaw
+from planarfriction.limit_surface import LimitSurface, surface_arrays
+from planarfriction.models import published_arrays
+from planarfriction.models.published_arrays import PublishedNumbers
 from planarfriction.patch import ContactPatch
 
 
@@ -60,11 +60,12 @@ class ReducedModelPublished(FrictionModel):
     `normal_force`, and keeps that shape.
     """
 
+    arrays = published_arrays
     leaves = ("parameters", "surface")
     parameters: PublishedParameters
     surface: Surface
 
-    def __init__(self, patch: ContactPatch, law: LuGre, surface: LimitSurface | None = None) -> None:
+    def __init__(self, patch: ContactPatch, law: FrictionLaw, surface: LimitSurface | None = None) -> None:
         super().__init__(patch, law)
         when = "keep" if surface is not None else "rebuild"
         shape = models.ReducedModelPublished(patch, law, surface, on_load_change=when)._reference  # pyright: ignore
@@ -85,52 +86,7 @@ class ReducedModelPublished(FrictionModel):
         """State of a contact at rest, `[3]`."""
         return jnp.zeros(3, self.parameters.sigma_0.dtype)
 
-    def rate(self, z, twist, load) -> jax.Array:
-        """Bristle rates `[..., 3]` [m/s, m/s, m^2/s]; they do not depend on the load."""
-        drive, scale, _ = self._drive(twist)
-        z = z / scale
-        k = bristles.decay(self._law, z, drive, -1)
-        return scale * (drive.u - k[..., None] * z)
-
-    def wrench(self, z, twist, load) -> jax.Array:
-        """Friction wrench on the moving body about the contact frame's origin, `[..., 3]` [N, N, N m]."""
-        drive, scale, centred = self._drive(twist)
-        k = bristles.decay(self._law, z / scale, drive, -1)
-        return jnp.asarray(load)[..., None] * self._unit_wrench(z, scale * drive.u - k[..., None] * z, centred)
-
-    def step(self, z, twist, load, dt) -> tuple[jax.Array, jax.Array]:
-        """State and wrench after `dt` [s] at a held twist; a contact without load forgets its state."""
-        drive, scale, centred = self._drive(twist)
-        load, dt = jnp.asarray(load), jnp.asarray(dt)
-        z, k = bristles.advance(self._law, z / scale, drive, dt, -1)
-        wrench = self._unit_wrench(scale * z, scale * (drive.u - k[..., None] * z), centred)
-        loaded = load[..., None] > 0.0
-        return jnp.where(loaded, scale * z, 0.0), load[..., None] * wrench
-
-    # ------------------------------------------------------------------ inside
-
-    @property
-    def _law(self):
-        return bristles.law_of(self.parameters, self.elasto_plastic)
-
-    def _drive(self, twist):
-        """Drive, diagonal of S, and the twist at the centre of pressure."""
-        p = self.parameters
-        vx, vy, omega = twist[..., 0], twist[..., 1], twist[..., 2]
-        centred = jnp.stack([vx - omega * p.centre_y, vy + omega * p.centre_x, omega], axis=-1)
-        one = jnp.ones_like(p.contact_radius)
-        scale = jnp.stack([one, one, p.contact_radius])
-        scaled = scale * centred
-        speed = xp.norm(scaled, -1)
-        u = sliding(self.surface.kind, self.surface.size, self.surface.data, scaled)
-        moving = speed > 0.0
-        h_norm = jnp.where(moving, xp.norm(u, -1) / jnp.where(moving, speed, 1.0), 1.0)
-        return bristles.Drive(u, speed, h_norm, bristles.grip(self._law, speed)), scale, centred
-
-    def _unit_wrench(self, z, rate, centred):
-        """Wrench per unit load about the origin."""
-        p = self.parameters
-        one = jnp.ones_like(p.second_moment)
-        velocity = centred * jnp.stack([one, one, p.second_moment])
-        fx, fy, tau = jnp.moveaxis(formulas.traction(z, rate, velocity, self._law), -1, 0)
-        return jnp.stack([fx, fy, tau + p.centre_x * fy - p.centre_y * fx], axis=-1)
+    def _shape(self) -> PublishedNumbers:
+        p, s = self.parameters, self.surface
+        own = (value[..., None] for value in (p.contact_radius, p.second_moment, p.centre_x, p.centre_y))
+        return PublishedNumbers(*own, functools.partial(surface_arrays.sliding, xp, s.kind, s.size, s.data))

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 
 from planarfriction import models
-from planarfriction.formulas import LawNumbers
-from planarfriction.jax import namespace as xp
 from planarfriction.jax.base import FrictionModel
-from planarfriction.laws import LuGre
+from planarfriction.laws import FrictionLaw
 from planarfriction.models import reduced_arrays
 from planarfriction.models.reduced_arrays import ReducedNumbers
 from planarfriction.patch import ContactPatch
@@ -39,6 +36,7 @@ class ReducedModel(FrictionModel):
     `planarfriction.ReducedModel`.
     """
 
+    arrays = reduced_arrays
     leaves = ("parameters", "shape")
     parameters: ReducedParameters
     shape: ReducedNumbers
@@ -46,7 +44,7 @@ class ReducedModel(FrictionModel):
     def __init__(
         self,
         patch: ContactPatch,
-        law: LuGre,
+        law: FrictionLaw,
         normal_force: float | None = None,
         *,
         segments: int = 24,
@@ -62,28 +60,5 @@ class ReducedModel(FrictionModel):
         """State of a contact at rest, `[3]`."""
         return jnp.zeros(3, self.parameters.sigma_0.dtype)
 
-    def rate(self, z, twist, load) -> jax.Array:
-        """Rates of the moments `[..., 3]` [m/s]; they do not depend on the load."""
-        return reduced_arrays.rate(xp, self._law, z, self._held(twist))
-
-    def wrench(self, z, twist, load) -> jax.Array:
-        """Friction wrench on the moving body about the contact frame's origin, `[..., 3]` [N, N, N m]."""
-        by = self._held(twist)
-        rate = reduced_arrays.rate(xp, self._law, z, by)
-        return jnp.asarray(load)[..., None] * reduced_arrays.wrench(xp, self._law, self.shape, z, rate, by.u)
-
-    def step(self, z, twist, load, dt) -> tuple[jax.Array, jax.Array]:
-        """State and wrench after `dt` [s] at a held twist; a contact without load forgets its state."""
-        by = self._held(twist)
-        load, dt = jnp.asarray(load)[..., None], jnp.asarray(dt)[..., None]
-        new, rate = reduced_arrays.advance(xp, self._law, z, by, dt, float(jnp.finfo(by.u.dtype).eps))
-        wrench = reduced_arrays.wrench(xp, self._law, self.shape, new, rate, by.u)
-        return jnp.where(load > 0.0, new, 0.0), load * wrench
-
-    @property
-    def _law(self) -> LawNumbers:
-        elastic = float(self.elasto_plastic)
-        return LawNumbers(**self.parameters._asdict(), gamma=math.nan, elasto_plastic=elastic)
-
-    def _held(self, twist) -> reduced_arrays.Held:
-        return reduced_arrays.held(xp, self._law, self.shape, twist)
+    def _shape(self) -> ReducedNumbers:
+        return self.shape

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -11,14 +11,17 @@ from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.jax.base import FrictionModel
 
+METHODS = ("adjoint", "eager")
+"""Compiled roll-out with its discrete adjoint; every step an operation of JAX, in `lax.scan`."""
+
 
 class Rollout(NamedTuple):
-    """What a roll-out of T steps returns."""
+    """A model stepped through T twists and loads."""
 
-    wrenches: jax.Array
-    """Wrench at the end of each step `[..., T, 3]` [N, N, N m]."""
     state: jax.Array
-    """State after the last step."""
+    """State after the last step, `[..., *state_shape]`."""
+    wrenches: jax.Array
+    """Wrench on the moving body at the end of each step, `[..., T, 3]` [N, N, N m]."""
 
 
 def rest(model: FrictionModel) -> jax.Array:
@@ -26,51 +29,61 @@ def rest(model: FrictionModel) -> jax.Array:
     return model.rest()
 
 
-def rate(model: FrictionModel, z, twist, load) -> jax.Array:
-    """Bristle rates `zdot`, of the shape of the state [m/s; m^2/s for the third bristle of the reduced model]."""
-    return model.rate(jnp.asarray(z), jnp.asarray(twist), load)
+def rate(model: FrictionModel, state, twist, normal_force) -> jax.Array:
+    """Rate of the state, of its shape."""
+    return model.rate(state, twist, normal_force)
 
 
-def wrench(model: FrictionModel, z, twist, load) -> jax.Array:
+def wrench(model: FrictionModel, state, twist, normal_force) -> jax.Array:
     """Friction wrench on the moving body, `[..., 3]` [N, N, N m]."""
-    return model.wrench(jnp.asarray(z), jnp.asarray(twist), load)
+    return model.wrench(state, twist, normal_force)
 
 
-def step(model: FrictionModel, z, twist, load, dt) -> tuple[jax.Array, jax.Array]:
+def step(model: FrictionModel, state, twist, normal_force, dt) -> tuple[jax.Array, jax.Array]:
     """Advance by `dt` [s] at a held twist: the new state and the wrench at the end, stable at any `dt`."""
-    return model.step(jnp.asarray(z), jnp.asarray(twist), load, dt)
+    return model.step(state, twist, normal_force, dt)
 
 
-def simulate(model: FrictionModel, twists, loads, dt, z0=None, *, method: str = "scan") -> Rollout:
-    """Steps of `dt` [s] through twists `[..., T, 3]` and loads (`[..., T]` or a number), from `z0` or from rest.
+def rollout(
+    model: FrictionModel, state, twist, normal_force, dt, *, parameters: Any = None, method: str | None = None
+) -> Rollout:
+    """The steps of a model from `state` (None: at rest) through `twist` `[..., T, 3]`, each held for `dt` [s].
 
-    Method "scan" differentiates through `lax.scan`, on any device and with respect to everything; "adjoint"
-    (`ReducedModelPublished`, CPU) runs the compiled roll-out and its discrete adjoint, much faster, in float64 inside.
+    `normal_force` broadcasts with `[..., T]`: one number, one for each step `[T]`, or one for each contact `[..., 1]`.
+    `parameters`, a record as `model.parameters` or `[P]` in its order, takes the place of the model's own.
+
+    `method` is `"eager"`, JAX operations step by step (any model and device, derivatives by everything, of any order),
+    or `"adjoint"`, the compiled roll-out with its discrete adjoint (`ReducedModelPublished` on the processor, float64
+    inside, first derivatives by the parameters, `state`, `twist` and `normal_force`): much faster. None takes "eager".
+
+    Raises `InvalidValueError` for wrong shapes and for a method that is not possible.
     """
-    validation.choice("method", method, ("scan", "adjoint"))
-    twists = jnp.asarray(twists)
-    if twists.ndim < 2 or twists.shape[-1] != 3:
-        raise InvalidValueError("twists", "have shape [..., T, 3]", f"shape {list(twists.shape)}")
-    loads = jnp.asarray(loads, twists.dtype)
-    z0 = model.rest() if z0 is None else jnp.asarray(z0)
-    inner = model.rest().ndim
+    method = "eager" if method is None else validation.choice("method", method, METHODS)
+    if parameters is not None:
+        model = model.replace(parameters=type(model.parameters)(*parameters))
+    twist = jnp.asarray(twist)
+    if twist.ndim < 2 or twist.shape[-1] != 3:
+        raise InvalidValueError("twist", "have shape [..., T, 3]", f"shape {list(twist.shape)}")
+    load = jnp.asarray(normal_force, twist.dtype)
+    start = model.rest() if state is None else jnp.asarray(state)
+    inner = model.rest().shape
     try:
-        shape = jnp.broadcast_shapes(twists.shape[:-1], loads.shape, (*z0.shape[:-inner], 1))
-        z0 = jnp.broadcast_to(z0, (*shape[:-1], *model.rest().shape))
+        shape = jnp.broadcast_shapes(twist.shape[:-1], load.shape, (*start.shape[: -len(inner)], 1))
+        start = jnp.broadcast_to(start, (*shape[:-1], *inner))
     except ValueError:
-        shapes = ", ".join(str(list(a.shape)) for a in (twists, loads, z0))
-        raise InvalidValueError("twists, loads and z0", "broadcast to [..., T]", f"shapes {shapes}") from None
-    twists, loads = jnp.broadcast_to(twists, (*shape, 3)), jnp.broadcast_to(loads, shape)
+        shapes = ", ".join(str(list(a.shape)) for a in (start, twist, load))
+        rule = "broadcast to [..., T]"
+        raise InvalidValueError("state, twist and normal_force", rule, f"shapes {shapes}") from None
+    twist, load = jnp.broadcast_to(twist, (*shape, 3)), jnp.broadcast_to(load, shape)
     if method == "adjoint":
-        from planarfriction.jax.adjoint import rollout
+        from planarfriction.jax import adjoint
 
-        return Rollout(*rollout(model, z0, twists, loads, dt))
+        return Rollout(*adjoint.rollout(model, start, twist, load, dt))
 
     def one(z, inputs):
-        twist, load = inputs
-        return model.step(z, twist, load, dt)
+        return model.step(z, *inputs, dt)
 
     # Only the states are kept for the way back; to step again costs less than to store all that a step computes.
     one = jax.checkpoint(one, prevent_cse=False)  # pyright: ignore[reportPrivateImportUsage]
-    z, wrenches = jax.lax.scan(one, z0, (jnp.moveaxis(twists, -2, 0), jnp.moveaxis(loads, -1, 0)))
-    return Rollout(jnp.moveaxis(wrenches, 0, -2), z)
+    end, wrenches = jax.lax.scan(one, start, (jnp.moveaxis(twist, -2, 0), jnp.moveaxis(load, -1, 0)))
+    return Rollout(end, jnp.moveaxis(wrenches, 0, -2))

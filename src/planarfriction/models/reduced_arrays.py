@@ -1,8 +1,9 @@
-"""The moment model for arrays of PyTorch and JAX: `kernels.steady` and `kernels.reduced` as `f(xp, ...)`.
+"""The reduced model for arrays of PyTorch and JAX: `kernels.steady` and `kernels.reduced` as `f(xp, ...)`.
 
-`xp` is the namespace of the formulas with `stack`, `root` (square root, slope 0 at 0) and `whole` (integer part within
-bounds). Vectors are `[..., 3]`, scalars and the law's parameters `[..., 1]` or plain numbers. Derivatives are finite
-everywhere and those of `kernels.reduced_adjoint`: at rest the step is that of a vanishing twist, `z + u dt`.
+`xp` is the namespace of the formulas with `stack`, `root` (square root, slope 0 at 0), `whole` (integer part within
+bounds) and `epsilon` (rounding error). Vectors are `[..., 3]`, scalars and the law's parameters `[..., 1]` or plain
+numbers. Derivatives are finite everywhere and those of `kernels.reduced_adjoint`: at rest the step is that of a
+vanishing twist, `z + u dt`.
 """
 
 from __future__ import annotations
@@ -14,10 +15,8 @@ import numpy as np
 from planarfriction import formulas
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels.steady import HEADER, QUARTIC
+from planarfriction.models.bristle_arrays import back_onto
 from planarfriction.models.reduced_map import ReducedShape
-
-ROUNDING = 256.0
-"""Excess over the largest deflection, in units of the rounding error, that counts as rounding."""
 
 
 class ReducedNumbers(NamedTuple):
@@ -174,25 +173,22 @@ def _place(xp, z, by: Held):
     return xp.root(dot(z, z) * by.per_q2), dot(z, by.q) * by.per_q2
 
 
-def rate(xp, law: LawNumbers, z, by: Held):
+def rate(xp, law: LawNumbers, shape: ReducedNumbers, z, by: Held):
     """`zdot = V_G - beta (lambda z + s m)`."""
     deflection, share = _place(xp, z, by)
     beta = _closure(xp, law, deflection, share, by.even)
     return by.u - xp.where(by.moves, beta * (by.decay * z + share * by.m), 0.0)
 
 
-def wrench(xp, law: LawNumbers, shape: ReducedNumbers, z, zdot, u):
+def wrench(xp, law: LawNumbers, shape: ReducedNumbers, z, zdot, by: Held):
     """Wrench about the origin per unit load, `F' g`."""
-    g = formulas.traction(z, zdot, u, law)
+    g = formulas.traction(z, zdot, by.u, law)
     f, x, y, s = shape.factor, g[..., 0], g[..., 1], g[..., 2]
     return xp.stack([f[0, 0] * x, f[0, 1] * x + f[1, 1] * y, f[0, 2] * x + f[1, 2] * y + f[2, 2] * s], -1)
 
 
-def advance(xp, law: LawNumbers, z, by: Held, dt, epsilon: float):
-    """Moments and their rates after `dt` of a held twist (see `kernels.reduced.advance`).
-
-    `epsilon` is the rounding error of the numbers.
-    """
+def advance(xp, law: LawNumbers, shape: ReducedNumbers, z, by: Held, dt):
+    """Moments and their rates after `dt` of a held twist (see `kernels.reduced.advance`)."""
     size, share = _place(xp, z, by)
     start = end = _closure(xp, law, size, share, by.even)
     if law.elasto_plastic:
@@ -208,9 +204,6 @@ def advance(xp, law: LawNumbers, z, by: Held, dt, epsilon: float):
     across = (1.0 - beta * share) * dt * left_slow * mean_gap
     new = left * z + (mean * by.decay * dt) * by.q + across * by.m
     if law.elasto_plastic:
-        reached = xp.root(dot(new, new) * by.per_q2)
-        largest = formulas.reachable_deflection(xp, size, law)
-        over = reached > (1.0 + ROUNDING * epsilon) * largest
-        new = new * formulas.cap(xp, xp.where(over, reached, 0.0), largest)
+        new = new * back_onto(xp, xp.root(dot(new, new) * by.per_q2), formulas.reachable_deflection(xp, size, law))
     new = xp.where(by.moves, new, z + dt * by.u)
-    return new, rate(xp, law, new, by)
+    return new, rate(xp, law, shape, new, by)

@@ -14,7 +14,7 @@ from planarfriction.torch.distributed import DistributedModel
 from planarfriction.torch.published import ReducedModelPublished
 from planarfriction.torch.reduced import ReducedModel
 from planarfriction.torch.reduced_planar import ReducedPlanarLuGre
-from planarfriction.torch.rollout import Rollout, rollout, simulate, tracking_loss
+from planarfriction.torch.rollout import Rollout, rollout, tracking_loss
 
 __all__ = [
     "DistributedModel",
@@ -23,6 +23,5 @@ __all__ = [
     "ReducedPlanarLuGre",
     "Rollout",
     "rollout",
-    "simulate",
     "tracking_loss",
 ]

@@ -11,14 +11,14 @@ from planarfriction import autodiff
 from planarfriction.errors import FrictionError
 
 _INNER = (1, 2, 1, 1)
-"""Axes of state `[3]`, twists `[T, 3]`, loads `[T]` and parameters `[P]` behind the batch axes."""
+"""Axes of state `[3]`, twist `[T, 3]`, normal_force `[T]` and parameters `[P]` behind the batch axes."""
 
 
 def roll_out(reference: Any, dt: float, *inputs: Tensor) -> tuple[Tensor, Tensor]:
-    """Wrenches `[..., T, 3]` and the last state `[..., 3]` of `autodiff.rollout`.
+    """The last state `[..., 3]` and wrenches `[..., T, 3]` of `autodiff.rollout`.
 
-    `reference` is the NumPy model; `inputs` are state `[..., 3]`, twists `[..., T, 3]`, loads `[..., T]` and parameters
-    `[..., P]`, whose batch axes broadcast.
+    `reference` is the NumPy model; `inputs` are state `[..., 3]`, twist `[..., T, 3]`, normal_force `[..., T]` and
+    parameters `[..., P]`, whose batch axes broadcast.
     """
     return _Rollout.apply(reference, dt, *inputs)  # pyright: ignore[reportReturnType]
 
@@ -26,8 +26,8 @@ def roll_out(reference: Any, dt: float, *inputs: Tensor) -> tuple[Tensor, Tensor
 class _Rollout(torch.autograd.Function):
     @staticmethod
     def forward(reference, dt, *inputs):
-        state, twists, loads, parameters = map(_to_numpy, inputs)
-        result = autodiff.rollout(reference, state, twists, loads, dt, parameters)
+        *arrays, parameters = map(_to_numpy, inputs)
+        result = autodiff.rollout(reference, *arrays, dt, parameters=parameters)
         return tuple(_like(array, inputs) for array in result)
 
     @staticmethod
@@ -45,14 +45,12 @@ class _Rollout(torch.autograd.Function):
 
 
 class _Gradient(torch.autograd.Function):
-    """Cotangents of the inputs from those of wrenches and last state; itself without derivative."""
+    """Cotangents of the inputs from those of last state and wrenches; itself without derivative."""
 
     @staticmethod
     def forward(reference, dt, *tensors):
-        state, twists, loads, parameters, wrenches_bar, state_bar = map(_to_numpy, tensors)
-        gradient = autodiff.rollout_gradient(
-            reference, state, twists, loads, dt, wrenches_bar, state_bar, parameters
-        )  # fmt: skip
+        *arrays, parameters, state_bar, wrenches_bar = map(_to_numpy, tensors)
+        gradient = autodiff.rollout_gradient(reference, *arrays, dt, wrenches_bar, state_bar, parameters=parameters)
         return tuple(_like(array, (tensor,)) for array, tensor in zip(gradient, tensors[:4], strict=True))
 
     @staticmethod
@@ -66,7 +64,7 @@ class _Gradient(torch.autograd.Function):
     @staticmethod
     def vmap(info, in_dims, reference, dt, *tensors):
         size = info.batch_size
-        aligned = _aligned(size, in_dims[2:], tensors, (*_INNER, 2, 1))
+        aligned = _aligned(size, in_dims[2:], tensors, (*_INNER, 1, 2))
         shapes = [_logical(tensor, dim) for tensor, dim in zip(tensors[:4], in_dims[2:6], strict=True)]
         gradients: Any = _Gradient.apply(reference, dt, *aligned)
         return tuple(g.reshape(size, *shape) for g, shape in zip(gradients, shapes, strict=True)), (0,) * 4

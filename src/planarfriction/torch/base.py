@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from types import ModuleType
 from typing import Any, NamedTuple
 
 import torch
@@ -15,7 +16,7 @@ from planarfriction.laws import ElastoPlastic, FrictionLaw, LuGre
 from planarfriction.laws.base import refuse_creep
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.metric import refuse_anisotropy
-from planarfriction.torch import bristle
+from planarfriction.torch import namespace as xp
 from planarfriction.torch.parameters import LAW, PhysicalParameters
 
 TRAINABLE = LAW[:-1]
@@ -25,24 +26,24 @@ TRAINABLE = LAW[:-1]
 class Prepared(NamedTuple):
     """A model's numbers, ready for one evaluation or for all steps of a roll-out."""
 
-    law: Any
-    """A record of the law's parameters, `Law` for bristles."""
-    shape: tuple[Tensor, ...]
-    """Of the patch; the model knows what they are."""
+    law: LawNumbers
+    """Broadcasts with the lengths of bristles."""
+    shape: Any
+    """Numbers of the patch as the model's arrays know them."""
 
 
 class FrictionModel(nn.Module):
-    """A friction model of PyTorch: the caller holds the state `z`; everything is about the contact frame's origin.
+    """A friction model of PyTorch: the caller holds the state; everything is about the contact frame's origin.
 
-    Twists `v` `[..., 3]` are `(vx, vy, omega)` of the moving body, wrenches `(fx, fy, tau)` act on it, loads `f_n`
-    `[...]` are >= 0; leading batch axes broadcast. `parameters` `[..., P]`, in the order of `names`, takes the place
+    `twist` `[..., 3]` is `(vx, vy, omega)` of the moving body, the wrench `(fx, fy, tau)` acts on it, `normal_force`
+    `[...]` is >= 0; leading batch axes broadcast. `parameters` `[..., P]`, in the order of `names`, takes the place
     of the model's own physical values, one row for each contact if wanted.
     """
 
+    arrays: ModuleType
+    """The model as `f(xp, ...)`: `held`, `rate`, `advance` and `wrench` of arrays."""
     components: tuple[int, ...]
     """Shape of the state of one contact."""
-    axis: int
-    """Axis of the components of a bristle."""
     physical: PhysicalParameters
     reference: models.FrictionModel
     """The same model in NumPy, with the parameters that this one started with."""
@@ -91,21 +92,39 @@ class FrictionModel(nn.Module):
         """State of contacts at rest, `[*batch, ...]`."""
         return self.physical.values.new_zeros((*batch, *self.components))
 
-    def forward(self, z: Tensor, v: Tensor, f_n: Tensor | float, *, parameters: Tensor | None = None):
-        """Bristle rates `z_dot` and wrench."""
-        prepared = self.prepare(self._vector(parameters))
-        z, v, load = self._inputs(z, v, f_n)
-        by, velocity = self._drive(prepared, v)
-        rate = self._raw(prepared, bristle.rate(prepared.law, self._scaled(prepared, z), by, self.axis))
-        return rate, load[..., None] * self._wrench(prepared, z, rate, velocity)
+    def forward(
+        self, state: Tensor, twist: Tensor, normal_force: Tensor | float, *, parameters: Tensor | None = None
+    ) -> tuple[Tensor, Tensor]:
+        """Rate of the state, and wrench."""
+        return self._evaluated(state, twist, normal_force, parameters)
+
+    def rate(
+        self, state: Tensor, twist: Tensor, normal_force: Tensor | float, *, parameters: Tensor | None = None
+    ) -> Tensor:
+        """Rate of the state, of its shape."""
+        return self._evaluated(state, twist, normal_force, parameters)[0]
+
+    def wrench(
+        self, state: Tensor, twist: Tensor, normal_force: Tensor | float, *, parameters: Tensor | None = None
+    ) -> Tensor:
+        """Friction wrench on the moving body `[..., 3]` [N, N, N m]."""
+        return self._evaluated(state, twist, normal_force, parameters)[1]
 
     def step(
-        self, z: Tensor, v: Tensor, f_n: Tensor | float, dt: Tensor | float, *, parameters: Tensor | None = None
+        self,
+        state: Tensor,
+        twist: Tensor,
+        normal_force: Tensor | float,
+        dt: Tensor | float,
+        *,
+        parameters: Tensor | None = None,
     ) -> tuple[Tensor, Tensor]:
-        """Bristles after `dt` [s] of a held twist, and the wrench at the end; a contact without load forgets."""
+        """State after `dt` [s] of a held twist, and the wrench at the end; a contact without load forgets."""
         prepared = self.prepare(self._vector(parameters))
-        z, v, load = self._inputs(z, v, f_n)
-        return self.advance(prepared, z, v, load, self._number(dt))
+        z, v, load = self._inputs(state, twist, normal_force)
+        by = self.arrays.held(xp, *prepared, v)
+        new, zdot = self.arrays.advance(xp, *prepared, z, by, self._inner(self._number(dt)))
+        return self._kept(new, load), load[..., None] * self.arrays.wrench(xp, *prepared, new, zdot, by)
 
     @property
     def lever(self) -> float:
@@ -116,59 +135,42 @@ class FrictionModel(nn.Module):
         """The numbers of the model at given physical parameters `[..., P]`."""
         raise NotImplementedError
 
-    def advance(self, prepared: Prepared, z: Tensor, v: Tensor, load: Tensor, dt: Tensor) -> tuple[Tensor, Tensor]:
-        """`step` of checked inputs."""
-        by, velocity = self._drive(prepared, v)
-        new, zdot = self._advance(prepared, z, by, dt)
-        return self._kept(new, load), load[..., None] * self._wrench(prepared, new, zdot, velocity)
-
     def roll_out(
         self, parameters: Tensor | None, z: Tensor, v: Tensor, load: Tensor, dt: Tensor
     ) -> tuple[Tensor, Tensor]:
-        """`advance` through twists `[..., T, 3]` and loads `[..., T]`: all wrenches `[..., T, 3]` and the last state.
+        """Steps through twists `[..., T, 3]` and loads `[..., T]`: the last state and all wrenches `[..., T, 3]`.
 
         Only the bristles go step by step; what drives them and what they cause is worked out for all steps at once.
         """
-        values = self._vector(parameters)
+        values, dt = self._vector(parameters), self._inner(dt)
         once, steps = self.prepare(values), self.prepare(values[..., None, :])
-        by, velocity = self._drive(steps, v)
+        by = self.arrays.held(xp, *steps, v)
         inner = len(self.components)
-        drives = zip(*(part.unbind(part.ndim - inner - 1) for part in by), strict=True)
+        drives = zip(*(_along(part, v.shape[-2], inner) for part in by), strict=True)
         states, rates = [], []
-        for drive, f_n in zip(drives, load.unbind(-1), strict=True):
-            new, zdot = self._advance(once, z, bristle.Drive(*drive), dt)
+        for drive, now in zip(drives, load.unbind(-1), strict=True):
+            new, zdot = self.arrays.advance(xp, *once, z, type(by)(*drive), dt)
             states.append(new)
             rates.append(zdot)
-            z = self._kept(new, f_n)
-        along = -inner - 1
-        wrenches = self._wrench(steps, torch.stack(states, along), torch.stack(rates, along), velocity)
-        return load[..., None] * wrenches, z
+            z = self._kept(new, now)
+        states, rates = torch.stack(states, -inner - 1), torch.stack(rates, -inner - 1)
+        return z, load[..., None] * self.arrays.wrench(xp, *steps, states, rates, by)
 
-    def _advance(self, prepared: Prepared, z: Tensor, by: bristle.Drive, dt: Tensor) -> tuple[Tensor, Tensor]:
-        """Bristles and their rates after a step."""
-        dt = dt.reshape(dt.shape + (1,) * len(self.components))
-        new, zdot = bristle.step(prepared.law, self._scaled(prepared, z), by, dt, self.axis)
-        return self._raw(prepared, new), self._raw(prepared, zdot)
+    def _evaluated(self, state, twist, normal_force, parameters) -> tuple[Tensor, Tensor]:
+        """Rate and wrench."""
+        prepared = self.prepare(self._vector(parameters))
+        z, v, load = self._inputs(state, twist, normal_force)
+        by = self.arrays.held(xp, *prepared, v)
+        rate = self.arrays.rate(xp, *prepared, z, by)
+        return rate, load[..., None] * self.arrays.wrench(xp, *prepared, z, rate, by)
 
     def _kept(self, z: Tensor, load: Tensor) -> Tensor:
         """Bristles that a contact keeps: one without load forgets them."""
-        return torch.where((load > 0.0).reshape(load.shape + (1,) * len(self.components)), z, 0.0)
+        return torch.where(self._inner(load > 0.0), z, 0.0)
 
-    def _drive(self, prepared: Prepared, v: Tensor) -> tuple[bristle.Drive, Tensor]:
-        """What drives the bristles, and the velocity that viscous friction sees."""
-        raise NotImplementedError
-
-    def _wrench(self, prepared: Prepared, z: Tensor, zdot: Tensor, velocity: Tensor) -> Tensor:
-        """Wrench about the origin, per unit load."""
-        raise NotImplementedError
-
-    def _scaled(self, prepared: Prepared, z: Tensor) -> Tensor:
-        """Bristles in the coordinates that the equation of a bristle holds in."""
-        return z
-
-    def _raw(self, prepared: Prepared, z: Tensor) -> Tensor:
-        """Inverse of `_scaled`."""
-        return z
+    def _inner(self, value: Tensor) -> Tensor:
+        """One value for each contact beside the components of a state."""
+        return value.reshape(value.shape + (1,) * len(self.components))
 
     # ------------------------------------------------------------------ inputs
 
@@ -176,13 +178,13 @@ class FrictionModel(nn.Module):
         values = self.physical.values
         return value if isinstance(value, Tensor) else torch.as_tensor(value, dtype=values.dtype, device=values.device)
 
-    def _inputs(self, z, v, f_n) -> tuple[Tensor, Tensor, Tensor]:
-        z, v, load = self._number(z), self._number(v), self._number(f_n)
+    def _inputs(self, state, twist, normal_force) -> tuple[Tensor, Tensor, Tensor]:
+        z, v, load = self._number(state), self._number(twist), self._number(normal_force)
         if z.shape[z.ndim - len(self.components) :] != self.components:
             wanted = ", ".join(map(str, self.components))
-            raise InvalidValueError("z", f"have shape [..., {wanted}]", f"shape {list(z.shape)}")
+            raise InvalidValueError("state", f"have shape [..., {wanted}]", f"shape {list(z.shape)}")
         if v.shape[-1:] != (3,):
-            raise InvalidValueError("v", "have shape [..., 3]", f"shape {list(v.shape)}")
+            raise InvalidValueError("twist", "have shape [..., 3]", f"shape {list(v.shape)}")
         return z, v, load
 
     def _vector(self, parameters: Tensor | None) -> Tensor:
@@ -198,3 +200,8 @@ class FrictionModel(nn.Module):
         trailing = (1,) * len(self.components)
         values = [value.reshape(value.shape + trailing) for value in parameters[..., : len(LAW)].unbind(-1)]
         return LawNumbers(**dict(zip(LAW, values, strict=True)), elasto_plastic=self.elasto_plastic)
+
+
+def _along(part: Any, steps: int, inner: int) -> Iterable[Any]:
+    """What a step holds, for each of the steps; a plain number is the same for all."""
+    return part.unbind(part.ndim - inner - 1) if isinstance(part, Tensor) else [part] * steps

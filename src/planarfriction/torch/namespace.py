@@ -10,7 +10,8 @@ import math
 import torch
 from torch import Tensor
 
-exp, sin, cos, stack = torch.exp, torch.sin, torch.cos, torch.stack
+exp, sin, cos, stack, ones_like = torch.exp, torch.sin, torch.cos, torch.stack, torch.ones_like
+atan2, moveaxis, concatenate, broadcast_arrays = torch.atan2, torch.movedim, torch.concatenate, torch.broadcast_tensors
 
 
 def where(condition, a, b):
@@ -39,9 +40,14 @@ def power(x: Tensor, exponent: Tensor) -> Tensor:
     return torch.where(usual, torch.pow(torch.where(usual, x, 1.0), exponent), largest)
 
 
+def dot(a: Tensor, b: Tensor, axis: int) -> Tensor:
+    """`a . b` along an axis, which stays with length 1."""
+    return (a * b).sum(axis, keepdim=True)
+
+
 def norm(vector: Tensor, axis: int) -> Tensor:
     """`|vector|` along an axis, which stays with length 1; its derivative at 0 is 0."""
-    return root((vector * vector).sum(axis, keepdim=True))
+    return root(dot(vector, vector, axis))
 
 
 def root(x: Tensor) -> Tensor:
@@ -53,3 +59,13 @@ def root(x: Tensor) -> Tensor:
 def whole(x: Tensor, most: int) -> Tensor:
     """Integer part, from 0 to `most`."""
     return x.detach().long().clamp(0, most)
+
+
+def held(x: Tensor) -> Tensor:
+    """The value, without its derivative."""
+    return x.detach()
+
+
+def epsilon(x: Tensor) -> float:
+    """Rounding error of the numbers."""
+    return torch.finfo(x.dtype).eps

@@ -5,17 +5,32 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from planarfriction import models
-from planarfriction.laws import LuGre
-from planarfriction.limit_surface import LimitSurface
+from planarfriction.laws import FrictionLaw
+from planarfriction.limit_surface import LimitSurface, surface_arrays
+from planarfriction.models import published_arrays
+from planarfriction.models.published_arrays import PublishedNumbers
 from planarfriction.patch import ContactPatch
-from planarfriction.torch import bristle
 from planarfriction.torch import namespace as xp
 from planarfriction.torch.base import TRAINABLE, FrictionModel, Prepared
 from planarfriction.torch.parameters import LAW
-from planarfriction.torch.surfaces import surface_of
+
+
+class Surface(nn.Module):
+    """A limit surface in a buffer; `forward(scaled, speed)` gives `u = h(V) |V_S|` `[..., 3]`."""
+
+    data: Tensor
+
+    def __init__(self, surface: LimitSurface, **kind) -> None:
+        super().__init__()
+        self.kind, self.size, data = surface.numbers
+        self.register_buffer("data", torch.as_tensor(data, **kind).clone())
+
+    def forward(self, scaled: Tensor, speed: Tensor) -> Tensor:
+        """`u` of scaled twists `[..., 3]` and their norms `[..., 1]`."""
+        return surface_arrays.sliding(xp, self.kind, self.size, self.data, scaled, speed)
 
 
 class ReducedModelPublished(FrictionModel):
@@ -33,14 +48,14 @@ class ReducedModelPublished(FrictionModel):
     Source: Waltersson and Karayiannidis 2024, section IV.
     """
 
+    arrays = published_arrays
     components = (3,)
-    axis = -1
     reference: models.ReducedModelPublished
 
     def __init__(
         self,
         patch: ContactPatch,
-        law: LuGre,
+        law: FrictionLaw,
         surface: LimitSurface | None = None,
         *,
         trainable: Iterable[str] = TRAINABLE,
@@ -52,7 +67,7 @@ class ReducedModelPublished(FrictionModel):
         self.reference = models.ReducedModelPublished(patch, law, surface, on_load_change=when)  # pyright: ignore
         shape = self.reference._reference
         kind = {"dtype": dtype or torch.get_default_dtype(), "device": device}
-        self.surface = surface_of(shape.surface, **kind)
+        self.surface = Surface(shape.surface, **kind)
         x, y = shape.centre_of_pressure.tolist()
         numbers = law.numbers._asdict()
         values = {name: numbers[name] for name in LAW}
@@ -65,36 +80,7 @@ class ReducedModelPublished(FrictionModel):
         return float(self.reference._reference.contact_radius)
 
     def prepare(self, parameters: Tensor) -> Prepared:
-        """The law, `S` as a vector, `r`, `<rho^2>` and the centre of pressure."""
-        radius, second_moment, x, y = parameters[..., len(LAW) :].split(1, -1)
-        scale = torch.cat([torch.ones_like(radius), torch.ones_like(radius), radius], -1)
-        return Prepared(self._law(parameters), (scale, radius, second_moment, x, y))
-
-    def _drive(self, prepared: Prepared, v: Tensor) -> tuple[bristle.Drive, Tensor]:
-        """What drives the scaled bristle, and `U V`."""
-        _, radius, second_moment, x, y = prepared.shape
-        vx, vy, omega = v.split(1, -1)
-        vx, vy = vx - omega * y, vy + omega * x
-        scaled = _joined(vx, vy, radius * omega)
-        speed = xp.norm(scaled, -1)
-        u = self.surface(scaled, speed)
-        u_norm = xp.norm(u, -1)
-        slides = u_norm > 0.0
-        size = torch.where(slides, u_norm / torch.where(slides, speed, 1.0), 1.0)
-        return bristle.drive(prepared.law, u, speed, size), _joined(vx, vy, second_moment * omega)
-
-    def _wrench(self, prepared: Prepared, z: Tensor, zdot: Tensor, velocity: Tensor) -> Tensor:
-        """Wrench about the origin, per unit load."""
-        _, _, _, x, y = prepared.shape
-        fx, fy, tau = bristle.traction(prepared.law, z, zdot, velocity).split(1, -1)
-        return _joined(fx, fy, tau + x * fy - y * fx)
-
-    def _scaled(self, prepared: Prepared, z: Tensor) -> Tensor:
-        return z / prepared.shape[0]
-
-    def _raw(self, prepared: Prepared, z: Tensor) -> Tensor:
-        return z * prepared.shape[0]
-
-
-def _joined(*components: Tensor) -> Tensor:
-    return torch.cat(torch.broadcast_tensors(*components), -1)
+        """The law, `r`, `<rho^2>`, the centre of pressure, and the limit surface."""
+        return Prepared(
+            self._law(parameters), PublishedNumbers(*parameters[..., len(LAW) :].split(1, -1), self.surface)
+        )

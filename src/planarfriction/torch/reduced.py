@@ -10,11 +10,10 @@ from torch import Tensor
 from planarfriction import models
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
-from planarfriction.laws import ElastoPlastic, LuGre
+from planarfriction.laws import ElastoPlastic, FrictionLaw, LuGre
 from planarfriction.models import reduced_arrays
-from planarfriction.models.reduced_arrays import Held, ReducedNumbers
+from planarfriction.models.reduced_arrays import ReducedNumbers
 from planarfriction.patch import ContactPatch
-from planarfriction.torch import namespace as xp
 from planarfriction.torch.base import FrictionModel, Prepared
 from planarfriction.torch.parameters import LAW
 
@@ -31,8 +30,8 @@ class ReducedModel(FrictionModel):
     `planarfriction.ReducedModel`.
     """
 
+    arrays = reduced_arrays
     components = (3,)
-    axis = -1
     reference: models.ReducedModel
     factor: Tensor
     quartic: Tensor
@@ -43,7 +42,7 @@ class ReducedModel(FrictionModel):
     def __init__(
         self,
         patch: ContactPatch,
-        law: LuGre,
+        law: FrictionLaw,
         normal_force: float | None = None,
         *,
         segments: int = 24,
@@ -80,57 +79,11 @@ class ReducedModel(FrictionModel):
     def prepare(self, parameters: Tensor) -> Prepared:
         """The law; the shape is fixed."""
         values = dict(zip(PARAMETERS, parameters[..., None].unbind(-2), strict=True))
-        return Prepared(LawNumbers(**values, gamma=self.gamma, elasto_plastic=self.elasto_plastic), ())
-
-    def forward(self, z: Tensor, v: Tensor, f_n: Tensor | float, *, parameters: Tensor | None = None):
-        """Rates `z_dot` of the moments and wrench."""
-        law = self.prepare(self._vector(parameters)).law
-        z, v, load = self._inputs(z, v, f_n)
-        by = self._held(law, v)
-        rate = reduced_arrays.rate(xp, law, z, by)
-        return rate, load[..., None] * reduced_arrays.wrench(xp, law, self._shape, z, rate, by.u)
-
-    def advance(self, prepared: Prepared, z: Tensor, v: Tensor, load: Tensor, dt: Tensor) -> tuple[Tensor, Tensor]:
-        """`step` of checked inputs."""
-        by = self._held(prepared.law, v)
-        new, zdot = self._next(prepared.law, z, by, dt)
-        wrench = reduced_arrays.wrench(xp, prepared.law, self._shape, new, zdot, by.u)
-        return self._kept(new, load), load[..., None] * wrench
-
-    def roll_out(
-        self, parameters: Tensor | None, z: Tensor, v: Tensor, load: Tensor, dt: Tensor
-    ) -> tuple[Tensor, Tensor]:
-        """`advance` through twists `[..., T, 3]` and loads `[..., T]`: all wrenches `[..., T, 3]` and the last state.
-
-        Only the moments go step by step; the steady states are read, and the wrenches made, for all steps at once.
-        """
-        values = self._vector(parameters)
-        once, steps = self.prepare(values).law, self.prepare(values[..., None, :]).law
-        by = self._held(steps, v)
-        along = zip(*(_steps(part, v.shape[-2]) for part in by), strict=True)
-        states, rates = [], []
-        for now, f_n in zip(along, load.unbind(-1), strict=True):
-            new, zdot = self._next(once, z, Held(*now), dt)
-            states.append(new)
-            rates.append(zdot)
-            z = self._kept(new, f_n)
-        wrenches = reduced_arrays.wrench(xp, steps, self._shape, torch.stack(states, -2), torch.stack(rates, -2), by.u)
-        return load[..., None] * wrenches, z
+        return Prepared(LawNumbers(**values, gamma=self.gamma, elasto_plastic=self.elasto_plastic), self._shape)
 
     @property
     def _shape(self) -> ReducedNumbers:
         return ReducedNumbers(*(getattr(self, name) for name in _BUFFERS))
 
-    def _held(self, law, v: Tensor) -> Held:
-        return reduced_arrays.held(xp, law, self._shape, v)
-
-    def _next(self, law, z: Tensor, by: Held, dt: Tensor) -> tuple[Tensor, Tensor]:
-        return reduced_arrays.advance(xp, law, z, by, dt[..., None], torch.finfo(z.dtype).eps)
-
 
 _BUFFERS = ("factor", "quartic", "scale", "flat", "rest_part")
-
-
-def _steps(part: Tensor | float, count: int) -> Iterable[Tensor | float]:
-    """What a step holds, for each of the steps."""
-    return part.unbind(-2) if isinstance(part, Tensor) else [part] * count

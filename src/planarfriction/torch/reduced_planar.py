@@ -16,6 +16,7 @@ from planarfriction import formulas, validation
 from planarfriction.errors import FrictionError, InvalidValueError
 from planarfriction.laws import LuGre
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceEllipsoid
+from planarfriction.models import published_arrays
 from planarfriction.patch import ContactPatch
 from planarfriction.torch import namespace as xp
 from planarfriction.torch.base import TRAINABLE
@@ -133,7 +134,8 @@ class ReducedPlanarLuGre(ReducedModelPublished):
         law, speed = self._law(values), xp.norm(v_scaled, -1)
         moving = speed > 0.0
         h = self.surface(v_scaled, speed) / torch.where(moving, speed, 1.0)  # zero at rest
-        return self._raw(self.prepare(values), h * formulas.stribeck(xp, speed, law) / law.sigma_0)
+        scale = published_arrays.scale(xp, self.prepare(values).shape)
+        return scale * h * formulas.stribeck(xp, speed, law) / law.sigma_0
 
     def bristle_rate(self, z: Tensor, v: Tensor) -> Tensor:
         """`z_dot = S h |v_s| - sigma_0 |v_s|/g z` `[..., 3]` [m/s, m/s, m^2/s]."""
@@ -143,8 +145,8 @@ class ReducedPlanarLuGre(ReducedModelPublished):
         """Wrench `w = -(sigma_0 z + sigma_1 z_dot + sigma_2 U v) f_n` `[..., 3]` [N, N, N m]."""
         prepared = self.prepare(self.physical())
         z, v, load = self._inputs(z, v, f_n)
-        _, velocity = self._drive(prepared, v)
-        return load[..., None] * self._wrench(prepared, z, self._number(z_dot), velocity)
+        by = self.arrays.held(xp, *prepared, v)
+        return load[..., None] * self.arrays.wrench(xp, *prepared, z, self._number(z_dot), by)
 
     def step(self, z: Tensor, v: Tensor, f_n: Tensor | float, dt: Tensor | float) -> tuple[Tensor, Tensor]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Bristles after `dt` [s] of a held twist, and the wrench at the end: exact, stable at any `dt`."""
@@ -167,7 +169,7 @@ def simulate(model: ReducedPlanarLuGre, v_profile: Tensor, f_n: Tensor | float, 
     By the compiled roll-out and its adjoint where it can, see `planarfriction.torch.rollout`; batches `[..., T, 3]`
     and loads `[T]` too.
     """
-    return rollout(model, v_profile, f_n, dt).wrenches
+    return rollout(model, None, v_profile, f_n, dt).wrenches
 
 
 def tracking_loss(
@@ -181,7 +183,7 @@ def tracking_loss(
 
     See `planarfriction.torch.tracking_loss`; the radius is that of the start.
     """
-    return weighted_loss(model, v_profile, reference, f_n, dt)
+    return weighted_loss(model, None, v_profile, f_n, dt, reference)
 
 
 def smoke_test() -> None:

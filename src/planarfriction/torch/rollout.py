@@ -18,70 +18,55 @@ METHODS = ("adjoint", "eager")
 
 
 class Rollout(NamedTuple):
-    """A roll-out of T steps."""
+    """A model stepped through T twists and loads."""
 
-    wrenches: Tensor
-    """Wrenches at the end of each step, `[..., T, 3]` [N, N, N m]."""
     state: Tensor
     """State after the last step, `[..., *components]`."""
-
-
-def simulate(
-    model: FrictionModel,
-    v_profile: Tensor,
-    f_n: Tensor | float,
-    dt: Tensor | float,
-    *,
-    z: Tensor | None = None,
-    parameters: Tensor | None = None,
-    method: str | None = None,
-) -> Tensor:
-    """Wrenches `[..., T, 3]` of the twists `v_profile` `[..., T, 3]`, each held for `dt` [s]; see `rollout`."""
-    return rollout(model, v_profile, f_n, dt, z=z, parameters=parameters, method=method).wrenches
+    wrenches: Tensor
+    """Wrench on the moving body at the end of each step, `[..., T, 3]` [N, N, N m]."""
 
 
 def rollout(
     model: FrictionModel,
-    v_profile: Tensor,
-    f_n: Tensor | float,
+    state: Tensor | None,
+    twist: Tensor,
+    normal_force: Tensor | float,
     dt: Tensor | float,
     *,
-    z: Tensor | None = None,
     parameters: Tensor | None = None,
     method: str | None = None,
 ) -> Rollout:
-    """Wrenches and the last state of `model.step` through the twists `v_profile` `[..., T, 3]`.
+    """The steps of a model from `state` (None: at rest) through `twist` `[..., T, 3]`, each held for `dt` [s].
 
-    The loads `f_n` broadcast with `[..., T]`: one number, one for each step `[T]`, or one for each contact `[..., 1]`.
-    `z` is the state at the start (None: at rest). Gradients reach the parameters of the model, `v_profile`, `f_n`,
-    `z` and `parameters`.
+    `normal_force` broadcasts with `[..., T]`: one number, one for each step `[T]`, or one for each contact `[..., 1]`.
+    Gradients reach the parameters of the model, `state`, `twist`, `normal_force` and `parameters`.
 
-    `method` is `"adjoint"`, the compiled roll-out with its discrete adjoint (reduced model on the processor, first
-    derivatives), or `"eager"`, PyTorch operations step by step (any model and device, derivatives of any order, also
-    to `dt`); None takes the adjoint where it can.
+    `method` is `"adjoint"`, the compiled roll-out with its discrete adjoint (`ReducedModelPublished` on the processor,
+    first derivatives), or `"eager"`, PyTorch operations step by step (any model and device, derivatives of any order,
+    also to `dt`); None takes the adjoint where it can.
 
     Raises `InvalidValueError` for wrong shapes and for a method that is not possible; the adjoint also for numbers that
     are not finite and for loads below zero.
     """
     if method is not None:
         validation.choice("method", method, METHODS)
-    v_profile, loads, step = model._number(v_profile), model._number(f_n), model._number(dt)
-    if v_profile.ndim < 2 or v_profile.shape[-1] != 3 or v_profile.shape[-2] == 0:
-        raise InvalidValueError("v_profile", "have shape [..., T, 3] with T > 0", f"shape {list(v_profile.shape)}")
+    twist, load, step = model._number(twist), model._number(normal_force), model._number(dt)
+    if twist.ndim < 2 or twist.shape[-1] != 3 or twist.shape[-2] == 0:
+        raise InvalidValueError("twist", "have shape [..., T, 3] with T > 0", f"shape {list(twist.shape)}")
     if step.ndim:
         raise InvalidValueError("dt", "be one number", f"shape {list(step.shape)}")
-    start = model.rest() if z is None else model._number(z)
+    start = model.rest() if state is None else model._inputs(state, twist, load)[0]
     try:
-        loads = loads.expand(torch.broadcast_shapes(loads.shape, v_profile.shape[-2:-1]))
+        load = load.expand(torch.broadcast_shapes(load.shape, twist.shape[-2:-1]))
     except RuntimeError:
-        rule = f"broadcast with [..., {v_profile.shape[-2]}]"
-        raise InvalidValueError("f_n", rule, f"shape {list(loads.shape)}") from None
-    obstacle = _obstacle(model, start, v_profile, loads, step)
+        rule = f"broadcast with [..., {twist.shape[-2]}]"
+        raise InvalidValueError("normal_force", rule, f"shape {list(load.shape)}") from None
+    obstacle = _obstacle(model, start, twist, load, step)
     if method == "adjoint" and obstacle:
         raise InvalidValueError("method", f"be 'eager' {obstacle}", repr(method))
     if method == "eager" or obstacle:
-        return Rollout(*model.roll_out(parameters, start, v_profile, loads, step))
-    return Rollout(*adjoint.roll_out(model.reference, float(step), start, v_profile, loads, model._vector(parameters)))
+        return Rollout(*model.roll_out(parameters, start, twist, load, step))
+    return Rollout(*adjoint.roll_out(model.reference, float(step), start, twist, load, model._vector(parameters)))
 
 
 def _obstacle(model: FrictionModel, *tensors: Tensor) -> str:
@@ -96,17 +81,25 @@ def _obstacle(model: FrictionModel, *tensors: Tensor) -> str:
 
 
 def tracking_loss(
-    model: FrictionModel, v_profile: Tensor, reference: Tensor, f_n: Tensor | float, dt: float, **options
+    model: FrictionModel,
+    state: Tensor | None,
+    twist: Tensor,
+    normal_force: Tensor | float,
+    dt: Tensor | float,
+    wrenches: Tensor,
+    *,
+    parameters: Tensor | None = None,
+    method: str | None = None,
 ) -> Tensor:
-    """Mean squared error of the wrench against `reference` `[..., T, 3]`: forces by the load, torque by load times r.
+    """Mean squared error of a `rollout` against measured `wrenches` `[..., T, 3]`, as a share of the load.
 
     `mean(((fx - fx*)/f_N)^2 + ((fy - fy*)/f_N)^2 + ((tau - tau*)/(f_N r))^2)` over the samples with load. The scales
-    are constants, r that of the patch. `options` are those of `simulate`.
+    are constants, r that of the patch. The other arguments are those of `rollout`.
     """
-    wrenches = simulate(model, v_profile, f_n, dt, **options)
-    reference, load = model._number(reference), model._number(f_n).detach()[..., None]
+    run = rollout(model, state, twist, normal_force, dt, parameters=parameters, method=method)
+    measured, load = model._number(wrenches), model._number(normal_force).detach()[..., None]
     loaded = load > 0.0
     lever = load.new_tensor([1.0, 1.0, model.lever])
-    error = torch.where(loaded, (wrenches - reference) / (torch.where(loaded, load, 1.0) * lever), 0.0)
+    error = torch.where(loaded, (run.wrenches - measured) / (torch.where(loaded, load, 1.0) * lever), 0.0)
     count = loaded.expand(torch.broadcast_shapes(loaded.shape, (*error.shape[:-1], 1))).sum()
     return (error * error).sum() / count.clamp(min=1)
