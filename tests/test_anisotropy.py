@@ -90,7 +90,8 @@ def test_translation_is_opposed_by_the_metric(heading):
 def test_coefficients_along_and_across_the_grain():
     for angle, coefficient in ((0.4, 1.3), (0.4 + math.pi / 2, 0.6)):
         e = np.array([math.cos(angle), math.sin(angle), 0.0])
-        np.testing.assert_allclose(steady(PATCHES["metric"], e)[:2], -coefficient * e[:2], rtol=1e-13)
+        # At 1 m/s, sigma_1 = 8e2 amplifies what the rounding of the velocity, 1e-16, leaves of the bristles' rate.
+        np.testing.assert_allclose(steady(PATCHES["metric"], e)[:2], -coefficient * e[:2], rtol=0.0, atol=3e-13)
 
 
 def test_easier_one_way_than_the_other():
