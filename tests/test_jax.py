@@ -256,6 +256,9 @@ def test_gradients_are_finite_at_kinks(kind, law):
 )
 def test_eager_and_adjoint_agree_at_kinks_too(kind, law):
     model = pairs(kind, law)[1]
+    # centre and radius without rounding: else that, and not the model, says on which side of a kink a twist is
+    whole = model.parameters._replace(centre_x=0.0, centre_y=0.0, contact_radius=2.0**-8)
+    model = model.replace(parameters=whole)
     motion, loads = hard(model)
     sides = np.random.default_rng(0).normal(size=motion.shape) * (1.0, 1.0, 100.0)
 
