@@ -1,4 +1,5 @@
 # make demo: the main job, with everything it needs.   make test: the tests.   The rest is for development.
+# make test-generic: the tests of numbers once more, compiled for any x86-64 or ARM processor instead of this one.
 
 PYTHON ?= python3
 VENV := .venv
@@ -8,7 +9,7 @@ BIN := $(VENV)/bin
 # survive from run to run. What is installed changes with pyproject.toml only.
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test lint bench clean
+.PHONY: demo test test-generic lint bench clean
 
 demo: $(VENV)/.package
 	$(BIN)/planarfriction run in-hand --model both --out out/ --plot
@@ -16,6 +17,20 @@ demo: $(VENV)/.package
 # Two processes, each test file in one of them: results that the tests of a file share are computed once.
 test: $(VENV)/.test
 	$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
+
+# What compiled loops and BLAS may round differently elsewhere: surfaces, models, steps, solver, compression, derivatives.
+NUMERIC := anisotrop* autodiff* batches compiled_math compressed exact formulas jax* limit_surface* models plain_data \
+	reduced_model scene_sensitivities solver steps torch*
+GENERIC := $(CURDIR)/.numba_cache/generic
+
+test-generic: $(VENV)/.test $(GENERIC)
+	NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES= NUMBA_CACHE_DIR=$(GENERIC) \
+	$(BIN)/python -m pytest -n 2 --dist loadfile $(NUMERIC:%=tests/test_%.py) $(ARGS)
+
+# Numba looks for changes in the file of a compiled function only, not in those that it calls.
+$(GENERIC): $(wildcard src/planarfriction/formulas.py src/planarfriction/kernels/*.py)
+	rm -rf $@
+	mkdir -p $@
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
@@ -27,7 +42,7 @@ bench: $(VENV)/.package
 	$(BIN)/planarfriction bench $(ARGS)
 
 clean:
-	rm -rf $(VENV) out build dist .pytest_cache .ruff_cache .hypothesis .import_linter_cache src/*.egg-info
+	rm -rf $(VENV) out build dist .numba_cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache src/*.egg-info
 	find src tests examples -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:

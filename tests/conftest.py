@@ -1,0 +1,15 @@
+"""What a test run draws: the same examples each time, unless it is asked for others."""
+
+from __future__ import annotations
+
+from hypothesis import settings
+
+settings.register_profile("repeatable", derandomize=True)
+settings.register_profile("random", derandomize=False)
+
+
+def pytest_configure(config) -> None:
+    """A run that decides on a change must not fail for another reason; slow tests may draw new examples."""
+    if config.getoption("--hypothesis-profile") is None:
+        slow = "slow" in config.getoption("markexpr").replace("not slow", "")
+        settings.load_profile("random" if slow else "repeatable")
