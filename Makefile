@@ -1,15 +1,17 @@
 # make demo: the main job, with everything it needs.   make test: the tests.   The rest is for development.
 # make test-generic: the tests of numbers once more, compiled for any x86-64 or ARM processor instead of this one.
+# make test-lowest: the tests with the lowest versions of everything.
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+LOWEST := .venv-lowest
 
 # The package is installed in place, so that sources count at once and compiled kernels, which Numba keeps beside them,
 # survive from run to run. What is installed changes with pyproject.toml only.
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test test-generic lint bench clean
+.PHONY: demo test test-generic test-lowest lint bench clean
 
 demo: $(VENV)/.package
 	$(BIN)/planarfriction run in-hand --model both --out out/ --plot
@@ -21,14 +23,18 @@ test: $(VENV)/.test
 # What compiled loops and BLAS may round differently elsewhere: surfaces, models, steps, solver, compression, derivatives.
 NUMERIC := anisotrop* autodiff* batches compiled_math compressed exact formulas jax* limit_surface* models plain_data \
 	reduced_model scene_sensitivities solver steps torch*
-GENERIC := $(CURDIR)/.numba_cache/generic
+CACHES := $(CURDIR)/.numba_cache
 
-test-generic: $(VENV)/.test $(GENERIC)
-	NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES= NUMBA_CACHE_DIR=$(GENERIC) \
+test-generic: $(VENV)/.test $(CACHES)/generic
+	NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES= NUMBA_CACHE_DIR=$(CACHES)/generic \
 	$(BIN)/python -m pytest -n 2 --dist loadfile $(NUMERIC:%=tests/test_%.py) $(ARGS)
 
+# The lowest versions that pyproject.toml promises, without the optional front ends.
+test-lowest: $(LOWEST)/.test $(CACHES)/lowest
+	NUMBA_CACHE_DIR=$(CACHES)/lowest $(LOWEST)/bin/python -m pytest -n 2 --dist loadfile $(ARGS)
+
 # Numba looks for changes in the file of a compiled function only, not in those that it calls.
-$(GENERIC): $(wildcard src/planarfriction/formulas.py src/planarfriction/kernels/*.py)
+$(CACHES)/%: $(wildcard src/planarfriction/formulas.py src/planarfriction/kernels/*.py)
 	rm -rf $@
 	mkdir -p $@
 
@@ -42,7 +48,7 @@ bench: $(VENV)/.package
 	$(BIN)/planarfriction bench $(ARGS)
 
 clean:
-	rm -rf $(VENV) out build dist .numba_cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache src/*.egg-info
+	rm -rf $(VENV) $(LOWEST) out build dist .numba_cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache src/*.egg-info
 	find src tests examples -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:
@@ -57,6 +63,12 @@ $(VENV)/.package: pyproject.toml | $(BIN)/python
 # PyTorch comes as a build for the CPU alone; others bring gigabytes for GPUs.
 $(VENV)/.test: $(VENV)/.package
 	$(PIP) --editable '.[test,torch,jax,quartic,examples]' torch==2.13.0
+	touch $@
+
+$(LOWEST)/.test: pyproject.toml
+	$(PYTHON) -m venv --clear $(LOWEST)
+	$(LOWEST)/bin/python -m pip install --quiet --disable-pip-version-check uv
+	$(LOWEST)/bin/uv pip install --quiet --python $(LOWEST) --resolution lowest-direct --editable '.[test]'
 	touch $@
 
 $(VENV)/.dev: $(VENV)/.test
