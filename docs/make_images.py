@@ -19,7 +19,7 @@ from planarfriction.patch import PUBLISHED_PATCHES
 LARGEST = 150_000
 """Largest size of a picture [bytes]."""
 
-LAW = pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
+LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
 """The published law."""
 
 

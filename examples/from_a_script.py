@@ -108,7 +108,9 @@ def draw(compared: Comparison) -> PlotFigure:
         twist = np.zeros((len(angle), 3))
         twist[:, "xy".index(axis)], twist[:, 2] = np.cos(angle), np.sin(angle) / r
         torque = -pf.LimitSurfaceTable(PAD).wrench(twist)[:, 2] / r
-        right.plot(np.degrees(angle), torque, color=PALETTE[0], linestyle=style, label=f"exact surface, slide along {axis}")
+        right.plot(
+            np.degrees(angle), torque, color=PALETTE[0], linestyle=style, label=f"exact surface, slide along {axis}"
+        )
     right.plot(np.degrees(angle), np.sin(angle), color=PALETTE[1], label="ellipsoid")
     right.set(xlabel="from slide (0) to spin (90) [deg]", ylabel="torque / (mu f_N r)", xticks=[0, 30, 60, 90])
     right.legend(loc="lower right", frameon=False, fontsize=8)

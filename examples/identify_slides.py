@@ -28,9 +28,7 @@ BODY = SlidingBody(MASS, INERTIA)
 WINDOW = 8
 """First poses that the start of a slide is estimated from: 47 ms of some 290 ms."""
 
-START = pf.LuGre(
-    mu_c=0.22, mu_s=0.22, v_s=1e-3, sigma_0=1e6, sigma_1=20.0, sigma_2=0.02, elasto_plastic=pf.ElastoPlastic(0.9)
-)
+START = pf.LuGre(mu_c=0.22, sigma_0=1e6, sigma_1=20.0, sigma_2=0.02, elasto_plastic=0.9)
 """Dry friction that may grow with the speed, on bristles so stiff that only the coefficient counts."""
 
 

@@ -115,9 +115,7 @@ def bristles(build: Callable[[pf.LuGre], object]) -> Predict:
         # and as they start relaxed, loading them takes mu g sigma_1/sigma_0 = 0.04 mm/s of speed. Ten times stiffer
         # ones, and a solver 100 times more exact, move no final pose by 0.03 mm or 0.02 deg. v_s is only the scale of
         # the solver's tolerance.
-        law = pf.LuGre(
-            mu_c=mu, mu_s=mu, v_s=1e-3, sigma_0=1e6, sigma_1=20.0, sigma_2=0.0, elasto_plastic=pf.ElastoPlastic(0.9)
-        )
+        law = pf.LuGre(mu_c=mu, mu_s=mu, v_s=1e-3, sigma_0=1e6, sigma_1=20.0, sigma_2=0.0, elasto_plastic=0.9)
         return build(law)
 
     def predict(mu: float, toss: Toss) -> np.ndarray:

@@ -138,7 +138,7 @@ def test_every_model_by_name(tmp_path, line, check):
 def test_the_in_hand_example_is_the_published_experiment():
     scene = Scene.from_file(EXAMPLES / "in_hand.toml")
     ready = in_hand(scene.contacts[0].model)
-    assert isinstance(scene.contacts[0].model, pf.ReducedModelPublished)
+    assert isinstance(scene.contacts[0].model, pf.ReducedModel)
     assert scene.body == ready.body
     assert scene.contacts[0].count == 2
     t = np.arange(201) * 0.01 + 0.005
