@@ -103,11 +103,12 @@ def draw(compared: Comparison) -> PlotFigure:
         left.plot(t, scale * fitted.wrenches[:, 2], color=colour, linewidth=1.0, label=f"fitted, {name}")
     left.set(xlabel="time [s]", ylabel="torque [N mm]", xlim=(0.5 * t[-1], t[-1]))
     left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, frameon=False, fontsize=8)
-    angle, r = np.radians(np.linspace(0.0, 90.0, 181)), float(PAD.contact_radius())
+    surface, angle = pf.LimitSurfaceTable(PAD), np.radians(np.linspace(0.0, 90.0, 181))
+    r = surface.contact_radius
     for axis, style in (("x", "-"), ("y", "--")):
         twist = np.zeros((len(angle), 3))
         twist[:, "xy".index(axis)], twist[:, 2] = np.cos(angle), np.sin(angle) / r
-        torque = -pf.LimitSurfaceTable(PAD).wrench(twist)[:, 2] / r
+        torque = -surface.wrench(twist)[:, 2] / r
         right.plot(
             np.degrees(angle), torque, color=PALETTE[0], linestyle=style, label=f"exact surface, slide along {axis}"
         )

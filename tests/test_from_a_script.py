@@ -38,7 +38,12 @@ def test_the_page_tells_what_comes_out(example):
         [example.LAW.mu_c, example.LAW.sigma_0, 1e3 * example.PAD.contact_radius()], rel=1e-3
     )
     found = {
-        f"fitted, {name}": [fit.mu_c, fit.sigma_0, 1e3 * fit.radius, *100 * example.misfit(fit.wrenches, compared.truth)]
+        f"fitted, {name}": [
+            fit.mu_c,
+            fit.sigma_0,
+            1e3 * fit.radius,
+            *100 * example.misfit(fit.wrenches, compared.truth),
+        ]
         for name, fit in compared.fits.items()
     }
     found["`ReducedModel` of the pad, nothing fitted"] = [*100 * example.misfit(compared.reduced, compared.truth)]
