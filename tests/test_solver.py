@@ -56,7 +56,7 @@ def test_structured_solve_is_the_solve_with_the_full_jacobian(scene):
 
     def rate(state: np.ndarray) -> np.ndarray:
         out = np.empty_like(state)
-        right_hand_side(packed.system, 0, 0.3, state, out)
+        right_hand_side(packed.system.address, 0, 0.3, state, out)
         return out
 
     steps = 1e-5 * packed.natural
@@ -116,7 +116,7 @@ def test_agrees_with_another_integrator():
 
     def rate(t: float, y: np.ndarray) -> np.ndarray:
         out = np.empty(len(y))
-        right_hand_side(packed.system, 0, t, np.ascontiguousarray(y), out)
+        right_hand_side(packed.system.address, 0, t, np.ascontiguousarray(y), out)
         return out
 
     atol = 1e-9 * packed.natural

@@ -10,7 +10,7 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError, SolverError
 from planarfriction.kernels import rosenbrock, tangent
-from planarfriction.kernels.rosenbrock import Output, Tolerance
+from planarfriction.kernels.rosenbrock import Output, run_of
 from planarfriction.kernels.tangent import Path
 from planarfriction.patch.metric import refuse_anisotropy
 from planarfriction.scenes.packing import PackedScene, pack
@@ -111,11 +111,11 @@ def _run(
     """The accepted steps, one of which ends at each recording time, and how many steps lead to each time."""
     system, motion, progress = packed.system, packed.system.motion, start_of(packed.state)
     y, cursor, clock, counts = progress
-    stages, tolerance = rosenbrock.stages_for(RODAS4, len(y)), Tolerance(rtol, atol)
     many = len(packed.models)
     nothing = Output(
         np.array([np.inf]), np.empty((1, 6)), np.empty((1, many, 3)), np.empty((1, many)), np.empty((0, 0))
     )
+    run = run_of(system, RODAS4, nothing, progress, rtol=rtol, atol=atol)
     pieces, sinces, lengths, starts, ends, until = [], [], [], [], [], [0]
     outcome, breaks = rosenbrock.PAUSED, motion.breaks
     if len(motion.velocity):
@@ -126,7 +126,7 @@ def _run(
         room = times[len(until)] - begin - since if times[len(until)] < breaks[piece + 1] else np.inf
         if 2.0 * proposed > room:  # end there, or halve what is left, as before a break
             clock[1] = room if proposed >= room else 0.5 * room
-        outcome = rosenbrock.advance(system, RODAS4, nothing, progress, tolerance, 1, stages)
+        outcome = run.advance(1)
         if int(counts[rosenbrock.STEPS]) == accepted:
             continue
         ended = int(cursor[0]) != piece
@@ -135,7 +135,7 @@ def _run(
         sinces.append(since)
         lengths.append(length)
         starts.append(before)
-        ends.append(stages.new.copy())
+        ends.append(run.stages.new.copy())
         if 2.0 * proposed > room:
             clock[1] = max(clock[1], proposed)
         at_break = ended and times[len(until)] <= breaks[piece + 1]
@@ -151,18 +151,20 @@ def _carry(packed: PackedScene, path: Path, until: np.ndarray, names: tuple[str,
     """Solve the variational equation along the steps, and evaluate it where `until` says."""
     system = packed.system
     n, count, many, instants = len(packed.state), len(names), len(packed.models), len(until)
-    space, tolerance = tangent.slopes_for(count, n), Tolerance(_ACCURACY, _ACCURACY * packed.natural)
+    space, atol = tangent.slopes_for(count, n), _ACCURACY * packed.natural
     slope, times = np.zeros((count, n)), np.empty(instants)
     bodies, wrenches = np.empty((instants, 6)), np.empty((instants, many, 3))
     d_bodies, d_wrenches = np.zeros((instants, 6, count)), np.zeros((instants, many, 3, count))
     for m in range(instants):
         last, done = max(until[m] - 1, 0), 1.0
         if m:
-            tangent.propagate(system, path, until[m - 1], until[m], slope, tolerance, space)
+            tangent.propagate(system.address, path, until[m - 1], until[m], slope, _ACCURACY, atol, space)
         else:
             done = 0.0
         piece, at = int(path.piece[last]), float(path.since[last] + done * path.step[last])
         state = path.end[last] if m else path.start[0]
-        tangent.wrench_slopes(system, piece, at, state, path.parameters, slope, wrenches[m], d_wrenches[m], space)
+        tangent.wrench_slopes(
+            system.address, piece, at, state, path.parameters, slope, wrenches[m], d_wrenches[m], space
+        )
         times[m], bodies[m], d_bodies[m] = system.motion.breaks[piece] + at, state[-6:], slope[:, -6:].T
     return SceneSensitivities(names, times, bodies, wrenches, d_bodies, d_wrenches)

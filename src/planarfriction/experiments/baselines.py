@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from planarfriction.kernels.body import system_of
 from planarfriction.kernels.rosenbrock import Method, Output
 from planarfriction.scenes import Scene
 from planarfriction.scenes.packing import PackedScene, pack
@@ -85,7 +86,7 @@ class Window:
             nonlocal evaluations
             evaluations += 1  # SciPy's own count leaves out what Radau's Jacobians need
             dy = np.empty(len(y))
-            right_hand_side(system, piece, since, np.ascontiguousarray(y), dy)
+            right_hand_side(system.address, piece, since, np.ascontiguousarray(y), dy)
             return dy
 
         options = {"method": method, "rtol": rtol, "atol": atol, "max_step": max_step}
@@ -112,7 +113,7 @@ def _pieces(packed: PackedScene, kept: slice) -> PackedScene:
     velocity = motion.velocity[kept] if len(motion.velocity) else motion.velocity
     breaks = motion.breaks[kept.start : kept.stop + 1]
     motion = motion._replace(breaks=breaks, velocity=velocity, **per_piece)
-    return packed._replace(system=packed.system._replace(motion=motion))
+    return packed._replace(system=system_of(packed.system.contacts, motion))
 
 
 def _output(packed: PackedScene, times: np.ndarray, *, bristles: bool) -> Output:

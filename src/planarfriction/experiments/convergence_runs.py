@@ -198,7 +198,7 @@ def _euler_part(contacts: Sequence[Contact], part: int, state: np.ndarray | None
     samples = []
     for k in range(steps):
         y[bristles : bristles + 3] = twists[k]
-        right_hand_side(packed.system, 0, 0.0, y, rate)
+        right_hand_side(packed.system.address, 0, 0.0, y, rate)
         if k % stride == 0:
             samples.append(packed.system.work.wrench.copy())
             y[:bristles][np.abs(y[:bristles]) < _NOTHING] = 0.0

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction.kernels import inlined, jit, kernel
+from planarfriction.kernels import entry, jit, kernel
 from planarfriction.kernels.contacts import (
     BACK_SUBSTITUTE,
     ELIMINATE,
@@ -24,7 +24,8 @@ from planarfriction.kernels.contacts import (
     contact_map,
     contact_map_slopes,
 )
-from planarfriction.kernels.pointers import call, place
+from planarfriction.kernels.pointers import address_of, at, call, doubles, integers, place_of
+from planarfriction.kernels.records import reader, row_of
 
 
 class Motion(NamedTuple):
@@ -57,7 +58,7 @@ class Motion(NamedTuple):
 class Work(NamedTuple):
     """Workspace of the linear algebra for C contacts."""
 
-    linear: np.ndarray
+    workspace: np.ndarray
     """Linearisations of the contacts, flat."""
     maps: np.ndarray
     """`A`, `G`, `H` of each contact (see `kernels.contacts`), [C, 3, 3, 3]."""
@@ -79,185 +80,261 @@ class Work(NamedTuple):
     """Twist and wrench of one contact and their changes, [4, 3] (see `contacts.ModelFunctions`)."""
 
 
+class SystemRecord(NamedTuple):
+    """A body on its contacts as compiled functions read it: fields of `Contacts`, `Motion` and `Work` by address."""
+
+    contacts: int
+    """How many."""
+    bristles: int
+    """States before those of the body."""
+    calls: int
+    record: int
+    mount: int
+    place: int
+    count: int
+    state: int
+    linear: int
+    inverse_mass: int
+    breaks: int
+    pieces: int
+    """How many."""
+    load: int
+    force: int
+    velocity: int
+    """0 for a free body."""
+    acceleration: int
+    row: int
+    body_axes: int
+    stop_speed: float
+    stop_radius: float
+    stop_time: float
+    workspace: int
+    """Where the linearisations are."""
+    maps: int
+    wrench: int
+    twist: int
+    stiffness: int
+    matrix: int
+    inverse: int
+    to_pose: int
+    body: int
+    rows: int
+    rates: int
+    """The functions of this module."""
+    linearise: int
+    factor: int
+    solve: int
+
+
+read = reader(SystemRecord)
+
+
 class System(NamedTuple):
     """A body on its contacts, with what its linear algebra works in."""
 
     contacts: Contacts
     motion: Motion
     work: Work
+    words: np.ndarray
+    """Its `SystemRecord`, as a row."""
+
+    @property
+    def address(self) -> int:
+        """What compiled functions take."""
+        return place_of(self.words)
 
 
 def system_of(contacts: Contacts, motion: Motion) -> System:
     """A system with its workspace (made outside compiled code, where an allocation costs compile time)."""
-    n, square = len(contacts.count), (3, 3)
+    n = len(contacts.count)
     work = Work(
-        np.zeros(contacts.linear[n]),
-        np.zeros((n, 3, 3, 3)),
-        np.zeros((n, 3)),
-        np.zeros(3),
-        np.zeros(square),
-        np.zeros(square),
-        np.zeros(square),
-        np.zeros(square),
-        np.zeros(3),
-        np.zeros((4, 3)),
+        workspace=np.zeros(contacts.linear[n]),
+        maps=np.zeros((n, 3, 3, 3)),
+        wrench=np.zeros((n, 3)),
+        twist=np.zeros(3),
+        stiffness=np.zeros((3, 3)),
+        matrix=np.zeros((3, 3)),
+        inverse=np.zeros((3, 3)),
+        to_pose=np.zeros((3, 3)),
+        body=np.zeros(3),
+        rows=np.zeros((4, 3)),
     )
-    return System(contacts, motion, work)
+    record = SystemRecord(
+        contacts=n,
+        bristles=int(contacts.state[n]),
+        **{name: place_of(array) for name, array in contacts._asdict().items()},
+        **{name: place_of(array) for name, array in motion._asdict().items() if isinstance(array, np.ndarray)},
+        **{name: place_of(array) for name, array in work._asdict().items()},
+        pieces=len(motion.breaks) - 1,
+        body_axes=int(motion.body_axes),
+        stop_speed=motion.stop_speed,
+        stop_radius=motion.stop_radius,
+        stop_time=motion.stop_time,
+        rates=address_of(rates, "ppfpp"),
+        linearise=address_of(linearise, "ppp"),
+        factor=address_of(factor, "ppfpf"),
+        solve=address_of(solve, "ppfpfpp"),
+    )
+    if not len(motion.velocity):
+        record = record._replace(velocity=0)
+    return System(contacts, motion, work, row_of(record))
 
 
-@inlined
+@kernel
 def times(a, u, v):
     """`v = a u` for a 3 x 3 matrix."""
     for i in range(3):
-        v[i] = 0.0
-        for j in range(3):
-            v[i] += a[i, j] * u[j]
-
-
-@inlined
-def load_of(system, piece, since, c):
-    """Normal force of all the identical contacts that contact c stands for."""
-    load = system.motion.load
-    return system.contacts.count[c] * (load[piece, 0, c] + since * load[piece, 1, c])
+        v[i] = a[3 * i] * u[0] + a[3 * i + 1] * u[1] + a[3 * i + 2] * u[2]
 
 
 @kernel
+def load_of(own, piece, since, c):
+    """Normal force of one of the identical contacts that contact c stands for."""
+    load, at = doubles(own.load), 2 * piece * own.contacts + c
+    return load[at] + since * load[at + own.contacts]
+
+
+@kernel
+def record_of(own, piece, c):
+    """Address of the record of contact c with the shape that it has on a piece."""
+    return integers(own.record)[integers(own.row)[piece * own.contacts + c]]
+
+
+@entry
 def rates(system, piece, since, y, dy):
-    """Right-hand side `dy` at `since` seconds into a piece; wrenches per unit load into `work.wrench`."""
-    contacts, motion, work = system
-    o = y.shape[0] - 6
-    u, pose = y[o : o + 3], y[o + 3 :]
-    v, a, total = work.twist, work.stiffness, work.body
+    """Right-hand side `dy` at `since` seconds into a piece; wrenches per unit load into the workspace."""
+    own = read(system)
+    o, six = own.bristles, 6 * piece
+    u, pose, out = doubles(at(y, o)), doubles(at(y, o + 3)), doubles(at(dy, o))
+    a, total, force = doubles(own.stiffness), doubles(own.body), doubles(own.force)
     for i in range(3):
-        total[i] = motion.force[piece, 0, i] + since * motion.force[piece, 1, i]
-    for c in range(contacts.count.shape[0]):
-        first, w = contacts.state[c], work.wrench[c]
-        contact_map(contacts.mount[c], contacts.place[c], pose, a)
-        times(a, u, v)
-        record = contacts.record[motion.row[piece, c]]
-        call(contacts.calls[c, EVALUATE], (record, place(y, first), v, place(dy, first), w))
-        load = load_of(system, piece, since, c)
+        total[i] = force[six + i] + since * force[six + 3 + i]
+    for c in range(own.contacts):
+        first, w = integers(own.state)[c], at(own.wrench, 3 * c)
+        contact_map(integers(own.mount)[c], doubles(at(own.place, 4 * c)), pose, a)
+        times(a, u, doubles(own.twist))
+        call(
+            integers(own.calls)[6 * c + EVALUATE], (record_of(own, piece, c), at(y, first), own.twist, at(dy, first), w)
+        )
+        load = doubles(own.count)[c] * load_of(own, piece, since, c)
         for i in range(3):
             for p in range(3):
-                total[i] += load * a[p, i] * w[p]
+                total[i] += load * a[3 * p + i] * doubles(w)[p]
     for i in range(3):
-        dy[o + i] = motion.acceleration[piece, i] + motion.inverse_mass[i] * total[i]
-    if motion.body_axes:
+        out[i] = doubles(own.acceleration)[3 * piece + i] + doubles(own.inverse_mass)[i] * total[i]
+    if own.body_axes:
         cos, sin = math.cos(pose[2]), math.sin(pose[2])
-        dy[o + 3] = cos * u[0] - sin * u[1]
-        dy[o + 4] = sin * u[0] + cos * u[1]
+        out[3] = cos * u[0] - sin * u[1]
+        out[4] = sin * u[0] + cos * u[1]
     else:
-        dy[o + 3] = u[0]
-        dy[o + 4] = u[1]
-    dy[o + 5] = u[2]
+        out[3] = u[0]
+        out[4] = u[1]
+    out[5] = u[2]
 
 
-@kernel
+@entry
 def linearise(system, piece, y):
     """Linearise every contact about `y`, whose `rates` were evaluated last."""
-    contacts, motion, work = system
-    o = y.shape[0] - 6
-    u, pose = y[o : o + 3], y[o + 3 :]
-    v, w, maps = work.twist, work.wrench, work.maps
-    for c in range(contacts.count.shape[0]):
-        contact_map(contacts.mount[c], contacts.place[c], pose, maps[c, 0])
-        contact_map_slopes(contacts.mount[c], maps[c, 0], u, w[c], maps[c, 1], maps[c, 2])
-        times(maps[c, 0], u, v)
-        record, lin = contacts.record[motion.row[piece, c]], place(work.linear, contacts.linear[c])
-        call(contacts.calls[c, LINEARISE], (record, place(y, contacts.state[c]), v, lin))
+    own = read(system)
+    o = own.bristles
+    u, pose, v = doubles(at(y, o)), doubles(at(y, o + 3)), doubles(own.twist)
+    for c in range(own.contacts):
+        mount, maps = integers(own.mount)[c], at(own.maps, 27 * c)
+        a, g, h = doubles(maps), doubles(at(maps, 9)), doubles(at(maps, 18))
+        contact_map(mount, doubles(at(own.place, 4 * c)), pose, a)
+        contact_map_slopes(mount, a, u, doubles(at(own.wrench, 3 * c)), g, h)
+        times(a, u, v)
+        z, lin = at(y, integers(own.state)[c]), at(own.workspace, integers(own.linear)[c])
+        call(integers(own.calls)[6 * c + LINEARISE], (record_of(own, piece, c), z, own.twist, lin))
 
 
-@kernel
+@entry
 def factor(system, piece, since, y, shift):
     """Eliminate bristles and pose from `shift I - J`, and invert the 3 x 3 matrix that is left for the velocity.
 
     A free body's pose follows from its velocity, `pose = (r_pose + u)/shift`, so that the twist of a contact changes by
     `(A + G/shift) u + G r_pose/shift`. (A prescribed velocity does not see the pose at all.)
     """
-    contacts, motion, work = system
-    stiffness, m = work.stiffness, work.matrix
-    for i in range(3):
-        for j in range(3):
-            m[i, j] = shift if i == j else 0.0
-            work.to_pose[i, j] = 0.0
-    for c in range(contacts.count.shape[0]):
-        record, lin = contacts.record[motion.row[piece, c]], place(work.linear, contacts.linear[c])
-        call(contacts.calls[c, FACTOR], (record, place(y, contacts.state[c]), shift, lin, stiffness))
-        load = load_of(system, piece, since, c)
-        a, g, h = work.maps[c, 0], work.maps[c, 1], work.maps[c, 2]
+    own = read(system)
+    s, m, to_pose = doubles(own.stiffness), doubles(own.matrix), doubles(own.to_pose)
+    b, v, inverse, inverse_mass = doubles(own.body), doubles(own.twist), doubles(own.inverse), doubles(own.inverse_mass)
+    for i in range(9):
+        m[i] = shift if i % 4 == 0 else 0.0
+        to_pose[i] = 0.0
+    for c in range(own.contacts):
+        z, lin = at(y, integers(own.state)[c]), at(own.workspace, integers(own.linear)[c])
+        call(integers(own.calls)[6 * c + FACTOR], (record_of(own, piece, c), z, shift, lin, own.stiffness))
+        load = doubles(own.count)[c] * load_of(own, piece, since, c)
+        maps = at(own.maps, 27 * c)
+        a, g, h = doubles(maps), doubles(at(maps, 9)), doubles(at(maps, 18))
         for j in range(3):
             for p in range(3):
-                work.body[p], work.twist[p] = 0.0, 0.0
-                for q in range(3):
-                    work.body[p] += stiffness[p, q] * a[q, j]
-                    work.twist[p] += stiffness[p, q] * g[q, j]
+                b[p] = s[3 * p] * a[j] + s[3 * p + 1] * a[3 + j] + s[3 * p + 2] * a[6 + j]
+                v[p] = s[3 * p] * g[j] + s[3 * p + 1] * g[3 + j] + s[3 * p + 2] * g[6 + j]
             for i in range(3):
-                per_velocity, per_pose = 0.0, h[i, j]
-                for p in range(3):
-                    per_velocity += a[p, i] * work.body[p]
-                    per_pose += a[p, i] * work.twist[p]
-                weight = motion.inverse_mass[i] * load
-                work.to_pose[i, j] += weight * per_pose / shift
-                m[i, j] -= weight * (per_velocity + per_pose / shift)
+                per_velocity = a[i] * b[0] + a[3 + i] * b[1] + a[6 + i] * b[2]
+                per_pose = h[3 * i + j] + a[i] * v[0] + a[3 + i] * v[1] + a[6 + i] * v[2]
+                weight = inverse_mass[i] * load
+                to_pose[3 * i + j] += weight * per_pose / shift
+                m[3 * i + j] -= weight * (per_velocity + per_pose / shift)
     determinant = 0.0
     for i in range(3):
-        work.body[i] = _cofactor(m, 0, i)
-        determinant += m[0, i] * work.body[i]
+        b[i] = _cofactor(m, 0, i)
+        determinant += m[i] * b[i]
     for i in range(3):
         for j in range(3):
-            work.inverse[i, j] = _cofactor(m, j, i) / determinant
-
-
-@inlined
-def _cofactor(m, i, j):
-    """Signed cofactor of a 3 x 3 matrix; cyclic neighbours carry the sign."""
-    i1, i2, j1, j2 = (i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3
-    return m[i1, j1] * m[i2, j2] - m[i1, j2] * m[i2, j1]
+            inverse[3 * i + j] = _cofactor(m, j, i) / determinant
 
 
 @kernel
+def _cofactor(m, i, j):
+    """Signed cofactor of a 3 x 3 matrix; cyclic neighbours carry the sign."""
+    i1, i2, j1, j2 = (i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3
+    return m[3 * i1 + j1] * m[3 * i2 + j2] - m[3 * i1 + j2] * m[3 * i2 + j1]
+
+
+@entry
 def solve(system, piece, since, y, shift, r, out):
     """Solve `(shift I - J) out = r` with the matrix that `factor` prepared."""
-    contacts, motion, work = system
-    o = y.shape[0] - 6
-    w, v, b = work.stiffness[0], work.twist, work.body
-    r_pose = r[o + 3 :]
+    own = read(system)
+    o, state, linear, calls = own.bristles, integers(own.state), integers(own.linear), integers(own.calls)
+    w, v, b = doubles(own.stiffness), doubles(own.twist), doubles(own.body)
+    r_body, r_pose, to_pose = doubles(at(r, o)), doubles(at(r, o + 3)), doubles(own.to_pose)
+    times(to_pose, r_pose, b)
     for i in range(3):
-        b[i] = r[o + i]
-        for j in range(3):
-            b[i] += work.to_pose[i, j] * r_pose[j]
-    for c in range(contacts.count.shape[0]):
-        first, lin = contacts.state[c], place(work.linear, contacts.linear[c])
-        record = contacts.record[motion.row[piece, c]]
-        call(contacts.calls[c, ELIMINATE], (record, place(y, first), shift, place(r, first), lin, w))
-        load = load_of(system, piece, since, c)
-        a = work.maps[c, 0]
+        b[i] += r_body[i]
+    for c in range(own.contacts):
+        first, lin = state[c], at(own.workspace, linear[c])
+        call(
+            calls[6 * c + ELIMINATE], (record_of(own, piece, c), at(y, first), shift, at(r, first), lin, own.stiffness)
+        )
+        load = doubles(own.count)[c] * load_of(own, piece, since, c)
+        a = doubles(at(own.maps, 27 * c))
         for i in range(3):
-            for p in range(3):
-                b[i] += motion.inverse_mass[i] * load * a[p, i] * w[p]
-    u, pose = out[o : o + 3], out[o + 3 :]
-    times(work.inverse, b, u)
+            force = a[i] * w[0] + a[3 + i] * w[1] + a[6 + i] * w[2]
+            b[i] += doubles(own.inverse_mass)[i] * load * force
+    u, pose, held = doubles(at(out, o)), doubles(at(out, o + 3)), doubles(at(y, o))
+    times(doubles(own.inverse), b, u)
     per_shift = 1.0 / shift
     pose[2] = per_shift * (r_pose[2] + u[2])
-    if motion.body_axes:
-        cos, sin = math.cos(y[o + 5]), math.sin(y[o + 5])
-        pose[0] = per_shift * (r_pose[0] + cos * u[0] - sin * u[1] - (sin * y[o] + cos * y[o + 1]) * pose[2])
-        pose[1] = per_shift * (r_pose[1] + sin * u[0] + cos * u[1] + (cos * y[o] - sin * y[o + 1]) * pose[2])
+    if own.body_axes:
+        cos, sin = math.cos(held[5]), math.sin(held[5])
+        pose[0] = per_shift * (r_pose[0] + cos * u[0] - sin * u[1] - (sin * held[0] + cos * held[1]) * pose[2])
+        pose[1] = per_shift * (r_pose[1] + sin * u[0] + cos * u[1] + (cos * held[0] - sin * held[1]) * pose[2])
     else:
         pose[0] = per_shift * (r_pose[0] + u[0])
         pose[1] = per_shift * (r_pose[1] + u[1])
-    for c in range(contacts.count.shape[0]):
-        first, lin = contacts.state[c], place(work.linear, contacts.linear[c])
-        a, g = work.maps[c, 0], work.maps[c, 1]
+    for c in range(own.contacts):
+        first, lin, maps = state[c], at(own.workspace, linear[c]), at(own.maps, 27 * c)
+        a, g = doubles(maps), doubles(at(maps, 9))
         for i in range(3):
-            v[i] = 0.0
-            for j in range(3):
-                v[i] += a[i, j] * u[j] + g[i, j] * pose[j]
-        record = contacts.record[motion.row[piece, c]]
-        call(contacts.calls[c, BACK_SUBSTITUTE], (record, place(y, first), place(r, first), v, lin, place(out, first)))
+            turn = g[3 * i] * pose[0] + g[3 * i + 1] * pose[1] + g[3 * i + 2] * pose[2]
+            v[i] = a[3 * i] * u[0] + a[3 * i + 1] * u[1] + a[3 * i + 2] * u[2] + turn
+        record = record_of(own, piece, c)
+        call(calls[6 * c + BACK_SUBSTITUTE], (record, at(y, first), at(r, first), own.twist, lin, at(out, first)))
 
 
 @jit
 def right_hand_side(system, piece, since, y, dy):
-    """`rates` for callers in Python, as an explicit or a general implicit solver needs it."""
-    rates(system, piece, since, y, dy)
+    """`rates` for callers in Python, as an explicit or a general implicit solver needs it; contiguous arrays."""
+    call(read(system).rates, (system, piece, since, y, dy))

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction.kernels import inlined
+from planarfriction.kernels import kernel
 from planarfriction.kernels.pointers import address_of
 
 WORLD, BODY, BODY_AXES = 0, 1, 2
@@ -76,7 +76,7 @@ class Contacts(NamedTuple):
     """Where the linearisation of each contact begins in its workspace, int [C + 1]."""
 
 
-@inlined
+@kernel
 def contact_map(mount, place, pose, a):
     """Write `A`, with `V = A u`, into `a` [3, 3]."""
     dx, dy, c, s = place[0], place[1], place[2], place[3]
@@ -86,27 +86,25 @@ def contact_map(mount, place, pose, a):
         ct, st = math.cos(pose[2]), math.sin(pose[2])
         dx, dy = ct * dx - st * dy, st * dx + ct * dy
         c, s = c * ct - s * st, s * ct + c * st
-    a[0, 0], a[0, 1], a[0, 2] = c, s, s * dx - c * dy
-    a[1, 0], a[1, 1], a[1, 2] = -s, c, s * dy + c * dx
-    a[2, 0], a[2, 1], a[2, 2] = 0.0, 0.0, 1.0
+    a[0], a[1], a[2] = c, s, s * dx - c * dy
+    a[3], a[4], a[5] = -s, c, s * dy + c * dx
+    a[6], a[7], a[8] = 0.0, 0.0, 1.0
 
 
-@inlined
+@kernel
 def contact_map_slopes(mount, a, u, w, g, h):
     """Write `G = d(A u)/d pose` and `H = d(A' W)/d pose` into `g` and `h` [3, 3]."""
-    for i in range(3):
-        for j in range(3):
-            g[i, j] = 0.0
-            h[i, j] = 0.0
+    for i in range(9):
+        g[i], h[i] = 0.0, 0.0
     if mount == WORLD:
         # the lever arm shortens as the body moves; world axes of the force
-        fx, fy = a[0, 0] * w[0] + a[1, 0] * w[1], a[0, 1] * w[0] + a[1, 1] * w[1]
-        g[0, 0], g[0, 1] = -u[2] * a[0, 1], u[2] * a[0, 0]
-        g[1, 0], g[1, 1] = -u[2] * a[1, 1], u[2] * a[1, 0]
-        h[2, 0], h[2, 1] = -fy, fx
+        fx, fy = a[0] * w[0] + a[3] * w[1], a[1] * w[0] + a[4] * w[1]
+        g[0], g[1] = -u[2] * a[1], u[2] * a[0]
+        g[3], g[4] = -u[2] * a[4], u[2] * a[3]
+        h[6], h[7] = -fy, fx
     elif mount == BODY:
         # the contact's axes turn with the body
-        g[0, 2] = a[1, 0] * u[0] + a[1, 1] * u[1]
-        g[1, 2] = -(a[0, 0] * u[0] + a[0, 1] * u[1])
-        h[0, 2] = a[1, 0] * w[0] - a[0, 0] * w[1]
-        h[1, 2] = a[1, 1] * w[0] - a[0, 1] * w[1]
+        g[2] = a[3] * u[0] + a[4] * u[1]
+        g[5] = -(a[0] * u[0] + a[1] * u[1])
+        h[2] = a[3] * w[0] - a[0] * w[1]
+        h[5] = a[4] * w[0] - a[1] * w[1]

@@ -14,6 +14,8 @@ from numba import types
 from numba.extending import intrinsic
 from numba.np.arrayobj import populate_array
 
+from planarfriction.kernels import kernel
+
 _DOUBLES = types.CPointer(types.float64)
 
 
@@ -26,8 +28,8 @@ def address_of(function: Any, words: str) -> int:
 
 
 def place_of(array: np.ndarray) -> int:
-    """Address of the first number of a contiguous array of doubles, which the caller keeps alive."""
-    assert array.dtype == np.float64 and array.flags.c_contiguous
+    """Address of the first number of a contiguous array of doubles or integers, which the caller keeps alive."""
+    assert array.dtype in (np.float64, np.int64) and array.flags.c_contiguous
     return array.ctypes.data
 
 
@@ -56,6 +58,19 @@ def call(typingctx, address, arguments):
 
 
 @intrinsic
+def address(typingctx, array, i):
+    """Address of number i of a contiguous array."""
+    if not (isinstance(array, types.Array) and array.layout == "C" and isinstance(i, types.Integer)):
+        return None
+
+    def generate(context, builder, signature, args):
+        first = context.make_array(signature.args[0])(context, builder, args[0]).data
+        return builder.ptrtoint(builder.gep(first, [args[1]]), ir.IntType(64))
+
+    return types.int64(array, types.int64), generate
+
+
+@intrinsic
 def doubles(typingctx, address):
     """The doubles at an address: `doubles(a)[i]`."""
     if not isinstance(address, types.Integer):
@@ -68,16 +83,21 @@ def doubles(typingctx, address):
 
 
 @intrinsic
-def place(typingctx, array, i):
-    """Address of number i of a contiguous array."""
-    if not (isinstance(array, types.Array) and array.layout == "C" and isinstance(i, types.Integer)):
+def integers(typingctx, address):
+    """The 64-bit integers at an address."""
+    if not isinstance(address, types.Integer):
         return None
 
     def generate(context, builder, signature, args):
-        first = context.make_array(signature.args[0])(context, builder, args[0]).data
-        return builder.ptrtoint(builder.gep(first, [args[1]]), ir.IntType(64))
+        return builder.inttoptr(args[0], ir.IntType(64).as_pointer())
 
-    return types.int64(array, types.int64), generate
+    return types.CPointer(types.int64)(address), generate
+
+
+@kernel
+def at(address, i):
+    """Address of number i from there on."""
+    return address + 8 * i
 
 
 def _array_over(context, builder, kind, address, shape):

@@ -21,9 +21,9 @@ import numpy as np
 
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import jit, kernel
-from planarfriction.kernels.body import factor, linearise, load_of, rates, solve, times
+from planarfriction.kernels.body import load_of, read, record_of, times
 from planarfriction.kernels.contacts import CHANGE
-from planarfriction.kernels.pointers import call, place
+from planarfriction.kernels.pointers import address, at, call, doubles, integers
 from planarfriction.kernels.rosenbrock import error_norm, forget_unloaded
 
 FRICTION, SIZE, MASS, INERTIA, LOAD = 0, 1, 2, 3, 4
@@ -48,52 +48,45 @@ STAGES = np.array(
 
 
 @kernel
-def _change(system, piece, c, y, dy, dz, parameter, dzdot):
+def _change(own, piece, c, y, dy, dz, parameter, dzdot):
     """Change of the bristle rates and of the wrench per unit load of contact c with its bristles, twist and parameter.
 
-    `y`, `dy`, `dz` and `dzdot` hold all states; `y` was linearised. `work.rows` holds V, W and dV and takes dW.
+    Addresses of all states, `y` linearised; `own.rows` holds V, W and dV and takes dW.
     """
-    contacts, motion, work = system
-    first, lin = contacts.state[c], place(work.linear, contacts.linear[c])
+    first, lin = integers(own.state)[c], at(own.workspace, integers(own.linear)[c])
     d_friction = 1.0 if parameter == FRICTION else 0.0
     d_size = 1.0 if parameter == SIZE else 0.0
-    call(
-        contacts.calls[c, CHANGE],
-        (
-            contacts.record[motion.row[piece, c]], place(y, first), place(dy, first), lin,
-            place(dz, first), place(dzdot, first), work.rows, d_friction, d_size,
-        ),
-    )  # fmt: skip
+    function, record = integers(own.calls)[6 * c + CHANGE], record_of(own, piece, c)
+    bristles = at(y, first), at(dy, first), lin, at(dz, first), at(dzdot, first)
+    call(function, (record, *bristles, own.rows, d_friction, d_size))
 
 
 @kernel
-def _partial(system, piece, since, w, parameter, out):
+def _partial(own, piece, since, w, parameter, out):
     """`df/dp` at the held state `w.state`, whose rates are in `w.rate` and whose linearisation was made last."""
-    contacts, motion, work = system
-    y, dy, rows, total = w.state, w.rate, work.rows, work.body
-    o = y.shape[0] - 6
-    for i in range(y.shape[0]):
+    o, dy, rows, total = own.bristles, w.rate, doubles(own.rows), doubles(own.body)
+    for i in range(out.shape[0]):
         out[i] = 0.0
+    inverse_mass, acceleration = doubles(own.inverse_mass), doubles(own.acceleration)
     if parameter in (MASS, INERTIA):
         for i in range(3):
-            if (i == 2) == (parameter == INERTIA) and motion.inverse_mass[i] > 0.0:
-                out[o + i] = motion.acceleration[piece, i] - dy[o + i]
+            if (i == 2) == (parameter == INERTIA) and inverse_mass[i] > 0.0:
+                out[o + i] = acceleration[3 * piece + i] - dy[o + i]
         return
     for i in range(3):
         total[i] = 0.0
-    for c in range(contacts.count.shape[0]):
-        a = work.maps[c, 0]
+    for c in range(own.contacts):
+        a, wrench = doubles(at(own.maps, 27 * c)), doubles(at(own.wrench, 3 * c))
         for i in range(3):
-            rows[1, i], rows[2, i], rows[3, i] = work.wrench[c, i], 0.0, work.wrench[c, i]
+            rows[3 + i], rows[6 + i], rows[9 + i] = wrench[i], 0.0, wrench[i]
         if parameter != LOAD:
-            times(a, y[o : o + 3], rows[0])
-            _change(system, piece, c, y, dy, w.zero, parameter, out)
-        load = load_of(system, piece, since, c)
+            times(a, doubles(address(w.state, o)), rows)
+            _change(own, piece, c, address(w.state, 0), address(dy, 0), address(w.zero, 0), parameter, address(out, 0))
+        load = doubles(own.count)[c] * load_of(own, piece, since, c)
         for i in range(3):
-            for p in range(3):
-                total[i] += load * a[p, i] * rows[3, p]
+            total[i] += load * (a[i] * rows[9] + a[3 + i] * rows[10] + a[6 + i] * rows[11])
     for i in range(3):
-        out[o + i] = motion.inverse_mass[i] * total[i]
+        out[o + i] = inverse_mass[i] * total[i]
 
 
 class Path(NamedTuple):
@@ -162,20 +155,20 @@ def _hermite(path, t, share, w):
 
 
 @kernel
-def _step(system, path, t, at, share, slope, out, w):
-    """Carry `slope` over a share of step t that begins `at`, both as parts of 1; `out` may be `slope`."""
-    piece, n = path.piece[t], w.state.shape[0]
+def _step(system, path, t, begin, share, slope, out, w):
+    """Carry `slope` over a share of step t from `begin` on, both as parts of 1; `out` may be `slope`."""
+    own, piece, n = read(system), path.piece[t], w.state.shape[0]
     h = share * path.step[t]
     shift = 1.0 / (h * GAMMA)
     for i in range(PLACES.shape[0]):
-        here = at + share * PLACES[i]
+        here = begin + share * PLACES[i]
         since = path.since[t] + here * path.step[t]
         _hermite(path, t, here, w)
-        rates(system, piece, since, w.state, w.rate)
-        linearise(system, piece, w.state)
+        call(own.rates, (system, piece, since, w.state, w.rate))
+        call(own.linearise, (system, piece, w.state))
         for p in range(path.parameters.shape[0]):
-            _partial(system, piece, since, w, path.parameters[p], w.forcing[p])
-        factor(system, piece, since, w.state, shift)
+            _partial(own, piece, since, w, path.parameters[p], w.forcing[p])
+        call(own.factor, (system, piece, since, w.state, shift))
         last = i == PLACES.shape[0] - 1
         for p in range(path.parameters.shape[0]):
             for m in range(n):
@@ -184,7 +177,7 @@ def _step(system, path, t, at, share, slope, out, w):
                     w.base[m] += h * STAGES[i, j] * w.stages[p, j, m]
                 w.right[m] = shift * w.base[m] + w.forcing[p, m]
             new = w.stages[p, i]
-            solve(system, piece, since, w.state, shift, w.right, new)
+            call(own.solve, (system, piece, since, w.state, shift, w.right, new))
             for m in range(n):
                 if last:
                     out[p, m] = new[m]
@@ -193,65 +186,66 @@ def _step(system, path, t, at, share, slope, out, w):
 
 
 @jit
-def propagate(system, path, first, last, slope, tolerance, w):
+def propagate(system, path, first, last, slope, rtol, atol, w):
     """Carry `slope` [P, n] through the steps `first` to `last` of a motion; return how many steps that took.
 
-    A step is halved, down to `SHORTEST` of a step of the motion, until one and two half ones agree to `tolerance`: the
-    Jacobian may jump within it. A contact that had no load forgets its slopes.
+    A step is halved, down to `SHORTEST` of a step of the motion, until one and two half ones agree to `rtol`, `atol`
+    [n]: the Jacobian may jump within it. A contact that had no load forgets its slopes.
     """
-    taken = 0
+    own, taken = read(system), 0
     for t in range(first, last):
-        rates(system, path.piece[t], path.since[t], path.start[t], w.start_rate)
-        rates(system, path.piece[t], path.since[t] + path.step[t], path.end[t], w.end_rate)
-        at, share = 0.0, 1.0
-        while at < 1.0:
-            _step(system, path, t, at, share, slope, w.coarse, w)
-            _step(system, path, t, at, 0.5 * share, slope, w.fine, w)
-            _step(system, path, t, at + 0.5 * share, 0.5 * share, w.fine, w.fine, w)
+        call(own.rates, (system, path.piece[t], path.since[t], path.start[t], w.start_rate))
+        call(own.rates, (system, path.piece[t], path.since[t] + path.step[t], path.end[t], w.end_rate))
+        begin, share = 0.0, 1.0
+        while begin < 1.0:
+            _step(system, path, t, begin, share, slope, w.coarse, w)
+            _step(system, path, t, begin, 0.5 * share, slope, w.fine, w)
+            _step(system, path, t, begin + 0.5 * share, 0.5 * share, w.fine, w.fine, w)
             taken += 1
             largest = 0.0
             for p in range(path.parameters.shape[0]):
                 for m in range(w.right.shape[0]):
                     w.right[m] = w.fine[p, m] - w.coarse[p, m]
-                error = error_norm(system.contacts, slope[p], w.fine[p], w.right, tolerance)
+                error = error_norm(own, slope[p], w.fine[p], w.right, rtol, atol)
                 largest = xp.maximum(largest, error)
             if largest > 1.0 and share > SHORTEST:
                 share *= 0.5
                 continue
-            at += share
+            begin += share
             for p in range(path.parameters.shape[0]):
                 for m in range(w.right.shape[0]):
                     slope[p, m] = w.fine[p, m]
             # places are multiples of the share, so that powers of two add up to one exactly
-            if largest < 0.05 and at < 1.0 and at % (2.0 * share) == 0.0:
+            if largest < 0.05 and begin < 1.0 and begin % (2.0 * share) == 0.0:
                 share *= 2.0
         if t + 1 < path.piece.shape[0] and path.piece[t + 1] != path.piece[t]:
             for p in range(path.parameters.shape[0]):
-                forget_unloaded(system.contacts, system.motion, path.piece[t], slope[p])
+                forget_unloaded(own, path.piece[t], slope[p])
     return taken
 
 
 @jit
 def wrench_slopes(system, piece, since, y, parameters, slope, wrench, out, w):
     """Wrenches [C, 3] of one of the identical contacts, and from the slopes [P, n] of y theirs `out` [C, 3, P]."""
-    contacts, motion, work = system
-    o, rows = y.shape[0] - 6, work.rows
-    rates(system, piece, since, y, w.rate)
-    linearise(system, piece, y)
-    for c in range(contacts.count.shape[0]):
-        load = motion.load[piece, 0, c] + since * motion.load[piece, 1, c]
-        a, g = work.maps[c, 0], work.maps[c, 1]
-        times(a, y[o : o + 3], rows[0])
+    own = read(system)
+    o, rows = own.bristles, doubles(own.rows)
+    call(own.rates, (system, piece, since, y, w.rate))
+    call(own.linearise, (system, piece, y))
+    for c in range(own.contacts):
+        load = load_of(own, piece, since, c)
+        a, g, unit = doubles(at(own.maps, 27 * c)), doubles(at(own.maps, 27 * c + 9)), doubles(at(own.wrench, 3 * c))
+        times(a, doubles(address(y, o)), rows)
         for i in range(3):
-            wrench[c, i] = load * work.wrench[c, i]
-            rows[1, i] = work.wrench[c, i]
+            wrench[c, i] = load * unit[i]
+            rows[3 + i] = unit[i]
         for p in range(parameters.shape[0]):
             for i in range(3):
-                rows[2, i] = 0.0
+                rows[6 + i] = 0.0
                 for j in range(3):
-                    rows[2, i] += a[i, j] * slope[p, o + j] + g[i, j] * slope[p, o + 3 + j]
-            _change(system, piece, c, y, w.rate, slope[p], parameters[p], w.base)
+                    rows[6 + i] += a[3 * i + j] * slope[p, o + j] + g[3 * i + j] * slope[p, o + 3 + j]
+            states = address(y, 0), address(w.rate, 0), address(slope[p], 0)
+            _change(own, piece, c, *states, parameters[p], address(w.base, 0))
             for i in range(3):
-                out[c, i, p] = load * rows[3, i]
+                out[c, i, p] = load * rows[9 + i]
                 if parameters[p] == LOAD:
-                    out[c, i, p] += load * work.wrench[c, i]
+                    out[c, i, p] += load * unit[i]

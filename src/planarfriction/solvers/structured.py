@@ -11,7 +11,7 @@ import numpy as np
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels import rosenbrock as kernels
 from planarfriction.kernels.body import System
-from planarfriction.kernels.rosenbrock import Method, Output, Progress, Tolerance
+from planarfriction.kernels.rosenbrock import Method, Output, Progress, run_of
 from planarfriction.solvers.statistics import Statistics
 
 _STATES_PER_SLICE = 400_000
@@ -68,23 +68,17 @@ def integrate(
         raise InvalidValueError("rtol", "be > 0", rtol)
     if not (np.isfinite(atol).all() and (atol > 0.0).all()):
         raise InvalidValueError("atol", "be > 0", float(np.min(atol)))
-    progressed = start_of(state)
-    tolerance, stages = Tolerance(float(rtol), atol), kernels.stages_for(method, len(state))
-
-    def advance(max_steps: int) -> int:
-        return kernels.advance(system, method, output, progressed, tolerance, max_steps, stages)
-
     begin = time.perf_counter()
-    advance(0)  # compiles, or loads from the cache, and takes no step
+    run_of(system, method, output, start_of(state), rtol=rtol, atol=atol).advance(0)  # compiles and takes no step
     compile_time = time.perf_counter() - begin
-    progressed = start_of(state)
-    (_, cursor, clock, counts), breaks = progressed, system.motion.breaks
+    run = run_of(system, method, output, start_of(state), rtol=rtol, atol=atol)
+    (_, cursor, clock, counts), breaks = run.progress, system.motion.breaks
     outcome, wall_time = kernels.PAUSED, 0.0
     slice_steps = max(20, _STATES_PER_SLICE // len(state))
     try:
         while outcome == kernels.PAUSED:
             begin = time.perf_counter()
-            outcome = advance(slice_steps)
+            outcome = run.advance(slice_steps)
             wall_time += time.perf_counter() - begin
             if progress is not None:
                 piece = min(int(cursor[0]), len(breaks) - 1)
