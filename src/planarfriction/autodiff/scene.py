@@ -10,7 +10,7 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError, SolverError
 from planarfriction.kernels import rosenbrock, tangent
-from planarfriction.kernels.rosenbrock import Output, run_of
+from planarfriction.kernels.integration import Output, run_of
 from planarfriction.kernels.tangent import Path
 from planarfriction.patch.metric import refuse_anisotropy
 from planarfriction.scenes.packing import PackedScene, pack
@@ -126,7 +126,7 @@ def _run(
         room = times[len(until)] - begin - since if times[len(until)] < breaks[piece + 1] else np.inf
         if 2.0 * proposed > room:  # end there, or halve what is left, as before a break
             clock[1] = room if proposed >= room else 0.5 * room
-        outcome = run.advance(1)
+        outcome = rosenbrock.advance(run.address, 1)
         if int(counts[rosenbrock.STEPS]) == accepted:
             continue
         ended = int(cursor[0]) != piece

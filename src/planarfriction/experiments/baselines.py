@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction.kernels.body import system_of
-from planarfriction.kernels.rosenbrock import Method, Output
+from planarfriction.kernels.integration import Method, Output
 from planarfriction.scenes import Scene
 from planarfriction.scenes.packing import PackedScene, pack
 from planarfriction.solvers import RODAS4, Statistics, integrate

@@ -8,7 +8,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError, SimulationInterrupted, SolverError
-from planarfriction.kernels.rosenbrock import Method, Output
+from planarfriction.kernels.integration import Method, Output
 from planarfriction.scenes.packing import PackedScene, pack
 from planarfriction.scenes.scene import Scene
 from planarfriction.scenes.signal import SAME_TIME

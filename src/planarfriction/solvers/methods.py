@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from planarfriction.kernels.rosenbrock import Method
+from planarfriction.kernels.integration import Method
 
 
 def _lower(*rows: tuple[float, ...]) -> np.ndarray:

@@ -11,7 +11,7 @@ import numpy as np
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels import rosenbrock as kernels
 from planarfriction.kernels.body import System
-from planarfriction.kernels.rosenbrock import Method, Output, Progress, run_of
+from planarfriction.kernels.integration import Method, Output, Progress, run_of
 from planarfriction.solvers.statistics import Statistics
 
 _STATES_PER_SLICE = 400_000
@@ -69,7 +69,8 @@ def integrate(
     if not (np.isfinite(atol).all() and (atol > 0.0).all()):
         raise InvalidValueError("atol", "be > 0", float(np.min(atol)))
     begin = time.perf_counter()
-    run_of(system, method, output, start_of(state), rtol=rtol, atol=atol).advance(0)  # compiles and takes no step
+    first = run_of(system, method, output, start_of(state), rtol=rtol, atol=atol)
+    kernels.advance(first.address, 0)  # compiles, or loads from the cache, and takes no step
     compile_time = time.perf_counter() - begin
     run = run_of(system, method, output, start_of(state), rtol=rtol, atol=atol)
     (_, cursor, clock, counts), breaks = run.progress, system.motion.breaks
@@ -78,7 +79,7 @@ def integrate(
     try:
         while outcome == kernels.PAUSED:
             begin = time.perf_counter()
-            outcome = run.advance(slice_steps)
+            outcome = kernels.advance(run.address, slice_steps)
             wall_time += time.perf_counter() - begin
             if progress is not None:
                 piece = min(int(cursor[0]), len(breaks) - 1)
