@@ -44,17 +44,14 @@ class Coarse(pf.DistributedModel):
 
 
 @pytest.fixture
-def own():
+def own(monkeypatch):
     """Members of one's own, forgotten again after the test."""
+    for family in ALL:
+        monkeypatch.setattr(family, "_members", dict(family._members))
     pf.laws.register("bronze", Bronze, "dry bronze")
     pf.models.register("coarse", Coarse)
     pf.patch.register("tile", lambda width, cells=3: pf.ContactPatch.rectangle(width, cells=cells, name="tile"))
     pf.scenes.register("still", lambda model, t_end=1.0: dataclasses.replace(in_hand(model, t_end=t_end), name="still"))
-    yield
-    for family, name in ((families.LAWS, "bronze"), (families.MODELS, "coarse")):
-        del family._members[name]
-    for family, name in ((families.SHAPES, "tile"), (families.SCENES, "still")):
-        del family._members[name]
 
 
 # ---------------------------------------------------------------------- the library's own

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
 _FULL_BALANCE = 1e-12
 """The twist of a wrench is found when its wrench is parallel to the given one to this angle [rad]."""
 
+_DIFFERENCE = 1e-5
+"""Angle [rad] of central differences of `h`: 1e-10 of its third derivative, and 1e-11 of rounding."""
+
 _ROUNDING = 16.0 * np.finfo(float).eps
 """Share of the positions by which the centre of pressure, a sum over the cells, may be off."""
 
@@ -48,16 +51,18 @@ class LimitSurface:
     metric leaves `h(-V) = -h(V)`. The asymmetric part is linear in V, its wrench the same for all twists: a surface
     stored for half of all directions and three numbers more are exact for all of them.
 
+    A surface of your own implements one method, `direction`; models store it as a table of `segments`.
+
     Source: Goyal, Ruina, Papadopoulos 1991.
     """
 
     patch: ContactPatch
     normal_force: float | None = dataclasses.field(default=None, kw_only=True)
 
-    kind: ClassVar[int]
-    """Kind of `kernels.surfaces`."""
     anisotropy: ClassVar[str] = "none"
     """Patches with direction-dependent friction that it takes: "none", "uniform" (all cells alike), "any"."""
+    segments: ClassVar[int] = 20
+    """Segments of a quadrant of the table that models store it as [-]."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.patch, ContactPatch):
@@ -92,11 +97,6 @@ class LimitSurface:
     def _radius(self) -> float:
         return float(self.patch.contact_radius(self.normal_force))
 
-    @functools.cached_property
-    def numbers(self) -> SurfaceNumbers:
-        """The stored surface for compiled loops, built on first use."""
-        raise NotImplementedError
-
     def _loaded_cells(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Positions about the centre of pressure (see `lever_coordinates`) and weights of the cells that carry load."""
         weights = self.patch.weights(self.normal_force)
@@ -130,6 +130,33 @@ class LimitSurface:
         weights = self.patch.weights(self.normal_force)
         wrench = np.einsum("n,nij,ni->j", weights, self.patch.levers(), self.patch.asymmetries())
         return np.linalg.solve(self._frame().T, wrench)
+
+    # ------------------------------------------------------------------ what a surface says of itself
+
+    def direction(self, units: np.ndarray) -> np.ndarray:
+        """`h` `[M, 3]`, the friction of unit scaled twists `[M, 3]` with its sign turned: what a surface has to say.
+
+        Scaled twists are `V_S = (vx, vy, r omega)` about the centre of pressure, with `r` the `contact_radius`, and
+        `h = -(fx, fy, tau/r)` is the gradient of the dissipation by them. It depends on the direction of V_S alone and
+        turns its sign with it; a pure translation has `h = (vx, vy, .)`.
+        """
+        raise NotImplementedError(f"{type(self).__name__} has to implement direction(units)")
+
+    def direction_slope(self, units: np.ndarray) -> np.ndarray:
+        """`dh/dV_S` `[M, 3, 3]` at unit scaled twists `[M, 3]`: by central differences unless overridden."""
+        slope = np.zeros((len(units), 3, 3))
+        for across in np.moveaxis(_plane(units), -2, 0):
+            ends = [self.direction(_unit(units + sign * _DIFFERENCE * across)) for sign in (1.0, -1.0)]
+            slope += np.einsum("mi,mj->mij", (ends[0] - ends[1]) / (2.0 * _DIFFERENCE), across)
+        return slope
+
+    @functools.cached_property
+    def numbers(self) -> SurfaceNumbers:
+        """The surface for compiled loops: a table of its potential, made on first use."""
+        from planarfriction.limit_surface.stored import stored_potential
+
+        data = stored_potential(lambda nodes: self.direction(nodes.reshape(-1, 3)).reshape(nodes.shape), self.segments)
+        return SurfaceNumbers(kernels.POTENTIAL, self.segments, data)
 
     # ------------------------------------------------------------------ the protocol
 
@@ -200,18 +227,27 @@ class LimitSurface:
         return transformed(frame, _rows("twist", twist)), frame
 
     def _direction(self, scaled: np.ndarray) -> np.ndarray:
-        """`h` of scaled twists `[..., 3]`; zero at rest."""
-        flat = np.ascontiguousarray(scaled.reshape(-1, 3))
-        u, speed = self._sliding(flat), np.linalg.norm(flat, axis=1)
+        """`h` of scaled twists `[..., 3]`, with what the asymmetry adds; zero at rest."""
+        flat = scaled.reshape(-1, 3)
+        moving, h = _norm(flat) > 0.0, np.zeros_like(flat)
+        h[moving] = self.direction(_unit(flat[moving]))
         if self._lean is not None:
-            u += speed[:, None] * self._lean
-        return (u / np.where(speed > 0.0, speed, 1.0)[:, None]).reshape(scaled.shape)
+            h[moving] += self._lean
+        return h.reshape(scaled.shape)
 
-    def _sliding(self, scaled: np.ndarray) -> np.ndarray:
-        """`u = h |V_S|` for scaled twists `[M, 3]`, without what the asymmetry adds."""
-        u, numbers = np.empty_like(scaled), self.numbers
-        kernels.sliding_batch(self.kind, numbers.data, 0, numbers.size, scaled, u)
-        return u
+    def _direction_slope(self, scaled: np.ndarray) -> np.ndarray:
+        """`dh/dV_S` for scaled twists `[M, 3]`, shape `[M, 3, 3]`; zero at rest."""
+        speed, slope = _norm(scaled), np.zeros((len(scaled), 3, 3))
+        moving = speed > 0.0
+        slope[moving] = self.direction_slope(_unit(scaled[moving])) / speed[moving, None, None]
+        return slope
+
+    def _sliding_slope(self, scaled: np.ndarray) -> np.ndarray:
+        """`du/dV_S` of `u = h |V_S|` without asymmetry, for `[M, 3]`, shape `[M, 3, 3]`; at rest the ellipsoid's."""
+        slope, moving = np.tile(np.eye(3), (len(scaled), 1, 1)), _norm(scaled) > 0.0
+        units = _unit(scaled[moving])
+        slope[moving] = self.direction_slope(units) + np.einsum("mi,mj->mij", self.direction(units), units)
+        return slope
 
     def _scaled_twists_of(self, targets: np.ndarray) -> np.ndarray:
         """`_scaled_twist_of` for unit vectors `[M, 3]`."""
@@ -262,22 +298,6 @@ class LimitSurface:
         h = self._direction(point[None])[0]
         return float(h @ point), basis @ h
 
-    def _sliding_slope(self, scaled: np.ndarray) -> np.ndarray:
-        """`du/dV_S` of `_sliding` for scaled twists `[M, 3]`, shape `[M, 3, 3]`."""
-        slopes = np.empty((len(scaled), 9))
-        numbers = self.numbers
-        kernels.sliding_jacobian_batch(self.kind, numbers.data, 0, numbers.size, np.ascontiguousarray(scaled), slopes)
-        return slopes.reshape(-1, 3, 3)
-
-    def _direction_slope(self, scaled: np.ndarray) -> np.ndarray:
-        """`dh/dV_S` for scaled twists `[M, 3]`, shape `[M, 3, 3]`; zero at rest."""
-        speed = np.linalg.norm(scaled, axis=1)
-        safe = np.where(speed > 0.0, speed, 1.0)
-        h = self._direction(scaled) if self._lean is None else self._direction(scaled) - self._lean
-        along = np.einsum("mi,mj->mij", h, scaled / safe[:, None])
-        slope = (self._sliding_slope(scaled) - along) / safe[:, None, None]
-        return np.where((speed > 0.0)[:, None, None], slope, 0.0)
-
 
 def scaling(centre_of_pressure: np.ndarray, contact_radius: float) -> np.ndarray:
     """`F` of `V_S = F V`: from the contact frame's origin to the centre of pressure, spin times the contact radius."""
@@ -288,6 +308,16 @@ def scaling(centre_of_pressure: np.ndarray, contact_radius: float) -> np.ndarray
 def _solved(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     """`matrix^-1 v` for each v of `vectors` `[M, 3]`, one by one: LAPACK rounds many at once differently."""
     return np.linalg.solve(matrix, vectors[..., None])[..., 0]
+
+
+def _norm(scaled: np.ndarray) -> np.ndarray:
+    """Lengths `[M]` of scaled twists `[M, 3]`, however large or small."""
+    return np.hypot(np.hypot(scaled[:, 0], scaled[:, 1]), scaled[:, 2])
+
+
+def _unit(scaled: np.ndarray) -> np.ndarray:
+    """Directions `[M, 3]` of scaled twists that are not at rest."""
+    return scaled / _norm(scaled)[:, None]
 
 
 def _plane(normal: np.ndarray) -> np.ndarray:

@@ -9,12 +9,13 @@ import numpy as np
 
 from planarfriction.kernels import surfaces as kernels
 from planarfriction.kernels.twists import least_dissipation
-from planarfriction.limit_surface.base import LimitSurface, SurfaceNumbers, _plane
+from planarfriction.limit_surface.base import SurfaceNumbers, _plane
 from planarfriction.limit_surface.cell_metrics import cell_slopes, cell_sums, cell_twist
+from planarfriction.limit_surface.compiled import CompiledLimitSurface
 
 
 @dataclass(frozen=True, eq=False)
-class LimitSurfaceCells(LimitSurface):
+class LimitSurfaceCells(CompiledLimitSurface):
     """Limit surface summed over the cells: `W = -sum w_i [v_i/|v_i| ; rho_i x v_i/|v_i|]`.
 
     Exact for point contacts; for a grid it jumps in small steps as the centre of rotation crosses cells (a cell at the

@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from planarfriction.kernels import surfaces as kernels
-from planarfriction.limit_surface.base import LimitSurface, SurfaceNumbers
+from planarfriction.limit_surface.base import SurfaceNumbers
+from planarfriction.limit_surface.compiled import CompiledLimitSurface
 
 
 @dataclass(frozen=True, eq=False)
-class LimitSurfaceEllipsoid(LimitSurface):
+class LimitSurfaceEllipsoid(CompiledLimitSurface):
     """Limit surface `fx^2 + fy^2 + (tau/r)^2 = 1` about the centre of pressure: `h = V_S/|V_S|`.
 
     Exact in pure sliding and in pure spin of a symmetric patch, wrong in between: which twist maps to which wrench.

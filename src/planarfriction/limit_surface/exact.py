@@ -8,9 +8,8 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from planarfriction.errors import InvalidValueError
 from planarfriction.kernels import exact as kernels
-from planarfriction.limit_surface.base import LimitSurface, SurfaceNumbers
+from planarfriction.limit_surface.base import LimitSurface, SurfaceNumbers, _norm
 from planarfriction.limit_surface.cells import LimitSurfaceCells
 from planarfriction.patch import Pressure, SoftFinger, Uniform
 from planarfriction.patch.outline import PolygonOutline, RoundOutline
@@ -96,18 +95,17 @@ class LimitSurfaceExact(LimitSurface):
     pressure. Points stay points. The wrench is continuous in the twist, the Jacobian exact; on lines the Jacobian grows
     without bound (as a logarithm) where the centre of rotation meets the line, and is cut off at 1e-15 of a cell.
 
-    Costs more than a sum over cells, and compiled loops do not know it: `LimitSurfaceTable` stores it for models.
+    Costs more than a sum over cells, and compiled loops do not know it: models store it as `LimitSurfaceTable` does.
     """
 
-    kind = -1  # no kind of compiled loops
     anisotropy = "uniform"
 
     @functools.cached_property
     def numbers(self) -> SurfaceNumbers:
-        """None: models take a stored surface."""
-        raise InvalidValueError(
-            "surface", "be one that compiled loops know; store it: LimitSurfaceTable(patch)", type(self).__name__
-        )
+        """Those of `LimitSurfaceTable`, which knows the mixed derivatives at its nodes."""
+        from planarfriction.limit_surface.table import LimitSurfaceTable
+
+        return LimitSurfaceTable(self.patch, self.segments, normal_force=self.normal_force).numbers
 
     @functools.cached_property
     def centre_of_pressure(self) -> np.ndarray:
@@ -168,31 +166,18 @@ class LimitSurfaceExact(LimitSurface):
         slopes = sums[:, [3, 4, 5, 4, 6, 7, 5, 7, 8]] * per_speed[:, None]
         return sums[:, :3], slopes.reshape(-1, 3, 3)
 
-    def _direction(self, scaled: np.ndarray) -> np.ndarray:
-        h = self.sums(scaled.reshape(-1, 3))[0].reshape(scaled.shape)
-        if self._lean is not None:
-            h += (_norm(scaled.reshape(-1, 3)) > 0.0).reshape(scaled.shape[:-1])[..., None] * self._lean
-        return h
+    def direction(self, units: np.ndarray) -> np.ndarray:
+        """Integrated in closed form, as far as there is one."""
+        return self.sums(units)[0]
 
-    def _direction_slope(self, scaled: np.ndarray) -> np.ndarray:
-        return self.sums(scaled)[1]
-
-    def _sliding_slope(self, scaled: np.ndarray) -> np.ndarray:
-        h, slopes = self.sums(scaled)
-        speed = _norm(scaled)[:, None, None]
-        unit = scaled[:, None, :] / np.where(speed > 0.0, speed, 1.0)
-        # at rest, where it has no value, the ellipsoid's
-        return np.where(speed > 0.0, speed * slopes + h[:, :, None] * unit, np.eye(3))
+    def direction_slope(self, units: np.ndarray) -> np.ndarray:
+        """Integrated alike."""
+        return self.sums(units)[1]
 
     def _scaled_twists_of(self, targets: np.ndarray) -> np.ndarray:
         if isinstance(self._parts, _Elements) and self._parts.corners.shape[1] == kernels.POINTS:
             return LimitSurfaceCells(self.patch, normal_force=self.normal_force)._scaled_twists_of(targets)
         return super()._scaled_twists_of(targets)
-
-
-def _norm(scaled: np.ndarray) -> np.ndarray:
-    """Lengths `[M]` of scaled twists `[M, 3]`, however large or small."""
-    return np.hypot(np.hypot(scaled[:, 0], scaled[:, 1]), scaled[:, 2])
 
 
 def _area(triangles: np.ndarray) -> np.ndarray:

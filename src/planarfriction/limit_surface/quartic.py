@@ -10,12 +10,10 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels import surfaces as kernels
 from planarfriction.limit_surface import quartic_fit
-from planarfriction.limit_surface.base import LimitSurface, SurfaceNumbers, _rows, scaling
+from planarfriction.limit_surface.base import LimitSurface, _rows, scaling
 from planarfriction.limit_surface.cells import LimitSurfaceCells
 from planarfriction.limit_surface.comparison import directions
-from planarfriction.limit_surface.stored import stored_potential
 from planarfriction.patch import ContactPatch
 
 _SLOPE_LEFT = 1e-14
@@ -47,8 +45,6 @@ class LimitSurfaceQuartic(LimitSurface):
 
     segments: int = dataclasses.field(default=20, kw_only=True)
     """Segments of a quadrant of the table for compiled loops [-]."""
-
-    kind = kernels.POTENTIAL
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "segments", validation.count("segments", self.segments, at_least=2))
@@ -106,11 +102,6 @@ class LimitSurfaceQuartic(LimitSurface):
         """Smallest eigenvalue of the certificate `Q`: the surface is convex, proven, where this is not negative."""
         return float(np.linalg.eigvalsh(quartic_fit.certificate(self.quartic))[0])
 
-    @functools.cached_property
-    def numbers(self) -> SurfaceNumbers:
-        """Potential and its derivatives at the nodes of a table, as `LimitSurfaceTable` stores them."""
-        return SurfaceNumbers(self.kind, self.segments, stored_potential(self._direction, self.segments))
-
     # ------------------------------------------------------------------ the protocol
 
     def _value(self, points: np.ndarray) -> np.ndarray:
@@ -154,26 +145,18 @@ class LimitSurfaceQuartic(LimitSurface):
             active = active[moved | (size > 1e-10)]
         return x
 
-    def _direction(self, scaled: np.ndarray) -> np.ndarray:
+    def direction(self, units: np.ndarray) -> np.ndarray:
         """`h` with `H(h) = 1` and its gradient along the twist."""
-        flat = scaled.reshape(-1, 3)
-        speed = np.linalg.norm(flat, axis=1)
-        moving = speed > 0.0
-        h = np.zeros_like(flat)
-        x = self._conjugate(flat[moving] / speed[moving, None])
-        h[moving] = x / self._value(x)[:, None] ** 0.25
-        return h.reshape(scaled.shape)
+        x = self._conjugate(units)
+        return x / self._value(x)[:, None] ** 0.25
 
-    def _sliding_slope(self, scaled: np.ndarray) -> np.ndarray:
-        """`du/dV_S`, from `x(V) = Phi^(1/3) h` and `dx/dV = (H''(x)/4)^-1`, Phi the dissipation of the unit twist."""
-        speed = np.linalg.norm(scaled, axis=1)
-        units = np.where(speed[:, None] > 0.0, scaled, [0.0, 0.0, 1.0]) / np.where(speed > 0.0, speed, 1.0)[:, None]
+    def direction_slope(self, units: np.ndarray) -> np.ndarray:
+        """`dh/dV_S`, from `x(V) = Phi^(1/3) h` and `dx/dV = (H''(x)/4)^-1`, Phi the dissipation of the unit twist."""
         x = self._conjugate(units)
         root = self._value(x) ** 0.25  # Phi^(1/3)
         h = x / root[:, None]
         slope = np.linalg.inv(0.25 * self._hessian(x)) / root[:, None, None]
-        slope -= np.einsum("mi,mj->mij", h, h) / (3.0 * root**3)[:, None, None]
-        return slope + np.einsum("mi,mj->mij", h, units)
+        return slope - np.einsum("mi,mj->mij", h, h) / (3.0 * root**3)[:, None, None]
 
 
 def _fitted(points: np.ndarray, twists: np.ndarray, velocity_weight: float) -> np.ndarray:

@@ -9,13 +9,14 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.kernels import surfaces as kernels
-from planarfriction.limit_surface.base import LimitSurface, SurfaceNumbers
+from planarfriction.limit_surface.base import SurfaceNumbers
 from planarfriction.limit_surface.cell_metrics import potential_table
+from planarfriction.limit_surface.compiled import CompiledLimitSurface
 from planarfriction.limit_surface.exact import STORED_RULES, LimitSurfaceExact
 
 
 @dataclass(frozen=True, eq=False)
-class LimitSurfaceTable(LimitSurface):
+class LimitSurfaceTable(CompiledLimitSurface):
     """Stored limit surface: dissipation and its gradient at `segments` x `4 segments` directions, bicubic in between.
 
     The potential is interpolated and the wrench is its gradient, so that `-W . V = Phi(V) > 0` and the Jacobian is

@@ -10,14 +10,15 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.kernels import surfaces as kernels
 from planarfriction.kernels import tables
-from planarfriction.limit_surface.base import LimitSurface, SurfaceNumbers, _plane
+from planarfriction.limit_surface.base import SurfaceNumbers, _plane
+from planarfriction.limit_surface.compiled import CompiledLimitSurface
 
 _SAME_ANSWER = 1e-12
 """Angle [rad] between a stored wrench and the wanted one below which a direction answers: rounding of the quadratic."""
 
 
 @dataclass(frozen=True, eq=False)
-class LimitSurfaceTablePublished(LimitSurface):
+class LimitSurfaceTablePublished(CompiledLimitSurface):
     """Stored limit surface as published: smoothed sums at `segments` x `4 segments` nodes, bilinear in the two angles.
 
     The sums are blended over the corners of the grid cell that holds the centre of rotation, the contact radius with

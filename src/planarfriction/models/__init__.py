@@ -1,7 +1,7 @@
 """Friction models of a contact patch: parameters, and pure functions of (state, twist, load)."""
 
 from planarfriction.families import MODELS
-from planarfriction.models.base import FrictionModel, ModelJacobians, StepJacobians
+from planarfriction.models.base import FrictionModel, ModelJacobians, PackedModel, StepJacobians
 from planarfriction.models.distributed import DistributedModel
 from planarfriction.models.reduced import ReducedModel
 from planarfriction.models.reduced_published import ReducedModelPublished
@@ -11,6 +11,7 @@ __all__ = [
     "DistributedModel",
     "FrictionModel",
     "ModelJacobians",
+    "PackedModel",
     "ReducedModel",
     "ReducedModelPublished",
     "StepJacobians",
