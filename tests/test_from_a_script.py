@@ -1,4 +1,4 @@
-"""The example that goes from a script with the paper's model to a contact patch: the numbers of its page, its picture."""
+"""The example that goes from a script with the paper's model to a contact patch: numbers of its page, its picture."""
 
 from __future__ import annotations
 
