@@ -41,6 +41,7 @@ _HOME = {
     "load": "planarfriction.scenes",
     "rollout": "planarfriction.autodiff",
     "simulate": "planarfriction.scenes",
+    "warm_up": "planarfriction.warm",
 }
 _MODULES = (
     "autodiff",
@@ -90,3 +91,4 @@ if TYPE_CHECKING:  # for editors and type checkers: the same names as above
     from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
     from planarfriction.patch import ContactPatch, LinearGradient, PressureMaps, SoftFinger, Uniform, grain
     from planarfriction.scenes import Body, Contact, Scene, Signal, Solution, load, simulate
+    from planarfriction.warm import warm_up

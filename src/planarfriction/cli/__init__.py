@@ -1,4 +1,4 @@
-"""Command line: `planarfriction run`, `limit-surface`, `reproduce`, `identify`, `bench`."""
+"""Command line: `planarfriction run`, `limit-surface`, `reproduce`, `identify`, `bench`, `warm`."""
 
 from __future__ import annotations
 

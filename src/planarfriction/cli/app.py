@@ -211,6 +211,20 @@ def identify(
 
 
 @app.command(
+    short_help="Compile everything ahead.",
+    help="""Compile everything ahead, so that no later run has to; what was compiled before is read from the cache.
+
+    Ctrl-C stops it; the parts that are done stay done.
+    """,
+)
+def warm() -> None:
+    """Warm up (the help above is what users see)."""
+    from planarfriction.cli import warm as command
+
+    command.warm()
+
+
+@app.command(
     short_help="Measure the speed of this installation.",
     help="""Measure the speed of this installation; every line stands beside its baseline from the same run.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,6 +26,8 @@ class PackedScene(NamedTuple):
     """Natural scale of each state: mu_c/sigma_0 for deflections and positions, v_s for velocities, angles over r."""
     models: list[PackedModel]
     """The model of each contact; the system holds addresses of its arrays."""
+    loading: float
+    """Time to compile the models' functions and the solver's, or to load them from the cache [s]."""
 
 
 def breaks_of(scene, t_end: float) -> np.ndarray:
@@ -52,8 +55,11 @@ def pack(scene, t_end: float, *, sensitivities: bool = False) -> PackedScene:
         row[:, c] = which + sum(len(each) for each in records)
         records.append(place_of(model.records) + model.records.strides[0] * np.arange(len(loads)))
         models.append(model)
+    begin = time.perf_counter()
+    calls = np.array([calls_of(model.functions, change=sensitivities) for model in models])
+    loading = time.perf_counter() - begin
     contacts = Contacts(
-        calls=np.array([calls_of(model.functions, change=sensitivities) for model in models]),
+        calls=calls,
         record=np.concatenate(records),
         mount=np.array([_mount(scene, contact) for contact in scene.contacts]),
         place=np.array([[*c.position, np.cos(c.angle), np.sin(c.angle)] for c in scene.contacts], dtype=float),
@@ -68,7 +74,8 @@ def pack(scene, t_end: float, *, sensitivities: bool = False) -> PackedScene:
     arm = np.array([1.0, 1.0, 1.0 / radius])
     state = np.concatenate([np.zeros(contacts.state[-1]), scene.body.velocity, scene.body.position, [scene.body.angle]])
     natural = np.concatenate([*(model.natural for model in models), speed * arm, length * arm])
-    return PackedScene(system_of(contacts, _motion(scene, breaks, load, row, radius)), state, natural, models)
+    system = system_of(contacts, _motion(scene, breaks, load, row, radius))
+    return PackedScene(system, state, natural, models, loading)
 
 
 def _starts(sizes: list[int]) -> np.ndarray:

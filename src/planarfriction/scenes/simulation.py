@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 
@@ -99,7 +100,8 @@ def simulate(
         atol=atol * packed.natural,
         progress=progress,
     )
-    solution = Solution(_histories(scene, packed, run.output), run.statistics, run.status, run.message, scene)
+    cost = replace(run.statistics, compile_time=run.statistics.compile_time + packed.loading)
+    solution = Solution(_histories(scene, packed, run.output), cost, run.status, run.message, scene)
     if run.status == "interrupted":
         raise SimulationInterrupted(solution)
     if run.status not in ("success", "at rest"):

@@ -1,0 +1,92 @@
+"""Compile ahead what is otherwise compiled when it is first used: after an installation, or while an image is built."""
+
+from __future__ import annotations
+
+import functools
+import time
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from planarfriction import autodiff, limit_surface, models
+from planarfriction.families import MODELS
+from planarfriction.laws import LuGre
+from planarfriction.patch import ContactPatch, grain
+from planarfriction.scenes import in_hand, simulate
+
+_INSTANT = 1e-3
+"""Simulated time [s]: compiling does not depend on how far a run goes."""
+
+
+class Part(NamedTuple):
+    """Something that is compiled in one go."""
+
+    words: str
+    """What it is, in a few words."""
+    work: Callable[[], Any]
+    """Uses it, which compiles it or reads it from the cache."""
+
+
+def warm_up(*, progress: Callable[[str], None] | None = None) -> dict[str, float]:
+    """Compile everything now and keep it on disk; returns the time that each part took [s].
+
+    What was compiled before is read from the cache. `progress` is called with the words of each part before it begins.
+    A part that is done stays done, so an interruption loses only the part that it meets. Machine code is kept beside
+    the sources, in the user's cache where these cannot be written, or in the folder that `NUMBA_CACHE_DIR` names.
+    """
+    times = {}
+    for part in _parts():
+        if progress is not None:
+            progress(part.words)
+        begin = time.perf_counter()
+        part.work()
+        times[part.words] = time.perf_counter() - begin
+    return times
+
+
+def _parts() -> list[Part]:
+    patch, law = ContactPatch.disc(radius=0.01, cells=5), LuGre(mu_s=1.2, elasto_plastic=0.9)
+    kinds = {name: MODELS[name](patch, law) for name in ("distributed", "reduced", "reduced-published")}
+    three_states = {name: model for name, model in kinds.items() if name != "distributed"}
+    grooved = models.DistributedModel(patch.with_friction_metric(grain(0.0, along=1.0, across=0.8)), law)
+    return [
+        *(Part(f"scenes, {name}", functools.partial(_simulate, model)) for name, model in kinds.items()),
+        Part("scenes, friction with a grain", functools.partial(_simulate, grooved)),
+        *(Part(f"steps, {name}", functools.partial(_step, model)) for name, model in kinds.items()),
+        *(Part(f"roll-outs, {name}", functools.partial(_roll, model)) for name, model in three_states.items()),
+        *(Part(f"derivatives of scenes, {name}", functools.partial(_derive, model)) for name, model in kinds.items()),
+        Part("limit surfaces", functools.partial(_surfaces, patch)),
+    ]
+
+
+def _simulate(model: Any) -> None:
+    simulate(in_hand(model), t_end=_INSTANT)
+
+
+def _derive(model: Any) -> None:
+    autodiff.scene_sensitivities(in_hand(model), t_end=_INSTANT)
+
+
+def _step(model: Any) -> None:
+    state, twist = model.rest(), (0.01, 0.0, 1.0)
+    for method in (model.rate, model.wrench, model.jacobians):
+        method(state, twist, 1.0)
+    for method in (model.step, model.step_jacobians):
+        method(state, twist, 1.0, 1e-4)
+        method(state, np.tile(twist, (2, 1)), 1.0, 1e-4)
+
+
+def _roll(model: Any) -> None:
+    arguments = None, np.tile((0.01, 0.0, 1.0), (2, 1)), 1.0, 1e-4
+    autodiff.rollout(model, *arguments)
+    autodiff.rollout_gradient(model, *arguments, np.ones((2, 3)))
+    autodiff.rollout_sensitivities(model, *arguments)
+
+
+def _surfaces(patch: ContactPatch) -> None:
+    kinds = (limit_surface.LimitSurfaceExact, limit_surface.LimitSurfaceCells, limit_surface.LimitSurfaceTable)
+    for kind in (*kinds, limit_surface.LimitSurfaceTablePublished, limit_surface.LimitSurfaceEllipsoid):
+        surface = kind(patch)
+        surface.jacobian((0.01, 0.0, 1.0))
+        surface.twist(surface.wrench((0.01, 0.0, 1.0)))
