@@ -51,7 +51,7 @@ def reproduced() -> dict[str, plots.style.PlotFigure]:
 def figures() -> dict[str, plots.style.PlotFigure]:
     """The figures by the names of their files."""
     circle, pads = PUBLISHED_PATCHES["Circle"](), PUBLISHED_PATCHES["NonConvex1"]()
-    models = {"distributed": pf.DistributedModel(circle, LAW), "reduced": pf.ReducedModelPublished(circle, LAW)}
+    models = {"distributed": pf.DistributedModel(circle, LAW), "reduced": pf.ReducedModel(circle, LAW)}
     in_hand = {name: pf.simulate(pf.scenes.in_hand(model)) for name, model in models.items()}
     return {
         "in-hand-motion": plots.plot_motion(in_hand["distributed"]),
