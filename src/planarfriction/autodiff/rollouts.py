@@ -209,7 +209,7 @@ def _roll(inputs: _Inputs, kept: int) -> tuple[np.ndarray, np.ndarray, np.ndarra
     return end, wrenches, states
 
 
-def _stepped(model: FrictionModel, state: Any, twist: Any, normal_force: Any, dt: Any) -> Rollout:
+def _stepped(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any) -> Rollout:
     """The steps of any model; it checks their numbers itself."""
     state = model.rest() if state is None else validation.numbers("state", state)
     twist, load, dt = _sequences(twist, normal_force, dt)

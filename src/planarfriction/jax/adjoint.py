@@ -72,18 +72,19 @@ _rollout.defvjp(_rollout_fwd, _rollout_bwd, symbolic_zeros=True)
 
 
 def _forward(kind: _Kind, *arrays):
-    def run(data, dt, parameters, *inputs):
-        wide = _beside(parameters, inputs[0])
-        return autodiff.rollout(_packed(kind, data), *inputs, dt, parameters=wide)
+    def run(data, dt, parameters, state, twist, load):
+        wide = _beside(parameters, state)
+        return autodiff.rollout(_packed(kind, data), state, twist, load, dt, parameters=wide)
 
     return _by_contact(run, arrays, arrays[4].dtype)
 
 
 def _backward(kind: _Kind, *arrays):
-    def run(data, dt, parameters, *inputs):
-        *inputs, state_bar, wrenches_bar = inputs
-        wide = _beside(parameters, inputs[0])
-        found = autodiff.rollout_gradient(_packed(kind, data), *inputs, dt, wrenches_bar, state_bar, parameters=wide)
+    def run(data, dt, parameters, state, twist, load, state_bar, wrenches_bar):
+        wide = _beside(parameters, state)
+        found = autodiff.rollout_gradient(
+            _packed(kind, data), state, twist, load, dt, wrenches_bar, state_bar, parameters=wide
+        )
         return found.parameters.reshape(parameters.shape), found.state, found.twist, found.normal_force
 
     return _by_contact(run, arrays, arrays[4].dtype)

@@ -88,5 +88,6 @@ class ReducedModelPublished(FrictionModel):
 
     def _shape(self) -> PublishedNumbers:
         p, s = self.parameters, self.surface
-        own = (value[..., None] for value in (p.contact_radius, p.second_moment, p.centre_x, p.centre_y))
-        return PublishedNumbers(*own, functools.partial(surface_arrays.sliding, xp, s.kind, s.size, s.data))
+        radius, second_moment, x, y = (value[..., None] for value in p[-4:])
+        surface = functools.partial(surface_arrays.sliding, xp, s.kind, s.size, s.data)
+        return PublishedNumbers(radius, second_moment, x, y, surface)

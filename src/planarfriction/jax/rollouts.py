@@ -81,7 +81,8 @@ def rollout(
         return Rollout(*adjoint.rollout(model, start, twist, load, dt))
 
     def one(z, inputs):
-        return model.step(z, *inputs, dt)
+        twist, load = inputs
+        return model.step(z, twist, load, dt)
 
     # Only the states are kept for the way back; to step again costs less than to store all that a step computes.
     one = jax.checkpoint(one, prevent_cse=False)  # pyright: ignore[reportPrivateImportUsage]

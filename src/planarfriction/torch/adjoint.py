@@ -26,8 +26,8 @@ def roll_out(reference: Any, dt: float, *inputs: Tensor) -> tuple[Tensor, Tensor
 class _Rollout(torch.autograd.Function):
     @staticmethod
     def forward(reference, dt, *inputs):
-        *arrays, parameters = map(_to_numpy, inputs)
-        result = autodiff.rollout(reference, *arrays, dt, parameters=parameters)
+        state, twist, load, parameters = map(_to_numpy, inputs)
+        result = autodiff.rollout(reference, state, twist, load, dt, parameters=parameters)
         return tuple(_like(array, inputs) for array in result)
 
     @staticmethod
@@ -49,8 +49,10 @@ class _Gradient(torch.autograd.Function):
 
     @staticmethod
     def forward(reference, dt, *tensors):
-        *arrays, parameters, state_bar, wrenches_bar = map(_to_numpy, tensors)
-        gradient = autodiff.rollout_gradient(reference, *arrays, dt, wrenches_bar, state_bar, parameters=parameters)
+        state, twist, load, parameters, state_bar, wrenches_bar = map(_to_numpy, tensors)
+        gradient = autodiff.rollout_gradient(
+            reference, state, twist, load, dt, wrenches_bar, state_bar, parameters=parameters
+        )
         return tuple(_like(array, (tensor,)) for array, tensor in zip(gradient, tensors[:4], strict=True))
 
     @staticmethod
