@@ -9,8 +9,11 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
+from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import published_adjoint, published_rollout, reduced_rollout
 from planarfriction.models import ReducedModel, ReducedModelPublished
+from planarfriction.models.reduced_map import ReducedShape
+from planarfriction.models.reduced_published import PublishedShape
 from planarfriction.patch.metric import refuse_anisotropy
 
 PARAMETERS = (
@@ -123,7 +126,7 @@ def has_one_shape(model: Any) -> bool:
 
 
 def _packed(model: Any) -> Packed:
-    family = _family(model)
+    _family(model)
     how = getattr(model, "on_load_change", None)
     if model.patch.depends_on_load and how != "keep":
         raise InvalidValueError(
@@ -133,12 +136,16 @@ def _packed(model: Any) -> Packed:
             f"on_load_change={how!r}" if how else "a patch that depends on the load",
         )
     refuse_anisotropy(model.patch, "derivatives of roll-outs")
-    shape = model.shape_at(1.0)
-    row = np.array([*model.law.numbers, *shape.numbers])
-    if family is REDUCED:
-        return Packed(row, np.zeros(3, dtype=int), shape.data, family)
+    return pack_shape(model.law.numbers, model.shape_at(1.0))
+
+
+def pack_shape(law: LawNumbers, shape: ReducedShape | PublishedShape) -> Packed:
+    """A law and what a patch is at one load, as compiled loops see them."""
+    row = np.array([*law, *shape.numbers])
+    if isinstance(shape, ReducedShape):
+        return Packed(row, np.zeros(3, dtype=int), shape.data, REDUCED)
     numbers = shape.surface.numbers
-    return Packed(row, np.array([numbers.kind, 0, numbers.size]), numbers.data, family)
+    return Packed(row, np.array([numbers.kind, 0, numbers.size]), numbers.data, PUBLISHED)
 
 
 def _checked(parameters: Any, names: tuple[str, ...]) -> np.ndarray:

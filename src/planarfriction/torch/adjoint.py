@@ -8,50 +8,51 @@ import torch
 from torch import Tensor
 
 from planarfriction import autodiff
+from planarfriction.autodiff.parameters import Packed
 from planarfriction.errors import FrictionError
 
 _INNER = (1, 2, 1, 1)
 """Axes of state `[3]`, twist `[T, 3]`, normal_force `[T]` and parameters `[P]` behind the batch axes."""
 
 
-def roll_out(reference: Any, dt: float, *inputs: Tensor) -> tuple[Tensor, Tensor]:
+def roll_out(model: Packed, dt: float, *inputs: Tensor) -> tuple[Tensor, Tensor]:
     """The last state `[..., 3]` and wrenches `[..., T, 3]` of `autodiff.rollout`.
 
-    `reference` is the NumPy model; `inputs` are state `[..., 3]`, twist `[..., T, 3]`, normal_force `[..., T]` and
-    parameters `[..., P]`, whose batch axes broadcast.
+    `inputs` are state `[..., 3]`, twist `[..., T, 3]`, normal_force `[..., T]` and parameters `[..., P]`, whose batch
+    axes broadcast.
     """
-    return _Rollout.apply(reference, dt, *inputs)  # pyright: ignore[reportReturnType]
+    return _Rollout.apply(model, dt, *inputs)  # pyright: ignore[reportReturnType]
 
 
 class _Rollout(torch.autograd.Function):
     @staticmethod
-    def forward(reference, dt, *inputs):
+    def forward(model, dt, *inputs):
         state, twist, load, parameters = map(_to_numpy, inputs)
-        result = autodiff.rollout(reference, state, twist, load, dt, parameters=parameters)
+        result = autodiff.rollout(model, state, twist, load, dt, parameters=parameters)
         return tuple(_like(array, inputs) for array in result)
 
     @staticmethod
     def setup_context(ctx, inputs, output):
-        ctx.reference, ctx.dt = inputs[:2]
+        ctx.model, ctx.dt = inputs[:2]
         ctx.save_for_backward(*inputs[2:])
 
     @staticmethod
     def backward(ctx, *bars):
-        return (None, None, *_Gradient.apply(ctx.reference, ctx.dt, *ctx.saved_tensors, *bars))  # pyright: ignore
+        return (None, None, *_Gradient.apply(ctx.model, ctx.dt, *ctx.saved_tensors, *bars))  # pyright: ignore
 
     @staticmethod
-    def vmap(info, in_dims, reference, dt, *inputs):
-        return _Rollout.apply(reference, dt, *_aligned(info.batch_size, in_dims[2:], inputs, _INNER)), (0, 0)
+    def vmap(info, in_dims, model, dt, *inputs):
+        return _Rollout.apply(model, dt, *_aligned(info.batch_size, in_dims[2:], inputs, _INNER)), (0, 0)
 
 
 class _Gradient(torch.autograd.Function):
     """Cotangents of the inputs from those of last state and wrenches; itself without derivative."""
 
     @staticmethod
-    def forward(reference, dt, *tensors):
+    def forward(model, dt, *tensors):
         state, twist, load, parameters, state_bar, wrenches_bar = map(_to_numpy, tensors)
         gradient = autodiff.rollout_gradient(
-            reference, state, twist, load, dt, wrenches_bar, state_bar, parameters=parameters
+            model, state, twist, load, dt, wrenches_bar, state_bar, parameters=parameters
         )
         return tuple(_like(array, (tensor,)) for array, tensor in zip(gradient, tensors[:4], strict=True))
 
@@ -64,11 +65,11 @@ class _Gradient(torch.autograd.Function):
         raise FrictionError("the adjoint gives first derivatives: take method='eager' to differentiate twice")
 
     @staticmethod
-    def vmap(info, in_dims, reference, dt, *tensors):
+    def vmap(info, in_dims, model, dt, *tensors):
         size = info.batch_size
         aligned = _aligned(size, in_dims[2:], tensors, (*_INNER, 1, 2))
         shapes = [_logical(tensor, dim) for tensor, dim in zip(tensors[:4], in_dims[2:6], strict=True)]
-        gradients: Any = _Gradient.apply(reference, dt, *aligned)
+        gradients: Any = _Gradient.apply(model, dt, *aligned)
         return tuple(g.reshape(size, *shape) for g, shape in zip(gradients, shapes, strict=True)), (0,) * 4
 
 

@@ -10,6 +10,7 @@ import torch
 from torch import Tensor, nn
 
 from planarfriction import models, validation
+from planarfriction.autodiff.parameters import Packed
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.laws import ElastoPlastic, FrictionLaw, LuGre
@@ -47,6 +48,8 @@ class FrictionModel(nn.Module):
     physical: PhysicalParameters
     reference: models.FrictionModel
     """The same model in NumPy, with the parameters that this one started with."""
+    compiled: Packed | None = None
+    """The same model as compiled roll-outs take it, if they know it."""
 
     def __init__(self, patch: ContactPatch, law: FrictionLaw) -> None:
         super().__init__()

@@ -8,6 +8,7 @@ import torch
 from torch import Tensor, nn
 
 from planarfriction import models
+from planarfriction.autodiff.parameters import pack_shape
 from planarfriction.laws import FrictionLaw
 from planarfriction.limit_surface import LimitSurface, surface_arrays
 from planarfriction.models import published_arrays
@@ -66,6 +67,7 @@ class ReducedModelPublished(FrictionModel):
         when = "keep" if surface is not None else "rebuild"
         self.reference = models.ReducedModelPublished(patch, law, surface, on_load_change=when)  # pyright: ignore
         shape = self.reference._reference
+        self.compiled = pack_shape(law.numbers, shape)
         kind = {"dtype": dtype or torch.get_default_dtype(), "device": device}
         self.surface = Surface(shape.surface, **kind)
         x, y = shape.centre_of_pressure.tolist()
@@ -81,6 +83,5 @@ class ReducedModelPublished(FrictionModel):
 
     def prepare(self, parameters: Tensor) -> Prepared:
         """The law, `r`, `<rho^2>`, the centre of pressure, and the limit surface."""
-        return Prepared(
-            self._law(parameters), PublishedNumbers(*parameters[..., len(LAW) :].split(1, -1), self.surface)
-        )
+        radius, second_moment, x, y = parameters[..., len(LAW) :].split(1, -1)
+        return Prepared(self._law(parameters), PublishedNumbers(radius, second_moment, x, y, self.surface))

@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from planarfriction import models
+from planarfriction.autodiff.parameters import pack_shape
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.laws import ElastoPlastic, FrictionLaw, LuGre
@@ -59,6 +60,7 @@ class ReducedModel(FrictionModel):
         self.gamma = law.numbers.gamma
         self.reference = models.ReducedModel(patch, law, segments=segments, speeds=speeds)
         shape = self.reference.shape_at(normal_force)
+        self.compiled = pack_shape(law.numbers, shape)
         self._lever = shape.contact_radius
         for name, values in zip(_BUFFERS, reduced_arrays.numbers_of(shape), strict=True):
             self.register_buffer(name, torch.as_tensor(values, **kind).clone())

@@ -11,7 +11,6 @@ from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.torch import adjoint
 from planarfriction.torch.base import FrictionModel
-from planarfriction.torch.published import ReducedModelPublished
 
 METHODS = ("adjoint", "eager")
 """Compiled roll-out with its discrete adjoint; every step an operation of PyTorch, recorded by autograd."""
@@ -41,9 +40,9 @@ def rollout(
     `normal_force` broadcasts with `[..., T]`: one number, one for each step `[T]`, or one for each contact `[..., 1]`.
     Gradients reach the parameters of the model, `state`, `twist`, `normal_force` and `parameters`.
 
-    `method` is `"adjoint"`, the compiled roll-out with its discrete adjoint (`ReducedModelPublished` on the processor,
-    first derivatives), or `"eager"`, PyTorch operations step by step (any model and device, derivatives of any order,
-    also to `dt`); None takes the adjoint where it can.
+    `method` is `"adjoint"`, the compiled roll-out with its discrete adjoint (reduced models on the processor, first
+    derivatives), or `"eager"`, PyTorch operations step by step (any model and device, derivatives of any order, also
+    to `dt`); None takes the adjoint where it can.
 
     Raises `InvalidValueError` for wrong shapes and for a method that is not possible; the adjoint also for numbers that
     are not finite and for loads below zero.
@@ -66,12 +65,13 @@ def rollout(
         raise InvalidValueError("method", f"be 'eager' {obstacle}", repr(method))
     if method == "eager" or obstacle:
         return Rollout(*model.roll_out(parameters, start, twist, load, step))
-    return Rollout(*adjoint.roll_out(model.reference, float(step), start, twist, load, model._vector(parameters)))
+    values = model._vector(parameters)
+    return Rollout(*adjoint.roll_out(model.compiled, float(step), start, twist, load, values))  # pyright: ignore
 
 
 def _obstacle(model: FrictionModel, *tensors: Tensor) -> str:
     """Why the adjoint cannot be used, or nothing."""
-    if not isinstance(model, ReducedModelPublished):
+    if model.compiled is None:
         return f"for {type(model).__name__}"
     if any(tensor.device.type != "cpu" for tensor in (*tensors, model.physical.values)):
         return "for tensors that are not on the processor"
