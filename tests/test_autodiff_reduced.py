@@ -1,4 +1,4 @@
-"""Derivatives of roll-outs of the moment model: closed forms, kinks, differences, and backwards against forwards."""
+"""Derivatives of roll-outs of the reduced model: closed forms, kinks, differences, and backwards against forwards."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The moment model in JAX: closed forms, agreement with the compiled one and with PyTorch, gradients."""
+"""The reduced model in JAX: closed forms, agreement with the compiled one and with PyTorch, gradients."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The moment model: what it holds exactly, its map, its step and its derivatives."""
+"""The reduced model: what it holds exactly, its map, its step and its derivatives."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The moment model in PyTorch: closed forms, agreement with the compiled one, gradients at and off the kinks."""
+"""The reduced model in PyTorch: closed forms, agreement with the compiled one, gradients at and off the kinks."""
 
 from __future__ import annotations
 

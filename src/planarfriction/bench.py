@@ -125,7 +125,7 @@ def _in_hand_distributed_101(name: str, full: bool) -> Measurement:
     return _line(name, costs[101], "ns per loaded cell and step", "the same on 21 x 21 cells", costs[21])
 
 
-def _in_hand_reduced(name: str, full: bool, load: Literal[1, 2] = 1) -> Measurement:
+def _in_hand_published(name: str, full: bool, load: Literal[1, 2] = 1) -> Measurement:
     scene = in_hand(ReducedModelPublished(_disc(), _law()), normal_force=in_hand_load(load))
     value, _ = _solver_time(scene, 9)
     return _line(name, value, "s", "SciPy LSODA over the whole run", lsoda_time(scene, scene.t_end))
@@ -208,7 +208,7 @@ def _published_loop(twists: np.ndarray) -> float:
     return _median(lambda: kernels.step_sequence(*arguments, z, twists, 1.0, 1e-4, wrench), 9)
 
 
-def _step_reduced_loop(name: str, full: bool) -> Measurement:
+def _step_published_loop(name: str, full: bool) -> Measurement:
     twists = _mixed_twists(20_000)
     loop, call = _published_loop(twists), _python_step(ReducedModelPublished(_disc(), _law()), 1000)
     return _line(name, loop / len(twists) * 1e6, "us", "one Python call of the same step", call * 1e6)
@@ -232,14 +232,14 @@ def _python_step(model: Any, inner: int) -> float:
     return _median(lambda: model.step(state, twist, 1.0, 1e-3), 9, inner)
 
 
-def _step_reduced_call(name: str, full: bool) -> Measurement:
+def _step_published_call(name: str, full: bool) -> Measurement:
     model = ReducedModelPublished(_disc(), _law())
     state, twist = model.rest(), np.array([0.01, 0.0, 1.0])
     rate = _median(lambda: model.rate(state, twist, 1.0), 9, 100)
     return _line(name, _python_step(model, 2000) * 1e6, "us", "one Python call of rate (NumPy)", rate * 1e6)
 
 
-def _moments_loop(model: ReducedModel, twists: np.ndarray) -> float:
+def _reduced_loop(model: ReducedModel, twists: np.ndarray) -> float:
     from planarfriction.kernels import reduced_step as kernels
 
     shape, z, wrench = model.shape_at(1.0), model.rest(), np.empty_like(twists)
@@ -247,19 +247,19 @@ def _moments_loop(model: ReducedModel, twists: np.ndarray) -> float:
     return _median(lambda: kernels.step_sequence(*arguments, z, twists, 1.0, 1e-4, wrench), 9)
 
 
-def _step_moments_loop(name: str, full: bool) -> Measurement:
+def _step_reduced_loop(name: str, full: bool) -> Measurement:
     twists = _mixed_twists(20_000)
-    ours, theirs = _moments_loop(ReducedModel(_disc(), _law()), twists), _published_loop(twists)
+    ours, theirs = _reduced_loop(ReducedModel(_disc(), _law()), twists), _published_loop(twists)
     return _line(name, ours / len(twists) * 1e6, "us", _AGAINST_PUBLISHED, theirs / len(twists) * 1e6)
 
 
-def _step_moments_call(name: str, full: bool) -> Measurement:
+def _step_reduced_call(name: str, full: bool) -> Measurement:
     ours, theirs = (_python_step(model(_disc(), _law()), 2000) for model in (ReducedModel, ReducedModelPublished))
     return _line(name, ours * 1e6, "us", _AGAINST_PUBLISHED, theirs * 1e6)
 
 
-def _gradient_moments(name: str, full: bool) -> Measurement:
-    """A roll-out with its gradient, as `gradient.reduced`."""
+def _gradient_reduced(name: str, full: bool) -> Measurement:
+    """A roll-out with its gradient, as `gradient.published`."""
     ours, theirs = (_value_and_gradient(model(_disc(), _law())) for model in (ReducedModel, ReducedModelPublished))
     return _line(name, ours, "s", _AGAINST_PUBLISHED, theirs)
 
@@ -278,7 +278,7 @@ def _value_and_gradient(model: ReducedModel | ReducedModelPublished) -> float:
     return _median(value_and_gradient, 15)
 
 
-def _gradient_reduced(name: str, full: bool) -> Measurement:
+def _gradient_published(name: str, full: bool) -> Measurement:
     """Half the squared wrenches of a roll-out, with its gradient to all parameters, twists, loads and the state."""
     from planarfriction import autodiff
 
@@ -311,7 +311,7 @@ def _eager_gradient(model: ReducedModelPublished, twists: np.ndarray, dt: float,
     return _median(value_and_gradient, 3 if full else 1)
 
 
-def _gradient_reduced_batch(name: str, full: bool) -> Measurement:
+def _gradient_published_batch(name: str, full: bool) -> Measurement:
     from planarfriction import autodiff
 
     model, contacts, steps, dt = ReducedModelPublished(_disc(), _law()), 1000, 1000, 1e-4
@@ -341,19 +341,19 @@ def _import(name: str, full: bool) -> Measurement:
 BENCHMARKS: dict[str, Callable[[str, bool], Measurement]] = {
     "in_hand.distributed": _in_hand_distributed,
     "in_hand.distributed.101": _in_hand_distributed_101,
-    "in_hand.published": _in_hand_reduced,
-    "in_hand.published.load_2": lambda name, full: _in_hand_reduced(name, full, load=2),
+    "in_hand.published": _in_hand_published,
+    "in_hand.published.load_2": lambda name, full: _in_hand_published(name, full, load=2),
     "in_hand.published.load_dependent": _in_hand_load_dependent,
     "in_hand.reduced.load_family": _in_hand_load_family,
     "table.build": _table_build,
-    "step.published.loop": _step_reduced_loop,
+    "step.published.loop": _step_published_loop,
     "step.distributed.loop": _step_distributed_loop,
-    "step.published.call": _step_reduced_call,
-    "step.reduced.loop": _step_moments_loop,
-    "step.reduced.call": _step_moments_call,
-    "gradient.published": _gradient_reduced,
-    "gradient.published.batch": _gradient_reduced_batch,
-    "gradient.reduced": _gradient_moments,
+    "step.published.call": _step_published_call,
+    "step.reduced.loop": _step_reduced_loop,
+    "step.reduced.call": _step_reduced_call,
+    "gradient.published": _gradient_published,
+    "gradient.published.batch": _gradient_published_batch,
+    "gradient.reduced": _gradient_reduced,
     "import": _import,
 }
 """Benchmarks by name."""

@@ -15,7 +15,7 @@ from planarfriction.experiments.velocity_driven_boxes import SAMPLES
 from planarfriction.models import ReducedModel, ReducedModelPublished
 from planarfriction.patch import PUBLISHED_PATCHES
 
-MODELS = {"reduced": "published reduced", "moments": "ReducedModel", "full": "distributed, 21 x 21"}
+MODELS = {"published": "published reduced", "reduced": "ReducedModel", "full": "distributed, 21 x 21"}
 """Model of the ladder -> its name in the report."""
 
 TARGETS = {"median": 0.25, "third quartile": 0.8, "maximum": 1.0}
@@ -47,7 +47,8 @@ def ratios(errors: Errors) -> dict[str, dict[str, float]]:
     """Error of `ReducedModel` over that of the published reduced model, by shape and statistic, force and torque."""
     names = [f"{before}{name}" for before in ("", "torque ") for name in TARGETS]
     return {
-        shape: {name: each["moments"][name] / each["reduced"][name] for name in names} for shape, each in errors.items()
+        shape: {name: each["reduced"][name] / each["published"][name] for name in names}
+        for shape, each in errors.items()
     }
 
 
@@ -63,8 +64,10 @@ def step_costs(shape: str = "Circle") -> dict[str, Any]:
     numbers, law = theirs.surface.numbers, np.array(LAW.numbers)
     stored = np.array([numbers.kind, 0, numbers.size])
     loops = {
-        "reduced": lambda z: published_step.step_sequence(law, theirs.numbers, stored, numbers.data, z, *fixed, wrench),
-        "moments": lambda z: reduced_step.step_sequence(
+        "published": lambda z: published_step.step_sequence(
+            law, theirs.numbers, stored, numbers.data, z, *fixed, wrench
+        ),
+        "reduced": lambda z: reduced_step.step_sequence(
             law, ours.numbers, np.zeros(3, int), ours.data, z, *fixed, wrench
         ),
     }
@@ -75,7 +78,7 @@ def step_costs(shape: str = "Circle") -> dict[str, Any]:
             begin = time.perf_counter()
             loop(state)
             times[name].append((time.perf_counter() - begin) / STEPS)
-    share = [ours / theirs for ours, theirs in zip(times["moments"][1:], times["reduced"][1:], strict=True)]
+    share = [ours / theirs for ours, theirs in zip(times["reduced"][1:], times["published"][1:], strict=True)]
     return {
         **{f"{name} [s]": statistics.median(values[1:]) for name, values in times.items()},
         "ratio": statistics.median(share),
@@ -89,8 +92,8 @@ def comparisons(errors: Errors) -> list[Comparison]:
             f"driven, {IN_WORDS[shape]}: ReducedModel, {name.removeprefix('torque ')} of the error of the {quantity}, "
             f"against {share:g} times the published model's",
             "converged",
-            each["moments"][name],
-            share * each["reduced"][name],
+            each["reduced"][name],
+            share * each["published"][name],
             unit,
             SAMPLES,
             "Three states keep the first moments of the bristle field alone. The reference: the distributed model with "

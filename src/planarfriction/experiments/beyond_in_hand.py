@@ -10,7 +10,7 @@ from planarfriction.experiments.in_hand_runs import FRICTION_CHANGE, Case, colum
 from planarfriction.scenes import simulate
 from planarfriction.scenes.ready import FINE
 
-ENDS = {"reduced": "published reduced", "moments": "ReducedModel"}
+ENDS = {"published": "published reduced", "reduced": "ReducedModel"}
 """Model of the ladder -> its name in the report."""
 
 SHIFT = "friction"
@@ -50,7 +50,7 @@ def end_distances(rows: list[Row], shifts: dict[str, float]) -> dict[str, dict[s
 
 def score(ends: dict[str, dict[str, float]], load: int) -> dict[str, Any]:
     """In how many runs under a load `ReducedModel` ends nearer than the published model, and the ratios."""
-    ratios = {case: each["moments"] / each["reduced"] for case, each in ends.items() if case.endswith(f"load {load}")}
+    ratios = {case: each["reduced"] / each["published"] for case, each in ends.items() if case.endswith(f"load {load}")}
     return {"runs": len(ratios), "nearer": sum(ratio < 1.0 for ratio in ratios.values()), "ratios": ratios}
 
 
@@ -58,7 +58,7 @@ def comparisons(ends: dict[str, dict[str, float]]) -> list[Comparison]:
     """What `ReducedModel` and the few cells miss, within 2 % and 0.1 % of friction, in the runs that depend on it."""
     rows = []
     for model, share, words in (
-        ("moments", 2e-2, "Three states do not hold the history of a patch that breaks away section by section."),
+        ("reduced", 2e-2, "Three states do not hold the history of a patch that breaks away section by section."),
         ("degree 5", FRICTION_CHANGE, "A few cells keep the moments of the patch, not its rim."),
     ):
         for case, each in ends.items():

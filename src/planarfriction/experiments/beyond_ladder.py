@@ -46,7 +46,7 @@ class Row:
 
     case: str
     model: str
-    """"reduced" (as published), the same with another surface, "moments", "full", or "degree d"."""
+    """"published", the same with another surface, "reduced", "full", or "degree d"."""
     states: int
     """Bristle states."""
     errors: dict[str, float]
@@ -61,10 +61,10 @@ def models(patch: ContactPatch, degrees: tuple[int, ...] = DEGREES) -> dict[str,
     """The models of a patch by name, each number of cells once."""
     result: dict[str, Any] = {
         "full": DistributedModel(patch, LAW),
-        "reduced": ReducedModelPublished(patch, LAW),
-        "reduced, smooth": ReducedModelPublished(patch, LAW, surface=LimitSurfaceTable(patch)),
-        "reduced, ellipsoid": ReducedModelPublished(patch, LAW, surface=LimitSurfaceEllipsoid(patch)),
-        "moments": ReducedModel(patch, LAW),
+        "published": ReducedModelPublished(patch, LAW),
+        "published, smooth": ReducedModelPublished(patch, LAW, surface=LimitSurfaceTable(patch)),
+        "published, ellipsoid": ReducedModelPublished(patch, LAW, surface=LimitSurfaceEllipsoid(patch)),
+        "reduced": ReducedModel(patch, LAW),
     }
     sizes = {patch.cells}
     for degree in degrees:

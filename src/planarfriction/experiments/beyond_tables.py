@@ -15,10 +15,10 @@ Numbers = dict[str, Any]
 
 MODEL_WORDS = {
     "full": "distributed, 21 x 21 cells",
-    "reduced": "published reduced, published table",
-    "reduced, smooth": "published reduced, LimitSurfaceTable",
-    "reduced, ellipsoid": "published reduced, ellipsoid",
-    "moments": "ReducedModel",
+    "published": "published reduced, published table",
+    "published, smooth": "published reduced, LimitSurfaceTable",
+    "published, ellipsoid": "published reduced, ellipsoid",
+    "reduced": "ReducedModel",
     "degree 3": "distributed, 28 compressed cells",
     "degree 5": "distributed, 45 compressed cells",
 }
@@ -82,7 +82,7 @@ def _ratios(ratios: dict[str, dict[str, float]]) -> Table:
 
 def _in_hand(ends: dict[str, dict[str, float]]) -> Table:
     rows = [
-        (case, *(1e3 * each[name] for name in (*ENDS, SHIFT)), each["moments"] / each["reduced"])
+        (case, *(1e3 * each[name] for name in (*ENDS, SHIFT)), each["reduced"] / each["published"])
         for case, each in ends.items()
     ]
     headings = ("run", *(f"{words} [mm]" for words in ENDS.values()), "0.1 % of friction [mm]", "ratio")

@@ -89,8 +89,8 @@ def _driven(ratios: dict[str, dict[str, float]], step: dict[str, float], costs: 
         f"force, over the published model's on {len(ratios)} shapes: {aimed}; of the torque, median: {min(torque):.3f} "
         f"to {max(torque):.3f}; its largest, just after the velocity jumps: {min(peak):.2f} to {max(peak):.2f}. "
         f"A step costs {step['ratio']:.2f} times a published one in a compiled loop "
-        f"({1e6 * step['moments [s]']:.2f} µs; {verdict} the {STEP_TARGET:g} aimed at); a whole run "
-        f"{costs['moments'] / costs['reduced']:.2f} times, for the solver picks its own steps. The distributed model "
+        f"({1e6 * step['reduced [s]']:.2f} µs; {verdict} the {STEP_TARGET:g} aimed at); a whole run "
+        f"{costs['reduced'] / costs['published']:.2f} times, for the solver picks its own steps. The distributed model "
         "of 21 x 21 cells is no reference here: its own staircase is often the largest error of the three. Much of the "
         "gain is that of the exact table: see the published model with LimitSurfaceTable in the table of combinations."
     )
@@ -100,15 +100,15 @@ def _in_hand(ends: dict[str, dict[str, float]], score: Numbers) -> str:
     first, second = score["load 1"], score["load 2"]
     worse = [case for case, ratio in second["ratios"].items() if ratio >= 1.0]
     except_for = f" (not: {'; '.join(worse)})" if worse else ""
-    shares = {name: _friction_shares(ends, name) for name in ("moments", "reduced")}
+    shares = {name: _friction_shares(ends, name) for name in ("reduced", "published")}
     return (
         f"In hand, `ReducedModel` ends nearer to the distributed model than the published one in {second['nearer']} of "
         f"{second['runs']} runs under load 2{except_for}; ratios of the distances {_spread(second['ratios'])}. Under "
         f"load 1 it is nearer in {first['nearer']} of {first['runs']}, ratios {_spread(first['ratios'])}: there the "
         "grip barely passes the threshold, sections of the patch creep before the whole slips, and three states do not "
         "hold that. In units of friction, over the runs that depend on it, "
-        f"`ReducedModel` is off by what {shares['moments'][0]:.2%} (median) to {shares['moments'][1]:.2%} (most) of "
-        f"friction would do, the published model by {shares['reduced'][0]:.2%} to {shares['reduced'][1]:.2%}."
+        f"`ReducedModel` is off by what {shares['reduced'][0]:.2%} (median) to {shares['reduced'][1]:.2%} (most) of "
+        f"friction would do, the published model by {shares['published'][0]:.2%} to {shares['published'][1]:.2%}."
     )
 
 
@@ -141,8 +141,8 @@ def _ladder(costs: dict[str, float], driven: Numbers, ends: dict[str, dict[str, 
     return (
         "Between 3 bristles and 882. On the patches with more than 45 cells, 45 compressed ones end at most "
         f"{1e3 * max(each['degree 5'] for each in few.values()):.2f} mm from the full grid in hand (published reduced: "
-        f"{1e3 * max(each['reduced'] for each in few.values()):.2f} mm, `ReducedModel`: "
-        f"{1e3 * max(each['moments'] for each in few.values()):.2f} mm), in {costs['degree 5']:.2f} of its time. Moved "
+        f"{1e3 * max(each['published'] for each in few.values()):.2f} mm, `ReducedModel`: "
+        f"{1e3 * max(each['reduced'] for each in few.values()):.2f} mm), in {costs['degree 5']:.2f} of its time. Moved "
         f"with a given velocity they are {min(quartile):.1f} to {max(quartile):.1f} times as far from the converged "
         "grid as the full one (third quartile of the force): the staircase of few cells is coarse. "
         "They are for breaking away, `ReducedModel` is for sliding."

@@ -1,4 +1,4 @@
-"""What the moment model stores of a patch: its second moments of slip and its steady sliding, a map over directions."""
+"""What the reduced model stores of a patch: second moments of slip and steady sliding, a map over directions."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ LEAST_SHARE = 0.25
 
 
 class ReducedShape(NamedTuple):
-    """What the moment model knows of its patch at one load."""
+    """What the reduced model knows of its patch at one load."""
 
     factor: np.ndarray
     """F [3, 3], upper triangular: `|F V|` is the root mean square of the cells' speeds."""

@@ -1,4 +1,4 @@
-"""Steady sliding summed over the cells of a patch, in the scaled coordinates `V_G = F V` of the moment model.
+"""Steady sliding summed over the cells of a patch, in the scaled coordinates `V_G = F V` of the reduced model.
 
 A cell sees `u = C V_G` with `C = B F^-1`, slides against `u/|u| + a`, and its wrench is C' times that.
 """
