@@ -41,7 +41,7 @@ def looped_of_two(function):
             out[i] = function(x[i], y[i])
 
     def call(x, y):
-        x, y = (np.ascontiguousarray(a, dtype=float) for a in np.broadcast_arrays(x, y))
+        x, y = (np.array(a, dtype=float) for a in np.broadcast_arrays(x, y))
         out = np.empty_like(x)
         loop(x, y, out)
         return out

@@ -227,6 +227,11 @@ def test_certificates(case, size):
     assert np.abs(slope @ along).max() <= 1e-11 * largest * np.linalg.norm(along)
 
 
+def test_a_spin_too_slow_to_divide_by_is_none():
+    surface = pf.LimitSurfaceExact(pf.ContactPatch.disc(0.01))
+    assert surface.dissipation((1.0, 0.0, 1e-320)) == surface.dissipation((1.0, 0.0, 0.0))
+
+
 @given(cases())
 @checked
 def test_gradient_and_jacobian_are_slopes(case):

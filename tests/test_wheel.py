@@ -53,5 +53,16 @@ def test_wheel_in_an_empty_environment(tmp_path):
     assert "times faster than real time" in run(command, "run", "in-hand")
     assert "0 out of tolerance" in run(command, "reproduce", "--only", "drift", "--quick")
     start = ["--start=mu_s=0.65", "--start=v_s=2e-3", "--start=sigma_0=2e4", "--start=sigma_1=30"]
-    found = run(command, "identify", "log.csv", "--patch", "disc", "--parameters", "mu_c,r", "--starts", "1", *start)
+    found = run(
+        command,
+        "identify",
+        "log.csv",
+        "--patch",
+        "disc",
+        "--parameters",
+        "mu_c,contact_radius",
+        "--starts",
+        "1",
+        *start,
+    )
     assert "mu_c" in found

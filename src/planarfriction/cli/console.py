@@ -31,7 +31,8 @@ def work_progress(label: str) -> Iterator[Callable[[str], None]]:
         yield lambda name: bar.update(task, description=f"{label}: {name}")
 
 
-def _bar() -> Progress:
+@contextmanager
+def _bar() -> Iterator[Progress]:
     console = Console(stderr=True)
     columns = (
         SpinnerColumn(),
@@ -39,7 +40,12 @@ def _bar() -> Progress:
         BarColumn(bar_width=30),
         TimeElapsedColumn(),
     )
-    return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+    bar = Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+    if bar.disable:  # not even begun: rich before 15 ends such a bar with an empty line
+        yield bar
+    else:
+        with bar:
+            yield bar
 
 
 def note(text: str) -> None:

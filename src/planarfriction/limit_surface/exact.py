@@ -72,7 +72,7 @@ class _Rings(NamedTuple):
 
     def sums(self, twists: np.ndarray, unit: float, rules: Rules) -> np.ndarray:
         spin = np.abs(twists[:, 2])
-        with np.errstate(divide="ignore"):
+        with np.errstate(divide="ignore", over="ignore"):
             kink = unit * np.hypot(twists[:, 0], twists[:, 1]) / spin  # where the rim runs as fast as the ring slides
         kink = np.clip(np.where(spin > 0.0, kink, np.inf), self.inner, self.outer)[:, None]
         share, weight = _double_exponential()
