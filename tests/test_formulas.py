@@ -278,7 +278,7 @@ def test_relaxation_slope_is_the_slope():
     x = 10.0 ** np.linspace(-5.0, 2.0, 300)
     got = formulas.relaxation_slope(np, x, *formulas.relaxation(np, x))
     # The slope is ((1 + x) exp(-x) - 1)/x^2, for small x as a series.
-    series = -sum((n + 1) * (-x) ** n / math.factorial(n + 2) for n in range(40))
+    series = -sum((n + 1) * (-x) ** n / float(math.factorial(n + 2)) for n in range(40))
     closed = -(-np.expm1(-x) - x * np.exp(-x)) / x**2
     assert got == pytest.approx(
         np.where(x < 2.0, series, closed), rel=1e-13
