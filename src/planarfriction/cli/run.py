@@ -114,7 +114,7 @@ def run(
             _keep_part(error.solution, solutions, label, folder)
         raise
     _print(solutions)
-    if folder is not None:
+    if folder is not None and pictures:
         _draw(solutions, folder, pictures)
     return 0
 

@@ -64,13 +64,6 @@ def _flush(count, points, ux, uy, power, exponents, gamma, out):
 
 
 @inlined
-def _push(count, points, ux, uy, x, y, w, vx, vy, spin):
-    points[0, count], points[1, count], points[2, count] = x, y, w
-    ux[count], uy[count] = vx - spin * y, vy + spin * x
-    return count + 1
-
-
-@inlined
 def _cut(stack, top, x, y, ax, ay, bx, by, weight, level, parts):
     """Replace a cell by its halves: four of a parallelogram, two of a segment."""
     for p in range(parts):
@@ -85,39 +78,41 @@ def _cut(stack, top, x, y, ax, ay, bx, by, weight, level, parts):
 
 @kernel
 def _sum(vx, vy, spin, cells, exponents, gamma, stack, points, ux, uy, power, out):
-    count = 0
-    for c in range(cells.shape[0]):
-        for i in range(7):
-            stack[0, i] = cells[c, i]
-        stack[0, 7] = 0.0
-        top = 1
-        while top > 0:
-            top -= 1
-            x, y, weight, level = stack[top, 0], stack[top, 1], stack[top, 6], stack[top, 7]
-            ax, ay, bx, by = stack[top, 2], stack[top, 3], stack[top, 4], stack[top, 5]
-            a, b = math.sqrt(ax * ax + ay * ay), math.sqrt(bx * bx + by * by)
-            reach = NEAR * spin * max(a, b)
-            sx, sy = vx - spin * y, vy + spin * x
-            if sx * sx + sy * sy < reach * reach and level < DEPTH:
-                top = _cut(stack, top, x, y, ax, ay, bx, by, weight, level, 4 if a > 0.0 and b > 0.0 else 2)
-                continue
-            if count + 4 > _BLOCK:
-                _flush(count, points, ux, uy, power, exponents, gamma, out)
-                count = 0
-            gx, gy, hx, hy = _GAUSS * ax, _GAUSS * ay, _GAUSS * bx, _GAUSS * by
-            if a > 0.0 and b > 0.0:
-                w = 0.25 * weight
-                count = _push(count, points, ux, uy, x - gx - hx, y - gy - hy, w, vx, vy, spin)
-                count = _push(count, points, ux, uy, x + gx - hx, y + gy - hy, w, vx, vy, spin)
-                count = _push(count, points, ux, uy, x - gx + hx, y - gy + hy, w, vx, vy, spin)
-                count = _push(count, points, ux, uy, x + gx + hx, y + gy + hy, w, vx, vy, spin)
-            elif a > 0.0 or b > 0.0:
-                gx, gy = gx + hx, gy + hy
-                count = _push(count, points, ux, uy, x - gx, y - gy, 0.5 * weight, vx, vy, spin)
-                count = _push(count, points, ux, uy, x + gx, y + gy, 0.5 * weight, vx, vy, spin)
-            else:
-                count = _push(count, points, ux, uy, x, y, weight, vx, vy, spin)
-    _flush(count, points, ux, uy, power, exponents, gamma, out)
+    count, top, next_cell = np.int64(0), 0, 0  # a literal 0 would have what it is passed to compiled once more
+    while True:
+        done = top == 0 and next_cell == cells.shape[0]
+        if done or count + 4 > _BLOCK:
+            _flush(count, points, ux, uy, power, exponents, gamma, out)
+            count = 0
+        if done:
+            return
+        if top == 0:
+            for i in range(7):
+                stack[0, i] = cells[next_cell, i]
+            stack[0, 7] = 0.0
+            top, next_cell = 1, next_cell + 1
+        top -= 1
+        x, y, weight, level = stack[top, 0], stack[top, 1], stack[top, 6], stack[top, 7]
+        ax, ay, bx, by = stack[top, 2], stack[top, 3], stack[top, 4], stack[top, 5]
+        a, b = math.sqrt(ax * ax + ay * ay), math.sqrt(bx * bx + by * by)
+        reach = NEAR * spin * max(a, b)
+        sx, sy = vx - spin * y, vy + spin * x
+        if sx * sx + sy * sy < reach * reach and level < DEPTH:
+            top = _cut(stack, top, x, y, ax, ay, bx, by, weight, level, 4 if a > 0.0 and b > 0.0 else 2)
+            continue
+        # a Gauss rule: two points along each edge that has a length
+        gx, gy, hx, hy = _GAUSS * ax, _GAUSS * ay, _GAUSS * bx, _GAUSS * by
+        across = 2 if a > 0.0 and b > 0.0 else 1
+        if across == 1:
+            gx, gy, hx, hy = gx + hx, gy + hy, 0.0, 0.0
+        along = 2 if a > 0.0 or b > 0.0 else 1
+        for i in range(along):
+            for j in range(across):
+                u, v = 2.0 * i - 1.0, 2.0 * j - 1.0
+                px, py = x + u * gx + v * hx, y + u * gy + v * hy
+                points[0, count], points[1, count], points[2, count] = px, py, weight / (along * across)
+                ux[count], uy[count] = vx - spin * py, vy + spin * px
+                count += 1
 
 
 @jit
