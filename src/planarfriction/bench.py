@@ -196,16 +196,20 @@ def _numpy_table(patch: ContactPatch, segments: int = 20) -> np.ndarray:
     return nodes
 
 
-def _published_loop(twists: np.ndarray) -> float:
-    """Time of the published reduced model's steps through `twists`, compiled [s]."""
-    from planarfriction.kernels import published_step as kernels
+def _compiled_loop(model: ReducedModel | ReducedModelPublished, twists: np.ndarray) -> float:
+    """Time of a model's steps through `twists`, compiled [s]."""
+    from planarfriction.autodiff.parameters import pack
+    from planarfriction.kernels.rollouts import Inputs
 
-    model = ReducedModelPublished(_disc(), _law())
-    shape = model.shape_at(1.0)
-    surface = np.array([shape.surface.numbers.kind, 0, shape.surface.numbers.size])
-    arguments = np.array(model.law.numbers), shape.numbers, surface, shape.surface.numbers.data
-    z, wrench = model.rest(), np.empty_like(twists)
-    return _median(lambda: kernels.step_sequence(*arguments, z, twists, 1.0, 1e-4, wrench), 9)
+    rows, surface, data, family = pack(model)
+    steps = len(twists)
+    inputs = Inputs(rows[None], surface, data, twists[None], np.ones((1, steps)), np.full(steps, 1e-4))
+    z, wrench, states = np.zeros((1, 3)), np.empty((1, steps, 3)), np.empty((1, 0, 3))
+    return _median(lambda: family.rollout(inputs, (0, 1), z, wrench, states), 9)
+
+
+def _published_loop(twists: np.ndarray) -> float:
+    return _compiled_loop(ReducedModelPublished(_disc(), _law()), twists)
 
 
 def _step_published_loop(name: str, full: bool) -> Measurement:
@@ -219,9 +223,10 @@ def _step_distributed_loop(name: str, full: bool) -> Measurement:
 
     model, twists = DistributedModel(_disc(), _law()), _mixed_twists(1000)
     x, y = (np.ascontiguousarray(column) for column in model.patch.positions.T)
+    cells = kernels.Cells(x, y, model.patch.weights()[None])
     z = model.rest().reshape(-1)
     scratch, wrench = np.empty_like(z), np.empty_like(twists)
-    arguments = x, y, model.patch.weights(), 1.0, 1e-4, scratch, wrench
+    arguments = cells, 1.0, 1e-4, scratch, wrench
     loop = _median(lambda: kernels.step_sequence(model.law.numbers, z, twists, *arguments), 9)
     call = _python_step(model, 100)
     return _line(name, loop / len(twists) * 1e6, "us", "one Python call of the same step", call * 1e6)
@@ -239,17 +244,9 @@ def _step_published_call(name: str, full: bool) -> Measurement:
     return _line(name, _python_step(model, 2000) * 1e6, "us", "one Python call of rate (NumPy)", rate * 1e6)
 
 
-def _reduced_loop(model: ReducedModel, twists: np.ndarray) -> float:
-    from planarfriction.kernels import reduced_step as kernels
-
-    shape, z, wrench = model.shape_at(1.0), model.rest(), np.empty_like(twists)
-    arguments = np.array(model.law.numbers), shape.numbers, np.zeros(3, dtype=int), shape.data
-    return _median(lambda: kernels.step_sequence(*arguments, z, twists, 1.0, 1e-4, wrench), 9)
-
-
 def _step_reduced_loop(name: str, full: bool) -> Measurement:
     twists = _mixed_twists(20_000)
-    ours, theirs = _reduced_loop(ReducedModel(_disc(), _law()), twists), _published_loop(twists)
+    ours, theirs = _compiled_loop(ReducedModel(_disc(), _law()), twists), _published_loop(twists)
     return _line(name, ours / len(twists) * 1e6, "us", _AGAINST_PUBLISHED, theirs / len(twists) * 1e6)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import published_adjoint, published_rollout, reduced_rollout
+from planarfriction.kernels import published_rollout, published_step, reduced_step
 from planarfriction.models import ReducedModel, ReducedModelPublished
 from planarfriction.models.reduced_map import ReducedShape
 from planarfriction.models.reduced_published import PublishedShape
@@ -46,26 +46,19 @@ class Family(NamedTuple):
     rollout: Callable[..., None]
     gradient: Callable[..., None]
     sensitivities: Callable[..., None]
-    """Compiled loops."""
+    """Compiled loops (see `kernels.rollouts`)."""
 
 
-PUBLISHED = Family(
-    PARAMETERS,
-    np.array([0, 1, 2, 3, 4, 5, 6, 8, 12, 13, 10, 11]),  # 7 says which bristles these are, 9 is no parameter
-    published_rollout.rollout,
-    published_rollout.gradient,
-    published_adjoint.sensitivities,
-)
-"""`ReducedModelPublished`, rows as in `kernels.published_adjoint`."""
+def _family_of(kernels: Any, names: tuple[str, ...], many: Any) -> Family:
+    columns = np.array([kernels.NAMES.index(name) for name in names])
+    return Family(names, columns, many.rollout, many.gradient, kernels.sensitivities)
 
-REDUCED = Family(
-    tuple(name for name in PARAMETERS[:8] if name != "gamma"),
-    np.array([0, 1, 2, 3, 4, 5, 8]),
-    reduced_rollout.rollout,
-    reduced_rollout.gradient,
-    reduced_rollout.sensitivities,
-)
-"""`ReducedModel`, rows as in `kernels.reduced_rollout`; gamma and the shape are built into its stored map."""
+
+PUBLISHED = _family_of(published_step, PARAMETERS, published_rollout)
+"""`ReducedModelPublished`."""
+
+REDUCED = _family_of(reduced_step, tuple(name for name in PARAMETERS[:8] if name != "gamma"), reduced_step)
+"""`ReducedModel`; gamma and the shape are built into its stored map."""
 
 
 class Packed(NamedTuple):

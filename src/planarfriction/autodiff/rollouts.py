@@ -13,6 +13,7 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.autodiff.parameters import Packed, has_one_shape, pack
 from planarfriction.errors import InvalidValueError
+from planarfriction.kernels.rollouts import Bars, Inputs
 from planarfriction.models import FrictionModel
 
 _WORTH_A_THREAD = 20_000
@@ -138,9 +139,9 @@ def rollout_gradient(
     twist_bar, load_bar = np.empty((count, steps, 3)), np.empty((count, steps))
     rows_bar = np.zeros((count, inputs.packed.rows.shape[-1]))
     family = inputs.packed.family
-    arguments = inputs.rows, inputs.packed.surface, inputs.packed.data, on_the_way, inputs.twist, inputs.normal_force
-    results = z_bar, twist_bar, load_bar, rows_bar
-    _share(inputs, lambda first, last: family.gradient(*arguments, inputs.dt, cotangents, first, last, *results))
+    bars = Bars(z_bar, twist_bar, load_bar, rows_bar)
+    packed = _kernel_inputs(inputs)
+    _share(inputs, lambda first, last: family.gradient(packed, on_the_way, cotangents, (first, last), bars))
     given = parameters if parameters is not None else inputs.packed.rows[..., family.columns]
     return RolloutGradient(
         *(
@@ -178,16 +179,8 @@ def rollout_sensitivities(
     wrenches = np.empty((len(inputs.state), len(inputs.dt), 3))
     slopes = np.empty((*wrenches.shape, len(columns)))
     end = inputs.state.copy()
-    arguments = (
-        inputs.rows,
-        inputs.packed.surface,
-        inputs.packed.data,
-        end,
-        inputs.twist,
-        inputs.normal_force,
-        inputs.dt,
-    )
-    _share(inputs, lambda first, last: family.sensitivities(*arguments, columns, first, last, wrenches, slopes))
+    packed = _kernel_inputs(inputs)
+    _share(inputs, lambda first, last: family.sensitivities(packed, (first, last), end, columns, wrenches, slopes))
     shaped = (array.reshape(*inputs.batch, *array.shape[1:]) for array in (end, wrenches, slopes))
     return RolloutSensitivities(*shaped)
 
@@ -196,16 +189,8 @@ def _roll(inputs: _Inputs, kept: int) -> tuple[np.ndarray, np.ndarray, np.ndarra
     """States at the end `[B, 3]`, wrenches `[B, T, 3]` and, with `kept = T` rather than 0, states before each step."""
     count, end = len(inputs.state), inputs.state.copy()
     wrenches, states = np.empty((count, len(inputs.dt), 3)), np.empty((count, kept, 3))
-    arguments = (
-        inputs.rows,
-        inputs.packed.surface,
-        inputs.packed.data,
-        end,
-        inputs.twist,
-        inputs.normal_force,
-        inputs.dt,
-    )
-    _share(inputs, lambda first, last: inputs.packed.family.rollout(*arguments, first, last, wrenches, states))
+    packed, family = _kernel_inputs(inputs), inputs.packed.family
+    _share(inputs, lambda first, last: family.rollout(packed, (first, last), end, wrenches, states))
     return end, wrenches, states
 
 
@@ -224,6 +209,12 @@ def _stepped(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any) -> 
     for t, held in enumerate(dt):
         state, wrenches[..., t, :] = model.step(state, twist[..., t, :], load[..., t], held)
     return Rollout(np.array(state), wrenches)
+
+
+def _kernel_inputs(inputs: _Inputs) -> Inputs:
+    """The inputs as compiled loops take them."""
+    packed = inputs.packed
+    return Inputs(inputs.rows, packed.surface, packed.data, inputs.twist, inputs.normal_force, inputs.dt)
 
 
 # ---------------------------------------------------------------------- shapes and threads

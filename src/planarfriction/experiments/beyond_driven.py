@@ -54,29 +54,17 @@ def ratios(errors: Errors) -> dict[str, dict[str, float]]:
 
 def step_costs(shape: str = "Circle") -> dict[str, Any]:
     """Median time of a step in a compiled loop [s] of both reduced models, in turns, and the median of their ratios."""
-    from planarfriction.kernels import published_step, reduced_step
+    from planarfriction.autodiff import rollout
 
     patch = PUBLISHED_PATCHES[shape]()
     directions = np.random.default_rng(7).normal(size=(STEPS, 3)) * [1.0, 1.0, 150.0]
     twists = directions * 10.0 ** np.random.default_rng(8).uniform(-4.0, -1.5, size=(STEPS, 1))
-    wrench, fixed = np.empty_like(twists), (twists, 1.0, 1e-4)
-    theirs, ours = ReducedModelPublished(patch, LAW).shape_at(1.0), ReducedModel(patch, LAW).shape_at(1.0)
-    numbers, law = theirs.surface.numbers, np.array(LAW.numbers)
-    stored = np.array([numbers.kind, 0, numbers.size])
-    loops = {
-        "published": lambda z: published_step.step_sequence(
-            law, theirs.numbers, stored, numbers.data, z, *fixed, wrench
-        ),
-        "reduced": lambda z: reduced_step.step_sequence(
-            law, ours.numbers, np.zeros(3, int), ours.data, z, *fixed, wrench
-        ),
-    }
-    times: dict[str, list[float]] = {name: [] for name in loops}
+    models = {"published": ReducedModelPublished(patch, LAW), "reduced": ReducedModel(patch, LAW)}
+    times: dict[str, list[float]] = {name: [] for name in models}
     for _ in range(ROUNDS + 1):
-        for name, loop in loops.items():
-            state = np.zeros(3)
+        for name, model in models.items():
             begin = time.perf_counter()
-            loop(state)
+            rollout(model, model.rest(), twists, 1.0, 1e-4)
             times[name].append((time.perf_counter() - begin) / STEPS)
     share = [ours / theirs for ours, theirs in zip(times["reduced"][1:], times["published"][1:], strict=True)]
     return {

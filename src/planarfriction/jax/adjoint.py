@@ -14,7 +14,7 @@ from planarfriction import autodiff
 from planarfriction.autodiff.parameters import Packed
 from planarfriction.errors import InvalidValueError
 from planarfriction.jax.published import ReducedModelPublished
-from planarfriction.kernels.published_adjoint import NUMBERS
+from planarfriction.kernels.published_step import NAMES
 
 
 class _Kind(NamedTuple):
@@ -109,8 +109,8 @@ def _by_contact(run, arrays, dtype):
 
 
 def _packed(kind: _Kind, data: np.ndarray) -> Packed:
-    row = np.zeros(NUMBERS)
-    row[7] = float(kind.elasto_plastic)
+    row = np.zeros(len(NAMES))
+    row[NAMES.index("elasto_plastic")] = float(kind.elasto_plastic)
     return Packed(row, np.array([kind.surface, 0, kind.size]), np.ascontiguousarray(data))
 
 

@@ -1,51 +1,76 @@
-"""The step of the distributed model, per unit normal load and about the contact frame's origin."""
+"""The step of the distributed model and its derivatives, cell by cell, per unit normal load.
+
+Twists and wrenches are about the contact frame's origin; see `bristle_step` for the step of a bristle.
+"""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
+
+import numpy as np
 
 from planarfriction import formulas
+from planarfriction.kernels import bristle_step, inlined, jit, kernel
 from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import inlined, jit, kernel
-from planarfriction.kernels.law import grip, squared
+from planarfriction.kernels.bristle_step import Bristle
+from planarfriction.kernels.law import grip, grip_slope, squared
+from planarfriction.kernels.vectors import norm, plus, times
+
+
+class Cells(NamedTuple):
+    """The n cells of a patch."""
+
+    x: np.ndarray
+    """Positions [m], [n]."""
+    y: np.ndarray
+    weights: np.ndarray
+    """Shares of the load, one row for all contacts of a batch or one for each, [B or 1, n]."""
+
+
+class CellJacobians(NamedTuple):
+    """Derivatives of the steps of B contacts."""
+
+    state_state: np.ndarray
+    """Of the new bristles by the old, cell by cell, [B, 2, 2, n]."""
+    state_twist: np.ndarray
+    """[B, 2, n, 3]"""
+    wrench_state: np.ndarray
+    """[B, 3, 2, n]"""
+    wrench_twist: np.ndarray
+    """[B, 3, 3]"""
+    wrench_load: np.ndarray
+    """[B, 3]"""
 
 
 @inlined
-def _step(law, z, vx, vy, omega, x, y, w, dt, out):
+def _bristle(law, z, u):
+    """A cell's bristle at the beginning of a step."""
+    speed = norm(u)
+    return Bristle(z, u, speed, 1.0, grip(law, speed))
+
+
+@inlined
+def _traction(law, u, end):
+    """Traction of a cell at the end of its step, per unit load."""
+    rate = plus(u, -end.stage.k, end.new)
+    return formulas.traction(end.new[0], rate[0], u[0], law), formulas.traction(end.new[1], rate[1], u[1], law)
+
+
+@inlined
+def _step(law, z, twist, x, y, w, dt, out):
     n = x.shape[0]
     zx, zy, ox, oy = z[:n], z[n:], out[:n], out[n:]
+    vx, vy, omega = twist
     fx, fy, tau = 0.0, 0.0, 0.0
-    for i in range(n):  # predicted end, and the mean decay into ox
-        ux, uy = vx - omega * y[i], vy + omega * x[i]
-        speed = math.sqrt(ux * ux + uy * uy)
-        q = grip(law, speed)
-        z_norm = math.sqrt(zx[i] * zx[i] + zy[i] * zy[i])
-        along = (zx[i] * ux + zy[i] * uy) / xp.where(z_norm > 0.0, z_norm, 1.0)
-        start = formulas.bristle_decay(xp, z_norm * q, along, speed, q, law)
-        px, py = zx[i] + ux * dt, zy[i] + uy * dt  # times 1/(1 + k dt), which leaves the direction
-        p_norm = math.sqrt(px * px + py * py)
-        along = (px * ux + py * uy) / xp.where(p_norm > 0.0, p_norm, 1.0)
-        deflection = xp.minimum(p_norm * q / (1.0 + start * dt), xp.maximum(z_norm * q, 1.0))
-        end = formulas.bristle_decay(xp, deflection, along, speed, q, law)
-        ox[i] = formulas.mean_decay(start, end, dt)
+    for i in range(n):  # apart: in one loop the vectors do not fit into the processor's registers
+        bristle = _bristle(law, (zx[i], zy[i]), (vx - omega * y[i], vy + omega * x[i]))
+        ox[i] = bristle_step.predict(law, bristle, dt).decay_dt
     for i in range(n):
-        ux, uy = vx - omega * y[i], vy + omega * x[i]
-        left, mean = formulas.relaxation(xp, ox[i] * dt)
-        ox[i] = zx[i] * left + ux * dt * mean
-        oy[i] = zy[i] * left + uy * dt * mean
-    for i in range(n):
-        ux, uy = vx - omega * y[i], vy + omega * x[i]
-        speed = math.sqrt(ux * ux + uy * uy)
-        q = grip(law, speed)
-        largest = formulas.reachable_deflection(xp, math.sqrt(zx[i] * zx[i] + zy[i] * zy[i]) * q, law)
-        norm = math.sqrt(ox[i] * ox[i] + oy[i] * oy[i])
-        along = (ox[i] * ux + oy[i] * uy) / xp.where(norm > 0.0, norm, 1.0)
-        back = formulas.cap(xp, norm * q, largest)
-        nx, ny = ox[i] * back, oy[i] * back
-        k = formulas.bristle_decay(xp, norm * q * back, along, speed, q, law)
-        ox[i], oy[i] = nx, ny
-        tx = w[i] * formulas.traction(nx, ux - k * nx, ux, law)
-        ty = w[i] * formulas.traction(ny, uy - k * ny, uy, law)
+        bristle = _bristle(law, (zx[i], zy[i]), (vx - omega * y[i], vy + omega * x[i]))
+        end = bristle_step.finish(law, bristle, dt, ox[i])
+        ox[i], oy[i] = end.new
+        tx, ty = times(w[i], _traction(law, bristle.u, end))
         fx += tx
         fy += ty
         tau += x[i] * ty - y[i] * tx
@@ -53,23 +78,22 @@ def _step(law, z, vx, vy, omega, x, y, w, dt, out):
 
 
 @kernel
-def step(law, z, vx, vy, omega, x, y, w, dt, out):
+def step(law, z, twist, x, y, w, dt, out):
     """Advance the bristles by `dt` at a held twist (see `formulas.relaxation`) and return the wrench at the end."""
     if law.gamma == 2.0:
-        return _step(squared(law), z, vx, vy, omega, x, y, w, dt, out)
-    return _step(law, z, vx, vy, omega, x, y, w, dt, out)
+        return _step(squared(law), z, twist, x, y, w, dt, out)
+    return _step(law, z, twist, x, y, w, dt, out)
 
 
 @jit
-def step_batch(law, z, twist, x, y, w, load, dt, out, wrench):
-    """`step` for a batch: `z`, `out` [B, 2n], `twist`, `wrench` [B, 3], `w` [B or 1, n], `load`, `dt` [B].
+def step_batch(law, z, twist, cells, load, dt, out, wrench):
+    """`step` for a batch: `z`, `out` [B, 2n], `twist`, `wrench` [B, 3], `load`, `dt` [B].
 
     Without load the bristles are forgotten.
     """
     for b in range(z.shape[0]):
-        fx, fy, tau = step(
-            law, z[b], twist[b, 0], twist[b, 1], twist[b, 2], x, y, w[min(b, w.shape[0] - 1)], dt[b], out[b]
-        )
+        w, held = cells.weights[min(b, cells.weights.shape[0] - 1)], (twist[b, 0], twist[b, 1], twist[b, 2])
+        fx, fy, tau = step(law, z[b], held, cells.x, cells.y, w, dt[b], out[b])
         wrench[b, 0], wrench[b, 1], wrench[b, 2] = load[b] * fx, load[b] * fy, load[b] * tau
         if load[b] == 0.0:
             out[b] = 0.0
@@ -77,11 +101,59 @@ def step_batch(law, z, twist, x, y, w, load, dt, out, wrench):
 
 
 @jit
-def step_sequence(law, z, twist, x, y, w, load, dt, out, wrench):
+def step_sequence(law, z, twist, cells, load, dt, out, wrench):
     """`step` through the twists [T, 3] of one contact, `z` in place (`out`: scratch), wrenches into `wrench` [T, 3]."""
     n = z.shape[0]
     for t in range(twist.shape[0]):
-        fx, fy, tau = step(law, z, twist[t, 0], twist[t, 1], twist[t, 2], x, y, w, dt, out)
+        held = twist[t, 0], twist[t, 1], twist[t, 2]
+        fx, fy, tau = step(law, z, held, cells.x, cells.y, cells.weights[0], dt, out)
         wrench[t, 0], wrench[t, 1], wrench[t, 2] = load * fx, load * fy, load * tau
         for i in range(n):
             z[i] = out[i]
+
+
+@inlined
+def _pull_back(law, step, new_bar, k_bar):
+    """Cotangents of `z` and of the cell's velocity from those of the new bristle and of its decay."""
+    bar, (_, u, speed, _, q) = bristle_step.pull_back(step, new_bar, k_bar), step.bristle
+    per = 1.0 / xp.where(speed > 0.0, speed, math.inf)
+    return bar.z, plus(bar.u, (bar.v + bar.q * grip_slope(law, speed, q)) * per, u)
+
+
+@jit
+def jacobians(law, z, twist, cells, load, dt, out):
+    """`CellJacobians` of steps into `out`, which comes in as zeros: `z` [B, 2, n], `twist` [B, 3], `load`, `dt` [B]."""
+    for b in range(z.shape[0]):
+        weights = cells.weights[min(b, cells.weights.shape[0] - 1)]
+        for m in range(weights.shape[0]):
+            px, py = cells.x[m], cells.y[m]
+            u = twist[b, 0] - twist[b, 2] * py, twist[b, 1] + twist[b, 2] * px
+            step = bristle_step.linearise(law, _bristle(law, (z[b, 0, m], z[b, 1, m]), u), dt[b])
+            new, k = step.end.new, step.end.stage.k
+            fx, fy = times(weights[m], _traction(law, u, step.end))
+            out.wrench_load[b, 0] += fx
+            out.wrench_load[b, 1] += fy
+            out.wrench_load[b, 2] += px * fy - py * fx
+            if load[b] == 0.0:
+                continue
+            share = load[b] * weights[m]
+            pull = share * (law.sigma_0 - law.sigma_1 * k)
+            for i in range(2):
+                unit = (1.0, 0.0) if i == 0 else (0.0, 1.0)
+                a, v = _pull_back(law, step, unit, 0.0)
+                out.state_state[b, i, 0, m], out.state_state[b, i, 1, m] = a
+                slopes = out.state_twist[b, i, m]
+                slopes[0], slopes[1], slopes[2] = v[0], v[1], px * v[1] - py * v[0]
+                # the force of the cell, -(sigma_0 n + sigma_1 (u - k n) + sigma_2 u)
+                k_bar = share * law.sigma_1 * (new[0] if i == 0 else new[1])
+                a, v = _pull_back(law, step, times(-pull, unit), k_bar)
+                v = plus(v, -share * (law.sigma_1 + law.sigma_2), unit)
+                lever, turn = (-py if i == 0 else px), px * v[1] - py * v[0]
+                out.wrench_state[b, i, 0, m], out.wrench_state[b, i, 1, m] = a
+                out.wrench_state[b, 2, 0, m] += lever * a[0]
+                out.wrench_state[b, 2, 1, m] += lever * a[1]
+                for row, arm in ((i, 1.0), (2, lever)):
+                    slopes = out.wrench_twist[b, row]
+                    slopes[0] += arm * v[0]
+                    slopes[1] += arm * v[1]
+                    slopes[2] += arm * turn

@@ -1,82 +1,178 @@
-"""The step of the published reduced model, per unit normal load and about the contact frame's origin."""
+"""The step of the published reduced model with its derivatives, and what is bound to it (see `rollouts`).
+
+In scaled coordinates, `V_S = S V` at the centre of pressure with `S = diag(1, 1, r)`, the bristle `S^-1 z` steps as in
+`bristle_step`, driven by `u = h(V) |V_S|` with `h = |u|/|V_S|` (docs/physics.md, "Reduced model"). With cotangents W'
+of the wrench and z' of the new state, one step backwards is
+
+    t = -((sigma_0 - sigma_1 k) n + sigma_1 u),   n' = -(sigma_0 - sigma_1 k) F + S z',   k' = sigma_1 F . n
+
+with F the cotangent of the scaled traction t, then `bristle_step.pull_back`, and `V_S' = (du/dV_S)' u' + v' V_S/v`. The
+numbers of the limit surface are held fixed: r acts through `V_S` alone.
+"""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
+
+import numpy as np
 
 from planarfriction import formulas
+from planarfriction.formulas import LawNumbers
+from planarfriction.kernels import bristle_step, inlined, jit, published, rollouts
 from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import inlined, jit
-from planarfriction.kernels.law import LAW, grip, law_of
-from planarfriction.kernels.published import scaled_twist, wrench
-from planarfriction.kernels.surfaces import sliding
+from planarfriction.kernels.bristle_step import Bristle, BristleStep
+from planarfriction.kernels.published_contact import Shape
+from planarfriction.kernels.records import reader
+from planarfriction.kernels.rollouts import Cotangents
+from planarfriction.kernels.surfaces import sliding, sliding_jacobian
+from planarfriction.kernels.vectors import applied_back, dot, norm, plus
+
+NAMES = (*LawNumbers._fields, *Shape._fields)
+"""Numbers of a contact, in the order of its row."""
+
+shape_of = reader(Shape)
+
+
+class Held(NamedTuple):
+    """What a step holds."""
+
+    twist: tuple
+    """V_S"""
+    omega: float
+    v: float
+    u: tuple
+
+
+class Step(NamedTuple):
+    """A step with all that its cotangents need."""
+
+    held: Held
+    h: float
+    stribeck: tuple
+    """Friction coefficient and its partial derivatives."""
+    bristle: BristleStep
+    traction: tuple
+    """Scaled, about the centre of pressure; its third component without the viscous term."""
+    new: tuple
+    """State."""
+    wrench: tuple
+    """About the origin, per unit load."""
 
 
 @inlined
-def step(law, z, vx, vy, omega, shape, surface, data, dt, out):
-    """Advance the bristle by `dt` at a held twist (see `formulas.relaxation`) and return the wrench at the end."""
-    x, y, s = scaled_twist(shape, vx, vy, omega)
-    r = shape[2]
-    v_n = math.sqrt(x * x + y * y + s * s)
-    ux, uy, us = sliding(surface[0], data, surface[1], surface[2], x, y, s, v_n)
-    zx, zy, zs = z[0], z[1], z[2] / r
-    u_norm = math.sqrt(ux * ux + uy * uy + us * us)
-    h_norm = u_norm / v_n if v_n > 0.0 else 1.0
-    per_h = 1.0 / h_norm
-    q = grip(law, v_n)
-    to_deflection = q * per_h
-    z_norm = math.sqrt(zx * zx + zy * zy + zs * zs)
-    along = per_h * (zx * ux + zy * uy + zs * us) / xp.where(z_norm > 0.0, z_norm, 1.0)
-    start = formulas.bristle_decay(xp, z_norm * to_deflection, along, v_n, q, law)
-    px, py, ps = zx + ux * dt, zy + uy * dt, zs + us * dt  # times 1/(1 + k dt), which leaves the direction
-    p_norm = math.sqrt(px * px + py * py + ps * ps)
-    along = per_h * (px * ux + py * uy + ps * us) / xp.where(p_norm > 0.0, p_norm, 1.0)
-    deflection = xp.minimum(p_norm * to_deflection / (1.0 + start * dt), xp.maximum(z_norm * to_deflection, 1.0))
-    end = formulas.bristle_decay(xp, deflection, along, v_n, q, law)
-    left, mean = formulas.relaxation(xp, formulas.mean_decay(start, end, dt) * dt)
-    nx, ny, ns = zx * left + ux * dt * mean, zy * left + uy * dt * mean, zs * left + us * dt * mean
-    n_norm = math.sqrt(nx * nx + ny * ny + ns * ns)
-    along = per_h * (nx * ux + ny * uy + ns * us) / xp.where(n_norm > 0.0, n_norm, 1.0)
-    largest = formulas.reachable_deflection(xp, z_norm * to_deflection, law)
-    back = formulas.cap(xp, n_norm * to_deflection, largest)
-    nx, ny, ns = nx * back, ny * back, ns * back
-    k = formulas.bristle_decay(xp, n_norm * back * to_deflection, along, v_n, q, law)
-    out[0], out[1], out[2] = nx, ny, r * ns
-    return wrench(law, shape, nx, ny, r * ns, ux - k * nx, uy - k * ny, r * (us - k * ns), x, y, omega)
+def hold(contact, twist):
+    """`Held` at a twist."""
+    shape, surface = contact.shape, contact.surface
+    vx, vy, omega = twist
+    scaled = vx - omega * shape.centre_y, vy + omega * shape.centre_x, shape.contact_radius * omega
+    v = norm(scaled)
+    u = sliding(surface[0], contact.data, surface[1], surface[2], scaled[0], scaled[1], scaled[2], v)
+    return Held(scaled, omega, v, u)
+
+
+@inlined
+def hold_slopes(contact, twist, work):
+    """`Held`, and `du/dV_S` row by row."""
+    held, surface, j = hold(contact, twist), contact.surface, work
+    x, y, s = held.twist
+    sliding_jacobian(surface[0], contact.data, surface[1], surface[2], x, y, s, held.v, j)
+    return held, (j[0], j[1], j[2], j[3], j[4], j[5], j[6], j[7], j[8])
+
+
+@inlined
+def linearise(contact, held, z, dt):
+    """`Step` from the raw state z."""
+    law, shape = contact.law, contact.shape
+    r, v = shape.contact_radius, held.v
+    moves = v > 0.0
+    h = xp.where(moves, norm(held.u) / xp.where(moves, v, 1.0), 1.0)
+    stribeck = formulas.stribeck_partials(xp, v, law)
+    bristle = Bristle((z[0], z[1], z[2] / r), held.u, v, 1.0 / h, law.sigma_0 / stribeck[0])
+    step = bristle_step.linearise(law, bristle, dt)
+    new = step.end.new
+    rate = plus(held.u, -step.end.stage.k, new)
+    fx = formulas.traction(new[0], rate[0], held.twist[0], law)
+    fy = formulas.traction(new[1], rate[1], held.twist[1], law)
+    fs = formulas.traction(new[2], rate[2], 0.0, law)
+    tau = r * fs + formulas.traction(0.0, 0.0, shape.second_moment * held.omega, law)
+    wrench = fx, fy, tau + shape.centre_x * fy - shape.centre_y * fx
+    return Step(held, h, stribeck, step, (fx, fy, fs), (new[0], new[1], r * new[2]), wrench)
+
+
+@inlined
+def pull_back(contact, step, slopes, new, wrench):
+    """`Cotangents` from those of the new state and of the wrench."""
+    law, shape, held, b = contact.law, contact.shape, step.held, step.bristle
+    n, k, z_s, q = b.end.new, b.end.stage.k, b.bristle.z[2], b.bristle.q
+    cx, cy, r = shape.centre_x, shape.centre_y, shape.contact_radius
+    wx, wy, wt = wrench
+    g = wx - cy * wt, wy + cx * wt, r * wt
+    g_n, g_u = dot(g, n), dot(g, held.u)
+    bars = bristle_step.pull_back(
+        b, plus((new[0], new[1], r * new[2]), law.sigma_1 * k - law.sigma_0, g), law.sigma_1 * g_n
+    )
+    # h = |u|/v, and the grip q = sigma_0/g(v)
+    per_v = 1.0 / xp.where(held.v > 0.0, held.v, math.inf)
+    u_bar = plus(plus(bars.u, -law.sigma_1, g), bars.h * per_v * per_v / step.h, held.u)
+    mu, by_speed, by_mu_c, by_mu_s, by_v_s, by_gamma = step.stribeck
+    mu_bar = -bars.q * q / mu
+    along = (bars.v + mu_bar * by_speed - bars.h * per_v * step.h) * per_v
+    x_bar, y_bar, s_bar = plus(plus(applied_back(slopes, u_bar), along, held.twist), -law.sigma_2, (g[0], g[1], 0.0))
+    turn = law.sigma_2 * wt
+    x, y, _ = held.twist
+    return Cotangents(
+        (bars.z[0], bars.z[1], bars.z[2] / r),
+        (x_bar, y_bar, r * s_bar + cx * y_bar - cy * x_bar - turn * shape.second_moment),
+        LawNumbers(
+            bars.q / mu - g_n, k * g_n - g_u, -(g[0] * x + g[1] * y + wt * shape.second_moment * held.omega),
+            mu_bar * by_mu_c, mu_bar * by_mu_s, mu_bar * by_v_s, mu_bar * by_gamma, 0.0, bars.breakaway, 0.0,
+        ),
+        Shape(
+            wt * step.traction[1] + held.omega * y_bar, -wt * step.traction[0] - held.omega * x_bar,
+            wt * step.traction[2] + new[2] * n[2] - bars.z[2] * z_s / r + held.omega * s_bar,
+            -turn * held.omega,
+        ),
+    )  # fmt: skip
+
+
+# ---------------------------------------------------------------------- bound to this model
 
 
 @jit
-def step_batch(law_row, shape, surface, data, z, twist, load, dt, out, wrench):
-    """`step` for a batch: `z`, `twist`, `out`, `wrench` [B, 3], `load`, `dt` [B]; without load z is forgotten."""
-    law = law_of(law_row)
-    for b in range(z.shape[0]):
-        fx, fy, tau = step(law, z[b], twist[b, 0], twist[b, 1], twist[b, 2], shape, surface, data, dt[b], out[b])
-        wrench[b, 0], wrench[b, 1], wrench[b, 2] = load[b] * fx, load[b] * fy, load[b] * tau
-        if load[b] == 0.0:
-            out[b] = 0.0
-            wrench[b] = 0.0
+def evaluate_batch(row, surface, data, inputs, out):
+    """See `rollouts.evaluate`."""
+    rollouts.evaluate(shape_of, published.evaluate, row, surface, data, inputs, out)
+
+
+@jit
+def linearise_batch(row, surface, data, inputs, lin):
+    """See `rollouts.linearise`."""
+    rollouts.linearise(shape_of, published.linearise, row, surface, data, inputs, lin)
+
+
+@jit
+def step_batch(row, surface, data, inputs, out):
+    """See `rollouts.batch`."""
+    rollouts.batch(shape_of, hold, linearise, row, surface, data, inputs, out)
 
 
 @jit
 def step_one(numbers, data, z, vx, vy, omega, load, dt, result):
-    """`step` of one contact for callers in Python: new state and wrench into `result` [6]; false for invalid inputs.
-
-    `numbers` holds law, shape (4) and surface (3): every argument costs a quarter of a microsecond on the way in.
-    """
-    finite = xp.is_finite(vx) and xp.is_finite(vy) and xp.is_finite(omega) and xp.is_finite(load) and xp.is_finite(dt)
-    finite = finite and xp.is_finite(z[0]) and xp.is_finite(z[1]) and xp.is_finite(z[2])
-    if not (finite and load > 0.0 and dt >= 0.0):
-        return False
-    surface = (int(numbers[LAW + 4]), int(numbers[LAW + 5]), int(numbers[LAW + 6]))
-    wrench = step(law_of(numbers), z, vx, vy, omega, numbers[LAW:], surface, data, dt, result)
-    result[3], result[4], result[5] = load * wrench[0], load * wrench[1], load * wrench[2]
-    return True
+    """See `rollouts.one`; every argument costs a quarter of a microsecond on the way in."""
+    return rollouts.one(shape_of, hold, linearise, numbers, data, z, (vx, vy, omega), load, dt, result)
 
 
 @jit
-def step_sequence(law_row, shape, surface, data, z, twist, load, dt, wrench):
-    """`step` through the twists [T, 3] of one contact, `z` in place, wrenches into `wrench` [T, 3]."""
-    law = law_of(law_row)
-    for t in range(twist.shape[0]):
-        fx, fy, tau = step(law, z, twist[t, 0], twist[t, 1], twist[t, 2], shape, surface, data, dt, z)
-        wrench[t, 0], wrench[t, 1], wrench[t, 2] = load * fx, load * fy, load * tau
+def jacobians(row, surface, data, inputs, out):
+    """See `rollouts.jacobians`."""
+    work = np.empty(rollouts.SCRATCH)
+    rollouts.jacobians(shape_of, hold_slopes, linearise, pull_back, row, surface, data, inputs, out, work)
+
+
+@jit
+def sensitivities(inputs, span, z, columns, wrenches, slopes):
+    """See `rollouts.sensitivities`."""
+    work = np.empty(rollouts.SCRATCH), np.empty((6, 7 + len(NAMES))), np.empty((6, columns.shape[0]))
+    results = wrenches, slopes
+    rollouts.sensitivities(shape_of, hold_slopes, linearise, pull_back, inputs, span, z, columns, results, work)

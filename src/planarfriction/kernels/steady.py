@@ -18,6 +18,9 @@ from planarfriction.kernels import cube, inlined, kernel
 QUARTIC = 8
 """Where K begins."""
 
+FAR = 1e30
+"""Steady state [m] of a patch at rest, where it has none: no bristle comes near it, so that nothing decays."""
+
 HEADER = QUARTIC + 36
 """Numbers in front of a map."""
 
@@ -234,4 +237,4 @@ def sliding(law, vx, vy, omega, shape, surface, data):
         qx, qy, qs = steady(law, shape, surface, data, x, y, s, v)
         even = evenness(shape, surface, data, x, y, s, v)[0] if law.elasto_plastic > 0.0 else 1.0
         return x, y, s, v, qx, qy, qs, even
-    return 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 1.0
+    return 0.0, 0.0, 0.0, 0.0, FAR, 0.0, 0.0, 1.0

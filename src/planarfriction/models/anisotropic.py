@@ -12,12 +12,11 @@ import numpy as np
 
 from planarfriction import formulas
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import distributed_adjoint
 from planarfriction.kernels import distributed_step as kernels
 from planarfriction.models.base import StepJacobians
 from planarfriction.patch import ContactPatch
 
-_ORIGIN, _WHOLE = np.zeros(1), np.ones((1, 1))
+_ALONE = kernels.Cells(np.zeros(1), np.zeros(1), np.ones((1, 1)))
 
 
 def cell_numbers(patch: ContactPatch, cells: np.ndarray) -> np.ndarray:
@@ -42,7 +41,7 @@ def step(model: Any, state: np.ndarray, velocity: np.ndarray, load: np.ndarray, 
     z, u, steps = _alone(state - centre, velocity, dt)
     new, pull = np.empty_like(z), np.empty_like(u)
     ones = np.ones(len(z))
-    kernels.step_batch(law, z, u, _ORIGIN, _ORIGIN, _WHOLE, ones, steps, new, pull)
+    kernels.step_batch(law, z, u, _ALONE, ones, steps, new, pull)
     loaded = (load > 0.0)[..., None, None]
     traction = _together(pull[:, :2], state) - law.sigma_0 * centre
     share = load[..., None] * model.patch.weights(load)
@@ -58,12 +57,11 @@ def step_jacobians(model: Any, state: np.ndarray, velocity: np.ndarray, load: np
         centre, centre_u = centres(law, model._asymmetry, velocity)
     z, u, steps = _alone(state - centre, velocity, dt)
     count = len(z)
-    new_z, new_u, pull_z = np.zeros((count, 2, 2, 1)), np.zeros((count, 2, 1, 3)), np.zeros((count, 3, 2, 1))
-    pull_u, pull = np.zeros((count, 3, 3)), np.zeros((count, 3))
-    distributed_adjoint.jacobians(
-        np.array(law), z.reshape(-1, 2, 1), u, _ORIGIN, _ORIGIN, _WHOLE, np.ones(count), steps,
-        new_z, new_u, pull_z, pull_u, pull,
-    )  # fmt: skip
+    slopes = kernels.CellJacobians(
+        *(np.zeros((count, *inner)) for inner in ((2, 2, 1), (2, 1, 3), (3, 2, 1), (3, 3), (3,)))
+    )
+    kernels.jacobians(law, z.reshape(-1, 2, 1), u, _ALONE, np.ones(count), steps, slopes)
+    new_z, new_u, pull_z, pull_u, pull = slopes
     new_z, new_u = _together(new_z[..., 0], state), _together(new_u[:, :, 0, :2], state)
     pull_z, pull_u = _together(pull_z[:, :2, :, 0], state), _together(pull_u[:, :2, :2], state)
     if centre_u is not None:

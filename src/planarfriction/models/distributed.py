@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planarfriction import formulas
-from planarfriction.kernels import anisotropic_contact, distributed_adjoint, distributed_contact
+from planarfriction.kernels import anisotropic_contact, distributed_contact
 from planarfriction.kernels import distributed_step as kernels
 from planarfriction.kernels.anisotropic_contact import AnisotropicContact
 from planarfriction.kernels.distributed_contact import DistributedContact
@@ -71,14 +71,11 @@ class DistributedModel(FrictionModel):
         batch = load.shape
         flat = np.ascontiguousarray(state.reshape(-1, 2 * state.shape[-1]))
         out, wrench = np.empty_like(flat), np.empty((len(flat), 3))
-        x, y = self._xy
         kernels.step_batch(
             self.law.numbers,
             flat,
             np.ascontiguousarray(twist.reshape(-1, 3)),
-            x,
-            y,
-            self._weights(load),
+            self._cells(load),
             np.ascontiguousarray(load.reshape(-1)),
             np.ascontiguousarray(dt.reshape(-1)),
             out,
@@ -130,21 +127,19 @@ class DistributedModel(FrictionModel):
         if self.patch.anisotropic:
             return anisotropic.step_jacobians(self, state, self._cell_velocity(twist), load, dt)
         batch, cells = load.shape, state.shape[-1]
-        shapes = (2, 2, cells), (2, cells, 3), (3, 2, cells), (3, 3), (3,)
-        results = [np.zeros((load.size, *shape)) for shape in shapes]
-        x, y = self._xy
-        distributed_adjoint.jacobians(
-            np.array(self.law.numbers),
+        results = kernels.CellJacobians(
+            *(np.zeros((load.size, *inner)) for inner in ((2, 2, cells), (2, cells, 3), (3, 2, cells), (3, 3), (3,)))
+        )
+        kernels.jacobians(
+            self.law.numbers,
             np.ascontiguousarray(state.reshape(-1, 2, cells)),
             np.ascontiguousarray(twist.reshape(-1, 3)),
-            x,
-            y,
-            self._weights(load),
+            self._cells(load),
             np.ascontiguousarray(load.reshape(-1)),
             np.ascontiguousarray(dt.reshape(-1)),
-            *results,
+            results,
         )
-        return StepJacobians(*(a.reshape(*batch, *shape) for a, shape in zip(results, shapes, strict=True)))
+        return StepJacobians(*(a.reshape(*batch, *a.shape[1:]) for a in results))
 
     def packed(self, loads: Sequence[float | None]) -> PackedModel:
         """See `FrictionModel.packed`; only cells that carry load at one of the loads have bristles."""
@@ -174,10 +169,10 @@ class DistributedModel(FrictionModel):
 
     # ------------------------------------------------------------------ cells
 
-    def _weights(self, load: np.ndarray) -> np.ndarray:
-        """Weights of the cells, one row `[1, N]` or one for each load `[B, N]`."""
+    def _cells(self, load: np.ndarray) -> kernels.Cells:
+        """The cells with one row of weights, or one for each load."""
         weights = self.patch.weights(load.reshape(-1)) if self.patch.depends_on_load else self.patch.weights()
-        return np.ascontiguousarray(np.atleast_2d(weights))
+        return kernels.Cells(*self._xy, np.ascontiguousarray(np.atleast_2d(weights)))
 
     @functools.cached_property
     def _xy(self) -> tuple[np.ndarray, np.ndarray]:

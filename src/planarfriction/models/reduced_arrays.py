@@ -2,7 +2,7 @@
 
 `xp` is the namespace of the formulas with `stack`, `root` (square root, slope 0 at 0), `whole` (integer part within
 bounds) and `epsilon` (rounding error). Vectors are `[..., 3]`, scalars and the law's parameters `[..., 1]` or plain
-numbers. Derivatives are finite everywhere and those of `kernels.reduced_adjoint`: at rest the step is that of a
+numbers. Derivatives are finite everywhere and those of `kernels.reduced_step`: at rest the step is that of a
 vanishing twist, `z + u dt`.
 """
 

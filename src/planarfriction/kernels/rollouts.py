@@ -1,0 +1,265 @@
+"""Steps and roll-outs of a reduced model, their discrete adjoint and their derivatives, one contact after another.
+
+Each is written once for all models of three states; the files of the models bind it to the functions of a model, which
+are compiled into it: with a contact `c`, a twist V, a state z and a step dt,
+
+- `shape_of(row)`: the shape, from the numbers behind those of the law;
+- `hold(c, V)`: what a step holds that does not depend on z;
+- `hold_slopes(c, V, work)`: that, and its slopes;
+- `linearise(c, held, z, dt)`: the step, with `new` state and `wrench` per unit load;
+- `pull_back(c, step, slopes, new, wrench)`: `Cotangents` of z, V and the contact's numbers from those of the new state
+  and of the wrench.
+
+A step without load forgets its state: it passes on no gradient but that of the load, the wrench per unit load that the
+smallest load would have.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from planarfriction.kernels import compiled_math as xp
+from planarfriction.kernels import inlined, kernel
+from planarfriction.kernels.law import LAW, law_of
+from planarfriction.kernels.vectors import accumulate, dot, put, three, times
+
+SCRATCH = 27
+"""Numbers that `hold_slopes` may write to."""
+
+
+class Contact(NamedTuple):
+    """A contact as the functions of a model see it."""
+
+    law: tuple
+    shape: tuple
+    surface: tuple
+    """What the model knows of its limit surface or maps, three integers."""
+    data: np.ndarray
+    """Their numbers, flat."""
+
+
+class Inputs(NamedTuple):
+    """Roll-outs of B contacts through T steps."""
+
+    rows: np.ndarray
+    """Numbers of law and shape, [B or 1, N]."""
+    surface: np.ndarray
+    """As in `Contact`, int [3]."""
+    data: np.ndarray
+    twist: np.ndarray
+    """[B or 1, T, 3]"""
+    load: np.ndarray
+    """[B or 1, T]"""
+    dt: np.ndarray
+    """[T]"""
+
+
+class Bars(NamedTuple):
+    """Cotangents of the inputs of B roll-outs."""
+
+    state: np.ndarray
+    """Comes in as that of the state at the end, [B, 3]."""
+    twist: np.ndarray
+    """[B, T, 3]"""
+    load: np.ndarray
+    """[B, T]"""
+    rows: np.ndarray
+    """[B, N], comes in as zeros."""
+
+
+class Cotangents(NamedTuple):
+    """Cotangents of all inputs of a step."""
+
+    state: tuple
+    twist: tuple
+    law: tuple
+    shape: tuple
+
+
+@inlined
+def _contact(shape_of, row, surface, data):
+    return Contact(law_of(row), shape_of(row[LAW:]), (surface[0], surface[1], surface[2]), data)
+
+
+@inlined
+def row_of(values, b):
+    """Which row of `values` belongs to contact b: its own, or the one that all share."""
+    return b if values.shape[0] > 1 else 0
+
+
+@inlined
+def _weighed(wrench, load):
+    """The wrench of a load; zero without, whatever it is per unit load."""
+    return times(load, wrench) if load != 0.0 else (0.0, 0.0, 0.0)
+
+
+# ---------------------------------------------------------------------- rates and steps
+
+
+@inlined
+def evaluate(shape_of, evaluate_one, row, surface, data, inputs, out):
+    """Rates and wrenches of B contacts into `out` [B, 6]; `inputs` are `z`, `twist` [B, 3] and `load` [B]."""
+    law, shape, (z, twist, load) = law_of(row), shape_of(row[LAW:]), inputs
+    for b in range(z.shape[0]):
+        vx, vy, omega = three(twist[b])
+        put(out[b, 3:], times(load[b], evaluate_one(law, z[b], vx, vy, omega, shape, surface, data, out[b])))
+
+
+@inlined
+def linearise(shape_of, linearise_one, row, surface, data, inputs, lin):
+    """Linearised rates of B contacts into `lin` [B, L]; `inputs` are `z` and `twist` [B, 3]."""
+    law, shape, (z, twist) = law_of(row), shape_of(row[LAW:]), inputs
+    for b in range(z.shape[0]):
+        vx, vy, omega = three(twist[b])
+        linearise_one(law, z[b], vx, vy, omega, shape, surface, data, lin[b])
+
+
+@kernel
+def _step(hold, linearise, contact, z, twist, load, dt):
+    """New state and wrench; a function of its own, so that one contact and a batch round alike."""
+    step = linearise(contact, hold(contact, twist), z, dt)
+    return step.new if load != 0.0 else (0.0, 0.0, 0.0), _weighed(step.wrench, load)
+
+
+@inlined
+def batch(shape_of, hold, linearise, row, surface, data, inputs, out):
+    """Steps of B contacts, new states and wrenches into `out` [B, 6]; `inputs` as `evaluate`, and `dt` [B]."""
+    contact, (z, twist, load, dt) = _contact(shape_of, row, surface, data), inputs
+    for b in range(z.shape[0]):
+        new, wrench = _step(hold, linearise, contact, three(z[b]), three(twist[b]), load[b], dt[b])
+        put(out[b], new)
+        put(out[b, 3:], wrench)
+
+
+@inlined
+def one(shape_of, hold, linearise, numbers, data, z, twist, load, dt, result):
+    """A step of one contact: new state and wrench into `result` [6]; false for invalid inputs.
+
+    Behind law and shape `numbers` holds the three of `Contact.surface`.
+    """
+    finite = xp.is_finite(load) and xp.is_finite(dt)
+    for i in range(3):
+        finite = finite and xp.is_finite(z[i]) and xp.is_finite(twist[i])
+    if not (finite and load > 0.0 and dt >= 0.0):
+        return False
+    shape = shape_of(numbers[LAW:])
+    last = numbers[LAW + len(shape) :]
+    contact = Contact(law_of(numbers), shape, (int(last[0]), int(last[1]), int(last[2])), data)
+    new, wrench = _step(hold, linearise, contact, three(z), twist, load, dt)
+    put(result, new)
+    put(result[3:], wrench)
+    return True
+
+
+@inlined
+def roll(shape_of, hold, linearise, inputs, span, z, wrench, states):
+    """Steps of the contacts `span[0]` to `span[1]`: `z` [B, 3] in place, wrenches into `wrench` [B, T, 3].
+
+    The state before each step goes into `states` [B, T, 3], unless that is empty. What the next step holds is read
+    before this one's step, which waits for the last one's state: the processor does both at once.
+    """
+    steps, kept = inputs.dt.shape[0], states.shape[1] > 0
+    for b in range(span[0], span[1] if steps > 0 else span[0]):
+        twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
+        contact = _contact(shape_of, inputs.rows[row_of(inputs.rows, b)], inputs.surface, inputs.data)
+        own, held = three(z[b]), hold(contact, three(twists[0]))
+        for t in range(steps):
+            following = hold(contact, three(twists[min(t + 1, steps - 1)]))
+            if kept:
+                put(states[b, t], own)
+            step = linearise(contact, held, own, inputs.dt[t])
+            own = step.new if loads[t] != 0.0 else (0.0, 0.0, 0.0)
+            put(wrench[b, t], _weighed(step.wrench, loads[t]))
+            held = following
+        put(z[b], own)
+
+
+# ---------------------------------------------------------------------- derivatives
+
+
+@inlined
+def gradient(shape_of, hold_slopes, linearise, pull_back, inputs, states, wrench_bar, span, bars, work):
+    """Adjoint of `roll` with its `states`, from the cotangents of the wrenches [B or 1, T, 3], into `bars`.
+
+    `span`: the first contact and the one behind the last; `work` [SCRATCH].
+    """
+    for b in range(span[0], span[1]):
+        twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
+        before, pulls = states[row_of(states, b)], wrench_bar[row_of(wrench_bar, b)]
+        contact = _contact(shape_of, inputs.rows[row_of(inputs.rows, b)], inputs.surface, inputs.data)
+        new, row_bar = three(bars.state[b]), bars.rows[b]
+        for t in range(inputs.dt.shape[0] - 1, -1, -1):
+            load, pull = loads[t], three(pulls[t])
+            held, slopes = hold_slopes(contact, three(twists[t]), work)
+            step = linearise(contact, held, three(before[t]), inputs.dt[t])
+            new = times(0.0 if load == 0.0 else 1.0, new)
+            bar = pull_back(contact, step, slopes, new, times(load, pull))
+            bars.load[b, t] = dot(pull, step.wrench)
+            put(bars.twist[b, t], bar.twist)
+            accumulate(row_bar, 0, 1, (bar.law, bar.shape))
+            new = bar.state
+        put(bars.state[b], new)
+
+
+@inlined
+def _jacobian(hold_slopes, linearise, pull_back, contact, z, twist, load, dt, work, out):
+    """Derivatives of the new state and of the wrench (6 rows) into `out` [6, 7 + N]; returns the step.
+
+    Columns: state (3), twist (3), load, and the N numbers of the contact.
+    """
+    held, slopes = hold_slopes(contact, twist, work)
+    step = linearise(contact, held, z, dt)
+    loaded = 0.0 if load == 0.0 else 1.0
+    for i in range(6):
+        unit = (1.0 if i % 3 == 0 else 0.0), (1.0 if i % 3 == 1 else 0.0), (1.0 if i % 3 == 2 else 0.0)
+        bar = pull_back(
+            contact, step, slopes, times(loaded if i < 3 else 0.0, unit), times(0.0 if i < 3 else load, unit)
+        )
+        row = out[i]
+        for m in range(row.shape[0]):
+            row[m] = 0.0
+        accumulate(row, 0, 1, (bar.state, bar.twist, 0.0 if i < 3 else dot(unit, step.wrench), bar.law, bar.shape))
+    return step
+
+
+@inlined
+def jacobians(shape_of, hold_slopes, linearise, pull_back, row, surface, data, inputs, out, work):
+    """Derivatives of steps into `out` [B, 6, 7 + N], as `_jacobian`; `inputs` as those of `batch`, `work` [SCRATCH]."""
+    contact, (z, twist, load, dt) = _contact(shape_of, row, surface, data), inputs
+    for b in range(z.shape[0]):
+        _jacobian(
+            hold_slopes, linearise, pull_back, contact, three(z[b]), three(twist[b]), load[b], dt[b], work, out[b]
+        )
+
+
+@inlined
+def sensitivities(shape_of, hold_slopes, linearise, pull_back, inputs, span, z, columns, results, work):
+    """Roll-outs with the derivatives of the wrenches by the numbers `columns` [P], forward in time.
+
+    `dz' = d new/dz dz + d new/d number`. `results`: wrenches [B, T, 3] and their derivatives [B, T, 3, P]; `work`:
+    arrays [SCRATCH], [6, 7 + N] and [6, P].
+    """
+    (wrenches, slopes), (scratch, here, change) = results, work
+    for b in range(span[0], span[1]):
+        twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
+        contact = _contact(shape_of, inputs.rows[row_of(inputs.rows, b)], inputs.surface, inputs.data)
+        own = three(z[b])
+        for i in range(6):
+            for p in range(change.shape[1]):
+                change[i, p] = 0.0
+        for t in range(inputs.dt.shape[0]):
+            load = loads[t]
+            step = _jacobian(
+                hold_slopes, linearise, pull_back, contact, own, three(twists[t]), load, inputs.dt[t], scratch, here
+            )
+            own = step.new if load != 0.0 else (0.0, 0.0, 0.0)
+            put(wrenches[b, t], _weighed(step.wrench, load))
+            for p in range(change.shape[1]):
+                before, column = (change[0, p], change[1, p], change[2, p]), 7 + columns[p]
+                for i in range(6):
+                    change[i, p] = here[i, column] + dot(three(here[i]), before)
+                for i in range(3):
+                    slopes[b, t, i, p] = change[3 + i, p]
+        put(z[b], own)

@@ -1,0 +1,131 @@
+"""Vectors of two or three components as tuples, and matrices [3, 3] as nine numbers, row by row."""
+
+from __future__ import annotations
+
+import math
+
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+
+from planarfriction.kernels import inlined
+
+_FLAGS = ("reassoc", "contract", "nsz", "arcp")
+
+
+@intrinsic
+def dot(typingctx, a, b):
+    """`a . b`"""
+
+    def generate(context, builder, signature, args):
+        parts = zip(*(cgutils.unpack_tuple(builder, vector) for vector in args), strict=True)
+        products = [builder.fmul(x, y, flags=_FLAGS) for x, y in parts]
+        total = products[0]
+        for product in products[1:]:
+            total = builder.fadd(total, product, flags=_FLAGS)
+        return total
+
+    return types.float64(a, b), generate
+
+
+@intrinsic
+def times(typingctx, c, a):
+    """`c a`"""
+
+    def generate(context, builder, signature, args):
+        parts = cgutils.unpack_tuple(builder, args[1])
+        return context.make_tuple(
+            builder, signature.return_type, [builder.fmul(args[0], x, flags=_FLAGS) for x in parts]
+        )
+
+    return types.UniTuple(types.float64, len(a))(types.float64, a), generate
+
+
+@intrinsic
+def plus(typingctx, a, c, b):
+    """`a + c b`"""
+
+    def generate(context, builder, signature, args):
+        parts = zip(cgutils.unpack_tuple(builder, args[0]), cgutils.unpack_tuple(builder, args[2]), strict=True)
+        sums = [builder.fadd(x, builder.fmul(args[1], y, flags=_FLAGS), flags=_FLAGS) for x, y in parts]
+        return context.make_tuple(builder, signature.return_type, sums)
+
+    return types.UniTuple(types.float64, len(a))(a, types.float64, b), generate
+
+
+@intrinsic
+def accumulate(typingctx, row, at, stride, record):
+    """Add the numbers of a record, which may hold records, one by one to `row[at]`, `row[at + stride]`, ..."""
+
+    def numbers(builder, kind, value):
+        if not isinstance(kind, types.BaseTuple):
+            return [value]
+        parts = zip(kind, cgutils.unpack_tuple(builder, value), strict=True)
+        return [number for each in parts for number in numbers(builder, *each)]
+
+    def generate(context, builder, signature, args):
+        first = context.make_array(signature.args[0])(context, builder, args[0]).data
+        at = args[1]
+        for number in numbers(builder, signature.args[3], args[3]):
+            place = builder.gep(first, [at])
+            builder.store(builder.fadd(builder.load(place), number, flags=_FLAGS), place)
+            at = builder.add(at, args[2], flags=("nsw",))
+        return context.get_dummy_value()
+
+    return types.void(row, types.intp, types.intp, record), generate
+
+
+@intrinsic(prefer_literal=True)
+def gathered(typingctx, row, at, stride, count):
+    """`row[at]`, `row[at + stride]`, ... as a tuple of a constant count."""
+    if not isinstance(count, types.IntegerLiteral):
+        return None
+    result = types.UniTuple(types.float64, count.literal_value)
+
+    def generate(context, builder, signature, args):
+        first = context.make_array(signature.args[0])(context, builder, args[0]).data
+        at, numbers = args[1], []
+        for _ in range(result.count):
+            numbers.append(builder.load(builder.gep(first, [at])))
+            at = builder.add(at, args[2], flags=("nsw",))
+        return context.make_tuple(builder, result, numbers)
+
+    return result(row, types.intp, types.intp, count), generate
+
+
+@inlined
+def norm(a):
+    """`|a|`"""
+    return math.sqrt(dot(a, a))
+
+
+@inlined
+def three(row):
+    """The first three numbers of a row."""
+    return row[0], row[1], row[2]
+
+
+@inlined
+def put(row, a):
+    """Write a vector to the beginning of a row."""
+    row[0], row[1], row[2] = a
+
+
+@inlined
+def applied(m, a):
+    """`M a`"""
+    return (
+        m[0] * a[0] + m[1] * a[1] + m[2] * a[2],
+        m[3] * a[0] + m[4] * a[1] + m[5] * a[2],
+        m[6] * a[0] + m[7] * a[1] + m[8] * a[2],
+    )
+
+
+@inlined
+def applied_back(m, a):
+    """`M' a`"""
+    return (
+        m[0] * a[0] + m[3] * a[1] + m[6] * a[2],
+        m[1] * a[0] + m[4] * a[1] + m[7] * a[2],
+        m[2] * a[0] + m[5] * a[1] + m[8] * a[2],
+    )

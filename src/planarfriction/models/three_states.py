@@ -1,0 +1,228 @@
+"""What the reduced models share: three states, and a shape of the patch that may follow the load."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+from types import ModuleType
+from typing import Any, ClassVar
+
+import numpy as np
+
+from planarfriction.geometry import transformed
+from planarfriction.models.base import FrictionModel, ModelJacobians, StepJacobians
+
+_REMEMBERED = 64
+"""Loads whose shapes a model remembers that builds each."""
+
+
+@dataclass(frozen=True, eq=False)
+class ThreeStateModel(FrictionModel):
+    """A model of three states per contact whose equations are compiled loops.
+
+    A member gives its compiled functions (`_kernels`) and its shapes: at one load (`shape_at`), the reference, and what
+    compiled loops need of one (`_maps`, `_levers`, `_rate_slopes`).
+    """
+
+    _kernels: ClassVar[ModuleType]
+    """Steps, rates and their derivatives, as in `kernels.reduced_step`."""
+    _linear: ClassVar[int]
+    """Numbers of a linearisation."""
+
+    @property
+    def state_shape(self) -> tuple[int, ...]:
+        """`(3,)`"""
+        return (3,)
+
+    def rate(self, state, twist, normal_force) -> np.ndarray:
+        """Rates of the state `zdot`, shape `[..., 3]`, in units of the state per second."""
+        return self._by_load(self._evaluate, (6,), *self._inputs(state, twist, normal_force))[..., :3]
+
+    def wrench(self, state, twist, normal_force) -> np.ndarray:
+        """Friction wrench on the moving body, shape `[..., 3]` [N, N, N m]."""
+        return self._out(self._by_load(self._evaluate, (6,), *self._inputs(state, twist, normal_force))[..., 3:])
+
+    def jacobians(self, state, twist, normal_force) -> ModelJacobians:
+        """Analytic derivatives of `rate` and `wrench` (see `ModelJacobians`); at kinks a one-sided derivative."""
+        packed = self._by_load(self._jacobians, (13, 3), *self._inputs(state, twist, normal_force))
+        square = [packed[..., i : i + 3, :] for i in (0, 3, 6, 9)]
+        zero = np.zeros_like(packed[..., 12, :])
+        slopes = ModelJacobians(square[0], square[1], zero, square[2], square[3], packed[..., 12, :])
+        return self._turned(slopes, "rate_twist")
+
+    def step(self, state, twist, normal_force, dt) -> tuple[np.ndarray, np.ndarray]:
+        """Advance by `dt` [s] at a held twist: the new state and the wrench at the end, stable at any `dt`.
+
+        Plain LuGre is linear in z and its step exact. Elasto-plastic: the exponential step with the mean decay of start
+        and predicted end, second order, kept within the largest deflection so that nothing overshoots.
+        """
+        array = np.ndarray
+        if (
+            type(state) is array
+            and state.shape == (3,)
+            and type(normal_force) is not array
+            and type(dt) is not array
+            and (type(twist) is not array or twist.ndim == 1)
+            and self._fixed is not None
+        ):  # one contact: no batch to broadcast, and the compiled step checks the numbers
+            step_one, numbers, data = self._fixed
+            result = np.empty(6)
+            try:
+                vx, vy, omega = twist
+                valid = step_one(
+                    numbers, data, state, float(vx), float(vy), float(omega), float(normal_force), float(dt), result
+                )
+            except (TypeError, ValueError):  # not numbers, or a batch: the checks below decide
+                valid = False
+            if valid:
+                return result[:3], result[3:]
+        packed = self._by_load(self._step, (6,), *self._inputs(state, twist, normal_force, dt=dt))
+        return packed[..., :3], self._out(packed[..., 3:])
+
+    def step_jacobians(self, state, twist, normal_force, dt) -> StepJacobians:
+        """Analytic derivatives of `step` (see `StepJacobians`); at kinks a one-sided derivative."""
+        packed = self._one_step_jacobians(state, twist, normal_force, dt)
+        if packed is None:
+            inputs = self._inputs(state, twist, normal_force, dt=dt)
+            packed = self._by_load(self._step_jacobians, (6, 7), *inputs)
+        new, wrench = packed[..., :3, :], packed[..., 3:, :]
+        slopes = StepJacobians(new[..., :3], new[..., 3:6], wrench[..., :3], wrench[..., 3:6], wrench[..., 6])
+        return self._turned(slopes, "state_twist")
+
+    # ------------------------------------------------------------------ axes of the twist
+
+    @property
+    def _axes(self) -> np.ndarray | None:
+        """Symmetric `[3, 3]`, or None: twists go in through it, wrenches come out."""
+        return None
+
+    def _out(self, wrench: np.ndarray) -> np.ndarray:
+        return wrench if self._axes is None else transformed(self._axes, wrench)
+
+    def _turned(self, slopes: Any, by_twist: str) -> Any:
+        """Derivatives by the twist and of the wrench through the axes."""
+        axes = self._axes
+        if axes is None:
+            return slopes
+        return slopes._replace(
+            **{by_twist: getattr(slopes, by_twist) @ axes},
+            wrench_state=axes @ slopes.wrench_state,
+            wrench_twist=axes @ slopes.wrench_twist @ axes,
+            wrench_load=transformed(axes, slopes.wrench_load),
+        )
+
+    # ------------------------------------------------------------------ shapes
+
+    def shape_at(self, normal_force: float) -> Any:
+        """What the model knows of its patch at a load [N]."""
+        raise NotImplementedError
+
+    @property
+    def _reference(self) -> Any:
+        """The shape that does not follow the load."""
+        raise NotImplementedError
+
+    @property
+    def _follows_load(self) -> bool:
+        return self.patch.depends_on_load
+
+    @functools.cached_property
+    def _recent(self) -> dict[float, Any]:
+        return {}
+
+    def _remembered(self, load: float, build) -> Any:
+        """`build(load)`, or what it gave for this load lately."""
+        if load not in self._recent:
+            while len(self._recent) >= _REMEMBERED:
+                self._recent.pop(next(iter(self._recent)))
+            self._recent[load] = build(load)
+        return self._recent[load]
+
+    def _maps(self, shape: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Of the limit surface or maps: three integers, and the numbers that hold them."""
+        raise NotImplementedError
+
+    def _levers(self, shape: Any) -> tuple[np.ndarray, np.ndarray]:
+        """G and H [3, 3] of `wrench = -G' (sigma_0 z + sigma_1 zdot + sigma_2 H V)`."""
+        raise NotImplementedError
+
+    def _rate_slopes(self, shape: Any, lin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """d rate / d state and d rate / d twist from the compiled linearisation [B, L]."""
+        raise NotImplementedError
+
+    # ------------------------------------------------------------------ compiled loops
+
+    def _row(self, shape: Any) -> np.ndarray:
+        return np.array([*self.law.numbers, *shape.numbers])
+
+    @functools.cached_property
+    def _fixed(self) -> tuple[Any, np.ndarray, np.ndarray] | None:
+        """The compiled step of one contact and its numbers, where the shape is fixed."""
+        if self.patch.depends_on_load or self._axes is not None:
+            return None
+        surface, data = self._maps(self._reference)
+        return self._kernels.step_one, np.array([*self._row(self._reference), *surface]), data
+
+    def _by_load(self, function, inner: tuple[int, ...], state, twist, load, *more) -> np.ndarray:
+        """Apply `function(shape, state, twist, load, ...)` to flat batches, one for each shape that the loads take."""
+        result = np.zeros((*load.shape, *inner))
+        flat = [np.ascontiguousarray(a.reshape(load.size, *a.shape[load.ndim :])) for a in (state, twist, load, *more)]
+        out = result.reshape(load.size, *inner)
+        if not self._follows_load:
+            out[:] = function(self._reference, *flat)
+            return out.reshape(result.shape)
+        for value, shape in self._shapes_of(flat[2]):
+            chosen = flat[2] == value
+            out[chosen] = function(shape, *(a[chosen] for a in flat))
+        return out.reshape(result.shape)
+
+    def _shapes_of(self, loads: np.ndarray):
+        """The different loads > 0 with their shapes, one after another."""
+        return ((value, self.shape_at(value)) for value in np.unique(loads[loads > 0.0]))
+
+    def _evaluate(self, shape: Any, state, twist, load) -> np.ndarray:
+        out = np.empty((len(load), 6))
+        self._kernels.evaluate_batch(self._row(shape), *self._maps(shape), (state, twist, load), out)
+        return out
+
+    def _jacobians(self, shape: Any, state, twist, load) -> np.ndarray:
+        law, (lever, viscous) = self.law.numbers, self._levers(shape)
+        lin = np.empty((len(load), self._linear))
+        self._kernels.linearise_batch(self._row(shape), *self._maps(shape), (state, twist), lin)
+        rate_state, rate_twist = self._rate_slopes(shape, lin)
+        weight = -load[:, None, None]
+        pull = law.sigma_0 * np.eye(3) + law.sigma_1 * rate_state
+        push = law.sigma_1 * rate_twist + law.sigma_2 * viscous
+        unit = self._evaluate(shape, state, twist, np.ones_like(load))[:, None, 3:]
+        return np.concatenate(
+            [rate_state, rate_twist, weight * (lever.T @ pull), weight * (lever.T @ push), unit], axis=1
+        )
+
+    def _step(self, shape: Any, state, twist, load, dt) -> np.ndarray:
+        out = np.empty((len(load), 6))
+        self._kernels.step_batch(self._row(shape), *self._maps(shape), (state, twist, load, dt), out)
+        return out
+
+    def _one_step_jacobians(self, state, twist, normal_force, dt) -> np.ndarray | None:
+        """`_step_jacobians` `[6, 7]` of one contact of fixed shape, checked quickly; None where that is not it."""
+        if self._fixed is None or [np.ndim(a) for a in (state, twist, normal_force, dt)] != [1, 1, 0, 0]:
+            return None
+        if len(state) != 3 or len(twist) != 3:
+            return None
+        try:
+            given = np.array([*state, *twist, normal_force, dt], dtype=float)
+        except (TypeError, ValueError):  # not numbers: the checks of `_inputs` say which
+            return None
+        if not (np.isfinite(given).all() and given[6] >= 0.0 and given[7] >= 0.0):
+            return None
+        return self._step_jacobians(self._reference, given[None, :3], given[None, 3:6], given[6:7], given[7:])[0]
+
+    def _step_jacobians(self, shape: Any, state, twist, load, dt) -> np.ndarray:
+        slopes = np.empty((len(load), 6, 7 + len(self._kernels.NAMES)))
+        if self._fixed is None:
+            row, (surface, data) = self._row(shape), self._maps(shape)
+        else:
+            _, numbers, data = self._fixed
+            row, surface = numbers[:-3], numbers[-3:].astype(int)
+        self._kernels.jacobians(row, surface, data, (state, twist, load, dt), slopes)
+        return slopes[:, :, :7]
