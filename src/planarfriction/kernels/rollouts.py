@@ -118,7 +118,7 @@ def linearise(shape_of, linearise_one, row, surface, data, inputs, lin):
 
 @kernel
 def _step(hold, linearise, contact, z, twist, load, dt):
-    """New state and wrench; a function of its own, so that one contact and a batch round alike."""
+    """New state and wrench."""
     step = linearise(contact, hold(contact, twist), z, dt)
     return step.new if load != 0.0 else (0.0, 0.0, 0.0), _weighed(step.wrench, load)
 
@@ -126,8 +126,9 @@ def _step(hold, linearise, contact, z, twist, load, dt):
 @inlined
 def batch(shape_of, hold, linearise, row, surface, data, inputs, out):
     """Steps of B contacts, new states and wrenches into `out` [B, 6]; `inputs` as `evaluate`, and `dt` [B]."""
-    contact, (z, twist, load, dt) = _contact(shape_of, row, surface, data), inputs
+    z, twist, load, dt = inputs
     for b in range(z.shape[0]):
+        contact = _contact(shape_of, row, surface, data)  # here, where it rounds as for one contact
         new, wrench = _step(hold, linearise, contact, three(z[b]), three(twist[b]), load[b], dt[b])
         put(out[b], new)
         put(out[b, 3:], wrench)
