@@ -28,11 +28,9 @@ INERTIA = MASS * SIDE**2 / 6.0
 LOAD = MASS * GRAVITY
 STIFFNESS, SPEED = 150.0, 0.01  # of the spring [N/m], of its far end [m/s]
 HOOK = jnp.array([0.5 * SIDE, 0.25 * SIDE])  # where the spring is fixed, block axes [m]
-LAW = pf.LuGre(
-    mu_c=0.3, mu_s=0.45, v_s=5e-3, sigma_0=1e5, sigma_1=300.0, sigma_2=0.4, elasto_plastic=pf.ElastoPlastic(0.9)
-)
-DEFLECTION = jnp.array([1e-6, 1e-6, 1e-6 * SIDE])
-"""Bristles in these units [m, m, m^2] are of the size of the other states, so that one tolerance fits all."""
+LAW = pf.LuGre(mu_c=0.3, mu_s=0.45, v_s=5e-3, sigma_0=1e5, sigma_1=300.0, sigma_2=0.4, elasto_plastic=0.9)
+DEFLECTION = 1e-6
+"""Moments of the bristles in this unit [m] are of the size of the other states, so that one tolerance fits all."""
 
 
 class State(NamedTuple):
@@ -60,7 +58,7 @@ def pull(time, pose) -> jax.Array:
     return jnp.array([force[0], force[1], arm[0] * force[1] - arm[1] * force[0]])
 
 
-def slope(time, state: State, model: pj.ReducedModelPublished) -> State:
+def slope(time, state: State, model: pj.ReducedModel) -> State:
     """Right-hand side: the block and its bristles."""
     to_table = turn(state.pose[2])
     twist, z = to_table.T @ state.twist, state.bristles * DEFLECTION
@@ -70,7 +68,7 @@ def slope(time, state: State, model: pj.ReducedModelPublished) -> State:
 
 
 @jax.jit
-def drag(model: pj.ReducedModelPublished, times) -> State:
+def drag(model: pj.ReducedModel, times) -> State:
     """States at `times` [s], from rest with the spring slack."""
     rest = State(jnp.zeros(3), jnp.zeros(3), jnp.zeros(3))
     return diffrax.diffeqsolve(
@@ -113,10 +111,10 @@ def draw(times, states: State, forces: np.ndarray, file: Path) -> None:
     figure.savefig(file)
 
 
-def run(duration: float = 8.0, surface: type = pf.LimitSurfaceTable) -> tuple[np.ndarray, State, np.ndarray]:
+def run(duration: float = 8.0) -> tuple[np.ndarray, State, np.ndarray]:
     """Times `[T]`, states and wrenches of the spring `[T, 3]`."""
     patch = pf.ContactPatch.rectangle(SIDE, cells=11)
-    model = pj.ReducedModelPublished(patch, LAW, surface(patch))
+    model = pj.ReducedModel(patch, LAW)
     times = jnp.linspace(0.0, duration, round(400 * duration) + 1)
     states = drag(model, times)
     return np.asarray(times), states, np.asarray(jax.vmap(pull)(times, states.pose))
