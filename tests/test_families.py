@@ -8,12 +8,14 @@ import sys
 from dataclasses import dataclass
 from pathlib import Path
 
+import click
 import numpy as np
 import pytest
 
 import planarfriction as pf
 from planarfriction import families
 from planarfriction.cli import main
+from planarfriction.cli.app import app
 from planarfriction.cli.run import build_scenes
 from planarfriction.errors import FileError, InvalidValueError
 from planarfriction.scenes import Solution, Statistics, in_hand
@@ -123,6 +125,17 @@ def test_the_command_line_knows_members_of_ones_own(own, capsys):
     assert "coarse" in capsys.readouterr().out
     assert main(["run", "in-hand", "--model", "fine"]) == 2
     assert "coarse" in capsys.readouterr().err
+
+
+def test_completion_knows_the_members_and_their_words(own):
+    command = app.commands["run"]
+    model, scene = (next(each for each in command.params if each.name == name) for name in ("model", "scene"))
+    context = click.Context(command)
+    offered = {item.value: item.help for item in model.shell_complete(context, "")}
+    assert offered == {**{name: families.MODELS.words(name) for name in families.MODELS}, "both": None}
+    assert "coarse" in offered
+    found = scene.shell_complete(context, "dri")
+    assert [item.value for item in found] == ["drift", "driven", "dri"] and found[-1].type == "file"
 
 
 def test_what_cannot_be_registered():

@@ -46,6 +46,7 @@ _HOME = {
 _MODULES = (
     "autodiff",
     "errors",
+    "families",
     "formulas",
     "geometry",
     "identify",

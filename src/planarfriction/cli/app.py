@@ -33,6 +33,11 @@ class MemberOf(click.Choice):
     def choices(self, value: object) -> None:
         """Nothing to keep."""
 
+    def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
+        """Members that begin so, with their words."""
+        words = {name: self.family.words(name) for name in self.family} | dict.fromkeys(self.more)
+        return [CompletionItem(name, help=help) for name, help in words.items() if name.startswith(incomplete)]
+
 
 def complete_scene(context: object, parameter: object, incomplete: str) -> list[CompletionItem]:
     """Ready scenes that begin so, and files."""
