@@ -90,17 +90,24 @@ def test_regularised_coulomb_relaxes_at_rest_within_its_time():
     assert after[0] / (before[0] + viscous) == pytest.approx(math.exp(-1.0), rel=1e-13)  # rounding
 
 
-def test_regularised_coulomb_creeps_under_a_held_force():
-    """`v = v_c F/(mu f_N - F)`, in a scene: a block pushed with 60 % of what it can hold."""
-    share, mass = 0.6, 0.1
-    force = share * 0.5 * LOAD
-    body = pf.Body(mass, 1e-5, gravity=(0.0, 0.0))
-    model = pf.DistributedModel(DISC, SIMPLE)
-    scene = pf.Scene(
-        body, [pf.Contact(model, LOAD, mounted_on="body")], 0.2, force=pf.Signal.constant([force, 0.0, 0.0])
-    )
-    data = pf.simulate(scene, rtol=1e-8).data
+def creeping_block(share: float) -> pf.Scene:
+    """A block on a disc, pushed with a share of what it can hold."""
+    model, force = pf.DistributedModel(DISC, SIMPLE), pf.Signal.constant([share * 0.5 * LOAD, 0.0, 0.0])
+    body = pf.Body(0.1, 1e-5, gravity=(0.0, 0.0))
+    return pf.Scene(body, [pf.Contact(model, LOAD, mounted_on="body")], 0.2, force=force)
+
+
+@pytest.mark.parametrize("share", [0.2, 0.6, 0.9])
+def test_regularised_coulomb_creeps_under_a_held_force(share):
+    """`v = v_c F/(mu f_N - F)`"""
+    data = pf.simulate(creeping_block(share), rtol=1e-8).data
     assert float(data.vx[-1]) == pytest.approx(1e-4 * share / (1.0 - share), rel=1e-4)  # of the solver
+
+
+def test_the_creep_of_a_scene_has_the_slope_of_its_closed_form():
+    """`dv/d(log mu) = -v_c F mu f_N/(mu f_N - F)^2`"""
+    found = pf.autodiff.scene_sensitivities(creeping_block(0.6), ("mu", "load"))
+    assert found.d_motion[-1, 0] == pytest.approx(-1e-4 * 0.6 / 0.4**2, rel=1e-4)  # of the solver
 
 
 # ---------------------------------------------------------------------- one bristle without a patch
