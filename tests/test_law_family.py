@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.autodiff import rollout_sensitivities
+from planarfriction.autodiff import rollout, rollout_sensitivities
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 
@@ -210,19 +210,14 @@ def test_the_reduced_model_takes_dahl_and_refuses_creep():
 @pytest.mark.parametrize("law", [DAHL, CREEPING], ids=["Dahl", "CoulombStribeck"])
 def test_sensitivities_of_other_laws_are_those_of_differences(law):
     model = pf.ReducedModelPublished(DISC, law, surface=pf.LimitSurfaceEllipsoid(DISC))
-    twists = np.array([[1e-3, 2e-4, 0.1]] * 12)
-    loads, dt = np.full(12, LOAD), np.full(12, 1e-3)
-    names = pf.autodiff.parameter_names(model)
-    base = pf.autodiff.parameters_of(model)
-    _, slopes = rollout_sensitivities(model, model.rest(), twists, loads, dt)[:2]
+    given = (model.rest(), np.array([[1e-3, 2e-4, 0.1]] * 12), np.full(12, LOAD), np.full(12, 1e-3))
+    names, base = pf.autodiff.parameter_names(model), pf.autodiff.parameters_of(model)
+    slopes = rollout_sensitivities(model, *given).d_wrenches
     for name in ("sigma_0", "mu_c"):
         i = names.index(name)
-        ends = []
-        for sign in (1.0, -1.0):
-            values = base.copy()
-            values[i] *= 1.0 + sign * 1e-6
-            ends.append(rollout_sensitivities(model, model.rest(), twists, loads, dt, parameters=values)[0])
-        expected = (ends[0] - ends[1]) / (2e-6 * base[i])
+        change = 1e-6 * base[i] * np.eye(len(base))[i]
+        ends = [rollout(model, *given, parameters=base + sign * change).wrenches for sign in (1.0, -1.0)]
+        expected = (ends[0] - ends[1]) / (2.0 * change[i])
         assert slopes[..., i] == pytest.approx(expected, rel=1e-5, abs=1e-6 * np.abs(expected).max())
 
 
