@@ -81,11 +81,12 @@ def slopes():
 
 
 @functools.cache
-def loss_and_slopes():
+def loss_and_slopes(method: str = "eager"):
     """Loss of a roll-out of the elasto-plastic model with its derivatives by law and twists, and the roll-out."""
 
     def loss(parameters, twists):
-        run = pj.rollout(pair("elasto-plastic")[1].replace(parameters=parameters), None, twists, 2.0, 1e-4)
+        model = pair("elasto-plastic")[1]
+        run = pj.rollout(model, None, twists, 2.0, 1e-4, parameters=parameters, method=method)
         return jnp.sum(jnp.square(run.wrenches * WEIGHTS)), run
 
     return jax.jit(jax.value_and_grad(loss, (0, 1), has_aux=True))
@@ -120,6 +121,17 @@ def test_it_equals_the_compiled_model(law):
         close(wrench, numpy_model.wrench(*inputs))
         for got, wanted in zip(step, numpy_model.step(*inputs, dt), strict=True):
             close(got, wanted)
+
+
+def test_a_patch_whose_shape_follows_the_load_keeps_that_of_one_load():
+    patch = pf.ContactPatch.disc(0.01, cells=9, pressure=pf.SoftFinger(c=0.005, n=1 / 3, k=2.0))
+    state, twist = [1e-7, 1e-7, 2e-7], [1e-3, 2e-4, 0.1]
+    model = pj.ReducedModel(patch, LAWS["plain"], 0.3, **SMALL)
+    wanted = pf.ReducedModel(patch, LAWS["plain"], **SMALL, load_error=0.0).step(state, twist, 0.3, 1e-4)
+    for got, want in zip(model.step(jnp.array(state), jnp.array(twist), 0.3, 1e-4), wanted, strict=True):
+        np.testing.assert_allclose(got, want, rtol=1e-12)
+    with pytest.raises(pf.FrictionError, match="normal_force must be"):
+        pj.ReducedModel(patch, LAWS["plain"])
 
 
 def test_gradients_are_the_analytic_jacobians():
@@ -163,6 +175,40 @@ def test_a_roll_out_is_that_of_numpy_and_its_gradient_that_of_differences():
         assert float(getattr(by_law, name) * now) == pytest.approx(float(difference), rel=1e-5, abs=1e-7), name
 
 
+def test_the_adjoint_is_that_of_numpy():
+    numpy_model, model = pair("elasto-plastic")
+    (_, run), (by_law, by_twist) = loss_and_slopes("adjoint")(model.parameters, sway(40))
+    _, wrenches = pf.rollout(numpy_model, None, sway(40), 2.0, 1e-4)
+    exact = pf.autodiff.rollout_gradient(numpy_model, None, sway(40), 2.0, 1e-4, 2.0 * WEIGHTS**2 * wrenches)
+    np.testing.assert_allclose(run.wrenches, wrenches, rtol=1e-13)  # the same code
+    np.testing.assert_allclose(np.stack(by_law), exact.parameters, rtol=1e-12)
+    np.testing.assert_allclose(by_twist, exact.twist, rtol=1e-12)
+
+
+def test_the_adjoint_goes_through_vmap():
+    model, loads, parameters = pair("plain")[1], np.array([1.0, 2.0, 0.0]), pair("plain")[1].parameters
+
+    def slope(load, mu_c):
+        changed = parameters._replace(mu_c=mu_c)
+        return jax.grad(
+            lambda p: pj.rollout(model, None, sway(9), load, 1e-4, parameters=p, method="adjoint").wrenches.sum()
+        )(changed).mu_c
+
+    together = jax.vmap(slope)(loads, jnp.array([0.8, 0.9, 1.0]))
+    for load, mu_c, value in zip(loads, (0.8, 0.9, 1.0), together, strict=True):
+        assert float(value) == pytest.approx(float(slope(load, mu_c)), rel=1e-12)
+
+
+@pytest.mark.slow
+def test_the_adjoint_agrees_with_the_eager_roll_out():
+    parameters = pair("elasto-plastic")[1].parameters
+    (_, (by_law, by_twist)), (_, (law, twist)) = (
+        loss_and_slopes(method)(parameters, sway(40)) for method in ("adjoint", "eager")
+    )
+    np.testing.assert_allclose(np.stack(by_law), np.stack(law), rtol=1e-8)
+    close(by_twist, twist, 1e-8)
+
+
 # ---------------------------------------------------------------------- PyTorch
 
 
@@ -190,8 +236,10 @@ def test_gradients_of_roll_outs_are_those_of_pytorch():
         (lambda: pj.ReducedModel("disc", LAWS["plain"]), "patch must be a ContactPatch"),
         (lambda: pair("plain")[1].replace(weights=1.0), "leaf must be one of parameters, shape, got 'weights'"),
         (
-            lambda: pj.rollout(pair("plain")[1], None, sway(4), 1.0, 1e-4, method="adjoint"),
-            "method must be 'eager' for ReducedModel",
+            lambda: jax.grad(lambda m: pj.rollout(m, None, sway(4), 1.0, 1e-4, method="adjoint").state.sum())(
+                pair("plain")[1]
+            ),
+            "shape must be held fixed with method='adjoint'",
         ),
     ],
 )

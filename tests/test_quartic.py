@@ -254,11 +254,11 @@ def test_stored_for_compiled_models():
         (lambda: pf.LimitSurfaceQuartic.fit(np.ones((6, 3)), np.ones((5, 3)), patch=FEET), "as many rows"),
         (
             lambda: pf.LimitSurfaceQuartic.fit(np.zeros((6, 3)), np.ones((6, 3)), patch=FEET),
-            "wrenches must not be zero",
+            "wrench must not be zero",
         ),
         (
             lambda: pf.LimitSurfaceQuartic.fit(np.ones((6, 3)), np.full((6, 3), np.nan), patch=FEET),
-            "twists must be finite",
+            "twist must be finite",
         ),
         (lambda: fitted("feet").compare(FEET), "reference must be a limit surface"),
         (lambda: fitted("feet").compare(fitted("feet"), samples=0), "samples must be an integer >= 2"),

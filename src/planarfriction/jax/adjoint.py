@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from typing import NamedTuple
 
 import jax
@@ -11,28 +12,37 @@ import numpy as np
 from jax.custom_derivatives import SymbolicZero
 
 from planarfriction import autodiff
-from planarfriction.autodiff.parameters import Packed
+from planarfriction.autodiff.parameters import Packed, pack_shape
 from planarfriction.errors import InvalidValueError
+from planarfriction.formulas import LawNumbers
 from planarfriction.jax.published import ReducedModelPublished
+from planarfriction.jax.reduced import ReducedModel
 from planarfriction.kernels.published_step import NAMES
+from planarfriction.models import reduced_arrays
+from planarfriction.models.reduced_arrays import ReducedNumbers
 
 
 class _Kind(NamedTuple):
     """What is fixed when a function is compiled."""
 
-    surface: int
-    size: int
+    leaf: str
+    """What of the model is held fixed."""
+    sizes: tuple
+    """Kind and size of a surface, or the shapes of the arrays of a `ReducedNumbers`."""
     elasto_plastic: bool
 
 
 def rollout(model, state, twist, normal_force, dt) -> tuple[jax.Array, jax.Array]:
     """Last state `[..., 3]` and wrenches `[..., T, 3]`; state, twist and normal_force have the same batch axes."""
-    if not isinstance(model, ReducedModelPublished):
+    if isinstance(model, ReducedModelPublished):
+        leaf, sizes, data = "surface", (model.surface.kind, model.surface.size), model.surface.data
+    elif isinstance(model, ReducedModel):
+        leaf, sizes = "shape", tuple(part.shape for part in model.shape)
+        data = jnp.concatenate([part.reshape(-1) for part in model.shape])
+    else:
         raise InvalidValueError("method", f"be 'eager' for {type(model).__name__}", "'adjoint'")
-    surface = model.surface
-    kind = _Kind(surface.kind, surface.size, model.elasto_plastic)
-    parameters = jnp.stack(model.parameters)
-    return _rollout(kind, surface.data, jnp.asarray(dt), parameters, state, twist, normal_force)
+    kind = _Kind(leaf, sizes, model.elasto_plastic)
+    return _rollout(kind, data, jnp.asarray(dt), jnp.stack(model.parameters), state, twist, normal_force)
 
 
 @functools.partial(jax.custom_vjp, nondiff_argnums=(0,))
@@ -44,7 +54,7 @@ def _rollout(kind: _Kind, data, dt, parameters, state, twist, load):
 
 
 def _rollout_fwd(kind: _Kind, data, dt, *inputs):
-    for name, value in (("surface", data), ("dt", dt)):
+    for name, value in ((kind.leaf, data), ("dt", dt)):
         if value.perturbed:
             raise InvalidValueError(
                 name,
@@ -109,9 +119,17 @@ def _by_contact(run, arrays, dtype):
 
 
 def _packed(kind: _Kind, data: np.ndarray) -> Packed:
+    """The model as compiled loops see it, with parameters that others take the place of."""
+    elastic = float(kind.elasto_plastic)
+    if kind.leaf == "shape":
+        ends = np.cumsum([math.prod(size) for size in kind.sizes])[:-1]
+        parts = (part.reshape(size) for part, size in zip(np.split(data, ends), kind.sizes, strict=True))
+        law = LawNumbers(1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, elastic, 0.5)
+        return pack_shape(law, reduced_arrays.shape_of(ReducedNumbers(*parts)))
     row = np.zeros(len(NAMES))
-    row[NAMES.index("elasto_plastic")] = float(kind.elasto_plastic)
-    return Packed(row, np.array([kind.surface, 0, kind.size]), np.ascontiguousarray(data))
+    row[NAMES.index("elasto_plastic")] = elastic
+    surface, size = kind.sizes
+    return Packed(row, np.array([surface, 0, size]), np.ascontiguousarray(data))
 
 
 def _beside(parameters: np.ndarray, state: np.ndarray) -> np.ndarray:

@@ -53,7 +53,7 @@ class ReducedModel(FrictionModel):
         super().__init__(patch, law)
         numbers, names = law.numbers, ReducedParameters._fields
         self.parameters = ReducedParameters(*(jnp.asarray(getattr(numbers, name), dtype=float) for name in names))
-        shape = models.ReducedModel(patch, law, segments=segments, speeds=speeds).shape_at(normal_force)
+        shape = models.ReducedModel(patch, law, segments=segments, speeds=speeds, load_error=0.0).shape_at(normal_force)
         self.shape = ReducedNumbers(*map(jnp.asarray, reduced_arrays.numbers_of(shape)))
 
     def rest(self) -> jax.Array:

@@ -53,8 +53,8 @@ def rollout(
     `parameters`, a record as `model.parameters` or `[P]` in its order, takes the place of the model's own.
 
     `method` is `"eager"`, JAX operations step by step (any model and device, derivatives by everything, of any order),
-    or `"adjoint"`, the compiled roll-out with its discrete adjoint (`ReducedModelPublished` on the processor, float64
-    inside, first derivatives by the parameters, `state`, `twist` and `normal_force`): much faster. None takes "eager".
+    or `"adjoint"`, the compiled roll-out with its discrete adjoint (reduced models on the processor, float64 inside,
+    first derivatives by the parameters, `state`, `twist` and `normal_force`): much faster. None takes "eager".
 
     Raises `InvalidValueError` for wrong shapes and for a method that is not possible.
     """

@@ -59,29 +59,29 @@ class LimitSurfaceQuartic(LimitSurface):
 
     @classmethod
     def fit(
-        cls, wrenches, twists, *, patch: ContactPatch, normal_force: float | None = None, velocity_weight: float = 1.0
+        cls, wrench, twist, *, patch: ContactPatch, normal_force: float | None = None, velocity_weight: float = 1.0
     ) -> LimitSurfaceQuartic:
         """The convex quartic nearest to measured pairs: `H(W) = 1`, and the gradient of H along the twist.
 
-        `wrenches` `[M, 3]` are friction wrenches per unit `mu f_N` on the moving body, `twists` `[M, 3]` its twists,
-        whose magnitude does not matter; both about the origin of the contact frame. The patch gives centre and radius
-        of the scaled coordinates, not the shape: a guess will do. `velocity_weight` weighs the squares of the
-        gradients' parts across the twists against those of `H - 1`.
+        `wrench` `[M, 3]` are friction wrenches per unit `mu f_N` on the moving body, `twist` `[M, 3]` its twists, whose
+        magnitude does not matter; both about the origin of the contact frame. The patch gives centre and radius of the
+        scaled coordinates, not the shape: a guess will do. `velocity_weight` weighs the squares of the gradients' parts
+        across the twists against those of `H - 1`.
 
         Raises `InvalidValueError` for pairs of the wrong shape, fewer than 5, not finite or zero.
         """
-        wrenches, twists = _rows("wrenches", wrenches), _rows("twists", twists)
-        if wrenches.ndim != 2 or wrenches.shape != twists.shape or len(wrenches) < 5:
+        wrench, twist = _rows("wrench", wrench), _rows("twist", twist)
+        if wrench.ndim != 2 or wrench.shape != twist.shape or len(wrench) < 5:
             raise InvalidValueError(
-                "twists", "have as many rows as wrenches, five or more", f"{list(wrenches.shape)}, {list(twists.shape)}"
+                "twist", "have as many rows as wrench, five or more", f"{list(wrench.shape)}, {list(twist.shape)}"
             )
-        for name, rows in (("wrenches", wrenches), ("twists", twists)):
+        for name, rows in (("wrench", wrench), ("twist", twist)):
             if not (np.abs(rows).max(axis=1) > 0.0).all():
                 raise InvalidValueError(name, "not be zero in any row", rows.tolist())
         frame = scaling(patch.centre_of_pressure(normal_force), float(patch.contact_radius(normal_force)))
-        points = -np.linalg.solve(frame.T, wrenches.T).T
+        points = -np.linalg.solve(frame.T, wrench.T).T
         weight = validation.non_negative("velocity_weight", velocity_weight)
-        coefficients = _fitted(points, twists @ frame.T, weight)
+        coefficients = _fitted(points, twist @ frame.T, weight)
         return cls(patch, normal_force=normal_force, coefficients=coefficients)
 
     @functools.cached_property

@@ -66,6 +66,14 @@ def numbers_of(shape: ReducedShape) -> ReducedNumbers:
     )
 
 
+def shape_of(numbers: ReducedNumbers) -> ReducedShape:
+    """The shape that has the `numbers`, in NumPy: the inverse of `numbers_of`."""
+    header, flat, rest = np.zeros(HEADER), numbers.flat, numbers.rest
+    header[:6] = len(flat), flat.shape[1] // 2, rest.shape[1] // 2, rest.shape[3], *numbers.scale
+    header[QUARTIC:] = numbers.quartic.ravel()
+    return ReducedShape(numbers.factor, np.concatenate([header, flat.ravel(), rest.ravel()]))
+
+
 def dot(a, b):
     """`a . b`, which keeps its axis."""
     return (a * b).sum(-1)[..., None]

@@ -58,7 +58,7 @@ class ReducedModel(FrictionModel):
             raise InvalidValueError("trainable", "not name gamma: the map of steady sliding is made for it", trainable)
         kind = {"dtype": dtype or torch.get_default_dtype(), "device": device}
         self.gamma = law.numbers.gamma
-        self.reference = models.ReducedModel(patch, law, segments=segments, speeds=speeds)
+        self.reference = models.ReducedModel(patch, law, segments=segments, speeds=speeds, load_error=0.0)
         shape = self.reference.shape_at(normal_force)
         self.compiled = pack_shape(law.numbers, shape)
         self._lever = shape.contact_radius
