@@ -196,7 +196,7 @@ def wrench(xp, law: LawNumbers, shape: ReducedNumbers, z, zdot, by: Held):
 
 
 def advance(xp, law: LawNumbers, shape: ReducedNumbers, z, by: Held, dt):
-    """Moments and their rates after `dt` of a held twist (see `kernels.reduced.advance`)."""
+    """Moments and their rates after `dt` of a held twist (see `kernels.reduced_step`)."""
     size, share = _place(xp, z, by)
     start = end = _closure(xp, law, size, share, by.even)
     if law.elasto_plastic:
