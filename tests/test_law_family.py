@@ -14,6 +14,7 @@ from planarfriction.formulas import LawNumbers
 
 POINT = pf.ContactPatch.points([(0.0, 0.0)])
 DISC = pf.ContactPatch.disc(0.01, 7)
+GROOVED = DISC.with_friction_metric([[1.2, 0.1], [0.1, 0.9]])
 LOAD = 3.0
 DAHL = pf.Dahl(mu_c=0.4, sigma_0=2e4)
 CREEPING = pf.CoulombStribeck(
@@ -144,21 +145,22 @@ def test_steady_friction_is_where_the_bristle_stays(law):
 # ---------------------------------------------------------------------- models
 
 
+def model_of(kind, law):
+    if kind == "reduced-published":
+        return pf.ReducedModelPublished(DISC, law, surface=pf.LimitSurfaceEllipsoid(DISC))
+    return pf.DistributedModel(GROOVED if kind == "grooved" else DISC, law)
+
+
 @pytest.mark.parametrize("law", [DAHL, CREEPING], ids=["Dahl", "CoulombStribeck"])
-@pytest.mark.parametrize("kind", ["distributed", "reduced-published"])
+@pytest.mark.parametrize("kind", ["distributed", "grooved", "reduced-published"])
 def test_models_of_other_laws_have_the_slopes_of_their_differences(kind, law):
-    surface = {} if kind == "distributed" else {"surface": pf.LimitSurfaceEllipsoid(DISC)}
-    make = pf.DistributedModel if kind == "distributed" else pf.ReducedModelPublished
-    model, rng = make(DISC, law, **surface), np.random.default_rng(1)
-    state = 0.5 * law.largest_deflection * rng.normal(size=model.state_shape)
-    if kind != "distributed":
-        state[2] *= 0.005  # the third is a moment
+    model, rng = model_of(kind, law), np.random.default_rng(1)
+    # the third state of the published model is a moment
+    scale = law.largest_deflection * (np.array([1.0, 1.0, 0.005]) if kind == "reduced-published" else 1.0)
+    state, sideways = 0.5 * scale * rng.normal(size=model.state_shape), scale * rng.normal(size=model.state_shape)
     twist, dt = np.array([1e-3, -5e-4, 0.2]), 2e-3
     slopes, step = model.jacobians(state, twist, LOAD), model.step_jacobians(state, twist, LOAD, dt)
     ahead = rng.normal(size=3) * np.array([1e-3, 1e-3, 0.1])
-    sideways = law.largest_deflection * rng.normal(size=model.state_shape)
-    if kind != "distributed":
-        sideways[2] *= 0.005
     h = 1e-5  # central differences of the second order: 1e-10 of the third derivative, above 1e-16/1e-5 of rounding
 
     def difference(function):
@@ -167,7 +169,7 @@ def test_models_of_other_laws_have_the_slopes_of_their_differences(kind, law):
     def close(found, expected):
         assert found == pytest.approx(expected, rel=1e-6, abs=1e-7 * np.abs(expected).max())
 
-    inner = "cdn,dn->cn" if kind == "distributed" else "cd,d->c"
+    inner = "cd,d->c" if kind == "reduced-published" else "cdn,dn->cn"
     close(
         np.einsum(inner, slopes.rate_state, sideways),
         difference(lambda e: model.rate(state + e * sideways, twist, LOAD)),
@@ -180,15 +182,29 @@ def test_models_of_other_laws_have_the_slopes_of_their_differences(kind, law):
 
 @pytest.mark.parametrize("law", [DAHL, CREEPING], ids=["Dahl", "CoulombStribeck"])
 def test_a_disc_that_slides_straight_has_the_friction_of_its_law(law):
-    for model in (
-        pf.DistributedModel(DISC, law),
-        pf.ReducedModelPublished(DISC, law, surface=pf.LimitSurfaceEllipsoid(DISC)),
-    ):
+    for kind in ("distributed", "reduced-published"):
+        model = model_of(kind, law)
         scene = pf.scenes.driven(model, twist=(3e-3, 4e-3, 0.0), normal_force=LOAD, t_end=0.2)
         data = pf.simulate(scene, rtol=1e-8).data
         friction = LOAD * float(law.steady_friction(5e-3))
         end = [float(data[name][-1, 0]) for name in ("fx", "fy")]
         assert end == pytest.approx([-0.6 * friction, -0.8 * friction], rel=1e-6)  # of the solver
+
+
+@pytest.mark.parametrize("law", [DAHL, CREEPING], ids=["Dahl", "CoulombStribeck"])
+def test_grooves_turn_and_scale_the_friction_of_a_law(law):
+    """In steady sliding with v, `f = -L (u/|u|) mu(|u|)` with `u = L v` and `L` the root of the metric."""
+    v, root = np.array([3e-3, 4e-3]), GROOVED.root
+    u = root @ v
+    expected = -LOAD * root @ u / np.linalg.norm(u) * law.steady_friction(np.linalg.norm(u))
+    scene = pf.scenes.driven(model_of("grooved", law), twist=(*v, 0.0), normal_force=LOAD, t_end=0.2)
+    data = pf.simulate(scene, rtol=1e-8).data
+    end = [float(data[name][-1, 0]) for name in ("fx", "fy")]
+    assert end == pytest.approx(expected, rel=1e-6)  # of the solver
+    _, wrench = held(model_of("grooved", law), 5e-3, 1.0, 2)
+    along = root @ [5e-3, 0.0]
+    size = np.linalg.norm(along)
+    assert wrench[:2] == pytest.approx(-LOAD * root @ along / size * law.steady_friction(size), rel=1e-9)
 
 
 def test_the_reduced_model_takes_dahl_and_refuses_creep():
