@@ -190,6 +190,15 @@ def test_scenes_page_names_every_key_and_every_member():
     assert not missing
 
 
+def test_glossary_names_every_member():
+    from planarfriction import families
+
+    page = (ROOT / "docs" / "glossary.md").read_text(encoding="utf-8")
+    for family in (families.MODELS, families.LAWS, families.SURFACES, families.SCENES):
+        for name in family:
+            assert f"`{name}`" in page and re.search(rf"\b{family[name].__name__}`", page), name
+
+
 def test_pictures_are_small_and_used():
     used = "".join(page.read_text(encoding="utf-8") for page in PAGES)
     for picture in (ROOT / "docs" / "images").glob("*"):
