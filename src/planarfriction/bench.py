@@ -241,7 +241,7 @@ def _step_published_call(name: str, full: bool) -> Measurement:
     model = ReducedModelPublished(_disc(), _law())
     state, twist = model.rest(), np.array([0.01, 0.0, 1.0])
     rate = _median(lambda: model.rate(state, twist, 1.0), 9, 100)
-    return _line(name, _python_step(model, 2000) * 1e6, "us", "one Python call of rate (NumPy)", rate * 1e6)
+    return _line(name, _python_step(model, 2000) * 1e6, "us", "one Python call of rate", rate * 1e6)
 
 
 def _step_reduced_loop(name: str, full: bool) -> Measurement:

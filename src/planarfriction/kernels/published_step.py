@@ -19,7 +19,7 @@ import numpy as np
 
 from planarfriction import formulas
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import bristle_step, inlined, jit, published, rollouts
+from planarfriction.kernels import bristle_step, inlined, jit, rollouts
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels.bristle_step import Bristle, BristleStep
 from planarfriction.kernels.published_contact import Shape
@@ -137,18 +137,6 @@ def pull_back(contact, step, slopes, new, wrench):
 
 
 # ---------------------------------------------------------------------- bound to this model
-
-
-@jit
-def evaluate_batch(row, surface, data, inputs, out):
-    """See `rollouts.evaluate`."""
-    rollouts.evaluate(shape_of, published.evaluate, row, surface, data, inputs, out)
-
-
-@jit
-def linearise_batch(row, surface, data, inputs, lin):
-    """See `rollouts.linearise`."""
-    rollouts.linearise(shape_of, published.linearise, row, surface, data, inputs, lin)
 
 
 @jit

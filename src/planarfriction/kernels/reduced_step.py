@@ -296,18 +296,6 @@ def pull_back(contact, step, slopes, new, wrench):
 
 
 @jit
-def evaluate_batch(row, surface, data, inputs, out):
-    """See `rollouts.evaluate`."""
-    rollouts.evaluate(shape_of, reduced.evaluate, row, surface, data, inputs, out)
-
-
-@jit
-def linearise_batch(row, surface, data, inputs, lin):
-    """See `rollouts.linearise`."""
-    rollouts.linearise(shape_of, reduced.linearise, row, surface, data, inputs, lin)
-
-
-@jit
 def step_batch(row, surface, data, inputs, out):
     """See `rollouts.batch`."""
     rollouts.batch(shape_of, hold, linearise, row, surface, data, inputs, out)

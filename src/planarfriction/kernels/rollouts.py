@@ -95,25 +95,7 @@ def _weighed(wrench, load):
     return times(load, wrench) if load != 0.0 else (0.0, 0.0, 0.0)
 
 
-# ---------------------------------------------------------------------- rates and steps
-
-
-@inlined
-def evaluate(shape_of, evaluate_one, row, surface, data, inputs, out):
-    """Rates and wrenches of B contacts into `out` [B, 6]; `inputs` are `z`, `twist` [B, 3] and `load` [B]."""
-    law, shape, (z, twist, load) = law_of(row), shape_of(row[LAW:]), inputs
-    for b in range(z.shape[0]):
-        vx, vy, omega = three(twist[b])
-        put(out[b, 3:], times(load[b], evaluate_one(law, z[b], vx, vy, omega, shape, surface, data, out[b])))
-
-
-@inlined
-def linearise(shape_of, linearise_one, row, surface, data, inputs, lin):
-    """Linearised rates of B contacts into `lin` [B, L]; `inputs` are `z` and `twist` [B, 3]."""
-    law, shape, (z, twist) = law_of(row), shape_of(row[LAW:]), inputs
-    for b in range(z.shape[0]):
-        vx, vy, omega = three(twist[b])
-        linearise_one(law, z[b], vx, vy, omega, shape, surface, data, lin[b])
+# ---------------------------------------------------------------------- steps
 
 
 @kernel
@@ -125,7 +107,7 @@ def _step(hold, linearise, contact, z, twist, load, dt):
 
 @inlined
 def batch(shape_of, hold, linearise, row, surface, data, inputs, out):
-    """Steps of B contacts, new states and wrenches into `out` [B, 6]; `inputs` as `evaluate`, and `dt` [B]."""
+    """Steps of B contacts, new states and wrenches into `out` [B, 6]; `inputs`: z, V [B, 3], load, dt [B]."""
     z, twist, load, dt = inputs
     for b in range(z.shape[0]):
         contact = _contact(shape_of, row, surface, data)  # here, where it rounds as for one contact

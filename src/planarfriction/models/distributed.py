@@ -8,7 +8,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planarfriction import formulas
 from planarfriction.kernels import anisotropic_contact, distributed_contact
 from planarfriction.kernels import distributed_step as kernels
 from planarfriction.kernels.anisotropic_contact import AnisotropicContact
@@ -18,6 +17,7 @@ from planarfriction.kernels.records import rows_of
 from planarfriction.laws.base import refuse_creep
 from planarfriction.models import anisotropic
 from planarfriction.models.base import FrictionModel, ModelJacobians, PackedModel, StepJacobians
+from planarfriction.models.rates import linearised, rates
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,18 +46,13 @@ class DistributedModel(FrictionModel):
 
     def rate(self, state, twist, normal_force) -> np.ndarray:
         """Bristle rates `zdot`, shape `[..., 2, N]` [m/s]."""
-        state, twist, _ = self._inputs(state, twist, normal_force)
-        return self._rate(state, self._cell_velocity(twist))
+        state, twist, load = self._inputs(state, twist, normal_force)
+        return self._rates(state, twist, load)[0]
 
     def wrench(self, state, twist, normal_force) -> np.ndarray:
         """Friction wrench on the moving body, shape `[..., 3]` [N, N, N m]."""
         state, twist, load = self._inputs(state, twist, normal_force)
-        velocity = self._cell_velocity(twist)
-        law = self.law.numbers
-        force = formulas.traction(state, self._rate(state, velocity), velocity, law)
-        return np.einsum(
-            "...cn,dcn->...d", force * (load[..., None] * self.patch.weights(load))[..., None, :], self._lever
-        )
+        return load[..., None] * self._rates(state, twist, load)[1]
 
     def step(self, state, twist, normal_force, dt) -> tuple[np.ndarray, np.ndarray]:
         """Advance by `dt` [s] at a held twist: the new state and the wrench at the end, stable at any `dt`.
@@ -86,39 +81,27 @@ class DistributedModel(FrictionModel):
     def jacobians(self, state, twist, normal_force) -> ModelJacobians:
         """Analytic derivatives of `rate` and `wrench` (see `ModelJacobians`); at kinks a one-sided derivative."""
         state, twist, load = self._inputs(state, twist, normal_force)
-        law = self.law.numbers
-        velocity = self._cell_velocity(twist)
-        shifted = state
-        if self._asymmetry is not None:
-            centre, centre_velocity = anisotropic.centres(law, self._asymmetry, velocity)
-            shifted = state - centre
-        k, k_z, k_v = self._decay_slopes(shifted, velocity)
-        identity = np.eye(2)[:, :, None]
-        rate_state = -k[..., None, None, :] * identity - shifted[..., :, None, :] * k_z[..., None, :, :]
-        rate_velocity = identity - shifted[..., :, None, :] * k_v[..., None, :, :]
-        if self._asymmetry is not None:
-            rate_velocity = rate_velocity - np.einsum("...abn,...bcn->...acn", rate_state, centre_velocity)
+        law, identity = self.law.numbers, np.eye(2)[:, :, None]
+        lin = linearised(self._of_all_cells(load), state.reshape(load.size, -1), twist.reshape(-1, 3))
+        lin = lin.reshape(*load.shape, -1, state.shape[-1])
+        if self.patch.anisotropic:
+            rate_state = -lin[..., :4, :].reshape(*load.shape, 2, 2, -1)
+            rate_velocity = lin[..., 4:8, :].reshape(*load.shape, 2, 2, -1)
+        else:
+            k, k_z, k_v = lin[..., :1, None, :], lin[..., None, 1:3, :], lin[..., None, 3:5, :]
+            rate_state = -k * identity - state[..., :, None, :] * k_z
+            rate_velocity = identity - state[..., :, None, :] * k_v
         rate_twist = np.einsum("...abn,dbn->...and", rate_velocity, self._lever)
         share = load[..., None] * self.patch.weights(load)
         force_state = -(law.sigma_0 * identity + law.sigma_1 * rate_state) * share[..., None, None, :]
         force_velocity = -(law.sigma_2 * identity + law.sigma_1 * rate_velocity) * share[..., None, None, :]
-        unit = (
-            self.wrench(state, twist, np.ones_like(load))
-            if not self.patch.depends_on_load
-            else np.divide(
-                self.wrench(state, twist, load),
-                load[..., None],
-                out=np.zeros((*load.shape, 3)),
-                where=load[..., None] > 0,
-            )
-        )
         return ModelJacobians(
             rate_state,
             rate_twist,
             np.zeros_like(state),
             np.einsum("dan,...abn->...dbn", self._lever, force_state),
             np.einsum("dan,...abn,ebn->...de", self._lever, force_velocity, self._lever),
-            unit,
+            self._rates(state, twist, load)[1],
         )
 
     def step_jacobians(self, state, twist, normal_force, dt) -> StepJacobians:
@@ -144,12 +127,15 @@ class DistributedModel(FrictionModel):
     def packed(self, loads: Sequence[float | None]) -> PackedModel:
         """See `FrictionModel.packed`; only cells that carry load at one of the loads have bristles."""
         weights = np.atleast_2d([self.patch.weights(load) for load in loads])
-        ever = weights.max(axis=0) > 0.0
-        weights, positions = np.ascontiguousarray(weights[:, ever]), self.patch.positions[ever]
+        return self._packed(weights, weights.max(axis=0) > 0.0)
+
+    def _packed(self, weights: np.ndarray, chosen: np.ndarray) -> PackedModel:
+        """The chosen cells as the solver sees them, with each row of weights [R, N]."""
+        weights, positions = np.ascontiguousarray(weights[:, chosen]), self.patch.positions[chosen]
         count, law = len(positions), self.law.numbers
         at = place_of(weights) + weights.strides[0] * np.arange(len(weights))
         if self.patch.anisotropic:
-            cells = anisotropic.cell_numbers(self.patch, ever)
+            cells = anisotropic.cell_numbers(self.patch, chosen)
             record = AnisotropicContact(law, count, place_of(cells), 0)
             functions, numbers, kept = anisotropic_contact.FUNCTIONS, anisotropic_contact.LINEAR_NUMBERS, (cells,)
         else:
@@ -164,7 +150,7 @@ class DistributedModel(FrictionModel):
             np.full(2 * count, self.law.largest_deflection),
             float(np.hypot(*(positions - positions.mean(axis=0)).T).mean()),
             (weights, *kept),
-            ever,
+            chosen,
         )
 
     # ------------------------------------------------------------------ cells
@@ -195,32 +181,11 @@ class DistributedModel(FrictionModel):
     def _cell_velocity(self, twist: np.ndarray) -> np.ndarray:
         return np.einsum("...d,dcn->...cn", twist, self._lever)
 
-    def _arguments(self, state: np.ndarray, velocity: np.ndarray):
-        """`z/|z|`, `|z|`, and the arguments of the bristle formulas, per cell."""
-        law = self.law.numbers
-        z_norm, speed = np.hypot(state[..., 0, :], state[..., 1, :]), np.hypot(velocity[..., 0, :], velocity[..., 1, :])
-        unit = state / np.where(z_norm > 0.0, z_norm, 1.0)[..., None, :]
-        grip = law.sigma_0 / formulas.stribeck(np, speed, law)
-        return unit, z_norm, (z_norm * grip, (unit * velocity).sum(axis=-2), speed, grip)
+    def _rates(self, state: np.ndarray, twist: np.ndarray, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Bristle rates, and wrenches per unit load."""
+        cells = self._of_all_cells(load)
+        rate, wrench = rates(cells, state.reshape(load.size, *self.state_shape), twist.reshape(-1, 3))
+        return rate.reshape(state.shape), wrench.reshape(twist.shape)
 
-    def _rate(self, state: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-        if self._asymmetry is not None:
-            state = state - anisotropic.centres(self.law.numbers, self._asymmetry, velocity)[0]
-        _, _, arguments = self._arguments(state, velocity)
-        k = formulas.bristle_decay(np, *arguments, self.law.numbers)
-        return velocity - k[..., None, :] * state
-
-    def _decay_slopes(self, state: np.ndarray, velocity: np.ndarray):
-        """`k` `[..., N]` and its gradients with respect to the cell's bristle and velocity `[..., 2, N]`."""
-        law = self.law.numbers
-        unit, z_norm, arguments = self._arguments(state, velocity)
-        _, along, speed, grip = arguments
-        k, k_deflection, k_along, k_speed = formulas.bristle_decay_partials(np, *arguments, law)
-        stribeck_slope = formulas.stribeck_slope(np, speed, law)
-        k_grip = k_deflection * z_norm + k / grip
-        k_speed = k_speed - k_grip * grip**2 * stribeck_slope / law.sigma_0
-        heading = velocity / np.where(speed > 0.0, speed, 1.0)[..., None, :]
-        turn = (velocity - along[..., None, :] * unit) / np.where(z_norm > 0.0, z_norm, 1.0)[..., None, :]
-        k_z = (k_deflection * grip)[..., None, :] * unit + k_along[..., None, :] * turn
-        k_v = k_along[..., None, :] * unit + k_speed[..., None, :] * heading
-        return k, k_z, k_v
+    def _of_all_cells(self, load: np.ndarray) -> PackedModel:
+        return self._packed(self._cells(load).weights, np.ones(len(self.patch.positions), bool))

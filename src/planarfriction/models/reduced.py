@@ -39,7 +39,7 @@ class ReducedModel(ThreeStateModel):
     from z = 0, and not from `a g/sigma_0` as those of the distributed model are.
     """
 
-    _kernels, _linear = reduced_step, reduced_contact.LINEAR
+    _kernels = reduced_step
 
     segments: int = 24
     """Squares of the map along a quarter of a face of its cube; 24 leave errors of 1e-5 (median) of z_ss."""
@@ -78,7 +78,9 @@ class ReducedModel(ThreeStateModel):
 
     def packed(self, loads: Sequence[float | None]) -> PackedModel:
         """See `FrictionModel.packed`; a family's maps stay where they are, its shapes refer to them."""
-        shapes = self.shapes_at(loads)
+        return self._records(self.shapes_at(loads))
+
+    def _records(self, shapes: Sequence[ReducedShape]) -> PackedModel:
         maps = {id(data): data for shape in shapes for data in (shape.data, shape.other) if data is not None}
         at = {name: place_of(data) for name, data in maps.items()}
         data = np.array([at[id(shape.data)] for shape in shapes])

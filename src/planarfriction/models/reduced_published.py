@@ -58,7 +58,7 @@ class ReducedModelPublished(ThreeStateModel):
     Source: Waltersson and Karayiannidis 2024, section IV.
     """
 
-    _kernels, _linear = published_step, published_contact.LINEAR
+    _kernels = published_step
 
     surface: LimitSurface = None  # pyright: ignore[reportAssignmentType]
     """Limit surface; None takes the published table of the patch."""
@@ -87,7 +87,9 @@ class ReducedModelPublished(ThreeStateModel):
 
     def packed(self, loads: Sequence[float | None]) -> PackedModel:
         """See `FrictionModel.packed`."""
-        shapes = [self._reference if load is None else self.shape_at(load) for load in loads]
+        return self._records([self._reference if load is None else self.shape_at(load) for load in loads])
+
+    def _records(self, shapes: Sequence[PublishedShape]) -> PackedModel:
         data = [np.ascontiguousarray(shape.surface.numbers.data, dtype=float) for shape in shapes]
         numbers, root = shapes[0].surface.numbers, shapes[0].root
         record = PublishedContact(
@@ -158,6 +160,9 @@ class ReducedModelPublished(ThreeStateModel):
     @property
     def _root(self) -> np.ndarray:
         return np.eye(2) if self.patch.root is None else self.patch.root
+
+    def _record(self, shape: PublishedShape) -> PackedModel:
+        return super()._record(shape) if self._axes is None else self._records([shape._replace(root=np.eye(2))])
 
     @property
     def _follows_load(self) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Sequence
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any, ClassVar
@@ -10,7 +11,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from planarfriction.geometry import transformed
-from planarfriction.models.base import FrictionModel, ModelJacobians, StepJacobians
+from planarfriction.models.base import FrictionModel, ModelJacobians, PackedModel, StepJacobians
+from planarfriction.models.rates import linearised, rates
 
 _REMEMBERED = 64
 """Loads whose shapes a model remembers that builds each."""
@@ -25,9 +27,7 @@ class ThreeStateModel(FrictionModel):
     """
 
     _kernels: ClassVar[ModuleType]
-    """Steps, rates and their derivatives, as in `kernels.reduced_step`."""
-    _linear: ClassVar[int]
-    """Numbers of a linearisation."""
+    """Steps and their derivatives, as in `kernels.reduced_step`."""
 
     @property
     def state_shape(self) -> tuple[int, ...]:
@@ -138,6 +138,18 @@ class ThreeStateModel(FrictionModel):
             self._recent[load] = build(load)
         return self._recent[load]
 
+    def _records(self, shapes: Sequence[Any]) -> PackedModel:
+        """See `packed`."""
+        raise NotImplementedError
+
+    def _record(self, shape: Any) -> PackedModel:
+        """One shape as the solver sees it; twists and wrenches as `_inputs` gives and `_out` takes them."""
+        return self._fixed_record if shape is self._reference else self._records([shape])
+
+    @functools.cached_property
+    def _fixed_record(self) -> PackedModel:
+        return self._records([self._reference])
+
     def _maps(self, shape: Any) -> tuple[np.ndarray, np.ndarray]:
         """Of the limit surface or maps: three integers, and the numbers that hold them."""
         raise NotImplementedError
@@ -181,19 +193,17 @@ class ThreeStateModel(FrictionModel):
         return ((value, self.shape_at(value)) for value in np.unique(loads[loads > 0.0]))
 
     def _evaluate(self, shape: Any, state, twist, load) -> np.ndarray:
-        out = np.empty((len(load), 6))
-        self._kernels.evaluate_batch(self._row(shape), *self._maps(shape), (state, twist, load), out)
-        return out
+        rate, unit = rates(self._record(shape), state, twist)
+        return np.concatenate([rate, load[:, None] * unit], axis=1)
 
     def _jacobians(self, shape: Any, state, twist, load) -> np.ndarray:
         law, (lever, viscous) = self.law.numbers, self._levers(shape)
-        lin = np.empty((len(load), self._linear))
-        self._kernels.linearise_batch(self._row(shape), *self._maps(shape), (state, twist), lin)
-        rate_state, rate_twist = self._rate_slopes(shape, lin)
+        record = self._record(shape)
+        rate_state, rate_twist = self._rate_slopes(shape, linearised(record, state, twist))
         weight = -load[:, None, None]
         pull = law.sigma_0 * np.eye(3) + law.sigma_1 * rate_state
         push = law.sigma_1 * rate_twist + law.sigma_2 * viscous
-        unit = self._evaluate(shape, state, twist, np.ones_like(load))[:, None, 3:]
+        unit = rates(record, state, twist)[1][:, None, :]
         return np.concatenate(
             [rate_state, rate_twist, weight * (lever.T @ pull), weight * (lever.T @ push), unit], axis=1
         )
