@@ -14,4 +14,5 @@ def read_batch(data, n, faces, v, values, gradients):
         for m in range(3):
             values[b, m] = spot.sign * cube.read(data, 0, n, 3, m, q)
             by_a, by_b = cube.read(data, 0, n, 3, m, q_a), cube.read(data, 0, n, 3, m, q_b)
-            cube.gradient(spot, by_a, by_b, gradients[b], 3 * m, 1)
+            slopes = cube.gradient(spot, by_a, by_b)
+            gradients[b, 3 * m], gradients[b, 3 * m + 1], gradients[b, 3 * m + 2] = slopes

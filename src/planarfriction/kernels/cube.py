@@ -159,8 +159,11 @@ def read_level(data, start, n, components, count, m, q, level, t):
 
 
 @inlined
-def gradient(spot, by_a, by_b, out, first, stride):
-    """Write the gradient by the direction's components, from the slopes on the face, to `out[first + stride * i]`."""
-    out[first + stride * ((spot.axis + 1) % 3)] = by_a * spot.by_side
-    out[first + stride * ((spot.axis + 2) % 3)] = by_b * spot.by_side
-    out[first + stride * spot.axis] = -(spot.a * by_a + spot.b * by_b) * spot.by_axis
+def gradient(spot, by_a, by_b):
+    """The gradient by the direction's components, from the slopes on the face."""
+    largest, first, second = -(spot.a * by_a + spot.b * by_b) * spot.by_axis, by_a * spot.by_side, by_b * spot.by_side
+    if spot.axis == 0:
+        return largest, first, second
+    if spot.axis == 1:
+        return second, largest, first
+    return first, second, largest

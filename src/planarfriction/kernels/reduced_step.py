@@ -29,8 +29,8 @@ from planarfriction.kernels.records import reader
 from planarfriction.kernels.reduced import to_origin
 from planarfriction.kernels.reduced_contact import Shape
 from planarfriction.kernels.rollouts import Cotangents
-from planarfriction.kernels.steady import FAR, evenness, scaled_twist, sliding, steady_by_law, steady_slopes
-from planarfriction.kernels.vectors import applied, applied_back, dot, norm, plus, times
+from planarfriction.kernels.steady import FAR, evenness, scaled_twist, sliding, steady
+from planarfriction.kernels.vectors import applied_back, dot, norm, plus, times
 
 NAMES = (*LawNumbers._fields, *Shape._fields)
 """Numbers of a contact, in the order of its row."""
@@ -52,8 +52,9 @@ class Slopes(NamedTuple):
 
     q_u: tuple
     """By u, row by row."""
-    q_law: tuple
-    """By mu_c, mu_s and v_s, a row each."""
+    q_mu_c: tuple
+    q_mu_s: tuple
+    q_v_s: tuple
     even_u: tuple
 
 
@@ -129,23 +130,15 @@ def hold_slopes(contact, twist, work):
     """`Held` and `Slopes` at a twist; none at rest, where they have no effect."""
     law, shape, surface, data = contact.law, contact.shape, contact.surface, contact.data
     vx, vy, omega = twist
-    x, y, s = scaled_twist(shape, vx, vy, omega)
-    v = norm((x, y, s))
-    q, even, even_u = (FAR, 0.0, 0.0), 1.0, (0.0, 0.0, 0.0)
-    j, p = work, work[15:]
+    x, y, s = u = scaled_twist(shape, vx, vy, omega)
+    v, none = norm(u), (0.0, 0.0, 0.0)
     if v > 0.0:
-        q = steady_slopes(law, shape, surface, data, x, y, s, v, j)
-        steady_by_law(law, shape, surface, data, x, y, s, v, p)
+        found = steady(law, shape, surface, data, u, v)
         even, by_x, by_y, by_s = evenness(shape, surface, data, x, y, s, v)
-        even_u = by_x, by_y, by_s
-    else:
-        for i in range(work.shape[0]):
-            work[i] = 0.0
-    return Held((x, y, s), v, q, even), Slopes(
-        (j[0], j[1], j[2], j[3], j[4], j[5], j[6], j[7], j[8]),
-        (p[0], p[1], p[2], p[3], p[4], p[5], p[6], p[7], p[8]),
-        even_u,
-    )
+        slopes = Slopes(found.by_u, found.by_mu_c, found.by_mu_s, found.by_v_s, (by_x, by_y, by_s))
+        return Held(u, v, found.q, even), slopes
+    still = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    return Held(u, v, (FAR, 0.0, 0.0), 1.0), Slopes(still, none, none, none, none)
 
 
 @inlined
@@ -280,13 +273,13 @@ def pull_back(contact, step, slopes, new, wrench):
     bar = _pull_back(law, step, new, pull)
     u_bar = plus(bar.u, 1.0, applied_back(slopes.q_u, bar.q))
     u_bar = plus(u_bar, law.breakaway_ratio * bar.breakaway, slopes.even_u)
-    by_mu_c, by_mu_s, by_v_s = applied(slopes.q_law, bar.q)
     return Cotangents(
         bar.z,
         to_origin(shape, *u_bar),
         LawNumbers(
             -dot(step.new, pull) - dot(held.q, bar.q) / law.sigma_0, -dot(step.rate, pull), -dot(held.u, pull),
-            by_mu_c, by_mu_s, by_v_s, 0.0, 0.0, held.even * bar.breakaway, 0.0,
+            dot(slopes.q_mu_c, bar.q), dot(slopes.q_mu_s, bar.q), dot(slopes.q_v_s, bar.q),
+            0.0, 0.0, held.even * bar.breakaway, 0.0,
         ),
         Shape(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     )  # fmt: skip

@@ -25,7 +25,7 @@ from planarfriction.kernels import inlined, kernel
 from planarfriction.kernels.law import LAW, law_of
 from planarfriction.kernels.vectors import accumulate, dot, put, three, times
 
-SCRATCH = 27
+SCRATCH = 9
 """Numbers that `hold_slopes` may write to."""
 
 

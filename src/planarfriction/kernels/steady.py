@@ -10,10 +10,12 @@ steady sliding at `g = 1`, and the rest r of that at `g = e = exp(-|v/v_s|^gamma
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from planarfriction import formulas
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import cube, inlined, kernel
+from planarfriction.kernels.vectors import applied_back, dot, plus, times
 
 QUARTIC = 8
 """Where K begins."""
@@ -31,151 +33,102 @@ def scaled_twist(shape, vx, vy, omega):
     return shape[0] * vx + shape[1] * vy + shape[2] * omega, shape[3] * vy + shape[4] * omega, shape[5] * omega
 
 
-@kernel
-def _sliding(law, data, start, x, y, s, v):
-    """`sigma_0 z_ss` of one map, and its least dissipation."""
+class Steady(NamedTuple):
+    """Steady sliding, and its slopes, which the compiler drops where nobody asks for them."""
+
+    q: tuple
+    """z_ss; in a single map `sigma_0 z_ss`."""
+    by_u: tuple
+    """Slopes by the scaled twist, [3, 3] row by row."""
+    by_mu_c: tuple
+    by_mu_s: tuple
+    by_v_s: tuple
+    least: float
+    """Least dissipation."""
+
+
+@inlined
+def _component(law, data, start, spot, places, v, i):
+    """Component i of one map with its slopes: by the direction (3), by v, mu_c, mu_s and v_s."""
     n, m, count, knee = int(data[start + 1]), int(data[start + 2]), int(data[start + 3]), data[start + 4]
-    faces = int(data[start])
-    spot = cube.locate(x, y, s, faces)
-    t = v / (v + knee * law.v_s)
-    drop = law.mu_s - law.mu_c
-    outer = (law.mu_s - drop * t) * spot.sign
-    inner = drop * spot.sign
     first = start + HEADER
-    second = first + faces * (2 * n + 1) * (2 * n + 1) * 12
-    p, q = cube.square(spot, n), cube.square(spot, m)
-    level, w = cube.levels(t, count)
-    return (
-        outer * cube.read(data, first, n, 3, 0, p) + inner * cube.read_level(data, second, m, 3, count, 0, q, level, w),
-        outer * cube.read(data, first, n, 3, 1, p) + inner * cube.read_level(data, second, m, 3, count, 1, q, level, w),
-        outer * cube.read(data, first, n, 3, 2, p) + inner * cube.read_level(data, second, m, 3, count, 2, q, level, w),
-        data[start + 5],
+    second = first + int(data[start]) * (2 * n + 1) * (2 * n + 1) * 12
+    per, drop = 1.0 / (v + knee * law.v_s), law.mu_s - law.mu_c
+    t = v * per
+    outer, (level, w), (p, p_a, p_b), (r, r_a, r_b) = law.mu_s - drop * t, cube.levels(t, count), places[0], places[1]
+    flat, rest = cube.read(data, first, n, 3, i, p), cube.read_level(data, second, m, 3, count, i, r, level, w)
+    flat_a, flat_b = cube.read(data, first, n, 3, i, p_a), cube.read(data, first, n, 3, i, p_b)
+    rest_a = cube.read_level(data, second, m, 3, count, i, r_a, level, w)
+    rest_b = cube.read_level(data, second, m, 3, count, i, r_b, level, w)
+    rest_t = cube.read_level(data, second, m, 3, count, i, r, level, cube.level_slopes(t, count))
+    by_t = spot.sign * drop * (rest_t - flat)
+    slopes = cube.gradient(spot, outer * flat_a + drop * rest_a, outer * flat_b + drop * rest_b)
+    value = spot.sign * (outer * flat + drop * rest)
+    by_mu_c, by_mu_s = spot.sign * (t * flat - rest), spot.sign * ((1.0 - t) * flat + rest)
+    return value, slopes, by_t * knee * law.v_s * per * per, by_mu_c, by_mu_s, -by_t * knee * t * per
+
+
+@inlined
+def _map(law, data, start, u, v):
+    """`Steady` of one map."""
+    spot = cube.locate(u[0], u[1], u[2], int(data[start]))
+    places = cube.squares(spot, int(data[start + 1])), cube.squares(spot, int(data[start + 2]))
+    q_x, slope_x, v_x, c_x, s_x, k_x = _component(law, data, start, spot, places, v, 0)
+    q_y, slope_y, v_y, c_y, s_y, k_y = _component(law, data, start, spot, places, v, 1)
+    q_s, slope_s, v_s, c_s, s_s, k_s = _component(law, data, start, spot, places, v, 2)
+    per_v = 1.0 / v
+    by_x, by_y, by_s = plus(slope_x, v_x * per_v, u), plus(slope_y, v_y * per_v, u), plus(slope_s, v_s * per_v, u)
+    by_u = by_x[0], by_x[1], by_x[2], by_y[0], by_y[1], by_y[2], by_s[0], by_s[1], by_s[2]
+    return Steady((q_x, q_y, q_s), by_u, (c_x, c_y, c_s), (s_x, s_y, s_s), (k_x, k_y, k_s), data[start + 5])
+
+
+@inlined
+def _mixed(one, other, share):
+    return Steady(
+        plus(times(1.0 - share, one.q), share, other.q),
+        plus(times(1.0 - share, one.by_u), share, other.by_u),
+        plus(times(1.0 - share, one.by_mu_c), share, other.by_mu_c),
+        plus(times(1.0 - share, one.by_mu_s), share, other.by_mu_s),
+        plus(times(1.0 - share, one.by_v_s), share, other.by_v_s),
+        (1.0 - share) * one.least + share * other.least,
     )
 
 
 @inlined
-def steady(law, shape, surface, data, x, y, s, v):
-    """`z_ss` [m] at the scaled twist, which moves at `v > 0`; its dissipation is never below the least."""
-    qx, qy, qs, least = 0.0, 0.0, 0.0, 0.0
-    for i in range(2 if shape[6] > 0.0 else 1):
-        share = shape[6] if i == 1 else 1.0 - shape[6]
-        hx, hy, hs, floor = _sliding(law, data, surface[i], x, y, s, v)
-        qx, qy, qs, least = qx + share * hx, qy + share * hy, qs + share * hs, least + share * floor
-    per_v = 1.0 / v
-    power = (qx * x + qy * y + qs * s) * per_v
-    raised = (formulas.floored(xp, power, law.mu_c * least) - power) * per_v
-    per = 1.0 / law.sigma_0
-    return (qx + raised * x) * per, (qy + raised * y) * per, (qs + raised * s) * per
-
-
-@kernel
-def _sliding_slopes(law, data, start, x, y, s, v, share, j):
-    """`_sliding`; adds `share` of its slopes by the scaled twist to `j` [9], row by row; `j[9:15]` is scratch."""
-    n, m, count, knee = int(data[start + 1]), int(data[start + 2]), int(data[start + 3]), data[start + 4]
-    faces = int(data[start])
-    spot = cube.locate(x, y, s, faces)
-    per = 1.0 / (v + knee * law.v_s)
-    t = v * per
-    by_v = knee * law.v_s * per * per / v  # dt/dV_G = by_v V_G
-    drop = law.mu_s - law.mu_c
-    outer = law.mu_s - drop * t
-    first = start + HEADER
-    second = first + faces * (2 * n + 1) * (2 * n + 1) * 12
-    p, p_a, p_b = cube.squares(spot, n)
-    q, q_a, q_b = cube.squares(spot, m)
-    level, w = cube.levels(t, count)
-    w_t = cube.level_slopes(t, count)
-    for i in range(3):
-        flat, rest = cube.read(data, first, n, 3, i, p), cube.read_level(data, second, m, 3, count, i, q, level, w)
-        flat_a, flat_b = cube.read(data, first, n, 3, i, p_a), cube.read(data, first, n, 3, i, p_b)
-        rest_a = cube.read_level(data, second, m, 3, count, i, q_a, level, w)
-        rest_b = cube.read_level(data, second, m, 3, count, i, q_b, level, w)
-        by_t = drop * spot.sign * (cube.read_level(data, second, m, 3, count, i, q, level, w_t) - flat)
-        cube.gradient(spot, outer * flat_a + drop * rest_a, outer * flat_b + drop * rest_b, j, 9, 1)
-        j[12 + i] = spot.sign * (outer * flat + drop * rest)
-        j[3 * i] += share * (j[9] + by_t * by_v * x)
-        j[3 * i + 1] += share * (j[10] + by_t * by_v * y)
-        j[3 * i + 2] += share * (j[11] + by_t * by_v * s)
-    return j[12], j[13], j[14], data[start + 5]
+def steady(law, shape, surface, data, u, v):
+    """`Steady` at the scaled twist, which moves at `v > 0`; its dissipation is never below the least."""
+    found = _map(law, data, surface[0], u, v)
+    if shape[6] > 0.0:
+        found = _mixed(found, _map(law, data, surface[1], u, v), shape[6])
+    per_v, per, least = 1.0 / v, 1.0 / law.sigma_0, found.least
+    n = times(per_v, u)
+    power = dot(found.q, n)
+    raised = formulas.floored(xp, power, law.mu_c * least) - power
+    stays = 1.0 - formulas.floored_slope(xp, power, law.mu_c * least)
+    # of the power by V_G; each row i of the slopes gains raised (e_i - n_i n)/v - stays n_i of it
+    j = found.by_u
+    by_power = plus(plus(applied_back(j, n), per_v, found.q), -power * per_v, n)
+    lost = plus(times(raised * per_v, n), stays, by_power)
+    x, y, s = plus((j[0], j[1], j[2]), -n[0], lost), plus((j[3], j[4], j[5]), -n[1], lost), (j[6], j[7], j[8])
+    s, one = plus(s, -n[2], lost), raised * per_v
+    by_u = x[0] + one, x[1], x[2], y[0], y[1] + one, y[2], s[0], s[1], s[2] + one
+    by_least = formulas.floored_by_least(xp, power, law.mu_c * least) * least
+    by_mu_c = plus(found.by_mu_c, by_least - stays * dot(found.by_mu_c, n), n)
+    by_mu_s = plus(found.by_mu_s, -stays * dot(found.by_mu_s, n), n)
+    by_v_s = plus(found.by_v_s, -stays * dot(found.by_v_s, n), n)
+    return Steady(
+        times(per, plus(found.q, raised, n)), times(per, by_u),
+        times(per, by_mu_c), times(per, by_mu_s), times(per, by_v_s), least,
+    )  # fmt: skip
 
 
 @kernel
 def steady_slopes(law, shape, surface, data, x, y, s, v, j):
-    """`dz_ss/dV_G` [s] into `j` [9], row by row; `j[9:15]` is scratch. Returns `z_ss`."""
+    """`dz_ss/dV_G` [s] into `j` [9], row by row. Returns `z_ss`."""
+    found = steady(law, shape, surface, data, (x, y, s), v)
     for i in range(9):
-        j[i] = 0.0
-    qx, qy, qs, least = 0.0, 0.0, 0.0, 0.0
-    for i in range(2 if shape[6] > 0.0 else 1):
-        share = shape[6] if i == 1 else 1.0 - shape[6]
-        hx, hy, hs, floor = _sliding_slopes(law, data, surface[i], x, y, s, v, share, j)
-        qx, qy, qs, least = qx + share * hx, qy + share * hy, qs + share * hs, least + share * floor
-    per_v = 1.0 / v
-    nx, ny, ns = x * per_v, y * per_v, s * per_v
-    power = qx * nx + qy * ny + qs * ns
-    raised = formulas.floored(xp, power, law.mu_c * least) - power
-    stays = 1.0 - formulas.floored_slope(xp, power, law.mu_c * least)
-    per = 1.0 / law.sigma_0
-    if raised != 0.0:
-        for i in range(3):
-            n_i = nx if i == 0 else (ny if i == 1 else ns)
-            q_i = qx if i == 0 else (qy if i == 1 else qs)
-            # of the power by V_G, component i
-            j[9 + i] = nx * j[i] + ny * j[3 + i] + ns * j[6 + i] + (q_i - power * n_i) * per_v
-        for i in range(3):
-            n_i = nx if i == 0 else (ny if i == 1 else ns)
-            for k in range(3):
-                n_k = nx if k == 0 else (ny if k == 1 else ns)
-                turn = ((1.0 if i == k else 0.0) - n_i * n_k) * per_v
-                j[3 * i + k] += raised * turn - stays * n_i * j[9 + k]
-    for i in range(9):
-        j[i] *= per
-    return (qx + raised * nx) * per, (qy + raised * ny) * per, (qs + raised * ns) * per
-
-
-@kernel
-def _sliding_by_law(law, data, start, x, y, s, v, share, out):
-    """Adds `share` of the slopes of `_sliding` by mu_c, mu_s and v_s to `out` [9], a row each."""
-    n, m, count, knee = int(data[start + 1]), int(data[start + 2]), int(data[start + 3]), data[start + 4]
-    faces = int(data[start])
-    spot = cube.locate(x, y, s, faces)
-    per = 1.0 / (v + knee * law.v_s)
-    t = v * per
-    first = start + HEADER
-    second = first + faces * (2 * n + 1) * (2 * n + 1) * 12
-    p, q = cube.square(spot, n), cube.square(spot, m)
-    level, w = cube.levels(t, count)
-    w_t = cube.level_slopes(t, count)
-    part, drop = share * spot.sign, law.mu_s - law.mu_c
-    by_v_s = -drop * knee * t * per
-    for i in range(3):
-        flat, rest = cube.read(data, first, n, 3, i, p), cube.read_level(data, second, m, 3, count, i, q, level, w)
-        out[i] += part * (t * flat - rest)
-        out[3 + i] += part * ((1.0 - t) * flat + rest)
-        out[6 + i] += part * by_v_s * (cube.read_level(data, second, m, 3, count, i, q, level, w_t) - flat)
-        out[9 + i] += part * ((law.mu_s - drop * t) * flat + drop * rest)
-    return data[start + 5]
-
-
-@kernel
-def steady_by_law(law, shape, surface, data, x, y, s, v, out):
-    """Slopes of `z_ss` by mu_c, mu_s and v_s into `out` [9], a row each; `out[9:12]` is scratch."""
-    for i in range(12):
-        out[i] = 0.0
-    least = 0.0
-    for i in range(2 if shape[6] > 0.0 else 1):
-        share = shape[6] if i == 1 else 1.0 - shape[6]
-        least += share * _sliding_by_law(law, data, surface[i], x, y, s, v, share, out)
-    per_v, per = 1.0 / v, 1.0 / law.sigma_0
-    nx, ny, ns = x * per_v, y * per_v, s * per_v
-    power = out[9] * nx + out[10] * ny + out[11] * ns
-    stays = 1.0 - formulas.floored_slope(xp, power, law.mu_c * least)
-    for i in range(3):
-        raised = -stays * (out[3 * i] * nx + out[3 * i + 1] * ny + out[3 * i + 2] * ns)
-        if i == 0:
-            raised += formulas.floored_by_least(xp, power, law.mu_c * least) * least
-        out[3 * i] = (out[3 * i] + raised * nx) * per
-        out[3 * i + 1] = (out[3 * i + 1] + raised * ny) * per
-        out[3 * i + 2] = (out[3 * i + 2] + raised * ns) * per
+        j[i] = found.by_u[i]
+    return found.q
 
 
 @inlined
@@ -234,7 +187,7 @@ def sliding(law, vx, vy, omega, shape, surface, data):
     x, y, s = scaled_twist(shape, vx, vy, omega)
     v = math.sqrt(x * x + y * y + s * s)
     if v > 0.0:
-        qx, qy, qs = steady(law, shape, surface, data, x, y, s, v)
+        qx, qy, qs = steady(law, shape, surface, data, (x, y, s), v).q
         even = evenness(shape, surface, data, x, y, s, v)[0] if law.elasto_plastic > 0.0 else 1.0
         return x, y, s, v, qx, qy, qs, even
     return 0.0, 0.0, 0.0, 0.0, FAR, 0.0, 0.0, 1.0

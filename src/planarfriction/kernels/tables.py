@@ -65,4 +65,5 @@ def smoothed_nodes(corners, grid, x, y, w, radius, size, nodes):
                 cx, cy = -distance * math.sin(j * segment), distance * math.cos(j * segment)
                 hx, hy, ht = smoothed_spin_sum(corners, grid, x, y, w, cx, cy)
             nodes[i, j, 0], nodes[i, j, 1], nodes[i, j, 2] = hx, hy, ht / radius
-        nodes[i, 4 * size] = nodes[i, 0]
+        for c in range(3):  # one by one: an assignment of arrays takes six times as long to compile
+            nodes[i, 4 * size, c] = nodes[i, 0, c]

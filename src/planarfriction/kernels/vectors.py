@@ -112,16 +112,6 @@ def put(row, a):
 
 
 @inlined
-def applied(m, a):
-    """`M a`"""
-    return (
-        m[0] * a[0] + m[1] * a[1] + m[2] * a[2],
-        m[3] * a[0] + m[4] * a[1] + m[5] * a[2],
-        m[6] * a[0] + m[7] * a[1] + m[8] * a[2],
-    )
-
-
-@inlined
 def applied_back(m, a):
     """`M' a`"""
     return (

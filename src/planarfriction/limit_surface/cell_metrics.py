@@ -82,7 +82,7 @@ def cell_twist(
 
 
 def potential_table(levers: np.ndarray, weights: np.ndarray, segments: int) -> np.ndarray:
-    """Numbers of a `POTENTIAL` surface of `kernels.surfaces`, flat: what `kernels.tables.potential_nodes` makes."""
+    """Numbers of a `POTENTIAL` surface of `kernels.surfaces`, flat, from sums over the cells."""
     segment = 0.5 * np.pi / segments
     polar, azimuth = np.arange(segments + 1)[:, None] * segment, np.arange(4 * segments) * segment
     sin_p, cos_p = np.sin(polar), np.cos(polar)

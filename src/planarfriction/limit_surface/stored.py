@@ -10,7 +10,7 @@ import numpy as np
 def stored_potential(direction: Callable[[np.ndarray], np.ndarray], segments: int) -> np.ndarray:
     """Numbers of kind `POTENTIAL` from `h(V_S)` `[..., 3]`: potential, its slopes and the mixed one, then the tilt.
 
-    As `kernels.tables.potential_nodes`, which has the sums over the cells in the place of `direction`.
+    What `limit_surface.cell_metrics.potential_table` makes of sums over cells, from any `direction`.
     """
     segment = 0.5 * np.pi / segments
     polar, azimuth = np.meshgrid(np.arange(segments + 1) * segment, np.arange(4 * segments) * segment, indexing="ij")

@@ -144,7 +144,7 @@ class ThreeStateModel(FrictionModel):
 
     def _record(self, shape: Any) -> PackedModel:
         """One shape as the solver sees it; twists and wrenches as `_inputs` gives and `_out` takes them."""
-        return self._fixed_record if shape is self._reference else self._records([shape])
+        return self._records([shape]) if self._follows_load else self._fixed_record
 
     @functools.cached_property
     def _fixed_record(self) -> PackedModel:
