@@ -179,7 +179,7 @@ def advance(run, max_steps):
             _step(run, own, method, piece, since, step, y, stages)
             taken += 1
             statistics[EVALUATIONS] += method.m.shape[0] if fresh else method.m.shape[0] - 1
-            norm = error_norm(own, y, stages.new, stages.error, run.rtol, doubles(run.atol))
+            norm = error_norm(own, y, stages.new, stages.error, run.rtol, vector(run.atol, n))
             # no growth right after a rejection, whose reason is still near
             growth = _GROWTH if fresh else 1.0
             scale = _SHRINKAGE

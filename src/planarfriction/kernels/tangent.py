@@ -198,9 +198,11 @@ def propagate(system, path, first, last, slope, rtol, atol, w):
         call(own.rates, (system, path.piece[t], path.since[t] + path.step[t], path.end[t], w.end_rate))
         begin, share = 0.0, 1.0
         while begin < 1.0:
-            _step(system, path, t, begin, share, slope, w.coarse, w)
-            _step(system, path, t, begin, 0.5 * share, slope, w.fine, w)
-            _step(system, path, t, begin + 0.5 * share, 0.5 * share, w.fine, w.fine, w)
+            for part in range(3):  # once the whole way, then in two halves
+                whole, second = part == 0, part == 2
+                from_here, how_far = begin + (0.5 * share if second else 0.0), share if whole else 0.5 * share
+                source, target = w.fine if second else slope, w.coarse if whole else w.fine
+                _step(system, path, t, from_here, how_far, source, target, w)
             taken += 1
             largest = 0.0
             for p in range(path.parameters.shape[0]):
