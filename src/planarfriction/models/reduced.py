@@ -126,4 +126,5 @@ class ReducedModel(ThreeStateModel):
         return shape.factor, shape.factor
 
     def _rate_slopes(self, shape: ReducedShape, lin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return lin[:, 1:10].reshape(-1, 3, 3), lin[:, 10:19].reshape(-1, 3, 3) @ shape.factor
+        by_z, by_v = (lin[:, at : at + 9].reshape(-1, 3, 3) for at in (reduced_contact.BY_Z, reduced_contact.BY_V))
+        return by_z, by_v @ shape.factor
