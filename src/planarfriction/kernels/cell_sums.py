@@ -27,9 +27,9 @@ _GONE = 40.0
 
 
 @kernel
-def _flush(count, points, ux, uy, power, exponents, gamma, out):
-    """Add `count` points (rows of `points`: x, y, weight) that slide at `u` to the sums of a direction."""
-    x, y, w = points[0], points[1], points[2]
+def _flush(count, points, exponents, gamma, out):
+    """Add `count` points (rows of `points`: x, y, weight, u, and one of scratch) to the sums of a direction."""
+    x, y, w, ux, uy, power = points[0], points[1], points[2], points[3], points[4], points[5]
     ox, oy, o_s, least = 0.0, 0.0, 0.0, 1e300
     for i in range(count):
         square = ux[i] * ux[i] + uy[i] * uy[i]
@@ -77,12 +77,12 @@ def _cut(stack, top, x, y, ax, ay, bx, by, weight, level, parts):
 
 
 @kernel
-def _sum(vx, vy, spin, cells, exponents, gamma, stack, points, ux, uy, power, out):
+def _sum(vx, vy, spin, cells, exponents, gamma, stack, points, out):
     count, top, next_cell = np.int64(0), 0, 0  # a literal 0 would have what it is passed to compiled once more
     while True:
         done = top == 0 and next_cell == cells.shape[0]
         if done or count + 4 > _BLOCK:
-            _flush(count, points, ux, uy, power, exponents, gamma, out)
+            _flush(count, points, exponents, gamma, out)
             count = 0
         if done:
             return
@@ -111,7 +111,7 @@ def _sum(vx, vy, spin, cells, exponents, gamma, stack, points, ux, uy, power, ou
                 u, v = 2.0 * i - 1.0, 2.0 * j - 1.0
                 px, py = x + u * gx + v * hx, y + u * gy + v * hy
                 points[0, count], points[1, count], points[2, count] = px, py, weight / (along * across)
-                ux[count], uy[count] = vx - spin * py, vy + spin * px
+                points[3, count], points[4, count] = vx - spin * py, vy + spin * px
                 count += 1
 
 
@@ -123,10 +123,9 @@ def steady_sums(directions, cells, exponents, gamma, out):
     radius of gyration, and the weight. `e` is 1 in row 0 and `exp(-exponents[k] |u|^gamma)` of the unit direction in
     row 1 + k; `exponents` [E] ascend.
     """
-    stack, points = np.empty((4 * DEPTH + 4, 8)), np.empty((3, _BLOCK))
-    ux, uy, power = np.empty(_BLOCK), np.empty(_BLOCK), np.empty(_BLOCK)
+    stack, points = np.empty((4 * DEPTH + 4, 8)), np.empty((6, _BLOCK))
     for m in range(directions.shape[0]):
         d = directions[m]
         per = 1.0 / math.sqrt(d[0] * d[0] + d[1] * d[1] + d[2] * d[2])
         out[m] = 0.0
-        _sum(d[0] * per, d[1] * per, d[2] * per, cells, exponents, gamma, stack, points, ux, uy, power, out[m])
+        _sum(d[0] * per, d[1] * per, d[2] * per, cells, exponents, gamma, stack, points, out[m])
