@@ -37,7 +37,7 @@ def identify_lugre(
     *,
     parameters: Sequence[str] = known.USUAL,
     start: LuGre | Mapping[str, float] | None = None,
-    elasto_plastic: ElastoPlastic | None = ElastoPlastic(0.9),  # noqa: B008 (frozen)
+    elasto_plastic: ElastoPlastic | float | None = ElastoPlastic(0.9),  # noqa: B008 (frozen)
     surface: type[LimitSurface] = LimitSurfaceTablePublished,
     noise: Sequence[float] | None = None,
     begins: str = "rest",
@@ -119,7 +119,7 @@ def _settled(problem, coordinates, minimum, noise, unknown: bool) -> tuple[Minim
     return minimum, noise
 
 
-def _start_law(start: Any, elasto_plastic: ElastoPlastic | None) -> tuple[LuGre, dict[str, float] | None]:
+def _start_law(start: Any, elasto_plastic: ElastoPlastic | float | None) -> tuple[LuGre, dict[str, float] | None]:
     """The law that holds what is not estimated, and the values given by name (None: a whole law was given)."""
     if type(start) is LuGre:
         return start, None

@@ -54,8 +54,8 @@ class LuGre(FrictionLaw):
     """Viscous friction per unit normal load [s/m]."""
     gamma: float = 2.0
     """Stribeck exponent [-]."""
-    elasto_plastic: ElastoPlastic | None = None
-    """Elasto-plastic extension; a number is taken as its breakaway ratio, None means plain LuGre."""
+    elasto_plastic: ElastoPlastic | float | None = None
+    """Elasto-plastic extension, None for plain LuGre; a number becomes the `ElastoPlastic` of that breakaway ratio."""
 
     def __post_init__(self) -> None:
         if self.mu_s is None:
@@ -72,7 +72,7 @@ class LuGre(FrictionLaw):
     def numbers(self) -> LawNumbers:
         """The law as the formulas see it."""
         plain = LawNumbers(self.sigma_0, self.sigma_1, self.sigma_2, self.mu_c, self.mu_s, self.v_s, self.gamma)
-        if self.elasto_plastic is None:
+        if not isinstance(self.elasto_plastic, ElastoPlastic):
             return plain
         return plain._replace(elasto_plastic=1.0, breakaway_ratio=self.elasto_plastic.breakaway_ratio)
 
