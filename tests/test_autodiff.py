@@ -539,6 +539,12 @@ def test_wrong_input_is_one_clear_line(changed, message):
         autodiff.rollout_gradient(**{**inputs, **changed})
 
 
+def test_a_roll_out_of_no_model_names_all_models():
+    message = r"model must be a friction model \(DistributedModel, ReducedModel, ReducedModelPublished\), got str"
+    with pytest.raises(InvalidValueError, match=message):
+        pf.rollout("reduced", None, np.zeros((3, 3)), 1.0, DT)
+
+
 def test_unknown_names_are_refused():
     model = model_of("ellipsoid")
     with pytest.raises(InvalidValueError, match="did you mean 'mu_s'"):

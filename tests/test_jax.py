@@ -404,6 +404,8 @@ def test_wrong_input_is_named():
         pj.rollout(model, None, np.zeros((4, 3)), 1.0, 1e-3, method="adjont")
     with pytest.raises(InvalidValueError, match="patch must be a ContactPatch"):
         pj.DistributedModel("disc", PLAIN)
+    with pytest.raises(InvalidValueError, match=r"model must be one of planarfriction.jax .* got planarfriction\.mod"):
+        pj.rollout(pairs("ellipsoid", "plain")[0], None, np.zeros((4, 3)), 1.0, 1e-3)
 
 
 def test_a_missing_package_names_its_extra(monkeypatch):

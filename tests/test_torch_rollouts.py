@@ -262,6 +262,10 @@ def test_a_gradient_to_the_time_step_is_eager():
         ({"normal_force": -1.0}, "normal_force must be >= 0"),
         ({"twist": tensor([[0.0, np.nan, 0.0]] * 4)}, "twist must be finite"),
         ({"model": DistributedModel(PATCH, LAWS["plain"]), "method": "adjoint"}, "for DistributedModel"),
+        (
+            {"model": pf.DistributedModel(PATCH, LAWS["plain"])},
+            r"model must be one of planarfriction.torch \(DistributedModel, ReducedModel, ReducedModelPublished\)",
+        ),
     ],
 )
 def test_wrong_input_is_one_line(change, message):

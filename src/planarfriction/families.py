@@ -53,6 +53,10 @@ class Family(Mapping[str, Any]):
         """What a member is, in one line."""
         return self._members[name].words
 
+    def classes(self) -> str:
+        """Names of all classes or functions, for messages."""
+        return ", ".join(make.__name__ for make in self.values())
+
     def choose(self, name: str) -> Any:
         """What makes the member `name`. Raises `InvalidValueError` that names all of them."""
         from planarfriction import validation  # brings NumPy with it, which names alone do not need

@@ -13,6 +13,7 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.autodiff.parameters import Packed, has_one_shape, pack
 from planarfriction.errors import InvalidValueError
+from planarfriction.families import MODELS
 from planarfriction.kernels.rollouts import Bars, Inputs
 from planarfriction.models import FrictionModel
 
@@ -89,6 +90,8 @@ def rollout(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, *, p
     Raises `InvalidValueError` for wrong shapes, for numbers out of range, and for `parameters` of a model that cannot
     take them.
     """
+    if not isinstance(model, FrictionModel | Packed):
+        raise InvalidValueError("model", f"be a friction model ({MODELS.classes()})", type(model).__name__)
     if parameters is None and isinstance(model, FrictionModel) and not has_one_shape(model):
         return _stepped(model, state, twist, normal_force, dt)
     inputs = _checked(model, state, twist, normal_force, dt, parameters)

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
+from planarfriction.families import MODELS
 from planarfriction.jax.base import FrictionModel
 
 METHODS = ("adjoint", "eager")
@@ -58,6 +59,10 @@ def rollout(
 
     Raises `InvalidValueError` for wrong shapes and for a method that is not possible.
     """
+    if not isinstance(model, FrictionModel):
+        kind = type(model)
+        rule = f"be one of planarfriction.jax ({MODELS.classes()})"
+        raise InvalidValueError("model", rule, f"{kind.__module__}.{kind.__name__}")
     method = "eager" if method is None else validation.choice("method", method, METHODS)
     if parameters is not None:
         model = model.replace(parameters=type(model.parameters)(*parameters))

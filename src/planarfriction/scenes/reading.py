@@ -70,7 +70,7 @@ class Section:
         """Value under `key` if it is one of `valid`, or raise an error that names the nearest valid one."""
         value, valid = self.get(key, default), list(valid)
         if value not in valid:
-            self.fail(f"{key} must be one of {', '.join(valid)}, got {value!r}{_hint(value, valid)}")
+            self.fail(f"{key} must be one of {', '.join(valid)}, got {value!r}{_near(value, valid)}")
         return value
 
     def path(self, key: str) -> Path:
@@ -99,9 +99,13 @@ class Section:
             raise (error if message.startswith(f"{self.source}: ") else self.error(message)) from None
 
 
-def _hint(value: Any, valid: Sequence[str]) -> str:
+def _near(value: Any, valid: Sequence[str]) -> str:
     near = difflib.get_close_matches(str(value), valid, n=1)
-    return f" (did you mean {near[0]!r}?)" if near else f" (valid: {', '.join(valid)})"
+    return f" (did you mean {near[0]!r}?)" if near else ""
+
+
+def _hint(value: Any, valid: Sequence[str]) -> str:
+    return _near(value, valid) or f" (valid: {', '.join(valid)})"
 
 
 def read_text(path: str | Path, kind: str) -> str:

@@ -84,7 +84,7 @@ class Contact:
         if not (isinstance(self.name, str) and self.name):
             raise InvalidValueError("name of a contact", "be a text that is not empty", self.name)
         if not (hasattr(self.model, "patch") and hasattr(self.model, "law")):
-            valid = f"be a friction model ({', '.join(make.__name__ for make in MODELS.values())})"
+            valid = f"be a friction model ({MODELS.classes()})"
             raise InvalidValueError(f"model of contact {self.name!r}", valid, self.model)
         of_contact = f"of contact {self.name!r}"
         load = as_signal(f"normal_force {of_contact}", self.normal_force, None)

@@ -9,6 +9,7 @@ from torch import Tensor
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
+from planarfriction.families import MODELS
 from planarfriction.torch import adjoint
 from planarfriction.torch.base import FrictionModel
 
@@ -47,6 +48,10 @@ def rollout(
     Raises `InvalidValueError` for wrong shapes and for a method that is not possible; the adjoint also for numbers that
     are not finite and for loads below zero.
     """
+    if not isinstance(model, FrictionModel):
+        kind = type(model)
+        rule = f"be one of planarfriction.torch ({MODELS.classes()})"
+        raise InvalidValueError("model", rule, f"{kind.__module__}.{kind.__name__}")
     if method is not None:
         validation.choice("method", method, METHODS)
     twist, load, step = model._number(twist), model._number(normal_force), model._number(dt)
