@@ -20,7 +20,7 @@ _ALONE = kernels.Cells(np.zeros(1), np.zeros(1), np.ones((1, 1)))
 
 
 def cell_numbers(patch: ContactPatch, cells: np.ndarray) -> np.ndarray:
-    """The numbers of the chosen cells, `[7, n]`, as `kernels.anisotropic` reads them."""
+    """The numbers of the chosen cells, `[7, n]`, as `kernels.anisotropic_contact` reads them."""
     levers, asymmetry = patch.levers()[cells], patch.asymmetries()[cells]
     return np.array([*(levers[:, i, j] for i, j in ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2))), *asymmetry.T])
 
