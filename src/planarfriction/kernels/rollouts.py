@@ -21,8 +21,9 @@ from typing import NamedTuple
 import numpy as np
 
 from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import inlined, kernel
+from planarfriction.kernels import inlined
 from planarfriction.kernels.law import LAW, law_of
+from planarfriction.kernels.pointers import address, at, call, doubles
 from planarfriction.kernels.vectors import accumulate, dot, put, three, times
 
 SCRATCH = 9
@@ -98,41 +99,45 @@ def _weighed(wrench, load):
 # ---------------------------------------------------------------------- steps
 
 
-@kernel
-def _step(hold, linearise, contact, z, twist, load, dt):
-    """New state and wrench."""
-    step = linearise(contact, hold(contact, twist), z, dt)
-    return step.new if load != 0.0 else (0.0, 0.0, 0.0), _weighed(step.wrench, load)
+# A step is called by its address: compiled into the code of one contact and into that of a batch, it would round
+# differently in each.
 
 
 @inlined
-def batch(shape_of, hold, linearise, row, surface, data, inputs, out):
-    """Steps of B contacts, new states and wrenches into `out` [B, 6]; `inputs`: z, V [B, 3], load, dt [B]."""
-    z, twist, load, dt = inputs
-    for b in range(z.shape[0]):
-        contact = _contact(shape_of, row, surface, data)  # here, where it rounds as for one contact
-        new, wrench = _step(hold, linearise, contact, three(z[b]), three(twist[b]), load[b], dt[b])
-        put(out[b], new)
-        put(out[b, 3:], wrench)
+def step(shape_of, hold, linearise, row, data, inputs, out):
+    """A step of one contact: `inputs` are its z, twist, load and dt [8], `out` the new state and the wrench [6].
 
-
-@inlined
-def one(shape_of, hold, linearise, numbers, data, z, twist, load, dt, result):
-    """A step of one contact: new state and wrench into `result` [6]; false for invalid inputs.
-
-    Behind law and shape `numbers` holds the three of `Contact.surface`.
+    All are addresses. Behind law and shape the row holds the three of `Contact.surface`.
     """
+    shape = shape_of(at(row, LAW))
+    last, given, out = doubles(at(row, LAW + len(shape))), doubles(inputs), doubles(out)
+    contact = Contact(law_of(row), shape, (int(last[0]), int(last[1]), int(last[2])), doubles(data))
+    z, twist, load = (given[0], given[1], given[2]), (given[3], given[4], given[5]), given[6]
+    result = linearise(contact, hold(contact, twist), z, given[7])
+    new, wrench = result.new if load != 0.0 else (0.0, 0.0, 0.0), _weighed(result.wrench, load)
+    out[0], out[1], out[2] = new
+    out[3], out[4], out[5] = wrench
+
+
+@inlined
+def batch(step_at, row, data, inputs, out):
+    """Steps of B contacts into `out` [B, 6], from `inputs` [B, 8], as in `step`, whose address is `step_at`."""
+    for b in range(inputs.shape[0]):
+        call(step_at, (row, data, address(inputs, 8 * b), address(out, 6 * b)))
+
+
+@inlined
+def one(step_at, row, data, z, twist, load, dt, result):
+    """A step of one contact: new state and wrench into the first of `result` [14]; false for invalid inputs."""
     finite = xp.is_finite(load) and xp.is_finite(dt)
     for i in range(3):
         finite = finite and xp.is_finite(z[i]) and xp.is_finite(twist[i])
     if not (finite and load > 0.0 and dt >= 0.0):
         return False
-    shape = shape_of(numbers[LAW:])
-    last = numbers[LAW + len(shape) :]
-    contact = Contact(law_of(numbers), shape, (int(last[0]), int(last[1]), int(last[2])), data)
-    new, wrench = _step(hold, linearise, contact, three(z), twist, load, dt)
-    put(result, new)
-    put(result[3:], wrench)
+    put(result[6:], three(z))
+    put(result[9:], twist)
+    result[12], result[13] = load, dt
+    call(step_at, (row, data, address(result, 6), result))
     return True
 
 

@@ -65,17 +65,17 @@ class ThreeStateModel(FrictionModel):
             and (type(twist) is not array or twist.ndim == 1)
             and self._fixed is not None
         ):  # one contact: no batch to broadcast, and the compiled step checks the numbers
-            step_one, numbers, data = self._fixed
-            result = np.empty(6)
+            kernels, (row, data), result = self._kernels, self._fixed, np.empty(14)
             try:
                 vx, vy, omega = twist
-                valid = step_one(
-                    numbers, data, state, float(vx), float(vy), float(omega), float(normal_force), float(dt), result
+                speeds = float(vx), float(vy), float(omega)
+                valid = kernels.step_one(
+                    kernels.step_address(), row, data, state, *speeds, float(normal_force), float(dt), result
                 )
             except (TypeError, ValueError):  # not numbers, or a batch: the checks below decide
                 valid = False
             if valid:
-                return result[:3], result[3:]
+                return result[:3], result[3:6]
         packed = self._by_load(self._step, (6,), *self._inputs(state, twist, normal_force, dt=dt))
         return packed[..., :3], self._out(packed[..., 3:])
 
@@ -168,12 +168,16 @@ class ThreeStateModel(FrictionModel):
         return np.array([*self.law.numbers, *shape.numbers])
 
     @functools.cached_property
-    def _fixed(self) -> tuple[Any, np.ndarray, np.ndarray] | None:
-        """The compiled step of one contact and its numbers, where the shape is fixed."""
+    def _fixed(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Numbers of the one contact, where the shape is fixed."""
         if self.patch.depends_on_load or self._axes is not None:
             return None
-        surface, data = self._maps(self._reference)
-        return self._kernels.step_one, np.array([*self._row(self._reference), *surface]), data
+        return self._contact(self._reference)
+
+    def _contact(self, shape: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Row of a contact, with the integers of its surface or maps at the end, and the numbers of these."""
+        surface, data = self._maps(shape)
+        return np.array([*self._row(shape), *surface]), data
 
     def _by_load(self, function, inner: tuple[int, ...], state, twist, load, *more) -> np.ndarray:
         """Apply `function(shape, state, twist, load, ...)` to flat batches, one for each shape that the loads take."""
@@ -210,7 +214,8 @@ class ThreeStateModel(FrictionModel):
 
     def _step(self, shape: Any, state, twist, load, dt) -> np.ndarray:
         out = np.empty((len(load), 6))
-        self._kernels.step_batch(self._row(shape), *self._maps(shape), (state, twist, load, dt), out)
+        inputs = np.concatenate([state, twist, load[:, None], dt[:, None]], axis=1)
+        self._kernels.step_batch(self._kernels.step_address(), *self._contact(shape), inputs, out)
         return out
 
     def _one_step_jacobians(self, state, twist, normal_force, dt) -> np.ndarray | None:
@@ -232,7 +237,7 @@ class ThreeStateModel(FrictionModel):
         if self._fixed is None:
             row, (surface, data) = self._row(shape), self._maps(shape)
         else:
-            _, numbers, data = self._fixed
+            numbers, data = self._fixed
             row, surface = numbers[:-3], numbers[-3:].astype(int)
         self._kernels.jacobians(row, surface, data, (state, twist, load, dt), slopes)
         return slopes[:, :, :7]
