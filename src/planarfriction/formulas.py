@@ -2,7 +2,8 @@
 
 `xp` is the namespace that supplies `exp`, `sin`, `cos`, `power`, `where`, `minimum` and `maximum`: NumPy, torch and
 jax.numpy pass themselves, compiled loops pass `planarfriction.kernels.compiled_math`. A formula is assignments and one
-return; it has no loop and no branch. Symbols as in Waltersson and Karayiannidis 2024 ("the paper").
+return; it has no loop and no branch. Symbols as in Waltersson and Karayiannidis 2024, sections III and IV; each formula
+names the section of docs/physics.md, or the page of docs, where it stands and comes from.
 
 A bristle is a vector `z` driven by a velocity `u`, of any dimension: two for a cell of the distributed model
 (`u = v`), three for the reduced model (`u = h(V) v_n`). The formulas see only norms and projections:
@@ -42,7 +43,7 @@ class LawNumbers(NamedTuple):
 
 
 def stribeck(xp, speed, law):
-    """Friction coefficient in steady sliding, `g = mu_c + (mu_s - mu_c) exp(-|v/v_s|^gamma)` [-]."""
+    """Friction coefficient in steady sliding, `g = mu_c + (mu_s - mu_c) exp(-|v/v_s|^gamma)` [-] ("Bristles")."""
     return law.mu_c + (law.mu_s - law.mu_c) * xp.exp(-xp.power(speed * (1.0 / law.v_s), law.gamma))
 
 
@@ -59,7 +60,7 @@ def slip_fraction(xp, deflection, breakaway_ratio):
     """Elasto-plastic `alpha` [-] of the relative deflection `|z|/z_max`: 0 below breakaway, 1 at full deflection.
 
     `1/2 + 1/2 sin(pi (share - 1/2)) = sin^2(pi share/2)` of the share of the way from breakaway to full deflection: in
-    this form exactly zero below breakaway, so that rounding cannot creep.
+    this form exactly zero below breakaway, so that rounding cannot creep. ("Bristles")
     """
     share = (deflection - breakaway_ratio) * (1.0 / (1.0 - breakaway_ratio))
     root = xp.sin(0.5 * math.pi * xp.minimum(xp.maximum(share, 0.0), 1.0))
@@ -77,7 +78,7 @@ def bristle_decay(xp, deflection, along, speed, grip, law):
     """Rate `k = beta |v| sigma_0 / g` [1/s] of `zdot = u - k z`.
 
     `beta |v| = alpha (|v| + z.v/|z|) / 2` for elasto-plastic bristles, `|v| + v_c` for plain ones (LuGre: v_c = 0);
-    `deflection = |z|/z_max`, `grip = sigma_0 / g` [1/m].
+    `deflection = |z|/z_max`, `grip = sigma_0 / g` [1/m]. ("Bristles")
     """
     alpha = slip_fraction(xp, deflection, law.breakaway_ratio)
     return xp.where(law.elasto_plastic > 0.0, 0.5 * alpha * (speed + along), speed + law.creep_speed) * grip
@@ -95,7 +96,7 @@ def bristle_decay_partials(xp, deflection, along, speed, grip, law):
 
 
 def traction(z, zdot, velocity, law):
-    """Friction per unit normal load on the moving body, `-(sigma_0 z + sigma_1 zdot + sigma_2 v)`, per component."""
+    """Friction per unit normal load on the moving body, `-(sigma_0 z + sigma_1 zdot + sigma_2 v)` ("Bristles")."""
     return -(law.sigma_0 * z + law.sigma_1 * zdot + law.sigma_2 * velocity)
 
 
@@ -104,7 +105,7 @@ def mean_decay(start, end, dt):
 
     Half and half for short steps (second order), all on the end for steps much longer than the bristle's memory,
     whose result is then the steady state of k at the end; the share of the start, `1/(2 + x + x^2)` of `x = k dt`,
-    leads over.
+    leads over. ("A step at a held twist")
     """
     x = 0.5 * (start + end) * dt
     return end + (start - end) / (2.0 + x + x * x)
@@ -116,7 +117,7 @@ def relaxation(xp, decay_dt):
     `z(dt) = exp(-x) z + (1 - exp(-x))/x u dt`. Plain LuGre has a constant k and this is its step. Elasto-plastic
     bristles take `mean_decay` of k at the start and at a predicted end, `z_p = (z + u dt)/(1 + k dt)`: second order,
     stable at any dt. Below `x = 1e-3` the quotient is its series, exact to 1e-16 there, where the difference would
-    cancel.
+    cancel. ("A step at a held twist")
     """
     remaining = xp.exp(-decay_dt)
     safe = xp.where(decay_dt > 1e-3, decay_dt, 1.0)
@@ -128,7 +129,7 @@ def reachable_deflection(xp, deflection, law):
     """Largest `|z|/z_max` that a step may end with: an elasto-plastic bristle never grows past `max(|z|, z_max)`.
 
     The exact solution stays in that ball, so bringing a step back onto it cannot enlarge the error. Plain LuGre needs
-    no bound: its step is exact.
+    no bound: its step is exact. ("A step at a held twist")
     """
     return xp.where(law.elasto_plastic > 0.0, xp.maximum(deflection, 1.0), math.inf)
 
@@ -147,7 +148,8 @@ def slip_share(xp, deflection, cosine, evenness, law):
 
     `alpha (1 + cos)/2` for elasto-plastic bristles, 1 for plain LuGre: that of a single bristle, but for an earlier
     breakaway `s_ba evenness`. `evenness = <v^2>/sqrt(<v^4>)`, over the cells' speeds, is 1 in translation; the less
-    even, the further the fastest cells are ahead of the mean and the earlier they slip.
+    even, the further the fastest cells are ahead of the mean and the earlier they slip. ("Reduced model";
+    docs/reduced-model.md, "What was tried for breakaway")
     """
     alpha = slip_fraction(xp, deflection, law.breakaway_ratio * evenness)
     return xp.where(law.elasto_plastic > 0.0, 0.5 * alpha * (1.0 + cosine), 1.0)
@@ -169,7 +171,10 @@ def slip_share_partials(xp, deflection, cosine, evenness, law):
 
 
 def floored(xp, value, least):
-    """`value` where it is at least `2 least`, and from there smoothly to `least`: `least (1 + (value/2 least)^2)`."""
+    """`value` where it is at least `2 least`, and from there smoothly to `least`: `least (1 + (value/2 least)^2)`.
+
+    Keeps the dissipation of a stored steady state above zero. ("Reduced model")
+    """
     share = xp.maximum(value, 0.0) * (0.5 / least)
     return xp.where(share < 1.0, least * (1.0 + share * share), value)
 
@@ -185,7 +190,7 @@ def floored_by_least(xp, value, least):
     return 1.0 - slope * slope
 
 
-# ---------------------------------------------------------------------- derivatives of a step
+# ---------------------------------------------------------------------- derivatives of a step (docs/differentiable.md)
 
 
 def stribeck_partials(xp, speed, law):

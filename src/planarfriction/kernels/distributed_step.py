@@ -1,6 +1,7 @@
 """The step of the distributed model and its derivatives, cell by cell, per unit normal load.
 
-Twists and wrenches are about the contact frame's origin; see `bristle_step` for the step of a bristle.
+Twists and wrenches are about the contact frame's origin; see `bristle_step` for the step of a bristle and
+docs/physics.md, "Distributed model".
 """
 
 from __future__ import annotations

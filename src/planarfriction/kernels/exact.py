@@ -1,5 +1,7 @@
 """Closed forms of `Phi(V) = int |v|` over segments, triangles, rectangles and rings: gradient and second derivatives.
 
+Derived in docs/physics.md, "Exact limit surfaces".
+
 `V = (x, y, s)` at the centre of pressure in any scale of lengths; the velocity of a place p is
 `v = (x - s py, y + s px) = s J d`, `d = p - c`, with the centre of rotation `c = (-y, x)/s` and J a quarter turn. So
 three integrals suffice,
@@ -22,6 +24,7 @@ import numpy as np
 
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import inlined, jit, kernel
+from planarfriction.kernels.vectors import accumulate
 
 POINTS, SEGMENTS, QUADS = 1, 2, 4
 """Kinds of elements by their number of corners; a triangle is a quad with two corners in one place."""
@@ -140,19 +143,6 @@ def _far(block, tier, count, rules, points, x, y, s):
 
 
 @kernel
-def _add(sums, m, part):
-    sums[m, 0] += part[0]
-    sums[m, 1] += part[1]
-    sums[m, 2] += part[2]
-    sums[m, 3] += part[3]
-    sums[m, 4] += part[4]
-    sums[m, 5] += part[5]
-    sums[m, 6] += part[6]
-    sums[m, 7] += part[7]
-    sums[m, 8] += part[8]
-
-
-@kernel
 def _tier(reach, speed, size):
     """Which Gauss rule serves an element; -1 for the closed form."""
     tier = -1
@@ -188,13 +178,13 @@ def element_sums(corners, shape, rules, points, reach, twist, sums):
             else:
                 tier = _tier(reach, speed, abs(s) * shape[i, 11])
             if tier < 0:
-                _add(sums, m, _near(corners, i, count, shape[i, 12], s, -y / s, x / s))
+                accumulate(sums[m], 0, 1, _near(corners, i, count, shape[i, 12], s, -y / s, x / s))
             else:
                 for k in range(11):
                     block[tier, k, held[tier]] = shape[i, k]
                 held[tier] += 1
         for tier in range(tiers):
-            _add(sums, m, _far(block, tier, held[tier], rules, points[tier], x, y, s))
+            accumulate(sums[m], 0, 1, _far(block, tier, held[tier], rules, points[tier], x, y, s))
 
 
 @kernel

@@ -16,7 +16,7 @@ from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import inlined, jit, kernel
 from planarfriction.kernels.law import LAW, LawNumbers
 from planarfriction.kernels.published_contact import Shape
-from planarfriction.kernels.published_step import NAMES, Held, linearise, pull_back
+from planarfriction.kernels.published_step import NAMES, Held, linearise, pull_back, scaled_twist
 from planarfriction.kernels.rollouts import Contact, row_of
 from planarfriction.kernels.surfaces import (
     BILINEAR,
@@ -27,7 +27,7 @@ from planarfriction.kernels.surfaces import (
     sliding,
     sliding_jacobian,
 )
-from planarfriction.kernels.vectors import accumulate, dot, gathered, norm, times
+from planarfriction.kernels.vectors import accumulate, dot, gathered, norm, three, times
 
 LANES = 8
 SLOTS = 128
@@ -236,10 +236,9 @@ def _read(w, own, inputs, first, lanes, begin, end):
         shape = _contact(own, c).shape
         twists, loads = inputs.twist[row_of(inputs.twist, first + c)], inputs.load[row_of(inputs.load, first + c)]
         for t in range(begin, end):
-            i, omega = (t - begin) * lanes + c, twists[t, 2]
-            x, y = twists[t, 0] - omega * shape.centre_y, twists[t, 1] + omega * shape.centre_x
-            _put(w, _TWIST, i, (x, y, shape.contact_radius * omega))
-            w[_OMEGA + i], w[_LOAD + i] = omega, loads[t]
+            i, twist = (t - begin) * lanes + c, three(twists[t])
+            _put(w, _TWIST, i, scaled_twist(shape, twist))
+            w[_OMEGA + i], w[_LOAD + i] = twist[2], loads[t]
 
 
 @kernel

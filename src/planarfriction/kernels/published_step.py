@@ -1,8 +1,8 @@
 """The step of the published reduced model with its derivatives, and what is bound to it (see `rollouts`).
 
 In scaled coordinates, `V_S = S V` at the centre of pressure with `S = diag(1, 1, r)`, the bristle `S^-1 z` steps as in
-`bristle_step`, driven by `u = h(V) |V_S|` with `h = |u|/|V_S|` (docs/physics.md, "Reduced model"). With cotangents W'
-of the wrench and z' of the new state, one step backwards is
+`bristle_step`, driven by `u = h(V) |V_S|` with `h = |u|/|V_S|` (docs/physics.md, "The published reduced model"). With
+cotangents W' of the wrench and z' of the new state, one step backwards is
 
     t = -((sigma_0 - sigma_1 k) n + sigma_1 u),   n' = -(sigma_0 - sigma_1 k) F + S z',   k' = sigma_1 F . n
 
@@ -63,14 +63,19 @@ class Step(NamedTuple):
 
 
 @inlined
+def scaled_twist(shape, twist):
+    """`V_S`"""
+    vx, vy, omega = twist
+    return vx - omega * shape.centre_y, vy + omega * shape.centre_x, shape.contact_radius * omega
+
+
+@inlined
 def hold(contact, twist):
     """`Held` at a twist."""
-    shape, surface = contact.shape, contact.surface
-    vx, vy, omega = twist
-    scaled = vx - omega * shape.centre_y, vy + omega * shape.centre_x, shape.contact_radius * omega
+    surface, scaled = contact.surface, scaled_twist(contact.shape, twist)
     v = norm(scaled)
     u = sliding(surface[0], contact.data, surface[1], surface[2], scaled[0], scaled[1], scaled[2], v)
-    return Held(scaled, omega, v, u)
+    return Held(scaled, twist[2], v, u)
 
 
 @inlined

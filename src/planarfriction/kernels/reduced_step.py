@@ -1,6 +1,6 @@
 """The step of the reduced model with its derivatives, and what is bound to it (see `rollouts`).
 
-With `beta` held the equation of the moments z (docs/reduced-model.md) is linear, its matrix
+With `beta` held the equation of the moments z (docs/physics.md, "Reduced model") is linear, its matrix
 `lambda I + m (x) z_ss/|z_ss|^2`, and the step is its exponential: of s with the rate `mu = lambda cos^2(V_G, z_ss)` and
 of the rest with lambda. Plain LuGre is exact; elasto-plastic moments take the mean of beta at the start and at an end
 predicted by an implicit Euler step, which is second order.

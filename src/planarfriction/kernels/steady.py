@@ -1,4 +1,4 @@
-"""Steady sliding of a patch from a stored map, in scaled coordinates `V_G = F V` (see `kernels.reduced`).
+"""Steady sliding of a patch from a stored map, in scaled coordinates `V_G = F V` (docs/physics.md, "Reduced model").
 
 A map is eight numbers (faces, n, n of the Stribeck part, its levels, knee, least dissipation, 0, 0), the matrix K
 [6, 6] of `<v^4> = m' K m` with `m = (x^2, y^2, s^2, x y, x s, y s)` of V_G, then two maps of `kernels.cube`: `h_0`,

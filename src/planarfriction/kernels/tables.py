@@ -1,4 +1,7 @@
-"""Nodes of the published table: sums over the cells at many centres of rotation."""
+"""Nodes of the published table: sums over the cells at many centres of rotation.
+
+See docs/physics.md, "The published table, to the letter".
+"""
 
 from __future__ import annotations
 
