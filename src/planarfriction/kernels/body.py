@@ -25,7 +25,7 @@ from planarfriction.kernels.contacts import (
     contact_map_slopes,
 )
 from planarfriction.kernels.pointers import address_of, at, call, doubles, integers, place_of
-from planarfriction.kernels.records import reader, row_of
+from planarfriction.kernels.records import addresses_in, reader, row_of
 
 
 class Motion(NamedTuple):
@@ -80,51 +80,17 @@ class Work(NamedTuple):
     """Twist and wrench of one contact and their changes, [4, 3] (see `contacts.ModelFunctions`)."""
 
 
-class SystemRecord(NamedTuple):
-    """A body on its contacts as compiled functions read it: fields of `Contacts`, `Motion` and `Work` by address."""
-
-    contacts: int
-    """How many."""
-    bristles: int
-    """States before those of the body."""
-    calls: int
-    record: int
-    mount: int
-    place: int
-    count: int
-    state: int
-    linear: int
-    inverse_mass: int
-    breaks: int
-    pieces: int
-    """How many."""
-    load: int
-    force: int
-    velocity: int
-    """0 for a free body."""
-    acceleration: int
-    row: int
-    body_axes: int
-    stop_speed: float
-    stop_radius: float
-    stop_time: float
-    workspace: int
-    """Where the linearisations are."""
-    maps: int
-    wrench: int
-    twist: int
-    stiffness: int
-    matrix: int
-    inverse: int
-    to_pose: int
-    body: int
-    rows: int
-    rates: int
-    """The functions of this module."""
-    linearise: int
-    factor: int
-    solve: int
-
+SystemRecord = NamedTuple(
+    "SystemRecord",
+    [
+        *((name, int) for name in ("contacts", "bristles", "pieces", "body_axes")),
+        *((name, float) for name in ("stop_speed", "stop_radius", "stop_time")),
+        *((name, int) for name in addresses_in(Contacts, Motion, Work)),
+        *((name, int) for name in ("rates", "linearise", "factor", "solve")),
+    ],
+)
+"""A body on its contacts as compiled functions read it: numbers, arrays by their addresses (0: a body is not driven by
+a velocity), and the functions of this module."""
 
 read = reader(SystemRecord)
 

@@ -9,7 +9,7 @@ import numpy as np
 from planarfriction.kernels import entry, kernel
 from planarfriction.kernels.body import System
 from planarfriction.kernels.pointers import address_of, doubles, matrix, place_of, vector
-from planarfriction.kernels.records import reader, row_of
+from planarfriction.kernels.records import addresses_in, reader, row_of
 
 
 class Method(NamedTuple):
@@ -105,49 +105,18 @@ def combine(coefficients, stages, count, n, base, out):
             out[i] += a * first[i] + b * second[i]
 
 
-class RunRecord(NamedTuple):
-    """An integration as compiled code reads it: the arrays of the records above by address, and their sizes."""
+_SIZES = ("system", "states", "contacts", "order_of_dense", "stage_count", "samples", "bristle_samples", "combine")
 
-    system: int
-    states: int
-    contacts: int
-    order_of_dense: int
-    stage_count: int
-    samples: int
-    bristle_samples: int
-    gamma: float
-    order: float
-    rtol: float
-    atol: int
-    a: int
-    c: int
-    m: int
-    e: int
-    alpha: int
-    time_gamma: int
-    dense: int
-    time: int
-    body: int
-    wrench: int
-    load: int
-    bristles: int
-    y: int
-    cursor: int
-    clock: int
-    statistics: int
-    k: int
-    rate: int
-    start_rate: int
-    right: int
-    argument: int
-    new: int
-    error: int
-    zero: int
-    time_slope: int
-    coupling: int
-    combine: int
-    """The function of this module."""
-
+RunRecord = NamedTuple(
+    "RunRecord",
+    [
+        *((name, int) for name in _SIZES),
+        *((name, float) for name in ("gamma", "order", "rtol")),
+        *((name, int) for name in addresses_in(Method, Output, Progress, Stages)),
+        ("atol", int),
+    ],
+)
+"""An integration as compiled code reads it: its system, sizes, numbers, and its arrays by their addresses."""
 
 read_run = reader(RunRecord)
 

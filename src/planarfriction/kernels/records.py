@@ -19,6 +19,11 @@ def _fields(record: Any) -> Iterator[tuple[str, Any]]:
     return iter(typing.get_type_hints(record).items())
 
 
+def addresses_in(*records: Any) -> list[str]:
+    """Names of the fields that hold arrays, which compiled code reads by their addresses."""
+    return [name for record in records for name, kind in _fields(record) if kind is np.ndarray]
+
+
 def size_of(record: Any) -> int:
     """How many words a record takes."""
     return sum(size_of(kind) if hasattr(kind, "_fields") else 1 for _, kind in _fields(record))
