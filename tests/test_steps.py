@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+import pickle
 
 import numpy as np
 import pytest
@@ -379,3 +380,14 @@ def test_a_reduced_soft_finger_needs_more_than_one_loaded_cell():
         soft().step(np.zeros(3), TWIST, 1e-6, 1e-3)
     _, wrench = pf.DistributedModel(FINGER, PLAIN).step(np.zeros((2, FINGER.cells)), TWIST, 1e-6, 1.0)
     assert math.isfinite(wrench[2])
+
+
+@pytest.mark.parametrize("model_type", [pf.ReducedModel, pf.ReducedModelPublished])
+def test_a_model_takes_no_addresses_to_another_process(model_type):
+    model = model_type(pf.ContactPatch.disc(0.01, cells=9), pf.LuGre())
+    state, twist = model.rest(), (0.01, 0.0, 1.0)
+    expected = model.step(state, twist, 2.0, 1e-3)
+    model.rate(state, twist, 2.0)
+    copy = pickle.loads(pickle.dumps(model))
+    assert not {"_fixed", "_fixed_record"} & set(vars(copy))
+    np.testing.assert_array_equal(copy.step(state, twist, 2.0, 1e-3), expected)

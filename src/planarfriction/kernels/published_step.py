@@ -159,18 +159,6 @@ def step_address() -> int:
 
 
 @jit
-def step_batch(step_at, row, data, inputs, out):
-    """See `rollouts.batch`."""
-    rollouts.batch(step_at, row, data, inputs, out)
-
-
-@jit
-def step_one(step_at, row, data, z, vx, vy, omega, load, dt, result):
-    """See `rollouts.one`; every argument costs a quarter of a microsecond on the way in."""
-    return rollouts.one(step_at, row, data, z, (vx, vy, omega), load, dt, result)
-
-
-@jit
 def jacobians(row, surface, data, inputs, out):
     """See `rollouts.jacobians`."""
     work = np.empty(rollouts.SCRATCH)

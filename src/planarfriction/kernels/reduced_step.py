@@ -303,18 +303,6 @@ def step_address() -> int:
 
 
 @jit
-def step_batch(step_at, row, data, inputs, out):
-    """See `rollouts.batch`."""
-    rollouts.batch(step_at, row, data, inputs, out)
-
-
-@jit
-def step_one(step_at, row, data, z, vx, vy, omega, load, dt, result):
-    """See `rollouts.one`; every argument costs a quarter of a microsecond on the way in."""
-    return rollouts.one(step_at, row, data, z, (vx, vy, omega), load, dt, result)
-
-
-@jit
 def rollout(inputs, span, z, wrench, states):
     """See `rollouts.roll`."""
     rollouts.roll(shape_of, hold, linearise, inputs, span, z, wrench, states)

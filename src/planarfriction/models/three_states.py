@@ -11,6 +11,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from planarfriction.geometry import transformed
+from planarfriction.kernels.pointers import place_of
+from planarfriction.kernels.rollouts import step_batch, step_one
 from planarfriction.models.base import FrictionModel, ModelJacobians, PackedModel, StepJacobians
 from planarfriction.models.rates import linearised, rates
 
@@ -65,12 +67,11 @@ class ThreeStateModel(FrictionModel):
             and (type(twist) is not array or twist.ndim == 1)
             and self._fixed is not None
         ):  # one contact: no batch to broadcast, and the compiled step checks the numbers
-            kernels, (row, data), result = self._kernels, self._fixed, np.empty(14)
+            places, result = self._fixed[0], np.empty(14)
             try:
                 vx, vy, omega = twist
-                speeds = float(vx), float(vy), float(omega)
-                valid = kernels.step_one(
-                    kernels.step_address(), row, data, state, *speeds, float(normal_force), float(dt), result
+                valid = step_one(
+                    places, state, float(vx), float(vy), float(omega), float(normal_force), float(dt), result
                 )
             except (TypeError, ValueError):  # not numbers, or a batch: the checks below decide
                 valid = False
@@ -168,16 +169,24 @@ class ThreeStateModel(FrictionModel):
         return np.array([*self.law.numbers, *shape.numbers])
 
     @functools.cached_property
-    def _fixed(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Numbers of the one contact, where the shape is fixed."""
+    def _fixed(self) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
+        """`_contact`, where the shape is fixed."""
         if self.patch.depends_on_load or self._axes is not None:
             return None
         return self._contact(self._reference)
 
-    def _contact(self, shape: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Row of a contact, with the integers of its surface or maps at the end, and the numbers of these."""
+    def _contact(self, shape: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Addresses for `kernels.rollouts.step_one`, and what they point to, which has to be kept.
+
+        That is the row of a contact, with the integers of its surface or maps at the end, and the numbers of these.
+        """
         surface, data = self._maps(shape)
-        return np.array([*self._row(shape), *surface]), data
+        row, data = np.array([*self._row(shape), *surface]), np.ascontiguousarray(data, dtype=float)
+        return np.array([self._kernels.step_address(), place_of(row), place_of(data)]), row, data
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy or another process gets: all but addresses, which hold here alone."""
+        return {name: value for name, value in self.__dict__.items() if name not in ("_fixed", "_fixed_record")}
 
     def _by_load(self, function, inner: tuple[int, ...], state, twist, load, *more) -> np.ndarray:
         """Apply `function(shape, state, twist, load, ...)` to flat batches, one for each shape that the loads take."""
@@ -215,7 +224,8 @@ class ThreeStateModel(FrictionModel):
     def _step(self, shape: Any, state, twist, load, dt) -> np.ndarray:
         out = np.empty((len(load), 6))
         inputs = np.concatenate([state, twist, load[:, None], dt[:, None]], axis=1)
-        self._kernels.step_batch(self._kernels.step_address(), *self._contact(shape), inputs, out)
+        contact = self._contact(shape)  # kept until the call is over
+        step_batch(contact[0], inputs, out)
         return out
 
     def _one_step_jacobians(self, state, twist, normal_force, dt) -> np.ndarray | None:
@@ -237,7 +247,7 @@ class ThreeStateModel(FrictionModel):
         if self._fixed is None:
             row, (surface, data) = self._row(shape), self._maps(shape)
         else:
-            numbers, data = self._fixed
+            _, numbers, data = self._fixed
             row, surface = numbers[:-3], numbers[-3:].astype(int)
         self._kernels.jacobians(row, surface, data, (state, twist, load, dt), slopes)
         return slopes[:, :, :7]
