@@ -31,8 +31,6 @@ _INNER = {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 kernel: Any = functools.partial(njit, forceinline=True, **_INNER, **_OPTIONS)
 """Compile an inner function into each of its callers: no allocation, no array assignments that might need a copy."""
 
-inlined = kernel
-
 entry: Any = functools.partial(njit, cache=True, **_INNER, **_OPTIONS)
 """Compile a function that compiled code calls by its address (see `kernels.pointers`)."""
 

@@ -22,7 +22,7 @@ from typing import NamedTuple
 
 from planarfriction import formulas
 from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import inlined
+from planarfriction.kernels import kernel
 from planarfriction.kernels.vectors import dot, norm, plus, times
 
 ROUNDING = 1.0 + 256.0 * 2.220446049250313e-16
@@ -111,7 +111,7 @@ class BristleBars(NamedTuple):
     breakaway: float
 
 
-@inlined
+@kernel
 def _place(z, u, per_h):
     size = norm(z)
     per_norm = 1.0 / xp.where(size > 0.0, size, math.inf)
@@ -119,7 +119,7 @@ def _place(z, u, per_h):
     return Place(unit, size, per_norm, per_h * dot(unit, u))
 
 
-@inlined
+@kernel
 def _stage(law, place, deflection, v, q):
     k, k_deflection, k_along, k_speed = formulas.bristle_decay_partials(xp, deflection, place.along, v, q, law)
     # exactly zero at full deflection: the prediction multiplies it by how far it would have gone, 1e9 in a long step
@@ -128,7 +128,7 @@ def _stage(law, place, deflection, v, q):
     return Stage(place, k, k_deflection, k_along, k_speed, k / q, k_breakaway)
 
 
-@inlined
+@kernel
 def predict(law, bristle, dt):
     """The mean decay over a step, from its values at the start and at a predicted end."""
     z, u, v, per_h, q = bristle
@@ -145,7 +145,7 @@ def predict(law, bristle, dt):
     return Prediction(start, end, shrink, reached, formulas.mean_decay(start.k, end.k, dt) * dt, by_start, by_end)
 
 
-@inlined
+@kernel
 def finish(law, bristle, dt, decay_dt):
     """The step itself, from the mean decay."""
     z, u, v, per_h, q = bristle
@@ -161,21 +161,21 @@ def finish(law, bristle, dt, decay_dt):
     return End(times(back, free), stage, left, mean, mean_slope, back, capped, deflection >= 1.0)
 
 
-@inlined
+@kernel
 def linearise(law, bristle, dt):
     """Step the bristle and keep the partial derivatives."""
     prediction = predict(law, bristle, dt)
     return BristleStep(bristle, dt, prediction, finish(law, bristle, dt, prediction.decay_dt))
 
 
-@inlined
+@kernel
 def _turn(place, norm_bar, along_bar, u, per_h):
     """Cotangent of a bristle from those of its norm and of its `along`."""
     c = along_bar * place.per_norm
     return plus(times(norm_bar - c * place.along, place.unit), c * per_h, u)
 
 
-@inlined
+@kernel
 def pull_back(s, new_bar, k_bar):
     """`BristleBars` from the cotangents of the new bristle and of its `k`."""
     (z, u, _, per_h, q), dt, prediction, last = s

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import inlined, jit, kernel
+from planarfriction.kernels import jit, kernel
 
 DEPTH = 6
 """How often a cell at the centre of rotation is halved: its last parts hold 1/4096 of its load (of a segment 1/64)."""
@@ -63,7 +63,7 @@ def _flush(count, points, exponents, gamma, out):
         out[k + 1, 2] += o_s
 
 
-@inlined
+@kernel
 def _cut(stack, top, x, y, ax, ay, bx, by, weight, level, parts):
     """Replace a cell by its halves: four of a parallelogram, two of a segment."""
     for p in range(parts):

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from planarfriction.kernels import inlined
+from planarfriction.kernels import kernel
 from planarfriction.kernels.four import four_nodes, four_nodes_levels
 
 
@@ -44,7 +44,7 @@ class Square(NamedTuple):
     w11: tuple
 
 
-@inlined
+@kernel
 def locate(x, y, s, faces):
     """`Spot` of a direction; not all of it may be zero."""
     ax, ay, a_s = abs(x), abs(y), abs(s)
@@ -62,7 +62,7 @@ def locate(x, y, s, faces):
     return Spot(axis, axis + 3 if far else axis, 1.0, first * size, second * size, size, per)
 
 
-@inlined
+@kernel
 def _cell(a, n):
     """Which of the `2 n` intervals holds `a`, and how far along."""
     u = (a + 1.0) * n
@@ -70,20 +70,20 @@ def _cell(a, n):
     return i, u - i
 
 
-@inlined
+@kernel
 def _values(u):
     """Cubic Hermite: weights of the values and slopes at both ends."""
     v = 1.0 - u
     return v * v * (1.0 + 2.0 * u), u * u * (3.0 - 2.0 * u), u * v * v, -u * u * v
 
 
-@inlined
+@kernel
 def _slopes(u, n):
     """Their derivatives by the coordinate of the face."""
     return 6.0 * u * (u - 1.0) * n, 6.0 * u * (1.0 - u) * n, (1.0 - u) * (1.0 - 3.0 * u) * n, u * (3.0 * u - 2.0) * n
 
 
-@inlined
+@kernel
 def _square(face, i, j, n, a, b):
     at = (face * (2 * n + 1) + i) * (2 * n + 1) + j
     return Square(
@@ -95,7 +95,7 @@ def _square(face, i, j, n, a, b):
     )
 
 
-@inlined
+@kernel
 def square(spot, n):
     """Weights that read the value."""
     i, u = _cell(spot.a, n)
@@ -103,7 +103,7 @@ def square(spot, n):
     return _square(spot.face, i, j, n, _values(u), _values(v))
 
 
-@inlined
+@kernel
 def squares(spot, n):
     """Weights that read the value, its slope by `a` and that by `b`."""
     i, u = _cell(spot.a, n)
@@ -116,7 +116,7 @@ def squares(spot, n):
     )
 
 
-@inlined
+@kernel
 def levels(t, count):
     """First of the four levels around `t` in [0, 1] of `count`, and their weights: a uniform cubic B-spline."""
     u = t * (count - 3)
@@ -132,7 +132,7 @@ def levels(t, count):
     )
 
 
-@inlined
+@kernel
 def level_slopes(t, count):
     """Derivatives of the weights of `levels` by t."""
     u = t * (count - 3)
@@ -141,7 +141,7 @@ def level_slopes(t, count):
     return -v * v * c, u * (3.0 * u - 4.0) * c, v * (4.0 - 3.0 * v) * c, u * u * c
 
 
-@inlined
+@kernel
 def read(data, start, n, components, m, q):
     """Component m of a map of one level."""
     node = 4 * components
@@ -149,7 +149,7 @@ def read(data, start, n, components, m, q):
     return four_nodes(data, at, node, row, q.w00, q.w01, q.w10, q.w11)
 
 
-@inlined
+@kernel
 def read_level(data, start, n, components, count, m, q, level, t):
     """Component m of a map of `count` levels, at the four levels from `level` with weights `t`."""
     step = 4 * components
@@ -158,7 +158,7 @@ def read_level(data, start, n, components, count, m, q, level, t):
     return four_nodes_levels(data, at, node, row, step, t, q.w00, q.w01, q.w10, q.w11)
 
 
-@inlined
+@kernel
 def gradient(spot, by_a, by_b):
     """The gradient by the direction's components, from the slopes on the face."""
     largest, first, second = -(spot.a * by_a + spot.b * by_b) * spot.by_axis, by_a * spot.by_side, by_b * spot.by_side

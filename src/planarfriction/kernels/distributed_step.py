@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planarfriction import formulas
-from planarfriction.kernels import bristle_step, inlined, jit, kernel
+from planarfriction.kernels import bristle_step, jit, kernel
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels.bristle_step import Bristle
 from planarfriction.kernels.law import grip, grip_slope, squared
@@ -44,21 +44,21 @@ class CellJacobians(NamedTuple):
     """[B, 3]"""
 
 
-@inlined
+@kernel
 def _bristle(law, z, u):
     """A cell's bristle at the beginning of a step."""
     speed = norm(u)
     return Bristle(z, u, speed, 1.0, grip(law, speed))
 
 
-@inlined
+@kernel
 def _traction(law, u, end):
     """Traction of a cell at the end of its step, per unit load."""
     rate = plus(u, -end.stage.k, end.new)
     return formulas.traction(end.new[0], rate[0], u[0], law), formulas.traction(end.new[1], rate[1], u[1], law)
 
 
-@inlined
+@kernel
 def _step(law, z, twist, x, y, w, dt, out):
     n = x.shape[0]
     zx, zy, ox, oy = z[:n], z[n:], out[:n], out[n:]
@@ -113,7 +113,7 @@ def step_sequence(law, z, twist, cells, load, dt, out, wrench):
             z[i] = out[i]
 
 
-@inlined
+@kernel
 def _pull_back(law, step, new_bar, k_bar):
     """Cotangents of `z` and of the cell's velocity from those of the new bristle and of its decay."""
     bar, (_, u, speed, _, q) = bristle_step.pull_back(step, new_bar, k_bar), step.bristle

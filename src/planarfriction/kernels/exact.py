@@ -23,7 +23,7 @@ import math
 import numpy as np
 
 from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import inlined, jit, kernel
+from planarfriction.kernels import jit, kernel
 from planarfriction.kernels.vectors import accumulate
 
 POINTS, SEGMENTS, QUADS = 1, 2, 4
@@ -40,7 +40,7 @@ _TINY = 1e-150
 _AT_REST = 1e-14
 
 
-@inlined
+@kernel
 def _segment(ax, ay, bx, by):
     """Height h of the origin over the line from a to b (> 0 to the left), and f, G, M of the segment.
 
@@ -76,7 +76,7 @@ def _segment(ax, ay, bx, by):
     return h, f, gx, gy, mxx, mxy, myy
 
 
-@inlined
+@kernel
 def _to_twist(density, s, cx, cy, f, gx, gy, mxx, mxy, myy):
     """Gradient (3) and second derivatives (xx, xy, xs, yy, ys, ss) with respect to the twist, from f, G and M."""
     signed = xp.where(s < 0.0, -density, density)

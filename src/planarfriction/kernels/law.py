@@ -5,7 +5,7 @@ from __future__ import annotations
 from planarfriction import formulas
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import inlined
+from planarfriction.kernels import kernel
 from planarfriction.kernels.records import reader
 
 LAW = len(LawNumbers._fields)
@@ -15,7 +15,7 @@ law_of = reader(LawNumbers)
 """Read a law from the beginning of a row."""
 
 
-@inlined
+@kernel
 def squared(law):
     """The law with the exponent 2 as a constant: the compiler then drops the general power from a loop."""
     return LawNumbers(
@@ -24,13 +24,13 @@ def squared(law):
     )  # fmt: skip
 
 
-@inlined
+@kernel
 def grip(law, speed):
     """`sigma_0/g(v)` [1/m]: one over the steady deflection of a bristle."""
     return law.sigma_0 / formulas.stribeck(xp, speed, law)
 
 
-@inlined
+@kernel
 def grip_slope(law, speed, grip):
     """Derivative of `sigma_0/g(v)` with respect to the speed [s/m^2]."""
     return -grip * grip * (1.0 / law.sigma_0) * formulas.stribeck_slope(xp, speed, law)

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import inlined, jit, kernel
+from planarfriction.kernels import jit, kernel
 from planarfriction.kernels.law import LAW, LawNumbers
 from planarfriction.kernels.published_contact import Shape
 from planarfriction.kernels.published_step import NAMES, Held, linearise, pull_back, scaled_twist
@@ -42,12 +42,12 @@ _TWIST, _SLIDING, _SLOPES, _OMEGA, _LOAD, _WRENCH, _STATE, _TWIST_BAR, _LOAD_BAR
 _ROW, _ROW_BAR, _CARRY, _OWN = (LANES * n for n in (0, _NUMBERS, 2 * _NUMBERS, 2 * _NUMBERS + 3))
 
 
-@inlined
+@kernel
 def _slot(w, field, i):
     return w[field + i], w[field + SLOTS + i], w[field + 2 * SLOTS + i]
 
 
-@inlined
+@kernel
 def _put(w, field, i, a):
     w[field + i], w[field + SLOTS + i], w[field + 2 * SLOTS + i] = a
 
@@ -79,13 +79,13 @@ def _corners(w, count, data, start, size):
             w[at + 2 * SLOTS], w[at + 3 * SLOTS] = data[p + c + row], data[p + c + row + 4]
 
 
-@inlined
+@kernel
 def _corner(w, c, i, a, b):
     at = _SLIDING + 4 * c * SLOTS + i
     return bilinear_blend(w[at], w[at + SLOTS], w[at + 2 * SLOTS], w[at + 3 * SLOTS], a, b)
 
 
-@inlined
+@kernel
 def _slope_row(corner, frame, moving, c):
     """A row of `du/dV_S`; that of the ellipsoid at rest."""
     radial, polar, azimuth = frame
@@ -99,7 +99,7 @@ def _slope_row(corner, frame, moving, c):
     )
 
 
-@inlined
+@kernel
 def _bilinear_one(w, i, a, b):
     """`u` in a slot; its speed and on which side of the equator it lies."""
     twist = _slot(w, _TWIST, i)
@@ -156,29 +156,29 @@ def _surface(w, count, surface, data, slopes, j):
 # ---------------------------------------------------------------------- steps, for the contacts abreast
 
 
-@inlined
+@kernel
 def _contact(own, c):
     row = gathered(own, _ROW + c, LANES, _NUMBERS)
     return Contact(LawNumbers(*row[:LAW]), Shape(*row[LAW:]), 0, 0)
 
 
-@inlined
+@kernel
 def _step(w, contact, c, z, dt):
     twist = _slot(w, _TWIST, c)
     return linearise(contact, Held(twist, w[_OMEGA + c], norm(twist), _slot(w, _SLIDING, c)), z, dt)
 
 
-@inlined
+@kernel
 def _carried(own, c):
     return own[_CARRY + c], own[_CARRY + LANES + c], own[_CARRY + 2 * LANES + c]
 
 
-@inlined
+@kernel
 def _carry(own, c, a):
     own[_CARRY + c], own[_CARRY + LANES + c], own[_CARRY + 2 * LANES + c] = a
 
 
-@inlined
+@kernel
 def _forward_one(w, own, c, dt):
     z, load = _carried(own, c), w[_LOAD + c]
     step = _step(w, _contact(own, c), c, z, dt)
@@ -191,11 +191,11 @@ def _forward_one(w, own, c, dt):
 @kernel
 def _forward(w, own, lanes, dt):
     """One step of the contacts, whose slots begin at the start of `w`."""
-    for c in range(lanes):  # the body apart: inlined later, it leaves the compiler a loop that it can count
+    for c in range(lanes):  # the body apart: kernel later, it leaves the compiler a loop that it can count
         _forward_one(w, own, c, dt)
 
 
-@inlined
+@kernel
 def _backward_one(w, own, c, dt):
     contact, load, pull = _contact(own, c), w[_LOAD + c], _slot(w, _WRENCH, c)
     step = _step(w, contact, c, _slot(w, _STATE, c), dt)

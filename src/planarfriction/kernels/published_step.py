@@ -20,7 +20,7 @@ import numpy as np
 
 from planarfriction import formulas
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import bristle_step, entry, inlined, jit, rollouts
+from planarfriction.kernels import bristle_step, entry, jit, kernel, rollouts
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels.bristle_step import Bristle, BristleStep
 from planarfriction.kernels.pointers import address_of
@@ -62,14 +62,14 @@ class Step(NamedTuple):
     """About the origin, per unit load."""
 
 
-@inlined
+@kernel
 def scaled_twist(shape, twist):
     """`V_S`"""
     vx, vy, omega = twist
     return vx - omega * shape.centre_y, vy + omega * shape.centre_x, shape.contact_radius * omega
 
 
-@inlined
+@kernel
 def hold(contact, twist):
     """`Held` at a twist."""
     surface, scaled = contact.surface, scaled_twist(contact.shape, twist)
@@ -78,7 +78,7 @@ def hold(contact, twist):
     return Held(scaled, twist[2], v, u)
 
 
-@inlined
+@kernel
 def hold_slopes(contact, twist, work):
     """`Held`, and `du/dV_S` row by row."""
     held, surface, j = hold(contact, twist), contact.surface, work
@@ -87,7 +87,7 @@ def hold_slopes(contact, twist, work):
     return held, (j[0], j[1], j[2], j[3], j[4], j[5], j[6], j[7], j[8])
 
 
-@inlined
+@kernel
 def linearise(contact, held, z, dt):
     """`Step` from the raw state z."""
     law, shape = contact.law, contact.shape
@@ -107,7 +107,7 @@ def linearise(contact, held, z, dt):
     return Step(held, h, stribeck, step, (fx, fy, fs), (new[0], new[1], r * new[2]), wrench)
 
 
-@inlined
+@kernel
 def pull_back(contact, step, slopes, new, wrench):
     """`Cotangents` from those of the new state and of the wrench."""
     law, shape, held, b = contact.law, contact.shape, step.held, step.bristle

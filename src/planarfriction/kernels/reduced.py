@@ -14,10 +14,10 @@ from __future__ import annotations
 
 from planarfriction import formulas
 from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import inlined
+from planarfriction.kernels import kernel
 
 
-@inlined
+@kernel
 def wrench(law, shape, zx, zy, zs, dx, dy, ds, x, y, s):
     """Wrench about the origin from state, rate and twist in scaled coordinates."""
     gx = formulas.traction(zx, dx, x, law)
@@ -26,7 +26,7 @@ def wrench(law, shape, zx, zy, zs, dx, dy, ds, x, y, s):
     return to_origin(shape, gx, gy, gs)
 
 
-@inlined
+@kernel
 def to_origin(shape, gx, gy, gs):
     """`F' g`."""
     return shape[0] * gx, shape[1] * gx + shape[3] * gy, shape[2] * gx + shape[4] * gy + shape[5] * gs
@@ -35,14 +35,14 @@ def to_origin(shape, gx, gy, gs):
 # ---------------------------------------------------------------------- the closure
 
 
-@inlined
+@kernel
 def closure(law, deflection, share, even):
     """`beta` of a state z: `deflection = |z|/|z_ss|`, `share` = s, `even` as in `steady.evenness`."""
     cosine = share / xp.where(deflection > 0.0, deflection, 1.0)
     return formulas.slip_share(xp, deflection, cosine, even, law)
 
 
-@inlined
+@kernel
 def closure_partials(law, deflection, share, even):
     """`beta` and its partial derivatives with respect to `deflection`, `share` and the breakaway `s_ba even`."""
     per = xp.where(deflection > 0.0, 1.0 / xp.where(deflection > 0.0, deflection, 1.0), 0.0)
@@ -50,7 +50,7 @@ def closure_partials(law, deflection, share, even):
     return beta, by_deflection - by_cosine * share * per * per, by_cosine * per, by_breakaway
 
 
-@inlined
+@kernel
 def part_rate(beta, share, decay, z, u, q):
     """One component of `z'`."""
     return u - beta * (decay * z + share * (u - decay * q))

@@ -24,7 +24,7 @@ import numpy as np
 from planarfriction import formulas
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import entry, inlined, jit, reduced, rollouts
+from planarfriction.kernels import entry, jit, kernel, reduced, rollouts
 from planarfriction.kernels.bristle_step import ROUNDING
 from planarfriction.kernels.pointers import address_of
 from planarfriction.kernels.records import reader
@@ -119,7 +119,7 @@ class Step(NamedTuple):
     """About the origin, per unit load."""
 
 
-@inlined
+@kernel
 def hold(contact, twist):
     """`Held` at a twist."""
     vx, vy, omega = twist
@@ -127,7 +127,7 @@ def hold(contact, twist):
     return Held((x, y, s), v, (qx, qy, qs), even)
 
 
-@inlined
+@kernel
 def hold_slopes(contact, twist, work):
     """`Held` and `Slopes` at a twist; none at rest, where they have no effect."""
     law, shape, surface, data = contact.law, contact.shape, contact.surface, contact.data
@@ -143,7 +143,7 @@ def hold_slopes(contact, twist, work):
     return Held(u, v, (FAR, 0.0, 0.0), 1.0), Slopes(still, none, none, none, none)
 
 
-@inlined
+@kernel
 def _stage(law, held, z, stretch, deflection, share):
     """The closure at a state; `stretch`: the change of the deflection is `stretch/deflection` times that along z."""
     beta, by_deflection, by_share, by_breakaway = reduced.closure_partials(law, deflection, share, held.even)
@@ -151,7 +151,7 @@ def _stage(law, held, z, stretch, deflection, share):
     return Stage(z, deflection, stretch, share, beta, by_deflection, by_share, by_breakaway)
 
 
-@inlined
+@kernel
 def linearise(contact, held, z, dt):
     """`Step` from the state z."""
     law, u, q = contact.law, held.u, held.q
@@ -206,7 +206,7 @@ class StepBars(NamedTuple):
     breakaway: float
 
 
-@inlined
+@kernel
 def _pull_back(law, s, new, pull):
     """`StepBars` from the cotangents of the new state and of the scaled traction."""
     start, predicted, end, per_q2, dt, q = s.start, s.predicted, s.end, s.per_q2, s.dt, s.held.q
@@ -266,7 +266,7 @@ def _pull_back(law, s, new, pull):
     return StepBars(dz, du, dq, breakaway)
 
 
-@inlined
+@kernel
 def pull_back(contact, step, slopes, new, wrench):
     """`Cotangents` from those of the new state and of the wrench; that of the scaled traction is `F W'`."""
     law, shape, held = contact.law, contact.shape, step.held

@@ -21,7 +21,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import inlined, jit
+from planarfriction.kernels import jit, kernel
 from planarfriction.kernels.law import LAW, law_of
 from planarfriction.kernels.pointers import address, at, call, doubles
 from planarfriction.kernels.vectors import accumulate, dot, put, three, times
@@ -79,18 +79,18 @@ class Cotangents(NamedTuple):
     shape: tuple
 
 
-@inlined
+@kernel
 def _contact(shape_of, row, surface, data):
     return Contact(law_of(row), shape_of(row[LAW:]), (surface[0], surface[1], surface[2]), data)
 
 
-@inlined
+@kernel
 def row_of(values, b):
     """Which row of `values` belongs to contact b: its own, or the one that all share."""
     return b if values.shape[0] > 1 else 0
 
 
-@inlined
+@kernel
 def _weighed(wrench, load):
     """The wrench of a load; zero without, whatever it is per unit load."""
     return times(load, wrench) if load != 0.0 else (0.0, 0.0, 0.0)
@@ -103,7 +103,7 @@ def _weighed(wrench, load):
 # differently in each.
 
 
-@inlined
+@kernel
 def step(shape_of, hold, linearise, row, data, inputs, out):
     """A step of one contact: `inputs` are its z, twist, load and dt [8], `out` the new state and the wrench [6].
 
@@ -145,7 +145,7 @@ def step_one(places, z, vx, vy, omega, load, dt, result):
     return True
 
 
-@inlined
+@kernel
 def roll(shape_of, hold, linearise, inputs, span, z, wrench, states):
     """Steps of the contacts `span[0]` to `span[1]`: `z` [B, 3] in place, wrenches into `wrench` [B, T, 3].
 
@@ -171,7 +171,7 @@ def roll(shape_of, hold, linearise, inputs, span, z, wrench, states):
 # ---------------------------------------------------------------------- derivatives
 
 
-@inlined
+@kernel
 def gradient(shape_of, hold_slopes, linearise, pull_back, inputs, states, wrench_bar, span, bars, work):
     """Adjoint of `roll` with its `states`, from the cotangents of the wrenches [B or 1, T, 3], into `bars`.
 
@@ -195,7 +195,7 @@ def gradient(shape_of, hold_slopes, linearise, pull_back, inputs, states, wrench
         put(bars.state[b], new)
 
 
-@inlined
+@kernel
 def _jacobian(hold_slopes, linearise, pull_back, contact, z, twist, load, dt, work, out):
     """Derivatives of the new state and of the wrench (6 rows) into `out` [6, 7 + N]; returns the step.
 
@@ -216,7 +216,7 @@ def _jacobian(hold_slopes, linearise, pull_back, contact, z, twist, load, dt, wo
     return step
 
 
-@inlined
+@kernel
 def jacobians(shape_of, hold_slopes, linearise, pull_back, row, surface, data, inputs, out, work):
     """Derivatives of steps into `out` [B, 6, 7 + N], as `_jacobian`; `inputs` as those of `batch`, `work` [SCRATCH]."""
     contact, (z, twist, load, dt) = _contact(shape_of, row, surface, data), inputs
@@ -226,7 +226,7 @@ def jacobians(shape_of, hold_slopes, linearise, pull_back, row, surface, data, i
         )
 
 
-@inlined
+@kernel
 def sensitivities(shape_of, hold_slopes, linearise, pull_back, inputs, span, z, columns, results, work):
     """Roll-outs with the derivatives of the wrenches by the numbers `columns` [P], forward in time.
 

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from planarfriction import formulas
 from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import cube, inlined, kernel
+from planarfriction.kernels import cube, kernel
 from planarfriction.kernels.vectors import applied_back, dot, plus, times
 
 QUARTIC = 8
@@ -27,7 +27,7 @@ HEADER = QUARTIC + 36
 """Numbers in front of a map."""
 
 
-@inlined
+@kernel
 def scaled_twist(shape, vx, vy, omega):
     """`V_G = F V`."""
     return shape[0] * vx + shape[1] * vy + shape[2] * omega, shape[3] * vy + shape[4] * omega, shape[5] * omega
@@ -47,7 +47,7 @@ class Steady(NamedTuple):
     """Least dissipation."""
 
 
-@inlined
+@kernel
 def _component(law, data, start, spot, places, v, i):
     """Component i of one map with its slopes: by the direction (3), by v, mu_c, mu_s and v_s."""
     n, m, count, knee = int(data[start + 1]), int(data[start + 2]), int(data[start + 3]), data[start + 4]
@@ -68,7 +68,7 @@ def _component(law, data, start, spot, places, v, i):
     return value, slopes, by_t * knee * law.v_s * per * per, by_mu_c, by_mu_s, -by_t * knee * t * per
 
 
-@inlined
+@kernel
 def _map(law, data, start, u, v):
     """`Steady` of one map."""
     spot = cube.locate(u[0], u[1], u[2], int(data[start]))
@@ -82,7 +82,7 @@ def _map(law, data, start, u, v):
     return Steady((q_x, q_y, q_s), by_u, (c_x, c_y, c_s), (s_x, s_y, s_s), (k_x, k_y, k_s), data[start + 5])
 
 
-@inlined
+@kernel
 def _mixed(one, other, share):
     return Steady(
         plus(times(1.0 - share, one.q), share, other.q),
@@ -94,7 +94,7 @@ def _mixed(one, other, share):
     )
 
 
-@inlined
+@kernel
 def steady(law, shape, surface, data, u, v):
     """`Steady` at the scaled twist, which moves at `v > 0`; its dissipation is never below the least."""
     found = _map(law, data, surface[0], u, v)
@@ -131,7 +131,7 @@ def steady_slopes(law, shape, surface, data, x, y, s, v, j):
     return found.q
 
 
-@inlined
+@kernel
 def _fourth(data, start, m):
     """`K m`."""
     k = start + QUARTIC
@@ -145,13 +145,13 @@ def _fourth(data, start, m):
     )
 
 
-@inlined
+@kernel
 def _row(data, k, m):
     low = data[k] * m[0] + data[k + 1] * m[1] + data[k + 2] * m[2]
     return low + data[k + 3] * m[3] + data[k + 4] * m[4] + data[k + 5] * m[5]
 
 
-@inlined
+@kernel
 def _blended(one, other, share):
     return (
         one[0] + share * (other[0] - one[0]),
@@ -163,7 +163,7 @@ def _blended(one, other, share):
     )
 
 
-@inlined
+@kernel
 def evenness(shape, surface, data, x, y, s, v):
     """`<v^2>/sqrt(<v^4>)` of the cells' speeds at the scaled twist, and its slopes by that, for `v > 0`."""
     per = 1.0 / v
@@ -181,7 +181,7 @@ def evenness(shape, surface, data, x, y, s, v):
     return even, c * by_x, c * by_y, c * by_s
 
 
-@inlined
+@kernel
 def sliding(law, vx, vy, omega, shape, surface, data):
     """Scaled twist, its norm, its steady state and evenness (any where the patch is at rest): what `advance` holds."""
     x, y, s = scaled_twist(shape, vx, vy, omega)

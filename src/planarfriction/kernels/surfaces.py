@@ -18,7 +18,7 @@ from __future__ import annotations
 import math
 
 from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import inlined, jit, kernel
+from planarfriction.kernels import jit, kernel
 
 BILINEAR, POTENTIAL, ELLIPSOID, CELLS = 0, 1, 2, 3
 
@@ -31,7 +31,7 @@ _SIN_AXIS, _COS_AXIS = math.sin(_AXIS), math.cos(_AXIS)
 _AT_REST = 1e-14
 
 
-@inlined
+@kernel
 def place(size, x, y, s):
     """Table coordinates of a direction with `s >= 0`: polar and azimuth cell, position within it, and the angles."""
     per_segment = size / (0.5 * math.pi)
@@ -44,7 +44,7 @@ def place(size, x, y, s):
     return i, j, a - i, b - j, polar, azimuth
 
 
-@inlined
+@kernel
 def _sines(x, y, s, polar):
     """Sine and cosine of the polar angle, which stays `_AXIS` away from the axis, and of the azimuth."""
     across = math.sqrt(x * x + y * y)
@@ -56,7 +56,7 @@ def _sines(x, y, s, polar):
     return sin_p, cos_p, y * per_across, xp.where(across > 0.0, x * per_across, 1.0)
 
 
-@inlined
+@kernel
 def bilinear_blend(low_left, low_right, high_left, high_right, a, b):
     """Bilinear value from four corners and its differences along the polar angle and the azimuth."""
     low = low_left + b * (low_right - low_left)
@@ -66,13 +66,13 @@ def bilinear_blend(low_left, low_right, high_left, high_right, a, b):
     return low + a * (high - low), high - low, right - left
 
 
-@inlined
+@kernel
 def _corners(data, p, row, a, b):
     """`bilinear_blend` of one component at a place in a table."""
     return bilinear_blend(data[p], data[p + 4], data[p + row], data[p + row + 4], a, b)
 
 
-@inlined
+@kernel
 def _bilinear(data, start, size, x, y, s, speed):
     i, j, a, b, _, _ = place(size, x, y, s)
     row = 4 * (4 * size + 1)
@@ -85,7 +85,7 @@ def _bilinear(data, start, size, x, y, s, speed):
     return hx * speed, hy * speed, hs * speed
 
 
-@inlined
+@kernel
 def bilinear_frame(size, x, y, s, polar):
     """Radial direction, and the slopes of the table coordinates in space, for the Jacobian of `_bilinear`."""
     per_segment = size / (0.5 * math.pi)
@@ -96,7 +96,7 @@ def bilinear_frame(size, x, y, s, polar):
     return radial, polar_slope, (-per_azimuth * sin_a, per_azimuth * cos_a, 0.0)
 
 
-@inlined
+@kernel
 def bilinear_inset(size, a, polar):
     """Position within the polar cell at which the Jacobian is taken: the axis has none."""
     return xp.where(polar < _AXIS, _AXIS * size / (0.5 * math.pi), a)
@@ -252,7 +252,7 @@ def _cells_jacobian(data, start, size, x, y, s, speed, out):
                 out[3 * i + j] += w * (along[i] * radial[j] + turn * across[i] * across[j])
 
 
-@inlined
+@kernel
 def sliding(kind, data, start, size, x, y, s, speed):
     """`u = h(V) |V_S|` of the scaled twist `(x, y, s)` of norm `speed`; the lower half sphere mirrors the upper."""
     if kind == ELLIPSOID:

@@ -8,7 +8,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from planarfriction.kernels import inlined
+from planarfriction.kernels import kernel
 
 _FLAGS = ("reassoc", "contract", "nsz", "arcp")
 
@@ -93,25 +93,25 @@ def gathered(typingctx, row, at, stride, count):
     return result(row, types.intp, types.intp, count), generate
 
 
-@inlined
+@kernel
 def norm(a):
     """`|a|`"""
     return math.sqrt(dot(a, a))
 
 
-@inlined
+@kernel
 def three(row):
     """The first three numbers of a row."""
     return row[0], row[1], row[2]
 
 
-@inlined
+@kernel
 def put(row, a):
     """Write a vector to the beginning of a row."""
     row[0], row[1], row[2] = a
 
 
-@inlined
+@kernel
 def applied_back(m, a):
     """`M' a`"""
     return (
