@@ -243,13 +243,12 @@ def factor(system, piece, since, y, shift):
                 weight = inverse_mass[i] * load
                 to_pose[3 * i + j] += weight * per_pose / shift
                 m[3 * i + j] -= weight * (per_velocity + per_pose / shift)
-    determinant = 0.0
-    for i in range(3):
-        b[i] = _cofactor(m, 0, i)
-        determinant += m[i] * b[i]
     for i in range(3):
         for j in range(3):
-            inverse[3 * i + j] = _cofactor(m, j, i) / determinant
+            inverse[3 * i + j] = _cofactor(m, j, i)
+    determinant = m[0] * inverse[0] + m[1] * inverse[3] + m[2] * inverse[6]
+    for i in range(9):
+        inverse[i] /= determinant
 
 
 @kernel

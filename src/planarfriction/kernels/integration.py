@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction.kernels import entry, kernel
+from planarfriction.kernels import entry
 from planarfriction.kernels.body import System
 from planarfriction.kernels.pointers import address_of, doubles, matrix, place_of, vector
 from planarfriction.kernels.records import addresses_in, reader, row_of
@@ -163,23 +163,3 @@ def run_of(system: System, method: Method, output: Output, progress: Progress, *
         **{name: place_of(array) for name, array in arrays.items() if isinstance(array, np.ndarray)},
     )
     return Run(system, method, output, progress, stages, atol, row_of(record))
-
-
-@kernel
-def method_of(own):
-    """The `Method` of a `RunRecord`."""
-    s = own.stage_count
-    a, c, dense = matrix(own.a, s, s), matrix(own.c, s, s), matrix(own.dense, own.order_of_dense, s)
-    m, e, alpha, time_gamma = vector(own.m, s), vector(own.e, s), vector(own.alpha, s), vector(own.time_gamma, s)
-    return Method(own.gamma, a, c, m, e, alpha, time_gamma, dense, own.order)
-
-
-@kernel
-def stages_of(own):
-    """Its `Stages`."""
-    n, s = own.states, own.stage_count
-    return Stages(
-        matrix(own.k, s, n), vector(own.rate, n), vector(own.start_rate, n), vector(own.right, n),
-        vector(own.argument, n), vector(own.new, n), vector(own.error, n), vector(own.zero, n),
-        vector(own.time_slope, 3), vector(own.coupling, s),
-    )  # fmt: skip

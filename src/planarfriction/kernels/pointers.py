@@ -14,8 +14,6 @@ from numba import types
 from numba.extending import intrinsic
 from numba.np.arrayobj import populate_array
 
-from planarfriction.kernels import kernel
-
 _DOUBLES = types.CPointer(types.float64)
 
 
@@ -94,10 +92,16 @@ def integers(typingctx, address):
     return types.CPointer(types.int64)(address), generate
 
 
-@kernel
-def at(address, i):
+@intrinsic
+def at(typingctx, address, i):
     """Address of number i from there on."""
-    return address + 8 * i
+    if not (isinstance(address, types.Integer) and isinstance(i, types.Integer)):
+        return None
+
+    def generate(context, builder, signature, args):
+        return builder.add(args[0], builder.mul(args[1], ir.Constant(ir.IntType(64), 8)))
+
+    return types.int64(types.int64, types.int64), generate
 
 
 def _array_over(context, builder, kind, address, shape):

@@ -7,8 +7,8 @@ import math
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import jit, kernel
 from planarfriction.kernels.body import load_of, read
-from planarfriction.kernels.integration import method_of, read_run, stages_of
-from planarfriction.kernels.pointers import call, doubles, integers, vector
+from planarfriction.kernels.integration import read_run
+from planarfriction.kernels.pointers import at, call, doubles, integers
 
 DONE, PAUSED, STEP_TOO_SMALL, AT_REST = 0, 1, 2, 3
 """Outcomes of `advance`."""
@@ -49,10 +49,10 @@ def error_norm(own, y, new, error, rtol, atol):
 
 
 @kernel
-def _record(run, own, piece, since, y, m):
-    """Write sample m from the state y."""
-    many = own.contacts
-    call(own.rates, (run.system, piece, since, y, run.rate))
+def _record(run, own, piece, since, state, m):
+    """Write sample m from the state at an address."""
+    many, y = own.contacts, doubles(state)
+    call(own.rates, (run.system, piece, since, state, run.rate))
     for i in range(6):
         doubles(run.body)[6 * m + i] = y[own.bristles + i]
     for c in range(many):
@@ -81,46 +81,47 @@ def _time_slope(own, piece, slope):
 @kernel
 def forget_unloaded(own, piece, y):
     """A contact without load on the whole piece keeps no memory: it starts again from rest."""
-    load, at = doubles(own.load), 2 * piece * own.contacts
+    load, first = doubles(own.load), 2 * piece * own.contacts
     for c in range(own.contacts):
-        if load[at + c] == 0.0 and load[at + own.contacts + c] == 0.0:
+        if load[first + c] == 0.0 and load[first + own.contacts + c] == 0.0:
             for i in range(integers(own.state)[c], integers(own.state)[c + 1]):
                 y[i] = 0.0
 
 
 @kernel
-def _interpolate(method, k, y, new, s, out):
-    """Continuous extension at the fraction `s` of a step: `(1 - s) y + s (new + (1 - s) (d_1 + s (d_2 + ...)))`."""
-    q = method.dense.shape[0]
-    for i in range(y.shape[0]):
+def _interpolate(run, share, out):
+    """Continuous extension at a share s of a step: `(1 - s) y + s (new + (1 - s) (d_1 + s (d_2 + ...)))`."""
+    n, s, q = run.states, run.stage_count, run.order_of_dense
+    k, dense, y, new = doubles(run.k), doubles(run.dense), doubles(run.y), doubles(run.new)
+    for i in range(n):
         inner = 0.0
         for p in range(q - 1, -1, -1):
             row = 0.0
-            for j in range(k.shape[0]):
-                row += method.dense[p, j] * k[j, i]
-            inner = row + s * inner
-        out[i] = (1.0 - s) * y[i] + s * (new[i] + (1.0 - s) * inner)
+            for j in range(s):
+                row += dense[p * s + j] * k[j * n + i]
+            inner = row + share * inner
+        out[i] = (1.0 - share) * y[i] + share * (new[i] + (1.0 - share) * inner)
 
 
 @kernel
-def _step(run, own, method, piece, since, step, y, stages):
-    """The stages of one step from `y`: solution into `stages.new`, its error estimate into `stages.error`."""
-    n, s = run.states, run.stage_count
-    k, argument, right, coupling = stages.k, stages.argument, stages.right, stages.coupling
-    shift = 1.0 / (step * method.gamma)
-    call(own.factor, (run.system, piece, since, y, shift))
+def _step(run, own, piece, since, step):
+    """The stages of one step from `y`: solution into `new`, its error estimate into `error`."""
+    n, s, k, right, coupling = run.states, run.stage_count, run.k, doubles(run.right), doubles(run.coupling)
+    shift = 1.0 / (step * run.gamma)
+    call(own.factor, (run.system, piece, since, run.y, shift))
     for i in range(s):
         for j in range(i):
-            coupling[j] = method.c[i, j] / step
+            coupling[j] = doubles(run.c)[i * s + j] / step
         if i > 0:
-            call(run.combine, (method.a[i], k, i, n, y, argument))
-            call(own.rates, (run.system, piece, since + method.alpha[i] * step, argument, stages.rate))
-        call(run.combine, (coupling, k, i, n, run.rate if i > 0 else run.start_rate, right))
+            call(run.combine, (at(run.a, i * s), k, i, n, run.y, run.argument))
+            time = since + doubles(run.alpha)[i] * step
+            call(own.rates, (run.system, piece, time, run.argument, run.rate))
+        call(run.combine, (run.coupling, k, i, n, run.rate if i > 0 else run.start_rate, run.right))
         for p in range(3):
-            right[n - 6 + p] += method.time_gamma[i] * step * stages.time_slope[p]
-        call(own.solve, (run.system, piece, since, y, shift, right, k[i]))
-    call(run.combine, (method.m, k, s, n, y, stages.new))
-    call(run.combine, (method.e, k, s, n, stages.zero, stages.error))
+            right[n - 6 + p] += doubles(run.time_gamma)[i] * step * doubles(run.time_slope)[p]
+        call(own.solve, (run.system, piece, since, run.y, shift, run.right, at(k, i * n)))
+    call(run.combine, (run.m, k, s, n, run.y, run.new))
+    call(run.combine, (run.e, k, s, n, run.zero, run.error))
 
 
 @kernel
@@ -129,8 +130,9 @@ def _at_rest(own, y, rate):
     speed, change = 0.0, 0.0
     for i in range(3):
         arm = own.stop_radius if i == 2 else 1.0
-        speed += (arm * y[own.bristles + i]) ** 2
-        change += (arm * rate[own.bristles + i]) ** 2
+        v, dv = arm * y[own.bristles + i], arm * rate[own.bristles + i]
+        speed += v * v
+        change += dv * dv
     return math.sqrt(speed) + own.stop_time * math.sqrt(change) < own.stop_speed
 
 
@@ -141,9 +143,8 @@ def advance(run, max_steps):
     The step that ends at a break is recorded (left limit) before the next piece begins.
     """
     run = read_run(run)
-    system, own, method, stages = run.system, read(run.system), method_of(run), stages_of(run)
-    n, samples = run.states, run.samples
-    y, breaks, times, clock = vector(run.y, n), doubles(own.breaks), doubles(run.time), doubles(run.clock)
+    own, n, s, samples = read(run.system), run.states, run.stage_count, run.samples
+    y, breaks, times, clock = doubles(run.y), doubles(own.breaks), doubles(run.time), doubles(run.clock)
     cursor, statistics = integers(run.cursor), integers(run.statistics)
     piece, m = cursor[0], cursor[1]
     since, h, first_step = clock[0], clock[1], clock[2]
@@ -159,7 +160,7 @@ def advance(run, max_steps):
                     y[n - 6 + i] = doubles(own.velocity)[3 * piece + i]
             h = xp.minimum(h, first_step)
             if piece == 0 and m == 0 and times[0] == begin:
-                _record(run, own, piece, 0.0, y, m)
+                _record(run, own, piece, 0.0, run.y, m)
                 m += 1
         while since < end - begin:
             # stretch the last step to the break, or halve what is left, so that no sliver of a step remains
@@ -172,19 +173,19 @@ def advance(run, max_steps):
                 outcome = PAUSED if taken >= max_steps else STEP_TOO_SMALL
                 break
             if fresh:
-                call(own.rates, (system, piece, since, y, stages.start_rate))
-                call(own.linearise, (system, piece, y))
-                _time_slope(own, piece, stages.time_slope)
+                call(own.rates, (run.system, piece, since, run.y, run.start_rate))
+                call(own.linearise, (run.system, piece, run.y))
+                _time_slope(own, piece, doubles(run.time_slope))
                 statistics[JACOBIANS] += 1
-            _step(run, own, method, piece, since, step, y, stages)
+            _step(run, own, piece, since, step)
             taken += 1
-            statistics[EVALUATIONS] += method.m.shape[0] if fresh else method.m.shape[0] - 1
-            norm = error_norm(own, y, stages.new, stages.error, run.rtol, vector(run.atol, n))
+            statistics[EVALUATIONS] += s if fresh else s - 1
+            norm = error_norm(own, y, doubles(run.new), doubles(run.error), run.rtol, doubles(run.atol))
             # no growth right after a rejection, whose reason is still near
             growth = _GROWTH if fresh else 1.0
             scale = _SHRINKAGE
             if xp.is_finite(norm):
-                ideal = _SAFETY * xp.maximum(norm, 1e-10) ** (-1.0 / method.order)
+                ideal = _SAFETY * xp.maximum(norm, 1e-10) ** (-1.0 / run.order)
                 scale = xp.minimum(growth, xp.maximum(_SHRINKAGE, ideal))
             fresh = norm <= 1.0
             if not fresh:
@@ -195,22 +196,22 @@ def advance(run, max_steps):
             reached = end - begin if last else since + step
             time = end if last else begin + reached
             while m < samples and times[m] <= time:
-                at = reached if times[m] == time else times[m] - begin
-                _interpolate(method, stages.k, y, stages.new, (at - since) / step, stages.argument)
-                _record(run, own, piece, at, stages.argument, m)
+                here = reached if times[m] == time else times[m] - begin
+                _interpolate(run, (here - since) / step, doubles(run.argument))
+                _record(run, own, piece, here, run.argument, m)
                 m += 1
             if starting:
                 first_step = step * scale
                 starting = False
             for i in range(n):
-                y[i] = stages.new[i]
+                y[i] = doubles(run.new)[i]
             since = reached
             h = xp.maximum(step * scale, h) if last else step * scale
-            if own.stop_speed > 0.0 and _at_rest(own, y, stages.start_rate):
+            if own.stop_speed > 0.0 and _at_rest(own, y, doubles(run.start_rate)):
                 outcome = AT_REST
                 if m < samples:
                     times[m] = time
-                    _record(run, own, piece, since, y, m)
+                    _record(run, own, piece, since, run.y, m)
                     m += 1
                 break
         if outcome == DONE:

@@ -12,6 +12,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+
 from planarfriction import formulas
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import cube, kernel
@@ -73,9 +75,10 @@ def _map(law, data, start, u, v):
     """`Steady` of one map."""
     spot = cube.locate(u[0], u[1], u[2], int(data[start]))
     places = cube.squares(spot, int(data[start + 1])), cube.squares(spot, int(data[start + 2]))
-    q_x, slope_x, v_x, c_x, s_x, k_x = _component(law, data, start, spot, places, v, 0)
-    q_y, slope_y, v_y, c_y, s_y, k_y = _component(law, data, start, spot, places, v, 1)
-    q_s, slope_s, v_s, c_s, s_s, k_s = _component(law, data, start, spot, places, v, 2)
+    # A literal number would have the function compiled once more.
+    q_x, slope_x, v_x, c_x, s_x, k_x = _component(law, data, start, spot, places, v, np.int64(0))
+    q_y, slope_y, v_y, c_y, s_y, k_y = _component(law, data, start, spot, places, v, np.int64(1))
+    q_s, slope_s, v_s, c_s, s_s, k_s = _component(law, data, start, spot, places, v, np.int64(2))
     per_v = 1.0 / v
     by_x, by_y, by_s = plus(slope_x, v_x * per_v, u), plus(slope_y, v_y * per_v, u), plus(slope_s, v_s * per_v, u)
     by_u = by_x[0], by_x[1], by_x[2], by_y[0], by_y[1], by_y[2], by_s[0], by_s[1], by_s[2]
@@ -83,23 +86,26 @@ def _map(law, data, start, u, v):
 
 
 @kernel
-def _mixed(one, other, share):
+def _with(total, share, one):
+    """`total + share one`"""
     return Steady(
-        plus(times(1.0 - share, one.q), share, other.q),
-        plus(times(1.0 - share, one.by_u), share, other.by_u),
-        plus(times(1.0 - share, one.by_mu_c), share, other.by_mu_c),
-        plus(times(1.0 - share, one.by_mu_s), share, other.by_mu_s),
-        plus(times(1.0 - share, one.by_v_s), share, other.by_v_s),
-        (1.0 - share) * one.least + share * other.least,
+        plus(total.q, share, one.q),
+        plus(total.by_u, share, one.by_u),
+        plus(total.by_mu_c, share, one.by_mu_c),
+        plus(total.by_mu_s, share, one.by_mu_s),
+        plus(total.by_v_s, share, one.by_v_s),
+        total.least + share * one.least,
     )
 
 
 @kernel
 def steady(law, shape, surface, data, u, v):
     """`Steady` at the scaled twist, which moves at `v > 0`; its dissipation is never below the least."""
-    found = _map(law, data, surface[0], u, v)
-    if shape[6] > 0.0:
-        found = _mixed(found, _map(law, data, surface[1], u, v), shape[6])
+    zero = (0.0, 0.0, 0.0)
+    found = Steady(zero, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), zero, zero, zero, 0.0)
+    for i in range(2 if shape[6] > 0.0 else 1):  # one place to read a map: it is inlined, and compiled, once
+        share = shape[6] if i == 1 else 1.0 - shape[6]
+        found = _with(found, share, _map(law, data, surface[i], u, v))
     per_v, per, least = 1.0 / v, 1.0 / law.sigma_0, found.least
     n = times(per_v, u)
     power = dot(found.q, n)

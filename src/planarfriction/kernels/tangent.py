@@ -192,7 +192,7 @@ def propagate(system, path, first, last, slope, rtol, atol, w):
     A step is halved, down to `SHORTEST` of a step of the motion, until one and two half ones agree to `rtol`, `atol`
     [n]: the Jacobian may jump within it. A contact that had no load forgets its slopes.
     """
-    own, taken = read(system), 0
+    own, taken, n = read(system), 0, w.right.shape[0]
     for t in range(first, last):
         call(own.rates, (system, path.piece[t], path.since[t], path.start[t], w.start_rate))
         call(own.rates, (system, path.piece[t], path.since[t] + path.step[t], path.end[t], w.end_rate))
@@ -206,16 +206,17 @@ def propagate(system, path, first, last, slope, rtol, atol, w):
             taken += 1
             largest = 0.0
             for p in range(path.parameters.shape[0]):
-                for m in range(w.right.shape[0]):
+                for m in range(n):
                     w.right[m] = w.fine[p, m] - w.coarse[p, m]
-                error = error_norm(own, slope[p], w.fine[p], w.right, rtol, atol)
+                old, new = doubles(address(slope, p * n)), doubles(address(w.fine, p * n))
+                error = error_norm(own, old, new, doubles(address(w.right, 0)), rtol, doubles(address(atol, 0)))
                 largest = xp.maximum(largest, error)
             if largest > 1.0 and share > SHORTEST:
                 share *= 0.5
                 continue
             begin += share
             for p in range(path.parameters.shape[0]):
-                for m in range(w.right.shape[0]):
+                for m in range(n):
                     slope[p, m] = w.fine[p, m]
             # places are multiples of the share, so that powers of two add up to one exactly
             if largest < 0.05 and begin < 1.0 and begin % (2.0 * share) == 0.0:
