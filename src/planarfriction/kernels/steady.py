@@ -86,15 +86,14 @@ def _map(law, data, start, u, v):
 
 
 @kernel
-def _with(total, share, one):
-    """`total + share one`"""
+def _mixed(one, other, share):
     return Steady(
-        plus(total.q, share, one.q),
-        plus(total.by_u, share, one.by_u),
-        plus(total.by_mu_c, share, one.by_mu_c),
-        plus(total.by_mu_s, share, one.by_mu_s),
-        plus(total.by_v_s, share, one.by_v_s),
-        total.least + share * one.least,
+        plus(times(1.0 - share, one.q), share, other.q),
+        plus(times(1.0 - share, one.by_u), share, other.by_u),
+        plus(times(1.0 - share, one.by_mu_c), share, other.by_mu_c),
+        plus(times(1.0 - share, one.by_mu_s), share, other.by_mu_s),
+        plus(times(1.0 - share, one.by_v_s), share, other.by_v_s),
+        (1.0 - share) * one.least + share * other.least,
     )
 
 
@@ -104,8 +103,8 @@ def steady(law, shape, surface, data, u, v):
     zero = (0.0, 0.0, 0.0)
     found = Steady(zero, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), zero, zero, zero, 0.0)
     for i in range(2 if shape[6] > 0.0 else 1):  # one place to read a map: it is inlined, and compiled, once
-        share = shape[6] if i == 1 else 1.0 - shape[6]
-        found = _with(found, share, _map(law, data, surface[i], u, v))
+        one = _map(law, data, surface[i], u, v)
+        found = _mixed(found, one, shape[6]) if i == 1 else one
     per_v, per, least = 1.0 / v, 1.0 / law.sigma_0, found.least
     n = times(per_v, u)
     power = dot(found.q, n)
