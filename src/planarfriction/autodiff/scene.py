@@ -152,7 +152,7 @@ def _carry(packed: PackedScene, path: Path, until: np.ndarray, names: tuple[str,
     system = packed.system
     n, count, many, instants = len(packed.state), len(names), len(packed.models), len(until)
     space, atol = tangent.slopes_for(count, n), _ACCURACY * packed.natural
-    slope, times = np.zeros((count, n)), np.empty(instants)
+    slope, scratch, times = np.zeros((count, n)), np.empty((2, n)), np.empty(instants)
     bodies, wrenches = np.empty((instants, 6)), np.empty((instants, many, 3))
     d_bodies, d_wrenches = np.zeros((instants, 6, count)), np.zeros((instants, many, 3, count))
     for m in range(instants):
@@ -164,7 +164,7 @@ def _carry(packed: PackedScene, path: Path, until: np.ndarray, names: tuple[str,
         piece, at = int(path.piece[last]), float(path.since[last] + done * path.step[last])
         state = path.end[last] if m else path.start[0]
         tangent.wrench_slopes(
-            system.address, piece, at, state, path.parameters, slope, wrenches[m], d_wrenches[m], space
+            system.address, piece, at, state, path.parameters, slope, wrenches[m], d_wrenches[m], scratch
         )
         times[m], bodies[m], d_bodies[m] = system.motion.breaks[piece] + at, state[-6:], slope[:, -6:].T
     return SceneSensitivities(names, times, bodies, wrenches, d_bodies, d_wrenches)

@@ -228,11 +228,14 @@ def propagate(system, path, first, last, slope, rtol, atol, w):
 
 
 @jit
-def wrench_slopes(system, piece, since, y, parameters, slope, wrench, out, w):
-    """Wrenches [C, 3] of one of the identical contacts, and from the slopes [P, n] of y theirs `out` [C, 3, P]."""
-    own = read(system)
+def wrench_slopes(system, piece, since, y, parameters, slope, wrench, out, scratch):
+    """Wrenches [C, 3] of one of the identical contacts, and from the slopes [P, n] of y theirs `out` [C, 3, P].
+
+    `scratch` [2, n] needs no values.
+    """
+    own, rate, change = read(system), address(scratch, 0), address(scratch, y.shape[0])
     o, rows = own.bristles, doubles(own.rows)
-    call(own.rates, (system, piece, since, y, w.rate))
+    call(own.rates, (system, piece, since, y, rate))
     call(own.linearise, (system, piece, y))
     for c in range(own.contacts):
         load = load_of(own, piece, since, c)
@@ -246,8 +249,8 @@ def wrench_slopes(system, piece, since, y, parameters, slope, wrench, out, w):
                 rows[6 + i] = 0.0
                 for j in range(3):
                     rows[6 + i] += a[3 * i + j] * slope[p, o + j] + g[3 * i + j] * slope[p, o + 3 + j]
-            states = address(y, 0), address(w.rate, 0), address(slope[p], 0)
-            _change(own, piece, c, *states, parameters[p], address(w.base, 0))
+            states = address(y, 0), rate, address(slope, p * y.shape[0])
+            _change(own, piece, c, *states, parameters[p], change)
             for i in range(3):
                 out[c, i, p] = load * rows[9 + i]
                 if parameters[p] == LOAD:
