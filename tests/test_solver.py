@@ -305,3 +305,15 @@ def test_results_are_reproducible():
     first, second = pf.simulate(scene, t_end=0.1), pf.simulate(scene, t_end=0.1)
     assert first.data.identical(second.data)
     assert first.statistics.steps == second.statistics.steps
+
+
+@pytest.mark.parametrize("kind", [pf.DistributedModel, pf.ReducedModel, pf.ReducedModelPublished])
+def test_a_contact_that_loses_its_load_starts_again_from_rest(kind):
+    """Pushed under load, then stopped; the bristles keep pushing, until the load goes, and not when it is back."""
+    model = kind(pf.ContactPatch.disc(radius=0.01, cells=5), pf.LuGre(mu_s=1.2))
+    twist = pf.Signal.sampled([0.0, 0.1], [[0.01, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    load = pf.Signal.sampled([0.0, 0.2, 0.3], [1.0, 0.0, 1.0])
+    data = pf.simulate(pf.scenes.driven(model, twist=twist, normal_force=load, t_end=0.4), save_every=0.05).data
+    fx = data.fx.values[:, 0]
+    assert fx[3] == pytest.approx(-1.0, abs=0.05)  # at 0.15 s; mu_c, while the bristles relaxed a little
+    assert fx[-1] == 0.0
