@@ -201,7 +201,9 @@ def test_every_surface_comes_back_from_a_scene(name):
     assert type(again.contacts[0].model.surface) is type(surface) and again.digest() == scene.digest()
 
 
+@pytest.mark.quartic
 def test_a_fitted_quartic_comes_back_with_its_numbers():
+    pytest.importorskip("cvxpy", reason="cvxpy is not installed: the convex quartic is an extra")
     coefficients = np.zeros(15)
     coefficients[[0, 10, 14]] = 1.0  # x^4, y^4, z^4
     coefficients[[3, 5, 12]] = 2.0  # x^2 y^2, x^2 z^2, y^2 z^2: the sphere

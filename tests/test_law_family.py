@@ -267,7 +267,7 @@ def test_a_subclass_is_what_its_numbers_say():
 
 @pytest.mark.torch
 def test_torch_takes_a_law_by_its_numbers_and_refuses_creep():
-    torch = pytest.importorskip("torch")
+    torch = pytest.importorskip("torch", reason="needs PyTorch: pip install 'planarfriction[torch]'")
     import planarfriction.torch as pt
 
     for law in (Halved(mu_c=0.8, mu_s=1.0), DAHL):
@@ -283,7 +283,7 @@ def test_torch_takes_a_law_by_its_numbers_and_refuses_creep():
 
 @pytest.mark.jax
 def test_jax_takes_a_law_by_its_numbers_and_refuses_creep():
-    jax = pytest.importorskip("jax")
+    jax = pytest.importorskip("jax", reason="needs the extra [jax]")
     import planarfriction.jax as pj
 
     for law in (Halved(mu_c=0.8, mu_s=1.0), DAHL):
