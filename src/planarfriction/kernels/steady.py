@@ -100,11 +100,10 @@ def _mixed(one, other, share):
 @kernel
 def steady(law, shape, surface, data, u, v):
     """`Steady` at the scaled twist, which moves at `v > 0`; its dissipation is never below the least."""
-    zero = (0.0, 0.0, 0.0)
-    found = Steady(zero, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), zero, zero, zero, 0.0)
-    for i in range(2 if shape[6] > 0.0 else 1):  # one place to read a map: it is inlined, and compiled, once
-        one = _map(law, data, surface[i], u, v)
-        found = _mixed(found, one, shape[6]) if i == 1 else one
+    # Read in a loop over the maps it would be compiled once, but a step of a fixed shape would take a tenth longer.
+    found = _map(law, data, surface[0], u, v)
+    if shape[6] > 0.0:
+        found = _mixed(found, _map(law, data, surface[1], u, v), shape[6])
     per_v, per, least = 1.0 / v, 1.0 / law.sigma_0, found.least
     n = times(per_v, u)
     power = dot(found.q, n)
