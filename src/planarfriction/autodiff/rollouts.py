@@ -263,7 +263,7 @@ def _checked(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, par
         np.broadcast_to(state, (*batch, 3)).reshape(count, 3),
         _rows("twist", twist, (steps, 3), batch),
         _rows("normal_force", load, (steps,), batch),
-        np.require(dt, float, ["C", "W"]),
+        np.require(dt, float, ["C", "W", "A"]),
         batch,
     )
 
@@ -278,7 +278,7 @@ def _rows(name: str, value: Any, inner: tuple[int, ...], batch: tuple[int, ...])
             wanted = ", ".join(str(n) for n in inner)
             raise InvalidValueError(name, f"have shape [..., {wanted}]", f"shape {list(value.shape)}") from None
     outer = value.shape[: value.ndim - len(inner)]
-    return np.require(value.reshape(math.prod(outer), *inner), float, ["C", "W"])
+    return np.require(value.reshape(math.prod(outer), *inner), float, ["C", "W", "A"])
 
 
 def _sum_to(shape: tuple[int, ...], gradient: np.ndarray) -> np.ndarray:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import functools
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any, ClassVar
 
 import numpy as np
+from numba import types
 
 from planarfriction.geometry import transformed
 from planarfriction.kernels.pointers import place_of
@@ -18,6 +20,13 @@ from planarfriction.models.rates import linearised, rates
 
 _REMEMBERED = 64
 """Loads whose shapes a model remembers that builds each."""
+
+_ARRAY, _FLOAT = np.ndarray, np.dtype(float)
+
+_PLAIN = frozenset((float, int, np.float64))
+"""What needs no conversion to a number."""
+
+_COMPILING = threading.Lock()
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,25 +67,20 @@ class ThreeStateModel(FrictionModel):
         Plain LuGre is linear in z and its step exact. Elasto-plastic: the exponential step with the mean decay of start
         and predicted end, second order, kept within the largest deflection so that nothing overshoots.
         """
-        array = np.ndarray
-        if (
-            type(state) is array
-            and state.shape == (3,)
-            and type(normal_force) is not array
-            and type(dt) is not array
-            and (type(twist) is not array or twist.ndim == 1)
-            and self._fixed is not None
-        ):  # one contact: no batch to broadcast, and the compiled step checks the numbers
-            places, result = self._fixed[0], np.empty(14)
+        kind, held = type(twist), None
+        if kind is tuple or kind is list:
+            held = twist
+        elif kind is _ARRAY and twist.ndim == 1 and twist.dtype is _FLOAT:
+            held = twist.tolist()
+        if held is not None and type(state) is _ARRAY and state.shape == (3,) and self._fixed is not None:
+            # one contact: no batch to broadcast, and the compiled step checks what it is given
+            result = np.empty(14)
             try:
-                vx, vy, omega = twist
-                valid = step_one(
-                    places, state, float(vx), float(vy), float(omega), float(normal_force), float(dt), result
-                )
-            except (TypeError, ValueError):  # not numbers, or a batch: the checks below decide
-                valid = False
-            if valid:
-                return result[:3], result[3:6]
+                vx, vy, omega = held
+                if step_one(self._fixed[0], state, vx, vy, omega, normal_force, dt, result):
+                    return result[:3], result[3:6]
+            except (TypeError, ValueError):  # not plain numbers, or a batch: the checks below decide
+                pass
         packed = self._by_load(self._step, (6,), *self._inputs(state, twist, normal_force, dt=dt))
         return packed[..., :3], self._out(packed[..., 3:])
 
@@ -182,6 +186,7 @@ class ThreeStateModel(FrictionModel):
         """
         surface, data = self._maps(shape)
         row, data = np.array([*self._row(shape), *surface]), np.ascontiguousarray(data, dtype=float)
+        _compile_step_one()
         return np.array([self._kernels.step_address(), place_of(row), place_of(data)]), row, data
 
     def __getstate__(self) -> dict[str, Any]:
@@ -230,14 +235,19 @@ class ThreeStateModel(FrictionModel):
 
     def _one_step_jacobians(self, state, twist, normal_force, dt) -> np.ndarray | None:
         """`_step_jacobians` `[6, 7]` of one contact of fixed shape, checked quickly; None where that is not it."""
-        if self._fixed is None or [np.ndim(a) for a in (state, twist, normal_force, dt)] != [1, 1, 0, 0]:
+        if self._fixed is None:
             return None
-        if len(state) != 3 or len(twist) != 3:
+        plain = []
+        for vector in (state, twist):
+            if type(vector) is _ARRAY and vector.ndim == 1 and vector.dtype is _FLOAT:
+                vector = vector.tolist()
+            if type(vector) not in (list, tuple) or len(vector) != 3:
+                return None
+            plain += vector
+        plain += normal_force, dt
+        if not _PLAIN.issuperset(map(type, plain)):  # the checks of `_inputs` say which
             return None
-        try:
-            given = np.array([*state, *twist, normal_force, dt], dtype=float)
-        except (TypeError, ValueError):  # not numbers: the checks of `_inputs` say which
-            return None
+        given = np.array(plain, dtype=float)
         if not (np.isfinite(given).all() and given[6] >= 0.0 and given[7] >= 0.0):
             return None
         return self._step_jacobians(self._reference, given[None, :3], given[None, 3:6], given[6:7], given[7:])[0]
@@ -251,3 +261,16 @@ class ThreeStateModel(FrictionModel):
             row, surface = numbers[:-3], numbers[-3:].astype(int)
         self._kernels.jacobians(row, surface, data, (state, twist, load, dt), slopes)
         return slopes[:, :, :7]
+
+
+@functools.cache
+def _compile_step_one() -> None:
+    """Compile `step_one` for plain numbers and arrays, and for nothing else.
+
+    Of other types it then says so at once, for free, where it would be compiled anew in the middle of a step.
+    """
+    number, vector, places = types.float64, types.float64[::1], types.int64[::1]
+    with _COMPILING:
+        if not step_one.signatures:
+            step_one.compile((places, vector, *(number,) * 5, vector))
+            step_one.disable_compile()

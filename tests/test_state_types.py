@@ -1,0 +1,140 @@
+"""States and twists of other types: converted or refused before compiled code sees them, which never compiles anew."""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import pytest
+from numba.core.dispatcher import Dispatcher
+
+import planarfriction as pf
+from planarfriction import autodiff
+
+PATCH = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
+LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
+MODELS = {
+    "distributed": pf.DistributedModel(PATCH, LAW),
+    "grain": pf.DistributedModel(PATCH.with_friction_metric(np.diag([1.0, 2.0])), LAW),
+    "reduced": pf.ReducedModel(PATCH, LAW, segments=6),
+    "published": pf.ReducedModelPublished(PATCH, LAW),
+}
+TWIST, LOAD, DT = (2e-3, -1e-3, 0.3), 2.0, 1e-4
+
+
+class Labelled(np.ndarray):
+    """A subclass of an array, as libraries of units and of labelled data have them."""
+
+
+def strided(a):
+    """Every other number of a larger array."""
+    wide = np.zeros((*a.shape[:-1], 2 * a.shape[-1]))
+    wide[..., ::2] = a
+    return wide[..., ::2]
+
+
+def read_only(a):
+    """May not be written to."""
+    a = a.copy()
+    a.flags.writeable = False
+    return a
+
+
+def unaligned(a):
+    """A field of a packed record."""
+    record = np.zeros(a.shape, np.dtype([("flag", "u1"), ("value", float)]))
+    record["value"] = a
+    return record["value"]
+
+
+FORMS = {
+    "float32": (lambda a: a.astype(np.float32), 1e-6),
+    "float16": (lambda a: a.astype(np.float16), 2e-2),
+    "long double": (lambda a: a.astype(np.longdouble), 0.0),
+    "strided": (strided, 0.0),
+    "backwards": (lambda a: a[..., ::-1].copy()[..., ::-1], 0.0),
+    "Fortran order": (np.asfortranarray, 0.0),
+    "read-only": (read_only, 0.0),
+    "byte-swapped": (lambda a: a.astype(">f8"), 0.0),
+    "unaligned": (unaligned, 0.0),
+    "subclass": (lambda a: a.view(Labelled), 0.0),
+    "list": (lambda a: a.tolist(), 0.0),
+}
+"""How numbers may come, and the relative error that their type brings with it."""
+
+every_model = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
+every_form = pytest.mark.parametrize("form", FORMS)
+
+
+def compiled() -> dict[str, int]:
+    """How often each kernel has been compiled."""
+    modules = [module for name, module in sys.modules.items() if name.startswith("planarfriction.kernels")]
+    found = {id(value): value for module in modules for value in vars(module).values() if isinstance(value, Dispatcher)}
+    return {f"{each.__module__}.{each.__name__}": len(each.signatures) for each in found.values()}
+
+
+def calls(model):
+    """All that takes a state, as functions of state and twist."""
+    yield lambda state, twist: model.rate(state, twist, LOAD)
+    yield lambda state, twist: model.wrench(state, twist, LOAD)
+    yield lambda state, twist: model.step(state, twist, LOAD, DT)
+    yield lambda state, twist: model.jacobians(state, twist, LOAD)
+    yield lambda state, twist: model.step_jacobians(state, twist, LOAD, DT)
+
+
+def roll_outs(model):
+    """The same of roll-outs, with twists `[T, 3]`."""
+    yield lambda state, twist: autodiff.rollout(model, state, twist, LOAD, DT)
+    if model is MODELS["reduced"] or model is MODELS["published"]:
+        yield lambda state, twist: autodiff.rollout_states(model, state, twist, LOAD, DT)
+        yield lambda state, twist: autodiff.rollout_sensitivities(model, state, twist, LOAD, DT)
+        yield lambda state, twist: autodiff.rollout_gradient(model, state, twist, LOAD, DT, twist)
+
+
+@pytest.fixture(scope="module", autouse=True)
+def everything_is_compiled():
+    """One contact and a batch run different loops."""
+    for model in MODELS.values():
+        for count in ((), (2,)):
+            state, twist = np.zeros((*count, *model.state_shape)), np.broadcast_to(TWIST, (*count, 4, 3))
+            for call in calls(model):
+                call(state, twist[..., 0, :].copy())
+            for call in roll_outs(model):
+                call(state, twist)
+
+
+def agree(found, wanted, error):
+    """Equal but for the rounding of the inputs; elasto-plastic bristles at 1/3 of breakaway magnify it little."""
+    pairs = zip(found, wanted, strict=True) if isinstance(found, tuple) else [(found, wanted)]
+    for a, b in pairs:
+        assert np.asarray(a).dtype == float
+        np.testing.assert_allclose(a, b, rtol=0.0, atol=100.0 * error * (np.abs(b).max() if np.size(b) else 0.0))
+
+
+@every_model
+@every_form
+@pytest.mark.parametrize("batch", [(), (2, 3)])
+def test_other_types_are_converted_without_compiling(model, form, batch):
+    convert, error = FORMS[form]
+    one = np.linspace(-3e-7, 3e-7, model.rest().size).reshape(model.state_shape)
+    if form == "float16":
+        one[:] = 0.0  # deflections are below its numbers
+    state, twist = np.broadcast_to(one, (*batch, *one.shape)).copy(), np.broadcast_to(TWIST, (*batch, 3)).copy()
+    sequence = np.stack([twist] * 4, -2)
+    for call, held in [(call, twist) for call in calls(model)] + [(call, sequence) for call in roll_outs(model)]:
+        wanted = call(state, held)
+        before = compiled()
+        found = call(convert(state), convert(held))
+        assert compiled() == before
+        agree(found, wanted, error)
+
+
+@every_model
+def test_whole_numbers_are_states(model):
+    rest = np.zeros(model.state_shape, dtype=int)
+    for call in calls(model):
+        wanted = call(model.rest(), np.array([1.0, 0.0, 2.0]))
+        before = compiled()
+        agree(call(rest, np.array([1, 0, 2])), wanted, 0.0)
+        agree(call(rest.astype(bool), (1, False, 2)), wanted, 0.0)
+        assert compiled() == before
