@@ -52,13 +52,13 @@ def test_the_slip_factor_is_that_of_the_very_load():
         assert shape.contact_radius**2 == pytest.approx(SOFT.second_moment(load), rel=1e-13)
 
 
-def test_a_shape_that_stays_needs_two_maps_an_octave():
+def test_a_shape_that_stays_needs_one_map_an_octave():
     still = feet([1, 2, 3], [10, 20, 30])
     family, fixed = model(still), model(pf.ContactPatch.points(SCALED.positions, [1, 2, 3]))
     twist = spread(50)
     for load in (1.0, 1.3, 1.9):
         np.testing.assert_allclose(steady(family, twist, load), steady(fixed, twist, load), rtol=0, atol=1e-13)
-    assert family.load_rungs == [1.0, 2.0]
+    assert family.load_rungs == [1.0]
 
 
 def test_a_contact_that_only_grows_is_followed_without_further_maps():
@@ -67,7 +67,7 @@ def test_a_contact_that_only_grows_is_followed_without_further_maps():
     ring = pf.ContactPatch.points(0.01 * np.stack([np.cos(angles), np.sin(angles)], 1))
     family = model(pf.ContactPatch(ring.positions, ring.areas, pf.SoftFinger(c=0.02, n=0.5, k=2.0)))
     family.shapes_at(np.linspace(1.01, 7.9, 40))
-    assert family.load_rungs == [1.0, 2.0, 4.0, 8.0]
+    assert family.load_rungs == [1.0, 2.0, 4.0]
 
 
 def test_rungs_stand_where_the_error_asks_for_them():
@@ -154,7 +154,7 @@ def test_a_run_is_that_of_shapes_rebuilt_at_every_load():
     assert abs(float(ours.y[-1])) > 1e-4
 
 
-def test_scenes_share_the_store_without_a_copy():
+def test_scenes_share_the_maps_without_a_copy():
     """A scene's record refers to the very map of the model at its load."""
     one, two = model(), model()
     contacts = [
@@ -166,6 +166,31 @@ def test_scenes_share_the_store_without_a_copy():
         data = of.shape_at(load).data
         assert data is there.kept[0]
         assert data.ctypes.data == there.records.view(np.int64)[0, -2]
+
+
+def test_a_family_forgets_before_it_takes_more_than_the_stated_memory(monkeypatch):
+    """Shapes in use keep their maps, and what is built again is what it was."""
+    lavish, loads, twist = model(), np.geomspace(0.3, 9.0, 40), spread(5)
+    expected = [steady(lavish, twist, load) for load in loads]
+    size = lavish.shape_at(1.2).data.nbytes
+    monkeypatch.setattr(load_family, "MEMORY", 4 * size)
+    family = model()
+    shapes = family.shapes_at(loads)
+    assert len(lavish.load_rungs) > 6
+    for load, shape, there in zip(loads, shapes, lavish.shapes_at(loads), strict=True):
+        assert len(family.load_rungs) <= 4
+        np.testing.assert_array_equal(shape.data, there.data)
+        np.testing.assert_array_equal(steady(family, twist, load), expected[loads.tolist().index(load)])
+
+
+def test_a_family_forgets_shapes_too(monkeypatch):
+    monkeypatch.setattr(load_family, "REMEMBERED", 5)
+    family = model()
+    shapes = family.shapes_at(np.linspace(1.0, 2.0, 23))
+    assert len(family._family._shapes) <= 5
+    assert [shape.factor.tobytes() for shape in shapes] == [
+        shape.factor.tobytes() for shape in model().shapes_at(np.linspace(1.0, 2.0, 23))
+    ]
 
 
 def test_files_keep_the_stated_error(tmp_path):

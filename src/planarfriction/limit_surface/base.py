@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import functools
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -74,6 +74,10 @@ class LimitSurface:
             object.__setattr__(self, "normal_force", validation.positive("normal_force", self.normal_force))
         if self.normal_force is not None or not self.patch.depends_on_load:
             _ = self.contact_radius  # refuses a patch of one point now rather than later
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy or another process gets, at one instant: another thread may be about to build something."""
+        return dict(self.__dict__)
 
     def at(self, normal_force: float) -> LimitSurface:
         """The same kind of surface for the shape at another load; itself where the shape does not depend on it."""

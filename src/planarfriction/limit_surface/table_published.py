@@ -37,9 +37,11 @@ class LimitSurfaceTablePublished(CompiledLimitSurface):
         object.__setattr__(self, "segments", validation.count("segments", self.segments, at_least=2))
         super().__post_init__()
 
-    @functools.cached_property
     def _grid(self) -> tuple[tuple[float, float, float, float], np.ndarray]:
-        """The patch's grid about the centre of pressure, and a cache for the sums at its corners."""
+        """The patch's grid about the centre of pressure, and a place for the sums at its corners, of the caller alone.
+
+        Compiled loops fill it as they go: two threads with one place would see each other's corners half done.
+        """
         grid = self.patch.grid
         if grid is None:
             return (0.0, 0.0, 1.0, 1.0), np.full((0, 0, 3), np.nan)
@@ -48,13 +50,13 @@ class LimitSurfaceTablePublished(CompiledLimitSurface):
         return place, np.full((grid.columns + 1, grid.rows + 1, 3), np.nan)
 
     def _radius(self) -> float:
-        place, corners = self._grid
+        place, corners = self._grid()
         return float(tables.smoothed_spin_sum(corners, place, *self._loaded_cells(), 0.0, 0.0)[2])
 
     @functools.cached_property
     def numbers(self) -> SurfaceNumbers:
         """`h` at the nodes."""
-        place, corners = self._grid
+        place, corners = self._grid()
         nodes = np.zeros((self.segments + 1, 4 * self.segments + 1, 4))
         tables.smoothed_nodes(corners, place, *self._loaded_cells(), self.contact_radius, self.segments, nodes)
         return SurfaceNumbers(self.kind, self.segments, nodes.reshape(-1))

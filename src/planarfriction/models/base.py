@@ -90,6 +90,10 @@ class FrictionModel:
         if not isinstance(self.law, FrictionLaw):
             raise InvalidValueError("law", "be a friction law of bristles, such as LuGre", self.law)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy or another process gets, at one instant: another thread may be about to build something."""
+        return dict(self.__dict__)
+
     @property
     def state_shape(self) -> tuple[int, ...]:
         """Shape of the state of one contact."""

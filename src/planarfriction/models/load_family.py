@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import threading
 
 import numpy as np
 
@@ -23,6 +24,9 @@ _WITHIN = (0.25, 0.5, 0.75)
 REMEMBERED = 4096
 """Loads whose shapes a family remembers."""
 
+MEMORY = 512e6
+"""Bytes of maps beyond which a family forgets all that it has built; default ones take 2 MB each."""
+
 
 class LoadFamily:
     """Shapes of a patch at any load, from maps that are built where loads are asked for.
@@ -35,6 +39,9 @@ class LoadFamily:
 
     On a grid the shape jumps or bends where a cell gets its first load. There `HALVINGS` ends the search: within these
     last intervals the error may be larger than `error` (soft fingers 12 cells across: 1e-3).
+
+    Any number of threads may ask: one builds at a time, and what has been built never changes. A shape holds its maps,
+    so that they live as long as anyone reads them, whatever the family forgets.
     """
 
     def __init__(self, patch: ContactPatch, gamma: float, segments: int, speeds: int, error: float) -> None:
@@ -43,46 +50,53 @@ class LoadFamily:
         self._sums: dict[float, np.ndarray | None] = {}
         self._good: dict[tuple[float, float], bool] = {}
         self._gaps: dict[tuple[float, float], float] = {}
-        self._store = np.empty(0)
         self._maps: dict[float, np.ndarray] = {}
         self._shapes: dict[float, ReducedShape] = {}
+        self._lock = threading.Lock()
+        """Held by who builds; shapes that are there are read without it."""
 
     @property
     def rungs(self) -> list[float]:
-        """Loads [N] whose maps have been built, ascending."""
-        return sorted(self._maps)
+        """Loads [N] whose maps have been built and not been forgotten, ascending."""
+        with self._lock:
+            return sorted(self._maps)
 
     def shapes(self, loads: list[float]) -> list[ReducedShape]:
         """Shapes at loads > 0 [N]: F of each load, and references to the maps of its two neighbours.
 
         Where a neighbour is so light that one point carries it, the shape is built at the load itself.
         """
-        if any(load not in self._shapes for load in loads):
-            self._add(sorted(set(loads)))
-        return [self._shapes[load] for load in loads]
+        known = self._shapes
+        found = {load: known.get(load) for load in loads}
+        missing = [load for load, shape in found.items() if shape is None]
+        if missing:
+            with self._lock:
+                found.update(self._built(missing))
+        return [found[load] for load in loads]  # pyright: ignore[reportReturnType]
 
-    def _add(self, loads: list[float]) -> None:
-        if len(self._shapes) + len(loads) > REMEMBERED:
-            self._shapes.clear()
-        between = [self._neighbours(load) for load in loads]
-        for rungs in between:
-            for rung in rungs or ():
-                self._build(rung)
-        for load, factor, rungs in zip(loads, slip_factor(self._patch, np.array(loads)), between, strict=True):
-            if rungs is None:
-                self._shapes[load] = reduced_shape(self._patch, load, *self._map)
-            else:
-                self._shapes[load] = self._blend(load, factor, *rungs)
+    def _built(self, loads: list[float]) -> dict[float, ReducedShape]:
+        """Shapes at loads that were missing, unless another thread has built them since."""
+        shapes = {}
+        for load, factor in zip(loads, slip_factor(self._patch, np.array(loads)), strict=True):
+            shape = self._shapes.get(load)
+            if shape is None:
+                rungs = self._neighbours(load)
+                alone = rungs is None
+                shape = reduced_shape(self._patch, load, *self._map) if alone else self._blend(load, factor, *rungs)
+            if len(self._shapes) >= REMEMBERED:
+                self._shapes = {}
+            shapes[load] = self._shapes[load] = shape
+        return shapes
 
     def _blend(self, load: float, factor: np.ndarray, low: float, high: float) -> ReducedShape:
         """Two rungs blended linearly in the load, or one alone where that is as close as wanted."""
         share = (load - low) / (high - low)
         apart = self._apart(low, high)
         if share * apart <= 0.5 * self._error:
-            return ReducedShape(factor, self._maps[low])
+            return ReducedShape(factor, self._map_at(low))
         if (1.0 - share) * apart <= 0.5 * self._error:
-            return ReducedShape(factor, self._maps[high])
-        return ReducedShape(factor, self._maps[low], self._maps[high], share)
+            return ReducedShape(factor, self._map_at(high))
+        return ReducedShape(factor, self._map_at(low), self._map_at(high), share)
 
     def _neighbours(self, load: float) -> tuple[float, float] | None:
         """The two rungs around a load, None if one of them has no map."""
@@ -130,21 +144,16 @@ class LoadFamily:
         cells = ScaledCells(self._patch, load, slip_factor(self._patch, load))
         return cells.sums(_directions(), np.empty(0), self._map[0])[:, 0]
 
-    def _build(self, rung: float) -> None:
-        """Build the map of a rung into the store, one array for all maps, so that nothing is copied to simulate."""
-        if rung in self._maps:
-            return
-        data = reduced_map(ScaledCells(self._patch, rung, slip_factor(self._patch, rung)), *self._map)
-        used = len(self._maps) * len(data)
-        if used + len(data) > len(self._store):
-            store = np.empty(max(2 * len(self._store), 8 * len(data)))
-            store[:used] = self._store[:used]
-            self._store = store
-            self._maps = {load: store[i * len(data) : (i + 1) * len(data)] for i, load in enumerate(self._maps)}
-            self._shapes.clear()  # they refer to the old store
-        view = self._store[used : used + len(data)]
-        view[:] = data
-        self._maps[rung] = view
+    def _map_at(self, rung: float) -> np.ndarray:
+        """The map of a rung."""
+        found = self._maps.get(rung)
+        if found is None:
+            cells = ScaledCells(self._patch, rung, slip_factor(self._patch, rung))
+            found = reduced_map(cells, *self._map)
+            if (len(self._maps) + 1) * found.nbytes > MEMORY:
+                self._maps, self._shapes = {}, {}
+            self._maps[rung] = found
+        return found
 
 
 def _largest(error: np.ndarray, of: np.ndarray) -> float:

@@ -16,7 +16,7 @@ from planarfriction.kernels.reduced_contact import ReducedContact, Shape
 from planarfriction.laws.base import refuse_creep
 from planarfriction.models.base import PackedModel
 from planarfriction.models.load_family import LoadFamily
-from planarfriction.models.reduced_map import ReducedShape, owner, reduced_shape
+from planarfriction.models.reduced_map import ReducedShape, reduced_shape
 from planarfriction.models.three_states import ThreeStateModel
 
 
@@ -77,7 +77,7 @@ class ReducedModel(ThreeStateModel):
         return self._family.rungs
 
     def packed(self, loads: Sequence[float | None]) -> PackedModel:
-        """See `FrictionModel.packed`; a family's maps stay where they are, its shapes refer to them."""
+        """See `FrictionModel.packed`; nothing is copied, the records refer to the maps of the shapes."""
         return self._records(self.shapes_at(loads))
 
     def _records(self, shapes: Sequence[ReducedShape]) -> PackedModel:
@@ -105,10 +105,10 @@ class ReducedModel(ThreeStateModel):
         return LoadFamily(self.patch, self.law.numbers.gamma, self.segments, self.speeds, self.load_error)
 
     def _built_at(self, load: float) -> ReducedShape:
-        def build(load: float) -> ReducedShape:
+        def build() -> ReducedShape:
             return reduced_shape(self.patch, load, self.law.numbers.gamma, self.segments, self.speeds)
 
-        return self._remembered(load, build)
+        return self._recent.get(load, build)
 
     def _shapes_of(self, loads: np.ndarray):
         values = np.unique(loads[loads > 0.0])
@@ -119,8 +119,9 @@ class ReducedModel(ThreeStateModel):
     def _maps(self, shape: ReducedShape) -> tuple[np.ndarray, np.ndarray]:
         if shape.other is None:
             return np.zeros(3, dtype=int), shape.data
-        store, start = owner(shape.data)
-        return np.array([start, owner(shape.other)[1], 0]), store
+        # compiled loops reach both maps from the one that lies first in memory: they take no negative numbers
+        apart = (place_of(shape.other) - place_of(shape.data)) // shape.data.itemsize
+        return np.array([max(-apart, 0), max(apart, 0), 0]), shape.data if apart > 0 else shape.other
 
     def _levers(self, shape: ReducedShape) -> tuple[np.ndarray, np.ndarray]:
         return shape.factor, shape.factor

@@ -51,14 +51,6 @@ def reduced_shape(
     return ReducedShape(factor, reduced_map(ScaledCells(patch, normal_force, factor), gamma, segments, speeds))
 
 
-def owner(data: np.ndarray) -> tuple[np.ndarray, int]:
-    """The flat array that `data` is a piece of, and where in it the piece begins; itself and 0 if it is no piece."""
-    base = data.base
-    if not (isinstance(base, np.ndarray) and base.ndim == 1 and base.dtype == data.dtype and base.flags.c_contiguous):
-        return data, 0
-    return base, (data.ctypes.data - base.ctypes.data) // data.itemsize
-
-
 def slip_factor(patch: ContactPatch, normal_force=None) -> np.ndarray:
     """F `[..., 3, 3]`, upper triangular, with `F'F = sum(w B'B)`: what the cells see of a twist V is `B V`.
 

@@ -83,7 +83,7 @@ class ReducedModelPublished(ThreeStateModel):
         if not self.patch.depends_on_load or self.on_load_change == "keep":
             return self._reference
         load = validation.positive("normal_force", normal_force)
-        return self._remembered(load, self._shape_at)
+        return self._recent.get(load, lambda: self._shape_at(load))
 
     def packed(self, loads: Sequence[float | None]) -> PackedModel:
         """See `FrictionModel.packed`."""

@@ -17,6 +17,7 @@ from planarfriction.kernels.pointers import place_of
 from planarfriction.kernels.rollouts import step_batch, step_one
 from planarfriction.models.base import FrictionModel, ModelJacobians, PackedModel, StepJacobians
 from planarfriction.models.rates import linearised, rates
+from planarfriction.models.remembered import Remembered
 
 _REMEMBERED = 64
 """Loads whose shapes a model remembers that builds each."""
@@ -27,6 +28,9 @@ _PLAIN = frozenset((float, int, np.float64))
 """What needs no conversion to a number."""
 
 _COMPILING = threading.Lock()
+
+_HERE_ALONE = ("_fixed", "_fixed_record", "_recent", "_family")
+"""What a copy makes anew: addresses hold in this process, and memories are shared by threads, not by models."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,12 +76,12 @@ class ThreeStateModel(FrictionModel):
             held = twist
         elif kind is _ARRAY and twist.ndim == 1 and twist.dtype is _FLOAT:
             held = twist.tolist()
-        if held is not None and type(state) is _ARRAY and state.shape == (3,) and self._fixed is not None:
+        if held is not None and type(state) is _ARRAY and state.shape == (3,) and (fixed := self._fixed):
             # one contact: no batch to broadcast, and the compiled step checks what it is given
             result = np.empty(14)
             try:
                 vx, vy, omega = held
-                if step_one(self._fixed[0], state, vx, vy, omega, normal_force, dt, result):
+                if step_one(fixed[0], state, vx, vy, omega, normal_force, dt, result):
                     return result[:3], result[3:6]
             except (TypeError, ValueError):  # not plain numbers, or a batch: the checks below decide
                 pass
@@ -132,16 +136,9 @@ class ThreeStateModel(FrictionModel):
         return self.patch.depends_on_load
 
     @functools.cached_property
-    def _recent(self) -> dict[float, Any]:
-        return {}
-
-    def _remembered(self, load: float, build) -> Any:
-        """`build(load)`, or what it gave for this load lately."""
-        if load not in self._recent:
-            while len(self._recent) >= _REMEMBERED:
-                self._recent.pop(next(iter(self._recent)))
-            self._recent[load] = build(load)
-        return self._recent[load]
+    def _recent(self) -> Remembered[Any]:
+        """Shapes at the latest loads."""
+        return Remembered(_REMEMBERED)
 
     def _records(self, shapes: Sequence[Any]) -> PackedModel:
         """See `packed`."""
@@ -190,8 +187,8 @@ class ThreeStateModel(FrictionModel):
         return np.array([self._kernels.step_address(), place_of(row), place_of(data)]), row, data
 
     def __getstate__(self) -> dict[str, Any]:
-        """What a copy or another process gets: all but addresses, which hold here alone."""
-        return {name: value for name, value in self.__dict__.items() if name not in ("_fixed", "_fixed_record")}
+        """What a copy or another process gets."""
+        return {name: value for name, value in super().__getstate__().items() if name not in _HERE_ALONE}
 
     def _by_load(self, function, inner: tuple[int, ...], state, twist, load, *more) -> np.ndarray:
         """Apply `function(shape, state, twist, load, ...)` to flat batches, one for each shape that the loads take."""
@@ -229,7 +226,7 @@ class ThreeStateModel(FrictionModel):
     def _step(self, shape: Any, state, twist, load, dt) -> np.ndarray:
         out = np.empty((len(load), 6))
         inputs = np.concatenate([state, twist, load[:, None], dt[:, None]], axis=1)
-        contact = self._contact(shape)  # kept until the call is over
+        contact = self._contact(shape)  # it and the shape, which holds the other map, are kept until the call is over
         step_batch(contact[0], inputs, out)
         return out
 
@@ -254,10 +251,11 @@ class ThreeStateModel(FrictionModel):
 
     def _step_jacobians(self, shape: Any, state, twist, load, dt) -> np.ndarray:
         slopes = np.empty((len(load), 6, 7 + len(self._kernels.NAMES)))
-        if self._fixed is None:
+        fixed = self._fixed
+        if fixed is None:
             row, (surface, data) = self._row(shape), self._maps(shape)
         else:
-            _, numbers, data = self._fixed
+            _, numbers, data = fixed
             row, surface = numbers[:-3], numbers[-3:].astype(int)
         self._kernels.jacobians(row, surface, data, (state, twist, load, dt), slopes)
         return slopes[:, :, :7]

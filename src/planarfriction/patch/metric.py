@@ -57,6 +57,10 @@ class Anisotropy:
         patch = dataclasses.replace(self, metric=metric, asymmetry=asymmetry)  # pyright: ignore
         return with_outline(patch, self.outline)  # pyright: ignore
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy or another process gets, at one instant: another thread may be about to look at the metric."""
+        return dict(self.__dict__)
+
     @functools.cached_property
     def anisotropic(self) -> bool:
         """Whether friction depends on the direction; metrics of ones and asymmetries of zero do not make it so."""

@@ -42,6 +42,7 @@ class PressureMaps(Pressure):
         for name, array in (("loads", loads), ("values", values)):
             array.setflags(write=False)
             object.__setattr__(self, name, array)
+        _ = self._shares  # now, and not while another thread copies what there is
 
     @functools.cached_property
     def _shares(self) -> np.ndarray:
