@@ -30,7 +30,7 @@ from scipy.optimize import minimize
 import planarfriction as pf
 from planarfriction import validation
 from planarfriction.errors import FileError
-from planarfriction.scenes.solution import check_writable
+from planarfriction.writing import check_writable
 
 LENGTH = 0.05  # rho of the metric: angles are between (vx, vy, rho omega) [m]
 TO_FIT, TO_TEST = 30, 10  # pushes of a split, as the authors did

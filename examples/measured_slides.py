@@ -29,7 +29,7 @@ import planarfriction as pf
 from planarfriction import validation
 from planarfriction.errors import FileError
 from planarfriction.scenes.ready import GRAVITY
-from planarfriction.scenes.solution import check_writable
+from planarfriction.writing import check_writable
 
 MASS, INERTIA, SIDE = 0.37, 8.10e-4, 0.1048  # of the cube [kg, kg m^2, m]
 OUTLINE = 0.5 * SIDE * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])

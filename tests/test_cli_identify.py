@@ -60,4 +60,4 @@ def test_a_bad_line_is_named(path, tmp_path, capsys):
     bad.write_text("\n".join(lines))
     assert main(["identify", str(bad)]) == 2
     message = capsys.readouterr().err
-    assert "line 8, column vx" in message and message.count("\n") == 1
+    assert "line 8, column 'vx'" in message and message.count("\n") == 1

@@ -265,11 +265,11 @@ def test_log_of_poses(log, tmp_path):
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", ["no numbers"]),
+        ("", ["is empty"]),
         ("t,vx,vy,omega,fx,fy\n0,0,0,0,0,0\n", ["no column tau, normal_force"]),
-        ("t,vx,vy,omega,fx,fy,tau,normal_force\n0,0,0,0,left,0,0,1\n", ["line 2", "column fx", "'left'"]),
-        ("# made\nt,vx,vy,omega,fx,fy,tau,normal_force\n0,0,0,0,0,0,0\n", ["line 3", "7 values"]),
-        ("t,vx,vy,omega,fx,fy,tau,normal_force\n0,0,0,nan,0,0,0,1\n", ["line 2", "column omega", "not finite"]),
+        ("t,vx,vy,omega,fx,fy,tau,normal_force\n0,0,0,0,left,0,0,1\n", ["line 2", "column 'fx'", "'left'"]),
+        ("# made\nt,vx,vy,omega,fx,fy,tau,normal_force\n0,0,0,0,0,0,0\n", ["line 3", "7 columns"]),
+        ("t,vx,vy,omega,fx,fy,tau,normal_force\n0,0,0,nan,0,0,0,1\n", ["line 2", "column 'omega'", "not finite"]),
         ("t,t,vx,vy,omega,fx,fy,tau,normal_force\n0,0,0,0,0,0,0,0,1\n", ["two columns 't'"]),
         ("t,vx,vy,omega,fx,fy,tau,normal_force\n0,0,0,0,0,0,0,1\n", ["at least 10 samples"]),
     ],

@@ -308,7 +308,7 @@ def test_animations_that_cannot_be_written_say_why(tmp_path, monkeypatch):
     monkeypatch.setattr(motion.shutil, "which", lambda name: None)
     with pytest.raises(FileError, match="ffmpeg"):
         plots.animate_motion(run, tmp_path / "motion.mp4")
-    with pytest.raises(FileError, match="cannot write"):
+    with pytest.raises(FileError, match="cannot be written"):
         plots.animate_motion(run, tmp_path / "missing" / "motion.gif")
 
 

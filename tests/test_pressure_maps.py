@@ -126,10 +126,10 @@ def test_broken_arrays(values, cell_size, message):
     ("file", "content", "message"),
     [
         ("pad.csv", "1,2\n3\n", "line 2 has 1 values, the first row has 2"),
-        ("pad.csv", "# kPa\n1,2\n3,x\n", "line 3, value 2: 'x' is no number"),
-        ("pad.csv", "1;2\n3;4\n", "line 1, value 1: '1;2' is no number"),
+        ("pad.csv", "# kPa\n1,2\n3,x\n", "line 3, value 2: 'x' is not a number"),
+        ("pad.csv", "1;2\n3;4\n", "line 1, value 1: '1;2' is not a number"),
         ("pad.csv", "", "the file holds no numbers"),
-        ("pad.csv", b"\x89PNG\r\n\x1a\n", "not a readable .csv file"),
+        ("pad.csv", b"\x89PNG\r\n\x1a\n", "not a text file (expected a pressure map)"),
         ("pad.npy", "1,2\n3,4\n", "not a readable .npy file"),
         ("pad.npy", "", "not a readable .npy file"),
         ("pad.png", "1,2\n3,4\n", "not a readable .png file"),
@@ -154,13 +154,9 @@ def test_missing_file_and_folder(tmp_path):
             pf.ContactPatch.from_pressure(tmp_path / name, 0.001)
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [("1,2\n3,nan\n", r"finite, got nan at index \(1, 1\)"), ("1,-2\n", r">= 0, got -2.0 at index \(0, 1\)")],
-)
-def test_broken_numbers_in_a_file_name_the_file(tmp_path, text, message):
-    (tmp_path / "pad.csv").write_text(text)
-    with pytest.raises(InvalidValueError, match=rf"pressure map .*pad.csv must be {message}"):
+def test_negative_pressures_in_a_file_name_the_file(tmp_path):
+    (tmp_path / "pad.csv").write_text("1,-2\n")
+    with pytest.raises(InvalidValueError, match=r"pressure map .*pad.csv must be >= 0, got -2.0 at index \(0, 1\)"):
         pf.ContactPatch.from_pressure(tmp_path / "pad.csv", 0.001)
 
 

@@ -321,7 +321,7 @@ def test_scene_with_default_tolerances_agrees_with_a_tight_one():
 
 def test_a_scene_file_keeps_the_model():
     from planarfriction.scenes.model_files import model_from_dict, model_to_dict
-    from planarfriction.scenes.reading import Section
+    from planarfriction.scenes.section import Section
 
     model = pf.ReducedModel(FEET, ELASTIC, **SMALL)
     again = model_from_dict(Section(model_to_dict(model), "contact"))

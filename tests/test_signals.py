@@ -185,7 +185,7 @@ def test_a_force_that_dips_below_zero_is_named_with_its_time():
         ("time,value\n", "has a header line but no rows"),
         ("", "is empty"),
         ("time,value\n1,1\n0,1\n", "times must increase, got 1 s, then 0 s at index 1 (unsorted)"),
-        ("time,value\n0,nan\n", "values must be finite"),
+        ("time,value\n0,nan\n", "line 2, column 'value': 'nan' is not finite"),
     ],
 )
 def test_bad_csv_files_get_one_line(tmp_path, text, message):

@@ -10,7 +10,8 @@ import xarray as xr
 import planarfriction as pf
 from planarfriction import FrictionError, Solution
 from planarfriction.scenes import Statistics, in_hand, load
-from planarfriction.scenes.solution import History, check_writable
+from planarfriction.scenes.solution import History, write_dataset
+from planarfriction.writing import check_writable
 
 UNITS = {"fx": "N", "fy": "N", "tau": "N m", "normal_force": "N"}
 
@@ -127,7 +128,8 @@ def test_files_that_are_no_solutions_get_one_line(tmp_path):
     (tmp_path / "hdf.nc").write_bytes(b"\x89HDF\r\n")
     xr.Dataset({"a": ("x", [1.0])}).to_netcdf(tmp_path / "other.nc", engine="scipy")
     strange = load(tmp_path / "good.nc").data.assign_attrs(scene="{}", statistics="{}", status="", message="")
-    strange.to_netcdf(tmp_path / "strange.nc", engine="scipy")
+    write_dataset(strange, tmp_path / "strange.nc")
+    write_dataset(strange.drop_attrs(), tmp_path / "bare.nc")
     (tmp_path / "folder.nc").mkdir()
     for name, reason in {
         "none.nc": "no such file",
@@ -136,7 +138,8 @@ def test_files_that_are_no_solutions_get_one_line(tmp_path):
         "text.nc": "not a saved solution",
         "empty.nc": "not a saved solution",
         "hdf.nc": "not a saved solution",
-        "other.nc": "not a saved solution of planarfriction",
+        "other.nc": "not a saved solution: it has no checksum",
+        "bare.nc": "not a saved solution of planarfriction (no attribute 'scene')",
         "strange.nc": "the scene in this file cannot be read: scene: missing key",
     }.items():
         with pytest.raises(FrictionError) as caught:

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 from planarfriction import validation
 from planarfriction.cli import output
 from planarfriction.cli.console import note, print_table, work_progress
-from planarfriction.errors import FileError, InvalidValueError
+from planarfriction.errors import InvalidValueError
+from planarfriction.writing import make_folder, write_text
 
 if TYPE_CHECKING:
     from planarfriction.identify import Identification
@@ -24,7 +25,7 @@ def identify(
     from planarfriction.identify import Log, identify_lugre
 
     if folder is not None:
-        output.prepare_folder(folder)
+        make_folder(folder)
     logs = [Log.from_csv(path, normal_force=normal_force) for path in paths]
     with work_progress("identifying") as progress:
         found = identify_lugre(logs, patch, progress=progress, **options)
@@ -65,10 +66,6 @@ def parse_noise(text: str | None) -> list[float] | None:
 
 def _write(found: Identification, folder: Path, stem: str) -> None:
     table, picture = folder / f"{stem}-identification.json", folder / f"{stem}-residuals.png"
-    try:
-        table.write_text(json.dumps(found.to_dict(), indent=2) + "\n", encoding="utf-8")
-        found.plot().savefig(picture)
-    except OSError as error:
-        raise FileError(f"cannot write to folder {folder}: {error.strerror or error}") from error
+    write_text(table, json.dumps(found.to_dict(), indent=2) + "\n")
     note(f"wrote {table}")
-    note(f"wrote {picture}")
+    note(f"wrote {output.write_picture(found.plot(), picture)}")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from planarfriction.cli.console import note, print_table
-from planarfriction.cli.output import check_picture, check_table, write_csv
+from planarfriction.cli.output import check_picture, check_table, write_csv, write_picture
 from planarfriction.cli.patches import find_patch, pressure_map
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import SURFACES
@@ -56,8 +56,7 @@ def show(patch: ContactPatch, kind: str, *, picture: Path | None, table: Path | 
     if picture is not None:
         from planarfriction import plots
 
-        plots.plot_limit_surface(surface).savefig(picture)
-        note(f"wrote {picture}")
+        note(f"wrote {write_picture(plots.plot_limit_surface(surface), picture)}")
 
 
 def _directions() -> tuple[np.ndarray, np.ndarray]:

@@ -3,32 +3,20 @@
 from __future__ import annotations
 
 import re
-import tempfile
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from planarfriction.errors import FileError
-from planarfriction.scenes.solution import check_writable
+from planarfriction.writing import check_writable, replacing, write_text
 
 if TYPE_CHECKING:
     from planarfriction.scenes import Solution
 
 PICTURES = (".png", ".pdf", ".svg")
 """Kinds of pictures."""
-
-
-def prepare_folder(folder: Path) -> Path:
-    """Make the folder if need be and try to write in it; raises FileError where that is not possible."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise FileError(f"cannot write to folder {folder}: {error.strerror or error}") from error
-    return folder
 
 
 def check_picture(path: Path) -> Path:
@@ -53,10 +41,14 @@ def write_csv(path: Path, columns: Mapping[str, np.ndarray]) -> None:
     lines += [
         ",".join(map(repr, row)) for row in zip(*(np.asarray(each).tolist() for each in columns.values()), strict=True)
     ]
-    try:
-        path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"{path}: cannot be written: {error.strerror or error}") from error
+    write_text(path, "\n".join(lines) + "\n")
+
+
+def write_picture(figure: Any, path: Path) -> Path:
+    """Write a matplotlib figure to `path`, of the kind that its suffix says; returns the path."""
+    with replacing(path) as file:
+        figure.savefig(file, format=path.suffix[1:].lower())
+    return path
 
 
 def write_solution(solution: Solution, folder: Path, label: str) -> list[Path]:

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from planarfriction.cli import INTERRUPTED, OUT_OF_TOLERANCE
 from planarfriction.cli.console import note, print_table, work_progress
-from planarfriction.cli.output import prepare_folder
 from planarfriction.errors import InvalidValueError
+from planarfriction.writing import make_folder
 
 
 def show_list() -> None:
@@ -29,7 +29,7 @@ def reproduce(names: Sequence[str], folder: Path, *, quick: bool, full: bool, ag
     chosen = [find_experiment(name).name for name in names] or list(EXPERIMENTS)
     from planarfriction.experiments.reproduction import Reproduction
 
-    reproduction = Reproduction(prepare_folder(folder), quick, full)
+    reproduction = Reproduction(make_folder(folder), quick, full)
     code = 0
     try:
         for index, name in enumerate(chosen, 1):
@@ -54,7 +54,7 @@ def _write(reproduction) -> None:
     import json
 
     from planarfriction.experiments.report import number, write_report
-    from planarfriction.experiments.reproduction import write_text
+    from planarfriction.writing import write_text
 
     records = reproduction.records()
     if not records:

@@ -14,6 +14,7 @@ from planarfriction.cli.patches import WIDTH, find_patch
 from planarfriction.cli.report import comparison
 from planarfriction.errors import SimulationInterrupted, SolverError
 from planarfriction.families import MODELS, SCENES
+from planarfriction.writing import make_folder
 
 if TYPE_CHECKING:
     from planarfriction.patch import ContactPatch
@@ -101,7 +102,7 @@ def run(
     if rtol is not None:
         options["rtol"] = validation.positive("--rtol", rtol)
     if folder is not None:
-        output.prepare_folder(folder)
+        make_folder(folder)
     solutions: dict[str, Solution] = {}
     try:
         for label, scene in scenes.items():
@@ -158,8 +159,7 @@ def _draw(solutions: dict[str, Solution], folder: Path, pictures: Sequence[str])
             contact = first.scene.contacts[0]
             figures[f"{name}-patch"] = plots.plot_patch(contact.model.patch, normal_force=_first_load(contact))
             for stem, figure in figures.items():
-                figure.savefig(folder / f"{stem}.png")
-                note(f"wrote {folder / stem}.png")
+                note(f"wrote {output.write_picture(figure, folder / f'{stem}.png')}")
         if "animate" in pictures:
             for label, solution in solutions.items():
                 note(f"wrote {plots.animate_motion(solution, folder / f'{name}-motion-{output.slug(label)}.gif')}")

@@ -14,6 +14,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from planarfriction.experiments import facts
+from planarfriction.writing import make_folder, replacing
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -191,9 +192,7 @@ def _read_piece(path: Path, fingerprint: str) -> Arrays | None:
 
 
 def _write_piece(path: Path, fingerprint: str, arrays: Arrays) -> None:
-    path.parent.mkdir(parents=True, exist_ok=True)
-    part = path.with_suffix(".part")
-    with part.open("wb") as file:
-        contents: dict[str, Any] = {"fingerprint": np.array(fingerprint), **arrays}
+    make_folder(path.parent)
+    contents: dict[str, Any] = {"fingerprint": np.array(fingerprint), **arrays}
+    with replacing(path) as file:
         np.savez_compressed(file, **contents)
-    part.replace(path)

@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from planarfriction import __version__
-from planarfriction.experiments.reproduction import Record, Reproduction, machine, write_text
+from planarfriction.experiments.reproduction import Record, Reproduction, machine
+from planarfriction.writing import write_text
 
 
 def write_report(reproduction: Reproduction) -> Path:

@@ -24,10 +24,10 @@ from pathlib import Path
 from typing import Any
 
 from planarfriction import __version__
-from planarfriction.errors import FileError
 from planarfriction.experiments import EXPERIMENTS, Experiment, find_experiment
 from planarfriction.experiments.experiment import Result, Work
 from planarfriction.scenes.solution import write_dataset
+from planarfriction.writing import make_folder, replacing, write_text
 
 Record = dict[str, Any]
 """A result as it is stored: what `result.json` holds."""
@@ -88,14 +88,13 @@ class Reproduction:
         if progress is not None:
             progress("drawing and writing")
         record = _record(each, result) | {"fingerprint": self.fingerprint}
-        try:
-            home.mkdir(parents=True, exist_ok=True)
-            for picture in result.pictures:
-                picture.figure.savefig(home / f"{picture.name}.png", dpi=150)
-                picture.figure.set_layout_engine("none")  # laid out once is enough for both
-                picture.figure.savefig(home / f"{picture.name}.svg", metadata={"Date": None})
-        except OSError as error:
-            raise FileError(f"{home}: cannot be written: {error.strerror or error}") from error
+        make_folder(home)
+        for picture in result.pictures:
+            with replacing(home / f"{picture.name}.png") as file:
+                picture.figure.savefig(file, format="png", dpi=150)
+            picture.figure.set_layout_engine("none")  # laid out once is enough for both
+            with replacing(home / f"{picture.name}.svg") as file:
+                picture.figure.savefig(file, format="svg", metadata={"Date": None})
         for name, dataset in result.data.items():
             write_dataset(dataset, home / f"{name}.nc")
         record["seconds"] = round(time.perf_counter() - begin, 2)
@@ -120,16 +119,6 @@ def machine() -> dict[str, Any]:
         "python": platform.python_version(),
         **packages,
     }
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a file, all or nothing; raises FileError where that is not possible."""
-    part = path.with_name(f"{path.name}.part")
-    try:
-        part.write_text(text, encoding="utf-8")
-        part.replace(path)
-    except OSError as error:
-        raise FileError(f"{path}: cannot be written: {error.strerror or error}") from error
 
 
 def _record(each: Experiment, result: Result) -> Record:

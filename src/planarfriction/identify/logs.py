@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +10,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import FileError, InvalidValueError
+from planarfriction.reading import Table
 
 TWIST = ("vx", "vy", "omega")
 MOTION = ("x", "y", "theta")
@@ -96,24 +95,24 @@ class Log:
 
         Raises FileError in one line with the line and the column of what is wrong.
         """
-        path = Path(path)
-        columns = read_columns(path)
-        time = columns.get("t", columns.get("time"))
-        if normal_force is not None and "normal_force" not in columns:
-            columns["normal_force"] = np.array(float(normal_force))
-        motion = TWIST if all(name in columns for name in TWIST) else MOTION
-        missing = [name for name in (*motion, *WRENCH, "normal_force") if name not in columns]
+        path, table = Path(path), Table(path)
+        time = next((name for name in ("t", "time") if name in table.names), None)
+        motion = TWIST if all(name in table.names for name in TWIST) else MOTION
+        load = ("normal_force",) if normal_force is None or "normal_force" in table.names else ()
+        missing = [name for name in (*motion, *WRENCH, *load) if name not in table.names]
         if time is None or missing:
             lacking = [*([] if time is not None else ["t"]), *missing]
             raise FileError(
                 f"{path}: has no column {', '.join(lacking)}; a log has t, {', '.join(TWIST)} (or "
                 f"{', '.join(MOTION)}), {', '.join(WRENCH)}, normal_force"
             )
-        moved, wrench = (np.stack([columns[name] for name in names], -1) for names in (motion, WRENCH))
+        columns = table.numbers([time, *motion, *WRENCH, *load])
+        times, moved, wrench = columns[:, 0], columns[:, 1:4], columns[:, 4:7]
+        loads = columns[:, 7] if load else normal_force
         try:
             if motion is TWIST:
-                return cls(time, moved, wrench, columns["normal_force"], path.stem)
-            return cls.from_motion(time, moved, wrench, columns["normal_force"], window=window, name=path.stem)
+                return cls(times, moved, wrench, loads, path.stem)
+            return cls.from_motion(times, moved, wrench, loads, window=window, name=path.stem)
         except InvalidValueError as error:
             raise FileError(f"{path}: {error}") from None
 
@@ -147,54 +146,6 @@ def differentiated(time, motion, *, window: int = 7) -> np.ndarray:
     return np.stack(
         [cos * slopes[:, 0] + sin * slopes[:, 1], cos * slopes[:, 1] - sin * slopes[:, 0], slopes[:, 2]], -1
     )
-
-
-def read_columns(path: Path) -> dict[str, np.ndarray]:
-    """Columns of numbers of a CSV file with a heading; raises FileError with line and column of what is no number."""
-    try:
-        with path.open(newline="", encoding="utf-8-sig") as file:
-            return _columns(path, _rows(file))
-    except FileNotFoundError:
-        raise FileError(f"{path}: no such file") from None
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        reason = getattr(error, "strerror", None) or " ".join(str(error).split())
-        raise FileError(f"{path}: cannot be read as a table: {reason}") from None
-
-
-def _rows(file) -> list[tuple[int, list[str]]]:
-    reader = csv.reader(file)
-    return [
-        (reader.line_num, row)
-        for row in reader
-        if any(entry.strip() for entry in row) and not row[0].lstrip().startswith("#")
-    ]
-
-
-def _columns(path: Path, rows: Sequence[tuple[int, list[str]]]) -> dict[str, np.ndarray]:
-    if len(rows) < 2:
-        raise FileError(f"{path}: holds no numbers (a heading and one line for each sample are needed)")
-    names = [entry.strip() for entry in rows[0][1]]
-    for name in names:
-        if names.count(name) > 1:
-            raise FileError(f"{path}: line {rows[0][0]} has two columns {name!r}")
-    needed = [i for i, name in enumerate(names) if name in {"t", "time", *TWIST, *MOTION, *WRENCH, "normal_force"}]
-    values = np.empty((len(rows) - 1, len(names)))
-    for row, (line, entries) in zip(values, rows[1:], strict=True):
-        if len(entries) != len(names):
-            raise FileError(f"{path}: line {line} has {len(entries)} values, the heading has {len(names)}")
-        for i in needed:
-            row[i] = _number(path, line, names[i], entries[i])
-    return {names[i]: values[:, i] for i in needed}
-
-
-def _number(path: Path, line: int, column: str, entry: str) -> float:
-    try:
-        value = float(entry)
-    except ValueError:
-        raise FileError(f"{path}: line {line}, column {column}: {entry.strip()!r} is no number") from None
-    if not math.isfinite(value):
-        raise FileError(f"{path}: line {line}, column {column}: {entry.strip()!r} is not finite")
-    return value
 
 
 def columns_of(log: Log) -> Mapping[str, np.ndarray]:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 
 import numpy as np
 
 from planarfriction.errors import FileError
+from planarfriction.reading import number, read_rows
 
 IMAGE_SUFFIXES = (".png", ".tif", ".tiff", ".bmp", ".pgm", ".jpg", ".jpeg")
 """Suffixes of the files that are read as grey images."""
@@ -40,31 +40,20 @@ def read_pressure_map(path: str | Path) -> np.ndarray:
     except FileError:
         raise
     # Pillow reports a broken PNG as SyntaxError; an oversized header of an NPY file ends in a MemoryError.
-    except (OSError, ValueError, SyntaxError, EOFError, MemoryError, csv.Error) as error:
+    except (OSError, ValueError, SyntaxError, EOFError, MemoryError) as error:
         reason = " ".join(str(error).split()) or type(error).__name__
         raise FileError(f"pressure map {path}: not a readable {path.suffix.lower()} file ({reason})") from error
 
 
 def _read_csv(path: Path) -> np.ndarray:
-    with path.open(newline="", encoding="utf-8-sig") as file:
-        lines = [
-            (number, line)
-            for number, line in enumerate(csv.reader(file), start=1)
-            if any(entry.strip() for entry in line) and not line[0].lstrip().startswith("#")
-        ]
-    if not lines:
+    rows: list[list[float]] = []
+    for line, cells in read_rows(path, "a pressure map"):
+        if rows and len(cells) != len(rows[0]):
+            rule = f"has {len(cells)} values, the first row has {len(rows[0])}"
+            raise FileError(f"pressure map {path}: line {line} {rule}")
+        rows.append([number(f"pressure map {path}", line, f"value {i}", cell) for i, cell in enumerate(cells, 1)])
+    if not rows:
         raise FileError(f"pressure map {path}: the file holds no numbers")
-    rows, width = [], len(lines[0][1])
-    for number, line in lines:
-        if len(line) != width:
-            raise FileError(f"pressure map {path}: line {number} has {len(line)} values, the first row has {width}")
-        row = []
-        for column, entry in enumerate(line, start=1):
-            try:
-                row.append(float(entry))
-            except ValueError:
-                raise FileError(f"pressure map {path}: line {number}, value {column}: {entry!r} is no number") from None
-        rows.append(row)
     return np.array(rows)
 
 

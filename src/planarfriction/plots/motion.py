@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,7 @@ from planarfriction import geometry
 from planarfriction.errors import FileError
 from planarfriction.plots import style
 from planarfriction.plots.patch import cell_boxes
+from planarfriction.writing import replacing
 
 if TYPE_CHECKING:
     from planarfriction.scenes import Contact, Solution
@@ -90,16 +92,16 @@ def animate_motion(solution: Solution, path: str | Path) -> Path:
     clock = axes.set_title(f"t = {time[-1]:.2f} s", fontsize="medium")
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # laid out once, so that the frames do not jitter
-    try:
-        with writer.saving(figure, str(path), dpi=100):
+    with replacing(path) as file, tempfile.TemporaryDirectory() as folder:
+        drawn = Path(folder) / f"motion{path.suffix}"  # the writers take no buffers
+        with writer.saving(figure, str(drawn), dpi=100):
             for instant in np.linspace(time[0], time[-1], count):
                 index = int(np.abs(time - instant).argmin())
                 _move(body, axes, poses[index])
                 track.set_data(*(1e3 * poses[: index + 1, :2].T))
                 clock.set_text(f"t = {time[index]:.2f} s")
                 writer.grab_frame()
-    except OSError as error:
-        raise FileError(f"cannot write {path}: {error.strerror or error}") from error
+        file.write(drawn.read_bytes())
     return path
 
 

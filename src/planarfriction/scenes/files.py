@@ -16,11 +16,13 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import FileError, InvalidValueError
+from planarfriction.reading import read_text
 from planarfriction.scenes.model_files import model_from_dict, model_to_dict
-from planarfriction.scenes.reading import Section, read_text
 from planarfriction.scenes.scene import Body, Contact, Scene
+from planarfriction.scenes.section import Section
 from planarfriction.scenes.signal import read_signal
 from planarfriction.scenes.toml_writer import to_toml
+from planarfriction.writing import write_text
 
 SCENE_KEYS = ("name", "t_end", "save_every", "stop_speed", "rtol", "atol", "body", "force", "velocity", "contact")
 BODY_KEYS = ("mass", "inertia", "position", "angle", "velocity", "gravity", "outline", "size")
@@ -139,7 +141,4 @@ def write_scene(scene: Scene, path: str | Path) -> None:
         raise InvalidValueError("path of a scene file", "end in .toml or .json", str(path))
     data = scene.to_dict()
     text = to_toml(data) if kind == ".toml" else json.dumps(data, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
-    try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise FileError(f"{path}: cannot be written: {error.strerror or error}") from None
+    write_text(path, text)

@@ -16,7 +16,7 @@ import numpy as np
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import LAWS, MODELS, SHAPES, SURFACES, Family
 from planarfriction.laws import ElastoPlastic
-from planarfriction.scenes.reading import Section
+from planarfriction.scenes.section import Section
 
 _GIVEN = ("patch", "law")
 """Parameters of models and surfaces that are not keys of their tables."""

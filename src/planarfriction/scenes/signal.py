@@ -11,7 +11,8 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
-from planarfriction.scenes.reading import Section, read_columns
+from planarfriction.reading import Table
+from planarfriction.scenes.section import Section
 
 Hold = Literal["previous", "linear"]
 
@@ -97,7 +98,7 @@ class Signal:
         the numbers, and InvalidValueError as the constructor does.
         """
         names = [value] if isinstance(value, str) else list(value)
-        table = read_columns(path, [time, *names])
+        table = Table(path).numbers([time, *names])
         try:
             return cls(table[:, 0], table[:, 1] if isinstance(value, str) else table[:, 1:], hold)
         except InvalidValueError as error:

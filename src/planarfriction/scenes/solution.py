@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import functools
+import hashlib
+import io
 import json
-import os
 import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -15,13 +16,26 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from planarfriction.errors import FileError, FrictionError
+from planarfriction.reading import read_bytes
 from planarfriction.scenes.scene import Scene
 from planarfriction.solvers.statistics import Statistics
+from planarfriction.writing import replacing
 
 if TYPE_CHECKING:
     import xarray as xr
 
 _META = ("scene", "statistics", "status", "message")
+
+_CHECKSUM = "planarfriction_checksum"
+
+_MARK = b"\0\0\0\x17" + _CHECKSUM.encode() + b"\0\0\0\0\x02\0\0\0\x47sha256:"
+"""What stands before the checksum in a NetCDF 3 file: its name, its type (text) and its length, with theirs."""
+
+_DIGITS = 64
+"""Length of the checksum after the mark."""
+
+_OTHERWISE = "xarray.load_dataset reads any NetCDF file as it is"
+"""What to do with a file that is not as it was saved."""
 
 _LEFT_OUT = "scene_left_out"
 """Attribute that says why the scene is not in the data."""
@@ -104,88 +118,78 @@ def _scene_attributes(scene: Scene | None) -> dict[str, str]:
 
 
 def write_dataset(data: xr.Dataset, path: str | Path) -> Path:
-    """Write a dataset to the NetCDF file `path`, all or nothing; raises FileError where it cannot be written."""
-    path = check_writable(path)
-    target = Path(os.path.realpath(path))  # a link stays one
-    # Written beside the target first: a crash half-way leaves an older result as it was.
-    part = _part(target)
-    try:
-        with _quiet():
-            data.to_netcdf(part, engine="scipy")
-        os.replace(part, target)
-    except OSError as error:
-        raise FileError(f"{path}: cannot be written: {error.strerror or error}") from None
-    finally:
-        part.unlink(missing_ok=True)
-    return path
+    """Write a dataset to the NetCDF file `path`, whole or not at all; raises FileError where it cannot be written."""
+    with replacing(path) as file:
+        try:
+            with _quiet():
+                content = bytes(data.assign_attrs({_CHECKSUM: "sha256:" + _DIGITS * "0"}).to_netcdf(engine="scipy"))
+        except (TypeError, RecursionError) as error:  # of what someone added to the data
+            raise FileError(f"{path}: cannot be written: {_one_line(error)}") from None
+        before, _, after = _parted(content)
+        for part in (before, _checksum(before, after), after):
+            file.write(part)
+    return Path(path)
+
+
+def _parted(content: bytes) -> tuple[memoryview, bytes, memoryview] | None:
+    """What stands before the checksum of a file, the checksum, and what stands after it; None without one."""
+    begin = content.find(_MARK) + len(_MARK)
+    if begin < len(_MARK):
+        return None
+    view = memoryview(content)
+    return view[:begin], bytes(view[begin : begin + _DIGITS]), view[begin + _DIGITS :]
+
+
+def _checksum(before: memoryview, after: memoryview) -> bytes:
+    """SHA-256 of all of a file but its checksum, in hexadecimal."""
+    digest = hashlib.sha256(before)
+    digest.update(after)
+    return digest.hexdigest().encode()
 
 
 def load(path: str | Path) -> Solution:
     """Read a solution that `Solution.save` wrote, with its scene and the models in it.
 
-    Raises FileError for a missing file and for a file that holds anything else.
+    What is loaded is what was saved, to the bit: the file holds a checksum of all its bytes. A file that another
+    program has changed is refused, on purpose or not; change the `data` of a solution and save that.
+
+    Raises FileError for a missing file, for a damaged or a changed one, and for one that holds anything else.
     """
     import xarray as xr
 
-    path = Path(path)
-    if not os.path.exists(path):
-        raise FileError(f"{path}: no such file (expected a saved solution)")
-    if path.is_dir():
-        raise FileError(f"{path}: is a folder, not a saved solution")
+    what = "a saved solution"
+    content = read_bytes(path, what)
+    if not content.startswith(b"CDF"):
+        raise FileError(f"{path}: not {what} (not a NetCDF 3 file)")
+    parted = _parted(content)
+    if parted is None:
+        raise FileError(f"{path}: not {what}: it has no checksum ({_OTHERWISE})")
+    before, checksum, after = parted
+    if checksum != _checksum(before, after):
+        raise FileError(f"{path}: damaged, or changed by another program: its checksum differs ({_OTHERWISE})")
     try:
-        with path.open("rb") as file, _quiet():
-            if file.read(3) != b"CDF":
-                raise FileError(f"{path}: not a saved solution (not a NetCDF 3 file)")
-            data = xr.load_dataset(path, engine="scipy")
-    except FrictionError:
-        raise
-    except Exception as error:  # a broken file can fail anywhere in the reader, with any exception
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise FileError(f"{path}: not a saved solution ({reason})") from None
+        with _quiet():
+            data = xr.load_dataset(io.BytesIO(content), engine="scipy")
+    except Exception as error:  # SciPy's reader can fail anywhere, with any exception
+        raise FileError(f"{path}: not {what} ({_one_line(error)})") from None
     missing = [name for name in _META if name not in data.attrs]
     if missing:
-        raise FileError(f"{path}: not a saved solution of planarfriction (no attribute {missing[0]!r})")
+        raise FileError(f"{path}: not {what} of planarfriction (no attribute {missing[0]!r})")
     meta = {name: str(data.attrs[name]) for name in _META}
-    for name in ("statistics", "status", "message"):
+    for name in ("statistics", "status", "message", _CHECKSUM):
         del data.attrs[name]
     try:
         scene: Any = Scene.from_dict(json.loads(meta["scene"])) if meta["scene"] else None
         statistics = Statistics(**json.loads(meta["statistics"]))
     except (ValueError, TypeError, FrictionError) as error:
-        reason = " ".join(str(error).split())
-        raise FileError(f"{path}: the scene in this file cannot be read: {reason}") from None
+        raise FileError(f"{path}: the scene in this file cannot be read: {_one_line(error)}") from None
     solution = Solution(data, statistics, meta["status"], meta["message"], scene)
     solution.data.attrs.update(data.attrs)  # as they were, with notes that someone added before it was saved
     return solution
 
 
-def check_writable(path: str | Path) -> Path:
-    """Return `path` if a file can be written there, or raise FileError: ask before a long run, not after it.
-
-    A file is really opened there, since permissions alone do not tell; what `path` holds stays as it is.
-    """
-    path = Path(path)
-    target = Path(os.path.realpath(path))
-    if os.path.isdir(target):
-        raise FileError(f"{path}: cannot be written: it is a folder, give the name of a file in it")
-    if not os.path.isdir(target.parent):
-        raise FileError(f"{path}: cannot be written: there is no folder {target.parent}")
-    existing = os.path.exists(target)
-    if existing and not os.path.isfile(target):
-        raise FileError(f"{path}: cannot be written: it is a device, not a file")
-    try:
-        if existing:
-            target.open("ab").close()
-        _part(target).open("ab").close()
-        _part(target).unlink()
-    except (OSError, ValueError) as error:
-        raise FileError(f"{path}: cannot be written: {getattr(error, 'strerror', None) or error}") from None
-    return path
-
-
-def _part(target: Path) -> Path:
-    """Where a file is written before it takes the place of `target`."""
-    return target.with_name(f"{target.name}.part")
+def _one_line(error: Exception) -> str:
+    return " ".join(str(error).split()) or type(error).__name__
 
 
 @contextlib.contextmanager

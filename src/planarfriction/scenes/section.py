@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-import csv
 import difflib
 from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from planarfriction.errors import FileError, FrictionError
 
@@ -106,50 +103,3 @@ def _near(value: Any, valid: Sequence[str]) -> str:
 
 def _hint(value: Any, valid: Sequence[str]) -> str:
     return _near(value, valid) or f" (valid: {', '.join(valid)})"
-
-
-def read_text(path: str | Path, kind: str) -> str:
-    """Text of the file at `path`, or one clear line; `kind` says what was expected, as in "a scene file"."""
-    path = Path(path)
-    try:
-        return path.read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise FileError(f"{path}: no such file (expected {kind})") from None
-    except IsADirectoryError:
-        raise FileError(f"{path}: is a folder, not {kind}") from None
-    except UnicodeDecodeError:
-        raise FileError(f"{path}: not a text file (expected {kind})") from None
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise FileError(f"{path}: cannot be read: {reason}") from None
-
-
-def read_columns(path: str | Path, names: Sequence[str]) -> np.ndarray:
-    """Columns `names` of a CSV file with a header line, shape `[rows, len(names)]`.
-
-    Lines that start with # are comments.
-    """
-    text = read_text(path, "a CSV file with a header line")
-    lines = [(number, line) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
-    lines = [(number, line) for number, line in lines if not line.lstrip().startswith("#")]
-    if not lines:
-        raise FileError(f"{path}: is empty (expected a header line and rows of numbers)")
-    rows = [[cell.strip() for cell in row] for row in csv.reader(line for _, line in lines)]
-    header, rows = rows[0], rows[1:]
-    for name in names:
-        if name not in header:
-            raise FileError(f"{path}: no column {name!r}{_hint(name, header)}")
-    if not rows:
-        raise FileError(f"{path}: has a header line but no rows")
-    columns = [header.index(name) for name in names]
-    result = np.empty((len(rows), len(names)))
-    for i, ((number, _), row) in enumerate(zip(lines[1:], rows, strict=True)):
-        if len(row) != len(header):
-            raise FileError(f"{path}: line {number} has {len(row)} columns, the header has {len(header)}")
-        for j, column in enumerate(columns):
-            try:
-                result[i, j] = float(row[column])
-            except ValueError:
-                message = f"{path}: line {number}, column {names[j]!r}: {row[column]!r} is not a number"
-                raise FileError(message) from None
-    return result
