@@ -193,7 +193,7 @@ SURFACE = pf.LimitSurfaceCells(pf.ContactPatch.rectangle(0.02, cells=3))
         (lambda: pf.LuGre(sigma_1=-1.0), "sigma_1 must be >= 0, got -1.0"),
         (lambda: pf.LuGre(sigma_2=math.nan), "sigma_2 must be finite, got nan"),
         (lambda: pf.LuGre(gamma=0.0), "gamma must be > 0, got 0.0"),
-        (lambda: pf.LuGre(mu_c="slippery"), "mu_c must be a number, got slippery"),
+        (lambda: pf.LuGre(mu_c="slippery"), "mu_c must be a number, got 'slippery'"),
         (lambda: pf.LuGre(mu_c=None), "mu_c must be a number, got None"),
         (
             lambda: pf.LuGre(elasto_plastic="early"),
@@ -210,7 +210,7 @@ SURFACE = pf.LimitSurfaceCells(pf.ContactPatch.rectangle(0.02, cells=3))
         (lambda: pf.Coulomb(0.0), "mu must be > 0, got 0.0"),
         (lambda: pf.Coulomb(math.nan), "mu must be finite, got nan"),
         (lambda: pf.Coulomb(0.3).wrench(SURFACE, (1, 0, 0), -2.0), "normal_force must be finite and >= 0, got -2.0"),
-        (lambda: pf.Coulomb(0.3).wrench(SURFACE, (1, 0, 0), "x"), "normal_force must be an array of numbers, got x"),
+        (lambda: pf.Coulomb(0.3).wrench(SURFACE, (1, 0, 0), "x"), "normal_force must be an array of numbers, got 'x'"),
         (
             lambda: pf.Coulomb(0.3).wrench(SURFACE, np.ones((2, 3)), np.ones(3)),
             "normal_force must broadcast with the twist, got shapes [3] and [2]",

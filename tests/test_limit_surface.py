@@ -349,7 +349,7 @@ SQUARE = PUBLISHED_PATCHES["Square"]()
         (lambda s: s.wrench(1.0), r"twist must have shape \[..., 3\], got shape \[\]"),
         (lambda s: s.dissipation((1.0, math.nan, 0.0)), "twist must be finite"),
         (lambda s: s.jacobian((1.0, math.inf, 0.0)), "twist must be finite"),
-        (lambda s: s.wrench("fast"), "twist must be an array of numbers, got fast"),
+        (lambda s: s.wrench("fast"), "twist must be an array of numbers, got 'fast'"),
         (lambda s: s.twist((0.0, 0.0, 0.0)), "wrench must not be zero"),
         (lambda s: s.twist([(1.0, 0.0, 0.0), (0.0, 0.0, 0.0)]), "wrench must not be zero"),
         (lambda s: s.twist((1.0, 0.0)), r"wrench must have shape \[..., 3\]"),

@@ -22,14 +22,14 @@ every_model = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
     [
         ((np.zeros(4), (0, 0, 0), 1.0), r"state must have shape \[..., .*3\], got shape \[4\]"),
         ((0.0, (0, 0, 0), 1.0), "state must have shape"),
-        (("soft", (0, 0, 0), 1.0), "state must be an array of numbers, got soft"),
+        (("soft", (0, 0, 0), 1.0), "state must be an array of numbers, got 'soft'"),
         ((None, (0, 0), 1.0), r"twist must have shape \[..., 3\], got shape \[2\]"),
         ((None, 0.1, 1.0), r"twist must have shape \[..., 3\], got shape \[\]"),
         ((None, ("x", 0, 0), 1.0), "twist must be an array of numbers"),
         ((None, (math.nan, 0, 0), 1.0), "twist must be finite"),
         ((None, (0, 0, 0), -1.0), "normal_force must be >= 0, got -1.0"),
         ((None, (0, 0, 0), math.inf), "normal_force must be finite, got inf"),
-        ((None, (0, 0, 0), "heavy"), "normal_force must be an array of numbers, got heavy"),
+        ((None, (0, 0, 0), "heavy"), "normal_force must be an array of numbers, got 'heavy'"),
         ((None, np.zeros((4, 3)), np.ones(5)), "batch axes must broadcast, got shapes"),
     ],
 )

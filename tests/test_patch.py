@@ -113,6 +113,7 @@ def test_plain_data_round_trips_to_the_last_bit(make):
     assert again.to_dict() == patch.to_dict()
 
 
+@pytest.mark.filterwarnings("ignore:patch 'points' is .* m wide")
 @settings(deadline=None, max_examples=25)
 @given(
     st.lists(st.tuples(st.floats(-1, 1), st.floats(-1, 1), st.floats(0.1, 10)), min_size=1, max_size=12),

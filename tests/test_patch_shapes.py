@@ -161,9 +161,9 @@ def test_polygon_agrees_with_rectangle_and_takes_concave_outlines():
     cut, whole = pf.ContactPatch.polygon(box, (8, 4)), pf.ContactPatch.rectangle(w, h, (8, 4))
     assert cut.positions == pytest.approx(whole.positions, abs=1e-16)
     assert cut.areas == pytest.approx(whole.areas, rel=1e-12)
-    corner = [(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)]
-    assert pf.ContactPatch.polygon(corner, 7).area() == pytest.approx(3.0, rel=1e-12)
-    assert pf.ContactPatch.polygon(corner, 7).centre_of_pressure() == pytest.approx((5 / 6, 5 / 6), rel=1e-12)
+    corner = 0.5 * np.array([(0, 0), (2, 0), (2, 1), (1, 1), (1, 2), (0, 2)])
+    assert pf.ContactPatch.polygon(corner, 7).area() == pytest.approx(0.75, rel=1e-12)
+    assert pf.ContactPatch.polygon(corner, 7).centre_of_pressure() == pytest.approx((5 / 12, 5 / 12), rel=1e-12)
 
 
 def test_cells_run_row_by_row_from_the_top_left():

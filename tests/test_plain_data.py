@@ -45,7 +45,7 @@ def patches(seed: int) -> list[pf.ContactPatch]:
         pf.ContactPatch.ring(*np.sort(sizes), 11),
         pf.ContactPatch.polygon(star, 9),
         pf.ContactPatch.line(sizes[0], 8, profile=lambda y: 1.0 + abs(y)),
-        pf.ContactPatch.points(random.normal(size=(5, 2)), random.random(5) + 0.01),
+        pf.ContactPatch.points(random.normal(0.0, 0.05, (5, 2)), random.random(5) + 0.01),
         grid.with_friction_metric(grains, random.uniform(-0.5, 0.5, (12, 2))),
         grid.with_friction_metric(None, lean),
     ]

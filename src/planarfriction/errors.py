@@ -2,11 +2,56 @@
 
 from __future__ import annotations
 
+import pickle
+import reprlib
 from typing import Any
 
+WIDTH = 80
+"""Characters of a bad value that a message shows."""
 
-class FrictionError(Exception):
-    """Base of every error that planarfriction raises on purpose."""
+_BRIEF = reprlib.Repr()
+_BRIEF.maxlist = _BRIEF.maxtuple = _BRIEF.maxset = _BRIEF.maxfrozenset = _BRIEF.maxdict = _BRIEF.maxarray = 12
+_BRIEF.maxstring = _BRIEF.maxlong = _BRIEF.maxother = 2 * WIDTH
+
+
+def shown(value: Any) -> str:
+    """`value` for a message: on one line, cut to `WIDTH` characters; texts without quotes."""
+    try:
+        text = value if isinstance(value, str) and value.isprintable() else _BRIEF.repr(value)
+    except Exception:  # what cannot be printed, such as integers of more than 4300 digits, is still named
+        text = f"{type(value).__name__} that is too long to show"
+    line = " ".join(text[: 4 * WIDTH].split())
+    return line if len(line) <= WIDTH else f"{line[: WIDTH - 3]}..."
+
+
+class _Travels:
+    """Errors go through pickles, and so between processes, with their attributes."""
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # By default an error is made anew from its message alone, which these constructors do not take.
+        kept = {name: value if _can_travel(value) else None for name, value in self.__dict__.items()}
+        return _restored, (type(self), self.args, kept)  # pyright: ignore[reportAttributeAccessIssue]
+
+
+def _can_travel(value: Any) -> bool:
+    try:
+        pickle.dumps(value)
+    except Exception:  # a lambda, an open file: its own pickling may fail with anything
+        return False
+    return True
+
+
+def _restored(kind: type[BaseException], arguments: tuple[Any, ...], attributes: dict[str, Any]) -> BaseException:
+    error = kind.__new__(kind, *arguments)
+    error.__dict__.update(attributes)
+    return error
+
+
+class FrictionError(_Travels, Exception):
+    """Base of every error that planarfriction raises on purpose.
+
+    Errors can be copied and pickled; an attribute that cannot be pickled is then None, the message stays.
+    """
 
 
 class InvalidValueError(FrictionError, ValueError):
@@ -19,13 +64,12 @@ class InvalidValueError(FrictionError, ValueError):
     rule
         The rule it breaks, continuing the sentence "<name> must ...".
     value
-        The offending value, or the text that describes it.
+        The offending value, or the text that describes it; the message shows its first 80 characters.
     """
 
     def __init__(self, name: str, rule: str, value: Any):
         self.name, self.rule, self.value = name, rule, value
-        shown = value if isinstance(value, str) else repr(value)
-        super().__init__(f"{name} must {rule}, got {shown}")
+        super().__init__(f"{name} must {rule}, got {shown(value)}")
 
 
 class FileError(FrictionError, OSError):
@@ -54,7 +98,7 @@ class SolverError(FrictionError, RuntimeError):
         super().__init__(message)
 
 
-class SimulationInterrupted(KeyboardInterrupt):
+class SimulationInterrupted(_Travels, KeyboardInterrupt):
     """Ctrl-C during a simulation; `solution` holds everything computed so far."""
 
     def __init__(self, solution: Any):

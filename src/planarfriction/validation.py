@@ -1,30 +1,172 @@
-"""Checks of user input, used at construction: each names the parameter, the rule and the value."""
+"""Checks of user input, used at construction: each names the parameter, the rule and the value.
+
+What counts as a number is decided in one place, `refusal`: plain real numbers and arrays of them. Texts, truth values,
+complex numbers, dates and times, masked entries and tensors with a gradient are refused, never converted. The same for
+what states a unit (Pint, Astropy, a DataArray with `attrs["units"]`) other than plain SI, as "m/s" or "N m": nothing is
+rescaled, so that 20 mm cannot become 20 m.
+"""
 
 from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Iterable, Mapping
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from planarfriction.errors import InvalidValueError
+from planarfriction.errors import InvalidValueError, shown
+
+LARGEST = 1e50
+"""Largest number of any quantity in SI units: beyond all that exists, and products of six stay finite."""
+
+SMALLEST = 1e-50
+"""Smallest of those that must be > 0, for the same reason."""
+
+SI_UNITS = frozenset({"m", "s", "kg", "N", "rad", "Pa", "J", "W", "Hz"})
+"""Units without prefix or factor: numbers in them and in their products are numbers in SI."""
+
+MOST_NUMBERS = 30_000_000
+"""Numbers of an array that is copied: 240 MB. A view of one number may be of any size."""
+
+DEEPEST = 16
+"""Levels of lists in lists that an array may be given as."""
+
+_FLOAT, _FINITE = np.dtype(float), np.finfo(float).max
+_PLAIN = frozenset({float, int, np.float64, np.float32, np.int64, np.int32})
+_OF_KIND = {
+    "b": " and no truth value",
+    "c": " and not complex",
+    "m": " and no time with a unit of its own (give seconds)",
+    "M": " and no date (give seconds)",
+}
+
+
+def refusal(value: Any, depth: int = 0) -> str | None:
+    """What is wrong with `value` as a number or an array of numbers, as what follows "be a number"; None: nothing."""
+    if type(value) in _PLAIN:
+        return None
+    if isinstance(value, (list, tuple)):
+        return _refusal_inside(value, depth)
+    if isinstance(value, (np.ndarray, np.generic)):
+        if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
+            return " and not masked"
+        return None if value.dtype.kind in "fiu" else _OF_KIND.get(value.dtype.kind, "")
+    if isinstance(value, (bool, complex)):
+        return _OF_KIND["b" if isinstance(value, bool) else "c"]
+    if isinstance(value, (str, bytes, bytearray, Mapping)):
+        return ""
+    if _states_a_unit(value):
+        return f" in SI units ({shown(_unit(value))} is none that is taken: convert, then pass plain numbers)"
+    if getattr(value, "requires_grad", False) is True:
+        return " without a gradient (detach the tensor)"
+    if isinstance(value, Sequence):
+        return _refusal_inside(value, depth)
+    if hasattr(value, "__array__"):
+        try:
+            found = np.asarray(value)
+        except Exception:  # tensors on a device, tracers: the reasons are theirs
+            return ""
+        return refusal(found)
+    return None if hasattr(type(value), "__float__") or hasattr(type(value), "__index__") else ""
+
+
+def _refusal_inside(values: Sequence[Any], depth: int) -> str | None:
+    """The first refusal of its items."""
+    if depth == DEEPEST:
+        return f" in lists at most {DEEPEST} deep"
+    if _PLAIN.issuperset(map(type, values)):
+        return None
+    return next((reason for each in values if (reason := refusal(each, depth + 1)) is not None), None)
+
+
+def _unit(value: Any) -> Any:
+    """The unit that a quantity, a DataArray or a variable of a file states, or None."""
+    for name in ("units", "unit"):
+        if (stated := getattr(value, name, None)) is not None and not callable(stated):
+            return stated
+    attributes = getattr(value, "attrs", None)
+    return attributes.get("units") if isinstance(attributes, Mapping) else None
+
+
+def _states_a_unit(value: Any) -> bool:
+    """Whether it states one that is not plain SI, given as text."""
+    unit = _unit(value)
+    if unit is None:
+        return False
+    return not isinstance(unit, str) or not set(re.findall(r"[^\W\d_]+|[%°]", unit)) <= SI_UNITS
+
+
+def numbers(name: str, value: Any) -> np.ndarray:
+    """Return `value` as a float array of any shape (no copy where it is one), or raise."""
+    if type(value) is np.ndarray and value.dtype == _FLOAT:
+        return value
+    reason = refusal(value)
+    if reason is not None:
+        raise InvalidValueError(name, f"be an array of numbers{reason}", quoted(value))
+    _check_size(name, value)
+    try:
+        return np.asarray(value, dtype=float)
+    except OverflowError:
+        raise InvalidValueError(name, "be finite", value) from None
+    except Exception:  # rows of different lengths; what an __array__ or __float__ raises
+        raise InvalidValueError(name, "be an array of numbers, with rows of equal length", value) from None
+
+
+def _check_size(name: str, value: Any) -> None:
+    """Raise, before memory is asked for, where an array is too large to be copied."""
+    if isinstance(value, np.ndarray) and value.size > MOST_NUMBERS:
+        raise InvalidValueError(name, f"hold at most {MOST_NUMBERS} numbers", f"shape {list(value.shape)}")
 
 
 def number(name: str, value: Any) -> float:
     """Return `value` as a finite float, or raise."""
+    if type(value) is not float:
+        value = _scalar(name, value)
+    if not -LARGEST <= value <= LARGEST:
+        rule = f"be at most {LARGEST:g} in size" if math.isfinite(value) else "be finite"
+        raise InvalidValueError(name, rule, value)
+    return value
+
+
+def _scalar(name: str, value: Any) -> float:
+    """`value` as a float, where it is one number of any kind."""
+    reason = refusal(value)
+    if reason is None and getattr(value, "ndim", isinstance(value, Sequence)) == 0:
+        try:
+            return float(value)
+        except OverflowError:
+            raise InvalidValueError(name, "be finite", value) from None
+        except Exception:  # what a __float__ raises
+            reason = None
+    raise InvalidValueError(name, f"be a number{reason or ''}", quoted(value))
+
+
+def number_in(name: str, value: str) -> float:
+    """The finite number that a text spells, as on a command line, or raise."""
     try:
         result = float(value)
     except (TypeError, ValueError):
         raise InvalidValueError(name, "be a number", value) from None
-    if not math.isfinite(result):
-        raise InvalidValueError(name, "be finite", result)
-    return result
+    return number(name, result)
+
+
+def quoted(value: Any) -> Any:
+    """`value` for a message, texts in quotes: "0.02" is no number."""
+    return repr(value[:200]) if isinstance(value, str) else value
 
 
 def positive(name: str, value: Any) -> float:
     """Return `value` as a finite float > 0, or raise."""
+    result = number(name, value)
+    if result < SMALLEST:
+        raise InvalidValueError(name, "be > 0" if result <= 0.0 else f"be at least {SMALLEST:g}", result)
+    return result
+
+
+def positive_load(name: str, value: Any) -> float:
+    """Return `value` as a finite float > 0, however small: loads fade out."""
     result = number(name, value)
     if result <= 0.0:
         raise InvalidValueError(name, "be > 0", result)
@@ -39,11 +181,17 @@ def non_negative(name: str, value: Any) -> float:
     return result
 
 
-def count(name: str, value: Any, at_least: int = 1) -> int:
-    """Return `value` as an integer >= `at_least`, or raise."""
-    if isinstance(value, bool) or number(name, value) != int(value) or value < at_least:
+def count(name: str, value: Any, at_least: int = 1, at_most: int | None = None) -> int:
+    """Return `value` as an integer >= `at_least`, and at most `at_most` if that is given, or raise.
+
+    A limit stands where memory or time would go beyond all use: it is stated before any is asked for.
+    """
+    result = value if type(value) is int else number(name, value)
+    if result < at_least or result != int(result):
         raise InvalidValueError(name, f"be an integer >= {at_least}", value)
-    return int(value)
+    if at_most is not None and result > at_most:
+        raise InvalidValueError(name, f"be at most {at_most}", value)
+    return int(result)
 
 
 def vector(name: str, value: Any, size: int) -> np.ndarray:
@@ -51,54 +199,70 @@ def vector(name: str, value: Any, size: int) -> np.ndarray:
     return array(name, value, (size,))
 
 
-def numbers(name: str, value: Any) -> np.ndarray:
-    """Return `value` as a float array of any shape (no copy where it is one), or raise."""
-    try:
-        return np.asarray(value, dtype=float)
-    except (TypeError, ValueError):
-        raise InvalidValueError(name, "be an array of numbers", value) from None
+def finite_numbers(name: str, value: Any) -> np.ndarray:
+    """Return `value` as a finite float array of any shape (no copy where it is one), or raise."""
+    result = numbers(name, value)
+    _check_size(name, result)
+    if not np.isfinite(result).all():
+        raise InvalidValueError(name, "be finite", result.tolist() if result.size < 10 else "NaN or infinity")
+    return result
 
 
 def non_negative_numbers(name: str, value: Any) -> np.ndarray:
     """Return `value` as a finite float array >= 0 of any shape, or raise."""
     result = numbers(name, value)
-    if not (np.isfinite(result).all() and (result >= 0.0).all()):
+    _check_size(name, result)
+    if not ((result >= 0.0) & (result < np.inf)).all():
         raise InvalidValueError(name, "be finite and >= 0", value)
     return result
 
 
-def array(name: str, value: Any, shape: tuple[int | None, ...]) -> np.ndarray:
-    """Return `value` as a finite float array; None in `shape` accepts any length on that axis."""
-    result = numbers(name, value).copy()
+def array(name: str, value: Any, shape: tuple[int | None, ...], *, largest: float = LARGEST) -> np.ndarray:
+    """Return `value` as a new finite float array, no number beyond `largest`; None in `shape` takes any length."""
+    result = numbers(name, value)
     matches = result.ndim == len(shape) and all(
         wanted in (None, length) for wanted, length in zip(shape, result.shape, strict=True)
     )
     if not matches:
         wanted = "[" + ", ".join("any" if n is None else str(n) for n in shape) + "]"
         raise InvalidValueError(name, f"have shape {wanted}", f"shape {list(result.shape)}")
-    if not np.isfinite(result).all():
-        where = tuple(int(i) for i in np.argwhere(~np.isfinite(result))[0])
-        raise InvalidValueError(name, "be finite", f"{result[where]} at index {where}")
+    _check_size(name, result)
+    result = result.copy()
+    if not np.abs(result).max(initial=0.0) <= min(largest, _FINITE):
+        _check_each(name, result, np.isfinite(result), "be finite")
+        _check_each(name, result, np.abs(result) <= largest, f"be at most {largest:g} in size")
     return result
 
 
-def non_negative_array(name: str, value: Any, shape: tuple[int | None, ...]) -> np.ndarray:
-    """Return `value` as a finite float array >= 0; None in `shape` accepts any length on that axis."""
-    result = array(name, value, shape)
-    if (result < 0.0).any():
-        where = tuple(int(i) for i in np.argwhere(result < 0.0)[0])
-        raise InvalidValueError(name, "be >= 0", f"{result[where]} at index {where}")
+def non_negative_array(name: str, value: Any, shape: tuple[int | None, ...], *, largest: float = LARGEST) -> np.ndarray:
+    """Return `value` as a new finite float array >= 0, as `array` does."""
+    result = array(name, value, shape, largest=largest)
+    _check_each(name, result, result >= 0.0, "be >= 0")
     return result
+
+
+def _check_each(name: str, values: np.ndarray, good: np.ndarray, rule: str) -> None:
+    if not good.all():
+        where = tuple(int(i) for i in np.argwhere(~good)[0])
+        raise InvalidValueError(name, rule, f"{values[where]} at index {where}")
+
+
+def text(name: str, value: Any) -> str:
+    """Return `value` if it is a text that can be printed, is not empty and neither begins nor ends with a space."""
+    if not (isinstance(value, str) and value.isprintable() and value.strip() == value and value):
+        rule = "be a text that is not empty, printable and without spaces at its ends"
+        raise InvalidValueError(name, rule, quoted(value))
+    return value
 
 
 def choice(name: str, value: Any, valid: Iterable[str]) -> str:
     """Return `value` if it is one of `valid`, or raise an error that names the nearest valid one."""
     valid = list(valid)
-    if value in valid:
+    if isinstance(value, str) and value in valid:
         return value
-    near = difflib.get_close_matches(str(value), valid, n=1)
-    hint = f" (did you mean {near[0]!r}?)" if near else ""
-    raise InvalidValueError(name, f"be one of {', '.join(valid)}", f"{value!r}{hint}")
+    near = difflib.get_close_matches(value[:200], valid, n=1) if isinstance(value, str) else []
+    given = f"{value!r} (did you mean {near[0]!r}?)" if near else quoted(value)
+    raise InvalidValueError(name, f"be one of {', '.join(valid)}", given)
 
 
 def keys(name: str, data: Any, required: Iterable[str], optional: Iterable[str] = ()) -> None:
@@ -111,3 +275,12 @@ def keys(name: str, data: Any, required: Iterable[str], optional: Iterable[str] 
     for key in required:
         if key not in data:
             raise InvalidValueError(name, f"have the key {key!r}", f"{', '.join(map(str, data)) or 'none'}")
+
+
+def broadcast(**arrays: np.ndarray) -> tuple[int, ...]:
+    """The common shape of `arrays`, or raise an error that names them and their shapes."""
+    try:
+        return np.broadcast_shapes(*(each.shape for each in arrays.values()))
+    except ValueError:
+        shapes = ", ".join(str(list(each.shape)) for each in arrays.values())
+        raise InvalidValueError(" and ".join(arrays), "broadcast", f"shapes {shapes}") from None

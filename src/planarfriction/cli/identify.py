@@ -48,7 +48,7 @@ def parse_start(entries: Sequence[str]) -> dict[str, float]:
         name, equals, value = entry.partition("=")
         if not equals:
             raise InvalidValueError("--start", "be NAME=VALUE, as mu_c=0.4", entry)
-        start[name.strip()] = validation.number(f"--start {name.strip()}", value)
+        start[name.strip()] = validation.number_in(f"--start {name.strip()}", value)
     return start
 
 
@@ -61,7 +61,7 @@ def parse_names(text: str | None) -> tuple[str, ...]:
 
 def parse_noise(text: str | None) -> list[float] | None:
     """The three numbers of `--noise`."""
-    return None if text is None else [validation.number("--noise", part) for part in text.split(",")]
+    return None if text is None else [validation.number_in("--noise", part) for part in text.split(",")]
 
 
 def _write(found: Identification, folder: Path, stem: str) -> None:

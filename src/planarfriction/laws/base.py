@@ -37,13 +37,13 @@ class FrictionLaw:
 
         `g(v) v/(v + v_c) + sigma_2 v`; laws without creep (v_c = 0) have `g(0)` at rest.
         """
-        law, speed = self.numbers, np.abs(validation.numbers("speed", speed))
+        law, speed = self.numbers, np.abs(validation.finite_numbers("speed", speed))
         share = speed / (speed + law.creep_speed) if law.creep_speed > 0.0 else 1.0
         return formulas.stribeck(np, speed, law) * share + law.sigma_2 * speed
 
     def rate(self, state, velocity, *, axis: int | None = None) -> np.ndarray:
         """Rate `zdot = v - k z` [m/s] of bristles with deflection `state` [m]; both broadcast."""
-        z, v = validation.numbers("state", state), validation.numbers("velocity", velocity)
+        z, v = _bristles(state, velocity, axis)
         law, length, speed = self.numbers, _norm(z, axis), _norm(v, axis)
         product = z * v if axis is None else (z * v).sum(axis=axis, keepdims=True)
         along = product / np.where(length > 0.0, length, 1.0)
@@ -52,11 +52,22 @@ class FrictionLaw:
 
     def force(self, state, velocity, normal_force, *, axis: int | None = None) -> np.ndarray:
         """Friction force [N] on the moving body; `normal_force` [N] broadcasts with bristles, not with components."""
-        z, v = validation.numbers("state", state), validation.numbers("velocity", velocity)
+        z, v = _bristles(state, velocity, axis)
         load = validation.non_negative_numbers("normal_force", normal_force)
         if axis is not None:
             load = np.expand_dims(load, axis)
+        validation.broadcast(state=z, velocity=v, normal_force=load)
         return load * formulas.traction(z, self.rate(z, v, axis=axis), v, self.numbers)
+
+
+def _bristles(state: Any, velocity: Any, axis: int | None) -> tuple[np.ndarray, np.ndarray]:
+    """Both inputs as arrays that broadcast and have such an axis."""
+    z, v = validation.finite_numbers("state", state), validation.finite_numbers("velocity", velocity)
+    least = min(z.ndim, v.ndim)
+    validation.broadcast(state=z, velocity=v)
+    if axis is not None and not (type(axis) is int and -least <= axis < least):
+        raise InvalidValueError("axis", f"be None or that of the components of both, of {least} axes", axis)
+    return z, v
 
 
 def refuse_creep(law: Any, by: str) -> None:

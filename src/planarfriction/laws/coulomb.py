@@ -27,6 +27,8 @@ class Coulomb:
         A body at rest gets a zero wrench: Coulomb's law alone cannot tell the force of a stuck contact.
         """
         load = validation.non_negative_numbers("normal_force", normal_force)
+        if not hasattr(surface, "wrench"):
+            raise InvalidValueError("surface", "be a limit surface", surface)
         direction = surface.wrench(twist)
         try:
             return self.mu * load[..., None] * direction

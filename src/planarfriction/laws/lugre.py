@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from numbers import Real
 from typing import Any
 
 from planarfriction import validation
@@ -84,6 +83,6 @@ def _elasto_plastic(value: Any) -> ElastoPlastic | None:
     if isinstance(value, Mapping):
         validation.keys("elasto_plastic", value, ["breakaway_ratio"])
         value = value["breakaway_ratio"]
-    if isinstance(value, bool) or not isinstance(value, Real):
+    if validation.refusal(value) is not None:
         raise InvalidValueError("elasto_plastic", "be a breakaway ratio, an ElastoPlastic or None", value)
-    return ElastoPlastic(float(value))
+    return ElastoPlastic(value)

@@ -11,6 +11,9 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 
+MOST_SAMPLES = 100_000
+"""Directions at which surfaces are compared: beyond these the figures of a comparison do not change any more."""
+
 if TYPE_CHECKING:
     from planarfriction.limit_surface.base import LimitSurface
 
@@ -72,7 +75,7 @@ def compare(surface: LimitSurface, reference: LimitSurface, samples: int) -> Sur
 
     if not isinstance(reference, LimitSurface):
         raise InvalidValueError("reference", "be a limit surface", reference)
-    units = directions(validation.count("samples", samples, at_least=2))
+    units = directions(validation.count("samples", samples, 2, MOST_SAMPLES))
     frame = reference._frame()  # V_S = frame V, and so W = frame' W_S
     twists, wrenches = np.linalg.solve(frame, units.T).T, units @ frame
     apart = np.linalg.solve(frame.T, (surface.wrench(twists) - reference.wrench(twists)).T).T

@@ -11,7 +11,7 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.limit_surface import quartic_fit
-from planarfriction.limit_surface.base import LimitSurface, _rows, scaling
+from planarfriction.limit_surface.base import MOST_SEGMENTS, LimitSurface, _rows, scaling
 from planarfriction.limit_surface.cells import LimitSurfaceCells
 from planarfriction.limit_surface.comparison import directions
 from planarfriction.patch import ContactPatch
@@ -47,7 +47,7 @@ class LimitSurfaceQuartic(LimitSurface):
     """Segments of a quadrant of the table for compiled loops [-]."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "segments", validation.count("segments", self.segments, at_least=2))
+        object.__setattr__(self, "segments", validation.count("segments", self.segments, 2, MOST_SEGMENTS))
         if self.surface is not None and not isinstance(self.surface, LimitSurface):
             raise InvalidValueError("surface", "be a limit surface", self.surface)
         super().__post_init__()
@@ -55,6 +55,7 @@ class LimitSurfaceQuartic(LimitSurface):
             given = validation.array("coefficients", self.coefficients, (15,))
             if not np.linalg.eigvalsh(quartic_fit.certificate(given))[0] > 0.0:
                 raise InvalidValueError("coefficients", "be those of a convex quartic", given.tolist())
+            given.setflags(write=False)
             object.__setattr__(self, "coefficients", given)
 
     @classmethod
@@ -78,6 +79,8 @@ class LimitSurfaceQuartic(LimitSurface):
         for name, rows in (("wrench", wrench), ("twist", twist)):
             if not (np.abs(rows).max(axis=1) > 0.0).all():
                 raise InvalidValueError(name, "not be zero in any row", rows.tolist())
+        if not isinstance(patch, ContactPatch):
+            raise InvalidValueError("patch", "be a ContactPatch", patch)
         frame = scaling(patch.centre_of_pressure(normal_force), float(patch.contact_radius(normal_force)))
         points = -np.linalg.solve(frame.T, wrench.T).T
         weight = validation.non_negative("velocity_weight", velocity_weight)

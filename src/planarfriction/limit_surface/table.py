@@ -9,7 +9,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.kernels import surfaces as kernels
-from planarfriction.limit_surface.base import SurfaceNumbers
+from planarfriction.limit_surface.base import MOST_SEGMENTS, SurfaceNumbers
 from planarfriction.limit_surface.cell_metrics import potential_table
 from planarfriction.limit_surface.compiled import CompiledLimitSurface
 from planarfriction.limit_surface.exact import STORED_RULES, LimitSurfaceExact
@@ -31,7 +31,7 @@ class LimitSurfaceTable(CompiledLimitSurface):
     anisotropy = "any"
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "segments", validation.count("segments", self.segments, at_least=2))
+        object.__setattr__(self, "segments", validation.count("segments", self.segments, 2, MOST_SEGMENTS))
         super().__post_init__()
 
     @functools.cached_property

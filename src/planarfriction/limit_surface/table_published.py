@@ -10,7 +10,7 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.kernels import surfaces as kernels
 from planarfriction.kernels import tables
-from planarfriction.limit_surface.base import SurfaceNumbers, _plane
+from planarfriction.limit_surface.base import MOST_SEGMENTS, SurfaceNumbers, _plane
 from planarfriction.limit_surface.compiled import CompiledLimitSurface
 
 _SAME_ANSWER = 1e-12
@@ -34,7 +34,7 @@ class LimitSurfaceTablePublished(CompiledLimitSurface):
     kind = kernels.BILINEAR
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "segments", validation.count("segments", self.segments, at_least=2))
+        object.__setattr__(self, "segments", validation.count("segments", self.segments, 2, MOST_SEGMENTS))
         super().__post_init__()
 
     def _grid(self) -> tuple[tuple[float, float, float, float], np.ndarray]:

@@ -9,11 +9,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.equality import ByValue, by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.laws import FrictionLaw
 from planarfriction.patch import ContactPatch
 
 
+@by_parts
 class ModelJacobians(NamedTuple):
     """Derivatives of the bristle rates and of the wrench; `[*s]` is the shape of the state without batch axes."""
 
@@ -31,6 +33,7 @@ class ModelJacobians(NamedTuple):
     """d wrench / d normal_force of a fixed shape, `[..., 3]`."""
 
 
+@by_parts
 class StepJacobians(NamedTuple):
     """Derivatives of the results of `step`: the new state, and the wrench at the end of the step.
 
@@ -50,6 +53,7 @@ class StepJacobians(NamedTuple):
     """d wrench / d normal_force, `[..., 3]`."""
 
 
+@by_parts
 class PackedModel(NamedTuple):
     """A model at R loads as the compiled solver sees it."""
 
@@ -72,7 +76,7 @@ class PackedModel(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class FrictionModel:
+class FrictionModel(ByValue):
     """A patch with a friction law; the caller holds the state.
 
     Twists and wrenches are about the contact frame's origin; the wrench acts on the moving body. Leading batch axes of

@@ -19,6 +19,9 @@ from planarfriction.models.load_family import LoadFamily
 from planarfriction.models.reduced_map import ReducedShape, reduced_shape
 from planarfriction.models.three_states import ThreeStateModel
 
+MOST_SEGMENTS, MOST_SPEEDS = 256, 64
+"""Sizes of the maps that are taken: some 0.6 GB for a fixed shape; errors fall with their fourth power."""
+
 
 @dataclass(frozen=True, eq=False)
 class ReducedModel(ThreeStateModel):
@@ -51,8 +54,8 @@ class ReducedModel(ThreeStateModel):
     def __post_init__(self) -> None:
         super().__post_init__()
         refuse_creep(self.law, "ReducedModel")  # its stored steady state is that of bristles without creep
-        object.__setattr__(self, "segments", validation.count("segments", self.segments, at_least=4))
-        object.__setattr__(self, "speeds", validation.count("speeds", self.speeds, at_least=5))
+        object.__setattr__(self, "segments", validation.count("segments", self.segments, 4, MOST_SEGMENTS))
+        object.__setattr__(self, "speeds", validation.count("speeds", self.speeds, 5, MOST_SPEEDS))
         object.__setattr__(self, "load_error", validation.non_negative("load_error", self.load_error))
         if not self.patch.depends_on_load:
             _ = self._reference  # refuses a patch of one point now rather than later
@@ -68,7 +71,7 @@ class ReducedModel(ThreeStateModel):
         if isinstance(loads, np.ndarray) and (loads > 0.0).all() and (loads < np.inf).all():
             loads = loads.tolist()  # one by one takes longer than all else
         else:
-            loads = [validation.positive("normal_force", load) for load in loads]
+            loads = [validation.positive_load("normal_force", load) for load in loads]
         return self._family.shapes(loads) if self.load_error > 0.0 else [self._built_at(load) for load in loads]
 
     @property

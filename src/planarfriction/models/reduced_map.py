@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels.steady import HEADER, QUARTIC
 from planarfriction.models import cube_map
@@ -19,6 +20,7 @@ LEAST_SHARE = 0.25
 """The floor of the dissipation, over the least dissipation of all stored directions."""
 
 
+@by_parts
 class ReducedShape(NamedTuple):
     """What the reduced model knows of its patch at one load."""
 

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.geometry import transformed
 from planarfriction.kernels import published_contact, published_step
@@ -24,6 +25,7 @@ from planarfriction.patch.metric import refuse_cell_metrics, same_metric
 ON_LOAD_CHANGE = ("rebuild", "rescale", "keep")
 
 
+@by_parts
 class PublishedShape(NamedTuple):
     """What the reduced model knows of its patch at one load."""
 
@@ -82,7 +84,7 @@ class ReducedModelPublished(ThreeStateModel):
         """Centre of pressure, `r`, `<rho^2>` and limit surface at a load [N]; recent loads are remembered."""
         if not self.patch.depends_on_load or self.on_load_change == "keep":
             return self._reference
-        load = validation.positive("normal_force", normal_force)
+        load = validation.positive_load("normal_force", normal_force)
         return self._recent.get(load, lambda: self._shape_at(load))
 
     def packed(self, loads: Sequence[float | None]) -> PackedModel:

@@ -81,7 +81,7 @@ def compressed(
 ) -> ContactPatch:
     """See `ContactPatch.compressed`."""
     refuse_cell_metrics(patch, "compressed")
-    degree = validation.count("degree", degree)
+    degree = validation.count("degree", degree, at_most=2 * HIGHEST_DEGREE)
     if error is not None:
         return _to_error(patch, degree, cells, validation.positive("error", error), loads)
     most = number_of_moments(degree + SURPLUS) if cells is None else validation.count("cells", cells)

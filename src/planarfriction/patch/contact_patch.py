@@ -14,8 +14,12 @@ from planarfriction.patch import outline as outlines
 from planarfriction.patch import plain_data, shapes
 from planarfriction.patch.grid import Grid
 from planarfriction.patch.metric import Anisotropy
-from planarfriction.patch.pressure import Uniform, as_law, check_pressure
+from planarfriction.patch.pressure import Uniform, as_law, check_not_negative, check_pressure, pressure_array
 from planarfriction.patch.pressure_maps import read_maps
+from planarfriction.patch.size import MOST_CELLS, check_cells, warn_of_the_unit
+
+MOST_DEGREE = 40
+"""Degree of polynomial moments that are given: beyond it powers are rounding."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -26,7 +30,8 @@ class ContactPatch(Anisotropy):
 
     Frame: the contact frame, x to the right, y up; **row 0 of a grid or map is its top** (largest y). Grids and maps
     are centred on the origin (a polygon stays where its vertices are) and list their cells row by row from the top
-    left; points keep the order given. Cells that carry no pressure at any load are dropped.
+    left; points keep the order given. Cells that carry no pressure at any load are dropped. A patch has at most
+    4,000,000 cells; one wider than 1 m or smaller than 10 um is made with a warning, as its lengths may be millimetres.
 
     Make patches with the class methods (`disc`, `rectangle`, `ring`, `line`, `polygon`, `points`, `from_pressure`).
     Their `pressure` is a law (`Uniform`, `LinearGradient`, `SoftFinger`), a function `p(x, y)` of two floats [m], one
@@ -59,9 +64,12 @@ class ContactPatch(Anisotropy):
     """Width and height of a whole cell [m], its load spread evenly over it; None for points (lines: one is 0)."""
     outline: outlines.Outline | None = field(init=False, default=None)
     """Outline that the class methods cut the cells from; None for other cells."""
-    _fixed_weights: np.ndarray | None = field(init=False, default=None)
+    _fixed_weights: np.ndarray | None = field(init=False, default=None, compare=False)
 
     def __post_init__(self) -> None:
+        validation.text("name", self.name)
+        if not (self.grid is None or isinstance(self.grid, Grid)):
+            raise InvalidValueError("grid", "be a Grid or None", self.grid)
         positions = validation.array("positions", self.positions, (None, 2))
         if len(positions) == 0:
             raise InvalidValueError("patch", "have at least one cell", "none")
@@ -72,6 +80,7 @@ class ContactPatch(Anisotropy):
             object.__setattr__(self, "cell_size", tuple(size.tolist()))
         elif self.grid is not None:
             object.__setattr__(self, "cell_size", (self.grid.cell_width, self.grid.cell_height))
+        check_cells(len(positions))
         areas = validation.array("areas", self.areas, (len(positions),))
         if not (areas > 0.0).all():
             raise InvalidValueError("areas", "be > 0", f"{areas.min()} at index {areas.argmin()}")
@@ -91,6 +100,7 @@ class ContactPatch(Anisotropy):
             fixed = self._shares(self.pressure.relative(self.positions))
             fixed.setflags(write=False)
             object.__setattr__(self, "_fixed_weights", fixed)
+        warn_of_the_unit(self.name, self.positions, self.cell_size)
 
     # ------------------------------------------------------------------ shapes
 
@@ -169,7 +179,7 @@ class ContactPatch(Anisotropy):
         a function of the coordinate along the line [m]; None is uniform. The grid is square with the line in its
         middle column or row (across the line it has one cell more than along it where `cells` is even).
         """
-        length, cells = validation.positive("length", length), validation.count("cells", cells)
+        length, cells = validation.positive("length", length), validation.count("cells", cells, at_most=MOST_CELLS)
         along = ["x", "y"].index(validation.choice("direction", direction, ("x", "y")))
         side, across = length / cells, cells + 1 - cells % 2
         columns, rows = (cells, across) if along == 0 else (across, cells)
@@ -179,7 +189,7 @@ class ContactPatch(Anisotropy):
         if callable(profile):
             profile = [profile(coordinate) for coordinate in positions[:, along].tolist()]
         elif profile is not None:
-            profile = validation.non_negative_array("profile", profile, (cells,))
+            profile = check_not_negative("profile", pressure_array("profile", profile, (cells,)))
         size = (side, 0.0) if along == 0 else (0.0, side)
         return cls(positions, np.full(cells, grid.cell_area), profile, grid, name, size)
 
@@ -209,7 +219,7 @@ class ContactPatch(Anisotropy):
         """
         positions = validation.array("positions", positions, (None, 2))
         if weights is not None:
-            weights = validation.non_negative_array("weights", weights, (len(positions),))
+            weights = check_not_negative("weights", pressure_array("weights", weights, (len(positions),)))
         return cls(positions, np.full(len(positions), validation.positive("area", area)), weights, None, name)
 
     @classmethod
@@ -225,7 +235,8 @@ class ContactPatch(Anisotropy):
         with their `loads` `[L]`; see `PressureMaps`.
         """
         law, (rows, columns), file = read_maps(pressure, loads)
-        size = validation.array("cell_size", cell_size, (2,) if np.ndim(cell_size) else ())
+        size = validation.numbers("cell_size", cell_size)
+        size = validation.array("cell_size", size, (2,) if size.ndim else ())
         width, height = np.broadcast_to([validation.positive("cell_size", side) for side in size.flat], 2)
         grid = Grid.around_origin(columns * width, rows * height, columns, rows)
         return cls(grid.centres(), np.full(rows * columns, grid.cell_area), law, grid, name or file or "pressure map")
@@ -248,7 +259,7 @@ class ContactPatch(Anisotropy):
         """
         from planarfriction.patch.refinement import refined
 
-        return refined(self, validation.count("parts", parts))
+        return refined(self, validation.count("parts", parts, at_most=MOST_CELLS))
 
     def compressed(
         self, degree: int = 5, *, cells: int | None = None, error: float | None = None, loads: Any = None
@@ -290,9 +301,7 @@ class ContactPatch(Anisotropy):
             if self._fixed_weights is None:
                 raise InvalidValueError("normal_force", "be given, the shape of this patch depends on it", "None")
             return self._fixed_weights
-        load = np.asarray(normal_force, dtype=float)
-        if not ((load >= 0.0) & (load < np.inf)).all():
-            raise InvalidValueError("normal_force", "be finite and >= 0", normal_force)
+        load = validation.non_negative_numbers("normal_force", normal_force)
         if self._fixed_weights is not None:
             return np.broadcast_to(self._fixed_weights, (*load.shape, self.cells))
         loaded = load > 0.0
@@ -328,7 +337,7 @@ class ContactPatch(Anisotropy):
         Shape `[..., degree + 1, degree + 1]` [m^(i + j)], zero where `i + j > degree`. `about` is the point (x0, y0)
         [m]: None for the centre of pressure (central moments), `(0, 0)` for the raw ones.
         """
-        degree = validation.count("degree", degree, at_least=0)
+        degree = validation.count("degree", degree, at_least=0, at_most=MOST_DEGREE)
         weights, dx, dy = self._about_centre_of_pressure(normal_force)
         if about is not None:
             dx, dy = (self.positions - validation.vector("about", about, 2)).T
@@ -340,7 +349,8 @@ class ContactPatch(Anisotropy):
 
     def pressure_values(self, normal_force) -> np.ndarray:
         """Pressure on each cell, `w_i f_N / a_i`, shape `[..., N]` [Pa]."""
-        return self.weights(normal_force) * np.asarray(normal_force, dtype=float)[..., None] / self.areas
+        load = validation.non_negative_numbers("normal_force", normal_force)
+        return self.weights(load) * load[..., None] / self.areas
 
     def plot(self, *, normal_force=None):
         """Draw the pressure map with its centre of pressure; returns a matplotlib Figure."""
@@ -381,5 +391,5 @@ class ContactPatch(Anisotropy):
 
 def _square_grid(width: float, cells: int) -> Grid:
     """Grid of `cells` x `cells` on the square `width` [m] wide about the origin."""
-    cells = validation.count("cells", cells)
+    cells = validation.count("cells", cells, at_most=MOST_CELLS)
     return Grid.around_origin(width, width, cells, cells)

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.errors import InvalidValueError
+from planarfriction.patch.size import check_cells
 
 
 @dataclass(frozen=True)
@@ -37,10 +39,12 @@ class Grid:
         }
         for name, check in checks.items():
             object.__setattr__(self, name, check(name, getattr(self, name)))
+        check_cells(self.rows * self.columns)
 
     @classmethod
     def around_origin(cls, width: float, height: float, columns: int, rows: int) -> Grid:
         """Grid of `columns` x `rows` cells on the box of `width` x `height` [m] whose middle is the origin."""
+        check_cells(columns * rows)  # before the cells are too small to be any
         return cls(-width / 2, -height / 2, width / columns, height / rows, columns, rows)
 
     @property
@@ -62,7 +66,9 @@ class Grid:
 
         Positions outside the grid get rows or columns outside `0 .. rows - 1` and `0 .. columns - 1`.
         """
-        positions = np.asarray(positions, dtype=float)
+        positions = validation.finite_numbers("positions", positions)
+        if positions.shape[-1:] != (2,):
+            raise InvalidValueError("positions", "have shape [..., 2]", f"shape {list(positions.shape)}")
         from_top = self.rows - (positions[..., 1] - self.y_min) / self.cell_height
         from_left = (positions[..., 0] - self.x_min) / self.cell_width
         return np.floor(from_top).astype(int), np.floor(from_left).astype(int)

@@ -14,6 +14,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch.outline import with_outline
 
@@ -37,7 +38,7 @@ def grain(angle: float, along: float, across: float) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Anisotropy:
+class Anisotropy(ByValue):
     """What a patch knows of directions; see `with_friction_metric`."""
 
     metric: Any = None
@@ -111,7 +112,8 @@ class Anisotropy:
             value = getattr(self, name)
             if value is None:
                 continue
-            per_cell = np.ndim(value) == size + 1
+            value = validation.numbers(name, value)
+            per_cell = value.ndim == size + 1
             value = validation.array(name, value, (len(kept),) * per_cell + (2,) * size)
             value = (_positive_definite if name == "metric" else _less_than_one)(value)
             value = value[kept] if per_cell else value

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch import shapes
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, eq=False)
-class PolygonOutline:
+class PolygonOutline(ByValue):
     """A simple polygon, convex or not."""
 
     vertices: np.ndarray

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 
 SAME_DISTANCE = 1e-9
@@ -136,12 +137,12 @@ class SoftFinger(Pressure):
 
     def radius(self, normal_force) -> np.ndarray:
         """Contact radius `R = min(c f_N^n, radius_max)` [m] at `normal_force` `[...]` [N]."""
-        radius = self.c * np.asarray(normal_force, dtype=float) ** self.n
+        radius = self.c * validation.numbers("normal_force", normal_force) ** self.n
         return radius if self.radius_max is None else np.minimum(radius, self.radius_max)
 
     def exponent(self, normal_force) -> np.ndarray:
         """Exponent `k` of the profile [-] at `normal_force` `[...]` [N]."""
-        load = np.asarray(normal_force, dtype=float)
+        load = validation.numbers("normal_force", normal_force)
         return np.full_like(load, self.k) if self.k_per_newton is None else self.k_per_newton * load
 
     def relative(self, positions: np.ndarray, normal_force: np.ndarray | None = None) -> np.ndarray:
@@ -167,19 +168,21 @@ class SoftFinger(Pressure):
 
 
 @dataclass(frozen=True, eq=False)
-class PerCell(Pressure):
+class PerCell(ByValue, Pressure):
     """One relative pressure for each cell of a patch: measured maps, profiles, functions evaluated at the cells."""
 
     values: np.ndarray
     """Relative pressures, shape `[N]` [-]."""
 
     def __post_init__(self) -> None:
-        values = validation.array("pressure", self.values, (None,))
+        values = pressure_array("pressure", self.values, (None,))
         values.setflags(write=False)
         object.__setattr__(self, "values", values)
 
     def relative(self, positions: np.ndarray, normal_force: np.ndarray | None = None) -> np.ndarray:
-        return validation.array("pressure", self.values, (len(positions),))
+        if len(self.values) != len(positions):
+            raise InvalidValueError("pressure", f"have shape [{len(positions)}]", f"shape [{len(self.values)}]")
+        return self.values
 
     def only(self, kept: np.ndarray) -> PerCell:
         return PerCell(self.values[kept])
@@ -199,7 +202,19 @@ def as_law(pressure: Any, positions: np.ndarray) -> Pressure:
         return pressure
     if callable(pressure):
         return PerCell([pressure(x, y) for x, y in positions.tolist()])  # pyright: ignore
-    return PerCell(validation.array("pressure", pressure, (len(positions),)))
+    return PerCell(pressure_array("pressure", pressure, (len(positions),)))
+
+
+def pressure_array(name: str, value: Any, shape: tuple[int | None, ...]) -> np.ndarray:
+    """Relative pressures as a new float array: a mask is one of zeros and ones, and any scale will do."""
+    if isinstance(value, np.ndarray) and value.dtype.kind == "b" and not isinstance(value, np.ma.MaskedArray):
+        value = value.astype(float)
+    return validation.array(name, value, shape, largest=np.inf)
+
+
+def check_not_negative(name: str, values: np.ndarray) -> np.ndarray:
+    """`values`, or an error that shows the first below zero."""
+    return validation.non_negative_array(name, values, values.shape, largest=np.inf)
 
 
 def check_pressure(values: np.ndarray, positions: np.ndarray) -> None:

@@ -11,13 +11,14 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch.files import read_pressure_map
-from planarfriction.patch.pressure import Pressure
+from planarfriction.patch.pressure import Pressure, check_not_negative, pressure_array
 
 
 @dataclass(frozen=True, eq=False)
-class PressureMaps(Pressure):
+class PressureMaps(ByValue, Pressure):
     """Relative pressures of the cells measured at several loads; only ratios within a map matter.
 
     Between two measured loads the share of each cell in the total of its map is linear in the load; below the first and
@@ -35,7 +36,7 @@ class PressureMaps(Pressure):
         loads = validation.array("loads", self.loads, (None,))
         if len(loads) == 0 or not (loads[0] > 0.0 and (np.diff(loads) > 0.0).all()):
             raise InvalidValueError("loads", "ascend and be > 0", loads.tolist())
-        values = validation.non_negative_array("pressure", self.values, (len(loads), None))
+        values = check_not_negative("pressure", pressure_array("pressure", self.values, (len(loads), None)))
         peak = values.max(axis=1, initial=0.0)
         if not (peak > 0.0).all():
             raise InvalidValueError("pressure", "have a total > 0 at every load", f"0 at {loads[peak.argmin()]:g} N")
@@ -96,8 +97,8 @@ def read_maps(pressure: Any, loads: Any = None) -> tuple[Any, tuple[int, int], s
             raise InvalidValueError(_what(pressure), "have a total > 0", "0")
         return values.ravel(), values.shape, name
     loads = validation.array("loads", loads, (None,))
-    if isinstance(pressure, (str, Path)) or len(pressure) != len(loads):
-        count = 1 if isinstance(pressure, (str, Path)) else len(pressure)
+    count = 1 if isinstance(pressure, (str, Path)) or not hasattr(pressure, "__len__") else len(pressure)
+    if count != len(loads) or isinstance(pressure, (str, Path)):
         raise InvalidValueError("pressure", f"have one map for each of {len(loads)} loads", count)
     maps = [_one_map(each) for each in pressure]
     shape = maps[0][0].shape if maps else (0, 0)
@@ -116,4 +117,5 @@ def _one_map(pressure: Any) -> tuple[np.ndarray, str | None]:
     """Values `[rows, columns]` of an array or a file, and the name of the file."""
     named = isinstance(pressure, (str, Path))
     values = read_pressure_map(pressure) if named else pressure
-    return validation.non_negative_array(_what(pressure), values, (None, None)), Path(pressure).stem if named else None
+    values = check_not_negative(_what(pressure), pressure_array(_what(pressure), values, (None, None)))
+    return values, Path(pressure).stem if named else None

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from planarfriction import validation
 from planarfriction.patch.contact_patch import ContactPatch
+from planarfriction.patch.size import MOST_CELLS, check_cells
 
 PUBLISHED_CELLS = 21
 """Rows and columns of the grid that the published masks are written on."""
@@ -31,12 +33,12 @@ def line(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
 
 def line_grad(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
     """Line along y, `width` [m] long, with weights cells, ..., 2, 1 from the top."""
-    return ContactPatch.line(width, cells, profile=np.arange(cells, 0, -1), name="LineGrad")
+    return ContactPatch.line(width, cells, profile=_steps(cells), name="LineGrad")
 
 
 def line_grad_x(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
     """Line along x, `width` [m] long, with weights cells, ..., 2, 1 from the left."""
-    return ContactPatch.line(width, cells, direction="x", profile=np.arange(cells, 0, -1), name="LineGradX")
+    return ContactPatch.line(width, cells, direction="x", profile=_steps(cells), name="LineGradX")
 
 
 def non_convex_1(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
@@ -49,8 +51,15 @@ def non_convex_2(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPa
     return _masked([(slice(9, 12), slice(0, 14)), (slice(4, 18), slice(18, 21))], cells, width, "NonConvex2")
 
 
+def _steps(cells: int) -> np.ndarray:
+    """cells, ..., 2, 1"""
+    return np.arange(validation.count("cells", cells, at_most=MOST_CELLS), 0, -1)
+
+
 def _masked(blocks: list[tuple[slice, slice]], cells: int, width: float, name: str) -> ContactPatch:
     """Uniform pressure on blocks of the published grid; a cell is loaded if its centre is in one of them."""
+    cells, width = validation.count("cells", cells, at_most=MOST_CELLS), validation.positive("width", width)
+    check_cells(cells**2)
     mask = np.zeros((PUBLISHED_CELLS, PUBLISHED_CELLS))
     for block in blocks:
         mask[block] = 1.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from planarfriction.patch.contact_patch import ContactPatch
+from planarfriction.patch.size import check_cells
 
 
 def refined(patch: ContactPatch, parts: int) -> ContactPatch:
@@ -12,6 +13,7 @@ def refined(patch: ContactPatch, parts: int) -> ContactPatch:
     extent = patch.cell_extents()
     if parts == 1 or not extent.any():
         return patch
+    check_cells(patch.cells * parts ** int(extent.any(axis=0).sum()))
     fine = (np.arange(parts) - (parts - 1) / 2) / parts
     offsets = [fine if side else np.zeros(1) for side in extent.max(axis=0)]
     inside = np.stack([axis.ravel() for axis in np.meshgrid(*offsets)], -1)

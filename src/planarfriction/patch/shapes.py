@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
 from planarfriction import validation
 from planarfriction.patch.grid import Grid
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
+from planarfriction.patch.size import MOST_CELLS
 
 CIRCLE_SIDES = 4096
 """Sides of the polygon that stands for a circle: at equal area, its moments are those of the circle to 1e-12."""
@@ -26,8 +25,8 @@ def columns_and_rows(cells: int | Sequence[int], width: float, height: float) ->
     A pair is taken as it is; one number counts the cells along the longer side, and the shorter side gets as many as
     keep the cells closest to square.
     """
-    if np.ndim(cells) == 0:
-        along = validation.count("cells", cells)
+    if not isinstance(cells, (Sequence, np.ndarray)) or isinstance(cells, str) or np.shape(cells) == ():
+        along = validation.count("cells", cells, at_most=MOST_CELLS)
         side = max(width, height) / along
         return max(1, round(width / side)), max(1, round(height / side))
     columns, rows = validation.vector("cells", cells, 2)

@@ -12,9 +12,10 @@ from typing import Any, Literal
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
-from planarfriction.scenes.signal import SAME_TIME, Signal, as_signal
+from planarfriction.scenes.signal import SAME_TIME, Signal, as_signal, sample_count
 
 RTOL, ATOL = 1e-5, 5e-4
 """Default tolerances: the published in-hand runs come out within 1.5e-6 m and 8e-6 rad of converged solutions."""
@@ -24,8 +25,8 @@ def _floats(name: str, value: Any, size: int) -> tuple[float, ...]:
     return tuple(validation.vector(name, value, size).tolist())
 
 
-@dataclass(frozen=True)
-class Body:
+@dataclass(frozen=True, eq=False)
+class Body(ByValue):
     """A rigid body that moves in the contact plane: inertia, initial state, gravity. World frame: x right, y up."""
 
     mass: float
@@ -40,7 +41,7 @@ class Body:
     """Initial twist `(vx, vy, omega)` of the centre of mass, world axes [m/s, m/s, rad/s]."""
     gravity: tuple[float, float] = (0.0, -9.81)
     """Gravity in the plane of motion, world axes [m/s^2]."""
-    outline: np.ndarray | None = field(default=None, compare=False, repr=False)
+    outline: np.ndarray | None = field(default=None, repr=False)
     """Polygon for drawings, in body axes with the centre of mass at the origin, shape `[M, 2]` [m], or None."""
 
     def __post_init__(self) -> None:
@@ -58,7 +59,7 @@ class Body:
 
 
 @dataclass(frozen=True, eq=False)
-class Contact:
+class Contact(ByValue):
     """A contact between body and world: a friction model, where it sits, and how hard it is pressed.
 
     Contacts fixed to the world (fingers) keep their frame while the body moves past; contacts fixed to the body (a box
@@ -81,8 +82,7 @@ class Contact:
     """Name in the results; unique in its scene."""
 
     def __post_init__(self) -> None:
-        if not (isinstance(self.name, str) and self.name):
-            raise InvalidValueError("name of a contact", "be a text that is not empty", self.name)
+        validation.text("name of a contact", self.name)
         if not (hasattr(self.model, "patch") and hasattr(self.model, "law")):
             valid = f"be a friction model ({MODELS.classes()})"
             raise InvalidValueError(f"model of contact {self.name!r}", valid, self.model)
@@ -97,7 +97,7 @@ class Contact:
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class Scene(ByValue):
     """Everything that a simulation needs: body, contacts, forces or prescribed velocity, duration.
 
     Raises InvalidValueError, naming the parameter, where the parts do not make a scene.
@@ -152,8 +152,8 @@ class Scene:
             for name in ("force", "stop_speed"):
                 if getattr(self, name) is not None:
                     raise InvalidValueError(name, "be None where the velocity is prescribed", getattr(self, name))
-        if not isinstance(self.name, str):
-            raise InvalidValueError("name", "be a text", self.name)
+        sample_count(self.t_end, self.save_every, "save_every")
+        validation.text("name", self.name)
 
     def breaks(self, t_end: float | None = None) -> np.ndarray:
         """Times [s] from 0 to `t_end` (default: the scene's) at which any signal jumps or bends, both ends included.

@@ -10,6 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.reading import Table
 from planarfriction.scenes.section import Section
@@ -20,14 +21,27 @@ SAME_TIME = 1e-12
 """Times closer than this [s] count as one: far below any step, far above the rounding of `i * dt`."""
 
 
+MOST_SAMPLES = 10_000_000
+"""Samples of a signal or a recording that are taken: a gigabyte for one contact."""
+
+
+def sample_count(span: float, step: float, name: str) -> int:
+    """Steps of `step` [s] that fit into `span` [s]; raises, before memory is asked for, where they are too many."""
+    count = span / step * (1.0 + 1e-12)  # so that the end itself is kept in spite of rounding
+    if count > MOST_SAMPLES:
+        rule = f"leave at most {MOST_SAMPLES} samples, be at least {span / MOST_SAMPLES:.3g} s for {span:g} s"
+        raise InvalidValueError(name, rule, step)
+    return int(count)
+
+
 def sample_times(t_end: float, dt: float = 0.01) -> np.ndarray:
     """Times `i dt` [s] from 0 to the last one not after `t_end`, each computed as `i * dt` (nothing accumulates)."""
     t_end, dt = validation.non_negative("t_end", t_end), validation.positive("dt", dt)
-    return np.arange(int(np.floor(t_end / dt + 1e-9)) + 1) * dt  # the 1e-9 keeps t_end itself in spite of rounding
+    return np.arange(sample_count(t_end + 1e-9 * dt, dt, "dt") + 1) * dt  # 1e-9 keeps t_end itself despite rounding
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Signal:
+class Signal(ByValue):
     """A sampled function of time, `[T]` or `[T, k]` values; constant before the first sample and after the last.
 
     With `hold="previous"` each value holds until the next sample, with `hold="linear"` straight lines join them.
@@ -45,7 +59,8 @@ class Signal:
 
     def __post_init__(self) -> None:
         times = validation.array("times", self.times, (None,))
-        values = validation.array("values", self.values, (None,) * (2 if np.ndim(self.values) == 2 else 1))
+        values = validation.numbers("values", self.values)
+        values = validation.array("values", values, (None,) * (2 if values.ndim == 2 else 1), largest=np.inf)
         if times.size == 0:
             raise InvalidValueError("times", "have at least one sample", "an empty array")
         if len(values) != len(times):
@@ -71,9 +86,10 @@ class Signal:
     @classmethod
     def constant(cls, value) -> Signal:
         """Signal that never changes; `value` is a number or a vector `[k]`."""
-        if isinstance(value, str) or np.ndim(value) == 0:
-            return cls(np.zeros(1), np.array([validation.number("value", value)]))
-        return cls(np.zeros(1), validation.array("value", value, (None,))[None])
+        value = validation.finite_numbers("value", value)
+        if value.ndim > 1:
+            raise InvalidValueError("value", "be a number or a vector", f"shape {list(value.shape)}")
+        return cls(np.zeros(1), value[None])
 
     @classmethod
     def sine(
@@ -97,6 +113,9 @@ class Signal:
         Lines that start with # are comments. Raises FileError for a missing file, a missing column or a text among
         the numbers, and InvalidValueError as the constructor does.
         """
+        validation.text("time", time)
+        if not isinstance(value, str) and not _is_texts(value):
+            raise InvalidValueError("value", "be the name of a column or a list of names", value)
         names = [value] if isinstance(value, str) else list(value)
         table = Table(path).numbers([time, *names])
         try:
@@ -173,15 +192,6 @@ class Signal:
         where = Section({"signal": data}, folder=Path(folder) if folder else None)
         return read_signal(where, "signal")
 
-    def __eq__(self, other: object) -> bool:
-        if not isinstance(other, Signal):
-            return NotImplemented
-        return (
-            self.hold == other.hold
-            and np.array_equal(self.times, other.times)
-            and np.array_equal(self.values, other.values)
-        )
-
     def __repr__(self) -> str:
         if len(self.times) == 1:
             return f"Signal.constant({self.values[0].tolist()})"
@@ -189,10 +199,6 @@ class Signal:
         return (
             f"Signal({len(self.times)} samples{columns}, {self.times[0]:g} to {self.times[-1]:g} s, hold={self.hold!r})"
         )
-
-    def __hash__(self) -> int:
-        # Adding 0.0 turns -0.0 into 0.0, which equals it.
-        return hash((self.hold, (self.times + 0.0).tobytes(), (self.values + 0.0).tobytes()))
 
     @property
     def _slopes(self) -> np.ndarray:
@@ -207,7 +213,7 @@ class Signal:
         return array[..., None] if self.values.ndim == 2 else array
 
     def _value(self, t, side: Literal["left", "right"]) -> np.ndarray:
-        t = np.asarray(t, dtype=float)
+        t = validation.finite_numbers("t", t)
         if self.hold == "linear":  # continuous: both limits agree, and at a sample the sample itself is exact
             side = "right"
         i = np.searchsorted(self.times, t, side=side) - 1
@@ -265,4 +271,4 @@ def read_signal(parent: Section, key: str) -> Signal:
 
 
 def _is_texts(value: Any) -> bool:
-    return isinstance(value, list) and bool(value) and all(isinstance(item, str) for item in value)
+    return isinstance(value, (list, tuple)) and bool(value) and all(isinstance(item, str) for item in value)

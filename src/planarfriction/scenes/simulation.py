@@ -12,7 +12,7 @@ from planarfriction.errors import InvalidValueError, SimulationInterrupted, Solv
 from planarfriction.kernels.integration import Method, Output
 from planarfriction.scenes.packing import PackedScene, pack
 from planarfriction.scenes.scene import Scene
-from planarfriction.scenes.signal import SAME_TIME
+from planarfriction.scenes.signal import SAME_TIME, sample_count
 from planarfriction.scenes.solution import History, Solution
 from planarfriction.solvers import RODAS4, integrate
 
@@ -111,8 +111,7 @@ def simulate(
 
 def recording_times(end: float, every: float, breaks: np.ndarray) -> np.ndarray:
     """Recording times; one that equals a break up to rounding is that break, so that it records the left limit."""
-    count = int(np.floor(end / every * (1.0 + 1e-12)))
-    times = np.arange(count + 1) * every
+    times = np.arange(sample_count(end, every, "save_every") + 1) * every
     if end - times[-1] > SAME_TIME:
         times = np.append(times, end)
     near = breaks[np.clip(np.searchsorted(breaks, times - SAME_TIME), 0, len(breaks) - 1)]

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from planarfriction.equality import by_parts
 from planarfriction.errors import FileError, FrictionError
 from planarfriction.reading import read_bytes
 from planarfriction.scenes.scene import Scene
@@ -41,6 +42,7 @@ _LEFT_OUT = "scene_left_out"
 """Attribute that says why the scene is not in the data."""
 
 
+@by_parts
 class History(NamedTuple):
     """One quantity over time, ready for a dataset."""
 
