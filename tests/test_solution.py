@@ -6,9 +6,11 @@ import os
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.io import netcdf_file
 
 import planarfriction as pf
 from planarfriction import FrictionError, Solution
+from planarfriction.errors import FileError
 from planarfriction.scenes import Statistics, in_hand, load
 from planarfriction.scenes.solution import History, write_dataset
 from planarfriction.writing import check_writable
@@ -147,3 +149,93 @@ def test_files_that_are_no_solutions_get_one_line(tmp_path):
         assert name in str(caught.value)
         assert reason in str(caught.value)
         assert "\n" not in str(caught.value)
+
+
+# ---------------------------------------------------------------------- damage
+
+
+def damaged(content: bytes, random: np.random.Generator) -> bytes:
+    """The content with one kind of damage somewhere: bits, bytes, a lost end, a lost or repeated block, noise."""
+    kind, place = random.integers(6), int(random.integers(len(content)))
+    length = int(random.integers(1, 65))
+    if kind == 0:
+        return content[:place] + bytes([content[place] ^ (1 << int(random.integers(8)))]) + content[place + 1 :]
+    if kind == 1:
+        return content[:place]
+    if kind == 2:
+        return content[:place] + content[place + length :]
+    if kind == 3:
+        return content[:place] + content[place : place + length] + content[place:]
+    if kind == 4:
+        return content[:place] + length * b"\0" + content[place + length :]
+    return content[:place] + random.bytes(length) + content[place + length :]
+
+
+def test_a_damaged_file_loads_as_it_was_saved_or_not_at_all(tmp_path):
+    """1,500 damages, with a seed: loading gives the very same solution or one line, never another solution."""
+    original, path = a_solution(), tmp_path / "run.nc"
+    good, random = original.save(path).read_bytes(), np.random.default_rng(11)
+    refused = 0
+    for _ in range(1500):
+        bad = damaged(good, random)
+        path.write_bytes(bad)
+        try:
+            again = load(path)
+        except FileError as error:
+            assert "\n" not in str(error) and "run.nc" in str(error)
+            refused += bad != good
+        else:
+            assert bad == good
+            xr.testing.assert_identical(again.data, original.data)
+    assert refused > 1400  # zeros over zeros are no damage
+
+
+def test_every_byte_counts(tmp_path):
+    good = a_solution().save(tmp_path / "run.nc").read_bytes()
+    for place in {*range(0, len(good), 7), *range(len(good) - 200, len(good))}:
+        (tmp_path / "run.nc").write_bytes(good[:place] + bytes([good[place] ^ 1]) + good[place + 1 :])
+        with pytest.raises(FileError):
+            load(tmp_path / "run.nc")
+
+
+def test_other_programs_read_the_file(tmp_path):
+    path, random = a_solution().save(tmp_path / "run.nc"), np.random.default_rng(0)
+    with xr.load_dataset(path, engine="scipy") as data:
+        assert np.array_equal(data["fx"], random.normal(size=(5, 1)))
+    with netcdf_file(path, mmap=False) as file:
+        assert np.array_equal(file.variables["time"][:], np.arange(5) * 0.01)
+
+
+def test_a_file_that_another_program_wrote_anew_is_refused_with_the_way_out(tmp_path):
+    path = a_solution().save(tmp_path / "run.nc")
+    data = xr.load_dataset(path, engine="scipy")
+    data["x"] = 2.0 * data["x"]
+    data.to_netcdf(tmp_path / "edited.nc", engine="scipy")
+    del data.attrs["planarfriction_checksum"]
+    data.to_netcdf(tmp_path / "stripped.nc", engine="scipy")
+    for name, reason in (("edited.nc", "changed by another program"), ("stripped.nc", "no checksum")):
+        with pytest.raises(FileError, match=rf"{name}: .*{reason}.*xarray.load_dataset"):
+            load(tmp_path / name)
+    solution = load(path)  # the way to change a solution
+    solution.data["x"] = 2.0 * solution.data["x"]
+    assert np.array_equal(load(solution.save(path)).data["x"], data["x"])
+    assert "planarfriction_checksum" not in solution.data.attrs
+
+
+def test_additions_that_no_file_can_hold_get_one_line(tmp_path):
+    for name, value in (("nested", {"a": 1}), ("object", object()), (3, "number as a name")):
+        solution = a_solution()
+        solution.save(tmp_path / "run.nc")
+        solution.data.attrs[name] = value
+        with pytest.raises(FileError, match=r"run.nc: cannot be written"):
+            solution.save(tmp_path / "run.nc")
+        load(tmp_path / "run.nc")
+
+
+@pytest.mark.parametrize("name", ["pipe.nc", "/dev/zero", "a\0b", "\udcff.nc"])
+def test_what_is_no_file_is_no_solution(tmp_path, name):
+    if name == "pipe.nc":
+        os.mkfifo(tmp_path / name)
+    with pytest.raises(FileError) as caught:
+        load(tmp_path / name)
+    assert "\n" not in str(caught.value)

@@ -133,11 +133,9 @@ def write_dataset(data: xr.Dataset, path: str | Path) -> Path:
     return Path(path)
 
 
-def _parted(content: bytes) -> tuple[memoryview, bytes, memoryview] | None:
-    """What stands before the checksum of a file, the checksum, and what stands after it; None without one."""
-    begin = content.find(_MARK) + len(_MARK)
-    if begin < len(_MARK):
-        return None
+def _parted(content: bytes) -> tuple[memoryview, bytes, memoryview]:
+    """What stands before the checksum of a file, the checksum, and what stands after it; a ValueError without one."""
+    begin = content.index(_MARK) + len(_MARK)
     view = memoryview(content)
     return view[:begin], bytes(view[begin : begin + _DIGITS]), view[begin + _DIGITS :]
 
@@ -163,10 +161,10 @@ def load(path: str | Path) -> Solution:
     content = read_bytes(path, what)
     if not content.startswith(b"CDF"):
         raise FileError(f"{path}: not {what} (not a NetCDF 3 file)")
-    parted = _parted(content)
-    if parted is None:
-        raise FileError(f"{path}: not {what}: it has no checksum ({_OTHERWISE})")
-    before, checksum, after = parted
+    try:
+        before, checksum, after = _parted(content)
+    except ValueError:
+        raise FileError(f"{path}: not {what}: it has no checksum ({_OTHERWISE})") from None
     if checksum != _checksum(before, after):
         raise FileError(f"{path}: damaged, or changed by another program: its checksum differs ({_OTHERWISE})")
     try:
