@@ -149,8 +149,8 @@ def test_broken_files(tmp_path, file, content, message):
 
 def test_missing_file_and_folder(tmp_path):
     (tmp_path / "folder.csv").mkdir()
-    for name in ("missing.csv", "folder.csv"):
-        with pytest.raises(FileError, match="no such file"):
+    for name, reason in (("missing.csv", "no such file"), ("folder.csv", "is a folder")):
+        with pytest.raises(FileError, match=reason):
             pf.ContactPatch.from_pressure(tmp_path / name, 0.001)
 
 

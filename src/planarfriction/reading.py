@@ -15,10 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from planarfriction.errors import FileError
-
-WIDTH = 80
-"""Characters of a cell that a message shows."""
+from planarfriction.errors import FileError, shown
 
 MOST_TEXT = 256_000_000
 """Largest text file that is read [bytes]: a log of a million samples fits."""
@@ -94,14 +91,14 @@ class Table:
             raise FileError(f"{path}: is empty (expected a header line and rows of numbers)")
         for name in filter(None, self.names):
             if self.names.count(name) > 1:
-                raise FileError(f"{path}: line {line} has two columns {name!r}")
+                raise FileError(f"{path}: line {line} has two columns {shown(repr(name))}")
 
     def numbers(self, names: Sequence[str]) -> np.ndarray:
         """Columns `names`, finite, shape `[rows, len(names)]`; raises FileError with the line and the column."""
         for name in names:
             if name not in self.names:
                 near = difflib.get_close_matches(name, self.names, n=1)
-                hint = f"did you mean {near[0]!r}?" if near else f"valid: {', '.join(self.names)}"
+                hint = f"did you mean {near[0]!r}?" if near else f"valid: {shown(', '.join(self.names))}"
                 raise FileError(f"{self._path}: no column {name!r} ({hint})")
         columns = [(name, self.names.index(name)) for name in names]
         values = array("d")
@@ -119,9 +116,9 @@ def number(path: str | Path, line: int, place: str, cell: str) -> float:
     try:
         value = float(cell)
     except ValueError:
-        raise FileError(f"{path}: line {line}, {place}: {cell[:WIDTH]!r} is not a number") from None
+        raise FileError(f"{path}: line {line}, {place}: {shown(repr(cell))} is not a number") from None
     if not math.isfinite(value):
-        raise FileError(f"{path}: line {line}, {place}: {cell[:WIDTH]!r} is not finite")
+        raise FileError(f"{path}: line {line}, {place}: {shown(repr(cell))} is not finite")
     return value
 
 

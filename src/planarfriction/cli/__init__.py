@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import sys
+import warnings
 from collections.abc import Sequence
 
 from planarfriction.errors import FrictionError
@@ -24,6 +25,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     from planarfriction.cli.app import app
 
+    # One line for a warning too, without the place in the code that it comes from.
+    warnings.showwarning = lambda message, *_: print("warning:", " ".join(str(message).split()), file=sys.stderr)
     given = list(sys.argv[1:] if arguments is None else arguments)
     try:
         code = app.main(given or ["--help"], prog_name="planarfriction", standalone_mode=False)

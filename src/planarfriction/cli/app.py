@@ -45,8 +45,17 @@ def complete_scene(context: object, parameter: object, incomplete: str) -> list[
     return [*names, CompletionItem(incomplete, type="file")]
 
 
-FILE = click.Path(path_type=Path)
-"""A path that the commands check themselves."""
+class FilePath(click.Path):
+    """A path that the commands check themselves, and that is one."""
+
+    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Path:
+        """The path; an empty text, as of a variable that a script has not set, is none."""
+        if not str(value) or "\0" in str(value):
+            self.fail("the name of a file or a folder is needed, got an empty one", param, ctx)
+        return Path(str(value))
+
+
+FILE = FilePath()
 
 
 @click.group(
@@ -199,7 +208,7 @@ def identify(
     from planarfriction.cli.patches import WIDTH, find_patch
     from planarfriction.laws import ElastoPlastic
 
-    chosen = find_patch(patch or "Circle", cell_size=cell_size, width=WIDTH if width is None else width)
+    chosen = find_patch(patch, cell_size=cell_size, width=WIDTH if width is None else width)
     return command.identify(
         logs,
         chosen,

@@ -26,7 +26,7 @@ def choose_patch(patch: str | None, pressure: Path | None, cell_size: float | No
         raise InvalidValueError("--patch", "not be given together with --pressure", patch)
     if pressure is not None:
         return pressure_map(pressure, cell_size)
-    return find_patch("Circle" if patch is None else patch, cell_size=cell_size)
+    return find_patch(patch, cell_size=cell_size)
 
 
 def show(patch: ContactPatch, kind: str, *, picture: Path | None, table: Path | None) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import inspect
+import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,12 +19,17 @@ if TYPE_CHECKING:
 WIDTH = 0.02
 """Width of named patches [m], that of the published experiments."""
 
+USUAL = "Circle"
+"""Patch where none is asked for."""
+
 _PER_WIDTH = {"width": 1.0, "length": 1.0, "radius": 0.5}
 """First parameters of shapes that a width decides, and how large they are for a width of 1."""
 
 
-def find_patch(text: str, *, cell_size: float | None, width: float = WIDTH) -> ContactPatch:
+def find_patch(text: str | None, *, cell_size: float | None, width: float = WIDTH) -> ContactPatch:
     """The patch called `text` (case does not matter), `width` [m] wide, or the pressure map in the file `text`.
+
+    Circle for None, not for an empty text.
 
     Raises
     ------
@@ -32,13 +38,14 @@ def find_patch(text: str, *, cell_size: float | None, width: float = WIDTH) -> C
     FileError
         The pressure map cannot be read.
     """
+    text = USUAL if text is None else text
     makers = _shapes(width)
     makers |= {name.lower(): functools.partial(make, width=width) for name, make in PUBLISHED_PATCHES.items()}
     if make := makers.get(text.lower()):
         if cell_size is not None:
             raise InvalidValueError("--cell-size", "come with a pressure map", f"{cell_size} for the patch {text}")
         return make()
-    if not (Path(text).suffix or Path(text).exists()):
+    if not (Path(text).suffix or (text and os.path.exists(text))):
         shapes = [name for name in _shapes(width) if name.title() not in PUBLISHED_PATCHES]
         validation.choice("patch", text, [*PUBLISHED_PATCHES, *shapes, "a pressure map file"])
     return pressure_map(text, cell_size)

@@ -12,7 +12,7 @@ from planarfriction.cli import INTERRUPTED, output
 from planarfriction.cli.console import note, print_table, simulation_progress
 from planarfriction.cli.patches import WIDTH, find_patch
 from planarfriction.cli.report import comparison
-from planarfriction.errors import SimulationInterrupted, SolverError
+from planarfriction.errors import InvalidValueError, SimulationInterrupted, SolverError
 from planarfriction.families import MODELS, SCENES
 from planarfriction.writing import make_folder
 
@@ -46,7 +46,7 @@ def build_scenes(
         return _scenes_from_file(name, kinds, patch, cell_size)
     validation.choice("scene", name, [*SCENES, "a scene file (.toml, .json)"])
     width = DRIFT_WIDTH if name == "drift" else WIDTH
-    contact_patch = find_patch(patch or "Circle", cell_size=cell_size, width=width)
+    contact_patch = find_patch(patch, cell_size=cell_size, width=width)
     kinds = kinds or (list(BOTH) if name == "in-hand" else ["distributed"])
     options: dict[str, Any] = {} if t_end is None else {"t_end": t_end}
     if name == "free-slide":
@@ -64,6 +64,8 @@ def _scenes_from_file(path: str, kinds: Sequence[str], patch: str | None, cell_s
     from planarfriction.scenes import Scene
 
     scene = Scene.from_file(path)
+    if patch is None and cell_size is not None:
+        raise InvalidValueError("--cell-size", "come with the pressure map of --patch", cell_size)
     contact_patch = None if patch is None else find_patch(patch, cell_size=cell_size)
     if not kinds and contact_patch is None:
         return {_label(scene): scene}

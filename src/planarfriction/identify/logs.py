@@ -108,7 +108,7 @@ class Log:
             )
         columns = table.numbers([time, *motion, *WRENCH, *load])
         times, moved, wrench = columns[:, 0], columns[:, 1:4], columns[:, 4:7]
-        loads = columns[:, 7] if load else validation.non_negative("normal_force", normal_force)
+        loads = columns[:, 7] if load else np.array(validation.non_negative("normal_force", normal_force))
         try:
             if motion is TWIST:
                 return cls(times, moved, wrench, loads, path.stem)

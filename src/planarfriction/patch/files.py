@@ -2,15 +2,23 @@
 
 from __future__ import annotations
 
+import io
+import math
+import warnings
+from array import array
 from pathlib import Path
 
 import numpy as np
 
-from planarfriction.errors import FileError
-from planarfriction.reading import number, read_rows
+from planarfriction.errors import FileError, FrictionError
+from planarfriction.patch.size import MOST_CELLS
+from planarfriction.reading import number, read_bytes, read_rows
 
 IMAGE_SUFFIXES = (".png", ".tif", ".tiff", ".bmp", ".pgm", ".jpg", ".jpeg")
 """Suffixes of the files that are read as grey images."""
+
+MOST_BYTES = 256_000_000
+"""Largest file of a map that is read."""
 
 GREY_MODES = ("1", "L", "I", "F", "I;16", "I;16B", "I;16L", "I;16N")
 """Pillow's names for images with one channel of numbers."""
@@ -33,41 +41,43 @@ def read_pressure_map(path: str | Path) -> np.ndarray:
     if reader is None:
         kinds = ", ".join(IMAGE_SUFFIXES)
         raise FileError(f"pressure map {path}: unknown kind {path.suffix!r}, use .csv, .npy or a grey image ({kinds})")
-    if not path.is_file():
-        raise FileError(f"pressure map {path}: no such file")
     try:
         return reader(path)
-    except FileError:
+    except FrictionError:
         raise
-    # Pillow reports a broken PNG as SyntaxError; an oversized header of an NPY file ends in a MemoryError.
-    except (OSError, ValueError, SyntaxError, EOFError, MemoryError) as error:
+    # Pillow reports a broken PNG as SyntaxError, and other things as what they are in its own code.
+    except Exception as error:
         reason = " ".join(str(error).split()) or type(error).__name__
-        raise FileError(f"pressure map {path}: not a readable {path.suffix.lower()} file ({reason})") from error
+        raise FileError(f"pressure map {path}: not a readable {path.suffix.lower()} file ({reason})") from None
 
 
 def _read_csv(path: Path) -> np.ndarray:
-    rows: list[list[float]] = []
+    values, width = array("d"), 0
     for line, cells in read_rows(path, "a pressure map"):
-        if rows and len(cells) != len(rows[0]):
-            rule = f"has {len(cells)} values, the first row has {len(rows[0])}"
-            raise FileError(f"pressure map {path}: line {line} {rule}")
-        rows.append([number(f"pressure map {path}", line, f"value {i}", cell) for i, cell in enumerate(cells, 1)])
-    if not rows:
+        width = width or len(cells)
+        if len(cells) != width:
+            raise FileError(f"pressure map {path}: line {line} has {len(cells)} values, the first row has {width}")
+        values.extend(number(f"pressure map {path}", line, f"value {i}", cell) for i, cell in enumerate(cells, 1))
+        _check_size(path, len(values))
+    if not values:
         raise FileError(f"pressure map {path}: the file holds no numbers")
-    return np.array(rows)
+    return np.array(values).reshape(-1, width)
 
 
 def _read_npy(path: Path) -> np.ndarray:
-    values = np.load(path, allow_pickle=False)
+    values = np.load(io.BytesIO(read_bytes(path, "a pressure map", MOST_BYTES)), allow_pickle=False)
     if not isinstance(values, np.ndarray) or values.dtype.kind not in "biuf":
         raise FileError(f"pressure map {path}: the file must hold one array of real numbers")
+    _check_size(path, values.size)
     return values.astype(float)
 
 
 def _read_image(path: Path) -> np.ndarray:
     from PIL import Image
 
-    with Image.open(path) as image:
+    with warnings.catch_warnings(), Image.open(io.BytesIO(read_bytes(path, "a pressure map", MOST_BYTES))) as image:
+        warnings.simplefilter("error", Image.DecompressionBombWarning)
+        _check_size(path, math.prod(image.size))
         if image.mode in GREY_MODES:
             return np.asarray(image, dtype=float)
         red, green, blue, alpha = np.moveaxis(np.asarray(image.convert("RGBA"), dtype=float), -1, 0)
@@ -76,3 +86,9 @@ def _read_image(path: Path) -> np.ndarray:
     if not (alpha == 255).all():
         raise FileError(f"pressure map {path}: the image is partly transparent, save it without transparency")
     return red
+
+
+def _check_size(path: Path, cells: int) -> None:
+    """Raise, before memory is asked for, where a map has more cells than a patch may have."""
+    if cells > MOST_CELLS:
+        raise FileError(f"pressure map {path}: has more than {MOST_CELLS} cells, the most that a patch may have")

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.errors import FileError, InvalidValueError
+from planarfriction.errors import FileError, InvalidValueError, shown
 from planarfriction.reading import read_text
 from planarfriction.scenes.model_files import model_from_dict, model_to_dict
 from planarfriction.scenes.scene import Body, Contact, Scene
@@ -126,11 +126,20 @@ def read_scene(path: str | Path) -> Scene:
         raise FileError(f"{path}: a scene file ends in .toml or .json{missing}")
     text = read_text(path, "a scene file")
     try:
-        data = tomllib.loads(text) if kind == ".toml" else json.loads(text)
-    except (tomllib.TOMLDecodeError, json.JSONDecodeError, RecursionError) as error:
-        reason = " ".join(str(error).split())
-        raise FileError(f"{path}: not valid {kind[1:].upper()}: {reason}") from None
+        data = tomllib.loads(text) if kind == ".toml" else json.loads(text, object_pairs_hook=_table)
+    except (ValueError, RecursionError) as error:  # ValueError: also a number of more digits than Python converts
+        raise FileError(f"{path}: not valid {kind[1:].upper()}: {shown(str(error).partition(';')[0])}") from None
     return scene_from_dict(data, folder=path.parent, source=str(path))
+
+
+def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """The table of a JSON object, in which each key stands once, as in TOML."""
+    table: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in table:
+            raise ValueError(f"two keys {shown(repr(key))}")
+        table[key] = value
+    return table
 
 
 def write_scene(scene: Scene, path: str | Path) -> None:

@@ -21,6 +21,10 @@ RTOL, ATOL = 1e-5, 5e-4
 """Default tolerances: the published in-hand runs come out within 1.5e-6 m and 8e-6 rad of converged solutions."""
 
 
+MOST_CONTACTS = 1_000_000
+"""Identical contacts that share one state."""
+
+
 def _floats(name: str, value: Any, size: int) -> tuple[float, ...]:
     return tuple(validation.vector(name, value, size).tolist())
 
@@ -93,7 +97,7 @@ class Contact(ByValue):
         validation.choice(f"mounted_on {of_contact}", self.mounted_on, ("world", "body"))
         object.__setattr__(self, "position", _floats(f"position {of_contact}", self.position, 2))
         object.__setattr__(self, "angle", validation.number(f"angle {of_contact}", self.angle))
-        object.__setattr__(self, "count", validation.count(f"count {of_contact}", self.count))
+        object.__setattr__(self, "count", validation.count(f"count {of_contact}", self.count, at_most=MOST_CONTACTS))
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from planarfriction.errors import FileError, FrictionError
+from planarfriction import validation
+from planarfriction.errors import FileError, FrictionError, shown
 
 _REQUIRED: Any = object()
 
@@ -23,7 +24,7 @@ class Section:
     def __init__(self, data: Any, where: str = "", source: str = "scene", folder: Path | None = None):
         self.where, self.source, self.folder = where, source, folder or Path()
         if not isinstance(data, dict):
-            self.fail(f"must be a table of keys and values, got {data!r}")
+            self.fail(f"must be a table of keys and values, got {_shown(data)}")
         self.data: dict[str, Any] = data
 
     def __contains__(self, key: str) -> bool:
@@ -43,7 +44,7 @@ class Section:
         keys = list(keys)
         for key in self.data:
             if key not in keys:
-                self.fail(f"unknown key {key!r}{_hint(key, keys)}")
+                self.fail(f"unknown key {_shown(key)}{_hint(key, keys)}")
         return self
 
     def get(self, key: str, default: Any = _REQUIRED) -> Any:
@@ -66,8 +67,8 @@ class Section:
     def choice(self, key: str, valid: Iterable[str], default: Any = _REQUIRED) -> str:
         """Value under `key` if it is one of `valid`, or raise an error that names the nearest valid one."""
         value, valid = self.get(key, default), list(valid)
-        if value not in valid:
-            self.fail(f"{key} must be one of {', '.join(valid)}, got {value!r}{_near(value, valid)}")
+        if not (isinstance(value, str) and value in valid):
+            self.fail(f"{key} must be one of {', '.join(valid)}, got {_shown(value)}{_near(value, valid)}")
         return value
 
     def path(self, key: str) -> Path:
@@ -78,12 +79,12 @@ class Section:
         """List of paths under `key`, taken from the folder of the scene file."""
         value = self.get(key)
         if not isinstance(value, list):
-            self.fail(f"{key} must be a list of paths, got {value!r}")
+            self.fail(f"{key} must be a list of paths, got {_shown(value)}")
         return [self._path(key, each) for each in value]
 
     def _path(self, key: str, value: Any) -> Path:
         if not isinstance(value, str) or not value:
-            self.fail(f"{key} must be the path of a file, got {value!r}")
+            self.fail(f"{key} must be the path of a file, got {_shown(value)}")
         return self.folder / value
 
     @contextlib.contextmanager
@@ -96,8 +97,12 @@ class Section:
             raise (error if message.startswith(f"{self.source}: ") else self.error(message)) from None
 
 
+def _shown(value: Any) -> str:
+    return shown(validation.quoted(value))
+
+
 def _near(value: Any, valid: Sequence[str]) -> str:
-    near = difflib.get_close_matches(str(value), valid, n=1)
+    near = difflib.get_close_matches(value[:200], valid, n=1) if isinstance(value, str) else []
     return f" (did you mean {near[0]!r}?)" if near else ""
 
 

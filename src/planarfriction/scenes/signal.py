@@ -11,7 +11,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.equality import ByValue
-from planarfriction.errors import InvalidValueError
+from planarfriction.errors import InvalidValueError, shown
 from planarfriction.reading import Table
 from planarfriction.scenes.section import Section
 
@@ -244,7 +244,7 @@ def read_signal(parent: Section, key: str) -> Signal:
     if not isinstance(data, dict):
         here = Section({}, parent.name_of(key), parent.source, parent.folder)
         if isinstance(data, (str, bool)):
-            here.fail(f"must be a number, a list of numbers or a table, got {data!r}")
+            here.fail(f"must be a number, a list of numbers or a table, got {shown(validation.quoted(data))}")
         with here.located():
             return Signal.constant(data)
     here = parent.section(key)

@@ -1,0 +1,178 @@
+"""Files that are read: CSV as others write it, and what is no file, too large or damaged gets one line at once."""
+
+import os
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import planarfriction as pf
+from planarfriction import FrictionError, Scene, Signal, reading
+from planarfriction.errors import FileError
+from planarfriction.identify import Log
+from planarfriction.patch import files as patch_files
+from planarfriction.patch import read_pressure_map
+
+NOISE = np.random.default_rng(0).bytes(300)
+
+READERS = {
+    "scene.toml": Scene.from_file,
+    "scene.json": Scene.from_file,
+    "load.csv": Signal.from_csv,
+    "log.csv": Log.from_csv,
+    "map.csv": read_pressure_map,
+    "map.npy": read_pressure_map,
+    "map.png": read_pressure_map,
+    "run.nc": pf.load,
+}
+"""A file of each kind, and what reads it."""
+
+
+def one_line(act, *arguments) -> str:
+    with pytest.raises(FrictionError) as caught:
+        act(*arguments)
+    assert "\n" not in str(caught.value)
+    return str(caught.value)
+
+
+# ---------------------------------------------------------------------- what is no file
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_what_is_no_file_is_said_at_once(tmp_path, name):
+    path = tmp_path / name
+    assert "no such file" in one_line(READERS[name], path)
+    path.mkdir()
+    assert "is a folder" in one_line(READERS[name], path)
+    path.rmdir()
+    os.mkfifo(path)  # opening it would wait for somebody who writes to it
+    assert "is a device or a pipe" in one_line(READERS[name], path)
+    path.unlink()
+    path.symlink_to("/dev/zero")
+    assert "is a device or a pipe" in one_line(READERS[name], path)
+    path.unlink()
+    path.symlink_to(path)
+    assert "cannot be read" in one_line(READERS[name], path)
+    assert "cannot be read" in one_line(READERS[name], tmp_path / f"a\0b{path.suffix}")
+
+
+@pytest.mark.parametrize("name", READERS)
+@pytest.mark.parametrize("content", [b"", NOISE, b"\xff\xfe\x00", b"a,b\n1,2\n", b"[" * 20_000, b"\0" * 100])
+def test_files_of_another_kind_get_one_line(tmp_path, name, content):
+    (tmp_path / name).write_bytes(content)
+    assert name in one_line(READERS[name], tmp_path / name)
+
+
+def test_what_a_shell_pipes_is_read(tmp_path):
+    rows = "".join(f"{0.01 * i},0,0,0,0,0,0,1\n" for i in range(20))
+    text = f"t,vx,vy,omega,fx,fy,tau,normal_force\n{rows}"
+    code = "import sys; from planarfriction.identify import Log; print(len(Log.from_csv('/dev/stdin').time))"
+    done = subprocess.run([sys.executable, "-c", code], input=text, capture_output=True, text=True, check=True)
+    assert done.stdout == "20\n"
+
+
+# ---------------------------------------------------------------------- what is too large
+
+
+def test_text_files_have_a_largest_size(tmp_path):
+    for name in ("scene.toml", "load.csv", "log.csv", "map.csv"):
+        with (tmp_path / name).open("wb") as file:
+            file.truncate(1 << 40)  # sparse: takes no place, and no memory holds it
+        assert "is larger than 256 MB, the most that is read" in one_line(READERS[name], tmp_path / name)
+
+
+def test_pipes_have_a_largest_size():
+    code = "from planarfriction import reading\nreading.MOST_TEXT = 100_000\nreading.read_text('/dev/stdin', 'a text')"
+    done = subprocess.run([sys.executable, "-c", code], input=100_001 * "a", capture_output=True, text=True)
+    assert "FileError: /dev/stdin: is larger than 0.1 MB, the most that is read as a text" in done.stderr
+
+
+def test_maps_have_a_largest_size(tmp_path, monkeypatch):
+    monkeypatch.setattr(patch_files, "MOST_CELLS", 99)
+    np.save(tmp_path / "map.npy", np.ones((10, 10), dtype=np.int8))
+    Image.new("L", (10, 10), 1).save(tmp_path / "map.png")
+    (tmp_path / "map.csv").write_text(10 * (",".join(10 * "1") + "\n"))
+    for name in ("map.npy", "map.png", "map.csv"):
+        assert f"{name}: has more than 99 cells" in one_line(read_pressure_map, tmp_path / name)
+
+
+def test_huge_pictures_are_refused_before_memory_is_asked_for(tmp_path):
+    """A few kilobytes that say 20,000 x 20,000 points: Pillow would raise an error of its own, or take 3 GB."""
+    for side in (3_000, 10_000, 20_000):
+        Image.new("1", (side, side)).save(tmp_path / "map.png")
+        assert "map.png: " in one_line(read_pressure_map, tmp_path / "map.png")
+
+
+def test_arrays_that_claim_more_than_they_hold(tmp_path):
+    np.save(tmp_path / "map.npy", np.ones((2, 2)))
+    content = (tmp_path / "map.npy").read_bytes()
+    for shape in (b"(999999, 999999)", b"(9999999999999, 9999999999999)"):
+        changed = content.replace(b"(2, 2)", shape, 1).replace(b" " * (len(shape) - 6), b"", 1)
+        (tmp_path / "map.npy").write_bytes(changed)
+        assert "not a readable .npy file" in one_line(read_pressure_map, tmp_path / "map.npy")
+
+
+# ---------------------------------------------------------------------- CSV as others write it
+
+
+def table(tmp_path, text):
+    (tmp_path / "table.csv").write_bytes(text.encode())
+    return reading.Table(tmp_path / "table.csv")
+
+
+def test_quotes_comments_empty_lines_and_line_ends(tmp_path):
+    text = (
+        '\ufeff# made by a logger, "unit\r\n\r\n'
+        '"t","two\nlines",note\r\n'
+        '0,"1",plain\r\n'
+        "  # half-way\r\n"
+        '1,2,"a ""quoted"" note\r\n# over three lines\r\n, with a comma"\r\n'
+        "2,3,\n"
+    )
+    read = table(tmp_path, text)
+    assert read.names == ["t", "two\nlines", "note"]
+    assert read.numbers(["two\nlines", "t"]).tolist() == [[1.0, 0.0], [2.0, 1.0], [3.0, 2.0]]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("a,a\n1,2\n", "line 1 has two columns 'a'"),
+        ("# x\n\n a , a\n1,2\n", "line 3 has two columns 'a'"),
+        ('a,b\n1,"2\n', "line 2 is not CSV: unexpected end of data"),
+        ('a,b\n1,"2"3\n', "line 2 is not CSV"),
+        (f"a,b\n1,{200_000 * '7'}\n", "line 2 is not CSV: field larger than field limit"),
+        (f"a,b\n1,{1000 * 'x'}\n", "xxx... is not a number"),
+        ('a,b\n1,"2\n2"\n', r"line 2, column 'b': '2\n2' is not a number"),
+        ("a,b\n1,2\n\n1,inf\n", "line 4, column 'b': 'inf' is not finite"),
+        (f"a,b\n1,{5000 * '9'}\n", "is not finite"),
+        ("a,b\n1,2,3\n", "line 2 has 3 columns, the header has 2"),
+        ("a,c\n1,2\n", "no column 'b' (valid: a, c)"),
+        ("a,b\n", "no rows"),
+        ("# nothing\n", "is empty"),
+        ("a,b\n1,\0\n", r"'\x00' is not a number"),
+    ],
+)
+def test_bad_tables_get_one_line(tmp_path, text, words):
+    message = one_line(lambda: table(tmp_path, text).numbers(["a", "b"]))
+    assert words in message and str(tmp_path) in message
+    assert len(message) < len(str(tmp_path)) + 200
+
+
+def test_columns_that_nobody_asks_for_may_hold_anything(tmp_path):
+    text = "a,,,note\n" + "".join(f"{i},,,{100_000 * 'x'}\n" for i in range(3))
+    assert table(tmp_path, text).numbers(["a"]).tolist() == [[0.0], [1.0], [2.0]]
+
+
+def test_long_tables_come_out_to_the_bit(tmp_path):
+    text = "a,b\n" + "".join(f"{i},{i / 3}\n" for i in range(100_000))
+    values = table(tmp_path, text).numbers(["b", "a"])
+    assert np.array_equal(values[:, 1], np.arange(100_000)) and np.array_equal(values[:, 0], np.arange(100_000) / 3)
+
+
+def test_duplicate_names_in_signals_and_logs_are_refused(tmp_path):
+    (tmp_path / "load.csv").write_text("time,value,value\n0,1,2\n")
+    with pytest.raises(FileError, match=r"two columns 'value'"):
+        Signal.from_csv(tmp_path / "load.csv")
