@@ -51,6 +51,11 @@ def read_pressure_map(path: str | Path) -> np.ndarray:
         raise FileError(f"pressure map {path}: not a readable {path.suffix.lower()} file ({reason})") from None
 
 
+def title(path: str | Path) -> str:
+    """Name of the patch of a map: that of its file, with ? for what cannot be printed."""
+    return "".join(each if each.isprintable() else "?" for each in Path(path).stem).strip() or "map"
+
+
 def _read_csv(path: Path) -> np.ndarray:
     values, width = array("d"), 0
     for line, cells in read_rows(path, "a pressure map"):

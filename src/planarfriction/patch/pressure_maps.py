@@ -13,7 +13,7 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
-from planarfriction.patch.files import read_pressure_map
+from planarfriction.patch.files import read_pressure_map, title
 from planarfriction.patch.pressure import Pressure, check_not_negative, pressure_array
 
 
@@ -118,4 +118,4 @@ def _one_map(pressure: Any) -> tuple[np.ndarray, str | None]:
     named = isinstance(pressure, (str, Path))
     values = read_pressure_map(pressure) if named else pressure
     values = check_not_negative(_what(pressure), pressure_array(_what(pressure), values, (None, None)))
-    return values, Path(pressure).stem if named else None
+    return values, title(pressure) if named else None
