@@ -208,7 +208,7 @@ def test_at_rest_nothing_moves_and_nothing_is_nan(model):
 
 
 def test_a_patch_of_one_point_is_refused():
-    with pytest.raises(InvalidValueError, match="patch must have more than one loaded point"):
+    with pytest.raises(InvalidValueError, match="patch must carry more than 1e-06 of its load"):
         pf.ReducedModel(pf.ContactPatch.points([(0.0, 0.0)]), PLAIN)
 
 

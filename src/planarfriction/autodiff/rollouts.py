@@ -14,6 +14,7 @@ from planarfriction import validation
 from planarfriction.autodiff.parameters import Packed, has_one_shape, pack
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
+from planarfriction.kernels.compiled_math import LARGEST
 from planarfriction.kernels.rollouts import Bars, Inputs
 from planarfriction.models import FrictionModel
 
@@ -246,8 +247,13 @@ def _checked(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, par
     twist, load, dt = _sequences(twist, normal_force, dt)
     steps = len(dt)
     for name, value in {"state": state, "twist": twist, "normal_force": load, "dt": dt}.items():
-        if not (np.isfinite(value.sum()) or np.isfinite(value).all()):  # a sum is quicker, but may overflow
-            raise InvalidValueError(name, "be finite", "NaN or infinity")
+        low, high = value.min(initial=0.0), value.max(initial=0.0)
+        if not (low >= -LARGEST and high <= LARGEST):  # NaN spreads to both
+            if np.isnan(low) or np.isinf(low) or np.isinf(high):
+                raise InvalidValueError(name, "be finite", "NaN or infinity")
+            raise InvalidValueError(
+                name, f"be between {-LARGEST:g} and {LARGEST:g}", float(low if -low > high else high)
+            )
     for name, value in {"normal_force": load, "dt": dt}.items():
         if value.min(initial=0.0) < 0.0:
             raise InvalidValueError(name, "be >= 0", float(value.min()))

@@ -52,6 +52,16 @@ def where(condition, a, b):
     return a if condition else b
 
 
+LARGEST = 1e50
+"""Largest number that a step takes [SI units]: products of three such and their squares stay among the doubles."""
+
+
+@_inline
+def in_range(x):
+    """A number, and not beyond `LARGEST`."""
+    return abs(x) <= LARGEST
+
+
 @_inline
 def is_finite(x):
     """Neither NaN nor infinite. (`math.isfinite` takes x - x, which reordering turns into 0.)"""

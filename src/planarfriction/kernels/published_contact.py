@@ -36,6 +36,7 @@ class Shape(NamedTuple):
     centre_x: float
     centre_y: float
     contact_radius: float
+    """0 of a point: its third state stays as it is, without effect."""
     second_moment: float
 
 
@@ -61,6 +62,12 @@ class PublishedContact(NamedTuple):
 
 
 read = reader(PublishedContact)
+
+
+@kernel
+def per_radius(radius):
+    """One over the contact radius; 0 of a point."""
+    return 1.0 / xp.where(radius > 0.0, radius, math.inf)
 
 
 @kernel
@@ -93,15 +100,16 @@ def evaluate(contact, z, v, zdot, w):
     x, y, s = _scaled(own, v)
     v_n = math.sqrt(x * x + y * y + s * s)
     ux, uy, us = sliding(own.kind, doubles(own.data), 0, own.size, x, y, s, v_n)
-    zx, zy, zs = z[0], z[1], z[2] / r
+    zx, zy, zs = z[0], z[1], z[2] * per_radius(r)
     u_norm, z_norm = math.sqrt(ux * ux + uy * uy + us * us), math.sqrt(zx * zx + zy * zy + zs * zs)
     h_norm = u_norm / v_n if v_n > 0.0 else 1.0
     along = (zx * ux + zy * uy + zs * us) / xp.where(z_norm * h_norm > 0.0, z_norm * h_norm, 1.0)
     q = grip(law, v_n)
     k = formulas.bristle_decay(xp, z_norm * q / h_norm, along, v_n, q, law)
-    zdot[0], zdot[1], zdot[2] = ux - k * z[0], uy - k * z[1], r * us - k * z[2]
+    ds = us - k * zs
+    zdot[0], zdot[1], zdot[2] = ux - k * z[0], uy - k * z[1], r * ds
     fx, fy = formulas.traction(z[0], zdot[0], x, law), formulas.traction(z[1], zdot[1], y, law)
-    tau = formulas.traction(z[2], zdot[2], own.shape.second_moment * v[2], law)
+    tau = r * formulas.traction(zs, ds, 0.0, law) + formulas.traction(0.0, 0.0, own.shape.second_moment * v[2], law)
     w[0], w[1], w[2] = _to_origin(own, fx, fy, tau)
 
 
@@ -115,7 +123,7 @@ def linearise(contact, z, v, lin):
     per_v = 1.0 / v_n if v_n > 0.0 else 0.0
     sliding_jacobian(own.kind, doubles(own.data), 0, own.size, x, y, s, v_n, j)
     ux, uy, us = j[0] * x + j[1] * y + j[2] * s, j[3] * x + j[4] * y + j[5] * s, j[6] * x + j[7] * y + j[8] * s
-    zx, zy, zs = z[0], z[1], z[2] / own.shape.contact_radius
+    zx, zy, zs = z[0], z[1], z[2] * per_radius(own.shape.contact_radius)
     u_norm, z_norm = math.sqrt(ux * ux + uy * uy + us * us), math.sqrt(zx * zx + zy * zy + zs * zs)
     h_norm = u_norm * per_v if u_norm > 0.0 else 1.0
     per_z = 1.0 / z_norm if z_norm > 0.0 else 0.0
@@ -191,7 +199,7 @@ def eliminate(contact, z, shift, r, lin, w):
     own, r, w = read(contact), doubles(r), doubles(w)
     radius, sigma_1 = own.shape.contact_radius, own.law.sigma_1
     pull = own.law.sigma_0 + sigma_1 * shift
-    bx, by, bs = _solve(doubles(lin), r[0], r[1], r[2] / radius)
+    bx, by, bs = _solve(doubles(lin), r[0], r[1], r[2] * per_radius(radius))
     fx, fy, tau = sigma_1 * r[0] - pull * bx, sigma_1 * r[1] - pull * by, sigma_1 * r[2] - pull * radius * bs
     w[0], w[1], w[2] = _to_origin(own, fx, fy, tau)
 
@@ -203,7 +211,7 @@ def back_substitute(contact, z, r, dv, lin, out):
     radius = own.shape.contact_radius
     x, y, s = _scaled(own, doubles(dv))
     x, y, s = _driven(lin, x, y, s)
-    out[0], out[1], bs = _solve(lin, r[0] + x, r[1] + y, r[2] / radius + s)
+    out[0], out[1], bs = _solve(lin, r[0] + x, r[1] + y, r[2] * per_radius(radius) + s)
     out[2] = radius * bs
 
 
@@ -217,14 +225,14 @@ def change(contact, z, zdot, lin, dz, dzdot, rows, friction, size):
     spin = rows[8] + size * rows[2]
     ux, uy = rows[6] - spin * cy, rows[7] + spin * cx
     zx, zy, zs = lin[SCALED], lin[SCALED + 1], lin[SCALED + 2]
-    ax, ay, a_s = dz[0] - friction * zx, dz[1] - friction * zy, dz[2] / r - (size + friction) * zs
+    ax, ay, a_s = dz[0] - friction * zx, dz[1] - friction * zy, dz[2] * per_radius(r) - (size + friction) * zs
     dk = lin[BY_Z] * ax + lin[BY_Z + 1] * ay + lin[BY_Z + 2] * a_s
     bx, by, bs = _driven(lin, ux, uy, r * spin)
     out[0] = bx - lin[DECAY] * ax - zx * dk
     out[1] = by - lin[DECAY] * ay - zy * dk
     out[2] = r * (bs - lin[DECAY] * a_s - zs * dk) + size * zdot[2]
     fx, fy = formulas.traction(dz[0], out[0], ux, law), formulas.traction(dz[1], out[1], uy, law)
-    tau = formulas.traction(dz[2], out[2], shape.second_moment * (spin + size * rows[2]), law)
+    tau = formulas.traction(xp.where(r > 0.0, dz[2], 0.0), out[2], shape.second_moment * (spin + size * rows[2]), law)
     rows[9], rows[10] = fx, fy
     rows[11] = tau + cx * fy - cy * fx + size * (cx * rows[4] - cy * rows[3])
 

@@ -18,7 +18,7 @@ from planarfriction.kernels.contacts import ModelFunctions
 from planarfriction.kernels.pointers import at, doubles
 from planarfriction.kernels.records import reader
 from planarfriction.kernels.reduced import closure, closure_partials, part_rate, to_origin, wrench
-from planarfriction.kernels.steady import evenness, scaled_twist, sliding, steady_slopes
+from planarfriction.kernels.steady import STILL, evenness, scaled_twist, sliding, steady_slopes
 
 BY_Z, BY_V, INVERSE, STEADY, EVENNESS, TWIST, REST = 0, 9, 18, 27, 42, 45, 48
 """Where a linearisation holds dz'/dz, dz'/dV_G, the inverse of D and dz_ss/dV_G (9 each; 6 of scratch behind the last),
@@ -117,7 +117,7 @@ def linearise(contact, z, v, lin):
     law, shape, data = own.law, own.shape, doubles(own.data)
     x, y, s = scaled_twist(shape, twist[0], twist[1], twist[2])
     v = math.sqrt(x * x + y * y + s * s)
-    if v > 0.0:
+    if v > STILL:
         j = doubles(at(lin, STEADY))
         out[TWIST], out[TWIST + 1], out[TWIST + 2] = x, y, s
         out[REST], out[REST + 1], out[REST + 2] = steady_slopes(law, shape, _maps(own), data, x, y, s, v, j)

@@ -31,7 +31,7 @@ from planarfriction.kernels.records import reader
 from planarfriction.kernels.reduced import to_origin
 from planarfriction.kernels.reduced_contact import Shape
 from planarfriction.kernels.rollouts import Cotangents
-from planarfriction.kernels.steady import FAR, evenness, scaled_twist, sliding, steady
+from planarfriction.kernels.steady import FAR, STILL, evenness, scaled_twist, sliding, steady
 from planarfriction.kernels.vectors import applied_back, dot, norm, plus, times
 
 NAMES = (*LawNumbers._fields, *Shape._fields)
@@ -134,13 +134,13 @@ def hold_slopes(contact, twist, work):
     vx, vy, omega = twist
     x, y, s = u = scaled_twist(shape, vx, vy, omega)
     v, none = norm(u), (0.0, 0.0, 0.0)
-    if v > 0.0:
+    if v > STILL:
         found = steady(law, shape, surface, data, u, v)
         even, by_x, by_y, by_s = evenness(shape, surface, data, x, y, s, v)
         slopes = Slopes(found.by_u, found.by_mu_c, found.by_mu_s, found.by_v_s, (by_x, by_y, by_s))
         return Held(u, v, found.q, even), slopes
     still = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    return Held(u, v, (FAR, 0.0, 0.0), 1.0), Slopes(still, none, none, none, none)
+    return Held(none, 0.0, (FAR, 0.0, 0.0), 1.0), Slopes(still, none, none, none, none)
 
 
 @kernel

@@ -135,9 +135,9 @@ def step_one(places, z, vx, vy, omega, load, dt, result):
 
     Called from Python: every argument costs a quarter of a microsecond on the way in.
     """
-    finite = xp.is_finite(vx) and xp.is_finite(vy) and xp.is_finite(omega) and xp.is_finite(load) and xp.is_finite(dt)
-    finite = finite and xp.is_finite(z[0]) and xp.is_finite(z[1]) and xp.is_finite(z[2])
-    if not (finite and load > 0.0 and dt >= 0.0):
+    valid = xp.in_range(vx) and xp.in_range(vy) and xp.in_range(omega) and xp.in_range(load) and xp.in_range(dt)
+    valid = valid and xp.in_range(z[0]) and xp.in_range(z[1]) and xp.in_range(z[2])
+    if not (valid and load > 0.0 and dt >= 0.0):
         return False
     result[6], result[7], result[8], result[9], result[10], result[11] = z[0], z[1], z[2], vx, vy, omega
     result[12], result[13] = load, dt

@@ -1,10 +1,13 @@
 """Steady sliding of a patch from a stored map, in scaled coordinates `V_G = F V` (docs/physics.md, "Reduced model").
 
-A map is eight numbers (faces, n, n of the Stribeck part, its levels, knee, least dissipation, 0, 0), the matrix K
+A map is eight numbers (faces, n, n of the Stribeck part, its levels, knee, least dissipation, stretch, 0), the matrix K
 [6, 6] of `<v^4> = m' K m` with `m = (x^2, y^2, s^2, x y, x s, y s)` of V_G, then two maps of `kernels.cube`: `h_0`,
 steady sliding at `g = 1`, and the rest r of that at `g = e = exp(-|v/v_s|^gamma)`,
 
     sigma_0 z_ss = (mu_s - (mu_s - mu_c) t) h_0 + (mu_s - mu_c) r(t),   t = |V_G| / (|V_G| + knee v_s)
+
+The maps are over the directions of `(x, y, stretch s)`: where nearly all of the load is on one point, all that happens
+lies close to the spin, and is drawn apart.
 """
 
 from __future__ import annotations
@@ -21,6 +24,9 @@ from planarfriction.kernels.vectors import applied_back, dot, plus, times
 
 QUARTIC = 8
 """Where K begins."""
+
+STILL = 1e-100
+"""Scaled speed [m/s] up to which a patch is at rest: squares of what is slower leave the range of doubles."""
 
 FAR = 1e30
 """Steady state [m] of a patch at rest, where it has none: no bristle comes near it, so that nothing decays."""
@@ -71,16 +77,24 @@ def _component(law, data, start, spot, places, v, i):
 
 
 @kernel
+def _drawn(slope, stretch):
+    """A slope by `(x, y, stretch s)` as one by (x, y, s)."""
+    return slope[0], slope[1], stretch * slope[2]
+
+
+@kernel
 def _map(law, data, start, u, v):
     """`Steady` of one map."""
-    spot = cube.locate(u[0], u[1], u[2], int(data[start]))
+    stretch = data[start + 6]
+    spot = cube.locate(u[0], u[1], stretch * u[2], int(data[start]))
     places = cube.squares(spot, int(data[start + 1])), cube.squares(spot, int(data[start + 2]))
     # A literal number would have the function compiled once more.
     q_x, slope_x, v_x, c_x, s_x, k_x = _component(law, data, start, spot, places, v, np.int64(0))
     q_y, slope_y, v_y, c_y, s_y, k_y = _component(law, data, start, spot, places, v, np.int64(1))
     q_s, slope_s, v_s, c_s, s_s, k_s = _component(law, data, start, spot, places, v, np.int64(2))
     per_v = 1.0 / v
-    by_x, by_y, by_s = plus(slope_x, v_x * per_v, u), plus(slope_y, v_y * per_v, u), plus(slope_s, v_s * per_v, u)
+    by_x, by_y = plus(_drawn(slope_x, stretch), v_x * per_v, u), plus(_drawn(slope_y, stretch), v_y * per_v, u)
+    by_s = plus(_drawn(slope_s, stretch), v_s * per_v, u)
     by_u = by_x[0], by_x[1], by_x[2], by_y[0], by_y[1], by_y[2], by_s[0], by_s[1], by_s[2]
     return Steady((q_x, q_y, q_s), by_u, (c_x, c_y, c_s), (s_x, s_y, s_s), (k_x, k_y, k_s), data[start + 5])
 
@@ -99,7 +113,7 @@ def _mixed(one, other, share):
 
 @kernel
 def steady(law, shape, surface, data, u, v):
-    """`Steady` at the scaled twist, which moves at `v > 0`; its dissipation is never below the least."""
+    """`Steady` at the scaled twist, which moves at `v > STILL`; its dissipation is never below the least."""
     # Read in a loop over the maps it would be compiled once, but a step of a fixed shape would take a tenth longer.
     found = _map(law, data, surface[0], u, v)
     if shape[6] > 0.0:
@@ -190,7 +204,7 @@ def sliding(law, vx, vy, omega, shape, surface, data):
     """Scaled twist, its norm, its steady state and evenness (any where the patch is at rest): what `advance` holds."""
     x, y, s = scaled_twist(shape, vx, vy, omega)
     v = math.sqrt(x * x + y * y + s * s)
-    if v > 0.0:
+    if v > STILL:
         qx, qy, qs = steady(law, shape, surface, data, (x, y, s), v).q
         even = evenness(shape, surface, data, x, y, s, v)[0] if law.elasto_plastic > 0.0 else 1.0
         return x, y, s, v, qx, qy, qs, even

@@ -7,8 +7,7 @@ import threading
 
 import numpy as np
 
-from planarfriction.errors import InvalidValueError
-from planarfriction.models.reduced_map import ReducedShape, reduced_map, reduced_shape, slip_factor
+from planarfriction.models.reduced_map import ReducedShape, is_point, reduced_map, reduced_shape, slip_factor
 from planarfriction.models.steady_sums import ScaledCells
 from planarfriction.patch import ContactPatch
 
@@ -64,7 +63,7 @@ class LoadFamily:
     def shapes(self, loads: list[float]) -> list[ReducedShape]:
         """Shapes at loads > 0 [N]: F of each load, and references to the maps of its two neighbours.
 
-        Where a neighbour is so light that one point carries it, the shape is built at the load itself.
+        Where one neighbour is so light that it is a point, the other is taken alone.
         """
         known = self._shapes
         found = {load: known.get(load) for load in loads}
@@ -80,16 +79,17 @@ class LoadFamily:
         for load, factor in zip(loads, slip_factor(self._patch, np.array(loads)), strict=True):
             shape = self._shapes.get(load)
             if shape is None:
-                rungs = self._neighbours(load)
-                alone = rungs is None
-                shape = reduced_shape(self._patch, load, *self._map) if alone else self._blend(load, factor, *rungs)
+                rungs = [] if factor[2, 2] == 0.0 else self._neighbours(load)
+                shape = self._blend(load, factor, *rungs) if rungs else reduced_shape(self._patch, load, *self._map)
             if len(self._shapes) >= REMEMBERED:
                 self._shapes = {}
             shapes[load] = self._shapes[load] = shape
         return shapes
 
-    def _blend(self, load: float, factor: np.ndarray, low: float, high: float) -> ReducedShape:
+    def _blend(self, load: float, factor: np.ndarray, low: float, high: float | None = None) -> ReducedShape:
         """Two rungs blended linearly in the load, or one alone where that is as close as wanted."""
+        if high is None:
+            return ReducedShape(factor, self._map_at(low))
         share = (load - low) / (high - low)
         apart = self._apart(low, high)
         if share * apart <= 0.5 * self._error:
@@ -98,8 +98,8 @@ class LoadFamily:
             return ReducedShape(factor, self._map_at(high))
         return ReducedShape(factor, self._map_at(low), self._map_at(high), share)
 
-    def _neighbours(self, load: float) -> tuple[float, float] | None:
-        """The two rungs around a load, None if one of them has no map."""
+    def _neighbours(self, load: float) -> list[float]:
+        """The two rungs around a load, without those that are points."""
         low = float(np.ldexp(0.5, np.frexp(load)[1]))  # the power of 2 below
         high = 2.0 * low
         for _ in range(HALVINGS):
@@ -107,19 +107,18 @@ class LoadFamily:
                 break
             middle = 0.5 * (low + high)
             low, high = (low, middle) if load < middle else (middle, high)
-        return None if self._sum(low) is None or self._sum(high) is None else (low, high)
+        return [rung for rung in (low, high) if self._sum(rung) is not None]
 
     def _is_good(self, low: float, high: float) -> bool:
         """Whether the blend of two rungs is as close as wanted."""
         if (low, high) not in self._good:
             worst = np.inf
             first, last = self._sum(low), self._sum(high)
-            if first is not None and last is not None:
-                errors = []
-                for share in _WITHIN:
-                    true = self._cell_sums(low + share * (high - low))
-                    errors.append(_largest(first + share * (last - first) - true, true))
-                worst = max(errors)
+            between = [low + share * (high - low) for share in _WITHIN]
+            if first is not None and last is not None and not any(is_point(self._patch, load) for load in between):
+                true = [self._cell_sums(load) for load in between]
+                pairs = zip(_WITHIN, true, strict=True)
+                worst = max(_largest(first + share * (last - first) - sums, sums) for share, sums in pairs)
             self._good[low, high] = bool(worst <= 0.5 * self._error)
         return self._good[low, high]
 
@@ -134,10 +133,7 @@ class LoadFamily:
     def _sum(self, load: float) -> np.ndarray | None:
         """Steady sliding at a rung in the checked directions, None where one point carries the load."""
         if load not in self._sums:
-            try:
-                self._sums[load] = self._cell_sums(load)
-            except InvalidValueError:
-                self._sums[load] = None
+            self._sums[load] = None if is_point(self._patch, load) else self._cell_sums(load)
         return self._sums[load]
 
     def _cell_sums(self, load: float) -> np.ndarray:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.errors import InvalidValueError
 from planarfriction.kernels import reduced_contact, reduced_step
 from planarfriction.kernels.pointers import place_of
 from planarfriction.kernels.records import rows_of
@@ -16,7 +17,7 @@ from planarfriction.kernels.reduced_contact import ReducedContact, Shape
 from planarfriction.laws.base import refuse_creep
 from planarfriction.models.base import PackedModel
 from planarfriction.models.load_family import LoadFamily
-from planarfriction.models.reduced_map import ReducedShape, reduced_shape
+from planarfriction.models.reduced_map import POINT, ReducedShape, is_point, reduced_shape
 from planarfriction.models.three_states import ThreeStateModel
 
 MOST_SEGMENTS, MOST_SPEEDS = 256, 64
@@ -35,7 +36,8 @@ class ReducedModel(ThreeStateModel):
 
     `z_ss` comes from a stored map over direction and speed with continuous slopes. A patch that depends on the load has
     maps at a ladder of loads, blended in between; they are built where loads are asked for (see `LoadFamily`). The
-    state is kept when the shape changes.
+    state is kept when the shape changes. Where one cell carries all but a millionth of the load, the contact is a point
+    without torque about it.
 
     Friction that depends on the direction: `|V_G|` is the root mean square of `|B_i V|` (see `ContactPatch.levers`),
     and `z_ss` sums `u/|u| + a`; an asymmetry takes maps of twice the size. It enters z_ss alone: bristles are measured
@@ -58,7 +60,10 @@ class ReducedModel(ThreeStateModel):
         object.__setattr__(self, "speeds", validation.count("speeds", self.speeds, 5, MOST_SPEEDS))
         object.__setattr__(self, "load_error", validation.non_negative("load_error", self.load_error))
         if not self.patch.depends_on_load:
-            _ = self._reference  # refuses a patch of one point now rather than later
+            if is_point(self.patch):
+                shown = f"{1.0 - self.patch.weights().max():.1g} of it"
+                raise InvalidValueError("patch", f"carry more than {POINT} of its load beside its heaviest cell", shown)
+            _ = self._reference
 
     def shape_at(self, normal_force: float | None) -> ReducedShape:
         """Second moments of slip and stored steady state at a load [N]; recent loads are remembered."""

@@ -27,7 +27,7 @@ class ReducedNumbers(NamedTuple):
     quartic: Any
     """K `[6, 6]` (see `kernels.steady`)."""
     scale: Any
-    """Knee and least dissipation `[2]`."""
+    """Knee, least dissipation and stretch `[3]`."""
     flat: Any
     """`h_0` over the nodes of the cube, `[faces, 2 n + 1, 2 n + 1, 3, 4]`."""
     rest: Any
@@ -60,7 +60,7 @@ def numbers_of(shape: ReducedShape) -> ReducedNumbers:
     return ReducedNumbers(
         shape.factor,
         data[QUARTIC:HEADER].reshape(6, 6),
-        data[4:6],
+        data[4:7],
         data[HEADER:middle].reshape(faces, 2 * n + 1, 2 * n + 1, 3, 4),
         np.reshape(data[middle:], (faces, 2 * m + 1, 2 * m + 1, levels, 3, 4)),
     )
@@ -69,7 +69,7 @@ def numbers_of(shape: ReducedShape) -> ReducedNumbers:
 def shape_of(numbers: ReducedNumbers) -> ReducedShape:
     """The shape that has the `numbers`, in NumPy: the inverse of `numbers_of`."""
     header, flat, rest = np.zeros(HEADER), numbers.flat, numbers.rest
-    header[:6] = len(flat), flat.shape[1] // 2, rest.shape[1] // 2, rest.shape[3], *numbers.scale
+    header[:7] = len(flat), flat.shape[1] // 2, rest.shape[1] // 2, rest.shape[3], *numbers.scale
     header[QUARTIC:] = numbers.quartic.ravel()
     return ReducedShape(numbers.factor, np.concatenate([header, flat.ravel(), rest.ravel()]))
 
@@ -82,9 +82,9 @@ def dot(a, b):
 # ---------------------------------------------------------------------- the map
 
 
-def _spot(xp, direction, faces: int):
+def _spot(xp, direction, stretch, faces: int):
     """Face, place on it and sign of what is read there (see `kernels.cube.locate`) for unit vectors, `[...]`."""
-    x, y, s = direction[..., 0], direction[..., 1], direction[..., 2]
+    x, y, s = direction[..., 0], direction[..., 1], stretch * direction[..., 2]
     ax, ay, a_s = abs(x), abs(y), abs(s)
     on_x, on_y = (ax >= ay) & (ax >= a_s), ay >= a_s
     largest = xp.where(on_x, x, xp.where(on_y, y, s))
@@ -127,7 +127,7 @@ def _levels(xp, t, count: int):
 
 def _sliding(xp, law: LawNumbers, shape: ReducedNumbers, n, t):
     """`sigma_0 z_ss` of unit vectors n at `t` `[..., 1]`."""
-    face, a, b, sign = _spot(xp, n, shape.flat.shape[0])
+    face, a, b, sign = _spot(xp, n, shape.scale[2], shape.flat.shape[0])
     face = face[..., None, None]
     i, j, w = _square(xp, a, b, shape.flat.shape[1])
     flat = (w[..., None, :] * shape.flat[face, i, j]).sum((-4, -3, -1))

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import functools
 from typing import NamedTuple
 
 import numpy as np
 
 from planarfriction.equality import by_parts
-from planarfriction.errors import InvalidValueError
 from planarfriction.kernels.steady import HEADER, QUARTIC
 from planarfriction.models import cube_map
-from planarfriction.models.steady_sums import ScaledCells
+from planarfriction.models.steady_sums import ScaledCells, ScaledPoint
 from planarfriction.patch import ContactPatch
 
 KNEE = 1.5
 """`|V_G|/v_s` at the middle of the Stribeck part's third coordinate: the best of 0.5..3 on the published patches."""
+
+POINT = 1e-6
+"""Share of the load beside its heaviest cell up to which a contact is a point, without torque about it."""
 
 LEAST_SHARE = 0.25
 """The floor of the dissipation, over the least dissipation of all stored directions."""
@@ -41,7 +44,7 @@ class ReducedShape(NamedTuple):
 
     @property
     def contact_radius(self) -> float:
-        """Radius of gyration [m]: turns spins into speeds."""
+        """Radius of gyration [m]: turns spins into speeds; 0 of a point."""
         return float(self.factor[2, 2])
 
 
@@ -50,57 +53,89 @@ def reduced_shape(
 ) -> ReducedShape:
     """What a patch is at a load; `segments` and `speeds` as in `ReducedModel`."""
     factor = slip_factor(patch, normal_force)
+    if factor[2, 2] == 0.0:
+        return ReducedShape(factor, point_map(patch, normal_force, factor, gamma, segments, speeds))
     return ReducedShape(factor, reduced_map(ScaledCells(patch, normal_force, factor), gamma, segments, speeds))
+
+
+def is_point(patch: ContactPatch, normal_force=None):
+    """Whether one cell carries the load but for a share `POINT` of it, `[...]` of bool."""
+    return 1.0 - patch.weights(normal_force).max(-1) <= POINT
 
 
 def slip_factor(patch: ContactPatch, normal_force=None) -> np.ndarray:
     """F `[..., 3, 3]`, upper triangular, with `F'F = sum(w B'B)`: what the cells see of a twist V is `B V`.
 
-    `normal_force` `[...]` [N], all > 0 where the patch depends on it. Raises `InvalidValueError` for one loaded point.
+    `normal_force` `[...]` [N], all > 0 where the patch depends on it. The last row is that of spins about the centre of
+    pressure: zero of a point.
     """
     weights = patch.weights(normal_force)
     x, y = ((weights * coordinate).sum(-1) for coordinate in patch.positions.T)
     dx, dy = (p - c[..., None] for p, c in zip(patch.positions.T, (x, y), strict=True))
-    gyration = np.sqrt((weights * (dx**2 + dy**2)).sum(-1))
-    if not np.all(gyration > 0.0):
-        shown = f"a radius of gyration of {np.min(gyration)} m"
-        raise InvalidValueError("patch", "have more than one loaded point", shown)
+    gyration = np.where(is_point(patch, normal_force), 0.0, np.sqrt((weights * (dx**2 + dy**2)).sum(-1)))
     if patch.root is not None:
-        return _metric_factor(patch, weights)
+        return _metric_factor(patch, weights, gyration)
     factor = np.zeros((*np.shape(x), 3, 3))
     factor[..., 0, 0] = factor[..., 1, 1] = 1.0
     factor[..., 0, 2], factor[..., 1, 2], factor[..., 2, 2] = -y, x, gyration
     return factor
 
 
-def _metric_factor(patch: ContactPatch, weights: np.ndarray) -> np.ndarray:
-    """F from Cholesky's factor of the second moments about the middle of the cells, which cancels no digits."""
+def _metric_factor(patch: ContactPatch, weights: np.ndarray, gyration: np.ndarray) -> np.ndarray:
+    """F from Cholesky's factor of the second moments about the middle of the cells, which cancels no digits.
+
+    That of a point has rank 2: QR of what its cell sees.
+    """
     x, y = patch.positions.mean(axis=0)
     shift = np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]])
     levers = patch.levers() @ np.linalg.inv(shift)
     second = np.einsum("...n,nij->...ij", weights, np.swapaxes(levers, 1, 2) @ levers)
-    return np.swapaxes(np.linalg.cholesky(second), -1, -2) @ shift
+    points = gyration == 0.0
+    second[points] = np.eye(3)
+    factor = np.swapaxes(np.linalg.cholesky(second), -1, -2) @ shift
+    upper = np.linalg.qr(patch.levers()[weights[points].argmax(-1)])[1]
+    factor[points, :2] = upper * np.sign(np.diagonal(upper, axis1=-2, axis2=-1))[..., None]
+    factor[points, 2] = 0.0
+    return factor
 
 
-def reduced_map(cells: ScaledCells, gamma: float, segments: int, speeds: int) -> np.ndarray:
+def point_map(
+    patch: ContactPatch, normal_force: float | None, factor: np.ndarray, gamma: float, segments: int, speeds: int
+) -> np.ndarray:
+    """The map of a point, which is the same for all points of one asymmetry."""
+    heaviest = int(patch.weights(normal_force).argmax())
+    lean = (0.0, 0.0)
+    if patch.asymmetric:
+        turn = patch.levers()[heaviest][:, :2] @ np.linalg.inv(factor[:2, :2])
+        lean = tuple((turn.T @ patch.asymmetries()[heaviest]).tolist())
+    return _point_map(lean, patch.asymmetric, gamma, segments, speeds)
+
+
+@functools.lru_cache(maxsize=8)
+def _point_map(lean: tuple[float, float], asymmetric: bool, gamma: float, segments: int, speeds: int) -> np.ndarray:
+    return reduced_map(ScaledPoint(np.array([*lean, 0.0]), asymmetric), gamma, segments, speeds)
+
+
+def reduced_map(cells: ScaledCells | ScaledPoint, gamma: float, segments: int, speeds: int) -> np.ndarray:
     """Numbers of the map of `cells`, as `kernels.steady` reads them; with an asymmetry for all six faces.
 
     `h_0`, which has the kinks, takes `segments` squares each way on a quarter of a face; the rest
     `r = h_1 - (1 - t) h_0` of the Stribeck part, which is smooth, a third of them, with `speeds` nodes in t.
     """
     coarse, faces = max(segments // 3, 2), 6 if cells.asymmetric else 3
-    directions = cube_map.face_nodes(segments)[:faces]
+    per_stretch = np.array([1.0, 1.0, 1.0 / cells.stretch])
+    directions = cube_map.face_nodes(segments)[:faces] * per_stretch
     steady = cells.sums(directions, np.empty(0), gamma)
     unit = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
     least = float(np.einsum("fijc,fijc->fij", steady[..., 0, :], unit).min())
     t = np.linspace(0.0, 1.0, speeds)
     relative = KNEE * t[1:-1] / (1.0 - t[1:-1])
-    sums = cells.sums(cube_map.face_nodes(coarse)[:faces], relative**gamma, gamma)
+    sums = cells.sums(cube_map.face_nodes(coarse)[:faces] * per_stretch, relative**gamma, gamma)
     rest = np.zeros((*sums.shape[:-2], speeds, 3))
     rest[..., 1:-1, :] = sums[..., 1:, :] - (1.0 - t[1:-1, None]) * sums[..., :1, :]
     levels = np.einsum("lt,fijtc->fijlc", cube_map.level_matrix(speeds), rest, optimize=True)
     header = np.zeros(HEADER)
-    header[:6] = faces, segments, coarse, speeds + 2, KNEE, LEAST_SHARE * least
+    header[:7] = faces, segments, coarse, speeds + 2, KNEE, LEAST_SHARE * least, cells.stretch
     header[QUARTIC:] = cells.fourth_moments().ravel()
     return np.concatenate([header, *(_numbers(values) for values in (steady, levels))])
 

@@ -17,12 +17,21 @@ from planarfriction.kernels import published_contact, published_step
 from planarfriction.kernels.pointers import place_of
 from planarfriction.kernels.published_contact import PublishedContact, Root, Shape
 from planarfriction.kernels.records import rows_of
+from planarfriction.kernels.surfaces import ELLIPSOID
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
+from planarfriction.limit_surface.base import SurfaceNumbers
 from planarfriction.models.base import PackedModel
+from planarfriction.models.reduced_map import is_point
 from planarfriction.models.three_states import ThreeStateModel
 from planarfriction.patch.metric import refuse_cell_metrics, same_metric
 
 ON_LOAD_CHANGE = ("rebuild", "rescale", "keep")
+
+
+class _OfPoint(NamedTuple):
+    """What stands for the limit surface of a point: `u = V_S`, and V_S has no third component."""
+
+    numbers: SurfaceNumbers = SurfaceNumbers(ELLIPSOID, 0, np.zeros(0))
 
 
 @by_parts
@@ -32,10 +41,10 @@ class PublishedShape(NamedTuple):
     centre_of_pressure: np.ndarray
     """[2] [m]; of a patch with a friction metric its `lever_coordinates`."""
     contact_radius: float
-    """r [m]; of the published table as published."""
+    """r [m]; of the published table as published; 0 of a point."""
     second_moment: float
     """<rho^2> [m^2]"""
-    surface: LimitSurface
+    surface: LimitSurface | _OfPoint
     root: np.ndarray = np.eye(2)
     """Symmetric root of the friction metric, [2, 2] [-]."""
 
@@ -43,6 +52,11 @@ class PublishedShape(NamedTuple):
     def numbers(self) -> np.ndarray:
         """The shape as compiled loops see it."""
         return np.array([*self.centre_of_pressure, self.contact_radius, self.second_moment])
+
+
+_SLIDES = np.array([1.0, 1.0, 0.0])
+_SLIDER = PublishedShape(np.zeros(2), 1.0, 0.0, _OfPoint())
+"""What steps as a point does, at the point, as long as it does not spin."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +69,8 @@ class ReducedModelPublished(ThreeStateModel):
 
     A patch that depends on the load: `on_load_change="rebuild"` follows the load with everything, `"rescale"` keeps the
     limit surface and `<rho^2>` of `surface.normal_force` and lets only `r` (and the centre of pressure) follow,
-    `"keep"` keeps all. The raw state is kept when `r` changes.
+    `"keep"` keeps all. The raw state is kept when `r` changes. Where one cell carries all but a millionth of the load,
+    the contact is a point without torque about it; what `z_tau` was there then stays, without effect.
 
     Source: Waltersson and Karayiannidis 2024, section IV.
     """
@@ -93,24 +108,25 @@ class ReducedModelPublished(ThreeStateModel):
 
     def _records(self, shapes: Sequence[PublishedShape]) -> PackedModel:
         data = [np.ascontiguousarray(shape.surface.numbers.data, dtype=float) for shape in shapes]
-        numbers, root = shapes[0].surface.numbers, shapes[0].root
+        root = shapes[0].root
         record = PublishedContact(
             self.law.numbers,
             Shape(*shapes[0].numbers),
             Root(root[0, 0], root[0, 1], root[1, 1]),
-            numbers.kind,
-            numbers.size,
+            0,
+            0,
             0,
         )
         rows = rows_of(
             record,
             len(shapes),
             shape=np.array([shape.numbers for shape in shapes]),
+            kind=np.array([shape.surface.numbers.kind for shape in shapes]),
             size=np.array([shape.surface.numbers.size for shape in shapes]),
             data=np.array([place_of(each) for each in data]),
         )
         radius = max(shape.contact_radius for shape in shapes)
-        natural = self.law.largest_deflection * np.array([1.0, 1.0, radius])
+        natural = self.law.largest_deflection * np.array([1.0, 1.0, radius or 1.0])
         return PackedModel(published_contact.FUNCTIONS, rows, 3, published_contact.LINEAR, natural, radius, tuple(data))
 
     # ------------------------------------------------------------------ axes of the friction metric
@@ -146,6 +162,9 @@ class ReducedModelPublished(ThreeStateModel):
         return PublishedShape(self._centre(surface), surface.contact_radius, second_moment, surface, self._root)
 
     def _shape_at(self, normal_force: float) -> PublishedShape:
+        if is_point(self.patch, normal_force):
+            centre = self.patch.lever_coordinates(*self.patch.centre_of_pressure(normal_force))
+            return PublishedShape(np.array(centre), 0.0, 0.0, _OfPoint(), self._root)
         surface = self.surface.at(normal_force)
         kept = self._reference if self.on_load_change == "rescale" else None
         return PublishedShape(
@@ -166,6 +185,25 @@ class ReducedModelPublished(ThreeStateModel):
     def _record(self, shape: PublishedShape) -> PackedModel:
         return super()._record(shape) if self._axes is None else self._records([shape._replace(root=np.eye(2))])
 
+    def _step(self, shape: PublishedShape, state, twist, load, dt) -> np.ndarray:
+        if shape.contact_radius > 0.0:
+            return super()._step(shape, state, twist, load, dt)
+        lever = self._levers(shape)[0]
+        out = super()._step(_SLIDER, state * _SLIDES, twist @ lever.T * _SLIDES, load, dt)
+        out[:, 2] = state[:, 2]
+        out[:, 3:] = out[:, 3:] @ lever
+        return out
+
+    def _step_jacobians(self, shape: PublishedShape, state, twist, load, dt) -> np.ndarray:
+        if shape.contact_radius > 0.0:
+            return super()._step_jacobians(shape, state, twist, load, dt)
+        lever = self._levers(shape)[0]
+        slopes = super()._step_jacobians(_SLIDER, state * _SLIDES, twist @ lever.T * _SLIDES, load, dt).copy()
+        slopes[:, [2, 5]], slopes[:, :, [2, 5]], slopes[:, 2, 2] = 0.0, 0.0, 1.0
+        slopes[:, :, 3:6] = slopes[:, :, 3:6] @ lever
+        slopes[:, 3:] = lever.T @ slopes[:, 3:]
+        return slopes
+
     @property
     def _follows_load(self) -> bool:
         return self.patch.depends_on_load and self.on_load_change != "keep"
@@ -183,4 +221,5 @@ class ReducedModelPublished(ThreeStateModel):
         scale, lever = np.array([1.0, 1.0, shape.contact_radius]), self._levers(shape)[0]
         k, k_z, z, scaled = lin[:, 0], lin[:, 1:4], lin[:, 4:7], lin[:, 7:16].reshape(-1, 3, 3)
         rate_state = -k[:, None, None] * np.eye(3) - z[:, :, None] * k_z[:, None, :]
-        return scale[:, None] * rate_state / scale, scale[:, None] * scaled * scale @ lever
+        per_scale = np.where(scale > 0.0, 1.0 / np.where(scale > 0.0, scale, 1.0), 0.0)
+        return scale[:, None] * rate_state * per_scale, scale[:, None] * scaled * scale @ lever

@@ -13,6 +13,9 @@ from planarfriction.patch import ContactPatch
 _BLOCK = 128
 """Directions that are summed at once."""
 
+EVEN = 0.5
+"""Mean distance from the centre of pressure over its root mean square above which maps need no stretch (disc: 0.94)."""
+
 _GAUSS = 0.5 / np.sqrt(3.0)
 
 
@@ -25,9 +28,12 @@ class ScaledCells:
         one_metric = patch.root is None or patch.root.ndim == 2
         weights = patch.weights(normal_force)
         loaded = weights > 0.0
-        self._cells = _parallelograms(patch, normal_force, factor, loaded) if one_metric else None
+        share, self.stretch = _spread(patch, weights)
+        """Of `s` in the map (see `kernels.steady`)."""
+        extents = share * patch.cell_extents()[loaded]
+        self._cells = _parallelograms(patch, normal_force, factor, loaded, extents) if one_metric else None
         self._levers = patch.levers()[loaded] @ np.linalg.inv(factor), weights[loaded]
-        self._points = None if one_metric and not self.asymmetric else _points(patch, weights, factor, loaded)
+        self._points = None if one_metric and not self.asymmetric else _points(patch, weights, factor, loaded, extents)
 
     def sums(self, directions: np.ndarray, exponents: np.ndarray, gamma: float) -> np.ndarray:
         """`sum(w e C'(u/|u| + a))` `[..., 1 + E, 3]` of scaled twists `[..., 3]` of any length.
@@ -68,14 +74,51 @@ class ScaledCells:
         return shares @ wrench
 
 
-def _parallelograms(patch: ContactPatch, normal_force, factor: np.ndarray, loaded: np.ndarray) -> np.ndarray:
+class ScaledPoint:
+    """A contact that is a point, as `ScaledCells`: `V_G/|V_G| + a`, whose last component its twists do not have."""
+
+    stretch = 1.0
+
+    def __init__(self, lean: np.ndarray, asymmetric: bool) -> None:
+        self.asymmetric, self._lean = asymmetric, lean
+
+    def sums(self, directions: np.ndarray, exponents: np.ndarray, gamma: float) -> np.ndarray:
+        """See `ScaledCells`; the point moves at the speed 1 in all unit directions."""
+        pull = directions / np.linalg.norm(directions, axis=-1, keepdims=True) + self._lean
+        return pull[..., None, :] * np.exp(-np.concatenate([[0.0], exponents]))[:, None]
+
+    def fourth_moments(self) -> np.ndarray:
+        """K of `|V_G|^4`."""
+        moments = np.zeros((6, 6))
+        moments[:3, :3] = 1.0
+        return moments
+
+
+def _spread(patch: ContactPatch, weights: np.ndarray) -> tuple[float, float]:
+    """The share of their extents over which cells spread their load, and the stretch of the map.
+
+    No cell spreads its load further than the patch does: one that carries nearly all of it becomes a point as the rest
+    goes. Where most of the load is that close to the centre of pressure, most of what turns is far from it, and all
+    that happens close to the spin is drawn apart by the ratio of the mean distance to that of the squares.
+    """
+    square = ((patch.positions - weights @ patch.positions) ** 2).sum(1)
+    own = (patch.cell_extents() ** 2).sum(1) / 12.0
+    gyration, spread = np.sqrt(weights @ square), np.sqrt(weights @ own)
+    share = min(1.0, gyration / spread) if spread > 0.0 else 1.0
+    ratio = float(weights @ np.sqrt(square + share**2 * own) / gyration)
+    return share, ratio if ratio < EVEN else 1.0
+
+
+def _parallelograms(
+    patch: ContactPatch, normal_force, factor: np.ndarray, loaded: np.ndarray, extents: np.ndarray
+) -> np.ndarray:
     """Cells `[N, 7]` of a patch with one metric, as `kernels.cell_sums` reads them.
 
     With T the upper left block of F and rho_g its last entry, a cell at `rho` about the centre of pressure sees
     `u = (V_G,x - V_G,s p_y, V_G,y + V_G,s p_x)` at `p = (T_11 rho_x, T_00 rho_y - T_01 rho_x)/rho_g`.
     """
     offset = patch.positions[loaded] - patch.centre_of_pressure(normal_force)
-    width, height = patch.cell_extents()[loaded].T
+    width, height = extents.T
     zero = np.zeros_like(width)
     x = np.stack([offset[:, 0], width, zero], -1)
     y = np.stack([offset[:, 1], zero, height], -1)
@@ -85,9 +128,8 @@ def _parallelograms(patch: ContactPatch, normal_force, factor: np.ndarray, loade
     return np.ascontiguousarray(np.concatenate([places, patch.weights(normal_force)[loaded, None]], axis=1))
 
 
-def _points(patch: ContactPatch, weights: np.ndarray, factor: np.ndarray, loaded: np.ndarray):
+def _points(patch: ContactPatch, weights: np.ndarray, factor: np.ndarray, loaded: np.ndarray, extents: np.ndarray):
     """`C` `[P, 2, 3]`, asymmetries `[P, 2]` and weights `[P]` of a 2 x 2 Gauss rule in each loaded cell."""
-    extents = patch.cell_extents()[loaded]
     along = [np.array([-_GAUSS, _GAUSS]) if side > 0.0 else np.zeros(1) for side in extents.max(axis=0)]
     inside = np.stack([axis.ravel() for axis in np.meshgrid(*along)], -1)
     count = len(inside)

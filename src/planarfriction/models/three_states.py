@@ -13,6 +13,7 @@ import numpy as np
 from numba import types
 
 from planarfriction.geometry import transformed
+from planarfriction.kernels.compiled_math import LARGEST
 from planarfriction.kernels.pointers import place_of
 from planarfriction.kernels.rollouts import step_batch, step_one
 from planarfriction.models.base import FrictionModel, ModelJacobians, PackedModel, StepJacobians
@@ -245,7 +246,7 @@ class ThreeStateModel(FrictionModel):
         if not _PLAIN.issuperset(map(type, plain)):  # the checks of `_inputs` say which
             return None
         given = np.array(plain, dtype=float)
-        if not (np.isfinite(given).all() and given[6] >= 0.0 and given[7] >= 0.0):
+        if not ((np.abs(given) <= LARGEST).all() and given[6] >= 0.0 and given[7] >= 0.0):
             return None
         return self._step_jacobians(self._reference, given[None, :3], given[None, 3:6], given[6:7], given[7:])[0]
 
