@@ -10,6 +10,7 @@ from numba.core.dispatcher import Dispatcher
 
 import planarfriction as pf
 from planarfriction import autodiff
+from planarfriction.errors import InvalidValueError
 
 PATCH = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
@@ -136,5 +137,62 @@ def test_whole_numbers_are_states(model):
         wanted = call(model.rest(), np.array([1.0, 0.0, 2.0]))
         before = compiled()
         agree(call(rest, np.array([1, 0, 2])), wanted, 0.0)
-        agree(call(rest.astype(bool), (1, False, 2)), wanted, 0.0)
+        agree(call(rest.astype(np.uint8), (1, 0, 2)), wanted, 0.0)
         assert compiled() == before
+
+
+TWISTS = {
+    "text": "123",
+    "bytes": b"123",
+    "texts": ("1", "2", "3"),
+    "dict": {1.0: "a", 2.0: "b", 3.0: "c"},
+    "set": {1.0, 2.0, 3.0},
+    "complex": np.array([1.0, 2.0, 3.0 + 1.0j]),
+    "complex list": [1.0, 2.0, 3.0 + 0.5j],
+    "complex numbers": (1.0, 2.0, np.complex128(3.0 + 1.0j)),
+    "durations": np.array([1, 2, 3], "m8[s]"),
+    "durations in a list": [np.timedelta64(1, "s"), 2.0, 3.0],
+    "dates": np.array([1, 2, 3], "M8[s]"),
+    "objects": np.array([1.0, 2.0, "3"], dtype=object),
+    "text array": np.array(["1", "2", "3"]),
+    "masked": np.ma.masked_array([1.0, 2.0, 3.0], [False, True, False]),
+    "masked in a list": [1.0, np.ma.masked, 3.0],
+    "nothing": (1.0, None, 3.0),
+}
+
+
+@every_model
+@pytest.mark.parametrize("kind", TWISTS)
+def test_what_is_no_twist_is_refused(model, kind):
+    for call in calls(model):
+        before = compiled()
+        with pytest.raises(InvalidValueError, match="twist must") as caught:
+            call(model.rest(), TWISTS[kind])
+        assert "\n" not in str(caught.value)
+        assert compiled() == before
+
+
+@every_model
+@pytest.mark.parametrize("kind", TWISTS)
+def test_what_is_no_state_is_refused(model, kind):
+    for call in calls(model):
+        with pytest.raises(InvalidValueError, match="state must"):
+            call(TWISTS[kind], TWIST)
+
+
+@every_model
+@pytest.mark.parametrize(
+    "value", ["1", b"1", 1.0 + 0.0j, np.complex128(1.0 + 1.0j), np.timedelta64(1, "s"), {1.0}, None, np.ma.masked]
+)
+def test_what_is_no_load_or_step_is_refused(model, value):
+    for call in (
+        lambda x: model.step(model.rest(), TWIST, x, DT),
+        lambda x: model.step_jacobians(model.rest(), TWIST, x, DT),
+    ):
+        before = compiled()
+        with pytest.raises(InvalidValueError, match="normal_force must"):
+            call(value)
+        assert compiled() == before
+    for call in (model.step, model.step_jacobians):
+        with pytest.raises(InvalidValueError, match="dt must"):
+            call(model.rest(), TWIST, LOAD, value)

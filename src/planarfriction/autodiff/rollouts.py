@@ -14,9 +14,9 @@ from planarfriction import validation
 from planarfriction.autodiff.parameters import Packed, has_one_shape, pack
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
-from planarfriction.kernels.compiled_math import LARGEST
 from planarfriction.kernels.rollouts import Bars, Inputs
 from planarfriction.models import FrictionModel
+from planarfriction.validation import LARGEST
 
 _WORTH_A_THREAD = 20_000
 """Steps [-] below which starting a thread costs more than it saves."""

@@ -14,6 +14,8 @@ from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic
 
+from planarfriction.validation import LARGEST
+
 # Not `reassoc`: the two-part constants of the argument reductions rely on the order of operations.
 _inline = njit(
     error_model="numpy",
@@ -52,13 +54,9 @@ def where(condition, a, b):
     return a if condition else b
 
 
-LARGEST = 1e50
-"""Largest number that a step takes [SI units]: products of three such and their squares stay among the doubles."""
-
-
 @_inline
 def in_range(x):
-    """A number, and not beyond `LARGEST`."""
+    """A number, and not beyond the largest that is taken: products of three and their squares stay finite."""
     return abs(x) <= LARGEST
 
 

@@ -16,9 +16,13 @@ smallest load would have.
 
 from __future__ import annotations
 
+import functools
+import threading
 from typing import NamedTuple
 
 import numpy as np
+from numba import types
+from numba.core.errors import NumbaError
 
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import jit, kernel
@@ -143,6 +147,25 @@ def step_one(places, z, vx, vy, omega, load, dt, result):
     result[12], result[13] = load, dt
     call(places[0], (places[1], places[2], address(result, 6), result))
     return True
+
+
+UNFIT = (TypeError, ValueError, NumbaError)
+"""What `step_one` answers other types with."""
+
+_COMPILING = threading.Lock()
+
+
+@functools.cache
+def compile_step_one() -> None:
+    """Compile `step_one` for plain numbers and arrays, and for nothing else.
+
+    Of other types it then says so at once, for free, where it would be compiled anew in the middle of a step.
+    """
+    number, vector, places = types.float64, types.float64[::1], types.int64[::1]
+    with _COMPILING:
+        if not step_one.signatures:
+            step_one.compile((places, vector, *(number,) * 5, vector))
+            step_one.disable_compile()
 
 
 @kernel

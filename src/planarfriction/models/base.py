@@ -11,7 +11,6 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.equality import ByValue, by_parts
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels.compiled_math import LARGEST
 from planarfriction.laws import FrictionLaw
 from planarfriction.patch import ContactPatch
 
@@ -131,9 +130,9 @@ class FrictionModel(ByValue):
         scalars = {"normal_force": normal_force, **more}
         arrays = {name: validation.numbers(name, value) for name, value in scalars.items()}
         for name, value in {"state": state, "twist": twist, **arrays}.items():
-            if not (np.abs(value) <= LARGEST).all():
+            if not (np.abs(value) <= validation.LARGEST).all():
                 finite = np.isfinite(value).all()
-                rule = f"be between {-LARGEST:g} and {LARGEST:g}" if finite else "be finite"
+                rule = f"be between {-validation.LARGEST:g} and {validation.LARGEST:g}" if finite else "be finite"
                 shown = "a larger number" if finite else "NaN or infinity"
                 raise InvalidValueError(name, rule, value.tolist() if value.size < 10 else shown)
         for name, value in arrays.items():

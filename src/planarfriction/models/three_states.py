@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import functools
-import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any, ClassVar
 
 import numpy as np
-from numba import types
 
 from planarfriction.geometry import transformed
-from planarfriction.kernels.compiled_math import LARGEST
 from planarfriction.kernels.pointers import place_of
-from planarfriction.kernels.rollouts import step_batch, step_one
+from planarfriction.kernels.rollouts import UNFIT, compile_step_one, step_batch, step_one
 from planarfriction.models.base import FrictionModel, ModelJacobians, PackedModel, StepJacobians
 from planarfriction.models.rates import linearised, rates
 from planarfriction.models.remembered import Remembered
+from planarfriction.validation import LARGEST
 
 _REMEMBERED = 64
 """Loads whose shapes a model remembers that builds each."""
@@ -27,8 +25,6 @@ _ARRAY, _FLOAT = np.ndarray, np.dtype(float)
 
 _PLAIN = frozenset((float, int, np.float64))
 """What needs no conversion to a number."""
-
-_COMPILING = threading.Lock()
 
 _HERE_ALONE = ("_fixed", "_fixed_record", "_recent", "_family")
 """What a copy makes anew: addresses hold in this process, and memories are shared by threads, not by models."""
@@ -84,7 +80,7 @@ class ThreeStateModel(FrictionModel):
                 vx, vy, omega = held
                 if step_one(fixed[0], state, vx, vy, omega, normal_force, dt, result):
                     return result[:3], result[3:6]
-            except (TypeError, ValueError):  # not plain numbers, or a batch: the checks below decide
+            except UNFIT:  # not plain numbers, or a batch: the checks below decide
                 pass
         packed = self._by_load(self._step, (6,), *self._inputs(state, twist, normal_force, dt=dt))
         return packed[..., :3], self._out(packed[..., 3:])
@@ -184,7 +180,7 @@ class ThreeStateModel(FrictionModel):
         """
         surface, data = self._maps(shape)
         row, data = np.array([*self._row(shape), *surface]), np.ascontiguousarray(data, dtype=float)
-        _compile_step_one()
+        compile_step_one()
         return np.array([self._kernels.step_address(), place_of(row), place_of(data)]), row, data
 
     def __getstate__(self) -> dict[str, Any]:
@@ -260,16 +256,3 @@ class ThreeStateModel(FrictionModel):
             row, surface = numbers[:-3], numbers[-3:].astype(int)
         self._kernels.jacobians(row, surface, data, (state, twist, load, dt), slopes)
         return slopes[:, :, :7]
-
-
-@functools.cache
-def _compile_step_one() -> None:
-    """Compile `step_one` for plain numbers and arrays, and for nothing else.
-
-    Of other types it then says so at once, for free, where it would be compiled anew in the middle of a step.
-    """
-    number, vector, places = types.float64, types.float64[::1], types.int64[::1]
-    with _COMPILING:
-        if not step_one.signatures:
-            step_one.compile((places, vector, *(number,) * 5, vector))
-            step_one.disable_compile()
