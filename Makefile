@@ -7,7 +7,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 LOWEST := .venv-lowest
 
-# The package is installed in place, so that sources count at once and compiled kernels, which Numba keeps beside them,
+# The package is installed in place, so that sources count at once and compiled kernels, which are kept beside them,
 # survive from run to run. What is installed changes with pyproject.toml only.
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
@@ -23,20 +23,13 @@ test: $(VENV)/.test
 # What compiled loops and BLAS may round differently elsewhere: surfaces, models, steps, solver, compression, derivatives.
 NUMERIC := anisotrop* autodiff* batches compiled_math compressed exact formulas jax* limit_surface* models plain_data \
 	reduced_model scene_sensitivities solver steps torch*
-CACHES := $(CURDIR)/.numba_cache
 
-test-generic: $(VENV)/.test $(CACHES)/generic
-	NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES= NUMBA_CACHE_DIR=$(CACHES)/generic \
-	$(BIN)/python -m pytest -n 2 --dist loadfile $(NUMERIC:%=tests/test_%.py) $(ARGS)
+test-generic: $(VENV)/.test
+	NUMBA_CPU_NAME=generic NUMBA_CPU_FEATURES= $(BIN)/python -m pytest -n 2 --dist loadfile $(NUMERIC:%=tests/test_%.py) $(ARGS)
 
 # The lowest versions that pyproject.toml promises, without the optional front ends.
-test-lowest: $(LOWEST)/.test $(CACHES)/lowest
-	NUMBA_CACHE_DIR=$(CACHES)/lowest $(LOWEST)/bin/python -m pytest -n 2 --dist loadfile $(ARGS)
-
-# Numba looks for changes in the file of a compiled function only, not in those that it calls.
-$(CACHES)/%: $(wildcard src/planarfriction/formulas.py src/planarfriction/kernels/*.py)
-	rm -rf $@
-	mkdir -p $@
+test-lowest: $(LOWEST)/.test
+	$(LOWEST)/bin/python -m pytest -n 2 --dist loadfile $(ARGS)
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
@@ -48,7 +41,7 @@ bench: $(VENV)/.package
 	$(BIN)/planarfriction bench $(ARGS)
 
 clean:
-	rm -rf $(VENV) $(LOWEST) out build dist .numba_cache .pytest_cache .ruff_cache .hypothesis .import_linter_cache src/*.egg-info
+	rm -rf $(VENV) $(LOWEST) out build dist .pytest_cache .ruff_cache .hypothesis .import_linter_cache src/*.egg-info
 	find src tests examples -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:

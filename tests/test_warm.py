@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import os
+import random
 import shutil
+import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -49,9 +52,21 @@ assert at_once == [run(kind) for kind in kinds], at_once
 """
 
 
-def started(code: str, cache=None) -> subprocess.Popen:
+COMMAND_LINE = "import sys; from planarfriction.cli import main; sys.exit(main(sys.argv[1:]))"
+
+INTERRUPTED = {
+    "simulate": [f"while True:\n    exec({FIRST_RUN!r})"],
+    "warm_up": ["import planarfriction as pf; pf.warm_up()"],
+    "run": [COMMAND_LINE, "run", "in-hand"],
+    "warm": [COMMAND_LINE, "warm"],
+    "reproduce": [COMMAND_LINE, "reproduce", "--only", "drift", "--quick"],
+}
+"""What compiles for some seconds at least."""
+
+
+def started(code: str, cache=None, *arguments: str) -> subprocess.Popen:
     where = os.environ if cache is None else {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
-    command = [sys.executable, "-c", code]
+    command = [sys.executable, "-c", code, *arguments]
     return subprocess.Popen(command, env=where, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
@@ -81,17 +96,55 @@ def test_first_runs_in_several_threads(tmp_path):
     result(started(THREADS, tmp_path))
 
 
-@pytest.mark.slow
-def test_a_read_only_installation_uses_the_cache_of_the_user(tmp_path):
-    installed = tmp_path / "planarfriction"
+def read_only_installation(folder: Path) -> dict[str, str]:
+    """Install the package where nothing can be written beside it; returns the environment that has it."""
+    installed = folder / "planarfriction"
     shutil.copytree(Path(pf.__file__).parent, installed, ignore=shutil.ignore_patterns("__pycache__"))
     (installed / "kernels" / "__pycache__").write_text("nothing can be written beside the sources")
-    where = {**os.environ, "PYTHONPATH": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "cache")}
+    where = {**os.environ, "PYTHONPATH": str(folder), "XDG_CACHE_HOME": str(folder / "cache")}
     where.pop("NUMBA_CACHE_DIR", None)
+    return where
+
+
+@pytest.mark.slow
+def test_a_read_only_installation_uses_the_cache_of_the_user(tmp_path):
+    where = read_only_installation(tmp_path)
     counting = COUNTING.replace("pf.warm_up()", FIRST_RUN.strip())
     counts = []
     for _ in range(2):
         run = subprocess.run([sys.executable, "-c", counting], env=where, capture_output=True, text=True, check=True)
         counts.append(int(run.stdout.split()[-1]))
     assert counts[0] > 0 and counts[1] == 0
-    assert any((tmp_path / "cache").rglob("*.nbi"))
+    assert any((tmp_path / "cache").rglob("*.machine"))
+
+
+@pytest.mark.slow
+def test_without_a_place_for_machine_code_the_command_line_runs_and_says_so_in_one_line(tmp_path):
+    where = read_only_installation(tmp_path)
+    (tmp_path / "cache").write_text("there is no home either")
+    command = [sys.executable, "-c", COMMAND_LINE, "run", "in-hand", "--t-end", "0.01"]
+    run = subprocess.run(command, env=where, cwd=tmp_path, capture_output=True, text=True, check=True)
+    (line,) = [line for line in run.stderr.splitlines() if "NUMBA_CACHE_DIR" in line]
+    assert line.startswith("warning: compiled code is not kept")
+    assert "Traceback" not in run.stderr and "~" not in os.listdir(tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("what", INTERRUPTED)
+def test_ctrl_c_while_compiling_ends_the_run(what, tmp_path):
+    code, *arguments = INTERRUPTED[what]
+    if what == "reproduce":
+        arguments += ["--out", str(tmp_path / "out")]
+    draw = random.Random(what)
+    for _ in range(4):
+        cache = tmp_path / f"{draw.random()}"
+        process = started(code, cache, *arguments)
+        patience = time.monotonic() + 120.0
+        while not any(cache.rglob("*.machine")) and time.monotonic() < patience:
+            time.sleep(0.01)
+        time.sleep(draw.uniform(0.0, 3.0))
+        process.send_signal(signal.SIGINT)
+        _, error = process.communicate(timeout=60)  # a second where the machine is idle; two of these never end alone
+        assert process.returncode in (130, -signal.SIGINT), error  # -SIGINT: Python ends so, shells call it 130
+        assert "Exception ignored" not in error
+    assert result(started(FIRST_RUN, cache)) == result(started(FIRST_RUN))

@@ -32,8 +32,9 @@ def warm_up(*, progress: Callable[[str], None] | None = None) -> dict[str, float
     """Compile everything now and keep it on disk; returns the time that each part took [s].
 
     What was compiled before is read from the cache. `progress` is called with the words of each part before it begins.
-    A part that is done stays done, so an interruption loses only the part that it meets. Machine code is kept beside
-    the sources, in the user's cache where these cannot be written, or in the folder that `NUMBA_CACHE_DIR` names.
+    What is compiled stays, so Ctrl-C loses only the function that it meets. Machine code is kept beside the sources, in
+    the user's cache where nothing can be written there, or in the folder that `NUMBA_CACHE_DIR` names; where that is
+    not possible either, a warning says so and each process compiles anew.
     """
     times = {}
     for part in _parts():

@@ -22,6 +22,13 @@ OUT_OF_TOLERANCE = 1
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code; what the user got wrong is one line on stderr, exit code 2."""
+    try:
+        return _run(list(sys.argv[1:] if arguments is None else arguments))
+    except KeyboardInterrupt:  # also while modules load
+        return INTERRUPTED
+
+
+def _run(arguments: list[str]) -> int:
     import click
 
     from planarfriction.cli.app import app
@@ -31,14 +38,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
             stream.reconfigure(errors="backslashreplace")  # names of files need not be text that a terminal can show
     # One line for a warning too, without the place in the code that it comes from.
     warnings.showwarning = lambda message, *_: print("warning:", " ".join(str(message).split()), file=sys.stderr)
-    given = list(sys.argv[1:] if arguments is None else arguments)
     try:
-        code = app.main(given or ["--help"], prog_name="planarfriction", standalone_mode=False)
+        code = app.main(arguments or ["--help"], prog_name="planarfriction", standalone_mode=False)
     except FrictionError as error:
         return _fail(str(error))
     except click.ClickException as error:
         return _fail(error.format_message())
-    except (KeyboardInterrupt, click.Abort):  # click turns the one into the other where its own code runs
+    except click.Abort:  # how click calls Ctrl-C where its own code runs
         return INTERRUPTED
     finally:
         gc.enable()

@@ -14,13 +14,16 @@ from numba import types
 from numba.extending import intrinsic
 from numba.np.arrayobj import populate_array
 
+from planarfriction.kernels.interrupts import heard_between_passes
+
 _DOUBLES = types.CPointer(types.float64)
 
 
 def address_of(function: Any, words: str) -> int:
     """Address of a compiled function in this process; `words` has a letter for each argument: p(lace) or f(loat)."""
     signature = tuple(types.int64 if word == "p" else types.float64 for word in words)
-    function.compile(signature)
+    with heard_between_passes():
+        function.compile(signature)
     compiled = function.overloads[signature]
     return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name)
 

@@ -1,0 +1,65 @@
+"""Ctrl-C while compiling: it waits for the end of the compiler's pass.
+
+LLVM calls back into Python. An exception that rises there is printed and forgotten, and the run would go on.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import inspect
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from typing import Any
+
+from numba.core import event
+
+
+class _Keyboard(event.Listener):
+    """Holds Ctrl-C back and hands it on between passes, where an exception does no more harm than a wrong type does."""
+
+    def __init__(self):
+        self.hear: Callable[..., Any] | None = None
+        """Who is to hear of it."""
+        self.pressed = False
+
+    def hold(self, number: int, frame: Any) -> None:
+        """Stands in for the handler of the signal."""
+        self.pressed = True
+
+    def hand_on(self) -> None:
+        """Do now what Ctrl-C would have done then."""
+        if self.pressed and self.hear is not None and _in_main_thread():
+            self.pressed = False
+            self.hear(signal.SIGINT, inspect.currentframe())
+
+    def on_start(self, event: Any) -> None:
+        """Before each pass."""
+        self.hand_on()
+
+    def on_end(self, event: Any) -> None:
+        """A pass may have ended with an error, which is not to be hidden."""
+
+
+_keyboard = _Keyboard()
+event.register("numba:run_pass", _keyboard)
+
+
+def _in_main_thread() -> bool:
+    return threading.current_thread() is threading.main_thread()  # no other hears signals
+
+
+@contextlib.contextmanager
+def heard_between_passes() -> Iterator[None]:
+    """Within this block, Ctrl-C is heard before the next pass of Numba's compiler or at the end of the block."""
+    hear = signal.getsignal(signal.SIGINT)
+    if not _in_main_thread() or not callable(hear) or hear == _keyboard.hold:
+        yield
+        return
+    _keyboard.hear, _keyboard.pressed = hear, False
+    signal.signal(signal.SIGINT, _keyboard.hold)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, hear)
+        _keyboard.hand_on()
