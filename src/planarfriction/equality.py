@@ -53,7 +53,8 @@ def same(one: Any, other: Any) -> bool:
     if isinstance(one, Mapping) and isinstance(other, Mapping):
         return one.keys() == other.keys() and all(same(one[key], other[key]) for key in one)
     try:
-        return bool(one == other)
+        equal = one == other
+        return bool(equal.all() if hasattr(equal, "all") else equal)  # tensors and data frames
     except Exception:  # parts of a user's own: what cannot be compared is not equal
         return False
 

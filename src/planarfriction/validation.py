@@ -10,8 +10,10 @@ from __future__ import annotations
 
 import difflib
 import math
+import os
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,6 +31,9 @@ SI_UNITS = frozenset({"m", "s", "kg", "N", "rad", "Pa", "J", "W", "Hz"})
 
 MOST_NUMBERS = 30_000_000
 """Numbers of an array that is copied: 240 MB. A view of one number may be of any size."""
+
+LONGEST_NAME = 100
+"""Characters of a name."""
 
 DEEPEST = 16
 """Levels of lists in lists that an array may be given as."""
@@ -58,7 +63,7 @@ def refusal(value: Any, depth: int = 0) -> str | None:
     if isinstance(value, (str, bytes, bytearray, Mapping)):
         return ""
     if _states_a_unit(value):
-        return f" in SI units ({shown(_unit(value))} is none that is taken: convert, then pass plain numbers)"
+        return f" in SI units ({shown(str(_unit(value)))} is none that is taken: convert, then pass plain numbers)"
     if getattr(value, "requires_grad", False) is True:
         return " without a gradient (detach the tensor)"
     if isinstance(value, Sequence):
@@ -181,15 +186,15 @@ def non_negative(name: str, value: Any) -> float:
     return result
 
 
-def count(name: str, value: Any, at_least: int = 1, at_most: int | None = None) -> int:
-    """Return `value` as an integer >= `at_least`, and at most `at_most` if that is given, or raise.
+def count(name: str, value: Any, at_least: int = 1, at_most: int = 2**63 - 1) -> int:
+    """Return `value` as an integer from `at_least` to `at_most`, or raise.
 
     A limit stands where memory or time would go beyond all use: it is stated before any is asked for.
     """
     result = value if type(value) is int else number(name, value)
     if result < at_least or result != int(result):
         raise InvalidValueError(name, f"be an integer >= {at_least}", value)
-    if at_most is not None and result > at_most:
+    if result > at_most:
         raise InvalidValueError(name, f"be at most {at_most}", value)
     return int(result)
 
@@ -199,12 +204,11 @@ def vector(name: str, value: Any, size: int) -> np.ndarray:
     return array(name, value, (size,))
 
 
-def finite_numbers(name: str, value: Any) -> np.ndarray:
-    """Return `value` as a finite float array of any shape (no copy where it is one), or raise."""
+def finite_numbers(name: str, value: Any, *, largest: float = LARGEST) -> np.ndarray:
+    """Return `value` as a finite float array of any shape (no copy where it is one), no number beyond `largest`."""
     result = numbers(name, value)
     _check_size(name, result)
-    if not np.isfinite(result).all():
-        raise InvalidValueError(name, "be finite", result.tolist() if result.size < 10 else "NaN or infinity")
+    _check_finite(name, result, largest)
     return result
 
 
@@ -212,8 +216,9 @@ def non_negative_numbers(name: str, value: Any) -> np.ndarray:
     """Return `value` as a finite float array >= 0 of any shape, or raise."""
     result = numbers(name, value)
     _check_size(name, result)
-    if not ((result >= 0.0) & (result < np.inf)).all():
-        raise InvalidValueError(name, "be finite and >= 0", value)
+    if not ((result >= 0.0) & (result <= LARGEST)).all():
+        rule = f"be >= 0 and at most {LARGEST:g}" if np.isfinite(result).all() else "be finite and >= 0"
+        raise InvalidValueError(name, rule, value)
     return result
 
 
@@ -228,9 +233,7 @@ def array(name: str, value: Any, shape: tuple[int | None, ...], *, largest: floa
         raise InvalidValueError(name, f"have shape {wanted}", f"shape {list(result.shape)}")
     _check_size(name, result)
     result = result.copy()
-    if not np.abs(result).max(initial=0.0) <= min(largest, _FINITE):
-        _check_each(name, result, np.isfinite(result), "be finite")
-        _check_each(name, result, np.abs(result) <= largest, f"be at most {largest:g} in size")
+    _check_finite(name, result, largest)
     return result
 
 
@@ -241,18 +244,33 @@ def non_negative_array(name: str, value: Any, shape: tuple[int | None, ...], *, 
     return result
 
 
+def _check_finite(name: str, values: np.ndarray, largest: float) -> None:
+    if not np.abs(values).max(initial=0.0) <= min(largest, _FINITE):
+        _check_each(name, values, np.isfinite(values), "be finite")
+        _check_each(name, values, np.abs(values) <= largest, f"be at most {largest:g} in size")
+
+
 def _check_each(name: str, values: np.ndarray, good: np.ndarray, rule: str) -> None:
     if not good.all():
-        where = tuple(int(i) for i in np.argwhere(~good)[0])
-        raise InvalidValueError(name, rule, f"{values[where]} at index {where}")
+        where = tuple(int(i) for i in np.unravel_index(int(np.argmin(good)), good.shape))
+        raise InvalidValueError(name, rule, f"{values[where]} at index {where}" if where else float(values))
 
 
 def text(name: str, value: Any) -> str:
-    """Return `value` if it is a text that can be printed, is not empty and neither begins nor ends with a space."""
+    """Return `value` if it is a text that can be a name: printable, not empty, not long, no spaces at its ends."""
     if not (isinstance(value, str) and value.isprintable() and value.strip() == value and value):
         rule = "be a text that is not empty, printable and without spaces at its ends"
         raise InvalidValueError(name, rule, quoted(value))
+    if len(value) > LONGEST_NAME:
+        raise InvalidValueError(name, f"have at most {LONGEST_NAME} characters", f"{len(value)}")
     return value
+
+
+def path(name: str, value: Any) -> Path:
+    """Return `value` as a path, or raise."""
+    if not isinstance(value, (str, os.PathLike)) or isinstance(os.fspath(value), bytes):
+        raise InvalidValueError(name, "be a path: a text or a pathlib.Path", value)
+    return Path(value)  # pyright: ignore[reportArgumentType]
 
 
 def choice(name: str, value: Any, valid: Iterable[str]) -> str:

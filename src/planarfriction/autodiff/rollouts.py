@@ -12,6 +12,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.autodiff.parameters import Packed, has_one_shape, pack
+from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
 from planarfriction.kernels.rollouts import Bars, Inputs
@@ -22,6 +23,7 @@ _WORTH_A_THREAD = 20_000
 """Steps [-] below which starting a thread costs more than it saves."""
 
 
+@by_parts
 class Rollout(NamedTuple):
     """A model stepped through T twists and loads."""
 
@@ -31,6 +33,7 @@ class Rollout(NamedTuple):
     """Wrench on the moving body at the end of each step, `[..., T, 3]` [N, N, N m]."""
 
 
+@by_parts
 class RolloutStates(NamedTuple):
     """A roll-out with its states on the way."""
 
@@ -42,6 +45,7 @@ class RolloutStates(NamedTuple):
     """State before each step, `[..., T, 3]`."""
 
 
+@by_parts
 class RolloutSensitivities(NamedTuple):
     """A roll-out with the derivatives of its wrenches by P parameters."""
 
@@ -53,6 +57,7 @@ class RolloutSensitivities(NamedTuple):
     """`[..., T, 3, P]`"""
 
 
+@by_parts
 class RolloutGradient(NamedTuple):
     """Gradient of a number with respect to the inputs of a roll-out, each of the shape of that input."""
 

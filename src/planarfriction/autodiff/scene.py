@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError, SolverError
 from planarfriction.kernels import rosenbrock, tangent
 from planarfriction.kernels.integration import Output, run_of
@@ -41,8 +42,8 @@ _CLOCK = 1e-12
 """Share of a step by which adding times up may be off."""
 
 
-@dataclass(frozen=True)
-class SceneSensitivities:
+@dataclass(frozen=True, eq=False)
+class SceneSensitivities(ByValue):
     """A motion and its derivatives with respect to P factors.
 
     A factor is 1 as the scene is: divided by a parameter's value it is the derivative with respect to the parameter.

@@ -7,6 +7,7 @@ import io
 import sys
 import warnings
 from collections.abc import Sequence
+from typing import Any
 
 from planarfriction.errors import FrictionError
 
@@ -39,7 +40,9 @@ def _run(arguments: list[str]) -> int:
     # One line for a warning too, without the place in the code that it comes from.
     warnings.showwarning = lambda message, *_: print("warning:", " ".join(str(message).split()), file=sys.stderr)
     try:
-        code = app.main(arguments or ["--help"], prog_name="planarfriction", standalone_mode=False)
+        with warnings.catch_warnings():
+            warnings.showwarning = _warn
+            code = app.main(arguments or ["--help"], prog_name="planarfriction", standalone_mode=False)
     except FrictionError as error:
         return _fail(str(error))
     except click.ClickException as error:
@@ -49,6 +52,10 @@ def _run(arguments: list[str]) -> int:
     finally:
         gc.enable()
     return code if isinstance(code, int) else 0
+
+
+def _warn(message: Warning | str, *where: Any) -> None:
+    print("warning:", " ".join(str(message).split()), file=sys.stderr)
 
 
 def _fail(message: str) -> int:

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.equality import ByValue
 from planarfriction.errors import FileError, InvalidValueError
 from planarfriction.reading import Table
 
@@ -24,7 +25,7 @@ EVEN = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Log:
+class Log(ByValue):
     """Twist and friction wrench of one contact over time, T samples.
 
     Twist and wrench are about the origin of the contact frame, in its axes; the wrench acts on the moving body, so that

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from planarfriction.equality import ByValue
 from planarfriction.identify.parameters import ALL
 from planarfriction.laws import LuGre
 
@@ -32,7 +33,7 @@ class Verdict:
 
 
 @dataclass(frozen=True, eq=False)
-class Identification:
+class Identification(ByValue):
     """Parameters that were estimated, in the order asked for; F of them."""
 
     names: tuple[str, ...]

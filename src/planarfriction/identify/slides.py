@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.scenes import simulate
 from planarfriction.scenes.ready import free_slide
@@ -21,7 +22,7 @@ CHANGES = np.array([2e-3, 2e-3, 2e-2])
 
 
 @dataclass(frozen=True, eq=False)
-class Slide:
+class Slide(ByValue):
     """One measured slide of a body on a level table, T samples.
 
     Raises InvalidValueError for fewer than five samples, wrong shapes, numbers that are not finite and times that do

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 
+from planarfriction.equality import by_parts
 from planarfriction.jax.base import FrictionModel
 from planarfriction.laws import FrictionLaw
 from planarfriction.models import distributed_arrays
@@ -14,6 +15,7 @@ from planarfriction.models.distributed_arrays import Cells
 from planarfriction.patch import ContactPatch
 
 
+@by_parts
 class LawParameters(NamedTuple):
     """Parameters of a friction law, scalars: names and units as in `LuGre`."""
 

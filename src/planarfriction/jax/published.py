@@ -10,6 +10,7 @@ import jax
 import jax.numpy as jnp
 
 from planarfriction import models
+from planarfriction.equality import ByValue, by_parts
 from planarfriction.jax import namespace as xp
 from planarfriction.jax.base import FrictionModel
 from planarfriction.laws import FrictionLaw
@@ -19,6 +20,7 @@ from planarfriction.models.published_arrays import PublishedNumbers
 from planarfriction.patch import ContactPatch
 
 
+@by_parts
 class PublishedParameters(NamedTuple):
     """Parameters of the published reduced model, scalars: names and units as in `LuGre` and `PublishedShape`."""
 
@@ -41,8 +43,8 @@ class PublishedParameters(NamedTuple):
 
 
 @functools.partial(jax.tree_util.register_dataclass, data_fields=["data"], meta_fields=["kind", "size"])
-@dataclass(frozen=True)
-class Surface:
+@dataclass(frozen=True, eq=False)
+class Surface(ByValue):
     """The numbers of a limit surface over scaled twists (see `planarfriction.kernels.surfaces`)."""
 
     kind: int

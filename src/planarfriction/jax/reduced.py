@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 
 from planarfriction import models
+from planarfriction.equality import by_parts
 from planarfriction.jax.base import FrictionModel
 from planarfriction.laws import FrictionLaw
 from planarfriction.models import reduced_arrays
@@ -15,6 +16,7 @@ from planarfriction.models.reduced_arrays import ReducedNumbers
 from planarfriction.patch import ContactPatch
 
 
+@by_parts
 class ReducedParameters(NamedTuple):
     """Parameters of the law, scalars: names and units as in `LuGre`; not gamma, for which the map is made."""
 

@@ -8,6 +8,7 @@ import jax
 import jax.numpy as jnp
 
 from planarfriction import validation
+from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
 from planarfriction.jax.base import FrictionModel
@@ -16,6 +17,7 @@ METHODS = ("adjoint", "eager")
 """Compiled roll-out with its discrete adjoint; every step an operation of JAX, in `lax.scan`."""
 
 
+@by_parts
 class Rollout(NamedTuple):
     """A model stepped through T twists and loads."""
 

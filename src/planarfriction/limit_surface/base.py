@@ -27,6 +27,9 @@ _FULL_BALANCE = 1e-12
 _DIFFERENCE = 1e-5
 """Angle [rad] of central differences of `h`: 1e-10 of its third derivative, and 1e-11 of rounding."""
 
+_LARGEST = 1e100
+"""Largest component of a twist or wrench: its square is finite, with room for sums."""
+
 MOST_SEGMENTS = 500
 """Segments of a quadrant of a stored surface that are taken: 32 MB; errors fall with their fourth power."""
 
@@ -337,7 +340,7 @@ def _plane(normal: np.ndarray) -> np.ndarray:
 
 
 def _rows(name: str, value) -> np.ndarray:
-    result = validation.finite_numbers(name, value)
+    result = validation.finite_numbers(name, value, largest=_LARGEST)
     if result.ndim == 0 or result.shape[-1] != 3:
         raise InvalidValueError(name, "have shape [..., 3]", f"shape {list(result.shape)}")
     return result

@@ -21,7 +21,7 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch import compressed_rows as rows
-from planarfriction.patch.metric import refuse_cell_metrics
+from planarfriction.patch.metric import Anisotropy, refuse_cell_metrics
 from planarfriction.patch.pressure import PerCell
 from planarfriction.patch.pressure_maps import PressureMaps
 
@@ -106,6 +106,9 @@ def surface_error(patch: ContactPatch, few: ContactPatch, normal_force=None) -> 
 
     Twists are spread evenly over the sphere of `(vx, vy, omega r)` about the centre of pressure.
     """
+    for name, each in (("patch", patch), ("few", few)):
+        if not isinstance(each, Anisotropy):
+            raise InvalidValueError(name, "be a ContactPatch", each)
     weights = patch.weights(normal_force)
     scaled = rows.scaled_positions(patch.positions, weights)
     whole = rows.dissipation(scaled, weights, rows.directions(CHECKED))

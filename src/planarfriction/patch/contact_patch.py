@@ -14,7 +14,7 @@ from planarfriction.patch import outline as outlines
 from planarfriction.patch import plain_data, shapes
 from planarfriction.patch.grid import Grid
 from planarfriction.patch.metric import Anisotropy
-from planarfriction.patch.pressure import Uniform, as_law, check_not_negative, check_pressure, pressure_array
+from planarfriction.patch.pressure import Uniform, as_law, check_not_negative, check_pressure, evaluated, pressure_array
 from planarfriction.patch.pressure_maps import read_maps
 from planarfriction.patch.size import MOST_CELLS, check_cells, warn_of_the_unit
 
@@ -111,7 +111,7 @@ class ContactPatch(Anisotropy):
         Cells at the rim have the area inside it, and the centroid of that part as position.
         """
         radius = validation.positive("radius", radius)
-        return cls._clipped(outlines.RoundOutline(0.0, radius), _square_grid(2 * radius, cells), pressure, name)
+        return cls._clipped(outlines.RoundOutline(0.0, radius), Grid.square(2 * radius, cells), pressure, name)
 
     @classmethod
     def disc_published(
@@ -122,7 +122,7 @@ class ContactPatch(Anisotropy):
         Distances are between cell centres and `cells` is odd, so the size of the mask depends on it: 317 of 21 x 21
         cells have the area of a disc of radius 10.05 cells, not 10.5. To reproduce; `disc` is the true disc.
         """
-        grid = _square_grid(2 * validation.positive("radius", radius), cells)
+        grid = Grid.square(2 * validation.positive("radius", radius), cells)
         if grid.columns % 2 == 0:
             raise InvalidValueError("cells", "be odd (the published mask is centred on a cell)", cells)
         reach = grid.columns // 2
@@ -161,7 +161,7 @@ class ContactPatch(Anisotropy):
         outer = validation.positive("outer_radius", outer_radius)
         if inner >= outer:
             raise InvalidValueError("inner_radius", "be < outer_radius", f"{inner} and {outer}")
-        return cls._clipped(outlines.RoundOutline(inner, outer), _square_grid(2 * outer, cells), pressure, name)
+        return cls._clipped(outlines.RoundOutline(inner, outer), Grid.square(2 * outer, cells), pressure, name)
 
     @classmethod
     def line(
@@ -187,7 +187,7 @@ class ContactPatch(Anisotropy):
         positions = np.zeros((cells, 2))
         positions[:, along] = (np.arange(cells) - (cells - 1) / 2) * (side if along == 0 else -side)
         if callable(profile):
-            profile = [profile(coordinate) for coordinate in positions[:, along].tolist()]
+            profile = evaluated("profile", profile, positions[:, along, None].tolist())
         elif profile is not None:
             profile = check_not_negative("profile", pressure_array("profile", profile, (cells,)))
         size = (side, 0.0) if along == 0 else (0.0, side)
@@ -239,7 +239,8 @@ class ContactPatch(Anisotropy):
         size = validation.array("cell_size", size, (2,) if size.ndim else ())
         width, height = np.broadcast_to([validation.positive("cell_size", side) for side in size.flat], 2)
         grid = Grid.around_origin(columns * width, rows * height, columns, rows)
-        return cls(grid.centres(), np.full(rows * columns, grid.cell_area), law, grid, name or file or "pressure map")
+        name = (file or "pressure map") if name is None else name
+        return cls(grid.centres(), np.full(rows * columns, grid.cell_area), law, grid, name)
 
     @classmethod
     def _clipped(cls, outline: outlines.Outline, grid: Grid, pressure: Any, name: str) -> ContactPatch:
@@ -249,7 +250,11 @@ class ContactPatch(Anisotropy):
         polygon = shapely.Polygon(*outline.rims())
         if not polygon.is_valid:
             raise InvalidValueError("vertices", "outline a simple polygon", shapely.is_valid_reason(polygon))
-        return outlines.with_outline(cls(*shapes.clip(polygon, grid), pressure, grid, name), outline)
+        try:
+            cells = shapes.clip(polygon, grid)
+        except shapely.errors.GEOSException as error:  # rounding of coordinates far apart in size
+            raise InvalidValueError("vertices", "outline a polygon that can be cut into cells", str(error)) from None
+        return outlines.with_outline(cls(*cells, pressure, grid, name), outline)
 
     def refined(self, parts: int) -> ContactPatch:
         """The same patch with every cell cut into `parts` x `parts` (a cell of a line into `parts`).
@@ -302,6 +307,9 @@ class ContactPatch(Anisotropy):
                 raise InvalidValueError("normal_force", "be given, the shape of this patch depends on it", "None")
             return self._fixed_weights
         load = validation.non_negative_numbers("normal_force", normal_force)
+        if load.size * self.cells > validation.MOST_NUMBERS:
+            rule = f"be at most {validation.MOST_NUMBERS // self.cells} loads for {self.cells} cells"
+            raise InvalidValueError("normal_force", rule, load.size)
         if self._fixed_weights is not None:
             return np.broadcast_to(self._fixed_weights, (*load.shape, self.cells))
         loaded = load > 0.0
@@ -387,9 +395,3 @@ class ContactPatch(Anisotropy):
     def from_dict(cls, data: Mapping[str, Any]) -> ContactPatch:
         """The patch that `to_dict` described; unknown and missing keys are errors that name them."""
         return plain_data.from_dict(cls, data)
-
-
-def _square_grid(width: float, cells: int) -> Grid:
-    """Grid of `cells` x `cells` on the square `width` [m] wide about the origin."""
-    cells = validation.count("cells", cells, at_most=MOST_CELLS)
-    return Grid.around_origin(width, width, cells, cells)

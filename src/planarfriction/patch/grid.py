@@ -8,7 +8,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
-from planarfriction.patch.size import check_cells
+from planarfriction.patch.size import MOST_CELLS, check_cells
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,17 @@ class Grid:
     @classmethod
     def around_origin(cls, width: float, height: float, columns: int, rows: int) -> Grid:
         """Grid of `columns` x `rows` cells on the box of `width` x `height` [m] whose middle is the origin."""
+        width, height = validation.positive("width", width), validation.positive("height", height)
+        columns = validation.count("columns", columns, at_most=MOST_CELLS)
+        rows = validation.count("rows", rows, at_most=MOST_CELLS)
         check_cells(columns * rows)  # before the cells are too small to be any
         return cls(-width / 2, -height / 2, width / columns, height / rows, columns, rows)
+
+    @classmethod
+    def square(cls, width: float, cells: int) -> Grid:
+        """Grid of `cells` x `cells` on the square `width` [m] wide about the origin."""
+        cells = validation.count("cells", cells, at_most=MOST_CELLS)
+        return cls.around_origin(width, width, cells, cells)
 
     @property
     def cell_area(self) -> float:

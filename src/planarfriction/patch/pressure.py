@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.equality import ByValue
-from planarfriction.errors import InvalidValueError
+from planarfriction.errors import InvalidValueError, shown
 
 SAME_DISTANCE = 1e-9
 """Relative difference below which two cells are equally far from the origin (rounding: 1e-16, cells: 1e-2)."""
@@ -123,10 +123,12 @@ class SoftFinger(Pressure):
 
     def __post_init__(self) -> None:
         if (self.k is None) == (self.k_per_newton is None):
-            shown = f"k={self.k}, k_per_newton={self.k_per_newton}"
-            raise InvalidValueError("SoftFinger", "have exactly one of k and k_per_newton", shown)
+            given = f"k={shown(self.k)}, k_per_newton={shown(self.k_per_newton)}"
+            raise InvalidValueError("SoftFinger", "have exactly one of k and k_per_newton", given)
         object.__setattr__(self, "c", validation.positive("c", self.c))
         object.__setattr__(self, "n", validation.non_negative("n", self.n))
+        if self.n > 1.0:
+            raise InvalidValueError("n", "be at most 1: a contact does not grow faster than its load", self.n)
         for name in ("k", "k_per_newton", "radius_max"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, validation.positive(name, getattr(self, name)))
@@ -137,19 +139,27 @@ class SoftFinger(Pressure):
 
     def radius(self, normal_force) -> np.ndarray:
         """Contact radius `R = min(c f_N^n, radius_max)` [m] at `normal_force` `[...]` [N]."""
-        radius = self.c * validation.numbers("normal_force", normal_force) ** self.n
+        return self._radius(validation.non_negative_numbers("normal_force", normal_force))
+
+    def _radius(self, load: np.ndarray) -> np.ndarray:
+        with np.errstate(over="ignore", under="ignore"):  # a radius of 0 would divide by zero
+            radius = np.maximum(self.c * load**self.n, validation.SMALLEST)
         return radius if self.radius_max is None else np.minimum(radius, self.radius_max)
 
     def exponent(self, normal_force) -> np.ndarray:
         """Exponent `k` of the profile [-] at `normal_force` `[...]` [N]."""
-        load = validation.numbers("normal_force", normal_force)
-        return np.full_like(load, self.k) if self.k_per_newton is None else self.k_per_newton * load
+        return self._exponent(validation.non_negative_numbers("normal_force", normal_force))
+
+    def _exponent(self, load: np.ndarray) -> np.ndarray:
+        if self.k_per_newton is None:
+            return np.full_like(load, self.k)
+        return np.maximum(self.k_per_newton * load, validation.SMALLEST)
 
     def relative(self, positions: np.ndarray, normal_force: np.ndarray | None = None) -> np.ndarray:
         load = np.asarray(1.0 if normal_force is None else normal_force, dtype=float)[..., None]
-        k = self.exponent(load)
+        k = self._exponent(load)
         distance = np.hypot(positions[:, 0], positions[:, 1])
-        ratio = distance / self.radius(load)
+        ratio = distance / self._radius(load)
         inside = ratio < 1.0
         nearest = distance <= distance.min() * (1.0 + SAME_DISTANCE)
         # In logarithms, relative to the largest value: at small k the profile underflows everywhere but at s = 0.
@@ -163,7 +173,7 @@ class SoftFinger(Pressure):
         if not self.depends_on_load:
             return super().ever_loaded(positions)
         distance = np.hypot(positions[:, 0], positions[:, 1])
-        largest = self.radius(1.0 if self.n == 0.0 else np.inf)
+        largest = self._radius(np.array(1.0 if self.n == 0.0 else np.inf))
         return (distance < largest) | (distance <= distance.min() * (1.0 + SAME_DISTANCE))
 
 
@@ -201,7 +211,7 @@ def as_law(pressure: Any, positions: np.ndarray) -> Pressure:
     if isinstance(pressure, Pressure):
         return pressure
     if callable(pressure):
-        return PerCell([pressure(x, y) for x, y in positions.tolist()])  # pyright: ignore
+        pressure = evaluated("pressure", pressure, positions.tolist())
     return PerCell(pressure_array("pressure", pressure, (len(positions),)))
 
 
@@ -210,6 +220,15 @@ def pressure_array(name: str, value: Any, shape: tuple[int | None, ...]) -> np.n
     if isinstance(value, np.ndarray) and value.dtype.kind == "b" and not isinstance(value, np.ma.MaskedArray):
         value = value.astype(float)
     return validation.array(name, value, shape, largest=np.inf)
+
+
+def evaluated(name: str, function: Callable[..., Any], points: list[list[float]]) -> list[Any]:
+    """Values of a function that a user gave as `name`, at each of the points."""
+    try:
+        return [function(*point) for point in points]
+    except Exception as error:
+        wanted = f"be a function of {' and '.join('xy'[: len(points[0])])} [m] that gives a number"
+        raise InvalidValueError(name, wanted, f"{type(error).__name__}: {error}") from error
 
 
 def check_not_negative(name: str, values: np.ndarray) -> np.ndarray:

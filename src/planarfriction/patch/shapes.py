@@ -25,7 +25,7 @@ def columns_and_rows(cells: int | Sequence[int], width: float, height: float) ->
     A pair is taken as it is; one number counts the cells along the longer side, and the shorter side gets as many as
     keep the cells closest to square.
     """
-    if not isinstance(cells, (Sequence, np.ndarray)) or isinstance(cells, str) or np.shape(cells) == ():
+    if not (isinstance(cells, (list, tuple)) or (isinstance(cells, np.ndarray) and cells.ndim)):
         along = validation.count("cells", cells, at_most=MOST_CELLS)
         side = max(width, height) / along
         return max(1, round(width / side)), max(1, round(height / side))

@@ -26,4 +26,4 @@ def warn_of_the_unit(name: str, positions: np.ndarray, cell_size: tuple[float, f
     width = max(float(np.ptp(x)) + side for x, side in zip(positions.T, cell_size or (0.0, 0.0), strict=True))
     if not LEAST_WIDTH <= width <= MOST_WIDTH and width > 0.0:  # 0: a point
         than = f"larger than {MOST_WIDTH:g}" if width > MOST_WIDTH else f"smaller than {LEAST_WIDTH:g}"
-        warnings.warn(f"patch {name!r} is {width:g} m wide, {than} m: are its lengths in metres?", stacklevel=4)
+        warnings.warn(f"patch {name!r} is {width:.3g} m wide, {than} m: are its lengths in metres?", stacklevel=4)

@@ -86,7 +86,7 @@ class Signal(ByValue):
     @classmethod
     def constant(cls, value) -> Signal:
         """Signal that never changes; `value` is a number or a vector `[k]`."""
-        value = validation.finite_numbers("value", value)
+        value = validation.finite_numbers("value", value, largest=np.inf)
         if value.ndim > 1:
             raise InvalidValueError("value", "be a number or a vector", f"shape {list(value.shape)}")
         return cls(np.zeros(1), value[None])
@@ -113,6 +113,7 @@ class Signal(ByValue):
         Lines that start with # are comments. Raises FileError for a missing file, a missing column or a text among
         the numbers, and InvalidValueError as the constructor does.
         """
+        validation.path("path", path)
         validation.text("time", time)
         if not isinstance(value, str) and not _is_texts(value):
             raise InvalidValueError("value", "be the name of a column or a list of names", value)
@@ -189,7 +190,7 @@ class Signal(ByValue):
     @classmethod
     def from_dict(cls, data: Any, folder: str | Path | None = None) -> Signal:
         """Signal from a number, a list of numbers (constants) or a table as in scene files (see `read_signal`)."""
-        where = Section({"signal": data}, folder=Path(folder) if folder else None)
+        where = Section({"signal": data}, folder=None if folder is None else validation.path("folder", folder))
         return read_signal(where, "signal")
 
     def __repr__(self) -> str:

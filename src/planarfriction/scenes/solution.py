@@ -8,10 +8,11 @@ import hashlib
 import io
 import json
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
+from urllib.parse import quote, unquote
 
 import numpy as np
 
@@ -24,6 +25,9 @@ from planarfriction.writing import replacing
 
 if TYPE_CHECKING:
     import xarray as xr
+
+_SAFE = "".join(chr(i) for i in range(32, 127) if chr(i) != "%")
+"""Characters of names that files keep as they are."""
 
 _META = ("scene", "statistics", "status", "message")
 
@@ -68,6 +72,15 @@ class Solution:
     """What happened, in one sentence; the remedy where the solver gave up."""
     scene: Scene
     """The scene that was simulated; None in a solution that was loaded from a file without it."""
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, Solution):
+            return NotImplemented
+        mine, others = ((each.statistics, each.status, each.message, each.scene) for each in (self, other))
+        return self is other or (mine == others and self.data.identical(other.data))
+
+    def __hash__(self) -> int:
+        return hash((self.statistics, self.status, self.message))
 
     @functools.cached_property
     def data(self) -> xr.Dataset:
@@ -124,6 +137,7 @@ def write_dataset(data: xr.Dataset, path: str | Path) -> Path:
     with replacing(path) as file:
         try:
             with _quiet():
+                data = _renamed(data, functools.partial(quote, safe=_SAFE))
                 content = bytes(data.assign_attrs({_CHECKSUM: "sha256:" + _DIGITS * "0"}).to_netcdf(engine="scipy"))
         except (TypeError, RecursionError) as error:  # of what someone added to the data
             raise FileError(f"{path}: cannot be written: {_one_line(error)}") from None
@@ -131,6 +145,12 @@ def write_dataset(data: xr.Dataset, path: str | Path) -> Path:
         for part in (before, _checksum(before, after), after):
             file.write(part)
     return Path(path)
+
+
+def _renamed(data: xr.Dataset, change: Callable[[str], str]) -> xr.Dataset:
+    """The same data under changed names: in a file, other letters than ASCII are "%CF%86", which SciPy can write."""
+    names = {name: change(name) for name in {*data.variables, *data.dims} if isinstance(name, str)}
+    return data.rename({name: new for name, new in names.items() if name != new})
 
 
 def _parted(content: bytes) -> tuple[memoryview, bytes, memoryview]:
@@ -172,6 +192,7 @@ def load(path: str | Path) -> Solution:
             data = xr.load_dataset(io.BytesIO(content), engine="scipy")
     except Exception as error:  # SciPy's reader can fail anywhere, with any exception
         raise FileError(f"{path}: not {what} ({_one_line(error)})") from None
+    data = _renamed(data, unquote)
     missing = [name for name in _META if name not in data.attrs]
     if missing:
         raise FileError(f"{path}: not {what} of planarfriction (no attribute {missing[0]!r})")

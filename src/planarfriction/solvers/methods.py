@@ -8,7 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from planarfriction.equality import by_parts
 from planarfriction.kernels.integration import Method
+
+by_parts(Method)  # kernels hold loops and nothing else
 
 
 def _lower(*rows: tuple[float, ...]) -> np.ndarray:

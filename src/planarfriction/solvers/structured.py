@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels import rosenbrock as kernels
 from planarfriction.kernels.body import System
@@ -37,8 +38,8 @@ def start_of(state: np.ndarray) -> Progress:
     return Progress(np.array(state, dtype=float), np.zeros(2, np.int64), clock, np.zeros(4, np.int64))
 
 
-@dataclass(frozen=True)
-class Integration:
+@dataclass(frozen=True, eq=False)
+class Integration(ByValue):
     """Outcome of `integrate`; the arrays hold the requested times that were reached."""
 
     output: Output

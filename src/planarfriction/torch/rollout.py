@@ -8,6 +8,7 @@ import torch
 from torch import Tensor
 
 from planarfriction import validation
+from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
 from planarfriction.torch import adjoint
@@ -17,6 +18,7 @@ METHODS = ("adjoint", "eager")
 """Compiled roll-out with its discrete adjoint; every step an operation of PyTorch, recorded by autograd."""
 
 
+@by_parts
 class Rollout(NamedTuple):
     """A model stepped through T twists and loads."""
 
