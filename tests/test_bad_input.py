@@ -343,7 +343,7 @@ def test_what_was_unchecked(call, message):
         (lambda: pf.SoftFinger(c=0.01, n=1e9, k=2.0), "n must be at most 1"),
         (lambda: ELLIPSOID.wrench((1e300, 0, 0)), "twist must be at most"),
         (lambda: pf.LuGre().rate(1e300, 1.0), "state must be at most"),
-        (lambda: SQUARE.pressure_values(1.7e308), "normal_force must be >= 0 and at most"),
+        (lambda: SQUARE.pressure_values(1.7e308), "normal_force must be at most"),
     ],
 )
 def test_limits_are_stated_before_memory_is_asked_for(call, message):

@@ -79,7 +79,8 @@ class Family(Mapping[str, Any]):
         """
         called = f"name of a {self.what}"
         if not (isinstance(name, str) and re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", name)):
-            raise InvalidValueError(called, "be of lower-case letters, digits and hyphens", name)
+            given = repr(name[:80]) if isinstance(name, str) else name
+            raise InvalidValueError(called, "be of lower-case letters, digits and hyphens", given)
         if name in self and isinstance(self._members[name].make, str):
             raise InvalidValueError(called, "not be that of a member of the library", name)
         if not callable(make):

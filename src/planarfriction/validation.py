@@ -217,7 +217,8 @@ def non_negative_numbers(name: str, value: Any) -> np.ndarray:
     result = numbers(name, value)
     _check_size(name, result)
     if not ((result >= 0.0) & (result <= LARGEST)).all():
-        rule = f"be >= 0 and at most {LARGEST:g}" if np.isfinite(result).all() else "be finite and >= 0"
+        large = ((result >= 0.0) & (result < np.inf)).all()
+        rule = f"be at most {LARGEST:g}" if large else "be finite and >= 0"
         raise InvalidValueError(name, rule, value)
     return result
 

@@ -37,8 +37,6 @@ def _run(arguments: list[str]) -> int:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # names of files need not be text that a terminal can show
-    # One line for a warning too, without the place in the code that it comes from.
-    warnings.showwarning = lambda message, *_: print("warning:", " ".join(str(message).split()), file=sys.stderr)
     try:
         with warnings.catch_warnings():
             warnings.showwarning = _warn
@@ -55,6 +53,7 @@ def _run(arguments: list[str]) -> int:
 
 
 def _warn(message: Warning | str, *where: Any) -> None:
+    """One line for a warning too, without the place in the code that it comes from."""
     print("warning:", " ".join(str(message).split()), file=sys.stderr)
 
 
