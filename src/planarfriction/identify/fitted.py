@@ -12,7 +12,7 @@ from planarfriction.identify import parameters as known
 from planarfriction.identify.least_squares import Minimum, correlations, covariance
 from planarfriction.identify.parameters import Coordinates
 from planarfriction.identify.problem import Problem, mean_load
-from planarfriction.identify.result import Identification
+from planarfriction.identify.result import Identification, verdicts_on_turns
 from planarfriction.identify.verdicts import Evidence, judge
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.models import ReducedModelPublished
@@ -46,10 +46,12 @@ def assemble(problem: Problem, coordinates: Coordinates, minimum: Minimum, noise
         spins=np.concatenate([each[1] for each in sliding]),
         loads=np.array([mean_load(log) for log in problem.logs]),
         without_slip=0.5 * float((problem.off(still, noise) ** 2).sum() - (off**2).sum()),
+        torque=any(log.channels[2] for log in problem.logs),
         largest_coefficient=max(float(np.nanquantile(each["coefficient"], 0.99)) for each in histories),
     )
     residuals = [
-        ((h["measured"] - h["predicted"]) / noise)[used] for h, used in zip(histories, problem.used, strict=True)
+        ((h["measured"] - h["predicted"]) / noise)[used][:, log.channels]
+        for h, log, used in zip(histories, problem.logs, problem.used, strict=True)
     ]
     law = _law(problem, values)
     return Identification(
@@ -57,7 +59,7 @@ def assemble(problem: Problem, coordinates: Coordinates, minimum: Minimum, noise
         values=values,
         standard_errors=errors,
         correlations=evidence.correlations,
-        verdicts=judge(evidence, residuals),
+        verdicts=(*judge(evidence, residuals), *verdicts_on_turns(problem.logs)),
         noise=noise,
         channels=CHANNELS,
         histories=tuple(histories),
@@ -83,7 +85,12 @@ def _history(problem: Problem, i: int, values: np.ndarray, speed: np.ndarray) ->
     force = np.linalg.norm(log.wrench / [1.0, 1.0, radius], axis=1)
     coefficient = force / np.where(log.normal_force > 0.0, log.normal_force, np.nan)
     predicted = problem.predictions[i].wrenches(vector)
-    history = {"name": log.name, "time": log.time, "measured": log.wrench, "predicted": predicted}
+    history = {
+        "name": log.name,
+        "time": log.time,
+        "measured": np.where(log.channels, log.wrench, np.nan),
+        "predicted": predicted,
+    }
     return {**history, "speed": speed, "coefficient": coefficient}
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.equality import ByValue
 from planarfriction.errors import FileError, InvalidValueError
+from planarfriction.identify.angles import unwrapped
 from planarfriction.reading import Table
 
 TWIST = ("vx", "vy", "omega")
@@ -45,6 +46,8 @@ class Log(ByValue):
     """Normal force [N], `[T]`, or one number for all samples."""
     name: str = "log"
     """Name for messages and plots."""
+    turns: int = 0
+    """Jumps by a whole turn that were taken out of the measured angle."""
 
     def __post_init__(self) -> None:
         time = validation.array("time", self.time, (None,))
@@ -68,6 +71,11 @@ class Log(ByValue):
             object.__setattr__(self, name, value)
 
     @property
+    def channels(self) -> np.ndarray:
+        """Which of fx, fy, tau were measured, `[3]` of bool: no torque where tau is 0 throughout."""
+        return np.array([True, True, bool(self.wrench[:, 2].any())])
+
+    @property
     def interval(self) -> float:
         """Median time between two samples [s]."""
         return float(np.median(np.diff(self.time)))
@@ -83,9 +91,12 @@ class Log(ByValue):
         """Log whose motion was measured, not its twist: `motion` is x, y, theta `[T, 3]` of the contact frame [m, rad].
 
         The pose is that of the contact frame in the world, the wrench in the contact frame's axes; the twist is
-        `differentiated` and turned into them.
+        `differentiated` and turned into them. Jumps of theta by a turn, as of a tracker that keeps it within one, are
+        taken out first and counted in `turns`; other jumps are refused.
         """
-        return cls(time, differentiated(time, motion, window=window), wrench, normal_force, name)
+        time, motion = _checked_motion(time, motion)
+        motion[:, 2], turns = unwrapped(time, motion[:, 2], f"theta of {name}")
+        return cls(time, differentiated(time, motion, window=window), wrench, normal_force, name, turns)
 
     @classmethod
     def from_csv(cls, path: str | Path, *, normal_force: float | None = None, window: int = 7) -> Log:
@@ -129,10 +140,13 @@ def as_logs(log: Log | Sequence[Log]) -> tuple[Log, ...]:
 def differentiated(time, motion, *, window: int = 7) -> np.ndarray:
     """Twist `[T, 3]` in the moving frame's axes from its pose x, y, theta `[T, 3]` [m, m, rad] at `time` `[T]` [s].
 
-    Slope of a parabola through `window` neighbouring samples (fewer at the ends); theta must be unwrapped.
+    Slope of a parabola through `window` neighbouring samples (fewer at the ends); jumps of theta by whole turns are
+    taken out first.
+
+    Raises InvalidValueError for times that do not increase and for other jumps of theta.
     """
-    time = validation.array("time", time, (None,))
-    motion = validation.array("motion", motion, (len(time), 3))
+    time, motion = _checked_motion(time, motion)
+    motion[:, 2], _ = unwrapped(time, motion[:, 2])
     window = validation.count("window", window, at_least=3)
     if len(time) < window:
         raise InvalidValueError("motion", f"hold at least window={window} samples", f"{len(time)}")
@@ -147,6 +161,15 @@ def differentiated(time, motion, *, window: int = 7) -> np.ndarray:
     return np.stack(
         [cos * slopes[:, 0] + sin * slopes[:, 1], cos * slopes[:, 1] - sin * slopes[:, 0], slopes[:, 2]], -1
     )
+
+
+def _checked_motion(time, motion) -> tuple[np.ndarray, np.ndarray]:
+    """Times `[T]` that increase, and a copy of the poses `[T, 3]`."""
+    time = validation.array("time", time, (None,))
+    if not (np.diff(time) > 0.0).all():
+        row = int(np.argmax(np.diff(time) <= 0.0)) + 1
+        raise InvalidValueError("time", "increase", f"{time[row]:g} after {time[row - 1]:g} s")
+    return time, validation.array("motion", motion, (len(time), 3))
 
 
 def columns_of(log: Log) -> Mapping[str, np.ndarray]:

@@ -12,7 +12,7 @@ from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify.least_squares import correlations, covariance, minimise
 from planarfriction.identify.parameters import Coordinates, check_names
-from planarfriction.identify.result import Identification, Verdict
+from planarfriction.identify.result import Identification, Verdict, verdicts_on_turns
 from planarfriction.identify.slides import (
     Slide,
     SlidingBody,
@@ -268,4 +268,4 @@ class _Fit:
                 )
         if len(self.slides) < 10:
             verdicts.append(Verdict("fit", False, f"errors from {len(self.slides)} slides only"))
-        return tuple(verdicts)
+        return (*verdicts, *verdicts_on_turns(self.slides))

@@ -46,6 +46,7 @@ class Problem:
         if finger:
             _check_finger(patch, finger)
         loads = [mean_load(log) for log in logs]
+        _check_wrenches(logs)
         if patch.depends_on_load:
             _check_constant(logs, loads)
         self.reference = float(np.median(loads))
@@ -113,8 +114,9 @@ class Problem:
             per_value = shape.slopes(values)
             rows = np.flatnonzero(per_value.any(axis=1))
             wrench, slope = prediction.sensitivities(shape.vector(values), [PARAMETERS[row] for row in rows])
-            offs.append(((wrench - prediction.log.wrench) / noise)[used].ravel())
-            slopes.append(((slope @ per_value[rows]) / noise[:, None])[used].reshape(-1, len(self.names)))
+            seen = prediction.log.channels / noise
+            offs.append(((wrench - prediction.log.wrench) * seen)[used].ravel())
+            slopes.append(((slope @ per_value[rows]) * seen[:, None])[used].reshape(-1, len(self.names)))
         return np.concatenate(offs), np.concatenate(slopes)
 
     def off(self, values: np.ndarray, noise: np.ndarray) -> np.ndarray:
@@ -124,13 +126,18 @@ class Problem:
     def _scaled(self, wrenches: Sequence[np.ndarray], noise: np.ndarray) -> np.ndarray:
         """Wrenches minus the measured ones over the noise, all used samples flat."""
         both = zip(wrenches, self.logs, self.used, strict=True)
-        return np.concatenate([((wrench - log.wrench) / noise)[used].ravel() for wrench, log, used in both])
+        return np.concatenate(
+            [((wrench - log.wrench) * (log.channels / noise))[used].ravel() for wrench, log, used in both]
+        )
 
     def noise(self, values: np.ndarray) -> np.ndarray:
         """Spread of the residuals of each channel `[3]`, with the degrees of freedom that the parameters took."""
         off = self.off(values, np.ones(3)).reshape(-1, 3)
-        free = max(off.size - len(self.names), 1)
-        return np.maximum(np.sqrt(np.mean(off**2, axis=0) * off.size / free), _least_noise(self.logs))
+        both = zip(self.logs, self.used, strict=True)
+        samples = np.sum([len(log.time[used]) * log.channels for log, used in both], axis=0)
+        free = max(samples.sum() - len(self.names), 1)
+        spread = np.sqrt((off**2).sum(axis=0) / np.maximum(samples, 1) * samples.sum() / free)
+        return np.where(samples > 0, np.maximum(spread, _least_noise(self.logs)), np.inf)
 
     def sliding(self, values: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """Sliding speed `|V_S|` and its part from spin [m/s], `[T]` each, of each log."""
@@ -176,6 +183,12 @@ def mean_load(log: Log) -> float:
     return float(loaded.mean())
 
 
+def _check_wrenches(logs: Sequence[Log]) -> None:
+    for log in logs:
+        if not log.wrench.any():
+            raise InvalidValueError(f"wrench of {log.name}", "not be 0 throughout", "0 in every sample")
+
+
 def _check_constant(logs: Sequence[Log], loads: Sequence[float]) -> None:
     for log, load in zip(logs, loads, strict=True):
         if np.abs(log.normal_force / load - 1.0).max() > CONSTANT:
@@ -200,7 +213,8 @@ def _least_noise(logs: Sequence[Log]) -> np.ndarray:
 
 def first_noise(logs: Sequence[Log]) -> np.ndarray:
     """Noise `[3]` from the jitter of the wrenches: the median second difference, which slow changes do not touch."""
+    measured = np.any([log.channels for log in logs], axis=0)
     jitter = np.concatenate([np.abs(np.diff(log.wrench, 2, axis=0)) for log in logs])
     largest = np.max([np.abs(log.wrench).max(axis=0) for log in logs], axis=0)
     spread = np.maximum(1.4826 * np.median(jitter, axis=0) / np.sqrt(6.0), 1e-3 * largest)
-    return np.maximum(spread, _least_noise(logs))
+    return np.where(measured, np.maximum(spread, _least_noise(logs)), np.inf)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -32,6 +32,15 @@ class Verdict:
         return f"{self.parameter}: {'' if self.identifiable else 'not identifiable, '}{self.reason}"
 
 
+def verdicts_on_turns(measured: Sequence[Any]) -> list[Verdict]:
+    """What was done to the angles of logs or slides."""
+    turned = {each.name: each.turns for each in measured if each.turns}
+    if not turned:
+        return []
+    count = f"{sum(turned.values())} jumps of theta by a whole turn were taken out"
+    return [Verdict("fit", True, f"{count}, in {', '.join(list(turned)[:3])}{' ...' if len(turned) > 3 else ''}")]
+
+
 @dataclass(frozen=True, eq=False)
 class Identification(ByValue):
     """Parameters that were estimated, in the order asked for; F of them."""
@@ -51,8 +60,8 @@ class Identification(ByValue):
     channels: tuple[tuple[str, str], ...]
     """Name and unit of the measured channels, such as ("fx", "N"), `[C]`."""
     histories: tuple[Mapping[str, Any], ...] = field(repr=False)
-    """Of each log or slide: "name", "time" `[T]`, "measured" and "predicted" `[T, C]`, and for logs with wrenches
-    "speed" `[T]` [m/s], the sliding speed `|V_S|`, and "coefficient" `[T]` [-], measured friction over load."""
+    """Of each log or slide: "name", "time" `[T]`, "measured" (NaN for what was not) and "predicted" `[T, C]`, and for
+    logs with wrenches "speed" `[T]` [m/s], the sliding speed `|V_S|`, and "coefficient" `[T]` [-], friction by load."""
     law: LuGre
     """The fitted law; parameters that were not asked for are as given."""
     model: Any = field(repr=False)
@@ -62,7 +71,7 @@ class Identification(ByValue):
 
     @property
     def residuals(self) -> list[np.ndarray]:
-        """Measured minus predicted over the noise, `[T, C]` for each log or slide."""
+        """Measured minus predicted over the noise, `[T, C]` for each log or slide; NaN where nothing was measured."""
         return [(each["measured"] - each["predicted"]) / self.noise for each in self.histories]
 
     @property

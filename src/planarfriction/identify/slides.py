@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
+from planarfriction.identify.angles import unwrapped
 from planarfriction.scenes import simulate
 from planarfriction.scenes.ready import free_slide
 
@@ -26,17 +27,19 @@ class Slide(ByValue):
     """One measured slide of a body on a level table, T samples.
 
     Raises InvalidValueError for fewer than five samples, wrong shapes, numbers that are not finite and times that do
-    not increase.
+    not increase, and for an angle that jumps otherwise than by whole turns.
     """
 
     time: np.ndarray
     """Sample times [s], `[T]`."""
     pose: np.ndarray
-    """x, y of the centre of mass and the unwrapped angle, world axes [m, m, rad], `[T, 3]`."""
+    """x, y of the centre of mass and the angle, world axes [m, m, rad], `[T, 3]`; its jumps by a turn are taken out."""
     twist: np.ndarray | None = None
     """Measured initial velocity, world axes [m/s, m/s, rad/s], `[3]`; None takes it from the first poses."""
     name: str = "slide"
     """Name for messages and plots."""
+    turns: int = field(default=0, init=False)
+    """Jumps by a whole turn that were taken out of the angle."""
 
     def __post_init__(self) -> None:
         time = validation.array("time", self.time, (None,))
@@ -45,10 +48,12 @@ class Slide(ByValue):
         if not (np.diff(time) > 0.0).all():
             raise InvalidValueError(f"time of {self.name}", "increase", "a time that does not")
         pose = validation.array("pose", self.pose, (len(time), 3))
+        pose[:, 2], turns = unwrapped(time, pose[:, 2], f"theta of {self.name}")
         twist = parabola(time, pose) if self.twist is None else validation.vector("twist", self.twist, 3)
         for name, value in {"time": time - time[0], "pose": pose, "twist": twist}.items():
             value.setflags(write=False)
             object.__setattr__(self, name, value)
+        object.__setattr__(self, "turns", turns)
 
     def first(self, samples: int) -> Slide:
         """The slide's first samples, at least five."""

@@ -19,6 +19,9 @@ TOGETHER = 0.98
 UNSEEN = 1.0
 """A parameter whose whole size moves no sample by this many spreads of the noise is not seen."""
 
+OF_TORQUE = ("contact_radius", "centre_x", "centre_y", *SOFT_FINGER)
+"""What the force tells only where the contact spins while it slides."""
+
 GAP = 3.0
 """Sliding speeds with this ratio and no sample between leave a gap."""
 
@@ -61,6 +64,8 @@ class Evidence:
     """Their part from spin, `r |omega|` [m/s]."""
     loads: np.ndarray
     """Normal force of each log [N]."""
+    torque: bool
+    """Whether any log has measured torques."""
     without_slip: float
     """How much the cost grows if the contact may not slip at all."""
     largest_coefficient: float
@@ -76,6 +81,9 @@ def judge(evidence: Evidence, residuals: Sequence[np.ndarray]) -> tuple[Verdict,
     verdicts = [verdict for i in range(len(evidence.names)) if (verdict := _parameter(evidence, i)) is not None]
     neighbours = _neighbour_correlation(residuals)
     size = np.sqrt(np.mean(np.concatenate([each.ravel() for each in residuals]) ** 2))
+    if not evidence.torque:
+        text = "tau is 0 throughout, as of a rig without a torque sensor: the estimates follow from the force alone"
+        verdicts.append(Verdict("fit", True, text))
     if neighbours > CORRELATED and size > SMALL:
         factor = np.sqrt((1.0 + neighbours) / (1.0 - min(neighbours, 0.999)))
         text = f"neighbouring residuals are correlated ({neighbours:.2f}), so the model or the measurement is off in a "
@@ -106,6 +114,9 @@ def _parameter(evidence: Evidence, i: int) -> Verdict | None:
         return Verdict(name, True, f"not told from 0, at most {value + 1.96 * error:.3g} {kind.unit}")
     if (partner := _partner(evidence, i)) is not None:
         other, correlation = partner
+        if not evidence.torque and not {name, other}.isdisjoint(OF_TORQUE):
+            text = f"told only together with {other} (correlation {correlation:.2f}): the torque would tell them apart"
+            return Verdict(name, False, f"{text}, and tau is 0 throughout")
         return Verdict(name, True, f"hangs together with {other} (correlation {correlation:.2f})")
     return None
 
@@ -120,6 +131,8 @@ def _why(evidence: Evidence, i: int, seen: float) -> str:
         return "no spin"
     if name in SOFT_FINGER and name != "c" and evidence.loads.max() < ONE_LOAD * evidence.loads.min():
         return "one load only"
+    if name in OF_TORQUE and not evidence.torque:
+        return "only the torque tells it, and tau is 0 throughout"
     if seen < UNSEEN:
         return f"moves no sample by more than {seen:.2g} times the noise"
     if (partner := _partner(evidence, i)) is not None:

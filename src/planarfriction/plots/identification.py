@@ -61,7 +61,7 @@ def _places(result: Identification) -> list[np.ndarray]:
 
 def _draw_channel(left: Any, right: Any, result: Identification, i: int, places: list[np.ndarray]) -> None:
     name, unit = result.channels[i]
-    shown = style.unit_for(KINDS[unit], *(each["measured"][:, i] for each in result.histories))
+    shown = style.unit_for(KINDS[unit], *(np.nan_to_num(each["measured"][:, i]) for each in result.histories))
     for number, (each, time) in enumerate(zip(result.histories, places, strict=True)):
         label = number == 0
         left.plot(
