@@ -89,6 +89,7 @@ class LimitSurface(ByValue):
 
     def at(self, normal_force: float) -> LimitSurface:
         """The same kind of surface for the shape at another load; itself where the shape does not depend on it."""
+        normal_force = validation.positive_load("normal_force", normal_force)
         if not self.patch.depends_on_load:
             return self
         return dataclasses.replace(self, normal_force=normal_force)

@@ -81,6 +81,8 @@ class LimitSurfaceQuartic(LimitSurface):
                 raise InvalidValueError(name, "not be zero in any row", rows.tolist())
         if not isinstance(patch, ContactPatch):
             raise InvalidValueError("patch", "be a ContactPatch", patch)
+        if normal_force is not None:
+            normal_force = validation.positive_load("normal_force", normal_force)
         frame = scaling(patch.centre_of_pressure(normal_force), float(patch.contact_radius(normal_force)))
         points = -np.linalg.solve(frame.T, wrench.T).T
         weight = validation.non_negative("velocity_weight", velocity_weight)

@@ -109,6 +109,8 @@ def surface_error(patch: ContactPatch, few: ContactPatch, normal_force=None) -> 
     for name, each in (("patch", patch), ("few", few)):
         if not isinstance(each, Anisotropy):
             raise InvalidValueError(name, "be a ContactPatch", each)
+    if normal_force is not None:
+        normal_force = validation.positive_load("normal_force", normal_force)
     weights = patch.weights(normal_force)
     scaled = rows.scaled_positions(patch.positions, weights)
     whole = rows.dissipation(scaled, weights, rows.directions(CHECKED))
