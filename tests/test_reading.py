@@ -176,3 +176,33 @@ def test_duplicate_names_in_signals_and_logs_are_refused(tmp_path):
     (tmp_path / "load.csv").write_text("time,value,value\n0,1,2\n")
     with pytest.raises(FileError, match=r"two columns 'value'"):
         Signal.from_csv(tmp_path / "load.csv")
+
+
+# ---------------------------------------------------------------------- names
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_what_is_no_path_is_refused(name):
+    for path in (5, None, b"scene.toml", ["scene.toml"], np.zeros(2)):
+        assert "path must be a path" in one_line(READERS[name], path)
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_names_that_cannot_be_printed_are_escaped_and_long_ones_cut(tmp_path, name):
+    kind = name[name.index(".") :]
+    for odd, shown in (("a\nb", r"a\nb"), ("\udcff", r"\udcff"), ("\x1b[31m", r"\x1b[31m")):
+        assert shown in one_line(READERS[name], tmp_path / f"{odd}{kind}")
+    assert len(one_line(READERS[name], tmp_path / (5000 * "x") / name)) == 300
+
+
+def test_damaged_arrays_get_one_line(tmp_path):
+    """NumPy reads the header of an array as source code, and says so in warnings and errors of the parser."""
+    np.save(tmp_path / "map.npy", np.ones((3, 3)))
+    good, random = (tmp_path / "map.npy").read_bytes(), np.random.default_rng(5)
+    for _ in range(300):
+        place = int(random.integers(128))
+        (tmp_path / "map.npy").write_bytes(good[:place] + random.bytes(2) + good[place + 2 :])
+        try:
+            assert read_pressure_map(tmp_path / "map.npy").shape
+        except FrictionError as error:
+            assert str(error).isprintable() and len(str(error)) <= 300

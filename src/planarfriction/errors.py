@@ -9,6 +9,9 @@ from typing import Any
 WIDTH = 80
 """Characters of a bad value that a message shows."""
 
+LONGEST = 300
+"""Characters of a message about a file."""
+
 _BRIEF = reprlib.Repr()
 _BRIEF.maxlist = _BRIEF.maxtuple = _BRIEF.maxset = _BRIEF.maxfrozenset = _BRIEF.maxdict = _BRIEF.maxarray = 12
 _BRIEF.maxstring = _BRIEF.maxlong = _BRIEF.maxother = 2 * WIDTH
@@ -22,6 +25,13 @@ def shown(value: Any) -> str:
         text = f"{type(value).__name__} that is too long to show"
     line = " ".join(text[: 4 * WIDTH].split())
     return line if len(line) <= WIDTH else f"{line[: WIDTH - 3]}..."
+
+
+def one_line(message: str) -> str:
+    """`message` without what cannot be printed, and without its middle where it is longer than `LONGEST`."""
+    if not message.isprintable():
+        message = "".join(each if each.isprintable() else ascii(each)[1:-1] for each in message)
+    return message if len(message) <= LONGEST else f"{message[: LONGEST // 2 - 5]} ... {message[-LONGEST // 2 :]}"
 
 
 class _Travels:
@@ -74,6 +84,9 @@ class InvalidValueError(FrictionError, ValueError):
 
 class FileError(FrictionError, OSError):
     """A file is missing, of the wrong kind, or cannot be written: says which file and what to do."""
+
+    def __str__(self) -> str:
+        return one_line(super().__str__())  # names of files may hold anything
 
 
 class MissingExtraError(FrictionError, ImportError):

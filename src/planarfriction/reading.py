@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from planarfriction import validation
 from planarfriction.errors import FileError, shown
 
 MOST_TEXT = 256_000_000
@@ -27,7 +28,7 @@ def read_bytes(path: str | Path, what: str, most: int | None = None) -> bytes:
     Raises FileError in one line for a missing file, a folder, a device, a named pipe (nobody may ever write to it), and
     a file of more than `most` bytes. The pipes that a shell makes (`<(...)`, `/dev/stdin`) are read.
     """
-    path = Path(path)
+    path = validation.path("path", path)
     try:
         status = os.stat(path)
         if stat.S_ISDIR(status.st_mode):
@@ -96,10 +97,10 @@ class Table:
     def numbers(self, names: Sequence[str]) -> np.ndarray:
         """Columns `names`, finite, shape `[rows, len(names)]`; raises FileError with the line and the column."""
         for name in names:
-            if name not in self.names:
-                near = difflib.get_close_matches(name, self.names, n=1)
+            if not (isinstance(name, str) and name in self.names):
+                near = difflib.get_close_matches(name[:200], self.names, n=1) if isinstance(name, str) else []
                 hint = f"did you mean {near[0]!r}?" if near else f"valid: {shown(', '.join(self.names))}"
-                raise FileError(f"{self._path}: no column {name!r} ({hint})")
+                raise FileError(f"{self._path}: no column {shown(validation.quoted(name))} ({hint})")
         columns = [(name, self.names.index(name)) for name in names]
         values = array("d")
         for line, row in self._rows:

@@ -14,6 +14,7 @@ import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 
+from planarfriction import validation
 from planarfriction.errors import FileError, FrictionError
 
 
@@ -45,7 +46,7 @@ def check_writable(path: str | Path) -> Path:
 
     A file is really made beside it, since permissions alone do not tell; what `path` holds stays as it is.
     """
-    path = Path(path)
+    path = validation.path("path", path)
     with _reporting(path):
         target = Path(os.path.realpath(path))
         if target.is_dir():
@@ -68,7 +69,7 @@ def make_folder(path: str | Path) -> Path:
 
     Raises FileError in one line where that is not possible.
     """
-    path = Path(path)
+    path = validation.path("path", path)
     try:
         path.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=path):

@@ -9,7 +9,7 @@ import warnings
 from collections.abc import Sequence
 from typing import Any
 
-from planarfriction.errors import FrictionError
+from planarfriction.errors import FrictionError, one_line
 
 INTERRUPTED = 130
 """Exit code after Ctrl-C, as shells report it."""
@@ -58,5 +58,5 @@ def _warn(message: Warning | str, *where: Any) -> None:
 
 
 def _fail(message: str) -> int:
-    print("error:", " ".join(message.split()), file=sys.stderr)
+    print("error:", one_line(" ".join(message.split())), file=sys.stderr)
     return BAD_INPUT

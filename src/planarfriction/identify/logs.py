@@ -107,7 +107,7 @@ class Log(ByValue):
 
         Raises FileError in one line with the line and the column of what is wrong.
         """
-        path, table = Path(path), Table(path)
+        path, table = validation.path("path", path), Table(path)
         time = next((name for name in ("t", "time") if name in table.names), None)
         motion = TWIST if all(name in table.names for name in TWIST) else MOTION
         load = ("normal_force",) if normal_force is None or "normal_force" in table.names else ()

@@ -57,6 +57,7 @@ class Slide(ByValue):
 
     def first(self, samples: int) -> Slide:
         """The slide's first samples, at least five."""
+        samples = validation.count("samples", samples, at_least=5)
         return Slide(self.time[:samples], self.pose[:samples], self.twist, self.name)
 
 
@@ -141,8 +142,18 @@ def fit_start(
 
     Least squares, a few Gauss-Newton steps from the measured start; `noise` `[3]` weighs metres against radians.
     """
-    part = slide if samples is None else slide.first(validation.count("samples", samples, at_least=5))
-    return improve_start(model, body, part, start_of(slide), np.asarray(noise), 3)
+    _check(body, slide)
+    noise = validation.vector("noise", noise, 3)
+    if not (noise > 0.0).all():
+        raise InvalidValueError("noise", "be > 0", noise.tolist())
+    part = slide if samples is None else slide.first(samples)
+    return improve_start(model, body, part, start_of(slide), noise, 3)
+
+
+def _check(body: Any, slide: Any) -> None:
+    for name, value, kind in (("body", body, SlidingBody), ("slide", slide, Slide)):
+        if not isinstance(value, kind):
+            raise InvalidValueError(name, f"be a {kind.__name__}", value)
 
 
 def start_of(slide: Slide) -> np.ndarray:
@@ -164,6 +175,7 @@ def predict_slide(model: Any, body: SlidingBody, slide: Slide, *, samples: int |
 
     The start is the measured one, or with `samples` the one that `fit_start` finds in so many first poses.
     """
+    _check(body, slide)
     if samples is None:
         return slide_poses(model, body, slide.time, slide.pose[0], slide.twist)
     start = fit_start(model, body, slide, samples=samples)

@@ -10,7 +10,8 @@ from pathlib import Path
 
 import numpy as np
 
-from planarfriction.errors import FileError, FrictionError
+from planarfriction import validation
+from planarfriction.errors import FileError, FrictionError, shown
 from planarfriction.patch.size import MOST_CELLS
 from planarfriction.reading import number, read_bytes, read_rows
 
@@ -35,7 +36,7 @@ def read_pressure_map(path: str | Path) -> np.ndarray:
     FileError
         The file is missing, of an unknown kind, or does not hold what its suffix says.
     """
-    path = Path(path)
+    path = validation.path("path", path)
     readers = {".csv": _read_csv, ".npy": _read_npy, **dict.fromkeys(IMAGE_SUFFIXES, _read_image)}
     reader = readers.get(path.suffix.lower())
     if reader is None:
@@ -47,7 +48,7 @@ def read_pressure_map(path: str | Path) -> np.ndarray:
         raise
     # Pillow reports a broken PNG as SyntaxError, and other things as what they are in its own code.
     except Exception as error:
-        reason = " ".join(str(error).split()) or type(error).__name__
+        reason = shown(" ".join(str(error).split())) or type(error).__name__
         raise FileError(f"pressure map {path}: not a readable {path.suffix.lower()} file ({reason})") from None
 
 
@@ -70,7 +71,10 @@ def _read_csv(path: Path) -> np.ndarray:
 
 
 def _read_npy(path: Path) -> np.ndarray:
-    values = np.load(io.BytesIO(read_bytes(path, "a pressure map", MOST_BYTES)), allow_pickle=False)
+    content = io.BytesIO(read_bytes(path, "a pressure map", MOST_BYTES))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # of a damaged header, which NumPy reads as source code
+        values = np.load(content, allow_pickle=False)
     if not isinstance(values, np.ndarray) or values.dtype.kind not in "biuf":
         raise FileError(f"pressure map {path}: the file must hold one array of real numbers")
     _check_size(path, values.size)

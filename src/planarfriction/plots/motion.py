@@ -17,7 +17,7 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
 from matplotlib.transforms import Affine2D
 
-from planarfriction import geometry
+from planarfriction import geometry, validation
 from planarfriction.errors import FileError
 from planarfriction.plots import style
 from planarfriction.plots.patch import cell_boxes
@@ -79,7 +79,7 @@ def animate_motion(solution: Solution, path: str | Path) -> Path:
     FileError
         The file is of another kind, cannot be written, or needs ffmpeg and there is none.
     """
-    path = Path(path)
+    path = validation.path("path", path)
     writer = _writer(path)
     time, poses = np.asarray(solution.data["time"], dtype=float), _poses(solution)
     count = int(np.clip(round(FRAMES_PER_SECOND * (time[-1] - time[0])), 2, LARGEST_FRAME_COUNT))

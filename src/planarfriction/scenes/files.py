@@ -72,7 +72,9 @@ def _contact_to_dict(contact: Contact) -> dict[str, Any]:
 
 def scene_from_dict(data: dict[str, Any], *, folder: str | Path | None = None, source: str = "scene") -> Scene:
     """Scene of a table; `source` names it in errors, relative paths start from `folder`."""
-    table = Section(data, "", source, Path(folder) if folder else None).only(SCENE_KEYS)
+    table = Section(data, "", source, validation.path("folder", folder) if folder is not None else None).only(
+        SCENE_KEYS
+    )
     contacts = _contacts(table)
     prescribed = "velocity" in table
     options = {key: table.get(key) for key in ("save_every", "stop_speed", "rtol", "atol", "name") if key in table}
@@ -119,7 +121,7 @@ def _contacts(scene: Section) -> list[Contact]:
 
 def read_scene(path: str | Path) -> Scene:
     """Scene of a `.toml` or `.json` file; errors are one line with the name of the file."""
-    path = Path(path)
+    path = validation.path("path", path)
     kind = path.suffix.lower()
     if kind not in (".toml", ".json"):
         missing = "" if os.path.exists(path) else ", and there is no such file"
@@ -144,7 +146,7 @@ def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 def write_scene(scene: Scene, path: str | Path) -> None:
     """Write a scene to a `.toml` or `.json` file."""
-    path = Path(path)
+    path = validation.path("path", path)
     kind = path.suffix.lower()
     if kind not in (".toml", ".json"):
         raise InvalidValueError("path of a scene file", "end in .toml or .json", str(path))
