@@ -11,6 +11,7 @@ import jax.numpy as jnp
 
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
+from planarfriction.jax import inputs
 from planarfriction.jax import namespace as xp
 from planarfriction.laws import FrictionLaw
 from planarfriction.laws.base import refuse_creep
@@ -22,6 +23,10 @@ class FrictionModel:
     """A friction model as a pytree; everything is about the contact frame's origin, the caller holds the state.
 
     Leading axes of state, twist `[..., 3]`, normal_force `[...]` and dt broadcast. `replace` makes a changed model.
+
+    Raises `InvalidValueError` for what is no number and for wrong shapes; outside of `jit`, `vmap` and `grad` also for
+    values that are not finite or, of loads and steps, below zero. Inside, a load below zero counts as none (friction
+    never drives), and so does a `dt` below zero; NaN stays NaN.
     """
 
     arrays: ClassVar[ModuleType]
@@ -66,26 +71,37 @@ class FrictionModel:
 
     def rate(self, state, twist, normal_force) -> jax.Array:
         """Rate of the state, of its shape; it does not depend on the load."""
-        numbers = self._numbers()
-        by = self.arrays.held(xp, *numbers, jnp.asarray(twist))
-        return self.arrays.rate(xp, *numbers, jnp.asarray(state), by)
+        numbers, (state, twist, _) = self._numbers(), self._inputs(state, twist, normal_force)
+        return self.arrays.rate(xp, *numbers, state, self.arrays.held(xp, *numbers, twist))
 
     def wrench(self, state, twist, normal_force) -> jax.Array:
         """Friction wrench on the moving body, `[..., 3]` [N, N, N m]."""
-        numbers, state = self._numbers(), jnp.asarray(state)
-        by = self.arrays.held(xp, *numbers, jnp.asarray(twist))
+        numbers, (state, twist, load) = self._numbers(), self._inputs(state, twist, normal_force)
+        by = self.arrays.held(xp, *numbers, twist)
         rate = self.arrays.rate(xp, *numbers, state, by)
-        return jnp.asarray(normal_force)[..., None] * self.arrays.wrench(xp, *numbers, state, rate, by)
+        return load[..., None] * self.arrays.wrench(xp, *numbers, state, rate, by)
 
     def step(self, state, twist, normal_force, dt) -> tuple[jax.Array, jax.Array]:
         """State and wrench after `dt` [s] at a held twist, stable at any `dt`; a contact without load forgets."""
-        numbers, load = self._numbers(), jnp.asarray(normal_force)
-        by = self.arrays.held(xp, *numbers, jnp.asarray(twist))
-        new, rate = self.arrays.advance(xp, *numbers, jnp.asarray(state), by, self._inner(jnp.asarray(dt)))
+        numbers, (state, twist, load) = self._numbers(), self._inputs(state, twist, normal_force)
+        dt = inputs.non_negative("dt", inputs.real("dt", dt))
+        by = self.arrays.held(xp, *numbers, twist)
+        new, rate = self.arrays.advance(xp, *numbers, state, by, self._inner(dt))
         wrench = self.arrays.wrench(xp, *numbers, new, rate, by)
         return jnp.where(self._inner(load) > 0.0, new, 0.0), load[..., None] * wrench
 
     # ------------------------------------------------------------------ inside
+
+    def _inputs(self, state, twist, normal_force) -> tuple[jax.Array, jax.Array, jax.Array]:
+        inner = self.rest().shape
+        state = inputs.shaped("state", inputs.real("state", state), inner)
+        twist = inputs.shaped("twist", inputs.real("twist", twist), (3,))
+        load = inputs.real("normal_force", normal_force)
+        inputs.broadcasting(
+            {"state": state.shape[: -len(inner)], "twist": twist.shape[:-1], "normal_force": load.shape}
+        )
+        load = inputs.non_negative("normal_force", load)
+        return inputs.finite("state", state), inputs.finite("twist", twist), load
 
     def _shape(self) -> Any:
         """Numbers of the patch as the model's arrays know them."""

@@ -11,6 +11,7 @@ from planarfriction import validation
 from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
+from planarfriction.jax import inputs
 from planarfriction.jax.base import FrictionModel
 
 METHODS = ("adjoint", "eager")
@@ -68,12 +69,13 @@ def rollout(
     method = "eager" if method is None else validation.choice("method", method, METHODS)
     if parameters is not None:
         model = model.replace(parameters=type(model.parameters)(*parameters))
-    twist = jnp.asarray(twist)
+    twist, dt = inputs.real("twist", twist), inputs.real("dt", dt)
     if twist.ndim < 2 or twist.shape[-1] != 3:
         raise InvalidValueError("twist", "have shape [..., T, 3]", f"shape {list(twist.shape)}")
-    load = jnp.asarray(normal_force, twist.dtype)
-    start = model.rest() if state is None else jnp.asarray(state)
     inner = model.rest().shape
+    load = inputs.non_negative("normal_force", inputs.real("normal_force", normal_force)).astype(twist.dtype)
+    start = model.rest() if state is None else inputs.shaped("state", inputs.real("state", state), inner)
+    start, twist, dt = inputs.finite("state", start), inputs.finite("twist", twist), inputs.non_negative("dt", dt)
     try:
         shape = jnp.broadcast_shapes(twist.shape[:-1], load.shape, (*start.shape[: -len(inner)], 1))
         start = jnp.broadcast_to(start, (*shape[:-1], *inner))

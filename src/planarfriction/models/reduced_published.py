@@ -44,7 +44,8 @@ class PublishedShape(NamedTuple):
     """r [m]; of the published table as published; 0 of a point."""
     second_moment: float
     """<rho^2> [m^2]"""
-    surface: LimitSurface | _OfPoint
+    surface: LimitSurface
+    """At a point, what stands for it."""
     root: np.ndarray = np.eye(2)
     """Symmetric root of the friction metric, [2, 2] [-]."""
 
@@ -55,7 +56,7 @@ class PublishedShape(NamedTuple):
 
 
 _SLIDES = np.array([1.0, 1.0, 0.0])
-_SLIDER = PublishedShape(np.zeros(2), 1.0, 0.0, _OfPoint())
+_SLIDER = PublishedShape(np.zeros(2), 1.0, 0.0, _OfPoint())  # pyright: ignore[reportArgumentType]
 """What steps as a point does, at the point, as long as it does not spin."""
 
 
@@ -164,7 +165,7 @@ class ReducedModelPublished(ThreeStateModel):
     def _shape_at(self, normal_force: float) -> PublishedShape:
         if is_point(self.patch, normal_force):
             centre = self.patch.lever_coordinates(*self.patch.centre_of_pressure(normal_force))
-            return PublishedShape(np.array(centre), 0.0, 0.0, _OfPoint(), self._root)
+            return PublishedShape(np.array(centre), 0.0, 0.0, _OfPoint(), self._root)  # pyright: ignore
         surface = self.surface.at(normal_force)
         kept = self._reference if self.on_load_change == "rescale" else None
         return PublishedShape(

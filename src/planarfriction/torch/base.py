@@ -17,6 +17,7 @@ from planarfriction.laws import ElastoPlastic, FrictionLaw, LuGre
 from planarfriction.laws.base import refuse_creep
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.metric import refuse_anisotropy
+from planarfriction.torch import inputs
 from planarfriction.torch import namespace as xp
 from planarfriction.torch.parameters import LAW, PhysicalParameters
 
@@ -39,6 +40,10 @@ class FrictionModel(nn.Module):
     `twist` `[..., 3]` is `(vx, vy, omega)` of the moving body, the wrench `(fx, fy, tau)` acts on it, `normal_force`
     `[...]` is >= 0; leading batch axes broadcast. `parameters` `[..., P]`, in the order of `names`, takes the place
     of the model's own physical values, one row for each contact if wanted.
+
+    Raises `InvalidValueError` for what is no number, for wrong shapes and for values that are not finite or, of loads
+    and steps, below zero, where values can be looked at without a wait. On a device, in `torch.compile` and `vmap` a
+    load below zero counts as none (friction never drives), and so does a `dt` below zero; NaN stays NaN.
     """
 
     arrays: ModuleType
@@ -126,7 +131,8 @@ class FrictionModel(nn.Module):
         prepared = self.prepare(self._vector(parameters))
         z, v, load = self._inputs(state, twist, normal_force)
         by = self.arrays.held(xp, *prepared, v)
-        new, zdot = self.arrays.advance(xp, *prepared, z, by, self._inner(self._number(dt)))
+        dt = inputs.non_negative("dt", self._number("dt", dt))
+        new, zdot = self.arrays.advance(xp, *prepared, z, by, self._inner(dt))
         return self._kept(new, load), load[..., None] * self.arrays.wrench(xp, *prepared, new, zdot, by)
 
     @property
@@ -177,18 +183,25 @@ class FrictionModel(nn.Module):
 
     # ------------------------------------------------------------------ inputs
 
-    def _number(self, value: Tensor | float) -> Tensor:
-        values = self.physical.values
-        return value if isinstance(value, Tensor) else torch.as_tensor(value, dtype=values.dtype, device=values.device)
+    def _number(self, name: str, value: Any) -> Tensor:
+        return inputs.real(name, value, self.physical.values)
 
     def _inputs(self, state, twist, normal_force) -> tuple[Tensor, Tensor, Tensor]:
-        z, v, load = self._number(state), self._number(twist), self._number(normal_force)
-        if z.shape[z.ndim - len(self.components) :] != self.components:
+        z, v = self._number("state", state), self._number("twist", twist)
+        load = self._number("normal_force", normal_force)
+        if z.shape[max(z.ndim - len(self.components), 0) :] != self.components:
             wanted = ", ".join(map(str, self.components))
             raise InvalidValueError("state", f"have shape [..., {wanted}]", f"shape {list(z.shape)}")
         if v.shape[-1:] != (3,):
             raise InvalidValueError("twist", "have shape [..., 3]", f"shape {list(v.shape)}")
-        return z, v, load
+        batches = z.shape[: z.ndim - len(self.components)], v.shape[:-1], load.shape
+        try:
+            torch.broadcast_shapes(*batches)
+        except RuntimeError:
+            shapes = ", ".join(str(list(shape)) for shape in batches)
+            raise InvalidValueError("batch axes", "broadcast", f"shapes {shapes}") from None
+        load = inputs.non_negative("normal_force", load)
+        return inputs.finite("state", z), inputs.finite("twist", v), load
 
     def _vector(self, parameters: Tensor | None) -> Tensor:
         if parameters is None:

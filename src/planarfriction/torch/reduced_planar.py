@@ -121,7 +121,7 @@ class ReducedPlanarLuGre(ReducedModelPublished):
     def g(self, speed: Tensor | float) -> Tensor:
         """Friction coefficient in steady sliding, `g = mu_c + (mu_s - mu_c) exp(-|v/v_s|^gamma)`, any shape [-]."""
         law = self._law(self.physical())
-        speed = self._number(speed)
+        speed = self._number("speed", speed)
         return formulas.stribeck(xp, speed[..., None].abs(), law)[..., 0]
 
     def steady_state_z(self, v_scaled: Tensor) -> Tensor:
@@ -129,7 +129,7 @@ class ReducedPlanarLuGre(ReducedModelPublished):
 
         `v_scaled` `[..., 3]` [m/s] is the twist at the centre of pressure, `(vx, vy, r omega)`.
         """
-        v_scaled = self._number(v_scaled)
+        v_scaled = self._number("v_scaled", v_scaled)
         values = self.physical()
         law, speed = self._law(values), xp.norm(v_scaled, -1)
         moving = speed > 0.0
@@ -146,7 +146,7 @@ class ReducedPlanarLuGre(ReducedModelPublished):
         prepared = self.prepare(self.physical())
         z, v, load = self._inputs(z, v, f_n)
         by = self.arrays.held(xp, *prepared, v)
-        return load[..., None] * self.arrays.wrench(xp, *prepared, z, self._number(z_dot), by)
+        return load[..., None] * self.arrays.wrench(xp, *prepared, z, self._number("z_dot", z_dot), by)
 
     def step(self, z: Tensor, v: Tensor, f_n: Tensor | float, dt: Tensor | float) -> tuple[Tensor, Tensor]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Bristles after `dt` [s] of a held twist, and the wrench at the end: exact, stable at any `dt`."""

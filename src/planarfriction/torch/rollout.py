@@ -11,7 +11,7 @@ from planarfriction import validation
 from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
-from planarfriction.torch import adjoint
+from planarfriction.torch import adjoint, inputs
 from planarfriction.torch.base import FrictionModel
 
 METHODS = ("adjoint", "eager")
@@ -47,8 +47,7 @@ def rollout(
     derivatives), or `"eager"`, PyTorch operations step by step (any model and device, derivatives of any order, also
     to `dt`); None takes the adjoint where it can.
 
-    Raises `InvalidValueError` for wrong shapes and for a method that is not possible; the adjoint also for numbers that
-    are not finite and for loads below zero.
+    Raises `InvalidValueError` as a step does (see `FrictionModel`), and for a method that is not possible.
     """
     if not isinstance(model, FrictionModel):
         kind = type(model)
@@ -56,12 +55,18 @@ def rollout(
         raise InvalidValueError("model", rule, f"{kind.__module__}.{kind.__name__}")
     if method is not None:
         validation.choice("method", method, METHODS)
-    twist, load, step = model._number(twist), model._number(normal_force), model._number(dt)
+    twist, step = model._number("twist", twist), model._number("dt", dt)
+    load = model._number("normal_force", normal_force)
     if twist.ndim < 2 or twist.shape[-1] != 3 or twist.shape[-2] == 0:
         raise InvalidValueError("twist", "have shape [..., T, 3] with T > 0", f"shape {list(twist.shape)}")
     if step.ndim:
         raise InvalidValueError("dt", "be one number", f"shape {list(step.shape)}")
-    start = model.rest() if state is None else model._inputs(state, twist, load)[0]
+    start = model.rest() if state is None else model._number("state", state)
+    if start.shape[max(start.ndim - len(model.components), 0) :] != model.components:
+        wanted = ", ".join(map(str, model.components))
+        raise InvalidValueError("state", f"have shape [..., {wanted}]", f"shape {list(start.shape)}")
+    start, twist = inputs.finite("state", start), inputs.finite("twist", twist)
+    load, step = inputs.non_negative("normal_force", load), inputs.non_negative("dt", step)
     try:
         load = load.expand(torch.broadcast_shapes(load.shape, twist.shape[-2:-1]))
     except RuntimeError:
@@ -104,7 +109,10 @@ def tracking_loss(
     are constants, r that of the patch. The other arguments are those of `rollout`.
     """
     run = rollout(model, state, twist, normal_force, dt, parameters=parameters, method=method)
-    measured, load = model._number(wrenches), model._number(normal_force).detach()[..., None]
+    measured, load = (
+        model._number("wrenches", wrenches),
+        model._number("normal_force", normal_force).detach()[..., None],
+    )
     loaded = load > 0.0
     lever = load.new_tensor([1.0, 1.0, model.lever])
     error = torch.where(loaded, (run.wrenches - measured) / (torch.where(loaded, load, 1.0) * lever), 0.0)

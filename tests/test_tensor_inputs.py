@@ -1,0 +1,194 @@
+"""What steps and roll-outs of PyTorch and JAX answer to wrong input: one line, or friction that never drives."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import planarfriction as pf
+from planarfriction.errors import InvalidValueError
+
+PATCH = pf.ContactPatch.points([(0.01, 0.0), (-0.01, 0.002), (0.0, 0.012)], [1.0, 2.0, 3.0])
+LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
+TWIST, LOAD, DT = [2e-3, -1e-3, 0.3], 2.0, 1e-3
+KINDS = ("DistributedModel", "ReducedModel", "ReducedModelPublished")
+
+WRONG = {
+    "twist": [
+        ("123", "be an array of numbers"),
+        ([1.0, 2.0], r"have shape \[..., 3\]"),
+        ([1.0, 2.0, 3.0, 4.0], r"have shape \[..., 3\]"),
+        (1.0, r"have shape \[..., 3\]"),
+        ([np.nan, 0.0, 0.0], "be finite"),
+        ([np.inf, 0.0, 0.0], "be finite"),
+        ([1e60, 0.0, 0.0], "be between|be finite"),
+        (np.array([1.0, 2.0, 3.0j]), "be an array of numbers and not complex"),
+        (np.ma.masked_array([1.0, 2.0, 3.0], [0, 1, 0]), "be an array of numbers and not masked"),
+        (None, "be an array of numbers"),
+        ([10**400, 0.0, 0.0], "be"),
+    ],
+    "normal_force": [
+        (-1.0, "be >= 0, got -1"),
+        (np.nan, "be finite"),
+        ("heavy", "be an array of numbers"),
+        (None, "be an array of numbers"),
+        (1j, "be an array of numbers"),
+    ],
+    "dt": [(-1e-3, "be >= 0, got -0.001"), (np.nan, "be finite"), ("now", "be an array"), (None, "be an array")],
+    "state": [
+        ([0.0], "have shape"),
+        (0.0, "have shape"),
+        ("soft", "be an array of numbers"),
+    ],
+}
+CASES = [(name, value, rule) for name, pairs in WRONG.items() for value, rule in pairs]
+every_kind = pytest.mark.parametrize("kind", KINDS)
+every_case = pytest.mark.parametrize(("name", "value", "rule"), CASES)
+
+
+def refuses(call, name, rule):
+    """One line that names the argument."""
+    with pytest.raises(InvalidValueError, match=f"^{name} must .*({rule})") as caught:
+        call()
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 300
+
+
+class Torch:
+    """The front end of PyTorch."""
+
+    def __init__(self) -> None:
+        self.torch = pytest.importorskip("torch", reason="needs PyTorch")
+        import planarfriction.torch as front
+
+        self.front = front
+
+    def model(self, kind):
+        return getattr(self.front, kind)(PATCH, LAW, dtype=self.torch.float64)
+
+    def array(self, value):
+        return self.torch.as_tensor(value, dtype=self.torch.float64)
+
+    def plain(self, tensor):
+        return tensor.detach().numpy()
+
+    def traced(self, function, value):
+        """The function where it cannot look at the value."""
+        return self.torch.vmap(function)(self.array([value]))[0]
+
+    def slope(self, function, value):
+        return self.torch.func.grad(function)(self.array(value))
+
+
+class Jax:
+    """The front end of JAX."""
+
+    def __init__(self) -> None:
+        self.jax = pytest.importorskip("jax", reason="needs JAX")
+        self.jax.config.update("jax_enable_x64", True)
+        import planarfriction.jax as front
+
+        self.front = front
+
+    def model(self, kind):
+        return getattr(self.front, kind)(PATCH, LAW)
+
+    def array(self, value):
+        return self.jax.numpy.asarray(value, float)
+
+    def plain(self, array):
+        return np.asarray(array)
+
+    def traced(self, function, value):
+        """The function where it cannot look at the value."""
+        return self.jax.jit(function)(self.array(value))
+
+    def slope(self, function, value):
+        return self.jax.grad(function)(self.array(value))
+
+
+@pytest.fixture(scope="module", params=[Torch, Jax], ids=["torch", "jax"])
+def front(request):
+    """A front end."""
+    return request.param()
+
+
+def arguments(front, model, **changed):
+    """Of a step."""
+    usual = {"state": model.rest(), "twist": front.array(TWIST), "normal_force": front.array(LOAD), "dt": DT}
+    return {**usual, **changed}
+
+
+@every_kind
+@every_case
+def test_a_step_refuses(front, kind, name, value, rule):
+    model = front.model(kind)
+    refuses(lambda: model.step(**arguments(front, model, **{name: value})), name, rule)
+    if name != "dt":
+        given = arguments(front, model, **{name: value})
+        given.pop("dt")
+        for call in (model.rate, model.wrench):
+            refuses(lambda call=call: call(**given), name, rule)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("method", ["eager", "adjoint"])
+@every_case
+def test_a_roll_out_refuses(front, kind, method, name, value, rule):
+    if method == "adjoint" and kind == "DistributedModel":
+        pytest.skip("steps eagerly")
+    model = front.model(kind)
+    given = arguments(front, model, twist=front.array([TWIST] * 4))
+    if name == "twist":
+        if np.ndim(value) != 1 or len(value) != 3:
+            return  # the shapes of roll-outs have tests of their own
+        value = np.ma.stack([value] * 4) if isinstance(value, np.ma.MaskedArray) else [value] * 4
+    given[name] = value
+    if name == "state" and method == "adjoint":
+        rule += "|be None"
+    refuses(lambda: front.front.rollout(model, **given, method=method), name, rule)
+
+
+@every_kind
+def test_batches_that_do_not_match(front, kind):
+    model = front.model(kind)
+    given = arguments(front, model, twist=front.array(np.zeros((4, 3))), normal_force=front.array(np.ones(5)))
+    with pytest.raises(InvalidValueError, match="batch axes must broadcast"):
+        model.step(**given)
+
+
+@every_kind
+def test_lists_and_whole_numbers_are_numbers(front, kind):
+    model = front.model(kind)
+    given = arguments(front, model)
+    state, wrench = model.step(**given)
+    again, same = model.step(given["state"], TWIST, 2, np.float64(DT))
+    np.testing.assert_allclose(front.plain(again), front.plain(state))
+    np.testing.assert_allclose(front.plain(same), front.plain(wrench))
+
+
+@every_kind
+def test_where_values_are_unseen_friction_never_drives(front, kind):
+    """In `vmap` and `jit` a load or a step below zero counts as zero."""
+    model = front.model(kind)
+    given = arguments(front, model)
+
+    def wrench(load):
+        return model.step(given["state"], given["twist"], load, given["dt"])[1]
+
+    assert not front.plain(front.traced(wrench, -1.0)).any()
+    np.testing.assert_allclose(front.plain(front.traced(wrench, LOAD)), front.plain(wrench(LOAD)), rtol=1e-12)
+
+    def moved(dt):
+        return model.step(given["state"], given["twist"], given["normal_force"], dt)[0]
+
+    assert not front.plain(front.traced(moved, -1e-3)).any()
+
+    def last(load):
+        sequence = front.array([TWIST] * 4)
+        return front.front.rollout(model, given["state"], sequence, load, DT, method="eager").wrenches
+
+    assert not front.plain(front.traced(last, -1.0)).any()
+    # at zero the slope is that of the smallest load
+    at_zero = front.slope(lambda load: wrench(load)[0], 0.0)
+    np.testing.assert_allclose(front.plain(at_zero), front.plain(wrench(LOAD))[0] / LOAD, rtol=1e-12)
