@@ -57,8 +57,40 @@ def figures() -> dict[str, plots.style.PlotFigure]:
         "in-hand-motion": plots.plot_motion(in_hand["distributed"]),
         "in-hand-histories": plots.plot_histories(in_hand),
         "limit-surface": plots.plot_limit_surface(pf.LimitSurfaceCells(pads)),
+        "pre-sliding-cycles": pre_sliding_cycles(),
         "pressure-map": plots.plot_patch(fingertip(), normal_force=5.0),
     }
+
+
+def small_cycles(model: pf.ReducedModel | pf.ReducedModelPublished, cycles: int = 20) -> tuple[np.ndarray, np.ndarray]:
+    """Force `fx` [N] before each cycle and energy that friction has taken by then [J].
+
+    A cycle is a push by 0.1 um, a turn by as much at the contact radius, and the straight way back, at 1 N.
+    """
+    leg, steps, dt = 1e-7, 50, 1e-3
+    push, turn = np.array([leg, 0.0, 0.0]), np.array([0.0, 0.0, leg / model.patch.contact_radius()])
+    twists = np.tile(np.repeat(np.array([push, turn, -(push + turn)]) / (steps * dt), steps, axis=0), (cycles, 1))
+    wrenches = np.concatenate([np.zeros((1, 3)), pf.autodiff.rollout(model, None, twists, 1.0, dt).wrenches])
+    work = -0.5 * np.einsum("ti,ti->t", wrenches[1:] + wrenches[:-1], twists) * dt
+    taken = np.concatenate([[0.0], work.cumsum()])
+    return wrenches[:: 3 * steps, 0], taken[:: 3 * steps]
+
+
+def pre_sliding_cycles() -> plots.style.PlotFigure:
+    """Small closed motions: the published reduced model ratchets and gives energy, that of moments does not."""
+    law = pf.LuGre(mu_s=1.2, elasto_plastic=0.9, sigma_1=0.0, sigma_2=0.0)
+    figure = plots.style.new_figure(8.0, 3.2)
+    force, energy = figure.subplots(1, 2)
+    for name, kind in (("published", pf.ReducedModelPublished), ("moments", pf.ReducedModel)):
+        fx, taken = small_cycles(kind(PUBLISHED_PATCHES["Circle"](), law))
+        force.plot(fx, ".-", label=name)
+        energy.plot(1e9 * taken, ".-", label=name)
+    force.set(xlabel="cycles", ylabel="force left over, fx [N]")
+    energy.set(xlabel="cycles", ylabel="energy that friction took [nJ]")
+    for axes in (force, energy):
+        plots.style.tidy(axes)
+        axes.legend()
+    return figure
 
 
 def main(folder: Path) -> None:
