@@ -57,15 +57,13 @@ def test_slow_twists_give_numbers(model, speed):
 
 
 @every_model
-@pytest.mark.parametrize("large", [1e10, 1e20, LARGEST])
+@pytest.mark.parametrize("large", [1e10, 1e20])
 def test_large_numbers_give_numbers(model, large):
-    """One or two at a time up to the largest, all together (slipping by 1e40 m in a step) up to 1e20."""
+    """All together, which slip by 1e40 m in a step."""
     for state in (*states(model), large * states(model)[-1]):
         batch = np.broadcast_to(state, (len(DIRECTIONS), *state.shape)).copy()
         for speed in (1e-3, large):
             for load, dt in ((1.0, 1e-3), (large, 1e-3), (1.0, large), (large, large)):
-                if large > 1e20 and dt * speed > large:
-                    continue
                 assert all(np.isfinite(part).all() for part in results(model, batch, DIRECTIONS * speed, load, dt))
 
 

@@ -26,7 +26,10 @@ def real(name: str, value: Any) -> jax.Array:
             value = jnp.stack([real(name, each) for each in value])
         else:
             checked = validation.numbers(name, value)
-            value = value if isinstance(value, np.ndarray) and value.dtype.kind == "f" else jnp.asarray(checked, float)
+            if isinstance(value, (int, float)) and not isinstance(value, np.generic):
+                value = float(checked)  # a plain number takes the precision of what it meets
+            elif not (isinstance(value, (np.ndarray, np.generic)) and value.dtype.kind == "f"):
+                value = jnp.asarray(checked, float)
     array = jnp.asarray(value)
     if jnp.issubdtype(array.dtype, jnp.floating):
         return array
