@@ -228,3 +228,23 @@ def test_published_and_converged_agree_to_the_stated_deviation():
         assert difference <= 1.02 * curve.deviation + 2.0 * curve.reading + 1e-7 * np.ptp(curve.values), name
         checked += 1
     assert checked > 60
+
+
+def test_a_full_disk_ends_in_one_line_and_keeps_what_was_there(tmp_path, monkeypatch):
+    """The pieces of an experiment and its results are written as everything is: whole, or not at all."""
+    from planarfriction import writing
+    from planarfriction.errors import FileError
+    from planarfriction.experiments.experiment import Work
+
+    kept = Work(folder=tmp_path, fingerprint="one").piece("a piece", lambda: {"x": np.arange(3.0)})
+
+    def full(number):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(writing.os, "fsync", full)
+    with pytest.raises(FileError, match=r"cannot be written: No space left on device") as caught:
+        Work(folder=tmp_path, fingerprint="two").piece("a piece", lambda: {"x": np.zeros(3)})
+    assert "\n" not in str(caught.value)
+    assert len(list(tmp_path.iterdir())) == 1
+    again = Work(folder=tmp_path, fingerprint="one").piece("a piece", dict)
+    assert np.array_equal(again["x"], kept["x"])
