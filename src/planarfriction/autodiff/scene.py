@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,10 +11,11 @@ from planarfriction import validation
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError, SolverError
 from planarfriction.kernels import rosenbrock, tangent
-from planarfriction.kernels.integration import Output, run_of
+from planarfriction.kernels.body import System
+from planarfriction.kernels.integration import Output, Run, run_of
 from planarfriction.kernels.tangent import Path
 from planarfriction.patch.metric import refuse_anisotropy
-from planarfriction.scenes.packing import PackedScene, pack
+from planarfriction.scenes.packing import Windows
 from planarfriction.scenes.scene import Scene
 from planarfriction.scenes.simulation import recording_times
 from planarfriction.solvers import RODAS4
@@ -37,6 +38,9 @@ SCENE_PARAMETERS = {
 
 _ACCURACY = 1e-7
 """Accuracy of each step of the derivatives, relative and in natural scales."""
+
+_NUMBERS = 4e6
+"""Numbers of the states at which a part of the steps begins, and as many at which it ends: 64 MB together."""
 
 _CLOCK = 1e-12
 """Share of a step by which adding times up may be off."""
@@ -97,75 +101,121 @@ def scene_sensitivities(
     every = scene.save_every if save_every is None else validation.positive("save_every", save_every)
     for contact in scene.contacts:
         refuse_anisotropy(contact.model.patch, "scene_sensitivities")
-    packed = pack(scene, end, sensitivities=True)
-    times = recording_times(end, every, packed.system.motion.breaks)
-    absolute = (
-        validation.positive("rtol", rtol) if atol is None else validation.positive("atol", atol)
-    ) * packed.natural
-    path, until = _run(packed, times, rtol, absolute, chosen)
-    return _carry(packed, path, until, tuple(names))
+    rtol = validation.positive("rtol", rtol)
+    absolute = rtol if atol is None else validation.positive("atol", atol)
+    times = recording_times(end, every)
+    windows = Windows(scene, end, times=times, sensitivities=True)
+    derivatives = _Derivatives(windows, len(times), chosen)
+    for part in _parts(windows, times, rtol, absolute * windows.natural, chosen):
+        derivatives.carry(*part)
+    return SceneSensitivities(tuple(names), *derivatives.recorded())
 
 
-def _run(
-    packed: PackedScene, times: np.ndarray, rtol: float, atol: np.ndarray, parameters: np.ndarray
-) -> tuple[Path, np.ndarray]:
-    """The accepted steps, one of which ends at each recording time, and how many steps lead to each time."""
-    system, motion, progress = packed.system, packed.system.motion, start_of(packed.state)
-    y, cursor, clock, counts = progress
-    many = len(packed.models)
+def _parts(
+    windows: Windows, times: np.ndarray, rtol: float, atol: np.ndarray, parameters: np.ndarray
+) -> Iterator[tuple[System, Path, list[int], bool]]:
+    """The accepted steps, one of which ends at each recording time, a part of the motion after another.
+
+    With each part come the window that it lies in, how many of its steps lead to each time on it, and whether its last
+    step ends at a break.
+    """
+    now, many, recorded = start_of(windows.state), len(windows.models), 1
+    most = max(int(_NUMBERS / len(windows.state)), 1)
     nothing = Output(
         np.array([np.inf]), np.empty((1, 6)), np.empty((1, many, 3)), np.empty((1, many)), np.empty((0, 0))
     )
-    run = run_of(system, RODAS4, nothing, progress, rtol=rtol, atol=atol)
-    pieces, sinces, lengths, starts, ends, until = [], [], [], [], [], [0]
-    outcome, breaks = rosenbrock.PAUSED, motion.breaks
-    if len(motion.velocity):
-        y[-6:-3] = motion.velocity[0]
-    while outcome == rosenbrock.PAUSED:
-        piece, since, proposed = int(cursor[0]), float(clock[0]), float(clock[1])
-        begin, before, accepted = breaks[piece], y.copy(), int(counts[rosenbrock.STEPS])
-        room = times[len(until)] - begin - since if times[len(until)] < breaks[piece + 1] else np.inf
-        if 2.0 * proposed > room:  # end there, or halve what is left, as before a break
-            clock[1] = room if proposed >= room else 0.5 * room
-        outcome = rosenbrock.advance(run.address, 1)
-        if int(counts[rosenbrock.STEPS]) == accepted:
-            continue
-        ended = int(cursor[0]) != piece
-        length = (breaks[piece + 1] - begin if ended else float(clock[0])) - since
-        pieces.append(piece)
-        sinces.append(since)
-        lengths.append(length)
-        starts.append(before)
-        ends.append(run.stages.new.copy())
-        if 2.0 * proposed > room:
-            clock[1] = max(clock[1], proposed)
-        at_break = ended and times[len(until)] <= breaks[piece + 1]
-        if at_break or length >= (1.0 - _CLOCK) * room or outcome == rosenbrock.AT_REST:
-            until.append(len(pieces))
+    outcome = rosenbrock.DONE
+    for system in windows:
+        run = run_of(system, RODAS4, nothing, now, rtol=rtol, atol=atol)
+        now.cursor[0], outcome = 0, rosenbrock.PAUSED
+        while outcome == rosenbrock.PAUSED:
+            steps: list[tuple] = []
+            until: list[int] = []
+            while outcome == rosenbrock.PAUSED and len(steps) < most:
+                outcome, step, reached = _trial(run, times[recorded])
+                steps += step
+                if reached:
+                    until.append(len(steps))
+                    recorded += 1
+            if steps:
+                ended = int(now.cursor[0]) != steps[-1][0]
+                path = Path(*map(np.array, zip(*steps, strict=True)), parameters)  # pyright: ignore[reportCallIssue]
+                yield system, path, until, ended
+        del system, run
+        if outcome != rosenbrock.DONE:
+            break
     if outcome == rosenbrock.STEP_TOO_SMALL:
         raise SolverError("the step size fell below the resolution of time: loosen rtol, or check the scene")
-    path = Path(*map(np.array, (pieces, sinces, lengths, starts, ends)), parameters)  # pyright: ignore[reportCallIssue]
-    return path, np.array(until)
 
 
-def _carry(packed: PackedScene, path: Path, until: np.ndarray, names: tuple[str, ...]) -> SceneSensitivities:
-    """Solve the variational equation along the steps, and evaluate it where `until` says."""
-    system = packed.system
-    n, count, many, instants = len(packed.state), len(names), len(packed.models), len(until)
-    space, atol = tangent.slopes_for(count, n), _ACCURACY * packed.natural
-    slope, scratch, times = np.zeros((count, n)), np.empty((2, n)), np.empty(instants)
-    bodies, wrenches = np.empty((instants, 6)), np.empty((instants, many, 3))
-    d_bodies, d_wrenches = np.zeros((instants, 6, count)), np.zeros((instants, many, 3, count))
-    for m in range(instants):
-        last, done = max(until[m] - 1, 0), 1.0
-        if m:
-            tangent.propagate(system.address, path, until[m - 1], until[m], slope, _ACCURACY, atol, space)
-        else:
-            done = 0.0
-        piece, at = int(path.piece[last]), float(path.since[last] + done * path.step[last])
-        state = path.end[last] if m else path.start[0]
-        tangent.wrench_slopes(
-            system.address, piece, at, state, path.parameters, slope, wrenches[m], d_wrenches[m], scratch
+def _trial(run: Run, time: float) -> tuple[int, list[tuple], bool]:
+    """Try one step, which ends at the next recording `time` at the latest.
+
+    Returns the outcome; of an accepted step the piece, the seconds into it, its length and the states at both ends; and
+    whether the time is reached.
+    """
+    y, cursor, clock, counts = run.progress
+    motion = run.system.motion
+    piece, since, proposed, accepted = int(cursor[0]), float(clock[0]), float(clock[1]), int(counts[rosenbrock.STEPS])
+    begin, end = motion.breaks[piece], motion.breaks[piece + 1]
+    if since == 0.0 and len(motion.velocity):
+        y[-6:-3] = motion.velocity[piece]
+    before, room = y.copy(), time - begin - since if time < end else np.inf
+    if 2.0 * proposed > room:  # end there, or halve what is left, as before a break
+        clock[1] = room if proposed >= room else 0.5 * room
+    outcome = rosenbrock.advance(run.address, 1)
+    if int(counts[rosenbrock.STEPS]) == accepted:
+        return outcome, [], False
+    ended = int(cursor[0]) != piece
+    length = (end - begin if ended else float(clock[0])) - since
+    if 2.0 * proposed > room:
+        clock[1] = max(clock[1], proposed)
+    reached = (ended and time <= end) or length >= (1.0 - _CLOCK) * room or outcome == rosenbrock.AT_REST
+    return outcome, [(piece, since, length, before, run.stages.new.copy())], bool(reached)
+
+
+class _Derivatives:
+    """The derivatives of a motion, carried along its steps as they come, and what is recorded of both."""
+
+    def __init__(self, windows: Windows, instants: int, parameters: np.ndarray) -> None:
+        n, count, many = len(windows.state), len(parameters), len(windows.models)
+        self._parameters, self._bristles = parameters, windows.bristles
+        self._space, self._atol = tangent.slopes_for(count, n), _ACCURACY * windows.natural
+        self._slope, self._scratch = np.zeros((count, n)), np.empty((2, n))
+        self._time, self._body, self._wrench = (
+            np.empty(instants),
+            np.empty((instants, 6)),
+            np.empty((instants, many, 3)),
         )
-        times[m], bodies[m], d_bodies[m] = system.motion.breaks[piece] + at, state[-6:], slope[:, -6:].T
-    return SceneSensitivities(names, times, bodies, wrenches, d_bodies, d_wrenches)
+        self._d_body, self._d_wrench = np.zeros((instants, 6, count)), np.zeros((instants, many, 3, count))
+        self._count = 0
+
+    def carry(self, system: System, path: Path, until: list[int], ended: bool) -> None:
+        """Go along steps of one window and record behind `until` of them; what `_parts` gives."""
+        if self._count == 0:
+            self._record(system, int(path.piece[0]), float(path.since[0]), path.start[0])
+        done = 0
+        for last in until:
+            self._propagate(system, path, done, last)
+            done, step = last, last - 1
+            self._record(system, int(path.piece[step]), float(path.since[step] + path.step[step]), path.end[step])
+        self._propagate(system, path, done, len(path.piece))
+        if ended:  # within a path `propagate` does so
+            load = system.motion.load[path.piece[-1]]
+            for c in np.flatnonzero((load == 0.0).all(axis=0)):
+                self._slope[:, self._bristles[c] : self._bristles[c + 1]] = 0.0
+
+    def _propagate(self, system: System, path: Path, first: int, last: int) -> None:
+        tangent.propagate(system.address, path, first, last, self._slope, _ACCURACY, self._atol, self._space)
+
+    def _record(self, system: System, piece: int, since: float, state: np.ndarray) -> None:
+        m, at = self._count, (system.address, piece, since, state, self._parameters, self._slope)
+        tangent.wrench_slopes(*at, self._wrench[m], self._d_wrench[m], self._scratch)
+        self._time[m], self._body[m] = system.motion.breaks[piece] + since, state[-6:]
+        self._d_body[m] = self._slope[:, -6:].T
+        self._count += 1
+
+    def recorded(self) -> tuple[np.ndarray, ...]:
+        """Times, motion, wrenches, and the derivatives of both."""
+        every = self._time, self._body, self._wrench, self._d_body, self._d_wrench
+        return tuple(values[: self._count] for values in every)

@@ -51,7 +51,7 @@ class Window:
         before = _pieces(packed, slice(0, first))
         output = _output(before, breaks[first : first + 1], bristles=True)
         tolerance = START_TOLERANCE * before.natural
-        run = integrate(before.system, output, before.state, method=RODAS4, rtol=START_TOLERANCE, atol=tolerance)
+        run = integrate([before.system], output, before.state, method=RODAS4, rtol=START_TOLERANCE, atol=tolerance)
         assert run.status == "success", run.message
         state = np.concatenate([run.output.bristles[-1], run.output.body[-1]])
         return cls(_pieces(packed._replace(state=state), slice(first, len(breaks) - 1)))
@@ -70,7 +70,7 @@ class Window:
         """Solve with the structured solver; `atol` is a share of the natural scales."""
         packed = self.packed
         output = _output(packed, self.ends, bristles=False)
-        run = integrate(packed.system, output, packed.state, method=method, rtol=rtol, atol=atol * packed.natural)
+        run = integrate([packed.system], output, packed.state, method=method, rtol=rtol, atol=atol * packed.natural)
         assert run.status == "success", run.message
         return Poses(run.statistics.wall_time, run.output.body[:, 3:], run.statistics.evaluations), run.statistics
 
@@ -113,7 +113,7 @@ def _pieces(packed: PackedScene, kept: slice) -> PackedScene:
     velocity = motion.velocity[kept] if len(motion.velocity) else motion.velocity
     breaks = motion.breaks[kept.start : kept.stop + 1]
     motion = motion._replace(breaks=breaks, velocity=velocity, **per_piece)
-    return packed._replace(system=system_of(packed.system.contacts, motion))
+    return packed._replace(system=system_of(packed.system.contacts, motion, packed.system.kept))
 
 
 def _output(packed: PackedScene, times: np.ndarray, *, bristles: bool) -> Output:

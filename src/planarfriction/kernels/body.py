@@ -48,11 +48,15 @@ class Motion(NamedTuple):
     row: np.ndarray
     """Shape of each contact on each piece, int [S, C]."""
     stop_speed: float
-    """End when the body's speed and its change within the bristles' time are below this [m/s]; 0: never."""
+    """End when the body is at rest: its speed is below this [m/s] and stays so (see `rosenbrock`); 0: never."""
     stop_radius: float
     """Lever arm that turns spin into speed for that test [m]."""
     stop_time: float
     """The bristles' time, sigma_1/sigma_0 [s]."""
+    stop_length: float
+    """The bristles' full deflection [m]."""
+    settled: float
+    """When the last of the inputs has changed for the last time [s]."""
 
 
 class Work(NamedTuple):
@@ -84,7 +88,7 @@ SystemRecord = NamedTuple(
     "SystemRecord",
     [
         *((name, int) for name in ("contacts", "bristles", "pieces", "body_axes")),
-        *((name, float) for name in ("stop_speed", "stop_radius", "stop_time")),
+        *((name, float) for name in ("stop_speed", "stop_radius", "stop_time", "stop_length", "settled")),
         *((name, int) for name in addresses_in(Contacts, Motion, Work)),
         *((name, int) for name in ("rates", "linearise", "factor", "solve")),
     ],
@@ -103,6 +107,8 @@ class System(NamedTuple):
     work: Work
     words: np.ndarray
     """Its `SystemRecord`, as a row."""
+    kept: tuple[np.ndarray, ...] = ()
+    """Arrays whose addresses are in the records of the contacts: they live as long as this does."""
 
     @property
     def address(self) -> int:
@@ -110,7 +116,7 @@ class System(NamedTuple):
         return place_of(self.words)
 
 
-def system_of(contacts: Contacts, motion: Motion) -> System:
+def system_of(contacts: Contacts, motion: Motion, kept: tuple[np.ndarray, ...] = ()) -> System:
     """A system with its workspace (made outside compiled code, where an allocation costs compile time)."""
     n = len(contacts.count)
     work = Work(
@@ -136,6 +142,8 @@ def system_of(contacts: Contacts, motion: Motion) -> System:
         stop_speed=motion.stop_speed,
         stop_radius=motion.stop_radius,
         stop_time=motion.stop_time,
+        stop_length=motion.stop_length,
+        settled=motion.settled,
         rates=address_of(rates, "ppfpp"),
         linearise=address_of(linearise, "ppp"),
         factor=address_of(factor, "ppfpf"),
@@ -143,7 +151,7 @@ def system_of(contacts: Contacts, motion: Motion) -> System:
     )
     if not len(motion.velocity):
         record = record._replace(velocity=0)
-    return System(contacts, motion, work, row_of(record))
+    return System(contacts, motion, work, row_of(record), kept)
 
 
 @kernel

@@ -23,6 +23,14 @@ _SAFETY, _GROWTH, _SHRINKAGE = 0.8, 2.5, 0.1
 # Smallest step relative to the time (at least 1 s): a few units in the last place of the clock.
 _RESOLUTION = 1e-15
 
+# How far a body is moved to see whether it rests, in full deflections of the bristles: on that way they go from one
+# side to the other, all but exp(-10) of it. Steps grow from one far below any swing to one that no bristle overshoots.
+_FAR, _FIRST, _LARGEST = 10.0, 1e-7, 0.1
+
+# How much faster than the stop speed a body at rest may become in swinging out, which takes bristles without damping
+# for ever: about what the change within the bristles' time lets through where they swing out in three periods.
+_SWING = 4.0
+
 
 @kernel
 def error_norm(own, y, new, error, rtol, atol):
@@ -125,15 +133,75 @@ def _step(run, own, piece, since, step):
 
 
 @kernel
-def _at_rest(own, y, rate):
-    """Body speed, and its change within the bristles' time, are below the speed that counts as rest."""
-    speed, change = 0.0, 0.0
+def _length(own, vector):
+    """Length of a velocity or acceleration of the body [3], its spin times the lever arm."""
+    arm = own.stop_radius
+    return math.sqrt(vector[0] * vector[0] + vector[1] * vector[1] + arm * arm * vector[2] * vector[2])
+
+
+@kernel
+def _at_rest(run, own, piece, since):
+    """Whether the body is at rest: slow, and held by friction for good.
+
+    Slow: its speed, and what that changes by within the bristles' time, are together below the stop speed. For good: no
+    input changes any more. Held: driven by its speed and the net force, it comes to a stop before it has moved by
+    `_FAR` full deflections of the bristles or is faster than `_SWING` stop speeds, and so it does when it swings back.
+    That is tried: the body moves along the line of the net force, at the speed that follows from the work done on it
+    (damping is left out), and the bristles follow. So nothing rests in free fall, without load, on a slope steeper than
+    friction, or at a turning point while the bristles still push it back, however slow it is.
+    """
+    bristles, y, rate, push = own.bristles, doubles(run.argument), doubles(run.rate), doubles(run.time_slope)
+    speed = _length(own, doubles(at(run.y, bristles)))
+    change = _length(own, doubles(at(run.start_rate, bristles)))
+    if doubles(own.breaks)[piece] < own.settled or not speed + own.stop_time * change < own.stop_speed:
+        return False
+    for i in range(run.states):
+        y[i] = doubles(run.y)[i]
     for i in range(3):
-        arm = own.stop_radius if i == 2 else 1.0
-        v, dv = arm * y[own.bristles + i], arm * rate[own.bristles + i]
-        speed += v * v
-        change += dv * dv
-    return math.sqrt(speed) + own.stop_time * math.sqrt(change) < own.stop_speed
+        push[i] = 0.0
+    force = _force(run, own, piece, since, push)
+    for i in range(3):
+        push[i] = rate[bristles + i] if force > 0.0 else doubles(run.y)[bristles + i]
+    size = _length(own, push)
+    if not size > 0.0:
+        return True
+    for i in range(3):
+        push[i] /= size
+    energy, most = 0.5 * speed * speed, 0.5 * (_SWING * own.stop_speed) ** 2
+    for _ in range(2):
+        way, step, force = 0.0, _FIRST, _force(run, own, piece, since, push)
+        while energy > 0.0 or way == 0.0:
+            if way > _FAR or energy > most:
+                return False
+            pace, moved = xp.maximum(math.sqrt(2.0 * energy), own.stop_speed), step * own.stop_length
+            _move(y, bristles, push, pace)
+            call(own.rates, (run.system, piece, since, run.argument, run.rate))
+            for i in range(bristles):
+                y[i] += moved / pace * rate[i]
+            before, force = force, _force(run, own, piece, since, push)
+            energy += 0.5 * (before + force) * moved
+            way, step = way + step, xp.minimum(_GROWTH * step, _LARGEST)
+        energy = 0.0
+        for i in range(3):
+            push[i] = -push[i]
+    return True
+
+
+@kernel
+def _force(run, own, piece, since, push):
+    """Acceleration of the body, if it stood still, along a direction; its size for no direction."""
+    rate, arm = doubles(at(run.rate, own.bristles)), own.stop_radius
+    _move(doubles(run.argument), own.bristles, push, 0.0)
+    call(own.rates, (run.system, piece, since, run.argument, run.rate))
+    along = push[0] * rate[0] + push[1] * rate[1] + arm * arm * push[2] * rate[2]
+    return along if push[0] != 0.0 or push[1] != 0.0 or push[2] != 0.0 else _length(own, rate)
+
+
+@kernel
+def _move(y, bristles, push, factor):
+    """Give the body a multiple of a velocity."""
+    for i in range(3):
+        y[bristles + i] = factor * push[i]
 
 
 @jit
@@ -207,7 +275,7 @@ def advance(run, max_steps):
                 y[i] = doubles(run.new)[i]
             since = reached
             h = xp.maximum(step * scale, h) if last else step * scale
-            if own.stop_speed > 0.0 and _at_rest(own, y, doubles(run.start_rate)):
+            if own.stop_speed > 0.0 and _at_rest(run, own, piece, since):
                 outcome = AT_REST
                 if m < samples:
                     times[m] = time

@@ -53,6 +53,13 @@ class StepJacobians(NamedTuple):
     """d wrench / d normal_force, `[..., 3]`."""
 
 
+ROOM = 64e6
+"""Bytes of shapes that a model packs at a time, if that is more than one shape."""
+
+SPELL = 0.25
+"""Time [s] for which a model builds the shapes that it packs at a time, if that is more than one shape."""
+
+
 @by_parts
 class PackedModel(NamedTuple):
     """A model at R loads as the compiled solver sees it."""
@@ -70,7 +77,7 @@ class PackedModel(NamedTuple):
     radius: float
     """Lever arm [m] that turns the spin of the patch into a speed."""
     kept: tuple[np.ndarray, ...]
-    """Arrays whose addresses are in the records: they live as long as this does."""
+    """Arrays whose addresses are in the records; who calls the functions keeps them."""
     cells: np.ndarray | None = None
     """Which cells of the model have bristles here, bool `[N]`, where states are those of cells."""
 
@@ -107,10 +114,13 @@ class FrictionModel(ByValue):
         """State of a contact at rest: no bristle is deflected."""
         return np.zeros(self.state_shape)
 
-    def packed(self, loads: Sequence[float | None]) -> PackedModel:
-        """The model at the distinct `loads` [N] of a run, `[None]` where the patch does not depend on the load.
+    def packed(self, loads: Sequence[float | None], between: tuple[float, float] | None = None) -> PackedModel:
+        """The model at distinct `loads` [N], `[None]` where the patch does not depend on the load.
 
-        What a model needs to be simulated in a scene; the solver calls its functions by address.
+        What a model needs to be simulated in a scene; the solver calls its functions by address. A patch that depends
+        on the load is packed as the run goes on: at loads `between` the lowest and the highest of the whole run, to
+        which bristles and natural scales belong; at as many of the first of `loads` as `ROOM` and `SPELL` allow, so
+        that there may be fewer records than loads, but one at least.
         """
         rule = "be one that can be simulated in a scene: it has no packed(loads)"
         raise InvalidValueError("model", rule, type(self).__name__)

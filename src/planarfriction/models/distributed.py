@@ -15,7 +15,7 @@ from planarfriction.kernels.distributed_contact import DistributedContact
 from planarfriction.kernels.pointers import place_of
 from planarfriction.kernels.records import rows_of
 from planarfriction.laws.base import refuse_creep
-from planarfriction.models import anisotropic
+from planarfriction.models import anisotropic, base
 from planarfriction.models.base import FrictionModel, ModelJacobians, PackedModel, StepJacobians
 from planarfriction.models.rates import linearised, rates
 
@@ -124,14 +124,20 @@ class DistributedModel(FrictionModel):
         )
         return StepJacobians(*(a.reshape(*batch, *a.shape[1:]) for a in results))
 
-    def packed(self, loads: Sequence[float | None]) -> PackedModel:
+    def packed(self, loads: Sequence[float | None], between: tuple[float, float] | None = None) -> PackedModel:
         """See `FrictionModel.packed`; only cells that carry load at one of the loads have bristles."""
-        weights = np.atleast_2d([self.patch.weights(load) for load in loads])
-        return self._packed(weights, weights.max(axis=0) > 0.0)
+        if between is None:
+            weights = np.atleast_2d([self.patch.weights(load) for load in loads])
+            return self._packed(weights, weights.max(axis=0) > 0.0)
+        chosen = self.patch.pressure.ever_loaded(self.patch.positions, between)
+        most = max(int(base.ROOM / (8.0 * chosen.sum())), 1)
+        return self._packed(np.array([self.patch.weights(load)[chosen] for load in loads[:most]]), chosen)
 
     def _packed(self, weights: np.ndarray, chosen: np.ndarray) -> PackedModel:
-        """The chosen cells as the solver sees them, with each row of weights [R, N]."""
-        weights, positions = np.ascontiguousarray(weights[:, chosen]), self.patch.positions[chosen]
+        """The chosen cells as the solver sees them, with each row of weights `[R, n]` of theirs or `[R, N]` of all."""
+        if weights.shape[1] > chosen.sum():
+            weights = weights[:, chosen]
+        weights, positions = np.ascontiguousarray(weights), self.patch.positions[chosen]
         count, law = len(positions), self.law.numbers
         at = place_of(weights) + weights.strides[0] * np.arange(len(weights))
         if self.patch.anisotropic:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,6 +22,9 @@ from planarfriction.models.three_states import ThreeStateModel
 
 MOST_SEGMENTS, MOST_SPEEDS = 256, 64
 """Sizes of the maps that are taken: some 0.6 GB for a fixed shape; errors fall with their fourth power."""
+
+_TOGETHER = 32
+"""Loads whose shapes are asked for at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,11 +87,14 @@ class ReducedModel(ThreeStateModel):
         """Loads [N] at which maps have been built so far, of a patch that depends on the load."""
         return self._family.rungs
 
-    def packed(self, loads: Sequence[float | None]) -> PackedModel:
-        """See `FrictionModel.packed`; nothing is copied, the records refer to the maps of the shapes."""
-        return self._records(self.shapes_at(loads))
+    def _shapes_at(self, loads: Sequence[float | None]) -> Iterator[ReducedShape]:
+        for first in range(0, len(loads), _TOGETHER):
+            yield from self.shapes_at(loads[first : first + _TOGETHER])
 
-    def _records(self, shapes: Sequence[ReducedShape]) -> PackedModel:
+    def _arrays(self, shape: ReducedShape) -> tuple[np.ndarray, ...]:
+        return (shape.data,) if shape.other is None else (shape.data, shape.other)
+
+    def _records(self, shapes: Sequence[ReducedShape], radius: float | None = None) -> PackedModel:
         maps = {id(data): data for shape in shapes for data in (shape.data, shape.other) if data is not None}
         at = {name: place_of(data) for name, data in maps.items()}
         data = np.array([at[id(shape.data)] for shape in shapes])
@@ -97,7 +103,7 @@ class ReducedModel(ThreeStateModel):
         numbers = np.column_stack([factors, [shape.blend for shape in shapes]])
         record = ReducedContact(self.law.numbers, Shape(*numbers[0]), 0, 0)
         rows = rows_of(record, len(shapes), shape=numbers, data=data, other=(other - data) // 8)
-        radius = max(shape.contact_radius for shape in shapes)
+        radius = max(shape.contact_radius for shape in shapes) if radius is None else radius
         natural = np.full(3, self.law.largest_deflection)
         kept = tuple(maps.values())
         return PackedModel(reduced_contact.FUNCTIONS, rows, 3, reduced_contact.LINEAR, natural, radius, kept)

@@ -103,11 +103,7 @@ class ReducedModelPublished(ThreeStateModel):
         load = validation.positive_load("normal_force", normal_force)
         return self._recent.get(load, lambda: self._shape_at(load))
 
-    def packed(self, loads: Sequence[float | None]) -> PackedModel:
-        """See `FrictionModel.packed`."""
-        return self._records([self._reference if load is None else self.shape_at(load) for load in loads])
-
-    def _records(self, shapes: Sequence[PublishedShape]) -> PackedModel:
+    def _records(self, shapes: Sequence[PublishedShape], radius: float | None = None) -> PackedModel:
         data = [np.ascontiguousarray(shape.surface.numbers.data, dtype=float) for shape in shapes]
         root = shapes[0].root
         record = PublishedContact(
@@ -126,7 +122,7 @@ class ReducedModelPublished(ThreeStateModel):
             size=np.array([shape.surface.numbers.size for shape in shapes]),
             data=np.array([place_of(each) for each in data]),
         )
-        radius = max(shape.contact_radius for shape in shapes)
+        radius = max(shape.contact_radius for shape in shapes) if radius is None else radius
         natural = self.law.largest_deflection * np.array([1.0, 1.0, radius or 1.0])
         return PackedModel(published_contact.FUNCTIONS, rows, 3, published_contact.LINEAR, natural, radius, tuple(data))
 

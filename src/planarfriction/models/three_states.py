@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+import time
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from types import ModuleType
 from typing import Any, ClassVar
@@ -13,6 +14,7 @@ import numpy as np
 from planarfriction.geometry import transformed
 from planarfriction.kernels.pointers import place_of
 from planarfriction.kernels.rollouts import UNFIT, compile_step_one, step_batch, step_one
+from planarfriction.models import base
 from planarfriction.models.base import FrictionModel, ModelJacobians, PackedModel, StepJacobians
 from planarfriction.models.rates import linearised, rates
 from planarfriction.models.remembered import Remembered
@@ -137,8 +139,38 @@ class ThreeStateModel(FrictionModel):
         """Shapes at the latest loads."""
         return Remembered(_REMEMBERED)
 
-    def _records(self, shapes: Sequence[Any]) -> PackedModel:
-        """See `packed`."""
+    def packed(self, loads: Sequence[float | None], between: tuple[float, float] | None = None) -> PackedModel:
+        """See `FrictionModel.packed`; the lever arm of a run is that at its highest load."""
+        if not self._follows_load:
+            return self._records([self._reference] * len(loads))
+        radius = None if between is None else self.shape_at(between[1]).contact_radius
+        return self._records(self._first_shapes(loads), radius)
+
+    def _first_shapes(self, loads: Sequence[float | None]) -> list[Any]:
+        """Shapes at the first of `loads`, as many as `ROOM` and `SPELL` allow."""
+        shapes, counted, size, begin = [], set(), 0, time.perf_counter()
+        for shape in self._shapes_at(loads):
+            for data in self._arrays(shape):
+                if id(data) not in counted:  # no other array takes its place, as `shapes` holds it
+                    counted.add(id(data))
+                    size += data.nbytes
+            if shapes and size > base.ROOM:
+                break
+            shapes.append(shape)
+            if time.perf_counter() - begin > base.SPELL:
+                break
+        return shapes
+
+    def _shapes_at(self, loads: Sequence[float | None]) -> Iterator[Any]:
+        """Shapes at loads, one after another."""
+        return (self.shape_at(load) for load in loads)  # pyright: ignore[reportArgumentType]
+
+    def _arrays(self, shape: Any) -> tuple[np.ndarray, ...]:
+        """The large arrays of a shape."""
+        return (self._maps(shape)[1],)
+
+    def _records(self, shapes: Sequence[Any], radius: float | None = None) -> PackedModel:
+        """The shapes as the solver sees them; `radius` [m] is the lever arm, by default the largest of them."""
         raise NotImplementedError
 
     def _record(self, shape: Any) -> PackedModel:

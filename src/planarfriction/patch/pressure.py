@@ -35,8 +35,8 @@ class Pressure:
         """
         raise NotImplementedError
 
-    def ever_loaded(self, positions: np.ndarray) -> np.ndarray:
-        """Which of `positions` `[N, 2]` [m] can carry pressure at any load, `[N]` of bool."""
+    def ever_loaded(self, positions: np.ndarray, between: tuple[float, float] | None = None) -> np.ndarray:
+        """Which of `positions` `[N, 2]` [m] can carry pressure at any load, or at any `between` two [N]; bool `[N]`."""
         return self.relative(positions) > 0.0
 
     def only(self, kept: np.ndarray) -> Pressure:
@@ -169,11 +169,12 @@ class SoftFinger(Pressure):
         profile = np.where(inside.any(-1, keepdims=True), profile, np.where(nearest, 0.0, -np.inf))
         return np.exp((profile - profile.max(-1, keepdims=True)) / k)
 
-    def ever_loaded(self, positions: np.ndarray) -> np.ndarray:
+    def ever_loaded(self, positions: np.ndarray, between: tuple[float, float] | None = None) -> np.ndarray:
         if not self.depends_on_load:
             return super().ever_loaded(positions)
         distance = np.hypot(positions[:, 0], positions[:, 1])
-        largest = self._radius(np.array(1.0 if self.n == 0.0 else np.inf))
+        highest = np.inf if between is None else between[1]
+        largest = self._radius(np.array(1.0 if self.n == 0.0 else highest))
         return (distance < largest) | (distance <= distance.min() * (1.0 + SAME_DISTANCE))
 
 

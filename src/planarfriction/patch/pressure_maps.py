@@ -66,9 +66,13 @@ class PressureMaps(ByValue, Pressure):
         share = (place - below)[..., None]
         return (1.0 - share) * self._shares[below] + share * self._shares[below + 1]
 
-    def ever_loaded(self, positions: np.ndarray) -> np.ndarray:
+    def ever_loaded(self, positions: np.ndarray, between: tuple[float, float] | None = None) -> np.ndarray:
         self.relative(positions)
-        return (self.values > 0.0).any(axis=0)
+        first, last = 0, len(self.loads) - 1
+        if between is not None:
+            first = max(int(np.searchsorted(self.loads, between[0], "right")) - 1, 0)
+            last = min(int(np.searchsorted(self.loads, between[1])), last)
+        return (self.values[first : last + 1] > 0.0).any(axis=0)
 
     def only(self, kept: np.ndarray) -> PressureMaps:
         return PressureMaps(self.loads, self.values[:, kept])

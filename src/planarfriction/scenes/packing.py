@@ -1,19 +1,28 @@
-"""From a scene to the flat arrays of the compiled solver."""
+"""From a scene to the flat arrays of the compiled solver, window after window of the motion."""
 
 from __future__ import annotations
 
 import time
-from typing import Any, NamedTuple
+from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
+from planarfriction.errors import InvalidValueError
 from planarfriction.kernels.body import Motion, System, system_of
 from planarfriction.kernels.contacts import BODY, BODY_AXES, WORLD, Contacts, calls_of
 from planarfriction.kernels.pointers import place_of
 from planarfriction.models.base import PackedModel
+from planarfriction.scenes.signal import SAME_TIME
 
 SHAPE_INTERVAL = 1e-3
 """Longest time [s] that a patch keeps its shape while the load it depends on changes; held loads need no limit."""
+
+WINDOW = 4096
+"""Pieces between breaks that are packed at a time; fewer where their shapes take more room (see `models.base.ROOM`)."""
+
+MOST_PIECES = 10**12
+"""Pieces of a motion, each of which the solver has to stop at."""
 
 
 class PackedScene(NamedTuple):
@@ -25,102 +34,224 @@ class PackedScene(NamedTuple):
     natural: np.ndarray
     """Natural scale of each state: mu_c/sigma_0 for deflections and positions, v_s for velocities, angles over r."""
     models: list[PackedModel]
-    """The model of each contact; the system holds addresses of its arrays."""
+    """The model of each contact."""
     loading: float
     """Time to compile the models' functions and the solver's, or to load them from the cache [s]."""
 
 
-def breaks_of(scene, t_end: float) -> np.ndarray:
-    """Times at which an input may jump or bend, from 0 to `t_end`, refined where a shape follows a continuous load."""
-    breaks = scene.breaks(t_end)
-    if not any(c.model.patch.depends_on_load and c.normal_force.hold == "linear" for c in scene.contacts):
-        return breaks
-    parts = np.maximum(np.ceil(np.diff(breaks) / SHAPE_INTERVAL - 1e-9).astype(int), 1)
-    fine = [np.linspace(a, b, n, endpoint=False) for a, b, n in zip(breaks[:-1], breaks[1:], parts, strict=True)]
-    return np.concatenate([*fine, [t_end]])
+class Pieces:
+    """The inputs of a scene from 0 to `t_end` [s], linear on each piece between two breaks.
+
+    Breaks are those of the signals; where the load of a patch whose shape follows it changes continuously, pieces are
+    no longer than `SHAPE_INTERVAL`. Pieces go by their number, so that there may be more of them than memory holds.
+    """
+
+    def __init__(self, scene, t_end: float) -> None:
+        self._breaks = scene.breaks(t_end)
+        """Breaks of the signals, [S + 1]."""
+        self._load = [contact.normal_force.pieces(self._breaks) for contact in scene.contacts]
+        self._force = None if scene.force is None else scene.force.pieces(self._breaks)
+        self._velocity = None if scene.velocity is None else scene.velocity.pieces(self._breaks)
+        lengths, parts = np.diff(self._breaks), np.ones(len(self._breaks) - 1)
+        for contact, (_, slope) in zip(scene.contacts, self._load, strict=True):
+            if contact.model.patch.depends_on_load:
+                fine = np.ceil(lengths / SHAPE_INTERVAL - 1e-9)
+                parts = np.where(slope != 0.0, np.maximum(fine, parts), parts)
+        if parts.sum() > MOST_PIECES:
+            rule = f"be at most {MOST_PIECES * SHAPE_INTERVAL:g} s where a patch follows a changing load"
+            raise InvalidValueError("t_end", rule, t_end)
+        self._first = np.concatenate([[0], np.cumsum(parts)]).astype(np.int64)
+        """Number of the first piece behind each break, [S + 1]."""
+        self._step = lengths / parts
+        self.count = int(self._first[-1])
+        """Number of pieces."""
+        moving = self._force is not None and (self._force[1][-1] != 0.0).any()
+        changing = moving or any(slope[-1] != 0.0 for _, slope in self._load)
+        self.settled = float(self._breaks[-1 if changing else -2])
+        """When the last of the inputs has changed for the last time [s]."""
+
+    def breaks(self, pieces: np.ndarray) -> np.ndarray:
+        """Times [s] at which pieces begin; that of number `count` is the end."""
+        here = self._behind(pieces)
+        begin = (pieces - self._first[here]) * self._step[here] + self._breaks[here]
+        return np.where(pieces == self.count, self._breaks[-1], begin)
+
+    def load(self, c: int, pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Normal force of contact c at the start of pieces, and its slope."""
+        return self._linear(self._load[c], pieces)
+
+    def held(self, c: int, pieces: np.ndarray) -> np.ndarray:
+        """Load whose shape contact c has on pieces: that in their middle [N]."""
+        load, slope = self.load(c, pieces)
+        return load + slope * (0.5 * (self.breaks(pieces + 1) - self.breaks(pieces)))
+
+    def between(self, c: int) -> tuple[float, float]:
+        """Lowest load > 0 and highest of contact c whose shape it takes [N]; both 1 where it never has a load."""
+        held = self.held(c, np.concatenate([self._first[:-1], self._first[1:] - 1]))
+        held = held[held > 0.0]
+        return (float(held.min()), float(held.max())) if len(held) else (1.0, 1.0)
+
+    def force(self, pieces: np.ndarray) -> np.ndarray:
+        """Applied wrench at the start of pieces, and its slope, [S, 2, 3]."""
+        if self._force is None:
+            return np.zeros((len(pieces), 2, 3))
+        return np.stack(self._linear(self._force, pieces), axis=1)
+
+    def velocity(self, pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        """Prescribed velocity at the start of pieces, and its slope, [S, 3] each; or None."""
+        return None if self._velocity is None else self._linear(self._velocity, pieces)
+
+    def _behind(self, pieces: np.ndarray) -> np.ndarray:
+        """Break of the signals that pieces lie behind."""
+        return np.minimum(np.searchsorted(self._first, pieces, side="right") - 1, len(self._step) - 1)
+
+    def _linear(self, signal: tuple[np.ndarray, np.ndarray], pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        here = self._behind(pieces)
+        start, slope = signal[0][here], signal[1][here]
+        since = self.breaks(pieces) - self._breaks[here]
+        return start + slope * (since[:, None] if slope.ndim == 2 else since), slope
+
+
+class Windows:
+    """The motion of a scene from 0 to `t_end` [s] in consecutive windows, to be gone through once.
+
+    A window holds `most` pieces (default: `WINDOW`), or as many as its shapes have room for. Where it ends leaves no
+    trace in the results. `times` to record become breaks where they equal one up to rounding, so that they record the
+    left limit. With `sensitivities` windows hold what derivatives need too.
+    """
+
+    def __init__(self, scene, t_end: float, *, times=None, sensitivities=False, most: int | None = None) -> None:
+        self._scene, self._times, self._most = scene, times, WINDOW if most is None else most
+        self._pieces, self._done = Pieces(scene, t_end), 0
+        contacts = scene.contacts
+        follows = [contact.model.patch.depends_on_load for contact in contacts]
+        self._between = [self._pieces.between(c) if follows[c] else None for c in range(len(contacts))]
+        self.models: list[PackedModel] = []
+        """The model of each contact, as packed last."""
+        records, row, pieces = self._pack()
+        begin = time.perf_counter()
+        calls = np.array([calls_of(model.functions, change=sensitivities) for model in self.models])
+        self.loading = time.perf_counter() - begin
+        """Time to compile the models' functions and the solver's, or to load them from the cache [s]."""
+        self._contacts = Contacts(
+            calls=calls,
+            record=records,
+            mount=np.array([_mount(scene, contact) for contact in contacts]),
+            place=np.array([[*c.position, np.cos(c.angle), np.sin(c.angle)] for c in contacts], dtype=float),
+            count=np.array([contact.count for contact in contacts], dtype=float),
+            state=_starts([model.states for model in self.models]),
+            linear=_starts([model.workspace for model in self.models]),
+        )
+        self._length = min(contact.model.law.largest_deflection for contact in contacts)
+        speed = min(contact.model.law.numbers.v_s for contact in contacts)
+        # a single point has no lever arm: its spin is measured in rad/s
+        self._radius = max(model.radius for model in self.models) or 1.0
+        arm, body = np.array([1.0, 1.0, 1.0 / self._radius]), scene.body
+        self.state = np.concatenate([np.zeros(self._contacts.state[-1]), body.velocity, body.position, [body.angle]])
+        """Bristles at rest, body velocity, pose."""
+        self.natural = np.concatenate([*(model.natural for model in self.models), speed * arm, self._length * arm])
+        """Natural scale of each state."""
+        self.bristles = self._contacts.state
+        """Where the bristles of each contact begin in the state, int [C + 1]."""
+        self.cells = [model.cells for model in self.models]
+        """Which cells of each contact have bristles."""
+        self._ready: System | None = self._system(row, pieces)
+
+    def __iter__(self) -> Iterator[System]:
+        while self._ready is not None or self._done < self._pieces.count:
+            yield self._taken()
+
+    def _taken(self) -> System:
+        """The next window, which nobody but the caller holds."""
+        ready, self._ready = self._ready, None
+        if ready is None:
+            records, row, pieces = self._pack()
+            self._contacts = self._contacts._replace(record=records)
+            ready = self._system(row, pieces)
+        return ready
+
+    def _pack(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Pack the next pieces: addresses of records, which of them each contact has on each piece, the pieces."""
+        pieces = np.arange(self._done, min(self._done + self._most, self._pieces.count))
+        old = [model for model, between in zip(self.models, self._between, strict=False) if between is None]
+        rows, count, self.models = [], len(pieces), []
+        for c, contact in enumerate(self._scene.contacts):
+            between = self._between[c]
+            if between is None:
+                self.models.append(old.pop(0) if old else contact.model.packed([None]))
+                rows.append(np.zeros(len(pieces), np.int64))
+                continue
+            held = self._pieces.held(c, pieces)
+            loads, row = _in_order(np.where(held > 0.0, held, between[0]))  # any, where there is no load
+            self.models.append(contact.model.packed(loads, between))
+            rows.append(row)
+            packed = len(self.models[c].records)
+            count = min(count, len(pieces) if packed == len(loads) else int(np.argmax(row == packed)))
+        first = _starts([len(model.records) for model in self.models])
+        self._done += count
+        addresses = [place_of(m.records) + m.records.strides[0] * np.arange(len(m.records)) for m in self.models]
+        return np.concatenate(addresses), np.stack(rows, axis=1)[:count] + first[:-1], pieces[:count]
+
+    def _system(self, row: np.ndarray, pieces: np.ndarray) -> System:
+        scene, inputs, models = self._scene, self._pieces, self.models
+        breaks = inputs.breaks(np.append(pieces, pieces[-1] + 1))
+        load = np.stack([np.stack(inputs.load(c, pieces), axis=1) for c in range(len(models))], axis=-1)
+        driven, body = inputs.velocity(pieces), scene.body
+        if driven is None:
+            driven = np.empty((0, 3)), np.tile([*body.gravity, 0.0], (len(pieces), 1)).astype(float)
+        free = scene.velocity is None
+        laws = [contact.model.law.numbers for contact in scene.contacts]
+        motion = Motion(
+            inverse_mass=np.array([1.0 / body.mass, 1.0 / body.mass, 1.0 / body.inertia]) if free else np.zeros(3),
+            body_axes=not free,
+            breaks=breaks,
+            load=load,
+            force=inputs.force(pieces),
+            velocity=driven[0],
+            acceleration=driven[1],
+            row=row,
+            stop_speed=float(scene.stop_speed or 0.0),
+            stop_radius=self._radius,
+            stop_time=max(law.sigma_1 / law.sigma_0 for law in laws),
+            stop_length=self._length,
+            settled=inputs.settled,
+        )
+        if self._times is not None:
+            _meet(self._times, breaks)
+        kept = tuple(array for model in models for array in (model.records, *model.kept))
+        return system_of(self._contacts, motion, kept)
 
 
 def pack(scene, t_end: float, *, sensitivities: bool = False) -> PackedScene:
-    """Flat arrays of the scene from 0 to `t_end` [s]; with `sensitivities` what its derivatives need too."""
-    breaks = breaks_of(scene, t_end)
-    pieces, count = len(breaks) - 1, len(scene.contacts)
-    middle = 0.5 * np.diff(breaks)
-    load, row = np.empty((pieces, 2, count)), np.empty((pieces, count), np.int64)
-    models: list[PackedModel] = []
-    records: list[np.ndarray] = []
-    for c, contact in enumerate(scene.contacts):
-        load[:, 0, c], load[:, 1, c] = contact.normal_force.pieces(breaks)
-        loads, which = _distinct_loads(contact.model.patch, load[:, 0, c] + load[:, 1, c] * middle)
-        model = contact.model.packed(loads)
-        row[:, c] = which + sum(len(each) for each in records)
-        records.append(place_of(model.records) + model.records.strides[0] * np.arange(len(loads)))
-        models.append(model)
-    begin = time.perf_counter()
-    calls = np.array([calls_of(model.functions, change=sensitivities) for model in models])
-    loading = time.perf_counter() - begin
-    contacts = Contacts(
-        calls=calls,
-        record=np.concatenate(records),
-        mount=np.array([_mount(scene, contact) for contact in scene.contacts]),
-        place=np.array([[*c.position, np.cos(c.angle), np.sin(c.angle)] for c in scene.contacts], dtype=float),
-        count=np.array([contact.count for contact in scene.contacts], dtype=float),
-        state=_starts([model.states for model in models]),
-        linear=_starts([model.workspace for model in models]),
-    )
-    length = min(c.model.law.largest_deflection for c in scene.contacts)
-    speed = min(c.model.law.numbers.v_s for c in scene.contacts)
-    # a single point has no lever arm: its spin is measured in rad/s
-    radius = max(model.radius for model in models) or 1.0
-    arm = np.array([1.0, 1.0, 1.0 / radius])
-    state = np.concatenate([np.zeros(contacts.state[-1]), scene.body.velocity, scene.body.position, [scene.body.angle]])
-    natural = np.concatenate([*(model.natural for model in models), speed * arm, length * arm])
-    system = system_of(contacts, _motion(scene, breaks, load, row, radius))
-    return PackedScene(system, state, natural, models, loading)
+    """Flat arrays of the scene from 0 to `t_end` [s] in one window, for scenes whose shapes fit into one."""
+    whole = Windows(scene, t_end, sensitivities=sensitivities, most=MOST_PIECES)
+    system = next(iter(whole))
+    assert system.motion.breaks[-1] == t_end, "the shapes of this scene take more room than one window has"
+    return PackedScene(system, whole.state, whole.natural, whole.models, whole.loading)
+
+
+def _in_order(loads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The different loads in the order of their first appearance, and which of them each is."""
+    different, first, which = np.unique(loads, return_index=True, return_inverse=True)
+    order = np.argsort(first)
+    place = np.empty(len(order), np.int64)
+    place[order] = np.arange(len(order))
+    return different[order], place[which]
+
+
+def _meet(times: np.ndarray, breaks: np.ndarray) -> None:
+    """Put ascending times that equal a break up to rounding onto it."""
+    first, last = np.searchsorted(times, [breaks[0] - SAME_TIME, breaks[-1] + SAME_TIME])
+    some = times[first : last + 1]
+    near = breaks[np.clip(np.searchsorted(breaks, some - SAME_TIME), 0, len(breaks) - 1)]
+    some[:] = np.where(np.abs(near - some) <= SAME_TIME, near, some)
 
 
 def _starts(sizes: list[int]) -> np.ndarray:
     return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
 
 
-def _distinct_loads(patch, held: np.ndarray) -> tuple[Any, np.ndarray]:
-    """Loads that need a shape of their own, and which of them each piece takes; pieces without load borrow one."""
-    if not patch.depends_on_load:
-        return [None], np.zeros(len(held), np.int64)
-    positive = np.unique(held[held > 0.0])
-    if len(positive) == 0:
-        positive = np.array([1.0])
-    return positive, np.minimum(np.searchsorted(positive, held), len(positive) - 1)
-
-
 def _mount(scene, contact) -> int:
     if scene.velocity is not None:
         return BODY_AXES
     return WORLD if contact.mounted_on == "world" else BODY
-
-
-def _motion(scene, breaks: np.ndarray, load: np.ndarray, row: np.ndarray, radius: float) -> Motion:
-    pieces = len(breaks) - 1
-    force = np.zeros((pieces, 2, 3))
-    if scene.force is not None:
-        force[:, 0], force[:, 1] = scene.force.pieces(breaks)
-    body: Any = scene.body
-    if scene.velocity is None:
-        velocity = np.empty((0, 3))
-        acceleration = np.tile([*body.gravity, 0.0], (pieces, 1)).astype(float)
-        inverse_mass = np.array([1.0 / body.mass, 1.0 / body.mass, 1.0 / body.inertia])
-    else:
-        velocity, acceleration = (np.ascontiguousarray(part) for part in scene.velocity.pieces(breaks))
-        inverse_mass = np.zeros(3)
-    return Motion(
-        inverse_mass=inverse_mass,
-        body_axes=scene.velocity is not None,
-        breaks=breaks,
-        load=load,
-        force=force,
-        velocity=velocity,
-        acceleration=acceleration,
-        row=row,
-        stop_speed=float(scene.stop_speed or 0.0),
-        stop_radius=radius,
-        stop_time=max(c.model.law.numbers.sigma_1 / c.model.law.numbers.sigma_0 for c in scene.contacts),
-    )

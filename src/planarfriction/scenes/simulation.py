@@ -10,7 +10,7 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError, SimulationInterrupted, SolverError
 from planarfriction.kernels.integration import Method, Output
-from planarfriction.scenes.packing import PackedScene, pack
+from planarfriction.scenes.packing import Windows
 from planarfriction.scenes.scene import Scene
 from planarfriction.scenes.signal import SAME_TIME, sample_count
 from planarfriction.scenes.solution import History, Solution
@@ -18,6 +18,9 @@ from planarfriction.solvers import RODAS4, integrate
 
 BRISTLES = ("none", "all")
 """What `simulate(..., bristles=)` records."""
+
+MOST_NUMBERS = 10**9
+"""Numbers of bristles that a run records at most: 8 GB."""
 
 _BODY = {"vx": "m/s", "vy": "m/s", "omega": "rad/s", "x": "m", "y": "m", "theta": "rad"}
 _WRENCH = {"fx": "N", "fy": "N", "tau": "N m"}
@@ -89,19 +92,24 @@ def simulate(
     atol = scene.atol if atol is None else validation.positive("atol", atol)
     every = scene.save_every if save_every is None else validation.positive("save_every", save_every)
     validation.choice("bristles", bristles, BRISTLES)
-    packed = pack(scene, end)
-    output = _output(recording_times(end, every, packed.system.motion.breaks), packed, bristles)
+    if not isinstance(method, Method):
+        raise InvalidValueError("method", "be solvers.RODAS4 or solvers.RODAS3", method)
+    if not (progress is None or callable(progress)):
+        raise InvalidValueError("progress", "be a function of the simulated time, or None", progress)
+    times = recording_times(end, every)
+    windows = Windows(scene, end, times=times)
+    output = _output(times, windows, bristles)
     run = integrate(
-        packed.system,
+        windows,
         output,
-        packed.state,
+        windows.state,
         method=method,
         rtol=rtol,
-        atol=atol * packed.natural,
+        atol=atol * windows.natural,
         progress=progress,
     )
-    cost = replace(run.statistics, compile_time=run.statistics.compile_time + packed.loading)
-    solution = Solution(_histories(scene, packed, run.output), cost, run.status, run.message, scene)
+    cost = replace(run.statistics, compile_time=run.statistics.compile_time + windows.loading)
+    solution = Solution(_histories(scene, windows, run.output), cost, run.status, run.message, scene)
     if run.status == "interrupted":
         raise SimulationInterrupted(solution)
     if run.status not in ("success", "at rest"):
@@ -109,20 +117,19 @@ def simulate(
     return solution
 
 
-def recording_times(end: float, every: float, breaks: np.ndarray) -> np.ndarray:
-    """Recording times; one that equals a break up to rounding is that break, so that it records the left limit."""
+def recording_times(end: float, every: float) -> np.ndarray:
+    """Every multiple of `every` up to the end, and the end."""
     times = np.arange(sample_count(end, every, "save_every") + 1) * every
-    if end - times[-1] > SAME_TIME:
-        times = np.append(times, end)
-    near = breaks[np.clip(np.searchsorted(breaks, times - SAME_TIME), 0, len(breaks) - 1)]
-    return np.where(np.abs(near - times) <= SAME_TIME, near, times)
+    return np.append(times, end) if end - times[-1] > SAME_TIME else times
 
 
-def _output(times: np.ndarray, packed: PackedScene, bristles: str) -> Output:
-    count, contacts = len(times), len(packed.models)
-    states = int(packed.system.contacts.state[-1])
+def _output(times: np.ndarray, windows: Windows, bristles: str) -> Output:
+    count, contacts, states = len(times), len(windows.models), int(windows.bristles[-1])
+    if bristles == "all" and count * states > MOST_NUMBERS:
+        shown = f"{count} samples of {states} numbers"
+        raise InvalidValueError("bristles", f"be 'none' above {MOST_NUMBERS:.0e} numbers (raise save_every)", shown)
     return Output(
-        times.copy(),
+        times,
         np.empty((count, 6)),
         np.empty((count, contacts, 3)),
         np.empty((count, contacts)),
@@ -130,7 +137,7 @@ def _output(times: np.ndarray, packed: PackedScene, bristles: str) -> Output:
     )
 
 
-def _histories(scene: Scene, packed: PackedScene, output: Output) -> dict[str, History]:
+def _histories(scene: Scene, windows: Windows, output: Output) -> dict[str, History]:
     """What was recorded, by name, with units."""
 
     def history(name: str, dims: tuple[str, ...], values: np.ndarray, unit: str) -> History:
@@ -147,7 +154,7 @@ def _histories(scene: Scene, packed: PackedScene, output: Output) -> dict[str, H
     histories["normal_force"] = history("normal_force", ("time", "contact"), output.load, "N")
     if len(output.bristles):
         for c, contact in enumerate(scene.contacts):
-            first, cells = packed.system.contacts.state, packed.models[c].cells
+            first, cells = windows.bristles, windows.cells[c]
             part = output.bristles[:, first[c] : first[c + 1]]
             name = f"bristles_{contact.name}"
             if cells is not None:

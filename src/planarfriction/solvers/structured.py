@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,7 +49,7 @@ class Integration(ByValue):
 
 
 def integrate(
-    system: System,
+    windows: Iterable[System],
     output: Output,
     state: np.ndarray,
     *,
@@ -58,10 +58,11 @@ def integrate(
     atol: np.ndarray,
     progress: Callable[[float], None] | None = None,
 ) -> Integration:
-    """Integrate from the first break of the system's motion to its last and record at `output.time`.
+    """Integrate a motion, which comes in windows, from its first break to its last and record at `output.time`.
 
-    `state` holds bristles, body velocity and pose; `atol` is the absolute tolerance of each of its entries.
-    `progress` is called with the simulated time now and then. Ctrl-C ends with the status "interrupted".
+    Each window goes on where the one before it ends, and is let go before the next one is asked for. `state` holds
+    bristles, body velocity and pose; `atol` is the absolute tolerance of each of its entries. `progress` is called with
+    the simulated time now and then, and before another window. Ctrl-C ends with the status "interrupted".
 
     Raises `InvalidValueError` for `rtol <= 0`.
     """
@@ -69,26 +70,32 @@ def integrate(
         raise InvalidValueError("rtol", "be > 0", rtol)
     if not (np.isfinite(atol).all() and (atol > 0.0).all()):
         raise InvalidValueError("atol", "be > 0", float(np.min(atol)))
-    begin = time.perf_counter()
-    first = run_of(system, method, output, start_of(state), rtol=rtol, atol=atol)
-    kernels.advance(first.address, 0)  # compiles, or loads from the cache, and takes no step
-    compile_time = time.perf_counter() - begin
-    run = run_of(system, method, output, start_of(state), rtol=rtol, atol=atol)
-    (_, cursor, clock, counts), breaks = run.progress, system.motion.breaks
-    outcome, wall_time = kernels.PAUSED, 0.0
+    at = start_of(state)
+    outcome, wall_time, compile_time = kernels.PAUSED, 0.0, None
     slice_steps = max(20, _STATES_PER_SLICE // len(state))
     try:
-        while outcome == kernels.PAUSED:
-            begin = time.perf_counter()
-            outcome = kernels.advance(run.address, slice_steps)
-            wall_time += time.perf_counter() - begin
-            if progress is not None:
-                piece = min(int(cursor[0]), len(breaks) - 1)
-                progress(float(breaks[piece] + clock[0]))
+        for system in windows:
+            if compile_time is None:
+                begin = time.perf_counter()
+                first = run_of(system, method, output, start_of(state), rtol=rtol, atol=atol)
+                kernels.advance(first.address, 0)  # compiles, or loads from the cache, and takes no step
+                compile_time = time.perf_counter() - begin
+            run, breaks = run_of(system, method, output, at, rtol=rtol, atol=atol), system.motion.breaks
+            at.cursor[0], outcome = 0, kernels.PAUSED
+            while outcome == kernels.PAUSED:
+                begin = time.perf_counter()
+                outcome = kernels.advance(run.address, slice_steps)
+                wall_time += time.perf_counter() - begin
+                if progress is not None:
+                    piece = min(int(at.cursor[0]), len(breaks) - 1)
+                    progress(float(breaks[piece] + at.clock[0]))
+            del system, run
+            if outcome != kernels.DONE:
+                break
     except KeyboardInterrupt:
         outcome = kernels.PAUSED
-    reached = int(cursor[1])
+    reached = int(at.cursor[1])
     kept = Output(*(array[:reached] if len(array) else array for array in output))
     status, message = _MESSAGES[int(outcome)]
-    statistics = Statistics(*counts.tolist(), wall_time=wall_time, compile_time=compile_time)
+    statistics = Statistics(*at.statistics.tolist(), wall_time=wall_time, compile_time=compile_time or 0.0)
     return Integration(kept, status, message, statistics)
