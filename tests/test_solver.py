@@ -291,6 +291,10 @@ def test_interruption_keeps_what_is_done():
         ({"save_every": 0.0}, "save_every must be > 0"),
         ({"t_end": 9.0}, "t_end must be at most the scene's 0.4 s"),
         ({"bristles": "al"}, "bristles must be one of none, all, got 'al'"),
+        ({"method": 5}, "method must be solvers.RODAS4 or solvers.RODAS3, got 5"),
+        ({"method": "RODAS4"}, "method must be solvers.RODAS4 or solvers.RODAS3, got"),
+        ({"progress": 5}, "progress must be a function of the simulated time, or None, got 5"),
+        ({"save_every": 1e-12}, "save_every must leave at most 10000000 samples"),
     ],
 )
 def test_bad_options_get_one_clear_line(options, message):
@@ -317,3 +321,9 @@ def test_a_contact_that_loses_its_load_starts_again_from_rest(kind):
     fx = data.fx.values[:, 0]
     assert fx[3] == pytest.approx(-1.0, abs=0.05)  # at 0.15 s; mu_c, while the bristles relaxed a little
     assert fx[-1] == 0.0
+
+
+def test_a_recording_larger_than_memory_is_refused(monkeypatch):
+    monkeypatch.setattr("planarfriction.scenes.simulation.MOST_NUMBERS", 1000)
+    with pytest.raises(pf.FrictionError, match=r"^bristles must be 'none' above 1000 numbers \(raise save_every\), got "):
+        pf.simulate(smooth_scene(), bristles="all")

@@ -122,6 +122,7 @@ class Windows:
 
     def __init__(self, scene, t_end: float, *, times=None, sensitivities=False, most: int | None = None) -> None:
         self._scene, self._times, self._most = scene, times, WINDOW if most is None else most
+        self._ahead = self._most
         self._pieces, self._done = Pieces(scene, t_end), 0
         contacts = scene.contacts
         follows = [contact.model.patch.depends_on_load for contact in contacts]
@@ -172,7 +173,7 @@ class Windows:
 
     def _pack(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Pack the next pieces: addresses of records, which of them each contact has on each piece, the pieces."""
-        pieces = np.arange(self._done, min(self._done + self._most, self._pieces.count))
+        pieces = np.arange(self._done, min(self._done + self._ahead, self._pieces.count))
         old = [model for model, between in zip(self.models, self._between, strict=False) if between is None]
         rows, count, self.models = [], len(pieces), []
         for c, contact in enumerate(self._scene.contacts):
@@ -181,16 +182,18 @@ class Windows:
                 self.models.append(old.pop(0) if old else contact.model.packed([None]))
                 rows.append(np.zeros(len(pieces), np.int64))
                 continue
-            held = self._pieces.held(c, pieces)
+            held = self._pieces.held(c, pieces[:count])
             loads, row = _in_order(np.where(held > 0.0, held, between[0]))  # any, where there is no load
             self.models.append(contact.model.packed(loads, between))
             rows.append(row)
             packed = len(self.models[c].records)
-            count = min(count, len(pieces) if packed == len(loads) else int(np.argmax(row == packed)))
+            count = count if packed == len(loads) else int(np.argmax(row == packed))
         first = _starts([len(model.records) for model in self.models])
         self._done += count
+        self._ahead = min(self._most, 2 * count)  # one contact does not pack much more than another has room for
         addresses = [place_of(m.records) + m.records.strides[0] * np.arange(len(m.records)) for m in self.models]
-        return np.concatenate(addresses), np.stack(rows, axis=1)[:count] + first[:-1], pieces[:count]
+        row = np.stack([row[:count] for row in rows], axis=1) + first[:-1]
+        return np.concatenate(addresses), row, pieces[:count]
 
     def _system(self, row: np.ndarray, pieces: np.ndarray) -> System:
         scene, inputs, models = self._scene, self._pieces, self.models

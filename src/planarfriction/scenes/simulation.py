@@ -127,7 +127,7 @@ def _output(times: np.ndarray, windows: Windows, bristles: str) -> Output:
     count, contacts, states = len(times), len(windows.models), int(windows.bristles[-1])
     if bristles == "all" and count * states > MOST_NUMBERS:
         shown = f"{count} samples of {states} numbers"
-        raise InvalidValueError("bristles", f"be 'none' above {MOST_NUMBERS:.0e} numbers (raise save_every)", shown)
+        raise InvalidValueError("bristles", f"be 'none' above {MOST_NUMBERS} numbers (raise save_every)", shown)
     return Output(
         times,
         np.empty((count, 6)),
