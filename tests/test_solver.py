@@ -325,5 +325,7 @@ def test_a_contact_that_loses_its_load_starts_again_from_rest(kind):
 
 def test_a_recording_larger_than_memory_is_refused(monkeypatch):
     monkeypatch.setattr("planarfriction.scenes.simulation.MOST_NUMBERS", 1000)
-    with pytest.raises(pf.FrictionError, match=r"^bristles must be 'none' above 1000 numbers \(raise save_every\), got "):
+    with pytest.raises(
+        pf.FrictionError, match=r"^bristles must be 'none' above 1000 numbers \(raise save_every\), got "
+    ):
         pf.simulate(smooth_scene(), bristles="all")

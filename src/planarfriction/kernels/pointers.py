@@ -6,6 +6,7 @@ registers. Its machine code is cached on disk; its address is looked up anew in 
 
 from __future__ import annotations
 
+import functools
 from typing import Any
 
 import numpy as np
@@ -19,6 +20,7 @@ from planarfriction.kernels.interrupts import heard_between_passes
 _DOUBLES = types.CPointer(types.float64)
 
 
+@functools.cache
 def address_of(function: Any, words: str) -> int:
     """Address of a compiled function in this process; `words` has a letter for each argument: p(lace) or f(loat)."""
     signature = tuple(types.int64 if word == "p" else types.float64 for word in words)

@@ -5,8 +5,8 @@ A record is a `NamedTuple` whose fields are numbers (`float`), counts and addres
 
 from __future__ import annotations
 
+import functools
 import typing
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -15,8 +15,9 @@ from numba import types
 from numba.extending import intrinsic
 
 
-def _fields(record: Any) -> Iterator[tuple[str, Any]]:
-    return iter(typing.get_type_hints(record).items())
+@functools.cache
+def _fields(record: Any) -> tuple[tuple[str, Any], ...]:
+    return tuple(typing.get_type_hints(record).items())
 
 
 def addresses_in(*records: Any) -> list[str]:

@@ -150,15 +150,15 @@ class ThreeStateModel(FrictionModel):
         """Shapes at the first of `loads`, as many as `ROOM` and `SPELL` allow."""
         shapes, counted, size, begin = [], set(), 0, time.perf_counter()
         for shape in self._shapes_at(loads):
-            for data in self._arrays(shape):
-                if id(data) not in counted:  # no other array takes its place, as `shapes` holds it
-                    counted.add(id(data))
-                    size += data.nbytes
-            if shapes and size > base.ROOM:
-                break
             shapes.append(shape)
-            if time.perf_counter() - begin > base.SPELL:
-                break
+            new = {id(data): data.nbytes for data in self._arrays(shape) if id(data) not in counted}
+            if new:  # no other array takes the place of one, as `shapes` holds it
+                counted.update(new)
+                size += sum(new.values())
+                if size > base.ROOM and len(shapes) > 1:
+                    return shapes[:-1]
+                if time.perf_counter() - begin > base.SPELL:
+                    break
         return shapes
 
     def _shapes_at(self, loads: Sequence[float | None]) -> Iterator[Any]:
