@@ -6,9 +6,12 @@ import importlib.util
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import planarfriction as pf
+from planarfriction.errors import InvalidValueError
+from planarfriction.identify import Slide, SlidingBody, fit_start
 from test_measured_slides import MU, slides
 
 SCRIPT = Path(__file__).parents[1] / "examples" / "identify_slides.py"
@@ -47,3 +50,20 @@ def test_friction_radius_and_ends_come_out(example, tmp_path, monkeypatch, capsy
 def test_a_missing_file_is_one_line(example, capsys):
     assert example.main(["none.csv"]) == 2
     assert capsys.readouterr().err == "error: none.csv: no such file\n"
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"body": 0.2}, "body must be a SlidingBody, got 0.2"),
+        ({"slide": [1.0]}, "slide must be a Slide"),
+        ({"noise": 0.1}, r"noise must have shape \[3\]"),
+        ({"noise": (1e-3, 1e-3, 0.0)}, "noise must be > 0"),
+        ({"samples": 5.5}, "samples must be an integer >= 5"),
+    ],
+)
+def test_what_cannot_be_fitted_is_named_in_one_line(changes, message):
+    time = np.linspace(0.0, 0.1, 11)
+    legal = {"body": SlidingBody(0.2, 1e-4), "slide": Slide(time, np.outer(0.1 * time, [1.0, 0.0, 0.0]))}
+    with pytest.raises(InvalidValueError, match=message):
+        fit_start(None, **{**legal, **changes})

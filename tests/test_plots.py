@@ -368,3 +368,21 @@ def test_units_suit_the_numbers(kind, exponent, sign):
 def test_zero_is_shown_in_the_usual_unit():
     assert style.unit_for("length", np.zeros(3)).label == "mm"
     assert style.unit_for("torque").label == "N mm"
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: plots.plot_motion(5), "solution must be a Solution, got 5"),
+        (lambda: plots.plot_solution(None), "solution must be a Solution, got None"),
+        (lambda: plots.plot_histories("run"), "solutions must be a Solution or a table of them by name, got run"),
+        (lambda: plots.plot_histories({"run": 5}), "solutions must be Solutions, under 'run' too, got 5"),
+        (lambda: plots.plot_histories({}), "solutions must hold at least one Solution"),
+        (lambda: plots.plot_patch(5), "patch must be a ContactPatch, got 5"),
+        (lambda: plots.plot_patch(pf.ContactPatch.disc(0.01), normal_force=[1.0]), "normal_force must be a number"),
+        (lambda: plots.plot_limit_surface(5), "surface must be a limit surface, got 5"),
+    ],
+)
+def test_what_cannot_be_drawn_is_named_in_one_line(call, message):
+    with pytest.raises(InvalidValueError, match=message):
+        call()

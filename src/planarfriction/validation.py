@@ -257,6 +257,13 @@ def _check_each(name: str, values: np.ndarray, good: np.ndarray, rule: str) -> N
         raise InvalidValueError(name, rule, f"{values[where]} at index {where}" if where else float(values))
 
 
+def instance(name: str, value: Any, kind: type | tuple[type, ...], what: str) -> Any:
+    """Return `value` if it is one of the kind, which messages call `what` ("a ContactPatch"), or raise."""
+    if not isinstance(value, kind):
+        raise InvalidValueError(name, f"be {what}", value)
+    return value
+
+
 def text(name: str, value: Any) -> str:
     """Return `value` if it is a text that can be a name: printable, not empty, not long, no spaces at its ends."""
     if not (isinstance(value, str) and value.isprintable() and value.strip() == value and value):
@@ -282,6 +289,14 @@ def choice(name: str, value: Any, valid: Iterable[str]) -> str:
     near = difflib.get_close_matches(value[:200], valid, n=1) if isinstance(value, str) else []
     given = f"{value!r} (did you mean {near[0]!r}?)" if near else quoted(value)
     raise InvalidValueError(name, f"be one of {', '.join(valid)}", given)
+
+
+def choices(name: str, value: Any, valid: Iterable[str]) -> list[str]:
+    """Return `value` as a list if it is a list or another sequence of `valid` ones, or raise."""
+    valid = list(valid)
+    if isinstance(value, str) or not isinstance(value, Sequence):
+        raise InvalidValueError(name, f"be a list of {', '.join(valid)}", quoted(value))
+    return [choice(name, each, valid) for each in value]
 
 
 def keys(name: str, data: Any, required: Iterable[str], optional: Iterable[str] = ()) -> None:

@@ -183,7 +183,7 @@ def rollout_sensitivities(
     inputs = _checked(model, state, twist, normal_force, dt, parameters)
     family = inputs.packed.family
     known = family.names
-    chosen = [known.index(validation.choice("names", name, known)) for name in (known if names is None else names)]
+    chosen = [known.index(name) for name in (known if names is None else validation.choices("names", names, known))]
     columns = family.columns[np.array(chosen, dtype=int)]
     wrenches = np.empty((len(inputs.state), len(inputs.dt), 3))
     slopes = np.empty((*wrenches.shape, len(columns)))

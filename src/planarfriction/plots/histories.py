@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from planarfriction import validation
+from planarfriction.errors import InvalidValueError, shown
 from planarfriction.plots import style
 
 if TYPE_CHECKING:
@@ -66,7 +68,16 @@ def draw_histories(figure: Any, solutions: Solution | Mapping[str, Solution]) ->
 
 def as_runs(solutions: Solution | Mapping[str, Solution]) -> dict[str, Solution]:
     """The solutions by label; a single one is labelled with the name of its scene."""
-    return dict(solutions) if isinstance(solutions, Mapping) else {str(solutions.scene.name): solutions}
+    from planarfriction.scenes import Solution
+
+    if not isinstance(solutions, Mapping):
+        solution = validation.instance("solutions", solutions, Solution, "a Solution or a table of them by name")
+        return {str(solution.scene.name): solution}
+    for name, each in solutions.items():
+        validation.instance("solutions", each, Solution, f"Solutions, under {shown(name)!r} too")
+    if not solutions:
+        raise InvalidValueError("solutions", "hold at least one Solution", solutions)
+    return {str(name): each for name, each in solutions.items()}
 
 
 class _Line(NamedTuple):

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib import colormaps
 
-from planarfriction import geometry
+from planarfriction import geometry, validation
 from planarfriction.families import SURFACES
 from planarfriction.plots import style
 
@@ -39,10 +39,13 @@ def plot_limit_surface(surface: Any, *, ellipsoid: Any = None) -> style.PlotFigu
     `surface` is any limit surface; `ellipsoid` the one to compare with, by default `LimitSurfaceEllipsoid` of the same
     patch. Both panels share their limits and their colours, the height tau/r. All three axes are pure numbers.
     """
-    from planarfriction.limit_surface import LimitSurfaceEllipsoid
+    from planarfriction.limit_surface import LimitSurface, LimitSurfaceEllipsoid
 
+    validation.instance("surface", surface, LimitSurface, "a limit surface")
     beside = ellipsoid
-    if beside is None:
+    if beside is not None:
+        validation.instance("ellipsoid", ellipsoid, LimitSurface, "a limit surface or None")
+    else:
         beside = LimitSurfaceEllipsoid(surface.patch, normal_force=surface.normal_force)
     polar = np.linspace(0.0, np.pi, POLAR_SEGMENTS + 1)[:, None]
     azimuth = np.linspace(0.0, 2 * np.pi, AZIMUTH_SEGMENTS + 1)[None, :]

@@ -55,6 +55,9 @@ def plot_motion(solution: Solution) -> style.PlotFigure:
 
 def draw_motion(figure: Any, solution: Solution) -> None:
     """Draw `plot_motion` into a figure or subfigure."""
+    from planarfriction.scenes import Solution
+
+    validation.instance("solution", solution, Solution, "a Solution")
     axes = figure.subplots()
     time, poses = np.asarray(solution.data["time"], dtype=float), _poses(solution)
     chosen = np.unique(np.linspace(0, len(time) - 1, min(INSTANTS, len(time))).round().astype(int))

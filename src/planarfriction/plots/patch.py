@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.collections import PolyCollection
 
+from planarfriction import validation
 from planarfriction.plots import style
 
 if TYPE_CHECKING:
@@ -22,8 +23,11 @@ def plot_patch(patch: ContactPatch, *, normal_force: float | None = None) -> sty
     patch without a grid is drawn as points coloured by the force on them, `w f_N`. Without `normal_force` [N] the
     colours show both per newton of load. Lengths in mm.
     """
+    from planarfriction.patch import ContactPatch
+
+    validation.instance("patch", patch, ContactPatch, "a ContactPatch")
+    load = 1.0 if normal_force is None else validation.non_negative("normal_force", normal_force)
     weights = patch.weights(normal_force)
-    load = 1.0 if normal_force is None else float(normal_force)
     centre = 1e3 * patch.centre_of_pressure(normal_force)
     figure = style.new_figure(5.6, _height(patch))
     axes = figure.add_subplot()

@@ -7,9 +7,9 @@ from typing import Any, Literal
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.errors import InvalidValueError
+from planarfriction.errors import InvalidValueError, shown
 from planarfriction.scenes.files import rectangle_inertia, rectangle_outline
-from planarfriction.scenes.scene import Body, Contact, Scene
+from planarfriction.scenes.scene import Body, Contact, Scene, checked_model
 from planarfriction.scenes.signal import Signal, sample_times
 
 GRAVITY = 9.81
@@ -40,8 +40,10 @@ def in_hand_load(load: Literal[1, 2], *, placement: Literal[1, 2] = 1, t_end: fl
 
     Source: Waltersson and Karayiannidis 2024, section VI.
     """
-    if (load, placement) not in {**IN_HAND_LOADS, **IN_HAND_DROPS}:
-        raise InvalidValueError("load and placement", "each be 1 or 2", f"load={load}, placement={placement}")
+    if not all(type(each) is int and each in (1, 2) for each in (load, placement)):
+        raise InvalidValueError(
+            "load and placement", "each be 1 or 2", f"load={shown(load)}, placement={shown(placement)}"
+        )
     if load == 1:
         offset, amplitude = IN_HAND_LOADS[load, placement]
         return Signal.sine(offset, amplitude, 2.0, t_end=t_end, dt=SAMPLE_TIME)
@@ -129,7 +131,8 @@ def free_slide(
     drawing, `save_every` [s] the time between samples.
     """
     if inertia is None:
-        inertia = mass * float(model.patch.second_moment(GRAVITY * mass))
+        mass, patch = validation.positive("mass", mass), checked_model("model", model).patch
+        inertia = mass * float(patch.second_moment(GRAVITY * mass))
     body = Body(mass, inertia, position, angle, twist, gravity=(0.0, 0.0), outline=outline)
     load: Any = GRAVITY * body.mass if normal_force is None else normal_force
     contact = Contact(model, load, mounted_on="body", name="table")

@@ -62,6 +62,13 @@ class Body(ByValue):
             object.__setattr__(self, "outline", outline)
 
 
+def checked_model(name: str, value: Any) -> Any:
+    """`value` if it is a friction model, or one that looks like it."""
+    if isinstance(value, type) or not (hasattr(value, "patch") and hasattr(value, "law")):
+        raise InvalidValueError(name, f"be a friction model ({MODELS.classes()})", value)
+    return value
+
+
 @dataclass(frozen=True, eq=False)
 class Contact(ByValue):
     """A contact between body and world: a friction model, where it sits, and how hard it is pressed.
@@ -87,9 +94,7 @@ class Contact(ByValue):
 
     def __post_init__(self) -> None:
         validation.text("name of a contact", self.name)
-        if not (hasattr(self.model, "patch") and hasattr(self.model, "law")):
-            valid = f"be a friction model ({MODELS.classes()})"
-            raise InvalidValueError(f"model of contact {self.name!r}", valid, self.model)
+        checked_model(f"model of contact {self.name!r}", self.model)
         of_contact = f"of contact {self.name!r}"
         load = as_signal(f"normal_force {of_contact}", self.normal_force, None)
         load.check_non_negative(f"normal_force {of_contact}")
