@@ -73,3 +73,23 @@ def test_wrong_states_and_steps(model):
 def test_wrong_models(call, message):
     with pytest.raises(InvalidValueError, match=message):
         call()
+
+
+@every_model
+def test_numbers_and_batches_without_bounds_are_refused_before_memory_is_asked_for(model):
+    with pytest.raises(InvalidValueError, match="batch axes must hold at most"):
+        model.step(model.rest(), (1, 0, 0), np.broadcast_to(1.0, (10**5, 10**5)), 1e-3)
+    with pytest.raises(InvalidValueError, match="twist must be finite"):
+        model.step_jacobians(model.rest(), (10**400, 0, 0), 1.0, 1e-3)
+
+
+@every_model
+def test_an_empty_batch_has_empty_derivatives(model):
+    assert {len(slope) for slope in model.jacobians(model.rest(), np.empty((0, 3)), 1.0)} == {0}
+
+
+@pytest.mark.parametrize("wrong", [{"wrenches_bar": np.full((5, 3), math.nan)}, {"states": np.full((5, 3), 1e200)}])
+def test_a_gradient_takes_no_cotangent_that_is_not_finite(wrong):
+    inputs = {"wrenches_bar": np.ones((5, 3)), **wrong}
+    with pytest.raises(InvalidValueError, match=next(iter(wrong))):
+        pf.autodiff.rollout_gradient(MODELS["reduced"], None, np.zeros((5, 3)), 1.0, 1e-3, **inputs)

@@ -7,7 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import planarfriction as pf
 from planarfriction import FrictionError, Signal
+from planarfriction.errors import InvalidValueError
 from planarfriction.scenes.signal import sample_times
 
 EPS = 4 * np.finfo(float).eps  # a handful of roundings
@@ -207,3 +209,10 @@ def test_missing_and_wrong_files_get_one_line(tmp_path):
     (tmp_path / "picture.csv").write_bytes(b"\x89PNG\xff\xfe\x00")
     with pytest.raises(FrictionError, match="not a text file"):
         Signal.from_csv(tmp_path / "picture.csv")
+
+
+def test_what_moves_a_scene_is_no_larger_than_anything_that_exists():
+    large = Signal.constant([0.01, 1e155, 1.0])  # a table of numbers may hold it
+    model = pf.DistributedModel(pf.ContactPatch.disc(0.01, 5), pf.LuGre())
+    with pytest.raises(InvalidValueError, match=r"velocity must be at most 1e\+50 in size, got 1e\+155"):
+        pf.scenes.driven(model, twist=large)

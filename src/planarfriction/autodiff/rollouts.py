@@ -281,7 +281,7 @@ def _checked(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, par
 
 def _rows(name: str, value: Any, inner: tuple[int, ...], batch: tuple[int, ...]) -> np.ndarray:
     """`value` `[..., *inner]` as `[B, *inner]`, or as one row where the contacts share it."""
-    value = validation.numbers(name, value)
+    value = validation.finite_numbers(name, value)
     if value.size != np.prod(inner) or value.shape[value.ndim - len(inner) :] != inner:
         try:
             value = np.broadcast_to(value, (*batch, *inner))

@@ -26,6 +26,8 @@ def unwrapped(time: np.ndarray, angle: np.ndarray, name: str = "theta") -> tuple
     Raises InvalidValueError for a jump that no whole turn explains, and where a wrapped angle turns by more than a
     quarter of a turn between two samples, so that nobody can tell which way.
     """
+    if len(angle) < 2:
+        return angle, 0
     steps = np.diff(angle)
     turns = np.round(steps / TURN)
     wrapped = bool(turns.any()) and np.ptp(angle) <= (1.0 + ROUNDED) * TURN

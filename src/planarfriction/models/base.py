@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -139,6 +140,15 @@ class FrictionModel(ByValue):
             raise InvalidValueError("twist", "have shape [..., 3]", f"shape {list(twist.shape)}")
         scalars = {"normal_force": normal_force, **more}
         arrays = {name: validation.numbers(name, value) for name, value in scalars.items()}
+        try:
+            batch = np.broadcast_shapes(
+                state.shape[: state.ndim - len(inner)], twist.shape[:-1], *(v.shape for v in arrays.values())
+            )
+        except ValueError:
+            shapes = ", ".join(str(list(v.shape)) for v in (state, twist, *arrays.values()))
+            raise InvalidValueError("batch axes", "broadcast", f"shapes {shapes}") from None
+        if math.prod(batch) > validation.MOST_NUMBERS:
+            raise InvalidValueError("batch axes", f"hold at most {validation.MOST_NUMBERS} contacts", list(batch))
         for name, value in {"state": state, "twist": twist, **arrays}.items():
             if not (np.abs(value) <= validation.LARGEST).all():
                 finite = np.isfinite(value).all()
@@ -148,13 +158,6 @@ class FrictionModel(ByValue):
         for name, value in arrays.items():
             if (value < 0.0).any():
                 raise InvalidValueError(name, "be >= 0", float(value.min()))
-        try:
-            batch = np.broadcast_shapes(
-                state.shape[: state.ndim - len(inner)], twist.shape[:-1], *(v.shape for v in arrays.values())
-            )
-        except ValueError:
-            shapes = ", ".join(str(list(v.shape)) for v in (state, twist, *arrays.values()))
-            raise InvalidValueError("batch axes", "broadcast", f"shapes {shapes}") from None
         wanted = [batch + inner, (*batch, 3), *(batch for _ in arrays)]
         given = [state, twist, *arrays.values()]
         return [

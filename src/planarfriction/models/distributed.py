@@ -82,11 +82,11 @@ class DistributedModel(FrictionModel):
         """Analytic derivatives of `rate` and `wrench` (see `ModelJacobians`); at kinks a one-sided derivative."""
         state, twist, load = self._inputs(state, twist, normal_force)
         law, identity = self.law.numbers, np.eye(2)[:, :, None]
-        lin = linearised(self._of_all_cells(load), state.reshape(load.size, -1), twist.reshape(-1, 3))
-        lin = lin.reshape(*load.shape, -1, state.shape[-1])
+        lin = linearised(self._of_all_cells(load), state.reshape(load.size, 2 * state.shape[-1]), twist.reshape(-1, 3))
+        lin = lin.reshape(*load.shape, lin.shape[-1] // state.shape[-1], state.shape[-1])
         if self.patch.anisotropic:
-            rate_state = -lin[..., :4, :].reshape(*load.shape, 2, 2, -1)
-            rate_velocity = lin[..., 4:8, :].reshape(*load.shape, 2, 2, -1)
+            rate_state = -lin[..., :4, :].reshape(*load.shape, 2, 2, state.shape[-1])
+            rate_velocity = lin[..., 4:8, :].reshape(*load.shape, 2, 2, state.shape[-1])
         else:
             k, k_z, k_v = lin[..., :1, None, :], lin[..., None, 1:3, :], lin[..., None, 3:5, :]
             rate_state = -k * identity - state[..., :, None, :] * k_z

@@ -273,7 +273,10 @@ class ThreeStateModel(FrictionModel):
         plain += normal_force, dt
         if not _PLAIN.issuperset(map(type, plain)):  # the checks of `_inputs` say which
             return None
-        given = np.array(plain, dtype=float)
+        try:
+            given = np.array(plain, dtype=float)
+        except OverflowError:  # an integer of hundreds of digits
+            return None
         if not ((np.abs(given) <= LARGEST).all() and given[6] >= 0.0 and given[7] >= 0.0):
             return None
         return self._step_jacobians(self._reference, given[None, :3], given[None, 3:6], given[6:7], given[7:])[0]

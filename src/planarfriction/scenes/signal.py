@@ -232,6 +232,7 @@ def as_signal(name: str, value: Any, columns: int | None) -> Signal:
     if signal.columns != columns:
         wanted = "be a signal of plain numbers" if columns is None else f"have {columns} columns"
         raise InvalidValueError(name, wanted, f"a signal with values of shape {list(signal.values.shape)}")
+    validation.finite_numbers(name, signal.values)  # alone it may have any, in a scene it moves something
     return signal
 
 
