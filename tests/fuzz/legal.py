@@ -1,0 +1,233 @@
+"""Every public constructor, factory and method, found by itself, with legal arguments to replace one by one."""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import types
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import planarfriction as pf
+
+EXAMPLES = Path(__file__).parent.parent.parent / "examples"
+LAW = pf.LuGre(mu_c=1.0, mu_s=1.2, elasto_plastic=0.9)
+PATCH = pf.ContactPatch.disc(0.01, 5)
+SOFT = pf.ContactPatch.disc(0.01, 5, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0))
+TWISTS = np.linspace([0.0, 0.0, 0.1], [0.01, 0.005, 1.0], 20)
+TIMES = np.linspace(0.0, 0.19, 20)
+
+SKIPPED = {
+    "warm_up": "compiles for minutes",
+    "plots.animate_motion": "draws for seconds",
+    "solvers.integrate": "is called by `simulate` alone, which checks",
+    "FrictionError": "an error",
+    "identify.identify_motion": "fits for seconds; its logs are attacked as files",
+    "identify.identify_lugre": "fits for seconds; its logs are attacked as files",
+}
+"""Not attacked, and why."""
+
+RECORDS = (
+    "Rollout RolloutGradient RolloutSensitivities RolloutStates SceneSensitivities Identification Verdict "
+    "SurfaceComparison ModelJacobians PackedModel StepJacobians Statistics Integration Solution LimitSurface FrictionLaw "
+    "FrictionModel Pressure"
+).split()
+"""What the library hands out, and bases of families: nobody calls their constructors."""
+
+
+PROTOCOL = (
+    "direction direction_slope sums lever_coordinates packed relative ever_loaded only repeated shape_at shapes_at pieces"
+    " check_non_negative wrench_and_slope"
+).split()
+"""Methods that the library calls, with what it has checked."""
+
+
+class Fresh(NamedTuple):
+    """An argument that a call may change, or that takes time to make."""
+
+    make: Callable[[], Any]
+
+
+class Target(NamedTuple):
+    """Something that a user calls."""
+
+    name: str
+    call: Callable[..., Any]
+    arguments: dict[str, Any]
+    """Legal ones, by name."""
+
+
+@functools.cache
+def objects() -> dict[str, Any]:
+    """Legal values by the name of the parameter, and one instance of each class by the name of the class."""
+    model, soft = pf.ReducedModelPublished(PATCH, LAW), pf.ReducedModelPublished(SOFT, LAW)
+    scene = pf.scenes.driven(model, t_end=0.02)
+    solution = pf.simulate(scene)
+    body = pf.identify.SlidingBody(0.2, 1e-4)
+    time = np.linspace(0.0, 0.2, 21)
+    pose = np.stack([0.1 * time - 0.2 * time**2, 0.0 * time, 0.5 * time], 1)
+    log = pf.identify.Log(TIMES, TWISTS, -TWISTS, 2.0)
+    surface = pf.LimitSurfaceCells(PATCH)
+    signal = pf.Signal.sampled([0.0, 0.1], [1.0, 2.0])
+    return {
+        # parts
+        "patch": PATCH, "law": LAW, "model": model, "scene": scene, "solution": solution, "solutions": solution,
+        "surface": surface, "reference": surface, "few": PATCH, "slide": pf.identify.Slide(time, pose), "log": log,
+        "contacts": [pf.Contact(model, 1.0)], "ellipsoid": pf.LimitSurfaceEllipsoid(PATCH),
+        "member": LAW, "method": pf.solvers.RODAS3, "body": pf.Body(1.0, 0.01), "progress": lambda *_: None, "make": lambda: None, "words": "words",
+        # numbers
+        "mass": 1.0, "inertia": 0.01, "radius": 0.01, "width": 0.02, "height": 0.01, "length": 0.02, "area": 1e-6,
+        "inner_radius": 0.005, "outer_radius": 0.01, "cells": 5, "mu": 0.5, "mu_c": 0.5, "mu_s": 0.6, "t_end": 0.02,
+        "angle": 0.1, "along": 0.4, "across": 0.6, "c": 0.006, "n": 0.3, "k": 2.0, "normal_force": 2.0,
+        "sigma_0": 1e5, "sigma_1": 100.0, "sigma_2": 0.1, "v_s": 1e-3, "gamma": 2.0, "dt": 1e-3, "time": TIMES,
+        "cell_size": 0.001, "offset": 2.0, "amplitude": 1.0, "frequency": 2.0, "count": 2, "degree": 2, "parts": 2,
+        "x_min": 0.0, "y_min": 0.0, "cell_width": 0.001, "cell_height": 0.001, "columns": 5, "rows": 5,
+        "load": 1, "speed": 0.01, "spin": 1.0, "segments": 5, "samples": 20, "save_every": 0.01, "stop_speed": 1e-4,
+        "rtol": 1e-4, "atol": 1e-3, "t": 0.05, "elasto_plastic": 0.9, "creep_speed": 1e-5, "relaxation_time": 0.01,
+        "breakaway_ratio": 0.5, "k_per_newton": None, "radius_max": 0.02, "error": None, "speeds": 6, "load_error": 0.01,
+        "times_repeated": 2, "gravity": (0.0, -9.81), "size": (0.15, 0.08), "fingers": 2, "phase": 0.0,
+        # arrays
+        "positions": [(0.0, 0.0), (0.01, 0.0), (0.0, 0.01)], "areas": [1e-6] * 3, "weights": [1.0, 2.0, 3.0],
+        "position": (0.0, 0.01), "velocity": None, "force": None, "vertices": [(0, 0), (0.01, 0), (0, 0.01)],
+        "outline": [(0.0, 0.0), (0.1, 0.0), (0.0, 0.1)], "gradient": (5.0, 2.0), "centre_of_mass": (0.002, 0.0),
+        "loads": [1.0, 2.0], "values": [1.0, 2.0], "times": [0.0, 0.1], "value": 2.0, "pressure": None,
+        "twist": TWISTS[9], "wrench": np.array([0.5, 0.1, 0.001]), "state": Fresh(lambda: np.zeros(3)), "about": (0.0, 0.0),
+        "wrenches_bar": np.ones((20, 3)), "state_bar": np.zeros(3), "metric": np.eye(2) * 0.25, "asymmetry": (0.1, 0.0),
+        "motion": TWISTS, "pose": pose, "breaks": [0.0, 0.1, 0.2], "noise": (1e-3, 1e-3, 0.02), "window": 7,
+        "velocity_weight": 1.0, "kept": np.array([True, False, True]), "coefficients": None,
+        # choices and texts
+        "hold": "previous", "name": "name", "mounted_on": "world", "at": "origin", "bristles": "none",
+        "direction": "y", "on_load_change": "keep", "names": ("mu",), "path": "out", "profile": None, "placement": 1,
+        "data": Fresh(lambda: PATCH.to_dict()), "folder": None, "grid": None, "parameters": None, "states": None,
+        "wrench_axis": None, "axis": None,
+        # instances, for their methods
+        "ContactPatch": SOFT, "Coulomb": pf.Coulomb(0.5), "CoulombStribeck": pf.CoulombStribeck(), "Dahl": pf.Dahl(),
+        "LuGre": LAW, "DistributedModel": pf.DistributedModel(PATCH, LAW), "ReducedModelPublished": soft,
+        "ReducedModel": pf.ReducedModel(PATCH, LAW, segments=8, speeds=6), "Signal": signal, "Scene": scene,
+        "Solution": solution, "Grid": pf.patch.Grid.around_origin(0.02, 0.02, 5, 5), "SoftFinger": SOFT.pressure,
+        "Slide": pf.identify.Slide(time, pose), "Log": log, "Uniform": pf.Uniform(),
+        "LinearGradient": pf.LinearGradient((5.0, 2.0)), "PressureMaps": pf.PressureMaps([1.0, 2.0], np.ones((2, 3))),
+        "PerCell": pf.patch.PerCell([1.0, 2.0, 3.0]),
+        **{name: getattr(pf, name)(PATCH) for name in pf.__all__ if name.startswith("LimitSurface")},
+    }  # fmt: skip
+
+
+SPECIAL: dict[str, dict[str, Any]] = {
+    "PressureMaps": {"values": np.ones((2, 3))},
+    "patch.PerCell": {"values": [1.0, 2.0, 3.0]},
+    "ContactPatch.from_pressure": {"pressure": np.ones((3, 3)), "loads": None},
+    "ContactPatch.compressed": {"cells": None},
+    "ContactPatch": {"pressure": None, "metric": None, "asymmetry": None, "cell_size": None},
+    "ContactPatch.moments": {"about": None},
+    "Scene.from_dict": {"data": Fresh(lambda: objects()["scene"].to_dict())},
+    "Signal.from_dict": {"data": Fresh(lambda: {"times": [0.0, 1.0], "values": [1.0, 2.0]})},
+    **{
+        f"{name}.from_dict": {"data": Fresh(lambda: {"law": "soft_finger", "c": 0.006, "k": 2.0})}
+        for name in ("patch.Pressure", "patch.PerCell", "SoftFinger", "Uniform", "LinearGradient", "PressureMaps")
+    },
+    **{
+        f"DistributedModel.{name}": {"state": Fresh(lambda: np.zeros((2, PATCH.cells)))}
+        for name in ("rate", "wrench", "step", "jacobians", "step_jacobians")
+    },
+    **{
+        f"{law}.{name}": {"state": Fresh(lambda: np.zeros(3)), "velocity": TWISTS[9]}
+        for law in ("LuGre", "Dahl", "CoulombStribeck")
+        for name in ("rate", "force")
+    },
+    "LimitSurfaceQuartic": {"surface": None},
+    "LimitSurfaceQuartic.fit": {"wrench": Fresh(lambda: objects()["LimitSurfaceCells"].wrench(TWISTS)), "twist": TWISTS},
+    "limit_surface.LimitSurfaceQuartic": {"surface": None},
+    "Body": {"velocity": (0.1, 0.0, 1.0)},
+    "ReducedModelPublished": {"surface": None},
+    "Signal.sine": {"t_end": 0.5},
+    "load": {"path": Fresh(lambda: objects()["solution"].save("solution.nc"))},
+    "Signal.from_csv": {"path": EXAMPLES / "load.csv", "value": "normal_force"  , "time": "time"},
+    "Scene.from_file": {"path": EXAMPLES / "drift.toml"},
+    "Scene.to_file": {"path": "scene.toml"},
+    "Solution.save": {"path": "solution.nc"},
+    "identify.Log.from_csv": {"path": EXAMPLES / "push.csv"},
+    "patch.read_pressure_map": {"path": EXAMPLES / "pad_pressure.csv"},
+    "identify.Log": {"twist": TWISTS, "wrench": TWISTS},
+    "identify.Log.from_motion": {"wrench": TWISTS},
+    "identify.SlidingBody": {"gravity": 9.81},
+    "identify.Slide": {"time": TIMES, "pose": TWISTS, "twist": None},
+    "identify.fit_start": {"body": Fresh(lambda: pf.identify.SlidingBody(0.2, 1e-4)), "noise": (1e-3, 1e-3, 0.02)},
+    "identify.predict_slide": {"body": Fresh(lambda: pf.identify.SlidingBody(0.2, 1e-4))},
+    "patch.surface_error": {"normal_force": None},
+    "scenes.in_hand": {"normal_force": None},
+    "scenes.free_slide": {"normal_force": None, "twist": (1.0, 0.0, 10.0), "inertia": None},
+    "scenes.drift": {"load": "normal"},
+    "rollout": {"twist": TWISTS},
+    "autodiff.rollout_states": {"twist": TWISTS},
+    "autodiff.rollout_gradient": {"twist": TWISTS},
+    "autodiff.rollout_sensitivities": {"twist": TWISTS, "names": ("mu_c",)},
+}
+"""Where a parameter of this name wants something else."""
+
+
+def _public(prefix: str, value: Any) -> Iterator[tuple[str, Callable[..., Any]]]:
+    """A function, or a class with its constructors and methods."""
+    if prefix in SKIPPED or not callable(value):
+        return
+    if not inspect.isclass(value):
+        yield prefix, value
+        return
+    if value.__name__ not in RECORDS:
+        yield prefix, value
+    for name in dir(value):
+        method = inspect.getattr_static(value, name)
+        own = getattr(method, "__func__", method)
+        if name in PROTOCOL or (name.startswith("_") and name != "__call__") or not callable(own):
+            continue
+        if isinstance(method, (classmethod, staticmethod)):
+            if value.__name__ not in RECORDS or name in vars(value):
+                yield f"{prefix}.{name}", getattr(value, name)
+        elif value.__name__ not in RECORDS and getattr(own, "__module__", "").startswith("planarfriction"):
+            yield f"{prefix}.{name}", own
+
+
+def _names() -> Iterator[tuple[str, Callable[..., Any]]]:
+    seen = set()
+    for name in pf.__all__:
+        value = getattr(pf, name)
+        inner = getattr(value, "__all__", []) if isinstance(value, types.ModuleType) else [None]
+        for part in inner:
+            found = value if part is None else getattr(value, part)
+            if not any(found is each for each in seen if each is not None) and callable(found):
+                seen.add(found)
+                yield from _public(name if part is None else f"{name}.{part}", found)
+
+
+def targets() -> list[Target]:
+    """All of them, with legal arguments; a new parameter without a legal value here is an error that says so."""
+    result = []
+    for name, call in _names():
+        if name in SKIPPED or name.rpartition(".")[2] in SKIPPED:
+            continue
+        arguments = {}
+        special = SPECIAL.get(name, {})
+        owner = name.split(".")[-2:-1]
+        for parameter in inspect.signature(call).parameters.values():
+            if parameter.kind in (parameter.VAR_KEYWORD, parameter.VAR_POSITIONAL):
+                continue
+            if parameter.name == "self":
+                if owner[0] not in objects():
+                    raise LookupError(f"tests/fuzz/legal.py has no instance of {owner[0]}")
+                arguments["self"] = objects()[owner[0]]
+            elif parameter.name in special:
+                arguments[parameter.name] = special[parameter.name]
+            elif parameter.name in objects():
+                arguments[parameter.name] = objects()[parameter.name]
+            elif parameter.default is parameter.empty:
+                raise LookupError(f"tests/fuzz/legal.py has no legal {parameter.name!r} for {name}")
+        if set(arguments) - {"self"}:
+            result.append(Target(name, call, arguments))
+    return result
+
+
+def made(argument: Any) -> Any:
+    """The argument, made anew where it is a recipe."""
+    return argument.make() if isinstance(argument, Fresh) else argument
