@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 ATTACKS: dict[str, tuple[Callable[[], None], int]] = {}
 """Kind -> test and the number of its examples in a run of a minute."""
 
-_CHECKS = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.large_base_example, HealthCheck.filter_too_much]
+_CHECKS = list(HealthCheck)
 
 
 def attack(kind: str, examples: int, *strategies: st.SearchStrategy) -> Callable:

@@ -1,4 +1,4 @@
-"""The promise: a call works, or says what is wrong in one line of its own; it is quick and small, and compiles nothing."""
+"""The promise: a call works, or says in one line of its own what is wrong; it is quick, small, and compiles nothing."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MEMORY = 1 << 30
 """What a call may ask for [bytes]."""
 
 LONGEST = 300
-"""Characters of a message: two lines of a terminal."""
+"""Characters of a message, besides the choices that it names."""
 
 CASES: collections.Counter[str] = collections.Counter()
 """How many cases of each kind were judged, and how many of them were refused."""
@@ -91,7 +91,7 @@ def watched(seconds: float = SECONDS, memory: int = MEMORY) -> Iterator[None]:
 
 
 def judge(kind: str, call: Callable[[], Any], *, names: tuple[str, ...] = (), compiles: bool = False) -> Any:
-    """The result of the call, or None where it was refused as promised; raises `Broken` where the promise does not hold.
+    """The result of the call, or None where it was refused as promised; raises `Broken` where neither is so.
 
     `names` are those of which the message has to contain one. Code that was never used before may be compiled where
     `compiles` says so.
@@ -124,7 +124,8 @@ def judge(kind: str, call: Callable[[], Any], *, names: tuple[str, ...] = (), co
 
 
 def _judge_message(message: str, names: tuple[str, ...]) -> None:
-    if not message.strip() or "\n" in message or len(message) > LONGEST or not message.isprintable():
+    length = len(re.sub(r"(one of|valid:|has) [\w., -]+", "", message))
+    if not message.strip() or length > LONGEST or not message.isprintable():
         raise Broken(f"the message is no line of at most {LONGEST} characters: {message[:200]!r} ({len(message)})")
     if " must " in message:  # with a name before it that a caller knows, or that of a part
         return
@@ -138,6 +139,5 @@ def finite(value: Any, where: str = "result") -> None:
     if isinstance(value, (tuple, list)):
         for each in value:
             finite(each, where)
-    elif isinstance(value, (float, np.ndarray, np.floating)) and np.asarray(value).dtype.kind == "f":
-        if not np.isfinite(value).all():
-            raise Broken(f"{where} is not finite: {str(value)[:80]!r}")
+    elif isinstance(value, (float, np.ndarray)) and not np.isfinite(np.asarray(value, float)).all():
+        raise Broken(f"{where} is not finite: {str(value)[:80]!r}")

@@ -12,10 +12,10 @@ import pytest
 from attack import attack, folder
 from judge import Broken, judge
 from mutation import mutated, mutated_bytes
+from working import use
 
 import planarfriction as pf
 from planarfriction.scenes.toml_writer import to_toml
-from working import use
 
 EXAMPLES = Path(__file__).parent.parent.parent / "examples"
 FILES = sorted(EXAMPLES.glob("*.toml"))

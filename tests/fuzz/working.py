@@ -6,8 +6,9 @@ import functools
 from typing import Any
 
 import numpy as np
-import planarfriction as pf
 from judge import finite
+
+import planarfriction as pf
 
 
 @functools.singledispatch

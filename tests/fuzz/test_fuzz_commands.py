@@ -1,0 +1,88 @@
+"""Every command with arguments that are wrong: exit code 2 and one line on stderr, or the work is done."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import random
+import shutil
+from pathlib import Path
+
+import click
+import matplotlib.pyplot as plt
+from attack import attack, folder
+from judge import Broken, judge
+from test_fuzz_tables import LOGS, MAPS
+
+from planarfriction import FrictionError
+from planarfriction.cli import INTERRUPTED, OUT_OF_TOLERANCE, main
+from planarfriction.cli.app import app
+
+EXAMPLES = Path(__file__).parent.parent.parent / "examples"
+LEGAL = {
+    "run": ["in-hand", "--model", "reduced-published", "--patch", "Line", "--t-end", "0.02"],
+    "limit-surface": ["--patch", "Line"],
+    "identify": ["log.csv", "--patch", "Line", "--parameters", "mu_c", "--starts", "1"],
+    "reproduce": ["--list"],
+    "bench": ["--only", "nothing"],
+}
+"""Where an attack begins; commands that are not here are asked for their help."""
+
+TEXTS = [
+    *("", " ", "x", "nan", "inf", "-inf", "0", "-1", "1", "2", "0.5", "1e-300", "5e-324", "1e300", "1e9", "1,2,3", "=", "a="),
+    *("mu_c=1e400", "mu_c=nan", "mu_c=0.5", "mu_c,mu_c", "φ\n", "--", "-", "--help", "--out", "a" * 5000, "9" * 5000),
+    *(".", "..", "/", "/dev/null", "nowhere/x.png", "picture.png", "picture.txt", "table.csv", "map.csv", "map.png", "map.npy"),
+    *("log.csv", "scene.toml", "scene.json", "empty.csv", "empty.toml", "folder.csv", "folder.toml", "Circle", "disc", "ring"),
+]
+
+
+def options(command: click.Command) -> list[str]:
+    """All options and flags of a command."""
+    return [name for parameter in command.params if isinstance(parameter, click.Option) for name in parameter.opts]
+
+
+def arguments(name: str, draw: random.Random) -> list[str]:
+    """The legal ones with up to three changes."""
+    result, known = list(LEGAL.get(name, ["--help"])), options(app.commands[name])
+    for _ in range(draw.randint(0, 3)):
+        change, at = draw.randrange(4), draw.randrange(len(result) + 1)
+        if change == 0 and result:
+            result[min(at, len(result) - 1)] = draw.choice(TEXTS)
+        elif change == 1:
+            del result[at : at + 1]
+        elif known:
+            result += [draw.choice(known), draw.choice(TEXTS)][: draw.choice([1, 2, 2, 2])]
+    return result
+
+
+@attack("commands", 120)
+def test_commands(draw: random.Random) -> None:
+    name = draw.choice([*app.commands, "run", "limit-surface", "identify"])
+    given = [name, *arguments(name, draw)]
+    if name in ("bench", "reproduce", "warm") and not {"--list", "--help", "nothing"} & set(given):
+        return  # minutes of work
+
+    def run() -> None:
+        output, errors = io.StringIO(), io.StringIO()
+        with contextlib.redirect_stdout(output), contextlib.redirect_stderr(errors):
+            code = main(given)
+        plt.close("all")
+        if code in (0, OUT_OF_TOLERANCE, INTERRUPTED):
+            return
+        if code != 2 or not errors.getvalue().startswith("error: ") or not errors.getvalue().endswith("\n"):
+            raise Broken(f"exit code {code} and {errors.getvalue()[:200]!r}")
+        raise FrictionError(errors.getvalue()[len("error: ") : -1])
+
+    with folder() as here:
+        (here / "log.csv").write_bytes(LOGS[0])
+        for path, contents in MAPS.items():
+            (here / path).write_bytes(contents[0])
+        for path in ("empty.csv", "empty.toml"):
+            (here / path).touch()
+        for path in ("folder.csv", "folder.toml"):
+            (here / path).mkdir()
+        shutil.copy(EXAMPLES / "driven.toml", here / "scene.toml")
+        try:
+            judge("commands", run, compiles=True)
+        except Broken as broken:
+            raise Broken(f"planarfriction {' '.join(given)[:300]!r}: {broken}") from broken

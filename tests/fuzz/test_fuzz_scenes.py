@@ -1,0 +1,68 @@
+"""Random legal scenes: they run, and come back from their files as they were."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+import random
+
+import some
+from attack import attack, folder
+from judge import Broken, judge
+from test_fuzz_solution_files import same
+from working import use
+
+import planarfriction as pf
+
+
+@attack("scenes", 60)
+def test_scenes_run_and_come_back(draw: random.Random) -> None:
+    scene = judge("scenes: built", lambda: some.scene(draw), compiles=True)
+    if scene is None:
+        return
+
+    def run() -> pf.Solution:
+        try:
+            return pf.simulate(scene, bristles="all")
+        except pf.errors.SolverError as gave_up:
+            use(gave_up.solution)
+            raise
+
+    solution = judge("scenes: simulated", run, compiles=True)
+    if solution is None:
+        return
+    use(solution)
+    with folder() as here:
+        loaded = judge("scenes: saved and loaded", lambda: pf.load(solution.save(here / "solution.nc")))
+        name = draw.choice(["scene.toml", "scene.json"])
+        scene.to_file(here / name)
+        read = judge("scenes: written and read", lambda: pf.Scene.from_file(here / name))
+    if loaded is None or not same(loaded, solution):
+        raise Broken("the solution is not what was saved")
+    for again in (read, pickle.loads(pickle.dumps(scene)), copy.deepcopy(scene)):
+        if again is None or again != scene or again.digest() != scene.digest():
+            raise Broken("the scene is not what was written")
+    if not same(pf.simulate(read, bristles="all"), solution):
+        raise Broken("the scene that was read runs otherwise")
+
+
+@attack("round trips", 150)
+def test_parts_come_back(draw: random.Random) -> None:
+    model = judge("round trips: built", lambda: some.model(draw), compiles=True)
+    if model is None:
+        return
+    state, load = model.rest(), some.spread(draw, -1, 1)
+    twist, dt = some.twist(draw, 0.01), some.spread(draw, -6, -1)
+    stepped = judge("round trips: stepped", lambda: model.step(state, twist, load, dt), compiles=True)
+    if stepped is None:
+        return
+    steps = [stepped[1].tobytes()]
+    contact = pf.Contact(model, load)
+    scene = pf.Scene(pf.Body(1.0, 0.1), [contact], 1.0)
+    read = judge("round trips: read", lambda: pf.Scene.from_dict(scene.to_dict())).contacts[0].model
+    for again in (read, pickle.loads(pickle.dumps(model)), copy.copy(model), copy.deepcopy(model)):
+        steps.append(again.step(again.rest(), twist, load, dt)[1].tobytes())
+        if (again.law, again.patch, again) != (model.law, model.patch, model):
+            raise Broken(f"a {type(model).__name__} differs from its copy")
+    if len(set(steps)) > 1:
+        raise Broken(f"a {type(model).__name__} and its copies step otherwise")
