@@ -139,5 +139,5 @@ def finite(value: Any, where: str = "result") -> None:
     if isinstance(value, (tuple, list)):
         for each in value:
             finite(each, where)
-    elif isinstance(value, (float, np.ndarray)) and not np.isfinite(np.asarray(value, float)).all():
+    elif np.asarray(value).dtype.kind in "fc" and not np.isfinite(value).all():
         raise Broken(f"{where} is not finite: {str(value)[:80]!r}")
