@@ -6,32 +6,43 @@ import contextlib
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any, NamedTuple
 
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
-ATTACKS: dict[str, tuple[Callable[[], None], int]] = {}
-"""Kind -> test and the number of its examples in a run of a minute."""
 
-_CHECKS = list(HealthCheck)
+class Attack(NamedTuple):
+    """A function of random things that raises where a promise is broken."""
+
+    function: Callable[..., None]
+    strategies: tuple[st.SearchStrategy, ...]
+    examples: int
+    """How many of them the tests take."""
+
+    def test(self, **options: Any) -> Callable[[], None]:
+        """The test that Hypothesis makes of it; seeds have no smaller ones, so that it looks for none."""
+        drawn, checks = given(*self.strategies)(self.function), list(HealthCheck)
+        return settings(deadline=None, suppress_health_check=checks, phases=[Phase.generate], **options)(drawn)
+
+    def again(self, examples: int) -> None:
+        """Attack with examples of which none was seen before."""
+        self.test(max_examples=examples, derandomize=False, database=None)()
+
+
+ATTACKS: dict[str, Attack] = {}
+"""All of them, by kind and name."""
 
 
 def attack(kind: str, examples: int, *strategies: st.SearchStrategy) -> Callable:
     """Make a test of a function of what the strategies draw; without one it draws from a `random.Random`."""
 
-    def made(function: Callable) -> Callable:
-        drawn = given(*(strategies or (st.randoms(use_true_random=True),)))(function)
-        test = settings(max_examples=examples, deadline=None, suppress_health_check=_CHECKS)(drawn)
-        ATTACKS[f"{kind}: {function.__name__.removeprefix('test_')}"] = test, examples
-        return test
+    def made(function: Callable[..., None]) -> Callable[[], None]:
+        whole = Attack(function, strategies or (st.randoms(use_true_random=True),), examples)
+        ATTACKS[f"{kind}: {function.__name__.removeprefix('test_')}"] = whole
+        return whole.test(max_examples=examples)
 
     return made
-
-
-def again(test: Callable, examples: int) -> Callable:
-    """The test with other examples than those of every run, and more of them; what fails is not looked for twice."""
-    phases = (Phase.generate, Phase.shrink)
-    return settings(test, max_examples=examples, derandomize=False, database=None, phases=phases)(test)
 
 
 @contextlib.contextmanager

@@ -1,0 +1,74 @@
+"""Everything public with one wrong argument: it works, or says in one line which argument is wrong."""
+
+from __future__ import annotations
+
+import functools
+from typing import Any
+
+import legal
+import matplotlib.pyplot as plt
+import nasty
+import numpy as np
+from attack import attack, folder
+from hypothesis import strategies as st
+from judge import Broken, judge
+from working import use
+
+
+@functools.cache
+def targets() -> dict[str, legal.Target]:
+    return {target.name: target for target in legal.targets()}
+
+
+def places() -> st.SearchStrategy[tuple[str, str]]:
+    """A target and one of its arguments."""
+    return st.sampled_from([(name, each) for name in targets() for each in targets()[name].arguments if each != "self"])
+
+
+def called(target: legal.Target, **changed: Any) -> Any:
+    """Call the target with legal arguments but for the changed ones, and use what it gives."""
+    arguments = {name: legal.made(value) for name, value in target.arguments.items()} | changed
+    own = [arguments.pop("self")] if "self" in arguments else []
+    result = target.call(*own, **arguments)
+    use(result)
+    plt.close("all")
+    return (result,)
+
+
+@functools.cache
+def compiled(name: str) -> None:
+    """What the target compiles at its first call is no fault of a wrong argument."""
+    with folder():
+        judge("constructors: legal", lambda: called(targets()[name]), compiles=True)
+
+
+def numeric(value: Any) -> bool:
+    """Whether a legal argument is made of numbers, so that a text or a date in its place must be refused."""
+    if isinstance(value, (tuple, list)):
+        return bool(value) and all(numeric(each) for each in value)
+    return isinstance(value, (float, int, np.ndarray))
+
+
+def test_legal_arguments_are_legal():
+    wrong = []
+    for name in targets():
+        try:
+            compiled(name)
+        except Broken as broken:
+            wrong.append(f"{name}: {broken}")
+    assert not wrong, "\n".join(wrong)
+
+
+@attack("constructors", 2000, st.deferred(places), nasty.nasty())
+def test_one_wrong_argument(place, drawn) -> None:
+    (name, argument), (what, make) = place, drawn
+    target = targets()[name]
+    compiled(name)
+    names = tuple(each for each in target.arguments if each != "self")
+    try:
+        with folder():
+            result = judge("constructors", lambda: called(target, **{argument: make()}), names=names)
+        if result is not None and what in nasty.WRONG and numeric(legal.made(target.arguments[argument])):
+            raise Broken("is taken for numbers")
+    except Broken as broken:
+        raise Broken(f"{name}({argument}=<{what}>): {broken}") from broken
