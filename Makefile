@@ -1,6 +1,7 @@
 # make demo: the main job, with everything it needs.   make test: the tests.   The rest is for development.
 # make test-generic: the tests of numbers once more, compiled for any x86-64 or ARM processor instead of this one.
 # make test-lowest: the tests with the lowest versions of everything.
+# make fuzz MINUTES=60: attacks with random examples, an hour long.
 
 PYTHON ?= python3
 VENV := .venv
@@ -11,7 +12,7 @@ LOWEST := .venv-lowest
 # survive from run to run. What is installed changes with pyproject.toml only.
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test test-generic test-lowest lint bench clean
+.PHONY: demo test test-generic test-lowest fuzz lint bench clean
 
 demo: $(VENV)/.package
 	$(BIN)/planarfriction run in-hand --model both --out out/ --plot
@@ -30,6 +31,11 @@ test-generic: $(VENV)/.test
 # The lowest versions that pyproject.toml promises, without the optional front ends.
 test-lowest: $(LOWEST)/.test
 	$(LOWEST)/bin/python -m pytest -n 2 --dist loadfile $(ARGS)
+
+MINUTES ?= 60
+
+fuzz: $(VENV)/.test
+	$(BIN)/python tests/fuzz $(MINUTES)
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .

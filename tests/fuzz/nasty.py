@@ -199,7 +199,6 @@ ODD: dict[str, Callable[[], Any]] = {
     "reversed array": lambda: np.linspace(0.1, 0.9, 3)[::-1],
     "read-only array": lambda: _read_only(np.linspace(0.1, 0.9, 3)),
     "transposed matrix": lambda: np.linspace(0.1, 0.9, 9).reshape(3, 3).T,
-    "matrix": lambda: np.asmatrix(np.eye(3)),
     "unmasked": lambda: np.ma.masked_array([0.1, 0.2, 0.3]),
     "repeated times": lambda: np.zeros(20),
     "rows": lambda: np.linspace(0.1, 0.9, 60).reshape(20, 3),
