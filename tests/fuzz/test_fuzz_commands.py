@@ -28,12 +28,12 @@ LEGAL = {
 }
 """Where an attack begins; commands that are not here are asked for their help."""
 
-TEXTS = [
-    *("", " ", "x", "nan", "inf", "-inf", "0", "-1", "1", "2", "0.5", "1e-300", "5e-324", "1e300", "1e9", "1,2,3", "=", "a="),
-    *("mu_c=1e400", "mu_c=nan", "mu_c=0.5", "mu_c,mu_c", "φ\n", "--", "-", "--help", "--out", "a" * 5000, "9" * 5000),
-    *(".", "..", "/", "/dev/null", "nowhere/x.png", "picture.png", "picture.txt", "table.csv", "map.csv", "map.png", "map.npy"),
-    *("log.csv", "scene.toml", "scene.json", "empty.csv", "empty.toml", "folder.csv", "folder.toml", "Circle", "disc", "ring"),
-]
+NUMBERS = "nan inf -inf 0 -1 1 2 0.5 1e-300 5e-324 1e300 1e9 1,2,3 mu_c=1e400 mu_c=nan mu_c=0.5 mu_c,mu_c a= =".split()
+PATHS = """
+    . .. / /dev/null nowhere/x.png picture.png picture.txt table.csv map.csv map.png map.npy log.csv scene.toml scene.json
+    empty.csv empty.toml folder.csv folder.toml Circle disc ring x - -- --help --out
+""".split()
+TEXTS = ["", " ", "φ\n", "a" * 5000, "9" * 5000, *NUMBERS, *PATHS]
 
 
 def options(command: click.Command) -> list[str]:

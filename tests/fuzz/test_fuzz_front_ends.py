@@ -116,7 +116,7 @@ def test_torch_arguments(draw: random.Random) -> None:
 
 
 @pytest.mark.jax
-@attack("steps", 15)
+@attack("steps", 6)
 def test_jax_walks(draw: random.Random) -> None:
     walk("jax", draw)
 
