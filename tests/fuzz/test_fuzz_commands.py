@@ -28,12 +28,16 @@ LEGAL = {
 }
 """Where an attack begins; commands that are not here are asked for their help."""
 
-NUMBERS = "nan inf -inf 0 -1 1 2 0.5 1e-300 5e-324 1e300 1e9 1,2,3 mu_c=1e400 mu_c=nan mu_c=0.5 mu_c,mu_c a= =".split()
-PATHS = """
+TEXTS = """
+    nan inf -inf 0 -1 1 2 0.5 1e-300 5e-324 1e300 1e9 1,2,3 mu_c=1e400 mu_c=nan mu_c=0.5 mu_c,mu_c a= = x - -- --help
     . .. / /dev/null nowhere/x.png picture.png picture.txt table.csv map.csv map.png map.npy log.csv scene.toml scene.json
-    empty.csv empty.toml folder.csv folder.toml Circle disc ring x - -- --help --out
-""".split()
-TEXTS = ["", " ", "φ\n", "a" * 5000, "9" * 5000, *NUMBERS, *PATHS]
+    empty.csv empty.toml folder.csv folder.toml Circle disc ring --out
+"""
+
+
+def text(draw: random.Random) -> str:
+    """Something to type."""
+    return draw.choice(["", " ", "φ\n", "a" * 5000, "9" * 5000, *TEXTS.split()])
 
 
 def options(command: click.Command) -> list[str]:
@@ -47,11 +51,11 @@ def arguments(name: str, draw: random.Random) -> list[str]:
     for _ in range(draw.randint(0, 3)):
         change, at = draw.randrange(4), draw.randrange(len(result) + 1)
         if change == 0 and result:
-            result[min(at, len(result) - 1)] = draw.choice(TEXTS)
+            result[min(at, len(result) - 1)] = text(draw)
         elif change == 1:
             del result[at : at + 1]
         elif known:
-            result += [draw.choice(known), draw.choice(TEXTS)][: draw.choice([1, 2, 2, 2])]
+            result += [draw.choice(known), text(draw)][: draw.choice([1, 2, 2, 2])]
     return result
 
 
