@@ -30,8 +30,8 @@ LEGAL = {
 
 TEXTS = """
     nan inf -inf 0 -1 1 2 0.5 1e-300 5e-324 1e300 1e9 1,2,3 mu_c=1e400 mu_c=nan mu_c=0.5 mu_c,mu_c a= = x - -- --help
-    . .. / /dev/null nowhere/x.png picture.png picture.txt table.csv map.csv map.png map.npy log.csv scene.toml scene.json
-    empty.csv empty.toml folder.csv folder.toml Circle disc ring --out
+    . .. / /dev/null nowhere/x.png picture.png picture.txt table.csv map.csv map.png map.npy log.csv scene.toml
+    scene.json empty.csv empty.toml folder.csv folder.toml Circle disc ring --out
 """
 
 

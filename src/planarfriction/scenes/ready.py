@@ -41,9 +41,8 @@ def in_hand_load(load: Literal[1, 2], *, placement: Literal[1, 2] = 1, t_end: fl
     Source: Waltersson and Karayiannidis 2024, section VI.
     """
     if not all(type(each) is int and each in (1, 2) for each in (load, placement)):
-        raise InvalidValueError(
-            "load and placement", "each be 1 or 2", f"load={shown(load)}, placement={shown(placement)}"
-        )
+        given = f"load={shown(load)}, placement={shown(placement)}"
+        raise InvalidValueError("load and placement", "each be 1 or 2", given)
     if load == 1:
         offset, amplitude = IN_HAND_LOADS[load, placement]
         return Signal.sine(offset, amplitude, 2.0, t_end=t_end, dt=SAMPLE_TIME)
