@@ -408,3 +408,11 @@ def test_bench_prints_a_table(capsys, measured):
     rows = table_rows(capsys.readouterr().out)
     assert rows == [["import", "0.1", "s"], ["table.build", "0.004", "s", "published", "0.4", "0.01"]]
     assert measured == [(None, False)]
+
+
+def test_a_shape_of_ones_own_without_parameters_leaves_the_names_of_patches_as_they_are(monkeypatch):
+    from planarfriction.families import SHAPES
+
+    monkeypatch.setattr(SHAPES, "_members", dict(SHAPES._members))
+    SHAPES.register("thumb", lambda: pf.ContactPatch.disc(0.01))
+    assert find_patch("disc", cell_size=None).name == "disc"

@@ -14,6 +14,10 @@ from hypothesis import strategies as st
 from judge import Broken, judge
 from working import use
 
+from planarfriction import families
+
+FAMILIES = (families.LAWS, families.MODELS, families.SURFACES, families.SHAPES, families.SCENES)
+
 
 @functools.cache
 def targets() -> dict[str, legal.Target]:
@@ -29,9 +33,14 @@ def called(target: legal.Target, **changed: Any) -> Any:
     """Call the target with legal arguments but for the changed ones, and use what it gives."""
     arguments = {name: legal.made(value) for name, value in target.arguments.items()} | changed
     own = [arguments.pop("self")] if "self" in arguments else []
-    result = target.call(*own, **arguments)
-    use(result)
-    plt.close("all")
+    before = [dict(family._members) for family in FAMILIES]
+    try:
+        result = target.call(*own, **arguments)
+        use(result)
+    finally:
+        plt.close("all")
+        for family, members in zip(FAMILIES, before, strict=True):  # what was registered is forgotten
+            family._members = members
     return (result,)
 
 

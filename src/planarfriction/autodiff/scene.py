@@ -94,7 +94,8 @@ def scene_sensitivities(
     """
     if not isinstance(scene, Scene):
         raise InvalidValueError("scene", "be a Scene", type(scene).__name__)
-    chosen = np.array([SCENE_PARAMETERS[validation.choice("names", name, SCENE_PARAMETERS)] for name in names], int)
+    names = validation.choices("names", names, SCENE_PARAMETERS)
+    chosen = np.array([SCENE_PARAMETERS[name] for name in names], int)
     end = scene.t_end if t_end is None else validation.positive("t_end", t_end)
     if end > scene.t_end:
         raise InvalidValueError("t_end", f"be at most the scene's {scene.t_end:g} s", end)

@@ -55,8 +55,8 @@ def _shapes(width: float) -> dict[str, Callable[[], ContactPatch]]:
     """The shapes that their width alone describes, by name."""
     makers = {}
     for name, make in SHAPES.items():
-        first, *others = inspect.signature(make).parameters.values()
-        if first.name in _PER_WIDTH and all(other.default is not other.empty for other in others):
+        first, *others = inspect.signature(make).parameters.values() or [None]  # a shape of one's own may have none
+        if first and first.name in _PER_WIDTH and all(other.default is not other.empty for other in others):
             makers[name] = functools.partial(make, _PER_WIDTH[first.name] * width)
     return makers
 

@@ -11,7 +11,7 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 
-MOST_SAMPLES = 20_000
+MOST_SAMPLES = 10_000
 """Directions at which surfaces are compared, in seconds: beyond them the figures hardly change any more."""
 
 if TYPE_CHECKING:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -24,6 +25,8 @@ def real(name: str, value: Any, like: Tensor) -> Tensor:
             raise InvalidValueError(name, "be a tensor of real numbers", f"one of {value.dtype}")
         return value.to(like.dtype)
     plain = value if type(value) is float else validation.numbers(name, value)
+    if isinstance(plain, np.ndarray) and min(plain.strides, default=0) < 0:  # tensors know no way backwards
+        plain = plain.copy()
     return torch.as_tensor(plain, dtype=like.dtype, device=like.device)
 
 
