@@ -436,3 +436,10 @@ def test_the_example_with_diffrax_sticks_slips_and_turns(tmp_path):
     assert -8.0 < np.degrees(states.pose[-1, 2]) < -4.0
     example.draw(times, states, forces, tmp_path / "picture.png")
     assert (tmp_path / "picture.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("kind", [">f8", np.longdouble])
+def test_floats_that_jax_does_not_know_are_converted(kind):
+    model, twist = pj.DistributedModel(PATCH, PLAIN), np.array([0.01, 0.0, 1.0])
+    given, wanted = (model.step(model.rest(), each, 1.0, 1e-3)[1] for each in (twist.astype(kind), twist))
+    assert np.array_equal(given, wanted)

@@ -183,3 +183,9 @@ def test_colours_and_transparency_are_refused(tmp_path):
         pf.ContactPatch.from_pressure(tmp_path / "colour.png", 0.001)
     with pytest.raises(FileError, match="partly transparent"):
         pf.ContactPatch.from_pressure(tmp_path / "clear.png", 0.001)
+
+
+def test_numbers_beyond_floats_in_a_file_are_refused_without_a_warning(tmp_path):
+    np.save(tmp_path / "map.npy", np.array([[1.0, 1.0], [1.0, np.longdouble("1e4000")]]))
+    with pytest.raises((FileError, InvalidValueError), match="inf"):
+        pf.ContactPatch.from_pressure(tmp_path / "map.npy", 0.001)

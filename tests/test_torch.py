@@ -328,3 +328,10 @@ def test_compiles_in_one_piece(backend, surface):
         torch.testing.assert_close(got, wanted, rtol=1e-12, atol=1e-15)
     compiled(state, twist, load)[1].square().sum().backward()
     assert all(raw.grad.isfinite() for raw in model.parameters())
+
+
+def test_arrays_that_are_read_backwards_are_copied():
+    twist = np.array([1.0, 0.0, 0.01])
+    model = distributed()
+    given, wanted = (model.step(model.rest(), each, 1.0, 1e-3)[1] for each in (twist[::-1], twist[::-1].copy()))
+    assert torch.equal(given, wanted)

@@ -16,7 +16,7 @@ ROUNDING = 1e-9
 BEYOND = {"distributed": ROUNDING, "reduced": 0.3, "published": 0.6}
 """Share by which the mean bristle may pass the largest deflection of one.
 
-Those of cells never do. A stored map of steady sliding strays from the true one: by up to 10 % in some thousand walks on
+Those of cells never do. A stored map of steady sliding strays from the true one: by up to 10 % in thousands of walks on
 small maps and few cells of very unequal weights. In the published equations three bristles relax each on its own: up to
 37 %. Either is more than seen, and far less than what a lost bound looks like.
 """

@@ -28,7 +28,9 @@ def real(name: str, value: Any) -> jax.Array:
             checked = validation.numbers(name, value)
             if isinstance(value, (int, float)) and not isinstance(value, np.generic):
                 value = float(checked)  # a plain number takes the precision of what it meets
-            elif not (isinstance(value, (np.ndarray, np.generic)) and value.dtype.kind == "f"):
+            elif not (
+                isinstance(value, (np.ndarray, np.generic)) and value.dtype.char in "efd" and value.dtype.isnative
+            ):
                 value = jnp.asarray(checked, float)
     array = jnp.asarray(value)
     if jnp.issubdtype(array.dtype, jnp.floating):

@@ -78,7 +78,8 @@ def _read_npy(path: Path) -> np.ndarray:
     if not isinstance(values, np.ndarray) or values.dtype.kind not in "biuf":
         raise FileError(f"pressure map {path}: the file must hold one array of real numbers")
     _check_size(path, values.size)
-    return values.astype(float)
+    with np.errstate(all="ignore"):  # what is too large for a float becomes infinite, which no patch takes
+        return values.astype(float)
 
 
 def _read_image(path: Path) -> np.ndarray:
