@@ -351,3 +351,17 @@ def test_wrong_outlines_get_one_line(outline, message):
     data = PUBLISHED_PATCHES["Square"](3).to_dict() | {"outline": outline}
     with pytest.raises(InvalidValueError, match=message):
         pf.ContactPatch.from_dict(data)
+
+
+def test_many_directions_of_a_disc_are_integrated_a_part_at_a_time():
+    import tracemalloc
+
+    surface = pf.LimitSurfaceExact(pf.ContactPatch.disc(0.01, 5))
+    units = np.random.default_rng(3).normal(size=(20_000, 3))
+    units /= np.linalg.norm(units, axis=-1, keepdims=True)
+    tracemalloc.start()
+    together = surface.direction(units)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 60e6  # 128 MB in one piece
+    assert np.array_equal(together[-5:], surface.direction(units[-5:]))

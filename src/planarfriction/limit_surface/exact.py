@@ -62,6 +62,10 @@ class _Elements(NamedTuple):
         return sums
 
 
+_TOGETHER = 4096
+"""Directions that are integrated over rings at a time: some ten MB, where all of a large table took a gigabyte."""
+
+
 class _Rings(NamedTuple):
     """A disc or ring about the centre of pressure under a pressure that depends on the radius alone."""
 
@@ -71,6 +75,13 @@ class _Rings(NamedTuple):
     normal_force: float | None
 
     def sums(self, twists: np.ndarray, unit: float, rules: Rules) -> np.ndarray:
+        sums = np.empty((len(twists), 9))
+        for first in range(0, len(twists), _TOGETHER):
+            part = slice(first, first + _TOGETHER)
+            sums[part] = self._sums(twists[part], unit)
+        return sums
+
+    def _sums(self, twists: np.ndarray, unit: float) -> np.ndarray:
         spin = np.abs(twists[:, 2])
         with np.errstate(divide="ignore", over="ignore"):
             kink = unit * np.hypot(twists[:, 0], twists[:, 1]) / spin  # where the rim runs as fast as the ring slides
