@@ -55,9 +55,11 @@ def _shapes(width: float) -> dict[str, Callable[[], ContactPatch]]:
     """The shapes that their width alone describes, by name."""
     makers = {}
     for name, make in SHAPES.items():
-        first, *others = inspect.signature(make).parameters.values() or [None]  # a shape of one's own may have none
-        if first and first.name in _PER_WIDTH and all(other.default is not other.empty for other in others):
-            makers[name] = functools.partial(make, _PER_WIDTH[first.name] * width)
+        parameters = list(inspect.signature(make).parameters.values())  # none, in a shape of one's own
+        if any(each.default is each.empty for each in parameters[1:]):
+            continue
+        if parameters and parameters[0].name in _PER_WIDTH:
+            makers[name] = functools.partial(make, _PER_WIDTH[parameters[0].name] * width)
     return makers
 
 
