@@ -173,10 +173,11 @@ def linearise(contact, held, z, dt):
     by_decay = -(start.beta - predicted.beta) * part * part * (1.0 + 2.0 * x) * half
     # the exponential
     slow_rate, rate = beta * slow * dt, beta * decay * dt
+    gap = xp.maximum(rate - slow_rate, 0.0)  # by rounding less where z_ss lies along V_G, which long steps blow up
     left_slow, mean_slow = formulas.relaxation(xp, slow_rate)
-    left_gap, mean_gap = formulas.relaxation(xp, rate - slow_rate)
+    left_gap, mean_gap = formulas.relaxation(xp, gap)
     left = left_slow * left_gap
-    mean = (slow_rate * mean_slow + (rate - slow_rate) * mean_gap * left_slow) / xp.where(rate > 0.0, rate, 1.0)
+    mean = (slow_rate * mean_slow + gap * mean_gap * left_slow) / xp.where(rate > 0.0, rate, 1.0)
     mean = xp.where(rate > 0.0, mean, 1.0)
     across = (1.0 - beta * start.share) * dt * left_slow * mean_gap
     free = plus(plus(times(left, z), mean * decay * dt, q), across, m)
@@ -188,7 +189,7 @@ def linearise(contact, held, z, dt):
     slip = plus(plus(u, -end.beta * decay, new), -end.beta * end.share, m)
     return Step(
         held, dt, m, per_q2, per_power, decay, slow, start, per_slow, per, predicted, beta, by_start, by_end, by_decay,
-        left_slow, left, mean_gap, formulas.relaxation_slope(xp, rate - slow_rate, left_gap, mean_gap),
+        left_slow, left, mean_gap, formulas.relaxation_slope(xp, gap, left_gap, mean_gap),
         mean, formulas.relaxation_slope(xp, rate, left, mean),
         end, free, size, back, size > largest * ROUNDING, start.deflection > 1.0, slip, new,
         reduced.wrench(

@@ -207,7 +207,7 @@ def advance(xp, law: LawNumbers, shape: ReducedNumbers, z, by: Held, dt):
     beta = formulas.mean_decay(start, end, by.decay * dt)
     slow_rate, rate_dt = beta * by.slow * dt, beta * by.decay * dt
     left_slow, _ = formulas.relaxation(xp, slow_rate)
-    _, mean_gap = formulas.relaxation(xp, rate_dt - slow_rate)
+    _, mean_gap = formulas.relaxation(xp, xp.maximum(rate_dt - slow_rate, 0.0))  # by rounding less
     left, mean = formulas.relaxation(xp, rate_dt)
     across = (1.0 - beta * share) * dt * left_slow * mean_gap
     new = left * z + (mean * by.decay * dt) * by.q + across * by.m
