@@ -147,6 +147,8 @@ def hold_slopes(contact, twist, work):
 def _stage(law, held, z, stretch, deflection, share):
     """The closure at a state; `stretch`: the change of the deflection is `stretch/deflection` times that along z."""
     beta, by_deflection, by_share, by_breakaway = reduced.closure_partials(law, deflection, share, held.even)
+    # exactly zero before breakaway: of hardly any deflection it is multiplied by the stretch, one over that
+    by_deflection = xp.where(deflection > law.breakaway_ratio * held.even, by_deflection, 0.0)
     stretch = stretch / xp.where(deflection > 0.0, deflection, math.inf)
     return Stage(z, deflection, stretch, share, beta, by_deflection, by_share, by_breakaway)
 
