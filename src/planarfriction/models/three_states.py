@@ -23,7 +23,9 @@ from planarfriction.validation import LARGEST
 _REMEMBERED = 64
 """Loads whose shapes a model remembers that builds each."""
 
-_ARRAY, _FLOAT = np.ndarray, np.dtype(float)
+_ARRAY, _FLOAT, _EMPTY = np.ndarray, np.dtype(float), np.empty
+_TRUTH = frozenset((bool, np.bool_))
+_STATE, _WRENCH = slice(3), slice(3, 6)
 
 _PLAIN = frozenset((float, int, np.float64))
 """What needs no conversion to a number."""
@@ -75,13 +77,19 @@ class ThreeStateModel(FrictionModel):
             held = twist
         elif kind is _ARRAY and twist.ndim == 1 and twist.dtype is _FLOAT:
             held = twist.tolist()
-        if held is not None and type(state) is _ARRAY and state.shape == (3,) and (fixed := self._fixed):
-            # one contact: no batch to broadcast, and the compiled step checks what it is given
-            result = np.empty(14)
+        if held is not None and type(state) is _ARRAY and state.size == 3 and (fixed := self._fixed):
+            # one contact: no batch to broadcast, and the compiled step checks what it is given, but takes True for 1.0
+            result = _EMPTY(14)
             try:
                 vx, vy, omega = held
-                if step_one(fixed[0], state, vx, vy, omega, normal_force, dt, result):
-                    return result[:3], result[3:6]
+                if not (
+                    bool is type(vx)
+                    or bool is type(vy)
+                    or bool is type(omega)
+                    or type(normal_force) in _TRUTH
+                    or bool is type(dt)
+                ) and step_one(fixed[0], state, vx, vy, omega, normal_force, dt, result):
+                    return result[_STATE], result[_WRENCH]
             except UNFIT:  # not plain numbers, or a batch: the checks below decide
                 pass
         packed = self._by_load(self._step, (6,), *self._inputs(state, twist, normal_force, dt=dt))
