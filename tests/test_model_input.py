@@ -84,6 +84,16 @@ def test_numbers_and_batches_without_bounds_are_refused_before_memory_is_asked_f
 
 
 @every_model
+@pytest.mark.parametrize("truth", [True, False])
+def test_a_truth_value_is_no_number_for_one_contact_or_many(model, truth):
+    for twist in ((0.01, 0.0, 0.1), np.full((4, 3), 0.01)):
+        for wrong in ({"normal_force": truth}, {"dt": truth}, {"twist": (0.01, truth, 0.1)}):
+            given = {"state": model.rest(), "twist": twist, "normal_force": 1.0, "dt": 1e-3, **wrong}
+            with pytest.raises(InvalidValueError, match="no truth value"):
+                model.step(**given)
+
+
+@every_model
 def test_an_empty_batch_has_empty_derivatives(model):
     assert {len(slope) for slope in model.jacobians(model.rest(), np.empty((0, 3)), 1.0)} == {0}
 

@@ -192,3 +192,33 @@ def test_where_values_are_unseen_friction_never_drives(front, kind):
     # at zero the slope is that of the smallest load
     at_zero = front.slope(lambda load: wrench(load)[0], 0.0)
     np.testing.assert_allclose(front.plain(at_zero), front.plain(wrench(LOAD))[0] / LOAD, rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["twist", "normal_force", "dt"])
+@pytest.mark.parametrize("method", ["adjoint", "eager"])
+@pytest.mark.parametrize("kind", ["ReducedModel", "ReducedModelPublished"])
+def test_where_values_are_unseen_not_a_number_stays_so_and_no_other_contact_is_spoilt(kind, method, name):
+    """Inside `jit` a load of NaN counted as none, and any NaN ended the adjoint in an error of its callback."""
+    front = Jax()
+    jax, model = front.jax, front.model(kind)
+    sequences = front.array(np.multiply.outer([1.0, 2.0, 3.0], [TWIST] * 4))
+    bad = {
+        "twist": sequences.at[1, 2, 0].set(np.nan),
+        "normal_force": front.array([[LOAD], [np.nan], [LOAD]]),
+        "dt": front.array(np.nan),
+    }
+    right = {"twist": sequences, "normal_force": front.array([[LOAD]] * 3), "dt": front.array(DT)}
+
+    def wrenches(twist, normal_force, dt):
+        return front.front.rollout(model, None, twist, normal_force, dt, method=method).wrenches
+
+    def finite(array):
+        return np.isfinite(front.plain(array)).all(axis=(1, 2))
+
+    spoilt = finite(jax.jit(wrenches)(**{**right, name: bad[name]}))
+    np.testing.assert_array_equal(spoilt, [name != "dt", False, name != "dt"])
+    if name == "twist":
+        slope = jax.jit(jax.grad(lambda twist: wrenches(twist, right["normal_force"], DT).sum()))(bad["twist"])
+        np.testing.assert_array_equal(finite(slope), [True, False, True])
+        alone = jax.jit(jax.grad(lambda twist: wrenches(twist, right["normal_force"], DT).sum()))(sequences)
+        np.testing.assert_allclose(front.plain(slope)[::2], front.plain(alone)[::2], rtol=1e-9, atol=1e-12)

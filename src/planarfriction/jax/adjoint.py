@@ -20,6 +20,7 @@ from planarfriction.jax.reduced import ReducedModel
 from planarfriction.kernels.published_step import NAMES
 from planarfriction.models import reduced_arrays
 from planarfriction.models.reduced_arrays import ReducedNumbers
+from planarfriction.validation import LARGEST
 
 
 class _Kind(NamedTuple):
@@ -82,22 +83,52 @@ _rollout.defvjp(_rollout_fwd, _rollout_bwd, symbolic_zeros=True)
 
 
 def _forward(kind: _Kind, *arrays):
-    def run(data, dt, parameters, state, twist, load):
-        wide = _beside(parameters, state)
-        return autodiff.rollout(_packed(kind, data), state, twist, load, dt, parameters=wide)
+    def run(data, dt, *inputs):
+        good, dt, (parameters, state, twist, load) = _numbers(dt, *inputs)
+        found = autodiff.rollout(_packed(kind, data), state, twist, load, dt, parameters=parameters)
+        return _spoilt(good, *found)
 
     return _by_contact(run, arrays, arrays[4].dtype)
 
 
 def _backward(kind: _Kind, *arrays):
-    def run(data, dt, parameters, state, twist, load, state_bar, wrenches_bar):
-        wide = _beside(parameters, state)
+    def run(data, dt, *inputs):
+        good, dt, (parameters, state, twist, load, state_bar, wrenches_bar) = _numbers(dt, *inputs)
         found = autodiff.rollout_gradient(
-            _packed(kind, data), state, twist, load, dt, wrenches_bar, state_bar, parameters=wide
+            _packed(kind, data), state, twist, load, dt, wrenches_bar, state_bar, parameters=parameters
         )
-        return found.parameters.reshape(parameters.shape), found.state, found.twist, found.normal_force
+        shared = tuple(i for i, length in enumerate(parameters.shape[:-1]) if length == 1)
+        (slopes,) = _spoilt(good.all(axis=shared, keepdims=True), found.parameters)
+        return slopes.reshape(inputs[0].shape), *_spoilt(good, found.state, found.twist, found.normal_force)
 
     return _by_contact(run, arrays, arrays[4].dtype)
+
+
+def _numbers(dt, parameters, *inputs):
+    """Which contacts are given numbers, bool `[...]`, and all inputs with harmless ones for the other contacts.
+
+    Inputs are those of a roll-out and, if any, cotangents of its results. There is nobody to whom an error could be
+    raised: NaN comes out where NaN went in, as from the operations of JAX.
+    """
+    wide = _beside(parameters, inputs[0])
+    inner = 1, 2, 1, 1, 2
+    fit = [
+        (np.abs(value) <= LARGEST).all(axis=tuple(range(-axes, 0)))
+        for value, axes in zip((wide, *inputs), (1, *inner), strict=False)
+    ]
+    good = functools.reduce(np.logical_and, fit) & (dt <= LARGEST)
+    if good.all():
+        return good, dt, (wide, *inputs)
+    usable = [
+        np.where(own.reshape(own.shape + (1,) * axes), value, harmless)
+        for own, value, axes, harmless in zip(fit, (wide, *inputs), (1, *inner), (0.5, 0, 0, 0, 0, 0), strict=False)
+    ]
+    return good, dt if dt <= LARGEST else 0.0, usable
+
+
+def _spoilt(good: np.ndarray, *results: np.ndarray) -> list[np.ndarray]:
+    """Results, NaN for contacts that are not good."""
+    return [np.where(good.reshape(good.shape + (1,) * (r.ndim - good.ndim)), r, np.nan) for r in results]
 
 
 def _by_contact(run, arrays, dtype):

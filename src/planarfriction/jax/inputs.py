@@ -16,7 +16,6 @@ from jax.core import Tracer
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
-from planarfriction.jax import namespace as xp
 
 
 def real(name: str, value: Any) -> jax.Array:
@@ -50,7 +49,7 @@ def non_negative(name: str, value: jax.Array) -> jax.Array:
     """`value`, refused where it is looked at and below zero; elsewhere what is below zero counts as zero."""
     extremes = _extremes(name, value)
     if extremes is None:
-        return xp.maximum(value, 0.0)
+        return jnp.where(value < 0.0, 0.0, value)  # not a maximum, which of NaN and zero takes zero
     if extremes[0] < 0.0:
         raise InvalidValueError(name, "be >= 0", extremes[0])
     return value

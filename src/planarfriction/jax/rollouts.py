@@ -60,7 +60,10 @@ def rollout(
     or `"adjoint"`, the compiled roll-out with its discrete adjoint (reduced models on the processor, float64 inside,
     first derivatives by the parameters, `state`, `twist` and `normal_force`): much faster. None takes "eager".
 
-    Raises `InvalidValueError` for wrong shapes and for a method that is not possible.
+    Inside `jit` a contact that is given NaN, or more than 1e50, gets NaN: its wrenches, its state and its gradients.
+
+    Raises `InvalidValueError` as a step does (see `FrictionModel`), and for a method that is not possible. Inside
+    `jit`, parameters out of their range end the adjoint in an error of JAX whose last line names them.
     """
     if not isinstance(model, FrictionModel):
         kind = type(model)

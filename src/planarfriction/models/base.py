@@ -90,7 +90,7 @@ class FrictionModel(ByValue):
     Twists and wrenches are about the contact frame's origin; the wrench acts on the moving body. Leading batch axes of
     state, twist `[..., 3]`, normal_force `[...]` and dt `[...]` broadcast. The bristles of a contact without load
     (`normal_force == 0`) go on moving while `rate` is integrated, as published; `step` and `simulate` forget them: a
-    contact that loses its load starts again from rest.
+    contact that loses its load starts again from rest. Truth values are no numbers, for one contact as for many.
     """
 
     patch: ContactPatch
