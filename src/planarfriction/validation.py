@@ -36,7 +36,7 @@ LONGEST_NAME = 100
 """Characters of a name."""
 
 DEEPEST = 16
-"""Levels of lists in lists that an array may be given as."""
+"""Axes of an array, and levels of lists in lists that one may be given as; NumPy broadcasts no more than 32."""
 
 _FLOAT, _FINITE = np.dtype(float), np.finfo(float).max
 _PLAIN = frozenset({float, int, np.float64, np.float32, np.int64, np.int32})
@@ -57,6 +57,8 @@ def refusal(value: Any, depth: int = 0) -> str | None:
     if isinstance(value, (np.ndarray, np.generic)):
         if isinstance(value, np.ma.MaskedArray) and np.ma.is_masked(value):
             return " and not masked"
+        if value.ndim > DEEPEST:
+            return f" along at most {DEEPEST} axes"
         return None if value.dtype.kind in "fiu" else _OF_KIND.get(value.dtype.kind, "")
     if isinstance(value, (bool, complex)):
         return _OF_KIND["b" if isinstance(value, bool) else "c"]
@@ -105,7 +107,7 @@ def _states_a_unit(value: Any) -> bool:
 
 def numbers(name: str, value: Any) -> np.ndarray:
     """Return `value` as a float array of any shape (no copy where it is one), or raise."""
-    if type(value) is np.ndarray and value.dtype == _FLOAT:
+    if type(value) is np.ndarray and value.dtype == _FLOAT and value.ndim <= DEEPEST:
         return value
     reason = refusal(value)
     if reason is not None:
