@@ -320,7 +320,7 @@ def test_what_was_unchecked(call, message):
         (lambda: pf.Body(1, 1, velocity=np.broadcast_to(1, (10**5, 10**5))), "velocity must hold at most"),
         (lambda: SQUARE.moments(10**5), "degree must be at most 40"),
         (lambda: SQUARE.compressed(10**5), "degree must be at most 32"),
-        (lambda: pf.LimitSurfaceTable(SQUARE, 10**5), "segments must be at most 500"),
+        (lambda: pf.LimitSurfaceTable(SQUARE, 10**5), "segments must be at most 256"),
         (lambda: pf.LimitSurfaceTablePublished(SQUARE, 10**5), "segments must be at most"),
         (lambda: pf.LimitSurfaceQuartic(SQUARE, segments=10**5), "segments must be at most"),
         (lambda: pf.ReducedModel(SQUARE, pf.LuGre(), segments=10**5), "segments must be at most 256"),
