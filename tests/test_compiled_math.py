@@ -49,7 +49,7 @@ def looped_of_two(function):
     return call
 
 
-exp, log, sin, cos = (looped(getattr(compiled_math, name)) for name in ("exp", "log", "sin", "cos"))
+exp, expm1, log, sin, cos = (looped(getattr(compiled_math, name)) for name in ("exp", "expm1", "log", "sin", "cos"))
 power, atan2 = looped_of_two(compiled_math.power), looped_of_two(compiled_math.atan2)
 
 
@@ -69,6 +69,12 @@ def test_exp_at_the_ends_of_its_range():
     # Limited to +-708 as stated; bristles ask for exp(-infinity) when a step is long.
     assert np.array_equal(exp([1e9, math.inf, -1e9, -math.inf]), exp([708.0, 708.0, -708.0, -708.0]))
     assert 0.0 < exp([-math.inf])[0] < 1e-300
+
+
+def test_expm1(random):
+    x = -np.concatenate([random.uniform(0.0, 1.0, 100_000), 10.0 ** random.uniform(-300, 3, 100_000), [0.4, 800.0]])
+    assert np.abs(expm1(x) / np.expm1(x) - 1.0).max() < 1.5e-15 + NUMPY  # the stated error
+    assert expm1([0.0])[0] == 0.0 and expm1([-math.inf])[0] == -1.0
 
 
 @pytest.mark.parametrize("decades", [1e-15, 1e-7, 0.1, 1.0, 307.0])
@@ -121,6 +127,12 @@ def test_power_is_exact_where_it_can_be(random):
     assert np.array_equal(power(1.0, [0.1, 1.0, 2.0, 7.0]), np.ones(4))
     # At rest: no exponent leaves a rest of exp(-709 exponent).
     assert np.array_equal(power(0.0, [0.001, 0.1, 0.5, 1.0, 1.5, 2.0, 9.0]), np.zeros(7))
+
+
+def test_integers_in_order(random):
+    x = np.concatenate([[-3.0, -1e-300], np.sort(10.0 ** random.uniform(-300, 300, 1000)), [math.inf]])
+    bits = [njit(lambda x: compiled_math.in_order(x))(each) for each in x[::100]]
+    assert bits == sorted(bits) and bits[0] < 0 and len(set(bits)) == len(bits)
 
 
 def test_where_minimum_maximum():

@@ -17,9 +17,14 @@ from typing import Any, Literal
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.experiments.baselines import lsoda_time
+from planarfriction.experiments.baselines import lsoda_time, scipy_twist
 from planarfriction.laws import ElastoPlastic, LuGre
-from planarfriction.limit_surface import LimitSurfaceTablePublished
+from planarfriction.limit_surface import (
+    LimitSurface,
+    LimitSurfaceExact,
+    LimitSurfaceTable,
+    LimitSurfaceTablePublished,
+)
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch, SoftFinger
 from planarfriction.scenes import Scene, Solution, in_hand, in_hand_load, simulate
@@ -196,6 +201,18 @@ def _numpy_table(patch: ContactPatch, segments: int = 20) -> np.ndarray:
     return nodes
 
 
+def _twist(name: str, full: bool, kind: type[LimitSurface], count: int | None = None) -> Measurement:
+    """The twist of a wrench, of an L that is a polygon: one a call, or `count` in a call."""
+    corners = [(0.0, 0.0), (0.03, 0.0), (0.03, 0.005), (0.005, 0.005), (0.005, 0.02), (0.0, 0.02)]
+    surface = kind(ContactPatch.polygon(corners, 21))
+    wrenches = np.random.default_rng(7).normal(size=(count or 1, 3)) * [1.0, 1.0, 0.01]
+    asked = wrenches[0] if count is None else wrenches
+    value = _median(lambda: surface.twist(asked), 15, 1 if count else 500) / len(wrenches)
+    theirs = _median(lambda: scipy_twist(surface, wrenches[0]), 5)
+    words = "SciPy (trust-exact) on the dissipation over the plane of unit power, one wrench"
+    return _line(name, value * 1e6, "us per wrench", words, theirs * 1e6)
+
+
 def _compiled_loop(model: ReducedModel | ReducedModelPublished, twists: np.ndarray) -> float:
     """Time of a model's steps through `twists`, compiled [s]."""
     from planarfriction.autodiff.parameters import pack
@@ -343,6 +360,10 @@ BENCHMARKS: dict[str, Callable[[str, bool], Measurement]] = {
     "in_hand.published.load_dependent": _in_hand_load_dependent,
     "in_hand.reduced.load_family": _in_hand_load_family,
     "table.build": _table_build,
+    "twist.table.call": lambda name, full: _twist(name, full, LimitSurfaceTable),
+    "twist.table.batch": lambda name, full: _twist(name, full, LimitSurfaceTable, 1000),
+    "twist.exact.call": lambda name, full: _twist(name, full, LimitSurfaceExact),
+    "twist.exact.batch": lambda name, full: _twist(name, full, LimitSurfaceExact, 1000),
     "step.published.loop": _step_published_loop,
     "step.distributed.loop": _step_distributed_loop,
     "step.published.call": _step_published_call,

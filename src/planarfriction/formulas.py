@@ -228,3 +228,8 @@ def relaxation_slope(xp, decay_dt, remaining, mean):
     series = 1.0 / 8.0 - x * (1.0 / 30.0 - x * (1.0 / 144.0 - x * (1.0 / 840.0 - x * series)))
     series = -0.5 + x * (1.0 / 3.0 - x * series)
     return xp.where(x > 0.1, (remaining - mean) / xp.where(x > 0.1, x, 1.0), series)
+
+
+def soft_finger(xp, ratio, k):
+    """`k log p` of the relative pressure `p = (1 - (s/R)^k)^(1/k)` of a soft fingertip, `ratio = s/R` in (0, 1)."""
+    return xp.log(-xp.expm1(k * xp.log(ratio)))

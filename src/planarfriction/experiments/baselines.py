@@ -1,4 +1,4 @@
-"""Runs to compare solvers with: ours and SciPy's on the same compiled right-hand side, over a window of a scene."""
+"""What to compare with: SciPy's solver on the same compiled right-hand side over a window of a scene, its minimiser."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import numpy as np
 
 from planarfriction.kernels.body import system_of
 from planarfriction.kernels.integration import Method, Output
+from planarfriction.limit_surface import LimitSurface
 from planarfriction.scenes import Scene
 from planarfriction.scenes.packing import PackedScene, pack
 from planarfriction.solvers import RODAS4, Statistics, integrate
@@ -126,3 +127,23 @@ def _output(packed: PackedScene, times: np.ndarray, *, bristles: bool) -> Output
         np.empty((count, contacts)),
         np.empty(states),
     )
+
+
+def scipy_twist(surface: LimitSurface, wrench: np.ndarray) -> np.ndarray:
+    """`surface.twist(wrench)` as one would write it with the surface's dissipation, wrench and Jacobian."""
+    from scipy import optimize
+
+    scale = np.array([1.0, 1.0, surface.contact_radius])
+    target = -wrench / scale
+    start = target / (target @ target) / scale  # of unit power
+    basis = np.linalg.svd(target[None])[2][1:] / scale
+    solution = optimize.minimize(
+        lambda place: float(surface.dissipation(start + place @ basis)),
+        np.zeros(2),
+        jac=lambda place: -basis @ surface.wrench(start + place @ basis),
+        hess=lambda place: -basis @ surface.jacobian(start + place @ basis) @ basis.T,
+        method="trust-exact",
+        options={"gtol": 1e-10},
+    )
+    twist = start + solution.x @ basis
+    return twist / surface.dissipation(twist)

@@ -79,6 +79,15 @@ def maximum(a, b):
 
 
 @_inline
+def in_order(x):
+    """An integer for a double, larger for larger ones: the largest of many integers is found in vector code.
+
+    Of negative numbers only that they are less than the others.
+    """
+    return _float_to_bits(x)
+
+
+@_inline
 def exp(x):
     """`e^x`, relative error below 6e-16, argument limited to +-708."""
     x = minimum(maximum(x, -_EXP_LARGEST), _EXP_LARGEST)
@@ -92,6 +101,20 @@ def exp(x):
     highest = 1.0 / 479001600.0 + r * (1.0 / 6227020800.0)
     p = (low + r4 * middle) + (r4 * r4) * (high + r4 * highest)
     return p * _bits_to_float((types.int64(k) + 1023) << 52)
+
+
+@_inline
+def expm1(x):
+    """`e^x - 1` for x <= 0, relative error below 1.5e-15."""
+    near = maximum(x, -0.4)
+    # the series, of which the last term is 1e-17 of the first
+    tail = 1.0 / 479001600.0 + near * (1.0 / 6227020800.0)
+    high = (1.0 / 362880.0 + near * (1.0 / 3628800.0)) + near * near * (1.0 / 39916800.0 + near * tail)
+    low = (1.0 / 120.0 + near * (1.0 / 720.0)) + near * near * (1.0 / 5040.0 + near * (1.0 / 40320.0))
+    first = (0.5 + near * (1.0 / 6.0)) + near * near * (1.0 / 24.0)
+    fourth = near * near * near * near
+    series = near + near * near * (first + near * near * near * (low + fourth * high))
+    return where(x < -0.4, exp(x) - 1.0, series)
 
 
 @_inline

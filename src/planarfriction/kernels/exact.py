@@ -19,15 +19,59 @@ Gauss rule on the velocities takes over, and it has no trouble with s = 0.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
+from planarfriction import formulas
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import jit, kernel
-from planarfriction.kernels.vectors import accumulate
+from planarfriction.kernels.vectors import accumulate, put_all
 
 POINTS, SEGMENTS, QUADS = 1, 2, 4
 """Kinds of elements by their number of corners; a triangle is a quad with two corners in one place."""
+
+
+class Elements(NamedTuple):
+    """Points, segments or quads."""
+
+    corners: np.ndarray
+    """Corners `[N, count, 2]`."""
+    shape: np.ndarray
+    """`[N, 13]`: the coefficients P, A, B, C of `_far`, those of its Jacobian determinant times the weight per length
+    or area, the radius about P, and that weight itself."""
+    rules: np.ndarray
+    """Gauss rules `[J, 3, K]` (xi, eta, weight)."""
+    points: np.ndarray
+    """How many points each rule has, `[J]`."""
+    reach: np.ndarray
+    """The distance in radii from which on each rule is used, `[J]`."""
+
+
+class Discs(NamedTuple):
+    """Evenly loaded discs about the centre of pressure; a hole has a negative load."""
+
+    radii: np.ndarray
+    """`[K]`."""
+    loads: np.ndarray
+    """Their shares of the load, `[K]`."""
+
+
+class Rings(NamedTuple):
+    """A disc or ring about the centre of pressure under the pressure of a soft fingertip."""
+
+    share: np.ndarray
+    """Nodes of a rule on (0, 1), `[K]`."""
+    weight: np.ndarray
+    """Their weights, `[K]`."""
+    inner: float
+    outer: float
+    """Radii between which there is load."""
+    radius: float
+    """Radius at which the pressure ends."""
+    exponent: float
+    """Exponent of the profile."""
+
 
 # Distance of the centre of rotation from a segment, relative to its length, below which the distance is rounding: the
 # second derivatives grow with its logarithm.
@@ -151,105 +195,173 @@ def _tier(reach, speed, size):
     return tier
 
 
-@jit
-def element_sums(corners, shape, rules, points, reach, twist, sums):
-    """Gradient and second derivatives of `Phi` at unit twists `[M, 3]` into `sums [M, 9]`.
+@kernel
+def element_sum(elements, x, y, s, block, held, sums):
+    """Gradient and second derivatives of `Phi` at a unit twist into the row `sums` [9].
 
-    Elements: `corners [N, count, 2]`, and `shape [N, 13]`: the coefficients P, A, B, C of `_far`, those of its Jacobian
-    determinant times the weight per length or area, the radius about P, and that weight itself. Gauss rules
-    `rules [J, 3, K]` (xi, eta, weight), of which rule j has `points[j]` points and is used from the distance `reach[j]`
-    radii on.
+    `block` [J, 11, N] and `held` [J] are scratch.
     """
+    corners, shape, tiers = elements.corners, elements.shape, elements.points.shape[0]
     number, count = corners.shape[0], corners.shape[1]
-    tiers = points.shape[0]
-    block = np.empty((tiers, 11, number))
-    held = np.zeros(tiers, np.int64)
+    for tier in range(tiers):
+        held[tier] = 0
+    for k in range(9):
+        sums[k] = 0.0
+    for i in range(number):
+        ux, uy = x - s * shape[i, 1], y + s * shape[i, 0]
+        speed = math.sqrt(ux * ux + uy * uy)
+        if count == POINTS:
+            tier = 0
+            if speed <= _AT_REST:
+                continue
+        else:
+            tier = _tier(elements.reach, speed, abs(s) * shape[i, 11])
+        if tier < 0:
+            accumulate(sums, 0, 1, _near(corners, i, count, shape[i, 12], s, -y / s, x / s))
+        else:
+            for k in range(11):
+                block[tier, k, held[tier]] = shape[i, k]
+            held[tier] += 1
+    for tier in range(tiers):
+        accumulate(sums, 0, 1, _far(block, tier, held[tier], elements.rules, elements.points[tier], x, y, s))
+
+
+@jit
+def element_sums(elements, twist, sums):
+    """`element_sum` at unit twists `[M, 3]` into `sums [M, 9]`."""
+    block = np.empty((elements.points.shape[0], 11, elements.corners.shape[0]))
+    held = np.empty(elements.points.shape[0], np.int64)
     for m in range(twist.shape[0]):
-        x, y, s = twist[m, 0], twist[m, 1], twist[m, 2]
-        sums[m] = 0.0
-        held[:] = 0
-        for i in range(number):
-            ux, uy = x - s * shape[i, 1], y + s * shape[i, 0]
-            speed = math.sqrt(ux * ux + uy * uy)
-            if count == POINTS:
-                tier = 0
-                if speed <= _AT_REST:
-                    continue
-            else:
-                tier = _tier(reach, speed, abs(s) * shape[i, 11])
-            if tier < 0:
-                accumulate(sums[m], 0, 1, _near(corners, i, count, shape[i, 12], s, -y / s, x / s))
-            else:
-                for k in range(11):
-                    block[tier, k, held[tier]] = shape[i, k]
-                held[tier] += 1
-        for tier in range(tiers):
-            accumulate(sums[m], 0, 1, _far(block, tier, held[tier], rules, points[tier], x, y, s))
+        element_sum(elements, twist[m, 0], twist[m, 1], twist[m, 2], block, held, sums[m])
 
 
 @kernel
 def _elliptic(complement):
-    """Complete elliptic integrals `B = int cos^2/Delta` and `D = int sin^2/Delta`, `Delta^2 = 1 - m sin^2`.
+    """Complete elliptic integrals `B = int cos^2/Delta`, `D = int sin^2/Delta` and `C = (D - B)/m`.
 
-    `complement = 1 - m > 0`. By the arithmetic-geometric mean: `K = pi/(2 agm)`, `D = K (1/2 + sum 2^(n-1) c_n^2/m)`.
+    `Delta^2 = 1 - m sin^2`, `complement = 1 - m > 0`. By the arithmetic-geometric mean: `K = pi/(2 agm)`,
+    `D = K (1/2 + m S)`, `B = K (1/2 - m S)`, `S = sum 2^(n-1) c_n^2/m^2`.
     """
-    a, b = 1.0, math.sqrt(complement)
-    # c_1^2/m, without cancellation where m is small
-    c = 0.5 * (1.0 - complement) / (1.0 + b)
-    total, power = 0.5, 1.0
-    per_m = 0.25 * (1.0 - complement) / ((1.0 + b) * (1.0 + b))
-    total += power * per_m
-    a, b = 0.5 * (a + b), math.sqrt(b)
-    while abs(c) > 1e-9 * a:
-        # c_(n+1) = c_n^2/(4 a_(n+1)), and so is its square over m
-        nxt = 0.5 * (a + b)
-        b = math.sqrt(a * b)
-        a = nxt
-        ratio = c / (4.0 * a)
-        per_m *= ratio * ratio
-        c *= ratio
-        power *= 2.0
-        total += power * per_m
-    first = 0.5 * math.pi / a
-    return first * (1.0 - total), first * total
+    b = math.sqrt(complement)
+    m = 1.0 - complement
+    c = 0.5 * m / (1.0 + b)  # c_1, without cancellation where m is small
+    first = 0.25 / ((1.0 + b) * (1.0 + b))
+    means = (0.5 * (1.0 + b), math.sqrt(b), c, first, first)
+    # from 1 - m = 1e-32 on, these are enough; a loop that stops by itself does not vectorise
+    means = _means(_means(_means(means, 2.0), 4.0), 8.0)
+    means = _means(_means(_means(_means(means, 16.0), 32.0), 64.0), 128.0)
+    size, total = 0.5 * math.pi / means[0], means[4]
+    return size * (0.5 - m * total), size * (0.5 + m * total), 2.0 * size * total
+
+
+@kernel
+def _means(means, power):
+    """The next arithmetic and geometric mean, c_n, its square over m^2, and their sum weighted with `power`."""
+    a, b, c, square, total = means
+    mean = 0.5 * (a + b)
+    ratio = c / (4.0 * mean)  # c_(n+1) = c_n^2/(4 a_(n+1)), and so is its square over m^2
+    square *= ratio * ratio
+    return mean, math.sqrt(a * b), c * ratio, square, total + power * square
+
+
+@kernel
+def _axial(x, y, s, v, across, spin, along, twirl):
+    """Gradient and second derivatives of what depends on the slide speed v and the spin alone."""
+    per = 1.0 / v if v > 0.0 else 0.0
+    ex, ey, more = x * per, y * per, along - across
+    return (
+        across * x, across * y, spin * s,
+        across + more * ex * ex, more * ex * ey, -twirl * x * s, across + more * ey * ey, -twirl * y * s, twirl * v * v,
+    )  # fmt: skip
+
+
+@kernel
+def _ratio(v, q):
+    """The larger of two speeds, the smaller over it, and `1 - m` of `m = ratio^2`, never zero."""
+    large = xp.maximum(xp.maximum(v, q), _TINY)
+    ratio = xp.minimum(v, q) / large
+    return large, ratio, xp.maximum(abs(v - q) / large * (1.0 + ratio), 1e-32)
+
+
+@kernel
+def disc_sum(discs, x, y, s):
+    """As `element_sum` for evenly loaded discs, in closed form (docs/physics.md, "Exact limit surfaces")."""
+    v = math.sqrt(x * x + y * y)
+    spin, along, across, twirl = 0.0, 0.0, 0.0, 0.0
+    for k in range(discs.radii.shape[0]):
+        radius = discs.radii[k]
+        q = abs(s) * radius
+        large, ratio, complement = _ratio(v, q)
+        b, d, c = _elliptic(complement)
+        e, w = complement * d, discs.loads[k] * 4.0 / (math.pi * large)
+        across += w * (2.0 * b + e) * (1.0 / 3.0)
+        if v < q:
+            by_spin = b * (3.0 - ratio * ratio) + e * (3.0 - 2.0 * ratio * ratio)
+            curve = b + 2.0 * e
+        else:
+            by_spin, curve = 3.0 * b + c - d, d - c
+        spin += w * by_spin * radius * radius * (1.0 / 9.0)
+        curve *= w / (3.0 * large * large)
+        along += curve * q * q
+        twirl += curve * radius * radius
+    return _axial(x, y, s, v, across, spin, along, twirl)
 
 
 @jit
-def ring_sums(radius, weight, twist, sums):
-    """As `element_sums` for rings about the centre of pressure, `radius` and `weight` `[M, K]` at unit twists `[M, 3]`.
+def disc_sums(discs, twist, sums):
+    """`disc_sum` at unit twists `[M, 3]` into `sums [M, 9]`."""
+    for m in range(twist.shape[0]):
+        put_all(sums[m], disc_sum(discs, twist[m, 0], twist[m, 1], twist[m, 2]))
+
+
+@kernel
+def _rings(rings, start, end, s, v, sums):
+    """Adds the rings between two radii to `sums`: the load, then what `_axial` takes."""
+    load, spin, along, across, twirl = 0.0, 0.0, 0.0, 0.0, 0.0
+    for n in range(rings.share.shape[0]):
+        rho = start + (end - start) * rings.share[n]
+        q = abs(s) * rho
+        large, _, complement = _ratio(v, q)
+        b, d, _ = _elliptic(complement)
+        e = b + complement * d
+        inside = xp.minimum(rho / rings.radius, 1.0)
+        pressure = xp.exp(formulas.soft_finger(xp, inside, rings.exponent) / rings.exponent)
+        part = (end - start) * rings.weight[n] * rho * pressure
+        w = part * 2.0 / (math.pi * large)
+        curve = w * d / (large * large)
+        load += part
+        across += w * xp.where(v >= q, e, b)
+        spin += w * xp.where(v >= q, b, e) * rho * rho
+        along += curve * q * q
+        twirl += curve * rho * rho
+    sums[0] += load
+    sums[1] += across
+    sums[2] += spin
+    sums[3] += along
+    sums[4] += twirl
+
+
+@kernel
+def ring_sum(rings, x, y, s, sums):
+    """As `element_sum` for rings.
 
     A ring whose rim runs at q and slides at v: `Phi = 2/pi (v + q) E(4 v q/(v + q)^2)`, in its derivatives with
     `k = min(v, q)/max(v, q)`: `2/pi E(k^2)` by the larger of v and q, `2/pi k B` by the smaller.
     """
+    v = math.sqrt(x * x + y * y)
+    # where the rim runs as fast as the ring slides, the sum over the radii has a kink
+    kink = rings.outer if v >= abs(s) * rings.outer else xp.maximum(v / abs(s), rings.inner)
+    for k in range(5):
+        sums[k] = 0.0
+    _rings(rings, rings.inner, kink, s, v, sums)
+    _rings(rings, kink, rings.outer, s, v, sums)
+    per = 1.0 / sums[0]
+    across, spin, along, twirl = per * sums[1], per * sums[2], per * sums[3], per * sums[4]
+    put_all(sums, _axial(x, y, s, v, across, spin, along, twirl))
+
+
+@jit
+def ring_sums(rings, twist, sums):
+    """`ring_sum` at unit twists `[M, 3]` into `sums [M, 9]`."""
     for m in range(twist.shape[0]):
-        x, y, s = twist[m, 0], twist[m, 1], twist[m, 2]
-        v = math.sqrt(x * x + y * y)
-        spin, along, across, cross, twirl = 0.0, 0.0, 0.0, 0.0, 0.0
-        for k in range(radius.shape[1]):
-            rho = radius[m, k]
-            q = abs(s) * rho
-            large, small = xp.maximum(v, q), xp.minimum(v, q)
-            if not large > 0.0:
-                continue
-            gap = abs(v - q) / large
-            ratio = small / large
-            complement = xp.maximum(gap * (1.0 + ratio), 1e-32)
-            b, d = _elliptic(complement)
-            e = b + complement * d
-            w = weight[m, k] * 2.0 / (math.pi * large)
-            by_slide, by_spin = (e, b) if v >= q else (b, e)
-            across += w * by_slide
-            spin += w * by_spin * rho * rho
-            curve = w * d / (large * large)
-            along += curve * q * q
-            cross -= curve * rho * rho
-            twirl += curve * rho * rho
-        per = 1.0 / v if v > 0.0 else 0.0
-        ex, ey = x * per, y * per
-        sums[m, 0], sums[m, 1], sums[m, 2] = across * x, across * y, spin * s
-        sums[m, 3] = across + (along - across) * ex * ex
-        sums[m, 4] = (along - across) * ex * ey
-        sums[m, 5] = cross * x * s
-        sums[m, 6] = across + (along - across) * ey * ey
-        sums[m, 7] = cross * y * s
-        sums[m, 8] = twirl * v * v
+        ring_sum(rings, twist[m, 0], twist[m, 1], twist[m, 2], sums[m])

@@ -1,105 +1,295 @@
-"""Twists of wrenches: the least dissipation of a sum over cells, whose minimum often lies on a kink."""
+"""Twists of wrenches: the least dissipation at a given power, by damped Newton steps, for surfaces known to loops.
+
+The gradient h of the dissipation `Phi` has to be parallel to a unit vector `target`, the wrench in conjugate scaled
+coordinates with its sign turned. There `Phi` is least in the plane `target . V = 1`; its slope in that plane over `h .
+target` is the tangent of the angle by which the wrench of V misses the wanted one.
+
+`frame` [21] is what scaled coordinates are (`LimitSurface._scaling`): the matrices that make targets of wrenches and
+twists of scaled twists, row by row, and what an asymmetry adds to h.
+"""
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-from planarfriction.kernels import jit, kernel
+import numpy as np
 
-_BALANCED = 1e-13
-"""Slope of the dissipation at which a rounded minimum is found, per `mu f_N` [-]."""
+from planarfriction.kernels import compiled_math as xp
+from planarfriction.kernels import exact, jit, kernel
+from planarfriction.kernels.surfaces import POTENTIAL, sliding, sliding_jacobian
+from planarfriction.kernels.vectors import dot, norm, plus, put_all, times
 
-_ROUGH = 1e-3
-"""The same for the roundings before the last, which only lead there [-]."""
+BAD_WRENCH = -1.0
+"""In place of an angle: a wrench that is zero or not finite."""
 
-_PLACED = 1e-15
-"""Rounding of a place in the plane [-]: over the rounding-off of a kink, the slope that it leaves there."""
+_BALANCED = 1e-12
+"""Angle [rad] at which a twist is found: what rounding leaves of the exact surfaces."""
 
-_UPHILL = 0.3
-"""Slope at the end of an accepted step, relative to that at its start [-]."""
+_ROUGH = 1e-6
+"""The same for a first guess [rad]."""
+
+_GOOD = 1e-10
+"""Angle [rad] below which a step that does not help ends the search: rounding has the rest."""
 
 _FLATTEST = 1e-12
 """Least curvature that a step of Newton's method trusts, relative to the largest [-]: cells in a line have none."""
 
-_LAST = 1e-10
-"""Speed, relative to the scaled twist, at which the kinks of `|v_i|` are rounded off in the end [-]."""
+_LEVEL = 1e-9
+"""Share of the dissipation by which it may rise where the balance gets better: near the minimum that says more."""
 
-_MOST_STEPS = 60
-"""Newton steps for each rounding; a handful are usual."""
+_MOST_TRIALS = 400
+"""Evaluations at which the search gives up; a handful are usual."""
+
+
+class Table(NamedTuple):
+    """A surface of kind `POTENTIAL`."""
+
+    data: np.ndarray
+    """Its numbers."""
+    size: int
+    """Segments of a quadrant."""
+    duals: np.ndarray
+    """Directions over their dissipation, `[3, rows, columns]`: the largest `target . dual` is nearest to the answer."""
+    mirror: float
+    """-1 if the opposite of a dual is one too, else 1."""
+
+
+class _Exact(NamedTuple):
+    elements: exact.Elements
+    discs: exact.Discs
+    rings: exact.Rings
+    block: np.ndarray
+    held: np.ndarray
+
+
+# ---------------------------------------------------------------------- coordinates
 
 
 @kernel
-def _rounded(x, y, w, target, basis, a, b, rounding):
-    """Slope and Hessian of `sum w_i sqrt(|v_i|^2 + rounding^2)` at a place in the plane `target . V = 1`."""
-    vx = target[0] + a * basis[0, 0] + b * basis[1, 0]
-    vy = target[1] + a * basis[0, 1] + b * basis[1, 1]
-    vs = target[2] + a * basis[0, 2] + b * basis[1, 2]
-    ga, gb, aa, ab, bb = 0.0, 0.0, 0.0, 0.0, 0.0
-    for i in range(x.shape[0]):
-        ux, uy = vx - vs * y[i], vy + vs * x[i]
-        pull = w[i] / math.sqrt(ux * ux + uy * uy + rounding * rounding)
-        # velocity of the cell per unit of a and of b
-        ax, ay = basis[0, 0] - basis[0, 2] * y[i], basis[0, 1] + basis[0, 2] * x[i]
-        bx, by = basis[1, 0] - basis[1, 2] * y[i], basis[1, 1] + basis[1, 2] * x[i]
-        along_a, along_b = ux * ax + uy * ay, ux * bx + uy * by
-        less = pull / (ux * ux + uy * uy + rounding * rounding)
-        ga += pull * along_a
-        gb += pull * along_b
-        aa += pull * (ax * ax + ay * ay) - less * along_a * along_a
-        ab += pull * (ax * bx + ay * by) - less * along_a * along_b
-        bb += pull * (bx * bx + by * by) - less * along_b * along_b
-    return ga, gb, aa, ab, bb
+def target_of(frame, wrench):
+    """The unit vector that h has to be parallel to; of no length for a wrench that is zero or not finite."""
+    largest = xp.maximum(xp.maximum(abs(wrench[0]), abs(wrench[1])), abs(wrench[2]))
+    sound = xp.is_finite(wrench[0]) and xp.is_finite(wrench[1]) and xp.is_finite(wrench[2]) and largest > 0.0
+    per = 1.0 / largest if sound else 0.0
+    x, y, s = wrench[0] * per, wrench[1] * per, wrench[2] * per
+    t = (
+        frame[0] * x + frame[1] * y + frame[2] * s,
+        frame[3] * x + frame[4] * y + frame[5] * s,
+        frame[6] * x + frame[7] * y + frame[8] * s,
+    )
+    return times(1.0 / norm(t), t) if sound else (0.0, 0.0, 0.0)
 
 
 @kernel
-def _newton_move(ga, gb, aa, ab, bb):
-    """Newton's step; along a direction without curvature, a long one downhill."""
-    middle, half = 0.5 * (aa + bb), math.sqrt(0.25 * (aa - bb) * (aa - bb) + ab * ab)
-    high = middle + half
-    if not high > 0.0:
+def is_wrench(target):
+    """Whether `target_of` found one."""
+    return target[0] != 0.0 or target[1] != 0.0 or target[2] != 0.0
+
+
+@kernel
+def put_twist(frame, v, power, row):
+    """Write the twist of the scaled twist v, which dissipates `power`, at unit dissipation."""
+    x, y, s = times(1.0 / power, v)
+    for i in range(3):
+        row[i] = frame[9 + 3 * i] * x + frame[10 + 3 * i] * y + frame[11 + 3 * i] * s
+
+
+@kernel
+def plane(n):
+    """Two unit vectors that span the plane across a unit vector."""
+    sign = -1.0 if n[2] < 0.0 else 1.0
+    a = -1.0 / (sign + n[2])
+    b = n[0] * n[1] * a
+    return (1.0 + sign * n[0] * n[0] * a, sign * b, -sign * n[0]), (b, sign + n[1] * n[1] * a, -n[1])
+
+
+@kernel
+def newton_move(ga, gb, aa, ab, bb):
+    """Newton's step; downhill also where the surface curves downwards, and long where it hardly curves."""
+    det, trace = aa * bb - ab * ab, aa + bb
+    if trace > 0.0 and det > 1e-6 * trace * trace:
+        return (ab * gb - bb * ga) / det, (ab * ga - aa * gb) / det
+    middle, half = 0.5 * trace, math.sqrt(0.25 * (aa - bb) * (aa - bb) + ab * ab)
+    high = middle + half if middle >= 0.0 else middle - half  # the larger one, which loses no digits
+    if high == 0.0:
         return 0.0, 0.0
-    low = max((aa * bb - ab * ab) / high, _FLATTEST * high)
+    low = xp.maximum(abs(det / high), _FLATTEST * abs(high))
+    # of high: its direction is across (ab, bb - high) and across (aa - high, ab)
     angle = 0.5 * math.atan2(2.0 * ab, aa - bb)
     cos, sin = math.cos(angle), math.sin(angle)
-    steep, flat = (cos * ga + sin * gb) / high, (cos * gb - sin * ga) / low
+    if middle < 0.0:
+        cos, sin = -sin, cos
+    steep, flat = (cos * ga + sin * gb) / abs(high), (cos * gb - sin * ga) / low
     return sin * flat - cos * steep, -sin * steep - cos * flat
 
 
+# ---------------------------------------------------------------------- surfaces
+
+
 @kernel
-def _descend(x, y, w, target, basis, a, b, rounding, balanced):
-    """Place of the rounded minimum, from the place `(a, b)`."""
-    ga, gb, aa, ab, bb = _rounded(x, y, w, target, basis, a, b, rounding)
-    last = math.inf
-    for _ in range(_MOST_STEPS):
+def _table_at(table, lean, v, scratch):
+    """`h` and the second derivatives (xx, xy, xs, yy, ys, ss) of the dissipation of a stored potential."""
+    size = norm(v)
+    per = 1.0 / size
+    h = times(per, sliding(POTENTIAL, table.data, 0, table.size, v[0], v[1], v[2], size))
+    sliding_jacobian(POTENTIAL, table.data, 0, table.size, v[0], v[1], v[2], size, scratch)
+    n = times(per, v)
+    second = (
+        per * (scratch[0] - h[0] * n[0]), per * (scratch[1] - h[0] * n[1]), per * (scratch[2] - h[0] * n[2]),
+        per * (scratch[4] - h[1] * n[1]), per * (scratch[5] - h[1] * n[2]), per * (scratch[8] - h[2] * n[2]),
+    )  # fmt: skip
+    return plus(h, 1.0, lean), second
+
+
+@kernel
+def _exact_at(surface, lean, v, scratch):
+    """The same of an integrated surface."""
+    per = 1.0 / norm(v)
+    n = times(per, v)
+    if surface.rings.share.shape[0] > 0:
+        exact.ring_sum(surface.rings, n[0], n[1], n[2], scratch)
+    elif surface.discs.radii.shape[0] > 0:
+        put_all(scratch, exact.disc_sum(surface.discs, n[0], n[1], n[2]))
+    else:
+        exact.element_sum(surface.elements, n[0], n[1], n[2], surface.block, surface.held, scratch)
+    second = (
+        per * scratch[3], per * scratch[4], per * scratch[5],
+        per * scratch[6], per * scratch[7], per * scratch[8],
+    )  # fmt: skip
+    return plus((scratch[0], scratch[1], scratch[2]), 1.0, lean), second
+
+
+@kernel
+def _across(a, second, b):
+    """`a' H b` of second derivatives."""
+    return (
+        a[0] * (second[0] * b[0] + second[1] * b[1] + second[2] * b[2])
+        + a[1] * (second[1] * b[0] + second[3] * b[1] + second[4] * b[2])
+        + a[2] * (second[2] * b[0] + second[4] * b[1] + second[5] * b[2])
+    )
+
+
+@kernel
+def _least(evaluate, surface, lean, target, guess, balanced, scratch):
+    """Scaled twist of least dissipation in the plane of `target`, from a guess; that dissipation, and the angle left.
+
+    A step is taken where the dissipation falls as it should; near the minimum, where that drowns in rounding, where the
+    balance is better.
+    """
+    first, second = plane(target)
+    per = 1.0 / dot(target, guess)
+    a, b = per * dot(first, guess), per * dot(second, guess)
+    ta, tb, da, db, downhill, length, most = a, b, 0.0, 0.0, 0.0, 1.0, math.inf
+    power, slope, angle, last = math.inf, math.inf, math.inf, 0.0
+    for _ in range(_MOST_TRIALS):
+        v = plus(plus(target, ta, first), tb, second)
+        h, slopes = evaluate(surface, lean, v, scratch)
+        trial, ga, gb = dot(h, v), dot(h, first), dot(h, second)
         size = math.sqrt(ga * ga + gb * gb)
-        # at a kink the slope stalls above the wanted one; there it need not halve any more
-        if size <= balanced or (size <= _PLACED / rounding and size >= 0.5 * last):
-            break
-        last = size
-        da, db = _newton_move(ga, gb, aa, ab, bb)
-        downhill, length = da * ga + db * gb, 1.0
-        while length > 1e-12:
-            ta, tb = a + length * da, b + length * db
-            ga, gb, aa, ab, bb = _rounded(x, y, w, target, basis, ta, tb, rounding)
-            # convex along the step: it is short enough while the slope at its end is not steeply uphill
-            if da * ga + db * gb <= -_UPHILL * downhill:
+        gain = power - trial
+        level = abs(gain) < _LEVEL * trial and size < 0.9 * slope
+        if level or gain > 1e-4 * length * downhill:
+            a, b, power, slope = ta, tb, trial, size
+            angle = math.atan2(size, dot(h, target))
+            if angle <= balanced:
                 break
+            da, db = newton_move(
+                ga, gb, _across(first, slopes, first), _across(first, slopes, second), _across(second, slopes, second)
+            )
+            move = math.sqrt(da * da + db * db)
+            if not move > 0.0:
+                break
+            # where the last step had to be shortened, the next one begins as short: the curvature there says little
+            most = 2.0 * length * last if length < 1.0 else 4.0 * most
+            length = xp.minimum(xp.minimum(most, norm(v)) / move, 1.0)
+            da, db, last, length = da * length, db * length, move * length, 1.0
+            downhill = abs(da * ga + db * gb)
+        else:
             length *= 0.5
-        a, b = ta, tb
-    return a, b
+            if angle < _GOOD or length < 1e-14:
+                break
+        ta, tb = a + length * da, b + length * db
+    return plus(plus(target, a, first), b, second), power, angle
+
+
+@kernel
+def _most(duals, row, target, mirror):
+    """The largest power of a row of duals, as an integer."""
+    x, y, s, most = target[0], target[1], target[2], 0
+    for j in range(duals.shape[2]):
+        power = x * duals[0, row, j] + y * duals[1, row, j] + s * duals[2, row, j]
+        most = max(most, xp.in_order(xp.maximum(power, mirror * power)))
+    return most
+
+
+@kernel
+def _nearest(table, target):
+    """The stored direction of least dissipation per unit of power that `target` would have."""
+    duals, mirror = table.duals, table.mirror
+    most, row, best, column, sign = 0, 0, 0.0, 0, 1.0
+    for i in range(duals.shape[1]):
+        here = _most(duals, i, target, mirror)
+        if here > most:
+            most, row = here, i
+    for j in range(duals.shape[2]):
+        power = target[0] * duals[0, row, j] + target[1] * duals[1, row, j] + target[2] * duals[2, row, j]
+        size = xp.maximum(power, mirror * power)
+        if size > best:
+            best, column, sign = size, j, (1.0 if size == power else -1.0)
+    return sign * duals[0, row, column], sign * duals[1, row, column], sign * duals[2, row, column]
+
+
+# ---------------------------------------------------------------------- entry points
 
 
 @jit
-def least_dissipation(x, y, w, targets, bases, twists):
-    """Scaled twists `[M, 3]` of least `sum w_i |v_i|` in the planes `target . V = 1`; `bases` `[M, 2, 3]` span them.
+def table_twists(table, frame, wrenches, twists):
+    """Twists of wrenches `[M, 3]` into `twists [M, 3]`, of unit dissipation.
 
-    The kinks are rounded off by a speed that shrinks to nothing: plain Newton steps stall on them.
+    Returns the largest angle [rad] between a wrench and that of its twist; `BAD_WRENCH` if there is none.
     """
-    for m in range(targets.shape[0]):
-        a, b, rounding = 0.0, 0.0, 1.0
-        while rounding > 2.0 * _LAST:
-            rounding *= 0.1
-            balanced = _ROUGH if rounding > 2.0 * _LAST else _BALANCED
-            a, b = _descend(x, y, w, targets[m], bases[m], a, b, rounding, balanced)
-        for i in range(3):
-            twists[m, i] = targets[m, i] + a * bases[m, 0, i] + b * bases[m, 1, i]
+    scratch, worst = np.empty(9), 0.0
+    lean = (frame[18], frame[19], frame[20])
+    for m in range(wrenches.shape[0]):
+        target = target_of(frame, wrenches[m])
+        if not is_wrench(target):
+            return BAD_WRENCH
+        v, power, angle = _least(_table_at, table, lean, target, _nearest(table, target), _BALANCED, scratch)
+        put_twist(frame, v, power, twists[m])
+        worst = angle if not angle <= worst else worst
+    return worst
+
+
+@jit
+def exact_twists(elements, discs, rings, table, frame, wrenches, twists):
+    """As `table_twists` for elements, or rings or discs if there are any, from the twist that their `table` has."""
+    block = np.empty((elements.points.shape[0], 11, elements.corners.shape[0]))
+    held, scratch, worst = np.empty(elements.points.shape[0], np.int64), np.empty(9), 0.0
+    surface = _Exact(elements, discs, rings, block, held)
+    lean = (frame[18], frame[19], frame[20])
+    for m in range(wrenches.shape[0]):
+        target = target_of(frame, wrenches[m])
+        if not is_wrench(target):
+            return BAD_WRENCH
+        guess, _, _ = _least(_table_at, table, lean, target, _nearest(table, target), _ROUGH, scratch)
+        v, power, angle = _least(_exact_at, surface, lean, target, guess, _BALANCED, scratch)
+        put_twist(frame, v, power, twists[m])
+        worst = angle if not angle <= worst else worst
+    return worst
+
+
+@jit
+def ellipsoid_twists(frame, wrenches, twists):
+    """As `table_twists` for the ellipsoid, whose answer is known."""
+    lean = (frame[18], frame[19], frame[20])
+    for m in range(wrenches.shape[0]):
+        target = target_of(frame, wrenches[m])
+        if not is_wrench(target):
+            return BAD_WRENCH
+        # h = V/|V| + lean is parallel to the target: the target's line meets the shifted unit sphere
+        along = dot(target, lean)
+        reach = along + math.sqrt(along * along + 1.0 - dot(lean, lean))
+        v = plus(times(reach, target), -1.0, lean)
+        put_twist(frame, v, norm(v) + dot(lean, v), twists[m])
+    return 0.0

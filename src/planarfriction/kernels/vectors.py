@@ -112,6 +112,13 @@ def put(row, a):
 
 
 @kernel
+def put_all(row, numbers):
+    """Write a tuple of any length to the beginning of a row."""
+    for i in range(len(numbers)):
+        row[i] = numbers[i]
+
+
+@kernel
 def applied_back(m, a):
     """`M' a`"""
     return (

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
@@ -11,24 +12,29 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.equality import ByValue, by_parts
-from planarfriction.errors import InvalidValueError
+from planarfriction.errors import FrictionError, InvalidValueError, SolverError
 from planarfriction.geometry import transformed
 from planarfriction.kernels import surfaces as kernels
+from planarfriction.kernels.twists import Table, table_twists
 from planarfriction.limit_surface.cell_metrics import scaled_levers
+from planarfriction.limit_surface.least_dissipation import across, descend, table_of
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.metric import refuse_anisotropy, refuse_cell_metrics, symmetric_root
 
 if TYPE_CHECKING:
     from planarfriction.limit_surface.comparison import SurfaceComparison
 
-_FULL_BALANCE = 1e-12
-"""The twist of a wrench is found when its wrench is parallel to the given one to this angle [rad]."""
+CERTIFIED = 1e-5
+"""Largest angle [rad] by which the wrench of a twist that is returned may miss the given one, in scaled coordinates.
+
+It is 1e-12 nearly everywhere. On lines it is more: 1e-8 beside wrenches that many twists share, where the dissipation
+has a slope without curvature that its rounding hides, and 3e-6 in tables next to a pure spin, where they have none."""
 
 _DIFFERENCE = 1e-5
 """Angle [rad] of central differences of `h`: 1e-10 of its third derivative, and 1e-11 of rounding."""
 
 _LARGEST = 1e100
-"""Largest component of a twist or wrench: its square is finite, with room for sums."""
+"""Largest component of a twist: its square is finite, with room for sums."""
 
 MOST_SEGMENTS = 256
 """Segments of a quadrant of a stored surface that are taken: 8 MB, two seconds; errors fall as their fourth power."""
@@ -158,9 +164,9 @@ class LimitSurface(ByValue):
     def direction_slope(self, units: np.ndarray) -> np.ndarray:
         """`dh/dV_S` `[M, 3, 3]` at unit scaled twists `[M, 3]`: by central differences unless overridden."""
         slope = np.zeros((len(units), 3, 3))
-        for across in np.moveaxis(_plane(units), -2, 0):
-            ends = [self.direction(_unit(units + sign * _DIFFERENCE * across)) for sign in (1.0, -1.0)]
-            slope += np.einsum("mi,mj->mij", (ends[0] - ends[1]) / (2.0 * _DIFFERENCE), across)
+        for axis in np.moveaxis(across(units), -2, 0):
+            ends = [self.direction(_unit(units + sign * _DIFFERENCE * axis)) for sign in (1.0, -1.0)]
+            slope += np.einsum("mi,mj->mij", (ends[0] - ends[1]) / (2.0 * _DIFFERENCE), axis)
         return slope
 
     @functools.cached_property
@@ -195,20 +201,23 @@ class LimitSurface(ByValue):
     def twist(self, wrench) -> np.ndarray:
         """Twist normal to the surface where the ray of `wrench` meets it, of unit dissipation, shape `[..., 3]`.
 
-        `argmin Phi(V)` subject to `-W . V = 1`, scaled to `Phi(V) = 1`; the magnitude of `wrench` does not matter.
+        `argmin Phi(V)` subject to `-W . V = 1`, scaled to `Phi(V) = 1`; the magnitude of `wrench` does not matter. The
+        wrench of what is returned is parallel to the given one to `CERTIFIED`; where the patch turns about a loaded
+        point, that point's own force, which may then be any up to its friction, makes up for the rest. Of many twists
+        with one wrench it is any, of several on a surface that is not convex one of little dissipation.
 
-        Raises `InvalidValueError` if `wrench` is zero, not finite or not of shape `[..., 3]`.
+        Raises `InvalidValueError` if `wrench` is zero, not finite or not of shape `[..., 3]`, and `SolverError` if no
+        twist is found.
         """
-        wrench = _rows("wrench", wrench)
-        if not (np.abs(wrench).max(axis=-1) > 0.0).all():
-            raise InvalidValueError("wrench", "not be zero", wrench.tolist())
-        frame = self._frame()
-        # conjugate coordinates: force and torque / r about the centre of pressure; -h balances the wrench
-        balanced = -_solved(frame.T, wrench.reshape(-1, 3))
-        balanced /= np.linalg.norm(balanced, axis=1)[:, None]
-        found = self._scaled_twists_of(balanced)
-        found /= np.einsum("ni,ni->n", self._direction(found), found)[:, None]
-        return _solved(frame, found).reshape(wrench.shape)
+        wrench = _vectors("wrench", wrench)
+        if wrench.ndim > 1:
+            validation.finite_numbers("wrench", wrench, largest=math.inf)  # before it is copied, whatever its size
+        rows = np.array(wrench, order="C").reshape(-1, 3)  # writable, for which loops are compiled
+        found = np.empty_like(rows)
+        angle = self._find_twists(rows, found)
+        if not 0.0 <= angle <= CERTIFIED:
+            raise _no_twist(wrench, angle)
+        return found.reshape(wrench.shape)
 
     def compare(self, reference: LimitSurface, *, samples: int = 200) -> SurfaceComparison:
         """Differences from another surface: wrenches of the same twists, and twists of the same wrenches.
@@ -234,6 +243,18 @@ class LimitSurface(ByValue):
                 root = symmetric_root(np.einsum("n,nij->ij", self.patch.weights(self.normal_force), self.patch.metric))
             frame[:2] = root @ frame[:2]
         return frame
+
+    @functools.cached_property
+    def _scaling(self) -> np.ndarray:
+        """What makes targets of wrenches and twists of scaled twists, and the lean: `kernels.twists` says how."""
+        back = np.linalg.inv(self._frame())
+        # conjugate coordinates: force and torque / r about the centre of pressure; -h balances the wrench
+        return np.concatenate([-back.T.ravel(), back.ravel(), np.zeros(3) if self._lean is None else self._lean])
+
+    @functools.cached_property
+    def _table(self) -> Table:
+        """The stored surface, from which searches for twists start."""
+        return table_of(self)
 
     def _scaled(self, twist) -> tuple[np.ndarray, np.ndarray]:
         frame = self._frame()
@@ -262,65 +283,19 @@ class LimitSurface(ByValue):
         slope[moving] = self.direction_slope(units) + np.einsum("mi,mj->mij", self.direction(units), units)
         return slope
 
-    def _scaled_twists_of(self, targets: np.ndarray) -> np.ndarray:
-        """`_scaled_twist_of` for unit vectors `[M, 3]`."""
-        return np.array([self._scaled_twist_of(target) for target in targets]).reshape(-1, 3)
+    def _find_twists(self, wrenches: np.ndarray, found: np.ndarray) -> float:
+        """Write the twists of wrenches `[M, 3]`; the largest angle [rad] that is left, negative for a bad wrench.
 
-    def _scaled_twist_of(self, target: np.ndarray) -> np.ndarray:
-        """Direction of the scaled twist whose `h` is parallel to the unit vector `target`.
-
-        Minimises the convex `Phi` over the plane `target . V = 1` by damped Newton steps from `_first_guess`.
+        From those of the stored table, by the surface's own `direction`.
         """
-        basis = _plane(target)
-        guess = self._first_guess(target)
-        place = basis @ guess / (target @ guess)
-        value, slope = self._dissipation_over(target, basis, place)
-        for _ in range(60):
-            balance = np.linalg.norm(slope)
-            if balance < _FULL_BALANCE:
-                break
-            point = target + place @ basis
-            hessian = basis @ self._direction_slope(point[None])[0] @ basis.T
-            # where a table curves downwards, the same step along that direction, but downhill
-            curvature, across = np.linalg.eigh(hessian)
-            curvature = np.maximum(np.abs(curvature), 1e-12 * np.abs(curvature).max())
-            if not curvature.max() > 0.0:
-                break
-            move = -across @ ((across.T @ slope) / curvature)
-            length = 1.0
-            while length > 1e-14:
-                trial, trial_slope = self._dissipation_over(target, basis, place + length * move)
-                gain = value - trial
-                # near the minimum the gain drowns in rounding; there a better balance shows progress
-                flat = abs(gain) < 1e-14 * value and np.linalg.norm(trial_slope) < 0.5 * balance
-                if flat or gain > 1e-4 * length * abs(move @ slope):
-                    break
-                length *= 0.5
-            else:
-                break
-            place, value, slope = place + length * move, trial, trial_slope
-        return target + place @ basis
-
-    def _first_guess(self, target: np.ndarray) -> np.ndarray:
-        """A scaled twist near the one whose `h` is parallel to `target`: the ellipsoid's."""
-        return target
-
-    def _dissipation_over(self, target: np.ndarray, basis: np.ndarray, place: np.ndarray) -> tuple[float, np.ndarray]:
-        """`Phi` and its slope `[2]` at a place in the plane `target . V = 1`."""
-        point = target + place @ basis
-        h = self._direction(point[None])[0]
-        return float(h @ point), basis @ h
+        angle = table_twists(self._table, self._scaling, wrenches, found)
+        return angle if angle < 0.0 else descend(self, wrenches, found)
 
 
 def scaling(centre_of_pressure: np.ndarray, contact_radius: float) -> np.ndarray:
     """`F` of `V_S = F V`: from the contact frame's origin to the centre of pressure, spin times the contact radius."""
     x, y = centre_of_pressure
     return np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, contact_radius]])
-
-
-def _solved(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """`matrix^-1 v` for each v of `vectors` `[M, 3]`, one by one: LAPACK rounds many at once differently."""
-    return np.linalg.solve(matrix, vectors[..., None])[..., 0]
 
 
 def _norm(scaled: np.ndarray) -> np.ndarray:
@@ -333,15 +308,20 @@ def _unit(scaled: np.ndarray) -> np.ndarray:
     return scaled / _norm(scaled)[:, None]
 
 
-def _plane(normal: np.ndarray) -> np.ndarray:
-    """Two unit vectors `[..., 2, 3]` that span the plane across the unit vector `normal` `[..., 3]`."""
-    first = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal), axis=-1)])
-    first /= np.linalg.norm(first, axis=-1)[..., None]
-    return np.stack([first, np.cross(normal, first)], axis=-2)
-
-
-def _rows(name: str, value) -> np.ndarray:
-    result = validation.finite_numbers(name, value, largest=_LARGEST)
+def _vectors(name: str, value) -> np.ndarray:
+    result = validation.numbers(name, value)
     if result.ndim == 0 or result.shape[-1] != 3:
         raise InvalidValueError(name, "have shape [..., 3]", f"shape {list(result.shape)}")
     return result
+
+
+def _rows(name: str, value) -> np.ndarray:
+    return validation.finite_numbers(name, _vectors(name, value), largest=_LARGEST)
+
+
+def _no_twist(wrench: np.ndarray, angle: float) -> FrictionError:
+    """Why there is no twist of `wrench` `[..., 3]`; raises that itself if it is not finite."""
+    validation.finite_numbers("wrench", wrench, largest=math.inf)
+    if not (np.abs(wrench).max(axis=-1) > 0.0).all():
+        return InvalidValueError("wrench", "not be zero", wrench.tolist())
+    return SolverError(f"no twist found: the wrench of the nearest one is {angle:.1e} rad off (see LimitSurfaceExact)")

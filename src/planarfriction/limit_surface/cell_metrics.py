@@ -46,41 +46,6 @@ def cell_slopes(levers: np.ndarray, weights: np.ndarray, scaled: np.ndarray) -> 
     return result
 
 
-def cell_twist(
-    levers: np.ndarray, weights: np.ndarray, lean: np.ndarray, target: np.ndarray, basis: np.ndarray
-) -> np.ndarray:
-    """Scaled twist `[3]` whose `h`, the constant `lean` `[3]` included, is parallel to the unit vector `target`.
-
-    Minimises the dissipation over the plane `target . V = 1`, spanned by `basis` `[2, 3]`, with the kinks of `|u_i|`
-    rounded off by a radius that shrinks to nothing.
-    """
-    from scipy import optimize
-
-    maps = np.einsum("ad,icd->aci", basis, levers)  # [2, 2, n]
-
-    def potential(place: np.ndarray, rounding: float):
-        point = target + place @ basis
-        velocity = levers @ point
-        speed = np.sqrt((velocity**2).sum(axis=1) + rounding**2)
-        along = np.einsum("aci,ic->ai", maps, velocity / speed[:, None])
-        hessian = np.einsum("i,aci,bci->ab", weights / speed, maps, maps)
-        hessian -= np.einsum("i,ai,bi->ab", weights / speed, along, along)
-        return float(weights @ speed + lean @ point), along @ weights + basis @ lean, hessian
-
-    place = np.zeros(2)
-    for rounding in 10.0 ** -np.arange(1.0, 11.0):
-        solution = optimize.minimize(
-            lambda p, e=rounding: potential(p, e)[:2],
-            place,
-            jac=True,
-            hess=lambda p, e=rounding: potential(p, e)[2],
-            method="trust-exact",
-            options={"gtol": 1e-13, "initial_trust_radius": max(10.0 * rounding, 1e-9)},
-        )
-        place = solution.x
-    return target + place @ basis
-
-
 def potential_table(levers: np.ndarray, weights: np.ndarray, segments: int) -> np.ndarray:
     """Numbers of a `POTENTIAL` surface of `kernels.surfaces`, flat, from sums over the cells."""
     segment = 0.5 * np.pi / segments

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from planarfriction.kernels import surfaces as kernels
-from planarfriction.kernels.twists import least_dissipation
-from planarfriction.limit_surface.base import SurfaceNumbers, _plane
-from planarfriction.limit_surface.cell_metrics import cell_slopes, cell_sums, cell_twist
+from planarfriction.kernels.cell_twists import cell_twists
+from planarfriction.limit_surface.base import SurfaceNumbers
+from planarfriction.limit_surface.cell_metrics import cell_slopes, cell_sums
 from planarfriction.limit_surface.compiled import CompiledLimitSurface
 
 
@@ -38,16 +38,12 @@ class LimitSurfaceCells(CompiledLimitSurface):
     def _sliding_slope(self, scaled: np.ndarray) -> np.ndarray:
         return super()._sliding_slope(scaled) if self._one_metric else cell_slopes(*self._scaled_levers, scaled)
 
-    def _scaled_twists_of(self, targets: np.ndarray) -> np.ndarray:
-        """As the base class, all at once, with the kinks of `|v_i|` rounded off by a radius that shrinks to nothing.
+    @functools.cached_property
+    def _cell_rows(self) -> tuple[np.ndarray, np.ndarray]:
+        """Levers `[2, 3, n]` and weights `[n]` for compiled loops."""
+        levers, weights = self._scaled_levers
+        return np.ascontiguousarray(np.moveaxis(levers, 0, -1)), weights
 
-        The minimum often lies on a kink (a wrench inside a flat facet of the surface: the body turns about one cell),
-        where the plain Newton method stalls.
-        """
-        if self._lean is not None or not self._one_metric:
-            lean = np.zeros(3) if self._lean is None else self._lean
-            found = [cell_twist(*self._scaled_levers, lean, target, _plane(target)) for target in targets]
-            return np.array(found).reshape(-1, 3)
-        found = np.empty_like(targets)
-        least_dissipation(*self.numbers.data.reshape(3, -1), targets, _plane(targets), found)
-        return found
+    def _find_twists(self, wrenches: np.ndarray, found: np.ndarray) -> float:
+        """The minimum often lies on a kink: a wrench inside a flat facet of the surface turns the body about a cell."""
+        return cell_twists(*self._cell_rows, self._scaling, wrenches, found)

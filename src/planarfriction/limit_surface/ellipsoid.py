@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planarfriction.kernels import surfaces as kernels
+from planarfriction.kernels.twists import ellipsoid_twists
 from planarfriction.limit_surface.base import SurfaceNumbers
 from planarfriction.limit_surface.compiled import CompiledLimitSurface
 
@@ -30,9 +31,5 @@ class LimitSurfaceEllipsoid(CompiledLimitSurface):
         """No numbers beyond the contact radius."""
         return SurfaceNumbers(self.kind, 0, np.zeros(0))
 
-    def _scaled_twist_of(self, target: np.ndarray) -> np.ndarray:
-        if self._lean is None:
-            return target
-        # h = V_S/|V_S| + lean is parallel to the target: the target's line meets the shifted unit sphere
-        along = float(target @ self._lean)
-        return (along + np.sqrt(along**2 + 1.0 - self._lean @ self._lean)) * target - self._lean
+    def _find_twists(self, wrenches: np.ndarray, found: np.ndarray) -> float:
+        return ellipsoid_twists(self._scaling, wrenches, found)

@@ -9,9 +9,10 @@ from typing import NamedTuple, Protocol
 import numpy as np
 
 from planarfriction.kernels import exact as kernels
+from planarfriction.kernels.twists import exact_twists
 from planarfriction.limit_surface.base import LimitSurface, SurfaceNumbers, _norm
 from planarfriction.limit_surface.cells import LimitSurfaceCells
-from planarfriction.patch import Pressure, SoftFinger, Uniform
+from planarfriction.patch import SoftFinger, Uniform
 from planarfriction.patch.outline import PolygonOutline, RoundOutline
 
 EXACT_RULES = ((4.0, 8), (8.0, 6), (16.0, 5), (50.0, 4), (400.0, 3))
@@ -35,6 +36,12 @@ _ENDS, _RADII = 3.3, 64
 """Double-exponential rule over radii: it ends where a share of 3e-19 of the way is left, and has so many points between
 kinks. Error of the wrench at most 3e-13 and of its slope 3e-12 (pressures that end in a step, k > 8), else 1e-14."""
 
+_EVEN = 1e300
+"""Exponent of the profile of an even pressure: that of a soft fingertip tends to it."""
+
+_THICK = 0.9
+"""Inner over outer radius up to which a ring is the difference of two discs: they lose a digit there."""
+
 
 Rules = tuple[tuple[float, int], ...]
 
@@ -43,6 +50,8 @@ class _Parts(Protocol):
     """What a surface is integrated over: sums `[M, 9]` at unit twists `[M, 3]`, in the unit of length `unit` [m]."""
 
     def sums(self, twists: np.ndarray, unit: float, rules: Rules) -> np.ndarray: ...
+
+    def rows(self, unit: float) -> kernels.Elements | kernels.Discs | kernels.Rings: ...
 
 
 class _Elements(NamedTuple):
@@ -54,16 +63,32 @@ class _Elements(NamedTuple):
     """Share of the load of each, `[N]` [-]; negative for the triangles that a polygon subtracts."""
 
     def sums(self, twists: np.ndarray, unit: float, rules: Rules) -> np.ndarray:
-        corners = self.corners / unit
-        shape = _shape(corners, self.weights)
-        nodes, points, reach = _gauss_rules(corners.shape[1], rules)
         sums = np.empty((len(twists), 9))
-        kernels.element_sums(corners, shape, nodes, points, reach, twists, sums)
+        kernels.element_sums(self.rows(unit, rules), twists, sums)
         return sums
 
+    def rows(self, unit: float, rules: Rules = EXACT_RULES) -> kernels.Elements:
+        """As compiled loops know them."""
+        corners = self.corners / unit
+        return kernels.Elements(corners, _shape(corners, self.weights), *_gauss_rules(corners.shape[1], rules))
 
-_TOGETHER = 4096
-"""Directions that are integrated over rings at a time: some ten MB, where all of a large table took a gigabyte."""
+
+class _Discs(NamedTuple):
+    """Evenly loaded discs about the centre of pressure; a ring is one less another."""
+
+    radii: np.ndarray
+    """Radii `[K]` [m]."""
+    loads: np.ndarray
+    """Share of the load of each, `[K]` [-]."""
+
+    def sums(self, twists: np.ndarray, unit: float, rules: Rules) -> np.ndarray:
+        sums = np.empty((len(twists), 9))
+        kernels.disc_sums(self.rows(unit), twists, sums)
+        return sums
+
+    def rows(self, unit: float) -> kernels.Discs:
+        """As compiled loops know them."""
+        return kernels.Discs(self.radii / unit, self.loads)
 
 
 class _Rings(NamedTuple):
@@ -71,30 +96,21 @@ class _Rings(NamedTuple):
 
     inner: float
     outer: float
-    pressure: Pressure
-    normal_force: float | None
+    """Radii of the patch [m]."""
+    reach: float
+    """Radius at which the pressure ends [m]."""
+    exponent: float
+    """Exponent of its profile; `_EVEN` for an even pressure."""
 
     def sums(self, twists: np.ndarray, unit: float, rules: Rules) -> np.ndarray:
         sums = np.empty((len(twists), 9))
-        for first in range(0, len(twists), _TOGETHER):
-            part = slice(first, first + _TOGETHER)
-            sums[part] = self._sums(twists[part], unit)
+        kernels.ring_sums(self.rows(unit), twists, sums)
         return sums
 
-    def _sums(self, twists: np.ndarray, unit: float) -> np.ndarray:
-        spin = np.abs(twists[:, 2])
-        with np.errstate(divide="ignore", over="ignore"):
-            kink = unit * np.hypot(twists[:, 0], twists[:, 1]) / spin  # where the rim runs as fast as the ring slides
-        kink = np.clip(np.where(spin > 0.0, kink, np.inf), self.inner, self.outer)[:, None]
-        share, weight = _double_exponential()
-        radii = np.hstack([self.inner + (kink - self.inner) * share, kink + (self.outer - kink) * share])
-        load = radii * np.hstack([(kink - self.inner) * weight, (self.outer - kink) * weight])
-        places = np.stack([radii.ravel(), np.zeros(radii.size)], -1)
-        force = None if self.normal_force is None else np.array(self.normal_force)
-        load *= self.pressure.relative(places, force).reshape(radii.shape)
-        sums = np.empty((len(twists), 9))
-        kernels.ring_sums(radii / unit, load / load.sum(axis=1, keepdims=True), twists, sums)
-        return sums
+    def rows(self, unit: float) -> kernels.Rings:
+        """As compiled loops know them."""
+        radii = (self.inner / unit, min(self.outer, self.reach) / unit, self.reach / unit)
+        return kernels.Rings(*_double_exponential(), *radii, self.exponent)
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,8 +162,14 @@ class LimitSurfaceExact(LimitSurface):
         outline, pressure = self._outline, self.patch.pressure
         self.patch.weights(self.normal_force)  # refuses a missing normal force
         if isinstance(outline, RoundOutline):
-            reach = float(pressure.radius(self.normal_force or 1.0)) if isinstance(pressure, SoftFinger) else np.inf
-            return _Rings(outline.inner, min(outline.outer, reach), pressure, self.normal_force)
+            if isinstance(pressure, Uniform) and outline.inner <= _THICK * outline.outer:
+                radii = np.array([outline.outer, outline.inner] if outline.inner > 0.0 else [outline.outer])
+                squares = radii**2 * [1.0, -1.0][: len(radii)]
+                return _Discs(radii, squares / squares.sum())
+            if isinstance(pressure, Uniform):
+                return _Rings(outline.inner, outline.outer, outline.outer, _EVEN)
+            load = self.normal_force or 1.0
+            return _Rings(outline.inner, outline.outer, *map(float, (pressure.radius(load), pressure.exponent(load))))
         if isinstance(outline, PolygonOutline):
             triangles = outline.triangles()
             areas = _area(triangles)
@@ -185,10 +207,27 @@ class LimitSurfaceExact(LimitSurface):
         """Integrated alike."""
         return self.sums(units)[1]
 
-    def _scaled_twists_of(self, targets: np.ndarray) -> np.ndarray:
-        if isinstance(self._parts, _Elements) and self._parts.corners.shape[1] == kernels.POINTS:
-            return LimitSurfaceCells(self.patch, normal_force=self.normal_force)._scaled_twists_of(targets)
-        return super()._scaled_twists_of(targets)
+    @functools.cached_property
+    def _points(self) -> LimitSurfaceCells | None:
+        """The sum over the cells, if they are points."""
+        points = isinstance(self._parts, _Elements) and self._parts.corners.shape[1] == kernels.POINTS
+        return LimitSurfaceCells(self.patch, normal_force=self.normal_force) if points else None
+
+    @functools.cached_property
+    def _loops(self) -> tuple[kernels.Elements, kernels.Discs, kernels.Rings]:
+        """What compiled loops integrate over: of the three only that which is not empty."""
+        none = np.zeros(0)
+        elements = _Elements(np.zeros((0, 2, 2)), none).rows(1.0)
+        discs, rings = kernels.Discs(none, none), kernels.Rings(none, none, 0.0, 1.0, 1.0, 1.0)
+        rows = self._parts.rows(self.contact_radius)
+        if isinstance(rows, kernels.Elements):
+            return rows, discs, rings
+        return (elements, rows, rings) if isinstance(rows, kernels.Discs) else (elements, discs, rows)
+
+    def _find_twists(self, wrenches: np.ndarray, found: np.ndarray) -> float:
+        if self._points is not None:
+            return self._points._find_twists(wrenches, found)
+        return exact_twists(*self._loops, self._table, self._scaling, wrenches, found)
 
 
 def _area(triangles: np.ndarray) -> np.ndarray:

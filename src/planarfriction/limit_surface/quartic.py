@@ -10,6 +10,8 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
+from planarfriction.geometry import transformed
+from planarfriction.kernels.twists import BAD_WRENCH
 from planarfriction.limit_surface import quartic_fit
 from planarfriction.limit_surface.base import MOST_SEGMENTS, LimitSurface, _rows, scaling
 from planarfriction.limit_surface.cells import LimitSurfaceCells
@@ -118,8 +120,16 @@ class LimitSurfaceQuartic(LimitSurface):
     def _hessian(self, points: np.ndarray) -> np.ndarray:
         return np.einsum("mcij,c->mij", quartic_fit.hessians(points), self.quartic)
 
-    def _scaled_twists_of(self, targets: np.ndarray) -> np.ndarray:
-        return self._gradient(targets)
+    def _find_twists(self, wrenches: np.ndarray, found: np.ndarray) -> float:
+        scaling, size = self._scaling, np.abs(wrenches).max(axis=1)
+        if not (np.isfinite(size).all() and (size > 0.0).all()):
+            return BAD_WRENCH
+        targets = (wrenches / size[:, None]) @ scaling[:9].reshape(3, 3).T
+        targets /= np.linalg.norm(targets, axis=1)[:, None]
+        # H(h) = 1 along the target, and Phi(V) = h . V = 4 for its gradient V there
+        x = targets / self._value(targets)[:, None] ** 0.25
+        found[:] = transformed(scaling[9:18].reshape(3, 3), 0.25 * self._gradient(x))
+        return 0.0
 
     def _conjugate(self, units: np.ndarray) -> np.ndarray:
         """`x` with `grad H(x) = 4 V` for unit vectors `[M, 3]`: the least of the convex `H(x)/4 - V . x`.

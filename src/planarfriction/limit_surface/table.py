@@ -9,6 +9,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.kernels import surfaces as kernels
+from planarfriction.kernels.twists import table_twists
 from planarfriction.limit_surface.base import MOST_SEGMENTS, SurfaceNumbers
 from planarfriction.limit_surface.cell_metrics import potential_table
 from planarfriction.limit_surface.compiled import CompiledLimitSurface
@@ -53,18 +54,8 @@ class LimitSurfaceTable(CompiledLimitSurface):
             return SurfaceNumbers(self.kind, self.segments, potential_table(*self._scaled_levers, self.segments))
         return SurfaceNumbers(self.kind, self.segments, _nodes(self._exact, self.segments))
 
-    def _first_guess(self, target: np.ndarray) -> np.ndarray:
-        """The node of least dissipation per unit of power that `target` would have."""
-        segment = 0.5 * np.pi / self.segments
-        polar, azimuth = np.meshgrid(
-            np.arange(self.segments + 1) * segment, np.arange(4 * self.segments) * segment, indexing="ij"
-        )
-        upper = np.stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], -1)
-        upper = upper.reshape(-1, 3)
-        power = upper @ target
-        upper *= np.where(power < 0.0, -1.0, 1.0)[:, None]
-        cost = np.einsum("ni,ni->n", self._direction(upper), upper) / np.maximum(np.abs(power), 1e-300)
-        return upper[int(np.argmin(cost))]
+    def _find_twists(self, wrenches: np.ndarray, found: np.ndarray) -> float:
+        return table_twists(self._table, self._scaling, wrenches, found)
 
 
 def _nodes(exact: LimitSurfaceExact, segments: int) -> np.ndarray:

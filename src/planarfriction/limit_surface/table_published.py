@@ -10,11 +10,9 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.kernels import surfaces as kernels
 from planarfriction.kernels import tables
-from planarfriction.limit_surface.base import MOST_SEGMENTS, SurfaceNumbers, _plane
+from planarfriction.kernels.published_twists import published_twists
+from planarfriction.limit_surface.base import MOST_SEGMENTS, SurfaceNumbers
 from planarfriction.limit_surface.compiled import CompiledLimitSurface
-
-_SAME_ANSWER = 1e-12
-"""Angle [rad] between a stored wrench and the wanted one below which a direction answers: rounding of the quadratic."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,41 +59,6 @@ class LimitSurfaceTablePublished(CompiledLimitSurface):
         tables.smoothed_nodes(corners, place, *self._loaded_cells(), self.contact_radius, self.segments, nodes)
         return SurfaceNumbers(self.kind, self.segments, nodes.reshape(-1))
 
-    def _scaled_twist_of(self, target: np.ndarray) -> np.ndarray:
-        """The direction whose stored `h` is parallel to `target`, exactly: two bilinear equations in each table cell.
-
-        Where the stored map folds and several directions answer, the one of least dissipation.
-        """
-        nodes = self.numbers.data.reshape(self.segments + 1, -1, 4)[..., :3]
-        across = nodes @ _plane(target).T  # [i, j, 2]: zero where h is parallel to the target
-        corner = across[:-1, :-1]
-        along_a, along_b = across[1:, :-1] - corner, across[:-1, 1:] - corner
-        twisted = across[1:, 1:] - across[1:, :-1] - along_b
-        # (corner + along_b b) x (along_a + twisted b) = 0 for the position b along the azimuth: q2 b^2 + q1 b + q0 = 0
-        q2, q0 = _cross(along_b, twisted), _cross(corner, along_a)
-        q1 = _cross(corner, twisted) + _cross(along_b, along_a)
-        root = np.sqrt(np.maximum(q1 * q1 - 4.0 * q2 * q0, 0.0))
-        half = -0.5 * (q1 + np.where(q1 < 0.0, -root, root))
-        b = np.clip(np.stack([_quotient(half, q2), _quotient(q0, half), np.zeros_like(q0)]), 0.0, 1.0)[..., None]
-        step, start = along_a + twisted * b, corner + along_b * b
-        a = np.clip(_quotient(-(start * step).sum(-1), (step * step).sum(-1)), 0.0, 1.0)[..., None]
-        place = np.stack(np.broadcast_arrays(np.arange(self.segments)[:, None], np.arange(4 * self.segments)), -1)
-        polar, azimuth = np.moveaxis(0.5 * np.pi / self.segments * (place + np.concatenate([a, b], -1)), -1, 0)
-        upper = np.stack([np.sin(polar) * np.cos(azimuth), np.sin(polar) * np.sin(azimuth), np.cos(polar)], -1)
-        upper = upper.reshape(-1, 3)
-        best = np.argsort(np.linalg.norm(start + step * a, axis=-1), axis=None)[:8]
-        h = self._direction(upper[best])
-        side, size = np.sign(h @ target), np.abs(h @ target)
-        miss = np.linalg.norm(np.cross(h, target), axis=-1)
-        answers = miss <= max(_SAME_ANSWER, miss.min())
-        chosen = np.flatnonzero(answers)[np.argmin(size[answers])]
-        return side[chosen] * upper[best[chosen]]
-
-
-def _cross(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    return first[..., 0] * second[..., 1] - first[..., 1] * second[..., 0]
-
-
-def _quotient(numerator: np.ndarray, denominator: np.ndarray) -> np.ndarray:
-    """The quotient; zero where there is none."""
-    return np.divide(numerator, denominator, out=np.zeros_like(numerator), where=denominator != 0.0)
+    def _find_twists(self, wrenches: np.ndarray, found: np.ndarray) -> float:
+        """Where the stored map folds and several directions answer, the one of least dissipation."""
+        return published_twists(self.numbers.data, self.segments, self._scaling, wrenches, found)

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from planarfriction import validation
+from planarfriction import formulas, validation
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError, shown
 
@@ -164,7 +164,7 @@ class SoftFinger(Pressure):
         nearest = distance <= distance.min() * (1.0 + SAME_DISTANCE)
         # In logarithms, relative to the largest value: at small k the profile underflows everywhere but at s = 0.
         with np.errstate(divide="ignore"):
-            profile = np.log(-np.expm1(k * np.log(np.where(inside, ratio, 0.5))))
+            profile = formulas.soft_finger(np, np.where(inside, ratio, 0.5), k)
         profile = np.where(inside, profile, -np.inf)
         profile = np.where(inside.any(-1, keepdims=True), profile, np.where(nearest, 0.0, -np.inf))
         return np.exp((profile - profile.max(-1, keepdims=True)) / k)

@@ -1,0 +1,137 @@
+"""Twists of wrenches for sums over cells: the least dissipation, whose minimum often lies on a kink.
+
+A cell sees `u = C V` of a scaled twist: in the plane `target . V = 1` `u = c + a d + b e` at the place `(a, b)`.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from planarfriction.kernels import jit, kernel
+from planarfriction.kernels.twists import BAD_WRENCH, is_wrench, newton_move, plane, put_twist, target_of
+from planarfriction.kernels.vectors import dot, plus
+
+_BALANCED = 1e-13
+"""Slope of the dissipation at which a rounded minimum is found, per `mu f_N` [-]."""
+
+_ROUGH = 1e-3
+"""The same for the roundings before the last, which only lead there [-]."""
+
+_PLACED = 1e-15
+"""Rounding of a place in the plane [-]: a step so short is none."""
+
+_UPHILL = 0.3
+"""Slope at the end of an accepted step, relative to that at its start [-]."""
+
+_LAST = 1e-10
+"""Speed, relative to the scaled twist, at which the kinks of `|u_i|` are rounded off in the end [-]."""
+
+_RESTS = 1e-6
+"""Speed, relative to the scaled twist, below which a cell may be one that rests [-]: it stands on a kink."""
+
+_FULL = 1.0 + 1e-6
+"""Most of its friction that a resting cell may bear [-], with what rounding off a kink leaves of it."""
+
+_MOST_STEPS = 60
+"""Newton steps for each rounding; a handful are usual."""
+
+
+@kernel
+def _rounded(seen, weights, by_lean, a, b, rounding):
+    """Slope and Hessian of `sum w_i sqrt(|u_i|^2 + rounding^2)`, with what the asymmetry adds, at a place."""
+    ga, gb, aa, ab, bb = by_lean[0], by_lean[1], 0.0, 0.0, 0.0
+    for i in range(weights.shape[0]):
+        ax, ay, bx, by = seen[2, i], seen[3, i], seen[4, i], seen[5, i]
+        ux, uy = seen[0, i] + a * ax + b * bx, seen[1, i] + a * ay + b * by
+        square = ux * ux + uy * uy + rounding * rounding
+        pull = weights[i] / math.sqrt(square)
+        along_a, along_b = ux * ax + uy * ay, ux * bx + uy * by
+        less = pull / square
+        ga += pull * along_a
+        gb += pull * along_b
+        aa += pull * (ax * ax + ay * ay) - less * along_a * along_a
+        ab += pull * (ax * bx + ay * by) - less * along_a * along_b
+        bb += pull * (bx * bx + by * by) - less * along_b * along_b
+    return ga, gb, aa, ab, bb
+
+
+@kernel
+def _descend(seen, weights, by_lean, a, b, rounding, balanced):
+    """Place of the rounded minimum, from the place `(a, b)`, and the slope there."""
+    ga, gb, aa, ab, bb = _rounded(seen, weights, by_lean, a, b, rounding)
+    for _ in range(_MOST_STEPS):
+        if math.sqrt(ga * ga + gb * gb) <= balanced:
+            break
+        da, db = newton_move(ga, gb, aa, ab, bb)
+        downhill, length = da * ga + db * gb, 1.0
+        while length > 1e-12:
+            ta, tb = a + length * da, b + length * db
+            ga, gb, aa, ab, bb = _rounded(seen, weights, by_lean, ta, tb, rounding)
+            # convex along the step: it is short enough while the slope at its end is not steeply uphill
+            if da * ga + db * gb <= -_UPHILL * downhill:
+                break
+            length *= 0.5
+        a, b = ta, tb
+        # at a kink the slope stays above the wanted one: a place is only so exact
+        if length * math.sqrt(da * da + db * db) <= _PLACED * (1.0 + abs(a) + abs(b)):
+            break
+    return a, b, ga, gb
+
+
+@kernel
+def _unborne(seen, weights, a, b, ga, gb):
+    """What is left of a slope after the slowest cell, if it rests, has taken it; and the dissipation of the cells."""
+    slowest, rests, power = math.inf, 0, 0.0
+    for i in range(weights.shape[0]):
+        ux, uy = seen[0, i] + a * seen[2, i] + b * seen[4, i], seen[1, i] + a * seen[3, i] + b * seen[5, i]
+        speed = math.sqrt(ux * ux + uy * uy)
+        power += weights[i] * speed
+        if speed < slowest:
+            slowest, rests = speed, i
+    left = math.sqrt(ga * ga + gb * gb)
+    i = rests
+    ax, ay, bx, by = seen[2, i], seen[3, i], seen[4, i], seen[5, i]
+    turn = ax * by - ay * bx
+    if slowest < _RESTS and turn != 0.0:
+        ux, uy = seen[0, i] + a * ax + b * bx, seen[1, i] + a * ay + b * by
+        pull = weights[i] / math.sqrt(ux * ux + uy * uy + _LAST * _LAST)
+        fx, fy = pull * ux - (ga * by - gb * ay) / turn, pull * uy - (gb * ax - ga * bx) / turn
+        if math.sqrt(fx * fx + fy * fy) <= _FULL * weights[i]:
+            left = 0.0
+    return left, power
+
+
+@jit
+def cell_twists(levers, weights, frame, wrenches, twists):
+    """Twists of wrenches `[M, 3]` into `twists [M, 3]`; returns as `kernels.twists.table_twists`.
+
+    `levers [2, 3, n]` are the C of the cells. The kinks are rounded off by a speed that shrinks to nothing, where plain
+    Newton steps would stall on them. A cell that rests bears any force up to its friction: a wrench is reached if one
+    such force makes up for what is missing.
+    """
+    seen = np.empty((6, weights.shape[0]))
+    worst = 0.0
+    for m in range(wrenches.shape[0]):
+        target = target_of(frame, wrenches[m])
+        if not is_wrench(target):
+            return BAD_WRENCH
+        first, second = plane(target)
+        for i in range(weights.shape[0]):
+            for k in range(2):
+                c = (levers[k, 0, i], levers[k, 1, i], levers[k, 2, i])
+                seen[k, i], seen[2 + k, i], seen[4 + k, i] = dot(c, target), dot(c, first), dot(c, second)
+        lean = (frame[18], frame[19], frame[20])
+        by_lean = (dot(lean, first), dot(lean, second))
+        a, b, ga, gb, rounding = 0.0, 0.0, 0.0, 0.0, 1.0
+        while rounding > 2.0 * _LAST:
+            rounding *= 0.1
+            balanced = _ROUGH if rounding > 2.0 * _LAST else _BALANCED
+            a, b, ga, gb = _descend(seen, weights, by_lean, a, b, rounding, balanced)
+        left, power = _unborne(seen, weights, a, b, ga, gb)
+        v = plus(plus(target, a, first), b, second)
+        power += dot(lean, v)
+        put_twist(frame, v, power, twists[m])
+        worst = max(worst, math.atan2(left, power))
+    return worst

@@ -1,0 +1,193 @@
+"""Twists of wrenches: the certificate, what rests, what many twists share, and what cannot be found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+import planarfriction as pf
+from planarfriction.errors import InvalidValueError, SolverError
+from planarfriction.limit_surface import LimitSurface
+from planarfriction.patch import PUBLISHED_PATCHES
+
+ELL = [(0.0, 0.0), (0.03, 0.0), (0.03, 0.005), (0.005, 0.005), (0.005, 0.02), (0.0, 0.02)]
+FEET = pf.ContactPatch.points([(0.0, 0.0), (0.03, 0.01), (0.01, 0.02)], [1.0, 2.0, 1.5])
+TEE = PUBLISHED_PATCHES["NonConvex2"](cells=9)
+GRAIN, LEAN = pf.grain(0.3, along=1.0, across=0.5), (0.2, -0.3)
+PATCHES = {
+    "disc": pf.ContactPatch.disc(0.01, 9),
+    "ring": pf.ContactPatch.ring(0.004, 0.01, 9),
+    "thin ring": pf.ContactPatch.ring(0.0095, 0.01, 41),
+    "soft finger": pf.ContactPatch.disc(0.01, 9, pressure=pf.SoftFinger(c=0.008, k=2.0)),
+    "L": pf.ContactPatch.polygon(ELL, 9),
+    "map": pf.ContactPatch.rectangle(0.02, cells=9, pressure=pf.LinearGradient((40.0, 10.0))),
+    "line": PUBLISHED_PATCHES["Line"](cells=9),
+    "T": TEE,
+    "feet": FEET,
+    "grain": TEE.with_friction_metric(GRAIN, LEAN),
+    "feet with a grain": FEET.with_friction_metric(GRAIN, LEAN),
+    "a grain in each cell": TEE.with_friction_metric(
+        np.where(TEE.positions[:, :1, None] > 0.0, GRAIN, pf.grain(-0.5, along=0.7, across=1.2)),
+        np.where(TEE.positions[:, 1:] > 0.0, [0.4, 0.0], [0.0, -0.2]),
+    ),
+}
+KINDS = {
+    "cells": pf.LimitSurfaceCells,
+    "exact": pf.LimitSurfaceExact,
+    "table": pf.LimitSurfaceTable,
+    "published table": pf.LimitSurfaceTablePublished,
+    "ellipsoid": pf.LimitSurfaceEllipsoid,
+}
+
+
+def refused(kind: str, patch: str) -> bool:
+    """Whether a surface does not take a patch, or, a table of cells with metrics, is not convex there."""
+    each = patch == "a grain in each cell"
+    grained = patch in ("grain", "feet with a grain") or each
+    return (kind == "published table" and grained) or (kind in ("exact", "ellipsoid") and each)
+
+
+CASES = [
+    pytest.param(kind, name, id=f"{kind}, {name}") for kind in KINDS for name in PATCHES if not refused(kind, name)
+]
+
+
+def scaled_frame(surface) -> np.ndarray:
+    """What makes scaled twists of twists: `W_S = F'^-1 W`."""
+    return surface._frame()
+
+
+def wrenches(surface, count: int) -> np.ndarray:
+    """Wrenches in directions spread over the scaled sphere, some with a vanishing part."""
+    directions = np.random.default_rng(2).normal(size=(count, 3))
+    directions[: count // 4] *= [1.0, 1.0, 1e-3]
+    directions[count // 4 : count // 2] *= [1e-3, 1e-3, 1.0]
+    return np.concatenate([directions, np.eye(3), -np.eye(3)]) @ scaled_frame(surface)
+
+
+def angles(surface, wrench, other) -> np.ndarray:
+    """Angles [rad] between wrenches in scaled coordinates."""
+    first, second = (np.linalg.solve(scaled_frame(surface).T, each.T).T for each in (wrench, other))
+    return np.arctan2(np.linalg.norm(np.cross(first, second), axis=1), np.einsum("ni,ni->n", first, second))
+
+
+@pytest.mark.parametrize(("kind", "name"), CASES)
+def test_the_wrench_of_the_twist_is_parallel(kind, name):
+    """And the twist is of unit dissipation. Sums over cells have facets, which the next test sees."""
+    surface = KINDS[kind](PATCHES[name])
+    asked = wrenches(surface, 60)
+    found = surface.twist(asked)
+    assert surface.dissipation(found) == pytest.approx(1.0, rel=1e-12)  # rounding
+    if kind != "cells" and "feet" not in name:
+        # beside what many twists share, and in the table's axis, lines allow less (`CERTIFIED`)
+        assert angles(surface, surface.wrench(found), asked).max() < (1e-5 if name == "line" else 1e-10)
+
+
+@pytest.mark.parametrize(
+    ("kind", "name"), [case for case in CASES if case.values[0] not in ("table", "published table")]
+)
+def test_no_other_twist_resists_the_wrench_with_less_dissipation(kind, name):
+    """Of all twists of unit dissipation the one found gives the wrench most power: facets and kinks included."""
+    surface = KINDS[kind](PATCHES[name])
+    asked = wrenches(surface, 20)
+    found = surface.twist(asked)
+    random = np.random.default_rng(5)
+    near = found[:, None] + 10.0 ** random.uniform(-7, 0, size=(1, 150, 1)) * random.normal(size=(1, 150, 3)) * (
+        np.linalg.norm(found, axis=-1)[:, None, None] * [1.0, 1.0, 1.0]
+    )
+    others = np.concatenate(
+        [near.reshape(-1, 3), np.linalg.solve(scaled_frame(surface), random.normal(size=(3, 500))).T]
+    )
+    others /= surface.dissipation(others)[:, None]
+    power = -np.einsum("mi,mi->m", asked, found)
+    assert ((-asked @ others.T).max(axis=1) <= power * (1 + 1e-9)).all()  # of the rounding off of kinks
+
+
+def test_a_cell_that_rests_bears_no_more_than_its_friction():
+    """Inside a facet the answer is the turn about the foot; just outside the foot slides."""
+    surface, foot = pf.LimitSurfaceCells(FEET), 1
+    place, weight = FEET.positions[foot], FEET.weights()[foot]
+    about = np.array([place[1], -place[0], 1.0])
+    turning = surface.wrench(about)
+    for share, turns in ((0.9999, True), (1.0001, False)):
+        held = share * weight * np.array([0.6, -0.8])
+        wrench = turning + np.array([*held, place[0] * held[1] - place[1] * held[0]])
+        vx, vy, omega = surface.twist(wrench)
+        speed = np.hypot(vx - omega * place[1], vy + omega * place[0]) / abs(omega)
+        assert (speed < 1e-8 * 0.03) == turns  # the rounding off of kinks, against 1e-4 of friction more
+
+
+def test_many_twists_share_the_wrench_of_a_line_that_slides_across_itself():
+    line = pf.ContactPatch.line(0.02, 21)
+    across = np.array([0.0, 1.0, 0.0]) if np.ptp(line.positions[:, 0]) > 0.0 else np.array([1.0, 0.0, 0.0])
+    for kind in (pf.LimitSurfaceExact, pf.LimitSurfaceTable, pf.LimitSurfaceCells):
+        surface = kind(line)
+        found = surface.twist(-across)
+        assert surface.wrench(found) * [1.0, 1.0, 100.0] == pytest.approx(-across, abs=1e-5)  # CERTIFIED
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_the_magnitude_of_a_wrench_does_not_matter_and_read_only_ones_will_do(kind):
+    surface = KINDS[kind](PATCHES["L"])
+    wrench = np.array([0.3, -0.2, 0.001])
+    wrench.setflags(write=False)
+    found = surface.twist(wrench)
+    for magnitude in (1e-290, 1e290):
+        assert surface.twist(magnitude * wrench) == pytest.approx(found, rel=1e-12)
+    assert wrench.tolist() == [0.3, -0.2, 0.001]
+
+
+@dataclass(frozen=True, eq=False)
+class Turned(LimitSurface):
+    """No limit surface: what it says is not the slope of any dissipation."""
+
+    def direction(self, units):
+        return np.stack([-units[:, 1], units[:, 0], units[:, 2]], axis=1)
+
+
+def test_a_twist_that_is_not_found_is_an_error():
+    with pytest.raises(SolverError, match=r"no twist found: the wrench of the nearest one is .* rad off"):
+        Turned(PATCHES["disc"]).twist((1.0, 0.2, 0.001))
+
+
+def test_a_bad_wrench_among_good_ones_is_named():
+    for surface in (KINDS[kind](FEET) for kind in KINDS):
+        with pytest.raises(InvalidValueError, match="wrench must not be zero"):
+            surface.twist([(1.0, 0.0, 0.0), (0.0, 0.0, 0.0)])
+        with pytest.raises(InvalidValueError, match="wrench must be finite"):
+            surface.twist([(1.0, 0.0, 0.0), (0.0, np.inf, 0.0)])
+
+
+@pytest.mark.parametrize("inner", [0.0, 0.003, 0.009])
+def test_even_discs_have_the_closed_form_of_their_rings(inner):
+    """Against the quadrature over rings: slow and fast spins, and the centre of rotation on and beside the rim."""
+    patch = pf.ContactPatch.ring(inner, 0.01, 41) if inner else pf.ContactPatch.disc(0.01, 41)
+    surface = pf.LimitSurfaceExact(patch)
+    by_rings = pf.LimitSurfaceExact(patch)
+    parts = surface._parts
+    object.__setattr__(by_rings, "__dict__", {**by_rings.__dict__, "_parts": rings_of(by_rings)})
+    assert type(parts) is not type(by_rings._parts)
+    random = np.random.default_rng(1)
+    scaled = random.normal(size=(2000, 3)) * 10.0 ** random.uniform(-6.0, 3.0, size=(2000, 3))
+    rim = 0.01 / surface.contact_radius
+    scaled[:20] = [[1.0, 0.0, (1.0 + sign * 10.0**-k) / rim] for k in range(1, 11) for sign in (1.0, -1.0)]
+    scaled[20:22] = [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
+    h, slope = surface.sums(scaled)
+    wanted, wanted_slope = by_rings.sums(scaled)
+    assert h == pytest.approx(wanted, abs=1e-13)  # the thinner ring loses a digit
+    size = np.linalg.norm(scaled, axis=1)[:, None, None]
+    # of slopes that grow with the logarithm or the reciprocal of a distance, relative to themselves
+    scale = np.abs(wanted_slope * size).max(axis=(1, 2), keepdims=True)
+    assert np.abs((slope - wanted_slope) * size / scale).max() < 1e-11
+    spins = np.abs(scaled[:, 2]) > 0.0
+    assert h[spins, 2] == pytest.approx(wanted[spins, 2], rel=1e-12)
+
+
+def rings_of(surface):
+    """The same disc as a pressure over rings."""
+    from planarfriction.limit_surface import exact
+
+    outline = surface._outline
+    return exact._Rings(outline.inner, outline.outer, outline.outer, exact._EVEN)
