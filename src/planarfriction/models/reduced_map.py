@@ -66,6 +66,8 @@ def is_point(patch: ContactPatch, normal_force=None):
 def slip_factor(patch: ContactPatch, normal_force=None) -> np.ndarray:
     """F `[..., 3, 3]`, upper triangular, with `F'F = sum(w B'B)`: what the cells see of a twist V is `B V`.
 
+    Cells as points, as the distributed model takes them: docs/reduced-model.md, "Cells as points or as areas".
+
     `normal_force` `[...]` [N], all > 0 where the patch depends on it. The last row is that of spins about the centre of
     pressure: zero of a point.
     """
