@@ -191,3 +191,11 @@ def rings_of(surface):
 
     outline = surface._outline
     return exact._Rings(outline.inner, outline.outer, outline.outer, exact._EVEN)
+
+
+def test_a_fingertip_smaller_than_the_hole_of_its_ring_loads_the_cells_beside_the_hole():
+    ring = pf.ContactPatch.ring(0.004, 0.01, 21, pressure=pf.SoftFinger(c=0.002, k=2.0))
+    surface, cells = pf.LimitSurfaceExact(ring), pf.LimitSurfaceCells(ring)
+    assert surface.contact_radius == pytest.approx(cells.contact_radius, rel=0.01)  # of a cell of 1 mm, at 4 mm
+    wrench = np.array([1.0, 0.2, 0.001])
+    assert angles(surface, surface.wrench(surface.twist(wrench))[None], wrench[None]) < 1e-9

@@ -154,7 +154,17 @@ class LimitSurfaceExact(LimitSurface):
         laws = (Uniform, SoftFinger) if isinstance(outline, RoundOutline) else (Uniform,)
         if isinstance(outline, RoundOutline) and self.patch.root is not None and (self.patch.root != np.eye(2)).any():
             return None  # a metric makes the rings ellipses
+        if isinstance(outline, RoundOutline) and self._soft[0] <= outline.inner:
+            return None  # the cells nearest to the hole share the load
         return outline if isinstance(pressure, laws) else None
+
+    @property
+    def _soft(self) -> tuple[float, float]:
+        """Where the pressure on a disc or ring ends [m], and the exponent of its profile."""
+        pressure, load = self.patch.pressure, self.normal_force or 1.0
+        if isinstance(pressure, SoftFinger):
+            return float(pressure.radius(load)), float(pressure.exponent(load))
+        return self.patch.outline.outer, _EVEN  # pyright: ignore[reportOptionalMemberAccess, reportAttributeAccessIssue]
 
     @functools.cached_property
     def _parts(self) -> _Parts:
@@ -166,10 +176,7 @@ class LimitSurfaceExact(LimitSurface):
                 radii = np.array([outline.outer, outline.inner] if outline.inner > 0.0 else [outline.outer])
                 squares = radii**2 * [1.0, -1.0][: len(radii)]
                 return _Discs(radii, squares / squares.sum())
-            if isinstance(pressure, Uniform):
-                return _Rings(outline.inner, outline.outer, outline.outer, _EVEN)
-            load = self.normal_force or 1.0
-            return _Rings(outline.inner, outline.outer, *map(float, (pressure.radius(load), pressure.exponent(load))))
+            return _Rings(outline.inner, outline.outer, *self._soft)
         if isinstance(outline, PolygonOutline):
             triangles = outline.triangles()
             areas = _area(triangles)
