@@ -81,7 +81,7 @@ def pre_sliding_cycles() -> plots.style.PlotFigure:
     law = pf.LuGre(mu_s=1.2, elasto_plastic=0.9, sigma_1=0.0, sigma_2=0.0)
     figure = plots.style.new_figure(8.0, 3.2)
     force, energy = figure.subplots(1, 2)
-    for name, kind in (("published", pf.ReducedModelPublished), ("moments", pf.ReducedModel)):
+    for name, kind in (("ReducedModelPublished", pf.ReducedModelPublished), ("ReducedModel", pf.ReducedModel)):
         fx, taken = small_cycles(kind(PUBLISHED_PATCHES["Circle"](), law))
         force.plot(fx, ".-", label=name)
         energy.plot(1e9 * taken, ".-", label=name)
