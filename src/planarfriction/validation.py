@@ -109,6 +109,8 @@ def numbers(name: str, value: Any) -> np.ndarray:
     """Return `value` as a float array of any shape (no copy where it is one), or raise."""
     if type(value) is np.ndarray and value.dtype == _FLOAT and value.ndim <= DEEPEST:
         return value
+    if type(value) is float:
+        return np.array(value)
     reason = refusal(value)
     if reason is not None:
         raise InvalidValueError(name, f"be an array of numbers{reason}", quoted(value))

@@ -140,10 +140,9 @@ class FrictionModel(ByValue):
             raise InvalidValueError("twist", "have shape [..., 3]", f"shape {list(twist.shape)}")
         scalars = {"normal_force": normal_force, **more}
         arrays = {name: validation.numbers(name, value) for name, value in scalars.items()}
+        batches = {state.shape[: state.ndim - len(inner)], twist.shape[:-1], *(v.shape for v in arrays.values())}
         try:
-            batch = np.broadcast_shapes(
-                state.shape[: state.ndim - len(inner)], twist.shape[:-1], *(v.shape for v in arrays.values())
-            )
+            batch = batches.pop() if len(batches) == 1 else np.broadcast_shapes(*batches)
         except ValueError:
             shapes = ", ".join(str(list(v.shape)) for v in (state, twist, *arrays.values()))
             raise InvalidValueError("batch axes", "broadcast", f"shapes {shapes}") from None
