@@ -305,7 +305,7 @@ def test_what_was_unchecked(call, message):
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: pf.ContactPatch.disc(0.01, 10**5), "cells must be at most 1000000 in all, got 10000000000"),
+        (lambda: pf.ContactPatch.disc(0.01, 10**5), "cells must be at most 1100000 in all, got 10000000000"),
         (lambda: pf.ContactPatch.ring(0.005, 0.01, 10**5), "cells must be at most"),
         (lambda: pf.ContactPatch.rectangle(0.01, cells=(10**5, 10**5)), "cells must be at most"),
         (lambda: pf.ContactPatch.rectangle(0.01, cells=10**300), "cells must be at most"),

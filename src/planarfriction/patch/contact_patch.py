@@ -31,7 +31,7 @@ class ContactPatch(Anisotropy):
     Frame: the contact frame, x to the right, y up; **row 0 of a grid or map is its top** (largest y). Grids and maps
     are centred on the origin (a polygon stays where its vertices are) and list their cells row by row from the top
     left; points keep the order given. Cells that carry no pressure at any load are dropped. A patch has at most
-    1,000,000 cells; one wider than 1 m or smaller than 10 um is made with a warning, as its lengths may be millimetres.
+    1,100,000 cells; one wider than 1 m or smaller than 10 um is made with a warning, as its lengths may be millimetres.
 
     Make patches with the class methods (`disc`, `rectangle`, `ring`, `line`, `polygon`, `points`, `from_pressure`).
     Their `pressure` is a law (`Uniform`, `LinearGradient`, `SoftFinger`), a function `p(x, y)` of two floats [m], one

@@ -8,8 +8,8 @@ import numpy as np
 
 from planarfriction.errors import InvalidValueError
 
-MOST_CELLS = 1_000_000
-"""Cells of a patch, and boxes of its grid, that are taken: 1000 x 1000, half a gigabyte while shapes are cut."""
+MOST_CELLS = 1_100_000
+"""Cells of a patch, and boxes of its grid, that are taken: some 1050 x 1050, half a gigabyte while shapes are cut."""
 
 LEAST_WIDTH, MOST_WIDTH = 1e-5, 1.0
 """Widths of a patch [m] outside of which its maker is asked whether they are in metres."""
