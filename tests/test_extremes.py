@@ -8,7 +8,7 @@ import pytest
 import planarfriction as pf
 from planarfriction import autodiff
 from planarfriction.errors import InvalidValueError
-from planarfriction.validation import LARGEST
+from planarfriction.formulas import LARGEST
 
 PATCH = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
 LAWS = {"plain": pf.LuGre(mu_s=1.2), "elasto-plastic": pf.LuGre(mu_s=1.2, elasto_plastic=0.9)}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import contextlib
 import importlib.util
 import os
@@ -18,6 +19,7 @@ import pytest
 from numba.core import config
 from numba.core.registry import cpu_target
 
+from planarfriction import kernels
 from planarfriction.kernels import machine_code
 from planarfriction.kernels.interrupts import heard_between_passes
 
@@ -293,3 +295,15 @@ def test_ctrl_c_is_heard_when_the_block_fails_too():
     with pytest.raises(KeyboardInterrupt), heard_between_passes(), heard_between_passes():
         os.kill(os.getpid(), signal.SIGINT)
         raise ValueError
+
+
+def test_whatever_goes_into_the_machine_code_is_in_the_digest():
+    """A constant of another file would stay in the code after a change: compiled loops take none from elsewhere."""
+    own = ("planarfriction.kernels.", "planarfriction.formulas")
+    for path in kernels._SOURCES.paths:
+        if path.stem == "machine_code":  # nothing of it is compiled
+            continue
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ImportFrom) and str(node.module).startswith("planarfriction"):
+                for alias in node.names:
+                    assert f"{node.module}.{alias.name}".startswith(own), f"{path.name}: {node.module}"

@@ -9,6 +9,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError, SolverError
+from planarfriction.kernels.cell_twists import cell_twists
 from planarfriction.limit_surface import LimitSurface
 from planarfriction.patch import PUBLISHED_PATCHES
 
@@ -150,6 +151,14 @@ class Turned(LimitSurface):
 def test_a_twist_that_is_not_found_is_an_error():
     with pytest.raises(SolverError, match=r"no twist found: the wrench of the nearest one is .* rad off"):
         Turned(PATCHES["disc"]).twist((1.0, 0.2, 0.001))
+
+
+def test_what_is_no_number_is_no_certificate():
+    surface = pf.LimitSurfaceCells(pf.ContactPatch.disc(0.01, cells=5))
+    levers, weights = surface._cell_rows
+    wrenches, found = np.array([[0.3, 0.1, 1e-3]]), np.empty((1, 3))
+    assert cell_twists(levers, weights, surface._scaling, wrenches, found) < 1e-12
+    assert np.isnan(cell_twists(levers, np.full_like(weights, np.nan), surface._scaling, wrenches, found))
 
 
 def test_a_bad_wrench_among_good_ones_is_named():

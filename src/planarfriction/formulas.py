@@ -16,6 +16,9 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
+LARGEST = 1e50
+"""Largest number of any quantity in SI units: beyond all that exists, and products of six stay finite."""
+
 
 class LawNumbers(NamedTuple):
     """What the formulas ask of a friction law, read by name: numbers, or arrays that broadcast with the bristles."""

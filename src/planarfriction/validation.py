@@ -19,12 +19,10 @@ from typing import Any
 import numpy as np
 
 from planarfriction.errors import InvalidValueError, shown
-
-LARGEST = 1e50
-"""Largest number of any quantity in SI units: beyond all that exists, and products of six stay finite."""
+from planarfriction.formulas import LARGEST
 
 SMALLEST = 1e-50
-"""Smallest of those that must be > 0, for the same reason."""
+"""Smallest of the numbers that must be > 0: products of six stay above zero."""
 
 SI_UNITS = frozenset({"m", "s", "kg", "N", "rad", "Pa", "J", "W", "Hz"})
 """Units without prefix or factor: numbers in them and in their products are numbers in SI."""
@@ -214,6 +212,14 @@ def finite_numbers(name: str, value: Any, *, largest: float = LARGEST) -> np.nda
     _check_size(name, result)
     _check_finite(name, result, largest)
     return result
+
+
+def within_range(name: str, low: Any, high: Any) -> None:
+    """Raise unless the smallest and the largest of some numbers are within `LARGEST`; NaN spreads to both."""
+    if not (low >= -LARGEST and high <= LARGEST):
+        worst = float(high if low >= -LARGEST else low)
+        beyond = f"be between {-LARGEST:g} and {LARGEST:g}"
+        raise InvalidValueError(name, beyond if math.isfinite(worst) else "be finite", worst)
 
 
 def non_negative_numbers(name: str, value: Any) -> np.ndarray:

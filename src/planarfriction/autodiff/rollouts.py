@@ -17,7 +17,6 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
 from planarfriction.kernels.rollouts import Bars, Inputs
 from planarfriction.models import FrictionModel
-from planarfriction.validation import LARGEST
 
 _WORTH_A_THREAD = 20_000
 """Steps [-] below which starting a thread costs more than it saves."""
@@ -252,13 +251,7 @@ def _checked(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, par
     twist, load, dt = _sequences(twist, normal_force, dt)
     steps = len(dt)
     for name, value in {"state": state, "twist": twist, "normal_force": load, "dt": dt}.items():
-        low, high = value.min(initial=0.0), value.max(initial=0.0)
-        if not (low >= -LARGEST and high <= LARGEST):  # NaN spreads to both
-            if np.isnan(low) or np.isinf(low) or np.isinf(high):
-                raise InvalidValueError(name, "be finite", "NaN or infinity")
-            raise InvalidValueError(
-                name, f"be between {-LARGEST:g} and {LARGEST:g}", float(low if -low > high else high)
-            )
+        validation.within_range(name, value.min(initial=0.0), value.max(initial=0.0))
     for name, value in {"normal_force": load, "dt": dt}.items():
         if value.min(initial=0.0) < 0.0:
             raise InvalidValueError(name, "be >= 0", float(value.min()))

@@ -14,13 +14,12 @@ from jax.custom_derivatives import SymbolicZero
 from planarfriction import autodiff
 from planarfriction.autodiff.parameters import Packed, pack_shape
 from planarfriction.errors import InvalidValueError
-from planarfriction.formulas import LawNumbers
+from planarfriction.formulas import LARGEST, LawNumbers
 from planarfriction.jax.published import ReducedModelPublished
 from planarfriction.jax.reduced import ReducedModel
 from planarfriction.kernels.published_step import NAMES
 from planarfriction.models import reduced_arrays
 from planarfriction.models.reduced_arrays import ReducedNumbers
-from planarfriction.validation import LARGEST
 
 
 class _Kind(NamedTuple):

@@ -78,8 +78,5 @@ def _extremes(name: str, value: jax.Array) -> tuple[float, float] | None:
         return None
     numbers = np.asarray(value)
     low, high = float(numbers.min(initial=0.0)), float(numbers.max(initial=0.0))
-    if not (low >= -validation.LARGEST and high <= validation.LARGEST):  # NaN spreads to both
-        beyond = f"be between {-validation.LARGEST:g} and {validation.LARGEST:g}"
-        worst = low if not low >= -validation.LARGEST else high
-        raise InvalidValueError(name, beyond if abs(worst) < float("inf") else "be finite", worst)
+    validation.within_range(name, low, high)
     return low, high

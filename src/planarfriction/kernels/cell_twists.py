@@ -133,5 +133,6 @@ def cell_twists(levers, weights, frame, wrenches, twists):
         v = plus(plus(target, a, first), b, second)
         power += dot(lean, v)
         put_twist(frame, v, power, twists[m])
-        worst = max(worst, math.atan2(left, power))
+        angle = math.atan2(left, power)
+        worst = angle if not angle <= worst else worst
     return worst

@@ -14,7 +14,7 @@ from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic
 
-from planarfriction.validation import LARGEST
+from planarfriction.formulas import LARGEST
 
 # Not `reassoc`: the two-part constants of the argument reductions rely on the order of operations.
 _inline = njit(

@@ -149,11 +149,7 @@ class FrictionModel(ByValue):
         if math.prod(batch) > validation.MOST_NUMBERS:
             raise InvalidValueError("batch axes", f"hold at most {validation.MOST_NUMBERS} contacts", list(batch))
         for name, value in {"state": state, "twist": twist, **arrays}.items():
-            if not (np.abs(value) <= validation.LARGEST).all():
-                finite = np.isfinite(value).all()
-                rule = f"be between {-validation.LARGEST:g} and {validation.LARGEST:g}" if finite else "be finite"
-                shown = "a larger number" if finite else "NaN or infinity"
-                raise InvalidValueError(name, rule, value.tolist() if value.size < 10 else shown)
+            validation.within_range(name, value.min(initial=0.0), value.max(initial=0.0))
         for name, value in arrays.items():
             if (value < 0.0).any():
                 raise InvalidValueError(name, "be >= 0", float(value.min()))

@@ -60,7 +60,11 @@ def reduced_shape(
 
 def is_point(patch: ContactPatch, normal_force=None):
     """Whether one cell carries the load but for a share `POINT` of it, `[...]` of bool."""
-    return 1.0 - patch.weights(normal_force).max(-1) <= POINT
+    return _one_carries(patch.weights(normal_force))
+
+
+def _one_carries(weights: np.ndarray):
+    return 1.0 - weights.max(-1) <= POINT
 
 
 def slip_factor(patch: ContactPatch, normal_force=None) -> np.ndarray:
@@ -74,7 +78,7 @@ def slip_factor(patch: ContactPatch, normal_force=None) -> np.ndarray:
     weights = patch.weights(normal_force)
     x, y = ((weights * coordinate).sum(-1) for coordinate in patch.positions.T)
     dx, dy = (p - c[..., None] for p, c in zip(patch.positions.T, (x, y), strict=True))
-    gyration = np.where(is_point(patch, normal_force), 0.0, np.sqrt((weights * (dx**2 + dy**2)).sum(-1)))
+    gyration = np.where(_one_carries(weights), 0.0, np.sqrt((weights * (dx**2 + dy**2)).sum(-1)))
     if patch.root is not None:
         return _metric_factor(patch, weights, gyration)
     factor = np.zeros((*np.shape(x), 3, 3))

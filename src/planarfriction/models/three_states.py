@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from planarfriction.formulas import LARGEST
 from planarfriction.geometry import transformed
 from planarfriction.kernels.pointers import place_of
 from planarfriction.kernels.rollouts import UNFIT, compile_step_one, step_batch, step_one
@@ -18,7 +19,6 @@ from planarfriction.models import base
 from planarfriction.models.base import FrictionModel, ModelJacobians, PackedModel, StepJacobians
 from planarfriction.models.rates import linearised, rates
 from planarfriction.models.remembered import Remembered
-from planarfriction.validation import LARGEST
 
 _REMEMBERED = 64
 """Loads whose shapes a model remembers that builds each."""

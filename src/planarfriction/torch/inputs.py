@@ -56,8 +56,5 @@ def _extremes(name: str, value: Tensor) -> tuple[float, float] | None:
         low, high = (each.item() for each in torch.aminmax(value.detach()))
     except RuntimeError:  # inside vmap, or of no values at all
         return None
-    if not (low >= -validation.LARGEST and high <= validation.LARGEST):  # NaN spreads to both
-        beyond = f"be between {-validation.LARGEST:g} and {validation.LARGEST:g}"
-        worst = low if not low >= -validation.LARGEST else high
-        raise InvalidValueError(name, beyond if abs(worst) < float("inf") else "be finite", worst)
+    validation.within_range(name, low, high)
     return low, high
