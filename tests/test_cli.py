@@ -21,7 +21,17 @@ from planarfriction.cli.patches import find_patch
 from planarfriction.cli.report import largest_differences
 from planarfriction.cli.run import build_scenes
 from planarfriction.errors import SimulationInterrupted, SolverError
+from planarfriction.kernels import rosenbrock
 from planarfriction.patch import PUBLISHED_PATCHES
+
+
+def test_ctrl_c_before_the_first_sample_is_no_traceback(monkeypatch, capsys):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(rosenbrock, "advance", interrupted)
+    assert main(["run", "in-hand", "--model", "reduced", "--t-end", "0.01"]) == 130
+    assert "Traceback" not in capsys.readouterr().err
 
 
 @pytest.fixture

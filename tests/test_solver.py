@@ -8,7 +8,7 @@ from numba import njit
 from scipy.integrate import solve_ivp
 
 import planarfriction as pf
-from planarfriction.kernels import body
+from planarfriction.kernels import body, rosenbrock
 from planarfriction.kernels.body import right_hand_side
 from planarfriction.kernels.pointers import call
 from planarfriction.patch import PUBLISHED_PATCHES
@@ -280,6 +280,16 @@ def test_interruption_keeps_what_is_done():
     part = caught.value.solution
     assert part.status == "interrupted"
     assert 0.3 < float(part.data.time[-1]) < 2.0
+
+
+def test_an_interruption_before_the_first_sample_keeps_nothing(monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(rosenbrock, "advance", interrupted)
+    with pytest.raises(KeyboardInterrupt) as caught:
+        pf.simulate(pf.scenes.in_hand(pf.DistributedModel(SMALL, ELASTIC)))
+    assert caught.type is KeyboardInterrupt
 
 
 @pytest.mark.parametrize(

@@ -81,7 +81,7 @@ def simulate(
     SolverError
         The solver gave up; carries the solution so far and says the remedy.
     SimulationInterrupted
-        Ctrl-C; carries the solution so far.
+        Ctrl-C; carries the solution so far. Before anything is recorded, while compiling, it stays `KeyboardInterrupt`.
     """
     if not isinstance(scene, Scene):
         raise InvalidValueError("scene", "be a Scene", type(scene).__name__)

@@ -62,7 +62,8 @@ def integrate(
 
     Each window goes on where the one before it ends, and is let go before the next one is asked for. `state` holds
     bristles, body velocity and pose; `atol` is the absolute tolerance of each of its entries. `progress` is called with
-    the simulated time now and then, and before another window. Ctrl-C ends with the status "interrupted".
+    the simulated time now and then, and before another window. Ctrl-C ends with the status "interrupted", or as it came
+    if nothing has been recorded yet.
 
     Raises `InvalidValueError` for `rtol <= 0`.
     """
@@ -93,6 +94,8 @@ def integrate(
             if outcome != kernels.DONE:
                 break
     except KeyboardInterrupt:
+        if at.cursor[1] == 0:  # while compiling: there is nothing to keep yet
+            raise
         outcome = kernels.PAUSED
     reached = int(at.cursor[1])
     kept = Output(*(array[:reached] if len(array) else array for array in output))
