@@ -146,21 +146,29 @@ def cap(xp, deflection, largest):
 # ---------------------------------------------------------------------- moments of the bristles
 
 
-def slip_share(xp, deflection, cosine, evenness, law):
+def evenness(square, fourth):
+    """Evenness e [-] of the bristles that the moments stand for: `<u^2>^2/<u^4>`, 1 where all are bent alike.
+
+    The bristle of a cell is taken as `u_i = B_i F^-1 z`, the only field that is a rigid motion of the cells and has the
+    moments z; `square = <u^2> = z.z`, `fourth = <u^4>`. ("Reduced model"; docs/reduced-model.md, "Breakaway")
+    """
+    return square * square / fourth
+
+
+def slip_share(xp, deflection, cosine, even, law):
     """Closure `beta` [-] of the moment equation, from `|z|/|z_ss|` and the cosine of the angle between z and z_ss.
 
     `alpha (1 + cos)/2` for elasto-plastic bristles, 1 for plain LuGre: that of a single bristle, but for an earlier
-    breakaway `s_ba evenness`. `evenness = <v^2>/sqrt(<v^4>)`, over the cells' speeds, is 1 in translation; the less
-    even, the further the fastest cells are ahead of the mean and the earlier they slip. ("Reduced model";
-    docs/reduced-model.md, "What was tried for breakaway")
+    breakaway `s_ba even` (see `evenness`): the less even, the further some bristles are ahead of the mean and the
+    earlier they slip. ("Reduced model")
     """
-    alpha = slip_fraction(xp, deflection, law.breakaway_ratio * evenness)
+    alpha = slip_fraction(xp, deflection, law.breakaway_ratio * even)
     return xp.where(law.elasto_plastic > 0.0, 0.5 * alpha * (1.0 + cosine), 1.0)
 
 
-def slip_share_partials(xp, deflection, cosine, evenness, law):
-    """`slip_share` and its partial derivatives by `deflection`, `cosine` and the breakaway `s_ba evenness`."""
-    breakaway = law.breakaway_ratio * evenness
+def slip_share_partials(xp, deflection, cosine, even, law):
+    """`slip_share` and its partial derivatives by `deflection`, `cosine` and the breakaway `s_ba even`."""
+    breakaway = law.breakaway_ratio * even
     alpha = slip_fraction(xp, deflection, breakaway)
     half = 0.5 * (1.0 + cosine)
     elastic = law.elasto_plastic > 0.0

@@ -37,7 +37,7 @@ def to_origin(shape, gx, gy, gs):
 
 @kernel
 def closure(law, deflection, share, even):
-    """`beta` of a state z: `deflection = |z|/|z_ss|`, `share` = s, `even` as in `steady.evenness`."""
+    """`beta` of a state z: `deflection = |z|/|z_ss|`, `share` = s, `even`: its evenness."""
     cosine = share / xp.where(deflection > 0.0, deflection, 1.0)
     return formulas.slip_share(xp, deflection, cosine, even, law)
 

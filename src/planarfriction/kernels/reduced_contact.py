@@ -22,7 +22,7 @@ from planarfriction.kernels.steady import STILL, evenness, scaled_twist, sliding
 
 BY_Z, BY_V, INVERSE, STEADY, EVENNESS, TWIST, REST = 0, 9, 18, 27, 42, 45, 48
 """Where a linearisation holds dz'/dz, dz'/dV_G, the inverse of D and dz_ss/dV_G (9 each; 6 of scratch behind the last),
-the slopes of the evenness (3), V_G (3) and z_ss (3)."""
+the slopes of the evenness by z (3), V_G (3) and z_ss (3)."""
 
 LINEAR = 51
 """Numbers of a linearisation."""
@@ -64,10 +64,11 @@ def evaluate(contact, z, v, zdot, w):
     """See `ModelFunctions`: `z' = V_G - beta (lambda z + s m)`."""
     own, z, twist, zdot, w = read(contact), doubles(z), doubles(v), doubles(zdot), doubles(w)
     law, data = own.law, doubles(own.data)
-    x, y, s, v, qx, qy, qs, even = sliding(law, twist[0], twist[1], twist[2], own.shape, _maps(own), data)
+    x, y, s, v, qx, qy, qs = sliding(law, twist[0], twist[1], twist[2], own.shape, _maps(own), data)
     power, per_q2 = x * qx + y * qy + s * qs, 1.0 / (qx * qx + qy * qy + qs * qs)
     decay = v * v / xp.where(power > 0.0, power, 1.0)
     share = (z[0] * qx + z[1] * qy + z[2] * qs) * per_q2
+    even = evenness(law, own.shape, _maps(own), data, (z[0], z[1], z[2]), per_q2)[0]
     beta = closure(law, math.sqrt((z[0] * z[0] + z[1] * z[1] + z[2] * z[2]) * per_q2), share, even)
     zdot[0] = part_rate(beta, share, decay, z[0], x, qx)
     zdot[1] = part_rate(beta, share, decay, z[1], y, qy)
@@ -77,7 +78,7 @@ def evaluate(contact, z, v, zdot, w):
 
 @kernel
 def _slopes(law, z, v, even, lin):
-    """`dz'/dz` and `dz'/dV_G` from V_G, z_ss, the evenness and their slopes."""
+    """`dz'/dz` and `dz'/dV_G` from V_G, z_ss, the evenness of z and their slopes."""
     u, q, j, j_even = (
         doubles(at(lin, TWIST)),
         doubles(at(lin, REST)),
@@ -94,13 +95,13 @@ def _slopes(law, z, v, even, lin):
     beta, by_deflection, by_share, by_breakaway = closure_partials(law, deflection, share, even)
     by_even = law.breakaway_ratio * by_breakaway
     for k in range(3):
-        by_z_k = (by_deflection * per_deflection * z[k] + by_share * q[k]) * per_q2
+        by_z_k = (by_deflection * per_deflection * z[k] + by_share * q[k]) * per_q2 + by_even * j_even[k]
         z_j = z[0] * j[k] + z[1] * j[3 + k] + z[2] * j[6 + k]
         q_j = (q[0] * j[k] + q[1] * j[3 + k] + q[2] * j[6 + k]) * per_q2
         u_j = u[0] * j[k] + u[1] * j[3 + k] + u[2] * j[6 + k]
         decay_k = (2.0 * u[k] - decay * (q[k] + u_j)) * per_power
         share_k = z_j * per_q2 - 2.0 * share * q_j
-        by_v_k = by_share * share_k - by_deflection * deflection * q_j + by_even * j_even[k]
+        by_v_k = by_share * share_k - by_deflection * deflection * q_j
         for i in range(3):
             same = 1.0 if i == k else 0.0
             m_i = u[i] - decay * q[i]
@@ -120,9 +121,13 @@ def linearise(contact, z, v, lin):
     if v > STILL:
         j = doubles(at(lin, STEADY))
         out[TWIST], out[TWIST + 1], out[TWIST + 2] = x, y, s
-        out[REST], out[REST + 1], out[REST + 2] = steady_slopes(law, shape, _maps(own), data, x, y, s, v, j)
-        even, out[EVENNESS], out[EVENNESS + 1], out[EVENNESS + 2] = evenness(shape, _maps(own), data, x, y, s, v)
-        _slopes(law, doubles(z), v, even, lin)
+        out[REST], out[REST + 1], out[REST + 2] = qx, qy, qs = steady_slopes(
+            law, shape, _maps(own), data, x, y, s, v, j
+        )
+        z, per_q2 = doubles(z), 1.0 / (qx * qx + qy * qy + qs * qs)
+        even, by_z = evenness(law, shape, _maps(own), data, (z[0], z[1], z[2]), per_q2)
+        out[EVENNESS], out[EVENNESS + 1], out[EVENNESS + 2] = by_z
+        _slopes(law, z, v, even, lin)
     else:
         for i in range(9):
             out[BY_Z + i], out[BY_V + i] = 0.0, 1.0 if i % 4 == 0 else 0.0

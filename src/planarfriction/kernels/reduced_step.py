@@ -5,8 +5,7 @@ With `beta` held the equation of the moments z (docs/physics.md, "Reduced model"
 of the rest with lambda. Plain LuGre is exact; elasto-plastic moments take the mean of beta at the start and at an end
 predicted by an implicit Euler step, which is second order.
 
-The step is a function of z, the scaled twist u, its steady state q and the breakaway b, the law's ratio times the
-evenness. `linearise` walks through it and keeps the partial derivatives, which the compiler drops where nobody asks for
+The step is a function of z, the scaled twist u, its steady state q and the breakaway ratio. `linearise` walks through it and keeps the partial derivatives, which the compiler drops where nobody asks for
 them; `pull_back` takes cotangents back. At the kinks: a state that the cap just touches counts as not capped (steady
 sliding sits on it to the last bit); at rest the step is that of a vanishing twist, `z + u dt`. The steady state depends
 on the friction coefficients and v_s, the traction on stiffness and dampings too, the closure on the breakaway ratio;
@@ -46,18 +45,16 @@ class Held(NamedTuple):
     u: tuple
     v: float
     q: tuple
-    even: float
 
 
 class Slopes(NamedTuple):
-    """Slopes of the steady state and of the evenness."""
+    """Slopes of the steady state."""
 
     q_u: tuple
     """By u, row by row."""
     q_mu_c: tuple
     q_mu_s: tuple
     q_v_s: tuple
-    even_u: tuple
 
 
 class Stage(NamedTuple):
@@ -71,7 +68,10 @@ class Stage(NamedTuple):
     beta: float
     by_deflection: float
     by_share: float
-    by_breakaway: float
+    by_ratio: float
+    """By the law's breakaway ratio."""
+    by_z: tuple
+    """Through the evenness alone."""
 
 
 class Step(NamedTuple):
@@ -123,8 +123,8 @@ class Step(NamedTuple):
 def hold(contact, twist):
     """`Held` at a twist."""
     vx, vy, omega = twist
-    x, y, s, v, qx, qy, qs, even = sliding(contact.law, vx, vy, omega, contact.shape, contact.surface, contact.data)
-    return Held((x, y, s), v, (qx, qy, qs), even)
+    x, y, s, v, qx, qy, qs = sliding(contact.law, vx, vy, omega, contact.shape, contact.surface, contact.data)
+    return Held((x, y, s), v, (qx, qy, qs))
 
 
 @kernel
@@ -132,25 +132,26 @@ def hold_slopes(contact, twist, work):
     """`Held` and `Slopes` at a twist; none at rest, where they have no effect."""
     law, shape, surface, data = contact.law, contact.shape, contact.surface, contact.data
     vx, vy, omega = twist
-    x, y, s = u = scaled_twist(shape, vx, vy, omega)
+    u = scaled_twist(shape, vx, vy, omega)
     v, none = norm(u), (0.0, 0.0, 0.0)
     if v > STILL:
         found = steady(law, shape, surface, data, u, v)
-        even, by_x, by_y, by_s = evenness(shape, surface, data, x, y, s, v)
-        slopes = Slopes(found.by_u, found.by_mu_c, found.by_mu_s, found.by_v_s, (by_x, by_y, by_s))
-        return Held(u, v, found.q, even), slopes
+        return Held(u, v, found.q), Slopes(found.by_u, found.by_mu_c, found.by_mu_s, found.by_v_s)
     still = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    return Held(none, 0.0, (FAR, 0.0, 0.0), 1.0), Slopes(still, none, none, none, none)
+    return Held(none, 0.0, (FAR, 0.0, 0.0)), Slopes(still, none, none, none)
 
 
 @kernel
-def _stage(law, held, z, stretch, deflection, share):
+def _stage(contact, z, per_q2, stretch, deflection, share):
     """The closure at a state; `stretch`: the change of the deflection is `stretch/deflection` times that along z."""
-    beta, by_deflection, by_share, by_breakaway = reduced.closure_partials(law, deflection, share, held.even)
+    law = contact.law
+    even, even_z = evenness(law, contact.shape, contact.surface, contact.data, z, per_q2)
+    beta, by_deflection, by_share, by_breakaway = reduced.closure_partials(law, deflection, share, even)
     # exactly zero before breakaway: of hardly any deflection it is multiplied by the stretch, one over that
-    by_deflection = xp.where(deflection > law.breakaway_ratio * held.even, by_deflection, 0.0)
+    by_deflection = xp.where(deflection > law.breakaway_ratio * even, by_deflection, 0.0)
     stretch = stretch / xp.where(deflection > 0.0, deflection, math.inf)
-    return Stage(z, deflection, stretch, share, beta, by_deflection, by_share, by_breakaway)
+    by_z = times(law.breakaway_ratio * by_breakaway, even_z)
+    return Stage(z, deflection, stretch, share, beta, by_deflection, by_share, even * by_breakaway, by_z)
 
 
 @kernel
@@ -161,11 +162,11 @@ def linearise(contact, held, z, dt):
     per_power = 1.0 / xp.where(power > 0.0, power, 1.0)
     decay, slow = held.v * held.v * per_power, power * per_q2
     m = plus(u, -decay, q)
-    start = _stage(law, held, z, per_q2, math.sqrt(dot(z, z) * per_q2), dot(z, q) * per_q2)
+    start = _stage(contact, z, per_q2, per_q2, math.sqrt(dot(z, z) * per_q2), dot(z, q) * per_q2)
     per_slow, per = 1.0 / (1.0 + start.beta * slow * dt), 1.0 / (1.0 + start.beta * decay * dt)
     share = (start.share + slow * dt) * per_slow
     ahead = plus(plus(z, dt, u), -dt * start.beta * share, m)
-    predicted = _stage(law, held, ahead, per * per * per_q2, per * math.sqrt(dot(ahead, ahead) * per_q2), share)
+    predicted = _stage(contact, ahead, per_q2, per * per * per_q2, per * math.sqrt(dot(ahead, ahead) * per_q2), share)
     # the mean of beta
     beta = formulas.mean_decay(start.beta, predicted.beta, decay * dt)
     by_start, by_end = formulas.mean_decay_partials(start.beta, predicted.beta, decay * dt)
@@ -187,7 +188,7 @@ def linearise(contact, held, z, dt):
     largest = formulas.reachable_deflection(xp, start.deflection, law)
     back = formulas.cap(xp, size, largest)
     new = times(back, free)
-    end = _stage(law, held, new, per_q2, size * back, dot(free, q) * per_q2 * back)
+    end = _stage(contact, new, per_q2, per_q2, size * back, dot(free, q) * per_q2 * back)
     slip = plus(plus(u, -end.beta * decay, new), -end.beta * end.share, m)
     return Step(
         held, dt, m, per_q2, per_power, decay, slow, start, per_slow, per, predicted, beta, by_start, by_end, by_decay,
@@ -206,7 +207,8 @@ class StepBars(NamedTuple):
     z: tuple
     u: tuple
     q: tuple
-    breakaway: float
+    ratio: float
+    """The law's breakaway ratio."""
 
 
 @kernel
@@ -219,8 +221,8 @@ def _pull_back(law, s, new, pull):
     d_beta = -dot(plus(times(s.decay, end.z), end.share, s.m), rate)
     d_decay, dm = -end.beta * dot(end.z, rate), times(-end.beta * end.share, rate)
     d_share = end.by_share * d_beta - end.beta * dot(s.m, rate)
-    d_size, breakaway = end.by_deflection * d_beta, end.by_breakaway * d_beta
-    dn = plus(plus(dn, end.stretch * d_size, end.z), per_q2 * d_share, q)
+    d_size, ratio = end.by_deflection * d_beta, end.by_ratio * d_beta
+    dn = plus(plus(plus(dn, end.stretch * d_size, end.z), per_q2 * d_share, q), d_beta, end.by_z)
     q_dq = -end.deflection * d_size - 2.0 * end.share * d_share
     dq = times(per_q2 * d_share, end.z)
     d_size = 0.0
@@ -244,9 +246,9 @@ def _pull_back(law, s, new, pull):
     # predicted end
     d_start, d_end = s.by_start * d_beta, s.by_end * d_beta
     d_predicted, ahead = predicted.by_deflection * d_end, predicted.by_share * d_end
-    breakaway += predicted.by_breakaway * d_end
+    ratio += predicted.by_ratio * d_end
     q_dq -= predicted.deflection * d_predicted
-    dp = times(predicted.stretch * d_predicted, predicted.z)
+    dp = plus(times(predicted.stretch * d_predicted, predicted.z), d_end, predicted.by_z)
     shrink, push = predicted.deflection * s.per * dt * d_predicted, dt * dot(s.m, dp)
     d_start -= shrink * s.decay + push * predicted.share
     d_decay -= shrink * start.beta
@@ -258,15 +260,15 @@ def _pull_back(law, s, new, pull):
     # start
     d_size += start.by_deflection * d_start
     d_share += ahead + start.by_share * d_start
-    breakaway += start.by_breakaway * d_start
-    dz = plus(plus(dz, start.stretch * d_size, start.z), per_q2 * d_share, q)
+    ratio += start.by_ratio * d_start
+    dz = plus(plus(plus(dz, start.stretch * d_size, start.z), per_q2 * d_share, q), d_start, start.by_z)
     q_dq -= start.deflection * d_size + 2.0 * (start.share * d_share + s.slow * d_slow)
     d_decay -= dot(q, dm)
     power = d_slow * per_q2 - s.decay * s.per_power * d_decay
     dq = plus(plus(dq, per_q2 * d_share, start.z), -s.decay, dm)
     dq = plus(plus(dq, power, s.held.u), per_q2 * q_dq, q)
     du = plus(plus(plus(du, 1.0, dm), 2.0 * s.per_power * d_decay, s.held.u), power, q)
-    return StepBars(dz, du, dq, breakaway)
+    return StepBars(dz, du, dq, ratio)
 
 
 @kernel
@@ -277,14 +279,13 @@ def pull_back(contact, step, slopes, new, wrench):
     pull = scaled_twist(shape, wx, wy, wt)
     bar = _pull_back(law, step, new, pull)
     u_bar = plus(bar.u, 1.0, applied_back(slopes.q_u, bar.q))
-    u_bar = plus(u_bar, law.breakaway_ratio * bar.breakaway, slopes.even_u)
     return Cotangents(
         bar.z,
         to_origin(shape, *u_bar),
         LawNumbers(
             -dot(step.new, pull) - dot(held.q, bar.q) / law.sigma_0, -dot(step.rate, pull), -dot(held.u, pull),
             dot(slopes.q_mu_c, bar.q), dot(slopes.q_mu_s, bar.q), dot(slopes.q_v_s, bar.q),
-            0.0, 0.0, held.even * bar.breakaway, 0.0,
+            0.0, 0.0, bar.ratio, 0.0,
         ),
         Shape(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
     )  # fmt: skip

@@ -1,7 +1,7 @@
 """Steady sliding of a patch from a stored map, in scaled coordinates `V_G = F V` (docs/physics.md, "Reduced model").
 
 A map is eight numbers (faces, n, n of the Stribeck part, its levels, knee, least dissipation, stretch, 0), the matrix K
-[6, 6] of `<v^4> = m' K m` with `m = (x^2, y^2, s^2, x y, x s, y s)` of V_G, then two maps of `kernels.cube`: `h_0`,
+[6, 6] of `<u^4> = m' K m` with `m = (x^2, y^2, s^2, x y, x s, y s)` of the slip or state, then two maps of `kernels.cube`: `h_0`,
 steady sliding at `g = 1`, and the rest r of that at `g = e = exp(-|v/v_s|^gamma)`,
 
     sigma_0 z_ss = (mu_s - (mu_s - mu_c) t) h_0 + (mu_s - mu_c) r(t),   t = |V_G| / (|V_G| + knee v_s)
@@ -30,6 +30,10 @@ STILL = 1e-100
 
 FAR = 1e30
 """Steady state [m] of a patch at rest, where it has none: no bristle comes near it, so that nothing decays."""
+
+FAINT = 1e-70
+"""Share of `|z_ss|^2` down to which, and up to whose inverse, a state has an evenness: the squares of others leave the
+range of doubles, and the closure is 0 or 1 there whatever it is."""
 
 HEADER = QUARTIC + 36
 """Numbers in front of a map."""
@@ -170,42 +174,31 @@ def _row(data, k, m):
 
 
 @kernel
-def _blended(one, other, share):
-    return (
-        one[0] + share * (other[0] - one[0]),
-        one[1] + share * (other[1] - one[1]),
-        one[2] + share * (other[2] - one[2]),
-        one[3] + share * (other[3] - one[3]),
-        one[4] + share * (other[4] - one[4]),
-        one[5] + share * (other[5] - one[5]),
-    )
-
-
-@kernel
-def evenness(shape, surface, data, x, y, s, v):
-    """`<v^2>/sqrt(<v^4>)` of the cells' speeds at the scaled twist, and its slopes by that, for `v > 0`."""
-    per = 1.0 / v
-    x, y, s = x * per, y * per, s * per
-    m = (x * x, y * y, s * s, x * y, x * s, y * s)
-    k = _fourth(data, surface[0], m)
-    if shape[6] > 0.0:
-        k = _blended(k, _fourth(data, surface[1], m), shape[6])
-    square = 1.0 / (k[0] * m[0] + k[1] * m[1] + k[2] * m[2] + k[3] * m[3] + k[4] * m[4] + k[5] * m[5])
-    even = math.sqrt(square)
-    c = 2.0 * even * per
-    by_x = x - square * (k[0] * x + 0.5 * (k[3] * y + k[4] * s))
-    by_y = y - square * (k[1] * y + 0.5 * (k[3] * x + k[5] * s))
-    by_s = s - square * (k[2] * s + 0.5 * (k[4] * x + k[5] * y))
-    return even, c * by_x, c * by_y, c * by_s
+def evenness(law, shape, surface, data, z, per_q2):
+    """`formulas.evenness` of a state relative to `|z_ss|`, and its slopes by z; 1 for plain bristles."""
+    x, y, s = z
+    px, py, ps = p = times(per_q2, z)
+    square = dot(p, z)
+    if law.elasto_plastic > 0.0 and square > FAINT and square * FAINT < 1.0:
+        m = (px * x, py * y, ps * s, px * y, px * s, py * s)
+        k = _fourth(data, surface[0], m)
+        if shape[6] > 0.0:
+            k = plus(times(1.0 - shape[6], k), shape[6], _fourth(data, surface[1], m))
+        fourth = dot(k, m)
+        even, c = formulas.evenness(square, fourth), 4.0 / fourth
+        by_x = square * px - even * (k[0] * px + 0.5 * (k[3] * py + k[4] * ps))
+        by_y = square * py - even * (k[1] * py + 0.5 * (k[3] * px + k[5] * ps))
+        by_s = square * ps - even * (k[2] * ps + 0.5 * (k[4] * px + k[5] * py))
+        return even, (c * by_x, c * by_y, c * by_s)
+    return 1.0, (0.0, 0.0, 0.0)
 
 
 @kernel
 def sliding(law, vx, vy, omega, shape, surface, data):
-    """Scaled twist, its norm, its steady state and evenness (any where the patch is at rest): what `advance` holds."""
+    """Scaled twist, its norm and its steady state (any where the patch is at rest): what a step holds."""
     x, y, s = scaled_twist(shape, vx, vy, omega)
     v = math.sqrt(x * x + y * y + s * s)
     if v > STILL:
         qx, qy, qs = steady(law, shape, surface, data, (x, y, s), v).q
-        even = evenness(shape, surface, data, x, y, s, v)[0] if law.elasto_plastic > 0.0 else 1.0
-        return x, y, s, v, qx, qy, qs, even
-    return 0.0, 0.0, 0.0, 0.0, FAR, 0.0, 0.0, 1.0
+        return x, y, s, v, qx, qy, qs
+    return 0.0, 0.0, 0.0, 0.0, FAR, 0.0, 0.0

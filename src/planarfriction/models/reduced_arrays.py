@@ -48,7 +48,6 @@ class Held(NamedTuple):
     slow: Any
     """`mu = V_G . z_ss/|z_ss|^2` [1/s]."""
     per_q2: Any
-    even: Any
     moves: Any
 
 
@@ -139,11 +138,15 @@ def _sliding(xp, law: LawNumbers, shape: ReducedNumbers, n, t):
     return sign[..., None] * ((law.mu_s - drop * t) * flat + drop * rest)
 
 
-def _evenness(xp, shape: ReducedNumbers, n):
-    """`<v^2>/sqrt(<v^4>)` of the cells' speeds at unit vectors n."""
+def _evenness(xp, shape: ReducedNumbers, z):
+    """`formulas.evenness` of states; 1 without deflection. Their size goes first, whose fourth power float32 lacks."""
+    bent = dot(z, z) > 0.0
+    safe = xp.where(bent, z, 1.0)
+    n = safe / xp.root(dot(safe, safe))
     x, y, s = n[..., 0], n[..., 1], n[..., 2]
     m = xp.stack([x * x, y * y, s * s, x * y, x * s, y * s], -1)
-    return 1.0 / xp.root((m[..., :, None] * shape.quartic * m[..., None, :]).sum((-2, -1)))[..., None]
+    fourth = (m[..., :, None] * shape.quartic * m[..., None, :]).sum((-2, -1))[..., None]
+    return xp.where(bent, formulas.evenness(dot(n, n), fourth), 1.0)
 
 
 # ---------------------------------------------------------------------- a twist
@@ -165,12 +168,12 @@ def held(xp, law: LawNumbers, shape: ReducedNumbers, twist) -> Held:
     q = (q + (formulas.floored(xp, power, law.mu_c * least) - power) * n) / law.sigma_0
     power, per_q2 = dot(q, n), 1.0 / dot(q, q)
     decay = v / power
-    even = _evenness(xp, shape, n) if law.elasto_plastic else 1.0
-    return Held(u, q, safe - decay * q, decay, v * power * per_q2, per_q2, even, moves)
+    return Held(u, q, safe - decay * q, decay, v * power * per_q2, per_q2, moves)
 
 
-def _closure(xp, law: LawNumbers, deflection, share, even):
-    """`beta` (see `kernels.reduced.closure`)."""
+def _closure(xp, law: LawNumbers, shape: ReducedNumbers, z, deflection, share):
+    """`beta` of a state z, which may be given times any factor (see `kernels.reduced.closure`)."""
+    even = _evenness(xp, shape, z) if law.elasto_plastic else 1.0
     deflected = deflection > 0.0
     cosine = xp.where(deflected, share / xp.where(deflected, deflection, 1.0), 0.0)
     return formulas.slip_share(xp, deflection, cosine, even, law)
@@ -184,7 +187,7 @@ def _place(xp, z, by: Held):
 def rate(xp, law: LawNumbers, shape: ReducedNumbers, z, by: Held):
     """`zdot = V_G - beta (lambda z + s m)`."""
     deflection, share = _place(xp, z, by)
-    beta = _closure(xp, law, deflection, share, by.even)
+    beta = _closure(xp, law, shape, z, deflection, share)
     return by.u - xp.where(by.moves, beta * (by.decay * z + share * by.m), 0.0)
 
 
@@ -198,12 +201,12 @@ def wrench(xp, law: LawNumbers, shape: ReducedNumbers, z, zdot, by: Held):
 def advance(xp, law: LawNumbers, shape: ReducedNumbers, z, by: Held, dt):
     """Moments and their rates after `dt` of a held twist (see `kernels.reduced_step`)."""
     size, share = _place(xp, z, by)
-    start = end = _closure(xp, law, size, share, by.even)
+    start = end = _closure(xp, law, shape, z, size, share)
     if law.elasto_plastic:
         ahead = (share + by.slow * dt) / (1.0 + start * by.slow * dt)
         predicted = z + dt * by.u - (dt * start * ahead) * by.m
         reached = xp.root(dot(predicted, predicted) * by.per_q2) / (1.0 + start * by.decay * dt)
-        end = _closure(xp, law, reached, ahead, by.even)
+        end = _closure(xp, law, shape, predicted, reached, ahead)
     beta = formulas.mean_decay(start, end, by.decay * dt)
     slow_rate, rate_dt = beta * by.slow * dt, beta * by.decay * dt
     left_slow, _ = formulas.relaxation(xp, slow_rate)
