@@ -5,11 +5,12 @@ With `beta` held the equation of the moments z (docs/physics.md, "Reduced model"
 of the rest with lambda. Plain LuGre is exact; elasto-plastic moments take the mean of beta at the start and at an end
 predicted by an implicit Euler step, which is second order.
 
-The step is a function of z, the scaled twist u, its steady state q and the breakaway ratio. `linearise` walks through it and keeps the partial derivatives, which the compiler drops where nobody asks for
-them; `pull_back` takes cotangents back. At the kinks: a state that the cap just touches counts as not capped (steady
-sliding sits on it to the last bit); at rest the step is that of a vanishing twist, `z + u dt`. The steady state depends
-on the friction coefficients and v_s, the traction on stiffness and dampings too, the closure on the breakaway ratio;
-gamma and the shape, built into the map, are held.
+The step is a function of z, the scaled twist u and its steady state q. `linearise` walks through it and keeps the
+partial derivatives, which the compiler drops where nobody asks for them; `pull_back` takes cotangents back. At the
+kinks: a state that the cap just touches counts as not capped (steady sliding sits on it to the last bit); at rest the
+step is that of a vanishing twist, `z + u dt`. The steady state depends on the friction coefficients and v_s, the
+traction on stiffness and dampings too, the closure on the breakaway ratio; gamma and the shape, built into the map, are
+held.
 """
 
 from __future__ import annotations

@@ -1,13 +1,14 @@
 """Steady sliding of a patch from a stored map, in scaled coordinates `V_G = F V` (docs/physics.md, "Reduced model").
 
-A map is eight numbers (faces, n, n of the Stribeck part, its levels, knee, least dissipation, stretch, 0), the matrix K
-[6, 6] of `<u^4> = m' K m` with `m = (x^2, y^2, s^2, x y, x s, y s)` of the slip or state, then two maps of `kernels.cube`: `h_0`,
-steady sliding at `g = 1`, and the rest r of that at `g = e = exp(-|v/v_s|^gamma)`,
+A map is eight numbers (faces, n, n of the Stribeck part, its levels, knee, least dissipation, stretch, 0), the 15
+coefficients of `<u^4>`, u the cells' speeds at V_G or their bristles in a state, then two maps of `kernels.cube`:
+`h_0`, steady sliding at `g = 1`, and the rest r of that at `g = e`, with `e = exp(-|v/v_s|^gamma)`,
 
     sigma_0 z_ss = (mu_s - (mu_s - mu_c) t) h_0 + (mu_s - mu_c) r(t),   t = |V_G| / (|V_G| + knee v_s)
 
 The maps are over the directions of `(x, y, stretch s)`: where nearly all of the load is on one point, all that happens
-lies close to the spin, and is drawn apart.
+lies close to the spin, and is drawn apart. The coefficients are those of `m_i m_j`, i <= 3 and j >= i row by row, with
+`m = (x^2, y^2, s^2, x y, x s, y s)`: every product of four components is once among them.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from planarfriction.kernels import cube, kernel
 from planarfriction.kernels.vectors import applied_back, dot, plus, times
 
 QUARTIC = 8
-"""Where K begins."""
+"""Where the coefficients of `<u^4>` begin."""
 
 STILL = 1e-100
 """Scaled speed [m/s] up to which a patch is at rest: squares of what is slower leave the range of doubles."""
@@ -35,7 +36,7 @@ FAINT = 1e-70
 """Share of `|z_ss|^2` down to which, and up to whose inverse, a state has an evenness: the squares of others leave the
 range of doubles, and the closure is 0 or 1 there whatever it is."""
 
-HEADER = QUARTIC + 36
+HEADER = QUARTIC + 15
 """Numbers in front of a map."""
 
 
@@ -154,23 +155,22 @@ def steady_slopes(law, shape, surface, data, x, y, s, v, j):
 
 
 @kernel
-def _fourth(data, start, m):
-    """`K m`."""
-    k = start + QUARTIC
+def _fourth(data, k):
+    """The coefficients of `<u^4>`, row by row."""
     return (
-        _row(data, k, m),
-        _row(data, k + 6, m),
-        _row(data, k + 12, m),
-        _row(data, k + 18, m),
-        _row(data, k + 24, m),
-        _row(data, k + 30, m),
+        (data[k], data[k + 1], data[k + 2], data[k + 3], data[k + 4], data[k + 5]),
+        (data[k + 6], data[k + 7], data[k + 8], data[k + 9], data[k + 10]),
+        (data[k + 11], data[k + 12], data[k + 13], data[k + 14]),
     )
 
 
 @kernel
-def _row(data, k, m):
-    low = data[k] * m[0] + data[k + 1] * m[1] + data[k + 2] * m[2]
-    return low + data[k + 3] * m[3] + data[k + 4] * m[4] + data[k + 5] * m[5]
+def _mixed_fourth(one, other, share):
+    return (
+        plus(times(1.0 - share, one[0]), share, other[0]),
+        plus(times(1.0 - share, one[1]), share, other[1]),
+        plus(times(1.0 - share, one[2]), share, other[2]),
+    )
 
 
 @kernel
@@ -181,15 +181,20 @@ def evenness(law, shape, surface, data, z, per_q2):
     square = dot(p, z)
     if law.elasto_plastic > 0.0 and square > FAINT and square * FAINT < 1.0:
         m = (px * x, py * y, ps * s, px * y, px * s, py * s)
-        k = _fourth(data, surface[0], m)
+        rows = _fourth(data, surface[0] + QUARTIC)
         if shape[6] > 0.0:
-            k = plus(times(1.0 - shape[6], k), shape[6], _fourth(data, surface[1], m))
-        fourth = dot(k, m)
-        even, c = formulas.evenness(square, fourth), 4.0 / fourth
-        by_x = square * px - even * (k[0] * px + 0.5 * (k[3] * py + k[4] * ps))
-        by_y = square * py - even * (k[1] * py + 0.5 * (k[3] * px + k[5] * ps))
-        by_s = square * ps - even * (k[2] * ps + 0.5 * (k[4] * px + k[5] * py))
-        return even, (c * by_x, c * by_y, c * by_s)
+            rows = _mixed_fourth(rows, _fourth(data, surface[1] + QUARTIC), shape[6])
+        (a0, a1, a2, a3, a4, a5), (b1, b2, b3, b4, b5), (c2, c3, c4, c5) = rows
+        m0, m1, m2 = m[0], m[1], m[2]
+        a, b, c = dot(rows[0], m), dot(rows[1], (m1, m2, m[3], m[4], m[5])), dot(rows[2], (m2, m[3], m[4], m[5]))
+        fourth = m0 * a + m1 * b + m2 * c
+        even, per = formulas.evenness(square, fourth), 4.0 / fourth
+        k_x, k_y, k_s = a + a0 * m0, a1 * m0 + b + b1 * m1, a2 * m0 + b2 * m1 + c + c2 * m2
+        k_xy, k_xs, k_ys = a3 * m0 + b3 * m1 + c3 * m2, a4 * m0 + b4 * m1 + c4 * m2, a5 * m0 + b5 * m1 + c5 * m2
+        by_x = square * px - even * (0.5 * k_x * px + 0.25 * (k_xy * py + k_xs * ps))
+        by_y = square * py - even * (0.5 * k_y * py + 0.25 * (k_xy * px + k_ys * ps))
+        by_s = square * ps - even * (0.5 * k_s * ps + 0.25 * (k_xs * px + k_ys * py))
+        return even, (per * by_x, per * by_y, per * by_s)
     return 1.0, (0.0, 0.0, 0.0)
 
 

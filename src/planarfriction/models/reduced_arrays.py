@@ -25,7 +25,7 @@ class ReducedNumbers(NamedTuple):
     factor: Any
     """F `[3, 3]`, upper triangular."""
     quartic: Any
-    """K `[6, 6]` (see `kernels.steady`)."""
+    """Coefficients of `<u^4>` `[15]` (see `kernels.steady`)."""
     scale: Any
     """Knee, least dissipation and stretch `[3]`."""
     flat: Any
@@ -58,7 +58,7 @@ def numbers_of(shape: ReducedShape) -> ReducedNumbers:
     middle = HEADER + faces * (2 * n + 1) ** 2 * 12
     return ReducedNumbers(
         shape.factor,
-        data[QUARTIC:HEADER].reshape(6, 6),
+        data[QUARTIC:HEADER],
         data[4:7],
         data[HEADER:middle].reshape(faces, 2 * n + 1, 2 * n + 1, 3, 4),
         np.reshape(data[middle:], (faces, 2 * m + 1, 2 * m + 1, levels, 3, 4)),
@@ -69,7 +69,7 @@ def shape_of(numbers: ReducedNumbers) -> ReducedShape:
     """The shape that has the `numbers`, in NumPy: the inverse of `numbers_of`."""
     header, flat, rest = np.zeros(HEADER), numbers.flat, numbers.rest
     header[:7] = len(flat), flat.shape[1] // 2, rest.shape[1] // 2, rest.shape[3], *numbers.scale
-    header[QUARTIC:] = numbers.quartic.ravel()
+    header[QUARTIC:] = numbers.quartic
     return ReducedShape(numbers.factor, np.concatenate([header, flat.ravel(), rest.ravel()]))
 
 
@@ -144,9 +144,9 @@ def _evenness(xp, shape: ReducedNumbers, z):
     safe = xp.where(bent, z, 1.0)
     n = safe / xp.root(dot(safe, safe))
     x, y, s = n[..., 0], n[..., 1], n[..., 2]
-    m = xp.stack([x * x, y * y, s * s, x * y, x * s, y * s], -1)
-    fourth = (m[..., :, None] * shape.quartic * m[..., None, :]).sum((-2, -1))[..., None]
-    return xp.where(bent, formulas.evenness(dot(n, n), fourth), 1.0)
+    m = [x * x, y * y, s * s, x * y, x * s, y * s]
+    products = xp.stack([m[i] * m[j] for i in range(3) for j in range(i, 6)], -1)
+    return xp.where(bent, formulas.evenness(dot(n, n), dot(shape.quartic, products)), 1.0)
 
 
 # ---------------------------------------------------------------------- a twist

@@ -142,7 +142,7 @@ def reduced_map(cells: ScaledCells | ScaledPoint, gamma: float, segments: int, s
     levels = np.einsum("lt,fijtc->fijlc", cube_map.level_matrix(speeds), rest, optimize=True)
     header = np.zeros(HEADER)
     header[:7] = faces, segments, coarse, speeds + 2, KNEE, LEAST_SHARE * least, cells.stretch
-    header[QUARTIC:] = cells.fourth_moments().ravel()
+    header[QUARTIC:] = cells.fourth_moments()
     return np.concatenate([header, *(_numbers(values) for values in (steady, levels))])
 
 

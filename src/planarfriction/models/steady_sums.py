@@ -11,6 +11,9 @@ from planarfriction.kernels.cell_sums import steady_sums
 from planarfriction.patch import ContactPatch
 
 _BLOCK = 128
+
+_PRODUCTS = (0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)
+"""Factors of the products m of three components."""
 """Directions that are summed at once."""
 
 EVEN = 0.5
@@ -52,12 +55,11 @@ class ScaledCells:
         return out.reshape(*directions.shape[:-1], -1, 3)
 
     def fourth_moments(self) -> np.ndarray:
-        """K `[6, 6]` of `<u^4> = m' K m`, m the products of a scaled twist (see `kernels.steady`); cells as points."""
+        """Coefficients of `<u^4>` `[15]` (see `kernels.steady`), cells as points."""
         levers, weights = self._levers
         square = np.swapaxes(levers, 1, 2) @ levers  # |u|^2 = V_G' square V_G
-        rows, columns = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]
-        products = square[:, rows, columns] * np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
-        return np.einsum("n,ni,nj->ij", weights, products, products)
+        products = square[:, *_PRODUCTS] * np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
+        return _collected(np.einsum("n,ni,nj->ij", weights, products, products))
 
     def _point_sums(self, unit: np.ndarray, exponents: np.ndarray, gamma: float) -> np.ndarray:
         """The whole sum for a metric per cell, else its even part; `[M, 1 + E, 3]`."""
@@ -88,10 +90,19 @@ class ScaledPoint:
         return pull[..., None, :] * np.exp(-np.concatenate([[0.0], exponents]))[:, None]
 
     def fourth_moments(self) -> np.ndarray:
-        """K of `|V_G|^4`."""
+        """Coefficients of `|V_G|^4`."""
         moments = np.zeros((6, 6))
         moments[:3, :3] = 1.0
-        return moments
+        return _collected(moments)
+
+
+def _collected(matrix: np.ndarray) -> np.ndarray:
+    """The coefficients of `m' K m` `[15]` from K `[6, 6]` (see `kernels.steady`)."""
+    powers = np.eye(3, dtype=int)[np.array(_PRODUCTS)].sum(0)
+    products = powers[:, None] + powers
+    rows, columns = np.triu_indices(3, m=6)
+    same = (products[rows, columns][:, None, None] == products).all(-1)
+    return (same * matrix).sum((1, 2))
 
 
 def _spread(patch: ContactPatch, weights: np.ndarray) -> tuple[float, float]:
