@@ -17,6 +17,7 @@ from planarfriction.patch import PUBLISHED_PATCHES
 PLAIN, ELASTIC = pf.LuGre(mu_s=1.2), pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
 LAWS = {"plain": PLAIN, "elasto-plastic": ELASTIC}
 PATCH = PUBLISHED_PATCHES["NonConvex2"]()
+GRAIN = pf.grain(0.4, 1.3, 0.6)
 FEET = pf.ContactPatch.points([(0.01, 0.0), (-0.01, 0.002), (0.0, 0.012)], [1.0, 2.0, 3.0])
 SMALL = {"segments": 8, "speeds": 8}
 
@@ -424,18 +425,34 @@ def test_states_of_any_size_break_away_without_a_number_out_of_range():
             np.testing.assert_allclose(parts[0], model.shape_at(None).factor @ twist, rtol=1e-12)
 
 
-@pytest.mark.parametrize("patch", [PATCH, FEET, PATCH.moved((0.03, -0.02)), GRAIN], ids=["T", "feet", "far", "grain"])
+@pytest.mark.parametrize("patch", [PATCH, FEET, PATCH.with_friction_metric(GRAIN)], ids=["T", "feet", "grain"])
 def test_a_translated_patch_breaks_away_as_one_bristle(patch):
-    """Evenness is 1 to rounding: what is left is the map's."""
-    model, one = pf.ReducedModel(patch, ELASTIC), pf.DistributedModel(patch, ELASTIC)
+    model, cells = pf.ReducedModel(patch, ELASTIC), pf.DistributedModel(patch, ELASTIC)
     for angle in (0.3, 2.0):
         twist = 1e-3 * np.array([np.cos(angle), np.sin(angle), 0.0])
-        states = [m.rest() for m in (model, one)]
+        states = [m.rest() for m in (model, cells)]
         for _ in range(60):
-            results = [m.step(z, twist, 1.0, 5e-5) for m, z in zip((model, one), states, strict=True)]
+            results = [m.step(z, twist, 1.0, 5e-5) for m, z in zip((model, cells), states, strict=True)]
             states = [r[0] for r in results]
-            # the map errs by 1e-5 of the steady force, over a lever arm of 0.04 m for the torque
-            assert np.abs((results[0][1] - results[1][1]) / [1.0, 1.0, 0.04]).max() < 4e-5
+            error, force = results[0][1] - results[1][1], np.linalg.norm(results[1][1][:2])
+            # the map errs by 1e-5 of the steady force, over a lever arm of 0.01 m for the torque
+            assert np.abs(error / [1.0, 1.0, 0.01]).max() < 4e-5 * max(1.0, force)
 
 
-SPIN_UP = {"Circle": 1.0, "Line": 1.0, "NonConvex2": 1.0}
+@pytest.mark.parametrize("shape", ["Circle", "Square", "Line", "NonConvex2"])
+def test_a_patch_that_is_spun_up_breaks_away_as_its_cells_do(shape):
+    """Largest error of the torque, from rest until it slides: a quarter of the published model's (0.07 to 0.16 seen).
+
+    A threshold that follows the speeds of the cells, without the square, has 0.28 to 0.62.
+    """
+    patch, twist = PUBLISHED_PATCHES[shape](), (0.0, 0.0, 0.02)
+    models = [kind(patch, ELASTIC) for kind in (pf.DistributedModel, pf.ReducedModel, pf.ReducedModelPublished)]
+    dt = 1e-8 / (twist[2] * patch.contact_radius())  # full deflection takes 1e-6 m
+    torques = np.empty((3, 400))
+    for model, torque in zip(models, torques, strict=True):
+        state = model.rest()
+        for i in range(400):
+            state, wrench = model.step(state, twist, 1.0, dt)
+            torque[i] = wrench[2]
+    ours, published = np.abs(torques[1:] - torques[0]).max(axis=1)
+    assert ours < 0.25 * published
