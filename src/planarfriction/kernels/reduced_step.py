@@ -116,6 +116,8 @@ class Step(NamedTuple):
     rate: tuple
     new: tuple
     """State."""
+    known: tuple
+    """Of the new state (see `known`)."""
     wrench: tuple
     """About the origin, per unit load."""
 
@@ -143,10 +145,15 @@ def hold_slopes(contact, twist, work):
 
 
 @kernel
-def _stage(contact, z, per_q2, stretch, deflection, share):
+def known(contact, z):
+    """What a step needs to know of its state beside z, and knows of the one at its end: the evenness and its slopes."""
+    return evenness(contact.law, contact.shape, contact.surface, contact.data, z)
+
+
+@kernel
+def _stage(law, z, known, stretch, deflection, share):
     """The closure at a state; `stretch`: the change of the deflection is `stretch/deflection` times that along z."""
-    law = contact.law
-    even, even_z = evenness(law, contact.shape, contact.surface, contact.data, z, per_q2)
+    even, even_z = known
     beta, by_deflection, by_share, by_breakaway = reduced.closure_partials(law, deflection, share, even)
     # exactly zero before breakaway: of hardly any deflection it is multiplied by the stretch, one over that
     by_deflection = xp.where(deflection > law.breakaway_ratio * even, by_deflection, 0.0)
@@ -158,16 +165,24 @@ def _stage(contact, z, per_q2, stretch, deflection, share):
 @kernel
 def linearise(contact, held, z, dt):
     """`Step` from the state z."""
+    return advance(contact, held, z, known(contact, z), dt)
+
+
+@kernel
+def advance(contact, held, z, before, dt):
+    """`Step` from the state z, of which `before` is `known`."""
     law, u, q = contact.law, held.u, held.q
     per_q2, power = 1.0 / dot(q, q), dot(u, q)
     per_power = 1.0 / xp.where(power > 0.0, power, 1.0)
     decay, slow = held.v * held.v * per_power, power * per_q2
     m = plus(u, -decay, q)
-    start = _stage(contact, z, per_q2, per_q2, math.sqrt(dot(z, z) * per_q2), dot(z, q) * per_q2)
+    start = _stage(law, z, before, per_q2, math.sqrt(dot(z, z) * per_q2), dot(z, q) * per_q2)
     per_slow, per = 1.0 / (1.0 + start.beta * slow * dt), 1.0 / (1.0 + start.beta * decay * dt)
     share = (start.share + slow * dt) * per_slow
     ahead = plus(plus(z, dt, u), -dt * start.beta * share, m)
-    predicted = _stage(contact, ahead, per_q2, per * per * per_q2, per * math.sqrt(dot(ahead, ahead) * per_q2), share)
+    predicted = _stage(
+        law, ahead, known(contact, ahead), per * per * per_q2, per * math.sqrt(dot(ahead, ahead) * per_q2), share
+    )
     # the mean of beta
     beta = formulas.mean_decay(start.beta, predicted.beta, decay * dt)
     by_start, by_end = formulas.mean_decay_partials(start.beta, predicted.beta, decay * dt)
@@ -189,13 +204,14 @@ def linearise(contact, held, z, dt):
     largest = formulas.reachable_deflection(xp, start.deflection, law)
     back = formulas.cap(xp, size, largest)
     new = times(back, free)
-    end = _stage(contact, new, per_q2, per_q2, size * back, dot(free, q) * per_q2 * back)
+    after = known(contact, new)
+    end = _stage(law, new, after, per_q2, size * back, dot(free, q) * per_q2 * back)
     slip = plus(plus(u, -end.beta * decay, new), -end.beta * end.share, m)
     return Step(
         held, dt, m, per_q2, per_power, decay, slow, start, per_slow, per, predicted, beta, by_start, by_end, by_decay,
         left_slow, left, mean_gap, formulas.relaxation_slope(xp, gap, left_gap, mean_gap),
         mean, formulas.relaxation_slope(xp, rate, left, mean),
-        end, free, size, back, size > largest * ROUNDING, start.deflection > 1.0, slip, new,
+        end, free, size, back, size > largest * ROUNDING, start.deflection > 1.0, slip, new, after,
         reduced.wrench(
             law, contact.shape, new[0], new[1], new[2], slip[0], slip[1], slip[2], u[0], u[1], u[2]
         ),
@@ -310,7 +326,7 @@ def step_address() -> int:
 @jit
 def rollout(inputs, span, z, wrench, states):
     """See `rollouts.roll`."""
-    rollouts.roll(shape_of, hold, linearise, inputs, span, z, wrench, states)
+    rollouts.roll(shape_of, hold, known, advance, inputs, span, z, wrench, states)
 
 
 @jit

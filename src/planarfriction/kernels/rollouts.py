@@ -169,23 +169,28 @@ def compile_step_one() -> None:
 
 
 @kernel
-def roll(shape_of, hold, linearise, inputs, span, z, wrench, states):
+def roll(shape_of, hold, known, advance, inputs, span, z, wrench, states):
     """Steps of the contacts `span[0]` to `span[1]`: `z` [B, 3] in place, wrenches into `wrench` [B, T, 3].
 
     The state before each step goes into `states` [B, T, 3], unless that is empty. What the next step holds is read
-    before this one's step, which waits for the last one's state: the processor does both at once.
+    before this one's step, which waits for the last one's state: the processor does both at once. `advance` is
+    `linearise` with what is `known` of the state, which the step before knows already.
     """
     steps, kept = inputs.dt.shape[0], states.shape[1] > 0
     for b in range(span[0], span[1] if steps > 0 else span[0]):
         twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
         contact = _contact(shape_of, inputs.rows[row_of(inputs.rows, b)], inputs.surface, inputs.data)
         own, held = three(z[b]), hold(contact, three(twists[0]))
+        before = known(contact, own)
         for t in range(steps):
             following = hold(contact, three(twists[min(t + 1, steps - 1)]))
             if kept:
                 put(states[b, t], own)
-            step = linearise(contact, held, own, inputs.dt[t])
-            own = step.new if loads[t] != 0.0 else (0.0, 0.0, 0.0)
+            step = advance(contact, held, own, before, inputs.dt[t])
+            own, before = step.new, step.known
+            if loads[t] == 0.0:
+                own = 0.0, 0.0, 0.0
+                before = known(contact, own)
             put(wrench[b, t], _weighed(step.wrench, loads[t]))
             held = following
         put(z[b], own)

@@ -33,8 +33,8 @@ FAR = 1e30
 """Steady state [m] of a patch at rest, where it has none: no bristle comes near it, so that nothing decays."""
 
 FAINT = 1e-70
-"""Share of `|z_ss|^2` down to which, and up to whose inverse, a state has an evenness: the squares of others leave the
-range of doubles, and the closure is 0 or 1 there whatever it is."""
+"""Square of a deflection, in the bristles' largest, from which on and up to whose inverse a state has an evenness: the
+squares of others leave the range of doubles, and the closure is 0 or 1 there whatever it is."""
 
 HEADER = QUARTIC + 15
 """Numbers in front of a map."""
@@ -174,10 +174,11 @@ def _mixed_fourth(one, other, share):
 
 
 @kernel
-def evenness(law, shape, surface, data, z, per_q2):
-    """`formulas.evenness` of a state relative to `|z_ss|`, and its slopes by z; 1 for plain bristles."""
+def evenness(law, shape, surface, data, z):
+    """`formulas.evenness` of a state, and its slopes by z; 1 for plain bristles."""
+    per = law.sigma_0 / law.mu_s
     x, y, s = z
-    px, py, ps = p = times(per_q2, z)
+    px, py, ps = p = times(per * per, z)
     square = dot(p, z)
     if law.elasto_plastic > 0.0 and square > FAINT and square * FAINT < 1.0:
         m = (px * x, py * y, ps * s, px * y, px * s, py * s)
