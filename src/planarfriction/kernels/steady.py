@@ -176,9 +176,9 @@ def _mixed_fourth(one, other, share):
 @kernel
 def evenness(law, shape, surface, data, z):
     """`formulas.evenness` of a state, and its slopes by z; 1 for plain bristles."""
-    per = law.sigma_0 / law.mu_s
+    grip = law.sigma_0 / law.mu_s
     x, y, s = z
-    px, py, ps = p = times(per * per, z)
+    px, py, ps = p = times(grip * grip, z)
     square = dot(p, z)
     if law.elasto_plastic > 0.0 and square > FAINT and square * FAINT < 1.0:
         m = (px * x, py * y, ps * s, px * y, px * s, py * s)
