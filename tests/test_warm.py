@@ -66,7 +66,9 @@ INTERRUPTED = {
 
 def started(code: str, cache=None, *arguments: str) -> subprocess.Popen:
     where = os.environ if cache is None else {**os.environ, "NUMBA_CACHE_DIR": str(cache)}
-    command = [sys.executable, "-c", code, *arguments]
+    # what runs in the background of a plain shell ignores Ctrl-C, and hands that down
+    heeds = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)\n"
+    command = [sys.executable, "-c", heeds + code, *arguments]
     return subprocess.Popen(command, env=where, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
 
 
