@@ -156,6 +156,7 @@ def test_float32_is_as_close_as_its_digits(surface):
 # ---------------------------------------------------------------------------------------- parameters
 
 
+@pytest.mark.filterwarnings("ignore:mu_c has been trained up to mu_s")
 @pytest.mark.parametrize("names", [PARAMETERS, ("mu_s",), ("mu_c",), ("mu_c", "mu_s", "sigma_2"), ()], ids=str)
 @pytest.mark.parametrize("mu_s", [1.0, 1.3])
 def test_values_go_round(names, mu_s):
@@ -173,6 +174,7 @@ def test_values_go_round(names, mu_s):
     )
 
 
+@pytest.mark.filterwarnings("ignore:mu_c has been trained up to mu_s")
 @pytest.mark.parametrize("names", [PARAMETERS, ("mu_s",), ("mu_c",)], ids=["all", "mu_s", "mu_c"])
 @pytest.mark.parametrize("dtype", [torch.float32, torch.float64])
 def test_no_optimiser_can_leave_the_valid_range(names, dtype):

@@ -141,6 +141,21 @@ def pack_shape(law: LawNumbers, shape: ReducedShape | PublishedShape) -> Packed:
     return Packed(row, np.array([numbers.kind, 0, numbers.size]), numbers.data, PUBLISHED)
 
 
+def pack_map(elasto_plastic: bool, factor: np.ndarray, data: np.ndarray) -> Packed:
+    """`ReducedModel` by its F and its map, for roll-outs at given parameters, which take the place of those here."""
+    return pack_shape(_any_law(elasto_plastic), ReducedShape(factor, data))
+
+
+def pack_surface(elasto_plastic: bool, kind: int, size: int, data: np.ndarray) -> Packed:
+    """`ReducedModelPublished` by its limit surface, for roll-outs at given parameters of law and shape."""
+    row = np.array([*_any_law(elasto_plastic), *np.zeros(len(published_step.NAMES) - len(LawNumbers._fields))])
+    return Packed(row, np.array([kind, 0, size]), data, PUBLISHED)
+
+
+def _any_law(elasto_plastic: bool) -> LawNumbers:
+    return LawNumbers(1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, float(elasto_plastic))
+
+
 def _checked(parameters: Any, names: tuple[str, ...]) -> np.ndarray:
     values = validation.numbers("parameters", parameters)
     if values.shape[-1:] != (len(names),):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 from typing import NamedTuple
 
 import jax
@@ -12,14 +11,11 @@ import numpy as np
 from jax.custom_derivatives import SymbolicZero
 
 from planarfriction import autodiff
-from planarfriction.autodiff.parameters import Packed, pack_shape
+from planarfriction.autodiff.parameters import Packed, pack_map, pack_surface
 from planarfriction.errors import InvalidValueError
-from planarfriction.formulas import LARGEST, LawNumbers
+from planarfriction.formulas import LARGEST
 from planarfriction.jax.published import ReducedModelPublished
 from planarfriction.jax.reduced import ReducedModel
-from planarfriction.kernels.published_step import NAMES
-from planarfriction.models import reduced_arrays
-from planarfriction.models.reduced_arrays import ReducedNumbers
 
 
 class _Kind(NamedTuple):
@@ -28,7 +24,7 @@ class _Kind(NamedTuple):
     leaf: str
     """What of the model is held fixed."""
     sizes: tuple
-    """Kind and size of a surface, or the shapes of the arrays of a `ReducedNumbers`."""
+    """Kind and size of a surface."""
     elasto_plastic: bool
 
 
@@ -37,8 +33,8 @@ def rollout(model, state, twist, normal_force, dt) -> tuple[jax.Array, jax.Array
     if isinstance(model, ReducedModelPublished):
         leaf, sizes, data = "surface", (model.surface.kind, model.surface.size), model.surface.data
     elif isinstance(model, ReducedModel):
-        leaf, sizes = "shape", tuple(part.shape for part in model.shape)
-        data = jnp.concatenate([part.reshape(-1) for part in model.shape])
+        leaf, sizes = "shape", ()
+        data = jnp.concatenate([model.shape.factor.reshape(-1), model.shape.map])
     else:
         raise InvalidValueError("method", f"be 'eager' for {type(model).__name__}", "'adjoint'")
     kind = _Kind(leaf, sizes, model.elasto_plastic)
@@ -150,16 +146,10 @@ def _by_contact(run, arrays, dtype):
 
 def _packed(kind: _Kind, data: np.ndarray) -> Packed:
     """The model as compiled loops see it, with parameters that others take the place of."""
-    elastic = float(kind.elasto_plastic)
     if kind.leaf == "shape":
-        ends = np.cumsum([math.prod(size) for size in kind.sizes])[:-1]
-        parts = (part.reshape(size) for part, size in zip(np.split(data, ends), kind.sizes, strict=True))
-        law = LawNumbers(1.0, 1.0, 1.0, 1.0, 1.0, 1.0, 1.0, elastic, 0.5)
-        return pack_shape(law, reduced_arrays.shape_of(ReducedNumbers(*parts)))
-    row = np.zeros(len(NAMES))
-    row[NAMES.index("elasto_plastic")] = elastic
+        return pack_map(kind.elasto_plastic, data[:9].reshape(3, 3), data[9:])
     surface, size = kind.sizes
-    return Packed(row, np.array([surface, 0, size]), np.ascontiguousarray(data))
+    return pack_surface(kind.elasto_plastic, surface, size, np.ascontiguousarray(data))
 
 
 def _beside(parameters: np.ndarray, state: np.ndarray) -> np.ndarray:

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import functools
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 
 from planarfriction import models
-from planarfriction.equality import by_parts
+from planarfriction.equality import ByValue, by_parts
 from planarfriction.jax.base import FrictionModel
 from planarfriction.laws import FrictionLaw
 from planarfriction.models import reduced_arrays
-from planarfriction.models.reduced_arrays import ReducedNumbers
+from planarfriction.models.reduced_arrays import MapSizes, ReducedNumbers
 from planarfriction.patch import ContactPatch
 
 
@@ -30,10 +32,22 @@ class ReducedParameters(NamedTuple):
     """Unused by plain bristles."""
 
 
+@functools.partial(jax.tree_util.register_dataclass, data_fields=["factor", "map"], meta_fields=["sizes"])
+@dataclass(frozen=True, eq=False)
+class Shape(ByValue):
+    """What the model knows of its patch."""
+
+    sizes: MapSizes
+    factor: jax.Array
+    """F `[3, 3]`."""
+    map: jax.Array
+    """Steady sliding, flat (see `planarfriction.kernels.steady`)."""
+
+
 class ReducedModel(FrictionModel):
     """The reduced model of bristle moments (`planarfriction.ReducedModel`) as a pytree.
 
-    State `(z_x, z_y, z_theta)` [m]. Leaves: the law's parameters, and the numbers of the patch with its map of steady
+    State `(z_x, z_y, z_theta)` [m]. Leaves: the law's parameters, and the shape: F of the patch and its map of steady
     sliding. A patch whose shape depends on the load keeps that of `normal_force` [N]; `segments` and `speeds` as in
     `planarfriction.ReducedModel`.
     """
@@ -41,7 +55,7 @@ class ReducedModel(FrictionModel):
     arrays = reduced_arrays
     leaves = ("parameters", "shape")
     parameters: ReducedParameters
-    shape: ReducedNumbers
+    shape: Shape
 
     def __init__(
         self,
@@ -56,11 +70,12 @@ class ReducedModel(FrictionModel):
         numbers, names = law.numbers, ReducedParameters._fields
         self.parameters = ReducedParameters(*(jnp.asarray(getattr(numbers, name), dtype=float) for name in names))
         shape = models.ReducedModel(patch, law, segments=segments, speeds=speeds, load_error=0.0).shape_at(normal_force)
-        self.shape = ReducedNumbers(*map(jnp.asarray, reduced_arrays.numbers_of(shape)))
+        sizes = reduced_arrays.sizes_of(shape.data)
+        self.shape = Shape(sizes, jnp.asarray(shape.factor), jnp.asarray(shape.data))
 
     def rest(self) -> jax.Array:
         """State of a contact at rest, `[3]`."""
         return jnp.zeros(3, self.parameters.sigma_0.dtype)
 
     def _shape(self) -> ReducedNumbers:
-        return self.shape
+        return reduced_arrays.numbers_of(self.shape.factor, self.shape.map, self.shape.sizes)

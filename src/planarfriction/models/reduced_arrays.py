@@ -16,11 +16,19 @@ from planarfriction import formulas
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels.steady import HEADER, QUARTIC
 from planarfriction.models.bristle_arrays import back_onto
-from planarfriction.models.reduced_map import ReducedShape
+
+
+class MapSizes(NamedTuple):
+    """How many numbers a map has, as `kernels.steady` names them."""
+
+    faces: int
+    segments: int
+    coarse: int
+    levels: int
 
 
 class ReducedNumbers(NamedTuple):
-    """A `ReducedShape` as arrays."""
+    """What `models.reduced_map.ReducedShape` holds, as arrays."""
 
     factor: Any
     """F `[3, 3]`, upper triangular."""
@@ -51,26 +59,22 @@ class Held(NamedTuple):
     moves: Any
 
 
-def numbers_of(shape: ReducedShape) -> ReducedNumbers:
-    """The numbers of a shape, in NumPy."""
-    data = shape.data
-    faces, n, m, levels = (int(value) for value in data[:4])
+def sizes_of(data: np.ndarray) -> MapSizes:
+    """The sizes of a map, from the numbers that compiled loops read."""
+    return MapSizes(*(int(value) for value in data[:4]))
+
+
+def numbers_of(factor, data, sizes: MapSizes) -> ReducedNumbers:
+    """The parts of F and the numbers of a map, arrays of any kind, of which they are views."""
+    faces, n, m, levels = sizes
     middle = HEADER + faces * (2 * n + 1) ** 2 * 12
     return ReducedNumbers(
-        shape.factor,
+        factor,
         data[QUARTIC:HEADER],
         data[4:7],
         data[HEADER:middle].reshape(faces, 2 * n + 1, 2 * n + 1, 3, 4),
-        np.reshape(data[middle:], (faces, 2 * m + 1, 2 * m + 1, levels, 3, 4)),
+        data[middle:].reshape(faces, 2 * m + 1, 2 * m + 1, levels, 3, 4),
     )
-
-
-def shape_of(numbers: ReducedNumbers) -> ReducedShape:
-    """The shape that has the `numbers`, in NumPy: the inverse of `numbers_of`."""
-    header, flat, rest = np.zeros(HEADER), numbers.flat, numbers.rest
-    header[:7] = len(flat), flat.shape[1] // 2, rest.shape[1] // 2, rest.shape[3], *numbers.scale
-    header[QUARTIC:] = numbers.quartic
-    return ReducedShape(numbers.factor, np.concatenate([header, flat.ravel(), rest.ravel()]))
 
 
 def dot(a, b):

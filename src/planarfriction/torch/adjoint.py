@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import torch
@@ -10,51 +11,75 @@ from torch import Tensor
 from planarfriction import autodiff
 from planarfriction.autodiff.parameters import Packed
 from planarfriction.errors import FrictionError
+from planarfriction.torch.base import Compiled
 
 _INNER = (1, 2, 1, 1)
 """Axes of state `[3]`, twist `[T, 3]`, normal_force `[T]` and parameters `[P]` behind the batch axes."""
 
+_INPUTS = len(_INNER)
 
-def roll_out(model: Packed, dt: float, *inputs: Tensor) -> tuple[Tensor, Tensor]:
+Pack = Callable[..., Packed]
+
+
+def roll_out(model: Compiled, dt: float, *inputs: Tensor) -> tuple[Tensor, Tensor]:
     """The last state `[..., 3]` and wrenches `[..., T, 3]` of `autodiff.rollout`.
 
     `inputs` are state `[..., 3]`, twist `[..., T, 3]`, normal_force `[..., T]` and parameters `[..., P]`, whose batch
     axes broadcast.
     """
-    return _Rollout.apply(model, dt, *inputs)  # pyright: ignore[reportReturnType]
+    kept = torch.is_grad_enabled() and any(tensor.requires_grad for tensor in inputs)
+    found: Any = _Rollout.apply(model.pack, dt, kept, *inputs, *model.buffers)
+    return found[0], found[1]
 
 
 class _Rollout(torch.autograd.Function):
+    """Last state, wrenches and, if they are `kept` for the way back, the states before each step in float64."""
+
     @staticmethod
-    def forward(model, dt, *inputs):
-        state, twist, load, parameters = map(_to_numpy, inputs)
-        result = autodiff.rollout(model, state, twist, load, dt, parameters=parameters)
-        return tuple(_like(array, inputs) for array in result)
+    def forward(pack: Pack, dt, kept, *tensors):
+        (state, twist, load, parameters), model = _numbers(pack, tensors, _INPUTS)
+        roll = autodiff.rollout_states if kept else autodiff.rollout
+        end, wrenches, *states = roll(model, state, twist, load, dt, parameters=parameters)
+        both = (_like(array, tensors[:_INPUTS]) for array in (end, wrenches))
+        return *both, torch.from_numpy(states[0]) if kept else torch.empty(0)
 
     @staticmethod
     def setup_context(ctx, inputs, output):
-        ctx.model, ctx.dt = inputs[:2]
-        ctx.save_for_backward(*inputs[2:])
+        ctx.pack, ctx.dt, ctx.kept = inputs[:3]
+        ctx.mark_non_differentiable(output[2])
+        ctx.save_for_backward(*inputs[3:], output[2])
 
     @staticmethod
     def backward(ctx, *bars):
-        return (None, None, *_Gradient.apply(ctx.model, ctx.dt, *ctx.saved_tensors, *bars))  # pyright: ignore
+        *tensors, states = ctx.saved_tensors
+        inputs, buffers = tensors[:_INPUTS], tensors[_INPUTS:]
+        given = (*inputs, *bars[:2], states) if ctx.kept else (*inputs, *bars[:2])
+        slopes: Any = _Gradient.apply(ctx.pack, ctx.dt, len(given), *given, *buffers)
+        return None, None, None, *slopes, *(None for _ in buffers)
 
     @staticmethod
-    def vmap(info, in_dims, model, dt, *inputs):
-        return _Rollout.apply(model, dt, *_aligned(info.batch_size, in_dims[2:], inputs, _INNER)), (0, 0)
+    def vmap(info, in_dims, pack, dt, kept, *tensors):
+        size, dims = info.batch_size, in_dims[3:]
+        if any(dim is not None for dim in dims[_INPUTS:]):
+            return _one_by_one(_Rollout, size, dims, (pack, dt, kept), tensors)
+        aligned = _aligned(size, dims[:_INPUTS], tensors[:_INPUTS], _INNER)
+        end, wrenches, states = _Rollout.apply(pack, dt, kept, *aligned, *tensors[_INPUTS:])  # pyright: ignore
+        return (end, wrenches, states), (0, 0, 0 if kept else None)
 
 
 class _Gradient(torch.autograd.Function):
-    """Cotangents of the inputs from those of last state and wrenches; itself without derivative."""
+    """Cotangents of the inputs from those of last state and wrenches; itself without derivative.
+
+    The first `count` tensors are the inputs, both cotangents and, if they were kept, the states before each step.
+    """
 
     @staticmethod
-    def forward(model, dt, *tensors):
-        state, twist, load, parameters, state_bar, wrenches_bar = map(_to_numpy, tensors)
+    def forward(pack: Pack, dt, count, *tensors):
+        (state, twist, load, parameters, state_bar, wrenches_bar, *states), model = _numbers(pack, tensors, count)
         gradient = autodiff.rollout_gradient(
-            model, state, twist, load, dt, wrenches_bar, state_bar, parameters=parameters
+            model, state, twist, load, dt, wrenches_bar, state_bar, parameters=parameters, states=(*states, None)[0]
         )
-        return tuple(_like(array, (tensor,)) for array, tensor in zip(gradient, tensors[:4], strict=True))
+        return tuple(_like(array, (tensor,)) for array, tensor in zip(gradient, tensors[:_INPUTS], strict=True))
 
     @staticmethod
     def setup_context(ctx, inputs, output):
@@ -62,22 +87,43 @@ class _Gradient(torch.autograd.Function):
 
     @staticmethod
     def backward(ctx, *bars):
-        raise FrictionError("the adjoint gives first derivatives: take method='eager' to differentiate twice")
+        raise FrictionError(_TWICE)
 
     @staticmethod
-    def vmap(info, in_dims, model, dt, *tensors):
-        size = info.batch_size
-        aligned = _aligned(size, in_dims[2:], tensors, (*_INNER, 1, 2))
-        shapes = [_logical(tensor, dim) for tensor, dim in zip(tensors[:4], in_dims[2:6], strict=True)]
-        gradients: Any = _Gradient.apply(model, dt, *aligned)
-        return tuple(g.reshape(size, *shape) for g, shape in zip(gradients, shapes, strict=True)), (0,) * 4
+    def vmap(info, in_dims, pack, dt, count, *tensors):
+        size, dims = info.batch_size, in_dims[3:]
+        if any(dim is not None for dim in dims[count:]):
+            return _one_by_one(_Gradient, size, dims, (pack, dt, count), tensors)
+        aligned = _aligned(size, dims[:count], tensors[:count], (*_INNER, 1, 2, 2)[:count])
+        gradients: Any = _Gradient.apply(pack, dt, count, *aligned, *tensors[count:])
+        shapes = [_logical(tensor, dim) for tensor, dim in zip(tensors[:_INPUTS], dims, strict=False)]
+        return tuple(g.reshape(size, *shape) for g, shape in zip(gradients, shapes, strict=True)), (0,) * _INPUTS
+
+
+_TWICE = "the adjoint gives first derivatives: take method='eager' to differentiate twice"
+
+
+def _numbers(pack: Pack, tensors, count: int) -> tuple[list[Any], Packed]:
+    """The first `count` tensors in NumPy, and the model from its buffers behind them."""
+    arrays = [_to_numpy(tensor) for tensor in tensors]
+    return arrays[:count], pack(*arrays[count:])
+
+
+def _one_by_one(function: Any, size: int, dims, fixed: tuple, tensors) -> tuple[tuple[Tensor, ...], tuple[int, ...]]:
+    """A `vmap` over different models: a call for each."""
+    parts = [
+        function.apply(*fixed, *(t if dim is None else t.select(dim, i) for t, dim in zip(tensors, dims, strict=True)))
+        for i in range(size)
+    ]
+    together = tuple(torch.stack(part) for part in zip(*parts, strict=True))
+    return together, (0,) * len(together)
 
 
 def _to_numpy(tensor: Tensor):
     return tensor.detach().to(torch.float64).numpy()
 
 
-def _like(array, tensors: tuple[Tensor, ...]) -> Tensor:
+def _like(array, tensors) -> Tensor:
     kind = tensors[0].dtype
     for tensor in tensors[1:]:
         kind = torch.promote_types(kind, tensor.dtype)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import torch
 from torch import Tensor, nn
 
-from planarfriction import models, validation
+from planarfriction import validation
 from planarfriction.autodiff.parameters import Packed
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
@@ -34,6 +34,18 @@ class Prepared(NamedTuple):
     """Numbers of the patch as the model's arrays know them."""
 
 
+class Compiled(NamedTuple):
+    """A model as compiled roll-outs take it."""
+
+    pack: Callable[..., Packed]
+    """The model from the `buffers` as arrays of NumPy."""
+    buffers: tuple[Tensor, ...]
+    """Its own numbers of the patch."""
+
+
+_KIND = {False: "plain", True: "elasto-plastic"}
+
+
 class FrictionModel(nn.Module):
     """A friction model of PyTorch: the caller holds the state; everything is about the contact frame's origin.
 
@@ -51,10 +63,11 @@ class FrictionModel(nn.Module):
     components: tuple[int, ...]
     """Shape of the state of one contact."""
     physical: PhysicalParameters
-    reference: models.FrictionModel
-    """The same model in NumPy, with the parameters that this one started with."""
-    compiled: Packed | None = None
-    """The same model as compiled roll-outs take it, if they know it."""
+    physical_type: ClassVar[type[PhysicalParameters]] = PhysicalParameters
+    bristles: Tensor
+    """1 where they are elasto-plastic, else 0; a state dict of the other kind is refused."""
+    lever: Tensor
+    """Lever arm [m]: torques are to forces as it is to 1."""
 
     def __init__(self, patch: ContactPatch, law: FrictionLaw) -> None:
         super().__init__()
@@ -63,13 +76,23 @@ class FrictionModel(nn.Module):
         refuse_creep(law, f"torch.{type(self).__name__}")
         refuse_anisotropy(patch, type(self).__name__)
         self.patch = patch
-        self.elasto_plastic = law.numbers.elasto_plastic
+        self.elasto_plastic = bool(law.numbers.elasto_plastic)
 
-    def _adopt(self, values: dict[str, float], trainable: Iterable[str], **kind: Any) -> None:
+    def _adopt(self, values: dict[str, float], trainable: Iterable[str], lever: float, **kind: Any) -> None:
+        """The physical parameters, and what else a state dict holds of every model."""
         trainable = tuple(trainable)
         if "breakaway_ratio" in trainable and not self.elasto_plastic:
             raise InvalidValueError("trainable", "not name breakaway_ratio for plain bristles", trainable)
-        self.physical = PhysicalParameters(values, trainable, **kind)
+        self.physical = self.physical_type(values, trainable, **kind)
+        self.register_buffer("bristles", torch.tensor(self.elasto_plastic, device=kind["device"]))
+        self.register_buffer("lever", torch.tensor(lever, **kind))
+
+    def _load_from_state_dict(self, state_dict: dict[str, Any], prefix: str, *rest: Any) -> None:
+        given = state_dict.get(f"{prefix}bristles")
+        if given is not None and bool(given) != self.elasto_plastic:
+            own, other = (_KIND[kind] for kind in (self.elasto_plastic, bool(given)))
+            raise InvalidValueError("state_dict", f"be that of {own} bristles", other)
+        super()._load_from_state_dict(state_dict, prefix, *rest)
 
     # ------------------------------------------------------------------ parameters
 
@@ -135,10 +158,9 @@ class FrictionModel(nn.Module):
         new, zdot = self.arrays.advance(xp, *prepared, z, by, self._inner(dt))
         return self._kept(new, load), load[..., None] * self.arrays.wrench(xp, *prepared, new, zdot, by)
 
-    @property
-    def lever(self) -> float:
-        """Contact radius of the patch [m]: torques are to forces as it is to 1."""
-        raise NotImplementedError
+    def compiled(self) -> Compiled | None:
+        """What compiled roll-outs need of the model, if they know it."""
+        return None
 
     def prepare(self, parameters: Tensor) -> Prepared:
         """The numbers of the model at given physical parameters `[..., P]`."""

@@ -7,7 +7,6 @@ from collections.abc import Iterable
 import torch
 from torch import Tensor, nn
 
-from planarfriction import models
 from planarfriction.laws import FrictionLaw
 from planarfriction.models import distributed_arrays
 from planarfriction.models.distributed_arrays import Cells
@@ -44,14 +43,14 @@ class DistributedModel(FrictionModel):
         device: torch.device | str | None = None,
     ):
         super().__init__(patch, law)
-        self.reference = models.DistributedModel(patch, law)
         self.components = (2, patch.cells)
         kind = {"dtype": dtype or torch.get_default_dtype(), "device": device}
         numbers, chosen = law.numbers._asdict(), tuple(trainable)
-        self._adopt({name: numbers[name] for name in LAW}, [name for name in chosen if name != "weights"], **kind)
-        self._lever = float(patch.contact_radius(normal_force))
-        self.register_buffer("positions", torch.as_tensor(patch.positions.T.copy(), **kind))
-        raw = torch.as_tensor(patch.weights(normal_force).copy(), **kind).log()
+        lever = float(patch.contact_radius(normal_force))
+        physical = [name for name in chosen if name != "weights"]
+        self._adopt({name: numbers[name] for name in LAW}, physical, lever, **kind)
+        self.register_buffer("positions", torch.tensor(patch.positions.T.copy(), **kind))
+        raw = torch.tensor(patch.weights(normal_force), **kind).log()
         if "weights" in chosen:
             self.raw_weights = nn.Parameter(raw)
         else:
@@ -61,11 +60,6 @@ class DistributedModel(FrictionModel):
     def weights(self) -> Tensor:
         """Share of the load on each cell `[N]`, with its gradient."""
         return torch.softmax(self.raw_weights, 0)
-
-    @property
-    def lever(self) -> float:
-        """Contact radius of the patch [m]."""
-        return self._lever
 
     def prepare(self, parameters: Tensor) -> Prepared:
         """The law and the cells."""

@@ -32,21 +32,21 @@ def real(name: str, value: Any, like: Tensor) -> Tensor:
 
 def finite(name: str, value: Tensor) -> Tensor:
     """`value`, refused where it is looked at and not finite."""
-    _extremes(name, value)
+    extremes(name, value)
     return value
 
 
 def non_negative(name: str, value: Tensor) -> Tensor:
     """`value`, refused where it is looked at and below zero; elsewhere what is below zero counts as zero."""
-    extremes = _extremes(name, value)
-    if extremes is None:
+    ends = extremes(name, value)
+    if ends is None:
         return value.clamp(min=0.0)
-    if extremes[0] < 0.0:
-        raise InvalidValueError(name, "be >= 0", extremes[0])
+    if ends[0] < 0.0:
+        raise InvalidValueError(name, "be >= 0", ends[0])
     return value
 
 
-def _extremes(name: str, value: Tensor) -> tuple[float, float] | None:
+def extremes(name: str, value: Tensor) -> tuple[float, float] | None:
     """Smallest and largest number, which are within the range of numbers; None where they are not looked at."""
     if torch.compiler.is_compiling() or value.device.type != "cpu":
         return None

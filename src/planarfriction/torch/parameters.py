@@ -10,10 +10,15 @@ An optimiser moves a raw number `w`; the physical value follows from it:
 
 A step of `w` is a relative change, so that one learning rate suits all. `|w|` has the slope 1 at `w = 0`: a value on
 its bound can leave it.
+
+What is not trained stays as it is. So mu_c trained beside a fixed mu_s has `mu_s = mu_c (1 + |w|)` as its rule too, the
+other way about: it cannot exceed mu_s, and a warning says when it has arrived there (on the processor, outside of
+`torch.compile` and `vmap`).
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterable, Mapping
 
 import torch
@@ -22,11 +27,13 @@ from torch import Tensor, nn
 from planarfriction import validation
 from planarfriction.autodiff import PARAMETERS
 from planarfriction.errors import InvalidValueError
+from planarfriction.torch import inputs
 
 LAW = PARAMETERS[:8]
 """Parameters of the friction law; the others describe the shape of the patch."""
 
 _POSITIVE = ("sigma_0", "mu_c", "v_s", "gamma", "contact_radius", "second_moment")
+_AT_MU_S = "mu_c has been trained up to mu_s, which is fixed and which it cannot exceed: name mu_s in trainable too"
 _LARGEST_EXPONENT = 30.0
 """A positive value stays within a factor e^30 = 1e13 of where it started, so that none overflows or becomes zero."""
 
@@ -72,7 +79,7 @@ class PhysicalParameters(nn.Module):
         """Set physical values by name; raises InvalidValueError for one out of its range."""
         for name in values:
             validation.choice("parameter", name, self.names)
-        new = {**dict(zip(self.names, self().tolist(), strict=True)), **values}
+        new = {**dict(zip(self.names, self._physical().tolist(), strict=True)), **values}
         _check(new)
         for i, name in enumerate(self.names):
             scale, raw = _raw(name, new, fixed_static="mu_s" not in self.raw)
@@ -82,6 +89,13 @@ class PhysicalParameters(nn.Module):
 
     def forward(self) -> Tensor:
         """The physical values `[P]`, in the order of `names`."""
+        if "mu_c" in self.raw and "mu_s" not in self.raw:
+            seen = inputs.extremes("mu_c", self.raw["mu_c"])
+            if seen is not None and seen[0] <= 0.0:  # beyond 0 it goes down again
+                warnings.warn(_AT_MU_S, stacklevel=4)
+        return self._physical()
+
+    def _physical(self) -> Tensor:
         if not self.raw:
             return self.values
         raw = torch.zeros_like(self.values).index_copy(0, self.places, torch.stack(list(self.raw.values())))

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable
+from typing import Any
 
 import torch
 from torch import Tensor, nn
 
 from planarfriction import models
-from planarfriction.autodiff.parameters import pack_shape
+from planarfriction.autodiff.parameters import pack_surface
+from planarfriction.errors import InvalidValueError
 from planarfriction.laws import FrictionLaw
 from planarfriction.limit_surface import LimitSurface, surface_arrays
 from planarfriction.models import published_arrays
 from planarfriction.models.published_arrays import PublishedNumbers
 from planarfriction.patch import ContactPatch
 from planarfriction.torch import namespace as xp
-from planarfriction.torch.base import TRAINABLE, FrictionModel, Prepared
+from planarfriction.torch.base import TRAINABLE, Compiled, FrictionModel, Prepared
 from planarfriction.torch.parameters import LAW
 
 
@@ -23,11 +26,21 @@ class Surface(nn.Module):
     """A limit surface in a buffer; `forward(scaled, speed)` gives `u = h(V) |V_S|` `[..., 3]`."""
 
     data: Tensor
+    form: Tensor
+    """Kind and size of the surface; a state dict of another form is refused."""
 
     def __init__(self, surface: LimitSurface, **kind) -> None:
         super().__init__()
         self.kind, self.size, data = surface.numbers
-        self.register_buffer("data", torch.as_tensor(data, **kind).clone())
+        self.register_buffer("data", torch.tensor(data, **kind))
+        self.register_buffer("form", torch.tensor([self.kind, self.size], device=kind["device"]))
+
+    def _load_from_state_dict(self, state_dict: dict[str, Any], prefix: str, *rest: Any) -> None:
+        given = state_dict.get(f"{prefix}form")
+        if given is not None and given.tolist() != self.form.tolist():
+            rule = "hold a limit surface of the same kind and size (kind, segments or cells)"
+            raise InvalidValueError("state_dict", f"{rule} as the model, {self.form.tolist()}", given.tolist())
+        super()._load_from_state_dict(state_dict, prefix, *rest)
 
     def forward(self, scaled: Tensor, speed: Tensor) -> Tensor:
         """`u` of scaled twists `[..., 3]` and their norms `[..., 1]`."""
@@ -51,7 +64,6 @@ class ReducedModelPublished(FrictionModel):
 
     arrays = published_arrays
     components = (3,)
-    reference: models.ReducedModelPublished
 
     def __init__(
         self,
@@ -65,21 +77,19 @@ class ReducedModelPublished(FrictionModel):
     ):
         super().__init__(patch, law)
         when = "keep" if surface is not None else "rebuild"
-        self.reference = models.ReducedModelPublished(patch, law, surface, on_load_change=when)  # pyright: ignore
-        shape = self.reference._reference
-        self.compiled = pack_shape(law.numbers, shape)
+        shape = models.ReducedModelPublished(patch, law, surface, on_load_change=when)._reference  # pyright: ignore
         kind = {"dtype": dtype or torch.get_default_dtype(), "device": device}
         self.surface = Surface(shape.surface, **kind)
         x, y = shape.centre_of_pressure.tolist()
         numbers = law.numbers._asdict()
         values = {name: numbers[name] for name in LAW}
         values |= {"contact_radius": shape.contact_radius, "second_moment": shape.second_moment}
-        self._adopt(values | {"centre_x": x, "centre_y": y}, trainable, **kind)
+        self._adopt(values | {"centre_x": x, "centre_y": y}, trainable, shape.contact_radius, **kind)
 
-    @property
-    def lever(self) -> float:
-        """Contact radius of the patch [m]."""
-        return float(self.reference._reference.contact_radius)
+    def compiled(self) -> Compiled:
+        """See `FrictionModel`."""
+        pack = functools.partial(pack_surface, self.elasto_plastic, self.surface.kind, self.surface.size)
+        return Compiled(pack, (self.surface.data,))
 
     def prepare(self, parameters: Tensor) -> Prepared:
         """The law, `r`, `<rho^2>`, the centre of pressure, and the limit surface."""

@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Iterable
+from typing import Any
 
 import torch
 from torch import Tensor
 
 from planarfriction import models
-from planarfriction.autodiff.parameters import pack_shape
+from planarfriction.autodiff.parameters import pack_map
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.laws import ElastoPlastic, FrictionLaw, LuGre
 from planarfriction.models import reduced_arrays
 from planarfriction.models.reduced_arrays import ReducedNumbers
 from planarfriction.patch import ContactPatch
-from planarfriction.torch.base import FrictionModel, Prepared
+from planarfriction.torch.base import Compiled, FrictionModel, Prepared
 from planarfriction.torch.parameters import LAW
 
 PARAMETERS = tuple(name for name in LAW if name != "gamma")
@@ -33,12 +35,12 @@ class ReducedModel(FrictionModel):
 
     arrays = reduced_arrays
     components = (3,)
-    reference: models.ReducedModel
     factor: Tensor
-    quartic: Tensor
-    scale: Tensor
-    flat: Tensor
-    rest_part: Tensor
+    """F `[3, 3]`."""
+    map: Tensor
+    """Steady sliding, flat."""
+    gamma: Tensor
+    """Stribeck exponent that the map is made for [-]."""
 
     def __init__(
         self,
@@ -57,26 +59,30 @@ class ReducedModel(FrictionModel):
         if "gamma" in trainable:
             raise InvalidValueError("trainable", "not name gamma: the map of steady sliding is made for it", trainable)
         kind = {"dtype": dtype or torch.get_default_dtype(), "device": device}
-        self.gamma = law.numbers.gamma
-        self.reference = models.ReducedModel(patch, law, segments=segments, speeds=speeds, load_error=0.0)
-        shape = self.reference.shape_at(normal_force)
-        self.compiled = pack_shape(law.numbers, shape)
-        self._lever = shape.contact_radius
-        for name, values in zip(_BUFFERS, reduced_arrays.numbers_of(shape), strict=True):
-            self.register_buffer(name, torch.as_tensor(values, **kind).clone())
+        shape = models.ReducedModel(patch, law, segments=segments, speeds=speeds, load_error=0.0).shape_at(normal_force)
+        self.sizes = reduced_arrays.sizes_of(shape.data)
+        self.register_buffer("factor", torch.tensor(shape.factor, **kind))
+        self.register_buffer("map", torch.tensor(shape.data, **kind))
         numbers = law.numbers._asdict()
-        self._adopt({name: numbers[name] for name in PARAMETERS}, trainable, **kind)
+        self.register_buffer("gamma", torch.tensor(numbers["gamma"], **kind))
+        self._adopt({name: numbers[name] for name in PARAMETERS}, trainable, shape.contact_radius, **kind)
 
-    @property
-    def lever(self) -> float:
-        """Radius of gyration of the pressure [m]."""
-        return self._lever
+    def _load_from_state_dict(self, state_dict: dict[str, Any], prefix: str, *rest: Any) -> None:
+        given = state_dict.get(f"{prefix}map")
+        if given is not None and (other := reduced_arrays.sizes_of(given)) != self.sizes:
+            rule = f"hold a map of the same size as the model (faces, segments, ...), {tuple(self.sizes)}"
+            raise InvalidValueError("state_dict", rule, tuple(other))
+        super()._load_from_state_dict(state_dict, prefix, *rest)
 
     def law(self) -> LuGre:
         """The law with the present values."""
         now = dict(zip(self.names, self.physical().tolist(), strict=True))
-        breakaway = now.pop("breakaway_ratio")
-        return LuGre(**now, gamma=self.gamma, elasto_plastic=ElastoPlastic(breakaway) if self.elasto_plastic else None)
+        elastic = ElastoPlastic(now.pop("breakaway_ratio"))
+        return LuGre(**now, gamma=float(self.gamma), elasto_plastic=elastic if self.elasto_plastic else None)
+
+    def compiled(self) -> Compiled:
+        """See `FrictionModel`."""
+        return Compiled(functools.partial(pack_map, self.elasto_plastic), (self.factor, self.map))
 
     def prepare(self, parameters: Tensor) -> Prepared:
         """The law; the shape is fixed."""
@@ -85,7 +91,4 @@ class ReducedModel(FrictionModel):
 
     @property
     def _shape(self) -> ReducedNumbers:
-        return ReducedNumbers(*(getattr(self, name) for name in _BUFFERS))
-
-
-_BUFFERS = ("factor", "quartic", "scale", "flat", "rest_part")
+        return reduced_arrays.numbers_of(self.factor, self.map, self.sizes)

@@ -35,14 +35,13 @@ class _OneSize(PhysicalParameters):
     def set(self, values: Mapping[str, float]) -> None:
         """Set physical values by name; raises InvalidValueError for one out of its range."""
         if "contact_radius" in values and "second_moment" not in values:
-            now = dict(zip(self.names, self().tolist(), strict=True))
+            now = dict(zip(self.names, self._physical().tolist(), strict=True))
             growth = values["contact_radius"] / now["contact_radius"]
             values = {**values, "second_moment": now["second_moment"] * growth**2}
         super().set(values)
 
-    def forward(self) -> Tensor:
-        """The physical values `[P]`, in the order of `names`."""
-        now = super().forward()
+    def _physical(self) -> Tensor:
+        now = super()._physical()
         growth = self._of(now, "contact_radius") / self._of(self.values, "contact_radius")
         return self._with(now, "second_moment", self._of(self.values, "second_moment") * growth**2)
 
@@ -67,6 +66,8 @@ class ReducedPlanarLuGre(ReducedModelPublished):
 
     Source: Waltersson and Karayiannidis 2024, section IV.
     """
+
+    physical_type = _OneSize
 
     def __init__(
         self,
@@ -94,16 +95,10 @@ class ReducedPlanarLuGre(ReducedModelPublished):
         trainable = (*TRAINABLE, "contact_radius")
         super().__init__(surface.patch, law, surface, trainable=trainable, dtype=dtype, device=device)
 
-    def _adopt(self, values: dict[str, float], trainable: Iterable[str], **kind: Any) -> None:
-        own = values["contact_radius"]
-        self._lever = own if self._given is None else self._given
-        size = {"contact_radius": self._lever, "second_moment": values["second_moment"] * (self._lever / own) ** 2}
-        self.physical = _OneSize(values | size, trainable, **kind)
-
-    @property
-    def lever(self) -> float:
-        """Contact radius at the start [m]."""
-        return self._lever
+    def _adopt(self, values: dict[str, float], trainable: Iterable[str], lever: float, **kind: Any) -> None:
+        radius = lever if self._given is None else self._given
+        size = {"contact_radius": radius, "second_moment": values["second_moment"] * (radius / lever) ** 2}
+        super()._adopt(values | size, trainable, radius, **kind)
 
     # ------------------------------------------------------------------ the present values
 

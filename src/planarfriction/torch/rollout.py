@@ -12,7 +12,7 @@ from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
 from planarfriction.torch import adjoint, inputs
-from planarfriction.torch.base import FrictionModel
+from planarfriction.torch.base import Compiled, FrictionModel
 
 METHODS = ("adjoint", "eager")
 """Compiled roll-out with its discrete adjoint; every step an operation of PyTorch, recorded by autograd."""
@@ -72,23 +72,25 @@ def rollout(
     except RuntimeError:
         rule = f"broadcast with [..., {twist.shape[-2]}]"
         raise InvalidValueError("normal_force", rule, f"shape {list(load.shape)}") from None
-    obstacle = _obstacle(model, start, twist, load, step)
+    compiled = model.compiled()
+    obstacle = _obstacle(model, compiled, start, twist, load, step)
     if method == "adjoint" and obstacle:
         raise InvalidValueError("method", f"be 'eager' {obstacle}", repr(method))
-    if method == "eager" or obstacle:
+    if method == "eager" or obstacle or compiled is None:
         return Rollout(*model.roll_out(parameters, start, twist, load, step))
-    values = model._vector(parameters)
-    return Rollout(*adjoint.roll_out(model.compiled, float(step), start, twist, load, values))  # pyright: ignore
+    return Rollout(*adjoint.roll_out(compiled, float(step), start, twist, load, model._vector(parameters)))
 
 
-def _obstacle(model: FrictionModel, *tensors: Tensor) -> str:
+def _obstacle(model: FrictionModel, compiled: Compiled | None, *tensors: Tensor) -> str:
     """Why the adjoint cannot be used, or nothing."""
-    if model.compiled is None:
+    if compiled is None:
         return f"for {type(model).__name__}"
     if any(tensor.device.type != "cpu" for tensor in (*tensors, model.physical.values)):
         return "for tensors that are not on the processor"
     if tensors[-1].requires_grad:
         return "for a gradient to dt"
+    if any(buffer.requires_grad for buffer in compiled.buffers):
+        return "for a gradient to the numbers of the patch"
     return "inside torch.compile" if torch.compiler.is_compiling() else ""
 
 
@@ -114,7 +116,8 @@ def tracking_loss(
         model._number("normal_force", normal_force).detach()[..., None],
     )
     loaded = load > 0.0
-    lever = load.new_tensor([1.0, 1.0, model.lever])
+    one = torch.ones_like(model.lever)
+    lever = torch.stack([one, one, model.lever]).to(load)
     error = torch.where(loaded, (run.wrenches - measured) / (torch.where(loaded, load, 1.0) * lever), 0.0)
     count = loaded.expand(torch.broadcast_shapes(loaded.shape, (*error.shape[:-1], 1))).sum()
     return (error * error).sum() / count.clamp(min=1)

@@ -1,0 +1,216 @@
+"""What a PyTorch module holds of its patch: its own numbers, for every way of evaluating it and in state dicts."""
+
+from __future__ import annotations
+
+import copy
+import functools
+
+import numpy as np
+import pytest
+
+import planarfriction as pf
+
+torch = pytest.importorskip("torch", reason="needs PyTorch: pip install 'planarfriction[torch]'")
+
+from planarfriction.torch import DistributedModel, ReducedModel, ReducedModelPublished, rollout  # noqa: E402
+
+pytestmark = pytest.mark.torch
+
+PATCH = pf.ContactPatch.from_pressure(np.random.default_rng(4).uniform(0.0, 1.0, (5, 6)), 0.002, name="lopsided")
+OTHER = pf.ContactPatch.from_pressure(np.random.default_rng(5).uniform(0.0, 1.0, (5, 6)), 0.004, name="other")
+PLAIN, ELASTIC = pf.LuGre(mu_s=1.2, gamma=1.7), pf.LuGre(mu_s=1.2, gamma=1.3, elasto_plastic=pf.ElastoPlastic(0.7))
+MODELS = {
+    "reduced": functools.partial(ReducedModel, segments=8, speeds=8),
+    "published": ReducedModelPublished,
+    "distributed": DistributedModel,
+}
+METHODS = {"reduced": ("adjoint", "eager"), "published": ("adjoint", "eager"), "distributed": ("eager",)}
+T = 20
+
+every_model = pytest.mark.parametrize("kind", MODELS)
+every_way = pytest.mark.parametrize(("kind", "method"), [(kind, m) for kind, all_of in METHODS.items() for m in all_of])
+
+
+def module(kind: str, patch: pf.ContactPatch = PATCH, law: pf.LuGre = ELASTIC, **options):
+    return MODELS[kind](patch, law, **{"dtype": torch.float64, **options})
+
+
+def twists() -> torch.Tensor:
+    t = 1e-4 * torch.arange(T, dtype=torch.float64)
+    return torch.stack([2e-3 * torch.sin(300 * t) + 1e-4, 1e-3 * torch.cos(200 * t), 0.3 * torch.sin(150 * t)], -1)
+
+
+def wrenches(model, method: str) -> torch.Tensor:
+    return rollout(model, None, twists(), 2.0, 1e-4, method=method).wrenches
+
+
+# ---------------------------------------------------------------------- own numbers
+
+
+@every_way
+def test_a_state_dict_carries_the_patch(kind, method):
+    model, other = module(kind), module(kind, OTHER)
+    assert not torch.allclose(wrenches(model, method), wrenches(other, method), rtol=1e-2)
+    model.load_state_dict(other.state_dict())
+    assert torch.equal(wrenches(model, method), wrenches(other, method))
+    assert model.law() == other.law() and model.lever == other.lever
+
+
+def test_a_state_dict_carries_the_stribeck_exponent_that_the_map_is_made_for():
+    steeper = pf.LuGre(mu_s=1.2, gamma=0.7, elasto_plastic=pf.ElastoPlastic(0.7))
+    model, other = module("reduced"), module("reduced", law=steeper)
+    model.load_state_dict(other.state_dict())
+    assert model.law() == steeper
+
+
+@every_way
+def test_models_that_are_stacked_keep_each_its_own_patch(kind, method):
+    models = [module(kind), module(kind, OTHER), module(kind, OTHER, pf.LuGre(0.5, 0.6, elasto_plastic=0.7, gamma=1.3))]
+    parameters, buffers = torch.func.stack_module_state(models)
+
+    def loss(parameters, buffers):
+        base = copy.deepcopy(models[0])
+        run = torch.func.functional_call(_Run(base, method), _inside({**parameters, **buffers}), ())
+        return run.square().sum(), run
+
+    slopes, together = torch.func.vmap(torch.func.grad(loss, has_aux=True))(parameters, buffers)
+    for i, model in enumerate(models):
+        alone = wrenches(model, method)
+        torch.testing.assert_close(together[i], alone, rtol=1e-12, atol=1e-14)
+        alone.square().sum().backward()
+        for name, parameter in model.named_parameters():
+            torch.testing.assert_close(slopes[name][i], parameter.grad, rtol=1e-9, atol=1e-12)
+
+
+class _Run(torch.nn.Module):
+    """A roll-out as what a module does."""
+
+    def __init__(self, model, method: str) -> None:
+        super().__init__()
+        self.model, self.method = model, method
+
+    def forward(self) -> torch.Tensor:
+        return wrenches(self.model, self.method)
+
+
+def _inside(values: dict) -> dict:
+    return {f"model.{name}": value for name, value in values.items()}
+
+
+def test_the_adjoint_differentiates_stacked_models_with_respect_to_shared_inputs():
+    models = [module("reduced"), module("reduced", OTHER)]
+    parameters, buffers = torch.func.stack_module_state(models)
+
+    class Run(torch.nn.Module):
+        def __init__(self, model) -> None:
+            super().__init__()
+            self.model = model
+
+        def forward(self, v):
+            return rollout(self.model, None, v, 2.0, 1e-4, method="adjoint").wrenches
+
+    def slopes(parameters, buffers, v):
+        values = _inside({**parameters, **buffers})
+        return torch.func.jacrev(lambda v: torch.func.functional_call(Run(models[0]), values, (v,))[5:8])(v)
+
+    together = torch.func.vmap(slopes, in_dims=(0, 0, None))(parameters, buffers, twists())
+    for model, slope in zip(models, together, strict=True):
+        alone = torch.func.jacrev(lambda v, model=model: Run(model)(v)[5:8])(twists())
+        torch.testing.assert_close(slope, alone, rtol=1e-12, atol=0.0)
+
+
+def test_a_single_precision_model_is_rolled_out_with_its_own_numbers():
+    model = module("reduced", dtype=torch.float32)
+    model.load_state_dict(module("reduced", OTHER).state_dict())
+    wanted = wrenches(module("reduced", OTHER), "adjoint")
+    torch.testing.assert_close(wrenches(model, "adjoint"), wanted, rtol=1e-4, atol=1e-5)  # a law and a map of 7 digits
+
+
+@every_model
+def test_buffers_share_no_memory_with_what_the_caller_gave(kind):
+    surface = pf.LimitSurfaceTable(PATCH) if kind == "published" else None
+    model = module(kind, surface=surface) if surface else module(kind)
+    before = surface.numbers.data.copy() if surface else None
+    positions, weights = PATCH.positions.copy(), PATCH.weights().copy()
+    reference = {"reduced": pf.ReducedModel, "published": pf.ReducedModelPublished, "distributed": pf.DistributedModel}
+    numpy_model = reference[kind](PATCH, ELASTIC)
+    inputs = numpy_model.rest() + 1e-7, twists()[3].numpy(), 2.0
+    wrench = numpy_model.wrench(*inputs)
+    with torch.no_grad():
+        for _, buffer in model.named_buffers():
+            buffer.zero_()
+    assert np.array_equal(PATCH.positions, positions) and np.array_equal(PATCH.weights(), weights)
+    assert np.array_equal(numpy_model.wrench(*inputs), wrench)
+    if surface:
+        assert np.array_equal(surface.numbers.data, before)
+
+
+def test_a_gradient_to_the_numbers_of_the_patch_is_eager():
+    model = module("reduced")
+    model.map.requires_grad_()
+    wrenches(model, None).square().sum().backward()
+    assert model.map.grad.abs().max() > 0.0
+    with pytest.raises(pf.FrictionError, match="be 'eager' for a gradient to the numbers of the patch"):
+        wrenches(model, "adjoint")
+
+
+# ---------------------------------------------------------------------- what does not fit
+
+
+@every_model
+def test_bristles_of_the_other_kind_are_refused(kind):
+    model = module(kind, law=PLAIN)
+    before = model.physical().clone()
+    with pytest.raises(
+        pf.FrictionError, match="state_dict must be that of plain bristles, got elasto-plastic"
+    ) as caught:
+        model.load_state_dict(module(kind, law=ELASTIC).state_dict())
+    assert "\n" not in str(caught.value) and torch.equal(model.physical(), before)
+    with pytest.raises(pf.FrictionError, match="state_dict must be that of elasto-plastic bristles, got plain"):
+        module(kind).load_state_dict(module(kind, law=PLAIN).state_dict())
+    nothing = {name: value for name, value in model.state_dict().items() if name != "bristles"}
+    with pytest.raises(RuntimeError, match=r'Missing key.*"bristles"'):
+        model.load_state_dict(nothing)
+
+
+@pytest.mark.parametrize(
+    ("model", "other", "message"),
+    [
+        (
+            lambda: module("reduced"),
+            lambda: module("reduced", segments=10),
+            r"state_dict must hold a map of the same size as the model \(faces, segments, ...\), \(3, 8, ",
+        ),
+        (
+            lambda: module("published", surface=pf.LimitSurfaceEllipsoid(PATCH)),
+            lambda: module("published", surface=pf.LimitSurfaceCells(PATCH)),
+            "state_dict must hold a limit surface of the same kind and size",
+        ),
+    ],
+)
+def test_another_size_of_the_shape_is_refused(model, other, message):
+    with pytest.raises(pf.FrictionError, match=message) as caught:
+        model().load_state_dict(other().state_dict())
+    assert "\n" not in str(caught.value)
+
+
+# ---------------------------------------------------------------------- a bound that moves with nothing
+
+
+@every_model
+def test_a_dynamic_friction_trained_up_to_a_fixed_static_one_is_said(kind):
+    model = module(kind, trainable=("mu_c",))
+    twist = twists()
+    optimiser = torch.optim.Adam(model.parameters(), lr=0.05)
+
+    def pull():
+        optimiser.zero_grad()
+        wrench = model.step(model.rest(), 100.0 * twist[0], 1.0, 1.0)[1]
+        (wrench[0].abs() - 2.0).square().backward()  # of more friction than mu_s gives
+        optimiser.step()
+
+    pull()
+    with pytest.warns(UserWarning, match="mu_c has been trained up to mu_s, which is fixed .*: name mu_s in trainable"):
+        for _ in range(8):
+            pull()
+        assert model.law().mu_c <= model.law().mu_s == pytest.approx(1.2, rel=1e-12)
