@@ -143,8 +143,10 @@ def test_a_map_is_small_and_finer_maps_are_closer():
     fine = steady(pf.ReducedModel(PATCH, PLAIN, segments=48, speeds=28), twist)
     scale = np.linalg.norm(fine, axis=1)
     errors = [
-        np.median(np.linalg.norm(steady(pf.ReducedModel(PATCH, PLAIN, *sizes), twist) - fine, axis=1) / scale)
-        for sizes in ((6, 7), (12, 14), (24, 28))
+        np.median(
+            np.linalg.norm(steady(pf.ReducedModel(PATCH, PLAIN, segments=n, speeds=t), twist) - fine, axis=1) / scale
+        )
+        for n, t in ((6, 7), (12, 14), (24, 28))
     ]
     assert errors[2] < 2e-6
     assert errors[0] > 6.0 * errors[1] > 36.0 * errors[2]
@@ -166,7 +168,8 @@ def test_sliding_always_dissipates(pressure, seed):
 @settings(max_examples=20, deadline=None)
 @given(st.floats(1e-4, 1.0), st.integers(0, 10**6))
 def test_two_points_always_dissipate(weight, seed):
-    _dissipates(pf.ReducedModel(pf.ContactPatch.points([(0.0, 0.01), (0.0, -0.01)], [1.0, weight]), PLAIN, 4, 6), seed)
+    patch = pf.ContactPatch.points([(0.0, 0.01), (0.0, -0.01)], [1.0, weight])
+    _dissipates(pf.ReducedModel(patch, PLAIN, segments=4, speeds=6), seed)
 
 
 def _dissipates(model: pf.ReducedModel, seed: int) -> None:

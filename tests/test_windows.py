@@ -194,7 +194,7 @@ def test_memory_does_not_grow_with_the_time_simulated(monkeypatch, name):
     size = {"distributed": 8 * 69, "published": 5 * 17 * 4 * 8}[name]
     peak(0.005, name)  # compiles, which takes memory too
     monkeypatch.setattr(base, "ROOM", 20.0 * size)
-    monkeypatch.setattr("planarfriction.models.three_states._REMEMBERED", 4)
+    monkeypatch.setattr("planarfriction.models.three_states.REMEMBERED", 4)
     assert peak(0.2, name) < 1.2 * peak(0.05, name)
 
 

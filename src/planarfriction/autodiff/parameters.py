@@ -115,6 +115,8 @@ def has_one_shape(model: Any) -> bool:
     """Whether a model is a reduced one that compiled roll-outs know: isotropic, and with one shape for all loads."""
     if not isinstance(model, ReducedModel | ReducedModelPublished) or model.patch.anisotropic:
         return False
+    if getattr(model, "parts", 1) > 1:
+        return False
     return not model.patch.depends_on_load or getattr(model, "on_load_change", None) == "keep"
 
 

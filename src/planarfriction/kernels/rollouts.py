@@ -28,6 +28,7 @@ from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import jit, kernel
 from planarfriction.kernels.law import LAW, law_of
 from planarfriction.kernels.pointers import address, at, call, doubles
+from planarfriction.kernels.records import reader, size_of
 from planarfriction.kernels.vectors import accumulate, dot, put, three, times
 
 SCRATCH = 9
@@ -123,29 +124,51 @@ def step(shape_of, hold, linearise, row, data, inputs, out):
     out[3], out[4], out[5] = wrench
 
 
+class Place(NamedTuple):
+    """Where compiled code finds a part of a contact: addresses of the model's `step`, and of its row and data."""
+
+    step: int
+    row: int
+    data: int
+    share: float
+    """Of the load."""
+
+
+_place = reader(Place)
+_WORDS = size_of(Place)
+
+
 @jit
 def step_batch(places, inputs, out):
-    """Steps of B contacts into `out` [B, 6] from `inputs` [B, 8], as in `step`.
-
-    `places` [3] are the addresses of a model's compiled `step`, of the contact's row and of its data.
-    """
+    """Steps of B contacts of one part into `out` [B, 6] from `inputs` [B, 8], as in `step`; `places` hold its place."""
+    part = _place(places)
     for b in range(inputs.shape[0]):
-        call(places[0], (places[1], places[2], address(inputs, 8 * b), address(out, 6 * b)))
+        call(part.step, (part.row, part.data, address(inputs, 8 * b), address(out, 6 * b)))
 
 
 @jit
 def step_one(places, z, vx, vy, omega, load, dt, result):
-    """A step of one contact: new state and wrench into the first of `result` [14]; false for invalid inputs.
+    """A step of one contact whose P parts are at the `places`, a row of words for each, flat; false for invalid inputs.
 
-    Called from Python: every argument costs a quarter of a microsecond on the way in.
+    `z` [3 P]. New state and wrench go into the first of `result` [3 P + 11]: each part writes its wrench where the next
+    one's state comes. Called from Python: every argument costs a quarter of a microsecond on the way in.
     """
     valid = xp.in_range(vx) and xp.in_range(vy) and xp.in_range(omega) and xp.in_range(load) and xp.in_range(dt)
-    valid = valid and xp.in_range(z[0]) and xp.in_range(z[1]) and xp.in_range(z[2])
+    n = 3 * (places.shape[0] // _WORDS)
+    for i in range(n):
+        valid = valid and xp.in_range(z[i])
     if not (valid and load > 0.0 and dt >= 0.0):
         return False
-    result[6], result[7], result[8], result[9], result[10], result[11] = z[0], z[1], z[2], vx, vy, omega
-    result[12], result[13] = load, dt
-    call(places[0], (places[1], places[2], address(result, 6), result))
+    result[n + 6], result[n + 7], result[n + 8], result[n + 9], result[n + 10] = vx, vy, omega, load, dt
+    fx, fy, tau = 0.0, 0.0, 0.0
+    for first in range(0, n, 3):
+        part = _place(address(places, first // 3 * _WORDS))
+        result[n + 3], result[n + 4], result[n + 5] = z[first], z[first + 1], z[first + 2]
+        call(part.step, (part.row, part.data, address(result, n + 3), address(result, first)))
+        fx += part.share * result[first + 3]
+        fy += part.share * result[first + 4]
+        tau += part.share * result[first + 5]
+    result[n], result[n + 1], result[n + 2] = fx, fy, tau
     return True
 
 
@@ -161,10 +184,10 @@ def compile_step_one() -> None:
 
     Of other types it then says so at once, for free, where it would be compiled anew in the middle of a step.
     """
-    number, vector, places = types.float64, types.float64[::1], types.int64[::1]
+    number, vector = types.float64, types.float64[::1]
     with _COMPILING:
         if not step_one.signatures:
-            step_one.compile((places, vector, *(number,) * 5, vector))
+            step_one.compile((vector, vector, *(number,) * 5, vector))
             step_one.disable_compile()
 
 

@@ -21,13 +21,14 @@ class ModelJacobians(NamedTuple):
     """Derivatives of the bristle rates and of the wrench; `[*s]` is the shape of the state without batch axes."""
 
     rate_state: np.ndarray
-    """d rate / d state: distributed `[..., 2, 2, N]` (cell by cell), reduced `[..., 3, 3]`."""
+    """d rate / d state: distributed `[..., 2, 2, N]` (cell by cell), reduced `[..., 3, 3]`, of P parts
+    `[..., P, 3, 3]` (part by part)."""
     rate_twist: np.ndarray
-    """d rate / d twist: distributed `[..., 2, N, 3]`, reduced `[..., 3, 3]`."""
+    """d rate / d twist: distributed `[..., 2, N, 3]`, reduced `[..., 3, 3]`, of P parts `[..., P, 3, 3]`."""
     rate_load: np.ndarray
     """d rate / d normal_force of a fixed shape: zero, `[..., *s]`."""
     wrench_state: np.ndarray
-    """d wrench / d state: distributed `[..., 3, 2, N]`, reduced `[..., 3, 3]`."""
+    """d wrench / d state: distributed `[..., 3, 2, N]`, reduced `[..., 3, 3]`, of P parts `[..., 3, P, 3]`."""
     wrench_twist: np.ndarray
     """d wrench / d twist at a held state, `[..., 3, 3]`."""
     wrench_load: np.ndarray
@@ -43,11 +44,12 @@ class StepJacobians(NamedTuple):
     """
 
     state_state: np.ndarray
-    """d new state / d state: distributed `[..., 2, 2, N]` (cell by cell), reduced `[..., 3, 3]`."""
+    """d new state / d state: distributed `[..., 2, 2, N]` (cell by cell), reduced `[..., 3, 3]`, of P parts
+    `[..., P, 3, 3]` (part by part)."""
     state_twist: np.ndarray
-    """d new state / d twist: distributed `[..., 2, N, 3]`, reduced `[..., 3, 3]`."""
+    """d new state / d twist: distributed `[..., 2, N, 3]`, reduced `[..., 3, 3]`, of P parts `[..., P, 3, 3]`."""
     wrench_state: np.ndarray
-    """d wrench / d state: distributed `[..., 3, 2, N]`, reduced `[..., 3, 3]`."""
+    """d wrench / d state: distributed `[..., 3, 2, N]`, reduced `[..., 3, 3]`, of P parts `[..., 3, P, 3]`."""
     wrench_twist: np.ndarray
     """d wrench / d twist, `[..., 3, 3]`: what an implicit host adds to its mass over `dt`."""
     wrench_load: np.ndarray

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import functools
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -16,9 +17,10 @@ from planarfriction.kernels.records import rows_of
 from planarfriction.kernels.reduced_contact import ReducedContact, Shape
 from planarfriction.laws.base import refuse_creep
 from planarfriction.models.base import PackedModel
-from planarfriction.models.load_family import LoadFamily
-from planarfriction.models.reduced_map import POINT, ReducedShape, is_point, reduced_shape
+from planarfriction.models.part_shapes import Part, PartShapes, together
+from planarfriction.models.reduced_map import POINT, ReducedShape, is_point, slip_factor
 from planarfriction.models.three_states import ThreeStateModel
+from planarfriction.patch.parts import labels_of, part_of
 
 MOST_SEGMENTS, MOST_SPEEDS = 256, 64
 """Sizes of the maps that are taken: some 0.6 GB for a fixed shape; errors fall with their fourth power."""
@@ -29,7 +31,7 @@ _TOGETHER = 32
 
 @dataclass(frozen=True, eq=False)
 class ReducedModel(ThreeStateModel):
-    """Reduced LuGre friction: the first moments of the bristle field of the patch, three states.
+    """Reduced LuGre friction: the first moments of the bristle field of the patch, three states for each of its parts.
 
     With `V_G = F V`, `|V_G|` the root mean square of the cells' speeds, and the patch's own steady state `z_ss(V)`, the
     sum over its cells at their own speeds: `zdot = V_G - beta (lambda (z - s z_ss) + s V_G)`, `s = z.z_ss/|z_ss|^2`,
@@ -49,12 +51,18 @@ class ReducedModel(ThreeStateModel):
 
     _kernels = reduced_step
 
+    _: KW_ONLY
+    parts: Any = 1
+    """Compact parts with moments and a map each: a count up to the cells that carry load, or "auto", which is taken as
+    6 for slender or separate shapes, else 4."""
     segments: int = 24
     """Squares of the map along a quarter of a face of its cube; 24 leave errors of 1e-5 (median) of z_ss."""
     speeds: int = 14
     """Nodes of the map over the speed, for the Stribeck part."""
     load_error: float = 4e-3
     """Largest relative error of z_ss from blending maps over the load; 0 builds a map for each load, which is slow."""
+    labels: np.ndarray = field(init=False, repr=False, compare=False)
+    """Which part each cell belongs to, `[N]`."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -62,39 +70,90 @@ class ReducedModel(ThreeStateModel):
         object.__setattr__(self, "segments", validation.count("segments", self.segments, 4, MOST_SEGMENTS))
         object.__setattr__(self, "speeds", validation.count("speeds", self.speeds, 5, MOST_SPEEDS))
         object.__setattr__(self, "load_error", validation.non_negative("load_error", self.load_error))
-        if not self.patch.depends_on_load:
-            if is_point(self.patch):
-                shown = f"{1.0 - self.patch.weights().max():.1g} of it"
-                raise InvalidValueError("patch", f"carry more than {POINT} of its load beside its heaviest cell", shown)
-            _ = self._reference
+        parts = _count_of(self.parts)
+        if not self.patch.depends_on_load and is_point(self.patch):
+            shown = f"{1.0 - self.patch.weights().max():.1g} of it"
+            raise InvalidValueError("patch", f"carry more than {POINT} of its load beside its heaviest cell", shown)
+        if parts is not None and parts > self.patch.cells:
+            raise InvalidValueError("parts", f"be at most the {self.patch.cells} cells that can carry load", parts)
+        object.__setattr__(self, "labels", labels_of(self.patch, parts))
+        object.__setattr__(self, "parts", int(self.labels.max()) + 1)
+        _ = self._parts
+
+    @property
+    def state_shape(self) -> tuple[int, ...]:
+        """`(3,)`, of several parts `(parts, 3)`."""
+        return (3,) if self.parts == 1 else (self.parts, 3)
 
     def shape_at(self, normal_force: float | None) -> ReducedShape:
-        """Second moments of slip and stored steady state at a load [N]; recent loads are remembered."""
+        """Second moments of slip and stored steady state of a model of one part at a load [N]; see `parts_at`."""
         return self.shapes_at([normal_force])[0]
 
     def shapes_at(self, loads) -> list[ReducedShape]:
         """`shape_at` of many loads [N], which costs less than one by one."""
+        if self.parts > 1:
+            raise InvalidValueError("parts", "be 1 for one shape (parts_at has that of each)", self.parts)
+        return self._parts[0].at(self._checked(loads))
+
+    def parts_at(self, normal_force: float | None) -> tuple[Part, ...]:
+        """Share of the load and shape of each part at a load [N]; recent loads are remembered."""
         if not self.patch.depends_on_load:
-            return [self._reference for _ in loads]
-        if isinstance(loads, np.ndarray) and (loads > 0.0).all() and (loads < np.inf).all():
-            loads = loads.tolist()  # one by one takes longer than all else
-        else:
-            loads = [validation.positive_load("normal_force", load) for load in loads]
-        return self._family.shapes(loads) if self.load_error > 0.0 else [self._built_at(load) for load in loads]
+            return self._fixed_parts
+        return self._parts_together([normal_force])[0]
 
     @property
     def load_rungs(self) -> list[float]:
         """Loads [N] at which maps have been built so far, of a patch that depends on the load."""
-        return self._family.rungs
+        return sorted({load for part in self._parts for load in part.rungs})
 
-    def _shapes_at(self, loads: Sequence[float | None]) -> Iterator[ReducedShape]:
+    def _checked(self, loads) -> list[float | None]:
+        if not self.patch.depends_on_load:
+            return list(loads)
+        if isinstance(loads, np.ndarray) and (loads > 0.0).all() and (loads < np.inf).all():
+            return loads.tolist()  # one by one takes longer than all else
+        return [validation.positive_load("normal_force", load) for load in loads]
+
+    def _parts_at(self, loads: Sequence[float | None]) -> Iterator[tuple[Part, ...]]:
         for first in range(0, len(loads), _TOGETHER):
-            yield from self.shapes_at(loads[first : first + _TOGETHER])
+            yield from self._parts_together(loads[first : first + _TOGETHER])
+
+    def _parts_together(self, loads: Sequence[float | None]) -> list[tuple[Part, ...]]:
+        """`parts_at` of loads [N]."""
+        loads = self._checked(loads)
+        shapes = zip(*(part.at(loads) for part in self._parts), strict=True)
+        if self.parts == 1:
+            return [(Part(1.0, shape),) for (shape,) in shapes]
+        weights = self.patch.weights(None if loads[0] is None else np.array(loads)).reshape(-1, self.patch.cells)
+        shares = np.stack([weights[:, self.labels == k].sum(-1) for k in range(self.parts)], -1).tolist()
+        return [tuple(map(Part, *each)) for each in zip(shares, shapes, strict=True)]
+
+    # ------------------------------------------------------------------ parts
+
+    @functools.cached_property
+    def _parts(self) -> tuple[PartShapes, ...]:
+        maps = self.law.numbers.gamma, self.segments, self.speeds
+        cells = (self.labels == k for k in range(self.parts))
+        patches = [self.patch] if self.parts == 1 else [part_of(self.patch, each) for each in cells]
+        return tuple(PartShapes(patch, maps, self.load_error) for patch in patches)
+
+    @functools.cached_property
+    def _fixed_parts(self) -> tuple[Part, ...]:
+        return self._parts_together([None])[0]
+
+    def _radius(self, load: float | None) -> float:
+        return float(slip_factor(self.patch, load)[2, 2])
 
     def _arrays(self, shape: ReducedShape) -> tuple[np.ndarray, ...]:
         return (shape.data,) if shape.other is None else (shape.data, shape.other)
 
-    def _records(self, shapes: Sequence[ReducedShape], radius: float | None = None) -> PackedModel:
+    def _packed(self, parts: Sequence[tuple[Part, ...]], widest: Sequence[float | None]) -> PackedModel:
+        if self.parts == 1:
+            return super()._packed(parts, widest)
+        radius = max(map(self._radius, widest))
+        each = [self._records([loaded[k].shape for loaded in parts], radius) for k in range(self.parts)]
+        return together(each, np.array([[part.share for part in loaded] for loaded in parts]))
+
+    def _records(self, shapes: Sequence[ReducedShape], radius: float) -> PackedModel:
         maps = {id(data): data for shape in shapes for data in (shape.data, shape.other) if data is not None}
         at = {name: place_of(data) for name, data in maps.items()}
         data = np.array([at[id(shape.data)] for shape in shapes])
@@ -103,32 +162,9 @@ class ReducedModel(ThreeStateModel):
         numbers = np.column_stack([factors, [shape.blend for shape in shapes]])
         record = ReducedContact(self.law.numbers, Shape(*numbers[0]), 0, 0)
         rows = rows_of(record, len(shapes), shape=numbers, data=data, other=(other - data) // 8)
-        radius = max(shape.contact_radius for shape in shapes) if radius is None else radius
         natural = np.full(3, self.law.largest_deflection)
         kept = tuple(maps.values())
         return PackedModel(reduced_contact.FUNCTIONS, rows, 3, reduced_contact.LINEAR, natural, radius, kept)
-
-    # ------------------------------------------------------------------ one shape
-
-    @functools.cached_property
-    def _reference(self) -> ReducedShape:
-        return reduced_shape(self.patch, None, self.law.numbers.gamma, self.segments, self.speeds)
-
-    @functools.cached_property
-    def _family(self) -> LoadFamily:
-        return LoadFamily(self.patch, self.law.numbers.gamma, self.segments, self.speeds, self.load_error)
-
-    def _built_at(self, load: float) -> ReducedShape:
-        def build() -> ReducedShape:
-            return reduced_shape(self.patch, load, self.law.numbers.gamma, self.segments, self.speeds)
-
-        return self._recent.get(load, build)
-
-    def _shapes_of(self, loads: np.ndarray):
-        values = np.unique(loads[loads > 0.0])
-        if self.load_error > 0.0:
-            self.shapes_at(values)  # all at once
-        return super()._shapes_of(values)
 
     def _maps(self, shape: ReducedShape) -> tuple[np.ndarray, np.ndarray]:
         if shape.other is None:
@@ -143,3 +179,12 @@ class ReducedModel(ThreeStateModel):
     def _rate_slopes(self, shape: ReducedShape, lin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         by_z, by_v = (lin[:, at : at + 9].reshape(-1, 3, 3) for at in (reduced_contact.BY_Z, reduced_contact.BY_V))
         return by_z, by_v @ shape.factor
+
+
+def _count_of(parts: Any) -> int | None:
+    """A number of parts, None for "auto"."""
+    if isinstance(parts, str):
+        if parts != "auto":
+            raise InvalidValueError("parts", 'be "auto" or an integer >= 1', validation.quoted(parts))
+        return None
+    return validation.count("parts", parts)

@@ -103,7 +103,7 @@ class ReducedModelPublished(ThreeStateModel):
         load = validation.positive_load("normal_force", normal_force)
         return self._recent.get(load, lambda: self._shape_at(load))
 
-    def _records(self, shapes: Sequence[PublishedShape], radius: float | None = None) -> PackedModel:
+    def _records(self, shapes: Sequence[PublishedShape], radius: float) -> PackedModel:
         data = [np.ascontiguousarray(shape.surface.numbers.data, dtype=float) for shape in shapes]
         root = shapes[0].root
         record = PublishedContact(
@@ -122,7 +122,6 @@ class ReducedModelPublished(ThreeStateModel):
             size=np.array([shape.surface.numbers.size for shape in shapes]),
             data=np.array([place_of(each) for each in data]),
         )
-        radius = max(shape.contact_radius for shape in shapes) if radius is None else radius
         natural = self.law.largest_deflection * np.array([1.0, 1.0, radius or 1.0])
         return PackedModel(published_contact.FUNCTIONS, rows, 3, published_contact.LINEAR, natural, radius, tuple(data))
 
@@ -180,7 +179,9 @@ class ReducedModelPublished(ThreeStateModel):
         return np.eye(2) if self.patch.root is None else self.patch.root
 
     def _record(self, shape: PublishedShape) -> PackedModel:
-        return super()._record(shape) if self._axes is None else self._records([shape._replace(root=np.eye(2))])
+        if self._axes is None:
+            return super()._record(shape)
+        return self._records([shape._replace(root=np.eye(2))], shape.contact_radius)
 
     def _step(self, shape: PublishedShape, state, twist, load, dt) -> np.ndarray:
         if shape.contact_radius > 0.0:

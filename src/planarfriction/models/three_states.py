@@ -14,32 +14,31 @@ import numpy as np
 from planarfriction.formulas import LARGEST
 from planarfriction.geometry import transformed
 from planarfriction.kernels.pointers import place_of
-from planarfriction.kernels.rollouts import UNFIT, compile_step_one, step_batch, step_one
+from planarfriction.kernels.records import row_of
+from planarfriction.kernels.rollouts import UNFIT, Place, compile_step_one, step_batch, step_one
 from planarfriction.models import base
 from planarfriction.models.base import FrictionModel, ModelJacobians, PackedModel, StepJacobians
+from planarfriction.models.part_shapes import REMEMBERED, Part
 from planarfriction.models.rates import linearised, rates
 from planarfriction.models.remembered import Remembered
 
-_REMEMBERED = 64
-"""Loads whose shapes a model remembers that builds each."""
-
 _ARRAY, _FLOAT, _EMPTY = np.ndarray, np.dtype(float), np.empty
 _TRUTH = frozenset((bool, np.bool_))
-_STATE, _WRENCH = slice(3), slice(3, 6)
 
 _PLAIN = frozenset((float, int, np.float64))
 """What needs no conversion to a number."""
 
-_HERE_ALONE = ("_fixed", "_fixed_record", "_recent", "_family")
+_HERE_ALONE = ("_fixed", "_fixed_records", "_recent")
 """What a copy makes anew: addresses hold in this process, and memories are shared by threads, not by models."""
 
 
 @dataclass(frozen=True, eq=False)
 class ThreeStateModel(FrictionModel):
-    """A model of three states per contact whose equations are compiled loops.
+    """A model of three states for each part of a contact, whose equations are compiled loops.
 
-    A member gives its compiled functions (`_kernels`) and its shapes: at one load (`shape_at`), the reference, and what
-    compiled loops need of one (`_maps`, `_levers`, `_rate_slopes`).
+    A member gives its compiled functions (`_kernels`) and its shapes: at one load (`shape_at`), and what compiled loops
+    need of one (`_maps`, `_levers`, `_rate_slopes`); one with several parts their shapes and shares (`parts_at`). Parts
+    see the same twist and know nothing of each other; the wrench is the sum of theirs, each times its share.
     """
 
     _kernels: ClassVar[ModuleType]
@@ -51,19 +50,21 @@ class ThreeStateModel(FrictionModel):
         return (3,)
 
     def rate(self, state, twist, normal_force) -> np.ndarray:
-        """Rates of the state `zdot`, shape `[..., 3]`, in units of the state per second."""
-        return self._by_load(self._evaluate, (6,), *self._inputs(state, twist, normal_force))[..., :3]
+        """Rates of the state `zdot`, shape `[..., *s]`, in units of the state per second."""
+        return _each(self._by_load(self._evaluate, (6,), *self._inputs(state, twist, normal_force))[..., :3])
 
     def wrench(self, state, twist, normal_force) -> np.ndarray:
         """Friction wrench on the moving body, shape `[..., 3]` [N, N, N m]."""
-        return self._out(self._by_load(self._evaluate, (6,), *self._inputs(state, twist, normal_force))[..., 3:])
+        return self._out(_sum(self._by_load(self._evaluate, (6,), *self._inputs(state, twist, normal_force))[..., 3:]))
 
     def jacobians(self, state, twist, normal_force) -> ModelJacobians:
         """Analytic derivatives of `rate` and `wrench` (see `ModelJacobians`); at kinks a one-sided derivative."""
         packed = self._by_load(self._jacobians, (13, 3), *self._inputs(state, twist, normal_force))
         square = [packed[..., i : i + 3, :] for i in (0, 3, 6, 9)]
-        zero = np.zeros_like(packed[..., 12, :])
-        slopes = ModelJacobians(square[0], square[1], zero, square[2], square[3], packed[..., 12, :])
+        load, zero = packed[..., 12, :], np.zeros_like(packed[..., 12, :])
+        slopes = ModelJacobians(
+            _each(square[0], 2), _each(square[1], 2), _each(zero), _each(square[2]), _sum(square[3]), _sum(load)
+        )
         return self._turned(slopes, "rate_twist")
 
     def step(self, state, twist, normal_force, dt) -> tuple[np.ndarray, np.ndarray]:
@@ -77,23 +78,29 @@ class ThreeStateModel(FrictionModel):
             held = twist
         elif kind is _ARRAY and twist.ndim == 1 and twist.dtype is _FLOAT:
             held = twist.tolist()
-        if held is not None and type(state) is _ARRAY and state.size == 3 and (fixed := self._fixed):
+        if held is not None and type(state) is _ARRAY and (fixed := self._fixed):
             # one contact: no batch to broadcast, and the compiled step checks what it is given, but takes True for 1.0
-            result = _EMPTY(14)
+            places, n = fixed[0], fixed[1]
+            many = n > 3 and state.shape == (n // 3, 3)
+            result = _EMPTY(n + 11)
             try:
                 vx, vy, omega = held
-                if not (
-                    bool is type(vx)
-                    or bool is type(vy)
-                    or bool is type(omega)
-                    or type(normal_force) in _TRUTH
-                    or bool is type(dt)
-                ) and step_one(fixed[0], state, vx, vy, omega, normal_force, dt, result):
-                    return result[_STATE], result[_WRENCH]
+                if (
+                    (many or state.size == n == 3)
+                    and not (
+                        bool is type(vx)
+                        or bool is type(vy)
+                        or bool is type(omega)
+                        or type(normal_force) in _TRUTH
+                        or bool is type(dt)
+                    )
+                    and step_one(places, state.ravel() if many else state, vx, vy, omega, normal_force, dt, result)
+                ):
+                    return result[:n].reshape(state.shape) if many else result[:n], result[n : n + 3]
             except UNFIT:  # not plain numbers, or a batch: the checks below decide
                 pass
         packed = self._by_load(self._step, (6,), *self._inputs(state, twist, normal_force, dt=dt))
-        return packed[..., :3], self._out(packed[..., 3:])
+        return _each(packed[..., :3]), self._out(_sum(packed[..., 3:]))
 
     def step_jacobians(self, state, twist, normal_force, dt) -> StepJacobians:
         """Analytic derivatives of `step` (see `StepJacobians`); at kinks a one-sided derivative."""
@@ -102,7 +109,13 @@ class ThreeStateModel(FrictionModel):
             inputs = self._inputs(state, twist, normal_force, dt=dt)
             packed = self._by_load(self._step_jacobians, (6, 7), *inputs)
         new, wrench = packed[..., :3, :], packed[..., 3:, :]
-        slopes = StepJacobians(new[..., :3], new[..., 3:6], wrench[..., :3], wrench[..., 3:6], wrench[..., 6])
+        slopes = StepJacobians(
+            _each(new[..., :3], 2),
+            _each(new[..., 3:6], 2),
+            _each(wrench[..., :3]),
+            _sum(wrench[..., 3:6]),
+            _sum(wrench[..., 6]),
+        )
         return self._turned(slopes, "state_twist")
 
     # ------------------------------------------------------------------ axes of the twist
@@ -133,10 +146,9 @@ class ThreeStateModel(FrictionModel):
         """What the model knows of its patch at a load [N]."""
         raise NotImplementedError
 
-    @property
-    def _reference(self) -> Any:
-        """The shape that does not follow the load."""
-        raise NotImplementedError
+    def parts_at(self, normal_force: float | None) -> tuple[Part, ...]:
+        """Share of the load and shape of each part at a load [N], which may be None where it makes no difference."""
+        return (Part(1.0, self.shape_at(normal_force)),)  # pyright: ignore[reportArgumentType]
 
     @property
     def _follows_load(self) -> bool:
@@ -145,49 +157,60 @@ class ThreeStateModel(FrictionModel):
     @functools.cached_property
     def _recent(self) -> Remembered[Any]:
         """Shapes at the latest loads."""
-        return Remembered(_REMEMBERED)
+        return Remembered(REMEMBERED)
 
     def packed(self, loads: Sequence[float | None], between: tuple[float, float] | None = None) -> PackedModel:
         """See `FrictionModel.packed`; the lever arm of a run is that at its highest load."""
         if not self._follows_load:
-            return self._records([self._reference] * len(loads))
-        radius = None if between is None else self.shape_at(between[1]).contact_radius
-        return self._records(self._first_shapes(loads), radius)
+            return self._packed([self.parts_at(None)] * len(loads), loads)
+        return self._packed(self._first_parts(loads), loads if between is None else between[1:])
 
-    def _first_shapes(self, loads: Sequence[float | None]) -> list[Any]:
-        """Shapes at the first of `loads`, as many as `ROOM` and `SPELL` allow."""
-        shapes, counted, size, begin = [], set(), 0, time.perf_counter()
-        for shape in self._shapes_at(loads):
-            shapes.append(shape)
-            new = {id(data): data.nbytes for data in self._arrays(shape) if id(data) not in counted}
-            if new:  # no other array takes the place of one, as `shapes` holds it
+    def _packed(self, parts: Sequence[tuple[Part, ...]], widest: Sequence[float | None]) -> PackedModel:
+        """The parts at some loads as the solver sees them; its lever arm is the largest at the loads `widest`."""
+        return self._records([each[0].shape for each in parts], max(map(self._radius, widest)))
+
+    def _radius(self, load: float | None) -> float:
+        """Lever arm [m] that turns spins into speeds at a load."""
+        return self.shape_at(load).contact_radius  # pyright: ignore[reportArgumentType]
+
+    def _first_parts(self, loads: Sequence[float | None]) -> list[tuple[Part, ...]]:
+        """Parts at the first of `loads`, as many as `ROOM` and `SPELL` allow."""
+        parts, counted, size, begin = [], set(), 0, time.perf_counter()
+        for each in self._parts_at(loads):
+            parts.append(each)
+            arrays = [array for part in each for array in self._arrays(part.shape)]
+            new = {id(data): data.nbytes for data in arrays if id(data) not in counted}
+            if new:  # no other array takes the place of one, as `parts` holds it
                 counted.update(new)
                 size += sum(new.values())
-                if size > base.ROOM and len(shapes) > 1:
-                    return shapes[:-1]
+                if size > base.ROOM and len(parts) > 1:
+                    return parts[:-1]
                 if time.perf_counter() - begin > base.SPELL:
                     break
-        return shapes
+        return parts
 
-    def _shapes_at(self, loads: Sequence[float | None]) -> Iterator[Any]:
-        """Shapes at loads, one after another."""
-        return (self.shape_at(load) for load in loads)  # pyright: ignore[reportArgumentType]
+    def _parts_at(self, loads: Sequence[float | None]) -> Iterator[tuple[Part, ...]]:
+        """`parts_at` of loads, one after another."""
+        return (self.parts_at(load) for load in loads)
 
     def _arrays(self, shape: Any) -> tuple[np.ndarray, ...]:
         """The large arrays of a shape."""
         return (self._maps(shape)[1],)
 
-    def _records(self, shapes: Sequence[Any], radius: float | None = None) -> PackedModel:
-        """The shapes as the solver sees them; `radius` [m] is the lever arm, by default the largest of them."""
+    def _records(self, shapes: Sequence[Any], radius: float) -> PackedModel:
+        """Shapes of one part as the solver sees them; `radius` [m] is the lever arm."""
         raise NotImplementedError
 
     def _record(self, shape: Any) -> PackedModel:
         """One shape as the solver sees it; twists and wrenches as `_inputs` gives and `_out` takes them."""
-        return self._records([shape]) if self._follows_load else self._fixed_record
+        known = None if self._follows_load else self._fixed_records.get(id(shape))
+        return self._records([shape], shape.contact_radius) if known is None else known
 
     @functools.cached_property
-    def _fixed_record(self) -> PackedModel:
-        return self._records([self._reference])
+    def _fixed_records(self) -> dict[int, PackedModel]:
+        """What is known of fixed shapes, which the model holds."""
+        shapes = [part.shape for part in self.parts_at(None)]
+        return {id(shape): self._records([shape], shape.contact_radius) for shape in shapes}
 
     def _maps(self, shape: Any) -> tuple[np.ndarray, np.ndarray]:
         """Of the limit surface or maps: three integers, and the numbers that hold them."""
@@ -207,42 +230,54 @@ class ThreeStateModel(FrictionModel):
         return np.array([*self.law.numbers, *shape.numbers])
 
     @functools.cached_property
-    def _fixed(self) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-        """`_contact`, where the shape is fixed."""
+    def _fixed(self) -> tuple[np.ndarray, int, list[tuple[np.ndarray, np.ndarray]]] | None:
+        """Where the shape is fixed: places for `kernels.rollouts.step_one`, numbers of a state, and what is there."""
         if self.patch.depends_on_load or self._axes is not None:
             return None
-        return self._contact(self._reference)
+        compile_step_one()
+        contacts = [self._contact(part) for part in self.parts_at(None)]
+        return np.concatenate([place for place, _, _ in contacts]), 3 * len(contacts), [each[1:] for each in contacts]
 
-    def _contact(self, shape: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Addresses for `kernels.rollouts.step_one`, and what they point to, which has to be kept.
+    def _contact(self, part: Part) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """A `kernels.rollouts.Place` as a row of words, and what it points to, which has to be kept.
 
         That is the row of a contact, with the integers of its surface or maps at the end, and the numbers of these.
         """
-        surface, data = self._maps(shape)
-        row, data = np.array([*self._row(shape), *surface]), np.ascontiguousarray(data, dtype=float)
-        compile_step_one()
-        return np.array([self._kernels.step_address(), place_of(row), place_of(data)]), row, data
+        surface, data = self._maps(part.shape)
+        row, data = np.array([*self._row(part.shape), *surface]), np.ascontiguousarray(data, dtype=float)
+        place = Place(self._kernels.step_address(), place_of(row), place_of(data), part.share)
+        return row_of(place), row, data
 
     def __getstate__(self) -> dict[str, Any]:
         """What a copy or another process gets."""
         return {name: value for name, value in super().__getstate__().items() if name not in _HERE_ALONE}
 
     def _by_load(self, function, inner: tuple[int, ...], state, twist, load, *more) -> np.ndarray:
-        """Apply `function(shape, state, twist, load, ...)` to flat batches, one for each shape that the loads take."""
-        result = np.zeros((*load.shape, *inner))
-        flat = [np.ascontiguousarray(a.reshape(load.size, *a.shape[load.ndim :])) for a in (state, twist, load, *more)]
-        out = result.reshape(load.size, *inner)
-        if not self._follows_load:
-            out[:] = function(self._reference, *flat)
-            return out.reshape(result.shape)
-        for value, shape in self._shapes_of(flat[2]):
-            chosen = flat[2] == value
-            out[chosen] = function(shape, *(a[chosen] for a in flat))
-        return out.reshape(result.shape)
+        """Apply `function(shape, state, twist, load, ...)` to flat batches, one for each part and each of its shapes.
 
-    def _shapes_of(self, loads: np.ndarray):
-        """The different loads > 0 with their shapes, one after another."""
-        return ((value, self.shape_at(value)) for value in np.unique(loads[loads > 0.0]))
+        Returns `[P, ..., *inner]`. Rows of the wrench, those behind the first half, are times the share of the part.
+        """
+        parts = int(np.prod(self.state_shape)) // 3
+        result = np.zeros((parts, *load.shape, *inner))
+        out, wrench_rows = result.reshape(parts, load.size, *inner), slice(inner[0] // 6 * 3, None)
+        flat = [np.ascontiguousarray(a.reshape(load.size, *a.shape[load.ndim :])) for a in (state, twist, load, *more)]
+        each_state = flat[0].reshape(load.size, parts, 3)
+        for value, found in self._loads_of(flat[2]):
+            chosen = slice(None) if value is None else flat[2] == value
+            others = [a[chosen] for a in flat[1:]]
+            for k, (share, shape) in enumerate(found):
+                rows = function(shape, np.ascontiguousarray(each_state[chosen, k]), *others)
+                if parts > 1:
+                    rows[:, wrench_rows] *= share
+                out[k, chosen] = rows
+        return result
+
+    def _loads_of(self, loads: np.ndarray) -> Iterator[tuple[float | None, tuple[Part, ...]]]:
+        """The different loads > 0 with the parts there, one after another; None for all where they are the same."""
+        if not self._follows_load:
+            return iter([(None, self.parts_at(None))])
+        different = np.unique(loads[loads > 0.0])
+        return zip(different, self._parts_at(different), strict=True)  # pyright: ignore[reportArgumentType]
 
     def _evaluate(self, shape: Any, state, twist, load) -> np.ndarray:
         rate, unit = rates(self._record(shape), state, twist)
@@ -263,13 +298,16 @@ class ThreeStateModel(FrictionModel):
     def _step(self, shape: Any, state, twist, load, dt) -> np.ndarray:
         out = np.empty((len(load), 6))
         inputs = np.concatenate([state, twist, load[:, None], dt[:, None]], axis=1)
-        contact = self._contact(shape)  # it and the shape, which holds the other map, are kept until the call is over
+        contact = self._contact(
+            Part(1.0, shape)
+        )  # it and the shape, which holds the other map, are kept until the call is over
         step_batch(contact[0], inputs, out)
         return out
 
     def _one_step_jacobians(self, state, twist, normal_force, dt) -> np.ndarray | None:
-        """`_step_jacobians` `[6, 7]` of one contact of fixed shape, checked quickly; None where that is not it."""
-        if self._fixed is None:
+        """`_step_jacobians` `[1, 6, 7]` of one contact of one part and fixed shape, checked quickly; else None."""
+        fixed = self._fixed
+        if fixed is None or fixed[1] > 3:
             return None
         plain = []
         for vector in (state, twist):
@@ -287,15 +325,26 @@ class ThreeStateModel(FrictionModel):
             return None
         if not ((np.abs(given) <= LARGEST).all() and given[6] >= 0.0 and given[7] >= 0.0):
             return None
-        return self._step_jacobians(self._reference, given[None, :3], given[None, 3:6], given[6:7], given[7:])[0]
+        shape = self.parts_at(None)[0].shape
+        return self._step_jacobians(shape, given[None, :3], given[None, 3:6], given[6:7], given[7:])
 
     def _step_jacobians(self, shape: Any, state, twist, load, dt) -> np.ndarray:
         slopes = np.empty((len(load), 6, 7 + len(self._kernels.NAMES)))
         fixed = self._fixed
-        if fixed is None:
+        if fixed is None or fixed[1] > 3:
             row, (surface, data) = self._row(shape), self._maps(shape)
         else:
-            _, numbers, data = fixed
+            numbers, data = fixed[2][0]
             row, surface = numbers[:-3], numbers[-3:].astype(int)
         self._kernels.jacobians(row, surface, data, (state, twist, load, dt), slopes)
         return slopes[:, :, :7]
+
+
+def _each(values: np.ndarray, inner: int = 1) -> np.ndarray:
+    """Values of each part `[P, ..., *inner]` with their parts in front of the inner axes; of one part without."""
+    return values[0] if len(values) == 1 else np.ascontiguousarray(np.moveaxis(values, 0, -1 - inner))
+
+
+def _sum(values: np.ndarray) -> np.ndarray:
+    """Sum over the parts `[P, ...]`."""
+    return values[0] if len(values) == 1 else values.sum(0)

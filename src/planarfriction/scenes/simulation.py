@@ -162,7 +162,10 @@ def _histories(scene: Scene, windows: Windows, output: Output) -> dict[str, Hist
                 full[:, :, cells] = part.reshape(len(part), 2, -1)
                 histories[name] = History(("time", "axis", f"cell_{contact.name}"), full, {"units": "m"})
             else:
-                histories[name] = History(("time", "component"), part, {"units": "m, m, m^2"})
+                inner = contact.model.state_shape
+                parts = () if len(inner) == 1 else (f"part_{contact.name}",)
+                states = part.reshape(len(part), *inner)
+                histories[name] = History(("time", *parts, "component"), states, {"units": "m, m, m^2"})
     histories["time"] = history("time", ("time",), output.time, "s")
     histories["contact"] = History(("contact",), np.array([contact.name for contact in scene.contacts]), {})
     return histories

@@ -1,0 +1,90 @@
+"""What the reduced model knows of one of its parts, at any load."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from planarfriction.equality import by_parts
+from planarfriction.kernels.contacts import calls_of
+from planarfriction.kernels.parts import FUNCTIONS, PartsContact
+from planarfriction.kernels.pointers import place_of
+from planarfriction.kernels.records import rows_of
+from planarfriction.models.base import PackedModel
+from planarfriction.models.load_family import LoadFamily
+from planarfriction.models.reduced_map import ReducedShape, reduced_shape
+from planarfriction.models.remembered import Remembered
+from planarfriction.patch import ContactPatch
+
+REMEMBERED = 64
+"""Loads whose shapes are remembered where each has a map of its own."""
+
+
+@by_parts
+class Part(NamedTuple):
+    """A part of a contact at one load."""
+
+    share: float
+    """Of the load."""
+    shape: Any
+    """What the model knows of its cells."""
+
+
+class PartShapes:
+    """The shapes of a part, built where loads are asked for; any number of threads may ask.
+
+    `maps` are the exponent, the segments and the speeds of its maps, `error` the largest from blending them; 0 builds a
+    map for each load.
+    """
+
+    def __init__(self, patch: ContactPatch, maps: tuple[float, int, int], error: float) -> None:
+        self.patch, self._maps, self._error = patch, maps, error
+        self._fixed = None if patch.depends_on_load else reduced_shape(patch, None, *maps)
+        self._forget()
+
+    def _forget(self) -> None:
+        self._family = LoadFamily(self.patch, *self._maps, self._error)
+        self._recent: Remembered[ReducedShape] = Remembered(REMEMBERED)
+
+    def at(self, loads: Sequence[float | None]) -> list[ReducedShape]:
+        """Shapes at loads > 0 of the whole patch [N], which costs less than one by one."""
+        if self._fixed is not None:
+            return [self._fixed for _ in loads]
+        return self._family.shapes(loads) if self._error > 0.0 else [self._built(load) for load in loads]  # pyright: ignore
+
+    @property
+    def rungs(self) -> list[float]:
+        """Loads [N] at which maps have been built and not been forgotten, ascending."""
+        return self._family.rungs
+
+    def _built(self, load: float) -> ReducedShape:
+        return self._recent.get(load, lambda: reduced_shape(self.patch, load, *self._maps))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy gets: memories are shared by threads, not by models."""
+        return {name: value for name, value in self.__dict__.items() if name not in ("_family", "_recent")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(state)
+        self._forget()
+
+
+def together(parts: Sequence[PackedModel], shares: np.ndarray) -> PackedModel:
+    """A contact of P parts as the solver sees it, from its parts at the same R loads and their shares `[R, P]`."""
+    one, count = parts[0], len(parts)
+    calls = calls_of(one.functions, change=True)
+    records = np.stack([place_of(part.records) + part.records.strides[0] * np.arange(len(shares)) for part in parts], 1)
+    records, shares = np.ascontiguousarray(records), np.ascontiguousarray(shares)
+    row = 8 * count * np.arange(len(shares))
+    record = PartsContact(count, one.states, one.workspace, place_of(calls), 0, 0)
+    return PackedModel(
+        FUNCTIONS,
+        rows_of(record, len(shares), records=place_of(records) + row, shares=place_of(shares) + row),
+        count * one.states,
+        count * one.workspace,
+        np.tile(one.natural, count),
+        one.radius,
+        (calls, records, shares, *(array for part in parts for array in (part.records, *part.kept))),
+    )

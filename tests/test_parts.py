@@ -1,0 +1,159 @@
+"""Parts: how a patch is split, what several parts hold exactly, and that as many parts as cells are the cells."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import planarfriction as pf
+from planarfriction.errors import InvalidValueError
+from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch, SoftFinger
+from planarfriction.patch.parts import automatic, labels_of, part_of, split
+from planarfriction.scenes import simulate
+
+PLAIN, ELASTIC = pf.LuGre(mu_s=1.2), pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
+LAWS = {"plain": PLAIN, "elasto-plastic": ELASTIC}
+T = PUBLISHED_PATCHES["NonConvex2"](11)
+FEET = ContactPatch.points([(0.01, 0.0), (-0.01, 0.002), (0.0, 0.012)], [1.0, 2.0, 3.0])
+SMALL = {"segments": 8, "speeds": 8}
+
+PATCHES = {name: make() for name, make in PUBLISHED_PATCHES.items()} | {
+    "L": ContactPatch.polygon([(0, 0), (0.02, 0), (0.02, 0.006), (0.006, 0.006), (0.006, 0.02), (0, 0.02)], 15),
+    "ring": ContactPatch.ring(0.005, 0.01, 15),
+    "off centre": ContactPatch.disc(0.01, 15, pressure=lambda x, y: np.exp(-((x - 0.003) ** 2 + y**2) / 5e-5)),
+    "pads": ContactPatch.points([(0.01 * i, 0.01 * j) for i in range(3) for j in range(3)]),
+    "octagon": ContactPatch.points(0.01 * np.exp(1j * np.pi / 4 * np.arange(8))[:, None].view(float)),
+}
+
+
+# ---------------------------------------------------------------------- the split
+
+
+@pytest.mark.parametrize("name", PATCHES)
+@settings(max_examples=8, deadline=None)
+@given(
+    st.floats(0.0, 2.0 * np.pi), st.booleans(), st.floats(-2.0, 2.0), st.floats(-0.1, 0.1), st.integers(0, 2**32 - 1)
+)
+def test_parts_turn_mirror_scale_and_move_with_the_cells(name, angle, mirrored, scale, shift, seed):
+    positions, weights = PATCHES[name].positions, PATCHES[name].weights()
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    moved = 10.0**scale * positions @ (turn @ np.diag([1.0, -1.0 if mirrored else 1.0])).T + shift * np.ptp(positions)
+    rounding = np.random.default_rng(seed)
+    moved *= 1.0 + 1e-14 * rounding.normal(size=moved.shape)
+    heavier = 3.0 * weights * (1.0 + 1e-15 * rounding.normal(size=weights.shape))
+    for parts in (2, 3, 4, 5, 6, 8):
+        np.testing.assert_array_equal(split(moved, heavier, parts), split(positions, weights, parts))
+    assert automatic(moved, heavier) == automatic(positions, weights)
+
+
+@pytest.mark.parametrize("middles", [[0, 6], [0, 8, 3 + 6j], [0, 7, 7j, 7 + 7j], [0, 5, 12, 8 + 3j]])
+def test_separate_pads_come_out_whole(middles):
+    pad = np.add.outer(np.arange(3), 1j * np.arange(3)).ravel()
+    places = np.add.outer(np.array(middles), pad).ravel()
+    labels = split(np.stack([places.real, places.imag], -1), np.ones(len(places)), len(middles))
+    pads = labels.reshape(len(middles), 9)
+    assert (pads == pads[:, :1]).all()
+    assert len(set(labels)) == len(middles)
+
+
+def test_even_patches_fall_into_equal_parts():
+    assert (np.bincount(labels_of(ContactPatch.line(0.02, 24), 4)) == 6).all()
+    disc = ContactPatch.disc(0.01, 20)
+    shares = np.bincount(labels_of(disc, 4), disc.weights())
+    np.testing.assert_allclose(shares, 0.25, rtol=1e-12)
+
+
+def test_auto_gives_more_parts_to_slender_and_separate_shapes():
+    chosen = {name: automatic(patch.positions, patch.weights()) for name, patch in PATCHES.items()}
+    assert {name for name, parts in chosen.items() if parts == 4} == {"Circle", "Square", "off centre"}
+    assert {parts for parts in chosen.values()} == {4, 6}
+    assert [automatic(np.eye(n, 2), np.ones(n)) for n in (1, 2, 3, 4, 5)] == [1, 2, 3, 4, 4]
+
+
+def test_thousands_of_cells_are_split_in_a_moment():
+    positions = np.random.default_rng(0).normal(size=(200_000, 2))
+    labels = split(positions, np.ones(len(positions)), 6)  # all pairs of cells would take 40 GB
+    assert (np.bincount(labels) > 20_000).all()
+    assert len(split(np.zeros((5, 2)), np.ones(5), 3)) == 5  # at one place: any cells will do
+
+
+def test_a_grain_is_split_as_the_scaled_places_are():
+    disc = ContactPatch.disc(0.01, 15)
+    rough = disc.with_friction_metric(pf.grain(0.0, along=1.0, across=3.0))
+    # a spin moves cells along y across the grain: it sees them further apart along x
+    labels = labels_of(rough, 4)
+    spans = [np.ptp(disc.positions[labels == k], axis=0) for k in range(4)]
+    assert all(x < y for x, y in spans)
+
+
+# ---------------------------------------------------------------------- parts of a patch
+
+
+def test_parts_add_up_to_the_patch():
+    soft = ContactPatch.disc(0.01, 15, pressure=SoftFinger(c=0.006, n=1 / 3, k=2.0))
+    loads = np.array([0.01, 0.5, 3.0])
+    for patch, at in ((T, 1.0), (soft, loads)):
+        labels = labels_of(patch, 6)
+        parts = [part_of(patch, labels == k) for k in range(6)]
+        shares = np.stack([patch.weights(at)[..., labels == k].sum(-1) for k in range(6)])
+        for k, part in enumerate(parts):
+            weights = part.weights(at) * shares[k][..., None]
+            np.testing.assert_allclose(weights, patch.weights(at)[..., labels == k], rtol=1e-12, atol=1e-300)
+            np.testing.assert_allclose(part.weights(at).sum(-1), 1.0, rtol=1e-14)
+        model = pf.ReducedModel(patch, PLAIN, parts=6, **SMALL)
+        for load in np.atleast_1d(at):
+            found = model.parts_at(load)
+            np.testing.assert_allclose(sum(part.share for part in found), 1.0, rtol=1e-14)
+            # second moments of slip add up
+            squares = sum(part.share * part.shape.factor.T @ part.shape.factor for part in found)
+            whole = pf.ReducedModel(patch, PLAIN, **SMALL).shape_at(load).factor
+            np.testing.assert_allclose(squares, whole.T @ whole, rtol=1e-12, atol=1e-18)
+
+
+@pytest.mark.parametrize("parts", [True, 0, -1, 2.5, "six", None, [2], float("nan"), 85])
+def test_other_parts_are_refused_in_one_line(parts):
+    with pytest.raises(InvalidValueError, match="parts must be") as error:
+        pf.ReducedModel(PUBLISHED_PATCHES["NonConvex2"](), PLAIN, parts=parts, **SMALL)
+    assert "\n" not in str(error.value)
+
+
+# ---------------------------------------------------------------------- as many parts as cells: the distributed model
+
+
+def twists(count: int, seed: int = 1) -> np.ndarray:
+    generator = np.random.default_rng(seed)
+    return generator.normal(size=(count, 3)) * [1.0, 1.0, 100.0] * 10.0 ** generator.uniform(-4, -1, (count, 1))
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("patch", [FEET, T], ids=["feet", "T"])
+def test_as_many_parts_as_cells_are_the_distributed_model(law, patch):
+    cells, errors = pf.DistributedModel(patch, LAWS[law]), []
+    for sizes in ({}, {"segments": 48, "speeds": 28}):
+        model = pf.ReducedModel(patch, LAWS[law], parts=patch.cells, **sizes)
+        ours, theirs, off = model.rest(), cells.rest(), []
+        for twist in twists(60):
+            rates = model.rate(ours, twist, 2.0)[:, :2].T, cells.rate(theirs, twist, 2.0)
+            forces = model.wrench(ours, twist, 2.0), cells.wrench(theirs, twist, 2.0)
+            speed = np.abs(twist * [1.0, 1.0, 0.01]).max()
+            off.append(np.abs(rates[0] - rates[1]).max() / speed)
+            off.append(np.abs((forces[0] - forces[1]) / [2.0, 2.0, 0.02]).max() / (1.0 + speed * 800.0))
+            ours, wrench = model.step(ours, twist, 2.0, 1e-3)
+            theirs, wanted = cells.step(theirs, twist, 2.0, 1e-3)
+            off.append(np.abs((wrench - wanted) / [2.0, 2.0, 0.02]).max())
+            off.append(np.abs(ours[:, :2].T - theirs).max() / LAWS[law].largest_deflection)
+            assert (ours[:, 2] == 0.0).all()
+        errors.append(np.median(off))
+    # what is left is the map of a point: interpolation of a unit vector, and of the Stribeck curve over the speed
+    assert errors[0] < 4e-5
+    assert errors[1] < errors[0] / 16.0
+
+
+def test_a_scene_with_as_many_parts_as_cells_is_that_of_the_distributed_model():
+    ends = []
+    for model in (pf.ReducedModel(T, ELASTIC, parts=T.cells), pf.DistributedModel(T, ELASTIC)):
+        data = simulate(pf.scenes.free_slide(model), rtol=1e-7, atol=1e-7).histories
+        ends.append([data[name].values[-1] for name in ("x", "y", "theta")])
+    np.testing.assert_allclose(ends[0], ends[1], rtol=2e-5)
