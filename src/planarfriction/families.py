@@ -116,7 +116,7 @@ MODELS = Family(
     "model",
     {
         "distributed": ("a bristle in every cell", "models.distributed:DistributedModel"),
-        "reduced": ("the moments of the bristles, three states", "models.reduced:ReducedModel"),
+        "reduced": ("the moments of the bristles, three states a part", "models.reduced:ReducedModel"),
         "reduced-published": (
             "three bristles and a limit surface, as published",
             "models.reduced_published:ReducedModelPublished",

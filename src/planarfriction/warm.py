@@ -50,10 +50,12 @@ def _parts() -> list[Part]:
     patch, law = ContactPatch.disc(radius=0.01, cells=5), LuGre(mu_s=1.2, elasto_plastic=0.9)
     kinds = {name: MODELS[name](patch, law) for name in ("distributed", "reduced", "reduced-published")}
     three_states = {name: model for name, model in kinds.items() if name != "distributed"}
+    sum_of_parts = models.ReducedModel(patch, law, parts=2)
     grooved = models.DistributedModel(patch.with_friction_metric(grain(0.0, along=1.0, across=0.8)), law)
     return [
         *(Part(f"scenes, {name}", functools.partial(_simulate, model)) for name, model in kinds.items()),
         Part("scenes, friction with a grain", functools.partial(_simulate, grooved)),
+        Part("scenes, reduced in parts", functools.partial(_derive, sum_of_parts)),
         *(Part(f"steps, {name}", functools.partial(_step, model)) for name, model in kinds.items()),
         *(Part(f"roll-outs, {name}", functools.partial(_roll, model)) for name, model in three_states.items()),
         *(Part(f"derivatives of scenes, {name}", functools.partial(_derive, model)) for name, model in kinds.items()),

@@ -37,9 +37,9 @@ def split(positions: np.ndarray, weights: np.ndarray, parts: int) -> np.ndarray:
 
     Again and again the part with the largest second moment `sum(w |rho - CoP|^2)` is halved by the line through its
     centre of pressure that takes most of it away: `|s|^2 (1/w_one + 1/w_other)`, s the sum of `w (rho - CoP)` over one
-    side. Gaps attract the line, so that separate pads tend to come out whole. Parts turn, move, mirror and scale with the
-    cells. Of equal lines (a square, a disc) the one wins that separates most along the way from the middle of the patch
-    to that of the part, and of those the one that leaves the first cells together.
+    side. Gaps attract the line, so that separate pads tend to come out whole. Parts turn, move, mirror and scale with
+    the cells. Of equal lines (a square, a disc) the one wins that separates most along the way from the middle of the
+    patch to that of the part, and of those the one that leaves the first cells together.
     """
     if parts >= len(positions):
         return np.arange(len(positions))
