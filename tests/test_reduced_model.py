@@ -12,6 +12,8 @@ from scipy.integrate import solve_ivp
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
 from planarfriction.models import cube_map
+from planarfriction.models.reduced_map import slip_factor
+from planarfriction.models.steady_sums import ScaledCells
 from planarfriction.patch import PUBLISHED_PATCHES
 
 PLAIN, ELASTIC = pf.LuGre(mu_s=1.2), pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
@@ -133,12 +135,13 @@ def test_slopes_are_continuous_across_the_edges_of_the_cube(faces):
                 side = point.copy()
                 side[:, axis] *= 1.0 + 1e-14
                 sides.append(_read(data, n, faces, side))
-            for one, other in zip(*sides, strict=True):
-                np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-10)
+            # both faces store the same values and slopes along the edge; those across it, up to 10, are rounded apart
+            for one, other, atol in zip(*sides, (1e-10, 2e-6), strict=True):
+                np.testing.assert_allclose(one, other, rtol=0.0, atol=atol)
 
 
 def test_a_map_is_small_and_finer_maps_are_closer():
-    assert pf.ReducedModel(PATCH, PLAIN).shape_at(None).data.nbytes < 4e6
+    assert pf.ReducedModel(PATCH, PLAIN).shape_at(None).data.nbytes < 1.05e6  # half of a common second-level cache
     twist = twists(300, seed=5)
     fine = steady(pf.ReducedModel(PATCH, PLAIN, segments=48, speeds=28), twist)
     scale = np.linalg.norm(fine, axis=1)
@@ -150,6 +153,32 @@ def test_a_map_is_small_and_finer_maps_are_closer():
     ]
     assert errors[2] < 2e-6
     assert errors[0] > 6.0 * errors[1] > 36.0 * errors[2]
+
+
+COMPACT = pf.ContactPatch(0.002 * np.indices((3, 3)).reshape(2, 9).T + [0.02, 0.0], np.full(9, 4e-6), np.full(9, 1 / 9))
+
+
+@pytest.mark.parametrize("gamma", [1.0, 2.0])
+@pytest.mark.parametrize(
+    ("patch", "median"),
+    [(PATCH, 6e-6), (PUBLISHED_PATCHES["Circle"](), 6e-6), (COMPACT, 2e-6)],
+    ids=["T", "disc", "compact"],
+)
+def test_the_map_is_the_sum_over_the_cells_at_every_speed(patch, median, gamma):
+    """Twists move all cells of a compact patch nearly alike: nothing smears its Stribeck effect over the speeds."""
+    law = pf.LuGre(mu_s=1.2, gamma=gamma)
+    factor, raised = slip_factor(patch), np.geomspace(1e-2, 1e2, 15)
+    scaled = twists(200, seed=6) @ factor.T
+    scaled /= np.linalg.norm(scaled, axis=1, keepdims=True)
+    sums = ScaledCells(patch, None, factor).sums(scaled, raised, gamma)
+    true = law.mu_c * sums[:, :1] + (law.mu_s - law.mu_c) * sums[:, 1:]
+    speeds = law.v_s * raised ** (1.0 / gamma)
+    ours = steady(
+        pf.ReducedModel(patch, law), np.linalg.solve(factor, (scaled[:, None] * speeds[:, None])[..., None])[..., 0]
+    )
+    errors = np.linalg.norm(law.sigma_0 * ours - true, axis=-1) / np.linalg.norm(true, axis=-1)
+    assert np.median(errors) < median
+    assert np.quantile(errors, 0.9) < 40.0 * median  # near the kinks: where the patch turns about one of its edges
 
 
 # ---------------------------------------------------------------------- properties
@@ -365,9 +394,6 @@ def test_driven_it_is_closer_to_the_converged_model_than_the_published_one(shape
 
 
 def test_the_stored_fourth_moments_are_those_of_the_cells_speeds():
-    from planarfriction.models.reduced_map import slip_factor
-    from planarfriction.models.steady_sums import ScaledCells
-
     patch = pf.ContactPatch.rectangle(0.02, 0.01, (4, 3), pressure=lambda x, y: 1.0 + 20.0 * x + 30.0 * y)
     factor = slip_factor(patch)
     stored = ScaledCells(patch, None, factor).fourth_moments()

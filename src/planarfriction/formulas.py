@@ -146,6 +146,16 @@ def cap(xp, deflection, largest):
 # ---------------------------------------------------------------------- moments of the bristles
 
 
+def stribeck_place(xp, speed, v_s, gamma, knee):
+    """Where a speed > 0 lies in a map of the Stribeck effect: `p/(p + knee)` in [0, 1) of `p = (v/v_s)^gamma` [-].
+
+    Its derivative with respect to `log v` is `gamma t (1 - t)`. ("Reduced model")
+    """
+    fast = speed > v_s
+    raised = xp.power(xp.where(fast, v_s, speed) / xp.where(fast, speed, v_s), gamma)  # stays finite
+    return xp.where(fast, 1.0, raised) / xp.where(fast, 1.0 + knee * raised, raised + knee)
+
+
 def evenness(square, fourth):
     """Evenness e [-] of the bristles that the moments stand for: `<u^2>^2/<u^4>`, 1 where all are bent alike.
 

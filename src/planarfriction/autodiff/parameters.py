@@ -145,7 +145,7 @@ def pack_shape(law: LawNumbers, shape: ReducedShape | PublishedShape) -> Packed:
 
 def pack_map(elasto_plastic: bool, factor: np.ndarray, data: np.ndarray) -> Packed:
     """`ReducedModel` by its F and its map, for roll-outs at given parameters, which take the place of those here."""
-    return pack_shape(_any_law(elasto_plastic), ReducedShape(factor, data))
+    return pack_shape(_any_law(elasto_plastic), ReducedShape(factor, np.asarray(data, dtype=np.float32)))
 
 
 def pack_surface(elasto_plastic: bool, kind: int, size: int, data: np.ndarray) -> Packed:

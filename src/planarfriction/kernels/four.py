@@ -1,4 +1,7 @@
-"""Sums of four numbers at a time, as vector code: the compiler does not find it in scalar sums this small."""
+"""Sums of four numbers at a time, as vector code: the compiler does not find it in scalar sums this small.
+
+The numbers are stored in single precision, and summed in double precision.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ from numba.extending import intrinsic
 
 _FLAGS = ("contract", "reassoc", "nsz")
 _VECTOR = ir.VectorType(ir.DoubleType(), 4)
+_STORED = ir.VectorType(ir.FloatType(), 4)
 _INDEX = ir.IntType(32)
 
 
@@ -27,8 +31,8 @@ def _load(context, builder, array_type, array, at):
     base = (
         context.make_array(array_type)(context, builder, array).data if isinstance(array_type, types.Array) else array
     )
-    place = builder.bitcast(builder.gep(base, [at]), _VECTOR.as_pointer())
-    return builder.load(place, align=8)
+    place = builder.bitcast(builder.gep(base, [at]), _STORED.as_pointer())
+    return builder.fpext(builder.load(place, align=4), _VECTOR)
 
 
 def _plus(builder, total, a, b):

@@ -17,7 +17,7 @@ from numba.np.arrayobj import populate_array
 
 from planarfriction.kernels.interrupts import heard_between_passes
 
-_DOUBLES = types.CPointer(types.float64)
+_DOUBLES, _FLOATS = types.CPointer(types.float64), types.CPointer(types.float32)
 
 
 @functools.cache
@@ -31,8 +31,8 @@ def address_of(function: Any, words: str) -> int:
 
 
 def place_of(array: np.ndarray) -> int:
-    """Address of the first number of a contiguous array of doubles or integers, which the caller keeps alive."""
-    assert array.dtype in (np.float64, np.int64) and array.flags.c_contiguous
+    """Address of the first number of a contiguous array, floats, doubles or integers, which the caller keeps alive."""
+    assert array.dtype in (np.float32, np.float64, np.int64) and array.flags.c_contiguous
     return array.ctypes.data
 
 
@@ -83,6 +83,18 @@ def doubles(typingctx, address):
         return builder.inttoptr(args[0], ir.DoubleType().as_pointer())
 
     return _DOUBLES(address), generate
+
+
+@intrinsic
+def floats(typingctx, address):
+    """The numbers of single precision at an address."""
+    if not isinstance(address, types.Integer):
+        return None
+
+    def generate(context, builder, signature, args):
+        return builder.inttoptr(args[0], ir.FloatType().as_pointer())
+
+    return _FLOATS(address), generate
 
 
 @intrinsic

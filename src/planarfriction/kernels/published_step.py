@@ -23,7 +23,7 @@ from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import bristle_step, entry, jit, kernel, rollouts
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels.bristle_step import Bristle, BristleStep
-from planarfriction.kernels.pointers import address_of
+from planarfriction.kernels.pointers import address_of, doubles
 from planarfriction.kernels.published_contact import Shape
 from planarfriction.kernels.records import reader
 from planarfriction.kernels.rollouts import Cotangents
@@ -149,7 +149,7 @@ def pull_back(contact, step, slopes, new, wrench):
 @entry
 def step(row, data, inputs, out):
     """See `rollouts.step`."""
-    rollouts.step(shape_of, hold, linearise, row, data, inputs, out)
+    rollouts.step(shape_of, doubles, hold, linearise, row, data, inputs, out)
 
 
 @functools.cache

@@ -15,7 +15,7 @@ from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import entry, kernel
 from planarfriction.kernels.contacts import ModelFunctions
-from planarfriction.kernels.pointers import at, doubles
+from planarfriction.kernels.pointers import at, doubles, floats
 from planarfriction.kernels.records import reader
 from planarfriction.kernels.reduced import closure, closure_partials, part_rate, to_origin, wrench
 from planarfriction.kernels.steady import STILL, evenness, scaled_twist, sliding, steady_slopes
@@ -48,7 +48,7 @@ class ReducedContact(NamedTuple):
     data: int
     """Where the map of steady sliding is (see `kernels.steady`)."""
     other: int
-    """How many doubles further on the other map is."""
+    """How many numbers further on the other map is."""
 
 
 read = reader(ReducedContact)
@@ -63,7 +63,7 @@ def _maps(own):
 def evaluate(contact, z, v, zdot, w):
     """See `ModelFunctions`: `z' = V_G - beta (lambda z + s m)`."""
     own, z, twist, zdot, w = read(contact), doubles(z), doubles(v), doubles(zdot), doubles(w)
-    law, data = own.law, doubles(own.data)
+    law, data = own.law, floats(own.data)
     x, y, s, v, qx, qy, qs = sliding(law, twist[0], twist[1], twist[2], own.shape, _maps(own), data)
     power, per_q2 = x * qx + y * qy + s * qs, 1.0 / (qx * qx + qy * qy + qs * qs)
     decay = v * v / xp.where(power > 0.0, power, 1.0)
@@ -115,7 +115,7 @@ def _slopes(law, z, v, even, lin):
 def linearise(contact, z, v, lin):
     """See `ModelFunctions`; at rest the rates do not depend on z and follow the twist."""
     own, twist, out = read(contact), doubles(v), doubles(lin)
-    law, shape, data = own.law, own.shape, doubles(own.data)
+    law, shape, data = own.law, own.shape, floats(own.data)
     x, y, s = scaled_twist(shape, twist[0], twist[1], twist[2])
     v = math.sqrt(x * x + y * y + s * s)
     if v > STILL:

@@ -26,7 +26,7 @@ from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import entry, jit, kernel, reduced, rollouts
 from planarfriction.kernels.bristle_step import ROUNDING
-from planarfriction.kernels.pointers import address_of
+from planarfriction.kernels.pointers import address_of, floats
 from planarfriction.kernels.records import reader
 from planarfriction.kernels.reduced import to_origin
 from planarfriction.kernels.reduced_contact import Shape
@@ -314,7 +314,7 @@ def pull_back(contact, step, slopes, new, wrench):
 @entry
 def step(row, data, inputs, out):
     """See `rollouts.step`."""
-    rollouts.step(shape_of, hold, linearise, row, data, inputs, out)
+    rollouts.step(shape_of, floats, hold, linearise, row, data, inputs, out)
 
 
 @functools.cache

@@ -109,14 +109,15 @@ def _weighed(wrench, load):
 
 
 @kernel
-def step(shape_of, hold, linearise, row, data, inputs, out):
+def step(shape_of, numbers_at, hold, linearise, row, data, inputs, out):
     """A step of one contact: `inputs` are its z, twist, load and dt [8], `out` the new state and the wrench [6].
 
-    All are addresses. Behind law and shape the row holds the three of `Contact.surface`.
+    All are addresses; `numbers_at(data)` are the numbers of the surface. Behind law and shape the row holds the three
+    of `Contact.surface`.
     """
     shape = shape_of(at(row, LAW))
     last, given, out = doubles(at(row, LAW + len(shape))), doubles(inputs), doubles(out)
-    contact = Contact(law_of(row), shape, (int(last[0]), int(last[1]), int(last[2])), doubles(data))
+    contact = Contact(law_of(row), shape, (int(last[0]), int(last[1]), int(last[2])), numbers_at(data))
     z, twist, load = (given[0], given[1], given[2]), (given[3], given[4], given[5]), given[6]
     result = linearise(contact, hold(contact, twist), z, given[7])
     new, wrench = result.new if load != 0.0 else (0.0, 0.0, 0.0), _weighed(result.wrench, load)

@@ -1,10 +1,11 @@
 """Steady sliding of a patch from a stored map, in scaled coordinates `V_G = F V` (docs/physics.md, "Reduced model").
 
-A map is eight numbers (faces, n, n of the Stribeck part, its levels, knee, least dissipation, stretch, 0), the 15
+A map is eight numbers (faces, n, n of the Stribeck part, its levels, knee, least dissipation, stretch, gamma), the 15
 coefficients of `<u^4>`, u the cells' speeds at V_G or their bristles in a state, then two maps of `kernels.cube`:
-`h_0`, steady sliding at `g = 1`, and the rest r of that at `g = e`, with `e = exp(-|v/v_s|^gamma)`,
+`h_0`, steady sliding at `g = 1`, and the rest r of that at `g = e`, with `e = exp(-|v/v_s|^gamma)`, all of them in
+single precision, so that it stays in the processor's cache,
 
-    sigma_0 z_ss = (mu_s - (mu_s - mu_c) t) h_0 + (mu_s - mu_c) r(t),   t = |V_G| / (|V_G| + knee v_s)
+    sigma_0 z_ss = (mu_s - (mu_s - mu_c) t) h_0 + (mu_s - mu_c) r(t),   t = p/(p + knee),   p = |V_G/v_s|^gamma
 
 The maps are over the directions of `(x, y, stretch s)`: where nearly all of the load is on one point, all that happens
 lies close to the spin, and is drawn apart. The coefficients are those of `m_i m_j`, i <= 3 and j >= i row by row, with
@@ -46,6 +47,12 @@ def scaled_twist(shape, vx, vy, omega):
     return shape[0] * vx + shape[1] * vy + shape[2] * omega, shape[3] * vy + shape[4] * omega, shape[5] * omega
 
 
+@kernel
+def number(data, i):
+    """Number i of a map, in double precision."""
+    return np.float64(data[i])
+
+
 class Steady(NamedTuple):
     """Steady sliding, and its slopes, which the compiler drops where nobody asks for them."""
 
@@ -61,13 +68,12 @@ class Steady(NamedTuple):
 
 
 @kernel
-def _component(law, data, start, spot, places, v, i):
-    """Component i of one map with its slopes: by the direction (3), by v, mu_c, mu_s and v_s."""
-    n, m, count, knee = int(data[start + 1]), int(data[start + 2]), int(data[start + 3]), data[start + 4]
+def _component(law, data, start, spot, places, t, i):
+    """Component i of one map with its slopes: by the direction (3), by t, mu_c and mu_s."""
+    n, m, count = int(data[start + 1]), int(data[start + 2]), int(data[start + 3])
     first = start + HEADER
     second = first + int(data[start]) * (2 * n + 1) * (2 * n + 1) * 12
-    per, drop = 1.0 / (v + knee * law.v_s), law.mu_s - law.mu_c
-    t = v * per
+    drop = law.mu_s - law.mu_c
     outer, (level, w), (p, p_a, p_b), (r, r_a, r_b) = law.mu_s - drop * t, cube.levels(t, count), places[0], places[1]
     flat, rest = cube.read(data, first, n, 3, i, p), cube.read_level(data, second, m, 3, count, i, r, level, w)
     flat_a, flat_b = cube.read(data, first, n, 3, i, p_a), cube.read(data, first, n, 3, i, p_b)
@@ -78,7 +84,7 @@ def _component(law, data, start, spot, places, v, i):
     slopes = cube.gradient(spot, outer * flat_a + drop * rest_a, outer * flat_b + drop * rest_b)
     value = spot.sign * (outer * flat + drop * rest)
     by_mu_c, by_mu_s = spot.sign * (t * flat - rest), spot.sign * ((1.0 - t) * flat + rest)
-    return value, slopes, by_t * knee * law.v_s * per * per, by_mu_c, by_mu_s, -by_t * knee * t * per
+    return value, slopes, by_t, by_mu_c, by_mu_s
 
 
 @kernel
@@ -90,18 +96,20 @@ def _drawn(slope, stretch):
 @kernel
 def _map(law, data, start, u, v):
     """`Steady` of one map."""
-    stretch = data[start + 6]
+    stretch, gamma = number(data, start + 6), number(data, start + 7)
+    t = formulas.stribeck_place(xp, v, law.v_s, gamma, number(data, start + 4))
     spot = cube.locate(u[0], u[1], stretch * u[2], int(data[start]))
     places = cube.squares(spot, int(data[start + 1])), cube.squares(spot, int(data[start + 2]))
     # A literal number would have the function compiled once more.
-    q_x, slope_x, v_x, c_x, s_x, k_x = _component(law, data, start, spot, places, v, np.int64(0))
-    q_y, slope_y, v_y, c_y, s_y, k_y = _component(law, data, start, spot, places, v, np.int64(1))
-    q_s, slope_s, v_s, c_s, s_s, k_s = _component(law, data, start, spot, places, v, np.int64(2))
-    per_v = 1.0 / v
-    by_x, by_y = plus(_drawn(slope_x, stretch), v_x * per_v, u), plus(_drawn(slope_y, stretch), v_y * per_v, u)
-    by_s = plus(_drawn(slope_s, stretch), v_s * per_v, u)
+    q_x, slope_x, t_x, c_x, s_x = _component(law, data, start, spot, places, t, np.int64(0))
+    q_y, slope_y, t_y, c_y, s_y = _component(law, data, start, spot, places, t, np.int64(1))
+    q_s, slope_s, t_s, c_s, s_s = _component(law, data, start, spot, places, t, np.int64(2))
+    v_x, v_y, v_s = by_log_v = times(gamma * t * (1.0 - t), (t_x, t_y, t_s))
+    along, by_v_s = times((1.0 / v) * (1.0 / v), u), times(-1.0 / law.v_s, by_log_v)
+    by_x, by_y = plus(_drawn(slope_x, stretch), v_x, along), plus(_drawn(slope_y, stretch), v_y, along)
+    by_s = plus(_drawn(slope_s, stretch), v_s, along)
     by_u = by_x[0], by_x[1], by_x[2], by_y[0], by_y[1], by_y[2], by_s[0], by_s[1], by_s[2]
-    return Steady((q_x, q_y, q_s), by_u, (c_x, c_y, c_s), (s_x, s_y, s_s), (k_x, k_y, k_s), data[start + 5])
+    return Steady((q_x, q_y, q_s), by_u, (c_x, c_y, c_s), (s_x, s_y, s_s), by_v_s, number(data, start + 5))
 
 
 @kernel
@@ -158,9 +166,16 @@ def steady_slopes(law, shape, surface, data, x, y, s, v, j):
 def _fourth(data, k):
     """The coefficients of `<u^4>`, row by row."""
     return (
-        (data[k], data[k + 1], data[k + 2], data[k + 3], data[k + 4], data[k + 5]),
-        (data[k + 6], data[k + 7], data[k + 8], data[k + 9], data[k + 10]),
-        (data[k + 11], data[k + 12], data[k + 13], data[k + 14]),
+        (
+            number(data, k),
+            number(data, k + 1),
+            number(data, k + 2),
+            number(data, k + 3),
+            number(data, k + 4),
+            number(data, k + 5),
+        ),
+        (number(data, k + 6), number(data, k + 7), number(data, k + 8), number(data, k + 9), number(data, k + 10)),
+        (number(data, k + 11), number(data, k + 12), number(data, k + 13), number(data, k + 14)),
     )
 
 

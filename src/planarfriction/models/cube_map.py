@@ -72,12 +72,21 @@ def level_matrix(count: int) -> np.ndarray:
 
 
 def flat(numbers: np.ndarray, components: int, faces: int) -> np.ndarray:
-    """`hermite`'s numbers, M = levels x components, as `kernels.cube` reads them, slopes per spacing of the nodes."""
+    """`hermite`'s numbers, M = levels x components, as `kernels.cube` reads them, slopes per spacing of the nodes.
+
+    Single precision. What both sides of an edge store is rounded alike, so that values and the slopes along it stay
+    the same; those across it then differ by 1e-7 of them.
+    """
     nodes = numbers.shape[1]
     per = 2.0 / (nodes - 1)
     scaled = numbers[:faces] * np.array([1.0, per, per, per * per])[:, None]
     levels = scaled.shape[-1] // components
-    return scaled.reshape(faces, nodes, nodes, 4, levels, components).transpose(0, 1, 2, 4, 5, 3).ravel()
+    return (
+        scaled.reshape(faces, nodes, nodes, 4, levels, components)
+        .transpose(0, 1, 2, 4, 5, 3)
+        .ravel()
+        .astype(np.float32)
+    )
 
 
 def _coordinates(n: int, ghosts: int = 0) -> np.ndarray:

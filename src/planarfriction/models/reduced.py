@@ -161,9 +161,9 @@ class ReducedModel(ThreeStateModel):
         factors = np.array([shape.factor for shape in shapes])[:, *np.triu_indices(3)]
         numbers = np.column_stack([factors, [shape.blend for shape in shapes]])
         record = ReducedContact(self.law.numbers, Shape(*numbers[0]), 0, 0)
-        rows = rows_of(record, len(shapes), shape=numbers, data=data, other=(other - data) // 8)
-        natural = np.full(3, self.law.largest_deflection)
         kept = tuple(maps.values())
+        rows = rows_of(record, len(shapes), shape=numbers, data=data, other=(other - data) // kept[0].itemsize)
+        natural = np.full(3, self.law.largest_deflection)
         return PackedModel(reduced_contact.FUNCTIONS, rows, 3, reduced_contact.LINEAR, natural, radius, kept)
 
     def _maps(self, shape: ReducedShape) -> tuple[np.ndarray, np.ndarray]:

@@ -35,7 +35,7 @@ class ReducedNumbers(NamedTuple):
     quartic: Any
     """Coefficients of `<u^4>` `[15]` (see `kernels.steady`)."""
     scale: Any
-    """Knee, least dissipation and stretch `[3]`."""
+    """Knee, least dissipation, stretch and gamma `[4]`."""
     flat: Any
     """`h_0` over the nodes of the cube, `[faces, 2 n + 1, 2 n + 1, 3, 4]`."""
     rest: Any
@@ -71,7 +71,7 @@ def numbers_of(factor, data, sizes: MapSizes) -> ReducedNumbers:
     return ReducedNumbers(
         factor,
         data[QUARTIC:HEADER],
-        data[4:7],
+        data[4:8],
         data[HEADER:middle].reshape(faces, 2 * n + 1, 2 * n + 1, 3, 4),
         data[middle:].reshape(faces, 2 * m + 1, 2 * m + 1, levels, 3, 4),
     )
@@ -166,8 +166,8 @@ def held(xp, law: LawNumbers, shape: ReducedNumbers, twist) -> Held:
     safe = xp.where(moves, u, 1.0)
     v = xp.root(dot(safe, safe))
     n = safe / v
-    knee, least = shape.scale[0], shape.scale[1]
-    q = _sliding(xp, law, shape, n, v / (v + knee * law.v_s))
+    knee, least, _, gamma = shape.scale
+    q = _sliding(xp, law, shape, n, formulas.stribeck_place(xp, v, law.v_s, gamma, knee))
     power = dot(q, n)
     q = (q + (formulas.floored(xp, power, law.mu_c * least) - power) * n) / law.sigma_0
     power, per_q2 = dot(q, n), 1.0 / dot(q, q)

@@ -13,8 +13,8 @@ from planarfriction.models import cube_map
 from planarfriction.models.steady_sums import ScaledCells, ScaledPoint
 from planarfriction.patch import ContactPatch
 
-KNEE = 1.5
-"""`|V_G|/v_s` at the middle of the Stribeck part's third coordinate: the best of 0.5..3 on the published patches."""
+KNEE = 3.0
+"""`|V_G/v_s|^gamma` at the middle of the Stribeck part's third coordinate: the best of 2..6 on published patches."""
 
 POINT = 1e-6
 """Share of the load beside its heaviest cell up to which a contact is a point, without torque about it."""
@@ -30,7 +30,7 @@ class ReducedShape(NamedTuple):
     factor: np.ndarray
     """F [3, 3], upper triangular: `|F V|` is the root mean square of the cells' speeds."""
     data: np.ndarray
-    """Steady sliding, as `kernels.steady` reads it."""
+    """Steady sliding, as `kernels.steady` reads it: single precision, which a map's own error exceeds 30 times."""
     other: np.ndarray | None = None
     """Steady sliding of another shape to blend with, or None."""
     blend: float = 0.0
@@ -129,19 +129,20 @@ def reduced_map(cells: ScaledCells | ScaledPoint, gamma: float, segments: int, s
     `r = h_1 - (1 - t) h_0` of the Stribeck part, which is smooth, a third of them, with `speeds` nodes in t.
     """
     coarse, faces = max(segments // 3, 2), 6 if cells.asymmetric else 3
-    per_stretch = np.array([1.0, 1.0, 1.0 / cells.stretch])
+    stretch = float(np.float32(cells.stretch))
+    per_stretch = np.array([1.0, 1.0, 1.0 / stretch])
     directions = cube_map.face_nodes(segments)[:faces] * per_stretch
     steady = cells.sums(directions, np.empty(0), gamma)
     unit = directions / np.linalg.norm(directions, axis=-1, keepdims=True)
     least = float(np.einsum("fijc,fijc->fij", steady[..., 0, :], unit).min())
     t = np.linspace(0.0, 1.0, speeds)
-    relative = KNEE * t[1:-1] / (1.0 - t[1:-1])
-    sums = cells.sums(cube_map.face_nodes(coarse)[:faces] * per_stretch, relative**gamma, gamma)
+    raised = KNEE * t[1:-1] / (1.0 - t[1:-1])
+    sums = cells.sums(cube_map.face_nodes(coarse)[:faces] * per_stretch, raised, gamma)
     rest = np.zeros((*sums.shape[:-2], speeds, 3))
     rest[..., 1:-1, :] = sums[..., 1:, :] - (1.0 - t[1:-1, None]) * sums[..., :1, :]
     levels = np.einsum("lt,fijtc->fijlc", cube_map.level_matrix(speeds), rest, optimize=True)
-    header = np.zeros(HEADER)
-    header[:7] = faces, segments, coarse, speeds + 2, KNEE, LEAST_SHARE * least, cells.stretch
+    header = np.zeros(HEADER, dtype=np.float32)
+    header[:8] = faces, segments, coarse, speeds + 2, KNEE, LEAST_SHARE * least, stretch, gamma
     header[QUARTIC:] = cells.fourth_moments()
     return np.concatenate([header, *(_numbers(values) for values in (steady, levels))])
 

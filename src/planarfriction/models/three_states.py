@@ -244,7 +244,7 @@ class ThreeStateModel(FrictionModel):
         That is the row of a contact, with the integers of its surface or maps at the end, and the numbers of these.
         """
         surface, data = self._maps(part.shape)
-        row, data = np.array([*self._row(part.shape), *surface]), np.ascontiguousarray(data, dtype=float)
+        row, data = np.array([*self._row(part.shape), *surface]), np.ascontiguousarray(data)
         place = Place(self._kernels.step_address(), place_of(row), place_of(data), part.share)
         return row_of(place), row, data
 
