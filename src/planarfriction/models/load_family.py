@@ -24,7 +24,7 @@ REMEMBERED = 4096
 """Loads whose shapes a family remembers."""
 
 MEMORY = 512e6
-"""Bytes of maps beyond which a family forgets all that it has built; default ones take 2 MB each."""
+"""Bytes of maps beyond which a family forgets all that it has built; default ones take 1 MB each."""
 
 
 class LoadFamily:
