@@ -218,7 +218,7 @@ def _compiled_loop(model: ReducedModel | ReducedModelPublished, twists: np.ndarr
     from planarfriction.autodiff.parameters import pack
     from planarfriction.kernels.rollouts import Inputs
 
-    rows, surface, data, family = pack(model)
+    ((rows, surface, data, family, _),) = pack(model)
     steps = len(twists)
     inputs = Inputs(rows[None], surface, data, twists[None], np.ones((1, steps)), np.full(steps, 1e-4))
     z, wrench, states = np.zeros((1, 3)), np.empty((1, steps, 3)), np.empty((1, 0, 3))

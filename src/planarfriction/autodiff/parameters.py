@@ -62,7 +62,7 @@ REDUCED = _family_of(reduced_step, tuple(name for name in PARAMETERS[:8] if name
 
 
 class Packed(NamedTuple):
-    """A reduced model as compiled loops see it."""
+    """A part of a reduced model as compiled loops see it; most models have one."""
 
     rows: np.ndarray
     """`[..., N]`, batch axes as those of the parameters."""
@@ -71,6 +71,8 @@ class Packed(NamedTuple):
     data: np.ndarray
     """Numbers of the limit surface or of the map, flat."""
     family: Family = PUBLISHED
+    share: float = 1.0
+    """Of the load."""
 
 
 def parameter_names(model: Any) -> tuple[str, ...]:
@@ -84,20 +86,26 @@ def parameter_names(model: Any) -> tuple[str, ...]:
 
 def parameters_of(model: Any) -> np.ndarray:
     """Parameters of a reduced model, shape `[P]`; plain bristles have a breakaway ratio without effect."""
-    packed = pack(model)
+    packed = pack(model)[0]
     return packed.rows[packed.family.columns]
 
 
-def pack(model: Any, parameters: Any = None) -> Packed:
-    """The model as compiled loops see it, with `parameters` `[..., P]` instead of its own if given.
+def pack(model: Any, parameters: Any = None) -> tuple[Packed, ...]:
+    """The parts of a model as compiled loops see them, with `parameters` `[..., P]` instead of its own if given.
 
     A friction coefficient `mu_s` below `mu_c`, which a law refuses, is let through: the formulas are smooth there.
     A model that is packed already, as the tensor front ends hold them, is taken as it is.
     """
-    packed = model if isinstance(model, Packed) else _packed(model)
+    if isinstance(model, Packed):
+        model = (model,)
+    packed = model if isinstance(model, tuple) else _packed(model)
     if parameters is None:
         return packed
-    values = _checked(parameters, packed.family.names)
+    values = _checked(parameters, packed[0].family.names)
+    return tuple(_with(part, values) for part in packed)
+
+
+def _with(packed: Packed, values: np.ndarray) -> Packed:
     row = np.broadcast_to(packed.rows, (*values.shape[:-1], packed.rows.shape[-1])).copy()
     row[..., packed.family.columns] = values
     return packed._replace(rows=row)
@@ -115,12 +123,10 @@ def has_one_shape(model: Any) -> bool:
     """Whether a model is a reduced one that compiled roll-outs know: isotropic, and with one shape for all loads."""
     if not isinstance(model, ReducedModel | ReducedModelPublished) or model.patch.anisotropic:
         return False
-    if getattr(model, "parts", 1) > 1:
-        return False
     return not model.patch.depends_on_load or getattr(model, "on_load_change", None) == "keep"
 
 
-def _packed(model: Any) -> Packed:
+def _packed(model: Any) -> tuple[Packed, ...]:
     _family(model)
     how = getattr(model, "on_load_change", None)
     if model.patch.depends_on_load and how != "keep":
@@ -131,7 +137,7 @@ def _packed(model: Any) -> Packed:
             f"on_load_change={how!r}" if how else "a patch that depends on the load",
         )
     refuse_anisotropy(model.patch, "derivatives of roll-outs")
-    return pack_shape(model.law.numbers, model.shape_at(1.0))
+    return tuple(pack_shape(model.law.numbers, shape)._replace(share=share) for share, shape in model.parts_at(1.0))
 
 
 def pack_shape(law: LawNumbers, shape: ReducedShape | PublishedShape) -> Packed:

@@ -41,7 +41,7 @@ class RolloutStates(NamedTuple):
     wrenches: np.ndarray
     """As in `Rollout`."""
     states: np.ndarray
-    """State before each step, `[..., T, 3]`."""
+    """State before each step, `[..., T, *state_shape]`."""
 
 
 @by_parts
@@ -69,11 +69,11 @@ class RolloutGradient(NamedTuple):
 class _Inputs(NamedTuple):
     """Checked inputs; B contacts in all, one row where all contacts share an input."""
 
-    packed: Packed
-    rows: np.ndarray
-    """[B or 1, N]"""
+    parts: tuple[Packed, ...]
+    rows: list[np.ndarray]
+    """[B or 1, N] of each part."""
     state: np.ndarray
-    """[B, 3]"""
+    """[P, B, 3]"""
     twist: np.ndarray
     """[B or 1, T, 3]"""
     normal_force: np.ndarray
@@ -81,6 +81,16 @@ class _Inputs(NamedTuple):
     dt: np.ndarray
     """[T]"""
     batch: tuple[int, ...]
+
+    def shaped(self, values: np.ndarray, *inner: int) -> np.ndarray:
+        """Values of each part and contact `[P, B, *inner, 3]` as `[*batch, *inner, P, 3]`; of one part without."""
+        each = values[0] if len(values) == 1 else np.moveaxis(values, 0, -2)
+        return each.reshape(*self.batch, *inner, *self.inner)
+
+    @property
+    def inner(self) -> tuple[int, ...]:
+        """Shape of the state of one contact."""
+        return _inner(self.parts)
 
 
 def rollout(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, *, parameters: Any = None) -> Rollout:
@@ -95,13 +105,13 @@ def rollout(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, *, p
     Raises `InvalidValueError` for wrong shapes, for numbers out of range, and for `parameters` of a model that cannot
     take them.
     """
-    if not isinstance(model, FrictionModel | Packed):
+    if not isinstance(model, FrictionModel | Packed | tuple):
         raise InvalidValueError("model", f"be a friction model ({MODELS.classes()})", type(model).__name__)
     if parameters is None and isinstance(model, FrictionModel) and not has_one_shape(model):
         return _stepped(model, state, twist, normal_force, dt)
     inputs = _checked(model, state, twist, normal_force, dt, parameters)
     end, wrenches, _ = _roll(inputs, 0)
-    return Rollout(end.reshape(*inputs.batch, 3), wrenches.reshape(*inputs.batch, *wrenches.shape[1:]))
+    return Rollout(inputs.shaped(end), wrenches)
 
 
 def rollout_states(
@@ -110,10 +120,7 @@ def rollout_states(
     """`rollout` of a reduced model with the state before each step, which saves `rollout_gradient` half of its way."""
     inputs = _checked(model, state, twist, normal_force, dt, parameters)
     end, wrenches, states = _roll(inputs, len(inputs.dt))
-    batch = inputs.batch
-    return RolloutStates(
-        end.reshape(*batch, 3), wrenches.reshape(*batch, *wrenches.shape[1:]), states.reshape(*batch, *states.shape[1:])
-    )
+    return RolloutStates(inputs.shaped(end), wrenches, inputs.shaped(states, len(inputs.dt)))
 
 
 def rollout_gradient(
@@ -131,36 +138,39 @@ def rollout_gradient(
     """Gradient of `sum(wrenches_bar wrenches) + sum(state_bar state)` of a `rollout` with respect to its inputs.
 
     The discrete adjoint: exact for the steps taken, at a few times the cost of the roll-out whatever the number of
-    inputs. `wrenches_bar` `[..., T, 3]` and `state_bar` `[..., 3]` (None: zero) broadcast. An input that several
-    contacts share gets the sum of theirs. `states`: those of `rollout_states`, if kept. At zero load the gradient with
-    respect to that load is the one-sided one.
+    inputs. `wrenches_bar` `[..., T, 3]` and `state_bar` `[..., *state_shape]` (None: zero) broadcast. An input that
+    several contacts share gets the sum of theirs. `states`: those of `rollout_states`, if kept. At zero load the
+    gradient with respect to that load is the one-sided one.
 
     Raises `InvalidValueError` as `rollout` does, and for a model that is not a reduced one of fixed shape.
     """
     inputs = _checked(model, state, twist, normal_force, dt, parameters)
-    count, steps = len(inputs.state), len(inputs.dt)
+    count, steps, inner = inputs.state.shape[1], len(inputs.dt), inputs.inner
     cotangents = _rows("wrenches_bar", wrenches_bar, (steps, 3), inputs.batch)
-    on_the_way = _roll(inputs, steps)[2] if states is None else _rows("states", states, (steps, 3), inputs.batch)
-    z_bar = np.zeros((count, 3))
+    if states is None:
+        on_the_way = _roll(inputs, steps)[2]
+    else:
+        on_the_way = _by_part(_rows("states", states, (steps, *inner), inputs.batch), len(inputs.parts))
+    z_bar = np.zeros_like(inputs.state)
     if state_bar is not None:
-        z_bar[:] = _rows("state_bar", state_bar, (3,), inputs.batch)
-    twist_bar, load_bar = np.empty((count, steps, 3)), np.empty((count, steps))
-    rows_bar = np.zeros((count, inputs.packed.rows.shape[-1]))
-    family = inputs.packed.family
-    bars = Bars(z_bar, twist_bar, load_bar, rows_bar)
-    packed = _kernel_inputs(inputs)
-    _share(inputs, lambda first, last: family.gradient(packed, on_the_way, cotangents, (first, last), bars))
-    given = parameters if parameters is not None else inputs.packed.rows[..., family.columns]
+        z_bar[:] = _by_part(_rows("state_bar", state_bar, inner, inputs.batch), len(inputs.parts))
+    columns, shapes = (
+        inputs.parts[0].family.columns,
+        ((count, steps, 3), (count, steps), (count, inputs.rows[0].shape[-1])),
+    )
+
+    def run(k: int, part: Packed, packed: Inputs, *own: np.ndarray) -> None:
+        pulls, bars = part.share * cotangents, Bars(z_bar[k], *own)
+        _share(packed, count, lambda *span: part.family.gradient(packed, on_the_way[k], pulls, span, bars))
+
+    twist_bar, load_bar, rows_bar = _summed(inputs, shapes, run)
+    given = parameters if parameters is not None else inputs.parts[0].rows[..., columns]
+    start = np.empty(inner) if state is None else state
     return RolloutGradient(
-        *(
-            _sum_to(np.shape(value), gradient.reshape(*inputs.batch, *gradient.shape[1:]))
-            for value, gradient in (
-                (np.empty(3) if state is None else state, z_bar),
-                (twist, twist_bar),
-                (normal_force, load_bar),
-                (given, rows_bar[:, family.columns]),
-            )
-        )
+        _sum_to(np.shape(start), inputs.shaped(z_bar)),
+        _sum_to(np.shape(twist), twist_bar),
+        _sum_to(np.shape(normal_force), load_bar),
+        _sum_to(np.shape(given), rows_bar[..., columns]),
     )
 
 
@@ -180,26 +190,50 @@ def rollout_sensitivities(
     of `parameter_names`, None for all.
     """
     inputs = _checked(model, state, twist, normal_force, dt, parameters)
-    family = inputs.packed.family
+    family, count, steps = inputs.parts[0].family, inputs.state.shape[1], len(inputs.dt)
     known = family.names
     chosen = [known.index(name) for name in (known if names is None else validation.choices("names", names, known))]
     columns = family.columns[np.array(chosen, dtype=int)]
-    wrenches = np.empty((len(inputs.state), len(inputs.dt), 3))
-    slopes = np.empty((*wrenches.shape, len(columns)))
-    end = inputs.state.copy()
-    packed = _kernel_inputs(inputs)
-    _share(inputs, lambda first, last: family.sensitivities(packed, (first, last), end, columns, wrenches, slopes))
-    shaped = (array.reshape(*inputs.batch, *array.shape[1:]) for array in (end, wrenches, slopes))
-    return RolloutSensitivities(*shaped)
+    end, shapes = inputs.state.copy(), ((count, steps, 3), (count, steps, 3, len(columns)))
+
+    def run(k: int, part: Packed, packed: Inputs, wrenches: np.ndarray, slopes: np.ndarray) -> None:
+        _share(packed, count, lambda *span: part.family.sensitivities(packed, span, end[k], columns, wrenches, slopes))
+        wrenches *= part.share
+        slopes *= part.share
+
+    wrenches, slopes = _summed(inputs, shapes, run)
+    return RolloutSensitivities(inputs.shaped(end), wrenches, slopes)
 
 
 def _roll(inputs: _Inputs, kept: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """States at the end `[B, 3]`, wrenches `[B, T, 3]` and, with `kept = T` rather than 0, states before each step."""
-    count, end = len(inputs.state), inputs.state.copy()
-    wrenches, states = np.empty((count, len(inputs.dt), 3)), np.empty((count, kept, 3))
-    packed, family = _kernel_inputs(inputs), inputs.packed.family
-    _share(inputs, lambda first, last: family.rollout(packed, (first, last), end, wrenches, states))
+    """States at the end `[P, B, 3]`, wrenches `[..., T, 3]`, and with `kept = T` the states before each step.
+
+    These are `[P, B, T, 3]`; `kept = 0` for none.
+    """
+    end, count = inputs.state.copy(), inputs.state.shape[1]
+    states = np.empty((len(end), count, kept, 3))
+
+    def run(k: int, part: Packed, packed: Inputs, wrenches: np.ndarray) -> None:
+        _share(packed, count, lambda *span: part.family.rollout(packed, span, end[k], wrenches, states[k]))
+        wrenches *= part.share
+
+    (wrenches,) = _summed(inputs, ((count, len(inputs.dt), 3),), run)
     return end, wrenches, states
+
+
+def _summed(inputs: _Inputs, shapes: Sequence[tuple[int, ...]], run: Callable[..., None]) -> list[np.ndarray]:
+    """Sums over the parts, which know nothing of each other, of what `run` writes into zeros of `shapes` `[B, ...]`.
+
+    It is given the number of the part, the part, the `Inputs` of its compiled loops, and the arrays.
+    """
+    total = [np.zeros(shape) for shape in shapes]
+    for k, (part, rows) in enumerate(zip(inputs.parts, inputs.rows, strict=True)):
+        own = [np.zeros(shape) for shape in shapes] if k > 0 else total
+        run(k, part, Inputs(rows, part.surface, part.data, inputs.twist, inputs.normal_force, inputs.dt), *own)
+        if k > 0:
+            for sums, values in zip(total, own, strict=True):
+                sums += values
+    return [values.reshape(*inputs.batch, *values.shape[1:]) for values in total]
 
 
 def _stepped(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any) -> Rollout:
@@ -217,12 +251,6 @@ def _stepped(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any) -> 
     for t, held in enumerate(dt):
         state, wrenches[..., t, :] = model.step(state, twist[..., t, :], load[..., t], held)
     return Rollout(np.array(state), wrenches)
-
-
-def _kernel_inputs(inputs: _Inputs) -> Inputs:
-    """The inputs as compiled loops take them."""
-    packed = inputs.packed
-    return Inputs(inputs.rows, packed.surface, packed.data, inputs.twist, inputs.normal_force, inputs.dt)
 
 
 # ---------------------------------------------------------------------- shapes and threads
@@ -244,10 +272,12 @@ def _sequences(twist: Any, normal_force: Any, dt: Any) -> tuple[np.ndarray, np.n
 
 
 def _checked(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, parameters: Any) -> _Inputs:
-    packed = pack(model, parameters)
-    state = np.zeros(3) if state is None else validation.numbers("state", state)
-    if state.shape[-1:] != (3,):
-        raise InvalidValueError("state", "have shape [..., 3]", f"shape {list(state.shape)}")
+    parts = pack(model, parameters)
+    inner = _inner(parts)
+    state = np.zeros(inner) if state is None else validation.numbers("state", state)
+    if state.shape[-len(inner) :] != inner:
+        wanted = ", ".join(map(str, inner))
+        raise InvalidValueError("state", f"have shape [..., {wanted}]", f"shape {list(state.shape)}")
     twist, load, dt = _sequences(twist, normal_force, dt)
     steps = len(dt)
     for name, value in {"state": state, "twist": twist, "normal_force": load, "dt": dt}.items():
@@ -255,21 +285,31 @@ def _checked(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, par
     for name, value in {"normal_force": load, "dt": dt}.items():
         if value.min(initial=0.0) < 0.0:
             raise InvalidValueError(name, "be >= 0", float(value.min()))
-    axes = state.shape[:-1], twist.shape[:-2], load.shape[:-1], packed.rows.shape[:-1]
+    axes = state.shape[: -len(inner)], twist.shape[:-2], load.shape[:-1], parts[0].rows.shape[:-1]
     try:
         batch = np.broadcast_shapes(*axes)
     except ValueError:
         raise InvalidValueError("batch axes", "broadcast", f"shapes {', '.join(str(list(a)) for a in axes)}") from None
     count = int(np.prod(batch))
     return _Inputs(
-        packed,
-        _rows("parameters", packed.rows, packed.rows.shape[-1:], batch),
-        np.broadcast_to(state, (*batch, 3)).reshape(count, 3),
+        parts,
+        [_rows("parameters", part.rows, part.rows.shape[-1:], batch) for part in parts],
+        _by_part(np.broadcast_to(state, (*batch, *inner)).reshape(count, *inner), len(parts)),
         _rows("twist", twist, (steps, 3), batch),
         _rows("normal_force", load, (steps,), batch),
         np.require(dt, float, ["C", "W", "A"]),
         batch,
     )
+
+
+def _inner(parts: tuple[Packed, ...]) -> tuple[int, ...]:
+    """Shape of the state of one contact."""
+    return (3,) if len(parts) == 1 else (len(parts), 3)
+
+
+def _by_part(values: np.ndarray, parts: int) -> np.ndarray:
+    """States of contacts `[B, ..., P, 3]`, of one part `[B, ..., 3]`, as those of each part `[P, B, ..., 3]`."""
+    return values[None] if parts == 1 else np.ascontiguousarray(np.moveaxis(values, -2, 0))
 
 
 def _rows(name: str, value: Any, inner: tuple[int, ...], batch: tuple[int, ...]) -> np.ndarray:
@@ -293,9 +333,8 @@ def _sum_to(shape: tuple[int, ...], gradient: np.ndarray) -> np.ndarray:
     return gradient.sum(axis=kept, keepdims=True) if kept else gradient
 
 
-def _share(inputs: _Inputs, work: Callable[[int, int], None]) -> None:
+def _share(inputs: Inputs, count: int, work: Callable[[int, int], None]) -> None:
     """Run `work(first, last)` over all contacts, on several threads where that pays."""
-    count = len(inputs.state)
     available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     threads = max(1, min(available, count, count * len(inputs.dt) // _WORTH_A_THREAD))
     if threads == 1:
