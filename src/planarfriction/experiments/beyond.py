@@ -13,9 +13,11 @@ from planarfriction.experiments import beyond_figures as figures
 from planarfriction.experiments import beyond_in_hand as in_hand
 from planarfriction.experiments import beyond_ladder as ladder
 from planarfriction.experiments import beyond_others as others
+from planarfriction.experiments import beyond_shapes as new_shapes
 from planarfriction.experiments import beyond_surfaces as surfaces
 from planarfriction.experiments import beyond_tables as tables
 from planarfriction.experiments import beyond_words as words
+from planarfriction.experiments.beyond_ladder_figure import draw_ladder
 from planarfriction.experiments.experiment import Arrays, Picture, Result, Work
 from planarfriction.experiments.in_hand_figures import end_shifts
 from planarfriction.experiments.runs import IN_WORDS, SIX_SHAPES
@@ -25,6 +27,8 @@ SHAPES = (*SIX_SHAPES, "LineGradX")
 QUICK_SHAPES = ("LineGrad", "NonConvex2")
 
 QUICK_TWISTS = 500
+
+NEW_SHAPES, QUICK_NEW_SHAPES, QUICK_SEEDS = tuple(new_shapes.shapes()), ("three feet",), (0, 1)
 
 
 def run(work: Work) -> Result:
@@ -42,6 +46,13 @@ def run(work: Work) -> Result:
         "staircase": surfaces.staircase,
     }
     pieces = work.pieces(single)
+    unseen = work.pieces(
+        {
+            f"new shapes, {name}": _new_shape(name, work.quick)
+            for name in (QUICK_NEW_SHAPES if work.quick else NEW_SHAPES)
+        }
+    )
+    unseen = {name.removeprefix("new shapes, "): each for name, each in unseen.items()}
     # one after the other: these are measured with a clock
     times = work.piece("time of runs", lambda: _times_of(shapes))
     rows = [dataclasses.replace(row, time=float(times[f"{row.case}|{row.model}"])) for row in rows]
@@ -54,6 +65,7 @@ def run(work: Work) -> Result:
         "grooves": grooved,
         "load family": {name: float(value) for name, value in family.items()},
         "step": costs,
+        "new shapes": {name: new_shapes.ratios(each) for name, each in unseen.items()},
     }
     return Result(
         findings=words.findings(numbers),
@@ -62,10 +74,11 @@ def run(work: Work) -> Result:
             *surfaces.comparisons(errors, pieces["staircase"]),
             *driven.comparisons(numbers["driven"]),
             *in_hand.comparisons(numbers["in hand"]),
+            *new_shapes.comparisons(unseen),
             *others.comparisons(numbers["plateaus"], grooved),
         ],
         numbers=numbers,
-        tables=tables.tables(rows, numbers),
+        tables=(*tables.tables(rows, numbers), new_shapes.table(unseen)),
     )
 
 
@@ -81,7 +94,7 @@ def _pictures(
         Picture("surface_staircase", words.STAIRCASE, figures.staircase(stairs)),
         Picture("driven_models", words.DRIVEN, figures.driven_boxes(numbers["driven"])),
         Picture("in_hand_ends", words.IN_HAND, end_shifts(ends)),
-        Picture("ladder", words.LADDER, figures.ladder_map(rows)),
+        Picture("ladder", words.LADDER, draw_ladder(rows)),
         Picture("grooves", words.GROOVES, figures.grooves(numbers["grooves"])),
     ]
 
@@ -93,6 +106,10 @@ def _surface_of(shape: str, quick: bool) -> Callable[[], dict[str, Any]]:
     with_quartic = surfaces.has_quartic() and shape in surfaces.QUARTIC_SHAPES
     kinds = tuple(name for name in surfaces.KINDS if name != "quartic" or with_quartic)
     return lambda: surfaces.surface_errors(shape, QUICK_TWISTS if quick else surfaces.TWISTS, kinds)
+
+
+def _new_shape(name: str, quick: bool) -> Callable[[], dict[str, Any]]:
+    return lambda: new_shapes.largest_errors(name, QUICK_SEEDS if quick else new_shapes.SEEDS)
 
 
 def _runs_of(shape: str) -> Callable[[], dict[str, Any]]:
@@ -141,8 +158,13 @@ def _numbers(rows: list[ladder.Row], found: dict[str, Arrays], errors: dict[str,
         "quartic installed": surfaces.has_quartic(),
         "driven": moved,
         "driven ratios": driven.ratios(moved),
+        "driven ratios, auto": driven.ratios(moved, ladder.AUTO),
+        "driven ratios, parts": driven.ratios(moved, ladder.AUTO, "reduced"),
         "in hand": ends,
-        "in hand score": {f"load {load}": in_hand.score(ends, load) for load in (1, 2)},
+        "in hand score": {
+            model: {f"load {load}": in_hand.score(ends, load, model) for load in (1, 2)}
+            for model in ("reduced", ladder.AUTO)
+        },
         "run costs": _run_costs(rows),
     }
 

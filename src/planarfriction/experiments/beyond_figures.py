@@ -1,4 +1,4 @@
-"""Figures beyond the paper: errors of surfaces, the staircase, errors of models, error against cost, grooves."""
+"""Figures beyond the paper: errors of surfaces, the staircase, errors of models, grooves."""
 
 from __future__ import annotations
 
@@ -8,20 +8,15 @@ import numpy as np
 
 from planarfriction.experiments import velocity_driven_boxes as boxes
 from planarfriction.experiments.beyond_driven import MODELS, Errors
-from planarfriction.experiments.beyond_ladder import Row
 from planarfriction.experiments.beyond_others import GROOVED_MODELS, closed_drift
 from planarfriction.experiments.beyond_surfaces import KINDS
-from planarfriction.experiments.beyond_tables import model_words
 from planarfriction.experiments.experiment import Arrays
 from planarfriction.experiments.runs import IN_WORDS
 from planarfriction.plots.style import LINE_STYLES, PALETTE, PlotFigure, new_figure, tidy
 
 COLOURS = dict(zip(KINDS, (PALETTE[1], PALETTE[0], PALETTE[6], PALETTE[3], PALETTE[4]), strict=True))
 
-MODEL_COLOURS = dict(zip(MODELS, (PALETTE[1], PALETTE[0], "0.45"), strict=True))
-
-FLOOR = 1e-4
-"""Smallest distance of an end that the map shows [mm]."""
+MODEL_COLOURS = dict(zip(MODELS, (PALETTE[1], PALETTE[5], PALETTE[0], "0.45"), strict=True))
 
 
 def surface_errors(errors: dict[str, Arrays]) -> PlotFigure:
@@ -112,10 +107,10 @@ def driven_boxes(errors: Errors) -> PlotFigure:
     for axes, (before, factor, label, linear) in zip(panels, rows, strict=True):
         axes.set_yscale("symlog", linthresh=linear, linscale=0.4)
         for place, each in enumerate(errors.values()):
-            for offset, (model, colour) in zip((-0.22, 0.0, 0.22), MODEL_COLOURS.items(), strict=True):
+            for offset, (model, colour) in zip((-0.3, -0.1, 0.1, 0.3), MODEL_COLOURS.items(), strict=True):
                 values = [factor * each[model][before + name] for name in boxes.COLUMNS]
                 box: dict[str, float] = dict(zip(("whislo", "q1", "med", "q3", "whishi"), values[:5], strict=True))
-                _box(axes, place + offset, box, colour, 0.17)
+                _box(axes, place + offset, box, colour, 0.16)
                 axes.plot(place + offset, values[5], marker="x", ms=5, mew=1.4, color=colour)
         axes.set(ylabel=label, ylim=(0.0, None))
         tidy(axes)
@@ -123,47 +118,8 @@ def driven_boxes(errors: Errors) -> PlotFigure:
     panels[1].set_xticks(range(len(errors)), [IN_WORDS[shape] for shape in errors])
     figure.align_ylabels(panels)
     handles = [_patch(colour, MODELS[model]) for model, colour in MODEL_COLOURS.items()] + [_cross()]
-    figure.legend(handles=handles, loc="outside upper center", ncols=4, frameon=False)
+    figure.legend(handles=handles, loc="outside upper center", ncols=5, frameon=False, fontsize="small")
     return figure
-
-
-def ladder_map(rows: list[Row]) -> PlotFigure:
-    """Error against cost of every model: velocity-driven (third quartile of the force error), in hand (end)."""
-    figure = new_figure(9.8, 4.9)
-    panels: Any = figure.subplots(1, 2)
-    models = list(dict.fromkeys(row.model for row in rows))
-    markers = dict(zip(models, "D^vsoPhX", strict=False))
-    for axes, quantity, title in (
-        (panels[0], "third quartile", "velocity-driven"),
-        (panels[1], "end", "in hand"),
-    ):
-        for i, model in enumerate(models):
-            points = [
-                (row.time, 1e3 * row.errors[quantity])
-                for row in rows
-                if row.model == model and quantity in row.errors and not (quantity == "end" and model == "full")
-            ]
-            if points:
-                cost, error = np.array(points).T
-                error = np.maximum(error, FLOOR)
-                look: dict[str, Any] = {"ls": "", "marker": markers[model], "color": PALETTE[i % len(PALETTE)]}
-                axes.plot(cost, error, ms=4.0, alpha=0.4, **look)
-                axes.plot(np.median(cost), np.median(error), ms=10.0, mec="white", **look)
-        axes.set(xscale="log", yscale="log", xlabel="time in the solver over the distributed model's [-]", title=title)
-        axes.title.set_fontsize("medium")
-        tidy(axes)
-    panels[0].set_ylabel("error of the force, third quartile [mN]")
-    panels[1].set_ylabel("end, from the distributed model [mm]")
-    panels[1].axvline(1.0, color="0.6", lw=1.0, ls=":")
-    handles = [_marker(markers[model], PALETTE[i % len(PALETTE)], model_words(model)) for i, model in enumerate(models)]
-    figure.legend(handles=handles, loc="outside upper center", ncols=3, frameon=False, fontsize="small")
-    return figure
-
-
-def _marker(marker: str, colour: str, label: str) -> Any:
-    from matplotlib.lines import Line2D
-
-    return Line2D([], [], ls="", marker=marker, ms=7, color=colour, label=label)
 
 
 def grooves(numbers: dict[str, Any]) -> PlotFigure:

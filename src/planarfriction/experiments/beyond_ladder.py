@@ -1,9 +1,8 @@
-"""Error against cost between 3 bristle states and 882: the reduced model, compressed patches, the whole grid."""
+"""Error against cost between 3 bristle states and 882: reduced models, their parts, few cells, the whole grid."""
 
 from __future__ import annotations
 
 import functools
-import statistics
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -22,6 +21,12 @@ from planarfriction.scenes.ready import driven, in_hand, in_hand_load
 DEGREES = (3, 5)
 """Degrees of the compressed patches: 28 and 45 cells."""
 
+PARTS = (1, 4, 6, 16)
+"""Parts of `ReducedModel`."""
+
+AUTO = "auto"
+"""As many parts as the model takes by itself, and the name of that model."""
+
 CASES = (
     *(Case(shape, load) for shape in (*SIX_SHAPES, "LineGradX") for load in (1, 2)),
     *(Case("Circle", load, 2) for load in (1, 2)),
@@ -36,7 +41,7 @@ REFERENCE_CELLS = 2100
 
 LEAST_PARTS, MOST_PARTS = 3, 33
 
-REPEATS, LONG, SHORT = 1, 0.05, 0.02
+REPEATS, LONG, SHORT = 3, 0.05, 0.02
 """A run is timed once and, if it takes less than LONG [s], so many times more; a short one before does not count."""
 
 
@@ -46,7 +51,7 @@ class Row:
 
     case: str
     model: str
-    """"published", the same with another surface, "reduced", "full", or "degree d"."""
+    """"published", the same with another surface, "reduced", "n parts", "auto", "degree d", or "full"."""
     states: int
     """Bristle states."""
     errors: dict[str, float]
@@ -54,20 +59,28 @@ class Row:
     statistics of a box plot (`boxes.COLUMNS`) of the error of the force [N] and, as "torque median" and so on, of the
     torque [N m] at the centre of pressure, from a finer grid."""
     time: float = float("nan")
-    """Median time in the solver at the default tolerances over that of the full model; `run_times` measures it."""
+    """Time in the solver at the default tolerances over that of the full model; `run_times` measures it."""
 
 
-def models(patch: ContactPatch, degrees: tuple[int, ...] = DEGREES) -> dict[str, Any]:
-    """The models of a patch by name, each number of cells once."""
+@functools.lru_cache(maxsize=8)
+def models(shape: str) -> dict[str, Any]:
+    """The models of a published patch by name, each number of cells once; kept, for fitting few cells takes seconds.
+
+    `AUTO` is one of the others by another name, where its number of parts is among `PARTS`.
+    """
+    patch = PUBLISHED_PATCHES[shape]()
     result: dict[str, Any] = {
         "full": DistributedModel(patch, LAW),
         "published": ReducedModelPublished(patch, LAW),
         "published, smooth": ReducedModelPublished(patch, LAW, surface=LimitSurfaceTable(patch)),
         "published, ellipsoid": ReducedModelPublished(patch, LAW, surface=LimitSurfaceEllipsoid(patch)),
-        "reduced": ReducedModel(patch, LAW),
     }
+    parts = {count: ReducedModel(patch, LAW, parts=count) for count in PARTS}
+    result |= {name_of_parts(count): model for count, model in parts.items()}
+    auto = ReducedModel(patch, LAW, parts=AUTO)
+    result[AUTO] = parts.get(auto.parts, auto)
     sizes = {patch.cells}
-    for degree in degrees:
+    for degree in DEGREES:
         few = patch.compressed(degree)
         if few.cells not in sizes:
             sizes.add(few.cells)
@@ -75,14 +88,13 @@ def models(patch: ContactPatch, degrees: tuple[int, ...] = DEGREES) -> dict[str,
     return result
 
 
-@functools.lru_cache(maxsize=8)
-def _models_of(shape: str, degrees: tuple[int, ...]) -> dict[str, Any]:
-    """`models` of a published patch, once for all its runs: fitting the few cells takes seconds."""
-    return models(PUBLISHED_PATCHES[shape](), degrees)
+def name_of_parts(parts: Any) -> str:
+    """Name of `ReducedModel` with so many parts, or with `AUTO`."""
+    return {1: "reduced", AUTO: AUTO}.get(parts, f"{parts} parts")
 
 
-def _scenes(shape: str) -> dict[str, Callable[[Any], Scene]]:
-    """What makes the scenes of a shape from a model, by case."""
+def scenes_of(shape: str) -> dict[str, Callable[[Any], Scene]]:
+    """What makes the scene of each run of a shape from a model, by case."""
     result: dict[str, Callable[[Any], Scene]] = {}
     for case in CASES:
         if case.shape == shape:
@@ -94,16 +106,15 @@ def _scenes(shape: str) -> dict[str, Callable[[Any], Scene]]:
     return result | ({f"driven, {shape}": driven} if shape in SIX_SHAPES else {})
 
 
-def in_hand_rows(cases: tuple[Case, ...] = CASES, degrees: tuple[int, ...] = DEGREES) -> list[Row]:
+def in_hand_rows(cases: tuple[Case, ...] = CASES) -> list[Row]:
     """Every model in every in-hand run, against the full distributed model of the same grid."""
     rows = []
     for case in cases:
-        scene = _scenes(case.shape)[case.words]
-        whole: dict[str, np.ndarray] = {}
-        for name, model in _models_of(case.shape, degrees).items():
-            run = columns(simulate(scene(model), **CLOSE))
-            whole = whole or run
-            apart = distance(run, whole)
+        scene = scenes_of(case.shape)[case.words]
+        run = functools.cache(lambda model, scene=scene: columns(simulate(scene(model), **CLOSE)))
+        whole = run(models(case.shape)["full"])
+        for name, model in models(case.shape).items():
+            apart = distance(run(model), whole)
             errors = {"position": float(apart.max()), "end": float(apart[-1])}
             rows.append(Row(case.words, name, int(np.prod(model.state_shape)), errors))
     return rows
@@ -116,15 +127,16 @@ def reference(patch: ContactPatch) -> ContactPatch:
     return patch.refined(int(np.clip((int(most) - 1) // 2 * 2 + 1, LEAST_PARTS, MOST_PARTS)))
 
 
-def driven_rows(shapes: tuple[str, ...] = SIX_SHAPES, degrees: tuple[int, ...] = DEGREES) -> list[Row]:
+def driven_rows(shapes: tuple[str, ...] = SIX_SHAPES) -> list[Row]:
     """Every model in the velocity-driven runs, against the distributed model of a finer grid."""
     rows = []
     for shape in shapes:
         patch = PUBLISHED_PATCHES[shape]()
         fine = columns(simulate(driven(DistributedModel(reference(patch), LAW))))
         wanted = at_centre_of_pressure(fine, patch)
-        for name, model in _models_of(shape, degrees).items():
-            miss = (at_centre_of_pressure(columns(simulate(driven(model))), patch) - wanted)[1:]
+        run = functools.cache(lambda model: columns(simulate(driven(model))))
+        for name, model in models(shape).items():
+            miss = (at_centre_of_pressure(run(model), patch) - wanted)[1:]
             named = {"": np.hypot(miss[:, 0], miss[:, 1]), "torque ": np.abs(miss[:, 2])}
             errors = {
                 before + statistic: value
@@ -135,17 +147,18 @@ def driven_rows(shapes: tuple[str, ...] = SIX_SHAPES, degrees: tuple[int, ...] =
     return rows
 
 
-def run_times(shape: str, degrees: tuple[int, ...] = DEGREES) -> dict[tuple[str, str], float]:
-    """Median time in the solver over that of the full model, by case and model; nothing else should run beside it."""
+def run_times(shape: str) -> dict[tuple[str, str], float]:
+    """Time in the solver over that of the full model, by case and model; nothing else should run beside it."""
     result = {}
-    for case, scene in _scenes(shape).items():
-        times = {name: _time(scene(model)) for name, model in _models_of(shape, degrees).items()}
+    for case, scene in scenes_of(shape).items():
+        time_of = functools.cache(lambda model, scene=scene: _time(scene(model)))
+        times = {name: time_of(model) for name, model in models(shape).items()}
         result |= {(case, name): value / times["full"] for name, value in times.items()}
     return result
 
 
 def _time(scene: Scene) -> float:
-    """Median time in the solver [s]."""
+    """Least time in the solver [s] of a few runs: other work beside them only ever adds to it."""
     simulate(scene, t_end=SHORT)
     first = simulate(scene).statistics.wall_time
-    return statistics.median([first, *(simulate(scene).statistics.wall_time for _ in range(REPEATS * (first < LONG)))])
+    return min([first, *(simulate(scene).statistics.wall_time for _ in range(REPEATS * (first < LONG)))])

@@ -5,15 +5,19 @@ from __future__ import annotations
 import statistics
 from typing import Any
 
-from planarfriction.experiments.beyond_driven import STEP_TARGET, TARGETS
+from planarfriction.experiments.beyond_driven import STATISTICS
 from planarfriction.experiments.beyond_in_hand import SHIFT, depends_on_friction
+from planarfriction.experiments.beyond_ladder import AUTO
 from planarfriction.experiments.beyond_others import GROOVED_MODELS
+from planarfriction.experiments.beyond_shapes import QUANTITIES
 from planarfriction.experiments.beyond_surfaces import QUARTIC_SHAPES
 from planarfriction.experiments.runs import IN_WORDS
 
 Numbers = dict[str, Any]
 
 FRICTION = "0.1 % of friction"
+
+PARTS = '`ReducedModel` with parts="auto"'
 
 SURFACES = (
     "Error of every kind of limit surface from the exact one, mu f_N = 1 N: box from first to third "
@@ -33,8 +37,10 @@ IN_HAND = (
     "does to the end."
 )
 LADDER = (
-    "Error against cost: small markers are single runs, large ones the medians of a model. Left: velocity-driven, from "
-    "a converged grid. Right: in hand, from the distributed model, which stands at the dotted line."
+    "Error against the time of a run in the solver, each family of models a line: medians over the patches of a row, "
+    "bars from the smallest to the largest. Numbers: parts of `ReducedModel`, cells of the distributed model. Left: "
+    "velocity-driven, from a converged grid. Middle and right: in hand, from the distributed model of all cells, which "
+    "stands at the dotted line."
 )
 GROOVES = "A block with a grooved sole on inclines: where it drifts to from rest, beside the closed form."
 
@@ -43,7 +49,8 @@ def findings(numbers: Numbers) -> list[str]:
     """What was done and what it shows, from the numbers of this run."""
     return [
         _surfaces(numbers["surfaces"], numbers["jumps"], numbers["quartic installed"]),
-        _driven(numbers["driven ratios"], numbers["step"], numbers["run costs"]),
+        _driven(numbers),
+        _new_shapes(numbers["new shapes"]),
         _in_hand(numbers["in hand"], numbers["in hand score"]),
         _plateaus(numbers["plateaus"]),
         _ladder(numbers["run costs"], numbers["driven"], numbers["in hand"]),
@@ -75,40 +82,85 @@ def _surfaces(errors: Numbers, jumps: dict[str, float], with_quartic: bool) -> s
     )
 
 
-def _driven(ratios: dict[str, dict[str, float]], step: dict[str, float], costs: dict[str, float]) -> str:
-    worst = {name: max(each[name] for each in ratios.values()) for name in TARGETS}
-    best = {name: min(each[name] for each in ratios.values()) for name in TARGETS}
-    aimed = ", ".join(
-        f"{name} {best[name]:.2f} to {worst[name]:.2f} (aimed at {share:g} or less)" for name, share in TARGETS.items()
-    )
-    torque, peak = ([each[f"torque {name}"] for each in ratios.values()] for name in ("median", "maximum"))
-    verdict = "within" if step["ratio"] <= STEP_TARGET else "above"
+def _driven(numbers: Numbers) -> str:
+    one, auto, over = (numbers[f"driven ratios{ending}"] for ending in ("", ", auto", ", parts"))
+    step, costs = numbers["step"], numbers["run costs"]
+    worse = {shape: [name for name, value in each.items() if value > 1.05] for shape, each in over.items()}
+    except_for = "; ".join(f"{IN_WORDS[shape]}: {', '.join(names)}" for shape, names in worse.items() if names)
     return (
         "Moved with a given velocity. The reference is the distributed model with its cells cut finely; the reduced "
-        "model as published sees the grid's table, `ReducedModel` the moments of the bristle field. Its error of the "
-        f"force, over the published model's on {len(ratios)} shapes: {aimed}; of the torque, median: {min(torque):.3f} "
-        f"to {max(torque):.3f}; its largest, just after the velocity jumps: {min(peak):.2f} to {max(peak):.2f}. "
-        f"A step costs {step['ratio']:.2f} times a published one in a compiled loop "
-        f"({1e6 * step['reduced [s]']:.2f} µs; {verdict} the {STEP_TARGET:g} aimed at); a whole run "
-        f"{costs['reduced'] / costs['published']:.2f} times, for the solver picks its own steps. The distributed model "
-        "of 21 x 21 cells is no reference here: its own staircase is often the largest error of the three. Much of the "
-        "gain is that of the exact table: see the published model with LimitSurfaceTable in the table of combinations."
+        "model as published sees the grid's table, `ReducedModel` the moments of the bristle field. Its error over "
+        f"the published model's on {len(one)} shapes: {_ranges(one)}; the largest of the torque comes just after the "
+        f'velocity jumps. With parts="auto": {_ranges(auto)}. {_more_than_one_part(except_for)} '
+        f"A step costs {_times(step, 'reduced')} times a published one in a compiled loop "
+        f"({1e6 * step['reduced']:.2f} µs), one of four parts {_times(step, '4 parts')} and one of six "
+        f"{_times(step, '6 parts')} times; a whole run {costs['reduced'] / costs['published']:.2f} and with "
+        f'parts="auto" {costs[AUTO] / costs["published"]:.2f} times, for the solver picks its own steps. The '
+        "distributed model of 21 x 21 cells is no reference here: its own staircase is often the largest error of all. "
+        "Much of the gain is that of the exact table: see the published model with LimitSurfaceTable in the table of "
+        "combinations."
     )
+
+
+def _ranges(ratios: dict[str, dict[str, float]]) -> str:
+    """From the best shape to the worst, by statistic."""
+    words = []
+    for before in ("", "torque "):
+        spans = []
+        for name in STATISTICS:
+            values = [each[before + name] for each in ratios.values()]
+            spans.append(f"{name} {min(values):.2g} to {max(values):.2g}")
+        words.append(f"{before.strip() or 'force'} {', '.join(spans)}")
+    return "; ".join(words)
+
+
+def _new_shapes(ratios: Numbers) -> str:
+    def worst(model: str) -> str:
+        return ", ".join(
+            f"{quantity} {max(max(each[model][quantity]) for each in ratios.values()):.2f}" for quantity in QUANTITIES
+        )
+
+    twists = len(next(iter(ratios.values()))["reduced"]["force"])
+    return (
+        f"Patches that no table holds ({', '.join(ratios)}), moved by {twists} smooth random twists each. The largest "
+        f"errors over the published model's in the same run, at worst: one part {worst('reduced')}; four parts "
+        f"{worst('4 parts')}; {PARTS} {worst(AUTO)}."
+    )
+
+
+def _more_than_one_part(except_for: str) -> str:
+    """What parts do to the errors of one part."""
+    if not except_for:
+        return "No statistic is more than 5 % worse than with one part."
+    return f"More than 5 % worse than with one part are only: {except_for}."
+
+
+def _times(step: dict[str, float], model: str) -> str:
+    return f"{step[model] / step['published']:.2f}"
 
 
 def _in_hand(ends: dict[str, dict[str, float]], score: Numbers) -> str:
+    shares = {name: _friction_shares(ends, name) for name in ("reduced", AUTO, "published")}
+    return (
+        "In hand, distances of the end from the distributed model's. "
+        f"{_nearer(score['reduced'], '`ReducedModel`')} {_nearer(score[AUTO], PARTS)} Under load 1 "
+        "the grip barely passes the threshold, and sections of the patch creep before the whole slips: one part does "
+        "not hold that, each of several breaks away by itself. In units of friction, over the runs that depend on it, "
+        f"`ReducedModel` is off by what {shares['reduced'][0]:.2%} (median) to {shares['reduced'][1]:.2%} (most) of "
+        f'friction would do, with parts="auto" by {shares[AUTO][0]:.2%} to {shares[AUTO][1]:.2%}, the published model '
+        f"by {shares['published'][0]:.2%} to {shares['published'][1]:.2%}."
+    )
+
+
+def _nearer(score: Numbers, who: str) -> str:
+    """In how many runs it ends nearer than the published model, by load."""
     first, second = score["load 1"], score["load 2"]
     worse = [case for case, ratio in second["ratios"].items() if ratio >= 1.0]
     except_for = f" (not: {'; '.join(worse)})" if worse else ""
-    shares = {name: _friction_shares(ends, name) for name in ("reduced", "published")}
     return (
-        f"In hand, `ReducedModel` ends nearer to the distributed model than the published one in {second['nearer']} of "
-        f"{second['runs']} runs under load 2{except_for}; ratios of the distances {_spread(second['ratios'])}. Under "
-        f"load 1 it is nearer in {first['nearer']} of {first['runs']}, ratios {_spread(first['ratios'])}: there the "
-        "grip barely passes the threshold, sections of the patch creep before the whole slips, and three states do not "
-        "hold that. In units of friction, over the runs that depend on it, "
-        f"`ReducedModel` is off by what {shares['reduced'][0]:.2%} (median) to {shares['reduced'][1]:.2%} (most) of "
-        f"friction would do, the published model by {shares['published'][0]:.2%} to {shares['published'][1]:.2%}."
+        f"{who} ends nearer than the published model in {second['nearer']} of {second['runs']} runs under load "
+        f"2{except_for}, ratios {_spread(second['ratios'])}; under load 1 in {first['nearer']} of {first['runs']}, "
+        f"ratios {_spread(first['ratios'])}."
     )
 
 
@@ -135,17 +187,20 @@ def _plateaus(angles: dict[str, float]) -> str:
 
 
 def _ladder(costs: dict[str, float], driven: Numbers, ends: dict[str, dict[str, float]]) -> str:
-    few = {case: each for case, each in ends.items() if "degree 5" in each}
-    moved = {shape: each for shape, each in driven.items() if "degree 5" in each}
-    quartile = [each["degree 5"]["third quartile"] / each["full"]["third quartile"] for each in moved.values()]
+    few = [each for each in ends.values() if "degree 5" in each]
+    moved = [each for each in driven.values() if "degree 5" in each]
+    quartile = [each["degree 5"]["third quartile"] / each["full"]["third quartile"] for each in moved]
+
+    def worst(model: str) -> str:
+        return f"{1e3 * max(each[model] for each in few):.2f} mm"
+
     return (
         "Between 3 bristles and 882. On the patches with more than 45 cells, 45 compressed ones end at most "
-        f"{1e3 * max(each['degree 5'] for each in few.values()):.2f} mm from the full grid in hand (published reduced: "
-        f"{1e3 * max(each['published'] for each in few.values()):.2f} mm, `ReducedModel`: "
-        f"{1e3 * max(each['reduced'] for each in few.values()):.2f} mm), in {costs['degree 5']:.2f} of its time. Moved "
-        f"with a given velocity they are {min(quartile):.1f} to {max(quartile):.1f} times as far from the converged "
-        "grid as the full one (third quartile of the force): the staircase of few cells is coarse. "
-        "They are for breaking away, `ReducedModel` is for sliding."
+        f"{worst('degree 5')} from the full grid in hand (published reduced: {worst('published')}, `ReducedModel`: "
+        f'{worst("reduced")}, with parts="auto": {worst(AUTO)}, 16 parts: {worst("16 parts")}), in '
+        f"{costs['degree 5']:.2f} of its time. Moved with a given velocity they are {min(quartile):.1f} to "
+        f"{max(quartile):.1f} times as far from the converged grid as the full one (third quartile of the force): the "
+        "staircase of few cells is coarse, and parts have none."
     )
 
 
