@@ -11,7 +11,7 @@ import planarfriction as pf
 from planarfriction import autodiff
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch, SoftFinger
-from planarfriction.patch.parts import automatic, labels_of, part_of, split
+from planarfriction.patch.parts import automatic, kurtosis, labels_of, part_of, split
 from planarfriction.scenes import simulate
 
 PLAIN, ELASTIC = pf.LuGre(mu_s=1.2), pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
@@ -67,8 +67,25 @@ def test_even_patches_fall_into_equal_parts():
 
 def test_auto_gives_more_parts_to_slender_and_separate_shapes():
     chosen = {name: automatic(patch.positions, patch.weights()) for name, patch in PATCHES.items()}
-    assert {name for name, parts in chosen.items() if parts == 4} == {"Circle", "Square", "off centre"}
-    assert set(chosen.values()) == {4, 6}
+    assert {name for name, parts in chosen.items() if parts == 4} == {"Circle", "Square"}
+    assert {name for name, parts in chosen.items() if parts == 8} == {"off centre"}  # a peak on a disc
+    assert set(chosen.values()) == {4, 6, 8}
+
+
+def test_auto_gives_most_parts_where_the_pressure_peaks():
+    def cone(x, y):
+        return max(0.0, 1.0 - np.hypot(x - 0.002, y) / 0.007)
+
+    even, peaked = ContactPatch.rectangle(0.02), ContactPatch.rectangle(0.02, pressure=cone)
+    assert [automatic(patch.positions, patch.weights()) for patch in (even, peaked)] == [4, 8]
+    # 100 cells across: sums are within 1e-3 of integrals, the rim of the disc, in steps, within 5e-3
+    square, disc = ContactPatch.rectangle(0.02, cells=100), ContactPatch.disc(0.01, cells=100)
+    for patch, expected, within in ((square, 5.6, 1e-3), (disc, 16.0 / 3.0, 5e-3)):
+        leaning = patch.positions @ [[1.0, 0.3], [0.0, 0.5]]
+        assert kurtosis(leaning, patch.weights()) == pytest.approx(expected, rel=within)
+
+
+def test_few_cells_are_all_parts():
     assert [automatic(np.eye(n, 2), np.ones(n)) for n in (1, 2, 3, 4, 5)] == [1, 2, 3, 4, 4]
 
 

@@ -54,7 +54,7 @@ class ReducedModel(ThreeStateModel):
     _: KW_ONLY
     parts: Any = 1
     """Compact parts with moments and a map each: a count up to the cells that carry load, or "auto", which is taken as
-    6 for slender or separate shapes, else 4."""
+    6 for slender or separate shapes, 8 for others whose pressure peaks, else 4."""
     segments: int = 24
     """Squares of the map along a quarter of a face of its cube; 24 leave errors of 1e-5 (median) of z_ss."""
     speeds: int = 14
