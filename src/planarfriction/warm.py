@@ -85,6 +85,7 @@ def _roll(model: Any) -> None:
     autodiff.rollout(model, *arguments)
     autodiff.rollout_gradient(model, *arguments, np.ones((2, 3)))
     autodiff.rollout_sensitivities(model, *arguments)
+    autodiff.rollout_tangent(model, *arguments)
 
 
 def _surfaces(patch: ContactPatch) -> None:

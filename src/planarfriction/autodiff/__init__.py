@@ -1,8 +1,9 @@
 """Roll-outs with their exact derivatives: what the tensor front ends and identification build on.
 
-`rollout` steps a model through given twists and loads; of a reduced model, `rollout_gradient` is its discrete adjoint
-and `rollout_sensitivities` its forward derivatives. Both are derivatives of the steps themselves, not of the continuous
-model, so that they agree with differences of `rollout` to rounding. Kinks: `planarfriction.kernels.bristle_step`.
+`rollout` steps a model through given twists and loads; of a reduced model, `rollout_gradient` is its discrete adjoint,
+`rollout_tangent` its change along given changes of the inputs, and `rollout_sensitivities` the derivatives of each
+wrench by the parameters. All are derivatives of the steps themselves, not of the continuous model, so that they agree
+with differences of `rollout` to rounding. Kinks: `planarfriction.kernels.bristle_step`.
 """
 
 from planarfriction.autodiff.parameters import PARAMETERS, parameter_names, parameters_of
@@ -11,10 +12,12 @@ from planarfriction.autodiff.rollouts import (
     RolloutGradient,
     RolloutSensitivities,
     RolloutStates,
+    RolloutTangent,
     rollout,
     rollout_gradient,
     rollout_sensitivities,
     rollout_states,
+    rollout_tangent,
 )
 from planarfriction.autodiff.scene import SCENE_PARAMETERS, SceneSensitivities, scene_sensitivities
 
@@ -25,6 +28,7 @@ __all__ = [
     "RolloutGradient",
     "RolloutSensitivities",
     "RolloutStates",
+    "RolloutTangent",
     "SceneSensitivities",
     "parameter_names",
     "parameters_of",
@@ -32,5 +36,6 @@ __all__ = [
     "rollout_gradient",
     "rollout_sensitivities",
     "rollout_states",
+    "rollout_tangent",
     "scene_sensitivities",
 ]

@@ -46,12 +46,13 @@ class Family(NamedTuple):
     rollout: Callable[..., None]
     gradient: Callable[..., None]
     sensitivities: Callable[..., None]
+    tangent: Callable[..., None]
     """Compiled loops (see `kernels.rollouts`)."""
 
 
 def _family_of(kernels: Any, names: tuple[str, ...], many: Any) -> Family:
     columns = np.array([kernels.NAMES.index(name) for name in names])
-    return Family(names, columns, many.rollout, many.gradient, kernels.sensitivities)
+    return Family(names, columns, many.rollout, many.gradient, kernels.sensitivities, kernels.tangent)
 
 
 PUBLISHED = _family_of(published_step, PARAMETERS, published_rollout)
@@ -151,13 +152,13 @@ def pack_shape(law: LawNumbers, shape: ReducedShape | PublishedShape) -> Packed:
 
 def pack_map(elasto_plastic: bool, factor: np.ndarray, data: np.ndarray) -> Packed:
     """`ReducedModel` by its F and its map, for roll-outs at given parameters, which take the place of those here."""
-    return pack_shape(_any_law(elasto_plastic), ReducedShape(factor, np.asarray(data, dtype=np.float32)))
+    return pack_shape(_any_law(elasto_plastic), ReducedShape(factor, np.ascontiguousarray(data, dtype=np.float32)))
 
 
 def pack_surface(elasto_plastic: bool, kind: int, size: int, data: np.ndarray) -> Packed:
     """`ReducedModelPublished` by its limit surface, for roll-outs at given parameters of law and shape."""
     row = np.array([*_any_law(elasto_plastic), *np.zeros(len(published_step.NAMES) - len(LawNumbers._fields))])
-    return Packed(row, np.array([kind, 0, size]), data, PUBLISHED)
+    return Packed(row, np.array([kind, 0, size]), np.ascontiguousarray(data, dtype=float), PUBLISHED)
 
 
 def _any_law(elasto_plastic: bool) -> LawNumbers:

@@ -171,3 +171,10 @@ def sensitivities(inputs, span, z, columns, wrenches, slopes):
     work = np.empty(rollouts.SCRATCH), np.empty((6, 7 + len(NAMES))), np.empty((6, columns.shape[0]))
     results = wrenches, slopes
     rollouts.sensitivities(shape_of, hold_slopes, linearise, pull_back, inputs, span, z, columns, results, work)
+
+
+@jit
+def tangent(inputs, span, z, changes, wrenches, slopes):
+    """See `rollouts.tangent`."""
+    work = np.empty(rollouts.SCRATCH), np.empty((6, 7 + len(NAMES)))
+    rollouts.tangent(shape_of, hold_slopes, linearise, pull_back, inputs, span, z, changes, (wrenches, slopes), work)

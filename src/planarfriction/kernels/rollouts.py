@@ -63,7 +63,7 @@ class Inputs(NamedTuple):
 
 
 class Bars(NamedTuple):
-    """Cotangents of the inputs of B roll-outs."""
+    """Cotangents of the inputs of B roll-outs, or changes of them."""
 
     state: np.ndarray
     """Comes in as that of the state at the end, [B, 3]."""
@@ -307,3 +307,38 @@ def sensitivities(shape_of, hold_slopes, linearise, pull_back, inputs, span, z, 
                 for i in range(3):
                     slopes[b, t, i, p] = change[3 + i, p]
         put(z[b], own)
+
+
+@kernel
+def tangent(shape_of, hold_slopes, linearise, pull_back, inputs, span, z, changes, results, work):
+    """Roll-outs with their change along given ones of the inputs, forward in time.
+
+    `changes` of the inputs: as `Bars`, one row where all contacts share one; that of the state, and `z`, in place.
+    `results`: wrenches [B, T, 3] and their changes; `work`: arrays [SCRATCH], [6, 7 + N].
+    """
+    (wrenches, slopes), (scratch, here) = results, work
+    for b in range(span[0], span[1]):
+        twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
+        turns, pushes = changes.twist[row_of(changes.twist, b)], changes.load[row_of(changes.load, b)]
+        row = changes.rows[row_of(changes.rows, b)]
+        contact = _contact(shape_of, inputs.rows[row_of(inputs.rows, b)], inputs.surface, inputs.data)
+        own, moved = three(z[b]), three(changes.state[b])
+        for t in range(inputs.dt.shape[0]):
+            load, turn = loads[t], three(turns[t])
+            step = _jacobian(
+                hold_slopes, linearise, pull_back, contact, own, three(twists[t]), load, inputs.dt[t], scratch, here
+            )
+            own = step.new if load != 0.0 else (0.0, 0.0, 0.0)
+            put(wrenches[b, t], _weighed(step.wrench, load))
+            new = (0.0, 0.0, 0.0)
+            for i in range(6):
+                change = dot(three(here[i]), moved) + dot(three(here[i, 3:]), turn) + here[i, 6] * pushes[t]
+                for m in range(row.shape[0]):
+                    change += here[i, 7 + m] * row[m]
+                if i < 3:
+                    new = new[1], new[2], change
+                else:
+                    slopes[b, t, i - 3] = change
+            moved = new
+        put(z[b], own)
+        put(changes.state[b], moved)

@@ -1,4 +1,7 @@
-"""The compiled roll-out and its discrete adjoint as functions of PyTorch: processor tensors, first derivatives."""
+"""The compiled roll-out with its derivatives, backwards and forwards, as functions of PyTorch.
+
+For tensors on the processor, and first derivatives.
+"""
 
 from __future__ import annotations
 
@@ -48,6 +51,7 @@ class _Rollout(torch.autograd.Function):
         ctx.pack, ctx.dt, ctx.kept = inputs[:3]
         ctx.mark_non_differentiable(output[2])
         ctx.save_for_backward(*inputs[3:], output[2])
+        ctx.save_for_forward(*inputs[3:])
 
     @staticmethod
     def backward(ctx, *bars):
@@ -56,6 +60,16 @@ class _Rollout(torch.autograd.Function):
         given = (*inputs, *bars[:2], states) if ctx.kept else (*inputs, *bars[:2])
         slopes: Any = _Gradient.apply(ctx.pack, ctx.dt, len(given), *given, *buffers)
         return None, None, None, *slopes, *(None for _ in buffers)
+
+    @staticmethod
+    def jvp(ctx, *tangents):
+        inputs, buffers = ctx.saved_tensors[:_INPUTS], ctx.saved_tensors[_INPUTS:]
+        changes = (
+            torch.zeros_like(x) if dot is None else dot
+            for x, dot in zip(inputs, tangents[3 : 3 + _INPUTS], strict=True)
+        )
+        found: Any = _Tangent.apply(ctx.pack, ctx.dt, *inputs, *changes, *buffers)
+        return *found, None
 
     @staticmethod
     def vmap(info, in_dims, pack, dt, kept, *tensors):
@@ -89,6 +103,8 @@ class _Gradient(torch.autograd.Function):
     def backward(ctx, *bars):
         raise FrictionError(_TWICE)
 
+    jvp = backward
+
     @staticmethod
     def vmap(info, in_dims, pack, dt, count, *tensors):
         size, dims = info.batch_size, in_dims[3:]
@@ -100,13 +116,41 @@ class _Gradient(torch.autograd.Function):
         return tuple(g.reshape(size, *shape) for g, shape in zip(gradients, shapes, strict=True)), (0,) * _INPUTS
 
 
+class _Tangent(torch.autograd.Function):
+    """Changes of last state and wrenches along those of the inputs, which follow these; itself without derivative."""
+
+    @staticmethod
+    def forward(pack: Pack, dt, *tensors):
+        (state, twist, load, parameters, *changes), model = _numbers(pack, tensors, 2 * _INPUTS)
+        found = autodiff.rollout_tangent(model, state, twist, load, dt, *changes, parameters=parameters)
+        return tuple(_like(array, tensors[:_INPUTS]) for array in found[2:])
+
+    @staticmethod
+    def setup_context(ctx, inputs, output):
+        pass
+
+    @staticmethod
+    def backward(ctx, *bars):
+        raise FrictionError(_TWICE)
+
+    jvp = backward
+
+    @staticmethod
+    def vmap(info, in_dims, pack, dt, *tensors):
+        size, dims, count = info.batch_size, in_dims[2:], 2 * _INPUTS
+        if any(dim is not None for dim in dims[count:]):
+            return _one_by_one(_Tangent, size, dims, (pack, dt), tensors)
+        aligned = _aligned(size, dims[:count], tensors[:count], _INNER * 2)
+        return _Tangent.apply(pack, dt, *aligned, *tensors[count:]), (0, 0)
+
+
 _TWICE = "the adjoint gives first derivatives: take method='eager' to differentiate twice"
 
 
 def _numbers(pack: Pack, tensors, count: int) -> tuple[list[Any], Packed]:
     """The first `count` tensors in NumPy, and the model from its buffers behind them."""
-    arrays = [_to_numpy(tensor) for tensor in tensors]
-    return arrays[:count], pack(*arrays[count:])
+    inputs = [tensor.detach().to(torch.float64).numpy() for tensor in tensors[:count]]
+    return inputs, pack(*(buffer.detach().numpy() for buffer in tensors[count:]))
 
 
 def _one_by_one(function: Any, size: int, dims, fixed: tuple, tensors) -> tuple[tuple[Tensor, ...], tuple[int, ...]]:
@@ -117,10 +161,6 @@ def _one_by_one(function: Any, size: int, dims, fixed: tuple, tensors) -> tuple[
     ]
     together = tuple(torch.stack(part) for part in zip(*parts, strict=True))
     return together, (0,) * len(together)
-
-
-def _to_numpy(tensor: Tensor):
-    return tensor.detach().to(torch.float64).numpy()
 
 
 def _like(array, tensors) -> Tensor:

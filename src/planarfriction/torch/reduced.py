@@ -38,7 +38,7 @@ class ReducedModel(FrictionModel):
     factor: Tensor
     """F `[3, 3]`."""
     map: Tensor
-    """Steady sliding, flat."""
+    """Steady sliding, flat; in single precision, as compiled roll-outs read it."""
     gamma: Tensor
     """Stribeck exponent that the map is made for [-]."""
 
@@ -62,7 +62,7 @@ class ReducedModel(FrictionModel):
         shape = models.ReducedModel(patch, law, segments=segments, speeds=speeds, load_error=0.0).shape_at(normal_force)
         self.sizes = reduced_arrays.sizes_of(shape.data)
         self.register_buffer("factor", torch.tensor(shape.factor, **kind))
-        self.register_buffer("map", torch.tensor(shape.data, **kind))
+        self.register_buffer("map", torch.tensor(shape.data, device=device))
         numbers = law.numbers._asdict()
         self.register_buffer("gamma", torch.tensor(numbers["gamma"], **kind))
         self._adopt({name: numbers[name] for name in PARAMETERS}, trainable, shape.contact_radius, **kind)

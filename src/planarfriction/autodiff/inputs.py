@@ -1,0 +1,153 @@
+"""Inputs of roll-outs as compiled loops take them: checked, contact by contact and part by part; and threads."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.autodiff.parameters import Packed, pack
+from planarfriction.errors import InvalidValueError
+from planarfriction.kernels.rollouts import Inputs
+
+_WORTH_A_THREAD = 20_000
+"""Steps [-] below which starting a thread costs more than it saves."""
+
+
+class RolloutInputs(NamedTuple):
+    """Checked inputs; B contacts in all, one row where all contacts share an input."""
+
+    parts: tuple[Packed, ...]
+    rows: list[np.ndarray]
+    """[B or 1, N] of each part."""
+    state: np.ndarray
+    """[P, B, 3]"""
+    twist: np.ndarray
+    """[B or 1, T, 3]"""
+    normal_force: np.ndarray
+    """[B or 1, T]"""
+    dt: np.ndarray
+    """[T]"""
+    batch: tuple[int, ...]
+
+    def shaped(self, values: np.ndarray, *inner: int) -> np.ndarray:
+        """Values of each part and contact `[P, B, *inner, 3]` as `[*batch, *inner, P, 3]`; of one part without."""
+        each = values[0] if len(values) == 1 else np.moveaxis(values, 0, -2)
+        return each.reshape(*self.batch, *inner, *self.inner)
+
+    @property
+    def inner(self) -> tuple[int, ...]:
+        """Shape of the state of one contact."""
+        return inner_of(self.parts)
+
+
+def sequences(twist: Any, normal_force: Any, dt: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Twists `[..., T, 3]`, loads `[..., T]` and steps `[T]`."""
+    twist, load, dt = (
+        validation.numbers(n, v) for n, v in (("twist", twist), ("normal_force", normal_force), ("dt", dt))
+    )
+    if twist.ndim < 2 or twist.shape[-1] != 3:
+        raise InvalidValueError("twist", "have shape [..., T, 3]", f"shape {list(twist.shape)}")
+    steps = twist.shape[-2]
+    if load.ndim and load.shape[-1] not in (1, steps):
+        raise InvalidValueError("normal_force", f"broadcast with [..., {steps}]", f"shape {list(load.shape)}")
+    if dt.ndim and dt.shape != (steps,):
+        raise InvalidValueError("dt", f"be one number or have shape [{steps}]", f"shape {list(dt.shape)}")
+    return twist, np.broadcast_to(load, (*load.shape[:-1], steps)), np.broadcast_to(dt, steps)
+
+
+def checked(
+    model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, parameters: Any, more: Sequence[tuple] = ()
+) -> RolloutInputs:
+    """Inputs of a roll-out; `more`: batch axes of what else belongs to it."""
+    parts = pack(model, parameters)
+    inner = inner_of(parts)
+    state = np.zeros(inner) if state is None else validation.numbers("state", state)
+    if state.shape[-len(inner) :] != inner:
+        wanted = ", ".join(map(str, inner))
+        raise InvalidValueError("state", f"have shape [..., {wanted}]", f"shape {list(state.shape)}")
+    twist, load, dt = sequences(twist, normal_force, dt)
+    steps = len(dt)
+    for name, value in {"state": state, "twist": twist, "normal_force": load, "dt": dt}.items():
+        validation.within_range(name, value.min(initial=0.0), value.max(initial=0.0))
+    for name, value in {"normal_force": load, "dt": dt}.items():
+        if value.min(initial=0.0) < 0.0:
+            raise InvalidValueError(name, "be >= 0", float(value.min()))
+    axes = state.shape[: -len(inner)], twist.shape[:-2], load.shape[:-1], parts[0].rows.shape[:-1], *more
+    try:
+        batch = np.broadcast_shapes(*axes)
+    except ValueError:
+        raise InvalidValueError("batch axes", "broadcast", f"shapes {', '.join(str(list(a)) for a in axes)}") from None
+    count = int(np.prod(batch))
+    return RolloutInputs(
+        parts,
+        [rows_of("parameters", part.rows, part.rows.shape[-1:], batch) for part in parts],
+        by_part(np.broadcast_to(state, (*batch, *inner)).reshape(count, *inner), len(parts)),
+        rows_of("twist", twist, (steps, 3), batch),
+        rows_of("normal_force", load, (steps,), batch),
+        np.require(dt, float, ["C", "W", "A"]),
+        batch,
+    )
+
+
+def inner_of(parts: tuple[Packed, ...]) -> tuple[int, ...]:
+    """Shape of the state of one contact."""
+    return (3,) if len(parts) == 1 else (len(parts), 3)
+
+
+def by_part(values: np.ndarray, parts: int) -> np.ndarray:
+    """States of contacts `[B, ..., P, 3]`, of one part `[B, ..., 3]`, as those of each part `[P, B, ..., 3]`."""
+    return values[None] if parts == 1 else np.ascontiguousarray(np.moveaxis(values, -2, 0))
+
+
+def rows_of(name: str, value: Any, inner: tuple[int, ...], batch: tuple[int, ...]) -> np.ndarray:
+    """`value` `[..., *inner]` as `[B, *inner]`, or as one row where the contacts share it."""
+    value = validation.finite_numbers(name, value)
+    if value.size != np.prod(inner) or value.shape[value.ndim - len(inner) :] != inner:
+        try:
+            value = np.broadcast_to(value, (*batch, *inner))
+        except ValueError:
+            wanted = ", ".join(str(n) for n in inner)
+            raise InvalidValueError(name, f"have shape [..., {wanted}]", f"shape {list(value.shape)}") from None
+    outer = value.shape[: value.ndim - len(inner)]
+    return np.require(value.reshape(math.prod(outer), *inner), float, ["C", "W", "A"])
+
+
+def sum_to(shape: tuple[int, ...], gradient: np.ndarray) -> np.ndarray:
+    """Sum a gradient over the axes along which its input was broadcast."""
+    extra = tuple(range(gradient.ndim - len(shape)))
+    gradient = gradient.sum(axis=extra) if extra else gradient
+    kept = tuple(i for i, n in enumerate(shape) if n == 1 and gradient.shape[i] != 1)
+    return gradient.sum(axis=kept, keepdims=True) if kept else gradient
+
+
+def share(inputs: Inputs, count: int, work: Callable[[int, int], None]) -> None:
+    """Run `work(first, last)` over all contacts, on several threads where that pays."""
+    available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    threads = max(1, min(available, count, count * len(inputs.dt) // _WORTH_A_THREAD))
+    if threads == 1:
+        work(0, count)
+        return
+    bounds = [count * i // threads for i in range(threads + 1)]
+    with ThreadPoolExecutor(threads) as pool:
+        list(pool.map(work, bounds[:-1], bounds[1:]))
+
+
+def summed(inputs: RolloutInputs, shapes: Sequence[tuple[int, ...]], run: Callable[..., None]) -> list[np.ndarray]:
+    """Sums over the parts, which know nothing of each other, of what `run` writes into zeros of `shapes` `[B, ...]`.
+
+    It is given the number of the part, the part, the `Inputs` of its compiled loops, and the arrays.
+    """
+    total = [np.zeros(shape) for shape in shapes]
+    for k, (part, rows) in enumerate(zip(inputs.parts, inputs.rows, strict=True)):
+        own = [np.zeros(shape) for shape in shapes] if k > 0 else total
+        run(k, part, Inputs(rows, part.surface, part.data, inputs.twist, inputs.normal_force, inputs.dt), *own)
+        if k > 0:
+            for sums, values in zip(total, own, strict=True):
+                sums += values
+    return [values.reshape(*inputs.batch, *values.shape[1:]) for values in total]
