@@ -28,7 +28,7 @@ _TRUTH = frozenset((bool, np.bool_))
 _PLAIN = frozenset((float, int, np.float64))
 """What needs no conversion to a number."""
 
-_HERE_ALONE = ("_fixed", "_fixed_records", "_recent")
+_HERE_ALONE = ("_fixed", "_contacts", "_fixed_records", "_recent")
 """What a copy makes anew: addresses hold in this process, and memories are shared by threads, not by models."""
 
 
@@ -80,13 +80,12 @@ class ThreeStateModel(FrictionModel):
             held = twist.tolist()
         if held is not None and type(state) is _ARRAY and (fixed := self._fixed):
             # one contact: no batch to broadcast, and the compiled step checks what it is given, but takes True for 1.0
-            places, n = fixed[0], fixed[1]
-            many = n > 3 and state.shape == (n // 3, 3)
-            result = _EMPTY(n + 11)
+            places, several, room, new, pull = fixed
+            result = _EMPTY(room)
             try:
                 vx, vy, omega = held
                 if (
-                    (many or state.size == n == 3)
+                    (state.size == 3 if several is None else state.shape == several)
                     and not (
                         bool is type(vx)
                         or bool is type(vy)
@@ -94,9 +93,11 @@ class ThreeStateModel(FrictionModel):
                         or type(normal_force) in _TRUTH
                         or bool is type(dt)
                     )
-                    and step_one(places, state.ravel() if many else state, vx, vy, omega, normal_force, dt, result)
+                    and step_one(
+                        places, state if several is None else state.ravel(), vx, vy, omega, normal_force, dt, result
+                    )
                 ):
-                    return result[:n].reshape(state.shape) if many else result[:n], result[n : n + 3]
+                    return result[new] if several is None else result[new].reshape(several), result[pull]
             except UNFIT:  # not plain numbers, or a batch: the checks below decide
                 pass
         packed = self._by_load(self._step, (6,), *self._inputs(state, twist, normal_force, dt=dt))
@@ -230,13 +231,25 @@ class ThreeStateModel(FrictionModel):
         return np.array([*self.law.numbers, *shape.numbers])
 
     @functools.cached_property
-    def _fixed(self) -> tuple[np.ndarray, int, list[tuple[np.ndarray, np.ndarray]]] | None:
-        """Where the shape is fixed: places for `kernels.rollouts.step_one`, numbers of a state, and what is there."""
-        if self.patch.depends_on_load or self._axes is not None:
+    def _fixed(self) -> tuple[np.ndarray, tuple[int, ...] | None, int, slice, slice] | None:
+        """What a step of one contact needs (see `kernels.rollouts.step_one`), where the shape is fixed.
+
+        That are the places of its parts, the shape of a state of several, how many numbers the compiled step writes,
+        and where among them it leaves the new state and the wrench. A plain tuple is taken apart the fastest.
+        """
+        contacts = self._contacts
+        if contacts is None:
             return None
         compile_step_one()
-        contacts = [self._contact(part) for part in self.parts_at(None)]
-        return np.concatenate([place for place, _, _ in contacts]), 3 * len(contacts), [each[1:] for each in contacts]
+        n, places = 3 * len(contacts), np.concatenate([place for place, _, _ in contacts])
+        return places, None if n == 3 else self.state_shape, n + 11, slice(n), slice(n, n + 3)
+
+    @functools.cached_property
+    def _contacts(self) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]] | None:
+        """`_contact` of each part, where the shape is fixed."""
+        if self.patch.depends_on_load or self._axes is not None:
+            return None
+        return [self._contact(part) for part in self.parts_at(None)]
 
     def _contact(self, part: Part) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """A `kernels.rollouts.Place` as a row of words, and what it points to, which has to be kept.
@@ -306,8 +319,8 @@ class ThreeStateModel(FrictionModel):
 
     def _one_step_jacobians(self, state, twist, normal_force, dt) -> np.ndarray | None:
         """`_step_jacobians` `[1, 6, 7]` of one contact of one part and fixed shape, checked quickly; else None."""
-        fixed = self._fixed
-        if fixed is None or fixed[1] > 3:
+        contacts = self._contacts
+        if contacts is None or len(contacts) > 1:
             return None
         plain = []
         for vector in (state, twist):
@@ -330,11 +343,11 @@ class ThreeStateModel(FrictionModel):
 
     def _step_jacobians(self, shape: Any, state, twist, load, dt) -> np.ndarray:
         slopes = np.empty((len(load), 6, 7 + len(self._kernels.NAMES)))
-        fixed = self._fixed
-        if fixed is None or fixed[1] > 3:
+        contacts = self._contacts
+        if contacts is None or len(contacts) > 1:
             row, (surface, data) = self._row(shape), self._maps(shape)
         else:
-            numbers, data = fixed[2][0]
+            ((_, numbers, data),) = contacts
             row, surface = numbers[:-3], numbers[-3:].astype(int)
         self._kernels.jacobians(row, surface, data, (state, twist, load, dt), slopes)
         return slopes[:, :, :7]
