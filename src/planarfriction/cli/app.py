@@ -16,6 +16,8 @@ PATCH_HELP = (
     "(.csv, .npy, grey image; row 0 is the top) with --cell-size."
 )
 
+AUTO_PARTS = "as many as the shape of the patch asks for, 4 to 8"
+
 
 class MemberOf(click.Choice):
     """A choice among the members of a family, those that are registered later too, and a few words more."""
@@ -43,6 +45,11 @@ def complete_scene(context: object, parameter: object, incomplete: str) -> list[
     """Ready scenes that begin so, and files."""
     names = [CompletionItem(name, help=SCENES.words(name)) for name in SCENES if name.startswith(incomplete)]
     return [*names, CompletionItem(incomplete, type="file")]
+
+
+def complete_parts(context: object, parameter: object, incomplete: str) -> list[CompletionItem]:
+    """What `--parts` may be."""
+    return [CompletionItem("auto", help=AUTO_PARTS)] if "auto".startswith(incomplete) else []
 
 
 class FilePath(click.Path):
@@ -78,6 +85,7 @@ def app() -> None:
     Examples:
       planarfriction run in-hand --model both --out out/ --plot
       planarfriction run drift --model reduced --patch Square --t-end 2
+      planarfriction run in-hand --model both --parts auto
       planarfriction run in-hand --patch pad.csv --cell-size 0.001 --animate
       planarfriction run scene.toml --rtol 1e-7 --out results/
     """,
@@ -89,6 +97,12 @@ def app() -> None:
     multiple=True,
     help="Friction model, may be repeated. Default: both for in-hand, else distributed or the file's.",
 )
+@click.option(
+    "--parts",
+    metavar="COUNT|auto",
+    shell_complete=complete_parts,
+    help=f"Parts of the reduced model; auto: {AUTO_PARTS}. Default: 1, or the file's.",
+)
 @click.option("--patch", help=f"Contact patch: {PATCH_HELP} Default: Circle, or the file's.")
 @click.option("--cell-size", type=float, help="Side of a cell of a pressure map in m.")
 @click.option("--t-end", type=float, help="Duration in s. Default: the scene's.")
@@ -99,6 +113,7 @@ def app() -> None:
 def run(
     scene: str,
     model: tuple[str, ...],
+    parts: str | None,
     patch: str | None,
     cell_size: float | None,
     t_end: float | None,
@@ -113,7 +128,7 @@ def run(
     gc.disable()
     from planarfriction.cli import run as command
 
-    scenes = command.build_scenes(scene, model, patch=patch, cell_size=cell_size, t_end=t_end)
+    scenes = command.build_scenes(scene, model, parts=parts, patch=patch, cell_size=cell_size, t_end=t_end)
     pictures = [name for name, wanted in (("plot", plot), ("animate", animate)) if wanted]
     folder = Path("out") if out is None and pictures else out
     return command.run(scenes, rtol=rtol, t_end=t_end, folder=folder, pictures=pictures)

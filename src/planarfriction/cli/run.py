@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Sequence
+import inspect
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -34,6 +35,7 @@ def build_scenes(
     name: str,
     models: Sequence[str],
     *,
+    parts: str | None = None,
     patch: str | None = None,
     cell_size: float | None = None,
     t_end: float | None = None,
@@ -43,15 +45,41 @@ def build_scenes(
         validation.positive("--t-end", t_end)
     kinds = list(dict.fromkeys(kind for each in models for kind in (BOTH if each == "both" else [each])))
     if Path(name).suffix.lower() in (".toml", ".json"):
-        return _scenes_from_file(name, kinds, patch, cell_size)
+        return _scenes_from_file(name, kinds, _parts(parts), patch, cell_size)
     validation.choice("scene", name, [*SCENES, "a scene file (.toml, .json)"])
     width = DRIFT_WIDTH if name == "drift" else WIDTH
     contact_patch = find_patch(patch, cell_size=cell_size, width=width)
     kinds = kinds or (list(BOTH) if name == "in-hand" else ["distributed"])
+    _check_parts(parts, [MODELS[kind] for kind in kinds])
     options: dict[str, Any] = {} if t_end is None else {"t_end": t_end}
     if name == "free-slide":
         options["save_every"] = SLIDE_SAMPLING
-    return {kind: SCENES[name](MODELS[kind](contact_patch, _law()), **options) for kind in kinds}
+    return {kind: SCENES[name](_make(MODELS[kind], contact_patch, _law(), _parts(parts)), **options) for kind in kinds}
+
+
+def _parts(text: str | None) -> int | str | None:
+    """A count, "auto" or nothing, as a model takes it."""
+    if text is None or text == "auto":
+        return text
+    if not (text.isdecimal() and len(text) < 10):
+        raise InvalidValueError("--parts", "be auto or an integer >= 1", text)
+    return validation.count("--parts", int(text))
+
+
+def _in_parts(make: Any) -> bool:
+    """Whether models of a class have parts."""
+    return "parts" in inspect.signature(make).parameters
+
+
+def _check_parts(parts: Any, makes: Iterable[Any]) -> None:
+    if parts is not None and not any(map(_in_parts, makes)):
+        kinds = ", ".join(kind for kind, make in MODELS.items() if _in_parts(make))
+        raise InvalidValueError("--parts", f"come with a model that has parts ({kinds})", parts)
+
+
+def _make(make: Any, patch: ContactPatch, law: Any, parts: int | str | None) -> Any:
+    """A model of a class, in `parts` where it has some."""
+    return make(patch, law, **({"parts": parts} if parts is not None and _in_parts(make) else {}))
 
 
 def _law() -> Any:
@@ -60,16 +88,19 @@ def _law() -> Any:
     return LuGre(mu_s=1.2, elasto_plastic=ElastoPlastic(0.9))
 
 
-def _scenes_from_file(path: str, kinds: Sequence[str], patch: str | None, cell_size: float | None) -> dict[str, Scene]:
+def _scenes_from_file(
+    path: str, kinds: Sequence[str], parts: int | str | None, patch: str | None, cell_size: float | None
+) -> dict[str, Scene]:
     from planarfriction.scenes import Scene
 
     scene = Scene.from_file(path)
     if patch is None and cell_size is not None:
         raise InvalidValueError("--cell-size", "come with the pressure map of --patch", cell_size)
     contact_patch = None if patch is None else find_patch(patch, cell_size=cell_size)
-    if not kinds and contact_patch is None:
+    if not kinds and contact_patch is None and parts is None:
         return {_label(scene): scene}
-    return {kind: _with_models(scene, kind, contact_patch) for kind in kinds or [_label(scene)]}
+    _check_parts(parts, [MODELS[kind] for kind in kinds] or [type(contact.model) for contact in scene.contacts])
+    return {kind: _with_models(scene, kind, contact_patch, parts) for kind in kinds or [_label(scene)]}
 
 
 def _label(scene: Scene) -> str:
@@ -78,15 +109,20 @@ def _label(scene: Scene) -> str:
     return (kinds.pop() if len(kinds) == 1 else None) or "mixed"
 
 
-def _with_models(scene: Scene, kind: str, patch: ContactPatch | None) -> Scene:
-    """The scene with models of one kind ("mixed": each as it is) on its own patches or on `patch`, laws as they are."""
+def _with_models(scene: Scene, kind: str, patch: ContactPatch | None, parts: int | str | None) -> Scene:
+    """The scene with models of one kind ("mixed": each as it is) on its own patches or on `patch`, laws as they are.
+
+    In `parts` where they have some, by default in as many as they have.
+    """
     contacts = []
     for contact in scene.contacts:
         model = contact.model
-        own = MODELS.name_of(model)
-        if patch is not None or kind not in ("mixed", own):
+        if patch is not None or kind not in ("mixed", MODELS.name_of(model)):
             make = type(model) if kind == "mixed" else MODELS[kind]
-            model = make(model.patch if patch is None else patch, model.law)
+            wanted = getattr(model, "parts", None) if parts is None else parts
+            model = _make(make, model.patch if patch is None else patch, model.law, wanted)
+        elif parts is not None and _in_parts(type(model)):
+            model = dataclasses.replace(model, parts=parts)
         contacts.append(dataclasses.replace(contact, model=model))
     return dataclasses.replace(scene, contacts=tuple(contacts))
 
