@@ -1,4 +1,4 @@
-"""Parts: how a patch is split, what several parts hold exactly, and that as many parts as cells are the cells."""
+"""How a patch is split into compact parts, and parts as patches."""
 
 from __future__ import annotations
 
@@ -8,16 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import planarfriction as pf
-from planarfriction import autodiff
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch, SoftFinger
 from planarfriction.patch.parts import automatic, kurtosis, labels_of, part_of, split
-from planarfriction.scenes import simulate
 
-PLAIN, ELASTIC = pf.LuGre(mu_s=1.2), pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
-LAWS = {"plain": PLAIN, "elasto-plastic": ELASTIC}
+PLAIN = pf.LuGre(mu_s=1.2)
 T = PUBLISHED_PATCHES["NonConvex2"](11)
-FEET = ContactPatch.points([(0.01, 0.0), (-0.01, 0.002), (0.0, 0.012)], [1.0, 2.0, 3.0])
 SMALL = {"segments": 8, "speeds": 8}
 
 PATCHES = {name: make() for name, make in PUBLISHED_PATCHES.items()} | {
@@ -134,109 +130,3 @@ def test_other_parts_are_refused_in_one_line(parts):
     with pytest.raises(InvalidValueError, match="parts must be") as error:
         pf.ReducedModel(PUBLISHED_PATCHES["NonConvex2"](), PLAIN, parts=parts, **SMALL)
     assert "\n" not in str(error.value)
-
-
-# ---------------------------------------------------------------------- as many parts as cells: the distributed model
-
-
-def twists(count: int, seed: int = 1) -> np.ndarray:
-    generator = np.random.default_rng(seed)
-    return generator.normal(size=(count, 3)) * [1.0, 1.0, 100.0] * 10.0 ** generator.uniform(-4, -1, (count, 1))
-
-
-@pytest.mark.parametrize("law", LAWS)
-@pytest.mark.parametrize("patch", [FEET, T], ids=["feet", "T"])
-def test_as_many_parts_as_cells_are_the_distributed_model(law, patch):
-    cells, errors = pf.DistributedModel(patch, LAWS[law]), []
-    for sizes in ({"segments": 12, "speeds": 7}, {}):
-        model = pf.ReducedModel(patch, LAWS[law], parts=patch.cells, **sizes)
-        ours, theirs, off = model.rest(), cells.rest(), []
-        for twist in twists(60):
-            rates = model.rate(ours, twist, 2.0)[:, :2].T, cells.rate(theirs, twist, 2.0)
-            forces = model.wrench(ours, twist, 2.0), cells.wrench(theirs, twist, 2.0)
-            speed = np.abs(twist * [1.0, 1.0, 0.01]).max()
-            off.append(np.abs(rates[0] - rates[1]).max() / speed)
-            off.append(np.abs((forces[0] - forces[1]) / [2.0, 2.0, 0.02]).max() / (1.0 + speed * 800.0))
-            ours, wrench = model.step(ours, twist, 2.0, 1e-3)
-            theirs, wanted = cells.step(theirs, twist, 2.0, 1e-3)
-            off.append(np.abs((wrench - wanted) / [2.0, 2.0, 0.02]).max())
-            off.append(np.abs(ours[:, :2].T - theirs).max() / LAWS[law].largest_deflection)
-            assert (ours[:, 2] == 0.0).all()
-        errors.append(np.median(off))
-    # what is left is the map of a point: interpolation of a unit vector, and of the Stribeck curve over the speed
-    assert errors[1] < 2e-6
-    assert errors[1] < errors[0] / 16.0
-
-
-def test_a_scene_with_as_many_parts_as_cells_is_that_of_the_distributed_model():
-    ends = []
-    for model in (pf.ReducedModel(T, ELASTIC, parts=T.cells), pf.DistributedModel(T, ELASTIC)):
-        data = simulate(pf.scenes.free_slide(model), rtol=1e-7, atol=1e-7).histories
-        ends.append([data[name].values[-1] for name in ("x", "y", "theta")])
-    np.testing.assert_allclose(ends[0], ends[1], rtol=2e-5)
-
-
-# ---------------------------------------------------------------------- roll-outs
-
-
-ROUGH = T.with_friction_metric(pf.grain(0.4, along=1.0, across=0.7))
-SOFT = ContactPatch.disc(0.01, 11, pressure=SoftFinger(c=0.006, n=1 / 3, k=2.0))
-
-
-@pytest.mark.parametrize("patch", [T, ROUGH, SOFT], ids=["T", "grain", "soft"])
-def test_steps_one_by_one_in_batches_and_rolled_out_are_the_same(patch):
-    model = pf.ReducedModel(patch, ELASTIC, parts=3, **SMALL)
-    held, loads, dt = twists(12), np.linspace(0.5, 2.0, 12), np.linspace(1e-4, 1e-2, 12)
-    loads[5] = 0.0  # a contact without load forgets all its parts
-    states, wrenches = [model.rest()], []
-    for twist, load, step in zip(held, loads, dt, strict=True):
-        state, wrench = model.step(states[-1], twist, load, step)
-        states.append(state)
-        wrenches.append(wrench)
-    assert states[-1].shape == (3, 3)
-    together = model.step(np.array(states[:-1]), held, loads, dt)
-    np.testing.assert_allclose(together[0], states[1:], rtol=1e-12, atol=1e-18)
-    np.testing.assert_allclose(together[1], wrenches, rtol=1e-12, atol=1e-12)
-    rolled = autodiff.rollout(model, None, np.stack([held, held]), loads, dt)
-    np.testing.assert_allclose(rolled.wrenches[1], wrenches, rtol=1e-12, atol=1e-12)
-    np.testing.assert_allclose(rolled.state, [states[-1]] * 2, rtol=1e-12, atol=1e-18)
-
-
-def test_a_roll_out_is_that_of_its_parts():
-    model = pf.ReducedModel(T, ELASTIC, parts=3)
-    held, total = twists(30), 0.0
-    kept = autodiff.rollout_states(model, model.rest(), held, 2.0, 1e-3)
-    for k in range(3):
-        part = part_of(T, model.labels == k)
-        rolled = autodiff.rollout_states(
-            pf.ReducedModel(part, ELASTIC), None, held, 2.0 * model.parts_at(None)[k].share, 1e-3
-        )
-        total = total + rolled.wrenches
-        np.testing.assert_allclose(kept.states[:, k], rolled.states, rtol=1e-12, atol=1e-20)
-    np.testing.assert_allclose(kept.wrenches, total, rtol=1e-12, atol=1e-12)
-
-
-def test_gradients_and_sensitivities_are_differences_of_roll_outs():
-    model = pf.ReducedModel(T, ELASTIC, parts=3)
-    generator = np.random.default_rng(5)
-    held, loads, dt = twists(20, 4), np.linspace(1.0, 2.0, 20), 1e-3
-    own, start = autodiff.parameters_of(model), 1e-7 * generator.normal(size=(3, 3))
-    w_bar, z_bar = generator.normal(size=(20, 3)) * [1.0, 1.0, 100.0], 1e5 * generator.normal(size=(3, 3))
-    inputs = {"state": start, "twist": held, "normal_force": loads, "parameters": own}
-
-    def value(**given) -> float:
-        given = {**inputs, **given}
-        end, wrenches = autodiff.rollout(model, *list(given.values())[:3], dt, parameters=given["parameters"])
-        return float((w_bar * wrenches).sum() + (z_bar * end).sum())
-
-    gradient = autodiff.rollout_gradient(model, start, held, loads, dt, w_bar, z_bar, parameters=own)
-    for name, at in inputs.items():
-        along = generator.normal(size=at.shape) * (np.abs(at) if name != "state" else 1e-7)
-        ahead, behind = (value(**{name: at + sign * 1e-6 * along}) for sign in (1, -1))
-        slope = float((getattr(gradient, name) * along).sum())
-        # differences of a sum of kinked steps: they hold to 1e-6 away from kinks
-        assert slope == pytest.approx((ahead - behind) / 2e-6, rel=2e-5, abs=1e-7)
-    found = autodiff.rollout_sensitivities(model, start, held, loads, dt, ("mu_c", "sigma_1"))
-    columns = [autodiff.parameter_names(model).index(name) for name in ("mu_c", "sigma_1")]
-    only = autodiff.rollout_gradient(model, start, held, loads, dt, w_bar).parameters[columns]
-    np.testing.assert_allclose(np.einsum("ti,tip->p", w_bar, found.d_wrenches), only, rtol=1e-9)

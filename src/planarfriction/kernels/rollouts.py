@@ -157,8 +157,8 @@ def step_one(places, z, vx, vy, omega, load, dt, result):
     valid = xp.in_range(vx) and xp.in_range(vy) and xp.in_range(omega) and xp.in_range(load) and xp.in_range(dt)
     valid = valid and load > 0.0 and dt >= 0.0
     count = places.shape[0] // _WORDS
-    z, out = doubles(address(z, 0)), address(result, 0)
-    given = doubles(at(out, 3 * count + 3))
+    z, out, inputs = doubles(address(z, 0)), address(result, 0), address(result, 3 * count + 3)
+    given = doubles(inputs)
     given[3], given[4], given[5], given[6], given[7] = vx, vy, omega, load, dt
     fx, fy, tau = 0.0, 0.0, 0.0
     for k in range(count):
@@ -167,7 +167,7 @@ def step_one(places, z, vx, vy, omega, load, dt, result):
         if not (valid and xp.in_range(x) and xp.in_range(y) and xp.in_range(s)):
             return False
         given[0], given[1], given[2] = x, y, s
-        call(part.step, (part.row, part.data, at(out, 3 * count + 3), out))
+        call(part.step, (part.row, part.data, inputs, out))
         w = doubles(at(out, 3))
         fx, fy, tau = fx + part.share * w[0], fy + part.share * w[1], tau + part.share * w[2]
         out = at(out, 3)
