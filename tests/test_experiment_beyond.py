@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import importlib.util
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,6 +12,7 @@ import pytest
 from planarfriction.experiments import EXPERIMENTS, beyond, beyond_driven, beyond_others, beyond_surfaces
 from planarfriction.experiments import beyond_in_hand as in_hand
 from planarfriction.experiments import beyond_ladder as ladder
+from planarfriction.experiments.beyond_ladder_figure import FAMILIES
 from planarfriction.experiments.experiment import Work
 from planarfriction.experiments.in_hand_runs import Case
 from planarfriction.experiments.runs import IN_WORDS
@@ -162,3 +165,41 @@ def test_a_piece_can_be_stored_and_read():
     }
     read = [dataclasses.replace(row, time=0.0) for row in beyond._rows_of(stored)]
     assert read == [dataclasses.replace(row, time=0.0) for row in rows]
+
+
+def test_tables_of_the_pages_are_those_of_the_report(result):
+    docs = Path(__file__).parent.parent / "docs"
+    if not docs.is_dir():
+        pytest.skip("no docs beside these tests")
+    spec = importlib.util.spec_from_file_location("make_tables", docs / "make_tables.py")
+    make_tables = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(make_tables)
+    tables = {table.title: dataclasses.asdict(table) for table in result.tables}
+    shown = 0
+    for path in docs.glob("*.md"):
+        page = make_tables.with_tables(path.read_text(encoding="utf-8"), tables)  # a title that is not there raises
+        assert make_tables.with_tables(page, tables) == page
+        shown += page.count("<!-- table: ")
+    assert shown >= 11
+    assert (
+        make_tables.markdown({"headings": ("a", "b"), "rows": [("x", 0.123)]})
+        == "| a | b |\n| --- | --- |\n| x | 0.12 |\n"
+    )
+
+
+def test_the_ladder_draws_every_family_that_was_run(result):
+    figure = next(picture.figure for picture in result.pictures if picture.name == "ladder")
+    assert len(figure.axes) == 6  # patches of many cells and of few; velocity-driven, and two loads in hand
+    shown = {text.get_text() for axes in figure.axes for text in axes.texts}
+    assert shown == {"", *(words for family in FAMILIES for words in family.rungs.values())}
+    widest = max(axes.get_xlim()[1] / axes.get_xlim()[0] for axes in figure.axes)
+    assert widest < 1e3  # an axis of times without an empty half
+
+
+def test_parts_are_looked_at_as_many_as_auto_takes(result):
+    for shape in beyond.QUICK_SHAPES:
+        models = ladder.models(shape)
+        assert models[ladder.AUTO] is models["6 parts"]
+        assert len(models["16 parts"].rest()) == 16
+    for each in result.numbers["in hand"].values():
+        assert each[ladder.AUTO] == each["6 parts"]

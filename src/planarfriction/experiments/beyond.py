@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable
 from typing import Any
 
@@ -46,6 +47,9 @@ def run(work: Work) -> Result:
         "staircase": surfaces.staircase,
     }
     pieces = work.pieces(single)
+    spun = work.pieces(
+        {f"spin-up, {IN_WORDS[s]}": functools.partial(driven.spin_up, s) for s in shapes if s in SIX_SHAPES}
+    )
     unseen = work.pieces(
         {
             f"new shapes, {name}": _new_shape(name, work.quick)
@@ -56,15 +60,16 @@ def run(work: Work) -> Result:
     # one after the other: these are measured with a clock
     times = work.piece("time of runs", lambda: _times_of(shapes))
     rows = [dataclasses.replace(row, time=float(times[f"{row.case}|{row.model}"])) for row in rows]
-    costs = {name: float(value) for name, value in work.piece("cost of a step", driven.step_costs).items()}
+    costs = _floats(work.piece("cost of a step", driven.step_costs))
     family = work.piece("soft finger", lambda: others.load_family(work.quick))
     grooved = {name: values.tolist() for name, values in pieces["grooves"].items()}
     numbers = _numbers(rows, found, errors) | {
         "jumps": surfaces.jumps(pieces["staircase"]),
-        "plateaus": {name: float(value) for name, value in pieces["plateaus"].items()},
+        "plateaus": _floats(pieces["plateaus"]),
         "grooves": grooved,
-        "load family": {name: float(value) for name, value in family.items()},
+        "load family": _floats(family),
         "step": costs,
+        "spin-up": {shape: _floats(spun[f"spin-up, {IN_WORDS[shape]}"]) for shape in shapes if shape in SIX_SHAPES},
         "new shapes": {name: new_shapes.ratios(each) for name, each in unseen.items()},
     }
     return Result(
@@ -127,6 +132,10 @@ def _runs_of(shape: str) -> Callable[[], dict[str, Any]]:
         return result
 
     return compute
+
+
+def _floats(piece: Arrays) -> dict[str, float]:
+    return {name: float(value) for name, value in piece.items()}
 
 
 def _times_of(shapes: tuple[str, ...]) -> dict[str, float]:

@@ -11,7 +11,7 @@ from planarfriction.experiments.beyond_ladder import AUTO, Row, name_of_parts
 from planarfriction.experiments.experiment import Comparison
 from planarfriction.experiments.runs import IN_WORDS, LAW
 from planarfriction.experiments.velocity_driven_boxes import SAMPLES
-from planarfriction.models import ReducedModel, ReducedModelPublished
+from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import PUBLISHED_PATCHES
 
 MODELS = {
@@ -34,6 +34,10 @@ PARTS = (1, 4, 6)
 """Parts whose steps are timed."""
 
 ROUNDS, STEPS = 9, 10_000
+
+SPIN, SPIN_STEPS, SPIN_STEP = 0.02, 400, 1e-8
+"""Speed of the spin from rest [rad/s], its steps, and how far each goes at the contact radius [m]: 1e-6 m are full
+deflection."""
 
 Errors = dict[str, dict[str, dict[str, float]]]
 """Shape -> model of the ladder -> statistic of the error."""
@@ -71,6 +75,25 @@ def step_costs(shape: str = "Circle") -> dict[str, Any]:
             rollout(model, model.rest(), twists, 1.0, 1e-4)
             best[name] = min(best[name], (time.process_time() - begin) / STEPS)
     return best
+
+
+def spin_up(shape: str) -> dict[str, float]:
+    """Largest error of the torque [N m] of a spin from rest until the patch slides, from its own cells, by model."""
+    patch = PUBLISHED_PATCHES[shape]()
+    models: dict[str, Any] = {"published": ReducedModelPublished(patch, LAW)}
+    models |= {name_of_parts(parts): ReducedModel(patch, LAW, parts=parts) for parts in (1, AUTO)}
+    dt = SPIN_STEP / (SPIN * patch.contact_radius())
+    wanted = _spun(DistributedModel(patch, LAW), dt)
+    return {name: float(np.abs(_spun(model, dt) - wanted).max()) for name, model in models.items()}
+
+
+def _spun(model: Any, dt: float) -> np.ndarray:
+    """Torque [N m] of a spin from rest, step by step."""
+    state, torques = model.rest(), np.empty(SPIN_STEPS)
+    for i in range(SPIN_STEPS):
+        state, wrench = model.step(state, (0.0, 0.0, SPIN), 1.0, dt)
+        torques[i] = wrench[2]
+    return torques
 
 
 def comparisons(errors: Errors) -> list[Comparison]:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
+
+import numpy as np
 
 from planarfriction.experiments.beyond_driven import MODELS, STATISTICS
 from planarfriction.experiments.beyond_in_hand import ENDS, SHIFT
@@ -34,8 +37,14 @@ def model_words(model: str) -> str:
     return MODEL_WORDS[model]
 
 
+def shown(value: float) -> str:
+    """Two digits, without an exponent where the number is easily read so."""
+    rounded = float(f"{value:.2g}")
+    return np.format_float_positional(rounded, trim="-") if 1e-4 <= abs(rounded) < 1e5 else f"{rounded:.2g}"
+
+
 def tables(rows: list[Row], numbers: Numbers) -> tuple[Table, ...]:
-    """Surfaces, models in both kinds of runs, every combination, plateaus, and the soft finger."""
+    """Surfaces, models in both kinds of runs, every combination, spin-up, costs and plateaus."""
     return (
         _surfaces(numbers["surfaces"]),
         _driven(numbers["driven"]),
@@ -45,6 +54,8 @@ def tables(rows: list[Row], numbers: Numbers) -> tuple[Table, ...]:
         _combinations(rows, "third quartile", "driven", 1e3, "error of the force, third quartile [mN]"),
         _combinations(rows, "end", "load 2", 1e3, "in hand, load 2: end from the distributed model [mm]"),
         _combinations(rows, "end", "load 1", 1e3, "in hand, load 1: end from the distributed model [mm]"),
+        _spin_up(numbers["spin-up"]),
+        _step(numbers["step"]),
         _plateaus(numbers["plateaus"]),
     )
 
@@ -55,7 +66,7 @@ def _surfaces(errors: dict[str, Any]) -> Table:
         (
             IN_WORDS[shape],
             *(
-                f"{1e3 * each[f'{kind}/force']['mean']:.2g} / {1e3 * each[f'{kind}/force']['max']:.2g}"
+                f"{shown(1e3 * each[f'{kind}/force']['mean'])} / {shown(1e3 * each[f'{kind}/force']['max'])}"
                 if f"{kind}/force" in each
                 else ""
                 for kind in kinds
@@ -70,7 +81,7 @@ def _surfaces(errors: dict[str, Any]) -> Table:
 def _driven(errors: dict[str, Any]) -> Table:
     headings = [f"{before}{name}" for before in ("", "torque ") for name in STATISTICS]
     rows = [
-        (f"{IN_WORDS[shape]}, {words}", *(1e3 * each[model][name] for name in headings))
+        (f"{IN_WORDS[shape]}, {words}", *(shown(1e3 * each[model][name]) for name in headings))
         for shape, each in errors.items()
         for model, words in MODELS.items()
     ]
@@ -80,12 +91,14 @@ def _driven(errors: dict[str, Any]) -> Table:
 
 def _ratios(ratios: dict[str, dict[str, float]], title: str) -> Table:
     names = list(next(iter(ratios.values())))
-    return Table(title, ("patch", *names), [(IN_WORDS[shape], *each.values()) for shape, each in ratios.items()])
+    return Table(
+        title, ("patch", *names), [(IN_WORDS[shape], *map(shown, each.values())) for shape, each in ratios.items()]
+    )
 
 
 def _in_hand(ends: dict[str, dict[str, float]]) -> Table:
     rows = [
-        (case, *(1e3 * each[name] for name in (*ENDS, SHIFT)), each[AUTO] / each["published"])
+        (case, *(shown(1e3 * each[name]) for name in (*ENDS, SHIFT)), shown(each[AUTO] / each["published"]))
         for case, each in ends.items()
     ]
     headings = ("run", *(f"{words} [mm]" for words in ENDS.values()), "0.1 % of friction [mm]", "auto / published")
@@ -101,9 +114,9 @@ def _combinations(rows: list[Row], quantity: str, run: str, factor: float, title
         own = [row for row in chosen if row.model == model]
         by_shape = {_shape_of(row): row for row in own}
         values = (by_shape.get(IN_WORDS[shape]) for shape in shapes)
-        cells = ["as full" if row is None else f"{factor * row.errors[quantity]:.2g}" for row in values]
+        cells = ["as full" if row is None else shown(factor * row.errors[quantity]) for row in values]
         costs, states = [row.time for row in own], [row.states for row in own]
-        result.append((model_words(model), _span(states, "d"), _span(costs, ".2g"), *cells))
+        result.append((model_words(model), _span(states, str), _span(costs, shown), *cells))
     words = [IN_WORDS[shape] for shape in shapes]
     note = (
         "Time: in the solver, over that of the distributed model of the same patch. "
@@ -119,9 +132,24 @@ def _shape_of(row: Row) -> str:
     return row.case.rpartition(", load")[0]
 
 
-def _span(values: list[Any], style: str) -> str:
-    low, high = format(min(values), style), format(max(values), style)
+def _span(values: list[Any], words: Callable[[Any], str]) -> str:
+    low, high = words(min(values)), words(max(values))
     return low if low == high else f"{low} to {high}"
+
+
+def _spin_up(errors: dict[str, dict[str, float]]) -> Table:
+    models = list(next(iter(errors.values())))
+    rows = [(IN_WORDS[shape], *(shown(1e3 * each[model]) for model in models)) for shape, each in errors.items()]
+    headings = ("patch", *(MODELS[model] for model in models))
+    note = "A spin at 0.02 rad/s from rest, in steps of a hundredth of a deflection, from the same cells."
+    return Table("Spin-up from rest: largest error of the torque [N mm]", headings, rows, note)
+
+
+def _step(times: dict[str, float]) -> Table:
+    rows = [
+        (model_words(model), shown(1e6 * value), shown(value / times["published"])) for model, value in times.items()
+    ]
+    return Table("Step in a compiled loop, disc", ("model", "time [µs]", "over the published model's"), rows)
 
 
 def _plateaus(angles: dict[str, float]) -> Table:
