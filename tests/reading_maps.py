@@ -9,10 +9,9 @@ from planarfriction.kernels import cube, jit
 def read_batch(data, n, faces, v, values, gradients):
     """Values [B, 3] and gradients [B, 9] of a map of one level and three components."""
     for b in range(v.shape[0]):
-        spot = cube.locate(v[b, 0], v[b, 1], v[b, 2], faces)
-        q, q_a, q_b = cube.squares(spot, n)
+        spot = cube.locate(v[b, 0], v[b, 1], v[b, 2], float(faces))
+        value, by_a, by_b = cube.read(data, 0, float(n), cube.square(spot, float(n)))
         for m in range(3):
-            values[b, m] = spot.sign * cube.read(data, 0, n, 3, m, q)
-            by_a, by_b = cube.read(data, 0, n, 3, m, q_a), cube.read(data, 0, n, 3, m, q_b)
-            slopes = cube.gradient(spot, by_a, by_b)
+            values[b, m] = spot.sign * value[m]
+            slopes = cube.gradient(spot, by_a[m], by_b[m])
             gradients[b, 3 * m], gradients[b, 3 * m + 1], gradients[b, 3 * m + 2] = slopes

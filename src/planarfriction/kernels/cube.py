@@ -1,28 +1,35 @@
 """Smooth maps over all directions in space: cubic Hermite patches on the faces of a cube, without trigonometry or pole.
 
 A direction `(x, y, s)` lies on the face of its largest component k; its place there is `a`, `b`, the next two
-components (in cyclic order) over that one. A face has `2 n + 1` nodes each way over [-1, 1]; a node holds, for each
-component, four numbers (value, its slopes by a and by b and its mixed slope, per spacing of the nodes), at one level
-or at several: the coefficients of a cubic B-spline in a third coordinate in [0, 1]. Number c of component m at level t
-of a node is at `node + (t * components + m) * 4 + c`. Odd maps, `f(-V) = -f(V)`, store three faces, others six
-(positive ones first). `planarfriction.models.cube_map` makes maps whose slopes are continuous across the edges of the
-cube too.
+components (in cyclic order) over that one. A face has `2 n + 1` nodes each way over [-1, 1]; a node holds, for each of
+three components, four numbers (value, its slopes by a and by b and its mixed slope, per spacing of the nodes), at one
+level or at several: the coefficients of a cubic B-spline in a third coordinate in [0, 1]. Number c of component m at
+level t of a node is at `node + (3 t + m) * 4 + c`. Odd maps, `f(-V) = -f(V)`, store three faces, others six (positive
+ones first). `planarfriction.models.cube_map` makes maps whose slopes are continuous across the edges of the cube too.
+
+Where a direction lies is found without branches, and counted in doubles: in vector code, for many at once.
 """
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
+from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import kernel
-from planarfriction.kernels.four import four_nodes, four_nodes_levels
+from planarfriction.kernels.four import patch, patch_of_levels
+from planarfriction.kernels.vectors import times
+
+NODE = 12
+"""Numbers of a node at one level."""
 
 
 class Spot(NamedTuple):
     """A direction on the cube."""
 
-    axis: int
+    axis: float
     """The largest component."""
-    face: int
+    face: float
     sign: float
     """Factor of what is read: -1 on the far side of an odd map."""
     a: float
@@ -34,86 +41,45 @@ class Spot(NamedTuple):
 
 
 class Square(NamedTuple):
-    """Where a direction lies among the nodes of a face, and the weights of the numbers of its four nodes."""
+    """Where a direction lies among the nodes of a face."""
 
-    at: int
+    at: float
     """The square's first node, counted from the first node of the map."""
-    w00: tuple
-    w01: tuple
-    w10: tuple
-    w11: tuple
+    u: float
+    """How far it is to the next node along a, of [0, 1]."""
+    v: float
+    """The same along b."""
 
 
 @kernel
 def locate(x, y, s, faces):
     """`Spot` of a direction; not all of it may be zero."""
     ax, ay, a_s = abs(x), abs(y), abs(s)
-    if ax >= ay and ax >= a_s:
-        axis, largest, first, second = 0, x, y, s
-    elif ay >= a_s:
-        axis, largest, first, second = 1, y, s, x
-    else:
-        axis, largest, first, second = 2, s, x, y
+    on_x, on_y = (ax >= ay) & (ax >= a_s), ay >= a_s
+    largest = xp.where(on_x, x, xp.where(on_y, y, s))
+    first, second = xp.where(on_x, y, xp.where(on_y, s, x)), xp.where(on_x, s, xp.where(on_y, x, y))
+    axis = xp.where(on_x, 0.0, xp.where(on_y, 1.0, 2.0))
     per = 1.0 / largest
-    size = abs(per)
-    far = largest < 0.0
-    if faces == 3:
-        return Spot(axis, axis, -1.0 if far else 1.0, first * per, second * per, size, size)
-    return Spot(axis, axis + 3 if far else axis, 1.0, first * size, second * size, size, per)
+    size, odd, far = abs(per), faces == 3.0, largest < 0.0
+    along = xp.where(odd, per, size)
+    sign, face = xp.where(odd & far, -1.0, 1.0), axis + xp.where(odd | (largest > 0.0), 0.0, 3.0)
+    return Spot(axis, face, sign, first * along, second * along, size, xp.where(odd, size, per))
 
 
 @kernel
 def _cell(a, n):
     """Which of the `2 n` intervals holds `a`, and how far along."""
     u = (a + 1.0) * n
-    i = min(max(int(u), 0), 2 * n - 1)
+    i = xp.minimum(xp.maximum(math.floor(u), 0.0), 2.0 * n - 1.0)
     return i, u - i
 
 
 @kernel
-def _values(u):
-    """Cubic Hermite: weights of the values and slopes at both ends."""
-    v = 1.0 - u
-    return v * v * (1.0 + 2.0 * u), u * u * (3.0 - 2.0 * u), u * v * v, -u * u * v
-
-
-@kernel
-def _slopes(u, n):
-    """Their derivatives by the coordinate of the face."""
-    return 6.0 * u * (u - 1.0) * n, 6.0 * u * (1.0 - u) * n, (1.0 - u) * (1.0 - 3.0 * u) * n, u * (3.0 * u - 2.0) * n
-
-
-@kernel
-def _square(face, i, j, n, a, b):
-    at = (face * (2 * n + 1) + i) * (2 * n + 1) + j
-    return Square(
-        at,
-        (a[0] * b[0], a[2] * b[0], a[0] * b[2], a[2] * b[2]),
-        (a[0] * b[1], a[2] * b[1], a[0] * b[3], a[2] * b[3]),
-        (a[1] * b[0], a[3] * b[0], a[1] * b[2], a[3] * b[2]),
-        (a[1] * b[1], a[3] * b[1], a[1] * b[3], a[3] * b[3]),
-    )
-
-
-@kernel
 def square(spot, n):
-    """Weights that read the value."""
+    """`Square` of a face of `2 n` intervals each way."""
     i, u = _cell(spot.a, n)
     j, v = _cell(spot.b, n)
-    return _square(spot.face, i, j, n, _values(u), _values(v))
-
-
-@kernel
-def squares(spot, n):
-    """Weights that read the value, its slope by `a` and that by `b`."""
-    i, u = _cell(spot.a, n)
-    j, v = _cell(spot.b, n)
-    a, b = _values(u), _values(v)
-    return (
-        _square(spot.face, i, j, n, a, b),
-        _square(spot.face, i, j, n, _slopes(u, n), b),
-        _square(spot.face, i, j, n, a, _slopes(v, n)),
-    )
+    return Square((spot.face * (2.0 * n + 1.0) + i) * (2.0 * n + 1.0) + j, u, v)
 
 
 @kernel
@@ -142,28 +108,28 @@ def level_slopes(t, count):
 
 
 @kernel
-def read(data, start, n, components, m, q):
-    """Component m of a map of one level."""
-    node = 4 * components
-    at, row = start + q.at * node + 4 * m, (2 * n + 1) * node
-    return four_nodes(data, at, node, row, q.w00, q.w01, q.w10, q.w11)
+def read(data, start, n, q):
+    """A map of one level and its slopes by a and by b, three components each."""
+    value, by_u, by_v = patch(data, start + NODE * int(q.at), NODE, NODE * (2 * int(n) + 1), q.u, q.v)
+    return value, times(n, by_u), times(n, by_v)
 
 
 @kernel
-def read_level(data, start, n, components, count, m, q, level, t):
-    """Component m of a map of `count` levels, at the four levels from `level` with weights `t`."""
-    step = 4 * components
-    node = count * step
-    at, row = start + q.at * node + level * step + 4 * m, (2 * n + 1) * node
-    return four_nodes_levels(data, at, node, row, step, t, q.w00, q.w01, q.w10, q.w11)
+def read_level(data, start, n, count, q, t):
+    """A map of `count` levels at t, its slopes by a and by b and that by t, three components each."""
+    node, (level, weights) = NODE * int(count), levels(t, int(count))
+    at, row = start + node * int(q.at) + NODE * level, (2 * int(n) + 1) * node
+    value, by_u, by_v, by_t = patch_of_levels(data, at, node, row, weights, level_slopes(t, int(count)), q.u, q.v)
+    return value, times(n, by_u), times(n, by_v), by_t
 
 
 @kernel
 def gradient(spot, by_a, by_b):
     """The gradient by the direction's components, from the slopes on the face."""
     largest, first, second = -(spot.a * by_a + spot.b * by_b) * spot.by_axis, by_a * spot.by_side, by_b * spot.by_side
-    if spot.axis == 0:
-        return largest, first, second
-    if spot.axis == 1:
-        return second, largest, first
-    return first, second, largest
+    on_x, on_y = spot.axis == 0.0, spot.axis == 1.0
+    return (
+        xp.where(on_x, largest, xp.where(on_y, second, first)),
+        xp.where(on_x, first, xp.where(on_y, largest, second)),
+        xp.where(on_x, second, xp.where(on_y, first, largest)),
+    )

@@ -67,24 +67,56 @@ class Steady(NamedTuple):
     """Least dissipation."""
 
 
+class Head(NamedTuple):
+    """The numbers in front of a map, as doubles."""
+
+    faces: float
+    n: float
+    coarse: float
+    """n of the Stribeck part."""
+    levels: float
+    knee: float
+    least: float
+    stretch: float
+    gamma: float
+
+
 @kernel
-def _component(law, data, start, spot, places, t, i):
-    """Component i of one map with its slopes: by the direction (3), by t, mu_c and mu_s."""
-    n, m, count = int(data[start + 1]), int(data[start + 2]), int(data[start + 3])
-    first = start + HEADER
-    second = first + int(data[start]) * (2 * n + 1) * (2 * n + 1) * 12
-    drop = law.mu_s - law.mu_c
-    outer, (level, w), (p, p_a, p_b), (r, r_a, r_b) = law.mu_s - drop * t, cube.levels(t, count), places[0], places[1]
-    flat, rest = cube.read(data, first, n, 3, i, p), cube.read_level(data, second, m, 3, count, i, r, level, w)
-    flat_a, flat_b = cube.read(data, first, n, 3, i, p_a), cube.read(data, first, n, 3, i, p_b)
-    rest_a = cube.read_level(data, second, m, 3, count, i, r_a, level, w)
-    rest_b = cube.read_level(data, second, m, 3, count, i, r_b, level, w)
-    rest_t = cube.read_level(data, second, m, 3, count, i, r, level, cube.level_slopes(t, count))
-    by_t = spot.sign * drop * (rest_t - flat)
-    slopes = cube.gradient(spot, outer * flat_a + drop * rest_a, outer * flat_b + drop * rest_b)
-    value = spot.sign * (outer * flat + drop * rest)
-    by_mu_c, by_mu_s = spot.sign * (t * flat - rest), spot.sign * ((1.0 - t) * flat + rest)
-    return value, slopes, by_t, by_mu_c, by_mu_s
+def head_of(data, start):
+    """`Head` of the map that begins at `start`."""
+    return Head(
+        number(data, start), number(data, start + 1), number(data, start + 2), number(data, start + 3),
+        number(data, start + 4), number(data, start + 5), number(data, start + 6), number(data, start + 7),
+    )  # fmt: skip
+
+
+class Readings(NamedTuple):
+    """What is read of both parts of a map, three components each, with their slopes by the place on a face and by t."""
+
+    flat: tuple
+    flat_a: tuple
+    flat_b: tuple
+    rest: tuple
+    rest_a: tuple
+    rest_b: tuple
+    rest_t: tuple
+
+
+@kernel
+def located(law, head, u, v):
+    """Where a scaled twist that moves at v lies in a map: its `Spot`, and t."""
+    spot = cube.locate(u[0], u[1], head.stretch * u[2], head.faces)
+    return spot, formulas.stribeck_place(xp, v, law.v_s, head.gamma, head.knee)
+
+
+@kernel
+def readings(data, start, head, flat, rest, t):
+    """`Readings` of the map that begins at `start`, at a `Square` of each part."""
+    first, side = start + HEADER, 2 * int(head.n) + 1
+    second = first + int(head.faces) * side * side * cube.NODE
+    value, by_a, by_b = cube.read(data, first, head.n, flat)
+    rest, rest_a, rest_b, rest_t = cube.read_level(data, second, head.coarse, head.levels, rest, t)
+    return Readings(value, by_a, by_b, rest, rest_a, rest_b, rest_t)
 
 
 @kernel
@@ -94,22 +126,32 @@ def _drawn(slope, stretch):
 
 
 @kernel
-def _map(law, data, start, u, v):
-    """`Steady` of one map."""
-    stretch, gamma = number(data, start + 6), number(data, start + 7)
-    t = formulas.stribeck_place(xp, v, law.v_s, gamma, number(data, start + 4))
-    spot = cube.locate(u[0], u[1], stretch * u[2], int(data[start]))
-    places = cube.squares(spot, int(data[start + 1])), cube.squares(spot, int(data[start + 2]))
-    # A literal number would have the function compiled once more.
-    q_x, slope_x, t_x, c_x, s_x = _component(law, data, start, spot, places, t, np.int64(0))
-    q_y, slope_y, t_y, c_y, s_y = _component(law, data, start, spot, places, t, np.int64(1))
-    q_s, slope_s, t_s, c_s, s_s = _component(law, data, start, spot, places, t, np.int64(2))
-    v_x, v_y, v_s = by_log_v = times(gamma * t * (1.0 - t), (t_x, t_y, t_s))
-    along, by_v_s = times((1.0 / v) * (1.0 / v), u), times(-1.0 / law.v_s, by_log_v)
-    by_x, by_y = plus(_drawn(slope_x, stretch), v_x, along), plus(_drawn(slope_y, stretch), v_y, along)
-    by_s = plus(_drawn(slope_s, stretch), v_s, along)
+def combined(law, head, u, v, spot, t, read):
+    """`Steady` of one map from its `Readings`, in front of the floor of the dissipation."""
+    drop = law.mu_s - law.mu_c
+    flat, rest = times(spot.sign, read.flat), times(spot.sign, read.rest)
+    by_t = times(drop, plus(times(spot.sign, read.rest_t), -1.0, flat))
+    outer = law.mu_s - drop * t
+    a_x, a_y, a_s = plus(times(outer, read.flat_a), drop, read.rest_a)
+    b_x, b_y, b_s = plus(times(outer, read.flat_b), drop, read.rest_b)
+    v_x, v_y, v_s = by_log_v = times(head.gamma * t * (1.0 - t), by_t)
+    along = times((1.0 / v) * (1.0 / v), u)
+    by_x = plus(_drawn(cube.gradient(spot, a_x, b_x), head.stretch), v_x, along)
+    by_y = plus(_drawn(cube.gradient(spot, a_y, b_y), head.stretch), v_y, along)
+    by_s = plus(_drawn(cube.gradient(spot, a_s, b_s), head.stretch), v_s, along)
     by_u = by_x[0], by_x[1], by_x[2], by_y[0], by_y[1], by_y[2], by_s[0], by_s[1], by_s[2]
-    return Steady((q_x, q_y, q_s), by_u, (c_x, c_y, c_s), (s_x, s_y, s_s), by_v_s, number(data, start + 5))
+    by_mu_c, by_mu_s = plus(times(t, flat), -1.0, rest), plus(rest, 1.0 - t, flat)
+    q = plus(times(outer, flat), drop, rest)
+    return Steady(q, by_u, by_mu_c, by_mu_s, times(-1.0 / law.v_s, by_log_v), head.least)
+
+
+@kernel
+def _map(law, data, start, u, v):
+    """`Steady` of one map, in front of the floor of the dissipation."""
+    head = head_of(data, start)
+    spot, t = located(law, head, u, v)
+    read = readings(data, start, head, cube.square(spot, head.n), cube.square(spot, head.coarse), t)
+    return combined(law, head, u, v, spot, t, read)
 
 
 @kernel
@@ -131,6 +173,12 @@ def steady(law, shape, surface, data, u, v):
     found = _map(law, data, surface[0], u, v)
     if shape[6] > 0.0:
         found = _mixed(found, _map(law, data, surface[1], u, v), shape[6])
+    return floored(law, u, v, found)
+
+
+@kernel
+def floored(law, u, v, found):
+    """`Steady` with a dissipation that is never below the least, and divided by sigma_0."""
     per_v, per, least = 1.0 / v, 1.0 / law.sigma_0, found.least
     n = times(per_v, u)
     power = dot(found.q, n)
