@@ -215,14 +215,12 @@ def _twist(name: str, full: bool, kind: type[LimitSurface], count: int | None = 
 
 def _compiled_loop(model: ReducedModel | ReducedModelPublished, twists: np.ndarray) -> float:
     """Time of a model's steps through `twists`, compiled [s]."""
-    from planarfriction.autodiff.parameters import pack
-    from planarfriction.kernels.rollouts import Inputs
+    from planarfriction.autodiff.inputs import checked
 
-    ((rows, surface, data, family, _),) = pack(model)
-    steps = len(twists)
-    inputs = Inputs(rows[None], surface, data, twists[None], np.ones((1, steps)), np.full(steps, 1e-4))
-    z, wrench, states = np.zeros((1, 3)), np.empty((1, steps, 3)), np.empty((1, 0, 3))
-    return _median(lambda: family.rollout(inputs, (0, 1), z, wrench, states), 9)
+    inputs = checked(model, None, twists, 1.0, 1e-4, None)
+    lanes, family = inputs.lanes(), inputs.parts[0].family
+    wrench, states = np.empty((1, *twists.shape)), np.empty((len(inputs.parts), 1, 0, 3))
+    return _median(lambda: family.rollout(lanes, (0, 1), inputs.state.copy(), wrench, states), 9)
 
 
 def _published_loop(twists: np.ndarray) -> float:

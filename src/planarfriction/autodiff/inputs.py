@@ -13,6 +13,8 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.autodiff.parameters import Packed, pack
 from planarfriction.errors import InvalidValueError
+from planarfriction.kernels.lanes import Lanes
+from planarfriction.kernels.pointers import place_of
 from planarfriction.kernels.rollouts import Inputs
 
 _WORTH_A_THREAD = 20_000
@@ -39,6 +41,18 @@ class RolloutInputs(NamedTuple):
         """Values of each part and contact `[P, B, *inner, 3]` as `[*batch, *inner, P, 3]`; of one part without."""
         each = values[0] if len(values) == 1 else np.moveaxis(values, 0, -2)
         return each.reshape(*self.batch, *inner, *self.inner)
+
+    def of_all(self, values: np.ndarray) -> np.ndarray:
+        """Values of each contact `[B, ...]` as `[*batch, ...]`."""
+        return values.reshape(*self.batch, *values.shape[1:])
+
+    def lanes(self) -> Lanes:
+        """All parts at once; compiled loops reach the numbers of all from those that lie first in memory."""
+        first = min((part.data for part in self.parts), key=place_of)
+        surface = np.array([part.surface for part in self.parts])
+        surface[:, 0] += [(place_of(part.data) - place_of(first)) // first.itemsize for part in self.parts]
+        shares = np.array([part.share for part in self.parts])
+        return Lanes(np.array(self.rows), shares, surface, first, self.twist, self.normal_force, self.dt)
 
     @property
     def inner(self) -> tuple[int, ...]:
@@ -126,7 +140,7 @@ def sum_to(shape: tuple[int, ...], gradient: np.ndarray) -> np.ndarray:
     return gradient.sum(axis=kept, keepdims=True) if kept else gradient
 
 
-def share(inputs: Inputs, count: int, work: Callable[[int, int], None]) -> None:
+def share(inputs: Inputs | Lanes, count: int, work: Callable[[int, int], None]) -> None:
     """Run `work(first, last)` over all contacts, on several threads where that pays."""
     available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     threads = max(1, min(available, count, count * len(inputs.dt) // _WORTH_A_THREAD))
@@ -150,4 +164,4 @@ def summed(inputs: RolloutInputs, shapes: Sequence[tuple[int, ...]], run: Callab
         if k > 0:
             for sums, values in zip(total, own, strict=True):
                 sums += values
-    return [values.reshape(*inputs.batch, *values.shape[1:]) for values in total]
+    return [inputs.of_all(values) for values in total]

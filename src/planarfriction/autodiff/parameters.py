@@ -10,7 +10,7 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import published_rollout, published_step, reduced_step
+from planarfriction.kernels import published_rollout, published_step, reduced_rollout, reduced_step
 from planarfriction.models import ReducedModel, ReducedModelPublished
 from planarfriction.models.reduced_map import ReducedShape
 from planarfriction.models.reduced_published import PublishedShape
@@ -58,7 +58,7 @@ def _family_of(kernels: Any, names: tuple[str, ...], many: Any) -> Family:
 PUBLISHED = _family_of(published_step, PARAMETERS, published_rollout)
 """`ReducedModelPublished`."""
 
-REDUCED = _family_of(reduced_step, tuple(name for name in PARAMETERS[:8] if name != "gamma"), reduced_step)
+REDUCED = _family_of(reduced_step, tuple(name for name in PARAMETERS[:8] if name != "gamma"), reduced_rollout)
 """`ReducedModel`; gamma and the shape are built into its stored map."""
 
 

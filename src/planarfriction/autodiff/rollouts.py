@@ -146,23 +146,17 @@ def rollout_gradient(
     z_bar = np.zeros_like(inputs.state)
     if state_bar is not None:
         z_bar[:] = by_part(rows_of("state_bar", state_bar, inner, inputs.batch), len(inputs.parts))
-    columns, shapes = (
-        inputs.parts[0].family.columns,
-        ((count, steps, 3), (count, steps), (count, inputs.rows[0].shape[-1])),
-    )
-
-    def run(k: int, part: Packed, packed: Inputs, *own: np.ndarray) -> None:
-        pulls, bars = part.share * cotangents, Bars(z_bar[k], *own)
-        share(packed, count, lambda *span: part.family.gradient(packed, on_the_way[k], pulls, span, bars))
-
-    twist_bar, load_bar, rows_bar = summed(inputs, shapes, run)
-    given = parameters if parameters is not None else inputs.parts[0].rows[..., columns]
+    rows_bar = np.zeros((len(inputs.parts), count, inputs.rows[0].shape[-1]))
+    bars = Bars(z_bar, np.empty((count, steps, 3)), np.empty((count, steps)), rows_bar)
+    lanes, family = inputs.lanes(), inputs.parts[0].family
+    share(lanes, count, lambda *span: family.gradient(lanes, on_the_way, cotangents, span, bars))
+    given = parameters if parameters is not None else inputs.parts[0].rows[..., family.columns]
     start = np.empty(inner) if state is None else state
     return RolloutGradient(
         sum_to(np.shape(start), inputs.shaped(z_bar)),
-        sum_to(np.shape(twist), twist_bar),
-        sum_to(np.shape(normal_force), load_bar),
-        sum_to(np.shape(given), rows_bar[..., columns]),
+        sum_to(np.shape(twist), inputs.of_all(bars.twist)),
+        sum_to(np.shape(normal_force), inputs.of_all(bars.load)),
+        sum_to(np.shape(given), inputs.of_all(rows_bar.sum(axis=0)[:, family.columns])),
     )
 
 
@@ -253,14 +247,10 @@ def _roll(inputs: RolloutInputs, kept: int) -> tuple[np.ndarray, np.ndarray, np.
     These are `[P, B, T, 3]`; `kept = 0` for none.
     """
     end, count = inputs.state.copy(), inputs.state.shape[1]
-    states = np.empty((len(end), count, kept, 3))
-
-    def run(k: int, part: Packed, packed: Inputs, wrenches: np.ndarray) -> None:
-        share(packed, count, lambda *span: part.family.rollout(packed, span, end[k], wrenches, states[k]))
-        wrenches *= part.share
-
-    (wrenches,) = summed(inputs, ((count, len(inputs.dt), 3),), run)
-    return end, wrenches, states
+    states, wrenches = np.empty((len(end), count, kept, 3)), np.empty((count, len(inputs.dt), 3))
+    lanes, family = inputs.lanes(), inputs.parts[0].family
+    share(lanes, count, lambda *span: family.rollout(lanes, span, end, wrenches, states))
+    return end, inputs.of_all(wrenches), states
 
 
 def _stepped(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any) -> Rollout:

@@ -18,7 +18,7 @@ from planarfriction.kernels.contacts import ModelFunctions
 from planarfriction.kernels.pointers import at, doubles, floats
 from planarfriction.kernels.records import reader
 from planarfriction.kernels.reduced import closure, closure_partials, part_rate, to_origin, wrench
-from planarfriction.kernels.steady import STILL, evenness, scaled_twist, sliding, steady_slopes
+from planarfriction.kernels.steady import STILL, evenness, fourth_moments, scaled_twist, sliding, steady_slopes
 
 BY_Z, BY_V, INVERSE, STEADY, EVENNESS, TWIST, REST = 0, 9, 18, 27, 42, 45, 48
 """Where a linearisation holds dz'/dz, dz'/dV_G, the inverse of D and dz_ss/dV_G (9 each; 6 of scratch behind the last),
@@ -68,7 +68,7 @@ def evaluate(contact, z, v, zdot, w):
     power, per_q2 = x * qx + y * qy + s * qs, 1.0 / (qx * qx + qy * qy + qs * qs)
     decay = v * v / xp.where(power > 0.0, power, 1.0)
     share = (z[0] * qx + z[1] * qy + z[2] * qs) * per_q2
-    even = evenness(law, own.shape, _maps(own), data, (z[0], z[1], z[2]))[0]
+    even = evenness(law, fourth_moments(own.shape, _maps(own), data), (z[0], z[1], z[2]))[0]
     beta = closure(law, math.sqrt((z[0] * z[0] + z[1] * z[1] + z[2] * z[2]) * per_q2), share, even)
     zdot[0] = part_rate(beta, share, decay, z[0], x, qx)
     zdot[1] = part_rate(beta, share, decay, z[1], y, qy)
@@ -123,7 +123,7 @@ def linearise(contact, z, v, lin):
         out[TWIST], out[TWIST + 1], out[TWIST + 2] = x, y, s
         out[REST], out[REST + 1], out[REST + 2] = steady_slopes(law, shape, _maps(own), data, x, y, s, v, j)
         z = doubles(z)
-        even, by_z = evenness(law, shape, _maps(own), data, (z[0], z[1], z[2]))
+        even, by_z = evenness(law, fourth_moments(shape, _maps(own), data), (z[0], z[1], z[2]))
         out[EVENNESS], out[EVENNESS + 1], out[EVENNESS + 2] = by_z
         _slopes(law, z, v, even, lin)
     else:

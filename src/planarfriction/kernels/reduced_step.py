@@ -31,7 +31,7 @@ from planarfriction.kernels.records import reader
 from planarfriction.kernels.reduced import to_origin
 from planarfriction.kernels.reduced_contact import Shape
 from planarfriction.kernels.rollouts import Cotangents
-from planarfriction.kernels.steady import FAR, STILL, evenness, scaled_twist, sliding, steady
+from planarfriction.kernels.steady import FAR, STILL, evenness, fourth_moments, scaled_twist, sliding, steady
 from planarfriction.kernels.vectors import applied_back, dot, norm, plus, times
 
 NAMES = (*LawNumbers._fields, *Shape._fields)
@@ -116,8 +116,8 @@ class Step(NamedTuple):
     rate: tuple
     new: tuple
     """State."""
-    known: tuple
-    """Of the new state (see `known`)."""
+    even: tuple
+    """Evenness of the new state, and its slopes."""
     wrench: tuple
     """About the origin, per unit load."""
 
@@ -145,15 +145,12 @@ def hold_slopes(contact, twist, work):
 
 
 @kernel
-def known(contact, z):
-    """What a step needs to know of its state beside z, and knows of the one at its end: the evenness and its slopes."""
-    return evenness(contact.law, contact.shape, contact.surface, contact.data, z)
+def _stage(law, z, even, stretch, deflection, share):
+    """The closure at a state, of which `even` is the `evenness`.
 
-
-@kernel
-def _stage(law, z, known, stretch, deflection, share):
-    """The closure at a state; `stretch`: the change of the deflection is `stretch/deflection` times that along z."""
-    even, even_z = known
+    `stretch`: the change of the deflection is `stretch/deflection` times that along z.
+    """
+    even, even_z = even
     beta, by_deflection, by_share, by_breakaway = reduced.closure_partials(law, deflection, share, even)
     # exactly zero before breakaway: of hardly any deflection it is multiplied by the stretch, one over that
     by_deflection = xp.where(deflection > law.breakaway_ratio * even, by_deflection, 0.0)
@@ -165,12 +162,13 @@ def _stage(law, z, known, stretch, deflection, share):
 @kernel
 def linearise(contact, held, z, dt):
     """`Step` from the state z."""
-    return advance(contact, held, z, known(contact, z), dt)
+    fourth = fourth_moments(contact.shape, contact.surface, contact.data)
+    return advance(contact, fourth, held, z, evenness(contact.law, fourth, z), dt)
 
 
 @kernel
-def advance(contact, held, z, before, dt):
-    """`Step` from the state z, of which `before` is `known`."""
+def advance(contact, fourth, held, z, before, dt):
+    """`Step` from the state z, of which `before` is the `evenness`; `fourth`: see `steady.fourth_moments`."""
     law, u, q = contact.law, held.u, held.q
     per_q2, power = 1.0 / dot(q, q), dot(u, q)
     per_power = 1.0 / xp.where(power > 0.0, power, 1.0)
@@ -181,7 +179,7 @@ def advance(contact, held, z, before, dt):
     share = (start.share + slow * dt) * per_slow
     ahead = plus(plus(z, dt, u), -dt * start.beta * share, m)
     predicted = _stage(
-        law, ahead, known(contact, ahead), per * per * per_q2, per * math.sqrt(dot(ahead, ahead) * per_q2), share
+        law, ahead, evenness(law, fourth, ahead), per * per * per_q2, per * math.sqrt(dot(ahead, ahead) * per_q2), share
     )
     # the mean of beta
     beta = formulas.mean_decay(start.beta, predicted.beta, decay * dt)
@@ -204,7 +202,7 @@ def advance(contact, held, z, before, dt):
     largest = formulas.reachable_deflection(xp, start.deflection, law)
     back = formulas.cap(xp, size, largest)
     new = times(back, free)
-    after = known(contact, new)
+    after = evenness(law, fourth, new)
     end = _stage(law, new, after, per_q2, size * back, dot(free, q) * per_q2 * back)
     slip = plus(plus(u, -end.beta * decay, new), -end.beta * end.share, m)
     return Step(
@@ -321,19 +319,6 @@ def step(row, data, inputs, out):
 def step_address() -> int:
     """Where `step` is in this process."""
     return address_of(step, "pppp")
-
-
-@jit
-def rollout(inputs, span, z, wrench, states):
-    """See `rollouts.roll`."""
-    rollouts.roll(shape_of, hold, known, advance, inputs, span, z, wrench, states)
-
-
-@jit
-def gradient(inputs, states, wrench_bar, span, bars):
-    """See `rollouts.gradient`."""
-    work = np.empty(rollouts.SCRATCH)
-    rollouts.gradient(shape_of, hold_slopes, linearise, pull_back, inputs, states, wrench_bar, span, bars, work)
 
 
 @jit

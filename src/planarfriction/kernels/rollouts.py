@@ -195,59 +195,7 @@ def compile_step_one() -> None:
             step_one.disable_compile()
 
 
-@kernel
-def roll(shape_of, hold, known, advance, inputs, span, z, wrench, states):
-    """Steps of the contacts `span[0]` to `span[1]`: `z` [B, 3] in place, wrenches into `wrench` [B, T, 3].
-
-    The state before each step goes into `states` [B, T, 3], unless that is empty. What the next step holds is read
-    before this one's step, which waits for the last one's state: the processor does both at once. `advance` is
-    `linearise` with what is `known` of the state, which the step before knows already.
-    """
-    steps, kept = inputs.dt.shape[0], states.shape[1] > 0
-    for b in range(span[0], span[1] if steps > 0 else span[0]):
-        twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
-        contact = _contact(shape_of, inputs.rows[row_of(inputs.rows, b)], inputs.surface, inputs.data)
-        own, held = three(z[b]), hold(contact, three(twists[0]))
-        before = known(contact, own)
-        for t in range(steps):
-            following = hold(contact, three(twists[min(t + 1, steps - 1)]))
-            if kept:
-                put(states[b, t], own)
-            step = advance(contact, held, own, before, inputs.dt[t])
-            own, before = step.new, step.known
-            if loads[t] == 0.0:
-                own = 0.0, 0.0, 0.0
-                before = known(contact, own)
-            put(wrench[b, t], _weighed(step.wrench, loads[t]))
-            held = following
-        put(z[b], own)
-
-
 # ---------------------------------------------------------------------- derivatives
-
-
-@kernel
-def gradient(shape_of, hold_slopes, linearise, pull_back, inputs, states, wrench_bar, span, bars, work):
-    """Adjoint of `roll` with its `states`, from the cotangents of the wrenches [B or 1, T, 3], into `bars`.
-
-    `span`: the first contact and the one behind the last; `work` [SCRATCH].
-    """
-    for b in range(span[0], span[1]):
-        twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
-        before, pulls = states[row_of(states, b)], wrench_bar[row_of(wrench_bar, b)]
-        contact = _contact(shape_of, inputs.rows[row_of(inputs.rows, b)], inputs.surface, inputs.data)
-        new, row_bar = three(bars.state[b]), bars.rows[b]
-        for t in range(inputs.dt.shape[0] - 1, -1, -1):
-            load, pull = loads[t], three(pulls[t])
-            held, slopes = hold_slopes(contact, three(twists[t]), work)
-            step = linearise(contact, held, three(before[t]), inputs.dt[t])
-            new = times(0.0 if load == 0.0 else 1.0, new)
-            bar = pull_back(contact, step, slopes, new, times(load, pull))
-            bars.load[b, t] = dot(pull, step.wrench)
-            put(bars.twist[b, t], bar.twist)
-            accumulate(row_bar, 0, 1, (bar.law, bar.shape))
-            new = bar.state
-        put(bars.state[b], new)
 
 
 @kernel

@@ -237,22 +237,28 @@ def _mixed_fourth(one, other, share):
 
 
 @kernel
-def evenness(law, shape, surface, data, z):
-    """`formulas.evenness` of a state, and its slopes by z; 1 for plain bristles."""
+def fourth_moments(shape, surface, data):
+    """The coefficients of `<u^4>` of a shape, row by row."""
+    rows = _fourth(data, surface[0] + QUARTIC)
+    if shape[6] > 0.0:
+        rows = _mixed_fourth(rows, _fourth(data, surface[1] + QUARTIC), shape[6])
+    return rows
+
+
+@kernel
+def evenness(law, fourth, z):
+    """`formulas.evenness` of a state, and its slopes by z; 1 for plain bristles. `fourth`: see `fourth_moments`."""
     grip = law.sigma_0 / law.mu_s
     x, y, s = z
     px, py, ps = p = times(grip * grip, z)
     square = dot(p, z)
     if law.elasto_plastic > 0.0 and square > FAINT and square * FAINT < 1.0:
         m = (px * x, py * y, ps * s, px * y, px * s, py * s)
-        rows = _fourth(data, surface[0] + QUARTIC)
-        if shape[6] > 0.0:
-            rows = _mixed_fourth(rows, _fourth(data, surface[1] + QUARTIC), shape[6])
-        (a0, a1, a2, a3, a4, a5), (b1, b2, b3, b4, b5), (c2, c3, c4, c5) = rows
+        (a0, a1, a2, a3, a4, a5), (b1, b2, b3, b4, b5), (c2, c3, c4, c5) = rows = fourth
         m0, m1, m2 = m[0], m[1], m[2]
         a, b, c = dot(rows[0], m), dot(rows[1], (m1, m2, m[3], m[4], m[5])), dot(rows[2], (m2, m[3], m[4], m[5]))
-        fourth = m0 * a + m1 * b + m2 * c
-        even, per = formulas.evenness(square, fourth), 4.0 / fourth
+        total = m0 * a + m1 * b + m2 * c
+        even, per = formulas.evenness(square, total), 4.0 / total
         k_x, k_y, k_s = a + a0 * m0, a1 * m0 + b + b1 * m1, a2 * m0 + b2 * m1 + c + c2 * m2
         k_xy, k_xs, k_ys = a3 * m0 + b3 * m1 + c3 * m2, a4 * m0 + b4 * m1 + c4 * m2, a5 * m0 + b5 * m1 + c5 * m2
         by_x = square * px - even * (0.5 * k_x * px + 0.25 * (k_xy * py + k_xs * ps))
