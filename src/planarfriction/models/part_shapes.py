@@ -79,12 +79,11 @@ def together(parts: Sequence[PackedModel], shares: np.ndarray) -> PackedModel:
     records, shares = np.ascontiguousarray(records), np.ascontiguousarray(shares)
     row = 8 * count * np.arange(len(shares))
     record = PartsContact(count, one.states, one.workspace, place_of(calls), 0, 0)
-    return PackedModel(
-        FUNCTIONS,
-        rows_of(record, len(shares), records=place_of(records) + row, shares=place_of(shares) + row),
-        count * one.states,
-        count * one.workspace,
-        np.tile(one.natural, count),
-        one.radius,
-        (calls, records, shares, *(array for part in parts for array in (part.records, *part.kept))),
+    return one._replace(
+        functions=FUNCTIONS,
+        records=rows_of(record, len(shares), records=place_of(records) + row, shares=place_of(shares) + row),
+        states=count * one.states,
+        workspace=count * one.workspace,
+        natural=np.tile(one.natural, count),
+        kept=(calls, records, shares, *(array for part in parts for array in (part.records, *part.kept))),
     )
