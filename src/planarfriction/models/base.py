@@ -63,6 +63,10 @@ SPELL = 0.25
 """Time [s] for which a model builds the shapes that it packs at a time, if that is more than one shape."""
 
 
+CREEP = 0.1
+"""Natural scale of the velocity of a body on a patch, as a share of v_s [-] (see `PackedModel`)."""
+
+
 @by_parts
 class PackedModel(NamedTuple):
     """A model at R loads as the compiled solver sees it."""
@@ -83,6 +87,12 @@ class PackedModel(NamedTuple):
     """Arrays whose addresses are in the records; who calls the functions keeps them."""
     cells: np.ndarray | None = None
     """Which cells of the model have bristles here, bool `[N]`, where states are those of cells."""
+    creep: float = CREEP
+    """Natural scale of the body's velocity, as a share of v_s [-].
+
+    A body that is about to slip, or has just stopped, creeps at a hundredth of v_s, and friction goes by the direction of
+    its twist however slow it is: with errors of a share of v_s itself that direction is noise, and a patch that should
+    just hold gives way, or the other way round."""
 
 
 @dataclass(frozen=True, eq=False)

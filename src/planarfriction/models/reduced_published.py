@@ -27,6 +27,10 @@ from planarfriction.patch.metric import refuse_cell_metrics, same_metric
 
 ON_LOAD_CHANGE = ("rebuild", "rescale", "keep")
 
+# Natural scale of a creep, as a share of v_s. The published map has several directions into which a patch that has come
+# to a halt may go on, and 1e-5 of v_s decides which: two pads end 9 um apart.
+_CREEP = 0.01
+
 
 class _OfPoint(NamedTuple):
     """What stands for the limit surface of a point: `u = V_S`, and V_S has no third component."""
@@ -123,7 +127,8 @@ class ReducedModelPublished(ThreeStateModel):
             data=np.array([place_of(each) for each in data]),
         )
         natural = self.law.largest_deflection * np.array([1.0, 1.0, radius or 1.0])
-        return PackedModel(published_contact.FUNCTIONS, rows, 3, published_contact.LINEAR, natural, radius, tuple(data))
+        size, kept = published_contact.LINEAR, tuple(data)
+        return PackedModel(published_contact.FUNCTIONS, rows, 3, size, natural, radius, kept, creep=_CREEP)
 
     # ------------------------------------------------------------------ axes of the friction metric
 

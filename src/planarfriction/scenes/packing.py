@@ -32,7 +32,7 @@ class PackedScene(NamedTuple):
     state: np.ndarray
     """Bristles at rest, body velocity, pose."""
     natural: np.ndarray
-    """Natural scale of each state: mu_c/sigma_0 for deflections and positions, v_s for velocities, angles over r."""
+    """Natural scale of each state (see `Windows.natural`)."""
     models: list[PackedModel]
     """The model of each contact."""
     loading: float
@@ -144,14 +144,20 @@ class Windows:
             linear=_starts([model.workspace for model in self.models]),
         )
         self._length = min(contact.model.law.largest_deflection for contact in contacts)
-        speed = min(contact.model.law.numbers.v_s for contact in contacts)
+        laws = [contact.model.law.numbers for contact in contacts]
+        speed = min(model.creep * law.v_s for model, law in zip(self.models, laws, strict=True))
         # a single point has no lever arm: its spin is measured in rad/s
         self._radius = max(model.radius for model in self.models) or 1.0
         arm, body = np.array([1.0, 1.0, 1.0 / self._radius]), scene.body
         self.state = np.concatenate([np.zeros(self._contacts.state[-1]), body.velocity, body.position, [body.angle]])
         """Bristles at rest, body velocity, pose."""
         self.natural = np.concatenate([*(model.natural for model in self.models), speed * arm, self._length * arm])
-        """Natural scale of each state."""
+        """Natural scale of each state: mu_c/sigma_0 for deflections and positions, a share of v_s for velocities (that
+        of a creep, `models.base.PackedModel.creep`), angles over r.
+
+        The least of all contacts. A velocity is not measured by v_s itself: below it friction hardly changes with speed,
+        but it does with direction.
+        """
         self.bristles = self._contacts.state
         """Where the bristles of each contact begin in the state, int [C + 1]."""
         self.cells = [model.cells for model in self.models]

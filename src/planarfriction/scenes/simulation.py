@@ -53,9 +53,10 @@ def simulate(
     """Simulate a scene from rest bristles at t = 0 and record it every `save_every` [s]; returns a `Solution`.
 
     Each step keeps its error below `rtol |y| + atol y_0`, for every component of the body's motion and for the mean
-    over each contact's bristles. The natural scales `y_0` are mu_c/sigma_0 for bristles and positions and v_s for
-    velocities (both over the contact radius for angles), so that `atol` is a share of a full bristle deflection. The
-    solver stops exactly at every break of a signal.
+    over each contact's bristles. The natural scales `y_0` are mu_c/sigma_0 for bristles and positions and a tenth of
+    v_s for velocities (a hundredth with the published reduced model; both over the contact radius for angles), so that
+    `atol` is a share of a full bristle deflection. A step that turns the twist of a contact is looked into on its way.
+    The solver stops exactly at every break of a signal.
 
     Parameters
     ----------
@@ -64,7 +65,8 @@ def simulate(
     t_end
         End [s], at most the scene's own.
     rtol, atol
-        Relative and natural-scale tolerances [-], > 0; the scene's own by default.
+        Relative and natural-scale tolerances [-], > 0; the scene's own by default. An `atol` that is not given follows
+        `rtol`, in the proportion of the scene's own.
     save_every
         Recording interval [s]; the scene's own by default. The end is always recorded.
     bristles
@@ -89,7 +91,7 @@ def simulate(
     if end > scene.t_end:
         raise InvalidValueError("t_end", f"be at most the scene's {scene.t_end:g} s", end)
     rtol = scene.rtol if rtol is None else validation.positive("rtol", rtol)
-    atol = scene.atol if atol is None else validation.positive("atol", atol)
+    atol = scene.atol * (rtol / scene.rtol) if atol is None else validation.positive("atol", atol)
     every = scene.save_every if save_every is None else validation.positive("save_every", save_every)
     validation.choice("bristles", bristles, BRISTLES)
     if not isinstance(method, Method):
