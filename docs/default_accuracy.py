@@ -69,6 +69,10 @@ def _row(cells: list[str]) -> str:
     return "| " + " | ".join(cells) + " |"
 
 
+def _length(metres: float) -> str:
+    return f"{1e6 * metres:.2g} µm" if metres >= 1e-7 else f"{1e9 * metres:.2g} nm"
+
+
 def main() -> None:
     """Print both tables."""
     print(_row(["", *MODELS]) + "\n" + _row(["---"] * (len(MODELS) + 1)))
@@ -80,7 +84,7 @@ def main() -> None:
     disc = {kind: next(scenes("Circle", MODELS[kind](PUBLISHED_PATCHES["Circle"]()))) for kind in kinds}
     for rtol in (1e-3, 1e-4, 1e-5, 1e-6, 1e-7):
         found = [motion_errors(disc[kind], rtol) for kind in kinds]
-        print(_row([f"{rtol:.0e}", *(f"{1e6 * m:.2g} µm, {rad:.1e} rad | {steps}" for m, rad, steps in found)]))
+        print(_row([f"{rtol:.0e}", *(f"{_length(m)}, {rad:.1e} rad | {steps}" for m, rad, steps in found)]))
 
 
 if __name__ == "__main__":
