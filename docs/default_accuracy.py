@@ -1,6 +1,6 @@
 """The tables of docs/solver.md: how far runs at the default tolerances end from converged ones, and what tolerances do.
 
-    python docs/default_accuracy.py
+python docs/default_accuracy.py
 """
 
 from __future__ import annotations

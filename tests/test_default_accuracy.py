@@ -34,11 +34,11 @@ accuracy = _script()
 def test_two_pads_end_where_they_should(kind):
     """Load 1: while the plate creeps, the centre of rotation sweeps across a pad, which may hold it, in a step's time.
 
-    Without a look into such steps the reduced model is off by 28 um at 1.2 times the default tolerances, and with v_s as
-    the scale of velocities by 32 to 80 um; the published one by 10 to 23 um.
+    Without a look into such steps the reduced model may be off by 27 um, and with velocities measured against v_s by
+    32 to 80 um; the published one by 10 to 23 um.
     """
     model = accuracy.MODELS[kind](PUBLISHED_PATCHES["NonConvex1"]())
-    errors = accuracy.end_errors(next(accuracy.scenes("NonConvex1", model)), (0.5, 1.0, 1.2, 1.45, 1.5))
+    errors = accuracy.end_errors(next(accuracy.scenes("NonConvex1", model)), (0.5, 1.0, 1.2, 1.25, 1.5))
     assert (errors < MOST).all(), errors
 
 
@@ -93,10 +93,10 @@ def test_velocities_are_measured_against_the_slowest_creep():
     models = {"fine": pf.ReducedModelPublished(patch, LAW), "plain": pf.DistributedModel(patch, LAW)}
     natural = {}
     for name, kinds in {"plain": ["plain"], "both": ["plain", "fine"]}.items():
-        contacts = [pf.Contact(models[kind], 1.0, name=kind) for kind in kinds]
+        contacts = [pf.Contact(models[kind], pf.Signal.constant(1.0), name=kind) for kind in kinds]
         natural[name] = pack(pf.Scene(pf.Body(0.2, 5e-4), contacts, 1.0), 1.0).natural[-6:-3]
     np.testing.assert_allclose(natural["plain"][:2], 0.1 * LAW.v_s, rtol=1e-12)
     np.testing.assert_allclose(natural["both"][:2], 0.01 * LAW.v_s, rtol=1e-12)
     # spins are those that move the lever arm as fast
-    lever = pack(pf.Scene(pf.Body(0.2, 5e-4), [pf.Contact(models["plain"], 1.0)], 1.0), 1.0).models[0].radius
+    lever = models["plain"].packed([None]).radius
     assert natural["plain"][2] == pytest.approx(0.1 * LAW.v_s / lever, rel=1e-12)

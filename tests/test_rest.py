@@ -103,10 +103,10 @@ def test_a_body_thrown_up_a_shallow_slope_stops_there(each):
     angle = np.arctan(0.6 * MU)
     brake = G * (np.sin(angle) + MU * np.cos(angle))
     assert solution.status == "at rest"
-    # it loses sigma_1/sigma_0 mu g of its speed at once, and rings for some milliseconds without damping
+    # it loses sigma_1/sigma_0 mu g of its speed at once, and without damping rings until the solver's own has its way
     left = 0.3 - each.sigma_1 / each.sigma_0 * MU * G
     assert float(solution.data.y[-1]) == pytest.approx(left**2 / (2.0 * brake), rel=5e-3, abs=5e-6)
-    assert float(solution.data.time[-1]) == pytest.approx(left / brake, abs=6e-3)
+    assert float(solution.data.time[-1]) == pytest.approx(left / brake, abs=6e-3 if each.sigma_1 > 0.0 else 1e-2)
 
 
 def test_a_load_that_vanishes_later_is_waited_for():

@@ -108,7 +108,7 @@ def forget_unloaded(own, piece, y):
 def _extend(run, share, value, slope, base, out):
     """Write `base` plus multiples of the continuous extension, less y, and of its slope in s, at a share s of a step.
 
-    The extension is `(1 - s) y + s (new + (1 - s) (d_1 + s (d_2 + ...)))` with `new = y + sum m_j k_j`: a sum of stages.
+    It is `(1 - s) y + s (new + (1 - s) (d_1 + s (d_2 + ...)))` with `new = y + sum m_j k_j`: a sum of stages.
     """
     s, q, m, dense, coupling = (
         run.stage_count,

@@ -90,9 +90,9 @@ class PackedModel(NamedTuple):
     creep: float = CREEP
     """Natural scale of the body's velocity, as a share of v_s [-].
 
-    A body that is about to slip, or has just stopped, creeps at a hundredth of v_s, and friction goes by the direction of
-    its twist however slow it is: with errors of a share of v_s itself that direction is noise, and a patch that should
-    just hold gives way, or the other way round."""
+    A body that is about to slip, or has just stopped, creeps at 1e-4 to 1e-2 of v_s, and friction goes by the direction
+    of its twist however slow it is: if errors are measured against v_s itself, that direction is noise, and a patch
+    that should just hold gives way, or the other way round."""
 
 
 @dataclass(frozen=True, eq=False)

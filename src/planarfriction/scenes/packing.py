@@ -155,8 +155,8 @@ class Windows:
         """Natural scale of each state: mu_c/sigma_0 for deflections and positions, a share of v_s for velocities (that
         of a creep, `models.base.PackedModel.creep`), angles over r.
 
-        The least of all contacts. A velocity is not measured by v_s itself: below it friction hardly changes with speed,
-        but it does with direction.
+        The least of all contacts. Velocities are not measured against v_s itself: below it friction hardly changes with
+        speed, but it does with direction.
         """
         self.bristles = self._contacts.state
         """Where the bristles of each contact begin in the state, int [C + 1]."""

@@ -18,8 +18,8 @@ from planarfriction.families import MODELS
 from planarfriction.scenes.signal import SAME_TIME, Signal, as_signal, sample_count
 
 RTOL, ATOL = 1e-5, 2e-4
-"""Default tolerances: the published in-hand runs of all models end within 2e-6 m and 2e-5 rad of the same model's run at
-a relative tolerance of 1e-9, with these tolerances and with 0.5 to 1.5 times these."""
+"""Default tolerances: with 0.5 to 1.5 times these, the published in-hand runs of all models end within 2e-6 m and
+2e-5 rad of the same model's run at a relative tolerance of 1e-9."""
 
 
 MOST_CONTACTS = 1_000_000
