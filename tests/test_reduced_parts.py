@@ -171,6 +171,18 @@ def test_sliding_parts_dissipate(patch):
     assert (np.einsum("bi,bi->b", wrench, held) < 0.0).all()
 
 
+def test_maps_of_parts_are_blended_over_the_load_as_closely_as_that_of_the_patch():
+    held, blended = twists(40, 6), pf.ReducedModel(SOFT, PLAIN, parts=4, **SMALL)
+    exact = pf.ReducedModel(SOFT, PLAIN, parts=4, load_error=0.0, **SMALL)
+    errors = []
+    for load in np.linspace(1.02, 1.98, 9):
+        pulls = [each.step(np.zeros((4, 3)), held, load, 1e6)[1] / [1.0, 1.0, 0.006] for each in (exact, blended)]
+        errors.append(np.linalg.norm(pulls[1] - pulls[0], axis=1) / np.linalg.norm(pulls[0], axis=1))
+    # each part may be off by as much; that all are at one load, and in one direction, is not seen
+    assert 1e-6 < np.max(errors) < blended.load_error
+    assert len(blended.load_rungs) < 40
+
+
 # ---------------------------------------------------------------------- derivatives of single steps
 
 

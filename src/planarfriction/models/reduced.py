@@ -60,7 +60,8 @@ class ReducedModel(ThreeStateModel):
     speeds: int = 14
     """Nodes of the map over the speed, for the Stribeck part."""
     load_error: float = 4e-3
-    """Largest relative error of z_ss from blending maps over the load; 0 builds a map for each load, which is slow."""
+    """Largest error of z_ss from blending maps over the load, of each part relative to the whole patch; 0 builds a map
+    for each load, which is slow."""
     labels: np.ndarray = field(init=False, repr=False, compare=False)
     """Which part each cell belongs to, `[N]`."""
 
@@ -134,7 +135,7 @@ class ReducedModel(ThreeStateModel):
         maps = self.law.numbers.gamma, self.segments, self.speeds
         cells = (self.labels == k for k in range(self.parts))
         patches = [self.patch] if self.parts == 1 else [part_of(self.patch, each) for each in cells]
-        return tuple(PartShapes(patch, maps, self.load_error) for patch in patches)
+        return tuple(PartShapes(patch, maps, self.parts * self.load_error) for patch in patches)
 
     @functools.cached_property
     def _fixed_parts(self) -> tuple[Part, ...]:
