@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-import importlib.util
+import runpy
 from pathlib import Path
 
 import numpy as np
@@ -171,20 +171,16 @@ def test_tables_of_the_pages_are_those_of_the_report(result):
     docs = Path(__file__).parent.parent / "docs"
     if not docs.is_dir():
         pytest.skip("no docs beside these tests")
-    spec = importlib.util.spec_from_file_location("make_tables", docs / "make_tables.py")
-    make_tables = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(make_tables)
+    make_tables = runpy.run_path(str(docs / "make_tables.py"))
+    with_tables, markdown = make_tables["with_tables"], make_tables["markdown"]
     tables = {table.title: dataclasses.asdict(table) for table in result.tables}
     shown = 0
     for path in docs.glob("*.md"):
-        page = make_tables.with_tables(path.read_text(encoding="utf-8"), tables)  # a title that is not there raises
-        assert make_tables.with_tables(page, tables) == page
+        page = with_tables(path.read_text(encoding="utf-8"), tables)  # a title that is not there raises
+        assert with_tables(page, tables) == page
         shown += page.count("<!-- table: ")
     assert shown >= 11
-    assert (
-        make_tables.markdown({"headings": ("a", "b"), "rows": [("x", 0.123)]})
-        == "| a | b |\n| --- | --- |\n| x | 0.12 |\n"
-    )
+    assert markdown({"headings": ("a", "b"), "rows": [("x", 0.123)]}) == "| a | b |\n| --- | --- |\n| x | 0.12 |\n"
 
 
 def test_the_ladder_draws_every_family_that_was_run(result):
