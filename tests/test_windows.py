@@ -83,6 +83,14 @@ def test_windows_end_where_shapes_take_too_much_room_or_time(monkeypatch, name, 
     assert_same(recorded(scene), whole)
 
 
+@pytest.mark.parametrize("name", MODELS)
+def test_one_window_holds_all_shapes_whatever_they_take(monkeypatch, name):
+    for limit in ("ROOM", "SPELL"):
+        monkeypatch.setattr(base, limit, 0.0)
+    packed = packing.pack(free(MODELS[name]()), 0.02)
+    assert packed.system.motion.breaks[-1] == 0.02 and len(packed.system.motion.row) > 5
+
+
 def test_windows_are_those_of_the_whole_motion():
     """Inputs, breaks and shapes of windows, put together, are those of one window."""
     scene = free(MODELS["distributed"]())

@@ -133,7 +133,8 @@ class FrictionModel(ByValue):
         What a model needs to be simulated in a scene; the solver calls its functions by address. A patch that depends
         on the load is packed as the run goes on: at loads `between` the lowest and the highest of the whole run, to
         which bristles and natural scales belong; at as many of the first of `loads` as `ROOM` and `SPELL` allow, so
-        that there may be fewer records than loads, but one at least.
+        that there may be fewer records than loads, but one at least. Without `between`, these are all loads of the run,
+        and each has its record.
         """
         rule = "be one that can be simulated in a scene: it has no packed(loads)"
         raise InvalidValueError("model", rule, type(self).__name__)

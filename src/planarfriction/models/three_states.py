@@ -164,7 +164,9 @@ class ThreeStateModel(FrictionModel):
         """See `FrictionModel.packed`; the lever arm of a run is that at its highest load."""
         if not self._follows_load:
             return self._packed([self.parts_at(None)] * len(loads), loads)
-        return self._packed(self._first_parts(loads), loads if between is None else between[1:])
+        if between is None:
+            return self._packed(list(self._parts_at(loads)), loads)
+        return self._packed(self._first_parts(loads), between[1:])
 
     def _packed(self, parts: Sequence[tuple[Part, ...]], widest: Sequence[float | None]) -> PackedModel:
         """The parts at some loads as the solver sees them; its lever arm is the largest at the loads `widest`."""
