@@ -31,7 +31,8 @@ SKIPPED = {
 """Not attacked, and why."""
 
 RECORDS = """
-    Rollout RolloutGradient RolloutSensitivities RolloutStates SceneSensitivities Identification Verdict Solution
+    Rollout RolloutGradient RolloutSensitivities RolloutStates RolloutTangent SceneSensitivities Identification Verdict
+    Solution
     SurfaceComparison ModelJacobians PackedModel StepJacobians Statistics Integration
     LimitSurface FrictionLaw FrictionModel Pressure
 """

@@ -24,7 +24,8 @@ REMEMBERED = 4096
 """Loads whose shapes a family remembers."""
 
 MEMORY = 512e6
-"""Bytes of maps beyond which a family forgets all that it has built; default ones take 1 MB each."""
+"""Bytes of maps beyond which a family forgets all that it has built, shared by those of a model; default ones take 1 MB
+each."""
 
 
 class LoadFamily:
@@ -43,8 +44,10 @@ class LoadFamily:
     so that they live as long as anyone reads them, whatever the family forgets.
     """
 
-    def __init__(self, patch: ContactPatch, gamma: float, segments: int, speeds: int, error: float) -> None:
-        self._patch, self._error = patch, error
+    def __init__(
+        self, patch: ContactPatch, gamma: float, segments: int, speeds: int, error: float, families: int = 1
+    ) -> None:
+        self._patch, self._error, self._families = patch, error, families
         self._map = gamma, segments, speeds
         self._sums: dict[float, np.ndarray | None] = {}
         self._good: dict[tuple[float, float], bool] = {}
@@ -146,7 +149,7 @@ class LoadFamily:
         if found is None:
             cells = ScaledCells(self._patch, rung, slip_factor(self._patch, rung))
             found = reduced_map(cells, *self._map)
-            if (len(self._maps) + 1) * found.nbytes > MEMORY:
+            if self._families * (len(self._maps) + 1) * found.nbytes > MEMORY:
                 self._maps, self._shapes = {}, {}
             self._maps[rung] = found
         return found

@@ -33,19 +33,19 @@ class Part(NamedTuple):
 
 
 class PartShapes:
-    """The shapes of a part, built where loads are asked for; any number of threads may ask.
+    """The shapes of one of `parts` parts, built where loads are asked for; any number of threads may ask.
 
-    `maps` are the exponent, the segments and the speeds of its maps, `error` the largest from blending them; 0 builds a
-    map for each load.
+    `maps` are the exponent, the segments and the speeds of its maps, `error` the largest from blending them, relative
+    to the whole patch; 0 builds a map for each load.
     """
 
-    def __init__(self, patch: ContactPatch, maps: tuple[float, int, int], error: float) -> None:
-        self.patch, self._maps, self._error = patch, maps, error
+    def __init__(self, patch: ContactPatch, maps: tuple[float, int, int], error: float, parts: int) -> None:
+        self.patch, self._maps, self._error, self._parts = patch, maps, error, parts
         self._fixed = None if patch.depends_on_load else reduced_shape(patch, None, *maps)
         self._forget()
 
     def _forget(self) -> None:
-        self._family = LoadFamily(self.patch, *self._maps, self._error)
+        self._family = LoadFamily(self.patch, *self._maps, self._parts * self._error, self._parts)
         self._recent: Remembered[ReducedShape] = Remembered(REMEMBERED)
 
     def at(self, loads: Sequence[float | None]) -> list[ReducedShape]:

@@ -25,6 +25,9 @@ from planarfriction.patch.parts import labels_of, part_of
 MOST_SEGMENTS, MOST_SPEEDS = 256, 64
 """Sizes of the maps that are taken: some 0.6 GB for a fixed shape; errors fall with their fourth power."""
 
+MOST_PARTS = 1024
+"""Parts that are taken with maps of 24 segments or less, a GB; of larger ones as many as take that."""
+
 _TOGETHER = 32
 """Loads whose shapes are asked for at once."""
 
@@ -71,7 +74,7 @@ class ReducedModel(ThreeStateModel):
         object.__setattr__(self, "segments", validation.count("segments", self.segments, 4, MOST_SEGMENTS))
         object.__setattr__(self, "speeds", validation.count("speeds", self.speeds, 5, MOST_SPEEDS))
         object.__setattr__(self, "load_error", validation.non_negative("load_error", self.load_error))
-        parts = _count_of(self.parts)
+        parts = _count_of(self.parts, int(MOST_PARTS * min(1.0, 24.0 / self.segments) ** 2))
         if not self.patch.depends_on_load and is_point(self.patch):
             shown = f"{1.0 - self.patch.weights().max():.1g} of it"
             raise InvalidValueError("patch", f"carry more than {POINT} of its load beside its heaviest cell", shown)
@@ -135,7 +138,7 @@ class ReducedModel(ThreeStateModel):
         maps = self.law.numbers.gamma, self.segments, self.speeds
         cells = (self.labels == k for k in range(self.parts))
         patches = [self.patch] if self.parts == 1 else [part_of(self.patch, each) for each in cells]
-        return tuple(PartShapes(patch, maps, self.parts * self.load_error) for patch in patches)
+        return tuple(PartShapes(patch, maps, self.load_error, self.parts) for patch in patches)
 
     @functools.cached_property
     def _fixed_parts(self) -> tuple[Part, ...]:
@@ -182,10 +185,10 @@ class ReducedModel(ThreeStateModel):
         return by_z, by_v @ shape.factor
 
 
-def _count_of(parts: Any) -> int | None:
+def _count_of(parts: Any, most: int) -> int | None:
     """A number of parts, None for "auto"."""
     if isinstance(parts, str):
         if parts != "auto":
             raise InvalidValueError("parts", 'be "auto" or an integer >= 1', validation.quoted(parts))
         return None
-    return validation.count("parts", parts)
+    return validation.count("parts", parts, at_most=most)
