@@ -2,8 +2,9 @@
 
 `xp` is the namespace that supplies `exp`, `sin`, `cos`, `power`, `where`, `minimum` and `maximum`: NumPy, torch and
 jax.numpy pass themselves, compiled loops pass `planarfriction.kernels.compiled_math`. A formula is assignments and one
-return; it has no loop and no branch. Symbols as in Waltersson and Karayiannidis 2024, sections III and IV; each formula
-names the section of docs/physics.md, or the page of docs, where it stands and comes from.
+return; it has no loop and no branch, and chooses what to divide rather than whether to: of that, compilers make a
+branch, and processors do not foresee it. Symbols as in Waltersson and Karayiannidis 2024, sections III and IV; each
+formula names the section of docs/physics.md, or the page of docs, where it stands and comes from.
 
 A bristle is a vector `z` driven by a velocity `u`, of any dimension: two for a cell of the distributed model
 (`u = v`), three for the reduced model (`u = h(V) v_n`). The formulas see only norms and projections:
@@ -123,9 +124,9 @@ def relaxation(xp, decay_dt):
     cancel. ("A step at a held twist")
     """
     remaining = xp.exp(-decay_dt)
-    safe = xp.where(decay_dt > 1e-3, decay_dt, 1.0)
+    far = decay_dt > 1e-3
     series = 1.0 - decay_dt * (0.5 - decay_dt * (1.0 / 6.0 - decay_dt * (1.0 / 24.0 - decay_dt * (1.0 / 120.0))))
-    return remaining, xp.where(decay_dt > 1e-3, (1.0 - remaining) / safe, series)
+    return remaining, xp.where(far, 1.0 - remaining, series) / xp.where(far, decay_dt, 1.0)
 
 
 def reachable_deflection(xp, deflection, law):
@@ -140,7 +141,7 @@ def reachable_deflection(xp, deflection, law):
 def cap(xp, deflection, largest):
     """Factor `min(1, largest/deflection)` that brings a bristle back onto the ball of that radius, direction kept."""
     over = deflection > largest
-    return xp.where(over, largest / xp.where(over, deflection, 1.0), 1.0)
+    return xp.where(over, largest, 1.0) / xp.where(over, deflection, 1.0)
 
 
 # ---------------------------------------------------------------------- moments of the bristles
@@ -248,7 +249,7 @@ def relaxation_slope(xp, decay_dt, remaining, mean):
     series = 1.0 / 5760.0 - x * (1.0 / 45360.0 - x * (1.0 / 403200.0 - x * (1.0 / 3991680.0)))
     series = 1.0 / 8.0 - x * (1.0 / 30.0 - x * (1.0 / 144.0 - x * (1.0 / 840.0 - x * series)))
     series = -0.5 + x * (1.0 / 3.0 - x * series)
-    return xp.where(x > 0.1, (remaining - mean) / xp.where(x > 0.1, x, 1.0), series)
+    return xp.where(x > 0.1, remaining - mean, series) / xp.where(x > 0.1, x, 1.0)
 
 
 def soft_finger(xp, ratio, k):

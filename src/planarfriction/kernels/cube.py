@@ -84,42 +84,34 @@ def square(spot, n):
 
 @kernel
 def levels(t, count):
-    """First of the four levels around `t` in [0, 1] of `count`, and their weights: a uniform cubic B-spline."""
-    u = t * (count - 3)
-    i = min(int(u), count - 4)
+    """First of the four levels around `t` in [0, 1] of `count`, their weights, and the derivatives of these by t.
+
+    A uniform cubic B-spline.
+    """
+    u = t * (count - 3.0)
+    i = xp.minimum(math.floor(u), count - 4.0)
     u -= i
-    v = 1.0 - u
-    sixth = 1.0 / 6.0
-    return i, (
-        v * v * v * sixth,
-        (4.0 + u * u * (3.0 * u - 6.0)) * sixth,
-        (4.0 + v * v * (3.0 * v - 6.0)) * sixth,
-        u * u * u * sixth,
-    )
+    v, sixth, c = 1.0 - u, 1.0 / 6.0, 0.5 * (count - 3.0)
+    near, far = (4.0 + u * u * (3.0 * u - 6.0)) * sixth, (4.0 + v * v * (3.0 * v - 6.0)) * sixth
+    weights = v * v * v * sixth, near, far, u * u * u * sixth
+    return i, weights, (-v * v * c, u * (3.0 * u - 4.0) * c, v * (4.0 - 3.0 * v) * c, u * u * c)
 
 
 @kernel
-def level_slopes(t, count):
-    """Derivatives of the weights of `levels` by t."""
-    u = t * (count - 3)
-    u -= min(int(u), count - 4)
-    v, c = 1.0 - u, 0.5 * (count - 3)
-    return -v * v * c, u * (3.0 * u - 4.0) * c, v * (4.0 - 3.0 * v) * c, u * u * c
-
-
-@kernel
-def read(data, start, n, q):
-    """A map of one level and its slopes by a and by b, three components each."""
-    value, by_u, by_v = patch(data, start + NODE * int(q.at), NODE, NODE * (2 * int(n) + 1), q.u, q.v)
+def read(data, n, q):
+    """A map of one level and its slopes by a and by b, three components each; `q.at` counts all of `data`."""
+    value, by_u, by_v = patch(data, int(q.at), NODE, NODE * (2 * int(n) + 1), q.u, q.v)
     return value, times(n, by_u), times(n, by_v)
 
 
 @kernel
-def read_level(data, start, n, count, q, t):
-    """A map of `count` levels at t, its slopes by a and by b and that by t, three components each."""
-    node, (level, weights) = NODE * int(count), levels(t, int(count))
-    at, row = start + node * int(q.at) + NODE * level, (2 * int(n) + 1) * node
-    value, by_u, by_v, by_t = patch_of_levels(data, at, node, row, weights, level_slopes(t, int(count)), q.u, q.v)
+def read_level(data, n, count, q, weights, slopes):
+    """A map of `count` levels, its slopes by a and by b and that by t, three components each.
+
+    `q.at` counts all of `data` and begins with the first of the four levels of `weights` and `slopes` (see `levels`).
+    """
+    node = NODE * int(count)
+    value, by_u, by_v, by_t = patch_of_levels(data, int(q.at), node, node * (2 * int(n) + 1), weights, slopes, q.u, q.v)
     return value, times(n, by_u), times(n, by_v), by_t
 
 

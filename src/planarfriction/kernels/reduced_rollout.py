@@ -10,7 +10,7 @@ import numpy as np
 
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import cube, jit, kernel, lanes
-from planarfriction.kernels.cube import Square, square
+from planarfriction.kernels.cube import Square
 from planarfriction.kernels.lanes import FIELDS, LANES, OWN, ROW, SLOTS, TWIST, TWIST_BAR, carried, put_slot, slot
 from planarfriction.kernels.law import LAW, LawNumbers
 from planarfriction.kernels.reduced_contact import Shape
@@ -21,6 +21,7 @@ from planarfriction.kernels.steady import (
     QUARTIC,
     STILL,
     Head,
+    Places,
     Readings,
     combined,
     evenness,
@@ -40,11 +41,12 @@ _FLAT_PLACE, _REST_PLACE, _T = (TWIST_BAR + SLOTS * n for n in (0, 3, 6))
 _SPEED, _FLAT, _REST, _FLAT_A, _FLAT_B, _REST_A, _REST_B, _REST_T, _END = (
     FIELDS + SLOTS * n for n in (3, 4, 7, 10, 13, 16, 19, 22, 25)
 )
+_WEIGHTS, _WEIGHT_SLOPES = (FIELDS + SLOTS * n for n in (10, 14))
 _STEADY, _BY_X, _BY_Y, _BY_S, _BY_MU_C, _BY_MU_S, _BY_V_S = _FLAT, _REST, _FLAT_A, _FLAT_B, _REST_A, _REST_B, _REST_T
 
-# Fields of `own`: head and beginning of the map, coefficients of `<u^4>`, evenness of the state.
-_HEAD, _START, _FOURTH, _EVEN, _OWN = (
-    OWN + LANES * n for n in (0, _HEAD_NUMBERS, _HEAD_NUMBERS + 1, _HEAD_NUMBERS + 16, _HEAD_NUMBERS + 17)
+# Fields of `own`: head and beginning of the map, coefficients of `<u^4>`, evenness and norm of the state.
+_HEAD, _START, _FOURTH, _EVEN, _SIZE, _OWN = (
+    OWN + LANES * n for n in (0, *(_HEAD_NUMBERS + m for m in (0, 1, 16, 17, 18)))
 )
 
 
@@ -68,7 +70,8 @@ def _begin(own, c, surface, data):
         own[_HEAD + m * LANES + c] = number(data, start + m)
     for m in range(15):
         own[_FOURTH + m * LANES + c] = number(data, start + QUARTIC + m)
-    own[_EVEN + c] = evenness(_contact(own, c).law, _fourth(own, c), carried(own, c))[0]
+    z = carried(own, c)
+    own[_EVEN + c], own[_SIZE + c] = evenness(_contact(own, c).law, _fourth(own, c), z)[0], norm(z)
 
 
 @kernel
@@ -88,27 +91,43 @@ def _moving(w, i):
 
 
 @kernel
-def _place(w, i, own, c):
-    """Where the twist of a slot lies in the map."""
-    twist, contact, head = slot(w, TWIST, i), _contact(own, c), Head(*gathered(own, _HEAD + c, LANES, _HEAD_NUMBERS))
+def _head(own, c):
+    return Head(*gathered(own, _HEAD + c, LANES, _HEAD_NUMBERS))
+
+
+@kernel
+def _put_four(w, field, i, a):
+    w[field + i], w[field + SLOTS + i] = a[0], a[1]
+    w[field + 2 * SLOTS + i], w[field + 3 * SLOTS + i] = a[2], a[3]
+
+
+@kernel
+def _place(w, i, own, c, slopes, squared):
+    """Where the twist of a slot lies in the map; `squared`: its exponent is 2."""
+    twist, head = slot(w, TWIST, i), _head(own, c)
     v = norm(twist)
     moves = v > STILL
     w[_SPEED + i] = xp.where(moves, v, 0.0)
     put_slot(w, TWIST, i, times(xp.where(moves, 1.0, 0.0), twist))
     u, v = _moving(w, i)
-    spot, t = located(contact.law, head, u, v)
-    flat, rest = square(spot, head.n), square(spot, head.coarse)
-    put_slot(w, _FLAT_PLACE, i, (flat.at, flat.u, flat.v))
-    put_slot(w, _REST_PLACE, i, (rest.at, rest.u, rest.v))
-    w[_T + i] = t
+    if squared:
+        head = Head(head.faces, head.n, head.coarse, head.levels, head.knee, head.least, head.stretch, 2.0)
+    _, places = located(_contact(own, c).law, head, own[_START + c], u, v)
+    put_slot(w, _FLAT_PLACE, i, (places.flat.at, places.flat.u, places.flat.v))
+    put_slot(w, _REST_PLACE, i, (places.rest.at, places.rest.u, places.rest.v))
+    w[_T + i] = places.t
+    _put_four(w, _WEIGHTS, i, places.weights)
+    if slopes:
+        _put_four(w, _WEIGHT_SLOPES, i, places.slopes)
 
 
 @kernel
 def _look(w, i, own, c, data, slopes):
     """What the map holds there."""
-    head, start = Head(*gathered(own, _HEAD + c, LANES, _HEAD_NUMBERS)), int(own[_START + c])
+    weights = gathered(w, _WEIGHTS + i, SLOTS, 4)
+    changes = gathered(w, _WEIGHT_SLOPES + i, SLOTS, 4) if slopes else (0.0, 0.0, 0.0, 0.0)
     flat, rest = Square(*slot(w, _FLAT_PLACE, i)), Square(*slot(w, _REST_PLACE, i))
-    read = readings(data, start, head, flat, rest, w[_T + i])
+    read = readings(data, _head(own, c), Places(flat, rest, 0.0, weights, changes))
     put_slot(w, _FLAT, i, read.flat)
     put_slot(w, _REST, i, read.rest)
     if slopes:
@@ -133,7 +152,7 @@ def _read(w, i, slopes):
 @kernel
 def _finish(w, i, own, c, slopes):
     """The steady state of a slot and its slopes."""
-    contact, head = _contact(own, c), Head(*gathered(own, _HEAD + c, LANES, _HEAD_NUMBERS))
+    contact, head = _contact(own, c), _head(own, c)
     (u, v), moves = _moving(w, i), w[_SPEED + i] > 0.0
     spot, t = cube.locate(u[0], u[1], head.stretch * u[2], head.faces), w[_T + i]
     found = floored(contact.law, u, v, combined(contact.law, head, u, v, spot, t, _read(w, i, slopes)))
@@ -150,13 +169,24 @@ def _finish(w, i, own, c, slopes):
 
 
 @kernel
-def _places(w, own, lanes):
-    for c in range(lanes):
-        _place(w, c, own, c)
+def _places(w, own, lanes, steps, slopes, squared):
+    alone = np.int64(0)
+    if lanes == 1:
+        for i in range(steps):
+            _place(w, i, own, alone, slopes, squared)
+    else:
+        for t in range(steps):
+            _place_row(w[t * lanes :], own, lanes, slopes, squared)
 
 
 @kernel
-def _finishes(w, own, lanes, slopes):
+def _place_row(w, own, lanes, slopes, squared):
+    for c in range(lanes):
+        _place(w, c, own, c, slopes, squared)
+
+
+@kernel
+def _finish_row(w, own, lanes, slopes):
     for c in range(lanes):
         _finish(w, c, own, c, slopes)
 
@@ -164,13 +194,13 @@ def _finishes(w, own, lanes, slopes):
 @kernel
 def _prepare(w, own, inputs, lanes, steps, slopes):
     """Steady states of all slots: in vector code over the lanes, or over the steps of a single one."""
-    alone = np.int64(0)
-    if lanes == 1:
-        for i in range(steps):
-            _place(w, i, own, alone)
+    alone, squared = np.int64(0), True
+    for c in range(lanes):
+        squared = squared and _head(own, c).gamma == 2.0
+    if squared:
+        _places(w, own, lanes, steps, slopes, True)
     else:
-        for t in range(steps):
-            _places(w[t * lanes :], own, lanes)
+        _places(w, own, lanes, steps, slopes, False)
     for t in range(steps):
         for c in range(lanes):
             _look(w, t * lanes + c, own, c, inputs.data, slopes)
@@ -179,7 +209,7 @@ def _prepare(w, own, inputs, lanes, steps, slopes):
             _finish(w, i, own, alone, slopes)
     else:
         for t in range(steps):
-            _finishes(w[t * lanes :], own, lanes, slopes)
+            _finish_row(w[t * lanes :], own, lanes, slopes)
 
 
 # ---------------------------------------------------------------------- bound to this model
@@ -193,15 +223,15 @@ def _held(w, c):
 @kernel
 def _advance(w, own, c, z, none, dt):
     even = own[_EVEN + c], (0.0, 0.0, 0.0)  # its slopes are those of the way back
-    step = advance(_contact(own, c), _fourth(own, c), _held(w, c), z, even, dt)
-    own[_EVEN + c] = xp.where(none, 1.0, step.even[0])
+    step = advance(_contact(own, c), _fourth(own, c), _held(w, c), z, own[_SIZE + c], even, dt)
+    own[_EVEN + c], own[_SIZE + c] = xp.where(none, 1.0, step.even[0]), xp.where(none, 0.0, step.norm)
     return step.new, step.wrench
 
 
 @kernel
 def _retreat(w, own, c, z, dt, new, pull):
     contact, fourth, m = _contact(own, c), _fourth(own, c), gathered(w, _BY_X + c, SLOTS, 18)
-    step = advance(contact, fourth, _held(w, c), z, evenness(contact.law, fourth, z), dt)
+    step = advance(contact, fourth, _held(w, c), z, norm(z), evenness(contact.law, fourth, z), dt)
     return step.wrench, pull_back(contact, step, Slopes(m[:9], m[9:12], m[12:15], m[15:]), new, pull)
 
 

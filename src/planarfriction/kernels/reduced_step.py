@@ -118,6 +118,8 @@ class Step(NamedTuple):
     """State."""
     even: tuple
     """Evenness of the new state, and its slopes."""
+    norm: float
+    """Of the new state."""
     wrench: tuple
     """About the origin, per unit load."""
 
@@ -163,24 +165,27 @@ def _stage(law, z, even, stretch, deflection, share):
 def linearise(contact, held, z, dt):
     """`Step` from the state z."""
     fourth = fourth_moments(contact.shape, contact.surface, contact.data)
-    return advance(contact, fourth, held, z, evenness(contact.law, fourth, z), dt)
+    return advance(contact, fourth, held, z, norm(z), evenness(contact.law, fourth, z), dt)
 
 
 @kernel
-def advance(contact, fourth, held, z, before, dt):
-    """`Step` from the state z, of which `before` is the `evenness`; `fourth`: see `steady.fourth_moments`."""
+def advance(contact, fourth, held, z, norm_z, even, dt):
+    """`Step` from the state z, of which `even` is the `evenness`; `fourth`: see `steady.fourth_moments`.
+
+    Each step waits for the last one's state. So the norm and the evenness of that come in, and those of the new one are
+    found beside the cap, not behind it: it changes neither the direction nor, by itself, the norm's digits.
+    """
     law, u, q = contact.law, held.u, held.q
     per_q2, power = 1.0 / dot(q, q), dot(u, q)
+    per_q = math.sqrt(per_q2)
     per_power = 1.0 / xp.where(power > 0.0, power, 1.0)
     decay, slow = held.v * held.v * per_power, power * per_q2
     m = plus(u, -decay, q)
-    start = _stage(law, z, before, per_q2, math.sqrt(dot(z, z) * per_q2), dot(z, q) * per_q2)
+    start = _stage(law, z, even, per_q2, norm_z * per_q, dot(z, q) * per_q2)
     per_slow, per = 1.0 / (1.0 + start.beta * slow * dt), 1.0 / (1.0 + start.beta * decay * dt)
     share = (start.share + slow * dt) * per_slow
     ahead = plus(plus(z, dt, u), -dt * start.beta * share, m)
-    predicted = _stage(
-        law, ahead, evenness(law, fourth, ahead), per * per * per_q2, per * math.sqrt(dot(ahead, ahead) * per_q2), share
-    )
+    predicted = _stage(law, ahead, evenness(law, fourth, ahead), per * per * per_q2, per * norm(ahead) * per_q, share)
     # the mean of beta
     beta = formulas.mean_decay(start.beta, predicted.beta, decay * dt)
     by_start, by_end = formulas.mean_decay_partials(start.beta, predicted.beta, decay * dt)
@@ -194,22 +199,24 @@ def advance(contact, fourth, held, z, before, dt):
     left_slow, mean_slow = formulas.relaxation(xp, slow_rate)
     left_gap, mean_gap = formulas.relaxation(xp, gap)
     left = left_slow * left_gap
-    mean = (slow_rate * mean_slow + gap * mean_gap * left_slow) / xp.where(rate > 0.0, rate, 1.0)
-    mean = xp.where(rate > 0.0, mean, 1.0)
+    per_rate = 1.0 / xp.where(rate > 0.0, rate, 1.0)
+    mean = xp.where(rate > 0.0, slow_rate * mean_slow + gap * mean_gap * left_slow, 1.0) * per_rate
     across = (1.0 - beta * start.share) * dt * left_slow * mean_gap
     free = plus(plus(times(left, z), mean * decay * dt, q), across, m)
-    size = math.sqrt(dot(free, free) * per_q2)
+    norm_free = norm(free)
+    size = norm_free * per_q
     largest = formulas.reachable_deflection(xp, start.deflection, law)
     back = formulas.cap(xp, size, largest)
     new = times(back, free)
-    after = evenness(law, fourth, new)
+    even_free, by_free = evenness(law, fourth, free)
+    after = even_free, times(1.0 / back, by_free)
     end = _stage(law, new, after, per_q2, size * back, dot(free, q) * per_q2 * back)
     slip = plus(plus(u, -end.beta * decay, new), -end.beta * end.share, m)
     return Step(
         held, dt, m, per_q2, per_power, decay, slow, start, per_slow, per, predicted, beta, by_start, by_end, by_decay,
         left_slow, left, mean_gap, formulas.relaxation_slope(xp, gap, left_gap, mean_gap),
         mean, formulas.relaxation_slope(xp, rate, left, mean),
-        end, free, size, back, size > largest * ROUNDING, start.deflection > 1.0, slip, new, after,
+        end, free, size, back, size > largest * ROUNDING, start.deflection > 1.0, slip, new, after, back * norm_free,
         reduced.wrench(
             law, contact.shape, new[0], new[1], new[2], slip[0], slip[1], slip[2], u[0], u[1], u[2]
         ),

@@ -102,20 +102,37 @@ class Readings(NamedTuple):
     rest_t: tuple
 
 
+class Places(NamedTuple):
+    """Where to read a map: both parts, of which each `at` counts all data, and t with what belongs to it."""
+
+    flat: cube.Square
+    rest: cube.Square
+    t: float
+    weights: tuple
+    slopes: tuple
+
+
 @kernel
-def located(law, head, u, v):
-    """Where a scaled twist that moves at v lies in a map: its `Spot`, and t."""
+def located(law, head, start, u, v):
+    """`Spot` and `Places` of a scaled twist that moves at v, in the map that begins at `start`."""
     spot = cube.locate(u[0], u[1], head.stretch * u[2], head.faces)
-    return spot, formulas.stribeck_place(xp, v, law.v_s, head.gamma, head.knee)
+    t = formulas.stribeck_place(xp, v, law.v_s, head.gamma, head.knee)
+    flat, rest = cube.square(spot, head.n), cube.square(spot, head.coarse)
+    level, weights, slopes = cube.levels(t, head.levels)
+    side, first = 2.0 * head.n + 1.0, start + HEADER
+    second = first + head.faces * side * side * cube.NODE
+    flat = cube.Square(first + cube.NODE * flat.at, flat.u, flat.v)
+    rest = cube.Square(second + cube.NODE * (head.levels * rest.at + level), rest.u, rest.v)
+    return spot, Places(flat, rest, t, weights, slopes)
 
 
 @kernel
-def readings(data, start, head, flat, rest, t):
-    """`Readings` of the map that begins at `start`, at a `Square` of each part."""
-    first, side = start + HEADER, 2 * int(head.n) + 1
-    second = first + int(head.faces) * side * side * cube.NODE
-    value, by_a, by_b = cube.read(data, first, head.n, flat)
-    rest, rest_a, rest_b, rest_t = cube.read_level(data, second, head.coarse, head.levels, rest, t)
+def readings(data, head, places):
+    """`Readings` of a map."""
+    value, by_a, by_b = cube.read(data, head.n, places.flat)
+    rest, rest_a, rest_b, rest_t = cube.read_level(
+        data, head.coarse, head.levels, places.rest, places.weights, places.slopes
+    )
     return Readings(value, by_a, by_b, rest, rest_a, rest_b, rest_t)
 
 
@@ -149,9 +166,8 @@ def combined(law, head, u, v, spot, t, read):
 def _map(law, data, start, u, v):
     """`Steady` of one map, in front of the floor of the dissipation."""
     head = head_of(data, start)
-    spot, t = located(law, head, u, v)
-    read = readings(data, start, head, cube.square(spot, head.n), cube.square(spot, head.coarse), t)
-    return combined(law, head, u, v, spot, t, read)
+    spot, places = located(law, head, float(start), u, v)
+    return combined(law, head, u, v, spot, places.t, readings(data, head, places))
 
 
 @kernel
