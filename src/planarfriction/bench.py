@@ -259,9 +259,9 @@ def _step_published_call(name: str, full: bool) -> Measurement:
     return _line(name, _python_step(model, 2000) * 1e6, "us", "one Python call of rate", rate * 1e6)
 
 
-def _step_reduced_loop(name: str, full: bool) -> Measurement:
+def _step_reduced_loop(name: str, full: bool, parts: int = 1) -> Measurement:
     twists = _mixed_twists(20_000)
-    ours, theirs = _compiled_loop(ReducedModel(_disc(), _law()), twists), _published_loop(twists)
+    ours, theirs = _compiled_loop(ReducedModel(_disc(), _law(), parts=parts), twists), _published_loop(twists)
     return _line(name, ours / len(twists) * 1e6, "us", _AGAINST_PUBLISHED, theirs / len(twists) * 1e6)
 
 
@@ -324,9 +324,22 @@ def _eager_gradient(model: ReducedModelPublished, twists: np.ndarray, dt: float,
 
 
 def _gradient_published_batch(name: str, full: bool) -> Measurement:
+    both, once = _batch(ReducedModelPublished(_disc(), _law()))
+    words = "the roll-out alone (the ratio is the share of its speed)"
+    return Measurement(name, both, "million contact-steps/s", words, once, both / once)
+
+
+def _gradient_reduced_batch(name: str, full: bool) -> Measurement:
+    (both, once), (theirs, alone) = (_batch(model(_disc(), _law())) for model in (ReducedModel, ReducedModelPublished))
+    words = f"{_AGAINST_PUBLISHED} (the roll-outs alone: {once:.3g} and {alone:.3g})"
+    return Measurement(name, both, "million contact-steps/s", words, theirs, both / theirs)
+
+
+def _batch(model: ReducedModel | ReducedModelPublished) -> tuple[float, float]:
+    """Million contact-steps/s of a thousand roll-outs with their gradient, and of the roll-outs alone."""
     from planarfriction import autodiff
 
-    model, contacts, steps, dt = ReducedModelPublished(_disc(), _law()), 1000, 1000, 1e-4
+    contacts, steps, dt = 1000, 1000, 1e-4
     twists = _mixed_twists(contacts * steps).reshape(contacts, steps, 3)
     loads = np.full((contacts, steps), 2.0)
 
@@ -334,10 +347,9 @@ def _gradient_published_batch(name: str, full: bool) -> Measurement:
         _, wrenches, states = autodiff.rollout_states(model, model.rest(), twists, loads, dt)
         autodiff.rollout_gradient(model, model.rest(), twists, loads, dt, wrenches, states=states)
 
-    both = 1e-6 * contacts * steps / _median(value_and_gradient, 5)
-    once = 1e-6 * contacts * steps / _median(lambda: autodiff.rollout(model, model.rest(), twists, loads, dt), 5)
-    words = "the roll-out alone (the ratio is the share of its speed)"
-    return Measurement(name, both, "million contact-steps/s", words, once, both / once)
+    both = _median(value_and_gradient, 5)
+    once = _median(lambda: autodiff.rollout(model, model.rest(), twists, loads, dt), 5)
+    return 1e-6 * contacts * steps / both, 1e-6 * contacts * steps / once
 
 
 def _import(name: str, full: bool) -> Measurement:
@@ -366,10 +378,12 @@ BENCHMARKS: dict[str, Callable[[str, bool], Measurement]] = {
     "step.distributed.loop": _step_distributed_loop,
     "step.published.call": _step_published_call,
     "step.reduced.loop": _step_reduced_loop,
+    "step.reduced.parts4.loop": lambda name, full: _step_reduced_loop(name, full, parts=4),
     "step.reduced.call": _step_reduced_call,
     "gradient.published": _gradient_published,
     "gradient.published.batch": _gradient_published_batch,
     "gradient.reduced": _gradient_reduced,
+    "gradient.reduced.batch": _gradient_reduced_batch,
     "import": _import,
 }
 """Benchmarks by name."""
