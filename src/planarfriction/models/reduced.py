@@ -42,6 +42,9 @@ class ReducedModel(ThreeStateModel):
     `|z|/|z_ss|` and the angle between z and z_ss. Exact: pre-sliding stiffness, viscous friction, steady sliding, and
     translation. State: `(z_x, z_y, z_theta)` [m]; the third is the moment over the radius of gyration of the pressure.
 
+    Each of several `parts` is a patch with moments of its own, state `[parts, 3]`. They see the same twist and share
+    the load; the wrench is the sum of theirs. As many parts as cells are the distributed model (docs/physics.md).
+
     `z_ss` comes from a stored map over direction and speed with continuous slopes. A patch that depends on the load has
     maps at a ladder of loads, blended in between; they are built where loads are asked for (see `LoadFamily`). The
     state is kept when the shape changes. Where one cell carries all but a millionth of the load, the contact is a point
