@@ -209,6 +209,65 @@ def test_the_adjoint_agrees_with_the_eager_roll_out():
     close(by_twist, twist, 1e-8)
 
 
+def law_of(law: str = "elasto-plastic"):
+    return jnp.stack(pair(law)[1].parameters)
+
+
+def square(method: str | None, steps: int = 4):
+    """Loss of the law in a row, and of twists."""
+
+    def loss(parameters, twists):
+        run = pj.rollout(pair("elasto-plastic")[1], None, twists, 2.0, 1e-4, parameters=parameters, method=method)
+        return jnp.square(run.wrenches * WEIGHTS).sum()
+
+    return loss, (law_of(), jnp.asarray(sway(steps)))
+
+
+@pytest.mark.parametrize("method", [None, "adjoint"])
+def test_forward_mode_is_reverse_mode(method):
+    loss, at = square(method)
+    by_law, by_twist = jax.jit(jax.jacfwd(loss, (0, 1)))(*at)
+    law, twist = jax.grad(loss, (0, 1))(*at)
+    np.testing.assert_allclose(by_law, law, rtol=1e-11)
+    close(by_twist, twist, 1e-11)
+
+
+def test_a_roll_out_of_a_batch_has_the_gradients_of_its_members():
+    loss, (law, twists) = square(None)
+    laws = jnp.stack([law, 1.1 * law])
+    together = jax.grad(lambda laws: jax.vmap(loss, (0, None))(laws, twists).sum())(laws)
+    by_twist = jax.grad(lambda twists: jax.vmap(loss, (0, None))(laws, twists).sum())(twists)
+    each = [jax.grad(loss, (0, 1))(one, twists) for one in laws]
+    np.testing.assert_allclose(together, np.stack([slope for slope, _ in each]), rtol=1e-12)
+    close(by_twist, each[0][1] + each[1][1], 1e-12)
+
+
+@pytest.mark.parametrize(
+    "twice", [jax.hessian, lambda f: jax.grad(lambda x: jax.grad(f)(x).sum()), lambda f: jax.jacfwd(jax.jacfwd(f))]
+)
+def test_second_derivatives_by_the_adjoint_are_one_line(twice):
+    loss, (law, twists) = square("adjoint")
+    with pytest.raises(pf.FrictionError, match="leave method out, or take 'eager', to differentiate twice") as caught:
+        twice(lambda law: loss(law, twists))(law)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.slow
+def test_without_a_method_what_the_adjoint_does_not_do_is_left_to_operations_of_jax():
+    def derivatives(method):
+        loss, (law, twists) = square(method)
+        hessian = jax.jit(jax.hessian(lambda law: loss(law, twists)))(law)
+        _, product = jax.jit(lambda x: jax.jvp(jax.grad(lambda law: loss(law, twists)), (law,), (x,)))(law)
+
+        def by_step(dt):
+            return pj.rollout(pair("elasto-plastic")[1], None, twists, 2.0, dt, method=method).wrenches.sum()
+
+        return law[:, None] * hessian * law, law * product, jax.grad(by_step)(1e-4)
+
+    for found, wanted in zip(derivatives(None), derivatives("eager"), strict=True):
+        np.testing.assert_allclose(found, wanted, rtol=1e-9, atol=1e-9 * np.abs(wanted).max())
+
+
 # ---------------------------------------------------------------------- PyTorch
 
 

@@ -179,7 +179,7 @@ def test_bristles_of_the_other_kind_are_refused(kind):
         (
             lambda: module("reduced"),
             lambda: module("reduced", segments=10),
-            r"state_dict must hold a map of the same size as the model \(faces, segments, ...\), \(3, 8, ",
+            r"state_dict must hold maps of the same sizes as the model \(faces, segments, ...\), \(3, 8, ",
         ),
         (
             lambda: module("published", surface=pf.LimitSurfaceEllipsoid(PATCH)),

@@ -84,15 +84,14 @@ def test_sliding_straight_has_the_friction_of_the_stribeck_curve(law):
 def test_a_stuck_patch_is_a_spring():
     model, state = module(), tensor([1e-9, -2e-9, 1e-9])
     slope = torch.func.jacrev(lambda z: model.step(z, tensor([0.0] * 3), 2.0, 1e-3)[1])(state)
-    np.testing.assert_allclose(slope.detach().numpy(), -2.0 * 1e6 * model.factor.T, rtol=1e-13, atol=1e-6)
+    np.testing.assert_allclose(slope.detach().numpy(), -2.0 * 1e6 * model.factor[0].T, rtol=1e-13, atol=1e-6)
 
 
 def test_a_map_of_six_faces_is_read_as_the_odd_one_that_it_repeats():
     model, reference = module(), compiled("elasto-plastic")
-    three = model._shape
+    law, three, _ = model.prepare(model.physical())[0]
     signs = tensor([-1.0, 1.0, 1.0, -1.0])
     flat, rest = (torch.cat([part, part.flip(1, 2) * signs]) for part in (three.flat, three.rest))
-    law = model.prepare(model.physical()).law
     twist = tensor(samples(reference)[1])
     odd, other = (reduced_arrays.held(xp, law, s, twist).q for s in (three, three._replace(flat=flat, rest=rest)))
     torch.testing.assert_close(odd, other, rtol=1e-12, atol=1e-20)

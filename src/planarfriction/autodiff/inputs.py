@@ -102,7 +102,7 @@ def checked(
         parts,
         [rows_of("parameters", part.rows, part.rows.shape[-1:], batch) for part in parts],
         by_part(np.broadcast_to(state, (*batch, *inner)).reshape(count, *inner), len(parts)),
-        rows_of("twist", twist, (steps, 3), batch),
+        parts[0].turned(rows_of("twist", twist, (steps, 3), batch)),
         rows_of("normal_force", load, (steps,), batch),
         np.require(dt, float, ["C", "W", "A"]),
         batch,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,11 +10,12 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
+from planarfriction.geometry import transformed
 from planarfriction.kernels import published_rollout, published_step, reduced_rollout, reduced_step
 from planarfriction.models import ReducedModel, ReducedModelPublished
+from planarfriction.models.reduced_arrays import MapSizes, starts_of
 from planarfriction.models.reduced_map import ReducedShape
-from planarfriction.models.reduced_published import PublishedShape
-from planarfriction.patch.metric import refuse_anisotropy
+from planarfriction.models.reduced_published import PublishedShape, axes_of
 
 PARAMETERS = (
     "sigma_0",
@@ -74,6 +75,12 @@ class Packed(NamedTuple):
     family: Family = PUBLISHED
     share: float = 1.0
     """Of the load."""
+    axes: np.ndarray | None = None
+    """Symmetric `[3, 3]`, or None: twists go in through it, wrenches come out."""
+
+    def turned(self, vectors: np.ndarray) -> np.ndarray:
+        """Twists into the axes of the compiled loops or wrenches out of them, `[..., 3]`."""
+        return vectors if self.axes is None else transformed(self.axes, vectors)
 
 
 def parameter_names(model: Any) -> tuple[str, ...]:
@@ -121,8 +128,8 @@ def _family(model: Any) -> Family:
 
 
 def has_one_shape(model: Any) -> bool:
-    """Whether a model is a reduced one that compiled roll-outs know: isotropic, and with one shape for all loads."""
-    if not isinstance(model, ReducedModel | ReducedModelPublished) or model.patch.anisotropic:
+    """Whether a model is a reduced one that compiled roll-outs know: with one shape for all loads."""
+    if not isinstance(model, ReducedModel | ReducedModelPublished):
         return False
     return not model.patch.depends_on_load or getattr(model, "on_load_change", None) == "keep"
 
@@ -137,7 +144,6 @@ def _packed(model: Any) -> tuple[Packed, ...]:
             + (", or on_load_change='keep'" if how else ""),
             f"on_load_change={how!r}" if how else "a patch that depends on the load",
         )
-    refuse_anisotropy(model.patch, "derivatives of roll-outs")
     return tuple(pack_shape(model.law.numbers, shape)._replace(share=share) for share, shape in model.parts_at(1.0))
 
 
@@ -147,18 +153,32 @@ def pack_shape(law: LawNumbers, shape: ReducedShape | PublishedShape) -> Packed:
     if isinstance(shape, ReducedShape):
         return Packed(row, np.zeros(3, dtype=int), shape.data, REDUCED)
     numbers = shape.surface.numbers
-    return Packed(row, np.array([numbers.kind, 0, numbers.size]), numbers.data, PUBLISHED)
+    axes = None if (shape.root == np.eye(2)).all() else axes_of(shape.root)
+    return Packed(row, np.array([numbers.kind, 0, numbers.size]), numbers.data, PUBLISHED, axes=axes)
 
 
-def pack_map(elasto_plastic: bool, factor: np.ndarray, data: np.ndarray) -> Packed:
-    """`ReducedModel` by its F and its map, for roll-outs at given parameters, which take the place of those here."""
-    return pack_shape(_any_law(elasto_plastic), ReducedShape(factor, np.ascontiguousarray(data, dtype=np.float32)))
+def pack_maps(
+    elasto_plastic: bool, sizes: Sequence[MapSizes], shares: np.ndarray, factors: np.ndarray, data: np.ndarray
+) -> tuple[Packed, ...]:
+    """`ReducedModel` by its parts, for roll-outs at given parameters, which take the place of those here.
+
+    `shares` `[P]` of the load, F `[P, 3, 3]`, and the maps one behind the other.
+    """
+    law, data = _any_law(elasto_plastic), np.ascontiguousarray(data, dtype=np.float32)
+    maps = (data[at : at + size.count] for at, size in zip(starts_of(sizes), sizes, strict=True))
+    shapes = (ReducedShape(factor, each) for factor, each in zip(factors, maps, strict=True))
+    return tuple(
+        pack_shape(law, shape)._replace(share=float(share)) for share, shape in zip(shares, shapes, strict=True)
+    )
 
 
-def pack_surface(elasto_plastic: bool, kind: int, size: int, data: np.ndarray) -> Packed:
+def pack_surface(
+    elasto_plastic: bool, kind: int, size: int, data: np.ndarray, root: np.ndarray | None = None
+) -> tuple[Packed]:
     """`ReducedModelPublished` by its limit surface, for roll-outs at given parameters of law and shape."""
     row = np.array([*_any_law(elasto_plastic), *np.zeros(len(published_step.NAMES) - len(LawNumbers._fields))])
-    return Packed(row, np.array([kind, 0, size]), np.ascontiguousarray(data, dtype=float), PUBLISHED)
+    data = np.ascontiguousarray(data, dtype=float)
+    return (Packed(row, np.array([kind, 0, size]), data, PUBLISHED, axes=None if root is None else axes_of(root)),)
 
 
 def _any_law(elasto_plastic: bool) -> LawNumbers:

@@ -137,8 +137,8 @@ def rollout_gradient(
     Raises `InvalidValueError` as `rollout` does, and for a model that is not a reduced one of fixed shape.
     """
     inputs = checked(model, state, twist, normal_force, dt, parameters)
-    count, steps, inner = inputs.state.shape[1], len(inputs.dt), inputs.inner
-    cotangents = rows_of("wrenches_bar", wrenches_bar, (steps, 3), inputs.batch)
+    count, steps, inner, turned = inputs.state.shape[1], len(inputs.dt), inputs.inner, inputs.parts[0].turned
+    cotangents = turned(rows_of("wrenches_bar", wrenches_bar, (steps, 3), inputs.batch))
     if states is None:
         on_the_way = _roll(inputs, steps)[2]
     else:
@@ -154,7 +154,7 @@ def rollout_gradient(
     start = np.empty(inner) if state is None else state
     return RolloutGradient(
         sum_to(np.shape(start), inputs.shaped(z_bar)),
-        sum_to(np.shape(twist), inputs.of_all(bars.twist)),
+        sum_to(np.shape(twist), inputs.of_all(turned(bars.twist))),
         sum_to(np.shape(normal_force), inputs.of_all(bars.load)),
         sum_to(np.shape(given), inputs.of_all(rows_bar.sum(axis=0)[:, family.columns])),
     )
@@ -187,8 +187,9 @@ def rollout_sensitivities(
         wrenches *= part.share
         slopes *= part.share
 
-    wrenches, slopes = summed(inputs, shapes, run)
-    return RolloutSensitivities(inputs.shaped(end), wrenches, slopes)
+    turned, (wrenches, slopes) = inputs.parts[0].turned, summed(inputs, shapes, run)
+    slopes = np.swapaxes(turned(np.swapaxes(slopes, -1, -2)), -1, -2)
+    return RolloutSensitivities(inputs.shaped(end), turned(wrenches), slopes)
 
 
 def rollout_tangent(
@@ -228,16 +229,17 @@ def rollout_tangent(
     rows = np.zeros((len(values), inputs.rows[0].shape[-1]))
     rows[:, family.columns] = values
     end, count = inputs.state.copy(), inputs.state.shape[1]
-    moved = np.zeros_like(end)
+    moved, turned = np.zeros_like(end), parts[0].turned
     moved[:] = by_part(z, len(parts))
+    turns = turned(twists)
 
     def run(k: int, part: Packed, packed: Inputs, wrenches: np.ndarray, slopes: np.ndarray) -> None:
-        bars = Bars(moved[k], twists, loads, rows)
+        bars = Bars(moved[k], turns, loads, rows)
         share(packed, count, lambda *span: part.family.tangent(packed, span, end[k], bars, wrenches, slopes))
         wrenches *= part.share
         slopes *= part.share
 
-    wrenches, slopes = summed(inputs, ((count, *steps, 3),) * 2, run)
+    wrenches, slopes = map(turned, summed(inputs, ((count, *steps, 3),) * 2, run))
     return RolloutTangent(inputs.shaped(end), wrenches, inputs.shaped(moved), slopes)
 
 
@@ -250,7 +252,7 @@ def _roll(inputs: RolloutInputs, kept: int) -> tuple[np.ndarray, np.ndarray, np.
     states, wrenches = np.empty((len(end), count, kept, 3)), np.empty((count, len(inputs.dt), 3))
     lanes, family = inputs.lanes(), inputs.parts[0].family
     share(lanes, count, lambda *span: family.rollout(lanes, span, end, wrenches, states))
-    return end, inputs.of_all(wrenches), states
+    return end, inputs.of_all(inputs.parts[0].turned(wrenches)), states
 
 
 def _stepped(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any) -> Rollout:

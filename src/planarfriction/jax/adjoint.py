@@ -1,158 +1,207 @@
-"""The compiled roll-out and its discrete adjoint (`planarfriction.autodiff`) as a function that JAX differentiates."""
+"""The compiled roll-out with its derivatives (`planarfriction.autodiff`) as primitives that JAX differentiates.
+
+`roll` has the linear `push`, forwards, as its derivative, whose transpose is `pull`, backwards: the discrete adjoint.
+What they do not do, higher derivatives and those by dt and by the numbers of the patch, is left to the roll-out of
+operations of JAX. All operands have `outer` leading axes, those that `vmap` has put there.
+"""
 
 from __future__ import annotations
 
 import functools
-from typing import NamedTuple
+from collections.abc import Callable
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from jax.custom_derivatives import SymbolicZero
+from jax.core import ShapedArray
+from jax.extend.core import Primitive
+from jax.interpreters import ad, batching, mlir
 
-from planarfriction import autodiff
-from planarfriction.autodiff.parameters import Packed, pack_map, pack_surface
-from planarfriction.errors import InvalidValueError
-from planarfriction.formulas import LARGEST
-from planarfriction.jax.published import ReducedModelPublished
-from planarfriction.jax.reduced import ReducedModel
+from planarfriction.errors import FrictionError, InvalidValueError
+from planarfriction.jax import callbacks
+from planarfriction.jax.callbacks import Kind
 
-
-class _Kind(NamedTuple):
-    """What is fixed when a function is compiled."""
-
-    leaf: str
-    """What of the model is held fixed."""
-    sizes: tuple
-    """Kind and size of a surface."""
-    elasto_plastic: bool
+_RESULTS, _INPUTS = 2, 4
+"""Last state and wrenches; parameters, state, twists and loads."""
 
 
-def rollout(model, state, twist, normal_force, dt) -> tuple[jax.Array, jax.Array]:
-    """Last state `[..., 3]` and wrenches `[..., T, 3]`; state, twist and normal_force have the same batch axes."""
-    if isinstance(model, ReducedModelPublished):
-        leaf, sizes, data = "surface", (model.surface.kind, model.surface.size), model.surface.data
-    elif isinstance(model, ReducedModel):
-        leaf, sizes = "shape", ()
-        data = jnp.concatenate([model.shape.factor.reshape(-1), model.shape.map])
+def rollout(model: Any, state, twist, normal_force, dt, *, strict: bool) -> tuple[jax.Array, jax.Array]:
+    """Last state and wrenches `[..., T, 3]`; state, twist and normal_force have the same batch axes."""
+    leaves, structure = jax.tree.flatten(model)
+    count = len(model.parameters)
+    kind = Kind(structure, count, model.rest().ndim, model.leaves[1], strict)
+    held = (jnp.asarray(dt), *map(jnp.asarray, leaves[count:]))
+    inputs = jnp.stack(leaves[:count]), state, twist, normal_force
+    end, wrenches, *_ = _roll.bind(*held, *inputs, kind=kind, outer=0, kept=False)
+    return end, wrenches
+
+
+def _eager(kind: Kind, outer: int) -> Callable[..., tuple[jax.Array, jax.Array]]:
+    """Last state and wrenches of held numbers and inputs by operations of JAX."""
+
+    def roll(dt, *arrays):
+        held, (parameters, *inputs) = arrays[:-_INPUTS], arrays[-_INPUTS:]
+        return kind.model(held, tuple(parameters)).roll(*inputs, dt)
+
+    for _ in range(outer):
+        roll = jax.vmap(roll)
+    return roll
+
+
+def _full(outer: int, operands) -> list[jax.Array]:
+    """Operands whose leading axes have their whole lengths."""
+    lead = jnp.broadcast_shapes(*(value.shape[:outer] for value in operands))
+    return [jnp.broadcast_to(value, (*lead, *value.shape[outer:])) for value in operands]
+
+
+def _primitive(name: str, callback: Callable[..., Any], results: Callable[..., list[Any]]) -> Primitive:
+    """A primitive that calls back to NumPy; `results(operands, kept)` have the shapes and types of its results."""
+    primitive = Primitive(f"planarfriction_{name}")
+    primitive.multiple_results = True
+
+    def shapes(*operands, kind: Kind, outer: int, kept: bool) -> list[Any]:
+        lead = np.broadcast_shapes(*(value.shape[:outer] for value in operands))
+        return [ShapedArray((*lead, *shape[outer:]), dtype) for shape, dtype in results(operands, kept, kind)]
+
+    def call(*operands, kind: Kind, outer: int, kept: bool) -> list[jax.Array]:
+        found = shapes(*operands, kind=kind, outer=outer, kept=kept)
+        outputs = [jax.ShapeDtypeStruct(value.shape, value.dtype) for value in found]
+        dtypes = tuple(value.dtype for value in found)
+        return jax.pure_callback(functools.partial(callback, kind, kept, dtypes), outputs, *operands)
+
+    def batch(operands, axes, *, kind: Kind, outer: int, kept: bool):
+        fronted = [
+            value[None] if axis is None else jnp.moveaxis(value, axis, 0)
+            for value, axis in zip(operands, axes, strict=True)
+        ]
+        found = primitive.bind(*fronted, kind=kind, outer=outer + 1, kept=kept)
+        return found, [0] * len(found)
+
+    primitive.def_impl(call)
+    primitive.def_abstract_eval(shapes)
+    batching.primitive_batchers[primitive] = batch
+    mlir.register_lowering(primitive, mlir.lower_fun(call, multiple_results=True))
+    return primitive
+
+
+def _rolled(operands, kept: bool, kind: Kind):
+    _, state, twist, _ = operands[-_INPUTS:]
+    steps = (*twist.shape[:-1], *state.shape[state.ndim - kind.axes :])
+    found = [(state.shape, twist.dtype), (twist.shape, twist.dtype)]
+    return [*found, (steps, twist.dtype)] if kept else found
+
+
+def _pushed(operands, kept: bool, kind: Kind):
+    return [(operands[i].shape, operands[-2].dtype) for i in (-3, -2)]
+
+
+def _pulled(operands, kept: bool, kind: Kind):
+    inputs = operands[-_RESULTS - kept - _INPUTS : -_RESULTS - kept]
+    return [(value.shape, value.dtype) for value in inputs]
+
+
+_roll = _primitive("roll", callbacks.forward, _rolled)
+_push = _primitive("push", callbacks.push, _pushed)
+_pull = _primitive("pull", callbacks.pull, _pulled)
+
+
+# ---------------------------------------------------------------------- derivatives
+
+
+def _known(tangents) -> bool:
+    return all(type(tangent) is ad.Zero for tangent in tangents)
+
+
+def _roll_jvp(primals, tangents, *, kind: Kind, outer: int, kept: bool):
+    held, dots = tangents[:-_INPUTS], [ad.instantiate_zeros(tangent) for tangent in tangents[-_INPUTS:]]
+    if _known(held):
+        # in less than double precision the states on the way are not those that the roll-out had
+        keep = primals[-2].dtype == np.float64
+        end, wrenches, *states = _roll.bind(*primals, kind=kind, outer=outer, kept=keep)
+        changes = _push.bind(*primals, *states, *dots, kind=kind, outer=outer, kept=keep)
+        states = states[: int(kept)]
     else:
-        raise InvalidValueError("method", f"be 'eager' for {type(model).__name__}", "'adjoint'")
-    kind = _Kind(leaf, sizes, model.elasto_plastic)
-    return _rollout(kind, data, jnp.asarray(dt), jnp.stack(model.parameters), state, twist, normal_force)
+        if kind.strict:
+            _refuse(held, kind)
+        dots = [ad.instantiate_zeros(tangent) for tangent in tangents]
+        at, along = (tuple(_full(outer, values)) for values in (primals, dots))
+        (end, wrenches), changes = jax.jvp(_eager(kind, outer), at, along)
+        states = _roll.bind(*primals, kind=kind, outer=outer, kept=True)[2:] if kept else []
+    return [end, wrenches, *states], [*changes, *(jnp.zeros_like(value) for value in states)]
 
 
-@functools.partial(jax.custom_vjp, nondiff_argnums=(0,))
-def _rollout(kind: _Kind, data, dt, parameters, state, twist, load):
-    shapes = jax.ShapeDtypeStruct(state.shape, twist.dtype), jax.ShapeDtypeStruct(twist.shape, twist.dtype)
-    return jax.pure_callback(
-        functools.partial(_forward, kind), shapes, data, dt, parameters, state, twist, load, vmap_method="expand_dims"
+def _refuse(held, kind: Kind) -> None:
+    """Raise for a derivative that the adjoint does not have."""
+    name = kind.leaf if type(held[0]) is ad.Zero else "dt"
+    rule = (
+        "be held fixed with method='adjoint': differentiate with respect to the parameters, state, twist and "
+        "normal_force, or leave method out"
     )
+    raise InvalidValueError(name, rule, "a derivative of it")
 
 
-def _rollout_fwd(kind: _Kind, data, dt, *inputs):
-    for name, value in ((kind.leaf, data), ("dt", dt)):
-        if value.perturbed:
-            raise InvalidValueError(
-                name,
-                "be held fixed with method='adjoint': differentiate with respect to the parameters, state, twist and "
-                "normal_force, or take method='eager'",
-                "a derivative of it",
+def _linear_jvp(primitive: Primitive, count: int, by_operations: Callable[..., Any]):
+    """The derivative of a function that is linear in its last `count` operands."""
+
+    def jvp(primals, tangents, *, kind: Kind, outer: int, kept: bool):
+        dots = [ad.instantiate_zeros(tangent) for tangent in tangents]
+        if _known(tangents[:-count]):
+            options = {"kind": kind, "outer": outer, "kept": kept}
+            changed = (*primals[:-count], *dots[-count:])
+            return primitive.bind(*primals, **options), primitive.bind(*changed, **options)
+        if kind.strict:
+            raise FrictionError(
+                "the adjoint gives first derivatives: leave method out, or take 'eager', to differentiate twice"
             )
-    values = (data.value, dt.value, *(entry.value for entry in inputs))
-    return _rollout(kind, *values), values
+        end = -count - kept  # without the states on the way
+        at, along = (tuple(_full(outer, (*values[:end], *values[-count:]))) for values in (primals, dots))
+        return jax.jvp(by_operations(_eager(kind, outer)), at, along)
+
+    ad.primitive_jvps[primitive] = jvp
 
 
-def _rollout_bwd(kind: _Kind, values, cotangents):
-    _, _, parameters, state, twist, load = values
-    shapes = [jax.ShapeDtypeStruct(value.shape, value.dtype) for value in (parameters, state, twist, load)]
-    results = (state, twist)
-    bars = [jnp.zeros_like(r) if isinstance(c, SymbolicZero) else c for c, r in zip(cotangents, results, strict=True)]
-    slopes = jax.pure_callback(functools.partial(_backward, kind), shapes, *values, *bars, vmap_method="expand_dims")
-    return jnp.zeros_like(values[0]), jnp.zeros_like(values[1]), *slopes
+def _push_by_operations(roll: Callable[..., Any]) -> Callable[..., Any]:
+    def push(*operands):
+        primals, dots = operands[:-_INPUTS], operands[-_INPUTS:]
+        held, inputs = primals[:-_INPUTS], primals[-_INPUTS:]
+        return list(jax.jvp(lambda *x: roll(*held, *x), inputs, dots)[1])
+
+    return push
 
 
-_rollout.defvjp(_rollout_fwd, _rollout_bwd, symbolic_zeros=True)
+def _pull_by_operations(roll: Callable[..., Any]) -> Callable[..., Any]:
+    def pull(*operands):
+        primals, bars = operands[:-_RESULTS], operands[-_RESULTS:]
+        held, inputs = primals[:-_INPUTS], primals[-_INPUTS:]
+        return list(jax.vjp(lambda *x: roll(*held, *x), *inputs)[1](tuple(bars)))
+
+    return pull
 
 
-# ---------------------------------------------------------------------- outside JAX, in NumPy
+def _transposed(primitive: Primitive, other: Primitive, count: int):
+    """`other` is the transpose of `primitive`, which is linear in its last `count` operands."""
+
+    def transpose(bars, *operands, **options):
+        known, linear = operands[:-count], operands[-count:]
+        slopes = other.bind(*known, *map(ad.instantiate_zeros, bars), **options)
+        found = [
+            _sum_to(slope, each.aval.shape) if ad.is_undefined_primal(each) else None
+            for slope, each in zip(slopes, linear, strict=True)
+        ]
+        return [None] * len(known) + found
+
+    ad.primitive_transposes[primitive] = transpose
 
 
-def _forward(kind: _Kind, *arrays):
-    def run(data, dt, *inputs):
-        good, dt, (parameters, state, twist, load) = _numbers(dt, *inputs)
-        found = autodiff.rollout(_packed(kind, data), state, twist, load, dt, parameters=parameters)
-        return _spoilt(good, *found)
-
-    return _by_contact(run, arrays, arrays[4].dtype)
+def _sum_to(value: jax.Array, shape: tuple[int, ...]) -> jax.Array:
+    """Sum over the axes along which an operand was broadcast."""
+    axes = tuple(i for i, length in enumerate(shape) if length != value.shape[i])
+    return value.sum(axes, keepdims=True) if axes else value
 
 
-def _backward(kind: _Kind, *arrays):
-    def run(data, dt, *inputs):
-        good, dt, (parameters, state, twist, load, state_bar, wrenches_bar) = _numbers(dt, *inputs)
-        found = autodiff.rollout_gradient(
-            _packed(kind, data), state, twist, load, dt, wrenches_bar, state_bar, parameters=parameters
-        )
-        shared = tuple(i for i, length in enumerate(parameters.shape[:-1]) if length == 1)
-        (slopes,) = _spoilt(good.all(axis=shared, keepdims=True), found.parameters)
-        return slopes.reshape(inputs[0].shape), *_spoilt(good, found.state, found.twist, found.normal_force)
-
-    return _by_contact(run, arrays, arrays[4].dtype)
-
-
-def _numbers(dt, parameters, *inputs):
-    """Which contacts are given numbers, bool `[...]`, and all inputs with harmless ones for the other contacts.
-
-    Inputs are those of a roll-out and, if any, cotangents of its results. There is nobody to whom an error could be
-    raised: NaN comes out where NaN went in, as from the operations of JAX.
-    """
-    wide = _beside(parameters, inputs[0])
-    inner = 1, 2, 1, 1, 2
-    fit = [
-        (np.abs(value) <= LARGEST).all(axis=tuple(range(-axes, 0)))
-        for value, axes in zip((wide, *inputs), (1, *inner), strict=False)
-    ]
-    good = functools.reduce(np.logical_and, fit) & (dt <= LARGEST)
-    if good.all():
-        return good, dt, (wide, *inputs)
-    usable = [
-        np.where(own.reshape(own.shape + (1,) * axes), value, harmless)
-        for own, value, axes, harmless in zip(fit, (wide, *inputs), (1, *inner), (0.5, 0, 0, 0, 0, 0), strict=False)
-    ]
-    return good, dt if dt <= LARGEST else 0.0, usable
-
-
-def _spoilt(good: np.ndarray, *results: np.ndarray) -> list[np.ndarray]:
-    """Results, NaN for contacts that are not good."""
-    return [np.where(good.reshape(good.shape + (1,) * (r.ndim - good.ndim)), r, np.nan) for r in results]
-
-
-def _by_contact(run, arrays, dtype):
-    """`run` on arrays whose leading axes `vmap` has put there, of length 1 where it did not map that array.
-
-    One call for all contacts; only if the surface or dt, the first two arrays, differ between contacts, one for each.
-    """
-    axes = arrays[0].ndim - 1
-    outer = np.broadcast_shapes(*(value.shape[:axes] for value in arrays))
-    shared = all(value.shape[:axes] == (1,) * axes for value in arrays[:2])
-    wide = [np.broadcast_to(np.asarray(value, float), (*outer, *value.shape[axes:])) for value in arrays]
-    if shared:
-        first = (0,) * axes
-        results = run(wide[0][first], wide[1][first], *wide[2:])
-    else:
-        parts = [run(*(value[index] for value in wide)) for index in np.ndindex(outer)]
-        results = [np.stack(part).reshape(*outer, *part[0].shape) for part in zip(*parts, strict=True)]
-    return tuple(value.astype(dtype) for value in results)
-
-
-def _packed(kind: _Kind, data: np.ndarray) -> Packed:
-    """The model as compiled loops see it, with parameters that others take the place of."""
-    if kind.leaf == "shape":
-        return pack_map(kind.elasto_plastic, data[:9].reshape(3, 3), data[9:])
-    surface, size = kind.sizes
-    return pack_surface(kind.elasto_plastic, surface, size, np.ascontiguousarray(data))
-
-
-def _beside(parameters: np.ndarray, state: np.ndarray) -> np.ndarray:
-    """Parameters with axes of length 1 for the batch axes that only the contacts have."""
-    own = state.ndim - parameters.ndim
-    return parameters.reshape(*parameters.shape[:-1], *(1,) * own, parameters.shape[-1])
+ad.primitive_jvps[_roll] = _roll_jvp
+_linear_jvp(_push, _INPUTS, _push_by_operations)
+_linear_jvp(_pull, _RESULTS, _pull_by_operations)
+_transposed(_push, _pull, _INPUTS)
+_transposed(_pull, _push, _RESULTS)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from types import ModuleType
 from typing import Any, ClassVar, Self
 
 import jax
 import jax.numpy as jnp
 
+from planarfriction.autodiff.parameters import Packed
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.jax import inputs
@@ -16,7 +18,6 @@ from planarfriction.jax import namespace as xp
 from planarfriction.laws import FrictionLaw
 from planarfriction.laws.base import refuse_creep
 from planarfriction.patch import ContactPatch
-from planarfriction.patch.metric import refuse_anisotropy
 
 
 class FrictionModel:
@@ -33,6 +34,8 @@ class FrictionModel:
     """The model as `f(xp, ...)`: `held`, `rate`, `advance` and `wrench` of arrays."""
     leaves: ClassVar[tuple[str, ...]]
     """Attributes that JAX maps over and differentiates; `elasto_plastic` is fixed when a function is compiled."""
+    axes: ClassVar[int]
+    """Of the state of a part."""
     parameters: Any
     """Physical parameters by name, scalars."""
     elasto_plastic: bool
@@ -45,7 +48,6 @@ class FrictionModel:
         if not isinstance(patch, ContactPatch):
             raise InvalidValueError("patch", "be a ContactPatch", patch)
         refuse_creep(law, f"jax.{type(self).__name__}")
-        refuse_anisotropy(patch, f"jax.{type(self).__name__}")
         self.elasto_plastic = law.numbers.elasto_plastic > 0.0
 
     def replace(self, **leaves: Any) -> Self:
@@ -71,24 +73,41 @@ class FrictionModel:
 
     def rate(self, state, twist, normal_force) -> jax.Array:
         """Rate of the state, of its shape; it does not depend on the load."""
-        numbers, (state, twist, _) = self._numbers(), self._inputs(state, twist, normal_force)
-        return self.arrays.rate(xp, *numbers, state, self.arrays.held(xp, *numbers, twist))
+        return self._evaluated(state, twist, normal_force)[0]
 
     def wrench(self, state, twist, normal_force) -> jax.Array:
         """Friction wrench on the moving body, `[..., 3]` [N, N, N m]."""
-        numbers, (state, twist, load) = self._numbers(), self._inputs(state, twist, normal_force)
-        by = self.arrays.held(xp, *numbers, twist)
-        rate = self.arrays.rate(xp, *numbers, state, by)
-        return load[..., None] * self.arrays.wrench(xp, *numbers, state, rate, by)
+        return self._evaluated(state, twist, normal_force)[1]
 
     def step(self, state, twist, normal_force, dt) -> tuple[jax.Array, jax.Array]:
         """State and wrench after `dt` [s] at a held twist, stable at any `dt`; a contact without load forgets."""
-        numbers, (state, twist, load) = self._numbers(), self._inputs(state, twist, normal_force)
-        dt = inputs.non_negative("dt", inputs.real("dt", dt))
-        by = self.arrays.held(xp, *numbers, twist)
-        new, rate = self.arrays.advance(xp, *numbers, state, by, self._inner(dt))
-        wrench = self.arrays.wrench(xp, *numbers, new, rate, by)
-        return jnp.where(self._inner(load) > 0.0, new, 0.0), load[..., None] * wrench
+        state, twist, load = self._inputs(state, twist, normal_force)
+        dt = self._inner(inputs.non_negative("dt", inputs.real("dt", dt)))
+        loaded = self._inner(load) > 0.0
+
+        def step(law, shape, z):
+            by = self.arrays.held(xp, law, shape, twist)
+            new, rate = self.arrays.advance(xp, law, shape, z, by, dt)
+            return jnp.where(loaded, new, 0.0), self.arrays.wrench(xp, law, shape, new, rate, by)
+
+        new, unit = self._summed(state, step)
+        return new, load[..., None] * unit
+
+    def roll(self, state, twist, normal_force, dt) -> tuple[jax.Array, jax.Array]:
+        """Last state and wrenches `[..., T, 3]` of steps through twists and loads, an operation of JAX each."""
+
+        def one(z, held):
+            twist, load = held
+            return self.step(z, twist, load, dt)
+
+        # Only the states are kept for the way back; to step again costs less than to store all that a step computes.
+        one = jax.checkpoint(one, prevent_cse=False)  # pyright: ignore[reportPrivateImportUsage]
+        end, wrenches = jax.lax.scan(one, state, (jnp.moveaxis(twist, -2, 0), jnp.moveaxis(normal_force, -1, 0)))
+        return end, jnp.moveaxis(wrenches, 0, -2)
+
+    def compiled(self) -> tuple[Packed, ...] | None:
+        """The model, of arrays of NumPy, as compiled roll-outs take it, if they know it; its law is any."""
+        return None
 
     # ------------------------------------------------------------------ inside
 
@@ -103,15 +122,36 @@ class FrictionModel:
         load = inputs.non_negative("normal_force", load)
         return inputs.finite("state", state), inputs.finite("twist", twist), load
 
-    def _shape(self) -> Any:
-        """Numbers of the patch as the model's arrays know them."""
+    def _parts(self) -> list[tuple[Any, Any]]:
+        """Share of the load and numbers of each part of the patch, as the model's arrays know them."""
         raise NotImplementedError
 
-    def _numbers(self) -> tuple[LawNumbers, Any]:
+    def _evaluated(self, state, twist, normal_force) -> tuple[jax.Array, jax.Array]:
+        """Rate and wrench."""
+        state, twist, load = self._inputs(state, twist, normal_force)
+
+        def evaluate(law, shape, z):
+            by = self.arrays.held(xp, law, shape, twist)
+            rate = self.arrays.rate(xp, law, shape, z, by)
+            return rate, self.arrays.wrench(xp, law, shape, z, rate, by)
+
+        rate, unit = self._summed(state, evaluate)
+        return rate, load[..., None] * unit
+
+    def _summed(self, state: jax.Array, run: Callable[..., Any]) -> tuple[jax.Array, jax.Array]:
+        """What `run` makes of the parts and their states, side by side, and the sum of the wrenches that it gives."""
+        law, parts = self._law(), self._parts()
+        if len(parts) == 1:
+            return run(law, parts[0][1], state)
+        found = [run(law, shape, state[..., k, :]) for k, (_, shape) in enumerate(parts)]
+        wrenches = [share * wrench for (share, _), (_, wrench) in zip(parts, found, strict=True)]
+        return jnp.stack([each for each, _ in found], -2), jnp.stack(wrenches).sum(0)
+
+    def _law(self) -> LawNumbers:
         named = {"gamma": math.nan, **self.parameters._asdict()}  # a map of steady sliding holds its gamma
         law = {name: named[name] for name in LawNumbers._fields if name in named}
-        return LawNumbers(**law, elasto_plastic=float(self.elasto_plastic)), self._shape()
+        return LawNumbers(**law, elasto_plastic=float(self.elasto_plastic))
 
     def _inner(self, value: jax.Array) -> jax.Array:
-        """One value for each contact beside the components of a state."""
-        return value.reshape(value.shape + (1,) * self.rest().ndim)
+        """One value for each contact beside the components of the state of a part."""
+        return value.reshape(value.shape + (1,) * self.axes)

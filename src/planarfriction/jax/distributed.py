@@ -13,6 +13,7 @@ from planarfriction.laws import FrictionLaw
 from planarfriction.models import distributed_arrays
 from planarfriction.models.distributed_arrays import Cells
 from planarfriction.patch import ContactPatch
+from planarfriction.patch.metric import refuse_anisotropy
 
 
 @by_parts
@@ -37,6 +38,7 @@ class DistributedModel(FrictionModel):
     """
 
     arrays = distributed_arrays
+    axes = 2
     leaves = ("parameters", "positions", "weights")
     parameters: LawParameters
     positions: jax.Array
@@ -46,6 +48,7 @@ class DistributedModel(FrictionModel):
 
     def __init__(self, patch: ContactPatch, law: FrictionLaw, normal_force: float | None = None) -> None:
         super().__init__(patch, law)
+        refuse_anisotropy(patch, f"jax.{type(self).__name__} (ReducedModel takes any)")
         numbers, names = law.numbers, LawParameters._fields
         self.parameters = LawParameters(*(jnp.asarray(getattr(numbers, name), dtype=float) for name in names))
         self.positions = jnp.asarray(patch.positions.T)
@@ -55,5 +58,5 @@ class DistributedModel(FrictionModel):
         """State of a contact at rest, `[2, N]`."""
         return jnp.zeros_like(self.positions)
 
-    def _shape(self) -> Cells:
-        return Cells(self.positions, self.weights)
+    def _parts(self) -> list[tuple[float, Cells]]:
+        return [(1.0, Cells(self.positions, self.weights))]

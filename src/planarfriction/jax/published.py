@@ -10,6 +10,7 @@ import jax
 import jax.numpy as jnp
 
 from planarfriction import models
+from planarfriction.autodiff.parameters import Packed, pack_surface
 from planarfriction.equality import ByValue, by_parts
 from planarfriction.jax import namespace as xp
 from planarfriction.jax.base import FrictionModel
@@ -42,7 +43,7 @@ class PublishedParameters(NamedTuple):
     centre_y: jax.Array
 
 
-@functools.partial(jax.tree_util.register_dataclass, data_fields=["data"], meta_fields=["kind", "size"])
+@functools.partial(jax.tree_util.register_dataclass, data_fields=["data", "root"], meta_fields=["kind", "size"])
 @dataclass(frozen=True, eq=False)
 class Surface(ByValue):
     """The numbers of a limit surface over scaled twists (see `planarfriction.kernels.surfaces`)."""
@@ -50,6 +51,8 @@ class Surface(ByValue):
     kind: int
     size: int
     data: jax.Array
+    root: jax.Array | None = None
+    """Symmetric root of the friction metric `[2, 2]`, of a patch that has one."""
 
 
 class ReducedModelPublished(FrictionModel):
@@ -63,6 +66,7 @@ class ReducedModelPublished(FrictionModel):
     """
 
     arrays = published_arrays
+    axes = 1
     leaves = ("parameters", "surface")
     parameters: PublishedParameters
     surface: Surface
@@ -82,14 +86,19 @@ class ReducedModelPublished(FrictionModel):
         }
         names = PublishedParameters._fields
         self.parameters = PublishedParameters(*(jnp.asarray(values[name], dtype=float) for name in names))
-        self.surface = Surface(kind, size, jnp.asarray(data))
+        self.surface = Surface(kind, size, jnp.asarray(data), None if patch.root is None else jnp.asarray(shape.root))
 
     def rest(self) -> jax.Array:
         """State of a contact at rest, `[3]`."""
         return jnp.zeros(3, self.parameters.sigma_0.dtype)
 
-    def _shape(self) -> PublishedNumbers:
+    def compiled(self) -> tuple[Packed]:
+        """See `FrictionModel`."""
+        s = self.surface
+        return pack_surface(self.elasto_plastic, s.kind, s.size, s.data, s.root)  # pyright: ignore[reportArgumentType]
+
+    def _parts(self) -> list[tuple[float, PublishedNumbers]]:
         p, s = self.parameters, self.surface
         radius, second_moment, x, y = (value[..., None] for value in p[-4:])
         surface = functools.partial(surface_arrays.sliding, xp, s.kind, s.size, s.data)
-        return PublishedNumbers(radius, second_moment, x, y, surface)
+        return [(1.0, PublishedNumbers(radius, second_moment, x, y, surface, s.root))]

@@ -8,8 +8,10 @@ from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
+import numpy as np
 
 from planarfriction import models
+from planarfriction.autodiff.parameters import Packed, pack_maps
 from planarfriction.equality import ByValue, by_parts
 from planarfriction.jax.base import FrictionModel
 from planarfriction.laws import FrictionLaw
@@ -32,27 +34,30 @@ class ReducedParameters(NamedTuple):
     """Unused by plain bristles."""
 
 
-@functools.partial(jax.tree_util.register_dataclass, data_fields=["factor", "map"], meta_fields=["sizes"])
+@functools.partial(jax.tree_util.register_dataclass, data_fields=["share", "factor", "map"], meta_fields=["sizes"])
 @dataclass(frozen=True, eq=False)
 class Shape(ByValue):
     """What the model knows of its patch."""
 
-    sizes: MapSizes
+    sizes: tuple[MapSizes, ...]
+    share: jax.Array
+    """Of the load that each part carries, `[P]`."""
     factor: jax.Array
-    """F `[3, 3]`."""
+    """F of each part, `[P, 3, 3]`."""
     map: jax.Array
-    """Steady sliding, flat (see `planarfriction.kernels.steady`)."""
+    """Steady sliding of the parts, one behind the other (see `planarfriction.kernels.steady`)."""
 
 
 class ReducedModel(FrictionModel):
     """The reduced model of bristle moments (`planarfriction.ReducedModel`) as a pytree.
 
-    State `(z_x, z_y, z_theta)` [m]. Leaves: the law's parameters, and the shape: F of the patch and its map of steady
-    sliding. A patch whose shape depends on the load keeps that of `normal_force` [N]; `segments` and `speeds` as in
-    `planarfriction.ReducedModel`.
+    State `(z_x, z_y, z_theta)` [m], of several parts `[P, 3]`. Leaves: the law's parameters, and the shape: F of the
+    parts and their maps of steady sliding. A patch whose shape depends on the load keeps that of `normal_force` [N];
+    `parts`, `segments` and `speeds` as in `planarfriction.ReducedModel`.
     """
 
     arrays = reduced_arrays
+    axes = 1
     leaves = ("parameters", "shape")
     parameters: ReducedParameters
     shape: Shape
@@ -63,19 +68,33 @@ class ReducedModel(FrictionModel):
         law: FrictionLaw,
         normal_force: float | None = None,
         *,
+        parts: int | str = 1,
         segments: int = 24,
         speeds: int = 14,
     ) -> None:
         super().__init__(patch, law)
         numbers, names = law.numbers, ReducedParameters._fields
         self.parameters = ReducedParameters(*(jnp.asarray(getattr(numbers, name), dtype=float) for name in names))
-        shape = models.ReducedModel(patch, law, segments=segments, speeds=speeds, load_error=0.0).shape_at(normal_force)
-        sizes = reduced_arrays.sizes_of(shape.data)
-        self.shape = Shape(sizes, jnp.asarray(shape.factor), jnp.asarray(shape.data))
+        model = models.ReducedModel(patch, law, parts=parts, segments=segments, speeds=speeds, load_error=0.0)
+        shares, shapes = zip(*model.parts_at(normal_force), strict=True)
+        self.shape = Shape(
+            tuple(reduced_arrays.sizes_of(shape.data) for shape in shapes),
+            jnp.asarray(shares, dtype=float),
+            jnp.asarray(np.stack([shape.factor for shape in shapes])),
+            jnp.asarray(np.concatenate([shape.data for shape in shapes])),
+        )
 
     def rest(self) -> jax.Array:
-        """State of a contact at rest, `[3]`."""
-        return jnp.zeros(3, self.parameters.sigma_0.dtype)
+        """State of a contact at rest, `[3]` or `[P, 3]`."""
+        count = len(self.shape.sizes)
+        return jnp.zeros(3 if count == 1 else (count, 3), self.parameters.sigma_0.dtype)
 
-    def _shape(self) -> ReducedNumbers:
-        return reduced_arrays.numbers_of(self.shape.factor, self.shape.map, self.shape.sizes)
+    def compiled(self) -> tuple[Packed, ...]:
+        """See `FrictionModel`."""
+        s = self.shape
+        return pack_maps(self.elasto_plastic, s.sizes, s.share, s.factor, s.map)  # pyright: ignore[reportArgumentType]
+
+    def _parts(self) -> list[tuple[jax.Array, ReducedNumbers]]:
+        s = self.shape
+        shapes = reduced_arrays.parts_of(s.factor, s.map, s.sizes)
+        return [(s.share[k], shape) for k, shape in enumerate(shapes)]

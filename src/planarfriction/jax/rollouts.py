@@ -11,7 +11,7 @@ from planarfriction import validation
 from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
-from planarfriction.jax import inputs
+from planarfriction.jax import adjoint, inputs
 from planarfriction.jax.base import FrictionModel
 
 METHODS = ("adjoint", "eager")
@@ -57,8 +57,10 @@ def rollout(
     `parameters`, a record as `model.parameters` or `[P]` in its order, takes the place of the model's own.
 
     `method` is `"eager"`, JAX operations step by step (any model and device, derivatives by everything, of any order),
-    or `"adjoint"`, the compiled roll-out with its discrete adjoint (reduced models on the processor, float64 inside,
-    first derivatives by the parameters, `state`, `twist` and `normal_force`): much faster. None takes "eager".
+    or `"adjoint"`, the compiled roll-out with its derivatives forwards and backwards (reduced models on the processor,
+    float64 inside, first derivatives by the parameters, `state`, `twist` and `normal_force`): much faster. None takes
+    the adjoint of a reduced model where JAX's default device is the processor, and for what the adjoint does not do,
+    higher derivatives and those by `dt` and by the numbers of the patch, the operations of JAX.
 
     Inside `jit` a contact that is given NaN, or more than 1e50, gets NaN: its wrenches, its state and its gradients.
 
@@ -69,7 +71,8 @@ def rollout(
         kind = type(model)
         rule = f"be one of planarfriction.jax ({MODELS.classes()})"
         raise InvalidValueError("model", rule, f"{kind.__module__}.{kind.__name__}")
-    method = "eager" if method is None else validation.choice("method", method, METHODS)
+    if method is not None:
+        validation.choice("method", method, METHODS)
     if parameters is not None:
         model = model.replace(parameters=type(model.parameters)(*parameters))
     twist, dt = inputs.real("twist", twist), inputs.real("dt", dt)
@@ -87,16 +90,9 @@ def rollout(
         rule = "broadcast to [..., T]"
         raise InvalidValueError("state, twist and normal_force", rule, f"shapes {shapes}") from None
     twist, load = jnp.broadcast_to(twist, (*shape, 3)), jnp.broadcast_to(load, shape)
-    if method == "adjoint":
-        from planarfriction.jax import adjoint
-
-        return Rollout(*adjoint.rollout(model, start, twist, load, dt))
-
-    def one(z, inputs):
-        twist, load = inputs
-        return model.step(z, twist, load, dt)
-
-    # Only the states are kept for the way back; to step again costs less than to store all that a step computes.
-    one = jax.checkpoint(one, prevent_cse=False)  # pyright: ignore[reportPrivateImportUsage]
-    end, wrenches = jax.lax.scan(one, start, (jnp.moveaxis(twist, -2, 0), jnp.moveaxis(load, -1, 0)))
-    return Rollout(end, jnp.moveaxis(wrenches, 0, -2))
+    known = type(model).compiled is not FrictionModel.compiled
+    if method == "adjoint" and not known:
+        raise InvalidValueError("method", f"be 'eager' for {type(model).__name__}", repr(method))
+    if method == "adjoint" or (method is None and known and jax.default_backend() == "cpu"):
+        return Rollout(*adjoint.rollout(model, start, twist, load, dt, strict=method == "adjoint"))
+    return Rollout(*model.roll(start, twist, load, dt))

@@ -29,6 +29,12 @@ class PublishedNumbers(NamedTuple):
     centre_y: Any
     surface: Callable[..., Any]
     """`u = h(V) |V_S|` of the scaled twist `[..., 3]` and its norm `[..., 1]`."""
+    root: Any = None
+    """Symmetric root of the friction metric `[2, 2]`, or None: velocities go in through it, forces come out."""
+
+
+def _through(root, x, y):
+    return (x, y) if root is None else (root[0, 0] * x + root[0, 1] * y, root[0, 1] * x + root[1, 1] * y)
 
 
 def scale(xp, shape: PublishedNumbers):
@@ -40,6 +46,7 @@ def scale(xp, shape: PublishedNumbers):
 def held(xp, law: LawNumbers, shape: PublishedNumbers, twist) -> Drive:
     """What drives the scaled bristle: `u = h(V) v_n`."""
     vx, vy, omega = twist[..., 0:1], twist[..., 1:2], twist[..., 2:3]
+    vx, vy = _through(shape.root, vx, vy)
     vx, vy = vx - omega * shape.centre_y, vy + omega * shape.centre_x
     scaled = _joined(xp, vx, vy, shape.contact_radius * omega)
     speed = xp.norm(scaled, AXIS)
@@ -67,7 +74,7 @@ def wrench(xp, law: LawNumbers, shape: PublishedNumbers, z, zdot, by: Drive):
     """Wrench about the origin per unit load `[..., 3]`."""
     force = formulas.traction(z, zdot, by.viscous, law)
     fx, fy, tau = force[..., 0:1], force[..., 1:2], force[..., 2:3]
-    return _joined(xp, fx, fy, tau + shape.centre_x * fy - shape.centre_y * fx)
+    return _joined(xp, *_through(shape.root, fx, fy), tau + shape.centre_x * fy - shape.centre_y * fx)
 
 
 def _joined(xp, x, y, s):

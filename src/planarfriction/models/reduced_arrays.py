@@ -8,6 +8,8 @@ vanishing twist, `z + u dt`.
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,6 +27,12 @@ class MapSizes(NamedTuple):
     segments: int
     coarse: int
     levels: int
+
+    @property
+    def count(self) -> int:
+        """Numbers of the map."""
+        nodes, own = 2 * self.segments + 1, 2 * self.coarse + 1
+        return HEADER + self.faces * 12 * (nodes * nodes + own * own * self.levels)
 
 
 class ReducedNumbers(NamedTuple):
@@ -62,6 +70,18 @@ class Held(NamedTuple):
 def sizes_of(data: np.ndarray) -> MapSizes:
     """The sizes of a map, from the numbers that compiled loops read."""
     return MapSizes(*(int(value) for value in data[:4]))
+
+
+def starts_of(sizes: Sequence[MapSizes]) -> list[int]:
+    """Where maps begin that lie one behind the other."""
+    ends = itertools.accumulate(size.count for size in sizes)
+    return [0, *ends][: len(sizes)]
+
+
+def parts_of(factors, data, sizes: Sequence[MapSizes]) -> list[ReducedNumbers]:
+    """`numbers_of` parts, from their F `[P, 3, 3]` and their maps, one behind the other."""
+    places = zip(starts_of(sizes), sizes, strict=True)
+    return [numbers_of(factors[k], data[at : at + size.count], size) for k, (at, size) in enumerate(places)]
 
 
 def numbers_of(factor, data, sizes: MapSizes) -> ReducedNumbers:

@@ -64,6 +64,13 @@ _SLIDER = PublishedShape(np.zeros(2), 1.0, 0.0, _OfPoint())  # pyright: ignore[r
 """What steps as a point does, at the point, as long as it does not spin."""
 
 
+def axes_of(root: np.ndarray) -> np.ndarray:
+    """`diag(L, 1)` `[3, 3]`: twists go in through it, wrenches come out."""
+    axes = np.eye(3)
+    axes[:2, :2] = root
+    return axes
+
+
 @dataclass(frozen=True, eq=False)
 class ReducedModelPublished(ThreeStateModel):
     """Reduced LuGre friction: three bristles, conjugate to the wrench at the centre of pressure, and a limit surface.
@@ -134,12 +141,8 @@ class ReducedModelPublished(ThreeStateModel):
 
     @functools.cached_property
     def _axes(self) -> np.ndarray | None:
-        """`diag(L, 1)` `[3, 3]`, or None: twists go in through it, wrenches come out."""
-        if self.patch.root is None:
-            return None
-        axes = np.eye(3)
-        axes[:2, :2] = self.patch.root
-        return axes
+        """`axes_of` the friction metric, or None."""
+        return None if self.patch.root is None else axes_of(self.patch.root)
 
     def _check_directions(self) -> None:
         by = type(self).__name__

@@ -6,7 +6,7 @@ For tensors on the processor, and first derivatives.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import torch
 from torch import Tensor
@@ -16,22 +16,28 @@ from planarfriction.autodiff.parameters import Packed
 from planarfriction.errors import FrictionError
 from planarfriction.torch.base import Compiled
 
-_INNER = (1, 2, 1, 1)
-"""Axes of state `[3]`, twist `[T, 3]`, normal_force `[T]` and parameters `[P]` behind the batch axes."""
+_INNER = (2, 1, 1)
+"""Axes of twist `[T, 3]`, normal_force `[T]` and parameters `[P]` behind the batch axes."""
 
-_INPUTS = len(_INNER)
+_INPUTS = 1 + len(_INNER)
+"""The state comes first."""
 
-Pack = Callable[..., Packed]
+
+class _Kind(NamedTuple):
+    """What a model is without its tensors (see `Compiled`)."""
+
+    pack: Callable[..., tuple[Packed, ...]]
+    axes: int
 
 
 def roll_out(model: Compiled, dt: float, *inputs: Tensor) -> tuple[Tensor, Tensor]:
-    """The last state `[..., 3]` and wrenches `[..., T, 3]` of `autodiff.rollout`.
+    """The last state and wrenches `[..., T, 3]` of `autodiff.rollout`.
 
-    `inputs` are state `[..., 3]`, twist `[..., T, 3]`, normal_force `[..., T]` and parameters `[..., P]`, whose batch
-    axes broadcast.
+    `inputs` are state `[..., 3]`, of several parts `[..., P, 3]`, twist `[..., T, 3]`, normal_force `[..., T]` and
+    parameters `[..., P]`, whose batch axes broadcast.
     """
     kept = torch.is_grad_enabled() and any(tensor.requires_grad for tensor in inputs)
-    found: Any = _Rollout.apply(model.pack, dt, kept, *inputs, *model.buffers)
+    found: Any = _Rollout.apply(_Kind(model.pack, model.axes), dt, kept, *inputs, *model.buffers)
     return found[0], found[1]
 
 
@@ -39,8 +45,8 @@ class _Rollout(torch.autograd.Function):
     """Last state, wrenches and, if they are `kept` for the way back, the states before each step in float64."""
 
     @staticmethod
-    def forward(pack: Pack, dt, kept, *tensors):
-        (state, twist, load, parameters), model = _numbers(pack, tensors, _INPUTS)
+    def forward(kind: _Kind, dt, kept, *tensors):
+        (state, twist, load, parameters), model = _numbers(kind, tensors, _INPUTS)
         roll = autodiff.rollout_states if kept else autodiff.rollout
         end, wrenches, *states = roll(model, state, twist, load, dt, parameters=parameters)
         both = (_like(array, tensors[:_INPUTS]) for array in (end, wrenches))
@@ -48,7 +54,7 @@ class _Rollout(torch.autograd.Function):
 
     @staticmethod
     def setup_context(ctx, inputs, output):
-        ctx.pack, ctx.dt, ctx.kept = inputs[:3]
+        ctx.kind, ctx.dt, ctx.kept = inputs[:3]
         ctx.mark_non_differentiable(output[2])
         ctx.save_for_backward(*inputs[3:], output[2])
         ctx.save_for_forward(*inputs[3:])
@@ -58,7 +64,7 @@ class _Rollout(torch.autograd.Function):
         *tensors, states = ctx.saved_tensors
         inputs, buffers = tensors[:_INPUTS], tensors[_INPUTS:]
         given = (*inputs, *bars[:2], states) if ctx.kept else (*inputs, *bars[:2])
-        slopes: Any = _Gradient.apply(ctx.pack, ctx.dt, len(given), *given, *buffers)
+        slopes: Any = _Gradient.apply(ctx.kind, ctx.dt, len(given), *given, *buffers)
         return None, None, None, *slopes, *(None for _ in buffers)
 
     @staticmethod
@@ -68,16 +74,16 @@ class _Rollout(torch.autograd.Function):
             torch.zeros_like(x) if dot is None else dot
             for x, dot in zip(inputs, tangents[3 : 3 + _INPUTS], strict=True)
         )
-        found: Any = _Tangent.apply(ctx.pack, ctx.dt, *inputs, *changes, *buffers)
+        found: Any = _Tangent.apply(ctx.kind, ctx.dt, *inputs, *changes, *buffers)
         return *found, None
 
     @staticmethod
-    def vmap(info, in_dims, pack, dt, kept, *tensors):
+    def vmap(info, in_dims, kind, dt, kept, *tensors):
         size, dims = info.batch_size, in_dims[3:]
         if any(dim is not None for dim in dims[_INPUTS:]):
-            return _one_by_one(_Rollout, size, dims, (pack, dt, kept), tensors)
-        aligned = _aligned(size, dims[:_INPUTS], tensors[:_INPUTS], _INNER)
-        end, wrenches, states = _Rollout.apply(pack, dt, kept, *aligned, *tensors[_INPUTS:])  # pyright: ignore
+            return _one_by_one(_Rollout, size, dims, (kind, dt, kept), tensors)
+        aligned = _aligned(size, dims[:_INPUTS], tensors[:_INPUTS], (kind.axes, *_INNER))
+        end, wrenches, states = _Rollout.apply(kind, dt, kept, *aligned, *tensors[_INPUTS:])  # pyright: ignore
         return (end, wrenches, states), (0, 0, 0 if kept else None)
 
 
@@ -88,8 +94,8 @@ class _Gradient(torch.autograd.Function):
     """
 
     @staticmethod
-    def forward(pack: Pack, dt, count, *tensors):
-        (state, twist, load, parameters, state_bar, wrenches_bar, *states), model = _numbers(pack, tensors, count)
+    def forward(kind: _Kind, dt, count, *tensors):
+        (state, twist, load, parameters, state_bar, wrenches_bar, *states), model = _numbers(kind, tensors, count)
         gradient = autodiff.rollout_gradient(
             model, state, twist, load, dt, wrenches_bar, state_bar, parameters=parameters, states=(*states, None)[0]
         )
@@ -106,12 +112,14 @@ class _Gradient(torch.autograd.Function):
     jvp = backward
 
     @staticmethod
-    def vmap(info, in_dims, pack, dt, count, *tensors):
+    def vmap(info, in_dims, kind, dt, count, *tensors):
         size, dims = info.batch_size, in_dims[3:]
         if any(dim is not None for dim in dims[count:]):
-            return _one_by_one(_Gradient, size, dims, (pack, dt, count), tensors)
-        aligned = _aligned(size, dims[:count], tensors[:count], (*_INNER, 1, 2, 2)[:count])
-        gradients: Any = _Gradient.apply(pack, dt, count, *aligned, *tensors[count:])
+            return _one_by_one(_Gradient, size, dims, (kind, dt, count), tensors)
+        aligned = _aligned(
+            size, dims[:count], tensors[:count], (kind.axes, *_INNER, kind.axes, 2, 1 + kind.axes)[:count]
+        )
+        gradients: Any = _Gradient.apply(kind, dt, count, *aligned, *tensors[count:])
         shapes = [_logical(tensor, dim) for tensor, dim in zip(tensors[:_INPUTS], dims, strict=False)]
         return tuple(g.reshape(size, *shape) for g, shape in zip(gradients, shapes, strict=True)), (0,) * _INPUTS
 
@@ -120,8 +128,8 @@ class _Tangent(torch.autograd.Function):
     """Changes of last state and wrenches along those of the inputs, which follow these; itself without derivative."""
 
     @staticmethod
-    def forward(pack: Pack, dt, *tensors):
-        (state, twist, load, parameters, *changes), model = _numbers(pack, tensors, 2 * _INPUTS)
+    def forward(kind: _Kind, dt, *tensors):
+        (state, twist, load, parameters, *changes), model = _numbers(kind, tensors, 2 * _INPUTS)
         found = autodiff.rollout_tangent(model, state, twist, load, dt, *changes, parameters=parameters)
         return tuple(_like(array, tensors[:_INPUTS]) for array in found[2:])
 
@@ -136,21 +144,21 @@ class _Tangent(torch.autograd.Function):
     jvp = backward
 
     @staticmethod
-    def vmap(info, in_dims, pack, dt, *tensors):
+    def vmap(info, in_dims, kind, dt, *tensors):
         size, dims, count = info.batch_size, in_dims[2:], 2 * _INPUTS
         if any(dim is not None for dim in dims[count:]):
-            return _one_by_one(_Tangent, size, dims, (pack, dt), tensors)
-        aligned = _aligned(size, dims[:count], tensors[:count], _INNER * 2)
-        return _Tangent.apply(pack, dt, *aligned, *tensors[count:]), (0, 0)
+            return _one_by_one(_Tangent, size, dims, (kind, dt), tensors)
+        aligned = _aligned(size, dims[:count], tensors[:count], (kind.axes, *_INNER) * 2)
+        return _Tangent.apply(kind, dt, *aligned, *tensors[count:]), (0, 0)
 
 
 _TWICE = "the adjoint gives first derivatives: take method='eager' to differentiate twice"
 
 
-def _numbers(pack: Pack, tensors, count: int) -> tuple[list[Any], Packed]:
+def _numbers(kind: _Kind, tensors, count: int) -> tuple[list[Any], tuple[Packed, ...]]:
     """The first `count` tensors in NumPy, and the model from its buffers behind them."""
     inputs = [tensor.detach().to(torch.float64).numpy() for tensor in tensors[:count]]
-    return inputs, pack(*(buffer.detach().numpy() for buffer in tensors[count:]))
+    return inputs, kind.pack(*(buffer.detach().numpy() for buffer in tensors[count:]))
 
 
 def _one_by_one(function: Any, size: int, dims, fixed: tuple, tensors) -> tuple[tuple[Tensor, ...], tuple[int, ...]]:
@@ -164,10 +172,10 @@ def _one_by_one(function: Any, size: int, dims, fixed: tuple, tensors) -> tuple[
 
 
 def _like(array, tensors) -> Tensor:
-    kind = tensors[0].dtype
+    dtype = tensors[0].dtype
     for tensor in tensors[1:]:
-        kind = torch.promote_types(kind, tensor.dtype)
-    return torch.from_numpy(array).to(kind)
+        dtype = torch.promote_types(dtype, tensor.dtype)
+    return torch.from_numpy(array).to(dtype)
 
 
 def _logical(tensor: Tensor, dim: int | None) -> list[int]:

@@ -16,7 +16,6 @@ from planarfriction.formulas import LawNumbers
 from planarfriction.laws import ElastoPlastic, FrictionLaw, LuGre
 from planarfriction.laws.base import refuse_creep
 from planarfriction.patch import ContactPatch
-from planarfriction.patch.metric import refuse_anisotropy
 from planarfriction.torch import inputs
 from planarfriction.torch import namespace as xp
 from planarfriction.torch.parameters import LAW, PhysicalParameters
@@ -26,21 +25,25 @@ TRAINABLE = LAW[:-1]
 
 
 class Prepared(NamedTuple):
-    """A model's numbers, ready for one evaluation or for all steps of a roll-out."""
+    """The numbers of a part of a model, ready for one evaluation or for all steps of a roll-out."""
 
     law: LawNumbers
     """Broadcasts with the lengths of bristles."""
     shape: Any
     """Numbers of the patch as the model's arrays know them."""
+    share: Any = 1.0
+    """Of the load; most models have one part, which carries all of it."""
 
 
 class Compiled(NamedTuple):
     """A model as compiled roll-outs take it."""
 
-    pack: Callable[..., Packed]
-    """The model from the `buffers` as arrays of NumPy."""
+    pack: Callable[..., tuple[Packed, ...]]
+    """Its parts from the `buffers` as arrays of NumPy."""
     buffers: tuple[Tensor, ...]
     """Its own numbers of the patch."""
+    axes: int
+    """Axes of a state: a model of several parts has two."""
 
 
 _KIND = {False: "plain", True: "elasto-plastic"}
@@ -62,6 +65,8 @@ class FrictionModel(nn.Module):
     """The model as `f(xp, ...)`: `held`, `rate`, `advance` and `wrench` of arrays."""
     components: tuple[int, ...]
     """Shape of the state of one contact."""
+    axes: int
+    """Axes of the state of a part."""
     physical: PhysicalParameters
     physical_type: ClassVar[type[PhysicalParameters]] = PhysicalParameters
     bristles: Tensor
@@ -74,7 +79,6 @@ class FrictionModel(nn.Module):
         if not isinstance(patch, ContactPatch):
             raise InvalidValueError("patch", "be a ContactPatch", patch)
         refuse_creep(law, f"torch.{type(self).__name__}")
-        refuse_anisotropy(patch, type(self).__name__)
         self.patch = patch
         self.elasto_plastic = bool(law.numbers.elasto_plastic)
 
@@ -151,19 +155,24 @@ class FrictionModel(nn.Module):
         parameters: Tensor | None = None,
     ) -> tuple[Tensor, Tensor]:
         """State after `dt` [s] of a held twist, and the wrench at the end; a contact without load forgets."""
-        prepared = self.prepare(self._vector(parameters))
+        parts = self.prepare(self._vector(parameters))
         z, v, load = self._inputs(state, twist, normal_force)
-        by = self.arrays.held(xp, *prepared, v)
-        dt = inputs.non_negative("dt", self._number("dt", dt))
-        new, zdot = self.arrays.advance(xp, *prepared, z, by, self._inner(dt))
-        return self._kept(new, load), load[..., None] * self.arrays.wrench(xp, *prepared, new, zdot, by)
+        dt = self._inner(inputs.non_negative("dt", self._number("dt", dt)))
+
+        def step(part: Prepared, z: Tensor) -> tuple[Tensor, Tensor]:
+            by = self.arrays.held(xp, part.law, part.shape, v)
+            new, zdot = self.arrays.advance(xp, part.law, part.shape, z, by, dt)
+            return self._kept(new, load), self.arrays.wrench(xp, part.law, part.shape, new, zdot, by)
+
+        new, unit = self._summed(parts, z, step)
+        return new, load[..., None] * unit
 
     def compiled(self) -> Compiled | None:
         """What compiled roll-outs need of the model, if they know it."""
         return None
 
-    def prepare(self, parameters: Tensor) -> Prepared:
-        """The numbers of the model at given physical parameters `[..., P]`."""
+    def prepare(self, parameters: Tensor) -> tuple[Prepared, ...]:
+        """The numbers of the parts of the model at given physical parameters `[..., P]`."""
         raise NotImplementedError
 
     def roll_out(
@@ -174,34 +183,53 @@ class FrictionModel(nn.Module):
         Only the bristles go step by step; what drives them and what they cause is worked out for all steps at once.
         """
         values, dt = self._vector(parameters), self._inner(dt)
-        once, steps = self.prepare(values), self.prepare(values[..., None, :])
-        by = self.arrays.held(xp, *steps, v)
-        inner = len(self.components)
-        drives = zip(*(_along(part, v.shape[-2], inner) for part in by), strict=True)
-        states, rates = [], []
-        for drive, now in zip(drives, load.unbind(-1), strict=True):
-            new, zdot = self.arrays.advance(xp, *once, z, type(by)(*drive), dt)
-            states.append(new)
-            rates.append(zdot)
-            z = self._kept(new, now)
-        states, rates = torch.stack(states, -inner - 1), torch.stack(rates, -inner - 1)
-        return z, load[..., None] * self.arrays.wrench(xp, *steps, states, rates, by)
+        parts = self.prepare(values[..., None, :])
+        once = dict(zip(map(id, parts), self.prepare(values), strict=True))
+
+        def roll(part: Prepared, z: Tensor) -> tuple[Tensor, Tensor]:
+            law, shape, _ = once[id(part)]
+            by = self.arrays.held(xp, part.law, part.shape, v)
+            drives = zip(*(_along(each, v.shape[-2], self.axes) for each in by), strict=True)
+            states, rates = [], []
+            for drive, now in zip(drives, load.unbind(-1), strict=True):
+                new, zdot = self.arrays.advance(xp, law, shape, z, type(by)(*drive), dt)
+                states.append(new)
+                rates.append(zdot)
+                z = self._kept(new, now)
+            states, rates = torch.stack(states, -self.axes - 1), torch.stack(rates, -self.axes - 1)
+            return z, self.arrays.wrench(xp, part.law, part.shape, states, rates, by)
+
+        end, unit = self._summed(parts, z, roll)
+        return end, load[..., None] * unit
 
     def _evaluated(self, state, twist, normal_force, parameters) -> tuple[Tensor, Tensor]:
         """Rate and wrench."""
-        prepared = self.prepare(self._vector(parameters))
+        parts = self.prepare(self._vector(parameters))
         z, v, load = self._inputs(state, twist, normal_force)
-        by = self.arrays.held(xp, *prepared, v)
-        rate = self.arrays.rate(xp, *prepared, z, by)
-        return rate, load[..., None] * self.arrays.wrench(xp, *prepared, z, rate, by)
+
+        def evaluate(part: Prepared, z: Tensor) -> tuple[Tensor, Tensor]:
+            by = self.arrays.held(xp, part.law, part.shape, v)
+            rate = self.arrays.rate(xp, part.law, part.shape, z, by)
+            return rate, self.arrays.wrench(xp, part.law, part.shape, z, rate, by)
+
+        rate, unit = self._summed(parts, z, evaluate)
+        return rate, load[..., None] * unit
+
+    def _summed(self, parts: tuple[Prepared, ...], z: Tensor, run: Callable[..., Any]) -> tuple[Tensor, Tensor]:
+        """What `run` makes of the parts and their states, side by side, and the sum of the wrenches that it gives."""
+        if len(parts) == 1:
+            return run(parts[0], z)
+        found = [run(part, each) for part, each in zip(parts, z.unbind(-2), strict=True)]
+        wrenches = [part.share * wrench for part, (_, wrench) in zip(parts, found, strict=True)]
+        return torch.stack([each for each, _ in found], -2), torch.stack(wrenches).sum(0)
 
     def _kept(self, z: Tensor, load: Tensor) -> Tensor:
         """Bristles that a contact keeps: one without load forgets them."""
         return torch.where(self._inner(load > 0.0), z, 0.0)
 
     def _inner(self, value: Tensor) -> Tensor:
-        """One value for each contact beside the components of a state."""
-        return value.reshape(value.shape + (1,) * len(self.components))
+        """One value for each contact beside the components of the state of a part."""
+        return value.reshape(value.shape + (1,) * self.axes)
 
     # ------------------------------------------------------------------ inputs
 
@@ -235,7 +263,7 @@ class FrictionModel(nn.Module):
 
     def _law(self, parameters: Tensor) -> LawNumbers:
         """The law's parameters, broadcasting with norms of bristles."""
-        trailing = (1,) * len(self.components)
+        trailing = (1,) * self.axes
         values = [value.reshape(value.shape + trailing) for value in parameters[..., : len(LAW)].unbind(-1)]
         return LawNumbers(**dict(zip(LAW, values, strict=True)), elasto_plastic=self.elasto_plastic)
 

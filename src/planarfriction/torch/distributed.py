@@ -11,6 +11,7 @@ from planarfriction.laws import FrictionLaw
 from planarfriction.models import distributed_arrays
 from planarfriction.models.distributed_arrays import Cells
 from planarfriction.patch import ContactPatch
+from planarfriction.patch.metric import refuse_anisotropy
 from planarfriction.torch.base import TRAINABLE, FrictionModel, Prepared
 from planarfriction.torch.parameters import LAW
 
@@ -29,6 +30,7 @@ class DistributedModel(FrictionModel):
     """
 
     arrays = distributed_arrays
+    axes = 2
     positions: Tensor
     """Positions of the cells `[2, N]` [m]."""
 
@@ -43,6 +45,7 @@ class DistributedModel(FrictionModel):
         device: torch.device | str | None = None,
     ):
         super().__init__(patch, law)
+        refuse_anisotropy(patch, f"torch.{type(self).__name__} (ReducedModel takes any)")
         self.components = (2, patch.cells)
         kind = {"dtype": dtype or torch.get_default_dtype(), "device": device}
         numbers, chosen = law.numbers._asdict(), tuple(trainable)
@@ -61,6 +64,6 @@ class DistributedModel(FrictionModel):
         """Share of the load on each cell `[N]`, with its gradient."""
         return torch.softmax(self.raw_weights, 0)
 
-    def prepare(self, parameters: Tensor) -> Prepared:
+    def prepare(self, parameters: Tensor) -> tuple[Prepared]:
         """The law and the cells."""
-        return Prepared(self._law(parameters), Cells(self.positions, self.weights))
+        return (Prepared(self._law(parameters), Cells(self.positions, self.weights)),)

@@ -64,6 +64,9 @@ class ReducedModelPublished(FrictionModel):
 
     arrays = published_arrays
     components = (3,)
+    axes = 1
+    root: Tensor | None
+    """Symmetric root of the friction metric `[2, 2]`, of a patch that has one."""
 
     def __init__(
         self,
@@ -80,6 +83,7 @@ class ReducedModelPublished(FrictionModel):
         shape = models.ReducedModelPublished(patch, law, surface, on_load_change=when)._reference  # pyright: ignore
         kind = {"dtype": dtype or torch.get_default_dtype(), "device": device}
         self.surface = Surface(shape.surface, **kind)
+        self.register_buffer("root", None if patch.root is None else torch.tensor(shape.root, **kind))
         x, y = shape.centre_of_pressure.tolist()
         numbers = law.numbers._asdict()
         values = {name: numbers[name] for name in LAW}
@@ -89,9 +93,10 @@ class ReducedModelPublished(FrictionModel):
     def compiled(self) -> Compiled:
         """See `FrictionModel`."""
         pack = functools.partial(pack_surface, self.elasto_plastic, self.surface.kind, self.surface.size)
-        return Compiled(pack, (self.surface.data,))
+        return Compiled(pack, (self.surface.data,) if self.root is None else (self.surface.data, self.root), 1)
 
-    def prepare(self, parameters: Tensor) -> Prepared:
+    def prepare(self, parameters: Tensor) -> tuple[Prepared]:
         """The law, `r`, `<rho^2>`, the centre of pressure, and the limit surface."""
         radius, second_moment, x, y = parameters[..., len(LAW) :].split(1, -1)
-        return Prepared(self._law(parameters), PublishedNumbers(radius, second_moment, x, y, self.surface))
+        shape = PublishedNumbers(radius, second_moment, x, y, self.surface, self.root)
+        return (Prepared(self._law(parameters), shape),)

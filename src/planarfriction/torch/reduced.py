@@ -6,16 +6,17 @@ import functools
 from collections.abc import Iterable
 from typing import Any
 
+import numpy as np
 import torch
 from torch import Tensor
 
 from planarfriction import models
-from planarfriction.autodiff.parameters import pack_map
+from planarfriction.autodiff.parameters import pack_maps
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.laws import ElastoPlastic, FrictionLaw, LuGre
 from planarfriction.models import reduced_arrays
-from planarfriction.models.reduced_arrays import ReducedNumbers
+from planarfriction.models.reduced_map import slip_factor
 from planarfriction.patch import ContactPatch
 from planarfriction.torch.base import Compiled, FrictionModel, Prepared
 from planarfriction.torch.parameters import LAW
@@ -25,22 +26,24 @@ PARAMETERS = tuple(name for name in LAW if name != "gamma")
 
 
 class ReducedModel(FrictionModel):
-    """Reduced LuGre friction of bristle moments, differentiable: three states `(z_x, z_y, z_theta)` [m].
+    """Reduced LuGre friction of bristle moments, differentiable: three states `(z_x, z_y, z_theta)` [m] a part.
 
-    The equations and the numbers of `planarfriction.ReducedModel`; buffers hold its patch with the map of steady
-    sliding. `trainable` names the parameters of the law that are `nn.Parameter`s; `gamma` cannot be one, the map is
-    made for it. A patch whose shape depends on the load keeps that of `normal_force` [N]; `segments` and `speeds` as in
-    `planarfriction.ReducedModel`.
+    The equations and the numbers of `planarfriction.ReducedModel`, states of several parts `[..., P, 3]`; buffers hold
+    its patch with the maps of steady sliding. `trainable` names the parameters of the law that are `nn.Parameter`s;
+    `gamma` cannot be one, the maps are made for it. A patch whose shape depends on the load keeps that of
+    `normal_force` [N]; `parts`, `segments` and `speeds` as in `planarfriction.ReducedModel`.
     """
 
     arrays = reduced_arrays
-    components = (3,)
+    axes = 1
+    share: Tensor
+    """Of the load that each part carries, `[P]`."""
     factor: Tensor
-    """F `[3, 3]`."""
+    """F of each part, `[P, 3, 3]`."""
     map: Tensor
-    """Steady sliding, flat; in single precision, as compiled roll-outs read it."""
+    """Steady sliding of the parts, one behind the other; in single precision, as compiled roll-outs read it."""
     gamma: Tensor
-    """Stribeck exponent that the map is made for [-]."""
+    """Stribeck exponent that the maps are made for [-]."""
 
     def __init__(
         self,
@@ -48,6 +51,7 @@ class ReducedModel(FrictionModel):
         law: FrictionLaw,
         normal_force: float | None = None,
         *,
+        parts: int | str = 1,
         segments: int = 24,
         speeds: int = 14,
         trainable: Iterable[str] = PARAMETERS[:-1],
@@ -59,19 +63,26 @@ class ReducedModel(FrictionModel):
         if "gamma" in trainable:
             raise InvalidValueError("trainable", "not name gamma: the map of steady sliding is made for it", trainable)
         kind = {"dtype": dtype or torch.get_default_dtype(), "device": device}
-        shape = models.ReducedModel(patch, law, segments=segments, speeds=speeds, load_error=0.0).shape_at(normal_force)
-        self.sizes = reduced_arrays.sizes_of(shape.data)
-        self.register_buffer("factor", torch.tensor(shape.factor, **kind))
-        self.register_buffer("map", torch.tensor(shape.data, device=device))
+        model = models.ReducedModel(patch, law, parts=parts, segments=segments, speeds=speeds, load_error=0.0)
+        shares, shapes = zip(*model.parts_at(normal_force), strict=True)
+        self.components, self.sizes = model.state_shape, tuple(reduced_arrays.sizes_of(shape.data) for shape in shapes)
+        self.register_buffer("share", torch.tensor(shares, **kind))
+        self.register_buffer("factor", torch.tensor(np.stack([shape.factor for shape in shapes]), **kind))
+        self.register_buffer("map", torch.tensor(np.concatenate([shape.data for shape in shapes]), device=device))
         numbers = law.numbers._asdict()
         self.register_buffer("gamma", torch.tensor(numbers["gamma"], **kind))
-        self._adopt({name: numbers[name] for name in PARAMETERS}, trainable, shape.contact_radius, **kind)
+        lever = float(slip_factor(patch, normal_force)[2, 2])
+        self._adopt({name: numbers[name] for name in PARAMETERS}, trainable, lever, **kind)
 
     def _load_from_state_dict(self, state_dict: dict[str, Any], prefix: str, *rest: Any) -> None:
-        given = state_dict.get(f"{prefix}map")
-        if given is not None and (other := reduced_arrays.sizes_of(given)) != self.sizes:
-            rule = f"hold a map of the same size as the model (faces, segments, ...), {tuple(self.sizes)}"
-            raise InvalidValueError("state_dict", rule, tuple(other))
+        shares, maps = (state_dict.get(f"{prefix}{name}") for name in ("share", "map"))
+        if shares is not None and len(shares) != len(self.sizes):
+            raise InvalidValueError("state_dict", f"hold as many parts as the model, {len(self.sizes)}", len(shares))
+        if maps is not None:
+            for start, own in zip(reduced_arrays.starts_of(self.sizes), self.sizes, strict=True):
+                if (other := reduced_arrays.sizes_of(maps[start:])) != own:
+                    rule = f"hold maps of the same sizes as the model (faces, segments, ...), {tuple(own)}"
+                    raise InvalidValueError("state_dict", rule, tuple(other))
         super()._load_from_state_dict(state_dict, prefix, *rest)
 
     def law(self) -> LuGre:
@@ -82,13 +93,12 @@ class ReducedModel(FrictionModel):
 
     def compiled(self) -> Compiled:
         """See `FrictionModel`."""
-        return Compiled(functools.partial(pack_map, self.elasto_plastic), (self.factor, self.map))
+        pack = functools.partial(pack_maps, self.elasto_plastic, self.sizes)
+        return Compiled(pack, (self.share, self.factor, self.map), len(self.components))
 
-    def prepare(self, parameters: Tensor) -> Prepared:
-        """The law; the shape is fixed."""
+    def prepare(self, parameters: Tensor) -> tuple[Prepared, ...]:
+        """The law and the parts; their shapes are fixed."""
         values = dict(zip(PARAMETERS, parameters[..., None].unbind(-2), strict=True))
-        return Prepared(LawNumbers(**values, gamma=self.gamma, elasto_plastic=self.elasto_plastic), self._shape)
-
-    @property
-    def _shape(self) -> ReducedNumbers:
-        return reduced_arrays.numbers_of(self.factor, self.map, self.sizes)
+        law = LawNumbers(**values, gamma=self.gamma, elasto_plastic=self.elasto_plastic)
+        shapes = reduced_arrays.parts_of(self.factor, self.map, self.sizes)
+        return tuple(Prepared(law, shape, self.share[k]) for k, shape in enumerate(shapes))

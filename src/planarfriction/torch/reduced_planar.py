@@ -129,7 +129,7 @@ class ReducedPlanarLuGre(ReducedModelPublished):
         law, speed = self._law(values), xp.norm(v_scaled, -1)
         moving = speed > 0.0
         h = self.surface(v_scaled, speed) / torch.where(moving, speed, 1.0)  # zero at rest
-        scale = published_arrays.scale(xp, self.prepare(values).shape)
+        scale = published_arrays.scale(xp, self.prepare(values)[0].shape)
         return scale * h * formulas.stribeck(xp, speed, law) / law.sigma_0
 
     def bristle_rate(self, z: Tensor, v: Tensor) -> Tensor:
@@ -138,10 +138,10 @@ class ReducedPlanarLuGre(ReducedModelPublished):
 
     def force(self, z: Tensor, z_dot: Tensor, v: Tensor, f_n: Tensor | float) -> Tensor:
         """Wrench `w = -(sigma_0 z + sigma_1 z_dot + sigma_2 U v) f_n` `[..., 3]` [N, N, N m]."""
-        prepared = self.prepare(self.physical())
+        law, shape, _ = self.prepare(self.physical())[0]
         z, v, load = self._inputs(z, v, f_n)
-        by = self.arrays.held(xp, *prepared, v)
-        return load[..., None] * self.arrays.wrench(xp, *prepared, z, self._number("z_dot", z_dot), by)
+        by = self.arrays.held(xp, law, shape, v)
+        return load[..., None] * self.arrays.wrench(xp, law, shape, z, self._number("z_dot", z_dot), by)
 
     def step(self, z: Tensor, v: Tensor, f_n: Tensor | float, dt: Tensor | float) -> tuple[Tensor, Tensor]:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Bristles after `dt` [s] of a held twist, and the wrench at the end: exact, stable at any `dt`."""

@@ -1,0 +1,163 @@
+"""Derivatives of roll-outs on patches whose friction depends on the direction, in NumPy, PyTorch and JAX."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+
+import planarfriction as pf
+from planarfriction import autodiff
+
+PLAIN = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
+GRAIN = pf.grain(0.6, along=0.5, across=1.0)
+LAW = pf.LuGre(mu_c=0.7, mu_s=1.2, gamma=1.5, elasto_plastic=pf.ElastoPlastic(0.6))
+PATCHES = {
+    "grain": PLAIN.with_friction_metric(GRAIN),
+    "of each cell": PLAIN.with_friction_metric([pf.grain(0.3 * i, 0.6, 1.1) for i in range(PLAIN.cells)]),
+    "asymmetric": PLAIN.with_friction_metric(GRAIN, asymmetry=[0.2, -0.1]),
+}
+MODELS = [*(("reduced", patch) for patch in PATCHES), ("parts", "grain"), ("published", "grain")]
+DT, T = 1e-4, 10
+
+every_model = pytest.mark.parametrize(("kind", "patch"), MODELS)
+
+
+@functools.cache
+def model_of(kind: str, patch: str):
+    if kind == "published":
+        return pf.ReducedModelPublished(PATCHES[patch], LAW, pf.LimitSurfaceTable(PATCHES[patch]))
+    return pf.ReducedModel(PATCHES[patch], LAW, parts=2 if kind == "parts" else 1, segments=8, speeds=8)
+
+
+def drive(model, seed: int = 0):
+    random = np.random.default_rng(seed)
+    sizes = np.array([1.0, 1.0, 150.0])
+    twists = np.cumsum(random.normal(size=(T, 3)), axis=0) * 3e-3 * sizes
+    state = random.normal(size=model.state_shape) * [3e-7, 3e-7, 2e-9]
+    return state, twists, random.uniform(1.0, 3.0, T)
+
+
+def bars(model, seed: int = 1):
+    random = np.random.default_rng(seed)
+    return random.normal(size=(T, 3)) * [1.0, 1.0, 150.0], random.normal(size=model.state_shape) * [1e6, 1e6, 1e8]
+
+
+@every_model
+def test_a_roll_out_takes_the_steps_of_the_model(kind, patch):
+    model = model_of(kind, patch)
+    state, twists, loads = drive(model)
+    end, wrenches = autodiff.rollout(model, state, twists, loads, DT)
+    for twist, load, wrench in zip(twists, loads, wrenches, strict=True):
+        state, wanted = model.step(state, twist, load, DT)
+        assert wrench == pytest.approx(wanted, rel=1e-11, abs=1e-13)  # sums in another order
+    assert end == pytest.approx(state, rel=1e-11, abs=1e-20)
+
+
+@every_model
+def test_the_gradient_is_that_of_differences(kind, patch):
+    model = model_of(kind, patch)
+    state, twists, loads = drive(model, 2)
+    bar, end_bar = bars(model)
+    parameters = autodiff.parameters_of(model)
+    inputs = {"state": state, "twist": twists, "normal_force": loads, "parameters": parameters}
+    gradient = autodiff.rollout_gradient(model, state, twists, loads, DT, bar, end_bar)
+    units = {
+        "state": np.array([1e-7, 1e-7, 1e-9]),
+        "twist": np.array([1e-3, 1e-3, 0.15]),
+        "normal_force": 1.0,
+        "parameters": np.where(parameters == 0.0, 1e-3, np.abs(parameters)),
+    }
+
+    def value(inputs):
+        parameters = inputs["parameters"]
+        run = autodiff.rollout(model, *(inputs[n] for n in list(inputs)[:3]), DT, parameters=parameters)
+        return (bar * run.wrenches).sum() + (end_bar * run.state).sum()
+
+    random = np.random.default_rng(5)
+    for name, found in gradient._asdict().items():
+        along = random.normal(size=found.shape) * units[name]
+        ends = [value({**inputs, name: inputs[name] + h * along}) for h in (1e-6, -1e-6)]
+        # rounding of numbers near 100 by 1e-16/1e-6, and jumps of the curvature at squares of the map
+        assert (found * along).sum() == pytest.approx((ends[0] - ends[1]) / 2e-6, rel=1e-5, abs=1e-5), name
+
+
+@every_model
+def test_forwards_is_the_transpose_of_backwards(kind, patch):
+    model, random = model_of(kind, patch), np.random.default_rng(3)
+    inputs, (bar, end_bar) = drive(model, 4), bars(model)
+    parameters = autodiff.parameters_of(model)
+    changes = [*drive(model, 7), parameters * random.normal(size=len(parameters))]
+    found = autodiff.rollout_tangent(model, *inputs, DT, *changes)
+    gradient = autodiff.rollout_gradient(model, *inputs, DT, bar, end_bar)
+    forwards = [*(bar * found.wrenches_dot).ravel(), *(end_bar * found.state_dot).ravel()]
+    backwards = np.concatenate([(g * x).ravel() for g, x in zip(gradient, changes, strict=True)])
+    size = np.abs(forwards).sum() + np.abs(backwards).sum()
+    assert sum(forwards) == pytest.approx(backwards.sum(), abs=1e-11 * size)
+    slopes = autodiff.rollout_sensitivities(model, *inputs, DT).d_wrenches
+    by_parameters = np.einsum("ti,tip->p", bar, slopes)
+    alone = autodiff.rollout_gradient(model, *inputs, DT, bar).parameters
+    assert (np.abs(by_parameters - alone) <= 1e-11 * np.abs(bar[..., None] * slopes).sum((0, 1))).all()
+
+
+@pytest.mark.torch
+@every_model
+def test_pytorch_has_the_same_numbers_and_gradients(kind, patch):
+    torch = pytest.importorskip("torch", reason="needs PyTorch: pip install 'planarfriction[torch]'")
+    from planarfriction.torch import ReducedModel, ReducedModelPublished, rollout
+
+    model, options = model_of(kind, patch), {"dtype": torch.float64}
+    if kind == "published":
+        module = ReducedModelPublished(PATCHES[patch], LAW, model.surface, **options)
+    else:
+        module = ReducedModel(PATCHES[patch], LAW, parts=model.parts, segments=8, speeds=8, **options)
+    state, twists, loads = drive(model)
+    got = module(*map(torch.tensor, (state, twists[3], loads[3])))
+    assert got[0].detach().numpy() == pytest.approx(model.rate(state, twists[3], loads[3]), rel=1e-12, abs=1e-18)
+    assert got[1].detach().numpy() == pytest.approx(model.wrench(state, twists[3], loads[3]), rel=1e-12, abs=1e-15)
+    bar, end_bar = map(torch.tensor, bars(model))
+    wanted = autodiff.rollout_gradient(model, state, twists, loads, DT, bar.numpy(), end_bar.numpy())
+    for method in ("adjoint", "eager"):
+        free = [torch.tensor(value, requires_grad=True) for value in (state, twists, loads)]
+        free.append(module.physical().detach().requires_grad_())
+        run = rollout(module, *free[:3], DT, parameters=free[3], method=method)
+        exact = autodiff.rollout(model, state, twists, loads, DT)
+        assert run.wrenches.detach().numpy() == pytest.approx(exact.wrenches, rel=1e-12, abs=1e-13), method
+        slopes = torch.autograd.grad((bar * run.wrenches).sum() + (end_bar * run.state).sum(), free)
+        for slope, want in zip(slopes, wanted, strict=True):
+            # sums in another order; slopes of the stiff steps amplify that
+            assert slope.numpy() == pytest.approx(want, rel=1e-8, abs=1e-9 * np.abs(want).max()), method
+
+
+@pytest.mark.jax
+@every_model
+def test_jax_has_the_same_numbers_and_gradients(kind, patch):
+    jax = pytest.importorskip("jax", reason="needs the extra [jax]")
+    import planarfriction.jax as pj
+
+    before = jax.config.read("jax_enable_x64")
+    jax.config.update("jax_enable_x64", True)
+    try:
+        model = model_of(kind, patch)
+        if kind == "published":
+            pytree = pj.ReducedModelPublished(PATCHES[patch], LAW, model.surface)
+        else:
+            pytree = pj.ReducedModel(PATCHES[patch], LAW, parts=model.parts, segments=8, speeds=8)
+        state, twists, loads = drive(model)
+        for got, want in zip(
+            pytree.step(state, twists[3], loads[3], DT), model.step(state, twists[3], loads[3], DT), strict=True
+        ):
+            assert np.asarray(got) == pytest.approx(want, rel=1e-12, abs=1e-15)
+        bar, end_bar = bars(model)
+
+        def value(parameters, state, twists, loads):
+            run = pj.rollout(pytree, state, twists, loads, DT, parameters=parameters)
+            return (bar * run.wrenches).sum() + (end_bar * run.state).sum()
+
+        by, *slopes = jax.grad(value, (0, 1, 2, 3))(pytree.parameters, state, twists, loads)
+        wanted = autodiff.rollout_gradient(model, state, twists, loads, DT, bar, end_bar)
+        for slope, want in zip((*slopes, np.stack(by)), wanted, strict=True):
+            assert np.asarray(slope) == pytest.approx(want, rel=1e-11, abs=1e-12 * np.abs(want).max())
+    finally:
+        jax.config.update("jax_enable_x64", before)
