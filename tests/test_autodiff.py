@@ -461,14 +461,11 @@ def test_one_load_for_each_contact_and_rest():
 # ---------------------------------------------------------------------- other models
 
 
-@pytest.mark.parametrize("kind", ["distributed", "follows the load", "with a grain"])
+@pytest.mark.parametrize("kind", ["distributed", "follows the load"])
 def test_a_rollout_of_any_model_takes_its_steps(kind):
     model = {
         "distributed": lambda: pf.DistributedModel(PATCH, ELASTIC),
         "follows the load": lambda: pf.ReducedModel(FINGER, ELASTIC, segments=8, speeds=8),
-        "with a grain": lambda: pf.ReducedModel(
-            PATCH.with_friction_metric(pf.grain(0.3, 0.6, 1.0)), ELASTIC, segments=8, speeds=8
-        ),
     }[kind]()
     twists = np.random.default_rng(3).normal(size=(2, 5, 3)) * (1e-3, 1e-3, 0.3)
     loads, steps = np.linspace(0.5, 1.5, 5), np.linspace(1e-4, 2e-4, 5)

@@ -128,7 +128,8 @@ def test_a_stuck_contact_is_a_spring():
     slopes = jax.jit(jax.grad(force))(model.parameters)
     assert slopes.sigma_0 == pytest.approx(-1e-5 * count * dt * load, rel=1e-12)
     assert slopes.sigma_1 == pytest.approx(-1e-5 * load, rel=1e-12)
-    assert slopes.mu_c == slopes.mu_s == slopes.v_s == 0.0
+    # what a factor of zero leaves of rounding
+    assert max(abs(slopes.mu_c), abs(slopes.mu_s), abs(slopes.v_s / 1e3)) < 1e-15
 
 
 def test_wrench_is_linear_in_the_weights_of_the_cells():

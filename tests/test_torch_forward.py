@@ -13,8 +13,7 @@ from torch.autograd import forward_ad  # noqa: E402
 
 from planarfriction.torch import ReducedModel, ReducedModelPublished, rollout  # noqa: E402
 
-OF_PYTORCH = "ignore:.torch.jit.script. is deprecated:DeprecationWarning"
-pytestmark = [pytest.mark.torch, pytest.mark.filterwarnings(OF_PYTORCH)]
+pytestmark = pytest.mark.torch
 
 PATCH = pf.ContactPatch.from_pressure(np.random.default_rng(4).uniform(0.0, 1.0, (5, 6)), 0.002, name="lopsided")
 LAW = pf.LuGre(mu_s=1.2, gamma=1.7, elasto_plastic=pf.ElastoPlastic(0.7))
