@@ -213,7 +213,7 @@ def law_of(law: str = "elasto-plastic"):
     return jnp.stack(pair(law)[1].parameters)
 
 
-def square(method: str | None, steps: int = 4):
+def square(method: str | None, steps: int = 20):
     """Loss of the law in a row, and of twists."""
 
     def loss(parameters, twists):
@@ -228,8 +228,8 @@ def test_forward_mode_is_reverse_mode(method):
     loss, at = square(method)
     by_law, by_twist = jax.jit(jax.jacfwd(loss, (0, 1)))(*at)
     law, twist = jax.grad(loss, (0, 1))(*at)
-    np.testing.assert_allclose(by_law, law, rtol=1e-11)
-    close(by_twist, twist, 1e-11)
+    np.testing.assert_allclose(by_law, law, rtol=1e-9)  # sums in another order
+    close(by_twist, twist, 1e-10)
 
 
 def test_a_roll_out_of_a_batch_has_the_gradients_of_its_members():
