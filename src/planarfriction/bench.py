@@ -136,6 +136,12 @@ def _in_hand_published(name: str, full: bool, load: Literal[1, 2] = 1) -> Measur
     return _line(name, value, "s", "SciPy LSODA over the whole run", lsoda_time(scene, scene.t_end))
 
 
+def _in_hand_reduced(name: str, full: bool) -> Measurement:
+    kinds = (ReducedModel, ReducedModelPublished)
+    value, theirs = (_solver_time(in_hand(kind(_disc(), _law())), 9)[0] for kind in kinds)
+    return _line(name, value, "s", "the published reduced model", theirs)
+
+
 def _soft() -> ContactPatch:
     """The published soft finger whose profile follows the load."""
     width = 0.02
@@ -368,6 +374,7 @@ BENCHMARKS: dict[str, Callable[[str, bool], Measurement]] = {
     "in_hand.published": _in_hand_published,
     "in_hand.published.load_2": lambda name, full: _in_hand_published(name, full, load=2),
     "in_hand.published.load_dependent": _in_hand_load_dependent,
+    "in_hand.reduced": _in_hand_reduced,
     "in_hand.reduced.load_family": _in_hand_load_family,
     "table.build": _table_build,
     "twist.table.call": lambda name, full: _twist(name, full, LimitSurfaceTable),
