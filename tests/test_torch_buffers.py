@@ -154,6 +154,21 @@ def test_a_gradient_to_the_numbers_of_the_patch_is_eager():
         wrenches(model, "adjoint")
 
 
+@every_model
+def test_single_precision_is_as_close_as_its_digits_however_stiff(kind):
+    """Steady sliding at 1 m/s, where sigma_1 times the rounding of a rate was 3e-3 of the load."""
+    law = pf.LuGre(mu_s=1.2, gamma=1.7, sigma_0=1e7, sigma_1=8e3, elasto_plastic=pf.ElastoPlastic(0.7))
+    single, double = (module(kind, law=law, dtype=dtype) for dtype in (torch.float32, torch.float64))
+    fast = (500.0 * twists()).float()
+    exact = rollout(double, None, fast.double(), 1.0, 1e-3, method="eager").wrenches
+    found = rollout(single, None, fast, 1.0, 1e-3, method="eager").wrenches
+    steps = [single.step(single.rest(), twist, 1.0, 1e-3)[1] for twist in fast]
+    assert found.dtype == steps[0].dtype == torch.float32
+    lever = torch.tensor([1.0, 1.0, double.lever.item()], dtype=torch.float64)
+    for each in (found, torch.stack(steps)):  # a step of a millisecond forgets where it began
+        assert ((each.double() - exact) / lever).abs().max() < 2e-6  # parameters and results have 7 digits
+
+
 # ---------------------------------------------------------------------- what does not fit
 
 

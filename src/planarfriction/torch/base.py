@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterable
 from types import ModuleType
 from typing import Any, ClassVar, NamedTuple
@@ -158,6 +159,8 @@ class FrictionModel(nn.Module):
         parts = self.prepare(self._vector(parameters))
         z, v, load = self._inputs(state, twist, normal_force)
         dt = self._inner(inputs.non_negative("dt", self._number("dt", dt)))
+        kind = functools.reduce(torch.promote_types, (each.dtype for each in (parts[0].law.sigma_0, z, v)))
+        z, v = _wide(z), _wide(v)
 
         def step(part: Prepared, z: Tensor) -> tuple[Tensor, Tensor]:
             by = self.arrays.held(xp, part.law, part.shape, v)
@@ -165,7 +168,7 @@ class FrictionModel(nn.Module):
             return self._kept(new, load), self.arrays.wrench(xp, part.law, part.shape, new, zdot, by)
 
         new, unit = self._summed(parts, z, step)
-        return new, load[..., None] * unit
+        return new.to(kind), (load[..., None] * unit).to(kind)
 
     def compiled(self) -> Compiled | None:
         """What compiled roll-outs need of the model, if they know it."""
@@ -185,6 +188,8 @@ class FrictionModel(nn.Module):
         values, dt = self._vector(parameters), self._inner(dt)
         parts = self.prepare(values[..., None, :])
         once = dict(zip(map(id, parts), self.prepare(values), strict=True))
+        kind = functools.reduce(torch.promote_types, (each.dtype for each in (values, z, v)))
+        z, v = _wide(z), _wide(v)
 
         def roll(part: Prepared, z: Tensor) -> tuple[Tensor, Tensor]:
             law, shape, _ = once[id(part)]
@@ -200,7 +205,7 @@ class FrictionModel(nn.Module):
             return z, self.arrays.wrench(xp, part.law, part.shape, states, rates, by)
 
         end, unit = self._summed(parts, z, roll)
-        return end, load[..., None] * unit
+        return end.to(kind), (load[..., None] * unit).to(kind)
 
     def _evaluated(self, state, twist, normal_force, parameters) -> tuple[Tensor, Tensor]:
         """Rate and wrench."""
@@ -266,6 +271,15 @@ class FrictionModel(nn.Module):
         trailing = (1,) * self.axes
         values = [value.reshape(value.shape + trailing) for value in parameters[..., : len(LAW)].unbind(-1)]
         return LawNumbers(**dict(zip(LAW, values, strict=True)), elasto_plastic=self.elasto_plastic)
+
+
+def _wide(value: Tensor) -> Tensor:
+    """Numbers of a step in double precision, and with them all that follows, where the device has it.
+
+    In steady sliding the rate of a bristle is the difference of two large numbers; sigma_1 times its rounding in single
+    precision would be 1e-4 of the load at 1 m/s.
+    """
+    return value if value.device.type == "mps" else value.double()
 
 
 def _along(part: Any, steps: int, inner: int) -> Iterable[Any]:
