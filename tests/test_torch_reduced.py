@@ -74,7 +74,7 @@ def assert_equal(tensors, arrays, tolerance=1e-12):
 
 @every_law
 def test_sliding_straight_has_the_friction_of_the_stribeck_curve(law):
-    model = module(law, segments=24, speeds=14)
+    model = module(law, segments=24, speeds=16)
     for speed in (1e-5, 1e-3, 0.1):
         _, wrench = model.step(model.rest(), tensor([speed, 0.0, 0.0]), 3.0, 1e6)
         g = 1.0 + 0.2 * np.exp(-((speed / 1e-3) ** 1.7))

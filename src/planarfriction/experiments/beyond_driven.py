@@ -22,7 +22,7 @@ MODELS = {
 }
 """Model of the ladder -> its name in the report."""
 
-BOUNDS = {"median": 0.5, "third quartile": 0.8, "maximum": 1.0}
+BOUNDS = {"median": 0.25, "third quartile": 0.8, "maximum": 1.0}
 """Statistic of the force error -> the share of the published reduced model's that `ReducedModel` is compared with."""
 
 STATISTICS = tuple(BOUNDS)

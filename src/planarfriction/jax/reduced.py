@@ -70,7 +70,7 @@ class ReducedModel(FrictionModel):
         *,
         parts: int | str = 1,
         segments: int = 24,
-        speeds: int = 14,
+        speeds: int = 16,
     ) -> None:
         super().__init__(patch, law)
         numbers, names = law.numbers, ReducedParameters._fields

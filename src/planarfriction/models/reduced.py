@@ -63,7 +63,7 @@ class ReducedModel(ThreeStateModel):
     6 for slender or separate shapes, 8 for others whose pressure peaks, else 4."""
     segments: int = 24
     """Squares of the map along a quarter of a face of its cube; 24 leave errors of 1e-5 (median) of z_ss."""
-    speeds: int = 14
+    speeds: int = 16
     """Nodes of the map over the speed, for the Stribeck part."""
     load_error: float = 4e-3
     """Largest error of z_ss from blending maps over the load, of each part relative to the whole patch; 0 builds a map

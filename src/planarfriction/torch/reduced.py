@@ -53,7 +53,7 @@ class ReducedModel(FrictionModel):
         *,
         parts: int | str = 1,
         segments: int = 24,
-        speeds: int = 14,
+        speeds: int = 16,
         trainable: Iterable[str] = PARAMETERS[:-1],
         dtype: torch.dtype | None = None,
         device: torch.device | str | None = None,
