@@ -123,7 +123,8 @@ def relaxation(xp, decay_dt):
     stable at any dt. Below `x = 1e-3` the quotient is its series, exact to 1e-16 there, where the difference would
     cancel. ("A step at a held twist")
     """
-    remaining = xp.exp(-decay_dt)
+    # e^-300 is nothing beside 1, and products with less leave the range in which processors are fast
+    remaining = xp.where(decay_dt < 300.0, xp.exp(xp.maximum(-decay_dt, -300.0)), 0.0)
     far = decay_dt > 1e-3
     series = 1.0 - decay_dt * (0.5 - decay_dt * (1.0 / 6.0 - decay_dt * (1.0 / 24.0 - decay_dt * (1.0 / 120.0))))
     return remaining, xp.where(far, 1.0 - remaining, series) / xp.where(far, decay_dt, 1.0)
