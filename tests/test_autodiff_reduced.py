@@ -296,7 +296,9 @@ def test_a_batch_is_a_loop():
     for i, j in np.ndindex(3, 2):
         one = states[i, 0], twists[j], loads, dt
         single = autodiff.rollout(model, *one, parameters=parameters[i, 0])
-        assert np.array_equal(wrenches[i, j], single.wrenches) and np.array_equal(ends[i, j], single.state)
+        # abreast with others a contact is rounded in another order on some processors
+        for abreast, lone in ((wrenches[i, j], single.wrenches), (ends[i, j], single.state)):
+            np.testing.assert_allclose(abreast, lone, rtol=0.0, atol=1e-12 * np.abs(lone).max())
         alone = autodiff.rollout_gradient(model, *one, bar[i, j], end_bar[i, j], parameters=parameters[i, 0])
         for sum_of, where, g in zip(total, ((i, 0), j, ..., (i, 0)), alone, strict=True):
             sum_of[where] += g
