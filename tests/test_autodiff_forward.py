@@ -92,3 +92,9 @@ def test_wrong_changes_are_one_clear_line(changes, message):
     with pytest.raises(InvalidValueError, match=message) as caught:
         autodiff.rollout_tangent(model_of("reduced"), *drive()[0], DT, **changes)
     assert "\n" not in str(caught.value)
+
+
+def test_ragged_twists_are_one_clear_line():
+    with pytest.raises(InvalidValueError, match=r"^twist must") as caught:
+        autodiff.rollout_tangent(model_of("reduced"), None, [[], [1.0, None], []], 1.0, 1e-3)
+    assert "\n" not in str(caught.value)

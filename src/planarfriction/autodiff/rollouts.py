@@ -214,7 +214,7 @@ def rollout_tangent(
     """
     parts = pack(model, parameters)
     family, each = parts[0].family, inner_of(parts)
-    steps = np.shape(twist)[-2:-1]
+    steps = validation.numbers("twist", twist).shape[-2:-1]
     inner = {
         "state_dot": each,
         "twist_dot": (*steps, 3),
