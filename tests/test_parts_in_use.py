@@ -196,3 +196,13 @@ def test_completion_knows_auto():
     assert [item.value for item in complete_parts(None, None, "a")] == ["auto"]
     assert isinstance(complete_parts(None, None, "")[0], CompletionItem)
     assert complete_parts(None, None, "4") == []
+
+
+@pytest.mark.parametrize(
+    ("make", "units"),
+    [(pf.ReducedModel, "m"), (pf.ReducedModelPublished, "m, m, m^2"), (pf.DistributedModel, "m")],
+)
+def test_recorded_states_have_the_units_of_their_model(make, units):
+    data = simulate(scenes.free_slide(make(T, LAW), t_end=0.01), bristles="all").data
+    (name,) = [each for each in data if each.startswith("bristles")]
+    assert data[name].attrs["units"] == units

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -107,6 +107,9 @@ class FrictionModel(ByValue):
 
     patch: ContactPatch
     law: FrictionLaw
+
+    state_units: ClassVar[str] = "m"
+    """Units of the state: one for all of its components, or one for each."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.patch, ContactPatch):

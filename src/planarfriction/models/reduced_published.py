@@ -88,6 +88,7 @@ class ReducedModelPublished(ThreeStateModel):
     """
 
     _kernels = published_step
+    state_units = "m, m, m^2"
 
     surface: LimitSurface = None  # pyright: ignore[reportAssignmentType]
     """Limit surface; None takes the published table of the patch."""

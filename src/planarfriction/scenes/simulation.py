@@ -167,7 +167,7 @@ def _histories(scene: Scene, windows: Windows, output: Output) -> dict[str, Hist
                 inner = contact.model.state_shape
                 parts = () if len(inner) == 1 else (f"part_{contact.name}",)
                 states = part.reshape(len(part), *inner)
-                histories[name] = History(("time", *parts, "component"), states, {"units": "m, m, m^2"})
+                histories[name] = History(("time", *parts, "component"), states, {"units": contact.model.state_units})
     histories["time"] = history("time", ("time",), output.time, "s")
     histories["contact"] = History(("contact",), np.array([contact.name for contact in scene.contacts]), {})
     return histories

@@ -87,8 +87,22 @@ class _Rollout(torch.autograd.Function):
         return (end, wrenches, states), (0, 0, 0 if kept else None)
 
 
-class _Gradient(torch.autograd.Function):
-    """Cotangents of the inputs from those of last state and wrenches; itself without derivative.
+class _First(torch.autograd.Function):
+    """A first derivative, itself without derivative."""
+
+    @staticmethod
+    def setup_context(ctx, inputs, output):
+        pass
+
+    @staticmethod
+    def backward(ctx, *bars):
+        raise FrictionError("the adjoint gives first derivatives: take method='eager' to differentiate twice")
+
+    jvp = backward
+
+
+class _Gradient(_First):
+    """Cotangents of the inputs from those of last state and wrenches.
 
     The first `count` tensors are the inputs, both cotangents and, if they were kept, the states before each step.
     """
@@ -100,16 +114,6 @@ class _Gradient(torch.autograd.Function):
             model, state, twist, load, dt, wrenches_bar, state_bar, parameters=parameters, states=(*states, None)[0]
         )
         return tuple(_like(array, (tensor,)) for array, tensor in zip(gradient, tensors[:_INPUTS], strict=True))
-
-    @staticmethod
-    def setup_context(ctx, inputs, output):
-        pass
-
-    @staticmethod
-    def backward(ctx, *bars):
-        raise FrictionError(_TWICE)
-
-    jvp = backward
 
     @staticmethod
     def vmap(info, in_dims, kind, dt, count, *tensors):
@@ -124,8 +128,8 @@ class _Gradient(torch.autograd.Function):
         return tuple(g.reshape(size, *shape) for g, shape in zip(gradients, shapes, strict=True)), (0,) * _INPUTS
 
 
-class _Tangent(torch.autograd.Function):
-    """Changes of last state and wrenches along those of the inputs, which follow these; itself without derivative."""
+class _Tangent(_First):
+    """Changes of last state and wrenches along those of the inputs, which follow these."""
 
     @staticmethod
     def forward(kind: _Kind, dt, *tensors):
@@ -134,25 +138,12 @@ class _Tangent(torch.autograd.Function):
         return tuple(_like(array, tensors[:_INPUTS]) for array in found[2:])
 
     @staticmethod
-    def setup_context(ctx, inputs, output):
-        pass
-
-    @staticmethod
-    def backward(ctx, *bars):
-        raise FrictionError(_TWICE)
-
-    jvp = backward
-
-    @staticmethod
     def vmap(info, in_dims, kind, dt, *tensors):
         size, dims, count = info.batch_size, in_dims[2:], 2 * _INPUTS
         if any(dim is not None for dim in dims[count:]):
             return _one_by_one(_Tangent, size, dims, (kind, dt), tensors)
         aligned = _aligned(size, dims[:count], tensors[:count], (kind.axes, *_INNER) * 2)
         return _Tangent.apply(kind, dt, *aligned, *tensors[count:]), (0, 0)
-
-
-_TWICE = "the adjoint gives first derivatives: take method='eager' to differentiate twice"
 
 
 def _numbers(kind: _Kind, tensors, count: int) -> tuple[list[Any], tuple[Packed, ...]]:
