@@ -121,6 +121,28 @@ def _pull_back(law, step, new_bar, k_bar):
     return bar.z, plus(bar.u, (bar.v + bar.q * grip_slope(law, speed, q)) * per, u)
 
 
+class CellSlopes(NamedTuple):
+    """A step of a cell, with the slopes of its traction row by row."""
+
+    new: tuple
+    traction: tuple
+    """Per unit load."""
+    by_z: tuple
+    by_u: tuple
+    """By the velocity of the cell."""
+
+
+@kernel
+def cell_slopes(law, z, u, dt):
+    """`CellSlopes` of a step from the bristle z at the velocity u."""
+    step = bristle_step.linearise(law, _bristle(law, z, u), dt)
+    new, k = step.end.new, step.end.stage.k
+    pull, damped = law.sigma_1 * k - law.sigma_0, -(law.sigma_1 + law.sigma_2)
+    (a, b), (c, d) = _pull_back(law, step, (pull, 0.0), law.sigma_1 * new[0])
+    (e, f), (g, h) = _pull_back(law, step, (0.0, pull), law.sigma_1 * new[1])
+    return CellSlopes(new, _traction(law, u, step.end), (a, b, e, f), (c + damped, d, g, h + damped))
+
+
 @jit
 def jacobians(law, z, twist, cells, load, dt, out):
     """`CellJacobians` of steps into `out`, which comes in as zeros: `z` [B, 2, n], `twist` [B, 3], `load`, `dt` [B]."""

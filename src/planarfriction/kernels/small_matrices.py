@@ -1,0 +1,78 @@
+"""Small matrices, row by row in memory."""
+
+from __future__ import annotations
+
+import math
+
+from planarfriction.kernels import compiled_math as xp
+from planarfriction.kernels import kernel
+
+SWEEPS = 5
+"""Of Jacobi rotations over a matrix [3, 3], which converge with their square from the second or third on."""
+
+
+@kernel
+def _rotate(s, q, i, j):
+    """One Jacobi rotation of the symmetric matrix s [3, 3], after which `s_ij = 0`; its axes are the columns of q."""
+    off = s[3 * i + j]
+    half = 0.5 * (s[4 * j] - s[4 * i]) / (off if off != 0.0 else 1.0)
+    tangent = (1.0 if half >= 0.0 else -1.0) / (abs(half) + math.sqrt(half * half + 1.0))
+    tangent = tangent if off != 0.0 else 0.0
+    cosine = 1.0 / math.sqrt(tangent * tangent + 1.0)
+    sine = tangent * cosine
+    for m in range(3):
+        one, other = s[3 * m + i], s[3 * m + j]
+        s[3 * m + i], s[3 * m + j] = cosine * one - sine * other, sine * one + cosine * other
+        one, other = q[3 * m + i], q[3 * m + j]
+        q[3 * m + i], q[3 * m + j] = cosine * one - sine * other, sine * one + cosine * other
+    for m in range(3):
+        one, other = s[3 * i + m], s[3 * j + m]
+        s[3 * i + m], s[3 * j + m] = cosine * one - sine * other, sine * one + cosine * other
+
+
+@kernel
+def leave_out_rising(p, scale, s, q):
+    """Take out of the slopes p [3, 3] the directions in which they rise; `scale` are twists of unit energy."""
+    for i in range(3):
+        for j in range(3):
+            s[3 * i + j] = 0.5 * (p[3 * i + j] + p[3 * j + i]) * scale[i] * scale[j]
+            q[3 * i + j] = 1.0 if i == j else 0.0
+    for turn in range(3 * SWEEPS):
+        _rotate(s, q, 1 if turn % 3 == 2 else 0, 1 if turn % 3 == 0 else 2)
+    for m in range(3):
+        rise = xp.maximum(s[4 * m], 0.0)
+        for i in range(3):
+            for j in range(3):
+                p[3 * i + j] -= rise * q[3 * i + m] * q[3 * j + m] / (scale[i] * scale[j])
+
+
+@kernel
+def solved(m, x, n):
+    """Solve `m x' = x` in place, by elimination with pivots. The diagonal of m ends as one over the pivots, 0 where it is singular.
+
+    Returns the sign of the determinant."""
+    sign = 1.0
+    for c in range(n):
+        pivot = c
+        for r in range(c + 1, n):
+            if abs(m[n * r + c]) > abs(m[n * pivot + c]):
+                pivot = r
+        if pivot != c:
+            sign = -sign
+            for j in range(c, n):
+                m[n * c + j], m[n * pivot + j] = m[n * pivot + j], m[n * c + j]
+            x[c], x[pivot] = x[pivot], x[c]
+        if m[n * c + c] < 0.0:
+            sign = -sign
+        per = 1.0 / m[n * c + c] if m[n * c + c] != 0.0 else 0.0
+        m[n * c + c] = per
+        for r in range(c + 1, n):
+            share = m[n * r + c] * per
+            for j in range(c + 1, n):
+                m[n * r + j] -= share * m[n * c + j]
+            x[r] -= share * x[c]
+    for c in range(n - 1, -1, -1):
+        for j in range(c + 1, n):
+            x[c] -= m[n * c + j] * x[j]
+        x[c] *= m[n * c + c]
+    return sign
