@@ -45,6 +45,7 @@ _HOME = {
 }
 _MODULES = (
     "autodiff",
+    "coupling",
     "errors",
     "families",
     "formulas",

@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import functools
 import math
+
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import entry, jit, kernel
 from planarfriction.kernels.coupling_rows import INVALID, read
@@ -264,7 +265,11 @@ def solve(patches, problem):
     for i in range(n):
         w[i] = given[row.load + i // 3] * given[row.unit + i]
     _forget_unloaded(own, problem)
-    given[row.iterations], given[row.residual] = iterations, best
+    given[row.iterations], given[row.residual], given[row.converged] = (
+        iterations,
+        best,
+        1.0 if best <= tolerance else 0.0,
+    )
 
 
 @kernel

@@ -45,6 +45,8 @@ class Row(NamedTuple):
     """`INVALID` where a number is out of range, or negative where it must not be."""
     residual: int
     """[m/s]"""
+    converged: int
+    """1 or 0."""
     unit: int
     """Wrenches of the models per unit load, [3k]; this and all that follows is scratch."""
     unit_slopes: int
@@ -83,7 +85,7 @@ def layout(patches: int, pieces: int, states: int) -> tuple[Row, dict[str, slice
     """Rows for k patches: where their parts begin, the same as slices, and how long they are."""
     k, n = patches, 3 * patches
     sizes = dict.fromkeys(Row._fields, n)
-    sizes |= dict.fromkeys(("dt", "tolerance", "most", "iterations", "residual"), 1)
+    sizes |= dict.fromkeys(("dt", "tolerance", "most", "iterations", "residual", "converged"), 1)
     sizes |= dict.fromkeys(("free_load", "load", "load_0", "best_load"), k)
     sizes |= dict.fromkeys(("state", "new"), states) | dict.fromkeys(("records", "shares"), pieces)
     sizes |= dict.fromkeys(("unit_slopes", "slopes"), 9 * k) | dict.fromkeys(("response", "matrix"), n * n)

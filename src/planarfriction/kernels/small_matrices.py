@@ -48,9 +48,10 @@ def leave_out_rising(p, scale, s, q):
 
 @kernel
 def solved(m, x, n):
-    """Solve `m x' = x` in place, by elimination with pivots. The diagonal of m ends as one over the pivots, 0 where it is singular.
+    """Solve `m x' = x` in place, by elimination with pivots; the sign of the determinant.
 
-    Returns the sign of the determinant."""
+    m [n, n] is lost. Where it is singular, the numbers that it does not determine are 0.
+    """
     sign = 1.0
     for c in range(n):
         pivot = c

@@ -22,7 +22,7 @@ from planarfriction.kernels import (
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels.distributed_step import cell_slopes
 from planarfriction.kernels.law import grip, grip_slope, squared
-from planarfriction.kernels.pointers import doubles
+from planarfriction.kernels.pointers import doubles, floats
 from planarfriction.kernels.rollouts import Contact
 from planarfriction.kernels.vectors import dot, norm, plus, put, three, times
 
@@ -49,7 +49,7 @@ def _pull_rows(pull_back, contact, step, slopes, out):
 def reduced(contact, z, v, dt, new, out):
     """A contact of `ReducedModel`, or one of its parts."""
     own, out = reduced_contact.read(contact), doubles(out)
-    contact = Contact(own.law, own.shape, (0, own.other, 0), doubles(own.data))
+    contact = Contact(own.law, own.shape, (0, own.other, 0), floats(own.data))
     held, slopes = reduced_step.hold_slopes(contact, three(doubles(v)), out)
     step = reduced_step.linearise(contact, held, three(doubles(z)), dt)
     put(doubles(new), step.new)

@@ -95,6 +95,18 @@ class PackedModel(NamedTuple):
     that should just hold gives way, or the other way round."""
 
 
+@by_parts
+class PackedSteps(NamedTuple):
+    """A model at R loads as `coupling` sees it, in P parts that share the twist and the load."""
+
+    records: np.ndarray
+    """What the model's function of `kernels.step_slopes` is given of each part, `[R, P, words]`."""
+    shares: np.ndarray
+    """Of the parts in the load, `[R, P]`."""
+    kept: tuple[np.ndarray, ...]
+    """As in `PackedModel`."""
+
+
 @dataclass(frozen=True, eq=False)
 class FrictionModel(ByValue):
     """A patch with a friction law; the caller holds the state.
@@ -141,6 +153,27 @@ class FrictionModel(ByValue):
         """
         rule = "be one that can be simulated in a scene: it has no packed(loads)"
         raise InvalidValueError("model", rule, type(self).__name__)
+
+    @property
+    def step_function(self) -> Any:
+        """Its function of `kernels.step_slopes`."""
+        raise InvalidValueError(
+            "model", "be one whose steps are compiled: it has no step_function", type(self).__name__
+        )
+
+    def packed_steps(self, loads: Sequence[float | None]) -> PackedSteps:
+        """The model at `loads` > 0 [N], `[None]` where the patch does not depend on the load, with all its states."""
+        raise NotImplementedError
+
+    @property
+    def _pieces(self) -> int:
+        """Parts of `packed_steps`, of as many states each."""
+        return 1
+
+    @property
+    def _follows_load(self) -> bool:
+        """Whether what the model knows of its patch changes with the load."""
+        return self.patch.depends_on_load
 
     def _inputs(self, state, twist, normal_force, **more) -> list[np.ndarray]:
         """Check the inputs and broadcast their batch axes against each other.

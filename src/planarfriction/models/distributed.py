@@ -5,10 +5,11 @@ from __future__ import annotations
 import functools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from planarfriction.kernels import anisotropic_contact, distributed_contact
+from planarfriction.kernels import anisotropic_contact, distributed_contact, step_slopes
 from planarfriction.kernels import distributed_step as kernels
 from planarfriction.kernels.anisotropic_contact import AnisotropicContact
 from planarfriction.kernels.distributed_contact import DistributedContact
@@ -16,7 +17,7 @@ from planarfriction.kernels.pointers import place_of
 from planarfriction.kernels.records import rows_of
 from planarfriction.laws.base import refuse_creep
 from planarfriction.models import anisotropic, base
-from planarfriction.models.base import FrictionModel, ModelJacobians, PackedModel, StepJacobians
+from planarfriction.models.base import FrictionModel, ModelJacobians, PackedModel, PackedSteps, StepJacobians
 from planarfriction.models.rates import linearised, rates
 
 
@@ -132,6 +133,17 @@ class DistributedModel(FrictionModel):
         chosen = self.patch.pressure.ever_loaded(self.patch.positions, between)
         most = max(int(base.ROOM / (8.0 * chosen.sum())), 1)
         return self._packed(np.array([self.patch.weights(load)[chosen] for load in loads[:most]]), chosen)
+
+    @property
+    def step_function(self) -> Any:
+        """See `FrictionModel.step_function`."""
+        return step_slopes.anisotropic if self.patch.anisotropic else step_slopes.distributed
+
+    def packed_steps(self, loads: Sequence[float | None]) -> PackedSteps:
+        """See `FrictionModel.packed_steps`."""
+        weights = np.array([self.patch.weights(load) for load in loads])
+        packed = self._packed(weights, np.ones(weights.shape[1], bool))
+        return PackedSteps(packed.records[:, None], np.ones((len(loads), 1)), packed.kept)
 
     def _packed(self, weights: np.ndarray, chosen: np.ndarray) -> PackedModel:
         """The chosen cells as the solver sees them, with each row of weights `[R, n]` of theirs or `[R, N]` of all."""

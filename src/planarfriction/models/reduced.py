@@ -11,7 +11,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels import reduced_contact, reduced_step
+from planarfriction.kernels import reduced_contact, reduced_step, step_slopes
 from planarfriction.kernels.pointers import place_of
 from planarfriction.kernels.records import rows_of
 from planarfriction.kernels.reduced_contact import ReducedContact, Shape
@@ -55,7 +55,7 @@ class ReducedModel(ThreeStateModel):
     from z = 0, and not from `a g/sigma_0` as those of the distributed model are.
     """
 
-    _kernels = reduced_step
+    _kernels, step_function = reduced_step, step_slopes.reduced
 
     _: KW_ONLY
     parts: Any = 1

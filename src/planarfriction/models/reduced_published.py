@@ -13,7 +13,7 @@ from planarfriction import validation
 from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.geometry import transformed
-from planarfriction.kernels import published_contact, published_step
+from planarfriction.kernels import published_contact, published_step, step_slopes
 from planarfriction.kernels.pointers import place_of
 from planarfriction.kernels.published_contact import PublishedContact, Root, Shape
 from planarfriction.kernels.records import rows_of
@@ -87,7 +87,7 @@ class ReducedModelPublished(ThreeStateModel):
     Source: Waltersson and Karayiannidis 2024, section IV.
     """
 
-    _kernels = published_step
+    _kernels, step_function = published_step, step_slopes.published
     state_units = "m, m, m^2"
 
     surface: LimitSurface = None  # pyright: ignore[reportAssignmentType]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ from planarfriction.kernels.pointers import place_of
 from planarfriction.kernels.records import row_of
 from planarfriction.kernels.rollouts import UNFIT, Place, compile_step_one, step_batch, step_one
 from planarfriction.models import base
-from planarfriction.models.base import FrictionModel, ModelJacobians, PackedModel, StepJacobians
+from planarfriction.models.base import FrictionModel, ModelJacobians, PackedModel, PackedSteps, StepJacobians
 from planarfriction.models.part_shapes import REMEMBERED, Part
 from planarfriction.models.rates import linearised, rates
 from planarfriction.models.remembered import Remembered
@@ -151,10 +152,6 @@ class ThreeStateModel(FrictionModel):
         """Share of the load and shape of each part at a load [N], which may be None where it makes no difference."""
         return (Part(1.0, self.shape_at(normal_force)),)  # pyright: ignore[reportArgumentType]
 
-    @property
-    def _follows_load(self) -> bool:
-        return self.patch.depends_on_load
-
     @functools.cached_property
     def _recent(self) -> Remembered[Any]:
         """Shapes at the latest loads."""
@@ -167,6 +164,18 @@ class ThreeStateModel(FrictionModel):
         if between is None:
             return self._packed(list(self._parts_at(loads)), loads)
         return self._packed(self._first_parts(loads), between[1:])
+
+    def packed_steps(self, loads: Sequence[float | None]) -> PackedSteps:
+        """See `FrictionModel.packed_steps`."""
+        parts = list(self._parts_at(loads)) if self._follows_load else [self.parts_at(None)] * len(loads)
+        each = [self._records([part.shape for part in same], 0.0) for same in zip(*parts, strict=True)]
+        shares = np.array([[part.share for part in loaded] for loaded in parts])
+        records = np.stack([part.records for part in each], 1)
+        return PackedSteps(records, shares, tuple(data for part in each for data in part.kept))
+
+    @property
+    def _pieces(self) -> int:
+        return math.prod(self.state_shape) // 3
 
     def _packed(self, parts: Sequence[tuple[Part, ...]], widest: Sequence[float | None]) -> PackedModel:
         """The parts at some loads as the solver sees them; its lever arm is the largest at the loads `widest`."""

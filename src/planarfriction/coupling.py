@@ -1,0 +1,316 @@
+"""One implicit step of many patches in contact space, for any host that steps bodies.
+
+A host that integrates with a fixed time step knows how the twists and loads of its patches at the end of the step would
+follow the friction wrenches that act during it. `CoupledPatches.step` finds the wrenches that fit: those of the models
+at the very twists and loads that come out. That is stable at any time step, whatever the stiffness of the bristles.
+"""
+
+from __future__ import annotations
+
+import functools
+import itertools
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.equality import ByValue, by_parts
+from planarfriction.errors import InvalidValueError
+from planarfriction.formulas import LARGEST
+from planarfriction.kernels import coupling as kernels
+from planarfriction.kernels.coupling_rows import Patches, layout
+from planarfriction.kernels.pointers import address_of, place_of
+from planarfriction.kernels.records import row_of
+from planarfriction.kernels.step_slopes import WORDS
+from planarfriction.kernels.threads import share
+from planarfriction.models import FrictionModel
+from planarfriction.models.base import PackedSteps
+
+TOLERANCE = 1e-9
+"""Default error of the twists [m/s]: a bristle is off by a thousandth of its largest deflection after a second."""
+
+ITERATIONS = 50
+
+PASSES = 10
+"""Rounds in which the shapes of patches follow their loads."""
+
+_WORTH_A_THREAD = 200
+"""Patches below which starting a thread costs more than it saves."""
+
+_INPUTS = ("state", "dt", "twist", "normal_force", "wrench", "twist_response", "load_response")
+_PLACES = ("state", "dt", "free_twist", "free_load", "guess", "response", "load_response")
+
+
+@by_parts
+class HostStep(NamedTuple):
+    """The step of a host for k patches: what comes out with the wrenches of a guess, and how other wrenches change it.
+
+    `V = twist + twist_response (W - wrench)`, `N = max(normal_force + load_response (W - wrench), 0)`, all at the end
+    of the step, as flat vectors patch by patch. Leading axes are environments.
+    """
+
+    twist: Any
+    """Twists of the patches `[..., k, 3]` [m/s, m/s, rad/s], each about its contact frame's origin, in its axes."""
+    normal_force: Any
+    """`[..., k]` [N]"""
+    wrench: Any
+    """The guess, `[..., k, 3]` [N, N, N m]: that of the last step, or zeros."""
+    twist_response: Any
+    """d twist / d wrench, `[..., 3k, 3k]`: for rigid bodies `dt J M^-1 J'`; `W.twist_response W >= 0`."""
+    load_response: Any = None
+    """d normal_force / d wrench, `[..., k, 3k]`; None where loads do not follow."""
+
+
+@by_parts
+class CoupledStep(NamedTuple):
+    """The end of a step: `state, wrench` are those of the models' `step` at `twist` and `normal_force`."""
+
+    state: np.ndarray
+    """`[..., states]`"""
+    wrench: np.ndarray
+    """`[..., k, 3]` [N, N, N m]"""
+    twist: np.ndarray
+    """`[..., k, 3]` [m/s, m/s, rad/s]"""
+    normal_force: np.ndarray
+    """`[..., k]` [N]"""
+    iterations: np.ndarray
+    """Newton iterations, int `[...]`."""
+    residual: np.ndarray
+    """How far twists and loads are from what the wrenches cause, `[...]` [m/s]; a load in the speed that it could."""
+    converged: np.ndarray
+    """Whether that is within the tolerance, bool `[...]`."""
+
+
+@dataclass(frozen=True, eq=False)
+class CoupledPatches(ByValue):
+    """Patches that one implicit step couples through the bodies of a host; models of all kinds may be mixed.
+
+    The caller holds the state: one vector, the states of the patches one behind the other (`states` gives each its
+    shape). A patch whose shape depends on the load has the shape of the load that comes out.
+
+    Raises `InvalidValueError` where `models` are no friction models with compiled steps.
+    """
+
+    models: tuple[FrictionModel, ...]
+
+    def __post_init__(self) -> None:
+        if isinstance(self.models, FrictionModel) or not isinstance(self.models, Iterable):
+            raise InvalidValueError("models", "be a list of friction models, one for each patch", self.models)
+        object.__setattr__(self, "models", tuple(self.models))
+        for model in self.models:
+            validation.instance("models", model, FrictionModel, "friction models, one for each patch")
+        if not self.models:
+            raise InvalidValueError("models", "hold at least one", "none")
+        _ = self._packed
+
+    @property
+    def state_shape(self) -> tuple[int, ...]:
+        """Shape of the state of all patches, `(states,)`."""
+        return (int(self._bounds[-1]),)
+
+    def rest(self) -> np.ndarray:
+        """State of patches at rest: no bristle is deflected."""
+        return np.zeros(self.state_shape)
+
+    def states(self, state: np.ndarray) -> list[np.ndarray]:
+        """Views of the state of each patch in `state` `[..., states]`, in the shape that its model gives it."""
+        if not (isinstance(state, np.ndarray) and state.shape[-1:] == self.state_shape):
+            shape = list(np.shape(state))
+            raise InvalidValueError("state", f"be an array of shape [..., {self._bounds[-1]}]", f"shape {shape}")
+        ends = zip(self._bounds, self._bounds[1:], self.models, strict=False)
+        return [state[..., a:b].reshape(*state.shape[:-1], *model.state_shape) for a, b, model in ends]
+
+    def step(
+        self, state, host: HostStep, dt, *, tolerance: float = TOLERANCE, iterations: int = ITERATIONS
+    ) -> CoupledStep:
+        """The wrenches that fit the step of a host: `W = w(V, N)`, with the V and N that they cause (see `HostStep`).
+
+        `w` are the wrenches of the models' steps of `dt` [s] from `state` `[..., states]`. Newton's method on W, from
+        the better of the guess and of rest; a step that goes too far is shortened, and slopes that rise are left out
+        (docs/embedding.md). Leading axes broadcast; environments run on threads, without the interpreter's lock.
+        `tolerance` is that of the twists [m/s], spins times the size of the patch. What does not converge within
+        `iterations` has the best found.
+
+        Raises `InvalidValueError` for what is not finite, not of its shape, or negative where it must not be.
+        """
+        if not isinstance(host, HostStep):
+            raise InvalidValueError("host", "be a HostStep", type(host).__name__)
+        tolerance = validation.positive("tolerance", tolerance)
+        iterations = validation.count("iterations", iterations, 0)
+        given = dict(zip(_INPUTS, (state, dt, *host), strict=True))
+        if host.load_response is None:
+            del given["load_response"]
+        arrays = {name: validation.numbers(name, value) for name, value in given.items()}
+        problems, batch = self._problems(arrays)
+        parts = self._parts
+        problems[:, parts["tolerance"]], problems[:, parts["most"]] = tolerance, iterations
+        problems[:, parts["wrench"]] = problems[:, parts["guess"]]
+        counts = self._solve(problems)
+        if (counts < 0).any():
+            _refuse(arrays)
+        return self._result(problems, counts, batch)
+
+    # ------------------------------------------------------------------ rows
+
+    def _problems(self, arrays: dict[str, np.ndarray]) -> tuple[np.ndarray, tuple[int, ...]]:
+        """A row for each environment, with the inputs written, and the batch axes."""
+        k, n = len(self.models), 3 * len(self.models)
+        inner = {
+            "state": self.state_shape, "dt": (), "twist": (k, 3), "normal_force": (k,), "wrench": (k, 3),
+            "twist_response": (n, n), "load_response": (k, n),
+        }  # fmt: skip
+        axes = {}
+        for name, array in arrays.items():
+            cut = array.ndim - len(inner[name])
+            if cut < 0 or array.shape[cut:] != inner[name]:
+                wanted = ", ".join(["...", *map(str, inner[name])])
+                raise InvalidValueError(name, f"have shape [{wanted}]", f"shape {list(array.shape)}")
+            axes[name] = array.shape[:cut]
+        batch = axes["state"]
+        if any(each != batch for each in axes.values()):
+            try:
+                batch = np.broadcast_shapes(*axes.values())
+            except ValueError:
+                shapes = ", ".join(str(list(each)) for each in axes.values())
+                raise InvalidValueError("batch axes", "broadcast", f"shapes {shapes}") from None
+        count, words = math.prod(batch), self._packed.words
+        if count * words > validation.MOST_NUMBERS:
+            rule = f"hold at most {validation.MOST_NUMBERS // words} environments of these patches"
+            raise InvalidValueError("batch axes", rule, list(batch))
+        problems = np.zeros((*batch, words))
+        for name, place in zip(_INPUTS, _PLACES, strict=True):
+            if name in arrays:
+                problems[..., self._parts[place]] = arrays[name].reshape(*axes[name], -1)
+        return problems.reshape(count, words), batch
+
+    def _solve(self, problems: np.ndarray) -> np.ndarray:
+        """Solve all problems; the iterations that each took, negative for invalid ones."""
+        packed, parts = self._packed, self._parts
+        most = len(problems) * len(self.models) // _WORTH_A_THREAD
+
+        def work(first: int, last: int) -> None:
+            kernels.solve_batch(packed.row, problems, first, last)
+
+        problems.view(np.int64)[:, parts["records"]], problems[:, parts["shares"]] = packed.records, packed.shares
+        loads, total = problems[:, parts["free_load"]], np.zeros(len(problems), int)
+        for i in range(PASSES + 1):
+            kept = self._write_following(problems, loads)
+            if i == PASSES:
+                problems[:, parts["most"]] = 0
+            share(len(problems), most, work)
+            del kept
+            taken = problems[:, parts["iterations"]][:, 0].astype(int)
+            total += taken
+            came_out = problems[:, parts["load"]].copy()
+            followed = not packed.following or (came_out == loads).all() or (i > 0 and (taken <= 0).all())
+            if followed or (taken < 0).any():
+                break
+            loads = came_out
+        return total
+
+    def _write_following(self, problems: np.ndarray, loads: np.ndarray) -> list[PackedSteps]:
+        """Write the pieces of patches whose shapes follow their loads `[E, k]`; returns what has to be kept."""
+        records, shares = problems.view(np.int64)[:, self._parts["records"]], problems[:, self._parts["shares"]]
+        kept = []
+        for p, pieces in self._packed.following:
+            chosen = np.flatnonzero((loads[:, p] > 0.0) & (loads[:, p] <= LARGEST))
+            records[:, pieces] = 0
+            if chosen.size:
+                steps = self.models[p].packed_steps(loads[chosen, p])
+                records[chosen, pieces], shares[chosen, pieces] = _addresses(steps), steps.shares
+                kept.append(steps)
+        return kept
+
+    def _result(self, problems: np.ndarray, counts: np.ndarray, batch: tuple[int, ...]) -> CoupledStep:
+        names, k = ("new", "wrench", "twist", "load", "residual", "converged"), len(self.models)
+        new, wrench, twist, load, residual, converged = (problems[:, self._parts[name]].copy() for name in names)
+        return CoupledStep(
+            new.reshape(*batch, new.shape[1]),
+            wrench.reshape(*batch, k, 3),
+            twist.reshape(*batch, k, 3),
+            load.reshape(*batch, k),
+            counts.reshape(batch),
+            residual.reshape(batch),
+            (converged > 0.0).reshape(batch),
+        )
+
+    # ------------------------------------------------------------------ what is packed once
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What a copy or another process gets: addresses hold in this process alone."""
+        return {"models": self.models}
+
+    @functools.cached_property
+    def _bounds(self) -> np.ndarray:
+        return np.cumsum([0, *(math.prod(model.state_shape) for model in self.models)])
+
+    @functools.cached_property
+    def _packed(self) -> _Packed:
+        return _packed(self.models, self._bounds)
+
+    @property
+    def _parts(self) -> dict[str, slice]:
+        return self._packed.parts
+
+
+class _Packed(NamedTuple):
+    """Patches as compiled code sees them."""
+
+    row: np.ndarray
+    """Their `Patches`."""
+    parts: dict[str, slice]
+    """Of the row of a problem."""
+    words: int
+    """Length of that."""
+    records: np.ndarray
+    """Addresses of the pieces' records, int `[pieces]`; 0 of those that follow their loads."""
+    shares: np.ndarray
+    """`[pieces]`"""
+    following: list[tuple[int, slice]]
+    """Patches whose pieces follow their loads, and these pieces."""
+    kept: list[Any]
+    """What is behind addresses."""
+
+
+def _packed(models: tuple[FrictionModel, ...], bounds: np.ndarray) -> _Packed:
+    counts = [model._pieces for model in models]
+    ends = np.cumsum([0, *counts]).tolist()
+    pieces = [slice(*each) for each in itertools.pairwise(ends)]
+    functions, owners, firsts = np.zeros((3, ends[-1]), np.int64)
+    records, shares, known, following = np.zeros(ends[-1], np.int64), np.zeros(ends[-1]), {}, []
+    for p, (model, own) in enumerate(zip(models, pieces, strict=True)):
+        functions[own], owners[own] = address_of(model.step_function, WORDS), p
+        firsts[own] = np.linspace(bounds[p], bounds[p + 1], counts[p], endpoint=False)
+        if model._follows_load:
+            following.append((p, own))
+            continue
+        steps = known.setdefault(id(model), None) or model.packed_steps([None])
+        known[id(model)] = steps
+        records[own], shares[own] = _addresses(steps)[0], steps.shares[0]
+    # all cells, whatever load they carry: a lever arm that does not follow the load
+    radius = np.array([np.sqrt((model.patch.positions**2).sum(1).mean()) for model in models])
+    row, parts, words = layout(len(models), ends[-1], int(bounds[-1]))
+    places = (place_of(each) for each in (functions, owners, firsts, radius))
+    patches = Patches(len(models), ends[-1], int(bounds[-1]), kernels.solve_address(), *places, row)
+    kept = [functions, owners, firsts, radius, *known.values()]
+    return _Packed(row_of(patches), parts, words, records, shares, following, kept)
+
+
+def _addresses(steps: PackedSteps) -> np.ndarray:
+    """Of the records, int `[R, P]`."""
+    r, p = steps.records.shape[:2]
+    return place_of(steps.records) + steps.records.strides[1] * np.arange(r * p).reshape(r, p)
+
+
+def _refuse(arrays: dict[str, np.ndarray]) -> None:
+    """Say which input is not finite, or negative where it must not be."""
+    for name, value in arrays.items():
+        validation.within_range(name, value.min(initial=0.0), value.max(initial=0.0))
+    for name in ("dt", "normal_force"):
+        if (arrays[name] < 0.0).any():
+            raise InvalidValueError(name, "be >= 0", float(arrays[name].min()))
+    diagonal = np.diagonal(arrays["twist_response"], axis1=-2, axis2=-1)
+    raise InvalidValueError("twist_response", "have a diagonal >= 0", float(diagonal.min()))
