@@ -293,16 +293,25 @@ def _packed(models: tuple[FrictionModel, ...], bounds: np.ndarray) -> _Packed:
     # all cells, whatever load they carry: a lever arm that does not follow the load
     radius = np.array([np.sqrt((model.patch.positions**2).sum(1).mean()) for model in models])
     row, parts, words = layout(len(models), ends[-1], int(bounds[-1]))
-    places = (place_of(each) for each in (functions, owners, firsts, radius))
-    patches = Patches(len(models), ends[-1], int(bounds[-1]), kernels.solve_address(), *places, row)
+    patches = Patches(
+        count=len(models),
+        pieces=ends[-1],
+        states=int(bounds[-1]),
+        solve=kernels.solve_address(),
+        functions=place_of(functions),
+        owners=place_of(owners),
+        firsts=place_of(firsts),
+        radius=place_of(radius),
+        row=row,
+    )
     kept = [functions, owners, firsts, radius, *known.values()]
     return _Packed(row_of(patches), parts, words, records, shares, following, kept)
 
 
 def _addresses(steps: PackedSteps) -> np.ndarray:
     """Of the records, int `[R, P]`."""
-    r, p = steps.records.shape[:2]
-    return place_of(steps.records) + steps.records.strides[1] * np.arange(r * p).reshape(r, p)
+    loads, parts, words = steps.records.shape
+    return place_of(steps.records) + 8 * words * np.arange(loads * parts).reshape(loads, parts)
 
 
 def _refuse(arrays: dict[str, np.ndarray]) -> None:
