@@ -252,7 +252,7 @@ def test_approaches_the_solver_with_order_one(kind):
     end = pf.simulate(scene, rtol=1e-9).data.isel(time=-1)
     exact = np.array([float(end[name]) for name in ("x", "y", "theta")])
     errors = [abs(_box(dt, t_end, model, push=push, velocity=velocity) - exact) for dt in (5e-4, 2.5e-4, 1.25e-4)]
-    assert (errors[0] < 0.03 * abs(exact)).all()
+    assert (errors[0] < 0.05 * abs(exact)).all()
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert (abs(orders - 1.0) < 0.12).all()
 
@@ -302,11 +302,11 @@ def _weights(model) -> np.ndarray | float:
 # ---------------------------------------------------------------------- Newton's method
 
 
-def _statistics(seed: int, environments: int, steps: int, height: float, kinds=KINDS[1:2]):
+def _statistics(seed: int, sets: int, environments: int, steps: int, height: float):
     generator, counts, residuals = np.random.default_rng(seed), [], []
     for k in (1, 2, 3, 4):
-        for _ in range(3):
-            patches = random_patches(generator, k, kinds)
+        for _ in range(sets):
+            patches = random_patches(generator, k)
             bodies = random_bodies(generator, environments, k, height)
             for *_, step in random_run(generator, patches, bodies, steps):
                 counts.append(step.iterations)
@@ -315,14 +315,14 @@ def _statistics(seed: int, environments: int, steps: int, height: float, kinds=K
 
 
 def test_few_iterations_and_no_step_is_lost():
-    counts, residuals = _statistics(11, 40, 10, 0.0)
+    counts, residuals = _statistics(11, 1, 100, 12, 0.0)
     assert counts.mean() < 5.0 and np.percentile(counts, 99) <= 15 and (residuals > 1e-6).mean() <= 1e-3
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("height", [0.0, 0.05])
 def test_a_hundred_thousand_random_steps(height):
-    counts, residuals = _statistics(12, 210, 40, height)
+    counts, residuals = _statistics(12, 3, 210, 40, height)
     assert len(counts) > 100_000
     assert counts.mean() < 5.0 and np.percentile(counts, 99) <= 15 and (residuals > 1e-6).mean() <= 1e-3
 

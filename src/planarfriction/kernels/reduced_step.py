@@ -329,13 +329,6 @@ def step_address() -> int:
 
 
 @jit
-def jacobians(row, surface, data, inputs, out):
-    """See `rollouts.jacobians`."""
-    work = np.empty(rollouts.SCRATCH)
-    rollouts.jacobians(shape_of, hold_slopes, linearise, pull_back, row, surface, data, inputs, out, work)
-
-
-@jit
 def sensitivities(inputs, span, z, columns, wrenches, slopes):
     """See `rollouts.sensitivities`."""
     work = np.empty(rollouts.SCRATCH), np.empty((6, 7 + len(NAMES))), np.empty((6, columns.shape[0]))

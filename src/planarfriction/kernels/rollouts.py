@@ -220,16 +220,6 @@ def _jacobian(hold_slopes, linearise, pull_back, contact, z, twist, load, dt, wo
 
 
 @kernel
-def jacobians(shape_of, hold_slopes, linearise, pull_back, row, surface, data, inputs, out, work):
-    """Derivatives of steps into `out` [B, 6, 7 + N], as `_jacobian`; `inputs` as those of `batch`, `work` [SCRATCH]."""
-    contact, (z, twist, load, dt) = _contact(shape_of, row, surface, data), inputs
-    for b in range(z.shape[0]):
-        _jacobian(
-            hold_slopes, linearise, pull_back, contact, three(z[b]), three(twist[b]), load[b], dt[b], work, out[b]
-        )
-
-
-@kernel
 def sensitivities(shape_of, hold_slopes, linearise, pull_back, inputs, span, z, columns, results, work):
     """Roll-outs with the derivatives of the wrenches by the numbers `columns` [P], forward in time.
 

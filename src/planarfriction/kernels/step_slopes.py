@@ -56,6 +56,38 @@ def reduced(contact, z, v, dt, new, out):
     _pull_rows(reduced_step.pull_back, contact, step, slopes, out)
 
 
+@kernel
+def _jacobian(hold_slopes, linearise, pull_back, contact, z, v, dt, out):
+    """Derivatives of the new state and of the wrench per unit load, by state, twist and load, into `out` [6, 7]."""
+    held, slopes = hold_slopes(contact, three(doubles(v)), out)
+    step = linearise(contact, held, three(doubles(z)), dt)
+    for i in range(6):
+        unit = (1.0 if i % 3 == 0 else 0.0), (1.0 if i % 3 == 1 else 0.0), (1.0 if i % 3 == 2 else 0.0)
+        of_state, of_wrench = times(1.0 if i < 3 else 0.0, unit), times(0.0 if i < 3 else 1.0, unit)
+        bar = pull_back(contact, step, slopes, of_state, of_wrench)
+        out[7 * i], out[7 * i + 1], out[7 * i + 2] = bar.state
+        out[7 * i + 3], out[7 * i + 4], out[7 * i + 5] = bar.twist
+        out[7 * i + 6] = dot(of_wrench, step.wrench)
+
+
+@entry
+def reduced_jacobian(contact, z, v, dt, out):
+    """`_jacobian` of a contact of `ReducedModel`, or one of its parts."""
+    own = reduced_contact.read(contact)
+    contact = Contact(own.law, own.shape, (0, own.other, 0), floats(own.data))
+    hold_slopes, linearise, pull_back = reduced_step.hold_slopes, reduced_step.linearise, reduced_step.pull_back
+    _jacobian(hold_slopes, linearise, pull_back, contact, z, v, dt, doubles(out))
+
+
+@entry
+def published_jacobian(contact, z, v, dt, out):
+    """`_jacobian` of a contact of `ReducedModelPublished` that is no point, in the axes of its friction metric."""
+    own = published_contact.read(contact)
+    contact = Contact(own.law, own.shape, (own.kind, 0, own.size), doubles(own.data))
+    hold_slopes, linearise, pull_back = published_step.hold_slopes, published_step.linearise, published_step.pull_back
+    _jacobian(hold_slopes, linearise, pull_back, contact, z, v, dt, doubles(out))
+
+
 @entry
 def published(contact, z, v, dt, new, out):
     """A contact of `ReducedModelPublished`; a point slides as a patch of any size does that does not spin."""

@@ -55,7 +55,8 @@ class ReducedModel(ThreeStateModel):
     from z = 0, and not from `a g/sigma_0` as those of the distributed model are.
     """
 
-    _kernels, step_function = reduced_step, step_slopes.reduced
+    _kernels = reduced_step
+    step_function, jacobian_function = step_slopes.reduced, step_slopes.reduced_jacobian
 
     _: KW_ONLY
     parts: Any = 1

@@ -87,7 +87,8 @@ class ReducedModelPublished(ThreeStateModel):
     Source: Waltersson and Karayiannidis 2024, section IV.
     """
 
-    _kernels, step_function = published_step, step_slopes.published
+    _kernels = published_step
+    step_function, jacobian_function = step_slopes.published, step_slopes.published_jacobian
     state_units = "m, m, m^2"
 
     surface: LimitSurface = None  # pyright: ignore[reportAssignmentType]

@@ -12,24 +12,28 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from planarfriction.formulas import LARGEST
 from planarfriction.geometry import transformed
 from planarfriction.kernels.pointers import place_of
+from planarfriction.kernels.quick_steps import compile_quick_steps
 from planarfriction.kernels.records import row_of
 from planarfriction.kernels.rollouts import UNFIT, Place, compile_step_one, step_batch, step_one
 from planarfriction.models import base
 from planarfriction.models.base import FrictionModel, ModelJacobians, PackedModel, PackedSteps, StepJacobians
 from planarfriction.models.part_shapes import REMEMBERED, Part
+from planarfriction.models.quick_steps import (
+    Quick,
+    jacobian_places,
+    jacobians_of_many,
+    jacobians_of_one,
+    step_of_many,
+)
 from planarfriction.models.rates import linearised, rates
 from planarfriction.models.remembered import Remembered
 
 _ARRAY, _FLOAT, _EMPTY = np.ndarray, np.dtype(float), np.empty
 _TRUTH = frozenset((bool, np.bool_))
 
-_PLAIN = frozenset((float, int, np.float64))
-"""What needs no conversion to a number."""
-
-_HERE_ALONE = ("_fixed", "_contacts", "_fixed_records", "_recent")
+_HERE_ALONE = ("_fixed", "_contacts", "_quick", "_fixed_records", "_recent")
 """What a copy makes anew: addresses hold in this process, and memories are shared by threads, not by models."""
 
 
@@ -44,6 +48,8 @@ class ThreeStateModel(FrictionModel):
 
     _kernels: ClassVar[ModuleType]
     """Steps and their derivatives, as in `kernels.reduced_step`."""
+    jacobian_function: ClassVar[Any]
+    """Its function `..._jacobian` of `kernels.step_slopes`."""
 
     @property
     def state_shape(self) -> tuple[int, ...]:
@@ -101,15 +107,21 @@ class ThreeStateModel(FrictionModel):
                     return result[new] if several is None else result[new].reshape(several), result[pull]
             except UNFIT:  # not plain numbers, or a batch: the checks below decide
                 pass
+        if (quick := self._quick) and (done := step_of_many(quick, state, twist, normal_force, dt)):
+            return done
         packed = self._by_load(self._step, (6,), *self._inputs(state, twist, normal_force, dt=dt))
         return _each(packed[..., :3]), self._out(_sum(packed[..., 3:]))
 
     def step_jacobians(self, state, twist, normal_force, dt) -> StepJacobians:
         """Analytic derivatives of `step` (see `StepJacobians`); at kinks a one-sided derivative."""
-        packed = self._one_step_jacobians(state, twist, normal_force, dt)
-        if packed is None:
-            inputs = self._inputs(state, twist, normal_force, dt=dt)
-            packed = self._by_load(self._step_jacobians, (6, 7), *inputs)
+        quick = self._quick
+        if quick is not None:
+            done = jacobians_of_one(quick, state, twist, normal_force, dt)
+            if done is None:
+                inputs = self._inputs(state, twist, normal_force, dt=dt)
+                done = jacobians_of_many(quick.jacobian_places, quick.shape, *inputs)
+            return done
+        packed = self._by_load(self._step_jacobians, (6, 7), *self._inputs(state, twist, normal_force, dt=dt))
         new, wrench = packed[..., :3, :], packed[..., 3:, :]
         slopes = StepJacobians(
             _each(new[..., :3], 2),
@@ -262,6 +274,17 @@ class ThreeStateModel(FrictionModel):
             return None
         return [self._contact(part) for part in self.parts_at(None)]
 
+    @functools.cached_property
+    def _quick(self) -> Quick | None:
+        """What small batches and derivatives need, where the shape is fixed."""
+        contacts, shape = self._contacts, self.state_shape
+        if contacts is None:
+            return None
+        compile_quick_steps()
+        steps = self.packed_steps([None])
+        places = jacobian_places(self.jacobian_function, steps.records[0], steps.shares[0])
+        return Quick(np.concatenate([place for place, _, _ in contacts]), places, math.prod(shape), shape, steps)
+
     def _contact(self, part: Part) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """A `kernels.rollouts.Place` as a row of words, and what it points to, which has to be kept.
 
@@ -328,40 +351,13 @@ class ThreeStateModel(FrictionModel):
         step_batch(contact[0], inputs, out)
         return out
 
-    def _one_step_jacobians(self, state, twist, normal_force, dt) -> np.ndarray | None:
-        """`_step_jacobians` `[1, 6, 7]` of one contact of one part and fixed shape, checked quickly; else None."""
-        contacts = self._contacts
-        if contacts is None or len(contacts) > 1:
-            return None
-        plain = []
-        for vector in (state, twist):
-            if type(vector) is _ARRAY and vector.ndim == 1 and vector.dtype is _FLOAT:
-                vector = vector.tolist()
-            if type(vector) not in (list, tuple) or len(vector) != 3:
-                return None
-            plain += vector
-        plain += normal_force, dt
-        if not _PLAIN.issuperset(map(type, plain)):  # the checks of `_inputs` say which
-            return None
-        try:
-            given = np.array(plain, dtype=float)
-        except OverflowError:  # an integer of hundreds of digits
-            return None
-        if not ((np.abs(given) <= LARGEST).all() and given[6] >= 0.0 and given[7] >= 0.0):
-            return None
-        shape = self.parts_at(None)[0].shape
-        return self._step_jacobians(shape, given[None, :3], given[None, 3:6], given[6:7], given[7:])
-
     def _step_jacobians(self, shape: Any, state, twist, load, dt) -> np.ndarray:
-        slopes = np.empty((len(load), 6, 7 + len(self._kernels.NAMES)))
-        contacts = self._contacts
-        if contacts is None or len(contacts) > 1:
-            row, (surface, data) = self._row(shape), self._maps(shape)
-        else:
-            ((_, numbers, data),) = contacts
-            row, surface = numbers[:-3], numbers[-3:].astype(int)
-        self._kernels.jacobians(row, surface, data, (state, twist, load, dt), slopes)
-        return slopes[:, :, :7]
+        record, out = self._record(shape), np.empty((len(load), 6, 7))
+        places = jacobian_places(self.jacobian_function, record.records, np.ones(1))
+        slopes = jacobians_of_many(places, (3,), state, twist, load, dt)
+        out[:, :3, :3], out[:, :3, 3:6], out[:, :3, 6] = slopes.state_state, slopes.state_twist, 0.0
+        out[:, 3:, :3], out[:, 3:, 3:6], out[:, 3:, 6] = slopes.wrench_state, slopes.wrench_twist, slopes.wrench_load
+        return out
 
 
 def _each(values: np.ndarray, inner: int = 1) -> np.ndarray:
