@@ -244,15 +244,20 @@ def _box(dt: float, t_end: float, model, *, push=(0.0, 0.0, 0.0), velocity=(0.0,
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_approaches_the_solver_with_order_one(kind):
-    """A box slides and turns, and is pushed: the error of its path halves with the step."""
-    model, push, velocity, t_end = kind(DISC, LAW), (0.3, -0.4, 0.01), (0.5, 0.1, 8.0), 0.024
+    """A box slides and turns, and is pushed: the error of its path halves with the step.
+
+    Without damping of the bristles: as they bend from rest at 0.5 m/s it pushes 400 times as hard as friction does, for
+    2 us, which shows in the path until steps are as short.
+    """
+    law = pf.LuGre(mu_s=1.2, sigma_1=0.0, elasto_plastic=0.9)
+    model, push, velocity, t_end = kind(DISC, law), (0.3, -0.4, 0.01), (0.5, 0.1, 8.0), 0.024
     feet = [pf.Contact(model, 0.5, mounted_on="body", position=at, name=f"foot {at}") for at in FEET.tolist()]
     body = pf.Body(0.2, 2e-4, gravity=(0.0, 0.0), velocity=velocity)
     scene = pf.Scene(body, feet, t_end=t_end, force=pf.Signal.constant(push))
     end = pf.simulate(scene, rtol=1e-9).data.isel(time=-1)
     exact = np.array([float(end[name]) for name in ("x", "y", "theta")])
-    errors = [abs(_box(dt, t_end, model, push=push, velocity=velocity) - exact) for dt in (5e-4, 2.5e-4, 1.25e-4)]
-    assert (errors[0] < 0.05 * abs(exact)).all()
+    errors = [abs(_box(dt, t_end, model, push=push, velocity=velocity) - exact) for dt in (2e-3, 1e-3, 5e-4)]
+    assert (errors[0] < 0.03 * abs(exact)).all()
     orders = np.log2(np.array(errors[:-1]) / errors[1:])
     assert (abs(orders - 1.0) < 0.12).all()
 
