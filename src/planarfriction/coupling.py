@@ -189,24 +189,25 @@ class CoupledPatches(ByValue):
     def _solve(self, problems: np.ndarray) -> np.ndarray:
         """Solve all problems; the iterations that each took, negative for invalid ones."""
         packed, parts = self._packed, self._parts
+        problems.view(np.int64)[:, parts["records"]], problems[:, parts["shares"]] = packed.records, packed.shares
         most = len(problems) * len(self.models) // _WORTH_A_THREAD
 
-        def work(first: int, last: int) -> None:
-            kernels.solve_batch(packed.row, problems, first, last)
+        def once() -> np.ndarray:
+            share(len(problems), most, lambda first, last: kernels.solve_batch(packed.row, problems, first, last))
+            return problems[:, parts["iterations"].start].astype(int)
 
-        problems.view(np.int64)[:, parts["records"]], problems[:, parts["shares"]] = packed.records, packed.shares
+        if not packed.following:
+            return once()
         loads, total = problems[:, parts["free_load"]], np.zeros(len(problems), int)
         for i in range(PASSES + 1):
             kept = self._write_following(problems, loads)
             if i == PASSES:
                 problems[:, parts["most"]] = 0
-            share(len(problems), most, work)
+            taken = once()
             del kept
-            taken = problems[:, parts["iterations"]][:, 0].astype(int)
             total += taken
             came_out = problems[:, parts["load"]].copy()
-            followed = not packed.following or (came_out == loads).all() or (i > 0 and (taken <= 0).all())
-            if followed or (taken < 0).any():
+            if (came_out == loads).all() or (i > 0 and (taken <= 0).all()) or (taken < 0).any():
                 break
             loads = came_out
         return total
@@ -226,16 +227,12 @@ class CoupledPatches(ByValue):
 
     def _result(self, problems: np.ndarray, counts: np.ndarray, batch: tuple[int, ...]) -> CoupledStep:
         names, k = ("new", "wrench", "twist", "load", "residual", "converged"), len(self.models)
-        new, wrench, twist, load, residual, converged = (problems[:, self._parts[name]].copy() for name in names)
-        return CoupledStep(
-            new.reshape(*batch, new.shape[1]),
-            wrench.reshape(*batch, k, 3),
-            twist.reshape(*batch, k, 3),
-            load.reshape(*batch, k),
-            counts.reshape(batch),
-            residual.reshape(batch),
-            (converged > 0.0).reshape(batch),
+        shapes = self.state_shape, (k, 3), (k, 3), (k,), (), ()
+        new, wrench, twist, load, residual, converged = (
+            problems[:, self._parts[name]].reshape((*batch, *shape)) for name, shape in zip(names, shapes, strict=True)
         )
+        step = CoupledStep(new, wrench, twist, load, counts.reshape(batch), residual, converged > 0.0)
+        return step if len(problems) == 1 else CoupledStep(*map(np.ascontiguousarray, step))
 
     # ------------------------------------------------------------------ what is packed once
 
