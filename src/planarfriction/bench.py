@@ -358,6 +358,30 @@ def _batch(model: ReducedModel | ReducedModelPublished) -> tuple[float, float]:
     return 1e-6 * contacts * steps / both, 1e-6 * contacts * steps / once
 
 
+def _step_reduced_several(name: str, full: bool) -> Measurement:
+    """The derivatives of one step, or the steps of four contacts, in one Python call."""
+    model = ReducedModel(_disc(), _law())
+    one, four = (np.zeros(3), (0.01, 0.0, 1.0), 1.0), (np.zeros((4, 3)), np.tile((0.01, 0.0, 1.0), (4, 1)), np.ones(4))
+    action = (lambda: model.step(*four, 1e-3)) if name.endswith("four") else lambda: model.step_jacobians(*one, 1e-3)
+    value = _median(action, 9, 2000)
+    return _line(name, value * 1e6, "us", "one Python call of step", _python_step(model, 2000) * 1e6)
+
+
+def _coupled(name: str, full: bool, environments: int = 1) -> Measurement:
+    """A box on four feet slides and turns: an implicit step, in one Python call for all environments."""
+    from planarfriction.coupling import CoupledPatches, HostStep
+
+    model, dt, feet = ReducedModel(_disc(), _law()), 1e-3, ((0.05, 0.03), (0.05, -0.03), (-0.05, 0.03), (-0.05, -0.03))
+    rows = np.concatenate([[[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]] for x, y in feet])
+    response, patches = dt * rows @ np.diag([5.0, 5.0, 5e3]) @ rows.T, CoupledPatches([model] * 4)
+    velocity = np.random.default_rng(7).normal(size=(environments, 3)) * [0.05, 0.05, 0.5]
+    host = HostStep((velocity @ rows.T).reshape(-1, 4, 3), np.full(4, 0.5), np.zeros((4, 3)), response)
+    value = _median(lambda: patches.step(patches.rest(), host, dt), 9, 1 + 500 // environments) / environments
+    rounds = float(patches.step(patches.rest(), host, dt).iterations.mean())
+    words = f"one Python call of a model's step (four patches, {rounds:.1f} rounds)"
+    return _line(name, value * 1e6, "us per step", words, _python_step(model, 2000) * 1e6)
+
+
 def _import(name: str, full: bool) -> Measurement:
     def seconds(module: str) -> float:
         code = f"import time; t = time.perf_counter(); import {module}; print(time.perf_counter() - t)"
@@ -387,6 +411,10 @@ BENCHMARKS: dict[str, Callable[[str, bool], Measurement]] = {
     "step.reduced.loop": _step_reduced_loop,
     "step.reduced.parts4.loop": lambda name, full: _step_reduced_loop(name, full, parts=4),
     "step.reduced.call": _step_reduced_call,
+    "step.reduced.slopes": _step_reduced_several,
+    "step.reduced.four": _step_reduced_several,
+    "coupled.four_feet.call": _coupled,
+    "coupled.four_feet.batch": lambda name, full: _coupled(name, full, 1000),
     "gradient.published": _gradient_published,
     "gradient.published.batch": _gradient_published_batch,
     "gradient.reduced": _gradient_reduced,

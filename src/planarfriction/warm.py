@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction import autodiff, limit_surface, models
+from planarfriction import autodiff, coupling, limit_surface, models
 from planarfriction.families import MODELS
 from planarfriction.laws import LuGre
 from planarfriction.patch import ContactPatch, grain
@@ -57,6 +57,7 @@ def _parts() -> list[Part]:
         Part("scenes, friction with a grain", functools.partial(_simulate, grooved)),
         Part("scenes, reduced in parts", functools.partial(_derive, sum_of_parts)),
         *(Part(f"steps, {name}", functools.partial(_step, model)) for name, model in kinds.items()),
+        Part("coupled patches", functools.partial(_couple, [*kinds.values(), grooved])),
         *(Part(f"roll-outs, {name}", functools.partial(_roll, model)) for name, model in three_states.items()),
         *(Part(f"derivatives of scenes, {name}", functools.partial(_derive, model)) for name, model in kinds.items()),
         Part("limit surfaces", functools.partial(_surfaces, patch)),
@@ -78,6 +79,13 @@ def _step(model: Any) -> None:
     for method in (model.step, model.step_jacobians):
         method(state, twist, 1.0, 1e-4)
         method(state, np.tile(twist, (2, 1)), 1.0, 1e-4)
+
+
+def _couple(kinds: list[Any]) -> None:
+    patches = coupling.CoupledPatches(kinds)
+    k = len(kinds)
+    host = coupling.HostStep(np.ones((k, 3)), np.ones(k), np.zeros((k, 3)), np.eye(3 * k))
+    patches.step(patches.rest(), host, 1e-4)
 
 
 def _roll(model: Any) -> None:
