@@ -17,7 +17,7 @@ from typing import Any, Literal
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.experiments.baselines import lsoda_time, scipy_twist
+from planarfriction.experiments.baselines import lsoda_time, numpy_table, scipy_twist
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.limit_surface import (
     LimitSurface,
@@ -183,28 +183,7 @@ def _in_hand_load_dependent(name: str, full: bool) -> Measurement:
 def _table_build(name: str, full: bool) -> Measurement:
     patch = _disc()
     value = _median(lambda: LimitSurfaceTablePublished(patch).numbers, 31)
-    return _line(name, value, "s", "the same nodes by NumPy, node by node", _median(lambda: _numpy_table(patch), 3))
-
-
-def _numpy_table(patch: ContactPatch, segments: int = 20) -> np.ndarray:
-    """Smoothed nodes as one would write them: four sums over the cells at every node."""
-    grid, radius, weights = patch.grid, patch.contact_radius(), patch.weights()
-    assert grid is not None
-    x, y = (patch.positions - patch.centre_of_pressure()).T
-    nodes = np.zeros((segments + 1, 4 * segments, 3))
-    for i in range(segments):
-        for j in range(4 * segments):
-            azimuth, distance = 0.5 * np.pi * j / segments, radius * np.tan(0.5 * np.pi * i / segments)
-            centre = np.array([-distance * np.sin(azimuth), distance * np.cos(azimuth)])
-            a, b = (centre - (grid.x_min, grid.y_min)) / (grid.cell_width, grid.cell_height)
-            for corner in range(4):
-                p, q = int(a) + corner % 2, int(b) + corner // 2
-                share = (1.0 - abs(a - p)) * (1.0 - abs(b - q))
-                dx = x - (grid.x_min + p * grid.cell_width)
-                dy = y - (grid.y_min + q * grid.cell_height)
-                scale = share * weights / np.hypot(dx, dy)
-                nodes[i, j] += -(scale @ dy), scale @ dx, scale @ (x * dx + y * dy) / radius
-    return nodes
+    return _line(name, value, "s", "the same nodes by NumPy, node by node", _median(lambda: numpy_table(patch), 3))
 
 
 def _twist(name: str, full: bool, kind: type[LimitSurface], count: int | None = None) -> Measurement:
