@@ -22,6 +22,7 @@ PLAIN = pf.LuGre()
 DISC = pf.ContactPatch.disc(radius=0.01, cells=9)
 GRAINED = pf.ContactPatch.rectangle(0.02, 0.01, cells=7).with_friction_metric(grain(0.3, along=1.0, across=0.7))
 LOPSIDED = GRAINED.with_friction_metric(grain(0.3, along=1.0, across=0.7), asymmetry=(0.2, 0.1))
+ASIDE = pf.ContactPatch.polygon([(0.0, 0.0), (0.03, 0.0), (0.03, 0.01), (0.01, 0.02)], cells=7)
 FINGER = pf.SoftFinger(c=0.0085, n=1 / 3, k=2.0, radius_max=0.01)
 SOFT = pf.ContactPatch.disc(radius=0.01, cells=9, pressure=FINGER)
 KINDS = (pf.DistributedModel, pf.ReducedModel, pf.ReducedModelPublished)
@@ -36,6 +37,7 @@ MODELS = {
     "reduced, grain": pf.ReducedModel(GRAINED, LAW),
     "reduced, four parts": pf.ReducedModel(DISC, LAW, parts=4),
     "published": pf.ReducedModelPublished(DISC, LAW),
+    "published, off its origin": pf.ReducedModelPublished(ASIDE, LAW),
     "published, grain": pf.ReducedModelPublished(GRAINED, LAW, surface=pf.LimitSurfaceTable(GRAINED)),
 }
 

@@ -23,6 +23,7 @@ HEAVY = (
     "jinja2",
     "llvmlite",
     "matplotlib",
+    "mujoco",
     "numba",
     "pandas",
     "rich",
@@ -40,6 +41,7 @@ HOMES = {
     "rich": "cli",
     "click": "cli",
     "torch": "torch",
+    "mujoco": "adapters",
     "jax": "jax",
 }
 """Package -> the floor whose modules may import it when they load; no floor may load the rest of HEAVY that way."""

@@ -1,0 +1,1 @@
+"""Friction of chosen contacts inside simulators that people already use, one package each."""

@@ -1,0 +1,16 @@
+"""Patch friction inside MuJoCo: normal contact stays MuJoCo's, friction of chosen pairs of geoms is ours.
+
+Needs MuJoCo: `pip install 'planarfriction[mujoco]'`.
+"""
+
+try:
+    import mujoco as _mujoco  # noqa: F401
+except ImportError:
+    from planarfriction.errors import MissingExtraError
+
+    raise MissingExtraError("mujoco", "mujoco") from None
+
+from planarfriction.adapters.mujoco.friction import Friction
+from planarfriction.adapters.mujoco.patches import Patch, prepare
+
+__all__ = ["Friction", "Patch", "prepare"]

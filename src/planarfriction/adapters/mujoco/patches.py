@@ -1,0 +1,130 @@
+"""Which contacts get patch friction, and what a model needs for it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.errors import InvalidValueError
+from planarfriction.models import FrictionModel
+
+CENTRES = ("site", "contact")
+
+
+@dataclass(frozen=True)
+class Patch:
+    """A patch between two geoms, fixed in the body of a site.
+
+    The frame of the patch has its x axis along the site's, projected on the contact plane, and its normal into the
+    site's body; its twist is that of this body relative to the other, its wrench acts on this body.
+    """
+
+    model: FrictionModel
+    site: str
+    """Name of a site on the body that owns the patch."""
+    geoms: tuple[str, str]
+    """Names of the two geoms in contact; one is on the site's body."""
+    centre: str = "site"
+    """Where the origin of the frame is: at the "site", or in the middle of the points of "contact"."""
+
+    def __post_init__(self) -> None:
+        validation.instance("model", self.model, FrictionModel, "a friction model")
+        validation.text("site", self.site)
+        if not (isinstance(self.geoms, Sequence) and len(self.geoms) == 2):
+            raise InvalidValueError("geoms", "be the names of two geoms", self.geoms)
+        object.__setattr__(self, "geoms", tuple(validation.text("geoms", name) for name in self.geoms))
+        validation.choice("centre", self.centre, CENTRES)
+
+
+def words(patches: Sequence[Patch]) -> int:
+    """Numbers that patches keep in `userdata`: two states, the wrenches, and the time of the second."""
+    return 2 * sum(math.prod(patch.model.state_shape) for patch in patches) + 3 * len(patches) + 1
+
+
+def prepare(spec: Any, patches: Sequence[Patch]) -> None:
+    """Give an `MjSpec` what the patches need: a pair without friction for each, and room in the user data.
+
+    Raises `InvalidValueError` for a geom or a site that is not there, and for the same pair twice.
+    """
+    check_once(patches)
+    for patch in patches:
+        if spec.site(patch.site) is None:
+            raise InvalidValueError("site", "be in the model", patch.site)
+        for name in patch.geoms:
+            if spec.geom(name) is None:
+                raise InvalidValueError("geoms", "be in the model", name)
+        pair = next((each for each in spec.pairs if {each.geomname1, each.geomname2} == set(patch.geoms)), None)
+        if pair is None:
+            pair = spec.add_pair(geomname1=patch.geoms[0], geomname2=patch.geoms[1])
+        pair.condim = 1
+    spec.nuserdata = max(spec.nuserdata, 0) + words(patches)
+
+
+def check_once(patches: Sequence[Patch]) -> None:
+    """Raise for what is no patch, and for the same pair twice."""
+    for patch in patches:
+        validation.instance("patches", patch, Patch, "patches")
+    pairs = [frozenset(patch.geoms) for patch in patches]
+    for pair in pairs:
+        if pairs.count(pair) > 1:
+            raise InvalidValueError("patches", "have each pair of geoms once", ", ".join(sorted(pair)))
+
+
+class Placed:
+    """A patch found in a compiled model."""
+
+    def __init__(self, m: Any, patch: Patch) -> None:
+        self.patch, self.site = patch, _named(m, "site", patch.site, mujoco.mjtObj.mjOBJ_SITE)
+        self.geoms = np.array([_named(m, "geoms", name, mujoco.mjtObj.mjOBJ_GEOM) for name in patch.geoms])
+        bodies, owner = m.geom_bodyid[self.geoms], m.site_bodyid[self.site]
+        if owner not in bodies:
+            raise InvalidValueError("site", f"be on the body of one of the geoms {patch.geoms}", patch.site)
+        own = int(bodies[1] == owner)
+        self.own, self.other = int(self.geoms[own]), int(self.geoms[1 - own])
+        self.bodies = int(bodies[1 - own]), int(owner)
+        for pair in range(m.npair):
+            if {int(m.pair_geom1[pair]), int(m.pair_geom2[pair])} == set(self.geoms.tolist()):
+                if m.pair_dim[pair] > 1:
+                    rule = f"have condim 1 between {' and '.join(patch.geoms)} (prepare does that)"
+                    raise InvalidValueError("pair", rule, int(m.pair_dim[pair]))
+                self.pair = pair
+                return
+        raise InvalidValueError("pair", "be in the model (prepare adds it)", " and ".join(patch.geoms))
+
+    def check_step(self, m: Any) -> None:
+        """Refuse time steps at which MuJoCo's own normal contact is lost: above half of its time constant."""
+        constant = float(m.pair_solref[self.pair, 0])
+        if constant > 0.0 and m.opt.timestep > 0.5 * constant:
+            rule = f"be at most half of solref[0] = {constant:g} s of the pair {' and '.join(self.patch.geoms)}"
+            raise InvalidValueError("timestep", rule, m.opt.timestep)
+
+    def contacts(self, d: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Its contacts that are in the solver, and the sign of their normals: 1 into the owner."""
+        pairs = d.contact.geom
+        forward = (pairs[:, 0] == self.other) & (pairs[:, 1] == self.own)
+        backward = (pairs[:, 0] == self.own) & (pairs[:, 1] == self.other)
+        chosen = np.flatnonzero((forward | backward) & (d.contact.efc_address >= 0))
+        return chosen, np.where(forward[chosen], 1.0, -1.0)
+
+    def frame(self, d: Any, chosen: np.ndarray, sign: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Origin [3], and axes [3, 3] as rows, of its frame in the world."""
+        normal = sign @ d.contact.frame[chosen, :3]
+        normal /= np.linalg.norm(normal)
+        x = d.site_xmat[self.site].reshape(3, 3)[:, 0]
+        x = x - normal * (x @ normal)
+        x /= np.linalg.norm(x)
+        centre = d.site_xpos[self.site] if self.patch.centre == "site" else d.contact.pos[chosen].mean(axis=0)
+        return centre, np.array([x, np.cross(normal, x), normal])
+
+
+def _named(m: Any, what: str, name: str, kind: Any) -> int:
+    found = mujoco.mj_name2id(m, kind, name)
+    if found < 0:
+        raise InvalidValueError(what, "be in the model", name)
+    return found
