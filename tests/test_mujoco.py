@@ -12,6 +12,7 @@ import planarfriction as pf
 mujoco = pytest.importorskip("mujoco")
 
 from planarfriction.adapters.mujoco import Friction, Patch, prepare  # noqa: E402
+from planarfriction.adapters.mujoco.responses import responses  # noqa: E402
 
 pytestmark = pytest.mark.mujoco
 
@@ -23,7 +24,8 @@ PADS = {"sphere": 'type="sphere" size="0.01"', "box": 'type="box" size="0.01 0.0
 def _grip(pad: str, dt: float, options: str = "") -> str:
     """A block of 0.2 kg between two pads on slides, held 4 mm beside its centre of mass."""
     pads = "".join(
-        f"""<body name="pad{side}" pos="{sign * 0.02} 0.004 0.5"><joint name="j{side}" type="slide" axis="{-sign} 0 0"/>
+        f"""<body name="pad{side}" pos="{sign * 0.02} 0.004 0.5">
+        <joint name="j{side}" type="slide" axis="{-sign} 0 0" damping="3"/>
         <geom name="pad{side}" {PADS[pad]} mass="0.05" contype="1" conaffinity="0"/></body>"""
         for side, sign in (("L", -1), ("R", 1))
     )
@@ -85,6 +87,61 @@ def test_a_disc_slides_and_spins_to_rest_where_theory_says(kind):
     distance, angle = 0.216581, 2.460359
     assert d.qpos[0] + 0.5 * dt == pytest.approx(distance, rel=1e-3)
     assert d.qpos[3] + 5.0 * dt == pytest.approx(angle, rel=2e-3)
+
+
+@pytest.mark.parametrize("integrator", ["Euler", "implicit", "implicitfast"])
+@pytest.mark.parametrize("jacobian", ["dense", "sparse"])
+def test_responses_are_differences_of_steps(integrator, jacobian):
+    m, d, patches = _gripper(options=f'integrator="{integrator}" jacobian="{jacobian}" tolerance="1e-14"')
+    friction = Friction(m, patches)
+    for _ in range(100):
+        friction.step(d)
+    mujoco.mj_step1(m, d)
+    rows, contacts = friction._geometry(d)
+
+    def ends(wrench):
+        other = copy.copy(d)
+        friction._apply(other, wrench @ rows)
+        found, loads = responses(m, other, rows, contacts), [other.efc_force[own].sum() for own in contacts]
+        mujoco.mj_step2(m, other)
+        return rows @ other.qvel, np.array(loads), found
+
+    guess = friction.wrenches(d).ravel()
+    twist, loads, found = ends(guess)
+    np.testing.assert_allclose(rows @ found.velocity, twist, atol=1e-12)
+    assert abs(found.load_response).max() > 1e-3 and loads.min() > 0.1
+    for i, small in enumerate(np.tile([1e-4, 1e-4, 1e-6], 2)):
+        (more, more_load, _), (less, less_load, _) = (ends(guess + sign * small * np.eye(6)[i]) for sign in (1.0, -1.0))
+        # constraints are quadratic as long as they hold: rounding, and the tolerance of MuJoCo's solver
+        scale = abs(found.twist_response[:, i]).max()
+        np.testing.assert_allclose((more - less) / (2.0 * small), found.twist_response[:, i], atol=1e-5 * scale)
+        scale = abs(found.load_response[:, i]).max()
+        np.testing.assert_allclose(
+            (more_load - less_load) / (2.0 * small), found.load_response[:, i], atol=1e-4 * scale + 1e-6
+        )
+
+
+def test_twists_are_in_the_axes_of_the_site():
+    """Whatever tangents MuJoCo gives the contact: the block moves along the x axis of its site, which lies aslant."""
+    m, d, patches = _gripper()
+    friction = Friction(m, patches)
+    for _ in range(100):
+        friction.step(d)
+    m.site_quat[0] = [np.cos(0.2), np.sin(0.2), 0.0, 0.0]
+    m.site_quat[0] = _times(m.site_quat[0], [np.sqrt(0.5), 0.0, np.sqrt(0.5), 0.0])
+    mujoco.mj_step1(m, d)
+    rows, _ = friction._geometry(d)
+    x = d.site_xmat[0].reshape(3, 3)[:, 0]
+    velocity = np.zeros(m.nv)
+    velocity[:3] = [0.0, x[1], x[2]]
+    along = rows[:3] @ velocity
+    np.testing.assert_allclose(along / np.hypot(x[1], x[2]), [1.0, 0.0, 0.0], atol=1e-6)
+
+
+def _times(a, b) -> np.ndarray:
+    out = np.zeros(4)
+    mujoco.mju_mulQuat(out, np.array(a, float), np.array(b, float))
+    return out
 
 
 def test_data_restore_bit_for_bit_and_forces_of_the_user_stay():
