@@ -18,6 +18,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.experiments.baselines import lsoda_time, numpy_table, scipy_twist
+from planarfriction.experiments.four_feet import four_feet
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.limit_surface import (
     LimitSurface,
@@ -348,15 +349,9 @@ def _step_reduced_several(name: str, full: bool) -> Measurement:
 
 def _coupled(name: str, full: bool, environments: int = 1) -> Measurement:
     """A box on four feet slides and turns: an implicit step, in one Python call for all environments."""
-    from planarfriction.coupling import CoupledPatches, HostStep
-
-    model, dt, feet = ReducedModel(_disc(), _law()), 1e-3, ((0.05, 0.03), (0.05, -0.03), (-0.05, 0.03), (-0.05, -0.03))
-    rows = np.concatenate([[[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]] for x, y in feet])
-    response, patches = dt * rows @ np.diag([5.0, 5.0, 5e3]) @ rows.T, CoupledPatches([model] * 4)
-    velocity = np.random.default_rng(7).normal(size=(environments, 3)) * [0.05, 0.05, 0.5]
-    host = HostStep((velocity @ rows.T).reshape(-1, 4, 3), np.full(4, 0.5), np.zeros((4, 3)), response)
-    value = _median(lambda: patches.step(patches.rest(), host, dt), 9, 1 + 500 // environments) / environments
-    rounds = float(patches.step(patches.rest(), host, dt).iterations.mean())
+    model = ReducedModel(_disc(), _law())
+    step = four_feet(model, environments)
+    value, rounds = _median(step, 9, 1 + 500 // environments) / environments, float(step().iterations.mean())
     words = f"one Python call of a model's step (four patches, {rounds:.1f} rounds)"
     return _line(name, value * 1e6, "us per step", words, _python_step(model, 2000) * 1e6)
 

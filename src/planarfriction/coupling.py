@@ -10,7 +10,7 @@ from __future__ import annotations
 import functools
 import itertools
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -94,7 +94,7 @@ class CoupledPatches(ByValue):
     Raises `InvalidValueError` where `models` are no friction models with compiled steps.
     """
 
-    models: tuple[FrictionModel, ...]
+    models: Sequence[FrictionModel]
 
     def __post_init__(self) -> None:
         if isinstance(self.models, FrictionModel) or not isinstance(self.models, Iterable):
@@ -272,7 +272,7 @@ class _Packed(NamedTuple):
     """What is behind addresses."""
 
 
-def _packed(models: tuple[FrictionModel, ...], bounds: np.ndarray) -> _Packed:
+def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _Packed:
     counts = [model._pieces for model in models]
     ends = np.cumsum([0, *counts]).tolist()
     pieces = [slice(*each) for each in itertools.pairwise(ends)]

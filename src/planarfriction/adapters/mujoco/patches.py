@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+# pyright: reportAttributeAccessIssue=false
+# MuJoCo describes few of its names to type checkers.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -7,6 +7,8 @@ rows of their contacts.
 
 from __future__ import annotations
 
+# pyright: reportAttributeAccessIssue=false
+# MuJoCo describes few of its names to type checkers.
 from typing import Any, NamedTuple
 
 import mujoco
