@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,6 +11,7 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.autodiff.parameters import Packed, pack
 from planarfriction.errors import InvalidValueError
+from planarfriction.kernels import threads
 from planarfriction.kernels.lanes import Lanes
 from planarfriction.kernels.pointers import place_of
 from planarfriction.kernels.rollouts import Inputs
@@ -142,14 +141,7 @@ def sum_to(shape: tuple[int, ...], gradient: np.ndarray) -> np.ndarray:
 
 def share(inputs: Inputs | Lanes, count: int, work: Callable[[int, int], None]) -> None:
     """Run `work(first, last)` over all contacts, on several threads where that pays."""
-    available = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    threads = max(1, min(available, count, count * len(inputs.dt) // _WORTH_A_THREAD))
-    if threads == 1:
-        work(0, count)
-        return
-    bounds = [count * i // threads for i in range(threads + 1)]
-    with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(work, bounds[:-1], bounds[1:]))
+    threads.share(count, count * len(inputs.dt) // _WORTH_A_THREAD, work)
 
 
 def summed(inputs: RolloutInputs, shapes: Sequence[tuple[int, ...]], run: Callable[..., None]) -> list[np.ndarray]:

@@ -1,9 +1,9 @@
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo describes few of its names to type checkers.)
 """Steps of MuJoCo with patch friction, implicit in contact space."""
 
 from __future__ import annotations
 
-# pyright: reportAttributeAccessIssue=false
-# MuJoCo describes few of its names to type checkers.
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 

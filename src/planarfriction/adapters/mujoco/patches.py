@@ -1,9 +1,9 @@
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo describes few of its names to type checkers.)
 """Which contacts get patch friction, and what a model needs for it."""
 
 from __future__ import annotations
 
-# pyright: reportAttributeAccessIssue=false
-# MuJoCo describes few of its names to type checkers.
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,3 +1,5 @@
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo describes few of its names to type checkers.)
 """How MuJoCo's step answers to wrenches on patches, while the set of active constraints holds.
 
 `H = M + Jc' D Jc` over the constraint rows in their quadratic range, `X = H^-1 J'`; the integrator goes on by
@@ -7,8 +9,6 @@ rows of their contacts.
 
 from __future__ import annotations
 
-# pyright: reportAttributeAccessIssue=false
-# MuJoCo describes few of its names to type checkers.
 from typing import Any, NamedTuple
 
 import mujoco
