@@ -22,7 +22,7 @@ ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")] + sorted(
     (ROOT / "docs").glob("*.md")
 )
-OPTIONAL = ("torch", "jax")
+OPTIONAL = ("torch", "jax", "mujoco")
 """Packages behind an extra; `planarfriction.torch` and `planarfriction.jax` carry their names."""
 FAMILIES = (families.LAWS, families.MODELS, families.SURFACES, families.SHAPES, families.SCENES)
 MODULES = {module.name for module in pkgutil.iter_modules(planarfriction.__path__)}
