@@ -216,8 +216,10 @@ def test_shapes_follow_the_loads_that_come_out():
     step = patches.step(state, host, 1e-3)
     assert step.converged.all() and abs(step.normal_force - host.normal_force).max() > 0.05
     for e in range(6):
-        one = HostStep(*(field[e] for field in host))
-        _checked(patches, state[e], one, 1e-3, CoupledStep(*(field[e] for field in step)))
+        one, own = HostStep(*(field[e] for field in host)), CoupledStep(*(field[e] for field in step))
+        _checked(patches, state[e], one, 1e-3, own)
+        alone = patches.step(state[e], one, 1e-3)
+        assert all(np.array_equal(each, other) for each, other in zip(alone, own, strict=True))
 
 
 # ---------------------------------------------------------------------- in time

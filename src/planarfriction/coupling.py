@@ -190,27 +190,31 @@ class CoupledPatches(ByValue):
         """Solve all problems; the iterations that each took, negative for invalid ones."""
         packed, parts = self._packed, self._parts
         problems.view(np.int64)[:, parts["records"]], problems[:, parts["shares"]] = packed.records, packed.shares
-        most = len(problems) * len(self.models) // _WORTH_A_THREAD
-
-        def once() -> np.ndarray:
-            share(len(problems), most, lambda first, last: kernels.solve_batch(packed.row, problems, first, last))
-            return problems[:, parts["iterations"].start].astype(int)
-
         if not packed.following:
-            return once()
-        loads, total = problems[:, parts["free_load"]], np.zeros(len(problems), int)
+            return self._once(problems)
+        total, unsettled = np.zeros(len(problems), int), np.arange(len(problems))
+        loads = problems[:, parts["free_load"]].copy()
         for i in range(PASSES + 1):
-            kept = self._write_following(problems, loads)
+            rows = problems[unsettled]
+            kept = self._write_following(rows, loads)
             if i == PASSES:
-                problems[:, parts["most"]] = 0
-            taken = once()
+                rows[:, parts["most"]] = 0
+            taken = self._once(rows)
             del kept
-            total += taken
-            came_out = problems[:, parts["load"]].copy()
-            if (came_out == loads).all() or (i > 0 and (taken <= 0).all()) or (taken < 0).any():
+            problems[unsettled], total[unsettled] = rows, total[unsettled] + taken
+            came_out = rows[:, parts["load"]]
+            # each environment on its own, so that it does not matter which others are in the batch
+            settled = (came_out == loads).all(axis=1) | (taken < 0) | ((i > 0) & (taken == 0))
+            unsettled, loads = unsettled[~settled], came_out[~settled]
+            if not unsettled.size:
                 break
-            loads = came_out
         return total
+
+    def _once(self, problems: np.ndarray) -> np.ndarray:
+        """Solve all problems with the shapes that they hold."""
+        row, most = self._packed.row, len(problems) * len(self.models) // _WORTH_A_THREAD
+        share(len(problems), most, lambda first, last: kernels.solve_batch(row, problems, first, last))
+        return problems[:, self._parts["iterations"].start].astype(int)
 
     def _write_following(self, problems: np.ndarray, loads: np.ndarray) -> list[PackedSteps]:
         """Write the pieces of patches whose shapes follow their loads `[E, k]`; returns what has to be kept."""

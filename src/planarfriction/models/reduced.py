@@ -132,8 +132,10 @@ class ReducedModel(ThreeStateModel):
         if self.parts == 1:
             return [(Part(1.0, shape),) for (shape,) in shapes]
         weights = self.patch.weights(None if loads[0] is None else np.array(loads)).reshape(-1, self.patch.cells)
-        shares = np.stack([weights[:, self.labels == k].sum(-1) for k in range(self.parts)], -1).tolist()
-        return [tuple(map(Part, *each)) for each in zip(shares, shapes, strict=True)]
+        # rows that lie in one piece: NumPy sums others in an order that depends on how many there are
+        each = (np.ascontiguousarray(weights[:, self.labels == k]) for k in range(self.parts))
+        shares = np.stack([part.sum(-1) for part in each], -1).tolist()
+        return [tuple(map(Part, *loaded)) for loaded in zip(shares, shapes, strict=True)]
 
     # ------------------------------------------------------------------ parts
 
