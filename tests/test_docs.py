@@ -23,7 +23,7 @@ PAGES = [ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md"
     (ROOT / "docs").glob("*.md")
 )
 OPTIONAL = ("torch", "jax", "mujoco")
-"""Packages behind an extra; `planarfriction.torch` and `planarfriction.jax` carry their names."""
+"""Packages behind an extra; `planarfriction.torch`, `planarfriction.adapters.mujoco` and so on carry their names."""
 FAMILIES = (families.LAWS, families.MODELS, families.SURFACES, families.SHAPES, families.SCENES)
 MODULES = {module.name for module in pkgutil.iter_modules(planarfriction.__path__)}
 
@@ -63,7 +63,7 @@ def missing_packages(page: Path) -> dict[int, str]:
         block.section: package
         for block in blocks(page)
         for package in OPTIONAL
-        if re.search(rf"^(import|from) (planarfriction\.)?{package}\b", block.text, re.MULTILINE)
+        if re.search(rf"^(import|from) (planarfriction\.)?(adapters\.)?{package}\b", block.text, re.MULTILINE)
         and importlib.util.find_spec(package) is None
     }
 
@@ -167,8 +167,8 @@ def test_names_exist(page):
     equations = "".join(block.text for block in blocks(page) if not block.language)
     for name in NAME.findall(prose(page)) + BARE_NAME.findall(equations):
         first, _, rest = name.partition(".")
-        package = rest.partition(".")[0] if first in ("pf", "planarfriction") else first
-        if package in OPTIONAL and (package == first or importlib.util.find_spec(package) is None):
+        packages = [part for part in name.split(".") if part in OPTIONAL]
+        if first in OPTIONAL or any(importlib.util.find_spec(package) is None for package in packages):
             continue  # a name of that package itself, or one that cannot be looked up without it
         if first in ("pf", "planarfriction"):
             assert resolve(rest), f"{page.name}: {name}"

@@ -140,14 +140,6 @@ _WORDS = size_of(Place)
 
 
 @jit
-def step_batch(places, inputs, out):
-    """Steps of B contacts of one part into `out` [B, 6] from `inputs` [B, 8], as in `step`; `places` hold its place."""
-    part = _place(places)
-    for b in range(inputs.shape[0]):
-        call(part.step, (part.row, part.data, address(inputs, 8 * b), address(out, 6 * b)))
-
-
-@jit
 def step_one(places, z, vx, vy, omega, load, dt, result):
     """A step of one contact whose P parts are at the `places`, a row of words for each, flat; false for invalid inputs.
 

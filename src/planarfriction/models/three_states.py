@@ -14,9 +14,9 @@ import numpy as np
 
 from planarfriction.geometry import transformed
 from planarfriction.kernels.pointers import place_of
-from planarfriction.kernels.quick_steps import compile_quick_steps
+from planarfriction.kernels.quick_steps import compile_quick_steps, step_many
 from planarfriction.kernels.records import row_of
-from planarfriction.kernels.rollouts import UNFIT, Place, compile_step_one, step_batch, step_one
+from planarfriction.kernels.rollouts import UNFIT, Place, compile_step_one, step_one
 from planarfriction.models import base
 from planarfriction.models.base import FrictionModel, ModelJacobians, PackedModel, PackedSteps, StepJacobians
 from planarfriction.models.part_shapes import REMEMBERED, Part
@@ -343,13 +343,11 @@ class ThreeStateModel(FrictionModel):
         )
 
     def _step(self, shape: Any, state, twist, load, dt) -> np.ndarray:
-        out = np.empty((len(load), 6))
-        inputs = np.concatenate([state, twist, load[:, None], dt[:, None]], axis=1)
-        contact = self._contact(
-            Part(1.0, shape)
-        )  # it and the shape, which holds the other map, are kept until the call is over
-        step_batch(contact[0], inputs, out)
-        return out
+        compile_quick_steps()
+        new, wrench = _EMPTY((len(load), 3)), _EMPTY((len(load), 3))
+        contact = self._contact(Part(1.0, shape))  # kept, as the shape is, which holds the other map, until it is over
+        step_many(contact[0], state, twist, load, dt, new, wrench, _EMPTY(14))
+        return np.concatenate([new, wrench], axis=1)
 
     def _step_jacobians(self, shape: Any, state, twist, load, dt) -> np.ndarray:
         record, out = self._record(shape), np.empty((len(load), 6, 7))
