@@ -24,6 +24,8 @@ PAGES = [ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md"
 )
 OPTIONAL = ("torch", "jax", "mujoco")
 """Packages behind an extra; `planarfriction.torch`, `planarfriction.adapters.mujoco` and so on carry their names."""
+RECIPES = ("pybullet", "genesis", "newton")
+"""Hosts that a page has recipes for, and no extra of ours installs."""
 FAMILIES = (families.LAWS, families.MODELS, families.SURFACES, families.SHAPES, families.SCENES)
 MODULES = {module.name for module in pkgutil.iter_modules(planarfriction.__path__)}
 
@@ -62,7 +64,7 @@ def missing_packages(page: Path) -> dict[int, str]:
     return {
         block.section: package
         for block in blocks(page)
-        for package in OPTIONAL
+        for package in (*OPTIONAL, *RECIPES)
         if re.search(rf"^(import|from) (planarfriction\.)?(adapters\.)?{package}\b", block.text, re.MULTILINE)
         and importlib.util.find_spec(package) is None
     }
