@@ -8,6 +8,7 @@ import io
 import itertools
 import math
 import os
+import re
 import stat
 from array import array
 from collections.abc import Iterator, Sequence
@@ -20,6 +21,11 @@ from planarfriction.errors import FileError, shown
 
 MOST_TEXT = 256_000_000
 """Largest text file that is read [bytes]: a log of a million samples fits."""
+
+SEPARATORS = (";", ",", "\t")
+"""What may stand between two cells, the first that a file has."""
+
+_DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 
 
 def read_bytes(path: str | Path, what: str, most: int | None = None) -> bytes:
@@ -63,22 +69,31 @@ def read_text(path: str | Path, what: str) -> str:
 def read_rows(path: str | Path, what: str) -> Iterator[tuple[int, list[str]]]:
     """Rows of a CSV file, each with the number of its line and its stripped cells.
 
-    Empty lines and lines that start with # are left out; a quoted cell may go over several lines.
+    Cells are separated by what stands in the first line: a semicolon, else a comma, else a tab; beside the first and
+    the last of these, numbers may have a decimal comma. Empty lines and lines that start with # are left out; a quoted
+    cell may go over several lines.
 
     Raises FileError in one line, also for a cell that is not well quoted or larger than `csv.field_size_limit`.
     """
     content = io.BytesIO(read_bytes(path, what, MOST_TEXT))
     lines = enumerate(io.TextIOWrapper(content, encoding="utf-8-sig", newline=""), 1)
-    number = 0
+    number, separator = 0, ""
     try:
         for number, line in lines:
             if line.strip() and not line.lstrip().startswith("#"):
+                separator = separator or next((each for each in SEPARATORS if each in line), ",")
                 record = itertools.chain([line], (more for _, more in lines))
-                yield number, [cell.strip() for cell in next(csv.reader(record, strict=True))]
+                cells = [cell.strip() for cell in next(csv.reader(record, strict=True, delimiter=separator))]
+                yield number, cells if separator == "," else [_with_point(cell) for cell in cells]
     except csv.Error as error:
         raise FileError(f"{path}: line {number} is not CSV: {error}") from None
     except UnicodeDecodeError:
         raise FileError(f"{path}: not a text file (expected {what})") from None
+
+
+def _with_point(cell: str) -> str:
+    """A number with a decimal point where it has a decimal comma; anything else as it is."""
+    return cell.replace(",", ".") if _DECIMAL_COMMA.fullmatch(cell) else cell
 
 
 class Table:

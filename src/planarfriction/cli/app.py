@@ -181,7 +181,8 @@ def limit_surface(
 
     Each LOG is a CSV file with a heading and the columns t, vx, vy, omega (or x, y, theta), fx, fy, tau, normal_force
     in s, m/s, rad/s, N and N m: twist and wrench about the origin of the contact frame, in its axes, the wrench on the
-    moving body. Prints estimates, their errors, and what the data cannot tell.
+    moving body. Files that `planarfriction run` writes are such logs. Prints estimates, their errors, and what the data
+    cannot tell.
 
     \b
     Examples:
@@ -197,6 +198,7 @@ def limit_surface(
 @click.option("--parameters", metavar="NAMES", help="What to estimate, separated by commas. Default: the law and r.")
 @click.option("--start", metavar="NAME=VALUE", multiple=True, help="Where to begin, or the value of what is held.")
 @click.option("--normal-force", type=float, help="Normal force in N, where the logs have no such column.")
+@click.option("--contact", metavar="NAME", help="Contact whose columns (NAME.vx) are read, where there are several.")
 @click.option("--noise", metavar="FX,FY,TAU", help="Spread of the measured wrench in N and N m. Default: estimated.")
 @click.option("--plain", is_flag=True, help="Plain LuGre bristles in place of elasto-plastic ones.")
 @click.option("--steady", is_flag=True, help="The logs begin in steady sliding, not at rest.")
@@ -211,6 +213,7 @@ def identify(
     parameters: str | None,
     start: tuple[str, ...],
     normal_force: float | None,
+    contact: str | None,
     noise: str | None,
     plain: bool,
     steady: bool,
@@ -229,6 +232,7 @@ def identify(
         chosen,
         folder=out,
         normal_force=normal_force,
+        contact=contact,
         parameters=command.parse_names(parameters),
         start=command.parse_start(start),
         noise=command.parse_noise(noise),

@@ -19,14 +19,20 @@ if TYPE_CHECKING:
 
 
 def identify(
-    paths: Sequence[Path], patch: ContactPatch, *, folder: Path | None, normal_force: float | None, **options: Any
+    paths: Sequence[Path],
+    patch: ContactPatch,
+    *,
+    folder: Path | None,
+    normal_force: float | None,
+    contact: str | None,
+    **options: Any,
 ) -> int:
     """Estimate the parameters from the logs, print them, and write JSON and picture into `folder`."""
     from planarfriction.identify import Log, identify_lugre
 
     if folder is not None:
         make_folder(folder)
-    logs = [Log.from_csv(path, normal_force=normal_force) for path in paths]
+    logs = [Log.from_csv(path, normal_force=normal_force, contact=contact) for path in paths]
     with work_progress("identifying") as progress:
         found = identify_lugre(logs, patch, progress=progress, **options)
     samples = sum(len(log.time) for log in logs)

@@ -61,17 +61,16 @@ def write_solution(solution: Solution, folder: Path, label: str) -> list[Path]:
 
 
 def history_columns(solution: Solution) -> dict[str, np.ndarray]:
-    """Histories as columns [SI]: time, the body, then each contact (`fx`, or `name.fx` where there are several)."""
+    """Histories as columns [SI]: time, the body, then of each contact what `Log.from_csv` reads (`name.vx`)."""
 
     def values(name: str) -> np.ndarray:
         return solution.histories[name].values
 
     columns = {name: values(name) for name in ("time", "x", "y", "theta", "vx", "vy", "omega")}
-    contacts = [str(name) for name in values("contact")]
-    for index, contact in enumerate(contacts):
-        prefix = "" if len(contacts) == 1 else f"{slug(contact)}."
-        for name in ("fx", "fy", "tau", "normal_force"):
-            columns[prefix + name] = values(name)[:, index]
+    for index, contact in enumerate(map(str, values("contact"))):
+        wrench = {name: values(name)[:, index] for name in ("fx", "fy", "tau", "normal_force")}
+        twist = dict(zip(("vx", "vy", "omega"), solution.contact_twist(contact).T, strict=True))
+        columns |= {f"{slug(contact)}.{name}": column for name, column in (twist | wrench).items()}
     return columns
 
 

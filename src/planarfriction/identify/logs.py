@@ -12,11 +12,9 @@ from planarfriction import validation
 from planarfriction.equality import ByValue
 from planarfriction.errors import FileError, InvalidValueError
 from planarfriction.identify.angles import unwrapped
+from planarfriction.identify.columns import MOTION, TWIST, WRENCH, find_columns
 from planarfriction.reading import Table
-
-TWIST = ("vx", "vy", "omega")
-MOTION = ("x", "y", "theta")
-WRENCH = ("fx", "fy", "tau")
+from planarfriction.scenes import Solution
 
 LEAST_SAMPLES = 10
 """Fewer samples say nothing about a law."""
@@ -99,34 +97,50 @@ class Log(ByValue):
         return cls(time, differentiated(time, motion, window=window), wrench, normal_force, name, turns)
 
     @classmethod
-    def from_csv(cls, path: str | Path, *, normal_force: float | None = None, window: int = 7) -> Log:
+    def from_csv(
+        cls, path: str | Path, *, normal_force: float | None = None, window: int = 7, contact: str | None = None
+    ) -> Log:
         """Log of a CSV file with a heading: columns t, vx, vy, omega (or x, y, theta), fx, fy, tau, normal_force [SI].
 
-        Other columns are ignored, lines that begin with # too. `normal_force` [N] stands in for a missing column of
-        that name; `window` is that of `from_motion`.
+        Other columns are ignored, lines that begin with # too; `time` and `fn` will do for t and normal_force, capital
+        letters for small ones, semicolons and tabs for commas. `normal_force` [N] stands in for a missing column of
+        that name; `window` is that of `from_motion`. Of columns `contact.vx`, as `planarfriction run` writes them,
+        those of `contact` are read, or of the only contact there.
 
         Raises FileError in one line with the line and the column of what is wrong.
         """
-        path, table = validation.path("path", path), Table(path)
-        time = next((name for name in ("t", "time") if name in table.names), None)
-        motion = TWIST if all(name in table.names for name in TWIST) else MOTION
-        load = ("normal_force",) if normal_force is None or "normal_force" in table.names else ()
-        missing = [name for name in (*motion, *WRENCH, *load) if name not in table.names]
-        if time is None or missing:
-            lacking = [*([] if time is not None else ["t"]), *missing]
-            raise FileError(
-                f"{path}: has no column {', '.join(lacking)}; a log has t, {', '.join(TWIST)} (or "
-                f"{', '.join(MOTION)}), {', '.join(WRENCH)}, normal_force"
-            )
-        columns = table.numbers([time, *motion, *WRENCH, *load])
-        times, moved, wrench = columns[:, 0], columns[:, 1:4], columns[:, 4:7]
-        loads = columns[:, 7] if load else np.array(validation.non_negative("normal_force", normal_force))
+        path = validation.path("path", path)
+        contact = None if contact is None else validation.text("contact", contact)
+        table = Table(path)
+        found = find_columns(path, table.names, contact=contact, with_load=normal_force is None)
+        columns = dict(zip(found, table.numbers(list(found.values())).T, strict=True))
+        motion = TWIST if "vx" in found else MOTION
+        moved, wrench = (np.stack([columns[name] for name in names], -1) for names in (motion, WRENCH))
+        loads = columns.get("normal_force")
+        if loads is None:
+            loads = np.array(validation.non_negative("normal_force", normal_force))
         try:
             if motion is TWIST:
-                return cls(times, moved, wrench, loads, path.stem)
-            return cls.from_motion(times, moved, wrench, loads, window=window, name=path.stem)
+                return cls(columns["t"], moved, wrench, loads, path.stem)
+            return cls.from_motion(columns["t"], moved, wrench, loads, window=window, name=path.stem)
         except InvalidValueError as error:
             raise FileError(f"{path}: {error}") from None
+
+    @classmethod
+    def from_solution(cls, solution: Solution, contact: str | None = None) -> Log:
+        """Log of one contact of a simulation: what its sensors would have measured without noise.
+
+        `contact` is a name; None takes the only one. The wrench is that of one of `count` identical contacts.
+
+        Raises InvalidValueError for a contact that is not there, FileError for a solution without its scene.
+        """
+        if not isinstance(solution, Solution):
+            raise InvalidValueError("solution", "be a Solution", type(solution).__name__)
+        twist, index = solution.contact_twist(contact), solution.contact_index(contact)
+        columns = {name: np.asarray(solution.histories[name].values) for name in ("time", *WRENCH, "normal_force")}
+        wrench = np.stack([columns[name][:, index] for name in WRENCH], -1)
+        name = f"{solution.scene.name}, {solution.scene.contacts[index].name}"
+        return cls(columns["time"], twist, wrench, columns["normal_force"][:, index], name)
 
 
 def as_logs(log: Log | Sequence[Log]) -> tuple[Log, ...]:

@@ -10,6 +10,7 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify import parameters as known
+from planarfriction.identify.checks import check_logs, with_findings
 from planarfriction.identify.fitted import assemble
 from planarfriction.identify.guess import guess_starts
 from planarfriction.identify.least_squares import Minimum, minimise
@@ -90,6 +91,7 @@ def identify_lugre(
     refuse_anisotropy(patch, "identify_lugre")
     validation.choice("begins", begins, BEGINS)
     starts = validation.count("starts", starts)
+    findings = check_logs(logs, patch, names)
     law, given = _start_law(start, elasto_plastic)
     problem = Problem(
         logs, patch, names, law, surface, begins, 1 if refine is None else validation.count("refine", refine)
@@ -107,7 +109,7 @@ def identify_lugre(
         problem.refine_twice()
         say(f"{problem.refine} steps between two samples")
         minimum, spread = _settled(problem, coordinates, minimum, spread, noise is None)
-    return assemble(problem, coordinates, minimum, spread, agreement)
+    return with_findings(assemble(problem, coordinates, minimum, spread, agreement), logs, findings)
 
 
 def _settled(problem, coordinates, minimum, noise, unknown: bool) -> tuple[Minimum, np.ndarray]:

@@ -16,8 +16,9 @@ from urllib.parse import quote, unquote
 
 import numpy as np
 
+from planarfriction import validation
 from planarfriction.equality import by_parts
-from planarfriction.errors import FileError, FrictionError
+from planarfriction.errors import FileError, FrictionError, InvalidValueError
 from planarfriction.reading import read_bytes
 from planarfriction.scenes.scene import Scene
 from planarfriction.solvers.statistics import Statistics
@@ -95,6 +96,38 @@ class Solution:
         import xarray as xr
 
         return xr.Dataset(dict(self.histories), attrs=_scene_attributes(self.scene))
+
+    def contact_twist(self, contact: str | None = None) -> np.ndarray:
+        """Twist of the body against one contact `[T, 3]` [m/s, m/s, rad/s], where `data` has that contact's wrench.
+
+        `(vx, vy, omega)` at the origin of the contact frame, in its axes. `contact` is a name; None takes the only one.
+
+        Raises InvalidValueError for a contact that is not there, FileError for a solution without its scene.
+        """
+        if self.scene is None:
+            raise FileError(f"the file has no scene, which a twist needs: {self.data.attrs[_LEFT_OUT]}")
+        chosen = self.scene.contacts[self.contact_index(contact)]
+        x, y, theta, vx, vy, omega = (
+            np.asarray(self.histories[name].values) for name in ("x", "y", "theta", "vx", "vy", "omega")
+        )
+        (dx, dy), angle = chosen.position, chosen.angle + 0.0 * theta
+        if self.scene.velocity is None and chosen.mounted_on == "world":
+            dx, dy = dx - x, dy - y
+        elif self.scene.velocity is None:
+            cos, sin = np.cos(theta), np.sin(theta)
+            dx, dy, angle = cos * dx - sin * dy, sin * dx + cos * dy, angle + theta
+        ux, uy = vx - omega * dy, vy + omega * dx
+        cos, sin = np.cos(angle), np.sin(angle)
+        return np.stack([cos * ux + sin * uy, cos * uy - sin * ux, omega], axis=-1)
+
+    def contact_index(self, contact: str | None = None) -> int:
+        """Place of a contact, given by its name, along the axis `contact`; None takes the only one."""
+        names = [str(name) for name in self.histories["contact"].values]
+        if contact is None and len(names) == 1:
+            return 0
+        if contact is None:
+            raise InvalidValueError("contact", f"be given where there are several ({', '.join(names)})", contact)
+        return names.index(validation.choice("contact", contact, names))
 
     def plot(self) -> Any:
         """Draw the motion of the body and the time histories; returns a matplotlib Figure.

@@ -1,0 +1,335 @@
+"""Checks of logs before they are fitted: each finding is one line that says what was found and what it points to."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from planarfriction.errors import InvalidValueError
+from planarfriction.identify.logs import Log
+from planarfriction.identify.result import Identification, Verdict
+from planarfriction.patch import ContactPatch
+
+FAST = 0.2
+"""Share of the usual largest speed from which a sample counts as sliding: bristles that load or turn are slower."""
+
+STRONG = 0.2
+"""The same of the wrench: what is smaller is noise, or a contact without load."""
+
+LEAST = 20
+"""Fewer sliding samples say nothing."""
+
+MOST = 120
+"""Sliding samples that are looked at, evenly chosen."""
+
+MOST_CELLS = 500
+"""Cells of a patch above which a few of them stand for all."""
+
+AGAINST = 0.7
+"""Share of the work with which friction drives the motion, above which its sign is wrong: friction takes work, but for
+what bristles give back."""
+
+OFF = 5.0
+"""Median angle between the wrench and that of sliding friction [deg] from which a log may have been misread."""
+
+BETTER = 0.4
+"""Share to which another reading of the log must lower that angle to be named: noise is lowered by none."""
+
+NEAR = np.geomspace(1.0 / 3.0, 3.0, 9)
+"""Factors on the size of the patch that count as the same patch: its size is estimated."""
+
+FAR = np.concatenate([np.geomspace(1e-4, 0.25, 28), np.geomspace(4.0, 1e4, 28)])
+"""Factors that do not."""
+
+LEVERS = {
+    1e-3: "the patch in mm",
+    0.13: "omega in deg/s",
+    10.0: "vx and vy in cm/s",
+    32.0: "vx and vy in mm/s, or tau in N mm",
+    1e3: "all lengths in mm but those of the patch",
+}
+"""Factors on the contact radius that a unit explains; it is told by the root of `tau v/(f omega)`."""
+
+SAME_LEVER = 2.0
+"""Factor within which a contact radius counts as one of these."""
+
+HIGH = 4.0
+"""Friction over load above which one of both has another unit or another scale."""
+
+TRAVEL = 0.1
+"""Way between two samples, as a share of the contact radius, that is long for slow sampling."""
+
+SLOW = 0.2
+"""Time between two samples [s] that is long for a log of friction."""
+
+SPEEDY = 10.0
+"""Speed [m/s] that is more likely one in mm/s."""
+
+ALIKE = 0.05
+"""Share within which loads count as one."""
+
+LEAST_MOUNTED = np.radians(20.0)
+"""Angle between the axes of force and motion [rad] that no anisotropy and no calibration explains."""
+
+LEAST_TURN = 0.5
+"""Turn of the contact [rad] below which axes of the world and of the contact are the same."""
+
+
+@dataclass(frozen=True)
+class Finding:
+    """Something about a log that does not look as it should."""
+
+    name: str
+    """What it is about, such as "wrench of log"."""
+    rule: str
+    """What is expected of it, continuing "<name> should ..."."""
+    found: str
+    """What was found, and what it points to."""
+    refuses: bool = False
+    """Whether no fit can make sense of it."""
+
+    def __str__(self) -> str:
+        return f"{self.name} should {self.rule}, got {self.found}"
+
+
+def check_logs(logs: Sequence[Log], patch: ContactPatch, names: Sequence[str] = ()) -> tuple[Finding, ...]:
+    """What is odd about logs of a contact on `patch` from which `names` are to be estimated.
+
+    Raises InvalidValueError, one line, for what no fit can make sense of.
+    """
+    findings = [finding for log in logs for finding in check_log(log, patch)]
+    findings += check_loads(logs, names)
+    for finding in findings:
+        if finding.refuses:
+            raise InvalidValueError(finding.name, finding.rule, finding.found)
+    return tuple(findings)
+
+
+def with_findings(result: Identification, logs: Sequence[Log], findings: Sequence[Finding]) -> Identification:
+    """The result with the findings, and what its estimates say about the sampling, among its verdicts."""
+    found = [*findings]
+    if {"sigma_0", "sigma_1"} <= set(result.names):
+        estimates = result.estimates
+        sampled = [check_sampling(log, estimates["sigma_0"], estimates["sigma_1"]) for log in logs]
+        found += [finding for finding in sampled if finding is not None]
+    verdicts = [Verdict("fit", False, str(finding)) for finding in found]
+    return dataclasses.replace(result, verdicts=(*result.verdicts, *verdicts))
+
+
+def check_log(log: Log, patch: ContactPatch) -> list[Finding]:
+    """Findings about one log: sign of the work, axes and units, way between samples, friction against load."""
+    size, sliding = _size(log, patch), Sliding.of(log, patch)
+    work = check_work(log, sliding)
+    found = [work] if work else [check_directions(log, sliding, size)]
+    found += [check_times(log, size), check_friction(log, size), check_unloaded(log, size)]
+    return [finding for finding in found if finding is not None]
+
+
+# ---------------------------------------------------------------------- work and direction
+
+
+@dataclass(frozen=True)
+class Sliding:
+    """Samples of a log that slide, S of them, beside the cells of its patch."""
+
+    twist: np.ndarray
+    """`[S, 3]`"""
+    wrench: np.ndarray
+    """`[S, 3]`"""
+    turned: np.ndarray
+    """Angle since the log began [rad], `[S]`."""
+    cells: np.ndarray
+    """Positions `[N, 2]` [m]."""
+    weights: np.ndarray
+    """Shares of the load `[N]`."""
+    channels: np.ndarray
+    """`[3]` of bool."""
+
+    @classmethod
+    def of(cls, log: Log, patch: ContactPatch) -> Sliding:
+        """The fast samples under load, at most `MOST` of them."""
+        many = patch.cells > MOST_CELLS and not patch.depends_on_load and not patch.anisotropic
+        few = patch.compressed() if many else patch
+        weights = few.weights(_load(log)) if few.depends_on_load else few.weights()
+        size = _size(log, patch)
+        speed, force = (np.linalg.norm(each, axis=1) for each in (log.twist * [1, 1, size], log.wrench / [1, 1, size]))
+        enough = [each >= share * np.quantile(each, 0.95) for each, share in ((speed, FAST), (force, STRONG))]
+        rows = np.flatnonzero(np.all([*enough, speed > 0.0, force > 0.0, log.normal_force > 0.0], axis=0))
+        rows = rows[:: max(1, -(-len(rows) // MOST))]
+        steps = 0.5 * (log.twist[1:, 2] + log.twist[:-1, 2]) * np.diff(log.time)
+        turned = np.concatenate([[0.0], np.cumsum(steps)])
+        return cls(log.twist[rows], log.wrench[rows], turned[rows], few.positions, weights, log.channels)
+
+    @property
+    def power(self) -> np.ndarray:
+        """Power of the wrench `[S]` [W]."""
+        return np.einsum("si,si->s", self.twist, self.wrench)
+
+    def friction(self, twist: np.ndarray, scale: float) -> np.ndarray:
+        """Wrenches `[S, 3]` of dry friction under a load of 1 at the twists, on the patch times `scale`."""
+        x, y = scale * self.cells.T
+        vx, vy = twist[:, :1] - twist[:, 2:] * y, twist[:, 1:2] + twist[:, 2:] * x
+        speed = np.hypot(vx, vy)
+        weights = -self.weights / np.where(speed > 0.0, speed, 1.0)
+        return np.stack([(weights * each).sum(axis=1) for each in (vx, vy, x * vy - y * vx)], -1)
+
+    def angle(self, twist: np.ndarray, wrench: np.ndarray, scale: float) -> float:
+        """Median angle [deg] between wrenches and those of dry friction."""
+        size = float(np.sqrt((self.weights * (self.cells**2).sum(axis=1)).sum()))
+        a, b = ((each / [1.0, 1.0, size])[:, self.channels] for each in (self.friction(twist, scale), wrench))
+        lengths = np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1)
+        cosines = np.einsum("si,si->s", a, b) / np.where(lengths > 0.0, lengths, 1.0)
+        return float(np.degrees(np.median(np.arccos(np.clip(cosines, -1.0, 1.0)))))
+
+    def best(self, twist: np.ndarray, wrench: np.ndarray, scales: np.ndarray = NEAR) -> tuple[float, float]:
+        """The least of these angles over sizes of the patch, and the size that has it."""
+        return min((self.angle(twist, wrench, scale), scale) for scale in scales)
+
+
+def check_work(log: Log, sliding: Sliding) -> Finding | None:
+    """Friction on the moving body takes work from it; a wrench that gives work has the wrong sign."""
+    power = sliding.power
+    if len(power) < LEAST or power[power > 0.0].sum() <= AGAINST * np.abs(power).sum():
+        return None
+    _, words = _best_reading(sliding)
+    rule = f"act on the moving body, against its motion (so it does {words})"
+    found = f"power > 0 in {100.0 * np.mean(power > 0.0):.4g} % of the samples that slide"
+    return Finding(f"wrench of {log.name}", rule, found, refuses=True)
+
+
+def check_directions(log: Log, sliding: Sliding, size: float) -> Finding | None:
+    """The wrench of sliding friction points against the twist as the patch says; another reading may fit far better."""
+    if len(sliding.twist) < LEAST:
+        return None
+    as_read, _ = sliding.best(sliding.twist, sliding.wrench)
+    if as_read < OFF:
+        return None
+    found = _best_reading(sliding)
+    angle, scale = sliding.best(sliding.twist, sliding.wrench, FAR)
+    if angle < found[0]:
+        factor = min(LEVERS, key=lambda each: abs(np.log(scale / each)))
+        hint = f" ({LEVERS[factor]}?)" if 1.0 / SAME_LEVER < scale / factor < SAME_LEVER else ""
+        found = angle, f"with a contact radius of {1e3 * scale * size:.3g} mm in place of {1e3 * size:.3g} mm{hint}"
+    if found[0] > BETTER * as_read:
+        return None
+    text = f"{as_read:.0f} deg off in the median, and {found[0]:.0f} deg {found[1]}"
+    return Finding(f"wrench of {log.name}", "point as friction on the patch does", text)
+
+
+def _best_reading(sliding: Sliding) -> tuple[float, str]:
+    """The reading of the log that has the directions of friction, its angle [deg] and words for it."""
+    return min((sliding.best(twist, wrench)[0], words) for words, twist, wrench in _readings(sliding))
+
+
+def _readings(sliding: Sliding) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
+    """Ways in which a log may have been written: words, twist and wrench as they then are."""
+    twist, wrench, turned = sliding.twist, sliding.wrench, sliding.turned
+    for words, signs in (
+        ("with fx, fy and tau of the other sign", (-1, -1, -1)),
+        ("with fx and fy of the other sign", (-1, -1, 1)),
+        ("with tau of the other sign", (1, 1, -1)),
+        ("with fx of the other sign", (-1, 1, 1)),
+        ("with fy of the other sign", (1, -1, 1)),
+        ("with fy and tau of the other sign, as where z points down", (1, -1, -1)),
+        ("with fx and tau of the other sign, as where z points down", (-1, 1, -1)),
+    ):
+        yield words, twist, wrench * signs
+    if np.ptp(turned) > LEAST_TURN:
+        yield "if the twist is in world axes", _rotated(twist, -turned), wrench
+        yield "if the wrench is in world axes", twist, _rotated(wrench, -turned)
+    for scale in NEAR[::4]:
+        expected, measured = (each[:, 0] + 1j * each[:, 1] for each in (sliding.friction(twist, scale), wrench))
+        angle = float(np.angle((expected * measured.conj()).sum()))
+        if abs(angle) > LEAST_MOUNTED:
+            yield f"with fx and fy turned by {np.degrees(angle):.0f} deg", twist, _rotated(wrench, angle)
+
+
+def _rotated(vectors: np.ndarray, angle: float | np.ndarray) -> np.ndarray:
+    """Planar vectors with a third component `[S, 3]`, turned by an angle."""
+    cos, sin = np.cos(angle), np.sin(angle)
+    x, y, z = vectors.T
+    return np.stack([cos * x - sin * y, sin * x + cos * y, z], -1)
+
+
+# ---------------------------------------------------------------------- times, speeds, loads
+
+
+def check_times(log: Log, size: float) -> Finding | None:
+    """A contact moves a small part of its size between two samples; more points to mm/s, or to times in ms."""
+    speed = float(np.quantile(np.linalg.norm(log.twist * [1, 1, size], axis=1), 0.9))
+    way = speed * log.interval
+    seen = (
+        f"{1e3 * way:.3g} mm between two samples {log.interval:.3g} s apart, on a contact radius of {1e3 * size:.3g} mm"
+    )
+    if log.interval >= SLOW and way > TRAVEL * size:
+        return Finding(f"t of {log.name}", "be in s", f"{seen}: is it in ms?")
+    if speed > SPEEDY or way > size:
+        return Finding(
+            f"twist of {log.name}", "be in m/s and rad/s", f"{seen}: are vx and vy in mm/s, or omega in deg/s?"
+        )
+    return None
+
+
+def check_friction(log: Log, size: float) -> Finding | None:
+    """Friction many times the load points to another unit of one of both."""
+    loaded = log.normal_force > 0.0
+    if not loaded.any():
+        return None
+    force = np.linalg.norm(log.wrench[loaded, :2], axis=1) / log.normal_force[loaded]
+    torque = np.abs(log.wrench[loaded, 2]) / (size * log.normal_force[loaded])
+    force, torque = float(np.quantile(force, 0.9)), float(np.quantile(torque, 0.9))
+    if force > HIGH:
+        text = f"friction of {force:.3g} times the load: is normal_force in kg or in kN?"
+        return Finding(f"normal_force of {log.name}", "be in N", text)
+    if torque > HIGH:
+        text = f"a torque of {torque:.3g} times the load and the contact radius: is it in N mm, or about another point?"
+        return Finding(f"tau of {log.name}", "be in N m about the origin of the contact frame", text)
+    return None
+
+
+def check_unloaded(log: Log, size: float) -> Finding | None:
+    """Friction where there is no load points to a load cell with an offset."""
+    force = np.linalg.norm(log.wrench / [1.0, 1.0, size], axis=1)
+    bare = log.normal_force == 0.0
+    if bare.sum() < LEAST or not np.median(force[bare]) > STRONG * np.quantile(force, 0.95):
+        return None
+    text = f"friction of {np.median(force[bare]):.3g} N there: has the load cell an offset?"
+    return Finding(
+        f"normal_force of {log.name}", f"be > 0 where there is friction (it is 0 in {bare.sum()} samples)", text
+    )
+
+
+def check_loads(logs: Sequence[Log], names: Sequence[str]) -> list[Finding]:
+    """What depends on the load is told by different loads only."""
+    wanted = [name for name in names if name in ("n", "k", "k_per_newton")]
+    loads = np.array([_load(log) for log in logs])
+    if not wanted or loads.max() > (1.0 + ALIKE) * loads.min():
+        return []
+    which = ", ".join(wanted)
+    return [Finding("normal_force", f"differ from log to log to tell {which}", f"{loads.mean():.4g} N throughout")]
+
+
+def check_sampling(log: Log, sigma_0: float, sigma_1: float) -> Finding | None:
+    """The damping of bristles shows above their corner `sigma_0/(2 pi sigma_1)` only, which samples must reach."""
+    if not sigma_0 > 0.0 or not sigma_1 > 0.0:
+        return None
+    corner, rate = sigma_0 / (2.0 * np.pi * sigma_1), 1.0 / log.interval
+    if rate >= 2.0 * corner:
+        return None
+    rule = (
+        f"be taken at {2.0 * corner:.3g} Hz or more to show sigma_1 (corner sigma_0/(2 pi sigma_1) at {corner:.3g} Hz)"
+    )
+    return Finding(f"samples of {log.name}", rule, f"{rate:.3g} Hz")
+
+
+def _load(log: Log) -> float:
+    loaded = log.normal_force[log.normal_force > 0.0]
+    return float(np.median(loaded)) if len(loaded) else 1.0
+
+
+def _size(log: Log, patch: ContactPatch) -> float:
+    """Length that turns spin into speed [m]: the contact radius at the load of the log."""
+    return float(patch.contact_radius(_load(log)) if patch.depends_on_load else patch.contact_radius())
