@@ -1,9 +1,9 @@
 """Friction of a cube from measured slides, without a force sensor: fitted on half of the tosses, tested on the other.
 
-The file is that of measured_slides.py: motion capture of a cube that was tossed, landed flat, and slid and spun until
-it stopped (ContactNets: Pfrommer, Halm, Posa, CoRL 2020).
+Motion capture of a cube that was tossed, landed flat, and slid and spun until it stopped (ContactNets: Pfrommer, Halm,
+Posa, CoRL 2020). The table comes with the package; a FOLDER may hold another one of the same form.
 
-    python examples/identify_slides.py contactnets_slides.csv.gz --splits 3 --out out/
+    python examples/identify_slides.py --splits 3 --out out/
 """
 
 from __future__ import annotations
@@ -16,14 +16,20 @@ from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
-from measured_slides import CORNERS, INERTIA, MASS, SQUARE, Toss, read_tosses, split
-from measured_slides_report import print_table, rms
 
 import planarfriction as pf
+from planarfriction.cli.console import print_table
 from planarfriction.errors import FrictionError
 from planarfriction.identify import Slide, SlidingBody, identify_motion, predict_slide
+from planarfriction.measured import Case as Toss
+from planarfriction.measured import slides as measured
+from planarfriction.measured.scores import rms
 
-BODY = SlidingBody(MASS, INERTIA)
+BODY = SlidingBody(measured.MASS, measured.INERTIA)
+SQUARE = measured.face()
+CORNERS = pf.ContactPatch.points(
+    0.5 * measured.SIDE * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]), name="four corners"
+)
 
 WINDOW = 8
 """First poses that the start of a slide is estimated from: 47 ms of some 290 ms."""
@@ -58,7 +64,15 @@ CASES = (
 
 def as_slide(toss: Toss) -> Slide:
     """A toss as the library takes it."""
-    return Slide(toss.time, toss.pose, toss.twist, f"toss {toss.number}")
+    return Slide(toss.question.time, toss.answer, name=toss.name)
+
+
+def split(tosses: Sequence[Toss], seed: int, most: int | None = None) -> tuple[list[Toss], list[Toss]]:
+    """Two halves of (at most `most` different) tosses, one to fit and one to test; no copies of one toss in both."""
+    ids = np.random.default_rng(seed).permutation(sorted({toss.group for toss in tosses}))[:most]
+    halves = set(ids[: len(ids) // 2]), set(ids[len(ids) // 2 :])
+    fit, test = ([toss for toss in tosses if toss.group in half] for half in halves)
+    return fit, test
 
 
 def errors(predicted: np.ndarray, slide: Slide, skipped: int) -> list[float]:
@@ -69,16 +83,16 @@ def errors(predicted: np.ndarray, slide: Slide, skipped: int) -> list[float]:
 
 
 def run(fit: Sequence[Slide], test: Sequence[Slide], cases: Sequence[Case], seed: int) -> list[tuple[str, ...]]:
-    """Fit every case on one half and predict the other, from the measured twist and from the first poses."""
+    """Fit every case on one half and predict the other, from a parabola and from the first poses."""
     rows = []
     for case in cases:
         found = identify_motion(
             fit, case.patch, BODY, parameters=case.parameters, start=_start(case), model=case.build, samples=WINDOW
         )
         told = ", ".join(f"{n} {v:.4g} ± {found.errors[n]:.1g}" for n, v in found.estimates.items())
-        for name, samples in (("measured twist", None), (f"first {WINDOW} poses", WINDOW)):
+        for name, samples in (("parabola", None), (f"first {WINDOW} poses", WINDOW)):
             all_errors = [errors(predict_slide(found.model, BODY, s, samples=samples), s, samples or 0) for s in test]
-            rows.append((str(seed), case.name, name, told, *(f"{e:.2f}" for e in rms(np.array(all_errors), axis=0))))
+            rows.append((str(seed), case.name, name, told, *(f"{rms(e):.2f}" for e in np.array(all_errors).T)))
         print(" | ".join(rows[-2]), "\n", " | ".join(rows[-1]), file=sys.stderr, flush=True)
     return rows
 
@@ -113,13 +127,13 @@ def draw(speed: np.ndarray, mu: np.ndarray) -> Figure:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("path", type=Path, help="file of measured slides")
+    parser.add_argument("folder", type=Path, nargs="?", help="folder with the table, that of the package by default")
     parser.add_argument("--splits", type=int, default=1, help="number of splits")
     parser.add_argument("--tosses", type=int, help="at most so many different tosses")
     parser.add_argument("--out", type=Path, help="folder for the picture of every slide's friction")
     options = parser.parse_args(arguments)
     try:
-        tosses = read_tosses(options.path)
+        tosses = measured.read(options.folder)
         rows = []
         for seed in range(options.splits):
             fit, test = ([as_slide(toss) for toss in half] for half in split(tosses, seed, options.tosses))

@@ -280,6 +280,48 @@ def bench(only: tuple[str, ...], full: bool, json: bool) -> None:
 
 
 @app.command(
+    short_help="Compare friction models on measured data.",
+    help="""Compare friction models on measured data of others, which comes with the package: three tasks, fixed splits.
+
+    slides: from the first 8 poses of a cube on a table, its path and its end. pushes: the twist of an object that is
+    pushed slowly, from the wrench. series: twists and wrenches along whole pushes. Each model is fitted to the training
+    cases and scored on the others, with bootstrap intervals. --own adds a function of yours (docs/measured.md).
+
+    \b
+    Examples:
+      planarfriction measured --out results/
+      planarfriction measured --task slides --only "exact surface" --own my_model.py:predict
+      planarfriction measured --list
+    """,
+)
+@click.option("--task", "tasks", metavar="NAME", multiple=True, help="Only this task; may be repeated.")
+@click.option("--only", metavar="NAME", multiple=True, help="Only this model of the library; may be repeated.")
+@click.option("--own", metavar="FILE.py:NAME", multiple=True, help="A model of your own; may be repeated.")
+@click.option("--list", "list_only", is_flag=True, help="List models and tasks.")
+@click.option("--tables", type=FILE, help="Folder with the measured tables. Default: those of the package.")
+@click.option("--out", type=FILE, help="Folder for JSON and pictures.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Of the bootstrap.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else on stdout.")
+def measured(
+    tasks: tuple[str, ...],
+    only: tuple[str, ...],
+    own: tuple[str, ...],
+    list_only: bool,
+    tables: Path | None,
+    out: Path | None,
+    seed: int,
+    as_json: bool,
+) -> int:
+    """Compare on measured data (the help above is what users see)."""
+    from planarfriction.cli import measured as command
+
+    if list_only:
+        command.show_list()
+        return 0
+    return command.measured(tasks, only, own, tables=tables, folder=out, seed=seed, as_json=as_json)
+
+
+@app.command(
     short_help="Reproduce the published experiments in one report.",
     help="""Reproduce the experiments of the source paper: one HTML report, ours beside the published numbers.
 

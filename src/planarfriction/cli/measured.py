@@ -1,0 +1,130 @@
+"""`planarfriction measured`: models compared on measured data."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from planarfriction import validation
+from planarfriction.cli import INTERRUPTED, output
+from planarfriction.cli.console import note, print_table, work_progress
+from planarfriction.errors import FileError, InvalidValueError, one_line
+from planarfriction.writing import make_folder, write_text
+
+
+def show_list() -> None:
+    """Print the models of the library and the tasks."""
+    from planarfriction.measured.library import LIBRARY
+    from planarfriction.measured.tasks import TASKS
+
+    rows = [[name, entry.words, "" if entry.installed else f"[{entry.extra}]"] for name, entry in LIBRARY.items()]
+    print_table("Models", ["name", "what it is", "needs"], rows)
+    print_table("Tasks", ["name", "what is asked"], [[task.name, task.title] for task in TASKS.values()])
+
+
+def measured(
+    tasks: Sequence[str],
+    only: Sequence[str],
+    own: Sequence[str],
+    *,
+    tables: Path | None,
+    folder: Path | None,
+    seed: int,
+    as_json: bool,
+) -> int:
+    """Compare, show and write; returns the exit code. An interrupt keeps the models that are done."""
+    from planarfriction.measured import TASKS, Benchmark
+    from planarfriction.measured.library import LIBRARY
+
+    validation.count("--seed", seed, 0)
+    left_out: list[str] = []
+    models = _library(only, left_out) if only or not own else {}
+    for entry in own:
+        name, model = load_model(entry)
+        if name in models or name in LIBRARY:
+            raise InvalidValueError("--own", "have a name that no model of the library has", name)
+        models[name] = model
+    if folder is not None:
+        make_folder(folder)
+    benchmark = Benchmark(models, tasks or tuple(TASKS), tables, seed)
+    benchmark.left_out += left_out
+    code = 0
+    try:
+        with work_progress("measured") as progress:
+            benchmark.run(progress)
+    except KeyboardInterrupt:
+        done = sum(map(len, benchmark.results.values()))
+        note(f"interrupted: {done} of {len(models) * len(benchmark.tasks)} results are there")
+        code = INTERRUPTED
+    show(benchmark, as_json)
+    if folder is not None and benchmark.results:
+        write(benchmark, folder)
+    return code
+
+
+def _library(only: Sequence[str], left_out: list[str]) -> dict[str, Any]:
+    from planarfriction.measured.benchmark import library
+    from planarfriction.measured.library import LIBRARY
+
+    chosen = [validation.choice("--only", name, LIBRARY) for name in only] or list(LIBRARY)
+    there = library(left_out)
+    return {name: there[name] for name in chosen if name in there}
+
+
+def load_model(entry: str) -> tuple[str, Callable[[Any], Any]]:
+    """Name and model of `FILE.py:NAME`: a function, or an object that can be called.
+
+    Raises FileError in one line where the file or what is in it cannot be had.
+    """
+    file, colon, name = entry.rpartition(":")
+    if not colon or not file.endswith(".py") or not name.isidentifier():
+        raise InvalidValueError("--own", "be FILE.py:NAME", entry)
+    path = Path(file)
+    if not path.is_file():
+        raise FileError(f"{path}: no such file")
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # whatever a file of the user raises
+        raise FileError(one_line(f"{path}: {type(error).__name__}: {' '.join(str(error).split())}")) from None
+    if not callable(getattr(module, name, None)):
+        raise FileError(f"{path}: has nothing called {name} that can be called")
+    return name, getattr(module, name)
+
+
+def show(benchmark: Any, as_json: bool) -> None:
+    """Print the tables, or JSON."""
+    from planarfriction.measured.report import table, to_dict
+    from planarfriction.measured.tasks import TASKS
+
+    if as_json:
+        print(json.dumps(to_dict(benchmark), indent=1))
+        return
+    for name in benchmark.results:
+        cases = next(iter(benchmark.results[name].values())).scores
+        counts = sum(each.cases for each in cases.values()) if name != "slides" else next(iter(cases.values())).cases
+        print_table(
+            f"{TASKS[name].title} ({counts} {'tosses' if name == 'slides' else 'tests'})", *table(benchmark, name)
+        )
+        for model, result in benchmark.results[name].items():
+            if result.told:
+                note(f"{model}, fitted: {', '.join(f'{key} {value:.4g}' for key, value in result.told.items())}")
+    for text in benchmark.left_out:
+        note(f"left out: {text}")
+
+
+def write(benchmark: Any, folder: Path) -> None:
+    """Write JSON and pictures."""
+    from planarfriction.measured.figures import draw
+    from planarfriction.measured.report import to_dict
+
+    path = folder / "measured.json"
+    write_text(path, json.dumps(to_dict(benchmark), indent=1) + "\n")
+    note(f"wrote {path}")
+    for name in benchmark.results:
+        note(f"wrote {output.write_picture(draw(benchmark, name), folder / f'measured-{name}.png')}")

@@ -1,0 +1,44 @@
+"""The models that the comparison begins with, and which of them are installed."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from planarfriction.limit_surface import LimitSurfaceEllipsoid, LimitSurfaceExact, LimitSurfaceQuartic
+from planarfriction.measured.models import BristleModel, PushedQuartic, SurfaceModel, UncoupledModel
+from planarfriction.measured.mujoco_box import MujocoBox
+from planarfriction.models import DistributedModel, ReducedModel
+
+
+class Entry(NamedTuple):
+    """A model of the comparison."""
+
+    make: Callable[[], Any]
+    words: str
+    """What it is, in one line."""
+    needs: str = ""
+    """Package of an extra that it needs, and the extra."""
+    extra: str = ""
+
+    @property
+    def installed(self) -> bool:
+        """Whether what it needs is there."""
+        return not self.needs or importlib.util.find_spec(self.needs) is not None
+
+
+LIBRARY = {
+    "uncoupled": Entry(lambda: UncoupledModel(False), "force and torque each as if the other were not there"),
+    "independent torsion": Entry(lambda: UncoupledModel(True), "the same with a fitted lever of the torque"),
+    "ellipsoid": Entry(lambda: SurfaceModel(LimitSurfaceEllipsoid), "an ellipsoid as limit surface"),
+    "quartic": Entry(lambda: SurfaceModel(LimitSurfaceQuartic), "a convex quartic of the patch", "cvxpy", "quartic"),
+    "quartic of pushes": Entry(PushedQuartic, "a convex quartic fitted to the training pushes", "cvxpy", "quartic"),
+    "exact surface": Entry(lambda: SurfaceModel(LimitSurfaceExact), "the limit surface of the patch itself"),
+    "reduced": Entry(lambda: BristleModel(ReducedModel), "ReducedModel, stiff bristles"),
+    "distributed": Entry(lambda: BristleModel(DistributedModel), "DistributedModel, stiff bristles"),
+    "MuJoCo box": Entry(
+        MujocoBox, "MuJoCo's own contact of a box, elliptic, condim 3 (slides only)", "mujoco", "mujoco"
+    ),
+}
+"""Models by name, from the simplest on."""
