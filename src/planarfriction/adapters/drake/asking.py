@@ -1,0 +1,157 @@
+"""A step of a plant with patch friction: solved in contact space, and asked for again with what was solved.
+
+Drake does not say how its contacts answer to wrenches. The first answer taken is that of the bodies without contact,
+which is never too stiff; each time the plant's step is asked for, what came out corrects it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from planarfriction.adapters.drake.row import Row
+from planarfriction.adapters.drake.shadow import Shadow
+from planarfriction.coupling import CoupledPatches
+
+PASSES = 12
+"""How often the plant's step is asked for at most."""
+
+MISFIT = 1e-7
+"""Twists that come out [m/s] within which they are what was solved for: what Drake's own solver leaves open."""
+
+NOTICED = 1e-6
+"""Twists that come out [m/s] so far off say how contacts answer; below, what gets no better is taken."""
+
+QUIET = 1e-9
+"""Changes of twists [m/s] that are not worth asking for: a thousandth of a micrometre in a second."""
+
+
+class Asked(NamedTuple):
+    """The end of a step: as flat vectors, patch by patch."""
+
+    bristles: np.ndarray
+    wrenches: np.ndarray
+    force: np.ndarray
+    """Generalized force that the wrenches are `[nv]`."""
+    owed: np.ndarray
+    """How far the twists that came out are from those that the bristles have seen."""
+    twists: np.ndarray
+    loads: np.ndarray
+    answers: np.ndarray
+    """How twists and loads answered in the end, for the next step to start from."""
+    report: tuple[float, ...]
+    """Passes, iterations, residual, misfit, whether the step in contact space has converged."""
+
+
+class Asking:
+    """Steps of patches on a shadow. What it keeps is scratch: each step starts from what it is given."""
+
+    def __init__(self, shadow: Shadow, coupled: CoupledPatches, size: int) -> None:
+        k = len(coupled.models)
+        self._shadow, self._row, self._normals = shadow, Row(coupled, shadow.dt), np.zeros((k, 3))
+        self._touching, self._levers = [False] * k, np.ones(3 * k)
+        self._levers[2::3] = [math.sqrt((model.patch.positions**2).sum(axis=1).mean()) for model in coupled.models]
+        self._rows, self._moved = np.zeros((3 * k, size)), np.zeros((size, 3 * k))
+        """Jacobian of the twists `[3k, nv]`; velocities that wrenches cause without contact `[nv, 3k]`."""
+
+    def step(
+        self,
+        applied: np.ndarray,
+        bristles: np.ndarray,
+        wrench: np.ndarray,
+        force: np.ndarray,
+        owed: np.ndarray,
+        answers: np.ndarray,
+    ) -> Asked:
+        """The step from where the shadow stands, under generalized forces `applied` and friction.
+
+        From `bristles`, the `wrench` of each patch in the last step, the generalized `force` that these were, the
+        twists that bristles are `owed` (those that they saw in the last step were off by them), and its `answers`.
+        """
+        row, passes, iterations, solved, misfit = self._row, 0, 0, False, np.inf
+        self._forget()
+        while True:
+            velocity = self._shadow.step(applied + force)
+            pushes = self._shadow.pushes(first=passes == 0)
+            passes += 1
+            if self._touch(pushes):
+                if passes == 1:
+                    self._answer_as_before(answers)
+                wrench, owed, solved, misfit = self._pressed(wrench), self._pressed(owed), False, np.inf
+            twist, load = self._rows @ velocity + owed, np.maximum((self._normals * pushes).sum(axis=1), 0.0)
+            if solved:
+                off = twist - row.twist
+                last, misfit = misfit, self._speed(off, load - row.load)
+                if misfit <= MISFIT or passes >= PASSES or 0.5 * last < misfit <= NOTICED:
+                    break
+                if misfit > last:  # learnt where contacts came or went
+                    self._answer_freely()
+                elif misfit > NOTICED:
+                    self._learn(wrench - row.guess, twist - row.free_twist, load - row.free_load)
+            turned = self._moved.T @ (wrench @ self._rows - force)  # the axes have, since the last step
+            row.free_twist[:], row.free_load[:], row.guess[:], row.state[:] = twist + turned, load, wrench, bristles
+            iterations += row.solve()
+            change, wrench, solved = row.wrench - wrench, row.wrench.copy(), True
+            force = wrench @ self._rows
+            moved = float(abs((abs(turned) + abs(row.response @ change)) * self._levers).max())
+            if moved <= QUIET:
+                misfit, off, twist = moved, 0.0 * owed, row.twist
+                break
+        report = passes, iterations, row.residual[0], misfit, row.converged[0]
+        kept = np.concatenate([self._touching, row.response.ravel(), row.load_response.ravel()])
+        return Asked(row.new, wrench, force, off, twist - owed, load, kept, report)
+
+    def _forget(self) -> None:
+        self._touching = [False] * len(self._touching)
+        for each in (self._rows, self._moved, self._row.response):
+            each.fill(0.0)
+
+    def _touch(self, pushes: np.ndarray) -> bool:
+        """Place patches that touch for the first time in this step; whether there are any."""
+        new = [p for p, touching in enumerate(self._touching) if not touching and pushes[p].any()]
+        for p in new:
+            self._rows[3 * p : 3 * p + 3], self._normals[p] = self._shadow.rows(p, pushes[p])
+            self._touching[p] = True
+        if new:
+            self._moved = self._shadow.moved(self._rows)
+            self._answer_freely()
+        return bool(new)
+
+    def _answer_freely(self) -> None:
+        """As the bodies do without contact: no answer is larger, so that with this one each pass gets closer."""
+        np.matmul(self._rows, self._moved, out=self._row.response)
+        self._row.load_response.fill(0.0)
+
+    def _answer_as_before(self, answers: np.ndarray) -> None:
+        """As in the last step, where the same patches touched in it."""
+        k = len(self._touching)
+        if answers[:k].tolist() == self._touching:
+            twists, loads = np.split(answers[k:], [9 * k * k])
+            self._row.response[:], self._row.load_response[:] = twists.reshape(3 * k, -1), loads.reshape(k, -1)
+
+    def _pressed(self, wrench: np.ndarray) -> np.ndarray:
+        """Of the patches that touch; zeros of the others."""
+        return wrench if all(self._touching) else np.where(np.repeat(self._touching, 3), wrench, 0.0)
+
+    def _speed(self, twist: np.ndarray, load: np.ndarray) -> float:
+        """Largest of changes of twists, and of loads in the speed that they could cause [m/s]."""
+        caused = np.diagonal(self._row.response)[::3] * load
+        return float(max(abs(twist * self._levers).max(), abs(caused).max()))
+
+    def _learn(self, wrench: np.ndarray, twist: np.ndarray, load: np.ndarray) -> None:
+        """Correct the answers by changes that came out: of twists symmetrically, of rank one.
+
+        Contacts only stiffen: `A - A_true >= 0`. Where a correction takes more than A has, contacts came or went.
+        """
+        response, load_response = self._row.response, self._row.load_response
+        expected = response @ wrench
+        off, along = expected - twist, expected @ wrench
+        load_response += np.outer(load - load_response @ wrench, expected / along)
+        gap = off @ wrench
+        if gap > 1e-9 * along:
+            corrected = response - np.outer(off, off) / gap
+            scale = 1.0 / np.sqrt(np.maximum(np.diagonal(response), 1e-300))
+            if np.linalg.eigvalsh(scale[:, None] * corrected * scale)[0] > -1e-9:
+                response[:] = corrected

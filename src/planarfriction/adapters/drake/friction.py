@@ -1,0 +1,231 @@
+"""A system that gives a discrete plant patch friction, implicit in contact space."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+from pydrake.common.value import AbstractValue
+from pydrake.geometry import SceneGraph
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.systems.framework import (
+    DiagramBuilder,
+    LeafSystem,
+    PortDataType,
+    ValueProducer,
+)
+from pydrake.systems.primitives import ConstantValueSource, ConstantVectorSource
+
+from planarfriction import validation
+from planarfriction.adapters.drake.asking import Asking
+from planarfriction.adapters.drake.patches import Patch, found
+from planarfriction.adapters.drake.shadow import Shadow
+from planarfriction.coupling import CoupledPatches
+from planarfriction.errors import InvalidValueError
+
+_GEOMETRY, _FORCE = "geometry_query", "applied_generalized_force"
+
+
+class Report(NamedTuple):
+    """What a step took."""
+
+    passes: int
+    """How often the plant's step was asked for."""
+    iterations: int
+    """Newton iterations of all passes."""
+    residual: float
+    """Of the step in contact space [m/s]."""
+    misfit: float
+    """Between the twists that were solved for and those that came out [m/s], spins times the size of the patch; loads
+    count as the speed that they could cause."""
+    converged: bool
+
+
+class PatchFriction(LeafSystem):
+    """Patch friction of a discrete plant: what `AddToBuilder` adds to a diagram beside it.
+
+    States of bristles, wrenches, twists and loads live in the context; the output ports show those of the last step.
+    The plant's parameters and shapes are those it had when this was made, whatever a context says later.
+
+    Raises `InvalidValueError` for plants that are continuous or not finalized, names that are not in the plant, pairs
+    with friction of their own.
+    """
+
+    def __init__(self, plant: MultibodyPlant, scene_graph: SceneGraph, patches: Iterable[Patch]) -> None:
+        super().__init__()
+        self.set_name("patch_friction")
+        _check(plant, scene_graph)
+        self._placed = found(plant, scene_graph, patches)
+        self.patches = tuple(each.patch for each in self._placed)
+        self.coupled = CoupledPatches([patch.model for patch in self.patches])
+        self._shadow = Shadow(plant, scene_graph, self._placed)
+        self._asking = Asking(self._shadow, self.coupled, plant.num_velocities())
+        self._size = plant.num_velocities()
+        self._declare_inputs(plant)
+        k, states = len(self.patches), self.coupled.state_shape[0]
+        sizes = {
+            "bristles": states, "wrenches": 3 * k, "force": self._size, "owed": 3 * k, "twists": 3 * k, "loads": k,
+            "answers": k * (1 + 12 * k), "report": len(Report._fields),
+        }  # fmt: skip
+        bounds = np.cumsum([0, *sizes.values()])
+        self._parts = {name: slice(*ends) for name, ends in zip(sizes, itertools.pairwise(bounds), strict=True)}
+        self.DeclareDiscreteState(int(bounds[-1]))
+        producer = ValueProducer(lambda: AbstractValue.Make(None), self._solve)
+        tickets = {self.all_input_ports_ticket(), self.xd_ticket()}
+        self._solution: Any = self.DeclareCacheEntry("solution", producer, tickets)
+        self.DeclareVectorOutputPort("generalized_force", self._size, self._write_force, {self._solution.ticket()})
+        for name in ("wrenches", "twists", "loads", "report"):
+            self.DeclareVectorOutputPort(name, sizes[name], self._writer(name), {self.xd_ticket()})
+        # Of the same kind as that of the plant: both are then worked out from the state before either.
+        if plant.has_sampled_output_ports():
+            self.DeclarePeriodicUnrestrictedUpdateEvent(plant.time_step(), 0.0, self._update)
+        else:
+            self.DeclarePeriodicDiscreteUpdateEvent(plant.time_step(), 0.0, self._update_discrete)
+
+    @staticmethod
+    def AddToBuilder(
+        builder: DiagramBuilder, plant: MultibodyPlant, scene_graph: SceneGraph, patches: Iterable[Patch]
+    ) -> PatchFriction:
+        """Add patch friction to a builder and connect it; everything else that drives the plant is connected before.
+
+        What was connected to the plant's `applied_generalized_force` is added to the friction.
+
+        Raises `InvalidValueError` as the class does, and for inputs of the plant that are exported.
+        """
+        validation.instance("builder", builder, DiagramBuilder, "a DiagramBuilder")
+        friction = PatchFriction(plant, scene_graph, patches)
+        sources = _sources(builder, plant)
+        builder.AddSystem(friction)
+        builder.Connect(plant.get_state_output_port(), friction.GetInputPort("state"))
+        for name in friction._inputs:
+            port, own = plant.GetInputPort(name), friction.GetInputPort(name)
+            if name in sources:
+                builder.Connect(sources[name], own)
+                if name == _FORCE:
+                    builder.Disconnect(sources[name], port)
+        builder.Connect(friction.GetOutputPort("generalized_force"), plant.GetInputPort(_FORCE))
+        _reserve(builder, plant, sources)
+        return friction
+
+    # ------------------------------------------------------------------ what a context holds
+
+    def GetBristles(self, context: Any) -> list[np.ndarray]:
+        """Copies of the states of all patches in this system's context, in the shape that their models give them."""
+        return self.coupled.states(self._read(context, "bristles").copy())
+
+    def GetReport(self, context: Any) -> Report:
+        """What the last step took, from this system's context."""
+        passes, iterations, residual, misfit, converged = self._read(context, "report").tolist()
+        return Report(int(passes), int(iterations), residual, misfit, converged > 0.0)
+
+    def get_generalized_force_output_port(self) -> Any:
+        """Goes to the plant: friction, and the generalized forces that others apply `[nv]`."""
+        return self.GetOutputPort("generalized_force")
+
+    def get_wrenches_output_port(self) -> Any:
+        """Wrenches of the last step, patch by patch `[3k]` [N, N, N m]."""
+        return self.GetOutputPort("wrenches")
+
+    def get_twists_output_port(self) -> Any:
+        """Twists at the end of the last step `[3k]` [m/s, m/s, rad/s]."""
+        return self.GetOutputPort("twists")
+
+    def get_loads_output_port(self) -> Any:
+        """Normal forces of the last step `[k]` [N]."""
+        return self.GetOutputPort("loads")
+
+    def get_report_output_port(self) -> Any:
+        """The numbers of `Report` `[5]`."""
+        return self.GetOutputPort("report")
+
+    # ------------------------------------------------------------------ a step
+
+    def _declare_inputs(self, plant: Any) -> None:
+        """The state of the plant, and all that drives the plant."""
+        self._state: Any = self.DeclareVectorInputPort("state", plant.num_multibody_states())
+        self._inputs: dict[str, Any] = {}
+        for i in range(plant.num_input_ports()):
+            port = plant.get_input_port(i)
+            if port.get_name() == _GEOMETRY:
+                continue
+            name = port.get_name()
+            if port.get_data_type() == PortDataType.kAbstractValued:
+                self._inputs[name] = self.DeclareAbstractInputPort(name, plant.AllocateInputAbstract(port))
+            elif port.size():
+                self._inputs[name] = self.DeclareVectorInputPort(name, port.size())
+
+    def _driven(self, context: Any) -> dict[str, AbstractValue]:
+        """What drives the plant besides generalized forces."""
+        return {
+            name: self.EvalAbstractInput(context, port.get_index())
+            for name, port in self._inputs.items()
+            if name != _FORCE and port.HasValue(context)
+        }
+
+    def _read(self, context: Any, name: str) -> np.ndarray:
+        return context.get_discrete_state_vector().value()[self._parts[name]]
+
+    def _solve(self, context: Any, solution: Any) -> None:
+        state, parts = self._state.Eval(context), self._parts
+        if not math.isfinite(state.sum()):
+            raise InvalidValueError("state", "be finite", f"{state[~np.isfinite(state)][0]} in that of the plant")
+        port = self._inputs[_FORCE]
+        applied = port.Eval(context) if port.HasValue(context) else np.zeros(self._size)
+        self._shadow.begin(state, self._driven(context))
+        own = context.get_discrete_state_vector().value()
+        before = (own[parts[name]] for name in ("bristles", "wrenches", "force", "owed", "answers"))
+        asked = self._asking.step(applied, *before)
+        solution.set_value((applied + asked.force, np.concatenate(asked)))
+
+    def _write_force(self, context: Any, output: Any) -> None:
+        output.SetFromVector(self._solution.Eval(context)[0])
+
+    def _writer(self, name: str) -> Any:
+        return lambda context, output: output.SetFromVector(self._read(context, name))
+
+    def _update(self, context: Any, state: Any) -> None:
+        self._update_discrete(context, state.get_mutable_discrete_state())
+
+    def _update_discrete(self, context: Any, state: Any) -> None:
+        state.get_mutable_vector(0).SetFromVector(self._solution.Eval(context)[1])
+
+
+def _check(plant: Any, scene_graph: Any) -> None:
+    validation.instance("plant", plant, MultibodyPlant, "a MultibodyPlant")
+    validation.instance("scene_graph", scene_graph, SceneGraph, "a SceneGraph")
+    if not plant.is_finalized():
+        raise InvalidValueError("plant", "be finalized", "one that is not")
+    if plant.time_step() == 0.0:
+        raise InvalidValueError("time_step", "be > 0: friction is for discrete plants", plant.time_step())
+    if not plant.geometry_source_is_registered():
+        raise InvalidValueError("plant", "be registered with the scene graph", "one that is not")
+
+
+def _sources(builder: Any, plant: Any) -> dict[str, Any]:
+    """Output ports that drive the plant, by the names of its inputs."""
+    sources = {}
+    for (system, index), (source, output) in builder.connection_map().items():
+        if system is plant:
+            sources[plant.get_input_port(index).get_name()] = source.get_output_port(output)
+    for i in range(plant.num_input_ports()):
+        port = plant.get_input_port(i)
+        if builder.IsConnectedOrExported(port) and port.get_name() not in sources:
+            raise InvalidValueError("plant", "have no exported input (export that of a PassThrough)", port.get_name())
+    return sources
+
+
+def _reserve(builder: Any, plant: Any, sources: dict[str, Any]) -> None:
+    """Connect what drives nothing yet to nothing: what came later would not be seen here, so that Drake refuses it."""
+    for i in range(plant.num_input_ports()):
+        port = plant.get_input_port(i)
+        name, nothing = port.get_name(), None
+        if name == "applied_spatial_force":
+            nothing = ConstantValueSource(plant.AllocateInputAbstract(port))
+        elif name.endswith("actuation") and port.size():
+            zeros: Any = np.zeros(port.size())
+            nothing = ConstantVectorSource(zeros)
+        if nothing is not None and name not in sources:
+            builder.Connect(builder.AddSystem(nothing).get_output_port(), port)

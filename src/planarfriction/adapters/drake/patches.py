@@ -1,0 +1,161 @@
+"""Which contacts get patch friction, and what a plant needs for it."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from pydrake.geometry import GeometryId, ProximityProperties, Role, RoleAssign
+from pydrake.multibody.plant import CoulombFriction
+from pydrake.multibody.tree import BodyIndex, FrameIndex
+
+from planarfriction import validation
+from planarfriction.errors import InvalidValueError
+from planarfriction.models import FrictionModel
+
+CENTRES = ("frame", "contact")
+
+_MATERIAL = ("material", "coulomb_friction")
+
+
+@dataclass(frozen=True)
+class Patch:
+    """A patch between two geometries, fixed in the body of a frame.
+
+    The frame of the patch has its x axis along that of the frame, projected on the contact plane, and its normal into
+    the frame's body; its twist is that of this body relative to the other, its wrench acts on this body.
+    """
+
+    model: FrictionModel
+    frame: str
+    """Name of a frame on the body that owns the patch."""
+    geometries: tuple[str, str]
+    """Names of the two collision geometries in contact, or of bodies, all whose geometries are meant."""
+    centre: str = "frame"
+    """Where the origin is: at that of the "frame", or in the middle of Drake's points of "contact"."""
+
+    def __post_init__(self) -> None:
+        validation.instance("model", self.model, FrictionModel, "a friction model")
+        validation.text("frame", self.frame)
+        if isinstance(self.geometries, str) or not (
+            isinstance(self.geometries, Sequence) and len(self.geometries) == 2
+        ):
+            raise InvalidValueError("geometries", "be the names of two geometries or bodies", self.geometries)
+        names = tuple(validation.text("geometries", name) for name in self.geometries)
+        object.__setattr__(self, "geometries", names)
+        validation.choice("centre", self.centre, CENTRES)
+
+
+class Placed:
+    """A patch found in a plant."""
+
+    def __init__(self, plant: Any, scene_graph: Any, patch: Patch) -> None:
+        self.patch, self.frame = patch, _frame(plant, patch.frame)
+        sides = [_geometries(plant, scene_graph, name) for name in patch.geometries]
+        bodies = [_body_of(plant, scene_graph, side[0]) for side in sides]
+        owner = self.frame.body()
+        if owner.index() not in [body.index() for body in bodies]:
+            raise InvalidValueError("frame", f"be on the body of one of the geometries {patch.geometries}", patch.frame)
+        if bodies[0].index() == bodies[1].index():
+            raise InvalidValueError("geometries", "be on two bodies", patch.geometries)
+        own = int(bodies[1].index() == owner.index())
+        self.other = bodies[1 - own].body_frame()
+        self.pairs = {(a.get_value(), b.get_value()) for a, b in itertools.product(sides[own], sides[1 - own])}
+        """Of ids, the owner's first."""
+        self._check_friction(scene_graph.model_inspector(), sides)
+
+    def _check_friction(self, inspector: Any, sides: list[list[GeometryId]]) -> None:
+        """Refuse pairs with friction of their own, and those that never touch."""
+        pairs, between = list(itertools.product(*sides)), " and ".join(self.patch.geometries)
+        if all(inspector.CollisionFiltered(*pair) for pair in pairs):
+            raise InvalidValueError("geometries", "be able to collide (a collision filter keeps them apart)", between)
+        least = max(min(_friction(inspector, one) for one in pair) for pair in pairs)
+        if least > 0.0:
+            raise InvalidValueError("friction", f"be 0 on {between}, on one of the two (prepare does that)", least)
+
+
+def prepare(plant: Any, scene_graph: Any, patches: Iterable[Patch]) -> None:
+    """Take Drake's friction off the first of the two `geometries` of each patch.
+
+    Drake has friction for geometries, not for pairs of them: the first slides on everything but its patch.
+
+    Raises `InvalidValueError` for geometries that are not there.
+    """
+    inspector = scene_graph.model_inspector()
+    for patch in checked(patches):
+        for geometry in _geometries(plant, scene_graph, patch.geometries[0]):
+            properties = ProximityProperties(inspector.GetProximityProperties(geometry))
+            properties.UpdateProperty(*_MATERIAL, CoulombFriction(0.0, 0.0))
+            scene_graph.AssignRole(plant.get_source_id(), geometry, properties, RoleAssign.kReplace)
+
+
+def checked(patches: Iterable[Patch]) -> list[Patch]:
+    """Raise for what is no patch."""
+    if isinstance(patches, Patch) or not isinstance(patches, Iterable):
+        raise InvalidValueError("patches", "be a list of patches", patches)
+    return [validation.instance("patches", patch, Patch, "patches") for patch in patches]
+
+
+def found(plant: Any, scene_graph: Any, patches: Iterable[Patch]) -> list[Placed]:
+    """The patches in a plant; raises for the same pair of geometries twice."""
+    placed = [Placed(plant, scene_graph, patch) for patch in checked(patches)]
+    if not placed:
+        raise InvalidValueError("patches", "hold at least one", "none")
+    for one, other in itertools.combinations(placed, 2):
+        if one.pairs & ({*other.pairs} | {(b, a) for a, b in other.pairs}):
+            raise InvalidValueError("patches", "have each pair of geometries once", " and ".join(one.patch.geometries))
+    return placed
+
+
+# ---------------------------------------------------------------------- names
+
+
+def _frame(plant: Any, name: str) -> Any:
+    frames = [plant.get_frame(FrameIndex(i)) for i in range(plant.num_frames())]
+    return _one("frame", "frame", {frame.scoped_name().get_full(): frame for frame in frames}, name)
+
+
+def _geometries(plant: Any, scene_graph: Any, name: str) -> list[GeometryId]:
+    """Collision geometries that a name stands for: one, or all of a body."""
+    inspector = scene_graph.model_inspector()
+    named = {
+        f"{_body_of(plant, scene_graph, each).scoped_name().get_full()}::{inspector.GetName(each)}": each
+        for each in inspector.GetAllGeometryIds(Role.kProximity)
+    }
+    own = _ending(named, name)
+    if own:
+        return [_one("geometries", "geometry", named, name)]
+    bodies = [plant.get_body(BodyIndex(i)) for i in range(plant.num_bodies())]
+    body = _one("geometries", "collision geometry or body", {b.scoped_name().get_full(): b for b in bodies}, name)
+    geometries = plant.GetCollisionGeometriesForBody(body)
+    if not geometries:
+        raise InvalidValueError("geometries", "be a body with collision geometries", name)
+    return geometries
+
+
+def _one(what: str, kind: str, named: dict[str, Any], name: str) -> Any:
+    keys = _ending(named, name)
+    if not keys:
+        raise InvalidValueError(what, f"be a {kind} of the plant", name)
+    if len(keys) > 1:
+        raise InvalidValueError(what, f"be one {kind} ({' or '.join(keys)})", name)
+    return named[keys[0]]
+
+
+def _ending(named: dict[str, Any], name: str) -> list[str]:
+    """Full names, with that of the model before, that a name may mean."""
+    return [full for full in named if full == name or full.endswith(f"::{name}")]
+
+
+def _body_of(plant: Any, scene_graph: Any, geometry: GeometryId) -> Any:
+    return plant.GetBodyFromFrameId(scene_graph.model_inspector().GetFrameId(geometry))
+
+
+def _friction(inspector: Any, geometry: GeometryId) -> float:
+    properties = inspector.GetProximityProperties(geometry)
+    if not properties.HasProperty(*_MATERIAL):
+        return np.inf  # the scene graph's own default, which is above zero
+    return properties.GetProperty(*_MATERIAL).dynamic_friction()

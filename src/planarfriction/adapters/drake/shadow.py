@@ -1,0 +1,160 @@
+"""A copy of a plant that is asked what its next step would come to, with other forces.
+
+Discrete plants sample their forces before a step and their contacts at its end: what depends on both has to be known
+before the plant itself steps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from pydrake.multibody.tree import JacobianWrtVariable
+from pydrake.systems.framework import DiagramBuilder
+
+from planarfriction.adapters.drake.patches import Placed
+from planarfriction.errors import InvalidValueError
+
+
+class Shadow:
+    """The copy, with two contexts: where a step begins, and what it comes to."""
+
+    def __init__(self, plant: Any, scene_graph: Any, placed: Sequence[Placed]) -> None:
+        from scipy.linalg.lapack import dposv  # pyright: ignore[reportAttributeAccessIssue]
+
+        self.plant, geometry = _copy("plant", plant), _copy("scene_graph", scene_graph)
+        builder = DiagramBuilder()
+        builder.AddSystem(self.plant)
+        builder.AddSystem(geometry)
+        builder.Connect(geometry.get_query_output_port(), self.plant.get_geometry_query_input_port())
+        poses = geometry.get_source_pose_port(plant.get_source_id())
+        builder.Connect(self.plant.get_geometry_pose_output_port(), poses)
+        self._diagram = builder.Build()
+        self._roots = self._diagram.CreateDefaultContext(), self._diagram.CreateDefaultContext()
+        self._begin, self._end = (self.plant.GetMyMutableContextFromRoot(root) for root in self._roots)
+        self._sampled, self.dt = plant.has_sampled_output_ports(), plant.time_step()
+        self._results = self.plant.get_contact_results_output_port()
+        force = self.plant.get_applied_generalized_force_input_port()
+        self._force = force.FixValue(self._begin, np.zeros(plant.num_velocities()))
+        self._driven: dict[str, Any] = {}
+        self._damping = self.dt * _damping(self.plant)
+        self._frames = [self.plant.get_frame(each.frame.index()) for each in placed]
+        self._others = [self.plant.get_frame(each.other.index()) for each in placed]
+        self._centres = [each.patch.centre for each in placed]
+        self._pairs = {}
+        for p, each in enumerate(placed):
+            for own, other in each.pairs:
+                self._pairs[other, own], self._pairs[own, other] = (p, 1.0), (p, -1.0)
+        self._solve = dposv  # the one of NumPy takes as long as a contact
+        self._points: list[tuple[int, int, float]] = []
+        self._surfaces: list[tuple[int, int, float]] = []
+
+    def begin(self, state: np.ndarray, driven: dict[str, Any]) -> None:
+        """Go where a step begins, with what drives the plant besides generalized forces."""
+        self.plant.SetPositionsAndVelocities(self._begin, state)
+        for name, value in driven.items():
+            if name in self._driven:
+                self._driven[name].GetMutableData().SetFrom(value)
+            else:
+                self._driven[name] = self.plant.GetInputPort(name).FixValue(self._begin, value)
+
+    def step(self, force: np.ndarray) -> np.ndarray:
+        """Velocities at the end of a step with generalized forces `[nv]`."""
+        self._force.GetMutableData().get_mutable_value().SetFromVector(force)
+        if self._sampled:
+            self.plant.CalcForcedUnrestrictedUpdate(self._begin, self._end.get_mutable_state())
+        else:
+            self.plant.CalcForcedDiscreteVariableUpdate(self._begin, self._end.get_mutable_discrete_state())
+        return self.plant.GetVelocities(self._end)
+
+    def pushes(self, *, first: bool) -> np.ndarray:
+        """Normal forces in the step taken last on the bodies that own the patches, in the world `[k, 3]`.
+
+        Which contacts are the patches' depends on where the step begins alone: found in its `first`.
+        """
+        results = self._contacts()
+        if first:
+            self._find(results)
+        forces = np.zeros((len(self._frames), 3))
+        for i, p, sign in self._points:
+            forces[p] += sign * results.point_pair_contact_info(i).contact_force()
+        for i, p, sign in self._surfaces:
+            forces[p] -= sign * results.hydroelastic_contact_info(i).F_Ac_W().translational()
+        return forces
+
+    def rows(self, p: int, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Jacobian of the twist of a patch `[3, nv]`, in the axes of its frame, and the normal."""
+        normal = force / np.sqrt(force @ force)
+        frame, world, origin = self._frames[p], self.plant.world_frame(), np.zeros(3)
+        pose = frame.CalcPoseInWorld(self._begin)
+        x = pose.rotation().matrix()[:, 0]
+        x = x - normal * (x @ normal)
+        x /= np.sqrt(x @ x)
+        if self._centres[p] == "contact":
+            origin = pose.inverse().multiply(self._centre(p))
+        spatial = self.plant.CalcJacobianSpatialVelocity(
+            self._begin, JacobianWrtVariable.kV, frame, origin, self._others[p], world
+        )
+        a, b, c, d, e, f = *normal.tolist(), *x.tolist()
+        y = np.array([b * f - c * e, c * d - a * f, a * e - b * d])
+        return np.array([x @ spatial[3:], y @ spatial[3:], normal @ spatial[:3]]), normal
+
+    def moved(self, jacobian: np.ndarray) -> np.ndarray:
+        """Velocities that wrenches cause in a step without contact `[nv, 3k]`: `dt (M + dt D)^-1 J'`."""
+        metric = self.plant.CalcMassMatrix(self._begin)
+        metric.flat[:: len(metric) + 1] += self._damping
+        _, found, _ = self._solve(metric, jacobian.T)
+        return self.dt * found
+
+    # ------------------------------------------------------------------ contacts
+
+    def _contacts(self) -> Any:
+        return self._results.Eval(self._end if self._sampled else self._begin)
+
+    def _find(self, results: Any) -> None:
+        """Contacts of the patches, and their signs: 1 where the owner is Drake's second body."""
+        self._points, self._surfaces = [], []
+        for i in range(results.num_point_pair_contacts()):
+            pair = results.point_pair_contact_info(i).point_pair()
+            key = self._pairs.get((pair.id_A.get_value(), pair.id_B.get_value()))
+            if key is not None:
+                self._points.append((i, *key))
+        for i in range(results.num_hydroelastic_contacts()):
+            surface = results.hydroelastic_contact_info(i).contact_surface()
+            key = self._pairs.get((surface.id_M().get_value(), surface.id_N().get_value()))
+            if key is not None:
+                self._surfaces.append((i, *key))
+
+    def _centre(self, p: int) -> np.ndarray:
+        """Of the contacts of a patch, by their forces."""
+        results, places, weights = self._contacts(), [], []
+        for i, owner, _ in self._points:
+            if owner == p:
+                info = results.point_pair_contact_info(i)
+                places.append(info.contact_point())
+                weights.append(np.linalg.norm(info.contact_force()))
+        for i, owner, _ in self._surfaces:
+            if owner == p:
+                info = results.hydroelastic_contact_info(i)
+                places.append(info.contact_surface().centroid())
+                weights.append(np.linalg.norm(info.F_Ac_W().translational()))
+        return np.average(places, axis=0, weights=weights)
+
+
+def _damping(plant: Any) -> np.ndarray:
+    """Of the joints, which a discrete plant takes implicitly `[nv]`."""
+    damping = np.zeros(plant.num_velocities())
+    for index in plant.GetJointIndices():
+        joint = plant.get_joint(index)
+        if joint.num_velocities():
+            first = joint.velocity_start()
+            damping[first : first + joint.num_velocities()] = joint.default_damping_vector()
+    return damping
+
+
+def _copy(name: str, system: Any) -> Any:
+    try:
+        return system.Clone()
+    except RuntimeError as error:
+        raise InvalidValueError(name, "be one that Drake can clone", str(error).splitlines()[0]) from None
