@@ -26,6 +26,7 @@ HEAVY = (
     "mujoco",
     "numba",
     "pandas",
+    "pydrake",
     "rich",
     "scipy",
     "shapely",
@@ -42,6 +43,7 @@ HOMES = {
     "click": "cli",
     "torch": "torch",
     "mujoco": "adapters",
+    "pydrake": "adapters",
     "jax": "jax",
 }
 """Package -> the floor whose modules may import it when they load; no floor may load the rest of HEAVY that way."""
