@@ -204,9 +204,9 @@ def _compiled_loop(model: ReducedModel | ReducedModelPublished, twists: np.ndarr
     from planarfriction.autodiff.inputs import checked
 
     inputs = checked(model, None, twists, 1.0, 1e-4, None)
-    lanes, family = inputs.lanes(), inputs.parts[0].family
+    compiled, family = inputs.compiled(), inputs.parts[0].family
     wrench, states = np.empty((1, *twists.shape)), np.empty((len(inputs.parts), 1, 0, 3))
-    return _median(lambda: family.rollout(lanes, (0, 1), inputs.state.copy(), wrench, states), 9)
+    return _median(lambda: family.rollout(compiled, (0, 1), inputs.state.copy(), wrench, states), 9)
 
 
 def _published_loop(twists: np.ndarray) -> float:

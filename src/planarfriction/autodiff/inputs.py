@@ -12,12 +12,16 @@ from planarfriction import validation
 from planarfriction.autodiff.parameters import Packed, pack
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels import threads
-from planarfriction.kernels.lanes import Lanes
-from planarfriction.kernels.pointers import place_of
+from planarfriction.kernels.law import LAW
 from planarfriction.kernels.rollouts import Inputs
+from planarfriction.models.shapes_by_load import ShapesByLoad, places_of
 
 _WORTH_A_THREAD = 20_000
 """Steps [-] below which starting a thread costs more than it saves."""
+
+
+LIGHTEST = 1e-9
+"""Load [N] whose shape stands for that of a load that fades in, of which the slope at no load is."""
 
 
 class RolloutInputs(NamedTuple):
@@ -45,18 +49,36 @@ class RolloutInputs(NamedTuple):
         """Values of each contact `[B, ...]` as `[*batch, ...]`."""
         return values.reshape(*self.batch, *values.shape[1:])
 
-    def lanes(self) -> Lanes:
-        """All parts at once; compiled loops reach the numbers of all from those that lie first in memory."""
-        first = min((part.data for part in self.parts), key=place_of)
-        surface = np.array([part.surface for part in self.parts])
-        surface[:, 0] += [(place_of(part.data) - place_of(first)) // first.itemsize for part in self.parts]
-        shares = np.array([part.share for part in self.parts])
-        return Lanes(np.array(self.rows), shares, surface, first, self.twist, self.normal_force, self.dt)
+    def compiled(self, slopes: bool = False) -> Inputs:
+        """All parts at once, as compiled loops take them; with the `slopes` of their shapes by the load."""
+        rows, at_loads = np.array(self.rows), self.parts[0].at_loads
+        if at_loads is None:
+            which, shapes = np.zeros((1, len(self.dt)), dtype=int), _fixed(self.parts)
+        else:
+            loads, which = np.unique(self.normal_force, return_inverse=True)
+            if loads[:1] == 0.0:  # any shape does for a step without load, but for its slope
+                loads[0] = loads[1] if len(loads) > 1 and not slopes else LIGHTEST
+            shapes = at_loads(loads if len(loads) else np.array([LIGHTEST]), slopes)
+        return Inputs(
+            rows, shapes.data, self.twist, self.normal_force, self.dt, which.reshape(-1, len(self.dt)),
+            shapes.shares, shapes.surface, shapes.shapes, shapes.by_load,
+        )  # fmt: skip
 
     @property
     def inner(self) -> tuple[int, ...]:
         """Shape of the state of one contact."""
         return inner_of(self.parts)
+
+
+def _fixed(parts: tuple[Packed, ...]) -> ShapesByLoad:
+    """Parts of a fixed shape: their rows hold its numbers."""
+    data = [part.data for part in parts]
+    begin, first = (np.zeros(1, dtype=int), data[0]) if len(data) == 1 else places_of(data)
+    surface = np.array([part.surface for part in parts])[:, None]
+    surface[:, 0, 0] += begin
+    count, numbers = len(parts), parts[0].rows.shape[-1] - LAW
+    shares = np.array([[part.share] for part in parts])
+    return ShapesByLoad(shares, surface, np.zeros((count, 1, numbers)), np.zeros((count, 1, numbers + 1)), first)
 
 
 def sequences(twist: Any, normal_force: Any, dt: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -139,21 +161,6 @@ def sum_to(shape: tuple[int, ...], gradient: np.ndarray) -> np.ndarray:
     return gradient.sum(axis=kept, keepdims=True) if kept else gradient
 
 
-def share(inputs: Inputs | Lanes, count: int, work: Callable[[int, int], None]) -> None:
+def share(inputs: Inputs, count: int, work: Callable[[int, int], None]) -> None:
     """Run `work(first, last)` over all contacts, on several threads where that pays."""
     threads.share(count, count * len(inputs.dt) // _WORTH_A_THREAD, work)
-
-
-def summed(inputs: RolloutInputs, shapes: Sequence[tuple[int, ...]], run: Callable[..., None]) -> list[np.ndarray]:
-    """Sums over the parts, which know nothing of each other, of what `run` writes into zeros of `shapes` `[B, ...]`.
-
-    It is given the number of the part, the part, the `Inputs` of its compiled loops, and the arrays.
-    """
-    total = [np.zeros(shape) for shape in shapes]
-    for k, (part, rows) in enumerate(zip(inputs.parts, inputs.rows, strict=True)):
-        own = [np.zeros(shape) for shape in shapes] if k > 0 else total
-        run(k, part, Inputs(rows, part.surface, part.data, inputs.twist, inputs.normal_force, inputs.dt), *own)
-        if k > 0:
-            for sums, values in zip(total, own, strict=True):
-                sums += values
-    return [inputs.of_all(values) for values in total]

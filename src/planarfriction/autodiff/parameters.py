@@ -11,11 +11,12 @@ from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.geometry import transformed
-from planarfriction.kernels import published_rollout, published_step, reduced_rollout, reduced_step
+from planarfriction.kernels import published_rollout, published_step, reduced_loads, reduced_rollout, reduced_step
 from planarfriction.models import ReducedModel, ReducedModelPublished
 from planarfriction.models.reduced_arrays import MapSizes, starts_of
 from planarfriction.models.reduced_map import ReducedShape
 from planarfriction.models.reduced_published import PublishedShape, axes_of
+from planarfriction.models.shapes_by_load import ShapesByLoad
 
 PARAMETERS = (
     "sigma_0",
@@ -51,16 +52,21 @@ class Family(NamedTuple):
     """Compiled loops (see `kernels.rollouts`)."""
 
 
-def _family_of(kernels: Any, names: tuple[str, ...], many: Any) -> Family:
-    columns = np.array([kernels.NAMES.index(name) for name in names])
-    return Family(names, columns, many.rollout, many.gradient, kernels.sensitivities, kernels.tangent)
+def _family_of(names: tuple[str, ...], numbers: tuple[str, ...], many: Any, one: Any) -> Family:
+    columns = np.array([numbers.index(name) for name in names])
+    return Family(names, columns, many.rollout, many.gradient, one.sensitivities, one.tangent)
 
 
-PUBLISHED = _family_of(published_step, PARAMETERS, published_rollout)
+PUBLISHED = _family_of(PARAMETERS, published_step.NAMES, published_rollout, published_step)
 """`ReducedModelPublished`."""
 
-REDUCED = _family_of(reduced_step, tuple(name for name in PARAMETERS[:8] if name != "gamma"), reduced_rollout)
+_OF_LAW = tuple(name for name in PARAMETERS[:8] if name != "gamma")
+
+REDUCED = _family_of(_OF_LAW, reduced_step.NAMES, reduced_rollout, reduced_loads)
 """`ReducedModel`; gamma and the shape are built into its stored map."""
+
+REDUCED_BY_LOAD = _family_of(_OF_LAW, reduced_step.NAMES, reduced_loads, reduced_loads)
+"""The same where the shape follows the load."""
 
 
 class Packed(NamedTuple):
@@ -77,6 +83,8 @@ class Packed(NamedTuple):
     """Of the load."""
     axes: np.ndarray | None = None
     """Symmetric `[3, 3]`, or None: twists go in through it, wrenches come out."""
+    at_loads: Callable[[np.ndarray, bool], ShapesByLoad] | None = None
+    """Of a model whose shape follows the load: all parts at given loads (see `ThreeStateModel._at_loads`)."""
 
     def turned(self, vectors: np.ndarray) -> np.ndarray:
         """Twists into the axes of the compiled loops or wrenches out of them, `[..., 3]`."""
@@ -127,24 +135,37 @@ def _family(model: Any) -> Family:
     raise InvalidValueError("model", "be a ReducedModel or a ReducedModelPublished", type(model).__name__)
 
 
-def has_one_shape(model: Any) -> bool:
-    """Whether a model is a reduced one that compiled roll-outs know: with one shape for all loads."""
-    if not isinstance(model, ReducedModel | ReducedModelPublished):
-        return False
-    return not model.patch.depends_on_load or getattr(model, "on_load_change", None) == "keep"
+def is_compiled(model: Any) -> bool:
+    """Whether a model is a reduced one that compiled roll-outs know."""
+    return isinstance(model, ReducedModel | ReducedModelPublished) and not _refusal(model)
+
+
+def _refusal(model: ReducedModel | ReducedModelPublished) -> tuple[str, str, Any] | None:
+    """The rule that a model breaks that compiled roll-outs do not know, as an `InvalidValueError` takes it."""
+    if not model._follows_load:
+        return None
+    if isinstance(model, ReducedModel):
+        if model.load_error > 0.0:
+            return None
+        return "load_error", "be > 0 for derivatives by the load: maps are blended in between", model.load_error
+    return (
+        "model",
+        "have a shape that does not follow the load: a patch of fixed shape, or on_load_change='keep'",
+        f"on_load_change={model.on_load_change!r}",
+    )
 
 
 def _packed(model: Any) -> tuple[Packed, ...]:
     _family(model)
-    how = getattr(model, "on_load_change", None)
-    if model.patch.depends_on_load and how != "keep":
-        raise InvalidValueError(
-            "model",
-            "have a shape that does not follow the load: a patch of fixed shape"
-            + (", or on_load_change='keep'" if how else ""),
-            f"on_load_change={how!r}" if how else "a patch that depends on the load",
-        )
-    return tuple(pack_shape(model.law.numbers, shape)._replace(share=share) for share, shape in model.parts_at(1.0))
+    refusal = _refusal(model)
+    if refusal is not None:
+        raise InvalidValueError(*refusal)
+    law = model.law.numbers
+    if not model._follows_load:
+        return tuple(pack_shape(law, shape)._replace(share=share) for share, shape in model.parts_at(1.0))
+    row = np.array([*law, *np.zeros(len(reduced_step.NAMES) - len(law))])
+    part = Packed(row, np.zeros(3, dtype=int), np.zeros(0, dtype=np.float32), REDUCED_BY_LOAD, at_loads=model._at_loads)
+    return (part,) * model.parts
 
 
 def pack_shape(law: LawNumbers, shape: ReducedShape | PublishedShape) -> Packed:

@@ -17,13 +17,12 @@ from planarfriction.autodiff.inputs import (
     sequences,
     share,
     sum_to,
-    summed,
 )
-from planarfriction.autodiff.parameters import Packed, has_one_shape, pack
+from planarfriction.autodiff.parameters import Packed, is_compiled, pack
 from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
-from planarfriction.kernels.rollouts import Bars, Inputs
+from planarfriction.kernels.rollouts import Bars
 from planarfriction.models import FrictionModel
 
 
@@ -99,7 +98,7 @@ def rollout(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, *, p
     """
     if not isinstance(model, FrictionModel | Packed | tuple):
         raise InvalidValueError("model", f"be a friction model ({MODELS.classes()})", type(model).__name__)
-    if parameters is None and isinstance(model, FrictionModel) and not has_one_shape(model):
+    if parameters is None and isinstance(model, FrictionModel) and not is_compiled(model):
         return _stepped(model, state, twist, normal_force, dt)
     inputs = checked(model, state, twist, normal_force, dt, parameters)
     end, wrenches, _ = _roll(inputs, 0)
@@ -147,9 +146,9 @@ def rollout_gradient(
     if state_bar is not None:
         z_bar[:] = by_part(rows_of("state_bar", state_bar, inner, inputs.batch), len(inputs.parts))
     rows_bar = np.zeros((len(inputs.parts), count, inputs.rows[0].shape[-1]))
-    bars = Bars(z_bar, np.empty((count, steps, 3)), np.empty((count, steps)), rows_bar)
-    lanes, family = inputs.lanes(), inputs.parts[0].family
-    share(lanes, count, lambda *span: family.gradient(lanes, on_the_way, cotangents, span, bars))
+    bars = Bars(z_bar, np.zeros((count, steps, 3)), np.zeros((count, steps)), rows_bar)
+    compiled, family = inputs.compiled(slopes=True), inputs.parts[0].family
+    share(compiled, count, lambda *span: family.gradient(compiled, on_the_way, cotangents, span, bars))
     given = parameters if parameters is not None else inputs.parts[0].rows[..., family.columns]
     start = np.empty(inner) if state is None else state
     return RolloutGradient(
@@ -180,16 +179,12 @@ def rollout_sensitivities(
     known = family.names
     chosen = [known.index(name) for name in (known if names is None else validation.choices("names", names, known))]
     columns = family.columns[np.array(chosen, dtype=int)]
-    end, shapes = inputs.state.copy(), ((count, steps, 3), (count, steps, 3, len(columns)))
-
-    def run(k: int, part: Packed, packed: Inputs, wrenches: np.ndarray, slopes: np.ndarray) -> None:
-        share(packed, count, lambda *span: part.family.sensitivities(packed, span, end[k], columns, wrenches, slopes))
-        wrenches *= part.share
-        slopes *= part.share
-
-    turned, (wrenches, slopes) = inputs.parts[0].turned, summed(inputs, shapes, run)
-    slopes = np.swapaxes(turned(np.swapaxes(slopes, -1, -2)), -1, -2)
-    return RolloutSensitivities(inputs.shaped(end), turned(wrenches), slopes)
+    end, compiled = inputs.state.copy(), inputs.compiled()
+    wrenches, slopes = np.zeros((count, steps, 3)), np.zeros((count, steps, 3, len(columns)))
+    share(compiled, count, lambda *span: family.sensitivities(compiled, span, end, columns, wrenches, slopes))
+    turned = inputs.parts[0].turned
+    slopes = np.swapaxes(turned(np.swapaxes(inputs.of_all(slopes), -1, -2)), -1, -2)
+    return RolloutSensitivities(inputs.shaped(end), turned(inputs.of_all(wrenches)), slopes)
 
 
 def rollout_tangent(
@@ -231,15 +226,10 @@ def rollout_tangent(
     end, count = inputs.state.copy(), inputs.state.shape[1]
     moved, turned = np.zeros_like(end), parts[0].turned
     moved[:] = by_part(z, len(parts))
-    turns = turned(twists)
-
-    def run(k: int, part: Packed, packed: Inputs, wrenches: np.ndarray, slopes: np.ndarray) -> None:
-        bars = Bars(moved[k], turns, loads, rows)
-        share(packed, count, lambda *span: part.family.tangent(packed, span, end[k], bars, wrenches, slopes))
-        wrenches *= part.share
-        slopes *= part.share
-
-    wrenches, slopes = map(turned, summed(inputs, ((count, *steps, 3),) * 2, run))
+    changed, compiled = Bars(moved, turned(twists), loads, rows), inputs.compiled(slopes=bool(loads.any()))
+    both = [np.zeros((count, *steps, 3)) for _ in range(2)]
+    share(compiled, count, lambda *span: family.tangent(compiled, span, end, changed, *both))
+    wrenches, slopes = (turned(inputs.of_all(values)) for values in both)
     return RolloutTangent(inputs.shaped(end), wrenches, inputs.shaped(moved), slopes)
 
 
@@ -249,9 +239,9 @@ def _roll(inputs: RolloutInputs, kept: int) -> tuple[np.ndarray, np.ndarray, np.
     These are `[P, B, T, 3]`; `kept = 0` for none.
     """
     end, count = inputs.state.copy(), inputs.state.shape[1]
-    states, wrenches = np.empty((len(end), count, kept, 3)), np.empty((count, len(inputs.dt), 3))
-    lanes, family = inputs.lanes(), inputs.parts[0].family
-    share(lanes, count, lambda *span: family.rollout(lanes, span, end, wrenches, states))
+    states, wrenches = np.empty((len(end), count, kept, 3)), np.zeros((count, len(inputs.dt), 3))
+    compiled, family = inputs.compiled(), inputs.parts[0].family
+    share(compiled, count, lambda *span: family.rollout(compiled, span, end, wrenches, states))
     return end, inputs.of_all(inputs.parts[0].turned(wrenches)), states
 
 

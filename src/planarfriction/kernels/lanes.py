@@ -16,14 +16,10 @@ The loops are written once; the files of the models bind them to functions, whic
 - `retreat(w, own, c, z, dt, new, pull)`: the wrench per unit load, and `Cotangents` from those of the new state and of
   the wrench.
 
-A step without load forgets its state, as in `rollouts`.
+A step without load forgets its state, as in `rollouts`, whose `Inputs` come in; the shape is the same for all loads.
 """
 
 from __future__ import annotations
-
-from typing import NamedTuple
-
-import numpy as np
 
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import kernel
@@ -43,24 +39,6 @@ model begin at `FIELDS`."""
 ROW, ROW_BAR, CARRY, SHARE, OWN = (LANES * n for n in (0, NUMBERS, 2 * NUMBERS, 2 * NUMBERS + 3, 2 * NUMBERS + 4))
 """Where fields of `own` begin: numbers of the contact and their gradient, what one step hands to the next, share of the
 load; those of the model begin at `OWN`."""
-
-
-class Lanes(NamedTuple):
-    """Roll-outs of B contacts of P parts through T steps."""
-
-    rows: np.ndarray
-    """Numbers of law and shape, [P, B or 1, N]."""
-    shares: np.ndarray
-    """Of the load, [P]."""
-    surface: np.ndarray
-    """As in `rollouts.Contact`, int [P, 3]."""
-    data: np.ndarray
-    twist: np.ndarray
-    """[B or 1, T, 3]"""
-    load: np.ndarray
-    """[B or 1, T]"""
-    dt: np.ndarray
-    """[T]"""
 
 
 @kernel
@@ -144,9 +122,9 @@ def _begin(begin, own, inputs, span, carried, first, lanes):
         for m in range(row.shape[0]):
             own[ROW + m * LANES + c] = row[m]
             own[ROW_BAR + m * LANES + c] = 0.0
-        own[SHARE + c] = inputs.shares[p]
+        own[SHARE + c] = inputs.shares[p, 0]
         carry(own, c, three(carried[p, b]))
-        begin(own, c, inputs.surface[p], inputs.data)
+        begin(own, c, inputs.surface[p, 0], inputs.data)
 
 
 @kernel

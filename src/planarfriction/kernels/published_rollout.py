@@ -153,7 +153,7 @@ def _scaled(own, c, twist):
 
 @kernel
 def _prepare(w, own, inputs, lanes, steps, slopes):
-    _surface(w, lanes * steps, inputs.surface[0], inputs.data, slopes, own[_SCRATCH:])
+    _surface(w, lanes * steps, inputs.surface[0, 0], inputs.data, slopes, own[_SCRATCH:])
 
 
 @kernel

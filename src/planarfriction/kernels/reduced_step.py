@@ -9,8 +9,8 @@ The step is a function of z, the scaled twist u and its steady state q. `lineari
 partial derivatives, which the compiler drops where nobody asks for them; `pull_back` takes cotangents back. At the
 kinks: a state that the cap just touches counts as not capped (steady sliding sits on it to the last bit); at rest the
 step is that of a vanishing twist, `z + u dt`. The steady state depends on the friction coefficients and v_s, the
-traction on stiffness and dampings too, the closure on the breakaway ratio; gamma and the shape, built into the map, are
-held.
+traction on stiffness and dampings too, the closure on the breakaway ratio; gamma, built into the map, is held, and so is
+the shape (but see `reduced_loads`).
 """
 
 from __future__ import annotations
@@ -19,12 +19,10 @@ import functools
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from planarfriction import formulas
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import entry, jit, kernel, reduced, rollouts
+from planarfriction.kernels import entry, kernel, reduced, rollouts
 from planarfriction.kernels.bristle_step import ROUNDING
 from planarfriction.kernels.pointers import address_of, floats
 from planarfriction.kernels.records import reader
@@ -229,8 +227,8 @@ class StepBars(NamedTuple):
     z: tuple
     u: tuple
     q: tuple
-    ratio: float
-    """The law's breakaway ratio."""
+    ratio: tuple
+    """The law's breakaway ratio, through the closure at the start, at the predicted end and at the end."""
 
 
 @kernel
@@ -243,7 +241,7 @@ def _pull_back(law, s, new, pull):
     d_beta = -dot(plus(times(s.decay, end.z), end.share, s.m), rate)
     d_decay, dm = -end.beta * dot(end.z, rate), times(-end.beta * end.share, rate)
     d_share = end.by_share * d_beta - end.beta * dot(s.m, rate)
-    d_size, ratio = end.by_deflection * d_beta, end.by_ratio * d_beta
+    d_size, ratio_end = end.by_deflection * d_beta, end.by_ratio * d_beta
     dn = plus(plus(plus(dn, end.stretch * d_size, end.z), per_q2 * d_share, q), d_beta, end.by_z)
     q_dq = -end.deflection * d_size - 2.0 * end.share * d_share
     dq = times(per_q2 * d_share, end.z)
@@ -268,7 +266,7 @@ def _pull_back(law, s, new, pull):
     # predicted end
     d_start, d_end = s.by_start * d_beta, s.by_end * d_beta
     d_predicted, ahead = predicted.by_deflection * d_end, predicted.by_share * d_end
-    ratio += predicted.by_ratio * d_end
+    ratio_ahead = predicted.by_ratio * d_end
     q_dq -= predicted.deflection * d_predicted
     dp = plus(times(predicted.stretch * d_predicted, predicted.z), d_end, predicted.by_z)
     shrink, push = predicted.deflection * s.per * dt * d_predicted, dt * dot(s.m, dp)
@@ -282,7 +280,7 @@ def _pull_back(law, s, new, pull):
     # start
     d_size += start.by_deflection * d_start
     d_share += ahead + start.by_share * d_start
-    ratio += start.by_ratio * d_start
+    ratio = start.by_ratio * d_start, ratio_ahead, ratio_end
     dz = plus(plus(plus(dz, start.stretch * d_size, start.z), per_q2 * d_share, q), d_start, start.by_z)
     q_dq -= start.deflection * d_size + 2.0 * (start.share * d_share + s.slow * d_slow)
     d_decay -= dot(q, dm)
@@ -294,23 +292,38 @@ def _pull_back(law, s, new, pull):
 
 
 @kernel
-def pull_back(contact, step, slopes, new, wrench):
-    """`Cotangents` from those of the new state and of the wrench; that of the scaled traction is `F W'`."""
-    law, shape, held = contact.law, contact.shape, step.held
+def pulled(contact, step, slopes, new, wrench):
+    """`StepBars`, of u with what q passes on to it, from the cotangents of the new state and of the wrench.
+
+    That of the scaled traction is `F W'`, which is returned first.
+    """
     wx, wy, wt = wrench
-    pull = scaled_twist(shape, wx, wy, wt)
-    bar = _pull_back(law, step, new, pull)
-    u_bar = plus(bar.u, 1.0, applied_back(slopes.q_u, bar.q))
+    pull = scaled_twist(contact.shape, wx, wy, wt)
+    bar = _pull_back(contact.law, step, new, pull)
+    return pull, StepBars(bar.z, plus(bar.u, 1.0, applied_back(slopes.q_u, bar.q)), bar.q, bar.ratio)
+
+
+@kernel
+def cotangents(contact, step, slopes, pull, bar, shape):
+    """`Cotangents` from what `pulled` finds, and that of the shape."""
+    law, held = contact.law, step.held
     return Cotangents(
         bar.z,
-        to_origin(shape, *u_bar),
+        to_origin(contact.shape, *bar.u),
         LawNumbers(
             -dot(step.new, pull) - dot(held.q, bar.q) / law.sigma_0, -dot(step.rate, pull), -dot(held.u, pull),
             dot(slopes.q_mu_c, bar.q), dot(slopes.q_mu_s, bar.q), dot(slopes.q_v_s, bar.q),
-            0.0, 0.0, bar.ratio, 0.0,
+            0.0, 0.0, bar.ratio[0] + bar.ratio[1] + bar.ratio[2], 0.0,
         ),
-        Shape(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0),
+        shape,
     )  # fmt: skip
+
+
+@kernel
+def pull_back(contact, step, slopes, new, wrench):
+    """`Cotangents` from those of the new state and of the wrench, where the shape is held."""
+    pull, bar = pulled(contact, step, slopes, new, wrench)
+    return cotangents(contact, step, slopes, pull, bar, Shape(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
 
 
 # ---------------------------------------------------------------------- bound to this model
@@ -326,18 +339,3 @@ def step(row, data, inputs, out):
 def step_address() -> int:
     """Where `step` is in this process."""
     return address_of(step, "pppp")
-
-
-@jit
-def sensitivities(inputs, span, z, columns, wrenches, slopes):
-    """See `rollouts.sensitivities`."""
-    work = np.empty(rollouts.SCRATCH), np.empty((6, 7 + len(NAMES))), np.empty((6, columns.shape[0]))
-    results = wrenches, slopes
-    rollouts.sensitivities(shape_of, hold_slopes, linearise, pull_back, inputs, span, z, columns, results, work)
-
-
-@jit
-def tangent(inputs, span, z, changes, wrenches, slopes):
-    """See `rollouts.tangent`."""
-    work = np.empty(rollouts.SCRATCH), np.empty((6, 7 + len(NAMES)))
-    rollouts.tangent(shape_of, hold_slopes, linearise, pull_back, inputs, span, z, changes, (wrenches, slopes), work)

@@ -10,6 +10,9 @@ are compiled into it: with a contact `c`, a twist V, a state z and a step dt,
 - `pull_back(c, step, slopes, new, wrench)`: `Cotangents` of z, V and the contact's numbers from those of the new state
   and of the wrench.
 
+Where the shape follows the load, a step takes that of its load, and the load moves the wrench through the numbers of the
+shape and the share of the part, too.
+
 A step without load forgets its state: it passes on no gradient but that of the load, the wrench per unit load that the
 smallest load would have.
 """
@@ -29,7 +32,7 @@ from planarfriction.kernels import jit, kernel
 from planarfriction.kernels.law import LAW, law_of
 from planarfriction.kernels.pointers import address, at, call, doubles
 from planarfriction.kernels.records import reader, size_of
-from planarfriction.kernels.vectors import accumulate, dot, put, three, times
+from planarfriction.kernels.vectors import accumulate, dot, plus, put, three, times
 
 SCRATCH = 9
 """Numbers that `hold_slopes` may write to."""
@@ -47,32 +50,41 @@ class Contact(NamedTuple):
 
 
 class Inputs(NamedTuple):
-    """Roll-outs of B contacts through T steps."""
+    """Roll-outs of B contacts of P parts through T steps, at L different loads where the shape follows the load."""
 
     rows: np.ndarray
-    """Numbers of law and shape, [B or 1, N]."""
-    surface: np.ndarray
-    """As in `Contact`, int [3]."""
+    """Numbers of law and shape, [P, B or 1, N]."""
     data: np.ndarray
+    """As in `Contact`, for all parts and loads."""
     twist: np.ndarray
     """[B or 1, T, 3]"""
     load: np.ndarray
     """[B or 1, T]"""
     dt: np.ndarray
     """[T]"""
+    which: np.ndarray
+    """Which of the L loads a step has, int [B or 1, T]; one for all where the shape is fixed."""
+    shares: np.ndarray
+    """Of the load, [P, L]."""
+    surface: np.ndarray
+    """As in `Contact`, int [P, L, 3]."""
+    shapes: np.ndarray
+    """Added to the numbers of the shape, [P, L, S]."""
+    by_load: np.ndarray
+    """Slopes of these numbers and of the share by the load, [P, L, S + 1] [1/N]."""
 
 
 class Bars(NamedTuple):
     """Cotangents of the inputs of B roll-outs, or changes of them."""
 
     state: np.ndarray
-    """Comes in as that of the state at the end, [B, 3]."""
+    """Comes in as that of the state at the end, [P, B, 3]."""
     twist: np.ndarray
     """[B, T, 3]"""
     load: np.ndarray
     """[B, T]"""
     rows: np.ndarray
-    """[B, N], comes in as zeros."""
+    """[P, B, N], comes in as zeros; changes are those of all parts, [B or 1, N]."""
 
 
 class Cotangents(NamedTuple):
@@ -85,8 +97,15 @@ class Cotangents(NamedTuple):
 
 
 @kernel
-def _contact(shape_of, row, surface, data):
-    return Contact(law_of(row), shape_of(row[LAW:]), (surface[0], surface[1], surface[2]), data)
+def _part(shape_of, inputs, row, p, at):
+    """Part p as it is at one of the loads."""
+    surface, shape = inputs.surface[p, at], plus(shape_of(row[LAW:]), 1.0, shape_of(inputs.shapes[p, at]))
+    return Contact(law_of(row), shape, (surface[0], surface[1], surface[2]), inputs.data)
+
+
+@kernel
+def _add(row, a):
+    row[0], row[1], row[2] = row[0] + a[0], row[1] + a[1], row[2] + a[2]
 
 
 @kernel
@@ -187,18 +206,66 @@ def compile_step_one() -> None:
             step_one.disable_compile()
 
 
+# ---------------------------------------------------------------------- roll-outs
+
+
+@kernel
+def roll(shape_of, hold, linearise, inputs, span, z, wrench, states):
+    """See `lanes.roll`, but that the wrenches are added to what is in `wrench`."""
+    steps, kept = inputs.dt.shape[0], states.shape[2] > 0
+    for b in range(span[0], span[1]):
+        twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
+        which = inputs.which[row_of(inputs.which, b)]
+        for p in range(inputs.shares.shape[0]):
+            rows, own = inputs.rows[p], three(z[p, b])
+            row = rows[row_of(rows, b)]
+            for t in range(steps):
+                if kept:
+                    put(states[p, b, t], own)
+                load, contact = loads[t], _part(shape_of, inputs, row, p, which[t])
+                step = linearise(contact, hold(contact, three(twists[t])), own, inputs.dt[t])
+                own = step.new if load != 0.0 else (0.0, 0.0, 0.0)
+                _add(wrench[b, t], _weighed(step.wrench, inputs.shares[p, which[t]] * load))
+            put(z[p, b], own)
+
+
+@kernel
+def gradient(shape_of, hold_slopes, linearise, pull_back, inputs, states, wrench_bar, span, bars, work):
+    """See `lanes.gradient`, but that the cotangents are added to what is in `bars`."""
+    for b in range(span[0], span[1]):
+        twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
+        which, pulls = inputs.which[row_of(inputs.which, b)], wrench_bar[row_of(wrench_bar, b)]
+        for p in range(inputs.shares.shape[0]):
+            rows, before, own = inputs.rows[p], states[p], three(bars.state[p, b])
+            row, before = rows[row_of(rows, b)], before[row_of(before, b)]
+            for t in range(inputs.dt.shape[0] - 1, -1, -1):
+                load, at, pull, slopes = loads[t], which[t], three(pulls[t]), inputs.by_load[p, which[t]]
+                share, contact = inputs.shares[p, at], _part(shape_of, inputs, row, p, at)
+                held, known = hold_slopes(contact, three(twists[t]), work)
+                step = linearise(contact, held, three(before[t]), inputs.dt[t])
+                new = times(0.0 if load == 0.0 else 1.0, own)
+                bar = pull_back(contact, step, known, new, times(share * load, pull))
+                own = bar.state
+                _add(bars.twist[b, t], bar.twist)
+                heavier = share + load * slopes[len(bar.shape)]
+                bars.load[b, t] += heavier * dot(pull, step.wrench) + dot(bar.shape, shape_of(slopes))
+                accumulate(bars.rows[p, b], 0, 1, (bar.law, bar.shape))
+            put(bars.state[p, b], own)
+
+
 # ---------------------------------------------------------------------- derivatives
 
 
 @kernel
-def _jacobian(hold_slopes, linearise, pull_back, contact, z, twist, load, dt, work, out):
+def _jacobian(hold_slopes, linearise, pull_back, contact, z, twist, loads, dt, work, out):
     """Derivatives of the new state and of the wrench (6 rows) into `out` [6, 7 + N]; returns the step.
 
-    Columns: state (3), twist (3), load, and the N numbers of the contact.
+    Columns: state (3), twist (3), load with the shape held, and the N numbers of the contact. `loads`: 0 where there is
+    none, else 1; that of the contact; its slope.
     """
     held, slopes = hold_slopes(contact, twist, work)
     step = linearise(contact, held, z, dt)
-    loaded = 0.0 if load == 0.0 else 1.0
+    loaded, load, heavier = loads
     for i in range(6):
         unit = (1.0 if i % 3 == 0 else 0.0), (1.0 if i % 3 == 1 else 0.0), (1.0 if i % 3 == 2 else 0.0)
         bar = pull_back(
@@ -207,39 +274,50 @@ def _jacobian(hold_slopes, linearise, pull_back, contact, z, twist, load, dt, wo
         row = out[i]
         for m in range(row.shape[0]):
             row[m] = 0.0
-        accumulate(row, 0, 1, (bar.state, bar.twist, 0.0 if i < 3 else dot(unit, step.wrench), bar.law, bar.shape))
+        by_load = 0.0 if i < 3 else heavier * dot(unit, step.wrench)
+        accumulate(row, 0, 1, (bar.state, bar.twist, by_load, bar.law, bar.shape))
     return step
+
+
+@kernel
+def _loads(inputs, load, p, at):
+    """`loads` of `_jacobian` for a part."""
+    share, by_load = inputs.shares[p, at], inputs.by_load[p, at]
+    return (0.0 if load == 0.0 else 1.0), share * load, share + load * by_load[by_load.shape[0] - 1]
 
 
 @kernel
 def sensitivities(shape_of, hold_slopes, linearise, pull_back, inputs, span, z, columns, results, work):
     """Roll-outs with the derivatives of the wrenches by the numbers `columns` [P], forward in time.
 
-    `dz' = d new/dz dz + d new/d number`. `results`: wrenches [B, T, 3] and their derivatives [B, T, 3, P]; `work`:
-    arrays [SCRATCH], [6, 7 + N] and [6, P].
+    `dz' = d new/dz dz + d new/d number`. `results`, to which is added: wrenches [B, T, 3] and their derivatives
+    [B, T, 3, P]; `work`: arrays [SCRATCH], [6, 7 + N] and [6, P].
     """
     (wrenches, slopes), (scratch, here, change) = results, work
     for b in range(span[0], span[1]):
         twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
-        contact = _contact(shape_of, inputs.rows[row_of(inputs.rows, b)], inputs.surface, inputs.data)
-        own = three(z[b])
-        for i in range(6):
-            for p in range(change.shape[1]):
-                change[i, p] = 0.0
-        for t in range(inputs.dt.shape[0]):
-            load = loads[t]
-            step = _jacobian(
-                hold_slopes, linearise, pull_back, contact, own, three(twists[t]), load, inputs.dt[t], scratch, here
-            )
-            own = step.new if load != 0.0 else (0.0, 0.0, 0.0)
-            put(wrenches[b, t], _weighed(step.wrench, load))
-            for p in range(change.shape[1]):
-                before, column = (change[0, p], change[1, p], change[2, p]), 7 + columns[p]
-                for i in range(6):
-                    change[i, p] = here[i, column] + dot(three(here[i]), before)
-                for i in range(3):
-                    slopes[b, t, i, p] = change[3 + i, p]
-        put(z[b], own)
+        which = inputs.which[row_of(inputs.which, b)]
+        for part in range(inputs.shares.shape[0]):
+            rows, own = inputs.rows[part], three(z[part, b])
+            row = rows[row_of(rows, b)]
+            for i in range(6):
+                for p in range(change.shape[1]):
+                    change[i, p] = 0.0
+            for t in range(inputs.dt.shape[0]):
+                load, at, contact = loads[t], which[t], _part(shape_of, inputs, row, part, which[t])
+                weights, twist = _loads(inputs, load, part, at), three(twists[t])
+                step = _jacobian(
+                    hold_slopes, linearise, pull_back, contact, own, twist, weights, inputs.dt[t], scratch, here
+                )
+                own = step.new if load != 0.0 else (0.0, 0.0, 0.0)
+                _add(wrenches[b, t], _weighed(step.wrench, weights[1]))
+                for p in range(change.shape[1]):
+                    before, column = (change[0, p], change[1, p], change[2, p]), 7 + columns[p]
+                    for i in range(6):
+                        change[i, p] = here[i, column] + dot(three(here[i]), before)
+                    for i in range(3):
+                        slopes[b, t, i, p] += change[3 + i, p]
+            put(z[part, b], own)
 
 
 @kernel
@@ -247,31 +325,35 @@ def tangent(shape_of, hold_slopes, linearise, pull_back, inputs, span, z, change
     """Roll-outs with their change along given ones of the inputs, forward in time.
 
     `changes` of the inputs: as `Bars`, one row where all contacts share one; that of the state, and `z`, in place.
-    `results`: wrenches [B, T, 3] and their changes; `work`: arrays [SCRATCH], [6, 7 + N].
+    `results`, to which is added: wrenches [B, T, 3] and their changes; `work`: arrays [SCRATCH], [6, 7 + N].
     """
     (wrenches, slopes), (scratch, here) = results, work
     for b in range(span[0], span[1]):
         twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
         turns, pushes = changes.twist[row_of(changes.twist, b)], changes.load[row_of(changes.load, b)]
-        row = changes.rows[row_of(changes.rows, b)]
-        contact = _contact(shape_of, inputs.rows[row_of(inputs.rows, b)], inputs.surface, inputs.data)
-        own, moved = three(z[b]), three(changes.state[b])
-        for t in range(inputs.dt.shape[0]):
-            load, turn = loads[t], three(turns[t])
-            step = _jacobian(
-                hold_slopes, linearise, pull_back, contact, own, three(twists[t]), load, inputs.dt[t], scratch, here
-            )
-            own = step.new if load != 0.0 else (0.0, 0.0, 0.0)
-            put(wrenches[b, t], _weighed(step.wrench, load))
-            new = (0.0, 0.0, 0.0)
-            for i in range(6):
-                change = dot(three(here[i]), moved) + dot(three(here[i, 3:]), turn) + here[i, 6] * pushes[t]
-                for m in range(row.shape[0]):
-                    change += here[i, 7 + m] * row[m]
-                if i < 3:
-                    new = new[1], new[2], change
-                else:
-                    slopes[b, t, i - 3] = change
-            moved = new
-        put(z[b], own)
-        put(changes.state[b], moved)
+        which, by = inputs.which[row_of(inputs.which, b)], changes.rows[row_of(changes.rows, b)]
+        for p in range(inputs.shares.shape[0]):
+            rows, own, moved = inputs.rows[p], three(z[p, b]), three(changes.state[p, b])
+            row = rows[row_of(rows, b)]
+            for t in range(inputs.dt.shape[0]):
+                load, at, contact = loads[t], which[t], _part(shape_of, inputs, row, p, which[t])
+                weights, twist, turn = _loads(inputs, load, p, at), three(twists[t]), three(turns[t])
+                step = _jacobian(
+                    hold_slopes, linearise, pull_back, contact, own, twist, weights, inputs.dt[t], scratch, here
+                )
+                own = step.new if load != 0.0 else (0.0, 0.0, 0.0)
+                _add(wrenches[b, t], _weighed(step.wrench, weights[1]))
+                new, follows = (0.0, 0.0, 0.0), inputs.by_load[p, at]
+                for i in range(6):
+                    change = dot(three(here[i]), moved) + dot(three(here[i, 3:]), turn) + here[i, 6] * pushes[t]
+                    for m in range(by.shape[0]):
+                        change += here[i, 7 + m] * by[m]
+                    for m in range(follows.shape[0] - 1):
+                        change += here[i, 7 + LAW + m] * follows[m] * pushes[t]
+                    if i < 3:
+                        new = new[1], new[2], change
+                    else:
+                        slopes[b, t, i - 3] += change
+                moved = new
+            put(z[p, b], own)
+            put(changes.state[p, b], moved)

@@ -218,6 +218,21 @@ def floored(law, u, v, found):
 
 
 @kernel
+def blended(law, shape, surface, data, u, v):
+    """`steady`, and the slope of z_ss by the blend, also where that is 0."""
+    one = found = _map(law, data, surface[0], u, v)
+    change, per = (0.0, 0.0, 0.0), 1.0 / law.sigma_0
+    if surface[1] != surface[0]:
+        other, n = _map(law, data, surface[1], u, v), times(1.0 / v, u)
+        found, change = _mixed(one, other, shape[6]), plus(other.q, -1.0, one.q)
+        power, least = dot(found.q, n), law.mu_c * found.least
+        stays = 1.0 - formulas.floored_slope(xp, power, least)
+        raised = formulas.floored_by_least(xp, power, least) * law.mu_c * (other.least - one.least)
+        change = times(per, plus(change, raised - stays * dot(change, n), n))
+    return floored(law, u, v, found), change
+
+
+@kernel
 def steady_slopes(law, shape, surface, data, x, y, s, v, j):
     """`dz_ss/dV_G` [s] into `j` [9], row by row. Returns `z_ss`."""
     found = steady(law, shape, surface, data, (x, y, s), v)
@@ -259,6 +274,32 @@ def fourth_moments(shape, surface, data):
     if shape[6] > 0.0:
         rows = _mixed_fourth(rows, _fourth(data, surface[1] + QUARTIC), shape[6])
     return rows
+
+
+@kernel
+def fourth_change(surface, data):
+    """The slopes of `fourth_moments` by the blend."""
+    one, other = _fourth(data, surface[0] + QUARTIC), _fourth(data, surface[1] + QUARTIC)
+    return plus(other[0], -1.0, one[0]), plus(other[1], -1.0, one[1]), plus(other[2], -1.0, one[2])
+
+
+@kernel
+def uneven(law, fourth, change, z):
+    """The slope of the logarithm of `evenness` where its `fourth` moments change."""
+    grip = law.sigma_0 / law.mu_s
+    x, y, s = p = times(grip, z)
+    square = dot(p, p)
+    if law.elasto_plastic > 0.0 and square > FAINT and square * FAINT < 1.0:
+        m = (x * x, y * y, s * s, x * y, x * s, y * s)
+        return -_quartic(change, m) / _quartic(fourth, m)
+    return 0.0
+
+
+@kernel
+def _quartic(rows, m):
+    """`<u^4>` from the products of two components each."""
+    m0, m1, m2, m3, m4, m5 = m
+    return m0 * dot(rows[0], m) + m1 * dot(rows[1], (m1, m2, m3, m4, m5)) + m2 * dot(rows[2], (m2, m3, m4, m5))
 
 
 @kernel

@@ -20,6 +20,9 @@ CHECKED = 64
 _WITHIN = (0.25, 0.5, 0.75)
 """Where between two rungs: a cell that gets its first load beside the middle leaves no trace in the middle."""
 
+ALIKE = 1e-7
+"""Relative difference up to which two rungs are the same but for the rounding of their maps."""
+
 REMEMBERED = 4096
 """Loads whose shapes a family remembers."""
 
@@ -76,6 +79,25 @@ class LoadFamily:
                 found.update(self._built(missing))
         return [found[load] for load in loads]  # pyright: ignore[reportReturnType]
 
+    def followed(self, loads: list[float], shapes: list[ReducedShape]) -> list[tuple[ReducedShape, float]]:
+        """The `shapes` at loads > 0 [N] with the maps of both neighbours, and the slopes of their blends [1/N].
+
+        A load that one rung serves alone has that rung's value, but moves on towards the other one all the same.
+        """
+        with self._lock:
+            return [self._followed(load, shape) for load, shape in zip(loads, shapes, strict=True)]
+
+    def _followed(self, load: float, shape: ReducedShape) -> tuple[ReducedShape, float]:
+        rungs = [] if shape.contact_radius == 0.0 else self._neighbours(load)
+        if len(rungs) < 2 or self._apart(*rungs) <= ALIKE:
+            return shape, 0.0
+        low, high = rungs
+        if shape.other is not None:
+            return shape, 1.0 / (high - low)
+        if self._served(load, low, high) == low:
+            return shape._replace(other=self._map_at(high)), 1.0 / (high - low)
+        return shape._replace(other=self._map_at(low)), -1.0 / (high - low)
+
     def _built(self, loads: list[float]) -> dict[float, ReducedShape]:
         """Shapes at loads that were missing, unless another thread has built them since."""
         shapes = {}
@@ -93,13 +115,17 @@ class LoadFamily:
         """Two rungs blended linearly in the load, or one alone where that is as close as wanted."""
         if high is None:
             return ReducedShape(factor, self._map_at(low))
-        share = (load - low) / (high - low)
-        apart = self._apart(low, high)
+        alone = self._served(load, low, high)
+        if alone is not None:
+            return ReducedShape(factor, self._map_at(alone))
+        return ReducedShape(factor, self._map_at(low), self._map_at(high), (load - low) / (high - low))
+
+    def _served(self, load: float, low: float, high: float) -> float | None:
+        """The one of two rungs that is as close as wanted to a load, if any."""
+        share, apart = (load - low) / (high - low), self._apart(low, high)
         if share * apart <= 0.5 * self._error:
-            return ReducedShape(factor, self._map_at(low))
-        if (1.0 - share) * apart <= 0.5 * self._error:
-            return ReducedShape(factor, self._map_at(high))
-        return ReducedShape(factor, self._map_at(low), self._map_at(high), share)
+            return low
+        return high if (1.0 - share) * apart <= 0.5 * self._error else None
 
     def _neighbours(self, load: float) -> list[float]:
         """The two rungs around a load, without those that are points."""

@@ -54,6 +54,10 @@ class PartShapes:
             return [self._fixed for _ in loads]
         return self._family.shapes(loads) if self._error > 0.0 else [self._built(load) for load in loads]  # pyright: ignore
 
+    def followed(self, loads: list[float], shapes: list[ReducedShape]) -> list[tuple[ReducedShape, float]]:
+        """See `LoadFamily.followed`."""
+        return self._family.followed(loads, shapes)
+
     @property
     def rungs(self) -> list[float]:
         """Loads [N] at which maps have been built and not been forgotten, ascending."""

@@ -19,6 +19,7 @@ from planarfriction.laws.base import refuse_creep
 from planarfriction.models.base import PackedModel
 from planarfriction.models.part_shapes import Part, PartShapes, together
 from planarfriction.models.reduced_map import POINT, ReducedShape, is_point, slip_factor
+from planarfriction.models.shapes_by_load import ShapesByLoad, places_of, slopes_by_load
 from planarfriction.models.three_states import ThreeStateModel
 from planarfriction.patch.parts import labels_of, part_of
 
@@ -182,6 +183,33 @@ class ReducedModel(ThreeStateModel):
         # compiled loops reach both maps from the one that lies first in memory: they take no negative numbers
         apart = (place_of(shape.other) - place_of(shape.data)) // shape.data.itemsize
         return np.array([max(-apart, 0), max(apart, 0), 0]), shape.data if apart > 0 else shape.other
+
+    def _at_loads(self, loads: np.ndarray, slopes: bool) -> ShapesByLoad:
+        parts = list(self._parts_at(loads.tolist()))
+        each = [[(loaded[k].shape, 0.0) for loaded in parts] for k in range(self.parts)]
+        by_load = np.zeros((self.parts, len(loads), 8))
+        if slopes:
+            for k, shapes in enumerate(self._parts):
+                each[k] = shapes.followed(loads.tolist(), [shape for shape, _ in each[k]])
+                by_load[k] = self._slopes(k, loads, [slope for _, slope in each[k]])
+        shapes = [[shape for shape, _ in one] for one in each]
+        maps = [(shape.data, shape.data if shape.other is None else shape.other) for one in shapes for shape in one]
+        begin, data = places_of([data for pair in maps for data in pair])
+        surface = np.zeros((self.parts, len(loads), 3), dtype=int)
+        surface[:, :, :2] = begin.reshape(self.parts, len(loads), 2)
+        shares = np.array([[loaded[k].share for loaded in parts] for k in range(self.parts)])
+        numbers = np.array([[shape.numbers for shape in one] for one in shapes])
+        return ShapesByLoad(shares, surface, numbers, by_load, data)
+
+    def _slopes(self, k: int, loads: np.ndarray, blends: list[float]) -> np.ndarray:
+        """Slopes of the numbers of part k and of its share by the load `[L, 8]`, given those of the blend."""
+        mine = self.labels == k
+
+        def numbers(loads: np.ndarray) -> np.ndarray:
+            share = np.ones(len(loads)) if self.parts == 1 else self.patch.weights(loads)[:, mine].sum(-1)
+            return np.column_stack([slip_factor(self._parts[k].patch, loads)[:, *np.triu_indices(3)], share])
+
+        return np.insert(slopes_by_load(numbers, loads), 6, blends, axis=1)
 
     def _levers(self, shape: ReducedShape) -> tuple[np.ndarray, np.ndarray]:
         return shape.factor, shape.factor

@@ -29,6 +29,7 @@ from planarfriction.models.quick_steps import (
 )
 from planarfriction.models.rates import linearised, rates
 from planarfriction.models.remembered import Remembered
+from planarfriction.models.shapes_by_load import ShapesByLoad
 
 _ARRAY, _FLOAT, _EMPTY = np.ndarray, np.dtype(float), np.empty
 _TRUTH = frozenset((bool, np.bool_))
@@ -164,6 +165,20 @@ class ThreeStateModel(FrictionModel):
         """Share of the load and shape of each part at a load [N], which may be None where it makes no difference."""
         return (Part(1.0, self.shape_at(normal_force)),)  # pyright: ignore[reportArgumentType]
 
+<<<<<<< HEAD
+=======
+    @property
+    def _follows_load(self) -> bool:
+        return self.patch.depends_on_load
+
+    def _at_loads(self, loads: np.ndarray, slopes: bool) -> ShapesByLoad:
+        """The parts at different loads > 0 `[L]` [N], with their `slopes` by the load or zeros.
+
+        For compiled roll-outs, of a model whose shape follows the load.
+        """
+        raise NotImplementedError
+
+>>>>>>> ff1ccbd (Roll-outs of load families run compiled, with gradients to every load through shape and share)
     @functools.cached_property
     def _recent(self) -> Remembered[Any]:
         """Shapes at the latest loads."""
