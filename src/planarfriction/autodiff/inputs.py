@@ -75,7 +75,7 @@ def _fixed(parts: tuple[Packed, ...]) -> ShapesByLoad:
     data = [part.data for part in parts]
     begin, first = (np.zeros(1, dtype=int), data[0]) if len(data) == 1 else places_of(data)
     surface = np.array([part.surface for part in parts])[:, None]
-    surface[:, 0, 0] += begin
+    surface[:, 0, :2] += begin[:, None]
     count, numbers = len(parts), parts[0].rows.shape[-1] - LAW
     shares = np.array([[part.share] for part in parts])
     return ShapesByLoad(shares, surface, np.zeros((count, 1, numbers)), np.zeros((count, 1, numbers + 1)), first)

@@ -43,6 +43,16 @@ def hold_slopes(contact, twist, work):
 
 
 @kernel
+def _through_evenness(contact, step, ratio):
+    """Cotangent of the blend through the evenness: a share of it moves the breakaway as that share of the ratio does."""
+    law, shape, surface, data = contact.law, contact.shape, contact.surface, contact.data
+    fourth, change = fourth_moments(shape, surface, data), fourth_change(surface, data)
+    at_start, ahead = uneven(law, fourth, change, step.start.z), uneven(law, fourth, change, step.predicted.z)
+    at_end = uneven(law, fourth, change, step.free)
+    return law.breakaway_ratio * dot(ratio, (at_start, ahead, at_end))
+
+
+@kernel
 def pull_back(contact, step, slopes, new, wrench):
     """`Cotangents` from those of the new state and of the wrench."""
     law, shape, u = contact.law, contact.shape, step.held.u
@@ -51,20 +61,13 @@ def pull_back(contact, step, slopes, new, wrench):
     gx = formulas.traction(step.new[0], step.rate[0], u[0], law)
     gy = formulas.traction(step.new[1], step.rate[1], u[1], law)
     gs = formulas.traction(step.new[2], step.rate[2], u[2], law)
-    fourth, change = (
-        fourth_moments(shape, contact.surface, contact.data),
-        fourth_change(contact.surface, contact.data),
-    )
-    # breakaway comes at the ratio times the evenness, so that a share of either moves it alike
-    share = law.breakaway_ratio * (
-        bar.ratio[0] * uneven(law, fourth, change, step.start.z)
-        + bar.ratio[1] * uneven(law, fourth, change, step.predicted.z)
-        + bar.ratio[2] * uneven(law, fourth, change, step.free)
-    )
+    blend = dot(slopes.q_blend, bar.q)
+    if contact.surface[1] != contact.surface[0]:
+        blend += _through_evenness(contact, step, bar.ratio)
     by_shape = Shape(
         ux * vx + gx * wx, ux * vy + gx * wy, ux * omega + gx * wt,
         uy * vy + gy * wy, uy * omega + gy * wt, us * omega + gs * wt,
-        dot(slopes.q_blend, bar.q) + share,
+        blend,
     )  # fmt: skip
     return cotangents(contact, step, slopes.held, pull, bar, by_shape)
 

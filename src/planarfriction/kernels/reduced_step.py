@@ -9,8 +9,8 @@ The step is a function of z, the scaled twist u and its steady state q. `lineari
 partial derivatives, which the compiler drops where nobody asks for them; `pull_back` takes cotangents back. At the
 kinks: a state that the cap just touches counts as not capped (steady sliding sits on it to the last bit); at rest the
 step is that of a vanishing twist, `z + u dt`. The steady state depends on the friction coefficients and v_s, the
-traction on stiffness and dampings too, the closure on the breakaway ratio; gamma, built into the map, is held, and so is
-the shape (but see `reduced_loads`).
+traction on stiffness and dampings too, the closure on the breakaway ratio; gamma, built into the map, is held. So is
+the shape (see `reduced_loads` where it moves).
 """
 
 from __future__ import annotations

@@ -10,7 +10,7 @@ are compiled into it: with a contact `c`, a twist V, a state z and a step dt,
 - `pull_back(c, step, slopes, new, wrench)`: `Cotangents` of z, V and the contact's numbers from those of the new state
   and of the wrench.
 
-Where the shape follows the load, a step takes that of its load, and the load moves the wrench through the numbers of the
+Where the shape follows the load, each step has that of its load, which moves the wrench through the numbers of the
 shape and the share of the part, too.
 
 A step without load forgets its state: it passes on no gradient but that of the load, the wrench per unit load that the

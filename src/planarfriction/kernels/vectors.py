@@ -43,14 +43,15 @@ def times(typingctx, c, a):
 
 @intrinsic
 def plus(typingctx, a, c, b):
-    """`a + c b`"""
+    """`a + c b`, a record if a is one."""
 
     def generate(context, builder, signature, args):
         parts = zip(cgutils.unpack_tuple(builder, args[0]), cgutils.unpack_tuple(builder, args[2]), strict=True)
         sums = [builder.fadd(x, builder.fmul(args[1], y, flags=_FLAGS), flags=_FLAGS) for x, y in parts]
         return context.make_tuple(builder, signature.return_type, sums)
 
-    return types.UniTuple(types.float64, len(a))(a, types.float64, b), generate
+    result = a if isinstance(a, types.BaseNamedTuple) else types.UniTuple(types.float64, len(a))
+    return result(a, types.float64, b), generate
 
 
 @intrinsic

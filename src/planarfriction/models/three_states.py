@@ -165,12 +165,6 @@ class ThreeStateModel(FrictionModel):
         """Share of the load and shape of each part at a load [N], which may be None where it makes no difference."""
         return (Part(1.0, self.shape_at(normal_force)),)  # pyright: ignore[reportArgumentType]
 
-<<<<<<< HEAD
-=======
-    @property
-    def _follows_load(self) -> bool:
-        return self.patch.depends_on_load
-
     def _at_loads(self, loads: np.ndarray, slopes: bool) -> ShapesByLoad:
         """The parts at different loads > 0 `[L]` [N], with their `slopes` by the load or zeros.
 
@@ -178,7 +172,6 @@ class ThreeStateModel(FrictionModel):
         """
         raise NotImplementedError
 
->>>>>>> ff1ccbd (Roll-outs of load families run compiled, with gradients to every load through shape and share)
     @functools.cached_property
     def _recent(self) -> Remembered[Any]:
         """Shapes at the latest loads."""
