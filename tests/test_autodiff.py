@@ -461,11 +461,11 @@ def test_one_load_for_each_contact_and_rest():
 # ---------------------------------------------------------------------- other models
 
 
-@pytest.mark.parametrize("kind", ["distributed", "follows the load"])
+@pytest.mark.parametrize("kind", ["distributed", "a map for each load"])
 def test_a_rollout_of_any_model_takes_its_steps(kind):
     model = {
         "distributed": lambda: pf.DistributedModel(PATCH, ELASTIC),
-        "follows the load": lambda: pf.ReducedModel(FINGER, ELASTIC, segments=8, speeds=8),
+        "a map for each load": lambda: pf.ReducedModel(FINGER, ELASTIC, segments=8, speeds=8, load_error=0.0),
     }[kind]()
     twists = np.random.default_rng(3).normal(size=(2, 5, 3)) * (1e-3, 1e-3, 0.3)
     loads, steps = np.linspace(0.5, 1.5, 5), np.linspace(1e-4, 2e-4, 5)
@@ -481,7 +481,7 @@ def test_a_rollout_of_any_model_takes_its_steps(kind):
         pf.rollout(model, None, np.zeros(3), 1.0, 1e-4)
     with pytest.raises(InvalidValueError, match="state, twist and normal_force must broadcast"):
         pf.rollout(model, None, twists, np.ones((3, 5)), 1e-4)
-    with pytest.raises(InvalidValueError, match=r"(model|patch) must"):
+    with pytest.raises(InvalidValueError, match=r"(model|load_error) must"):
         pf.rollout(model, None, twists, loads, steps, parameters=np.ones(7))
 
 

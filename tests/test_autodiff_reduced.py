@@ -345,7 +345,7 @@ FINGER = pf.ContactPatch.rectangle(
         ({"parameters": np.ones(7)}, r"breakaway_ratio must be in \[0, 1\), got 1.0"),
         ({"parameters": np.zeros(7)}, "sigma_0 must be > 0, got 0.0"),
         ({"model": PATCH}, "model must be a ReducedModel or a ReducedModelPublished, got ContactPatch"),
-        ({"model": pf.ReducedModel(FINGER, LAWS["plain"])}, "model must have a shape that does not follow the load"),
+        ({"model": pf.ReducedModel(FINGER, LAWS["plain"], load_error=0.0)}, "load_error must be > 0 for derivatives"),
     ],
 )
 def test_wrong_input_is_one_clear_line(changed, message):

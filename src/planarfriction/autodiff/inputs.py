@@ -56,11 +56,12 @@ class RolloutInputs(NamedTuple):
             which, shapes = np.zeros((1, len(self.dt)), dtype=int), _fixed(self.parts)
         else:
             loads, which = np.unique(self.normal_force, return_inverse=True)
-            if loads[:1] == 0.0:  # any shape does for a step without load, but for its slope
+            which = which.reshape(self.normal_force.shape)
+            if (loads[:1] == 0.0).any():  # any shape does for a step without load, but for its slope
                 loads[0] = loads[1] if len(loads) > 1 and not slopes else LIGHTEST
             shapes = at_loads(loads if len(loads) else np.array([LIGHTEST]), slopes)
         return Inputs(
-            rows, shapes.data, self.twist, self.normal_force, self.dt, which.reshape(-1, len(self.dt)),
+            rows, shapes.data, self.twist, self.normal_force, self.dt, which,
             shapes.shares, shapes.surface, shapes.shapes, shapes.by_load,
         )  # fmt: skip
 

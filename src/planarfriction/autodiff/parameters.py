@@ -147,7 +147,8 @@ def _refusal(model: ReducedModel | ReducedModelPublished) -> tuple[str, str, Any
     if isinstance(model, ReducedModel):
         if model.load_error > 0.0:
             return None
-        return "load_error", "be > 0 for derivatives by the load: maps are blended in between", model.load_error
+        rule = "be > 0 for derivatives and parameters of roll-outs: between maps, the shape is blended over the load"
+        return "load_error", rule, model.load_error
     return (
         "model",
         "have a shape that does not follow the load: a patch of fixed shape, or on_load_change='keep'",

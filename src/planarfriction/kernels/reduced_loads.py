@@ -44,7 +44,7 @@ def hold_slopes(contact, twist, work):
 
 @kernel
 def _through_evenness(contact, step, ratio):
-    """Cotangent of the blend through the evenness: a share of it moves the breakaway as that share of the ratio does."""
+    """Cotangent of the blend through the evenness, a share of which moves the breakaway as that share of the ratio."""
     law, shape, surface, data = contact.law, contact.shape, contact.surface, contact.data
     fourth, change = fourth_moments(shape, surface, data), fourth_change(surface, data)
     at_start, ahead = uneven(law, fourth, change, step.start.z), uneven(law, fourth, change, step.predicted.z)
@@ -55,7 +55,7 @@ def _through_evenness(contact, step, ratio):
 @kernel
 def pull_back(contact, step, slopes, new, wrench):
     """`Cotangents` from those of the new state and of the wrench."""
-    law, shape, u = contact.law, contact.shape, step.held.u
+    law, u = contact.law, step.held.u
     pull, bar = pulled(contact, step, slopes.held, new, wrench)
     (vx, vy, omega), (wx, wy, wt), (ux, uy, us) = slopes.twist, wrench, bar.u
     gx = formulas.traction(step.new[0], step.rate[0], u[0], law)

@@ -186,30 +186,31 @@ class ReducedModel(ThreeStateModel):
 
     def _at_loads(self, loads: np.ndarray, slopes: bool) -> ShapesByLoad:
         parts = list(self._parts_at(loads.tolist()))
-        each = [[(loaded[k].shape, 0.0) for loaded in parts] for k in range(self.parts)]
-        by_load = np.zeros((self.parts, len(loads), 8))
+        shares = np.array([[part.share for part in loaded] for loaded in parts]).T
+        shapes = [[loaded[k].shape for loaded in parts] for k in range(self.parts)]
+        numbers, by_load = np.array([[shape.numbers for shape in each] for each in shapes]), None
         if slopes:
-            for k, shapes in enumerate(self._parts):
-                each[k] = shapes.followed(loads.tolist(), [shape for shape, _ in each[k]])
-                by_load[k] = self._slopes(k, loads, [slope for _, slope in each[k]])
-        shapes = [[shape for shape, _ in one] for one in each]
-        maps = [(shape.data, shape.data if shape.other is None else shape.other) for one in shapes for shape in one]
+            found = [part.followed(loads.tolist(), each) for part, each in zip(self._parts, shapes, strict=True)]
+            shapes = [[shape for shape, _ in each] for each in found]
+            blends = np.array([[slope for _, slope in each] for each in found])
+            by_load = [self._slopes(k, loads, numbers[k], shares[k], blends[k]) for k in range(self.parts)]
+        maps = [(shape.data, shape.data if shape.other is None else shape.other) for each in shapes for shape in each]
         begin, data = places_of([data for pair in maps for data in pair])
-        surface = np.zeros((self.parts, len(loads), 3), dtype=int)
-        surface[:, :, :2] = begin.reshape(self.parts, len(loads), 2)
-        shares = np.array([[loaded[k].share for loaded in parts] for k in range(self.parts)])
-        numbers = np.array([[shape.numbers for shape in one] for one in shapes])
-        return ShapesByLoad(shares, surface, numbers, by_load, data)
+        surface = np.zeros((*shares.shape, 3), dtype=int)
+        surface[:, :, :2] = begin.reshape(*shares.shape, 2)
+        by_load = np.zeros((*shares.shape, 8)) if by_load is None else np.array(by_load)
+        return ShapesByLoad(np.ascontiguousarray(shares), surface, numbers, by_load, data)
 
-    def _slopes(self, k: int, loads: np.ndarray, blends: list[float]) -> np.ndarray:
+    def _slopes(self, k: int, loads: np.ndarray, shape: np.ndarray, share: np.ndarray, blend: np.ndarray) -> np.ndarray:
         """Slopes of the numbers of part k and of its share by the load `[L, 8]`, given those of the blend."""
-        mine = self.labels == k
+        mine, patch = self.labels == k, self._parts[k].patch
 
-        def numbers(loads: np.ndarray) -> np.ndarray:
+        def factor_and_share(loads: np.ndarray) -> np.ndarray:
             share = np.ones(len(loads)) if self.parts == 1 else self.patch.weights(loads)[:, mine].sum(-1)
-            return np.column_stack([slip_factor(self._parts[k].patch, loads)[:, *np.triu_indices(3)], share])
+            return np.column_stack([slip_factor(patch, loads)[:, *np.triu_indices(3)], share])
 
-        return np.insert(slopes_by_load(numbers, loads), 6, blends, axis=1)
+        middle = np.column_stack([shape[:, :6], share])
+        return np.insert(slopes_by_load(factor_and_share, loads, middle), 6, blend, axis=1)
 
     def _levers(self, shape: ReducedShape) -> tuple[np.ndarray, np.ndarray]:
         return shape.factor, shape.factor

@@ -39,15 +39,14 @@ class _Holding:
         self.__array_interface__, self.others = first.__array_interface__, others
 
 
-def slopes_by_load(numbers: Callable[[np.ndarray], np.ndarray], loads: np.ndarray) -> np.ndarray:
-    """Central differences of numbers `[L, M]` at loads > 0 `[L]`, one-sided where one side is of another kind.
+def slopes_by_load(numbers: Callable[[np.ndarray], np.ndarray], loads: np.ndarray, middle: np.ndarray) -> np.ndarray:
+    """Central differences of numbers, `middle` `[L, M]` at loads > 0 `[L]`, one-sided beside those of another kind.
 
     That is told by the zeros of the last two numbers: contacts that shrink to a point, and parts that lose their load.
     """
-    places = loads * (1.0 - STEP), loads, loads * (1.0 + STEP)
-    low, middle, high = (_in_turn(numbers, place) for place in places)
     sides = []
-    for end, place in ((low, places[0]), (high, places[2])):
+    for place in (loads * (1.0 - STEP), loads * (1.0 + STEP)):
+        end = _in_turn(numbers, place)
         same = ((end[:, -2:] == 0.0) == (middle[:, -2:] == 0.0)).all(axis=1)
         sides.append((np.where(same[:, None], end, middle), np.where(same, place, loads)))
     (low, begin), (high, end) = sides

@@ -1,0 +1,291 @@
+"""Derivatives of roll-outs on patches whose shape follows the load: through F, the blend of maps and the shares."""
+
+from __future__ import annotations
+
+import functools
+
+import numpy as np
+import pytest
+
+import planarfriction as pf
+from planarfriction import autodiff
+from planarfriction.errors import InvalidValueError
+
+X, Y = np.meshgrid(np.arange(-3, 4) * 1e-3, np.arange(3, -4, -1) * 1e-3)
+LIGHT = np.maximum(1.0 - ((X - 1e-3) ** 2 + Y**2) / 0.003**2, 0.0)
+HEAVY = np.sqrt(np.maximum(1.0 - (X**2 + (Y - 1e-3) ** 2) / 0.0045**2, 0.0))
+TIP = pf.ContactPatch.from_pressure({0.5: LIGHT, 4.0: HEAVY}, cell_size=1e-3)
+"""Grows, flattens and moves; no cell gets its first load between the two maps."""
+
+ELASTIC = pf.LuGre(mu_c=0.7, mu_s=1.2, gamma=1.5, elasto_plastic=pf.ElastoPlastic(0.3))
+MODELS = {
+    "plain": (TIP, pf.LuGre(mu_c=0.7, mu_s=1.2), 1),
+    "elasto-plastic": (TIP, ELASTIC, 1),
+    "parts": (TIP, ELASTIC, 3),
+    "grain": (TIP.with_friction_metric(pf.grain(0.6, along=0.5, across=1.0)), ELASTIC, 1),
+    "asymmetric": (TIP.with_friction_metric(pf.grain(0.6, along=0.5, across=1.0), asymmetry=[0.2, -0.1]), ELASTIC, 2),
+}
+LOADS = np.linspace(1.031, 3.063, 12)
+"""A ramp over many rungs."""
+
+DT, T, SIZES = 1e-4, len(LOADS), np.array([1.0, 1.0, 250.0])
+
+every_model = pytest.mark.parametrize("kind", MODELS)
+
+
+@functools.cache
+def model_of(kind: str, load_error: float = 3e-4) -> pf.ReducedModel:
+    patch, law, parts = MODELS[kind]
+    return pf.ReducedModel(patch, law, parts=parts, segments=8, speeds=6, load_error=load_error)
+
+
+def drive(model: pf.ReducedModel, seed: int = 0):
+    """A state, and twists that start, slide, spin and turn back."""
+    random = np.random.default_rng(seed)
+    return random.normal(size=model.state_shape) * 3e-7, np.cumsum(random.normal(size=(T, 3)), axis=0) * 3e-3 * SIZES
+
+
+def blended_loads(model: pf.ReducedModel) -> np.ndarray:
+    """A ramp over many rungs, where each load blends two of them in each part, as do those beside it."""
+    loads = [
+        load
+        for load in np.linspace(1.031, 3.063, 60)
+        if all(part.shape.blend > 0.0 for h in (-1e-5, 1e-5) for part in model.parts_at(load * (1.0 + h)))
+    ]
+    return np.array(loads)[np.linspace(0, len(loads) - 1, T).astype(int)]
+
+
+def bars_of(model: pf.ReducedModel, seed: int = 1):
+    random = np.random.default_rng(seed)
+    return random.normal(size=(T, 3)) * SIZES, random.normal(size=model.state_shape) * 1e6
+
+
+# ---------------------------------------------------------------------- the steps
+
+
+@every_model
+def test_a_roll_out_takes_the_steps_of_the_model(kind):
+    model = model_of(kind)
+    state, twists = drive(model)
+    loads = LOADS.copy()
+    loads[[3, 5]] = 0.0, 1.0  # a step without load, and a rung alone
+    found = autodiff.rollout_states(model, state, twists, loads, DT)
+    again = pf.rollout(model, state, twists, loads, DT)
+    for t in range(T):
+        assert found.states[t] == pytest.approx(state, rel=1e-11, abs=1e-20)
+        state, wrench = model.step(state, twists[t], loads[t], DT)
+        assert found.wrenches[t] == pytest.approx(wrench, rel=1e-11, abs=1e-13)  # rounded in another order
+    assert found.state == pytest.approx(state, rel=1e-11, abs=1e-20)
+    assert np.array_equal(again.wrenches, found.wrenches) and np.array_equal(again.state, found.state)
+
+
+def test_a_batch_is_a_loop():
+    model = model_of("parts")
+    states, twists = np.stack([drive(model, i)[0] for i in range(3)])[:, None], drive(model)[1]
+    loads = LOADS * np.array([[0.7], [1.0]])
+    bar, end_bar = bars_of(model)
+    inputs = autodiff.parameters_of(model) * np.array([0.9, 1.0])[:, None]
+    found = autodiff.rollout_gradient(model, states, twists, loads, DT, bar, end_bar, parameters=inputs)
+    assert [g.shape for g in found] == [np.shape(x) for x in (states, twists, loads, inputs)]
+    whole = [np.zeros_like(g) for g in found]
+    for i, j in np.ndindex(3, 2):
+        one = states[i, 0], twists, loads[j], DT
+        alone = autodiff.rollout_gradient(model, *one, bar, end_bar, parameters=inputs[j])
+        for total, at, g in zip(whole, ((i, 0), ..., j, j), alone, strict=True):
+            total[at] += g
+    for got, wanted in zip(found, whole, strict=True):
+        assert got == pytest.approx(wanted, rel=1e-11, abs=1e-12 * np.abs(wanted).max())
+
+
+# ---------------------------------------------------------------------- closed forms
+
+
+def test_the_torque_of_a_slide_follows_the_centre_of_pressure():
+    """`W = -mu f (1, 0, -y(f))` of a slide along x; y is linear in the load between two measured ones."""
+    x, y = np.array([[0.01, -0.01, 0.0], [0.0, 0.002, 0.012]])
+    shares = np.array([[0.6, 0.3, 0.1], [0.1, 0.3, 0.6]])
+    feet = pf.ContactPatch.points(np.stack([x, y], 1))
+    law = pf.LuGre(mu_c=0.8, mu_s=0.8, sigma_2=0.0)
+    for parts in (1, 3):
+        patch = pf.ContactPatch(feet.positions, feet.areas, pf.PressureMaps((1.0, 3.0), shares))
+        model = pf.ReducedModel(patch, law, parts=parts, segments=8, speeds=6)
+        load, bar = 1.6, np.array([[0.0, 0.0, 1.0]])
+        found = autodiff.rollout_gradient(model, None, [[0.01, 0.0, 0.0]], load, 1e6, bar)
+        low, high = shares @ y
+        centre, slope = low + (load - 1.0) * (high - low) / 2.0, (high - low) / 2.0
+        # Slopes of F err by 1e-10; along one direction maps are in single precision, whose part in the torque is 1e-6
+        # of the pressure's radius.
+        assert float(found.normal_force) == pytest.approx(0.8 * (centre + load * slope), rel=1e-6, abs=1e-8)
+
+
+@every_model
+def test_a_family_that_stays_as_it_is_has_the_gradient_of_a_fixed_patch(kind):
+    patch, law, parts = MODELS[kind]
+    measured = pf.ContactPatch.from_pressure({0.5: HEAVY, 4.0: 2.0 * HEAVY}, cell_size=1e-3)
+    fixed = pf.ContactPatch.from_pressure(HEAVY, cell_size=1e-3)
+    if patch.metric is not None:
+        measured, fixed = (p.with_friction_metric(patch.metric, asymmetry=patch.asymmetry) for p in (measured, fixed))
+    family = pf.ReducedModel(measured, law, parts=parts, segments=8, speeds=6)
+    single = pf.ReducedModel(fixed, law, parts=parts, segments=8, speeds=6)
+    if not np.array_equal(family.labels, single.labels):  # split by the load and by the area
+        family, single = (pf.ReducedModel(p, law, segments=8, speeds=6) for p in (measured, fixed))
+    state, twists = drive(family)
+    bars = bars_of(family)
+    loads = LOADS.copy()
+    loads[4] = 0.0
+    found, wanted = (autodiff.rollout_gradient(m, state, twists, loads, DT, *bars) for m in (family, single))
+    for got, want in zip(found, wanted, strict=True):
+        # weights at another load differ by rounding, and so do slopes of the shape: 1e-16 over the step of 1e-5
+        assert got == pytest.approx(want, rel=1e-8, abs=1e-9 * np.abs(want).max())
+
+
+# ---------------------------------------------------------------------- against differences
+
+
+@every_model
+def test_the_gradient_is_that_of_differences(kind):
+    model = model_of(kind)
+    (state, twists), loads = drive(model, 2), blended_loads(model)
+    parameters, bars = autodiff.parameters_of(model), bars_of(model)
+    inputs = {"state": state, "twist": twists, "normal_force": loads, "parameters": parameters}
+    units = {"state": 1e-7, "twist": 1e-3 * SIZES, "normal_force": 1.0, "parameters": np.maximum(parameters, 1e-3)}
+    gradient = autodiff.rollout_gradient(model, state, twists, loads, DT, *bars)
+
+    def value(name: str, change: np.ndarray) -> float:
+        of = {**inputs, name: inputs[name] + change * units[name]}
+        run = autodiff.rollout(model, *(of[n] for n in list(of)[:3]), DT, parameters=of["parameters"])
+        return float((bars[0] * run.wrenches).sum() + (bars[1] * run.state).sum())
+
+    for name, found in gradient._asdict().items():
+        scaled, expected = found * units[name], np.empty_like(found)
+        for index in np.ndindex(found.shape):
+            step = np.zeros_like(found)
+            step[index] = 1e-6
+            expected[index] = (value(name, step) - value(name, -step)) / 2e-6
+        # rounding of numbers near 100 by 1e-16/1e-6, and jumps of the curvature at squares of the map
+        allowed = 1e-6 * np.abs(scaled).max() + 1e-7
+        assert scaled == pytest.approx(expected, rel=1e-6, abs=allowed), name
+
+
+@pytest.mark.parametrize(("kind", "error"), [("elasto-plastic", 4e-3), ("parts", 1e-3)])
+def test_a_load_that_one_rung_serves_moves_on_along_the_blend(kind, error, monkeypatch):
+    """The blend of the very same rungs, read where it is as good as the nearer rung alone."""
+    patch, law, parts = MODELS[kind]
+    model = pf.ReducedModel(patch, law, parts=parts, segments=8, speeds=6, load_error=error)
+    state, twists = drive(model, 3)
+    bars = bars_of(model)
+    for rung in (1.0, 2.0):
+        at_rung = [part.shape.data for part in model.parts_at(rung)]
+        for load in (rung * (1.0 + 1e-6), rung * (1.0 - 1e-6)):
+            for part, data in zip(model.parts_at(load), at_rung, strict=True):
+                assert part.shape.other is None and np.array_equal(part.shape.data, data)
+            served = autodiff.rollout_gradient(model, state, twists, load, DT, *bars)
+            with monkeypatch.context() as patched:
+                for part in model._parts:
+                    patched.setattr(part._family, "_error", 1e-12)
+                    patched.setattr(part._family, "_shapes", {})
+                assert all(part.shape.blend > 0.0 for part in model.parts_at(load))
+                ends = [pf.rollout(model, state, twists, load * (1.0 + h), DT) for h in (5e-7, -5e-7)]
+            values = [(bars[0] * run.wrenches).sum() + (bars[1] * run.state).sum() for run in ends]
+            # 1e-6 of the way to the next rung, and rounding of numbers near 100 by 1e-16/1e-6
+            assert float(served.normal_force) == pytest.approx((values[0] - values[1]) / (1e-6 * load), rel=2e-6)
+
+
+def test_steady_sliding_changes_with_the_load_as_that_of_the_distributed_model():
+    """Over one long step, where the closure has no say."""
+    patch, law, twist = TIP.refined(3), pf.LuGre(mu_c=0.7, mu_s=1.2), 3e-3 * SIZES * [1.0, 0.5, 1.0]
+    exact, step = pf.DistributedModel(patch, law), 1e-5
+    for parts in (1, 2):
+        model = pf.ReducedModel(patch, law, parts=parts, segments=12, load_error=2e-3)
+        for load in (1.3, 2.2):
+            tangent = autodiff.rollout_tangent(model, None, twist[None], load, 1e6, normal_force_dot=1.0)
+            ends = [exact.step(exact.rest(), twist, load * (1.0 + h), 1e6)[1] for h in (step, -step)]
+            wanted = (ends[0] - ends[1]) / (2.0 * step * load)
+            held = ends[0] / load  # with the shape held
+            error, moved = (np.abs(a - wanted) * SIZES for a in (tangent.wrenches_dot[0], held))
+            # chords of the blend, and cells as areas in the one and points in the other
+            assert error.max() < 0.05 * moved.max()
+
+
+# ---------------------------------------------------------------------- backwards against forwards
+
+
+@every_model
+def test_forwards_is_the_transpose_of_backwards(kind):
+    """`<bar, J x> = <J' bar, x>` for changes x of all inputs, also at rest, without load and on rungs."""
+    model, random = model_of(kind), np.random.default_rng(3)
+    state, twists = drive(model, 4)
+    loads = LOADS.copy()
+    loads[[2, 5, 6]] = 0.0, 1.0, 2.0 - 1e-9
+    twists[8] = 0.0
+    parameters, (bar, end_bar) = autodiff.parameters_of(model), bars_of(model)
+    changes = [*drive(model, 5), random.normal(size=T), parameters * random.normal(size=len(parameters))]
+    found = autodiff.rollout_tangent(model, state, twists, loads, DT, *changes)
+    gradient = autodiff.rollout_gradient(model, state, twists, loads, DT, bar, end_bar)
+    forwards = [*(bar * found.wrenches_dot).ravel(), *(end_bar * found.state_dot).ravel()]
+    backwards = [*np.concatenate([(g * x).ravel() for g, x in zip(gradient, changes, strict=True)])]
+    assert sum(forwards) == pytest.approx(sum(backwards), abs=1e-11 * np.abs(forwards + backwards).sum())
+    plain = pf.rollout(model, state, twists, loads, DT)
+    assert found.wrenches == pytest.approx(plain.wrenches, rel=1e-11, abs=1e-13)
+
+
+@every_model
+def test_changes_of_parameters_are_the_sensitivities(kind):
+    model = model_of(kind)
+    state, twists = drive(model, 6)
+    by = autodiff.rollout_sensitivities(model, state, twists, LOADS, DT)
+    directions = np.eye(len(autodiff.parameter_names(model)))
+    found = autodiff.rollout_tangent(model, state, twists, LOADS, DT, parameters_dot=directions)
+    assert found.wrenches_dot == pytest.approx(np.moveaxis(by.d_wrenches, -1, 0), rel=1e-10, abs=1e-12)
+    assert by.wrenches == pytest.approx(pf.rollout(model, state, twists, LOADS, DT).wrenches, rel=1e-11, abs=1e-13)
+
+
+# ---------------------------------------------------------------------- ends of the range
+
+
+def test_without_load_the_slope_is_the_wrench_per_newton_of_a_small_one():
+    model = model_of("parts")
+    state, twists = drive(model, 7)
+    loads = LOADS.copy()
+    loads[4] = 0.0
+    bar = np.ones((T, 3)) * (np.arange(T) == 4)[:, None]
+    found = autodiff.rollout_gradient(model, state, twists, loads, DT, bar)
+    before = autodiff.rollout_states(model, state, twists, loads, DT).states[4]
+    small = model.step(before, twists[4], 1e-6, DT)[1].sum() / 1e-6
+    assert found.normal_force[4] == pytest.approx(small, rel=1e-9)
+    assert not found.twist.any() and not found.normal_force[:4].any()
+    alone = autodiff.rollout_gradient(model, before, twists[4:5], 0.0, DT, bar[4:5])
+    assert float(alone.normal_force) == pytest.approx(small, rel=1e-9)
+
+
+def test_a_contact_that_shrinks_to_a_point_has_finite_slopes():
+    pair = pf.ContactPatch.points([(0.0, 0.0), (0.011, 0.0)])
+    patch = pf.ContactPatch(pair.positions, pair.areas, pf.SoftFinger(c=0.01, n=1.0, k=2.0))
+    model = pf.ReducedModel(patch, ELASTIC, segments=8, speeds=6)
+    loads = np.array([1.1 * (1.0 - 1e-7), 1.1, 1.1 * (1.0 + 5e-6), 1.105, 0.5, 5e-324])
+    twists = np.tile([1e-3, 1e-3, 0.1], (len(loads), 1))
+    found = autodiff.rollout_gradient(model, None, twists, loads, DT, np.ones((len(loads), 3)))
+    assert all(np.isfinite(g).all() for g in found)
+    # a point has a wrench in proportion to its load
+    ends = [pf.rollout(model, None, twists, loads + h * (np.arange(6) == 4), DT).wrenches.sum() for h in (1e-3, -1e-3)]
+    assert found.normal_force[4] == pytest.approx((ends[0] - ends[1]) / 2e-3, rel=1e-9)
+
+
+def test_no_steps_and_shared_loads():
+    model = model_of("plain")
+    nothing = autodiff.rollout_gradient(model, None, np.empty((0, 3)), 1.0, DT, np.empty((0, 3)), np.ones(3))
+    assert np.array_equal(nothing.state, np.ones(3)) and nothing.normal_force == 0.0
+    state, twists = drive(model)
+    bar = np.ones((T, 3))
+    whole = autodiff.rollout_gradient(model, state, twists, 1.3, DT, bar)
+    each = autodiff.rollout_gradient(model, state, twists, np.full(T, 1.3), DT, bar)
+    assert float(whole.normal_force) == pytest.approx(each.normal_force.sum(), rel=1e-12)
+
+
+def test_a_map_for_each_load_is_refused_in_one_line():
+    model = pf.ReducedModel(TIP, ELASTIC, segments=8, speeds=6, load_error=0.0)
+    state, twists = drive(model)
+    with pytest.raises(InvalidValueError, match=r"^load_error must be > 0 for derivatives .*, got 0.0$") as caught:
+        autodiff.rollout_tangent(model, state, twists, LOADS, DT)
+    assert "\n" not in str(caught.value)
+    assert pf.rollout(model, state, twists[:2], LOADS[:2], DT).wrenches.shape == (2, 3)
