@@ -23,6 +23,7 @@ from pydrake.systems.framework import EventStatus
 from pydrake.systems.primitives import ConstantValueSource, ConstantVectorSource, LogVectorOutput
 
 from drake_scenes import CONTACTS, bare, gripped, on_the_floor, running, sliding
+from planarfriction import bench
 from planarfriction.adapters.drake import Patch, PatchFriction, prepare
 from planarfriction.errors import InvalidValueError, MissingExtraError
 
@@ -34,8 +35,8 @@ BOX = pf.ReducedModel(pf.ContactPatch.rectangle(0.1, cells=9), LAW)
 COULOMB = pf.LuGre(mu_c=0.3, sigma_0=1e5, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9)
 DISC = pf.ReducedModel(pf.ContactPatch.disc(radius=0.1, cells=41), COULOMB)
 
-MISFIT = 1e-7
-"""Twists [m/s] that Drake's own contact solver leaves open, to a part in a million of what moves in a step."""
+MISFIT = 1e-6
+"""Twists [m/s] that are taken where they get no closer: Drake's own contact solver leaves 1e-8 to 1e-7 open."""
 
 
 def _patches(box: str = "box") -> list[Patch]:
@@ -167,9 +168,36 @@ def test_answers_learnt_are_differences_of_steps():
     assert np.linalg.eigvalsh(free - asking._row.response)[0] > -1e-12
 
 
-def test_twists_and_wrenches_are_in_the_axes_of_the_frame():
+def test_what_comes_out_otherwise_than_bristles_saw_is_owed_to_them(monkeypatch):
+    """A box that has just touched down, with one correction alone; then a held box that owes its bristles a way."""
+    run = sliding("box", "point", 2e-3, BOX, tilt=0.3)
+    run.to(0.02)
+    run.plant.SetVelocities(run.context, [1.0, 0.0, 0.0, 0.1, 0.0, -0.1])
+    asking, shadow, given = run.friction._asking, run.friction._shadow, np.array([1e-4, 0.0, 0.0])
+    parts = run.friction._parts
+    own = run.own.get_discrete_state_vector().value().copy()
+    before = [own[parts[name]] for name in ("bristles", "wrenches", "force")]
+    monkeypatch.setattr("planarfriction.adapters.drake.asking.MISFIT", 1.0)
+    shadow.begin(run.plant.GetPositionsAndVelocities(run.context), {})
+    asked = asking.step(np.zeros(6), *before, given, own[parts["answers"]])
+    came_out = asking._rows @ shadow.step(asked.force)
+    assert abs(asked.owed).max() > 1e-5
+    np.testing.assert_allclose(asked.twists, came_out, atol=1e-9)
+    np.testing.assert_allclose(asking._row.twist + asked.owed, came_out + given, atol=1e-9)
+    monkeypatch.undo()
+    run = sliding("box", "point", 2e-3, BOX)
+    run.to(0.3)
+    own = run.own.get_discrete_state_vector().value().copy()
+    before = [own[run.friction._parts[name]] for name in ("bristles", "wrenches", "force")]
+    run.friction._shadow.begin(run.plant.GetPositionsAndVelocities(run.context), {})
+    asked = run.friction._asking.step(np.zeros(6), *before, given, own[run.friction._parts["answers"]])
+    np.testing.assert_allclose(asked.twists, -given, atol=2e-6)  # pulled back, but for what bristles give
+
+
+@pytest.mark.parametrize("contact", CONTACTS)
+def test_twists_and_wrenches_are_in_the_axes_of_the_frame(contact):
     """A disc that slides along x and has turned by a quarter slides along -y of its frame; friction is against it."""
-    run = sliding("disc", "point", 2e-3, DISC)
+    run = sliding("disc", contact, 2e-3, DISC)
     run.to(0.1)
     state = run.plant.GetPositions(run.context)
     state[:4] = np.sqrt([0.5, 0.0, 0.0, 0.5])
@@ -362,3 +390,5 @@ def test_without_drake_the_extra_is_named(monkeypatch):
     monkeypatch.delitem(sys.modules, "planarfriction.adapters.drake")
     with pytest.raises(MissingExtraError, match=r"pip install 'planarfriction\[drake\]'"):
         importlib.import_module("planarfriction.adapters.drake")
+    (line,) = bench.run(["drake.disc.point"])
+    assert line.value is None and "pip install 'planarfriction[drake]'" in line.baseline

@@ -9,16 +9,17 @@ import importlib
 import statistics
 import subprocess
 import sys
-import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.errors import MissingExtraError
+from planarfriction.experiments import drake_disc
 from planarfriction.experiments.baselines import lsoda_time, numpy_table, scipy_twist
 from planarfriction.experiments.four_feet import four_feet
+from planarfriction.experiments.measurement import Measurement, line, median, once
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.limit_surface import (
     LimitSurface,
@@ -37,22 +38,6 @@ WINDOW = 0.1
 _AGAINST_PUBLISHED = "the same of ReducedModelPublished"
 
 
-@dataclass(frozen=True)
-class Measurement:
-    """One line of the benchmark."""
-
-    name: str
-    value: float
-    """Median."""
-    unit: str
-    baseline: str
-    """What it is compared with, in words."""
-    baseline_value: float
-    """Median of the baseline, same unit."""
-    ratio: float
-    """How many times cheaper than the baseline: baseline over value, unless `baseline` says otherwise."""
-
-
 def run(
     names: Sequence[str] | None = None, *, full: bool = False, progress: Callable[[str], None] | None = None
 ) -> list[Measurement]:
@@ -65,24 +50,11 @@ def run(
     for name in chosen:
         if progress is not None:
             progress(name)
-        results.append(BENCHMARKS[name](name, full))
+        try:
+            results.append(BENCHMARKS[name](name, full))
+        except MissingExtraError as missing:
+            results.append(Measurement(name, None, "", f"left out: {missing}", None, None))
     return results
-
-
-def _line(name: str, value: float, unit: str, baseline: str, baseline_value: float) -> Measurement:
-    return Measurement(name, value, unit, baseline, baseline_value, baseline_value / value)
-
-
-def _median(action: Callable[[], Any], repeats: int, inner: int = 1) -> float:
-    """Median time of `action` [s] over `repeats` rounds of `inner` calls, after one call that does not count."""
-    action()
-    times = []
-    for _ in range(repeats):
-        begin = time.perf_counter()
-        for _ in range(inner):
-            action()
-        times.append((time.perf_counter() - begin) / inner)
-    return statistics.median(times)
 
 
 def _solver_time(scene: Scene, repeats: int, **options: Any) -> tuple[float, Solution]:
@@ -114,7 +86,7 @@ def _in_hand_distributed(name: str, full: bool) -> Measurement:
     scene = in_hand(DistributedModel(_disc(), _law()))
     value, _ = _solver_time(scene, 5)
     if full:
-        return _line(name, value, "s", "SciPy LSODA over the whole run", lsoda_time(scene, scene.t_end))
+        return line(name, value, "s", "SciPy LSODA over the whole run", lsoda_time(scene, scene.t_end))
     ours, _ = _solver_time(scene, 5, t_end=WINDOW)
     theirs = lsoda_time(scene, WINDOW)
     words = f"SciPy LSODA over the first {WINDOW} s (the ratio is to the {ours * 1e3:.2g} ms of that window here)"
@@ -128,19 +100,19 @@ def _in_hand_distributed_101(name: str, full: bool) -> Measurement:
         value, solution = _solver_time(in_hand(DistributedModel(patch, _law())), 3, t_end=WINDOW)
         trials = solution.statistics.steps + solution.statistics.rejections
         costs[cells] = value / trials / patch.cells * 1e9
-    return _line(name, costs[101], "ns per loaded cell and step", "the same on 21 x 21 cells", costs[21])
+    return line(name, costs[101], "ns per loaded cell and step", "the same on 21 x 21 cells", costs[21])
 
 
 def _in_hand_published(name: str, full: bool, load: Literal[1, 2] = 1) -> Measurement:
     scene = in_hand(ReducedModelPublished(_disc(), _law()), normal_force=in_hand_load(load))
     value, _ = _solver_time(scene, 9)
-    return _line(name, value, "s", "SciPy LSODA over the whole run", lsoda_time(scene, scene.t_end))
+    return line(name, value, "s", "SciPy LSODA over the whole run", lsoda_time(scene, scene.t_end))
 
 
 def _in_hand_reduced(name: str, full: bool) -> Measurement:
     kinds = (ReducedModel, ReducedModelPublished)
     value, theirs = (_solver_time(in_hand(kind(_disc(), _law())), 9)[0] for kind in kinds)
-    return _line(name, value, "s", "the published reduced model", theirs)
+    return line(name, value, "s", "the published reduced model", theirs)
 
 
 def _soft() -> ContactPatch:
@@ -157,34 +129,28 @@ def _in_hand_load_family(name: str, full: bool) -> Measurement:
     family, rebuilt = ReducedModel(soft, _law()), ReducedModel(soft, _law(), load_error=0.0)
     scenes = [in_hand(family), in_hand(ReducedModel(fixed, _law()))]
     simulate(scenes[1], t_end=0.02)
-    built = _once(lambda: simulate(scenes[0]))
-    every = _once(lambda: simulate(in_hand(rebuilt)))
-    times = np.array([[_once(lambda scene=scene: simulate(scene)) for scene in scenes] for _ in range(25)])
+    built = once(lambda: simulate(scenes[0]))
+    every = once(lambda: simulate(in_hand(rebuilt)))
+    times = np.array([[once(lambda scene=scene: simulate(scene)) for scene in scenes] for _ in range(25)])
     value, theirs = np.median(times, axis=0).tolist()
     words = (
         f"the same with a fixed shape (both: all of simulate); the family's {len(family.load_rungs)} maps took "
         f"{built:.2g} s before, a map for every load in place of them takes {every:.2g} s"
     )
-    return _line(name, value, "s", words, theirs)
-
-
-def _once(action: Callable[[], Any]) -> float:
-    begin = time.perf_counter()
-    action()
-    return time.perf_counter() - begin
+    return line(name, value, "s", words, theirs)
 
 
 def _in_hand_load_dependent(name: str, full: bool) -> Measurement:
     soft = _soft()
-    rebuilt = _median(lambda: simulate(in_hand(ReducedModelPublished(soft, _law()))), 3)
-    fixed = _median(lambda: simulate(in_hand(ReducedModelPublished(_disc(), _law()))), 3)
-    return _line(name, rebuilt, "s", "the same with a fixed shape (both: all of simulate)", fixed)
+    rebuilt = median(lambda: simulate(in_hand(ReducedModelPublished(soft, _law()))), 3)
+    fixed = median(lambda: simulate(in_hand(ReducedModelPublished(_disc(), _law()))), 3)
+    return line(name, rebuilt, "s", "the same with a fixed shape (both: all of simulate)", fixed)
 
 
 def _table_build(name: str, full: bool) -> Measurement:
     patch = _disc()
-    value = _median(lambda: LimitSurfaceTablePublished(patch).numbers, 31)
-    return _line(name, value, "s", "the same nodes by NumPy, node by node", _median(lambda: numpy_table(patch), 3))
+    value = median(lambda: LimitSurfaceTablePublished(patch).numbers, 31)
+    return line(name, value, "s", "the same nodes by NumPy, node by node", median(lambda: numpy_table(patch), 3))
 
 
 def _twist(name: str, full: bool, kind: type[LimitSurface], count: int | None = None) -> Measurement:
@@ -193,10 +159,10 @@ def _twist(name: str, full: bool, kind: type[LimitSurface], count: int | None = 
     surface = kind(ContactPatch.polygon(corners, 21))
     wrenches = np.random.default_rng(7).normal(size=(count or 1, 3)) * [1.0, 1.0, 0.01]
     asked = wrenches[0] if count is None else wrenches
-    value = _median(lambda: surface.twist(asked), 15, 1 if count else 500) / len(wrenches)
-    theirs = _median(lambda: scipy_twist(surface, wrenches[0]), 5)
+    value = median(lambda: surface.twist(asked), 15, 1 if count else 500) / len(wrenches)
+    theirs = median(lambda: scipy_twist(surface, wrenches[0]), 5)
     words = "SciPy (trust-exact) on the dissipation over the plane of unit power, one wrench"
-    return _line(name, value * 1e6, "us per wrench", words, theirs * 1e6)
+    return line(name, value * 1e6, "us per wrench", words, theirs * 1e6)
 
 
 def _compiled_loop(model: ReducedModel | ReducedModelPublished, twists: np.ndarray) -> float:
@@ -206,7 +172,7 @@ def _compiled_loop(model: ReducedModel | ReducedModelPublished, twists: np.ndarr
     inputs = checked(model, None, twists, 1.0, 1e-4, None)
     compiled, family = inputs.compiled(), inputs.parts[0].family
     wrench, states = np.empty((1, *twists.shape)), np.empty((len(inputs.parts), 1, 0, 3))
-    return _median(lambda: family.rollout(compiled, (0, 1), inputs.state.copy(), wrench, states), 9)
+    return median(lambda: family.rollout(compiled, (0, 1), inputs.state.copy(), wrench, states), 9)
 
 
 def _published_loop(twists: np.ndarray) -> float:
@@ -216,7 +182,7 @@ def _published_loop(twists: np.ndarray) -> float:
 def _step_published_loop(name: str, full: bool) -> Measurement:
     twists = _mixed_twists(20_000)
     loop, call = _published_loop(twists), _python_step(ReducedModelPublished(_disc(), _law()), 1000)
-    return _line(name, loop / len(twists) * 1e6, "us", "one Python call of the same step", call * 1e6)
+    return line(name, loop / len(twists) * 1e6, "us", "one Python call of the same step", call * 1e6)
 
 
 def _step_distributed_loop(name: str, full: bool) -> Measurement:
@@ -228,38 +194,38 @@ def _step_distributed_loop(name: str, full: bool) -> Measurement:
     z = model.rest().reshape(-1)
     scratch, wrench = np.empty_like(z), np.empty_like(twists)
     arguments = cells, 1.0, 1e-4, scratch, wrench
-    loop = _median(lambda: kernels.step_sequence(model.law.numbers, z, twists, *arguments), 9)
+    loop = median(lambda: kernels.step_sequence(model.law.numbers, z, twists, *arguments), 9)
     call = _python_step(model, 100)
-    return _line(name, loop / len(twists) * 1e6, "us", "one Python call of the same step", call * 1e6)
+    return line(name, loop / len(twists) * 1e6, "us", "one Python call of the same step", call * 1e6)
 
 
 def _python_step(model: Any, inner: int) -> float:
     state, twist = model.rest(), (0.01, 0.0, 1.0)
-    return _median(lambda: model.step(state, twist, 1.0, 1e-3), 9, inner)
+    return median(lambda: model.step(state, twist, 1.0, 1e-3), 9, inner)
 
 
 def _step_published_call(name: str, full: bool) -> Measurement:
     model = ReducedModelPublished(_disc(), _law())
     state, twist = model.rest(), np.array([0.01, 0.0, 1.0])
-    rate = _median(lambda: model.rate(state, twist, 1.0), 9, 100)
-    return _line(name, _python_step(model, 2000) * 1e6, "us", "one Python call of rate", rate * 1e6)
+    rate = median(lambda: model.rate(state, twist, 1.0), 9, 100)
+    return line(name, _python_step(model, 2000) * 1e6, "us", "one Python call of rate", rate * 1e6)
 
 
 def _step_reduced_loop(name: str, full: bool, parts: int = 1) -> Measurement:
     twists = _mixed_twists(20_000)
     ours, theirs = _compiled_loop(ReducedModel(_disc(), _law(), parts=parts), twists), _published_loop(twists)
-    return _line(name, ours / len(twists) * 1e6, "us", _AGAINST_PUBLISHED, theirs / len(twists) * 1e6)
+    return line(name, ours / len(twists) * 1e6, "us", _AGAINST_PUBLISHED, theirs / len(twists) * 1e6)
 
 
 def _step_reduced_call(name: str, full: bool) -> Measurement:
     ours, theirs = (_python_step(model(_disc(), _law()), 2000) for model in (ReducedModel, ReducedModelPublished))
-    return _line(name, ours * 1e6, "us", _AGAINST_PUBLISHED, theirs * 1e6)
+    return line(name, ours * 1e6, "us", _AGAINST_PUBLISHED, theirs * 1e6)
 
 
 def _gradient_reduced(name: str, full: bool) -> Measurement:
     """A roll-out with its gradient, as `gradient.published`."""
     ours, theirs = (_value_and_gradient(model(_disc(), _law())) for model in (ReducedModel, ReducedModelPublished))
-    return _line(name, ours, "s", _AGAINST_PUBLISHED, theirs)
+    return line(name, ours, "s", _AGAINST_PUBLISHED, theirs)
 
 
 def _value_and_gradient(model: ReducedModel | ReducedModelPublished) -> float:
@@ -273,7 +239,7 @@ def _value_and_gradient(model: ReducedModel | ReducedModelPublished) -> float:
         _, wrenches, states = autodiff.rollout_states(model, model.rest(), twists, loads, dt)
         autodiff.rollout_gradient(model, model.rest(), twists, loads, dt, wrenches, states=states)
 
-    return _median(value_and_gradient, 15)
+    return median(value_and_gradient, 15)
 
 
 def _gradient_published(name: str, full: bool) -> Measurement:
@@ -284,12 +250,12 @@ def _gradient_published(name: str, full: bool) -> Measurement:
     loads = np.full(len(twists), 2.0)
     value = _value_and_gradient(model)
     try:
-        return _line(name, value, "s", "PyTorch, eager, the same roll-out", _eager_gradient(model, twists, dt, full))
+        return line(name, value, "s", "PyTorch, eager, the same roll-out", _eager_gradient(model, twists, dt, full))
     except ImportError:
         inputs = len(autodiff.PARAMETERS) + 3 + 4 * len(twists)
-        once = _median(lambda: autodiff.rollout(model, model.rest(), twists, loads, dt), 15)
+        once = median(lambda: autodiff.rollout(model, model.rest(), twists, loads, dt), 15)
         words = f"central differences, 2 x {inputs} roll-outs of {once * 1e3:.2g} ms (PyTorch is not installed)"
-        return _line(name, value, "s", words, 2 * inputs * once)
+        return line(name, value, "s", words, 2 * inputs * once)
 
 
 def _eager_gradient(model: ReducedModelPublished, twists: np.ndarray, dt: float, full: bool) -> float:
@@ -306,7 +272,7 @@ def _eager_gradient(model: ReducedModelPublished, twists: np.ndarray, dt: float,
         wrenches = front.rollout(module, start, profile, loads, dt, method="eager").wrenches
         (0.5 * wrenches * wrenches).sum().backward()
 
-    return _median(value_and_gradient, 3 if full else 1)
+    return median(value_and_gradient, 3 if full else 1)
 
 
 def _gradient_published_batch(name: str, full: bool) -> Measurement:
@@ -333,8 +299,8 @@ def _batch(model: ReducedModel | ReducedModelPublished) -> tuple[float, float]:
         _, wrenches, states = autodiff.rollout_states(model, model.rest(), twists, loads, dt)
         autodiff.rollout_gradient(model, model.rest(), twists, loads, dt, wrenches, states=states)
 
-    both = _median(value_and_gradient, 5)
-    once = _median(lambda: autodiff.rollout(model, model.rest(), twists, loads, dt), 5)
+    both = median(value_and_gradient, 5)
+    once = median(lambda: autodiff.rollout(model, model.rest(), twists, loads, dt), 5)
     return 1e-6 * contacts * steps / both, 1e-6 * contacts * steps / once
 
 
@@ -343,17 +309,17 @@ def _step_reduced_several(name: str, full: bool) -> Measurement:
     model = ReducedModel(_disc(), _law())
     one, four = (np.zeros(3), (0.01, 0.0, 1.0), 1.0), (np.zeros((4, 3)), np.tile((0.01, 0.0, 1.0), (4, 1)), np.ones(4))
     action = (lambda: model.step(*four, 1e-3)) if name.endswith("four") else lambda: model.step_jacobians(*one, 1e-3)
-    value = _median(action, 9, 2000)
-    return _line(name, value * 1e6, "us", "one Python call of step", _python_step(model, 2000) * 1e6)
+    value = median(action, 9, 2000)
+    return line(name, value * 1e6, "us", "one Python call of step", _python_step(model, 2000) * 1e6)
 
 
 def _coupled(name: str, full: bool, environments: int = 1) -> Measurement:
     """A box on four feet slides and turns: an implicit step, in one Python call for all environments."""
     model = ReducedModel(_disc(), _law())
     step = four_feet(model, environments)
-    value, rounds = _median(step, 9, 1 + 500 // environments) / environments, float(step().iterations.mean())
+    value, rounds = median(step, 9, 1 + 500 // environments) / environments, float(step().iterations.mean())
     words = f"one Python call of a model's step (four patches, {rounds:.1f} rounds)"
-    return _line(name, value * 1e6, "us per step", words, _python_step(model, 2000) * 1e6)
+    return line(name, value * 1e6, "us per step", words, _python_step(model, 2000) * 1e6)
 
 
 def _import(name: str, full: bool) -> Measurement:
@@ -363,7 +329,7 @@ def _import(name: str, full: bool) -> Measurement:
         return float(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
 
     ours, theirs = (statistics.median(seconds(module) for _ in range(7)) for module in ("planarfriction", "numpy"))
-    return _line(name, ours, "s", "import numpy", theirs)
+    return line(name, ours, "s", "import numpy", theirs)
 
 
 BENCHMARKS: dict[str, Callable[[str, bool], Measurement]] = {
@@ -389,6 +355,8 @@ BENCHMARKS: dict[str, Callable[[str, bool], Measurement]] = {
     "step.reduced.four": _step_reduced_several,
     "coupled.four_feet.call": _coupled,
     "coupled.four_feet.batch": lambda name, full: _coupled(name, full, 1000),
+    "drake.disc.point": drake_disc.measure,
+    "drake.disc.hydroelastic": drake_disc.measure,
     "gradient.published": _gradient_published,
     "gradient.published.batch": _gradient_published_batch,
     "gradient.reduced": _gradient_reduced,

@@ -27,6 +27,8 @@ NOTICED = 1e-6
 QUIET = 1e-9
 """Changes of twists [m/s] that are not worth asking for: a thousandth of a micrometre in a second."""
 
+_ONES = np.ones(3)
+
 
 class Asked(NamedTuple):
     """The end of a step: as flat vectors, patch by patch."""
@@ -39,7 +41,9 @@ class Asked(NamedTuple):
     """How far the twists that came out are from those that the bristles have seen."""
     twists: np.ndarray
     loads: np.ndarray
-    answers: np.ndarray
+    touching: list[bool]
+    twist_answers: np.ndarray
+    load_answers: np.ndarray
     """How twists and loads answered in the end, for the next step to start from."""
     report: tuple[float, ...]
     """Passes, iterations, residual, misfit, whether the step in contact space has converged."""
@@ -80,7 +84,7 @@ class Asking:
                 if passes == 1:
                     self._answer_as_before(answers)
                 wrench, owed, solved, misfit = self._pressed(wrench), self._pressed(owed), False, np.inf
-            twist, load = self._rows @ velocity + owed, np.maximum((self._normals * pushes).sum(axis=1), 0.0)
+            twist, load = self._rows @ velocity + owed, np.maximum((self._normals * pushes) @ _ONES, 0.0)
             if solved:
                 off = twist - row.twist
                 last, misfit = misfit, self._speed(off, load - row.load)
@@ -95,13 +99,13 @@ class Asking:
             iterations += row.solve()
             change, wrench, solved = row.wrench - wrench, row.wrench.copy(), True
             force = wrench @ self._rows
-            moved = float(abs((abs(turned) + abs(row.response @ change)) * self._levers).max())
+            moved = self._speed(turned + row.response @ change)
             if moved <= QUIET:
                 misfit, off, twist = moved, 0.0 * owed, row.twist
                 break
         report = passes, iterations, row.residual[0], misfit, row.converged[0]
-        kept = np.concatenate([self._touching, row.response.ravel(), row.load_response.ravel()])
-        return Asked(row.new, wrench, force, off, twist - owed, load, kept, report)
+        answers = self._touching, row.response.ravel(), row.load_response.ravel()
+        return Asked(row.new, wrench, force, off, twist - owed, load, *answers, report)
 
     def _forget(self) -> None:
         self._touching = [False] * len(self._touching)
@@ -110,7 +114,9 @@ class Asking:
 
     def _touch(self, pushes: np.ndarray) -> bool:
         """Place patches that touch for the first time in this step; whether there are any."""
-        new = [p for p, touching in enumerate(self._touching) if not touching and pushes[p].any()]
+        if all(self._touching):
+            return False
+        new = [p for p, touching in enumerate(self._touching) if not touching and pushes[p] @ pushes[p] > 0.0]
         for p in new:
             self._rows[3 * p : 3 * p + 3], self._normals[p] = self._shadow.rows(p, pushes[p])
             self._touching[p] = True
@@ -135,10 +141,14 @@ class Asking:
         """Of the patches that touch; zeros of the others."""
         return wrench if all(self._touching) else np.where(np.repeat(self._touching, 3), wrench, 0.0)
 
-    def _speed(self, twist: np.ndarray, load: np.ndarray) -> float:
-        """Largest of changes of twists, and of loads in the speed that they could cause [m/s]."""
-        caused = np.diagonal(self._row.response)[::3] * load
-        return float(max(abs(twist * self._levers).max(), abs(caused).max()))
+    def _speed(self, twist: np.ndarray, load: np.ndarray | None = None) -> float:
+        """Size of changes of twists, and of loads in the speed that they could cause [m/s]."""
+        speeds = self._levers * twist
+        squares = speeds @ speeds
+        if load is not None:
+            caused = self._row.response.diagonal()[::3] * load
+            squares += caused @ caused
+        return math.sqrt(squares)
 
     def _learn(self, wrench: np.ndarray, twist: np.ndarray, load: np.ndarray) -> None:
         """Correct the answers by changes that came out: of twists symmetrically, of rank one.

@@ -6,6 +6,7 @@ before the plant itself steps.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any
 
@@ -85,14 +86,13 @@ class Shadow:
 
     def rows(self, p: int, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Jacobian of the twist of a patch `[3, nv]`, in the axes of its frame, and the normal."""
-        normal = force / np.sqrt(force @ force)
+        normal = force / math.sqrt(force @ force)
         frame, world, origin = self._frames[p], self.plant.world_frame(), np.zeros(3)
-        pose = frame.CalcPoseInWorld(self._begin)
-        x = pose.rotation().matrix()[:, 0]
+        x = frame.CalcRotationMatrixInWorld(self._begin).matrix()[:, 0]
         x = x - normal * (x @ normal)
-        x /= np.sqrt(x @ x)
+        x /= math.sqrt(x @ x)
         if self._centres[p] == "contact":
-            origin = pose.inverse().multiply(self._centre(p))
+            origin = frame.CalcPoseInWorld(self._begin).inverse().multiply(self._centre(p))
         spatial = self.plant.CalcJacobianSpatialVelocity(
             self._begin, JacobianWrtVariable.kV, frame, origin, self._others[p], world
         )

@@ -1,0 +1,48 @@
+"""One line of `planarfriction bench`, and how times are taken for it."""
+
+from __future__ import annotations
+
+import statistics
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Measurement:
+    """One line of the benchmark; without numbers where what it needs is not installed, as `baseline` then says."""
+
+    name: str
+    value: float | None
+    """Median."""
+    unit: str
+    baseline: str
+    """What it is compared with, in words."""
+    baseline_value: float | None
+    """Median of the baseline, same unit."""
+    ratio: float | None
+    """How many times cheaper than the baseline: baseline over value, unless `baseline` says otherwise."""
+
+
+def line(name: str, value: float, unit: str, baseline: str, baseline_value: float) -> Measurement:
+    return Measurement(name, value, unit, baseline, baseline_value, baseline_value / value)
+
+
+def median(action: Callable[[], Any], repeats: int, inner: int = 1) -> float:
+    """Median time of `action` [s] over `repeats` rounds of `inner` calls, after one call that does not count."""
+    action()
+    times = []
+    for _ in range(repeats):
+        begin = time.perf_counter()
+        for _ in range(inner):
+            action()
+        times.append((time.perf_counter() - begin) / inner)
+    return statistics.median(times)
+
+
+def once(action: Callable[[], Any]) -> float:
+    """Time of `action` [s]."""
+    begin = time.perf_counter()
+    action()
+    return time.perf_counter() - begin
