@@ -1,0 +1,259 @@
+"""Scenes in MuJoCo in which friction decides: held, shaken, spun to rest, turned in the hand, carried on a tray.
+
+Each comes as a model with MuJoCo's own friction at given settings, or with patches. Needs MuJoCo when it is built.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any, Literal, NamedTuple
+
+import numpy as np
+
+from planarfriction.laws import LuGre
+from planarfriction.models import FrictionModel, ReducedModel
+from planarfriction.patch import ContactPatch
+from planarfriction.scenes.ready import GRAVITY, in_hand_load
+
+PADS = ("sphere", "box", "cylinder")
+
+STARTS = ((1.0, 10.0), (1.0, 20.0), (1.0, 3.0))
+"""Of the disc: speed [m/s] and spin [rad/s]."""
+
+
+class Native(NamedTuple):
+    """Settings of MuJoCo's own friction."""
+
+    cone: Literal["pyramidal", "elliptic"] = "elliptic"
+    impratio: float = 10.0
+    noslip: int = 0
+    condim: int = 4
+    solref: float = 0.02
+    """Time constant of its contacts [s]."""
+
+
+@dataclass(frozen=True)
+class MujocoScene:
+    """A scene: its model as text, where its patches are, and what drives it."""
+
+    text: Callable[[Native, float, str], str]
+    """MJCF for settings of contacts, a time step and an integrator."""
+    patches: tuple[tuple[str, tuple[str, str]], ...]
+    """Site and pair of geoms of each patch."""
+    model: FrictionModel
+    """Friction of each."""
+    control: Callable[[float], Sequence[float]]
+    """Of the actuators at a time [s]."""
+    time: float
+    """How long it lasts [s]."""
+    settle: float = 0.0
+    """Time [s] before it, with the controls of time 0."""
+    weightless: bool = False
+    """Whether gravity begins after that."""
+    start: tuple[float, ...] | None = None
+    """Velocities then; None as they are."""
+
+    def native(self, settings: Native, dt: float = 2e-3, integrator: str = "Euler") -> tuple[Any, Any]:
+        """Model and data with MuJoCo's own friction."""
+        import mujoco
+
+        m = mujoco.MjModel.from_xml_string(self.text(settings, dt, integrator))
+        return m, mujoco.MjData(m)
+
+    def ours(
+        self, dt: float = 2e-3, integrator: str = "Euler", solref: float = 0.02, model: FrictionModel | None = None
+    ) -> tuple[Any, Any, Any]:
+        """Model, data, and the friction of its patches; `model` in place of the scene's own."""
+        import mujoco
+
+        from planarfriction.adapters.mujoco import Friction, Patch, prepare
+
+        patches = [Patch(model or self.model, site=site, geoms=geoms) for site, geoms in self.patches]
+        spec = mujoco.MjSpec.from_string(self.text(Native(condim=1, impratio=1.0, solref=solref), dt, integrator))
+        prepare(spec, patches)
+        m = spec.compile()
+        return m, mujoco.MjData(m), Friction(m, patches)
+
+    def run(self, m: Any, d: Any, step: Callable[[], None]) -> np.ndarray:
+        """Positions `[steps + 1, nq]`, from when it has settled: `step` is `mj_step` or takes its place."""
+        gravity, dt = m.opt.gravity.copy(), float(m.opt.timestep)
+        if self.weightless:
+            m.opt.gravity[:] = 0.0
+        if m.nu:
+            d.ctrl[:] = self.control(0.0)
+        for _ in range(round(self.settle / dt)):
+            step()
+        m.opt.gravity[:] = gravity
+        if self.start is not None:
+            d.qvel[:] = self.start
+        path = [d.qpos.copy()]
+        for i in range(round(self.time / dt)):
+            if m.nu:
+                d.ctrl[:] = self.control(i * dt)
+            step()
+            path.append(d.qpos.copy())
+        return np.array(path)
+
+
+def _document(settings: Native, dt: float, integrator: str, torsion: float, body: str, mu: float) -> str:
+    """A whole model; `torsion` is mu times the lever arm of friction against spin [m]."""
+    options = f'cone="{settings.cone}" impratio="{settings.impratio}" noslip_iterations="{settings.noslip}"'
+    contact = f'condim="{settings.condim}" friction="{mu} {torsion} 0" solref="{settings.solref} 1"'
+    return f"""<mujoco><option timestep="{dt}" integrator="{integrator}" {options}/>
+    <default><geom {contact}/></default>{body}</mujoco>"""
+
+
+def _pad(radius: float, mu: float, sigma_0: float) -> ReducedModel:
+    law = LuGre(mu_c=mu, mu_s=mu, sigma_0=sigma_0, sigma_1=math.sqrt(sigma_0) * 0.8, sigma_2=0.0, elasto_plastic=0.9)
+    return ReducedModel(ContactPatch.disc(radius=radius, cells=21), law)
+
+
+_SHAPES = {
+    "sphere": (0.01, 'type="sphere" size="0.01"'),
+    "box": (0.005, 'type="box" size="0.005 0.008862 0.008862"'),
+    "cylinder": (0.005, 'type="cylinder" size="0.01 0.005" euler="0 90 0"'),
+}
+"""Depth [m] of pads with the area of a disc of radius 0.01 m, and their geoms."""
+
+_BLOCK = """<geom name="block" type="box" size="0.01 0.04 0.06" mass="0.2" contype="0" conaffinity="1"/>
+    <site name="left" pos="-0.01 {0} 0" zaxis="1 0 0"/><site name="right" pos="0.01 {0} 0" zaxis="-1 0 0"/>"""
+
+_HELD = ("left", ("pad left", "block")), ("right", ("pad right", "block"))
+
+
+def grip(pad: str = "box", *, squeeze: float = 3.0, beside: float = 4e-3) -> MujocoScene:
+    """A block of 0.2 kg between two pads that press with `squeeze` [N], held `beside` its centre of mass [m]."""
+    depth, geom = _SHAPES[pad]
+    pads = "".join(
+        f"""<body pos="{sign * (0.01 + depth)} {beside} 0.5"><joint name="{side}" type="slide" axis="{-sign} 0 0"/>
+        <geom name="pad {side}" {geom} mass="0.05" contype="1" conaffinity="0"/></body>"""
+        for side, sign in (("left", -1), ("right", 1))
+    )
+    # one point where a cylinder touches: several jump about from step to step, and the block rocks by 1e-4 degrees
+    body = f"""<option><flag multiccd="disable"/></option>
+    <worldbody><body name="block" pos="0 0 0.5"><freejoint/>{_BLOCK.format(beside)}</body>{pads}</worldbody>
+    <actuator><motor joint="left"/><motor joint="right"/></actuator>"""
+    return MujocoScene(
+        lambda settings, dt, integrator: _document(settings, dt, integrator, 2e-2 / 3.0, body, 1.0),
+        _HELD,
+        _pad(0.01, 1.0, 1e6),
+        lambda t: (squeeze, squeeze),
+        time=5.0,
+        settle=0.6,
+        weightless=True,
+    )
+
+
+SHAKEN = 3.0
+"""How long the gripper is shaken [s]."""
+
+
+def shaken(pad: str = "box", *, squeeze: float = 6.0) -> MujocoScene:
+    """The same block in a gripper that is moved up and down, and turned, for 3 s, and then held for 2 s."""
+    depth, geom = _SHAPES[pad]
+    fingers = "".join(
+        f"""<body pos="{sign * (0.01 + depth)} 0 0">
+        <joint name="{side}" type="slide" axis="{-sign} 0 0" damping="20"/>
+        <geom name="pad {side}" {geom} mass="0.05" contype="1" conaffinity="0"/></body>"""
+        for side, sign in (("left", -1), ("right", 1))
+    )
+    body = f"""<worldbody><body name="arm" pos="0 0 0.5"><joint name="lift" type="slide" axis="0 0 1" damping="20"/>
+    <joint name="turn" axis="1 0 0" damping="1"/><inertial pos="0 0 0.1" mass="1" diaginertia="0.01 0.01 0.01"/>
+    {fingers}</body><body name="block" pos="0 0 0.5"><freejoint/>{_BLOCK.format(0.0)}</body></worldbody>
+    <actuator><motor joint="left"/><motor joint="right"/><position joint="lift" kp="5000" dampratio="1"/>
+    <position joint="turn" kp="200" dampratio="1"/></actuator>"""
+
+    def control(t: float) -> tuple[float, ...]:
+        fades = 1.0 if t < SHAKEN else math.exp(-5.0 * (t - SHAKEN))
+        lift, turn = 0.02 * math.sin(4.0 * math.pi * t), 0.1 * math.sin(2.6 * math.pi * t)
+        return squeeze, squeeze, fades * lift, fades * turn
+
+    return MujocoScene(
+        lambda settings, dt, integrator: _document(settings, dt, integrator, 2e-2 / 3.0, body, 1.0),
+        _HELD,
+        _pad(0.01, 1.0, 1e6),
+        control,
+        time=5.0,
+        settle=0.6,
+        weightless=True,
+    )
+
+
+def in_the_hand(d: Any) -> np.ndarray:
+    """Where the block of `shaken` is in the gripper [m]."""
+    arm = d.body("arm")
+    return arm.xmat.reshape(3, 3).T @ (d.body("block").xpos - arm.xpos)
+
+
+def disc(speed: float, spin: float, *, radius: float = 0.1, mu: float = 0.3) -> MujocoScene:
+    """A disc of 0.2 kg that starts with `speed` [m/s] and `spin` [rad/s] on the floor; `coulomb_disc.stop` says where
+    it comes to rest."""
+    inertia = 0.5 * 0.2 * radius**2
+    body = f"""<worldbody><geom name="floor" type="plane" size="9 9 .1"/><body name="disc" pos="0 0 0.002">
+    <joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/><joint type="slide" axis="0 0 1"/>
+    <joint type="hinge" axis="0 0 1"/><inertial pos="0 0 0" mass="0.2" diaginertia="{inertia / 2} {inertia / 2} {inertia}"/>
+    <geom name="disc" type="cylinder" size="{radius} 0.002" mass="0"/><site name="disc" pos="0 0 -0.002"/></body>
+    </worldbody>"""
+    law = LuGre(mu_c=mu, mu_s=mu, sigma_0=1e5, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9)
+    return MujocoScene(
+        lambda settings, dt, integrator: _document(settings, dt, integrator, 0.0, body, mu),
+        (("disc", ("floor", "disc")),),
+        ReducedModel(ContactPatch.disc(radius=radius, cells=31), law),
+        lambda t: (),
+        time=1.2,
+        settle=0.6,
+        start=(speed, 0.0, 0.0, spin),
+    )
+
+
+def plate(load: Literal[1, 2] = 1, *, model: FrictionModel | None = None) -> MujocoScene:
+    """The published in-hand run: a plate held upright between two pads slips and turns as the grip varies.
+
+    Its plane is that of x and y, gravity is along -y; positions are x, y, z, the angle, and that of the upper pad.
+    """
+    body = f"""<option gravity="0 {-GRAVITY} 0"/><worldbody><geom name="lower" type="sphere" size="0.01" pos="0 0 -0.012"
+    contype="1" conaffinity="0"/><site name="lower" pos="0 0 -0.002"/>
+    <body name="upper" pos="0 0 0.012"><joint name="press" type="slide" axis="0 0 -1"/>
+    <geom name="upper" type="sphere" size="0.01" mass="0.01" contype="1" conaffinity="0"/>
+    <site name="upper" pos="0 0 -0.01"/></body>
+    <body name="plate" pos="0.002 0 0"><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/>
+    <joint type="slide" axis="0 0 1"/><joint type="hinge" axis="0 0 1"/>
+    <inertial pos="0 0 0" mass="0.2" diaginertia="1e-3 1e-3 {0.2 / 12.0 * (0.15**2 + 0.08**2)}"/>
+    <geom name="plate" type="box" size="0.075 0.04 0.002" mass="0" contype="0" conaffinity="1"/></body></worldbody>
+    <actuator><motor joint="press"/></actuator>"""
+    force = in_hand_load(load)
+    own = ReducedModel(ContactPatch.disc(radius=0.01, cells=21), LuGre(mu_s=1.2, elasto_plastic=0.9))
+    return MujocoScene(
+        lambda settings, dt, integrator: _document(settings, dt, integrator, 2e-2 / 3.0, body, 1.0),
+        (("lower", ("lower", "plate")), ("upper", ("upper", "plate"))),
+        own if model is None else model,
+        lambda t: (float(force(t)),),
+        time=2.0,
+        settle=0.6,
+        weightless=True,
+    )
+
+
+def tray(blocks: int = 2) -> MujocoScene:
+    """A tray shaken to and fro with `blocks` of 0.1 kg on it, which slip and turn; its first two positions are its own."""
+    places = [(0.1 * (i % 4 - 1.5), 0.1 * (i // 4 - 0.5)) for i in range(blocks)]
+    carried = "".join(
+        f"""<body name="block {i}" pos="{x} {y} 0.025"><freejoint/>
+        <geom name="block {i}" type="box" size="0.02 0.02 0.02" mass="0.1" contype="0" conaffinity="1"/>
+        <site name="block {i}" pos="0 0 -0.02"/></body>"""
+        for i, (x, y) in enumerate(places)
+    )
+    body = f"""<worldbody><body name="tray"><joint name="x" type="slide" axis="1 0 0" damping="20"/>
+    <joint name="y" type="slide" axis="0 1 0" damping="20"/>
+    <geom name="tray" type="box" size="0.25 0.15 0.005" mass="1" contype="1" conaffinity="0"/></body>{carried}</worldbody>
+    <actuator><position joint="x" kp="5000" dampratio="1"/><position joint="y" kp="5000" dampratio="1"/></actuator>"""
+    return MujocoScene(
+        lambda settings, dt, integrator: _document(settings, dt, integrator, 0.006, body, 0.4),
+        tuple((f"block {i}", ("tray", f"block {i}")) for i in range(blocks)),
+        _pad(0.02, 0.4, 1e5),
+        lambda t: (0.02 * math.sin(6.0 * math.pi * t), 0.02 * math.sin(4.6 * math.pi * t)),
+        time=2.0,
+        settle=0.4,
+    )
