@@ -190,10 +190,10 @@ def in_the_hand(d: Any) -> np.ndarray:
 def disc(speed: float, spin: float, *, radius: float = 0.1, mu: float = 0.3) -> MujocoScene:
     """A disc of 0.2 kg that starts with `speed` [m/s] and `spin` [rad/s] on the floor; `coulomb_disc.stop` says where
     it comes to rest."""
-    inertia = 0.5 * 0.2 * radius**2
+    i = 0.5 * 0.2 * radius**2
     body = f"""<worldbody><geom name="floor" type="plane" size="9 9 .1"/><body name="disc" pos="0 0 0.002">
     <joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/><joint type="slide" axis="0 0 1"/>
-    <joint type="hinge" axis="0 0 1"/><inertial pos="0 0 0" mass="0.2" diaginertia="{inertia / 2} {inertia / 2} {inertia}"/>
+    <joint type="hinge" axis="0 0 1"/><inertial pos="0 0 0" mass="0.2" diaginertia="{i / 2} {i / 2} {i}"/>
     <geom name="disc" type="cylinder" size="{radius} 0.002" mass="0"/><site name="disc" pos="0 0 -0.002"/></body>
     </worldbody>"""
     law = LuGre(mu_c=mu, mu_s=mu, sigma_0=1e5, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9)
@@ -211,17 +211,19 @@ def disc(speed: float, spin: float, *, radius: float = 0.1, mu: float = 0.3) -> 
 def plate(load: Literal[1, 2] = 1, *, model: FrictionModel | None = None) -> MujocoScene:
     """The published in-hand run: a plate held upright between two pads slips and turns as the grip varies.
 
-    Its plane is that of x and y, gravity is along -y; positions are x, y, z, the angle, and that of the upper pad.
+    Its plane is that of x and y, gravity is along -y; positions are x (less 2 mm), y, z, the angle, and that of the
+    upper pad.
     """
-    body = f"""<option gravity="0 {-GRAVITY} 0"/><worldbody><geom name="lower" type="sphere" size="0.01" pos="0 0 -0.012"
-    contype="1" conaffinity="0"/><site name="lower" pos="0 0 -0.002"/>
-    <body name="upper" pos="0 0 0.012"><joint name="press" type="slide" axis="0 0 -1"/>
-    <geom name="upper" type="sphere" size="0.01" mass="0.01" contype="1" conaffinity="0"/>
-    <site name="upper" pos="0 0 -0.01"/></body>
+    body = f"""<option gravity="0 {-GRAVITY} 0"/><worldbody>
+    <geom name="lower" type="sphere" size="0.01" pos="0 0 -0.012" contype="1" conaffinity="0"/>
+    <site name="lower" pos="0 0 -0.002"/>
     <body name="plate" pos="0.002 0 0"><joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/>
     <joint type="slide" axis="0 0 1"/><joint type="hinge" axis="0 0 1"/>
     <inertial pos="0 0 0" mass="0.2" diaginertia="1e-3 1e-3 {0.2 / 12.0 * (0.15**2 + 0.08**2)}"/>
-    <geom name="plate" type="box" size="0.075 0.04 0.002" mass="0" contype="0" conaffinity="1"/></body></worldbody>
+    <geom name="plate" type="box" size="0.075 0.04 0.002" mass="0" contype="0" conaffinity="1"/></body>
+    <body name="upper" pos="0 0 0.012"><joint name="press" type="slide" axis="0 0 -1"/>
+    <geom name="upper" type="sphere" size="0.01" mass="0.01" contype="1" conaffinity="0"/>
+    <site name="upper" pos="0 0 -0.01"/></body></worldbody>
     <actuator><motor joint="press"/></actuator>"""
     force = in_hand_load(load)
     own = ReducedModel(ContactPatch.disc(radius=0.01, cells=21), LuGre(mu_s=1.2, elasto_plastic=0.9))
@@ -237,7 +239,7 @@ def plate(load: Literal[1, 2] = 1, *, model: FrictionModel | None = None) -> Muj
 
 
 def tray(blocks: int = 2) -> MujocoScene:
-    """A tray shaken to and fro with `blocks` of 0.1 kg on it, which slip and turn; its first two positions are its own."""
+    """A tray shaken to and fro with `blocks` of 0.1 kg on it, which slip and turn; it comes first in the positions."""
     places = [(0.1 * (i % 4 - 1.5), 0.1 * (i // 4 - 0.5)) for i in range(blocks)]
     carried = "".join(
         f"""<body name="block {i}" pos="{x} {y} 0.025"><freejoint/>
@@ -247,7 +249,8 @@ def tray(blocks: int = 2) -> MujocoScene:
     )
     body = f"""<worldbody><body name="tray"><joint name="x" type="slide" axis="1 0 0" damping="20"/>
     <joint name="y" type="slide" axis="0 1 0" damping="20"/>
-    <geom name="tray" type="box" size="0.25 0.15 0.005" mass="1" contype="1" conaffinity="0"/></body>{carried}</worldbody>
+    <geom name="tray" type="box" size="0.25 0.15 0.005" mass="1" contype="1" conaffinity="0"/></body>
+    {carried}</worldbody>
     <actuator><position joint="x" kp="5000" dampratio="1"/><position joint="y" kp="5000" dampratio="1"/></actuator>"""
     return MujocoScene(
         lambda settings, dt, integrator: _document(settings, dt, integrator, 0.006, body, 0.4),
