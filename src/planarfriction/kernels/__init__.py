@@ -42,5 +42,10 @@ def entry(function: Any) -> Any:
     return kept(njit(**_INNER, **_OPTIONS)(function), _SOURCES)
 
 
+def callback(function: Any) -> Any:
+    """Compile a function that C libraries call by its address (see `pointers.c_address_of`), and keep it on disk."""
+    return kept(njit(_nrt=False, no_cpython_wrapper=True, **_OPTIONS)(function), _SOURCES)
+
+
 for _name, _formula in inspect.getmembers(formulas, inspect.isfunction):
     register_jitable(forceinline=True, **_INNER, **_OPTIONS)(_formula)

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
+from llvmlite.binding import add_symbol
 from numba import types
 from numba.extending import intrinsic
 from numba.np.arrayobj import populate_array
@@ -151,3 +152,60 @@ def matrix(typingctx, address, rows, columns):
         return _array_over(context, builder, kind, args[0], args[1:])
 
     return kind(types.int64, types.int64, types.int64), generate
+
+
+@intrinsic
+def integers32(typingctx, address):
+    """The 32-bit integers at an address."""
+    if not isinstance(address, types.Integer):
+        return None
+
+    def generate(context, builder, signature, args):
+        return builder.inttoptr(args[0], ir.IntType(32).as_pointer())
+
+    return types.CPointer(types.int32)(address), generate
+
+
+@intrinsic
+def call_c(typingctx, address, arguments):
+    """Call the function of a C library at `address` with a tuple of integers; the word that it returns."""
+    if any(not isinstance(given, types.Integer) for given in arguments):
+        return None
+    word = ir.IntType(64)
+
+    def generate(context, builder, signature, args):
+        target, packed = args
+        values = [
+            context.cast(builder, builder.extract_value(packed, i), given, types.int64)
+            for i, given in enumerate(signature.args[1])
+        ]
+        kind = ir.FunctionType(word, [word] * len(values))
+        return builder.call(builder.inttoptr(target, kind.as_pointer()), values)
+
+    return types.int64(address, arguments), generate
+
+
+def c_address_of(function: Any, words: int) -> int:
+    """Address of a compiled `kernels.callback` for C libraries, which give it `words` addresses."""
+    signature = (types.int64,) * words
+    with heard_between_passes():
+        function.compile(signature)
+    compiled = function.overloads[signature]
+    return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name)
+
+
+def shared_word(name: str) -> tuple[np.ndarray, Any]:
+    """A word of this process that compiled code finds by its name: as an array [1], and as a compiled function."""
+    word = np.zeros(1, np.int64)
+    add_symbol(name, place_of(word))
+
+    @intrinsic
+    def read_word(typingctx):
+        def generate(context, builder, signature, args):
+            place = builder.module.globals.get(name) or ir.GlobalVariable(builder.module, ir.IntType(64), name)
+            place.linkage = "external"
+            return builder.load(place)
+
+        return types.int64(), generate
+
+    return word, read_word

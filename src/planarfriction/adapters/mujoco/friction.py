@@ -4,16 +4,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import ctypes
+import functools
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from typing import Any, NamedTuple
 
 import mujoco
 import numpy as np
 
-from planarfriction.adapters.mujoco.patches import Patch, Placed, check_once, words
-from planarfriction.adapters.mujoco.responses import responses
-from planarfriction.coupling import CoupledPatches, CoupledStep, HostStep
-from planarfriction.errors import InvalidValueError
+from planarfriction.adapters.mujoco.library import layout
+from planarfriction.adapters.mujoco.patches import Patch, Placed, check_once, memory, words
+from planarfriction.coupling import CoupledPatches
+from planarfriction.errors import FrictionError, InvalidValueError
+from planarfriction.kernels import coupling as kernels
+from planarfriction.kernels import mujoco_step
+from planarfriction.kernels.mujoco_records import Host
+from planarfriction.kernels.pointers import address_of, c_address_of, place_of
+from planarfriction.kernels.records import row_of
 
 INTEGRATORS = {
     int(mujoco.mjtIntegrator.mjINT_EULER): "Euler",
@@ -21,136 +29,155 @@ INTEGRATORS = {
     int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST): "implicitfast",
 }
 
-PASSES = 3
-"""How often a step is solved anew where other constraints have become active through it."""
-
-MISFIT = 1e-8
-"""Twists that come out [m/s] within which the active constraints have held."""
-
 
 class Report(NamedTuple):
-    """What a step took."""
+    """What the last step took."""
 
     iterations: int
-    """Newton iterations of all passes."""
+    """Newton iterations of all passes, -1 where the state was not finite: such a step is without friction."""
     passes: int
+    """How often it was solved, anew where other constraints had become active; 0 without contact."""
     residual: float
     """Of the step in contact space [m/s]."""
-    misfit: float
-    """Between the twists that were solved for and those that came out [m/s, rad/s]."""
     converged: bool
 
 
 class Friction:
-    """Patch friction for a model that `prepare` has made ready; `step` takes the place of `mj_step`.
+    """Patch friction for a model that `prepare` has made ready.
 
-    States live in the data, in the last numbers of `userdata`: whoever copies or restores these gets the friction too.
-    One object steps any number of data of its model, one at a time.
+    Either `step(d)` in the place of `mj_step`, or, within `with friction.install():`, `mj_step` itself, the viewer and
+    `mujoco.rollout`. States live in the data, in the last numbers of `userdata`: whoever copies or restores these gets
+    the friction too. One object serves any number of data of its model, on any number of threads.
 
-    Raises `InvalidValueError` for an integrator without a fixed metric, noslip iterations, too little user data, names
-    that are not in the model, pairs with friction of their own.
+    Raises `InvalidValueError` for an integrator without a fixed metric, noslip iterations, sleeping, too little user
+    data, names that are not in the model, pairs with friction of their own, shapes that follow their loads.
     """
 
     def __init__(self, m: Any, patches: Sequence[Patch]) -> None:
         check_once(patches)
-        self.m, self.patches, self._placed = m, tuple(patches), [Placed(m, patch) for patch in patches]
-        if m.opt.integrator not in INTEGRATORS:
-            rule = f"be {', '.join(INTEGRATORS.values())}"
-            name = mujoco.mjtIntegrator(m.opt.integrator).name.removeprefix("mjINT_")
-            raise InvalidValueError("integrator", rule, name)
-        if m.opt.noslip_iterations > 0:
-            rule = "be 0: they change what has been solved"
-            raise InvalidValueError("noslip_iterations", rule, m.opt.noslip_iterations)
-        for placed in self._placed:
-            placed.check_step(m)
-        if m.nuserdata < words(patches):
-            raise InvalidValueError("nuserdata", f"be at least {words(patches)} (prepare adds them)", m.nuserdata)
+        self.m, self.patches, self.placed = m, tuple(patches), [Placed(m, patch) for patch in patches]
         self.coupled = CoupledPatches([patch.model for patch in patches])
-        self._first, self._size = m.nuserdata - words(patches), self.coupled.state_shape[0]
-        self.report: Report | None = None
-        self.last: CoupledStep | None = None
-        """What the last step came to, in the frames of the patches."""
-        self._lin = np.zeros((2, 3, m.nv)), np.zeros((2, 3, m.nv))
+        for patch in patches:
+            if patch.model._follows_load:
+                rule = "have a shape that does not follow the load: compiled steps need it in stored numbers"
+                raise InvalidValueError("model", rule, type(patch.model).__name__)
+        self._check()
+        needed = words(patches, m.nv)
+        if m.nuserdata < needed:
+            raise InvalidValueError("nuserdata", f"be at least {needed} (prepare adds them)", m.nuserdata)
+        self._memory = memory(patches, m.nv, m.nuserdata - needed)
+
+    def _check(self) -> None:
+        """Refuse options of the model that do not fit."""
+        m, options = self.m, self.m.opt
+        if options.integrator not in INTEGRATORS:
+            rule = f"be {', '.join(INTEGRATORS.values())}"
+            raise InvalidValueError("integrator", rule, mujoco.mjtIntegrator(options.integrator).name[6:])
+        if options.noslip_iterations > 0:
+            rule = "be 0: they change what has been solved"
+            raise InvalidValueError("noslip_iterations", rule, options.noslip_iterations)
+        sleep = getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", 0)
+        if options.enableflags & int(sleep):
+            raise InvalidValueError("sleep", "be disabled: what sleeps does not answer to wrenches", "enabled")
+        for placed in self.placed:
+            placed.check_step(m)
 
     # ------------------------------------------------------------------ what the data hold
 
+    def _own(self, d: Any, first: int, count: int) -> np.ndarray:
+        return d.userdata[first : first + count]
+
     def state(self, d: Any) -> np.ndarray:
-        """The state of all patches, a view of `userdata`; `coupled.states` gives each its shape."""
-        return d.userdata[self._first : self._first + self._size]
+        """The state of all patches at the time of the data, a view of `userdata`; `coupled.states` shapes it."""
+        at = self._memory
+        stepped = d.time == d.userdata[at.next]
+        return self._own(d, at.new if stepped else at.state, self.coupled.state_shape[0])
 
     def wrenches(self, d: Any) -> np.ndarray:
-        """Of the last step `[k, 3]`, a view of `userdata`: the guess of the next."""
-        first = self._first + 2 * self._size
-        return d.userdata[first : first + 3 * len(self.patches)].reshape(-1, 3)
+        """Of the last step `[k, 3]`, on the bodies of the sites, in the frames of the patches; a view of `userdata`."""
+        return self._own(d, self._memory.wrench, 3 * len(self.patches)).reshape(-1, 3)
+
+    def twists(self, d: Any) -> np.ndarray:
+        """At the end of the last step `[k, 3]`, of the bodies of the sites relative to the others."""
+        return self._own(d, self._memory.twist, 3 * len(self.patches)).reshape(-1, 3)
+
+    def loads(self, d: Any) -> np.ndarray:
+        """Normal forces at the end of the last step `[k]` [N]."""
+        return self._own(d, self._memory.load, len(self.patches))
+
+    def report(self, d: Any) -> Report:
+        """What the last step took."""
+        at, u = self._memory, d.userdata
+        return Report(int(u[at.iterations]), int(u[at.passes]), float(u[at.residual]), bool(u[at.converged]))
 
     def reset(self, d: Any) -> None:
         """Let all bristles rest."""
-        d.userdata[self._first : self._first + words(self.patches)] = 0.0
+        at = self._memory
+        d.userdata[at.state : at.converged + 1] = 0.0
 
-    # ------------------------------------------------------------------ a step
+    # ------------------------------------------------------------------ steps
 
     def step(self, d: Any) -> None:
-        """`mj_step` with friction. `qfrc_applied` is the user's before and after."""
-        m, dt, applied = self.m, self.m.opt.timestep, d.qfrc_applied.copy()
-        mujoco.mj_step1(m, d)
-        jacobian, rows = self._geometry(d)
-        wrench = self.wrenches(d).ravel().copy()
-        wrench[np.repeat([len(own) == 0 for own in rows], 3)] = 0.0
-        state, iterations, passes = self.state(d).copy(), 0, 0
-        self._apply(d, applied + wrench @ jacobian)
-        while True:
-            found = responses(m, d, jacobian, rows)
-            free = (jacobian @ found.velocity).reshape(-1, 3)
-            host = HostStep(free, _loads(d, rows), wrench.reshape(-1, 3), found.twist_response, found.load_response)
-            step = self.coupled.step(state, host, dt)
-            wrench, iterations, passes = step.wrench.ravel(), iterations + int(step.iterations), passes + 1
-            d.qfrc_applied[:] = applied + wrench @ jacobian
-            d.qacc_warmstart[:] = d.qacc
-            if passes == PASSES:
-                break
-            self._apply(d, d.qfrc_applied)
-            came_out = (jacobian @ responses(m, d, jacobian, rows).velocity).reshape(-1, 3)
-            if abs(came_out - step.twist).max() <= MISFIT:
-                break
-        mujoco.mj_step2(m, d)
-        d.qfrc_applied[:] = applied
-        self._advance(d, state, step, jacobian, rows, iterations, passes)
+        """`mj_step` with friction.
 
-    def _apply(self, d: Any, force: np.ndarray) -> None:
-        d.qfrc_applied[:] = force
-        mujoco.mj_fwdActuation(self.m, d)
-        mujoco.mj_fwdAcceleration(self.m, d)
-        mujoco.mj_fwdConstraint(self.m, d)
+        Raises `InvalidValueError` for a state that is not finite.
+        """
+        mujoco.mj_step1(self.m, d)
+        mujoco_step.plan_step(self._row, self.m._address, d._address)
+        mujoco.mj_step2(self.m, d)
+        if d.userdata[self._memory.iterations] < 0.0:
+            raise InvalidValueError("state", "be finite", "a number that is not")
 
-    def _advance(self, d: Any, state, step: CoupledStep, jacobian, rows, iterations: int, passes: int) -> None:
-        """Bristles go on with the twists and loads that came out."""
-        dt, twist, loads = self.m.opt.timestep, (jacobian @ d.qvel).reshape(-1, 3), _loads(d, rows)
-        new = self.coupled.states(self.state(d))
-        for patch, before, after, held, load in zip(
-            self.patches, self.coupled.states(state), new, twist, loads, strict=True
-        ):
-            after[...] = patch.model.step(before, held, float(load), dt)[0]
-        self.wrenches(d)[:] = step.wrench
-        misfit = float(abs(twist - step.twist).max())
-        self.report = Report(iterations, passes, float(step.residual), misfit, bool(step.converged))
-        self.last = step
+    @contextmanager
+    def install(self) -> Iterator[Friction]:
+        """Give `mj_step` friction within a `with` block, and with it the viewer, `mujoco.rollout`, and derivatives.
 
-    def _geometry(self, d: Any) -> tuple[np.ndarray, list[np.ndarray]]:
-        """Jacobian of the twists `[3k, nv]`, and the constraint rows of each patch; zero and none without contact."""
-        jacobian, rows = np.zeros((3 * len(self.patches), self.m.nv)), []
-        moves, turns = self._lin
-        for p, placed in enumerate(self._placed):
-            chosen, sign = placed.contacts(d)
-            rows.append(d.contact.efc_address[chosen])
-            if len(chosen):
-                centre, axes = placed.frame(d, chosen, sign)
-                for side, body in enumerate(placed.bodies):
-                    mujoco.mj_jac(self.m, d, moves[side], turns[side], centre, body)
-                jacobian[3 * p : 3 * p + 2] = axes[:2] @ (moves[1] - moves[0])
-                jacobian[3 * p + 2] = axes[2] @ (turns[1] - turns[0])
-        return jacobian, rows
+        All data of this model, and of its copies, get it. MuJoCo calls compiled code, on any number of threads.
+
+        Raises `FrictionError` where a control callback is installed.
+        """
+        self._check()
+        if mujoco.get_mjcb_control() is not None or mujoco_step.INSTALLED[0] != 0:
+            raise FrictionError("a control callback is installed already: remove it with mujoco.set_mjcb_control(None)")
+        mujoco_step.INSTALLED[0] = place_of(self._row)
+        mujoco.set_mjcb_control(_callback())
+        try:
+            yield self
+        finally:
+            mujoco.set_mjcb_control(None)
+            mujoco_step.INSTALLED[0] = 0
+
+    @functools.cached_property
+    def _row(self) -> np.ndarray:
+        """What compiled steps know of the model."""
+        packed, k = self.coupled._packed, len(self.patches)
+        problem = self.coupled.problem()
+        chosen = [
+            (each.site, each.own, each.other, *reversed(each.bodies), each.patch.centre == "contact")
+            for each in self.placed
+        ]
+        columns = np.ascontiguousarray(np.array(chosen, np.int64).T)
+        names = ("sites", "own", "other", "own_bodies", "other_bodies", "at_contact")
+        self._kept = problem, columns, packed
+        return row_of(
+            Host(
+                nv=self.m.nv,
+                nuserdata=self.m.nuserdata,
+                count=k,
+                states=self.coupled.state_shape[0],
+                words=packed.words,
+                problem=place_of(problem),
+                patches=place_of(packed.row),
+                solve=kernels.solve_address(),
+                plan=address_of(mujoco_step.plan, "ppp"),
+                memory=self._memory,
+                **dict(zip(names, (place_of(columns) + 8 * k * np.arange(6)).tolist(), strict=True)),
+                **layout(),
+            )
+        )
 
 
-def _loads(d: Any, rows: list[np.ndarray]) -> np.ndarray:
-    """Normal forces `[k]`."""
-    return np.array([max(d.efc_force[own].sum(), 0.0) for own in rows])
+@functools.cache
+def _callback() -> Any:
+    """The compiled control callback."""
+    return ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(c_address_of(mujoco_step.control, 2))

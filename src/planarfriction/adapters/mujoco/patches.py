@@ -14,6 +14,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
+from planarfriction.kernels.mujoco_records import Memory
 from planarfriction.models import FrictionModel
 
 CENTRES = ("site", "contact")
@@ -44,13 +45,23 @@ class Patch:
         validation.choice("centre", self.centre, CENTRES)
 
 
-def words(patches: Sequence[Patch]) -> int:
-    """Numbers that patches keep in `userdata`: two states, the wrenches, and the time of the second."""
-    return 2 * sum(math.prod(patch.model.state_shape) for patch in patches) + 3 * len(patches) + 1
+def words(patches: Sequence[Patch], nv: int) -> int:
+    """Numbers that patches keep in `userdata` (see `kernels.mujoco_records.Memory`)."""
+    return memory(patches, nv, 0).converged + 1
+
+
+def memory(patches: Sequence[Patch], nv: int, first: int) -> Memory:
+    """Where in the user data, from word `first` on."""
+    states, k = sum(math.prod(patch.model.state_shape) for patch in patches), len(patches)
+    sizes = [states, states, 3 * k, 3 * k, 3 * k, k, nv, nv, nv]
+    sizes += [1] * (len(Memory._fields) - len(sizes))
+    return Memory(*np.cumsum([first, *sizes[:-1]]).tolist())
 
 
 def prepare(spec: Any, patches: Sequence[Patch]) -> None:
     """Give an `MjSpec` what the patches need: a pair without friction for each, and room in the user data.
+
+    A pair that is there keeps what it says, but for its friction; a new one has what its geoms say.
 
     Raises `InvalidValueError` for a geom or a site that is not there, and for the same pair twice.
     """
@@ -64,8 +75,10 @@ def prepare(spec: Any, patches: Sequence[Patch]) -> None:
         pair = next((each for each in spec.pairs if {each.geomname1, each.geomname2} == set(patch.geoms)), None)
         if pair is None:
             pair = spec.add_pair(geomname1=patch.geoms[0], geomname2=patch.geoms[1])
+            pair.solref[:], pair.solimp[:], pair.margin, pair.gap = math.nan, math.nan, math.nan, math.nan
         pair.condim = 1
-    spec.nuserdata = max(spec.nuserdata, 0) + words(patches)
+    nv = spec.copy().compile().nv
+    spec.nuserdata = max(spec.nuserdata, 0) + words(patches, nv)
 
 
 def check_once(patches: Sequence[Patch]) -> None:

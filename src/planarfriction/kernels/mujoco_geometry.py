@@ -1,0 +1,159 @@
+"""Where the patches of a MuJoCo model are in contact, and how their twists follow its velocities."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from planarfriction.kernels import kernel
+from planarfriction.kernels.pointers import at, call_c, doubles, integers, integers32
+
+
+class Scratch(NamedTuple):
+    """Addresses of what a step works with."""
+
+    problem: int
+    jacobian: int
+    """Of the twists, [3k, nv]."""
+    inertia: int
+    """[nv, nv]"""
+    stiff: int
+    """H, and then the metric of the integrator, [nv, nv]."""
+    answers: int
+    """H^-1 J' and, last, the acceleration, [nv, 3k + 1]."""
+    held: int
+    """What the integrator makes of these, [nv, 3k + 1]."""
+    moves: int
+    """[3, nv]"""
+    turns: int
+    """[3, nv]"""
+    more: int
+    """Acceleration that the change of wrenches adds, [nv]."""
+    owners: int
+    """The patch of each constraint, -1 of others, int [nefc]."""
+    misses: int
+    """J qacc - aref, [nefc]."""
+    counts: int
+    """Contacts of each patch, int [k]."""
+    frames: int
+    """Sums over these: normals into the own body, and positions, [k, 6]."""
+
+
+@kernel
+def take(own, d, nefc):
+    """Take scratch from the data's own stack, until it is freed."""
+    k, nv, n = own.count, own.nv, 3 * own.count
+    total = own.words + nv * (n + 2 * nv + 2 * (n + 1) + 7) + 2 * nefc + 7 * k
+    problem = call_c(own.functions.mj_stackAllocNum, (d, total))
+    jacobian = at(problem, own.words)
+    inertia = at(jacobian, nv * n)
+    stiff = at(inertia, nv * nv)
+    answers = at(stiff, nv * nv)
+    held = at(answers, nv * (n + 1))
+    moves = at(held, nv * (n + 1))
+    turns = at(moves, 3 * nv)
+    more = at(turns, 3 * nv)
+    owners = at(more, nv)
+    misses = at(owners, nefc)
+    counts = at(misses, nefc)
+    return Scratch(
+        problem, jacobian, inertia, stiff, answers, held, moves, turns, more, owners, misses, counts, at(counts, k)
+    )
+
+
+@kernel
+def _collect(own, d, s, nefc):
+    """Owners of constraints, and sums over the contacts of each patch."""
+    owners, counts, frames = integers(s.owners), integers(s.counts), doubles(s.frames)
+    contacts, ncon = integers(d + own.data.contact)[0], integers32(d + own.data.ncon)[0]
+    for r in range(nefc):
+        owners[r] = -1
+    for p in range(own.count):
+        counts[p] = 0
+        for i in range(6):
+            frames[6 * p + i] = 0.0
+    for c in range(ncon):
+        contact = contacts + own.contact.size * c
+        row = integers32(contact + own.contact.efc_address)[0]
+        if row < 0:
+            continue
+        one, two = integers32(contact + own.contact.geom)[0], integers32(contact + own.contact.geom)[1]
+        for p in range(own.count):
+            first, second = integers(own.other)[p], integers(own.own)[p]
+            forward, back = one == first and two == second, one == second and two == first
+            if forward or back:
+                sign = 1.0 if forward else -1.0
+                for i in range(3):
+                    frames[6 * p + i] += sign * doubles(contact + own.contact.frame)[i]
+                    frames[6 * p + 3 + i] += doubles(contact + own.contact.pos)[i]
+                counts[p] += 1
+                owners[row] = p
+
+
+@kernel
+def _across(x, y, z, nx, ny, nz):
+    """The part of a vector across the normal, and its square over that of the vector."""
+    along = x * nx + y * ny + z * nz
+    x, y, z = x - along * nx, y - along * ny, z - along * nz
+    return x, y, z, x * x + y * y + z * z
+
+
+ALONG = 1e-12
+"""Square of the sine of the angle between a site's x axis and the normal below which its y axis takes its place."""
+
+
+@kernel
+def _axes(own, d, frame, site):
+    """The axes of a patch: x along that of its site, across the normal."""
+    nx, ny, nz = frame[0], frame[1], frame[2]
+    length = math.sqrt(nx * nx + ny * ny + nz * nz)
+    nx, ny, nz = nx / length, ny / length, nz / length
+    turned = doubles(at(integers(d + own.data.site_xmat)[0], 9 * site))
+    x, y, z, square = _across(turned[0], turned[3], turned[6], nx, ny, nz)
+    if square < ALONG:
+        x, y, z, square = _across(turned[1], turned[4], turned[7], nx, ny, nz)
+    length = math.sqrt(square)
+    x, y, z = x / length, y / length, z / length
+    return (x, y, z), (ny * z - nz * y, nz * x - nx * z, nx * y - ny * x), (nx, ny, nz)
+
+
+@kernel
+def _rows(own, m, d, s, p):
+    """The three rows of patch p in the Jacobian."""
+    nv, frame, site = own.nv, doubles(at(s.frames, 6 * p)), integers(own.sites)[p]
+    (ax, ay, az), (bx, by, bz), (nx, ny, nz) = _axes(own, d, frame, site)
+    centre, rows = at(s.frames, 6 * p + 3), doubles(at(s.jacobian, 3 * nv * p))
+    if integers(own.at_contact)[p] != 0:
+        for i in range(3):
+            frame[3 + i] /= integers(s.counts)[p]
+    else:
+        centre = at(integers(d + own.data.site_xpos)[0], 3 * site)
+    for i in range(3 * nv):
+        rows[i] = 0.0
+    moves, turns = doubles(s.moves), doubles(s.turns)
+    for side in range(2):
+        body = integers(own.own_bodies)[p] if side == 0 else integers(own.other_bodies)[p]
+        if body == 0:
+            continue
+        sign = 1.0 if side == 0 else -1.0
+        call_c(own.functions.mj_jac, (m, d, s.moves, s.turns, centre, body))
+        for i in range(nv):
+            x, y, z = sign * moves[i], sign * moves[nv + i], sign * moves[2 * nv + i]
+            rows[i] += ax * x + ay * y + az * z
+            rows[nv + i] += bx * x + by * y + bz * z
+            rows[2 * nv + i] += sign * (nx * turns[i] + ny * turns[nv + i] + nz * turns[2 * nv + i])
+
+
+@kernel
+def place(own, m, d, s, nefc):
+    """Write the Jacobian of the twists, zero without contact. How many patches are in contact."""
+    _collect(own, d, s, nefc)
+    touching = 0
+    for p in range(own.count):
+        if integers(s.counts)[p] > 0:
+            _rows(own, m, d, s, p)
+            touching += 1
+        else:
+            for i in range(3 * own.nv):
+                doubles(s.jacobian)[3 * own.nv * p + i] = 0.0
+    return touching

@@ -1,0 +1,178 @@
+"""What compiled steps know of MuJoCo: where its structs hold things, its functions, its constants.
+
+Offsets are in bytes and belong to the version that is installed (`adapters.mujoco.library` finds them).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from planarfriction.kernels.records import reader
+
+
+class ModelOffsets(NamedTuple):
+    """Of `mjModel`."""
+
+    nv: int
+    nuserdata: int
+    timestep: int
+    integrator: int
+    disableflags: int
+    dof_damping: int
+
+
+class DataOffsets(NamedTuple):
+    """Of `mjData`."""
+
+    time: int
+    ncon: int
+    nefc: int
+    contact: int
+    efc_type: int
+    efc_J: int
+    efc_J_rownnz: int
+    efc_J_rowadr: int
+    efc_J_colind: int
+    efc_D: int
+    efc_R: int
+    efc_frictionloss: int
+    efc_aref: int
+    efc_state: int
+    efc_force: int
+    qvel: int
+    qacc: int
+    qacc_warmstart: int
+    qfrc_passive: int
+    qDeriv: int
+    userdata: int
+    site_xpos: int
+    site_xmat: int
+
+
+class SlopeOffsets(NamedTuple):
+    """Of the sparsity of `qDeriv`, in the model or, in older versions, in the data."""
+
+    in_model: int
+    """1 or 0."""
+    D_rownnz: int
+    D_rowadr: int
+    D_colind: int
+
+
+class ContactOffsets(NamedTuple):
+    """Of `mjContact`."""
+
+    size: int
+    """Of a contact."""
+    pos: int
+    frame: int
+    H: int
+    dim: int
+    geom: int
+    efc_address: int
+
+
+class Functions(NamedTuple):
+    """Addresses of MuJoCo's functions."""
+
+    mj_markStack: int
+    mj_freeStack: int
+    mj_stackAllocNum: int
+    mj_fwdActuation: int
+    mj_fwdAcceleration: int
+    mj_fwdConstraint: int
+    mj_constraintUpdate: int
+    mj_fullM: int
+    mj_jac: int
+    mj_isSparse: int
+    mjd_smooth_vel: int
+
+
+class Constants(NamedTuple):
+    """Of its enumerations."""
+
+    SATISFIED: int
+    QUADRATIC: int
+    LINEARNEG: int
+    LINEARPOS: int
+    CONE: int
+    EQUALITY: int
+    FRICTION_DOF: int
+    FRICTION_TENDON: int
+    ELLIPTIC: int
+    EULER: int
+    IMPLICIT: int
+    IMPLICITFAST: int
+    NO_EULERDAMP: int
+
+
+class Memory(NamedTuple):
+    """Where the user data hold what patches remember from step to step, in words."""
+
+    state: int
+    """At `time`."""
+    new: int
+    """At `next`."""
+    guess: int
+    """Wrenches at the beginning of the step, [3k]."""
+    wrench: int
+    """Of the step, [3k]."""
+    twist: int
+    """[3k]"""
+    load: int
+    """[k]"""
+    warmstart: int
+    """`qacc_warmstart` at the beginning of the step, [nv]."""
+    passive: int
+    """`qfrc_passive` without friction, [nv]."""
+    total: int
+    """And with it, [nv]."""
+    time: int
+    """At the beginning of the step [s]."""
+    next: int
+    """At its end [s]."""
+    iterations: int
+    passes: int
+    residual: int
+    converged: int
+
+
+class Host(NamedTuple):
+    """A model with patches."""
+
+    nv: int
+    nuserdata: int
+    count: int
+    """Patches k."""
+    states: int
+    words: int
+    """Of a problem in contact space."""
+    problem: int
+    """Where one without inputs is."""
+    patches: int
+    """Where the row of `coupling_rows.Patches` is."""
+    solve: int
+    """Address of `coupling.solve`."""
+    plan: int
+    """Address of `mujoco_step.plan`."""
+    sites: int
+    """Where the sites of the patches are, int [k]; so with what follows."""
+    own: int
+    """Geoms on the bodies of the sites."""
+    other: int
+    own_bodies: int
+    other_bodies: int
+    at_contact: int
+    """Whether the origin is in the middle of the contacts."""
+    inertia: int
+    """Offset of the inertia that `mj_fullM` wants, -1 where it takes the data."""
+    memory: Memory
+    model: ModelOffsets
+    data: DataOffsets
+    slopes: SlopeOffsets
+    contact: ContactOffsets
+    functions: Functions
+    constants: Constants
+
+
+read = reader(Host)

@@ -1,0 +1,232 @@
+"""How MuJoCo's step answers to wrenches on patches, while the set of active constraints holds.
+
+`H = M + Jc' D Jc` over the constraint rows in their quadratic range, and `Jc' C Jc` over elliptic contacts that slide
+(C is the Hessian of their cone); `X = H^-1 J'`. The integrator goes on by `v + dt Mh^-1 M qacc` with its own metric Mh:
+twists answer with `A = dt J Mh^-1 M X`, loads with `B = -sum D Jc X` over the rows of their contacts.
+"""
+
+from __future__ import annotations
+
+from planarfriction.kernels import compiled_math as xp
+from planarfriction.kernels import kernel
+from planarfriction.kernels.elimination import backward, eliminate, multiply
+from planarfriction.kernels.pointers import at, call_c, doubles, integers, integers32
+
+MISFIT = 1e-8
+"""Speed [m/s] by which what comes out may miss what has been solved for."""
+
+
+@kernel
+def is_sparse(own, m):
+    """Whether Jacobians of constraints are."""
+    return call_c(own.functions.mj_isSparse, (m,)) & 0xFFFFFFFF != 0
+
+
+@kernel
+def row_of(own, d, sparse, r):
+    """Row r of the constraints' Jacobian: how many numbers, where they and their columns are."""
+    if sparse:
+        first = integers32(integers(d + own.data.efc_J_rowadr)[0])[r]
+        count = integers32(integers(d + own.data.efc_J_rownnz)[0])[r]
+        return count, at(integers(d + own.data.efc_J)[0], first), integers(d + own.data.efc_J_colind)[0] + 4 * first
+    return own.nv, at(integers(d + own.data.efc_J)[0], own.nv * r), 0
+
+
+@kernel
+def column(columns, i):
+    """Column of number i of a row."""
+    return integers32(columns)[i] if columns != 0 else i
+
+
+@kernel
+def row_times(own, d, sparse, r, x):
+    """Row r of the constraints' Jacobian, times a vector."""
+    count, numbers, columns = row_of(own, d, sparse, r)
+    total = 0.0
+    for i in range(count):
+        total += doubles(numbers)[i] * x[column(columns, i)]
+    return total
+
+
+@kernel
+def _add_rows(own, d, sparse, one, other, factor, h):
+    """Add to h the product of two rows of the constraints' Jacobian."""
+    count, left, rows = row_of(own, d, sparse, one)
+    others, right, columns = row_of(own, d, sparse, other)
+    for i in range(count):
+        scaled = factor * doubles(left)[i]
+        if scaled != 0.0:
+            first = own.nv * column(rows, i)
+            for j in range(others):
+                h[first + column(columns, j)] += scaled * doubles(right)[j]
+
+
+@kernel
+def _add_cones(own, m, d, s, sparse, nefc, h):
+    """Add the Hessians of elliptic contacts that slide."""
+    acceleration, aref = doubles(integers(d + own.data.qacc)[0]), doubles(integers(d + own.data.efc_aref)[0])
+    for r in range(nefc):
+        doubles(s.misses)[r] = row_times(own, d, sparse, r, acceleration) - aref[r]
+    call_c(own.functions.mj_constraintUpdate, (m, d, s.misses, 0, 1))
+    contacts, states = integers(d + own.data.contact)[0], integers32(integers(d + own.data.efc_state)[0])
+    for c in range(integers32(d + own.data.ncon)[0]):
+        contact = contacts + own.contact.size * c
+        row, dim = integers32(contact + own.contact.efc_address)[0], integers32(contact + own.contact.dim)[0]
+        if row < 0 or states[row] != own.constants.CONE:
+            continue
+        for i in range(dim):
+            for j in range(dim):
+                _add_rows(own, d, sparse, row + i, row + j, doubles(contact + own.contact.H)[dim * i + j], h)
+
+
+@kernel
+def _stiff(own, m, d, s, sparse, nefc):
+    """M, and H."""
+    if own.inertia >= 0:
+        call_c(own.functions.mj_fullM, (m, s.inertia, integers(d + own.inertia)[0]))
+    else:
+        call_c(own.functions.mj_fullM, (m, d, s.inertia))
+    h, inertia, cones = doubles(s.stiff), doubles(s.inertia), False
+    for i in range(own.nv * own.nv):
+        h[i] = inertia[i]
+    states, weights = integers32(integers(d + own.data.efc_state)[0]), doubles(integers(d + own.data.efc_D)[0])
+    for r in range(nefc):
+        if states[r] == own.constants.QUADRATIC:
+            _add_rows(own, d, sparse, r, r, weights[r], h)
+        cones = cones or states[r] == own.constants.CONE
+    if cones:
+        _add_cones(own, m, d, s, sparse, nefc, h)
+
+
+@kernel
+def _has_metric(own, m):
+    """Whether the integrator has another metric than M."""
+    integrator, damping = integers32(m + own.model.integrator)[0], doubles(integers(m + own.model.dof_damping)[0])
+    if integrator != own.constants.EULER:
+        return True
+    damped = False
+    if integers32(m + own.model.disableflags)[0] & own.constants.NO_EULERDAMP == 0:
+        for i in range(own.nv):
+            damped = damped or damping[i] > 0.0
+    return damped
+
+
+@kernel
+def _metric(own, m, d, s):
+    """Write the metric of the integrator in the place of H."""
+    nv, metric, dt = own.nv, doubles(s.stiff), doubles(m + own.model.timestep)[0]
+    for i in range(nv * nv):
+        metric[i] = doubles(s.inertia)[i]
+    integrator = integers32(m + own.model.integrator)[0]
+    if integrator == own.constants.EULER:
+        for i in range(nv):
+            metric[(nv + 1) * i] += dt * doubles(integers(m + own.model.dof_damping)[0])[i]
+        return
+    fast = integrator == own.constants.IMPLICITFAST
+    call_c(own.functions.mjd_smooth_vel, (m, d, 0 if fast else 1))
+    base = m if own.slopes.in_model != 0 else d
+    counts = integers32(integers(base + own.slopes.D_rownnz)[0])
+    firsts = integers32(integers(base + own.slopes.D_rowadr)[0])
+    columns = integers32(integers(base + own.slopes.D_colind)[0])
+    slopes = doubles(integers(d + own.data.qDeriv)[0])
+    for i in range(nv):
+        for c in range(firsts[i], firsts[i] + counts[i]):
+            j = columns[c]
+            if not fast:
+                metric[nv * i + j] -= dt * slopes[c]
+            elif j <= i:
+                metric[nv * i + j] -= dt * slopes[c]
+                if j < i:
+                    metric[nv * j + i] -= dt * slopes[c]
+
+
+@kernel
+def _loads(own, d, s, sparse, nefc):
+    """Loads, and their answers, into the problem."""
+    host, row, k, columns = own.host, own.row, own.host.count, 3 * own.host.count + 1
+    load, answers = doubles(at(s.problem, row.free_load)), doubles(at(s.problem, row.load_response))
+    for p in range(k):
+        load[p] = 0.0
+        for i in range(3 * k):
+            answers[3 * k * p + i] = 0.0
+    states, weights = integers32(integers(d + host.data.efc_state)[0]), doubles(integers(d + host.data.efc_D)[0])
+    force = doubles(integers(d + host.data.efc_force)[0])
+    for r in range(nefc):
+        p = integers(s.owners)[r]
+        if p < 0:
+            continue
+        load[p] += force[r]
+        if states[r] != host.constants.QUADRATIC:
+            continue
+        count, numbers, places = row_of(host, d, sparse, r)
+        for i in range(count):
+            factor, first = weights[r] * doubles(numbers)[i], columns * column(places, i)
+            if factor != 0.0:
+                for c in range(3 * k):
+                    answers[3 * k * p + c] -= factor * doubles(s.answers)[first + c]
+    for p in range(k):
+        load[p] = xp.maximum(load[p], 0.0)
+
+
+@kernel
+def respond(own, m, d, s, sparse, nefc):
+    """Write twists, loads and their responses, at the accelerations and forces in the data, into the problem."""
+    host, row = own.host, own.row
+    nv, n, dt = host.nv, 3 * host.count, doubles(m + host.model.timestep)[0]
+    columns, jacobian, answers = n + 1, doubles(s.jacobian), doubles(s.answers)
+    _stiff(host, m, d, s, sparse, nefc)
+    stiff = doubles(s.stiff)
+    eliminate(stiff, nv)
+    for i in range(nv):
+        for c in range(n):
+            answers[columns * i + c] = jacobian[nv * c + i]
+        answers[columns * i + n] = 0.0
+    backward(stiff, nv, answers, columns)
+    acceleration, velocity = doubles(integers(d + host.data.qacc)[0]), doubles(integers(d + host.data.qvel)[0])
+    for i in range(nv):
+        answers[columns * i + n] = acceleration[i]
+    held = answers
+    if _has_metric(host, m):
+        held = doubles(s.held)
+        multiply(doubles(s.inertia), nv, answers, columns, held)
+        _metric(host, m, d, s)
+        eliminate(stiff, nv)
+        backward(stiff, nv, held, columns)
+    response, twist = doubles(at(s.problem, row.response)), doubles(at(s.problem, row.free_twist))
+    for r in range(n):
+        twist[r] = 0.0
+        for c in range(n):
+            response[n * r + c] = 0.0
+        for i in range(nv):
+            factor = jacobian[nv * r + i]
+            if factor != 0.0:
+                twist[r] += factor * (velocity[i] + dt * held[columns * i + n])
+                for c in range(n):
+                    response[n * r + c] += dt * factor * held[columns * i + c]
+    _loads(own, d, s, sparse, nefc)
+
+
+@kernel
+def leaves_range(own, m, d, s, sparse, nefc):
+    """Whether a constraint leaves its range through the acceleration `more`, so that what was solved does not hold."""
+    acceleration, more = doubles(integers(d + own.data.qacc)[0]), doubles(s.more)
+    kinds, states = integers32(integers(d + own.data.efc_type)[0]), integers32(integers(d + own.data.efc_state)[0])
+    aref, inverse = doubles(integers(d + own.data.efc_aref)[0]), doubles(integers(d + own.data.efc_R)[0])
+    loss, dt, e = doubles(integers(d + own.data.efc_frictionloss)[0]), doubles(m + own.model.timestep)[0], own.constants
+    for r in range(nefc):
+        change, kind, state = row_times(own, d, sparse, r, more), kinds[r], states[r]
+        if change == 0.0 or kind == e.EQUALITY:
+            continue
+        if kind == e.ELLIPTIC:
+            if dt * abs(change) > MISFIT:
+                return True
+            continue
+        miss = row_times(own, d, sparse, r, acceleration) - aref[r] + change
+        if kind == e.FRICTION_DOF or kind == e.FRICTION_TENDON:
+            bound = inverse[r] * loss[r]
+            then = e.LINEARNEG if miss <= -bound else (e.LINEARPOS if miss >= bound else e.QUADRATIC)
+        else:
+            then = e.QUADRATIC if miss < 0.0 else e.SATISFIED
+        if then != state:
+            return True
+    return False
