@@ -30,8 +30,8 @@ class Native(NamedTuple):
     impratio: float = 10.0
     noslip: int = 0
     condim: int = 4
-    solref: float = 0.02
-    """Time constant of its contacts [s]."""
+    solref: float | None = None
+    """Time constant of contacts [s]; None: that of the scene."""
 
 
 @dataclass(frozen=True)
@@ -54,16 +54,22 @@ class MujocoScene:
     """Whether gravity begins after that."""
     start: tuple[float, ...] | None = None
     """Velocities then; None as they are."""
+    solref: float = 0.02
+    """Time constant of contacts [s]."""
 
     def native(self, settings: Native, dt: float = 2e-3, integrator: str = "Euler") -> tuple[Any, Any]:
         """Model and data with MuJoCo's own friction."""
         import mujoco
 
-        m = mujoco.MjModel.from_xml_string(self.text(settings, dt, integrator))
+        m = mujoco.MjModel.from_xml_string(self._text(settings, dt, integrator))
         return m, mujoco.MjData(m)
 
     def ours(
-        self, dt: float = 2e-3, integrator: str = "Euler", solref: float = 0.02, model: FrictionModel | None = None
+        self,
+        dt: float = 2e-3,
+        integrator: str = "Euler",
+        solref: float | None = None,
+        model: FrictionModel | None = None,
     ) -> tuple[Any, Any, Any]:
         """Model, data, and the friction of its patches; `model` in place of the scene's own."""
         import mujoco
@@ -71,10 +77,14 @@ class MujocoScene:
         from planarfriction.adapters.mujoco import Friction, Patch, prepare
 
         patches = [Patch(model or self.model, site=site, geoms=geoms) for site, geoms in self.patches]
-        spec = mujoco.MjSpec.from_string(self.text(Native(condim=1, impratio=1.0, solref=solref), dt, integrator))
+        spec = mujoco.MjSpec.from_string(self._text(Native(condim=1, impratio=1.0, solref=solref), dt, integrator))
         prepare(spec, patches)
         m = spec.compile()
         return m, mujoco.MjData(m), Friction(m, patches)
+
+    def _text(self, settings: Native, dt: float, integrator: str) -> str:
+        solref = self.solref if settings.solref is None else settings.solref
+        return self.text(settings._replace(solref=solref), dt, integrator)
 
     def run(self, m: Any, d: Any, step: Callable[[], None]) -> np.ndarray:
         """Positions `[steps + 1, nq]`, from when it has settled: `step` is `mj_step` or takes its place."""
@@ -235,6 +245,7 @@ def plate(load: Literal[1, 2] = 1, *, model: FrictionModel | None = None) -> Muj
         time=2.0,
         settle=0.6,
         weightless=True,
+        solref=0.004,  # the pads press with what the motor gives
     )
 
 

@@ -47,7 +47,7 @@ def _applied(m, i, n, x, start):
 
 
 @kernel
-def _evaluate(own, problem):
+def evaluate(own, problem):
     """Step all pieces at the twists of the row: new state, and wrenches with their slopes per unit load."""
     row = own.row
     unit, slopes = doubles(at(problem, row.unit)), doubles(at(problem, row.unit_slopes))
@@ -169,7 +169,7 @@ def _go(own, problem, w, held, whole):
         for i in range(n):
             w[i] = start[i] + far * change[i]
         _host(own, problem, w, held)
-        _evaluate(own, problem)
+        evaluate(own, problem)
         here = _slope(own, problem, w)
         if whole or here >= -DOWNHILL * first or not first > 0.0 or shortening == SHORTENINGS:
             break
@@ -215,18 +215,18 @@ def _start(own, problem, w, tolerance):
     """Evaluate the better of the twists that wrenches w cause and of rest. The misfit, and whether it is rest."""
     row, n = own.row, 3 * own.count
     _host(own, problem, w, False)
-    _evaluate(own, problem)
+    evaluate(own, problem)
     misfit = _misfit(own, problem)
     if misfit > tolerance:
         twist = doubles(at(problem, row.twist))
         for i in range(n):
             twist[i] = 0.0
-        _evaluate(own, problem)
+        evaluate(own, problem)
         at_rest = _misfit(own, problem)
         if at_rest <= misfit:
             return at_rest, True
         _host(own, problem, w, False)
-        _evaluate(own, problem)
+        evaluate(own, problem)
     return misfit, False
 
 
@@ -261,7 +261,7 @@ def solve(patches, problem):
             given[row.twist + i] = given[row.best_twist + i]
         for p in range(k):
             given[row.load + p] = given[row.best_load + p]
-        _evaluate(own, problem)
+        evaluate(own, problem)
     for i in range(n):
         w[i] = given[row.load + i // 3] * given[row.unit + i]
     _forget_unloaded(own, problem)

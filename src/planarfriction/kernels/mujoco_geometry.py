@@ -29,6 +29,14 @@ class Scratch(NamedTuple):
     """[3, nv]"""
     more: int
     """Acceleration that the change of wrenches adds, [nv]."""
+    start: int
+    """Wrenches where a step in contact space begins, [3k]."""
+    goal: int
+    """And where it ends, [3k]."""
+    move: int
+    """Twists between, [3k]."""
+    block: int
+    """[6, 6]"""
     owners: int
     """The patch of each constraint, -1 of others, int [nefc]."""
     misses: int
@@ -43,7 +51,7 @@ class Scratch(NamedTuple):
 def take(own, d, nefc):
     """Take scratch from the data's own stack, until it is freed."""
     k, nv, n = own.count, own.nv, 3 * own.count
-    total = own.words + nv * (n + 2 * nv + 2 * (n + 1) + 7) + 2 * nefc + 7 * k
+    total = own.words + nv * (n + 2 * nv + 2 * (n + 1) + 7) + 3 * n + 36 + 2 * nefc + 7 * k
     problem = call_c(own.functions.mj_stackAllocNum, (d, total))
     jacobian = at(problem, own.words)
     inertia = at(jacobian, nv * n)
@@ -53,12 +61,16 @@ def take(own, d, nefc):
     moves = at(held, nv * (n + 1))
     turns = at(moves, 3 * nv)
     more = at(turns, 3 * nv)
-    owners = at(more, nv)
+    start = at(more, nv)
+    goal = at(start, n)
+    move = at(goal, n)
+    block = at(move, n)
+    owners = at(block, 36)
     misses = at(owners, nefc)
     counts = at(misses, nefc)
-    return Scratch(
-        problem, jacobian, inertia, stiff, answers, held, moves, turns, more, owners, misses, counts, at(counts, k)
-    )
+    frames = at(counts, k)
+    first = problem, jacobian, inertia, stiff, answers, held, moves, turns, more
+    return Scratch(*first, start, goal, move, block, owners, misses, counts, frames)
 
 
 @kernel

@@ -86,6 +86,8 @@ class Functions(NamedTuple):
     mj_jac: int
     mj_isSparse: int
     mjd_smooth_vel: int
+    mjd_freeMhat: int
+    """0 in versions without."""
 
 
 class Constants(NamedTuple):
@@ -164,6 +166,12 @@ class Host(NamedTuple):
     other_bodies: int
     at_contact: int
     """Whether the origin is in the middle of the contacts."""
+    free_count: int
+    """Free joints."""
+    free_joints: int
+    """Where they are, int [free_count]."""
+    free_dofs: int
+    """And where their degrees of freedom begin."""
     inertia: int
     """Offset of the inertia that `mj_fullM` wants, -1 where it takes the data."""
     memory: Memory

@@ -11,15 +11,22 @@ from typing import NamedTuple
 
 from planarfriction.kernels import callback, entry, jit, kernel
 from planarfriction.kernels import compiled_math as xp
+from planarfriction.kernels.coupling import evaluate
 from planarfriction.kernels.coupling_rows import Row
 from planarfriction.kernels.coupling_rows import read as read_patches
 from planarfriction.kernels.mujoco_geometry import place, take
 from planarfriction.kernels.mujoco_records import Host, read
-from planarfriction.kernels.mujoco_responses import MISFIT, is_sparse, leaves_range, respond
+from planarfriction.kernels.mujoco_responses import is_sparse, leaves_range, respond
 from planarfriction.kernels.pointers import address, at, call, call_c, doubles, integers, integers32, shared_word
 
-PASSES = 4
+PASSES = 10
 """How often a step is solved anew where other constraints have become active through it."""
+
+SHORTENINGS = 4
+"""How often the way to a solution is shortened that would go too far, which others prevent, before the next one."""
+
+DOWNHILL = 0.5
+"""How far beyond the root along this way it may end, as a share of the slope at its start."""
 
 INSTALLED, _installed = shared_word("planarfriction_mujoco")
 """Where the `Host` is whose model the callback serves, 0 without one."""
@@ -114,23 +121,55 @@ def _add(own, d, s, problem):
 
 
 @kernel
-def _gap(own, problem):
-    """Between the twists that were solved for and those that come out."""
-    largest = 0.0
+def _slope(own, patches, s):
+    """`move . (w(V, N) - W)` at the twists, loads and wrenches of the host: positive before the root, then negative."""
+    problem, row, n = doubles(s.problem), own.row, 3 * own.host.count
+    _copy(doubles(at(s.problem, row.free_twist)), doubles(at(s.problem, row.twist)), n)
+    _copy(doubles(at(s.problem, row.free_load)), doubles(at(s.problem, row.load)), own.host.count)
+    evaluate(patches, s.problem)
+    total = 0.0
+    for i in range(n):
+        gap = problem[row.load + i // 3] * problem[row.unit + i] - problem[row.guess + i]
+        total += doubles(s.move)[i] * gap
+    return total
+
+
+@kernel
+def _set_out(own, s):
+    """Keep the way to the solution, and begin the next from there."""
+    problem, row = doubles(s.problem), own.row
     for i in range(3 * own.host.count):
-        largest = xp.maximum(largest, abs(problem[own.row.twist + i] - problem[own.row.free_twist + i]))
-    return largest
+        doubles(s.start)[i], doubles(s.goal)[i] = problem[row.guess + i], problem[row.wrench + i]
+        doubles(s.move)[i] = problem[row.twist + i] - problem[row.free_twist + i]
+
+
+@kernel
+def _begin(own, s, far):
+    """The next guess: so far on this way."""
+    for i in range(3 * own.host.count):
+        begin, end = doubles(s.start)[i], doubles(s.goal)[i]
+        guess = end if far == 1.0 else begin + far * (end - begin)
+        doubles(s.problem)[own.row.guess + i] = guess
+        doubles(s.problem)[own.row.wrench + i] = guess
 
 
 @kernel
 def _solve(own, m, d, u, s, nefc):
-    """Wrenches that fit the step, into the problem and into the passive forces. Iterations, passes, residual."""
-    host, row, sparse = own.host, own.row, is_sparse(own.host, m)
-    problem, n, iterations, passes = doubles(s.problem), 3 * own.host.count, 0.0, 0
+    """Wrenches that fit the step, into the problem and into the passive forces. Iterations, and passes."""
+    host, row, sparse, patches = own.host, own.row, is_sparse(own.host, m), read_patches(own.host.patches)
+    problem, n = doubles(s.problem), 3 * own.host.count
+    iterations, passes, shortenings, first, far = 0.0, 0, 0, 0.0, 1.0
     while True:
         respond(own, m, d, s, sparse, nefc)
-        if passes > 0 and _gap(own, problem) <= MISFIT:
-            break
+        if passes > 0 and shortenings < SHORTENINGS:
+            here = _slope(own, patches, s)
+            if here < -DOWNHILL * first:
+                far *= xp.minimum(xp.maximum(first / (first - here), 0.1), 0.7)
+                shortenings += 1
+                _begin(own, s, far)
+                _apply(host, d, u, s, doubles(at(s.problem, row.guess)))
+                _accelerate(host, m, d)
+                continue
         call(host.solve, (host.patches, s.problem))
         passes += 1
         if problem[row.iterations] < 0.0:
@@ -142,8 +181,10 @@ def _solve(own, m, d, u, s, nefc):
         _apply(host, d, u, s, doubles(at(s.problem, row.wrench)))
         if passes >= PASSES or not leaves_range(host, m, d, s, sparse, nefc):
             break
+        _set_out(own, s)
+        first, shortenings, far = _slope(own, patches, s), 0, 1.0
+        _begin(own, s, far)
         _accelerate(host, m, d)
-        _copy(doubles(at(s.problem, row.wrench)), doubles(at(s.problem, row.guess)), n)
     return iterations, passes
 
 

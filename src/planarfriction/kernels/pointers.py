@@ -168,18 +168,18 @@ def integers32(typingctx, address):
 
 @intrinsic
 def call_c(typingctx, address, arguments):
-    """Call the function of a C library at `address` with a tuple of integers; the word that it returns."""
-    if any(not isinstance(given, types.Integer) for given in arguments):
+    """Call the function of a C library at `address` with a tuple of integers and doubles; the word that it returns."""
+    if any(not isinstance(given, (types.Integer, types.Float)) for given in arguments):
         return None
     word = ir.IntType(64)
 
     def generate(context, builder, signature, args):
         target, packed = args
-        values = [
-            context.cast(builder, builder.extract_value(packed, i), given, types.int64)
-            for i, given in enumerate(signature.args[1])
-        ]
-        kind = ir.FunctionType(word, [word] * len(values))
+        values = []
+        for i, given in enumerate(signature.args[1]):
+            wanted = types.float64 if isinstance(given, types.Float) else types.int64
+            values.append(context.cast(builder, builder.extract_value(packed, i), given, wanted))
+        kind = ir.FunctionType(word, [value.type for value in values])
         return builder.call(builder.inttoptr(target, kind.as_pointer()), values)
 
     return types.int64(address, arguments), generate

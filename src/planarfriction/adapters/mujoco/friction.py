@@ -158,7 +158,9 @@ class Friction:
         ]
         columns = np.ascontiguousarray(np.array(chosen, np.int64).T)
         names = ("sites", "own", "other", "own_bodies", "other_bodies", "at_contact")
-        self._kept = problem, columns, packed
+        joints = np.flatnonzero(self.m.jnt_type == int(mujoco.mjtJoint.mjJNT_FREE))
+        free = np.array([joints, self.m.jnt_dofadr[joints]], np.int64)
+        self._kept = problem, columns, free, packed
         return row_of(
             Host(
                 nv=self.m.nv,
@@ -170,6 +172,9 @@ class Friction:
                 patches=place_of(packed.row),
                 solve=kernels.solve_address(),
                 plan=address_of(mujoco_step.plan, "ppp"),
+                free_count=len(joints),
+                free_joints=place_of(free),
+                free_dofs=place_of(free) + 8 * len(joints),
                 memory=self._memory,
                 **dict(zip(names, (place_of(columns) + 8 * k * np.arange(6)).tolist(), strict=True)),
                 **layout(),

@@ -99,7 +99,8 @@ def _functions() -> records.Functions:
     folder = Path(mujoco.__file__).parent
     path = next(each for name in _FILES for each in folder.glob(name))
     library, names = ctypes.CDLL(str(path)), records.Functions._fields
-    return records.Functions(*(ctypes.cast(getattr(library, name), ctypes.c_void_p).value or 0 for name in names))
+    found = (getattr(library, name, None) for name in names)
+    return records.Functions(*(ctypes.cast(each, ctypes.c_void_p).value if each else 0 for each in found))
 
 
 def _constants() -> records.Constants:

@@ -1,0 +1,37 @@
+"""What comes out of a step of MuJoCo, from its contacts and velocities, beside what was solved for."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+
+
+def twists_and_loads(friction, d) -> tuple[np.ndarray, np.ndarray]:
+    """Of all patches `[k, 3]`, `[k]`, after a step: positions in the data are still those at its beginning."""
+    m, k = friction.m, len(friction.patches)
+    twists, loads = np.zeros((k, 3)), np.zeros(k)
+    for p, placed in enumerate(friction.placed):
+        chosen, sign = placed.contacts(d)
+        if not len(chosen):
+            continue
+        centre, axes = placed.frame(d, chosen, sign)
+        loads[p] = d.efc_force[d.contact.efc_address[chosen]].sum()
+        for side, body in zip((-1.0, 1.0), placed.bodies, strict=True):
+            moves, turns = np.zeros((3, m.nv)), np.zeros((3, m.nv))
+            mujoco.mj_jac(m, d, moves, turns, centre, body)
+            twists[p] += side * np.array([*(axes[:2] @ moves @ d.qvel), axes[2] @ turns @ d.qvel])
+    return twists, loads
+
+
+def misfit(friction, d) -> float:
+    """Largest difference of twists [m/s], spins at a lever arm of 1 cm, and of loads in thousands of newtons."""
+    twists, loads = twists_and_loads(friction, d)
+    missed = abs(twists - friction.twists(d)) * [1.0, 1.0, 0.01]
+    return max(missed.max(), 1e-3 * abs(loads - friction.loads(d)).max())
+
+
+def step_checked(friction, d, most: float) -> None:
+    """A step after which nothing misfits by more than `most`."""
+    friction.step(d)
+    assert friction.report(d).converged
+    assert misfit(friction, d) <= most, d.time
