@@ -117,5 +117,7 @@ def test_grips_are_quiet_at_every_time_step_that_normal_contact_allows(sigma_0, 
         path = scene.run(m, d, lambda friction=friction, d=d: friction.step(d))
         # falls onto its bristles, which hold the weight at 0.2 g / (2 x 3 N sigma_0), and turns on them
         assert abs(path[:, 2] - path[0, 2]).max() <= 2.5 * 0.2 * 9.81 / (6.0 * sigma_0)
-        # without damping of their own, sqrt(6 N sigma_0 / m) is damped by the implicit step alone, at 75/s or more
-        assert np.ptp(path[-len(path) // 10 :, :3], axis=0).max() <= 1e-9, dt
+        # what turns on soft bristles without damping of their own is damped by the implicit step alone, at 2/s or more
+        tenth = len(path) // 10
+        first, last = (np.ptp(part[:, :3], axis=0).max() for part in (path[:tenth], path[-tenth:]))
+        assert last <= (1e-9 if sigma_1 > 0.0 else 0.3 * first), dt

@@ -1,3 +1,5 @@
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo describes few of its names to type checkers.)
 """Scenes in MuJoCo in which friction decides: held, shaken, spun to rest, turned in the hand, carried on a tray.
 
 Each comes as a model with MuJoCo's own friction at given settings, or with patches. Needs MuJoCo when it is built.

@@ -100,7 +100,7 @@ def _functions() -> records.Functions:
     path = next(each for name in _FILES for each in folder.glob(name))
     library, names = ctypes.CDLL(str(path)), records.Functions._fields
     found = (getattr(library, name, None) for name in names)
-    return records.Functions(*(ctypes.cast(each, ctypes.c_void_p).value if each else 0 for each in found))
+    return records.Functions(*((each and ctypes.cast(each, ctypes.c_void_p).value) or 0 for each in found))
 
 
 def _constants() -> records.Constants:
