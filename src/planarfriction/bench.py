@@ -16,7 +16,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import MissingExtraError
-from planarfriction.experiments import drake_disc
+from planarfriction.experiments import drake_disc, mujoco_costs
 from planarfriction.experiments.baselines import lsoda_time, numpy_table, scipy_twist
 from planarfriction.experiments.four_feet import four_feet
 from planarfriction.experiments.measurement import Measurement, line, median, once
@@ -355,6 +355,11 @@ BENCHMARKS: dict[str, Callable[[str, bool], Measurement]] = {
     "step.reduced.four": _step_reduced_several,
     "coupled.four_feet.call": _coupled,
     "coupled.four_feet.batch": lambda name, full: _coupled(name, full, 1000),
+    "mujoco.tray.1": mujoco_costs.measure,
+    "mujoco.tray.2": mujoco_costs.measure,
+    "mujoco.tray.8": mujoco_costs.measure,
+    "mujoco.grip": mujoco_costs.measure,
+    "mujoco.rollout": mujoco_costs.measure,
     "drake.disc.point": drake_disc.measure,
     "drake.disc.hydroelastic": drake_disc.measure,
     "gradient.published": _gradient_published,

@@ -238,7 +238,7 @@ class CoupledPatches(ByValue):
         step = CoupledStep(new, wrench, twist, load, counts.reshape(batch), residual, converged > 0.0)
         return step if len(problems) == 1 else CoupledStep(*map(np.ascontiguousarray, step))
 
-    def problem(self) -> np.ndarray:
+    def _blank_problem(self) -> np.ndarray:
         """The row of a problem without inputs, for compiled hosts; its patches follow no loads (`kernels.coupling`)."""
         row, parts = np.zeros((1, self._packed.words)), self._parts
         row.view(np.int64)[:, parts["records"]], row[:, parts["shares"]] = self._packed.records, self._packed.shares

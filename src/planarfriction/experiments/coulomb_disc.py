@@ -9,9 +9,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from scipy.integrate import solve_ivp
-from scipy.special import ellipe, ellipkm1
-
 GRAVITY = 9.81
 """[m/s^2]"""
 
@@ -32,6 +29,8 @@ class Stop(NamedTuple):
 
 def wrench(ratio: float) -> tuple[float, float]:
     """Force over `mu N` and torque over `mu N R` of a disc, against its motion; `ratio` is speed over rim speed."""
+    from scipy.special import ellipe, ellipkm1
+
     if ratio < 1e-9:
         return ratio, 2.0 / 3.0
     if abs(ratio - 1.0) < 1e-10:
@@ -51,6 +50,7 @@ def wrench(ratio: float) -> tuple[float, float]:
 
 def stop(speed: float, spin: float, *, radius: float = 0.1, mu: float = 0.3) -> Stop:
     """Where a disc of homogeneous mass comes to rest that starts with `speed` [m/s] and `spin` [rad/s]."""
+    from scipy.integrate import solve_ivp
 
     def rates(_, y):
         v, w = max(y[0], 0.0), max(y[1], 0.0)

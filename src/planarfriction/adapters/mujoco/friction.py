@@ -151,7 +151,7 @@ class Friction:
     def _row(self) -> np.ndarray:
         """What compiled steps know of the model."""
         packed, k = self.coupled._packed, len(self.patches)
-        problem = self.coupled.problem()
+        problem = self.coupled._blank_problem()
         chosen = [
             (each.site, each.own, each.other, *reversed(each.bodies), each.patch.centre == "contact")
             for each in self.placed
