@@ -194,6 +194,20 @@ def test_what_comes_out_otherwise_than_bristles_saw_is_owed_to_them(monkeypatch)
     np.testing.assert_allclose(asked.twists, -given, atol=2e-6)  # pulled back, but for what bristles give
 
 
+def test_answers_that_lead_away_are_forgotten():
+    """Answers of the last step that are far too stiff, as where a second contact has gone: each pass would overshoot."""
+    run = sliding("box", "point", 2e-3, BOX, tilt=0.3)
+    run.to(0.3)
+    own, parts = run.own.get_discrete_state_vector().value().copy(), run.friction._parts
+    answers = own[parts["answers"]]
+    answers[1:10] *= 0.02
+    run.friction._shadow.begin(run.plant.GetPositionsAndVelocities(run.context), {})
+    before = [own[parts[name]] for name in ("bristles", "wrenches", "force")]
+    asked = run.friction._asking.step(np.array([0.0, 0.0, 0.0, 0.1, 0.0, 0.0]), *before, np.zeros(3), answers)
+    passes, _, _, misfit, _ = asked.report
+    assert passes < 10 and misfit <= MISFIT
+
+
 @pytest.mark.parametrize("contact", CONTACTS)
 def test_twists_and_wrenches_are_in_the_axes_of_the_frame(contact):
     """A disc that slides along x and has turned by a quarter slides along -y of its frame; friction is against it."""
