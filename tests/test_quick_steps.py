@@ -102,5 +102,11 @@ def test_what_is_not_in_order_is_refused(name):
             model.step_jacobians(**{**one, "normal_force": _plain(one["normal_force"])})
 
 
+@pytest.mark.parametrize("twist", [np.array(0.0), np.zeros((1, 3, 1))])
+def test_twists_of_other_axes_are_one_clear_line(twist):
+    with pytest.raises(pf.errors.InvalidValueError, match=r"^twist must have shape \[..., 3\]"):
+        MODELS["reduced"].step(np.zeros((1, 3)), twist, 1.0, 1e-3)
+
+
 def _plain(value):
     return value if isinstance(value, bool) else float(value)

@@ -151,7 +151,7 @@ def _refusal(model: ReducedModel | ReducedModelPublished) -> tuple[str, str, Any
         return "load_error", rule, model.load_error
     return (
         "model",
-        "have a shape that does not follow the load: a patch of fixed shape, or on_load_change='keep'",
+        "have a shape that does not follow the load, or be a ReducedModel: a fixed patch, or on_load_change='keep'",
         f"on_load_change={model.on_load_change!r}",
     )
 

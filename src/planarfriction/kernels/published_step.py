@@ -159,19 +159,6 @@ def step_address() -> int:
 
 
 @jit
-def rollout(inputs, span, z, wrench, states):
-    """See `rollouts.roll`."""
-    rollouts.roll(shape_of, hold, linearise, inputs, span, z, wrench, states)
-
-
-@jit
-def gradient(inputs, states, wrench_bar, span, bars):
-    """See `rollouts.gradient`."""
-    work = np.empty(rollouts.SCRATCH)
-    rollouts.gradient(shape_of, hold_slopes, linearise, pull_back, inputs, states, wrench_bar, span, bars, work)
-
-
-@jit
 def sensitivities(inputs, span, z, columns, wrenches, slopes):
     """See `rollouts.sensitivities`."""
     work = np.empty(rollouts.SCRATCH), np.empty((6, 7 + len(NAMES))), np.empty((6, columns.shape[0]))

@@ -55,8 +55,7 @@ def step_of_many(quick: Quick, state, twist, normal_force, dt) -> tuple[np.ndarr
     if type(state) is not _ARRAY or type(twist) is not _ARRAY:
         return None
     places, _, n, shape, _ = quick
-    count = len(twist)
-    if state.shape != (count, *shape):
+    if twist.ndim != 2 or state.shape != (count := len(twist), *shape):
         return None
     try:
         if type(normal_force) is not _ARRAY:
