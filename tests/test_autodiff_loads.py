@@ -137,6 +137,7 @@ def test_a_family_that_stays_as_it_is_has_the_gradient_of_a_fixed_patch(kind):
     for got, want in zip(found, wanted, strict=True):
         # weights at another load differ by rounding, and so do slopes of the shape: 1e-16 over the step of 1e-5
         assert got == pytest.approx(want, rel=1e-8, abs=1e-9 * np.abs(want).max())
+    assert {rung for rung in family.load_rungs if rung > 1e-6} == {1.0, 2.0}  # no maps to move towards
 
 
 # ---------------------------------------------------------------------- against differences
@@ -269,6 +270,22 @@ def test_a_contact_that_shrinks_to_a_point_has_finite_slopes():
     # a point has a wrench in proportion to its load
     ends = [pf.rollout(model, None, twists, loads + h * (np.arange(6) == 4), DT).wrenches.sum() for h in (1e-3, -1e-3)]
     assert found.normal_force[4] == pytest.approx((ends[0] - ends[1]) / 2e-3, rel=1e-9)
+
+
+def test_a_contact_that_has_just_ceased_to_be_a_point_looks_ahead_alone():
+    """Up to a share of 1e-6 of the other foot it is a point, behind that its radius goes on from 11 um."""
+    pair = pf.ContactPatch.points([(0.0, 0.0), (0.011, 0.0)])
+    patch = pf.ContactPatch(pair.positions, pair.areas, pf.PressureMaps((1.0, 2.0), [[1.0, 0.0], [1.0, 2e-6]]))
+    model = pf.ReducedModel(patch, ELASTIC, segments=8, speeds=6)
+    low, high = 1.4, 1.6
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if model.shape_at(middle).contact_radius == 0.0 else (low, middle)
+    load, twist, bar = high * (1.0 + 2e-6), [[0.0, 0.0, 0.1]], [[0.0, 0.0, 1.0]]
+    found = autodiff.rollout_gradient(model, None, twist, load, DT, bar)
+    ends = [pf.rollout(model, None, twist, load * (1.0 + h), DT).wrenches[0, 2] for h in (1e-6, -1e-6)]
+    # the radius bends by 1e-5 of itself over the step; rounding is 1e-16 over 1e-6
+    assert float(found.normal_force) == pytest.approx((ends[0] - ends[1]) / (2e-6 * load), rel=1e-4)
 
 
 def test_no_steps_and_shared_loads():
