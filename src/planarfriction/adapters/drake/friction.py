@@ -73,7 +73,7 @@ class PatchFriction(LeafSystem):
         bounds = np.cumsum([0, *sizes.values()])
         self._parts = {name: slice(*ends) for name, ends in zip(sizes, itertools.pairwise(bounds), strict=True)}
         self.DeclareDiscreteState(int(bounds[-1]))
-        producer = ValueProducer(lambda: AbstractValue.Make(None), self._solve)
+        producer = ValueProducer(lambda: AbstractValue.Make(()), self._solve)
         tickets = {self.all_input_ports_ticket(), self.xd_ticket()}
         self._solution: Any = self.DeclareCacheEntry("solution", producer, tickets)
         self.DeclareVectorOutputPort("generalized_force", self._size, self._write_force, {self._solution.ticket()})
