@@ -1,0 +1,214 @@
+"""The step in contact space of `planarfriction.coupling` in operations of JAX, with derivatives.
+
+The same steps of Newton's method as `kernels.coupling` takes, which says why; here as one flat loop with one evaluation
+of the models a round, so that environments side by side wait for each other as little as they can, and little is
+compiled. Derivatives are those of the equation that is solved, at its solution.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+
+from planarfriction.kernels.coupling import DOWNHILL, JOINT, ROUND, ROUNDING, SHORTENINGS
+
+_GUESS, _REST, _SEARCH = range(3)
+"""What a round evaluates: the twists that the guess causes, twists at rest, or a point along a Newton step."""
+
+Unit = Callable[[jax.Array], jax.Array]
+"""Wrenches of the models' steps per unit load `[k, 3]` of their twists `[k, 3]`."""
+
+
+class Host(NamedTuple):
+    """How twists and loads at the end of a step follow the wrenches w `[3k]` that act during it."""
+
+    twist: jax.Array
+    """Without wrenches, `[3k]`."""
+    load: jax.Array
+    """`[k]`"""
+    response: jax.Array
+    """A, `[3k, 3k]`."""
+    load_response: jax.Array
+    """B, `[k, 3k]`."""
+
+    def twists(self, w: jax.Array) -> jax.Array:
+        """`[k, 3]`"""
+        return (self.twist + self.response @ w).reshape(-1, 3)
+
+    def loads(self, w: jax.Array) -> jax.Array:
+        """`[k]`"""
+        load = self.load + self.load_response @ w
+        return jnp.where(load > 0.0, load, 0.0)
+
+
+class Solved(NamedTuple):
+    """Wrenches that fit."""
+
+    wrench: jax.Array
+    """`[3k]`"""
+    iterations: jax.Array
+    residual: jax.Array
+    """[m/s], as in `coupling.CoupledStep`."""
+    converged: jax.Array
+
+
+class _Round(NamedTuple):
+    """What one round of the loop leaves to the next."""
+
+    phase: Any
+    w: Any
+    """Where the next round evaluates, with its twists and loads."""
+    twist: Any
+    load: Any
+    unit: Any
+    """At the guess, with slopes and misfit."""
+    slopes: Any
+    misfit: Any
+    start: Any
+    """The Newton step on the way: whence, how far in all and in twists, `A dW . s` there, and the share tried."""
+    change: Any
+    move: Any
+    first: Any
+    far: Any
+    tries: Any
+    whole: Any
+    held: Any
+    iterations: Any
+    best: Any
+    wrench: Any
+    """Of the models, where the misfit was best."""
+    done: Any
+
+
+def solve(unit: Unit, host: Host, guess: jax.Array, radius: jax.Array, tolerance: float, most: int) -> Solved:
+    """The wrenches `w(V, N)` with the V and N that they cause; `guess` `[3k]`, `radius` of the patches `[k]` [m]."""
+    count, lever = len(host.load), jnp.ones((len(host.load), 3)).at[:, 2].set(radius)
+    caused = host.response @ guess
+    speeds = lever.ravel() * (abs(host.twist + caused) + abs(caused))
+    tolerance = jnp.maximum(tolerance, ROUNDING * speeds.max())
+    diagonal = jnp.diagonal(host.response).reshape(-1, 3)
+    scale = jnp.where(diagonal > 0.0, jnp.sqrt(abs(diagonal)), 1.0)
+    eye = jnp.broadcast_to(jnp.eye(3)[:, None], (3, count, 3))
+
+    def evaluate(twist):
+        return jax.vmap(lambda along: jax.jvp(unit, (twist,), (along,)), out_axes=(None, -1))(eye)
+
+    def misfit_of(twist, load, unit):
+        w = (load[:, None] * unit).ravel()
+        gap = abs(host.twists(w) - twist) * lever
+        missing = abs(host.loads(w) - load)
+        gap = jnp.maximum(gap, diagonal * missing[:, None] * jnp.array([1.0, 1.0, 0.0]))
+        return jnp.where(jnp.isfinite(gap).all(), gap.max(), jnp.inf)
+
+    def newton(w, twist, load, unit, slopes, held):
+        """The step, what it moves, and `A dW . s` at its start."""
+        lacks = host.load + host.load_response @ w - load
+        follows = jnp.where(held | ((load == 0.0) & (lacks < 0.0)), 0.0, 1.0)
+        own = load[:, None, None] * slopes
+        both = jnp.stack([own, _without_rising(own, scale)])
+        caused = both @ host.response.reshape(count, 3, -1) + (follows[:, None] * unit)[..., None] * (
+            host.load_response[:, None]
+        )
+        matrix = jnp.eye(3 * count) - caused.reshape(2, 3 * count, -1)
+        base = (load + follows * lacks)[:, None] * unit - w.reshape(-1, 3)
+        right = base + (both @ (host.twists(w) - twist)[..., None])[..., 0]
+        change, sign = _solved(matrix, right.reshape(2, -1))
+        move = change @ host.response.T
+        towards = move.reshape(2, count, 3)
+        downhill = (towards * (change.reshape(towards.shape) - (own @ towards[..., None])[..., 0])).sum((1, 2))
+        plain = (sign[0] > 0.0) & (downhill[0] > 0.0)
+        change, move = jnp.where(plain, change[0], change[1]), jnp.where(plain, move[0], move[1])
+        return change, move, (move * ((load[:, None] * unit).ravel() - w)).sum()
+
+    def body(c: _Round) -> _Round:
+        unit, slopes = evaluate(c.twist)
+        searching = c.phase == _SEARCH
+        here = (c.move * ((c.load[:, None] * unit).ravel() - c.w)).sum()
+        near = c.whole | (here >= -DOWNHILL * c.first) | ~(c.first > 0.0) | (c.tries == SHORTENINGS)
+        accepted = ~searching | near
+        load = jnp.where(c.held, host.loads(c.w), c.load)
+        misfit = misfit_of(c.twist, load, unit)
+        # the better of the guess and of rest
+        back = (c.phase == _REST) & (misfit > c.misfit)
+        twist, misfit = jnp.where(back, host.twists(c.w), c.twist), jnp.where(back, c.misfit, misfit)
+        unit, slopes = jnp.where(back, c.unit, unit), jnp.where(back, c.slopes, slopes)
+        to_rest = (c.phase == _GUESS) & (misfit > tolerance)
+        iterations = c.iterations + (searching & near)
+        better = accepted & (misfit < c.best)
+        best = jnp.where(better, misfit, c.best)
+        wrench = jnp.where(better, (load[:, None] * unit).ravel(), c.wrench)
+        done = accepted & ~to_rest & ((misfit <= tolerance) | (iterations >= most) | (misfit == jnp.inf))
+        # a new step, or less of the last
+        held = jnp.where(accepted, iterations % ROUND >= JOINT, c.held)
+        change, move, first = newton(c.w, twist, load, unit, slopes, held)
+        change, move, first = (
+            jnp.where(accepted, new, old)
+            for new, old in zip((change, move, first), (c.change, c.move, c.first), strict=True)
+        )
+        slope = jnp.where(c.first == here, 1.0, c.first - here)
+        far = jnp.where(accepted, 1.0, c.far * jnp.clip(c.first / slope, 0.1, 0.7))
+        start = jnp.where(accepted, c.w, c.start)
+        w = jnp.where(to_rest, c.w, start + far * change)
+        return _Round(
+            phase=jnp.where(to_rest, _REST, _SEARCH),
+            w=w,
+            twist=jnp.where(to_rest, 0.0, host.twists(w)),
+            load=jnp.where(to_rest | held, load, host.loads(w)),
+            unit=unit,
+            slopes=slopes,
+            misfit=misfit,
+            start=start,
+            change=change,
+            move=move,
+            first=first,
+            far=far,
+            tries=jnp.where(accepted, 0, c.tries + 1),
+            whole=jnp.where(accepted, c.phase == _REST, c.whole) & ~back,
+            held=held & ~to_rest,
+            iterations=iterations,
+            best=best,
+            wrench=wrench,
+            done=done,
+        )
+
+    none, zeros = jnp.zeros(3 * count), jnp.zeros((count, 3))
+    first = _Round(
+        phase=jnp.asarray(_GUESS), w=guess, twist=host.twists(guess), load=host.loads(guess),
+        unit=zeros, slopes=jnp.zeros((count, 3, 3)), misfit=jnp.asarray(jnp.inf),
+        start=guess, change=none, move=none, first=jnp.asarray(0.0), far=jnp.asarray(1.0), tries=jnp.asarray(0),
+        whole=jnp.asarray(False), held=jnp.asarray(False), iterations=jnp.asarray(0),
+        best=jnp.asarray(jnp.inf), wrench=none, done=jnp.asarray(False),
+    )  # fmt: skip
+    end = jax.lax.while_loop(lambda c: ~c.done, body, first)
+    return Solved(end.wrench, end.iterations, end.best, end.best <= tolerance)
+
+
+def fitting(unit: Unit, host: Host, found: jax.Array) -> jax.Array:
+    """The wrenches `found`, with the derivatives of `w(V, N) - W = 0` by all that is in `unit` and `host`."""
+
+    def gap(w):
+        return (host.loads(w)[:, None] * unit(host.twists(w))).ravel() - w
+
+    def linear(slope, right):
+        return jnp.linalg.solve(jax.jacobian(slope)(right), right)
+
+    return jax.lax.custom_root(gap, jax.lax.stop_gradient(found), lambda _, w: w, linear)
+
+
+def _without_rising(slopes: jax.Array, scale: jax.Array) -> jax.Array:
+    """Slopes `[k, 3, 3]` without the directions in which they rise; `scale` `[k, 3]` are twists of unit energy."""
+    both = scale[:, :, None] * scale[:, None, :]
+    rises, axes = jnp.linalg.eigh(0.5 * (slopes + slopes.mT) * both)
+    return slopes - (axes * jnp.maximum(rises, 0.0)[:, None]) @ axes.mT / both
+
+
+def _solved(matrix: jax.Array, right: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """Solutions `[..., n]`, 0 where there are none, and signs of the determinants."""
+    factors, pivots = jax.scipy.linalg.lu_factor(matrix)
+    found = jax.scipy.linalg.lu_solve((factors, pivots), right[..., None])[..., 0]
+    swaps = (pivots != jnp.arange(pivots.shape[-1])).sum(-1)
+    sign = jnp.sign(jnp.diagonal(factors, axis1=-2, axis2=-1)).prod(-1) * (1.0 - 2.0 * (swaps % 2))
+    return jnp.where(jnp.isfinite(found), found, 0.0), sign

@@ -1,0 +1,117 @@
+# pyright: reportAttributeAccessIssue=false, reportPrivateImportUsage=false
+# (MJX keeps what its constraints are in `_impl`.)
+"""How MJX's step answers to wrenches on patches, while the set of active constraints holds.
+
+As `planarfriction.adapters.mujoco.responses`, with the accelerations themselves: `H qacc = f + Jp' W + Jc' (D a + c)`
+over the rows in their quadratic range and those at their largest force c. It is what MJX's solver goes towards, exact,
+and it has derivatives where the solver's loop has none.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+from mujoco import mjx
+
+from planarfriction.adapters.mjx.newton import Host
+
+
+class Active(NamedTuple):
+    """Which constraint rows are active."""
+
+    quadratic: jax.Array
+    """Rows whose force follows the acceleration, bool `[nefc]`."""
+    pull: jax.Array
+    """Sign of the force of rows at their friction loss, else 0, `[nefc]`."""
+
+
+class Answer(NamedTuple):
+    """Accelerations, forces of constraints, twists and loads as they follow from wrenches w `[3k]`."""
+
+    free: jax.Array
+    """Acceleration without wrenches, `[nv]`."""
+    moved: jax.Array
+    """By wrenches, `[nv, 3k]`."""
+    stiffness: jax.Array
+    """D of the quadratic rows, `[nefc]`."""
+    limit: jax.Array
+    """Force of the others, `[nefc]`."""
+    host: Host
+
+    def acceleration(self, w: jax.Array) -> jax.Array:
+        """`[nv]`"""
+        return self.free + self.moved @ w
+
+    def forces(self, d: Any, w: jax.Array) -> jax.Array:
+        """Of constraints, `[nefc]`."""
+        return self.limit - self.stiffness * _gap(d, self.acceleration(w))
+
+
+def active_rows(d: Any) -> Active:
+    """From the forces that MJX's solver has found."""
+    return _active(d, d._impl.efc_force > 0.0, d._impl.efc_force)
+
+
+def active_at(d: Any, acceleration: jax.Array) -> Active:
+    """At an acceleration."""
+    gap = _gap(d, acceleration)
+    return _active(d, gap < 0.0, -d._impl.efc_D * gap)
+
+
+def _active(d: Any, pressed: jax.Array, force: jax.Array) -> Active:
+    """Equalities always are, friction below its loss, all else where it is `pressed`."""
+    row = jnp.arange(len(force))
+    loss = (row >= d._impl.ne) & (row < d._impl.ne + d._impl.nf)
+    at_loss = loss & (abs(force) >= d._impl.efc_frictionloss)
+    quadratic = jnp.where(loss, ~at_loss, pressed | (row < d._impl.ne))
+    return Active(quadratic, jnp.where(at_loss, jnp.sign(force), 0.0))
+
+
+def slack(d: Any, before: Active, after: Active, acceleration: jax.Array, dt: jax.Array) -> jax.Array:
+    """Largest speed [m/s] at which a row is on the wrong side of its range."""
+    wrong = (before.quadratic != after.quadratic) | (before.pull != after.pull)
+    loss = d._impl.efc_frictionloss / d._impl.efc_D
+    return (jnp.where(wrong, abs(abs(_gap(d, acceleration)) - loss), 0.0) * dt).max(initial=0.0)
+
+
+def answer(m: Any, d: Any, jacobian: jax.Array, rows: jax.Array, active: Active) -> Answer:
+    """`jacobian` `[3k, nv]` of the patches' twists, `rows` `[k, nefc]` 1 where a row is one of their contacts.
+
+    `qfrc_smooth` in the data is without wrenches.
+    """
+    constraints, inertia = d._impl.efc_J, mjx.full_m(m, d)
+    stiffness = jnp.where(active.quadratic, d._impl.efc_D, 0.0)
+    limit = active.pull * d._impl.efc_frictionloss
+    stiff = inertia + constraints.T @ (stiffness[:, None] * constraints)
+    pushed = d.qfrc_smooth + constraints.T @ (stiffness * d._impl.efc_aref + limit)
+    factor = jax.scipy.linalg.cho_factor(0.5 * (stiff + stiff.T))
+    found = jax.scipy.linalg.cho_solve(factor, jnp.concatenate([pushed[:, None], jacobian.T], axis=1))
+    free, moved = found[:, 0], found[:, 1:]
+    gains = jax.vmap(lambda acceleration: _gained(m, d, inertia, acceleration), in_axes=1, out_axes=1)(found)
+    weights = rows * stiffness
+    host = Host(
+        twist=jacobian @ (d.qvel + gains[:, 0]),
+        load=-weights @ _gap(d, free),
+        response=jacobian @ gains[:, 1:],
+        load_response=-weights @ (constraints @ moved),
+    )
+    return Answer(free, moved, stiffness, limit, host)
+
+
+def integrate(m: Any, d: Any) -> Any:
+    """The integrator of the model, once the accelerations are there."""
+    return mjx.euler(m, d) if m.opt.integrator == mjx.IntegratorType.EULER else mjx.implicit(m, d)
+
+
+def _gained(m: Any, d: Any, inertia: jax.Array, acceleration: jax.Array) -> jax.Array:
+    """What the integrator makes of an acceleration: the velocity that it gains in a step, linear in it."""
+    force = inertia @ acceleration
+    d = d.replace(qacc=acceleration, qfrc_smooth=force, qfrc_constraint=jnp.zeros_like(force))
+    return integrate(m, d).qvel - d.qvel
+
+
+def _gap(d: Any, acceleration: jax.Array) -> jax.Array:
+    """Of rows, how far accelerations are above those at which they are without force."""
+    return d._impl.efc_J @ acceleration - d._impl.efc_aref
