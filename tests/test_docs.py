@@ -22,7 +22,7 @@ ROOT = Path(__file__).parent.parent
 PAGES = [ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md")] + sorted(
     (ROOT / "docs").glob("*.md")
 )
-OPTIONAL = ("torch", "jax", "mujoco", "pydrake")
+OPTIONAL = ("torch", "jax", "mujoco", "mujoco.mjx", "pydrake")
 """Packages behind an extra; `planarfriction.torch`, `planarfriction.adapters.mujoco` and so on carry their names."""
 RECIPES = ("pybullet", "genesis", "newton")
 """Hosts that a page has recipes for, and no extra of ours installs."""
@@ -66,8 +66,15 @@ def missing_packages(page: Path) -> dict[int, str]:
         for block in blocks(page)
         for package in (*OPTIONAL, *RECIPES)
         if re.search(rf"^(import|from) (planarfriction\.)?(adapters\.)?{package}\b", block.text, re.MULTILINE)
-        and importlib.util.find_spec(package) is None
+        and not installed(package)
     }
+
+
+def installed(package: str) -> bool:
+    try:
+        return importlib.util.find_spec(package) is not None
+    except ModuleNotFoundError:  # a part of what is not there
+        return False
 
 
 def unsigned_zeros(text: str) -> str:

@@ -19,6 +19,10 @@ from planarfriction.formulas import LawNumbers
 from planarfriction.kernels.steady import HEADER, QUARTIC
 from planarfriction.models.bristle_arrays import back_onto
 
+_SQUARES = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]
+_FOURTHS = [list(each) for each in zip(*((i, j) for i in range(3) for j in range(i, 6)), strict=True)]
+"""Factors of the products of two and of four components in the order of `quartic`."""
+
 
 class MapSizes(NamedTuple):
     """How many numbers a map has, as `kernels.steady` names them."""
@@ -167,9 +171,8 @@ def _evenness(xp, shape: ReducedNumbers, z):
     bent = dot(z, z) > 0.0
     safe = xp.where(bent, z, 1.0)
     n = safe / xp.root(dot(safe, safe))
-    x, y, s = n[..., 0], n[..., 1], n[..., 2]
-    m = [x * x, y * y, s * s, x * y, x * s, y * s]
-    products = xp.stack([m[i] * m[j] for i in range(3) for j in range(i, 6)], -1)
+    m = n[..., _SQUARES[0]] * n[..., _SQUARES[1]]
+    products = m[..., _FOURTHS[0]] * m[..., _FOURTHS[1]]  # not one by one, of which XLA makes ten times the code
     return xp.where(bent, formulas.evenness(dot(n, n), dot(shape.quartic, products)), 1.0)
 
 

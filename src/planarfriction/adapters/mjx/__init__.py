@@ -11,7 +11,7 @@ except ImportError:
 
     raise MissingExtraError("mjx", "mjx") from None
 
-from planarfriction.adapters.mjx.friction import Friction, Report
+from planarfriction.adapters.mjx.friction import Friction
 from planarfriction.adapters.mujoco import Patch, prepare
 
-__all__ = ["Friction", "Patch", "Report", "prepare"]
+__all__ = ["Friction", "Patch", "prepare"]

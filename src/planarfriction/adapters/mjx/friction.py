@@ -17,11 +17,13 @@ from mujoco import mjx
 from planarfriction import models
 from planarfriction.adapters.mjx import newton, responses
 from planarfriction.adapters.mjx.geometry import Places, geometry, places
-from planarfriction.adapters.mujoco.patches import Patch, Placed, check_once, words
+from planarfriction.adapters.mujoco.friction import Report
+from planarfriction.adapters.mujoco.patches import Patch, Placed, check_once, memory, words
 from planarfriction.coupling import ITERATIONS, TOLERANCE
 from planarfriction.errors import InvalidValueError
 from planarfriction.jax import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.jax.base import FrictionModel
+from planarfriction.kernels.mujoco_records import Memory
 
 INTEGRATORS = {
     int(mujoco.mjtIntegrator.mjINT_EULER): "Euler",
@@ -35,23 +37,19 @@ SLACK = 1e-10
 """Speed [m/s] to which the active constraints have to hold."""
 
 
-class Report(NamedTuple):
-    """What a step took, and what came out in the frames of the patches."""
+class _Search(NamedTuple):
+    """What the search for the active constraints goes on from."""
 
+    active: responses.Active
+    wrench: jax.Array
+    """`[3k]`"""
+    acceleration: jax.Array
     iterations: jax.Array
-    """Newton iterations of all passes."""
     passes: jax.Array
     residual: jax.Array
-    """Of the step in contact space [m/s]."""
-    slack: jax.Array
-    """Largest speed at which a constraint is on the wrong side of its range [m/s]."""
     converged: jax.Array
-    twist: jax.Array
-    """`[k, 3]` [m/s, m/s, rad/s]"""
-    wrench: jax.Array
-    """`[k, 3]` [N, N, N m]"""
-    normal_force: jax.Array
-    """`[k]` [N]"""
+    """In contact space."""
+    slack: jax.Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,47 +62,50 @@ class _Fixed:
     shapes: tuple[tuple[int, ...], ...]
     """Of the states."""
     radius: np.ndarray
-    first: int
-    """Where the states begin in `userdata`."""
-
-    @property
-    def size(self) -> int:
-        """Numbers of all states."""
-        return sum(math.prod(shape) for shape in self.shapes)
+    memory: Memory
+    """Where things are in `userdata`."""
+    nuserdata: int
 
 
 @jax.tree_util.register_pytree_node_class
 class Friction:
     """Patch friction for a model that `prepare` has made ready; `step` takes the place of `mjx.step`.
 
-    States live in `userdata` of the data, where `planarfriction.adapters.mujoco` keeps them too. A pytree whose leaves
-    are those of its `models` (`planarfriction.jax`), one for each different model of the patches.
+    States live in the data, in the last numbers of `userdata`, as those of `planarfriction.adapters.mujoco` do, so that
+    data go on where they are put from one into the other. A pytree whose leaves are those of its `models`
+    (`planarfriction.jax`), one for each different model of the patches.
 
     Raises `InvalidValueError` without double precision, for an integrator or a cone that does not fit, noslip
     iterations, too little user data, names that are not in the model, pairs with friction of their own, models that
-    JAX does not have and patches whose shape depends on the load.
+    JAX does not have, shapes that follow their loads.
     """
 
     def __init__(self, m: Any, patches: Sequence[Patch]) -> None:
         check_once(patches)
         placed = [Placed(m, patch) for patch in patches]
-        _check(m, patches, placed)
+        _check(m, placed)
         known = list({id(patch.model): patch.model for patch in patches}.values())
         self.models: tuple[FrictionModel, ...] = tuple(map(_in_jax, known))
+        needed = words(patches, m.nv)
+        if m.nuserdata < needed:
+            raise InvalidValueError("nuserdata", f"be at least {needed} (prepare adds them)", m.nuserdata)
         which = tuple(next(i for i, model in enumerate(known) if model is patch.model) for patch in patches)
         radius = np.array([np.sqrt((patch.model.patch.positions**2).sum(1).mean()) for patch in patches])
         shapes = tuple(self.models[i].rest().shape for i in which)
-        self._fixed = _Fixed(places(placed), which, shapes, radius, m.nuserdata - words(patches))
+        at = memory(patches, m.nv, m.nuserdata - needed)
+        self._fixed = _Fixed(places(placed), which, shapes, radius, at, m.nuserdata)
 
     def replace(self, models: Sequence[FrictionModel]) -> Self:
         """The same patches with other models."""
         return self.tree_unflatten(self._fixed, (tuple(models),))
 
-    def tree_flatten(self):
+    def tree_flatten(self) -> tuple[Any, _Fixed]:
+        """For JAX."""
         return (self.models,), self._fixed
 
     @classmethod
     def tree_unflatten(cls, fixed: _Fixed, leaves) -> Self:
+        """For JAX."""
         friction = object.__new__(cls)
         friction._fixed, (friction.models,) = fixed, leaves
         return friction
@@ -112,40 +113,64 @@ class Friction:
     # ------------------------------------------------------------------ what the data hold
 
     def states(self, d: Any) -> list[jax.Array]:
-        """State of each patch."""
-        fixed, found = self._fixed, []
-        first = fixed.first
-        for shape in fixed.shapes:
-            found.append(d.userdata[..., first : first + math.prod(shape)].reshape(*d.userdata.shape[:-1], *shape))
-            first += math.prod(shape)
-        return found
+        """State of each patch at the time of the data."""
+        at, sizes = self._fixed.memory, [math.prod(shape) for shape in self._fixed.shapes]
+        flat = self._now(d, at.new, at.state, sum(sizes))
+        parts = jnp.split(flat, np.cumsum(sizes)[:-1], axis=-1)
+        return [z.reshape(*z.shape[:-1], *shape) for z, shape in zip(parts, self._fixed.shapes, strict=True)]
 
     def wrenches(self, d: Any) -> jax.Array:
-        """Of the last step `[k, 3]`: the guess of the next."""
-        first, count = self._fixed.first + 2 * self._fixed.size, len(self._fixed.which)
-        return d.userdata[..., first : first + 3 * count].reshape(*d.userdata.shape[:-1], count, 3)
+        """Of the last step `[k, 3]`, on the bodies of the sites, in the frames of the patches."""
+        return self._each(d, self._fixed.memory.wrench, 3)
+
+    def twists(self, d: Any) -> jax.Array:
+        """At the end of the last step `[k, 3]`, of the bodies of the sites relative to the others."""
+        return self._each(d, self._fixed.memory.twist, 3)
+
+    def loads(self, d: Any) -> jax.Array:
+        """Normal forces at the end of the last step `[k]` [N]."""
+        return self._each(d, self._fixed.memory.load, 1)[..., 0]
+
+    def report(self, d: Any) -> Report:
+        """What the last step took."""
+        at, u = self._fixed.memory, d.userdata
+        converged = u[..., at.converged] > 0.0
+        return Report(u[..., at.iterations], u[..., at.passes], u[..., at.residual], converged)
 
     def reset(self, d: Any) -> Any:
         """The data with all bristles at rest."""
-        return d.replace(userdata=d.userdata.at[..., self._fixed.first :].set(0.0))
+        at = self._fixed.memory
+        return d.replace(userdata=d.userdata.at[..., at.state : at.converged + 1].set(0.0))
+
+    def _each(self, d: Any, first: int, count: int) -> jax.Array:
+        k = len(self._fixed.which)
+        return d.userdata[..., first : first + count * k].reshape(*d.userdata.shape[:-1], k, count)
+
+    def _now(self, d: Any, after: int, before: int, count: int) -> jax.Array:
+        """Of the time of the data: of the end of the last step, or of its beginning; zeros at other times."""
+        at, u = self._fixed.memory, d.userdata
+        ends, begins = d.time == u[..., at.next], d.time == u[..., at.time]
+        begun = jnp.where(begins[..., None], u[..., before : before + count], 0.0)
+        return jnp.where(ends[..., None], u[..., after : after + count], begun)
 
     # ------------------------------------------------------------------ a step
 
     def step(self, m: Any, d: Any) -> Any:
-        """`mjx.step` with friction: a pure function for `jit`, `vmap` and `grad`."""
-        return self.step_report(m, d)[0]
-
-    def step_report(self, m: Any, d: Any) -> tuple[Any, Report]:
-        """`step`, and what it took."""
+        """`mjx.step` with friction: a pure function for `jit`, `vmap`, `lax.scan` and `grad`."""
         if d.qpos.dtype != jnp.float64:
             _refuse_precision(f"data of {d.qpos.dtype}")
-        before, applied, dt = d, d.qfrc_applied, m.opt.timestep
+        if d.userdata.shape != (self._fixed.nuserdata,):
+            rule = (
+                f"have shape [{self._fixed.nuserdata}]: of one environment, of the model of the patches (see jax.vmap)"
+            )
+            raise InvalidValueError("userdata", rule, f"shape {list(d.userdata.shape)}")
+        given, dt, at = d, m.opt.timestep, self._fixed.memory
+        states, guess = self.states(d), self._now(d, at.wrench, at.guess, 3 * len(self._fixed.which))
         d = _moved(m, d)
         jacobian, rows, touching = geometry(m, d, self._fixed.places)
-        guess = jnp.where(touching[:, None], self.wrenches(d), 0.0).ravel()
-        states = self.states(d)
-        active, found = self._search(*jax.lax.stop_gradient((self.models, m, d, jacobian, rows, states, guess)))
-        answer = responses.answer(m, d, jacobian, rows, active)
+        guess = jnp.where(jnp.repeat(touching, 3), guess, 0.0)
+        found = self._search(*jax.lax.stop_gradient((self.models, m, d, jacobian, rows, states, guess)))
+        answer = responses.answer(m, d, jacobian, rows, found.active)
 
         def unit(twist):
             return self._evaluate(self.models, states, twist, jnp.ones(len(rows)), dt)[1]
@@ -153,57 +178,43 @@ class Friction:
         wrench = newton.fitting(unit, answer.host, found.wrench)
         twist, load = answer.host.twists(wrench), answer.host.loads(wrench)
         new, _ = self._evaluate(self.models, states, twist, load, dt)
-        d = self._integrated(m, d, applied, jacobian, wrench, answer)
+        d = self._integrated(m, d, jacobian, wrench, answer)
+        kept = {"state": states, "new": new, "guess": guess, "wrench": wrench, "twist": twist, "load": load}
+        kept |= {"time": given.time, "next": d.time, "iterations": found.iterations, "passes": found.passes}
+        kept |= {"residual": found.residual, "converged": found.converged & (found.slack <= SLACK)}
+        d = d.replace(userdata=self._written(d.userdata, kept))
         # in double precision MJX makes long integers of some that came in short, at which `lax.scan` would stop
-        d = jax.tree.map(lambda after, given: after.astype(given.dtype), self._kept(d, new, wrench), before)
-        return d, found._replace(twist=twist, wrench=wrench.reshape(-1, 3), normal_force=load)
+        return jax.tree.map(lambda after, before: after.astype(before.dtype), d, given)
 
-    def _search(self, models, m, d, jacobian, rows, states, guess) -> tuple[responses.Active, Report]:
+    def _search(self, models, m, d, jacobian, rows, states, guess) -> _Search:
         """Which constraints are active in the end, and the wrenches, without derivatives."""
-        applied, dt, fixed = d.qfrc_applied, m.opt.timestep, self._fixed
+        applied, dt, radius = d.qfrc_applied, m.opt.timestep, jnp.asarray(self._fixed.radius)
 
         def unit(twist):
             return self._evaluate(models, states, twist, jnp.ones(len(rows)), dt)[1]
 
-        def body(carry):
-            _, report, start = carry
-            w = report.wrench
-            pushed = mjx.fwd_acceleration(m, d.replace(qfrc_applied=applied + w @ jacobian))
-            active = responses.active_rows(mjx.solve(m, pushed.replace(qacc_warmstart=start)))
+        def body(last: _Search) -> _Search:
+            pushed = mjx.fwd_acceleration(m, d.replace(qfrc_applied=applied + last.wrench @ jacobian))
+            active = responses.active_rows(mjx.solve(m, pushed.replace(qacc_warmstart=last.acceleration)))
             answer = responses.answer(m, d, jacobian, rows, active)
-            solved = newton.solve(unit, answer.host, w, jnp.asarray(fixed.radius), TOLERANCE, ITERATIONS)
+            solved = newton.solve(unit, answer.host, last.wrench, radius, TOLERANCE, ITERATIONS)
             acceleration = answer.acceleration(solved.wrench)
             slack = responses.slack(d, active, responses.active_at(d, acceleration), acceleration, dt)
-            report = Report(
-                iterations=report.iterations + solved.iterations,
-                passes=report.passes + 1,
-                residual=solved.residual,
-                slack=slack,
-                converged=solved.converged & (slack <= SLACK),
-                twist=report.twist,
-                wrench=solved.wrench,
-                normal_force=report.normal_force,
-            )
-            return active, report, acceleration
+            iterations, passes = last.iterations + solved.iterations, last.passes + 1
+            ends = solved.residual, solved.converged, slack
+            return _Search(active, solved.wrench, acceleration, iterations, passes, *ends)
 
-        def unsettled(carry):
-            _, report, _ = carry
-            return (report.passes == 0) | ((report.slack > SLACK) & (report.passes < PASSES))
+        def unsettled(last: _Search) -> jax.Array:
+            return (last.passes == 0) | ((last.slack > SLACK) & (last.passes < PASSES))
 
-        count, none = len(rows), jnp.zeros(d._impl.efc_J.shape[0])
-        zero = jnp.asarray(0.0)
-        report = Report(
-            jnp.asarray(0), jnp.asarray(0), zero, zero, jnp.asarray(False), jnp.zeros((count, 3)), guess,
-            jnp.zeros(count),
-        )  # fmt: skip
-        start = responses.Active(none > 0.0, none), report, d.qacc_warmstart
-        active, report, _ = jax.lax.while_loop(unsettled, body, start)
-        return active, report
+        none, zero, count = jnp.zeros(rows.shape[1]), jnp.asarray(0.0), jnp.asarray(0)
+        active = responses.Active(none > 0.0, none)
+        start = _Search(active, guess, d.qacc_warmstart, count, count, zero, zero > 0.0, zero)
+        return jax.lax.while_loop(unsettled, body, start)
 
     def _evaluate(self, models, states, twist, load, dt) -> tuple[list[jax.Array], jax.Array]:
         """New states and wrenches of steps; patches of the same model side by side."""
-        new: list[Any] = [None] * len(states)
-        wrenches: list[Any] = [None] * len(states)
+        new, wrenches = [jnp.empty(0)] * len(states), [jnp.empty(0)] * len(states)
         for number, model in enumerate(models):
             own = [p for p, i in enumerate(self._fixed.which) if i == number]
             index = np.array(own)
@@ -212,20 +223,22 @@ class Friction:
                 new[p], wrenches[p] = after[i], wrench[i]
         return new, jnp.stack(wrenches)
 
-    def _integrated(self, m, d, applied, jacobian, wrench, answer: responses.Answer) -> Any:
-        """The data after the step; forces of the user are theirs again."""
+    def _integrated(self, m, d, jacobian, wrench, answer: responses.Answer) -> Any:
+        """The data after the step; the forces of the user are theirs again."""
+        applied = d.qfrc_applied
         d = mjx.fwd_acceleration(m, d.replace(qfrc_applied=applied + wrench @ jacobian))
         force = answer.forces(d, wrench)
         d = d.replace(qacc=answer.acceleration(wrench), qfrc_constraint=force @ d._impl.efc_J)
         d = mjx.sensor_acc(m, d.tree_replace({"_impl.efc_force": force}))
         return responses.integrate(m, d).replace(qfrc_applied=applied)
 
-    def _kept(self, d, new, wrench) -> Any:
-        """Put what the next step starts from into the user data."""
-        first, size = self._fixed.first, self._fixed.size
-        userdata = d.userdata.at[first : first + size].set(jnp.concatenate([z.ravel() for z in new]))
-        first += 2 * size
-        return d.replace(userdata=userdata.at[first : first + len(wrench)].set(wrench))
+    def _written(self, userdata: jax.Array, kept: dict[str, Any]) -> jax.Array:
+        """User data with what is kept for the next step, and for those who look."""
+        for name, value in kept.items():
+            flat = jnp.concatenate([jnp.ravel(each) for each in value]) if isinstance(value, list) else jnp.ravel(value)
+            first = getattr(self._fixed.memory, name)
+            userdata = userdata.at[first : first + len(flat)].set(flat.astype(userdata.dtype))
+        return userdata
 
 
 def _moved(m: Any, d: Any) -> Any:
@@ -235,7 +248,7 @@ def _moved(m: Any, d: Any) -> Any:
     return mjx.fwd_acceleration(m, mjx.fwd_actuation(m, d))
 
 
-def _check(m: Any, patches: Sequence[Patch], placed: Sequence[Placed]) -> None:
+def _check(m: Any, placed: Sequence[Placed]) -> None:
     if not jax.config.jax_enable_x64:
         _refuse_precision("float32")
     if m.opt.integrator not in INTEGRATORS:
@@ -250,8 +263,6 @@ def _check(m: Any, patches: Sequence[Patch], placed: Sequence[Placed]) -> None:
         raise InvalidValueError("noslip_iterations", rule, m.opt.noslip_iterations)
     for each in placed:
         each.check_step(m)
-    if m.nuserdata < words(patches):
-        raise InvalidValueError("nuserdata", f"be at least {words(patches)} (prepare adds them)", m.nuserdata)
 
 
 def _refuse_precision(given: str) -> None:
@@ -261,12 +272,11 @@ def _refuse_precision(given: str) -> None:
 
 def _in_jax(model: models.FrictionModel) -> FrictionModel:
     """The model of JAX that a model of NumPy is."""
-    if model.patch.depends_on_load:
-        raise InvalidValueError("patch", "keep its shape at all loads in MJX", "one that depends on the load")
+    if model._follows_load:
+        rule = "have a shape that does not follow the load: models of JAX keep theirs"
+        raise InvalidValueError("model", rule, type(model).__name__)
     if isinstance(model, models.ReducedModel):
-        return ReducedModel(
-            model.patch, model.law, parts=model.parts, segments=model.segments, speeds=model.speeds
-        )
+        return ReducedModel(model.patch, model.law, parts=model.parts, segments=model.segments, speeds=model.speeds)
     if isinstance(model, models.ReducedModelPublished):
         return ReducedModelPublished(model.patch, model.law, model.surface)
     if isinstance(model, models.DistributedModel):

@@ -35,7 +35,7 @@ def places(placed: Sequence[Placed]) -> Places:
 
 
 def geometry(m: Any, d: Any, where: Places) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """Jacobian of the twists `[3k, nv]`, constraint rows of each patch `[k, nefc]` as 1 and 0, and who is in contact."""
+    """Jacobian of the twists `[3k, nv]`, rows of each patch's contacts `[k, nefc]`, 1 or 0, and who is in contact."""
     contact = d._impl.contact
     single = jnp.asarray(contact.dim == 1) & (contact.dist < contact.includemargin)
     frames = contact.frame.reshape(-1, 3, 3)
@@ -53,9 +53,7 @@ def geometry(m: Any, d: Any, where: Places) -> tuple[jax.Array, jax.Array, jax.A
         centre = jnp.where(place.at_site, d.site_xpos[place.site], middle)
         moves, turns = (
             own - other
-            for own, other in zip(
-                mjx.jac(m, d, centre, place.owner), mjx.jac(m, d, centre, place.support), strict=True
-            )
+            for own, other in zip(mjx.jac(m, d, centre, place.owner), mjx.jac(m, d, centre, place.support), strict=True)
         )
         jacobian = jnp.stack([moves @ x, moves @ jnp.cross(normal, x), turns @ normal])
         return jnp.where(touching, jacobian, 0.0), jnp.where(chosen, 1.0, 0.0), touching

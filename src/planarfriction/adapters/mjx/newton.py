@@ -109,8 +109,9 @@ def solve(unit: Unit, host: Host, guess: jax.Array, radius: jax.Array, tolerance
         follows = jnp.where(held | ((load == 0.0) & (lacks < 0.0)), 0.0, 1.0)
         own = load[:, None, None] * slopes
         both = jnp.stack([own, _without_rising(own, scale)])
-        caused = both @ host.response.reshape(count, 3, -1) + (follows[:, None] * unit)[..., None] * (
-            host.load_response[:, None]
+        caused = (
+            both @ host.response.reshape(count, 3, -1)
+            + (follows[:, None] * unit)[..., None] * (host.load_response[:, None])
         )
         matrix = jnp.eye(3 * count) - caused.reshape(2, 3 * count, -1)
         base = (load + follows * lacks)[:, None] * unit - w.reshape(-1, 3)
