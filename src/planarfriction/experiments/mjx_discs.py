@@ -1,3 +1,5 @@
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo and JAX describe few of their names to type checkers.)
 """Discs that slide and spin in MJX, side by side: what patch friction costs over its own."""
 
 from __future__ import annotations
@@ -20,8 +22,7 @@ def cost(environments: int) -> tuple[float, float]:
 
     Both in double precision, measured in turns. Raises `MissingExtraError` without MJX.
     """
-    from planarfriction.adapters import mjx as adapter  # says which extra is missing
-
+    adapter = _adapter()
     import jax
     from mujoco import mjx
 
@@ -44,6 +45,13 @@ def cost(environments: int) -> tuple[float, float]:
         jax.config.update("jax_enable_x64", before)
     ours, theirs = map(statistics.median, times)
     return ours, theirs
+
+
+def _adapter() -> Any:
+    """First of all, as it says which extra is missing."""
+    from planarfriction.adapters import mjx
+
+    return mjx
 
 
 def _ours(adapter: Any) -> tuple[Any, Any, Any]:

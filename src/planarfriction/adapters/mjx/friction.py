@@ -157,6 +157,8 @@ class Friction:
 
     def step(self, m: Any, d: Any) -> Any:
         """`mjx.step` with friction: a pure function for `jit`, `vmap`, `lax.scan` and `grad`."""
+        if m.impl != mjx.Impl.JAX:
+            raise InvalidValueError("impl", "be JAX's: mjx.put_model(m, impl='jax')", m.impl.value)
         if d.qpos.dtype != jnp.float64:
             _refuse_precision(f"data of {d.qpos.dtype}")
         if d.userdata.shape != (self._fixed.nuserdata,):

@@ -18,13 +18,13 @@ from planarfriction.adapters.mujoco.patches import Placed
 class Places(NamedTuple):
     """Numbers of the sites, geoms and bodies of k patches, `[k]` each."""
 
-    site: np.ndarray
-    own: np.ndarray
+    site: Any
+    own: Any
     """The geom on the body that owns the patch, and the other."""
-    other: np.ndarray
-    owner: np.ndarray
-    support: np.ndarray
-    at_site: np.ndarray
+    other: Any
+    owner: Any
+    support: Any
+    at_site: Any
     """Whether the origin is at the site."""
 
 

@@ -88,7 +88,7 @@ def solve(unit: Unit, host: Host, guess: jax.Array, radius: jax.Array, tolerance
     count, lever = len(host.load), jnp.ones((len(host.load), 3)).at[:, 2].set(radius)
     caused = host.response @ guess
     speeds = lever.ravel() * (abs(host.twist + caused) + abs(caused))
-    tolerance = jnp.maximum(tolerance, ROUNDING * speeds.max())
+    near = jnp.maximum(tolerance, ROUNDING * speeds.max())
     diagonal = jnp.diagonal(host.response).reshape(-1, 3)
     scale = jnp.where(diagonal > 0.0, jnp.sqrt(abs(diagonal)), 1.0)
     eye = jnp.broadcast_to(jnp.eye(3)[:, None], (3, count, 3))
@@ -128,20 +128,20 @@ def solve(unit: Unit, host: Host, guess: jax.Array, radius: jax.Array, tolerance
         unit, slopes = evaluate(c.twist)
         searching = c.phase == _SEARCH
         here = (c.move * ((c.load[:, None] * unit).ravel() - c.w)).sum()
-        near = c.whole | (here >= -DOWNHILL * c.first) | ~(c.first > 0.0) | (c.tries == SHORTENINGS)
-        accepted = ~searching | near
+        far_enough = c.whole | (here >= -DOWNHILL * c.first) | ~(c.first > 0.0) | (c.tries == SHORTENINGS)
+        accepted = ~searching | far_enough
         load = jnp.where(c.held, host.loads(c.w), c.load)
         misfit = misfit_of(c.twist, load, unit)
         # the better of the guess and of rest
         back = (c.phase == _REST) & (misfit > c.misfit)
         twist, misfit = jnp.where(back, host.twists(c.w), c.twist), jnp.where(back, c.misfit, misfit)
         unit, slopes = jnp.where(back, c.unit, unit), jnp.where(back, c.slopes, slopes)
-        to_rest = (c.phase == _GUESS) & (misfit > tolerance)
-        iterations = c.iterations + (searching & near)
+        to_rest = (c.phase == _GUESS) & (misfit > near)
+        iterations = c.iterations + (searching & far_enough)
         better = accepted & (misfit < c.best)
         best = jnp.where(better, misfit, c.best)
         wrench = jnp.where(better, (load[:, None] * unit).ravel(), c.wrench)
-        done = accepted & ~to_rest & ((misfit <= tolerance) | (iterations >= most) | (misfit == jnp.inf))
+        done = accepted & ~to_rest & ((misfit <= near) | (iterations >= most) | (misfit == jnp.inf))
         # a new step, or less of the last
         held = jnp.where(accepted, iterations % ROUND >= JOINT, c.held)
         change, move, first = newton(c.w, twist, load, unit, slopes, held)
@@ -184,7 +184,7 @@ def solve(unit: Unit, host: Host, guess: jax.Array, radius: jax.Array, tolerance
         best=jnp.asarray(jnp.inf), wrench=none, done=jnp.asarray(False),
     )  # fmt: skip
     end = jax.lax.while_loop(lambda c: ~c.done, body, first)
-    return Solved(end.wrench, end.iterations, end.best, end.best <= tolerance)
+    return Solved(end.wrench, end.iterations, end.best, end.best <= near)
 
 
 def fitting(unit: Unit, host: Host, found: jax.Array) -> jax.Array:
