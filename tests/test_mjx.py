@@ -156,6 +156,7 @@ BALL = """<mujoco><option timestep="0.002"/><worldbody><geom name="floor" type="
 """Slides and spins on a patch; small, as derivatives take long to compile."""
 
 
+@pytest.mark.slow
 def test_gradients_are_differences_by_velocity_and_friction():
     """Backwards through MJX's solver, whose loop has no derivative, and through the step of the patches."""
     law = pf.LuGre(mu_s=0.5, mu_c=0.3, v_s=0.1, sigma_0=1e5, elasto_plastic=0.9)
@@ -264,6 +265,36 @@ def test_the_step_in_contact_space_is_the_compiled_one_for_all_models(kind):
     compare_with_compiled(3, (kind,), 100, 64)
 
 
+def test_derivatives_of_the_step_in_contact_space_are_differences():
+    """Of a patch that slides and spins, whose load follows: by all that the host says, and by friction."""
+    model = _in_jax(pf.DistributedModel(pf.ContactPatch.disc(radius=0.01, cells=5), pf.LuGre(mu_s=1.2)))
+    response = 0.01 * np.array([[1.0, 0.1, 0.0], [0.1, 1.0, 0.0], [0.0, 0.0, 1e4]])
+    load_response = np.array([[0.2, -0.1, 3.0]])
+
+    def problem(numbers):
+        twist, load, mu_c, share = numbers[:3], numbers[3:4], numbers[4], numbers[5]
+        own = model.replace(parameters=model.parameters._replace(mu_c=mu_c))
+
+        def unit(twists):
+            return own.step(jnp.full((1, *own.rest().shape), 1e-7), twists, 1.0, 1e-3)[1]
+
+        return unit, newton.Host(twist, load, share * response, share * load_response)
+
+    @jax.jit
+    @jax.value_and_grad
+    def power(numbers):
+        found = newton.solve(*problem(jax.lax.stop_gradient(numbers)), jnp.zeros(3), jnp.array([0.01]), 1e-13, 50)
+        unit, host = problem(numbers)
+        wrench = newton.fitting(unit, host, found.wrench)
+        return wrench @ jnp.array([1.0, -2.0, 100.0]) + host.loads(wrench)[0]
+
+    at = np.array([0.05, 0.02, 5.0, 2.0, 1.0, 1.0])
+    slopes, steps = power(at)[1], 1e-6 * np.diag(at)
+    differences = [(power(at + step)[0] - power(at - step)[0]) / (2.0 * step.sum()) for step in steps]
+    # rounding, 1e-13 over 1e-6 of the numbers, where friction falls by 10 N s/m
+    np.testing.assert_allclose(slopes, differences, rtol=1e-5, atol=1e-5)
+
+
 # ---------------------------------------------------------------------- bad input
 
 BAD = {
@@ -305,6 +336,8 @@ def test_what_does_not_fit_is_refused_in_one_line():
     m.pair_dim[0] = 1
     friction, mx, there = Friction(m, patches), mjx.put_model(m), mjx.put_data(m, d)
     two = jax.tree.map(lambda each: jnp.stack([each, each]), there)
+    with pytest.raises(InvalidValueError, match=r"models must be models of .*: ReducedModel, got"):
+        friction.replace([scene.model])
     with pytest.raises(InvalidValueError, match=r"userdata must have shape \[\d+\]: of one environment"):
         friction.step(mx, two)
     with pytest.raises(InvalidValueError, match=r"precision must be float64, .*, got data of float32"):

@@ -96,7 +96,11 @@ class Friction:
         self._fixed = _Fixed(places(placed), which, shapes, radius, at, m.nuserdata)
 
     def replace(self, models: Sequence[FrictionModel]) -> Self:
-        """The same patches with other models."""
+        """The same patches with other models, of the same kinds in the same order."""
+        kinds, given = ([type(model).__name__ for model in each] for each in (self.models, models))
+        if given != kinds or not all(isinstance(model, FrictionModel) for model in models):
+            rule = f"be models of planarfriction.jax: {', '.join(kinds)}"
+            raise InvalidValueError("models", rule, ", ".join(given))
         return self.tree_unflatten(self._fixed, (tuple(models),))
 
     def tree_flatten(self) -> tuple[Any, _Fixed]:
