@@ -16,7 +16,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import MissingExtraError
-from planarfriction.experiments import drake_disc, mujoco_costs
+from planarfriction.experiments import drake_disc, mjx_costs, mujoco_costs
 from planarfriction.experiments.baselines import lsoda_time, numpy_table, scipy_twist
 from planarfriction.experiments.four_feet import four_feet
 from planarfriction.experiments.measurement import Measurement, line, median, once
@@ -360,6 +360,7 @@ BENCHMARKS: dict[str, Callable[[str, bool], Measurement]] = {
     "mujoco.tray.8": mujoco_costs.measure,
     "mujoco.grip": mujoco_costs.measure,
     "mujoco.rollout": mujoco_costs.measure,
+    "mjx.discs": mjx_costs.measure,
     "drake.disc.point": drake_disc.measure,
     "drake.disc.hydroelastic": drake_disc.measure,
     "gradient.published": _gradient_published,

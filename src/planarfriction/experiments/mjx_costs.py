@@ -5,22 +5,24 @@
 from __future__ import annotations
 
 import statistics
-import time
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
+
+from planarfriction.experiments.measurement import Measurement, line, once
 from planarfriction.experiments.mujoco_scenes import Native, disc
 
-STEPS = 100
-"""Of a roll-out that is timed: 0.2 s, in which all slide."""
+ENVIRONMENTS = 16
 
-ROUNDS = 5
+STEPS, ROUNDS = 100, 5
+"""Of a roll-out that is timed: 0.2 s, in which all slide; and how often, in turns."""
 
 
-def cost(environments: int) -> tuple[float, float]:
-    """Time [s] of a step of all `environments` by `vmap`, with patch friction and with MJX's own of condim 4.
+def measure(name: str, full: bool) -> Measurement:
+    """A step of one of `ENVIRONMENTS` that `vmap` steps at once, with patch friction and with MJX's own in turns.
 
-    Both in double precision, measured in turns. Raises `MissingExtraError` without MJX.
+    Both in double precision. Raises `MissingExtraError` without MJX.
     """
     adapter = _adapter()
     import jax
@@ -30,21 +32,15 @@ def cost(environments: int) -> tuple[float, float]:
     jax.config.update("jax_enable_x64", True)
     try:
         m, prepared, friction = _ours(adapter)
-        own, native = disc(1.0, 10.0).native(Native())
-        runs = [
-            _rolled(friction.step, m, prepared, environments),
-            _rolled(mjx.step, own, native, environments),
-        ]
-        times: list[list[float]] = [[], []]
-        for _ in range(ROUNDS):
-            for run, spent in zip(runs, times, strict=True):
-                begin = time.perf_counter()
-                run()
-                spent.append((time.perf_counter() - begin) / STEPS)
+        runs = _rolled(friction.step, m, prepared), _rolled(mjx.step, *disc(1.0, 10.0).native(Native()))
+        times = np.array([[once(run) for run in runs] for _ in range(ROUNDS)]) / (STEPS * ENVIRONMENTS)
     finally:
         jax.config.update("jax_enable_x64", before)
-    ours, theirs = map(statistics.median, times)
-    return ours, theirs
+    value, theirs = (statistics.median(column) * 1e6 for column in times.T)
+    words = (
+        f"MJX's own friction, condim 4, elliptic, impratio 10 (patch friction costs {value / theirs:.2g} times as much)"
+    )
+    return line(name, value, "us per step", words, theirs)
 
 
 def _adapter() -> Any:
@@ -66,7 +62,7 @@ def _ours(adapter: Any) -> tuple[Any, Any, Any]:
     return m, mujoco.MjData(m), adapter.Friction(m, patches)
 
 
-def _rolled(step: Callable[..., Any], m: Any, d: Any, environments: int) -> Callable[[], None]:
+def _rolled(step: Callable[..., Any], m: Any, d: Any) -> Callable[[], None]:
     """A compiled roll-out of discs with different starts, whose contact has settled."""
     import jax
     import jax.numpy as jnp
@@ -76,7 +72,7 @@ def _rolled(step: Callable[..., Any], m: Any, d: Any, environments: int) -> Call
     for _ in range(300):
         mujoco.mj_step(m, d)
     mx, data = mjx.put_model(m), mjx.put_data(m, d)
-    speeds, spins = jnp.linspace(0.8, 1.2, environments), jnp.linspace(20.0, 5.0, environments)
+    speeds, spins = jnp.linspace(0.8, 1.2, ENVIRONMENTS), jnp.linspace(20.0, 5.0, ENVIRONMENTS)
 
     @jax.jit
     def roll(mx, speeds, spins):
