@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,7 @@ from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError, SolverError
 from planarfriction.kernels import rosenbrock, tangent
 from planarfriction.kernels.body import System
-from planarfriction.kernels.integration import Output, Run, run_of
+from planarfriction.kernels.integration import Output, run_of
 from planarfriction.kernels.tangent import Path
 from planarfriction.patch.metric import refuse_anisotropy
 from planarfriction.scenes.packing import Windows
@@ -36,14 +36,14 @@ SCENE_PARAMETERS = {
 - `load`: every normal force, patches keeping the shape that they have.
 """
 
-_ACCURACY = 1e-7
-"""Accuracy of each step of the derivatives, relative and in natural scales."""
+_SHARE, _POWER = 0.1, 2.0 / 3.0
+"""Accuracy of each step of the derivatives, relative and in natural scales: a share of a power of `rtol`."""
 
 _NUMBERS = 4e6
-"""Numbers of the states at which a part of the steps begins, and as many at which it ends: 64 MB together."""
+"""Numbers of the states that a part of the motion holds, and as many of their rates: 64 MB together."""
 
-_CLOCK = 1e-12
-"""Share of a step by which adding times up may be off."""
+_LEAST_NODES = 16
+"""Ends of steps that a part holds at least."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,42 +106,21 @@ def scene_sensitivities(
     absolute = rtol if atol is None else validation.positive("atol", atol)
     times = recording_times(end, every)
     windows = Windows(scene, end, times=times, sensitivities=True)
-    derivatives = _Derivatives(windows, len(times), chosen)
-    for part in _parts(windows, times, rtol, absolute * windows.natural, chosen):
-        derivatives.carry(*part)
+    derivatives = _Derivatives(windows, times, chosen, rtol)
+    _integrate(windows, derivatives, rtol, absolute * windows.natural)
     return SceneSensitivities(tuple(names), *derivatives.recorded())
 
 
-def _parts(
-    windows: Windows, times: np.ndarray, rtol: float, atol: np.ndarray, parameters: np.ndarray
-) -> Iterator[tuple[System, Path, list[int], bool]]:
-    """The accepted steps, one of which ends at each recording time, a part of the motion after another.
-
-    With each part come the window that it lies in, how many of its steps lead to each time on it, and whether its last
-    step ends at a break.
-    """
-    now, many, recorded = start_of(windows.state), len(windows.models), 1
-    most = max(int(_NUMBERS / len(windows.state)), 1)
-    nothing = Output(
-        np.array([np.inf]), np.empty((1, 6)), np.empty((1, many, 3)), np.empty((1, many)), np.empty((0, 0))
-    )
-    outcome = rosenbrock.DONE
+def _integrate(windows: Windows, derivatives: _Derivatives, rtol: float, atol: np.ndarray) -> None:
+    """Integrate the motion as `simulate` does, and carry the derivatives along a part of its steps after another."""
+    now, n, outcome = start_of(windows.state), len(windows.state), rosenbrock.DONE
+    path = tangent.path_for(max(int(_NUMBERS / n), _LEAST_NODES), n)
     for system in windows:
-        run = run_of(system, RODAS4, nothing, now, rtol=rtol, atol=atol)
+        run = run_of(system, RODAS4, derivatives.output, now, rtol=rtol, atol=atol)
         now.cursor[0], outcome = 0, rosenbrock.PAUSED
         while outcome == rosenbrock.PAUSED:
-            steps: list[tuple] = []
-            until: list[int] = []
-            while outcome == rosenbrock.PAUSED and len(steps) < most:
-                outcome, step, reached = _trial(run, times[recorded])
-                steps += step
-                if reached:
-                    until.append(len(steps))
-                    recorded += 1
-            if steps:
-                ended = int(now.cursor[0]) != steps[-1][0]
-                path = Path(*map(np.array, zip(*steps, strict=True)), parameters)  # pyright: ignore[reportCallIssue]
-                yield system, path, until, ended
+            nodes, outcome = tangent.follow(run.address, path)
+            derivatives.carry(system, path, nodes, int(now.cursor[1]))
         del system, run
         if outcome != rosenbrock.DONE:
             break
@@ -149,74 +128,53 @@ def _parts(
         raise SolverError("the step size fell below the resolution of time: loosen rtol, or check the scene")
 
 
-def _trial(run: Run, time: float) -> tuple[int, list[tuple], bool]:
-    """Try one step, which ends at the next recording `time` at the latest.
-
-    Returns the outcome; of an accepted step the piece, the seconds into it, its length and the states at both ends; and
-    whether the time is reached.
-    """
-    y, cursor, clock, counts = run.progress
-    motion = run.system.motion
-    piece, since, proposed, accepted = int(cursor[0]), float(clock[0]), float(clock[1]), int(counts[rosenbrock.STEPS])
-    begin, end = motion.breaks[piece], motion.breaks[piece + 1]
-    if since == 0.0 and len(motion.velocity):
-        y[-6:-3] = motion.velocity[piece]
-    before, room = y.copy(), time - begin - since if time < end else np.inf
-    if 2.0 * proposed > room:  # end there, or halve what is left, as before a break
-        clock[1] = room if proposed >= room else 0.5 * room
-    outcome = rosenbrock.advance(run.address, 1)
-    if int(counts[rosenbrock.STEPS]) == accepted:
-        return outcome, [], False
-    ended = int(cursor[0]) != piece
-    length = (end - begin if ended else float(clock[0])) - since
-    if 2.0 * proposed > room:
-        clock[1] = max(clock[1], proposed)
-    reached = (ended and time <= end) or length >= (1.0 - _CLOCK) * room or outcome == rosenbrock.AT_REST
-    return outcome, [(piece, since, length, before, run.stages.new.copy())], bool(reached)
-
-
 class _Derivatives:
     """The derivatives of a motion, carried along its steps as they come, and what is recorded of both."""
 
-    def __init__(self, windows: Windows, instants: int, parameters: np.ndarray) -> None:
-        n, count, many = len(windows.state), len(parameters), len(windows.models)
-        self._parameters, self._bristles = parameters, windows.bristles
-        self._space, self._atol = tangent.slopes_for(count, n), _ACCURACY * windows.natural
-        self._slope, self._scratch = np.zeros((count, n)), np.empty((2, n))
-        self._time, self._body, self._wrench = (
-            np.empty(instants),
-            np.empty((instants, 6)),
-            np.empty((instants, many, 3)),
-        )
+    def __init__(self, windows: Windows, times: np.ndarray, parameters: np.ndarray, rtol: float) -> None:
+        n, count, many, instants = len(windows.state), len(parameters), len(windows.models), len(times)
+        body, wrench, load = np.empty((instants, 6)), np.empty((instants, many, 3)), np.empty((instants, many))
+        self.output = Output(times, body, wrench, load, np.empty((0, 0)))
+        """What the integration of the motion records."""
+        self._parameters, self._accuracy = parameters, _SHARE * rtol**_POWER
+        self._space, self._atol = tangent.slopes_for(count, n), self._accuracy * windows.natural
+        self._slope, self._state, self._scratch = np.zeros((count, n)), np.empty(n), np.empty((2, n))
         self._d_body, self._d_wrench = np.zeros((instants, 6, count)), np.zeros((instants, many, 3, count))
-        self._count = 0
+        self._count, self._wrench = 0, np.empty((many, 3))
 
-    def carry(self, system: System, path: Path, until: list[int], ended: bool) -> None:
-        """Go along steps of one window and record behind `until` of them; what `_parts` gives."""
-        if self._count == 0:
-            self._record(system, int(path.piece[0]), float(path.since[0]), path.start[0])
-        done = 0
-        for last in until:
-            self._propagate(system, path, done, last)
-            done, step = last, last - 1
-            self._record(system, int(path.piece[step]), float(path.since[step] + path.step[step]), path.end[step])
-        self._propagate(system, path, done, len(path.piece))
-        if ended:  # within a path `propagate` does so
-            load = system.motion.load[path.piece[-1]]
-            for c in np.flatnonzero((load == 0.0).all(axis=0)):
-                self._slope[:, self._bristles[c] : self._bristles[c + 1]] = 0.0
+    def carry(self, system: System, path: Path, nodes: int, reached: int) -> None:
+        """Go along the nodes of a path and fill what belongs to the `reached` instants that the motion has recorded."""
+        pieces, breaks = path.piece[:nodes], system.motion.breaks
+        ends = np.append(np.flatnonzero(np.diff(pieces)), nodes - 1)
+        first = 0
+        for last in ends.tolist() if nodes else []:
+            piece, since, reach = int(pieces[last]), float(path.since[first]), float(path.since[last])
+            begin, length = breaks[piece], breaks[piece + 1] - breaks[piece]
+            time = breaks[piece + 1] if reach == length else begin + reach
+            while self._count < reached and self.output.time[self._count] <= time:
+                instant = self.output.time[self._count]
+                here = reach if instant == time else float(instant - begin)
+                self._propagate(system, path, first, last, since, here)
+                self._record(system, path, first, last, here)
+                since = here
+            self._propagate(system, path, first, last, since, reach)
+            if reach == length:
+                tangent.forget(system.address, piece, self._slope)
+            first = last + 1
 
-    def _propagate(self, system: System, path: Path, first: int, last: int) -> None:
-        tangent.propagate(system.address, path, first, last, self._slope, _ACCURACY, self._atol, self._space)
+    def _propagate(self, system: System, path: Path, first: int, last: int, begin: float, until: float) -> None:
+        along = self._slope, self._parameters, self._accuracy, self._atol, self._space
+        tangent.propagate(system.address, path, first, last, begin, until, *along)
 
-    def _record(self, system: System, piece: int, since: float, state: np.ndarray) -> None:
-        m, at = self._count, (system.address, piece, since, state, self._parameters, self._slope)
-        tangent.wrench_slopes(*at, self._wrench[m], self._d_wrench[m], self._scratch)
-        self._time[m], self._body[m] = system.motion.breaks[piece] + since, state[-6:]
+    def _record(self, system: System, path: Path, first: int, last: int, since: float) -> None:
+        m, piece = self._count, int(path.piece[first])
+        tangent.state_at(path, first, last, since, self._state)
+        at = system.address, piece, since, self._state, self._parameters, self._slope
+        tangent.wrench_slopes(*at, self._wrench, self._d_wrench[m], self._scratch)
         self._d_body[m] = self._slope[:, -6:].T
         self._count += 1
 
     def recorded(self) -> tuple[np.ndarray, ...]:
         """Times, motion, wrenches, and the derivatives of both."""
-        every = self._time, self._body, self._wrench, self._d_body, self._d_wrench
+        every = self.output.time, self.output.body, self.output.wrench, self._d_body, self._d_wrench
         return tuple(values[: self._count] for values in every)

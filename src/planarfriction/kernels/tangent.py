@@ -1,13 +1,14 @@
 """Forward sensitivities of a planar body on its contacts: the variational equation along a computed motion.
 
 With the right-hand side `f(t, y, p)` of `kernels.body` and its Jacobian `J`, the derivative `s = dy/dp` obeys the
-linear equation `s' = J(t) s + df/dp`. It is solved on the steps of the motion itself by an L-stable method of order 4
-with a diagonal of `gamma`: each stage is one `factor` and, for each parameter, one `solve` of `body`,
+linear equation `s' = J(t) s + df/dp`. It is solved by an L-stable method of order 4 with a diagonal of `gamma`: each
+stage is one `factor` and, for each parameter, one `solve` of `body`,
 
     b_i = s + h sum_{j<i} a_ij G_j,   (I/(h gamma) - J_i) S_i = b_i/(h gamma) + df/dp,   G_i = (S_i - b_i)/(h gamma)
 
-with `J_i` at the cubic Hermite interpolant of the step. Source of the coefficients: Hairer and Wanner, Solving ODEs II,
-table IV.6.5.
+with `J_i` at the cubic Hermite interpolant between the accepted steps of the motion. Derivatives need fewer digits than
+the motion, so that one step of theirs goes over several of it; the embedded method of order 3 tells how many. Source of
+the coefficients: Hairer and Wanner, Solving ODEs II, table IV.6.5.
 
 Friction and size enter by scaling: with all coefficients `g` times m, a bristle behaves as `z/m` did,
 `zdot(z; m) = zdot(z/m; 1)`; a patch `l` times as large sees `l omega` and gives `l tau`.
@@ -23,14 +24,18 @@ from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import jit, kernel
 from planarfriction.kernels.body import load_of, read, record_of, times
 from planarfriction.kernels.contacts import CHANGE
+from planarfriction.kernels.integration import read_run
 from planarfriction.kernels.pointers import address, at, call, doubles, integers
-from planarfriction.kernels.rosenbrock import error_norm, forget_unloaded
+from planarfriction.kernels.rosenbrock import PAUSED, STEPS, advance, error_norm, forget_unloaded
 
 FRICTION, SIZE, MASS, INERTIA, LOAD = 0, 1, 2, 3, 4
 """Parameters; each is a factor, 1 as the scene is."""
 
 SHORTEST = 2.0**-12
 """Shortest step, as a share of one of the motion."""
+
+MOST = 8
+"""Steps of the motion that one of the derivatives goes over at most, so that it passes over nothing sudden."""
 
 GAMMA = 0.25
 PLACES = np.array([0.25, 0.75, 0.55, 0.5, 1.0])
@@ -45,6 +50,14 @@ STAGES = np.array(
     ]
 )
 """Stage arguments below the diagonal, `a_ij`."""
+ERROR = np.array([-3.0 / 16.0, -27.0 / 32.0, 25.0 / 32.0, 0.0, 0.25])
+"""Solution minus that of the embedded method, in `h G_i`."""
+START, AGAIN = 0.125, np.array([-11.0 / 32.0, -11.0 / 64.0, 25.0 / 64.0, 0.0, 0.0])
+"""Another difference of order 3, `START h s'` at the start of the step and `AGAIN` in `h G_i`: a Jacobian that jumps
+before the first stage would go unseen without it."""
+
+# Step control, as that of the motion: cautious, and no faster growth than a transient that is followed needs.
+_SAFETY, _GROWTH, _SHRINKAGE = 0.85, 2.0, 0.2
 
 
 @kernel
@@ -90,20 +103,52 @@ def _partial(own, piece, since, w, parameter, out):
 
 
 class Path(NamedTuple):
-    """T accepted steps of a motion, and the derivatives that are carried along it."""
+    """The ends of accepted steps of a motion, K of them; between two of the same piece lies a step."""
 
     piece: np.ndarray
-    """Piece between breaks that each step lies in, int [T]."""
+    """Piece between breaks, int [K]."""
     since: np.ndarray
-    """Seconds into it at the start, [T]."""
-    step: np.ndarray
-    """Length [s], [T]."""
-    start: np.ndarray
-    """States at the start, [T, n]."""
-    end: np.ndarray
-    """States at the end, before a contact whose load ends forgets its bristles, [T, n]."""
-    parameters: np.ndarray
-    """int [P]"""
+    """Seconds into it, [K]."""
+    state: np.ndarray
+    """[K, n]; at the end of a piece before a contact whose load ends forgets its bristles."""
+    rate: np.ndarray
+    """Its rate, [K, n]."""
+
+
+def path_for(most: int, n: int) -> Path:
+    """Room for the ends of steps (made outside compiled code)."""
+    return Path(np.zeros(most, np.int64), np.zeros(most), np.zeros((most, n)), np.zeros((most, n)))
+
+
+@jit
+def follow(run, path):
+    """Go on with the run at an address until it ends or `path` is full; return how many nodes that has, the outcome."""
+    integration, count, outcome = read_run(run), 0, PAUSED
+    own, n = read(integration.system), integration.states
+    y, new, start_rate = doubles(integration.y), doubles(integration.new), doubles(integration.start_rate)
+    cursor, clock, counts = integers(integration.cursor), doubles(integration.clock), integers(integration.statistics)
+    breaks = doubles(own.breaks)
+    while outcome == PAUSED and count + 2 <= path.piece.shape[0]:
+        piece, since, accepted = cursor[0], clock[0], counts[STEPS]
+        starting = count == 0 or path.piece[count - 1] != piece
+        if starting:
+            if since == 0.0 and own.velocity != 0:
+                for i in range(3):
+                    y[n - 6 + i] = doubles(own.velocity)[3 * piece + i]
+            path.piece[count], path.since[count] = piece, since
+            for i in range(n):
+                path.state[count, i] = y[i]
+        outcome = advance(run, 1)
+        if counts[STEPS] == accepted:
+            continue
+        count += starting
+        ended = cursor[0] != piece
+        path.piece[count], path.since[count] = piece, breaks[piece + 1] - breaks[piece] if ended else clock[0]
+        for i in range(n):
+            path.rate[count - 1, i], path.state[count, i] = start_rate[i], new[i]
+        call(own.rates, (integration.system, piece, path.since[count], path.state[count], path.rate[count]))
+        count += 1
+    return count, outcome
 
 
 class Slopes(NamedTuple):
@@ -113,14 +158,14 @@ class Slopes(NamedTuple):
     """`df/dp`, [P, n]."""
     stages: np.ndarray
     """`G` of each stage, [P, 5, n]."""
-    coarse: np.ndarray
-    """Derivatives after one step, [P, n]."""
-    fine: np.ndarray
-    """After two of half the length, [P, n]."""
-    start_rate: np.ndarray
-    """Rates at the start of a step of the motion, [n]."""
-    end_rate: np.ndarray
-    """Rates at its end, [n]."""
+    new: np.ndarray
+    """Derivatives after a step, [P, n]."""
+    error: np.ndarray
+    """Their error estimates, [P, n]."""
+    other: np.ndarray
+    """Those from the start of the step, [P, n]."""
+    before: np.ndarray
+    """Rates of the derivatives at the end of the step before, [P, n]."""
     state: np.ndarray
     """[n]"""
     rate: np.ndarray
@@ -131,100 +176,122 @@ class Slopes(NamedTuple):
     """[n]"""
     zero: np.ndarray
     """Zeros, [n]."""
+    pace: np.ndarray
+    """Length of the next step, in steps of the motion, [1]."""
 
 
 def slopes_for(count: int, n: int) -> Slopes:
     """Workspace for `count` derivatives of n states (made outside compiled code)."""
-    return Slopes(
-        np.zeros((count, n)),
-        np.zeros((count, len(PLACES), n)),
-        np.zeros((count, n)),
-        np.zeros((count, n)),
-        *np.zeros((7, n)),
-    )
+    forcing, new, error, other, before = np.zeros((5, count, n))
+    of_parameters = forcing, np.zeros((count, len(PLACES), n)), new, error, other, before
+    return Slopes(*of_parameters, *np.zeros((5, n)), np.ones(1))
 
 
 @kernel
-def _hermite(path, t, share, w):
-    """State at a share of step t into `w.state`."""
-    left, right, h = 1.0 - share, share, path.step[t]
-    start, end = path.start[t], path.end[t]
-    for m in range(start.shape[0]):
-        bend = (left - right) * (end[m] - start[m]) + h * (right * w.end_rate[m] - left * w.start_rate[m])
-        w.state[m] = left * start[m] + right * end[m] - left * right * bend
+def _interpolate(path, k, since, state):
+    """State at `since` seconds into the piece, in the step after node k."""
+    h = path.since[k + 1] - path.since[k]
+    right = (since - path.since[k]) / h
+    left = 1.0 - right
+    start, end, start_rate, end_rate = path.state[k], path.state[k + 1], path.rate[k], path.rate[k + 1]
+    for m in range(state.shape[0]):
+        bend = (left - right) * (end[m] - start[m]) + h * (right * end_rate[m] - left * start_rate[m])
+        state[m] = left * start[m] + right * end[m] - left * right * bend
 
 
 @kernel
-def _step(system, path, t, begin, share, slope, out, w):
-    """Carry `slope` over a share of step t from `begin` on, both as parts of 1; `out` may be `slope`."""
-    own, piece, n = read(system), path.piece[t], w.state.shape[0]
-    h = share * path.step[t]
+def _node(path, k, last, since):
+    """The last node from k on, but for `last`, that is not behind `since`."""
+    while k + 1 < last and path.since[k + 1] <= since:
+        k += 1
+    return k
+
+
+@kernel
+def _step(system, path, k, last, since, h, slope, parameters, known, w):
+    """Carry `slope` over `h` seconds into `w.new`, its error estimates into `w.error` and `w.other`.
+
+    The latter is 0 unless it is `known` (1 or 0) how fast the slope changes at the start, `w.before`.
+    """
+    own, piece, n = read(system), path.piece[k], w.state.shape[0]
     shift = 1.0 / (h * GAMMA)
     for i in range(PLACES.shape[0]):
-        here = begin + share * PLACES[i]
-        since = path.since[t] + here * path.step[t]
-        _hermite(path, t, here, w)
-        call(own.rates, (system, piece, since, w.state, w.rate))
+        time = since + h * PLACES[i]
+        _interpolate(path, _node(path, k, last, time), time, w.state)
+        call(own.rates, (system, piece, time, w.state, w.rate))
         call(own.linearise, (system, piece, w.state))
-        for p in range(path.parameters.shape[0]):
-            _partial(own, piece, since, w, path.parameters[p], w.forcing[p])
-        call(own.factor, (system, piece, since, w.state, shift))
-        last = i == PLACES.shape[0] - 1
-        for p in range(path.parameters.shape[0]):
+        for p in range(parameters.shape[0]):
+            _partial(own, piece, time, w, parameters[p], w.forcing[p])
+        call(own.factor, (system, piece, time, w.state, shift))
+        for p in range(parameters.shape[0]):
             for m in range(n):
                 w.base[m] = slope[p, m]
-                for j in range(i):
+            for j in range(i):
+                for m in range(n):
                     w.base[m] += h * STAGES[i, j] * w.stages[p, j, m]
-                w.right[m] = shift * w.base[m] + w.forcing[p, m]
-            new = w.stages[p, i]
-            call(own.solve, (system, piece, since, w.state, shift, w.right, new))
             for m in range(n):
-                if last:
-                    out[p, m] = new[m]
-                else:
-                    new[m] = shift * (new[m] - w.base[m])
+                w.right[m] = shift * w.base[m] + w.forcing[p, m]
+            new = w.new[p]
+            call(own.solve, (system, piece, time, w.state, shift, w.right, new))
+            for m in range(n):
+                w.stages[p, i, m] = shift * (new[m] - w.base[m])
+    for p in range(parameters.shape[0]):
+        for m in range(n):
+            w.error[p, m], w.other[p, m] = 0.0, known * h * START * w.before[p, m]
+        for j in range(PLACES.shape[0]):
+            one, other = h * ERROR[j], known * h * AGAIN[j]
+            for m in range(n):
+                w.error[p, m] += one * w.stages[p, j, m]
+                w.other[p, m] += other * w.stages[p, j, m]
 
 
 @jit
-def propagate(system, path, first, last, slope, rtol, atol, w):
-    """Carry `slope` [P, n] through the steps `first` to `last` of a motion; return how many steps that took.
+def propagate(system, path, first, last, begin, until, slope, parameters, rtol, atol, w):
+    """Carry `slope` [P, n] from `begin` to `until` seconds into a piece, whose nodes are `first` to `last` of a path.
 
-    A step is halved, down to `SHORTEST` of a step of the motion, until one and two half ones agree to `rtol`, `atol`
-    [n]: the Jacobian may jump within it. A contact that had no load forgets its slopes.
+    Returns how many steps that took. Each keeps its error below `rtol`, `atol` [n], but for one shorter than `SHORTEST`
+    of a step of the motion: the Jacobian may jump within it.
     """
-    own, taken, n = read(system), 0, w.right.shape[0]
-    for t in range(first, last):
-        call(own.rates, (system, path.piece[t], path.since[t], path.start[t], w.start_rate))
-        call(own.rates, (system, path.piece[t], path.since[t] + path.step[t], path.end[t], w.end_rate))
-        begin, share = 0.0, 1.0
-        while begin < 1.0:
-            for part in range(3):  # once the whole way, then in two halves
-                whole, second = part == 0, part == 2
-                from_here, how_far = begin + (0.5 * share if second else 0.0), share if whole else 0.5 * share
-                source, target = w.fine if second else slope, w.coarse if whole else w.fine
-                _step(system, path, t, from_here, how_far, source, target, w)
-            taken += 1
-            largest = 0.0
-            for p in range(path.parameters.shape[0]):
-                for m in range(n):
-                    w.right[m] = w.fine[p, m] - w.coarse[p, m]
-                old, new = doubles(address(slope, p * n)), doubles(address(w.fine, p * n))
-                error = error_norm(own, old, new, doubles(address(w.right, 0)), rtol, doubles(address(atol, 0)))
-                largest = xp.maximum(largest, error)
-            if largest > 1.0 and share > SHORTEST:
-                share *= 0.5
-                continue
-            begin += share
-            for p in range(path.parameters.shape[0]):
-                for m in range(n):
-                    slope[p, m] = w.fine[p, m]
-            # places are multiples of the share, so that powers of two add up to one exactly
-            if largest < 0.05 and begin < 1.0 and begin % (2.0 * share) == 0.0:
-                share *= 2.0
-        if t + 1 < path.piece.shape[0] and path.piece[t + 1] != path.piece[t]:
-            for p in range(path.parameters.shape[0]):
-                forget_unloaded(own, path.piece[t], slope[p])
+    own, taken, n, k, since = read(system), 0, w.right.shape[0], first, begin
+    while since < until:
+        k = _node(path, k, last, since)
+        local, remaining = path.since[k + 1] - path.since[k], until - since
+        wanted = w.pace[0] * local
+        reach = xp.minimum(wanted, path.since[xp.minimum(k + MOST, last)] - since)
+        h = reach if 2.0 * reach <= remaining else (remaining if reach >= remaining else 0.5 * remaining)
+        _step(system, path, k, last, since, h, slope, parameters, 1.0 if since > 0.0 else 0.0, w)
+        taken += 1
+        largest = 0.0
+        for p in range(parameters.shape[0]):
+            old, new = doubles(address(slope, p * n)), doubles(address(w.new, p * n))
+            for error in (address(w.error, p * n), address(w.other, p * n)):
+                norm = error_norm(own, old, new, doubles(error), rtol, doubles(address(atol, 0)))
+                largest = xp.maximum(largest, norm)
+        scale = xp.minimum(_GROWTH, xp.maximum(_SHRINKAGE, _SAFETY * xp.maximum(largest, 1e-10) ** -0.25))
+        ideal = scale * h / local
+        if largest > 1.0 and h > SHORTEST * local:
+            w.pace[0] = ideal
+            continue
+        w.pace[0] = xp.maximum(ideal, w.pace[0] if h < wanted else SHORTEST)
+        since = until if h == remaining else since + h
+        for p in range(parameters.shape[0]):
+            for m in range(n):
+                slope[p, m], w.before[p, m] = w.new[p, m], w.stages[p, PLACES.shape[0] - 1, m]
     return taken
+
+
+@jit
+def forget(system, piece, slope):
+    """A contact without load on a piece forgets its slopes [P, n] at the end of it."""
+    own = read(system)
+    for p in range(slope.shape[0]):
+        forget_unloaded(own, piece, slope[p])
+
+
+@jit
+def state_at(path, first, last, since, state):
+    """Write the state at `since` seconds into the piece whose nodes are `first` to `last` of a path."""
+    _interpolate(path, _node(path, first, last, since), since, state)
 
 
 @jit
