@@ -21,12 +21,7 @@ from planarfriction.experiments.baselines import lsoda_time, numpy_table, scipy_
 from planarfriction.experiments.four_feet import four_feet
 from planarfriction.experiments.measurement import Measurement, line, median, once
 from planarfriction.laws import ElastoPlastic, LuGre
-from planarfriction.limit_surface import (
-    LimitSurface,
-    LimitSurfaceExact,
-    LimitSurfaceTable,
-    LimitSurfaceTablePublished,
-)
+from planarfriction.limit_surface import LimitSurface, LimitSurfaceExact, LimitSurfaceTable, LimitSurfaceTablePublished
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch, SoftFinger
 from planarfriction.scenes import Scene, Solution, in_hand, in_hand_load, simulate
@@ -322,6 +317,14 @@ def _coupled(name: str, full: bool, environments: int = 1) -> Measurement:
     return line(name, value * 1e6, "us per step", words, _python_step(model, 2000) * 1e6)
 
 
+def _sensitivities(name: str, full: bool) -> Measurement:
+    from planarfriction.autodiff import scene_sensitivities
+
+    scene, tight = in_hand(ReducedModel(_disc(), _law()), t_end=0.5), {"rtol": 1e-9, "atol": 1e-9}
+    ours = _median(lambda: scene_sensitivities(scene, ("mu",), **tight), 3)
+    return _line(name, ours, "s", "the same simulation alone", _median(lambda: simulate(scene, **tight), 3))
+
+
 def _import(name: str, full: bool) -> Measurement:
     def seconds(module: str) -> float:
         code = f"import time; t = time.perf_counter(); import {module}; print(time.perf_counter() - t)"
@@ -367,6 +370,7 @@ BENCHMARKS: dict[str, Callable[[str, bool], Measurement]] = {
     "gradient.published.batch": _gradient_published_batch,
     "gradient.reduced": _gradient_reduced,
     "gradient.reduced.batch": _gradient_reduced_batch,
+    "sensitivities.reduced": _sensitivities,
     "import": _import,
 }
 """Benchmarks by name."""

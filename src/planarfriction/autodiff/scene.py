@@ -79,10 +79,10 @@ def scene_sensitivities(
     """Derivatives of a simulated motion with respect to factors on the scene's parameters (see `SCENE_PARAMETERS`).
 
     The scene is simulated with tight tolerances (`atol` as in `simulate`; default `rtol`). Along the accepted steps the
-    variational equation `s' = J s + df/dp` is then solved with the solver's own analytic Jacobian: by an L-stable
-    method of order 4, each step halved until the derivatives are right to 1e-7 of themselves. At the default tolerance
-    they agree with central differences of tight simulations to 1e-6 of the largest, with tables, whose Jacobian jumps
-    from cell to cell, to 1e-4 (2e-5 for `rtol=1e-11`).
+    variational equation `s' = J s + df/dp` is solved with the solver's own analytic Jacobian, by an L-stable method of
+    order 4 whose steps go over several of the motion, each right to `0.1 rtol^(2/3)` of the derivatives. At the default
+    tolerance they agree with central differences of tight simulations to 5e-6 of the largest, and to 2e-5 through
+    tables, whose Jacobian jumps from cell to cell.
 
     A bristle that begins to slip or sticks again bends the right-hand side but does not make it jump: the derivative
     goes on through such a transition, and is the change of a motion that makes the same transitions a little earlier

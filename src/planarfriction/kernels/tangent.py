@@ -146,7 +146,8 @@ def follow(run, path):
         path.piece[count], path.since[count] = piece, breaks[piece + 1] - breaks[piece] if ended else clock[0]
         for i in range(n):
             path.rate[count - 1, i], path.state[count, i] = start_rate[i], new[i]
-        call(own.rates, (integration.system, piece, path.since[count], path.state[count], path.rate[count]))
+        if ended or outcome != PAUSED or count + 3 > path.piece.shape[0]:  # else the next trial evaluates it
+            call(own.rates, (integration.system, piece, path.since[count], path.state[count], path.rate[count]))
         count += 1
     return count, outcome
 
