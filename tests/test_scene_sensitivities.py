@@ -10,6 +10,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.autodiff import SCENE_PARAMETERS, scene_sensitivities
+from planarfriction.autodiff import scene as scene_module
 from planarfriction.errors import InvalidValueError
 
 LAW = pf.LuGre(
@@ -117,6 +118,16 @@ def test_motion_and_wrenches_are_those_of_simulate(kind):
         assert found.motion[:, i] == pytest.approx(data[name].values, abs=1e-7 * np.abs(data[name].values).max())
     for i, name in enumerate(("fx", "fy", "tau")):
         assert found.wrenches[..., i] == pytest.approx(data[name].values, abs=1e-5 * np.abs(data[name].values).max())
+
+
+def test_a_part_of_the_motion_at_a_time_gives_the_same(monkeypatch):
+    """Parts of sixteen nodes: steps of the derivatives end elsewhere, which moves them by less than their accuracy."""
+    whole = sensitivities("ellipsoid")
+    monkeypatch.setattr(scene_module, "_NUMBERS", 1.0)
+    parts = scene_sensitivities(slide("ellipsoid"), NAMES)
+    assert parts.motion == pytest.approx(whole.motion, abs=1e-9)
+    largest = np.abs(whole.d_motion).max(axis=0)
+    assert (np.abs(parts.d_motion - whole.d_motion).max(axis=0) <= 1e-5 * largest).all()
 
 
 @pytest.mark.parametrize(

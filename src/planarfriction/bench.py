@@ -320,9 +320,10 @@ def _coupled(name: str, full: bool, environments: int = 1) -> Measurement:
 def _sensitivities(name: str, full: bool) -> Measurement:
     from planarfriction.autodiff import scene_sensitivities
 
-    scene, tight = in_hand(ReducedModel(_disc(), _law()), t_end=0.5), {"rtol": 1e-9, "atol": 1e-9}
-    ours = _median(lambda: scene_sensitivities(scene, ("mu",), **tight), 3)
-    return _line(name, ours, "s", "the same simulation alone", _median(lambda: simulate(scene, **tight), 3))
+    scene, tight = in_hand(ReducedModel(_disc(), _law()), t_end=0.5), 1e-9
+    ours = median(lambda: scene_sensitivities(scene, ("mu",), rtol=tight, atol=tight), 3)
+    alone = median(lambda: simulate(scene, rtol=tight, atol=tight), 3)
+    return line(name, ours, "s", "the same simulation alone", alone)
 
 
 def _import(name: str, full: bool) -> Measurement:
