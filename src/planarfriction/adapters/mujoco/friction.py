@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
+from planarfriction.adapters.mujoco.draw import draw_patch
 from planarfriction.adapters.mujoco.library import layout
 from planarfriction.adapters.mujoco.patches import Patch, Placed, check_once, memory, words
 from planarfriction.coupling import CoupledPatches
@@ -114,6 +115,22 @@ class Friction:
         """Let all bristles rest."""
         at = self._memory
         d.userdata[at.state : at.converged + 1] = 0.0
+
+    def draw(self, scene: Any, d: Any) -> None:
+        """Add each patch in contact to an `MjvScene`: its outline, its friction, and its centre of rotation.
+
+        Friction has the scale of MuJoCo's own contact forces, `vis.map.force / stat.meanmass` metres for a newton.
+
+        Raises `InvalidValueError` where the scene has no room for more geoms.
+        """
+        newton, wrenches, twists = self.m.vis.map.force / self.m.stat.meanmass, self.wrenches(d), self.twists(d)
+        for placed, wrench, twist in zip(self.placed, wrenches, twists, strict=True):
+            chosen, sign = placed.contacts(d)
+            if len(chosen):
+                origin, axes = placed.frame(d, chosen, sign)
+                # between the two surfaces, which overlap by what the contact gives
+                middle = origin + axes[2] * (axes[2] @ (d.contact.pos[chosen].mean(axis=0) - origin))
+                draw_patch(scene, placed.patch.model.patch, (middle, axes), wrench, twist, newton)
 
     # ------------------------------------------------------------------ steps
 

@@ -1,0 +1,141 @@
+"""A gripper in MuJoCo lets a plate swing down in its fingers by easing its grip, grips again, and turns it.
+
+The plate is held beside its centre of mass by two soft pads. As the grip eases, the pads come to the edge of what they
+can bear: a force and a torque at once, which trade off as the limit surface of their patch says. The plate turns, and
+slides down a little, until its centre of mass hangs close enough beside the pads. With the weight m g and two pads of
+radius R, pressed with N each, that is at the distance
+
+    l = 2 mu N R t(f) / (m g),   f = m g / (2 mu N)
+
+where `t(f)` is the torque that a disc bears beside the force f (relative to `mu N R` and to `mu N`). A contact of
+MuJoCo's own has separate limits for force and torque, and what it holds creeps. Run it:
+
+    python examples/mujoco_gripper.py --out out/
+
+The picture needs OpenGL; without a screen set MUJOCO_GL=egl or MUJOCO_GL=osmesa.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+import mujoco
+import numpy as np
+
+import planarfriction as pf
+from planarfriction.adapters.mujoco import Friction, Patch, prepare
+from planarfriction.plots.style import new_figure
+
+MU, RADIUS, MASS, ARM = 1.0, 0.012, 0.1, 0.04  # [-], pads [m], plate [kg], from the pads to its centre of mass [m]
+FIRM, LOOSE = 6.0, 1.4  # forces of each finger [N]
+GRIPS = (
+    (0.3, FIRM),
+    (0.5, 2.6),
+    (2.3, LOOSE),
+    (2.7, LOOSE),
+    (2.8, FIRM),
+)  # at times [s], and between them in proportion
+TURNS, END = 2.9, 4.2  # the hand turns; all is over [s]
+SHOWN = 0.2, 1.6, 2.6, 4.2  # times of the pictures [s]
+
+FINGERS = "".join(
+    f"""<body pos="{sign * 0.007} 0 0"><joint name="{side}" type="slide" axis="{-sign} 0 0" damping="20"/>
+    <geom name="{side}" type="cylinder" size="{RADIUS} 0.005" euler="0 90 0" mass="0.05" rgba=".3 .35 .4 .2"/>
+    <site name="{side}" pos="{-sign * 0.005} 0 0" zaxis="{sign} 0 0" size="1e-4"/></body>"""
+    for side, sign in (("near", 1), ("far", -1))
+)
+HAND = f"""<mujoco><option timestep="0.002" integrator="implicitfast"><flag multiccd="disable"/></option>
+<default><geom solref="0.004 1" solimp="0.99 0.99 0.001"/></default>
+<visual><headlight ambient=".5 .5 .5" diffuse=".3 .3 .3" specular="0 0 0"/><map force="0.012" znear="0.01"/></visual>
+<asset><texture name="sky" type="skybox" builtin="flat" rgb1="1 1 1" width="8" height="8"/></asset>
+<worldbody>
+  <body name="hand"><joint name="turn" axis="1 0 0" damping="1"/>
+    <inertial pos="0 0 0" mass="1" diaginertia="0.01 0.01 0.01"/>{FINGERS}</body>
+  <body name="plate"><freejoint/>
+    <geom name="plate" type="box" size="0.002 0.055 0.02" pos="0 {ARM} 0" mass="{MASS}" rgba=".8 .75 .65 1"/></body>
+</worldbody>
+<actuator><motor joint="near"/><motor joint="far"/><position joint="turn" kp="200" dampratio="1"/></actuator>
+</mujoco>"""
+
+
+def controls(t: float) -> tuple[float, float, float]:
+    """Forces of the fingers [N] and the angle of the hand [rad]."""
+    force = float(np.interp(t, *np.transpose(GRIPS)))
+    s = np.clip((t - TURNS) / 0.8, 0.0, 1.0)
+    return force, force, 1.2 * float(s * s * (3.0 - 2.0 * s))
+
+
+def hand() -> tuple[mujoco.MjModel, mujoco.MjData, Friction]:
+    """The model, its data, and the friction of the pads."""
+    law = pf.LuGre(mu_c=MU, mu_s=MU, sigma_0=1e5, sigma_1=300.0, sigma_2=10.0, elasto_plastic=0.9)
+    pad = pf.ReducedModel(pf.ContactPatch.disc(radius=RADIUS, cells=21), law)
+    patches = [Patch(pad, site=side, geoms=(side, "plate")) for side in ("near", "far")]
+    spec = mujoco.MjSpec.from_string(HAND)
+    spec.geom("near").contype = spec.geom("far").contype = 0  # they touch the plate through its pairs alone
+    prepare(spec, patches)
+    m = spec.compile()
+    return m, mujoco.MjData(m), Friction(m, patches)
+
+
+def reach() -> float:
+    """How far beside the pads the centre of mass hangs while the grip is loose [m], in theory."""
+    spins = np.geomspace(1e-2, 1e5, 4001)  # of a disc that moves with 1 m/s
+    twists = np.stack([np.zeros_like(spins), np.ones_like(spins), spins], axis=1)
+    wrench = abs(pf.LimitSurfaceExact(pf.ContactPatch.disc(radius=RADIUS)).wrench(twists))
+    share = MASS * 9.81 / (2.0 * MU * LOOSE)
+    return float(np.interp(share, wrench[::-1, 1], wrench[::-1, 2])) / share
+
+
+def run(draw: bool = True) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Time, the plate's angle in the hand, its centre of mass beside and below the pads, `[steps, 4]`; pictures."""
+    m, d, friction = hand()
+    renderer = mujoco.Renderer(m, 360, 360) if draw else None
+    camera = mujoco.MjvCamera()
+    camera.lookat[:], camera.distance, camera.azimuth, camera.elevation = (0.0, 0.026, -0.022), 0.19, 194.0, -12.0
+    gravity, m.opt.gravity[:] = m.opt.gravity.copy(), 0.0
+    rows, pictures = [], []
+    for k in range(-100, round(END / m.opt.timestep)):
+        t = k * m.opt.timestep
+        if k == 0:  # the fingers hold it now
+            m.opt.gravity[:] = gravity
+        d.ctrl[:] = controls(t)
+        friction.step(d)
+        turned, plate = d.body("hand").xmat.reshape(3, 3), d.body("plate")
+        held, at = turned.T @ plate.xmat.reshape(3, 3), turned.T @ plate.xipos
+        rows.append([t, -np.arctan2(held[2, 1], held[1, 1]), at[1], -at[2]])
+        if renderer is not None and any(abs(t - shown + m.opt.timestep) < 1e-9 for shown in SHOWN):
+            renderer.update_scene(d, camera)
+            friction.draw(renderer.scene, d)
+            pictures.append(renderer.render())
+    return np.array(rows), pictures
+
+
+def main() -> None:
+    """Run, print, draw."""
+    parser = argparse.ArgumentParser(description="A plate that swings in a gripper, in MuJoCo.")
+    parser.add_argument("--out", type=Path, default=Path("out"), help="folder for the picture")
+    folder = parser.parse_args().out
+    rows, pictures = run()
+    time, angle, beside, below = rows.T
+    loose, last = np.searchsorted(time, GRIPS[3][0]) - 1, time > END - 0.2
+    print(
+        f"loose: turned by {np.degrees(angle[loose]):.1f} degrees, hangs {1e3 * beside[loose]:.1f} mm beside the pads",
+        end="",
+    )
+    print(f" (theory {1e3 * reach():.1f} mm)")
+    print(f"firm: turns by {np.degrees(np.ptp(angle[time > TURNS])):.3f} degrees in the hand while that turns by 69")
+    creep = np.hypot(np.ptp(beside[last]), np.ptp(below[last])) / 0.2
+    print(f"held: creeps by {1e6 * creep:.4f} um/s")
+    folder.mkdir(parents=True, exist_ok=True)
+    figure = new_figure(9.0, 2.6)
+    for axes, shown, picture in zip(figure.subplots(1, len(SHOWN)), SHOWN, pictures, strict=True):
+        axes.imshow(picture)
+        axes.set_title(f"{shown} s, grip {controls(shown)[0]:.1f} N", fontsize="medium")
+        axes.axis("off")
+    figure.savefig(folder / "mujoco-gripper.png")
+    print(f"wrote {folder / 'mujoco-gripper.png'}")
+
+
+if __name__ == "__main__":
+    main()

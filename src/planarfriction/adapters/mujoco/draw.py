@@ -1,0 +1,87 @@
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo describes few of its names to type checkers.)
+"""Patches drawn into a MuJoCo scene: their outlines, their friction, and what they turn about."""
+
+from __future__ import annotations
+
+import itertools
+from typing import Any
+
+import mujoco
+import numpy as np
+import shapely
+
+from planarfriction.errors import InvalidValueError
+from planarfriction.patch import ContactPatch
+
+OUTLINE, FRICTION, CENTRE = (0.1, 0.4, 1.0, 1.0), (0.9, 0.1, 0.1, 1.0), (0.1, 0.7, 0.2, 1.0)
+"""Colours: red, green, blue, opacity."""
+
+STANDS = 1e-6
+"""Speed of the rim [m/s] below which a patch turns about nothing: what sticks moves by rounding."""
+
+FAR = 5.0
+"""Sizes of the patch within which the centre of rotation is drawn; further off the patch slides."""
+
+_CLOSING = 0.1
+"""Gap between cells, of the side of a cell, that an outline does not show: cells cut by a rim are drawn smaller."""
+
+_FINE = 0.01
+"""Error of an outline that does not show, of the size of the patch."""
+
+
+def outlines(patch: ContactPatch) -> list[np.ndarray]:
+    """Rims of a patch, closed, `[M, 2]` [m] each: those that its cells were cut from, else those around its cells."""
+    if patch.outline is not None:
+        outer, holes = patch.outline.rims()
+        rims = [np.concatenate([rim, rim[:1]]) for rim in (outer, *holes)]
+    else:
+        half, gap = 0.5 * np.sqrt(patch.areas)[:, None], _CLOSING * float(np.sqrt(patch.areas.max()))
+        cells = shapely.box(*(patch.positions - half).T, *(patch.positions + half).T)
+        whole = shapely.union_all(shapely.buffer(cells, gap, join_style="mitre")).buffer(-gap, join_style="mitre")
+        rims = [shapely.get_coordinates(rim) for rim in shapely.get_parts(shapely.boundary(whole))]
+    error = _FINE * _size(patch)
+    return [shapely.get_coordinates(shapely.LineString(rim).simplify(error)) for rim in rims]
+
+
+def draw_patch(
+    scene: Any,
+    patch: ContactPatch,
+    frame: tuple[np.ndarray, np.ndarray],
+    wrench: np.ndarray,
+    twist: np.ndarray,
+    newton: float,
+) -> None:
+    """Add the patch with its origin [3] and axes [3, 3] as rows in the world; a newton is drawn as `newton` [m].
+
+    Raises `InvalidValueError` where the scene has no room for more geoms.
+    """
+    origin, axes = frame
+    size = _size(patch)
+    for rim in outlines(patch):
+        corners = origin + rim @ axes[:2]
+        for start, end in itertools.pairwise(corners):
+            _connect(scene, mujoco.mjtGeom.mjGEOM_CAPSULE, 0.04 * size, start, end, OUTLINE)
+    force = wrench[:2] @ axes[:2]
+    if force.any():
+        _connect(scene, mujoco.mjtGeom.mjGEOM_ARROW, 0.08 * size, origin, origin + newton * force, FRICTION)
+    vx, vy, omega = twist
+    if max(np.hypot(vx, vy), size * abs(omega)) > STANDS and np.hypot(vx, vy) < FAR * size * abs(omega):
+        centre = origin + np.array([-vy, vx]) / omega @ axes[:2]
+        _connect(scene, mujoco.mjtGeom.mjGEOM_CYLINDER, 0.1 * size, centre, centre + 0.1 * size * axes[2], CENTRE)
+
+
+def _size(patch: ContactPatch) -> float:
+    """Distance of the furthest cell from the origin [m]."""
+    return float(np.hypot(*patch.positions.T).max() + np.sqrt(patch.areas.max()))
+
+
+def _connect(scene: Any, kind: Any, width: float, start: np.ndarray, end: np.ndarray, colour: tuple) -> None:
+    if scene.ngeom >= scene.maxgeom:
+        raise InvalidValueError("scene", "have room for more geoms (maxgeom)", scene.maxgeom)
+    geom = scene.geoms[scene.ngeom]
+    mujoco.mjv_initGeom(geom, kind, np.zeros(3), np.zeros(3), np.zeros(9), np.array(colour, np.float32))
+    mujoco.mjv_connector(geom, kind, width, start, end)
+    geom.emission = 0.7  # seen in the dark of a contact too
+    geom.category = mujoco.mjtCatBit.mjCAT_DECOR
+    scene.ngeom += 1
