@@ -172,11 +172,13 @@ def test_tables_of_the_pages_are_those_of_the_report(result):
     if not docs.is_dir():
         pytest.skip("no docs beside these tests")
     make_tables = runpy.run_path(str(docs / "make_tables.py"))
-    with_tables, markdown = make_tables["with_tables"], make_tables["markdown"]
+    with_tables, markdown, mark = (make_tables[name] for name in ("with_tables", "markdown", "MARK"))
     tables = {table.title: dataclasses.asdict(table) for table in result.tables}
     shown = 0
     for path in docs.glob("*.md"):
-        page = with_tables(path.read_text(encoding="utf-8"), tables)  # a title that is not there raises
+        page = with_tables(path.read_text(encoding="utf-8"), tables)
+        # the other comparison, of simulators, has its tables on a page of its own
+        assert path.name == "simulators.md" or {found["title"] for found in mark.finditer(page)} <= set(tables)
         assert with_tables(page, tables) == page
         shown += page.count("<!-- table: ")
     assert shown >= 11

@@ -351,3 +351,29 @@ def reproduce(only: tuple[str, ...], list_only: bool, out: Path, quick: bool, fu
         command.show_list()
         return 0
     return command.reproduce(only, out, quick=quick, full=full, again=again)
+
+
+@app.command(
+    short_help="Compare with simulators' own friction.",
+    help="""Patch friction inside simulators beside their own friction at its best settings, in one run.
+
+    Creep of what is held, slip of what is shaken, discs that slide and spin to rest, a plate turned in the hand, and
+    the time of a step. Needs MuJoCo (pip install 'planarfriction[mujoco]').
+
+    Writes numbers.json and a figure to --out and prints the tables. Interrupted and started again, it goes on where it
+    was. The exit code is 1 where one of our numbers is out of its tolerance.
+
+    \b
+    Examples:
+      planarfriction simulators
+      planarfriction simulators --quick --out results/
+    """,
+)
+@click.option("--out", type=FILE, default=Path("simulators"), show_default=True, help="Folder for numbers and figure.")
+@click.option("--quick", is_flag=True, help="A small part of everything, in seconds.")
+@click.option("--again", is_flag=True, help="Do everything anew.")
+def simulators(out: Path, quick: bool, again: bool) -> int:
+    """Compare (the help above is what users see)."""
+    from planarfriction.cli import simulators as command
+
+    return command.compare(out, quick=quick, again=again)

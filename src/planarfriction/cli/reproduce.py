@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from planarfriction.cli import INTERRUPTED, OUT_OF_TOLERANCE
 from planarfriction.cli.console import note, print_table, work_progress
 from planarfriction.errors import InvalidValueError
 from planarfriction.writing import make_folder
+
+if TYPE_CHECKING:
+    from planarfriction.experiments.reproduction import Reproduction
 
 
 def show_list() -> None:
@@ -30,6 +34,13 @@ def reproduce(names: Sequence[str], folder: Path, *, quick: bool, full: bool, ag
     from planarfriction.experiments.reproduction import Reproduction
 
     reproduction = Reproduction(make_folder(folder), quick, full)
+    code = carry_out(reproduction, chosen, again=again)
+    _write(reproduction)
+    return code
+
+
+def carry_out(reproduction: Reproduction, chosen: Sequence[str], *, again: bool) -> int:
+    """Carry out the experiments `chosen`, with progress and a line for each; returns the exit code."""
     code = 0
     try:
         for index, name in enumerate(chosen, 1):
@@ -45,7 +56,6 @@ def reproduce(names: Sequence[str], folder: Path, *, quick: bool, full: bool, ag
     except KeyboardInterrupt:
         note(f"stopped in {name}: the same command goes on from there")
         code = INTERRUPTED
-    _write(reproduction)
     return code
 
 

@@ -199,24 +199,40 @@ def in_the_hand(d: Any) -> np.ndarray:
     return arm.xmat.reshape(3, 3).T @ (d.body("block").xpos - arm.xpos)
 
 
-def disc(speed: float, spin: float, *, radius: float = 0.1, mu: float = 0.3) -> MujocoScene:
-    """A disc of 0.2 kg that starts with `speed` [m/s] and `spin` [rad/s] on the floor; `coulomb_disc.stop` says where
-    it comes to rest."""
+def disc(
+    speed: float,
+    spin: float,
+    *,
+    radius: float = 0.1,
+    mu: float = 0.3,
+    joint: Literal["plane", "free"] = "plane",
+    touch: Literal["face", "point"] = "face",
+) -> MujocoScene:
+    """A disc of 0.2 kg that starts with `speed` [m/s] and `spin` [rad/s] on the floor.
+
+    `coulomb_disc.stop` says where it comes to rest. It moves on joints of its plane, or freely, which MuJoCo's own
+    friction does better with; it touches with its face, or in a point with the torsion of a disc that only spins,
+    `2/3 mu R`.
+    """
     i = 0.5 * 0.2 * radius**2
+    plane = """<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/><joint type="slide" axis="0 0 1"/>
+    <joint type="hinge" axis="0 0 1"/>"""
+    geom = {"face": f'type="cylinder" size="{radius} 0.002"', "point": 'type="sphere" size="0.002"'}[touch]
     body = f"""<worldbody><geom name="floor" type="plane" size="9 9 .1"/><body name="disc" pos="0 0 0.002">
-    <joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/><joint type="slide" axis="0 0 1"/>
-    <joint type="hinge" axis="0 0 1"/><inertial pos="0 0 0" mass="0.2" diaginertia="{i / 2} {i / 2} {i}"/>
-    <geom name="disc" type="cylinder" size="{radius} 0.002" mass="0"/><site name="disc" pos="0 0 -0.002"/></body>
+    {plane if joint == "plane" else "<freejoint/>"}
+    <inertial pos="0 0 0" mass="0.2" diaginertia="{i / 2} {i / 2} {i}"/>
+    <geom name="disc" {geom} mass="0"/><site name="disc" pos="0 0 -0.002"/></body>
     </worldbody>"""
     law = LuGre(mu_c=mu, mu_s=mu, sigma_0=1e5, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9)
+    torsion = 2.0 / 3.0 * mu * radius if touch == "point" else 0.0
     return MujocoScene(
-        lambda settings, dt, integrator: _document(settings, dt, integrator, 0.0, body, mu),
+        lambda settings, dt, integrator: _document(settings, dt, integrator, torsion, body, mu),
         (("disc", ("floor", "disc")),),
         ReducedModel(ContactPatch.disc(radius=radius, cells=31), law),
         lambda t: (),
         time=1.2,
         settle=0.6,
-        start=(speed, 0.0, 0.0, spin),
+        start=(speed, 0.0, 0.0, spin) if joint == "plane" else (speed, 0.0, 0.0, 0.0, 0.0, spin),
     )
 
 
@@ -272,4 +288,33 @@ def tray(blocks: int = 2) -> MujocoScene:
         lambda t: (0.02 * math.sin(6.0 * math.pi * t), 0.02 * math.sin(4.6 * math.pi * t)),
         time=2.0,
         settle=0.4,
+    )
+
+
+def capsule() -> MujocoScene:
+    """A capsule of 45 g pinched between two flat pads that move into it by 2 mm: it touches along lines.
+
+    Source: MuJoCo issue 3328.
+    """
+    pads = "".join(
+        f"""<body pos="{sign * 0.014} 0 0.2"><joint name="{side}" type="slide" axis="{-sign} 0 0" damping="20"/>
+        <geom name="pad {side}" type="box" size="0.01 0.02 0.02" mass="0.1" contype="1" conaffinity="0"/></body>"""
+        for side, sign in (("left", -1), ("right", 1))
+    )
+    body = f"""<worldbody>{pads}<body name="capsule" pos="0 0 0.2" euler="90 0 0"><freejoint/>
+    <geom name="capsule" type="capsule" size="0.004 0.02" mass="0.045" contype="0" conaffinity="1"/>
+    <site name="left" pos="-0.004 0 0" zaxis="1 0 0"/><site name="right" pos="0.004 0 0" zaxis="-1 0 0"/></body>
+    </worldbody>
+    <actuator><position joint="left" kp="2000"/><position joint="right" kp="2000"/></actuator>"""
+    # the sites' x axes lie along the capsule
+    law = LuGre(mu_c=0.7, mu_s=0.7, sigma_0=1e6, sigma_1=800.0, sigma_2=0.0, elasto_plastic=0.9)
+    line = ContactPatch.rectangle(0.04, 5e-4, cells=21)
+    return MujocoScene(
+        lambda settings, dt, integrator: _document(settings, dt, integrator, 0.005, body, 0.7),
+        (("left", ("pad left", "capsule")), ("right", ("pad right", "capsule"))),
+        ReducedModel(line, law),
+        lambda t: (6e-3, 6e-3),
+        time=5.0,
+        settle=1.0,
+        weightless=True,
     )

@@ -17,14 +17,14 @@ import platform
 import shutil
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from planarfriction import __version__
-from planarfriction.experiments import EXPERIMENTS, Experiment, find_experiment
+from planarfriction import __version__, validation
+from planarfriction.experiments import EXPERIMENTS, Experiment
 from planarfriction.experiments.experiment import Result, Work
 from planarfriction.scenes.solution import write_dataset
 from planarfriction.writing import make_folder, replacing, write_text
@@ -40,6 +40,8 @@ class Reproduction:
     folder: Path
     quick: bool = False
     full: bool = False
+    experiments: Mapping[str, Experiment] = field(default_factory=lambda: EXPERIMENTS)
+    """Those that there are, by name."""
 
     @property
     def fingerprint(self) -> str:
@@ -55,8 +57,8 @@ class Reproduction:
         return record if isinstance(record, dict) and record.get("fingerprint") == self.fingerprint else None
 
     def records(self) -> list[Record]:
-        """All results kept in the folder, in the order of the paper."""
-        return [record for name in EXPERIMENTS if (record := self.kept(name)) is not None]
+        """All results kept in the folder, in the order of the experiments."""
+        return [record for name in self.experiments if (record := self.kept(name)) is not None]
 
     def run(
         self,
@@ -72,7 +74,8 @@ class Reproduction:
 
         Raises `InvalidValueError` for an unknown name, `FileError` where nothing can be written.
         """
-        chosen = [find_experiment(name) for name in (EXPERIMENTS if names is None else names)]
+        wanted = self.experiments if names is None else names
+        chosen = [self.experiments[validation.choice("experiment", name, self.experiments)] for name in wanted]
         for each in chosen:
             record = None if again else self.kept(each.name)
             yield self._carry_out(each, again, progress) if record is None else record

@@ -1,0 +1,147 @@
+"""What the comparison of simulators says: its tables, our numbers beside what they have to keep, and its findings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from planarfriction.experiments import simulators_runs as runs
+from planarfriction.experiments.experiment import Comparison, Table, compare_number
+from planarfriction.experiments.simulators_runs import NATIVE, PATCHES
+
+OWN = "impratio 10"
+"""The setting that costs are relative to."""
+
+TOUCHING = tuple((name, NATIVE[name]) for name in (OWN, "noslip 10"))
+"""Settings that a disc slides with, on its face and on one point."""
+
+BARS = {
+    "creep": (1e-3, "um/s"), "turning": (1e-6, "deg/s"), "displacement": (1.0, "um"), "slip": (1.0, "um"),
+    "distance": (0.05, "%"), "angle": (0.2, "%"), "end": (2.5, "mm"), "turned": (0.5, "deg"),
+}  # fmt: skip
+"""What patches have to keep."""
+
+Numbers = dict[str, dict[str, dict[str, float]]]
+"""Case -> way -> quantity."""
+
+
+def comparisons(found: dict[str, Numbers]) -> list[Comparison]:
+    """Our numbers against rest, and against the exact disc and the converged run."""
+    rows: list[tuple[str, float, str]] = []
+    for case, ways in found["steps"].items():
+        for dt, values in ways.items():
+            label = f"{case}, dt {dt}"
+            rows += [
+                (f"creep, {label}", 1e6 * values["creep"], "creep"),
+                (f"turning, {label}", float(np.degrees(values["spin"])), "turning"),
+                (f"displacement, {label}", 1e6 * values["moved"], "displacement"),
+            ]
+    if "capsule" in found["held"]:
+        rows.append(("creep, capsule", 1e6 * found["held"]["capsule"][PATCHES]["creep"], "creep"))
+    rows += [(f"slip, shaken, {name}", 1e6 * ways[PATCHES]["slip"], "slip") for name, ways in found["shaken"].items()]
+    for start, ways in found["disc"].items():
+        for kind in runs.KINDS:
+            rows += [
+                (f"{what} of the disc, {start}, {kind}", 100 * ways[kind][what], what) for what in ("distance", "angle")
+            ]
+    for load, ways in found["in hand"].items():
+        values = ways[next(iter(runs.KINDS))]
+        rows += [
+            (f"end in the hand, {load}", 1e3 * float(np.hypot(values["x"], values["y"])), "end"),
+            (f"angle in the hand, {load}", float(np.degrees(values["theta"])), "turned"),
+        ]
+    references = {"distance": "closed form", "angle": "closed form", "end": "converged", "turned": "converged"}
+    return [
+        compare_number(
+            quantity,
+            value,
+            0.0,
+            reference=references.get(kind, "closed form"),
+            tolerance=BARS[kind][0],
+            unit=BARS[kind][1],
+            cause="the time step, and the normal contact of the simulator",
+        )
+        for quantity, value, kind in rows
+    ]
+
+
+def tables(found: dict[str, Numbers]) -> list[Table]:
+    return [
+        _table("What is held: creep and turning", found["held"], _creep),
+        Table(
+            "Patches at other time steps: creep, turning and largest displacement",
+            ["", *next(iter(found["steps"].values()))],
+            [
+                [case, *(f"{_creep(values)}; {1e6 * values['moved']:.2f} um" for values in ways.values())]
+                for case, ways in found["steps"].items()
+            ],
+        ),
+        _table("A gripper shaken for 3 s: slip in the hand", found["shaken"], lambda v: f"{1e6 * v['slip']:.3g} um"),
+        _table(
+            "A disc that slides and spins to rest: errors of distance and angle",
+            found["disc"],
+            lambda v: f"{100 * v['distance']:+.2f} %, {100 * v['angle']:+.2f} %",
+        ),
+        _table("The published in-hand run: errors of the end in height and angle", found["in hand"], _end),
+        _table(
+            "Time of a step, over that with impratio 10",
+            {
+                f"{case} ({1e6 * ways[OWN]['seconds']:.0f} us)": {
+                    way: {"ratio": values["seconds"] / ways[OWN]["seconds"]} for way, values in ways.items()
+                }
+                for case, ways in found["cost"].items()
+            },
+            lambda v: f"{v['ratio']:.2f}",
+        ),
+    ]
+
+
+def _table(title: str, cases: Numbers, words: Callable[[Mapping[str, float]], str]) -> Table:
+    """Ways as rows, cases as columns."""
+    ways = next(iter(cases.values()))
+    rows = [[way, *(words(case[way]) for case in cases.values())] for way in ways]
+    return Table(title, ["", *cases], rows)
+
+
+def _creep(values: Mapping[str, float]) -> str:
+    if values["dropped"]:
+        return "dropped"
+    return f"{_short(1e6 * values['creep'])} um/s, {_short(float(np.degrees(values['spin'])))} deg/s"
+
+
+def _end(values: Mapping[str, float]) -> str:
+    if abs(values["y"]) > runs.DROPPED:
+        return "dropped"
+    return f"{1e3 * values['y']:+.1f} mm, {np.degrees(values['theta']):+.1f} deg"
+
+
+def _short(value: float) -> str:
+    return f"{value:.0e}" if value < 1e-2 else f"{value:.3g}"
+
+
+def findings(found: dict[str, Numbers], versions: Mapping[str, str]) -> Sequence[str]:
+    """Where the simulator's own friction suffices, and where not, with the numbers of this run."""
+
+    def worst(kind: str, way: str, *keys: str) -> float:
+        return max(abs(case[way][key]) for case in found[kind].values() for key in keys)
+
+    noslip, reduced = "noslip 10", next(iter(runs.KINDS))
+    creep = {way: _short(1e6 * worst("held", way, "creep")) for way in (OWN, noslip, PATCHES)}
+    slip = _short(1e6 * min(worst("shaken", way, "slip") for way in NATIVE))
+    touching = [f"{name}, {touch}" for touch in ("face", "point") for name, _ in TOUCHING]
+    stops = 100.0 * min(worst("disc", way, "distance", "angle") for way in touching)
+    ends = 1e3 * min(worst("in hand", way, "y") for way in NATIVE)
+    ratios = [ways[PATCHES]["seconds"] / ways[OWN]["seconds"] for ways in found["cost"].values()]
+    return [
+        f"MuJoCo {versions['mujoco']}, steps of 2 ms. Where a thing is only held, noslip suffices: with 10 iterations"
+        f" it creeps by {creep[noslip]} um/s at most, with patches by {creep[PATCHES]} um/s. The elliptic cone alone"
+        f" lets it creep by up to {creep[OWN]} um/s.",
+        f"While the hand is shaken it does not: the best settings let the block slip by {slip} um, patches by "
+        f"{_short(1e6 * worst('shaken', PATCHES, 'slip'))} um, which is the yield of their bristles.",
+        f"What slides and turns at once needs the shape of the patch. Whatever its settings, MuJoCo's own friction is"
+        f" off by {stops:.0f} % in distance or angle of one of the discs, patches by "
+        f"{100.0 * worst('disc', reduced, 'distance', 'angle'):.2f} %; in the hand by {ends:.1f} mm, patches by "
+        f"{1e3 * worst('in hand', reduced, 'y'):.1f} mm.",
+        f"A step with patches takes {min(ratios):.2f} to {max(ratios):.2f} times that of the elliptic cone.",
+    ]
