@@ -1,6 +1,6 @@
 """Patch friction inside simulators beside their own at its best settings: held, shaken, stopped, turned, timed.
 
-Needs MuJoCo.
+Needs MuJoCo; Drake is compared with where it is installed.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from planarfriction.errors import MissingExtraError
-from planarfriction.experiments import mujoco_scenes
+from planarfriction.experiments import mujoco_scenes, simulators_drake
 from planarfriction.experiments import simulators_runs as runs
 from planarfriction.experiments import simulators_words as words
 from planarfriction.experiments.experiment import Picture, Result, Work
@@ -35,7 +35,7 @@ def run(work: Work) -> Result:
         import mujoco
     except ImportError as error:
         raise MissingExtraError("mujoco", "mujoco") from error
-    found = {
+    found: dict[str, Any] = {
         "held": _held(work),
         "steps": _steps(work),
         "shaken": _shaken(work),
@@ -44,6 +44,9 @@ def run(work: Work) -> Result:
         "cost": _cost(work),
     }
     versions = {"mujoco": mujoco.__version__}
+    if simulators_drake.installed():
+        found["drake"] = simulators_drake.run(work)
+        versions["drake"] = simulators_drake.version()
     return Result(
         findings=words.findings(found, versions),
         pictures=[

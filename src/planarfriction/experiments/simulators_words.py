@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -26,7 +27,7 @@ Numbers = dict[str, dict[str, dict[str, float]]]
 """Case -> way -> quantity."""
 
 
-def comparisons(found: dict[str, Numbers]) -> list[Comparison]:
+def comparisons(found: Mapping[str, Any]) -> list[Comparison]:
     """Our numbers against rest, and against the exact disc and the converged run."""
     rows: list[tuple[str, float, str]] = []
     for case, ways in found["steps"].items():
@@ -51,6 +52,19 @@ def comparisons(found: dict[str, Numbers]) -> list[Comparison]:
             (f"end in the hand, {load}", 1e3 * float(np.hypot(values["x"], values["y"])), "end"),
             (f"angle in the hand, {load}", float(np.degrees(values["theta"])), "turned"),
         ]
+    if "drake" in found:
+        for dt, ways in found["drake"]["creep"].items():
+            rows += [
+                (f"creep, Drake, {way}, dt {dt}", 1e6 * values["creep"], "creep")
+                for way, values in ways.items()
+                if way.startswith(PATCHES)
+            ]
+        for start, ways in found["drake"]["disc"].items():
+            for way in (way for way in ways if way.startswith(PATCHES)):
+                rows += [
+                    (f"{what} of the disc, Drake, {start}, {way}", 100 * ways[way][what], what)
+                    for what in ("distance", "angle")
+                ]
     references = {"distance": "closed form", "angle": "closed form", "end": "converged", "turned": "converged"}
     return [
         compare_number(
@@ -66,7 +80,8 @@ def comparisons(found: dict[str, Numbers]) -> list[Comparison]:
     ]
 
 
-def tables(found: dict[str, Numbers]) -> list[Table]:
+def tables(found: Mapping[str, Any]) -> list[Table]:
+    """Ways as rows, cases as columns, each number with its unit."""
     return [
         _table("What is held: creep and turning", found["held"], _creep),
         Table(
@@ -81,20 +96,40 @@ def tables(found: dict[str, Numbers]) -> list[Table]:
         _table(
             "A disc that slides and spins to rest: errors of distance and angle",
             found["disc"],
-            lambda v: f"{100 * v['distance']:+.2f} %, {100 * v['angle']:+.2f} %",
+            _stop,
         ),
         _table("The published in-hand run: errors of the end in height and angle", found["in hand"], _end),
         _table(
-            "Time of a step, over that with impratio 10",
-            {
-                f"{case} ({1e6 * ways[OWN]['seconds']:.0f} us)": {
-                    way: {"ratio": values["seconds"] / ways[OWN]["seconds"]} for way, values in ways.items()
-                }
-                for case, ways in found["cost"].items()
-            },
-            lambda v: f"{v['ratio']:.2f}",
+            "Time of a step, over that with impratio 10", _ratios(found["cost"], OWN), lambda v: f"{v['ratio']:.2f}"
+        ),
+        *(_drake_tables(found["drake"]) if "drake" in found else ()),
+    ]
+
+
+def _drake_tables(found: Mapping[str, Any]) -> list[Table]:
+    return [
+        _table(
+            "Drake, a box on an incline of 0.3 rad: creep",
+            found["creep"],
+            lambda v: f"{_short(1e6 * abs(v['creep']))} um/s",
+        ),
+        _table("Drake, the disc: errors of distance and angle", found["disc"], _stop),
+        _table(
+            "Drake, time of a step of the box, over that without patches",
+            _ratios(found["cost"], "lagged"),
+            lambda v: f"{v['ratio']:.1f}",
         ),
     ]
+
+
+def _ratios(cases: Numbers, own: str) -> Numbers:
+    """Times over those of one way."""
+    return {
+        f"{case} ({1e6 * ways[own]['seconds']:.0f} us)": {
+            way: {"ratio": values["seconds"] / ways[own]["seconds"]} for way, values in ways.items()
+        }
+        for case, ways in cases.items()
+    }
 
 
 def _table(title: str, cases: Numbers, words: Callable[[Mapping[str, float]], str]) -> Table:
@@ -110,6 +145,10 @@ def _creep(values: Mapping[str, float]) -> str:
     return f"{_short(1e6 * values['creep'])} um/s, {_short(float(np.degrees(values['spin'])))} deg/s"
 
 
+def _stop(values: Mapping[str, float]) -> str:
+    return f"{100 * values['distance']:+.2f} %, {100 * values['angle']:+.2f} %"
+
+
 def _end(values: Mapping[str, float]) -> str:
     if abs(values["y"]) > runs.DROPPED:
         return "dropped"
@@ -120,7 +159,7 @@ def _short(value: float) -> str:
     return f"{value:.0e}" if value < 1e-2 else f"{value:.3g}"
 
 
-def findings(found: dict[str, Numbers], versions: Mapping[str, str]) -> Sequence[str]:
+def findings(found: Mapping[str, Any], versions: Mapping[str, str]) -> Sequence[str]:
     """Where the simulator's own friction suffices, and where not, with the numbers of this run."""
 
     def worst(kind: str, way: str, *keys: str) -> float:
@@ -133,7 +172,7 @@ def findings(found: dict[str, Numbers], versions: Mapping[str, str]) -> Sequence
     stops = 100.0 * min(worst("disc", way, "distance", "angle") for way in touching)
     ends = 1e3 * min(worst("in hand", way, "y") for way in NATIVE)
     ratios = [ways[PATCHES]["seconds"] / ways[OWN]["seconds"] for ways in found["cost"].values()]
-    return [
+    said = [
         f"MuJoCo {versions['mujoco']}, steps of 2 ms. Where a thing is only held, noslip suffices: with 10 iterations"
         f" it creeps by {creep[noslip]} um/s at most, with patches by {creep[PATCHES]} um/s. The elliptic cone alone"
         f" lets it creep by up to {creep[OWN]} um/s.",
@@ -145,3 +184,12 @@ def findings(found: dict[str, Numbers], versions: Mapping[str, str]) -> Sequence
         f"{1e3 * worst('in hand', reduced, 'y'):.1f} mm.",
         f"A step with patches takes {min(ratios):.2f} to {max(ratios):.2f} times that of the elliptic cone.",
     ]
+    if "drake" in found:
+        cases = found["drake"]["creep"].values()
+        own = min(abs(value["creep"]) for case in cases for way, value in case.items() if not way.startswith(PATCHES))
+        ours = max(abs(value["creep"]) for case in cases for way, value in case.items() if way.startswith(PATCHES))
+        said.append(
+            f"Drake {versions['drake']}: a box on an incline creeps by {_short(1e6 * own)} um/s at least, with patches"
+            f" by {_short(1e6 * ours)} um/s at most."
+        )
+    return said
