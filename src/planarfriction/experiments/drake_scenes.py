@@ -76,9 +76,10 @@ class DrakeScene:
         from pydrake.math import RigidTransform
         from pydrake.multibody.tree import FixedOffsetFrame, SpatialInertia, UnitInertia
 
+        origin, up = np.zeros(3), np.array([0.0, 0.0, 1.0])
         disc, height = self.shape == "disc", self.height
-        inertia = UnitInertia.SolidCylinder(0.1, 0.004, [0, 0, 1]) if disc else UnitInertia.SolidBox(0.1, 0.1, 0.04)
-        body = plant.AddRigidBody("body", SpatialInertia(0.2, [0, 0, 0], inertia))
+        inertia = UnitInertia.SolidCylinder(0.1, 0.004, up) if disc else UnitInertia.SolidBox(0.1, 0.1, 0.04)
+        body = plant.AddRigidBody("body", SpatialInertia(0.2, origin, inertia))
         soft, rigid = self._material(contact, rigid=False), self._material(contact, rigid=True)
         if contact == "hydroelastic":
             solid = Cylinder(0.1, 0.004) if disc else Box(0.1, 0.1, 0.04)
@@ -87,14 +88,14 @@ class DrakeScene:
             around = np.array([[1, 0], [0, 1], [-1, 0], [0, -1]])
             corners = 0.1 * around if disc else 0.05 * (around + np.roll(around, 1, axis=0))
             for i, corner in enumerate(corners):
-                place = RigidTransform([*corner, 0.001 - height])
+                place = RigidTransform(np.array([*corner, 0.001 - height]))
                 plant.RegisterCollisionGeometry(body, place, Sphere(0.001), f"foot {i}", soft)
         plant.RegisterCollisionGeometry(plant.world_body(), RigidTransform(), HalfSpace(), "floor", rigid)
-        plant.AddFrame(FixedOffsetFrame("bottom", body.body_frame(), RigidTransform([0, 0, -height])))
+        plant.AddFrame(FixedOffsetFrame("bottom", body.body_frame(), RigidTransform(-height * up)))
         down = GRAVITY * np.array([math.sin(self.tilt), 0.0, -math.cos(self.tilt)])
         plant.mutable_gravity_field().set_gravity_vector(down)
         plant.Finalize()
-        plant.SetDefaultFloatingBaseBodyPose(body, RigidTransform([0, 0, height - 1e-5]))
+        plant.SetDefaultFloatingBaseBodyPose(body, RigidTransform((height - 1e-5) * up))
 
     def _material(self, contact: str, *, rigid: bool) -> Any:
         from pydrake import geometry
@@ -136,7 +137,7 @@ def slide(way: Way, start: tuple[float, float], dt: float = 2e-3) -> tuple[float
     simulator.AdvanceTo(SETTLED)
     body = plant.GetBodyByName("body")
     before = plant.GetPositions(context)[4:6].copy()
-    velocity = SpatialVelocity([0, 0, start[1]], [start[0], 0, 0])
+    velocity = SpatialVelocity(np.array([0.0, 0.0, start[1]]), np.array([start[0], 0.0, 0.0]))
     plant.SetFreeBodySpatialVelocity(context=context, body=body, V_JpJc=velocity)
     turned = 0.0
     for i in range(round(1.2 / dt)):

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, Literal
 
 from planarfriction.errors import MissingExtraError
 from planarfriction.experiments import mujoco_scenes, simulators_drake
@@ -140,7 +140,7 @@ def _disc(work: Work) -> Numbers:
 def _in_hand(work: Work) -> Numbers:
     ways: dict[str, Any] = {name: (way, None) for name, way in NATIVE.items()}
     ways |= {name: (PATCHES, kind) for name, kind in runs.KINDS.items()}
-    loads = (2,) if work.quick else (1, 2)
+    loads: tuple[Literal[1, 2], ...] = (2,) if work.quick else (1, 2)
     return {
         f"load {load}": _measure(
             work,

@@ -29,7 +29,7 @@ against slip besides; and with stiffer contacts besides, which hold best while t
 
 FRICTIONLESS = Native(condim=1)
 
-PATCHES = "patches"
+PATCHES: Literal["patches"] = "patches"
 """Our friction, in the place of a setting."""
 
 KINDS: dict[str, type | None] = {"patches, reduced": None, "patches, distributed": DistributedModel}
@@ -42,7 +42,8 @@ DROPPED = 0.05
 
 Way = Native | Literal["patches"]
 
-_disc, _plate, _stop = (functools.cache(f) for f in (mujoco_scenes.disc, mujoco_scenes.plate, coulomb_disc.stop))
+_disc, _plate = functools.cache(mujoco_scenes.disc), functools.cache(mujoco_scenes.plate)
+_stop = functools.cache(coulomb_disc.stop)
 
 
 def begin(
@@ -53,7 +54,7 @@ def begin(
 
     if isinstance(way, Native):
         m, d = scene.native(way, dt, integrator)
-        return m, d, lambda: mujoco.mj_step(m, d)
+        return m, d, lambda: mujoco.mj_step(m, d)  # pyright: ignore[reportAttributeAccessIssue]
     m, d, friction = scene.ours(dt, integrator, model=model)
     return m, d, lambda: friction.step(d)
 

@@ -65,13 +65,12 @@ def comparisons(found: Mapping[str, Any]) -> list[Comparison]:
                     (f"{what} of the disc, Drake, {start}, {way}", 100 * ways[way][what], what)
                     for what in ("distance", "angle")
                 ]
-    references = {"distance": "closed form", "angle": "closed form", "end": "converged", "turned": "converged"}
     return [
         compare_number(
             quantity,
             value,
             0.0,
-            reference=references.get(kind, "closed form"),
+            reference="converged" if kind in ("end", "turned") else "closed form",
             tolerance=BARS[kind][0],
             unit=BARS[kind][1],
             cause="the time step, and the normal contact of the simulator",

@@ -9,7 +9,6 @@ from typing import Any
 
 import mujoco
 import numpy as np
-import shapely
 
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch import ContactPatch
@@ -32,6 +31,8 @@ _FINE = 0.01
 
 def outlines(patch: ContactPatch) -> list[np.ndarray]:
     """Rims of a patch, closed, `[M, 2]` [m] each: those that its cells were cut from, else those around its cells."""
+    import shapely
+
     if patch.outline is not None:
         outer, holes = patch.outline.rims()
         rims = [np.concatenate([rim, rim[:1]]) for rim in (outer, *holes)]
