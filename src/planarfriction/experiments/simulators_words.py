@@ -91,7 +91,9 @@ def tables(found: Mapping[str, Any]) -> list[Table]:
                 for case, ways in found["steps"].items()
             ],
         ),
-        _table("A gripper shaken for 3 s: slip in the hand", found["shaken"], lambda v: f"{1e6 * v['slip']:.3g} um"),
+        _table(
+            "A gripper shaken for 3 s: slip in the hand", found["shaken"], lambda v: f"{_short(1e6 * v['slip'])} um"
+        ),
         _table(
             "A disc that slides and spins to rest: errors of distance and angle",
             found["disc"],
@@ -155,7 +157,10 @@ def _end(values: Mapping[str, float]) -> str:
 
 
 def _short(value: float) -> str:
-    return f"{value:.0e}" if value < 1e-2 else f"{value:.3g}"
+    """A number that is large, readable, or merely small."""
+    if value < 1e-2:
+        return f"{value:.0e}"
+    return f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
 
 
 def findings(found: Mapping[str, Any], versions: Mapping[str, str]) -> Sequence[str]:
