@@ -1,3 +1,5 @@
+# pyright: reportArgumentType=false, reportCallIssue=false
+# (Drake describes arrays to type checkers in a way that no array fits.)
 """Scenes in Drake in which friction decides: a disc that slides and spins to rest, and a box that an incline holds.
 
 Each comes with Drake's own friction or with a patch. Needs Drake when it is built.

@@ -6,6 +6,7 @@ Needs MuJoCo; Drake is compared with where it is installed.
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Mapping
 from typing import Any, Literal
 
@@ -145,7 +146,7 @@ def _in_hand(work: Work) -> Numbers:
         f"load {load}": _measure(
             work,
             f"in hand, load {load}",
-            {name: lambda load=load, job=job: runs.in_hand(job[0], load, job[1]) for name, job in ways.items()},
+            {name: functools.partial(runs.in_hand, way, load, kind) for name, (way, kind) in ways.items()},
         )
         for load in loads
     }

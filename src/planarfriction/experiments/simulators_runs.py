@@ -29,7 +29,7 @@ against slip besides; and with stiffer contacts besides, which hold best while t
 
 FRICTIONLESS = Native(condim=1)
 
-PATCHES: Literal["patches"] = "patches"
+PATCHES = "patches"
 """Our friction, in the place of a setting."""
 
 KINDS: dict[str, type | None] = {"patches, reduced": None, "patches, distributed": DistributedModel}
@@ -40,7 +40,8 @@ DT = 2e-3
 DROPPED = 0.05
 """A block that has sunk by this [m] is no longer held."""
 
-Way = Native | Literal["patches"]
+Way = Native | str
+"""Settings of MuJoCo's own friction, or `PATCHES`."""
 
 _disc, _plate = functools.cache(mujoco_scenes.disc), functools.cache(mujoco_scenes.plate)
 _stop = functools.cache(coulomb_disc.stop)
