@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import time
 from collections.abc import Callable
+from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -58,6 +59,7 @@ def _parts() -> list[Part]:
         Part("scenes, reduced in parts", functools.partial(_derive, sum_of_parts)),
         *(Part(f"steps, {name}", functools.partial(_step, model)) for name, model in kinds.items()),
         Part("coupled patches", functools.partial(_couple, [*kinds.values(), grooved])),
+        *([Part("steps inside MuJoCo", _host)] if find_spec("mujoco") else []),
         *(Part(f"roll-outs, {name}", functools.partial(_roll, model)) for name, model in three_states.items()),
         *(Part(f"derivatives of scenes, {name}", functools.partial(_derive, model)) for name, model in kinds.items()),
         Part("limit surfaces", functools.partial(_surfaces, patch)),
@@ -86,6 +88,12 @@ def _couple(kinds: list[Any]) -> None:
     k = len(kinds)
     host = coupling.HostStep(np.ones((k, 3)), np.ones(k), np.zeros((k, 3)), np.eye(3 * k))
     patches.step(patches.rest(), host, 1e-4)
+
+
+def _host() -> None:
+    from planarfriction.kernels import mujoco_step
+
+    mujoco_step.compile_ahead()
 
 
 def _roll(model: Any) -> None:

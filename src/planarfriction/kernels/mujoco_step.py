@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from numba import types
+
 from planarfriction.kernels import callback, entry, jit, kernel
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels.coupling import evaluate
@@ -17,7 +19,18 @@ from planarfriction.kernels.coupling_rows import read as read_patches
 from planarfriction.kernels.mujoco_geometry import place, take
 from planarfriction.kernels.mujoco_records import Host, read
 from planarfriction.kernels.mujoco_responses import is_sparse, leaves_range, respond
-from planarfriction.kernels.pointers import address, at, call, call_c, doubles, integers, integers32, shared_word
+from planarfriction.kernels.pointers import (
+    address,
+    address_of,
+    at,
+    c_address_of,
+    call,
+    call_c,
+    doubles,
+    integers,
+    integers32,
+    shared_word,
+)
 
 PASSES = 10
 """How often a step is solved anew where other constraints have become active through it."""
@@ -264,3 +277,19 @@ def control(m, d):
 def plan_step(host, m, d):
     """`plan` from Python: the row of a `Host`, addresses of model and data."""
     call(read(host).plan, (address(host, 0), m, d))
+
+
+def plan_address() -> int:
+    """Where `plan` is in this process."""
+    return address_of(plan, "ppp")
+
+
+def control_address() -> int:
+    """Where C code calls `control`."""
+    return c_address_of(control, 2)
+
+
+def compile_ahead() -> None:
+    """Compile what steps inside MuJoCo take."""
+    plan_address(), control_address()
+    plan_step.compile((types.float64[::1], types.int64, types.int64))

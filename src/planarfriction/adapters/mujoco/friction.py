@@ -21,7 +21,7 @@ from planarfriction.errors import FrictionError, InvalidValueError
 from planarfriction.kernels import coupling as kernels
 from planarfriction.kernels import mujoco_step
 from planarfriction.kernels.mujoco_records import Host
-from planarfriction.kernels.pointers import address_of, c_address_of, place_of
+from planarfriction.kernels.pointers import place_of
 from planarfriction.kernels.records import row_of
 
 INTEGRATORS = {
@@ -188,7 +188,7 @@ class Friction:
                 problem=place_of(problem),
                 patches=place_of(packed.row),
                 solve=kernels.solve_address(),
-                plan=address_of(mujoco_step.plan, "ppp"),
+                plan=mujoco_step.plan_address(),
                 free_count=len(joints),
                 free_joints=place_of(free),
                 free_dofs=place_of(free) + 8 * len(joints),
@@ -202,4 +202,4 @@ class Friction:
 @functools.cache
 def _callback() -> Any:
     """The compiled control callback."""
-    return ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(c_address_of(mujoco_step.control, 2))
+    return ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(mujoco_step.control_address())
