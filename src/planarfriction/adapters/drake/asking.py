@@ -104,8 +104,8 @@ class Asking:
                 misfit, off, twist = moved, 0.0 * owed, row.twist
                 break
         report = passes, iterations, row.residual[0], misfit, row.converged[0]
-        answers = self._touching, row.response.ravel(), row.load_response.ravel()
-        return Asked(row.new, wrench, force, off, twist - owed, load, *answers, report)
+        twists, loads = row.response.ravel(), row.load_response.ravel()
+        return Asked(row.new, wrench, force, off, twist - owed, load, self._touching, twists, loads, report)
 
     def _forget(self) -> None:
         self._touching = [False] * len(self._touching)
