@@ -54,10 +54,19 @@ def fitted(task: str, stored: Mapping[str, Any]) -> list[list[str]]:
     return [["fitted", *keys], *rows]
 
 
+def checked(task: str, stored: Mapping[str, Any]) -> list[list[str]]:
+    """Headings and rows: what the models say of their own answers on the test cases."""
+    told = {name: model["checked"] for name, model in stored["models"].items() if model["checked"]}
+    keys = list(dict.fromkeys(key for found in told.values() for key in found))
+    rows = [[name, *(f"{found[key]:.2f}" if key in found else "" for key in keys)] for name, found in told.items()]
+    return [["model", *keys], *rows]
+
+
 TABLES: dict[str, tuple[str, Callable[[str, Mapping[str, Any]], list[list[str]]]]] = {
     **{task: (task, scores) for task in TASKS},
     **{f"{task} minus": (task, differences) for task in TASKS},
     "slides fitted": ("slides", fitted),
+    "slides checked": ("slides", checked),
 }
 
 

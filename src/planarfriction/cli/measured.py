@@ -113,6 +113,8 @@ def show(benchmark: Any, as_json: bool) -> None:
         )
         for model, result in benchmark.results[name].items():
             if result.told:
+                for key, value in result.checked.items():
+                    note(f"{model}: {key} {value:.3g}")
                 note(f"{model}, fitted: {', '.join(f'{key} {value:.4g}' for key, value in result.told.items())}")
     for text in benchmark.left_out:
         note(f"left out: {text}")

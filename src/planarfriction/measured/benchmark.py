@@ -45,6 +45,8 @@ class Result:
     """`[rows, columns]` of each test case, as the task defines them."""
     told: Mapping[str, float]
     """What was fitted."""
+    checked: Mapping[str, float]
+    """What the model says of its own answers on the test cases, where it says anything."""
     seconds: float
     """Fit and prediction."""
 
@@ -109,9 +111,12 @@ class Benchmark:
                     continue  # a model need not answer every task
                 errors = tuple(task.errors(case, answer) for case, answer in zip(test, answers, strict=True))
                 told = fitted.told() if hasattr(fitted, "told") and name == "slides" else {}
+                checked = fitted.check(test) if hasattr(fitted, "check") else {}
                 seconds = time.perf_counter() - begun
                 scores = score(task, test, errors, self.seed)
-                self.results.setdefault(name, {})[called] = Result(scores, tuple(answers), errors, told, seconds)
+                self.results.setdefault(name, {})[called] = Result(
+                    scores, tuple(answers), errors, told, checked, seconds
+                )
         return self.results
 
 

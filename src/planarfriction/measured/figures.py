@@ -11,7 +11,7 @@ from planarfriction.measured.benchmark import Benchmark
 from planarfriction.measured.tasks import TASKS
 from planarfriction.plots import style
 
-DRAWN = ("uncoupled", "ellipsoid", "exact surface")
+DRAWN = ("uncoupled", "ellipsoid", "exact surface", "toss by toss")
 """Models of an example, where they took part, besides those of the user."""
 
 

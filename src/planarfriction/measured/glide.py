@@ -22,26 +22,28 @@ CHANGES = np.array([2e-3, 2e-3, 2e-2])
 TURNS = 2
 """Gauss-Newton steps from the velocity of a parabola to that of the model: a third moves it by less than 1e-5 m/s."""
 
-Friction = Callable[[np.ndarray], np.ndarray]
-"""Friction wrenches `[K, 3]` over the weight [1, 1, m] of twists `[K, 3]`, both in the axes of the bodies."""
+Friction = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""Friction wrenches `[K, 3]` over the weight [1, 1, m] of twists `[K, 3]`, both in the axes of the bodies.
+
+The second argument are numbers of each slide's own, `[K, P]`, the columns of its start behind pose and twist."""
 
 
 def glide(friction: Friction, starts: np.ndarray, time: np.ndarray, radius_squared: float) -> np.ndarray:
-    """Poses `[K, T, 3]` at `time` `[T]` from 0 of slides from `starts` `[K, 6]`: pose and twist, world axes.
+    """Poses `[K, T, 3]` at `time` `[T]` from 0 of slides from `starts` `[K, 6 + P]`: pose, twist, numbers of their own.
 
     `radius_squared` is the inertia over the mass [m^2]. The fourth order method of Runge and Kutta; a body whose last
     step would turn it round stops where its deceleration ends.
     """
     end = float(time[-1])
     steps = max(int(np.ceil(end / STEP)), 1)
-    step, state = end / steps, starts.copy()
+    step, state, own = end / steps, starts[:, :6].copy(), starts[:, 6:]
     per = GRAVITY * np.array([1.0, 1.0, 1.0 / radius_squared])
     energy = np.array([1.0, 1.0, radius_squared])
 
-    def rates(state: np.ndarray) -> np.ndarray:
+    def rates(state: np.ndarray, own: np.ndarray) -> np.ndarray:
         cos, sin = np.cos(state[:, 2]), np.sin(state[:, 2])
         vx, vy, omega = state[:, 3:].T
-        fx, fy, tau = friction(np.stack([cos * vx + sin * vy, cos * vy - sin * vx, omega], axis=1)).T
+        fx, fy, tau = friction(np.stack([cos * vx + sin * vy, cos * vy - sin * vx, omega], axis=1), own).T
         return np.concatenate(
             [state[:, 3:], np.stack([cos * fx - sin * fy, sin * fx + cos * fy, tau], 1) * per], axis=1
         )
@@ -51,13 +53,14 @@ def glide(friction: Friction, starts: np.ndarray, time: np.ndarray, radius_squar
     for i in range(steps):
         now, state = state[moving], state.copy()
         if len(now):
-            a = rates(now)
+            mine = own[moving]
+            a = rates(now, mine)
             speed, brake = np.sqrt(now[:, 3:] ** 2 @ energy), np.sqrt(a[:, 3:] ** 2 @ energy)
             left = np.divide(speed, brake, out=np.full(len(now), np.inf), where=brake > 0.0)
             stops = left <= step
-            b = rates(now + 0.5 * step * a)
-            c = rates(now + 0.5 * step * b)
-            d = rates(now + step * c)
+            b = rates(now + 0.5 * step * a, mine)
+            c = rates(now + 0.5 * step * b, mine)
+            d = rates(now + step * c, mine)
             after = now + step / 6.0 * (a + 2.0 * b + 2.0 * c + d)
             after[stops, :3] = now[stops, :3] + 0.5 * left[stops, None] * now[stops, 3:]
             after[stops, 3:] = 0.0

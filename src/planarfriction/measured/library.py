@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from planarfriction.limit_surface import LimitSurfaceEllipsoid, LimitSurfaceExact, LimitSurfaceQuartic
 from planarfriction.measured.models import BristleModel, PushedQuartic, SurfaceModel, UncoupledModel
 from planarfriction.measured.mujoco_box import MujocoBox
+from planarfriction.measured.tossed import SpeedModel, TossModel
 from planarfriction.models import DistributedModel, ReducedModel
 
 
@@ -37,6 +38,8 @@ LIBRARY = {
     "exact surface": Entry(lambda: SurfaceModel(LimitSurfaceExact), "the limit surface of the patch itself"),
     "reduced": Entry(lambda: BristleModel(ReducedModel), "ReducedModel, stiff bristles"),
     "distributed": Entry(lambda: BristleModel(DistributedModel), "DistributedModel, stiff bristles"),
+    "mu(v) and radius": Entry(SpeedModel, "friction that grows with the speed, a fitted radius (slides only)"),
+    "toss by toss": Entry(TossModel, "the same, friction, radius and centre of each toss its own (slides only)"),
     "MuJoCo box": Entry(
         MujocoBox, "MuJoCo's own contact of a box, elliptic, condim 3 (slides only)", "mujoco", "mujoco"
     ),

@@ -39,7 +39,7 @@ class SurfaceModel:
         made = surfaces(self.surface, questions)
         if questions[0].task == "slides":
             wrench = quick(made[0])
-            return glide.slides(lambda twist: self.mu * wrench(twist), questions)
+            return glide.slides(lambda twist, _: self.mu * wrench(twist), questions)
         return [_direction(surface, question) for surface, question in zip(made, questions, strict=True)]
 
     def fit(self, cases: Sequence[Case]) -> SurfaceModel:
@@ -48,7 +48,7 @@ class SurfaceModel:
             return self
         (made,), radius = surfaces(self.surface, [cases[0].question]), cases[0].question.patch.contact_radius()
         wrench = quick(made)
-        predict = lambda values, asked: glide.slides(lambda twist: values[0] * wrench(twist), asked)  # noqa: E731
+        predict = lambda values, asked: glide.slides(lambda twist, _: values[0] * wrench(twist), asked)  # noqa: E731
         return dataclasses.replace(self, mu=float(fitting.fit_slides(predict, [fitting.MU], cases, radius)[0]))
 
     def told(self) -> dict[str, float]:
@@ -56,7 +56,7 @@ class SurfaceModel:
         return {"mu": self.mu}
 
 
-def quick(surface: LimitSurface) -> glide.Friction:
+def quick(surface: LimitSurface) -> Callable[[np.ndarray], np.ndarray]:
     """`surface.wrench` of twists `[K, 3]` from the numbers that compiled loops take: errors of 1e-5 at most."""
     numbers, frame = surface.numbers, scaling(surface.centre_of_pressure, surface.contact_radius)
 
@@ -108,7 +108,7 @@ class UncoupledModel:
         """Answers to questions of one task."""
         if questions[0].task == "slides":
             lever = self._lever(questions[0])
-            return glide.slides(lambda twist: self.mu * uncoupled(twist, lever), questions)
+            return glide.slides(lambda twist, _: self.mu * uncoupled(twist, lever), questions)
         return [self._direction(question, self._lever(question)) for question in questions]
 
     def fit(self, cases: Sequence[Case]) -> UncoupledModel:
@@ -121,7 +121,7 @@ class UncoupledModel:
 
             def predict(values: np.ndarray, asked: Sequence[Any]) -> list[np.ndarray]:
                 lever = radius * (values[1] if self.fitted_lever else self.share)
-                return glide.slides(lambda twist: values[0] * uncoupled(twist, lever), asked)
+                return glide.slides(lambda twist, _: values[0] * uncoupled(twist, lever), asked)
 
             found = fitting.fit_slides(predict, begin, cases, radius)
             return dataclasses.replace(self, mu=float(found[0]), share=float([*found, self.share][1]))

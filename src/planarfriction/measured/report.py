@@ -67,6 +67,7 @@ def to_dict(benchmark: Benchmark) -> dict[str, Any]:
             models[called] = {
                 "scores": scores,
                 "fitted": dict(result.told),
+                "checked": dict(result.checked),
                 "seconds": round(result.seconds, 2),
                 "errors": errors,
             }
