@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify.least_squares import correlations, covariance, minimise
+from planarfriction.identify.outliers import contradictions, verdicts_on_slides, weights
 from planarfriction.identify.parameters import Coordinates, check_names
 from planarfriction.identify.result import Identification, Verdict, verdicts_on_turns
 from planarfriction.identify.slides import (
@@ -39,8 +40,11 @@ CHANNELS = (("x", "m"), ("y", "m"), ("theta", "rad"))
 FIRST_NOISE = 1e-3
 """Spread of the positions in the first fit [m]; of the angles this over the contact radius."""
 
-NOISE_ROUNDS = 2
-"""Times that the noise is estimated from the residuals, each with a fit after it."""
+NOISE_ROUNDS, MOST_ROUNDS = 2, 8
+"""Times that noise and weights are estimated from the residuals, each with a fit after it: more until they settle."""
+
+SETTLED = 0.02
+"""Change of a weight that asks for no other round."""
 
 TOLERANCE = 1e-4
 """The search ends when coordinates or cost change by less than this share: far below the standard errors."""
@@ -61,6 +65,7 @@ def identify_motion(
     start: LuGre = DRY,
     model: Build = ReducedModelPublished,
     samples: int | None = None,
+    loss: Literal["robust", "squares"] = "robust",
     progress: Callable[[str], None] | None = None,
 ) -> Identification:
     """Estimate friction from slides that stop, without a force sensor.
@@ -87,6 +92,10 @@ def identify_motion(
         Makes the friction model from a patch and a law, as `ReducedModelPublished` and `DistributedModel` do.
     samples
         First poses that the start of a slide is estimated from, at least five; None takes all.
+    loss
+        "robust" leaves out slides that friction alone cannot have made (they speed up, or keep their speed), and those
+        whose residuals are 6 times those of the median slide, and lets those from 2.5 times on count less; "squares"
+        takes all alike. What was left out, and the slide that moves an estimate most, is told in the verdicts.
     progress
         Called with a text now and then.
 
@@ -109,16 +118,27 @@ def identify_motion(
     refuse_anisotropy(patch, "identify_motion")
     if samples is not None:
         samples = validation.count("samples", samples, at_least=5)
+    robust = validation.choice("loss", loss, ("robust", "squares")) == "robust"
+    strange = contradictions(slides, body) if robust else {}
+    if 2 * len(strange) >= len(slides):
+        strange = {}  # where most are strange, none is: the fit itself will be poor
+    left_out = {slides[i].name: why for i, why in strange.items()}
+    slides = tuple(slide for i, slide in enumerate(slides) if i not in strange)
     fit = _Fit(slides, patch, body, names, start, model, samples, progress)
     values = fit.start_values()
     coordinates = Coordinates(names, values, start.mu_c)
     x, noise = coordinates.of(values), np.array([FIRST_NOISE, FIRST_NOISE, FIRST_NOISE / patch.contact_radius()])
-    for turn in range(NOISE_ROUNDS + 1):
+    for turn in range(MOST_ROUNDS + 1):
+        known = fit.weights
         if turn > 0:
+            if robust:
+                fit.weights = weights(fit.errors(coordinates.values(x), noise))
             noise = fit.spread(coordinates.values(x))
         minimum = minimise(fit.residuals(coordinates, noise), [x], coordinates.bounds(), tolerance=TOLERANCE)
         x = minimum.x
-    return fit.result(coordinates, minimum, noise)
+        if turn >= NOISE_ROUNDS and np.abs(fit.weights - known).max() < SETTLED:
+            break
+    return fit.result(coordinates, minimum, noise, left_out)
 
 
 class _Fit:
@@ -129,6 +149,7 @@ class _Fit:
         self.law, self.build, self.samples = law, build, samples
         self.say = (lambda text: None) if progress is None else progress
         self.starts: list[np.ndarray] = [start_of(slide) for slide in slides]
+        self.weights = np.ones(len(slides))
         self._turns = 3  # of the first evaluation; later ones begin where the last one ended
 
     def start_values(self) -> np.ndarray:
@@ -156,27 +177,41 @@ class _Fit:
 
     def spread(self, values: np.ndarray) -> np.ndarray:
         """Spread of the residuals of each channel `[3]`; that of x and y is the same."""
-        model = self.fitted_model(values)
-        both = zip(self.slides, self.starts, strict=True)
-        off = np.concatenate(
-            [slide.pose - slide_poses(model, self.body, slide.time, s[:3], s[3:]) for slide, s in both]
-        )
-        free = off.size / max(off.size - len(self.names) - 6 * len(self.slides), 1)
-        squares = free * np.mean(off**2, axis=0)
+        offs, counts = self._offs(values), np.array([len(slide.time) for slide in self.slides])
+        total = 3 * float(self.weights @ counts)
+        free = total / max(total - len(self.names) - 6 * float(self.weights.sum()), 1.0)
+        each = np.array([np.sum(off**2, axis=0) for off in offs])
+        squares = free * (self.weights @ each) / (self.weights @ counts)
         across = np.sqrt(0.5 * (squares[0] + squares[1]))
         return np.maximum([across, across, np.sqrt(squares[2])], 1e-9)
+
+    def _offs(self, values: np.ndarray) -> list[np.ndarray]:
+        """Measured minus simulated poses of each slide `[T, 3]`."""
+        model, both = self.fitted_model(values), zip(self.slides, self.starts, strict=True)
+        return [slide.pose - slide_poses(model, self.body, slide.time, s[:3], s[3:]) for slide, s in both]
+
+    def errors(self, values: np.ndarray, noise: np.ndarray) -> np.ndarray:
+        """Root mean square of the residuals of each slide over the noise `[N]`."""
+        return np.array([np.sqrt(np.mean((off / noise) ** 2)) for off in self._offs(values)])
 
     def residuals(self, coordinates: Coordinates, noise: np.ndarray):
         """Function of the coordinates: residuals at the best starts and their derivatives with the starts free."""
 
         def evaluate(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            offs, slopes = self.linearised(coordinates.values(x), noise)
+            offs, slopes = self.weighted(*self.linearised(coordinates.values(x), noise))
             pull, per_pull = coordinates.prior(x)
             return np.concatenate([*offs, pull]), np.concatenate(
                 [np.concatenate(slopes) @ coordinates.slopes(x), per_pull]
             )
 
         return evaluate
+
+    def weighted(self, offs: list[np.ndarray], slopes: list[np.ndarray]) -> tuple[list[np.ndarray], list[np.ndarray]]:
+        """Residuals and derivatives of each slide with the root of its weight."""
+        roots = np.sqrt(self.weights)
+        pairs = zip(roots, offs, slopes, strict=True)
+        both = [(root * off, root * slope) for root, off, slope in pairs]
+        return [off for off, _ in both], [slope for _, slope in both]
 
     def linearised(self, values: np.ndarray, noise: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
         """Scaled residuals `[3 T]` of each slide and derivatives `[3 T, F]`, the start of each following."""
@@ -210,10 +245,15 @@ class _Fit:
         self._turns = 0
         return offs, slopes
 
-    def result(self, coordinates: Coordinates, minimum, noise: np.ndarray) -> Identification:
+    def result(self, coordinates: Coordinates, minimum, noise: np.ndarray, left_out: dict[str, str]) -> Identification:
         values = coordinates.values(minimum.x)
         offs, slopes = self.linearised(values, noise)
+        plain = np.array([np.sqrt(np.mean(off**2)) for off in offs])
+        offs, slopes = self.weighted(offs, slopes)
         spread = self._covariance(offs, slopes, ~minimum.at_bound)
+        votes = np.stack([slope.T @ off for off, slope in zip(offs, slopes, strict=True)])
+        alone = covariance(np.concatenate(slopes), ~minimum.at_bound)
+        moved = votes @ alone if np.isfinite(alone).all() else np.zeros_like(votes)
         errors, together = np.sqrt(np.diag(spread)), correlations(spread)
         model = self.fitted_model(values)
         histories = []
@@ -227,7 +267,12 @@ class _Fit:
             values=values,
             standard_errors=errors,
             correlations=together,
-            verdicts=self._verdicts(values, errors, together, minimum.at_bound),
+            verdicts=(
+                *self._verdicts(values, errors, together, minimum.at_bound),
+                *verdicts_on_slides(
+                    left_out, plain / np.median(plain), self.weights, self.slides, moved, self.names, errors
+                ),
+            ),
             noise=noise,
             channels=CHANNELS,
             histories=tuple(histories),
@@ -239,7 +284,7 @@ class _Fit:
     def _covariance(self, offs, slopes, free) -> np.ndarray:
         """Covariance `[F, F]` in which each slide votes as one: `H^-1 (sum g g') H^-1 n/(n - 1)`, vote `g = J' r`."""
         plain = covariance(np.concatenate(slopes), free)
-        if len(self.slides) < 2 or not np.isfinite(plain).all():
+        if np.count_nonzero(self.weights) < 2 or not np.isfinite(plain).all():
             return plain
         votes = np.stack([slope.T @ off for off, slope in zip(offs, slopes, strict=True)])
         return plain @ (votes.T @ votes) @ plain * len(votes) / (len(votes) - 1)
@@ -266,6 +311,7 @@ class _Fit:
                 verdicts.append(
                     Verdict(name, False, f"its standard error is {100 * errors[i] / abs(values[i]):.0f} % of it")
                 )
-        if len(self.slides) < 10:
-            verdicts.append(Verdict("fit", False, f"errors from {len(self.slides)} slides only"))
+        count = int((self.weights > 0.0).sum())
+        if count < 10:
+            verdicts.append(Verdict("fit", False, f"errors from {count} slides only"))
         return (*verdicts, *verdicts_on_turns(self.slides))
