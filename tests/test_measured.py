@@ -67,7 +67,10 @@ def test_splits_keep_copies_and_pushes_together(cases):
 
 
 def test_the_wrench_of_a_pusher_goes_with_the_motion(cases):
-    """A wrong sign, or world axes in place of the object's, would spoil the power."""
+    """A wrong sign, or axes of the one and not of the other, would spoil the power."""
+    assert series.to_object(np.array([[1.0, 0.0, 2.0]]), np.array([np.pi / 2])) == pytest.approx(
+        np.array([[0.0, -1.0, 2.0]])
+    )
     for case in cases["pushes"]:
         assert np.einsum("mi,mi->m", case.question.wrenches, case.answer).min() > 0.0
     for case in cases["series"]:
