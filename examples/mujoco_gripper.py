@@ -92,7 +92,7 @@ def run(draw: bool = True) -> tuple[np.ndarray, list[np.ndarray]]:
     m, d, friction = hand()
     renderer = mujoco.Renderer(m, 360, 360) if draw else None
     camera = mujoco.MjvCamera()
-    camera.lookat[:], camera.distance, camera.azimuth, camera.elevation = (0.0, 0.026, -0.022), 0.19, 194.0, -12.0
+    camera.lookat[:], camera.distance, camera.azimuth, camera.elevation = (0.0, 0.028, -0.02), 0.21, 194.0, -12.0
     gravity, m.opt.gravity[:] = m.opt.gravity.copy(), 0.0
     rows, pictures = [], []
     for k in range(-100, round(END / m.opt.timestep)):
