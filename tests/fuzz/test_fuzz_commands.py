@@ -63,7 +63,7 @@ def arguments(name: str, draw: random.Random) -> list[str]:
 def test_commands(draw: random.Random) -> None:
     name = draw.choice([*app.commands, "run", "limit-surface", "identify"])
     given = [name, *arguments(name, draw)]
-    if name in ("bench", "reproduce", "warm") and not {"--list", "--help", "nothing"} & set(given):
+    if name in ("bench", "reproduce", "simulators", "warm") and not {"--list", "--help", "nothing"} & set(given):
         return  # minutes of work
 
     def run() -> None:
