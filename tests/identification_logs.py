@@ -8,6 +8,7 @@ import planarfriction as pf
 from planarfriction.autodiff import parameters_of
 from planarfriction.identify import Log
 from planarfriction.identify.prediction import Prediction
+from planarfriction.identify.simulators import PublishedSimulator
 
 LAW = pf.LuGre(
     mu_c=0.5,
@@ -38,7 +39,7 @@ def clean_log(time, twist, *, law=LAW, patch=PATCH, load=LOAD, name="log") -> Lo
     """The log of a contact without noise."""
     model = pf.ReducedModelPublished(patch, law)
     empty = Log(time, twist, np.zeros_like(twist), load, name)
-    wrench = Prediction(model, empty, refine=16).wrenches(parameters_of(model))
+    wrench = Prediction(PublishedSimulator(model), empty, twist, refine=16).wrenches(parameters_of(model))
     return Log(time, twist, wrench, load, name)
 
 

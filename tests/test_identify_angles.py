@@ -96,6 +96,11 @@ def test_times_that_do_not_increase_are_refused_before_slopes_are_taken():
 # ---------------------------------------------------------------------- estimates
 
 
+def identify(log, patch, **options):
+    """Of the model that the logs were made with, without anything that a rig adds."""
+    return identify_lugre(log, patch, model="reduced-published", nuisance=(), **options)
+
+
 @pytest.fixture(scope="module")
 def spun():
     """A log with a spin that goes on for four turns."""
@@ -125,7 +130,7 @@ def test_a_wrapped_angle_gives_the_same_estimates_and_says_so(spun):
     assert [log.turns for log in logs] == [0, 4]
     assert np.abs(logs[1].twist - logs[0].twist).max() < 1e-8 * 25.0  # slopes of what is 1e-15 rad apart, over 1 ms
     options = {"parameters": ("mu_c", "contact_radius"), "start": KNOWN, "starts": 1}
-    smooth, jumping = (identify_lugre(log, PATCH, **options) for log in logs)
+    smooth, jumping = (identify(log, PATCH, **options) for log in logs)
     for name in ("mu_c", "contact_radius"):
         assert jumping.estimates[name] == pytest.approx(smooth.estimates[name], rel=1e-6)
     assert jumping.estimates["mu_c"] == pytest.approx(LAW.mu_c, rel=0.02)
@@ -143,7 +148,7 @@ def test_without_torques_the_force_tells_what_it_can():
     """The force of a contact that spins while it slides tells the friction and, through its loss, the radius."""
     log = noisy(clean_log(*excitation(duration=1.0)), 3)
     options = {"parameters": ("mu_c", "contact_radius"), "start": KNOWN, "starts": 1}
-    found, full = identify_lugre(without_torque(log), PATCH, **options), identify_lugre(log, PATCH, **options)
+    found, full = identify(without_torque(log), PATCH, **options), identify(log, PATCH, **options)
     for name, true in (("mu_c", LAW.mu_c), ("contact_radius", RADIUS)):
         assert found.estimates[name] == pytest.approx(true, abs=5.0 * found.errors[name])
         assert full.errors[name] < found.errors[name] < 0.01 * true
@@ -157,7 +162,7 @@ def test_without_torques_the_force_tells_what_it_can():
 def test_what_would_need_the_torque_is_no_estimate(spun):
     """Where spin dominates, the force tells the ratio of friction and radius only."""
     options = {"parameters": ("mu_c", "contact_radius"), "start": KNOWN, "starts": 1}
-    found = identify_lugre(without_torque(spun), PATCH, **options)
+    found = identify(without_torque(spun), PATCH, **options)
     assert not found.identifiable("mu_c") and not found.identifiable("contact_radius")
     ratio = found.estimates["mu_c"] / found.estimates["contact_radius"]
     assert ratio == pytest.approx(LAW.mu_c / RADIUS, rel=0.02)
@@ -169,17 +174,17 @@ def test_what_only_the_torque_tells_is_named():
     time, twist = excitation(duration=1.0)
     log = noisy(clean_log(time, twist * [1e-4, 1e-4, 5.0]), 3)
     options = {"parameters": ("mu_c", "contact_radius"), "start": KNOWN, "starts": 1, "noise": (0.02, 0.02, 1e-4)}
-    found = identify_lugre(without_torque(log), PATCH, **options)
+    found = identify(without_torque(log), PATCH, **options)
     assert not found.identifiable("contact_radius")
     assert "contact_radius: not identifiable, only the torque tells it, and tau is 0 throughout" in [
         str(each) for each in found.verdicts
     ]
-    assert identify_lugre(log, PATCH, **options).identifiable("contact_radius")
+    assert identify(log, PATCH, **options).identifiable("contact_radius")
 
 
 def test_one_log_of_several_may_lack_torques(spun):
     options = {"parameters": ("mu_c", "contact_radius"), "start": KNOWN, "starts": 1}
-    found = identify_lugre([spun, without_torque(spun)], PATCH, **options)
+    found = identify([spun, without_torque(spun)], PATCH, **options)
     assert found.estimates["contact_radius"] == pytest.approx(RADIUS, rel=0.01)
     assert not any("tau is 0" in str(each) for each in found.verdicts)
 
@@ -187,4 +192,4 @@ def test_one_log_of_several_may_lack_torques(spun):
 def test_a_log_of_zeros_is_refused(spun):
     nothing = Log(spun.time, spun.twist, np.zeros_like(spun.wrench), LOAD, "dead")
     with pytest.raises(pf.FrictionError, match="wrench of dead must not be 0 throughout"):
-        identify_lugre(nothing, PATCH)
+        identify(nothing, PATCH)

@@ -19,6 +19,7 @@ from planarfriction.errors import MissingExtraError
 from planarfriction.experiments import drake_disc, mjx_costs, mujoco_costs
 from planarfriction.experiments.baselines import lsoda_time, numpy_table, scipy_twist
 from planarfriction.experiments.four_feet import four_feet
+from planarfriction.experiments.identified_log import identification
 from planarfriction.experiments.measurement import Measurement, line, median, once
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceExact, LimitSurfaceTable, LimitSurfaceTablePublished
@@ -372,6 +373,8 @@ BENCHMARKS: dict[str, Callable[[str, bool], Measurement]] = {
     "gradient.reduced": _gradient_reduced,
     "gradient.reduced.batch": _gradient_reduced_batch,
     "sensitivities.reduced": _sensitivities,
+    "identify.log": identification,
+    "identify.log.distributed": identification,
     "import": _import,
 }
 """Benchmarks by name."""

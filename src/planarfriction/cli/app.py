@@ -202,6 +202,8 @@ def limit_surface(
 @click.option("--noise", metavar="FX,FY,TAU", help="Spread of the measured wrench in N and N m. Default: estimated.")
 @click.option("--plain", is_flag=True, help="Plain LuGre bristles in place of elasto-plastic ones.")
 @click.option("--steady", is_flag=True, help="The logs begin in steady sliding, not at rest.")
+@click.option("--model", default="auto", show_default=True, help="reduced-published, distributed, reduced, or auto.")
+@click.option("--nuisance", metavar="NAMES", help="What the rig may add: delay,bias,load,twist or none. Default: all.")
 @click.option("--starts", type=int, default=4, show_default=True, help="Number of starts of the search.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed that scatters the starts.")
 @click.option("--out", type=FILE, help="Folder for the estimates (JSON) and the residual plot (PNG).")
@@ -217,6 +219,8 @@ def identify(
     noise: str | None,
     plain: bool,
     steady: bool,
+    model: str,
+    nuisance: str | None,
     starts: int,
     seed: int,
     out: Path | None,
@@ -238,6 +242,8 @@ def identify(
         noise=command.parse_noise(noise),
         elasto_plastic=None if plain else ElastoPlastic(),
         begins="steady" if steady else "rest",
+        model=model,
+        nuisance=command.parse_nuisance(nuisance),
         starts=starts,
         seed=seed,
     )

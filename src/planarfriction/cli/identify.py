@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from planarfriction import validation
 from planarfriction.cli import output
-from planarfriction.cli.console import note, print_table, work_progress
+from planarfriction.cli.console import note, work_progress
 from planarfriction.errors import InvalidValueError
 from planarfriction.writing import make_folder, write_text
 
@@ -37,10 +37,7 @@ def identify(
         found = identify_lugre(logs, patch, progress=progress, **options)
     samples = sum(len(log.time) for log in logs)
     title = f"{', '.join(log.name for log in logs)}: {samples} samples, {patch.name}"
-    print_table(title, ["parameter", "estimate", "std. error", "95 % interval", "unit", "verdict"], found.rows())
-    for verdict in found.verdicts:
-        if verdict.parameter == "fit":
-            note(str(verdict))
+    print(title, "", found.table(), sep="\n")
     note(f"{found.starts[0]} of {found.starts[1]} starts ended here")
     if folder is not None:
         _write(found, folder, output.slug(logs[0].name))
@@ -63,6 +60,15 @@ def parse_names(text: str | None) -> tuple[str, ...]:
     from planarfriction.identify.parameters import USUAL, check_names
 
     return USUAL if text is None else check_names([name.strip() for name in text.split(",") if name.strip()])
+
+
+def parse_nuisance(text: str | None) -> tuple[str, ...]:
+    """Names of `--nuisance`, separated by commas; all without it."""
+    from planarfriction.identify.nuisance import GROUPS
+
+    if text is None:
+        return GROUPS
+    return () if text.strip() == "none" else tuple(name.strip() for name in text.split(","))
 
 
 def parse_noise(text: str | None) -> list[float] | None:

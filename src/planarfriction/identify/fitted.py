@@ -3,93 +3,98 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from planarfriction.autodiff import PARAMETERS
 from planarfriction.identify import parameters as known
-from planarfriction.identify.least_squares import Minimum, correlations, covariance
-from planarfriction.identify.parameters import Coordinates
+from planarfriction.identify.choice import Candidate
+from planarfriction.identify.least_squares import correlations
+from planarfriction.identify.nuisance import CHANNELS, Nuisance
 from planarfriction.identify.problem import Problem, mean_load
 from planarfriction.identify.result import Identification, verdicts_on_turns
+from planarfriction.identify.simulators import model_of
 from planarfriction.identify.verdicts import Evidence, judge
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.models import ReducedModelPublished
 from planarfriction.patch import ContactPatch
 
-CHANNELS = (("fx", "N"), ("fy", "N"), ("tau", "N m"))
-
 NO_SLIP = 50.0
 """Factor on the friction coefficients that keeps any contact from slipping."""
 
-HUGE = 1e200
-"""Variance that stands for an infinite one while it is turned into other coordinates."""
 
-
-def assemble(problem: Problem, coordinates: Coordinates, minimum: Minimum, noise, agreement) -> Identification:
-    values = coordinates.values(minimum.x)
-    off, jacobian = problem.linearised(values, noise)
-    still = values * np.where(np.isin(problem.names, ("mu_c", "mu_s")), NO_SLIP, 1.0)
-    spread = _spread(jacobian, coordinates.slopes(minimum.x), ~minimum.at_bound)
-    errors = np.sqrt(np.diag(spread))
+def assemble(
+    best: Candidate, candidates: Sequence[Candidate], skipped: Sequence[str], agreement: tuple[int, int]
+) -> Identification:
+    """The identification of the best of several models."""
+    fit, u = best.fit, best.uncertainty
+    problem, count = fit.problem, len(fit.problem.names)
+    values, rig = problem.split(fit.values)
+    errors = np.sqrt(np.diag(u.covariance))
+    still = fit.values.copy()
+    still[:count] *= np.where(np.isin(problem.names, ("mu_c", "mu_s")), NO_SLIP, 1.0)
+    off = problem.off(fit.values, fit.spread)
     sliding = problem.sliding(values)
-    histories = [_history(problem, i, values, speed) for i, (speed, _) in enumerate(sliding)]
+    shown = problem.shown(fit.values)
+    histories = [_history(problem, i, values, shown[i], speed) for i, (speed, _) in enumerate(sliding)]
     evidence = Evidence(
         names=problem.names,
         values=values,
-        errors=errors,
-        correlations=correlations(spread),
-        at_bound=minimum.at_bound,
-        jacobian=jacobian,
+        errors=errors[:count],
+        correlations=correlations(u.covariance)[:count, :count],
+        at_bound=fit.at_bound[:count],
+        jacobian=u.jacobian[:, :count],
         speeds=np.concatenate([each[0] for each in sliding]),
         spins=np.concatenate([each[1] for each in sliding]),
         loads=np.array([mean_load(log) for log in problem.logs]),
-        without_slip=0.5 * float((problem.off(still, noise) ** 2).sum() - (off**2).sum()),
+        without_slip=0.5 * float((problem.off(still, fit.spread) ** 2).sum() - (off**2).sum()),
         torque=any(log.channels[2] for log in problem.logs),
         largest_coefficient=max(float(np.nanquantile(each["coefficient"], 0.99)) for each in histories),
     )
-    residuals = [
-        ((h["measured"] - h["predicted"]) / noise)[used][:, log.channels]
-        for h, log, used in zip(histories, problem.logs, problem.used, strict=True)
-    ]
     law = _law(problem, values)
+    noise_of_twist = [
+        Nuisance(
+            f"noise_{name}",
+            unit,
+            float(value),
+            float(value / np.sqrt(0.3 * len(log.time))),
+            log.name if several else "",
+        )
+        for log, twist in zip(problem.logs, problem.twists, strict=True)
+        for name, unit, value in zip(("vx", "vy", "omega"), ("m/s", "m/s", "rad/s"), twist.noise, strict=True)
+        for several in [len(problem.logs) > 1]
+    ]
     return Identification(
         names=problem.names,
         values=values,
-        standard_errors=errors,
+        standard_errors=errors[:count],
         correlations=evidence.correlations,
-        verdicts=(*judge(evidence, residuals), *verdicts_on_turns(problem.logs)),
-        noise=noise,
+        verdicts=(*judge(evidence, best, candidates, skipped), *verdicts_on_turns(problem.logs)),
+        noise=fit.noise,
         channels=CHANNELS,
         histories=tuple(histories),
         law=law,
         model=_model(problem, values, law),
         starts=agreement,
+        rig=(*problem.rig.found(rig, errors[count:]), *(noise_of_twist if "twist" in problem.rig.groups else [])),
+        scores=tuple(each.score for each in candidates),
+        chosen=problem.kind,
     )
 
 
-def _spread(jacobian: np.ndarray, slopes: np.ndarray, free: np.ndarray) -> np.ndarray:
-    """Covariance `[F, F]` of the values from derivatives with respect to them and their slopes over the coordinates."""
-    of_coordinates = np.minimum(covariance(jacobian @ slopes, free), HUGE)
-    result = slopes @ of_coordinates @ slopes.T
-    diagonal = np.diag(result)
-    result[np.diag_indices(len(result))] = np.where(diagonal >= 1e-50 * HUGE, np.inf, diagonal)
-    return result
-
-
-def _history(problem: Problem, i: int, values: np.ndarray, speed: np.ndarray) -> dict[str, Any]:
+def _history(problem: Problem, i: int, values: np.ndarray, shown: np.ndarray, speed: np.ndarray) -> dict[str, Any]:
     """What was measured and predicted of log i, with its sliding speeds."""
     log, vector = problem.logs[i], problem.shapes[i].vector(values)
     radius = vector[PARAMETERS.index("contact_radius")]
     force = np.linalg.norm(log.wrench / [1.0, 1.0, radius], axis=1)
     coefficient = force / np.where(log.normal_force > 0.0, log.normal_force, np.nan)
-    predicted = problem.predictions[i].wrenches(vector)
     history = {
         "name": log.name,
         "time": log.time,
         "measured": np.where(log.channels, log.wrench, np.nan),
-        "predicted": predicted,
+        "predicted": shown,
     }
     return {**history, "speed": speed, "coefficient": coefficient}
 
@@ -105,7 +110,7 @@ def _law(problem: Problem, values: np.ndarray) -> LuGre:
     return dataclasses.replace(problem.law, **fields)
 
 
-def _model(problem: Problem, values: np.ndarray, law: LuGre) -> ReducedModelPublished:
+def _model(problem: Problem, values: np.ndarray, law: LuGre) -> Any:
     """The fitted model: the patch scaled about its centre of pressure, or with the fitted soft-finger constants."""
     given = dict(zip(problem.names, values.tolist(), strict=True))
     patch, surface = problem.model.patch, type(problem.model.surface)
@@ -115,11 +120,10 @@ def _model(problem: Problem, values: np.ndarray, law: LuGre) -> ReducedModelPubl
         fitted = ContactPatch(problem.patch.positions, problem.patch.areas, pressure, problem.patch.grid, patch.name)
         return ReducedModelPublished(fitted, law, surface=surface(fitted, normal_force=problem.reference))
     if any(name in known.SHAPE for name in given):
-        centre = patch.centre_of_pressure()
-        scale = given.get("contact_radius", problem.model.surface.contact_radius) / problem.model.surface.contact_radius
+        centre, radius = patch.centre_of_pressure(), float(problem.shapes[0].base[PARAMETERS.index("contact_radius")])
         to = np.array([given.get("centre_x", centre[0]), given.get("centre_y", centre[1])])
-        patch = moved_patch(patch, centre, to, scale)
-    return ReducedModelPublished(patch, law, surface=surface(patch))
+        patch = moved_patch(patch, centre, to, given.get("contact_radius", radius) / radius)
+    return model_of(problem.kind, patch, law, surface)
 
 
 def moved_patch(patch: ContactPatch, centre: np.ndarray, to: np.ndarray, scale: float) -> ContactPatch:

@@ -86,7 +86,7 @@ def _stiffnesses(problem: Any, speeds: list[np.ndarray], mu_c: float) -> np.ndar
 def _cost(problem: Any, values: np.ndarray, noise: np.ndarray) -> float:
     return sum(
         float((((wrench - log.wrench) * (log.channels / noise))[used] ** 2).sum())
-        for wrench, log, used in zip(problem.wrenches(values), problem.logs, problem.used, strict=True)
+        for wrench, log, used in zip(problem.shown(values), problem.logs, problem.used, strict=True)
     )
 
 

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
+import html
+import textwrap
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
+from planarfriction import validation
 from planarfriction.equality import ByValue
+from planarfriction.identify.choice import ModelScore
+from planarfriction.identify.nuisance import Nuisance
 from planarfriction.identify.parameters import ALL
 from planarfriction.laws import LuGre
 
@@ -41,7 +47,16 @@ def verdicts_on_turns(measured: Sequence[Any]) -> list[Verdict]:
     return [Verdict("fit", True, f"{count}, in {', '.join(list(turned)[:3])}{' ...' if len(turned) > 3 else ''}")]
 
 
-@dataclass(frozen=True, eq=False)
+def interval(name: str, value: float, error: float) -> tuple[float, float]:
+    """95 % interval [SI]: symmetric as factors for parameters that are > 0, else as differences."""
+    if ALL[name].logarithmic and value > 0.0:
+        with np.errstate(over="ignore"):
+            factor = float(np.exp(TWO_SIDED * error / value))
+        return float(value / factor), float(value * factor)
+    return max(float(value - TWO_SIDED * error), ALL[name].low), float(value + TWO_SIDED * error)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Identification(ByValue):
     """Parameters that were estimated, in the order asked for; F of them."""
 
@@ -68,6 +83,12 @@ class Identification(ByValue):
     """The fitted friction model."""
     starts: tuple[int, int]
     """How many starts ended in this minimum, and how many there were."""
+    rig: tuple[Nuisance, ...] = ()
+    """What was estimated of the rig: delay, zeros, drift of the load cell, noise of the twist."""
+    scores: tuple[ModelScore, ...] = ()
+    """The models that were fitted."""
+    chosen: str = ""
+    """Name of the model that explains the data best."""
 
     @property
     def residuals(self) -> list[np.ndarray]:
@@ -86,20 +107,33 @@ class Identification(ByValue):
 
     def intervals(self) -> dict[str, tuple[float, float]]:
         """95 % intervals [SI]: symmetric as factors for parameters that are > 0, else as differences."""
-        result = {}
-        for name, value, error in zip(self.names, self.values, self.standard_errors, strict=True):
-            if ALL[name].logarithmic and value > 0.0:
-                with np.errstate(over="ignore"):
-                    factor = float(np.exp(TWO_SIDED * error / value))
-                result[name] = (float(value / factor), float(value * factor))
-            else:
-                low = float(value - TWO_SIDED * error)
-                result[name] = (max(low, ALL[name].low), float(value + TWO_SIDED * error))
-        return result
+        both = zip(self.names, self.values, self.standard_errors, strict=True)
+        return {name: interval(name, value, error) for name, value, error in both}
 
     def identifiable(self, name: str) -> bool:
         """Whether the data tell this parameter."""
         return not any(each.parameter == name and not each.identifiable for each in self.verdicts)
+
+    def residual_correlations(self, lags: int = 50) -> np.ndarray:
+        """Correlations of the residuals over 0 to `lags` samples, `[lags + 1, C]`; those of noise are 0 but for the
+        first."""
+        lags = validation.count("lags", lags)
+        lags = min(lags, *(len(each["time"]) - 2 for each in self.histories))
+        sums = np.zeros((lags + 1, len(self.channels)))
+        for each in self.residuals:
+            left = np.nan_to_num(each[1:])
+            for lag in range(lags + 1):
+                sums[lag] += (left[lag:] * left[: len(left) - lag]).sum(axis=0)
+        return sums / np.where(sums[0] > 0.0, sums[0], 1.0)
+
+    def summary(self) -> str:
+        """The verdict in plain words: what the data tell, and whether the fit can be believed."""
+        told = [name for name in self.names if self.identifiable(name)]
+        lines = [f"Told by the data: {', '.join(told)}." if told else "None of the parameters can be told."]
+        if len(told) < len(self.names):
+            lines[0] += f" Not told: {', '.join(name for name in self.names if name not in told)}."
+        lines += [f"{_sentence(each.reason)}" for each in self.verdicts if each.parameter == "fit"]
+        return "\n".join(textwrap.fill(line, WIDTH) for line in lines)
 
     def rows(self) -> list[list[str]]:
         """Table of text: name, estimate, standard error, 95 % interval, unit, verdict; one row for each parameter."""
@@ -122,14 +156,32 @@ class Identification(ByValue):
         return rows
 
     def table(self) -> str:
-        """The rows as text, with a heading, then the verdicts on the fit."""
-        heading = ["parameter", "estimate", "std. error", "95 % interval", "unit", "verdict"]
-        rows = [heading, *self.rows()]
-        widths = [max(len(row[i]) for row in rows) for i in range(len(heading))]
-        lines = [
-            "  ".join(entry.ljust(width) for entry, width in zip(row, widths, strict=True)).rstrip() for row in rows
+        """The summary, then a table in 80 columns: estimates, 95 % intervals, what to mind, what the rig adds."""
+        lines, remarks, intervals = [], [], self.intervals()
+        for name, value in zip(self.names, self.values, strict=True):
+            told = self.identifiable(name)
+            low, high = intervals[name]
+            shown = f"{low:.4g} .. {high:.4g}" if told else "not identifiable"
+            lines.append(f"{name:<16}{value:>11.5g}   {shown:<26}{ALL[name].unit}".rstrip())
+            reasons = "; ".join(each.reason for each in self.verdicts if each.parameter == name)
+            if reasons:
+                remarks.append(textwrap.fill(f"{name}: {reasons}", WIDTH, subsequent_indent="  "))
+        heading = f"{'parameter':<16}{'estimate':>11}   {'95 % interval':<26}unit"
+        rig = [
+            f"{_short(each):<27}{each.value:>11.3g}   {each.interval[0]:.3g} .. {each.interval[1]:.3g} {each.unit}"
+            for each in self.rig
         ]
-        return "\n".join([*lines, *(str(each) for each in self.verdicts if each.parameter == "fit")])
+        blocks = [self.summary(), "\n".join([heading, *lines]), "\n".join(remarks), "\n".join(["Of the rig:", *rig])]
+        return "\n\n".join(block for block in blocks if block and block != "Of the rig:")
+
+    def __str__(self) -> str:
+        return self.table()
+
+    def __repr__(self) -> str:
+        return self.table()
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{html.escape(self.table())}</pre>"
 
     def to_dict(self) -> dict[str, Any]:
         """Everything but the histories as plain data, ready for JSON (None for what is infinite)."""
@@ -153,6 +205,23 @@ class Identification(ByValue):
             "correlations": {name: row.tolist() for name, row in zip(self.names, self.correlations, strict=True)},
             "verdicts": [str(each) for each in self.verdicts],
             "noise": {name: plain(value) for (name, _), value in zip(self.channels, self.noise, strict=True)},
+            "rig": [
+                {
+                    "name": each.name,
+                    "log": each.log,
+                    "estimate": each.value,
+                    "standard_error": plain(each.error),
+                    "interval_95": [plain(edge) for edge in each.interval],
+                    "unit": each.unit,
+                }
+                for each in self.rig
+            ],
+            "model": self.chosen,
+            "models": [dataclasses.asdict(each) for each in self.scores],
+            "residual_correlations": {
+                name: column.tolist()
+                for (name, _), column in zip(self.channels, self.residual_correlations().T, strict=True)
+            },
             "starts": {"agreeing": self.starts[0], "total": self.starts[1]},
         }
 
@@ -161,3 +230,17 @@ class Identification(ByValue):
         from planarfriction.plots.identification import plot_identification
 
         return plot_identification(self)
+
+
+WIDTH = 80
+"""Columns of a table."""
+
+
+def _sentence(text: str) -> str:
+    """Words as a sentence."""
+    return f"{text[0].upper()}{text[1:]}."
+
+
+def _short(each: Nuisance) -> str:
+    """Name of a quantity of the rig, with its log."""
+    return f"{each.name} ({each.log})"[:26] if each.log else each.name

@@ -7,8 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planarfriction.identify.choice import Candidate, ModelScore, dependence
 from planarfriction.identify.parameters import ALL, SOFT_FINGER
-from planarfriction.identify.result import Verdict
+from planarfriction.identify.result import Verdict, interval
+from planarfriction.identify.uncertainty import Uncertainty
 
 VAGUE = 0.3
 """Standard error, as a share of the estimate, above which a parameter that must be > 0 counts as not told."""
@@ -36,9 +38,6 @@ ONE_LOAD = 1.05
 
 SLIPPED = 12.0
 """Growth of the cost (half the sum of squares) without slip below which the data hold none: 5 standard errors."""
-
-SMALL = 0.5
-"""Residuals smaller than this share of the noise do no harm, whatever their pattern."""
 
 CORRELATED = 0.3
 """Correlation of neighbouring residuals above which they are no noise."""
@@ -76,21 +75,47 @@ class Evidence:
         return float(self.values[self.names.index(name)]) if name in self.names else otherwise
 
 
-def judge(evidence: Evidence, residuals: Sequence[np.ndarray]) -> tuple[Verdict, ...]:
-    """The verdicts on all parameters and on the residuals `[T, C]` of each log."""
-    verdicts = [verdict for i in range(len(evidence.names)) if (verdict := _parameter(evidence, i)) is not None]
-    neighbours = _neighbour_correlation(residuals)
-    size = np.sqrt(np.mean(np.concatenate([each.ravel() for each in residuals]) ** 2))
+def judge(
+    evidence: Evidence, best: Candidate, candidates: Sequence[Candidate], skipped: Sequence[str]
+) -> tuple[Verdict, ...]:
+    """The verdicts on the fit, then on all parameters: where it is rejected, none of them is told."""
+    u, chosen, scores = best.uncertainty, best.score, [each.score for each in candidates]
+    verdicts = [Verdict("fit", not u.rejected, _on_fit(u, chosen))]
+    if len(scores) > 1:
+        others = sorted((each for each in scores if each.model != chosen.model), key=lambda each: each.held_out)
+        told = ", ".join(
+            f"{each.model} {each.held_out:.3g} ({each.held_out - chosen.held_out:+.2g})" for each in others
+        )
+        text = f"{chosen.model} predicts held-out parts best, to {chosen.held_out:.3g} times the noise; {told}"
+        verdicts.append(Verdict("fit", True, text))
+    if skipped:
+        verdicts.append(Verdict("fit", True, f"{', '.join(skipped)}: not tried, as it would take minutes (ask for it)"))
     if not evidence.torque:
         text = "tau is 0 throughout, as of a rig without a torque sensor: the estimates follow from the force alone"
         verdicts.append(Verdict("fit", True, text))
-    if neighbours > CORRELATED and size > SMALL:
-        factor = np.sqrt((1.0 + neighbours) / (1.0 - min(neighbours, 0.999)))
-        text = f"neighbouring residuals are correlated ({neighbours:.2f}), so the model or the measurement is off in a "
-        verdicts.append(
-            Verdict("fit", False, f"{text}regular way and the true errors are some {factor:.1f} times larger")
-        )
+    for i, name in enumerate(evidence.names):
+        verdict = _parameter(evidence, i)
+        if verdict is None or verdict.identifiable:
+            low, high = interval(name, evidence.values[i], evidence.errors[i])
+            if u.rejected:
+                verdict = Verdict(name, False, f"{chosen.model} does not explain the data, so this follows its error")
+            elif reason := dependence(name, (low, high), chosen, scores):
+                verdict = Verdict(name, False, reason)
+        if verdict is not None:
+            verdicts.append(verdict)
     return tuple(verdicts)
+
+
+def _on_fit(u: Uncertainty, chosen: ModelScore) -> str:
+    """The test of the fit in words."""
+    size = np.sqrt(u.excess)
+    if not u.rejected:
+        return f"{chosen.model} explains the data: what it leaves is {size:.2f} times the noise of the sensors"
+    text = f"{chosen.model} is rejected: what it leaves is {size:.2f} times the noise of the sensors, where "
+    text += f"{np.sqrt(u.limit):.2f} may be chance"
+    if u.neighbours > CORRELATED:
+        text += f", and hangs together in time (correlation {u.neighbours:.2f})"
+    return f"{text}; the patch, the kind of bristles or the measurement is off, and intervals are no more than a hint"
 
 
 def _parameter(evidence: Evidence, i: int) -> Verdict | None:
@@ -100,7 +125,8 @@ def _parameter(evidence: Evidence, i: int) -> Verdict | None:
         return Verdict(
             name, False, f"the contact never slips, friction reaches {evidence.largest_coefficient:.2g} of the load"
         )
-    if evidence.at_bound[i]:
+    rests_on_zero = kind.low == 0.0 and value <= 1e-6 and not kind.logarithmic
+    if evidence.at_bound[i] and not rests_on_zero:
         return _on_bound(evidence, i)
     size = abs(value)
     seen = np.abs(evidence.jacobian[:, i]).max() * size
@@ -161,8 +187,6 @@ def _on_bound(evidence: Evidence, i: int) -> Verdict:
     if name == "mu_s":
         reason = speed_gap(evidence.speeds, evidence.value("v_s", 1e-3)) or "no friction above mu_c was seen"
         return Verdict(name, False, f"{reason}: equal to mu_c")
-    if ALL[name].low == 0.0 and evidence.values[i] <= 1e-6:
-        return Verdict(name, True, f"0 fits best, at most {1.96 * evidence.errors[i]:.3g} {ALL[name].unit}")
     return Verdict(name, False, f"the fit ran into the bound {evidence.values[i]:.3g} {ALL[name].unit}")
 
 
@@ -189,10 +213,3 @@ def speed_gap(speeds: np.ndarray, around: float) -> str:
     if not np.isfinite(high):
         return f"no sample above {1e3 * low:.2g} mm/s"
     return f"no sample between {1e3 * low:.2g} and {1e3 * high:.2g} mm/s"
-
-
-def _neighbour_correlation(residuals: Sequence[np.ndarray]) -> float:
-    """Correlation of residuals one sample apart, over all logs and channels."""
-    products = sum(float((each[1:] * each[:-1]).sum()) for each in residuals)
-    squares = sum(float((each[1:] ** 2 + each[:-1] ** 2).sum()) / 2 for each in residuals)
-    return products / squares if squares > 0.0 else 0.0

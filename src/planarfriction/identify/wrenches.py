@@ -5,19 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify import parameters as known
 from planarfriction.identify.checks import check_logs, with_findings
+from planarfriction.identify.choice import Candidate, best_of
 from planarfriction.identify.fitted import assemble
 from planarfriction.identify.guess import guess_starts
-from planarfriction.identify.least_squares import Minimum, minimise
 from planarfriction.identify.logs import Log, as_logs
-from planarfriction.identify.parameters import Coordinates
-from planarfriction.identify.problem import Problem, first_noise, given_noise
+from planarfriction.identify.nuisance import GROUPS, check_groups
+from planarfriction.identify.problem import Problem, given_noise
 from planarfriction.identify.result import Identification
+from planarfriction.identify.search import search
+from planarfriction.identify.sensors import first_noise
+from planarfriction.identify.simulators import MODELS
+from planarfriction.identify.uncertainty import uncertainty
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
 from planarfriction.patch import ContactPatch
@@ -28,8 +30,8 @@ BEGINS = ("rest", "steady")
 START_MU_S = 1.2
 """Static coefficient that a search starts with unless it is told otherwise: above `mu_c`, free to move."""
 
-NOISE_ROUNDS = 2
-"""Times that the noise is estimated from the residuals, each with a fit after it."""
+USUAL_EVALUATIONS, PATIENCE = 60, 120.0
+"""Evaluations that a search takes, and the time [s] that "auto" has for one of its models."""
 
 
 def identify_lugre(
@@ -37,6 +39,8 @@ def identify_lugre(
     patch: ContactPatch,
     *,
     parameters: Sequence[str] = known.USUAL,
+    model: str = "auto",
+    nuisance: Sequence[str] = GROUPS,
     start: LuGre | Mapping[str, float] | None = None,
     elasto_plastic: ElastoPlastic | float | None = ElastoPlastic(0.9),  # noqa: B008 (frozen)
     surface: type[LimitSurface] = LimitSurfaceTablePublished,
@@ -47,10 +51,10 @@ def identify_lugre(
     seed: int = 0,
     progress: Callable[[str], None] | None = None,
 ) -> Identification:
-    """Estimate parameters of the reduced LuGre model from logs of twist and wrench.
+    """Estimate parameters of a LuGre contact from logs of twist and wrench, and which model explains them.
 
-    Bounded nonlinear least squares over the wrenches of the fixed-step roll-out, with exact derivatives of that
-    roll-out; residuals over the noise, parameters as logarithms where they must be > 0.
+    Bounded nonlinear least squares over the wrenches of a fixed-step roll-out; residuals over the noise, parameters as
+    logarithms where they must be > 0. What the rig adds (delay, zeros, drift) is estimated along.
 
     Parameters
     ----------
@@ -63,14 +67,20 @@ def identify_lugre(
     parameters
         Names of what to estimate: fields of `LuGre`, `breakaway_ratio`, `contact_radius`, `centre_x`, `centre_y`, and
         `c`, `n`, `k` or `k_per_newton` of a `SoftFinger`. What is not named keeps the value of `start`.
+    model
+        "reduced-published", "distributed", "reduced", or "auto": the one of them that predicts held-out parts best;
+        those whose fit would take minutes are left out.
+    nuisance
+        What the rig may add: "delay" between motion and wrench, "bias" (zeros of the wrench and their drift), "load"
+        (scale and drift of the load cell), "twist" (noise of the twist). All unless switched off.
     start
         Where to begin, and the values of what is held: a law, or values by name. What is missing is guessed.
     elasto_plastic
         Kind of bristles (of a `start` that is a law: its own).
     surface
-        Class of the limit surface.
+        Class of the limit surface of "reduced-published".
     noise
-        Spread of the measured fx, fy [N] and tau [N m]; None estimates each from the residuals.
+        Spread of the measured fx, fy [N] and tau [N m]; None estimates each from its jitter.
     begins
         "rest": every log begins with relaxed bristles. "steady": with those of long sliding at its first twist.
     refine
@@ -89,36 +99,51 @@ def identify_lugre(
     if not isinstance(patch, ContactPatch):
         raise InvalidValueError("patch", "be a ContactPatch", type(patch).__name__)
     refuse_anisotropy(patch, "identify_lugre")
+    kinds = _kinds(validation.choice("model", model, ("auto", *MODELS)), patch, names)
+    groups = check_groups(nuisance)
     validation.choice("begins", begins, BEGINS)
     starts = validation.count("starts", starts)
     findings = check_logs(logs, patch, names)
     law, given = _start_law(start, elasto_plastic)
-    problem = Problem(
-        logs, patch, names, law, surface, begins, 1 if refine is None else validation.count("refine", refine)
-    )
+    steps = 1 if refine is None else validation.count("refine", refine)
     say = (lambda text: None) if progress is None else progress
-    say("looking for starts")
     spread = first_noise(logs) if noise is None else given_noise(noise)
-    candidates = guess_starts(problem, given, starts=starts, seed=validation.count("seed", seed, 0), noise=spread)
-    coordinates = Coordinates(names, candidates[0], law.mu_c)
-    points = [coordinates.of(each) for each in candidates]
-    minimum = minimise(problem.residuals(coordinates, spread), points, coordinates.bounds(), progress=progress)
-    agreement = (minimum.agreeing, len(points))
-    minimum, spread = _settled(problem, coordinates, minimum, spread, noise is None)
-    while refine is None and problem.coarse(coordinates.values(minimum.x), spread):
-        problem.refine_twice()
-        say(f"{problem.refine} steps between two samples")
-        minimum, spread = _settled(problem, coordinates, minimum, spread, noise is None)
-    return with_findings(assemble(problem, coordinates, minimum, spread, agreement), logs, findings)
+    # The quickest model leads: it finds where the others begin.
+    points, found, skipped, rig = [], [], [], None
+    for kind in dict.fromkeys((MODELS[0], *kinds)):
+        problem = Problem(logs, patch, names, law, surface, begins, steps, kind, groups)
+        if not points:
+            say(f"{kind}: looking for starts")
+            chance = validation.count("seed", seed, 0)
+            points = guess_starts(problem, given, starts=starts, seed=chance, noise=spread)
+        elif model == "auto" and problem.work * USUAL_EVALUATIONS > PATIENCE:
+            skipped.append(kind)
+            continue
+        fit = search(
+            problem,
+            points,
+            noise=spread,
+            known_noise=noise is not None,
+            fixed_steps=refine is not None,
+            rig=rig,
+            say=lambda text, kind=kind: say(f"{kind}: {text}"),
+        )
+        if kind in kinds:
+            found.append(Candidate(fit, uncertainty(fit)))
+        if rig is None:
+            agreement, points, rig = fit.starts, [fit.values[: len(names)]], fit.values[len(names) :]
+    return with_findings(assemble(best_of(found), found, skipped, agreement), logs, findings)
 
 
-def _settled(problem, coordinates, minimum, noise, unknown: bool) -> tuple[Minimum, np.ndarray]:
-    """The minimum from a minimum, with the noise that its residuals have if that is `unknown`."""
-    for _ in range(NOISE_ROUNDS if unknown else 1):
-        if unknown:
-            noise = problem.noise(coordinates.values(minimum.x))
-        minimum = minimise(problem.residuals(coordinates, noise), [minimum.x], coordinates.bounds())
-    return minimum, noise
+def _kinds(model: str, patch: ContactPatch, names: Sequence[str]) -> tuple[str, ...]:
+    """Names of the models to fit: of patches that follow their load only the published one knows how."""
+    follows = patch.depends_on_load or any(name in known.SOFT_FINGER for name in names)
+    if follows and model not in ("auto", MODELS[0]):
+        rule = f"be {MODELS[0]!r} where the patch changes with the load"
+        raise InvalidValueError("model", rule, model)
+    if follows:
+        return MODELS[:1]
+    return MODELS if model == "auto" else (model,)
 
 
 def _start_law(start: Any, elasto_plastic: ElastoPlastic | float | None) -> tuple[LuGre, dict[str, float] | None]:

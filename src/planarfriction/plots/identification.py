@@ -24,7 +24,7 @@ def plot_identification(result: Identification) -> style.PlotFigure:
 
     Residuals of a good fit fill the band of two spreads of the noise and show no pattern. With wrenches, the friction
     coefficient over the sliding speed is drawn below with the fitted Stribeck curve: where it has no samples, the data
-    tell nothing.
+    tell nothing. Beside it the correlation of the residuals over time, which that of noise leaves at zero.
     """
     with_speed = "speed" in result.histories[0]
     rows = len(result.channels)
@@ -42,7 +42,8 @@ def plot_identification(result: Identification) -> style.PlotFigure:
         axes.set_xlabel("time, one after another [s]" if several else "time [s]")
     figure.axes[1].set_title("(measured - fitted) / noise", fontsize="medium")
     if with_speed:
-        _draw_speeds(figure.add_subplot(grid[rows, :]), result)
+        _draw_speeds(figure.add_subplot(grid[rows, 0]), result)
+        _draw_correlations(figure.add_subplot(grid[rows, 1]), result)
     handles, labels = figure.axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper left", ncols=2, frameon=False, fontsize="small")
     return figure
@@ -100,4 +101,18 @@ def _draw_speeds(axes: Any, result: Identification) -> None:
     axes.set(xscale="log", xlabel="sliding speed [mm/s]", ylabel="friction / load [-]")
     axes.set_ylim(0.0, 1.1 * max(steady.max(), np.quantile(coefficient, 0.995)))
     axes.legend(frameon=False, fontsize="small", loc="lower right")
+    style.tidy(axes)
+
+
+def _draw_correlations(axes: Any, result: Identification) -> None:
+    """Correlations of the residuals of each channel over the lag, with the band that those of noise stay in."""
+    values = result.residual_correlations()
+    samples = sum(len(each["time"]) for each in result.histories)
+    step = float(np.median(np.diff(result.histories[0]["time"])))
+    axes.axhspan(-2.0 / np.sqrt(samples), 2.0 / np.sqrt(samples), color="0.92", zorder=0)
+    for i, (name, _) in enumerate(result.channels):
+        if values[:, i].any():
+            axes.plot(1e3 * step * np.arange(len(values)), values[:, i], color=style.PALETTE[i], label=name)
+    axes.set(xlabel="lag [ms]", ylabel="correlation of residuals [-]")
+    axes.legend(frameon=False, fontsize="small")
     style.tidy(axes)
