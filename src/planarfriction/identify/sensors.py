@@ -21,11 +21,8 @@ MEDIAN = 1.4826
 CLIP, CLIP_VARIANCE, CLIPPED = 3.0, 0.9733, 5
 """Spreads beyond which a difference is left out, the variance of a normal distribution cut there, and rounds."""
 
-LEAST_NOISE = 1e-6
-"""Noise below this share of the largest value of a channel is none that a sensor has."""
-
-FIRST = 1e-3
-"""Least noise that a search begins with, as a share of the largest value: less makes it stiff."""
+LEAST_NOISE = 1e-3
+"""Noise below this share of the largest force or torque is none that sensors have, nor what is between samples."""
 
 QUIET = 1e-3
 """Noise of the twist below this share of its root mean square is left as it is."""
@@ -58,8 +55,7 @@ def least_noise(logs: Sequence[Log]) -> np.ndarray:
 
 def first_noise(logs: Sequence[Log]) -> np.ndarray:
     """Noise `[3]` of the wrenches to begin a search with."""
-    largest = np.max([np.abs(log.wrench).max(axis=0) for log in logs], axis=0)
-    return np.maximum(wrench_noise(logs, [log.wrench for log in logs]), FIRST * largest)
+    return wrench_noise(logs, [log.wrench for log in logs])
 
 
 def wrench_noise(logs: Sequence[Log], offs: Sequence[np.ndarray]) -> np.ndarray:

@@ -18,6 +18,9 @@ VAGUE = 0.3
 TOGETHER = 0.98
 """Correlation above which two parameters are told only together."""
 
+WELL = 0.02
+"""Standard error, as a share of the estimate, below which it does not matter what an estimate hangs together with."""
+
 UNSEEN = 1.0
 """A parameter whose whole size moves no sample by this many spreads of the noise is not seen."""
 
@@ -143,7 +146,8 @@ def _parameter(evidence: Evidence, i: int) -> Verdict | None:
         if not evidence.torque and not {name, other}.isdisjoint(OF_TORQUE):
             text = f"told only together with {other} (correlation {correlation:.2f}): the torque would tell them apart"
             return Verdict(name, False, f"{text}, and tau is 0 throughout")
-        return Verdict(name, True, f"hangs together with {other} (correlation {correlation:.2f})")
+        if error > WELL * size:
+            return Verdict(name, True, f"hangs together with {other} (correlation {correlation:.2f})")
     return None
 
 

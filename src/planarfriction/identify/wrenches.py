@@ -103,8 +103,8 @@ def identify_lugre(
     groups = check_groups(nuisance)
     validation.choice("begins", begins, BEGINS)
     starts = validation.count("starts", starts)
-    findings = check_logs(logs, patch, names)
     law, given = _start_law(start, elasto_plastic)
+    findings = check_logs(logs, patch, names)
     steps = 1 if refine is None else validation.count("refine", refine)
     say = (lambda text: None) if progress is None else progress
     spread = first_noise(logs) if noise is None else given_noise(noise)
