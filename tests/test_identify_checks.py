@@ -207,13 +207,13 @@ def solution():
 
 
 def test_a_simulation_gives_its_law_back(solution):
-    """Twists between samples are taken as linear: 1e-3 of the wrench, which moves the bristles' numbers most."""
+    """Twists between samples are taken as smooth, and forces jump: 1e-3 of the wrench, which moves gamma by 5 %."""
     begin = dataclasses.replace(LAW, mu_c=0.4)
     log = Log.from_solution(solution)
     found = identify_lugre(log, PATCH, start=begin, starts=1, model="reduced-published", nuisance=())
     expected = {name: getattr(LAW, name) for name in found.names if name != "contact_radius"}
     for name, value in expected.items():
-        assert found.estimates[name] == pytest.approx(value, rel=0.05), name
+        assert found.estimates[name] == pytest.approx(value, rel=0.08), name
     assert found.estimates["mu_c"] == pytest.approx(LAW.mu_c, rel=2e-3)
     radius = pf.ReducedModelPublished(PATCH, LAW).surface.contact_radius
     assert found.estimates["contact_radius"] == pytest.approx(radius, rel=2e-3)
