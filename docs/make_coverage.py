@@ -82,7 +82,7 @@ def truth(row: Row) -> tuple[np.ndarray, np.ndarray, np.ndarray, dict[str, float
     model = pf.DistributedModel(patch, LAW) if row.model == "distributed" else pf.ReducedModelPublished(patch, LAW)
     steps = pf.rollout(model, None, 0.5 * (twist[1:] + twist[:-1]), LOAD, time[1])
     values = {name: getattr(LAW, name) for name in NAMES[:-1]}
-    radius = patch.contact_radius() if row.model == "distributed" else model.surface.contact_radius
+    radius = model.surface.contact_radius if isinstance(model, pf.ReducedModelPublished) else patch.contact_radius()
     return time, twist, np.vstack([np.zeros(3), steps.wrenches]), {**values, "contact_radius": float(radius)}
 
 
