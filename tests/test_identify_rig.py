@@ -128,13 +128,14 @@ def test_derivatives_of_all_models_agree_with_differences(kind, log):
 
 
 def test_a_delay_is_found_and_makes_the_damping_uncertain(log):
-    """The wrench comes 2 ms late. With the delay free sigma_1 is told several times worse: that is the truth."""
-    late = np.vstack([np.repeat(log.wrench[:1], 2, axis=0), log.wrench[:-2]])
+    """The wrench comes 4 ms late. With the delay free sigma_1 is told several times worse: that is the truth."""
+    late = np.vstack([np.repeat(log.wrench[:1], 4, axis=0), log.wrench[:-4]])
     seen = noisy(changed(log, wrench=late), 1)
     options = {"starts": 1, "model": "reduced-published"}
     found, without = identify_lugre(seen, PATCH, **options), identify_lugre(seen, PATCH, nuisance=("bias",), **options)
     delay = rig(found)["delay"]
-    assert delay.value == pytest.approx(2e-3, abs=max(3.0 * delay.error, 1e-4))
+    assert delay.value == pytest.approx(4e-3, abs=3.0 * delay.error)
+    assert delay.error < 4e-4
     for name, value in truth().items():
         assert found.estimates[name] == pytest.approx(value, abs=4.0 * found.errors[name]), name
     assert abs(without.estimates["sigma_1"] - 30.0) > 4.0 * found.errors["sigma_1"] or not without.identifiable(
@@ -172,7 +173,9 @@ def test_noise_of_the_twist_is_reported_and_widens(log):
     seen = changed(log, twist=log.twist + spread * np.random.default_rng(5).standard_normal(log.twist.shape))
     found, quiet = identify_lugre(noisy(seen, 4), PATCH, **FEW), identify_lugre(noisy(log, 4), PATCH, **FEW)
     assert rig(found)["noise_vx"].value == pytest.approx(spread[0], rel=0.15)
-    assert found.errors["contact_radius"] > 1.2 * quiet.errors["contact_radius"]
+    # without the errors of the twists in the intervals, 1.7 and 1.9 times those of a quiet twist
+    assert found.errors["mu_c"] > 2.5 * quiet.errors["mu_c"]
+    assert found.errors["contact_radius"] > 2.5 * quiet.errors["contact_radius"]
     assert found.estimates["contact_radius"] == pytest.approx(
         quiet.estimates["contact_radius"], abs=4.0 * found.errors["contact_radius"]
     )
