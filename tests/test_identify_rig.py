@@ -220,6 +220,18 @@ def test_nothing_is_told_by_a_model_that_is_rejected(distributed):
     assert found.residual_correlations()[1].max() > 0.5
 
 
+def test_a_load_cell_that_only_the_fit_needs_rejects_it():
+    """Samples of 1 ms lose what stiff bristles do: delay and load cell would make up for it, with 5 % off mu_c."""
+    model = pf.ReducedModelPublished(PATCH, pf.LuGre(mu_c=0.8, sigma_0=1e5, sigma_1=200.0, elasto_plastic=0.9))
+    log = Log.from_solution(pf.simulate(pf.scenes.driven(model), rtol=1e-7, save_every=1e-3))
+    given = {"parameters": ("mu_c", "mu_s", "contact_radius"), "start": model.law, "model": "reduced-published"}
+    found = identify_lugre(log, PATCH, starts=1, **given)
+    assert abs(rig(found)["load_scale"].value) > 0.02
+    assert found.scores[0].rejected and not any(map(found.identifiable, found.names))
+    assert "load cell" in found.summary()
+    assert identify_lugre(log, PATCH, starts=1, nuisance=(), **given).estimates["mu_c"] == pytest.approx(0.8, rel=2e-3)
+
+
 def test_a_table_fits_eighty_columns_and_a_repl(chosen):
     lines = chosen.table().splitlines()
     assert max(map(len, lines)) <= 80

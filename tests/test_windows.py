@@ -136,8 +136,13 @@ def test_sensitivities_in_windows_and_in_parts(monkeypatch, name):
     monkeypatch.setattr(module, "_NUMBERS", 1.0)  # one step at a time
     parts = pf.autodiff.scene_sensitivities(scene, t_end=0.025, save_every=1e-3)
     for one in (windows, parts):
-        for field in ("time", "motion", "wrenches", "d_motion", "d_wrenches"):
+        for field in ("time", "motion", "wrenches"):
             np.testing.assert_array_equal(getattr(one, field), getattr(whole, field), err_msg=field)
+        # derivatives go over several steps at once, fewer where a window or a part ends: to their own error
+        for field in ("d_motion", "d_wrenches"):
+            wanted = getattr(whole, field)
+            error = np.abs(getattr(one, field) - wanted) / np.abs(wanted).max(axis=(0, -1), keepdims=True)
+            assert error.max() < 2e-5, field
     assert np.abs(whole.d_motion).max() > 0.0
 
 

@@ -139,6 +139,11 @@ class Rig:
                 widths[j] = np.hypot(SCALE, self.range_of_drift(values) / EDGE)
         return widths
 
+    def strain(self, values: np.ndarray) -> float:
+        """How many times its width the scale of the load cell was moved: friction cannot tell it, so a model erred."""
+        at = [j for j, column in enumerate(self.columns) if column.name == "load_scale"]
+        return float(np.abs(values / self.with_drift(values))[at].max(initial=0.0))
+
     def found(self, values: np.ndarray, errors: np.ndarray) -> tuple[Nuisance, ...]:
         """The estimates with their errors, as records."""
         several = len(self.logs) > 1

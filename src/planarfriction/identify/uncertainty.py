@@ -17,7 +17,8 @@ EXCESS = 1.25
 """Mean square of the residuals over that of the noise that is still put down to the noise's own estimate."""
 
 CHANCE = 4.0
-"""Standard deviations of that mean square, for independent residuals, that are put down to chance."""
+"""Standard deviations of that mean square, for independent residuals, that are put down to chance; and of the scale of
+the load cell."""
 
 BLOCKS, FOLDS = 20, 5
 """Blocks that each log is cut into, every fifth of which is held out in turn."""
@@ -50,6 +51,8 @@ class Uncertainty:
     """Mean square of the residuals over that of the noise [-]."""
     limit: float
     """Above which excess the fit is rejected."""
+    strain: float
+    """How many times its width the scale of the load cell was moved [-]."""
     neighbours: float
     """Correlation of residuals one sample apart [-]."""
     held_out: np.ndarray
@@ -57,8 +60,8 @@ class Uncertainty:
 
     @property
     def rejected(self) -> bool:
-        """Whether the fit leaves more than the noise."""
-        return bool(self.excess > self.limit)
+        """Whether the fit leaves more than the noise, or only a load cell that nobody has would make it do so."""
+        return bool(self.excess > self.limit or self.strain > CHANCE)
 
     @property
     def score(self) -> float:
@@ -89,6 +92,7 @@ def uncertainty(fit: Fit) -> Uncertainty:
         jacobian,
         excess,
         EXCESS + CHANCE * np.sqrt(2.0 / measured),
+        problem.rig.strain(fit.values[count:]),
         neighbours,
         _held_out(fit, off, jacobian, pull),
     )

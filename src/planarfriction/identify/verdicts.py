@@ -114,8 +114,12 @@ def _on_fit(u: Uncertainty, chosen: ModelScore) -> str:
     size = np.sqrt(u.excess)
     if not u.rejected:
         return f"{chosen.model} explains the data: what it leaves is {size:.2f} times the noise of the sensors"
-    text = f"{chosen.model} is rejected: what it leaves is {size:.2f} times the noise of the sensors, where "
-    text += f"{np.sqrt(u.limit):.2f} may be chance"
+    if u.excess > u.limit:
+        text = f"{chosen.model} is rejected: what it leaves is {size:.2f} times the noise of the sensors, where "
+        text += f"{np.sqrt(u.limit):.2f} may be chance"
+    else:
+        usual = f"off by {u.strain:.0f} times what is usual"
+        text = f"{chosen.model} is rejected: it fits only with a load cell that is {usual}"
     if u.neighbours > CORRELATED:
         text += f", and hangs together in time (correlation {u.neighbours:.2f})"
     return f"{text}; the patch, the kind of bristles or the measurement is off, and intervals are no more than a hint"
