@@ -3,9 +3,14 @@
 Needs MJX and JAX: `pip install 'planarfriction[mjx]'`.
 """
 
+import contextlib as _contextlib
+import sys as _sys
+
 try:
     import jax as _jax  # noqa: F401
-    import mujoco.mjx as _mjx  # noqa: F401
+
+    with _contextlib.redirect_stdout(_sys.stderr):  # MJX prints which of its back ends it misses
+        import mujoco.mjx as _mjx  # noqa: F401
 except ImportError:
     from planarfriction.errors import MissingExtraError
 
