@@ -1,4 +1,4 @@
-"""What the comparison of simulators says: its tables, our numbers beside what they have to keep, and its findings."""
+"""What the comparison of simulators says: its tables, our numbers beside those of theory, and its findings."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ OWN = "impratio 10"
 TOUCHING = tuple((name, NATIVE[name]) for name in (OWN, "noslip 10"))
 """Settings that a disc slides with, on its face and on one point."""
 
-BARS = {
+TOLERANCES = {
     "creep": (1e-3, "um/s"), "turning": (1e-6, "deg/s"), "displacement": (1.0, "um"), "slip": (1.0, "um"),
     "distance": (0.05, "%"), "angle": (0.2, "%"), "end": (2.5, "mm"), "turned": (0.5, "deg"),
 }  # fmt: skip
-"""What patches have to keep."""
+"""How far patches may be from the closed form, or from the converged run, before it is said."""
 
 Numbers = dict[str, dict[str, dict[str, float]]]
 """Case -> way -> quantity."""
@@ -71,8 +71,8 @@ def comparisons(found: Mapping[str, Any]) -> list[Comparison]:
             value,
             0.0,
             reference="converged" if kind in ("end", "turned") else "closed form",
-            tolerance=BARS[kind][0],
-            unit=BARS[kind][1],
+            tolerance=TOLERANCES[kind][0],
+            unit=TOLERANCES[kind][1],
             cause="the time step, and the normal contact of the simulator",
         )
         for quantity, value, kind in rows
