@@ -9,12 +9,9 @@ import click
 from click.shell_completion import CompletionItem
 
 from planarfriction import __version__
-from planarfriction.families import MODELS, PUBLISHED_PATCHES, SCENES, SURFACES, Family
-
-PATCH_HELP = (
-    f"{', '.join(PUBLISHED_PATCHES)}, another shape that its width describes (disc, rectangle), or a pressure map "
-    "(.csv, .npy, grey image; row 0 is the top) with --cell-size."
-)
+from planarfriction.cli.options import FILE, PATCH_HELP
+from planarfriction.cli.plan import plan
+from planarfriction.families import MODELS, SCENES, SURFACES, Family
 
 AUTO_PARTS = "as many as the shape of the patch asks for, 4 to 8"
 
@@ -50,19 +47,6 @@ def complete_scene(context: object, parameter: object, incomplete: str) -> list[
 def complete_parts(context: object, parameter: object, incomplete: str) -> list[CompletionItem]:
     """What `--parts` may be."""
     return [CompletionItem("auto", help=AUTO_PARTS)] if "auto".startswith(incomplete) else []
-
-
-class FilePath(click.Path):
-    """A path that the commands check themselves, and that is one."""
-
-    def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Path:
-        """The path; an empty text, as of a variable that a script has not set, is none."""
-        if not str(value) or "\0" in str(value):
-            self.fail("the name of a file or a folder is needed, got an empty one", param, ctx)
-        return Path(str(value))
-
-
-FILE = FilePath()
 
 
 @click.group(
@@ -383,3 +367,6 @@ def simulators(out: Path, quick: bool, again: bool) -> int:
     from planarfriction.cli import simulators as command
 
     return command.compare(out, quick=quick, again=again)
+
+
+app.add_command(plan)

@@ -38,7 +38,8 @@ def assemble(
     off = problem.off(fit.values, fit.spread)
     sliding = problem.sliding(values)
     shown = problem.shown(fit.values)
-    histories = [_history(problem, i, values, shown[i], speed) for i, (speed, _) in enumerate(sliding)]
+    unseen = _unseen(best)
+    histories = [_history(problem, i, values, shown[i], unseen[i], speed) for i, (speed, _) in enumerate(sliding)]
     evidence = Evidence(
         names=problem.names,
         values=values,
@@ -84,7 +85,21 @@ def assemble(
     )
 
 
-def _history(problem: Problem, i: int, values: np.ndarray, shown: np.ndarray, speed: np.ndarray) -> dict[str, Any]:
+def _unseen(best: Candidate) -> list[np.ndarray]:
+    """Wrenches `[T, 3]` of each log as fits predict them that saw neither the sample nor its block."""
+    fit, result, at = best.fit, [], 0
+    for log, used, spread in zip(fit.problem.logs, fit.problem.used, fit.spread, strict=True):
+        wrench, size = np.full_like(log.wrench, np.nan), 3 * len(log.time[used])
+        off = best.uncertainty.unseen[at : at + size].reshape(-1, 3)
+        wrench[used] = np.where(log.channels, log.wrench[used] + off * spread[used], np.nan)
+        result.append(wrench)
+        at += size
+    return result
+
+
+def _history(
+    problem: Problem, i: int, values: np.ndarray, shown: np.ndarray, unseen: np.ndarray, speed: np.ndarray
+) -> dict[str, Any]:
     """What was measured and predicted of log i, with its sliding speeds."""
     log, vector = problem.logs[i], problem.shapes[i].vector(values)
     radius = vector[PARAMETERS.index("contact_radius")]
@@ -95,6 +110,7 @@ def _history(problem: Problem, i: int, values: np.ndarray, shown: np.ndarray, sp
         "time": log.time,
         "measured": np.where(log.channels, log.wrench, np.nan),
         "predicted": shown,
+        "held_out": unseen,
     }
     return {**history, "speed": speed, "coefficient": coefficient}
 

@@ -28,6 +28,9 @@ DELAY, LONGEST = 0.01, 0.05
 BIAS, ZERO_DRIFT = 0.1, 0.05
 """Spreads of the zeros and of their drift, as shares of the largest value of the channel."""
 
+LEAST = 1e-3
+"""Share of the largest force that either of its channels counts as, also where it stays at 0."""
+
 DRIFT = (0.05, 0.02, 0.02)
 """Spreads of the drift of the load cell by degree [-]; its first is half of the change over the log."""
 
@@ -78,6 +81,7 @@ class Rig:
             columns.append(_Column("load_scale", "-", None, SCALE))
         for i, log in enumerate(logs):
             largest = np.abs(log.wrench).max(axis=0)
+            largest[:2] = np.maximum(largest[:2], LEAST * largest[:2].max())
             for k, (channel, unit) in enumerate(CHANNELS):
                 if "bias" in groups and log.channels[k]:
                     columns.append(_Column(f"bias_{channel}", unit, i, BIAS * largest[k]))

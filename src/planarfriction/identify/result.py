@@ -75,8 +75,9 @@ class Identification(ByValue):
     channels: tuple[tuple[str, str], ...]
     """Name and unit of the measured channels, such as ("fx", "N"), `[C]`."""
     histories: tuple[Mapping[str, Any], ...] = field(repr=False)
-    """Of each log or slide: "name", "time" `[T]`, "measured" (NaN for what was not) and "predicted" `[T, C]`, and for
-    logs with wrenches "speed" `[T]` [m/s], the sliding speed `|V_S|`, and "coefficient" `[T]` [-], friction by load."""
+    """Of each log or slide: "name", "time" `[T]`, "measured" (NaN for what was not) and "predicted" `[T, C]`. For logs
+    with wrenches also "held_out" `[T, C]`, as fits predict it that saw neither the sample nor its block (NaN at a start
+    from rest), "speed" `[T]` [m/s], the sliding speed `|V_S|`, and "coefficient" `[T]` [-], friction by load."""
     law: LuGre
     """The fitted law; parameters that were not asked for are as given."""
     model: Any = field(repr=False)

@@ -57,6 +57,8 @@ class Uncertainty:
     """Correlation of residuals one sample apart [-]."""
     held_out: np.ndarray
     """Root mean square over the noise of what a fit without it leaves of each fold [-], `[FOLDS]`."""
+    unseen: np.ndarray
+    """Scaled residuals `[M]` of each sample where a fit without its fold predicts it."""
 
     @property
     def rejected(self) -> bool:
@@ -94,7 +96,7 @@ def uncertainty(fit: Fit) -> Uncertainty:
         EXCESS + CHANCE * np.sqrt(2.0 / measured),
         problem.rig.strain(fit.values[count:]),
         neighbours,
-        _held_out(fit, off, jacobian, pull),
+        *_held_out(fit, off, jacobian, pull),
     )
 
 
@@ -174,8 +176,8 @@ def _of_twists(fit: Fit, jacobian: np.ndarray, pull: np.ndarray, free: np.ndarra
     return shifts.T @ shifts / len(shifts)
 
 
-def _held_out(fit: Fit, off, jacobian, pull) -> np.ndarray:
-    """Root mean square of the residuals of each fold where the others alone were fitted, to first order."""
+def _held_out(fit: Fit, off, jacobian, pull) -> tuple[np.ndarray, np.ndarray]:
+    """Residuals of each fold where the others alone were fitted, to first order: root mean squares, and all `[M]`."""
     count = len(fit.values)
     fold, seen = [], []
     for rows, log in _by_log(fit, off[:, None]):
@@ -186,11 +188,11 @@ def _held_out(fit: Fit, off, jacobian, pull) -> np.ndarray:
     size = np.maximum(np.linalg.norm(np.concatenate([jacobian, pull]), axis=0), np.finfo(float).tiny)
     slopes, base = jacobian / size, pull / size
     whole = slopes.T @ slopes + base.T @ base + RIDGE * np.eye(count)
-    result = []
+    result, unseen = [], np.empty_like(off)
     for k in range(FOLDS):
         out = fold == k
         kept = whole - slopes[out].T @ slopes[out]
         move = np.linalg.lstsq(kept, slopes[out].T @ off[out], rcond=None)[0]
-        left = (off[out] + slopes[out] @ move)[seen[out]]
-        result.append(np.sqrt(np.mean(left**2)))
-    return np.array(result)
+        unseen[out] = off[out] + slopes[out] @ move
+        result.append(np.sqrt(np.mean(unseen[out & seen] ** 2)))
+    return np.array(result), unseen

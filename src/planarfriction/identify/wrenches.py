@@ -146,6 +146,11 @@ def _kinds(model: str, patch: ContactPatch, names: Sequence[str]) -> tuple[str, 
     return MODELS if model == "auto" else (model,)
 
 
+def guessed_law(values: Mapping[str, float]) -> LuGre:
+    """The law that a search without data would begin with, for values by name; usual ones where there are none."""
+    return _start_law(values, ElastoPlastic(0.9))[0]
+
+
 def _start_law(start: Any, elasto_plastic: ElastoPlastic | float | None) -> tuple[LuGre, dict[str, float] | None]:
     """The law that holds what is not estimated, and the values given by name (None: a whole law was given)."""
     if type(start) is LuGre:

@@ -24,12 +24,13 @@ def plot_identification(result: Identification) -> style.PlotFigure:
 
     Residuals of a good fit fill the band of two spreads of the noise and show no pattern. With wrenches, the friction
     coefficient over the sliding speed is drawn below with the fitted Stribeck curve: where it has no samples, the data
-    tell nothing. Beside it the correlation of the residuals over time, which that of noise leaves at zero.
+    tell nothing. Beside it the correlation of the residuals over time, which that of noise leaves at zero. At the
+    bottom what fits that saw neither a sample nor its block predict of it, over what was measured.
     """
     with_speed = "speed" in result.histories[0]
     rows = len(result.channels)
-    figure = style.new_figure(9.6, 1.75 * rows + (3.0 if with_speed else 0.6))
-    grid = figure.add_gridspec(rows + with_speed, 2, height_ratios=[1.0] * rows + [1.5] * with_speed)
+    figure = style.new_figure(9.6, 1.75 * rows + (5.8 if with_speed else 0.6))
+    grid = figure.add_gridspec(rows + 2 * with_speed, 2, height_ratios=[1.0] * rows + [1.5, 1.6] * with_speed)
     place = _places(result)
     left = right = None
     for i in range(rows):
@@ -44,6 +45,9 @@ def plot_identification(result: Identification) -> style.PlotFigure:
     if with_speed:
         _draw_speeds(figure.add_subplot(grid[rows, 0]), result)
         _draw_correlations(figure.add_subplot(grid[rows, 1]), result)
+        below = grid[rows + 1, :].subgridspec(1, rows)
+        for i in range(rows):
+            _draw_held_out(figure.add_subplot(below[0, i]), result, i)
     handles, labels = figure.axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper left", ncols=2, frameon=False, fontsize="small")
     return figure
@@ -115,4 +119,24 @@ def _draw_correlations(axes: Any, result: Identification) -> None:
             axes.plot(1e3 * step * np.arange(len(values)), values[:, i], color=style.PALETTE[i], label=name)
     axes.set(xlabel="lag [ms]", ylabel="correlation of residuals [-]")
     axes.legend(frameon=False, fontsize="small")
+    style.tidy(axes)
+
+
+def _draw_held_out(axes: Any, result: Identification, i: int) -> None:
+    """What fits predict of samples that they did not see, over what was measured; a good one keeps to the diagonal."""
+    name, unit = result.channels[i]
+    measured, held_out = (
+        np.concatenate([each[key][:, i] for each in result.histories]) for key in ("measured", "held_out")
+    )
+    seen = np.isfinite(measured) & np.isfinite(held_out)
+    if not seen.any():
+        axes.text(0.5, 0.5, f"{name} was not measured", ha="center", transform=axes.transAxes)
+        return
+    measured, held_out = measured[seen], held_out[seen]
+    shown = style.unit_for(KINDS[unit], measured)
+    every = max(1, len(measured) // MOST_POINTS)
+    axes.plot(shown.factor * measured[::every], shown.factor * held_out[::every], ".", color="0.6", markersize=2.0)
+    edge = shown.factor * float(np.abs(measured).max())
+    axes.plot([-edge, edge], [-edge, edge], color=style.PALETTE[1], linewidth=0.9)
+    axes.set(xlabel=f"measured {name} [{shown.label}]", ylabel=f"held-out prediction [{shown.label}]")
     style.tidy(axes)

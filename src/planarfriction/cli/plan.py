@@ -1,0 +1,110 @@
+"""`planarfriction plan`: the motion that tells most of what the logs so far do not."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from planarfriction.cli.options import FILE, PATCH_HELP
+
+if TYPE_CHECKING:
+    from planarfriction.identify import Log
+    from planarfriction.laws import LuGre
+    from planarfriction.patch import ContactPatch
+
+
+@click.command(
+    short_help="Which motion to measure next, to identify.",
+    help="""Rank motions by the information that they are expected to add for `planarfriction identify`.
+
+    Each LOG is one as that command reads; what it tells is fitted first. Without any, the law is a guess: --start.
+    Prints gains in bits, and the errors that are expected after the best motion; --out writes that motion.
+
+    \b
+    Examples:
+      planarfriction plan --patch disc --start mu_c=0.5 --start sigma_0=2e4 --out next.csv
+      planarfriction plan slow.csv --patch disc --speed 0.03 --spin 2
+      planarfriction plan slow.csv --wanted sigma_1
+    """,
+)
+@click.argument("logs", metavar="[LOG]...", type=FILE, nargs=-1)
+@click.option("--patch", "patch_name", metavar="PATCH", help=f"Contact patch: {PATCH_HELP} Default: Circle.")
+@click.option("--cell-size", type=float, help="Side of a cell of a pressure map in m.")
+@click.option("--width", type=float, help="Width of a patch that is given by name in m. Default: 0.02.")
+@click.option("--parameters", metavar="NAMES", help="What to estimate, separated by commas. Default: the law and r.")
+@click.option("--wanted", metavar="NAMES", help="Those whose information counts. Default: all.")
+@click.option("--start", metavar="NAME=VALUE", multiple=True, help="Guess of a parameter, or value of what is held.")
+@click.option("--normal-force", type=float, multiple=True, help="Load in N, may be repeated. Default: the logs', or 1.")
+@click.option("--speed", type=float, default=0.05, show_default=True, help="Largest speed in m/s.")
+@click.option("--spin", type=float, help="Largest angular speed in rad/s. Default: the rim as fast as --speed.")
+@click.option("--duration", type=float, default=2.0, show_default=True, help="Length of a motion in s.")
+@click.option("--rate", type=float, default=1000.0, show_default=True, help="Samples per second.")
+@click.option(
+    "--noise", metavar="FX,FY,TAU", help="Spread of the measured wrench in N and N m. Default: the logs', 1 %."
+)
+@click.option("--out", type=FILE, help="Table of the best motion to write (.csv).")
+def plan(
+    logs: tuple[Path, ...],
+    patch_name: str | None,
+    cell_size: float | None,
+    width: float | None,
+    parameters: str | None,
+    wanted: str | None,
+    start: tuple[str, ...],
+    normal_force: tuple[float, ...],
+    speed: float,
+    spin: float | None,
+    duration: float,
+    rate: float,
+    noise: str | None,
+    out: Path | None,
+) -> int:
+    """Plan (the help above is what users see)."""
+    from planarfriction.cli import identify, output
+    from planarfriction.cli.console import note
+    from planarfriction.cli.patches import WIDTH, find_patch
+    from planarfriction.identify import Log, candidate_motions, plan_motion
+    from planarfriction.identify.logs import columns_of
+
+    patch = find_patch(patch_name, cell_size=cell_size, width=WIDTH if width is None else width)
+    names, values, spread = identify.parse_names(parameters), identify.parse_start(start), identify.parse_noise(noise)
+    if out is not None:
+        output.check_table(out)
+    measured = [Log.from_csv(path, normal_force=normal_force[0] if normal_force else None) for path in logs]
+    patch, law = _known(measured, patch, names, values, spread)
+    loads = list(normal_force) or sorted({float(f"{log.normal_force.mean():.3g}") for log in measured}) or [1.0]
+    motions = candidate_motions(patch, law, normal_force=loads, speed=speed, spin=spin, duration=duration, rate=rate)
+    found = plan_motion(
+        patch,
+        law,
+        logs=measured,
+        motions=motions,
+        parameters=names,
+        wanted=None if wanted is None else [name.strip() for name in wanted.split(",")],
+        noise=spread,
+    )
+    print(found.table())
+    if out is not None:
+        output.write_csv(out, columns_of(found.best))
+        note(f"wrote {out}, with the wrench that is expected")
+    return 0
+
+
+def _known(
+    logs: list[Log], patch: ContactPatch, names: tuple[str, ...], start: dict[str, float], noise: list[float] | None
+) -> tuple[ContactPatch, LuGre]:
+    """Patch and law as the logs tell them, or as guessed where there are none."""
+    from planarfriction.cli.console import note, work_progress
+    from planarfriction.identify import identify_lugre
+    from planarfriction.identify.wrenches import guessed_law
+
+    if not logs:
+        return patch, guessed_law(start)
+    with work_progress("identifying") as progress:
+        found = identify_lugre(
+            logs, patch, parameters=names, start=start, noise=noise, model="reduced-published", progress=progress
+        )
+    note(found.summary().replace("\n", " "))
+    return found.model.patch, found.law
