@@ -97,14 +97,15 @@ def _known(
 ) -> tuple[ContactPatch, LuGre]:
     """Patch and law as the logs tell them, or as guessed where there are none."""
     from planarfriction.cli.console import note, work_progress
-    from planarfriction.identify import identify_lugre
+    from planarfriction.identify import identify_lugre, told_so_far
     from planarfriction.identify.wrenches import guessed_law
 
+    law = guessed_law(start)
     if not logs:
-        return patch, guessed_law(start)
+        return patch, law
     with work_progress("identifying") as progress:
         found = identify_lugre(
             logs, patch, parameters=names, start=start, noise=noise, model="reduced-published", progress=progress
         )
     note(found.summary().replace("\n", " "))
-    return found.model.patch, found.law
+    return told_so_far(found, patch, law)

@@ -7,7 +7,7 @@ which motion tells what is still missing.
 from planarfriction.identify.candidates import candidate_motions
 from planarfriction.identify.logs import Log, differentiated
 from planarfriction.identify.motion import identify_motion
-from planarfriction.identify.planning import MotionPlan, plan_motion
+from planarfriction.identify.planning import MotionPlan, plan_motion, told_so_far
 from planarfriction.identify.result import Identification, Verdict
 from planarfriction.identify.slides import Slide, SlidingBody, fit_start, predict_slide
 from planarfriction.identify.wrenches import identify_lugre
@@ -26,4 +26,5 @@ __all__ = [
     "identify_motion",
     "plan_motion",
     "predict_slide",
+    "told_so_far",
 ]

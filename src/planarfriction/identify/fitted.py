@@ -91,7 +91,7 @@ def _unseen(best: Candidate) -> list[np.ndarray]:
     for log, used, spread in zip(fit.problem.logs, fit.problem.used, fit.spread, strict=True):
         wrench, size = np.full_like(log.wrench, np.nan), 3 * len(log.time[used])
         off = best.uncertainty.unseen[at : at + size].reshape(-1, 3)
-        wrench[used] = np.where(log.channels, log.wrench[used] + off * spread[used], np.nan)
+        wrench[used] = log.wrench[used] + off * np.where(log.channels, spread[used], np.nan)
         result.append(wrench)
         at += size
     return result

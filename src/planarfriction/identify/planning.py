@@ -12,6 +12,7 @@ Sources: Lindley 1956 (gain of information); Chaloner and Verdinelli 1995 (its f
 
 from __future__ import annotations
 
+import dataclasses
 import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -28,7 +29,7 @@ from planarfriction.identify.logs import Log, as_logs
 from planarfriction.identify.nuisance import GROUPS, check_groups
 from planarfriction.identify.parameters import ALL, PRIOR, SHAPE_PRIOR, Coordinates
 from planarfriction.identify.problem import Problem, block_diag, given_noise
-from planarfriction.identify.result import WIDTH
+from planarfriction.identify.result import WIDTH, Identification
 from planarfriction.identify.sensors import first_noise
 from planarfriction.laws import LuGre
 from planarfriction.limit_surface import LimitSurfaceTablePublished
@@ -43,6 +44,10 @@ REFINE = 4
 
 KNOWN = 0.5
 """Standard error over the value above which a parameter counts as unknown."""
+
+
+FAINT = 1e-14
+"""Share of the largest information below which rounding decides."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -116,8 +121,7 @@ def plan_motion(
     Parameters
     ----------
     patch, law
-        The contact as far as it is known: a guess before the first log, then the patch and the law of an
-        `Identification` (`found.model.patch`, `found.law`).
+        The contact as far as it is known: a guess before the first log, then `told_so_far`.
     logs
         What was measured so far; none before the first.
     motions
@@ -175,6 +179,26 @@ def plan_motion(
     )
 
 
+def told_so_far(found: Identification, patch: ContactPatch, law: LuGre) -> tuple[ContactPatch, LuGre]:
+    """The patch and the law to plan with: what `found` knows to better than a half, the rest as in `patch` and `law`.
+
+    A value of `law` that lies outside the interval of `found` moves to the middle of that.
+    """
+    validation.instance("found", found, Identification, "an Identification")
+    validation.instance("law", law, LuGre, "a LuGre law")
+    good = [name for name, value in found.estimates.items() if found.errors[name] < KNOWN * abs(value)]
+    fields = {name: found.estimates[name] for name in good if name in known.LAW and name != "breakaway_ratio"}
+    for name, (low, high) in found.intervals().items():
+        if name not in (*good, "breakaway_ratio") and name in known.LAW and not low <= getattr(law, name) <= high:
+            fields[name] = 0.5 * (low + high)
+    if "breakaway_ratio" in good:
+        fields["elasto_plastic"] = found.law.elasto_plastic
+    fields["mu_s"] = max(fields.get("mu_s", law.mu_s), fields.get("mu_c", law.mu_c))
+    shape = {*known.SHAPE, *known.SOFT_FINGER} & set(found.names)
+    moved = bool(shape) and shape <= {*good, "centre_x", "centre_y"}
+    return (found.model.patch if moved else patch), dataclasses.replace(law, **fields)
+
+
 class _Task:
     """The information of logs about the coordinates `[F]` of the contact and what all logs share of the rig `[S]`."""
 
@@ -227,7 +251,9 @@ class _Task:
     def covariance(self, information: np.ndarray) -> np.ndarray:
         """Covariance `[F, F]` of the coordinates of the contact."""
         size = 1.0 / np.sqrt(np.diag(information))
-        inverse = np.linalg.inv(information * np.outer(size, size)) * np.outer(size, size)
+        strengths, axes = np.linalg.eigh(information * np.outer(size, size))
+        strengths = np.maximum(strengths, FAINT * strengths[-1])
+        inverse = (axes / strengths) @ axes.T * np.outer(size, size)
         return inverse[: len(self.names), : len(self.names)]
 
     def errors(self, covariance: np.ndarray) -> np.ndarray:
