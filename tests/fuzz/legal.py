@@ -27,12 +27,13 @@ SKIPPED = {
     "FrictionError": "an error",
     "identify.identify_motion": "fits for seconds; its logs are attacked as files",
     "identify.identify_lugre": "fits for seconds; its logs are attacked as files",
+    "identify.told_so_far": "takes what a fit returns",
 }
 """Not attacked, and why."""
 
 RECORDS = """
     Rollout RolloutGradient RolloutSensitivities RolloutStates RolloutTangent SceneSensitivities Identification Verdict
-    Solution
+    MotionPlan Solution
     SurfaceComparison ModelJacobians PackedModel StepJacobians Statistics Integration
     LimitSurface FrictionLaw FrictionModel Pressure
 """
@@ -157,6 +158,15 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "identify.Log.from_motion": {"wrench": TWISTS},
     "identify.SlidingBody": {"gravity": 9.81},
     "identify.Slide": {"time": TIMES, "pose": TWISTS, "twist": None},
+    "identify.plan_motion": {
+        "logs": (),
+        "motions": Fresh(lambda: objects()["log"]),
+        "parameters": ("mu_c",),
+        "wanted": ("mu_c",),
+        "nuisance": (),
+        "noise": (1e-3, 1e-3, 1e-5),
+    },
+    "identify.candidate_motions": {"duration": 0.5, "rate": 500.0},
     "identify.fit_start": {"body": Fresh(lambda: pf.identify.SlidingBody(0.2, 1e-4)), "noise": (1e-3, 1e-3, 0.02)},
     "identify.predict_slide": {"body": Fresh(lambda: pf.identify.SlidingBody(0.2, 1e-4))},
     "patch.surface_error": {"normal_force": None},

@@ -23,6 +23,7 @@ LEGAL = {
     "run": ["in-hand", "--model", "reduced-published", "--patch", "Line", "--t-end", "0.02"],
     "limit-surface": ["--patch", "Line"],
     "identify": ["log.csv", "--patch", "Line", "--parameters", "mu_c", "--starts", "1"],
+    "plan": ["--patch", "Line", "--parameters", "mu_c", "--duration", "0.2"],
     "reproduce": ["--list"],
     "bench": ["--only", "nothing"],
 }

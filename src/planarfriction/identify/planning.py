@@ -165,7 +165,7 @@ def plan_motion(
     for each in candidates:
         shown = task.expected(each)
         expected.append(shown)
-        after = task.covariance(so_far + task.of_logs((shown,), task.groups))
+        after = task.covariance(so_far + task.of_logs((task.measured(shown),), task.groups))
         gains.append(_entropy(start, pick) - _entropy(after, pick))
         errors.append(task.errors(after))
     order = np.argsort(-np.array(gains), kind="stable")
@@ -231,10 +231,13 @@ class _Task:
         return self.problem([Log(time, np.ones((10, 3)), np.ones((10, 3)), 1.0)], self.groups)
 
     def expected(self, motion: Log) -> Log:
-        """The motion with its wrenches, each off by its noise: a channel of zeros would count as not measured."""
-        problem = self.problem([Log(motion.time, motion.twist, np.ones_like(motion.twist), motion.normal_force)], ())
-        wrench = problem.shown(self.values)[0] + np.where(np.isfinite(self.noise), self.noise, 0.0)
-        return Log(motion.time, motion.twist, wrench, motion.normal_force, motion.name)
+        """The motion with its wrenches."""
+        problem = self.problem([dataclasses.replace(motion, wrench=np.ones_like(motion.twist))], ())
+        return dataclasses.replace(motion, wrench=problem.shown(self.values)[0])
+
+    def measured(self, log: Log) -> Log:
+        """The log with wrenches off by their noise: a torque of 0 throughout would count as one that nobody measured."""
+        return dataclasses.replace(log, wrench=log.wrench + np.where(np.isfinite(self.noise), self.noise, 0.0))
 
     def of_logs(self, logs: Sequence[Log], groups: Sequence[str]) -> np.ndarray:
         """Information `[F + S, F + S]` of logs, with what each adds of its own estimated along."""
