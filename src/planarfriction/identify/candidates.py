@@ -81,7 +81,7 @@ def candidate_motions(
         turn = speed / float(patch.contact_radius(load)) if spin is None else validation.positive("spin", spin)
         for name, twist in _twists(time, speed, turn, law.mu_s / law.sigma_0, rate).items():
             called = f"{name}, {load:g} N" if len(loads) > 1 else name
-            result.append(Log(time, twist, np.zeros_like(twist), load, called))
+            result.append(Log(time, twist, np.zeros_like(twist), np.full_like(time, load), called))
     return tuple(result)
 
 

@@ -187,7 +187,9 @@ def told_so_far(found: Identification, patch: ContactPatch, law: LuGre) -> tuple
     validation.instance("found", found, Identification, "an Identification")
     validation.instance("law", law, LuGre, "a LuGre law")
     good = [name for name, value in found.estimates.items() if found.errors[name] < KNOWN * abs(value)]
-    fields = {name: found.estimates[name] for name in good if name in known.LAW and name != "breakaway_ratio"}
+    fields: dict[str, Any] = {
+        name: found.estimates[name] for name in good if name in known.LAW and name != "breakaway_ratio"
+    }
     for name, (low, high) in found.intervals().items():
         if name not in (*good, "breakaway_ratio") and name in known.LAW and not low <= getattr(law, name) <= high:
             fields[name] = 0.5 * (low + high)
@@ -228,7 +230,7 @@ class _Task:
 
     def _probe(self) -> Problem:
         time = np.linspace(0.0, 1.0, 10)
-        return self.problem([Log(time, np.ones((10, 3)), np.ones((10, 3)), 1.0)], self.groups)
+        return self.problem([Log(time, np.ones((10, 3)), np.ones((10, 3)), np.ones(10))], self.groups)
 
     def expected(self, motion: Log) -> Log:
         """The motion with its wrenches."""
@@ -236,7 +238,7 @@ class _Task:
         return dataclasses.replace(motion, wrench=problem.shown(self.values)[0])
 
     def measured(self, log: Log) -> Log:
-        """The log with wrenches off by their noise: a torque of 0 throughout would count as one that nobody measured."""
+        """The log with wrenches off by their noise: a torque of 0 throughout would count as not measured."""
         return dataclasses.replace(log, wrench=log.wrench + np.where(np.isfinite(self.noise), self.noise, 0.0))
 
     def of_logs(self, logs: Sequence[Log], groups: Sequence[str]) -> np.ndarray:
