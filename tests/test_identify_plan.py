@@ -118,6 +118,8 @@ def test_the_table_fits_80_columns(motions):
         ({"noise": (1.0, 0.0, 1.0)}, "noise"),
         ({"nuisance": ["lag"]}, "nuisance"),
         ({"motions": []}, "Log"),
+        ({"motions": 3}, "Log"),
+        ({"parameters": 3}, "parameters must be a list"),
     ],
 )
 def test_what_is_wrong_is_one_line(options, words):
@@ -126,7 +128,8 @@ def test_what_is_wrong_is_one_line(options, words):
 
 
 @pytest.mark.parametrize(
-    "options", [{"speed": 0.0}, {"spin": -1.0}, {"duration": 0.01}, {"rate": 1e9}, {"normal_force": 0}]
+    "options",
+    [{"speed": 0.0}, {"spin": -1.0}, {"duration": 0.01}, {"rate": 1e9}, {"normal_force": 0}, {"normal_force": []}],
 )
 def test_motions_that_no_rig_makes_are_refused(options):
     with pytest.raises(InvalidValueError):

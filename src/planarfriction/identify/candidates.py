@@ -16,6 +16,9 @@ from planarfriction.patch import ContactPatch
 SAMPLES = 100, 100_000
 """Fewest samples that show a motion, and most that a plan is made for."""
 
+LOADS = 20
+"""Most loads of a plan."""
+
 SINES = (2.3, 1.7, 3.1)
 """Frequencies of vx, vy and omega [Hz]: no two periods meet again soon."""
 
@@ -61,14 +64,15 @@ def candidate_motions(
     Raises
     ------
     InvalidValueError
-        A number that is not > 0, or fewer than 100 or more than 100000 samples.
+        A number that is not > 0, more than 20 loads, or fewer than 100 or more than 100000 samples.
     """
     if not isinstance(patch, ContactPatch):
         raise InvalidValueError("patch", "be a ContactPatch", type(patch).__name__)
     validation.instance("law", law, LuGre, "a LuGre law")
-    loads = [
-        validation.positive("normal_force", each) for each in np.ravel(validation.numbers("normal_force", normal_force))
-    ]
+    given = validation.numbers("normal_force", normal_force)
+    if given.ndim > 1 or not 1 <= given.size <= LOADS:
+        raise InvalidValueError("normal_force", f"be one load or a list of up to {LOADS}", f"shape {given.shape}")
+    loads = [validation.positive("normal_force", each) for each in given.reshape(-1)]
     speed, duration, rate = (
         validation.positive(name, value) for name, value in (("speed", speed), ("duration", duration), ("rate", rate))
     )

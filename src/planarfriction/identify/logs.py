@@ -145,7 +145,7 @@ class Log(ByValue):
 
 def as_logs(log: Log | Sequence[Log]) -> tuple[Log, ...]:
     """One log or several as a tuple."""
-    logs = (log,) if isinstance(log, Log) else tuple(log)
+    logs = (log,) if isinstance(log, Log) else tuple(log) if isinstance(log, Sequence) else ()
     if not logs or not all(isinstance(each, Log) for each in logs):
         raise InvalidValueError("log", "be a Log or a list of them", log)
     return logs

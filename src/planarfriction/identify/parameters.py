@@ -73,9 +73,8 @@ SHAPE_PRIOR = 1.0
 
 def check_names(names: Sequence[str], known: Collection[str] = tuple(ALL)) -> tuple[str, ...]:
     """The names, each one of the `known` and given once."""
-    names = (names,) if isinstance(names, str) else tuple(names)
+    names = tuple(validation.choices("parameters", (names,) if isinstance(names, str) else names, known))
     for name in names:
-        validation.choice("parameters", name, known)
         if names.count(name) > 1:
             raise InvalidValueError("parameters", "hold each name once", f"{name!r} {names.count(name)} times")
     if not names:

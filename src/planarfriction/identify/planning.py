@@ -148,7 +148,7 @@ def plan_motion(
     validation.instance("law", law, LuGre, "a LuGre law")
     if "breakaway_ratio" in names and law.elasto_plastic is None:
         raise InvalidValueError("parameters", "hold breakaway_ratio only for elasto-plastic bristles", names)
-    groups, before = check_groups(nuisance), () if logs == () or logs == [] else as_logs(logs)
+    groups, before = check_groups(nuisance), () if isinstance(logs, (list, tuple)) and not logs else as_logs(logs)
     chosen = names if wanted is None else known.check_names(wanted, names)
     if motions is None:
         loads = sorted({float(f"{np.median(log.normal_force):.3g}") for log in before}) or [1.0]
