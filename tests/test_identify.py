@@ -235,7 +235,7 @@ def test_json_and_plot(log, tmp_path):
     figure = found.plot()
     figure.savefig(tmp_path / "residuals.png")
     assert (tmp_path / "residuals.png").read_bytes().startswith(b"\x89PNG")
-    assert len(figure.axes) == 11  # three channels twice, the speeds and the correlations
+    assert len(figure.axes) == 11  # three channels three times, speeds, correlations
 
 
 def write(path, log, **changes):
