@@ -163,7 +163,7 @@ def test_derivatives_end_where_a_slide_stops():
 
 def test_wrong_input_is_named():
     scene = slide("ellipsoid")
-    with pytest.raises(InvalidValueError, match="names must be one of mu, r, mass, inertia, load"):
+    with pytest.raises(InvalidValueError, match="parameters must be one of mu, r, mass, inertia, load"):
         scene_sensitivities(scene, ("my",))
     with pytest.raises(InvalidValueError, match=r"t_end must be at most the scene's 0\.4 s"):
         scene_sensitivities(scene, t_end=1.0)

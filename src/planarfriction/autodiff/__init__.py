@@ -6,6 +6,7 @@ wrench by the parameters. All are derivatives of the steps themselves, not of th
 with differences of `rollout` to rounding. Kinks: `planarfriction.kernels.bristle_step`.
 """
 
+from planarfriction.autodiff.drives import SCENE_PARAMETERS
 from planarfriction.autodiff.parameters import PARAMETERS, parameter_names, parameters_of
 from planarfriction.autodiff.rollouts import (
     Rollout,
@@ -19,7 +20,7 @@ from planarfriction.autodiff.rollouts import (
     rollout_states,
     rollout_tangent,
 )
-from planarfriction.autodiff.scene import SCENE_PARAMETERS, SceneSensitivities, scene_sensitivities
+from planarfriction.autodiff.scene import SceneSensitivities, scene_sensitivities
 
 __all__ = [
     "PARAMETERS",

@@ -2,39 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.autodiff.drives import Columns
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError, SolverError
 from planarfriction.kernels import rosenbrock, tangent
 from planarfriction.kernels.body import System
 from planarfriction.kernels.integration import Output, run_of
-from planarfriction.kernels.tangent import Path
+from planarfriction.kernels.tangent import Drives, Path
 from planarfriction.patch.metric import refuse_anisotropy
 from planarfriction.scenes.packing import Windows
 from planarfriction.scenes.scene import Scene
 from planarfriction.scenes.simulation import recording_times
 from planarfriction.solvers import RODAS4
 from planarfriction.solvers.structured import start_of
-
-SCENE_PARAMETERS = {
-    "mu": tangent.FRICTION,
-    "r": tangent.SIZE,
-    "mass": tangent.MASS,
-    "inertia": tangent.INERTIA,
-    "load": tangent.LOAD,
-}
-"""What `scene_sensitivities` knows: factors, 1 as the scene is, of
-
-- `mu`: mu_c and mu_s of every contact;
-- `r`: the size of every patch, about the origin of its contact frame (positions, contact radius, second moment);
-- `mass`, `inertia`: of the body, forces held (gravity pulls in proportion to the mass);
-- `load`: every normal force, patches keeping the shape that they have.
-"""
 
 _SHARE, _POWER = 0.1, 2.0 / 3.0
 """Accuracy of each step of the derivatives, relative and in natural scales: a share of a power of `rtol`."""
@@ -48,13 +34,16 @@ _LEAST_NODES = 16
 
 @dataclass(frozen=True, eq=False)
 class SceneSensitivities(ByValue):
-    """A motion and its derivatives with respect to P factors.
+    """A motion and its derivatives with respect to P numbers.
 
-    A factor is 1 as the scene is: divided by a parameter's value it is the derivative with respect to the parameter.
+    Parameters are factors, 1 as the scene is: divided by a parameter's value it is the derivative with respect to the
+    parameter. Knots and components of the start have the units of the signal and of the state.
     """
 
     names: tuple[str, ...]
-    """The factors."""
+    """What they are with respect to; `fingers.normal_force[2]` is knot 2 of a signal."""
+    columns: dict[str, slice]
+    """Where the P derivatives of a parameter, a signal (all its knots) or a component of the start stand."""
     time: np.ndarray
     """`[M]` [s]"""
     motion: np.ndarray
@@ -69,14 +58,22 @@ class SceneSensitivities(ByValue):
 
 def scene_sensitivities(
     scene: Scene,
-    names: Sequence[str] = ("mu", "r", "mass", "load"),
+    parameters: Sequence[str] = ("mu", "r", "mass", "load"),
     *,
+    signals: Mapping[str, Sequence[float]] | None = None,
+    initial: Sequence[str] = (),
     t_end: float | None = None,
     rtol: float = 1e-9,
     atol: float | None = None,
     save_every: float | None = None,
 ) -> SceneSensitivities:
-    """Derivatives of a simulated motion with respect to factors on the scene's parameters (see `SCENE_PARAMETERS`).
+    """Derivatives of a simulated motion with respect to the scene's parameters, its signals and its start.
+
+    `parameters` are factors (see `SCENE_PARAMETERS`). `signals` gives knots [s] by the name of a signal: `force`,
+    `velocity`, or `NAME.normal_force` for a contact of that name. The derivative is that with respect to a number added
+    to the signal at the knot, joined in time as the signal's own samples are (`hold`): `sum_k d_k hat_k(t)`. At the
+    times of its samples it is the derivative with respect to their values. Patches keep the shape that they have.
+    `initial` names components of the body's start: vx, vy, omega, x, y, theta.
 
     The scene is simulated with tight tolerances (`atol` as in `simulate`; default `rtol`). Along the accepted steps the
     variational equation `s' = J s + df/dp` is solved with the solver's own analytic Jacobian, by an L-stable method of
@@ -94,8 +91,7 @@ def scene_sensitivities(
     """
     if not isinstance(scene, Scene):
         raise InvalidValueError("scene", "be a Scene", type(scene).__name__)
-    names = validation.choices("names", names, SCENE_PARAMETERS)
-    chosen = np.array([SCENE_PARAMETERS[name] for name in names], int)
+    columns = Columns(scene, parameters, signals, initial)
     end = scene.t_end if t_end is None else validation.positive("t_end", t_end)
     if end > scene.t_end:
         raise InvalidValueError("t_end", f"be at most the scene's {scene.t_end:g} s", end)
@@ -105,10 +101,11 @@ def scene_sensitivities(
     rtol = validation.positive("rtol", rtol)
     absolute = rtol if atol is None else validation.positive("atol", atol)
     times = recording_times(end, every)
-    windows = Windows(scene, end, times=times, sensitivities=True)
-    derivatives = _Derivatives(windows, times, chosen, rtol)
+    windows = Windows(scene, end, times=times, sensitivities=True, marks=columns.marks)
+    derivatives = _Derivatives(windows, times, columns, rtol)
+    columns.start(scene, windows, derivatives.slope)
     _integrate(windows, derivatives, rtol, absolute * windows.natural)
-    return SceneSensitivities(tuple(names), *derivatives.recorded())
+    return SceneSensitivities(columns.names, columns.of, *derivatives.recorded())
 
 
 def _integrate(windows: Windows, derivatives: _Derivatives, rtol: float, atol: np.ndarray) -> None:
@@ -118,6 +115,7 @@ def _integrate(windows: Windows, derivatives: _Derivatives, rtol: float, atol: n
     for system in windows:
         run = run_of(system, RODAS4, derivatives.output, now, rtol=rtol, atol=atol)
         now.cursor[0], outcome = 0, rosenbrock.PAUSED
+        derivatives.columns.enter(system)
         while outcome == rosenbrock.PAUSED:
             nodes, outcome = tangent.follow(run.address, path)
             derivatives.carry(system, path, nodes, int(now.cursor[1]))
@@ -131,14 +129,14 @@ def _integrate(windows: Windows, derivatives: _Derivatives, rtol: float, atol: n
 class _Derivatives:
     """The derivatives of a motion, carried along its steps as they come, and what is recorded of both."""
 
-    def __init__(self, windows: Windows, times: np.ndarray, parameters: np.ndarray, rtol: float) -> None:
-        n, count, many, instants = len(windows.state), len(parameters), len(windows.models), len(times)
+    def __init__(self, windows: Windows, times: np.ndarray, columns: Columns, rtol: float) -> None:
+        n, count, many, instants = len(windows.state), len(columns.names), len(windows.models), len(times)
         body, wrench, load = np.empty((instants, 6)), np.empty((instants, many, 3)), np.empty((instants, many))
         self.output = Output(times, body, wrench, load, np.empty((0, 0)))
         """What the integration of the motion records."""
-        self._parameters, self._accuracy = parameters, _SHARE * rtol**_POWER
+        self.columns, self._accuracy = columns, _SHARE * rtol**_POWER
         self._space, self._atol = tangent.slopes_for(count, n), self._accuracy * windows.natural
-        self._slope, self._state, self._scratch = np.zeros((count, n)), np.empty(n), np.empty((2, n))
+        self.slope, self._state, self._scratch = np.zeros((count, n)), np.empty(n), np.empty((2, n))
         self._d_body, self._d_wrench = np.zeros((instants, 6, count)), np.zeros((instants, many, 3, count))
         self._count, self._wrench = 0, np.empty((many, 3))
 
@@ -151,30 +149,34 @@ class _Derivatives:
             piece, since, reach = int(pieces[last]), float(path.since[first]), float(path.since[last])
             begin, length = breaks[piece], breaks[piece + 1] - breaks[piece]
             time = breaks[piece + 1] if reach == length else begin + reach
+            drives = self.columns.at(piece, float(breaks[piece + 1]))
+            if since == 0.0:
+                self.columns.begin(drives, self.slope)
             while self._count < reached and self.output.time[self._count] <= time:
                 instant = self.output.time[self._count]
                 here = reach if instant == time else float(instant - begin)
-                self._propagate(system, path, first, last, since, here)
-                self._record(system, path, first, last, here)
+                self._propagate(system, path, drives, first, last, since, here)
+                self._record(system, path, drives, first, last, here)
                 since = here
-            self._propagate(system, path, first, last, since, reach)
+            self._propagate(system, path, drives, first, last, since, reach)
             if reach == length:
-                tangent.forget(system.address, piece, self._slope)
+                tangent.forget(system.address, piece, self.slope)
             first = last + 1
 
-    def _propagate(self, system: System, path: Path, first: int, last: int, begin: float, until: float) -> None:
-        along = self._slope, self._parameters, self._accuracy, self._atol, self._space
-        tangent.propagate(system.address, path, first, last, begin, until, *along)
+    def _propagate(self, system: System, path: Path, drives: Drives, *span: float) -> None:
+        along = self.slope, drives, self._accuracy, self._atol, self._space
+        tangent.propagate(system.address, path, *span, *along)
 
-    def _record(self, system: System, path: Path, first: int, last: int, since: float) -> None:
+    def _record(self, system: System, path: Path, drives: Drives, first: int, last: int, since: float) -> None:
         m, piece = self._count, int(path.piece[first])
         tangent.state_at(path, first, last, since, self._state)
-        at = system.address, piece, since, self._state, self._parameters, self._slope
+        at = system.address, piece, since, self._state, drives, self.slope
         tangent.wrench_slopes(*at, self._wrench, self._d_wrench[m], self._scratch)
-        self._d_body[m] = self._slope[:, -6:].T
+        self._d_body[m] = self.slope[:, -6:].T
         self._count += 1
 
     def recorded(self) -> tuple[np.ndarray, ...]:
         """Times, motion, wrenches, and the derivatives of both."""
-        every = self.output.time, self.output.body, self.output.wrench, self._d_body, self._d_wrench
+        slopes = self.columns.sorted(self._d_body), self.columns.sorted(self._d_wrench)
+        every = self.output.time, self.output.body, self.output.wrench, *slopes
         return tuple(values[: self._count] for values in every)

@@ -31,6 +31,22 @@ from planarfriction.kernels.rosenbrock import PAUSED, STEPS, advance, error_norm
 FRICTION, SIZE, MASS, INERTIA, LOAD = 0, 1, 2, 3, 4
 """Parameters; each is a factor, 1 as the scene is."""
 
+NORMAL_FORCE, FORCE, VELOCITY, INITIAL = 5, 6, 7, 8
+"""What else the motion depends on: the load of one contact, a component of the applied wrench or of the prescribed
+velocity, each in proportion to a weight that is linear on a piece, and a component of the start."""
+
+
+class Drives(NamedTuple):
+    """P numbers that a motion depends on."""
+
+    kind: np.ndarray
+    """`FRICTION` to `INITIAL`, int [P]."""
+    place: np.ndarray
+    """Contact, component of the wrench or velocity, or of velocity and pose at the start; int [P]."""
+    weight: np.ndarray
+    """Change of a signal per change of the number, at the start of the piece and its slope, [P, 2]."""
+
+
 SHORTEST = 2.0**-12
 """Shortest step, as a share of one of the motion."""
 
@@ -75,12 +91,22 @@ def _change(own, piece, c, y, dy, dz, parameter, dzdot):
 
 
 @kernel
-def _partial(own, piece, since, w, parameter, out):
+def _partial(own, piece, since, w, drives, p, out):
     """`df/dp` at the held state `w.state`, whose rates are in `w.rate` and whose linearisation was made last."""
+    parameter, place = drives.kind[p], drives.place[p]
+    weight = drives.weight[p, 0] + drives.weight[p, 1] * since
     o, dy, rows, total = own.bristles, w.rate, doubles(own.rows), doubles(own.body)
     for i in range(out.shape[0]):
         out[i] = 0.0
     inverse_mass, acceleration = doubles(own.inverse_mass), doubles(own.acceleration)
+    if parameter == INITIAL:
+        return
+    if parameter == VELOCITY:
+        out[o + place] = drives.weight[p, 1]
+        return
+    if parameter == FORCE:
+        out[o + place] = inverse_mass[place] * weight
+        return
     if parameter in (MASS, INERTIA):
         for i in range(3):
             if (i == 2) == (parameter == INERTIA) and inverse_mass[i] > 0.0:
@@ -89,13 +115,15 @@ def _partial(own, piece, since, w, parameter, out):
     for i in range(3):
         total[i] = 0.0
     for c in range(own.contacts):
+        if parameter == NORMAL_FORCE and c != place:
+            continue
         a, wrench = doubles(at(own.maps, 27 * c)), doubles(at(own.wrench, 3 * c))
         for i in range(3):
             rows[3 + i], rows[6 + i], rows[9 + i] = wrench[i], 0.0, wrench[i]
-        if parameter != LOAD:
+        if parameter in (FRICTION, SIZE):
             times(a, doubles(address(w.state, o)), rows)
             _change(own, piece, c, address(w.state, 0), address(dy, 0), address(w.zero, 0), parameter, address(out, 0))
-        load = doubles(own.count)[c] * load_of(own, piece, since, c)
+        load = doubles(own.count)[c] * (weight if parameter == NORMAL_FORCE else load_of(own, piece, since, c))
         for i in range(3):
             total[i] += load * (a[i] * rows[9] + a[3 + i] * rows[10] + a[6 + i] * rows[11])
     for i in range(3):
@@ -209,7 +237,7 @@ def _node(path, k, last, since):
 
 
 @kernel
-def _step(system, path, k, last, since, h, slope, parameters, known, w):
+def _step(system, path, k, last, since, h, slope, drives, known, w):
     """Carry `slope` over `h` seconds into `w.new`, its error estimates into `w.error` and `w.other`.
 
     The latter is 0 unless it is `known` (1 or 0) how fast the slope changes at the start, `w.before`.
@@ -221,10 +249,10 @@ def _step(system, path, k, last, since, h, slope, parameters, known, w):
         _interpolate(path, _node(path, k, last, time), time, w.state)
         call(own.rates, (system, piece, time, w.state, w.rate))
         call(own.linearise, (system, piece, w.state))
-        for p in range(parameters.shape[0]):
-            _partial(own, piece, time, w, parameters[p], w.forcing[p])
+        for p in range(drives.kind.shape[0]):
+            _partial(own, piece, time, w, drives, p, w.forcing[p])
         call(own.factor, (system, piece, time, w.state, shift))
-        for p in range(parameters.shape[0]):
+        for p in range(drives.kind.shape[0]):
             for m in range(n):
                 w.base[m] = slope[p, m]
             for j in range(i):
@@ -236,7 +264,7 @@ def _step(system, path, k, last, since, h, slope, parameters, known, w):
             call(own.solve, (system, piece, time, w.state, shift, w.right, new))
             for m in range(n):
                 w.stages[p, i, m] = shift * (new[m] - w.base[m])
-    for p in range(parameters.shape[0]):
+    for p in range(drives.kind.shape[0]):
         for m in range(n):
             w.error[p, m], w.other[p, m] = 0.0, known * h * START * w.before[p, m]
         for j in range(PLACES.shape[0]):
@@ -247,7 +275,7 @@ def _step(system, path, k, last, since, h, slope, parameters, known, w):
 
 
 @jit
-def propagate(system, path, first, last, begin, until, slope, parameters, rtol, atol, w):
+def propagate(system, path, first, last, begin, until, slope, drives, rtol, atol, w):
     """Carry `slope` [P, n] from `begin` to `until` seconds into a piece, whose nodes are `first` to `last` of a path.
 
     Returns how many steps that took. Each keeps its error below `rtol`, `atol` [n], but for one shorter than `SHORTEST`
@@ -260,10 +288,10 @@ def propagate(system, path, first, last, begin, until, slope, parameters, rtol, 
         wanted = w.pace[0] * local
         reach = xp.minimum(wanted, path.since[xp.minimum(k + MOST, last)] - since)
         h = reach if 2.0 * reach <= remaining else (remaining if reach >= remaining else 0.5 * remaining)
-        _step(system, path, k, last, since, h, slope, parameters, 1.0 if since > 0.0 else 0.0, w)
+        _step(system, path, k, last, since, h, slope, drives, 1.0 if since > 0.0 else 0.0, w)
         taken += 1
         largest = 0.0
-        for p in range(parameters.shape[0]):
+        for p in range(drives.kind.shape[0]):
             old, new = doubles(address(slope, p * n)), doubles(address(w.new, p * n))
             for error in (address(w.error, p * n), address(w.other, p * n)):
                 norm = error_norm(own, old, new, doubles(error), rtol, doubles(address(atol, 0)))
@@ -275,7 +303,7 @@ def propagate(system, path, first, last, begin, until, slope, parameters, rtol, 
             continue
         w.pace[0] = xp.maximum(ideal, w.pace[0] if h < wanted else SHORTEST)
         since = until if h == remaining else since + h
-        for p in range(parameters.shape[0]):
+        for p in range(drives.kind.shape[0]):
             for m in range(n):
                 slope[p, m], w.before[p, m] = w.new[p, m], w.stages[p, PLACES.shape[0] - 1, m]
     return taken
@@ -296,7 +324,7 @@ def state_at(path, first, last, since, state):
 
 
 @jit
-def wrench_slopes(system, piece, since, y, parameters, slope, wrench, out, scratch):
+def wrench_slopes(system, piece, since, y, drives, slope, wrench, out, scratch):
     """Wrenches [C, 3] of one of the identical contacts, and from the slopes [P, n] of y theirs `out` [C, 3, P].
 
     `scratch` [2, n] needs no values.
@@ -312,14 +340,15 @@ def wrench_slopes(system, piece, since, y, parameters, slope, wrench, out, scrat
         for i in range(3):
             wrench[c, i] = load * unit[i]
             rows[3 + i] = unit[i]
-        for p in range(parameters.shape[0]):
+        for p in range(drives.kind.shape[0]):
             for i in range(3):
                 rows[6 + i] = 0.0
                 for j in range(3):
                     rows[6 + i] += a[3 * i + j] * slope[p, o + j] + g[3 * i + j] * slope[p, o + 3 + j]
             states = address(y, 0), rate, address(slope, p * y.shape[0])
-            _change(own, piece, c, *states, parameters[p], change)
+            _change(own, piece, c, *states, drives.kind[p], change)
+            more = load if drives.kind[p] == LOAD else 0.0
+            if drives.kind[p] == NORMAL_FORCE and drives.place[p] == c:
+                more = drives.weight[p, 0] + drives.weight[p, 1] * since
             for i in range(3):
-                out[c, i, p] = load * rows[9 + i]
-                if parameters[p] == LOAD:
-                    out[c, i, p] += load * unit[i]
+                out[c, i, p] = load * rows[9 + i] + more * unit[i]

@@ -13,7 +13,7 @@ from planarfriction.kernels.body import Motion, System, system_of
 from planarfriction.kernels.contacts import BODY, BODY_AXES, WORLD, Contacts, calls_of
 from planarfriction.kernels.pointers import place_of
 from planarfriction.models.base import PackedModel
-from planarfriction.scenes.signal import SAME_TIME
+from planarfriction.scenes.signal import SAME_TIME, breaks_between
 
 SHAPE_INTERVAL = 1e-3
 """Longest time [s] that a patch keeps its shape while the load it depends on changes; held loads need no limit."""
@@ -46,9 +46,10 @@ class Pieces:
     no longer than `SHAPE_INTERVAL`. Pieces go by their number, so that there may be more of them than memory holds.
     """
 
-    def __init__(self, scene, t_end: float) -> None:
-        self._breaks = scene.breaks(t_end)
-        """Breaks of the signals, [S + 1]."""
+    def __init__(self, scene, t_end: float, marks=()) -> None:
+        own = scene.breaks(t_end)
+        self._breaks = breaks_between(np.concatenate([own[1:-1], marks]), t_end)
+        """Breaks of the signals and `marks` [s], [S + 1]."""
         self._load = [contact.normal_force.pieces(self._breaks) for contact in scene.contacts]
         self._force = None if scene.force is None else scene.force.pieces(self._breaks)
         self._velocity = None if scene.velocity is None else scene.velocity.pieces(self._breaks)
@@ -67,7 +68,7 @@ class Pieces:
         """Number of pieces."""
         moving = self._force is not None and (self._force[1][-1] != 0.0).any()
         changing = moving or any(slope[-1] != 0.0 for _, slope in self._load)
-        self.settled = float(self._breaks[-1 if changing else -2])
+        self.settled = float(own[-1 if changing else -2])
         """When the last of the inputs has changed for the last time [s]."""
 
     def breaks(self, pieces: np.ndarray) -> np.ndarray:
@@ -117,13 +118,15 @@ class Windows:
 
     A window holds `most` pieces (default: `WINDOW`), or as many as its shapes have room for. Where it ends leaves no
     trace in the results. `times` to record become breaks where they equal one up to rounding, so that they record the
-    left limit. With `sensitivities` windows hold what derivatives need too.
+    left limit. With `sensitivities` windows hold what derivatives need too, and the solver stops at `marks` [s].
     """
 
-    def __init__(self, scene, t_end: float, *, times=None, sensitivities=False, most: int | None = None) -> None:
+    def __init__(
+        self, scene, t_end: float, *, times=None, sensitivities=False, marks=(), most: int | None = None
+    ) -> None:
         self._scene, self._times, self._most = scene, times, WINDOW if most is None else most
         self._ahead = self._most
-        self._pieces, self._done = Pieces(scene, t_end), 0
+        self._pieces, self._done = Pieces(scene, t_end, marks), 0
         contacts = scene.contacts
         follows = [contact.model.patch.depends_on_load for contact in contacts]
         self._between = [self._pieces.between(c) if follows[c] else None for c in range(len(contacts))]

@@ -15,7 +15,7 @@ from planarfriction import validation
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
-from planarfriction.scenes.signal import SAME_TIME, Signal, as_signal, sample_count
+from planarfriction.scenes.signal import Signal, as_signal, breaks_between, sample_count
 
 RTOL, ATOL = 1e-5, 2e-4
 """Default tolerances: with 0.5 to 1.5 times these, the published in-hand runs of all models end within 2e-6 m and
@@ -173,10 +173,7 @@ class Scene(ByValue):
         t_end = self.t_end if t_end is None else validation.positive("t_end", t_end)
         signals = [contact.normal_force for contact in self.contacts]
         signals += [signal for signal in (self.force, self.velocity) if signal is not None]
-        inner = np.unique(np.concatenate([signal.breaks for signal in signals]))
-        inner = inner[(inner > SAME_TIME) & (inner < t_end - SAME_TIME)]
-        inner = inner[np.diff(inner, prepend=0.0) > SAME_TIME]
-        return np.concatenate([[0.0], inner, [t_end]])
+        return breaks_between(np.concatenate([signal.breaks for signal in signals]), t_end)
 
     def to_dict(self) -> dict[str, Any]:
         """The scene as plain numbers, texts, lists and tables; `from_dict` restores it to the last bit."""

@@ -25,6 +25,14 @@ MOST_SAMPLES = 10_000_000
 """Samples of a signal or a recording that are taken: a gigabyte for one contact."""
 
 
+def breaks_between(times: np.ndarray, t_end: float) -> np.ndarray:
+    """0, the different `times` [s] in between, and `t_end`; those within rounding of each other count as one."""
+    inner = np.unique(times)
+    inner = inner[(inner > SAME_TIME) & (inner < t_end - SAME_TIME)]
+    inner = inner[np.diff(inner, prepend=0.0) > SAME_TIME]
+    return np.concatenate([[0.0], inner, [t_end]])
+
+
 def sample_count(span: float, step: float, name: str) -> int:
     """Steps of `step` [s] that fit into `span` [s]; raises, before memory is asked for, where they are too many."""
     count = span / step * (1.0 + 1e-12)  # so that the end itself is kept in spite of rounding

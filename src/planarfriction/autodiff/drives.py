@@ -1,0 +1,153 @@
+"""What a motion depends on, as the compiled variational equation takes it: factors, knots of signals, the start."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.errors import InvalidValueError
+from planarfriction.kernels import tangent
+from planarfriction.kernels.body import System
+from planarfriction.kernels.tangent import Drives
+from planarfriction.scenes.packing import Windows
+from planarfriction.scenes.scene import Scene
+from planarfriction.scenes.signal import SAME_TIME, Signal
+
+SCENE_PARAMETERS = {
+    "mu": tangent.FRICTION,
+    "r": tangent.SIZE,
+    "mass": tangent.MASS,
+    "inertia": tangent.INERTIA,
+    "load": tangent.LOAD,
+}
+"""What `scene_sensitivities` knows: factors, 1 as the scene is, of
+
+- `mu`: mu_c and mu_s of every contact;
+- `r`: the size of every patch, about the origin of its contact frame (positions, contact radius, second moment);
+- `mass`, `inertia`: of the body, forces held (gravity pulls in proportion to the mass);
+- `load`: every normal force, patches keeping the shape that they have.
+"""
+
+STATES = ("vx", "vy", "omega", "x", "y", "theta")
+"""Velocity and pose of the body, in the order of the state."""
+
+MOST_KNOTS = 1000
+"""Knots of a signal: each has a derivative of all states."""
+
+_COLUMNS = {"force": ("fx", "fy", "tau"), "velocity": STATES[:3]}
+
+
+class Knots:
+    """The knots of one signal of a scene: numbers added to it there, joined in time as its own samples are."""
+
+    def __init__(self, scene: Scene, name: str, times: Any) -> None:
+        at = f"knots of {name}"
+        times = validation.array(at, times, (None,))
+        if not 1 <= len(times) <= MOST_KNOTS:
+            raise InvalidValueError(at, f"be 1 to {MOST_KNOTS} times", len(times))
+        if times[0] < 0.0 or times[-1] > scene.t_end or (np.diff(times) <= SAME_TIME).any():
+            raise InvalidValueError(at, f"increase from 0 s on to at most {scene.t_end:g} s", times.tolist())
+        self.name, self.times = name, times
+        if name in _COLUMNS:
+            self.kind = tangent.FORCE if name == "force" else tangent.VELOCITY
+            self.signal, self.components = getattr(scene, name), tuple(enumerate(_COLUMNS[name]))
+        else:
+            names = [f"{contact.name}.normal_force" for contact in scene.contacts]
+            self.kind, self.components = tangent.NORMAL_FORCE, ((names.index(name), ""),)
+            self.signal = scene.contacts[names.index(name)].normal_force
+        hold = "previous" if self.signal is None else self.signal.hold
+        self.hats = Signal(times, np.eye(len(times)), hold)
+        """For each knot what a change of one there adds to the signal."""
+        before = times if hold == "previous" else np.append(0.0, times[:-1])
+        self.begins = np.append(0.0, before[1:])
+        """When each knot begins to have a say [s]."""
+
+
+class Columns:
+    """The derivatives of a motion, one after another in the order in which they begin."""
+
+    def __init__(self, scene: Scene, parameters: Any, signals: Any, initial: Any) -> None:
+        parameters = validation.choices("parameters", parameters, SCENE_PARAMETERS)
+        driven = scene.velocity is not None
+        initial = validation.choices("initial", initial, STATES[3:] if driven else STATES)
+        valid = [f"{contact.name}.normal_force" for contact in scene.contacts] + ["velocity" if driven else "force"]
+        signals = {} if signals is None else signals
+        if not isinstance(signals, Mapping):
+            raise InvalidValueError("signals", "be a table of knots [s] by the name of a signal", signals)
+        self._knots = [Knots(scene, validation.choice("a signal", name, valid), t) for name, t in signals.items()]
+        plain = [(name, SCENE_PARAMETERS[name], 0) for name in parameters]
+        plain += [(name, tangent.INITIAL, STATES.index(name)) for name in initial]
+        begins, sources = [np.zeros(len(plain))], [np.full((len(plain), 2), -1)]
+        self.of = {name: slice(i, i + 1) for i, (name, _, _) in enumerate(plain)}
+        """Where the derivatives with respect to each name stand; those of a signal knot by knot."""
+        for s, knots in enumerate(self._knots):
+            many, first = len(knots.times), len(plain)
+            plain += [
+                (f"{knots.name}[{k}]" + (f".{part}" if part else ""), knots.kind, place)
+                for k in range(many)
+                for place, part in knots.components
+            ]
+            each = np.repeat(np.arange(many), len(knots.components))
+            begins.append(knots.begins[each])
+            sources.append(np.stack([np.full(len(each), s), each], axis=1))
+            self.of[knots.name] = slice(first, len(plain))
+        self.names = tuple(name for name, _, _ in plain)
+        begin = np.concatenate(begins)
+        self._order = np.argsort(begin, kind="stable")
+        self._begin, self._source = begin[self._order], np.concatenate(sources)[self._order].astype(int)
+        self._drives = Drives(
+            np.array([kind for _, kind, _ in plain], int)[self._order],
+            np.array([place for _, _, place in plain], int)[self._order],
+            np.zeros((len(plain), 2)),
+        )
+        self._scale = np.ones(len(plain))
+        self._hats: list[tuple[np.ndarray, np.ndarray]] = []
+
+    @property
+    def marks(self) -> np.ndarray:
+        """Where the solver has to stop [s]."""
+        return np.concatenate([np.zeros(0), *(knots.times for knots in self._knots)])
+
+    def start(self, scene: Scene, windows: Windows, slope: np.ndarray) -> None:
+        """Choose the units in which errors are judged, and write the derivatives [P, n] at the start."""
+        natural, start = windows.natural[-6:], np.abs(windows.state[-6:])
+        grip = sum(contact.count * np.abs(contact.normal_force.values).max() for contact in scene.contacts) or 1.0
+        arm = natural[3] / natural[5]
+        for p, (kind, place) in enumerate(zip(self._drives.kind, self._drives.place, strict=True)):
+            if kind == tangent.NORMAL_FORCE:
+                self._scale[p] = np.abs(scene.contacts[place].normal_force.values).max() or 1.0
+            elif kind == tangent.FORCE:
+                self._scale[p] = grip * (arm if place == 2 else 1.0)
+            elif kind == tangent.VELOCITY and scene.velocity is not None:
+                self._scale[p] = max(np.abs(scene.velocity.values[:, place]).max(), natural[place])
+            elif kind == tangent.INITIAL:
+                self._scale[p] = max(start[place], natural[place])
+                slope[p, slope.shape[1] - 6 + place] = self._scale[p]
+
+    def enter(self, system: System) -> None:
+        """Take the pieces of the window that comes next."""
+        self._hats = [knots.hats.pieces(system.motion.breaks) for knots in self._knots]
+
+    def at(self, piece: int, end: float) -> Drives:
+        """The numbers that have a say on a piece of the window, which ends at `end` [s]."""
+        count = int(np.searchsorted(self._begin, end - SAME_TIME))
+        drives, source = self._drives, self._source
+        for p in range(count):
+            s, k = source[p]
+            if s >= 0:
+                drives.weight[p] = [self._scale[p] * each[piece, k] for each in self._hats[s]]
+        return Drives(drives.kind[:count], drives.place[:count], drives.weight[:count])
+
+    def begin(self, drives: Drives, slope: np.ndarray) -> None:
+        """Put the derivatives of a prescribed velocity onto that with which a piece begins."""
+        for p in np.flatnonzero(drives.kind == tangent.VELOCITY):
+            slope[p, slope.shape[1] - 6 + drives.place[p]] = drives.weight[p, 0]
+
+    def sorted(self, values: np.ndarray) -> np.ndarray:
+        """Derivatives [..., P] per unit of each number, in the order of `names`."""
+        result = np.empty_like(values)
+        result[..., self._order] = values / self._scale
+        return result
