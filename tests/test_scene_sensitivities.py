@@ -123,7 +123,7 @@ def test_motion_and_wrenches_are_those_of_simulate(kind):
 def test_a_part_of_the_motion_at_a_time_gives_the_same(monkeypatch):
     """Parts of sixteen nodes: steps of the derivatives end elsewhere, which moves them by less than their accuracy."""
     whole = sensitivities("ellipsoid")
-    monkeypatch.setattr(scene_module, "_NUMBERS", 1.0)
+    monkeypatch.setattr(scene_module, "NUMBERS", 1.0)
     parts = scene_sensitivities(slide("ellipsoid"), NAMES)
     assert parts.motion == pytest.approx(whole.motion, abs=1e-9)
     largest = np.abs(whole.d_motion).max(axis=0)

@@ -133,7 +133,7 @@ def test_sensitivities_in_windows_and_in_parts(monkeypatch, name):
     whole = pf.autodiff.scene_sensitivities(scene, t_end=0.025, save_every=1e-3)
     monkeypatch.setattr(packing, "WINDOW", 3)
     windows = pf.autodiff.scene_sensitivities(scene, t_end=0.025, save_every=1e-3)
-    monkeypatch.setattr(module, "_NUMBERS", 1.0)  # one step at a time
+    monkeypatch.setattr(module, "NUMBERS", 1.0)  # one step at a time
     parts = pf.autodiff.scene_sensitivities(scene, t_end=0.025, save_every=1e-3)
     for one in (windows, parts):
         for field in ("time", "motion", "wrenches"):

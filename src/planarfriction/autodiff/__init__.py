@@ -21,6 +21,7 @@ from planarfriction.autodiff.rollouts import (
     rollout_tangent,
 )
 from planarfriction.autodiff.scene import SceneSensitivities, scene_sensitivities
+from planarfriction.autodiff.scene_gradient import SceneGradient, scene_gradient
 
 __all__ = [
     "PARAMETERS",
@@ -30,6 +31,7 @@ __all__ = [
     "RolloutSensitivities",
     "RolloutStates",
     "RolloutTangent",
+    "SceneGradient",
     "SceneSensitivities",
     "parameter_names",
     "parameters_of",
@@ -38,5 +40,6 @@ __all__ = [
     "rollout_sensitivities",
     "rollout_states",
     "rollout_tangent",
+    "scene_gradient",
     "scene_sensitivities",
 ]

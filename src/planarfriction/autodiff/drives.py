@@ -70,6 +70,8 @@ class Columns:
     """The derivatives of a motion, one after another in the order in which they begin."""
 
     def __init__(self, scene: Scene, parameters: Any, signals: Any, initial: Any) -> None:
+        if not isinstance(scene, Scene):
+            raise InvalidValueError("scene", "be a Scene", type(scene).__name__)
         parameters = validation.choices("parameters", parameters, SCENE_PARAMETERS)
         driven = scene.velocity is not None
         initial = validation.choices("initial", initial, STATES[3:] if driven else STATES)
@@ -140,6 +142,21 @@ class Columns:
             if s >= 0:
                 drives.weight[p] = [self._scale[p] * each[piece, k] for each in self._hats[s]]
         return Drives(drives.kind[:count], drives.place[:count], drives.weight[:count])
+
+    def inputs(self) -> tuple[Drives, np.ndarray]:
+        """The different inputs behind the numbers, in units, and which of them each number moves."""
+        kind, place = self._drives.kind, self._drives.place
+        pairs, which = np.unique(np.stack([kind, place], axis=1), axis=0, return_inverse=True)
+        driven = pairs[:, 0] == tangent.VELOCITY  # its rate has a say, not its value
+        weight = np.stack([1.0 - driven, 1.0 * driven], axis=1)
+        return Drives(pairs[:, 0].copy(), pairs[:, 1].copy(), weight), which.reshape(-1)
+
+    def gained(self, drives: Drives, moments: np.ndarray) -> np.ndarray:
+        """What a cost gains on a piece per number, from the moments [., 2] of the input that each of them moves."""
+        of_signal = (drives.weight * moments).sum(axis=1)
+        driven = drives.weight[:, 1] * moments[:, 0]
+        gained = np.where(drives.kind == tangent.VELOCITY, driven, of_signal)
+        return np.where(drives.kind <= tangent.LOAD, moments[:, 0], gained)
 
     def begin(self, drives: Drives, slope: np.ndarray) -> None:
         """Put the derivatives of a prescribed velocity onto that with which a piece begins."""

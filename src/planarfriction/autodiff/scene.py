@@ -22,13 +22,13 @@ from planarfriction.scenes.simulation import recording_times
 from planarfriction.solvers import RODAS4
 from planarfriction.solvers.structured import start_of
 
-_SHARE, _POWER = 0.1, 2.0 / 3.0
+SHARE, POWER = 0.1, 2.0 / 3.0
 """Accuracy of each step of the derivatives, relative and in natural scales: a share of a power of `rtol`."""
 
-_NUMBERS = 4e6
+NUMBERS = 4e6
 """Numbers of the states that a part of the motion holds, and as many of their rates: 64 MB together."""
 
-_LEAST_NODES = 16
+LEAST_NODES = 16
 """Ends of steps that a part holds at least."""
 
 
@@ -89,9 +89,16 @@ def scene_sensitivities(
 
     Raises `InvalidValueError` for unknown names or numbers out of range, and `SolverError` where the solver gives up.
     """
-    if not isinstance(scene, Scene):
-        raise InvalidValueError("scene", "be a Scene", type(scene).__name__)
     columns = Columns(scene, parameters, signals, initial)
+    windows, times, rtol, absolute = prepared(scene, columns, t_end, rtol, atol, save_every)
+    derivatives = _Derivatives(windows, times, columns, rtol)
+    columns.start(scene, windows, derivatives.slope)
+    _integrate(windows, derivatives, rtol, absolute * windows.natural)
+    return SceneSensitivities(columns.names, columns.of, *derivatives.recorded())
+
+
+def prepared(scene: Scene, columns: Columns, t_end, rtol, atol, save_every) -> tuple[Windows, np.ndarray, float, float]:
+    """The windows of a motion whose derivatives are wanted, the instants to record, tolerances."""
     end = scene.t_end if t_end is None else validation.positive("t_end", t_end)
     if end > scene.t_end:
         raise InvalidValueError("t_end", f"be at most the scene's {scene.t_end:g} s", end)
@@ -101,17 +108,13 @@ def scene_sensitivities(
     rtol = validation.positive("rtol", rtol)
     absolute = rtol if atol is None else validation.positive("atol", atol)
     times = recording_times(end, every)
-    windows = Windows(scene, end, times=times, sensitivities=True, marks=columns.marks)
-    derivatives = _Derivatives(windows, times, columns, rtol)
-    columns.start(scene, windows, derivatives.slope)
-    _integrate(windows, derivatives, rtol, absolute * windows.natural)
-    return SceneSensitivities(columns.names, columns.of, *derivatives.recorded())
+    return Windows(scene, end, times=times, sensitivities=True, marks=columns.marks), times, rtol, absolute
 
 
 def _integrate(windows: Windows, derivatives: _Derivatives, rtol: float, atol: np.ndarray) -> None:
     """Integrate the motion as `simulate` does, and carry the derivatives along a part of its steps after another."""
     now, n, outcome = start_of(windows.state), len(windows.state), rosenbrock.DONE
-    path = tangent.path_for(max(int(_NUMBERS / n), _LEAST_NODES), n)
+    path = tangent.path_for(max(int(NUMBERS / n), LEAST_NODES), n)
     for system in windows:
         run = run_of(system, RODAS4, derivatives.output, now, rtol=rtol, atol=atol)
         now.cursor[0], outcome = 0, rosenbrock.PAUSED
@@ -122,6 +125,11 @@ def _integrate(windows: Windows, derivatives: _Derivatives, rtol: float, atol: n
         del system, run
         if outcome != rosenbrock.DONE:
             break
+    check_outcome(outcome)
+
+
+def check_outcome(outcome: int) -> None:
+    """Raise `SolverError` where the solver gave up."""
     if outcome == rosenbrock.STEP_TOO_SMALL:
         raise SolverError("the step size fell below the resolution of time: loosen rtol, or check the scene")
 
@@ -134,7 +142,7 @@ class _Derivatives:
         body, wrench, load = np.empty((instants, 6)), np.empty((instants, many, 3)), np.empty((instants, many))
         self.output = Output(times, body, wrench, load, np.empty((0, 0)))
         """What the integration of the motion records."""
-        self.columns, self._accuracy = columns, _SHARE * rtol**_POWER
+        self.columns, self._accuracy = columns, SHARE * rtol**POWER
         self._space, self._atol = tangent.slopes_for(count, n), self._accuracy * windows.natural
         self.slope, self._state, self._scratch = np.zeros((count, n)), np.empty(n), np.empty((2, n))
         self._d_body, self._d_wrench = np.zeros((instants, 6, count)), np.zeros((instants, many, 3, count))
