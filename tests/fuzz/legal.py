@@ -32,8 +32,8 @@ SKIPPED = {
 """Not attacked, and why."""
 
 RECORDS = """
-    Rollout RolloutGradient RolloutSensitivities RolloutStates RolloutTangent SceneSensitivities Identification Verdict
-    MotionPlan Solution
+    Rollout RolloutGradient RolloutSensitivities RolloutStates RolloutTangent SceneGradient SceneSensitivities
+    Identification Verdict MotionPlan Solution
     SurfaceComparison ModelJacobians PackedModel StepJacobians Statistics Integration
     LimitSurface FrictionLaw FrictionModel Pressure
 """
@@ -104,7 +104,7 @@ def objects() -> dict[str, Any]:
         "velocity_weight": 1.0, "kept": np.array([True, False, True]), "coefficients": None,
         # choices and texts
         "hold": "previous", "name": "name", "mounted_on": "world", "at": "origin", "bristles": "none",
-        "direction": "y", "on_load_change": "keep", "names": ("mu",), "path": "out", "profile": None, "placement": 1,
+        "direction": "y", "on_load_change": "keep", "names": ("mu",), "parameters": ("mu",), "initial": ("x",), "path": "out", "profile": None, "placement": 1,
         "data": Fresh(lambda: PATCH.to_dict()), "folder": None, "grid": None, "parameters": None, "states": None,
         "wrench_axis": None, "axis": None,
         # instances, for their methods

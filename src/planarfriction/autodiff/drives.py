@@ -99,7 +99,9 @@ class Columns:
         self.names = tuple(name for name, _, _ in plain)
         begin = np.concatenate(begins)
         self._order = np.argsort(begin, kind="stable")
-        self._begin, self._source = begin[self._order], np.concatenate(sources)[self._order].astype(int)
+        self._begin, source = begin[self._order], np.concatenate(sources)[self._order].astype(int)
+        mine = [np.flatnonzero(source[:, 0] == s) for s in range(len(self._knots))]
+        self._sources = [(columns, source[columns, 1]) for columns in mine]
         self._drives = Drives(
             np.array([kind for _, kind, _ in plain], int)[self._order],
             np.array([place for _, _, place in plain], int)[self._order],
@@ -136,11 +138,10 @@ class Columns:
     def at(self, piece: int, end: float) -> Drives:
         """The numbers that have a say on a piece of the window, which ends at `end` [s]."""
         count = int(np.searchsorted(self._begin, end - SAME_TIME))
-        drives, source = self._drives, self._source
-        for p in range(count):
-            s, k = source[p]
-            if s >= 0:
-                drives.weight[p] = [self._scale[p] * each[piece, k] for each in self._hats[s]]
+        drives = self._drives
+        for (start, slope), (column, knot) in zip(self._hats, self._sources, strict=True):
+            drives.weight[column, 0] = self._scale[column] * start[piece, knot]
+            drives.weight[column, 1] = self._scale[column] * slope[piece, knot]
         return Drives(drives.kind[:count], drives.place[:count], drives.weight[:count])
 
     def inputs(self) -> tuple[Drives, np.ndarray]:

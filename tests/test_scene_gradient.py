@@ -1,0 +1,150 @@
+"""Derivatives of scenes to the knots of their signals and to their start, forwards and in reverse."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+
+import numpy as np
+import pytest
+
+import planarfriction as pf
+from planarfriction.autodiff import scene_gradient, scene_sensitivities
+from planarfriction.errors import InvalidValueError
+from test_scene_sensitivities import LAW, MOTION, model_of, slide
+
+KNOTS = np.array([0.0, 0.05, 0.15, 0.3, 0.34])
+SIGNALS = {"own.normal_force": KNOTS, "force": KNOTS}
+START = {"vx": 1e-5, "omega": 1e-4, "x": 1e-6, "theta": 1e-4}
+"""Components of the start, and steps for differences."""
+
+
+@functools.cache
+def pushed(kind: str) -> pf.Scene:
+    """The plate that slides, stops and is pushed off again, its load never zero: it may go down as well as up."""
+    scene = slide(kind)
+    load = pf.Signal([0.0, 0.2, 0.3, 0.36], [3.0, 2.0, 1.0, 2.5], "linear")
+    own = dataclasses.replace(scene.contacts[0], normal_force=load)
+    return dataclasses.replace(scene, contacts=[own, scene.contacts[1]])
+
+
+def with_more(signal: pf.Signal, values) -> pf.Signal:
+    """A signal plus values at the knots, joined as its own are."""
+    times, more = np.union1d(signal.times, KNOTS), pf.Signal(KNOTS, values, signal.hold)
+    return pf.Signal(times, signal(times) + more(times), signal.hold)
+
+
+def changed(scene: pf.Scene, name: str, k: int, component: int, change: float) -> pf.Scene:
+    """The scene with one knot, or one component of the start, changed."""
+    body = scene.body
+    if name in START:
+        start = np.array([*body.velocity, *body.position, body.angle])
+        start[MOTION.index(name)] += change
+        moved = dataclasses.replace(body, velocity=start[:3], position=start[3:5], angle=start[5])
+        return dataclasses.replace(scene, body=moved)
+    values = np.zeros((len(KNOTS), 3))
+    values[k, component] = change
+    if name == "force":
+        return dataclasses.replace(scene, force=with_more(scene.force, values))
+    own = dataclasses.replace(scene.contacts[0], normal_force=with_more(scene.contacts[0].normal_force, values[:, 0]))
+    return dataclasses.replace(scene, contacts=[own, scene.contacts[1]])
+
+
+@pytest.mark.parametrize("kind", ["distributed", "ellipsoid", "moments"])
+def test_derivatives_to_knots_and_start_are_differences(kind):
+    """Differences of order 4 of tight simulations; both sides are right to a few 1e-7 of the largest value."""
+    scene = pushed(kind)
+    found = scene_sensitivities(scene, (), signals=SIGNALS, initial=list(START))
+    numbers = [(name, 0, 0, h) for name, h in START.items()]
+    numbers += [("own.normal_force", k, 0, 2e-4) for k in (1, 3)]
+    numbers += [("force", 2, 1, 1e-4), ("force", 3, 2, 1e-6)]
+    for name, k, component, h in numbers:
+        scenes = [changed(scene, name, k, component, i * h) for i in (1, -1, 2, -2)]
+        tight = [pf.simulate(each, rtol=1e-11, atol=1e-11).data for each in scenes]
+        p = found.columns[name].start + (3 * k + component if name == "force" else k)
+        for values, names in ((found.d_motion[..., p], MOTION), (found.d_wrenches[..., p], ("fx", "fy", "tau"))):
+            for i, variable in enumerate(names):
+                near, back, far, far_back = (data[variable].values for data in tight)
+                expected = (8.0 * (near - back) - (far - far_back)) / (12.0 * h)
+                error = np.abs(values[..., i] - expected).max() / np.abs(expected).max()
+                assert error <= 5e-6, (found.names[p], variable, error)
+
+
+def test_a_sliding_block_loses_speed_to_each_knot_of_its_load():
+    """`v(T) = v_0 - mu int N dt/m`: a knot's share of the integral is that of its hat, and the start's is whole."""
+    law = dataclasses.replace(LAW, mu_s=LAW.mu_c, sigma_2=0.0, sigma_1=1.0)
+    model = pf.DistributedModel(pf.ContactPatch.disc(0.01, cells=5), law)
+    body = pf.Body(0.5, 1e-3, velocity=(0.6, 0.0, 0.0), gravity=(0.0, 0.0))
+    load = pf.Signal([0.0, 0.04, 0.1], [5.0, 4.0, 6.0], "linear")
+    contact = pf.Contact(model, load, mounted_on="body")
+    scene = pf.Scene(body, [contact], 0.1, save_every=0.05)
+    found = scene_sensitivities(scene, (), signals={"contact.normal_force": load.times}, initial=["vx"])
+    areas = np.array([0.02, 0.05, 0.03])
+    # 1e-5 of the velocity is lost while the bristles deflect
+    assert found.d_motion[-1, 0] == pytest.approx([1.0, *(-LAW.mu_c / 0.5 * areas)], abs=1e-4)
+    assert found.names == ("vx", *(f"contact.normal_force[{k}]" for k in range(3)))
+
+
+@pytest.mark.parametrize("kind", ["ellipsoid", "moments"])
+def test_the_reverse_is_the_product_with_the_derivatives_forwards(kind):
+    """Two methods of order 4 with steps of their own; through a lost load, stops and a new slip."""
+    scene = slide(kind)
+    numbers = {"signals": SIGNALS | {"fixed.normal_force": KNOTS}, "initial": list(START)}
+    factors = ("mu", "r", "mass", "inertia", "load")
+    forwards = scene_sensitivities(scene, factors, **numbers)
+    slope = np.random.default_rng(1).normal(size=forwards.motion.shape) / np.abs(forwards.motion).max(axis=0)
+    reverse = scene_gradient(scene, lambda time, motion: slope, factors, **numbers)
+    expected = np.einsum("mi,mip->p", slope, forwards.d_motion)
+    assert reverse.names == forwards.names
+    assert reverse.motion == pytest.approx(forwards.motion, abs=1e-12)
+    for name, here in reverse.columns.items():
+        error = np.abs(reverse.gradient[here] - expected[here]).max() / np.abs(expected[here]).max()
+        assert error < 3e-5, (name, error)
+
+
+@pytest.mark.parametrize("hold", ["linear", "previous"])
+def test_the_reverse_reaches_a_prescribed_velocity(hold):
+    """Linear in the knots but for the turning axes; rounding of two integrations."""
+    twist = pf.Signal([0.0, 0.1, 0.2], [[0.01, 0.0, 0.5], [0.02, 0.01, -1.0], [0.0, 0.02, 1.0]], hold)
+    scene = pf.scenes.driven(model_of("moments"), twist=twist, t_end=0.3)
+    numbers = {"signals": {"velocity": [0.0, 0.05, 0.1, 0.2]}, "initial": ["x", "theta"]}
+    forwards = scene_sensitivities(scene, (), **numbers)
+    slope = np.random.default_rng(2).normal(size=forwards.motion.shape)
+    reverse = scene_gradient(scene, lambda time, motion: slope, **numbers)
+    expected = np.einsum("mi,mip->p", slope, forwards.d_motion)
+    assert reverse.gradient == pytest.approx(expected, abs=1e-8 * np.abs(expected).max())
+    assert np.abs(expected).min() > 0.0
+
+
+def test_a_held_contact_has_no_say():
+    """Below breakaway the load moves nothing: a plan that starts from rest finds no slope there."""
+    model = model_of("moments")
+    body = pf.Body(0.4, 6e-4, gravity=(0.0, 0.0))
+    scene = pf.Scene(body, [pf.Contact(model, 5.0, mounted_on="body")], 0.1, force=pf.Signal.constant([0.1, 0.0, 0.0]))
+    found = scene_gradient(
+        scene,
+        lambda time, motion: np.eye(6)[[3] * len(time)] / len(time),
+        signals={"contact.normal_force": [0.0, 0.05]},
+    )
+    # the bristles' length over the load: what the deflection itself changes by
+    assert np.abs(found.gradient).max() < LAW.largest_deflection / 5.0
+
+
+def test_wrong_input_is_named():
+    scene = pushed("ellipsoid")
+    with pytest.raises(
+        InvalidValueError, match=r"a signal must be one of own\.normal_force, fixed\.normal_force, force"
+    ):
+        scene_sensitivities(scene, signals={"own": KNOTS})
+    with pytest.raises(InvalidValueError, match=r"knots of force must increase from 0 s on to at most 0\.4 s"):
+        scene_sensitivities(scene, signals={"force": [0.0, 0.5]})
+    with pytest.raises(InvalidValueError, match="knots of force must be 1 to 1000 times"):
+        scene_sensitivities(scene, signals={"force": []})
+    with pytest.raises(InvalidValueError, match="initial must be one of vx, vy, omega, x, y, theta"):
+        scene_sensitivities(scene, initial=["angle"])
+    with pytest.raises(InvalidValueError, match="signals must be a table of knots"):
+        scene_gradient(scene, lambda time, motion: motion, signals=["force"])
+    with pytest.raises(InvalidValueError, match="slope must be a function of time and motion"):
+        scene_gradient(scene, np.zeros(6))
+    with pytest.raises(InvalidValueError, match=r"slope of the cost must have shape"):
+        scene_gradient(scene, lambda time, motion: motion[0], signals=SIGNALS)
