@@ -104,7 +104,7 @@ def objects() -> dict[str, Any]:
         "velocity_weight": 1.0, "kept": np.array([True, False, True]), "coefficients": None,
         # choices and texts
         "hold": "previous", "name": "name", "mounted_on": "world", "at": "origin", "bristles": "none",
-        "direction": "y", "on_load_change": "keep", "names": ("mu",), "parameters": ("mu",), "initial": ("x",), "path": "out", "profile": None, "placement": 1,
+        "direction": "y", "on_load_change": "keep", "names": ("mu",), "path": "out", "profile": None, "placement": 1,
         "data": Fresh(lambda: PATCH.to_dict()), "folder": None, "grid": None, "parameters": None, "states": None,
         "wrench_axis": None, "axis": None,
         # instances, for their methods
@@ -177,6 +177,13 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "autodiff.rollout_states": {"twist": TWISTS},
     "autodiff.rollout_gradient": {"twist": TWISTS},
     "autodiff.rollout_sensitivities": {"twist": TWISTS, "names": ("mu_c",)},
+    "autodiff.scene_sensitivities": {"parameters": ("mu",), "signals": {}, "initial": ("x",)},
+    "autodiff.scene_gradient": {
+        "parameters": ("mu",),
+        "signals": {},
+        "initial": ("x",),
+        "slope": lambda time, motion: 0.0 * motion,
+    },
 }
 """Where a parameter of this name wants something else."""
 
