@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import sys
 
 import numpy as np
 import pytest
@@ -11,8 +12,10 @@ import pytest
 import planarfriction as pf
 from planarfriction.autodiff import scene_gradient, scene_sensitivities
 from planarfriction.errors import InvalidValueError
+from planarfriction.scenes import packing
 from test_scene_sensitivities import LAW, MOTION, model_of, slide
 
+reverse_module = sys.modules[scene_gradient.__module__]
 KNOTS = np.array([0.0, 0.05, 0.15, 0.3, 0.34])
 SIGNALS = {"own.normal_force": KNOTS, "force": KNOTS}
 START = {"vx": 1e-5, "omega": 1e-4, "x": 1e-6, "theta": 1e-4}
@@ -128,6 +131,24 @@ def test_a_held_contact_has_no_say():
     )
     # the bristles' length over the load: what the deflection itself changes by
     assert np.abs(found.gradient).max() < LAW.largest_deflection / 5.0
+
+
+def test_windows_parts_and_a_shorter_motion_leave_no_trace(monkeypatch):
+    """The same steps, but where the parts of the path end: to the accuracy of the derivatives."""
+    scene = slide("ellipsoid")
+
+    def gradient(end: float) -> np.ndarray:
+        return scene_gradient(scene, lambda time, motion: np.ones_like(motion), signals=SIGNALS, t_end=end).gradient
+
+    whole, short = gradient(0.4), gradient(0.1)
+    monkeypatch.setattr(packing, "WINDOW", 3)
+    assert gradient(0.4) == pytest.approx(whole, rel=1e-6, abs=1e-7 * np.abs(whole).max())
+    monkeypatch.setattr(reverse_module, "NUMBERS", 1.0)
+    assert gradient(0.4) == pytest.approx(whole, rel=1e-6, abs=1e-7 * np.abs(whole).max())
+    knots = scene_sensitivities(scene, (), signals=SIGNALS, t_end=0.1)
+    expected = knots.d_motion.sum(axis=(0, 1))
+    assert short == pytest.approx(expected, abs=2e-6 * np.abs(expected).max())
+    assert (short[3:5] == 0.0).all()  # knots behind the end
 
 
 def test_wrong_input_is_named():

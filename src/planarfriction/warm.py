@@ -62,6 +62,7 @@ def _parts() -> list[Part]:
         *([Part("steps inside MuJoCo", _host)] if find_spec("mujoco") else []),
         *(Part(f"roll-outs, {name}", functools.partial(_roll, model)) for name, model in three_states.items()),
         *(Part(f"derivatives of scenes, {name}", functools.partial(_derive, model)) for name, model in kinds.items()),
+        Part("derivatives of scenes in reverse", functools.partial(_reverse, kinds["reduced"])),
         Part("limit surfaces", functools.partial(_surfaces, patch)),
     ]
 
@@ -72,6 +73,10 @@ def _simulate(model: Any) -> None:
 
 def _derive(model: Any) -> None:
     autodiff.scene_sensitivities(in_hand(model), t_end=_INSTANT)
+
+
+def _reverse(model: Any) -> None:
+    autodiff.scene_gradient(in_hand(model), lambda time, motion: np.ones_like(motion), ["mu"], t_end=_INSTANT)
 
 
 def _step(model: Any) -> None:

@@ -76,7 +76,7 @@ def scene_gradient(
     return SceneGradient(columns.names, columns.of, time, motion, gradient)
 
 
-def _followed(windows: Windows, times: np.ndarray, rtol: float, absolute: np.ndarray):
+def _followed(windows: Windows, times: np.ndarray, rtol: float, absolute: float):
     """The motion: what is recorded, its path in parts with the system of each, and how many instants it has."""
     instants, many, n = len(times), len(windows.models), len(windows.state)
     output = Output(
