@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -60,7 +61,7 @@ def scene_sensitivities(
     scene: Scene,
     parameters: Sequence[str] = ("mu", "r", "mass", "load"),
     *,
-    signals: Mapping[str, Sequence[float]] | None = None,
+    signals: Mapping[str, Any] | None = None,
     initial: Sequence[str] = (),
     t_end: float | None = None,
     rtol: float = 1e-9,

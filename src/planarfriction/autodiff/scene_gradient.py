@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -46,7 +47,7 @@ def scene_gradient(
     slope: Callable[[np.ndarray, np.ndarray], np.ndarray],
     parameters: Sequence[str] = (),
     *,
-    signals: Mapping[str, Sequence[float]] | None = None,
+    signals: Mapping[str, Any] | None = None,
     initial: Sequence[str] = (),
     t_end: float | None = None,
     rtol: float = 1e-9,
