@@ -97,6 +97,9 @@ class Columns:
             sources.append(np.stack([np.full(len(each), s), each], axis=1))
             self.of[knots.name] = slice(first, len(plain))
         self.names = tuple(name for name, _, _ in plain)
+        say = [knots.hats(0.0)[k] for knots in self._knots for k in range(len(knots.times)) for _ in knots.components]
+        self.of_start = [name for name, share in zip(self.names, [1.0] * len(begins[0]) + say, strict=True) if share]
+        """Names of those that have a say at t = 0."""
         begin = np.concatenate(begins)
         self._order = np.argsort(begin, kind="stable")
         self._begin, source = begin[self._order], np.concatenate(sources)[self._order].astype(int)

@@ -142,6 +142,17 @@ class FrictionModel(ByValue):
         """State of a contact at rest: no bristle is deflected."""
         return np.zeros(self.state_shape)
 
+    def state_of(self, deflections, normal_force) -> np.ndarray:
+        """State of a contact at rest whose bristles are bent by `deflections` `[2, N]` [m] under a load > 0 [N].
+
+        Its wrench is that of the bristles, `-sum w_i B_i' sigma_0 z_i f_N`, whatever a model keeps of them.
+        """
+        deflections = validation.array("deflections", deflections, (2, len(self.patch.positions)))
+        return self._state_of(deflections, validation.positive_load("normal_force", normal_force))
+
+    def _state_of(self, deflections: np.ndarray, load: float) -> np.ndarray:
+        raise InvalidValueError("model", "be one that starts with a load: it has no _state_of", type(self).__name__)
+
     def packed(self, loads: Sequence[float | None], between: tuple[float, float] | None = None) -> PackedModel:
         """The model at distinct `loads` [N], `[None]` where the patch does not depend on the load.
 

@@ -125,6 +125,9 @@ class DistributedModel(FrictionModel):
         )
         return StepJacobians(*(a.reshape(*batch, *a.shape[1:]) for a in results))
 
+    def _state_of(self, deflections: np.ndarray, load: float) -> np.ndarray:
+        return deflections
+
     def packed(self, loads: Sequence[float | None], between: tuple[float, float] | None = None) -> PackedModel:
         """See `FrictionModel.packed`; only cells that carry load at one of the loads have bristles."""
         if between is None:

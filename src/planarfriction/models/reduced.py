@@ -138,6 +138,10 @@ class ReducedModel(ThreeStateModel):
         shares = np.stack([part.sum(-1) for part in each], -1).tolist()
         return [tuple(map(Part, *loaded)) for loaded in zip(shares, shapes, strict=True)]
 
+    @property
+    def _labels(self) -> np.ndarray:
+        return self.labels
+
     # ------------------------------------------------------------------ parts
 
     @functools.cached_property

@@ -133,6 +133,20 @@ class ThreeStateModel(FrictionModel):
         )
         return self._turned(slopes, "state_twist")
 
+    def _state_of(self, deflections: np.ndarray, load: float) -> np.ndarray:
+        pulls = -self.law.numbers.sigma_0 * load * self.patch.weights(load) * deflections
+        wrenches = np.einsum("nij,in->nj", self.patch.levers(), pulls)
+        per_state = self.jacobians(self.rest(), np.zeros(3), load).wrench_state.reshape(3, -1, 3)
+        parts = range(per_state.shape[1])
+        sums = [wrenches[self._labels == k].sum(axis=0) for k in parts]
+        states = [np.linalg.lstsq(per_state[:, k], sums[k], rcond=1e-12)[0] for k in parts]
+        return np.array(states).reshape(self.state_shape)
+
+    @property
+    def _labels(self) -> np.ndarray:
+        """Which part each cell belongs to, `[N]`."""
+        return np.zeros(self.patch.cells, int)
+
     # ------------------------------------------------------------------ axes of the twist
 
     @property

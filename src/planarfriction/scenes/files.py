@@ -24,7 +24,10 @@ from planarfriction.scenes.signal import read_signal
 from planarfriction.scenes.toml_writer import to_toml
 from planarfriction.writing import write_text
 
-SCENE_KEYS = ("name", "t_end", "save_every", "stop_speed", "rtol", "atol", "body", "force", "velocity", "contact")
+SCENE_KEYS = (
+    "name", "t_end", "save_every", "stop_speed", "rtol", "atol", "start", "body", "force", "velocity", "contact"
+)  # fmt: skip
+_OPTIONS = ("save_every", "stop_speed", "rtol", "atol", "name", "start")
 BODY_KEYS = ("mass", "inertia", "position", "angle", "velocity", "gravity", "outline", "size")
 CONTACT_KEYS = ("name", "mounted_on", "position", "angle", "count", "normal_force", "model", "patch", "law")
 
@@ -47,6 +50,8 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
     data: dict[str, Any] = {key: getattr(scene, key) for key in ("name", "t_end", "save_every", "rtol", "atol")}
     if scene.stop_speed is not None:
         data["stop_speed"] = scene.stop_speed
+    if scene.start != "rest":
+        data["start"] = scene.start
     data["body"] = {"mass": body.mass, "inertia": body.inertia, "position": list(body.position), "angle": body.angle}
     data["body"] |= {"velocity": list(body.velocity), "gravity": list(body.gravity)}
     if body.outline is not None:
@@ -77,7 +82,7 @@ def scene_from_dict(data: dict[str, Any], *, folder: str | Path | None = None, s
     )
     contacts = _contacts(table)
     prescribed = "velocity" in table
-    options = {key: table.get(key) for key in ("save_every", "stop_speed", "rtol", "atol", "name") if key in table}
+    options = {key: table.get(key) for key in _OPTIONS if key in table}
     signals = {key: read_signal(table, key) for key in ("force", "velocity") if key in table}
     # A body that is moved as prescribed needs no mass; whoever leaves it out does not mean to say anything about it.
     moved = {"mass": 1.0, "inertia": 1.0, "gravity": [0.0, 0.0]}

@@ -14,6 +14,7 @@ from planarfriction.kernels.contacts import BODY, BODY_AXES, WORLD, Contacts, ca
 from planarfriction.kernels.pointers import place_of
 from planarfriction.models.base import PackedModel
 from planarfriction.scenes.signal import SAME_TIME, breaks_between
+from planarfriction.scenes.start import first_states
 
 SHAPE_INTERVAL = 1e-3
 """Longest time [s] that a patch keeps its shape while the load it depends on changes; held loads need no limit."""
@@ -30,7 +31,7 @@ class PackedScene(NamedTuple):
 
     system: System
     state: np.ndarray
-    """Bristles at rest, body velocity, pose."""
+    """Bristles as the scene starts, body velocity, pose."""
     natural: np.ndarray
     """Natural scale of each state (see `Windows.natural`)."""
     models: list[PackedModel]
@@ -152,8 +153,8 @@ class Windows:
         # a single point has no lever arm: its spin is measured in rad/s
         self._radius = max(model.radius for model in self.models) or 1.0
         arm, body = np.array([1.0, 1.0, 1.0 / self._radius]), scene.body
-        self.state = np.concatenate([np.zeros(self._contacts.state[-1]), body.velocity, body.position, [body.angle]])
-        """Bristles at rest, body velocity, pose."""
+        self.state = np.concatenate([self._first(), body.velocity, body.position, [body.angle]])
+        """Bristles as the scene starts, body velocity, pose."""
         self.natural = np.concatenate([*(model.natural for model in self.models), speed * arm, self._length * arm])
         """Natural scale of each state: mu_c/sigma_0 for deflections and positions, a share of v_s for velocities (that
         of a creep, `models.base.PackedModel.creep`), angles over r.
@@ -166,6 +167,15 @@ class Windows:
         self.cells = [model.cells for model in self.models]
         """Which cells of each contact have bristles."""
         self._ready: System | None = self._system(row, pieces)
+
+    def _first(self) -> np.ndarray:
+        """The bristles with which the scene starts, those that the solver has."""
+        shaped = np.array([self._pieces.held(c, np.zeros(1, np.int64))[0] for c in range(len(self.models))])
+        states = first_states(self._scene, shaped)
+        if states is None:
+            return np.zeros(self._contacts.state[-1])
+        chosen = [each if m.cells is None else each[:, m.cells] for each, m in zip(states, self.models, strict=True)]
+        return np.concatenate([each.ravel() for each in chosen])
 
     def __iter__(self) -> Iterator[System]:
         while self._ready is not None or self._done < self._pieces.count:

@@ -17,6 +17,9 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
 from planarfriction.scenes.signal import Signal, as_signal, breaks_between, sample_count
 
+STARTS = ("rest", "equilibrium", "sliding")
+"""How bristles may start."""
+
 RTOL, ATOL = 1e-5, 2e-4
 """Default tolerances: with 0.5 to 1.5 times these, the published in-hand runs of all models end within 2e-6 m and
 2e-5 rad of the same model's run at a relative tolerance of 1e-9."""
@@ -137,6 +140,9 @@ class Scene(ByValue):
     """Tolerance as a share of the natural scales (see `simulate`) [-]."""
     name: str = "scene"
     """Name of the scene."""
+    start: Literal["rest", "equilibrium", "sliding"] = "rest"
+    """How the bristles start: not deflected; carrying the load of a body that stands still (with the least elastic
+    energy, which says how contacts share it); or in the steady state of the initial velocity."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.body, Body):
@@ -164,6 +170,17 @@ class Scene(ByValue):
                     raise InvalidValueError(name, "be None where the velocity is prescribed", getattr(self, name))
         sample_count(self.t_end, self.save_every, "save_every")
         validation.text("name", self.name)
+        self._check_start()
+
+    def _check_start(self) -> None:
+        validation.choice("start", self.start, STARTS)
+        velocity = self.body.velocity if self.velocity is None else self.velocity(0.0).tolist()
+        if self.start == "equilibrium" and self.velocity is not None:
+            raise InvalidValueError("start", "be 'rest' or 'sliding' where the velocity is prescribed", self.start)
+        if self.start == "equilibrium" and any(velocity):
+            raise InvalidValueError("velocity of the body", "be zero where start is 'equilibrium'", velocity)
+        if self.start == "sliding" and not any(velocity):
+            raise InvalidValueError("initial velocity", "not be zero where start is 'sliding'", velocity)
 
     def breaks(self, t_end: float | None = None) -> np.ndarray:
         """Times [s] from 0 to `t_end` (default: the scene's) at which any signal jumps or bends, both ends included.

@@ -50,7 +50,7 @@ def simulate(
     method: Method = RODAS4,
     progress: Callable[[float], None] | None = None,
 ) -> Solution:
-    """Simulate a scene from rest bristles at t = 0 and record it every `save_every` [s]; returns a `Solution`.
+    """Simulate a scene from its start at t = 0 and record it every `save_every` [s]; returns a `Solution`.
 
     Each step keeps its error below `rtol |y| + atol y_0`, for every component of the body's motion and for the mean
     over each contact's bristles. The natural scales `y_0` are mu_c/sigma_0 for bristles and positions and a tenth of

@@ -1,0 +1,177 @@
+"""How the bristles of a scene start: at rest, carrying the load, or as in steady sliding."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.optimize import minimize, root
+
+from planarfriction import formulas
+from planarfriction.errors import InvalidValueError
+
+_LONG = 1e6
+"""Step [s] in which bristles reach the steady state of a held twist: all that move by more than 1e-12 m/s."""
+
+_BALANCED = 1e-9
+"""Share of the load that an equilibrium may leave unbalanced: far below what the solver sees at any tolerance."""
+
+_NEAR = 1e-3
+"""Share of the load that the search of the least energy leaves unbalanced where it has found it."""
+
+
+def first_states(scene: Any, shaped: np.ndarray) -> list[np.ndarray] | None:
+    """The first state of each contact `[*state_shape]`, or None for bristles at rest.
+
+    `shaped` `[C]` are the loads [N] whose shapes the contacts have at first.
+    """
+    if scene.start == "rest":
+        return None
+    for contact in scene.contacts:
+        if not hasattr(contact.model, "state_of"):
+            rule = f"be 'rest' for a {type(contact.model).__name__}, which has no state_of(deflections, normal_force)"
+            raise InvalidValueError("start", rule, scene.start)
+    loads = np.array([float(contact.normal_force(0.0)) for contact in scene.contacts])
+    shaped = np.where(loads > 0.0, shaped, 0.0)
+    return _sliding(scene, shaped) if scene.start == "sliding" else _equilibrium(scene, loads, shaped)
+
+
+def contact_map(scene: Any, contact: Any) -> np.ndarray:
+    """`A` `[3, 3]` of `V = A u` at t = 0: the twist of a contact from the velocity of the body."""
+    body, (dx, dy), angle = scene.body, contact.position, contact.angle
+    if scene.velocity is None and contact.mounted_on == "world":
+        dx, dy = dx - body.position[0], dy - body.position[1]
+    elif scene.velocity is None:
+        cos, sin = np.cos(body.angle), np.sin(body.angle)
+        dx, dy, angle = cos * dx - sin * dy, sin * dx + cos * dy, angle + body.angle
+    cos, sin = np.cos(angle), np.sin(angle)
+    return np.array([[cos, sin, sin * dx - cos * dy], [-sin, cos, sin * dy + cos * dx], [0.0, 0.0, 1.0]])
+
+
+def _sliding(scene: Any, shaped: np.ndarray) -> list[np.ndarray]:
+    velocity = scene.body.velocity if scene.velocity is None else scene.velocity(0.0)
+    states = []
+    for contact, load in zip(scene.contacts, shaped, strict=True):
+        model = contact.model
+        twist = contact_map(scene, contact) @ np.asarray(velocity)
+        states.append(model.step(model.rest(), twist, load, _LONG)[0] if load > 0.0 else model.rest())
+    return states
+
+
+# ---------------------------------------------------------------------- bristles that carry the load
+
+
+class _Cells(NamedTuple):
+    """The cells of all contacts."""
+
+    levers: np.ndarray
+    """What a small motion of the body is to each, `[n, 2, 3]`."""
+    stiffness: np.ndarray
+    """`count f_N w_i sigma_0` `[n]` [N/m]."""
+    largest: np.ndarray
+    """Largest deflection `[n]` [m]."""
+    middle: np.ndarray
+    """Where each bristle would be as far from its largest deflection in all directions `[n, 2]` [m]."""
+
+    def bent(self, motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Deflections `[n, 2]` after a small motion of the body `[3]`, and their slopes `[n, 2, 2]` by the stretch."""
+        way = self.levers @ motion - self.middle
+        length = np.hypot(*way.T)
+        over = length > self.largest
+        share = np.where(over, self.largest, 1.0) / np.where(over, length, 1.0)
+        along = way / np.where(length > 0.0, length, 1.0)[:, None]
+        slope = share[:, None, None] * (np.eye(2) - over[:, None, None] * along[:, :, None] * along[:, None, :])
+        return self.middle + share[:, None] * way, slope
+
+    def load(self, deflections: np.ndarray) -> np.ndarray:
+        """What deflections `[n, 2]` hold of a load on the body `[3]`."""
+        return np.einsum("n,nij,ni->j", self.stiffness, self.levers, deflections)
+
+
+def _equilibrium(scene: Any, loads: np.ndarray, shaped: np.ndarray) -> list[np.ndarray]:
+    """The bristles that the body bends when one small rigid motion brings it from rest to where they carry its load.
+
+    None is bent further than it can be, and of all bristles that carry the load these store the least energy: with
+    `zhat(d)` the nearest to `B_i d` that a bristle can be, the motion d makes `int sum k_i zhat_i dB_i d - P.d` least.
+    That is the rule by which contacts share what statics leaves open.
+    """
+    for contact in scene.contacts:
+        if contact.model.law.numbers.creep_speed > 0.0:
+            raise InvalidValueError("start", "be 'rest' or 'sliding' with a law that creeps", scene.start)
+    applied = np.zeros(3) if scene.force is None else scene.force(0.0)
+    pull = applied + scene.body.mass * np.array([*scene.body.gravity, 0.0])
+    cells = [_cells_of(scene, *each) for each in zip(scene.contacts, loads, shaped, strict=True)]
+    bent = _least_energy(_Cells(*(np.concatenate(each) for each in zip(*cells, strict=True))), pull)
+    ends = np.cumsum([len(each.stiffness) for each in cells])[:-1]
+    states = []
+    for contact, each, load in zip(scene.contacts, np.split(bent, ends), shaped, strict=True):
+        model = contact.model
+        states.append(model.state_of(each.T, load) if load > 0.0 else model.rest())
+    return states
+
+
+def _cells_of(scene: Any, contact: Any, load: float, shaped: float) -> _Cells:
+    model = contact.model
+    patch, law = model.patch, model.law.numbers
+    levers = patch.levers() @ contact_map(scene, contact)
+    weights = patch.weights(shaped) if shaped > 0.0 else np.zeros(len(levers))
+    largest = float(formulas.stribeck(np, np.zeros(()), law)) / law.sigma_0
+    middle = largest * patch.asymmetries() if patch.asymmetric else np.zeros((len(levers), 2))
+    return _Cells(levers, contact.count * load * law.sigma_0 * weights, np.full(len(levers), largest), middle)
+
+
+def _least_energy(cells: _Cells, pull: np.ndarray) -> np.ndarray:
+    """Deflections `[n, 2]` that carry a load `[3]`; raises where none do."""
+    elastic = np.einsum("n,nia,nib->ab", cells.stiffness, cells.levers, cells.levers)
+    scale = 1.0 / np.sqrt(np.where(np.diagonal(elastic) > 0.0, np.diagonal(elastic), 1.0))
+    scaled = elastic * np.outer(scale, scale)
+    motion = scale * np.linalg.lstsq(scaled, scale * pull, rcond=1e-14)[0]
+    if not np.array_equal(cells.bent(motion)[0], _free(cells, motion)):
+        motion = _bent_to_the_end(cells, pull, motion, scale)
+    bent = cells.bent(motion)[0]
+    size = max(np.abs(scale * pull).max(), np.finfo(float).tiny)
+    if np.abs(scale * (cells.load(bent) - pull)).max() > _BALANCED * size:
+        at_most = _held(cells, pull, motion)
+        friction = "" if at_most is None else f" (they hold {100.0 * at_most:.3g} % of the load at most)"
+        rule = f"be 'rest' or 'sliding' where the contacts do not hold the body{friction}"
+        raise InvalidValueError("start", rule, "equilibrium")
+    return bent
+
+
+def _free(cells: _Cells, motion: np.ndarray) -> np.ndarray:
+    return cells.middle + (cells.levers @ motion - cells.middle)
+
+
+def _bent_to_the_end(cells: _Cells, pull: np.ndarray, motion: np.ndarray, scale: np.ndarray) -> np.ndarray:
+    """The motion of least energy where some bristles are bent as far as they can be."""
+    unit = np.abs(motion / scale).max()  # motions of the search are of order one
+
+    def energy(x: np.ndarray) -> float:
+        d = unit * scale * x
+        way = cells.levers @ d
+        out = way - cells.bent(d)[0]
+        stored = 0.5 * (cells.stiffness * (way**2 - out**2).sum(axis=1)).sum()
+        return (stored - pull @ d) / unit**2
+
+    def slope(x: np.ndarray) -> np.ndarray:
+        return scale * (cells.load(cells.bent(unit * scale * x)[0]) - pull) / unit
+
+    def curvature(x: np.ndarray) -> np.ndarray:
+        bend = cells.bent(unit * scale * x)[1]
+        inner = np.einsum("n,nia,nij,njb->ab", cells.stiffness, cells.levers, bend, cells.levers)
+        return inner * np.outer(scale, scale)
+
+    options = {"gtol": 1e-13, "maxiter": 100, "max_trust_radius": 1e6}
+    found = minimize(energy, motion / (unit * scale), method="trust-exact", jac=slope, hess=curvature, options=options)
+    close = np.abs(found.jac).max() < _NEAR * np.abs(scale * pull).max() / unit
+    if close:  # the energy hides in its own rounding how close this is
+        closer = root(slope, found.x, jac=curvature)
+        return unit * scale * (closer.x if np.abs(closer.fun).max() < np.abs(found.jac).max() else found.x)
+    return unit * scale * found.x
+
+
+def _held(cells: _Cells, pull: np.ndarray, motion: np.ndarray) -> float | None:
+    """A bound below 1 on the share of the load that friction holds, from a motion that proves it; None without one."""
+    way, power = cells.levers @ motion, float(pull @ motion)
+    most = (cells.stiffness * (cells.largest * np.hypot(*way.T) + (cells.middle * way).sum(axis=1))).sum()
+    return float(most / power) if 0.0 <= most < power else None
