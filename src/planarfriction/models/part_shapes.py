@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+import weakref
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -20,6 +22,21 @@ from planarfriction.patch import ContactPatch
 
 REMEMBERED = 64
 """Loads whose shapes are remembered where each has a map of its own."""
+
+_FIXED: weakref.WeakKeyDictionary[ContactPatch, dict[tuple[float, int, int], ReducedShape]] = (
+    weakref.WeakKeyDictionary()
+)
+"""What models on the same patch have in common, whatever their friction, as long as the patch is in use."""
+
+_LOCK = threading.Lock()
+
+
+def fixed_shape(patch: ContactPatch, maps: tuple[float, int, int]) -> ReducedShape:
+    """The shape of a patch that does not depend on the load, built once for all models on it that live together."""
+    with _LOCK:
+        known = _FIXED.setdefault(patch, {})
+    found = known.get(maps)
+    return known.setdefault(maps, reduced_shape(patch, None, *maps)) if found is None else found
 
 
 @by_parts
@@ -41,7 +58,7 @@ class PartShapes:
 
     def __init__(self, patch: ContactPatch, maps: tuple[float, int, int], error: float, parts: int) -> None:
         self.patch, self._maps, self._error, self._parts = patch, maps, error, parts
-        self._fixed = None if patch.depends_on_load else reduced_shape(patch, None, *maps)
+        self._fixed = None if patch.depends_on_load else fixed_shape(patch, maps)
         self._forget()
 
     def _forget(self) -> None:

@@ -1,0 +1,152 @@
+"""How bristles start: carrying the load of a body that stands still, or as in steady sliding."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import planarfriction as pf
+from planarfriction.errors import FileError, InvalidValueError
+from planarfriction.scenes.start import contact_map, first_states
+
+LAW = pf.LuGre(mu_c=0.8, mu_s=1.0, sigma_0=1e5, elasto_plastic=0.9)
+COULOMB = pf.LuGre(mu_c=0.5, sigma_0=1e5, sigma_2=0.0, elasto_plastic=0.9)
+PATCH = pf.ContactPatch.disc(0.01, cells=7)
+SOFT = pf.ContactPatch.rectangle(0.02, cells=7, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0))
+GRAINED = PATCH.with_friction_metric(pf.grain(0.3, 0.7, 1.0))
+BRUSHED = PATCH.with_friction_metric(pf.grain(0.3, 0.7, 1.0), (0.2, 0.1))
+WEIGHT = 0.2 * 9.81
+
+
+def three_parts(patch, law):
+    return pf.ReducedModel(patch, law, parts=3)
+
+
+def model_name(model) -> str:
+    return f"{type(model).__name__}-{model.state_shape}-{model.patch.name}-{model.law.elasto_plastic is not None}"
+
+
+PLAIN = dataclasses.replace(LAW, elasto_plastic=None)
+MODELS = [
+    *(kind(PATCH, law) for law in (LAW, PLAIN) for kind in (pf.DistributedModel, three_parts, pf.ReducedModel)),
+    pf.ReducedModelPublished(PATCH, LAW),
+    *(kind(SOFT, LAW) for kind in (pf.DistributedModel, pf.ReducedModel, pf.ReducedModelPublished)),
+    pf.DistributedModel(BRUSHED, LAW),
+    pf.ReducedModel(BRUSHED, LAW),
+    pf.ReducedModelPublished(GRAINED, LAW, surface=pf.LimitSurfaceEllipsoid(GRAINED)),
+]
+
+
+def held(model, load: float = 6.0, **more) -> pf.Scene:
+    """A plate that the grip holds off its centre of mass."""
+    scene = pf.scenes.in_hand(model, centre_of_mass=(0.015, 0.0), normal_force=load, t_end=0.1)
+    return dataclasses.replace(scene, **{"start": "equilibrium", **more})
+
+
+@pytest.mark.parametrize("model", MODELS, ids=model_name)
+def test_a_body_in_equilibrium_stays_where_it_is(model):
+    """To 1e-12 m, which is 1e-7 of a full deflection; bristles at rest give way by more than 1e-6 m."""
+    data = pf.simulate(held(model), t_end=0.05).data
+    moved = max(float(abs(data.theta).max()) * 0.01, float(abs(data.y).max()))
+    assert moved < 1e-12
+    sagged = pf.simulate(held(model, start="rest"), t_end=0.05).data
+    assert float(abs(sagged.y).max()) > 1e-6
+    wrench = np.array([float(data[name][0, 0]) for name in ("fx", "fy", "tau")])
+    assert wrench == pytest.approx([0.0, 0.5 * WEIGHT, 0.5 * WEIGHT * 0.015], abs=1e-12)
+
+
+def test_contacts_share_the_load_by_their_stiffness():
+    """A push along the line between two feet: they take it in proportion to `f_N sigma_0`, the rule that is stated."""
+    soft = dataclasses.replace(LAW, sigma_0=0.5e5)
+    feet = [
+        pf.Contact(pf.DistributedModel(PATCH, LAW), 4.0, position=(-0.05, 0.0), name="hard"),
+        pf.Contact(pf.ReducedModel(PATCH, soft), 2.0, "body", position=(0.05, 0.0), count=2, name="soft"),
+    ]
+    body = pf.Body(1.0, 1e-3, gravity=(0.0, 0.0))
+    scene = pf.Scene(body, feet, 0.02, force=(1.5, 0.0, 0.0), start="equilibrium")
+    fx = pf.simulate(scene).data.fx.values
+    assert fx[0] == pytest.approx([-1.5 * 4.0 / 6.0, -1.5 * 1.0 / 6.0], rel=1e-9)
+    assert fx[-1] == pytest.approx(fx[0], rel=1e-6)
+
+
+def test_no_bristle_is_bent_further_than_it_can_be():
+    """Near the limit the outer cells of the patch are at `mu_s / sigma_0`, the inner ones below, and all balances."""
+    scene = held(pf.DistributedModel(PATCH, LAW), load=2.6)
+    (state,) = first_states(scene, np.array([2.6])) or []
+    length = np.hypot(*state)
+    largest = LAW.mu_s / LAW.sigma_0
+    assert length.max() <= largest * (1 + 1e-12)
+    assert 0 < np.isclose(length, largest, rtol=1e-9).sum() < len(length)
+    wrench = 2 * scene.contacts[0].model.wrench(state, np.zeros(3), 2.6)
+    map_ = contact_map(scene, scene.contacts[0])
+    assert map_.T @ wrench == pytest.approx([0.0, WEIGHT, 0.0], abs=1e-9)
+
+
+def test_where_nothing_holds_the_body_one_line_says_so():
+    """In translation friction holds `2 mu_s f_N` of the weight: the share in the message is that."""
+    scene = pf.scenes.in_hand(MODELS[0], centre_of_mass=(0.0, 0.0), normal_force=0.6 * WEIGHT / 2, t_end=0.1)
+    with pytest.raises(InvalidValueError, match=r"start must be .*they hold 60 % of the load at most") as error:
+        pf.simulate(dataclasses.replace(scene, start="equilibrium"))
+    assert "\n" not in str(error.value)
+    with pytest.raises(InvalidValueError, match="do not hold the body"):
+        pf.simulate(held(MODELS[0], load=0.0))
+    with pytest.raises(InvalidValueError, match="law that creeps"):
+        pf.simulate(held(pf.DistributedModel(PATCH, pf.CoulombStribeck(0.5, 0.5))))
+
+
+@pytest.mark.parametrize("model", MODELS, ids=model_name)
+def test_sliding_bristles_start_in_their_steady_state(model):
+    """At a held twist the wrench of the start is that of the end, to the solver's tolerance."""
+    scene = pf.scenes.driven(model, twist=(0.004, 0.001, 0.3), normal_force=2.0, t_end=0.1)
+    data = pf.simulate(dataclasses.replace(scene, start="sliding")).data
+    for name, scale in (("fx", 2.0), ("fy", 2.0), ("tau", 0.02)):
+        assert data[name][0, 0] == pytest.approx(float(data[name][-1, 0]), abs=1e-5 * scale)
+    empty = pf.simulate(scene).data
+    assert abs(float(empty.fx[0, 0] - data.fx[0, 0])) > 0.1
+
+
+def test_a_block_that_slides_goes_as_far_as_friction_lets_it():
+    """`v^2 / (2 mu g)`, to a hundredth of a full deflection; the damping of empty bristles would stop it at once."""
+    way, deflection = {}, 0.5 / 1e5
+    for start in ("rest", "sliding"):
+        scene = pf.scenes.free_slide(pf.ReducedModel(PATCH, COULOMB), twist=(0.05, 0.0, 0.0), save_every=1e-4)
+        data = pf.simulate(dataclasses.replace(scene, start=start), t_end=0.02, rtol=1e-8).data
+        way[start] = float(data.x.max()) - 0.05**2 / (2 * 0.5 * 9.81)
+    assert abs(way["sliding"]) < 0.01 * deflection
+    assert abs(way["rest"]) > deflection
+
+
+def test_files_and_solutions_keep_the_start(tmp_path):
+    scene = held(MODELS[0])
+    for name in ("scene.toml", "scene.json"):
+        scene.to_file(tmp_path / name)
+        assert pf.Scene.from_file(tmp_path / name) == scene
+    solution = pf.simulate(scene, t_end=0.02)
+    assert pf.load(solution.save(tmp_path / "run.nc")).scene.start == "equilibrium"
+    assert "start" not in held(MODELS[0], start="rest").to_dict()
+    data = scene.to_dict() | {"start": "slide"}
+    with pytest.raises(FileError, match="start must be one of rest, equilibrium, sliding"):
+        pf.Scene.from_dict(data)
+
+
+def test_starts_that_make_no_sense_are_refused():
+    scene = held(MODELS[0])
+    moving = dataclasses.replace(scene.body, velocity=(0.1, 0.0, 0.0))
+    with pytest.raises(InvalidValueError, match="velocity of the body must be zero"):
+        dataclasses.replace(scene, body=moving)
+    with pytest.raises(InvalidValueError, match="not be zero where start is 'sliding'"):
+        dataclasses.replace(scene, start="sliding")
+    driven = pf.scenes.driven(MODELS[0], t_end=0.1)
+    with pytest.raises(InvalidValueError, match="velocity is prescribed"):
+        dataclasses.replace(driven, start="equilibrium")
+
+
+def test_derivatives_to_what_moves_the_start_are_refused():
+    scene, knots = held(pf.ReducedModel(PATCH, LAW)), np.array([0.0, 0.05])
+    for parameters, signals in ((["mu"], {}), ((), {"fingers.normal_force": knots})):
+        with pytest.raises(InvalidValueError, match="start must be 'rest' for the derivative to"):
+            pf.autodiff.scene_sensitivities(scene, parameters, signals=signals)
+    with pytest.raises(InvalidValueError, match="start must be 'rest' for the derivative to vx"):
+        pf.autodiff.scene_gradient(scene, lambda time, motion: 0.0 * motion, initial=["vx"])
