@@ -55,6 +55,7 @@ _MODULES = (
     "limit_surface",
     "models",
     "patch",
+    "planning",
     "plots",
     "scenes",
     "solvers",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import brentq
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
@@ -45,7 +44,10 @@ def holding_load(wrench, patch: ContactPatch, mu: float, margin: float = 0.0) ->
         raise InvalidValueError("wrench", "be a load that this patch holds at some normal force", load.tolist())
     if tried <= low:
         return (1.0 + margin) * tried
-    return (1.0 + margin) * float(brentq(lambda each: each - _needed(load, patch, mu, each), low, tried, rtol=1e-12))
+    from scipy.optimize import brentq
+
+    found = brentq(lambda each: each - _needed(load, patch, mu, each), low, tried, xtol=1e-12 * low)
+    return (1.0 + margin) * float(found)  # pyright: ignore[reportArgumentType]
 
 
 def _needed(load: np.ndarray, patch: ContactPatch, mu: float, normal_force: float | None) -> float:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import minimize, root
 
 from planarfriction import formulas
 from planarfriction.errors import InvalidValueError
@@ -144,6 +143,8 @@ def _free(cells: _Cells, motion: np.ndarray) -> np.ndarray:
 
 def _bent_to_the_end(cells: _Cells, pull: np.ndarray, motion: np.ndarray, scale: np.ndarray) -> np.ndarray:
     """The motion of least energy where some bristles are bent as far as they can be."""
+    from scipy.optimize import minimize, root
+
     unit = np.abs(motion / scale).max()  # motions of the search are of order one
 
     def energy(x: np.ndarray) -> float:

@@ -1,0 +1,293 @@
+"""Profiles of a grip force that let a held body turn or slide by as much as wanted, and then hold it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.equality import ByValue
+from planarfriction.errors import InvalidValueError
+from planarfriction.planning.holding import holding_load
+from planarfriction.planning.motions import ROUGH, Aim, Grips, load_on
+from planarfriction.planning.report import GripReport
+from planarfriction.scenes import Scene, Signal
+
+LEVELS = (0.93, 0.85, 0.7, 0.5, 0.25, 0.02)
+"""Grips to start from, as shares of the load that holds a sliding body: all below what holds it, where nothing would
+follow a change of the grip."""
+
+KICK = 0.7
+"""Share of the load that holds a body at rest with which the grip begins: bristles at rest give way at once."""
+
+SPANS = (0.75, 0.2)
+"""Shares of the duration over which knots are spread: a short drop needs them close, a slow turn far apart."""
+
+ROUNDS, TRIES = 2, 16
+"""Rounds in which the worst friction gets more weight, and profiles that are tried in each."""
+
+MOST_KNOTS = 200
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class GripPlan(ByValue):
+    """A grip force over time that brings a body where it should be, and what becomes of it."""
+
+    scene: Scene
+    """The scene with the profile in place: `simulate(plan.scene)` runs the plan."""
+    signal: Signal
+    """Normal force of one of the identical contacts [N], lines between its knots, held after the last."""
+    report: GripReport
+    """What the plan reaches, as the scene is and with other frictions."""
+    contact: str
+    """Name of the contact that was planned."""
+    frictions: tuple[Scene, ...] = field(default=(), compare=False)
+    """The plan with the frictions of the report."""
+
+    def __repr__(self) -> str:
+        return str(self.report)
+
+    def plot(self) -> Any:
+        """Draw the profile and the motion, as the scene is and with other frictions; returns a matplotlib Figure."""
+        from planarfriction.plots.planning import plot_grip
+
+        return plot_grip(self)
+
+
+def plan_grip(
+    scene: Scene,
+    goal: Mapping[str, Any],
+    *,
+    contact: str | None = None,
+    knots: Any = 20,
+    bounds: Sequence[float] | None = None,
+    margin: float = 0.5,
+    friction: float = 0.05,
+    aim: str = "nominal",
+) -> GripPlan:
+    """Plan the normal force of a contact so that a body that it holds turns or slides by as much as wanted, and stops.
+
+    The load moves the body, friction brakes it. The search begins with profiles that let it go at a few levels below
+    the load that holds it, until the time that makes the goal (a root of one number), takes the best of them, and bends
+    its knots by least squares with the derivatives of `scene_sensitivities`.
+
+    Parameters
+    ----------
+    scene
+        A free body, its contacts and the duration; bristles start at rest.
+    goal
+        `{"angle": radians}`: turn by that angle, and slide as little as can be; or `{"slide": (dx, dy)}`: slide by that
+        much [m], world axes, and turn as little as can be. Slide is that of the place under the grip.
+    contact
+        Name of the contact whose normal force is planned; None takes the only one.
+    knots
+        How many, evenly over the first three quarters or the first fifth of the duration, whichever does better; or
+        their times [s]. The last value is held.
+    bounds
+        Least and largest normal force [N]; None for 0.02 and 4 times the load that holds the body.
+    margin
+        By how much, as a share, the last knot and all in the last quarter of the duration exceed at least the
+        `holding_load` with mu_c at the goal.
+    friction
+        Uncertainty of mu_c and mu_s, as a share: the report says what it does.
+    aim
+        "nominal": the goal as the scene is; "worst": the least that the worst of the frictions misses.
+
+    Raises
+    ------
+    InvalidValueError
+        A parameter breaks its rule, or no grip within the bounds brings the body to the goal.
+    """
+    begin = time.perf_counter()
+    index = _contact_of(scene, contact)
+    angle, slide = _goal(goal)
+    spread = _knots(scene, knots)
+    friction = validation.non_negative("friction", friction)
+    if friction >= 1.0:
+        raise InvalidValueError("friction", "be below 1", friction)
+    validation.choice("aim", aim, ("nominal", "worst"))
+    chosen = scene.contacts[index]
+    patch, law = chosen.model.patch, chosen.model.law.numbers
+    at_start = holding_load(load_on(scene, index, 0.0, np.zeros(2), 0.0), patch, law.mu_c)
+    if at_start == 0.0:
+        raise InvalidValueError("scene", "have a load that moves the body", "no gravity and no force")
+    at_end = holding_load(load_on(scene, index, angle or 0.0, slide, scene.t_end), patch, law.mu_c)
+    low, high = _bounds(bounds, at_start)
+    least = (1.0 + validation.non_negative("margin", margin)) * at_end
+    if least > high:
+        raise InvalidValueError("bounds", f"reach the {least:.3g} N that hold the body at the end", [low, high])
+    radius = float(patch.contact_radius(at_start))
+    shares = (1.0, 1.0 - friction, 1.0 + friction) if friction else (1.0,)
+    wanted = Aim(angle, slide, radius)
+    seen = sorted({*shares, 0.99, 1.01})
+    grips = Grips(scene, index, seen)
+    wanted = Aim(angle, slide, radius)
+    factors = shares if aim == "worst" else (1.0,)
+    searches = [_Search(grips, wanted, factors, times, (low, least, high), at_start) for times in spread]
+    kick, hold = KICK * law.mu_c / law.mu_s, min(high, max(2.0 * least, at_start))
+    profile = max(searches, key=lambda each: each.begin(kick, hold)).bent()
+    outcomes = grips.outcomes(profile, seen, rtol=None)
+    cost = grips.simulations, grips.jacobians, time.perf_counter() - begin
+    report = GripReport.of(wanted, seen, outcomes, float(profile.values[-1]), at_end, cost)
+    found = tuple(grips.scene_of(profile, factor) for factor in shares)
+    return GripPlan(found[0], profile, report, chosen.name, found)
+
+
+class _Search:
+    """The search for the values at some knots, between `low`, `least` for those that hold, and `high` [N]."""
+
+    def __init__(
+        self, grips: Grips, aim: Aim, factors: Sequence[float], times: np.ndarray, between: tuple, holding: float
+    ) -> None:
+        low, least, self._high = between
+        held = times >= SPANS[0] * grips.scene.t_end
+        held[-1] = True
+        self._grips, self._aim, self._factors, self._times = grips, aim, factors, times
+        self._low, self._holding = np.where(held, least, low), holding
+        self._bend = ROUGH / holding * np.diff(np.eye(len(times)), 2, axis=0)
+        self._weights = np.full(len(factors), 1.0 / len(factors))
+        self._values = np.zeros(0)
+        self._reached = 0.0
+
+    def begin(self, kick: float, hold: float) -> float:
+        """How good the best of the profiles is that let the body go at one level, until the time that makes the goal.
+
+        Minus what the search makes least; far less without such a profile.
+        """
+        from scipy.optimize import brentq
+
+        found = []
+        for level in LEVELS:
+            profile = _Release(self._times, level * self._holding, kick * self._holding, hold)
+
+            def missing(until: float, profile: _Release = profile) -> float:
+                (outcome,) = self._grips.outcomes(self._signal(self._inside(profile(until))), [1.0])
+                return self._aim.progress(outcome) - 1.0
+
+            most = missing(profile.latest)
+            self._reached = max(self._reached, most + 1.0)
+            if most > 0.0:
+                until = float(brentq(missing, profile.earliest, profile.latest, xtol=1e-4))  # pyright: ignore
+                values = self._inside(profile(until))
+                found.append((-0.5 * float((self._residuals(values) ** 2).sum()), values))
+        if not found:
+            return -np.inf
+        best, self._values = max(found, key=lambda each: each[0])
+        return best
+
+    def bent(self) -> Signal:
+        """The profile after the search, from that of the start."""
+        from scipy.optimize import least_squares
+
+        if not len(self._values):
+            name, goal = ("slide", self._aim.slide.tolist()) if self._aim.angle is None else ("angle", self._aim.angle)
+            rule = f"be a goal that the load takes the body to ({100.0 * self._reached:.3g} % of the way at most)"
+            raise InvalidValueError(name, rule, goal)
+        values, best, least = self._values, self._values, np.inf
+        for _ in range(1 if len(self._factors) == 1 else 1 + ROUNDS):
+            found = least_squares(
+                self._residuals,
+                values,
+                jac=self._slopes,  # pyright: ignore[reportArgumentType]
+                bounds=(self._low, np.full(len(values), self._high * (1.0 + 1e-6))),
+                x_scale=self._holding,
+                max_nfev=TRIES,
+            )
+            values = found.x
+            misses = np.array([self._far(each) for each in self._grips.outcomes(self._signal(values), self._factors)])
+            if misses.max() < least:
+                best, least = values, misses.max()
+            self._weights = self._weights * misses / (self._weights @ misses) if misses.any() else self._weights
+        return self._signal(best)
+
+    def _signal(self, values: np.ndarray) -> Signal:
+        return Signal.sampled(self._times, values, "linear")
+
+    def _far(self, outcome: Any) -> float:
+        return float(np.linalg.norm(self._aim.misses(outcome)))
+
+    def _inside(self, values: np.ndarray) -> np.ndarray:
+        return np.clip(values, self._low + 1e-6 * self._high, self._high)
+
+    def _residuals(self, values: np.ndarray) -> np.ndarray:
+        outcomes = self._grips.outcomes(self._signal(values), self._factors)
+        misses = [w**0.5 * self._aim.misses(each) for w, each in zip(self._weights, outcomes, strict=True)]
+        return np.concatenate([*misses, self._bend @ values])
+
+    def _slopes(self, values: np.ndarray) -> np.ndarray:
+        per = 1.0 / self._aim.scales()[:, None]
+        slopes = self._grips.slopes(self._signal(values), self._factors)
+        rows = [w**0.5 * per * each for w, each in zip(self._weights, slopes, strict=True)]
+        return np.concatenate([*rows, self._bend])
+
+
+class _Release:
+    """A profile that begins low, goes on at a level until some time, and then holds."""
+
+    def __init__(self, times: np.ndarray, level: float, kick: float, hold: float) -> None:
+        self._times, self._hold = times, hold
+        self._rise = float(np.diff(times).max())
+        self._low = np.interp(times, [times[0], times[0] + self._rise], [min(level, kick), level])
+        self.earliest, self.latest = float(times[0]) - self._rise, float(times[-1]) - self._rise
+
+    def __call__(self, until: float) -> np.ndarray:
+        share = np.interp(self._times, [until, until + self._rise], [0.0, 1.0])
+        return self._low + (self._hold - self._low) * share
+
+
+# ---------------------------------------------------------------------- what was asked for
+
+
+def _contact_of(scene: Any, name: str | None) -> int:
+    """Place of the contact whose grip is planned."""
+    validation.instance("scene", scene, Scene, "a Scene")
+    if scene.velocity is not None:
+        raise InvalidValueError("velocity", "be None for a body that a grip moves", scene.velocity)
+    if scene.start != "rest":
+        raise InvalidValueError("start", "be 'rest' for a plan, whose derivatives begin there", scene.start)
+    if scene.stop_speed is not None:
+        raise InvalidValueError("stop_speed", "be None for a plan, which has to hold until the end", scene.stop_speed)
+    names = [each.name for each in scene.contacts]
+    if name is None and len(names) > 1:
+        raise InvalidValueError("contact", f"be given where there are several ({', '.join(names)})", name)
+    return 0 if name is None else names.index(validation.choice("contact", name, names))
+
+
+def _goal(goal: Any) -> tuple[float | None, np.ndarray]:
+    """Angle, None where the goal is a slide, and slide, zeros where it is an angle."""
+    if not isinstance(goal, Mapping) or len(goal) != 1:
+        raise InvalidValueError("goal", 'be {"angle": radians} or {"slide": (dx, dy)}', validation.quoted(goal))
+    validation.keys("goal", goal, [], ["angle", "slide"])
+    if "angle" in goal:
+        angle, slide = validation.number("angle", goal["angle"]), np.zeros(2)
+    else:
+        angle, slide = None, validation.array("slide", goal["slide"], (2,))
+    if not angle and not slide.any():
+        raise InvalidValueError("goal", "not be zero", dict(goal))
+    return angle, slide
+
+
+def _knots(scene: Scene, knots: Any) -> list[np.ndarray]:
+    """Times of the knots [s], of which the best are taken."""
+    if isinstance(knots, (int, np.integer)) and not isinstance(knots, bool):
+        count = validation.count("knots", knots, 4, MOST_KNOTS)
+        return [np.linspace(0.0, share * scene.t_end, count) for share in SPANS]
+    times = validation.array("knots", knots, (None,))
+    if not 4 <= len(times) <= MOST_KNOTS or times[0] != 0.0 or (np.diff(times) <= 0.0).any():
+        raise InvalidValueError("knots", f"be 4 to {MOST_KNOTS} times that increase from 0 s on", times.tolist())
+    if times[-1] >= scene.t_end:
+        raise InvalidValueError("knots", f"end before the scene does, at {scene.t_end:g} s", times.tolist())
+    return [times]
+
+
+def _bounds(bounds: Any, holding: float) -> tuple[float, float]:
+    if bounds is None:
+        return 0.02 * holding, 4.0 * holding
+    low, high = validation.non_negative_array("bounds", bounds, (2,)).tolist()
+    if not low < high:
+        raise InvalidValueError("bounds", "be the least and the largest normal force", [low, high])
+    return low, high
