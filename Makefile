@@ -2,6 +2,7 @@
 # make test-generic: the tests of numbers once more, compiled for any x86-64 or ARM processor instead of this one.
 # make test-lowest: the tests with the lowest versions of everything.
 # make fuzz MINUTES=60: attacks with random examples, an hour long.
+# make docs: the site, in build/docs; scripts of its gallery run once, and again when they have changed.
 
 PYTHON ?= python3
 VENV := .venv
@@ -12,7 +13,7 @@ LOWEST := .venv-lowest
 # survive from run to run. What is installed changes with pyproject.toml only.
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 
-.PHONY: demo test test-generic test-lowest fuzz lint bench clean
+.PHONY: demo test test-generic test-lowest fuzz docs lint bench clean
 
 demo: $(VENV)/.package
 	$(BIN)/planarfriction run in-hand --model both --out out/ --plot
@@ -37,6 +38,9 @@ MINUTES ?= 60
 fuzz: $(VENV)/.test
 	$(BIN)/python tests/fuzz $(MINUTES)
 
+docs: $(VENV)/.docs
+	$(BIN)/python -m sphinx -W --keep-going -n docs build/docs
+
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -47,7 +51,7 @@ bench: $(VENV)/.package
 	$(BIN)/planarfriction bench $(ARGS)
 
 clean:
-	rm -rf $(VENV) $(LOWEST) out build dist .pytest_cache .ruff_cache .hypothesis .import_linter_cache src/*.egg-info
+	rm -rf $(VENV) $(LOWEST) out build dist docs/api docs/gallery docs/notebooks .pytest_cache .ruff_cache .hypothesis .import_linter_cache src/*.egg-info
 	find src tests examples -name __pycache__ -type d -prune -exec rm -rf {} +
 
 $(BIN)/python:
@@ -72,4 +76,9 @@ $(LOWEST)/.test: pyproject.toml
 
 $(VENV)/.dev: $(VENV)/.test
 	$(PIP) --editable '.[dev]'
+	touch $@
+
+# With all optional packages, so that nothing is missing from the reference and the gallery.
+$(VENV)/.docs: $(VENV)/.test
+	$(PIP) --editable '.[docs]'
 	touch $@

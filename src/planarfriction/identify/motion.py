@@ -75,6 +75,9 @@ def identify_motion(
     them, which makes the rest of the slide a prediction. Friction is seen through accelerations: mu as `mu g`, the
     contact radius as `mu m g r/inertia`.
 
+    Standard errors come from the spread over the slides (each votes as a whole), so they hold although the residuals
+    within a slide are alike and friction differs from slide to slide. They need ten slides or more to mean much.
+
     Parameters
     ----------
     slides
@@ -98,9 +101,6 @@ def identify_motion(
         takes all alike. What was left out, and the slide that moves an estimate most, is told in the verdicts.
     progress
         Called with a text now and then.
-
-    Standard errors come from the spread over the slides (each votes as a whole), so they hold although the residuals
-    within a slide hang together and friction differs from slide to slide. They need ten slides or more to mean much.
 
     Raises
     ------

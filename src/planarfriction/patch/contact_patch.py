@@ -41,13 +41,13 @@ class ContactPatch(Anisotropy):
     then leads the shape of the result. A patch whose shape depends on the load has weights 0, and with them
     moments 0, at zero load.
 
+    Source: Waltersson and Karayiannidis 2024, section III.
+
     Raises
     ------
     InvalidValueError
         No cells, wrong shapes, numbers that are not finite, negative pressure, zero total pressure, a normal force that
         is negative or missing where it is needed.
-
-    Source: Waltersson and Karayiannidis 2024, section III.
     """
 
     positions: np.ndarray

@@ -1,0 +1,107 @@
+"""The documentation site: `make docs` builds it from these pages, the docstrings and the scripts of the gallery."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE / "extensions"))
+os.environ.setdefault("PYTHONHASHSEED", "0")
+
+import matplotlib  # noqa: E402
+
+matplotlib.use("Agg")
+
+import planarfriction  # noqa: E402
+
+project = "planarfriction"
+author = "the authors of planarfriction"
+copyright = author
+version = release = planarfriction.__version__
+
+extensions = [
+    "myst_parser",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.viewcode",
+    "sphinx_click",
+    "sphinx_copybutton",
+    "sphinx_gallery.gen_gallery",
+    "api_pages",
+    "code_links",
+    "glossary_links",
+    "mathml",
+    "repository_links",
+]
+exclude_patterns = ["extensions", "gallery/**.ipynb", "gallery/**.py", "notebooks/**.ipynb", "notebooks/**.py"]
+suppress_warnings = [
+    "config.cache",  # sphinx-gallery keeps functions in its settings
+]
+
+# -- pages in Markdown: colon fences, so that the Python of a page stays easy to find for the tests
+
+myst_enable_extensions = ["amsmath", "attrs_inline", "colon_fence", "deflist", "dollarmath"]
+myst_heading_anchors = 4
+html_math_renderer = "mathml"  # by docutils: nothing is loaded from elsewhere when a page is read
+
+# -- API from docstrings, whose `code` is in single backticks
+
+default_role = "literal"
+autodoc_member_order = "bysource"
+autodoc_typehints_format = "short"
+autodoc_preserve_defaults = True
+autodoc_default_options = {"members": True}
+napoleon_google_docstring = napoleon_numpy_docstring = False  # `api_pages` applies it where there are sections
+napoleon_use_rtype = False
+OPTIONAL = ("torch", "jax", "mujoco", "pydrake")
+MISSING = [name for name in OPTIONAL if importlib.util.find_spec(name) is None]
+autodoc_mock_imports = MISSING
+
+nitpicky = True
+nitpick_ignore_regex = [
+    # Types of other libraries in signatures: no inventory of theirs is downloaded for a link.
+    # In the same place: types of ours that are no one's to make, and so stand in no `__all__`.
+    (r"py:class", r"planarfriction\..*|types\.\w+|Path|Tensor|History|style\.PlotFigure|tuple\[float"),
+    (r"py:.*", r"(np|numpy|xr|xarray|matplotlib|scipy|torch|jax|jaxlib|numba|mujoco|pydrake|pathlib|collections)\..*"),
+]
+
+# -- the gallery: every script is run, and again when it has changed
+
+NEEDS = {"torch": "torch", "jax": "jax", "mujoco": "mujoco", "pydrake": "drake"}
+WITHOUT = "|".join(f"_{NEEDS[name]}" for name in MISSING)
+sphinx_gallery_conf = {
+    "examples_dirs": ["../examples/gallery", "../examples/notebooks"],
+    "gallery_dirs": ["gallery", "notebooks"],
+    "filename_pattern": r"\.py$",
+    "ignore_pattern": rf"__init__\.py{f'|({WITHOUT}).py$' if WITHOUT else ''}",
+    "matplotlib_animations": False,
+    "image_scrapers": ("matplotlib", "figure_scraper"),
+    "remove_config_comments": True,
+    "min_reported_time": 10,
+    "show_signature": False,
+    "download_all_examples": False,
+    "write_computation_times": False,
+    "nested_sections": False,
+    "within_subsection_order": "FileNameSortKey",
+    "abort_on_example_error": False,
+}
+
+# -- looks
+
+html_theme = "furo"
+html_title = f"planarfriction {version}"
+html_static_path = ["static"]
+html_css_files = ["site.css"]
+html_show_sphinx = False
+html_copy_source = False
+copybutton_prompt_text = "$ "
+
+
+def setup(app):
+    """Tables of numbers in files have no words to colour."""
+    from pygments.lexers.special import TextLexer
+
+    app.add_lexer("csv", TextLexer)

@@ -1,0 +1,171 @@
+"""One page of reference for every public module, written from `__all__`: what is made public appears by itself.
+
+Also a page with the compiled loops that the pages of the documentation name, so that these names are links.
+"""
+
+from __future__ import annotations
+
+import importlib
+import inspect
+import pkgutil
+import re
+import sys
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from sphinx.application import Sphinx
+from sphinx.ext.napoleon import NumpyDocstring
+from sphinx.pycode import ModuleAnalyzer
+
+import planarfriction
+
+OPTIONAL = ("torch", "jax", "adapters.mujoco", "adapters.mjx", "adapters.drake")
+"""Public modules that load a package of an extra, and so stand in no list of the package."""
+
+KERNEL = re.compile(r"\bkernels\.\w+(?:\.\w+)?")
+
+
+def public_modules() -> list[str]:
+    return ["planarfriction", *(f"planarfriction.{name}" for name in (*planarfriction._MODULES, *OPTIONAL))]
+
+
+def public_names(module: ModuleType) -> list[str]:
+    """What `__all__` lists, or what the module defines; modules have pages of their own."""
+    own = [name for name, value in vars(module).items() if getattr(value, "__module__", None) == module.__name__]
+    names = getattr(module, "__all__", [name for name in own if not name.startswith("_")])
+    return [name for name in names if not inspect.ismodule(getattr(module, name, None))]
+
+
+def heading(text: str, line: str = "=") -> list[str]:
+    return [text, line * len(text), ""]
+
+
+def entry(full_name: str, value: Any) -> list[str]:
+    """The directive that documents `value`, its members and those that it inherits from us."""
+    if inspect.isclass(value):
+        foreign = [base.__name__ for base in value.__mro__ if not base.__module__.startswith("planarfriction")]
+        return [f".. autoclass:: {full_name}", f"   :inherited-members: {', '.join(foreign)}", ""]
+    if inspect.isfunction(value) or hasattr(value, "py_func"):
+        return [f".. autofunction:: {full_name}", ""]
+    name = full_name.rsplit(".", 1)[-1]
+    return [f".. py:data:: {full_name}", "", *(f"   {line}" for line in words_of(name, value)), ""]
+
+
+def words_of(name: str, value: Any) -> list[str]:
+    """The words below a constant, or a bound method's own, in whichever module of the package has them."""
+    if inspect.isroutine(value):
+        return (inspect.getdoc(value) or "").splitlines()
+    for module in list(sys.modules):
+        if module.startswith("planarfriction.") and vars(sys.modules[module]).get(name) is value:
+            words = ModuleAnalyzer.for_module(module).find_attr_docs().get(("", name))
+            if words:
+                return words
+    return []
+
+
+def first_sentence(value: Any) -> str:
+    text = " ".join((inspect.getdoc(value) or "").split("\n\n")[0].split())
+    return re.split(r"(?<=[.:])\s", text)[0].rstrip(":.")
+
+
+def page(name: str, documented: dict[int, str]) -> list[str]:
+    """A module's page; what an earlier page documents is only named, in a list at the end."""
+    module = importlib.import_module(name)
+    lines = [*heading(name), f".. automodule:: {name}", "   :no-members:", ""]
+    elsewhere = []
+    for each in public_names(module):
+        value = getattr(module, each)
+        known = documented.setdefault(id(value), f"{name}.{each}") if not isinstance(value, (str, int)) else None
+        if known in (None, f"{name}.{each}"):
+            lines += entry(f"{name}.{each}", value)
+        else:
+            elsewhere.append(f"- `{known}`")
+    if elsewhere:
+        lines += ["Also here, and documented elsewhere:", "", *elsewhere, ""]
+    return lines
+
+
+def kernels_page(pages: Path) -> list[str]:
+    """The compiled functions and modules that the pages name, with their words and their source."""
+    named = {name for path in pages.glob("*.md") for name in KERNEL.findall(path.read_text(encoding="utf-8"))}
+    modules = {module.name for module in pkgutil.iter_modules([str(Path(planarfriction.__path__[0]) / "kernels")])}
+    lines = heading("Compiled loops")
+    lines += [
+        "Internal: no promise is made about them. They are here since the pages name them beside their equations.",
+        "",
+    ]
+    for module_name in sorted({name.split(".")[1] for name in named} & modules):
+        module = importlib.import_module(f"planarfriction.kernels.{module_name}")
+        lines += [*heading(f"kernels.{module_name}", "-"), f".. automodule:: {module.__name__}", "   :no-members:", ""]
+        for name in sorted(name for name in named if name.startswith(f"kernels.{module_name}.")):
+            each = name.split(".")[2]
+            if hasattr(module, each):
+                lines += entry(f"{module.__name__}.{each}", getattr(module, each))
+    return lines
+
+
+def write(path: Path, lines: list[str]) -> None:
+    """Write a page if it has changed, so that Sphinx reads no page twice."""
+    text = "\n".join(lines) + "\n"
+    if not path.exists() or path.read_text(encoding="utf-8") != text:
+        path.write_text(text, encoding="utf-8")
+
+
+def generate(app: Sphinx) -> None:
+    folder = Path(app.srcdir) / "api"
+    folder.mkdir(exist_ok=True)
+    documented: dict[int, str] = {}
+    missing = tuple(app.config.autodoc_mock_imports)
+    written = {"index.rst", "kernels.rst"}
+    rows = []
+    for name in public_modules():
+        try:
+            lines = page(name, documented)
+        except ImportError as error:
+            if not missing:
+                raise error
+            continue
+        file = name.replace("planarfriction.", "") if name != "planarfriction" else "planarfriction"
+        write(folder / f"{file}.rst", lines)
+        written.add(f"{file}.rst")
+        rows.append((file, first_sentence(importlib.import_module(name))))
+    write(folder / "kernels.rst", kernels_page(Path(app.srcdir)))
+    index = [
+        *heading("Python"),
+        "Every public name, from its docstring.",
+        "",
+        ".. list-table::",
+        "   :widths: 25 75",
+        "",
+    ]
+    for file, words in rows:
+        index += [f"   * - :doc:`{file}`", f"     - {words}"]
+    index += ["   * - :doc:`kernels`", "     - Compiled loops that these pages name", ""]
+    index += [".. toctree::", "   :hidden:", "", *(f"   {file}" for file, _ in rows), "   kernels"]
+    write(folder / "index.rst", index)
+    for old in {path.name for path in folder.glob("*.rst")} - written:
+        (folder / old).unlink()
+
+
+def as_restructured_text(app: Sphinx, what: str, name: str, thing: Any, options: Any, lines: list[str]) -> None:
+    """Sections in the style of NumPy, and `|v|` outside of backticks as a size, which is a substitution there.
+
+    The words of attributes have no sections, and a colon in them is a colon.
+    """
+    if what not in ("attribute", "property", "data"):
+        lines[:] = NumpyDocstring(list(lines), app.config, app, what, name, thing, options).lines()
+    code = False
+    for i, line in enumerate(lines):
+        pieces = line.split("`")
+        for k, piece in enumerate(pieces):
+            code ^= k > 0
+            if not code:
+                pieces[k] = re.sub(r"(?<!\\)\|", r"\\|", piece)
+        lines[i] = "`".join(pieces)
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    app.connect("builder-inited", generate)
+    app.connect("autodoc-process-docstring", as_restructured_text)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,0 +1,43 @@
+"""What the pages share with the repository: files beside `docs` that are pages here, and links to them."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from sphinx.application import Sphinx
+
+PAGES = {"contributing": "CONTRIBUTING.md", "changelog": "CHANGELOG.md"}
+"""Page -> the file of the repository that it is; the page beside this one only says so."""
+
+LINKS = {
+    r"(?:\.\./)?README\.md(?:#[\w-]+)?": "index.md#citation",
+    r"(?:\.\./)?CONTRIBUTING\.md": "contributing.md",
+    r"(?:\.\./)?CHANGELOG\.md": "changelog.md",
+    r"docs/([\w-]+\.md(?:#[\w-]+)?)": r"\1",
+}
+"""Link in a file of the repository -> link to the page."""
+
+
+def rewrite(app: Sphinx, name: str, source: list[str]) -> None:
+    """Put the file in the place of its page, and make links lead to pages."""
+    if name in PAGES:
+        path = Path(app.srcdir).parent / PAGES[name]
+        app.env.note_dependency(path)
+        source[0] = path.read_text(encoding="utf-8")
+    for pattern, page in LINKS.items():
+        source[0] = re.sub(rf"\]\({pattern}\)", rf"]({page})", source[0])
+    if name == "index":
+        source[0] = re.sub(
+            r"^[\w-]*\*\n", lambda entry: entry[0] if pages(app, entry[0]) else "", source[0], flags=re.M
+        )
+
+
+def pages(app: Sphinx, pattern: str) -> bool:
+    """Whether a pattern in a list of pages finds one; Sphinx warns of each that does not."""
+    return any(Path(app.srcdir).glob(f"{pattern.strip()}.md"))
+
+
+def setup(app: Sphinx) -> dict[str, bool]:
+    app.connect("source-read", rewrite)
+    return {"parallel_read_safe": True, "parallel_write_safe": True}

@@ -1,0 +1,65 @@
+"""The site of the documentation builds without a warning: links, names, terms, docstrings, and every gallery script."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+NEEDED = ("sphinx", "myst_parser", "sphinx_gallery", "sphinx_click", "sphinx_copybutton", "furo")
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not (ROOT / "docs" / "conf.py").exists(), reason="no docs beside these tests"),
+    pytest.mark.skipif(any(importlib.util.find_spec(name) is None for name in NEEDED), reason="needs the extra [docs]"),
+]
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The built site of a copy of the sources, so that what is generated does not land among them."""
+    copy = tmp_path_factory.mktemp("copy")
+    generated = (
+        shutil.ignore_patterns("api", "gallery", "notebooks") if not (ROOT / "docs" / "gallery").exists() else None
+    )
+    shutil.copytree(ROOT / "docs", copy / "docs", ignore=generated)
+    shutil.copytree(ROOT / "examples", copy / "examples", ignore=shutil.ignore_patterns("__pycache__"))
+    for name in ("CONTRIBUTING.md", "CHANGELOG.md", "README.md"):
+        shutil.copy(ROOT / name, copy)
+    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-n", "-q", "docs", "site"]
+    path = os.pathsep.join([str(ROOT / "src"), *filter(None, [os.environ.get("PYTHONPATH")])])
+    done = subprocess.run(
+        command, cwd=copy, env=os.environ | {"PYTHONPATH": path}, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return copy / "site"
+
+
+def test_equations_names_and_terms_are_links(site):
+    physics = (site / "physics.html").read_text(encoding="utf-8")
+    assert "<math" in physics and "$$" not in physics
+    assert 'href="api/formulas.html#planarfriction.formulas.stribeck"' in physics
+    assert 'href="api/kernels.html#planarfriction.kernels.exact.disc_sum"' in physics
+    assert 'href="glossary.html#term-limit-surface"' in physics
+
+
+def test_every_public_name_is_in_the_reference(site):
+    import planarfriction
+
+    pages = "".join(page.read_text(encoding="utf-8") for page in (site / "api").glob("*.html"))
+    missing = [name for name in planarfriction._HOME if f'id="planarfriction.{name}"' not in pages]
+    missing += [name for name in planarfriction._MODULES if f'id="module-planarfriction.{name}"' not in pages]
+    assert not missing
+
+
+def test_the_gallery_has_a_picture_for_each_script(site):
+    scripts = [path.stem for path in (ROOT / "examples" / "gallery").glob("plot_*.py")]
+    pictures = {path.name for path in (site / "_images").glob("sphx_glr_*")}
+    assert scripts
+    assert not [name for name in scripts if f"sphx_glr_{name}_001.png" not in pictures]
