@@ -1,4 +1,4 @@
-"""Figures of the library are not pyplot's: a gallery script shows one by giving it a name, as `figure = patch.plot()`."""
+"""Figures of the library are not pyplot's: a gallery script shows one by giving it a name, `figure = ...`."""
 
 from __future__ import annotations
 
