@@ -73,6 +73,7 @@ def fails(capsys, *arguments: str) -> str:
         ["run", "in-hand", "--patch", "pad.csv", "--cell-size"],
         ["limit-surface", "--pressure", "pad.csv", "--cell-size"],
         ["identify", "log.csv", "--width"],
+        ["identify", "plan", "--speed"],
     ],
     ids=lambda command: f"{command[0]} {command[-1]}",
 )
@@ -96,6 +97,8 @@ def test_numbers(capsys, command, value):
         ["identify", "log.csv", "--parameters"],
         ["identify", "log.csv", "--start"],
         ["identify", "log.csv", "--noise"],
+        ["identify", "plan"],
+        ["identify", "plan", "--wanted"],
         ["bench", "--only"],
         ["reproduce", "--only"],
         ["warm"],

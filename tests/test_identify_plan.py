@@ -6,10 +6,12 @@ import dataclasses
 
 import numpy as np
 import pytest
+from click.shell_completion import ShellComplete
 
 import planarfriction as pf
 from identification_logs import LAW, LOAD, PATCH, clean_log, excitation, noisy
 from planarfriction.cli import main
+from planarfriction.cli.app import app
 from planarfriction.cli.output import write_csv
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify import Log, candidate_motions, identify_lugre, plan_motion, told_so_far
@@ -175,7 +177,7 @@ def test_the_command_writes_a_motion_that_identify_reads(tmp_path, slide, capsys
     write_csv(tmp_path / "slide.csv", columns_of(slide))
     out = tmp_path / "next.csv"
     options = ["--patch", "disc", "--duration", "0.5", "--speed", "0.03", "--spin", "2", "--out", str(out)]
-    assert main(["plan", str(tmp_path / "slide.csv"), *options, "--parameters", "mu_c,contact_radius"]) == 0
+    assert main(["identify", "plan", str(tmp_path / "slide.csv"), *options, "--parameters", "mu_c,contact_radius"]) == 0
     assert capsys.readouterr().out.startswith("Move next: ")
     motion = Log.from_csv(out)
     assert len(motion.time) == 500 and motion.twist.any() and np.abs(motion.twist[:, 2]).max() <= 2.0
@@ -193,6 +195,33 @@ def test_the_command_writes_a_motion_that_identify_reads(tmp_path, slide, capsys
     ],
 )
 def test_what_is_wrong_with_a_command_is_one_line(capsys, options, words):
-    assert main(["plan", *options]) == 2
+    assert main(["identify", "plan", *options]) == 2
     message = capsys.readouterr().err
     assert message.startswith("error: ") and message.count("\n") == 1 and words in message, message
+
+
+def test_plan_is_a_word_of_identify_and_not_a_log(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    for command, words in (
+        (["identify", "-h"], ["[OPTIONS] LOG...", "--nuisance", "Commands:", "identify plan --help"]),
+        (["identify", "plan", "--help"], ["Usage: planarfriction identify plan [OPTIONS] [LOG]...", "--wanted"]),
+    ):
+        assert main(command) == 0
+        text = capsys.readouterr().out
+        assert all(word in text for word in words), text
+    assert main(["plan"]) == 2 and "No such command 'plan'" in capsys.readouterr().err
+    assert main(["identify", "./plan"]) == 2 and "error: plan: no such file" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("before", "incomplete", "found"),
+    [
+        (["identify"], "pl", {"plan", "pl"}),
+        (["identify", "slow.csv"], "pl", {"pl"}),
+        (["identify", "plan"], "--wan", {"--wanted"}),
+        (["identify"], "--nuis", {"--nuisance"}),
+    ],
+)
+def test_completion_knows_the_plan(before, incomplete, found):
+    shell = ShellComplete(app, {}, "planarfriction", "_PLANARFRICTION_COMPLETE")
+    assert {item.value for item in shell.get_completions(before, incomplete)} == found

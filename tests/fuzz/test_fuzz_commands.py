@@ -17,13 +17,15 @@ from test_fuzz_tables import LOGS, MAPS
 from planarfriction import FrictionError
 from planarfriction.cli import INTERRUPTED, OUT_OF_TOLERANCE, main
 from planarfriction.cli.app import app
+from planarfriction.cli.identify_plan import plan
 
 EXAMPLES = Path(__file__).parent.parent.parent / "examples"
+PLAN = "identify plan"
 LEGAL = {
     "run": ["in-hand", "--model", "reduced-published", "--patch", "Line", "--t-end", "0.02"],
     "limit-surface": ["--patch", "Line"],
     "identify": ["log.csv", "--patch", "Line", "--parameters", "mu_c", "--starts", "1"],
-    "plan": ["--patch", "Line", "--parameters", "mu_c", "--duration", "0.2"],
+    PLAN: ["--patch", "Line", "--parameters", "mu_c", "--duration", "0.2"],
     "reproduce": ["--list"],
     "bench": ["--only", "nothing"],
 }
@@ -48,7 +50,7 @@ def options(command: click.Command) -> list[str]:
 
 def arguments(name: str, draw: random.Random) -> list[str]:
     """The legal ones with up to three changes."""
-    result, known = list(LEGAL.get(name, ["--help"])), options(app.commands[name])
+    result, known = list(LEGAL.get(name, ["--help"])), options(plan if name == PLAN else app.commands[name])
     for _ in range(draw.randint(0, 3)):
         change, at = draw.randrange(4), draw.randrange(len(result) + 1)
         if change == 0 and result:
@@ -62,8 +64,8 @@ def arguments(name: str, draw: random.Random) -> list[str]:
 
 @attack("commands", 120)
 def test_commands(draw: random.Random) -> None:
-    name = draw.choice([*app.commands, "run", "limit-surface", "identify"])
-    given = [name, *arguments(name, draw)]
+    name = draw.choice([*app.commands, "run", "limit-surface", "identify", PLAN])
+    given = [*name.split(), *arguments(name, draw)]
     if name in ("bench", "reproduce", "simulators", "warm") and not {"--list", "--help", "nothing"} & set(given):
         return  # minutes of work
 

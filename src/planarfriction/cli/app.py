@@ -9,8 +9,8 @@ import click
 from click.shell_completion import CompletionItem
 
 from planarfriction import __version__
+from planarfriction.cli.identify_plan import FitOrPlan, complete_log
 from planarfriction.cli.options import FILE, PATCH_HELP
-from planarfriction.cli.plan import plan
 from planarfriction.families import MODELS, SCENES, SURFACES, Family
 
 AUTO_PARTS = "as many as the shape of the patch asks for, 4 to 8"
@@ -51,7 +51,7 @@ def complete_parts(context: object, parameter: object, incomplete: str) -> list[
 
 @click.group(
     name="planarfriction",
-    context_settings={"max_content_width": 100},
+    context_settings={"max_content_width": 100, "help_option_names": ["-h", "--help"]},
     help="Friction of contact patches that slide and spin: simulate scenes, draw limit surfaces, measure speed.",
 )
 @click.version_option(__version__, message="%(prog)s %(version)s")
@@ -160,22 +160,24 @@ def limit_surface(
 
 
 @app.command(
-    short_help="Estimate friction parameters from measured logs.",
+    cls=FitOrPlan,
+    short_help="Estimate friction parameters from logs; identify plan: what to measure next.",
     help="""Estimate friction parameters of a contact from logs of its motion and its friction wrench.
 
     Each LOG is a CSV file with a heading and the columns t, vx, vy, omega (or x, y, theta), fx, fy, tau, normal_force
     in s, m/s, rad/s, N and N m: twist and wrench about the origin of the contact frame, in its axes, the wrench on the
     moving body. Files that `planarfriction run` writes are such logs. Prints estimates, their errors, and what the data
-    cannot tell.
+    cannot tell. With `plan` as the first word it says which motion to measure next (a log of that name: ./plan).
 
     \b
     Examples:
       planarfriction identify log.csv --patch disc --out out/
       planarfriction identify slow.csv fast.csv --patch pad.csv --cell-size 0.001
       planarfriction identify log.csv --parameters mu_c,mu_s,v_s --start sigma_0=1e5 --start sigma_1=100
+      planarfriction identify plan slow.csv --patch disc
     """,
 )
-@click.argument("logs", metavar="LOG...", type=FILE, nargs=-1, required=True)
+@click.argument("logs", metavar="LOG...", type=FILE, nargs=-1, required=True, shell_complete=complete_log)
 @click.option("--patch", help=f"Contact patch: {PATCH_HELP} Default: Circle.")
 @click.option("--cell-size", type=float, help="Side of a cell of a pressure map in m.")
 @click.option("--width", type=float, help="Width of a patch that is given by name in m. Default: 0.02.")
@@ -367,6 +369,3 @@ def simulators(out: Path, quick: bool, again: bool) -> int:
     from planarfriction.cli import simulators as command
 
     return command.compare(out, quick=quick, again=again)
-
-
-app.add_command(plan)

@@ -1,11 +1,12 @@
-"""`planarfriction plan`: the motion that tells most of what the logs so far do not."""
+"""`planarfriction identify plan`: the motion to measure next, and how `identify` comes to that command."""
 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
+from click.shell_completion import CompletionItem
 
 from planarfriction.cli.options import FILE, PATCH_HELP
 
@@ -15,18 +16,51 @@ if TYPE_CHECKING:
     from planarfriction.patch import ContactPatch
 
 
-@click.command(
-    short_help="Which motion to measure next, to identify.",
-    help="""Rank motions by the information that they are expected to add for `planarfriction identify`.
+NAME = "plan"
 
-    Each LOG is one as that command reads; what it tells is fitted first. Without any, the law is a guess: --start.
+SHORT_HELP = "Which motion to measure next."
+
+
+class FitOrPlan(click.Command):
+    """`identify`: fits the logs that follow, unless the first word is that of the plan."""
+
+    def make_context(
+        self, info_name: str | None, args: list[str], parent: click.Context | None = None, **extra: Any
+    ) -> click.Context:
+        """The context of the fit, or that of the plan."""
+        if args[:1] == [NAME]:
+            return plan.make_context(f"{info_name} {NAME}", args[1:], parent, **extra)
+        return super().make_context(info_name, args, parent, **extra)
+
+    def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The options, then the other command."""
+        super().format_options(ctx, formatter)
+        with formatter.section("Commands"):
+            formatter.write_dl([(NAME, f"{SHORT_HELP} See {ctx.command_path} {NAME} --help.")])
+
+
+def complete_log(ctx: click.Context, parameter: object, incomplete: str) -> list[CompletionItem]:
+    """Files, and the word of the plan where it may stand."""
+    words = (
+        [CompletionItem(NAME, help=SHORT_HELP)] if not ctx.params.get("logs") and NAME.startswith(incomplete) else []
+    )
+    return [*words, CompletionItem(incomplete, type="file")]
+
+
+@click.command(
+    name=NAME,
+    short_help=SHORT_HELP,
+    help="""Rank motions by the information that each is expected to add to that of the logs so far.
+
+    Each LOG is one as `planarfriction identify` reads; the logs are fitted first. Without any, the law is a guess:
+    --start.
     Prints gains in bits, and the errors that are expected after the best motion; --out writes that motion.
 
     \b
     Examples:
-      planarfriction plan --patch disc --start mu_c=0.5 --start sigma_0=2e4 --out next.csv
-      planarfriction plan slow.csv --patch disc --speed 0.03 --spin 2
-      planarfriction plan slow.csv --wanted sigma_1
+      planarfriction identify plan --patch disc --start mu_c=0.5 --start sigma_0=2e4 --out next.csv
+      planarfriction identify plan slow.csv --patch disc --speed 0.03 --spin 2
+      planarfriction identify plan slow.csv --wanted sigma_1
     """,
 )
 @click.argument("logs", metavar="[LOG]...", type=FILE, nargs=-1)
