@@ -26,7 +26,7 @@ def guess_starts(problem: Any, given: dict[str, float] | None, *, starts: int, s
     if given is None:
         first = problem.start_values(problem.law)
         return [first, *(_scattered(first, problem.names, random) for _ in range(starts - 1))]
-    ranked = sorted(_grid(problem, given), key=lambda values: _cost(problem, values, noise))
+    ranked = sorted(_grid(problem, given), key=lambda values: misfit(problem, values, noise))
     return ranked[:starts] + [_scattered(ranked[0], problem.names, random) for _ in range(starts - len(ranked))]
 
 
@@ -83,7 +83,8 @@ def _stiffnesses(problem: Any, speeds: list[np.ndarray], mu_c: float) -> np.ndar
     return np.geomspace(mu_c / short, mu_c / max(long, 10.0 * short), STIFFNESSES)
 
 
-def _cost(problem: Any, values: np.ndarray, noise: np.ndarray) -> float:
+def misfit(problem: Any, values: np.ndarray, noise: np.ndarray) -> float:
+    """Sum of the squares that values `[F]` or `[F + K]` leave, over the noise `[3]`."""
     return sum(
         float((((wrench - log.wrench) * (log.channels / noise))[used] ** 2).sum())
         for wrench, log, used in zip(problem.shown(values), problem.logs, problem.used, strict=True)

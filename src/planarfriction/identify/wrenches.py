@@ -16,7 +16,7 @@ from planarfriction.identify.logs import Log, as_logs
 from planarfriction.identify.nuisance import GROUPS, check_groups
 from planarfriction.identify.problem import Problem, given_noise
 from planarfriction.identify.result import Identification
-from planarfriction.identify.search import search
+from planarfriction.identify.search import follow, look, refined
 from planarfriction.identify.sensors import first_noise
 from planarfriction.identify.simulators import MODELS
 from planarfriction.identify.uncertainty import uncertainty
@@ -109,30 +109,29 @@ def identify_lugre(
     say = (lambda text: None) if progress is None else progress
     spread = first_noise(logs) if noise is None else given_noise(noise)
     # The quickest model leads: it finds where the others begin.
-    points, found, skipped, rig = [], [], [], None
+    guesses, found, skipped, lead = [], [], [], None
     for kind in dict.fromkeys((MODELS[0], *kinds)):
         problem = Problem(logs, patch, names, law, surface, begins, steps, kind, groups)
-        if not points:
-            say(f"{kind}: looking for starts")
+
+        def tell(text: str, kind: str = kind) -> None:
+            say(f"{kind}: {text}")
+
+        if lead is None:
+            tell("looking for starts")
             chance = validation.count("seed", seed, 0)
-            points = guess_starts(problem, given, starts=starts, seed=chance, noise=spread)
+            guesses = guess_starts(problem, given, starts=starts, seed=chance, noise=spread)
+            fit = look(problem, guesses, noise=spread, say=tell)
         elif model == "auto" and problem.work * USUAL_EVALUATIONS > PATIENCE:
             skipped.append(kind)
             continue
-        fit = search(
-            problem,
-            points,
-            noise=spread,
-            known_noise=noise is not None,
-            fixed_steps=refine is not None,
-            rig=rig,
-            say=lambda text, kind=kind: say(f"{kind}: {text}"),
-        )
+        else:
+            fit = follow(problem, lead, guesses, noise=spread, say=tell)
         if kind in kinds:
+            fit = refined(fit, known_noise=noise is not None, fixed_steps=refine is not None, say=tell)
             found.append(Candidate(fit, uncertainty(fit)))
-        if rig is None:
-            agreement, points, rig = fit.starts, [fit.values[: len(names)]], fit.values[len(names) :]
-    return with_findings(assemble(best_of(found), found, skipped, agreement), logs, findings)
+        lead = fit if lead is None else lead
+    assert lead is not None
+    return with_findings(assemble(best_of(found), found, skipped, lead.starts), logs, findings)
 
 
 def _kinds(model: str, patch: ContactPatch, names: Sequence[str]) -> tuple[str, ...]:
