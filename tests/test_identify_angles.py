@@ -157,6 +157,9 @@ def test_without_torques_the_force_tells_what_it_can():
     assert np.isnan(found.residuals[0][:, 2]).all() and np.isfinite(found.residuals[0][:, :2]).all()
     assert found.to_dict()["noise"]["tau"] is None
     found.plot().draw_without_rendering()
+    rounding = 1e-19 * np.random.default_rng(0).standard_normal(len(log.time))
+    faint = Log(log.time, log.twist, without_torque(log).wrench + np.outer(rounding, [0, 0, 1]), log.normal_force)
+    assert identify(faint, PATCH, **options).estimates == pytest.approx(found.estimates, rel=1e-9)
 
 
 def test_what_would_need_the_torque_is_no_estimate(spun):

@@ -145,6 +145,15 @@ def test_findings_stand_beside_the_estimates(log):
     assert any("samples of log should be taken at" in str(verdict) for verdict in told.verdicts)
 
 
+def test_sampling_is_no_matter_where_sigma_1_may_be_zero():
+    """Its corner may then lie anywhere: no rate of 1e+11 Hz is asked for."""
+    law = dataclasses.replace(LAW, sigma_1=0.0)
+    log = noisy(clean_log(*excitation(duration=1.0, rate=200.0), law=law), 1)
+    told = identify_lugre(log, PATCH, parameters=("sigma_0", "sigma_1"), start=LAW, starts=1, model="reduced-published")
+    assert told.intervals()["sigma_1"][0] == 0.0
+    assert not any("samples of log" in str(verdict) for verdict in told.verdicts)
+
+
 # ------------------------------------------------------------------------------------------------ no false alarms
 
 

@@ -16,6 +16,7 @@ import planarfriction as pf
 from planarfriction.cli import main
 from planarfriction.errors import InvalidValueError
 from planarfriction.measured import TASKS, Benchmark, glide, models, pushes, series, steady, tossed
+from planarfriction.measured.figures import draw, ellipse
 from planarfriction.measured.mujoco_box import MujocoBox
 from planarfriction.measured.scores import angles, drawings, interval, mean
 from planarfriction.measured.tables import TABLES, shipped
@@ -248,6 +249,30 @@ def test_the_command_writes_tables_json_and_pictures(tmp_path, capsys):
     assert stored["tasks"]["pushes"]["published"]["authors' quartic"]["hardboard_deg"] == pytest.approx(12.2, abs=0.05)
     for task in ("pushes", "slides"):
         assert (out / f"measured-{task}.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_regions_of_ends_are_drawn_and_hold_them():
+    """Ends on a ring of two half axes about what is predicted, and the picture beside the slides."""
+    region = np.diag([4e-6, 1e-6, 0.01])
+    region[0, 1] = region[1, 0] = 1e-6
+    edge = ellipse(region)
+    assert np.einsum("pi,ij,pj->p", edge, np.linalg.inv(region[:2, :2]), edge) == pytest.approx(1.0, rel=1e-12)
+
+    class Sure:
+        def __call__(self, question):
+            return np.vstack([question.first, np.repeat(question.first[-1:], len(question.time) - 8, axis=0)])
+
+        def regions(self, questions):
+            return np.repeat(region[None], len(questions), axis=0)
+
+    benchmark = Benchmark({"sure": Sure()}, ["slides"])
+    benchmark.run()
+    axes = draw(benchmark, "slides").subfigs[1].axes
+    assert len(axes) == 7
+    off = np.column_stack(axes[-1].lines[0].get_data())
+    answers = [case.answer[-1] - case.question.first[-1] for case in benchmark.test("slides")]
+    far = [d @ np.linalg.solve(region[:2, :2], d) for d in np.array(answers)[:, :2]]
+    assert (off**2).sum(axis=1) == pytest.approx(far, rel=1e-9)
 
 
 def test_an_interrupt_keeps_what_is_done(tmp_path, capsys):

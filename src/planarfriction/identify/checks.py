@@ -111,8 +111,9 @@ def check_logs(logs: Sequence[Log], patch: ContactPatch, names: Sequence[str] = 
 def with_findings(result: Identification, logs: Sequence[Log], findings: Sequence[Finding]) -> Identification:
     """The result with the findings, and what its estimates say about the sampling, among its verdicts."""
     found = [*findings]
-    if {"sigma_0", "sigma_1"} <= set(result.names):
-        estimates = result.estimates
+    estimates, least = result.estimates, {name: low for name, (low, _) in result.intervals().items()}
+    # where sigma_1 may be 0, or nobody knows it, its corner may lie anywhere
+    if "sigma_0" in estimates and least.get("sigma_1", 0.0) > 0.0:
         sampled = [check_sampling(log, estimates["sigma_0"], estimates["sigma_1"]) for log in logs]
         found += [finding for finding in sampled if finding is not None]
     verdicts = [Verdict("fit", False, str(finding)) for finding in found]

@@ -23,6 +23,10 @@ EVEN = 1e-3
 """Samples whose times stray from an even grid by at most this share of the sampling time lie on it: rounded stamps."""
 
 
+LEVER = 1e-9
+"""Torque over force [m] up to which the torque is rounding: a nanometre is no size of a contact, nor off any centre."""
+
+
 @dataclass(frozen=True, eq=False)
 class Log(ByValue):
     """Twist and friction wrench of one contact over time, T samples.
@@ -70,8 +74,9 @@ class Log(ByValue):
 
     @property
     def channels(self) -> np.ndarray:
-        """Which of fx, fy, tau were measured, `[3]` of bool: no torque where tau is 0 throughout."""
-        return np.array([True, True, bool(self.wrench[:, 2].any())])
+        """Which of fx, fy, tau were measured, `[3]` of bool: no torque where tau is 0, or rounding, throughout."""
+        largest = np.abs(self.wrench).max(axis=0)
+        return np.array([True, True, bool(largest[2] > LEVER * largest[:2].max())])
 
     @property
     def interval(self) -> float:

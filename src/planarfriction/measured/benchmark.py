@@ -49,6 +49,8 @@ class Result:
     """What the model says of its own answers on the test cases, where it says anything."""
     seconds: float
     """Fit and prediction."""
+    regions: np.ndarray | None = None
+    """Regions of the ends of slides `[K, 3, 3]`, of models that have `regions`."""
 
 
 @dataclass
@@ -112,10 +114,11 @@ class Benchmark:
                 errors = tuple(task.errors(case, answer) for case, answer in zip(test, answers, strict=True))
                 told = fitted.told() if hasattr(fitted, "told") and name == "slides" else {}
                 checked = fitted.check(test) if hasattr(fitted, "check") else {}
+                regions = fitted.regions([case.question for case in test]) if hasattr(fitted, "regions") else None
                 seconds = time.perf_counter() - begun
                 scores = score(task, test, errors, self.seed)
                 self.results.setdefault(name, {})[called] = Result(
-                    scores, tuple(answers), errors, told, checked, seconds
+                    scores, tuple(answers), errors, told, checked, seconds, regions
                 )
         return self.results
 

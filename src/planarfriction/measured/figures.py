@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from planarfriction.measured import pushes, slides
-from planarfriction.measured.benchmark import Benchmark
+from planarfriction.measured.benchmark import Benchmark, Result
+from planarfriction.measured.questions import Case
 from planarfriction.measured.tasks import TASKS
 from planarfriction.plots import style
 
@@ -62,31 +64,59 @@ def _chosen(benchmark: Benchmark, task: str) -> dict[str, Any]:
 
 def _draw_slides(part: Any, benchmark: Benchmark, count: int = 3) -> None:
     """Ways of a few slides as errors would hide them: how far each went and turned, measured and predicted."""
-    test = benchmark.test("slides")
+    test, chosen = benchmark.test("slides"), _chosen(benchmark, "slides")
     shown = slides.by_spin(test, count)
-    every = part.subplots(1, 2 * count, width_ratios=(1.2, 1.0) * count)
+    sure = next((name for name, result in chosen.items() if result.regions is not None), None)
+    widths = (1.2, 1.0) * count + (1.2,) * (sure is not None)
+    every = part.subplots(1, len(widths), width_ratios=widths)
+    if sure is not None:
+        _draw_ends(every[-1], test, chosen[sure], style.PALETTE[list(chosen).index(sure)])
     for i, case in enumerate(shown):
         way, turn = every[2 * i : 2 * i + 2]
         index = next(j for j, each in enumerate(test) if each is case)
         first, time = case.answer[0], case.question.time
         way.plot(*_shift(case.answer, first), color="0.2", linewidth=2.4, label="measured")
         turn.plot(time, np.degrees(case.answer[:, 2] - first[2]), color="0.2", linewidth=2.4)
-        for colour, (name, result) in zip(style.PALETTE, _chosen(benchmark, "slides").items(), strict=False):
+        for colour, (name, result) in zip(style.PALETTE, chosen.items(), strict=False):
             poses = result.answers[index]
             way.plot(*_shift(poses, first), color=colour, linewidth=1.2, label=name)
-            turn.plot(time, np.degrees(poses[:, 2] - first[2]), color=colour, linewidth=1.2)
+            turned = np.degrees(poses[:, 2] - first[2])
+            turn.plot(time, turned, color=colour, linewidth=1.2)
+            if result.regions is not None:
+                edge = 1e3 * (poses[-1, :2] - first[:2] + ellipse(result.regions[index]))
+                way.plot(*edge.T, color=colour, linewidth=0.9)
+                half = float(np.degrees(np.sqrt(result.regions[index][2, 2])))
+                turn.errorbar(time[-1], turned[-1], yerr=half, color=colour, elinewidth=0.9, capsize=2.5)
         way.set(aspect="equal", xlabel="x [mm]", ylabel="y [mm]")
         way.set_adjustable("datalim")
         turn.set(xlabel="time [s]", ylabel="turned [deg]")
         way.set_title(case.name, fontsize="small", loc="left")
-        for axes in (way, turn):
-            style.tidy(axes)
-            axes.tick_params(labelsize="small")
-            axes.xaxis.label.set_fontsize("small")
-            axes.yaxis.label.set_fontsize("small")
+    for axes in every:
+        style.tidy(axes)
+        axes.tick_params(labelsize="small")
+        axes.xaxis.label.set_fontsize("small")
+        axes.yaxis.label.set_fontsize("small")
     part.legend(
         *every[0].get_legend_handles_labels(), loc="outside lower center", ncols=6, frameon=False, fontsize="small"
     )
+
+
+def ellipse(region: np.ndarray) -> np.ndarray:
+    """Points `[P, 2]` on the edge of the region of a place, `d' S^-1 d = 1`."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 61)
+    return np.stack([np.cos(angle), np.sin(angle)], axis=1) @ np.linalg.cholesky(region[:2, :2]).T
+
+
+def _draw_ends(axes: Any, test: Sequence[Case], result: Result, colour: str) -> None:
+    """Measured ends of all slides about the predicted ones, each in half axes of its own ellipse."""
+    assert result.regions is not None
+    off = np.array([case.answer[-1] - poses[-1] for case, poses in zip(test, result.answers, strict=True)])[:, :2]
+    squares, ways = np.linalg.eigh(result.regions[:, :2, :2])
+    off = np.einsum("kij,ki->kj", ways, off) / np.sqrt(squares)
+    axes.plot(*off[:, ::-1].T, ".", color="0.2", markersize=3)
+    axes.plot(*ellipse(np.eye(3)).T, color=colour, linewidth=1.2)
+    axes.set(aspect="equal", xlabel="along [half axes]", ylabel="across [half axes]")
+    axes.set_title(f"{len(test)} ends", fontsize="small", loc="left", color=colour)
 
 
 def _shift(poses: np.ndarray, first: np.ndarray) -> np.ndarray:

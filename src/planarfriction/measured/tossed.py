@@ -213,6 +213,14 @@ class TossModel:
             found.append(slope @ spread[i] @ slope.T + np.diag(pushed))
         return np.array([answer[-1] for answer in answers]), np.array(found)
 
+    def regions(self, questions: Sequence[SlideQuestion]) -> np.ndarray:
+        """Matrices S `[K, 3, 3]` of what is to hold 95 % of ends: places with `d' S^-1 d <= 1`, angles within its root.
+
+        S is the part of x and y for the place, and that of the angle.
+        """
+        size = np.sqrt([self.reach[0], self.reach[0], self.reach[1]])
+        return self.ends(questions)[1] * np.outer(size, size)
+
     def distances(self, cases: Sequence[Case]) -> np.ndarray:
         """Squares of the errors of place and angle at the end over their covariances, `[K, 2]`."""
         ends, spread = self.ends([case.question for case in cases])
