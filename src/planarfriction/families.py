@@ -161,5 +161,6 @@ SCENES = Family(
         "drift": ("a loaded puck whose elastic patch must not drift", "scenes.ready:drift"),
         "free-slide": ("a puck thrown onto a table", "scenes.ready:free_slide"),
         "driven": ("a patch moved with a prescribed velocity", "scenes.ready:driven"),
+        "pushed": ("a plate on a table, pushed along by finger pads that move", "scenes.ready:pushed"),
     },
 )

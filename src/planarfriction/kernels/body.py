@@ -20,6 +20,7 @@ from planarfriction.kernels.contacts import (
     EVALUATE,
     FACTOR,
     LINEARISE,
+    WORLD,
     Contacts,
     contact_map,
     contact_map_slopes,
@@ -47,6 +48,9 @@ class Motion(NamedTuple):
     """Gravity, or the slope of the prescribed velocity, [S, 3]."""
     row: np.ndarray
     """Shape of each contact on each piece, int [S, C]."""
+    mover: np.ndarray
+    """Displacement, velocity and acceleration `(x, y, angle)` of the world's side of each contact at the start of each
+    piece, world axes, [S, C, 9]; empty [0, C, 9] where all stand still."""
     stop_speed: float
     """End when the body is at rest: its speed is below this [m/s] and stays so (see `rosenbrock`); 0: never."""
     stop_radius: float
@@ -82,6 +86,8 @@ class Work(NamedTuple):
     """A vector of the body, [3]."""
     rows: np.ndarray
     """Twist and wrench of one contact and their changes, [4, 3] (see `contacts.ModelFunctions`)."""
+    moved: np.ndarray
+    """Where each contact frame is, as in `Contacts.place`, and what `seen_by` says, where something moves, [C, 8]."""
 
 
 SystemRecord = NamedTuple(
@@ -94,7 +100,7 @@ SystemRecord = NamedTuple(
     ],
 )
 """A body on its contacts as compiled functions read it: numbers, arrays by their addresses (0: a body is not driven by
-a velocity), and the functions of this module."""
+a velocity, nothing it touches moves), and the functions of this module."""
 
 read = reader(SystemRecord)
 
@@ -130,6 +136,7 @@ def system_of(contacts: Contacts, motion: Motion, kept: tuple[np.ndarray, ...] =
         to_pose=np.zeros((3, 3)),
         body=np.zeros(3),
         rows=np.zeros((4, 3)),
+        moved=np.zeros((n, 8)),
     )
     record = SystemRecord(
         contacts=n,
@@ -151,6 +158,8 @@ def system_of(contacts: Contacts, motion: Motion, kept: tuple[np.ndarray, ...] =
     )
     if not len(motion.velocity):
         record = record._replace(velocity=0)
+    if not len(motion.mover):
+        record = record._replace(mover=0)
     return System(contacts, motion, work, row_of(record), kept)
 
 
@@ -174,6 +183,38 @@ def record_of(own, piece, c):
     return integers(own.record)[integers(own.row)[piece * own.contacts + c]]
 
 
+@kernel
+def place_at(own, piece, since, c, state):
+    """Address of where the frame of contact c is (see `Contacts.place`), and that of the velocity it sees [3].
+
+    That is the body's at `state` (address of its velocity and pose), less the one that the world's side of the contact
+    would have there. What carries the frame moves and turns it; ground under a patch on the body turns about the
+    world's origin.
+    """
+    if own.mover == 0:
+        return at(own.place, 4 * c), state
+    mount, place, y = integers(own.mount)[c], doubles(at(own.place, 4 * c)), doubles(state)
+    mover = doubles(at(own.mover, 9 * (piece * own.contacts + c)))
+    moved = doubles(at(own.moved, 8 * c))
+    vx, vy = mover[3] + since * mover[6], mover[4] + since * mover[7]
+    omega, dx, dy = mover[5] + since * mover[8], y[3], y[4]
+    for i in range(4):
+        moved[i] = place[i]
+    if mount == WORLD:
+        half = 0.5 * since
+        turned = mover[2] + since * (mover[5] + half * mover[8])
+        c_t, s_t = math.cos(turned), math.sin(turned)
+        moved[0] += mover[0] + since * (mover[3] + half * mover[6])
+        moved[1] += mover[1] + since * (mover[4] + half * mover[7])
+        moved[2], moved[3] = c_t * place[2] - s_t * place[3], s_t * place[2] + c_t * place[3]
+        dx, dy = dx - moved[0], dy - moved[1]
+    moved[4] = y[0] - (vx - omega * dy)
+    moved[5] = y[1] - (vy + omega * dx)
+    moved[6] = y[2] - omega
+    moved[7] = omega
+    return at(own.moved, 8 * c), at(own.moved, 8 * c + 4)
+
+
 @entry
 def rates(system, piece, since, y, dy):
     """Right-hand side `dy` at `since` seconds into a piece; wrenches per unit load into the workspace."""
@@ -185,8 +226,9 @@ def rates(system, piece, since, y, dy):
         total[i] = force[six + i] + since * force[six + 3 + i]
     for c in range(own.contacts):
         first, w = integers(own.state)[c], at(own.wrench, 3 * c)
-        contact_map(integers(own.mount)[c], doubles(at(own.place, 4 * c)), pose, a)
-        times(a, u, doubles(own.twist))
+        place, seen = place_at(own, piece, since, c, at(y, o))
+        contact_map(integers(own.mount)[c], doubles(place), pose, a)
+        times(a, doubles(seen), doubles(own.twist))
         call(
             integers(own.calls)[6 * c + EVALUATE], (record_of(own, piece, c), at(y, first), own.twist, at(dy, first), w)
         )
@@ -211,13 +253,21 @@ def linearise(system, piece, y):
     """Linearise every contact about `y`, whose `rates` were evaluated last."""
     own = read(system)
     o = own.bristles
-    u, pose, v = doubles(at(y, o)), doubles(at(y, o + 3)), doubles(own.twist)
+    pose, v = doubles(at(y, o + 3)), doubles(own.twist)
     for c in range(own.contacts):
         mount, maps = integers(own.mount)[c], at(own.maps, 27 * c)
         a, g, h = doubles(maps), doubles(at(maps, 9)), doubles(at(maps, 18))
-        contact_map(mount, doubles(at(own.place, 4 * c)), pose, a)
-        contact_map_slopes(mount, a, u, doubles(at(own.wrench, 3 * c)), g, h)
-        times(a, u, v)
+        place, seen = at(own.place, 4 * c), at(y, o)
+        if own.mover != 0:  # as `rates` left them
+            place, seen = at(own.moved, 8 * c), at(own.moved, 8 * c + 4)
+        contact_map(mount, doubles(place), pose, a)
+        contact_map_slopes(mount, a, doubles(seen), doubles(at(own.wrench, 3 * c)), g, h)
+        if own.mover != 0:
+            omega = doubles(own.moved)[8 * c + 7]  # elsewhere, the other side has another velocity
+            for i in range(3):
+                g[3 * i] -= omega * a[3 * i + 1]
+                g[3 * i + 1] += omega * a[3 * i]
+        times(a, doubles(seen), v)
         z, lin = at(y, integers(own.state)[c]), at(own.workspace, integers(own.linear)[c])
         call(integers(own.calls)[6 * c + LINEARISE], (record_of(own, piece, c), z, own.twist, lin))
 

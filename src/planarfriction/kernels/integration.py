@@ -81,6 +81,8 @@ class Stages(NamedTuple):
     """Its error estimate, [n]."""
     zero: np.ndarray
     """Zeros, [n]."""
+    drift: np.ndarray
+    """`df/dt` where something that a contact touches moves, [n]."""
     time_slope: np.ndarray
     """`df/dt` of the accelerations, [3]."""
     coupling: np.ndarray
@@ -145,7 +147,7 @@ def run_of(system: System, method: Method, output: Output, progress: Progress, *
     Steps keep their error below `rtol |y| + atol`, `atol` [n].
     """
     n, s = len(progress.y), len(method.m)
-    stages = Stages(np.zeros((s, n)), *np.zeros((7, n)), np.zeros(3), np.zeros(s))
+    stages = Stages(np.zeros((s, n)), *np.zeros((8, n)), np.zeros(3), np.zeros(s))
     atol = np.ascontiguousarray(atol, dtype=float)
     arrays = {**method._asdict(), **output._asdict(), **progress._asdict(), **stages._asdict(), "atol": atol}
     record = RunRecord(

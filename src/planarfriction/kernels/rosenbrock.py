@@ -6,7 +6,7 @@ import math
 
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import jit, kernel
-from planarfriction.kernels.body import load_of, read, times
+from planarfriction.kernels.body import load_of, place_at, read, times
 from planarfriction.kernels.contacts import contact_map
 from planarfriction.kernels.integration import read_run
 from planarfriction.kernels.pointers import at, call, doubles, integers
@@ -31,6 +31,10 @@ _ANGLE, _LOOKS, _DOUBT = 0.1, 8, 10.0
 # A contact with more bristle states than this has a twist for each of many cells, of which none holds the patch alone:
 # looks would cost a quarter of the time and find nothing.
 _MANY = 100
+
+# Share of a step over which the rates are compared to see how they change with the time alone: what it leaves out is
+# far below any tolerance, and so is what rounding makes of it.
+_NUDGE = 1e-6
 
 # Smallest step relative to the time (at least 1 s): a few units in the last place of the clock.
 _RESOLUTION = 1e-15
@@ -99,6 +103,18 @@ def _time_slope(own, piece, slope):
 
 
 @kernel
+def _drift(run, own, piece, since, step):
+    """`df/dt` of all states [n] where what a contact touches moves: a difference over a small share of a step.
+
+    That is right to `_NUDGE` and costs one evaluation, while each model would have to know what its bristles say.
+    """
+    by, now, out = _NUDGE * step, doubles(run.start_rate), doubles(run.drift)
+    call(own.rates, (run.system, piece, since + by, run.y, run.rate))
+    for i in range(run.states):
+        out[i] = (doubles(run.rate)[i] - now[i]) / by
+
+
+@kernel
 def forget_unloaded(own, piece, y):
     """A contact without load on the whole piece keeps no memory: it starts again from rest."""
     load, first = doubles(own.load), 2 * piece * own.contacts
@@ -145,8 +161,13 @@ def _step(run, own, piece, since, step):
             time = since + doubles(run.alpha)[i] * step
             call(own.rates, (run.system, piece, time, run.argument, run.rate))
         call(run.combine, (run.coupling, k, i, n, run.rate if i > 0 else run.start_rate, run.right))
-        for p in range(3):
-            right[n - 6 + p] += doubles(run.time_gamma)[i] * step * doubles(run.time_slope)[p]
+        slope = doubles(run.time_gamma)[i] * step
+        if own.mover != 0:
+            for p in range(n):
+                right[p] += slope * doubles(run.drift)[p]
+        else:
+            for p in range(3):
+                right[n - 6 + p] += slope * doubles(run.time_slope)[p]
         call(own.solve, (run.system, piece, since, run.y, shift, run.right, at(k, i * n)))
     call(run.combine, (run.m, k, s, n, run.y, run.new))
     call(run.combine, (run.e, k, s, n, run.zero, run.error))
@@ -160,25 +181,26 @@ def _length(own, vector):
 
 
 @kernel
-def _direction(run, own, c, state, out):
+def _direction(own, piece, since, c, state, out):
     """Write the direction of the twist of contact c in a state into `out` [3]; zeros at rest."""
     a, v, y = doubles(own.stiffness), doubles(own.twist), at(state, own.bristles)
-    contact_map(integers(own.mount)[c], doubles(at(own.place, 4 * c)), doubles(at(y, 3)), a)
-    times(a, doubles(y), v)
+    place, seen = place_at(own, piece, since, c, y)
+    contact_map(integers(own.mount)[c], doubles(place), doubles(at(y, 3)), a)
+    times(a, doubles(seen), v)
     size = _length(own, v)
     per_size = 1.0 / xp.where(size > 0.0, size, 1.0)
     out[0], out[1], out[2] = per_size * v[0], per_size * v[1], per_size * own.stop_radius * v[2]
 
 
 @kernel
-def _turn(run, own):
+def _turn(run, own, piece, since, step):
     """Largest change of direction of the twist of a contact of few states from `y` to `new`, as an angle [rad]."""
     before, after, largest = doubles(own.body), doubles(own.matrix), 0.0
     for c in range(own.contacts):
         if integers(own.state)[c + 1] - integers(own.state)[c] > _MANY:
             continue
-        _direction(run, own, c, run.y, before)
-        _direction(run, own, c, run.new, after)
+        _direction(own, piece, since, c, run.y, before)
+        _direction(own, piece, since + step, c, run.new, after)
         x, y, z = after[0] - before[0], after[1] - before[1], after[2] - before[2]
         largest = xp.maximum(largest, math.sqrt(x * x + y * y + z * z))
     return largest
@@ -190,7 +212,7 @@ def _look_inside(run, own, piece, since, step):
 
     The residual of the continuous extension, through the matrix of the step, is what a stage there would have added.
     """
-    looks = xp.minimum(_LOOKS, int(_turn(run, own) / _ANGLE))
+    looks = xp.minimum(_LOOKS, int(_turn(run, own, piece, since, step) / _ANGLE))
     shift, largest = 1.0 / (step * run.gamma), 0.0
     for i in range(looks):
         share = (i + 1.0) / (looks + 1.0)
@@ -308,6 +330,9 @@ def advance(run, max_steps):
                 call(own.rates, (run.system, piece, since, run.y, run.start_rate))
                 call(own.linearise, (run.system, piece, run.y))
                 _time_slope(own, piece, doubles(run.time_slope))
+                if own.mover != 0:
+                    _drift(run, own, piece, since, step)
+                    statistics[EVALUATIONS] += 1
                 statistics[JACOBIANS] += 1
             _step(run, own, piece, since, step)
             taken += 1

@@ -44,8 +44,8 @@ _TIME_COLOURS = ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.92, 256))
 def plot_motion(solution: Solution) -> style.PlotFigure:
     """Draw the outline of the body at 12 instants, evenly spaced in time and coloured by it, with the contact patches.
 
-    World axes in mm, equal scales. Patches fixed to the world are drawn once, patches on the body with each outline; a
-    body without an outline is drawn as a line from its centre of mass along its x axis. The thin line is the path of
+    World axes in mm, equal scales. Patches fixed to the world are drawn once, patches on the body and pads that are
+    driven with each outline; a body without an outline is drawn as a line from its centre of mass along its x axis. The thin line is the path of
     the centre of mass.
     """
     figure = style.new_figure(6.4, 5.2)
@@ -64,8 +64,11 @@ def draw_motion(figure: Any, solution: Solution) -> None:
     scale = Normalize(time[0], time[-1] if time[-1] > time[0] else time[0] + 1.0)
     for index in chosen:
         _move(_draw_mount(axes, solution, "body", _TIME_COLOURS(scale(time[index]))), axes, poses[index])
+        for contact in _driven(solution):
+            pads = _draw_shape(axes, _pad_shape(contact), _TIME_COLOURS(scale(time[index])))
+            _move(pads, axes, _carried(contact, time[index]))
     _draw_mount(axes, solution, "world", style.PAD_COLOUR)
-    _finish(axes, _limits(solution, poses[chosen]))
+    _finish(axes, _limits(solution, time[chosen], poses[chosen]))
     axes.plot(*(1e3 * poses[:, :2].T), color="0.3", linewidth=0.9, zorder=4)
     dots = {"s": 14, "edgecolor": "white", "linewidth": 0.5, "zorder": 5}
     axes.scatter(*(1e3 * poses[chosen, :2].T), color=_TIME_COLOURS(scale(time[chosen])), **dots)
@@ -90,7 +93,8 @@ def animate_motion(solution: Solution, path: str | Path) -> Path:
     axes = figure.subplots()
     _draw_mount(axes, solution, "world", style.PAD_COLOUR)
     body = _draw_mount(axes, solution, "body", style.PALETTE[0])
-    _finish(axes, _limits(solution, poses))
+    pads = [(each, _draw_shape(axes, _pad_shape(each), style.PAD_COLOUR)) for each in _driven(solution)]
+    _finish(axes, _limits(solution, time, poses))
     (track,) = axes.plot([], [], color="0.3", linewidth=0.9)
     clock = axes.set_title(f"t = {time[-1]:.2f} s", fontsize="medium")
     figure.draw_without_rendering()
@@ -101,6 +105,8 @@ def animate_motion(solution: Solution, path: str | Path) -> Path:
             for instant in np.linspace(time[0], time[-1], count):
                 index = int(np.abs(time - instant).argmin())
                 _move(body, axes, poses[index])
+                for contact, pad in pads:
+                    _move(pad, axes, _carried(contact, time[index]))
                 track.set_data(*(1e3 * poses[: index + 1, :2].T))
                 clock.set_text(f"t = {time[index]:.2f} s")
                 writer.grab_frame()
@@ -132,20 +138,37 @@ def _placed(points: np.ndarray, pose: np.ndarray) -> np.ndarray:
 
 
 def _draw_mount(axes: Any, solution: Solution, mounted_on: str, colour: Any) -> list[Artist]:
-    """Draw what belongs to the world or to the body, with its frame on that of the axes [mm]; returns the artists."""
-    shapes = [1e3 * _on_mount(contact) for contact in solution.scene.contacts if contact.mounted_on == mounted_on]
-    artists: list[Artist] = []
-    for shape in shapes:
-        if shape.ndim == 3:
-            artists.append(PathPatch(_one_path(shape), facecolor=colour, edgecolor="none", alpha=PAD_OPACITY, zorder=2))
-        else:
-            look = {"marker": "o", "markersize": 4.5, "markeredgewidth": 0.0, "linestyle": "none"}
-            artists.append(Line2D(*shape.T, **look, color=colour, alpha=0.8, zorder=2))
+    """Draw what belongs to the body or stands in the world, its frame on that of the axes [mm]; returns the artists."""
+    moving = _driven(solution)
+    here = [each for each in solution.scene.contacts if each.mounted_on == mounted_on and each not in moving]
+    artists = [artist for contact in here for artist in _draw_shape(axes, _on_mount(contact), colour)]
     if mounted_on == "body":
-        artists += [Line2D(*(1e3 * line.T), color=colour, linewidth=1.3, zorder=3) for line in _body_lines(solution)]
-    for artist in artists:
-        axes.add_artist(artist)
+        lines = [Line2D(*(1e3 * line.T), color=colour, linewidth=1.3, zorder=3) for line in _body_lines(solution)]
+        artists += [axes.add_artist(line) for line in lines]
     return artists
+
+
+def _draw_shape(axes: Any, shape: np.ndarray, colour: Any) -> list[Artist]:
+    """Draw boxes `[N, 4, 2]` or points `[N, 2]` [m] in the frame of the axes [mm]; returns the artists."""
+    shape = 1e3 * shape
+    if shape.ndim == 3:
+        drawn: Artist = PathPatch(_one_path(shape), facecolor=colour, edgecolor="none", alpha=PAD_OPACITY, zorder=2)
+    else:
+        look = {"marker": "o", "markersize": 4.5, "markeredgewidth": 0.0, "linestyle": "none"}
+        drawn = Line2D(*shape.T, **look, color=colour, alpha=0.8, zorder=2)
+    return [axes.add_artist(drawn)]
+
+
+def _driven(solution: Solution) -> list[Contact]:
+    """Contacts whose frame is carried by something that moves as prescribed."""
+    return [each for each in solution.scene.contacts if each.mounted_on == "world" and each.velocity is not None]
+
+
+def _carried(contact: Contact, time: float) -> np.ndarray:
+    """Pose (x, y, angle) of the frame of a driven contact [m, m, rad]."""
+    from planarfriction.scenes.movers import displacement
+
+    return np.array([*contact.position, contact.angle]) + displacement(contact.velocity, [time])[0]  # pyright: ignore
 
 
 def _move(artists: list[Artist], axes: Any, pose: np.ndarray) -> None:
@@ -183,10 +206,16 @@ def _on_mount(contact: Contact) -> np.ndarray:
     return _placed(_pad_shape(contact), np.array([*contact.position, contact.angle], dtype=float))
 
 
-def _limits(solution: Solution, poses: np.ndarray) -> np.ndarray:
-    """Limits of both axes, `[2, 2]` [mm], that hold everything drawn at `poses` `[T, 3]`."""
+def _limits(solution: Solution, times: np.ndarray, poses: np.ndarray) -> np.ndarray:
+    """Limits of both axes, `[2, 2]` [mm], that hold everything drawn at `times` and `poses` `[T, 3]`."""
     points = [_placed(line, pose) for pose in poses for line in _body_lines(solution)]
+    moving = _driven(solution)
+    for contact in moving:
+        shape = _pad_shape(contact).reshape(-1, 2)
+        points += [_placed(shape, _carried(contact, time)) for time in times]
     for contact in solution.scene.contacts:
+        if contact in moving:
+            continue
         shape = _on_mount(contact).reshape(-1, 2)
         points += [shape] if contact.mounted_on == "world" else [_placed(shape, pose) for pose in poses]
     everything = 1e3 * np.concatenate(points)

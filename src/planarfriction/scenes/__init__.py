@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from planarfriction.families import SCENES
-from planarfriction.scenes.ready import drift, driven, free_slide, in_hand, in_hand_load, published_velocity
+from planarfriction.scenes.ready import drift, driven, free_slide, in_hand, in_hand_load, published_velocity, pushed
 from planarfriction.scenes.scene import Body, Contact, Scene
 from planarfriction.scenes.signal import Signal
 from planarfriction.scenes.solution import Solution, Statistics, load
@@ -28,6 +28,7 @@ __all__ = [
     "in_hand_load",
     "load",
     "published_velocity",
+    "pushed",
     "register",
     "simulate",
 ]

@@ -13,7 +13,8 @@ from planarfriction.kernels.body import Motion, System, system_of
 from planarfriction.kernels.contacts import BODY, BODY_AXES, WORLD, Contacts, calls_of
 from planarfriction.kernels.pointers import place_of
 from planarfriction.models.base import PackedModel
-from planarfriction.scenes.signal import SAME_TIME, breaks_between
+from planarfriction.scenes.movers import displacement
+from planarfriction.scenes.signal import SAME_TIME, Signal, breaks_between
 from planarfriction.scenes.start import first_states
 
 SHAPE_INTERVAL = 1e-3
@@ -54,6 +55,7 @@ class Pieces:
         self._load = [contact.normal_force.pieces(self._breaks) for contact in scene.contacts]
         self._force = None if scene.force is None else scene.force.pieces(self._breaks)
         self._velocity = None if scene.velocity is None else scene.velocity.pieces(self._breaks)
+        self._mover = [_mover(contact.velocity, self._breaks) for contact in scene.contacts]
         lengths, parts = np.diff(self._breaks), np.ones(len(self._breaks) - 1)
         for contact, (_, slope) in zip(scene.contacts, self._load, strict=True):
             if contact.model.patch.depends_on_load:
@@ -68,6 +70,7 @@ class Pieces:
         self.count = int(self._first[-1])
         """Number of pieces."""
         moving = self._force is not None and (self._force[1][-1] != 0.0).any()
+        moving |= any((mover[-1, 3:] != 0.0).any() for mover in self._mover)
         changing = moving or any(slope[-1] != 0.0 for _, slope in self._load)
         self.settled = float(own[-1 if changing else -2])
         """When the last of the inputs has changed for the last time [s]."""
@@ -102,6 +105,20 @@ class Pieces:
     def velocity(self, pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
         """Prescribed velocity at the start of pieces, and its slope, [S, 3] each; or None."""
         return None if self._velocity is None else self._linear(self._velocity, pieces)
+
+    def mover(self, pieces: np.ndarray) -> np.ndarray:
+        """Displacement, velocity and acceleration of the world's side of each contact as pieces begin, [S, C, 9].
+
+        Empty [0, C, 9] where all stand still.
+        """
+        movers = np.stack(self._mover, axis=1)
+        if not movers.any():
+            return movers[:0]
+        here = self._behind(pieces)
+        since, found = (self.breaks(pieces) - self._breaks[here])[:, None, None], movers[here]
+        by, velocity, slope = found[..., :3], found[..., 3:6], found[..., 6:]
+        by = by + since * (velocity + 0.5 * since * slope)
+        return np.concatenate([by, velocity + since * slope, slope], axis=-1)
 
     def _behind(self, pieces: np.ndarray) -> np.ndarray:
         """Break of the signals that pieces lie behind."""
@@ -232,6 +249,7 @@ class Windows:
             velocity=driven[0],
             acceleration=driven[1],
             row=row,
+            mover=inputs.mover(pieces),
             stop_speed=float(scene.stop_speed or 0.0),
             stop_radius=self._radius,
             stop_time=max(law.sigma_1 / law.sigma_0 for law in laws),
@@ -270,6 +288,13 @@ def _meet(times: np.ndarray, breaks: np.ndarray) -> None:
 
 def _starts(sizes: list[int]) -> np.ndarray:
     return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+
+
+def _mover(velocity: Signal | None, breaks: np.ndarray) -> np.ndarray:
+    """Displacement, velocity and acceleration of what moves at the start of each piece between `breaks`, [S, 9]."""
+    if velocity is None:
+        return np.zeros((len(breaks) - 1, 9))
+    return np.concatenate([displacement(velocity, breaks[:-1]), *velocity.pieces(breaks)], axis=1)
 
 
 def _mount(scene, contact) -> int:

@@ -176,3 +176,37 @@ def driven(
     body = Body(1.0, 1.0, gravity=(0.0, 0.0))  # moved as prescribed: mass and inertia play no part
     velocity = published_velocity() if twist is None else twist
     return Scene(body, [contact], t_end, velocity=velocity, **FINE, name="driven")
+
+
+def pushed(
+    model: Any,
+    *,
+    pad: Any = None,
+    velocity: Any = None,
+    normal_force: Any = 1.0,
+    fingers: int = 2,
+    position=(-0.06, 0.01),
+    mass: float = 0.2,
+    size=(0.15, 0.08),
+    t_end: float = 2.0,
+) -> Scene:
+    """A plate on a table that a hand pushes along: two finger pads pinch it behind its centre and move as prescribed.
+
+    `model` is the friction of the patch that the plate of `size` (width, height) [m] and `mass` [kg] stands on, under
+    its weight, its frame at the centre of mass. The pads, with the model `pad` (default: the same), begin at `position`
+    [m] from there and press with `normal_force` [N] each, a signal or a number. `velocity` is their twist
+    `(vx, vy, omega)`, world axes, `[T, 3]`: a signal or a constant (default: up to 0.05 m/s along x and back to rest,
+    each in a tenth of the time). The pads may slip and turn on the plate; pushed from behind, it swings round.
+
+    A pusher at the edge of a plate, which touches a point of its outline, is not a patch: see `planning.push`.
+    """
+    t_end = validation.positive("t_end", t_end)
+    if velocity is None:
+        times = t_end * np.array([0.0, 0.1, 0.9, 1.0])
+        velocity = Signal.sampled(times, [[0.0] * 3, [0.05, 0.0, 0.0], [0.05, 0.0, 0.0], [0.0] * 3], "linear")
+    body = Body(mass, rectangle_inertia(mass, size), gravity=(0.0, 0.0), outline=rectangle_outline(size))
+    table = Contact(model, GRAVITY * body.mass, mounted_on="body", name="table")
+    pads = Contact(
+        model if pad is None else pad, normal_force, position=position, count=fingers, name="fingers", velocity=velocity
+    )
+    return Scene(body, [table, pads], t_end, name="pushed")

@@ -78,7 +78,7 @@ class Contact(ByValue):
     """A contact between body and world: a friction model, where it sits, and how hard it is pressed.
 
     Contacts fixed to the world (fingers) keep their frame while the body moves past; contacts fixed to the body (a box
-    on a table) carry it along.
+    on a table) carry it along. The world's side of either may move: a pad that is driven, a belt that runs.
     """
 
     model: Any = field(repr=False)
@@ -95,6 +95,12 @@ class Contact(ByValue):
     """Number of identical contacts (same place, same load) that share this one's state."""
     name: str = "contact"
     """Name in the results; unique in its scene."""
+    velocity: Signal | None = None
+    """Prescribed twist `(vx, vy, omega)` of the world's side, world axes, `[T, 3]` [m/s, m/s, rad/s]; None: at rest.
+
+    A pad fixed to the world carries the contact frame along: it is the twist at the frame's origin. Under a patch fixed
+    to the body it is the twist of the ground (a belt, a turntable) at the origin of the world.
+    """
 
     def __post_init__(self) -> None:
         validation.text("name of a contact", self.name)
@@ -107,6 +113,8 @@ class Contact(ByValue):
         object.__setattr__(self, "position", _floats(f"position {of_contact}", self.position, 2))
         object.__setattr__(self, "angle", validation.number(f"angle {of_contact}", self.angle))
         object.__setattr__(self, "count", validation.count(f"count {of_contact}", self.count, at_most=MOST_CONTACTS))
+        if self.velocity is not None:
+            object.__setattr__(self, "velocity", as_signal(f"velocity {of_contact}", self.velocity, 3))
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,6 +176,10 @@ class Scene(ByValue):
             for name in ("force", "stop_speed"):
                 if getattr(self, name) is not None:
                     raise InvalidValueError(name, "be None where the velocity is prescribed", getattr(self, name))
+            for contact in self.contacts:
+                if contact.velocity is not None:
+                    name = f"velocity of contact {contact.name!r}"
+                    raise InvalidValueError(name, "be None where the body's velocity is prescribed", contact.velocity)
         sample_count(self.t_end, self.save_every, "save_every")
         validation.text("name", self.name)
         self._check_start()
@@ -189,6 +201,7 @@ class Scene(ByValue):
         """
         t_end = self.t_end if t_end is None else validation.positive("t_end", t_end)
         signals = [contact.normal_force for contact in self.contacts]
+        signals += [contact.velocity for contact in self.contacts if contact.velocity is not None]
         signals += [signal for signal in (self.force, self.velocity) if signal is not None]
         return breaks_between(np.concatenate([signal.breaks for signal in signals]), t_end)
 

@@ -20,6 +20,7 @@ from planarfriction import validation
 from planarfriction.equality import by_parts
 from planarfriction.errors import FileError, FrictionError, InvalidValueError
 from planarfriction.reading import read_bytes
+from planarfriction.scenes.movers import displacement
 from planarfriction.scenes.scene import Scene
 from planarfriction.solvers.statistics import Statistics
 from planarfriction.writing import replacing
@@ -111,6 +112,15 @@ class Solution:
             np.asarray(self.histories[name].values) for name in ("x", "y", "theta", "vx", "vy", "omega")
         )
         (dx, dy), angle = chosen.position, chosen.angle + 0.0 * theta
+        if chosen.velocity is not None:
+            time = np.asarray(self.histories["time"].values)
+            moves, way = chosen.velocity.left(time).T, displacement(chosen.velocity, time).T
+            to = np.zeros(2)
+            if chosen.mounted_on == "world":
+                dx, dy, angle = dx + way[0], dy + way[1], angle + way[2]
+                to = dx, dy
+            vx, vy = vx - moves[0] + moves[2] * (y - to[1]), vy - moves[1] - moves[2] * (x - to[0])
+            omega = omega - moves[2]
         if self.scene.velocity is None and chosen.mounted_on == "world":
             dx, dy = dx - x, dy - y
         elif self.scene.velocity is None:

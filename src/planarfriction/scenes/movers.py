@@ -1,0 +1,19 @@
+"""What moves under or with a contact: where prescribed velocities have carried it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from planarfriction.scenes.signal import Signal
+
+
+def displacement(velocity: Signal, times) -> np.ndarray:
+    """Integral `[T, k]` of a velocity `[k]` from 0 to `times` `[T]` [s], which are >= 0: exact, piece by piece."""
+    times = np.asarray(times, dtype=float)
+    breaks = np.unique(np.concatenate([[0.0], velocity.breaks, times]))
+    breaks = breaks[breaks >= 0.0]
+    if len(breaks) == 1:
+        return np.zeros((len(times), velocity.columns or 1))
+    middle, lengths = 0.5 * (breaks[1:] + breaks[:-1]), np.diff(breaks)  # linear in between: the middle is the mean
+    way = np.cumsum(velocity(middle).reshape(len(middle), -1) * lengths[:, None], axis=0)
+    return np.concatenate([np.zeros((1, way.shape[1])), way])[np.searchsorted(breaks, times)]
