@@ -120,7 +120,7 @@ def test_a_broken_scene_file_is_one_line(capsys, tmp_path):
 # ---------------------------------------------------------------------- scenes and patches
 
 
-@pytest.mark.parametrize("name", ["in-hand", "drift", "free-slide", "driven"])
+@pytest.mark.parametrize("name", ["in-hand", "drift", "free-slide", "driven", "pushed"])
 def test_ready_scenes_by_name(name):
     built = build_scenes(name, ["both"], t_end=1.5)
     assert [type(scene.contacts[0].model).__name__ for scene in built.values()] == list(run_models())

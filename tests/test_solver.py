@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from numba import njit
@@ -42,12 +44,24 @@ def free_scene() -> pf.Scene:
     return pf.Scene(pf.Body(0.3, 4e-4, (0.01, 0.02), 0.3, (0.1, -0.05, 2.0)), contacts, 1.0, force=force)
 
 
+def moving_scene() -> pf.Scene:
+    """The same, on a finger that moves and turns and over a turntable that speeds up."""
+    scene = free_scene()
+    finger, foot, pad = scene.contacts
+    sway = pf.Signal.sampled([0.0, 1.0], [[0.1, -0.2, 3.0], [0.5, 0.3, -8.0]], hold="linear")
+    return dataclasses.replace(
+        scene, contacts=[dataclasses.replace(each, velocity=sway) for each in (finger, foot)] + [pad]
+    )
+
+
 def driven_scene() -> pf.Scene:
     twist = pf.Signal.sampled([0.0, 1.0], [[0.01, 0.002, 0.3], [0.02, -0.01, 1.0]], hold="linear")
     return pf.scenes.driven(pf.DistributedModel(SMALL, ELASTIC), twist=twist, t_end=1.0)
 
 
-@pytest.mark.parametrize("scene", [free_scene(), driven_scene()], ids=["free", "prescribed"])
+@pytest.mark.parametrize(
+    "scene", [free_scene(), moving_scene(), driven_scene()], ids=["free", "on what moves", "prescribed"]
+)
 def test_structured_solve_is_the_solve_with_the_full_jacobian(scene):
     packed = pack(scene, 1.0)
     generator = np.random.default_rng(3)

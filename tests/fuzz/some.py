@@ -105,6 +105,8 @@ def scene(draw: random.Random) -> pf.Scene:
     def contact(number: int) -> pf.Contact:
         options = {"mounted_on": draw.choice(["world", "body"]), "angle": draw.uniform(-math.pi, math.pi)}
         options |= {"position": (draw.uniform(-0.1, 0.1), draw.uniform(-0.1, 0.1)), "count": draw.randint(1, 3)}
+        if velocity is None and draw.random() < 0.2:
+            options["velocity"] = signal(draw, t_end, lambda: [draw.uniform(-1, 1), 0.0, draw.uniform(-10, 10)])
         return pf.Contact(model(draw), signal(draw, t_end, load), name=f"{draw.choice('aφ')} {number}", **options)
 
     velocity, force = None, None

@@ -106,9 +106,6 @@ def prepared(scene: Scene, columns: Columns, t_end, rtol, atol, save_every) -> t
     every = scene.save_every if save_every is None else validation.positive("save_every", save_every)
     for contact in scene.contacts:
         refuse_anisotropy(contact.model.patch, "scene_sensitivities")
-        if contact.velocity is not None:
-            name = f"velocity of contact {contact.name!r}"
-            raise InvalidValueError(name, "be None in scene_sensitivities", contact.velocity)
     if scene.start != "rest" and columns.of_start:
         rule = f"be 'rest' for the derivative to {columns.of_start[0]}, which has a say in how the bristles start"
         raise InvalidValueError("start", rule, scene.start)

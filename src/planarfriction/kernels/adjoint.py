@@ -20,7 +20,7 @@ import numpy as np
 
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import jit, kernel
-from planarfriction.kernels.body import load_of, read, times
+from planarfriction.kernels.body import load_of, read, seen_by, times
 from planarfriction.kernels.pointers import address, at, call, doubles, integers
 from planarfriction.kernels.rosenbrock import error_norm
 from planarfriction.kernels.small_matrices import solved
@@ -88,7 +88,7 @@ def _jacobian(own, piece, since, w):
     for c in range(own.contacts):
         maps = at(own.maps, 27 * c)
         a, g, h = doubles(maps), doubles(at(maps, 9)), doubles(at(maps, 18))
-        times(a, doubles(at(y, o)), rows)
+        times(a, doubles(seen_by(own, c, y)), rows)
         for i in range(3):
             rows[3 + i] = doubles(own.wrench)[3 * c + i]
         load = doubles(own.count)[c] * load_of(own, piece, since, c)

@@ -87,7 +87,8 @@ class Work(NamedTuple):
     rows: np.ndarray
     """Twist and wrench of one contact and their changes, [4, 3] (see `contacts.ModelFunctions`)."""
     moved: np.ndarray
-    """Where each contact frame is, as in `Contacts.place`, and what `seen_by` says, where something moves, [C, 8]."""
+    """Where each contact frame is, as in `Contacts.place`, and the velocity it sees (see `place_at`) with the spin of the
+    world's side, where something moves, [C, 8]."""
 
 
 SystemRecord = NamedTuple(
@@ -215,6 +216,12 @@ def place_at(own, piece, since, c, state):
     return at(own.moved, 8 * c), at(own.moved, 8 * c + 4)
 
 
+@kernel
+def seen_by(own, c, y):
+    """Address of the velocity that contact c sees [3], as `rates` of the state `y` left it."""
+    return at(y, own.bristles) if own.mover == 0 else at(own.moved, 8 * c + 4)
+
+
 @entry
 def rates(system, piece, since, y, dy):
     """Right-hand side `dy` at `since` seconds into a piece; wrenches per unit load into the workspace."""
@@ -257,9 +264,8 @@ def linearise(system, piece, y):
     for c in range(own.contacts):
         mount, maps = integers(own.mount)[c], at(own.maps, 27 * c)
         a, g, h = doubles(maps), doubles(at(maps, 9)), doubles(at(maps, 18))
-        place, seen = at(own.place, 4 * c), at(y, o)
-        if own.mover != 0:  # as `rates` left them
-            place, seen = at(own.moved, 8 * c), at(own.moved, 8 * c + 4)
+        place = at(own.place if own.mover == 0 else own.moved, (4 if own.mover == 0 else 8) * c)
+        seen = seen_by(own, c, y)
         contact_map(mount, doubles(place), pose, a)
         contact_map_slopes(mount, a, doubles(seen), doubles(at(own.wrench, 3 * c)), g, h)
         if own.mover != 0:

@@ -22,7 +22,7 @@ import numpy as np
 
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import jit, kernel
-from planarfriction.kernels.body import load_of, read, record_of, times
+from planarfriction.kernels.body import load_of, read, record_of, seen_by, times
 from planarfriction.kernels.contacts import CHANGE
 from planarfriction.kernels.integration import read_run
 from planarfriction.kernels.pointers import address, at, call, doubles, integers
@@ -121,7 +121,7 @@ def _partial(own, piece, since, w, drives, p, out):
         for i in range(3):
             rows[3 + i], rows[6 + i], rows[9 + i] = wrench[i], 0.0, wrench[i]
         if parameter in (FRICTION, SIZE):
-            times(a, doubles(address(w.state, o)), rows)
+            times(a, doubles(seen_by(own, c, address(w.state, 0))), rows)
             _change(own, piece, c, address(w.state, 0), address(dy, 0), address(w.zero, 0), parameter, address(out, 0))
         load = doubles(own.count)[c] * (weight if parameter == NORMAL_FORCE else load_of(own, piece, since, c))
         for i in range(3):
@@ -336,7 +336,7 @@ def wrench_slopes(system, piece, since, y, drives, slope, wrench, out, scratch):
     for c in range(own.contacts):
         load = load_of(own, piece, since, c)
         a, g, unit = doubles(at(own.maps, 27 * c)), doubles(at(own.maps, 27 * c + 9)), doubles(at(own.wrench, 3 * c))
-        times(a, doubles(address(y, o)), rows)
+        times(a, doubles(seen_by(own, c, address(y, 0))), rows)
         for i in range(3):
             wrench[c, i] = load * unit[i]
             rows[3 + i] = unit[i]
