@@ -87,8 +87,8 @@ class Work(NamedTuple):
     rows: np.ndarray
     """Twist and wrench of one contact and their changes, [4, 3] (see `contacts.ModelFunctions`)."""
     moved: np.ndarray
-    """Where each contact frame is, as in `Contacts.place`, and the velocity it sees (see `place_at`) with the spin of the
-    world's side, where something moves, [C, 8]."""
+    """Where each contact frame is, as in `Contacts.place`, and the velocity it sees (see `place_at`), with the spin of
+    the world's side, where something moves, [C, 8]."""
 
 
 SystemRecord = NamedTuple(

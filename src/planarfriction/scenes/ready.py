@@ -205,7 +205,8 @@ def pushed(
         times = t_end * np.array([0.0, 0.1, 0.9, 1.0])
         velocity = Signal.sampled(times, [[0.0] * 3, [0.05, 0.0, 0.0], [0.05, 0.0, 0.0], [0.0] * 3], "linear")
     body = Body(mass, rectangle_inertia(mass, size), gravity=(0.0, 0.0), outline=rectangle_outline(size))
-    table = Contact(model, GRAVITY * body.mass, mounted_on="body", name="table")
+    weight: Any = GRAVITY * body.mass
+    table = Contact(model, weight, mounted_on="body", name="table")
     pads = Contact(
         model if pad is None else pad, normal_force, position=position, count=fingers, name="fingers", velocity=velocity
     )
