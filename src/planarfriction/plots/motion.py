@@ -66,7 +66,7 @@ def draw_motion(figure: Any, solution: Solution) -> None:
         _move(_draw_mount(axes, solution, "body", _TIME_COLOURS(scale(time[index]))), axes, poses[index])
         for contact in _driven(solution):
             pads = _draw_shape(axes, _pad_shape(contact), _TIME_COLOURS(scale(time[index])))
-            _move(pads, axes, _carried(contact, time[index]))
+            _move(pads, axes, _carried(contact, float(time[index])))
     _draw_mount(axes, solution, "world", style.PAD_COLOUR)
     _finish(axes, _limits(solution, time[chosen], poses[chosen]))
     axes.plot(*(1e3 * poses[:, :2].T), color="0.3", linewidth=0.9, zorder=4)
