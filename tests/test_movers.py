@@ -163,6 +163,17 @@ def test_what_is_pulled_comes_round_and_what_is_pushed_swings_away():
     assert -line < turns[1][-1] < -0.5 * line  # pulled: towards the line
 
 
+@pytest.mark.parametrize("mounted_on", ["world", "body"])
+def test_a_body_that_starts_sliding_slides_against_what_moves(mounted_on):
+    body = pf.Body(0.2, 1e-4, (0.02, -0.01), velocity=(0.3, 0.1, 2.0), gravity=(0.0, 0.0))
+    place, moves = (0.01, 0.03), (-0.1, 0.2, -3.0)
+    contact = pf.Contact(MODELS["reduced"], 1.0, mounted_on, place, angle=0.5, name="pad", velocity=moves)
+    run = pf.simulate(pf.Scene(body, [contact], 1e-6, start="sliding", save_every=1e-6))
+    steady = MODELS["reduced"].step(MODELS["reduced"].rest(), run.contact_twist("pad")[0], 1.0, 1e6)[1]
+    found = run.data.isel(time=0, contact=0)
+    assert [float(found[name]) for name in ("fx", "fy", "tau")] == pytest.approx(steady, rel=1e-9)
+
+
 def test_driven_pads_are_drawn_where_they_are(tmp_path):
     run = pf.simulate(pushed(MODELS["reduced"], t_end=0.5))
     figure = pf.plots.plot_motion(run)

@@ -52,9 +52,18 @@ def _sliding(scene: Any, shaped: np.ndarray) -> list[np.ndarray]:
     states = []
     for contact, load in zip(scene.contacts, shaped, strict=True):
         model = contact.model
-        twist = contact_map(scene, contact) @ np.asarray(velocity)
+        twist = contact_map(scene, contact) @ (np.asarray(velocity) - _carried(scene.body, contact))
         states.append(model.step(model.rest(), twist, load, _LONG)[0] if load > 0.0 else model.rest())
     return states
+
+
+def _carried(body: Any, contact: Any) -> np.ndarray:
+    """Velocity `[3]` that the centre of mass would have at t = 0 on what the contact touches."""
+    if contact.velocity is None:
+        return np.zeros(3)
+    x, y = np.subtract(body.position, contact.position if contact.mounted_on == "world" else (0.0, 0.0))
+    vx, vy, omega = contact.velocity(0.0)
+    return np.array([vx - omega * y, vy + omega * x, omega])
 
 
 # ---------------------------------------------------------------------- bristles that carry the load
