@@ -11,8 +11,9 @@ from typing import TYPE_CHECKING, Any
 from planarfriction import validation
 from planarfriction.cli import INTERRUPTED, output
 from planarfriction.cli.console import note, print_table, simulation_progress
-from planarfriction.cli.patches import WIDTH, find_patch
+from planarfriction.cli.patches import find_patch
 from planarfriction.cli.report import comparison
+from planarfriction.cli.usual import published_law, usual
 from planarfriction.errors import InvalidValueError, SimulationInterrupted, SolverError
 from planarfriction.families import MODELS, SCENES
 from planarfriction.writing import make_folder
@@ -20,9 +21,6 @@ from planarfriction.writing import make_folder
 if TYPE_CHECKING:
     from planarfriction.patch import ContactPatch
     from planarfriction.scenes import Scene, Solution
-
-DRIFT_WIDTH = 0.05
-"""Width of the patch in the published drift experiment [m]."""
 
 SLIDE_SAMPLING = 1e-3
 """Time between samples of the free slide [s], which lasts a tenth of a second."""
@@ -47,14 +45,18 @@ def build_scenes(
     if Path(name).suffix.lower() in (".toml", ".json"):
         return _scenes_from_file(name, kinds, _parts(parts), patch, cell_size)
     validation.choice("scene", name, [*SCENES, "a scene file (.toml, .json)"])
-    width = DRIFT_WIDTH if name == "drift" else WIDTH
-    contact_patch = find_patch(patch, cell_size=cell_size, width=width)
+    of_scene = usual(name)
+    if patch is None and cell_size is None and of_scene.patch is not None:
+        contact_patch = of_scene.patch()
+    else:
+        contact_patch = find_patch(patch, cell_size=cell_size, width=of_scene.width)
+    law = (of_scene.law or published_law)()
     kinds = kinds or (list(BOTH) if name == "in-hand" else ["distributed"])
     _check_parts(parts, [MODELS[kind] for kind in kinds])
     options: dict[str, Any] = {} if t_end is None else {"t_end": t_end}
     if name == "free-slide":
         options["save_every"] = SLIDE_SAMPLING
-    return {kind: SCENES[name](_make(MODELS[kind], contact_patch, _law(), _parts(parts)), **options) for kind in kinds}
+    return {kind: SCENES[name](_make(MODELS[kind], contact_patch, law, _parts(parts)), **options) for kind in kinds}
 
 
 def _parts(text: str | None) -> int | str | None:
@@ -80,12 +82,6 @@ def _check_parts(parts: Any, makes: Iterable[Any]) -> None:
 def _make(make: Any, patch: ContactPatch, law: Any, parts: int | str | None) -> Any:
     """A model of a class, in `parts` where it has some."""
     return make(patch, law, **({"parts": parts} if parts is not None and _in_parts(make) else {}))
-
-
-def _law() -> Any:
-    from planarfriction.laws import ElastoPlastic, LuGre
-
-    return LuGre(mu_s=1.2, elasto_plastic=ElastoPlastic(0.9))
 
 
 def _scenes_from_file(

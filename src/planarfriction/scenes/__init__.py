@@ -9,6 +9,7 @@ from planarfriction.scenes.ready import drift, driven, free_slide, in_hand, in_h
 from planarfriction.scenes.scene import Body, Contact, Scene
 from planarfriction.scenes.signal import Signal
 from planarfriction.scenes.solution import Solution, Statistics, load
+from planarfriction.scenes.worlds import curling, foot, pivot
 
 if TYPE_CHECKING:
     from planarfriction.scenes.simulation import simulate
@@ -21,12 +22,15 @@ __all__ = [
     "Signal",
     "Solution",
     "Statistics",
+    "curling",
     "drift",
     "driven",
+    "foot",
     "free_slide",
     "in_hand",
     "in_hand_load",
     "load",
+    "pivot",
     "published_velocity",
     "pushed",
     "register",

@@ -1,0 +1,124 @@
+"""Ready scenes beyond the hand and the table: a part that pivots in the gripper, a foot that turns, a curling stone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.errors import InvalidValueError
+from planarfriction.scenes.files import rectangle_inertia, rectangle_outline
+from planarfriction.scenes.ready import GRAVITY, SAMPLE_TIME, STOP_SPEED
+from planarfriction.scenes.scene import Body, Contact, Scene
+from planarfriction.scenes.signal import Signal, as_signal
+
+GRIP = ([0.0, 0.2, 0.24, 0.36, 0.4], [4.0, 4.0, 1.0, 1.0, 6.0])
+"""Corners [s], [N] of the grip of one finger: holds, lets go, catches."""
+
+SWAY = ([0.7, 1.0], [0.1, 0.9])
+"""Corners [s], [-] of the share of the weight on the forefoot."""
+
+TURNS = ([0.0, 0.1, 0.4, 1.1, 1.4], [0.0, 20.0, 0.0, -20.0, 0.0])
+"""Times [s] and yaw torques [N m] from then on that turn the foot, and turn it back."""
+
+SOLE_WIDTH = 0.09
+"""Width of the outline around both patches of a foot [m], for drawings."""
+
+STONE_RADIUS = 0.14
+"""Radius of a curling stone [m]: 0.88 m around, of 0.91 m (36 inches) that the rules allow."""
+
+
+def pivot(
+    model: Any,
+    *,
+    mass: float = 0.06,
+    size=(0.16, 0.03),
+    arm: float = 0.06,
+    normal_force: Any = None,
+    fingers: int = 2,
+    t_end: float = 1.0,
+) -> Scene:
+    """A part held level by one end between finger pads: the grip loosens, the part swings down and is caught.
+
+    The pads sit at the origin of the world; the centre of mass of the plate of `size` (width, height) [m] and `mass`
+    [kg] starts `arm` [m] beside them. Each of the `fingers` presses with the full `normal_force` [N], a signal or a
+    number (default: 4 N; from 0.24 s 1 N, from 0.4 s 6 N). The part turns where `fingers mu f_N r < mass g arm`, and
+    the contact radius r of a soft finger grows with its load.
+    """
+    arm = validation.positive("arm", arm)
+    inertia, outline = rectangle_inertia(mass, size), rectangle_outline(size)
+    body = Body(mass, inertia, (arm, 0.0), gravity=(0.0, -GRAVITY), outline=outline)
+    load = Signal.sampled(*GRIP, hold="linear").held(SAMPLE_TIME) if normal_force is None else normal_force
+    return Scene(body, [Contact(model, load, count=fingers, name="fingers")], t_end, name="pivot")
+
+
+def foot(
+    model: Any,
+    *,
+    forefoot: Any = None,
+    mass: float = 40.0,
+    inertia: float = 1.0,
+    length: float = 0.16,
+    share: Any = None,
+    torque: Any = None,
+    t_end: float = 2.0,
+) -> Scene:
+    """A robot that stands on one foot, turns about its heel and back about its forefoot: a step aside without a step.
+
+    Heel (`model`) and `forefoot` (a model; the heel's by default) are fixed to the body, `length` [m] apart along x,
+    with the centre of mass of `mass` [kg] and `inertia` about the vertical [kg m^2] midway. `share` of the weight is on
+    the forefoot [-] (default: 0.1, from 1 s on 0.9), and the yaw `torque` [N m] turns the body (default: 20 N m for
+    0.3 s from 0.1 s on, -20 N m from 1.1 s on); each a signal or a number.
+    """
+    half = 0.5 * validation.positive("length", length)
+    ahead = Signal.sampled(*SWAY, hold="linear") if share is None else as_signal("share", share, None)
+    if ahead.values.min() < 0.0 or ahead.values.max() > 1.0:
+        raise InvalidValueError("share", "be in [0, 1]", f"{ahead.values.min():g} to {ahead.values.max():g}")
+    turning = Signal.sampled(*TURNS) if torque is None else as_signal("torque", torque, None)
+    wrench = Signal.sampled(turning.times, turning.values[:, None] * [0.0, 0.0, 1.0], turning.hold)
+    body = Body(mass, inertia, gravity=(0.0, 0.0), outline=_around(half, 0.5 * SOLE_WIDTH))
+    contacts = [
+        Contact(
+            patch,
+            Signal.sampled(ahead.times, GRAVITY * body.mass * part, ahead.hold),
+            mounted_on="body",
+            position=(x, 0.0),
+            name=name,
+        )
+        for name, patch, part, x in (
+            ("heel", model, 1.0 - ahead.values, -half),
+            ("forefoot", model if forefoot is None else forefoot, ahead.values, half),
+        )
+    ]
+    return Scene(body, contacts, t_end, force=wrench, name="foot")
+
+
+def curling(
+    model: Any,
+    *,
+    mass: float = 19.0,
+    inertia: float | None = None,
+    twist=(2.2, 0.0, 1.5),
+    t_end: float = 60.0,
+    save_every: float = 0.05,
+) -> Scene:
+    """A curling stone let go with the `twist` `(vx, vy, omega)`; ends when it has stopped.
+
+    The patch is fixed to the stone, its frame's origin at the centre of mass: a narrow ring, on real stones. `mass`
+    [kg], `inertia` about the vertical [kg m^2] (default: that of a cylinder of radius 0.14 m), `save_every` [s] the
+    time between samples. Friction that is the same in all directions on an even pressure slows the stone and its spin,
+    and does not make it curl.
+    """
+    if inertia is None:
+        inertia = 0.5 * validation.positive("mass", mass) * STONE_RADIUS**2
+    body = Body(mass, inertia, velocity=twist, gravity=(0.0, 0.0), outline=_around(0.0, STONE_RADIUS))
+    ice = Contact(model, GRAVITY * body.mass, mounted_on="body", name="ice")
+    return Scene(body, [ice], t_end, stop_speed=STOP_SPEED, save_every=save_every, name="curling")
+
+
+def _around(half: float, radius: float) -> np.ndarray:
+    """Outline `[M, 2]` [m] at the distance `radius` from the line between (-half, 0) and (half, 0)."""
+    angle = 2.0 * np.pi * (np.arange(64) + 0.5) / 64
+    x, y = radius * np.cos(angle), radius * np.sin(angle)
+    return np.stack([x + np.copysign(half, x), y], axis=1)
