@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,8 +14,9 @@ from scipy.special import ellipe, ellipk
 import planarfriction as pf
 from planarfriction.cli.run import build_scenes
 from planarfriction.errors import FrictionError
-from planarfriction.scenes import foot, free_slide, pivot
+from planarfriction.scenes import curling, foot, free_slide, pivot
 
+EXAMPLES = Path(__file__).parents[1] / "examples"
 G = 9.81
 COULOMB = pf.LuGre(mu_c=1.0, sigma_0=1e5, sigma_1=100.0, sigma_2=0.0)
 """Stiff bristles with one coefficient at all speeds: Coulomb friction but for the first 10 um."""
@@ -228,3 +230,26 @@ def test_scenes_bring_their_patch_and_their_law():
     (standing,) = build_scenes("foot", [], patch="Square").values()
     assert standing.contacts[1].model.patch.area() == pytest.approx(0.06**2, rel=1e-12)
     assert standing.contacts[0].model.law.mu_s == 1.2
+
+
+# ---------------------------------------------------------------------- examples
+
+
+@pytest.mark.parametrize("make", [pivot, foot, curling])
+def test_the_example_of_a_scene_is_that_scene(make):
+    path = EXAMPLES / f"{make.__name__}.toml"
+    if not path.exists():
+        pytest.skip("no examples beside these tests")
+    scene = pf.Scene.from_file(path)
+    ready = make(scene.contacts[0].model)
+    assert scene.contacts[-1].model == ready.contacts[-1].model
+    t = np.linspace(0.0, scene.t_end, 400) + 1e-4
+    for ours, its in zip(scene.contacts, ready.contacts, strict=True):
+        assert ours.normal_force(t) == pytest.approx(its.normal_force(t), rel=1e-12)
+        assert (ours.name, ours.position, ours.count) == (its.name, its.position, its.count)
+    if ready.force is not None:
+        assert scene.force(t).tolist() == ready.force(t).tolist()
+    for name in ("t_end", "save_every", "stop_speed", "name"):
+        assert getattr(scene, name) == getattr(ready, name)
+    for name in ("mass", "inertia", "position", "velocity", "gravity"):
+        assert getattr(scene.body, name) == pytest.approx(getattr(ready.body, name), rel=1e-12)

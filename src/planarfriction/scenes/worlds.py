@@ -113,7 +113,8 @@ def curling(
     if inertia is None:
         inertia = 0.5 * validation.positive("mass", mass) * STONE_RADIUS**2
     body = Body(mass, inertia, velocity=twist, gravity=(0.0, 0.0), outline=_around(0.0, STONE_RADIUS))
-    ice = Contact(model, GRAVITY * body.mass, mounted_on="body", name="ice")
+    weight: Any = GRAVITY * body.mass
+    ice = Contact(model, weight, mounted_on="body", name="ice")
     return Scene(body, [ice], t_end, stop_speed=STOP_SPEED, save_every=save_every, name="curling")
 
 
