@@ -41,7 +41,8 @@ def pivot() -> PlotFigure:
     finger = pf.SoftFinger(c=0.006, n=1 / 3, k=2.0, radius_max=0.012)
     pads = pf.DistributedModel(pf.ContactPatch.disc(0.012, pressure=finger), LAW)
     figure = new_figure(10.0, 4.2)
-    left, right = figure.subfigures(1, 2, width_ratios=(1.1, 1.0))
+    parts: Any = figure.subfigures(1, 2, width_ratios=(1.1, 1.0))
+    left, right = parts
     draw_motion(left, pf.simulate(pf.scenes.pivot(pads, t_end=0.5)))
     grip, angle = right.subplots(2, 1, sharex=True, height_ratios=(1.0, 2.2))
     for colour, length in zip(PALETTE, (0.06, 0.09, 0.12, 0.15), strict=False):
@@ -62,7 +63,8 @@ def foot() -> PlotFigure:
     page = from_page("sole =")
     sole, outline, rays, centre = (page[name] for name in ("sole", "outline", "rays", "centre"))
     figure = new_figure(11.0, 3.6)
-    left, middle, right = figure.subfigures(1, 3, width_ratios=(0.75, 1.0, 1.15))
+    parts: Any = figure.subfigures(1, 3, width_ratios=(0.75, 1.0, 1.15))
+    left, middle, right = parts
     axes = left.subplots()
     shown = axes.scatter(*(1e3 * sole.positions[:, ::-1].T), c=sole.weights() / sole.areas, cmap=PRESSURE_MAP, s=11)
     shown.set_clim(0.0)
