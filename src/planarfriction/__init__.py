@@ -41,6 +41,7 @@ _HOME = {
     "load": "planarfriction.scenes",
     "rollout": "planarfriction.autodiff",
     "simulate": "planarfriction.scenes",
+    "sweep": "planarfriction.sweeps",
     "warm_up": "planarfriction.warm",
 }
 _MODULES = (
@@ -59,6 +60,7 @@ _MODULES = (
     "plots",
     "scenes",
     "solvers",
+    "sweeps",
 )
 
 __all__ = [*_HOME, *_MODULES]
@@ -94,4 +96,5 @@ if TYPE_CHECKING:  # for editors and type checkers: the same names as above
     from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
     from planarfriction.patch import ContactPatch, LinearGradient, PressureMaps, SoftFinger, Uniform, grain
     from planarfriction.scenes import Body, Contact, Scene, Signal, Solution, load, simulate
+    from planarfriction.sweeps import sweep
     from planarfriction.warm import warm_up

@@ -117,3 +117,15 @@ class SimulationInterrupted(_Travels, KeyboardInterrupt):
     def __init__(self, solution: Any):
         self.solution = solution
         super().__init__("simulation interrupted")
+
+
+class SweepError(FrictionError, RuntimeError):
+    """A sweep ended early, or nothing came of any of its runs."""
+
+
+class SweepInterrupted(_Travels, KeyboardInterrupt):
+    """Ctrl-C during a sweep; `data` is the dataset of the runs that are done, with the status "missing" for others."""
+
+    def __init__(self, message: str, data: Any):
+        self.data = data
+        super().__init__(f"sweep interrupted: {message}")

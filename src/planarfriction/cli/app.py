@@ -11,6 +11,7 @@ from click.shell_completion import CompletionItem
 from planarfriction import __version__
 from planarfriction.cli.identify_plan import FitOrPlan, complete_log
 from planarfriction.cli.options import FILE, PATCH_HELP
+from planarfriction.cli.sweep import sweep
 from planarfriction.families import MODELS, SCENES, SURFACES, Family
 
 AUTO_PARTS = "as many as the shape of the patch asks for, 4 to 8"
@@ -72,6 +73,7 @@ def app() -> None:
       planarfriction run in-hand --model both --parts auto
       planarfriction run in-hand --patch pad.csv --cell-size 0.001 --animate
       planarfriction run scene.toml --rtol 1e-7 --out results/
+      planarfriction run scene.toml --set body.mass=0.3 --set fingers.law.mu_c=0.5
     """,
 )
 @click.argument("scene", shell_complete=complete_scene)
@@ -91,6 +93,7 @@ def app() -> None:
 @click.option("--cell-size", type=float, help="Side of a cell of a pressure map in m.")
 @click.option("--t-end", type=float, help="Duration in s. Default: the scene's.")
 @click.option("--rtol", type=float, help="Relative tolerance of the solver.")
+@click.option("--set", "settings", metavar="PATH=VALUE", multiple=True, help="A value of the scene; may be repeated.")
 @click.option("--out", type=FILE, help="Folder for the data (NetCDF, CSV) and the pictures.")
 @click.option("--plot", is_flag=True, help="Draw histories, motion and patch (PNG; to out/ by default).")
 @click.option("--animate", is_flag=True, help="Draw the motion as a GIF (to out/ by default).")
@@ -102,6 +105,7 @@ def run(
     cell_size: float | None,
     t_end: float | None,
     rtol: float | None,
+    settings: tuple[str, ...],
     out: Path | None,
     plot: bool,
     animate: bool,
@@ -112,7 +116,9 @@ def run(
     gc.disable()
     from planarfriction.cli import run as command
 
-    scenes = command.build_scenes(scene, model, parts=parts, patch=patch, cell_size=cell_size, t_end=t_end)
+    scenes = command.build_scenes(
+        scene, model, parts=parts, patch=patch, cell_size=cell_size, t_end=t_end, settings=command.one_each(settings)
+    )
     pictures = [name for name, wanted in (("plot", plot), ("animate", animate)) if wanted]
     folder = Path("out") if out is None and pictures else out
     return command.run(scenes, rtol=rtol, t_end=t_end, folder=folder, pictures=pictures)
@@ -369,3 +375,6 @@ def simulators(out: Path, quick: bool, again: bool) -> int:
     from planarfriction.cli import simulators as command
 
     return command.compare(out, quick=quick, again=again)
+
+
+app.add_command(sweep)

@@ -32,6 +32,14 @@ def work_progress(label: str) -> Iterator[Callable[[str], None]]:
 
 
 @contextmanager
+def count_progress(label: str) -> Iterator[Callable[[int, int, str], None]]:
+    """Progress bar over things that are done, of all, with words that say more."""
+    with _bar() as bar:
+        task = bar.add_task(label, total=None)
+        yield lambda done, of, words: bar.update(task, completed=done, total=of, description=f"{label}: {words}")
+
+
+@contextmanager
 def _bar() -> Iterator[Progress]:
     console = Console(stderr=True)
     columns = (

@@ -43,7 +43,7 @@ def measured(
     left_out: list[str] = []
     models = _library(only, left_out) if only or not own else {}
     for entry in own:
-        name, model = load_model(entry)
+        name, model = load_function("--own", entry)
         if name in models or name in LIBRARY:
             raise InvalidValueError("--own", "have a name that no model of the library has", name)
         models[name] = model
@@ -74,14 +74,14 @@ def _library(only: Sequence[str], left_out: list[str]) -> dict[str, Any]:
     return {name: there[name] for name in chosen if name in there}
 
 
-def load_model(entry: str) -> tuple[str, Callable[[Any], Any]]:
-    """Name and model of `FILE.py:NAME`: a function, or an object that can be called.
+def load_function(option: str, entry: str) -> tuple[str, Callable[[Any], Any]]:
+    """Name and function, or object that can be called, of the `FILE.py:NAME` that an option has.
 
     Raises FileError in one line where the file or what is in it cannot be had.
     """
     file, colon, name = entry.rpartition(":")
     if not colon or not file.endswith(".py") or not name.isidentifier():
-        raise InvalidValueError("--own", "be FILE.py:NAME", entry)
+        raise InvalidValueError(option, "be FILE.py:NAME", entry)
     path = Path(file)
     if not path.is_file():
         raise FileError(f"{path}: no such file")

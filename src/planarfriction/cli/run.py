@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 import inspect
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -37,13 +38,29 @@ def build_scenes(
     patch: str | None = None,
     cell_size: float | None = None,
     t_end: float | None = None,
+    settings: Mapping[str, Any] | None = None,
 ) -> dict[str, Scene]:
-    """The scenes to simulate, by the label of their model."""
+    """The scenes to simulate, by the label of their model, with the values of `settings` by their paths."""
+    makers = scene_makers(name, models, parts=parts, patch=patch, cell_size=cell_size, t_end=t_end)
+    scenes = {kind: make(**(settings or {})) for kind, make in makers.items()}
+    return {kind or _label(scene): scene for kind, scene in scenes.items()}
+
+
+def scene_makers(
+    name: str,
+    models: Sequence[str],
+    *,
+    parts: str | None = None,
+    patch: str | None = None,
+    cell_size: float | None = None,
+    t_end: float | None = None,
+) -> dict[str, Callable[..., Scene]]:
+    """What makes the scenes of some values, by the kind of their model; "" for the file's own."""
     if t_end is not None:
         validation.positive("--t-end", t_end)
     kinds = list(dict.fromkeys(kind for each in models for kind in (BOTH if each == "both" else [each])))
     if Path(name).suffix.lower() in (".toml", ".json"):
-        return _scenes_from_file(name, kinds, _parts(parts), patch, cell_size)
+        return _makers_from_file(name, kinds, _parts(parts), patch, cell_size)
     validation.choice("scene", name, [*SCENES, "a scene file (.toml, .json)"])
     of_scene = usual(name)
     if patch is None and cell_size is None and of_scene.patch is not None:
@@ -56,7 +73,32 @@ def build_scenes(
     options: dict[str, Any] = {} if t_end is None else {"t_end": t_end}
     if name == "free-slide":
         options["save_every"] = SLIDE_SAMPLING
-    return {kind: SCENES[name](_make(MODELS[kind], contact_patch, law, _parts(parts)), **options) for kind in kinds}
+    made = {kind: _make(MODELS[kind], contact_patch, law, _parts(parts)) for kind in kinds}
+    return {kind: functools.partial(_ready, SCENES[name], model, options) for kind, model in made.items()}
+
+
+def _ready(make: Callable[..., Scene], model: Any, options: dict[str, Any], **values: Any) -> Scene:
+    """A ready scene: values that its function takes, such as `mass`, go there, the others to what it returns."""
+    from planarfriction.sweeps.settings import Settable
+
+    own = [name for name in inspect.signature(make).parameters if name != "model"]
+    scene = make(model, **options | {name: value for name, value in values.items() if name in own})
+    rest = {path: value for path, value in values.items() if path not in own}
+    return Settable.of(scene, own)(**rest) if rest else scene
+
+
+def one_each(settings: Sequence[str]) -> dict[str, Any]:
+    """Values of `--set path=value` by their paths."""
+    if not settings:
+        return {}
+    from planarfriction.sweeps.settings import parse_all
+
+    several = parse_all(settings)
+    for path, values in several.items():
+        if len(values) > 1:
+            rule = "be one value (planarfriction sweep takes several)"
+            raise InvalidValueError(f"--set {path}", rule, ", ".join(map(str, values)))
+    return {path: next(iter(values.values())) for path, values in several.items()}
 
 
 def _parts(text: str | None) -> int | str | None:
@@ -84,19 +126,24 @@ def _make(make: Any, patch: ContactPatch, law: Any, parts: int | str | None) -> 
     return make(patch, law, **({"parts": parts} if parts is not None and _in_parts(make) else {}))
 
 
-def _scenes_from_file(
+def _makers_from_file(
     path: str, kinds: Sequence[str], parts: int | str | None, patch: str | None, cell_size: float | None
-) -> dict[str, Scene]:
-    from planarfriction.scenes import Scene
+) -> dict[str, Callable[..., Scene]]:
+    from planarfriction.sweeps.settings import Settable
 
-    scene = Scene.from_file(path)
+    make = Settable.of(path)
     if patch is None and cell_size is not None:
         raise InvalidValueError("--cell-size", "come with the pressure map of --patch", cell_size)
     contact_patch = None if patch is None else find_patch(patch, cell_size=cell_size)
     if not kinds and contact_patch is None and parts is None:
-        return {_label(scene): scene}
-    _check_parts(parts, [MODELS[kind] for kind in kinds] or [type(contact.model) for contact in scene.contacts])
-    return {kind: _with_models(scene, kind, contact_patch, parts) for kind in kinds or [_label(scene)]}
+        return {"": make}
+    if kinds:
+        _check_parts(parts, [MODELS[kind] for kind in kinds])
+
+    def changed(kind: str) -> Callable[..., Scene]:
+        return lambda **values: _with_models(make(**values), kind, contact_patch, parts)
+
+    return {kind: changed(kind) for kind in kinds or [""]}
 
 
 def _label(scene: Scene) -> str:
@@ -106,10 +153,13 @@ def _label(scene: Scene) -> str:
 
 
 def _with_models(scene: Scene, kind: str, patch: ContactPatch | None, parts: int | str | None) -> Scene:
-    """The scene with models of one kind ("mixed": each as it is) on its own patches or on `patch`, laws as they are.
+    """The scene with models of one kind ("": its own; "mixed": each as it is) on its own patches or on `patch`, laws as they are.
 
     In `parts` where they have some, by default in as many as they have.
     """
+    if not kind:
+        kind = _label(scene)
+        _check_parts(parts, [type(contact.model) for contact in scene.contacts])
     contacts = []
     for contact in scene.contacts:
         model = contact.model

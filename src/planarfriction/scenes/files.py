@@ -133,16 +133,20 @@ def _contacts(scene: Section) -> list[Contact]:
 def read_scene(path: str | Path) -> Scene:
     """Scene of a `.toml` or `.json` file; errors are one line with the name of the file."""
     path = validation.path("path", path)
+    return scene_from_dict(read_table(path), folder=path.parent, source=str(path))
+
+
+def read_table(path: Path) -> dict[str, Any]:
+    """Table of a `.toml` or `.json` file, as it is written."""
     kind = path.suffix.lower()
     if kind not in (".toml", ".json"):
         missing = "" if os.path.exists(path) else ", and there is no such file"
         raise FileError(f"{path}: a scene file ends in .toml or .json{missing}")
     text = read_text(path, "a scene file")
     try:
-        data = tomllib.loads(text) if kind == ".toml" else json.loads(text, object_pairs_hook=_table)
+        return tomllib.loads(text) if kind == ".toml" else json.loads(text, object_pairs_hook=_table)
     except (ValueError, RecursionError) as error:  # ValueError: also a number of more digits than Python converts
         raise FileError(f"{path}: not valid {kind[1:].upper()}: {shown(str(error).partition(';')[0])}") from None
-    return scene_from_dict(data, folder=path.parent, source=str(path))
 
 
 def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -1,0 +1,121 @@
+"""`planarfriction sweep`: a scene for every combination of some of its values."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from planarfriction.cli.options import FILE, PATCH_HELP
+from planarfriction.families import SCENES
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+
+@click.command(
+    short_help="Simulate a scene for every combination of values.",
+    help=f"""Simulate a scene for every combination of some of its values; a sweep that was stopped goes on.
+
+    SCENE is {", ".join(SCENES)}, or a file (.toml, .json). PATH leads to a value of it: body.mass, t_end, and of a
+    contact that is called fingers, fingers.law.mu_c; of a ready scene also what its function takes, such as mass.
+
+    Each run is a file in --out, written whole or not at all; the same command does only those that are missing.
+    --out gets sweep.nc too, the dataset of all runs; a path that ends in .zarr is the dataset itself.
+
+    \b
+    Examples:
+      planarfriction sweep scene.toml --set body.mass=0.1:0.3:20 --set fingers.law.mu_c=0.5,0.8
+      planarfriction sweep in-hand --set mass=0.1:0.3:5 --set fingers.model=reduced,distributed --out runs/
+      planarfriction sweep scene.toml --set body.position.0=0:0.02:50 --measure mine.py:slip
+    """,
+)
+@click.argument("scene")
+@click.option(
+    "--set",
+    "settings",
+    metavar="PATH=VALUES",
+    multiple=True,
+    required=True,
+    help="START:STOP:COUNT, both ends included, or VALUE,VALUE,...; may be repeated.",
+)
+@click.option("--model", metavar="NAME", help="Friction model. Default: the file's, else reduced.")
+@click.option("--parts", metavar="COUNT|auto", help="Parts of the reduced model. Default: 1, or the file's.")
+@click.option("--patch", help=f"Contact patch: {PATCH_HELP} Default: Circle, or the file's.")
+@click.option("--cell-size", type=float, help="Side of a cell of a pressure map in m.")
+@click.option("--t-end", type=float, help="Duration of a ready scene in s.")
+@click.option("--measure", metavar="FILE.py:NAME", help="Function of a solution: what to keep. Default: everything.")
+@click.option("--out", type=FILE, default=Path("sweep"), show_default=True, help="Folder of the runs, or .zarr store.")
+def sweep(
+    scene: str,
+    settings: tuple[str, ...],
+    model: str | None,
+    parts: str | None,
+    patch: str | None,
+    cell_size: float | None,
+    t_end: float | None,
+    measure: str | None,
+    out: Path,
+) -> int:
+    """Sweep (the help above is what users see)."""
+    from planarfriction import sweeps, validation
+    from planarfriction.cli import INTERRUPTED
+    from planarfriction.cli.console import count_progress, note
+    from planarfriction.cli.measured import load_function
+    from planarfriction.cli.run import scene_makers
+    from planarfriction.errors import FrictionError, SweepInterrupted
+    from planarfriction.families import MODELS
+    from planarfriction.sweeps.settings import parse_all
+
+    values = parse_all(settings)
+    if model is not None:
+        validation.choice("--model", model, MODELS)
+    models = [model] if model is not None else ["reduced"] if scene in SCENES else []
+    options: dict[str, Any] = {"parts": parts, "patch": patch, "cell_size": cell_size, "t_end": t_end}
+    make = next(iter(scene_makers(scene, models, **options).values()))
+    try:  # a path that leads nowhere is wrong in all runs
+        make(**{path: next(iter(each.values())) for path, each in values.items()})
+    except FrictionError:
+        make(**{path: list(each.values())[-1] for path, each in values.items()})
+    function = None if measure is None else load_function("--measure", measure)[1]
+    last: list[sweeps.Progress] = []
+    try:
+        with count_progress("sweep") as report:
+
+            def tell(progress: sweeps.Progress) -> None:
+                last[:] = [progress]
+                report(progress.done, progress.runs, str(progress))
+
+            data = sweeps.sweep(make, values, out=out, measure=function, progress=tell)
+    except SweepInterrupted:
+        note(f"interrupted: {last[0]}; the same command goes on" if last else "interrupted")
+        return INTERRUPTED
+    note(str(last[0]))
+    _show(data, out)
+    return 0
+
+
+def _show(data: xr.Dataset, out: Path) -> None:
+    """Write the dataset and say what is in it."""
+    from planarfriction.cli.console import note, print_table
+    from planarfriction.scenes.solution import write_dataset
+
+    failed = [str(each) for each in data.failure.values.ravel().tolist() if each]
+    if failed:
+        note(f"{len(failed)} failed, the first: {failed[0]} (scenes in {out}/*.failed.json)")
+    swept = data.status.dims
+    if out.suffix == ".zarr":
+        note(f"wrote {out}")
+    else:
+        note(f"wrote {write_dataset(data, out / 'sweep.nc')}")
+    ends = data.isel(time=-1) if "time" in data.dims else data
+    rows = []
+    for name, each in ends.data_vars.items():
+        if each.dims == swept and each.dtype.kind in "fiu":
+            unit = f" [{each.attrs['units']}]" if "units" in each.attrs else ""
+            rows.append([f"{name}{unit}", *(f"{float(of):.6g}" for of in (each.min(), each.median(), each.max()))])
+    title = f"{data.status.size} runs over {', '.join(map(str, swept))}"
+    if "time" in data.dims:
+        title += f", at {float(data.time[-1]):g} s"
+    print_table(title, ["", "least", "median", "greatest"], rows)

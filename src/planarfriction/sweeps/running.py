@@ -1,0 +1,324 @@
+"""`sweep`: run a scene for every combination of some quantities, and go on where an earlier sweep has ended."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import threading
+import time
+from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import (
+    FIRST_COMPLETED,
+    BrokenExecutor,
+    CancelledError,
+    Executor,
+    Future,
+    ProcessPoolExecutor,
+    ThreadPoolExecutor,
+    wait,
+)
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+
+from planarfriction.errors import InvalidValueError, SweepError, SweepInterrupted
+from planarfriction.scenes import Scene
+from planarfriction.sweeps.dataset import RESERVED, Collected
+from planarfriction.sweeps.identity import Runs
+from planarfriction.sweeps.quantities import Grid, check_takes, grid_of
+from planarfriction.sweeps.records import FAILED, Folder, Record, reason_of, run
+from planarfriction.sweeps.settings import Settable
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from planarfriction.scenes import Solution
+
+_BETWEEN = 0.5
+"""Time between two reports of progress [s]."""
+
+_AHEAD = 4
+"""Runs that each worker of an executor has waiting, so that none is idle and none keeps memory for nothing."""
+
+_WORKERS = 64
+"""Workers of an executor that does not say how many it has."""
+
+
+class Progress(NamedTuple):
+    """How far a sweep is; as text one line for people."""
+
+    runs: int
+    """Runs of the sweep."""
+    done: int
+    """Those that are done, found ones included."""
+    found: int
+    """Those of an earlier sweep."""
+    failed: int
+    """Those that failed."""
+    damaged: int
+    """Files of earlier runs that were damaged: those runs are done again."""
+    left: float | None
+    """Time until the end [s], from the time that runs have taken so far; None before the first."""
+
+    def __str__(self) -> str:
+        counts = {"found": self.found, "failed": self.failed, "damaged and done again": self.damaged}
+        words = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
+        left = "" if self.left is None or self.done == self.runs else f", {_duration(self.left)} left"
+        return f"{self.done} of {self.runs} runs{f' ({words})' if words else ''}{left}"
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 90.0:
+        return f"{seconds:.0f} s"
+    minutes = seconds / 60.0
+    return f"{minutes:.0f} min" if minutes < 90.0 else f"{minutes / 60.0:.1f} h"
+
+
+class Store(Protocol):
+    """Where runs are kept and found again."""
+
+    damaged: int
+
+    def find(self, digest: str, index: tuple[int, ...]) -> Record | None: ...
+
+    def put(self, digest: str, index: tuple[int, ...], record: Record, scene: Scene | None) -> None: ...
+
+
+class _Memory:
+    """Keeps nothing."""
+
+    damaged = 0
+
+    def find(self, digest: str, index: tuple[int, ...]) -> Record | None:
+        return None
+
+    def put(self, digest: str, index: tuple[int, ...], record: Record, scene: Scene | None) -> None:
+        pass
+
+
+class _Job(NamedTuple):
+    """A run that has been handed out."""
+
+    index: tuple[int, ...]
+    digest: str
+    scene: Scene
+
+
+def sweep(
+    make_scene: Callable[..., Scene] | Scene | str | Path,
+    values: Mapping[str, Any],
+    *,
+    out: str | Path | None = None,
+    executor: Executor | None = None,
+    measure: Callable[[Solution], Any] | None = None,
+    progress: Callable[[Progress], object] | None = None,
+) -> xr.Dataset:
+    """Simulate a scene for every combination of some quantities; returns a dataset with a dimension for each of them.
+
+    Runs that are in `out` are not done again: a run is known by its scene, its measurement and the equations, whatever
+    makes it. A kill at any moment loses no more than the runs in flight. Equal scenes give equal bits, in any order and
+    with any executor on the same kind of processor.
+
+    A run that fails is no end: `status` holds how each run ended ("success", "at rest", "failed"), `failure` why it
+    failed, and `out` has its scene in `<run>.failed.json`. It is tried again by the next call. `run` names each run.
+
+    Parameters
+    ----------
+    make_scene
+        Function that returns the Scene of some values, which it gets by name; or a Scene or the path of a scene file, of
+        which dotted names like "fingers.law.mu_c" are values.
+    values
+        Name of each quantity -> list of numbers, texts or truth values, or mapping from labels to values of any kind.
+    out
+        Folder that keeps each run as a file, or the path of a store that ends in .zarr (the extra [sweep]), which keeps
+        results that memory need not hold; None to keep nothing.
+    executor
+        Any `concurrent.futures.Executor`; by default threads, one for each processor.
+    measure
+        Function of a Solution that returns what the dataset is made of: a number, a mapping from names to numbers,
+        texts or arrays, or an xarray object. By default everything in `Solution.data`, over the instants that any of
+        the runs records: NaN where one has none, its last values where its body has come to rest before.
+    progress
+        Called with a `Progress` now and then; `print` will do.
+
+    Raises
+    ------
+    InvalidValueError
+        A parameter breaks its rule.
+    FileError
+        The folder cannot be written.
+    SweepError
+        All runs failed, or the executor did.
+    SweepInterrupted
+        Ctrl-C; carries the dataset so far. What is done stays in `out`.
+    """
+    grid = grid_of(values)
+    make = _maker(make_scene, grid)
+    for name in RESERVED:
+        if name in grid.labels:
+            raise InvalidValueError("name of a swept quantity", f"not be one of {', '.join(RESERVED)}", name)
+    if not (measure is None or callable(measure)):
+        raise InvalidValueError("measure", "be a function of a Solution, or None", measure)
+    if not (progress is None or callable(progress)):
+        raise InvalidValueError("progress", "be a function of a Progress, or None", progress)
+    if executor is not None and not isinstance(executor, Executor):
+        raise InvalidValueError("executor", "be a concurrent.futures.Executor, or None", executor)
+    if isinstance(executor, ProcessPoolExecutor):
+        _check_travels(measure)
+    runs = Runs(measure)
+    if out is not None and Path(out).suffix == ".zarr":
+        from planarfriction.sweeps.zarr_store import sweep_to_zarr
+
+        return sweep_to_zarr(make, grid, runs, measure, Path(out), executor, progress)
+    collected = Collected(grid)
+    store = _Memory() if out is None else Folder(out)
+    sweeping = Sweeping(make, grid, runs, measure, store, collected.put, progress)
+    try:
+        sweeping.go(executor)
+    except KeyboardInterrupt:
+        raise SweepInterrupted(str(sweeping.progress()), collected.dataset(sweeping.ends, measure is None)) from None
+    sweeping.check_some_worked()
+    return collected.dataset(sweeping.ends, measure is None)
+
+
+def _maker(make_scene: Any, grid: Grid) -> Callable[..., Scene]:
+    """The function that makes scenes, whatever it is given as."""
+    if callable(make_scene):
+        return check_takes(make_scene, list(grid.values))
+    if not isinstance(make_scene, (Scene, str, os.PathLike)):
+        raise InvalidValueError("make_scene", "be a function that returns a Scene, a Scene, or a path", make_scene)
+    make = Settable.of(make_scene)
+    make.check(grid.values)
+    return make
+
+
+def _check_travels(measure: Any) -> None:
+    try:
+        pickle.dumps(measure)
+    except Exception as error:
+        rule = "be a function that other processes can import, as one that a module defines with def"
+        raise InvalidValueError("measure", rule, reason_of(error)) from None
+
+
+class Sweeping:
+    """A sweep that is going on."""
+
+    def __init__(
+        self,
+        make_scene: Callable[..., Scene],
+        grid: Grid,
+        runs: Runs,
+        measure: Callable[[Solution], Any] | None,
+        store: Store,
+        put: Callable[[tuple[int, ...], str, Record], None],
+        report: Callable[[Progress], object] | None,
+    ) -> None:
+        self._make_scene, self._grid, self._runs, self._measure = make_scene, grid, runs, measure
+        self._store, self._put, self._report = store, put, report
+        self.ends: set[tuple[float, float]] = set()
+        """End and sampling interval of all scenes [s]."""
+        self._found = self._new = self._failed = 0
+        self._reason = self._ended = ""
+        self._begin = self._reported = time.monotonic()
+        self._stopped = threading.Event()
+
+    def progress(self) -> Progress:
+        """How far it is."""
+        done = self._found + self._new
+        spent = time.monotonic() - self._begin
+        left = spent / self._new * (self._grid.size - done) if self._new else None
+        return Progress(self._grid.size, done, self._found, self._failed, self._store.damaged, left)
+
+    def check_some_worked(self) -> None:
+        """Raise where every run failed: the mistake is in what they share."""
+        if self._failed == self._grid.size:
+            raise SweepError(f"all {self._failed} runs failed; the first: {self._reason}")
+
+    def go(self, executor: Executor | None) -> None:
+        """Do all runs that are not done, at most so many at a time that memory stays as it is."""
+        if executor is not None:
+            self._go(executor, _AHEAD * (getattr(executor, "_max_workers", None) or _WORKERS), None)
+            return
+        threads = os.cpu_count() or 1
+        with ThreadPoolExecutor(threads, "sweep") as own:
+            try:
+                self._go(own, _AHEAD * threads, self._stopped.is_set)
+            except BaseException:
+                self._stopped.set()
+                raise
+
+    def _go(self, executor: Executor, most: int, stopped: Callable[[], bool] | None) -> None:
+        pending: dict[Future, _Job] = {}
+        try:
+            for job in self._jobs():
+                pending[executor.submit(run, job.scene, self._measure, stopped)] = job
+                if len(pending) >= most:
+                    self._collect(pending)
+            while pending:
+                self._collect(pending)
+        except BaseException:
+            for future in pending:
+                future.cancel()
+            self._take([future for future in pending if future.done() and not future.cancelled()], pending)
+            raise
+        finally:
+            self._tell(at_once=True)
+
+    def _jobs(self) -> Iterator[_Job]:
+        """Runs that are to be done; those that are there, or have no scene, are dealt with."""
+        for index, values in self._grid.points():
+            try:
+                scene = self._make_scene(**values)
+            except Exception as error:
+                self._keep(index, "", Record(FAILED, f"make_scene: {reason_of(error)}", {}), None)
+                continue
+            if not isinstance(scene, Scene):
+                raise InvalidValueError("make_scene", "return a Scene", type(scene).__name__)
+            scene = self._runs.shared(scene)
+            self.ends.add((scene.t_end, scene.save_every))
+            digest = self._runs.digest(scene)
+            record = self._store.find(digest, index)
+            if record is None:
+                yield _Job(index, digest, scene)
+            else:
+                self._found += 1
+                self._put(index, digest, record)
+                self._tell()
+
+    def _collect(self, pending: dict[Future, _Job]) -> None:
+        """Take what is done, at least one."""
+        done, _ = wait(pending, timeout=_BETWEEN, return_when=FIRST_COMPLETED)
+        self._take(done, pending)
+        self._tell()
+
+    def _take(self, done: Any, pending: dict[Future, _Job]) -> None:
+        for future in done:
+            job = pending.pop(future)
+            try:
+                record = future.result()
+            except (BrokenExecutor, CancelledError) as error:
+                self._ended = f"the executor ended ({reason_of(error)}): what is done is kept, sweep again to go on"
+                continue
+            except KeyboardInterrupt:  # in a process that heard Ctrl-C too: this run is not done
+                continue
+            except Exception as error:  # of an executor that lost the run, or could not send it
+                record = Record(FAILED, reason_of(error), {})
+            self._keep(job.index, job.digest, record, job.scene)
+        if self._ended:
+            raise SweepError(self._ended)
+
+    def _keep(self, index: tuple[int, ...], digest: str, record: Record, scene: Scene | None) -> None:
+        if digest:
+            self._store.put(digest, index, record, scene)
+        self._put(index, digest, record)
+        self._new += 1
+        if record.status == FAILED:
+            self._failed += 1
+            self._reason = self._reason or f"{self._grid.words(index)}: {record.reason}"
+
+    def _tell(self, at_once: bool = False) -> None:
+        now = time.monotonic()
+        if self._report is not None and (at_once or now - self._reported >= _BETWEEN):
+            self._reported = now
+            self._report(self.progress())
+
+

@@ -1,0 +1,225 @@
+"""Values of a scene by dotted path, `fingers.law.mu_c`: of scene files, of scenes, and as a command line spells them."""
+
+from __future__ import annotations
+
+import difflib
+import inspect
+import re
+import tomllib
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.errors import FrictionError, InvalidValueError, shown
+from planarfriction.families import LAWS, MODELS, SHAPES, SURFACES, Family
+from planarfriction.scenes import Scene
+from planarfriction.scenes.files import BODY_KEYS, CONTACT_KEYS, SCENE_KEYS, read_table, scene_from_dict
+
+MOST_VALUES = 1_000_000
+"""Values of a setting."""
+
+_BY_NAME = {"model": "kind", "surface": "kind", "law": "kind", "pressure": "law"}
+"""Tables that may be written as a name alone, and the key that the name then has."""
+
+_FAMILIES: dict[str, tuple[Family, str]] = {
+    "law": (LAWS, "kind"),
+    "model": (MODELS, "kind"),
+    "patch": (SHAPES, "shape"),
+    "surface": (SURFACES, "kind"),
+}
+"""Tables of a member of a family, and the key that says which."""
+
+
+class Settable:
+    """A scene as a table, some of whose values change: each call makes the scene of some values."""
+
+    def __init__(
+        self,
+        table: Mapping[str, Any],
+        source: str = "scene",
+        folder: Path | None = None,
+        others: Sequence[str] = (),
+    ) -> None:
+        self._table, self._source, self._folder, self._others = table, source, folder, others
+
+    @classmethod
+    def of(cls, scene: Scene | str | Path, others: Sequence[str] = ()) -> Settable:
+        """The table of a scene, or of a scene file; `others` are names that messages list too.
+
+        Raises FileError for a file that holds no table.
+        """
+        if isinstance(scene, Scene):
+            return cls(scene.to_dict(), others=others)
+        path = validation.path("scene", scene)
+        table = read_table(path)
+        if not isinstance(table, dict):
+            scene_from_dict(table, source=str(path))  # says what is wrong
+        return cls(table, str(path), path.parent)
+
+    def __call__(self, **values: Any) -> Scene:
+        """The scene with these values, by their paths. Raises InvalidValueError for a path that leads nowhere."""
+        table: Any = self._table
+        for path, value in values.items():
+            table = self._changed(table, path, value)
+        return scene_from_dict(table, folder=self._folder, source=self._source)
+
+    def check(self, values: Mapping[str, list[Any]]) -> None:
+        """Raise where neither the first nor the last of the values make a scene: then it is a path that is wrong."""
+        for path, each in values.items():
+            self._changed(self._table, path, each[0])
+        try:
+            self(**{path: each[0] for path, each in values.items()})
+        except FrictionError:
+            self(**{path: each[-1] for path, each in values.items()})
+
+    def _changed(self, table: Mapping[str, Any], path: str, value: Any) -> dict[str, Any]:
+        tables = _tables(table)
+        names = self._contacts(tables)
+        for number, name in enumerate(names):
+            if path.startswith(f"{name}."):
+                parts = path[len(name) + 1 :].split(".")
+                changed = _set(tables[number], parts, value, path, name, CONTACT_KEYS)
+                return {**table, "contact": [*tables[:number], changed, *tables[number + 1 :]]}
+        if path in ("body", *names):
+            there = ", ".join(f"{path}.{key}" for key in (BODY_KEYS if path == "body" else CONTACT_KEYS))
+            raise InvalidValueError(path, f"be one value, not a table of them: {there}", "the table")
+        keys = [key for key in SCENE_KEYS if key != "contact"]
+        return _set(table, path.split("."), value, path, "the scene", [*keys, *names, *self._others])
+
+    @staticmethod
+    def _contacts(tables: list[Any]) -> list[str]:
+        """Names of the contacts, as a solution has them."""
+        default = "contact" if len(tables) == 1 else "contact {}"
+        given = [each.get("name") if isinstance(each, Mapping) else None for each in tables]
+        return [str(name or default.format(number)) for number, name in enumerate(given, 1)]
+
+
+def _tables(table: Mapping[str, Any]) -> list[Any]:
+    tables = table.get("contact", [])
+    return tables if isinstance(tables, list) else [tables]
+
+
+def _set(table: Any, parts: list[str], value: Any, path: str, where: str, valid: Sequence[str] | None = None) -> Any:
+    """A copy of a table, or of a list, with a value changed; what does not change is shared."""
+    key, *rest = parts
+    if isinstance(table, list):
+        if not (key.isdecimal() and int(key) < len(table)):
+            raise InvalidValueError(path, f"count the {len(table)} parts of {where} from 0", repr(key))
+        number = int(key)
+        inner = _set(table[number], rest, value, path, f"{where}.{key}") if rest else value
+        return [*table[:number], inner, *table[number + 1 :]]
+    if not isinstance(table, Mapping):
+        raise InvalidValueError(path, f"end at {where}, which is {shown(table)}", f"{key!r} after it")
+    valid = list(table) if valid is None else list(valid)
+    if key not in valid:
+        near = difflib.get_close_matches(key, valid, n=1)
+        hint = f" (did you mean {near[0]!r}?)" if near else ""
+        raise InvalidValueError(path, f"lead to a value of the scene: {where} has {', '.join(valid)}", f"{key!r}{hint}")
+    name = key if where == "the scene" else f"{where}.{key}"
+    if not rest:
+        return {**table, key: value}
+    if key not in table:
+        raise InvalidValueError(path, f"lead into a table that is there: {where} has no {key!r}", repr(key))
+    inner = table[key]
+    if isinstance(inner, str) and key in _BY_NAME:
+        inner = {_BY_NAME[key]: inner}
+    return {**table, key: _set(inner, rest, value, path, name, _keys(key, inner))}
+
+
+def _keys(key: str, table: Any) -> list[str] | None:
+    """Keys that a table may have, whether they are written or not; None: those that are."""
+    if key == "body":
+        return list(BODY_KEYS)
+    family, kind = _FAMILIES.get(key, (None, ""))
+    if family is None or not isinstance(table, Mapping):
+        return None
+    make = family.get(table.get(kind, "lugre"))
+    more = [] if make is None else [name for name in inspect.signature(make).parameters if name not in ("patch", "law")]
+    return list(dict.fromkeys([kind, *more, *table, *(("metric", "asymmetry") if key == "patch" else ())]))
+
+
+# ---------------------------------------------------------------------- as a command line spells them
+
+
+def parse(text: str) -> tuple[str, dict[Any, Any]]:
+    """Path and values of `path=value`, `path=value,value,...` or `path=start:stop:count`; labels -> values.
+
+    A value is a number, true, false, a list in brackets, or a text.
+
+    Raises InvalidValueError in one line.
+    """
+    path, equals, spelled = text.partition("=")
+    path, spelled = path.strip(), spelled.strip()
+    if not (path and equals and spelled):
+        raise InvalidValueError("--set", "be PATH=VALUE, PATH=VALUE,VALUE,... or PATH=START:STOP:COUNT", repr(text))
+    if re.fullmatch(r"[^:\[\]{}\"']*:[^:]*:[^:]*", spelled):
+        values = _spaced(path, spelled)
+        return path, dict(zip(values, values, strict=True))
+    pieces = _separated(spelled)
+    values = [_value(path, each) for each in pieces]
+    labels = [each if isinstance(value, (list, dict)) else value for each, value in zip(pieces, values, strict=True)]
+    for label in labels:
+        if labels.count(label) > 1:
+            raise InvalidValueError(f"--set {path}", "have each value once", f"{label} {labels.count(label)} times")
+    return path, dict(zip(labels, values, strict=True))
+
+
+def parse_all(texts: Sequence[str]) -> dict[str, dict[Any, Any]]:
+    """What `parse` makes of several texts, each of another path."""
+    found: dict[str, dict[Any, Any]] = {}
+    for text in texts:
+        path, values = parse(text)
+        if path in found:
+            raise InvalidValueError(f"--set {path}", "stand once", repr(text))
+        found[path] = values
+    return found
+
+
+def _spaced(path: str, spelled: str) -> list[float]:
+    """Evenly spaced numbers, both ends included."""
+    first, last, number = spelled.split(":")
+    try:
+        count = int(number)
+    except ValueError:
+        raise InvalidValueError(f"--set {path}", "be START:STOP:COUNT with a whole number of values", spelled) from None
+    validation.count(f"COUNT of --set {path}", count, 2, MOST_VALUES)
+    ends = [validation.number_in(f"{end} of --set {path}", each) for end, each in (("START", first), ("STOP", last))]
+    if ends[0] == ends[1]:
+        raise InvalidValueError(f"--set {path}", "go from START to another STOP", spelled)
+    return np.linspace(*ends, count).tolist()
+
+
+def _separated(spelled: str) -> list[str]:
+    """Pieces between commas that are in no brackets."""
+    pieces, depth = [""], 0
+    for letter in spelled:
+        depth += (letter in "[{") - (letter in "]}")
+        if letter == "," and depth <= 0:
+            pieces.append("")
+        else:
+            pieces[-1] += letter
+    return [each.strip() for each in pieces]
+
+
+def _value(path: str, spelled: str) -> Any:
+    if not spelled:
+        raise InvalidValueError(f"--set {path}", "have a value between commas", repr(spelled))
+    if spelled[0] in "[{\"'":
+        try:
+            return tomllib.loads(f"value = {spelled}")["value"]
+        except (ValueError, RecursionError):
+            raise InvalidValueError(f"--set {path}", "be a list or a text as in TOML", spelled) from None
+    if spelled in ("true", "false"):
+        return spelled == "true"
+    try:
+        return int(spelled)
+    except ValueError:
+        pass
+    try:
+        number = float(spelled)
+    except ValueError:
+        return spelled
+    return validation.number(f"--set {path}", number)
