@@ -34,7 +34,7 @@ SKIPPED = {
 
 RECORDS = """
     Rollout RolloutGradient RolloutSensitivities RolloutStates RolloutTangent SceneGradient SceneSensitivities
-    Identification Verdict MotionPlan Solution
+    Identification Verdict MotionPlan Solution Progress
     SurfaceComparison ModelJacobians PackedModel StepJacobians Statistics Integration
     LimitSurface FrictionLaw FrictionModel Pressure
 """
@@ -177,6 +177,13 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "scenes.in_hand": {"normal_force": None},
     "scenes.free_slide": {"normal_force": None, "twist": (1.0, 0.0, 10.0), "inertia": None},
     "scenes.drift": {"load": "normal"},
+    "sweep": {
+        "make_scene": Fresh(lambda: lambda mass: pf.scenes.driven(objects()["model"], t_end=0.01, normal_force=mass)),
+        "values": {"mass": [1.0, 2.0]},
+        "out": None,
+        "executor": None,
+        "measure": None,
+    },
     "rollout": {"twist": TWISTS},
     "autodiff.rollout_states": {"twist": TWISTS},
     "autodiff.rollout_gradient": {"twist": TWISTS},

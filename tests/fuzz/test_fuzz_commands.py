@@ -23,6 +23,17 @@ EXAMPLES = Path(__file__).parent.parent.parent / "examples"
 PLAN = "identify plan"
 LEGAL = {
     "run": ["in-hand", "--model", "reduced-published", "--patch", "Line", "--t-end", "0.02"],
+    "sweep": [
+        "driven",
+        "--model",
+        "reduced-published",
+        "--patch",
+        "Line",
+        "--t-end",
+        "0.02",
+        "--set",
+        "normal_force=1,2",
+    ],
     "limit-surface": ["--patch", "Line"],
     "identify": ["log.csv", "--patch", "Line", "--parameters", "mu_c", "--starts", "1"],
     PLAN: ["--patch", "Line", "--parameters", "mu_c", "--duration", "0.2"],
@@ -34,7 +45,8 @@ LEGAL = {
 TEXTS = """
     nan inf -inf 0 -1 1 2 0.5 1e-300 5e-324 1e300 1e9 1,2,3 mu_c=1e400 mu_c=nan mu_c=0.5 mu_c,mu_c a= = x - -- --help
     . .. / /dev/null nowhere/x.png picture.png picture.txt table.csv map.csv map.png map.npy log.csv scene.toml
-    scene.json empty.csv empty.toml folder.csv folder.toml Circle disc ring --out
+    scene.json empty.csv empty.toml folder.csv folder.toml Circle disc ring --out runs.zarr t_end=0.01
+    body.mass=1:2:3 patch.law.mu_c=0.5,0.8 patch.model=reduced,distributed patch.position=[0,0] t_end=a:b
 """
 
 

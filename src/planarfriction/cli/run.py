@@ -153,9 +153,10 @@ def _label(scene: Scene) -> str:
 
 
 def _with_models(scene: Scene, kind: str, patch: ContactPatch | None, parts: int | str | None) -> Scene:
-    """The scene with models of one kind ("": its own; "mixed": each as it is) on its own patches or on `patch`, laws as they are.
+    """The scene with models of one kind on its own patches or on `patch`, laws as they are.
 
-    In `parts` where they have some, by default in as many as they have.
+    The kind is "" for that of the scene, "mixed" for each as it is. In `parts` where they have some, by default in as
+    many as they have.
     """
     if not kind:
         kind = _label(scene)

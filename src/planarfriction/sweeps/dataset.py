@@ -22,14 +22,12 @@ MOST_NUMBERS = 2 * 10**9
 MISSING = "missing"
 """Status of a run that has not been done, in what an interrupted sweep returns."""
 
-RESERVED = ("status", "failure", "run")
-"""Variables of every sweep: how each run ended, why it failed, and the digest that names it."""
-
-_OWN = {
+OWN = {
     "status": "how the run ended",
     "failure": "why the run failed, empty where it did not",
     "run": "digest of scene, measurement and equations",
 }
+"""Variables of every sweep, and what they are."""
 
 
 def instants(ends: Iterable[tuple[float, float]]) -> np.ndarray:
@@ -65,13 +63,13 @@ def on_instants(record: Record, time: np.ndarray) -> dict[str, History]:
 
 def check_names(grid: Grid, variables: Mapping[str, History]) -> None:
     """Raise where a swept quantity and something else have the same name."""
-    taken = {*RESERVED, *variables, *(dim for each in variables.values() for dim in each.dims)}
+    taken = {*OWN, *variables, *(dim for each in variables.values() for dim in each.dims)}
     for name in grid.labels:
         if name in taken:
             raise InvalidValueError("name of a swept quantity", "not be that of a variable or of its axis", name)
-    for name in RESERVED:
+    for name in OWN:
         if name in variables:
-            raise InvalidValueError("measure", f"not return anything called {', '.join(RESERVED)}", name)
+            raise InvalidValueError("measure", f"not return anything called {', '.join(OWN)}", name)
 
 
 class Collected:
@@ -152,7 +150,7 @@ class Collected:
             status[index], failure[index], run[index] = record.status, record.reason, self._runs[index]
         own = {"status": status, "failure": failure, "run": run}
         return {
-            name: History(tuple(self.grid.labels), values.astype(str), {"long_name": _OWN[name]})
+            name: History(tuple(self.grid.labels), values.astype(str), {"long_name": OWN[name]})
             for name, values in own.items()
         }
 

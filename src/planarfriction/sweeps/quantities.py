@@ -70,14 +70,10 @@ def _scalars(name: str, given: Any) -> list[Any]:
     rule = "be a list of numbers, of texts or of truth values (of anything else: a mapping from labels to values)"
     if isinstance(given, (str, bytes)) or not (isinstance(given, (Sequence, range)) or hasattr(given, "__array__")):
         raise InvalidValueError(name, rule, validation.quoted(given))
-    if isinstance(given, (list, tuple)) and not all(_plain(each) for each in given):
+    if isinstance(given, (list, tuple)) and not _of_one_kind(given):
         raise InvalidValueError(name, rule, given)
     array = np.asarray(given)
     if array.ndim != 1 or array.dtype.kind not in "biufU":
-        raise InvalidValueError(name, rule, given)
-    if isinstance(given, (list, tuple)) and array.dtype.kind == "U" and not all(isinstance(each, str) for each in given):
-        raise InvalidValueError(name, rule, given)
-    if isinstance(given, (list, tuple)) and array.dtype.kind != "b" and any(isinstance(each, bool) for each in given):
         raise InvalidValueError(name, rule, given)
     result = array.tolist()
     if not result:
@@ -90,8 +86,11 @@ def _scalars(name: str, given: Any) -> list[Any]:
     return result
 
 
-def _plain(value: Any) -> bool:
-    return isinstance(value, (bool, int, float, str, np.generic)) or (isinstance(value, np.ndarray) and value.ndim == 0)
+def _of_one_kind(values: Sequence[Any]) -> bool:
+    """Whether all are numbers, or all texts, or all truth values."""
+    return any(all(isinstance(value, kind) for value in values) for kind in (str, (bool, np.bool_))) or all(
+        isinstance(value, (int, float, np.number)) and not isinstance(value, bool) for value in values
+    )
 
 
 def check_takes(make_scene: Any, names: Sequence[str]) -> Callable[..., Any]:

@@ -63,13 +63,16 @@ class Stopped(BaseException):
 def reason_of(error: BaseException) -> str:
     """An error as one line; the kind too, where it is not one of the library."""
     words = " ".join(str(error).split())
-    return one_line(words if isinstance(error, FrictionError) else f"{type(error).__name__}: {words}".removesuffix(": "))
+    return one_line(
+        words if isinstance(error, FrictionError) else f"{type(error).__name__}: {words}".removesuffix(": ")
+    )
 
 
 def variables(found: Any, measure: Callable[..., Any] | None = None) -> dict[str, History]:
     """What a measurement returned as named arrays: a number, a mapping of names, or an xarray object."""
     if hasattr(found, "data_vars"):  # a Dataset
-        found = {str(name): found[name] for name in found.variables if name in found.data_vars}
+        axes = {str(name): found[name] for name in found.coords if found[name].dims == (name,)}
+        found = {**{str(name): found[name] for name in found.data_vars}, **axes}
     elif not isinstance(found, Mapping):
         found = {getattr(found, "name", None) or _name_of(measure): found}
     return {_checked_name(name): _variable(name, value) for name, value in found.items()}
@@ -105,7 +108,7 @@ def pack(record: Record) -> bytes:
     """A record as the bytes of an NPZ file, which has a checksum of each entry; equal records give equal bytes."""
     about = {name: [each.dims, each.attrs] for name, each in record.variables.items()}
     meta = json.dumps({"status": record.status, "reason": record.reason, "end": record.end, "variables": about})
-    arrays = {_entry(name): np.ascontiguousarray(each.values) for name, each in record.variables.items()}
+    arrays = {_entry(name): np.asarray(each.values) for name, each in record.variables.items()}
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as file:  # np.savez has names of its own that no variable may have
         for name, array in {_META: np.frombuffer(meta.encode(), np.uint8), **arrays}.items():
@@ -119,8 +122,7 @@ def unpack(content: bytes) -> Record:
     with np.load(io.BytesIO(content), allow_pickle=False) as file:
         meta = json.loads(file[_META].tobytes())
         found = {
-            name: History(tuple(dims), file[_entry(name)], attrs)
-            for name, (dims, attrs) in meta["variables"].items()
+            name: History(tuple(dims), file[_entry(name)], attrs) for name, (dims, attrs) in meta["variables"].items()
         }
     return Record(meta["status"], meta["reason"], found, meta["end"])
 
@@ -154,15 +156,16 @@ class Folder:
             self.damaged += 1
             return None
 
-    def put(self, digest: str, index: tuple[int, ...], record: Record, scene: Scene | None) -> None:
-        """Keep what a run has left; a kill leaves the file out or whole."""
+    def put(self, digest: str, index: tuple[int, ...], record: Record, scene: Scene | None) -> Record:
+        """Keep what a run has left; a kill leaves the file out or whole. Returns it."""
         failed = self.path / f"{digest}.failed.json"
         if record.status == FAILED:
             put(failed, failure(record.reason, scene).encode())
-            return
+            return record
         put(self.file(digest), pack(record))
         with contextlib.suppress(OSError):
             failed.unlink(missing_ok=True)
+        return record
 
 
 def failure(reason: str, scene: Scene | None) -> str:
@@ -172,5 +175,3 @@ def failure(reason: str, scene: Scene | None) -> str:
     except FrictionError as error:  # with a model that is not registered
         table = str(error)
     return json.dumps({"reason": reason, "scene": table}, indent=1) + "\n"
-
-

@@ -20,9 +20,10 @@ from concurrent.futures import (
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
+from planarfriction import validation
 from planarfriction.errors import InvalidValueError, SweepError, SweepInterrupted
 from planarfriction.scenes import Scene
-from planarfriction.sweeps.dataset import RESERVED, Collected
+from planarfriction.sweeps.dataset import OWN, Collected, instants
 from planarfriction.sweeps.identity import Runs
 from planarfriction.sweeps.quantities import Grid, check_takes, grid_of
 from planarfriction.sweeps.records import FAILED, Folder, Record, reason_of, run
@@ -80,7 +81,7 @@ class Store(Protocol):
 
     def find(self, digest: str, index: tuple[int, ...]) -> Record | None: ...
 
-    def put(self, digest: str, index: tuple[int, ...], record: Record, scene: Scene | None) -> None: ...
+    def put(self, digest: str, index: tuple[int, ...], record: Record, scene: Scene | None) -> Record: ...
 
 
 class _Memory:
@@ -91,8 +92,8 @@ class _Memory:
     def find(self, digest: str, index: tuple[int, ...]) -> Record | None:
         return None
 
-    def put(self, digest: str, index: tuple[int, ...], record: Record, scene: Scene | None) -> None:
-        pass
+    def put(self, digest: str, index: tuple[int, ...], record: Record, scene: Scene | None) -> Record:
+        return record
 
 
 class _Job(NamedTuple):
@@ -124,8 +125,8 @@ def sweep(
     Parameters
     ----------
     make_scene
-        Function that returns the Scene of some values, which it gets by name; or a Scene or the path of a scene file, of
-        which dotted names like "fingers.law.mu_c" are values.
+        Function that returns the Scene of some values, which it gets by name; or a Scene, or the path of a scene file,
+        whose values have dotted names like "fingers.law.mu_c".
     values
         Name of each quantity -> list of numbers, texts or truth values, or mapping from labels to values of any kind.
     out
@@ -153,9 +154,9 @@ def sweep(
     """
     grid = grid_of(values)
     make = _maker(make_scene, grid)
-    for name in RESERVED:
+    for name in OWN:
         if name in grid.labels:
-            raise InvalidValueError("name of a swept quantity", f"not be one of {', '.join(RESERVED)}", name)
+            raise InvalidValueError("name of a swept quantity", f"not be one of {', '.join(OWN)}", name)
     if not (measure is None or callable(measure)):
         raise InvalidValueError("measure", "be a function of a Solution, or None", measure)
     if not (progress is None or callable(progress)):
@@ -165,10 +166,8 @@ def sweep(
     if isinstance(executor, ProcessPoolExecutor):
         _check_travels(measure)
     runs = Runs(measure)
-    if out is not None and Path(out).suffix == ".zarr":
-        from planarfriction.sweeps.zarr_store import sweep_to_zarr
-
-        return sweep_to_zarr(make, grid, runs, measure, Path(out), executor, progress)
+    if out is not None and validation.path("out", out).suffix == ".zarr":
+        return _to_zarr(make, grid, runs, measure, Path(out), executor, progress)
     collected = Collected(grid)
     store = _Memory() if out is None else Folder(out)
     sweeping = Sweeping(make, grid, runs, measure, store, collected.put, progress)
@@ -180,11 +179,47 @@ def sweep(
     return collected.dataset(sweeping.ends, measure is None)
 
 
+def _to_zarr(
+    make: Callable[..., Scene],
+    grid: Grid,
+    runs: Runs,
+    measure: Callable[[Solution], Any] | None,
+    path: Path,
+    executor: Executor | None,
+    progress: Callable[[Progress], object] | None,
+) -> xr.Dataset:
+    """A sweep whose results go to a store; its instants must be known before the first run."""
+    from planarfriction.sweeps.zarr_store import ZarrStore
+
+    time = None if measure is not None else instants(_ends(make, grid))
+    store = ZarrStore(path, grid, time)
+    sweeping = Sweeping(make, grid, runs, measure, store, store.note, progress)
+    try:
+        sweeping.go(executor)
+    except KeyboardInterrupt:
+        raise SweepInterrupted(str(sweeping.progress()), store.dataset()) from None
+    finally:
+        store.close()
+    sweeping.check_some_worked()
+    return store.dataset()
+
+
+def _ends(make: Callable[..., Scene], grid: Grid) -> Iterator[tuple[float, float]]:
+    """End and sampling interval of all scenes that can be made [s]."""
+    for _, values in grid.points():
+        try:
+            scene = make(**values)
+        except Exception:  # it fails again, and is recorded, when its turn comes
+            continue
+        if isinstance(scene, Scene):
+            yield scene.t_end, scene.save_every
+
+
 def _maker(make_scene: Any, grid: Grid) -> Callable[..., Scene]:
     """The function that makes scenes, whatever it is given as."""
     if callable(make_scene):
         return check_takes(make_scene, list(grid.values))
-    if not isinstance(make_scene, (Scene, str, os.PathLike)):
+    if not isinstance(make_scene, (Scene, str, Path)):
         raise InvalidValueError("make_scene", "be a function that returns a Scene, a Scene, or a path", make_scene)
     make = Settable.of(make_scene)
     make.check(grid.values)
@@ -308,7 +343,7 @@ class Sweeping:
 
     def _keep(self, index: tuple[int, ...], digest: str, record: Record, scene: Scene | None) -> None:
         if digest:
-            self._store.put(digest, index, record, scene)
+            record = self._store.put(digest, index, record, scene)
         self._put(index, digest, record)
         self._new += 1
         if record.status == FAILED:
@@ -320,5 +355,3 @@ class Sweeping:
         if self._report is not None and (at_once or now - self._reported >= _BETWEEN):
             self._reported = now
             self._report(self.progress())
-
-

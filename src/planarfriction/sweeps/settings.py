@@ -1,4 +1,4 @@
-"""Values of a scene by dotted path, `fingers.law.mu_c`: of scene files, of scenes, and as a command line spells them."""
+"""Values of a scene by dotted path, `fingers.law.mu_c`: of files, of scenes, and as a command line spells them."""
 
 from __future__ import annotations
 
@@ -186,18 +186,23 @@ def _spaced(path: str, spelled: str) -> list[float]:
     except ValueError:
         raise InvalidValueError(f"--set {path}", "be START:STOP:COUNT with a whole number of values", spelled) from None
     validation.count(f"COUNT of --set {path}", count, 2, MOST_VALUES)
-    ends = [validation.number_in(f"{end} of --set {path}", each) for end, each in (("START", first), ("STOP", last))]
-    if ends[0] == ends[1]:
+    start, stop = (
+        validation.number_in(f"START of --set {path}", first),
+        validation.number_in(f"STOP of --set {path}", last),
+    )
+    if start == stop:
         raise InvalidValueError(f"--set {path}", "go from START to another STOP", spelled)
-    return np.linspace(*ends, count).tolist()
+    return np.linspace(start, stop, count).tolist()
 
 
 def _separated(spelled: str) -> list[str]:
-    """Pieces between commas that are in no brackets."""
-    pieces, depth = [""], 0
+    """Pieces between commas that are in no brackets and no quotes."""
+    pieces, depth, quote = [""], 0, ""
     for letter in spelled:
-        depth += (letter in "[{") - (letter in "]}")
-        if letter == "," and depth <= 0:
+        if letter in "\"'" and quote in ("", letter):
+            quote = "" if quote else letter
+        depth += 0 if quote else (letter in "[{") - (letter in "]}")
+        if letter == "," and depth <= 0 and not quote:
             pieces.append("")
         else:
             pieces[-1] += letter
