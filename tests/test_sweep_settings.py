@@ -231,7 +231,7 @@ def test_ctrl_c_says_how_to_go_on(file, capsys, monkeypatch):
     assert "interrupted: 4 of 10 runs (1 found), 3 s left; the same command goes on" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("command", ["", "run", "sweep", "bench", "identify", "plan", "warm"])
+@pytest.mark.parametrize("command", ["", "run", "sweep", "bench", "identify", "warm"])
 def test_every_command_has_short_help(command, capsys):
     assert main([*command.split(), "-h"]) == 0
     assert "Usage: planarfriction" in capsys.readouterr().out

@@ -1,4 +1,4 @@
-"""Command line: `planarfriction run`, `sweep`, `limit-surface`, `reproduce`, `measured`, `identify`, `bench`, `warm`."""
+"""Command line: `planarfriction run`, `sweep`, `limit-surface`, `reproduce`, `identify`, `bench` and others."""
 
 from __future__ import annotations
 

@@ -74,6 +74,11 @@ def _duration(seconds: float) -> str:
     return f"{minutes:.0f} min" if minutes < 90.0 else f"{minutes / 60.0:.1f} h"
 
 
+def processors() -> int:
+    """How many this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
 class Store(Protocol):
     """Where runs are kept and found again."""
 
@@ -273,7 +278,7 @@ class Sweeping:
         if executor is not None:
             self._go(executor, _AHEAD * (getattr(executor, "_max_workers", None) or _WORKERS), None)
             return
-        threads = os.cpu_count() or 1
+        threads = processors()
         with ThreadPoolExecutor(threads, "sweep") as own:
             try:
                 self._go(own, _AHEAD * threads, self._stopped.is_set)
