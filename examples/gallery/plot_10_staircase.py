@@ -1,0 +1,31 @@
+"""
+The staircase of a sum over cells
+=================================
+
+Sum the friction over cells, and each cell that the centre of rotation crosses turns its force round: the wrench moves
+in steps. Integrated exactly, it is smooth.
+"""
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+import planarfriction as pf
+
+line = pf.ContactPatch.line(0.02, cells=9)
+centres = np.linspace(-0.012, 0.012, 601)  # of rotation, along the line
+twists = np.stack([centres, np.zeros_like(centres), np.ones_like(centres)], axis=1)  # about (0, y): vx = y omega
+figure, ax = plt.subplots(figsize=(6.0, 3.6), layout="constrained")
+for name, surface in (
+    ("sum over 9 cells", pf.LimitSurfaceCells(line)),
+    ("exact", pf.LimitSurfaceExact(line)),
+    ("table of the exact surface", pf.LimitSurfaceTable(line)),
+):
+    ax.plot(1e3 * centres, surface.wrench(twists)[:, 0], label=name)
+ax.set(xlabel="centre of rotation, y [mm]", ylabel="fx over mu f_N [-]")
+ax.legend(fontsize=8)
+
+# %%
+# Exact: the force is the share of the line on one side less that on the other.
+exact = pf.LimitSurfaceExact(line).wrench((0.004, 0.0, 1.0))[0]
+print(exact)
+assert abs(exact + 0.4) < 1e-9
