@@ -53,6 +53,7 @@ default_role = "literal"
 autodoc_member_order = "bysource"
 autodoc_typehints_format = "short"
 autodoc_preserve_defaults = True
+python_maximum_signature_line_length = 90
 autodoc_default_options = {"members": True}
 napoleon_google_docstring = napoleon_numpy_docstring = False  # `api_pages` applies it where there are sections
 napoleon_use_rtype = False
@@ -77,8 +78,8 @@ sphinx_gallery_conf = {
     "gallery_dirs": ["gallery", "notebooks"],
     "filename_pattern": r"\.py$",
     "ignore_pattern": rf"__init__\.py{f'|({WITHOUT}).py$' if WITHOUT else ''}",
-    "matplotlib_animations": False,
-    "image_scrapers": ("matplotlib", "figure_scraper"),
+    "capture_repr": (),
+    "image_scrapers": ("figure_scraper",),
     "remove_config_comments": True,
     "min_reported_time": 10,
     "show_signature": False,

@@ -60,8 +60,8 @@ class CodeLinks(SphinxPostTransform):
         text = re.sub(r"^pj\.", "jax.", text)
         if not NAME.match(text) or text in PLAIN_WORDS:
             return None
-        if "." in text and f"planarfriction.{text}" in objects:
-            return f"planarfriction.{text}"
+        if ("." in text or not text.islower()) and f"planarfriction.{text}" in objects:
+            return f"planarfriction.{text}"  # of models that have one name in several front ends, the one in NumPy
         first, _, rest = text.partition(".")
         if rest and f"planarfriction.{first}" in objects:  # a module, from which the object is documented elsewhere
             first, _, rest = rest.partition(".")

@@ -17,18 +17,19 @@ from planarfriction.patch import PUBLISHED_PATCHES
 # -----------
 #
 # A contact is full of bristles, which bend like springs until they slip: the LuGre law. Pushed from rest, the force
-# grows over a few micrometres, peaks at the static coefficient and settles at that of sliding.
+# grows over a few micrometres, peaks a little above the static coefficient and falls to that of sliding as the motion
+# gets faster.
 law = pf.LuGre(mu_c=1.0, mu_s=1.2, v_s=1e-3, sigma_0=1e6, sigma_1=8e2, sigma_2=0.2, elasto_plastic=0.9)
 bristle = pf.DistributedModel(pf.ContactPatch.points([[0.0, 0.0]]), law)
 
-dt, steps = 1e-5, 800
+dt, steps = 1e-4, 5000
 twists = np.zeros((steps, 3))
 twists[:, 0] = np.linspace(0.0, 4e-3, steps)
 force = -pf.rollout(bristle, None, twists, 1.0, dt).wrenches[:, 0]
 
 figure, ax = plt.subplots(figsize=(6.0, 3.2), layout="constrained")
-ax.plot(1e6 * dt * twists[:, 0].cumsum(), force)
-ax.set(xlabel="way [um]", ylabel="friction per load [-]")
+ax.semilogx(1e6 * dt * twists[1:, 0].cumsum(), force[1:])
+ax.set(xlabel="way [um]", ylabel="friction per load [-]", xlim=(0.01, None))
 
 # %%
 # A patch of bristles
