@@ -65,7 +65,7 @@ nitpicky = True
 nitpick_ignore_regex = [
     # Types of other libraries in signatures: no inventory of theirs is downloaded for a link.
     # In the same place: types of ours that are no one's to make, and so stand in no `__all__`.
-    (r"py:class", r"planarfriction\..*|types\.\w+|Path|Tensor|History|style\.PlotFigure|tuple\[float"),
+    (r"py:class", r"planarfriction\..*|types\.\w+|Executor|Path|Tensor|History|style\.PlotFigure|tuple\[float"),
     (r"py:.*", r"(np|numpy|xr|xarray|matplotlib|scipy|torch|jax|jaxlib|numba|mujoco|pydrake|pathlib|collections)\..*"),
 ]
 
