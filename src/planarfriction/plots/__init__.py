@@ -4,10 +4,11 @@ Figures are plain objects: save them with `figure.savefig(path)`, or let a noteb
 global state. SI inside; the axes show mm, N, degrees and the like, with the unit in the label.
 """
 
+from planarfriction.plots.animation import animate_solution
 from planarfriction.plots.histories import plot_histories
 from planarfriction.plots.limit_surface import plot_limit_surface
-from planarfriction.plots.motion import animate_motion, plot_motion
+from planarfriction.plots.motion import plot_motion
 from planarfriction.plots.patch import plot_patch
 from planarfriction.plots.solution import plot_solution
 
-__all__ = ["animate_motion", "plot_histories", "plot_limit_surface", "plot_motion", "plot_patch", "plot_solution"]
+__all__ = ["animate_solution", "plot_histories", "plot_limit_surface", "plot_motion", "plot_patch", "plot_solution"]

@@ -75,14 +75,15 @@ def _kind(surface: Any) -> str:
     return (name and SURFACES.words(name)) or type(surface).__name__
 
 
-def draw_surface(axes: Any, mesh: np.ndarray, directions: np.ndarray, limit: float) -> None:
+def draw_surface(axes: Any, mesh: np.ndarray, directions: np.ndarray, limit: float, *, opacity: float = 1.0) -> Any:
     """Draw a limit surface, points `mesh` `[P, A, 3]` with their `directions`, into 3-D axes up to `limit`."""
     # The outward normal of a limit surface is the twist itself: shading needs no differences of the mesh.
     normal = -directions[:-1, :-1]
     lightness = 0.62 + 0.38 * np.clip(normal @ (_LIGHT / np.linalg.norm(_LIGHT)), -0.6, 1.0)
     colours = colormaps["cividis"](0.6 + 0.4 * mesh[:-1, :-1, 2] / limit)
     colours[..., :3] *= lightness[..., None]
-    axes.plot_surface(
+    colours[..., 3] = opacity
+    drawn = axes.plot_surface(
         *np.moveaxis(mesh, -1, 0), rstride=1, cstride=1, facecolors=colours, linewidth=0, antialiased=False, shade=False
     )
     ticks = [-1.0, -0.5, 0.0, 0.5, 1.0]
@@ -91,3 +92,4 @@ def draw_surface(axes: Any, mesh: np.ndarray, directions: np.ndarray, limit: flo
     axes.tick_params(labelsize="small")
     axes.set_box_aspect((1.0, 1.0, 1.0), zoom=0.9)
     axes.view_init(elev=22, azim=-55)
+    return drawn

@@ -1,10 +1,7 @@
-"""Motion of the body in the plane: a strobe of its outline with the contact patches, and an animation."""
+"""Motion of the body in the plane: a strobe of its outline with the contact patches."""
 
 from __future__ import annotations
 
-import shutil
-import tempfile
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,22 +15,14 @@ from matplotlib.path import Path as Outline
 from matplotlib.transforms import Affine2D
 
 from planarfriction import geometry, validation
-from planarfriction.errors import FileError
 from planarfriction.plots import style
 from planarfriction.plots.patch import cell_boxes
-from planarfriction.writing import replacing
 
 if TYPE_CHECKING:
     from planarfriction.scenes import Contact, Solution
 
 INSTANTS = 12
 """Number of outlines in a strobe."""
-
-FRAMES_PER_SECOND = 25
-"""Frame rate of animations [1/s]."""
-
-LARGEST_FRAME_COUNT = 100
-"""Longest animation [frames]; longer motions are shown faster than they are."""
 
 PAD_OPACITY = 0.35
 """Opacity of contact patches, so that those of a strobe show through each other."""
@@ -73,58 +62,6 @@ def draw_motion(figure: Any, solution: Solution) -> None:
     dots = {"s": 14, "edgecolor": "white", "linewidth": 0.5, "zorder": 5}
     axes.scatter(*(1e3 * poses[chosen, :2].T), color=_TIME_COLOURS(scale(time[chosen])), **dots)
     figure.colorbar(ScalarMappable(scale, _TIME_COLOURS), ax=axes, label="time [s]", aspect=30)
-
-
-def animate_motion(solution: Solution, path: str | Path) -> Path:
-    """Write an animation of the motion to `path`, a `.gif` (or `.mp4` where ffmpeg is installed); returns the path.
-
-    25 frames a second, in real time up to 100 frames; longer motions are shown faster.
-
-    Raises
-    ------
-    FileError
-        The file is of another kind, cannot be written, or needs ffmpeg and there is none.
-    """
-    path = validation.path("path", path)
-    writer = _writer(path)
-    time, poses = np.asarray(solution.data["time"], dtype=float), _poses(solution)
-    count = int(np.clip(round(FRAMES_PER_SECOND * (time[-1] - time[0])), 2, LARGEST_FRAME_COUNT))
-    figure = style.new_figure(6.0, 5.0)
-    axes = figure.subplots()
-    _draw_mount(axes, solution, "world", style.PAD_COLOUR)
-    body = _draw_mount(axes, solution, "body", style.PALETTE[0])
-    pads = [(each, _draw_shape(axes, _pad_shape(each), style.PAD_COLOUR)) for each in _driven(solution)]
-    _finish(axes, _limits(solution, time, poses))
-    (track,) = axes.plot([], [], color="0.3", linewidth=0.9)
-    clock = axes.set_title(f"t = {time[-1]:.2f} s", fontsize="medium")
-    figure.draw_without_rendering()
-    figure.set_layout_engine("none")  # laid out once, so that the frames do not jitter
-    with replacing(path) as file, tempfile.TemporaryDirectory() as folder:
-        drawn = Path(folder) / f"motion{path.suffix}"  # the writers take no buffers
-        with writer.saving(figure, str(drawn), dpi=100):
-            for instant in np.linspace(time[0], time[-1], count):
-                index = int(np.abs(time - instant).argmin())
-                _move(body, axes, poses[index])
-                for contact, pad in pads:
-                    _move(pad, axes, _carried(contact, time[index]))
-                track.set_data(*(1e3 * poses[: index + 1, :2].T))
-                clock.set_text(f"t = {time[index]:.2f} s")
-                writer.grab_frame()
-        file.write(drawn.read_bytes())
-    return path
-
-
-def _writer(path: Path) -> Any:
-    from matplotlib.animation import FFMpegWriter, PillowWriter
-
-    kind = path.suffix.lower()
-    if kind == ".gif":
-        return PillowWriter(fps=FRAMES_PER_SECOND)
-    if kind != ".mp4":
-        raise FileError(f"cannot write {path}: animations are .gif or .mp4 files")
-    if shutil.which("ffmpeg") is None:
-        raise FileError(f"cannot write {path}: ffmpeg is not installed, write a .gif instead")
-    return FFMpegWriter(fps=FRAMES_PER_SECOND)
 
 
 def _poses(solution: Solution) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,8 +22,27 @@ PAD_COLOUR = "#D55E00"
 """Colour of contact patches in the plane."""
 
 
+WITHOUT_WINDOW = ("agg", "cairo", "pdf", "pgf", "ps", "svg", "template")
+"""Backends of matplotlib that draw to files alone."""
+
+
 class PlotFigure(Figure):
     """A matplotlib figure without pyplot that notebooks show by themselves."""
+
+    def show(self, warn: bool = True) -> None:
+        """Show the figure: in a window, which a script waits for, or in the notebook.
+
+        Loads pyplot, as nothing else here does. Where no window can open, `warn` says so in one line.
+        """
+        from matplotlib import pyplot
+
+        if pyplot.get_backend().lower() in WITHOUT_WINDOW:
+            if warn:
+                warnings.warn(f"no window can open here ({pyplot.get_backend()}): use savefig", stacklevel=2)
+            return
+        if self.canvas.manager is None:
+            pyplot.figure(FigureClass=lambda *_, **__: self)  # the figure that pyplot makes is this one
+        pyplot.show()
 
     def _repr_png_(self) -> bytes:
         buffer = io.BytesIO()

@@ -105,9 +105,7 @@ class Solution:
 
         Raises InvalidValueError for a contact that is not there, FileError for a solution without its scene.
         """
-        if self.scene is None:
-            raise FileError(f"the file has no scene, which a twist needs: {self.data.attrs[_LEFT_OUT]}")
-        chosen = self.scene.contacts[self.contact_index(contact)]
+        chosen = scene_of(self, "a twist").contacts[self.contact_index(contact)]
         x, y, theta, vx, vy, omega = (
             np.asarray(self.histories[name].values) for name in ("x", "y", "theta", "vx", "vy", "omega")
         )
@@ -142,13 +140,36 @@ class Solution:
     def plot(self) -> Any:
         """Draw the motion of the body and the time histories; returns a matplotlib Figure.
 
+        `.show()` opens a window, or shows it in a notebook.
+
         Raises FileError for a solution that was loaded from a file without its scene.
         """
-        if self.scene is None:
-            raise FileError(f"the file has no scene, which the plot needs: {self.data.attrs[_LEFT_OUT]}")
+        scene_of(self, "the plot")
         from planarfriction.plots import plot_solution
 
         return plot_solution(self)
+
+    def animate(
+        self,
+        path: str | Path,
+        *,
+        slow: float | None = None,
+        fps: float = 30.0,
+        follow: bool = True,
+        dpi: float = 100.0,
+        progress: Callable[[float], None] | None = None,
+    ) -> Path:
+        """Write a moving picture to `path` (`.gif`, `.mp4`, `.html`): body, slip of the cells, wrench in its surface.
+
+        `slow` is how many times slower than real time it runs (chosen where left out: 75 to 300 frames), `fps` the
+        frames a second, `follow` whether the view goes with a body that goes far; `plots.animate_solution` says more.
+
+        Raises FileError where the file cannot be written or the solution has no scene, InvalidValueError for a
+        parameter that breaks its rule.
+        """
+        from planarfriction.plots import animate_solution
+
+        return animate_solution(self, path, slow=slow, fps=fps, follow=follow, dpi=dpi, progress=progress)
 
     def save(self, path: str | Path) -> Path:
         """Write everything, scene included, to the NetCDF file `path`; `load` brings it back.
@@ -164,6 +185,13 @@ class Solution:
             "message": self.message,
         }
         return write_dataset(self.data.assign_attrs(attributes), path)
+
+
+def scene_of(solution: Solution, what: str) -> Scene:
+    """The scene of a solution, which `what` needs; raises FileError where it was loaded without one."""
+    if solution.scene is None:
+        raise FileError(f"the file has no scene, which {what} needs: {solution.data.attrs[_LEFT_OUT]}")
+    return solution.scene
 
 
 def _scene_attributes(scene: Scene | None) -> dict[str, str]:

@@ -1,0 +1,128 @@
+"""Moving pictures of solutions."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.errors import InvalidValueError
+from planarfriction.plots.film import Film
+from planarfriction.plots.film_files import check_kind, write_frames
+from planarfriction.plots.track import track_of
+from planarfriction.writing import replacing
+
+if TYPE_CHECKING:
+    from planarfriction.scenes import Solution
+
+LEAST_FRAMES, USUAL_FRAMES, MOST_FRAMES = 75, 300, 3000
+"""Frames that a picture has at least, and at most, where nothing is asked for; most that it can have."""
+
+FASTEST = 50.0
+"""Most frames a second: browsers show faster GIFs ten times too slow."""
+
+
+def animate_solution(
+    solution: Solution,
+    path: str | Path,
+    *,
+    slow: float | None = None,
+    fps: float = 30.0,
+    follow: bool = True,
+    dpi: float = 100.0,
+    progress: Callable[[float], None] | None = None,
+) -> Path:
+    """Write a moving picture of a solution to `path`, a `.gif`, `.mp4` or `.html`; returns the path.
+
+    Left the body in the world: outline, contact patches, the path of its centre, the friction force on it at each
+    contact (world axes, all identical contacts) and its centre of rotation. Right, for each contact (the three that are
+    pressed hardest): its cells, from pale to blue as their bristles bend and orange where they slip, and its wrench in
+    its limit surface, for mu_c f_N = 1. Which cells slip is found by a distributed model with the contact's law on the
+    recorded path, from rest, whatever the model; samples of more than a few ms blur it.
+
+    Parameters
+    ----------
+    solution
+        What to show.
+    path
+        File to write; `.mp4` needs ffmpeg or the extra `[ffmpeg]`.
+    slow
+        How many times slower than real time [-]; below 1 is faster. None: real time where that makes 75 to 300 frames,
+        else the next of 1, 2, 5, 10, ... that does.
+    fps
+        Frames a second, at most 50.
+    follow
+        Whether the view follows a body that goes much farther than it is large, rather than hold the whole motion.
+    dpi
+        Size: a picture is 9.6 x 5.4 inches.
+    progress
+        Called with the time of each frame [s].
+
+    Raises
+    ------
+    FileError
+        The file is of another kind, cannot be written, or needs ffmpeg and there is none; the solution has no scene.
+    InvalidValueError
+        A parameter breaks its rule.
+    """
+    from planarfriction.scenes.solution import Solution, scene_of
+
+    scene_of(validation.instance("solution", solution, Solution, "a Solution"), "the animation")
+    path = validation.path("path", path)
+    check_kind(path)
+    times, pace = frame_times(np.asarray(solution.histories["time"].values, dtype=float), slow, fps)
+    validation.instance("follow", follow, bool, "True or False")
+    dpi = validation.positive("dpi", dpi)
+    if not 20.0 <= dpi <= 400.0:
+        raise InvalidValueError("dpi", "be from 20 to 400", dpi)
+    if not (progress is None or callable(progress)):
+        raise InvalidValueError("progress", "be a function of the time of a frame, or None", progress)
+    with replacing(path) as file:
+        film = Film(solution, track_of(solution, times), follow=follow, pace=pace, dpi=dpi)
+
+        def frame(number: int) -> np.ndarray:
+            if progress is not None:
+                progress(float(times[number]))
+            return film.picture(number)
+
+        write_frames(path, file, frame, len(times), fps)
+    return path
+
+
+def frame_times(sampled: np.ndarray, slow: float | None, fps: float) -> tuple[np.ndarray, str]:
+    """Times of the frames [s] of a solution with samples at `sampled` [s], and how fast they go by, in words."""
+    fps = validation.positive("fps", fps)
+    if fps > FASTEST:
+        raise InvalidValueError("fps", f"be at most {FASTEST:g}", fps)
+    span = float(sampled[-1] - sampled[0])
+    if slow is None:
+        slow = _usual_pace(span * fps)
+    else:
+        slow = validation.positive("slow", slow)
+    wanted = slow * span * fps
+    if wanted > MOST_FRAMES:
+        rule = f"make at most {MOST_FRAMES} frames, at most {MOST_FRAMES / (span * fps):.3g} here"
+        raise InvalidValueError("slow", rule, slow)
+    count = max(round(wanted) + 1, 2) if span > 0.0 else LEAST_FRAMES
+    if slow == 1.0 or span == 0.0:
+        words = ""
+    else:
+        words = f"   ({slow:g} x slower)" if slow > 1.0 else f"   ({1.0 / slow:g} x faster)"
+    return np.linspace(sampled[0], sampled[-1], count), words
+
+
+def _usual_pace(frames: float) -> float:
+    """How many times slower than real time, where that takes so many `frames` [-]."""
+    if frames > USUAL_FRAMES:
+        return 1.0 / _round_up(frames / USUAL_FRAMES)
+    return _round_up(LEAST_FRAMES / frames) if 0.0 < frames < LEAST_FRAMES else 1.0
+
+
+def _round_up(value: float) -> float:
+    """The next of 1, 2, 5, 10, 20, ..."""
+    power = 10.0 ** math.floor(math.log10(value))
+    return next(each * power for each in (1.0, 2.0, 5.0, 10.0) if each * power >= value * (1.0 - 1e-12))

@@ -1,0 +1,214 @@
+"""The frames of a moving picture: the body in the world, and beside it the cells and the wrench of each contact."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.lines import Line2D
+from matplotlib.patches import FancyArrowPatch, Patch
+from matplotlib.transforms import Affine2D
+
+from planarfriction import geometry
+from planarfriction.plots import style
+from planarfriction.plots.motion import _body_lines, _placed
+from planarfriction.plots.panels import (
+    SLIP,
+    STICK,
+    CellPanel,
+    SurfacePanel,
+    cell_polygons,
+    cells_of,
+    centre_mark,
+    colour_cells,
+    has_surface,
+    put_centre,
+    still_speed,
+)
+from planarfriction.plots.track import Track
+
+if TYPE_CHECKING:
+    from planarfriction.scenes import Solution
+
+WIDTH, HEIGHT = 9.6, 5.4
+"""Size of a frame [inch]."""
+
+MOST_PANELS = 3
+"""Contacts that have panels of their own beside the motion: those that are pressed hardest."""
+
+VIEW, ROAM = 2.3, 1.5
+"""Side of a view that follows the body, in its largest radius [-]; how many such views the motion fills before one."""
+
+ARROW = 0.3
+"""Length of the longest of a force, as a share of the view [-]."""
+
+
+class Film:
+    """The frames of a track."""
+
+    def __init__(self, solution: Solution, track: Track, *, follow: bool, pace: str, dpi: float):
+        self.track, self.pace = track, pace
+        self.figure = style.PlotFigure(figsize=(WIDTH, HEIGHT), dpi=dpi, facecolor="white")
+        self.canvas = FigureCanvasAgg(self.figure)
+        hardest = sorted(track.contacts, key=lambda each: -each.contact.count * float(each.loads.max()))
+        chosen = sorted(hardest[:MOST_PANELS], key=lambda each: each.index)
+        world, places = _places(len(chosen))
+        self.axes = self.figure.add_axes(world)
+        self.panels: list[CellPanel | SurfacePanel] = []
+        for each, (cells, bar, surface) in zip(chosen, places, strict=True):
+            shown = self.figure.add_axes(bar) if bar and each.slip is not None else None
+            self.panels.append(CellPanel(self.figure.add_axes(cells), each, bar=shown))
+            if has_surface(each):
+                self.panels.append(SurfacePanel(self.figure.add_axes(surface, projection="3d"), each))
+        self._draw_body(solution)
+        self.views = _filling(_views(solution, track, follow), self.axes.bbox.width / self.axes.bbox.height)
+        self.axes.set(xlabel="x [mm]", ylabel="y [mm]")
+        self.axes.yaxis.set_label_coords(0.014, 0.5, transform=self.figure.transFigure)  # clear of any tick label
+        self.axes.ticklabel_format(useOffset=False)
+        self.axes.locator_params(nbins=7)
+        style.tidy(self.axes)
+        self._legend()
+        self.axes.set_animated(True)
+        self.backgrounds: dict[tuple, Any] = {}
+
+    def picture(self, frame: int) -> np.ndarray:
+        """A frame as red, green and blue `[height, width, 3]`, each a byte."""
+        self.show(frame)
+        levels = tuple(each.level(frame) for each in self.panels if isinstance(each, SurfacePanel))
+        if levels not in self.backgrounds:
+            for panel in self.panels:
+                if isinstance(panel, SurfacePanel):
+                    panel.choose(panel.level(frame))
+            self.canvas.draw()
+            self.backgrounds[levels] = self.canvas.copy_from_bbox(self.figure.bbox)
+        self.canvas.restore_region(self.backgrounds[levels])
+        self.figure.draw_artist(self.axes)
+        for panel in self.panels:
+            for artist in panel.artists():
+                panel.axes.draw_artist(artist)
+        return np.asarray(self.canvas.buffer_rgba())[..., :3].copy()
+
+    def show(self, frame: int) -> None:
+        """Go to a frame."""
+        track = self.track
+        pose, (x, y) = track.poses[frame], self.views[frame]
+        self.axes.set(xlim=x, ylim=y)
+        _put(self.body, pose, self.axes)
+        self.path.set_data(*(1e3 * track.poses[: frame + 1, :2].T))
+        for each, cells, arrow in self.contacts:
+            colour_cells(cells, each, frame)
+            _put([cells], each.poses[frame], self.axes)
+            _, centre = each.shape(frame)
+            start = 1e3 * _placed(centre, each.poses[frame])
+            arrow.set_positions(start, start + self.millimetres_per_newton * each.forces[frame])
+        put_centre(self.centre, track.twists[frame], pose[:2], still=self.still)
+        self.clock.set_text(f"t = {track.times[frame]:.{self.digits}f} s{self.pace}")
+        self.words.set_text(self._moved(frame))
+        for panel in self.panels:
+            panel.show(frame)
+
+    def _draw_body(self, solution: Solution) -> None:
+        axes, track = self.axes, self.track
+        lines = [Line2D(*(1e3 * each.T), color="0.25", linewidth=1.5, zorder=5) for each in _body_lines(solution)]
+        self.body = [axes.add_artist(each) for each in lines]
+        (self.path,) = axes.plot([], [], color="0.45", linewidth=0.9, zorder=5)
+        self.contacts = []
+        for each in track.contacts:
+            cells = axes.add_collection(cells_of(each, edge="face"), autolim=False)
+            cells.set_zorder(4)
+            look = {"arrowstyle": "-|>,head_length=5,head_width=2.5", "linewidth": 2.2, "shrinkA": 0, "shrinkB": 0}
+            arrow = FancyArrowPatch((0, 0), (1, 1), color=style.PALETTE[2], zorder=7, **look)
+            self.contacts.append((each, cells, axes.add_patch(arrow)))
+        self.centre = centre_mark(axes)
+        self.still = still_speed(track.twists)
+        span = float(track.times[-1] - track.times[0])
+        self.digits = int(np.clip(2 - math.floor(math.log10(span)), 2, 9)) if span > 0.0 else 3
+        self.clock = axes.text(0.0, 1.06, "", transform=axes.transAxes, va="bottom", fontsize="medium")
+        self.words = axes.text(0.0, 1.01, "", transform=axes.transAxes, va="bottom", fontsize="small", color="0.3")
+
+    def _legend(self) -> None:
+        forces = np.concatenate([np.hypot(*each.forces.T)[:, None] for each in self.track.contacts], axis=1)
+        largest = float(forces.max())
+        side = float(np.diff(self.views[0], axis=-1).min())
+        self.millimetres_per_newton = ARROW * side / largest if largest > 0.0 else 0.0
+        unit = style.unit_for("force", largest)
+        words = f"friction on the body (longest {unit.factor * largest:.3g} {unit.label})"
+        handles: list[Any] = [Line2D([], [], color=style.PALETTE[2], linewidth=2.2, label=words), self.centre]
+        if len(self.track.contacts) > 1:  # one has its colours beside its cells
+            handles += [Patch(color=STICK, label="sticks"), Patch(color=SLIP, label="slips")]
+        self.figure.legend(
+            handles=handles,
+            loc="lower left",
+            bbox_to_anchor=(0.03, 0.0),
+            ncols=len(handles),
+            frameon=False,
+            fontsize="small",
+            columnspacing=1.2,
+            handlelength=1.4,
+        )
+
+    def _moved(self, frame: int) -> str:
+        """How far the body has come, in units that fit the whole motion."""
+        way = self.track.poses - self.track.poses[0]
+        length, angle = style.unit_for("length", way[:, :2]), style.unit_for("angle", way[:, 2])
+        x, y, turn = np.round(way[frame] * (length.factor, length.factor, angle.factor), 2) + 0.0  # no -0.00
+        return f"moved by x {x:.2f}, y {y:.2f} {length.label}, turned by {turn:.2f} {angle.label}"
+
+
+def _places(contacts: int) -> tuple[tuple, list[tuple]]:
+    """Where the world is in a frame, and for each contact its cells, their colours (or None) and its limit surface."""
+    if contacts == 1:
+        world = (0.072, 0.145, 0.5, 0.745)
+        return world, [((0.665, 0.6, 0.2, 0.355), (0.88, 0.6, 0.014, 0.355), (0.605, 0.03, 0.35, 0.48))]
+    height = 1.0 / contacts
+    places: list[tuple] = []
+    for number in range(contacts):
+        low, side = 1.0 - (number + 1) * height, height - 0.17
+        cells = (0.57, low + 0.105, side * HEIGHT / WIDTH, side)
+        places.append((cells, None, (0.775, low + 0.02, 0.21, height - 0.04)))
+    return (0.072, 0.145, 0.43, 0.745), places
+
+
+def _put(artists: list[Any], pose: np.ndarray, axes: Any) -> None:
+    """Put the frame of the artists at `pose` (x, y, angle) [m, m, rad] in the plane of the axes [mm]."""
+    transform = Affine2D().rotate(pose[2]).translate(*(1e3 * pose[:2])) + axes.transData
+    for artist in artists:
+        artist.set_transform(transform)
+
+
+def _views(solution: Solution, track: Track, follow: bool) -> np.ndarray:
+    """Limits of both axes for each frame `[F, 2, 2]` [mm]: of all that is drawn, or of a window that follows the body.
+
+    A window follows where the motion is much longer than the body; it stays within the limits of the whole.
+    """
+    own = np.concatenate(_body_lines(solution))
+    of_body, of_world = [own], []
+    for each in track.contacts:
+        points = cell_polygons(each.contact.model.patch).reshape(-1, 2)
+        if each.contact.mounted_on == "body":
+            of_body.append(_placed(points, np.array([*each.contact.position, each.contact.angle])))
+        else:
+            of_world += [_placed(points, pose) for pose in np.unique(each.poses, axis=0)]
+    carried = np.concatenate(of_body)
+    radius = float(np.hypot(*carried.T).max()) or 1e-3
+    turned = geometry.rotate(carried[None], track.poses[:, None, 2]) + track.poses[:, None, :2]
+    everything = np.concatenate([turned.reshape(-1, 2), *of_world])
+    low, high = everything.min(axis=0), everything.max(axis=0)
+    margin = 0.05 * max(float((high - low).max()), radius)
+    low, high, side = low - margin, high + margin, VIEW * radius
+    if not follow or (high - low).max() <= ROAM * side:
+        return np.broadcast_to(1e3 * np.stack([low, high], -1), (len(track.times), 2, 2))
+    half = np.minimum(0.5 * side, 0.5 * (high - low).max())
+    room = np.maximum(0.5 * (high - low) - half, 0.0)  # how far the middle may go from that of the whole
+    whole = 0.5 * (low + high)
+    middle = np.clip(track.poses[:, :2], whole - room, whole + room)
+    return 1e3 * np.stack([middle - half, middle + half], -1)
+
+
+def _filling(views: np.ndarray, ratio: float) -> np.ndarray:
+    """Views widened to axes of such a width over height, so that both axes have one scale."""
+    middle, (width, height) = views.mean(axis=-1), np.diff(views[0], axis=-1)[:, 0]
+    sides = np.array([max(width, height * ratio), max(height, width / ratio)])
+    return np.stack([middle - 0.5 * sides, middle + 0.5 * sides], -1)

@@ -1,0 +1,136 @@
+"""Files of moving pictures: GIF by Pillow, MP4 by ffmpeg, HTML with matplotlib's player."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import shutil
+import subprocess
+import tempfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.figure import Figure
+from PIL import Image
+
+from planarfriction.errors import FileError
+
+KINDS = (".gif", ".mp4", ".html")
+"""Kinds of moving pictures."""
+
+LAST = 1.0
+"""Time [s] for which a GIF rests on its last frame before it begins again."""
+
+PALETTE_FRAMES = 6
+"""Frames from which the 256 colours of a GIF or HTML are chosen."""
+
+WHITE = 251
+"""Least red, green and blue of a colour of a palette that stands for white."""
+
+PIXELS = 64.0
+"""Dots per inch of the figures that writers see: sizes over it are exact numbers."""
+
+
+def write_frames(path: Path, file: io.BytesIO, frame: Callable[[int], np.ndarray], count: int, fps: float) -> None:
+    """Write `count` pictures `[height, width, 3]` (bytes) to a file of the kind that `path` says, `fps` a second."""
+    kind = path.suffix.lower()
+    if kind == ".gif":
+        _write_gif(file, frame, count, fps)
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        drawn = Path(folder) / f"film{kind}"  # these writers take no buffers
+        figure = _Shown(frame(0), _palette(frame, count) if kind == ".html" else None)
+        with _writing(path, drawn, figure, fps) as writer:
+            for number in range(count):
+                figure.picture = frame(number)
+                writer.grab_frame()
+        file.write(drawn.read_bytes())
+
+
+def check_kind(path: Path) -> None:
+    """Raise FileError unless `path` is a moving picture of a kind that can be written here."""
+    if path.suffix.lower() not in KINDS:
+        raise FileError(f"cannot write {path}: animations are {', '.join(KINDS[:-1])} or {KINDS[-1]} files")
+    if path.suffix.lower() == ".mp4":
+        _ffmpeg(path)
+
+
+def _palette(frame: Callable[[int], np.ndarray], count: int) -> Image.Image:
+    """256 colours for all frames: one choice keeps them from flickering, and what does not change costs little."""
+    chosen = np.unique(np.linspace(0, count - 1, PALETTE_FRAMES).round().astype(int))
+    sheet = Image.fromarray(np.concatenate([frame(int(each)) for each in chosen]))
+    found = sheet.quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    colours = np.array(found.getpalette(), dtype=np.uint8).reshape(-1, 3)
+    colours[colours.min(axis=1) >= WHITE] = 255  # the cut makes a mean of white and its neighbours
+    found.putpalette(colours.tobytes())
+    return found
+
+
+def _write_gif(file: io.BytesIO, frame: Callable[[int], np.ndarray], count: int, fps: float) -> None:
+    palette = _palette(frame, count)
+    ends = np.round(100.0 * np.arange(1, count + 1) / fps)  # GIF counts hundredths of a second
+    durations = 10.0 * np.diff(ends, prepend=0.0)
+    durations[-1] += 1e3 * LAST
+    first, *others = (
+        Image.fromarray(frame(number)).quantize(palette=palette, dither=Image.Dither.NONE) for number in range(count)
+    )
+    first.save(file, format="GIF", save_all=True, append_images=others, duration=durations.tolist(), loop=0)
+
+
+class _Shown(Figure):
+    """A figure that is a picture already: for writers that save a figure frame by frame."""
+
+    def __init__(self, picture: np.ndarray, palette: Image.Image | None):
+        height, width = picture.shape[0] // 2 * 2, picture.shape[1] // 2 * 2  # ffmpeg takes even sizes alone
+        super().__init__(figsize=(width / PIXELS, height / PIXELS), dpi=PIXELS)
+        self.picture, self.palette, self.size = picture, palette, (height, width)
+
+    def savefig(self, fname: Any, *, format: str, **options: Any) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
+        """Write the picture: as a PNG in the colours of the palette, or as the bytes that ffmpeg reads."""
+        image = Image.fromarray(self.picture[: self.size[0], : self.size[1]])
+        if format == "png":
+            image.quantize(palette=self.palette, dither=Image.Dither.NONE).save(fname, format="PNG")
+        else:
+            fname.write(image.convert("RGBA").tobytes())
+
+
+@contextlib.contextmanager
+def _writing(path: Path, drawn: Path, figure: Any, fps: float) -> Iterator[Any]:
+    from matplotlib.animation import FFMpegWriter, HTMLWriter
+
+    settings: dict[str, Any] = {"animation.embed_limit": 4096.0}
+    if drawn.suffix == ".mp4":
+        settings["animation.ffmpeg_path"] = _ffmpeg(path)
+        writer: Any = FFMpegWriter(fps=fps, codec="h264", extra_args=["-crf", "20", "-pix_fmt", "yuv420p"])
+    else:
+        writer = HTMLWriter(fps=fps, embed_frames=True)
+    stopped = False
+    with matplotlib.rc_context(settings):
+        try:
+            with writer.saving(figure, str(drawn), PIXELS):
+                try:
+                    yield writer
+                except KeyboardInterrupt:
+                    stopped = True
+                    raise
+        except (subprocess.CalledProcessError, BrokenPipeError):
+            if stopped:  # ffmpeg was stopped too, and says so
+                raise KeyboardInterrupt from None
+            raise FileError(f"cannot write {path}: ffmpeg failed, write a .gif or an .html instead") from None
+
+
+def _ffmpeg(path: Path) -> str:
+    """The program, of the system or of imageio-ffmpeg."""
+    found = shutil.which("ffmpeg")
+    if found is None:
+        try:
+            from imageio_ffmpeg import get_ffmpeg_exe
+
+            found = get_ffmpeg_exe()
+        except (ImportError, RuntimeError):
+            what = "ffmpeg is not installed: run pip install 'planarfriction[ffmpeg]', or write a .gif or an .html"
+            raise FileError(f"cannot write {path}: {what}") from None
+    return found

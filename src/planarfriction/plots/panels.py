@@ -1,0 +1,235 @@
+"""The panels of a moving picture that show one contact: its cells, and its wrench in the limit surface."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.cm import ScalarMappable
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import LinearSegmentedColormap, ListedColormap, Normalize
+
+from planarfriction import geometry
+from planarfriction.errors import FrictionError
+from planarfriction.laws import FrictionLaw
+from planarfriction.plots import style
+from planarfriction.plots.limit_surface import draw_surface, scaled_samples
+from planarfriction.plots.patch import cell_boxes
+from planarfriction.plots.track import ContactTrack
+
+STICK, SLIP, PLAIN = "#0072B2", "#E66100", "#9AA5B1"
+"""Colours of what sticks (from pale to this as its bristles bend), of what slips, and of what is not known."""
+
+LOAD_STEP = 1.15
+"""A patch that follows the load has its limit surface drawn at loads that differ by this factor."""
+
+POLAR, AZIMUTH = 36, 72
+"""Mesh of the limit surface."""
+
+FARTHEST = 1.6
+"""Largest force of the limit surface's axes, of mu_c f_N [-]; what is beyond is drawn outside."""
+
+TAIL = 25
+"""Frames whose wrenches are drawn behind the wrench."""
+
+STILL, ARM = 1e-3, 1e-2
+"""Share of the largest speed below which a body stands, and turns about no point [-]; lever of its spin in it [m]."""
+
+_PALE = LinearSegmentedColormap.from_list("stick", ["#EAF1F7", STICK])(np.linspace(0.0, 1.0, 230))
+CELLS = ListedColormap([*_PALE, *[SLIP] * 26])
+"""Colours of cells: up to 0.9 those of bristles that stick, above it of those that slip."""
+
+
+def cell_polygons(patch: Any) -> np.ndarray:
+    """The cells of a patch `[N, M, 2]` [m] in its frame; points are drawn as little hexagons."""
+    if patch.grid is not None:
+        return cell_boxes(patch, patch.grid)
+    extent = float(np.ptp(patch.positions, axis=0).max()) or 1e-2
+    around = np.pi / 3.0 * np.arange(6)
+    hexagon = min(0.05, 0.5 / math.sqrt(len(patch.positions))) * extent * np.stack([np.cos(around), np.sin(around)], -1)
+    return patch.positions[:, None, :] + hexagon
+
+
+def cells_of(track: ContactTrack, *, edge: str) -> PolyCollection:
+    """The cells of a contact [mm], to be coloured frame by frame; `edge` is the colour of their edges."""
+    boxes = list(1e3 * cell_polygons(track.contact.model.patch))
+    cells = PolyCollection(boxes, edgecolor=edge, linewidth=0.3)
+    if track.slip is not None:
+        cells.set(cmap=CELLS, clim=(0.0, 1.0))
+    return cells
+
+
+def colour_cells(cells: PolyCollection, track: ContactTrack, frame: int) -> None:
+    """Colour the cells as they are at a frame; those without load disappear."""
+    weights, _ = track.shape(frame)
+    loaded = weights > 0.0
+    if track.slip is None:
+        cells.set_facecolor([PLAIN if each else "none" for each in loaded])
+        return
+    bent, slips = track.slip.bent[frame], track.slip.slips[frame]
+    shade = np.where(slips, 1.0, 0.89 * np.minimum(bent, 1.0))
+    cells.set_array(np.ma.masked_array(shade, ~loaded))
+
+
+class CellPanel:
+    """The cells of a contact in its own frame, and the point about which the body turns on it."""
+
+    def __init__(self, axes: Any, track: ContactTrack, *, bar: Any):
+        self.axes, self.track = axes, track
+        points = 1e3 * cell_polygons(track.contact.model.patch).reshape(-1, 2)
+        low, high = points.min(axis=0), points.max(axis=0)
+        half = 0.56 * float((high - low).max())
+        for set_limits, middle in zip((axes.set_xlim, axes.set_ylim), 0.5 * (low + high), strict=True):
+            set_limits(middle - half, middle + half)
+        axes.set_xlabel("x [mm]", fontsize="small", labelpad=1)
+        axes.set_ylabel("y [mm]", fontsize="small", labelpad=1)
+        axes.set_aspect("equal")
+        axes.tick_params(labelsize="small")
+        axes.locator_params(nbins=4)
+        style.tidy(axes)
+        self.cells = axes.add_collection(cells_of(track, edge="white"))
+        self.centre = centre_mark(axes)
+        self.words = axes.text(0.5, 1.02, "", transform=axes.transAxes, ha="center", va="bottom", fontsize="small")
+        if bar is not None:
+            shown = axes.figure.colorbar(ScalarMappable(Normalize(0.0, 1.0), CELLS), cax=bar)
+            shown.set_ticks([0.0, 0.45, 0.95], labels=["unbent", "sticks", "slips"], fontsize="small")
+            shown.ax.tick_params(length=0)
+        for artist in self.artists():
+            artist.set_animated(True)
+
+    def artists(self) -> list[Artist]:
+        """What changes from frame to frame."""
+        return [self.cells, self.centre, self.words]
+
+    def show(self, frame: int) -> None:
+        """Go to a frame."""
+        track = self.track
+        colour_cells(self.cells, track, frame)
+        put_centre(self.centre, track.twists[frame], np.zeros(2), still=still_speed(track.twists))
+        name = str(track.contact.name)
+        if track.slip is not None:
+            weights, _ = track.shape(frame)
+            name += f": {100.0 * float(weights[track.slip.slips[frame]].sum()):.0f} % of the load slips"
+        self.words.set_text(name)
+
+
+class SurfacePanel:
+    """The limit surface of a contact at its load, and the friction wrench in it, both for mu_c f_N = 1."""
+
+    def __init__(self, axes: Any, track: ContactTrack):
+        self.axes, self.track = axes, track
+        self.levels = _levels(track)
+        self.surfaces = {level: surface_at(track.contact.model.patch, load) for level, load in self.levels.items()}
+        polar = np.linspace(0.0, np.pi, POLAR + 1)[:, None]
+        azimuth = np.linspace(0.0, 2.0 * np.pi, AZIMUTH + 1)[None, :]
+        meshes = {level: scaled_samples(each, polar, azimuth) for level, each in self.surfaces.items()}
+        self.points = self._points()
+        reach = max(float(np.abs(mesh).max()) for _, mesh in meshes.values())
+        limit = 1.05 * max(reach, min(FARTHEST, float(np.abs(self.points).max())))
+        self.drawn = {
+            level: draw_surface(axes, mesh, directions, limit, opacity=0.35)
+            for level, (directions, mesh) in meshes.items()
+        }
+        axes.tick_params(labelsize="x-small", pad=-2)
+        axes.set_title("limit surface, $\\mu_c f_N = 1$", fontsize="small", y=0.98)
+        self.floor = -limit
+        (self.shadow,) = axes.plot([], [], [], color="0.45", linewidth=1.2, marker="o", markersize=3)
+        (self.tail,) = axes.plot([], [], [], color=style.PALETTE[1], linewidth=1.0, alpha=0.6)
+        (self.arm,) = axes.plot([], [], [], color="black", linewidth=1.6)
+        (self.head,) = axes.plot([], [], [], color=style.PALETTE[1], marker="o", markersize=6, markeredgecolor="white")
+        for artist in self.artists():
+            artist.set_animated(True)
+
+    def artists(self) -> list[Artist]:
+        """What changes from frame to frame, on top of the surface."""
+        return [self.shadow, self.tail, self.arm, self.head]
+
+    def level(self, frame: int) -> Any:
+        """The load level of a frame: a key of `levels`."""
+        return _level(self.track, frame)
+
+    def choose(self, level: Any) -> None:
+        """Show the surface at a level alone."""
+        for each, surface in self.drawn.items():
+            surface.set_visible(each == level)
+
+    def show(self, frame: int) -> None:
+        """Go to a frame."""
+        fx, fy, tau = self.points[frame]
+        tail = self.points[max(0, frame - TAIL) : frame + 1]
+        self.shadow.set_data_3d([fx, fx], [fy, fy], [self.floor, self.floor])
+        self.tail.set_data_3d(*tail.T)
+        self.arm.set_data_3d([0.0, fx], [0.0, fy], [0.0, tau])
+        self.head.set_data_3d([fx], [fy], [tau])
+
+    def _points(self) -> np.ndarray:
+        """Wrenches `(fx, fy, tau/r)` about the centre of pressure over `mu_c f_N`, `[F, 3]` [-]; zero without load."""
+        track, mu = self.track, float(self.track.contact.model.law.numbers.mu_c)
+        points = np.zeros((len(track.loads), 3))
+        for frame, load in enumerate(track.loads):
+            if load > 0.0:
+                surface = self.surfaces[self.level(frame)]
+                wrench = geometry.wrench_at(track.wrenches[frame], track.shape(frame)[1])
+                points[frame] = wrench / np.array([1.0, 1.0, surface.contact_radius]) / (mu * load)
+        return points
+
+
+def surface_at(patch: Any, load: float | None) -> Any:
+    """The exact limit surface of a patch at a load; a table of it where the cells differ in their friction."""
+    from planarfriction.limit_surface import LimitSurfaceExact, LimitSurfaceTable
+
+    each_its_own = patch.root is not None and patch.root.ndim == 3
+    return (LimitSurfaceTable if each_its_own else LimitSurfaceExact)(patch, normal_force=load)
+
+
+def has_surface(track: ContactTrack) -> bool:
+    """Whether a limit surface can be drawn: one point has none, and a model of one's own may have other friction."""
+    if not isinstance(track.contact.model.law, FrictionLaw):
+        return False
+    try:
+        loads = _levels(track)
+        for load in list(loads.values())[:1]:
+            surface_at(track.contact.model.patch, load)
+    except FrictionError:
+        return False
+    return bool(loads)
+
+
+def _levels(track: ContactTrack) -> dict[Any, float | None]:
+    """Level -> load [N] at which its surface is drawn; None where the shape does not depend on the load."""
+    if not track.contact.model.patch.depends_on_load:
+        return {None: None}
+    found = sorted({_level(track, frame) for frame, load in enumerate(track.loads) if load > 0.0})
+    return {level: LOAD_STEP**level for level in found}
+
+
+def _level(track: ContactTrack, frame: int) -> Any:
+    """The level of the load of a frame; where it has none, that of the frame before it with one, or of the first."""
+    if not track.contact.model.patch.depends_on_load:
+        return None
+    loaded = np.flatnonzero(track.loads > 0.0)
+    before = loaded[loaded <= frame]
+    load = track.loads[before[-1] if len(before) else loaded[0]]
+    return round(math.log(load) / math.log(LOAD_STEP))
+
+
+def centre_mark(axes: Any) -> Any:
+    """The mark of a centre of rotation."""
+    look = {"marker": "o", "markersize": 8, "markerfacecolor": "none", "markeredgewidth": 1.8, "linestyle": "none"}
+    return axes.plot([], [], color="#111111", zorder=8, label="centre of rotation", **look)[0]
+
+
+def put_centre(mark: Any, twist: np.ndarray, at: np.ndarray, *, still: float) -> None:
+    """Put the mark [mm] where a body with `twist` at `at` [m] turns; nowhere where it is slower than `still` [m/s]."""
+    vx, vy, omega = twist
+    if omega == 0.0 or math.hypot(vx, vy) + ARM * abs(omega) < still:
+        mark.set_data([], [])
+    else:
+        mark.set_data([1e3 * (at[0] - vy / omega)], [1e3 * (at[1] + vx / omega)])
+
+
+def still_speed(twists: np.ndarray) -> float:
+    """Speed [m/s] below which a body that has the twists `[F, 3]` stands."""
+    return STILL * float((np.hypot(*twists[:, :2].T) + ARM * np.abs(twists[:, 2])).max())

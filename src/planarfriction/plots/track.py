@@ -1,0 +1,141 @@
+"""What a moving picture shows at its instants: poses, forces and slip of a solution, between its samples too."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from planarfriction import geometry
+from planarfriction.plots.histories import KICK
+from planarfriction.plots.slip import SlipField, slip_field
+
+if TYPE_CHECKING:
+    from planarfriction.scenes import Contact, Solution
+
+MOST_STEPS = 5000
+"""Most steps in which bristles follow a motion; of more samples, evenly chosen ones."""
+
+
+@dataclass(frozen=True, eq=False)
+class ContactTrack:
+    """A contact at F frames."""
+
+    contact: Contact
+    index: int
+    """Its place among the contacts of the scene."""
+    poses: np.ndarray
+    """Pose (x, y, angle) of its frame in the world `[F, 3]` [m, m, rad]."""
+    twists: np.ndarray
+    """Twist of the body on it, in its frame `[F, 3]` [m/s, m/s, rad/s]."""
+    wrenches: np.ndarray
+    """Friction wrench of one of the identical contacts, in its frame `[F, 3]` [N, N, N m]."""
+    loads: np.ndarray
+    """Normal force of one of them `[F]` [N]."""
+    slip: SlipField | None
+    """Which cells slip; None where the model has no bristles that are known."""
+    _shapes: dict[int, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict, init=False, repr=False)
+    """The shape of the frame that was asked for last: every part of a picture needs it."""
+
+    @functools.cached_property
+    def forces(self) -> np.ndarray:
+        """Friction force of all identical contacts on the body, world axes `[F, 2]` [N]."""
+        return self.contact.count * geometry.rotate(self.wrenches[:, :2], self.poses[:, 2])
+
+    def shape(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
+        """Share of the load on each cell `[N]` [-], and centre of pressure `[2]` [m], at the load of a frame."""
+        patch, load = self.contact.model.patch, float(self.loads[frame])
+        key = frame if patch.depends_on_load else -1
+        if key not in self._shapes:
+            self._shapes.clear()
+            if patch.depends_on_load and not load > 0.0:
+                self._shapes[key] = np.zeros(len(patch.positions)), np.zeros(2)
+            else:
+                at = load if patch.depends_on_load else None
+                self._shapes[key] = patch.weights(at), patch.centre_of_pressure(at)
+        return self._shapes[key]
+
+
+class Track(NamedTuple):
+    """A solution at F frames."""
+
+    times: np.ndarray
+    """`[F]` [s]."""
+    poses: np.ndarray
+    """Pose (x, y, theta) of the body `[F, 3]` [m, m, rad]."""
+    twists: np.ndarray
+    """Its twist (vx, vy, omega) there, world axes `[F, 3]` [m/s, m/s, rad/s]."""
+    contacts: list[ContactTrack]
+
+
+def track_of(solution: Solution, times: np.ndarray) -> Track:
+    """The solution at `times` `[F]` [s]: poses between samples without overshoot, all else along straight lines."""
+    sampled = np.asarray(solution.histories["time"].values, dtype=float)
+    every = np.unique(np.linspace(0, len(sampled) - 1, min(len(sampled), MOST_STEPS)).round().astype(int))
+    steps = np.unique(np.concatenate([sampled[every], times]))
+    frames = np.searchsorted(steps, times)
+    poses = _poses(solution, sampled, steps)
+    twists = np.stack([_values(solution, name, sampled, times) for name in ("vx", "vy", "omega")], -1)
+    if solution.scene.velocity is not None:  # in axes of the body
+        twists = geometry.rotate(twists, poses[frames, 2])
+    contacts = []
+    for index, contact in enumerate(solution.scene.contacts):
+        at = contact_poses(contact, steps, poses)
+        loads = _values(solution, "normal_force", sampled, steps, index)
+        slip = slip_field(contact.model, steps, _ways(contact, steps, poses, at), loads, frames)
+        wrenches = _between(times, sampled, _without_kick(solution, index))
+        against = _between(times, sampled, solution.contact_twist(contact.name))
+        contacts.append(ContactTrack(contact, index, at[frames], against, wrenches, loads[frames], slip))
+    return Track(times, poses[frames], twists, contacts)
+
+
+def contact_poses(contact: Contact, times: np.ndarray, poses: np.ndarray) -> np.ndarray:
+    """Poses of the frame of a contact `[T, 3]` [m, m, rad] at `times`, where the body has `poses` `[T, 3]`."""
+    fixed = np.array([*contact.position, contact.angle], dtype=float)
+    if contact.mounted_on == "world":
+        return np.broadcast_to(fixed, poses.shape)
+    return poses + geometry.rotate(fixed, poses[:, 2])
+
+
+def _ways(contact: Contact, times: np.ndarray, poses: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """How far the body moves on a contact from each instant to the next, in the frame of the contact `[T - 1, 3]`.
+
+    That of the material of the body at the origin of the frame, half-way: of second order in the turn of a step.
+    """
+    body, place, middle = np.diff(poses, axis=0), np.diff(at, axis=0), 0.5 * (at[1:] + at[:-1])
+    ways = geometry.twist_at(body, middle[:, :2] - 0.5 * (poses[1:, :2] + poses[:-1, :2]))
+    if contact.mounted_on == "world":
+        ways = ways - place
+    return geometry.rotate(ways, -middle[:, 2])
+
+
+def _poses(solution: Solution, sampled: np.ndarray, times: np.ndarray) -> np.ndarray:
+    poses = np.stack([np.asarray(solution.histories[name].values, dtype=float) for name in ("x", "y", "theta")], -1)
+    if len(sampled) == 1:
+        return np.broadcast_to(poses, (len(times), 3))
+    return PchipInterpolator(sampled, poses, axis=0)(np.clip(times, sampled[0], sampled[-1]))
+
+
+def _values(solution: Solution, name: str, sampled: np.ndarray, times: np.ndarray, contact: Any = None) -> np.ndarray:
+    values = np.asarray(solution.histories[name].values, dtype=float)
+    return np.interp(times, sampled, values if contact is None else values[:, contact])
+
+
+def _without_kick(solution: Solution, contact: int) -> np.ndarray:
+    """Wrenches of a contact `[T, 3]`; a first one that dwarfs the others lasts microseconds, and gives way to the next.
+
+    Bristles that start at rest under a moving body kick once (`sigma_1 v f_N`).
+    """
+    names = ("fx", "fy", "tau")
+    wrenches = np.stack([np.asarray(solution.histories[name].values, dtype=float)[:, contact] for name in names], -1)
+    for column in wrenches.T:
+        if len(column) > 1 and abs(column[0]) > KICK * np.abs(column[1:]).max():
+            column[0] = column[1]
+    return wrenches
+
+
+def _between(times: np.ndarray, sampled: np.ndarray, values: np.ndarray) -> np.ndarray:
+    return np.stack([np.interp(times, sampled, column) for column in values.T], -1)
