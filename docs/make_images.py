@@ -56,7 +56,7 @@ def figures() -> dict[str, plots.style.PlotFigure]:
     return {
         "in-hand-motion": plots.plot_motion(in_hand["distributed"]),
         "in-hand-histories": plots.plot_histories(in_hand),
-        "limit-surface": plots.plot_limit_surface(pf.LimitSurfaceCells(pads)),
+        "limit-surface": plots.plot_limit_surface(pf.LimitSurfaceExact(pads)),
         "pre-sliding-cycles": pre_sliding_cycles(),
         "pressure-map": plots.plot_patch(fingertip(), normal_force=5.0),
     }

@@ -12,6 +12,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import planarfriction as pf
 import synthetic
@@ -23,6 +24,7 @@ from planarfriction.cli.run import build_scenes
 from planarfriction.errors import SimulationInterrupted, SolverError
 from planarfriction.kernels import rosenbrock
 from planarfriction.patch import PUBLISHED_PATCHES
+from planarfriction.plots import animation
 
 
 def test_ctrl_c_before_the_first_sample_is_no_traceback(monkeypatch, capsys):
@@ -234,6 +236,7 @@ def test_columns_of_several_contacts_carry_their_names():
 
 def test_run_draws(simulated, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(animation, "LEAST_FRAMES", 3)
     assert main(["run", "drift", "--t-end", "0.1", "--plot", "--animate"]) == 0
     drawn = sorted(path.name for path in (tmp_path / "out").iterdir() if path.suffix in (".png", ".gif"))
     stem = "drift-tangential"
@@ -357,7 +360,7 @@ def test_ctrl_c_in_the_solver_keeps_what_is_done(capsys, tmp_path, monkeypatch):
 
 def test_limit_surface_writes_samples_that_are_on_it(capsys, tmp_path):
     path = tmp_path / "surface.csv"
-    assert main(["limit-surface", "--patch", "LineGrad", "--csv", str(path)]) == 0
+    assert main(["limit-surface", "--patch", "LineGrad", "--surface", "cells", "--csv", str(path)]) == 0
     rows = {row[0]: row[1] for row in table_rows(capsys.readouterr().out)}
     assert rows["contact radius r [mm]"] == "4.040404"
     assert rows["centre of pressure [mm]"] == "0, 3.1746"
@@ -383,6 +386,20 @@ def test_limit_surface_of_a_measured_map_is_drawn(tmp_path):
     given = ["--pressure", str(tmp_path / "pad.csv"), "--cell-size", "0.001", "--out", str(picture)]
     assert main(["limit-surface", *given]) == 0
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_limit_surface_is_the_exact_one_alone_or_to_be_turned(capsys, tmp_path):
+    pytest.importorskip("plotly")
+    alone, both, page = (tmp_path / name for name in ("alone.png", "both.png", "both.html"))
+    assert main(["limit-surface", "--out", str(alone), "--alone"]) == 0
+    assert "(exact)" in capsys.readouterr().out
+    for path in (both, page):
+        assert main(["limit-surface", "--surface", "ellipsoid", "--out", str(path)]) == 0
+    with Image.open(alone) as one, Image.open(both) as two:
+        assert two.width == 2 * one.width
+    assert page.read_text(encoding="utf-8").count('"type":"surface"') >= 2
+    assert main(["limit-surface", "--alone"]) == 2
+    assert "--alone must come with a picture to write (--out), got True" in capsys.readouterr().err
 
 
 # ---------------------------------------------------------------------- bench

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 
@@ -12,12 +13,11 @@ from hypothesis import strategies as st
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex
 from mpl_toolkits.mplot3d import Axes3D
-from PIL import Image
 
 import planarfriction as pf
 import synthetic
 from planarfriction import plots
-from planarfriction.errors import FileError, InvalidValueError
+from planarfriction.errors import InvalidValueError, MissingExtraError
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction.plots import motion, style
 from planarfriction.plots.limit_surface import sample_limit_surface, scaled_samples
@@ -147,6 +147,41 @@ def test_the_ellipsoid_beside_the_surface_is_the_unit_sphere_in_the_same_limits(
     assert distance.max() < np.sqrt(2) + 1e-9
     assert np.abs(distance - 1.0).max() > 0.1  # the line is not an ellipsoid
     assert overhang(figure) <= CUT
+
+
+def test_a_limit_surface_can_be_drawn_alone():
+    figure = plots.plot_limit_surface(pf.LimitSurfaceEllipsoid(pf.ContactPatch.disc(0.01, 9)), beside=None)
+    (axes,) = figure.axes
+    assert axes.get_title() == "disc: ellipsoid"
+    assert overhang(figure) <= CUT
+
+
+def test_another_surface_can_stand_beside_it():
+    patch = PUBLISHED_PATCHES["NonConvex1"]()
+    figure = plots.plot_limit_surface(pf.LimitSurfaceExact(patch), beside=pf.LimitSurfaceCells(patch))
+    assert [axes.get_title() for axes in figure.axes] == ["NonConvex1: exact", "sum over the cells"]
+
+
+@pytest.mark.parametrize("beside", ["ellipsoid", None])
+def test_the_surface_to_be_turned_has_the_numbers_of_the_picture(beside):
+    pytest.importorskip("plotly")
+    surface = pf.LimitSurfaceExact(PUBLISHED_PATCHES["LineGrad"]())
+    figure = plots.interactive_limit_surface(surface, beside=beside)
+    assert len(figure.data) == (1 if beside is None else 2)
+    own = figure.data[0]
+    mesh, directions = np.stack([own.x, own.y, own.z], -1), np.asarray(own.customdata)
+    twists = directions[7, 11] / [1.0, 1.0, surface.contact_radius]
+    centre = surface.centre_of_pressure
+    wrench = pf.geometry.wrench_at(surface.wrench(pf.geometry.twist_at(twists, -centre)), centre)
+    assert mesh[7, 11] == pytest.approx(wrench / [1.0, 1.0, surface.contact_radius], abs=1e-12)
+    low, high = figure.layout.scene.zaxis.range
+    assert low < mesh.min() and mesh.max() < high
+
+
+def test_without_plotly_the_extra_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "plotly", None)
+    with pytest.raises(MissingExtraError, match=r"plotly is not installed: run pip install 'planarfriction\[plotly\]'"):
+        plots.interactive_limit_surface(pf.LimitSurfaceEllipsoid(pf.ContactPatch.disc(0.01, 9)))
 
 
 # ---------------------------------------------------------------------- histories
@@ -291,27 +326,6 @@ def test_a_run_of_one_sample_can_be_drawn():
     assert overhang(plots.plot_histories(short)) <= CUT
 
 
-def test_animation_has_25_frames_a_second(tmp_path):
-    run = synthetic.solution(t_end=0.4)
-    path = plots.animate_motion(run, tmp_path / "motion.gif")
-    with Image.open(path) as image:
-        assert (image.n_frames, image.info["duration"]) == (10, 40)
-        first = np.asarray(image.convert("L"), dtype=float)
-        image.seek(9)
-        assert np.abs(np.asarray(image.convert("L"), dtype=float) - first).max() > 100  # something moves
-
-
-def test_animations_that_cannot_be_written_say_why(tmp_path, monkeypatch):
-    run = synthetic.solution(t_end=0.1)
-    with pytest.raises(FileError, match=r"\.gif or \.mp4"):
-        plots.animate_motion(run, tmp_path / "motion.avi")
-    monkeypatch.setattr(motion.shutil, "which", lambda name: None)
-    with pytest.raises(FileError, match="ffmpeg"):
-        plots.animate_motion(run, tmp_path / "motion.mp4")
-    with pytest.raises(FileError, match="cannot be written"):
-        plots.animate_motion(run, tmp_path / "missing" / "motion.gif")
-
-
 # ---------------------------------------------------------------------- all of them
 
 
@@ -341,6 +355,50 @@ def test_a_label_that_is_cut_off_is_found():
 
 def test_notebooks_show_figures():
     assert plots.plot_patch(pf.ContactPatch.rectangle(0.02, cells=3))._repr_png_().startswith(b"\x89PNG")
+
+
+WINDOW = """
+import sys, types
+import matplotlib
+from matplotlib.backend_bases import FigureManagerBase
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+import planarfriction as pf
+
+shown = []
+class Manager(FigureManagerBase):
+    def show(self):
+        shown.append(self.canvas.figure)
+    @classmethod
+    def start_main_loop(cls):
+        shown.append("waits")
+class FigureCanvas(FigureCanvasAgg):
+    manager_class = Manager
+screen = types.ModuleType("screen")
+screen.FigureCanvas, screen.FigureManager = FigureCanvas, Manager
+sys.modules["screen"] = screen
+
+figure = pf.ContactPatch.disc(0.01, 5).plot()
+size = tuple(figure.get_size_inches())
+matplotlib.use("module://screen")
+figure.show()
+assert shown == [figure, "waits"], shown
+assert tuple(figure.get_size_inches()) == size and figure.dpi == 120
+from matplotlib import pyplot
+pyplot.close(figure)  # the user closes the window
+figure.show()
+assert shown == [figure, "waits"] * 2, shown
+"""
+
+
+def test_a_figure_opens_its_window_and_waits():
+    subprocess.run([sys.executable, "-c", WINDOW], check=True, timeout=120)
+
+
+def test_without_a_screen_show_says_what_to_do():
+    code = "import planarfriction as pf; pf.ContactPatch.disc(0.01, 5).plot().show()"
+    asked = {"capture_output": True, "text": True, "check": True, "timeout": 120}
+    done = subprocess.run([sys.executable, "-c", code], env={**os.environ, "MPLBACKEND": "agg"}, **asked)
+    assert "no window can open here (agg): use savefig" in done.stderr
 
 
 def test_pyplot_is_left_alone():
@@ -381,6 +439,10 @@ def test_zero_is_shown_in_the_usual_unit():
         (lambda: plots.plot_patch(5), "patch must be a ContactPatch, got 5"),
         (lambda: plots.plot_patch(pf.ContactPatch.disc(0.01), normal_force=[1.0]), "normal_force must be a number"),
         (lambda: plots.plot_limit_surface(5), "surface must be a limit surface, got 5"),
+        (
+            lambda: plots.plot_limit_surface(pf.LimitSurfaceEllipsoid(pf.ContactPatch.disc(0.01)), beside="me"),
+            'beside must be a limit surface, "ellipsoid" or None, got me',
+        ),
     ],
 )
 def test_what_cannot_be_drawn_is_named_in_one_line(call, message):

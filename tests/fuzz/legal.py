@@ -22,7 +22,8 @@ TIMES = np.linspace(0.0, 0.19, 20)
 
 SKIPPED = {
     "warm_up": "compiles for minutes",
-    "plots.animate_motion": "draws for seconds",
+    "plots.animate_solution": "draws for seconds; tests/test_animation.py attacks it",
+    "Solution.animate": "draws for seconds; tests/test_animation.py attacks it",
     "solvers.integrate": "is called by `simulate` alone, which checks",
     "FrictionError": "an error",
     "identify.identify_motion": "fits for seconds; its logs are attacked as files",

@@ -96,7 +96,7 @@ def app() -> None:
 @click.option("--set", "settings", metavar="PATH=VALUE", multiple=True, help="A value of the scene; may be repeated.")
 @click.option("--out", type=FILE, help="Folder for the data (NetCDF, CSV) and the pictures.")
 @click.option("--plot", is_flag=True, help="Draw histories, motion and patch (PNG; to out/ by default).")
-@click.option("--animate", is_flag=True, help="Draw the motion as a GIF (to out/ by default).")
+@click.option("--animate", is_flag=True, help="Draw motion and slip as a moving GIF (to out/ by default).")
 def run(
     scene: str,
     model: tuple[str, ...],
@@ -127,7 +127,7 @@ def run(
 @app.command(
     name="limit-surface",
     short_help="Numbers, picture and samples of a limit surface.",
-    help="""Limit surface of a contact patch: numbers, a picture beside the ellipsoid, samples as CSV.
+    help="""Limit surface of a contact patch: numbers, a picture beside the ellipsoid or alone, samples as CSV.
 
     The CSV has the columns vx vy omega fx fy tau: twists around the direction sphere and their friction wrenches for
     mu f_N = 1, about the origin of the contact frame, in m/s, rad/s, 1 and m.
@@ -135,6 +135,7 @@ def run(
     \b
     Examples:
       planarfriction limit-surface --patch NonConvex1 --out surface.png
+      planarfriction limit-surface --patch NonConvex1 --out surface.html --alone
       planarfriction limit-surface --pressure pad.png --cell-size 0.0005 --surface table --csv samples.csv
     """,
 )
@@ -144,11 +145,12 @@ def run(
 @click.option(
     "--surface",
     type=MemberOf(SURFACES),
-    default="cells",
+    default="exact",
     show_default=True,
     help="How the surface is represented.",
 )
-@click.option("--out", type=FILE, help="Picture to write (.png, .pdf, .svg).")
+@click.option("--out", type=FILE, help="Picture to write (.png, .pdf, .svg; .html to turn it with the mouse).")
+@click.option("--alone", is_flag=True, help="Draw the surface without the ellipsoid beside it.")
 @click.option("--csv", type=FILE, help="Table of samples to write (.csv).")
 def limit_surface(
     patch: str | None,
@@ -156,13 +158,14 @@ def limit_surface(
     cell_size: float | None,
     surface: str,
     out: Path | None,
+    alone: bool,
     csv: Path | None,
 ) -> None:
     """Show a limit surface (the help above is what users see)."""
     from planarfriction.cli import limit_surface as command
 
     chosen = command.choose_patch(patch, pressure, cell_size)
-    command.show(chosen, surface, picture=out, table=csv)
+    command.show(chosen, surface, picture=out, alone=alone, table=csv)
 
 
 @app.command(

@@ -12,9 +12,13 @@ from planarfriction.cli.output import check_picture, check_table, write_csv, wri
 from planarfriction.cli.patches import find_patch, pressure_map
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import SURFACES
+from planarfriction.writing import write_text
 
 if TYPE_CHECKING:
     from planarfriction.patch import ContactPatch
+
+HTML = ".html"
+"""A picture to be turned with the mouse."""
 
 POLAR_SAMPLES, AZIMUTH_SAMPLES = 37, 72
 """Samples of the direction sphere in the CSV: every five degrees."""
@@ -29,10 +33,12 @@ def choose_patch(patch: str | None, pressure: Path | None, cell_size: float | No
     return find_patch(patch, cell_size=cell_size)
 
 
-def show(patch: ContactPatch, kind: str, *, picture: Path | None, table: Path | None) -> None:
-    """Print the numbers of a limit surface; write its picture and its samples where asked for."""
+def show(patch: ContactPatch, kind: str, *, picture: Path | None, alone: bool, table: Path | None) -> None:
+    """Print the numbers of a limit surface; write its picture (alone or beside the ellipsoid) and its samples."""
     if picture is not None:
-        check_picture(picture)
+        check_picture(picture, also=(HTML,))
+    elif alone:
+        raise InvalidValueError("--alone", "come with a picture to write (--out)", alone)
     if table is not None:
         check_table(table)
     surface = SURFACES[kind](patch)
@@ -54,9 +60,17 @@ def show(patch: ContactPatch, kind: str, *, picture: Path | None, table: Path | 
         )
         note(f"wrote {table}")
     if picture is not None:
-        from planarfriction import plots
+        _draw(surface, picture, None if alone else "ellipsoid")
 
-        note(f"wrote {write_picture(plots.plot_limit_surface(surface), picture)}")
+
+def _draw(surface: Any, picture: Path, beside: str | None) -> None:
+    from planarfriction import plots
+
+    if picture.suffix.lower() == HTML:  # with plotly's own code in it, so that it opens without a network
+        write_text(picture, plots.interactive_limit_surface(surface, beside=beside).to_html(include_plotlyjs=True))
+    else:
+        write_picture(plots.plot_limit_surface(surface, beside=beside), picture)
+    note(f"wrote {picture}")
 
 
 def _directions() -> tuple[np.ndarray, np.ndarray]:

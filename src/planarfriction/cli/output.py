@@ -19,9 +19,9 @@ PICTURES = (".png", ".pdf", ".svg")
 """Kinds of pictures."""
 
 
-def check_picture(path: Path) -> Path:
-    """Return `path` if a picture can be written there, or raise FileError."""
-    return _check_kind(path, PICTURES, "a picture")
+def check_picture(path: Path, *, also: tuple[str, ...] = ()) -> Path:
+    """Return `path` if a picture, or another file of the kinds `also`, can be written there, or raise FileError."""
+    return _check_kind(path, (*PICTURES, *also), "a picture")
 
 
 def check_table(path: Path) -> Path:

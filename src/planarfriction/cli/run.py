@@ -237,17 +237,21 @@ def _draw(solutions: dict[str, Solution], folder: Path, pictures: Sequence[str])
 
     first = next(iter(solutions.values()))
     name = output.slug(first.scene.name)
-    with simulation_progress("drawing", 1.0):
-        if "plot" in pictures:
+    if "plot" in pictures:
+        with simulation_progress("drawing", 1.0):
             figures = {f"{name}-histories": plots.plot_histories(solutions)}
             figures |= {f"{name}-motion-{output.slug(each)}": plots.plot_motion(solutions[each]) for each in solutions}
             contact = first.scene.contacts[0]
             figures[f"{name}-patch"] = plots.plot_patch(contact.model.patch, normal_force=_first_load(contact))
             for stem, figure in figures.items():
                 note(f"wrote {output.write_picture(figure, folder / f'{stem}.png')}")
-        if "animate" in pictures:
-            for label, solution in solutions.items():
-                note(f"wrote {plots.animate_motion(solution, folder / f'{name}-motion-{output.slug(label)}.gif')}")
+    if "animate" in pictures:
+        for label, solution in solutions.items():
+            path = folder / f"{name}-motion-{output.slug(label)}.gif"
+            end = float(solution.histories["time"].values[-1])
+            with simulation_progress(f"drawing {path.name}", end) as progress:
+                solution.animate(path, progress=progress)
+            note(f"wrote {path}")
 
 
 def _first_load(contact: Any) -> float:

@@ -1,14 +1,23 @@
-"""Plots: the contact patch, the limit surface, time histories and motion, each as a matplotlib `Figure`.
+"""Plots: the contact patch, the limit surface, time histories and motion, each as a matplotlib `Figure`; moving ones.
 
-Figures are plain objects: save them with `figure.savefig(path)`, or let a notebook show them. Nothing touches pyplot's
-global state. SI inside; the axes show mm, N, degrees and the like, with the unit in the label.
+Figures are plain objects: save them with `figure.savefig(path)`, open them with `figure.show()`, or let a notebook show
+them. Nothing but `show` touches pyplot's global state. SI inside; the axes show mm, N, degrees and the like, with the
+unit in the label. Moving pictures are written to files.
 """
 
 from planarfriction.plots.animation import animate_solution
 from planarfriction.plots.histories import plot_histories
-from planarfriction.plots.limit_surface import plot_limit_surface
+from planarfriction.plots.limit_surface import interactive_limit_surface, plot_limit_surface
 from planarfriction.plots.motion import plot_motion
 from planarfriction.plots.patch import plot_patch
 from planarfriction.plots.solution import plot_solution
 
-__all__ = ["animate_solution", "plot_histories", "plot_limit_surface", "plot_motion", "plot_patch", "plot_solution"]
+__all__ = [
+    "animate_solution",
+    "interactive_limit_surface",
+    "plot_histories",
+    "plot_limit_surface",
+    "plot_motion",
+    "plot_patch",
+    "plot_solution",
+]

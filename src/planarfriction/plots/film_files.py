@@ -27,7 +27,7 @@ LAST = 1.0
 PALETTE_FRAMES = 6
 """Frames from which the 256 colours of a GIF or HTML are chosen."""
 
-WHITE = 251
+WHITE = 248
 """Least red, green and blue of a colour of a palette that stands for white."""
 
 PIXELS = 64.0

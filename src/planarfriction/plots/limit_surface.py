@@ -1,4 +1,4 @@
-"""Limit surface in three dimensions, with the ellipsoid beside it."""
+"""Limit surface in three dimensions, with another one beside it: a picture, or one to be turned with the mouse."""
 
 from __future__ import annotations
 
@@ -8,11 +8,19 @@ import numpy as np
 from matplotlib import colormaps
 
 from planarfriction import geometry, validation
+from planarfriction.errors import MissingExtraError
 from planarfriction.families import SURFACES
 from planarfriction.plots import style
 
 POLAR_SEGMENTS, AZIMUTH_SEGMENTS = 90, 180
 """Mesh of the direction sphere: fine enough that the facets of a 21 x 21 patch look as they are."""
+
+_AXES = ("fx [-]", "fy [-]", "τ/r [-]")
+
+_UNDER_THE_POINTER = (
+    "fx %{x:.4f}<br>fy %{y:.4f}<br>τ/r %{z:.4f}<br><br>sliding along<br>"
+    "vx %{customdata[0]:.3f}<br>vy %{customdata[1]:.3f}<br>r ω %{customdata[2]:.3f}<extra></extra>"
+)
 
 _LIGHT = np.array([0.35, -0.6, 0.72])
 
@@ -33,31 +41,82 @@ def sample_limit_surface(surface: Any, polar: np.ndarray, azimuth: np.ndarray) -
     return twists, surface.wrench(twists)
 
 
-def plot_limit_surface(surface: Any, *, ellipsoid: Any = None) -> style.PlotFigure:
-    """Draw the limit surface (fx, fy, tau/r) for mu f_N = 1 about the centre of pressure, the ellipsoid beside it.
+def plot_limit_surface(surface: Any, *, beside: Any = "ellipsoid") -> style.PlotFigure:
+    """Draw the limit surface (fx, fy, tau/r) for mu f_N = 1 about the centre of pressure, with another one beside it.
 
-    `surface` is any limit surface; `ellipsoid` the one to compare with, by default `LimitSurfaceEllipsoid` of the same
-    patch. Both panels share their limits and their colours, the height tau/r. All three axes are pure numbers.
+    `surface` is any limit surface; `beside` another one, "ellipsoid" for that of the same patch, or None to draw
+    `surface` alone. Both panels share their limits and their colours, the height tau/r. All three axes are pure
+    numbers.
+
+    Raises InvalidValueError if either is no limit surface.
     """
-    from planarfriction.limit_surface import LimitSurface, LimitSurfaceEllipsoid
-
-    validation.instance("surface", surface, LimitSurface, "a limit surface")
-    beside = ellipsoid
-    if beside is not None:
-        validation.instance("ellipsoid", ellipsoid, LimitSurface, "a limit surface or None")
-    else:
-        beside = LimitSurfaceEllipsoid(surface.patch, normal_force=surface.normal_force)
-    polar = np.linspace(0.0, np.pi, POLAR_SEGMENTS + 1)[:, None]
-    azimuth = np.linspace(0.0, 2 * np.pi, AZIMUTH_SEGMENTS + 1)[None, :]
-    scaled = [scaled_samples(each, polar, azimuth) for each in (surface, beside)]
+    shown = _with_names(surface, beside)
+    polar, azimuth = _mesh()
+    scaled = [scaled_samples(each, polar, azimuth) for each, _ in shown]
     limit = 1.05 * max(float(np.abs(mesh).max()) for _, mesh in scaled)
-    figure = style.new_figure(9.6, 4.8)
-    names = (f"{surface.patch.name}: {_kind(surface)}", _kind(beside))
-    for column, ((directions, mesh), name) in enumerate(zip(scaled, names, strict=True)):
-        axes = figure.add_subplot(1, 2, column + 1, projection="3d")
+    figure = style.new_figure(4.8 * len(shown), 4.8)
+    for column, ((directions, mesh), (_, name)) in enumerate(zip(scaled, shown, strict=True)):
+        axes = figure.add_subplot(1, len(shown), column + 1, projection="3d")
         draw_surface(axes, mesh, directions, limit)
         axes.set_title(name, fontsize="medium")
     return figure
+
+
+def interactive_limit_surface(surface: Any, *, beside: Any = "ellipsoid") -> Any:
+    """The picture of `plot_limit_surface` as a plotly figure, to be turned, zoomed and read with the mouse.
+
+    `.show()` opens it in the browser, `.write_html(path)` writes it. Under the pointer stand the friction wrench and
+    the direction of sliding that it belongs to.
+
+    Raises MissingExtraError without plotly, the extra `[plotly]`, and InvalidValueError if either is no limit surface.
+    """
+    shown = _with_names(surface, beside)
+    try:
+        from plotly import graph_objects as go
+        from plotly.subplots import make_subplots
+    except ImportError:
+        raise MissingExtraError("plotly", "plotly") from None
+    figure = make_subplots(
+        cols=len(shown), specs=[[{"type": "scene"}] * len(shown)], subplot_titles=[name for _, name in shown]
+    )
+    scaled = [scaled_samples(each, *_mesh()) for each, _ in shown]
+    limit = 1.05 * max(float(np.abs(mesh).max()) for _, mesh in scaled)
+    for column, (directions, mesh) in enumerate(scaled):
+        drawn = go.Surface(
+            **dict(zip("xyz", np.moveaxis(mesh, -1, 0), strict=True)),
+            customdata=directions,
+            hovertemplate=_UNDER_THE_POINTER,
+            colorscale="Cividis",
+            cmin=-limit,
+            cmax=limit,
+            showscale=False,
+        )
+        figure.add_trace(drawn, row=1, col=column + 1)
+    axis = {"range": [-limit, limit]}
+    scene = {f"{name}axis": {**axis, "title": {"text": text}} for name, text in zip("xyz", _AXES, strict=True)}
+    figure.update_scenes(aspectmode="cube", camera_eye={"x": 1.1, "y": -1.6, "z": 0.8}, **scene)
+    figure.update_layout(margin={"l": 0, "r": 0, "t": 40, "b": 0}, title={"text": "Limit surface, μ f_N = 1", "x": 0.5})
+    return figure
+
+
+def _with_names(surface: Any, beside: Any) -> list[tuple[Any, str]]:
+    """The surfaces to draw, with their titles."""
+    from planarfriction.limit_surface import LimitSurface, LimitSurfaceEllipsoid
+
+    validation.instance("surface", surface, LimitSurface, "a limit surface")
+    shown = [(surface, f"{surface.patch.name}: {_kind(surface)}")]
+    if beside is None:
+        return shown
+    if isinstance(beside, str) and beside == "ellipsoid":
+        beside = LimitSurfaceEllipsoid(surface.patch, normal_force=surface.normal_force)
+    validation.instance("beside", beside, LimitSurface, 'a limit surface, "ellipsoid" or None')
+    return [*shown, (beside, _kind(beside))]
+
+
+def _mesh() -> tuple[np.ndarray, np.ndarray]:
+    """Polar angles and azimuths [rad] of the mesh, broadcastable."""
+    polar = np.linspace(0.0, np.pi, POLAR_SEGMENTS + 1)[:, None]
+    return polar, np.linspace(0.0, 2 * np.pi, AZIMUTH_SEGMENTS + 1)[None, :]
 
 
 def scaled_samples(surface: Any, polar: np.ndarray, azimuth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -65,4 +65,3 @@ def slip_field(
     if len(frames) > 1:  # what goes on before the first frame is not known: as after it
         bent[0], slips[0] = np.where(slips[1], bent[1], 0.0), slips[1]
     return SlipField(bent, slips)
-

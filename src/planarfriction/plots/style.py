@@ -40,7 +40,8 @@ class PlotFigure(Figure):
             if warn:
                 warnings.warn(f"no window can open here ({pyplot.get_backend()}): use savefig", stacklevel=2)
             return
-        if self.canvas.manager is None:
+        manager = self.canvas.manager
+        if manager is None or not pyplot.fignum_exists(manager.num):
             pyplot.figure(FigureClass=lambda *_, **__: self)  # the figure that pyplot makes is this one
         pyplot.show()
 
