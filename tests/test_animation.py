@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,7 +19,7 @@ from planarfriction.plots.animation import frame_times
 from planarfriction.plots.film import Film
 from planarfriction.plots.limit_surface import scaled_samples
 from planarfriction.plots.panels import CellPanel, SurfacePanel
-from planarfriction.plots.slip import slip_field
+from planarfriction.plots.slip import bristles_of, slip_field
 from planarfriction.plots.track import track_of
 
 LAW = pf.LuGre(mu_c=1.0, mu_s=1.0, sigma_0=1e4, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9)
@@ -112,9 +111,9 @@ def test_the_way_of_a_contact_is_that_of_its_twist(mounted_on):
 
 
 def field(ways: np.ndarray, cells: int = 21):
-    model = pf.ReducedModel(pf.ContactPatch.disc(0.01, cells), LAW)
-    times = 0.01 * np.arange(len(ways) + 1)
-    return model.patch, slip_field(model, times, np.asarray(ways), np.full(len(times), 2.0), np.arange(len(times)))
+    model = bristles_of(pf.ReducedModel(pf.ContactPatch.disc(0.01, cells), LAW))
+    times, loads = 0.01 * np.arange(len(ways) + 1), np.full(len(ways) + 1, 2.0)
+    return model.patch, slip_field(model, model.rest(), times, np.asarray(ways), loads, np.arange(len(times)))
 
 
 def test_a_patch_that_is_pushed_sticks_up_to_breakaway_and_slips_beyond():
@@ -158,9 +157,23 @@ def test_a_reduced_model_shows_the_bristles_that_a_distributed_one_has():
 
 
 def test_a_law_without_bristles_leaves_the_cells_plain():
-    model = pf.ReducedModel(pf.ContactPatch.disc(0.01, 5), LAW)
-    own = SimpleNamespace(patch=model.patch, law="tape")
-    assert slip_field(own, np.arange(3.0), np.zeros((2, 3)), np.ones(3), np.arange(3)) is None
+    assert bristles_of(Own()) is None
+
+
+@pytest.mark.parametrize("start", ["equilibrium", "sliding"])
+def test_bristles_start_as_those_of_the_scene(start):
+    model, moving = pf.ReducedModel(pf.ContactPatch.disc(0.01, 7), LAW), (0.05, 0.0, 0.0)
+    scene = synthetic.scene()
+    body = dataclasses.replace(scene.body, velocity=moving if start == "sliding" else (0.0, 0.0, 0.0))
+    contacts = [dataclasses.replace(scene.contacts[0], model=model, normal_force=4.0)]
+    run = synthetic.solution(dataclasses.replace(scene, body=body, contacts=contacts, start=start))
+    zero = np.zeros(201)
+    run = changed(run, x=zero, y=zero, theta=zero, normal_force=np.full((201, 1), 4.0))
+    bent = track_of(run, np.linspace(0.0, 2.0, 3)).contacts[0].slip.bent
+    if start == "sliding":
+        assert bent[1:] == pytest.approx(np.ones_like(bent[1:]), rel=1e-3)
+    else:  # the weight of 0.2 kg on 4 N of mu = 1, up to the torque of the plate's small offset
+        assert bent[1:].mean() == pytest.approx(0.2 * 9.81 / 4.0, rel=0.05)
 
 
 # ---------------------------------------------------------------------- what a frame shows
@@ -360,7 +373,8 @@ def test_a_gif_has_its_frames_at_their_pace(tmp_path):
 def test_an_html_file_plays_by_itself(tmp_path):
     text = synthetic.solution().animate(tmp_path / "motion.html", **SMALL).read_text(encoding="utf-8")
     assert text.count("data:image/png;base64") == 7
-    assert "http://" not in text.replace("http://www.w3.org", "")
+    assert "http" not in text.replace("http://www.w3.org", "")  # nothing is fetched
+    assert all(each in text for each in (">slower</button>", ">&gt;</button>", ">faster</button>"))
 
 
 def test_an_mp4_file_is_a_film(tmp_path):

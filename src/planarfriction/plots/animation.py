@@ -42,7 +42,7 @@ def animate_solution(
     contact (world axes, all identical contacts) and its centre of rotation. Right, for each contact (the three that are
     pressed hardest): its cells, from pale to blue as their bristles bend and orange where they slip, and its wrench in
     its limit surface, for mu_c f_N = 1. Which cells slip is found by a distributed model with the contact's law on the
-    recorded path, from rest, whatever the model; samples of more than a few ms blur it.
+    recorded path, whatever the model of the contact; samples that are far apart blur it.
 
     Parameters
     ----------

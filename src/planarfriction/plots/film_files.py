@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import re
 import shutil
 import subprocess
 import tempfile
@@ -30,6 +31,19 @@ PALETTE_FRAMES = 6
 WHITE = 248
 """Least red, green and blue of a colour of a palette that stands for white."""
 
+SIGNS = {
+    "minus": "slower",
+    "fast-backward": "|&lt;&lt;",
+    "step-backward": "|&lt;",
+    "play fa-flip-horizontal": "&lt;",
+    "pause": "||",
+    "play": "&gt;",
+    "step-forward": "&gt;|",
+    "fast-forward": "&gt;&gt;|",
+    "plus": "faster",
+}
+"""Icon of a button of the player -> what stands on it."""
+
 PIXELS = 64.0
 """Dots per inch of the figures that writers see: sizes over it are exact numbers."""
 
@@ -47,7 +61,7 @@ def write_frames(path: Path, file: io.BytesIO, frame: Callable[[int], np.ndarray
             for number in range(count):
                 figure.picture = frame(number)
                 writer.grab_frame()
-        file.write(drawn.read_bytes())
+        file.write(_self_contained(drawn.read_bytes()) if kind == ".html" else drawn.read_bytes())
 
 
 def check_kind(path: Path) -> None:
@@ -56,6 +70,12 @@ def check_kind(path: Path) -> None:
         raise FileError(f"cannot write {path}: animations are {', '.join(KINDS[:-1])} or {KINDS[-1]} files")
     if path.suffix.lower() == ".mp4":
         _ffmpeg(path)
+
+
+def _self_contained(page: bytes) -> bytes:
+    """The page of a player with signs on its buttons that every browser has, in place of a font from the network."""
+    page = re.sub(rb"<link\b[^>]*>", b"", page)
+    return re.sub(rb'<i class="fa fa-([\w -]+)"></i>', lambda found: SIGNS.get(found[1].decode(), "?").encode(), page)
 
 
 def _palette(frame: Callable[[int], np.ndarray], count: int) -> Image.Image:
@@ -98,10 +118,10 @@ class _Shown(Figure):
 
 
 @contextlib.contextmanager
-def _writing(path: Path, drawn: Path, figure: Any, fps: float) -> Iterator[Any]:
+def _writing(path: Path, drawn: Path, figure: Any, fps: Any) -> Iterator[Any]:
     from matplotlib.animation import FFMpegWriter, HTMLWriter
 
-    settings: dict[str, Any] = {"animation.embed_limit": 4096.0}
+    settings: Any = {"animation.embed_limit": 4096.0}  # [MB]: all frames, for whoever asks for them
     if drawn.suffix == ".mp4":
         settings["animation.ffmpeg_path"] = _ffmpeg(path)
         writer: Any = FFMpegWriter(fps=fps, codec="h264", extra_args=["-crf", "20", "-pix_fmt", "yuv420p"])

@@ -51,8 +51,7 @@ def plot_limit_surface(surface: Any, *, beside: Any = "ellipsoid") -> style.Plot
     Raises InvalidValueError if either is no limit surface.
     """
     shown = _with_names(surface, beside)
-    polar, azimuth = _mesh()
-    scaled = [scaled_samples(each, polar, azimuth) for each, _ in shown]
+    scaled = [scaled_samples(each, *even_mesh(each)) for each, _ in shown]
     limit = 1.05 * max(float(np.abs(mesh).max()) for _, mesh in scaled)
     figure = style.new_figure(4.8 * len(shown), 4.8)
     for column, ((directions, mesh), (_, name)) in enumerate(zip(scaled, shown, strict=True)):
@@ -79,7 +78,7 @@ def interactive_limit_surface(surface: Any, *, beside: Any = "ellipsoid") -> Any
     figure = make_subplots(
         cols=len(shown), specs=[[{"type": "scene"}] * len(shown)], subplot_titles=[name for _, name in shown]
     )
-    scaled = [scaled_samples(each, *_mesh()) for each, _ in shown]
+    scaled = [scaled_samples(each, *even_mesh(each)) for each, _ in shown]
     limit = 1.05 * max(float(np.abs(mesh).max()) for _, mesh in scaled)
     for column, (directions, mesh) in enumerate(scaled):
         drawn = go.Surface(
@@ -92,10 +91,12 @@ def interactive_limit_surface(surface: Any, *, beside: Any = "ellipsoid") -> Any
             showscale=False,
         )
         figure.add_trace(drawn, row=1, col=column + 1)
-    axis = {"range": [-limit, limit]}
-    scene = {f"{name}axis": {**axis, "title": {"text": text}} for name, text in zip("xyz", _AXES, strict=True)}
-    figure.update_scenes(aspectmode="cube", camera_eye={"x": 1.1, "y": -1.6, "z": 0.8}, **scene)
-    figure.update_layout(margin={"l": 0, "r": 0, "t": 40, "b": 0}, title={"text": "Limit surface, μ f_N = 1", "x": 0.5})
+    scene: dict[str, Any] = {"aspectmode": "cube", "camera": {"eye": {"x": 1.3, "y": -1.9, "z": 0.9}}}
+    for name, text in zip("xyz", _AXES, strict=True):
+        scene[f"{name}axis"] = {"range": [-limit, limit], "title": {"text": text}}
+    figure.update_scenes(scene)
+    title = {"text": "Limit surface, μ f<sub>N</sub> = 1", "x": 0.5}
+    figure.update_layout(margin={"l": 0, "r": 0, "t": 60, "b": 0}, title=title)
     return figure
 
 
@@ -113,10 +114,25 @@ def _with_names(surface: Any, beside: Any) -> list[tuple[Any, str]]:
     return [*shown, (beside, _kind(beside))]
 
 
-def _mesh() -> tuple[np.ndarray, np.ndarray]:
-    """Polar angles and azimuths [rad] of the mesh, broadcastable."""
-    polar = np.linspace(0.0, np.pi, POLAR_SEGMENTS + 1)[:, None]
-    return polar, np.linspace(0.0, 2 * np.pi, AZIMUTH_SEGMENTS + 1)[None, :]
+def even_mesh(surface: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Polar angles `[P, 1]` and azimuths `[1, A]` [rad] that lie close where the surface bends little.
+
+    There its points are far apart for a small turn of the twist, as where the body turns about a pad: facets of a mesh
+    of even angles would show.
+    """
+    polar = np.linspace(0.0, np.pi, POLAR_SEGMENTS + 1)
+    azimuth = np.linspace(0.0, 2 * np.pi, AZIMUTH_SEGMENTS + 1)
+    for _ in range(2):  # the second time with what lay between the points of the first
+        _, points = scaled_samples(surface, polar[:, None], azimuth[None, :])
+        polar = _evened(polar, np.linalg.norm(np.diff(points, axis=0), axis=-1).max(axis=1))
+        azimuth = _evened(azimuth, np.linalg.norm(np.diff(points, axis=1), axis=-1).max(axis=0))
+    return polar[:, None], azimuth[None, :]
+
+
+def _evened(angles: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """As many angles, by half spread evenly along the `steps` between them and by half as they are."""
+    way = np.concatenate([[0.0], np.cumsum(steps / steps.sum() + np.diff(angles) / (angles[-1] - angles[0]))])
+    return np.interp(np.linspace(0.0, way[-1], len(angles)), way, angles)
 
 
 def scaled_samples(surface: Any, polar: np.ndarray, azimuth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -137,7 +153,7 @@ def _kind(surface: Any) -> str:
 def draw_surface(axes: Any, mesh: np.ndarray, directions: np.ndarray, limit: float, *, opacity: float = 1.0) -> Any:
     """Draw a limit surface, points `mesh` `[P, A, 3]` with their `directions`, into 3-D axes up to `limit`."""
     # The outward normal of a limit surface is the twist itself: shading needs no differences of the mesh.
-    normal = -directions[:-1, :-1]
+    normal = -0.25 * (directions[:-1, :-1] + directions[1:, :-1] + directions[:-1, 1:] + directions[1:, 1:])
     lightness = 0.62 + 0.38 * np.clip(normal @ (_LIGHT / np.linalg.norm(_LIGHT)), -0.6, 1.0)
     colours = colormaps["cividis"](0.6 + 0.4 * mesh[:-1, :-1, 2] / limit)
     colours[..., :3] *= lightness[..., None]

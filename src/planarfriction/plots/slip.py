@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from planarfriction import formulas
 from planarfriction.errors import InvalidValueError
-from planarfriction.laws import FrictionLaw
+
+if TYPE_CHECKING:
+    from planarfriction.models import DistributedModel
 
 SLIPPING = 0.5
 """A cell slips where its bristle takes up less than this share of the way that the cell goes [-]."""
@@ -26,25 +28,31 @@ class SlipField(NamedTuple):
     """Whether each cell slips, bool `[F, N]`."""
 
 
-def slip_field(
-    model: Any, times: np.ndarray, ways: np.ndarray, loads: np.ndarray, frames: np.ndarray
-) -> SlipField | None:
-    """The slip field of a contact's patch under its law, at the instants `frames` (indices into `times`), or None.
-
-    `ways` `[T - 1, 3]` [m, m, rad] is how far the body moves on the contact from one of `times` `[T]` [s] to the next,
-    in the frame of the contact, `loads` `[T]` [N]. The bristles are those of `DistributedModel`, from rest, whatever
-    the model of the contact: so the field of a reduced model is that of the patch on its path. Of the way `u` of a cell
-    `u - (z_1 - z_0)` is slip. None where the model's law or patch has no distributed bristles.
-    """
+def bristles_of(model: Any) -> DistributedModel | None:
+    """The distributed model of a contact's patch and law; None where they have no bristles."""
     from planarfriction.models import DistributedModel
 
-    if not isinstance(model.law, FrictionLaw):
-        return None
     try:
-        bristles = DistributedModel(model.patch, model.law)
+        return DistributedModel(model.patch, model.law)
     except InvalidValueError:
         return None
-    law, state, count = model.law.numbers, bristles.rest(), len(bristles.patch.positions)
+
+
+def slip_field(
+    bristles: DistributedModel,
+    state: np.ndarray,
+    times: np.ndarray,
+    ways: np.ndarray,
+    loads: np.ndarray,
+    frames: np.ndarray,
+) -> SlipField:
+    """The slip field of a contact at the instants `frames` (indices into `times`), from the bristles `state` `[2, N]`.
+
+    `ways` `[T - 1, 3]` [m, m, rad] is how far the body moves on the contact from one of `times` `[T]` [s] to the next,
+    in the frame of the contact, `loads` `[T]` [N]. Of the way `u` of a cell `u - (z_1 - z_0)` is slip: what its bristle
+    does not take up.
+    """
+    law, count, largest = bristles.law.numbers, len(bristles.patch.positions), bristles.law.largest_deflection
     levers, lean = bristles.patch.levers(), bristles.patch.asymmetries().T
     bent, slips = np.zeros((len(frames), count)), np.zeros((len(frames), count), dtype=bool)
     way, slip, frame = np.zeros(count), np.zeros(count), 1
@@ -60,7 +68,7 @@ def slip_field(
         if frame < len(frames) and k + 1 == frames[frame]:
             steady = formulas.stribeck(np, length / dt, law) / law.sigma_0
             bent[frame] = np.hypot(*(state - lean * steady)) / steady
-            slips[frame] = (slip > SLIPPING * way) & (way > AT_REST * model.law.largest_deflection)
+            slips[frame] = (slip > SLIPPING * way) & (way > AT_REST * largest)
             way[:], slip[:], frame = 0.0, 0.0, frame + 1
     if len(frames) > 1:  # what goes on before the first frame is not known: as after it
         bent[0], slips[0] = np.where(slips[1], bent[1], 0.0), slips[1]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import warnings
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -42,7 +43,8 @@ class PlotFigure(Figure):
             return
         manager = self.canvas.manager
         if manager is None or not pyplot.fignum_exists(manager.num):
-            pyplot.figure(FigureClass=lambda *_, **__: self)  # the figure that pyplot makes is this one
+            adopt: Any = lambda *_, **__: self  # noqa: E731
+            pyplot.figure(FigureClass=adopt)  # the figure that pyplot makes is this one
         pyplot.show()
 
     def _repr_png_(self) -> bytes:

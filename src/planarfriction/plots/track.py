@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -11,9 +11,10 @@ from scipy.interpolate import PchipInterpolator
 
 from planarfriction import geometry
 from planarfriction.plots.histories import KICK
-from planarfriction.plots.slip import SlipField, slip_field
+from planarfriction.plots.slip import SlipField, bristles_of, slip_field
 
 if TYPE_CHECKING:
+    from planarfriction.models import DistributedModel
     from planarfriction.scenes import Contact, Solution
 
 MOST_STEPS = 5000
@@ -82,14 +83,29 @@ def track_of(solution: Solution, times: np.ndarray) -> Track:
     if solution.scene.velocity is not None:  # in axes of the body
         twists = geometry.rotate(twists, poses[frames, 2])
     contacts = []
-    for index, contact in enumerate(solution.scene.contacts):
+    for index, (contact, first) in enumerate(zip(solution.scene.contacts, _first(solution), strict=True)):
         at = contact_poses(contact, steps, poses)
         loads = _values(solution, "normal_force", sampled, steps, index)
-        slip = slip_field(contact.model, steps, _ways(contact, steps, poses, at), loads, frames)
+        slip = first and slip_field(*first, steps, _ways(contact, steps, poses, at), loads, frames)
         wrenches = _between(times, sampled, _without_kick(solution, index))
         against = _between(times, sampled, solution.contact_twist(contact.name))
         contacts.append(ContactTrack(contact, index, at[frames], against, wrenches, loads[frames], slip))
     return Track(times, poses[frames], twists, contacts)
+
+
+def _first(solution: Solution) -> list[tuple[DistributedModel, np.ndarray] | None]:
+    """The distributed model of each contact, whatever its own, and how its bristles start; None without bristles."""
+    from planarfriction.scenes.start import first_states
+
+    scene = solution.scene
+    models = [bristles_of(each.model) for each in scene.contacts]
+    known = [each for each in models if each is not None]
+    if scene.start == "rest" or len(known) < len(models):
+        return [each and (each, each.rest()) for each in models]
+    contacts = [replace(each, model=model) for each, model in zip(scene.contacts, known, strict=True)]
+    loads = np.asarray(solution.histories["normal_force"].values, dtype=float)[0]
+    states = first_states(replace(scene, contacts=contacts), loads)
+    return list(zip(known, states or [], strict=True))
 
 
 def contact_poses(contact: Contact, times: np.ndarray, poses: np.ndarray) -> np.ndarray:
