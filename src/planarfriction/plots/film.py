@@ -186,7 +186,7 @@ def _views(solution: Solution, track: Track, follow: bool) -> np.ndarray:
     own = np.concatenate(_body_lines(solution))
     of_body, of_world = [own], []
     for each in track.contacts:
-        points = cell_polygons(each.contact.model.patch).reshape(-1, 2)
+        points = _rim(cell_polygons(each.contact.model.patch).reshape(-1, 2))
         if each.contact.mounted_on == "body":
             of_body.append(_placed(points, np.array([*each.contact.position, each.contact.angle])))
         else:
@@ -205,6 +205,12 @@ def _views(solution: Solution, track: Track, follow: bool) -> np.ndarray:
     whole = 0.5 * (low + high)
     middle = np.clip(track.poses[:, :2], whole - room, whole + room)
     return 1e3 * np.stack([middle - half, middle + half], -1)
+
+
+def _rim(points: np.ndarray) -> np.ndarray:
+    """The points that reach farthest in each of 16 directions: enough of them to see the limits of a drawing."""
+    angles = 2.0 * np.pi * np.arange(16) / 16
+    return points[np.unique((points @ np.stack([np.cos(angles), np.sin(angles)])).argmax(axis=0))]
 
 
 def _filling(views: np.ndarray, ratio: float) -> np.ndarray:

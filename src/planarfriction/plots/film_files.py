@@ -32,7 +32,7 @@ WHITE = 248
 """Least red, green and blue of a colour of a palette that stands for white."""
 
 SIGNS = {
-    "minus": "slower",
+    "minus": "&minus;",
     "fast-backward": "|&lt;&lt;",
     "step-backward": "|&lt;",
     "play fa-flip-horizontal": "&lt;",
@@ -40,7 +40,7 @@ SIGNS = {
     "play": "&gt;",
     "step-forward": "&gt;|",
     "fast-forward": "&gt;&gt;|",
-    "plus": "faster",
+    "plus": "+",
 }
 """Icon of a button of the player -> what stands on it."""
 

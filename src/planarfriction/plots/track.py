@@ -111,9 +111,16 @@ def _first(solution: Solution) -> list[tuple[DistributedModel, np.ndarray] | Non
 def contact_poses(contact: Contact, times: np.ndarray, poses: np.ndarray) -> np.ndarray:
     """Poses of the frame of a contact `[T, 3]` [m, m, rad] at `times`, where the body has `poses` `[T, 3]`."""
     fixed = np.array([*contact.position, contact.angle], dtype=float)
-    if contact.mounted_on == "world":
-        return np.broadcast_to(fixed, poses.shape)
-    return poses + geometry.rotate(fixed, poses[:, 2])
+    if contact.mounted_on == "body":
+        return poses + geometry.rotate(fixed, poses[:, 2])
+    return fixed + _carried(contact, times)
+
+
+def _carried(contact: Contact, times: np.ndarray) -> np.ndarray:
+    """How far the world's side of a contact has moved as prescribed `[T, 3]` [m, m, rad]."""
+    from planarfriction.scenes.movers import displacement
+
+    return np.zeros((len(times), 3)) if contact.velocity is None else displacement(contact.velocity, times)
 
 
 def _ways(contact: Contact, times: np.ndarray, poses: np.ndarray, at: np.ndarray) -> np.ndarray:
@@ -121,10 +128,10 @@ def _ways(contact: Contact, times: np.ndarray, poses: np.ndarray, at: np.ndarray
 
     That of the material of the body at the origin of the frame, half-way: of second order in the turn of a step.
     """
-    body, place, middle = np.diff(poses, axis=0), np.diff(at, axis=0), 0.5 * (at[1:] + at[:-1])
+    body, middle = np.diff(poses, axis=0), 0.5 * (at[1:] + at[:-1])
     ways = geometry.twist_at(body, middle[:, :2] - 0.5 * (poses[1:, :2] + poses[:-1, :2]))
-    if contact.mounted_on == "world":
-        ways = ways - place
+    ground = np.diff(_carried(contact, times), axis=0)  # of a pad at its frame, of the ground at the world's origin
+    ways = ways - (geometry.twist_at(ground, middle[:, :2]) if contact.mounted_on == "body" else ground)
     return geometry.rotate(ways, -middle[:, 2])
 
 
