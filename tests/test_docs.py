@@ -211,5 +211,5 @@ def test_glossary_names_every_member():
 def test_pictures_are_small_and_used():
     used = "".join(page.read_text(encoding="utf-8") for page in PAGES)
     for picture in (ROOT / "docs" / "images").glob("*"):
-        assert picture.stat().st_size < 200_000, picture.name
+        assert picture.stat().st_size < (1_500_000 if picture.suffix == ".gif" else 200_000), picture.name
         assert f"images/{picture.name}" in used, picture.name

@@ -10,14 +10,16 @@ import subprocess
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import matplotlib
 import numpy as np
 from matplotlib.figure import Figure
-from PIL import Image
 
 from planarfriction.errors import FileError
+
+if TYPE_CHECKING:
+    from PIL import Image
 
 KINDS = (".gif", ".mp4", ".html")
 """Kinds of moving pictures."""
@@ -80,6 +82,8 @@ def _self_contained(page: bytes) -> bytes:
 
 def _palette(frame: Callable[[int], np.ndarray], count: int) -> Image.Image:
     """256 colours for all frames: one choice keeps them from flickering, and what does not change costs little."""
+    from PIL import Image
+
     chosen = np.unique(np.linspace(0, count - 1, PALETTE_FRAMES).round().astype(int))
     sheet = Image.fromarray(np.concatenate([frame(int(each)) for each in chosen]))
     found = sheet.quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
@@ -90,6 +94,8 @@ def _palette(frame: Callable[[int], np.ndarray], count: int) -> Image.Image:
 
 
 def _write_gif(file: io.BytesIO, frame: Callable[[int], np.ndarray], count: int, fps: float) -> None:
+    from PIL import Image
+
     palette = _palette(frame, count)
     ends = np.round(100.0 * np.arange(1, count + 1) / fps)  # GIF counts hundredths of a second
     durations = 10.0 * np.diff(ends, prepend=0.0)
@@ -110,6 +116,8 @@ class _Shown(Figure):
 
     def savefig(self, fname: Any, *, format: str, **options: Any) -> None:  # pyright: ignore[reportIncompatibleMethodOverride]
         """Write the picture: as a PNG in the colours of the palette, or as the bytes that ffmpeg reads."""
+        from PIL import Image
+
         image = Image.fromarray(self.picture[: self.size[0], : self.size[1]])
         if format == "png":
             image.quantize(palette=self.palette, dither=Image.Dither.NONE).save(fname, format="PNG")

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
 
 from planarfriction import geometry
 from planarfriction.plots.histories import KICK
@@ -136,6 +135,8 @@ def _ways(contact: Contact, times: np.ndarray, poses: np.ndarray, at: np.ndarray
 
 
 def _poses(solution: Solution, sampled: np.ndarray, times: np.ndarray) -> np.ndarray:
+    from scipy.interpolate import PchipInterpolator
+
     poses = np.stack([np.asarray(solution.histories[name].values, dtype=float) for name in ("x", "y", "theta")], -1)
     if len(sampled) == 1:
         return np.broadcast_to(poses, (len(times), 3))
