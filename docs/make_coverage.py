@@ -129,9 +129,9 @@ def page(counts: dict[str, Count]) -> str:
     ]
     for name, count in counts.items():
         row = ROWS[name]
-        cells = [f"{count.inside_told[n]} of {count.told[n]}" if count.told[n] else "not told" for n in NAMES]
+        cells = [f"{count.inside_told[n]} of {count.told[n]}" if count.told[n] else "not identifiable" for n in NAMES]
         told = sum(count.told.values())
-        share = f"{100.0 * sum(count.inside_told.values()) / told:.1f} %" if told else "none told"
+        share = f"{100.0 * sum(count.inside_told.values()) / told:.1f} %" if told else "none"
         cells += [share, f"{count.rejected} of {count.seeds}"]
         lines.append(f"| {row.words} | {row.model} | {' | '.join(cells)} |")
     return "\n".join(lines) + "\n"

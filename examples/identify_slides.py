@@ -1,7 +1,8 @@
 """Friction of a cube from measured slides, without a force sensor: fitted on half of the tosses, tested on the other.
 
 Motion capture of a cube that was tossed, landed flat, and slid and spun until it stopped (ContactNets: Pfrommer, Halm,
-Posa, CoRL 2020). The table comes with the package; a FOLDER may hold another one of the same form.
+Posa, CoRL 2020). The table comes with the package; a FOLDER may hold another one of the same form. Each of the five
+fits to a half takes half a minute; --tosses 60 is enough for a look.
 
     python examples/identify_slides.py --splits 3 --out out/
 """
@@ -18,7 +19,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import planarfriction as pf
-from planarfriction.cli.console import print_table
+from planarfriction.cli.console import print_table, work_progress
 from planarfriction.errors import FrictionError
 from planarfriction.identify import Slide, SlidingBody, identify_motion, predict_slide
 from planarfriction.measured import Case as Toss
@@ -86,9 +87,9 @@ def run(fit: Sequence[Slide], test: Sequence[Slide], cases: Sequence[Case], seed
     """Fit every case on one half and predict the other, from a parabola and from the first poses."""
     rows = []
     for case in cases:
-        found = identify_motion(
-            fit, case.patch, BODY, parameters=case.parameters, start=_start(case), model=case.build, samples=WINDOW
-        )
+        options = {"parameters": case.parameters, "start": _start(case), "model": case.build, "samples": WINDOW}
+        with work_progress(case.name) as progress:
+            found = identify_motion(fit, case.patch, BODY, **options, progress=progress)
         told = ", ".join(f"{n} {v:.4g} ± {found.errors[n]:.1g}" for n, v in found.estimates.items())
         for name, samples in (("parabola", None), (f"first {WINDOW} poses", WINDOW)):
             all_errors = [errors(predict_slide(found.model, BODY, s, samples=samples), s, samples or 0) for s in test]

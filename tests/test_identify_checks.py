@@ -125,7 +125,7 @@ def test_loads_that_never_vary(log):
     other = changed(log, load=2.0)
     assert check_loads([log, other], ("mu_c", "n")) == check_loads([log, log], ("mu_c",)) == []
     (found,) = check_loads([log, log], ("mu_c", "n"))
-    assert str(found) == "normal_force should differ from log to log to tell n, got 2 N throughout"
+    assert str(found) == "normal_force should differ from log to log to show n, got 2 N throughout"
 
 
 def test_sampling_against_the_corner_of_the_bristles(log):

@@ -14,7 +14,7 @@ from planarfriction.cli import main
 from planarfriction.cli.app import app
 from planarfriction.cli.output import write_csv
 from planarfriction.errors import InvalidValueError
-from planarfriction.identify import Log, candidate_motions, identify_lugre, plan_motion, told_so_far
+from planarfriction.identify import Log, candidate_motions, identify_lugre, known_so_far, plan_motion
 from planarfriction.identify.logs import columns_of
 
 NOISE = (0.01, 0.01, 6e-5)
@@ -99,7 +99,7 @@ def test_a_second_load_tells_how_a_soft_finger_grows():
 def test_what_the_logs_tell_replaces_the_guess(slide):
     guess = dataclasses.replace(LAW, mu_c=0.3, mu_s=0.9, sigma_1=5e3)
     fit = identify_lugre(slide, PATCH, model="reduced-published", starts=1)
-    patch, law = told_so_far(fit, PATCH, guess)
+    patch, law = known_so_far(fit, PATCH, guess)
     assert patch is PATCH  # a slide tells no radius
     assert law.mu_c == fit.estimates["mu_c"] and law.mu_s == fit.estimates["mu_s"]
     assert law.sigma_1 == pytest.approx(0.5 * sum(fit.intervals()["sigma_1"]))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib
 import json
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ import pytest
 import planarfriction as pf
 from identification_logs import LAW, LOAD, PATCH, clean_log, excitation, noisy, truth
 from planarfriction.autodiff import PARAMETERS, parameters_of
-from planarfriction.identify import Log, identify_lugre
+from planarfriction.identify import Log, identify_lugre, search
 from planarfriction.identify.fitted import moved_patch
 from planarfriction.identify.least_squares import condensed
 from planarfriction.identify.prediction import Prediction
@@ -273,3 +274,26 @@ def test_intervals_hold_the_truth(name, monkeypatch):
         assert count.rejected == 6 and told == 0
     else:
         assert count.told["mu_c"] == 6 and all(count.told[each] >= 5 for each in script.NAMES if each != "sigma_1")
+
+
+@pytest.mark.parametrize(
+    ("lead", "near", "tried", "best"),
+    [
+        (SimpleNamespace(values=np.array([5.0]), near=True), {5.0}, [5.0], 5.0),
+        (SimpleNamespace(values=np.array([5.0]), near=False), {2.0}, [2.0], 2.0),
+        (SimpleNamespace(values=np.array([5.0]), near=False), {5.0}, [2.0, 5.0], 2.0),
+        (SimpleNamespace(values=np.array([1.0]), near=False), {}, [2.0, 1.0], 1.0),
+    ],
+)
+def test_a_model_begins_where_the_lead_ended_if_that_is_near_the_data(monkeypatch, lead, near, tried, best):
+    """Else at the guess that misfits least, and at both where neither comes near; the lower cost is taken."""
+    seen = []
+
+    def look(problem, starts, *, noise, say):
+        seen.append(float(starts[0][0]))
+        return SimpleNamespace(cost=starts[0][0], near=starts[0][0] in near)
+
+    monkeypatch.setattr(search, "look", look)
+    monkeypatch.setattr(search, "misfit", lambda problem, values, noise: values[0])
+    found = search.follow(None, lead, [np.array([3.0]), np.array([2.0])], noise=None, say=None)
+    assert seen == tried and found.cost == best

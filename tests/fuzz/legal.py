@@ -29,7 +29,7 @@ SKIPPED = {
     "identify.identify_motion": "fits for seconds; its logs are attacked as files",
     "planning.plan_grip": "plans for a second; tests/test_grip_planning.py attacks it",
     "identify.identify_lugre": "fits for seconds; its logs are attacked as files",
-    "identify.told_so_far": "takes what a fit returns",
+    "identify.known_so_far": "takes what a fit returns",
 }
 """Not attacked, and why."""
 

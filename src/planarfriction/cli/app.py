@@ -176,7 +176,7 @@ def limit_surface(
     Each LOG is a CSV file with a heading and the columns t, vx, vy, omega (or x, y, theta), fx, fy, tau, normal_force
     in s, m/s, rad/s, N and N m: twist and wrench about the origin of the contact frame, in its axes, the wrench on the
     moving body. Files that `planarfriction run` writes are such logs. Prints estimates, their errors, and what the data
-    cannot tell. With `plan` as the first word it says which motion to measure next (a log of that name: ./plan).
+    do not determine. With `plan` as the first word it says which motion to measure next (a log of that name: ./plan).
 
     \b
     Examples:

@@ -129,9 +129,9 @@ def plan(
 def _known(
     logs: list[Log], patch: ContactPatch, names: tuple[str, ...], start: dict[str, float], noise: list[float] | None
 ) -> tuple[ContactPatch, LuGre]:
-    """Patch and law as the logs tell them, or as guessed where there are none."""
+    """Patch and law as the logs show them, or as guessed where there are none."""
     from planarfriction.cli.console import note, work_progress
-    from planarfriction.identify import identify_lugre, told_so_far
+    from planarfriction.identify import identify_lugre, known_so_far
     from planarfriction.identify.wrenches import guessed_law
 
     law = guessed_law(start)
@@ -142,4 +142,4 @@ def _known(
             logs, patch, parameters=names, start=start, noise=noise, model="reduced-published", progress=progress
         )
     note(found.summary().replace("\n", " "))
-    return told_so_far(found, patch, law)
+    return known_so_far(found, patch, law)

@@ -1,13 +1,13 @@
 """Identification: parameters of the friction models from measurements, with their errors and with what stays unknown.
 
 `identify_lugre` reads logs of motion and wrench, `identify_motion` slides without a force sensor; `plan_motion` says
-which motion tells what is still missing.
+which motion to measure next.
 """
 
 from planarfriction.identify.candidates import candidate_motions
 from planarfriction.identify.logs import Log, differentiated
 from planarfriction.identify.motion import identify_motion
-from planarfriction.identify.planning import MotionPlan, plan_motion, told_so_far
+from planarfriction.identify.planning import MotionPlan, known_so_far, plan_motion
 from planarfriction.identify.result import Identification, Verdict
 from planarfriction.identify.slides import Slide, SlidingBody, fit_start, predict_slide
 from planarfriction.identify.wrenches import identify_lugre
@@ -24,7 +24,7 @@ __all__ = [
     "fit_start",
     "identify_lugre",
     "identify_motion",
+    "known_so_far",
     "plan_motion",
     "predict_slide",
-    "told_so_far",
 ]

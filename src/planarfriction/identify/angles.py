@@ -9,7 +9,7 @@ from planarfriction.errors import InvalidValueError
 TURN = 2.0 * np.pi
 
 QUARTER = 0.25 * TURN
-"""Most that an angle may turn, or its step may change, between two samples for its turns to be told [rad]."""
+"""Most that an angle may turn, or its step may change, between two samples for its turns to be counted [rad]."""
 
 ROUNDED = 1e-3
 """By how much the range of a wrapped angle may exceed a turn, for rounding [turns]."""
@@ -24,7 +24,7 @@ def unwrapped(time: np.ndarray, angle: np.ndarray, name: str = "theta") -> tuple
     An angle that goes on beyond a turn is as it should be, however fast it turns.
 
     Raises InvalidValueError for a jump that no whole turn explains, and where a wrapped angle turns by more than a
-    quarter of a turn between two samples, so that nobody can tell which way.
+    quarter of a turn between two samples, so that its direction is unknown.
     """
     if len(angle) < 2:
         return angle, 0

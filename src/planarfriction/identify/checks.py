@@ -51,7 +51,7 @@ LEVERS = {
     32.0: "vx and vy in mm/s, or tau in N mm",
     1e3: "all lengths in mm but those of the patch",
 }
-"""Factors on the contact radius that a unit explains; it is told by the root of `tau v/(f omega)`."""
+"""Factors on the contact radius that a unit explains; it shows as the root of `tau v/(f omega)`."""
 
 SAME_LEVER = 2.0
 """Factor within which a contact radius counts as one of these."""
@@ -304,13 +304,13 @@ def check_unloaded(log: Log, size: float) -> Finding | None:
 
 
 def check_loads(logs: Sequence[Log], names: Sequence[str]) -> list[Finding]:
-    """What depends on the load is told by different loads only."""
+    """What depends on the load shows at different loads only."""
     wanted = [name for name in names if name in ("n", "k", "k_per_newton")]
     loads = np.array([_load(log) for log in logs])
     if not wanted or loads.max() > (1.0 + ALIKE) * loads.min():
         return []
     which = ", ".join(wanted)
-    return [Finding("normal_force", f"differ from log to log to tell {which}", f"{loads.mean():.4g} N throughout")]
+    return [Finding("normal_force", f"differ from log to log to show {which}", f"{loads.mean():.4g} N throughout")]
 
 
 def check_sampling(log: Log, sigma_0: float, sigma_1: float) -> Finding | None:

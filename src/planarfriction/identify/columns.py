@@ -35,7 +35,7 @@ _HEADING = re.compile(r"(?P<name>[^\[(]*?)\s*(?:[\[(](?P<unit>[^\])]*)[\])])?")
 def find_columns(path: Path, headings: Sequence[str], *, contact: str | None, with_load: bool) -> dict[str, str]:
     """Heading of each column of a log that a file has: `t`, twist or else motion, wrench, normal force if there.
 
-    Names are told without regard to case and may carry a unit in brackets; `ALIASES` are known. Where columns are named
+    Names are read without regard to case and may carry a unit in brackets; `ALIASES` are known. Where columns are named
     "contact.vx", those of `contact` are taken, or of the only contact that has them all.
 
     Raises FileError for a column that is missing, that is there twice, or that has another unit.

@@ -95,8 +95,8 @@ def covariance(jacobian: np.ndarray, free: np.ndarray) -> np.ndarray:
     """Covariance `[F, F]` of least squares whose residuals have unit spread: `(J' J)^-1`.
 
     Parameters that are not `free` (`[F]` of bool: on a bound) have the variance of a fit of that parameter alone, and
-    no part in the others. One that moves no residual has an infinite variance; a combination that cannot be told has a
-    huge one, so that all in it show it.
+    no part in the others. One that moves no residual has an infinite variance; a combination that moves none
+    has a huge one, so that all in it show it.
     """
     count = jacobian.shape[1]
     jacobian = _triangle(jacobian)

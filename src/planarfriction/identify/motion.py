@@ -30,7 +30,7 @@ from planarfriction.patch import ContactPatch
 from planarfriction.patch.metric import refuse_anisotropy
 
 MOTION_PARAMETERS = ("mu_c", "mu_s", "v_s", "gamma", "sigma_2", "contact_radius")
-"""What slides can tell; `mu_s` follows `mu_c` where it is not asked for."""
+"""What slides can determine; `mu_s` follows `mu_c` where it is not asked for."""
 
 DRY = LuGre(mu_c=0.3, mu_s=0.3, v_s=1e-3, sigma_0=1e6, sigma_1=20.0, sigma_2=0.0, elasto_plastic=ElastoPlastic(0.9))
 """Dry friction with bristles so stiff that only the coefficient counts."""
@@ -50,7 +50,11 @@ TOLERANCE = 1e-4
 """The search ends when coordinates or cost change by less than this share: far below the standard errors."""
 
 CHANGE = 0.01
-"""Share of a parameter that derivatives are taken over (at least of its start)."""
+"""Share of a parameter that derivatives are taken over (at least of its start).
+
+Differences, not `scene_sensitivities`: for slides this short and tolerances this loose those take four times as long
+through a table and as long through an ellipsoid, and they know neither v_s nor sigma_2.
+"""
 
 Build = Callable[..., Any]
 """Makes a friction model from a patch and a law."""
@@ -98,7 +102,7 @@ def identify_motion(
     loss
         "robust" leaves out slides that friction alone cannot have made (they speed up, or keep their speed), and those
         whose residuals are 6 times those of the median slide, and lets those from 2.5 times on count less; "squares"
-        takes all alike. What was left out, and the slide that moves an estimate most, is told in the verdicts.
+        takes all alike. What was left out, and the slide that moves an estimate most, stand in the verdicts.
     progress
         Called with a text now and then.
 
@@ -131,9 +135,10 @@ def identify_motion(
     for turn in range(MOST_ROUNDS + 1):
         known = fit.weights
         if turn > 0:
+            offs = fit.offs(coordinates.values(x))
             if robust:
-                fit.weights = weights(fit.errors(coordinates.values(x), noise))
-            noise = fit.spread(coordinates.values(x))
+                fit.weights = weights(np.array([np.sqrt(np.mean((off / noise) ** 2)) for off in offs]))
+            noise = fit.spread(offs)
         minimum = minimise(fit.residuals(coordinates, noise), [x], coordinates.bounds(), tolerance=TOLERANCE)
         x = minimum.x
         if turn >= NOISE_ROUNDS and np.abs(fit.weights - known).max() < SETTLED:
@@ -175,9 +180,9 @@ class _Fit:
             patch = ContactPatch(positions, scale**2 * patch.areas, patch.weights() / patch.areas, None, patch.name)
         return self.build(patch, self.fitted_law(values))
 
-    def spread(self, values: np.ndarray) -> np.ndarray:
+    def spread(self, offs: Sequence[np.ndarray]) -> np.ndarray:
         """Spread of the residuals of each channel `[3]`; that of x and y is the same."""
-        offs, counts = self._offs(values), np.array([len(slide.time) for slide in self.slides])
+        counts = np.array([len(slide.time) for slide in self.slides])
         total = 3 * float(self.weights @ counts)
         free = total / max(total - len(self.names) - 6 * float(self.weights.sum()), 1.0)
         each = np.array([np.sum(off**2, axis=0) for off in offs])
@@ -185,14 +190,10 @@ class _Fit:
         across = np.sqrt(0.5 * (squares[0] + squares[1]))
         return np.maximum([across, across, np.sqrt(squares[2])], 1e-9)
 
-    def _offs(self, values: np.ndarray) -> list[np.ndarray]:
+    def offs(self, values: np.ndarray) -> list[np.ndarray]:
         """Measured minus simulated poses of each slide `[T, 3]`."""
         model, both = self.fitted_model(values), zip(self.slides, self.starts, strict=True)
         return [slide.pose - slide_poses(model, self.body, slide.time, s[:3], s[3:]) for slide, s in both]
-
-    def errors(self, values: np.ndarray, noise: np.ndarray) -> np.ndarray:
-        """Root mean square of the residuals of each slide over the noise `[N]`."""
-        return np.array([np.sqrt(np.mean((off / noise) ** 2)) for off in self._offs(values)])
 
     def residuals(self, coordinates: Coordinates, noise: np.ndarray):
         """Function of the coordinates: residuals at the best starts and their derivatives with the starts free."""
@@ -303,10 +304,14 @@ class _Fit:
             elif name == "contact_radius" and np.sqrt(np.mean(spin**2)) < NO_SPIN * np.sqrt(np.mean(speed**2)):
                 verdicts.append(Verdict(name, False, "no spin"))
             elif row[other] > TOGETHER:
-                text = f"told only together with {self.names[other]} (correlation {together[i, other]:.2f})"
+                text = f"cannot be separated from {self.names[other]} (correlation {together[i, other]:.2f})"
                 verdicts.append(Verdict(name, not vague or name == "sigma_2", text))
             elif name == "sigma_2" and values[i] < 1.96 * errors[i]:
-                verdicts.append(Verdict(name, True, f"not told from 0, at most {values[i] + 1.96 * errors[i]:.3g} s/m"))
+                verdicts.append(
+                    Verdict(
+                        name, True, f"cannot be distinguished from 0, at most {values[i] + 1.96 * errors[i]:.3g} s/m"
+                    )
+                )
             elif vague and name != "sigma_2":
                 verdicts.append(
                     Verdict(name, False, f"its standard error is {100 * errors[i] / abs(values[i]):.0f} % of it")

@@ -3,7 +3,7 @@
     y(t) = (1 + scale + sum_k drift_k P_k(u)) W(t - delay) + bias + zero_drift u,    u from -1 to 1 over the log,
 
 with Legendre polynomials `P_k`. All of it is estimated along with the parameters of the contact, each held loosely at
-zero, so that what the data cannot tell from friction shows as a wider interval of both.
+zero, so that what looks like friction in the data shows as a wider interval of both.
 """
 
 from __future__ import annotations
@@ -144,7 +144,7 @@ class Rig:
         return widths
 
     def strain(self, values: np.ndarray) -> float:
-        """How many times its width the scale of the load cell was moved: friction cannot tell it, so a model erred."""
+        """How many times its width the scale of the load cell was moved: friction does not show it."""
         at = [j for j, column in enumerate(self.columns) if column.name == "load_scale"]
         return float(np.abs(values / self.with_drift(values))[at].max(initial=0.0))
 

@@ -125,10 +125,10 @@ class Coordinates:
         return np.clip(result, *self.bounds())
 
     def prior(self, coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Weak pull to the start, `[F]` and its derivatives `[F, F]`: keeps what the data do not tell where it began.
+        """Weak pull to the start, `[F]` and its derivatives `[F, F]`: keeps what the data leave open where it began.
 
-        In units of the noise of one residual, one for every factor of `PRIOR`: what the data tell to 10 % is moved by
-        a thousandth of its error. The linear coordinates, whose scale is a guess, are left alone.
+        In units of the noise of one residual, one for every factor of `PRIOR`: what the data give to 10 % is moved by a
+        thousandth of its error. The linear coordinates, whose scale is a guess, are left alone.
         """
         width = np.where(self.logarithmic, PRIOR, np.inf)
         for name, value in (("gamma", SHAPE_PRIOR), ("mu_s", SHAPE_PRIOR)):

@@ -1,10 +1,10 @@
-"""`plan_motion`: which motion tells most that the logs so far do not, by the information that it is expected to add.
+"""`plan_motion`: which motion adds most to what the logs so far show, by the information that it is expected to bring.
 
 With the derivatives J of the wrenches over their noise, information adds up over logs,
 
     C_0 = (P + sum over logs J' J)^-1,    C_m = (C_0^-1 + J_m' J_m)^-1,    gain = log2(det C_0 / det C_m) / 2   [bit],
 
-P that of what is taken for granted. What the rig adds is estimated along: zeros and drift of each log anew, delay and
+P that of what is taken for granted. What the rig adds is estimated too: zeros and drift for each log, delay and
 scale of the load cell once for all. To first order in the parameters, so the gain holds near the law that is given.
 
 Sources: Lindley 1956 (gain of information); Chaloner and Verdinelli 1995 (its form for normal errors, section 4).
@@ -52,7 +52,7 @@ FAINT = 1e-14
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MotionPlan(ByValue):
-    """Motions by what they are expected to tell, the best first; M motions, F parameters."""
+    """Motions by the information that they are expected to add, the best first; M motions, F parameters."""
 
     names: tuple[str, ...]
     """Names of the parameters."""
@@ -69,7 +69,7 @@ class MotionPlan(ByValue):
 
     @property
     def best(self) -> Log:
-        """The motion that tells most."""
+        """The motion that adds most."""
         return self.motions[0]
 
     def table(self) -> str:
@@ -121,7 +121,7 @@ def plan_motion(
     Parameters
     ----------
     patch, law
-        The contact as far as it is known: a guess before the first log, then `told_so_far`.
+        The contact as far as it is known: a guess before the first log, then `known_so_far`.
     logs
         What was measured so far; none before the first.
     motions
@@ -179,7 +179,7 @@ def plan_motion(
     )
 
 
-def told_so_far(found: Identification, patch: ContactPatch, law: LuGre) -> tuple[ContactPatch, LuGre]:
+def known_so_far(found: Identification, patch: ContactPatch, law: LuGre) -> tuple[ContactPatch, LuGre]:
     """The patch and the law to plan with: what `found` knows to better than a half, the rest as in `patch` and `law`.
 
     A value of `law` that lies outside the interval of `found` moves to the middle of that.

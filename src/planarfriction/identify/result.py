@@ -1,4 +1,4 @@
-"""What an identification found: estimates with their errors, what the data cannot tell, residuals, the fitted model."""
+"""What an identification found: estimates with their errors, what the data leave open, residuals, the fitted model."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class Verdict:
 
     parameter: str
     identifiable: bool
-    """Whether the data tell it; for the fit: whether nothing is wrong."""
+    """Whether the data determine it; for the fit: whether nothing is wrong."""
     reason: str
     """Why not, or what to mind."""
 
@@ -69,7 +69,7 @@ class Identification(ByValue):
     correlations: np.ndarray
     """Correlations of the estimates [-], `[F, F]`."""
     verdicts: tuple[Verdict, ...]
-    """What the data cannot tell, and what to mind."""
+    """What the data do not determine, and what to mind."""
     noise: np.ndarray
     """Spread of each measured channel that the residuals are scaled by, `[C]` (units of the channels)."""
     channels: tuple[tuple[str, str], ...]
@@ -112,7 +112,7 @@ class Identification(ByValue):
         return {name: interval(name, value, error) for name, value, error in both}
 
     def identifiable(self, name: str) -> bool:
-        """Whether the data tell this parameter."""
+        """Whether the data determine this parameter."""
         return not any(each.parameter == name and not each.identifiable for each in self.verdicts)
 
     def residual_correlations(self, lags: int = 50) -> np.ndarray:
@@ -128,11 +128,11 @@ class Identification(ByValue):
         return sums / np.where(sums[0] > 0.0, sums[0], 1.0)
 
     def summary(self) -> str:
-        """The verdict in plain words: what the data tell, and whether the fit can be believed."""
-        told = [name for name in self.names if self.identifiable(name)]
-        lines = [f"Told by the data: {', '.join(told)}." if told else "None of the parameters can be told."]
-        if len(told) < len(self.names):
-            lines[0] += f" Not told: {', '.join(name for name in self.names if name not in told)}."
+        """The verdict in plain words: what the data determine, and whether the fit can be believed."""
+        known = [name for name in self.names if self.identifiable(name)]
+        lines = [f"Identified: {', '.join(known)}." if known else "None of the parameters is identifiable."]
+        if 0 < len(known) < len(self.names):
+            lines[0] += f" Not identifiable: {', '.join(name for name in self.names if name not in known)}."
         lines += [f"{_sentence(each.reason)}" for each in self.verdicts if each.parameter == "fit"]
         return "\n".join(textwrap.fill(line, WIDTH) for line in lines)
 

@@ -1,4 +1,4 @@
-"""What sensors add to a log: the noise of its channels, told from their jitter, and twists without theirs."""
+"""What sensors add to a log: the noise of its channels, estimated from their jitter, and twists without theirs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from planarfriction.identify.logs import Log
 
 ORDER = 3
-"""Order of the differences that noise is told from: motions of a tenth of the sampling rate leave 2 % of themselves."""
+"""Order of the differences that give the noise: motions of a tenth of the sampling rate leave 2 % of themselves."""
 
 SIZE = float(np.sqrt(20.0))
 """Spread of third differences of noise of unit spread: 1 + 9 + 9 + 1 under the root."""

@@ -1,7 +1,7 @@
 """How sure a fit is: whether it leaves more than noise, how far off values may be, how it predicts what is held out.
 
-The noise is told from the jitter of the signals, not from what a fit leaves; so a fit can be rejected. Where what is
-left hangs together in time, intervals follow its covariance over time (Newey and West 1987), never below the plain one.
+The noise is estimated from the jitter of the signals, not from what a fit leaves; so a fit can be rejected. Where
+residuals are correlated in time, intervals follow that (Newey and West 1987), and are never narrower than without.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ HUGE = 1e200
 """Variance that stands for an infinite one while it is turned into other coordinates."""
 
 RIDGE = 1e-10
-"""Share of the largest curvature that keeps what no sample tells where it is."""
+"""Share of the largest curvature that keeps what no sample depends on where it is."""
 
 
 @dataclass(frozen=True)
@@ -111,7 +111,7 @@ def _pull(fit: Fit) -> np.ndarray:
 
 
 def _covariance(fit: Fit, rows: np.ndarray, free: np.ndarray) -> np.ndarray:
-    """Covariance of the values, with what is `free` of the coordinates; infinite where the data tell nothing."""
+    """Covariance of the values, with what is `free` of the coordinates; infinite where the data say nothing."""
     count = len(fit.problem.names)
     slopes = np.eye(len(fit.values))
     slopes[:count, :count] = fit.coordinates.slopes(fit.x[:count])

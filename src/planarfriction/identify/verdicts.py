@@ -1,4 +1,4 @@
-"""What the data cannot tell, and why: each rule names the parameter and what is missing."""
+"""What the data do not determine, and why: each rule names the parameter and what is missing."""
 
 from __future__ import annotations
 
@@ -13,19 +13,19 @@ from planarfriction.identify.result import Verdict, interval
 from planarfriction.identify.uncertainty import Uncertainty
 
 VAGUE = 0.3
-"""Standard error, as a share of the estimate, above which a parameter that must be > 0 counts as not told."""
+"""Standard error, as a share of the estimate, above which a parameter that must be > 0 counts as unknown."""
 
 TOGETHER = 0.98
-"""Correlation above which two parameters are told only together."""
+"""Correlation above which two parameters cannot be separated."""
 
 WELL = 0.02
-"""Standard error, as a share of the estimate, below which it does not matter what an estimate hangs together with."""
+"""Standard error, as a share of the estimate, below which it does not matter what an estimate is correlated with."""
 
 UNSEEN = 1.0
 """A parameter whose whole size moves no sample by this many spreads of the noise is not seen."""
 
 OF_TORQUE = ("contact_radius", "centre_x", "centre_y", *SOFT_FINGER)
-"""What the force tells only where the contact spins while it slides."""
+"""What the force depends on only where the contact spins while it slides."""
 
 GAP = 3.0
 """Sliding speeds with this ratio and no sample between leave a gap."""
@@ -81,7 +81,7 @@ class Evidence:
 def judge(
     evidence: Evidence, best: Candidate, candidates: Sequence[Candidate], skipped: Sequence[str]
 ) -> tuple[Verdict, ...]:
-    """The verdicts on the fit, then on all parameters: where it is rejected, none of them is told."""
+    """The verdicts on the fit, then on all parameters: where it is rejected, none of them is identifiable."""
     u, chosen, scores = best.uncertainty, best.score, [each.score for each in candidates]
     verdicts = [Verdict("fit", not u.rejected, _on_fit(u, chosen))]
     if len(scores) > 1:
@@ -121,7 +121,7 @@ def _on_fit(u: Uncertainty, chosen: ModelScore) -> str:
         usual = f"off by {u.strain:.0f} times what is usual"
         text = f"{chosen.model} is rejected: it fits only with a load cell that is {usual}"
     if u.neighbours > CORRELATED:
-        text += f", and hangs together in time (correlation {u.neighbours:.2f})"
+        text += f", and neighbouring residuals are correlated ({u.neighbours:.2f})"
     return f"{text}; the patch, the kind of bristles or the measurement is off, and intervals are no more than a hint"
 
 
@@ -144,14 +144,14 @@ def _parameter(evidence: Evidence, i: int) -> Verdict | None:
     if not kind.logarithmic and not np.isfinite(error):
         return Verdict(name, False, _why(evidence, i, seen))
     if kind.low == 0.0 and value < 1.96 * error:
-        return Verdict(name, True, f"not told from 0, at most {value + 1.96 * error:.3g} {kind.unit}")
+        return Verdict(name, True, f"cannot be distinguished from 0, at most {value + 1.96 * error:.3g} {kind.unit}")
     if (partner := _partner(evidence, i)) is not None:
         other, correlation = partner
         if not evidence.torque and not {name, other}.isdisjoint(OF_TORQUE):
-            text = f"told only together with {other} (correlation {correlation:.2f}): the torque would tell them apart"
+            text = f"cannot be separated from {other} (correlation {correlation:.2f}): that takes the torque"
             return Verdict(name, False, f"{text}, and tau is 0 throughout")
         if error > WELL * size:
-            return Verdict(name, True, f"hangs together with {other} (correlation {correlation:.2f})")
+            return Verdict(name, True, f"strongly correlated with {other} ({correlation:.2f})")
     return None
 
 
@@ -166,16 +166,16 @@ def _why(evidence: Evidence, i: int, seen: float) -> str:
     if name in SOFT_FINGER and name != "c" and evidence.loads.max() < ONE_LOAD * evidence.loads.min():
         return "one load only"
     if name in OF_TORQUE and not evidence.torque:
-        return "only the torque tells it, and tau is 0 throughout"
+        return "only the torque depends on it, and tau is 0 throughout"
     if seen < UNSEEN:
         return f"moves no sample by more than {seen:.2g} times the noise"
     if (partner := _partner(evidence, i)) is not None:
-        return f"told only together with {partner[0]} (correlation {partner[1]:.2f})"
+        return f"cannot be separated from {partner[0]} (correlation {partner[1]:.2f})"
     return f"its standard error is {100 * evidence.errors[i] / abs(evidence.values[i]):.0f} % of it"
 
 
 def _no_stribeck(evidence: Evidence) -> str:
-    """Why the Stribeck curve has no shape: mu_s is not told from mu_c."""
+    """Why the Stribeck curve has no shape: mu_s may be mu_c."""
     if "mu_s" not in evidence.names or "mu_c" not in evidence.names:
         return ""
     s, c = evidence.names.index("mu_s"), evidence.names.index("mu_c")
@@ -186,7 +186,7 @@ def _no_stribeck(evidence: Evidence) -> str:
         spread = np.sqrt(max(evidence.errors[s] ** 2 + evidence.errors[c] ** 2 - 2.0 * both, 0.0))
     if evidence.at_bound[s] or not excess > 1.96 * spread:
         gap = speed_gap(evidence.speeds, evidence.value("v_s", 1e-3))
-        return gap or "mu_s cannot be told from mu_c"
+        return gap or "mu_s cannot be distinguished from mu_c"
     return ""
 
 

@@ -24,7 +24,7 @@ def plot_identification(result: Identification) -> style.PlotFigure:
 
     Residuals of a good fit fill the band of two spreads of the noise and show no pattern. With wrenches, the friction
     coefficient over the sliding speed is drawn below with the fitted Stribeck curve: where it has no samples, the data
-    tell nothing. Beside it the correlation of the residuals over time, which that of noise leaves at zero. At the
+    say nothing. Beside it the correlation of the residuals over time, which that of noise leaves at zero. At the
     bottom what fits that saw neither a sample nor its block predict of it, over what was measured.
     """
     with_speed = "speed" in result.histories[0]
