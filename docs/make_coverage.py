@@ -122,7 +122,7 @@ def page(counts: dict[str, Count]) -> str:
         "parameters, all nuisance parameters free, one start. Each entry: seeds whose 95 % interval holds the true",
         "value, of those in which the parameter was called identifiable. The last columns: the share over all",
         "parameters, and seeds in which the fit was rejected; then no parameter is called identifiable. In the row of",
-        "the drift nobody knows when the load cell was right; the truth there is that of its first sample.",
+        "the drift it is unknown when the load cell was right; the truth there is that of its first sample.",
         "",
         f"| data | model | {' | '.join(NAMES)} | all | rejected |",
         "|---" * (len(NAMES) + 4) + "|",
