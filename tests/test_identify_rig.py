@@ -236,9 +236,9 @@ def test_a_load_cell_that_only_the_fit_needs_rejects_it():
 def test_a_table_fits_eighty_columns_and_a_repl(chosen):
     lines = chosen.table().splitlines()
     assert max(map(len, lines)) <= 80
-    assert lines[0].startswith("Told by the data: mu_c")
+    assert lines[0].startswith("Identified: mu_c")
     assert repr(chosen) == str(chosen) == chosen.table()
-    assert chosen._repr_html_().startswith("<pre>Told")
+    assert chosen._repr_html_().startswith("<pre>Identified")
 
 
 @pytest.mark.parametrize(
