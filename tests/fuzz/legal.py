@@ -35,7 +35,7 @@ SKIPPED = {
 
 RECORDS = """
     Rollout RolloutGradient RolloutSensitivities RolloutStates RolloutTangent SceneGradient SceneSensitivities
-    Identification Verdict MotionPlan Solution Progress
+    Identification Verdict MotionPlan GripPlan GripReport Solution Progress
     SurfaceComparison ModelJacobians PackedModel StepJacobians Statistics Integration
     LimitSurface FrictionLaw FrictionModel Pressure
 """

@@ -14,7 +14,7 @@ from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.planning.holding import holding_load
 from planarfriction.planning.motions import ROUGH, Aim, Grips, load_on
-from planarfriction.planning.report import GripReport
+from planarfriction.planning.report import GripReport, report_of
 from planarfriction.scenes import Scene, Signal
 
 LEVELS = (0.93, 0.85, 0.7, 0.5, 0.25, 0.02)
@@ -132,7 +132,7 @@ def plan_grip(
     profile = max(searches, key=lambda each: each.begin(kick, hold)).bent()
     outcomes = grips.outcomes(profile, seen, rtol=None)
     cost = grips.simulations, grips.jacobians, time.perf_counter() - begin
-    report = GripReport.of(wanted, seen, outcomes, float(profile.values[-1]), at_end, cost)
+    report = report_of(wanted, seen, outcomes, float(profile.values[-1]), at_end, cost)
     found = tuple(grips.scene_of(profile, factor) for factor in shares)
     return GripPlan(found[0], profile, report, chosen.name, found)
 

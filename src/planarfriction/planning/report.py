@@ -42,29 +42,6 @@ class GripReport(ByValue):
     wall_time: float
     """Time that it took [s]."""
 
-    @classmethod
-    def of(
-        cls, aim: Any, frictions: Sequence[float], outcomes: Sequence[Any], grip: float, holding: float, cost: Any
-    ) -> GripReport:
-        """Report of where a plan ends with each friction."""
-        end = dict(zip(frictions, outcomes, strict=True))
-        turns = aim.angle is not None
-        size = abs(aim.angle) if turns else float(np.hypot(*aim.slide))
-        moved = abs(aim.progress(end[1.01]) - aim.progress(end[0.99])) / 2.0 * size
-        return cls(
-            {"angle": aim.angle} if turns else {"slide": tuple(aim.slide.tolist())},
-            end[1.0].angle,
-            end[1.0].slide,
-            float(np.linalg.norm(end[1.0].speed * [1.0, 1.0, aim.radius])),
-            grip,
-            holding,
-            np.array(frictions),
-            np.array([each.angle for each in outcomes]),
-            np.array([each.slide for each in outcomes]),
-            moved,
-            *cost,
-        )
-
     @property
     def spread(self) -> float:
         """Largest miss of the goal over all frictions: angle [rad] or slide [m]."""
@@ -93,3 +70,26 @@ class GripReport(ByValue):
         return "\n".join(lines)
 
     __repr__ = __str__
+
+
+def report_of(
+    aim: Any, frictions: Sequence[float], outcomes: Sequence[Any], grip: float, holding: float, cost: Any
+) -> GripReport:
+    """Report of where a plan ends with each friction."""
+    end = dict(zip(frictions, outcomes, strict=True))
+    turns = aim.angle is not None
+    size = abs(aim.angle) if turns else float(np.hypot(*aim.slide))
+    moved = abs(aim.progress(end[1.01]) - aim.progress(end[0.99])) / 2.0 * size
+    return GripReport(
+        {"angle": aim.angle} if turns else {"slide": tuple(aim.slide.tolist())},
+        end[1.0].angle,
+        end[1.0].slide,
+        float(np.linalg.norm(end[1.0].speed * [1.0, 1.0, aim.radius])),
+        grip,
+        holding,
+        np.array(frictions),
+        np.array([each.angle for each in outcomes]),
+        np.array([each.slide for each in outcomes]),
+        moved,
+        *cost,
+    )
