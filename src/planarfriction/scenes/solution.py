@@ -28,6 +28,8 @@ from planarfriction.writing import replacing
 if TYPE_CHECKING:
     import xarray as xr
 
+    from planarfriction.scenes.slip import SlipEvent
+
 _SAFE = "".join(chr(i) for i in range(32, 127) if chr(i) != "%")
 """Characters of names that files keep as they are."""
 
@@ -136,6 +138,19 @@ class Solution:
         if contact is None:
             raise InvalidValueError("contact", f"be given where there are several ({', '.join(names)})", contact)
         return names.index(validation.choice("contact", contact, names))
+
+    def slip_events(self) -> tuple[SlipEvent, ...]:
+        """When each contact slips: onset, end, path and angle of each `SlipEvent`.
+
+        A contact slips while more than half of its motion is not taken up by its bristles, `|u - zdot| > |u|/2`, and
+        if it gets further than a full deflection mu_c/sigma_0: no speed decides. Onset and end lie between samples, on
+        straight lines. Bristles have to be recorded: `simulate(scene, bristles="all")`.
+
+        Raises InvalidValueError where they are not, FileError for a solution without its scene.
+        """
+        from planarfriction.scenes.slip import slip_events
+
+        return slip_events(self)
 
     def plot(self) -> Any:
         """Draw the motion of the body and the time histories; returns a matplotlib Figure.
