@@ -58,6 +58,7 @@ def figures() -> dict[str, plots.style.PlotFigure]:
         "in-hand-histories": plots.plot_histories(in_hand),
         "limit-surface": plots.plot_limit_surface(pf.LimitSurfaceExact(pads)),
         "pre-sliding-cycles": pre_sliding_cycles(),
+        "grip-plan": grip_plan(),
         "pressure-map": plots.plot_patch(fingertip(), normal_force=5.0),
     }
 
@@ -91,6 +92,13 @@ def pre_sliding_cycles() -> plots.style.PlotFigure:
         plots.style.tidy(axes)
         axes.legend()
     return figure
+
+
+def grip_plan() -> plots.style.PlotFigure:
+    """The plan of docs/grip-planning.md."""
+    model = pf.ReducedModel(pf.ContactPatch.disc(radius=0.01), LAW)
+    plate = pf.scenes.in_hand(model, centre_of_mass=(0.025, 0.0), normal_force=4.0, t_end=1.0)
+    return pf.planning.plan_grip(plate, {"angle": np.radians(-30.0)}).plot()
 
 
 def main(folder: Path) -> None:

@@ -28,7 +28,8 @@ SPANS = (0.75, 0.2)
 """Shares of the duration over which knots are spread: a short drop needs them close, a slow turn far apart."""
 
 ROUNDS, TRIES = 2, 16
-"""Rounds in which the worst friction gets more weight, and profiles that are tried in each."""
+"""Rounds in which the worst friction gets more weight, and profiles that are tried for one friction; for several half
+as many in each round."""
 
 MOST_KNOTS = 200
 
@@ -188,14 +189,15 @@ class _Search:
             rule = f"be a goal that the load takes the body to ({100.0 * self._reached:.3g} % of the way at most)"
             raise InvalidValueError(name, rule, goal)
         values, best, least = self._values, self._values, np.inf
-        for _ in range(1 if len(self._factors) == 1 else 1 + ROUNDS):
+        rounds, tries = (1, TRIES) if len(self._factors) == 1 else (1 + ROUNDS, TRIES // 2)
+        for _ in range(rounds):
             found = least_squares(
                 self._residuals,
                 values,
                 jac=self._slopes,  # pyright: ignore[reportArgumentType]
                 bounds=(self._low, np.full(len(values), self._high * (1.0 + 1e-6))),
                 x_scale=self._holding,
-                max_nfev=TRIES,
+                max_nfev=tries,
             )
             values = found.x
             misses = np.array([self._far(each) for each in self._grips.outcomes(self._signal(values), self._factors)])

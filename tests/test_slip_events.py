@@ -1,0 +1,70 @@
+"""When contacts slip, against closed forms and against what the scene does to them."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import planarfriction as pf
+from planarfriction.errors import FileError, InvalidValueError
+
+PATCH = pf.ContactPatch.disc(0.01, cells=7)
+LAW = pf.LuGre(mu_c=0.5, sigma_0=1e5, sigma_1=300.0, sigma_2=0.0, elasto_plastic=0.9)
+SOFT = pf.ContactPatch.rectangle(0.02, cells=7, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0))
+MODELS = [
+    pf.DistributedModel(PATCH, LAW),
+    pf.ReducedModel(PATCH, LAW),
+    pf.ReducedModel(PATCH, LAW, parts=3),
+    pf.ReducedModelPublished(PATCH, LAW),
+    pf.DistributedModel(SOFT, LAW),
+    pf.ReducedModelPublished(SOFT, LAW),
+]
+G = 9.81
+
+
+@pytest.mark.parametrize("model", MODELS, ids=lambda m: f"{type(m).__name__}-{m.state_shape}-{m.patch.name}")
+def test_a_block_slips_until_it_stops(model):
+    """From 0 to v/(mu g) over v^2/(2 mu g): to a recording interval, and to a full deflection of 5 um."""
+    scene = pf.scenes.free_slide(model, mass=0.5, twist=(0.1, 0.0, 0.0), save_every=1e-4, t_end=0.03)
+    scene = dataclasses.replace(scene, start="sliding", stop_speed=None)
+    (event,) = pf.simulate(scene, bristles="all").slip_events()
+    assert (event.contact, event.onset) == ("table", 0.0)
+    assert event.end == pytest.approx(0.1 / (0.5 * G), abs=2e-4)
+    assert event.path == pytest.approx(0.1**2 / (2 * 0.5 * G), abs=5e-6)
+    assert event.angle == pytest.approx(0.0, abs=1e-12)
+
+
+def test_each_push_beyond_friction_is_one_slip_and_one_below_is_none():
+    force = pf.Signal([0.0, 0.02, 0.05, 0.07, 0.1], np.outer([0.3, 1.2, 0.3, 1.2, 0.3], [0.5 * G, 0.0, 0.0]))
+    body = pf.Body(1.0, 1e-3, gravity=(0.0, 0.0))
+    table = pf.Contact(MODELS[0], G, name="table")
+    scene = pf.Scene(body, [table], 0.2, force=force, save_every=5e-4, start="equilibrium")
+    events = pf.simulate(scene, bristles="all").slip_events()
+    assert len(events) == 2
+    for event, begin, end in zip(events, (0.02, 0.07), (0.05, 0.1), strict=True):
+        assert begin < event.onset < begin + 0.005  # after a few milliseconds the bristles are full
+        # 0.2 mu g for 30 ms less those, and then stopped by 0.7 mu g
+        assert end < event.end < end + 0.03 * 0.2 / 0.7 + 1e-3
+    shaken = dataclasses.replace(scene, force=pf.Signal([0.0, 0.02, 0.05], np.outer([0.3, 0.85, 0.3], [0.5 * G, 0, 0])))
+    assert pf.simulate(shaken, bristles="all").slip_events() == ()
+
+
+def test_slow_is_not_stuck():
+    """A contact that is dragged at a hundredth of v_s slips from its first full deflection on."""
+    speed = 1e-5
+    scene = pf.scenes.driven(pf.ReducedModel(PATCH, LAW), twist=(speed, 0.0, 0.0), t_end=3.0)
+    (event,) = pf.simulate(scene, bristles="all").slip_events()
+    full = 0.5 / 1e5 / speed
+    assert 0.9 * full < event.onset < full * 1.1
+    assert event.end == 3.0
+    assert event.path == pytest.approx(speed * (3.0 - event.onset), rel=1e-6)
+
+
+def test_what_slip_events_need_is_said_in_one_line(tmp_path):
+    solution = pf.simulate(pf.scenes.driven(MODELS[0], t_end=0.02))
+    with pytest.raises(InvalidValueError, match="bristles must be recorded for slip events"):
+        solution.slip_events()
+    with pytest.raises(FileError, match="no scene"):
+        dataclasses.replace(solution, scene=None).slip_events()
