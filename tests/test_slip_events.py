@@ -51,6 +51,16 @@ def test_each_push_beyond_friction_is_one_slip_and_one_below_is_none():
     assert pf.simulate(shaken, bristles="all").slip_events() == ()
 
 
+def test_bristles_that_give_way_are_no_slip():
+    """Plain LuGre at 0.7 of what friction holds: most of each small motion is lost, but none goes a full deflection."""
+    force = pf.Signal([0.0, 0.02, 0.05], np.outer([0.7, 0.8, 0.7], [0.5 * G, 0.0, 0.0]))
+    plain = dataclasses.replace(LAW, elasto_plastic=None)
+    table = pf.Contact(pf.ReducedModel(PATCH, plain), G, name="table")
+    body = pf.Body(1.0, 1e-3, gravity=(0.0, 0.0))
+    scene = pf.Scene(body, [table], 0.1, force=force, save_every=5e-4, start="equilibrium")
+    assert pf.simulate(scene, bristles="all").slip_events() == ()
+
+
 def test_slow_is_not_stuck():
     """A contact that is dragged at a hundredth of v_s slips from its first full deflection on."""
     speed = 1e-5

@@ -138,6 +138,10 @@ def test_starts_that_make_no_sense_are_refused():
         dataclasses.replace(scene, body=moving)
     with pytest.raises(InvalidValueError, match="not be zero where start is 'sliding'"):
         dataclasses.replace(scene, start="sliding")
+    running = dataclasses.replace(scene.contacts[0], velocity=(0.1, 0.0, 0.0))
+    with pytest.raises(InvalidValueError, match="velocity of contact 'fingers' must be zero at first"):
+        dataclasses.replace(scene, contacts=[running])
+    assert dataclasses.replace(scene, contacts=[running], start="sliding").start == "sliding"
     driven = pf.scenes.driven(MODELS[0], t_end=0.1)
     with pytest.raises(InvalidValueError, match="velocity is prescribed"):
         dataclasses.replace(driven, start="equilibrium")

@@ -253,6 +253,9 @@ def _contact_of(scene: Any, name: str | None) -> int:
         raise InvalidValueError("start", "be 'rest' for a plan, whose derivatives begin there", scene.start)
     if scene.stop_speed is not None:
         raise InvalidValueError("stop_speed", "be None for a plan, which has to hold until the end", scene.stop_speed)
+    for each in scene.contacts:
+        if each.velocity is not None:
+            raise InvalidValueError(f"velocity of contact {each.name!r}", "be None for a grip plan", each.velocity)
     names = [each.name for each in scene.contacts]
     if name is None and len(names) > 1:
         raise InvalidValueError("contact", f"be given where there are several ({', '.join(names)})", name)

@@ -186,13 +186,16 @@ class Scene(ByValue):
 
     def _check_start(self) -> None:
         validation.choice("start", self.start, STARTS)
-        velocity = self.body.velocity if self.velocity is None else self.velocity(0.0).tolist()
+        driven = {"the body": self.body.velocity if self.velocity is None else self.velocity(0.0).tolist()}
+        driven |= {f"contact {c.name!r}": c.velocity(0.0).tolist() for c in self.contacts if c.velocity is not None}
+        moves = [name for name, velocity in driven.items() if any(velocity)]
         if self.start == "equilibrium" and self.velocity is not None:
             raise InvalidValueError("start", "be 'rest' or 'sliding' where the velocity is prescribed", self.start)
-        if self.start == "equilibrium" and any(velocity):
-            raise InvalidValueError("velocity of the body", "be zero where start is 'equilibrium'", velocity)
-        if self.start == "sliding" and not any(velocity):
-            raise InvalidValueError("initial velocity", "not be zero where start is 'sliding'", velocity)
+        if self.start == "equilibrium" and moves:
+            rule = "be zero at first where start is 'equilibrium'"
+            raise InvalidValueError(f"velocity of {moves[0]}", rule, driven[moves[0]])
+        if self.start == "sliding" and not moves:
+            raise InvalidValueError("initial velocity", "not be zero where start is 'sliding'", driven["the body"])
 
     def breaks(self, t_end: float | None = None) -> np.ndarray:
         """Times [s] from 0 to `t_end` (default: the scene's) at which any signal jumps or bends, both ends included.
