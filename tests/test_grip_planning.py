@@ -72,6 +72,19 @@ def test_a_plate_slides_by_ten_millimetres_without_turning(offset):
     assert abs(end["vy"]) < 1e-9
 
 
+def held_at_first(grip: float) -> pf.Scene:
+    scene = pf.scenes.in_hand(MODEL, centre_of_mass=(0.025, 0.0), normal_force=grip, t_end=1.0)
+    return dataclasses.replace(scene, start="equilibrium")
+
+
+def test_a_plan_goes_on_from_the_grip_that_holds_the_plate():
+    plan = plan_grip(held_at_first(5.0), {"angle": -HALF})
+    assert plan.signal.values[0] == pytest.approx(5.0, rel=1e-5)
+    data = pf.simulate(plan.scene).data
+    assert math.degrees(float(data.theta[-1])) == pytest.approx(-30.0, abs=0.05)
+    assert abs(float(data.omega[-1])) < 1e-9
+
+
 def test_the_report_says_what_friction_does():
     """Its frictions are those of scenes whose law is scaled, and one percent is the slope between them."""
     report = turning().report
@@ -124,8 +137,9 @@ def test_goals_and_scenes_that_cannot_be_planned_are_refused_in_one_line():
         'goal must be {"angle"': lambda: plan_grip(plate(), {"angle": 1.0, "slide": (0, 1)}),
         "goal key must be one of angle, slide": lambda: plan_grip(plate(), {"turn": 1.0}),
         "goal must not be zero": lambda: plan_grip(plate(), {"angle": 0.0}),
-        "start must be 'rest' for a plan": lambda: plan_grip(
-            dataclasses.replace(plate(), start="equilibrium"), {"angle": -1.0}
+        "contacts do not hold the body": lambda: plan_grip(held_at_first(2.0), {"angle": -1.0}),
+        "start must be 'rest' or 'equilibrium'": lambda: plan_grip(
+            dataclasses.replace(pf.scenes.free_slide(MODEL), stop_speed=None, start="sliding"), {"angle": -1.0}
         ),
         "bounds must reach": lambda: plan_grip(plate(), {"angle": -HALF}, bounds=(0.1, 4.0)),
         "bounds must be the least": lambda: plan_grip(plate(), {"angle": -HALF}, bounds=(4.0, 2.0)),

@@ -147,10 +147,40 @@ def test_starts_that_make_no_sense_are_refused():
         dataclasses.replace(driven, start="equilibrium")
 
 
+def held_by_two(change: str = "", by: float = 0.0) -> pf.Scene:
+    """A plate in equilibrium on two pads, some of whose cells are bent as far as they can be, that then slips."""
+    more = {name: by * (name == change) for name in ("grip", "push", "mass")}
+    grip = pf.Signal([0.0, 0.02, 0.06], [2.6 + more["grip"], 1.0, 3.6], "linear")
+    pads = [
+        pf.Contact(pf.ReducedModel(PATCH, LAW), grip, count=2, name="grip"),
+        pf.Contact(pf.DistributedModel(PATCH, PLAIN), 0.3, position=(0.05, 0.01), name="other"),
+    ]
+    body = pf.Body(0.2 * (1.0 + more["mass"]), 4e-4, (0.015, 0.0))
+    push = pf.Signal([0.0, 0.06], [[more["push"], 0.0, 0.0], [0.0, 0.0, 0.0]], "linear")
+    return pf.Scene(body, pads, 0.06, force=push, save_every=0.06, start="equilibrium")
+
+
+def test_derivatives_follow_an_equilibrium():
+    """Central differences of tight runs, right to 1e-6 of the largest, of a knot at t = 0, a push and the mass."""
+    knots = {"grip.normal_force": np.array([0.0, 0.02, 0.06]), "force": np.array([0.0, 0.06])}
+    found = pf.autodiff.scene_sensitivities(held_by_two(), ("mass", "inertia"), signals=knots)
+
+    def end(change: str, by: float) -> np.ndarray:
+        histories = pf.simulate(held_by_two(change, by), rtol=1e-10, atol=1e-10).histories
+        return np.array([float(histories[name].values[-1]) for name in ("vx", "vy", "omega", "x", "y", "theta")])
+
+    for change, name in (("grip", "grip.normal_force[0]"), ("push", "force[0].fx"), ("mass", "mass")):
+        difference = (end(change, 1e-5) - end(change, -1e-5)) / 2e-5
+        slope = found.d_motion[-1, :, found.names.index(name)]
+        assert slope == pytest.approx(difference, abs=3e-6 * np.abs(difference).max())
+
+
 def test_derivatives_to_what_moves_the_start_are_refused():
     scene, knots = held(pf.ReducedModel(PATCH, LAW)), np.array([0.0, 0.05])
-    for parameters, signals in ((["mu"], {}), ((), {"fingers.normal_force": knots})):
-        with pytest.raises(InvalidValueError, match="start must be 'rest' for the derivative to"):
-            pf.autodiff.scene_sensitivities(scene, parameters, signals=signals)
+    with pytest.raises(InvalidValueError, match="start must be 'rest' for the derivative to mu"):
+        pf.autodiff.scene_sensitivities(scene, ["mass", "mu"])
+    thrown = dataclasses.replace(pf.scenes.free_slide(scene.contacts[0].model, twist=(0.1, 0.0, 1.0)), start="sliding")
+    with pytest.raises(InvalidValueError, match=r"for the derivative to table.normal_force\[0\]"):
+        pf.autodiff.scene_sensitivities(thrown, (), signals={"table.normal_force": knots})
     with pytest.raises(InvalidValueError, match="start must be 'rest' for the derivative to vx"):
         pf.autodiff.scene_gradient(scene, lambda time, motion: 0.0 * motion, initial=["vx"])

@@ -37,6 +37,9 @@ STATES = ("vx", "vy", "omega", "x", "y", "theta")
 MOST_KNOTS = 1000
 """Knots of a signal: each has a derivative of all states."""
 
+_OF_EQUILIBRIUM = (tangent.NORMAL_FORCE, tangent.FORCE, tangent.LOAD, tangent.MASS)
+"""What changes how bristles start that carry the load, and whose derivative is known."""
+
 _COLUMNS = {"force": ("fx", "fy", "tau"), "velocity": STATES[:3]}
 
 
@@ -97,9 +100,6 @@ class Columns:
             sources.append(np.stack([np.full(len(each), s), each], axis=1))
             self.of[knots.name] = slice(first, len(plain))
         self.names = tuple(name for name, _, _ in plain)
-        say = [knots.hats(0.0)[k] for knots in self._knots for k in range(len(knots.times)) for _ in knots.components]
-        self.of_start = [name for name, share in zip(self.names, [1.0] * len(begins[0]) + say, strict=True) if share]
-        """Names of those that have a say at t = 0."""
         begin = np.concatenate(begins)
         self._order = np.argsort(begin, kind="stable")
         self._begin, source = begin[self._order], np.concatenate(sources)[self._order].astype(int)
@@ -133,6 +133,33 @@ class Columns:
             elif kind == tangent.INITIAL:
                 self._scale[p] = max(start[place], natural[place])
                 slope[p, slope.shape[1] - 6 + place] = self._scale[p]
+        if scene.start != "rest":
+            self._start_held(scene, windows, slope)
+
+    def _start_held(self, scene: Scene, windows: Windows, slope: np.ndarray) -> None:
+        """Write the derivatives of bristles that carry the load at the start; refuse those of others."""
+        count = len(slope)
+        say = self._drives.kind != tangent.INERTIA
+        for (columns, knot), knots in zip(self._sources, self._knots, strict=True):
+            say[columns] = knots.hats(0.0)[knot] != 0.0
+        kinds = _OF_EQUILIBRIUM if scene.start == "equilibrium" else ()
+        refused = np.flatnonzero(say & ~np.isin(self._drives.kind, kinds))
+        if len(refused):
+            name = self.names[self._order[refused[0]]]
+            rule = f"be 'rest' for the derivative to {name}, which has a say in how the bristles start"
+            raise InvalidValueError("start", rule, scene.start)
+        d_loads, d_pull = np.zeros((count, len(scene.contacts))), np.zeros((count, 3))
+        for p in np.flatnonzero(say):
+            kind, place = self._drives.kind[p], self._drives.place[p]
+            if kind == tangent.LOAD:
+                d_loads[p] = [float(contact.normal_force(0.0)) for contact in scene.contacts]
+            elif kind == tangent.MASS:
+                d_pull[p, :2] = scene.body.mass * np.array(scene.body.gravity)
+        for (columns, knot), knots in zip(self._sources, self._knots, strict=True):
+            share, place = knots.hats(0.0)[knot], self._drives.place[columns]
+            changes = d_loads if knots.kind == tangent.NORMAL_FORCE else d_pull
+            changes[columns, place] = self._scale[columns] * share
+        slope[:, :-6] = windows.first_slopes(d_loads, d_pull) if count else slope[:, :-6]
 
     def enter(self, system: System) -> None:
         """Take the pieces of the window that comes next."""

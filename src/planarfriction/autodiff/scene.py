@@ -106,9 +106,6 @@ def prepared(scene: Scene, columns: Columns, t_end, rtol, atol, save_every) -> t
     every = scene.save_every if save_every is None else validation.positive("save_every", save_every)
     for contact in scene.contacts:
         refuse_anisotropy(contact.model.patch, "scene_sensitivities")
-    if scene.start != "rest" and columns.of_start:
-        rule = f"be 'rest' for the derivative to {columns.of_start[0]}, which has a say in how the bristles start"
-        raise InvalidValueError("start", rule, scene.start)
     rtol = validation.positive("rtol", rtol)
     absolute = rtol if atol is None else validation.positive("atol", atol)
     times = recording_times(end, every)

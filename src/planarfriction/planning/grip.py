@@ -79,7 +79,8 @@ def plan_grip(
     Parameters
     ----------
     scene
-        A free body, its contacts and the duration; bristles start at rest.
+        A free body, its contacts and the duration. With `start="equilibrium"` the grip begins with the scene's own
+        normal force, which has to hold the body; with bristles at rest it begins as is best.
     goal
         `{"angle": radians}`: turn by that angle, and slide as little as can be; or `{"slide": (dx, dy)}`: slide by that
         much [m], world axes, and turn as little as can be. Slide is that of the place under the grip.
@@ -144,11 +145,16 @@ class _Search:
     def __init__(
         self, grips: Grips, aim: Aim, factors: Sequence[float], times: np.ndarray, between: tuple, holding: float
     ) -> None:
-        low, least, self._high = between
+        low, least, high = between
+        self._high = high
         held = times >= SPANS[0] * grips.scene.t_end
         held[-1] = True
         self._grips, self._aim, self._factors, self._times = grips, aim, factors, times
-        self._low, self._holding = np.where(held, least, low), holding
+        self._low, self._highest = np.where(held, least, low), np.full(len(times), high * (1.0 + 1e-6))
+        self._first = grips.first
+        if self._first is not None:  # whoever holds the body at first goes on from there
+            self._low[0], self._highest[0] = self._first * (1.0 - 1e-6), self._first * (1.0 + 1e-6)
+        self._holding = holding
         self._bend = ROUGH / holding * np.diff(np.eye(len(times)), 2, axis=0)
         self._weights = np.full(len(factors), 1.0 / len(factors))
         self._values = np.zeros(0)
@@ -163,7 +169,9 @@ class _Search:
 
         found = []
         for level in LEVELS:
-            profile = _Release(self._times, level * self._holding, kick * self._holding, hold)
+            low = np.array([min(level, kick), level]) * self._holding
+            low = low if self._first is None else np.append(self._first, low)
+            profile = _Release(self._times, low, hold)
 
             def missing(until: float, profile: _Release = profile) -> float:
                 (outcome,) = self._grips.outcomes(self._signal(self._inside(profile(until))), [1.0])
@@ -195,7 +203,7 @@ class _Search:
                 self._residuals,
                 values,
                 jac=self._slopes,  # pyright: ignore[reportArgumentType]
-                bounds=(self._low, np.full(len(values), self._high * (1.0 + 1e-6))),
+                bounds=(self._low, self._highest),
                 x_scale=self._holding,
                 max_nfev=tries,
             )
@@ -213,7 +221,8 @@ class _Search:
         return float(np.linalg.norm(self._aim.misses(outcome)))
 
     def _inside(self, values: np.ndarray) -> np.ndarray:
-        return np.clip(values, self._low + 1e-6 * self._high, self._high)
+        inside = 1e-2 * np.minimum(self._highest - self._low, 1e-4 * self._high)
+        return np.clip(values, self._low + inside, self._highest - inside)
 
     def _residuals(self, values: np.ndarray) -> np.ndarray:
         outcomes = self._grips.outcomes(self._signal(values), self._factors)
@@ -228,12 +237,12 @@ class _Search:
 
 
 class _Release:
-    """A profile that begins low, goes on at a level until some time, and then holds."""
+    """A profile that begins with the values `low`, goes on at the last of them until some time, and then holds."""
 
-    def __init__(self, times: np.ndarray, level: float, kick: float, hold: float) -> None:
+    def __init__(self, times: np.ndarray, low: np.ndarray, hold: float) -> None:
         self._times, self._hold = times, hold
         self._rise = float(np.diff(times).max())
-        self._low = np.interp(times, [times[0], times[0] + self._rise], [min(level, kick), level])
+        self._low = np.interp(times, times[0] + self._rise * np.arange(len(low)), low)
         self.earliest, self.latest = float(times[0]) - self._rise, float(times[-1]) - self._rise
 
     def __call__(self, until: float) -> np.ndarray:
@@ -249,8 +258,8 @@ def _contact_of(scene: Any, name: str | None) -> int:
     validation.instance("scene", scene, Scene, "a Scene")
     if scene.velocity is not None:
         raise InvalidValueError("velocity", "be None for a body that a grip moves", scene.velocity)
-    if scene.start != "rest":
-        raise InvalidValueError("start", "be 'rest' for a plan, whose derivatives begin there", scene.start)
+    if scene.start == "sliding":
+        raise InvalidValueError("start", "be 'rest' or 'equilibrium' for a grip plan", scene.start)
     if scene.stop_speed is not None:
         raise InvalidValueError("stop_speed", "be None for a plan, which has to hold until the end", scene.stop_speed)
     for each in scene.contacts:

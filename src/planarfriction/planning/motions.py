@@ -80,6 +80,9 @@ class Grips:
         self.scene, self.index = scene, contact
         self.name = f"{scene.contacts[contact].name}.normal_force"
         self._members = {factor: [with_friction(each, factor) for each in scene.contacts] for factor in factors}
+        held = scene.start == "equilibrium"
+        self.first = float(scene.contacts[contact].normal_force(0.0)) if held else None
+        """Normal force that holds the body at first [N]; None where it may be any."""
         self.simulations = self.jacobians = 0
 
     def scene_of(self, profile: Signal, factor: float = 1.0) -> Scene:

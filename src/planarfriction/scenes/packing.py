@@ -15,7 +15,7 @@ from planarfriction.kernels.pointers import place_of
 from planarfriction.models.base import PackedModel
 from planarfriction.scenes.movers import displacement
 from planarfriction.scenes.signal import SAME_TIME, Signal, breaks_between
-from planarfriction.scenes.start import first_states
+from planarfriction.scenes.start import first_slopes, first_states
 
 SHAPE_INTERVAL = 1e-3
 """Longest time [s] that a patch keeps its shape while the load it depends on changes; held loads need no limit."""
@@ -187,12 +187,24 @@ class Windows:
 
     def _first(self) -> np.ndarray:
         """The bristles with which the scene starts, those that the solver has."""
-        shaped = np.array([self._pieces.held(c, np.zeros(1, np.int64))[0] for c in range(len(self.models))])
-        states = first_states(self._scene, shaped)
-        if states is None:
-            return np.zeros(self._contacts.state[-1])
-        chosen = [each if m.cells is None else each[:, m.cells] for each, m in zip(states, self.models, strict=True)]
-        return np.concatenate([each.ravel() for each in chosen])
+        states = first_states(self._scene, self._shaped)
+        return (
+            np.zeros(self._contacts.state[-1]) if states is None else self._flat([state[None] for state in states])[0]
+        )
+
+    def first_slopes(self, d_loads: np.ndarray, d_pull: np.ndarray) -> np.ndarray:
+        """Changes of those of an equilibrium, `[K, n]`; see `start.first_slopes`."""
+        return self._flat(first_slopes(self._scene, self._shaped, d_loads, d_pull))
+
+    @property
+    def _shaped(self) -> np.ndarray:
+        """Loads whose shapes the contacts have at first [N]."""
+        return np.array([self._pieces.held(c, np.zeros(1, np.int64))[0] for c in range(len(self.models))])
+
+    def _flat(self, states: list[np.ndarray]) -> np.ndarray:
+        """States `[K, *state_shape]` of the contacts as the solver has them, `[K, n]`."""
+        chosen = [each if m.cells is None else each[..., m.cells] for each, m in zip(states, self.models, strict=True)]
+        return np.concatenate([each.reshape(len(each), -1) for each in chosen], axis=1)
 
     def __iter__(self) -> Iterator[System]:
         while self._ready is not None or self._done < self._pieces.count:

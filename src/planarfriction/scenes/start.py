@@ -35,6 +35,36 @@ def first_states(scene: Any, shaped: np.ndarray) -> list[np.ndarray] | None:
     return _sliding(scene, shaped) if scene.start == "sliding" else _equilibrium(scene, loads, shaped)
 
 
+def first_slopes(scene: Any, shaped: np.ndarray, d_loads: np.ndarray, d_pull: np.ndarray) -> list[np.ndarray]:
+    """Changes of the first states `[K, *state_shape]` of an equilibrium, per contact, with K changes of what is held.
+
+    `d_loads` `[K, C]` are those of the normal forces [N], `d_pull` `[K, 3]` those of the load on the body. Bristles
+    follow the motion to which the body is pulled on, but for those bent as far as they can be, which only turn.
+    """
+    loads = np.array([float(contact.normal_force(0.0)) for contact in scene.contacts])
+    each, pull = _held_by(scene, loads, np.where(loads > 0.0, shaped, 0.0))
+    cells = _Cells.together(each)
+    bent, slope = cells.bent(_least_energy(cells, pull))
+    ends = np.cumsum([len(one.stiffness) for one in each])[:-1]
+    share = np.concatenate(
+        [
+            np.tile(d[:, None], len(one.stiffness)) / (load or 1.0)
+            for d, load, one in zip(d_loads.T, loads, each, strict=True)
+        ],
+        axis=1,
+    )
+    held = np.einsum("kn,n,nij,ni->kj", share, cells.stiffness, cells.levers, bent)
+    stiff = np.einsum("n,nia,nij,njb->ab", cells.stiffness, cells.levers, slope, cells.levers)
+    motions = np.linalg.lstsq(stiff, (d_pull - held).T, rcond=None)[0]
+    changes = np.split(np.einsum("nij,njb,bk->kni", slope, cells.levers, motions), ends, axis=1)
+    found = []
+    for contact, change, load in zip(scene.contacts, changes, shaped, strict=True):
+        model = contact.model
+        states = [model.state_of(row.T, load) if load > 0.0 else model.rest() for row in change]
+        found.append(np.array(states).reshape(len(change), *model.state_shape))
+    return found
+
+
 def contact_map(scene: Any, contact: Any) -> np.ndarray:
     """`A` `[3, 3]` of `V = A u` at t = 0: the twist of a contact from the velocity of the body."""
     body, (dx, dy), angle = scene.body, contact.position, contact.angle
@@ -81,6 +111,11 @@ class _Cells(NamedTuple):
     middle: np.ndarray
     """Where each bristle would be as far from its largest deflection in all directions `[n, 2]` [m]."""
 
+    @classmethod
+    def together(cls, each: Any) -> _Cells:
+        """Those of several contacts."""
+        return cls(*(np.concatenate(parts) for parts in zip(*each, strict=True)))
+
     def bent(self, motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Deflections `[n, 2]` after a small motion of the body `[3]`, and their slopes `[n, 2, 2]` by the stretch."""
         way = self.levers @ motion - self.middle
@@ -103,19 +138,25 @@ def _equilibrium(scene: Any, loads: np.ndarray, shaped: np.ndarray) -> list[np.n
     `zhat(d)` the nearest to `B_i d` that a bristle can be, the motion d makes `int sum k_i zhat_i dB_i d - P.d` least.
     That is the rule by which contacts share what statics leaves open.
     """
+    each, pull = _held_by(scene, loads, shaped)
+    cells = _Cells.together(each)
+    bent = cells.bent(_least_energy(cells, pull))[0]
+    ends = np.cumsum([len(one.stiffness) for one in each])[:-1]
+    states = []
+    for contact, part, load in zip(scene.contacts, np.split(bent, ends), shaped, strict=True):
+        model = contact.model
+        states.append(model.state_of(part.T, load) if load > 0.0 else model.rest())
+    return states
+
+
+def _held_by(scene: Any, loads: np.ndarray, shaped: np.ndarray) -> tuple[list[_Cells], np.ndarray]:
+    """The cells of each contact, and the load on the body that they hold."""
     for contact in scene.contacts:
         if contact.model.law.numbers.creep_speed > 0.0:
             raise InvalidValueError("start", "be 'rest' or 'sliding' with a law that creeps", scene.start)
     applied = np.zeros(3) if scene.force is None else scene.force(0.0)
     pull = applied + scene.body.mass * np.array([*scene.body.gravity, 0.0])
-    cells = [_cells_of(scene, *each) for each in zip(scene.contacts, loads, shaped, strict=True)]
-    bent = _least_energy(_Cells(*(np.concatenate(each) for each in zip(*cells, strict=True))), pull)
-    ends = np.cumsum([len(each.stiffness) for each in cells])[:-1]
-    states = []
-    for contact, each, load in zip(scene.contacts, np.split(bent, ends), shaped, strict=True):
-        model = contact.model
-        states.append(model.state_of(each.T, load) if load > 0.0 else model.rest())
-    return states
+    return [_cells_of(scene, *each) for each in zip(scene.contacts, loads, shaped, strict=True)], pull
 
 
 def _cells_of(scene: Any, contact: Any, load: float, shaped: float) -> _Cells:
@@ -129,7 +170,7 @@ def _cells_of(scene: Any, contact: Any, load: float, shaped: float) -> _Cells:
 
 
 def _least_energy(cells: _Cells, pull: np.ndarray) -> np.ndarray:
-    """Deflections `[n, 2]` that carry a load `[3]`; raises where none do."""
+    """The motion `[3]` after which bristles carry a load `[3]`; raises where none does."""
     elastic = np.einsum("n,nia,nib->ab", cells.stiffness, cells.levers, cells.levers)
     scale = 1.0 / np.sqrt(np.where(np.diagonal(elastic) > 0.0, np.diagonal(elastic), 1.0))
     scaled = elastic * np.outer(scale, scale)
@@ -143,7 +184,7 @@ def _least_energy(cells: _Cells, pull: np.ndarray) -> np.ndarray:
         friction = "" if at_most is None else f" (they hold {100.0 * at_most:.3g} % of the load at most)"
         rule = f"be 'rest' or 'sliding' where the contacts do not hold the body{friction}"
         raise InvalidValueError("start", rule, "equilibrium")
-    return bent
+    return motion
 
 
 def _free(cells: _Cells, motion: np.ndarray) -> np.ndarray:
