@@ -19,6 +19,7 @@ PATCH = pf.ContactPatch.disc(0.01, 5)
 SOFT = pf.ContactPatch.disc(0.01, 5, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0))
 TWISTS = np.linspace([0.0, 0.0, 0.1], [0.01, 0.005, 1.0], 20)
 TIMES = np.linspace(0.0, 0.19, 20)
+SQUARE = [(-0.01, -0.01), (0.01, -0.01), (0.01, 0.01), (-0.01, 0.01)]
 
 SKIPPED = {
     "warm_up": "compiles for minutes",
@@ -28,6 +29,7 @@ SKIPPED = {
     "FrictionError": "an error",
     "identify.identify_motion": "fits for seconds; its logs are attacked as files",
     "planning.plan_grip": "plans for a second; tests/test_grip_planning.py attacks it",
+    "planning.plan_push": "plans for seconds; tests/test_pushing.py attacks it",
     "identify.identify_lugre": "fits for seconds; its logs are attacked as files",
     "identify.known_so_far": "takes what a fit returns",
 }
@@ -35,7 +37,7 @@ SKIPPED = {
 
 RECORDS = """
     Rollout RolloutGradient RolloutSensitivities RolloutStates RolloutTangent SceneGradient SceneSensitivities
-    Identification Verdict MotionPlan GripPlan GripReport Solution Progress
+    Identification Verdict MotionPlan GripPlan GripReport Push PushPlan PushReport Solution Progress
     SurfaceComparison ModelJacobians PackedModel StepJacobians Statistics Integration
     LimitSurface FrictionLaw FrictionModel Pressure
 """
@@ -125,6 +127,14 @@ def objects() -> dict[str, Any]:
 
 
 SPECIAL: dict[str, dict[str, Any]] = {
+    "planning.motion_cone": {"at": (-0.01, 0.002), "normal": (1.0, 0.0)},
+    "planning.push": {
+        "slider": Fresh(lambda: pf.planning.Slider(pf.LimitSurfaceEllipsoid(PATCH), SQUARE)),
+        "pusher": Fresh(lambda: pf.planning.Pusher(0.3)),
+        "path": pf.Signal.sampled([0.0, 1.0], [[-0.015, 0.0], [-0.005, 0.002]], "linear"),
+        "start": (0.0, 0.0, 0.0),
+        "samples": 5,
+    },
     "PressureMaps": {"values": np.ones((2, 3))},
     "patch.PerCell": {"values": [1.0, 2.0, 3.0]},
     "ContactPatch.from_pressure": {"pressure": np.ones((3, 3)), "loads": None},

@@ -1,7 +1,24 @@
-"""Plans: what to do with a grip so that a part ends where it should."""
+"""Plans: what to do with a grip, or with a pusher, so that a part ends where it should."""
 
+from planarfriction.planning.contact_modes import motion_cone
 from planarfriction.planning.grip import GripPlan, plan_grip
 from planarfriction.planning.holding import holding_load
+from planarfriction.planning.push_plans import PushPlan, PushReport, plan_push
+from planarfriction.planning.pushing import Push, push
 from planarfriction.planning.report import GripReport
+from planarfriction.planning.slider import Pusher, Slider
 
-__all__ = ["GripPlan", "GripReport", "holding_load", "plan_grip"]
+__all__ = [
+    "GripPlan",
+    "GripReport",
+    "Push",
+    "PushPlan",
+    "PushReport",
+    "Pusher",
+    "Slider",
+    "holding_load",
+    "motion_cone",
+    "plan_grip",
+    "plan_push",
+    "push",
+]

@@ -1,0 +1,177 @@
+"""Which way a slider goes at this instant: it sticks to the pusher, or the pusher slides left or right along it.
+
+A force `f` at a place of the slider has the wrench `F = (f, r x f)`; friction balances it, so that the twist is normal
+to the limit surface at F. The velocity of that place turns with the force, monotonically, since it is the normal to a
+section of the convex surface: the forces of the pusher's friction cone have the velocities of the **motion cone**.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.limit_surface import LimitSurface
+
+STICK, LEFT, RIGHT = "stick", "slide left", "slide right"
+"""What a pusher does that pushes; left and right as it looks."""
+
+
+_BEYOND = 0.1
+"""How far beyond the friction cone a force is looked for that makes a pusher stick [rad], so that a step of an
+integrator may go beyond the end of the mode."""
+
+
+_EDGE = 1.0 - 1e-9
+"""Share of its half width from which on a face is pressed at its end, as far as rounding can say."""
+
+
+class Place(NamedTuple):
+    """Where a slider is touched, in its own axes."""
+
+    at: np.ndarray
+    """`[2]` [m]"""
+    normal: np.ndarray
+    """Unit vector into the slider `[2]`."""
+    half_width: float = 0.0
+    """Of a face that lies flush [m]; `at` is its middle."""
+
+
+class Motion(NamedTuple):
+    """How a slider moves."""
+
+    twist: np.ndarray
+    """Twist of the slider about its frame's origin, in its own axes `[3]`."""
+    mode: str
+    """`STICK`, `LEFT` or `RIGHT`."""
+    slack: float
+    """How far the mode is from its end: an angle [rad], or a share of the face [-]."""
+    force: np.ndarray
+    """Direction of the pusher's force `[2]`, in the slider's axes."""
+    leans: int = 0
+    """A face that cannot stay flush: 1 where it turns about its left end, -1 about its right one."""
+
+
+def motion_cone(surface: LimitSurface, at, normal, mu: float) -> np.ndarray:
+    """Edges of the motion cone `[2, 2]`: velocities of a slider's place for the friction cone's right and left edge.
+
+    Velocities of the pusher between the two make it stick, others slide along the slider, which then moves as on the
+    nearer edge. `at` `[2]` [m] is the place, `normal` `[2]` the direction into the slider, in the axes of the surface;
+    unit vectors come back.
+
+    Raises `InvalidValueError` for arguments out of range.
+
+    Source: Mason 1986; Lynch, Maekawa and Tanie 1992.
+    """
+    validation.instance("surface", surface, LimitSurface, "a limit surface")
+    at, normal = validation.vector("at", at, 2), validation.vector("normal", normal, 2)
+    length = validation.positive("length of normal", float(np.hypot(*normal)))
+    angle = math.atan(validation.non_negative("mu", mu))
+    found = [pushed_by(surface, Place(at, normal / length), each)[1] for each in (-angle, angle)]
+    return np.array(found) / np.hypot(*np.transpose(found))[:, None]
+
+
+def motion_at(surface: LimitSurface, place: Place, mu: float, velocity: np.ndarray, held: str = "") -> Motion:
+    """How a slider moves that is touched at a place by a pusher with a `velocity` `(vx, vy, omega)` there.
+
+    All in the slider's axes; the pusher approaches, `velocity . normal > 0`. A mode that is `held` stays so beyond its
+    end, where its slack is negative.
+    """
+    if place.half_width > 0.0:
+        return _flush(surface, place, mu, velocity, held)
+    angle, wanted = math.atan(mu), _angle(place, velocity)
+    edges = [pushed_by(surface, place, each) for each in (-angle, angle)]
+    right, left = (_angle(place, each[1]) for each in edges)
+    if angle == 0.0:  # left or right, the force is the same, and no mode has an end
+        held = LEFT if wanted >= left else RIGHT
+    mode = held or (LEFT if wanted >= left else RIGHT if wanted <= right else STICK)
+    if mode == STICK:
+        twist, moved, force = _stuck(surface, place, angle + _BEYOND, wanted)
+        scale = math.hypot(velocity[0], velocity[1]) / math.hypot(moved[0], moved[1])
+        return Motion(scale * twist, mode, min(wanted - right, left - wanted), force)
+    twist, moved = edges[mode == LEFT]
+    scale, force = (
+        (velocity[:2] @ place.normal) / (moved @ place.normal),
+        _force(place, angle if mode == LEFT else -angle),
+    )
+    slack = math.inf if angle == 0.0 else wanted - left if mode == LEFT else right - wanted
+    return Motion(scale * twist, mode, slack, force)
+
+
+def _force(place: Place, angle: float) -> np.ndarray:
+    """Unit force at an angle to the left of the normal."""
+    (x, y), c, s = place.normal.tolist(), math.cos(angle), math.sin(angle)
+    return np.array([c * x - s * y, s * x + c * y])
+
+
+def _angle(place: Place, vector: Any) -> float:
+    """Angle of a vector to the left of the normal [rad]."""
+    (x, y), (a, b) = place.normal.tolist(), (float(vector[0]), float(vector[1]))
+    return math.atan2(x * b - y * a, x * a + y * b)
+
+
+def pushed_by(surface: LimitSurface, place: Place, angle: float) -> tuple[np.ndarray, tuple[float, float]]:
+    """Twist of unit power under a force at an angle to the normal, and the velocity of the place."""
+    (nx, ny), (x, y), c, s = place.normal.tolist(), place.at.tolist(), math.cos(angle), math.sin(angle)
+    fx, fy = c * nx - s * ny, s * nx + c * ny
+    twist = surface.twist((-fx, -fy, y * fx - x * fy))
+    vx, vy, omega = twist.tolist()
+    return twist, (vx - omega * y, vy + omega * x)
+
+
+def _stuck(surface: LimitSurface, place: Place, angle: float, wanted: float) -> tuple[np.ndarray, np.ndarray, Any]:
+    """Twist whose place has a velocity of the wanted angle, that velocity and the direction of the force."""
+    from scipy.optimize import brentq
+
+    off = lambda each: _angle(place, pushed_by(surface, place, each)[1]) - wanted  # noqa: E731
+    try:
+        found: float = brentq(off, -angle, angle, xtol=1e-13)  # pyright: ignore
+    except ValueError:  # far beyond the end of the mode: a step that will be taken back
+        found = math.copysign(angle, -off(angle))
+    return *pushed_by(surface, place, found), _force(place, found)
+
+
+# ---------------------------------------------------------------------- a face that lies flush
+
+
+def _flush(surface: LimitSurface, place: Place, mu: float, velocity: np.ndarray, held: str = "") -> Motion:
+    """How a slider moves under a face with the `velocity` `(vx, vy, omega)` at its middle.
+
+    The pressure of the face has a resultant that crosses it, at an angle within the friction cone.
+    """
+    (x, y), (nx, ny), h = place.at, place.normal, place.half_width
+    tangent, angle, omega = np.array([-ny, nx]), math.atan(mu), velocity[2]
+    stuck = np.array([velocity[0] + omega * y, velocity[1] - omega * x, omega])
+    speed = math.hypot(velocity[0], velocity[1]) + abs(omega) * (h + math.hypot(x, y))
+
+    def of(slip: float) -> tuple[np.ndarray, float, float, np.ndarray]:
+        """Twist, angle of the force, where it crosses the face as a share of the half width, force."""
+        twist = stuck - slip * np.array([*tangent, 0.0])
+        fx, fy, tau = -surface.wrench(twist)
+        pressed, along = fx * nx + fy * ny, fx * tangent[0] + fy * tangent[1]
+        turn = tau - (x * fy - y * fx)  # about the middle, of the normal force alone
+        share = -turn / (pressed * h) if pressed > 0.0 else math.copysign(math.inf, -turn)
+        return twist, math.atan2(along, pressed), share, np.array([fx, fy])
+
+    twist, lean, share, force = of(0.0)
+    mode, slack = STICK, angle - abs(lean)
+    if angle == 0.0:
+        held = LEFT if lean > 0.0 else RIGHT
+    if held in (LEFT, RIGHT) or (not held and slack < 0.0):
+        mode = held or (LEFT if lean > 0.0 else RIGHT)
+        slip = _slip(lambda u: of(u)[1], angle if mode == LEFT else -angle, speed)
+        twist, _, share, force = of(slip)
+        slack = math.inf if angle == 0.0 else slip / speed if mode == LEFT else -slip / speed
+    leans = int(math.copysign(1.0, share)) if abs(share) > _EDGE else 0
+    return Motion(twist, mode, min(slack, 1.0 - abs(share)), force, leans)
+
+
+def _slip(angle_of: Any, wanted: float, speed: float) -> float:
+    """Speed at which the face slides along the slider, to the left, for a force at the wanted angle [m/s]."""
+    from scipy.optimize import brentq
+
+    # from far to the right to far to the left the force turns from one side of the normal to the other
+    off = lambda x: angle_of(speed * x / (1.0 - abs(x))) - wanted  # noqa: E731
+    return (lambda x: speed * x / (1.0 - abs(x)))(brentq(off, -0.999999, 0.999999, xtol=1e-14))  # pyright: ignore

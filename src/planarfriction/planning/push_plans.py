@@ -1,0 +1,252 @@
+"""Open-loop pushes to a pose: a pusher that sticks, and the forces of its friction cone that lead there."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.equality import ByValue
+from planarfriction.errors import InvalidValueError, SolverError
+from planarfriction.limit_surface import LimitSurfaceEllipsoid
+from planarfriction.planning.contact_modes import STICK, Place, pushed_by
+from planarfriction.planning.pushing import Push, push
+from planarfriction.planning.slider import Pusher, Slider
+from planarfriction.scenes import Signal
+
+PARTS = 3
+"""Parts of a plan, each of constant force: turn, go on, turn."""
+
+PLACES = ((0.5,), (0.35, 0.65))
+"""Where an edge may be pushed, as shares of its length: the others where its middle leads nowhere."""
+
+CHORDS = 40
+"""Lines that the arc of the pusher in one part is made of."""
+
+NODES = 65
+"""Forces whose twists are joined by a spline for the search: what that leaves is aimed beside, as what lines leave."""
+
+ROUNDS = 2
+"""Times that a plan aims beside the goal by what its lines have missed."""
+
+_TURNS = ((-0.7, 0.0, 0.7), (0.7, 0.0, -0.7), (0.7, 0.0, 0.7), (-0.7, 0.0, -0.7))
+"""Forces that a search begins with, as shares of the angle that they may have."""
+
+REACHED = 1e-6
+"""Miss of a plan before it is made of lines, as a share of the slider's size and as an angle [rad]."""
+
+
+@dataclass(frozen=True)
+class PushReport:
+    """What a plan of a push reaches."""
+
+    goal: tuple[float, float, float]
+    """What was wanted [m, m, rad]."""
+    end: tuple[float, float, float]
+    """Where the push ends that follows the path [m, m, rad]."""
+    ellipsoid_end: tuple[float, float, float]
+    """Where it ends if the patch's limit surface is its ellipsoid [m, m, rad]."""
+    edge: int
+    """Edge of the outline that is pushed: it begins at the corner of this number, counter-clockwise."""
+    place: tuple[float, float]
+    """Where, in the slider's axes [m]."""
+    length: float
+    """Length of the pusher's path [m]."""
+    used: float
+    """Share of the friction cone's half angle that the plan uses at most [-]."""
+    sticks: bool
+    """Whether the pusher sticks all the way."""
+    wall_time: float
+    """Time that the plan took [s]."""
+
+    def __str__(self) -> str:
+        rows = (("wanted", self.goal), ("reached", self.end), ("with an ellipsoid", self.ellipsoid_end))
+        lines = [f"{'':18}{'x [mm]':>10}{'y [mm]':>10}{'turn [deg]':>12}"]
+        lines += [f"{name:18}{1e3 * x:>10.2f}{1e3 * y:>10.2f}{math.degrees(a):>12.2f}" for name, (x, y, a) in rows]
+        lines += [f"{1e3 * self.length:.4g} mm along edge {self.edge}, {self.used:.0%} of the friction cone."]
+        return "\n".join(lines)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PushPlan(ByValue):
+    """A path of a pusher that brings a slider to a pose."""
+
+    path: Signal
+    """Position of the pusher over time, at unit speed `[K, 2]` [m]."""
+    push: Push
+    """The push that follows it."""
+    report: PushReport
+    """What it reaches."""
+
+    def __repr__(self) -> str:
+        return str(self.report)
+
+    def plot(self) -> Any:
+        """Draw the push; returns a matplotlib Figure."""
+        return self.push.plot()
+
+
+def plan_push(
+    slider: Slider,
+    pusher: Pusher,
+    goal,
+    *,
+    start=(0.0, 0.0, 0.0),
+    margin: float = 0.2,
+    edges: Sequence[int] | None = None,
+) -> PushPlan:
+    """A short path of a point pusher that brings a slider to the pose `goal` `(x, y, theta)` [m, m, rad].
+
+    A pusher that sticks keeps its place on the slider, and a constant force in the slider's axes gives a constant twist
+    there, on every limit surface. So a plan is three parts of constant force, each within the friction cone but for a
+    `margin` of its half angle, whose motions are arcs; angles and lengths are found by shooting (SciPy) from
+    turns to either side, on the middle of each edge (or beside it), and the shortest is taken. As with a car that only
+    goes forward, a goal beside or behind takes a long way round.
+
+    `start` is the first pose, `edges` the edges that may be pushed (all by default).
+
+    Raises `InvalidValueError` for arguments out of range and a pusher without friction or with a face, `SolverError`
+    where no plan is found.
+
+    Source: Lynch and Mason 1996.
+    """
+    validation.instance("slider", slider, Slider, "a Slider")
+    validation.instance("pusher", pusher, Pusher, "a Pusher")
+    if pusher.width > 0.0 or pusher.mu == 0.0:
+        raise InvalidValueError("pusher", "be a point with friction, for a plan", pusher)
+    start, goal = validation.vector("start", start, 3), validation.vector("goal", goal, 3)
+    margin = validation.number("margin", margin)
+    if not 0.0 <= margin < 1.0:
+        raise InvalidValueError("margin", "be >= 0 and < 1", margin)
+    count = len(slider.outline)
+    chosen = range(count) if edges is None else [validation.count("edges", each, 0, count - 1) for each in edges]
+    begin, largest = time.perf_counter(), (1.0 - margin) * math.atan(pusher.mu)
+    if not np.any(goal - start):
+        raise InvalidValueError("goal", "differ from the start", goal.tolist())
+    aim, found = _relative(start, goal), []
+    for shares in PLACES:
+        for edge in chosen:
+            for at in _places(slider, edge, shares):
+                length, x = _shortest(slider, Place(at, slider.inward[edge]), largest, aim)
+                found += [(length, x, edge, at)] if length < math.inf else []
+        if found:
+            break
+    if not found:
+        raise SolverError("no plan reaches the goal: try other edges, a smaller margin or a pose further ahead")
+    length, x, edge, at = min(found, key=lambda each: each[0])
+    place = Place(at, slider.inward[edge])
+    path = _path(slider, place, x, start)
+    done = push(slider, pusher, path, start=start)
+    for _ in range(ROUNDS):
+        aim = aim + _relative(start, goal) - _relative(start, done.end)
+        length, x = _shortest(slider, place, largest, aim, x)
+        if length == math.inf:
+            break
+        tried = _path(slider, place, x, start)
+        path, done = min(
+            (path, done), (tried, push(slider, pusher, tried, start=start)), key=lambda e: _off(e[1], goal)
+        )
+    other = Slider(
+        LimitSurfaceEllipsoid(slider.surface.patch, normal_force=slider.surface.normal_force), slider.outline
+    )
+    rest = push(other, pusher, path, start=start)
+    report = PushReport(
+        _triple(goal), _triple(done.end), _triple(rest.end), edge, (float(at[0]), float(at[1])), length,
+        float(np.abs(x[:PARTS]).max() / math.atan(pusher.mu)), bool((done.mode[1:] == STICK).all()),
+        time.perf_counter() - begin,
+    )  # fmt: skip
+    return PushPlan(path, done, report)
+
+
+def _triple(values: np.ndarray) -> tuple[float, float, float]:
+    x, y, angle = (float(value) for value in values)
+    return x, y, angle
+
+
+def _places(slider: Slider, edge: int, shares: Sequence[float]) -> list[np.ndarray]:
+    ends = slider.outline[[edge, (edge + 1) % len(slider.outline)]]
+    return [ends[0] + share * (ends[1] - ends[0]) for share in shares]
+
+
+def _off(done: Push, goal: np.ndarray) -> float:
+    """By how much a push misses [m]."""
+    return float(np.abs((done.end - goal) * [1.0, 1.0, done.slider.size]).max())
+
+
+def _relative(start: np.ndarray, goal: np.ndarray) -> np.ndarray:
+    """The goal in the axes of the start."""
+    c, s, (x, y, angle) = math.cos(start[2]), math.sin(start[2]), goal - start
+    return np.array([c * x + s * y, c * y - s * x, angle])
+
+
+def _moved(pose: np.ndarray, twist: np.ndarray, way: float) -> np.ndarray:
+    """A pose after a twist of its own axes has been held: an arc."""
+    vx, vy, omega = twist.tolist()
+    half, (x, y, angle) = 0.5 * way * omega, pose.tolist()
+    chord = way * (math.sin(half) / half if abs(half) > 1e-12 else 1.0)
+    c, s = chord * math.cos(angle + half), chord * math.sin(angle + half)
+    return np.array([x + c * vx - s * vy, y + s * vx + c * vy, angle + 2.0 * half])
+
+
+def _twist(slider: Slider, place: Place, angle: float) -> np.ndarray:
+    """Twist under a force at an angle to the normal, at unit speed of the place."""
+    twist, moved = pushed_by(slider.surface, place, angle)
+    return twist / math.hypot(*moved)
+
+
+def _shortest(
+    slider: Slider, place: Place, largest: float, goal: np.ndarray, known: np.ndarray | None = None
+) -> tuple[float, np.ndarray]:
+    """Length of the shortest plan at a place, and its angles and lengths `[2 PARTS]`; infinite where none is found."""
+    from scipy.interpolate import CubicSpline
+    from scipy.optimize import least_squares, minimize
+
+    unit, nodes = slider.size, np.linspace(-largest, largest, NODES)
+    twists = CubicSpline(nodes, [_twist(slider, place, each) for each in nodes])
+
+    def miss(x: np.ndarray) -> np.ndarray:
+        pose = np.zeros(3)
+        for twist, way in zip(twists(x[:PARTS]), x[PARTS:], strict=True):
+            pose = _moved(pose, twist, unit * way)
+        return (pose - goal) / [unit, unit, 1.0]
+
+    def length(x: np.ndarray) -> float:
+        return x[PARTS:].sum()
+
+    far = max(math.hypot(goal[0], goal[1]) / unit, 0.3)
+    bounds = [(-largest, largest)] * PARTS + [(0.0, 10.0 * far + 20.0)] * PARTS
+    slope = np.repeat([0.0, 1.0], PARTS)
+    best, found = math.inf, np.zeros(2 * PARTS)
+    begins = [np.array([largest * each for each in turns] + [0.4 * far] * PARTS) for turns in _TURNS]
+    for begin in begins if known is None else [known]:
+        run = minimize(
+            length, begin, jac=lambda x: slope, method="SLSQP", bounds=bounds,
+            constraints={"type": "eq", "fun": miss}, options={"ftol": 1e-6, "maxiter": 30},
+        )  # fmt: skip
+        low, high = np.transpose(bounds)
+        x = least_squares(miss, np.clip(run.x, low + 1e-9, high - 1e-9), bounds=(low, high), xtol=1e-14, ftol=1e-14).x
+        if np.abs(miss(x)).max() < REACHED and length(x) < best:
+            best, found = length(x), x
+    return unit * best, found
+
+
+def _path(slider: Slider, place: Place, x: np.ndarray, start: np.ndarray) -> Signal:
+    """Path of the pusher at unit speed, as lines."""
+    pose, now, times, at = start, 0.0, [], []
+    for angle, way in zip(x[:PARTS], slider.size * x[PARTS:], strict=True):
+        if way < 1e-9:
+            continue
+        twist = _twist(slider, place, angle)
+        for share in np.linspace(0.0, 1.0, CHORDS + 1)[0 if not times else 1 :]:
+            here = _moved(pose, twist, share * way)
+            c, s = math.cos(here[2]), math.sin(here[2])
+            arm = np.array([c * place.at[0] - s * place.at[1], s * place.at[0] + c * place.at[1]])
+            at.append(here[:2] + arm)
+            times.append(now + share * way)
+        pose, now = _moved(pose, twist, way), now + way
+    return Signal.sampled(times, at, "linear")

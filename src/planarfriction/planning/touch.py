@@ -1,0 +1,198 @@
+"""Where pusher and slider touch: an end of the pusher at an edge, a corner of the slider at the face, or all of it."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from planarfriction.errors import InvalidValueError
+from planarfriction.planning.contact_modes import Place
+from planarfriction.planning.slider import Pusher, Slider
+
+END, CORNER, FACE = "end", "corner", "face"
+
+_LOOKS = 64
+"""Instants between two samples of a path at which a free pusher is looked at."""
+
+_NEAR = 1e-9
+"""Distance that counts as touching, as a share of the slider's size."""
+
+_FLUSH = 1e-4
+"""Angle [rad] between a face and an edge that touch twice, beyond which they are not flush."""
+
+
+class Contact(NamedTuple):
+    """What touches: an end of the pusher at an edge, a corner at the face, or the face at an edge."""
+
+    kind: str
+    edge: int
+    """The edge, or the corner."""
+    end: int = 0
+
+
+class Scenery:
+    """A slider, a pusher and the path of the latter: all the geometry of a push."""
+
+    def __init__(self, slider: Slider, pusher: Pusher, times: np.ndarray, poses: np.ndarray) -> None:
+        self.slider, self.pusher = slider, pusher
+        self._times, self._poses = times, poses
+        self._rates = np.diff(poses, axis=0) / np.diff(times)[:, None]
+        self._ends, self.near = pusher.ends, _NEAR * slider.size
+        edges = np.roll(slider.outline, -1, axis=0) - slider.outline
+        self._lengths = np.hypot(*edges.T)
+
+    def pose(self, t: float) -> np.ndarray:
+        """Pose of the pusher `[3]`."""
+        i = self._piece(t)
+        return self._poses[i] + (t - self._times[i]) * self._rates[i]
+
+    def _piece(self, t: float, forward: bool = False) -> int:
+        i = int(np.searchsorted(self._times, t, side="right" if forward else "left")) - 1
+        return min(max(i, 0), len(self._rates) - 1)
+
+    def piece_end(self, t: float) -> float:
+        """Where the line ends that the pusher follows from a time on."""
+        return float(self._times[self._piece(t, forward=True) + 1])
+
+    def end(self, i: int, t: float, q: np.ndarray) -> np.ndarray:
+        """An end of the pusher in the slider's axes `[2]`."""
+        x, y, angle = self.pose(t)
+        (a, b), c, s = self._ends[i], math.cos(angle), math.sin(angle)
+        return _inside(q, x + c * a - s * b, y + s * a + c * b)
+
+    def corners(self, t: float, q: np.ndarray) -> np.ndarray:
+        """Corners of the slider in the pusher's axes `[M, 2]`."""
+        c, s = math.cos(q[2]), math.sin(q[2])
+        world = self.slider.outline @ np.array([[c, s], [-s, c]]) + q[:2]
+        x, y, angle = self.pose(t)
+        c, s = math.cos(angle), math.sin(angle)
+        return (world - [x, y]) @ np.array([[c, -s], [s, c]])
+
+    def features(self, t: float, q: np.ndarray) -> list[tuple[float, Contact]]:
+        """Everything that may touch, with its distance [m]."""
+        found = []
+        for i in range(len(self._ends)):
+            gaps = self.slider.gaps(self.end(i, t, q))
+            edge = int(gaps.argmax())
+            found.append((float(gaps[edge]), Contact(END, edge, i)))
+        half = 0.5 * self.pusher.width
+        if half > 0.0:
+            # a corner behind the face's line by more than the face is wide is on its back
+            for k, (ahead, aside) in enumerate(self.corners(t, q)):
+                if abs(aside) <= (1.0 + _NEAR) * half and ahead > -half:
+                    found.append((float(ahead), Contact(CORNER, k)))
+        return found
+
+    def gap(self, t: float, q: np.ndarray) -> float:
+        """Distance of pusher and slider [m], negative where they overlap."""
+        return min(each[0] for each in self.features(t, q))
+
+    def closes(self, contact: Contact) -> bool:
+        """Whether something else may begin to touch."""
+        return self.pusher.width > 0.0 and contact.kind != FACE
+
+    def clear(self, contact: Contact, t: float, q: np.ndarray) -> float:
+        """Distance of all that does not touch yet [m]."""
+        return min(gap for gap, each in self.features(t, q) if not _same(contact, each, len(self._lengths))) + self.near
+
+    def flush(self, contact: Contact, t: float, q: np.ndarray) -> Contact:
+        """The face at the edge that it has closed with."""
+        c, s = math.cos(self.pose(t)[2] - q[2]), math.sin(self.pose(t)[2] - q[2])
+        along = self.slider.inward @ [c, s]
+        edge = int(along.argmax())
+        if math.acos(min(along[edge], 1.0)) > _FLUSH:
+            raise InvalidValueError("path", "not wedge the slider between two places of the face", f"t = {t:g} s")
+        return Contact(FACE, edge)
+
+    def within(self, contact: Contact, t: float, q: np.ndarray) -> float:
+        """How far what touches is from the end of its edge, or of the face [m]."""
+        if contact.kind == CORNER:
+            return 0.5 * self.pusher.width - abs(self.corners(t, q)[contact.edge][1])
+        if contact.kind == END:
+            s = self.along(contact.edge, self.end(contact.end, t, q))
+            return min(s, self._lengths[contact.edge] - s)
+        low, high = self.overlap(contact.edge, t, q)
+        return high - low
+
+    def along(self, edge: int, point: np.ndarray) -> float:
+        """Place of a point along an edge [m]."""
+        return float((point - self.slider.outline[edge]) @ self.slider.along[edge])
+
+    def overlap(self, edge: int, t: float, q: np.ndarray) -> tuple[float, float]:
+        """Part of an edge that the face covers, from its left to its right end as it looks [m]."""
+        right, left = (self.along(edge, self.end(i, t, q)) for i in range(2))
+        return max(left, 0.0), min(right, self._lengths[edge])
+
+    def rate(self, t: float, forward: bool = False) -> np.ndarray:
+        """Velocity of the pusher `[3]`."""
+        return self._rates[self._piece(t, forward)]
+
+
+def _inside(q: np.ndarray, x: float, y: float) -> np.ndarray:
+    c, s = math.cos(q[2]), math.sin(q[2])
+    dx, dy = x - q[0], y - q[1]
+    return np.array([c * dx + s * dy, c * dy - s * dx])
+
+
+def _same(contact: Contact, other: Contact, edges: int) -> bool:
+    """Whether a feature is the one that touches: an end at any edge, a corner."""
+    return contact.kind == other.kind and (
+        contact.end == other.end if contact.kind == END else contact.edge % edges == other.edge
+    )
+
+
+def place_of(
+    scenery: Scenery, contact: Contact, t: float, q: np.ndarray, forward: bool = False
+) -> tuple[Place, np.ndarray]:
+    """Where the slider is touched, and the pusher's velocity there `(vx, vy, omega)`, in the slider's axes."""
+    slider, (x, y, angle), half = scenery.slider, scenery.pose(t), 0.0
+    if contact.kind == END:
+        at, normal = scenery.end(contact.end, t, q), slider.inward[contact.edge]
+    elif contact.kind == CORNER:
+        at = slider.outline[contact.edge]
+        normal = np.array([math.cos(angle - q[2]), math.sin(angle - q[2])])
+    else:
+        low, high = scenery.overlap(contact.edge, t, q)
+        half, normal = 0.5 * max(high - low, 0.0), slider.inward[contact.edge]
+        at = slider.outline[contact.edge] + 0.5 * (low + high) * slider.along[contact.edge]
+    vx, vy, omega = scenery.rate(t, forward)
+    c, s = math.cos(q[2]), math.sin(q[2])
+    arm = at - _inside(q, x, y)
+    velocity = np.array([c * vx + s * vy - omega * arm[1], c * vy - s * vx + omega * arm[0], omega])
+    return Place(at, normal, half), velocity
+
+
+def flush_after(scenery: Scenery, contact: Contact, t: float, q: np.ndarray, leans: int) -> Contact:
+    """What still touches when a face turns about its left end (1) or its right one (-1)."""
+    edge, corners = contact.edge, len(scenery.slider.outline)
+    right, left = (scenery.along(edge, scenery.end(i, t, q)) for i in range(2))
+    if leans > 0:
+        return Contact(END, edge, 1) if left >= 0.0 else Contact(CORNER, edge)
+    inside = right <= scenery.along(edge, scenery.slider.outline[(edge + 1) % corners])
+    return Contact(END, edge, 0) if inside else Contact(CORNER, (edge + 1) % corners)
+
+
+def touch_after(scenery: Scenery, t: float, q: np.ndarray) -> tuple[float, Contact] | None:
+    """When and where a pusher that does not touch a slider at rest begins to, or None."""
+    from scipy.optimize import brentq
+
+    times = scenery._times[scenery._times > t]
+    grid, last = [t], t
+    for each in times:
+        grid += np.linspace(last, each, _LOOKS + 1)[1:].tolist()
+        last = each
+    off = lambda at: scenery.gap(at, q) + scenery.near  # noqa: E731
+    before = off(grid[0])
+    for low, high in itertools.pairwise(grid):
+        after = off(high)
+        if after < 0.0 <= before:
+            at = brentq(off, low, high, xtol=1e-14 * max(abs(high), 1.0))
+            near = [each for gap, each in scenery.features(at, q) if gap < 100.0 * scenery.near]  # pyright: ignore
+            if len(near) > 1:
+                return at, scenery.flush(near[0], at, q)  # pyright: ignore
+            return at, min(scenery.features(at, q))[1]  # pyright: ignore
+        before = after
+    return None

@@ -1,0 +1,215 @@
+"""Quasi-static pushes: motion cones, the way a slider turns, symmetries, order, plans."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import planarfriction as pf
+from planarfriction.planning import Pusher, Slider, motion_cone, plan_push, push
+
+HALF = 0.045
+SQUARE = np.array([[-HALF, -HALF], [HALF, -HALF], [HALF, HALF], [-HALF, HALF]])
+PATCH = pf.ContactPatch.rectangle(2 * HALF, cells=5)
+SURFACES = {
+    "ellipsoid": pf.LimitSurfaceEllipsoid(PATCH),
+    "exact": pf.LimitSurfaceExact(PATCH),
+    "table": pf.LimitSurfaceTable(PATCH),
+    "feet": pf.LimitSurfaceExact(pf.ContactPatch.points([[-0.03, -0.02], [0.04, -0.03], [0.0, 0.04]], [1.0, 1.0, 1.2])),
+}
+MU = 0.3
+
+
+def straight(begin, end) -> pf.Signal:
+    return pf.Signal.sampled([0.0, 1.0], [begin, end], "linear")
+
+
+def slider(kind: str = "ellipsoid") -> Slider:
+    return Slider(SURFACES[kind], SQUARE)
+
+
+# ---------------------------------------------------------------------- at an instant
+
+
+def test_motion_cone_of_an_ellipsoid_is_the_closed_form():
+    # V = (fx, fy, tau/r^2): the place r of force f moves along (1 + (y^2, -x y; -x y, x^2)/c^2) f
+    surface, at, c = SURFACES["ellipsoid"], np.array([-HALF, 0.02]), SURFACES["ellipsoid"].contact_radius
+    x, y = at
+    matrix = np.eye(2) + np.array([[y * y, -x * y], [-x * y, x * x]]) / c**2
+    edges = np.array([[1.0, -MU], [1.0, MU]]) @ matrix
+    expected = edges / np.hypot(*edges.T)[:, None]
+    np.testing.assert_allclose(motion_cone(surface, at, (2.0, 0.0), MU), expected, atol=1e-12)  # rounding
+
+
+@pytest.mark.parametrize("kind", SURFACES)
+def test_the_edges_of_a_motion_cone_are_in_order_and_wider_than_nothing(kind):
+    for y in (-0.03, 0.0, 0.02):
+        right, left = motion_cone(SURFACES[kind], (-HALF, y), (1.0, 0.0), MU)
+        assert right[0] * left[1] - right[1] * left[0] > -1e-9  # a facet of feet has one velocity for many forces
+        assert right[0] > 0.0 and left[0] > 0.0
+
+
+@pytest.mark.parametrize("kind", ["ellipsoid", "exact", "table"])
+@pytest.mark.parametrize("mu", [0.0, 0.3, 2.0])
+def test_the_edges_of_the_friction_cone_vote_on_the_turn(kind, mu):
+    # Mason 1986: both edges of the friction cone and the line of pushing vote, by the side of the centre that they pass
+    for angle in (-0.6, 0.1, 0.5):
+        for y in (-0.04, -0.01, 0.015, 0.04):
+            way = np.array([np.cos(angle), np.sin(angle)])
+            begin = np.array([-HALF, y])
+            found = push(slider(kind), Pusher(mu), straight(begin, begin + 1e-3 * way), samples=3)
+            votes = [-HALF * s - y * c for c, s in [way, *([1.0, sign * mu] for sign in (-1.0, 1.0))]]
+            assert np.sign(found.end[2]) == np.sign(sorted(votes)[1]), (angle, y)
+
+
+@pytest.mark.parametrize("kind", ["ellipsoid", "exact"])
+@pytest.mark.parametrize("mu", [0.0, MU])
+def test_a_push_through_the_centre_does_not_turn(kind, mu):
+    found = push(slider(kind), Pusher(mu), straight((-0.06, 0.0), (0.04, 0.0)))
+    np.testing.assert_allclose(found.end, [0.04 + HALF, 0.0, 0.0], rtol=0.0, atol=1e-6)  # 10 times rtol
+
+
+# ---------------------------------------------------------------------- along a path
+
+
+@pytest.mark.parametrize("kind", SURFACES)
+def test_a_push_is_the_same_seen_from_elsewhere_and_at_any_speed(kind):
+    path = straight((-0.06, 0.01), (0.0, 0.03))
+    plain = push(slider(kind), Pusher(MU), path, rtol=1e-9)
+    turn, by = 0.7, np.array([0.3, -0.2])
+    moved = pf.Signal.sampled([2.0, 9.0], by + pf.geometry.rotate(path.values, turn), "linear")
+    other = push(slider(kind), Pusher(MU), moved, start=(*by, turn), rtol=1e-9)
+    expected = np.concatenate([by + pf.geometry.rotate(plain.end[:2], turn), [plain.end[2] + turn]])
+    # the slope of a table jumps from cell to cell, which holds up the tolerance
+    np.testing.assert_allclose(other.end, expected, rtol=0.0, atol=5e-6)
+    assert (other.mode == plain.mode).mean() > 0.95  # samples at a change of mode may differ
+
+
+def test_a_mirrored_push_is_mirrored():
+    found = [push(slider("exact"), Pusher(MU), straight((-0.06, s * 0.01), (0.0, s * 0.04))).end for s in (1, -1)]
+    np.testing.assert_allclose(found[0], found[1] * [1.0, -1.0, -1.0], rtol=0.0, atol=1e-6)
+
+
+def test_a_rough_pusher_sticks_and_a_smooth_one_slides():
+    path = straight((-HALF, 0.01), (0.0, 0.04))
+    stuck = push(slider(), Pusher(20.0), path)
+    assert set(stuck.mode) <= {"stick", "free"} and (stuck.mode == "stick").sum() >= 100
+    np.testing.assert_allclose(stuck.place[1:], np.tile([-HALF, 0.01], (100, 1)), rtol=0.0, atol=1e-7)
+    smooth = push(slider(), Pusher(0.0), path)
+    assert set(smooth.mode) <= {"slide left", "slide right", "free"}
+    assert np.abs(smooth.place[-1, 1] - 0.01) > 2e-3
+    np.testing.assert_allclose(smooth.place[1:, 0], -HALF, rtol=0.0, atol=1e-7)  # on the edge all the way
+
+
+def test_a_stuck_pusher_turns_the_slider_as_the_ellipsoid_says():
+    # with the arm along the push the angle b between them obeys b' = -sin(b) R/(c^2 + R^2) per length (Lynch 1996)
+    surface, at = SURFACES["ellipsoid"], np.array([-HALF, 0.02])
+    c, arm = surface.contact_radius, np.hypot(*at)
+    found = push(slider(), Pusher(20.0), straight(at, (at[0] + 0.05, at[1])))
+    b = np.arctan2(-at[1], -at[0]) + np.array([0.0, found.end[2]])
+    ways = np.linspace(0.0, 0.05, 20001)
+    angle = b[0]
+    for step in np.diff(ways):  # explicit midpoint, 1e-10
+        rate = lambda a: arm * np.sin(a) / (c * c + arm * arm)  # noqa: E731
+        angle += step * rate(angle + 0.5 * step * rate(angle))
+    assert b[1] == pytest.approx(angle, abs=1e-6)
+
+
+def test_order_of_convergence():
+    path = straight((-HALF, 0.01), (0.03, 0.03))
+    best = push(slider(), Pusher(MU), path, rtol=1e-11, samples=2).end
+    errors = [np.abs(push(slider(), Pusher(MU), path, rtol=rtol, samples=2).end - best).max() for rtol in (1e-4, 1e-8)]
+    assert errors[1] < 3e-7 and errors[0] < 3e-3  # errors follow the tolerance, changes of mode included
+
+
+def test_contact_is_kept_and_never_entered():
+    found = push(slider("exact"), Pusher(0.1), straight((-0.07, 0.0), (0.03, 0.035)))
+    touched = found.mode != "free"
+    assert 0 < touched.sum() < len(touched)
+    gaps = [
+        slider().gaps(pf.geometry.rotate(at[:2] - pose[:2], -pose[2])).max()
+        for at, pose in zip(found.pusher_pose, found.pose, strict=True)
+    ]
+    assert np.min(gaps) > -1e-7  # rtol times the size
+    assert np.abs(np.array(gaps)[touched]).max() < 1e-7
+
+
+def test_a_pusher_that_goes_away_leaves_the_slider():
+    path = pf.Signal.sampled([0.0, 1.0, 2.0, 3.0], [(-0.06, 0.0), (-0.03, 0.0), (-0.06, 0.0), (-0.02, 0.0)], "linear")
+    found = push(slider(), Pusher(MU), path, samples=301)
+    assert (found.mode[101:200] == "free").all()
+    assert np.ptp(found.pose[101:200], axis=0).max() == 0.0
+    assert found.end[0] == pytest.approx(-0.02 + HALF, abs=1e-6)
+
+
+# ---------------------------------------------------------------------- a flat face
+
+
+def test_a_face_comes_flush_and_stays():
+    found = push(slider("exact"), Pusher(MU, 0.06), straight((-0.07, 0.0, 0.2), (0.02, 0.0, 0.2)))
+    assert found.end[2] == pytest.approx(0.2, abs=1e-5)
+    gaps = slider().gaps(pf.geometry.rotate(found.pusher_pose[-1, :2] - found.pose[-1, :2], -found.pose[-1, 2]))
+    assert gaps.max() == pytest.approx(0.0, abs=1e-6)
+
+
+def test_a_face_beside_the_centre_turns_about_its_end():
+    found = push(slider("exact"), Pusher(1.0, 0.02), straight((-0.06, 0.034, 0.0), (0.0, 0.034, 0.0)))
+    assert found.end[2] < -0.2  # a narrow face at the corner cannot keep the slider straight
+    wide = push(slider("exact"), Pusher(1.0, 0.09), straight((-0.06, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    np.testing.assert_allclose(wide.end, [HALF, 0.0, 0.0], rtol=0.0, atol=1e-8)
+
+
+# ---------------------------------------------------------------------- plans
+
+
+@pytest.mark.parametrize("kind", ["ellipsoid", "exact"])
+def test_a_plan_leads_to_its_pose(kind):
+    goal = (0.2, 0.03, 0.3)
+    plan = plan_push(slider(kind), Pusher(0.4), goal, edges=[3])
+    np.testing.assert_allclose(plan.push.end, goal, rtol=0.0, atol=1e-4)
+    again = push(slider(kind), Pusher(0.4), plan.path)
+    np.testing.assert_allclose(again.end, plan.push.end, rtol=0.0, atol=1e-12)
+    assert plan.report.sticks and plan.report.used <= 0.8 + 1e-9
+    assert plan.report.length < 1.3 * np.hypot(*goal[:2])
+    assert "reached" in str(plan.report)
+    # a pusher that is rougher than thought sticks too, and nothing changes
+    rough = push(slider(kind), Pusher(0.5), plan.path)
+    np.testing.assert_allclose(rough.end, plan.push.end, rtol=0.0, atol=1e-5)
+
+
+def test_a_push_is_drawn():
+    found = push(slider(), Pusher(MU), straight((-0.06, 0.01), (0.0, 0.03)))
+    assert len(found.plot().axes[0].lines) == 9
+    assert "stick" in repr(found)
+
+
+# ---------------------------------------------------------------------- what is refused
+
+
+def test_bad_input_is_refused_in_one_line():
+    path = straight((-0.06, 0.0), (0.0, 0.0))
+    cases = [
+        (lambda: Slider(SURFACES["exact"], [[0, 0], [1, 0], [0.2, 0.2], [0, 1]]), "outline must be convex"),
+        (lambda: Slider(PATCH, SQUARE), "surface must be a limit surface"),
+        (lambda: Pusher(-0.1), "mu must be >= 0"),
+        (lambda: push(slider(), Pusher(), straight((0.0, 0.0), (0.1, 0.0))), "begin outside the slider"),
+        (lambda: push(slider(), Pusher(), pf.Signal.constant([0.0, 0.0])), "path must be a Signal of two"),
+        (lambda: push(slider(), Pusher(0.1, 0.02), path), "path must have 3 columns"),
+        (lambda: push(slider(), Pusher(), path, rtol=0.0), "rtol must be > 0"),
+        (lambda: motion_cone(SURFACES["exact"], (0.0, 0.0), (0.0, 0.0), 0.1), "normal"),
+        (lambda: plan_push(slider(), Pusher(), (0.1, 0.0, 0.0)), "be a point with friction"),
+        (lambda: plan_push(slider(), Pusher(0.3), (0.0, 0.0, 0.0)), "goal must differ"),
+        (lambda: plan_push(slider(), Pusher(0.3), (0.1, 0.0, 0.0), margin=1.0), "margin must be >= 0 and < 1"),
+        (lambda: plan_push(slider(), Pusher(0.3), (0.1, 0.0, 0.0), edges=[4]), "edges"),
+    ]
+    for call, words in cases:
+        with pytest.raises(pf.FrictionError, match=words) as caught:
+            call()
+        assert "\n" not in str(caught.value)
+
+
+def test_sliders_take_outlines_of_either_sense():
+    turned = dataclasses.replace(slider(), outline=SQUARE[::-1])
+    assert turned.gaps(np.zeros(2)).max() == pytest.approx(-HALF)
