@@ -122,14 +122,17 @@ def objects() -> dict[str, Any]:
         "Slide": pf.identify.Slide(time, pose), "Log": log, "Uniform": pf.Uniform(),
         "LinearGradient": pf.LinearGradient((5.0, 2.0)), "PressureMaps": pf.PressureMaps([1.0, 2.0], np.ones((2, 3))),
         "PerCell": pf.patch.PerCell([1.0, 2.0, 3.0]),
+        "Slider": pf.planning.Slider(pf.LimitSurfaceEllipsoid(PATCH), SQUARE),
         **{name: getattr(pf, name)(PATCH) for name in pf.__all__ if name.startswith("LimitSurface")},
     }  # fmt: skip
 
 
 SPECIAL: dict[str, dict[str, Any]] = {
+    "planning.Slider": {"outline": SQUARE},
+    "planning.Slider.gaps": {"point": (0.0, 0.0)},
     "planning.motion_cone": {"at": (-0.01, 0.002), "normal": (1.0, 0.0)},
     "planning.push": {
-        "slider": Fresh(lambda: pf.planning.Slider(pf.LimitSurfaceEllipsoid(PATCH), SQUARE)),
+        "slider": Fresh(lambda: objects()["Slider"]),
         "pusher": Fresh(lambda: pf.planning.Pusher(0.3)),
         "path": pf.Signal.sampled([0.0, 1.0], [[-0.015, 0.0], [-0.005, 0.002]], "linear"),
         "start": (0.0, 0.0, 0.0),

@@ -121,7 +121,7 @@ def pushed_by(surface: LimitSurface, place: Place, angle: float) -> tuple[np.nda
     return twist, (vx - omega * y, vy + omega * x)
 
 
-def _stuck(surface: LimitSurface, place: Place, angle: float, wanted: float) -> tuple[np.ndarray, np.ndarray, Any]:
+def _stuck(surface: LimitSurface, place: Place, angle: float, wanted: float) -> tuple[np.ndarray, Any, Any]:
     """Twist whose place has a velocity of the wanted angle, that velocity and the direction of the force."""
     from scipy.optimize import brentq
 

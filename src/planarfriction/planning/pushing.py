@@ -19,6 +19,9 @@ from planarfriction.scenes.signal import as_signal
 FREE = "free"
 """The mode of a pusher that does not touch, or that goes away."""
 
+MOST_SAMPLES = 100_000
+"""Instants that are recorded at most."""
+
 MOST_PHASES = 2_000
 """Changes of mode in a push that are followed."""
 
@@ -96,7 +99,7 @@ def push(
         raise InvalidValueError("path", 'be a Signal of two samples or more with hold="linear"', path)
     path = as_signal("path", path, 2 if path.columns == 2 and pusher.width == 0.0 else 3)
     start = validation.vector("start", start, 3).astype(float)
-    count, rtol = validation.count("samples", samples, at_least=2), validation.positive("rtol", rtol)
+    count, rtol = validation.count("samples", samples, 2, MOST_SAMPLES), validation.positive("rtol", rtol)
     poses = path.values if path.columns == 3 else np.pad(path.values, ((0, 0), (0, 1)))
     scenery = Scenery(slider, pusher, path.times, poses)
     time = np.linspace(path.times[0], path.times[-1], count)

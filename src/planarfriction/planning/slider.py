@@ -57,8 +57,11 @@ class Slider(ByValue):
         return float(np.hypot(*self.outline.T).max())
 
     def gaps(self, point: np.ndarray) -> np.ndarray:
-        """Distances of a point `[2]` from the lines of all edges `[M]` [m], > 0 outside; it is outside if one is."""
-        return np.einsum("mi,mi->m", self.outline - point, self.inward)
+        """Distances of a point `[2]` from the lines of all edges `[M]` [m], > 0 outside; it is outside if one is.
+
+        Raises `InvalidValueError` for a point that is none.
+        """
+        return np.einsum("mi,mi->m", self.outline - validation.vector("point", point, 2), self.inward)
 
 
 @dataclass(frozen=True)
