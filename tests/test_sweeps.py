@@ -366,6 +366,8 @@ def leave(solution: pf.Solution) -> float:
 def test_an_executor_that_dies_is_an_error_in_one_line(tmp_path):
     with concurrent.futures.ProcessPoolExecutor(1) as pool, pytest.raises(SweepError, match="what is done is kept"):
         pf.sweep(grip, {"grip": GRIPS}, executor=pool, measure=leave, out=tmp_path)
+    with pytest.raises(SweepError, match="the executor ended"):  # it takes no more
+        pf.sweep(grip, {"grip": GRIPS}, executor=pool)
 
 
 def test_models_are_built_once_for_equal_scenes():

@@ -35,14 +35,22 @@ def replacing(path: str | Path) -> Iterator[io.BytesIO]:
         _replace(Path(os.path.realpath(path)), buffer.getbuffer())
 
 
-def put(path: Path, content: bytes) -> None:
+def put(path: str, content: bytes) -> None:
     """Make `content` the file `path`, whole or not at all even if the process is killed.
 
     Without waiting for the disk, as `replacing` does: after the computer itself has failed the file may be damaged. For
     many small files that carry a checksum, and whose loss costs no more than the work of one.
     """
     with _reporting(path):
-        _replace(path, memoryview(content), wait=False)
+        part = os.path.join(os.path.dirname(path), _part_name())
+        try:
+            with open(part, "xb", buffering=0) as file:
+                file.write(content)
+            os.replace(part, path)
+        except BaseException:
+            with contextlib.suppress(OSError):
+                os.unlink(part)
+            raise
 
 
 def write_text(path: str | Path, text: str) -> None:
@@ -89,14 +97,13 @@ def make_folder(path: str | Path) -> Path:
     return path
 
 
-def _replace(target: Path, content: memoryview, wait: bool = True) -> None:
+def _replace(target: Path, content: memoryview) -> None:
     part = _part(target)
     try:
         with part.open("xb") as file:
             file.write(content)
-            if wait:
-                file.flush()
-                os.fsync(file.fileno())
+            file.flush()
+            os.fsync(file.fileno())
         with contextlib.suppress(FileNotFoundError):
             shutil.copymode(target, part)
         part.replace(target)
@@ -108,7 +115,11 @@ def _replace(target: Path, content: memoryview, wait: bool = True) -> None:
 
 def _part(target: Path) -> Path:
     """A name beside `target` that no other process takes."""
-    return target.with_name(f".planarfriction-{secrets.token_hex(8)}.part")
+    return target.with_name(_part_name())
+
+
+def _part_name() -> str:
+    return f".planarfriction-{secrets.token_hex(8)}.part"
 
 
 @contextlib.contextmanager

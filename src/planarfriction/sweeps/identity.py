@@ -35,6 +35,8 @@ MODELS_KEPT = 32
 
 _PLAIN = (bool, int, float, complex, str, bytes, type(None))
 
+_KINDS = frozenset(_PLAIN)
+
 
 @functools.cache
 def equations() -> str:
@@ -79,6 +81,9 @@ class _Content:
         elif isinstance(value, np.ndarray):
             self._array(value)
         elif isinstance(value, (tuple, list)):
+            if all(type(each) in _KINDS for each in value):  # at once: most of a scene is such tuples
+                self._say("plain list", repr(tuple(value)).encode(errors="surrogatepass"))
+                return
             self._say("list", str(len(value)).encode())
             for each in value:
                 self.add(each)
@@ -206,9 +211,19 @@ class Runs:
 
     def digest(self, scene: Scene) -> str:
         """Name of the run of a scene."""
-        contacts = [_fields(contact, "model") for contact in scene.contacts]
+        records = [scene, scene.body, *scene.contacts]
         models = [self._of_model(contact.model) for contact in scene.contacts]
-        return digest_of(self._same, _fields(scene, "contacts"), contacts, models)
+        plain: list[Any] = []
+        others: list[Any] = []
+        for record in records:
+            for name in _names(type(record)):
+                value = getattr(record, name)
+                if type(value) in _KINDS:
+                    plain += True, value
+                else:
+                    plain.append(False)
+                    others.append(value)
+        return digest_of([self._same, *models, *plain], others)
 
     def _of_model(self, model: Any) -> str:
         if id(model) not in self._digests:
@@ -223,5 +238,7 @@ def _keep(held: dict[Any, Any], key: Any, value: Any) -> None:
     held[key] = value
 
 
-def _fields(record: Any, but: str) -> list[tuple[str, Any]]:
-    return [(field.name, getattr(record, field.name)) for field in dataclasses.fields(record) if field.name != but]
+@functools.cache
+def _names(kind: type) -> tuple[str, ...]:
+    """Fields of a scene and its parts but for those that are records with fields of their own, dealt with apart."""
+    return tuple(field.name for field in dataclasses.fields(kind) if field.name not in ("body", "contacts", "model"))

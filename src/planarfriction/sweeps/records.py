@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import json
+import os
 import re
 import zipfile
 from collections.abc import Callable, Mapping
@@ -105,10 +106,18 @@ def _variable(name: str, value: Any) -> History:
 
 
 def pack(record: Record) -> bytes:
-    """A record as the bytes of an NPZ file, which has a checksum of each entry; equal records give equal bytes."""
-    about = {name: [each.dims, each.attrs] for name, each in record.variables.items()}
+    """A record as the bytes of an NPZ file, which has a checksum of each entry; equal records give equal bytes.
+
+    Single numbers and texts are in the entry that describes the others, as JSON.
+    """
+    about, arrays = {}, {}
+    for name, each in record.variables.items():
+        values = np.asarray(each.values)
+        single = values.ndim == 0 and values.dtype.kind in "biufU"
+        about[name] = [each.dims, each.attrs, values.dtype.str, values.item() if single else None]
+        if not single:
+            arrays[_entry(name)] = values
     meta = json.dumps({"status": record.status, "reason": record.reason, "end": record.end, "variables": about})
-    arrays = {_entry(name): np.asarray(each.values) for name, each in record.variables.items()}
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as file:  # np.savez has names of its own that no variable may have
         for name, array in {_META: np.frombuffer(meta.encode(), np.uint8), **arrays}.items():
@@ -120,10 +129,10 @@ def pack(record: Record) -> bytes:
 def unpack(content: bytes) -> Record:
     """The record of a file; any exception for one that is damaged."""
     with np.load(io.BytesIO(content), allow_pickle=False) as file:
-        meta = json.loads(file[_META].tobytes())
-        found = {
-            name: History(tuple(dims), file[_entry(name)], attrs) for name, (dims, attrs) in meta["variables"].items()
-        }
+        meta, found = json.loads(file[_META].tobytes()), {}
+        for name, (dims, attrs, kind, value) in meta["variables"].items():
+            values = file[_entry(name)] if value is None else np.array(value, np.dtype(kind))
+            found[name] = History(tuple(dims), values, attrs)
     return Record(meta["status"], meta["reason"], found, meta["end"])
 
 
@@ -137,17 +146,15 @@ class Folder:
 
     def __init__(self, path: str | Path) -> None:
         self.path = make_folder(path)
+        self._begin = f"{self.path}{os.sep}"
         self.damaged = 0
         """Files that were found and did not count."""
-
-    def file(self, digest: str) -> Path:
-        """Where the run of a digest is."""
-        return self.path / f"{digest}.npz"
 
     def find(self, digest: str, index: tuple[int, ...]) -> Record | None:
         """What the run has left; None where it has not been done, and where its file is not whole."""
         try:
-            content = self.file(digest).read_bytes()
+            with open(f"{self._begin}{digest}.npz", "rb", buffering=0) as file:
+                content = file.read()
         except OSError:
             return None
         try:
@@ -158,13 +165,13 @@ class Folder:
 
     def put(self, digest: str, index: tuple[int, ...], record: Record, scene: Scene | None) -> Record:
         """Keep what a run has left; a kill leaves the file out or whole. Returns it."""
-        failed = self.path / f"{digest}.failed.json"
+        failed = f"{self._begin}{digest}.failed.json"
         if record.status == FAILED:
             put(failed, failure(record.reason, scene).encode())
             return record
-        put(self.file(digest), pack(record))
+        put(f"{self._begin}{digest}.npz", pack(record))
         with contextlib.suppress(OSError):
-            failed.unlink(missing_ok=True)
+            os.unlink(failed)
         return record
 
 

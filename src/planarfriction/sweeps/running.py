@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import os
 import pickle
+import queue
 import threading
 import time
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import (
-    FIRST_COMPLETED,
     BrokenExecutor,
     CancelledError,
     Executor,
     Future,
     ProcessPoolExecutor,
     ThreadPoolExecutor,
-    wait,
 )
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
@@ -42,6 +41,8 @@ _AHEAD = 4
 
 _WORKERS = 64
 """Workers of an executor that does not say how many it has."""
+
+_ENDED = "the executor ended ({}): what is done is kept, sweep again to go on"
 
 
 class Progress(NamedTuple):
@@ -288,13 +289,19 @@ class Sweeping:
 
     def _go(self, executor: Executor, most: int, stopped: Callable[[], bool] | None) -> None:
         pending: dict[Future, _Job] = {}
+        done: queue.SimpleQueue[Future] = queue.SimpleQueue()
         try:
             for job in self._jobs():
-                pending[executor.submit(run, job.scene, self._measure, stopped)] = job
+                try:
+                    future = executor.submit(run, job.scene, self._measure, stopped)
+                except RuntimeError as error:  # broken, or shut down
+                    raise SweepError(_ENDED.format(reason_of(error))) from None
+                pending[future] = job
+                future.add_done_callback(done.put)
                 if len(pending) >= most:
-                    self._collect(pending)
+                    self._collect(done, pending)
             while pending:
-                self._collect(pending)
+                self._collect(done, pending)
         except BaseException:
             for future in pending:
                 future.cancel()
@@ -324,19 +331,24 @@ class Sweeping:
                 self._put(index, digest, record)
                 self._tell()
 
-    def _collect(self, pending: dict[Future, _Job]) -> None:
-        """Take what is done, at least one."""
-        done, _ = wait(pending, timeout=_BETWEEN, return_when=FIRST_COMPLETED)
-        self._take(done, pending)
+    def _collect(self, done: queue.SimpleQueue[Future], pending: dict[Future, _Job]) -> None:
+        """Take what is done, at least one, or say after a while that nothing is."""
+        try:
+            found = [done.get(timeout=_BETWEEN)]
+            while not done.empty():
+                found.append(done.get())
+        except queue.Empty:
+            found = []
+        self._take(found, pending)
         self._tell()
 
-    def _take(self, done: Any, pending: dict[Future, _Job]) -> None:
+    def _take(self, done: list[Future], pending: dict[Future, _Job]) -> None:
         for future in done:
             job = pending.pop(future)
             try:
                 record = future.result()
             except (BrokenExecutor, CancelledError) as error:
-                self._ended = f"the executor ended ({reason_of(error)}): what is done is kept, sweep again to go on"
+                self._ended = _ENDED.format(reason_of(error))
                 continue
             except KeyboardInterrupt:  # in a process that heard Ctrl-C too: this run is not done
                 continue

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +14,7 @@ from planarfriction.errors import FileError, MissingExtraError
 from planarfriction.scenes.solution import History
 from planarfriction.sweeps.dataset import MISSING, OWN, check_names, difference, on_instants
 from planarfriction.sweeps.quantities import Grid
-from planarfriction.sweeps.records import FAILED, Record, failure
+from planarfriction.sweeps.records import FAILED, Record, failure, reason_of
 from planarfriction.writing import make_folder, put
 
 if TYPE_CHECKING:
@@ -47,11 +48,13 @@ class ZarrStore:
         try:
             self._group: Any = zarr.open_group(path, mode="a", zarr_format=3)
             self._begin()
+        except FileError:
+            raise
         except (OSError, ValueError, KeyError, TypeError) as error:
-            if isinstance(error, FileError):
-                raise
-            raise FileError(f"{path}: no zarr store of a sweep, and none can be made: {error}") from None
-        self._journal = (path / "run" / _JOURNAL).open("ab", buffering=0)
+            raise FileError(f"{path}: no zarr store of a sweep, and none can be made: {reason_of(error)}") from None
+        self._journal = (path / "run" / _JOURNAL).open("a+b", buffering=0)
+        if self._journal.tell() and not self._ends_a_line():
+            self._journal.write(b"\n")
 
     def close(self) -> None:
         """Let go of the journal."""
@@ -153,7 +156,7 @@ class ZarrStore:
                         self._arrays[name][index] = values.astype(object) if values.dtype.kind == "U" else values
         if record.status == FAILED:
             folder = make_folder(self.path.with_suffix(".failed"))
-            put(folder / f"{digest or 'no-scene'}.json", failure(record.reason, scene).encode())
+            put(str(folder / f"{digest}.json"), failure(record.reason, scene).encode())
         number = self._number(index)
         line = json.dumps([number, digest, record.status, record.reason])
         self._journal.write(f"{line}\n".encode())
@@ -179,6 +182,11 @@ class ZarrStore:
                     self._outcomes[int(number)] = str(digest), str(status), str(reason)
             except (ValueError, TypeError):
                 continue
+
+    def _ends_a_line(self) -> bool:
+        """Whether the journal ends as it should: a kill may have cut its last line."""
+        self._journal.seek(-1, os.SEEK_END)
+        return self._journal.read() == b"\n"
 
     # ------------------------------------------------------------------ the whole
 
