@@ -16,11 +16,11 @@ from planarfriction.scenes import Scene, Signal, Solution, in_hand, in_hand_load
 from planarfriction.sweeps import sweep
 from planarfriction.sweeps.running import processors
 
-_MASSES, _OFFSETS, _GRIPS = np.linspace(0.1, 0.25, 10), np.linspace(0.0, 0.009, 10), np.linspace(0.8, 1.6, 10)
+_MASSES, _OFFSETS, _GRIPS = np.linspace(0.1, 0.25, 25), np.linspace(0.0, 0.009, 10), (0.8, 1.0, 1.2, 1.4)
 
 
 def measure(name: str, full: bool) -> Measurement:
-    """A thousand runs of 2 s in ten blocks, each of which is also simulated one run after another right before."""
+    """A thousand runs of 2 s in blocks of 250, each of which is also simulated one run after another right before."""
     model = ReducedModel(PUBLISHED_PATCHES["Circle"](), LuGre(mu_s=1.2, elasto_plastic=ElastoPlastic(0.9)))
     held = in_hand_load(1)
     loads = {float(grip): Signal(held.times, grip * held.values) for grip in _GRIPS}
@@ -39,14 +39,14 @@ def measure(name: str, full: bool) -> Measurement:
                 for offset in _OFFSETS:
                     solver += simulate(make(mass, offset, grip)).statistics.wall_time
             middle = time.process_time()
+            alone += middle - begin
             swept += once(lambda values=values: sweep(make, values, out=folder, measure=end))
             used += time.process_time() - middle
-            alone += middle - begin
             memory.append(_memory())
     count = processors()
     words = (
         f"time in the solver of the same runs, one after another, over {count} processors (processor time: "
-        f"{used / alone:.2f} of that of simulate; memory: {memory[-1] - memory[0]:+.1f} MB from run 100 to 1,000)"
+        f"{used / alone:.2f} of that of simulate; memory: {memory[-1] - memory[0]:+.1f} MB from run 250 to 1,000)"
     )
     return Measurement(name, swept, "s", words, solver / count, solver / count / swept)
 
