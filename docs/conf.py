@@ -41,6 +41,8 @@ suppress_warnings = [
     "config.cache",  # sphinx-gallery keeps functions in its settings
 ]
 
+smartquotes = False  # options of commands have two hyphens
+
 # -- pages in Markdown: colon fences, so that the Python of a page stays easy to find for the tests
 
 myst_enable_extensions = ["amsmath", "attrs_inline", "colon_fence", "deflist", "dollarmath"]
