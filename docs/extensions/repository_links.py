@@ -28,14 +28,13 @@ def rewrite(app: Sphinx, name: str, source: list[str]) -> None:
     for pattern, page in LINKS.items():
         source[0] = re.sub(rf"\]\({pattern}\)", rf"]({page})", source[0])
     if name == "index":
-        source[0] = re.sub(
-            r"^[\w-]*\*\n", lambda entry: entry[0] if pages(app, entry[0]) else "", source[0], flags=re.M
-        )
+        source[0] = re.sub(r"^\*\n", "".join(f"{page}\n" for page in unlisted(app, source[0])), source[0], flags=re.M)
 
 
-def pages(app: Sphinx, pattern: str) -> bool:
-    """Whether a pattern in a list of pages finds one; Sphinx warns of each that does not."""
-    return any(Path(app.srcdir).glob(f"{pattern.strip()}.md"))
+def unlisted(app: Sphinx, index: str) -> list[str]:
+    """Pages that no list of the first page names: they stand where one has a line with a star."""
+    pages = sorted(path.stem for path in Path(app.srcdir).glob("*.md"))
+    return [page for page in pages if page != "index" and not re.search(rf"^{page}$", index, flags=re.M)]
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

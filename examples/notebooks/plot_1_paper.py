@@ -49,7 +49,7 @@ histories = driven.plot()
 # All wrenches of steady sliding form a closed surface. An ellipsoid is often put in its place; it is right for pure
 # sliding and pure spin of a round patch and wrong in between.
 pads = PUBLISHED_PATCHES["NonConvex1"]()
-surfaces = pf.plots.plot_limit_surface(pf.LimitSurfaceTablePublished(pads), ellipsoid=pf.LimitSurfaceEllipsoid(pads))
+surfaces = pf.plots.plot_limit_surface(pf.LimitSurfaceTablePublished(pads))
 
 # %%
 # Three bristles instead of 634
