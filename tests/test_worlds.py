@@ -55,8 +55,8 @@ def test_the_part_turns_as_far_as_a_pendulum_on_a_pin_with_the_friction_of_the_p
     expected = solve_ivp(rate, (start, 1.0), (0.0, 0.0), events=stopped, max_step=1e-3).y[0, -1]
     solution = pf.simulate(scene)
     angle, stays = float(solution.data.theta[-1]), solution.data.theta.sel(time=0.2, method="nearest")
-    assert abs(stays) < 0.01 and angle < -1.0  # it sags until its bristles carry it
-    assert angle == pytest.approx(expected, rel=0.02)  # they slide by 1 mm and sag at first, which a pin does not
+    assert abs(stays) < 1e-5 and angle < -1.0  # bristles of 10 um at a radius of 6 mm, and the tolerance
+    assert angle == pytest.approx(expected, rel=0.02)  # they slide by 1 mm, which a pin does not
     slide = np.hypot(solution.data.x[-1] - ARM * math.cos(angle), solution.data.y[-1] - ARM * math.sin(angle))
     assert 1e-4 < slide < 3e-3
 
@@ -65,7 +65,7 @@ def test_the_part_turns_as_far_as_a_pendulum_on_a_pin_with_the_friction_of_the_p
 def test_a_grip_holds_from_the_load_to_the_four_thirds_that_the_torque_needs(share, holds):
     """The weight asks for a hundredth of the force too, and takes 0.5 % of the torque."""
     needed = brentq(lambda load: held_torque(load) - MASS * G * ARM, 0.1, 10.0)
-    scene = pivot(pf.DistributedModel(FINGERTIP, COULOMB), normal_force=share * needed, t_end=0.5)
+    scene = pivot(pf.DistributedModel(FINGERTIP, COULOMB), normal_force=share * needed, start="rest", t_end=0.5)
     assert (abs(float(pf.simulate(scene).data.theta[-1])) < 0.05) == holds
 
 
@@ -249,7 +249,7 @@ def test_the_example_of_a_scene_is_that_scene(make):
         assert (ours.name, ours.position, ours.count) == (its.name, its.position, its.count)
     if ready.force is not None:
         assert scene.force(t).tolist() == ready.force(t).tolist()
-    for name in ("t_end", "save_every", "stop_speed", "name"):
+    for name in ("t_end", "save_every", "stop_speed", "start", "name"):
         assert getattr(scene, name) == getattr(ready, name)
     for name in ("mass", "inertia", "position", "velocity", "gravity"):
         assert getattr(scene.body, name) == pytest.approx(getattr(ready.body, name), rel=1e-12)

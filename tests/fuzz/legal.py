@@ -198,6 +198,8 @@ SPECIAL: dict[str, dict[str, Any]] = {
         "executor": None,
         "measure": None,
     },
+    "scenes.pivot": {"normal_force": None, "mass": 0.02, "start": "equilibrium"},
+    "scenes.curling": {"twist": (1.0, 0.0, 10.0), "start": "sliding"},
     "rollout": {"twist": TWISTS},
     "autodiff.rollout_states": {"twist": TWISTS},
     "autodiff.rollout_gradient": {"twist": TWISTS},

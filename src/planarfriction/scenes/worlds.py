@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -37,6 +37,7 @@ def pivot(
     arm: float = 0.06,
     normal_force: Any = None,
     fingers: int = 2,
+    start: Literal["rest", "equilibrium"] = "equilibrium",
     t_end: float = 1.0,
 ) -> Scene:
     """A part held level by one end between finger pads: the grip loosens, the part swings down and is caught.
@@ -44,13 +45,14 @@ def pivot(
     The pads sit at the origin of the world; the centre of mass of the plate of `size` (width, height) [m] and `mass`
     [kg] starts `arm` [m] beside them. Each of the `fingers` presses with the full `normal_force` [N], a signal or a
     number (default: 4 N; from 0.24 s 1 N, from 0.4 s 6 N). The part turns where `fingers mu f_N r < mass g arm`, and
-    the contact radius r of a soft finger grows with its load.
+    the contact radius r of a soft finger grows with its load. Bristles `start` with the weight on them; a grip that
+    does not hold it has to start at "rest".
     """
     arm = validation.positive("arm", arm)
     inertia, outline = rectangle_inertia(mass, size), rectangle_outline(size)
     body = Body(mass, inertia, (arm, 0.0), gravity=(0.0, -GRAVITY), outline=outline)
     load = Signal.sampled(*GRIP, hold="linear").held(SAMPLE_TIME) if normal_force is None else normal_force
-    return Scene(body, [Contact(model, load, count=fingers, name="fingers")], t_end, name="pivot")
+    return Scene(body, [Contact(model, load, count=fingers, name="fingers")], t_end, start=start, name="pivot")
 
 
 def foot(
@@ -100,22 +102,23 @@ def curling(
     mass: float = 19.0,
     inertia: float | None = None,
     twist=(2.2, 0.0, 1.5),
+    start: Literal["rest", "sliding"] = "sliding",
     t_end: float = 60.0,
     save_every: float = 0.05,
 ) -> Scene:
     """A curling stone let go with the `twist` `(vx, vy, omega)`; ends when it has stopped.
 
     The patch is fixed to the stone, its frame's origin at the centre of mass: a narrow ring, on real stones. `mass`
-    [kg], `inertia` about the vertical [kg m^2] (default: that of a cylinder of radius 0.14 m), `save_every` [s] the
-    time between samples. Friction that is the same in all directions on an even pressure slows the stone and its spin,
-    and does not make it curl.
+    [kg], `inertia` about the vertical [kg m^2] (default: that of a cylinder of radius 0.14 m), `start` how the bristles
+    start, `save_every` [s] the time between samples. Friction that is the same in all directions on an even pressure
+    slows the stone and its spin, and does not make it curl.
     """
     if inertia is None:
         inertia = 0.5 * validation.positive("mass", mass) * STONE_RADIUS**2
     body = Body(mass, inertia, velocity=twist, gravity=(0.0, 0.0), outline=_around(0.0, STONE_RADIUS))
     weight: Any = GRAVITY * body.mass
     ice = Contact(model, weight, mounted_on="body", name="ice")
-    return Scene(body, [ice], t_end, stop_speed=STOP_SPEED, save_every=save_every, name="curling")
+    return Scene(body, [ice], t_end, None, None, STOP_SPEED, save_every, start=start, name="curling")
 
 
 def _around(half: float, radius: float) -> np.ndarray:
