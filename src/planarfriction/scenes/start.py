@@ -191,6 +191,7 @@ def _free(cells: _Cells, motion: np.ndarray) -> np.ndarray:
     return cells.middle + (cells.levers @ motion - cells.middle)
 
 
+@np.errstate(over="ignore", invalid="ignore")  # of loads that nothing holds
 def _bent_to_the_end(cells: _Cells, pull: np.ndarray, motion: np.ndarray, scale: np.ndarray) -> np.ndarray:
     """The motion of least energy where some bristles are bent as far as they can be."""
     from scipy.optimize import minimize, root
