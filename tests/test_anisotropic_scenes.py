@@ -146,7 +146,6 @@ def test_wrong_metrics_get_one_line(metric, asymmetry, message):
         lambda: reduced(PATCHES["cell metrics"]),
         lambda: reduced(PATCHES["both"]),
         lambda: pf.ReducedModelPublished(PATCHES["metric"], STRIBECK, surface=pf.LimitSurfaceTable(PLAIN)),
-        lambda: pf.autodiff.scene_sensitivities(in_hand(reduced(PATCHES["metric"]))),
         lambda: pf.identify.identify_motion([], PATCHES["metric"], None),  # pyright: ignore
     ],
 )

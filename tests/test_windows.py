@@ -130,11 +130,12 @@ def test_sensitivities_in_windows_and_in_parts(monkeypatch, name):
     scene = free(MODELS[name]())
     from planarfriction.autodiff import scene as module
 
-    whole = pf.autodiff.scene_sensitivities(scene, t_end=0.025, save_every=1e-3)
+    numbers = {"parameters": ("mu", "r", "mass"), "t_end": 0.025, "save_every": 1e-3}
+    whole = pf.autodiff.scene_sensitivities(scene, **numbers)
     monkeypatch.setattr(packing, "WINDOW", 3)
-    windows = pf.autodiff.scene_sensitivities(scene, t_end=0.025, save_every=1e-3)
+    windows = pf.autodiff.scene_sensitivities(scene, **numbers)
     monkeypatch.setattr(module, "NUMBERS", 1.0)  # one step at a time
-    parts = pf.autodiff.scene_sensitivities(scene, t_end=0.025, save_every=1e-3)
+    parts = pf.autodiff.scene_sensitivities(scene, **numbers)
     for one in (windows, parts):
         for field in ("time", "motion", "wrenches"):
             np.testing.assert_array_equal(getattr(one, field), getattr(whole, field), err_msg=field)

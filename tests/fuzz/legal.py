@@ -210,6 +210,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
         "signals": {},
         "initial": ("x",),
         "slope": lambda time, motion: 0.0 * motion,
+        "wrench_slope": lambda time, wrenches: 0.0 * wrenches,
     },
 }
 """Where a parameter of this name wants something else."""

@@ -28,7 +28,7 @@ SCENE_PARAMETERS = {
 - `mu`: mu_c and mu_s of every contact;
 - `r`: the size of every patch, about the origin of its contact frame (positions, contact radius, second moment);
 - `mass`, `inertia`: of the body, forces held (gravity pulls in proportion to the mass);
-- `load`: every normal force, patches keeping the shape that they have.
+- `load`: every normal force; not where a patch changes its shape with it.
 """
 
 STATES = ("vx", "vy", "omega", "x", "y", "theta")
@@ -69,6 +69,15 @@ class Knots:
         """When each knot begins to have a say [s]."""
 
 
+def _refuse_shapes(scene: Scene, parameters: Any, signals: Mapping[str, Any]) -> None:
+    """Derivatives by a load hold the patch, which is wrong where the patch follows the load."""
+    for contact in scene.contacts:
+        for name in (*parameters, *signals):
+            if contact.model.patch.depends_on_load and name in ("load", f"{contact.name}.normal_force"):
+                rule = f"leave out {name}: the patch of contact {contact.name!r} changes its shape with the load"
+                raise InvalidValueError("parameters" if name == "load" else "signals", rule, name)
+
+
 class Columns:
     """The derivatives of a motion, one after another in the order in which they begin."""
 
@@ -82,6 +91,7 @@ class Columns:
         signals = {} if signals is None else signals
         if not isinstance(signals, Mapping):
             raise InvalidValueError("signals", "be a table of knots [s] by the name of a signal", signals)
+        _refuse_shapes(scene, parameters, signals)
         self._knots = [Knots(scene, validation.choice("a signal", name, valid), t) for name, t in signals.items()]
         plain = [(name, SCENE_PARAMETERS[name], 0) for name in parameters]
         plain += [(name, tangent.INITIAL, STATES.index(name)) for name in initial]
@@ -105,11 +115,13 @@ class Columns:
         self._begin, source = begin[self._order], np.concatenate(sources)[self._order].astype(int)
         mine = [np.flatnonzero(source[:, 0] == s) for s in range(len(self._knots))]
         self._sources = [(columns, source[columns, 1]) for columns in mine]
-        self._drives = Drives(
-            np.array([kind for _, kind, _ in plain], int)[self._order],
-            np.array([place for _, _, place in plain], int)[self._order],
-            np.zeros((len(plain), 2)),
-        )
+        pairs = np.array([[kind, place] for _, kind, place in plain], int).reshape(-1, 2)[self._order]
+        inputs, which = np.unique(pairs, axis=0, return_inverse=True)
+        kinds = (np.ascontiguousarray(column) for column in (*pairs.T, *inputs.T))
+        kind, place, input_kind, input_place = kinds
+        self._drives = Drives(kind, place, np.zeros((len(plain), 2)), which.reshape(-1), input_kind, input_place)
+        self.inputs = len(inputs)
+        """How many different inputs are behind the numbers."""
         self._scale = np.ones(len(plain))
         self._hats: list[tuple[np.ndarray, np.ndarray]] = []
 
@@ -172,18 +184,12 @@ class Columns:
         for (start, slope), (column, knot) in zip(self._hats, self._sources, strict=True):
             drives.weight[column, 0] = self._scale[column] * start[piece, knot]
             drives.weight[column, 1] = self._scale[column] * slope[piece, knot]
-        return Drives(drives.kind[:count], drives.place[:count], drives.weight[:count])
-
-    def inputs(self) -> tuple[Drives, np.ndarray]:
-        """The different inputs behind the numbers, in units, and which of them each number moves."""
-        kind, place = self._drives.kind, self._drives.place
-        pairs, which = np.unique(np.stack([kind, place], axis=1), axis=0, return_inverse=True)
-        driven = pairs[:, 0] == tangent.VELOCITY  # its rate has a say, not its value
-        weight = np.stack([1.0 - driven, 1.0 * driven], axis=1)
-        return Drives(pairs[:, 0].copy(), pairs[:, 1].copy(), weight), which.reshape(-1)
+        each = (values[:count] for values in (drives.kind, drives.place, drives.weight, drives.input))
+        return Drives(*each, drives.input_kind, drives.input_place)
 
     def gained(self, drives: Drives, moments: np.ndarray) -> np.ndarray:
-        """What a cost gains on a piece per number, from the moments [., 2] of the input that each of them moves."""
+        """What a cost gains on a piece per number, from the moments [U, 2] of the inputs."""
+        moments = moments[drives.input]
         of_signal = (drives.weight * moments).sum(axis=1)
         driven = drives.weight[:, 1] * moments[:, 0]
         gained = np.where(drives.kind == tangent.VELOCITY, driven, of_signal)

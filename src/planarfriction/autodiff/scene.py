@@ -16,7 +16,6 @@ from planarfriction.kernels import rosenbrock, tangent
 from planarfriction.kernels.body import System
 from planarfriction.kernels.integration import Output, run_of
 from planarfriction.kernels.tangent import Drives, Path
-from planarfriction.patch.metric import refuse_anisotropy
 from planarfriction.scenes.packing import Windows
 from planarfriction.scenes.scene import Scene
 from planarfriction.scenes.simulation import recording_times
@@ -73,7 +72,7 @@ def scene_sensitivities(
     `parameters` are factors (see `SCENE_PARAMETERS`). `signals` gives knots [s] by the name of a signal: `force`,
     `velocity`, or `NAME.normal_force` for a contact of that name. The derivative is that with respect to a number added
     to the signal at the knot, joined in time as the signal's own samples are (`hold`): `sum_k d_k hat_k(t)`. At the
-    times of its samples it is the derivative with respect to their values. Patches keep the shape that they have.
+    times of its samples it is the derivative with respect to their values.
     `initial` names components of the body's start: vx, vy, omega, x, y, theta.
 
     The scene is simulated with tight tolerances (`atol` as in `simulate`; default `rtol`). Along the accepted steps the
@@ -104,12 +103,15 @@ def prepared(scene: Scene, columns: Columns, t_end, rtol, atol, save_every) -> t
     if end > scene.t_end:
         raise InvalidValueError("t_end", f"be at most the scene's {scene.t_end:g} s", end)
     every = scene.save_every if save_every is None else validation.positive("save_every", save_every)
-    for contact in scene.contacts:
-        refuse_anisotropy(contact.model.patch, "scene_sensitivities")
     rtol = validation.positive("rtol", rtol)
     absolute = rtol if atol is None else validation.positive("atol", atol)
     times = recording_times(end, every)
-    return Windows(scene, end, times=times, sensitivities=True, marks=columns.marks), times, rtol, absolute
+    windows = Windows(scene, end, times=times, sensitivities=True, marks=columns.marks)
+    for contact, model in zip(scene.contacts, windows.models, strict=True):
+        if None in model.functions:
+            rule = "have all of the functions of `kernels.contacts.ModelFunctions` for derivatives of scenes"
+            raise InvalidValueError(f"model of contact {contact.name!r}", rule, type(contact.model).__name__)
+    return windows, times, rtol, absolute
 
 
 def _integrate(windows: Windows, derivatives: _Derivatives, rtol: float, atol: np.ndarray) -> None:
@@ -144,7 +146,7 @@ class _Derivatives:
         self.output = Output(times, body, wrench, load, np.empty((0, 0)))
         """What the integration of the motion records."""
         self.columns, self._accuracy = columns, SHARE * rtol**POWER
-        self._space, self._atol = tangent.slopes_for(count, n), self._accuracy * windows.natural
+        self._space, self._atol = tangent.slopes_for(count, columns.inputs, n), self._accuracy * windows.natural
         self.slope, self._state, self._scratch = np.zeros((count, n)), np.empty(n), np.empty((2, n))
         self._d_body, self._d_wrench = np.zeros((instants, 6, count)), np.zeros((instants, many, 3, count))
         self._count, self._wrench = 0, np.empty((many, 3))

@@ -16,14 +16,11 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.kernels import adjoint, rosenbrock, tangent
 from planarfriction.kernels.body import System
 from planarfriction.kernels.integration import Output, run_of
-from planarfriction.kernels.tangent import Path
+from planarfriction.kernels.tangent import Drives, Path
 from planarfriction.scenes.packing import Windows
 from planarfriction.scenes.scene import Scene
 from planarfriction.solvers import RODAS4
 from planarfriction.solvers.structured import start_of
-
-MOST_STATES = 60
-"""Bristle states of all contacts together that `scene_gradient` takes: its matrices are dense."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,15 +35,18 @@ class SceneGradient(ByValue):
     """`[M]` [s]"""
     motion: np.ndarray
     """vx, vy, omega, x, y, theta of the body `[M, 6]`."""
+    wrenches: np.ndarray
+    """Wrench of one of the identical contacts `[M, C, 3]` [N, N, N m]."""
     gradient: np.ndarray
     """`[P]`"""
 
 
 def scene_gradient(
     scene: Scene,
-    slope: Callable[[np.ndarray, np.ndarray], np.ndarray],
+    slope: Callable[[np.ndarray, np.ndarray], np.ndarray] | None,
     parameters: Sequence[str] = (),
     *,
+    wrench_slope: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
     signals: Mapping[str, Any] | None = None,
     initial: Sequence[str] = (),
     t_end: float | None = None,
@@ -54,63 +54,80 @@ def scene_gradient(
     atol: float | None = None,
     save_every: float | None = None,
 ) -> SceneGradient:
-    """Slope of a cost of the motion with respect to parameters, signals and start, as in `scene_sensitivities`.
+    """Slope of a cost of a motion with respect to parameters, signals and start, as in `scene_sensitivities`.
 
-    `slope(time, motion)` takes the times `[M]` and the motion `[M, 6]` and returns `dcost/dmotion` `[M, 6]`. The
-    adjoint `-l' = J' l` runs back over the accepted steps, jumps by the slope at each instant, and gathers
+    `slope(time, motion)` takes the times `[M]` and the motion `[M, 6]` and returns `dcost/dmotion` `[M, 6]`;
+    `wrench_slope(time, wrenches)` adds `dcost/dwrenches` `[M, C, 3]` for the wrench of one of the identical contacts.
+    The adjoint `-l' = J' l` runs back over the accepted steps, jumps by the slopes at each instant, and gathers
     `int l' df/dp dt`: it takes the time of one derivative, whatever the number of knots.
 
-    Raises `InvalidValueError` as `scene_sensitivities` does, and where the contacts have more than `MOST_STATES` states
-    together (a `DistributedModel` of many cells); `SolverError` where the solver gives up.
+    Raises `InvalidValueError` as `scene_sensitivities` does; `SolverError` where the solver gives up.
     """
-    if not callable(slope):
-        raise InvalidValueError("slope", "be a function of time and motion", slope)
-    columns = Columns(scene, parameters, signals, initial)
-    windows, times, rtol, absolute = prepared(scene, columns, t_end, rtol, atol, save_every)
-    if windows.bristles[-1] > MOST_STATES:
-        rule = f"have contacts of at most {MOST_STATES} states together"
-        raise InvalidValueError("scene", rule, int(windows.bristles[-1]))
-    output, segments, count = _followed(windows, times, rtol, absolute)
-    time, motion = output.time[:count], output.body[:count]
-    seeds = validation.array("slope of the cost", slope(time, motion), (count, 6))
-    gradient = _Adjoint(scene, windows, columns, seeds, rtol).back(segments, time)
-    return SceneGradient(columns.names, columns.of, time, motion, gradient)
-
-
-def _followed(windows: Windows, times: np.ndarray, rtol: float, absolute: float):
-    """The motion: what is recorded, its path in parts with the system of each, and how many instants it has."""
-    instants, many, n = len(times), len(windows.models), len(windows.state)
-    output = Output(
-        times, np.empty((instants, 6)), np.empty((instants, many, 3)), np.empty((instants, many)), np.empty((0, 0))
+    for name, function in (("slope", slope), ("wrench_slope", wrench_slope)):
+        if not callable(function) and (function is not None or (slope is None and wrench_slope is None)):
+            raise InvalidValueError(name, "be a function of time and motion, or wrenches", function)
+    done = Followed(scene, parameters, signals, initial, t_end, rtol, atol, save_every)
+    of_motion, of_wrenches = np.zeros_like(done.motion), None
+    if slope is not None:
+        of_motion = validation.array("slope of the cost", slope(done.time, done.motion), done.motion.shape)
+    if wrench_slope is not None:
+        of_wrenches = wrench_slope(done.time, done.wrenches)
+        of_wrenches = validation.array("wrench_slope of the cost", of_wrenches, done.wrenches.shape)
+    return SceneGradient(
+        done.columns.names, done.columns.of, done.time, done.motion, done.wrenches, done.back(of_motion, of_wrenches)
     )
-    now, outcome, parts = start_of(windows.state), rosenbrock.DONE, []
-    room = tangent.path_for(max(min(int(NUMBERS / n), 4096), LEAST_NODES), n)
-    for system in windows:
-        run = run_of(system, RODAS4, output, now, rtol=rtol, atol=absolute * windows.natural)
-        now.cursor[0], outcome = 0, rosenbrock.PAUSED
-        while outcome == rosenbrock.PAUSED:
-            nodes, outcome = tangent.follow(run.address, room)
-            parts.append((system, Path(*(each[:nodes].copy() for each in room))))
-        if outcome != rosenbrock.DONE:
-            break
-    check_outcome(outcome)
-    return output, parts, int(now.cursor[1])
+
+
+class Followed:
+    """A simulated motion with the way that it took, along which slopes of costs go back; not for several threads."""
+
+    def __init__(self, scene: Scene, parameters, signals, initial, t_end, rtol, atol, save_every) -> None:
+        self.columns = Columns(scene, parameters, signals, initial)
+        windows, times, self._rtol, absolute = prepared(scene, self.columns, t_end, rtol, atol, save_every)
+        self._scene, self._windows = scene, windows
+        instants, many, n = len(times), len(windows.models), len(windows.state)
+        body, wrenches, load = np.empty((instants, 6)), np.empty((instants, many, 3)), np.empty((instants, many))
+        output = Output(times, body, wrenches, load, np.empty((0, 0)))
+        now, outcome = start_of(windows.state), rosenbrock.DONE
+        self._parts: list[tuple[System, Path]] = []
+        room = tangent.path_for(max(min(int(NUMBERS / n), 4096), LEAST_NODES), n)
+        for system in windows:
+            run = run_of(system, RODAS4, output, now, rtol=self._rtol, atol=absolute * windows.natural)
+            now.cursor[0], outcome = 0, rosenbrock.PAUSED
+            while outcome == rosenbrock.PAUSED:
+                nodes, outcome = tangent.follow(run.address, room)
+                self._parts.append((system, Path(*(each[:nodes].copy() for each in room))))
+            if outcome != rosenbrock.DONE:
+                break
+        check_outcome(outcome)
+        count = int(now.cursor[1])
+        self.time, self.motion, self.wrenches = times[:count], body[:count], wrenches[:count]
+
+    def back(self, of_motion: np.ndarray, of_wrenches: np.ndarray | None) -> np.ndarray:
+        """The gradient [P] of a cost from its slopes by the motion [M, 6] and by the wrenches [M, C, 3]."""
+        seeds = of_motion, np.zeros_like(self.wrenches) if of_wrenches is None else of_wrenches
+        return _Adjoint(self._scene, self._windows, self.columns, seeds, self._rtol).back(self._parts, self.time)
 
 
 class _Adjoint:
     """The adjoint of a motion on its way back, and what the cost gains by then."""
 
-    def __init__(self, scene: Scene, windows: Windows, columns: Columns, seeds: np.ndarray, rtol: float) -> None:
+    def __init__(
+        self, scene: Scene, windows: Windows, columns: Columns, seeds: tuple[np.ndarray, np.ndarray], rtol: float
+    ) -> None:
         n = len(windows.state)
-        self._columns, self._seeds, self._driven = columns, seeds, scene.velocity is not None
+        (self._seeds, self._wrench_seeds), self._columns = seeds, columns
+        self._driven = scene.velocity is not None
         self._state, self._initial = np.zeros(n), np.zeros((len(columns.names), n))
         columns.start(scene, windows, self._initial)
-        self._inputs, self._which = columns.inputs()
-        self._gain, self._moments = np.zeros(len(columns.names)), np.zeros((len(self._inputs.kind), 2))
+        self._gain, self._moments = np.zeros(len(columns.names)), np.zeros((columns.inputs, 2))
         self._accuracy = SHARE * rtol**POWER
-        level = np.abs(seeds * windows.natural[-6:]).max(initial=0.0) or 1.0
+        grip = max(np.abs(contact.normal_force.values).max() for contact in scene.contacts)
+        wrench = grip * np.array([1.0, 1.0, windows.natural[-3] / windows.natural[-1]])
+        scaled = np.append(self._seeds * windows.natural[-6:], self._wrench_seeds * wrench)
+        level = np.abs(scaled).max(initial=0.0) or 1.0
         self._atol = self._accuracy * level / windows.natural
-        self._space, self._known = adjoint.workspace_for(len(self._inputs.kind), n), 0.0
+        self._space, self._known = adjoint.workspace_for(columns.inputs, n), 0.0
 
     def back(self, parts: list[tuple[System, Path]], time: np.ndarray) -> np.ndarray:
         """The gradient [P], from the path of the motion and the instants at which the cost sees it."""
@@ -133,17 +150,21 @@ class _Adjoint:
         if since == end - begin:
             tangent.forget(system.address, piece, self._state[None, :])
             self._known = 0.0
+        drives = self._columns.at(piece, end)
         self._moments[:] = 0.0
         while m >= 0 and (time[m] > begin + reach or time[m] == begin == 0.0 == reach):
             here = min(float(time[m]) - begin, since)
-            if self._seeds[m].any():
-                self._propagate(system, path, first, last, since, here)
+            if self._seeds[m].any() or self._wrench_seeds[m].any():
+                self._propagate(system, path, drives, first, last, since, here)
+                if self._wrench_seeds[m].any():
+                    tangent.state_at(path, first, last, here, self._space.state)
+                    at = system.address, piece, here, self._wrench_seeds[m]
+                    adjoint.jump(*at, self._state, drives, self._moments, self._space)
                 self._state[-6:] += self._seeds[m]
                 since, self._known = here, 0.0
             m -= 1
-        self._propagate(system, path, first, last, since, reach)
-        drives = self._columns.at(piece, end)
-        self._gain[: len(drives.kind)] += self._columns.gained(drives, self._moments[self._which[: len(drives.kind)]])
+        self._propagate(system, path, drives, first, last, since, reach)
+        self._gain[: len(drives.kind)] += self._columns.gained(drives, self._moments)
         if reach == 0.0 and self._driven:
             of_velocity = drives.kind == tangent.VELOCITY
             here = np.flatnonzero(of_velocity)
@@ -151,8 +172,9 @@ class _Adjoint:
             self._state[-6:-3], self._known = 0.0, 0.0
         return m
 
-    def _propagate(self, system: System, path: Path, first: int, last: int, since: float, until: float) -> None:
+    def _propagate(self, system: System, path: Path, drives: Drives, first: int, last: int, *span: float) -> None:
+        since, until = span
         if until < since:
-            numbers = self._state, self._inputs, self._moments, self._known, self._accuracy, self._atol, self._space
+            numbers = self._state, drives, self._moments, self._known, self._accuracy, self._atol, self._space
             adjoint.propagate_back(system.address, path, first, last, since, until, *numbers)
             self._known = 1.0

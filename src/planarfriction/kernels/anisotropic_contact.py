@@ -180,7 +180,58 @@ def back_substitute(contact, z, r, dv, lin, out):
 
 @entry
 def change(contact, z, zdot, lin, dz, dzdot, rows, friction, size):
-    """Not derived: sensitivities refuse anisotropic patches before they come here."""
+    """See `ModelFunctions`; `a/q` grows with friction as z does."""
+    own, z, lin, dz, out = read(contact), doubles(z), doubles(lin), doubles(dz), doubles(dzdot)
+    rows = doubles(rows)
+    n, law, cells, weights = own.count, own.law, doubles(own.cells), doubles(own.weights)
+    spin = rows[8] + size * rows[2]
+    fx, fy, tau = 0.0, 0.0, size * rows[5]
+    for i in range(n):
+        lever = _lever(cells, n, i)
+        ux, uy = _seen(lever, rows[6], rows[7], spin)
+        ax, ay = dz[i] - friction * z[i], dz[n + i] - friction * z[n + i]
+        dx = lin[4 * n + i] * ux + lin[5 * n + i] * uy - lin[i] * ax - lin[n + i] * ay
+        dy = lin[6 * n + i] * ux + lin[7 * n + i] * uy - lin[2 * n + i] * ax - lin[3 * n + i] * ay
+        out[i], out[n + i] = dx, dy
+        tx = weights[i] * formulas.traction(dz[i], dx, ux, law)
+        ty = weights[i] * formulas.traction(dz[n + i], dy, uy, law)
+        wx, wy, wt = _wrench(lever, tx, ty)
+        fx += wx
+        fy += wy
+        tau += wt
+    rows[9], rows[10], rows[11] = fx, fy, tau
 
 
-FUNCTIONS = ModelFunctions(evaluate, linearise, factor, eliminate, back_substitute, change)
+@entry
+def solve_transposed(contact, z, r, lin, out):
+    """See `ModelFunctions`."""
+    own, r, lin, out = read(contact), doubles(r), doubles(lin), doubles(out)
+    n = own.count
+    for i in range(n):
+        x, y = r[i], r[n + i]
+        out[i], out[n + i] = lin[8 * n + i] * x + lin[10 * n + i] * y, lin[9 * n + i] * x + lin[11 * n + i] * y
+
+
+@entry
+def pull_back(contact, z, lin, dzdot, rows, out):
+    """See `ModelFunctions`; as `distributed_contact`."""
+    own, given, lin, out, rows = read(contact), doubles(dzdot), doubles(lin), doubles(out), doubles(rows)
+    n, law, cells, weights = own.count, own.law, doubles(own.cells), doubles(own.weights)
+    vx, vy, omega = 0.0, 0.0, 0.0
+    for i in range(n):
+        lever = _lever(cells, n, i)
+        tx, ty = _seen(lever, rows[9], rows[10], rows[11])
+        tx, ty = weights[i] * tx, weights[i] * ty
+        lx, ly = given[i] - law.sigma_1 * tx, given[n + i] - law.sigma_1 * ty
+        out[i] = -lin[i] * lx - lin[2 * n + i] * ly - law.sigma_0 * tx
+        out[n + i] = -lin[n + i] * lx - lin[3 * n + i] * ly - law.sigma_0 * ty
+        ux = lin[4 * n + i] * lx + lin[6 * n + i] * ly - law.sigma_2 * tx
+        uy = lin[5 * n + i] * lx + lin[7 * n + i] * ly - law.sigma_2 * ty
+        wx, wy, wt = _wrench(lever, ux, uy)
+        vx += wx
+        vy += wy
+        omega += wt
+    rows[6], rows[7], rows[8] = vx, vy, omega
+
+
+FUNCTIONS = ModelFunctions(evaluate, linearise, factor, eliminate, back_substitute, change, solve_transposed, pull_back)

@@ -16,6 +16,7 @@ import numpy as np
 from planarfriction.kernels import entry, jit, kernel
 from planarfriction.kernels.contacts import (
     BACK_SUBSTITUTE,
+    CALLS,
     ELIMINATE,
     EVALUATE,
     FACTOR,
@@ -237,7 +238,8 @@ def rates(system, piece, since, y, dy):
         contact_map(integers(own.mount)[c], doubles(place), pose, a)
         times(a, doubles(seen), doubles(own.twist))
         call(
-            integers(own.calls)[6 * c + EVALUATE], (record_of(own, piece, c), at(y, first), own.twist, at(dy, first), w)
+            integers(own.calls)[CALLS * c + EVALUATE],
+            (record_of(own, piece, c), at(y, first), own.twist, at(dy, first), w),
         )
         load = doubles(own.count)[c] * load_of(own, piece, since, c)
         for i in range(3):
@@ -275,7 +277,7 @@ def linearise(system, piece, y):
                 g[3 * i + 1] += omega * a[3 * i]
         times(a, doubles(seen), v)
         z, lin = at(y, integers(own.state)[c]), at(own.workspace, integers(own.linear)[c])
-        call(integers(own.calls)[6 * c + LINEARISE], (record_of(own, piece, c), z, own.twist, lin))
+        call(integers(own.calls)[CALLS * c + LINEARISE], (record_of(own, piece, c), z, own.twist, lin))
 
 
 @entry
@@ -293,7 +295,7 @@ def factor(system, piece, since, y, shift):
         to_pose[i] = 0.0
     for c in range(own.contacts):
         z, lin = at(y, integers(own.state)[c]), at(own.workspace, integers(own.linear)[c])
-        call(integers(own.calls)[6 * c + FACTOR], (record_of(own, piece, c), z, shift, lin, own.stiffness))
+        call(integers(own.calls)[CALLS * c + FACTOR], (record_of(own, piece, c), z, shift, lin, own.stiffness))
         load = doubles(own.count)[c] * load_of(own, piece, since, c)
         maps = at(own.maps, 27 * c)
         a, g, h = doubles(maps), doubles(at(maps, 9)), doubles(at(maps, 18))
@@ -335,7 +337,8 @@ def solve(system, piece, since, y, shift, r, out):
     for c in range(own.contacts):
         first, lin = state[c], at(own.workspace, linear[c])
         call(
-            calls[6 * c + ELIMINATE], (record_of(own, piece, c), at(y, first), shift, at(r, first), lin, own.stiffness)
+            calls[CALLS * c + ELIMINATE],
+            (record_of(own, piece, c), at(y, first), shift, at(r, first), lin, own.stiffness),
         )
         load = doubles(own.count)[c] * load_of(own, piece, since, c)
         a = doubles(at(own.maps, 27 * c))
@@ -360,7 +363,7 @@ def solve(system, piece, since, y, shift, r, out):
             turn = g[3 * i] * pose[0] + g[3 * i + 1] * pose[1] + g[3 * i + 2] * pose[2]
             v[i] = a[3 * i] * u[0] + a[3 * i + 1] * u[1] + a[3 * i + 2] * u[2] + turn
         record = record_of(own, piece, c)
-        call(calls[6 * c + BACK_SUBSTITUTE], (record, at(y, first), at(r, first), own.twist, lin, at(out, first)))
+        call(calls[CALLS * c + BACK_SUBSTITUTE], (record, at(y, first), at(r, first), own.twist, lin, at(out, first)))
 
 
 @jit

@@ -18,8 +18,11 @@ from planarfriction.kernels.pointers import address_of
 WORLD, BODY, BODY_AXES = 0, 1, 2
 """Fixed to the world; fixed to the body; fixed to a body whose prescribed velocity is given in its own axes."""
 
-EVALUATE, LINEARISE, FACTOR, ELIMINATE, BACK_SUBSTITUTE, CHANGE = range(6)
-"""Columns of `Contacts.calls`."""
+EVALUATE, LINEARISE, FACTOR, ELIMINATE, BACK_SUBSTITUTE, CHANGE, SOLVE_TRANSPOSED, PULL_BACK = range(8)
+"""Columns of `Contacts.calls`; derivatives of scenes need those from `CHANGE` on."""
+
+CALLS = 8
+"""How many there are."""
 
 
 class ModelFunctions(NamedTuple):
@@ -39,29 +42,36 @@ class ModelFunctions(NamedTuple):
     """`(contact, z, shift, r, lin, W)`: write the wrench that the residual r of z' causes."""
     back_substitute: Any
     """`(contact, z, r, dV, lin, out)`: solve `D out = r + df/dV dV`."""
-    change: Any
+    change: Any = None
     """`(contact, z, z', lin, dz, dz', rows, friction, size)`: write the change `dz'` of z' and that of the wrench.
 
     `rows` [4, 3] holds V, W, dV and takes dW. The changes come from `dz`, `dV` and from relative changes of all
-    coefficients of friction and of the size of the patch."""
+    coefficients of friction and of the size of the patch. None: the model takes no part in derivatives of scenes."""
+    solve_transposed: Any = None
+    """`(contact, z, r, lin, out)`: solve `D' out = r` with the D that `factor` prepared."""
+    pull_back: Any = None
+    """`(contact, z, lin, l, rows, out)`: the transpose of `change`, at held coefficients.
+
+    From `l` of z' and `rows[3]` of the wrench write `(df/dz)' l + (dW/dz)' rows[3]` to `out` and the same by V to
+    `rows[2]`."""
 
 
-WORDS = ("ppppp", "pppp", "ppfpp", "ppfppp", "pppppp", "pppppppff")
+WORDS = ("ppppp", "pppp", "ppfpp", "ppfppp", "pppppp", "pppppppff", "ppppp", "pppppp")
 """Arguments of `ModelFunctions` (see `pointers.address_of`)."""
 
 
 def calls_of(functions: ModelFunctions, *, change: bool = False) -> np.ndarray:
-    """Addresses of the functions of a model, compiled or read from the cache, [6]; that of `change` only if asked."""
-    count = len(functions) if change else CHANGE
-    addresses = [address_of(function, words) for function, words in zip(functions[:count], WORDS, strict=False)]
-    return np.array(addresses + [0] * (len(functions) - count), np.int64)
+    """Addresses of the functions of a model, compiled or read from the cache, [8]; from `change` on only if asked."""
+    wanted = functions if change else functions[:CHANGE]
+    found = [address_of(each, words) if each else 0 for each, words in zip(wanted, WORDS, strict=False)]
+    return np.array(found + [0] * (CALLS - len(found)), np.int64)
 
 
 class Contacts(NamedTuple):
     """C contacts and the R shapes they take."""
 
     calls: np.ndarray
-    """Addresses of each contact's `ModelFunctions`, int [C, 6]."""
+    """Addresses of each contact's `ModelFunctions`, int [C, 8]."""
     record: np.ndarray
     """Addresses of the records of contacts, one for each shape, int [R]."""
     mount: np.ndarray

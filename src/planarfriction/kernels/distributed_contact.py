@@ -220,4 +220,35 @@ def change(contact, z, zdot, lin, dz, dzdot, rows, friction, size):
     rows[9], rows[10], rows[11] = fx, fy, tau
 
 
-FUNCTIONS = ModelFunctions(evaluate, linearise, factor, eliminate, back_substitute, change)
+@entry
+def solve_transposed(contact, z, r, lin, out):
+    """See `ModelFunctions`: `D = (shift + k) I + z (x) k_z`."""
+    own, z, r, out = read(contact), doubles(z), doubles(r), doubles(out)
+    n, (_, kzx, kzy, _, _, per_diagonal, per_rank_one) = own.count, _linear(own, lin)
+    for i in range(n):
+        c = (z[i] * r[i] + z[n + i] * r[n + i]) * per_rank_one[i]
+        out[i], out[n + i] = (r[i] - kzx[i] * c) * per_diagonal[i], (r[n + i] - kzy[i] * c) * per_diagonal[i]
+
+
+@entry
+def pull_back(contact, z, lin, dzdot, rows, out):
+    """See `ModelFunctions`: with the share t of a cell in the wrench, its z' gets `l - sigma_1 t`."""
+    own, z, given, out, rows = read(contact), doubles(z), doubles(dzdot), doubles(out), doubles(rows)
+    n, law, (x, y, weights) = own.count, own.law, _cells(own)
+    k, kzx, kzy, kvx, kvy, _, _ = _linear(own, lin)
+    fx, fy, tau = rows[9], rows[10], rows[11]
+    vx, vy, omega = 0.0, 0.0, 0.0
+    for i in range(n):
+        tx, ty = weights[i] * (fx - tau * y[i]), weights[i] * (fy + tau * x[i])
+        lx, ly = given[i] - law.sigma_1 * tx, given[n + i] - law.sigma_1 * ty
+        c = z[i] * lx + z[n + i] * ly
+        out[i] = -k[i] * lx - kzx[i] * c - law.sigma_0 * tx
+        out[n + i] = -k[i] * ly - kzy[i] * c - law.sigma_0 * ty
+        ux, uy = lx - kvx[i] * c - law.sigma_2 * tx, ly - kvy[i] * c - law.sigma_2 * ty
+        vx += ux
+        vy += uy
+        omega += x[i] * uy - y[i] * ux
+    rows[6], rows[7], rows[8] = vx, vy, omega
+
+
+FUNCTIONS = ModelFunctions(evaluate, linearise, factor, eliminate, back_substitute, change, solve_transposed, pull_back)

@@ -16,6 +16,8 @@ from planarfriction.kernels.contacts import (
     EVALUATE,
     FACTOR,
     LINEARISE,
+    PULL_BACK,
+    SOLVE_TRANSPOSED,
     ModelFunctions,
 )
 from planarfriction.kernels.pointers import at, call, doubles, integers
@@ -31,7 +33,7 @@ class PartsContact(NamedTuple):
     workspace: int
     """Numbers that a linearisation of a part takes."""
     calls: int
-    """Where the addresses of the functions of a part are, [6]."""
+    """Where the addresses of the functions of a part are, [8]."""
     records: int
     """Where the addresses of the records of the parts are, [count]."""
     shares: int
@@ -118,4 +120,29 @@ def change(contact, z, zdot, lin, dz, dzdot, rows, friction, size):
     one[0], one[1], one[2] = x, y, tau
 
 
-FUNCTIONS = ModelFunctions(evaluate, linearise, factor, eliminate, back_substitute, change)
+@entry
+def solve_transposed(contact, z, r, lin, out):
+    """See `ModelFunctions`."""
+    own = read(contact)
+    for k in range(own.count):
+        part, first, work, _ = _part(own, k)
+        call(integers(own.calls)[SOLVE_TRANSPOSED], (part, at(z, first), at(r, first), at(lin, work), at(out, first)))
+
+
+@entry
+def pull_back(contact, z, lin, dzdot, rows, out):
+    """See `ModelFunctions`; a part takes its share of the wrench."""
+    own, v, w = read(contact), doubles(at(rows, 6)), doubles(at(rows, 9))
+    fx, fy, tau = w[0], w[1], w[2]
+    x, y, s = 0.0, 0.0, 0.0
+    for k in range(own.count):
+        part, first, work, share = _part(own, k)
+        w[0], w[1], w[2] = share * fx, share * fy, share * tau
+        states = at(z, first), at(lin, work), at(dzdot, first), rows, at(out, first)
+        call(integers(own.calls)[PULL_BACK], (part, *states))
+        x, y, s = x + v[0], y + v[1], s + v[2]
+    v[0], v[1], v[2] = x, y, s
+    w[0], w[1], w[2] = fx, fy, tau
+
+
+FUNCTIONS = ModelFunctions(evaluate, linearise, factor, eliminate, back_substitute, change, solve_transposed, pull_back)

@@ -217,13 +217,16 @@ def back_substitute(contact, z, r, dv, lin, out):
 
 @entry
 def change(contact, z, zdot, lin, dz, dzdot, rows, friction, size):
-    """See `ModelFunctions`; of an isotropic patch."""
+    """See `ModelFunctions`."""
     own, lin, zdot, dz = read(contact), doubles(lin), doubles(zdot), doubles(dz)
-    out, rows = doubles(dzdot), doubles(rows)
+    z, out, rows = doubles(z), doubles(dzdot), doubles(rows)
     law, shape = own.law, own.shape
     cx, cy, r = shape.centre_x, shape.centre_y, shape.contact_radius
     spin = rows[8] + size * rows[2]
-    ux, uy = rows[6] - spin * cy, rows[7] + spin * cx
+    ux, uy = _through(own.root, rows[6], rows[7])
+    ux, uy = ux - spin * cy, uy + spin * cx
+    vx, vy, _ = _scaled(own, rows)
+    gx, gy = formulas.traction(z[0], zdot[0], vx, law), formulas.traction(z[1], zdot[1], vy, law)
     zx, zy, zs = lin[SCALED], lin[SCALED + 1], lin[SCALED + 2]
     ax, ay, a_s = dz[0] - friction * zx, dz[1] - friction * zy, dz[2] * per_radius(r) - (size + friction) * zs
     dk = lin[BY_Z] * ax + lin[BY_Z + 1] * ay + lin[BY_Z + 2] * a_s
@@ -233,8 +236,39 @@ def change(contact, z, zdot, lin, dz, dzdot, rows, friction, size):
     out[2] = r * (bs - lin[DECAY] * a_s - zs * dk) + size * zdot[2]
     fx, fy = formulas.traction(dz[0], out[0], ux, law), formulas.traction(dz[1], out[1], uy, law)
     tau = formulas.traction(xp.where(r > 0.0, dz[2], 0.0), out[2], shape.second_moment * (spin + size * rows[2]), law)
-    rows[9], rows[10] = fx, fy
-    rows[11] = tau + cx * fy - cy * fx + size * (cx * rows[4] - cy * rows[3])
+    rows[9], rows[10] = _through(own.root, fx, fy)
+    rows[11] = tau + cx * fy - cy * fx + size * (cx * gy - cy * gx)
 
 
-FUNCTIONS = ModelFunctions(evaluate, linearise, factor, eliminate, back_substitute, change)
+@entry
+def solve_transposed(contact, z, r, lin, out):
+    """See `ModelFunctions`."""
+    own, r, lin, out = read(contact), doubles(r), doubles(lin), doubles(out)
+    radius, per = own.shape.contact_radius, lin[DIAGONAL]
+    x, y, s = r[0], r[1], radius * r[2]
+    c = (lin[SCALED] * x + lin[SCALED + 1] * y + lin[SCALED + 2] * s) * lin[RANK_ONE]
+    out[0], out[1] = (x - c * lin[BY_Z]) * per, (y - c * lin[BY_Z + 1]) * per
+    out[2] = per_radius(radius) * (s - c * lin[BY_Z + 2]) * per
+
+
+@entry
+def pull_back(contact, z, lin, dzdot, rows, out):
+    """See `ModelFunctions`; transposes of `_scaled` and `_to_origin` are each other's but for the contact radius."""
+    own, given, lin, out = read(contact), doubles(dzdot), doubles(lin), doubles(out)
+    x, y, _ = _scaled(own, doubles(at(rows, 9)))
+    rows = doubles(rows)
+    law, shape, r, tau = own.law, own.shape, own.shape.contact_radius, rows[11]
+    lx, ly, ls = given[0] - law.sigma_1 * x, given[1] - law.sigma_1 * y, r * (given[2] - law.sigma_1 * tau)
+    c = lin[SCALED] * lx + lin[SCALED + 1] * ly + lin[SCALED + 2] * ls
+    k, per = lin[DECAY], per_radius(r)
+    out[0] = -k * lx - lin[BY_Z] * c - law.sigma_0 * x
+    out[1] = -k * ly - lin[BY_Z + 1] * c - law.sigma_0 * y
+    out[2] = -per * (k * ls + lin[BY_Z + 2] * c) - xp.where(r > 0.0, law.sigma_0 * tau, 0.0)
+    ux = lin[BY_V] * lx + lin[BY_V + 3] * ly + lin[BY_V + 6] * ls - law.sigma_2 * x
+    uy = lin[BY_V + 1] * lx + lin[BY_V + 4] * ly + lin[BY_V + 7] * ls - law.sigma_2 * y
+    us = lin[BY_V + 2] * lx + lin[BY_V + 5] * ly + lin[BY_V + 8] * ls
+    spin = r * us - law.sigma_2 * shape.second_moment * tau
+    rows[6], rows[7], rows[8] = _to_origin(own, ux, uy, spin)
+
+
+FUNCTIONS = ModelFunctions(evaluate, linearise, factor, eliminate, back_substitute, change, solve_transposed, pull_back)

@@ -201,4 +201,34 @@ def change(contact, z, zdot, lin, dz, dzdot, rows, friction, size):
     rows[11] = tau + size * rows[5]
 
 
-FUNCTIONS = ModelFunctions(evaluate, linearise, factor, eliminate, back_substitute, change)
+@kernel
+def _transposed_times(m, x, y, s):
+    """The transpose of a matrix times a vector."""
+    return (
+        m[0] * x + m[3] * y + m[6] * s,
+        m[1] * x + m[4] * y + m[7] * s,
+        m[2] * x + m[5] * y + m[8] * s,
+    )
+
+
+@entry
+def solve_transposed(contact, z, r, lin, out):
+    """See `ModelFunctions`."""
+    r, out = doubles(r), doubles(out)
+    out[0], out[1], out[2] = _transposed_times(doubles(at(lin, INVERSE)), r[0], r[1], r[2])
+
+
+@entry
+def pull_back(contact, z, lin, dzdot, rows, out):
+    """See `ModelFunctions`; the transpose of `F' g` is F."""
+    own, given, out, rows = read(contact), doubles(dzdot), doubles(out), doubles(rows)
+    law, shape = own.law, own.shape
+    x, y, s = scaled_twist(shape, rows[9], rows[10], rows[11])
+    lx, ly, ls = given[0] - law.sigma_1 * x, given[1] - law.sigma_1 * y, given[2] - law.sigma_1 * s
+    zx, zy, zs = _transposed_times(doubles(lin), lx, ly, ls)
+    out[0], out[1], out[2] = zx - law.sigma_0 * x, zy - law.sigma_0 * y, zs - law.sigma_0 * s
+    vx, vy, vs = _transposed_times(doubles(at(lin, BY_V)), lx, ly, ls)
+    rows[6], rows[7], rows[8] = to_origin(shape, vx - law.sigma_2 * x, vy - law.sigma_2 * y, vs - law.sigma_2 * s)
+
+
+FUNCTIONS = ModelFunctions(evaluate, linearise, factor, eliminate, back_substitute, change, solve_transposed, pull_back)

@@ -7,8 +7,7 @@ stage is one `factor` and, for each parameter, one `solve` of `body`,
     b_i = s + h sum_{j<i} a_ij G_j,   (I/(h gamma) - J_i) S_i = b_i/(h gamma) + df/dp,   G_i = (S_i - b_i)/(h gamma)
 
 with `J_i` at the cubic Hermite interpolant between the accepted steps of the motion. Derivatives need fewer digits than
-the motion, so that one step of theirs goes over several of it; the embedded method of order 3 tells how many. Source of
-the coefficients: Hairer and Wanner, Solving ODEs II, table IV.6.5.
+the motion, so that one step of theirs goes over several of it; the embedded method of order 3 tells how many.
 
 Friction and size enter by scaling: with all coefficients `g` times m, a bristle behaves as `z/m` did,
 `zdot(z; m) = zdot(z/m; 1)`; a patch `l` times as large sees `l omega` and gives `l tau`.
@@ -23,10 +22,11 @@ import numpy as np
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import jit, kernel
 from planarfriction.kernels.body import load_of, read, record_of, seen_by, times
-from planarfriction.kernels.contacts import CHANGE
+from planarfriction.kernels.contacts import CALLS, CHANGE
 from planarfriction.kernels.integration import read_run
 from planarfriction.kernels.pointers import address, at, call, doubles, integers
-from planarfriction.kernels.rosenbrock import PAUSED, STEPS, advance, error_norm, forget_unloaded
+from planarfriction.kernels.rosenbrock import PAUSED, STEPS, advance, forget_unloaded
+from planarfriction.kernels.sdirk import GAMMA, PLACES, excess_of, pace_after, stage_base
 
 FRICTION, SIZE, MASS, INERTIA, LOAD = 0, 1, 2, 3, 4
 """Parameters; each is a factor, 1 as the scene is."""
@@ -37,7 +37,7 @@ velocity, each in proportion to a weight that is linear on a piece, and a compon
 
 
 class Drives(NamedTuple):
-    """P numbers that a motion depends on."""
+    """P numbers that a motion depends on, by way of U inputs: the knots of a signal all move the same."""
 
     kind: np.ndarray
     """`FRICTION` to `INITIAL`, int [P]."""
@@ -45,6 +45,12 @@ class Drives(NamedTuple):
     """Contact, component of the wrench or velocity, or of velocity and pose at the start; int [P]."""
     weight: np.ndarray
     """Change of a signal per change of the number, at the start of the piece and its slope, [P, 2]."""
+    input: np.ndarray
+    """Which input, int [P]."""
+    input_kind: np.ndarray
+    """As `kind`, int [U]."""
+    input_place: np.ndarray
+    """As `place`, int [U]."""
 
 
 SHORTEST = 2.0**-12
@@ -52,28 +58,6 @@ SHORTEST = 2.0**-12
 
 MOST = 8
 """Steps of the motion that one of the derivatives goes over at most, so that it passes over nothing sudden."""
-
-GAMMA = 0.25
-PLACES = np.array([0.25, 0.75, 0.55, 0.5, 1.0])
-"""Stage times, as shares of the step."""
-STAGES = np.array(
-    [
-        [0.0, 0.0, 0.0, 0.0],
-        [1.0 / 2.0, 0.0, 0.0, 0.0],
-        [17.0 / 50.0, -1.0 / 25.0, 0.0, 0.0],
-        [371.0 / 1360.0, -137.0 / 2720.0, 15.0 / 544.0, 0.0],
-        [25.0 / 24.0, -49.0 / 48.0, 125.0 / 16.0, -85.0 / 12.0],
-    ]
-)
-"""Stage arguments below the diagonal, `a_ij`."""
-ERROR = np.array([-3.0 / 16.0, -27.0 / 32.0, 25.0 / 32.0, 0.0, 0.25])
-"""Solution minus that of the embedded method, in `h G_i`."""
-START, AGAIN = 0.125, np.array([-11.0 / 32.0, -11.0 / 64.0, 25.0 / 64.0, 0.0, 0.0])
-"""Another difference of order 3, `START h s'` at the start of the step and `AGAIN` in `h G_i`: a Jacobian that jumps
-before the first stage would go unseen without it."""
-
-# Step control, as that of the motion: cautious, and no faster growth than a transient that is followed needs.
-_SAFETY, _GROWTH, _SHRINKAGE = 0.85, 2.0, 0.2
 
 
 @kernel
@@ -85,16 +69,15 @@ def _change(own, piece, c, y, dy, dz, parameter, dzdot):
     first, lin = integers(own.state)[c], at(own.workspace, integers(own.linear)[c])
     d_friction = 1.0 if parameter == FRICTION else 0.0
     d_size = 1.0 if parameter == SIZE else 0.0
-    function, record = integers(own.calls)[6 * c + CHANGE], record_of(own, piece, c)
+    function, record = integers(own.calls)[CALLS * c + CHANGE], record_of(own, piece, c)
     bristles = at(y, first), at(dy, first), lin, at(dz, first), at(dzdot, first)
     call(function, (record, *bristles, own.rows, d_friction, d_size))
 
 
 @kernel
-def _partial(own, piece, since, w, drives, p, out):
-    """`df/dp` at the held state `w.state`, whose rates are in `w.rate` and whose linearisation was made last."""
-    parameter, place = drives.kind[p], drives.place[p]
-    weight = drives.weight[p, 0] + drives.weight[p, 1] * since
+def _partial(own, piece, since, w, parameter, place, out):
+    """`df/dp` of an input at the held state `w.state`, whose rates are in `w.rate`, linearised last; of a prescribed
+    velocity that by its slope."""
     o, dy, rows, total = own.bristles, w.rate, doubles(own.rows), doubles(own.body)
     for i in range(out.shape[0]):
         out[i] = 0.0
@@ -102,10 +85,10 @@ def _partial(own, piece, since, w, drives, p, out):
     if parameter == INITIAL:
         return
     if parameter == VELOCITY:
-        out[o + place] = drives.weight[p, 1]
+        out[o + place] = 1.0
         return
     if parameter == FORCE:
-        out[o + place] = inverse_mass[place] * weight
+        out[o + place] = inverse_mass[place]
         return
     if parameter in (MASS, INERTIA):
         for i in range(3):
@@ -123,7 +106,7 @@ def _partial(own, piece, since, w, drives, p, out):
         if parameter in (FRICTION, SIZE):
             times(a, doubles(seen_by(own, c, address(w.state, 0))), rows)
             _change(own, piece, c, address(w.state, 0), address(dy, 0), address(w.zero, 0), parameter, address(out, 0))
-        load = doubles(own.count)[c] * (weight if parameter == NORMAL_FORCE else load_of(own, piece, since, c))
+        load = doubles(own.count)[c] * (1.0 if parameter == NORMAL_FORCE else load_of(own, piece, since, c))
         for i in range(3):
             total[i] += load * (a[i] * rows[9] + a[3 + i] * rows[10] + a[6 + i] * rows[11])
     for i in range(3):
@@ -180,19 +163,26 @@ def follow(run, path):
     return count, outcome
 
 
+@kernel
+def _share(drives, p, since):
+    """How much of its input a number moves."""
+    kind = drives.kind[p]
+    if kind in (NORMAL_FORCE, FORCE):
+        return drives.weight[p, 0] + drives.weight[p, 1] * since
+    return drives.weight[p, 1] if kind == VELOCITY else (0.0 if kind == INITIAL else 1.0)
+
+
 class Slopes(NamedTuple):
-    """Workspace for P derivatives of n states."""
+    """Workspace for P derivatives of n states by way of U inputs."""
 
     forcing: np.ndarray
-    """`df/dp`, [P, n]."""
+    """`df/dp` of the inputs, [U, n]."""
+    level: np.ndarray
+    """Largest derivatives so far by the numbers of each input, [U, n]."""
     stages: np.ndarray
     """`G` of each stage, [P, 5, n]."""
     new: np.ndarray
     """Derivatives after a step, [P, n]."""
-    error: np.ndarray
-    """Their error estimates, [P, n]."""
-    other: np.ndarray
-    """Those from the start of the step, [P, n]."""
     before: np.ndarray
     """Rates of the derivatives at the end of the step before, [P, n]."""
     state: np.ndarray
@@ -209,11 +199,11 @@ class Slopes(NamedTuple):
     """Length of the next step, in steps of the motion, [1]."""
 
 
-def slopes_for(count: int, n: int) -> Slopes:
+def slopes_for(count: int, inputs: int, n: int) -> Slopes:
     """Workspace for `count` derivatives of n states (made outside compiled code)."""
-    forcing, new, error, other, before = np.zeros((5, count, n))
-    of_parameters = forcing, np.zeros((count, len(PLACES), n)), new, error, other, before
-    return Slopes(*of_parameters, *np.zeros((5, n)), np.ones(1))
+    of_inputs, of_numbers = np.zeros((2, inputs, n)), np.zeros((2, count, n))
+    stages = np.zeros((count, len(PLACES), n))
+    return Slopes(*of_inputs, stages, *of_numbers, *np.zeros((5, n)), np.ones(1))
 
 
 @kernel
@@ -237,10 +227,10 @@ def _node(path, k, last, since):
 
 
 @kernel
-def _step(system, path, k, last, since, h, slope, drives, known, w):
-    """Carry `slope` over `h` seconds into `w.new`, its error estimates into `w.error` and `w.other`.
+def _step(system, path, k, last, since, h, slope, drives, known, rtol, atol, w):
+    """Carry `slope` over `h` seconds into `w.new`; how far its error estimates exceed what is allowed.
 
-    The latter is 0 unless it is `known` (1 or 0) how fast the slope changes at the start, `w.before`.
+    One of them is 0 unless it is `known` (1 or 0) how fast the slope changes at the start, `w.before`.
     """
     own, piece, n = read(system), path.piece[k], w.state.shape[0]
     shift = 1.0 / (h * GAMMA)
@@ -249,29 +239,29 @@ def _step(system, path, k, last, since, h, slope, drives, known, w):
         _interpolate(path, _node(path, k, last, time), time, w.state)
         call(own.rates, (system, piece, time, w.state, w.rate))
         call(own.linearise, (system, piece, w.state))
-        for p in range(drives.kind.shape[0]):
-            _partial(own, piece, time, w, drives, p, w.forcing[p])
+        for u in range(drives.input_kind.shape[0]):
+            _partial(own, piece, time, w, drives.input_kind[u], drives.input_place[u], w.forcing[u])
         call(own.factor, (system, piece, time, w.state, shift))
         for p in range(drives.kind.shape[0]):
+            stages = address(w.stages, p * PLACES.shape[0] * n)
+            stage_base(i, h, n, address(slope, p * n), stages, address(w.base, 0))
+            share, forcing = _share(drives, p, time), w.forcing[drives.input[p]]
             for m in range(n):
-                w.base[m] = slope[p, m]
-            for j in range(i):
+                w.right[m] = shift * w.base[m]
+            if share != 0.0:
                 for m in range(n):
-                    w.base[m] += h * STAGES[i, j] * w.stages[p, j, m]
-            for m in range(n):
-                w.right[m] = shift * w.base[m] + w.forcing[p, m]
+                    w.right[m] += share * forcing[m]
             new = w.new[p]
             call(own.solve, (system, piece, time, w.state, shift, w.right, new))
             for m in range(n):
                 w.stages[p, i, m] = shift * (new[m] - w.base[m])
+    largest = 0.0
     for p in range(drives.kind.shape[0]):
-        for m in range(n):
-            w.error[p, m], w.other[p, m] = 0.0, known * h * START * w.before[p, m]
-        for j in range(PLACES.shape[0]):
-            one, other = h * ERROR[j], known * h * AGAIN[j]
-            for m in range(n):
-                w.error[p, m] += one * w.stages[p, j, m]
-                w.other[p, m] += other * w.stages[p, j, m]
+        old, new, level = address(slope, p * n), address(w.new, p * n), address(w.level, drives.input[p] * n)
+        stages, before = address(w.stages, p * PLACES.shape[0] * n), address(w.before, p * n)
+        excess = excess_of(own, n, (old, new, level, before, stages, address(atol, 0)), h, known, rtol)
+        largest = xp.maximum(largest, excess)
+    return largest
 
 
 @jit
@@ -281,31 +271,26 @@ def propagate(system, path, first, last, begin, until, slope, drives, rtol, atol
     Returns how many steps that took. Each keeps its error below `rtol`, `atol` [n], but for one shorter than `SHORTEST`
     of a step of the motion: the Jacobian may jump within it.
     """
-    own, taken, n, k, since = read(system), 0, w.right.shape[0], first, begin
+    taken, n, k, since = 0, w.right.shape[0], first, begin
     while since < until:
         k = _node(path, k, last, since)
         local, remaining = path.since[k + 1] - path.since[k], until - since
         wanted = w.pace[0] * local
         reach = xp.minimum(wanted, path.since[xp.minimum(k + MOST, last)] - since)
         h = reach if 2.0 * reach <= remaining else (remaining if reach >= remaining else 0.5 * remaining)
-        _step(system, path, k, last, since, h, slope, drives, 1.0 if since > 0.0 else 0.0, w)
+        largest = _step(system, path, k, last, since, h, slope, drives, 1.0 if since > 0.0 else 0.0, rtol, atol, w)
         taken += 1
-        largest = 0.0
-        for p in range(drives.kind.shape[0]):
-            old, new = doubles(address(slope, p * n)), doubles(address(w.new, p * n))
-            for error in (address(w.error, p * n), address(w.other, p * n)):
-                norm = error_norm(own, old, new, doubles(error), rtol, doubles(address(atol, 0)))
-                largest = xp.maximum(largest, norm)
-        scale = xp.minimum(_GROWTH, xp.maximum(_SHRINKAGE, _SAFETY * xp.maximum(largest, 1e-10) ** -0.25))
-        ideal = scale * h / local
+        ideal = pace_after(largest) * h / local
         if largest > 1.0 and h > SHORTEST * local:
             w.pace[0] = ideal
             continue
         w.pace[0] = xp.maximum(ideal, w.pace[0] if h < wanted else SHORTEST)
         since = until if h == remaining else since + h
         for p in range(drives.kind.shape[0]):
+            level = w.level[drives.input[p]]
             for m in range(n):
                 slope[p, m], w.before[p, m] = w.new[p, m], w.stages[p, PLACES.shape[0] - 1, m]
+                level[m] = xp.maximum(level[m], abs(w.new[p, m]))
     return taken
 
 
