@@ -174,7 +174,7 @@ def test_derivatives_through_friction_that_depends_on_the_direction(kind):
 
 
 def test_what_has_no_derivative_is_refused():
-    soft = pf.DistributedModel(pf.ContactPatch.disc(0.01, cells=5, pressure=pf.SoftFinger(c=5e-3)), LAW)
+    soft = pf.DistributedModel(pf.ContactPatch.disc(0.01, cells=5, pressure=pf.SoftFinger(c=5e-3, n=1 / 3, k=2.0)), LAW)
     scene = pf.Scene(pf.Body(0.4, 6e-4), [pf.Contact(soft, 3.0, name="soft")], 0.1)
     rule = r"must leave out soft.normal_force: the patch of contact 'soft' changes its shape with the load"
     with pytest.raises(InvalidValueError, match="signals " + rule):

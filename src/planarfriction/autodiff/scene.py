@@ -72,8 +72,8 @@ def scene_sensitivities(
     `parameters` are factors (see `SCENE_PARAMETERS`). `signals` gives knots [s] by the name of a signal: `force`,
     `velocity`, or `NAME.normal_force` for a contact of that name. The derivative is that with respect to a number added
     to the signal at the knot, joined in time as the signal's own samples are (`hold`): `sum_k d_k hat_k(t)`. At the
-    times of its samples it is the derivative with respect to their values.
-    `initial` names components of the body's start: vx, vy, omega, x, y, theta.
+    times of its samples it is the derivative with respect to their values. `initial` names components of the body's
+    start: vx, vy, omega, x, y, theta.
 
     The scene is simulated with tight tolerances (`atol` as in `simulate`; default `rtol`). Along the accepted steps the
     variational equation `s' = J s + df/dp` is solved with the solver's own analytic Jacobian, by an L-stable method of
