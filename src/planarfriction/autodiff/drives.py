@@ -184,8 +184,8 @@ class Columns:
         for (start, slope), (column, knot) in zip(self._hats, self._sources, strict=True):
             drives.weight[column, 0] = self._scale[column] * start[piece, knot]
             drives.weight[column, 1] = self._scale[column] * slope[piece, knot]
-        each = (values[:count] for values in (drives.kind, drives.place, drives.weight, drives.input))
-        return Drives(*each, drives.input_kind, drives.input_place)
+        kind, place, weight, which = (values[:count] for values in drives[:4])
+        return Drives(kind, place, weight, which, drives.input_kind, drives.input_place)
 
     def gained(self, drives: Drives, moments: np.ndarray) -> np.ndarray:
         """What a cost gains on a piece per number, from the moments [U, 2] of the inputs."""
