@@ -16,6 +16,7 @@ from planarfriction.jax.distributed import DistributedModel, LawParameters
 from planarfriction.jax.published import PublishedParameters, ReducedModelPublished, Surface
 from planarfriction.jax.reduced import ReducedModel, ReducedParameters
 from planarfriction.jax.rollouts import Rollout, rate, rest, rollout, step, wrench
+from planarfriction.jax.scene import SceneMotion, simulate_scene
 
 __all__ = [
     "DistributedModel",
@@ -25,10 +26,12 @@ __all__ = [
     "ReducedModelPublished",
     "ReducedParameters",
     "Rollout",
+    "SceneMotion",
     "Surface",
     "rate",
     "rest",
     "rollout",
+    "simulate_scene",
     "step",
     "wrench",
 ]

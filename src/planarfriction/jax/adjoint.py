@@ -55,22 +55,22 @@ def _full(outer: int, operands) -> list[jax.Array]:
     return [jnp.broadcast_to(value, (*lead, *value.shape[outer:])) for value in operands]
 
 
-def _primitive(name: str, callback: Callable[..., Any], results: Callable[..., list[Any]]) -> Primitive:
+def primitive_of(name: str, callback: Callable[..., Any], results: Callable[..., list[Any]]) -> Primitive:
     """A primitive that calls back to NumPy; `results(operands, kept)` have the shapes and types of its results."""
     primitive = Primitive(f"planarfriction_{name}")
     primitive.multiple_results = True
 
-    def shapes(*operands, kind: Kind, outer: int, kept: bool) -> list[Any]:
+    def shapes(*operands, kind: Any, outer: int, kept: bool) -> list[Any]:
         lead = np.broadcast_shapes(*(value.shape[:outer] for value in operands))
         return [ShapedArray((*lead, *shape[outer:]), dtype) for shape, dtype in results(operands, kept, kind)]
 
-    def call(*operands, kind: Kind, outer: int, kept: bool) -> list[jax.Array]:
+    def call(*operands, kind: Any, outer: int, kept: bool) -> list[jax.Array]:
         found = shapes(*operands, kind=kind, outer=outer, kept=kept)
         outputs = [jax.ShapeDtypeStruct(value.shape, value.dtype) for value in found]
         dtypes = tuple(value.dtype for value in found)
         return jax.pure_callback(functools.partial(callback, kind, kept, dtypes), outputs, *operands)
 
-    def batch(operands, axes, *, kind: Kind, outer: int, kept: bool):
+    def batch(operands, axes, *, kind: Any, outer: int, kept: bool):
         fronted = [
             value[None] if axis is None else jnp.moveaxis(value, axis, 0)
             for value, axis in zip(operands, axes, strict=True)
@@ -101,9 +101,9 @@ def _pulled(operands, kept: bool, kind: Kind):
     return [(value.shape, value.dtype) for value in inputs]
 
 
-_roll = _primitive("roll", callbacks.forward, _rolled)
-_push = _primitive("push", callbacks.push, _pushed)
-_pull = _primitive("pull", callbacks.pull, _pulled)
+_roll = primitive_of("roll", callbacks.forward, _rolled)
+_push = primitive_of("push", callbacks.push, _pushed)
+_pull = primitive_of("pull", callbacks.pull, _pulled)
 
 
 # ---------------------------------------------------------------------- derivatives
@@ -179,7 +179,7 @@ def _pull_by_operations(roll: Callable[..., Any]) -> Callable[..., Any]:
     return pull
 
 
-def _transposed(primitive: Primitive, other: Primitive, count: int):
+def transposed(primitive: Primitive, other: Primitive, count: int):
     """`other` is the transpose of `primitive`, which is linear in its last `count` operands."""
 
     def transpose(bars, *operands, **options):
@@ -203,5 +203,5 @@ def _sum_to(value: jax.Array, shape: tuple[int, ...]) -> jax.Array:
 ad.primitive_jvps[_roll] = _roll_jvp
 _linear_jvp(_push, _INPUTS, _push_by_operations)
 _linear_jvp(_pull, _RESULTS, _pull_by_operations)
-_transposed(_push, _pull, _INPUTS)
-_transposed(_pull, _push, _RESULTS)
+transposed(_push, _pull, _INPUTS)
+transposed(_pull, _push, _RESULTS)

@@ -15,6 +15,7 @@ from planarfriction.torch.published import ReducedModelPublished
 from planarfriction.torch.reduced import ReducedModel
 from planarfriction.torch.reduced_planar import ReducedPlanarLuGre
 from planarfriction.torch.rollout import Rollout, rollout, tracking_loss
+from planarfriction.torch.scene import SceneMotion, simulate_scene
 
 __all__ = [
     "DistributedModel",
@@ -22,6 +23,8 @@ __all__ = [
     "ReducedModelPublished",
     "ReducedPlanarLuGre",
     "Rollout",
+    "SceneMotion",
     "rollout",
+    "simulate_scene",
     "tracking_loss",
 ]

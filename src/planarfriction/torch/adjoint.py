@@ -87,7 +87,7 @@ class _Rollout(torch.autograd.Function):
         return (end, wrenches, states), (0, 0, 0 if kept else None)
 
 
-class _First(torch.autograd.Function):
+class First(torch.autograd.Function):
     """A first derivative, itself without derivative."""
 
     @staticmethod
@@ -101,7 +101,7 @@ class _First(torch.autograd.Function):
     jvp = backward
 
 
-class _Gradient(_First):
+class _Gradient(First):
     """Cotangents of the inputs from those of last state and wrenches.
 
     The first `count` tensors are the inputs, both cotangents and, if they were kept, the states before each step.
@@ -128,7 +128,7 @@ class _Gradient(_First):
         return tuple(g.reshape(size, *shape) for g, shape in zip(gradients, shapes, strict=True)), (0,) * _INPUTS
 
 
-class _Tangent(_First):
+class _Tangent(First):
     """Changes of last state and wrenches along those of the inputs, which follow these."""
 
     @staticmethod

@@ -1,0 +1,199 @@
+"""A scene as a function of numbers, with derivatives both ways: what the tensor front ends call."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import os
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.autodiff.drives import SCENE_PARAMETERS, STATES, Columns
+from planarfriction.autodiff.scene import scene_sensitivities
+from planarfriction.autodiff.scene_gradient import Followed
+from planarfriction.errors import InvalidValueError
+from planarfriction.scenes.scene import Contact, Scene
+from planarfriction.scenes.signal import Signal
+from planarfriction.scenes.simulation import recording_times
+
+FACTORS = tuple(name for name in SCENE_PARAMETERS if name != "r")
+"""Parameters of a scene that a function may take: the size of its patches is not among them."""
+
+
+class SceneFunction:
+    """The motion `[M, 6]` and the wrenches `[M, C, 3]` of a scene as a function of P numbers, for B sets of them.
+
+    The numbers are factors of parameters, components of the start, and the values of signals at their knots (all
+    components of a knot together), in the order in which they are named. A motion that ends early stays as it ended.
+    Different sets are simulated at the same time, in as many threads as there are processors.
+    """
+
+    def __init__(
+        self,
+        scene: Scene,
+        parameters: Sequence[str] = (),
+        signals: Mapping[str, Any] | None = None,
+        initial: Sequence[str] = (),
+        *,
+        t_end: float | None = None,
+        rtol: float = 1e-9,
+        atol: float | None = None,
+        save_every: float | None = None,
+    ) -> None:
+        self._parameters = validation.choices("parameters", parameters, FACTORS)
+        self._knots = {name: validation.array(f"knots of {name}", t, (None,)) for name, t in (signals or {}).items()}
+        self._options = {"t_end": t_end, "rtol": rtol, "atol": atol, "save_every": save_every}
+        columns = Columns(scene, self._parameters, self._knots, initial)
+        self._scene, self._initial = scene, tuple(initial)
+        self.count = len(columns.names)
+        """P"""
+        self.shapes = {
+            name: (len(times), *(3,) * (name in ("force", "velocity"))) for name, times in self._knots.items()
+        }
+        """Shape of the values of each signal: `[K]`, of force and velocity `[K, 3]`."""
+        end = scene.t_end if t_end is None else validation.positive("t_end", t_end)
+        every = scene.save_every if save_every is None else validation.positive("save_every", save_every)
+        self.time = recording_times(end, every)
+        """`[M]` [s]"""
+        self.results = (len(self.time), 6), (len(self.time), len(scene.contacts), 3)
+        """Shapes of motion and wrenches."""
+
+    def run(self, values: np.ndarray, kept: dict[bytes, Followed] | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Motion `[B, M, 6]` and wrenches `[B, M, C, 3]` at `values` `[B, P]`; the ways that they took into `kept`."""
+
+        def one(row: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            done = self._followed(row)
+            if kept is not None:
+                kept[row.tobytes()] = done
+            return self._filled(done.motion), self._filled(done.wrenches)
+
+        return self._stacked(_in_threads(one, values))
+
+    def pull(self, values, of_motion, of_wrenches, kept: dict[bytes, Followed] | None = None) -> np.ndarray:
+        """Slopes `[B, P]` of costs from their slopes by motion and wrenches, shaped as these."""
+        different, which = np.unique(values, axis=0, return_inverse=True)
+        gradient = np.empty_like(values)
+
+        def some(i: int) -> None:
+            row = different[i]
+            done = (kept or {}).get(row.tobytes()) or self._followed(row)
+            for b in np.flatnonzero(which.reshape(-1) == i):
+                seeds = (self._folded(bar[b], len(done.time)) for bar in (of_motion, of_wrenches))
+                gradient[b] = done.back(*seeds) * self._slopes(row)
+
+        _in_threads(some, range(len(different)))
+        return gradient
+
+    def push(self, values: np.ndarray, changes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Changes of motion and wrenches with those of the values `[B, P]`."""
+
+        def one(pair) -> tuple[np.ndarray, np.ndarray]:
+            row, change = pair
+            names = self._parameters, self._knots, self._initial
+            found = scene_sensitivities(
+                self._scene_at(row), names[0], signals=names[1], initial=names[2], **self._options
+            )
+            change = change * self._slopes(row)
+            return self._filled(found.d_motion @ change), self._filled(found.d_wrenches @ change)
+
+        return self._stacked(_in_threads(one, list(zip(values, changes, strict=True))))
+
+    def _followed(self, row: np.ndarray) -> Followed:
+        numbers = self._parameters, self._knots, self._initial
+        return Followed(self._scene_at(row), *numbers, *self._options.values())
+
+    def _stacked(self, results: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+        motion, wrenches = (np.array([result[i] for result in results]).reshape(-1, *self.results[i]) for i in (0, 1))
+        return motion, wrenches
+
+    def _filled(self, values: np.ndarray) -> np.ndarray:
+        """Values at all instants, from those up to the end of the motion."""
+        return values[np.minimum(np.arange(len(self.time)), len(values) - 1)]
+
+    def _folded(self, bar: np.ndarray, count: int) -> np.ndarray:
+        """The transpose of `_filled`."""
+        result = bar[:count].copy()
+        result[-1] += bar[count:].sum(axis=0)
+        return result
+
+    def _slopes(self, row: np.ndarray) -> np.ndarray:
+        """Derivative by each number per derivative of `scene_sensitivities`, which is that by a factor at 1."""
+        slopes, factors = np.ones(self.count), dict(zip(self._parameters, row, strict=False))
+        slopes[: len(factors)] = 1.0 / row[: len(factors)]
+        first = len(factors) + len(self._initial)
+        for name, shape in self.shapes.items():
+            last = first + int(np.prod(shape))
+            if name not in ("force", "velocity"):
+                slopes[first:last] = factors.get("load", 1.0)
+            first = last
+        return slopes
+
+    def _scene_at(self, row: np.ndarray) -> Scene:
+        """The scene with these numbers in it."""
+        values = iter(np.asarray(row, float).tolist())
+        factors = {name: validation.positive(name, next(values)) for name in self._parameters}
+        start = {name: next(values) for name in self._initial}
+        signals = {
+            name: np.reshape([next(values) for _ in range(int(np.prod(shape)))], shape)
+            for name, shape in self.shapes.items()
+        }
+        scene, body = self._scene, self._scene.body
+        state = [
+            start.get(name, now) for name, now in zip(STATES, (*body.velocity, *body.position, body.angle), strict=True)
+        ]
+        body = dataclasses.replace(
+            body,
+            mass=body.mass * factors.get("mass", 1.0),
+            inertia=body.inertia * factors.get("inertia", 1.0),
+            velocity=tuple(state[:3]),
+            position=tuple(state[3:5]),
+            angle=state[5],
+        )
+        changed: dict[str, Any] = {
+            name: self._signal(name, getattr(scene, name), values)
+            for name, values in signals.items()
+            if name in ("force", "velocity")
+        }
+        contacts = [self._contact(contact, signals, factors) for contact in scene.contacts]
+        return dataclasses.replace(scene, body=body, contacts=contacts, **changed)
+
+    def _contact(self, contact: Contact, signals: dict[str, np.ndarray], factors: dict[str, float]) -> Contact:
+        name, load = f"{contact.name}.normal_force", contact.normal_force
+        if name in signals:
+            load = self._signal(name, load, signals[name])
+        if "load" in factors:
+            load = dataclasses.replace(load, values=factors["load"] * load.values)
+        model = contact.model
+        if factors.get("mu", 1.0) != 1.0:
+            model = dataclasses.replace(model, law=_with_friction(model.law, factors["mu"]))
+        return dataclasses.replace(contact, model=model, normal_force=load)
+
+    def _signal(self, name: str, old: Signal | None, values: np.ndarray) -> Signal:
+        return Signal(self._knots[name], values, "linear" if old is None else old.hold)
+
+
+def _with_friction(law: Any, factor: float) -> Any:
+    """The law with `factor` times the friction."""
+    names = [field.name for field in dataclasses.fields(law) if field.name in ("mu_c", "mu_s")]
+    more = dataclasses.replace(law, **{name: factor * getattr(law, name) for name in names})
+    wanted = law.numbers._replace(mu_c=factor * law.numbers.mu_c, mu_s=factor * law.numbers.mu_s)
+    if not np.allclose(more.numbers, wanted, rtol=1e-12, atol=0.0):
+        raise InvalidValueError("parameters", f"leave out mu: {type(law).__name__} has more to scale", "mu")
+    return more
+
+
+def _in_threads(work: Callable[[Any], Any], items: Sequence[Any]) -> list[Any]:
+    """`work` on each of the items, whose compiled loops hold no lock."""
+    if len(items) <= 1:
+        return [work(item) for item in items]
+    with ThreadPoolExecutor(min(len(items), _processors())) as pool:
+        return list(pool.map(work, items))
+
+
+@functools.cache
+def _processors() -> int:
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
