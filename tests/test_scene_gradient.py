@@ -137,6 +137,20 @@ def test_the_reverse_takes_many_contacts_of_many_cells():
     agree(scene, numbers, 2e-6, 2e-5)
 
 
+def test_the_reverse_takes_contacts_that_move():
+    """A pad that sways over the body, and a table that turns under it."""
+    model, load = model_of("ellipsoid"), pf.Signal([0.0, 0.1], [2.0, 3.0], "linear")
+    sway = pf.Signal([0.0, 0.05, 0.1], [(0.02, 0.0, 0.3), (0.0, 0.01, -0.5), (0.01, 0.0, 0.2)], "linear")
+    contacts = [
+        pf.Contact(model, load, position=(0.03, 0.01), angle=0.4, name="pad", velocity=sway),
+        pf.Contact(model, 2.0, mounted_on="body", name="table", velocity=(0.0, 0.0, 0.5)),
+    ]
+    body = pf.Body(0.4, 6e-4, velocity=(0.05, 0.0, 0.5), gravity=(0.0, 0.0))
+    scene = pf.Scene(body, contacts, 0.1, save_every=0.02)
+    numbers = {"signals": {"pad.normal_force": [0.0, 0.05, 0.1], "force": [0.02]}, "initial": ["vx", "y", "theta"]}
+    agree(scene, numbers | {"parameters": ("mu", "mass", "r")}, 2e-6, 2e-5)
+
+
 @pytest.mark.parametrize("kind", ["cells", "both", "root"])
 def test_derivatives_through_friction_that_depends_on_the_direction(kind):
     """Cells with metrics and asymmetries of their own, one for all, and the root of a metric around a limit surface."""
