@@ -71,7 +71,7 @@ class SceneFunction:
                 kept[row.tobytes()] = done
             return self._filled(done.motion), self._filled(done.wrenches)
 
-        return self._stacked(_in_threads(one, values))
+        return self._stacked(_in_threads(one, list(values)))
 
     def pull(self, values, of_motion, of_wrenches, kept: dict[bytes, Followed] | None = None) -> np.ndarray:
         """Slopes `[B, P]` of costs from their slopes by motion and wrenches, shaped as these."""

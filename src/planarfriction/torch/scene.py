@@ -61,7 +61,9 @@ def simulate_scene(
     knots = {name: _plain(times) for name, (times, _) in signals.items()}
     function = SceneFunction(scene, tuple(parameters), knots, tuple(initial), **options)
     like = torch.empty((), dtype=torch.float64)
-    named = [(name, inputs.real(name, value, like)[..., None]) for name, value in (parameters | initial).items()]
+    named = [
+        (name, inputs.real(name, value, like)[..., None]) for name, value in (*parameters.items(), *initial.items())
+    ]
     for name, (_, values) in signals.items():
         tensor, shape = inputs.real(name, values, like), function.shapes[name]
         if tuple(tensor.shape[max(tensor.ndim - len(shape), 0) :]) != shape:
@@ -126,8 +128,8 @@ class _Pull(First):
 
     @staticmethod
     def forward(function: SceneFunction, kept: dict | None, numbers: Tensor, *bars: Tensor):
-        arrays = (_rows(bar, inner) for bar, inner in zip(bars, (2, 3), strict=True))
-        return _shaped(function.pull(_rows(numbers, 1), *arrays, kept), numbers.shape[:-1], numbers)
+        slopes = function.pull(_rows(numbers, 1), _rows(bars[0], 2), _rows(bars[1], 3), kept)
+        return _shaped(slopes, numbers.shape[:-1], numbers)
 
     @staticmethod
     def vmap(info, in_dims, function, kept, *tensors):
