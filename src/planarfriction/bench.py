@@ -16,7 +16,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import MissingExtraError
-from planarfriction.experiments import drake_disc, grip_plan, mjx_costs, mujoco_costs, sweep_costs
+from planarfriction.experiments import drake_disc, grip_plan, mjx_costs, mujoco_costs, push_cost, sweep_costs
 from planarfriction.experiments.baselines import lsoda_time, numpy_table, scipy_twist
 from planarfriction.experiments.four_feet import four_feet
 from planarfriction.experiments.identified_log import identification
@@ -374,6 +374,7 @@ BENCHMARKS: dict[str, Callable[[str, bool], Measurement]] = {
     "gradient.reduced.batch": _gradient_reduced_batch,
     "sensitivities.reduced": _sensitivities,
     "planning.grip": grip_plan.measure,
+    "planning.push": push_cost.measure,
     "identify.log": identification,
     "identify.log.distributed": identification,
     "sweep": sweep_costs.measure,

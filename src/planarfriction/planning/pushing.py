@@ -22,6 +22,10 @@ FREE = "free"
 MOST_SAMPLES = 100_000
 """Instants that are recorded at most."""
 
+RESTLESS, STILL = 4, 1e-6
+"""Changes of mode in a row, each within a share of the whole time, after which events no longer separate the modes: on
+a facet of a limit surface a push may stay at the edge of its motion cone."""
+
 MOST_PHASES = 2_000
 """Changes of mode in a push that are followed."""
 
@@ -118,6 +122,7 @@ def _follow(scenery: Scenery, start: np.ndarray, time: np.ndarray, rtol: float) 
         raise InvalidValueError("path", "begin outside the slider", scenery.pose(time[0]).tolist())
     now, q, held = float(time[0]), start.copy(), ""
     contact: Contact | None = None
+    restless = 0
     for _ in range(MOST_PHASES):
         if contact is None:
             touched = touch_after(scenery, now, q)
@@ -140,6 +145,7 @@ def _follow(scenery: Scenery, start: np.ndarray, time: np.ndarray, rtol: float) 
         if first.leans:
             contact = flush_after(scenery, contact, now, q, first.leans)
             continue
+        mode = "" if restless >= RESTLESS and not place.half_width else mode
         phase = _Phase(scenery, contact, mode)
         span, atol = (now, end), rtol * np.array([slider.size, slider.size, 1.0])
         run = solve_ivp(
@@ -150,8 +156,9 @@ def _follow(scenery: Scenery, start: np.ndarray, time: np.ndarray, rtol: float) 
             poses[here] = run.sol(time[here]).T
             for k in np.flatnonzero(here):
                 place, velocity = place_of(scenery, contact, time[k], poses[k])
-                modes[k] = mode if mu > 0.0 else motion_at(slider.surface, place, mu, velocity).mode
+                modes[k] = mode if mode and mu > 0.0 else motion_at(slider.surface, place, mu, velocity).mode
                 places[k] = place.at
+        restless = restless + 1 if run.t[-1] - now < STILL * (time[-1] - time[0]) else 0
         q, now = run.y[:, -1].copy(), float(run.t[-1])
         poses[time > now] = q
         if run.status == 0:
@@ -184,6 +191,8 @@ class _Phase:
         kinds = {"mode": self._slack, "leaves": self._approach, "ends": self._range, "closes": self._clear}
         if not scenery.closes(contact):
             del kinds["closes"]
+        if not mode:
+            del kinds["mode"]
         self.names, self.events = list(kinds), []
         for function in kinds.values():
             event = lambda t, q, f=function: f(t, q)  # noqa: E731
