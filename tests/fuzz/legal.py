@@ -24,6 +24,7 @@ SQUARE = [(-0.01, -0.01), (0.01, -0.01), (0.01, 0.01), (-0.01, 0.01)]
 SKIPPED = {
     "warm_up": "compiles for minutes",
     "plots.animate_solution": "draws for seconds; tests/test_animation.py attacks it",
+    "plots.interactive_limit_surface": "needs plotly; checks what plot_limit_surface checks",
     "Solution.animate": "draws for seconds; tests/test_animation.py attacks it",
     "solvers.integrate": "is called by `simulate` alone, which checks",
     "FrictionError": "an error",
@@ -81,7 +82,7 @@ def objects() -> dict[str, Any]:
         # parts
         "patch": PATCH, "law": LAW, "model": model, "scene": scene, "solution": solution, "solutions": solution,
         "surface": surface, "reference": surface, "few": PATCH, "slide": pf.identify.Slide(time, pose), "log": log,
-        "contacts": [pf.Contact(model, 1.0)], "ellipsoid": pf.LimitSurfaceEllipsoid(PATCH),
+        "contacts": [pf.Contact(model, 1.0)], "beside": pf.LimitSurfaceEllipsoid(PATCH),
         "member": LAW, "method": pf.solvers.RODAS3, "body": pf.Body(1.0, 0.01), "progress": lambda *_: None,
         "make": lambda: None, "words": "words",
         # numbers
