@@ -118,7 +118,9 @@ def test_the_way_of_a_contact_is_that_of_its_twist(mounted_on, moves):
 def field(ways: np.ndarray, cells: int = 21):
     model = bristles_of(pf.ReducedModel(pf.ContactPatch.disc(0.01, cells), LAW))
     times, loads = 0.01 * np.arange(len(ways) + 1), np.full(len(ways) + 1, 2.0)
-    return model.patch, slip_field(model, model.rest(), times, np.asarray(ways), loads, np.arange(len(times)))
+    return model.patch, slip_field(
+        model, model.rest(), times, np.asarray(ways), loads, np.arange(len(times)), np.zeros(3)
+    )
 
 
 def test_a_patch_that_is_pushed_sticks_up_to_breakaway_and_slips_beyond():
@@ -136,6 +138,15 @@ def test_a_patch_that_turns_slips_outside_and_sticks_inside():
     # bristles take up all below 0.09 mm and, a few steps past the 0.1 mm that they can bend, next to nothing
     assert not slips[-1][reach < 0.9e-4].any()
     assert slips[-1][reach > 1.3e-4].all() and (reach > 1.3e-4).any()
+
+
+@pytest.mark.parametrize("speed", [0.0, 1e-2])
+def test_at_first_slips_what_moves(speed):
+    model = bristles_of(pf.ReducedModel(pf.ContactPatch.disc(0.01, 5), LAW))
+    ways, twist = np.full((2, 3), [1e-3, 0.0, 0.0]), np.array([speed, 0.0, 0.0])
+    _, slips = slip_field(model, model.rest(), np.arange(3.0), ways, np.full(3, 2.0), np.arange(3), twist)
+    assert slips[1:].all()
+    assert slips[0].all() == (speed > 0.0)
 
 
 def test_what_stops_does_not_slip():

@@ -65,7 +65,7 @@ class Film:
         self._draw_body(solution)
         self.views = _filling(_views(solution, track, follow), self.axes.bbox.width / self.axes.bbox.height)
         self.axes.set(xlabel="x [mm]", ylabel="y [mm]")
-        self.axes.yaxis.set_label_coords(0.014, 0.5, transform=self.figure.transFigure)  # clear of any tick label
+        self.axes.yaxis.set_label_coords(0.022, 0.5, transform=self.figure.transFigure)  # clear of any tick label
         self.axes.ticklabel_format(useOffset=False)
         self.axes.locator_params(nbins=7)
         style.tidy(self.axes)

@@ -141,6 +141,8 @@ class SurfacePanel:
         (self.head,) = axes.plot([], [], [], color=style.PALETTE[1], marker="o", markersize=6, markeredgecolor="white")
         for artist in self.artists():
             artist.set_animated(True)
+            artist.set_clip_box(axes.bbox)  # viscous friction may be many times mu_c f_N
+            artist.set_clip_on(True)
 
     def artists(self) -> list[Artist]:
         """What changes from frame to frame, on top of the surface."""

@@ -45,17 +45,19 @@ def slip_field(
     ways: np.ndarray,
     loads: np.ndarray,
     frames: np.ndarray,
+    first: np.ndarray,
 ) -> SlipField:
     """The slip field of a contact at the instants `frames` (indices into `times`), from the bristles `state` `[2, N]`.
 
     `ways` `[T - 1, 3]` [m, m, rad] is how far the body moves on the contact from one of `times` `[T]` [s] to the next,
-    in the frame of the contact, `loads` `[T]` [N]. Of the way `u` of a cell `u - (z_1 - z_0)` is slip: what its bristle
-    does not take up.
+    in the frame of the contact, `loads` `[T]` [N], `first` `[3]` its twist at first [m/s, m/s, rad/s]. Of the way `u`
+    of a cell `u - (z_1 - z_0)` is slip: what its bristle does not take up.
     """
     law, count, largest = bristles.law.numbers, len(bristles.patch.positions), bristles.law.largest_deflection
     levers, lean = bristles.patch.levers(), bristles.patch.asymmetries().T
     bent, slips = np.zeros((len(frames), count)), np.zeros((len(frames), count), dtype=bool)
     way, slip, frame = np.zeros(count), np.zeros(count), 1
+    bent[0] = _bent(state, levers @ first, lean, law)
     for k, (step, dt) in enumerate(zip(ways, np.diff(times), strict=True)):
         if not dt > 0.0:
             continue
@@ -66,10 +68,16 @@ def slip_field(
         way += length
         slip += np.hypot(*(moved - (state - before)))
         if frame < len(frames) and k + 1 == frames[frame]:
-            steady = formulas.stribeck(np, length / dt, law) / law.sigma_0
-            bent[frame] = np.hypot(*(state - lean * steady)) / steady
+            bent[frame] = _bent(state, moved.T / dt, lean, law)
             slips[frame] = (slip > SLIPPING * way) & (way > AT_REST * largest)
             way[:], slip[:], frame = 0.0, 0.0, frame + 1
-    if len(frames) > 1:  # what goes on before the first frame is not known: as after it
-        bent[0], slips[0] = np.where(slips[1], bent[1], 0.0), slips[1]
+    if len(frames) > 1:  # what moves at first has no way behind it, and does as right after it
+        span = times[frames[1]] - times[frames[0]]
+        slips[0] = slips[1] & (np.hypot(*(levers @ first).T) * span > AT_REST * largest)
     return SlipField(bent, slips)
+
+
+def _bent(state: np.ndarray, velocity: np.ndarray, lean: np.ndarray, law: Any) -> np.ndarray:
+    """Deflections `[2, N]` over the largest at the velocities `[N, 2]` of the cells, `[N]`."""
+    steady = formulas.stribeck(np, np.hypot(*velocity.T), law) / law.sigma_0
+    return np.hypot(*(state - lean * steady)) / steady

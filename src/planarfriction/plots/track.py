@@ -85,9 +85,9 @@ def track_of(solution: Solution, times: np.ndarray) -> Track:
     for index, (contact, first) in enumerate(zip(solution.scene.contacts, _first(solution), strict=True)):
         at = contact_poses(contact, steps, poses)
         loads = _values(solution, "normal_force", sampled, steps, index)
-        slip = first and slip_field(*first, steps, _ways(contact, steps, poses, at), loads, frames)
-        wrenches = _between(times, sampled, _without_kick(solution, index))
         against = _between(times, sampled, solution.contact_twist(contact.name))
+        slip = first and slip_field(*first, steps, _ways(contact, steps, poses, at), loads, frames, against[0])
+        wrenches = _between(times, sampled, _without_kick(solution, index))
         contacts.append(ContactTrack(contact, index, at[frames], against, wrenches, loads[frames], slip))
     return Track(times, poses[frames], twists, contacts)
 
