@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import subprocess
 
 import numpy as np
 import pytest
@@ -150,7 +151,7 @@ def test_at_first_slips_what_moves(speed):
 
 
 def test_what_stops_does_not_slip():
-    _, (bent, slips) = field([[1e-5, 0.0, 0.0]] * 30 + [[0.0, 0.0, 0.0]] * 3)
+    _, (bent, slips) = field([[1e-5, 0.0, 0.0]] * 30 + [[1e-9, 0.0, 0.0]] * 3)  # creeps by 1e-5 of a full deflection
     assert slips[30].all() and not slips[31:].any()
     assert bent[-1] == pytest.approx(np.ones_like(bent[-1]), rel=1e-3)
 
@@ -423,6 +424,29 @@ def test_ctrl_c_leaves_what_was_there(tmp_path, kind):
         synthetic.solution().animate(path, dpi=25.0, slow=0.2, progress=stop)
     assert path.read_text() == "kept"
     assert list(tmp_path.iterdir()) == [path]
+
+
+@pytest.mark.parametrize("stopped", [True, False])
+def test_an_ffmpeg_that_fails_is_named_and_one_that_is_stopped_is_not(tmp_path, monkeypatch, stopped):
+    pytest.importorskip("imageio_ffmpeg")
+    from matplotlib.animation import FFMpegWriter
+
+    whole = FFMpegWriter.finish
+
+    def fails(self) -> None:
+        whole(self)
+        raise subprocess.CalledProcessError(255, "ffmpeg")
+
+    def stop(time: float) -> None:
+        if stopped:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(FFMpegWriter, "finish", fails)
+    wanted = "" if stopped else "cannot write .*: ffmpeg failed, write a .gif or an .html instead"
+    count = iter(range(99))
+    with pytest.raises(KeyboardInterrupt if stopped else FileError, match=wanted):
+        path = tmp_path / "motion.mp4"
+        synthetic.solution().animate(path, **SMALL, progress=lambda time: stop(time) if next(count) > 2 else None)
 
 
 @pytest.mark.parametrize(
