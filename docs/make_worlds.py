@@ -81,10 +81,11 @@ def foot() -> PlotFigure:
         (pf.LimitSurfaceEllipsoid, "ellipsoid", {"color": PALETTE[1], "linestyle": "--"}),
     ):
         surface = kind(sole)
-        beside = surface.wrench(surface.twist(pf.geometry.wrench_at(rays, -centre)))
+        both = np.concatenate([rays[::-1] * [1.0, -1.0, 1.0], rays[1:]])
+        beside = surface.wrench(surface.twist(pf.geometry.wrench_at(both, -centre)))
         _, side, torque = pf.geometry.wrench_at(beside, centre).T
         axes.plot(side, 1e3 * torque, label=label, **look)
-    axes.set(xlabel="side force over mu f_N", ylabel="torque over mu f_N [mm]", ylim=(0.0, None))
+    axes.set(xlabel="side force, to the left, over mu f_N", ylabel="torque over mu f_N [mm]", ylim=(0.0, None))
     axes.legend(fontsize=8)
     tidy(axes)
     draw_motion(right, pf.simulate(pf.scenes.foot(pf.DistributedModel(pf.ContactPatch.disc(0.03), LAW))))
