@@ -25,7 +25,7 @@ from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceExact, LimitSurfaceTable, LimitSurfaceTablePublished
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch, SoftFinger
-from planarfriction.scenes import Scene, Solution, in_hand, in_hand_load, simulate
+from planarfriction.scenes import Scene, Signal, Solution, in_hand, in_hand_load, simulate
 from planarfriction.scenes.ready import IN_HAND_LOADS
 
 WINDOW = 0.1
@@ -319,10 +319,22 @@ def _coupled(name: str, full: bool, environments: int = 1) -> Measurement:
 
 
 def _sensitivities(name: str, full: bool) -> Measurement:
-    from planarfriction.autodiff import scene_sensitivities
+    """Derivatives to friction, to twenty knots of the grip, and of one cost to those knots."""
+    from planarfriction.autodiff import scene_gradient, scene_sensitivities
 
-    scene, tight = in_hand(ReducedModel(_disc(), _law()), t_end=0.5), 1e-9
-    ours = median(lambda: scene_sensitivities(scene, ("mu",), rtol=tight, atol=tight), 3)
+    knots, tight = np.linspace(0.0, 0.5, 20), 1e-9
+    grip = Signal(knots, 1.73 - 0.91 * np.sin(4.0 * np.pi * knots), "linear")
+    load = None if name == "sensitivities.reduced" else grip
+    scene = in_hand(ReducedModel(_disc(), _law()), normal_force=load, t_end=0.5)
+    signals = {"fingers.normal_force": knots}
+    work = {
+        "sensitivities.reduced": lambda: scene_sensitivities(scene, ("mu",), rtol=tight, atol=tight),
+        "sensitivities.knots": lambda: scene_sensitivities(scene, (), signals=signals, rtol=tight, atol=tight),
+        "sensitivities.gradient": lambda: scene_gradient(
+            scene, lambda time, motion: np.ones_like(motion), signals=signals, rtol=tight, atol=tight
+        ),
+    }
+    ours = median(work[name], 3)
     alone = median(lambda: simulate(scene, rtol=tight, atol=tight), 3)
     return line(name, ours, "s", "the same simulation alone", alone)
 
@@ -373,6 +385,8 @@ BENCHMARKS: dict[str, Callable[[str, bool], Measurement]] = {
     "gradient.reduced": _gradient_reduced,
     "gradient.reduced.batch": _gradient_reduced_batch,
     "sensitivities.reduced": _sensitivities,
+    "sensitivities.knots": _sensitivities,
+    "sensitivities.gradient": _sensitivities,
     "planning.grip": grip_plan.measure,
     "planning.push": push_cost.measure,
     "identify.log": identification,
