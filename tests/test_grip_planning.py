@@ -165,6 +165,22 @@ def test_a_plan_draws_itself():
     assert len(figure.axes[1].lines) == 4  # three frictions and the goal
 
 
+@pytest.mark.parametrize("patch", [PATCH, SOFT])
+@pytest.mark.parametrize("kind", [pf.DistributedModel, pf.ReducedModel, pf.ReducedModelPublished])
+def test_a_model_with_another_law_is_that_model_to_the_bit(kind, patch):
+    """What is shared with the first is what the second would have built; another exponent makes another map."""
+    first = kind(patch, LAW)
+    twist, load, dt = (0.003, 0.001, 0.4), 2.3, 1e-3
+    first.step(first.rest(), twist, load, dt)
+    for law in (dataclasses.replace(LAW, mu_c=0.7), dataclasses.replace(LAW, gamma=1.5)):
+        shared, alone = first.with_law(law), kind(patch, law)
+        assert shared == alone
+        for mine, its in zip(
+            shared.step(shared.rest(), twist, load, dt), alone.step(alone.rest(), twist, load, dt), strict=True
+        ):
+            assert (mine == its).all()
+
+
 # ---------------------------------------------------------------------- the smallest grip
 
 

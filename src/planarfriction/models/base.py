@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -141,6 +142,10 @@ class FrictionModel(ByValue):
     def rest(self) -> np.ndarray:
         """State of a contact at rest: no bristle is deflected."""
         return np.zeros(self.state_shape)
+
+    def with_law(self, law: FrictionLaw) -> Self:
+        """The same model with another law; what it has built of its patch is shared where no law has a say in it."""
+        return dataclasses.replace(self, law=law)
 
     def state_of(self, deflections, normal_force) -> np.ndarray:
         """State of a contact at rest whose bristles are bent by `deflections` `[2, N]` [m] under a load > 0 [N].

@@ -58,6 +58,7 @@ class ReducedModel(ThreeStateModel):
 
     _kernels = reduced_step
     step_function, jacobian_function = step_slopes.reduced, step_slopes.reduced_jacobian
+    _shared = ("_parts",)
 
     _: KW_ONLY
     parts: Any = 1

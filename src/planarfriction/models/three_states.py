@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from planarfriction.kernels.pointers import place_of
 from planarfriction.kernels.quick_steps import compile_quick_steps, step_many
 from planarfriction.kernels.records import row_of
 from planarfriction.kernels.rollouts import UNFIT, Place, compile_step_one, step_one
+from planarfriction.laws import FrictionLaw
 from planarfriction.models import base
 from planarfriction.models.base import FrictionModel, ModelJacobians, PackedModel, PackedSteps, StepJacobians
 from planarfriction.models.part_shapes import REMEMBERED, Part
@@ -49,6 +50,8 @@ class ThreeStateModel(FrictionModel):
 
     _kernels: ClassVar[ModuleType]
     """Steps and their derivatives, as in `kernels.reduced_step`."""
+    _shared: ClassVar[tuple[str, ...]] = ("_recent",)
+    """Memories of shapes."""
     jacobian_function: ClassVar[Any]
     """Its function `..._jacobian` of `kernels.step_slopes`."""
 
@@ -132,6 +135,13 @@ class ThreeStateModel(FrictionModel):
             _sum(wrench[..., 6]),
         )
         return self._turned(slopes, "state_twist")
+
+    def with_law(self, law: FrictionLaw) -> Self:
+        """See `FrictionModel.with_law`."""
+        changed = super().with_law(law)
+        if changed.law.numbers.gamma == self.law.numbers.gamma:  # all that a shape takes from the law
+            changed.__dict__.update({name: getattr(self, name) for name in self._shared})
+        return changed
 
     def _state_of(self, deflections: np.ndarray, load: float) -> np.ndarray:
         pulls = -self.law.numbers.sigma_0 * load * self.patch.weights(load) * deflections

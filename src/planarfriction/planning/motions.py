@@ -143,8 +143,9 @@ def with_friction(contact: Contact, factor: float) -> Contact:
     if not scaled:
         rule = "be one of mu_c and mu_s, where friction is to be uncertain"
         raise InvalidValueError("law", rule, type(law).__name__)
-    model = dataclasses.replace(contact.model, law=dataclasses.replace(law, **scaled))
-    return dataclasses.replace(contact, model=model)
+    law, model = dataclasses.replace(law, **scaled), contact.model
+    changed = model.with_law(law) if hasattr(model, "with_law") else dataclasses.replace(model, law=law)
+    return dataclasses.replace(contact, model=changed)
 
 
 def grip_position(scene: Scene, contact: int) -> np.ndarray:
