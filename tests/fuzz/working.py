@@ -6,6 +6,7 @@ import functools
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from judge import finite
 
 import planarfriction as pf
@@ -15,6 +16,12 @@ import planarfriction as pf
 def use(value: Any) -> None:
     """Arrays, numbers and tuples of them."""
     finite(value)
+
+
+@use.register
+def _(data: xr.Dataset) -> None:
+    """Of a sweep: every run says whether it failed, and why; those that did have no numbers."""
+    assert data.failure.dtype.kind == "U"
 
 
 @use.register
