@@ -20,7 +20,13 @@ from planarfriction import plots
 from planarfriction.errors import InvalidValueError, MissingExtraError
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction.plots import motion, style
-from planarfriction.plots.limit_surface import sample_limit_surface, scaled_samples
+from planarfriction.plots.limit_surface import (
+    AZIMUTH_SEGMENTS,
+    POLAR_SEGMENTS,
+    even_mesh,
+    sample_limit_surface,
+    scaled_samples,
+)
 
 DRAWING = 1e-9  # [mm], [N], ...: coordinates are scaled once on their way to the axes, so only rounding may differ
 CUT = 1.0  # [pixel]: the box of a letter is rounded up to whole pixels
@@ -154,6 +160,18 @@ def test_a_limit_surface_can_be_drawn_alone():
     (axes,) = figure.axes
     assert axes.get_title() == "disc: ellipsoid"
     assert overhang(figure) <= CUT
+
+
+def test_the_facets_of_a_surface_are_small_where_it_is_nearly_flat():
+    """Two pads: all twists about one of them have wrenches far apart; 0.28 with even angles, 0.11 so."""
+    surface = pf.LimitSurfaceExact(PUBLISHED_PATCHES["NonConvex1"]())
+    _, points = scaled_samples(surface, *even_mesh(surface))
+    assert points.shape == (POLAR_SEGMENTS + 1, AZIMUTH_SEGMENTS + 1, 3)
+    steps = [np.linalg.norm(np.diff(points, axis=axis), axis=-1).max() for axis in (0, 1)]
+    even = np.linspace(0.0, np.pi, POLAR_SEGMENTS + 1)[:, None], np.linspace(0.0, 2 * np.pi, AZIMUTH_SEGMENTS + 1)
+    _, points = scaled_samples(surface, *even)
+    before = [np.linalg.norm(np.diff(points, axis=axis), axis=-1).max() for axis in (0, 1)]
+    assert max(steps) < 0.5 * max(before)
 
 
 def test_another_surface_can_stand_beside_it():
