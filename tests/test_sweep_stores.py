@@ -91,7 +91,7 @@ def test_a_damaged_chunk_is_found_by_who_reads_it(zarr, tmp_path):
 def test_another_grid_needs_another_store(zarr, tmp_path):
     path = tmp_path / "all.zarr"
     pf.sweep(grip, VALUES, out=path, measure=end)
-    for values in ({"grip": [1.0, 2.0], "mass": MASSES}, {"grip": GRIPS}, {"grip": GRIPS, "t_end": [0.01]}):
+    for values in ({"grip": [1.0, 2.0, 4.0], "mass": MASSES}, {"grip": GRIPS}, {"grip": GRIPS, "t_end": [0.01]}):
         with pytest.raises(pf.FrictionError, match="holds") as caught:
             pf.sweep(grip, values, out=path, measure=end)
         assert "\n" not in str(caught.value)

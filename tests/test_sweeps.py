@@ -169,6 +169,18 @@ def test_a_measurement_counts_by_what_it_does():
     assert identity.digest_of(named) == identity.digest_of({"theta", "y", "x"})
 
 
+def test_numbers_and_functions_that_a_measurement_mentions_are_part_of_it():
+    def measure(lines: str):
+        space: dict = {"__name__": "mine"}
+        exec(lines + "\ndef measure(solution):\n    return helper(solution) * LIMIT", space)
+        return space["measure"]
+
+    first, helper = "LIMIT = 1.0", "\ndef helper(solution):\n    return 1.0"
+    digests = [measure(first + helper), measure("LIMIT = 2.0" + helper), measure(first + helper.replace("1.0", "2.0"))]
+    assert len({identity.digest_of(each) for each in digests}) == 3
+    assert identity.digest_of(measure(first + helper)) == identity.digest_of(digests[0])
+
+
 def test_a_run_of_other_equations_does_not_count(tmp_path, monkeypatch):
     pf.sweep(grip, {"grip": [1.0]}, out=tmp_path)
     monkeypatch.setattr(identity, "equations", lambda: "others")

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from planarfriction import FrictionError
-from planarfriction.writing import check_writable, make_folder, replacing, write_text
+from planarfriction.writing import check_writable, make_folder, put, replacing, write_text
 
 resource = pytest.importorskip("resource")  # not on Windows
 
@@ -225,3 +225,17 @@ def test_folders_are_made_or_refused_in_one_line(tmp_path):
     for path in (tmp_path / "plain", tmp_path / "plain" / "out", "/proc/out", "a\0b"):
         with pytest.raises(FrictionError, match="cannot write to folder"):
             make_folder(path)
+
+
+def test_a_small_file_that_cannot_take_its_place_leaves_the_old_one(tmp_path, monkeypatch):
+    target = str(tmp_path / "run.npz")
+    put(target, OLD)
+
+    def full(*_):
+        assert len(names(tmp_path)) == 2  # the new one is beside the old one, and whole
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "replace", full)
+    with pytest.raises(FrictionError, match=r"run\.npz: cannot be written: No space left on device"):
+        put(target, b"new")
+    assert names(tmp_path) == ["run.npz"] and Path(target).read_bytes() == OLD
