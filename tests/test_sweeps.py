@@ -121,6 +121,7 @@ def test_values_of_any_kind_have_labels():
         ({"make_scene": lambda grip: 1.0}, "make_scene must return a Scene, got float"),
         ({"measure": 3}, "measure must be a function of a Solution"),
         ({"measure": lambda solution: object()}, "must return numbers, texts and arrays of them"),
+        ({"progress": float}, "progress must be a function of a Progress, got TypeError: float() argument"),
         ({"executor": 3}, "executor must be a concurrent.futures.Executor"),
         ({"make_scene": lambda grip: 1 / 0}, "all 3 runs failed; the first: grip=1.0: make_scene: ZeroDivisionError"),
     ],
@@ -248,10 +249,10 @@ def test_failures_are_recorded_with_reason_and_scene_and_are_no_end(tmp_path):
         return 1.0
 
     data = pf.sweep(grip, {"grip": GRIPS}, out=tmp_path / "b", measure=picky)
-    assert data.failure.values.tolist() == ["", "ValueError: two is bad", ""]
+    assert data.failure.values.tolist() == ["", "measure: ValueError: two is bad", ""]
     (file,) = (tmp_path / "b").glob("*.failed.json")
     kept = json.loads(file.read_text())
-    assert kept["reason"] == "ValueError: two is bad" and pf.Scene.from_dict(kept["scene"]) == grip(2.0)
+    assert kept["reason"] == "measure: ValueError: two is bad" and pf.Scene.from_dict(kept["scene"]) == grip(2.0)
     assert file.name == f"{data.run.values[1]}.failed.json"
     again = found(tmp_path / "b", GRIPS, measure=picky)
     assert again == 2  # the failure is tried again

@@ -49,12 +49,14 @@ def run(scene: Scene, measure: Callable[[Solution], Any] | None, stopped: Callab
         if stopped is not None and stopped():
             raise Stopped
 
+    where = ""
     try:
         solution = simulate(scene, progress=look)
+        where = "measure: "
         found = solution.histories if measure is None else measure(solution)
         return Record(solution.status, "", variables(found, measure), scene.t_end)
     except Exception as error:
-        return Record(FAILED, reason_of(error), {}, scene.t_end)
+        return Record(FAILED, f"{where}{reason_of(error)}", {}, scene.t_end)
 
 
 class Stopped(BaseException):

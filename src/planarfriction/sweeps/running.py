@@ -371,4 +371,7 @@ class Sweeping:
         now = time.monotonic()
         if self._report is not None and (at_once or now - self._reported >= _BETWEEN):
             self._reported = now
-            self._report(self.progress())
+            try:
+                self._report(self.progress())
+            except Exception as error:
+                raise InvalidValueError("progress", "be a function of a Progress", reason_of(error)) from error
