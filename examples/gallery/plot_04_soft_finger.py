@@ -22,8 +22,8 @@ for load in (1.0, 3.0, 8.0):
     left.plot(1e3 * patch.positions[middle, 0], 1e-3 * patch.pressure_values(load)[middle], label=f"{load:g} N")
 left.set(xlabel="x [mm]", ylabel="pressure [kPa]")
 left.legend()
-right.loglog(loads, 1e3 * loads * radii, ".-", label="torque of a spin, mu = 1")
-right.loglog(loads, 1e3 * loads * radii[0], ":", label="in proportion to the load")
+right.plot(loads, 1e3 * loads * radii, ".-", label="torque of a spin, mu = 1")
+right.plot(loads, 1e3 * loads * radii[0], ":", label="in proportion to the load")
 right.set(xlabel="normal force [N]", ylabel="torque [N mm]")
 right.legend()
 

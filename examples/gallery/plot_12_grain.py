@@ -2,8 +2,8 @@
 Friction with a grain
 =====================
 
-A grooved sole slides more easily along its grooves. Friction is then not opposite to the motion: it leans towards the
-grooves.
+A grooved sole slides more easily along its grooves. Friction is then not opposite to the motion: it leans away from
+the grooves, and so pushes the sole towards them.
 """
 
 import matplotlib.pyplot as plt
