@@ -53,3 +53,9 @@ def test_the_example_reaches_its_pose():
     found = example.plan()
     assert found.push.end == pytest.approx(example.GOAL, abs=1e-4)
     assert found.report.sticks
+
+
+def test_a_push_at_the_edge_of_its_motion_cone_goes_on():
+    # on three feet one of these pushes would change its mode without end
+    measured = [each for each in followed.single_pushes() if each.name.startswith("wood_30_63_43")]
+    assert np.isfinite(followed.errors(measured, pf.LimitSurfaceExact)).all()
