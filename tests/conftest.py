@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+
 from hypothesis import settings
 
 settings.register_profile("repeatable", derandomize=True)
@@ -10,6 +12,7 @@ settings.register_profile("random", derandomize=False)
 
 def pytest_configure(config) -> None:
     """A run that decides on a change must not fail for another reason; slow tests may draw new examples."""
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored in what a shell starts in the background
     if config.getoption("--hypothesis-profile") is None:
         slow = "slow" in config.getoption("markexpr").replace("not slow", "")
         settings.load_profile("random" if slow else "repeatable")

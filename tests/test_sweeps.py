@@ -6,6 +6,7 @@ import concurrent.futures
 import dataclasses
 import functools
 import json
+import multiprocessing
 import os
 import signal
 import subprocess
@@ -25,6 +26,9 @@ from planarfriction.sweeps import identity, records
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
 PATCH = pf.ContactPatch.disc(0.01, cells=7)
 MODEL = pf.ReducedModel(PATCH, LAW, segments=4, speeds=5)
+FRESH = multiprocessing.get_context("spawn")
+"""Forks of a process in which other tests have started JAX can hang."""
+
 GRIPS, MASSES = [1.0, 2.0, 3.0], [0.1, 0.2]
 
 
@@ -365,7 +369,7 @@ def test_any_executor_gives_the_same_bits():
 
 
 def test_processes_give_the_same_bits_and_take_no_lambda():
-    with concurrent.futures.ProcessPoolExecutor(2) as pool:
+    with concurrent.futures.ProcessPoolExecutor(2, FRESH) as pool:
         with pytest.raises(pf.FrictionError, match="measure must be a function that other processes can import"):
             pf.sweep(grip, {"grip": GRIPS}, executor=pool, measure=lambda solution: 1.0)
         data = pf.sweep(grip, {"grip": GRIPS, "mass": MASSES}, executor=pool)
@@ -377,7 +381,10 @@ def leave(solution: pf.Solution) -> float:
 
 
 def test_an_executor_that_dies_is_an_error_in_one_line(tmp_path):
-    with concurrent.futures.ProcessPoolExecutor(1) as pool, pytest.raises(SweepError, match="what is done is kept"):
+    with (
+        concurrent.futures.ProcessPoolExecutor(1, FRESH) as pool,
+        pytest.raises(SweepError, match="what is done is kept"),
+    ):
         pf.sweep(grip, {"grip": GRIPS}, executor=pool, measure=leave, out=tmp_path)
     with pytest.raises(SweepError, match="the executor ended"):  # it takes no more
         pf.sweep(grip, {"grip": GRIPS}, executor=pool)

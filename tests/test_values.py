@@ -12,7 +12,15 @@ import pytest
 
 import planarfriction as pf
 from planarfriction import errors, identify, solvers
-from planarfriction.errors import FileError, InvalidValueError, MissingExtraError, SimulationInterrupted, SolverError
+from planarfriction.errors import (
+    FileError,
+    InvalidValueError,
+    MissingExtraError,
+    SimulationInterrupted,
+    SolverError,
+    SweepError,
+    SweepInterrupted,
+)
 from planarfriction.patch import PerCell
 
 SQUARE = pf.ContactPatch.rectangle(0.02, cells=5)
@@ -162,6 +170,8 @@ RAISED = {
     "extra": MissingExtraError("torch", "torch"),
     "solver": SolverError("at t = 1 s: step size fell below", None),
     "interrupted": SimulationInterrupted(None),
+    "sweep": SweepError("the executor ended"),
+    "sweep interrupted": SweepInterrupted("1 of 2 done", None),
     "base": errors.FrictionError("no"),
 }
 

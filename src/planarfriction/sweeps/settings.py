@@ -113,7 +113,7 @@ def _set(table: Any, parts: list[str], value: Any, path: str, where: str, valid:
         return [*table[:number], inner, *table[number + 1 :]]
     if not isinstance(table, Mapping):
         raise InvalidValueError(path, f"end at {where}, which is {shown(table)}", f"{key!r} after it")
-    valid = list(table) if valid is None else list(valid)
+    valid = list(table) if valid is None else list(dict.fromkeys(valid))
     if key not in valid:
         near = difflib.get_close_matches(key, valid, n=1)
         hint = f" (did you mean {near[0]!r}?)" if near else ""
