@@ -103,7 +103,7 @@ def _show(data: xr.Dataset, out: Path) -> None:
 
     failed = [str(each) for each in data.failure.values.ravel().tolist() if each]
     if failed:
-        note(f"{len(failed)} failed, the first: {failed[0]} (scenes in {out}/*.failed.json)")
+        note(f"{len(failed)} failed, the first: {failed[0]} (the reasons of all: variable failure)")
     swept = data.status.dims
     if out.suffix == ".zarr":
         note(f"wrote {out}")
