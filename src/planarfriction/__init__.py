@@ -78,23 +78,66 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *__all__])
+    return sorted([*__all__, "__version__"])
 
 
-if TYPE_CHECKING:  # for editors and type checkers: the same names as above
-    from planarfriction.autodiff import rollout
-    from planarfriction.errors import FrictionError
-    from planarfriction.laws import Coulomb, CoulombStribeck, Dahl, ElastoPlastic, LuGre
-    from planarfriction.limit_surface import (
-        LimitSurfaceCells,
-        LimitSurfaceEllipsoid,
-        LimitSurfaceExact,
-        LimitSurfaceQuartic,
-        LimitSurfaceTable,
-        LimitSurfaceTablePublished,
+if TYPE_CHECKING:  # for editors and type checkers: the same names as above, public by `as`
+    from planarfriction import (
+        autodiff as autodiff,
+        coupling as coupling,
+        errors as errors,
+        families as families,
+        formulas as formulas,
+        geometry as geometry,
+        identify as identify,
+        laws as laws,
+        limit_surface as limit_surface,
+        models as models,
+        patch as patch,
+        planning as planning,
+        plots as plots,
+        scenes as scenes,
+        solvers as solvers,
+        sweeps as sweeps,
     )
-    from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
-    from planarfriction.patch import ContactPatch, LinearGradient, PressureMaps, SoftFinger, Uniform, grain
-    from planarfriction.scenes import Body, Contact, Scene, Signal, Solution, load, simulate
-    from planarfriction.sweeps import sweep
-    from planarfriction.warm import warm_up
+    from planarfriction.autodiff import rollout as rollout
+    from planarfriction.errors import FrictionError as FrictionError
+    from planarfriction.laws import (
+        Coulomb as Coulomb,
+        CoulombStribeck as CoulombStribeck,
+        Dahl as Dahl,
+        ElastoPlastic as ElastoPlastic,
+        LuGre as LuGre,
+    )
+    from planarfriction.limit_surface import (
+        LimitSurfaceCells as LimitSurfaceCells,
+        LimitSurfaceEllipsoid as LimitSurfaceEllipsoid,
+        LimitSurfaceExact as LimitSurfaceExact,
+        LimitSurfaceQuartic as LimitSurfaceQuartic,
+        LimitSurfaceTable as LimitSurfaceTable,
+        LimitSurfaceTablePublished as LimitSurfaceTablePublished,
+    )
+    from planarfriction.models import (
+        DistributedModel as DistributedModel,
+        ReducedModel as ReducedModel,
+        ReducedModelPublished as ReducedModelPublished,
+    )
+    from planarfriction.patch import (
+        ContactPatch as ContactPatch,
+        LinearGradient as LinearGradient,
+        PressureMaps as PressureMaps,
+        SoftFinger as SoftFinger,
+        Uniform as Uniform,
+        grain as grain,
+    )
+    from planarfriction.scenes import (
+        Body as Body,
+        Contact as Contact,
+        Scene as Scene,
+        Signal as Signal,
+        Solution as Solution,
+        load as load,
+        simulate as simulate,
+    )
+    from planarfriction.sweeps import sweep as sweep
+    from planarfriction.warm import warm_up as warm_up

@@ -1,6 +1,7 @@
-"""Values are equal where their parts are: `==` and `hash` of records with arrays in them, always a plain bool.
+"""Records with arrays in them: `==` and `hash` by their parts, always a plain bool, and a `repr` of one line.
 
-The `==` that Python makes for dataclasses and named tuples compares arrays as a whole and raises.
+The `==` that Python makes for dataclasses and named tuples compares arrays as a whole and raises; their `repr` writes
+out every number.
 """
 
 from __future__ import annotations
@@ -13,9 +14,21 @@ import numpy as np
 
 _KindT = TypeVar("_KindT", bound=type)
 
+_SHORT = 9
+"""Numbers of an array, items of a sequence, that a `repr` shows."""
+
 
 class ByValue:
-    """Base of frozen dataclasses (`eq=False`) that compare by type and content."""
+    """Base of frozen dataclasses (`eq=False`) that compare by type and content, and show themselves in one line."""
+
+    def __init_subclass__(cls, **more: Any) -> None:
+        super().__init_subclass__(**more)
+        if "__repr__" not in cls.__dict__:  # else the decorator `dataclass` writes one of its own
+            cls.__repr__ = super(cls, cls).__repr__  # pyright: ignore[reportAttributeAccessIssue]
+
+    def __repr__(self) -> str:
+        shown = [field for field in dataclasses.fields(self) if field.repr]  # pyright: ignore[reportArgumentType]
+        return _record(self, {field.name: getattr(self, field.name, None) for field in shown})
 
     def __eq__(self, other: object) -> bool:
         if type(self) is not type(other):
@@ -27,7 +40,7 @@ class ByValue:
 
 
 def by_parts(kind: _KindT) -> _KindT:
-    """Decorator of named tuples with arrays: they compare by content."""
+    """Decorator of named tuples with arrays: they compare by content, and show themselves in one line."""
 
     def equal(self: Any, other: object) -> bool:
         return type(self) is type(other) and _same_items(self, other)
@@ -35,9 +48,43 @@ def by_parts(kind: _KindT) -> _KindT:
     def differ(self: Any, other: object) -> bool:
         return not equal(self, other)
 
-    for name, method in (("__eq__", equal), ("__ne__", differ), ("__hash__", None)):
+    def show(self: Any) -> str:
+        return _record(self, self._asdict())
+
+    for name, method in (("__eq__", equal), ("__ne__", differ), ("__hash__", None), ("__repr__", show)):
         setattr(kind, name, method)
     return kind
+
+
+def brief(value: Any) -> str:
+    """`value` in few words: arrays by their shape and long sequences by their length, where they are not short."""
+    if isinstance(value, np.ndarray):
+        return np.array2string(value, separator=", ") if value.size <= _SHORT and value.ndim < 2 else _shape(value)
+    if isinstance(value, (tuple, list)) and type(value) in (tuple, list):
+        if len(value) > _SHORT:
+            return f"{type(value).__name__} of {len(value)}"
+        items = ", ".join(map(brief, value))
+        return f"[{items}]" if isinstance(value, list) else f"({items}{',' if len(value) == 1 else ''})"
+    if isinstance(value, Mapping) and len(value) > _SHORT:
+        return f"{type(value).__name__} of {len(value)}"
+    return " ".join(repr(value).split())
+
+
+def unusual(record: Any, but: tuple[str, ...] = ()) -> list[str]:
+    """Arguments of a dataclass that are not as by default, as `name=value`; those in `but` are left out."""
+    return [
+        f"{field.name}={brief(getattr(record, field.name))}"
+        for field in dataclasses.fields(record)
+        if field.init and field.repr and field.name not in but and not same(getattr(record, field.name), field.default)
+    ]
+
+
+def _record(record: Any, parts: Mapping[str, Any]) -> str:
+    return f"{type(record).__name__}({', '.join(f'{name}={brief(part)}' for name, part in parts.items())})"
+
+
+def _shape(array: np.ndarray) -> str:
+    return f"array {list(array.shape)}"
 
 
 def same(one: Any, other: Any) -> bool:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.equality import ByValue, by_parts
+from planarfriction.equality import ByValue, by_parts, unusual
 from planarfriction.errors import FrictionError, InvalidValueError, SolverError
 from planarfriction.geometry import transformed
 from planarfriction.kernels import surfaces as kernels
@@ -92,6 +92,15 @@ class LimitSurface(ByValue):
     def __getstate__(self) -> dict[str, Any]:
         """What a copy or another process gets, at one instant: another thread may be about to build something."""
         return dict(self.__dict__)
+
+    def __repr__(self) -> str:
+        parts = [f"{self.patch.name!r} of {self.patch.cells} cells", *unusual(self, but=("patch",))]
+        return f"{type(self).__name__}({', '.join(parts)})"
+
+    def _repr_html_(self) -> str:
+        from planarfriction.plots.notebook import surface_html
+
+        return surface_html(self)
 
     def at(self, normal_force: float) -> LimitSurface:
         """The same kind of surface for the shape at another load; itself where the shape does not depend on it."""

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.equality import ByValue, by_parts
+from planarfriction.equality import ByValue, by_parts, unusual
 from planarfriction.errors import InvalidValueError
 from planarfriction.laws import FrictionLaw
 from planarfriction.patch import ContactPatch
@@ -134,6 +134,11 @@ class FrictionModel(ByValue):
         """What a copy or another process gets, at one instant: another thread may be about to build something."""
         return dict(self.__dict__)
 
+    def __repr__(self) -> str:
+        parts = [f"{self.patch.name!r} of {self.patch.cells} cells", _named(self.law)]
+        parts += unusual(self, but=("patch", "law"))
+        return f"{type(self).__name__}({', '.join(parts)})"
+
     @property
     def state_shape(self) -> tuple[int, ...]:
         """Shape of the state of one contact."""
@@ -224,3 +229,10 @@ class FrictionModel(ByValue):
             a if a.shape == shape and a.flags.carray else np.broadcast_to(a, shape).copy()
             for a, shape in zip(given, wanted, strict=True)
         ]
+
+
+def _named(law: FrictionLaw) -> str:
+    """A law in few words: what it is, and how much friction there is."""
+    numbers = law.numbers
+    static = "" if numbers.mu_s == numbers.mu_c else f", mu_s={numbers.mu_s:g}"
+    return f"{type(law).__name__}(mu_c={numbers.mu_c:g}{static}, ...)"

@@ -371,6 +371,11 @@ class ContactPatch(Anisotropy):
         law = type(self.pressure).__name__
         return f"ContactPatch({self.name!r}, {self.cells} cells{grid}, {law} pressure)"
 
+    def _repr_html_(self) -> str:
+        from planarfriction.plots.notebook import patch_html
+
+        return patch_html(self)
+
     def _about_centre_of_pressure(self, normal_force) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Weights and both coordinates of the cells relative to the CoP, each of shape `[..., N]`."""
         weights = self.weights(normal_force)
@@ -384,8 +389,6 @@ class ContactPatch(Anisotropy):
             raise InvalidValueError("pressure", "load at least one cell at every load", f"a peak of {peak.min()}")
         load = relative / peak * self.areas
         return load / load.sum(-1, keepdims=True)
-
-    # ------------------------------------------------------------------ plain data
 
     def to_dict(self) -> dict[str, Any]:
         """The patch as numbers, strings and lists, ready for JSON; `from_dict` restores it to the last bit."""

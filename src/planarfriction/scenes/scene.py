@@ -66,6 +66,12 @@ class Body(ByValue):
             object.__setattr__(self, "outline", outline)
 
 
+def between(signal: Signal) -> str:
+    """The lowest and the highest value of a signal of plain numbers, in words; one number where it is constant."""
+    low, high = float(signal.values.min()), float(signal.values.max())
+    return f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
+
+
 def checked_model(name: str, value: Any) -> Any:
     """`value` if it is a friction model, or one that looks like it."""
     if isinstance(value, type) or not (hasattr(value, "patch") and hasattr(value, "law")):
@@ -115,6 +121,12 @@ class Contact(ByValue):
         object.__setattr__(self, "count", validation.count(f"count {of_contact}", self.count, at_most=MOST_CONTACTS))
         if self.velocity is not None:
             object.__setattr__(self, "velocity", as_signal(f"velocity {of_contact}", self.velocity, 3))
+
+    def __repr__(self) -> str:
+        count = f"{self.count} x " if self.count > 1 else ""
+        moved = "" if self.velocity is None else ", which moves"
+        load = between(self.normal_force)
+        return f"Contact({self.name!r}: {count}{self.model!r} on the {self.mounted_on}{moved}, {load} N)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -196,6 +208,13 @@ class Scene(ByValue):
             raise InvalidValueError(f"velocity of {moves[0]}", rule, driven[moves[0]])
         if self.start == "sliding" and not moves:
             raise InvalidValueError("initial velocity", "not be zero where start is 'sliding'", driven["the body"])
+
+    def __repr__(self) -> str:
+        contacts = "; ".join(repr(contact) for contact in self.contacts[:2])
+        more = f"; {len(self.contacts) - 2} more" if len(self.contacts) > 2 else ""
+        driven = ", force given" if self.force is not None else ", velocity given" if self.velocity is not None else ""
+        body = f"{self.body.mass:g} kg, {self.body.inertia:.3g} kg m^2"
+        return f"Scene({self.name!r}: {self.t_end:g} s, body of {body}{driven}; {contacts}{more})"
 
     def breaks(self, t_end: float | None = None) -> np.ndarray:
         """Times [s] from 0 to `t_end` (default: the scene's) at which any signal jumps or bends, both ends included.

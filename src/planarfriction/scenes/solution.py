@@ -86,6 +86,19 @@ class Solution:
     def __hash__(self) -> int:
         return hash((self.statistics, self.status, self.message))
 
+    def __repr__(self) -> str:
+        name = "no scene" if self.scene is None else repr(self.scene.name)
+        time = np.asarray(self.histories["time"].values)
+        end = (f"{each}={float(self.histories[each].values[-1]):.4g}" for each in ("x", "y", "theta") if len(time))
+        cost = f"{self.statistics.steps} steps in {1e3 * self.statistics.wall_time:.3g} ms"
+        until = f"{len(time)} samples to t={float(time[-1]):g} s" if len(time) else "no samples"
+        return f"Solution({name}, {self.status}: {until}, {', '.join([*end, cost])})"
+
+    def _repr_html_(self) -> str:
+        from planarfriction.plots.notebook import solution_html
+
+        return solution_html(self)
+
     @functools.cached_property
     def data(self) -> xr.Dataset:
         """Histories over `time` [s] and `contact`, each with its unit in `attrs["units"]`; made on first use.

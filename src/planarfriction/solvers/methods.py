@@ -64,3 +64,11 @@ RODAS4 = Method(
     order=4.0,
 )
 """Order 4(3), six stages and right-hand sides, continuous extension of order 3. Source: Hairer and Wanner, RODAS."""
+
+
+def _named(self: Method) -> str:
+    name = next((name for name, each in (("RODAS4", RODAS4), ("RODAS3", RODAS3)) if each == self), "one of your own")
+    return f"Method({name}, order {self.order:g}, {len(self.m)} stages)"
+
+
+Method.__repr__ = _named  # tables of coefficients tell a reader nothing

@@ -1,0 +1,140 @@
+"""What a notebook shows of a patch, a limit surface and a solution: a small picture and a few numbers beside it."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from planarfriction import geometry
+from planarfriction.errors import FrictionError
+from planarfriction.plots import style
+from planarfriction.plots.motion import draw_motion
+
+if TYPE_CHECKING:
+    from planarfriction.limit_surface import LimitSurface
+    from planarfriction.patch import ContactPatch
+    from planarfriction.scenes import Solution
+
+_LOAD = 1.0
+"""Load [N] at which a patch is shown whose shape depends on it."""
+
+_DIRECTIONS = 120
+"""Twists whose wrenches make the section of a limit surface."""
+
+
+def patch_html(patch: ContactPatch) -> str:
+    """A thumbnail of the pressure, cells, size, contact radius and centre of pressure of a patch."""
+    load = _LOAD if patch.depends_on_load else None
+    rows = {"cells": f"{patch.cells}", "size": _size(patch)}
+    try:
+        rows["contact radius"] = _length(float(patch.contact_radius(load)))
+        rows["centre of pressure"] = _point(patch.centre_of_pressure(load))
+        figure = _pressure(patch, patch.weights(load))
+    except FrictionError:  # a shape that there is not at this load
+        figure = None
+    if load is not None:
+        rows["shown at"] = f"{load:g} N"
+    return _beside(figure, f"ContactPatch {patch.name!r}", rows)
+
+
+def surface_html(surface: LimitSurface) -> str:
+    """A section of the limit surface through force along x and torque, its patch and its contact radius."""
+    rows = {"patch": f"{surface.patch.name!r} of {surface.patch.cells} cells"}
+    figure = None
+    try:
+        rows["contact radius"] = _length(surface.contact_radius)
+        rows["centre of pressure"] = _point(surface.centre_of_pressure)
+        rows["section"] = "fx across, τ/r up, per µ f_N"
+        figure = _section(surface)
+    except FrictionError:  # no load for a shape that depends on it
+        rows["shape"] = "depends on the load: give a normal_force"
+    return _beside(figure, type(surface).__name__, rows)
+
+
+def solution_html(solution: Solution) -> str:
+    """The motion of the body, how the run ended, and what it took."""
+    time = np.asarray(solution.histories["time"].values)
+    x, y, theta = (float(np.asarray(solution.histories[name].values)[-1]) for name in ("x", "y", "theta"))
+    cost = solution.statistics
+    rows = {
+        "status": f"{solution.status}: {solution.message}",
+        "samples": f"{len(time)}, to {float(time[-1]):g} s",
+        "end": f"{_point((x, y))}, turned by {np.degrees(theta):.2f} deg",
+        "cost": f"{cost.steps} steps, {1e3 * cost.wall_time:.3g} ms",
+    }
+    figure, title = None, "Solution"
+    if solution.scene is not None:
+        title = f"Solution {solution.scene.name!r}"
+        figure = style.new_figure(4.0, 3.0)
+        draw_motion(figure, solution)
+    return _beside(figure, title, rows)
+
+
+def _pressure(patch: ContactPatch, weights: np.ndarray) -> style.PlotFigure:
+    figure = style.new_figure(1.5, 1.5)
+    axes = figure.add_subplot()
+    if patch.grid is None:
+        axes.scatter(*patch.positions.T, s=60 * weights / weights.max(), c=weights, cmap=style.PRESSURE_MAP)
+        axes.margins(0.3)
+    else:
+        grid = patch.grid
+        pixels = np.full((grid.rows, grid.columns), np.nan)
+        pixels[grid.locate(patch.positions)] = weights / patch.areas
+        box = np.array([0.0, grid.columns * grid.cell_width, 0.0, grid.rows * grid.cell_height])
+        axes.imshow(pixels, cmap=style.PRESSURE_MAP, vmin=0.0, extent=tuple(box), interpolation="nearest")
+    axes.set(aspect="equal")
+    axes.set_axis_off()
+    return figure
+
+
+def _section(surface: LimitSurface) -> style.PlotFigure:
+    way = np.linspace(0.0, 2.0 * np.pi, _DIRECTIONS + 1)
+    radius, centre = surface.contact_radius, surface.centre_of_pressure
+    about_centre = np.stack([np.cos(way), np.zeros_like(way), np.sin(way) / radius], -1)
+    wrenches = geometry.wrench_at(surface.wrench(geometry.twist_at(about_centre, -centre)), centre)
+    figure = style.new_figure(1.5, 1.5)
+    axes = figure.add_subplot()
+    axes.plot(wrenches[:, 0], wrenches[:, 2] / radius, color=style.PALETTE[0], linewidth=1.5)
+    axes.axhline(0.0, color="0.8", linewidth=0.6, zorder=0)
+    axes.axvline(0.0, color="0.8", linewidth=0.6, zorder=0)
+    axes.set(aspect="equal")
+    axes.set_axis_off()
+    return figure
+
+
+def _size(patch: ContactPatch) -> str:
+    if patch.grid is None:
+        width, height = np.ptp(patch.positions, axis=0)
+    else:
+        width, height = patch.grid.columns * patch.grid.cell_width, patch.grid.rows * patch.grid.cell_height
+    unit = style.unit_for("length", max(width, height))
+    return f"{unit.factor * width:.3g} x {unit.factor * height:.3g} {unit.label}"
+
+
+def _length(value: float) -> str:
+    unit = style.unit_for("length", value)
+    return f"{unit.factor * value:.4g} {unit.label}"
+
+
+def _point(point: Any) -> str:
+    return f"({1e3 * float(point[0]):.2f}, {1e3 * float(point[1]):.2f}) mm".replace("-0.00", "0.00")
+
+
+def _beside(figure: style.PlotFigure | None, title: str, rows: dict[str, str]) -> str:
+    """A picture and a table in one row of HTML, all of it in one piece: nothing is loaded from elsewhere."""
+    picture = ""
+    if figure is not None:
+        buffer = io.BytesIO()
+        figure.savefig(buffer, format="png", dpi=96)
+        data = base64.b64encode(buffer.getvalue()).decode()
+        picture = f'<img alt="" src="data:image/png;base64,{data}">'
+    lines = "".join(
+        f'<tr><td style="text-align:left">{name}</td><td style="text-align:left">{html.escape(value)}</td></tr>'
+        for name, value in rows.items()
+    )
+    table = f"<div><b>{html.escape(title)}</b><table>{lines}</table></div>"
+    return f'<div style="display:flex;align-items:center;gap:1em">{picture}{table}</div>'
