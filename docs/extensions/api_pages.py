@@ -19,6 +19,7 @@ from sphinx.ext.napoleon import NumpyDocstring
 from sphinx.pycode import ModuleAnalyzer
 
 import planarfriction
+from planarfriction.described import HEADING
 
 OPTIONAL = ("torch", "jax", "adapters.mujoco", "adapters.mjx", "adapters.drake")
 """Public modules that load a package of an extra, and so stand in no list of the package."""
@@ -153,6 +154,8 @@ def as_restructured_text(app: Sphinx, what: str, name: str, thing: Any, options:
 
     The words of attributes have no sections, and a colon in them is a colon.
     """
+    if what == "class" and f"{HEADING}:" in lines:  # each has an entry of its own here
+        del lines[lines.index(f"{HEADING}:") :]
     if what not in ("attribute", "property", "data"):
         lines[:] = NumpyDocstring(list(lines), app.config, app, what, name, thing, options).lines()
     code = False

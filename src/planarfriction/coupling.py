@@ -95,6 +95,7 @@ class CoupledPatches(ByValue):
     """
 
     models: Sequence[FrictionModel]
+    """Friction models with compiled steps, one for each patch."""
 
     def __post_init__(self) -> None:
         if isinstance(self.models, FrictionModel) or not isinstance(self.models, Iterable):
@@ -116,7 +117,10 @@ class CoupledPatches(ByValue):
         return np.zeros(self.state_shape)
 
     def states(self, state: np.ndarray) -> list[np.ndarray]:
-        """Views of the state of each patch in `state` `[..., states]`, in the shape that its model gives it."""
+        """Views of the state of each patch in `state` `[..., states]`, in the shape that its model gives it.
+
+        Raises InvalidValueError for a state of another shape.
+        """
         if not (isinstance(state, np.ndarray) and state.shape[-1:] == self.state_shape):
             shape = list(np.shape(state))
             raise InvalidValueError("state", f"be an array of shape [..., {self._bounds[-1]}]", f"shape {shape}")

@@ -12,6 +12,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from planarfriction.described import described
+
 _KindT = TypeVar("_KindT", bound=type)
 
 _SHORT = 9
@@ -23,6 +25,8 @@ class ByValue:
 
     def __init_subclass__(cls, **more: Any) -> None:
         super().__init_subclass__(**more)
+        if cls.__dict__.get("__doc__"):
+            described(cls)
         if "__repr__" not in cls.__dict__:  # else the decorator `dataclass` writes one of its own
             cls.__repr__ = super(cls, cls).__repr__  # pyright: ignore[reportAttributeAccessIssue]
 
@@ -53,7 +57,7 @@ def by_parts(kind: _KindT) -> _KindT:
 
     for name, method in (("__eq__", equal), ("__ne__", differ), ("__hash__", None), ("__repr__", show)):
         setattr(kind, name, method)
-    return kind
+    return described(kind)
 
 
 def brief(value: Any) -> str:

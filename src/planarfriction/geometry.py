@@ -31,7 +31,7 @@ def wrench_at(wrench, offset) -> np.ndarray:
 
 
 def transformed(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """`matrix @ v` for each v of `vectors` `[..., 3]`, rounded alike for one and for many, in any order in memory.
+    """Products `matrix @ v` for v of `vectors` `[..., 3]`, rounded alike for one and for many, in any order in memory.
 
     Only products and sums of single numbers are rounded the same everywhere; those of BLAS depend on the number of rows
     and on the processor.

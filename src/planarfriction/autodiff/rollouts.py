@@ -79,9 +79,13 @@ class RolloutGradient(NamedTuple):
     """Gradient of a number with respect to the inputs of a roll-out, each of the shape of that input."""
 
     state: np.ndarray
+    """By the state before the first step, of its shape [1/unit of the state]."""
     twist: np.ndarray
+    """By the twists, `[..., T, 3]` [s/m, s/m, s/rad]."""
     normal_force: np.ndarray
+    """By the loads, of their shape [1/N]."""
     parameters: np.ndarray
+    """By the parameters of the law, `[..., P]` [1/unit of each]."""
 
 
 def rollout(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, *, parameters: Any = None) -> Rollout:
@@ -108,7 +112,7 @@ def rollout(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, *, p
 def rollout_states(
     model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, *, parameters: Any = None
 ) -> RolloutStates:
-    """`rollout` of a reduced model with the state before each step, which saves `rollout_gradient` half of its way."""
+    """A `rollout` that keeps the state before each step, which saves `rollout_gradient` half of its way."""
     inputs = checked(model, state, twist, normal_force, dt, parameters)
     end, wrenches, states = _roll(inputs, len(inputs.dt))
     return RolloutStates(inputs.shaped(end), wrenches, inputs.shaped(states, len(inputs.dt)))
@@ -176,6 +180,9 @@ def rollout_sensitivities(
 
     Forward in time, for least squares, which wants each wrench's own derivatives; the initial state is held. `names`:
     of `parameter_names`, None for all.
+
+    Raises InvalidValueError for inputs of wrong shapes, below zero where that is not possible, or of parameters that
+    the law has not.
     """
     inputs = checked(model, state, twist, normal_force, dt, parameters)
     family, count, steps = inputs.parts[0].family, inputs.state.shape[1], len(inputs.dt)

@@ -183,6 +183,8 @@ def known_so_far(found: Identification, patch: ContactPatch, law: LuGre) -> tupl
     """The patch and the law to plan with: what `found` knows to better than a half, the rest as in `patch` and `law`.
 
     A value of `law` that lies outside the interval of `found` moves to the middle of that.
+
+    Raises InvalidValueError where `found` is no Identification, or `law` no LuGre law.
     """
     validation.instance("found", found, Identification, "an Identification")
     validation.instance("law", law, LuGre, "a LuGre law")

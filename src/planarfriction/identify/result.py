@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.described import described
 from planarfriction.equality import ByValue
 from planarfriction.identify.choice import ModelScore
 from planarfriction.identify.nuisance import Nuisance
@@ -22,11 +23,13 @@ TWO_SIDED = 1.96
 """Standard errors on either side of the estimate that hold 95 % of a normal distribution."""
 
 
+@described
 @dataclass(frozen=True)
 class Verdict:
     """What the data say about one parameter, or about the fit (`parameter` is then "fit")."""
 
     parameter: str
+    """Name of the parameter, or "fit"."""
     identifiable: bool
     """Whether the data determine it; for the fit: whether nothing is wrong."""
     reason: str
@@ -117,7 +120,10 @@ class Identification(ByValue):
 
     def residual_correlations(self, lags: int = 50) -> np.ndarray:
         """Correlations of the residuals over 0 to `lags` samples, `[lags + 1, C]`; those of noise are 0 but for the
-        first."""
+        first.
+
+        Raises InvalidValueError for `lags` that are no count.
+        """
         lags = validation.count("lags", lags)
         lags = min(lags, *(len(each["time"]) - 2 for each in self.histories))
         sums = np.zeros((lags + 1, len(self.channels)))

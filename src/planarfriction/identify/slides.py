@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.described import described
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify.angles import unwrapped
@@ -56,14 +57,21 @@ class Slide(ByValue):
         object.__setattr__(self, "turns", turns)
 
     def first(self, samples: int) -> Slide:
-        """The slide's first samples, at least five."""
+        """The slide's first samples, at least five.
+
+        Raises InvalidValueError for fewer samples than a slide needs.
+        """
         samples = validation.count("samples", samples, at_least=5)
         return Slide(self.time[:samples], self.pose[:samples], self.twist, self.name)
 
 
+@described
 @dataclass(frozen=True)
 class SlidingBody:
-    """What slides: its inertia, and gravity."""
+    """What slides: its inertia, and gravity.
+
+    Raises InvalidValueError for a mass, an inertia or a load that is not > 0.
+    """
 
     mass: float
     """Mass [kg]; plays no part in a slide under its own weight but for `inertia/mass`."""
@@ -141,6 +149,8 @@ def fit_start(
     """Start pose and twist `[6]` with which the simulated slide fits the first `samples` poses best (None: all).
 
     Least squares, a few Gauss-Newton steps from the measured start; `noise` `[3]` weighs metres against radians.
+
+    Raises InvalidValueError for a `noise` that is not > 0.
     """
     _check(body, slide)
     noise = validation.vector("noise", noise, 3)

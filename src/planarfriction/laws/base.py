@@ -36,6 +36,8 @@ class FrictionLaw:
         """Friction force over normal force [-] in steady sliding at `speed` >= 0 `[...]` [m/s].
 
         `g(v) v/(v + v_c) + sigma_2 v`; laws without creep (v_c = 0) have `g(0)` at rest.
+
+        Raises InvalidValueError for a speed that is not finite.
         """
         law, speed = self.numbers, np.abs(validation.finite_numbers("speed", speed))
         share = speed / (speed + law.creep_speed) if law.creep_speed > 0.0 else 1.0
@@ -51,7 +53,10 @@ class FrictionLaw:
         return v - formulas.bristle_decay(np, length * grip, along, speed, grip, law) * z
 
     def force(self, state, velocity, normal_force, *, axis: int | None = None) -> np.ndarray:
-        """Friction force [N] on the moving body; `normal_force` [N] broadcasts with bristles, not with components."""
+        """Friction force [N] on the moving body; `normal_force` [N] broadcasts with bristles, not with components.
+
+        Raises InvalidValueError for a load below zero, and for shapes that do not broadcast.
+        """
         z, v = _bristles(state, velocity, axis)
         load = validation.non_negative_numbers("normal_force", normal_force)
         if axis is not None:

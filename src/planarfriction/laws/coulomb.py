@@ -7,12 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.described import described
 from planarfriction.errors import InvalidValueError
 
 
+@described
 @dataclass(frozen=True)
 class Coulomb:
-    """Coulomb friction: the wrench lies on the limit surface scaled by `mu f_N`."""
+    """Coulomb friction: the wrench lies on the limit surface scaled by `mu f_N`.
+
+    Raises InvalidValueError for a `mu` that is not > 0.
+    """
 
     mu: float
     """Friction coefficient [-]."""
@@ -25,6 +30,9 @@ class Coulomb:
 
         `surface` is any limit surface, `twist` has shape `[..., 3]` [m/s, m/s, rad/s], `normal_force` `[...]` [N].
         A body at rest gets a zero wrench: Coulomb's law alone cannot tell the force of a stuck contact.
+
+        Raises InvalidValueError where `surface` is no limit surface, or the loads are below zero or do not broadcast
+        with the twists.
         """
         load = validation.non_negative_numbers("normal_force", normal_force)
         if not hasattr(surface, "wrench"):

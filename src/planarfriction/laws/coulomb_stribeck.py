@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from planarfriction import validation
+from planarfriction.described import described
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.laws.base import FrictionLaw
 
 
+@described
 @dataclass(frozen=True)
 class CoulombStribeck(FrictionLaw):
     """Coulomb friction with Stribeck and viscous terms, regularised by a creep speed.
@@ -23,6 +25,8 @@ class CoulombStribeck(FrictionLaw):
     without Stribeck and viscous terms at `v = v_c F/(mu_c f_N - F)`. The smaller `creep_speed`, the closer to Coulomb;
     the shorter `relaxation_time`, the closer to a function of the speed alone. A contact that shall stick takes `LuGre`
     with `elasto_plastic`.
+
+    Raises InvalidValueError for a parameter outside its range, and for `mu_s` below `mu_c`.
 
     Sources: Stribeck 1902; the curve as in Armstrong-Helouvry, Dupont, Canudas de Wit 1994, table 1; of the limit
     `tau -> 0`, the regularisation `v/(|v| + v_c)`.

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from planarfriction import validation
+from planarfriction.described import described
 from planarfriction.formulas import LawNumbers
 from planarfriction.laws.base import FrictionLaw
 
@@ -12,12 +13,15 @@ _SPEED = 1e-3
 """Speed [m/s] that solvers measure errors against; Dahl friction does not depend on the speed."""
 
 
+@described
 @dataclass(frozen=True)
 class Dahl(FrictionLaw):
     """Dahl friction per unit normal load: LuGre without Stribeck effect, damping and viscous friction.
 
     `zdot = v - sigma_0 |v| / mu_c z`, `f = -sigma_0 z f_N`: the force depends on the way and not on the speed. From
     rest, sliding by x in one direction gives `f = -mu_c f_N (1 - exp(-sigma_0 x / mu_c))`.
+
+    Raises InvalidValueError for a parameter that is not > 0.
 
     Sources: Dahl 1968, "A solid friction model"; Dahl 1976, "Solid friction damping of mechanical vibrations".
     """

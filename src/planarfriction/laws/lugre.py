@@ -7,14 +7,18 @@ from dataclasses import dataclass
 from typing import Any
 
 from planarfriction import validation
+from planarfriction.described import described
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.laws.base import FrictionLaw
 
 
+@described
 @dataclass(frozen=True)
 class ElastoPlastic:
     """Elasto-plastic bristles: purely elastic below breakaway, so that nothing creeps that should stand still.
+
+    Raises InvalidValueError for a `breakaway_ratio` outside [0, 1).
 
     Source: Dupont, Hayward, Armstrong, Altpeter 2002.
     """
@@ -29,12 +33,15 @@ class ElastoPlastic:
         object.__setattr__(self, "breakaway_ratio", value)
 
 
+@described
 @dataclass(frozen=True)
 class LuGre(FrictionLaw):
     """LuGre friction per unit normal load, with Stribeck and viscous terms.
 
     `g(v) = mu_c + (mu_s - mu_c) exp(-|v/v_s|^gamma)`, `zdot = v - beta sigma_0 |v| / g z`,
     `f = -(sigma_0 z + sigma_1 zdot + sigma_2 v) f_N`; `beta = 1` unless `elasto_plastic` is given.
+
+    Raises InvalidValueError for a parameter outside its range, and for `mu_s` below `mu_c`.
 
     Sources: Canudas de Wit et al. 1995; parameters as in Waltersson and Karayiannidis 2024.
     """

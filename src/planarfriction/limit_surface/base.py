@@ -67,11 +67,16 @@ class LimitSurface(ByValue):
 
     A surface of your own implements one method, `direction`; models store it as a table of `segments`.
 
+    Raises InvalidValueError for a patch of one point, one with direction-dependent friction that the surface does not
+    take, and a load that is not > 0.
+
     Source: Goyal, Ruina, Papadopoulos 1991.
     """
 
     patch: ContactPatch
+    """The patch that slides."""
     normal_force: float | None = dataclasses.field(default=None, kw_only=True)
+    """Load [N] at which the shape of the patch is taken; None where it does not depend on the load."""
 
     anisotropy: ClassVar[str] = "none"
     """Patches with direction-dependent friction that it takes: "none", "uniform" (all cells alike), "any"."""
@@ -103,7 +108,10 @@ class LimitSurface(ByValue):
         return surface_html(self)
 
     def at(self, normal_force: float) -> LimitSurface:
-        """The same kind of surface for the shape at another load; itself where the shape does not depend on it."""
+        """The same kind of surface for the shape at another load; itself where the shape does not depend on it.
+
+        Raises InvalidValueError for a load that is not > 0.
+        """
         normal_force = validation.positive_load("normal_force", normal_force)
         if not self.patch.depends_on_load:
             return self
@@ -116,7 +124,10 @@ class LimitSurface(ByValue):
 
     @functools.cached_property
     def contact_radius(self) -> float:
-        """`r = |tau|` of a spin about the centre of pressure [m]: scales the torque axis."""
+        """`r = |tau|` of a spin about the centre of pressure [m]: scales the torque axis.
+
+        Raises InvalidValueError for a patch of one point.
+        """
         radius = self._radius()
         if not radius > 0.0:
             raise InvalidValueError("patch", "have a contact radius > 0 (more than one point)", f"r={radius}")

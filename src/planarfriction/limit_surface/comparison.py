@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.described import described
 from planarfriction.errors import InvalidValueError
 
 MOST_SAMPLES = 10_000
@@ -33,6 +34,7 @@ class Spread:
         return cls(float(size.max()), float(size.mean()), float(np.sqrt(np.mean(size**2))))
 
 
+@described
 @dataclass(frozen=True)
 class SurfaceComparison:
     """Differences of a limit surface from a reference, in the reference's scaled coordinates; `print` shows a table."""

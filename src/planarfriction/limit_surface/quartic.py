@@ -36,6 +36,8 @@ class LimitSurfaceQuartic(LimitSurface):
 
     Compiled models use it as a table of `segments`, like `LimitSurfaceTable`. Needs the extra `quartic` (cvxpy).
 
+    Raises InvalidValueError for coefficients that are not those of a convex quartic, MissingExtraError without cvxpy.
+
     Source: Zhou, Paolini, Bagnell, Mason 2016.
     """
 

@@ -23,6 +23,8 @@ class LimitSurfaceTable(CompiledLimitSurface):
     The potential is interpolated and the wrench is its gradient, so that `-W . V = Phi(V) > 0` and the Jacobian is
     symmetric at every twist; the nodes are those of `LimitSurfaceExact` (to 1e-7), mixed derivatives included
     (where cells have friction metrics of their own, plain sums over the cells).
+
+    Raises InvalidValueError for a number of segments that is not taken, and as every limit surface.
     """
 
     segments: int = 20

@@ -23,6 +23,8 @@ class LimitSurfaceTablePublished(CompiledLimitSurface):
     them; the nodes are not renormalised in between. The map has kinks and is not the gradient of a potential: see
     `LimitSurfaceTable` for one that is. Patches without a grid (points) use the plain sums.
 
+    Raises InvalidValueError for a number of segments that is not taken, and as every limit surface.
+
     Source: Waltersson and Karayiannidis 2024, section IV.
     """
 

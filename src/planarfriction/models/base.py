@@ -116,10 +116,14 @@ class FrictionModel(ByValue):
     state, twist `[..., 3]`, normal_force `[...]` and dt `[...]` broadcast. The bristles of a contact without load
     (`normal_force == 0`) go on moving while `rate` is integrated, as published; `step` and `simulate` forget them: a
     contact that loses its load starts again from rest. Truth values are no numbers, for one contact as for many.
+
+    Raises InvalidValueError where the patch is no ContactPatch, or the law none of bristles.
     """
 
     patch: ContactPatch
+    """Where the contact is, and how the load spreads over it."""
     law: FrictionLaw
+    """Law of the bristles, such as `LuGre`."""
 
     state_units: ClassVar[str] = "m"
     """Units of the state: one for all of its components, or one for each."""
@@ -156,6 +160,9 @@ class FrictionModel(ByValue):
         """State of a contact at rest whose bristles are bent by `deflections` `[2, N]` [m] under a load > 0 [N].
 
         Its wrench is that of the bristles, `-sum w_i B_i' sigma_0 z_i f_N`, whatever a model keeps of them.
+
+        Raises InvalidValueError for deflections of another shape, a load that is not > 0, and a model that cannot start
+        with a load.
         """
         deflections = validation.array("deflections", deflections, (2, len(self.patch.positions)))
         return self._state_of(deflections, validation.positive_load("normal_force", normal_force))
@@ -171,13 +178,18 @@ class FrictionModel(ByValue):
         which bristles and natural scales belong; at as many of the first of `loads` as `ROOM` and `SPELL` allow, so
         that there may be fewer records than loads, but one at least. Without `between`, these are all loads of the run,
         and each has its record.
+
+        Raises InvalidValueError for a model that cannot be simulated in a scene.
         """
         rule = "be one that can be simulated in a scene: it has no packed(loads)"
         raise InvalidValueError("model", rule, type(self).__name__)
 
     @property
     def step_function(self) -> Any:
-        """Its function of `kernels.step_slopes`."""
+        """Its function of `kernels.step_slopes`.
+
+        Raises InvalidValueError for a model whose steps are not compiled.
+        """
         raise InvalidValueError(
             "model", "be one whose steps are compiled: it has no step_function", type(self).__name__
         )

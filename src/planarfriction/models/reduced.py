@@ -54,6 +54,9 @@ class ReducedModel(ThreeStateModel):
     Friction that depends on the direction: `|V_G|` is the root mean square of `|B_i V|` (see `ContactPatch.levers`),
     and `z_ss` sums `u/|u| + a`; an asymmetry takes maps of twice the size. It enters z_ss alone: bristles are measured
     from z = 0, and not from `a g/sigma_0` as those of the distributed model are.
+
+    Raises InvalidValueError for a patch with all of its load on one cell, more parts than cells, and settings out of
+    range.
     """
 
     _kernels = reduced_step
@@ -69,8 +72,8 @@ class ReducedModel(ThreeStateModel):
     speeds: int = 16
     """Nodes of the map over the speed, for the Stribeck part."""
     load_error: float = 4e-3
-    """Largest error of z_ss from blending maps over the load, of each part relative to the whole patch; 0 builds a map
-    for each load, which is slow."""
+    """Largest error of z_ss from blending maps over the load, of each part relative to the whole patch [-]; 0 builds
+    a map for each load, which is slow."""
     labels: np.ndarray = field(init=False, repr=False, compare=False)
     """Which part each cell belongs to, `[N]`."""
 
@@ -100,7 +103,10 @@ class ReducedModel(ThreeStateModel):
         return self.shapes_at([normal_force])[0]
 
     def shapes_at(self, loads) -> list[ReducedShape]:
-        """`shape_at` of many loads [N], which costs less than one by one."""
+        """`shape_at` of many loads [N], which costs less than one by one.
+
+        Raises InvalidValueError for a model in parts, and for loads that are not > 0.
+        """
         if self.parts > 1:
             raise InvalidValueError("parts", "be 1 for one shape (parts_at has that of each)", self.parts)
         return self._parts[0].at(self._checked(loads))

@@ -84,6 +84,9 @@ class ReducedModelPublished(ThreeStateModel):
     `"keep"` keeps all. The raw state is kept when `r` changes. Where one cell carries all but a millionth of the load,
     the contact is a point without torque about it; what `z_tau` was there then stays, without effect.
 
+    Raises InvalidValueError for a surface that is none, and one without the `normal_force` that its `on_load_change`
+    needs.
+
     Source: Waltersson and Karayiannidis 2024, section IV.
     """
 
@@ -110,7 +113,10 @@ class ReducedModelPublished(ThreeStateModel):
             )
 
     def shape_at(self, normal_force: float) -> PublishedShape:
-        """Centre of pressure, `r`, `<rho^2>` and limit surface at a load [N]; recent loads are remembered."""
+        """Centre of pressure, `r`, `<rho^2>` and limit surface at a load [N]; recent loads are remembered.
+
+        Raises InvalidValueError for a load that is not > 0.
+        """
         if not self.patch.depends_on_load or self.on_load_change == "keep":
             return self._reference
         load = validation.positive_load("normal_force", normal_force)

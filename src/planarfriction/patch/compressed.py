@@ -105,6 +105,8 @@ def surface_error(patch: ContactPatch, few: ContactPatch, normal_force=None) -> 
     """Largest relative error of the dissipation of `few` against that of `patch`, over twists of all directions [-].
 
     Twists are spread evenly over the sphere of `(vx, vy, omega r)` about the centre of pressure.
+
+    Raises InvalidValueError where either is no ContactPatch.
     """
     for name, each in (("patch", patch), ("few", few)):
         if not isinstance(each, Anisotropy):

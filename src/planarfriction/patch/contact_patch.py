@@ -102,16 +102,15 @@ class ContactPatch(Anisotropy):
             object.__setattr__(self, "_fixed_weights", fixed)
         warn_of_the_unit(self.name, self.positions, self.cell_size)
 
-    # ------------------------------------------------------------------ shapes
-
     @classmethod
     def disc(cls, radius: float, cells: int = 21, *, pressure: Any = None, name: str = "disc") -> ContactPatch:
         """Disc of `radius` [m] about the origin on a grid of `cells` x `cells`, its rim cutting the cells.
 
-        Cells at the rim have the area inside it, and the centroid of that part as position.
+        Cells at the rim have the area inside it, and the centroid of that part as position. Raises InvalidValueError
+        for a parameter that breaks its rule.
         """
         radius = validation.positive("radius", radius)
-        return cls._clipped(outlines.RoundOutline(0.0, radius), Grid.square(2 * radius, cells), pressure, name)
+        return outlines.clipped(cls, outlines.RoundOutline(0.0, radius), Grid.square(2 * radius, cells), pressure, name)
 
     @classmethod
     def disc_published(
@@ -120,7 +119,8 @@ class ContactPatch(Anisotropy):
         """The published disc mask: whole cells of a grid `2 radius` [m] wide, within `cells // 2` cells of the centre.
 
         Distances are between cell centres and `cells` is odd, so the size of the mask depends on it: 317 of 21 x 21
-        cells have the area of a disc of radius 10.05 cells, not 10.5. To reproduce; `disc` is the true disc.
+        cells have the area of a disc of radius 10.05 cells, not 10.5. To reproduce; `disc` is the true disc. Raises
+        InvalidValueError for an even number of cells.
         """
         grid = Grid.square(2 * validation.positive("radius", radius), cells)
         if grid.columns % 2 == 0:
@@ -143,7 +143,8 @@ class ContactPatch(Anisotropy):
     ) -> ContactPatch:
         """Rectangle of `width` x `height` [m] about the origin; without `height` a square.
 
-        `cells` counts along the longer side (cells as square as possible), or is `(columns, rows)`.
+        `cells` counts along the longer side (cells as square as possible), or is `(columns, rows)`. Raises
+        InvalidValueError for a parameter that breaks its rule.
         """
         width = validation.positive("width", width)
         height = width if height is None else validation.positive("height", height)
@@ -156,12 +157,15 @@ class ContactPatch(Anisotropy):
     def ring(
         cls, inner_radius: float, outer_radius: float, cells: int = 21, *, pressure: Any = None, name: str = "ring"
     ) -> ContactPatch:
-        """Ring between two radii [m] about the origin on a grid of `cells` x `cells`, cut at both rims."""
+        """Ring between two radii [m] about the origin on a grid of `cells` x `cells`, cut at both rims.
+
+        Raises InvalidValueError unless 0 < inner_radius < outer_radius.
+        """
         inner = validation.positive("inner_radius", inner_radius)
         outer = validation.positive("outer_radius", outer_radius)
         if inner >= outer:
             raise InvalidValueError("inner_radius", "be < outer_radius", f"{inner} and {outer}")
-        return cls._clipped(outlines.RoundOutline(inner, outer), Grid.square(2 * outer, cells), pressure, name)
+        return outlines.clipped(cls, outlines.RoundOutline(inner, outer), Grid.square(2 * outer, cells), pressure, name)
 
     @classmethod
     def line(
@@ -176,8 +180,9 @@ class ContactPatch(Anisotropy):
         """Line of `length` [m] along `direction` ("y" or "x") through the origin, one cell wide.
 
         `profile` holds the relative pressures `[cells]` from the top down (y) or from the left to the right (x), or is
-        a function of the coordinate along the line [m]; None is uniform. The grid is square with the line in its
-        middle column or row (across the line it has one cell more than along it where `cells` is even).
+        a function of the coordinate along the line [m]; None is uniform. The grid is square with the line in its middle
+        column or row (across the line it has one cell more than along it where `cells` is even). Raises
+        InvalidValueError for a parameter that breaks its rule.
         """
         length, cells = validation.positive("length", length), validation.count("cells", cells, at_most=MOST_CELLS)
         along = ["x", "y"].index(validation.choice("direction", direction, ("x", "y")))
@@ -199,7 +204,8 @@ class ContactPatch(Anisotropy):
     ) -> ContactPatch:
         """Polygon with `vertices` `[M, 2]` [m], convex or not, on a grid over its bounding box, cut along its sides.
 
-        `cells` counts along the longer side of the bounding box, or is `(columns, rows)`.
+        `cells` counts along the longer side of the bounding box, or is `(columns, rows)`. Raises InvalidValueError for
+        vertices that outline no simple polygon.
         """
         outline = outlines.polygon_outline(vertices)
         vertices = outline.vertices
@@ -209,13 +215,14 @@ class ContactPatch(Anisotropy):
             raise InvalidValueError("vertices", "enclose an area", f"a box of {width} x {height} m")
         columns, rows = shapes.columns_and_rows(cells, width, height)
         grid = Grid(low[0], low[1], width / columns, height / rows, columns, rows)
-        return cls._clipped(outline, grid, pressure, name)
+        return outlines.clipped(cls, outline, grid, pressure, name)
 
     @classmethod
     def points(cls, positions, weights=None, *, area: float = 1e-6, name: str = "points") -> ContactPatch:
         """Any set of contact points `[N, 2]` [m] with relative `weights` `[N]` (equal if None), such as feet.
 
-        `area` [m^2] is what each point stands for; only `areas`, `area` and `pressure_values` look at it.
+        `area` [m^2] is what each point stands for; only `areas`, `area` and `pressure_values` look at it. Raises
+        InvalidValueError for weights below zero.
         """
         positions = validation.array("positions", positions, (None, 2))
         if weights is not None:
@@ -232,7 +239,7 @@ class ContactPatch(Anisotropy):
         side of a cell or `(width, height)`. Only ratios of the pressures matter. Cells without pressure are dropped.
 
         Maps measured at several loads: a mapping `{load [N]: map}`, or a list of maps (a stack `[L, rows, columns]`)
-        with their `loads` `[L]`; see `PressureMaps`.
+        with their `loads` `[L]`; see `PressureMaps`. Raises FileError, InvalidValueError for what is no map.
         """
         law, (rows, columns), file = read_maps(pressure, loads)
         size = validation.numbers("cell_size", cell_size)
@@ -242,25 +249,11 @@ class ContactPatch(Anisotropy):
         name = (file or "pressure map") if name is None else name
         return cls(grid.centres(), np.full(rows * columns, grid.cell_area), law, grid, name)
 
-    @classmethod
-    def _clipped(cls, outline: outlines.Outline, grid: Grid, pressure: Any, name: str) -> ContactPatch:
-        """Patch of the parts of the grid's boxes inside an outline."""
-        import shapely
-
-        polygon = shapely.Polygon(*outline.rims())
-        if not polygon.is_valid:
-            raise InvalidValueError("vertices", "outline a simple polygon", shapely.is_valid_reason(polygon))
-        try:
-            cells = shapes.clip(polygon, grid)
-        except shapely.errors.GEOSException as error:  # rounding of coordinates far apart in size
-            raise InvalidValueError("vertices", "outline a polygon that can be cut into cells", str(error)) from None
-        return outlines.with_outline(cls(*cells, pressure, grid, name), outline)
-
     def refined(self, parts: int) -> ContactPatch:
         """The same patch with every cell cut into `parts` x `parts` (a cell of a line into `parts`).
 
         Pressure laws are evaluated at the new cells, numbers per cell are repeated. Cells that a rim cuts are replaced
-        by cells of the same area and centroid. Points stay points.
+        by cells of the same area and centroid. Points stay points. Raises InvalidValueError for too many cells.
         """
         from planarfriction.patch.refinement import refined
 
@@ -278,8 +271,6 @@ class ContactPatch(Anisotropy):
         from planarfriction.patch.compressed import compressed
 
         return compressed(self, degree, cells=cells, error=error, loads=loads)
-
-    # ------------------------------------------------------------------ quantities
 
     def cell_extents(self) -> np.ndarray:
         """Width and height over which the load of each cell is spread, `[N, 2]` [m]; a cut cell's are smaller."""
@@ -301,7 +292,10 @@ class ContactPatch(Anisotropy):
         return self.pressure.depends_on_load
 
     def weights(self, normal_force=None) -> np.ndarray:
-        """Share of the normal force on each cell, `w_i = p_i a_i / sum(p a)`, shape `[..., N]` [-]."""
+        """Share of the normal force on each cell, `w_i = p_i a_i / sum(p a)`, shape `[..., N]` [-].
+
+        Raises InvalidValueError without a load that is needed.
+        """
         if normal_force is None:
             if self._fixed_weights is None:
                 raise InvalidValueError("normal_force", "be given, the shape of this patch depends on it", "None")
@@ -343,7 +337,8 @@ class ContactPatch(Anisotropy):
         """Polynomial moments of the pressure, `M[i, j] = sum(w (x - x0)^i (y - y0)^j)` for `i + j <= degree`.
 
         Shape `[..., degree + 1, degree + 1]` [m^(i + j)], zero where `i + j > degree`. `about` is the point (x0, y0)
-        [m]: None for the centre of pressure (central moments), `(0, 0)` for the raw ones.
+        [m]: None for the centre of pressure (central moments), `(0, 0)` for the raw ones. Raises InvalidValueError for
+        a parameter that breaks its rule.
         """
         degree = validation.count("degree", degree, at_least=0, at_most=MOST_DEGREE)
         weights, dx, dy = self._about_centre_of_pressure(normal_force)
@@ -356,7 +351,10 @@ class ContactPatch(Anisotropy):
         return result
 
     def pressure_values(self, normal_force) -> np.ndarray:
-        """Pressure on each cell, `w_i f_N / a_i`, shape `[..., N]` [Pa]."""
+        """Pressure on each cell, `w_i f_N / a_i`, shape `[..., N]` [Pa].
+
+        Raises InvalidValueError for a load below zero.
+        """
         load = validation.non_negative_numbers("normal_force", normal_force)
         return self.weights(load) * load[..., None] / self.areas
 

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.described import described
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch.size import MOST_CELLS, check_cells
 
 
+@described
 @dataclass(frozen=True)
 class Grid:
     """A regular grid of boxes in the contact frame: x to the right, y up, **row 0 is the top row** (largest y)."""
@@ -43,7 +45,10 @@ class Grid:
 
     @classmethod
     def around_origin(cls, width: float, height: float, columns: int, rows: int) -> Grid:
-        """Grid of `columns` x `rows` cells on the box of `width` x `height` [m] whose middle is the origin."""
+        """Grid of `columns` x `rows` cells on the box of `width` x `height` [m] whose middle is the origin.
+
+        Raises InvalidValueError for sides that are not > 0, and for too many cells.
+        """
         width, height = validation.positive("width", width), validation.positive("height", height)
         columns = validation.count("columns", columns, at_most=MOST_CELLS)
         rows = validation.count("rows", rows, at_most=MOST_CELLS)
@@ -52,7 +57,10 @@ class Grid:
 
     @classmethod
     def square(cls, width: float, cells: int) -> Grid:
-        """Grid of `cells` x `cells` on the square `width` [m] wide about the origin."""
+        """Grid of `cells` x `cells` on the square `width` [m] wide about the origin.
+
+        Raises InvalidValueError for a width that is not > 0, and for too many cells.
+        """
         cells = validation.count("cells", cells, at_most=MOST_CELLS)
         return cls.around_origin(width, width, cells, cells)
 
@@ -74,6 +82,8 @@ class Grid:
         """Row and column of the cell that holds each of `positions` `[..., 2]` [m]; row 0 is the top.
 
         Positions outside the grid get rows or columns outside `0 .. rows - 1` and `0 .. columns - 1`.
+
+        Raises InvalidValueError for positions of another shape.
         """
         positions = validation.finite_numbers("positions", positions)
         if positions.shape[-1:] != (2,):

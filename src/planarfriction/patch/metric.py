@@ -30,6 +30,8 @@ def grain(angle: float, along: float, across: float) -> np.ndarray:
     `along` and `across` are the friction coefficients along and across the grain relative to those of the law, > 0;
     `angle` is that of the grain from the contact frame's x axis. Oblique sliding in a direction `e` dissipates
     `sqrt(e' M e)`.
+
+    Raises InvalidValueError for an angle that is not finite, and for frictions that are not > 0.
     """
     angle = validation.number("angle", angle)
     squares = [validation.positive("along", along) ** 2, validation.positive("across", across) ** 2]

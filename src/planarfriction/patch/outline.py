@@ -15,6 +15,7 @@ from planarfriction.patch import shapes
 
 if TYPE_CHECKING:
     from planarfriction.patch.contact_patch import ContactPatch
+    from planarfriction.patch.grid import Grid
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,3 +97,17 @@ def with_outline(patch: ContactPatch, outline: Outline | None) -> ContactPatch:
     """The new `patch`, knowing that its cells were cut from that outline."""
     object.__setattr__(patch, "outline", outline)
     return patch
+
+
+def clipped(kind: type[ContactPatch], outline: Outline, grid: Grid, pressure: Any, name: str) -> ContactPatch:
+    """Patch of the parts of the grid's boxes inside an outline."""
+    import shapely
+
+    polygon = shapely.Polygon(*outline.rims())
+    if not polygon.is_valid:
+        raise InvalidValueError("vertices", "outline a simple polygon", shapely.is_valid_reason(polygon))
+    try:
+        cells = shapes.clip(polygon, grid)
+    except shapely.errors.GEOSException as error:  # rounding of coordinates far apart in size
+        raise InvalidValueError("vertices", "outline a polygon that can be cut into cells", str(error)) from None
+    return with_outline(kind(*cells, pressure, grid, name), outline)

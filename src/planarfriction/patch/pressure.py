@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from planarfriction import formulas, validation
+from planarfriction.described import described
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError, shown
 
@@ -55,7 +56,10 @@ class Pressure:
 
     @staticmethod
     def from_dict(data: Mapping[str, Any]) -> Pressure:
-        """The law described by `{"law": name, parameter: value, ...}`."""
+        """The law described by `{"law": name, parameter: value, ...}`.
+
+        Raises InvalidValueError for what is no such table, and for a law that is not there.
+        """
         from planarfriction.patch.pressure_maps import PressureMaps
 
         laws = {kind.law: kind for kind in (Uniform, LinearGradient, SoftFinger, PressureMaps)}
@@ -79,11 +83,14 @@ class Uniform(Pressure):
         return np.ones(len(positions))
 
 
+@described
 @dataclass(frozen=True)
 class LinearGradient(Pressure):
     """Pressure that grows linearly over the patch: `p ~ 1 + gx x + gy y`.
 
     A patch on which it would be negative somewhere is refused when it is made.
+
+    Raises InvalidValueError for gradients that are not finite.
     """
 
     law = "linear_gradient"
@@ -98,6 +105,7 @@ class LinearGradient(Pressure):
         return 1.0 + gx * positions[:, 0] + gy * positions[:, 1]
 
 
+@described
 @dataclass(frozen=True, kw_only=True)
 class SoftFinger(Pressure):
     """Soft fingertip whose contact grows with the load: `p(s) ~ (1 - (s/R)^k)^(1/k)`, `R = min(c f_N^n, radius_max)`.
@@ -105,6 +113,9 @@ class SoftFinger(Pressure):
     s is the distance from the origin. Give exactly one of `k` and `k_per_newton` (`k = k_per_newton f_N`). With `n = 0`
     and a constant `k` the shape is fixed. A cell is loaded if its position is inside R; if none is, the cells nearest
     to the origin share the load.
+
+    Raises InvalidValueError for a parameter outside its range, and unless exactly one of `k` and `k_per_newton` is
+    given.
 
     Sources: Xydas and Kao 1999; Waltersson and Karayiannidis 2024.
     """
@@ -138,7 +149,10 @@ class SoftFinger(Pressure):
         return self.n != 0.0 or self.k is None
 
     def radius(self, normal_force) -> np.ndarray:
-        """Contact radius `R = min(c f_N^n, radius_max)` [m] at `normal_force` `[...]` [N]."""
+        """Contact radius `R = min(c f_N^n, radius_max)` [m] at `normal_force` `[...]` [N].
+
+        Raises InvalidValueError for a load below zero.
+        """
         return self._radius(validation.non_negative_numbers("normal_force", normal_force))
 
     def _radius(self, load: np.ndarray) -> np.ndarray:
@@ -147,7 +161,10 @@ class SoftFinger(Pressure):
         return radius if self.radius_max is None else np.minimum(radius, self.radius_max)
 
     def exponent(self, normal_force) -> np.ndarray:
-        """Exponent `k` of the profile [-] at `normal_force` `[...]` [N]."""
+        """Exponent `k` of the profile [-] at `normal_force` `[...]` [N].
+
+        Raises InvalidValueError for a load below zero.
+        """
         return self._exponent(validation.non_negative_numbers("normal_force", normal_force))
 
     def _exponent(self, load: np.ndarray) -> np.ndarray:
@@ -191,6 +208,7 @@ class PerCell(ByValue, Pressure):
         object.__setattr__(self, "values", values)
 
     def relative(self, positions: np.ndarray, normal_force: np.ndarray | None = None) -> np.ndarray:
+        """Relative pressures of the cells, `[N]`. Raises InvalidValueError for another number of positions."""
         if len(self.values) != len(positions):
             raise InvalidValueError("pressure", f"have shape [{len(positions)}]", f"shape [{len(self.values)}]")
         return self.values

@@ -56,6 +56,8 @@ class PressureMaps(ByValue, Pressure):
         return len(self.loads) > 1
 
     def relative(self, positions: np.ndarray, normal_force: np.ndarray | None = None) -> np.ndarray:
+        """Relative pressures of the cells at the loads, `[..., N]`. Raises InvalidValueError for another number of
+        positions, and for a load below zero."""
         if self.values.shape[1] != len(positions):
             raise InvalidValueError("pressure", f"have shape [L, {len(positions)}]", f"shape {list(self.values.shape)}")
         if not self.depends_on_load:

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.described import described
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError, SolverError
 from planarfriction.limit_surface import LimitSurfaceEllipsoid
@@ -41,6 +42,7 @@ REACHED = 1e-6
 """Miss of a plan before it is made of lines, as a share of the slider's size and as an angle [rad]."""
 
 
+@described
 @dataclass(frozen=True)
 class PushReport:
     """What a plan of a push reaches."""

@@ -35,9 +35,11 @@ class Push(ByValue):
     """Where a slider goes, and how."""
 
     slider: Slider
+    """What was pushed."""
     pusher: Pusher
+    """What pushed it."""
     time: np.ndarray
-    """`[T]` [s]"""
+    """Instants `[T]` [s]."""
     pose: np.ndarray
     """Pose `(x, y, theta)` of the slider's frame in the world `[T, 3]` [m, m, rad]."""
     pusher_pose: np.ndarray

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.described import described
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.limit_surface import LimitSurface
@@ -64,6 +65,7 @@ class Slider(ByValue):
         return np.einsum("mi,mi->m", self.outline - validation.vector("point", point, 2), self.inward)
 
 
+@described
 @dataclass(frozen=True)
 class Pusher:
     """What pushes: a point, or a flat face that looks along its own x axis.

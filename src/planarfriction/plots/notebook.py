@@ -107,8 +107,8 @@ def _section(surface: LimitSurface) -> style.PlotFigure:
 
 
 def _size(patch: ContactPatch) -> str:
-    if patch.grid is None:
-        width, height = np.ptp(patch.positions, axis=0)
+    if patch.grid is None or patch.cell_size is None or min(patch.cell_size) == 0.0:  # points, lines
+        width, height = np.ptp(patch.positions, axis=0) + (0.0 if patch.cell_size is None else patch.cell_size)
     else:
         width, height = patch.grid.columns * patch.grid.cell_width, patch.grid.rows * patch.grid.cell_height
     unit = style.unit_for("length", max(width, height))
@@ -129,7 +129,7 @@ def _beside(figure: style.PlotFigure | None, title: str, rows: dict[str, str]) -
     picture = ""
     if figure is not None:
         buffer = io.BytesIO()
-        figure.savefig(buffer, format="png", dpi=96)
+        figure.savefig(buffer, format="png", dpi=96, bbox_inches="tight")
         data = base64.b64encode(buffer.getvalue()).decode()
         picture = f'<img alt="" src="data:image/png;base64,{data}">'
     lines = "".join(

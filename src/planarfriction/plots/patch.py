@@ -22,6 +22,8 @@ def plot_patch(patch: ContactPatch, *, normal_force: float | None = None) -> sty
     Cells of a grid are drawn in their true area at their true centroid and coloured by their pressure `w f_N / a`; a
     patch without a grid is drawn as points coloured by the force on them, `w f_N`. Without `normal_force` [N] the
     colours show both per newton of load. Lengths in mm.
+
+    Raises InvalidValueError for what is no patch, a load below zero, and a missing load where the shape depends on it.
     """
     from planarfriction.patch import ContactPatch
 

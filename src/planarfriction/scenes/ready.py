@@ -38,6 +38,8 @@ def in_hand_load(load: Literal[1, 2], *, placement: Literal[1, 2] = 1, t_end: fl
     Load 1 is a sine at 2 Hz, load 2 is constant with one drop. `placement` 1 is the centre of mass at (0.002, 0) m,
     2 at (0.025, 0) m.
 
+    Raises InvalidValueError for another load or placement.
+
     Source: Waltersson and Karayiannidis 2024, section VI.
     """
     if not all(type(each) is int and each in (1, 2) for each in (load, placement)):
@@ -95,6 +97,8 @@ def drift(model: Any, *, load: Literal["tangential", "normal"] = "tangential", t
     `load="tangential"`: the force oscillates, and from 2.8 s on a torque too; `load="normal"`: force and torque stay
     and the normal force oscillates after 1 s. The contact is fixed to the world.
 
+    Raises InvalidValueError for a parameter that breaks its rule.
+
     Source: Waltersson and Karayiannidis 2024, section VI.
     """
     validation.choice("load", load, ("tangential", "normal"))
@@ -128,6 +132,8 @@ def free_slide(
     mass [kg m^2] (default: that of a puck whose mass is spread like its contact pressure), initial `position` [m] and
     `angle` [rad], `normal_force` [N] a signal or a number (default: the weight `9.81 mass`), `outline` `[M, 2]` [m] for
     drawing, `save_every` [s] the time between samples.
+
+    Raises InvalidValueError for a parameter that breaks its rule.
     """
     if inertia is None:
         mass, patch = validation.positive("mass", mass), checked_model("model", model).patch
@@ -143,6 +149,8 @@ def published_velocity(*, speed: float = 0.015, spin: float = 1.0) -> Signal:
 
     `speed` [m/s] is the peak of vx (vy peaks at 0.4 of it), `spin` [rad/s] that of omega: spin up, slide along x while
     spinning, slide along y, spin down, stop.
+
+    Raises InvalidValueError for a parameter that breaks its rule.
 
     Source: Waltersson and Karayiannidis 2024, section VI.
     """
@@ -167,6 +175,8 @@ def driven(
     `twist` is a signal `[T, 3]` or a constant (default: `published_velocity()`), `normal_force` [N] a signal or a
     number. `at` says which point of the patch has the velocity: the origin of the contact frame, or the centre of
     pressure (of a patch that changes with the load: the one at t = 0). Wrenches are about the contact frame's origin.
+
+    Raises InvalidValueError for a parameter that breaks its rule.
     """
     validation.choice("at", at, ("origin", "centre_of_pressure"))
     contact = Contact(model, normal_force, mounted_on="body", name="patch")
@@ -199,6 +209,8 @@ def pushed(
     each in a tenth of the time). The pads may slip and turn on the plate; pushed from behind, it swings round.
 
     A pusher at the edge of a plate, which touches a point of its outline, is not a patch: see `planning.push`.
+
+    Raises InvalidValueError for a parameter that breaks its rule.
     """
     t_end = validation.positive("t_end", t_end)
     if velocity is None:

@@ -35,7 +35,10 @@ def _floats(name: str, value: Any, size: int) -> tuple[float, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Body(ByValue):
-    """A rigid body that moves in the contact plane: inertia, initial state, gravity. World frame: x right, y up."""
+    """A rigid body that moves in the contact plane: inertia, initial state, gravity. World frame: x right, y up.
+
+    Raises InvalidValueError for a mass or an inertia that is not > 0, and for vectors of the wrong length.
+    """
 
     mass: float
     """Mass [kg]."""
@@ -85,6 +88,9 @@ class Contact(ByValue):
 
     Contacts fixed to the world (fingers) keep their frame while the body moves past; contacts fixed to the body (a box
     on a table) carry it along. The world's side of either may move: a pad that is driven, a belt that runs.
+
+    Raises InvalidValueError for what is no friction model, a load below zero, and other parameters that break their
+    rule.
     """
 
     model: Any = field(repr=False)
@@ -220,6 +226,8 @@ class Scene(ByValue):
         """Times [s] from 0 to `t_end` (default: the scene's) at which any signal jumps or bends, both ends included.
 
         Breaks within rounding of each other (`SAME_TIME`) count as one.
+
+        Raises InvalidValueError for an end that is not > 0.
         """
         t_end = self.t_end if t_end is None else validation.positive("t_end", t_end)
         signals = [contact.normal_force for contact in self.contacts]

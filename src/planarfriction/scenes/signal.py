@@ -93,7 +93,10 @@ class Signal(ByValue):
 
     @classmethod
     def constant(cls, value) -> Signal:
-        """Signal that never changes; `value` is a number or a vector `[k]`."""
+        """Signal that never changes; `value` is a number or a vector `[k]`.
+
+        Raises InvalidValueError for anything else.
+        """
         value = validation.finite_numbers("value", value, largest=np.inf)
         if value.ndim > 1:
             raise InvalidValueError("value", "be a number or a vector", f"shape {list(value.shape)}")
@@ -106,6 +109,8 @@ class Signal(ByValue):
         """`offset + amplitude sin(2 pi frequency t + phase)`, sampled every `dt` [s] up to `t_end` and held in between.
 
         `frequency` is in Hz, `phase` in rad.
+
+        Raises InvalidValueError for a parameter that breaks its rule.
         """
         offset, amplitude = validation.number("offset", offset), validation.number("amplitude", amplitude)
         frequency, phase = validation.non_negative("frequency", frequency), validation.number("phase", phase)
@@ -184,7 +189,7 @@ class Signal(ByValue):
         return self.values[i] + slope * self._spread(breaks[:-1] - self.times[i]), slope
 
     def check_non_negative(self, name: str) -> None:
-        """Raise InvalidValueError with `name`, time and value where the signal is below zero."""
+        """Raises InvalidValueError with `name`, time and value where the signal is below zero."""
         below = np.argwhere(self.values < 0.0)
         if len(below):
             i = int(below[0][0])
@@ -197,7 +202,10 @@ class Signal(ByValue):
 
     @classmethod
     def from_dict(cls, data: Any, folder: str | Path | None = None) -> Signal:
-        """Signal from a number, a list of numbers (constants) or a table as in scene files (see `read_signal`)."""
+        """Signal from a number, a list of numbers (constants) or a table as in scene files (see `read_signal`).
+
+        Raises FileError for a table that is no signal, InvalidValueError for a `folder` that is no path.
+        """
         where = Section({"signal": data}, folder=None if folder is None else validation.path("folder", folder))
         return read_signal(where, "signal")
 

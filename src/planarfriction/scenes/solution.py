@@ -17,6 +17,7 @@ from urllib.parse import quote, unquote
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.described import described
 from planarfriction.equality import by_parts
 from planarfriction.errors import FileError, FrictionError, InvalidValueError
 from planarfriction.reading import read_bytes
@@ -62,6 +63,7 @@ class History(NamedTuple):
     """Its unit in "units", what it is in "long_name"."""
 
 
+@described
 @dataclass(frozen=True, eq=False)
 class Solution:
     """Result of a simulation: histories, statistics, and the scene they belong to."""
@@ -144,7 +146,10 @@ class Solution:
         return np.stack([cos * ux + sin * uy, cos * uy - sin * ux, omega], axis=-1)
 
     def contact_index(self, contact: str | None = None) -> int:
-        """Place of a contact, given by its name, along the axis `contact`; None takes the only one."""
+        """Place of a contact, given by its name, along the axis `contact`; None takes the only one.
+
+        Raises InvalidValueError for a name that is not there, and for None where there are several.
+        """
         names = [str(name) for name in self.histories["contact"].values]
         if contact is None and len(names) == 1:
             return 0

@@ -47,6 +47,8 @@ def pivot(
     number (default: 4 N; from 0.24 s 1 N, from 0.4 s 6 N). The part turns where `fingers mu f_N r < mass g arm`, and
     the contact radius r of a soft finger grows with its load. Bristles `start` with the weight on them; a grip that
     does not hold it has to start at "rest".
+
+    Raises InvalidValueError for a parameter that breaks its rule.
     """
     arm = validation.positive("arm", arm)
     inertia, outline = rectangle_inertia(mass, size), rectangle_outline(size)
@@ -72,6 +74,8 @@ def foot(
     with the centre of mass of `mass` [kg] and `inertia` about the vertical [kg m^2] midway. `share` of the weight is on
     the forefoot [-] (default: 0.1, from 1 s on 0.9), and the yaw `torque` [N m] turns the body (default: 20 N m for
     0.3 s from 0.1 s on, -20 N m from 1.1 s on); each a signal or a number.
+
+    Raises InvalidValueError for a parameter that breaks its rule.
     """
     half = 0.5 * validation.positive("length", length)
     ahead = Signal.sampled(*SWAY, hold="linear") if share is None else as_signal("share", share, None)
@@ -112,6 +116,8 @@ def curling(
     [kg], `inertia` about the vertical [kg m^2] (default: that of a cylinder of radius 0.14 m), `start` how the bristles
     start, `save_every` [s] the time between samples. Friction that is the same in all directions on an even pressure
     slows the stone and its spin, and does not make it curl.
+
+    Raises InvalidValueError for a parameter that breaks its rule.
     """
     if inertia is None:
         inertia = 0.5 * validation.positive("mass", mass) * STONE_RADIUS**2

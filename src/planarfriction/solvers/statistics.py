@@ -5,7 +5,10 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 
+from planarfriction.described import described
 
+
+@described
 @dataclass(frozen=True)
 class Statistics:
     """What a run cost."""

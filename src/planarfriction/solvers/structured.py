@@ -46,9 +46,13 @@ class Integration(ByValue):
     """Outcome of `integrate`; the arrays hold the requested times that were reached."""
 
     output: Output
+    """What was recorded."""
     status: str
+    """How it ended, as in a `Solution`."""
     message: str
+    """What happened, in one sentence."""
     statistics: Statistics
+    """What it took."""
 
 
 def integrate(

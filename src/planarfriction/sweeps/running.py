@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from planarfriction import validation
+from planarfriction.described import described
 from planarfriction.errors import InvalidValueError, SweepError, SweepInterrupted
 from planarfriction.scenes import Scene
 from planarfriction.sweeps.dataset import OWN, Collected, instants
@@ -45,6 +46,7 @@ _WORKERS = 64
 _ENDED = "the executor ended ({}): what is done is kept, sweep again to go on"
 
 
+@described
 class Progress(NamedTuple):
     """How far a sweep is; as text one line for people."""
 

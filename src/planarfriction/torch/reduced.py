@@ -32,6 +32,8 @@ class ReducedModel(FrictionModel):
     its patch with the maps of steady sliding. `trainable` names the parameters of the law that are `nn.Parameter`s;
     `gamma` cannot be one, the maps are made for it. A patch whose shape depends on the load keeps that of
     `normal_force` [N]; `parts`, `segments` and `speeds` as in `planarfriction.ReducedModel`.
+
+    Raises InvalidValueError where `trainable` names gamma, or something that the law has not.
     """
 
     arrays = reduced_arrays

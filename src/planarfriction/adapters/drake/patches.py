@@ -27,6 +27,9 @@ class Patch:
 
     The frame of the patch has its x axis along that of the frame, projected on the contact plane, and its normal into
     the frame's body; its twist is that of this body relative to the other, its wrench acts on this body.
+
+    Raises InvalidValueError unless `geometries` are two names, `centre` is one that there is and
+    `model` a friction model.
     """
 
     model: FrictionModel

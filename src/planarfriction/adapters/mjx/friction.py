@@ -96,7 +96,10 @@ class Friction:
         self._fixed = _Fixed(places(placed), which, shapes, radius, at, m.nuserdata)
 
     def replace(self, models: Sequence[FrictionModel]) -> Self:
-        """The same patches with other models, of the same kinds in the same order."""
+        """The same patches with other models, of the same kinds in the same order.
+
+        Raises InvalidValueError for models of other kinds.
+        """
         kinds, given = ([type(model).__name__ for model in each] for each in (self.models, models))
         if given != kinds or not all(isinstance(model, FrictionModel) for model in models):
             rule = f"be models of planarfriction.jax: {', '.join(kinds)}"
@@ -160,7 +163,10 @@ class Friction:
     # ------------------------------------------------------------------ a step
 
     def step(self, m: Any, d: Any) -> Any:
-        """`mjx.step` with friction: a pure function for `jit`, `vmap`, `lax.scan` and `grad`."""
+        """`mjx.step` with friction: a pure function for `jit`, `vmap`, `lax.scan` and `grad`.
+
+        Raises InvalidValueError for a model of MJX in another implementation, and for data without its user data.
+        """
         if m.impl != mjx.Impl.JAX:
             raise InvalidValueError("impl", "be JAX's: mjx.put_model(m, impl='jax')", m.impl.value)
         if d.qpos.dtype != jnp.float64:

@@ -26,6 +26,8 @@ class Patch:
 
     The frame of the patch has its x axis along the site's, projected on the contact plane, and its normal into the
     site's body; its twist is that of this body relative to the other, its wrench acts on this body.
+
+    Raises InvalidValueError unless `geoms` are two names, `centre` is one that there is and `model` a friction model.
     """
 
     model: FrictionModel

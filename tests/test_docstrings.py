@@ -1,0 +1,120 @@
+"""What `help()` says: each public class and function begins with a sentence, has units, and says what it raises."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import importlib
+import inspect
+import re
+import textwrap
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import pytest
+
+import planarfriction as pf
+from planarfriction.described import HEADING
+
+FRONT_ENDS = {"torch": "torch", "jax": "jax", "adapters.mujoco": "mujoco", "adapters.mjx": "mujoco.mjx"}
+FRONT_ENDS |= {"adapters.drake": "pydrake"}
+PLAIN = [name for name in pf._MODULES if name not in ("errors", "families", "formulas")]
+OF_PYTHON = {"NotImplementedError", "AttributeError", "TypeError", "StopIteration", "KeyError"}
+"""Raised for Python's own protocols, or by a method that a subclass has to write."""
+
+
+class Public(NamedTuple):
+    """A function, or a class as it is made, that users call."""
+
+    name: str
+    code: Any
+    """The function whose body is read."""
+    doc: str
+
+
+def members(where: str) -> Iterator[tuple[str, Any]]:
+    """Public classes and functions of a module of the package, each under its full name."""
+    module = importlib.import_module(f"planarfriction.{where}")
+    names = getattr(module, "__all__", None) or [name for name in vars(module) if not name.startswith("_")]
+    home = "planarfriction" if hasattr(module, "__all__") else module.__name__
+    for name in names:
+        value = getattr(module, name)
+        if callable(value) and getattr(value, "__module__", "").startswith(home):
+            yield f"{where}.{name}", value
+
+
+def callables(where: str) -> Iterator[Public]:
+    for name, value in members(where):
+        if not inspect.isclass(value):
+            yield Public(name, value, value.__doc__ or "")
+            continue
+        for attribute, member in vars(value).items():
+            code = member.__func__ if isinstance(member, (classmethod, staticmethod)) else member
+            code = code.fget if isinstance(code, property) else getattr(code, "func", code)
+            if not inspect.isfunction(code):
+                continue
+            if attribute in ("__init__", "__post_init__"):
+                yield Public(name, code, value.__doc__ or "")
+            elif not attribute.startswith("_"):
+                yield Public(f"{name}.{attribute}", code, inspect.getdoc(member) or "")
+
+
+def raises(code: Any) -> set[str]:
+    """Names of the errors that a function raises itself; "InvalidValueError" where it checks a parameter."""
+    try:
+        tree = ast.parse(textwrap.dedent(inspect.getsource(code)))
+    except (OSError, SyntaxError):  # what `dataclass` wrote
+        return set()
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Raise) and node.exc is not None:
+            made = node.exc.func if isinstance(node.exc, ast.Call) else node.exc
+            found.add(ast.unparse(made))
+        if isinstance(node, ast.Call) and ast.unparse(node.func).startswith("validation."):
+            found.add("InvalidValueError")
+    return found - OF_PYTHON
+
+
+def modules() -> list[Any]:
+    return [*PLAIN, *(pytest.param(name, marks=getattr(pytest.mark, name.rpartition(".")[2])) for name in FRONT_ENDS)]
+
+
+@pytest.mark.parametrize("where", modules())
+def test_what_raises_says_so(where):
+    if where in FRONT_ENDS:
+        pytest.importorskip(FRONT_ENDS[where])
+    silent = {each.name for each in callables(where) if raises(each.code) and not re.search(r"\bRaises\b", each.doc)}
+    assert not silent
+
+
+def records(where: str) -> list[tuple[str, Any]]:
+    """Public dataclasses and named tuples, as users see them."""
+    kinds = [(name, value) for name, value in members(where) if inspect.isclass(value)]
+    return [(name, value) for name, value in kinds if dataclasses.is_dataclass(value) or hasattr(value, "_fields")]
+
+
+def arguments(kind: Any) -> list[tuple[str, str]]:
+    """Names and types of the arguments of a record, but for its own."""
+    if dataclasses.is_dataclass(kind):
+        return [(each.name, str(each.type)) for each in dataclasses.fields(kind) if each.init and each.name[0] != "_"]
+    return [(name, str(kind.__annotations__.get(name, ""))) for name in kind._fields]
+
+
+@pytest.mark.parametrize("where", PLAIN)
+def test_help_begins_with_a_sentence(where):
+    for name, value in members(where):
+        first = (inspect.getdoc(value) or "").partition("\n\n")[0]
+        assert re.match(r"[A-Z]", first) and first.rstrip().endswith((".", ":", "?", "`")), name
+
+
+@pytest.mark.parametrize("where", PLAIN)
+def test_help_says_what_each_argument_is(where):
+    """Numbers with their unit, arrays with their shape too."""
+    for kind, value in records(where):
+        said = inspect.getdoc(value) or ""
+        listed = said.partition(f"\n{HEADING}:\n")[2]
+        for name, of in arguments(value):
+            match = re.search(rf"^{name}\n((?:    .*\n?|\n)+)", listed + "\n", re.MULTILINE)
+            assert match, f"{kind}: {name}"
+            if re.match(r"(float|np.ndarray)", of):
+                assert re.search(r"\[[^\]]+\]|\(units of", match[1]), f"{kind}: {name} has no unit"
