@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from planarfriction import validation
 from planarfriction.equality import ByValue, by_parts
@@ -128,7 +129,13 @@ class CoupledPatches(ByValue):
         return [state[..., a:b].reshape(*state.shape[:-1], *model.state_shape) for a, b, model in ends]
 
     def step(
-        self, state, host: HostStep, dt, *, tolerance: float = TOLERANCE, iterations: int = ITERATIONS
+        self,
+        state: ArrayLike,
+        host: HostStep,
+        dt: ArrayLike,
+        *,
+        tolerance: float = TOLERANCE,
+        iterations: int = ITERATIONS,
     ) -> CoupledStep:
         """The wrenches that fit the step of a host: `W = w(V, N)`, with the V and N that they cause (see `HostStep`).
 

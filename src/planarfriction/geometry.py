@@ -6,9 +6,10 @@ All functions broadcast over leading axes; the last axis has length 3 (or 2 for 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 
-def twist_at(twist, offset) -> np.ndarray:
+def twist_at(twist: ArrayLike, offset: ArrayLike) -> np.ndarray:
     """Twist at the point displaced by `offset` [m] from the reference point.
 
     `vx' = vx - omega dy`, `vy' = vy + omega dx`, `omega' = omega`; shapes `[..., 3]` and `[..., 2]`.
@@ -20,7 +21,7 @@ def twist_at(twist, offset) -> np.ndarray:
     )
 
 
-def wrench_at(wrench, offset) -> np.ndarray:
+def wrench_at(wrench: ArrayLike, offset: ArrayLike) -> np.ndarray:
     """Wrench about the point displaced by `offset` [m] from the reference point.
 
     `tau' = tau - (dx fy - dy fx)`; forces stay. `wrench . twist` is the same at every point.
@@ -40,7 +41,7 @@ def transformed(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(x * matrix[:, 0] + y * matrix[:, 1] + z * matrix[:, 2])
 
 
-def rotate(vector, angle) -> np.ndarray:
+def rotate(vector: ArrayLike, angle: ArrayLike) -> np.ndarray:
     """Rotate the first two components of a twist, wrench or point by `angle` [rad], counter-clockwise."""
     vector, angle = np.asarray(vector, dtype=float), np.asarray(angle, dtype=float)
     c, s = np.cos(angle), np.sin(angle)

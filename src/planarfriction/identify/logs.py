@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from planarfriction import validation
 from planarfriction.equality import ByValue
@@ -51,6 +53,18 @@ class Log(ByValue):
     turns: int = 0
     """Jumps by a whole turn that were taken out of the measured angle."""
 
+    if TYPE_CHECKING:  # what is given may be more than what is kept
+
+        def __init__(
+            self,
+            time: ArrayLike,
+            twist: ArrayLike,
+            wrench: ArrayLike,
+            normal_force: ArrayLike,
+            name: str = "log",
+            turns: int = 0,
+        ) -> None: ...
+
     def __post_init__(self) -> None:
         time = validation.array("time", self.time, (None,))
         samples = len(time)
@@ -90,7 +104,16 @@ class Log(ByValue):
         return bool(np.abs(self.time - self.time[0] - steps).max() <= EVEN * self.interval)
 
     @classmethod
-    def from_motion(cls, time, motion, wrench, normal_force, *, window: int = 7, name: str = "log") -> Log:
+    def from_motion(
+        cls,
+        time: ArrayLike,
+        motion: ArrayLike,
+        wrench: ArrayLike,
+        normal_force: ArrayLike,
+        *,
+        window: int = 7,
+        name: str = "log",
+    ) -> Log:
         """Log whose motion was measured, not its twist: `motion` is x, y, theta `[T, 3]` of the contact frame [m, rad].
 
         The pose is that of the contact frame in the world, the wrench in the contact frame's axes; the twist is
@@ -156,7 +179,7 @@ def as_logs(log: Log | Sequence[Log]) -> tuple[Log, ...]:
     return logs
 
 
-def differentiated(time, motion, *, window: int = 7) -> np.ndarray:
+def differentiated(time: ArrayLike, motion: ArrayLike, *, window: int = 7) -> np.ndarray:
     """Twist `[T, 3]` in the moving frame's axes from its pose x, y, theta `[T, 3]` [m, m, rad] at `time` `[T]` [s].
 
     Slope of a parabola through `window` neighbouring samples (fewer at the ends); jumps of theta by whole turns are

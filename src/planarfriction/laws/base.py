@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from planarfriction import formulas, validation
 from planarfriction.errors import InvalidValueError
@@ -32,7 +33,7 @@ class FrictionLaw:
         """Steady-state deflection at high speed, `mu_c / sigma_0` [m]: the natural scale of a bristle."""
         return self.numbers.mu_c / self.numbers.sigma_0
 
-    def steady_friction(self, speed) -> np.ndarray:
+    def steady_friction(self, speed: ArrayLike) -> np.ndarray:
         """Friction force over normal force [-] in steady sliding at `speed` >= 0 `[...]` [m/s].
 
         `g(v) v/(v + v_c) + sigma_2 v`; laws without creep (v_c = 0) have `g(0)` at rest.
@@ -43,7 +44,7 @@ class FrictionLaw:
         share = speed / (speed + law.creep_speed) if law.creep_speed > 0.0 else 1.0
         return formulas.stribeck(np, speed, law) * share + law.sigma_2 * speed
 
-    def rate(self, state, velocity, *, axis: int | None = None) -> np.ndarray:
+    def rate(self, state: ArrayLike, velocity: ArrayLike, *, axis: int | None = None) -> np.ndarray:
         """Rate `zdot = v - k z` [m/s] of bristles with deflection `state` [m]; both broadcast."""
         z, v = _bristles(state, velocity, axis)
         law, length, speed = self.numbers, _norm(z, axis), _norm(v, axis)
@@ -52,7 +53,9 @@ class FrictionLaw:
         grip = law.sigma_0 / formulas.stribeck(np, speed, law)
         return v - formulas.bristle_decay(np, length * grip, along, speed, grip, law) * z
 
-    def force(self, state, velocity, normal_force, *, axis: int | None = None) -> np.ndarray:
+    def force(
+        self, state: ArrayLike, velocity: ArrayLike, normal_force: ArrayLike, *, axis: int | None = None
+    ) -> np.ndarray:
         """Friction force [N] on the moving body; `normal_force` [N] broadcasts with bristles, not with components.
 
         Raises InvalidValueError for a load below zero, and for shapes that do not broadcast.

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from planarfriction import validation
 from planarfriction.equality import ByValue, by_parts, unusual
@@ -199,7 +200,7 @@ class LimitSurface(ByValue):
 
     # ------------------------------------------------------------------ the protocol
 
-    def wrench(self, twist) -> np.ndarray:
+    def wrench(self, twist: ArrayLike) -> np.ndarray:
         """Friction wrench `W(V)` on the moving body, shape `[..., 3]` [1, 1, m]; zero at rest.
 
         Raises `InvalidValueError` if `twist` is not finite or not of shape `[..., 3]`.
@@ -207,18 +208,18 @@ class LimitSurface(ByValue):
         scaled, frame = self._scaled(twist)
         return -transformed(frame.T, self._direction(scaled))
 
-    def dissipation(self, twist) -> np.ndarray:
+    def dissipation(self, twist: ArrayLike) -> np.ndarray:
         """Dissipated power `Phi(V) = -W . V >= 0` per unit `mu f_N`, shape `[...]` [m/s]."""
         scaled, _ = self._scaled(twist)
         return np.einsum("...i,...i", self._direction(scaled), scaled)
 
-    def jacobian(self, twist) -> np.ndarray:
+    def jacobian(self, twist: ArrayLike) -> np.ndarray:
         """`dW/dV`, shape `[..., 3, 3]`; zero along `V` itself and undefined at rest, where it is returned as zero."""
         scaled, frame = self._scaled(twist)
         flat = scaled.reshape(-1, 3)
         return -(frame.T @ self._direction_slope(flat) @ frame).reshape(*scaled.shape[:-1], 3, 3)
 
-    def twist(self, wrench) -> np.ndarray:
+    def twist(self, wrench: ArrayLike) -> np.ndarray:
         """Twist normal to the surface where the ray of `wrench` meets it, of unit dissipation, shape `[..., 3]`.
 
         `argmin Phi(V)` subject to `-W . V = 1`, scaled to `Phi(V) = 1`; the magnitude of `wrench` does not matter. The

@@ -7,6 +7,7 @@ import functools
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
@@ -64,7 +65,13 @@ class LimitSurfaceQuartic(LimitSurface):
 
     @classmethod
     def fit(
-        cls, wrench, twist, *, patch: ContactPatch, normal_force: float | None = None, velocity_weight: float = 1.0
+        cls,
+        wrench: ArrayLike,
+        twist: ArrayLike,
+        *,
+        patch: ContactPatch,
+        normal_force: float | None = None,
+        velocity_weight: float = 1.0,
     ) -> LimitSurfaceQuartic:
         """The convex quartic nearest to measured pairs: `H(W) = 1`, and the gradient of H along the twist.
 

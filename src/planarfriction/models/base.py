@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from planarfriction import validation
 from planarfriction.equality import ByValue, by_parts, unusual
@@ -156,7 +157,7 @@ class FrictionModel(ByValue):
         """The same model with another law; what it has built of its patch is shared where no law has a say in it."""
         return dataclasses.replace(self, law=law)
 
-    def state_of(self, deflections, normal_force) -> np.ndarray:
+    def state_of(self, deflections: ArrayLike, normal_force: ArrayLike) -> np.ndarray:
         """State of a contact at rest whose bristles are bent by `deflections` `[2, N]` [m] under a load > 0 [N].
 
         Its wrench is that of the bristles, `-sum w_i B_i' sigma_0 z_i f_N`, whatever a model keeps of them.
@@ -208,7 +209,7 @@ class FrictionModel(ByValue):
         """Whether what the model knows of its patch changes with the load."""
         return self.patch.depends_on_load
 
-    def _inputs(self, state, twist, normal_force, **more) -> list[np.ndarray]:
+    def _inputs(self, state: ArrayLike, twist: ArrayLike, normal_force: ArrayLike, **more) -> list[np.ndarray]:
         """Check the inputs and broadcast their batch axes against each other.
 
         All come out in C order and writable: compiled loops know no other arrays, and sums run the same way.

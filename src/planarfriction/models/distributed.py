@@ -45,17 +45,17 @@ class DistributedModel(FrictionModel):
         """`(2, N)` for the N cells that can carry load."""
         return (2, len(self.patch.positions))
 
-    def rate(self, state, twist, normal_force) -> np.ndarray:
+    def rate(self, state: Any, twist: Any, normal_force: Any) -> np.ndarray:
         """Bristle rates `zdot`, shape `[..., 2, N]` [m/s]."""
         state, twist, load = self._inputs(state, twist, normal_force)
         return self._rates(state, twist, load)[0]
 
-    def wrench(self, state, twist, normal_force) -> np.ndarray:
+    def wrench(self, state: Any, twist: Any, normal_force: Any) -> np.ndarray:
         """Friction wrench on the moving body, shape `[..., 3]` [N, N, N m]."""
         state, twist, load = self._inputs(state, twist, normal_force)
         return load[..., None] * self._rates(state, twist, load)[1]
 
-    def step(self, state, twist, normal_force, dt) -> tuple[np.ndarray, np.ndarray]:
+    def step(self, state: Any, twist: Any, normal_force: Any, dt: Any) -> tuple[np.ndarray, np.ndarray]:
         """Advance by `dt` [s] at a held twist: the new state and the wrench at the end, stable at any `dt`.
 
         Plain LuGre is linear in z and its step exact. Elasto-plastic: the exponential step with the mean decay of start
@@ -79,7 +79,7 @@ class DistributedModel(FrictionModel):
         )
         return out.reshape(state.shape), wrench.reshape(*batch, 3)
 
-    def jacobians(self, state, twist, normal_force) -> ModelJacobians:
+    def jacobians(self, state: Any, twist: Any, normal_force: Any) -> ModelJacobians:
         """Analytic derivatives of `rate` and `wrench` (see `ModelJacobians`); at kinks a one-sided derivative."""
         state, twist, load = self._inputs(state, twist, normal_force)
         law, identity = self.law.numbers, np.eye(2)[:, :, None]
@@ -105,7 +105,7 @@ class DistributedModel(FrictionModel):
             self._rates(state, twist, load)[1],
         )
 
-    def step_jacobians(self, state, twist, normal_force, dt) -> StepJacobians:
+    def step_jacobians(self, state: Any, twist: Any, normal_force: Any, dt: Any) -> StepJacobians:
         """Analytic derivatives of `step` (see `StepJacobians`); at kinks a one-sided derivative."""
         state, twist, load, dt = self._inputs(state, twist, normal_force, dt=dt)
         if self.patch.anisotropic:

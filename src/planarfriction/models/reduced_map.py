@@ -6,6 +6,7 @@ import functools
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from planarfriction.equality import by_parts
 from planarfriction.kernels.steady import HEADER, QUARTIC
@@ -59,7 +60,7 @@ def reduced_shape(
     return ReducedShape(factor, reduced_map(ScaledCells(patch, normal_force, factor), gamma, segments, speeds))
 
 
-def is_point(patch: ContactPatch, normal_force=None):
+def is_point(patch: ContactPatch, normal_force: ArrayLike | None = None):
     """Whether one cell carries the load but for a share `POINT` of it, `[...]` of bool."""
     return _one_carries(patch.weights(normal_force))
 
@@ -68,7 +69,7 @@ def _one_carries(weights: np.ndarray):
     return 1.0 - weights.max(-1) <= POINT
 
 
-def slip_factor(patch: ContactPatch, normal_force=None) -> np.ndarray:
+def slip_factor(patch: ContactPatch, normal_force: ArrayLike | None = None) -> np.ndarray:
     """F `[..., 3, 3]`, upper triangular, with `F'F = sum(w B'B)`: what the cells see of a twist V is `B V`.
 
     Cells as points, as the distributed model takes them: docs/reduced-model.md, "Cells as points or as areas".

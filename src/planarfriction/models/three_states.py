@@ -60,15 +60,15 @@ class ThreeStateModel(FrictionModel):
         """`(3,)`"""
         return (3,)
 
-    def rate(self, state, twist, normal_force) -> np.ndarray:
+    def rate(self, state: Any, twist: Any, normal_force: Any) -> np.ndarray:
         """Rates of the state `zdot`, shape `[..., *s]`, in units of the state per second."""
         return _each(self._by_load(self._evaluate, (6,), *self._inputs(state, twist, normal_force))[..., :3])
 
-    def wrench(self, state, twist, normal_force) -> np.ndarray:
+    def wrench(self, state: Any, twist: Any, normal_force: Any) -> np.ndarray:
         """Friction wrench on the moving body, shape `[..., 3]` [N, N, N m]."""
         return self._out(_sum(self._by_load(self._evaluate, (6,), *self._inputs(state, twist, normal_force))[..., 3:]))
 
-    def jacobians(self, state, twist, normal_force) -> ModelJacobians:
+    def jacobians(self, state: Any, twist: Any, normal_force: Any) -> ModelJacobians:
         """Analytic derivatives of `rate` and `wrench` (see `ModelJacobians`); at kinks a one-sided derivative."""
         packed = self._by_load(self._jacobians, (13, 3), *self._inputs(state, twist, normal_force))
         square = [packed[..., i : i + 3, :] for i in (0, 3, 6, 9)]
@@ -78,7 +78,7 @@ class ThreeStateModel(FrictionModel):
         )
         return self._turned(slopes, "rate_twist")
 
-    def step(self, state, twist, normal_force, dt) -> tuple[np.ndarray, np.ndarray]:
+    def step(self, state: Any, twist: Any, normal_force: Any, dt: Any) -> tuple[np.ndarray, np.ndarray]:
         """Advance by `dt` [s] at a held twist: the new state and the wrench at the end, stable at any `dt`.
 
         Plain LuGre is linear in z and its step exact. Elasto-plastic: the exponential step with the mean decay of start
@@ -116,7 +116,7 @@ class ThreeStateModel(FrictionModel):
         packed = self._by_load(self._step, (6,), *self._inputs(state, twist, normal_force, dt=dt))
         return _each(packed[..., :3]), self._out(_sum(packed[..., 3:]))
 
-    def step_jacobians(self, state, twist, normal_force, dt) -> StepJacobians:
+    def step_jacobians(self, state: Any, twist: Any, normal_force: Any, dt: Any) -> StepJacobians:
         """Analytic derivatives of `step` (see `StepJacobians`); at kinks a one-sided derivative."""
         quick = self._quick
         if quick is not None:

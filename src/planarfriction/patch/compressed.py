@@ -17,6 +17,7 @@ import math
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
@@ -101,7 +102,7 @@ def compressed(
     return _few(patch, found, nodes)
 
 
-def surface_error(patch: ContactPatch, few: ContactPatch, normal_force=None) -> float:
+def surface_error(patch: ContactPatch, few: ContactPatch, normal_force: ArrayLike | None = None) -> float:
     """Largest relative error of the dissipation of `few` against that of `patch`, over twists of all directions [-].
 
     Twists are spread evenly over the sphere of `(vx, vy, omega r)` about the centre of pressure.

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
@@ -200,7 +201,7 @@ class ContactPatch(Anisotropy):
 
     @classmethod
     def polygon(
-        cls, vertices, cells: int | Sequence[int] = 21, *, pressure: Any = None, name: str = "polygon"
+        cls, vertices: Any, cells: int | Sequence[int] = 21, *, pressure: Any = None, name: str = "polygon"
     ) -> ContactPatch:
         """Polygon with `vertices` `[M, 2]` [m], convex or not, on a grid over its bounding box, cut along its sides.
 
@@ -218,7 +219,7 @@ class ContactPatch(Anisotropy):
         return outlines.clipped(cls, outline, grid, pressure, name)
 
     @classmethod
-    def points(cls, positions, weights=None, *, area: float = 1e-6, name: str = "points") -> ContactPatch:
+    def points(cls, positions: Any, weights: Any = None, *, area: float = 1e-6, name: str = "points") -> ContactPatch:
         """Any set of contact points `[N, 2]` [m] with relative `weights` `[N]` (equal if None), such as feet.
 
         `area` [m^2] is what each point stands for; only `areas`, `area` and `pressure_values` look at it. Raises
@@ -291,7 +292,7 @@ class ContactPatch(Anisotropy):
         """Whether the weights change with the normal force."""
         return self.pressure.depends_on_load
 
-    def weights(self, normal_force=None) -> np.ndarray:
+    def weights(self, normal_force: ArrayLike | None = None) -> np.ndarray:
         """Share of the normal force on each cell, `w_i = p_i a_i / sum(p a)`, shape `[..., N]` [-].
 
         Raises InvalidValueError without a load that is needed.
@@ -310,12 +311,12 @@ class ContactPatch(Anisotropy):
         weights = self._shares(self.pressure.relative(self.positions, np.where(loaded, load, 1.0)))
         return np.where(loaded[..., None], weights, 0.0)
 
-    def centre_of_pressure(self, normal_force=None) -> np.ndarray:
+    def centre_of_pressure(self, normal_force: ArrayLike | None = None) -> np.ndarray:
         """Centre of pressure `sum(w rho)`, shape `[..., 2]` [m]."""
         weights = self.weights(normal_force)
         return np.stack([(weights * coordinate).sum(-1) for coordinate in self.positions.T], -1)
 
-    def contact_radius(self, normal_force=None) -> float | np.ndarray:
+    def contact_radius(self, normal_force: ArrayLike | None = None) -> float | np.ndarray:
         """Contact radius `r = sum(w |rho - CoP|)` [m]: a pure spin about the CoP has the friction torque `mu f_N r`.
 
         With a friction metric `sum(w |L J (rho - CoP)|)`, J a quarter turn; the second moment alike.
@@ -323,17 +324,17 @@ class ContactPatch(Anisotropy):
         weights, *offset = self._about_centre_of_pressure(normal_force)
         return (weights * np.hypot(*self.lever_coordinates(*offset))).sum(-1)
 
-    def second_moment(self, normal_force=None) -> float | np.ndarray:
+    def second_moment(self, normal_force: ArrayLike | None = None) -> float | np.ndarray:
         """Second moment `<rho^2> = sum(w |rho - CoP|^2)` [m^2]."""
         weights, *offset = self._about_centre_of_pressure(normal_force)
         dx, dy = self.lever_coordinates(*offset)
         return (weights * (dx**2 + dy**2)).sum(-1)
 
-    def area(self, normal_force=None) -> float | np.ndarray:
+    def area(self, normal_force: ArrayLike | None = None) -> float | np.ndarray:
         """Area of the cells under load [m^2]."""
         return np.where(self.weights(normal_force) > 0.0, self.areas, 0.0).sum(-1)
 
-    def moments(self, degree: int, normal_force=None, *, about=None) -> np.ndarray:
+    def moments(self, degree: int, normal_force: ArrayLike | None = None, *, about: Any = None) -> np.ndarray:
         """Polynomial moments of the pressure, `M[i, j] = sum(w (x - x0)^i (y - y0)^j)` for `i + j <= degree`.
 
         Shape `[..., degree + 1, degree + 1]` [m^(i + j)], zero where `i + j > degree`. `about` is the point (x0, y0)
@@ -350,7 +351,7 @@ class ContactPatch(Anisotropy):
                 result[..., i, j] = (weights * dx**i * dy**j).sum(-1)
         return result
 
-    def pressure_values(self, normal_force) -> np.ndarray:
+    def pressure_values(self, normal_force: ArrayLike) -> np.ndarray:
         """Pressure on each cell, `w_i f_N / a_i`, shape `[..., N]` [Pa].
 
         Raises InvalidValueError for a load below zero.
@@ -358,7 +359,7 @@ class ContactPatch(Anisotropy):
         load = validation.non_negative_numbers("normal_force", normal_force)
         return self.weights(load) * load[..., None] / self.areas
 
-    def plot(self, *, normal_force=None):
+    def plot(self, *, normal_force: float | None = None) -> Any:
         """Draw the pressure map with its centre of pressure; returns a matplotlib Figure."""
         from planarfriction import plots
 

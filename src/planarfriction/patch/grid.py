@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from planarfriction import validation
 from planarfriction.described import described
@@ -78,7 +79,7 @@ class Grid:
         y = y_middle - (np.arange(self.rows) - (self.rows - 1) / 2) * self.cell_height
         return np.stack([np.tile(x, self.rows), np.repeat(y, self.columns)], -1)
 
-    def locate(self, positions) -> tuple[np.ndarray, np.ndarray]:
+    def locate(self, positions: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         """Row and column of the cell that holds each of `positions` `[..., 2]` [m]; row 0 is the top.
 
         Positions outside the grid get rows or columns outside `0 .. rows - 1` and `0 .. columns - 1`.

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from planarfriction import formulas, validation
 from planarfriction.described import described
@@ -148,7 +149,7 @@ class SoftFinger(Pressure):
     def depends_on_load(self) -> bool:
         return self.n != 0.0 or self.k is None
 
-    def radius(self, normal_force) -> np.ndarray:
+    def radius(self, normal_force: ArrayLike) -> np.ndarray:
         """Contact radius `R = min(c f_N^n, radius_max)` [m] at `normal_force` `[...]` [N].
 
         Raises InvalidValueError for a load below zero.
@@ -160,7 +161,7 @@ class SoftFinger(Pressure):
             radius = np.maximum(self.c * load**self.n, validation.SMALLEST)
         return radius if self.radius_max is None else np.minimum(radius, self.radius_max)
 
-    def exponent(self, normal_force) -> np.ndarray:
+    def exponent(self, normal_force: ArrayLike) -> np.ndarray:
         """Exponent `k` of the profile [-] at `normal_force` `[...]` [N].
 
         Raises InvalidValueError for a load below zero.

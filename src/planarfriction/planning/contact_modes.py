@@ -11,6 +11,7 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from planarfriction import validation
 from planarfriction.limit_surface import LimitSurface
@@ -54,7 +55,7 @@ class Motion(NamedTuple):
     """A face that cannot stay flush: 1 where it turns about its left end, -1 about its right one."""
 
 
-def motion_cone(surface: LimitSurface, at, normal, mu: float) -> np.ndarray:
+def motion_cone(surface: LimitSurface, at: ArrayLike, normal: ArrayLike, mu: float) -> np.ndarray:
     """Edges of the motion cone `[2, 2]`: velocities of a slider's place for the friction cone's right and left edge.
 
     Velocities of the pusher between the two make it stick, others slide along the slider, which then moves as on the

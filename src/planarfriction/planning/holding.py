@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
@@ -13,7 +14,7 @@ _STEP, _STEPS = 1.25, 120
 """Factor between the loads that are tried on a patch that follows its load, and how many of them."""
 
 
-def holding_load(wrench, patch: ContactPatch, mu: float, margin: float = 0.0) -> float:
+def holding_load(wrench: ArrayLike, patch: ContactPatch, mu: float, margin: float = 0.0) -> float:
     """Smallest normal force [N] whose friction holds a load `wrench` `(fx, fy, tau)` [N, N, N m] on a contact.
 
     The load acts on the body, about the origin of the contact frame. Friction can be anything inside the limit surface:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from planarfriction import validation
 from planarfriction.described import described
@@ -96,9 +97,9 @@ class PushPlan(ByValue):
 def plan_push(
     slider: Slider,
     pusher: Pusher,
-    goal,
+    goal: ArrayLike,
     *,
-    start=(0.0, 0.0, 0.0),
+    start: ArrayLike = (0.0, 0.0, 0.0),
     margin: float = 0.2,
     edges: Sequence[int] | None = None,
 ) -> PushPlan:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from planarfriction import validation
 from planarfriction.equality import ByValue
@@ -71,7 +72,7 @@ def push(
     pusher: Pusher,
     path: Signal,
     *,
-    start=(0.0, 0.0, 0.0),
+    start: ArrayLike = (0.0, 0.0, 0.0),
     samples: int = 101,
     rtol: float = 1e-7,
 ) -> Push:

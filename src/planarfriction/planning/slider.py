@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from planarfriction import validation
 from planarfriction.described import described
@@ -25,6 +27,14 @@ class Slider(ByValue):
     """Limit surface of the patch that it stands on; its frame is the slider's."""
     outline: np.ndarray
     """Corners of the convex outline `[M, 2]` in that frame [m], in either sense of rotation."""
+
+    if TYPE_CHECKING:  # what is given may be more than what is kept
+
+        def __init__(
+            self,
+            surface: LimitSurface,
+            outline: ArrayLike,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         validation.instance("surface", self.surface, LimitSurface, "a limit surface")

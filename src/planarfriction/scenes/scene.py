@@ -7,9 +7,10 @@ import json
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from planarfriction import validation
 from planarfriction.equality import ByValue
@@ -54,6 +55,19 @@ class Body(ByValue):
     """Gravity in the plane of motion, world axes [m/s^2]."""
     outline: np.ndarray | None = field(default=None, repr=False)
     """Polygon for drawings, in body axes with the centre of mass at the origin, shape `[M, 2]` [m], or None."""
+
+    if TYPE_CHECKING:  # what is given may be more than what is kept
+
+        def __init__(
+            self,
+            mass: float,
+            inertia: float,
+            position: ArrayLike = (0.0, 0.0),
+            angle: float = 0.0,
+            velocity: ArrayLike = (0.0, 0.0, 0.0),
+            gravity: ArrayLike = (0.0, -9.81),
+            outline: ArrayLike | None = None,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         for name in ("mass", "inertia"):
@@ -114,6 +128,20 @@ class Contact(ByValue):
     to the body it is the twist of the ground (a belt, a turntable) at the origin of the world.
     """
 
+    if TYPE_CHECKING:  # what is given may be more than what is kept
+
+        def __init__(
+            self,
+            model: Any,
+            normal_force: Signal | ArrayLike,
+            mounted_on: Literal["world", "body"] = "world",
+            position: ArrayLike = (0.0, 0.0),
+            angle: float = 0.0,
+            count: int = 1,
+            name: str = "contact",
+            velocity: Signal | ArrayLike | None = None,
+        ) -> None: ...
+
     def __post_init__(self) -> None:
         validation.text("name of a contact", self.name)
         checked_model(f"model of contact {self.name!r}", self.model)
@@ -169,6 +197,23 @@ class Scene(ByValue):
     start: Literal["rest", "equilibrium", "sliding"] = "rest"
     """How the bristles start: not deflected; carrying the load of a body that stands still (with the least elastic
     energy, which says how contacts share it); or in the steady state of the initial velocity."""
+
+    if TYPE_CHECKING:  # what is given may be more than what is kept
+
+        def __init__(
+            self,
+            body: Body,
+            contacts: Contact | Sequence[Contact],
+            t_end: float,
+            force: Signal | ArrayLike | None = None,
+            velocity: Signal | ArrayLike | None = None,
+            stop_speed: float | None = None,
+            save_every: float = 0.01,
+            rtol: float = RTOL,
+            atol: float = ATOL,
+            name: str = "scene",
+            start: Literal["rest", "equilibrium", "sliding"] = "rest",
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         if not isinstance(self.body, Body):

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from planarfriction import validation
 from planarfriction.equality import ByValue
@@ -65,6 +66,15 @@ class Signal(ByValue):
     hold: Hold = "previous"
     """What happens between the samples: "previous" or "linear"."""
 
+    if TYPE_CHECKING:  # what is given may be more than what is kept
+
+        def __init__(
+            self,
+            times: ArrayLike,
+            values: ArrayLike,
+            hold: Hold = "previous",
+        ) -> None: ...
+
     def __post_init__(self) -> None:
         times = validation.array("times", self.times, (None,))
         values = validation.numbers("values", self.values)
@@ -87,12 +97,12 @@ class Signal(ByValue):
         object.__setattr__(self, "values", values)
 
     @classmethod
-    def sampled(cls, times, values, hold: Hold = "previous") -> Signal:
+    def sampled(cls, times: ArrayLike, values: ArrayLike, hold: Hold = "previous") -> Signal:
         """Signal through samples: `times` [s] of shape `[T]`, `values` of shape `[T]` or `[T, k]`."""
         return cls(times, values, hold)
 
     @classmethod
-    def constant(cls, value) -> Signal:
+    def constant(cls, value: ArrayLike) -> Signal:
         """Signal that never changes; `value` is a number or a vector `[k]`.
 
         Raises InvalidValueError for anything else.
@@ -142,11 +152,11 @@ class Signal(ByValue):
         times = self.times[0] + sample_times(self.times[-1] - self.times[0], dt)
         return Signal(times, self(times))
 
-    def __call__(self, t) -> np.ndarray:
+    def __call__(self, t: ArrayLike) -> np.ndarray:
         """Value at the times `t` [s] (any shape); at a jump the value that begins there."""
         return self._value(t, "right")
 
-    def left(self, t) -> np.ndarray:
+    def left(self, t: ArrayLike) -> np.ndarray:
         """Value just before the times `t` [s] (any shape): at a jump the value that ends there."""
         return self._value(t, "left")
 
@@ -165,7 +175,7 @@ class Signal(ByValue):
             change = self._slopes - before
         return self.times[(change != 0.0).reshape(len(self.times), -1).any(axis=1)]
 
-    def pieces(self, breaks) -> tuple[np.ndarray, np.ndarray]:
+    def pieces(self, breaks: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
         """Straight pieces of the signal between `breaks` `[S + 1]` [s]: values at their starts and slopes.
 
         On piece s the signal is `start[s] + slope[s] (t - breaks[s])`; both have shape `[S]` or `[S, k]`, and the
