@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import os
 import random
 import shutil
@@ -11,9 +12,12 @@ import sys
 import time
 from pathlib import Path
 
+import numba
 import pytest
 
 import planarfriction as pf
+from planarfriction import warm
+from planarfriction.scenes import compiling, simulation
 
 COUNTING = """
 import numba.core.event as events
@@ -84,6 +88,41 @@ def test_what_was_compiled_ahead_is_not_compiled_again():
     assert list(times) == told and len(told) > 5
     assert all(seconds > 0.0 for seconds in times.values())
     assert result(started(COUNTING)) == "0"
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+@pytest.fixture
+def compiled_anew(monkeypatch):
+    """A function of Numba's that nothing has compiled yet, called by every simulation."""
+    fresh = numba.njit(lambda x: x + 1.0)
+    whole = simulation.integrate
+    monkeypatch.setattr(simulation, "integrate", lambda *args, **options: (fresh(1.0), whole(*args, **options))[1])
+    monkeypatch.setattr(compiling._Said, "done", False)
+
+
+@pytest.mark.parametrize(
+    ("stream", "options", "lines"), [(Terminal, {}, 1), (io.StringIO, {}, 0), (Terminal, {"progress": print}, 0)]
+)
+def test_the_first_simulation_says_that_it_compiles(compiled_anew, monkeypatch, stream, options, lines):
+    """Once, to somebody who waits and is told nothing else."""
+    monkeypatch.setattr(sys, "stderr", stream())
+    scene = pf.scenes.in_hand(pf.ReducedModelPublished(pf.ContactPatch.disc(radius=0.01, cells=5), pf.LuGre()))
+    for _ in range(2):
+        pf.simulate(scene, t_end=1e-3, **options)
+    said = sys.stderr.getvalue().splitlines()
+    assert len(said) == lines and all("compiles its solver, once after installation" in line for line in said)
+
+
+def test_warming_up_names_its_parts_to_somebody_who_waits(monkeypatch):
+    monkeypatch.setattr(sys, "stderr", Terminal())
+    monkeypatch.setattr(warm, "_parts", lambda: [warm.Part("first", dict), warm.Part("second", dict)])
+    assert list(pf.warm_up()) == ["first", "second"]
+    shown = sys.stderr.getvalue()
+    assert "\rcompiling: first" in shown and "\rcompiling: second" in shown and "compiled 2 parts" in shown
 
 
 @pytest.mark.slow

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import sys
 import time
 from collections.abc import Callable
 from importlib.util import find_spec
@@ -15,9 +16,13 @@ from planarfriction.families import MODELS
 from planarfriction.laws import LuGre
 from planarfriction.patch import ContactPatch, grain
 from planarfriction.scenes import in_hand, simulate
+from planarfriction.scenes.compiling import watched
 
 _INSTANT = 1e-3
 """Simulated time [s]: compiling does not depend on how far a run goes."""
+
+_WIDTH = 60
+"""Columns of the line that names what is compiled."""
 
 
 class Part(NamedTuple):
@@ -32,19 +37,28 @@ class Part(NamedTuple):
 def warm_up(*, progress: Callable[[str], None] | None = None) -> dict[str, float]:
     """Compile everything now and keep it on disk; returns the time that each part took [s].
 
-    What was compiled before is read from the cache. `progress` is called with the words of each part before it begins.
+    What was compiled before is read from the cache. `progress` is called with the words of each part before it begins;
+    without it, a line on the terminal or in the notebook names the part.
     What is compiled stays, so Ctrl-C loses only the function that it meets. Machine code is kept beside the sources, in
     the user's cache where nothing can be written there, or in the folder that `NUMBA_CACHE_DIR` names; where that is
     not possible either, a warning says so and each process compiles anew.
     """
-    times = {}
+    times, shown = {}, progress is None and watched()
+    progress = _show if shown else progress
     for part in _parts():
         if progress is not None:
             progress(part.words)
         begin = time.perf_counter()
         part.work()
         times[part.words] = time.perf_counter() - begin
+    if shown:
+        print(f"\rcompiled {len(times)} parts in {sum(times.values()):.1f} s".ljust(_WIDTH), file=sys.stderr)
     return times
+
+
+def _show(words: str) -> None:
+    """Write over the line before."""
+    print(f"\rcompiling: {words}".ljust(_WIDTH), end="", file=sys.stderr, flush=True)
 
 
 def _parts() -> list[Part]:
@@ -68,7 +82,7 @@ def _parts() -> list[Part]:
 
 
 def _simulate(model: Any) -> None:
-    simulate(in_hand(model), t_end=_INSTANT)
+    simulate(in_hand(model), t_end=_INSTANT, progress=lambda time: None)  # whoever called knows that this compiles
 
 
 def _derive(model: Any) -> None:

@@ -49,7 +49,14 @@ def step(model: FrictionModel, state, twist, normal_force, dt) -> tuple[jax.Arra
 
 
 def rollout(
-    model: FrictionModel, state, twist, normal_force, dt, *, parameters: Any = None, method: str | None = None
+    model: FrictionModel,
+    state: Any,
+    twist: Any,
+    normal_force: Any,
+    dt: Any,
+    *,
+    parameters: Any = None,
+    method: str | None = None,
 ) -> Rollout:
     """The steps of a model from `state` (None: at rest) through `twist` `[..., T, 3]`, each held for `dt` [s].
 

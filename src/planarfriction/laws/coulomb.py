@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,7 +27,7 @@ class Coulomb:
     def __post_init__(self) -> None:
         object.__setattr__(self, "mu", validation.positive("mu", self.mu))
 
-    def wrench(self, surface, twist: ArrayLike, normal_force: ArrayLike) -> np.ndarray:
+    def wrench(self, surface: Any, twist: ArrayLike, normal_force: ArrayLike) -> np.ndarray:
         """Friction wrench `mu f_N W(V)` on the sliding body about the contact frame's origin [N, N, N m].
 
         `surface` is any limit surface, `twist` has shape `[..., 3]` [m/s, m/s, rad/s], `normal_force` `[...]` [N].

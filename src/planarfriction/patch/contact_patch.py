@@ -232,7 +232,7 @@ class ContactPatch(Anisotropy):
 
     @classmethod
     def from_pressure(
-        cls, pressure, cell_size: float | Sequence[float], *, loads=None, name: str | None = None
+        cls, pressure: Any, cell_size: float | Sequence[float], *, loads: Any = None, name: str | None = None
     ) -> ContactPatch:
         """Patch of a measured pressure map: an array `[rows, columns]`, or the path of a CSV, NPY or grey image file.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import warnings
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -46,6 +46,10 @@ class PlotFigure(Figure):
             adopt: Any = lambda *_, **__: self  # noqa: E731
             pyplot.figure(FigureClass=adopt)  # the figure that pyplot makes is this one
         pyplot.show()
+
+    if TYPE_CHECKING:  # matplotlib leaves this one half open
+
+        def savefig(self, fname: Any, **options: Any) -> None: ...
 
     def _repr_png_(self) -> bytes:
         buffer = io.BytesIO()

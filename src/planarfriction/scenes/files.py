@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -35,13 +36,13 @@ CONTACT_KEYS = (
 )
 
 
-def rectangle_outline(size: tuple[float, float]) -> np.ndarray:
+def rectangle_outline(size: Sequence[float]) -> np.ndarray:
     """Corners `[4, 2]` [m] of a rectangle of `size` (width, height) about the origin."""
     half = [0.5 * validation.positive("size", side) for side in validation.vector("size", size, 2)]
     return np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * half
 
 
-def rectangle_inertia(mass: float, size: tuple[float, float]) -> float:
+def rectangle_inertia(mass: float, size: Sequence[float]) -> float:
     """Moment of inertia of a uniform rectangle about its centre, `m (w^2 + h^2) / 12` [kg m^2]."""
     width, height = (validation.positive("size", side) for side in validation.vector("size", size, 2))
     return validation.positive("mass", mass) / 12.0 * (width**2 + height**2)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -55,11 +56,11 @@ def in_hand_load(load: Literal[1, 2], *, placement: Literal[1, 2] = 1, t_end: fl
 def in_hand(
     model: Any,
     *,
-    centre_of_mass: tuple[float, float] = (0.002, 0.0),
+    centre_of_mass: Sequence[float] = (0.002, 0.0),
     normal_force: Any = None,
     fingers: int = 2,
     mass: float = 0.2,
-    size: tuple[float, float] = (0.15, 0.08),
+    size: Sequence[float] = (0.15, 0.08),
     t_end: float = 2.0,
 ) -> Scene:
     """A plate held upright between finger pads that slips and turns under gravity as the grip varies.
@@ -118,8 +119,8 @@ def free_slide(
     *,
     mass: float = 0.2,
     inertia: float | None = None,
-    twist: tuple[float, float, float] = (1.0, 0.0, 100.0),
-    position: tuple[float, float] = (0.0, 0.0),
+    twist: Sequence[float] = (1.0, 0.0, 100.0),
+    position: Sequence[float] = (0.0, 0.0),
     angle: float = 0.0,
     normal_force: Any = None,
     outline: np.ndarray | None = None,
@@ -195,9 +196,9 @@ def pushed(
     velocity: Any = None,
     normal_force: Any = 1.0,
     fingers: int = 2,
-    position: tuple[float, float] = (-0.06, 0.01),
+    position: Sequence[float] = (-0.06, 0.01),
     mass: float = 0.2,
-    size: tuple[float, float] = (0.15, 0.08),
+    size: Sequence[float] = (0.15, 0.08),
     t_end: float = 2.0,
 ) -> Scene:
     """A plate on a table that a hand pushes along: two finger pads pinch it behind its centre and move as prescribed.

@@ -10,6 +10,7 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError, SimulationInterrupted, SolverError
 from planarfriction.kernels.integration import Method, Output
+from planarfriction.scenes.compiling import said_when_compiling
 from planarfriction.scenes.packing import Windows
 from planarfriction.scenes.scene import Scene
 from planarfriction.scenes.signal import SAME_TIME, sample_count
@@ -56,7 +57,8 @@ def simulate(
     over each contact's bristles. The natural scales `y_0` are mu_c/sigma_0 for bristles and positions and a tenth of
     v_s for velocities (a hundredth with the published reduced model; both over the contact radius for angles), so that
     `atol` is a share of a full bristle deflection. A step that turns the twist of a contact is looked into on its way.
-    The solver stops exactly at every break of a signal.
+    The solver stops exactly at every break of a signal. The first run after an installation compiles the solver; if
+    there is no `progress`, a line on the terminal or in the notebook says so.
 
     Parameters
     ----------
@@ -99,17 +101,11 @@ def simulate(
     if not (progress is None or callable(progress)):
         raise InvalidValueError("progress", "be a function of the simulated time, or None", progress)
     times = recording_times(end, every)
-    windows = Windows(scene, end, times=times)
-    output = _output(times, windows, bristles)
-    run = integrate(
-        windows,
-        output,
-        windows.state,
-        method=method,
-        rtol=rtol,
-        atol=atol * windows.natural,
-        progress=progress,
-    )
+    with said_when_compiling(silent=progress is not None):
+        windows = Windows(scene, end, times=times)
+        output = _output(times, windows, bristles)
+        scales = atol * windows.natural
+        run = integrate(windows, output, windows.state, method=method, rtol=rtol, atol=scales, progress=progress)
     cost = replace(run.statistics, compile_time=run.statistics.compile_time + windows.loading)
     solution = Solution(_histories(scene, windows, run.output), cost, run.status, run.message, scene)
     if run.status == "interrupted":

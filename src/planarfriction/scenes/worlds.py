@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
@@ -33,7 +34,7 @@ def pivot(
     model: Any,
     *,
     mass: float = 0.06,
-    size: tuple[float, float] = (0.16, 0.03),
+    size: Sequence[float] = (0.16, 0.03),
     arm: float = 0.06,
     normal_force: Any = None,
     fingers: int = 2,
@@ -105,7 +106,7 @@ def curling(
     *,
     mass: float = 19.0,
     inertia: float | None = None,
-    twist: tuple[float, float, float] = (2.2, 0.0, 1.5),
+    twist: Sequence[float] = (2.2, 0.0, 1.5),
     start: Literal["rest", "sliding"] = "sliding",
     t_end: float = 60.0,
     save_every: float = 0.05,

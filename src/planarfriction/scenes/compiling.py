@@ -1,0 +1,43 @@
+"""One line that says why the first simulation after an installation takes so long."""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import sys
+from collections.abc import Iterator
+from typing import Any
+
+from numba.core import event
+
+_LINE = "planarfriction compiles its solver, once after installation (planarfriction.warm_up() does all of it ahead)"
+
+
+def watched() -> bool:
+    """Whether somebody sits before this process: at a terminal, or in a notebook."""
+    alone = multiprocessing.parent_process() is None
+    return alone and ("ipykernel" in sys.modules or (sys.stderr is not None and sys.stderr.isatty()))
+
+
+class _Said(event.Listener):
+    """Says it when the first function is compiled; what is read from the cache needs no words."""
+
+    done = False
+
+    def on_start(self, event: Any) -> None:
+        if not _Said.done:
+            _Said.done = True
+            print(_LINE, file=sys.stderr, flush=True)
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+@contextlib.contextmanager
+def said_when_compiling(silent: bool = False) -> Iterator[None]:
+    """Say so, once in a process, if something is compiled in here and somebody waits for it."""
+    if silent or _Said.done or not watched():
+        yield
+    else:
+        with event.install_listener("numba:compile", _Said()):
+            yield

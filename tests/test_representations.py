@@ -1,0 +1,104 @@
+"""What the prompt and a notebook show of records: one short line, or a picture with a few numbers."""
+
+from __future__ import annotations
+
+import base64
+import dataclasses
+import io
+import re
+from typing import NamedTuple
+
+import numpy as np
+import pytest
+from PIL import Image
+
+import planarfriction as pf
+from planarfriction.equality import ByValue, by_parts
+
+DISC = pf.ContactPatch.disc(radius=0.01, cells=9)
+LAW = pf.LuGre(mu_s=1.2)
+SOFT = pf.ContactPatch.disc(0.01, 9, pressure=pf.SoftFinger(c=0.0085, n=1 / 3, k=2.0))
+
+
+class Samples(NamedTuple):
+    samples: list[int]
+
+
+@pytest.fixture(scope="module")
+def solution():
+    return pf.simulate(pf.scenes.in_hand(pf.ReducedModelPublished(DISC, LAW)), t_end=0.02)
+
+
+def test_records_are_one_short_and_telling_line(solution):
+    model = pf.ReducedModel(DISC, LAW, parts=4)
+    assert repr(model) == "ReducedModel('disc' of 77 cells, LuGre(mu_c=1, mu_s=1.2, ...), parts=4)"
+    assert (
+        repr(pf.LimitSurfaceExact(SOFT, normal_force=2.0)) == "LimitSurfaceExact('disc' of 77 cells, normal_force=2.0)"
+    )
+    assert repr(pf.solvers.RODAS3) == "Method(RODAS3, order 3, 4 stages)"
+    grip = pf.Signal.sampled([0.0, 1.0], [1.0, 2.5])
+    contact = pf.Contact(pf.DistributedModel(DISC, pf.Dahl(0.5)), grip, count=2, name="pads")
+    line = "Contact('pads': 2 x DistributedModel('disc' of 77 cells, Dahl(mu_c=0.5, ...)) on the world, 1 to 2.5 N)"
+    assert repr(contact) == line
+    scene = pf.Scene(pf.Body(0.5, 2e-4), contact, 0.1, name="grip")
+    assert repr(scene) == f"Scene('grip': 0.1 s, body of 0.5 kg, 0.0002 kg m^2; {line})"
+    assert repr(solution).startswith("Solution('in-hand', success: 3 samples to t=0.02 s, x=")
+    assert re.search(r", \d+ steps in [\d.]+ ms\)$", repr(solution))
+    for each in (model, contact, scene, solution, solution.statistics, SOFT, pf.solvers.RODAS4):
+        assert len(repr(each)) < 250 and "\n" not in repr(each)
+
+
+def test_large_parts_of_a_record_are_shown_by_their_size():
+    @dataclasses.dataclass(frozen=True, eq=False)
+    class Record(ByValue):
+        short: np.ndarray
+        long: np.ndarray
+        hidden: int = dataclasses.field(default=0, repr=False)
+
+    class Pair(pf.autodiff.Rollout):
+        pass
+
+    assert repr(Record(np.ones(2), np.ones((40, 3)))).endswith("Record(short=[1., 1.], long=array [40, 3])")
+    assert repr(Pair(np.ones(3), np.ones((40, 3)))) == "Pair(state=[1., 1., 1.], wrenches=array [40, 3])"
+    assert (
+        repr(by_parts(type("One", (tuple,), {"_asdict": lambda self: {"a": list(range(12))}}))()) == "One(a=list of 12)"
+    )
+
+
+def pictures(html: str) -> list[Image.Image]:
+    found = re.findall(r"data:image/png;base64,([^\"]+)", html)
+    return [Image.open(io.BytesIO(base64.b64decode(each))) for each in found]
+
+
+def test_notebooks_show_a_patch_with_its_pressure():
+    patch = pf.ContactPatch.from_pressure(np.array([[9.0, 0.0], [1.0, 1.0]]), 1e-3, name="<b>")
+    html = patch._repr_html_()
+    (picture,) = pictures(html)
+    assert "&lt;b&gt;" in html and "<b><b>" not in html
+    assert "2 x 2 mm" in html and "(-0.41, 0.32) mm" in html
+    pixels = np.asarray(picture.convert("RGB"), dtype=float)
+    height, width, _ = pixels.shape
+    corner = {(r, c): pixels[int(height * r), int(width * c)] for r in (0.3, 0.7) for c in (0.3, 0.7)}
+    assert corner[0.3, 0.3].sum() > corner[0.7, 0.7].sum() + 100  # row 0 is the top, and the most loaded is brightest
+    assert np.abs(corner[0.7, 0.3] - corner[0.7, 0.7]).max() < 2.0
+    assert corner[0.3, 0.7].min() > 250  # no load, no colour
+
+
+def test_notebooks_show_every_kind_of_patch_surface_and_solution(solution):
+    assert "shown at" in SOFT._repr_html_()
+    for patch in (pf.ContactPatch.points([(0.0, 0.0)]), pf.ContactPatch.line(0.02, 5), SOFT):
+        assert len(pictures(patch._repr_html_())) == 1
+    assert "20 x 0 mm" not in pf.ContactPatch.line(0.02, 5)._repr_html_()
+    assert "0 x 20 mm" in pf.ContactPatch.line(0.02, 5)._repr_html_()
+    assert len(pictures(pf.LimitSurfaceExact(DISC)._repr_html_())) == 1
+    without_load = pf.LimitSurfaceCells(SOFT)._repr_html_()
+    assert not pictures(without_load) and "give a normal_force" in without_load
+    shown = solution._repr_html_()
+    assert len(pictures(shown)) == 1 and "in-hand" in shown and "reached the end" in shown
+    assert not pictures(dataclasses.replace(solution, scene=None)._repr_html_())
+
+
+def test_dir_lists_what_is_public_and_nothing_else():
+    listed = dir(pf)
+    assert set(listed) == {*pf.__all__, "__version__"} and len(listed) == len(set(listed))
+    assert all(hasattr(pf, name) for name in listed)
