@@ -11,6 +11,7 @@ from pathlib import Path
 import click
 import numpy as np
 import pytest
+from click.shell_completion import ShellComplete
 
 import planarfriction as pf
 from planarfriction import families
@@ -254,3 +255,19 @@ def test_only_what_can_be_written_has_its_scene_in_the_data(law):
 def test_a_parameter_that_is_no_plain_data_is_named(own):
     with pytest.raises(InvalidValueError, match=r"grit must be an attribute of Coarse and plain data .* got function"):
         in_hand(Coarse(DISC, LAW, grit=lambda: 3)).to_dict()  # pyright: ignore
+
+
+@pytest.mark.parametrize(
+    ("before", "incomplete", "found"),
+    [
+        (["limit-surface", "--patch"], "non", {"NonConvex1", "NonConvex2", "non"}),
+        (["run", "in-hand", "--patch"], "rec", {"rectangle", "rec"}),
+        (["identify", "--patch"], "sq", {"Square", "sq"}),
+        (["sweep"], "pus", {"pushed", "pus"}),
+        (["run"], "pus", {"pushed", "pus"}),
+    ],
+)
+def test_completion_knows_patches_and_scenes(before, incomplete, found):
+    shell = ShellComplete(app, {}, "planarfriction", "_PLANARFRICTION_COMPLETE")
+    offered = shell.get_completions(before, incomplete)
+    assert {item.value for item in offered} == found and offered[-1].type == "file"

@@ -10,7 +10,7 @@ from click.shell_completion import CompletionItem
 
 from planarfriction import __version__
 from planarfriction.cli.identify_plan import FitOrPlan, complete_log
-from planarfriction.cli.options import FILE, PATCH_HELP
+from planarfriction.cli.options import FILE, PATCH_HELP, complete_patch, complete_scene
 from planarfriction.cli.sweep import sweep
 from planarfriction.families import MODELS, SCENES, SURFACES, Family
 
@@ -37,12 +37,6 @@ class MemberOf(click.Choice):
         """Members that begin so, with their words."""
         words = {name: self.family.words(name) for name in self.family} | dict.fromkeys(self.more)
         return [CompletionItem(name, help=help) for name, help in words.items() if name.startswith(incomplete)]
-
-
-def complete_scene(context: object, parameter: object, incomplete: str) -> list[CompletionItem]:
-    """Ready scenes that begin so, and files."""
-    names = [CompletionItem(name, help=SCENES.words(name)) for name in SCENES if name.startswith(incomplete)]
-    return [*names, CompletionItem(incomplete, type="file")]
 
 
 def complete_parts(context: object, parameter: object, incomplete: str) -> list[CompletionItem]:
@@ -89,7 +83,11 @@ def app() -> None:
     shell_complete=complete_parts,
     help=f"Parts of the reduced model; auto: {AUTO_PARTS}. Default: 1, or the file's.",
 )
-@click.option("--patch", help=f"Contact patch: {PATCH_HELP} Default: the scene's (mostly Circle), or the file's.")
+@click.option(
+    "--patch",
+    shell_complete=complete_patch,
+    help=f"Contact patch: {PATCH_HELP} Default: the scene's (mostly Circle), or the file's.",
+)
 @click.option("--cell-size", type=float, help="Side of a cell of a pressure map in m.")
 @click.option("--t-end", type=float, help="Duration in s. Default: the scene's.")
 @click.option("--rtol", type=float, help="Relative tolerance of the solver.")
@@ -139,7 +137,7 @@ def run(
       planarfriction limit-surface --pressure pad.png --cell-size 0.0005 --surface table --csv samples.csv
     """,
 )
-@click.option("--patch", help=f"Contact patch: {PATCH_HELP} Default: Circle.")
+@click.option("--patch", shell_complete=complete_patch, help=f"Contact patch: {PATCH_HELP} Default: Circle.")
 @click.option("--pressure", type=FILE, help="Pressure map (.csv, .npy, grey image); row 0 is the top.")
 @click.option("--cell-size", type=float, help="Side of a cell of the pressure map in m.")
 @click.option(
@@ -187,7 +185,7 @@ def limit_surface(
     """,
 )
 @click.argument("logs", metavar="LOG...", type=FILE, nargs=-1, required=True, shell_complete=complete_log)
-@click.option("--patch", help=f"Contact patch: {PATCH_HELP} Default: Circle.")
+@click.option("--patch", shell_complete=complete_patch, help=f"Contact patch: {PATCH_HELP} Default: Circle.")
 @click.option("--cell-size", type=float, help="Side of a cell of a pressure map in m.")
 @click.option("--width", type=float, help="Width of a patch that is given by name in m. Default: 0.02.")
 @click.option("--parameters", metavar="NAMES", help="What to estimate, separated by commas. Default: the law and r.")

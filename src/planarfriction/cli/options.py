@@ -5,8 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 
 import click
+from click.shell_completion import CompletionItem
 
-from planarfriction.families import PUBLISHED_PATCHES
+from planarfriction.families import PUBLISHED_PATCHES, SCENES
 
 PATCH_HELP = (
     f"{', '.join(PUBLISHED_PATCHES)}, another shape that its width describes (disc, rectangle), or a pressure map "
@@ -25,3 +26,17 @@ class FilePath(click.Path):
 
 
 FILE = FilePath()
+
+
+def complete_scene(context: object, parameter: object, incomplete: str) -> list[CompletionItem]:
+    """Ready scenes that begin so, and files."""
+    names = [CompletionItem(name, help=SCENES.words(name)) for name in SCENES if name.startswith(incomplete)]
+    return [*names, CompletionItem(incomplete, type="file")]
+
+
+def complete_patch(context: object, parameter: object, incomplete: str) -> list[CompletionItem]:
+    """Patches by name that begin so, however they are written, and files."""
+    from planarfriction.cli.patches import patch_names
+
+    names = [CompletionItem(name) for name in patch_names() if name.lower().startswith(incomplete.lower())]
+    return [*names, CompletionItem(incomplete, type="file")]

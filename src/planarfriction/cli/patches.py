@@ -46,9 +46,13 @@ def find_patch(text: str | None, *, cell_size: float | None, width: float = WIDT
             raise InvalidValueError("--cell-size", "come with a pressure map", f"{cell_size} for the patch {text}")
         return make()
     if not (Path(text).suffix or (text and os.path.exists(text))):
-        shapes = [name for name in _shapes(width) if name.title() not in PUBLISHED_PATCHES]
-        validation.choice("patch", text, [*PUBLISHED_PATCHES, *shapes, "a pressure map file"])
+        validation.choice("patch", text, [*patch_names(), "a pressure map file"])
     return pressure_map(text, cell_size)
+
+
+def patch_names() -> list[str]:
+    """Names that `find_patch` knows."""
+    return [*PUBLISHED_PATCHES, *(name for name in _shapes(WIDTH) if name.title() not in PUBLISHED_PATCHES)]
 
 
 def _shapes(width: float) -> dict[str, Callable[[], ContactPatch]]:

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from planarfriction.cli.options import FILE, PATCH_HELP
+from planarfriction.cli.options import FILE, PATCH_HELP, complete_patch, complete_scene
 from planarfriction.families import SCENES
 
 if TYPE_CHECKING:
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
       planarfriction sweep scene.toml --set body.position.0=0:0.02:50 --measure mine.py:slip
     """,
 )
-@click.argument("scene")
+@click.argument("scene", shell_complete=complete_scene)
 @click.option(
     "--set",
     "settings",
@@ -42,7 +42,9 @@ if TYPE_CHECKING:
 )
 @click.option("--model", metavar="NAME", help="Friction model. Default: the file's, else reduced.")
 @click.option("--parts", metavar="COUNT|auto", help="Parts of the reduced model. Default: 1, or the file's.")
-@click.option("--patch", help=f"Contact patch: {PATCH_HELP} Default: Circle, or the file's.")
+@click.option(
+    "--patch", shell_complete=complete_patch, help=f"Contact patch: {PATCH_HELP} Default: Circle, or the file's."
+)
 @click.option("--cell-size", type=float, help="Side of a cell of a pressure map in m.")
 @click.option("--t-end", type=float, help="Duration of a ready scene in s.")
 @click.option("--measure", metavar="FILE.py:NAME", help="Function of a solution: what to keep. Default: everything.")
