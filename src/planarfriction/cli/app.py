@@ -10,7 +10,7 @@ from click.shell_completion import CompletionItem
 
 from planarfriction import __version__
 from planarfriction.cli.identify_plan import FitOrPlan, complete_log
-from planarfriction.cli.options import FILE, PATCH_HELP, complete_patch, complete_scene
+from planarfriction.cli.options import FILE, complete_scene, patch_option
 from planarfriction.cli.sweep import sweep
 from planarfriction.families import MODELS, SCENES, SURFACES, Family
 
@@ -137,7 +137,7 @@ def run(
       planarfriction limit-surface --pressure pad.png --cell-size 0.0005 --surface table --csv samples.csv
     """,
 )
-@click.option("--patch", shell_complete=complete_patch, help=f"Contact patch: {PATCH_HELP} Default: Circle.")
+@patch_option("Default: Circle.")
 @click.option("--pressure", type=FILE, help="Pressure map (.csv, .npy, grey image); row 0 is the top.")
 @click.option("--cell-size", type=float, help="Side of a cell of the pressure map in m.")
 @click.option(
@@ -185,7 +185,7 @@ def limit_surface(
     """,
 )
 @click.argument("logs", metavar="LOG...", type=FILE, nargs=-1, required=True, shell_complete=complete_log)
-@click.option("--patch", shell_complete=complete_patch, help=f"Contact patch: {PATCH_HELP} Default: Circle.")
+@patch_option("Default: Circle.")
 @click.option("--cell-size", type=float, help="Side of a cell of a pressure map in m.")
 @click.option("--width", type=float, help="Width of a patch that is given by name in m. Default: 0.02.")
 @click.option("--parameters", metavar="NAMES", help="What to estimate, separated by commas. Default: the law and r.")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.shell_completion import CompletionItem
 
-from planarfriction.cli.options import FILE, PATCH_HELP, complete_patch
+from planarfriction.cli.options import FILE
 
 if TYPE_CHECKING:
     from planarfriction.identify import Log

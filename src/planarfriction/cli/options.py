@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
@@ -40,3 +42,9 @@ def complete_patch(context: object, parameter: object, incomplete: str) -> list[
 
     names = [CompletionItem(name) for name in patch_names() if name.lower().startswith(incomplete.lower())]
     return [*names, CompletionItem(incomplete, type="file")]
+
+
+def patch_option(default: str, name: str = "patch") -> Callable[[Any], Any]:
+    """The option `--patch`, given to a command as `name`; `default` says what is taken without it."""
+    words = f"Contact patch: {PATCH_HELP} {default}"
+    return click.option("--patch", name, metavar="PATCH", shell_complete=complete_patch, help=words)

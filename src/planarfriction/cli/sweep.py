@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from planarfriction.cli.options import FILE, PATCH_HELP, complete_patch, complete_scene
+from planarfriction.cli.options import FILE, complete_scene, patch_option
 from planarfriction.families import SCENES
 
 if TYPE_CHECKING:
@@ -42,9 +42,7 @@ if TYPE_CHECKING:
 )
 @click.option("--model", metavar="NAME", help="Friction model. Default: the file's, else reduced.")
 @click.option("--parts", metavar="COUNT|auto", help="Parts of the reduced model. Default: 1, or the file's.")
-@click.option(
-    "--patch", shell_complete=complete_patch, help=f"Contact patch: {PATCH_HELP} Default: Circle, or the file's."
-)
+@patch_option("Default: Circle, or the file's.")
 @click.option("--cell-size", type=float, help="Side of a cell of a pressure map in m.")
 @click.option("--t-end", type=float, help="Duration of a ready scene in s.")
 @click.option("--measure", metavar="FILE.py:NAME", help="Function of a solution: what to keep. Default: everything.")
