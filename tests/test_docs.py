@@ -213,3 +213,17 @@ def test_pictures_are_small_and_used():
     for picture in (ROOT / "docs" / "images").glob("*"):
         assert picture.stat().st_size < (1_500_000 if picture.suffix == ".gif" else 200_000), picture.name
         assert f"images/{picture.name}" in used, picture.name
+
+
+def test_readme_is_short_and_its_numbers_stand_where_it_links():
+    """Five rows against what people use today; each number is on the page of its row, in the same spelling."""
+    text = PAGES[0].read_text(encoding="utf-8")
+    assert text.count("\n") <= 120
+    rows = re.findall(r"^\| (?!\|)(.+) \|$", text, re.MULTILINE)
+    assert len(rows) == 5
+    for row in rows:
+        what, *values = row.split(" | ")
+        (link,) = LINK.findall(what)
+        page = (ROOT / link).read_text(encoding="utf-8")
+        for number in re.findall(r"-?\d[\d.]*(?:e-?\d+)? \S+|\(.+?\)", " ".join(values)):
+            assert number.strip("()") in page, f"{link}: {number}"

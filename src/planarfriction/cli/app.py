@@ -83,11 +83,7 @@ def app() -> None:
     shell_complete=complete_parts,
     help=f"Parts of the reduced model; auto: {AUTO_PARTS}. Default: 1, or the file's.",
 )
-@click.option(
-    "--patch",
-    shell_complete=complete_patch,
-    help=f"Contact patch: {PATCH_HELP} Default: the scene's (mostly Circle), or the file's.",
-)
+@patch_option("Default: the scene's (mostly Circle), or the file's.")
 @click.option("--cell-size", type=float, help="Side of a cell of a pressure map in m.")
 @click.option("--t-end", type=float, help="Duration in s. Default: the scene's.")
 @click.option("--rtol", type=float, help="Relative tolerance of the solver.")

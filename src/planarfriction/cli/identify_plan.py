@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.shell_completion import CompletionItem
 
-from planarfriction.cli.options import FILE
+from planarfriction.cli.options import FILE, patch_option
 
 if TYPE_CHECKING:
     from planarfriction.identify import Log
@@ -64,13 +64,7 @@ def complete_log(ctx: click.Context, parameter: object, incomplete: str) -> list
     """,
 )
 @click.argument("logs", metavar="[LOG]...", type=FILE, nargs=-1)
-@click.option(
-    "--patch",
-    "patch_name",
-    metavar="PATCH",
-    shell_complete=complete_patch,
-    help=f"Contact patch: {PATCH_HELP} Default: Circle.",
-)
+@patch_option("Default: Circle.", "patch_name")
 @click.option("--cell-size", type=float, help="Side of a cell of a pressure map in m.")
 @click.option("--width", type=float, help="Width of a patch that is given by name in m. Default: 0.02.")
 @click.option("--parameters", metavar="NAMES", help="What to estimate, separated by commas. Default: the law and r.")
