@@ -97,10 +97,14 @@ class Terminal(io.StringIO):
 
 @pytest.fixture
 def compiled_anew(monkeypatch):
-    """A function of Numba's that nothing has compiled yet, called by every simulation."""
-    fresh = numba.njit(lambda x: x + 1.0)
+    """In every simulation, a function of Numba's that nothing has compiled yet."""
     whole = simulation.integrate
-    monkeypatch.setattr(simulation, "integrate", lambda *args, **options: (fresh(1.0), whole(*args, **options))[1])
+
+    def integrate(*args, **options):
+        numba.njit(lambda x: x + 1.0)(1.0)
+        return whole(*args, **options)
+
+    monkeypatch.setattr(simulation, "integrate", integrate)
     monkeypatch.setattr(compiling._Said, "done", False)
 
 
