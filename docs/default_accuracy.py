@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 import planarfriction as pf
-from planarfriction.experiments.in_hand_runs import CENTRES_OF_MASS
+from planarfriction.experiments.in_hand.runs import CENTRES_OF_MASS
 from planarfriction.experiments.runs import IN_WORDS, LAW
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction.scenes.scene import RTOL

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
-from planarfriction.experiments.in_hand_runs import CENTRES_OF_MASS, TIGHT, Case, distance
+from planarfriction.experiments.in_hand.runs import CENTRES_OF_MASS, TIGHT, Case, distance
 from planarfriction.experiments.runs import LAW, columns
 from planarfriction.patch import PUBLISHED_PATCHES, surface_error
 from planarfriction.patch.compressed import number_of_moments

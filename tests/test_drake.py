@@ -25,8 +25,8 @@ from pydrake.systems.primitives import ConstantValueSource, ConstantVectorSource
 from drake_scenes import CONTACTS, bare, gripped, on_the_floor, running, sliding
 from planarfriction import bench
 from planarfriction.adapters.drake import Patch, PatchFriction, prepare
+from planarfriction.bench.coulomb_disc import stop
 from planarfriction.errors import InvalidValueError, MissingExtraError
-from planarfriction.experiments.coulomb_disc import stop
 
 pytestmark = pytest.mark.drake
 

@@ -9,12 +9,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planarfriction.experiments import EXPERIMENTS, beyond, beyond_driven, beyond_others, beyond_surfaces
-from planarfriction.experiments import beyond_in_hand as in_hand
-from planarfriction.experiments import beyond_ladder as ladder
-from planarfriction.experiments.beyond_ladder_figure import FAMILIES
+from planarfriction.experiments import EXPERIMENTS
+from planarfriction.experiments.beyond import driven as beyond_driven
+from planarfriction.experiments.beyond import in_hand, ladder
+from planarfriction.experiments.beyond import others as beyond_others
+from planarfriction.experiments.beyond import run as beyond
+from planarfriction.experiments.beyond import surfaces as beyond_surfaces
+from planarfriction.experiments.beyond.ladder_figure import FAMILIES
 from planarfriction.experiments.experiment import Work
-from planarfriction.experiments.in_hand_runs import Case
+from planarfriction.experiments.in_hand.runs import Case
 from planarfriction.experiments.runs import IN_WORDS
 from planarfriction.limit_surface import LimitSurfaceCells, LimitSurfaceExact
 from planarfriction.patch import PUBLISHED_PATCHES

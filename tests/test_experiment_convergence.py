@@ -7,8 +7,9 @@ import dataclasses
 import numpy as np
 import pytest
 
-from planarfriction.experiments import convergence, facts
-from planarfriction.experiments import convergence_runs as runs
+from planarfriction.experiments import facts
+from planarfriction.experiments.convergence import run as convergence
+from planarfriction.experiments.convergence import runs
 from planarfriction.experiments.experiment import Work
 from planarfriction.scenes import Signal
 

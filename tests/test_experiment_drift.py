@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from planarfriction.experiments import drift, facts
+from planarfriction.experiments import facts
+from planarfriction.experiments.drift import run as drift
 from planarfriction.experiments.experiment import Work, compare_curve
 
 

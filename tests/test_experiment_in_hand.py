@@ -9,8 +9,8 @@ import pytest
 
 from planarfriction.experiments import facts
 from planarfriction.experiments.experiment import Result, Work
-from planarfriction.experiments.in_hand import CASES, KINDS, LESS, MORE, REDUCED, run
-from planarfriction.experiments.in_hand_runs import (
+from planarfriction.experiments.in_hand.run import CASES, KINDS, LESS, MORE, REDUCED, run
+from planarfriction.experiments.in_hand.runs import (
     Case,
     compare_with_converged,
     compare_with_published,

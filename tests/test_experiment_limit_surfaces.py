@@ -9,10 +9,11 @@ import numpy as np
 import pytest
 from scipy import integrate
 
-from planarfriction.experiments import facts, limit_surfaces
+from planarfriction.experiments import facts
 from planarfriction.experiments.experiment import Work
-from planarfriction.experiments.limit_surfaces_gradient import half_load_cell, linear_line
-from planarfriction.experiments.limit_surfaces_patches import patch_comparisons
+from planarfriction.experiments.limit_surfaces import run as limit_surfaces
+from planarfriction.experiments.limit_surfaces.gradient import half_load_cell, linear_line
+from planarfriction.experiments.limit_surfaces.patches import patch_comparisons
 from planarfriction.experiments.runs import SIX_SHAPES
 from planarfriction.limit_surface import LimitSurfaceCells, LimitSurfaceEllipsoid
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch

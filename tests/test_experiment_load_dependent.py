@@ -7,9 +7,8 @@ import pytest
 
 from planarfriction.experiments import facts
 from planarfriction.experiments.experiment import Result, Work
-from planarfriction.experiments.in_hand_runs import compare_with_converged, simulated
-from planarfriction.experiments.load_dependent import run
-from planarfriction.experiments.load_dependent_models import (
+from planarfriction.experiments.in_hand.runs import compare_with_converged, simulated
+from planarfriction.experiments.load_dependent.models import (
     DISTRIBUTED,
     KEPT,
     KEPT_LARGEST,
@@ -23,6 +22,7 @@ from planarfriction.experiments.load_dependent_models import (
     soft_patch,
     soft_scene,
 )
+from planarfriction.experiments.load_dependent.run import run
 
 
 @pytest.fixture(scope="module")

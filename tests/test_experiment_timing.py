@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.experiments import facts, timing
-from planarfriction.experiments import timing_runs as runs
-from planarfriction.experiments.baselines import LSODA, Window
+from planarfriction.bench.baselines import LSODA, Window
+from planarfriction.experiments import facts
 from planarfriction.experiments.experiment import Work
 from planarfriction.experiments.runs import published_model
+from planarfriction.experiments.timing import run as timing
+from planarfriction.experiments.timing import runs
 from planarfriction.scenes import in_hand
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from planarfriction.experiments import facts, velocity_driven
-from planarfriction.experiments import velocity_driven_boxes as boxes
+from planarfriction.experiments import facts
 from planarfriction.experiments.experiment import Work
+from planarfriction.experiments.velocity_driven import boxes
+from planarfriction.experiments.velocity_driven import run as velocity_driven
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.experiments import push_cost
+from planarfriction.bench import push_cost
 from planarfriction.measured import followed
 from planarfriction.planning import Pusher, Slider, push
 

@@ -20,8 +20,8 @@ from coupling_problems import random_bodies, random_patches, random_run  # noqa:
 from planarfriction.adapters import mujoco as adapter  # noqa: E402
 from planarfriction.adapters.mjx import Friction, Patch, newton, prepare  # noqa: E402
 from planarfriction.adapters.mjx.friction import _in_jax  # noqa: E402
-from planarfriction.experiments import coulomb_disc  # noqa: E402
-from planarfriction.experiments.mujoco_scenes import STARTS, Native, disc, grip  # noqa: E402
+from planarfriction.bench import coulomb_disc  # noqa: E402
+from planarfriction.bench.mujoco_scenes import STARTS, Native, disc, grip  # noqa: E402
 
 pytestmark = pytest.mark.mjx
 

@@ -16,7 +16,7 @@ from mujoco import rollout  # noqa: E402
 
 from mujoco_misfit import misfit, step_checked, twists_and_loads  # noqa: E402
 from planarfriction.adapters.mujoco import Friction, Patch, prepare  # noqa: E402
-from planarfriction.experiments import mujoco_scenes  # noqa: E402
+from planarfriction.bench import mujoco_scenes  # noqa: E402
 
 pytestmark = pytest.mark.mujoco
 

@@ -12,7 +12,7 @@ import planarfriction as pf
 mujoco = pytest.importorskip("mujoco")
 
 from mujoco_misfit import step_checked  # noqa: E402
-from planarfriction.experiments import coulomb_disc, mujoco_scenes  # noqa: E402
+from planarfriction.bench import coulomb_disc, mujoco_scenes  # noqa: E402
 from planarfriction.scenes import in_hand, in_hand_load, simulate  # noqa: E402
 
 pytestmark, SLOW = pytest.mark.mujoco, pytest.mark.slow

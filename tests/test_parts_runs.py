@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.experiments import beyond_ladder as ladder
-from planarfriction.experiments import beyond_shapes as new_shapes
-from planarfriction.experiments.in_hand_runs import FRICTION_CHANGE, Case, columns, end_distance, with_friction
+from planarfriction.experiments.beyond import ladder
+from planarfriction.experiments.beyond import shapes as new_shapes
+from planarfriction.experiments.in_hand.runs import FRICTION_CHANGE, Case, columns, end_distance, with_friction
 from planarfriction.experiments.runs import LAW
 from planarfriction.patch import PUBLISHED_PATCHES
 

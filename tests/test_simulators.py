@@ -12,8 +12,11 @@ from planarfriction.experiments.experiment import Work
 
 pytest.importorskip("mujoco", reason="needs MuJoCo: pip install 'planarfriction[mujoco]'")
 
-from planarfriction.experiments import mujoco_scenes, simulators, simulators_drake, simulators_runs
-from planarfriction.experiments.simulators_runs import NATIVE, PATCHES
+from planarfriction.bench import mujoco_scenes
+from planarfriction.experiments.simulators import drake as simulators_drake
+from planarfriction.experiments.simulators import run as simulators
+from planarfriction.experiments.simulators import runs as simulators_runs
+from planarfriction.experiments.simulators.runs import NATIVE, PATCHES
 
 pytestmark = pytest.mark.mujoco
 

@@ -2,7 +2,8 @@
 
 One more, `beyond`, goes beyond it and has our own converged references.
 
-`EXPERIMENTS` lists them by name; each lives in a module of its own with a function `run(work) -> Result`.
+`EXPERIMENTS` lists them by name; each lives in a folder of its own, whose module `run` has a function
+`run(work) -> Result`, and whose `findings.md.j2` holds what is said about it.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Experiment:
-    """An entry of the list: its name, its title, and the module that holds it."""
+    """An entry of the list: its name, its title, and the folder that holds it."""
 
     name: str
     title: str
@@ -28,7 +29,7 @@ class Experiment:
     @property
     def run(self) -> Callable[[Work], Result]:
         """The function that carries it out."""
-        return importlib.import_module(f"{__name__}.{self.name.replace('-', '_')}").run
+        return importlib.import_module(f"{__name__}.{self.name.replace('-', '_')}.run").run
 
 
 EXPERIMENTS = {

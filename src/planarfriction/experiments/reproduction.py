@@ -150,6 +150,6 @@ def _plain(value: Any) -> Any:
 def _code() -> str:
     home = Path(__file__).parents[1]
     digest = hashlib.sha256(f"{sys.version} {machine()}".encode())
-    for path in sorted(path for path in home.rglob("*") if path.suffix in (".py", ".json", ".npz")):
+    for path in sorted(path for path in home.rglob("*") if path.suffix in (".py", ".j2", ".json", ".npz")):
         digest.update(path.read_bytes())
     return digest.hexdigest()

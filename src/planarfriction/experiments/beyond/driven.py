@@ -1,0 +1,119 @@
+"""Reduced models in the velocity-driven runs: error from a finer grid, and what a step costs."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+
+from planarfriction.experiments.beyond.ladder import AUTO, Row, name_of_parts
+from planarfriction.experiments.experiment import Comparison
+from planarfriction.experiments.runs import IN_WORDS, LAW
+from planarfriction.experiments.velocity_driven.boxes import SAMPLES
+from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
+from planarfriction.patch import PUBLISHED_PATCHES
+
+MODELS = {
+    "published": "published reduced",
+    "reduced": "ReducedModel",
+    AUTO: 'ReducedModel, parts="auto"',
+    "full": "distributed, 21 x 21",
+}
+"""Model of the ladder -> its name in the report."""
+
+BOUNDS = {"median": 0.25, "third quartile": 0.8, "maximum": 1.0}
+"""Statistic of the force error -> the share of the published reduced model's that `ReducedModel` is compared with."""
+
+STATISTICS = tuple(BOUNDS)
+
+TORQUE_BOUND = 1.0
+"""The same for the largest error of the torque."""
+
+PARTS = (1, 4, 6)
+"""Parts whose steps are timed."""
+
+ROUNDS, STEPS = 9, 10_000
+
+SPIN, SPIN_STEPS, SPIN_STEP = 0.02, 400, 1e-8
+"""Speed of the spin from rest [rad/s], its steps, and how far each goes at the contact radius [m]: 1e-6 m are full
+deflection."""
+
+Errors = dict[str, dict[str, dict[str, float]]]
+"""Shape -> model of the ladder -> statistic of the error."""
+
+
+def driven_errors(rows: list[Row]) -> Errors:
+    """The rows of the velocity-driven runs by shape and model."""
+    result: Errors = {}
+    for row in rows:
+        before, _, shape = row.case.partition(", ")
+        if before == "driven":
+            result.setdefault(shape, {})[row.model] = row.errors
+    return result
+
+
+def ratios(errors: Errors, model: str = "reduced", over: str = "published") -> dict[str, dict[str, float]]:
+    """Error of a model of the ladder over that of another, by shape and statistic, force and torque."""
+    names = [f"{before}{name}" for before in ("", "torque ") for name in STATISTICS]
+    return {shape: {name: each[model][name] / each[over][name] for name in names} for shape, each in errors.items()}
+
+
+def step_costs(shape: str = "Circle") -> dict[str, Any]:
+    """Time of a step in a compiled loop [s] by reduced model, each the least of turns in which all take part."""
+    from planarfriction.autodiff import rollout
+
+    patch = PUBLISHED_PATCHES[shape]()
+    directions = np.random.default_rng(7).normal(size=(STEPS, 3)) * [1.0, 1.0, 150.0]
+    twists = directions * 10.0 ** np.random.default_rng(8).uniform(-4.0, -1.5, size=(STEPS, 1))
+    models: dict[str, Any] = {"published": ReducedModelPublished(patch, LAW)}
+    models |= {name_of_parts(count): ReducedModel(patch, LAW, parts=count) for count in PARTS}
+    best = dict.fromkeys(models, np.inf)
+    for _ in range(ROUNDS):
+        for name, model in models.items():
+            begin = time.process_time()
+            rollout(model, model.rest(), twists, 1.0, 1e-4)
+            best[name] = min(best[name], (time.process_time() - begin) / STEPS)
+    return best
+
+
+def spin_up(shape: str) -> dict[str, float]:
+    """Largest error of the torque [N m] of a spin from rest until the patch slides, from its own cells, by model."""
+    patch = PUBLISHED_PATCHES[shape]()
+    models: dict[str, Any] = {"published": ReducedModelPublished(patch, LAW)}
+    models |= {name_of_parts(parts): ReducedModel(patch, LAW, parts=parts) for parts in (1, AUTO)}
+    dt = SPIN_STEP / (SPIN * patch.contact_radius())
+    wanted = _spun(DistributedModel(patch, LAW), dt)
+    return {name: float(np.abs(_spun(model, dt) - wanted).max()) for name, model in models.items()}
+
+
+def _spun(model: Any, dt: float) -> np.ndarray:
+    """Torque [N m] of a spin from rest, step by step."""
+    state, torques = model.rest(), np.empty(SPIN_STEPS)
+    for i in range(SPIN_STEPS):
+        state, wrench = model.step(state, (0.0, 0.0, SPIN), 1.0, dt)
+        torques[i] = wrench[2]
+    return torques
+
+
+def comparisons(errors: Errors) -> list[Comparison]:
+    """Errors of `ReducedModel` from the finer grid, at most a share of the published reduced model's."""
+    return [
+        Comparison(
+            f"driven, {IN_WORDS[shape]}: {MODELS[model]}, {name.removeprefix('torque ')} of the error of the "
+            f"{quantity}, against {share:g} times the published model's",
+            "converged",
+            each[model][name],
+            share * each["published"][name],
+            unit,
+            SAMPLES,
+            "A part keeps the first moments of its bristle field alone. The reference: the distributed model with its "
+            "cells cut finely.",
+        )
+        for shape, each in errors.items()
+        for model in ("reduced", AUTO)
+        for name, share, quantity, unit in (
+            *((name, share, "force", "N") for name, share in BOUNDS.items()),
+            ("torque maximum", TORQUE_BOUND, "torque", "N m"),
+        )
+    ]

@@ -1,0 +1,139 @@
+"""Figures beyond the paper: errors of surfaces, the staircase, errors of models, grooves."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from planarfriction.experiments.beyond.driven import MODELS, Errors
+from planarfriction.experiments.beyond.others import GROOVED_MODELS, closed_drift
+from planarfriction.experiments.beyond.surfaces import KINDS
+from planarfriction.experiments.experiment import Arrays
+from planarfriction.experiments.runs import IN_WORDS
+from planarfriction.experiments.velocity_driven import boxes
+from planarfriction.plots.style import LINE_STYLES, PALETTE, PlotFigure, new_figure, tidy
+
+COLOURS = dict(zip(KINDS, (PALETTE[1], PALETTE[0], PALETTE[6], PALETTE[3], PALETTE[4]), strict=True))
+
+MODEL_COLOURS = dict(zip(MODELS, (PALETTE[1], PALETTE[5], PALETTE[0], "0.45"), strict=True))
+
+
+def surface_errors(errors: dict[str, Arrays]) -> PlotFigure:
+    """Errors of force [N] and torque [N mm] of each kind of surface from the exact one."""
+    figure = new_figure(9.6, 6.8)
+    panels: Any = figure.subplots(2, 1, sharex=True)
+    for axes, (quantity, factor, label) in zip(
+        panels, (("force", 1.0, "error of the force [N]"), ("torque", 1e3, "error of the torque [N mm]")), strict=True
+    ):
+        for place, each in enumerate(errors.values()):
+            kinds = [kind for kind in KINDS if f"{kind}/{quantity}" in each]
+            for i, kind in enumerate(kinds):
+                at = place + 0.15 * (i - 0.5 * (len(kinds) - 1))
+                _range(axes, at, factor * each[f"{kind}/{quantity}"], COLOURS[kind])
+        axes.set(yscale="log", ylabel=label)
+        tidy(axes)
+        axes.grid(False, axis="x")
+    panels[1].set_xticks(range(len(errors)), [IN_WORDS[shape].replace(", ", ",\n") for shape in errors])
+    figure.align_ylabels(panels)
+    shown = [kind for kind in KINDS if any(f"{kind}/force" in each for each in errors.values())]
+    figure.legend(
+        handles=[_patch(COLOURS[kind], kind) for kind in shown] + [_cross()],
+        loc="outside upper center", ncols=6, frameon=False, fontsize="small",
+    )  # fmt: skip
+    return figure
+
+
+def _range(axes: Any, at: float, values: np.ndarray, colour: str) -> None:
+    """Box from first to third quartile, whiskers from 5 to 95 %, the maximum as a cross."""
+    low, first, median, third, high = np.percentile(values, [5, 25, 50, 75, 95])
+    box = {"whislo": low, "q1": first, "med": median, "q3": third, "whishi": high}
+    _box(axes, at, box, colour, 0.12)
+    axes.plot(at, values.max(), marker="x", ms=4.5, mew=1.3, color=colour)
+
+
+def _box(axes: Any, at: float, box: dict[str, float], colour: str, width: float) -> None:
+    line = {"color": colour, "linewidth": 1.0}
+    axes.bxp(
+        [box], positions=[at], widths=width, showfliers=False, patch_artist=True, manage_ticks=False,
+        boxprops={"facecolor": colour, "edgecolor": colour}, medianprops={"color": "white", "linewidth": 1.4},
+        whiskerprops=line, capprops=line,
+    )  # fmt: skip
+
+
+def _patch(colour: str, label: str) -> Any:
+    from matplotlib.patches import Patch
+
+    return Patch(facecolor=colour, edgecolor=colour, label=label)
+
+
+def _cross() -> Any:
+    from matplotlib.lines import Line2D
+
+    return Line2D([], [], ls="", marker="x", ms=5, mew=1.3, color="0.3", label="maximum")
+
+
+def staircase(stairs: Arrays) -> PlotFigure:
+    """Torque [N mm] and force [N] of a spin over its centre [mm], summed and exact, for line and disc."""
+    figure = new_figure(9.6, 6.0)
+    panels: Any = figure.subplots(2, 2, sharex=True)
+    place = 1e3 * stairs["place"]
+    for row, shape in zip(panels, ("Line", "Circle"), strict=True):
+        for axes, ending, factor, label in (
+            (row[0], "", 1e3, "torque [N mm]"),
+            (row[1], ", force", 1.0, "force [N]"),
+        ):
+            cells, exact = factor * stairs[f"{shape}/sum{ending}"], factor * stairs[f"{shape}/exact{ending}"]
+            if shape == "Circle":  # steps of a few thousandths do not show beside the curve itself
+                cells, exact, label = 1e3 * (cells - exact), 0.0 * exact, f"{label[:5].strip()} - exact"
+                label = "torque, from the exact one [N µm]" if not ending else "force, from the exact one [mN]"
+            axes.plot(place, cells, color=PALETTE[1], lw=1.1, label="sum over the 21 x 21 grid's cells")
+            axes.plot(place, exact, color=PALETTE[0], lw=1.3, ls=LINE_STYLES[0], label="exact")
+            axes.set(ylabel=label, xlim=(0.0, place[-1]))
+            axes.set_title(IN_WORDS[shape], fontsize="medium", loc="left")
+            tidy(axes)
+    for axes in panels[1]:
+        axes.set_xlabel("centre of rotation from the middle [mm]")
+    figure.align_ylabels(panels)
+    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=2, frameon=False)
+    return figure
+
+
+def driven_boxes(errors: Errors) -> PlotFigure:
+    """Errors of force [mN] and torque [N mm] of the models, from the finer grid."""
+    figure = new_figure(9.6, 7.0)
+    panels: Any = figure.subplots(2, 1, sharex=True)
+    rows = (("", 1e3, "error of the force [mN]", 1e-2), ("torque ", 1e3, "error of the torque [N mm]", 1e-4))
+    for axes, (before, factor, label, linear) in zip(panels, rows, strict=True):
+        axes.set_yscale("symlog", linthresh=linear, linscale=0.4)
+        for place, each in enumerate(errors.values()):
+            for offset, (model, colour) in zip((-0.3, -0.1, 0.1, 0.3), MODEL_COLOURS.items(), strict=True):
+                values = [factor * each[model][before + name] for name in boxes.COLUMNS]
+                box: dict[str, float] = dict(zip(("whislo", "q1", "med", "q3", "whishi"), values[:5], strict=True))
+                _box(axes, place + offset, box, colour, 0.16)
+                axes.plot(place + offset, values[5], marker="x", ms=5, mew=1.4, color=colour)
+        axes.set(ylabel=label, ylim=(0.0, None))
+        tidy(axes)
+        axes.grid(False, axis="x")
+    panels[1].set_xticks(range(len(errors)), [IN_WORDS[shape] for shape in errors])
+    figure.align_ylabels(panels)
+    handles = [_patch(colour, MODELS[model]) for model, colour in MODEL_COLOURS.items()] + [_cross()]
+    figure.legend(handles=handles, loc="outside upper center", ncols=5, frameon=False, fontsize="small")
+    return figure
+
+
+def grooves(numbers: dict[str, Any]) -> PlotFigure:
+    """Drift of the grooved block [deg] over the slope [deg], simulated and in closed form."""
+    figure = new_figure(5.4, 3.6)
+    axes: Any = figure.subplots()
+    slopes = np.array(numbers["slope"])
+    fine = np.linspace(slopes[0], slopes[-1], 100)
+    axes.plot(np.degrees(fine), np.degrees([closed_drift(s) for s in fine]), color=PALETTE[1], label="closed form")
+    for kind, marker, colour in zip(GROOVED_MODELS, "ox+", (PALETTE[0], PALETTE[4], PALETTE[6]), strict=True):
+        axes.plot(
+            np.degrees(slopes), np.degrees(numbers[kind]), marker, color=colour, label=kind, fillstyle="none", ms=7
+        )
+    axes.set(xlabel="slope [deg]", ylabel="drift from the fall line [deg]", ylim=(0.0, None))
+    axes.legend(frameon=False)
+    tidy(axes)
+    return figure

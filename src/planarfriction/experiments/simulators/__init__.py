@@ -1,0 +1,3 @@
+"""Patch friction inside simulators beside their own at its best settings: held, shaken, stopped, turned, timed.
+
+Needs MuJoCo; Drake is compared with where it is installed."""

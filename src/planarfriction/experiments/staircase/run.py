@@ -1,0 +1,335 @@
+"""The staircase of a line contact in steady state: plain sum, bilinear smoothing, and the rod that has no steps."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from planarfriction.experiments import facts
+from planarfriction.experiments.experiment import (
+    Arrays,
+    Comparison,
+    Picture,
+    Result,
+    Work,
+    compare_curve,
+    compare_number,
+)
+from planarfriction.experiments.staircase.figures import overview, zoom
+from planarfriction.experiments.staircase.words import error_table, findings
+from planarfriction.kernels import tables
+from planarfriction.limit_surface import LimitSurfaceCells
+from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
+from planarfriction.scenes.ready import published_velocity
+from planarfriction.scenes.signal import sample_times
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+WIDTH = 0.02
+"""Length of the line [m]."""
+
+SAMPLE_TIME = 1e-4
+"""Time between the samples of the published curves [s]."""
+
+COMPONENTS = (("fx", "N"), ("fy", "N"), ("tau", "N m"))
+
+SLIDE_RAMP = (0.8, 1.4, 0.015)
+"""Start and end [s] of the ramp of vx, and the speed that it reaches [m/s]; the spin is 1 rad/s meanwhile."""
+
+ALLOWANCE = {"N": 1e-9, "N m": 1e-12}
+"""Rounding of a sum over 21 cells, generously."""
+
+STEP = 0.02
+"""Change of fx between neighbouring samples that counts as a step of the plain sum [N]: half a cell is 0.024 N."""
+
+
+def rod_wrench(twist: np.ndarray, half_length: float) -> np.ndarray:
+    """Sliding wrench `[..., 3]` [1, 1, m] of a uniform rod along y about its middle, exact; zero at rest.
+
+    `W = -dPhi/dV` of `Phi = [F(u1) - F(u0)]/(4 a omega)`, `F(u) = u s + vy^2 asinh(u/|vy|)`, `s = sqrt(u^2 + vy^2)`,
+    where `u1, u0 = vx +- omega a` are the speeds of the ends across the rod and `a` is `half_length` [m].
+    """
+    vx, vy, omega = np.moveaxis(np.asarray(twist, dtype=float), -1, 0)
+    ends = np.stack([vx + omega * half_length, vx - omega * half_length])
+    speeds = np.hypot(ends, vy)
+    total = speeds.sum(axis=0)
+    moving = np.where(total > 0.0, total, 1.0)
+    spinning, along = np.where(omega != 0.0, omega, 1.0), np.where(vy != 0.0, np.abs(vy), 1.0)
+    spread = np.where(vy != 0.0, np.arcsinh(ends[0] / along) - np.arcsinh(ends[1] / along), 0.0)
+    fx = -2.0 * vx / moving
+    fy = -np.where(omega != 0.0, vy * spread / (2.0 * half_length * spinning), 2.0 * vy / moving)
+    # the integral of y u/s over the rod, by parts: differences between the ends of vx s - (u s - vy^2 asinh)/2
+    difference = vx * (speeds[0] - speeds[1]) - 0.5 * (ends[0] * speeds[0] - ends[1] * speeds[1] - vy**2 * spread)
+    torque = difference / (2.0 * half_length * spinning**2)
+    return np.stack([fx, fy, np.where(omega != 0.0, torque, 0.0)], -1)
+
+
+def smoothed_wrench(twist: np.ndarray, patch: ContactPatch) -> np.ndarray:
+    """Sliding wrench `[T, 3]` [1, 1, m] with the published bilinear smoothing; the patch is centred on the origin.
+
+    Source: Waltersson and Karayiannidis 2024, section IV.
+    """
+    grid = patch.grid
+    assert grid is not None, "the smoothing needs a grid"
+    place = (grid.x_min, grid.y_min, grid.cell_width, grid.cell_height)
+    corners = np.full((grid.columns + 1, grid.rows + 1, 3), np.nan)
+    x, y = np.ascontiguousarray(patch.positions.T)
+    weights = np.array(patch.weights())
+    # a slide has its centre of rotation outside every grid: there the plain sum holds
+    wrench = LimitSurfaceCells(patch).wrench(twist)
+    for i in np.flatnonzero(twist[:, 2] > 0.0):
+        vx, vy, omega = twist[i]
+        wrench[i] = -np.array(tables.smoothed_spin_sum(corners, place, x, y, weights, -vy / omega, vx / omega))
+    return wrench
+
+
+def run(work: Work) -> Result:
+    """Carry out the experiment."""
+    time = sample_times(5.0, SAMPLE_TIME)
+    profile = dataclasses.replace(published_velocity(), hold="linear")
+    twist = profile(time)
+    patch = PUBLISHED_PATCHES["Line"](width=WIDTH)
+    found = work.piece("line, 21 cells", lambda: _wrenches(twist, patch))
+    steps = _steps(time, found["plain"][:, 0])
+    shifts = _label_shifts(profile, patch)
+    cells = (11, 21) if work.quick else (11, 21, 41, 81)
+    errors = {count: _errors(work, twist, count) for count in cells}
+    numbers = _numbers(time, found, steps) | {
+        "miss_if_labels_mean_the_state": shifts,
+        "error_against_the_rod": {str(count): error for count, error in errors.items()},
+    }
+    return Result(
+        findings=findings(numbers),
+        pictures=(
+            Picture("staircase", _OVERVIEW, overview(time, found)),
+            Picture("staircase_zoom", _ZOOM, zoom(time, found, numbers["edge"])),
+        ),
+        comparisons=_comparisons(time, twist, found, steps, patch),
+        numbers=numbers,
+        tables=(error_table(errors),),
+        data={"line": _dataset(time, twist, found)},
+    )
+
+
+_OVERVIEW = (
+    "Steady-state wrench of the line about its middle along the published velocity profile: plain sum over 21 "
+    "cells, bilinear smoothing, and the exact rod; markers are the vertices of the published curves."
+)
+_ZOOM = (
+    "The first steps (top), and where the smoothing ends (bottom): as the centre of rotation leaves the grid the "
+    "smoothed curve jumps to the plain sum, on the high side at the edge, on the low side one cell beyond it."
+)
+
+
+def _wrenches(twist: np.ndarray, patch: ContactPatch) -> Arrays:
+    return {
+        "plain": LimitSurfaceCells(patch).wrench(twist),
+        "bilinear": smoothed_wrench(twist, patch),
+        "rod": rod_wrench(twist, 0.5 * WIDTH),
+    }
+
+
+def _steps(time: np.ndarray, fx: np.ndarray) -> Arrays:
+    """Last sample before each step of fx, and the height of the step, while vx changes."""
+    change = np.abs(np.diff(fx))
+    at = np.flatnonzero(change > STEP)
+    return {"time": time[at], "height": change[at]}
+
+
+def _published_steps() -> tuple[np.ndarray, float]:
+    """Last published vertex before each step of plain fx, and the time to the next one [s], the same at every step."""
+    curve = facts.published_curve("staircase/plain/fx")
+    before = np.flatnonzero(np.abs(np.diff(curve.values)) > STEP)
+    return curve.time[before], float(np.diff(curve.time)[before].max())
+
+
+def _label_shifts(profile: Any, patch: ContactPatch) -> dict[str, float]:
+    """How far plain fx and fy [N] miss the published vertices if a label means the state one sample before or after."""
+    surface = LimitSurfaceCells(patch)
+    result = {}
+    for words, shift in (("before", -SAMPLE_TIME), ("at", 0.0), ("after", SAMPLE_TIME)):
+        misses = []
+        for column, name in enumerate(("fx", "fy")):
+            curve = facts.published_curve(f"staircase/plain/{name}")
+            ours = surface.wrench(profile(np.maximum(curve.time + shift, 0.0)))[:, column]
+            misses.append(float(np.abs(ours - curve.values).max()))
+        result[words] = max(misses)
+    return result
+
+
+def _errors(work: Work, twist: np.ndarray, count: int) -> dict[str, list[float]]:
+    """Largest and mean distance from the rod, tangential [N] and torque [N m], of both sums over `count` cells."""
+    patch = PUBLISHED_PATCHES["Line"](cells=count, width=WIDTH)
+    found = work.piece(f"line, {count} cells", lambda: _wrenches(twist, patch))
+    moving = np.abs(twist).max(axis=1) > 0.0
+    result = {}
+    for name in ("plain", "bilinear"):
+        miss = (found[name] - found["rod"])[moving]
+        force, torque = np.hypot(miss[:, 0], miss[:, 1]), np.abs(miss[:, 2])
+        result[name] = [float(value) for value in (force.max(), force.mean(), torque.max(), torque.mean())]
+    return result
+
+
+def _crossings(patch: ContactPatch) -> np.ndarray:
+    """When the centre of rotation, at y = vx/omega, meets the centres of cells during the ramp of vx [s]."""
+    start, end, speed = SLIDE_RAMP
+    y = np.sort(patch.positions[:, 1])
+    return start + (end - start) * y[y > -1e-9] / speed
+
+
+def _numbers(time: np.ndarray, found: Arrays, steps: Arrays) -> dict[str, Any]:
+    spin = int(np.searchsorted(time, 0.7))  # any time of pure spin
+    radius = {name: float(-found[name][spin, 2]) for name in ("plain", "bilinear", "rod")}
+    smoothed = found["bilinear"]
+    up = np.flatnonzero((time > 0.9) & (time < 1.4))
+    down = np.flatnonzero((time > 3.4) & (time < 4.0))
+    high, low = (_largest_jump(time, smoothed[:, column], part) for column, part in ((0, up), (1, down)))
+    inside = (time > SLIDE_RAMP[0] + 1e-3) & (time < high["time"] - 1e-3)
+    return {
+        "sample_time": SAMPLE_TIME,
+        "published_vertices_around_a_step": _published_steps()[1],
+        "radius": radius,
+        "steps": {
+            "count": len(steps["time"]),
+            "on the way up": int((steps["time"] < 1.4).sum()),
+            "first": float(steps["height"][0]),
+            "largest": float(steps["height"].max()),
+            "last samples before": steps["time"].tolist(),
+        },
+        "edge": {"high": high, "low": low},
+        "kink_of_tau": {
+            name: float(np.abs(np.diff(found[name][inside, 2], 2)).max() / SAMPLE_TIME) for name in ("bilinear", "rod")
+        },
+    }
+
+
+def _largest_jump(time: np.ndarray, values: np.ndarray, part: np.ndarray) -> dict[str, float]:
+    change = np.abs(np.diff(values[part]))
+    at = int(change.argmax())
+    return {"time": float(time[part[at]]), "jump": float(change[at])}
+
+
+def _comparisons(
+    time: np.ndarray, twist: np.ndarray, found: Arrays, steps: Arrays, patch: ContactPatch
+) -> list[Comparison]:
+    rows = []
+    for name, words in (("plain", "plain sum"), ("bilinear", "bilinear smoothing")):
+        for column, (component, unit) in enumerate(COMPONENTS):
+            rows.append(
+                compare_curve(
+                    f"steady state of the line, {words}, {component}",
+                    time,
+                    found[name][:, column],
+                    f"staircase/{name}/{component}",
+                    allowance=ALLOWANCE[unit],
+                    cause="The same sum at the same samples: what is left is the error of reading the figure.",
+                )
+            )
+    for component, values in zip(("vx", "vy", "omega"), twist.T, strict=True):
+        rows.append(
+            compare_curve(
+                f"velocity profile, {component}",
+                time,
+                values,
+                f"convergence/velocity/{component}",
+                allowance=1e-12,
+                cause="The same profile, at each sample's own time: what is left is the error of reading the figure.",
+            )
+        )
+    return [*rows, *_plateaus(time, found), *_step_comparisons(steps, patch)]
+
+
+def _plateaus(time: np.ndarray, found: Arrays) -> list[Comparison]:
+    """Torque of a pure spin: published plateaus, and what plain sum and rod must give."""
+    published = facts.published_table("patches")["Line"]
+    spin = int(np.searchsorted(time, 0.7))
+    cell = WIDTH / 21
+    closed = {
+        "plain": (
+            cell * (21**2 - 1) / (4 * 21),
+            "The plain sum over 21 equal cells is cell (N^2 - 1)/(4 N): rounding.",
+        ),
+        "rod": (0.25 * WIDTH, "A rod of half-length a has r = a/2: rounding."),
+    }
+    rows = []
+    for name, column in (("plain", "plain sum"), ("bilinear", "as published")):
+        rows.append(
+            compare_number(
+                f"torque of a pure spin, {name}",
+                found[name][spin, 2],
+                -published[f"contact radius, {column} [m]"],
+                reference="published",
+                tolerance=6e-12,
+                unit="N m",
+                cause="The table gives the contact radius to 1e-11 m: rounding.",
+            )
+        )
+    for name, (radius, cause) in closed.items():
+        rows.append(
+            compare_number(
+                f"torque of a pure spin, {name}",
+                found[name][spin, 2],
+                -radius,
+                reference="closed form",
+                tolerance=1e-15,
+                unit="N m",
+                cause=cause,
+            )
+        )
+    return rows
+
+
+def _step_comparisons(steps: Arrays, patch: ContactPatch) -> list[Comparison]:
+    """When and by how much plain fx steps."""
+    theirs, _ = _published_steps()
+    upward = steps["time"] < SLIDE_RAMP[1]
+    late = np.abs(_crossings(patch) - steps["time"][upward])
+    # first and last the centre of rotation leaves and meets the middle cell
+    heights = np.where(np.isin(np.arange(len(steps["height"])), [0, len(steps["height"]) - 1]), 1.0, 2.0) / patch.cells
+    return [
+        Comparison(
+            "last sample before each step of plain fx",
+            "published",
+            float(np.abs(theirs - steps["time"]).max()),
+            0.5 * SAMPLE_TIME,
+            "s",
+            len(theirs),
+            "The same samples on both sides of every step: the labels of this figure are the times of the state.",
+        ),
+        Comparison(
+            "steps of plain fx while vx grows, from when the centre of rotation meets a cell to the last sample before",
+            "closed form",
+            float(late.max()),
+            SAMPLE_TIME,
+            "s",
+            len(late),
+            "A step shows at the first sample after the centre of rotation has met a cell: less than the sample time.",
+        ),
+        Comparison(
+            "height of the steps of plain fx",
+            "closed form",
+            float(np.abs(steps["height"] - heights).max()),
+            ALLOWANCE["N"],
+            "N",
+            len(heights),
+            "A cell that the centre of rotation passes turns round and changes fx by twice its load; the middle "
+            "one, which adds nothing while the centre of rotation stands on it, by once.",
+        ),
+    ]
+
+
+def _dataset(time: np.ndarray, twist: np.ndarray, found: Arrays) -> xr.Dataset:
+    import xarray as xr
+
+    thinned = slice(None, None, 5)
+    columns = {
+        name: ("time", values[thinned], {"units": unit})
+        for name, unit, values in zip(("vx", "vy", "omega"), ("m/s", "m/s", "rad/s"), twist.T, strict=True)
+    }
+    for name, wrench in found.items():
+        for column, (component, unit) in enumerate(COMPONENTS):
+            columns[f"{component}_{name}"] = ("time", wrench[thinned, column], {"units": unit})
+    return xr.Dataset(columns, {"time": ("time", time[thinned], {"units": "s"})})

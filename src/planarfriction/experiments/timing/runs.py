@@ -1,0 +1,185 @@
+"""Timed runs: whole in-hand runs as in the paper's table, and solvers against each other on a window."""
+
+from __future__ import annotations
+
+import functools
+import statistics
+import time
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from planarfriction.bench.baselines import LSODA, Poses, Window
+from planarfriction.experiments.experiment import Arrays, Work
+from planarfriction.experiments.load_dependent.models import DISTRIBUTED, REBUILT, RESCALED, soft_scene
+from planarfriction.experiments.runs import published_model
+from planarfriction.scenes import Scene, in_hand, simulate
+from planarfriction.solvers import RODAS3, RODAS4
+
+ATOL_PER_RTOL = 30.0
+"""Absolute tolerance, as a share of the natural scales, over the relative one: between those of the ready scenes."""
+
+REFERENCE = 1e-10
+"""Relative tolerance of the solution that errors are measured from."""
+
+ENOUGH = 1.0
+"""Runs are repeated until this time [s] is spent: what takes longer runs once."""
+
+MOST_REPEATS = 9
+
+BREAKAWAY = (0.36, 0.38)
+"""Window [s] in which the plate breaks away: a general solver takes too long for all of the distributed run."""
+
+QUICK_WINDOW = (0.36, 0.37)
+"""Window of a quick look [s]."""
+
+STRUCTURED = {"RODAS3": RODAS3, "RODAS4": RODAS4}
+"""Our methods by name."""
+
+ROWS: dict[str, dict[str, Callable[[], Scene]]] = {
+    "circle, shape independent of the load": {
+        "distributed": lambda: in_hand(published_model("d", "Circle")),
+        "reduced": lambda: in_hand(published_model("r", "Circle")),
+    },
+    "k = 2": {
+        "distributed": lambda: soft_scene(1, DISTRIBUTED),
+        "reduced": lambda: soft_scene(1, RESCALED),
+    },
+    "k = 2 f_N": {
+        "distributed": lambda: soft_scene(2, DISTRIBUTED),
+        "reduced": lambda: soft_scene(2, REBUILT),
+    },
+}
+"""Rows of the published table, and what makes their scenes: with models that have computed nothing yet."""
+
+CIRCLE = next(iter(ROWS))
+"""The row without a load-dependent shape."""
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What solvers are compared on."""
+
+    name: str
+    kind: str
+    """"distributed" or "reduced"."""
+    begin: float
+    end: float
+    tolerances: dict[str, tuple[float, ...]]
+    """Solver -> relative tolerances."""
+
+    @functools.cached_property
+    def window(self) -> Window:
+        """The scene between the two times."""
+        return Window.of(ROWS[CIRCLE][self.kind](), self.begin, self.end)
+
+
+def problems(work: Work) -> list[Problem]:
+    """Reduced: the whole run; distributed: a short window. A quick look takes a short window for both."""
+    if work.quick:
+        tolerances = {"RODAS4": (1e-6,), "LSODA": (1e-6,)}
+        with_radau = {**tolerances, "Radau": (1e-6,)}
+        return [_problem("reduced", *QUICK_WINDOW, with_radau), _problem("distributed", *QUICK_WINDOW, tolerances)]
+    several = dict.fromkeys(STRUCTURED, (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)) | {"LSODA": (1e-4, 1e-6, 1e-8)}
+    reduced, distributed = ((1e-4, 1e-6, 1e-8),) * 2 if work.full else ((1e-4, 1e-6), (1e-6,))
+    return [
+        _problem("reduced", 0.0, 2.0, {**several, "Radau": reduced}),
+        _problem("distributed", *BREAKAWAY, {**several, "Radau": distributed}),
+    ]
+
+
+def _problem(kind: str, begin: float, end: float, tolerances: dict[str, tuple[float, ...]]) -> Problem:
+    return Problem(f"{kind}, {begin:g} to {end:g} s", kind, begin, end, tolerances)
+
+
+def solve(problem: Problem, solver: str, tolerance: float) -> Poses:
+    """One run; absolute tolerances are the same share of the natural scales for all solvers."""
+    window, atol = problem.window, ATOL_PER_RTOL * tolerance
+    if solver in STRUCTURED:
+        return window.ours(rtol=tolerance, atol=atol, method=STRUCTURED[solver])[0]
+    return window.general(method=solver, rtol=tolerance, atol=atol * window.packed.natural)
+
+
+def reference(problem: Problem, work: Work) -> np.ndarray:
+    """Poses at the ends of the window's pieces, [S, 3], by RODAS4 at a tight tolerance."""
+    label = f"timing, {problem.name}, reference"
+    return work.piece(label, lambda: {"poses": solve(problem, "RODAS4", REFERENCE).poses})["poses"]
+
+
+def work_precision(problem: Problem, work: Work) -> dict[tuple[str, float], Arrays]:
+    """Solver and tolerance -> `time` [s] (median), `poses`, `evaluations`, `repeats`."""
+    found = {}
+    for solver, tolerances in problem.tolerances.items():
+        for tolerance in tolerances:
+            label = f"timing, {problem.name}, {solver} at {tolerance:.0e}"
+            action = functools.partial(solve, problem, solver, tolerance)
+            compute = functools.partial(_repeated, action, 1 if work.quick else MOST_REPEATS)
+            found[solver, tolerance] = work.piece(label, compute)
+    return found
+
+
+def _repeated(action: Callable[[], Poses], repeats: int) -> dict[str, Any]:
+    poses = action()
+    times = [poses.wall_time]
+    while sum(times) < ENOUGH and len(times) < repeats:
+        times.append(action().wall_time)
+    median = statistics.median(times)
+    return {"time": median, "poses": poses.poses, "evaluations": poses.evaluations, "repeats": len(times)}
+
+
+# ---------------------------------------------------------------------- the table
+
+
+def whole_runs(row: str, kind: str, work: Work) -> Arrays:
+    """All of `simulate` at default tolerances, tables included: median `time` [s], `trials` of steps, `solver` [s]."""
+    return work.piece(
+        f"timing, {row}, {kind}, whole run",
+        functools.partial(_whole_runs, ROWS[row][kind], 1 if work.quick else MOST_REPEATS),
+    )
+
+
+def _whole_runs(scene: Callable[[], Scene], repeats: int) -> dict[str, float]:
+    simulate(scene(), t_end=0.02)  # compiles
+    totals, solver, trials = [], [], 0
+    while sum(totals) < ENOUGH and len(totals) < repeats:
+        fresh = scene()
+        begin = time.perf_counter()
+        run = simulate(fresh).statistics
+        totals.append(time.perf_counter() - begin - run.compile_time)
+        solver.append(run.wall_time)
+        trials = run.steps + run.rejections
+    return {"time": statistics.median(totals), "solver": statistics.median(solver), "trials": trials}
+
+
+def beside_lsoda(row: str, kind: str, begin: float, end: float, work: Work) -> Arrays:
+    """LSODA as published, and ours at default tolerances, over a window: times `lsoda` and `ours` [s]."""
+    label = f"timing, {row}, {kind}, LSODA as published, {begin:g} to {end:g} s"
+    return work.piece(label, functools.partial(_beside_lsoda, ROWS[row][kind], begin, end))
+
+
+def _beside_lsoda(scene: Callable[[], Scene], begin: float, end: float) -> dict[str, float]:
+    fresh = scene()
+    window = Window.of(fresh, begin, end)
+    ours = _median(window.ours(rtol=fresh.rtol, atol=fresh.atol)[0] for _ in range(MOST_REPEATS))
+    return {"lsoda": window.general(**LSODA).wall_time, "ours": ours}
+
+
+def _median(runs: Iterable[Poses]) -> float:
+    return statistics.median(run.wall_time for run in runs)
+
+
+def position_error(poses: np.ndarray, reference: np.ndarray) -> float:
+    """Largest distance between two histories of the centre of mass [m]."""
+    return float(np.hypot(*(poses - reference)[:, :2].T).max())
+
+
+def angle_error(poses: np.ndarray, reference: np.ndarray) -> float:
+    """Largest difference of the angle [rad]."""
+    return float(np.abs(poses - reference)[:, 2].max())
+
+
+def cheapest(points: Sequence[tuple[float, float]], error: float) -> float | None:
+    """Shortest time among the points (error, time) that are at least as good as `error`; None: none is."""
+    return min((t for found, t in points if found <= error), default=None)
