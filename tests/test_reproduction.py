@@ -24,8 +24,9 @@ from planarfriction.experiments.experiment import (
     compare_curve,
     compare_number,
 )
-from planarfriction.experiments.report import number, write_report
+from planarfriction.experiments.report import write_report
 from planarfriction.experiments.reproduction import Reproduction
+from planarfriction.experiments.wording import number
 
 
 class Made:

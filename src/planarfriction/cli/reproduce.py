@@ -63,7 +63,8 @@ def _write(reproduction) -> None:
     """Write the report and the numbers of everything finished so far; print the summary."""
     import json
 
-    from planarfriction.experiments.report import number, write_report
+    from planarfriction.experiments.report import write_report
+    from planarfriction.experiments.wording import number
     from planarfriction.writing import write_text
 
     records = reproduction.records()

@@ -43,6 +43,15 @@ class Comparison:
     """Our value, where it is a single number."""
     theirs: float | None = None
     """The reference's value, where it is a single number."""
+    span: float | None = None
+    """What the difference is a share of: range of the reference's curve, size of its number; None: nothing fits."""
+    paper: float | None = None
+    """Distance of a published curve from the converged solution, which is most of its tolerance; None: not known."""
+
+    @property
+    def share(self) -> float | None:
+        """The difference as a share of the span [-]."""
+        return self.difference / self.span if self.span else None
 
     @property
     def holds(self) -> bool:
@@ -62,7 +71,17 @@ def compare_curve(
     inside = curve.time <= time[-1] + 1e-9  # a run may be shorter than the figure
     difference = np.abs(_at(curve.time[inside], time, values) - curve.values[inside])
     tolerance = (curve.deviation or 0.0) + curve.reading + allowance
-    return Comparison(quantity, "published", float(difference.max()), tolerance, curve.unit, int(inside.sum()), cause)
+    return Comparison(
+        quantity,
+        "published",
+        float(difference.max()),
+        tolerance,
+        curve.unit,
+        int(inside.sum()),
+        cause,
+        span=float(np.ptp(curve.values)),
+        paper=curve.deviation,
+    )
 
 
 def compare_converged(
@@ -74,8 +93,11 @@ def compare_converged(
     inside = reference["time"] <= time[-1] + 1e-9
     expected = reference[column][inside]
     difference = np.abs(_at(reference["time"][inside], time, values) - expected)
-    tolerance = allowance + facts.CONVERGED_SHARE * float(np.ptp(reference[column]))
-    return Comparison(quantity, "converged", float(difference.max()), tolerance, unit, int(inside.sum()), cause)
+    span = float(np.ptp(reference[column]))
+    tolerance = allowance + facts.CONVERGED_SHARE * span
+    return Comparison(
+        quantity, "converged", float(difference.max()), tolerance, unit, int(inside.sum()), cause, span=span
+    )
 
 
 def compare_number(
@@ -90,7 +112,8 @@ def compare_number(
 ) -> Comparison:
     """One number beside its reference."""
     ours, theirs = float(ours), float(theirs)
-    return Comparison(quantity, reference, abs(ours - theirs), tolerance, unit, 1, cause, ours, theirs)
+    difference, size = abs(ours - theirs), abs(theirs)
+    return Comparison(quantity, reference, difference, tolerance, unit, 1, cause, ours, theirs, size or None)
 
 
 def _at(wanted: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -127,7 +150,7 @@ class Result:
     """What an experiment found."""
 
     findings: Sequence[str]
-    """Paragraphs in plain words: what was done, what it shows, with the numbers measured in this run."""
+    """Paragraphs of Markdown: what it shows, with the numbers measured in this run."""
     pictures: Sequence[Picture]
     comparisons: Sequence[Comparison]
     numbers: Mapping[str, Any]
@@ -135,6 +158,10 @@ class Result:
     tables: Sequence[Table] = ()
     data: Mapping[str, xr.Dataset] = field(default_factory=dict)
     """Curves by name, with units; written as NetCDF."""
+    asked: str = ""
+    """What was asked, Markdown."""
+    verdict: str = ""
+    """One or two sentences for the top of the report, Markdown."""
 
 
 @dataclass(frozen=True)

@@ -9,21 +9,31 @@ from pathlib import Path
 from typing import Any
 
 from planarfriction import __version__
+from planarfriction.experiments import markup
 from planarfriction.experiments.reproduction import Record, Reproduction, machine
+from planarfriction.experiments.wording import environment
 from planarfriction.writing import write_text
+
+Rows = list[dict[str, Any]]
 
 
 def write_report(reproduction: Reproduction) -> Path:
     """Write `report.html` from all results kept in the folder; returns its path."""
-    import jinja2
+    from markupsafe import Markup
 
-    loader = jinja2.PackageLoader("planarfriction.experiments", "")
-    environment = jinja2.Environment(loader=loader, autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    environment.filters["number"] = number
+    page = environment().overlay()
+    page.filters |= {
+        "markdown": lambda text: Markup(markup.to_html(text)),
+        "inline": lambda text: Markup(markup.inline(text)),
+        "symbols": lambda text: Markup(markup.name_to_html(str(text))),
+        "percent": percent,
+    }
     counter = itertools.count(1)
     sections = [_section(record, reproduction.folder / record["name"], counter) for record in reproduction.records()]
-    page = environment.get_template("report.html.j2").render(
+    rows = [row for section in sections for row in section["comparisons"]]
+    text = page.get_template("report.html.j2").render(
         sections=sections,
+        every={"all": _summary(rows)} | _by_kind(rows),
         version=__version__,
         date=datetime.date.today().isoformat(),
         machine=machine(),
@@ -31,33 +41,48 @@ def write_report(reproduction: Reproduction) -> Path:
         seconds=sum(section["seconds"] for section in sections),
     )
     path = reproduction.folder / "report.html"
-    write_text(path, page)
+    write_text(path, text)
     return path
 
 
-def number(value: Any) -> str:
-    """A number as text with four digits; other things as they are; nothing for None."""
-    if value is None:
-        return ""
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return str(value)
-    return f"{value:d}" if isinstance(value, int) else f"{value:.4g}"
+def percent(share: float | None) -> str:
+    """A share as a percentage with two digits; nothing for None."""
+    return "" if share is None else f"{100.0 * share:.2g}"
 
 
 def _section(record: Record, home: Path, counter: Any) -> Record:
-    """A record with its pictures as data, numbered, and its comparisons grouped by the cause of their differences."""
+    """A record with its pictures as data, numbered, and its comparisons apart by what they can show."""
     comparisons = record["comparisons"]
-    causes = dict.fromkeys(row["cause"] for row in comparisons)
     return record | {
         "pictures": [
             picture | _image(home / f"{picture['name']}.png") | {"index": next(counter)}
             for picture in record["pictures"]
         ],
-        "groups": [(cause, [row for row in comparisons if row["cause"] == cause]) for cause in causes],
-        "missed": [row for row in comparisons if not row["holds"]],
-        "share": max(
-            (row["difference"] / row["tolerance"] for row in comparisons if row["tolerance"] > 0.0), default=0.0
-        ),
+        "every": _summary(comparisons),
+        **_by_kind(comparisons),
+    }
+
+
+def _by_kind(rows: Rows) -> dict[str, Any]:
+    """Rows beside what is exact or converged, and rows beside the paper."""
+    return {
+        "exact": _summary([row for row in rows if row["reference"] != "published"]),
+        "paper": _summary([row for row in rows if row["reference"] == "published"]),
+    }
+
+
+def _summary(rows: Rows) -> dict[str, Any]:
+    """The rows, those out of tolerance, the rows by cause, and the largest shares of span, ours and the paper's."""
+    causes = dict.fromkeys(row["cause"] for row in rows)
+    shares = [row["share"] for row in rows if row["share"] is not None]
+    paper = [row["paper"] / row["span"] for row in rows if row["paper"] and row["span"]]
+    return {
+        "rows": rows,
+        "missed": [row for row in rows if not row["holds"]],
+        "groups": [(cause, [row for row in rows if row["cause"] == cause]) for cause in causes],
+        "share": max(shares, default=None),
+        "paper_share": max(paper, default=None),
+        "of_tolerance": max((row["difference"] / row["tolerance"] for row in rows if row["tolerance"]), default=None),
     }
 
 

@@ -128,10 +128,14 @@ def _record(each: Experiment, result: Result) -> Record:
     return {
         "name": each.name,
         "title": each.title,
+        "verdict": result.verdict,
+        "asked": result.asked,
         "findings": list(result.findings),
         "pictures": [{"name": picture.name, "caption": picture.caption} for picture in result.pictures],
         "tables": [_plain(dataclasses.asdict(table)) for table in result.tables],
-        "comparisons": [_plain(dataclasses.asdict(row)) | {"holds": row.holds} for row in result.comparisons],
+        "comparisons": [
+            _plain(dataclasses.asdict(row)) | {"share": row.share, "holds": row.holds} for row in result.comparisons
+        ],
         "numbers": _plain(result.numbers),
         "data": [f"{name}.nc" for name in result.data],
     }

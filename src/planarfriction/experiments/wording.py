@@ -1,0 +1,102 @@
+"""What is said about an experiment: a template beside its code, filled with the numbers of a run.
+
+A template is Markdown with formulas between dollar signs. Its parts begin with `## verdict`, `## asked`, `## found` and
+`## figure NAME` for each figure.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    import jinja2
+
+
+@dataclass(frozen=True)
+class Words:
+    """The parts of a filled template."""
+
+    parts: Mapping[str, str]
+    """Heading -> Markdown."""
+
+    @property
+    def verdict(self) -> str:
+        """One or two sentences for readers who read no further."""
+        return self.parts["verdict"]
+
+    @property
+    def asked(self) -> str:
+        """What the experiment asks."""
+        return self.parts["asked"]
+
+    @property
+    def found(self) -> Sequence[str]:
+        """What it found, in paragraphs."""
+        return self.parts["found"].split("\n\n")
+
+    def caption(self, name: str) -> str:
+        """What to see in the figure called `name`."""
+        return self.parts[f"figure {name}"]
+
+
+def words(home: str, **numbers: Any) -> Words:
+    """Fill the template `findings.md.j2` of the experiment in the folder `home` with the numbers of a run."""
+    return Words(_parts(environment().get_template(f"{home}/findings.md.j2").render(**numbers)))
+
+
+def _parts(text: str) -> dict[str, str]:
+    _, *pieces = re.split(r"^## (.+)\n", text, flags=re.M)
+    return {
+        heading.strip(): re.sub(r"\n{3,}", "\n\n", body.strip())
+        for heading, body in zip(pieces[::2], pieces[1::2], strict=True)
+    }
+
+
+@functools.cache
+def environment() -> jinja2.Environment:
+    """Templates of the experiments and of the report, with filters for numbers; an unknown name is an error."""
+    import jinja2
+
+    made = jinja2.Environment(
+        loader=jinja2.PackageLoader("planarfriction.experiments", ""),
+        autoescape=lambda name: bool(name and name.endswith(".html.j2")),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    made.filters |= {"fmt": fmt, "power": power, "span": span, "number": number}
+    return made
+
+
+def fmt(value: Any, spec: str) -> str:
+    """A number in a format of Python's; no zero has a sign."""
+    text = format(float(value), spec)
+    return text if re.search("[1-9]", text) else text.lstrip("+-")
+
+
+def power(value: float, digits: int = 0) -> str:
+    """A number with a power of ten, as a formula."""
+    if value == 0.0:
+        return "0"
+    mantissa, exponent = f"{value:.{digits}e}".split("e")
+    factor = "" if mantissa == "1" else rf"{mantissa} \times "
+    return rf"${factor}10^{{{int(exponent)}}}$"
+
+
+def span(values: Sequence[float], spec: str = ".2f", factor: float = 1.0) -> str:
+    """From the smallest to the largest; once where both read the same."""
+    low, high = (fmt(factor * choose(values), spec) for choose in (min, max))
+    return low if low == high else f"{low} to {high}"
+
+
+def number(value: Any) -> str:
+    """A number as text with four digits; other things as they are; nothing for None."""
+    if value is None:
+        return ""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return str(value)
+    return f"{value:d}" if isinstance(value, int) else fmt(value, ".4g")
