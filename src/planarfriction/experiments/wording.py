@@ -12,6 +12,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from planarfriction.experiments.experiment import Picture, Result
+
 if TYPE_CHECKING:
     import jinja2
 
@@ -23,27 +25,14 @@ class Words:
     parts: Mapping[str, str]
     """Heading -> Markdown."""
 
-    @property
-    def verdict(self) -> str:
-        """One or two sentences for readers who read no further."""
-        return self.parts["verdict"]
-
-    @property
-    def asked(self) -> str:
-        """What the experiment asks."""
-        return self.parts["asked"]
-
-    @property
-    def found(self) -> Sequence[str]:
-        """What it found, in paragraphs."""
-        return self.parts["found"].split("\n\n")
-
-    def caption(self, name: str) -> str:
-        """What to see in the figure called `name`."""
-        return self.parts[f"figure {name}"]
+    def result(self, figures: Mapping[str, Any], **rest: Any) -> Result:
+        """The result with these words and `figures` by name; `rest` are its other fields."""
+        pictures = [Picture(name, self.parts[f"figure {name}"], figure) for name, figure in figures.items()]
+        found = self.parts["found"].split("\n\n")
+        return Result(found, pictures, asked=self.parts["asked"], verdict=self.parts["verdict"], **rest)
 
 
-def words(home: str, **numbers: Any) -> Words:
+def fill(home: str, **numbers: Any) -> Words:
     """Fill the template `findings.md.j2` of the experiment in the folder `home` with the numbers of a run."""
     return Words(_parts(environment().get_template(f"{home}/findings.md.j2").render(**numbers)))
 

@@ -6,9 +6,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from planarfriction.experiments import facts
+from planarfriction.experiments import facts, looks
 from planarfriction.experiments.experiment import Arrays
-from planarfriction.plots.style import LINE_STYLES, PALETTE, PlotFigure, new_figure, tidy
+from planarfriction.experiments.runs import NAMES
+from planarfriction.plots.style import LINE_STYLES, PlotFigure, new_figure, tidy
 from planarfriction.scenes.ready import drift_force
 
 WORDS = {
@@ -22,9 +23,9 @@ WORDS = {
 """Model in the names of curves -> words."""
 
 ROWS = (("x", "$x$ [nm]", 1e9), ("theta", "$\\theta$ [µrad]", 1e6))
-LAW_COLOURS = {"": PALETTE[1], "_ep": PALETTE[0]}
+LAW_LINES = {"": LINE_STYLES[1], "_ep": "-"}
 LAW_WORDS = {"": "plain", "_ep": "elasto-plastic"}
-LOAD_COLOURS = {"fx": PALETTE[6], "tau": PALETTE[3], "normal": PALETTE[2]}
+LOAD_COLOURS = {"fx": "0.15", "tau": "0.55", "normal": "0.55"}
 
 
 def motion(load: Literal["tangential", "normal"], found: dict[tuple[str, str], Arrays]) -> PlotFigure:
@@ -35,9 +36,9 @@ def motion(load: Literal["tangential", "normal"], found: dict[tuple[str, str], A
         _draw_load(panels[0, column], load, found[load, kind], last=column == 1)
         panels[0, column].set_title(title, fontsize="medium")
         for axes, (name, label, factor) in zip(panels[1:, column], ROWS, strict=True):
-            for law, colour in LAW_COLOURS.items():
-                run = found[load, kind + law]
-                axes.plot(run["time"], factor * run[name], color=colour, lw=1.3, label=LAW_WORDS[law])
+            for law, line in LAW_LINES.items():
+                run, colour = found[load, kind + law], looks.OF_MODEL[kind]
+                axes.plot(run["time"], factor * run[name], color=colour, ls=line, lw=1.3, label=LAW_WORDS[law])
                 if load == "tangential":
                     _vertices(axes, f"drift/{kind}{law}/{name}", factor, colour)
             if column == 0:
@@ -46,21 +47,21 @@ def motion(load: Literal["tangential", "normal"], found: dict[tuple[str, str], A
     for axes in panels[-1]:
         axes.set(xlabel="time [s]", xlim=(0.0, 5.0))
     figure.align_ylabels(panels[:, 0])
-    figure.legend(handles=_key(load), loc="outside upper center", ncols=6, frameon=False, fontsize=9)
+    figure.legend(handles=_key(load), loc="outside upper center", ncols=4, frameon=False, fontsize=9)
     return figure
 
 
 def plateaus(found: dict[tuple[str, str], Arrays], straight: Arrays, numbers: dict[str, Any]) -> PlotFigure:
     """Deflections x [nm] and theta [µrad] in the first second of the normal-load run, elasto-plastic bristles."""
     figure = new_figure(9.6, 3.9)
-    looks = {
-        "d_ep": (PALETTE[0], "-", 3.4, 0.5),
-        "r_ep": (PALETTE[1], "-", 3.4, 0.5),
-        "e_ep": (PALETTE[2], LINE_STYLES[1], 1.4, 1.0),
-        "straight": (PALETTE[6], LINE_STYLES[3], 1.1, 1.0),
+    lines = {
+        "d_ep": (looks.DISTRIBUTED, "-", 3.4, 0.5),
+        "r_ep": (looks.REDUCED, "-", 3.4, 0.5),
+        "e_ep": (looks.ELLIPSOID, LINE_STYLES[1], 1.4, 1.0),
+        "straight": (looks.REDUCED, LINE_STYLES[3], 1.1, 1.0),
     }
     for axes, (name, label, factor) in zip(figure.subplots(1, 2), ROWS, strict=True):
-        for model, (colour, line, width, opacity) in looks.items():
+        for model, (colour, line, width, opacity) in lines.items():
             run = straight if model == "straight" else found["normal", model]
             part = run["time"] <= 1.0
             look = {"color": colour, "linestyle": line, "linewidth": width, "alpha": opacity}
@@ -110,12 +111,15 @@ def _vertices(axes: Any, name: str, factor: float, colour: str, *, every: int = 
 def _key(load: str) -> list[Any]:
     from matplotlib.lines import Line2D
 
-    lines = [(LAW_COLOURS[law], words) for law, words in LAW_WORDS.items()] + [(LOAD_COLOURS["fx"], "applied $f_x$")]
-    if load == "tangential":
-        lines.append((LOAD_COLOURS["tau"], "applied $\\tau$"))
-    else:
-        lines.append((LOAD_COLOURS["normal"], "normal force"))
-    handles = [Line2D([], [], color=colour, lw=1.4, label=words) for colour, words in lines]
+    lines = [
+        (looks.OF_MODEL[kind], line, f"{NAMES[kind]}, {LAW_WORDS[law]}")
+        for kind in "dr"
+        for law, line in LAW_LINES.items()
+    ]
+    lines.append((LOAD_COLOURS["fx"], "-", "applied $f_x$"))
+    other = ("tau", "applied $\\tau$") if load == "tangential" else ("normal", "normal force")
+    lines.append((LOAD_COLOURS[other[0]], "-", other[1]))
+    handles = [Line2D([], [], color=colour, ls=line, lw=1.4, label=words) for colour, line, words in lines]
     if load == "tangential":
         handles.append(Line2D([], [], ls="", marker="o", ms=3, mfc="white", mec="0.3", label="published"))
     return handles

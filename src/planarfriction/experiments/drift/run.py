@@ -21,8 +21,9 @@ from planarfriction.experiments.drift.runs import (
     move,
     straight_ramp,
 )
-from planarfriction.experiments.drift.words import creep_table, findings
-from planarfriction.experiments.experiment import Picture, Result, Work
+from planarfriction.experiments.drift.tables import creep_table, told
+from planarfriction.experiments.experiment import Result, Work
+from planarfriction.experiments.wording import fill
 from planarfriction.scenes.ready import drift_force
 
 if TYPE_CHECKING:
@@ -42,33 +43,17 @@ def run(work: Work) -> Result:
     found: Runs = dict(zip(keys, pieces.values(), strict=True))
     straight = work.piece("drift, straight ramp", lambda: straight_ramp(rtol, atol))
     numbers = measure(found, straight)
-    return Result(
-        findings=findings(numbers),
-        pictures=(
-            Picture("drift_tangential", _TANGENTIAL, figures.motion("tangential", found)),
-            Picture("drift_normal", _NORMAL, figures.motion("normal", found)),
-            Picture("drift_plateaus", _PLATEAUS, figures.plateaus(found, straight, numbers["plateaus"])),
-        ),
+    return fill("drift", **told(numbers)).result(
+        {
+            "drift_tangential": figures.motion("tangential", found),
+            "drift_normal": figures.motion("normal", found),
+            "drift_plateaus": figures.plateaus(found, straight, numbers["plateaus"]),
+        },
         comparisons=comparisons(found, numbers, share),
         numbers=numbers | {"rtol": rtol, "atol": atol},
         tables=(creep_table(numbers),),
         data={load: _dataset(load, found) for load in LOADS},
     )
-
-
-_TANGENTIAL = (
-    "Oscillating force, from 2.8 s on also torque, both below what friction holds: plain bristles creep away, "
-    "elasto-plastic ones come back. Markers are vertices of the published curves."
-)
-_NORMAL = (
-    "Constant force and torque under an oscillating normal force. The reduced model's deflections differ from the "
-    "distributed one's already before the oscillation begins at 1 s."
-)
-_PLATEAUS = (
-    "The deflections that force and torque reach together, elasto-plastic bristles. Dotted: closed forms. With the "
-    "ellipsoid x is exact and theta has the stiffness sigma_0 r^2 in place of sigma_0 <rho^2>; with the table both "
-    "depend on the path, and differ between a ramp in steps of 0.01 s and a straight one."
-)
 
 
 def _dataset(load: Load, found: Runs) -> xr.Dataset:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction.experiments import facts
+from planarfriction.experiments import facts, looks
 from planarfriction.experiments.experiment import Arrays
 from planarfriction.plots.motion import draw_motion
 from planarfriction.plots.style import LINE_STYLES, PALETTE, PlotFigure, new_figure, tidy
@@ -27,8 +27,8 @@ AXES = {
 """Column of a run -> its label on an axis, shown units per SI unit."""
 
 LOOKS: dict[str, dict[str, Any]] = {
-    "distributed": {"color": PALETTE[0], "linewidth": 1.5},
-    "reduced": {"color": PALETTE[1], "linewidth": 1.5, "linestyle": LINE_STYLES[1]},
+    "distributed": {"color": looks.DISTRIBUTED, "linewidth": 1.5},
+    "reduced": {"color": looks.REDUCED, "linewidth": 1.5, "linestyle": LINE_STYLES[1]},
 }
 """Model -> how its line looks."""
 

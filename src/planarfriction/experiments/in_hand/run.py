@@ -10,16 +10,14 @@ from planarfriction.experiments import facts
 from planarfriction.experiments.experiment import (
     Arrays,
     Comparison,
-    Picture,
     Result,
     Work,
     compare_curve,
     compare_number,
 )
-from planarfriction.experiments.in_hand import figures as in_hand_figures
+from planarfriction.experiments.in_hand import figures
 from planarfriction.experiments.in_hand.runs import (
     CENTRES_OF_MASS,
-    DEFAULT_ALLOWANCE,
     FRICTION_CHANGE,
     TIGHT,
     Case,
@@ -44,6 +42,8 @@ from planarfriction.experiments.in_hand.tables import (
     shift_table,
 )
 from planarfriction.experiments.runs import NAMES, Kind
+from planarfriction.experiments.wording import fill
+from planarfriction.plots.style import PlotFigure
 from planarfriction.scenes.ready import FINE, GRAVITY
 from planarfriction.scenes.scene import ATOL, RTOL
 
@@ -70,9 +70,9 @@ def run(work: Work) -> Result:
     shifts = {case: _shifts(case, runs) for case in cases}
     numbers = {case.words: _numbers(case, runs, shifts[case]) for case in cases}
     accuracy = _accuracy(cases, runs)
-    return Result(
-        findings=_findings(cases, runs, numbers, accuracy),
-        pictures=_pictures(cases, runs, shifts),
+    said = fill("in_hand", **_told(cases, runs, numbers, accuracy))
+    return said.result(
+        _figures(cases, runs, shifts),
         comparisons=_comparisons(cases, runs),
         numbers={"cases": numbers, "accuracy": accuracy, "tolerances": {"report": TIGHT, "friction and grid": FINE}},
         tables=(end_table(numbers), shift_table(numbers), accuracy_table(accuracy)),
@@ -188,71 +188,53 @@ def _compare_rest(case: Case, run: Arrays, words: str) -> list[Comparison]:
     ]  # fmt: skip
 
 
-def _findings(
+def _told(
     cases: tuple[Case, ...], runs: Runs, numbers: dict[str, dict[str, Any]], accuracy: dict[str, Any]
-) -> list[str]:
+) -> dict[str, Any]:
+    """What the template names."""
     worst = {
         who: {name: max(row[who][name] for row in accuracy.values()) for name in ("y", "theta", "fy")}
         for who in ("report", "default", "published")
     }
-    ours, theirs, default = worst["report"], worst["published"], worst["default"]
-    distances = {words: each["shift of the end [m]"][REDUCED] for words, each in numbers.items()}
-    nearest, farthest = min(distances, key=distances.__getitem__), max(distances, key=distances.__getitem__)
-    friction = {words: _friction_shift(each) for words, each in numbers.items()}
+    shifts = {case: each["shift of the end [m]"] for case, each in numbers.items()}
+    apart = sorted((each[REDUCED], case) for case, each in shifts.items())
+    friction = {case: max(each[MORE], each[LESS]) for case, each in shifts.items()}
     touchiest = max(friction, key=friction.__getitem__)
-    shares = [each["distance between the models as friction"] for each in numbers.values()]
-    solver = max(each["shift of the end [m]"][DEFAULTS] for each in numbers.values())
-    first = numbers[cases[0].words]
-    x = {placement: 1e3 * start[0] for placement, start in CENTRES_OF_MASS.items()}
-    return [
-        "A plate hangs between two finger pads whose grip varies: each time it is too weak, the plate slips and "
-        f"turns, then sticks again. Its centre of mass starts {x[1]:g} mm beside the pads, in the far placement "
-        f"{x[2]:g} mm. All curves here are computed with rtol = {TIGHT['rtol']:.0e}, atol = {TIGHT['atol']:.0e}. They "
-        f"lie within {ours['y'] * 1e9:.0f} nm, {ours['theta'] * 1e6:.2f} µrad and {ours['fy'] * 1e6:.1f} µN (fy) of "
-        f"the converged solutions; the published curves lie within {theirs['y'] * 1e9:.0f} nm, "
-        f"{theirs['theta'] * 1e6:.2f} µrad and {theirs['fy'] * 1e6:.0f} µN of them. So what is left between us and "
-        "the paper is the error of its solver.",
-        "The distance between the two models is another matter: it belongs to the reduced model and no solver "
-        f"removes it. At the end it is {distances[nearest] * 1e3:.2f} mm ({nearest}) to "
-        f"{distances[farthest] * 1e3:.2f} mm ({farthest}); the default tolerances move the end of the distributed "
-        f"model by {solver * 1e3:.4f} mm at most.",
-        f"That distance is best read beside what friction does. {FRICTION_CHANGE:.1%} more or less of both friction "
-        f"coefficients moves the end by {min(friction.values()) * 1e3:.2f} to {max(friction.values()) * 1e3:.2f} mm, "
-        f"the most for {touchiest}{_one_sided(numbers[touchiest])}; the distance between the models is that of "
-        f"{min(shares):.2%} to {max(shares):.2%} of friction. No measured coefficient is that well known.",
-        "Where this sensitivity comes from: the load that holds the plate falls as its centre of mass comes under "
-        f"the fingers ({cases[0].words}: from {first['load that holds the start [N]']:.3f} N to "
-        f"{first['load that holds the end [N]']:.3f} N), towards the smallest load there is "
-        f"({first['smallest load [N]']:.3f} N). Friction then exceeds or misses what is needed by very little: at the "
-        f"end of {touchiest} the two loads differ by {_margin(numbers[touchiest]):.2%}.",
-        f"At the default tolerances (rtol = {RTOL:.0e}, atol = {ATOL:.0e}) motions are within "
-        f"{default['y'] * 1e6:.1f} µm and {default['theta'] * 1e6:.1f} µrad of the converged ones (promised: "
-        f"{DEFAULT_ALLOWANCE['m'] * 1e6:.0f} µm, {DEFAULT_ALLOWANCE['rad'] * 1e6:.0f} µrad), single samples of fy "
-        f"only within {default['fy'] * 1e3:.1f} mN: {_where_forces_differ(cases, runs)} Near a slip the force follows "
-        "the velocity, and a small shift in time shows.",
-    ]
+    more, less = shifts[touchiest][MORE], shifts[touchiest][LESS]
+    loads = numbers[touchiest]
+    return {
+        "ours": worst["report"],
+        "theirs": worst["published"],
+        "default": worst["default"],
+        "nearest": apart[0][::-1],
+        "farthest": apart[-1][::-1],
+        "solver": max(each[DEFAULTS] for each in shifts.values()),
+        "friction": friction,
+        "touchiest": touchiest,
+        "one_sided": {"more": more, "less": less} if max(more, less) > 1.5 * min(more, less) else None,
+        "shares": [each["distance between the models as friction"] for each in numbers.values()],
+        "change": FRICTION_CHANGE,
+        "first_case": cases[0].words,
+        "first": numbers[cases[0].words],
+        "margin": abs(loads["load that holds the end [N]"] / loads["smallest load [N]"] - 1.0),
+        "where": _where_forces_differ(cases, runs),
+        "starts": CENTRES_OF_MASS,
+        "tight": TIGHT,
+        "rtol": RTOL,
+        "atol": ATOL,
+        "far": any(case.placement == 2 for case in cases),
+        "groups": {
+            _stem(case): {"words": case.group, "published": case.has_references} for case in cases if case.load == 1
+        },
+    }
 
 
-def _friction_shift(numbers: dict[str, Any]) -> float:
-    shifts = numbers["shift of the end [m]"]
-    return max(shifts[MORE], shifts[LESS])
+def _stem(case: Case) -> str:
+    return f"{case.shape}_placement_{case.placement}"
 
 
-def _margin(numbers: dict[str, Any]) -> float:
-    """Difference between the smallest load and the one that holds the end, as a share of the former."""
-    return abs(numbers["load that holds the end [N]"] / numbers["smallest load [N]"] - 1.0)
-
-
-def _one_sided(numbers: dict[str, Any]) -> str:
-    """Says so where more and less friction do not move the end alike."""
-    shifts = numbers["shift of the end [m]"]
-    if max(shifts[MORE], shifts[LESS]) < 1.5 * min(shifts[MORE], shifts[LESS]):
-        return ""
-    return f" ({shifts[MORE] * 1e3:.2f} mm with more, {shifts[LESS] * 1e3:.2f} mm with less: far from linear)"
-
-
-def _where_forces_differ(cases: tuple[Case, ...], runs: Runs) -> str:
-    """When fy at the default tolerances is farthest from the converged one, and how fast it changes there."""
+def _where_forces_differ(cases: tuple[Case, ...], runs: Runs) -> dict[str, Any]:
+    """The run and the time [s] at which fy at the default tolerances is farthest from the converged one."""
     found = []
     for case in cases:
         for kind in KINDS if case.has_references else ():
@@ -260,17 +242,16 @@ def _where_forces_differ(cases: tuple[Case, ...], runs: Runs) -> str:
             difference = np.abs(run["fy"][1:] - reference["fy"])
             at = int(difference.argmax())
             found.append((float(difference[at]), f"{case.words}, {NAMES[kind]}", float(reference["time"][at])))
-    _, words, time = max(found)
-    return f"the largest difference is that of {words} at {time:.2f} s."
+    _, case, time = max(found)
+    return {"words": case, "time": time}
 
 
-def _pictures(cases: tuple[Case, ...], runs: Runs, shifts: dict[Case, dict[str, float]]) -> list[Picture]:
+def _figures(cases: tuple[Case, ...], runs: Runs, shifts: dict[Case, dict[str, float]]) -> dict[str, PlotFigure]:
     shown = [case for case in cases if case.shape == "Circle" and case.load == 1]
-    panels = {case.words: (case.scene("d"), runs[case, "d"]) for case in shown}
-    pictures = [Picture("motion", _MOTION, in_hand_figures.strobes(panels))]
+    result = {"motion": figures.strobes({case.words: (case.scene("d"), runs[case, "d"]) for case in shown})}
     for case in cases:
         if case.load == 1:
-            pictures += _histories(case, _group(case, cases), runs)
+            result |= _histories(case, _group(case, cases), runs)
     lines = {
         f"load {load}": {
             case.group: (runs[case, "d"]["time"], distance(runs[case, "r"], runs[case, "d"]))
@@ -279,35 +260,19 @@ def _pictures(cases: tuple[Case, ...], runs: Runs, shifts: dict[Case, dict[str, 
         }
         for load in LOADS
     }
-    figure = in_hand_figures.distances(lines, "reduced from distributed [mm]")
-    pictures.append(Picture("distance", "Distance of the centre of mass between the two models over time.", figure))
-    figure = in_hand_figures.end_shifts({case.words: shifts[case] for case in cases})
-    return [*pictures, Picture("what_moves_the_end", _END, figure)]
+    result["distance"] = figures.distances(lines, "reduced from distributed [mm]")
+    result["what_moves_the_end"] = figures.end_shifts({case.words: shifts[case] for case in cases})
+    return result
 
 
-def _histories(case: Case, group: list[Case], runs: Runs) -> list[Picture]:
+def _histories(case: Case, group: list[Case], runs: Runs) -> dict[str, PlotFigure]:
     """Motion and forces of one shape and placement under both loads."""
     panels = {f"load {each.load}": {NAMES[kind]: runs[each, kind] for kind in KINDS} for each in group}
     published = {
         f"load {each.load}": {NAMES[kind]: each.key(kind) for kind in KINDS} for each in group if each.has_references
     }
-    note = " Markers: vertices of the published curves." if published else ""
-    stem = f"{case.shape}_placement_{case.placement}"
-    motion = in_hand_figures.histories(panels, ("normal_force", "x", "y", "theta"), published=published)
-    forces = in_hand_figures.histories(panels, ("fx", "fy", "tau"), published=published)
-    return [
-        Picture(f"{stem}_motion", f"{case.group.capitalize()}: load of one finger and motion.{note}", motion),
-        Picture(
-            f"{stem}_forces", f"{case.group.capitalize()}: friction wrench of one finger on the plate.{note}", forces
-        ),
-    ]
-
-
-_MOTION = (
-    "The plate at twelve instants under load 1, distributed model; in orange the pads, which neither move nor turn. "
-    "Left the centre of mass starts near the pads, right (far placement) well beside them."
-)
-_END = (
-    "What moves the end of the distributed model's run. The distance to the reduced model is comparable to what a "
-    "change of friction does that nobody could measure; grid and tolerances matter far less."
-)
+    columns = {"motion": ("normal_force", "x", "y", "theta"), "forces": ("fx", "fy", "tau")}
+    return {
+        f"{_stem(case)}_{what}": figures.histories(panels, names, published=published)
+        for what, names in columns.items()
+    }

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction.experiments import facts
+from planarfriction.experiments import facts, looks
 from planarfriction.experiments.experiment import Arrays
-from planarfriction.plots.style import LINE_STYLES, PALETTE, PlotFigure, new_figure, tidy
+from planarfriction.plots.style import LINE_STYLES, PlotFigure, new_figure, tidy
 
 PANELS = (("fx", "$f_x$ [N]", 1.0), ("fy", "$f_y$ [N]", 1.0), ("tau", "$\\tau$ [N mm]", 1e3))
 LINES = (
@@ -16,7 +16,7 @@ LINES = (
     ("bilinear", "bilinear smoothing", "-", 1.3),
     ("rod", "rod, exact", LINE_STYLES[1], 1.1),
 )
-COLOURS = {"plain": PALETTE[0], "bilinear": PALETTE[1], "rod": PALETTE[6]}
+COLOURS = {"plain": looks.DISTRIBUTED, "bilinear": looks.REDUCED, "rod": looks.EXACT}
 
 
 def overview(time: np.ndarray, found: Arrays) -> PlotFigure:

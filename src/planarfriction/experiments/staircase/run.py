@@ -11,14 +11,14 @@ from planarfriction.experiments import facts
 from planarfriction.experiments.experiment import (
     Arrays,
     Comparison,
-    Picture,
     Result,
     Work,
     compare_curve,
     compare_number,
 )
 from planarfriction.experiments.staircase.figures import overview, zoom
-from planarfriction.experiments.staircase.words import error_table, findings
+from planarfriction.experiments.staircase.tables import error_table, told
+from planarfriction.experiments.wording import fill
 from planarfriction.kernels import tables
 from planarfriction.limit_surface import LimitSurfaceCells
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
@@ -101,27 +101,13 @@ def run(work: Work) -> Result:
         "miss_if_labels_mean_the_state": shifts,
         "error_against_the_rod": {str(count): error for count, error in errors.items()},
     }
-    return Result(
-        findings=findings(numbers),
-        pictures=(
-            Picture("staircase", _OVERVIEW, overview(time, found)),
-            Picture("staircase_zoom", _ZOOM, zoom(time, found, numbers["edge"])),
-        ),
+    return fill("staircase", **told(numbers)).result(
+        {"staircase": overview(time, found), "staircase_zoom": zoom(time, found, numbers["edge"])},
         comparisons=_comparisons(time, twist, found, steps, patch),
         numbers=numbers,
         tables=(error_table(errors),),
         data={"line": _dataset(time, twist, found)},
     )
-
-
-_OVERVIEW = (
-    "Steady-state wrench of the line about its middle along the published velocity profile: plain sum over 21 "
-    "cells, bilinear smoothing, and the exact rod; markers are the vertices of the published curves."
-)
-_ZOOM = (
-    "The first steps (top), and where the smoothing ends (bottom): as the centre of rotation leaves the grid the "
-    "smoothed curve jumps to the plain sum, on the high side at the edge, on the low side one cell beyond it."
-)
 
 
 def _wrenches(twist: np.ndarray, patch: ContactPatch) -> Arrays:
