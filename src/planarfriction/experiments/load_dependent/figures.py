@@ -7,18 +7,19 @@ from typing import Any
 
 import numpy as np
 
+from planarfriction.experiments import looks
 from planarfriction.patch import ContactPatch
 from planarfriction.plots.style import LINE_STYLES, PALETTE, PlotFigure, new_figure, tidy
 
 Moments = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
-def looks(labels: tuple[str, ...]) -> dict[str, dict[str, Any]]:
-    """Lines that can be told apart where they coincide."""
-    styles = (*LINE_STYLES, (0, (3, 3)))
-    return {
-        label: {"color": PALETTE[i], "linestyle": styles[i % len(styles)], "linewidth": 1.5}
-        for i, label in enumerate(labels)
+def lines(labels: tuple[str, ...]) -> dict[str, dict[str, Any]]:
+    """Lines of the distributed model, the first, and of the reduced ones, which their style tells apart."""
+    first, *reduced = labels
+    return {first: {"color": looks.DISTRIBUTED, "linewidth": 1.5}} | {
+        label: {"color": looks.REDUCED, "linestyle": style, "linewidth": 1.5}
+        for label, style in zip(reduced, LINE_STYLES, strict=True)
     }
 
 
