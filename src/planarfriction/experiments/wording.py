@@ -57,7 +57,7 @@ def environment() -> jinja2.Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    made.filters |= {"fmt": fmt, "power": power, "span": span, "number": number}
+    made.filters |= {"fmt": fmt, "short": short, "power": power, "span": span, "number": number}
     return made
 
 
@@ -65,6 +65,11 @@ def fmt(value: Any, spec: str) -> str:
     """A number in a format of Python's; no zero has a sign."""
     text = format(float(value), spec)
     return text if re.search("[1-9]", text) else text.lstrip("+-")
+
+
+def short(value: float, digits: int = 3) -> str:
+    """A number with so many digits, without an exponent where it reads well without."""
+    return fmt(float(f"{value:.{digits}g}"), "g")
 
 
 def power(value: float, digits: int = 0) -> str:

@@ -11,12 +11,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from planarfriction.experiments import facts
-from planarfriction.experiments.experiment import Arrays, Comparison, Picture, Result, Table, Work
+from planarfriction.experiments.experiment import Arrays, Comparison, Result, Table, Work
 from planarfriction.experiments.timing import runs
 from planarfriction.experiments.timing.runs import BREAKAWAY, CIRCLE, QUICK_WINDOW, ROWS, Problem
+from planarfriction.experiments.wording import fill, short
 
 if TYPE_CHECKING:
     import xarray as xr
+
+    from planarfriction.plots.style import PlotFigure
 
 KINDS = ("distributed", "reduced")
 
@@ -32,14 +35,17 @@ CONVERGED = {"reduced": "in_hand/Circle/r1", "distributed": "in_hand/Circle/d1"}
 CONVERGED_ALLOWANCE = {"x": 1e-7, "y": 1e-7, "theta": 1e-6}
 """Accuracy of our reference and of the start of the window [m, m, rad]."""
 
-PUBLISHED_STEP_RATIO = 80.0
+PUBLISHED_STEP_RATIO = 80
 """How many times cheaper one step of the reduced model is, according to the paper."""
 
 LEVELS = {"reduced": 1e-6, "distributed": 1e-8}
 """Position errors [m] at which times are compared."""
 
+TIMES = ("time", "first quartile", "third quartile")
+"""Median and quartiles of the time in the entries of `Points`."""
+
 Points = dict[str, list[dict[str, float]]]
-"""Solver -> its runs: tolerance, error [m], time [s], evaluations, repeats."""
+"""Solver -> its runs: tolerance, error [m], median and quartiles of the time [s], evaluations, repeats."""
 
 
 def run(work: Work) -> Result:
@@ -53,9 +59,8 @@ def run(work: Work) -> Result:
     comparisons = [c for p in problems for c in _agreements(p, solved[p], references[p])]
     comparisons += [c for p in problems for c in _against_converged(p, references[p])]
     machine = _machine()
-    return Result(
-        findings=_findings(table, baselines, points, comparisons, machine),
-        pictures=[_picture(points)],
+    return fill("timing", **_told(table, baselines, points, comparisons, machine)).result(
+        {"timing_work_precision": _figure(points)},
         comparisons=comparisons,
         numbers={
             "machine": machine,
@@ -96,24 +101,35 @@ def _points(solved: Mapping[tuple[str, float], Arrays], reference: np.ndarray) -
         entry = {
             "tolerance": tolerance,
             "error": runs.position_error(found["poses"], reference),
-            **{name: float(found[name]) for name in ("time", "evaluations", "repeats")},
+            **dict(zip(TIMES, found["time"].tolist(), strict=True)),
+            **{name: float(found[name]) for name in ("evaluations", "repeats")},
         }
         points.setdefault(solver, []).append(entry)
     return points
 
 
 def _row_numbers(row: Mapping[str, Arrays], baselines: Mapping[str, Arrays]) -> dict[str, Any]:
-    numbers: dict[str, Any] = {f"{kind} [s]": float(row[kind]["time"]) for kind in KINDS}
-    numbers["ratio"] = numbers["distributed [s]"] / numbers["reduced [s]"]
-    numbers |= {f"{kind}, LSODA over ours": float(b["lsoda"] / b["ours"]) for kind, b in baselines.items()}
-    numbers |= {f"{kind}, solver [s]": float(row[kind]["solver"]) for kind in KINDS}
-    return numbers | {f"{kind}, LSODA [s]": float(b["lsoda"]) for kind, b in baselines.items()}
+    numbers: dict[str, Any] = {f"{kind} [s]": _spread(row[kind]["time"]) for kind in KINDS}
+    numbers["ratio"] = _ratio(row["distributed"]["time"], row["reduced"]["time"])
+    numbers |= {f"{kind}, LSODA over ours": _ratio(each["lsoda"], each["ours"]) for kind, each in baselines.items()}
+    numbers |= {f"{kind}, solver [s]": _spread(row[kind]["solver"]) for kind in KINDS}
+    return numbers | {f"{kind}, LSODA [s]": _spread(each["lsoda"]) for kind, each in baselines.items()}
 
 
-def _step_ratio(table: Mapping[str, Mapping[str, Arrays]]) -> float:
+def _step_ratio(table: Mapping[str, Mapping[str, Arrays]]) -> dict[str, float]:
     """Cost of one step of the distributed model over one of the reduced model."""
-    cost = {kind: float(run["solver"] / run["trials"]) for kind, run in table[CIRCLE].items()}
-    return cost["distributed"] / cost["reduced"]
+    cost = {kind: run["solver"] / run["trials"] for kind, run in table[CIRCLE].items()}
+    return _ratio(cost["distributed"], cost["reduced"])
+
+
+def _spread(times: np.ndarray) -> dict[str, float]:
+    """Median and quartiles by name."""
+    return dict(zip(("middle", "least", "most"), map(float, times), strict=True))
+
+
+def _ratio(times: np.ndarray, others: np.ndarray) -> dict[str, float]:
+    """Ratio of the medians, and the least and the greatest that the quartiles allow."""
+    return _spread(times / others[[0, 2, 1]])
 
 
 # ---------------------------------------------------------------------- comparisons
@@ -158,81 +174,62 @@ def _against_converged(problem: Problem, reference: np.ndarray) -> list[Comparis
 # ---------------------------------------------------------------------- words, figure, tables
 
 
-def _findings(
+def _told(
     table: Mapping[str, Mapping[str, Arrays]],
     baselines: Mapping[str, Mapping[str, Arrays]],
     points: Mapping[Problem, Points],
     comparisons: Sequence[Comparison],
     machine: Mapping[str, Any],
-) -> list[str]:
-    published = facts.published_table("timing")[CIRCLE]
-    ours = {kind: float(table[CIRCLE][kind]["time"]) for kind in KINDS}
-    ratios = {kind: float(b["lsoda"] / b["ours"]) for kind, b in baselines[CIRCLE].items()}
-    rebuilt, kept = (float(table[row]["reduced"]["time"]) for row in ("k = 2 f_N", "k = 2"))
-    solver = {row: 1e3 * float(kinds["reduced"]["solver"]) for row, kinds in table.items()}
-    agreed = max(c.difference for c in comparisons if c.unit == "m" and "beside" in c.quantity)
-    found = [
-        f"The in-hand run of 2 s takes {ours['distributed'] * 1e3:.3g} ms with the distributed and "
-        f"{ours['reduced'] * 1e3:.3g} ms with the reduced model (disc, default tolerances, all of `simulate`, without "
-        f"compile time); published are {published['distributed [s]']:g} s and {published['reduced [s]']:g} s on the "
-        f"authors' machine, a factor of {published['ratio']:g} between the models where it is "
-        f"{ours['distributed'] / ours['reduced']:.2g} here. Machine: {machine['cpus']} CPUs, {machine['machine']}, "
-        f"load average {machine['load average']:.1f} at the end.",
-        "LSODA as published (compiled right-hand side, restarted at every jump of the load) takes "
-        f"{ratios['distributed']:.3g} times longer than ours for the distributed model and {ratios['reduced']:.3g} "
-        "times longer for the reduced one, over the spans named in the table. It makes its Jacobian from one "
-        "evaluation for each state and solves a dense system; ours eliminates the bristles at the cost of an "
-        f"evaluation. One of our steps is {_step_ratio(table):.2g} times cheaper with the reduced model than with the "
-        f"distributed one (published: about {PUBLISHED_STEP_RATIO:g}).",
-        f"A table rebuilt at every load costs the reduced model {rebuilt / kept:.2g} times the run with one table "
-        f"(k = 2 f_N beside k = 2); published are {_published_rebuild_ratio():.2g} times. "
-        f"The solver has {solver['k = 2']:.2g} and {solver['k = 2 f_N']:.2g} ms of the two; the rest makes the "
-        "contact's shape for each load.",
-    ]
-    found += [_precision_finding(problem, points[problem]) for problem in points]
-    found.append(
-        f"All solvers find the same motion: SciPy's at their tightest tolerances differ from our reference by at most "
-        f"{agreed:.1e} m."
-    )
-    return found
-
-
-def _published_rebuild_ratio() -> float:
+) -> dict[str, Any]:
+    """What the template names."""
     published = facts.published_table("timing")
-    return published["k = 2 f_N"]["reduced [s]"] / published["k = 2"]["reduced [s]"]
+    return {
+        "ours": {kind: _spread(table[CIRCLE][kind]["time"]) for kind in KINDS},
+        "between": _ratio(*(table[CIRCLE][kind]["time"] for kind in KINDS)),
+        "beside": {kind: _ratio(each["lsoda"], each["ours"]) for kind, each in baselines[CIRCLE].items()},
+        "step": _step_ratio(table),
+        "rebuilding": _ratio(*(table[row]["reduced"]["time"] for row in ("k = 2 f_N", "k = 2"))),
+        "solver": {row: float(kinds["reduced"]["solver"][0]) for row, kinds in table.items()},
+        "published": published[CIRCLE],
+        "published_step": PUBLISHED_STEP_RATIO,
+        "published_rebuilding": published["k = 2 f_N"]["reduced [s]"] / published["k = 2"]["reduced [s]"],
+        "precision": [_precision(problem, each) for problem, each in points.items()],
+        "machine": machine,
+        "agreed": max(c.difference for c in comparisons if c.unit == "m" and "beside" in c.quantity),
+    }
 
 
-def _precision_finding(problem: Problem, points: Points) -> str:
+def _precision(problem: Problem, points: Points) -> dict[str, Any]:
+    """The time of each solver to the same error, and the solvers that do not reach it."""
     level = LEVELS[problem.kind]
     times = {
-        solver: runs.cheapest([(entry["error"], entry["time"]) for entry in entries], level)
+        solver: runs.cheapest([(each["error"], [each[name] for name in TIMES]) for each in entries], level)
         for solver, entries in points.items()
     }
-    reached = {solver: seconds for solver, seconds in times.items() if seconds is not None}
-    missed = [solver for solver, seconds in times.items() if seconds is None]
-    listed = ", ".join(f"{solver} {seconds * 1e3:.3g} ms" for solver, seconds in reached.items())
-    words = f"Work against precision, {problem.name}: to a position error of {level:.0e} m or less, {listed or 'none'}"
-    return words + (f"; not reached by {', '.join(missed)} at the tolerances tried." if missed else ".")
+    return {
+        "name": problem.name,
+        "level": level,
+        "reached": {solver: _spread(np.array(each)) for solver, each in times.items() if each is not None},
+        "missed": [solver for solver, each in times.items() if each is None],
+    }
 
 
-def _picture(points: Mapping[Problem, Points]) -> Picture:
+def _figure(points: Mapping[Problem, Points]) -> PlotFigure:
     from planarfriction.plots.style import PALETTE, new_figure, tidy
 
     figure = new_figure(9.6, 4.2)
     panels = figure.subplots(1, len(points), squeeze=False)[0]
     for axes, (problem, solvers) in zip(panels, points.items(), strict=True):
         for i, (solver, entries) in enumerate(solvers.items()):
-            errors, times = ([entry[name] for entry in entries] for name in ("error", "time"))
-            axes.loglog(errors, times, "osD^"[i] + "-", color=PALETTE[i], markersize=5, linewidth=1.3, label=solver)
-        axes.set(xlabel="largest position error [m]", ylabel="wall time [s]")
+            errors, times, first, third = (np.array([entry[name] for entry in entries]) for name in ("error", *TIMES))
+            bars = {"yerr": [times - first, third - times], "capsize": 2.5, "elinewidth": 1.0}
+            look = {"color": PALETTE[i], "markersize": 5, "linewidth": 1.3, "label": solver}
+            axes.errorbar(errors, times, fmt="osD^"[i] + "-", **bars, **look)
+        axes.set(xscale="log", yscale="log", xlabel="largest position error [m]", ylabel="wall time [s]")
         axes.set_title(problem.name, fontsize="medium")
         tidy(axes)
     figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
-    caption = (
-        "Work against precision: wall time over the error of the centre of mass, in-hand run, disc, load 1. "
-        "Each marker is a tolerance."
-    )
-    return Picture("timing_work_precision", caption, figure)
+    return figure
 
 
 def _published_table(table: Mapping[str, Mapping[str, Arrays]], baselines: Mapping[str, Mapping[str, Arrays]]) -> Table:
@@ -246,15 +243,16 @@ def _published_table(table: Mapping[str, Mapping[str, Arrays]], baselines: Mappi
         rows.append(
             [
                 row,
-                *(_short(numbers[f"{kind} [s]"]) for kind in KINDS),
-                _short(numbers["ratio"]),
+                *(_shown(numbers[f"{kind} [s]"]) for kind in KINDS),
+                _shown(numbers["ratio"]),
                 *(published[f"{kind} [s]"] for kind in KINDS),
                 published["ratio"],
-                *("not run" if ratio is None else _short(ratio) for ratio in ratios),
+                *("not run" if ratio is None else _shown(ratio) for ratio in ratios),
             ]
         )
     note = (
-        "Ours: all of `simulate`, default tolerances, median. LSODA over ours: time in the solver over the same span, "
+        "Ours: all of `simulate`, default tolerances, median, in brackets quartiles. "
+        "LSODA over ours: time in the solver over the same span, "
         f"the whole run or, where that takes minutes, {BREAKAWAY[0]:g} to {BREAKAWAY[1]:g} s (the plate breaks away; a "
         f"quick look takes {QUICK_WINDOW[0]:g} to {QUICK_WINDOW[1]:g} s), without the tables. k = 2: the table is kept "
         "and r follows the load; k = 2 f_N: all is rebuilt every 0.01 s."
@@ -268,7 +266,7 @@ def _points_table(problem: Problem, points: Points) -> Table:
             solver,
             f"{entry['tolerance']:.0e}",
             f"{entry['error']:.1e}",
-            _short(entry["time"] * 1e3),
+            _shown(_spread(np.array([1e3 * entry[name] for name in TIMES]))),
             int(entry["evaluations"]),
             int(entry["repeats"]),
         ]
@@ -283,9 +281,10 @@ def _points_table(problem: Problem, points: Points) -> Table:
     return Table(f"Work against precision, {problem.name}", headings, rows, note)
 
 
-def _short(value: float) -> float:
-    """To three digits."""
-    return float(f"{value:.3g}")
+def _shown(times: Mapping[str, float]) -> str:
+    """The median, and in brackets the quartiles where they differ."""
+    middle, least, most = (short(times[name]) for name in ("middle", "least", "most"))
+    return middle if least == most else f"{middle} ({least} to {most})"
 
 
 def _dataset(points: Points) -> xr.Dataset:

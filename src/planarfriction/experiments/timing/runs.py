@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import functools
-import statistics
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -109,7 +108,7 @@ def reference(problem: Problem, work: Work) -> np.ndarray:
 
 
 def work_precision(problem: Problem, work: Work) -> dict[tuple[str, float], Arrays]:
-    """Solver and tolerance -> `time` [s] (median), `poses`, `evaluations`, `repeats`."""
+    """Solver and tolerance -> `time` [s] (median, quartiles), `poses`, `evaluations`, `repeats`."""
     found = {}
     for solver, tolerances in problem.tolerances.items():
         for tolerance in tolerances:
@@ -125,15 +124,18 @@ def _repeated(action: Callable[[], Poses], repeats: int) -> dict[str, Any]:
     times = [poses.wall_time]
     while sum(times) < ENOUGH and len(times) < repeats:
         times.append(action().wall_time)
-    median = statistics.median(times)
-    return {"time": median, "poses": poses.poses, "evaluations": poses.evaluations, "repeats": len(times)}
+    return {"time": _spread(times), "poses": poses.poses, "evaluations": poses.evaluations, "repeats": len(times)}
+
+
+def _spread(times: Sequence[float]) -> list[float]:
+    return np.percentile(times, [50.0, 25.0, 75.0]).tolist()
 
 
 # ---------------------------------------------------------------------- the table
 
 
 def whole_runs(row: str, kind: str, work: Work) -> Arrays:
-    """All of `simulate` at default tolerances, tables included: median `time` [s], `trials` of steps, `solver` [s]."""
+    """All of `simulate` at default tolerances, tables included: `time`, `solver` [s] (median, quartiles), `trials`."""
     return work.piece(
         f"timing, {row}, {kind}, whole run",
         functools.partial(_whole_runs, ROWS[row][kind], 1 if work.quick else MOST_REPEATS),
@@ -150,11 +152,11 @@ def _whole_runs(scene: Callable[[], Scene], repeats: int) -> dict[str, float]:
         totals.append(time.perf_counter() - begin - run.compile_time)
         solver.append(run.wall_time)
         trials = run.steps + run.rejections
-    return {"time": statistics.median(totals), "solver": statistics.median(solver), "trials": trials}
+    return {"time": _spread(totals), "solver": _spread(solver), "trials": trials}
 
 
 def beside_lsoda(row: str, kind: str, begin: float, end: float, work: Work) -> Arrays:
-    """LSODA as published, and ours at default tolerances, over a window: times `lsoda` and `ours` [s]."""
+    """LSODA as published, and ours at default tolerances, over a window: `lsoda` and `ours` [s] (median, quartiles)."""
     label = f"timing, {row}, {kind}, LSODA as published, {begin:g} to {end:g} s"
     return work.piece(label, functools.partial(_beside_lsoda, ROWS[row][kind], begin, end))
 
@@ -162,12 +164,9 @@ def beside_lsoda(row: str, kind: str, begin: float, end: float, work: Work) -> A
 def _beside_lsoda(scene: Callable[[], Scene], begin: float, end: float) -> dict[str, float]:
     fresh = scene()
     window = Window.of(fresh, begin, end)
-    ours = _median(window.ours(rtol=fresh.rtol, atol=fresh.atol)[0] for _ in range(MOST_REPEATS))
-    return {"lsoda": window.general(**LSODA).wall_time, "ours": ours}
-
-
-def _median(runs: Iterable[Poses]) -> float:
-    return statistics.median(run.wall_time for run in runs)
+    ours = [window.ours(rtol=fresh.rtol, atol=fresh.atol)[0].wall_time for _ in range(MOST_REPEATS)]
+    lsoda = _repeated(lambda: window.general(**LSODA), MOST_REPEATS)["time"]
+    return {"lsoda": lsoda, "ours": _spread(ours)}
 
 
 def position_error(poses: np.ndarray, reference: np.ndarray) -> float:
@@ -180,6 +179,6 @@ def angle_error(poses: np.ndarray, reference: np.ndarray) -> float:
     return float(np.abs(poses - reference)[:, 2].max())
 
 
-def cheapest(points: Sequence[tuple[float, float]], error: float) -> float | None:
-    """Shortest time among the points (error, time) that are at least as good as `error`; None: none is."""
-    return min((t for found, t in points if found <= error), default=None)
+def cheapest(points: Sequence[tuple[float, Sequence[float]]], error: float) -> Sequence[float] | None:
+    """Shortest of the times (median first) among the points (error, times) at least as good as `error`; None: none."""
+    return min((times for found, times in points if found <= error), default=None)
