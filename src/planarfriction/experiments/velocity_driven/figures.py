@@ -6,22 +6,20 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction.experiments import facts, runs
+from planarfriction.experiments import facts, looks, runs
 from planarfriction.experiments.experiment import Arrays
 from planarfriction.experiments.velocity_driven import boxes
-from planarfriction.plots.style import LINE_STYLES, PALETTE, PlotFigure, new_figure, tidy
+from planarfriction.plots.style import LINE_STYLES, PlotFigure, new_figure, tidy
 from planarfriction.scenes.ready import published_velocity
 
-FORCES = (("fx", 0, "$f_x$", PALETTE[0]), ("fy", 1, "$f_y$", PALETTE[1]))
-TORQUE = (("tau", 2, "$\\tau$", PALETTE[2]),)
-PANELS = ((FORCES, "force [N]", 1.0), (TORQUE, "torque [N mm]", 1e3))
+COMPONENTS = (("fx", "$f_x$ [N]", 1.0), ("fy", "$f_y$ [N]", 1.0), ("tau", "$\\tau$ [N mm]", 1e3))
 
 LOOKS = {"d": ("-", 2.6, 0.45), "r": (LINE_STYLES[1], 1.3, 1.0), "e": (LINE_STYLES[2], 1.5, 1.0)}
 """Letter of a model -> line style, width, opacity: the distributed model broad and pale below the others."""
 
 MARKERS = {"d": "o", "r": "s", "e": "^"}
 
-BOX_COLOURS = {"corrected": PALETTE[0], "ellipsoid": PALETTE[1]}
+BOX_COLOURS = {"corrected": looks.REDUCED, "ellipsoid": looks.ELLIPSOID}
 BOX_WORDS = {"corrected": "table", "ellipsoid": "ellipsoid"}
 BOX_PANELS = (("ft", "error of the force [N]", 1.0, 1e-5), ("tau", "error of the torque [N mm]", 1e3, 1e-4))
 """Quantity, label, factor, and where the axis turns from linear to logarithmic."""
@@ -29,71 +27,53 @@ BOX_PANELS = (("ft", "error of the force [N]", 1.0, 1e-5), ("tau", "error of the
 
 def profile(disc: Arrays) -> PlotFigure:
     """Velocity profile [mm/s, rad/s], and the wrench of the distributed model of the disc [N, N mm]."""
-    figure = new_figure(9.0, 6.6)
-    speeds, forces = figure.subplots(2, 1, sharex=True)
+    figure = new_figure(9.6, 4.6)
+    above, below = figure.subplots(2, 3, sharex=True)
     time = np.arange(0.0, 5.0, 0.001)
-    velocity = published_velocity()
-    spin = speeds.twinx()
-    quantities = (
-        (speeds, 0, "vx", "$v_x$", 1e3, PALETTE[0]),
-        (speeds, 1, "vy", "$v_y$", 1e3, PALETTE[1]),
-        (spin, 2, "omega", "$\\omega$", 1.0, PALETTE[2]),
-    )
-    for axes, column, name, label, factor, colour in quantities:
-        axes.plot(time, factor * velocity(time)[:, column], color=colour, lw=1.4, label=label)
-        _vertices(axes, f"driven/velocity/{name}", factor, colour, "o")
-    speeds.set_ylabel("speed [mm/s]")
-    spin.set_ylabel("angular speed [rad/s]")
-    tidy(speeds)
-    spin.spines["top"].set_visible(False)
-    torque = forces.twinx()
-    for axes, lines, factor in ((forces, FORCES, 1.0), (torque, TORQUE, 1e3)):
-        for name, column, label, colour in lines:
-            axes.plot(disc["time"], factor * disc["d"][:, column], color=colour, lw=1.4, label=label)
-            _vertices(axes, f"driven/Circle/d, alone/{name}", factor, colour, "o")
-    forces.set(ylabel="force [N]", xlabel="time [s]", xlim=(0.0, 5.0))
-    torque.set_ylabel("torque [N mm]")
-    # zero at the same height on both sides
-    forces.set_ylim(-1.3, 0.1)
-    torque.set_ylim(-9.1, 0.7)
-    tidy(forces)
-    torque.spines["top"].set_visible(False)
-    for first, second in ((speeds, spin), (forces, torque)):
-        _legend_of(first, (first, second), frameon=False, loc="upper left", bbox_to_anchor=(1.08, 1.0))
+    velocity = published_velocity()(time).T
+    speeds = (("vx", "$v_x$ [mm/s]", 1e3), ("vy", "$v_y$ [mm/s]", 1e3), ("omega", "$\\omega$ [rad/s]", 1.0))
+    for axes, (name, label, factor), values in zip(above, speeds, velocity, strict=True):
+        axes.plot(time, factor * values, color="0.15", lw=1.4)
+        _vertices(axes, f"driven/velocity/{name}", factor, "0.15", "o")
+        axes.set_ylabel(label)
+        tidy(axes)
+    for axes, (name, label, factor), values in zip(below, COMPONENTS, disc["d"].T, strict=True):
+        axes.plot(disc["time"], factor * values, color=looks.DISTRIBUTED, lw=1.4)
+        _vertices(axes, f"driven/Circle/d, alone/{name}", factor, looks.DISTRIBUTED, "o")
+        axes.set(xlabel="time [s]", ylabel=label, xlim=(0.0, 5.0))
+        tidy(axes)
     return figure
 
 
 def pair(shape: str, kind: str, wrenches: Arrays) -> PlotFigure:
-    """Force [N] and torque [N mm] of one reduced model on top of those of the distributed one, as published."""
-    figure = new_figure(9.6, 4.0)
-    for axes, (lines, label, factor) in zip(figure.subplots(1, 2), PANELS, strict=True):
-        _draw(axes, wrenches, ("d", kind), lines, factor)
-        beside = ", beside the ellipsoid" if kind == "e" else ""
+    """Forces [N] and torque [N mm] of one reduced model on top of those of the distributed one, as published."""
+    figure = new_figure(9.6, 3.4)
+    panels = figure.subplots(1, 3)
+    beside = ", beside the ellipsoid" if kind == "e" else ""
+    for column, (axes, (name, label, factor)) in enumerate(zip(panels, COMPONENTS, strict=True)):
+        _draw(axes, wrenches, ("d", kind), column)
         for model, ending in (("d", beside), (kind, "")):
-            for name, _, _, colour in lines:
-                _vertices(axes, f"driven/{shape}/{model}{ending}/{name}", factor, colour, MARKERS[model])
+            curve = f"driven/{shape}/{model}{ending}/{name}"
+            _vertices(axes, curve, factor, looks.OF_MODEL[model], MARKERS[model])
         axes.set(xlabel="time [s]", ylabel=label)
-        handles = _key(("d", kind), lines) + _marker_key(("d", kind))
-        ncols = len(handles) // 2
-        above = {"loc": "lower center", "bbox_to_anchor": (0.5, 1.0)}
-        axes.legend(handles=handles, ncols=ncols, frameon=False, fontsize=8, **above)
+    handles = _key(("d", kind)) + _marker_key(("d", kind))
+    figure.legend(handles=handles, loc="outside upper center", ncols=4, frameon=False, fontsize=9)
     return figure
 
 
 def page(found: dict[str, Arrays]) -> PlotFigure:
-    """Force [N] and torque [N mm] of several shapes, a row for each, with all three models."""
-    figure = new_figure(9.6, 2.3 * len(found) + 0.7)
-    panels = figure.subplots(len(found), 2, sharex=True, squeeze=False)
+    """Forces [N] and torque [N mm] of several shapes, a row for each, with all three models."""
+    figure = new_figure(9.6, 2.1 * len(found) + 0.7)
+    panels = figure.subplots(len(found), 3, sharex=True, squeeze=False)
     for row, (shape, wrenches) in zip(panels, found.items(), strict=True):
-        for axes, (lines, label, factor) in zip(row, PANELS, strict=True):
-            _draw(axes, wrenches, ("d", "r", "e"), lines, factor)
+        row[0].set_title(runs.IN_WORDS[shape], fontsize="medium", loc="left")
+        for column, (axes, (_, label, _)) in enumerate(zip(row, COMPONENTS, strict=True)):
+            _draw(axes, wrenches, ("d", "r", "e"), column)
             axes.set_ylabel(label)
-            axes.set_title(runs.IN_WORDS[shape], fontsize="medium", loc="left")
     for axes in panels[-1]:
         axes.set_xlabel("time [s]")
     figure.align_ylabels(panels)
-    handles = [handle for lines in (FORCES, TORQUE) for handle in _key(("d", "r", "e"), lines)]
-    figure.legend(handles=handles, loc="outside upper center", ncols=3, frameon=False, fontsize=8)
+    figure.legend(handles=_key(("d", "r", "e")), loc="outside upper center", ncols=3, frameon=False, fontsize=9)
     return figure
 
 
@@ -161,14 +141,17 @@ def _box_key() -> list[Any]:
 # ------------------------------------------------------------------ lines, markers, keys
 
 
-def _draw(axes: Any, wrenches: Arrays, kinds: tuple[str, ...], lines: Any, factor: float) -> None:
+def _draw(axes: Any, wrenches: Arrays, kinds: tuple[str, ...], column: int) -> None:
     for kind in kinds:
-        style, width, opacity = LOOKS[kind]
-        for _, column, _, colour in lines:
-            values = factor * wrenches[kind][:, column]
-            axes.plot(wrenches["time"], values, ls=style, lw=width, alpha=opacity, color=colour)
+        values = COMPONENTS[column][2] * wrenches[kind][:, column]
+        axes.plot(wrenches["time"], values, **_look(kind))
     axes.set_xlim(0.0, 5.0)
     tidy(axes)
+
+
+def _look(kind: str) -> dict[str, Any]:
+    style, width, opacity = LOOKS[kind]
+    return {"ls": style, "lw": width, "alpha": opacity, "color": looks.OF_MODEL[kind]}
 
 
 def _vertices(axes: Any, name: str, factor: float, colour: str, marker: str) -> None:
@@ -178,28 +161,17 @@ def _vertices(axes: Any, name: str, factor: float, colour: str, marker: str) -> 
     )
 
 
-def _key(kinds: tuple[str, ...], lines: Any) -> list[Any]:
+def _key(kinds: tuple[str, ...]) -> list[Any]:
     from matplotlib.lines import Line2D
 
-    handles = []
-    for _, _, label, colour in lines:
-        for kind in kinds:
-            style, width, opacity = LOOKS[kind]
-            words = f"{label}, {runs.NAMES[kind]}"
-            handles.append(Line2D([], [], ls=style, lw=width, alpha=opacity, color=colour, label=words))
-    return handles
+    return [Line2D([], [], label=runs.NAMES[kind], **_look(kind)) for kind in kinds]
 
 
 def _marker_key(kinds: tuple[str, ...]) -> list[Any]:
     from matplotlib.lines import Line2D
 
+    marks = {"ls": "", "ms": 4, "mfc": "white"}
     return [
-        Line2D(
-            [], [], ls="", marker=MARKERS[kind], ms=4, mfc="white", mec="0.3", label=f"published, {runs.NAMES[kind]}"
-        )
+        Line2D([], [], marker=MARKERS[kind], mec=looks.OF_MODEL[kind], label=f"{runs.NAMES[kind]}, published", **marks)
         for kind in kinds
     ]
-
-
-def _legend_of(axes: Any, sources: tuple[Any, ...], **options: Any) -> None:
-    axes.legend(handles=[line for each in sources for line in each.get_legend_handles_labels()[0]], **options)

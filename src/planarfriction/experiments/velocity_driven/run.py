@@ -10,7 +10,6 @@ from planarfriction.experiments import facts, runs
 from planarfriction.experiments.experiment import (
     Arrays,
     Comparison,
-    Picture,
     Result,
     Work,
     compare_converged,
@@ -18,8 +17,10 @@ from planarfriction.experiments.experiment import (
     compare_number,
 )
 from planarfriction.experiments.velocity_driven import boxes, figures
-from planarfriction.experiments.velocity_driven.words import error_table, findings
+from planarfriction.experiments.velocity_driven.tables import error_table, told
+from planarfriction.experiments.wording import fill
 from planarfriction.patch import PUBLISHED_PATCHES
+from planarfriction.plots.style import PlotFigure
 from planarfriction.scenes import simulate
 from planarfriction.scenes.ready import driven, published_velocity
 from planarfriction.scenes.signal import sample_times
@@ -72,9 +73,8 @@ def run(work: Work) -> Result:
     errors = {shape: boxes.errors(wrenches) for shape, wrenches in found.items()}
     numbers = _numbers(found, errors)
     velocity = published_velocity()
-    return Result(
-        findings=findings(numbers),
-        pictures=_pictures(found, errors),
+    return fill("velocity_driven", **told(numbers)).result(
+        _figures(found, errors),
         comparisons=[
             *_curve_comparisons(found),
             *_velocity_comparisons(velocity),
@@ -87,36 +87,14 @@ def run(work: Work) -> Result:
     )
 
 
-def _pictures(found: dict[str, Arrays], errors: dict[str, boxes.Errors]) -> list[Picture]:
-    pictures = [
-        Picture("velocity_profile", _PROFILE, figures.profile(found["Circle"])),
-        *(
-            Picture(f"driven_{shape.lower()}_{kind}", caption, figures.pair(shape, kind, found[shape]))
-            for shape, kind, caption in _PAIRS
-        ),
-        Picture("driven_errors", _BOXES, figures.box_plots(errors)),
-    ]
+def _figures(found: dict[str, Arrays], errors: dict[str, boxes.Errors]) -> dict[str, PlotFigure]:
+    result = {"velocity_profile": figures.profile(found["Circle"])}
+    for shape, kind in (("Circle", "r"), ("Circle", "e"), ("NonConvex1", "r")):
+        result[f"driven_{shape.lower()}_{kind}"] = figures.pair(shape, kind, found[shape])
     others = {shape: found[shape] for shape in found if shape not in QUICK_SHAPES}
     if others:
-        pictures.insert(-1, Picture("driven_other_shapes", _OTHERS, figures.page(others)))
-    return pictures
-
-
-_PROFILE = (
-    "Velocity of the centre of pressure, and the wrench of the distributed model of the disc; markers are the "
-    "vertices of the published curves."
-)
-_PAIRS = (
-    ("Circle", "r", "Disc: reduced (dashed) on top of distributed model; markers are the published vertices of both."),
-    ("Circle", "e", "Disc: where it slides and spins at once, the ellipsoid misses both force and torque."),
-    ("NonConvex1", "r", "Two pads: reduced on top of distributed model; markers are the published vertices of both."),
-)
-_OTHERS = "The other shapes, of which no curves are published as numbers: distributed, reduced and ellipsoid."
-_BOXES = (
-    "Errors against the distributed model at 500 samples: box from first to third quartile, median, whiskers to the "
-    "last sample within 1.5 of the box's height, and the maximum as a cross, which the published plots hide. Filled: "
-    "ours; open: published. Linear from zero to the first tick, logarithmic above."
-)
+        result["driven_other_shapes"] = figures.page(others)
+    return result | {"driven_errors": figures.box_plots(errors)}
 
 
 # ------------------------------------------------------------------ comparisons
