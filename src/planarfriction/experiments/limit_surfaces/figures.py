@@ -8,12 +8,13 @@ from typing import Any
 import numpy as np
 
 from planarfriction import geometry
+from planarfriction.experiments import looks
 from planarfriction.experiments.runs import IN_WORDS
 from planarfriction.limit_surface import LimitSurfaceCells, LimitSurfaceEllipsoid
 from planarfriction.plots.limit_surface import draw_surface, scaled_samples
-from planarfriction.plots.style import LINE_STYLES, PALETTE, PlotFigure, new_figure, tidy
+from planarfriction.plots.style import LINE_STYLES, PlotFigure, new_figure, tidy
 
-EXACT, BESIDE, LINK = PALETTE[0], PALETTE[1], "0.45"
+SUM, BESIDE, LINK = looks.DISTRIBUTED, looks.ELLIPSOID, "0.45"
 """Colours of the sum over the cells, of the ellipsoid, and of what joins them."""
 
 ACROSS_Y = ("NonConvex1", "NonConvex2")
@@ -86,12 +87,12 @@ def _section(axes: Any, surface: LimitSurfaceCells, column: int, count: int = MA
     """Points (f, tau/r) of twists (v, r omega) with velocity along one axis, f the force along it."""
     ellipsoid = LimitSurfaceEllipsoid(surface.patch)
     fine = (_points_of(each, column, 1441) for each in (surface, ellipsoid))
-    for points, colour, name in zip(fine, (EXACT, BESIDE), ("sum over the cells", "ellipsoid"), strict=True):
+    for points, colour, name in zip(fine, (SUM, BESIDE), ("sum over the cells", "ellipsoid"), strict=True):
         axes.plot(*points, color=colour, lw=1.4, label=name)
     marked = [_points_of(each, column, count, closed=False) for each in (surface, ellipsoid)]
     for exact, beside in zip(*(points.T for points in marked), strict=True):
         axes.plot(*np.stack([exact, beside]).T, color=LINK, lw=0.8, zorder=1)
-    axes.plot(*marked[0], ls="", marker="o", ms=3.8, color=EXACT)
+    axes.plot(*marked[0], ls="", marker="o", ms=3.8, color=SUM)
     axes.plot(*marked[1], ls="", marker="s", ms=3.4, color=BESIDE)
     axes.plot([], [], color=LINK, lw=0.8, label="same twist")
     force = ("$f_x$", "$f_y$")[column]
@@ -113,8 +114,8 @@ def gradient_line(surface: LimitSurfaceCells, numbers: dict[str, Any]) -> PlotFi
     figure = new_figure(10.0, 4.6)
     load, force, section = figure.subplots(1, 3, width_ratios=(0.55, 1.0, 1.25))
     centres = (
-        ("about the centre of pressure", numbers["cells"]["centre of pressure"], PALETTE[2], "D"),
-        ("about the middle of the load", numbers["cells"]["middle cell"], PALETTE[3], "o"),
+        ("about the centre of pressure", numbers["cells"]["centre of pressure"], looks.OTHER, "D"),
+        ("about the middle of the load", numbers["cells"]["middle cell"], looks.MOMENTS, "o"),
     )
     _load_panel(load, numbers, centres)
     _force_panel(force, surface, numbers, centres)
@@ -139,9 +140,9 @@ def _force_panel(axes: Any, surface: LimitSurfaceCells, numbers: dict[str, Any],
     half = 0.5 * numbers["cell"] * len(numbers["loads"])
     y = np.linspace(-1.25 * half, 1.25 * half, 2001)
     continuous = 1.0 - 2.0 * np.clip((y + half) / (2.0 * half), 0.0, 1.0) ** 2
-    axes.plot(_force_of(surface, y), 1e3 * y, color=EXACT, lw=1.4)
+    axes.plot(_force_of(surface, y), 1e3 * y, color=SUM, lw=1.4)
     axes.plot(_force_of(LimitSurfaceEllipsoid(surface.patch), y), 1e3 * y, color=BESIDE, lw=1.4)
-    axes.plot(continuous, 1e3 * y, color=PALETTE[6], lw=1.0, ls=LINE_STYLES[1])
+    axes.plot(continuous, 1e3 * y, color=looks.EXACT, lw=1.0, ls=LINE_STYLES[1])
     for _, at, colour, marker in centres:
         axes.axhline(1e3 * at, color=colour, lw=0.8)
         for each in (surface, LimitSurfaceEllipsoid(surface.patch)):
@@ -159,9 +160,9 @@ def _force_of(surface: Any, y: np.ndarray) -> np.ndarray:
 def _spin_panel(axes: Any, surface: LimitSurfaceCells, numbers: dict[str, Any], centres: Any) -> None:
     """The upper half of the section, turned to positive torque: what balances the friction of a negative spin."""
     ellipsoid = LimitSurfaceEllipsoid(surface.patch)
-    for each, colour, name in ((surface, EXACT, "sum over the cells"), (ellipsoid, BESIDE, "ellipsoid")):
+    for each, colour, name in ((surface, SUM, "sum over the cells"), (ellipsoid, BESIDE, "ellipsoid")):
         axes.plot(*_points_of(each, 0, 2881), color=colour, lw=1.4, label=name)
-    axes.plot([], [], color=PALETTE[6], lw=1.0, ls=LINE_STYLES[1], label="continuous gradient")
+    axes.plot([], [], color=looks.EXACT, lw=1.0, ls=LINE_STYLES[1], label="continuous pressure")
     for name, y, colour, marker in centres:
         points = []
         for each in (surface, ellipsoid):
@@ -169,6 +170,6 @@ def _spin_panel(axes: Any, surface: LimitSurfaceCells, numbers: dict[str, Any], 
             points.append((wrench[0], wrench[2] / each.contact_radius))
         axes.plot(*np.array(points).T, color=colour, lw=0.9, marker=marker, ms=5.5, label=f"spin {name}")
     torque = numbers["cells"]["torque"] / surface.contact_radius
-    axes.plot([0.0], [-torque], marker="*", ms=10, ls="", color=PALETTE[6], label="torque without force", zorder=1)
+    axes.plot([0.0], [-torque], marker="*", ms=10, ls="", color=looks.EXACT, label="torque without force", zorder=1)
     axes.set(xlabel="$f_x$ [-]", ylabel="$\\tau/r$ [-]", xlim=(-0.32, 0.32), ylim=(-1.01, -0.86))
     tidy(axes)

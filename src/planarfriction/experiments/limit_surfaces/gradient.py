@@ -125,7 +125,7 @@ def gradient_comparisons(numbers: Numbers) -> list[Comparison]:
             "Weights on both sides of the centre of pressure: rounding.",
         ),
         (
-            "centre of the spin without force, beside a continuous gradient",
+            "centre of the spin without force, line, linear pressure, beside a continuous one",
             ours["equal halves"],
             smooth["equal halves"],
             0.5 * cell,
@@ -133,7 +133,7 @@ def gradient_comparisons(numbers: Numbers) -> list[Comparison]:
             "A sum over cells can change the sign of its force at a cell only: up to half a cell.",
         ),
         (
-            "centre of pressure of the gradient line, beside a continuous gradient",
+            "centre of pressure, line, linear pressure, beside a continuous one",
             ours["centre of pressure"],
             smooth["centre of pressure"],
             cell / (6.0 * (CELLS + 1)) + 1e-12,
@@ -142,14 +142,21 @@ def gradient_comparisons(numbers: Numbers) -> list[Comparison]:
             "floor)).",
         ),
         (
-            "contact radius, LineGrad, beside a continuous gradient",
+            "contact radius, line, linear pressure, beside a continuous one",
             ours["radius"],
             smooth["radius"],
             lumped,
             "m",
             lumping,
         ),
-        ("torque of the spin without force, LineGrad", ours["torque"], smooth["torque"], lumped, "m", lumping),
+        (
+            "torque of the spin without force, line, linear pressure",
+            ours["torque"],
+            smooth["torque"],
+            lumped,
+            "m",
+            lumping,
+        ),
     ]
     return [
         compare_number(name, found, expected, reference="closed form", tolerance=tolerance, unit=unit, cause=cause)

@@ -8,6 +8,7 @@ from typing import Any
 
 from planarfriction.experiments import facts
 from planarfriction.experiments.experiment import Comparison, compare_number
+from planarfriction.experiments.runs import IN_WORDS
 from planarfriction.limit_surface import LimitSurfaceTablePublished
 from planarfriction.patch import ContactPatch
 
@@ -124,12 +125,14 @@ def _grid_rows(patches: Mapping[str, Numbers]) -> list[_Row]:
         "LineGrad": (CELLS - 1) * (CELLS + 2) * cell**2 / 18.0,
     }
     rows: list[_Row] = [
-        (f"second moment, {name}", _moments(patches[name])[1], value, 1e-17, "m^2", exact)
+        (f"second moment, {IN_WORDS[name]}", _moments(patches[name])[1], value, 1e-17, "m^2", exact)
         for name, value in second.items()
     ]
     for name, value in (("Square", square), ("Line", 0.25 * WIDTH)):
         found = _moments(patches[name])[0]
-        rows.append((f"contact radius, {name}, without cells", found, value, cell**2 / (12.0 * found), "m", _LUMPED))
+        rows.append(
+            (f"contact radius, {IN_WORDS[name]}, without cells", found, value, cell**2 / (12.0 * found), "m", _LUMPED)
+        )
     return rows
 
 
@@ -146,5 +149,14 @@ def _line_rows(numbers: Numbers) -> list[_Row]:
         cause = (
             "Centre of rotation just beyond the last cell: the force is 1 and the torque 0, of what the search finds."
         )
-        rows.append((f"ellipsoid, largest distance of corresponding points, {name}", found, expected, 1e-5, "1", cause))
+        rows.append(
+            (
+                f"ellipsoid, largest distance of corresponding points, {IN_WORDS[name]}",
+                found,
+                expected,
+                1e-5,
+                "1",
+                cause,
+            )
+        )
     return rows

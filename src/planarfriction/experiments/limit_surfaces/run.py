@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from planarfriction import geometry
-from planarfriction.experiments.experiment import Picture, Result, Work
-from planarfriction.experiments.limit_surfaces import figures, words
+from planarfriction.experiments.experiment import Result, Work
+from planarfriction.experiments.limit_surfaces import figures
 from planarfriction.experiments.limit_surfaces.gradient import gradient_comparisons, gradient_numbers
 from planarfriction.experiments.limit_surfaces.patches import (
     disc_numbers,
@@ -17,7 +17,9 @@ from planarfriction.experiments.limit_surfaces.patches import (
     patch_numbers,
     shape_comparisons,
 )
+from planarfriction.experiments.limit_surfaces.tables import tables, told
 from planarfriction.experiments.runs import SIX_SHAPES
+from planarfriction.experiments.wording import fill
 from planarfriction.limit_surface import (
     LimitSurface,
     LimitSurfaceCells,
@@ -60,20 +62,19 @@ def run(work: Work) -> Result:
         "tables": {name: {key: each[key] for key in STORED} for name, each in errors.items()},
         "gradient": gradient,
     }
-    return Result(
-        findings=words.findings(numbers),
-        pictures=(
-            Picture("surfaces", words.OVERVIEW, figures.overview(surfaces, coarse=work.quick)),
-            Picture("correspondence", words.CORRESPONDENCE, figures.correspondence(surfaces)),
-            Picture("gradient_line", words.GRADIENT, figures.gradient_line(surfaces["LineGrad"], gradient)),
-        ),
+    return fill("limit_surfaces", **told(numbers)).result(
+        {
+            "surfaces": figures.overview(surfaces, coarse=work.quick),
+            "correspondence": figures.correspondence(surfaces),
+            "gradient_line": figures.gradient_line(surfaces["LineGrad"], gradient),
+        },
         comparisons=[
             *patch_comparisons(numbers["patches"]),
             *shape_comparisons(numbers),
             *gradient_comparisons(gradient),
         ],
         numbers=numbers,
-        tables=words.tables(numbers),
+        tables=tables(numbers),
         data={"surfaces": _dataset(surfaces)},
     )
 
