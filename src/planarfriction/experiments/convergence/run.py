@@ -11,10 +11,9 @@ from planarfriction.experiments import facts
 from planarfriction.experiments.convergence import figures, runs
 from planarfriction.experiments.convergence.figures import QUANTITIES
 from planarfriction.experiments.convergence.runs import Case, Errors
-from planarfriction.experiments.convergence.words import RADIUS, base_radius_error, findings, key, radius_errors
+from planarfriction.experiments.convergence.told import RADIUS, base_radius_error, key, radius_errors, told
 from planarfriction.experiments.experiment import (
     Comparison,
-    Picture,
     Result,
     Table,
     Work,
@@ -22,7 +21,9 @@ from planarfriction.experiments.experiment import (
     compare_number,
 )
 from planarfriction.experiments.runs import IN_WORDS
+from planarfriction.experiments.wording import fill
 from planarfriction.patch import ContactPatch
+from planarfriction.plots.style import PlotFigure
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -54,9 +55,8 @@ def run(work: Work) -> Result:
     mask, cut = radius_errors(counts)
     slopes = {family: {key(case): _slopes(counts, errors[case][family]) for case in cases} for family in runs.FAMILIES}
     comparisons = [*_profile_comparisons(), *_comparisons(counts, errors, work), *_euler_comparisons(counts, euler)]
-    return Result(
-        findings=findings(counts, errors, slopes, comparisons),
-        pictures=_pictures(counts, errors, mask, cut),
+    return fill("convergence", **told(counts, errors, slopes, comparisons)).result(
+        _figures(counts, errors, mask, cut),
         comparisons=[*comparisons, _cut_radius_comparison(counts)],
         numbers={
             "counts": list(counts),
@@ -160,31 +160,18 @@ def _against_figure(
 # ---------------------------------------------------------------------- figures, tables
 
 
-def _pictures(counts: Sequence[int], errors: Mapping[Case, Errors], mask: np.ndarray, cut: np.ndarray) -> list[Picture]:
-    pictures = [
-        Picture(
-            "convergence_cells_distributed",
-            "Distributed model: error from 101 x 101 cells over the number of cells, and the velocity profile. Lines: "
-            "this run; dots: published.",
-            figures.errors_and_profile("cells_distributed", counts, errors),
-        ),
-        Picture(
-            "convergence_cells_reduced",
-            "Reduced model: error from the distributed model on 101 x 101 cells over the number of cells.",
-            figures.errors_over_counts("cells_reduced", counts, errors),
-        ),
-        Picture(
-            "convergence_segments",
-            "Reduced model on 21 x 21 cells: error from a table of 100 segments over the number of segments.",
-            figures.errors_over_counts("segments", counts, errors),
-        ),
-    ]
+def _figures(
+    counts: Sequence[int], errors: Mapping[Case, Errors], mask: np.ndarray, cut: np.ndarray
+) -> dict[str, PlotFigure]:
+    result = {
+        "convergence_cells_distributed": figures.errors_and_profile("cells_distributed", counts, errors),
+        "convergence_cells_reduced": figures.errors_over_counts("cells_reduced", counts, errors),
+        "convergence_segments": figures.errors_over_counts("segments", counts, errors),
+    }
     if ("Circle", "p0") in errors:
         torque = errors["Circle", "p0"]["cells_distributed"][:, 1]
-        caption = "Why the disc converges slowly: its mask changes size with the grid; cells cut by the rim do not."
-        figure = figures.radius_errors(counts, mask, cut, torque)
-        pictures.append(Picture("convergence_disc_radius", caption, figure))
-    return pictures
+        result["convergence_disc_radius"] = figures.radius_errors(counts, mask, cut, torque)
+    return result
 
 
 def _slope_table(slopes: Mapping[str, Mapping[str, Mapping[str, float]]], counts: Sequence[int]) -> Table:
