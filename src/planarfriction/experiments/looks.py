@@ -10,3 +10,14 @@ DISTRIBUTED, REDUCED, ELLIPSOID, MOMENTS, PARTS, OTHER, EXACT = PALETTE
 
 OF_MODEL = {"d": DISTRIBUTED, "r": REDUCED, "e": ELLIPSOID}
 """Letter of a model in the names of curves -> its colour."""
+
+OF_CAUSE = {
+    "reduced model instead": REDUCED,
+    "default tolerances": DISTRIBUTED,
+    "three times finer grid": OTHER,
+    "published reduced": REDUCED,
+    "ReducedModel": MOMENTS,
+    "ReducedModel, 4 parts": OTHER,
+    'ReducedModel, parts="auto"': PARTS,
+}
+"""What moves the end of an in-hand run -> its colour; a change of friction is black."""

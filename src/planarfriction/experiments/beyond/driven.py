@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from planarfriction.experiments.beyond.ladder import AUTO, Row, name_of_parts
-from planarfriction.experiments.experiment import Comparison
+from planarfriction.experiments.experiment import Arrays, Comparison
 from planarfriction.experiments.runs import IN_WORDS, LAW
 from planarfriction.experiments.velocity_driven.boxes import SAMPLES
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
@@ -60,7 +60,7 @@ def ratios(errors: Errors, model: str = "reduced", over: str = "published") -> d
 
 
 def step_costs(shape: str = "Circle") -> dict[str, Any]:
-    """Time of a step in a compiled loop [s] by reduced model, each the least of turns in which all take part."""
+    """Times of a step in a compiled loop [s] by reduced model, one of each round in which all take part."""
     from planarfriction.autodiff import rollout
 
     patch = PUBLISHED_PATCHES[shape]()
@@ -68,13 +68,27 @@ def step_costs(shape: str = "Circle") -> dict[str, Any]:
     twists = directions * 10.0 ** np.random.default_rng(8).uniform(-4.0, -1.5, size=(STEPS, 1))
     models: dict[str, Any] = {"published": ReducedModelPublished(patch, LAW)}
     models |= {name_of_parts(count): ReducedModel(patch, LAW, parts=count) for count in PARTS}
-    best = dict.fromkeys(models, np.inf)
-    for _ in range(ROUNDS):
+    times = {name: np.empty(ROUNDS) for name in models}
+    for turn in range(-1, ROUNDS):  # the first compiles
         for name, model in models.items():
             begin = time.process_time()
             rollout(model, model.rest(), twists, 1.0, 1e-4)
-            best[name] = min(best[name], (time.process_time() - begin) / STEPS)
-    return best
+            if turn >= 0:
+                times[name][turn] = (time.process_time() - begin) / STEPS
+    return times
+
+
+def step_numbers(times: Arrays) -> dict[str, dict[str, list[float]]]:
+    """Median and quartiles of the time of a step [s], and of its ratio to the published model's in the same round."""
+    return {
+        name: {"time": median_and_quartiles(each), "ratio": median_and_quartiles(each / times["published"])}
+        for name, each in times.items()
+    }
+
+
+def median_and_quartiles(values: Any) -> list[float]:
+    """Median, first and third quartile."""
+    return np.percentile(values, [50.0, 25.0, 75.0]).tolist()
 
 
 def spin_up(shape: str) -> dict[str, float]:

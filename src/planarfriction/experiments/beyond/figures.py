@@ -6,17 +6,18 @@ from typing import Any
 
 import numpy as np
 
+from planarfriction.experiments import looks
 from planarfriction.experiments.beyond.driven import MODELS, Errors
 from planarfriction.experiments.beyond.others import GROOVED_MODELS, closed_drift
 from planarfriction.experiments.beyond.surfaces import KINDS
 from planarfriction.experiments.experiment import Arrays
 from planarfriction.experiments.runs import IN_WORDS
 from planarfriction.experiments.velocity_driven import boxes
-from planarfriction.plots.style import LINE_STYLES, PALETTE, PlotFigure, new_figure, tidy
+from planarfriction.plots.style import PlotFigure, new_figure, tidy
 
-COLOURS = dict(zip(KINDS, (PALETTE[1], PALETTE[0], PALETTE[6], PALETTE[3], PALETTE[4]), strict=True))
+COLOURS = dict(zip(KINDS, (looks.REDUCED, looks.MOMENTS, looks.DISTRIBUTED, looks.OTHER, looks.ELLIPSOID), strict=True))
 
-MODEL_COLOURS = dict(zip(MODELS, (PALETTE[1], PALETTE[5], PALETTE[0], "0.45"), strict=True))
+MODEL_COLOURS = dict(zip(MODELS, (looks.REDUCED, looks.MOMENTS, looks.PARTS, looks.DISTRIBUTED), strict=True))
 
 
 def surface_errors(errors: dict[str, Arrays]) -> PlotFigure:
@@ -87,8 +88,8 @@ def staircase(stairs: Arrays) -> PlotFigure:
             if shape == "Circle":  # steps of a few thousandths do not show beside the curve itself
                 cells, exact, label = 1e3 * (cells - exact), 0.0 * exact, f"{label[:5].strip()} - exact"
                 label = "torque, from the exact one [N µm]" if not ending else "force, from the exact one [mN]"
-            axes.plot(place, cells, color=PALETTE[1], lw=1.1, label="sum over the 21 x 21 grid's cells")
-            axes.plot(place, exact, color=PALETTE[0], lw=1.3, ls=LINE_STYLES[0], label="exact")
+            axes.plot(place, cells, color=looks.DISTRIBUTED, lw=1.1, label="sum over the 21 x 21 grid's cells")
+            axes.plot(place, exact, color=looks.EXACT, lw=1.3, label="exact")
             axes.set(ylabel=label, xlim=(0.0, place[-1]))
             axes.set_title(IN_WORDS[shape], fontsize="medium", loc="left")
             tidy(axes)
@@ -128,8 +129,10 @@ def grooves(numbers: dict[str, Any]) -> PlotFigure:
     axes: Any = figure.subplots()
     slopes = np.array(numbers["slope"])
     fine = np.linspace(slopes[0], slopes[-1], 100)
-    axes.plot(np.degrees(fine), np.degrees([closed_drift(s) for s in fine]), color=PALETTE[1], label="closed form")
-    for kind, marker, colour in zip(GROOVED_MODELS, "ox+", (PALETTE[0], PALETTE[4], PALETTE[6]), strict=True):
+    axes.plot(np.degrees(fine), np.degrees([closed_drift(s) for s in fine]), color=looks.EXACT, label="closed form")
+    for kind, marker, colour in zip(
+        GROOVED_MODELS, "ox+", (looks.DISTRIBUTED, looks.MOMENTS, looks.REDUCED), strict=True
+    ):
         axes.plot(
             np.degrees(slopes), np.degrees(numbers[kind]), marker, color=colour, label=kind, fillstyle="none", ms=7
         )

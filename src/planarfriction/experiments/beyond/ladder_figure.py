@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from planarfriction.experiments import looks
 from planarfriction.experiments.beyond.ladder import Row
 from planarfriction.experiments.runs import IN_WORDS
-from planarfriction.plots.style import PALETTE, PlotFigure, new_figure, tidy
+from planarfriction.plots.style import PlotFigure, new_figure, tidy
 
 
 @dataclass(frozen=True)
@@ -26,15 +27,15 @@ class Family:
 
 
 FAMILIES = (
-    Family("published reduced model", {"published": ""}, PALETTE[1], "^"),
+    Family("published reduced model", {"published": ""}, looks.REDUCED, "^"),
     Family(
         "ReducedModel, its parts",
         {"reduced": "1", "4 parts": "4", "6 parts": "6", "16 parts": "16"},
-        PALETTE[0],
+        looks.MOMENTS,
         "o",
         (4, -11),
     ),
-    Family("distributed, its cells", {"degree 3": "28", "degree 5": "45", "full": "all"}, PALETTE[2], "D"),
+    Family("distributed, its cells", {"degree 3": "28", "degree 5": "45", "full": "all"}, looks.DISTRIBUTED, "D"),
 )
 
 COLUMNS = (

@@ -9,18 +9,24 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction.experiments.beyond import driven, figures, in_hand, ladder, others, surfaces, tables, words
+from planarfriction.experiments.beyond import driven, figures, in_hand, ladder, others, surfaces, tables
 from planarfriction.experiments.beyond import shapes as new_shapes
 from planarfriction.experiments.beyond.ladder_figure import draw_ladder
-from planarfriction.experiments.experiment import Arrays, Picture, Result, Work
+from planarfriction.experiments.beyond.told import told
+from planarfriction.experiments.experiment import Arrays, Result, Work
 from planarfriction.experiments.in_hand.figures import end_shifts
 from planarfriction.experiments.runs import IN_WORDS, SIX_SHAPES
+from planarfriction.experiments.wording import fill
+from planarfriction.plots.style import PlotFigure
 
 SHAPES = (*SIX_SHAPES, "LineGradX")
 
 QUICK_SHAPES = ("LineGrad", "NonConvex2")
 
 QUICK_TWISTS = 500
+
+FRICTION = "0.1 % of friction"
+"""What moves the end beside the models, in the figure of the ends."""
 
 NEW_SHAPES, QUICK_NEW_SHAPES, QUICK_SEEDS = tuple(new_shapes.shapes()), ("three feet",), (0, 1)
 
@@ -53,7 +59,7 @@ def run(work: Work) -> Result:
     # one after the other: these are measured with a clock
     times = work.piece("time of runs", lambda: _times_of(shapes))
     rows = [dataclasses.replace(row, time=float(times[f"{row.case}|{row.model}"])) for row in rows]
-    costs = _floats(work.piece("cost of a step", driven.step_costs))
+    costs = driven.step_numbers(work.piece("cost of a step", driven.step_costs))
     family = work.piece("soft finger", lambda: others.load_family(work.quick))
     grooved = {name: values.tolist() for name, values in pieces["grooves"].items()}
     numbers = _numbers(rows, found, errors) | {
@@ -65,9 +71,8 @@ def run(work: Work) -> Result:
         "spin-up": {shape: _floats(spun[f"spin-up, {IN_WORDS[shape]}"]) for shape in shapes if shape in SIX_SHAPES},
         "new shapes": {name: new_shapes.ratios(each) for name, each in unseen.items()},
     }
-    return Result(
-        findings=words.findings(numbers),
-        pictures=_pictures(rows, errors, pieces["staircase"], numbers),
+    return fill("beyond", **told(numbers)).result(
+        _figures(rows, errors, pieces["staircase"], numbers),
         comparisons=[
             *surfaces.comparisons(errors, pieces["staircase"]),
             *driven.comparisons(numbers["driven"]),
@@ -80,21 +85,21 @@ def run(work: Work) -> Result:
     )
 
 
-def _pictures(
+def _figures(
     rows: list[ladder.Row], errors: dict[str, Arrays], stairs: Arrays, numbers: dict[str, Any]
-) -> list[Picture]:
+) -> dict[str, PlotFigure]:
     ends = {
-        case: {in_hand.ENDS.get(name, words.FRICTION): each[name] for name in (*in_hand.ENDS, in_hand.SHIFT)}
+        case: {in_hand.ENDS.get(name, FRICTION): each[name] for name in (*in_hand.ENDS, in_hand.SHIFT)}
         for case, each in numbers["in hand"].items()
     }
-    return [
-        Picture("surface_errors", words.SURFACES, figures.surface_errors(errors)),
-        Picture("surface_staircase", words.STAIRCASE, figures.staircase(stairs)),
-        Picture("driven_models", words.DRIVEN, figures.driven_boxes(numbers["driven"])),
-        Picture("in_hand_ends", words.IN_HAND, end_shifts(ends)),
-        Picture("ladder", words.LADDER, draw_ladder(rows)),
-        Picture("grooves", words.GROOVES, figures.grooves(numbers["grooves"])),
-    ]
+    return {
+        "surface_errors": figures.surface_errors(errors),
+        "surface_staircase": figures.staircase(stairs),
+        "driven_models": figures.driven_boxes(numbers["driven"]),
+        "in_hand_ends": end_shifts(ends),
+        "ladder": draw_ladder(rows),
+        "grooves": figures.grooves(numbers["grooves"]),
+    }
 
 
 # ------------------------------------------------------------------ pieces
@@ -168,6 +173,7 @@ def _numbers(rows: list[ladder.Row], found: dict[str, Arrays], errors: dict[str,
             for model in ("reduced", ladder.AUTO)
         },
         "run costs": _run_costs(rows),
+        "run ratios": _run_ratios(rows),
     }
 
 
@@ -182,3 +188,14 @@ def _run_costs(rows: list[ladder.Row]) -> dict[str, float]:
     """Median over all runs of the time in the solver over that of the distributed model."""
     models = dict.fromkeys(row.model for row in rows)
     return {model: float(np.median([row.time for row in rows if row.model == model])) for model in models}
+
+
+def _run_ratios(rows: list[ladder.Row]) -> dict[str, list[float]]:
+    """Median and quartiles over all runs of the time in the solver over that of the published model in the same run."""
+    times = {(row.case, row.model): row.time for row in rows}
+    return {
+        model: driven.median_and_quartiles(
+            [value / times[case, "published"] for (case, other), value in times.items() if other == model]
+        )
+        for model in dict.fromkeys(row.model for row in rows)
+    }

@@ -112,7 +112,7 @@ def jumps(stairs: Arrays) -> dict[str, float]:
 
 
 def comparisons(errors: dict[str, Arrays], stairs: Arrays) -> list[Comparison]:
-    """The exact surface beside closed forms, sums over ever finer cells, and the table beside its promise."""
+    """The exact surface beside closed forms, sums over ever finer cells, and the errors of the table."""
     return [*_closed_forms(stairs), *_finer_sums(errors), *_tables(errors)]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import numpy as np
@@ -13,6 +13,7 @@ from planarfriction.experiments.beyond.ladder import AUTO, Row
 from planarfriction.experiments.beyond.surfaces import KINDS
 from planarfriction.experiments.experiment import Table
 from planarfriction.experiments.runs import IN_WORDS, SIX_SHAPES
+from planarfriction.experiments.wording import fmt
 
 Numbers = dict[str, Any]
 
@@ -145,14 +146,21 @@ def _spin_up(errors: dict[str, dict[str, float]]) -> Table:
     return Table("Spin-up from rest: largest error of the torque [N mm]", headings, rows, note)
 
 
-def _step(times: dict[str, float]) -> Table:
+def _step(costs: dict[str, dict[str, list[float]]]) -> Table:
     rows = [
-        (model_words(model), shown(1e6 * value), shown(value / times["published"])) for model, value in times.items()
+        (model_words(model), _spread(1e6 * value for value in each["time"]), _spread(each["ratio"]))
+        for model, each in costs.items()
     ]
-    return Table("Step in a compiled loop, disc", ("model", "time [µs]", "over the published model's"), rows)
+    note = "Medians, in brackets the quartiles; ratios within a round, in which all models take part."
+    return Table("Step in a compiled loop, disc", ("model", "time [µs]", "over the published model's"), rows, note)
+
+
+def _spread(values: Iterable[float]) -> str:
+    middle, first, third = map(shown, values)
+    return f"{middle} ({first} to {third})"
 
 
 def _plateaus(angles: dict[str, float]) -> Table:
     exact = angles["closed form"]
-    rows = [(name, 1e6 * angle, f"{angle / exact - 1.0:+.3%}") for name, angle in angles.items()]
+    rows = [(name, 1e6 * angle, f"{fmt(100.0 * (angle / exact - 1.0), '+.3f')} %") for name, angle in angles.items()]
     return Table("Angle of the disc under a torque that friction holds", ("model", "angle [µrad]", "off"), rows)

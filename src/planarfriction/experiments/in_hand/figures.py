@@ -127,10 +127,11 @@ def end_shifts(rows: Mapping[str, Mapping[str, float]]) -> PlotFigure:
     figure = new_figure(8.6, 1.5 + 0.36 * len(rows))
     axes = figure.subplots()
     causes = list(dict.fromkeys(cause for shifts in rows.values() for cause in shifts))
-    for i, (cause, marker) in enumerate(zip(causes, "osD^v", strict=False)):
+    for cause, marker in zip(causes, "<>oD^", strict=False):
         places = [j for j, shifts in enumerate(rows.values()) if cause in shifts]
         shown = [1e3 * shifts[cause] for shifts in rows.values() if cause in shifts]
-        axes.plot(shown, places, linestyle="none", marker=marker, markersize=6.5, color=PALETTE[i], label=cause)
+        colour = looks.OF_CAUSE.get(cause, looks.EXACT)
+        axes.plot(shown, places, linestyle="none", marker=marker, markersize=6.5, color=colour, label=cause)
     axes.set(xscale="log", xlabel="shift of the end [mm]", ylim=(len(rows) - 0.5, -0.5))
     axes.margins(x=0.08)
     axes.set_yticks(range(len(rows)), list(rows))
