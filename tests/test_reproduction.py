@@ -10,6 +10,7 @@ import re
 
 import numpy as np
 import pytest
+from jinja2 import UndefinedError
 
 from planarfriction import experiments
 from planarfriction.cli import main
@@ -24,9 +25,10 @@ from planarfriction.experiments.experiment import (
     compare_curve,
     compare_number,
 )
+from planarfriction.experiments.markup import name_to_html, to_html
 from planarfriction.experiments.report import write_report
 from planarfriction.experiments.reproduction import Reproduction
-from planarfriction.experiments.wording import number
+from planarfriction.experiments.wording import environment, fill, fmt, number, power, short, span
 
 
 class Made:
@@ -50,8 +52,19 @@ class Made:
         )
         table = Table("Some", ["name", "value"], [["first", np.float64(0.123456)], ["second", 3]], note="a note")
         data = {"curves": xr.Dataset({"x": ("time", np.arange(3.0))})}
+        exact = compare_number(
+            "two, fx", ours, 2.0, reference="closed form", tolerance=1e-3, unit="m^2", cause="rounding"
+        )
+        picture = Picture("line", "A line.", figure)
         return Result(
-            ["Found."], [Picture("line", "A line.", figure)], [row], {"value": np.float64(ours)}, [table], data
+            ["Found $x^2$."],
+            [picture],
+            [row, exact],
+            {"value": np.float64(ours)},
+            [table],
+            data,
+            asked="Why?",
+            verdict=f"The verdict of {self.name}.",
         )
 
     def compute(self, letter: str) -> dict[str, float]:
@@ -133,10 +146,26 @@ def test_the_command_writes_a_report_and_all_numbers(made, tmp_path, capsys):
     assert numbers["experiments"]["second"]["comparisons"][0]["holds"] is True
     page = (tmp_path / "report.html").read_text()
     assert "About &lt;first&gt;" in page and "none &amp; all" in page and "0.1235" in page and "a note" in page
-    # self-contained: each figure is inside, nothing is loaded from elsewhere
+    # self-contained: each figure and each formula is inside, nothing is loaded from elsewhere
     sources = re.findall(r'(?:src|href)="([^"]*)"', page)
     assert sum(source.startswith("data:image/png;base64,") for source in sources) == 2
-    assert all(source.startswith(("data:image/png;base64,", "#")) for source in sources)
+    assert sum(source.startswith("data:image/svg+xml;base64,") for source in sources) == 2
+    assert all(source.startswith(("data:image/", "#")) for source in sources)
+
+
+def test_the_report_begins_with_its_verdict_and_tells_our_test_from_the_papers(made, tmp_path):
+    main(["reproduce", "--out", str(tmp_path)])
+    head, first, _ = re.split("<section", (tmp_path / "report.html").read_text())
+    assert "All 4 comparisons are within their tolerance" in head
+    assert "The verdict of first." in head and "The verdict of second." in head
+    places = [
+        first.index(each)
+        for each in ("Why?", "<figure>", "Found ", "Some", "Ours against converged", "Ours against the paper")
+    ]
+    assert places == sorted(places)
+    ours, papers = first.split("Ours against the paper")
+    assert "<i>f<sub>x</sub></i>" in ours and "m²" in ours and "none &amp; all" not in ours
+    assert "none &amp; all" in papers and "whatever its error" in papers
 
 
 def test_a_number_out_of_tolerance_is_shown_and_sets_the_exit_code(made, tmp_path, capsys):
@@ -183,6 +212,34 @@ def test_the_list_names_every_experiment_and_each_has_its_module(capsys):
 
 def test_numbers_as_text():
     assert [number(value) for value in (None, 3, 0.123456, "x", True)] == ["", "3", "0.1235", "x", "True"]
+    assert [fmt(value, "+.2f") for value in (-1e-9, 0.0, 0.2, -0.2)] == ["0.00", "0.00", "+0.20", "-0.20"]
+    assert [short(value) for value in (1043.7, 0.0012345)] == ["1040", "0.00123"]
+    assert [power(1e-8), power(3.14e-5, 1), power(0.0)] == ["$10^{-8}$", r"$3.1 \times 10^{-5}$", "0"]
+    assert [span([2.0, 1.0], ".1f"), span([3, 3], "d")] == ["1.0 to 2.0", "3"]
+
+
+def test_markdown_with_formulas():
+    page = to_html("A *word*, `code`, <b>, $\\sigma_0 < 1$ and 5 $.")
+    assert "<em>word</em>" in page and "<code>code</code>" in page and "&lt;b&gt;" in page and "and 5 $." in page
+    (picture,) = re.findall(r'<img[^>]*alt="([^"]*)"', page)
+    assert picture == r"\sigma_0 &lt; 1"
+
+
+def test_symbols_in_names():
+    assert name_to_html("r, <rho^2> [mm^2], fx & exact") == (
+        "<i>r</i>, ⟨<i>ρ</i>²⟩ [mm²], <i>f<sub>x</sub></i> &amp; exact"
+    )
+    assert name_to_html("reduced, 21 x 21, extra") == "reduced, 21 × 21, extra"
+
+
+def test_every_experiment_has_a_template_that_is_complete():
+    """Each can be read; what a template names and a run does not give is an error in the run."""
+    for name in experiments.EXPERIMENTS:
+        source, *_ = environment().loader.get_source(environment(), f"{name.replace('-', '_')}/findings.md.j2")
+        assert [f"## {part}\n" in source for part in ("verdict", "asked", "found")] == [True] * 3, name
+        assert "aimed" not in source and "promise" not in source
+    with pytest.raises(UndefinedError):
+        fill("drift")
 
 
 # ---------------------------------------------------------------------- comparisons and facts

@@ -57,7 +57,7 @@ def inline(text: str) -> str:
 
 def name_to_html(text: str) -> str:
     """The name of a quantity or a column, whose symbols are plain words, as HTML with typeset symbols."""
-    parts = _SYMBOL.split(text)
+    parts = _SYMBOL.split(re.sub(r"(?<=\d) x (?=\d)", " × ", text))
     return "".join(SYMBOLS[part] if i % 2 else html.escape(part) for i, part in enumerate(parts))
 
 

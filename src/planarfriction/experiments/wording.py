@@ -63,7 +63,7 @@ def environment() -> jinja2.Environment:
 
 def fmt(value: Any, spec: str) -> str:
     """A number in a format of Python's; no zero has a sign."""
-    text = format(float(value), spec)
+    text = format(value, spec)
     return text if re.search("[1-9]", text) else text.lstrip("+-")
 
 
@@ -81,7 +81,7 @@ def power(value: float, digits: int = 0) -> str:
     return rf"${factor}10^{{{int(exponent)}}}$"
 
 
-def span(values: Sequence[float], spec: str = ".2f", factor: float = 1.0) -> str:
+def span(values: Sequence[float], spec: str = ".2f", factor: float = 1) -> str:
     """From the smallest to the largest; once where both read the same."""
     low, high = (fmt(factor * choose(values), spec) for choose in (min, max))
     return low if low == high else f"{low} to {high}"

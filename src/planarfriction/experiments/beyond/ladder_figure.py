@@ -10,6 +10,7 @@ import numpy as np
 from planarfriction.experiments import looks
 from planarfriction.experiments.beyond.ladder import Row
 from planarfriction.experiments.runs import IN_WORDS
+from planarfriction.experiments.wording import span
 from planarfriction.plots.style import PlotFigure, new_figure, tidy
 
 
@@ -66,7 +67,7 @@ def draw_ladder(rows: list[Row]) -> PlotFigure:
                 _draw_family(axes, family, [row for row in group if case in row.case], quantity)
             axes.set(xscale="log", yscale="log", ylabel=label)
             axes.yaxis.label.set_fontsize("small")
-            axes.set_title(f"{title},\npatches of {min(cells)} to {max(cells)} cells", fontsize="medium", loc="left")
+            axes.set_title(f"{title},\npatches of {span(cells, 'd')} cells", fontsize="medium", loc="left")
             axes.margins(x=0.12, y=0.1)
             axes.xaxis.set_major_locator(FixedLocator(TICKS))
             axes.xaxis.set_major_formatter("{x:g}")

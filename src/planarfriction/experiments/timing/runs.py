@@ -142,7 +142,7 @@ def whole_runs(row: str, kind: str, work: Work) -> Arrays:
     )
 
 
-def _whole_runs(scene: Callable[[], Scene], repeats: int) -> dict[str, float]:
+def _whole_runs(scene: Callable[[], Scene], repeats: int) -> dict[str, Any]:
     simulate(scene(), t_end=0.02)  # compiles
     totals, solver, trials = [], [], 0
     while sum(totals) < ENOUGH and len(totals) < repeats:
@@ -161,7 +161,7 @@ def beside_lsoda(row: str, kind: str, begin: float, end: float, work: Work) -> A
     return work.piece(label, functools.partial(_beside_lsoda, ROWS[row][kind], begin, end))
 
 
-def _beside_lsoda(scene: Callable[[], Scene], begin: float, end: float) -> dict[str, float]:
+def _beside_lsoda(scene: Callable[[], Scene], begin: float, end: float) -> dict[str, Any]:
     fresh = scene()
     window = Window.of(fresh, begin, end)
     ours = [window.ours(rtol=fresh.rtol, atol=fresh.atol)[0].wall_time for _ in range(MOST_REPEATS)]
@@ -179,6 +179,6 @@ def angle_error(poses: np.ndarray, reference: np.ndarray) -> float:
     return float(np.abs(poses - reference)[:, 2].max())
 
 
-def cheapest(points: Sequence[tuple[float, Sequence[float]]], error: float) -> Sequence[float] | None:
+def cheapest(points: Sequence[tuple[float, list[float]]], error: float) -> list[float] | None:
     """Shortest of the times (median first) among the points (error, times) at least as good as `error`; None: none."""
     return min((times for found, times in points if found <= error), default=None)

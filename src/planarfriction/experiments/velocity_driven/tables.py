@@ -11,7 +11,7 @@ from planarfriction.experiments.experiment import Table
 def told(numbers: dict[str, Any]) -> dict[str, Any]:
     """What the template names."""
     errors = numbers["errors"]
-    quartiles = [
+    quartiles: list[dict[str, Any]] = [
         {"shape": runs.IN_WORDS[shape]}
         | {name: each["ft"][model]["third quartile"] for name, model in (("table", "corrected"), ("ellipsoid",) * 2)}
         for shape, each in errors.items()
