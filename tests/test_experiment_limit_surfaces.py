@@ -132,7 +132,7 @@ def test_data_is_complete_and_has_units(result):
 
 
 def test_a_wrong_surface_would_be_noticed(result):
-    row = next(row for row in result.comparisons if row.quantity.endswith("corresponding points, Line"))
+    row = next(row for row in result.comparisons if row.quantity.endswith("corresponding points, line"))
     other = limit_surfaces.ellipsoid_errors(LimitSurfaceCells(PUBLISHED_PATCHES["Line"](cells=23)), (50, 100))
     broken = dataclasses.replace(row, difference=abs(other["ellipsoid/points, max"] - row.theirs))
     assert not broken.holds
