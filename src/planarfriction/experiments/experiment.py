@@ -44,14 +44,14 @@ class Comparison:
     theirs: float | None = None
     """The reference's value, where it is a single number."""
     span: float | None = None
-    """What the difference is a share of: range of the reference's curve, size of its number; None: nothing fits."""
+    """Largest less smallest value of the reference's curve; None: not a curve."""
     paper: float | None = None
     """Distance of a published curve from the converged solution, which is most of its tolerance; None: not known."""
 
     @property
     def share(self) -> float | None:
-        """The difference as a share of the span [-]."""
-        return self.difference / self.span if self.span else None
+        """The difference as a share of the span [-]; None where the reference is zero, up to the tolerance."""
+        return self.difference / self.span if self.span and self.span > self.tolerance else None
 
     @property
     def holds(self) -> bool:
@@ -112,8 +112,7 @@ def compare_number(
 ) -> Comparison:
     """One number beside its reference."""
     ours, theirs = float(ours), float(theirs)
-    difference, size = abs(ours - theirs), abs(theirs)
-    return Comparison(quantity, reference, difference, tolerance, unit, 1, cause, ours, theirs, size or None)
+    return Comparison(quantity, reference, abs(ours - theirs), tolerance, unit, 1, cause, ours, theirs)
 
 
 def _at(wanted: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:

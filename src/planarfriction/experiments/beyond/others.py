@@ -159,7 +159,10 @@ def grooves(quick: bool) -> dict[str, Any]:
 
 def comparisons(angles: dict[str, float], grooved: dict[str, Any]) -> list[Comparison]:
     """Plateaus beside the distributed model and the closed form; directions of drift beside theirs."""
-    stiff = "The same torsional stiffness, sigma_0 <rho^2>; what is left is that bristles near the threshold give way."
+    stiff = (
+        r"The same torsional stiffness, $\sigma_0 \langle\rho^2\rangle$; what is left is that bristles near the "
+        "threshold give way."
+    )
     settled = "Bristles that are not yet at rest, and the tolerance of the solver."
     rows = [
         compare_number(

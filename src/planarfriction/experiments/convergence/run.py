@@ -116,7 +116,7 @@ def _comparisons(counts: Sequence[int], errors: Mapping[Case, Errors], work: Wor
         family = "cells_distributed" if name == "cells_distributed_again" else name
         for case in errors:
             every = runs.interval(case, family, work)
-            cause = "Explicit Euler steps of 1e-5 s in the figure"
+            cause = "Explicit Euler steps of $10^{-5}$ s in the figure"
             if every > runs.PUBLISHED_INTERVAL:
                 cause += f", and means over samples every {every:g} s here, {runs.PUBLISHED_INTERVAL:g} s there"
             found += _against_figure(name, counts, case, errors[case][family], TOLERANCE[every], f"{cause}.")
@@ -124,7 +124,7 @@ def _comparisons(counts: Sequence[int], errors: Mapping[Case, Errors], work: Wor
 
 
 def _euler_comparisons(counts: Sequence[int], errors: Mapping[Case, Errors]) -> list[Comparison]:
-    cause = "None: the same explicit Euler steps of 1e-5 s, and the same samples; rounding and reading the figure."
+    cause = "None: the same explicit Euler steps of $10^{-5}$ s and the same samples; rounding and reading the figure."
     return [
         comparison
         for case in errors

@@ -58,7 +58,8 @@ def _motion_comparisons(found: Runs, share: float) -> list[Comparison]:
 _SOLVER = "The figure's solver, and ours, each by its tolerance: it is as far from the converged solution."
 _TWICE = "The same equations, solved twice: what is left is the error of our solver, which drift adds up."
 _SIDEWAYS = (
-    "Our patch is fixed to the table and the disc's centre moves over it, so that its bristles hold y = int x dtheta; "
+    "Our patch is fixed to the table and the disc's centre moves over it, so that its bristles hold "
+    r"$y = \int x\,\mathrm{d}\theta$; "
     "in the reference the patch goes with the centre and y is zero."
 )
 
@@ -77,19 +78,22 @@ def _sideways_comparisons(found: Runs) -> list[Comparison]:
                 0.1 * float(np.abs(path).max()),
                 "m",
                 len(path),
-                "The integral is taken over samples 0.01 s apart, between which x and theta oscillate.",
+                "The integral is taken over samples 0.01 s apart, between which $x$ and $\\theta$ oscillate.",
             )
         )
     return rows
+
+
+_SPRING = r"$x = F/(\sigma_0 f_N)$"
 
 
 def _plateau_comparisons(plateaus: dict[str, Any]) -> list[Comparison]:
     units, rows = dict(MOTION), []
     tolerances = {"d_ep": 1e-6, "e_ep": 1e-5, "straight": 5e-4}
     causes = {
-        "d_ep": "x = F/(sigma_0 f_N), theta = tau/(sigma_0 f_N <rho^2>): what is left is our solver's error.",
-        "e_ep": "x = F/(sigma_0 f_N), theta = tau/(sigma_0 f_N r^2): what is left is our solver's error.",
-        "straight": "The deflection along the twist whose h is parallel to the load: what is left is the disc's mass.",
+        "d_ep": rf"{_SPRING}, $\theta = \tau/(\sigma_0 f_N \langle\rho^2\rangle)$: what is left is our solver's error.",
+        "e_ep": rf"{_SPRING}, $\theta = \tau/(\sigma_0 f_N r^2)$: what is left is our solver's error.",
+        "straight": "The deflection along the twist with $h$ parallel to the load: what is left is the disc's mass.",
     }
     for model, closed in plateaus["closed form"].items():
         for name, value in closed.items():
@@ -113,7 +117,7 @@ def _plateau_comparisons(plateaus: dict[str, Any]) -> list[Comparison]:
                 reference="closed form",
                 tolerance=tolerances["d_ep"] * x,
                 unit="m",
-                cause="x = F/(sigma_0 f_N) with every model: what is left is our solver's error.",
+                cause=f"{_SPRING} with every model: what is left is our solver's error.",
             )
         )
     return rows
@@ -160,6 +164,7 @@ def _width_comparison(implied: float) -> Comparison:
         reference="published",
         tolerance=1e-5 * WIDTH,
         unit="m",
-        cause="theta = tau/(sigma_0 f_N <rho^2>) at the largest torque: the patch of the figures is 0.05 m wide, where "
+        cause=r"$\theta = \tau/(\sigma_0 f_N \langle\rho^2\rangle)$ at the largest torque: the patch of the figures is "
+        "0.05 m wide, where "
         "the article gives 0.05 m as its radius.",
     )

@@ -83,7 +83,10 @@ def shape_comparisons(numbers: Numbers) -> list[Comparison]:
 
 _Row = tuple[str, float, float, float, str, str]
 
-_LUMPED = "Each cell's load stands at its middle: the mean distance lacks about cell^2/(24 distance)."
+_LUMPED = (
+    r"Each cell's load stands at its middle: at the distance $d$ the mean distance lacks about $c^2/(24\,d)$, for "
+    "cells of width $c$."
+)
 
 
 def _disc_rows(numbers: Numbers) -> list[_Row]:
@@ -92,7 +95,7 @@ def _disc_rows(numbers: Numbers) -> list[_Row]:
     cell = disc["cell"]
     lost = cell**2 / 6.0
     ragged = "Its cells stand in whole rows: the rim is ragged, and each cell's load stands at its middle."
-    lumped = "Each cell's load stands at its middle: a whole cell's own second moment, cell^2/6, is missing."
+    lumped = "Each cell's load stands at its middle: a cell's own second moment, $c^2/6$ for the width $c$, is missing."
     rows: list[_Row] = []
     for name, radius, found, causes in (
         ("mask of 317 cells", disc["equal-area radius"], _moments(mask), (ragged, ragged)),

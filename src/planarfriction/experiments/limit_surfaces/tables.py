@@ -91,7 +91,7 @@ def _ellipsoid(errors: dict[str, Numbers]) -> Table:
         "Distance of the ellipsoid from the sum over the cells",
         ("patch", *columns, "torque, max [N mm]"),
         rows,
-        "In (fx, fy, tau/r) for mu f_N = 1. Surfaces: nearest points. Points: those of the same twist.",
+        "In $(f_x, f_y, \\tau/r)$ for $\\mu f_N = 1$. Surfaces: nearest points. Points: those of the same twist.",
     )
 
 

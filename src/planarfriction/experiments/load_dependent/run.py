@@ -133,8 +133,8 @@ def _compare_moments(pressure: int, cells: int, loads: np.ndarray) -> list[Compa
     """r and <rho^2> of a grid beside those of the round contact."""
     patch = soft_patch(pressure, cells=cells)
     cause = (
-        "Profiles are sampled at the centres of cells; a round rim on a grid errs by a share of (cell/R)^1.5, half "
-        "of it for r, all of it for <rho^2>, as an estimate."
+        "Profiles are sampled at the centres of cells; a round rim on a grid errs by a share of $(c/R)^{1.5}$ for the "
+        "width $c$ of cells, half of it for $r$, all of it for $\\langle\\rho^2\\rangle$, as an estimate."
     )
     share = 0.5 * (WIDTH / cells / finger(pressure).radius(loads)) ** 1.5
     rows = []

@@ -236,9 +236,9 @@ def _plateaus(time: np.ndarray, found: Arrays) -> list[Comparison]:
     closed = {
         "plain": (
             cell * (21**2 - 1) / (4 * 21),
-            "The plain sum over 21 equal cells is cell (N^2 - 1)/(4 N): rounding.",
+            "The plain sum over $N$ = 21 equal cells of width $c$ is $c\\,(N^2 - 1)/(4N)$: rounding.",
         ),
-        "rod": (0.25 * WIDTH, "A rod of half-length a has r = a/2: rounding."),
+        "rod": (0.25 * WIDTH, "A rod of half-length $a$ has $r = a/2$: rounding."),
     }
     rows = []
     for name, column in (("plain", "plain sum"), ("bilinear", "as published")):

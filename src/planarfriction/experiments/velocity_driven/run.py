@@ -151,16 +151,18 @@ def _rounded(name: str) -> float:
 
 _TWICE = "The same equations, solved twice: what is left is the error of both solvers."
 _SOLVER = (
-    "The figure's solver (relative tolerance 1e-6, absolute 1e-8 m, when a bristle bends by 1e-6 m): it is as far "
-    "from the converged solution where the velocity changes."
+    "The figure's solver (relative tolerance $10^{-6}$, absolute $10^{-8}$ m, when a bristle bends by $10^{-6}$ m): it "
+    "is as far from the converged solution where the velocity changes."
 )
 _GUARDED = (
-    "The program behind the published ellipsoid adds 1e-10 m to |z| where it takes the angle between bristle and "
-    "velocity, which raises friction by 5e-5; the rest is its solver, as in the figures of the other models."
+    "The program behind the published ellipsoid adds $10^{-10}$ m to $|z|$ where it takes the angle between bristle "
+    r"and velocity, which raises friction by $5 \times 10^{-5}$; the rest is its solver, as in the figures of the "
+    "other models."
 )
 _SPIN_UP = (
     "The figure's solver misses the first samples of the spin-up, by as much as in the figure of the table model, "
-    "which is the same there: with its tolerances and the guard of 1e-10 m put in, the curve is met to 1e-9 N m."
+    "which is the same there: with its tolerances and the guard of $10^{-10}$ m put in, the curve is met to "
+    "$10^{-9}$ N m."
 )
 
 
@@ -190,8 +192,9 @@ def _guard_comparison(disc: Arrays) -> Comparison:
         reference="closed form",
         tolerance=boxes.OWN["N"],
         unit="N",
-        cause="With |z| + 1e-10 m in the angle, beta is (1 + |z|/(|z| + 1e-10 m))/2 in a steady slide, so the "
-        "bristles bend by half of 1e-10 m further: what is left is of second order in that length.",
+        cause=r"With $|z| + \epsilon$ in the angle, $\epsilon = 10^{-10}$ m, $\beta$ is $(1 + |z|/(|z| + \epsilon))/2$ "
+        r"in a steady slide, so the bristles bend by $\epsilon/2$ further: what is left is of second order in "
+        "that length.",
     )
 
 
