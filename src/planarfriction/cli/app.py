@@ -9,6 +9,7 @@ import click
 from click.shell_completion import CompletionItem
 
 from planarfriction import __version__
+from planarfriction.cli.explore import explore
 from planarfriction.cli.identify_plan import FitOrPlan, complete_log
 from planarfriction.cli.options import FILE, complete_scene, patch_option
 from planarfriction.cli.sweep import sweep
@@ -375,3 +376,4 @@ def simulators(out: Path, quick: bool, again: bool) -> int:
 
 
 app.add_command(sweep)
+app.add_command(explore)
