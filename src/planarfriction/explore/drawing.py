@@ -11,16 +11,17 @@ from typing import Literal
 
 import numpy as np
 
-from planarfriction import validation
+from planarfriction import geometry, validation
 from planarfriction.errors import FileError, InvalidValueError
-from planarfriction.limit_surface import LimitSurfaceEllipsoid, LimitSurfaceExact, SurfaceComparison
+from planarfriction.limit_surface import LimitSurfaceEllipsoid, LimitSurfaceExact
+from planarfriction.limit_surface.comparison import directions
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch, Grid, read_pressure_map
 
 MOST_SIDE = 64
 """Most rows and columns of a map: with more, a stroke of the brush would no longer follow the hand."""
 
-SAMPLES = 60
-"""Directions in which ellipsoid and surface are compared: a hundredth of a second on 21 x 21 cells."""
+SAMPLES = 100
+"""Directions in which ellipsoid and surface are compared."""
 
 DRAWN = "drawn"
 """Name of a map that was painted."""
@@ -123,9 +124,15 @@ class Drawing:
         return LimitSurfaceEllipsoid(self.patch)
 
     @functools.cached_property
-    def comparison(self) -> SurfaceComparison:
-        """How far the ellipsoid is from the exact surface over all directions."""
-        return self.ellipsoid.compare(self.surface, samples=SAMPLES)
+    def largest_errors(self) -> tuple[float, float]:
+        """How far the ellipsoid is off over all directions: distance of (fx, fy, tau/r) for the same twist [-], and
+        angle between the twists (vx, vy, r omega) of the same wrench [deg]."""
+        units, scale = directions(SAMPLES), np.array([1.0, 1.0, self.surface.contact_radius])
+        twists = geometry.twist_at(units / scale, -self.surface.centre_of_pressure)
+        apart = self.ellipsoid.wrench(twists) - self.surface.wrench(twists)
+        apart = geometry.wrench_at(apart, self.surface.centre_of_pressure) / scale
+        angle = self.ellipsoid.compare(self.surface, samples=SAMPLES).angle.largest
+        return float(np.linalg.norm(apart, axis=1).max()), angle
 
 
 def _places(grid: Grid, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -9,7 +9,7 @@ from typing import Any
 
 import panel as pn
 from bokeh import events
-from bokeh.models import ColumnDataSource, CustomJS, Range1d
+from bokeh.models import ColumnDataSource, LinearColorMapper, Range1d
 from bokeh.plotting import figure
 
 from planarfriction.errors import FrictionError
@@ -28,6 +28,8 @@ OWN = "own map"
 
 FASTEST = 0.1
 """Velocity [m/s] that a drag from the middle to the edge of the map gives."""
+
+_CODE = "textarea {font-family: monospace; color: #222 !important; background: #FAFAFA; opacity: 1 !important}"
 
 _TABLE = "font-variant-numeric:tabular-nums;border-collapse:collapse"
 
@@ -50,7 +52,7 @@ class Page:
     def _controls(self) -> None:
         widgets = pn.widgets
         self.patch = widgets.Select(name="Patch", options=[*PUBLISHED_PATCHES, OWN], value=self.state.drawing.name)
-        self.cell_size = widgets.FloatInput(name="Cell size [mm]", value=1e3 * self.state.drawing.cell_size, step=0.1)
+        self.cell_size = widgets.FloatInput(name="Cell size [mm]", step=0.1, format="0[.]0000")
         self.file = widgets.FileInput(name="Pressure map", accept="", sizing_mode="stretch_width")
         self.clear = widgets.Button(name="Clear the map")
         self.tool = widgets.RadioButtonGroup(options=TOOLS, value="turn")
@@ -171,11 +173,12 @@ class Page:
         )
         plot.grid.visible = False
         self._ranges = plot.x_range, plot.y_range = Range1d(), Range1d()
-        plot.image("image", "x", "y", "dw", "dh", source=self.sources["map"], palette="Cividis256", alpha=0.85)
-        for name, colour, width in (("slip", "#444444", 1), ("wrench", {"field": "colour"}, 4)):
+        shades = LinearColorMapper("Cividis256", low=0.0, high=1.0, nan_color="#FFFFFF00")
+        plot.image("image", "x", "y", "dw", "dh", source=self.sources["map"], color_mapper=shades, alpha=0.85)
+        for name, colour, width, size in (("slip", "#444444", 1, 6), ("wrench", {"field": "colour"}, "width", 13)):
             source = self.sources[name]
             plot.segment("x0", "y0", "x1", "y1", source=source, color=colour, line_width=width)
-            plot.scatter("x1", "y1", angle="angle", marker="triangle", size=4 + 2 * width, source=source, color=colour)
+            plot.scatter("x1", "y1", angle="angle", marker="triangle", size=size, source=source, color=colour)
         centre = {"source": self.sources["centre"], "size": 18, "line_width": 3, "color": "#D00000"}
         plot.scatter("x", "y", marker="circle_cross", fill_alpha=0.0, **centre)
         for kind in (events.PanStart, events.Pan, events.Tap):
@@ -187,7 +190,7 @@ class Page:
         self.numbers = pn.pane.HTML("", css_classes=["numbers"])
         self.message = pn.pane.Alert("", alert_type="danger", visible=False, css_classes=["message"])
         self.python, self.toml = (
-            pn.widgets.TextAreaInput(disabled=True, height=330, max_length=10**6, sizing_mode="stretch_width")
+            pn.widgets.TextAreaInput(disabled=True, height=330, max_length=10**6, sizing_mode="stretch_width", stylesheets=[_CODE])
             for _ in range(2)
         )
 
@@ -220,7 +223,7 @@ class Page:
             text = numbers(self.state, self.answer, time.perf_counter() - begin)
         except FrictionError:
             self.answer, self._figure, self.surface.object = None, {}, None
-            self.sources["wrench"].data = {name: [] for name in ("x0", "y0", "x1", "y1", "angle", "colour")}
+            self.sources["wrench"].data = {name: [] for name in self.sources["wrench"].data}
             self.python.value = self.toml.value = self.numbers.object = ""
             raise
         self.numbers.object = text
@@ -275,15 +278,15 @@ def numbers(state: State, found: Answer, seconds: float) -> str:
         + "</tr>"
         for name, text in words.items()
     )
-    apart, centre = state.drawing.comparison, state.centre_of_rotation
+    (force, angle), centre = state.drawing.largest_errors, state.centre_of_rotation
     where = "none, no spin" if centre is None else f"({1e3 * centre[0]:.2f}, {1e3 * centre[1]:.2f}) mm"
     return (
         f"<table style='{_TABLE}'><tr><td></td><td align=right>fx [N]</td><td align=right>fy [N]</td>"
         f"<td align=right>τ [N mm]</td></tr>{rows}</table>"
-        f"Centre of rotation: {where}; power {1e3 * found.power:.4g} mW<br>"
-        f"Ellipsoid here: {found.force_error:.3f} off, twist {found.angle_error:.1f}° off; at most: "
-        f"force {apart.force.largest:.3f}, τ/r {apart.torque.largest:.3f}, twist {apart.angle.largest:.1f}°<br>"
-        f"<small>Answered in {1e3 * seconds:.1f} ms</small>"
+        f"Centre of rotation: {where}; dissipated power {1e3 * found.power:.4g} mW<br>"
+        f"Error of the ellipsoid: {found.force_error:.3f} of μ<sub>c</sub> f<sub>N</sub> and {found.angle_error:.1f}° "
+        f"in the twist here, up to {max(force, found.force_error):.3f} and {max(angle, found.angle_error):.1f}° "
+        f"elsewhere<br><small>Answered in {1e3 * seconds:.1f} ms</small>"
     )
 
 

@@ -54,10 +54,10 @@ def slip_arrows(state: State) -> dict[str, np.ndarray]:
 
 
 def wrench_arrows(state: State, answer: Answer) -> dict[str, Any]:
-    """Forces of law, surface and ellipsoid as arrows from the centre of pressure [mm], with their colours."""
+    """Forces of law, surface and ellipsoid as arrows from the centre of pressure [mm], one on top of the other."""
     start = np.tile(state.drawing.surface.centre_of_pressure, (3, 1))
     longest = REACH * max(state.drawing.width, state.drawing.height)
-    return {**_arrows(start, start + longest * answer.points[:, :2]), "colour": list(COLOURS.values())}
+    return {**_arrows(start, start + longest * answer.points[:, :2]), "colour": list(COLOURS.values()), "width": [8, 5, 2]}
 
 
 def _arrows(starts: np.ndarray, ends: np.ndarray) -> dict[str, np.ndarray]:
@@ -132,7 +132,7 @@ def _marker(name: str, point: np.ndarray) -> dict[str, Any]:
         "mode": "lines+markers",
         **_coordinates(np.stack([np.zeros(3), point])),
         "line": {"color": COLOURS[name], "width": 5},
-        "marker": {"color": COLOURS[name], "size": [0, 6]},
+        "marker": {"color": COLOURS[name], "size": [0, 8]},
         "hovertemplate": "fx %{x:.4f}<br>fy %{y:.4f}<br>τ/r %{z:.4f}<extra></extra>",
     }
 
@@ -143,7 +143,7 @@ def _layout() -> dict[str, Any]:
         f"{name}axis": {"range": [-limit, limit], "title": {"text": text}}
         for name, text in zip("xyz", ("fx", "fy", "τ/r"), strict=True)
     }
-    camera = {"eye": {"x": 1.2, "y": -1.6, "z": 0.8}}
+    camera = {"eye": {"x": 1.25, "y": -1.65, "z": 0.8}, "center": {"x": 0.0, "y": 0.0, "z": -0.12}}
     return {
         "scene": {**axes, "aspectmode": "cube", "camera": camera},
         "margin": {"l": 0, "r": 0, "t": 0, "b": 0},

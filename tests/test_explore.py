@@ -1,0 +1,220 @@
+"""The explorer without its browser: what the state answers, what is drawn of it, and the code that it becomes."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import tomllib
+
+import numpy as np
+import pytest
+
+import planarfriction as pf
+from planarfriction.errors import FileError, FrictionError, InvalidValueError
+from planarfriction.explore import code, pictures
+from planarfriction.explore.answers import answer
+from planarfriction.explore.drawing import MOST_SIDE, Drawing
+from planarfriction.explore.state import State, law_parameters
+from planarfriction.laws import LAWS
+from planarfriction.patch import PUBLISHED_PATCHES
+
+PAINTED = Drawing.published("Square").painted(0.004, 0.002, radius=0.003, pressure=0.4)
+
+
+def saved(pressures: np.ndarray) -> bytes:
+    buffer = io.BytesIO()
+    np.save(buffer, pressures)
+    return buffer.getvalue()
+
+
+# ---------------------------------------------------------------------- drawing
+
+
+@pytest.mark.parametrize("name", PUBLISHED_PATCHES)
+def test_the_map_of_a_published_patch_presses_as_the_patch_does(name):
+    drawing = Drawing.published(name)
+    as_map, patch = Drawing(drawing.pressures, drawing.cell_size).patch, drawing.patch
+    np.testing.assert_allclose(as_map.positions, patch.positions, atol=1e-9)
+    np.testing.assert_allclose(as_map.weights(), patch.weights(), rtol=1e-12)
+
+
+def test_a_brush_paints_the_cells_in_its_radius_and_leaves_the_drawing_it_was_given():
+    before = Drawing(np.zeros((5, 7)), 1e-3)
+    after = before.painted(0.002, 0.001, radius=1.01e-3, pressure=0.5)  # a cell and its four neighbours
+    expected = np.zeros((5, 7))
+    expected[1, 4:7] = expected[0, 5] = expected[2, 5] = 0.5  # row 0 is the top, y = 2 mm
+    np.testing.assert_array_equal(after.pressures, expected)
+    assert not before.pressures.any() and after.origin == "drawn"
+
+
+def test_a_brush_smaller_than_a_cell_paints_the_cell_under_it_and_outside_the_map_none():
+    blank = Drawing(np.zeros((3, 3)), 1e-3)
+    assert blank.painted(0.0014, -0.0014, radius=0.0, pressure=1.0).pressures[2, 2] == 1.0
+    assert not blank.painted(0.0016, 0.0, radius=0.0, pressure=1.0).pressures.any()
+
+
+def test_a_file_is_read_and_a_path_in_its_name_left_out():
+    pressures = np.array([[0.0, 1.0], [2.0, 3.0]])
+    drawing = Drawing.read("C:\\maps\\pad.npy", saved(pressures), 2e-3)
+    np.testing.assert_array_equal(drawing.pressures, pressures)
+    assert (drawing.name, drawing.origin, drawing.width) == ("pad.npy", "file", 4e-3)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("pad.txt", b"1,2", "pad.txt: unknown kind '.txt'"),
+        ("pad.csv", b"1,2\n3,x\n", "pad.csv: line 2"),
+        ("pad.png", b"no image", "pad.png: not a readable .png file"),
+        ("pad", b"", "pad: unknown kind ''"),
+        ("pad.csv", b"0,0\n0,0\n", "have a total > 0"),
+        ("pad.csv", b"-1,2\n", "pressure must be >= 0"),
+        ("pad.npy", saved(np.ones((1, MOST_SIDE + 1))), f"at most {MOST_SIDE} rows and columns"),
+    ],
+)
+def test_a_file_that_is_no_map_is_one_line_without_the_place_where_it_was_kept(name, content, words):
+    with pytest.raises(FrictionError) as error:
+        Drawing.read(name, content, 1e-3)
+    assert words in str(error.value) and "\n" not in str(error.value) and "/" not in str(error.value).split(":")[0]
+
+
+# ---------------------------------------------------------------------- state
+
+
+def test_the_centre_of_rotation_is_where_it_was_put_and_does_not_move():
+    state = State(twist=(0.3, 0.2, -2.0)).turning_about(0.004, -0.003)
+    assert state.centre_of_rotation == pytest.approx((0.004, -0.003)) and state.twist[2] == -2.0
+    np.testing.assert_allclose(pf.geometry.twist_at(state.twist, (0.004, -0.003))[:2], 0.0, atol=1e-17)
+    assert State(twist=(0.3, 0.2, 0.0)).centre_of_rotation is None
+    assert State(twist=(0.3, 0.2, 0.0)).turning_about(0.0, 0.0).twist[2] == 1.0
+
+
+@pytest.mark.parametrize("values", [{"normal_force": 0.0}, {"twist": (0.0, 1.0)}, {"twist": (np.nan, 0.0, 0.0)}])
+def test_a_state_refuses_what_breaks_a_rule(values):
+    with pytest.raises(InvalidValueError, match=next(iter(values))):
+        State().changed(**values)
+
+
+@pytest.mark.parametrize("kind", LAWS)
+def test_the_parameters_of_a_law_make_it_again(kind):
+    law = State().with_law(kind).law
+    assert State().with_law(kind, **law_parameters(law)).law == law
+
+
+# ---------------------------------------------------------------------- answers
+
+
+@pytest.mark.parametrize("drawing", [Drawing.published("NonConvex2"), PAINTED], ids=["published", "painted"])
+@pytest.mark.parametrize("law", [pf.LuGre(mu_c=0.6, mu_s=0.9, elasto_plastic=0.9), pf.Dahl(mu_c=0.4)])
+def test_the_friction_is_that_of_a_model_that_has_slid_for_long(drawing, law):
+    state = State(drawing, law, 2.0, (0.012, -0.004, 3.0))
+    model = pf.DistributedModel(drawing.patch, law)
+    bristles, wrench = model.rest(), np.zeros(3)
+    for _ in range(200):  # 0.02 s: the slowest loaded cell slides by many times the 1 um that a bristle bends
+        bristles, wrench = model.step(bristles, state.twist, 2.0, 1e-4)
+    np.testing.assert_allclose(answer(state).friction, wrench, rtol=1e-4, atol=2e-7)
+
+
+def test_without_stribeck_and_viscous_friction_the_law_is_on_the_limit_surface_of_its_cells():
+    state = State(law=pf.Dahl(mu_c=0.5), normal_force=3.0)
+    expected = 1.5 * pf.LimitSurfaceCells(state.drawing.patch).wrench(state.twist)
+    found = answer(state)
+    np.testing.assert_allclose(found.friction, expected, rtol=1e-12, atol=1e-15)
+    np.testing.assert_allclose(found.surface, 1.5 * state.drawing.surface.wrench(state.twist), rtol=1e-12)
+    assert found.power == pytest.approx(-expected @ state.twist)
+    # the ellipsoid is the unit sphere in these axes, but for its radius, a sum over cells that is integrated here
+    assert np.linalg.norm(found.points[2]) == pytest.approx(1.0, abs=3e-3)
+
+
+def test_the_ellipsoid_is_right_in_a_spin_about_the_centre_of_pressure_and_nowhere_worse_than_said():
+    centred = answer(State(twist=(0.0, 0.0, 2.0)))
+    assert centred.force_error < 3e-3 and centred.angle_error < 1e-6  # its radius: see above
+    worst = State().drawing.largest_errors
+    shares = np.linspace(-2.0, 2.0, 9)
+    found = [answer(State(twist=(0.01 * share, 0.0, 1.0))) for share in shares]
+    assert 0.1 < max(each.force_error for each in found) < 1.05 * worst[0]  # 100 directions miss little of the largest
+    assert 5.0 < max(each.angle_error for each in found) < 1.05 * worst[1]
+
+
+def test_at_rest_nothing_is_said_and_nothing_fails():
+    found = answer(State(twist=(0.0, 0.0, 0.0)))
+    assert not found.friction.any() and not found.points.any() and found.angle_error == 0.0
+
+
+def test_what_does_not_press_has_no_answer():
+    with pytest.raises(InvalidValueError, match="have a total > 0"):
+        answer(State(drawing=State().drawing.cleared()))
+
+
+# ---------------------------------------------------------------------- pictures
+
+
+def test_the_picture_of_the_map_has_its_top_row_at_the_top():
+    drawing = Drawing(np.array([[2.0, 0.0], [1.0, 1.0], [1.0, 1.0]]), 1e-3)
+    columns = pictures.pressure_image(drawing)
+    np.testing.assert_array_equal(columns["image"][0][-1], [1.0, np.nan])  # rows run upwards
+    assert [columns[key][0] for key in ("x", "y", "dw", "dh")] == [-1.0, -1.5, 2.0, 3.0]
+
+
+def test_arrows_of_slip_turn_about_the_centre_of_rotation_and_stand_where_something_presses():
+    state = State(Drawing.published("NonConvex1")).turning_about(0.002, 0.001)
+    arrows = pictures.slip_arrows(state)
+    along = np.stack([arrows["x1"] - arrows["x0"], arrows["y1"] - arrows["y0"]])
+    lever = np.stack([arrows["x0"] - 2.0, arrows["y0"] - 1.0])
+    assert len(arrows["x0"]) > 2 and np.abs(arrows["y0"]).max() < 1.5
+    np.testing.assert_allclose((along * lever).sum(axis=0), 0.0, atol=1e-12)
+
+
+def test_moving_the_twist_leaves_the_drawn_surface_as_it_is():
+    state = State(PAINTED)
+    figure = pictures.surface_figure(state)
+    moved = pictures.moved(figure, answer(state))
+    assert all(one is other for one, other in zip(figure["data"][:2], moved["data"][:2], strict=True))
+    for trace, point in zip(moved["data"][2:], answer(state).points, strict=True):
+        assert [trace[axis][1] for axis in "xyz"] == pytest.approx(point.tolist())
+
+
+# ---------------------------------------------------------------------- code
+
+
+@pytest.mark.parametrize("origin", ["published", "drawn", "file"])
+def test_the_code_gives_the_numbers_on_the_screen(origin, tmp_path, monkeypatch):
+    drawing = {"published": Drawing.published("LineGrad"), "drawn": PAINTED}.get(origin)
+    if drawing is None:
+        content = saved(np.array([[0.0, 1.0, 3.0], [1.0, 1.0, 0.1]]))
+        (tmp_path / "pad.npy").write_bytes(content)
+        drawing = Drawing.read("pad.npy", content, 1.5e-3)
+    monkeypatch.chdir(tmp_path)
+    state = State(drawing, pf.LuGre(mu_c=0.7, mu_s=0.8, elasto_plastic=0.5), 2.5, (0.01, 0.02, -1.5))
+    expected = answer(state)
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        exec(code.python(state), {})
+    *surfaces, friction = printed.getvalue().splitlines()
+    for line, wrench in zip(surfaces, (expected.surface, expected.ellipsoid), strict=True):
+        np.testing.assert_allclose(np.fromstring(line.strip("[]"), sep=" "), wrench, atol=1e-8)  # eight digits are printed
+    np.testing.assert_allclose(np.fromstring(friction, sep=" "), expected.friction, rtol=1e-4, atol=2e-7)
+    (tmp_path / "scene.toml").write_text(code.toml(state))
+    scene = pf.Scene.from_file("scene.toml")
+    assert scene.contacts[0].model.law == state.law and scene.velocity is not None
+    np.testing.assert_array_equal(scene.velocity(0.3), state.twist)
+    np.testing.assert_allclose(scene.contacts[0].model.patch.weights(), drawing.patch.weights(), rtol=1e-15)
+    assert float(scene.contacts[0].normal_force(0.3)) == 2.5
+
+
+@pytest.mark.parametrize("kind", LAWS)
+def test_the_code_of_every_law_makes_that_law(kind):
+    state = State().with_law(kind, mu_c=0.3)
+    line = next(line for line in code.python(state).splitlines() if line.startswith("law = "))
+    assert eval(line.removeprefix("law = "), {"pf": pf}) == state.law
+    assert tomllib.loads(code.toml(state))["contact"][0]["law"]["kind"] == kind
+
+
+def test_without_panel_the_command_names_the_extra(monkeypatch, capsys):
+    from planarfriction.cli import main
+
+    monkeypatch.setitem(__import__("sys").modules, "panel", None)
+    assert main(["explore", "--no-browser"]) == 2
+    assert "planarfriction[explore]" in capsys.readouterr().err
+    with pytest.raises(FileError, match="unknown kind"):
+        Drawing.read("x.exe", b"", 1e-3)
