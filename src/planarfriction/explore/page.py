@@ -31,6 +31,8 @@ FASTEST = 0.1
 
 _CODE = "textarea {font-family: monospace; color: #222 !important; background: #FAFAFA; opacity: 1 !important}"
 
+_ALERT = "background:#FBE3E0;border:1px solid #C0392B;padding:6px 12px;font-size:110%"
+
 _TABLE = "font-variant-numeric:tabular-nums;border-collapse:collapse"
 
 
@@ -52,9 +54,9 @@ class Page:
     def _controls(self) -> None:
         widgets = pn.widgets
         self.patch = widgets.Select(name="Patch", options=[*PUBLISHED_PATCHES, OWN], value=self.state.drawing.name)
-        self.cell_size = widgets.FloatInput(name="Cell size [mm]", step=0.1, format="0[.]0000")
+        self.cell_size = widgets.FloatInput(name="Cell size [mm]", step=0.1, format="0[.]0000", width=140)
         self.file = widgets.FileInput(name="Pressure map", accept="", sizing_mode="stretch_width")
-        self.clear = widgets.Button(name="Clear the map")
+        self.clear = widgets.Button(name="Clear the map", width=140, align="end")
         self.tool = widgets.RadioButtonGroup(options=TOOLS, value="turn")
         self.brush = widgets.FloatSlider(name="Brush: radius [cells]", start=0.5, end=6.0, step=0.5, value=1.5)
         self.pressure = widgets.FloatSlider(name="Brush: pressure", start=0.1, end=1.0, step=0.1, value=1.0)
@@ -65,6 +67,9 @@ class Page:
         self.vx = widgets.FloatSlider(name="vx [mm/s]", start=-100.0, end=100.0, step=0.1, value=1e3 * vx)
         self.vy = widgets.FloatSlider(name="vy [mm/s]", start=-100.0, end=100.0, step=0.1, value=1e3 * vy)
         self.omega = widgets.FloatSlider(name="ω [rad/s]", start=-10.0, end=10.0, step=0.01, value=omega)
+        for name, widget in vars(self).items():  # a name for the widget in the page too
+            if isinstance(widget, widgets.Widget):
+                widget.css_classes = [name.replace("_", "-")]
         self._offer_parameters()
         for slider in (self.vx, self.vy, self.omega):
             slider.param.watch(self._slid, "value")
@@ -87,7 +92,7 @@ class Page:
     def _offer_parameters(self) -> None:
         """Fields for the parameters of the law; empty ones have a default that depends on others."""
         inputs = [
-            pn.widgets.FloatInput(name=name, value=value, width=140)
+            pn.widgets.FloatInput(name=name, value=value, width=140, css_classes=["parameter", name])
             for name, value in law_parameters(self.state.law).items()
         ]
         for each in inputs:
@@ -155,7 +160,8 @@ class Page:
             self._say(str(error))
 
     def _say(self, text: str) -> None:
-        self.message.object, self.message.visible = html.escape(text), True
+        self.message.object = f"<div id='message' style='{_ALERT}'>{html.escape(text)}</div>"
+        self.message.visible = True
 
     def _change(self, **values: Any) -> None:
         self.state = self.state.changed(**values)
@@ -188,10 +194,10 @@ class Page:
         self.map = plot
         self.surface = pn.pane.Plotly(None, config={"displaylogo": False}, name="surface")
         self.numbers = pn.pane.HTML("", css_classes=["numbers"])
-        self.message = pn.pane.Alert("", alert_type="danger", visible=False, css_classes=["message"])
+        self.message = pn.pane.HTML("", visible=False, sizing_mode="stretch_width")
         self.python, self.toml = (
-            pn.widgets.TextAreaInput(disabled=True, height=330, max_length=10**6, sizing_mode="stretch_width", stylesheets=[_CODE])
-            for _ in range(2)
+            pn.widgets.TextAreaInput(disabled=True, height=330, max_length=10**6, sizing_mode="stretch_width", stylesheets=[_CODE], css_classes=[kind])
+            for kind in ("python", "toml")
         )
 
     def _redraw(self, *, quick: bool = False) -> None:
@@ -242,7 +248,7 @@ class Page:
         left = pn.Column(
             pn.pane.HTML("<h2 style='margin:0'>planarfriction explorer</h2>"),
             self.patch,
-            pn.Row(self.cell_size, self.clear, align="end"),
+            pn.Row(self.cell_size, self.clear),
             pn.pane.HTML("Pressure map (.csv, .npy, grey image):"),
             self.file,
             self.brush,
@@ -255,7 +261,7 @@ class Page:
             *(self.vx, self.vy, self.omega),
             width=330,
         )
-        middle = pn.Column(pn.pane.HTML("A drag over the map moves:"), self.tool, pn.pane.Bokeh(self.map))
+        middle = pn.Column(pn.pane.HTML("A drag over the map moves:"), self.tool, pn.pane.Bokeh(self.map, css_classes=["map"]))
         right = pn.Column(self.numbers, self.surface)
         tabs = pn.Tabs(("Python", self._copied(self.python)), ("Scene file (TOML)", self._copied(self.toml)))
         return pn.Column(self.message, pn.Row(left, pn.Column(pn.Row(middle, right), tabs)))
@@ -263,7 +269,7 @@ class Page:
     @staticmethod
     def _copied(area: Any) -> Any:
         """A text with a button that copies it."""
-        copy = pn.widgets.Button(name="Copy")
+        copy = pn.widgets.Button(name="Copy", css_classes=[f"copy-{area.css_classes[0]}"])
         copy.js_on_click(args={"area": area}, code="navigator.clipboard.writeText(area.value)")
         return pn.Column(copy, area, sizing_mode="stretch_width")
 
@@ -281,12 +287,12 @@ def numbers(state: State, found: Answer, seconds: float) -> str:
     (force, angle), centre = state.drawing.largest_errors, state.centre_of_rotation
     where = "none, no spin" if centre is None else f"({1e3 * centre[0]:.2f}, {1e3 * centre[1]:.2f}) mm"
     return (
-        f"<table style='{_TABLE}'><tr><td></td><td align=right>fx [N]</td><td align=right>fy [N]</td>"
+        f"<div id='answer'><table style='{_TABLE}'><tr><td></td><td align=right>fx [N]</td><td align=right>fy [N]</td>"
         f"<td align=right>τ [N mm]</td></tr>{rows}</table>"
         f"Centre of rotation: {where}; dissipated power {1e3 * found.power:.4g} mW<br>"
         f"Error of the ellipsoid: {found.force_error:.3f} of μ<sub>c</sub> f<sub>N</sub> and {found.angle_error:.1f}° "
         f"in the twist here, up to {max(force, found.force_error):.3f} and {max(angle, found.angle_error):.1f}° "
-        f"elsewhere<br><small>Answered in {1e3 * seconds:.1f} ms</small>"
+        f"elsewhere<br><small>Answered in {1e3 * seconds:.1f} ms</small></div>"
     )
 
 

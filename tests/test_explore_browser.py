@@ -1,0 +1,253 @@
+"""The explorer in a real browser, without a window: every control, files that are no maps, two visitors at once."""
+
+from __future__ import annotations
+
+import re
+import shutil
+import socket
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+from collections.abc import Iterator
+
+import numpy as np
+import pytest
+
+pytestmark = [pytest.mark.slow, pytest.mark.explore]
+
+pytest.importorskip("panel")
+playwright = pytest.importorskip("playwright.sync_api")
+
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+SOFTWARE_GL = ["--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
+
+NEXT_ANSWER = """async (before) => {
+    const find = (root) => {
+        for (const each of root.querySelectorAll("*")) {
+            const found = each.id === "answer" ? each : each.shadowRoot && find(each.shadowRoot);
+            if (found) return found;
+        }
+        return null;
+    };
+    const begin = performance.now();
+    for (;;) {
+        await new Promise(requestAnimationFrame);
+        const found = find(document);
+        if (found && found.innerHTML !== before) return [performance.now() - begin, found.innerHTML];
+        if (performance.now() - begin > 10000) return [null, before];
+    }
+}"""
+"""Waits until the numbers are others than before: the time that took [ms], and the numbers."""
+
+
+@pytest.fixture(scope="module")
+def address() -> Iterator[str]:
+    command = [sys.executable, "-c", "import sys; from planarfriction.cli import main; sys.exit(main())", "explore"]
+    with subprocess.Popen([*command, "--no-browser"], stderr=subprocess.PIPE, text=True) as process:
+        try:
+            yield re.search(r"http://localhost:\d+", process.stderr.readline())[0]
+        finally:
+            process.terminate()
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[object]:
+    if CHROMIUM is None:
+        pytest.skip("needs Chromium")
+    with playwright.sync_playwright() as driver:
+        chromium = driver.chromium.launch(executable_path=CHROMIUM, args=SOFTWARE_GL)
+        yield chromium
+        chromium.close()
+
+
+class Visitor:
+    """A page in the browser, and what stands on it."""
+
+    def __init__(self, browser, address: str):
+        context = browser.new_context(viewport={"width": 1500, "height": 1100})
+        context.grant_permissions(["clipboard-read", "clipboard-write"], origin=address)
+        self.page, self.errors, self.elsewhere = context.new_page(), [], []
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.page.on("request", lambda asked: self.elsewhere.append(asked.url) if self._outside(asked.url) else None)
+        self.address = address
+        self.page.goto(address)
+        self.page.wait_for_selector("#answer", timeout=60_000)
+
+    def _outside(self, url: str) -> bool:
+        return not url.startswith((self.address, "data:", "blob:", self.address.replace("http", "ws")))
+
+    def text(self) -> str:
+        return self.page.locator("#answer").inner_text()
+
+    def numbers(self) -> np.ndarray:
+        """Wrenches of law, surface and ellipsoid, `[3, 3]` [N, N, N mm]."""
+        return np.array([[float(each) for each in row.split("\t")[1:]] for row in self.text().splitlines()[1:4]])
+
+    def message(self) -> str:
+        return self.page.locator("#message").inner_text(timeout=5000)
+
+    def code(self, kind: str = "python") -> str:
+        return self.page.locator(f".{kind} textarea").input_value()
+
+    def after(self, act) -> str:
+        """Numbers once `act` has changed them."""
+        before = self.page.locator("#answer").inner_html()
+        act()
+        time, _ = self.page.evaluate(NEXT_ANSWER, before)
+        assert time is not None, "nothing changed"
+        return self.text()
+
+    def choose(self, control: str, value: str) -> None:
+        self.page.locator(f".{control} select").select_option(value)
+
+    def fill(self, control: str, value: str) -> None:
+        field = self.page.locator(f".{control} input").first
+        field.fill(value)
+        field.press("Enter")
+
+    def tool(self, name: str) -> None:
+        self.page.locator(".tool").get_by_text(name, exact=True).click()
+
+    def place(self, x: float, y: float) -> tuple[float, float]:
+        """Where a point of the map [mm] is on the screen."""
+        return tuple(
+            self.page.evaluate(
+                """([x, y]) => {
+                    const view = Bokeh.index.query_one((each) => each.model.type === "Figure");
+                    const canvas = view.canvas_view.el.getBoundingClientRect(), frame = view.frame;
+                    return [canvas.x + frame.x_scale.compute(x), canvas.y + frame.y_scale.compute(y)];
+                }""",
+                [x, y],
+            )
+        )
+
+    def drag(self, *points: tuple[float, float]) -> None:
+        places = [self.place(*point) for point in points]
+        self.page.mouse.move(*places[0])
+        self.page.mouse.down()
+        for place in places[1:]:
+            self.page.mouse.move(*place, steps=4)
+        self.page.mouse.up()
+
+
+@pytest.fixture
+def visitor(browser, address) -> Iterator[Visitor]:
+    """A new page; nothing may fail in it or ask another computer for anything."""
+    one = Visitor(browser, address)
+    yield one
+    one.page.context.close()
+    assert one.errors == [] and one.elsewhere == []
+
+
+def test_a_drag_moves_the_centre_of_rotation_to_the_pointer(visitor):
+    visitor.after(lambda: visitor.drag((0.0, 10.0), (3.0, 5.0), (5.0, -4.0)))
+    visitor.page.wait_for_timeout(500)
+    x, y = map(float, re.search(r"rotation: \((.*?), (.*?)\) mm", visitor.text()).groups())
+    assert (x, y) == pytest.approx((5.0, -4.0), abs=0.1)  # a pixel is 0.05 mm
+    twist = re.search(r"twist, normal_force = \((.*?), (.*?), 1.0\)", visitor.code()).groups()
+    assert [float(each) for each in twist] == pytest.approx([1e-3 * y, -1e-3 * x], abs=1e-5)
+
+
+def test_a_drag_gives_the_velocity_and_friction_points_against_it(visitor):
+    visitor.tool("Velocity")
+    visitor.after(lambda: visitor.drag((0.0, 0.0), (0.0, 5.0)))
+    visitor.page.wait_for_timeout(500)
+    friction = visitor.numbers()[0]
+    assert friction[1] < -0.9 and abs(friction[0]) < 0.05
+
+
+def test_a_brush_paints_and_an_eraser_takes_away(visitor):
+    visitor.tool("Eraser")
+    visitor.after(lambda: visitor.drag((-3.0, 0.0), (3.0, 0.0)))
+    visitor.page.wait_for_timeout(1000)
+    erased = visitor.code()
+    assert "from_pressure([" in erased and visitor.page.locator(".patch select").input_value() == "own map"
+    visitor.tool("Brush")
+    visitor.page.locator(".brush .noUi-handle").press("ArrowRight")
+    visitor.page.locator(".pressure .noUi-handle").press("ArrowLeft")
+    visitor.after(lambda: visitor.drag((-3.0, 0.0), (3.0, 0.0)))
+    visitor.page.wait_for_timeout(1000)
+    assert ", 0.9," in visitor.code() and ", 0.9," not in erased
+
+
+def test_a_cleared_map_says_what_is_missing_and_can_be_painted(visitor):
+    visitor.page.locator(".clear button").click()
+    assert "have a total > 0" in visitor.message()
+    visitor.tool("Brush")
+    visitor.drag((-3.0, 2.0), (3.0, 2.0))
+    visitor.page.wait_for_selector("#answer")
+    assert np.abs(visitor.numbers()[0]).max() > 0.5
+
+
+def test_every_other_control_changes_what_is_said(visitor):
+    assert "Line" in visitor.after(lambda: visitor.choose("patch", "Line")) or "Line" in visitor.code()
+    visitor.after(lambda: visitor.fill("cell-size", "2"))
+    assert "cell_size=0.002" in visitor.code()
+    visitor.after(lambda: visitor.choose("patch", "Square"))
+    visitor.after(lambda: visitor.fill("load", "2"))
+    assert np.abs(visitor.numbers()[1]).max() > 1.0 and ", 2.0" in visitor.code()
+    visitor.after(lambda: visitor.fill("sigma_2", "3"))
+    assert "sigma_2=3" in visitor.code()
+    visitor.after(lambda: visitor.choose("law", "dahl"))
+    assert "pf.Dahl(" in visitor.code() and visitor.page.locator(".parameter").count() == 2
+    for name in ("vx", "vy", "omega"):
+        visitor.after(lambda name=name: visitor.page.locator(f".{name} .noUi-handle").press("ArrowRight"))
+
+
+def test_a_value_that_breaks_a_rule_is_one_line_and_the_page_goes_on(visitor):
+    visitor.fill("mu_s", "0.5")
+    assert "mu_s must be >= mu_c" in visitor.message()
+    visitor.after(lambda: visitor.fill("mu_s", "1.5"))
+    assert "mu_s=1.5" in visitor.code()
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [("pad.txt", b"1", "unknown kind"), ("pad.csv", b"1,x\n", "line 1"), ("pad.png", b"\x89PNG", "not a readable")],
+)
+def test_a_wrong_file_is_one_line_and_a_right_one_is_loaded_after_it(visitor, name, content, words):
+    before = visitor.text()
+    visitor.page.locator(".file input").set_input_files({"name": name, "mimeType": "", "buffer": content})
+    message = visitor.message()
+    assert name in message and words in message and visitor.text() == before
+    right = {"name": "right.csv", "mimeType": "text/csv", "buffer": b"0,1,0\n1,2,1\n"}
+    visitor.after(lambda: visitor.page.locator(".file input").set_input_files(right))
+    assert "'right.csv'" in visitor.code() and not visitor.page.locator("#message").is_visible()
+
+
+def test_what_is_on_the_screen_can_be_copied(visitor):
+    visitor.page.locator(".copy-python button").click()
+    assert visitor.page.evaluate("navigator.clipboard.readText()") == visitor.code()
+    visitor.page.get_by_text("Scene file (TOML)").click()
+    visitor.page.locator(".copy-toml button").click()
+    assert 'kind = "lugre"' in visitor.page.evaluate("navigator.clipboard.readText()")
+
+
+def test_two_visitors_do_not_change_each_other(visitor, browser, address):
+    other = Visitor(browser, address)
+    before = other.text(), other.code()
+    visitor.after(lambda: visitor.choose("patch", "NonConvex2"))
+    visitor.after(lambda: visitor.fill("load", "5"))
+    assert (other.text(), other.code()) == before
+    other.after(lambda: other.choose("patch", "Line"))
+    assert "NonConvex2" in visitor.code() and "'Line'" in other.code()
+    other.page.context.close()
+    assert other.errors == []
+
+
+def test_nobody_else_in_the_network_can_reach_it(address):
+    port = int(address.rpartition(":")[2])
+    with socket.create_connection(("127.0.0.1", port), timeout=5):
+        pass
+    others = {each[4][0] for each in socket.getaddrinfo(socket.gethostname(), None, socket.AF_INET)}
+    for host in (others | {"127.0.0.2"}) - {"127.0.0.1"}:
+        with pytest.raises(OSError), socket.create_connection((host, port), timeout=5):
+            pass
+
+
+def test_pages_of_other_sites_are_refused(address):
+    headers = {"Origin": "http://example.org", "Upgrade": "websocket", "Connection": "Upgrade"}
+    headers |= {"Sec-WebSocket-Version": "13", "Sec-WebSocket-Protocol": "bokeh, none", "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA=="}
+    with pytest.raises(urllib.error.HTTPError, match="403"):
+        urllib.request.urlopen(urllib.request.Request(f"{address}/ws", headers=headers), timeout=10)
