@@ -192,7 +192,9 @@ def test_the_code_gives_the_numbers_on_the_screen(origin, tmp_path, monkeypatch)
         exec(code.python(state), {})
     *surfaces, friction = printed.getvalue().splitlines()
     for line, wrench in zip(surfaces, (expected.surface, expected.ellipsoid), strict=True):
-        np.testing.assert_allclose(np.fromstring(line.strip("[]"), sep=" "), wrench, atol=1e-8)  # eight digits are printed
+        np.testing.assert_allclose(
+            np.fromstring(line.strip("[]"), sep=" "), wrench, atol=1e-8
+        )  # eight digits are printed
     np.testing.assert_allclose(np.fromstring(friction, sep=" "), expected.friction, rtol=1e-4, atol=2e-7)
     (tmp_path / "scene.toml").write_text(code.toml(state))
     scene = pf.Scene.from_file("scene.toml")

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+import http.client
 import re
 import shutil
 import socket
 import subprocess
 import sys
-import urllib.error
-import urllib.request
 from collections.abc import Iterator
 
 import numpy as np
@@ -35,7 +34,7 @@ NEXT_ANSWER = """async (before) => {
         await new Promise(requestAnimationFrame);
         const found = find(document);
         if (found && found.innerHTML !== before) return [performance.now() - begin, found.innerHTML];
-        if (performance.now() - begin > 10000) return [null, before];
+        if (performance.now() - begin > 30000) return [null, before];
     }
 }"""
 """Waits until the numbers are others than before: the time that took [ms], and the numbers."""
@@ -248,6 +247,12 @@ def test_nobody_else_in_the_network_can_reach_it(address):
 
 def test_pages_of_other_sites_are_refused(address):
     headers = {"Origin": "http://example.org", "Upgrade": "websocket", "Connection": "Upgrade"}
-    headers |= {"Sec-WebSocket-Version": "13", "Sec-WebSocket-Protocol": "bokeh, none", "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA=="}
-    with pytest.raises(urllib.error.HTTPError, match="403"):
-        urllib.request.urlopen(urllib.request.Request(f"{address}/ws", headers=headers), timeout=10)
+    headers |= {
+        "Sec-WebSocket-Version": "13",
+        "Sec-WebSocket-Protocol": "bokeh, none",
+        "Sec-WebSocket-Key": "AAAAAAAAAAAAAAAAAAAAAA==",
+    }
+    connection = http.client.HTTPConnection(address.removeprefix("http://"), timeout=10)
+    connection.request("GET", "/ws", headers=headers)
+    assert connection.getresponse().status == 403
+    connection.close()

@@ -35,7 +35,8 @@ def answer(state: State) -> Answer:
     surface, ellipsoid = state.drawing.surface, state.drawing.ellipsoid
     twist, strength = np.array(state.twist), state.law.numbers.mu_c * state.normal_force
     unit = surface.wrench(twist)
-    wrenches = np.stack([steady_wrench(state), strength * unit, strength * ellipsoid.wrench(twist)])
+    friction, on_surface, on_ellipsoid = steady_wrench(state), strength * unit, strength * ellipsoid.wrench(twist)
+    wrenches = np.stack([friction, on_surface, on_ellipsoid])
     scale = np.array([1.0, 1.0, surface.contact_radius])
     points = geometry.wrench_at(wrenches, surface.centre_of_pressure) / (strength * scale)
     angle = 0.0
@@ -44,7 +45,7 @@ def answer(state: State) -> Answer:
         here, there = geometry.twist_at(both, surface.centre_of_pressure) * scale
         angle = float(np.degrees(np.arctan2(np.linalg.norm(np.cross(here, there)), here @ there)))
     error = float(np.linalg.norm(points[2] - points[1]))
-    return Answer(*wrenches, points, error, angle, float(-wrenches[0] @ twist))
+    return Answer(friction, on_surface, on_ellipsoid, points, error, angle, float(-friction @ twist))
 
 
 def steady_wrench(state: State) -> np.ndarray:
@@ -56,4 +57,3 @@ def steady_wrench(state: State) -> np.ndarray:
     share = patch.weights() * state.law.steady_friction(speed) / np.where(speed > 0.0, speed, 1.0)
     fx, fy = -state.normal_force * share * vx, -state.normal_force * share * vy
     return np.array([fx.sum(), fy.sum(), (x * fy - y * fx).sum()])
-

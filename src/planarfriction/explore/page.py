@@ -10,12 +10,14 @@ from typing import Any
 import panel as pn
 from bokeh import events
 from bokeh.models import ColumnDataSource, LinearColorMapper, Range1d
+from bokeh.palettes import Cividis256
 from bokeh.plotting import figure
 
 from planarfriction.errors import FrictionError
 from planarfriction.explore import code, pictures
 from planarfriction.explore.answers import Answer, answer
 from planarfriction.explore.drawing import Drawing
+from planarfriction.explore.pacing import Paced
 from planarfriction.explore.state import State, law_parameters
 from planarfriction.laws import LAWS
 from planarfriction.patch import PUBLISHED_PATCHES
@@ -44,6 +46,7 @@ class Page:
         self.answer: Answer | None = None
         self._figure: dict[str, Any] = {}
         self._silent, self._pointer = False, None
+        self.slow = Paced(self._show_slow)
         self._controls()
         self._pictures()
         self._redraw()
@@ -61,7 +64,7 @@ class Page:
         self.brush = widgets.FloatSlider(name="Brush: radius [cells]", start=0.5, end=6.0, step=0.5, value=1.5)
         self.pressure = widgets.FloatSlider(name="Brush: pressure", start=0.1, end=1.0, step=0.1, value=1.0)
         self.law = widgets.Select(name="Law", options=list(LAWS), value=LAWS.name_of(self.state.law))
-        self.parameters = pn.GridBox(ncols=2)
+        self.parameters: Any = pn.GridBox(ncols=2)
         self.load = widgets.FloatInput(name="Normal force [N]", value=self.state.normal_force, step=0.5)
         vx, vy, omega = self.state.twist
         self.vx = widgets.FloatSlider(name="vx [mm/s]", start=-100.0, end=100.0, step=0.1, value=1e3 * vx)
@@ -124,7 +127,8 @@ class Page:
             return
         waiting, self._pointer = self._pointer is not None, (1e-3 * event.x, 1e-3 * event.y)
         if not waiting:
-            pn.state.curdoc.add_next_tick_callback(self._follow)
+            document: Any = pn.state.curdoc
+            document.add_next_tick_callback(self._follow)
 
     def _follow(self) -> None:
         pointer, self._pointer = self._pointer, None
@@ -173,13 +177,13 @@ class Page:
         self._refresh()
 
     def _pictures(self) -> None:
-        self.sources = {name: ColumnDataSource() for name in ("map", "slip", "wrench", "centre")}
+        self.sources: dict[str, Any] = {name: ColumnDataSource() for name in ("map", "slip", "wrench", "centre")}
         plot: Any = figure(
             width=520, height=520, tools="", toolbar_location=None, x_axis_label="x [mm]", y_axis_label="y [mm]"
         )
         plot.grid.visible = False
         self._ranges = plot.x_range, plot.y_range = Range1d(), Range1d()
-        shades = LinearColorMapper("Cividis256", low=0.0, high=1.0, nan_color="#FFFFFF00")
+        shades = LinearColorMapper(palette=Cividis256, low=0.0, high=1.0, nan_color="#FFFFFF00")
         plot.image("image", "x", "y", "dw", "dh", source=self.sources["map"], color_mapper=shades, alpha=0.85)
         for name, colour, width, size in (("slip", "#444444", 1, 6), ("wrench", {"field": "colour"}, "width", 13)):
             source = self.sources[name]
@@ -196,7 +200,14 @@ class Page:
         self.numbers = pn.pane.HTML("", css_classes=["numbers"])
         self.message = pn.pane.HTML("", visible=False, sizing_mode="stretch_width")
         self.python, self.toml = (
-            pn.widgets.TextAreaInput(disabled=True, height=330, max_length=10**6, sizing_mode="stretch_width", stylesheets=[_CODE], css_classes=[kind])
+            pn.widgets.TextAreaInput(
+                disabled=True,
+                height=330,
+                max_length=10**6,
+                sizing_mode="stretch_width",
+                stylesheets=[_CODE],
+                css_classes=[kind],
+            )
             for kind in ("python", "toml")
         )
 
@@ -224,8 +235,7 @@ class Page:
         try:
             self.answer = answer(self.state)
             self.sources["wrench"].data = pictures.wrench_arrows(self.state, self.answer)
-            self.surface.object = pictures.moved(self._figure, self.answer)
-            self.python.value, self.toml.value = code.python(self.state), code.toml(self.state)
+            self.slow.ask()
             text = numbers(self.state, self.answer, time.perf_counter() - begin)
         except FrictionError:
             self.answer, self._figure, self.surface.object = None, {}, None
@@ -233,6 +243,12 @@ class Page:
             self.python.value = self.toml.value = self.numbers.object = ""
             raise
         self.numbers.object = text
+
+    def _show_slow(self) -> None:
+        """What does not have to follow a drag: the picture in 3-D and the code."""
+        if self.answer is not None:
+            self.surface.object = pictures.moved(self._figure, self.answer)
+            self.python.value, self.toml.value = code.python(self.state), code.toml(self.state)
 
     def _quietly(self, values: dict[Any, Any]) -> None:
         """Set controls to what the state is, without taking that for a wish of the user."""
@@ -261,10 +277,14 @@ class Page:
             *(self.vx, self.vy, self.omega),
             width=330,
         )
-        middle = pn.Column(pn.pane.HTML("A drag over the map moves:"), self.tool, pn.pane.Bokeh(self.map, css_classes=["map"]))
+        middle = pn.Column(
+            pn.pane.HTML("A drag over the map moves:"), self.tool, pn.pane.Bokeh(self.map, css_classes=["map"])
+        )
         right = pn.Column(self.numbers, self.surface)
         tabs = pn.Tabs(("Python", self._copied(self.python)), ("Scene file (TOML)", self._copied(self.toml)))
-        return pn.Column(self.message, pn.Row(left, pn.Column(pn.Row(middle, right), tabs)))
+        return pn.Column(
+            self.message, self.slow.asked, self.slow.drawn, pn.Row(left, pn.Column(pn.Row(middle, right), tabs))
+        )
 
     @staticmethod
     def _copied(area: Any) -> Any:

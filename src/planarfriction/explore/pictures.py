@@ -57,7 +57,11 @@ def wrench_arrows(state: State, answer: Answer) -> dict[str, Any]:
     """Forces of law, surface and ellipsoid as arrows from the centre of pressure [mm], one on top of the other."""
     start = np.tile(state.drawing.surface.centre_of_pressure, (3, 1))
     longest = REACH * max(state.drawing.width, state.drawing.height)
-    return {**_arrows(start, start + longest * answer.points[:, :2]), "colour": list(COLOURS.values()), "width": [8, 5, 2]}
+    return {
+        **_arrows(start, start + longest * answer.points[:, :2]),
+        "colour": list(COLOURS.values()),
+        "width": [8, 5, 2],
+    }
 
 
 def _arrows(starts: np.ndarray, ends: np.ndarray) -> dict[str, np.ndarray]:
