@@ -8,12 +8,15 @@ import tomllib
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import planarfriction as pf
 from planarfriction.errors import FileError, FrictionError, InvalidValueError
 from planarfriction.explore import code, pictures
 from planarfriction.explore.answers import answer
 from planarfriction.explore.drawing import MOST_SIDE, Drawing
+from planarfriction.explore.films import film
+from planarfriction.explore.ladder import RUNGS, climb
 from planarfriction.explore.state import State, law_parameters
 from planarfriction.laws import LAWS
 from planarfriction.patch import PUBLISHED_PATCHES
@@ -210,6 +213,26 @@ def test_the_code_of_every_law_makes_that_law(kind):
     line = next(line for line in code.python(state).splitlines() if line.startswith("law = "))
     assert eval(line.removeprefix("law = "), {"pf": pf}) == state.law
     assert tomllib.loads(code.toml(state))["contact"][0]["law"]["kind"] == kind
+
+
+# ---------------------------------------------------------------------- runs
+
+
+def test_the_models_are_compared_with_the_distributed_one_and_a_law_that_one_refuses_is_said():
+    rungs = {each.name: each for each in climb(State(Drawing.published("NonConvex1"), State().law))}
+    assert list(rungs) == list(RUNGS) and rungs["distributed"].error == 0.0
+    assert [each.states for each in rungs.values()] == [36, 36, 12, 3, 3]
+    assert 0.0 < rungs["reduced, 4 parts"].error < rungs["reduced"].error < 0.2  # of mu_c f_N
+    refused = {each.name: each for each in climb(State().with_law("coulomb-stribeck"))}["reduced"]
+    assert np.isnan(refused.error) and "no creep_speed" in refused.refusal
+
+
+@pytest.mark.slow  # a film takes seconds
+def test_a_scene_is_run_with_the_contact_on_the_screen():
+    with Image.open(io.BytesIO(film(State(), "free-slide", "reduced"))) as picture:
+        assert picture.format == "GIF" and picture.n_frames >= 75
+    with pytest.raises(FrictionError, match="creep_speed"):
+        film(State().with_law("coulomb-stribeck"), "free-slide", "reduced")
 
 
 def test_without_panel_the_command_names_the_extra(monkeypatch, capsys):

@@ -223,6 +223,19 @@ def test_what_is_on_the_screen_can_be_copied(visitor):
     assert 'kind = "lugre"' in visitor.page.evaluate("navigator.clipboard.readText()")
 
 
+def test_the_models_are_compared_and_a_scene_is_run_while_the_page_goes_on(visitor):
+    visitor.page.get_by_text("Models", exact=True).click()
+    visitor.page.locator(".compare button").click()
+    visitor.page.locator("#ladder tr").nth(5).wait_for(timeout=120_000)
+    visitor.page.get_by_text("Run a scene").click()
+    visitor.page.locator(".scene select").select_option("free-slide")
+    visitor.page.locator(".model select").select_option("distributed")
+    visitor.page.locator(".run button").click()
+    visitor.after(lambda: visitor.fill("load", "3"))  # meanwhile
+    visitor.page.locator("#film").wait_for(timeout=120_000)
+    assert visitor.page.locator("#film").evaluate("(each) => each.naturalWidth") > 300
+
+
 def test_two_visitors_do_not_change_each_other(visitor, browser, address):
     other = Visitor(browser, address)
     before = other.text(), other.code()

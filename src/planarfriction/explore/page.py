@@ -16,6 +16,7 @@ from bokeh.plotting import figure
 from planarfriction.errors import FrictionError
 from planarfriction.explore import code, pictures
 from planarfriction.explore.answers import Answer, answer
+from planarfriction.explore.background import models_tab, scene_tab
 from planarfriction.explore.drawing import Drawing
 from planarfriction.explore.pacing import Paced
 from planarfriction.explore.state import State, law_parameters
@@ -281,7 +282,12 @@ class Page:
             pn.pane.HTML("A drag over the map moves:"), self.tool, pn.pane.Bokeh(self.map, css_classes=["map"])
         )
         right = pn.Column(self.numbers, self.surface)
-        tabs = pn.Tabs(("Python", self._copied(self.python)), ("Scene file (TOML)", self._copied(self.toml)))
+        tabs = pn.Tabs(
+            ("Python", self._copied(self.python)),
+            ("Scene file (TOML)", self._copied(self.toml)),
+            ("Models", models_tab(lambda: self.state)),
+            ("Run a scene", scene_tab(lambda: self.state)),
+        )
         return pn.Column(
             self.message, self.slow.asked, self.slow.drawn, pn.Row(left, pn.Column(pn.Row(middle, right), tabs))
         )
