@@ -1,4 +1,4 @@
-"""What takes longer than a drag: the comparison of the models and the film of a scene, each at the press of a button."""
+"""What takes longer than a drag: the comparison of the models and the film of a scene, each at a button's press."""
 
 from __future__ import annotations
 

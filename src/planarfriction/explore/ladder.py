@@ -21,7 +21,7 @@ RUNGS: dict[str, Callable[[Any, Any], Any]] = {
     "distributed, few cells": lambda patch, law: DistributedModel(patch.compressed(), law),
     "reduced, 4 parts": lambda patch, law: ReducedModel(patch, law, parts=4),
     "reduced": ReducedModel,
-    "reduced, as published": ReducedModelPublished,
+    "reduced, as published": lambda patch, law: ReducedModelPublished(patch, law),
 }
 """From the reference down to three states."""
 
