@@ -5,12 +5,14 @@ Needs the extra `explore`, Playwright and Chromium.
 
 from __future__ import annotations
 
+import io
 import re
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+from PIL import Image
 from playwright.sync_api import sync_playwright
 
 GRAPHICS = ("--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader")
@@ -38,7 +40,8 @@ def main(folder: Path) -> None:
         page.mouse.click(*place)
         page.wait_for_timeout(6000)
         folder.mkdir(parents=True, exist_ok=True)
-        page.screenshot(path=folder / "explorer.png")
+        with Image.open(io.BytesIO(page.screenshot())) as picture:
+            picture.convert("RGB").quantize(256).save(folder / "explorer.png", optimize=True)
         browser.close()
         server.terminate()
 
