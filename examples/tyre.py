@@ -78,7 +78,7 @@ def roll(slips: np.ndarray, steps: int = COLUMNS, *, slide_back: bool = True) ->
     """Roll by `steps` columns, from bristles at rest, with each of `slips` `(vx, vy, omega)` per unit rolling speed.
 
     `slips` `[slips, 3]` [1, 1, 1/m] is the twist of the patch over the ground, less the rolling. With
-    `slide_back=False` bristles above their largest deflection relax as LuGre has it.
+    `slide_back=False` bristles above their largest deflection relax as in LuGre.
     """
     patch = patch_of_a_tyre()
     law, load = bristles(patch), LOAD * patch.weights()
@@ -159,7 +159,7 @@ def main(arguments: list[str] | None = None) -> None:
     print(f"largest difference from the brush model: force {force:.2f} %, torque {torque:.2f} %")
     relaxed = roll(sideways(angles), slide_back=False)
     force, torque = 100.0 * errors(angles, relaxed.wrenches[-1])
-    print(f"where bristles above their limit relax as LuGre has it: force {force:.0f} %, torque {torque:.0f} %")
+    print(f"if bristles above their limit relax as in LuGre: force {force:.0f} %, torque {torque:.0f} %")
     options.out.mkdir(parents=True, exist_ok=True)
     path = options.out / "tyre.png"
     draw(angles, rolling).savefig(path)
