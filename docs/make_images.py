@@ -1,6 +1,7 @@
 """Make the pictures of README and docs from the library itself: `python docs/make_images.py [FOLDER]`.
 
-They go to `docs/images` unless a folder is named. Each stays below 150 kB.
+They go to `docs/images` unless a folder is named. Each stays below 150 kB. Those of the
+reproduction come from `make_tables.py`.
 """
 
 from __future__ import annotations
@@ -12,8 +13,6 @@ import numpy as np
 
 import planarfriction as pf
 from planarfriction import plots
-from planarfriction.experiments import find_experiment
-from planarfriction.experiments.experiment import Work
 from planarfriction.patch import PUBLISHED_PATCHES
 
 LARGEST = 150_000
@@ -28,24 +27,6 @@ def fingertip() -> pf.ContactPatch:
     y, x = np.mgrid[0:16, 0:24] - np.array([7.5, 11.5])[:, None, None]
     pressure = np.clip(1.0 - (x / 11.0) ** 2 - (y / 7.0) ** 2, 0.0, None) ** 0.5 * (1.0 + 0.045 * x - 0.04 * y)
     return pf.ContactPatch.from_pressure(pressure, cell_size=1e-3, name="fingertip")
-
-
-REPRODUCED = {
-    "limit-surfaces": ("correspondence",),
-    "velocity-driven": ("driven_errors",),
-    "timing": ("timing_work_precision",),
-    "beyond": ("surface_staircase", "driven_models", "ladder"),
-}
-"""Experiment of the report -> its most telling pictures."""
-
-
-def reproduced() -> dict[str, plots.style.PlotFigure]:
-    """Pictures of the reproduced experiments, by the names of their files; takes minutes."""
-    found = {}
-    for name, wanted in REPRODUCED.items():
-        pictures = find_experiment(name).run(Work(progress=lambda label: print(label, flush=True))).pictures
-        found |= {each.name.replace("_", "-"): each.figure for each in pictures if each.name in wanted}
-    return found
 
 
 def figures() -> dict[str, plots.style.PlotFigure]:
@@ -104,7 +85,7 @@ def grip_plan() -> plots.style.PlotFigure:
 def main(folder: Path) -> None:
     """Write every picture and say how large it is."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name, figure in (figures() | reproduced()).items():
+    for name, figure in figures().items():
         path = folder / f"{name}.png"
         figure.savefig(path, dpi=90, facecolor="white", metadata={"Software": None})
         size = path.stat().st_size

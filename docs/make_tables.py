@@ -1,31 +1,71 @@
-"""Put the tables of a reproduction into the pages that show them: `python docs/make_tables.py reproduction`.
+"""Put what was measured into the pages that show it: `python docs/make_tables.py PLACE ...`.
 
-The folder is that of `planarfriction reproduce` or of `planarfriction simulators`. A table stands below a line
-`<!-- table: TITLE -->`, named as in the report; tables that the folder does not have stay as they are. So do pictures,
-but for those of the names that `docs/images` has.
+A place is the folder of `planarfriction reproduce` or of `planarfriction simulators`, or a file that holds what
+`planarfriction bench --json` printed. A table stands below a line `<!-- table: TITLE -->`, named as in the report or
+here; what an experiment found stands below `<!-- verdict: EXPERIMENT -->`. README's row about speed is that of the
+benchmark. What the places do not have stays as it is. So do pictures, but for those of `docs/images` that the
+reports have drawn.
 """
 
 from __future__ import annotations
 
 import json
 import re
-import shutil
 import sys
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from PIL import Image
+
 MARK = re.compile(r"<!-- table: (?P<title>.+?) -->\n\n(?:(?:\|.*\n)+\n)?")
+VERDICT = re.compile(r"<!-- verdict: (?P<name>.+?) -->\n\n(?:(?:[^\n#<!].*\n)+\n)?")
+SPEED = re.compile(r"^(?P<what>\| .*\(docs/benchmarks\.md\).* \|) .+ \| .+ \|$", re.MULTILINE)
+
+SHRUNK = 0.6
+"""Pictures of the pages over those of the reports, whose dots are finer."""
+
+COST = {
+    "in_hand.distributed": "in-hand run of 2 s, distributed",
+    "in_hand.distributed.101": "the same on 101 x 101 cells",
+    "in_hand.published": "in-hand run of 2 s, published reduced, load 1",
+    "in_hand.published.load_2": "the same under load 2",
+    "in_hand.reduced": "in-hand run of 2 s, `ReducedModel`, load 1",
+    "in_hand.published.load_dependent": "in-hand run, published reduced, rebuilt every 0.01 s as the load changes",
+    "in_hand.reduced.load_family": "in-hand run, `ReducedModel`, maps of a load family (k = 2 f_N)",
+    "table.build": "one table of a limit surface, 20 segments",
+    "step.published.loop": "one step of the published reduced model, compiled loop",
+    "step.reduced.loop": "one step of `ReducedModel`, compiled loop, random twists",
+    "step.reduced.parts4.loop": "the same in four parts",
+    "step.distributed.loop": "one step of the distributed model, compiled loop",
+    "step.published.call": "one Python call of `step`, published reduced",
+    "gradient.published": "gradient of a 2,000-step roll-out to all parameters, twists, loads, with its value",
+    "gradient.reduced": "the same of `ReducedModel`",
+    "gradient.published.batch": "gradients of 1,000 contacts x 1,000 steps, published reduced",
+    "gradient.reduced.batch": "the same of `ReducedModel`",
+    "import": "`import planarfriction`",
+}
+"""Benchmark -> its row in the table of costs."""
 
 
-def markdown(table: dict[str, Any]) -> str:
+SECONDS = (("s", 1.0), ("ms", 1e3), ("µs", 1e6))
+"""Units of time, and how many of them are a second; a time is shown in the first that it is a tenth of."""
+
+
+def markdown(table: Mapping[str, Any]) -> str:
     """A table of a report as lines of a page."""
     rows = [table["headings"], ["---"] * len(table["headings"]), *table["rows"]]
     return "".join(
-        f"| {' | '.join(each if isinstance(each, str) else f'{each:.2g}' for each in row)} |\n" for row in rows
+        f"| {' | '.join(each if isinstance(each, str) else rounded(each) for each in row)} |\n" for row in rows
     )
 
 
-def with_tables(page: str, tables: dict[str, dict[str, Any]]) -> str:
+def rounded(value: float) -> str:
+    """A number with two digits."""
+    return f"{float(f'{value:.2g}'):g}"
+
+
+def with_tables(page: str, tables: Mapping[str, Mapping[str, Any]]) -> str:
     """The text of a page with the tables that it names, as far as there are any."""
 
     def replaced(found: re.Match[str]) -> str:
@@ -35,22 +75,72 @@ def with_tables(page: str, tables: dict[str, dict[str, Any]]) -> str:
     return MARK.sub(replaced, page)
 
 
-def main(reproduction: Path) -> None:
-    """Rewrite every page that has tables, and say which."""
-    records = [json.loads(path.read_text(encoding="utf-8")) for path in sorted(reproduction.glob("*/result.json"))]
-    tables = {table["title"]: table for record in records for table in record["tables"]}
+def with_verdicts(page: str, verdicts: Mapping[str, str]) -> str:
+    """The text of a page with what the experiments found that it names, as far as it is known."""
+
+    def replaced(found: re.Match[str]) -> str:
+        name = found["name"]
+        return f"<!-- verdict: {name} -->\n\n{verdicts[name]}\n\n" if name in verdicts else found[0]
+
+    return VERDICT.sub(replaced, page)
+
+
+def shown(value: float, unit: str) -> str:
+    """A time as one reads it, with two digits; another quantity as it is."""
+    if unit in ("s", "us"):
+        seconds = value * (1.0 if unit == "s" else 1e-6)
+        unit, factor = next(each for each in SECONDS if seconds >= 0.1 / each[1] or each is SECONDS[-1])
+        value = factor * seconds
+    return f"{rounded(value)} {unit}"
+
+
+def costs(lines: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """The table of costs, by its title; none without its benchmarks."""
+    found = {line["name"]: line for line in lines if line["value"] is not None}
+    rows = []
+    for name, words in COST.items():
+        if name in found:
+            line = found[name]
+            beside = f"{shown(line['baseline_value'], line['unit'])}: {line['baseline']}"
+            rows.append((words, shown(line["value"], line["unit"]), beside, line["ratio"], f"`{name}`"))
+    headings = ("what", "cost", "beside it, in the same run", "ratio", "name")
+    return {"Cost": {"headings": headings, "rows": rows}} if rows else {}
+
+
+def with_speed(readme: str, lines: Sequence[Mapping[str, Any]]) -> str:
+    """README with its row about the in-hand run, whose baseline is given the first 0.1 s of it."""
+    found = [line for line in lines if line["name"] == "in_hand.distributed" and "over the first" in line["baseline"]]
+    if not found:
+        return readme
+    theirs, ours = (shown(found[0][key], found[0]["unit"]) for key in ("baseline_value", "value"))
+    return SPEED.sub(lambda row: f"{row['what']} {theirs} | {ours} |", readme)
+
+
+def main(places: Sequence[Path]) -> None:
+    """Rewrite every page that shows what the places hold, and say which."""
+    folders = [place for place in places if place.is_dir()]
+    records = [
+        json.loads(path.read_text("utf-8")) for folder in folders for path in sorted(folder.glob("*/result.json"))
+    ]
+    lines = [line for place in places if not place.is_dir() for line in json.loads(place.read_text("utf-8"))]
+    tables = {table["title"]: table for record in records for table in record["tables"]} | costs(lines)
+    verdicts = {record["name"]: record["verdict"] for record in records if record["verdict"]}
     docs = Path(__file__).parent
-    for path in sorted(docs.glob("*.md")):
+    for path in (docs.parent / "README.md", *sorted(docs.glob("*.md"))):
         before = path.read_text(encoding="utf-8")
-        after = with_tables(before, tables)
+        after = with_verdicts(with_tables(before, tables), verdicts)
+        after = with_speed(after, lines) if path.name == "README.md" else after
         if after != before:
             path.write_text(after, encoding="utf-8")
             print(f"{path.name}: new numbers")
-    for picture in sorted(reproduction.glob("*/*.png")):
-        if (docs / "images" / picture.name).exists():
-            shutil.copyfile(picture, docs / "images" / picture.name)
-            print(f"images/{picture.name}")
+    for drawn in sorted(path for folder in folders for path in folder.glob("*/*.png")):
+        picture = docs / "images" / drawn.name.replace("_", "-")
+        if picture.exists():
+            with Image.open(drawn) as image:
+                size = tuple(round(SHRUNK * side) for side in image.size)
+                image.convert("RGB").resize(size, Image.Resampling.LANCZOS).quantize(128).save(picture, optimize=True)
+            print(f"images/{picture.name}: {picture.stat().st_size / 1000:.0f} kB")
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]))
+    main([Path(each) for each in sys.argv[1:]])

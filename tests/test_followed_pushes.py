@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.bench import push_cost
+from planarfriction.bench import plans
 from planarfriction.measured import followed
 from planarfriction.planning import Pusher, Slider, push
 
@@ -39,10 +39,10 @@ def test_a_push_is_that_of_least_power_in_small_steps():
     # Peshkin and Sanderson 1989: a pusher that sticks moves the object with the least power
     surface = pf.LimitSurfaceExact(pf.ContactPatch.rectangle(0.09))
     slider = Slider(surface, 0.045 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]))
-    path = pf.Signal.sampled([0.0, 1.0], [push_cost.BEGIN, push_cost.END], "linear")
+    path = pf.Signal.sampled([0.0, 1.0], [plans.BEGIN, plans.END], "linear")
     end = push(slider, Pusher(20.0), path, samples=2).end
     # Euler steps of half a millimetre: 1e-4 m, 3e-3 rad
-    np.testing.assert_allclose(push_cost.least_power(surface), end, rtol=0.0, atol=4e-3)
+    np.testing.assert_allclose(plans.least_power(surface), end, rtol=0.0, atol=4e-3)
 
 
 def test_the_example_reaches_its_pose():

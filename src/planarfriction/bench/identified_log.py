@@ -19,10 +19,10 @@ SHARE = 0.01
 """Noise of each wrench channel over its root mean square."""
 
 
-def identification(name: str, full: bool) -> Measurement:
-    """The benchmarks `identify.log` and `identify.log.distributed`."""
-    value, plain = identification_times("distributed" if name.endswith("distributed") else "reduced-published")
-    return line(name, value, "s", "the same fit without nuisance parameters", plain)
+def identification(full: bool, model: str = "reduced-published") -> Measurement:
+    """A fit with the distributed model, or with the published reduced one."""
+    value, plain = identification_times(model)
+    return line(value, "s", "the same fit without nuisance parameters", plain)
 
 
 def identification_times(model: str) -> tuple[float, float]:

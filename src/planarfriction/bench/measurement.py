@@ -14,6 +14,7 @@ class Measurement:
     """One line of the benchmark; without numbers where what it needs is not installed, as `baseline` then says."""
 
     name: str
+    """Of the benchmark."""
     value: float | None
     """Median."""
     unit: str
@@ -25,8 +26,9 @@ class Measurement:
     """How many times cheaper than the baseline: baseline over value, unless `baseline` says otherwise."""
 
 
-def line(name: str, value: float, unit: str, baseline: str, baseline_value: float) -> Measurement:
-    return Measurement(name, value, unit, baseline, baseline_value, baseline_value / value)
+def line(value: float, unit: str, baseline: str, baseline_value: float, ratio: float | None = None) -> Measurement:
+    """A measurement without a name yet; `ratio` is that of the two values unless it is given."""
+    return Measurement("", value, unit, baseline, baseline_value, baseline_value / value if ratio is None else ratio)
 
 
 def median(action: Callable[[], Any], repeats: int, inner: int = 1) -> float:

@@ -19,7 +19,7 @@ STEPS, ROUNDS = 100, 5
 """Of a roll-out that is timed: 0.2 s, in which all slide; and how often, in turns."""
 
 
-def measure(name: str, full: bool) -> Measurement:
+def discs(full: bool) -> Measurement:
     """A step of one of `ENVIRONMENTS` that `vmap` steps at once, with patch friction and with MJX's own in turns.
 
     Both in double precision. Raises `MissingExtraError` without MJX.
@@ -40,7 +40,7 @@ def measure(name: str, full: bool) -> Measurement:
     words = (
         f"MJX's own friction, condim 4, elliptic, impratio 10 (patch friction costs {value / theirs:.2g} times as much)"
     )
-    return line(name, value, "us per step", words, theirs)
+    return line(value, "us per step", words, theirs)
 
 
 def _adapter() -> Any:

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from planarfriction.bench import mujoco_scenes
 from planarfriction.bench.measurement import Measurement, line
-from planarfriction.bench.mujoco_scenes import MujocoScene, Native, grip, tray
+from planarfriction.bench.mujoco_scenes import MujocoScene, Native
 
 ROUNDS, STEPS = 15, 300
 """Rounds in turns, and steps of each."""
@@ -19,24 +20,35 @@ ROUNDS, STEPS = 15, 300
 ENVIRONMENTS, THREADS = 16, 2
 
 
-def measure(name: str, full: bool) -> Measurement:
-    """A step of what comes behind the first point of `name`: "tray." with 1, 2, or 8 blocks, "grip", or "rollout".
+def tray(full: bool, blocks: int) -> Measurement:
+    """A step of a tray with so many blocks."""
+    return _beside_own(mujoco_scenes.tray, blocks)
 
-    Raises `MissingExtraError` without MuJoCo.
-    """
+
+def grip(full: bool) -> Measurement:
+    """A step of a grip at rest."""
+    return _beside_own(mujoco_scenes.grip)
+
+
+def rollout(full: bool) -> Measurement:
+    """A step of a tray of two blocks, in roll-outs on threads."""
+    return _beside_own(mujoco_scenes.tray, 2, rolled=True)
+
+
+def _beside_own(make: Callable[..., MujocoScene], *arguments: int, rolled: bool = False) -> Measurement:
+    """Raises `MissingExtraError` without MuJoCo."""
     from planarfriction.adapters.mujoco import Friction  # noqa: F401  (says how to install MuJoCo)
 
-    what, _, blocks = name.partition(".")[2].partition(".")
-    scene = grip() if what == "grip" else tray(int(blocks or "2"))
+    scene = make(*arguments)
     m, d, friction = scene.ours()
     own, held = _settled(scene, m, d, lambda: friction.step(d)), _native(scene)
-    if what == "rollout":
+    if rolled:
         with friction.install():
             value, theirs = _in_turns(_rollouts(scene, m, own), _rollouts(scene, *held))
     else:
         value, theirs = _in_turns(_steps(scene, m, own, friction.step), _steps(scene, *held))
     words = f"MuJoCo's own, condim 4, elliptic, impratio 10 (patch friction costs {value / theirs:.2f} times as much)"
-    return line(name, value * 1e6, "us per step", words, theirs * 1e6)
+    return line(value * 1e6, "us per step", words, theirs * 1e6)
 
 
 def _in_turns(*actions: Callable[[], float]) -> tuple[float, float]:

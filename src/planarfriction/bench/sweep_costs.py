@@ -8,20 +8,19 @@ import time
 
 import numpy as np
 
-from planarfriction.bench.measurement import Measurement, once
-from planarfriction.laws import ElastoPlastic, LuGre
+from planarfriction import sweeps
+from planarfriction.bench.measurement import Measurement, line, once
+from planarfriction.bench.workloads import disc, law
 from planarfriction.models import ReducedModel
-from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction.scenes import Scene, Signal, Solution, in_hand, in_hand_load, simulate
-from planarfriction.sweeps import sweep
 from planarfriction.sweeps.running import processors
 
 _MASSES, _OFFSETS, _GRIPS = np.linspace(0.1, 0.25, 25), np.linspace(0.0, 0.009, 10), (0.8, 1.0, 1.2, 1.4)
 
 
-def measure(name: str, full: bool) -> Measurement:
+def sweep(full: bool) -> Measurement:
     """A thousand runs of 2 s in blocks of 250, each of which is also simulated one run after another right before."""
-    model = ReducedModel(PUBLISHED_PATCHES["Circle"](), LuGre(mu_s=1.2, elasto_plastic=ElastoPlastic(0.9)))
+    model = ReducedModel(disc(), law())
     held = in_hand_load(1)
     loads = {float(grip): Signal(held.times, grip * held.values) for grip in _GRIPS}
 
@@ -40,7 +39,7 @@ def measure(name: str, full: bool) -> Measurement:
                     solver += simulate(make(mass, offset, grip)).statistics.wall_time
             middle = time.process_time()
             alone += middle - begin
-            swept += once(lambda values=values: sweep(make, values, out=folder, measure=end))
+            swept += once(lambda values=values: sweeps.sweep(make, values, out=folder, measure=end))
             used += time.process_time() - middle
             memory.append(_memory())
     count = processors()
@@ -48,7 +47,7 @@ def measure(name: str, full: bool) -> Measurement:
         f"time in the solver of the same runs, one after another, over {count} processors (processor time: "
         f"{used / alone:.2f} of that of simulate; memory: {memory[-1] - memory[0]:+.1f} MB from run 250 to 1,000)"
     )
-    return Measurement(name, swept, "s", words, solver / count, solver / count / swept)
+    return line(swept, "s", words, solver / count)
 
 
 def end(solution: Solution) -> dict[str, float]:
