@@ -1,6 +1,6 @@
-"""Count how often intervals hold the truth, and write identification-coverage.md: `python docs/make_coverage.py`.
+"""Count how often intervals contain the true value, and write identification-coverage.md: `python docs/make_coverage.py`.
 
-What was counted before is kept in the file that `--kept` names, so that a run can be broken off and gone on with.
+The counts are kept in the file given by `--kept`, so that an interrupted run can be continued.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ LAW = pf.LuGre(
 DISC = pf.ContactPatch.disc(0.01, cells=11)
 LOAD, RATE, DURATION, FINER = 2.0, 200, 4.0, 50
 SHARE = 0.01
-"""Noise of each wrench channel over its root mean square."""
+"""Noise of each wrench channel, relative to its root mean square."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Row:
 
     words: str
     model: str
-    """That made the data, and that is fitted."""
+    """The model that generates the data and is then fitted."""
     rim_heavy: bool = False
     delay: float = 0.0
     bias: float = 0.0
@@ -48,19 +48,19 @@ class Row:
 
 
 ROWS = {
-    "exact": Row("the model that is fitted", "reduced-published"),
+    "exact": Row("same model, nothing else wrong", "reduced-published"),
     "delay": Row("wrench delayed by 2 ms", "reduced-published", delay=2e-3),
-    "drift": Row("load cell that drifts by 5 %", "reduced-published", drift=0.05),
-    "bias": Row("zeros off by 3 % of each channel", "reduced-published", bias=0.03),
-    "twist": Row("1 % of noise on the twist", "reduced-published", twist_noise=0.01),
+    "drift": Row("load cell drifts by 5 %", "reduced-published", drift=0.05),
+    "bias": Row("offset of 3 % on each wrench channel", "reduced-published", bias=0.03),
+    "twist": Row("1 % noise on the twist", "reduced-published", twist_noise=0.01),
     "distributed": Row("distributed model, same disc", "distributed"),
-    "rim": Row("distributed model, pressure at the rim; a uniform disc is fitted", "distributed", rim_heavy=True),
+    "rim": Row("pressure concentrated at the rim, but a uniform disc is fitted", "distributed", rim_heavy=True),
 }
 
 
 @dataclass
 class Count:
-    """How the fits of one row went."""
+    """Counts over the fits of one row."""
 
     seeds: int = 0
     rejected: int = 0
@@ -87,7 +87,7 @@ def truth(row: Row) -> tuple[np.ndarray, np.ndarray, np.ndarray, dict[str, float
 
 
 def observed(row: Row, made: tuple, seed: int) -> Log:
-    """What sensors show of the truth."""
+    """The log that sensors with the disturbances of this row would record."""
     time, twist, wrench, _ = made
     random = np.random.default_rng(seed)
     late = round(row.delay / time[1])
@@ -116,13 +116,14 @@ def counted(row: Row, made: tuple, seed: int, count: Count) -> None:
 def page(counts: dict[str, Count]) -> str:
     """The page of the counts."""
     lines = [
-        "# How often the intervals hold the truth",
+        "# How often the intervals contain the true value",
         "",
-        "Made by `docs/make_coverage.py`: logs of 4 s at 200 Hz with 1 % of noise on each wrench channel, eight",
-        "parameters, all nuisance parameters free, one start. Each entry: seeds whose 95 % interval holds the true",
-        "value, of those in which the parameter was called identifiable. The last columns: the share over all",
-        "parameters, and seeds in which the fit was rejected; then no parameter is called identifiable. In the row of",
-        "the drift it is unknown when the load cell was right; the truth there is that of its first sample.",
+        "`docs/make_coverage.py` simulates logs of 4 s at 200 Hz with 1 % noise on each wrench channel, and fits eight",
+        "parameters to each of them, with all nuisance parameters free and one starting point. An entry such as",
+        "*28 of 30* means that the parameter was called identifiable in 30 logs, which differ in their noise, and that",
+        "the 95 % interval contained the true value in 28 of them. The column *all* is the share over all parameters.",
+        "The last column counts the logs whose fit was rejected; no parameter is called identifiable in those. Where",
+        "the load cell drifts, the true values are those that belong to its first sample.",
         "",
         f"| data | model | {' | '.join(NAMES)} | all | rejected |",
         "|---" * (len(NAMES) + 4) + "|",
