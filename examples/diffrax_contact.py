@@ -1,7 +1,7 @@
-"""A block that a spring drags over a table, with diffrax: it sticks, slips, and turns until the spring pulls straight.
+"""A spring drags a block across a table, solved with diffrax: it sticks, slips, and turns until the spring is in line.
 
-The bristles of the contact are part of the ODE: their rate is one line of its right-hand side. The spring is hooked
-off the middle, and its far end moves at a constant speed:
+The bristles of the contact are part of the ODE: their rate is one line of its right-hand side. The spring is attached
+off the middle of the block, and its far end moves at a constant speed:
 
     python examples/diffrax_contact.py --out out/
 
@@ -30,11 +30,11 @@ STIFFNESS, SPEED = 150.0, 0.01  # of the spring [N/m], of its far end [m/s]
 HOOK = jnp.array([0.5 * SIDE, 0.25 * SIDE])  # where the spring is fixed, block axes [m]
 LAW = pf.LuGre(mu_c=0.3, mu_s=0.45, v_s=5e-3, sigma_0=1e5, sigma_1=300.0, sigma_2=0.4, elasto_plastic=0.9)
 DEFLECTION = 1e-6
-"""Moments of the bristles in this unit [m] are of the size of the other states, so that one tolerance fits all."""
+"""Unit [m] in which the moments of the bristles are about as large as the other states: one tolerance suits all."""
 
 
 class State(NamedTuple):
-    """Of the block, table axes, and of the bristles, block axes."""
+    """State of the block (table axes) and of the bristles (block axes)."""
 
     pose: jax.Array
     """x, y, theta [m, m, rad]"""
@@ -45,13 +45,13 @@ class State(NamedTuple):
 
 
 def turn(theta) -> jax.Array:
-    """Block axes to table axes: a twist or a wrench, `[3, 3]`."""
+    """Rotation `[3, 3]` of a twist or a wrench from block axes to table axes."""
     c, s = jnp.cos(theta), jnp.sin(theta)
     return jnp.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 
 
 def pull(time, pose) -> jax.Array:
-    """Wrench of the spring on the block [N, N, N m]."""
+    """Wrench of the spring on the block, `[3]` [N, N, N m]."""
     arm = turn(pose[2])[:2, :2] @ HOOK
     far_end = HOOK + jnp.array([SPEED * time, 0.0])
     force = STIFFNESS * (far_end - pose[:2] - arm)
@@ -69,7 +69,7 @@ def slope(time, state: State, model: pj.ReducedModel) -> State:
 
 @jax.jit
 def drag(model: pj.ReducedModel, times) -> State:
-    """States at `times` [s], from rest with the spring slack."""
+    """States at `times` [s], starting at rest with a relaxed spring."""
     rest = State(jnp.zeros(3), jnp.zeros(3), jnp.zeros(3))
     return diffrax.diffeqsolve(
         diffrax.ODETerm(slope),
@@ -86,7 +86,7 @@ def drag(model: pj.ReducedModel, times) -> State:
 
 
 def draw(times, states: State, forces: np.ndarray, file: Path) -> None:
-    """Speed, spring force and yaw over time."""
+    """Plot speed, spring force and yaw against time."""
     figure = new_figure(6.4, 5.4)
     rows = (
         ("block [mm/s]", 1e3 * states.twist[:, 0]),
@@ -112,7 +112,7 @@ def draw(times, states: State, forces: np.ndarray, file: Path) -> None:
 
 
 def run(duration: float = 8.0) -> tuple[np.ndarray, State, np.ndarray]:
-    """Times `[T]`, states and wrenches of the spring `[T, 3]`."""
+    """Simulate; returns times `[T]`, states, and wrenches of the spring `[T, 3]`."""
     patch = pf.ContactPatch.rectangle(SIDE, cells=11)
     model = pj.ReducedModel(patch, LAW)
     times = jnp.linspace(0.0, duration, round(400 * duration) + 1)
@@ -121,7 +121,7 @@ def run(duration: float = 8.0) -> tuple[np.ndarray, State, np.ndarray]:
 
 
 def main() -> None:
-    """Run, print the largest force of the spring, draw."""
+    """Simulate, print the largest force of the spring, and draw."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder for the picture")
     folder = parser.parse_args().out

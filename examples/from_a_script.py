@@ -1,9 +1,9 @@
-"""From a script with the paper's model to a contact patch: friction, stiffness and radius of a rubber pad, fitted.
+"""Fit friction, stiffness and radius of a rubber pad, from a script that uses the paper's model.
 
-A pad of 40 x 20 mm rubs over a plane, from movements too small to slide to millimetres. A fine model of it, two
-bristles in each cell, stands for the measured wrenches. The reduced model, built from numbers as scripts do it,
-is fitted to them twice by gradient descent: with the ellipsoid, and with the limit surface of the pad. Then both meet a
-movement that they have not seen, beside the library's own `ReducedModel` of the same pad. Run it:
+A pad of 40 x 20 mm rubs on a plane, with movements from too small to slide up to millimetres. A fine model of the pad,
+with bristles in two directions in each cell, provides the "measured" wrenches. The reduced model, built from plain
+numbers, is fitted to them twice by gradient descent: with the ellipsoid, and with the limit surface of the pad. Both
+fits then predict a movement that they have not seen, and are compared with the library's `ReducedModel`. Run it:
 
     python examples/from_a_script.py --out out/
 """
@@ -31,7 +31,7 @@ SPEED = 4e-3  # of a point of the pad at the end of the movement [m/s]
 
 
 class Fitted(NamedTuple):
-    """What came out with one limit surface."""
+    """Result of the fit with one limit surface."""
 
     mu_c: float
     sigma_0: float
@@ -39,11 +39,11 @@ class Fitted(NamedTuple):
     radius: float
     """[m]"""
     wrenches: np.ndarray
-    """Of the unseen movement, `[STEPS, 3]`."""
+    """Predicted wrenches of the unseen movement, `[STEPS, 3]`."""
 
 
 def movement(seed: int) -> np.ndarray:
-    """Twists `[STEPS, 3]`: six sines a component, from movements below breakaway, 200 times smaller, to SPEED."""
+    """Twists `[STEPS, 3]`: six sines in each component; the amplitude grows 200-fold, from sticking to SPEED."""
     random, t = np.random.default_rng(seed), np.arange(STEPS) * DT
     sizes, phases = random.normal(size=(6, 3)), random.uniform(0.0, 2.0 * np.pi, (6, 3))
     frequencies = np.array([0.5, 0.8, 1.1, 1.7, 2.3, 3.1])[:, None]
@@ -73,13 +73,13 @@ def misfit(wrenches: np.ndarray, truth: np.ndarray) -> np.ndarray:
 
 
 class Comparison(NamedTuple):
-    """All wrenches of the unseen movement, and what was fitted on the way."""
+    """All wrenches of the unseen movement, and the fits."""
 
     truth: np.ndarray
-    """Of the distributed model, `[STEPS, 3]`."""
+    """Wrenches of the distributed model, `[STEPS, 3]`."""
     fits: dict[str, Fitted]
     reduced: np.ndarray
-    """Of `ReducedModel`, with nothing fitted, `[STEPS, 3]`."""
+    """Wrenches of `ReducedModel`, with nothing fitted, `[STEPS, 3]`."""
 
 
 def run(steps: int = 200) -> Comparison:
@@ -94,7 +94,7 @@ def run(steps: int = 200) -> Comparison:
 
 
 def draw(compared: Comparison) -> PlotFigure:
-    """Torque of the unseen movement, and why the ellipsoid misses it: torque of steady sliding over the twist."""
+    """Plot the torque of the unseen movement, and why the ellipsoid gets it wrong: the torque of steady sliding."""
     figure = new_figure(10.0, 3.4)
     left, right = figure.subplots(1, 2, width_ratios=[1.9, 1.0])
     t, scale = np.arange(STEPS) * DT, 1e3
@@ -133,7 +133,7 @@ def main(arguments: list[str] | None = None) -> None:
         if fitted is not None:
             numbers = f" mu_c {fitted.mu_c:.3f}, sigma_0 {fitted.sigma_0:.3g} 1/m, radius {1e3 * fitted.radius:.2f} mm;"
         fx, fy, tau = 100.0 * misfit(wrenches, compared.truth)
-        print(f"{name}:{numbers} unseen movement off by {fx:.1f}, {fy:.1f} and {tau:.1f} % (fx, fy, torque)")
+        print(f"{name}:{numbers} errors on the unseen movement: {fx:.1f}, {fy:.1f} and {tau:.1f} % (fx, fy, torque)")
     options.out.mkdir(parents=True, exist_ok=True)
     path = options.out / "from_a_script.png"
     draw(compared).savefig(path)

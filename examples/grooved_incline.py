@@ -1,14 +1,14 @@
-"""A block with a grooved sole drifts sideways down an incline: which way, and from which slope on?
+"""A block with a grooved sole drifts sideways down an incline: in which direction, and at which slope does it start?
 
-The sole meets `mu along` along its grooves and `mu across` across them, and the grooves stand at 40 degrees to the
-fall line. Gravity pulls straight down. Friction, `-mu N M e/|e|_M` with `|e|_M = sqrt(e' M e)`, is not opposite to the
-motion `e`: it leans away from the grooves, and the block towards them. From rest the block keeps to one direction, in
-which friction and gravity leave an acceleration along `e` alone:
+The friction coefficient is `mu along` along the grooves and `mu across` across them, and the grooves are at 40 degrees
+to the fall line. Friction, `-mu N M e/|e|_M` with `|e|_M = sqrt(e' M e)`, is not opposite to the motion `e`: it
+deviates away from the grooves, so the block drifts towards them. A block that starts from rest slides in a constant
+direction `e`, the one in which friction and gravity together accelerate it along `e` alone:
 
     e x (g sin(slope) d - mu g cos(slope) M e/|e|_M) = 0,   d the fall line
 
-It starts where `tan(slope) = mu/sqrt(d' M^-1 d)`, in the direction `M^-1 d`; the steeper the incline, the straighter.
-The simulated block, bristles and all, is compared with that. Run it:
+It starts to slide where `tan(slope) = mu/sqrt(d' M^-1 d)`, in the direction `M^-1 d`; the steeper the incline, the
+smaller the drift. The script compares a simulation with bristles with this closed form. Run it:
 
     python examples/grooved_incline.py --out out/
 """
@@ -33,7 +33,7 @@ DOWN = np.array([0.0, -1.0])  # the fall line in the plane
 
 
 def steepest_at_rest() -> float:
-    """Slope [rad] from which on the block slides."""
+    """Slope [rad] above which the block slides."""
     return float(np.arctan(MU / np.sqrt(DOWN @ np.linalg.solve(METRIC, DOWN))))
 
 
@@ -50,7 +50,7 @@ def drift(slope: float) -> float:
 
 
 def slide(slope: float, kind: str = "distributed", t_end: float = 0.55) -> pf.Solution:
-    """The block from rest, on an incline of `slope` [rad]; the plane of motion is the incline."""
+    """Simulate the block from rest on an incline of `slope` [rad]; the plane of motion is the incline."""
     patch = pf.ContactPatch.rectangle(WIDTH, HEIGHT, 15).with_friction_metric(METRIC)
     model = {"distributed": pf.DistributedModel, "reduced": pf.ReducedModel}[kind](patch, LAW)
     half = 0.5 * np.array([WIDTH, HEIGHT])
@@ -62,7 +62,7 @@ def slide(slope: float, kind: str = "distributed", t_end: float = 0.55) -> pf.So
 
 
 def drift_of(solution: pf.Solution) -> float:
-    """Angle [rad] from the fall line to where the block went."""
+    """Angle [rad] between the fall line and the simulated displacement."""
     return float(np.arctan2(solution.data.x[-1], -solution.data.y[-1]))
 
 
@@ -115,7 +115,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder of the picture")
     options = parser.parse_args(arguments)
     slopes = np.radians([22.0, 25.0, 30.0, 35.0, 40.0, 50.0, 60.0])
-    print(f"slides from {np.degrees(steepest_at_rest()):.2f} deg on")
+    print(f"the block slides on slopes above {np.degrees(steepest_at_rest()):.2f} deg")
     found: dict[str, list[float]] = {"distributed": [], "reduced": []}
     for slope in slopes:
         for kind, drifts in found.items():

@@ -1,8 +1,8 @@
-"""Friction of a cube from measured slides, without a force sensor: fitted on half of the tosses, tested on the other.
+"""Friction of a cube from measured slides, without a force sensor: fitted to half of the tosses, tested on the rest.
 
-Motion capture of a cube that was tossed, landed flat, and slid and spun until it stopped (ContactNets: Pfrommer, Halm,
-Posa, CoRL 2020). The table comes with the package; a FOLDER may hold another one of the same form. Each of the five
-fits to a half takes half a minute; --tosses 60 is enough for a look.
+The data are from motion capture of a cube that was tossed, landed flat, and slid and spun until it stopped
+(ContactNets: Pfrommer, Halm, Posa, CoRL 2020). The table comes with the package; FOLDER may contain another one of the
+same format. Each of the five fits takes half a minute; --tosses 60 is enough for a first look.
 
     python examples/identify_slides.py --splits 3 --out out/
 """
@@ -33,20 +33,20 @@ CORNERS = pf.ContactPatch.points(
 )
 
 WINDOW = 8
-"""First poses that the start of a slide is estimated from: 47 ms of some 290 ms."""
+"""Number of poses from which the initial state of a slide is estimated: 47 ms of about 290 ms."""
 
 START = pf.LuGre(mu_c=0.22, sigma_0=1e6, sigma_1=20.0, sigma_2=0.02, elasto_plastic=0.9)
-"""Dry friction that may grow with the speed, on bristles so stiff that only the coefficient counts."""
+"""Dry friction that may grow with speed, with bristles so stiff that only the coefficient matters."""
 
 
 def ellipsoid(patch: pf.ContactPatch, law: pf.LuGre) -> pf.ReducedModelPublished:
-    """The reduced model with an ellipsoid for its limit surface."""
+    """The reduced model with an ellipsoid as its limit surface."""
     return pf.ReducedModelPublished(patch, law, surface=pf.LimitSurfaceEllipsoid(patch))
 
 
 @dataclass(frozen=True)
 class Case:
-    """What is fitted: a contact, a model of it, the parameters, and where a slide's start comes from."""
+    """What is fitted: a contact patch, a model of it, and the parameters."""
 
     name: str
     patch: pf.ContactPatch
@@ -64,12 +64,12 @@ CASES = (
 
 
 def as_slide(toss: Toss) -> Slide:
-    """A toss as the library takes it."""
+    """Convert a toss into a `Slide`."""
     return Slide(toss.question.time, toss.answer, name=toss.name)
 
 
 def split(tosses: Sequence[Toss], seed: int, most: int | None = None) -> tuple[list[Toss], list[Toss]]:
-    """Two halves of (at most `most` different) tosses, one to fit and one to test; no copies of one toss in both."""
+    """Split (at most `most` different) tosses into halves to fit and to test; copies of a toss stay in one half."""
     ids = np.random.default_rng(seed).permutation(sorted({toss.group for toss in tosses}))[:most]
     halves = set(ids[: len(ids) // 2]), set(ids[len(ids) // 2 :])
     fit, test = ([toss for toss in tosses if toss.group in half] for half in halves)
@@ -77,14 +77,14 @@ def split(tosses: Sequence[Toss], seed: int, most: int | None = None) -> tuple[l
 
 
 def errors(predicted: np.ndarray, slide: Slide, skipped: int) -> list[float]:
-    """Position [mm] and yaw error [deg] at the last sample, then their RMS over the samples after the `skipped`."""
+    """Position [mm] and yaw error [deg] at the last sample, then their RMS over the samples after `skipped`."""
     off = (predicted - slide.pose)[skipped:]
     position, yaw = 1e3 * np.hypot(off[:, 0], off[:, 1]), np.degrees(np.abs(off[:, 2]))
     return [position[-1], yaw[-1], rms(position), rms(yaw)]
 
 
 def run(fit: Sequence[Slide], test: Sequence[Slide], cases: Sequence[Case], seed: int) -> list[tuple[str, ...]]:
-    """Fit every case on one half and predict the other, from a parabola and from the first poses."""
+    """Fit every case to one half and predict the other, starting from a parabola and from the first poses."""
     rows = []
     for case in cases:
         options = {"parameters": case.parameters, "start": _start(case), "model": case.build, "samples": WINDOW}
@@ -99,21 +99,21 @@ def run(fit: Sequence[Slide], test: Sequence[Slide], cases: Sequence[Case], seed
 
 
 def _start(case: Case) -> pf.LuGre:
-    """The start; without a viscous term where it is not asked for."""
+    """The initial guess; without a viscous term unless that is fitted."""
     from dataclasses import replace
 
     return START if "sigma_2" in case.parameters else replace(START, sigma_2=0.0)
 
 
 def friction_of_each(slides: Sequence[Slide]) -> tuple[np.ndarray, np.ndarray]:
-    """Initial speeds [m/s] and friction coefficients of the slides, each identified from one slide alone."""
+    """Initial speed [m/s] and friction coefficient of each slide, identified from that slide alone."""
     found = [identify_motion(s, SQUARE, BODY, parameters=("mu_c",), start=_start(CASES[0])) for s in slides]
     starts = np.array([each.histories[0]["start"] for each in found])
     return np.hypot(starts[:, 3], starts[:, 4]), np.array([each.estimates["mu_c"] for each in found])
 
 
 def draw(speed: np.ndarray, mu: np.ndarray) -> Figure:
-    """Friction of every slide over its initial speed."""
+    """Plot the friction of every slide against its initial speed."""
     figure = Figure(figsize=(6.0, 3.6), dpi=110, layout="constrained")
     axes = figure.add_subplot()
     axes.plot(speed, mu, ".", color="#0072B2", markersize=5)
@@ -128,10 +128,10 @@ def draw(speed: np.ndarray, mu: np.ndarray) -> Figure:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("folder", type=Path, nargs="?", help="folder with the table, that of the package by default")
+    parser.add_argument("folder", type=Path, nargs="?", help="folder with the table (default: the one of the package)")
     parser.add_argument("--splits", type=int, default=1, help="number of splits")
-    parser.add_argument("--tosses", type=int, help="at most so many different tosses")
-    parser.add_argument("--out", type=Path, help="folder for the picture of every slide's friction")
+    parser.add_argument("--tosses", type=int, help="use at most this many different tosses")
+    parser.add_argument("--out", type=Path, help="folder for a picture of the friction of every slide")
     options = parser.parse_args(arguments)
     try:
         tosses = measured.read(options.folder)

@@ -1,21 +1,22 @@
 """Learn a pressure distribution from measured wrenches, by gradient descent through the friction of every cell.
 
-A pad of 24 x 24 mm slides and spins on a plane; a sensor measures force and torque, with noise. How the load spreads
-over the pad is unknown: the weights of its 8 x 8 cells start out equal and follow the gradient of the misfit. Run it:
+A pad of 24 x 24 mm slides and spins on a plane; a sensor measures force and torque, with noise. How the load is
+distributed over the pad is unknown: the weights of its 8 x 8 cells start out equal and follow the gradient of the
+misfit. Run it:
 
     python examples/learn_pressure.py --out out/
 
-What wrenches can tell. In steady sliding about a centre of rotation c, the torque about c is
-`mu f_N sum w_i |rho_i - c|`: a picture of the pressure, blurred by the kernel |rho - c|. With centres of rotation all
-over the pad, as here, the blur can be undone, but detail is damped with the cube of its wave number, so that noise
-decides how fine a map can be; the low moments (centre of pressure, contact radius, second moment) come out far better
-than single cells. Poorer motions leave less, however small the noise:
+What can be learned from wrenches: in steady sliding about a centre of rotation c, the torque about c is
+`mu f_N sum w_i |rho_i - c|`, which is an image of the pressure blurred by the kernel |rho - c|. With centres of
+rotation all over the pad, as here, the blur can be undone, but detail is damped with the cube of its wave number, so
+the noise limits the resolution of the map. The low moments (centre of pressure, contact radius, second moment) are far
+more accurate than single cells. Less varied motions determine less, however small the noise:
 
-- straight slides: the centre of pressure and nothing else;
+- straight slides: only the centre of pressure;
 - pushing without slip: the centre of pressure and the second moment;
 - one spin about a fixed point: three numbers, the mean distance of the load from that point and the mean of its
-  directions. The example fits that too, and gets a wrong map with a perfect misfit;
-- a torque sensor alone, and centres of rotation on one line: the map or its mirror image about that line.
+  directions. The example fits this case too, and gets a wrong map with a perfect fit;
+- only a torque sensor, and centres of rotation on one line: the map or its mirror image about that line.
 """
 
 from __future__ import annotations
@@ -38,10 +39,10 @@ NOISE = 2e-3  # of the friction force, and of the friction torque: that of a goo
 
 
 class Learnt(NamedTuple):
-    """What a fit found."""
+    """Result of a fit."""
 
     weights: np.ndarray
-    """`[N]`"""
+    """Share of the load on each cell, `[N]` [-]."""
     losses: list[float]
 
 
@@ -57,7 +58,7 @@ def true_patch() -> pf.ContactPatch:
 
 
 def slides_about_points(count: int, rng: np.random.Generator) -> torch.Tensor:
-    """Twists `[count, STEPS, 3]` about centres of rotation all over the pad and around it, both ways."""
+    """Twists `[count, STEPS, 3]` about centres of rotation all over the pad and around it, in both directions."""
     reach = 0.75 * CELLS * CELL
     cx, cy = rng.uniform(-reach, reach, (2, count))
     omega = rng.choice([-1.0, 1.0], count) * 3.0
@@ -65,7 +66,7 @@ def slides_about_points(count: int, rng: np.random.Generator) -> torch.Tensor:
 
 
 def spins_about_the_middle(count: int) -> torch.Tensor:
-    """The same spin, measured `count` times."""
+    """Twists of the same spin, `count` times."""
     return held(np.tile([0.0, 0.0, 3.0], (count, 1)))
 
 
@@ -85,7 +86,7 @@ def measure(patch: pf.ContactPatch, twists: torch.Tensor, rng: np.random.Generat
 
 
 def learn(twists: torch.Tensor, wrenches: torch.Tensor, steps: int) -> Learnt:
-    """Weights of the cells, from equal ones, by Adam on the misfit of all wrenches."""
+    """Fit the weights of the cells to all wrenches with Adam, starting from equal weights."""
     flat = pf.ContactPatch.from_pressure(np.ones((CELLS, CELLS)), CELL)
     model = DistributedModel(flat, LAW, trainable=("weights",), dtype=torch.float64)
     optimiser = torch.optim.Adam(model.parameters(), lr=0.1)
@@ -102,7 +103,7 @@ def learn(twists: torch.Tensor, wrenches: torch.Tensor, steps: int) -> Learnt:
 
 
 def moved_load(truth: pf.ContactPatch, weights: np.ndarray) -> float:
-    """Share of the load that sits on the wrong cell."""
+    """Share of the load that is on the wrong cell."""
     return 0.5 * float(np.abs(weights - truth.weights()).sum())
 
 
@@ -122,7 +123,7 @@ def summary(truth: pf.ContactPatch, weights: np.ndarray) -> dict[str, float]:
 
 
 def draw(truth: pf.ContactPatch, rich: Learnt, poor: Learnt):
-    """Three maps on one scale, and how the misfits fell."""
+    """Plot three maps on one scale, and the misfits during the fit."""
     figure = new_figure(10.5, 3.1)
     axes = figure.subplots(1, 4, width_ratios=[1, 1, 1, 1.25])
     half = 0.5e3 * CELLS * CELL

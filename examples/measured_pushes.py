@@ -1,10 +1,10 @@
-"""Pushes of triangles on three feet, measured by others, against friction models: single pushes, and whole series.
+"""Compare friction models with published measurements of pushed triangles: single pushes, and time series.
 
     python examples/measured_pushes.py --out out/
     python examples/measured_pushes.py FOLDER
 
-The tables come with the package; FOLDER holds others of the same form. The same as `planarfriction measured --task
-pushes --task series`; docs/measured.md tells how to hand in a model of your own.
+The tables come with the package; FOLDER may contain others of the same format. The script does the same as
+`planarfriction measured --task pushes --task series`; docs/measured.md explains how to test a model of your own.
 """
 
 from __future__ import annotations

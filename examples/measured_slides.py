@@ -1,10 +1,10 @@
-"""Free slides of a cube on a table, measured by others, against friction models: from the first 8 poses to the end.
+"""Compare friction models with published measurements of a sliding cube: from its first 8 poses to the end.
 
     python examples/measured_slides.py --out out/
     python examples/measured_slides.py FOLDER
 
-The tables come with the package; FOLDER holds others of the same form. The same as `planarfriction measured --task
-slides`; docs/measured.md tells how to hand in a model of your own.
+The tables come with the package; FOLDER may contain others of the same format. The script does the same as
+`planarfriction measured --task slides`; docs/measured.md explains how to test a model of your own.
 """
 
 from __future__ import annotations

@@ -1,14 +1,14 @@
-"""A gripper in MuJoCo lets a plate swing down in its fingers by easing its grip, grips again, and turns it.
+"""A gripper in MuJoCo loosens its grip until a plate swings down between its fingers, grips again, and turns the plate.
 
-The plate is held beside its centre of mass by two soft pads. As the grip eases, the pads come to the edge of what they
-can bear: a force and a torque at once, which trade off as the limit surface of their patch says. The plate turns, and
-slides down a little, until its centre of mass hangs close enough beside the pads. With the weight m g and two pads of
-radius R, pressed with N each, that is at the distance
+Two soft pads hold the plate off its centre of mass. As the grip loosens, the pads reach the limit of the force and
+torque that they can transmit together, which is given by the limit surface of their patch. The plate turns, and slides
+down a little, until the horizontal distance of its centre of mass from the pads is small enough. With the weight m g
+and two pads of radius R, each pressed with N, this distance is
 
     l = 2 mu N R t(f) / (m g),   f = m g / (2 mu N)
 
-where `t(f)` is the torque that a disc bears beside the force f (relative to `mu N R` and to `mu N`). A contact of
-MuJoCo's own has separate limits for force and torque, and what it holds creeps. Run it:
+where `t(f)` is the torque that a disc can transmit in addition to the force f (relative to `mu N R` and to `mu N`).
+MuJoCo's own contacts have separate limits for force and torque, and the objects they hold creep. Run it:
 
     python examples/mujoco_gripper.py --out out/
 
@@ -60,14 +60,14 @@ HAND = f"""<mujoco><option timestep="0.002" integrator="implicitfast"><flag mult
 
 
 def controls(t: float) -> tuple[float, float, float]:
-    """Forces of the fingers [N] and the angle of the hand [rad]."""
+    """Controls at time t: forces of the two fingers [N] and the angle of the hand [rad]."""
     force = float(np.interp(t, *np.transpose(GRIPS)))
     s = np.clip((t - TURNS) / 0.8, 0.0, 1.0)
     return force, force, 1.2 * float(s * s * (3.0 - 2.0 * s))
 
 
 def hand() -> tuple[mujoco.MjModel, mujoco.MjData, Friction]:
-    """The model, its data, and the friction of the pads."""
+    """Build the model, its data, and the friction of the pads."""
     law = pf.LuGre(mu_c=MU, mu_s=MU, sigma_0=1e5, sigma_1=300.0, sigma_2=10.0, elasto_plastic=0.9)
     pad = pf.ReducedModel(pf.ContactPatch.disc(radius=RADIUS, cells=21), law)
     patches = [Patch(pad, site=side, geoms=(side, "plate")) for side in ("near", "far")]
@@ -79,7 +79,7 @@ def hand() -> tuple[mujoco.MjModel, mujoco.MjData, Friction]:
 
 
 def reach() -> float:
-    """How far beside the pads the centre of mass hangs while the grip is loose [m], in theory."""
+    """Horizontal distance [m] of the centre of mass from the pads while the grip is loose, in theory."""
     spins = np.geomspace(1e-2, 1e5, 4001)  # of a disc that moves with 1 m/s
     twists = np.stack([np.zeros_like(spins), np.ones_like(spins), spins], axis=1)
     wrench = abs(pf.LimitSurfaceExact(pf.ContactPatch.disc(radius=RADIUS)).wrench(twists))
@@ -88,7 +88,10 @@ def reach() -> float:
 
 
 def run(draw: bool = True) -> tuple[np.ndarray, list[np.ndarray]]:
-    """Time, the plate's angle in the hand, its centre of mass beside and below the pads, `[steps, 4]`; pictures."""
+    """Simulate; returns rows `[steps, 4]` of time, angle in the hand, and offset of the plate's centre, and pictures.
+
+    The offset of the centre of mass is measured to the side of the pads and downwards.
+    """
     m, d, friction = hand()
     renderer = mujoco.Renderer(m, 360, 360) if draw else None
     camera = mujoco.MjvCamera()
@@ -112,7 +115,7 @@ def run(draw: bool = True) -> tuple[np.ndarray, list[np.ndarray]]:
 
 
 def main() -> None:
-    """Run, print, draw."""
+    """Simulate, print the results, and draw."""
     parser = argparse.ArgumentParser(description="A plate that swings in a gripper, in MuJoCo.")
     parser.add_argument("--out", type=Path, default=Path("out"), help="folder for the picture")
     folder = parser.parse_args().out
@@ -120,13 +123,13 @@ def main() -> None:
     time, angle, beside, below = rows.T
     loose, last = np.searchsorted(time, GRIPS[3][0]) - 1, time > END - 0.2
     print(
-        f"loose: turned by {np.degrees(angle[loose]):.1f} degrees, hangs {1e3 * beside[loose]:.1f} mm beside the pads",
-        end="",
+        f"loose grip: the plate has turned by {np.degrees(angle[loose]):.1f} degrees, with its centre of mass"
+        f" {1e3 * beside[loose]:.1f} mm to the side of the pads (theory: {1e3 * reach():.1f} mm)"
     )
-    print(f" (theory {1e3 * reach():.1f} mm)")
-    print(f"firm: turns by {np.degrees(np.ptp(angle[time > TURNS])):.3f} degrees in the hand while that turns by 69")
+    turned = np.degrees(np.ptp(angle[time > TURNS]))
+    print(f"firm grip: it turns by {turned:.3f} degrees relative to the hand while the hand turns by 69 degrees")
     creep = np.hypot(np.ptp(beside[last]), np.ptp(below[last])) / 0.2
-    print(f"held: creeps by {1e6 * creep:.4f} um/s")
+    print(f"at rest: it creeps at {1e6 * creep:.4f} um/s")
     folder.mkdir(parents=True, exist_ok=True)
     figure = new_figure(9.0, 2.6)
     for axes, shown, picture in zip(figure.subplots(1, len(SHOWN)), SHOWN, pictures, strict=True):

@@ -1,8 +1,8 @@
-"""Push a square across a table to a pose, and see what another limit surface would make of the same path.
+"""Plan a push that moves a square across a table to a given pose.
 
     python examples/push_to_a_pose.py [push.png]
 
-The pusher sticks to the middle of an edge; the plan is three arcs, each of a constant force within the friction cone.
+The pusher sticks to the middle of an edge. The plan has three arcs, each with a constant force in the friction cone.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ SQUARE = 0.045 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]])  # [m]
 
 
 def plan() -> PushPlan:
-    """The plan, pushed at the left edge."""
+    """Plan a push at the left edge."""
     slider = Slider(pf.LimitSurfaceExact(pf.ContactPatch.rectangle(0.09)), SQUARE)
     return plan_push(slider, Pusher(mu=0.4), GOAL, edges=[3])
 
 
 def main() -> None:
-    """Print the plan, and draw it where a file is named."""
+    """Print the plan, and draw it if a file is named."""
     found = plan()
     print(found)
     if len(sys.argv) > 1:

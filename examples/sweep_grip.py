@@ -1,7 +1,7 @@
-"""How hard to grip: a plate whose centre of mass is beside the fingers turns, slips or holds, over grip and friction.
+"""How hard to grip a plate off its centre of mass: a sweep over grip force and friction shows if it turns or slips.
 
-A sweep of `N x N` runs. Every run that is done stays in the folder of `--out`: stop the script, start it again, and it
-goes on; with a finer grid only what is new is simulated.
+The sweep has `N x N` runs. Finished runs are kept in the folder `--out`: if the script is stopped and started again, it
+continues, and with a finer grid only the new points are simulated.
 
     python examples/sweep_grip.py [--out FOLDER] [--points N]
 """
@@ -21,49 +21,48 @@ from planarfriction import plots
 
 PAD = pf.ContactPatch.disc(0.01, cells=15)
 OFFSET = 0.025
-"""From the fingers to the centre of mass [m]."""
+"""Distance from the fingers to the centre of mass [m]."""
 
 MASS = 0.2
 RATIO = 1.2
-"""mu_s over mu_c."""
+"""mu_s / mu_c."""
 
 HELD = np.radians(0.5)
-"""Angle below which a plate counts as held [rad]: an elastic pad lets it sag a little."""
+"""Angle below which a plate counts as held [rad]: elastic pads let it sag a little."""
 
 
 def plate(grip: float, mu_c: float) -> pf.Scene:
-    """The plate between two fingers of constant grip [N], for half a second."""
+    """The plate between two fingers with a constant grip force [N], for half a second."""
     law = pf.LuGre(mu_c=mu_c, mu_s=RATIO * mu_c, elasto_plastic=pf.ElastoPlastic(0.9))
     model = pf.ReducedModel(PAD, law)
     return pf.scenes.in_hand(model, normal_force=grip, centre_of_mass=(OFFSET, 0.0), mass=MASS, t_end=0.5)
 
 
 def end(solution: pf.Solution) -> dict[str, float]:
-    """Angle [rad] and way down [m] at the end."""
+    """Final angle [rad] and slip of the pads [m]."""
     x, y, theta = (solution.histories[name].values[-1] for name in ("x", "y", "theta"))
-    pad = np.array([x, y]) - OFFSET * np.array(
-        [np.cos(theta), np.sin(theta)]
-    )  # the plate's point that was between them
+    start = OFFSET * np.array([np.cos(theta), np.sin(theta)])
+    pad = np.array([x, y]) - start  # the point of the plate that was between the pads at the start
     return {"angle": float(theta), "slip": float(np.linalg.norm(pad))}
 
 
 def run(points: int, folder: Path | None = None) -> xr.Dataset:
-    """The sweep, with as many values of each quantity."""
+    """Run the sweep with `points` values of each quantity."""
     values = {"grip": np.linspace(1.5, 6.0, points), "mu_c": np.linspace(0.5, 1.5, points)}
     return pf.sweep(plate, values, out=folder, measure=end, progress=print)
 
 
 def holding_grip(mu_s: np.ndarray) -> np.ndarray:
-    """Grip of each of two fingers that just holds the plate [N], by the limit surface of the pad."""
+    """Smallest grip force of each of two fingers that holds the plate [N], from the limit surface of the pad."""
     weight = 9.81 * MASS
     wrench = np.array([0.0, weight, weight * OFFSET])
     surface = pf.LimitSurfaceExact(PAD)
-    limit = surface.wrench(surface.twist(wrench))  # the wrench in this direction that friction bears at mu f_N = 1
+    limit = surface.wrench(surface.twist(wrench))  # largest wrench in this direction for mu f_N = 1
     return np.linalg.norm(wrench) / np.linalg.norm(limit) / (2.0 * mu_s)
 
 
 def draw(data: xr.Dataset) -> Any:
-    """Angle and slip over grip and friction, with the limit of holding."""
+    """Plot angle and slip against grip and friction, with the holding limit."""
     figure = plots.style.new_figure(9.0, 3.6)
     panels = figure.subplots(1, 2, sharey=True)
     mu = np.linspace(float(data.mu_c[0]), float(data.mu_c[-1]), 200)
@@ -88,7 +87,7 @@ def main(arguments: list[str] | None = None) -> None:
     options = parser.parse_args(arguments)
     data = run(options.points, options.out / "sweep-grip")
     agree = (abs(data.angle) < HELD) == (data.grip > holding_grip(RATIO * data.mu_c))
-    print(f"held or not as the limit surface says: {int(agree.sum())} of {agree.size} runs")
+    print(f"held or not, as the limit surface predicts: {int(agree.sum())} of {agree.size} runs")
     path = options.out / "sweep_grip.png"
     draw(data).savefig(path, dpi=90, facecolor="white", metadata={"Software": None})
     print(f"wrote {path}")

@@ -1,7 +1,7 @@
-"""Turn a plate in the hand by loosening the grip: a plan, what friction does to it, and a plan that minds it less.
+"""Turn a plate in the hand by loosening the grip, with a plan for nominal friction and one for uncertain friction.
 
-Two finger pads hold a plate 25 mm beside its centre of mass. Loosened below the load that holds it, the plate turns
-under its own weight; gripped again, it stops. When, how much and how hard is what `plan_grip` finds. Run it:
+Two finger pads hold a plate 25 mm from its centre of mass. When they press less than is needed to hold it, the plate
+turns under its own weight; when they grip again, it stops. `plan_grip` finds when and how hard to press. Run it:
 
     python examples/turn_in_hand.py --out out/
 """
@@ -21,7 +21,7 @@ OFFSET = 0.025  # [m]
 
 
 def plan(degrees: float, aim: str) -> GripPlan:
-    """A plan that turns the plate by so many degrees within a second."""
+    """Plan to turn the plate by this many degrees within a second."""
     model = pf.ReducedModel(PAD, LAW)
     scene = pf.scenes.in_hand(model, centre_of_mass=(OFFSET, 0.0), normal_force=4.0, t_end=1.0)
     return plan_grip(scene, {"angle": math.radians(degrees)}, aim=aim)
@@ -38,7 +38,7 @@ def main() -> None:
         if aim == "nominal":
             weight = 9.81 * found.scene.body.mass / 2  # of two fingers
             load = (0.0, -weight, -OFFSET * weight)
-            print(f"At rest each finger has to press with {holding_load(load, PAD, LAW.mu_s):.2f} N.\n")
+            print(f"To hold the plate, each finger must press with {holding_load(load, PAD, LAW.mu_s):.2f} N.\n")
         print(f"{found}\n")
         found.plot().savefig(options.out / f"turn-{aim}.png")
         found.scene.to_file(options.out / f"turn-{aim}.toml")

@@ -1,10 +1,10 @@
-"""A rolling tyre: bristles that are carried through the contact patch, against the closed form of the brush model.
+"""A rolling tyre: bristles move through the contact patch; the result is compared with the closed-form brush model.
 
-The patch of a tyre is a grid of cells with the bristles of the distributed model. While the tyre rolls on by a column
-of cells, every bristle moves one column towards the rear, and new ones enter at the front without deflection. A bristle
-that comes under less pressure than it is bent for slides back at once. Bristles are equally stiff whatever presses
-them, as those of the brush model are. With `s = theta tan(alpha)`, `theta = 2 c a^2/(3 mu f_N)` and
-`l = 1 - s` (0 from full sliding on), for a parabolic pressure (Pacejka 2012, section 3.2):
+The patch of a tyre is a grid of cells with the bristles of the distributed model. Each time the tyre rolls forward by
+one column of cells, every bristle moves one column towards the rear, and new bristles enter at the front without
+deflection. Where the pressure becomes too low for the deflection of a bristle, the bristle slides back at once. As in
+the brush model, the stiffness of the bristles does not depend on the pressure. With `s = theta tan(alpha)`,
+`theta = 2 c a^2/(3 mu f_N)` and `l = 1 - s` (0 in full sliding), for a parabolic pressure (Pacejka 2012, section 3.2):
 
     F = mu f_N (1 - l^3),    T = mu f_N a l^3 (1 - l)
 
@@ -34,7 +34,7 @@ BREAKAWAY = 0.99  # the brush model has 1: bristles that do not give at all unti
 
 
 class Rolling(NamedTuple):
-    """A tyre that has rolled, at each slip."""
+    """Results of rolling, for each slip."""
 
     wrenches: np.ndarray
     """`(fx, fy, tau)` about the middle of the patch after each column, `[steps, slips, 3]` [N, N, N m]."""
@@ -43,21 +43,21 @@ class Rolling(NamedTuple):
 
 
 def patch_of_a_tyre() -> pf.ContactPatch:
-    """A rectangle with a pressure that is a parabola along x, the direction of rolling."""
+    """A rectangle whose pressure is a parabola along x, the rolling direction."""
     return pf.ContactPatch.rectangle(
         2.0 * HALF_LENGTH, WIDTH, (COLUMNS, ROWS), pressure=lambda x, y: 1.0 - (x / HALF_LENGTH) ** 2
     )
 
 
 def bristles(patch: pf.ContactPatch) -> LawNumbers:
-    """Law of each cell: stiffness per load, so that all are equally stiff, and a sharp breakaway."""
+    """Law of each cell, with a sharp breakaway; its stiffness per unit load makes all bristles equally stiff."""
     stiffness = STIFFNESS * 2.0 * HALF_LENGTH / patch.cells / LOAD
     plain = pf.LuGre(mu_c=MU, sigma_1=0.0, sigma_2=0.0, elasto_plastic=BREAKAWAY).numbers
     return LawNumbers(*plain)._replace(sigma_0=stiffness / patch.weights())
 
 
 def bend(z: np.ndarray, velocity: np.ndarray, dt: np.ndarray, law: LawNumbers) -> np.ndarray:
-    """Bristles `[..., 2, N]` [m] after `dt` at a held velocity: the step of `DistributedModel`, with a law per cell."""
+    """Bristles `[..., 2, N]` [m] after `dt` at constant velocity: the step of `DistributedModel`, a law per cell."""
     speed = np.linalg.norm(velocity, axis=-2, keepdims=True)
     grip = law.sigma_0 / formulas.stribeck(np, speed, law)
 
@@ -75,10 +75,15 @@ def bend(z: np.ndarray, velocity: np.ndarray, dt: np.ndarray, law: LawNumbers) -
 
 
 def roll(slips: np.ndarray, steps: int = COLUMNS, *, slide_back: bool = True) -> Rolling:
-    """Roll by `steps` columns, from bristles at rest, with each of `slips` `(vx, vy, omega)` per unit rolling speed.
+    """Roll by `steps` columns from relaxed bristles, with each of `slips` `(vx, vy, omega)` per unit rolling speed.
 
+<<<<<<< HEAD
     `slips` `[slips, 3]` [1, 1, 1/m] is the twist of the patch over the ground, less the rolling. With
     `slide_back=False` bristles above their largest deflection relax as in LuGre.
+=======
+    `slips` `[slips, 3]` [1, 1, 1/m] is the twist of the patch relative to the ground, without the rolling motion. With
+    `slide_back=False`, bristles above their largest deflection relax according to the LuGre law instead.
+>>>>>>> e804e5d (Plain English in the examples)
     """
     patch = patch_of_a_tyre()
     law, load = bristles(patch), LOAD * patch.weights()
@@ -106,19 +111,19 @@ def brush(slope: np.ndarray) -> np.ndarray:
 
 
 def sideways(angles: np.ndarray) -> np.ndarray:
-    """Slips of a wheel that moves at `angles` [rad] to its plane: its velocity over that of rolling, `[..., 3]`."""
+    """Slips `[..., 3]` of a wheel that moves at `angles` [rad] to its plane: velocity divided by rolling velocity."""
     return np.stack([0.0 * angles, np.tan(angles), 0.0 * angles], axis=-1)
 
 
 def errors(angles: np.ndarray, wrenches: np.ndarray) -> np.ndarray:
-    """Largest difference of force and torque from the brush model, over its largest value, `[2]` [-]."""
+    """Largest difference of force and torque from the brush model, relative to its largest value, `[2]` [-]."""
     expected = brush(np.tan(angles))
     found = np.stack([-wrenches[:, 1], wrenches[:, 2]])
     return np.abs(found - expected).max(axis=1) / np.abs(expected).max(axis=1)
 
 
 def draw(angles: np.ndarray, rolling: Rolling) -> PlotFigure:
-    """Force and torque over the slip angle, the bent bristles at three angles, and how the force builds up."""
+    """Plot force and torque against slip angle, the bent bristles at three angles, and how the force builds up."""
     figure = new_figure(10.0, 5.6)
     (force, torque), (bent, built) = figure.subplots(2, 2)
     degrees, fine = np.degrees(angles), np.radians(np.linspace(0.0, np.degrees(angles[-1]), 200))
@@ -139,8 +144,8 @@ def draw(angles: np.ndarray, rolling: Rolling) -> PlotFigure:
         bent.plot(x, 1e3 * rolling.field[k, 1].mean(axis=0), color=colour, label=f"{degrees[k]:.0f} deg")
         way = 1e3 * (np.arange(len(rolling.wrenches)) + 1) * 2.0 * HALF_LENGTH / COLUMNS
         built.plot(way, -rolling.wrenches[:, k, 1], color=colour, label=f"{degrees[k]:.0f} deg")
-    bent.set(xlabel="place in the patch [mm], rolling to the right", ylabel="deflection [mm]")
-    built.set(xlabel="way rolled after the wheel was turned [mm]", ylabel="side force [N]")
+    bent.set(xlabel="position in the patch [mm], rolling to the right", ylabel="deflection [mm]")
+    built.set(xlabel="distance rolled after the wheel was turned [mm]", ylabel="side force [N]")
     for axes in (force, torque, bent, built):
         tidy(axes)
     bent.set_ylim(top=1.35e3 * float(limit.max()))

@@ -59,4 +59,4 @@ def test_it_prints_and_draws(example, tmp_path, capsys):
     example.main(["--out", str(tmp_path), "--steps", "2"])
     assert (tmp_path / "from_a_script.png").stat().st_size > 10_000
     printed = capsys.readouterr().out
-    assert printed.count("unseen movement off by") == 3
+    assert printed.count("errors on the unseen movement") == 3
