@@ -1,8 +1,9 @@
-"""One implicit step of many patches in contact space, for any host that steps bodies.
+"""One implicit step of many patches in contact space, for use inside any simulator.
 
-A host that integrates with a fixed time step knows how the twists and loads of its patches at the end of the step would
-follow the friction wrenches that act during it. `CoupledPatches.step` finds the wrenches that fit: those of the models
-at the very twists and loads that come out. That is stable at any time step, whatever the stiffness of the bristles.
+The simulator (host) integrates with a fixed time step, and knows how the twists and loads of its patches at the end of
+the step depend on the friction wrenches that act during it. `CoupledPatches.step` finds wrenches that are consistent:
+they are those of the models at the twists and loads that they cause. This is stable at any time step, whatever the
+stiffness of the bristles.
 """
 
 from __future__ import annotations
@@ -47,7 +48,7 @@ _PLACES = ("state", "dt", "free_twist", "free_load", "guess", "response", "load_
 
 @by_parts
 class HostStep(NamedTuple):
-    """The step of a host for k patches: what comes out with the wrenches of a guess, and how other wrenches change it.
+    """The step of a host for k patches: the outcome for a guess of the wrenches, and how other wrenches change it.
 
     `V = twist + twist_response (W - wrench)`, `N = max(normal_force + load_response (W - wrench), 0)`, all at the end
     of the step, as flat vectors patch by patch. Leading axes are environments.
@@ -56,43 +57,44 @@ class HostStep(NamedTuple):
     twist: Any
     """Twists of the patches `[..., k, 3]` [m/s, m/s, rad/s], each about its contact frame's origin, in its axes."""
     normal_force: Any
-    """`[..., k]` [N]"""
+    """Normal forces `[..., k]` [N]."""
     wrench: Any
-    """The guess, `[..., k, 3]` [N, N, N m]: that of the last step, or zeros."""
+    """Guess of the wrenches, `[..., k, 3]` [N, N, N m]: those of the last step, or zeros."""
     twist_response: Any
     """d twist / d wrench, `[..., 3k, 3k]`: for rigid bodies `dt J M^-1 J'`; `W.twist_response W >= 0`."""
     load_response: Any = None
-    """d normal_force / d wrench, `[..., k, 3k]`; None where loads do not follow."""
+    """d normal_force / d wrench, `[..., k, 3k]`; None if the loads do not depend on the wrenches."""
 
 
 @by_parts
 class CoupledStep(NamedTuple):
-    """The end of a step: `state, wrench` are those of the models' `step` at `twist` and `normal_force`."""
+    """The end of a step: `state` and `wrench` are those of the models' `step` at `twist` and `normal_force`."""
 
     state: np.ndarray
-    """`[..., states]`"""
+    """State of all patches `[..., states]`."""
     wrench: np.ndarray
-    """`[..., k, 3]` [N, N, N m]"""
+    """Wrenches `[..., k, 3]` [N, N, N m]."""
     twist: np.ndarray
-    """`[..., k, 3]` [m/s, m/s, rad/s]"""
+    """Twists `[..., k, 3]` [m/s, m/s, rad/s]."""
     normal_force: np.ndarray
-    """`[..., k]` [N]"""
+    """Normal forces `[..., k]` [N]."""
     iterations: np.ndarray
     """Newton iterations, int `[...]`."""
     residual: np.ndarray
-    """How far twists and loads are from what the wrenches cause, `[...]` [m/s]; a load in the speed that it could."""
+    """Largest difference between the twists and loads and those the wrenches cause, `[...]` [m/s]; loads count as the
+    speed they could cause."""
     converged: np.ndarray
-    """Whether that is within the tolerance, bool `[...]`."""
+    """Whether the residual is within the tolerance, bool `[...]`."""
 
 
 @dataclass(frozen=True, eq=False)
 class CoupledPatches(ByValue):
-    """Patches that one implicit step couples through the bodies of a host; models of all kinds may be mixed.
+    """Patches that are coupled through the bodies of a host and stepped together; different models may be mixed.
 
-    The caller holds the state: one vector, the states of the patches one behind the other (`states` gives each its
-    shape). A patch whose shape depends on the load has the shape of the load that comes out.
+    The caller keeps the state: one vector with the states of all patches in order (`states` gives each its shape). A
+    patch whose shape depends on the load has the shape for the load at the end of the step.
 
-    Raises `InvalidValueError` where `models` are no friction models with compiled steps.
+    Raises `InvalidValueError` unless all `models` are friction models with compiled steps.
     """
 
     models: Sequence[FrictionModel]
@@ -114,11 +116,11 @@ class CoupledPatches(ByValue):
         return (int(self._bounds[-1]),)
 
     def rest(self) -> np.ndarray:
-        """State of patches at rest: no bristle is deflected."""
+        """State of all patches at rest, with relaxed bristles."""
         return np.zeros(self.state_shape)
 
     def states(self, state: np.ndarray) -> list[np.ndarray]:
-        """Views of the state of each patch in `state` `[..., states]`, in the shape that its model gives it.
+        """Views of the state of each patch in `state` `[..., states]`, each in the shape that its model uses.
 
         Raises InvalidValueError for a state of another shape.
         """
@@ -137,15 +139,16 @@ class CoupledPatches(ByValue):
         tolerance: float = TOLERANCE,
         iterations: int = ITERATIONS,
     ) -> CoupledStep:
-        """The wrenches that fit the step of a host: `W = w(V, N)`, with the V and N that they cause (see `HostStep`).
+        """Find the wrenches of a host's step: `W = w(V, N)`, with the V and N that they cause (see `HostStep`).
 
-        `w` are the wrenches of the models' steps of `dt` [s] from `state` `[..., states]`. Newton's method on W, from
-        the better of the guess and of rest; a step that goes too far is shortened, and slopes that rise are left out
-        (docs/embedding.md). Leading axes broadcast; environments run on threads, without the interpreter's lock.
-        `tolerance` is that of the twists [m/s], spins times the size of the patch. What does not converge within
-        `iterations` has the best found.
+        `w` are the wrenches of the models' steps of `dt` [s] from `state` `[..., states]`. Solved by Newton's method
+        for W, starting from the better of the guess and rest; a step that goes too far is shortened, and slopes with
+        the wrong sign are left out (docs/embedding.md). Leading axes broadcast; environments run on threads, without
+        the interpreter's lock. `tolerance` is that of the twists [m/s], with spins multiplied by the size of the patch.
+        If the iteration does not converge within `iterations`, the best result found is returned.
 
-        Raises `InvalidValueError` for what is not finite, not of its shape, or negative where it must not be.
+        Raises `InvalidValueError` for input that is not finite, has the wrong shape, or is negative where it must not
+        be.
         """
         if not isinstance(host, HostStep):
             raise InvalidValueError("host", "be a HostStep", type(host).__name__)

@@ -1,7 +1,7 @@
-"""Records with arrays in them: `==` and `hash` by their parts, always a plain bool, and a `repr` of one line.
+"""Records that contain arrays: `==` and `hash` by content, and a `repr` of one line.
 
-The `==` that Python makes for dataclasses and named tuples compares arrays as a whole and raises; their `repr` writes
-out every number.
+The `==` that Python generates for dataclasses and named tuples compares arrays as a whole and raises; their `repr`
+prints every number.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ _SHORT = 9
 
 
 class ByValue:
-    """Base of frozen dataclasses (`eq=False`) that compare by type and content, and show themselves in one line."""
+    """Base of frozen dataclasses (`eq=False`) that are compared by type and content and have a `repr` of one line."""
 
     def __init_subclass__(cls, **more: Any) -> None:
         super().__init_subclass__(**more)
@@ -44,7 +44,7 @@ class ByValue:
 
 
 def by_parts(kind: _KindT) -> _KindT:
-    """Decorator of named tuples with arrays: they compare by content, and show themselves in one line."""
+    """Decorator for named tuples with arrays: they are compared by content and have a `repr` of one line."""
 
     def equal(self: Any, other: object) -> bool:
         return type(self) is type(other) and _same_items(self, other)

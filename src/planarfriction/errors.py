@@ -1,4 +1,4 @@
-"""Errors of the library: each derives from `FrictionError`, carries its facts as attributes and reads as one line."""
+"""Errors of the library: each derives from `FrictionError`, keeps its details as attributes and reads as one line."""
 
 from __future__ import annotations
 
@@ -58,9 +58,9 @@ def _restored(kind: type[BaseException], arguments: tuple[Any, ...], attributes:
 
 
 class FrictionError(_Travels, Exception):
-    """Base of every error that planarfriction raises on purpose.
+    """Base class of every error that planarfriction raises on purpose.
 
-    Errors can be copied and pickled; an attribute that cannot be pickled is then None, the message stays.
+    Errors can be copied and pickled; an attribute that cannot be pickled becomes None, and the message stays the same.
     """
 
 
@@ -83,14 +83,14 @@ class InvalidValueError(FrictionError, ValueError):
 
 
 class FileError(FrictionError, OSError):
-    """A file is missing, of the wrong kind, or cannot be written: says which file and what to do."""
+    """A file is missing, of the wrong kind, or cannot be written; the message names the file and what to do."""
 
     def __str__(self) -> str:
         return one_line(super().__str__())  # names of files may hold anything
 
 
 class MissingExtraError(FrictionError, ImportError):
-    """An optional package is not installed: names the extra that installs it."""
+    """An optional package is not installed; the message names the extra that installs it."""
 
     def __init__(self, package: str, extra: str):
         self.package, self.extra = package, extra
@@ -98,7 +98,7 @@ class MissingExtraError(FrictionError, ImportError):
 
 
 class SolverError(FrictionError, RuntimeError):
-    """The solver gave up; the message says the remedy.
+    """The solver failed; the message suggests a remedy.
 
     Attributes
     ----------
@@ -120,11 +120,11 @@ class SimulationInterrupted(_Travels, KeyboardInterrupt):
 
 
 class SweepError(FrictionError, RuntimeError):
-    """A sweep ended early, or nothing came of any of its runs."""
+    """A sweep ended early, or none of its runs succeeded."""
 
 
 class SweepInterrupted(_Travels, KeyboardInterrupt):
-    """Ctrl-C during a sweep; `data` is the dataset of the runs that are done, with the status "missing" for others."""
+    """Ctrl-C during a sweep; `data` is the dataset of the finished runs, with the status "missing" for the others."""
 
     def __init__(self, message: str, data: Any):
         self.data = data

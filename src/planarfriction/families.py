@@ -1,6 +1,6 @@
-"""The families and their members: a name for files and command line, a class loaded on first use, a line of words.
+"""Families of laws, surfaces, models, shapes and scenes: each member has a name, a class, and a description.
 
-Nothing else lists members: a new one is one file and one line here, or a call of `register` at run time.
+Nothing else lists the members: a new one needs one file and one line here, or a call of `register` at run time.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from planarfriction.errors import InvalidValueError
 
 
 class Member(NamedTuple):
-    """A member of a family."""
+    """One member of a family."""
 
     words: str
-    """What it is, in one line."""
+    """Description in one line."""
     make: Any
-    """Its class or function, or where that is: "module:name"."""
+    """Class or function that makes it, or where to find that: "module:name"."""
 
 
 class Family(Mapping[str, Any]):
-    """Names of a family, in order; `family[name]` is what makes the member, loaded on first use."""
+    """The members of a family by name, in order; `family[name]` is the class or function, loaded on first use."""
 
     def __init__(self, what: str, members: Mapping[str, tuple[str, str]]):
         self.what = what
@@ -50,7 +50,7 @@ class Family(Mapping[str, Any]):
         return name in self._members
 
     def words(self, name: str) -> str:
-        """What a member is, in one line."""
+        """Description of a member, in one line."""
         return self._members[name].words
 
     def classes(self) -> str:
@@ -58,24 +58,24 @@ class Family(Mapping[str, Any]):
         return ", ".join(make.__name__ for make in self.values())
 
     def choose(self, name: str) -> Any:
-        """What makes the member `name`. Raises `InvalidValueError` that names all of them."""
+        """Class or function of the member `name`. Raises `InvalidValueError`, listing all names, if there is none."""
         from planarfriction import validation  # brings NumPy with it, which names alone do not need
 
         return self[validation.choice(self.what, name, self)]
 
     def name_of(self, member: Any) -> str | None:
-        """Name of the class of `member`; None where it is no member. Loads nothing."""
+        """Name of the class of `member`, or None if it is not a member. Loads nothing."""
         kind = type(member)
         path = f"{kind.__module__.removeprefix('planarfriction.')}:{kind.__qualname__}"
         return next((name for name, each in self._members.items() if each.make in (kind, path)), None)
 
     def register(self, name: str, make: Callable[..., Any], words: str = "") -> None:
-        """Add a member of your own: files and command line of this process then know it by `name`.
+        """Add a member of your own, which files and the command line of this process then know by `name`.
 
-        `words` say what it is, in one line. A member that was registered before is replaced.
+        `words` describes it in one line. A member that was registered before is replaced.
 
-        Raises `InvalidValueError` if the name is not of lower-case letters, digits and hyphens, or that of a member of
-        the library, and if `make` cannot be called.
+        Raises `InvalidValueError` if the name has other characters than lower-case letters, digits and hyphens, if it
+        is that of a member of the library, and if `make` cannot be called.
         """
         called = f"name of a {self.what}"
         if not (isinstance(name, str) and re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", name)):

@@ -24,7 +24,7 @@ def twist_at(twist: ArrayLike, offset: ArrayLike) -> np.ndarray:
 def wrench_at(wrench: ArrayLike, offset: ArrayLike) -> np.ndarray:
     """Wrench about the point displaced by `offset` [m] from the reference point.
 
-    `tau' = tau - (dx fy - dy fx)`; forces stay. `wrench . twist` is the same at every point.
+    `tau' = tau - (dx fy - dy fx)`; the forces do not change. `wrench . twist` is the same at every point.
     """
     wrench, offset = np.asarray(wrench, dtype=float), np.asarray(offset, dtype=float)
     fx, fy = wrench[..., 0], wrench[..., 1]
@@ -32,10 +32,10 @@ def wrench_at(wrench: ArrayLike, offset: ArrayLike) -> np.ndarray:
 
 
 def transformed(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Products `matrix @ v` for v of `vectors` `[..., 3]`, rounded alike for one and for many, in any order in memory.
+    """Products `matrix @ v` for each v in `vectors` `[..., 3]`, with the same rounding for one vector as for many.
 
-    Only products and sums of single numbers are rounded the same everywhere; those of BLAS depend on the number of rows
-    and on the processor.
+    Only products and sums of single numbers are rounded in the same way everywhere; the rounding of BLAS depends on the
+    number of rows and on the processor.
     """
     x, y, z = (vectors[..., i, None] for i in range(3))
     return np.ascontiguousarray(x * matrix[:, 0] + y * matrix[:, 1] + z * matrix[:, 2])

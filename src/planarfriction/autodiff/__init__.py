@@ -1,9 +1,9 @@
-"""Roll-outs with their exact derivatives: what the tensor front ends and identification build on.
+"""Roll-outs with exact derivatives, on which the tensor front ends and identification are built.
 
-`rollout` steps a model through given twists and loads; of a reduced model, `rollout_gradient` is its discrete adjoint,
-`rollout_tangent` its change along given changes of the inputs, and `rollout_sensitivities` the derivatives of each
-wrench by the parameters. All are derivatives of the steps themselves, not of the continuous model, so that they agree
-with differences of `rollout` to rounding. Kinks: `planarfriction.kernels.bristle_step`.
+`rollout` steps a model through given twists and loads. For reduced models, `rollout_gradient` is its discrete adjoint,
+`rollout_tangent` its directional derivative, and `rollout_sensitivities` gives the derivatives of each wrench with
+respect to the parameters. All are derivatives of the steps themselves, not of the continuous model, so they agree with
+finite differences of `rollout` to rounding. Kinks are described in `planarfriction.kernels.bristle_step`.
 """
 
 from planarfriction.autodiff.drives import SCENE_PARAMETERS

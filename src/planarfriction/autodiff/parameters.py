@@ -92,16 +92,16 @@ class Packed(NamedTuple):
 
 
 def parameter_names(model: Any) -> tuple[str, ...]:
-    """Names of the P parameters of a reduced model, in the order of their vector.
+    """Names of the P parameters of a reduced model, in the order of the parameter vector.
 
-    Those of `ReducedModelPublished` are `PARAMETERS`. `ReducedModel` has those of the law but gamma, which is built
-    into its stored map as the shape of the patch is.
+    Those of `ReducedModelPublished` are `PARAMETERS`. Those of `ReducedModel` are the parameters of the law without
+    gamma, because its stored map depends on gamma, as it does on the shape of the patch.
     """
     return _family(model).names
 
 
 def parameters_of(model: Any) -> np.ndarray:
-    """Parameters of a reduced model, shape `[P]`; plain bristles have a breakaway ratio without effect."""
+    """Parameters of a reduced model, shape `[P]`; for plain bristles the breakaway ratio is there but has no effect."""
     packed = pack(model)[0]
     return packed.rows[packed.family.columns]
 

@@ -1,4 +1,4 @@
-"""Roll-outs with a fixed step, and their derivatives backwards and forwards."""
+"""Roll-outs with a fixed step, and their reverse and forward derivatives."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ from planarfriction.models import FrictionModel
 
 @by_parts
 class Rollout(NamedTuple):
-    """A model stepped through T twists and loads."""
+    """Result of stepping a model through T twists and loads."""
 
     state: np.ndarray
     """State after the last step, `[..., *state_shape]`."""
@@ -38,7 +38,7 @@ class Rollout(NamedTuple):
 
 @by_parts
 class RolloutStates(NamedTuple):
-    """A roll-out with its states on the way."""
+    """A roll-out together with its intermediate states."""
 
     state: np.ndarray
     """As in `Rollout`."""
@@ -50,7 +50,7 @@ class RolloutStates(NamedTuple):
 
 @by_parts
 class RolloutSensitivities(NamedTuple):
-    """A roll-out with the derivatives of its wrenches by P parameters."""
+    """A roll-out with the derivatives of its wrenches with respect to P parameters."""
 
     state: np.ndarray
     """As in `Rollout`."""
@@ -62,7 +62,7 @@ class RolloutSensitivities(NamedTuple):
 
 @by_parts
 class RolloutTangent(NamedTuple):
-    """A roll-out and its change along given changes of its inputs."""
+    """A roll-out and its change for given changes of the inputs."""
 
     state: np.ndarray
     """As in `Rollout`."""
@@ -76,29 +76,30 @@ class RolloutTangent(NamedTuple):
 
 @by_parts
 class RolloutGradient(NamedTuple):
-    """Gradient of a number with respect to the inputs of a roll-out, each of the shape of that input."""
+    """Gradient of a scalar with respect to the inputs of a roll-out, each of the shape of that input."""
 
     state: np.ndarray
-    """By the state before the first step, of its shape [1/unit of the state]."""
+    """With respect to the state before the first step, of its shape [1/unit of the state]."""
     twist: np.ndarray
-    """By the twists, `[..., T, 3]` [s/m, s/m, s/rad]."""
+    """With respect to the twists, `[..., T, 3]` [s/m, s/m, s/rad]."""
     normal_force: np.ndarray
-    """By the loads, of their shape [1/N]."""
+    """With respect to the loads, of their shape [1/N]."""
     parameters: np.ndarray
-    """By the parameters of the law, `[..., P]` [1/unit of each]."""
+    """With respect to the parameters, `[..., P]` [1/unit of each]."""
 
 
 def rollout(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, *, parameters: Any = None) -> Rollout:
     """Step a model from `state` (None: at rest) through `twist` `[..., T, 3]`, each held for `dt` [s].
 
     The steps are those of `model.step`. `normal_force` broadcasts with `[..., T]`: one number, one for each step, or
-    one for each contact `[..., 1]`; `dt` is one number or `[T]`; leading axes broadcast. `parameters` `[..., P]` of a
-    reduced model (see `parameter_names`) take the place of its own; the limit surface, or the map of a `ReducedModel`,
-    stays as it is, in scaled coordinates. Reduced models run compiled, batches on all processors; any other model steps
-    in Python, and so do shapes that are built for each load (`load_error=0`, `ReducedModelPublished` but "keep").
+    one for each contact `[..., 1]`; `dt` is one number or `[T]`; leading axes broadcast. For a reduced model,
+    `parameters` `[..., P]` (see `parameter_names`) replace its own; the limit surface, or the map of a `ReducedModel`,
+    stays as it is, in scaled coordinates. Reduced models run in compiled code, batches on all processors; all other
+    models step in Python, as do shapes that are rebuilt for each load (`load_error=0`, and `ReducedModelPublished`
+    unless "keep").
 
-    Raises `InvalidValueError` for wrong shapes, for numbers out of range, and for `parameters` of a model that cannot
-    take them.
+    Raises `InvalidValueError` for wrong shapes, for numbers out of range, and for `parameters` if the model cannot take
+    them.
     """
     if not isinstance(model, FrictionModel | Packed | tuple):
         raise InvalidValueError("model", f"be a friction model ({MODELS.classes()})", type(model).__name__)
@@ -112,7 +113,7 @@ def rollout(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, *, p
 def rollout_states(
     model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, *, parameters: Any = None
 ) -> RolloutStates:
-    """A `rollout` that keeps the state before each step, which saves `rollout_gradient` half of its way."""
+    """A `rollout` that keeps the state before each step, which saves `rollout_gradient` half of its work."""
     inputs = checked(model, state, twist, normal_force, dt, parameters)
     end, wrenches, states = _roll(inputs, len(inputs.dt))
     return RolloutStates(inputs.shaped(end), wrenches, inputs.shaped(states, len(inputs.dt)))
@@ -132,15 +133,16 @@ def rollout_gradient(
 ) -> RolloutGradient:
     """Gradient of `sum(wrenches_bar wrenches) + sum(state_bar state)` of a `rollout` with respect to its inputs.
 
-    The discrete adjoint: exact for the steps taken, at a few times the cost of the roll-out whatever the number of
-    inputs. `wrenches_bar` `[..., T, 3]` and `state_bar` `[..., *state_shape]` (None: zero) broadcast. An input that
-    several contacts share gets the sum of theirs. `states`: those of `rollout_states`, if kept. At zero load the
-    gradient with respect to that load is the one-sided one.
+    This is the discrete adjoint: exact for the steps taken, and a few times as expensive as the roll-out whatever the
+    number of inputs. `wrenches_bar` `[..., T, 3]` and `state_bar` `[..., *state_shape]` (None: zero) broadcast. The
+    gradient of an input that several contacts share is the sum over these contacts. `states` are those of
+    `rollout_states`, if available. At zero load the gradient with respect to that load is one-sided.
 
-    A shape that follows the load moves with each: second moments and shares by central differences over 1e-5 of the
-    load, which err by 1e-10 of themselves; maps along the chord between two rungs (docs/load-families.md).
+    If the shape depends on the load, it is differentiated too: second moments and shares by central differences with a
+    step of 1e-5 of the load (relative error 1e-10), maps along the chord between two of the stored loads
+    (docs/load-families.md).
 
-    Raises `InvalidValueError` as `rollout` does, and for a model that is not a reduced one that runs compiled.
+    Raises `InvalidValueError` as `rollout` does, and for a model that has no compiled roll-out.
     """
     inputs = checked(model, state, twist, normal_force, dt, parameters)
     count, steps, inner, turned = inputs.state.shape[1], len(inputs.dt), inputs.inner, inputs.parts[0].turned
@@ -176,13 +178,13 @@ def rollout_sensitivities(
     *,
     parameters: Any = None,
 ) -> RolloutSensitivities:
-    """A `rollout` of a reduced model with the derivatives of its wrenches by the parameters `names`.
+    """A `rollout` of a reduced model with the derivatives of its wrenches with respect to the parameters `names`.
 
-    Forward in time, for least squares, which wants each wrench's own derivatives; the initial state is held. `names`:
-    of `parameter_names`, None for all.
+    Computed forward in time, for least squares, which needs the derivatives of each wrench; the initial state is held
+    fixed. `names` are some of `parameter_names`, or None for all.
 
-    Raises InvalidValueError for inputs of wrong shapes, below zero where that is not possible, or of parameters that
-    the law has not.
+    Raises InvalidValueError for inputs of wrong shapes, for negative values where they are not possible, and for names
+    that are not parameters of the law.
     """
     inputs = checked(model, state, twist, normal_force, dt, parameters)
     family, count, steps = inputs.parts[0].family, inputs.state.shape[1], len(inputs.dt)
@@ -210,10 +212,10 @@ def rollout_tangent(
     *,
     parameters: Any = None,
 ) -> RolloutTangent:
-    """A `rollout` of a reduced model with its change along given changes of its inputs.
+    """A `rollout` of a reduced model with its change for given changes of the inputs.
 
-    Forward in time, at some six times the cost of `rollout_gradient`: `J x` where that gives `J' x`. Changes have the
-    shapes of their inputs; leading axes broadcast, so that one roll-out takes many directions.
+    Computed forward in time, at about six times the cost of `rollout_gradient`: it gives `J x` where that gives `J' x`.
+    The changes have the shapes of their inputs; leading axes broadcast, so that one roll-out can take many directions.
 
     Raises `InvalidValueError` as `rollout_gradient` does.
     """

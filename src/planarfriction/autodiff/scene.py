@@ -36,24 +36,24 @@ LEAST_NODES = 16
 class SceneSensitivities(ByValue):
     """A motion and its derivatives with respect to P numbers.
 
-    Parameters are factors, 1 as the scene is: divided by a parameter's value it is the derivative with respect to the
-    parameter. Knots and components of the start have the units of the signal and of the state.
+    Parameters are factors with the value 1: divide the derivative by the value of a parameter to get the derivative
+    with respect to the parameter itself. Knots and initial values have the units of the signal and of the state.
     """
 
     names: tuple[str, ...]
-    """What they are with respect to; `fingers.normal_force[2]` is knot 2 of a signal."""
+    """What the derivatives are with respect to; `fingers.normal_force[2]` is knot 2 of a signal."""
     columns: dict[str, slice]
-    """Where the P derivatives of a parameter, a signal (all its knots) or a component of the start stand."""
+    """Which of the P derivatives belong to a parameter, a signal (all its knots) or an initial value, by name."""
     time: np.ndarray
-    """`[M]` [s]"""
+    """Times `[M]` [s]."""
     motion: np.ndarray
     """vx, vy, omega, x, y, theta of the body `[M, 6]`, as in a solution's data."""
     wrenches: np.ndarray
     """Wrench of one of the identical contacts `[M, C, 3]` [N, N, N m]."""
     d_motion: np.ndarray
-    """`[M, 6, P]`"""
+    """Derivatives of the motion `[M, 6, P]`."""
     d_wrenches: np.ndarray
-    """`[M, C, 3, P]`"""
+    """Derivatives of the wrenches `[M, C, 3, P]`."""
 
 
 def scene_sensitivities(
@@ -67,27 +67,27 @@ def scene_sensitivities(
     atol: float | None = None,
     save_every: float | None = None,
 ) -> SceneSensitivities:
-    """Derivatives of a simulated motion with respect to the scene's parameters, its signals and its start.
+    """Derivatives of a simulated motion with respect to the scene's parameters, its signals and its initial state.
 
     `parameters` are factors (see `SCENE_PARAMETERS`). `signals` gives knots [s] by the name of a signal: `force`,
-    `velocity`, or `NAME.normal_force` for a contact of that name. The derivative is that with respect to a number added
-    to the signal at the knot, joined in time as the signal's own samples are (`hold`): `sum_k d_k hat_k(t)`. At the
-    times of its samples it is the derivative with respect to their values. `initial` names components of the body's
-    start: vx, vy, omega, x, y, theta.
+    `velocity`, or `NAME.normal_force` for the contact of that name. The derivative is with respect to a number added to
+    the signal at the knot and interpolated in time like the signal's own samples (`hold`): `sum_k d_k hat_k(t)`. If the
+    knots are the times of the samples, it is the derivative with respect to the sampled values. `initial` names
+    components of the body's initial state: vx, vy, omega, x, y, theta.
 
     The scene is simulated with tight tolerances (`atol` as in `simulate`; default `rtol`). Along the accepted steps the
     variational equation `s' = J s + df/dp` is solved with the solver's own analytic Jacobian, by an L-stable method of
-    order 4 whose steps go over several of the motion, each right to `0.1 rtol^(2/3)` of the derivatives. At the default
-    tolerance they agree with central differences of tight simulations to 5e-6 of the largest, and to 2e-5 through
-    tables, whose Jacobian jumps from cell to cell.
+    order 4 whose steps span several steps of the motion, each accurate to `0.1 rtol^(2/3)` of the derivatives. At the
+    default tolerance the derivatives agree with central differences of tight simulations to 5e-6 of the largest, and to
+    2e-5 with tables, whose Jacobian jumps from cell to cell.
 
-    A bristle that begins to slip or sticks again bends the right-hand side but does not make it jump: the derivative
-    goes on through such a transition, and is the change of a motion that makes the same transitions a little earlier
-    or later. It is large where the motion hangs on friction by a thread, as in a slip that barely happens. On a kink
+    A bristle that begins to slip or to stick bends the right-hand side but does not make it jump: the derivative
+    continues through such a transition, and describes a motion that makes the same transitions slightly earlier or
+    later. It is large if the motion depends very sensitively on friction, as in a slip that barely happens. On a kink
     (a velocity that stays zero, the edge of a table's cell) it is the derivative of one side. The instants at which
-    signals jump and at which a slide counts as stopped are held.
+    signals jump, and at which a slide counts as stopped, are held fixed.
 
-    Raises `InvalidValueError` for unknown names or numbers out of range, and `SolverError` where the solver gives up.
+    Raises `InvalidValueError` for unknown names or numbers out of range, and `SolverError` if the solver fails.
     """
     columns = Columns(scene, parameters, signals, initial)
     windows, times, rtol, absolute = prepared(scene, columns, t_end, rtol, atol, save_every)

@@ -1,4 +1,4 @@
-"""The reverse of scene sensitivities: the slope of one cost of a motion, whatever the number of knots."""
+"""The reverse of scene sensitivities: the gradient of one cost of a motion, whatever the number of knots."""
 
 from __future__ import annotations
 
@@ -25,20 +25,20 @@ from planarfriction.solvers.structured import start_of
 
 @dataclass(frozen=True, eq=False)
 class SceneGradient(ByValue):
-    """A motion and the slope of a cost with respect to P numbers (see `SceneSensitivities`)."""
+    """A motion and the gradient of a cost with respect to P numbers (see `SceneSensitivities`)."""
 
     names: tuple[str, ...]
-    """What it is with respect to."""
+    """What the gradient is with respect to."""
     columns: dict[str, slice]
-    """Where the slopes of a parameter, a signal (all its knots) or a component of the start stand."""
+    """Which components of the gradient belong to a parameter, a signal (all its knots) or an initial value, by name."""
     time: np.ndarray
-    """`[M]` [s]"""
+    """Times `[M]` [s]."""
     motion: np.ndarray
     """vx, vy, omega, x, y, theta of the body `[M, 6]`."""
     wrenches: np.ndarray
     """Wrench of one of the identical contacts `[M, C, 3]` [N, N, N m]."""
     gradient: np.ndarray
-    """`[P]`"""
+    """Gradient of the cost `[P]`."""
 
 
 def scene_gradient(
@@ -54,14 +54,15 @@ def scene_gradient(
     atol: float | None = None,
     save_every: float | None = None,
 ) -> SceneGradient:
-    """Slope of a cost of a motion with respect to parameters, signals and start, as in `scene_sensitivities`.
+    """Gradient of a cost of a motion with respect to parameters, signals and initial state, as in
+    `scene_sensitivities`.
 
     `slope(time, motion)` takes the times `[M]` and the motion `[M, 6]` and returns `dcost/dmotion` `[M, 6]`;
     `wrench_slope(time, wrenches)` adds `dcost/dwrenches` `[M, C, 3]` for the wrench of one of the identical contacts.
-    The adjoint `-l' = J' l` runs back over the accepted steps, jumps by the slopes at each instant, and gathers
-    `int l' df/dp dt`: it takes the time of one derivative, whatever the number of knots.
+    The adjoint `-l' = J' l` runs backwards over the accepted steps, jumps by these slopes at each instant, and
+    accumulates `int l' df/dp dt`. It takes as long as one derivative, whatever the number of knots.
 
-    Raises `InvalidValueError` as `scene_sensitivities` does; `SolverError` where the solver gives up.
+    Raises `InvalidValueError` as `scene_sensitivities` does, and `SolverError` if the solver fails.
     """
     for name, function in (("slope", slope), ("wrench_slope", wrench_slope)):
         if not callable(function) and (function is not None or (slope is None and wrench_slope is None)):

@@ -1,7 +1,7 @@
-"""Identification: parameters of the friction models from measurements, with their errors and with what stays unknown.
+"""Identification: parameters of the friction models from measurements, with their uncertainty.
 
-`identify_lugre` reads logs of motion and wrench, `identify_motion` slides without a force sensor; `plan_motion` says
-which motion to measure next.
+`identify_lugre` reads logs of motion and wrench, `identify_motion` slides without a force sensor; `plan_motion`
+suggests which motion to measure next.
 """
 
 from planarfriction.identify.candidates import candidate_motions

@@ -1,4 +1,4 @@
-"""Motions that an experiment may consist of: a small family that loads, reverses, slides and spins a contact."""
+"""Motions for an experiment: a small family that loads, reverses, slides and spins a contact."""
 
 from __future__ import annotations
 
@@ -45,21 +45,22 @@ def candidate_motions(
     duration: float = 2.0,
     rate: float = 1000.0,
 ) -> tuple[Log, ...]:
-    """Motions that begin at rest, six for each load, as logs whose wrenches are zero.
+    """Motions to choose from for an experiment: six for each load, starting at rest, as logs whose wrenches are zero.
 
-    Grown sines of slide and spin, a slide that grows from slow to fast, slow and quick reversals over three times the
-    way at which bristles break away, spin alone, spin during a slide.
+    They are: growing sines of slide and spin, a slide that becomes faster, slow and quick reversals over three times
+    the distance at which bristles break away, spin alone, and spin during a slide.
 
     Parameters
     ----------
     patch, law
-        The contact as far as it is known.
+        The contact, as far as it is known.
     normal_force
         One load or several [N].
     speed, spin
-        The largest that the rig can do [m/s, rad/s]; a spin of None moves the rim of the contact as fast as `speed`.
+        The largest that the rig can produce [m/s, rad/s]; None for `spin` moves the rim of the contact as fast as
+        `speed`.
     duration, rate
-        Length of each motion [s], samples per second [Hz].
+        Length of each motion [s] and samples per second [Hz].
 
     Raises
     ------

@@ -33,11 +33,11 @@ LEVER = 1e-9
 class Log(ByValue):
     """Twist and friction wrench of one contact over time, T samples.
 
-    Twist and wrench are about the origin of the contact frame, in its axes; the wrench acts on the moving body, so that
+    Twist and wrench are about the origin of the contact frame, in its axes; the wrench acts on the moving body, so
     friction points against the motion.
 
     Raises InvalidValueError for fewer than ten samples, wrong shapes, numbers that are not finite, times that do not
-    increase and negative normal forces.
+    increase, and negative normal forces.
     """
 
     time: np.ndarray
@@ -51,7 +51,7 @@ class Log(ByValue):
     name: str = "log"
     """Name for messages and plots."""
     turns: int = 0
-    """Jumps by a whole turn that were taken out of the measured angle."""
+    """Number of whole-turn jumps that were removed from the measured angle."""
 
     if TYPE_CHECKING:  # what is given may be more than what is kept
 
@@ -88,7 +88,7 @@ class Log(ByValue):
 
     @property
     def channels(self) -> np.ndarray:
-        """Which of fx, fy, tau were measured, `[3]` of bool: no torque where tau is 0, or rounding, throughout."""
+        """Which of fx, fy, tau were measured, `[3]` of bool; a tau that is always 0, up to rounding, was not."""
         largest = np.abs(self.wrench).max(axis=0)
         return np.array([True, True, bool(largest[2] > LEVER * largest[:2].max())])
 
@@ -114,11 +114,12 @@ class Log(ByValue):
         window: int = 7,
         name: str = "log",
     ) -> Log:
-        """Log whose motion was measured, not its twist: `motion` is x, y, theta `[T, 3]` of the contact frame [m, rad].
+        """Make a log from measured poses instead of twists: `motion` is x, y, theta `[T, 3]` of the contact frame [m,
+        rad].
 
-        The pose is that of the contact frame in the world, the wrench in the contact frame's axes; the twist is
-        `differentiated` and turned into them. Jumps of theta by a turn, as of a tracker that keeps it within one, are
-        taken out first and counted in `turns`; other jumps are refused.
+        The pose is that of the contact frame in the world, the wrench is in the axes of the contact frame; the twist is
+        obtained with `differentiated` and rotated into these axes. Jumps of theta by a whole turn, as from a tracker
+        that limits it to one turn, are removed first and counted in `turns`; other jumps are refused.
         """
         time, motion = _checked_motion(time, motion)
         motion[:, 2], turns = unwrapped(time, motion[:, 2], f"theta of {name}")
@@ -128,14 +129,15 @@ class Log(ByValue):
     def from_csv(
         cls, path: str | Path, *, normal_force: float | None = None, window: int = 7, contact: str | None = None
     ) -> Log:
-        """Log of a CSV file with a heading: columns t, vx, vy, omega (or x, y, theta), fx, fy, tau, normal_force [SI].
+        """Read a log from a CSV file with a heading: columns t, vx, vy, omega (or x, y, theta), fx, fy, tau,
+        normal_force [SI].
 
-        Other columns are ignored, lines that begin with # too; `time` and `fn` will do for t and normal_force, capital
-        letters for small ones, semicolons and tabs for commas. `normal_force` [N] stands in for a missing column of
-        that name; `window` is that of `from_motion`. Of columns `contact.vx`, as `planarfriction run` writes them,
-        those of `contact` are read, or of the only contact there.
+        Other columns and lines that begin with # are ignored. `time` and `fn` are accepted for t and normal_force,
+        capital letters for small ones, and semicolons and tabs for commas. `normal_force` [N] replaces a missing column
+        of that name; `window` is that of `from_motion`. If columns are named `contact.vx`, as in the files of
+        `planarfriction run`, those of `contact` are read, or those of the only contact.
 
-        Raises FileError in one line with the line and the column of what is wrong.
+        Raises FileError, in one line that names the line and the column of what is wrong.
         """
         path = validation.path("path", path)
         contact = None if contact is None else validation.text("contact", contact)
@@ -156,11 +158,11 @@ class Log(ByValue):
 
     @classmethod
     def from_solution(cls, solution: Solution, contact: str | None = None) -> Log:
-        """Log of one contact of a simulation: what its sensors would have measured without noise.
+        """Make a log of one contact of a simulation: what ideal sensors would have measured.
 
-        `contact` is a name; None takes the only one. The wrench is that of one of `count` identical contacts.
+        `contact` is a name; None takes the only contact. The wrench is that of one of `count` identical contacts.
 
-        Raises InvalidValueError for a contact that is not there, FileError for a solution without its scene.
+        Raises InvalidValueError for a contact that does not exist, FileError for a solution without its scene.
         """
         if not isinstance(solution, Solution):
             raise InvalidValueError("solution", "be a Solution", type(solution).__name__)
@@ -180,10 +182,10 @@ def as_logs(log: Log | Sequence[Log]) -> tuple[Log, ...]:
 
 
 def differentiated(time: ArrayLike, motion: ArrayLike, *, window: int = 7) -> np.ndarray:
-    """Twist `[T, 3]` in the moving frame's axes from its pose x, y, theta `[T, 3]` [m, m, rad] at `time` `[T]` [s].
+    """Twist `[T, 3]` in the axes of a moving frame, from its pose x, y, theta `[T, 3]` [m, m, rad] at `time` `[T]` [s].
 
-    Slope of a parabola through `window` neighbouring samples (fewer at the ends); jumps of theta by whole turns are
-    taken out first.
+    The slope of a parabola through `window` neighbouring samples (fewer at the ends). Jumps of theta by whole turns are
+    removed first.
 
     Raises InvalidValueError for times that do not increase and for other jumps of theta.
     """

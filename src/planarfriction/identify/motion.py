@@ -1,4 +1,4 @@
-"""`identify_motion`: friction from motion alone, slides that stop."""
+"""`identify_motion`: friction from motion alone, using slides that come to rest."""
 
 from __future__ import annotations
 
@@ -72,39 +72,41 @@ def identify_motion(
     loss: Literal["robust", "squares"] = "robust",
     progress: Callable[[str], None] | None = None,
 ) -> Identification:
-    """Estimate friction from slides that stop, without a force sensor.
+    """Estimate friction from slides that come to rest, without a force sensor.
 
-    Every slide is simulated with the structured solver. Its start (pose and twist, six numbers) is estimated along with
-    the parameters, so that a noisy first velocity does no harm: from all of its poses, or from the first `samples` of
-    them, which makes the rest of the slide a prediction. Friction is seen through accelerations: mu as `mu g`, the
-    contact radius as `mu m g r/inertia`.
+    Every slide is simulated with the structured solver. Its initial state (pose and twist, six numbers) is estimated
+    together with the parameters, so that a noisy first velocity does no harm: from all of its poses, or from the first
+    `samples` of them, which makes the rest of the slide a prediction. Friction is observed through accelerations: mu as
+    `mu g`, the contact radius as `mu m g r/inertia`.
 
-    Standard errors come from the spread over the slides (each votes as a whole), so they hold although the residuals
-    within a slide are alike and friction differs from slide to slide. They need ten slides or more to mean much.
+    Standard errors come from the spread over the slides, each of which counts as one observation. They are therefore
+    valid although the residuals within a slide are correlated and friction differs from slide to slide. Ten slides or
+    more are needed for meaningful errors.
 
     Parameters
     ----------
     slides
         The measured slides.
     patch
-        The contact, its frame's origin at the centre of mass. Its size is a start where `contact_radius` is asked for;
-        the patch is scaled about its centre of pressure.
+        The contact, with the origin of its frame at the centre of mass. If `contact_radius` is estimated, its size is
+        the initial guess, and the patch is scaled about its centre of pressure.
     body
         Mass, inertia and gravity.
     parameters
-        Names out of mu_c, mu_s, v_s, gamma, sigma_2, contact_radius.
+        Some of mu_c, mu_s, v_s, gamma, sigma_2, contact_radius.
     start
-        Where to begin, and the values of what is held. Its bristles should be stiff.
+        Initial guess, and the values of parameters that are not estimated. Its bristles should be stiff.
     model
         Makes the friction model from a patch and a law, as `ReducedModelPublished` and `DistributedModel` do.
     samples
-        First poses that the start of a slide is estimated from, at least five; None takes all.
+        Number of poses from which the initial state of a slide is estimated, at least five; None takes all.
     loss
-        "robust" leaves out slides that friction alone cannot have made (they speed up, or keep their speed), and those
-        whose residuals are 6 times those of the median slide, and lets those from 2.5 times on count less; "squares"
-        takes all alike. What was left out, and the slide that moves an estimate most, stand in the verdicts.
+        "robust" leaves out slides that friction alone cannot explain (they speed up, or keep their speed) and those
+        whose residuals exceed 6 times those of the median slide, and gives less weight to those above 2.5 times;
+        "squares" treats all slides alike. The verdicts name the slides left out, and the slide that changes an estimate
+        most.
     progress
-        Called with a text now and then.
+        Called with a text from time to time.
 
     Raises
     ------

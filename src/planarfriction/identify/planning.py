@@ -1,4 +1,4 @@
-"""`plan_motion`: which motion adds most to what the logs so far show, by the information that it is expected to bring.
+"""`plan_motion`: which motion adds most information to the logs so far.
 
 With the derivatives J of the wrenches over their noise, information adds up over logs,
 
@@ -52,29 +52,29 @@ FAINT = 1e-14
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MotionPlan(ByValue):
-    """Motions by the information that they are expected to add, the best first; M motions, F parameters."""
+    """Motions ranked by the information that they are expected to add, the best first; M motions, F parameters."""
 
     names: tuple[str, ...]
     """Names of the parameters."""
     values: np.ndarray
-    """Their values, near which the plan holds [SI], `[F]`."""
+    """Their values, near which the plan is valid [SI], `[F]`."""
     motions: tuple[Log, ...]
-    """The motions, with the wrenches that are expected."""
+    """The motions, with their expected wrenches."""
     gains: np.ndarray
-    """Information that each is expected to add [bit], `[M]`."""
+    """Information that each motion is expected to add [bit], `[M]`."""
     errors_so_far: np.ndarray
-    """Standard errors before [SI], `[F]`."""
+    """Standard errors before any of these motions [SI], `[F]`."""
     errors: np.ndarray
-    """Standard errors that are expected after each motion [SI], `[M, F]`."""
+    """Expected standard errors after each motion [SI], `[M, F]`."""
 
     @property
     def best(self) -> Log:
-        """The motion that adds most."""
+        """The motion that adds the most information."""
         return self.motions[0]
 
     def table(self) -> str:
-        """In 80 columns: the gain of each motion, and which parameter it leaves least known; errors before and after
-        the best one."""
+        """Text in 80 columns: the gain of each motion and the parameter it leaves least certain; the errors before and
+        after the best one."""
         lines = [f"{'motion':<38}{'gain [bit]':>10}   {'least known after it'}"]
         for motion, gain, errors in zip(self.motions, self.gains, self.errors, strict=True):
             at = int(np.argmax(errors / self._sizes))
@@ -116,30 +116,33 @@ def plan_motion(
 ) -> MotionPlan:
     """Rank motions by the information that they are expected to add to that of the logs so far.
 
-    Wrenches and derivatives are those of `ReducedModelPublished`; Lindley's gain for normal errors, see the module.
+    Wrenches and derivatives are those of `ReducedModelPublished`; the information is Lindley's gain for normal errors
+    (see the module).
 
     Parameters
     ----------
     patch, law
-        The contact as far as it is known: a guess before the first log, then `known_so_far`.
+        The contact, as far as it is known: a guess before the first log, then `known_so_far`.
     logs
-        What was measured so far; none before the first.
+        Logs measured so far; none before the first experiment.
     motions
-        Motions to choose from, as logs that begin at rest and whose wrenches are not looked at; None for
-        `candidate_motions` at the loads of `logs`, or at 1 N.
+        Motions to choose from, as logs that begin at rest and whose wrenches are ignored; None for `candidate_motions`
+        at the loads of `logs`, or at 1 N.
     parameters
-        What is estimated, as in `identify_lugre`.
+        Names of what is estimated, as in `identify_lugre`.
     wanted
-        Those of the parameters whose information counts; None for all.
+        The parameters whose information counts; None for all.
     noise
-        Spread of the measured fx, fy [N] and tau [N m]; None takes that of `logs`, or 1 % of the largest friction.
+        Standard deviation of the measured fx, fy [N] and tau [N m]; None takes that of `logs`, or 1 % of the largest
+        friction.
     nuisance
-        What the rig may add, as in `identify_lugre`; motions to come are taken to have no noise on the twist.
+        Disturbances that the rig may add, as in `identify_lugre`; future motions are assumed to have no noise on the
+        twist.
 
     Raises
     ------
     InvalidValueError
-        A parameter breaks its rule, or a motion that does not move.
+        A parameter breaks its rule, or a motion does not move.
     """
     names = known.check_names(parameters)
     if not isinstance(patch, ContactPatch):
@@ -180,11 +183,11 @@ def plan_motion(
 
 
 def known_so_far(found: Identification, patch: ContactPatch, law: LuGre) -> tuple[ContactPatch, LuGre]:
-    """The patch and the law to plan with: what `found` knows to better than a half, the rest as in `patch` and `law`.
+    """The patch and the law to plan with: values that `found` knows to within a factor of about two, else those given.
 
-    A value of `law` that lies outside the interval of `found` moves to the middle of that.
+    A value of `law` that lies outside the interval of `found` is moved to its middle.
 
-    Raises InvalidValueError where `found` is no Identification, or `law` no LuGre law.
+    Raises InvalidValueError if `found` is not an Identification, or `law` not a LuGre law.
     """
     validation.instance("found", found, Identification, "an Identification")
     validation.instance("law", law, LuGre, "a LuGre law")

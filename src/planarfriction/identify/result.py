@@ -1,4 +1,4 @@
-"""What an identification found: estimates with their errors, what the data leave open, residuals, the fitted model."""
+"""The result of an identification: estimates with their errors, verdicts, residuals, and the fitted model."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ TWO_SIDED = 1.96
 @described
 @dataclass(frozen=True)
 class Verdict:
-    """What the data say about one parameter, or about the fit (`parameter` is then "fit")."""
+    """What the data show about one parameter, or about the fit as a whole (`parameter` is then "fit")."""
 
     parameter: str
     """Name of the parameter, or "fit"."""
     identifiable: bool
-    """Whether the data determine it; for the fit: whether nothing is wrong."""
+    """Whether the data determine the parameter; for the fit, whether nothing is wrong."""
     reason: str
-    """Why not, or what to mind."""
+    """Why not, or a caution."""
 
     def __str__(self) -> str:
         if self.parameter == "fit":
@@ -61,20 +61,20 @@ def interval(name: str, value: float, error: float) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Identification(ByValue):
-    """Parameters that were estimated, in the order asked for; F of them."""
+    """Result of an identification: F estimated parameters, in the order in which they were requested."""
 
     names: tuple[str, ...]
     """Names of the parameters."""
     values: np.ndarray
     """Estimates [SI], `[F]`."""
     standard_errors: np.ndarray
-    """Their standard errors [SI], `[F]`; infinite where the data say nothing, zero for one on its bound."""
+    """Their standard errors [SI], `[F]`; infinite if the data do not determine a value, zero for one at its bound."""
     correlations: np.ndarray
     """Correlations of the estimates [-], `[F, F]`."""
     verdicts: tuple[Verdict, ...]
-    """What the data do not determine, and what to mind."""
+    """Parameters that the data do not determine, and cautions."""
     noise: np.ndarray
-    """Spread of each measured channel that the residuals are scaled by, `[C]` (units of the channels)."""
+    """Standard deviation of each measured channel, by which the residuals are scaled, `[C]` (units of the channels)."""
     channels: tuple[tuple[str, str], ...]
     """Name and unit of the measured channels, such as ("fx", "N"), `[C]`."""
     histories: tuple[Mapping[str, Any], ...] = field(repr=False)
@@ -82,13 +82,13 @@ class Identification(ByValue):
     with wrenches also "held_out" `[T, C]`, as fits predict it that saw neither the sample nor its block (NaN at a start
     from rest), "speed" `[T]` [m/s], the sliding speed `|V_S|`, and "coefficient" `[T]` [-], friction by load."""
     law: LuGre
-    """The fitted law; parameters that were not asked for are as given."""
+    """The fitted law; parameters that were not estimated are as given."""
     model: Any = field(repr=False)
     """The fitted friction model."""
     starts: tuple[int, int]
-    """How many starts ended in this minimum, and how many there were."""
+    """How many starting points ended in this minimum, and how many there were."""
     rig: tuple[Nuisance, ...] = ()
-    """What was estimated of the rig: delay, zeros, drift of the load cell, noise of the twist."""
+    """Estimated disturbances of the rig: delay, zeros, drift of the load cell, noise of the twist."""
     scores: tuple[ModelScore, ...] = ()
     """The models that were fitted."""
     chosen: str = ""
@@ -96,7 +96,7 @@ class Identification(ByValue):
 
     @property
     def residuals(self) -> list[np.ndarray]:
-        """Measured minus predicted over the noise, `[T, C]` for each log or slide; NaN where nothing was measured."""
+        """(Measured - predicted) / noise, `[T, C]` for each log or slide; NaN where nothing was measured."""
         return [(each["measured"] - each["predicted"]) / self.noise for each in self.histories]
 
     @property
@@ -119,10 +119,10 @@ class Identification(ByValue):
         return not any(each.parameter == name and not each.identifiable for each in self.verdicts)
 
     def residual_correlations(self, lags: int = 50) -> np.ndarray:
-        """Correlations of the residuals over 0 to `lags` samples, `[lags + 1, C]`; those of noise are 0 but for the
-        first.
+        """Autocorrelations of the residuals at 0 to `lags` samples, `[lags + 1, C]`; for pure noise all but the first
+        are 0.
 
-        Raises InvalidValueError for `lags` that are no count.
+        Raises InvalidValueError unless `lags` is a count.
         """
         lags = validation.count("lags", lags)
         lags = min(lags, *(len(each["time"]) - 2 for each in self.histories))
@@ -134,7 +134,7 @@ class Identification(ByValue):
         return sums / np.where(sums[0] > 0.0, sums[0], 1.0)
 
     def summary(self) -> str:
-        """The verdict in plain words: what the data determine, and whether the fit can be believed."""
+        """The verdict in plain words: what the data determine, and whether the fit can be trusted."""
         known = [name for name in self.names if self.identifiable(name)]
         lines = [f"Identified: {', '.join(known)}." if known else "None of the parameters is identifiable."]
         if 0 < len(known) < len(self.names):
@@ -163,7 +163,7 @@ class Identification(ByValue):
         return rows
 
     def table(self) -> str:
-        """The summary, then a table in 80 columns: estimates, 95 % intervals, what to mind, what the rig adds."""
+        """The summary, then a table in 80 columns: estimates, 95 % intervals, cautions, and disturbances of the rig."""
         lines, remarks, intervals = [], [], self.intervals()
         for name, value in zip(self.names, self.values, strict=True):
             told = self.identifiable(name)
@@ -191,7 +191,7 @@ class Identification(ByValue):
         return f"<pre>{html.escape(self.table())}</pre>"
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything but the histories as plain data, ready for JSON (None for what is infinite)."""
+        """Everything except the histories as plain data for JSON (None for infinite values)."""
 
         def plain(value: float) -> float | None:
             return float(value) if np.isfinite(value) else None

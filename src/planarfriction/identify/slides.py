@@ -1,4 +1,4 @@
-"""Free slides: a body that was thrown onto a level table, measured until it stops, and its simulated motion."""
+"""Free slides: a body that was thrown onto a level table and measured until it stops, and its simulated motion."""
 
 from __future__ import annotations
 
@@ -27,20 +27,20 @@ CHANGES = np.array([2e-3, 2e-3, 2e-2])
 class Slide(ByValue):
     """One measured slide of a body on a level table, T samples.
 
-    Raises InvalidValueError for fewer than five samples, wrong shapes, numbers that are not finite and times that do
-    not increase, and for an angle that jumps otherwise than by whole turns.
+    Raises InvalidValueError for fewer than five samples, wrong shapes, numbers that are not finite, times that do not
+    increase, and an angle that jumps by anything but whole turns.
     """
 
     time: np.ndarray
     """Sample times [s], `[T]`."""
     pose: np.ndarray
-    """x, y of the centre of mass and the angle, world axes [m, m, rad], `[T, 3]`; its jumps by a turn are taken out."""
+    """x, y of the centre of mass and the angle, world axes [m, m, rad], `[T, 3]`; jumps by whole turns are removed."""
     twist: np.ndarray | None = None
-    """Measured initial velocity, world axes [m/s, m/s, rad/s], `[3]`; None takes it from the first poses."""
+    """Measured initial velocity, world axes [m/s, m/s, rad/s], `[3]`; None estimates it from the first poses."""
     name: str = "slide"
     """Name for messages and plots."""
     turns: int = field(default=0, init=False)
-    """Jumps by a whole turn that were taken out of the angle."""
+    """Number of whole-turn jumps that were removed from the angle."""
 
     def __post_init__(self) -> None:
         time = validation.array("time", self.time, (None,))
@@ -57,7 +57,7 @@ class Slide(ByValue):
         object.__setattr__(self, "turns", turns)
 
     def first(self, samples: int) -> Slide:
-        """The slide's first samples, at least five.
+        """The first samples of the slide, at least five.
 
         Raises InvalidValueError for fewer samples than a slide needs.
         """
@@ -68,13 +68,13 @@ class Slide(ByValue):
 @described
 @dataclass(frozen=True)
 class SlidingBody:
-    """What slides: its inertia, and gravity.
+    """The body that slides: its mass and inertia, and gravity.
 
     Raises InvalidValueError for a mass, an inertia or a load that is not > 0.
     """
 
     mass: float
-    """Mass [kg]; plays no part in a slide under its own weight but for `inertia/mass`."""
+    """Mass [kg]; in a slide under the body's own weight only `inertia/mass` matters."""
     inertia: float
     """Moment of inertia about the vertical through the centre of mass [kg m^2]."""
     gravity: float = 9.81
@@ -146,9 +146,9 @@ def start_slopes(model: Any, body: SlidingBody, slide: Slide, start: np.ndarray)
 def fit_start(
     model: Any, body: SlidingBody, slide: Slide, *, samples: int | None = None, noise: Any = (1e-3, 1e-3, 2e-2)
 ) -> np.ndarray:
-    """Start pose and twist `[6]` with which the simulated slide fits the first `samples` poses best (None: all).
+    """Initial pose and twist `[6]` for which the simulated slide best fits the first `samples` poses (None: all).
 
-    Least squares, a few Gauss-Newton steps from the measured start; `noise` `[3]` weighs metres against radians.
+    Least squares, a few Gauss-Newton steps from the measured start; `noise` `[3]` weights metres against radians.
 
     Raises InvalidValueError for a `noise` that is not > 0.
     """
@@ -181,9 +181,9 @@ def improve_start(model: Any, body: SlidingBody, slide: Slide, start: np.ndarray
 
 
 def predict_slide(model: Any, body: SlidingBody, slide: Slide, *, samples: int | None = None) -> np.ndarray:
-    """Poses `[T, 3]` of a slide as the model predicts them from its start.
+    """Poses `[T, 3]` of a slide, predicted by the model from its initial state.
 
-    The start is the measured one, or with `samples` the one that `fit_start` finds in so many first poses.
+    That is the measured one or, with `samples`, the one that `fit_start` finds from that many poses.
     """
     _check(body, slide)
     if samples is None:

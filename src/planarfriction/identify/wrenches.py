@@ -51,44 +51,47 @@ def identify_lugre(
     seed: int = 0,
     progress: Callable[[str], None] | None = None,
 ) -> Identification:
-    """Estimate parameters of a LuGre contact from logs of twist and wrench, and which model explains them.
+    """Estimate parameters of a LuGre contact from logs of twist and wrench, and find which model explains them.
 
-    Bounded nonlinear least squares over the wrenches of a fixed-step roll-out; residuals over the noise, parameters as
-    logarithms where they must be > 0. What the rig adds (delay, zeros, drift) is estimated along.
+    Bounded nonlinear least squares for the wrenches of a fixed-step roll-out; residuals are divided by the noise, and
+    parameters that must be > 0 are fitted as logarithms. Disturbances of the rig (delay, zeros, drift) are estimated
+    too.
 
     Parameters
     ----------
     log
         One log or several of the same contact.
     patch
-        The contact. Its shape and centre of pressure are taken as known, its size only as a start where
-        `contact_radius` is asked for. For soft-finger constants its pressure is a `SoftFinger` and the load of each
-        log is constant.
+        The contact. Its shape and centre of pressure are assumed known; its size is only an initial guess if
+        `contact_radius` is estimated. To estimate soft-finger constants its pressure must be a `SoftFinger`, and the
+        load of each log must be constant.
     parameters
         Names of what to estimate: fields of `LuGre`, `breakaway_ratio`, `contact_radius`, `centre_x`, `centre_y`, and
-        `c`, `n`, `k` or `k_per_newton` of a `SoftFinger`. What is not named keeps the value of `start`.
+        `c`, `n`, `k` or `k_per_newton` of a `SoftFinger`. All others keep the values of `start`.
     model
         "reduced-published", "distributed", "reduced", or "auto": the one of them that predicts held-out parts best;
-        those whose fit would take minutes are left out.
+        models whose fit would take minutes are left out.
     nuisance
-        What the rig may add: "delay" between motion and wrench, "bias" (zeros of the wrench and their drift), "load"
-        (scale and drift of the load cell), "twist" (noise of the twist). All unless switched off.
+        Disturbances that the rig may add: "delay" between motion and wrench, "bias" (zeros of the wrench and their
+        drift), "load" (scale and drift of the load cell), "twist" (noise of the twist). All by default.
     start
-        Where to begin, and the values of what is held: a law, or values by name. What is missing is guessed.
+        Initial guess, and the values of parameters that are not estimated: a law, or values by name. Missing values are
+        guessed.
     elasto_plastic
-        Kind of bristles (of a `start` that is a law: its own).
+        Kind of bristles (if `start` is a law, that of the law).
     surface
         Class of the limit surface of "reduced-published".
     noise
-        Spread of the measured fx, fy [N] and tau [N m]; None estimates each from its jitter.
+        Standard deviation of the measured fx, fy [N] and tau [N m]; None estimates each from its jitter.
     begins
-        "rest": every log begins with relaxed bristles. "steady": with those of long sliding at its first twist.
+        "rest": every log begins with relaxed bristles. "steady": it begins with those of steady sliding at its first
+        twist.
     refine
-        Steps between two samples; None doubles them until more move no estimate by a fifth of its error.
+        Steps between two samples; None doubles them until no estimate changes by more than a fifth of its error.
     starts, seed
-        Number of starts, and the seed that scatters them.
+        Number of starting points, and the random seed that scatters them.
     progress
-        Called with a text now and then.
+        Called with a text from time to time.
 
     Raises
     ------

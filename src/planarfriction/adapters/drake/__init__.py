@@ -1,4 +1,5 @@
-"""Patch friction inside Drake: normal contact stays Drake's, friction of chosen pairs of geometries is ours.
+"""Patch friction inside Drake: Drake keeps the normal contact, and this package supplies friction for chosen
+geometries.
 
 Needs Drake: `pip install 'planarfriction[drake]'`.
 """

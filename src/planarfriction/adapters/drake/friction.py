@@ -1,4 +1,4 @@
-"""A system that gives a discrete plant patch friction, implicit in contact space."""
+"""A Drake system that adds patch friction to a discrete plant, implicit in contact space."""
 
 from __future__ import annotations
 
@@ -30,28 +30,29 @@ _GEOMETRY, _FORCE = "geometry_query", "applied_generalized_force"
 
 
 class Report(NamedTuple):
-    """What a step took."""
+    """Statistics of one step."""
 
     passes: int
-    """How often the plant's step was asked for."""
+    """How many times the plant's step was evaluated."""
     iterations: int
-    """Newton iterations of all passes."""
+    """Newton iterations, summed over all passes."""
     residual: float
-    """Of the step in contact space [m/s]."""
+    """Residual of the step in contact space [m/s]."""
     misfit: float
-    """Between the twists that were solved for and those that came out [m/s], spins times the size of the patch; loads
-    count as the speed that they could cause."""
+    """Difference between the twists that were solved for and those of the plant [m/s]. Spins are multiplied by the size
+    of the patch; loads count as the speed they could cause."""
     converged: bool
 
 
 class PatchFriction(LeafSystem):
-    """Patch friction of a discrete plant: what `AddToBuilder` adds to a diagram beside it.
+    """Patch friction for a discrete plant, as a system that `AddToBuilder` adds to a diagram next to the plant.
 
-    States of bristles, wrenches, twists and loads live in the context; the output ports show those of the last step.
-    The plant's parameters and shapes are those it had when this was made, whatever a context says later.
+    The context holds the states of the bristles, the wrenches, twists and loads; the output ports give those of the
+    last step. The plant's parameters and shapes are those at the time this system is made; later changes in a context
+    have no effect.
 
-    Raises `InvalidValueError` for plants that are continuous or not finalized, names that are not in the plant, pairs
-    with friction of their own.
+    Raises `InvalidValueError` for plants that are continuous or not finalized, names that are not in the plant, and
+    pairs with friction of their own.
     """
 
     def __init__(self, plant: MultibodyPlant, scene_graph: SceneGraph, patches: Iterable[Patch]) -> None:
@@ -89,7 +90,7 @@ class PatchFriction(LeafSystem):
     def AddToBuilder(
         builder: DiagramBuilder, plant: MultibodyPlant, scene_graph: SceneGraph, patches: Iterable[Patch]
     ) -> PatchFriction:
-        """Add patch friction to a builder and connect it; everything else that drives the plant is connected before.
+        """Add patch friction to a builder and connect it; connect all other inputs of the plant before.
 
         What was connected to the plant's `applied_generalized_force` is added to the friction.
 
@@ -113,16 +114,16 @@ class PatchFriction(LeafSystem):
     # ------------------------------------------------------------------ what a context holds
 
     def GetBristles(self, context: Any) -> list[np.ndarray]:
-        """Copies of the states of all patches in this system's context, in the shape that their models give them."""
+        """Copies of the states of all patches from this system's context, each in the shape that its model uses."""
         return self.coupled.states(self._read(context, "bristles").copy())
 
     def GetReport(self, context: Any) -> Report:
-        """What the last step took, from this system's context."""
+        """Statistics of the last step, from this system's context."""
         passes, iterations, residual, misfit, converged = self._read(context, "report").tolist()
         return Report(int(passes), int(iterations), residual, misfit, converged > 0.0)
 
     def get_generalized_force_output_port(self) -> Any:
-        """Goes to the plant: friction, and the generalized forces that others apply `[nv]`."""
+        """Port to connect to the plant: friction plus the generalized forces that others apply `[nv]`."""
         return self.GetOutputPort("generalized_force")
 
     def get_wrenches_output_port(self) -> Any:

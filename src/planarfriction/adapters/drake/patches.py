@@ -1,4 +1,4 @@
-"""Which contacts get patch friction, and what a plant needs for it."""
+"""Which contacts get patch friction, and how a plant is prepared for it."""
 
 from __future__ import annotations
 
@@ -23,22 +23,23 @@ _MATERIAL = ("material", "coulomb_friction")
 
 @dataclass(frozen=True)
 class Patch:
-    """A patch between two geometries, fixed in the body of a frame.
+    """A contact patch between two geometries, attached to the body of a frame.
 
-    The frame of the patch has its x axis along that of the frame, projected on the contact plane, and its normal into
-    the frame's body; its twist is that of this body relative to the other, its wrench acts on this body.
+    The x axis of the patch is that of the frame, projected on the contact plane; its normal points into the frame's
+    body. The twist is that of this body relative to the other one, and the wrench acts on this body.
 
-    Raises InvalidValueError unless `geometries` are two names, `centre` is one that there is and
-    `model` a friction model.
+    Raises InvalidValueError unless `geometries` are two names, `centre` is one of the options and `model` is a friction
+    model.
     """
 
     model: FrictionModel
     frame: str
     """Name of a frame on the body that owns the patch."""
     geometries: tuple[str, str]
-    """Names of the two collision geometries in contact, or of bodies, all whose geometries are meant."""
+    """Names of the two collision geometries in contact, or of bodies; a body stands for all of its collision
+    geometries."""
     centre: str = "frame"
-    """Where the origin is: at that of the "frame", or in the middle of Drake's points of "contact"."""
+    """Origin of the patch: that of the "frame", or the middle of Drake's points of "contact"."""
 
     def __post_init__(self) -> None:
         validation.instance("model", self.model, FrictionModel, "a friction model")
@@ -81,11 +82,12 @@ class Placed:
 
 
 def prepare(plant: Any, scene_graph: Any, patches: Iterable[Patch]) -> None:
-    """Take Drake's friction off the first of the two `geometries` of each patch.
+    """Remove Drake's own friction from the first of the two `geometries` of each patch.
 
-    Drake has friction for geometries, not for pairs of them: the first slides on everything but its patch.
+    In Drake, friction belongs to geometries, not to pairs of them: the first geometry then slides without friction on
+    everything except its patch.
 
-    Raises `InvalidValueError` for geometries that are not there.
+    Raises `InvalidValueError` for geometries that are not in the plant.
     """
     inspector = scene_graph.model_inspector()
     for patch in checked(patches):

@@ -1,4 +1,4 @@
-"""Patch friction inside MJX: as `planarfriction.adapters.mujoco`, many environments at once, with derivatives.
+"""Patch friction inside MJX: like `planarfriction.adapters.mujoco`, for many environments at once and with derivatives.
 
 Needs MJX and JAX: `pip install 'planarfriction[mjx]'`.
 """

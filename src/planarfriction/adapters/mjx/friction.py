@@ -69,15 +69,15 @@ class _Fixed:
 
 @jax.tree_util.register_pytree_node_class
 class Friction:
-    """Patch friction for a model that `prepare` has made ready; `step` takes the place of `mjx.step`.
+    """Patch friction for a model that `prepare` has prepared; call `step` instead of `mjx.step`.
 
-    States live in the data, in the last numbers of `userdata`, as those of `planarfriction.adapters.mujoco` do, so that
-    data go on where they are put from one into the other. A pytree whose leaves are those of its `models`
-    (`planarfriction.jax`), one for each different model of the patches.
+    States are stored in the data, in the last numbers of `userdata`, in the same way as by
+    `planarfriction.adapters.mujoco`, so that data can be moved from one to the other. This is a pytree whose leaves are
+    those of its `models` (`planarfriction.jax`), one for each different model among the patches.
 
-    Raises `InvalidValueError` without double precision, for an integrator or a cone that does not fit, noslip
-    iterations, too little user data, names that are not in the model, pairs with friction of their own, models that
-    JAX does not have, shapes that follow their loads.
+    Raises `InvalidValueError` without double precision, for an unsuitable integrator or cone, noslip iterations, too
+    little user data, names that are not in the model, pairs with friction of their own, models that JAX does not have,
+    and shapes that change with the load.
     """
 
     def __init__(self, m: Any, patches: Sequence[Patch]) -> None:
@@ -96,7 +96,7 @@ class Friction:
         self._fixed = _Fixed(places(placed), which, shapes, radius, at, m.nuserdata)
 
     def replace(self, models: Sequence[FrictionModel]) -> Self:
-        """The same patches with other models, of the same kinds in the same order.
+        """The same patches with other models, which must be of the same kinds in the same order.
 
         Raises InvalidValueError for models of other kinds.
         """
@@ -107,12 +107,12 @@ class Friction:
         return self.tree_unflatten(self._fixed, (tuple(models),))
 
     def tree_flatten(self) -> tuple[Any, _Fixed]:
-        """For JAX."""
+        """Take the pytree apart (called by JAX)."""
         return (self.models,), self._fixed
 
     @classmethod
     def tree_unflatten(cls, fixed: _Fixed, leaves) -> Self:
-        """For JAX."""
+        """Rebuild the pytree (called by JAX)."""
         friction = object.__new__(cls)
         friction._fixed, (friction.models,) = fixed, leaves
         return friction
@@ -120,18 +120,19 @@ class Friction:
     # ------------------------------------------------------------------ what the data hold
 
     def states(self, d: Any) -> list[jax.Array]:
-        """State of each patch at the time of the data."""
+        """State of each patch at the current time of the data."""
         at, sizes = self._fixed.memory, [math.prod(shape) for shape in self._fixed.shapes]
         flat = self._now(d, at.new, at.state, sum(sizes))
         parts = jnp.split(flat, np.cumsum(sizes)[:-1], axis=-1)
         return [z.reshape(*z.shape[:-1], *shape) for z, shape in zip(parts, self._fixed.shapes, strict=True)]
 
     def wrenches(self, d: Any) -> jax.Array:
-        """Of the last step `[k, 3]`, on the bodies of the sites, in the frames of the patches."""
+        """Wrenches of the last step `[k, 3]` [N, N, N m] on the bodies of the sites, in the frames of the patches."""
         return self._each(d, self._fixed.memory.wrench, 3)
 
     def twists(self, d: Any) -> jax.Array:
-        """At the end of the last step `[k, 3]`, of the bodies of the sites relative to the others."""
+        """Twists at the end of the last step `[k, 3]` [m/s, m/s, rad/s] of the bodies of the sites relative to the
+        other bodies."""
         return self._each(d, self._fixed.memory.twist, 3)
 
     def loads(self, d: Any) -> jax.Array:
@@ -139,13 +140,13 @@ class Friction:
         return self._each(d, self._fixed.memory.load, 1)[..., 0]
 
     def report(self, d: Any) -> Report:
-        """What the last step took."""
+        """Statistics of the last step."""
         at, u = self._fixed.memory, d.userdata
         converged = u[..., at.converged] > 0.0
         return Report(u[..., at.iterations], u[..., at.passes], u[..., at.residual], converged)
 
     def reset(self, d: Any) -> Any:
-        """The data with all bristles at rest."""
+        """Return the data with all bristles relaxed."""
         at = self._fixed.memory
         return d.replace(userdata=d.userdata.at[..., at.state : at.converged + 1].set(0.0))
 
@@ -163,7 +164,7 @@ class Friction:
     # ------------------------------------------------------------------ a step
 
     def step(self, m: Any, d: Any) -> Any:
-        """`mjx.step` with friction: a pure function for `jit`, `vmap`, `lax.scan` and `grad`.
+        """Step with patch friction, instead of `mjx.step`: a pure function for `jit`, `vmap`, `lax.scan` and `grad`.
 
         Raises InvalidValueError for a model of MJX in another implementation, and for data without its user data.
         """

@@ -1,4 +1,4 @@
-"""Patch friction inside MuJoCo: normal contact stays MuJoCo's, friction of chosen pairs of geoms is ours.
+"""Patch friction inside MuJoCo: MuJoCo keeps the normal contact, and this package supplies friction for chosen geoms.
 
 Needs MuJoCo: `pip install 'planarfriction[mujoco]'`.
 """

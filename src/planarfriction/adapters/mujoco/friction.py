@@ -32,26 +32,27 @@ INTEGRATORS = {
 
 
 class Report(NamedTuple):
-    """What the last step took."""
+    """Statistics of the last step."""
 
     iterations: int
-    """Newton iterations of all passes, -1 where the state was not finite: such a step is without friction."""
+    """Newton iterations, summed over all passes; -1 if the state was not finite, and the step had no friction."""
     passes: int
-    """How often it was solved, anew where other constraints had become active; 0 without contact."""
+    """How many times the step was solved (again after other constraints became active); 0 without contact."""
     residual: float
-    """Of the step in contact space [m/s]."""
+    """Residual of the step in contact space [m/s]."""
     converged: bool
 
 
 class Friction:
-    """Patch friction for a model that `prepare` has made ready.
+    """Patch friction for a model that `prepare` has prepared.
 
-    Either `step(d)` in the place of `mj_step`, or, within `with friction.install():`, `mj_step` itself, the viewer and
-    `mujoco.rollout`. States live in the data, in the last numbers of `userdata`: whoever copies or restores these gets
-    the friction too. One object serves any number of data of its model, on any number of threads.
+    Either call `step(d)` instead of `mj_step`, or use `with friction.install():`, which adds friction to `mj_step`
+    itself, the viewer and `mujoco.rollout`. States are stored in the data, in the last numbers of `userdata`: copying
+    or restoring these includes the friction. One object can be used with any number of data of its model, on any number
+    of threads.
 
     Raises `InvalidValueError` for an integrator without a fixed metric, noslip iterations, sleeping, too little user
-    data, names that are not in the model, pairs with friction of their own, shapes that follow their loads.
+    data, names that are not in the model, pairs with friction of their own, and shapes that change with the load.
     """
 
     def __init__(self, m: Any, patches: Sequence[Patch]) -> None:
@@ -89,17 +90,20 @@ class Friction:
         return d.userdata[first : first + count]
 
     def state(self, d: Any) -> np.ndarray:
-        """The state of all patches at the time of the data, a view of `userdata`; `coupled.states` shapes it."""
+        """State of all patches at the current time of the data, as a view of `userdata`; `coupled.states` gives it its
+        shape."""
         at = self._memory
         stepped = d.time == d.userdata[at.next]
         return self._own(d, at.new if stepped else at.state, self.coupled.state_shape[0])
 
     def wrenches(self, d: Any) -> np.ndarray:
-        """Of the last step `[k, 3]`, on the bodies of the sites, in the frames of the patches; a view of `userdata`."""
+        """Wrenches of the last step `[k, 3]` [N, N, N m] on the sites' bodies, in the patches' frames; a view of
+        `userdata`."""
         return self._own(d, self._memory.wrench, 3 * len(self.patches)).reshape(-1, 3)
 
     def twists(self, d: Any) -> np.ndarray:
-        """At the end of the last step `[k, 3]`, of the bodies of the sites relative to the others."""
+        """Twists at the end of the last step `[k, 3]` [m/s, m/s, rad/s] of the bodies of the sites relative to the
+        other bodies."""
         return self._own(d, self._memory.twist, 3 * len(self.patches)).reshape(-1, 3)
 
     def loads(self, d: Any) -> np.ndarray:
@@ -107,21 +111,22 @@ class Friction:
         return self._own(d, self._memory.load, len(self.patches))
 
     def report(self, d: Any) -> Report:
-        """What the last step took."""
+        """Statistics of the last step."""
         at, u = self._memory, d.userdata
         return Report(int(u[at.iterations]), int(u[at.passes]), float(u[at.residual]), bool(u[at.converged]))
 
     def reset(self, d: Any) -> None:
-        """Let all bristles rest."""
+        """Relax all bristles."""
         at = self._memory
         d.userdata[at.state : at.converged + 1] = 0.0
 
     def draw(self, scene: Any, d: Any) -> None:
         """Add each patch in contact to an `MjvScene`: its outline, its friction, and its centre of rotation.
 
-        Friction has the scale of MuJoCo's own contact forces, `vis.map.force / stat.meanmass` metres for a newton.
+        Friction forces are drawn to the scale of MuJoCo's own contact forces, `vis.map.force / stat.meanmass` metres
+        per newton.
 
-        Raises `InvalidValueError` where the scene has no room for more geoms.
+        Raises `InvalidValueError` if the scene has no room for more geoms.
         """
         newton, wrenches, twists = self.m.vis.map.force / self.m.stat.meanmass, self.wrenches(d), self.twists(d)
         for placed, wrench, twist in zip(self.placed, wrenches, twists, strict=True):
@@ -135,7 +140,7 @@ class Friction:
     # ------------------------------------------------------------------ steps
 
     def step(self, d: Any) -> None:
-        """`mj_step` with friction.
+        """Step with patch friction, instead of `mj_step`.
 
         Raises `InvalidValueError` for a state that is not finite.
         """
@@ -147,11 +152,11 @@ class Friction:
 
     @contextmanager
     def install(self) -> Iterator[Friction]:
-        """Give `mj_step` friction within a `with` block, and with it the viewer, `mujoco.rollout`, and derivatives.
+        """Add friction to `mj_step` within a `with` block, and so to the viewer, `mujoco.rollout` and derivatives.
 
-        All data of this model, and of its copies, get it. MuJoCo calls compiled code, on any number of threads.
+        This applies to all data of this model and of its copies. MuJoCo calls compiled code, on any number of threads.
 
-        Raises `FrictionError` where a control callback is installed.
+        Raises `FrictionError` if another control callback is installed.
         """
         self._check()
         if mujoco.get_mjcb_control() is not None or mujoco_step.INSTALLED[0] != 0:

@@ -1,6 +1,6 @@
 # pyright: reportAttributeAccessIssue=false
 # (MuJoCo describes few of its names to type checkers.)
-"""Which contacts get patch friction, and what a model needs for it."""
+"""Which contacts get patch friction, and how a model is prepared for it."""
 
 from __future__ import annotations
 
@@ -22,12 +22,13 @@ CENTRES = ("site", "contact")
 
 @dataclass(frozen=True)
 class Patch:
-    """A patch between two geoms, fixed in the body of a site.
+    """A contact patch between two geoms, attached to the body of a site.
 
-    The frame of the patch has its x axis along the site's, projected on the contact plane, and its normal into the
-    site's body; its twist is that of this body relative to the other, its wrench acts on this body.
+    The x axis of the patch is that of the site, projected on the contact plane; its normal points into the site's body.
+    The twist is that of this body relative to the other one, and the wrench acts on this body.
 
-    Raises InvalidValueError unless `geoms` are two names, `centre` is one that there is and `model` a friction model.
+    Raises InvalidValueError unless `geoms` are two names, `centre` is one of the options and `model` is a friction
+    model.
     """
 
     model: FrictionModel
@@ -36,7 +37,7 @@ class Patch:
     geoms: tuple[str, str]
     """Names of the two geoms in contact; one is on the site's body."""
     centre: str = "site"
-    """Where the origin of the frame is: at the "site", or in the middle of the points of "contact"."""
+    """Origin of the patch: that of the "site", or the middle of the points of "contact"."""
 
     def __post_init__(self) -> None:
         validation.instance("model", self.model, FrictionModel, "a friction model")
@@ -61,11 +62,11 @@ def memory(patches: Sequence[Patch], nv: int, first: int) -> Memory:
 
 
 def prepare(spec: Any, patches: Sequence[Patch]) -> None:
-    """Give an `MjSpec` what the patches need: a pair without friction for each, and room in the user data.
+    """Prepare an `MjSpec` for the patches: add a contact pair without friction for each, and room in the user data.
 
-    A pair that is there keeps what it says, but for its friction; a new one has what its geoms say.
+    An existing pair keeps its settings except for friction; a new pair takes those of its geoms.
 
-    Raises `InvalidValueError` for a geom or a site that is not there, and for the same pair twice.
+    Raises `InvalidValueError` for a geom or a site that does not exist, and for the same pair twice.
     """
     check_once(patches)
     for patch in patches:
