@@ -1,4 +1,4 @@
-"""Compile ahead what is otherwise compiled when it is first used: after an installation, or while an image is built."""
+"""Compile ahead what would otherwise be compiled on first use: after an installation, or when an image is built."""
 
 from __future__ import annotations
 
@@ -26,22 +26,22 @@ _WIDTH = 60
 
 
 class Part(NamedTuple):
-    """Something that is compiled in one go."""
+    """One part of the code that is compiled in one go."""
 
     words: str
-    """What it is, in a few words."""
+    """Description in a few words."""
     work: Callable[[], Any]
-    """Uses it, which compiles it or reads it from the cache."""
+    """Function that uses it, and thereby compiles it or reads it from the cache."""
 
 
 def warm_up(*, progress: Callable[[str], None] | None = None) -> dict[str, float]:
     """Compile everything now and keep it on disk; returns the time that each part took [s].
 
-    What was compiled before is read from the cache. `progress` is called with the words of each part before it begins;
-    without it, a line on the terminal or in the notebook names the part.
-    What is compiled stays, so Ctrl-C loses only the function that it meets. Machine code is kept beside the sources, in
-    the user's cache where nothing can be written there, or in the folder that `NUMBA_CACHE_DIR` names; where that is
-    not possible either, a warning says so and each process compiles anew.
+    Code that was compiled before is read from the cache. `progress` is called with the description of each part before
+    it begins; without it, a line on the terminal or in the notebook names the part. Compiled functions are kept, so
+    Ctrl-C loses only the current one. Machine code is stored beside the sources, or in the user's cache if that folder
+    is not writable, or in the folder named by `NUMBA_CACHE_DIR`. If none of them is possible, a warning says so and
+    each process compiles again.
     """
     times, shown = {}, progress is None and watched()
     progress = _show if shown else progress

@@ -1,6 +1,6 @@
-"""JAX front end: models as pytrees, pure functions that `jit`, `vmap` and `grad` go through.
+"""JAX front end: models as pytrees, and pure functions that work with `jit`, `vmap` and `grad`.
 
-Needs the extra `[jax]`. Set `jax.config.update("jax_enable_x64", True)` for float64, as everywhere in JAX.
+Needs the extra `[jax]`. For float64 set `jax.config.update("jax_enable_x64", True)`, as always in JAX.
 """
 
 from __future__ import annotations

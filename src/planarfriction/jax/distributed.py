@@ -18,7 +18,7 @@ from planarfriction.patch.metric import refuse_anisotropy
 
 @by_parts
 class LawParameters(NamedTuple):
-    """Parameters of a friction law, scalars: names and units as in `LuGre`."""
+    """Parameters of a friction law as scalars; names and units as in `LuGre`."""
 
     sigma_0: jax.Array
     sigma_1: jax.Array

@@ -23,7 +23,7 @@ from planarfriction.patch import ContactPatch
 
 @by_parts
 class PublishedParameters(NamedTuple):
-    """Parameters of the published reduced model, scalars: names and units as in `LuGre` and `PublishedShape`."""
+    """Parameters of the published reduced model as scalars; names and units as in `LuGre` and `PublishedShape`."""
 
     sigma_0: jax.Array
     sigma_1: jax.Array
@@ -35,9 +35,9 @@ class PublishedParameters(NamedTuple):
     breakaway_ratio: jax.Array
     """Unused by plain bristles."""
     contact_radius: jax.Array
-    """r [m]"""
+    """Contact radius r [m]."""
     second_moment: jax.Array
-    """<rho^2> [m^2]"""
+    """Second moment <rho^2> [m^2]."""
     centre_x: jax.Array
     """Centre of pressure [m]."""
     centre_y: jax.Array
@@ -46,13 +46,13 @@ class PublishedParameters(NamedTuple):
 @functools.partial(jax.tree_util.register_dataclass, data_fields=["data", "root"], meta_fields=["kind", "size"])
 @dataclass(frozen=True, eq=False)
 class Surface(ByValue):
-    """The numbers of a limit surface over scaled twists (see `planarfriction.kernels.surfaces`)."""
+    """The numbers of a limit surface in scaled coordinates (see `planarfriction.kernels.surfaces`)."""
 
     kind: int
     size: int
     data: jax.Array
     root: jax.Array | None = None
-    """Symmetric root of the friction metric `[2, 2]`, of a patch that has one."""
+    """Symmetric root of the friction metric `[2, 2]`, if the patch has one."""
 
 
 class ReducedModelPublished(FrictionModel):
@@ -61,8 +61,8 @@ class ReducedModelPublished(FrictionModel):
     `zdot = S h v_n - k z`, `W = -(sigma_0 z + sigma_1 zdot + sigma_2 U V) f_N`. State `(z_x, z_y, z_tau)` [m, m, m^2].
     Leaves: the parameters and the numbers of the surface, which stay as they are when `contact_radius` changes.
 
-    `surface` None takes the published table. A patch whose shape depends on the load needs a surface with its
-    `normal_force`, and keeps that shape.
+    `surface` None takes the published table. If the shape of the patch depends on the load, the surface must have a
+    `normal_force`, and the shape at that load is kept.
     """
 
     arrays = published_arrays

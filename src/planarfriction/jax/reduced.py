@@ -22,7 +22,8 @@ from planarfriction.patch import ContactPatch
 
 @by_parts
 class ReducedParameters(NamedTuple):
-    """Parameters of the law, scalars: names and units as in `LuGre`; not gamma, for which the map is made."""
+    """Parameters of the law as scalars; names and units as in `LuGre`, without gamma, on which the stored map
+    depends."""
 
     sigma_0: jax.Array
     sigma_1: jax.Array
@@ -51,9 +52,9 @@ class Shape(ByValue):
 class ReducedModel(FrictionModel):
     """The reduced model of bristle moments (`planarfriction.ReducedModel`) as a pytree.
 
-    State `(z_x, z_y, z_theta)` [m], of several parts `[P, 3]`. Leaves: the law's parameters, and the shape: F of the
-    parts and their maps of steady sliding. A patch whose shape depends on the load keeps that of `normal_force` [N];
-    `parts`, `segments` and `speeds` as in `planarfriction.ReducedModel`.
+    State `(z_x, z_y, z_theta)` [m], or `[P, 3]` for several parts. Leaves: the law's parameters, and the shape: F of
+    the parts and their maps of steady sliding. If the shape of the patch depends on the load, the shape at
+    `normal_force` [N] is kept; `parts`, `segments` and `speeds` as in `planarfriction.ReducedModel`.
     """
 
     arrays = reduced_arrays

@@ -20,7 +20,7 @@ METHODS = ("adjoint", "eager")
 
 @by_parts
 class Rollout(NamedTuple):
-    """A model stepped through T twists and loads."""
+    """Result of stepping a model through T twists and loads."""
 
     state: jax.Array
     """State after the last step, `[..., *state_shape]`."""
@@ -29,12 +29,12 @@ class Rollout(NamedTuple):
 
 
 def rest(model: FrictionModel) -> jax.Array:
-    """State of a contact at rest: no bristle is deflected."""
+    """State of a contact at rest, with relaxed bristles."""
     return model.rest()
 
 
 def rate(model: FrictionModel, state, twist, normal_force) -> jax.Array:
-    """Rate of the state, of its shape."""
+    """Rate of the state, of the same shape."""
     return model.rate(state, twist, normal_force)
 
 
@@ -44,7 +44,7 @@ def wrench(model: FrictionModel, state, twist, normal_force) -> jax.Array:
 
 
 def step(model: FrictionModel, state, twist, normal_force, dt) -> tuple[jax.Array, jax.Array]:
-    """Advance by `dt` [s] at a held twist: the new state and the wrench at the end, stable at any `dt`."""
+    """Advance by `dt` [s] at a constant twist; returns the new state and the wrench at the end. Stable at any `dt`."""
     return model.step(state, twist, normal_force, dt)
 
 
@@ -58,21 +58,21 @@ def rollout(
     parameters: Any = None,
     method: str | None = None,
 ) -> Rollout:
-    """The steps of a model from `state` (None: at rest) through `twist` `[..., T, 3]`, each held for `dt` [s].
+    """Step a model from `state` (None: at rest) through `twist` `[..., T, 3]`, each held for `dt` [s].
 
     `normal_force` broadcasts with `[..., T]`: one number, one for each step `[T]`, or one for each contact `[..., 1]`.
-    `parameters`, a record as `model.parameters` or `[P]` in its order, takes the place of the model's own.
+    `parameters`, a record like `model.parameters` or an array `[P]` in the same order, replaces the model's own.
 
-    `method` is `"eager"`, JAX operations step by step (any model and device, derivatives by everything, of any order),
-    or `"adjoint"`, the compiled roll-out with its derivatives forwards and backwards (reduced models on the processor,
-    float64 inside, first derivatives by the parameters, `state`, `twist` and `normal_force`): much faster. None takes
-    the adjoint of a reduced model where JAX's default device is the processor, and for what the adjoint does not do,
-    higher derivatives and those by `dt` and by the numbers of the patch, the operations of JAX.
+    `method` is `"eager"`, JAX operations step by step (any model and device, all kinds and orders of derivatives), or
+    `"adjoint"`, the much faster compiled roll-out with forward and reverse derivatives (reduced models on the CPU,
+    float64 inside, first derivatives with respect to the parameters, `state`, `twist` and `normal_force`). None uses
+    the adjoint for a reduced model if JAX's default device is the CPU, and JAX operations for whatever the adjoint
+    cannot do: higher derivatives, and those with respect to `dt` and the numbers of the patch.
 
-    Inside `jit` a contact that is given NaN, or more than 1e50, gets NaN: its wrenches, its state and its gradients.
+    Inside `jit`, a contact whose input is NaN or exceeds 1e50 gets NaN in its wrenches, its state and its gradients.
 
     Raises `InvalidValueError` as a step does (see `FrictionModel`), and for a method that is not possible. Inside
-    `jit`, parameters out of their range end the adjoint in an error of JAX whose last line names them.
+    `jit`, parameters outside their range make the adjoint end in an error of JAX whose last line names them.
     """
     if not isinstance(model, FrictionModel):
         kind = type(model)

@@ -20,10 +20,10 @@ from planarfriction.scenes.scene import Scene
 
 @by_parts
 class SceneMotion(NamedTuple):
-    """Where a body goes and what its contacts pull with, at M instants."""
+    """Motion of a body, and the wrenches of its contacts, at M instants."""
 
     time: jax.Array
-    """`[M]` [s]"""
+    """Times `[M]` [s]."""
     motion: jax.Array
     """vx, vy, omega, x, y, theta of the body `[..., M, 6]`."""
     wrenches: jax.Array
@@ -41,19 +41,20 @@ def simulate_scene(
     atol: float | None = None,
     save_every: float | None = None,
 ) -> SceneMotion:
-    """The motion of a scene as a function of arrays.
+    """Simulate a scene as a differentiable function of arrays.
 
-    `parameters` gives factors `[...]`, 1 as the scene is, of mu, mass, inertia, load. `signals` gives knots [s], known
-    numbers, and values by the name of a signal as in `autodiff.scene_sensitivities`, `(times [K], values [..., K])`, of
-    `force` and `velocity` `[..., K, 3]`: they take the place of the scene's own signal and are joined as that was.
-    `initial` gives components `[...]` of the start: vx, vy, omega, x, y, theta. Their leading axes broadcast, and each
-    set of numbers is a simulation of its own, on a thread of its own; `vmap` puts an axis in front of them.
+    `parameters` gives factors `[...]` (1 leaves the scene as it is) on mu, mass, inertia and load. `signals` gives
+    knots [s], which must be concrete numbers, and values by the name of a signal as in `autodiff.scene_sensitivities`,
+    `(times [K], values [..., K])`, for `force` and `velocity` `[..., K, 3]`. They replace the scene's own signal and
+    are interpolated in the same way. `initial` gives components `[...]` of the initial state: vx, vy, omega, x, y,
+    theta. Leading axes broadcast, and each set of numbers is a separate simulation on its own thread; `vmap` adds an
+    axis in front.
 
-    Backwards the derivatives are those of `autodiff.scene_gradient`, which simulates once more, forwards those of
-    `scene_sensitivities`. First derivatives only; computed in double precision on the processor.
+    Reverse derivatives are those of `autodiff.scene_gradient`, which simulates once more; forward derivatives are those
+    of `scene_sensitivities`. First derivatives only; computed in double precision on the CPU.
 
-    Raises `InvalidValueError` for names and numbers out of range, and `SolverError` where the solver gives up; inside
-    `jit` these end in an error of JAX whose last line names them.
+    Raises `InvalidValueError` for names and numbers out of range, and `SolverError` if the solver fails; inside `jit`
+    these end in an error of JAX whose last line names them.
     """
     parameters, signals, initial = parameters or {}, signals or {}, initial or {}
     for name, pair in signals.items():

@@ -1,4 +1,4 @@
-"""What every friction law of bristles offers."""
+"""The interface of every friction law that is based on bristles."""
 
 from __future__ import annotations
 
@@ -13,24 +13,24 @@ from planarfriction.formulas import LawNumbers
 
 
 class FrictionLaw:
-    """A friction law per unit normal load: frozen parameters, which it gives to the formulas by name.
+    """A friction law per unit normal load: a frozen record of parameters that enter the formulas by name.
 
     `zdot = v - k z`, `f = -(sigma_0 z + sigma_1 zdot + sigma_2 v) f_N`, with the decay k of `formulas.bristle_decay`
-    and the steady friction `g(v)` of `formulas.stribeck`. A member of the family says what its numbers in them are;
-    models ask for nothing else.
+    and the steady friction `g(v)` of `formulas.stribeck`. Each member of the family only defines which `numbers` enter
+    these formulas; models need nothing else.
 
-    `rate` and `force` are those of one bristle without a patch: along a line for arrays of any shape, in more
-    dimensions where `axis` says which axis holds the components.
+    `rate` and `force` describe a single bristle without a patch: along a line for arrays of any shape, or in several
+    dimensions, where `axis` is the axis of the components.
     """
 
     @property
     def numbers(self) -> LawNumbers:
-        """The law as the formulas see it: the one thing that a new law has to say."""
+        """The numbers that the law puts into the formulas; a new law must define only this."""
         raise NotImplementedError
 
     @property
     def largest_deflection(self) -> float:
-        """Steady-state deflection at high speed, `mu_c / sigma_0` [m]: the natural scale of a bristle."""
+        """Steady-state deflection at high speed, `mu_c / sigma_0` [m], which is the natural scale of a bristle."""
         return self.numbers.mu_c / self.numbers.sigma_0
 
     def steady_friction(self, speed: ArrayLike) -> np.ndarray:

@@ -30,11 +30,11 @@ class Coulomb:
     def wrench(self, surface: Any, twist: ArrayLike, normal_force: ArrayLike) -> np.ndarray:
         """Friction wrench `mu f_N W(V)` on the sliding body about the contact frame's origin [N, N, N m].
 
-        `surface` is any limit surface, `twist` has shape `[..., 3]` [m/s, m/s, rad/s], `normal_force` `[...]` [N].
-        A body at rest gets a zero wrench: Coulomb's law alone cannot tell the force of a stuck contact.
+        `surface` is any limit surface, `twist` has shape `[..., 3]` [m/s, m/s, rad/s], `normal_force` `[...]` [N]. At
+        rest the wrench is zero: Coulomb's law alone does not determine the force of a sticking contact.
 
-        Raises InvalidValueError where `surface` is no limit surface, or the loads are below zero or do not broadcast
-        with the twists.
+        Raises InvalidValueError unless `surface` is a limit surface and the loads are >= 0 and broadcast with the
+        twists.
         """
         load = validation.non_negative_numbers("normal_force", normal_force)
         if not hasattr(surface, "wrench"):

@@ -1,4 +1,4 @@
-"""Coulomb with Stribeck effect, regularised: a curve of friction over speed, followed within a relaxation time."""
+"""Regularised Coulomb friction with Stribeck effect: friction follows a curve over speed within a relaxation time."""
 
 from __future__ import annotations
 
@@ -21,21 +21,21 @@ class CoulombStribeck(FrictionLaw):
         f = -(g(v) v/(|v| + v_c) + sigma_2 v) f_N,
 
     and the first part p of f follows a change of the speed by `pdot = -((|v| + v_c) p / g(v) + v f_N) mu_s/(v_c tau)`:
-    at rest it decays as `exp(-t/tau)`. So a contact under a held force `F < mu_s f_N` does not stand still but creeps,
-    without Stribeck and viscous terms at `v = v_c F/(mu_c f_N - F)`. The smaller `creep_speed`, the closer to Coulomb;
-    the shorter `relaxation_time`, the closer to a function of the speed alone. A contact that shall stick takes `LuGre`
-    with `elasto_plastic`.
+    at rest it decays as `exp(-t/tau)`. A contact under a constant force `F < mu_s f_N` therefore does not stay at rest
+    but creeps; without Stribeck and viscous terms its speed is `v = v_c F/(mu_c f_N - F)`. The smaller `creep_speed`,
+    the closer to Coulomb; the shorter `relaxation_time`, the closer to a function of the speed alone. For a contact
+    that must stick, use `LuGre` with `elasto_plastic`.
 
     Raises InvalidValueError for a parameter outside its range, and for `mu_s` below `mu_c`.
 
-    Sources: Stribeck 1902; the curve as in Armstrong-Helouvry, Dupont, Canudas de Wit 1994, table 1; of the limit
-    `tau -> 0`, the regularisation `v/(|v| + v_c)`.
+    Sources: Stribeck 1902; the curve as in Armstrong-Helouvry, Dupont, Canudas de Wit 1994, table 1; of the limit `tau
+    -> 0`, the regularisation `v/(|v| + v_c)`.
     """
 
     mu_c: float = 1.0
     """Coulomb coefficient [-]."""
     mu_s: float = None  # pyright: ignore[reportAssignmentType]
-    """Static coefficient [-], at least `mu_c`, which it is where it is left out."""
+    """Static coefficient [-], at least `mu_c`; equal to `mu_c` by default."""
     v_s: float = 1e-3
     """Stribeck speed [m/s]."""
     gamma: float = 2.0
@@ -43,9 +43,9 @@ class CoulombStribeck(FrictionLaw):
     sigma_2: float = 0.0
     """Viscous friction per unit normal load [s/m]."""
     creep_speed: float = 1e-5
-    """v_c [m/s]: at this speed friction is half of what it is in fast sliding."""
+    """v_c [m/s]: speed at which friction is half of that in fast sliding."""
     relaxation_time: float = 1e-2
-    """tau [s]: time in which the force at rest falls to 1/e."""
+    """tau [s]: time in which the force at rest decays to 1/e."""
 
     def __post_init__(self) -> None:
         if self.mu_s is None:
@@ -58,7 +58,7 @@ class CoulombStribeck(FrictionLaw):
 
     @property
     def numbers(self) -> LawNumbers:
-        """The law as the formulas see it: plain bristles of `sigma_0 = mu_s/(v_c tau)` that relax."""
+        """The numbers for the formulas: those of plain bristles with `sigma_0 = mu_s/(v_c tau)` that relax."""
         return LawNumbers(
             sigma_0=self.mu_s / (self.creep_speed * self.relaxation_time),
             sigma_1=0.0,

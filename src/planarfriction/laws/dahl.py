@@ -1,4 +1,4 @@
-"""Dahl: bristles that bend and slip, the oldest law with presliding."""
+"""Dahl: bristles that bend and slip, the oldest law with pre-sliding."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ _SPEED = 1e-3
 class Dahl(FrictionLaw):
     """Dahl friction per unit normal load: LuGre without Stribeck effect, damping and viscous friction.
 
-    `zdot = v - sigma_0 |v| / mu_c z`, `f = -sigma_0 z f_N`: the force depends on the way and not on the speed. From
-    rest, sliding by x in one direction gives `f = -mu_c f_N (1 - exp(-sigma_0 x / mu_c))`.
+    `zdot = v - sigma_0 |v| / mu_c z`, `f = -sigma_0 z f_N`: the force depends on the distance and not on the speed.
+    From rest, sliding by x in one direction gives `f = -mu_c f_N (1 - exp(-sigma_0 x / mu_c))`.
 
     Raises InvalidValueError for a parameter that is not > 0.
 
@@ -37,7 +37,7 @@ class Dahl(FrictionLaw):
 
     @property
     def numbers(self) -> LawNumbers:
-        """The law as the formulas see it."""
+        """The numbers that the law puts into the formulas."""
         return LawNumbers(
             sigma_0=self.sigma_0, sigma_1=0.0, sigma_2=0.0, mu_c=self.mu_c, mu_s=self.mu_c, v_s=_SPEED, gamma=2.0
         )

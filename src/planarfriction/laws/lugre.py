@@ -16,7 +16,7 @@ from planarfriction.laws.base import FrictionLaw
 @described
 @dataclass(frozen=True)
 class ElastoPlastic:
-    """Elasto-plastic bristles: purely elastic below breakaway, so that nothing creeps that should stand still.
+    """Elasto-plastic bristles: purely elastic below breakaway, so that a sticking contact does not creep.
 
     Raises InvalidValueError for a `breakaway_ratio` outside [0, 1).
 
@@ -49,7 +49,7 @@ class LuGre(FrictionLaw):
     mu_c: float = 1.0
     """Coulomb coefficient [-]."""
     mu_s: float = None  # pyright: ignore[reportAssignmentType]
-    """Static (breakaway) coefficient [-], at least `mu_c`, which it is where it is left out."""
+    """Static (breakaway) coefficient [-], at least `mu_c`; equal to `mu_c` by default."""
     v_s: float = 1e-3
     """Stribeck speed [m/s]."""
     sigma_0: float = 1e6
@@ -61,7 +61,7 @@ class LuGre(FrictionLaw):
     gamma: float = 2.0
     """Stribeck exponent [-]."""
     elasto_plastic: ElastoPlastic | float | None = None
-    """Elasto-plastic extension, None for plain LuGre; a number becomes the `ElastoPlastic` of that breakaway ratio."""
+    """Elasto-plastic extension, None for plain LuGre; a number is taken as the breakaway ratio of `ElastoPlastic`."""
 
     def __post_init__(self) -> None:
         if self.mu_s is None:
@@ -76,7 +76,7 @@ class LuGre(FrictionLaw):
 
     @property
     def numbers(self) -> LawNumbers:
-        """The law as the formulas see it."""
+        """The numbers that the law puts into the formulas."""
         plain = LawNumbers(self.sigma_0, self.sigma_1, self.sigma_2, self.mu_c, self.mu_s, self.v_s, self.gamma)
         if not isinstance(self.elasto_plastic, ElastoPlastic):
             return plain

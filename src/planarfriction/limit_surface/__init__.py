@@ -1,4 +1,5 @@
-"""Limit surfaces: the friction wrench of every sliding twist, per unit `mu f_N`. They know shape, not friction."""
+"""Limit surfaces: the friction wrench for every sliding twist, per unit `mu f_N`. They depend on shape, not on
+friction."""
 
 from planarfriction.families import SURFACES
 from planarfriction.limit_surface.base import LimitSurface

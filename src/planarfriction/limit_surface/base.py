@@ -58,18 +58,18 @@ class LimitSurface(ByValue):
     """Set of friction wrenches of a sliding patch, per unit `mu f_N`: `W(V) = -d Phi/d V`, `Phi(V) = sum w_i |v_i|`.
 
     Twists `(vx, vy, omega)` [m/s, m/s, rad/s] and wrenches `(fx, fy, tau)` [1, 1, m] are about the contact frame's
-    origin and act on the moving body; leading axes broadcast. `normal_force` [N] fixes the shape of a patch that
-    depends on the load; leave it out otherwise. A patch of one point has no limit surface (its contact radius is
-    zero).
+    origin and act on the moving body; leading axes broadcast. If the shape of the patch depends on the load,
+    `normal_force` [N] selects the shape; leave it out otherwise. A patch with a single point has no limit surface (its
+    contact radius is zero).
 
-    A patch with a friction metric and an asymmetry: `Phi(V) = sum w_i (|u_i| + a_i . u_i)` with `u_i = L_i v_i`. The
-    metric leaves `h(-V) = -h(V)`. The asymmetric part is linear in V, its wrench the same for all twists: a surface
-    stored for half of all directions and three numbers more are exact for all of them.
+    With a friction metric and an asymmetry: `Phi(V) = sum w_i (|u_i| + a_i . u_i)` with `u_i = L_i v_i`. With a metric
+    alone, `h(-V) = -h(V)` still holds. The asymmetric part of Phi is linear in V, and its wrench is the same for all
+    twists, so a surface stored for half of all directions and three more numbers describe all of them exactly.
 
     A surface of your own implements one method, `direction`; models store it as a table of `segments`.
 
-    Raises InvalidValueError for a patch of one point, one with direction-dependent friction that the surface does not
-    take, and a load that is not > 0.
+    Raises InvalidValueError for a patch with a single point, for direction-dependent friction that the surface does not
+    support, and for a load that is not > 0.
 
     Source: Goyal, Ruina, Papadopoulos 1991.
     """
@@ -77,12 +77,12 @@ class LimitSurface(ByValue):
     patch: ContactPatch
     """The patch that slides."""
     normal_force: float | None = dataclasses.field(default=None, kw_only=True)
-    """Load [N] at which the shape of the patch is taken; None where it does not depend on the load."""
+    """Load [N] for which the shape of the patch is taken; None if it does not depend on the load."""
 
     anisotropy: ClassVar[str] = "none"
-    """Patches with direction-dependent friction that it takes: "none", "uniform" (all cells alike), "any"."""
+    """Direction-dependent friction that it supports: "none", "uniform" (all cells alike), "any"."""
     segments: ClassVar[int] = 20
-    """Segments of a quadrant of the table that models store it as [-]."""
+    """Segments per quadrant of the table in which models store it [-]."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.patch, ContactPatch):
@@ -109,7 +109,8 @@ class LimitSurface(ByValue):
         return surface_html(self)
 
     def at(self, normal_force: float) -> LimitSurface:
-        """The same kind of surface for the shape at another load; itself where the shape does not depend on it.
+        """The same kind of surface for the shape at another load; returns itself if the shape does not depend on the
+        load.
 
         Raises InvalidValueError for a load that is not > 0.
         """
@@ -125,7 +126,7 @@ class LimitSurface(ByValue):
 
     @functools.cached_property
     def contact_radius(self) -> float:
-        """`r = |tau|` of a spin about the centre of pressure [m]: scales the torque axis.
+        """`r = |tau|` of a spin about the centre of pressure [m], by which the torque axis is scaled.
 
         Raises InvalidValueError for a patch of one point.
         """
@@ -174,11 +175,11 @@ class LimitSurface(ByValue):
     # ------------------------------------------------------------------ what a surface says of itself
 
     def direction(self, units: np.ndarray) -> np.ndarray:
-        """`h` `[M, 3]`, the friction of unit scaled twists `[M, 3]` with its sign turned: what a surface has to say.
+        """Negative friction `h` `[M, 3]` for unit scaled twists `[M, 3]`; every surface must define this.
 
-        Scaled twists are `V_S = (vx, vy, r omega)` about the centre of pressure, with `r` the `contact_radius`, and
-        `h = -(fx, fy, tau/r)` is the gradient of the dissipation by them. It depends on the direction of V_S alone and
-        turns its sign with it; a pure translation has `h = (vx, vy, .)`.
+        Scaled twists are `V_S = (vx, vy, r omega)` about the centre of pressure, with `r` the `contact_radius`, and `h
+        = -(fx, fy, tau/r)` is the gradient of the dissipation with respect to them. It depends only on the direction of
+        V_S, and changes sign with it; a pure translation has `h = (vx, vy, .)`.
         """
         raise NotImplementedError(f"{type(self).__name__} has to implement direction(units)")
 
@@ -192,7 +193,7 @@ class LimitSurface(ByValue):
 
     @functools.cached_property
     def numbers(self) -> SurfaceNumbers:
-        """The surface for compiled loops: a table of its potential, made on first use."""
+        """The surface for compiled code: a table of its potential, computed on first use."""
         from planarfriction.limit_surface.stored import stored_potential
 
         data = stored_potential(lambda nodes: self.direction(nodes.reshape(-1, 3)).reshape(nodes.shape), self.segments)
@@ -214,18 +215,19 @@ class LimitSurface(ByValue):
         return np.einsum("...i,...i", self._direction(scaled), scaled)
 
     def jacobian(self, twist: ArrayLike) -> np.ndarray:
-        """`dW/dV`, shape `[..., 3, 3]`; zero along `V` itself and undefined at rest, where it is returned as zero."""
+        """`dW/dV`, shape `[..., 3, 3]`; zero along `V` itself. At rest it is undefined and returned as zero."""
         scaled, frame = self._scaled(twist)
         flat = scaled.reshape(-1, 3)
         return -(frame.T @ self._direction_slope(flat) @ frame).reshape(*scaled.shape[:-1], 3, 3)
 
     def twist(self, wrench: ArrayLike) -> np.ndarray:
-        """Twist normal to the surface where the ray of `wrench` meets it, of unit dissipation, shape `[..., 3]`.
+        """Twist of unit dissipation normal to the surface where the ray of `wrench` meets it, shape `[..., 3]`.
 
         `argmin Phi(V)` subject to `-W . V = 1`, scaled to `Phi(V) = 1`; the magnitude of `wrench` does not matter. The
-        wrench of what is returned is parallel to the given one to `CERTIFIED`; where the patch turns about a loaded
-        point, that point's own force, which may then be any up to its friction, makes up for the rest. Of many twists
-        with one wrench it is any, of several on a surface that is not convex one of little dissipation.
+        wrench of the returned twist is parallel to the given one within `CERTIFIED`. If the patch turns about a loaded
+        point, the friction of that point, which is undetermined up to its limit, makes up the difference. If many
+        twists have the same wrench, any of them is returned; on a surface that is not convex, one with little
+        dissipation.
 
         Raises `InvalidValueError` if `wrench` is zero, not finite or not of shape `[..., 3]`, and `SolverError` if no
         twist is found.
@@ -241,7 +243,7 @@ class LimitSurface(ByValue):
         return found.reshape(wrench.shape)
 
     def compare(self, reference: LimitSurface, *, samples: int = 200) -> SurfaceComparison:
-        """Differences from another surface: wrenches of the same twists, and twists of the same wrenches.
+        """Compare with another surface: wrenches of the same twists, and twists of the same wrenches.
 
         Both at `samples` directions, spread evenly over the sphere of the reference's scaled coordinates.
 

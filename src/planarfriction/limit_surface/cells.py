@@ -18,8 +18,8 @@ from planarfriction.limit_surface.compiled import CompiledLimitSurface
 class LimitSurfaceCells(CompiledLimitSurface):
     """Limit surface summed over the cells: `W = -sum w_i [v_i/|v_i| ; rho_i x v_i/|v_i|]`.
 
-    Exact for point contacts; for a grid it jumps in small steps as the centre of rotation crosses cells (a cell at the
-    centre of rotation adds nothing). Takes any friction metric and asymmetry of the cells.
+    Exact for point contacts; for a grid it changes in small jumps as the centre of rotation crosses cells (a cell at
+    the centre of rotation contributes nothing). Supports any friction metric and asymmetry of the cells.
     """
 
     kind = kernels.CELLS

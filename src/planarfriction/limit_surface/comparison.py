@@ -1,4 +1,4 @@
-"""How far two limit surfaces are apart: in force, and in which twist belongs to which wrench."""
+"""How far two limit surfaces differ: in force, and in the twist that belongs to a wrench."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ class SurfaceComparison:
     """Differences of a limit surface from a reference, in the reference's scaled coordinates; `print` shows a table."""
 
     force: Spread
-    """Difference of the forces of the same twists, per unit `mu f_N` [-]."""
+    """Difference between the forces of the same twists, per unit `mu f_N` [-]."""
     torque: Spread
-    """Difference of their torques about the reference's centre of pressure, over its contact radius [-]."""
+    """Difference between their torques about the reference's centre of pressure, divided by its contact radius [-]."""
     radius: Spread
-    """How much further out the surface is along the same wrench, relative to the reference [-]."""
+    """How much further out the surface is in the direction of the same wrench, relative to the reference [-]."""
     angle: Spread
     """Angle between the twists `(vx, vy, r omega)` of the same wrench [deg]."""
     samples: int

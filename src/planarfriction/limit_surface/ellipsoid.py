@@ -17,8 +17,8 @@ from planarfriction.limit_surface.compiled import CompiledLimitSurface
 class LimitSurfaceEllipsoid(CompiledLimitSurface):
     """Limit surface `fx^2 + fy^2 + (tau/r)^2 = 1` about the centre of pressure: `h = V_S/|V_S|`.
 
-    Exact in pure sliding and in pure spin of a symmetric patch, wrong in between: which twist maps to which wrench.
-    A friction metric of the whole patch stretches it, an asymmetry `a` shifts its centre.
+    Exact in pure sliding and in pure spin of a symmetric patch. In between it assigns the wrong twist to a wrench. A
+    friction metric of the whole patch stretches it, and an asymmetry `a` shifts its centre.
 
     Source: Howe and Cutkosky 1996.
     """
@@ -28,7 +28,7 @@ class LimitSurfaceEllipsoid(CompiledLimitSurface):
 
     @functools.cached_property
     def numbers(self) -> SurfaceNumbers:
-        """No numbers beyond the contact radius."""
+        """Empty: nothing is needed besides the contact radius."""
         return SurfaceNumbers(self.kind, 0, np.zeros(0))
 
     def _find_twists(self, wrenches: np.ndarray, found: np.ndarray) -> float:

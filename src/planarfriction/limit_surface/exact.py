@@ -1,4 +1,4 @@
-"""The limit surface of evenly loaded cells, segments, polygons, discs and rings, integrated and not summed."""
+"""Limit surface of the continuous patch (evenly loaded cells, segments, polygons, discs and rings), by integration."""
 
 from __future__ import annotations
 
@@ -117,26 +117,28 @@ class _Rings(NamedTuple):
 class LimitSurfaceExact(LimitSurface):
     """Limit surface of the continuous patch: `W = -dPhi/dV`, `Phi = int p |v| dA`, in closed form.
 
-    Integrated over the patch's outline where the pressure is uniform on it (polygons), or depends on the radius alone
-    (discs and rings, `Uniform` or `SoftFinger`); else over its cells, each a rectangle (on lines a segment) of uniform
-    pressure. Points stay points. The wrench is continuous in the twist, the Jacobian exact; on lines the Jacobian grows
-    without bound (as a logarithm) where the centre of rotation meets the line, and is cut off at 1e-15 of a cell.
+    Integrated over the patch's outline if the pressure on it is uniform (polygons) or depends on the radius alone
+    (discs and rings, `Uniform` or `SoftFinger`), otherwise over its cells, each a rectangle (on lines a segment) of
+    uniform pressure. Points remain points. The wrench is continuous in the twist, and the Jacobian is exact; on lines
+    the Jacobian has a logarithmic singularity where the centre of rotation meets the line, and is cut off at 1e-15 of a
+    cell.
 
-    Costs more than a sum over cells, and compiled loops do not know it: models store it as `LimitSurfaceTable` does.
+    It costs more than a sum over cells, and compiled code cannot evaluate it: models store it as `LimitSurfaceTable`
+    does.
     """
 
     anisotropy = "uniform"
 
     @functools.cached_property
     def numbers(self) -> SurfaceNumbers:
-        """Those of `LimitSurfaceTable`, which knows the mixed derivatives at its nodes."""
+        """Those of `LimitSurfaceTable`, with the mixed derivatives at its nodes."""
         from planarfriction.limit_surface.table import LimitSurfaceTable
 
         return LimitSurfaceTable(self.patch, self.segments, normal_force=self.normal_force).numbers
 
     @functools.cached_property
     def centre_of_pressure(self) -> np.ndarray:
-        """Centre of pressure `[2]` of what is integrated [m]."""
+        """Centre of pressure `[2]` [m] of the pressure that is integrated."""
         if isinstance(self._outline, PolygonOutline):
             triangles = self._outline.triangles()
             areas = _area(triangles)
@@ -207,11 +209,11 @@ class LimitSurfaceExact(LimitSurface):
         return sums[:, :3], slopes.reshape(-1, 3, 3)
 
     def direction(self, units: np.ndarray) -> np.ndarray:
-        """Integrated in closed form, as far as there is one."""
+        """Negative friction `h` `[M, 3]` for unit scaled twists `[M, 3]`, in closed form where there is one."""
         return self.sums(units)[0]
 
     def direction_slope(self, units: np.ndarray) -> np.ndarray:
-        """Integrated alike."""
+        """`dh/dV_S` `[M, 3, 3]`, integrated in the same way."""
         return self.sums(units)[1]
 
     @functools.cached_property

@@ -1,4 +1,4 @@
-"""A convex quartic in the place of a limit surface."""
+"""A convex quartic that approximates a limit surface."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ _SAMPLES = 400
 
 @dataclass(frozen=True, eq=False)
 class LimitSurfaceQuartic(LimitSurface):
-    """Limit surface `H(fx, fy, tau/r) = 1` about the centre of pressure, H a convex homogeneous quartic.
+    """Limit surface `H(fx, fy, tau/r) = 1` about the centre of pressure, with a convex homogeneous quartic H.
 
     The twist of a wrench is along the gradient of H, in closed form. Convexity is certified by a sum of squares:
     `z' H''(x) z = y' Q y` with `y = (x_i z_j)` and positive definite `Q` (every convex quartic of three variables has
@@ -49,7 +49,7 @@ class LimitSurfaceQuartic(LimitSurface):
     """Coefficients of the 15 monomials `quartic_fit.POWERS`, `[15]`; by default fitted to `surface`, for each load."""
 
     segments: int = dataclasses.field(default=20, kw_only=True)
-    """Segments of a quadrant of the table for compiled loops [-]."""
+    """Segments per quadrant of the table for compiled code [-]."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "segments", validation.count("segments", self.segments, 2, MOST_SEGMENTS))
@@ -73,12 +73,12 @@ class LimitSurfaceQuartic(LimitSurface):
         normal_force: float | None = None,
         velocity_weight: float = 1.0,
     ) -> LimitSurfaceQuartic:
-        """The convex quartic nearest to measured pairs: `H(W) = 1`, and the gradient of H along the twist.
+        """Fit a convex quartic to measured pairs: `H(W) = 1`, with the gradient of H along the twist.
 
         `wrench` `[M, 3]` are friction wrenches per unit `mu f_N` on the moving body, `twist` `[M, 3]` its twists, whose
-        magnitude does not matter; both about the origin of the contact frame. The patch gives centre and radius of the
-        scaled coordinates, not the shape: a guess will do. `velocity_weight` weighs the squares of the gradients' parts
-        across the twists against those of `H - 1`.
+        magnitude does not matter; both about the origin of the contact frame. The patch only defines the centre and
+        radius of the scaled coordinates, not the shape, so a guess is enough. `velocity_weight` weights the squares of
+        the gradients' components across the twists against those of `H - 1`.
 
         Raises `InvalidValueError` for pairs of the wrong shape, fewer than 5, not finite or zero.
         """
@@ -102,7 +102,7 @@ class LimitSurfaceQuartic(LimitSurface):
 
     @functools.cached_property
     def quartic(self) -> np.ndarray:
-        """The 15 coefficients in use."""
+        """The 15 coefficients."""
         if self.coefficients is not None:
             return self.coefficients
         surface = self.surface or LimitSurfaceCells(self.patch, normal_force=self.normal_force)
@@ -115,7 +115,7 @@ class LimitSurfaceQuartic(LimitSurface):
 
     @functools.cached_property
     def convexity(self) -> float:
-        """Smallest eigenvalue of the certificate `Q`: the surface is convex, proven, where this is not negative."""
+        """Smallest eigenvalue of the certificate `Q`; if it is not negative, the surface is proven to be convex."""
         return float(np.linalg.eigvalsh(quartic_fit.certificate(self.quartic))[0])
 
     # ------------------------------------------------------------------ the protocol

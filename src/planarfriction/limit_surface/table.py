@@ -1,4 +1,4 @@
-"""A stored limit surface, smooth and exactly passive."""
+"""A stored limit surface that is smooth and exactly passive."""
 
 from __future__ import annotations
 
@@ -21,14 +21,14 @@ class LimitSurfaceTable(CompiledLimitSurface):
     """Stored limit surface: dissipation and its gradient at `segments` x `4 segments` directions, bicubic in between.
 
     The potential is interpolated and the wrench is its gradient, so that `-W . V = Phi(V) > 0` and the Jacobian is
-    symmetric at every twist; the nodes are those of `LimitSurfaceExact` (to 1e-7), mixed derivatives included
-    (where cells have friction metrics of their own, plain sums over the cells).
+    symmetric at every twist. The nodes, including mixed derivatives, are those of `LimitSurfaceExact` (to 1e-7); if
+    cells have friction metrics of their own, they are plain sums over the cells.
 
-    Raises InvalidValueError for a number of segments that is not taken, and as every limit surface.
+    Raises InvalidValueError for an unsupported number of segments, and as every limit surface does.
     """
 
     segments: int = 20
-    """Segments of a quadrant [-]."""
+    """Segments per quadrant [-]."""
 
     kind = kernels.POTENTIAL
     anisotropy = "any"
@@ -51,7 +51,8 @@ class LimitSurfaceTable(CompiledLimitSurface):
 
     @functools.cached_property
     def numbers(self) -> SurfaceNumbers:
-        """Potential, its derivatives along both angles and the mixed one at the nodes; the force in a pure spin."""
+        """At the nodes, the potential, its derivatives along both angles and the mixed one; and the force in a pure
+        spin."""
         if not self._one_metric:
             return SurfaceNumbers(self.kind, self.segments, potential_table(*self._scaled_levers, self.segments))
         return SurfaceNumbers(self.kind, self.segments, _nodes(self._exact, self.segments))

@@ -1,4 +1,4 @@
-"""The stored limit surface of the paper, to the letter."""
+"""The stored limit surface exactly as in the paper."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from planarfriction.limit_surface.compiled import CompiledLimitSurface
 class LimitSurfaceTablePublished(CompiledLimitSurface):
     """Stored limit surface as published: smoothed sums at `segments` x `4 segments` nodes, bilinear in the two angles.
 
-    The sums are blended over the corners of the grid cell that holds the centre of rotation, the contact radius with
-    them; the nodes are not renormalised in between. The map has kinks and is not the gradient of a potential: see
-    `LimitSurfaceTable` for one that is. Patches without a grid (points) use the plain sums.
+    The sums, and the contact radius, are blended over the corners of the grid cell that contains the centre of
+    rotation; interpolated values are not renormalised. The map has kinks and is not the gradient of a potential;
+    `LimitSurfaceTable` is. Patches without a grid (points) use the plain sums.
 
-    Raises InvalidValueError for a number of segments that is not taken, and as every limit surface.
+    Raises InvalidValueError for an unsupported number of segments, and as every limit surface does.
 
     Source: Waltersson and Karayiannidis 2024, section IV.
     """
 
     segments: int = 20
-    """Segments of a quadrant [-]."""
+    """Segments per quadrant [-]."""
 
     kind = kernels.BILINEAR
 

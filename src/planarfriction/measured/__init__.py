@@ -1,6 +1,6 @@
-"""A comparison on measured data: three tasks with fixed splits, the library's models, and any model of one's own.
+"""A comparison of models on measured data: three tasks with fixed splits, the library's models, and models of your own.
 
-The tables of others that it stands on come with the package; `data/NOTICE` names their sources and licences.
+The published tables that it uses come with the package; `data/NOTICE` names their sources and licences.
 """
 
 from planarfriction.measured.benchmark import Benchmark, Result, Score

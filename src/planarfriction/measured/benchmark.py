@@ -1,4 +1,4 @@
-"""Every model on every task: fitted on the training cases, scored on the others."""
+"""Every model on every task: fitted to the training cases, scored on the others."""
 
 from __future__ import annotations
 
@@ -23,53 +23,53 @@ AT_ONCE = 16
 
 @dataclass(frozen=True)
 class Score:
-    """What one measure says of a model."""
+    """The value of one measure for a model."""
 
     value: float
     low: float
-    """Lower end of the 95 % interval, bootstrap over independent cases."""
+    """Lower end of the 95 % interval, from a bootstrap over independent cases."""
     high: float
     cases: int
-    """Independent cases: tosses with their copies, or pushes."""
+    """Number of independent cases: tosses with their copies, or pushes."""
 
 
 @dataclass(frozen=True, eq=False)
 class Result:
-    """A model on a task."""
+    """The result of one model on one task."""
 
     scores: Mapping[str, Score]
-    """By the key of the measure."""
+    """Scores by the key of the measure."""
     answers: tuple[np.ndarray, ...]
-    """To the test cases, in their order."""
+    """Answers to the test cases, in their order."""
     errors: tuple[np.ndarray, ...]
-    """`[rows, columns]` of each test case, as the task defines them."""
+    """Errors `[rows, columns]` of each test case, as the task defines them."""
     told: Mapping[str, float]
-    """What was fitted."""
+    """Fitted numbers by name."""
     checked: Mapping[str, float]
-    """What the model says of its own answers on the test cases, where it says anything."""
+    """Checks of the model's own uncertainty on the test cases, if it states any."""
     seconds: float
-    """Fit and prediction."""
+    """Time of fit and prediction [s]."""
     regions: np.ndarray | None = None
-    """Regions of the ends of slides `[K, 3, 3]`, of models that have `regions`."""
+    """Regions of the final poses of slides `[K, 3, 3]`, for models that have `regions`."""
 
 
 @dataclass
 class Benchmark:
-    """Models compared on measured data. `run` fills `results` as it goes, so that an interrupt loses nothing.
+    """Models compared on measured data. `run` fills `results` model by model, so that an interrupt loses nothing.
 
     Raises `InvalidValueError` for names that are not known and models that cannot be called.
     """
 
     models: Mapping[str, Callable[[Any], np.ndarray]] | None = None
-    """Name -> model; those of the library that are installed by default."""
+    """Models by name; by default those of the library that are installed."""
     tasks: Sequence[str] = tuple(TASKS)
     """Names of tasks."""
     folder: Path | None = None
-    """Folder with the tables; those of the package by default."""
+    """Folder with the tables; by default those of the package."""
     seed: int = 0
-    """Of the bootstrap."""
+    """Seed of the bootstrap."""
     results: dict[str, dict[str, Result]] = field(default_factory=dict, init=False)
-    """Task -> model -> what came out."""
+    """Results by task and model."""
     left_out: list[str] = field(default_factory=list, init=False)
     """What was not run, and why."""
 
@@ -95,7 +95,7 @@ class Benchmark:
     def run(self, progress: Callable[[str], None] | None = None) -> dict[str, dict[str, Result]]:
         """Fit and score every model on every task; returns `results`.
 
-        Raises `InvalidValueError` where an answer has another shape than asked for, or numbers that are not finite.
+        Raises `InvalidValueError` if an answer has the wrong shape or contains numbers that are not finite.
         """
         say = (lambda text: None) if progress is None else progress
         for name in self.tasks:

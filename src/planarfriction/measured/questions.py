@@ -1,4 +1,4 @@
-"""What a model is asked: one kind of question for each task, about one slide, one layout of feet, or one push."""
+"""The questions that models answer: one kind for each task, about one slide, one layout of feet, or one push."""
 
 from __future__ import annotations
 
@@ -15,35 +15,35 @@ FIRST_POSES = 8
 
 @dataclass(frozen=True, eq=False)
 class SlideQuestion:
-    """Where is a body that slides freely on a level table? Answer: its poses `[T, 3]` at `time`, world axes.
+    """Where does a body that slides freely on a level table go? Answer: its poses `[T, 3]` at `time`, world axes.
 
-    The first poses are measured; the rest is to be predicted.
+    The first poses are measured; the model predicts the rest.
     """
 
     time: np.ndarray
-    """Sample times from 0 [s], `[T]`; the first of them are those of `first`."""
+    """Sample times from 0 [s], `[T]`; the first eight are those of `first`."""
     first: np.ndarray
     """The first measured poses x, y, theta of the centre of mass, world axes [m, m, rad], `[8, 3]`."""
     patch: ContactPatch
-    """The face that touches the table, frame at the centre of mass; its pressure is not known, uniform here."""
+    """The face that touches the table, frame at the centre of mass; its pressure is unknown, and uniform here."""
     mass: float
-    """[kg]"""
+    """Mass [kg]."""
     inertia: float
-    """About the vertical through the centre of mass [kg m^2]."""
+    """Moment of inertia about the vertical through the centre of mass [kg m^2]."""
     height: float
-    """Of the centre of mass above the table [m]."""
+    """Height of the centre of mass above the table [m]."""
     task: Literal["slides"] = field(default="slides", init=False)
 
 
 @dataclass(frozen=True, eq=False)
 class PushQuestion:
-    """Which way does an object go that is pushed slowly? Answer: a twist `[M, 3]` for each wrench, of any length.
+    """Which way does an object move when it is pushed slowly? Answer: a twist `[M, 3]` for each wrench, of any length.
 
     Twists `(vx, vy, omega)` and wrenches `(fx, fy, tau)` are about the centre of mass, in the axes of the object.
     """
 
     wrenches: np.ndarray
-    """Wrench of the pusher on the object [N, N, N m], `[M, 3]`; friction is minus this."""
+    """Wrench of the pusher on the object [N, N, N m], `[M, 3]`; the friction wrench is its negative."""
     patch: ContactPatch
     """The feet with their shares of the load, or the flat face under uniform pressure."""
     layout: str
@@ -53,7 +53,7 @@ class PushQuestion:
 
 @dataclass(frozen=True, eq=False)
 class SeriesQuestion:
-    """One push in time, from rest: the twists of its wrenches, or the wrenches of its twists. Answer `[T, 3]`.
+    """One push over time, from rest: the twists for its wrenches, or the wrenches for its twists. Answer `[T, 3]`.
 
     Both are about the centre of mass, in the axes of the object; only the direction of an answer counts.
     """
@@ -63,7 +63,7 @@ class SeriesQuestion:
     given: np.ndarray
     """Wrenches of the pusher on the object [N, N, N m], or twists of the object [m/s, m/s, rad/s], `[T, 3]`."""
     wanted: Literal["twists", "wrenches"]
-    """Which of the two is asked for; wrenches are those of the pusher, friction is minus them."""
+    """Which of the two the model must predict; wrenches are those of the pusher, friction is their negative."""
     patch: ContactPatch
     """The feet with their shares of the load."""
     normal_force: float
@@ -75,17 +75,18 @@ Question = SlideQuestion | PushQuestion | SeriesQuestion
 
 
 class Case(NamedTuple):
-    """A question with what was measured."""
+    """A question together with the measured answer."""
 
     question: Any
     """One of the three kinds."""
     answer: np.ndarray
-    """What was measured, of the shape of an answer."""
+    """The measured answer, of the same shape as a model's."""
     name: str
-    """Which slide, layout or push it is."""
+    """Name of the slide, layout or push."""
     group: str
-    """Cases of one group are no independent evidence: they stay on one side of the split, and are drawn together."""
+    """Cases of one group are not independent: they stay on one side of the split, and the bootstrap draws them as a
+    unit."""
     scored: np.ndarray
-    """Rows of the answer that count, or all."""
+    """Rows of the answer that are scored, or all."""
     board: str = ""
-    """What it slid on, or which kind of contact it had."""
+    """The board it slid on, or the kind of contact."""

@@ -1,4 +1,4 @@
-"""What every friction model offers, and the checks of its inputs."""
+"""The interface of every friction model, and the checks of its inputs."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ class ModelJacobians(NamedTuple):
 class StepJacobians(NamedTuple):
     """Derivatives of the results of `step`: the new state, and the wrench at the end of the step.
 
-    The shape of the patch is held fixed. Without load a step forgets its bristles: all is zero but `wrench_load`, the
-    wrench per unit load that the smallest load would have.
+    The shape of the patch is held fixed. Without load a step resets its bristles: all derivatives are zero except
+    `wrench_load`, which is the wrench per unit load in the limit of a small load.
     """
 
     state_state: np.ndarray
@@ -53,7 +53,7 @@ class StepJacobians(NamedTuple):
     wrench_state: np.ndarray
     """d wrench / d state: distributed `[..., 3, 2, N]`, reduced `[..., 3, 3]`, of P parts `[..., 3, P, 3]`."""
     wrench_twist: np.ndarray
-    """d wrench / d twist, `[..., 3, 3]`: what an implicit host adds to its mass over `dt`."""
+    """d wrench / d twist, `[..., 3, 3]`; an implicit simulator adds this, times `dt`, to its mass matrix."""
     wrench_load: np.ndarray
     """d wrench / d normal_force, `[..., 3]`."""
 
@@ -71,63 +71,64 @@ CREEP = 0.1
 
 @by_parts
 class PackedModel(NamedTuple):
-    """A model at R loads as the compiled solver sees it."""
+    """A model at R loads, in the form that the compiled solver reads."""
 
     functions: Any
     """Its `kernels.contacts.ModelFunctions`."""
     records: np.ndarray
-    """What the functions are given of the contact, a row of words for each load, `[R, words]` (`kernels.records`)."""
+    """Data of the contact for these functions, a row of words for each load, `[R, words]` (`kernels.records`)."""
     states: int
-    """Bristle states of a contact."""
+    """Number of bristle states of a contact."""
     workspace: int
-    """Numbers that a linearisation takes."""
+    """Number of values that a linearisation needs."""
     natural: np.ndarray
-    """Natural scale of each state, `[states]`: that of a full deflection."""
+    """Natural scale of each state, `[states]`: its value at full deflection."""
     radius: float
     """Lever arm [m] that turns the spin of the patch into a speed."""
     kept: tuple[np.ndarray, ...]
-    """Arrays whose addresses are in the records; who calls the functions keeps them."""
+    """Arrays whose addresses are in the records; the caller of the functions must keep them alive."""
     cells: np.ndarray | None = None
     """Which cells of the model have bristles here, bool `[N]`, where states are those of cells."""
     creep: float = CREEP
     """Natural scale of the body's velocity, as a share of v_s [-].
 
-    A body that is about to slip, or has just stopped, creeps at 1e-4 to 1e-2 of v_s, and friction goes by the direction
-    of its twist however slow it is: if errors are measured against v_s itself, that direction is noise, and a patch
-    that should just hold gives way, or the other way round."""
+    A body that is about to slip, or has just stopped, creeps at 1e-4 to 1e-2 of v_s, and friction depends on the
+    direction of its twist however slow it is. If errors were measured against v_s itself, that direction would be
+    noise, and a patch that just holds could give way, or the other way round.
+    """
 
 
 @by_parts
 class PackedSteps(NamedTuple):
-    """A model at R loads as `coupling` sees it, in P parts that share the twist and the load."""
+    """A model at R loads, in the form that `coupling` reads, in P parts that share the twist and the load."""
 
     records: np.ndarray
-    """What the model's function of `kernels.step_slopes` is given of each part, `[R, P, words]`."""
+    """Data of each part for the model's function of `kernels.step_slopes`, `[R, P, words]`."""
     shares: np.ndarray
-    """Of the parts in the load, `[R, P]`."""
+    """Share of the load that each part carries, `[R, P]`."""
     kept: tuple[np.ndarray, ...]
     """As in `PackedModel`."""
 
 
 @dataclass(frozen=True, eq=False)
 class FrictionModel(ByValue):
-    """A patch with a friction law; the caller holds the state.
+    """A contact patch with a friction law; the caller keeps the state.
 
     Twists and wrenches are about the contact frame's origin; the wrench acts on the moving body. Leading batch axes of
-    state, twist `[..., 3]`, normal_force `[...]` and dt `[...]` broadcast. The bristles of a contact without load
-    (`normal_force == 0`) go on moving while `rate` is integrated, as published; `step` and `simulate` forget them: a
-    contact that loses its load starts again from rest. Truth values are no numbers, for one contact as for many.
+    state, twist `[..., 3]`, normal_force `[...]` and dt `[...]` broadcast. Without load (`normal_force == 0`) the
+    bristles continue to move if `rate` is integrated, as published; `step` and `simulate` reset them, so that a contact
+    that loses its load starts again from rest. Booleans are not accepted as numbers.
 
-    Raises InvalidValueError where the patch is no ContactPatch, or the law none of bristles.
+    Raises InvalidValueError unless `patch` is a ContactPatch and `law` a law of bristles.
     """
 
     patch: ContactPatch
-    """Where the contact is, and how the load spreads over it."""
+    """Geometry of the contact, and how the load is distributed over it."""
     law: FrictionLaw
     """Law of the bristles, such as `LuGre`."""
 
     state_units: ClassVar[str] = "m"
-    """Units of the state: one for all of its components, or one for each."""
+    """Units of the state: one for all components, or one for each."""
 
     def __post_init__(self) -> None:
         if not isinstance(self.patch, ContactPatch):
@@ -150,17 +151,18 @@ class FrictionModel(ByValue):
         raise NotImplementedError
 
     def rest(self) -> np.ndarray:
-        """State of a contact at rest: no bristle is deflected."""
+        """State of a contact at rest, with relaxed bristles."""
         return np.zeros(self.state_shape)
 
     def with_law(self, law: FrictionLaw) -> Self:
-        """The same model with another law; what it has built of its patch is shared where no law has a say in it."""
+        """The same model with another law; precomputed properties of the patch that do not depend on the law are
+        shared."""
         return dataclasses.replace(self, law=law)
 
     def state_of(self, deflections: ArrayLike, normal_force: ArrayLike) -> np.ndarray:
-        """State of a contact at rest whose bristles are bent by `deflections` `[2, N]` [m] under a load > 0 [N].
+        """State of a contact at rest whose bristles have the `deflections` `[2, N]` [m] under a load > 0 [N].
 
-        Its wrench is that of the bristles, `-sum w_i B_i' sigma_0 z_i f_N`, whatever a model keeps of them.
+        Its wrench is that of the bristles, `-sum w_i B_i' sigma_0 z_i f_N`, whichever state variables a model uses.
 
         Raises InvalidValueError for deflections of another shape, a load that is not > 0, and a model that cannot start
         with a load.
@@ -172,13 +174,13 @@ class FrictionModel(ByValue):
         raise InvalidValueError("model", "be one that starts with a load: it has no _state_of", type(self).__name__)
 
     def packed(self, loads: Sequence[float | None], between: tuple[float, float] | None = None) -> PackedModel:
-        """The model at distinct `loads` [N], `[None]` where the patch does not depend on the load.
+        """The model at distinct `loads` [N] for the compiled solver; `[None]` if the patch does not depend on the load.
 
-        What a model needs to be simulated in a scene; the solver calls its functions by address. A patch that depends
-        on the load is packed as the run goes on: at loads `between` the lowest and the highest of the whole run, to
-        which bristles and natural scales belong; at as many of the first of `loads` as `ROOM` and `SPELL` allow, so
-        that there may be fewer records than loads, but one at least. Without `between`, these are all loads of the run,
-        and each has its record.
+        A model needs this to be simulated in a scene; the solver calls its functions by address. A patch that depends
+        on the load is packed during the run, in several calls: `between` gives the lowest and the highest load of the
+        whole run, which determine the bristles and the natural scales. As many of the first of `loads` are packed as
+        `ROOM` and `SPELL` allow, so there may be fewer records than loads, but at least one. Without `between`, these
+        are all loads of the run, and each has its record.
 
         Raises InvalidValueError for a model that cannot be simulated in a scene.
         """
@@ -187,7 +189,7 @@ class FrictionModel(ByValue):
 
     @property
     def step_function(self) -> Any:
-        """Its function of `kernels.step_slopes`.
+        """The model's function of `kernels.step_slopes`.
 
         Raises InvalidValueError for a model whose steps are not compiled.
         """
@@ -196,7 +198,8 @@ class FrictionModel(ByValue):
         )
 
     def packed_steps(self, loads: Sequence[float | None]) -> PackedSteps:
-        """The model at `loads` > 0 [N], `[None]` where the patch does not depend on the load, with all its states."""
+        """The model at `loads` > 0 [N], with all of its states, for `coupling`; `[None]` if the patch ignores the
+        load."""
         raise NotImplementedError
 
     @property

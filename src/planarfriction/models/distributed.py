@@ -23,14 +23,14 @@ from planarfriction.models.rates import linearised, rates
 
 @dataclass(frozen=True, eq=False)
 class DistributedModel(FrictionModel):
-    """Distributed LuGre friction, exact for the patch it is given.
+    """Distributed LuGre friction, exact for the given patch.
 
-    `zdot_i = v_i - beta sigma_0 |v_i| / g z_i`, `W = sum w_i f_N [t_i ; rho_i x t_i]`,
-    `t_i = -(sigma_0 z_i + sigma_1 zdot_i + sigma_2 v_i)`. State: bristle deflections `[2, N]` [m], x then y.
+    `zdot_i = v_i - beta sigma_0 |v_i| / g z_i`, `W = sum w_i f_N [t_i ; rho_i x t_i]`, `t_i = -(sigma_0 z_i + sigma_1
+    zdot_i + sigma_2 v_i)`. State: bristle deflections `[2, N]` [m], x then y.
 
-    A patch with a friction metric: `u_i = L_i v_i` takes the place of `v_i`, and `L_i t_i` that of `t_i`. Asymmetric
-    friction: the bristle decays towards `a_i g/sigma_0` instead of zero,
-    `zdot_i = u_i - k_i (z_i - a_i g/sigma_0)`, `k_i = beta sigma_0 |u_i|/g`, beta that of the bristle seen from there.
+    With a friction metric, `u_i = L_i v_i` replaces `v_i`, and `L_i t_i` replaces `t_i`. With asymmetric friction the
+    bristle decays towards `a_i g/sigma_0` instead of zero, `zdot_i = u_i - k_i (z_i - a_i g/sigma_0)`, `k_i = beta
+    sigma_0 |u_i|/g`, where beta depends on the deflection measured from there.
 
     Source: Waltersson and Karayiannidis 2024, section III.
     """
@@ -56,10 +56,11 @@ class DistributedModel(FrictionModel):
         return load[..., None] * self._rates(state, twist, load)[1]
 
     def step(self, state: Any, twist: Any, normal_force: Any, dt: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Advance by `dt` [s] at a held twist: the new state and the wrench at the end, stable at any `dt`.
+        """Advance by `dt` [s] at a constant twist; returns the new state and the wrench at the end. Stable at any `dt`.
 
-        Plain LuGre is linear in z and its step exact. Elasto-plastic: the exponential step with the mean decay of start
-        and predicted end, second order, kept within the largest deflection so that nothing overshoots.
+        Plain LuGre is linear in z, and its step is exact. Elasto-plastic bristles use an exponential step with the
+        average of the decay at the start and at the predicted end: second order, and limited to the largest deflection
+        so that nothing overshoots.
         """
         state, twist, load, dt = self._inputs(state, twist, normal_force, dt=dt)
         if self.patch.anisotropic:
@@ -80,7 +81,7 @@ class DistributedModel(FrictionModel):
         return out.reshape(state.shape), wrench.reshape(*batch, 3)
 
     def jacobians(self, state: Any, twist: Any, normal_force: Any) -> ModelJacobians:
-        """Analytic derivatives of `rate` and `wrench` (see `ModelJacobians`); at kinks a one-sided derivative."""
+        """Analytic derivatives of `rate` and `wrench` (see `ModelJacobians`); one-sided at kinks."""
         state, twist, load = self._inputs(state, twist, normal_force)
         law, identity = self.law.numbers, np.eye(2)[:, :, None]
         lin = linearised(self._of_all_cells(load), state.reshape(load.size, 2 * state.shape[-1]), twist.reshape(-1, 3))
@@ -106,7 +107,7 @@ class DistributedModel(FrictionModel):
         )
 
     def step_jacobians(self, state: Any, twist: Any, normal_force: Any, dt: Any) -> StepJacobians:
-        """Analytic derivatives of `step` (see `StepJacobians`); at kinks a one-sided derivative."""
+        """Analytic derivatives of `step` (see `StepJacobians`); one-sided at kinks."""
         state, twist, load, dt = self._inputs(state, twist, normal_force, dt=dt)
         if self.patch.anisotropic:
             return anisotropic.step_jacobians(self, state, self._cell_velocity(twist), load, dt)

@@ -1,4 +1,4 @@
-"""The reduced model: the moments of the bristle field, three states."""
+"""The reduced model: three states, which are moments of the bristle field."""
 
 from __future__ import annotations
 
@@ -40,20 +40,22 @@ class ReducedModel(ThreeStateModel):
     With `V_G = F V`, `|V_G|` the root mean square of the cells' speeds, and the patch's own steady state `z_ss(V)`, the
     sum over its cells at their own speeds: `zdot = V_G - beta (lambda (z - s z_ss) + s V_G)`, `s = z.z_ss/|z_ss|^2`,
     `lambda = |V_G|^2/(V_G.z_ss)`, `W = -F' (sigma_0 z + sigma_1 zdot + sigma_2 V_G) f_N`; beta as for one bristle, from
-    `|z|/|z_ss|` and the angle between z and z_ss. Exact: pre-sliding stiffness, viscous friction, steady sliding, and
-    translation. State: `(z_x, z_y, z_theta)` [m]; the third is the moment over the radius of gyration of the pressure.
+    `|z|/|z_ss|` and the angle between z and z_ss. Pre-sliding stiffness, viscous friction, steady sliding and
+    translation are exact. State: `(z_x, z_y, z_theta)` [m]; the third is the moment divided by the radius of gyration
+    of the pressure.
 
-    Each of several `parts` is a patch with moments of its own, state `[parts, 3]`. They see the same twist and share
-    the load; the wrench is the sum of theirs. As many parts as cells are the distributed model (docs/physics.md).
+    With several `parts`, each is a patch with moments of its own, and the state is `[parts, 3]`. They share the twist
+    and the load; the wrench is the sum of theirs. With as many parts as cells this is the distributed model
+    (docs/physics.md).
 
     `z_ss` comes from a stored map over direction and speed with continuous slopes. A patch that depends on the load has
-    maps at a ladder of loads, blended in between; they are built where loads are asked for (see `LoadFamily`). The
-    state is kept when the shape changes. Where one cell carries all but a millionth of the load, the contact is a point
+    maps at a series of loads, which are interpolated; they are computed when a load is needed (see `LoadFamily`). The
+    state is kept when the shape changes. If one cell carries all but a millionth of the load, the contact is a point
     without torque about it.
 
-    Friction that depends on the direction: `|V_G|` is the root mean square of `|B_i V|` (see `ContactPatch.levers`),
-    and `z_ss` sums `u/|u| + a`; an asymmetry takes maps of twice the size. It enters z_ss alone: bristles are measured
-    from z = 0, and not from `a g/sigma_0` as those of the distributed model are.
+    With direction-dependent friction, `|V_G|` is the root mean square of `|B_i V|` (see `ContactPatch.levers`), and
+    `z_ss` sums `u/|u| + a`; with an asymmetry the maps are twice as large. The asymmetry affects z_ss alone:
+    deflections are measured from z = 0, not from `a g/sigma_0` as in the distributed model.
 
     Raises InvalidValueError for a patch with all of its load on one cell, more parts than cells, and settings out of
     range.
@@ -65,17 +67,17 @@ class ReducedModel(ThreeStateModel):
 
     _: KW_ONLY
     parts: Any = 1
-    """Compact parts with moments and a map each: a count up to the cells that carry load, or "auto", which is taken as
-    6 for slender or separate shapes, 8 for others whose pressure peaks, else 4."""
+    """Number of compact parts, each with its own moments and map, up to the number of cells that carry load; "auto"
+    means 6 for slender or separate shapes, 8 for others whose pressure has a peak, else 4."""
     segments: int = 24
-    """Squares of the map along a quarter of a face of its cube; 24 leave errors of 1e-5 (median) of z_ss."""
+    """Squares of the map along a quarter of a face of its cube; 24 give a median error of 1e-5 of z_ss."""
     speeds: int = 16
-    """Nodes of the map over the speed, for the Stribeck part."""
+    """Number of speeds in the map, for the Stribeck effect."""
     load_error: float = 4e-3
-    """Largest error of z_ss from blending maps over the load, of each part relative to the whole patch [-]; 0 builds
-    a map for each load, which is slow."""
+    """Largest error of z_ss from interpolating maps over the load, of each part relative to the whole patch [-]; 0
+    computes a map for each load, which is slow."""
     labels: np.ndarray = field(init=False, repr=False, compare=False)
-    """Which part each cell belongs to, `[N]`."""
+    """Part to which each cell belongs, `[N]`."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -95,7 +97,7 @@ class ReducedModel(ThreeStateModel):
 
     @property
     def state_shape(self) -> tuple[int, ...]:
-        """`(3,)`, of several parts `(parts, 3)`."""
+        """`(3,)`, or `(parts, 3)` with several parts."""
         return (3,) if self.parts == 1 else (self.parts, 3)
 
     def shape_at(self, normal_force: float | None) -> ReducedShape:
@@ -103,7 +105,7 @@ class ReducedModel(ThreeStateModel):
         return self.shapes_at([normal_force])[0]
 
     def shapes_at(self, loads) -> list[ReducedShape]:
-        """`shape_at` of many loads [N], which costs less than one by one.
+        """`shape_at` for many loads [N] at once, which is cheaper than one by one.
 
         Raises InvalidValueError for a model in parts, and for loads that are not > 0.
         """
@@ -112,14 +114,14 @@ class ReducedModel(ThreeStateModel):
         return self._parts[0].at(self._checked(loads))
 
     def parts_at(self, normal_force: float | None) -> tuple[Part, ...]:
-        """Share of the load and shape of each part at a load [N]; recent loads are remembered."""
+        """Share of the load and shape of each part at a load [N]; recent loads are cached."""
         if not self.patch.depends_on_load:
             return self._fixed_parts
         return self._parts_together([normal_force])[0]
 
     @property
     def load_rungs(self) -> list[float]:
-        """Loads [N] at which maps have been built so far, of a patch that depends on the load."""
+        """Loads [N] for which maps have been computed so far, if the patch depends on the load."""
         return sorted({load for part in self._parts for load in part.rungs})
 
     def _checked(self, loads) -> list[float | None]:

@@ -75,17 +75,17 @@ def axes_of(root: np.ndarray) -> np.ndarray:
 class ReducedModelPublished(ThreeStateModel):
     """Reduced LuGre friction: three bristles, conjugate to the wrench at the centre of pressure, and a limit surface.
 
-    With `S = diag(1, 1, r)`, `V_S = S V`, `v_n = |V_S|` and `h(V)` the direction of the sliding wrench:
-    `zdot = S h v_n - beta sigma_0 v_n / g(v_n) z`, `W = -(sigma_0 z + sigma_1 zdot + sigma_2 U V) f_N`,
-    `U = diag(1, 1, <rho^2>)`. State: `(z_x, z_y, z_tau)` [m, m, m^2].
+    With `S = diag(1, 1, r)`, `V_S = S V`, `v_n = |V_S|` and `h(V)` the direction of the sliding wrench: `zdot = S h v_n
+    - beta sigma_0 v_n / g(v_n) z`, `W = -(sigma_0 z + sigma_1 zdot + sigma_2 U V) f_N`, `U = diag(1, 1, <rho^2>)`.
+    State: `(z_x, z_y, z_tau)` [m, m, m^2].
 
-    A patch that depends on the load: `on_load_change="rebuild"` follows the load with everything, `"rescale"` keeps the
-    limit surface and `<rho^2>` of `surface.normal_force` and lets only `r` (and the centre of pressure) follow,
-    `"keep"` keeps all. The raw state is kept when `r` changes. Where one cell carries all but a millionth of the load,
-    the contact is a point without torque about it; what `z_tau` was there then stays, without effect.
+    For a patch that depends on the load, `on_load_change="rebuild"` recomputes everything for each load, `"rescale"`
+    keeps the limit surface and `<rho^2>` of `surface.normal_force` and updates only `r` (and the centre of pressure),
+    and `"keep"` keeps everything. The raw state is kept when `r` changes. If one cell carries all but a millionth of
+    the load, the contact is a point without torque about it; `z_tau` then keeps its value, without effect.
 
-    Raises InvalidValueError for a surface that is none, and one without the `normal_force` that its `on_load_change`
-    needs.
+    Raises InvalidValueError if `surface` is not a limit surface, and if it lacks the `normal_force` that
+    `on_load_change` needs.
 
     Source: Waltersson and Karayiannidis 2024, section IV.
     """
@@ -95,9 +95,9 @@ class ReducedModelPublished(ThreeStateModel):
     state_units = "m, m, m^2"
 
     surface: LimitSurface = None  # pyright: ignore[reportAssignmentType]
-    """Limit surface; None takes the published table of the patch."""
+    """Limit surface; None uses the published table of the patch."""
     on_load_change: str = "rebuild"
-    """What follows the load where the patch depends on it: "rebuild", "rescale" or "keep"."""
+    """What is updated when the load changes the shape of the patch: "rebuild", "rescale" or "keep"."""
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -113,7 +113,7 @@ class ReducedModelPublished(ThreeStateModel):
             )
 
     def shape_at(self, normal_force: float) -> PublishedShape:
-        """Centre of pressure, `r`, `<rho^2>` and limit surface at a load [N]; recent loads are remembered.
+        """Centre of pressure, `r`, `<rho^2>` and limit surface at a load [N]; recent loads are cached.
 
         Raises InvalidValueError for a load that is not > 0.
         """

@@ -1,4 +1,4 @@
-"""Few cells that stand for many: same moments of the pressure, same wrench of a spin, nearly the same limit surface.
+"""A few cells that represent many: same moments of the pressure, same wrench of a spin, nearly the same limit surface.
 
 Start from all cells and drop those with the least weight, a tenth at a time. After each round the weights x that are
 left are found anew, as near as possible to the limit surface of the weights w of all cells:
@@ -103,11 +103,12 @@ def compressed(
 
 
 def surface_error(patch: ContactPatch, few: ContactPatch, normal_force: ArrayLike | None = None) -> float:
-    """Largest relative error of the dissipation of `few` against that of `patch`, over twists of all directions [-].
+    """Largest relative error of the dissipation of `few` compared with that of `patch`, over twists of all directions
+    [-].
 
     Twists are spread evenly over the sphere of `(vx, vy, omega r)` about the centre of pressure.
 
-    Raises InvalidValueError where either is no ContactPatch.
+    Raises InvalidValueError unless both are ContactPatches.
     """
     for name, each in (("patch", patch), ("few", few)):
         if not isinstance(each, Anisotropy):

@@ -1,4 +1,4 @@
-"""The contact patch: where the cells are, how large they are, and how the normal load spreads over them."""
+"""The contact patch: the positions and areas of its cells, and how the normal load is distributed over them."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ MOST_DEGREE = 40
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ContactPatch(Anisotropy):
-    """A flat contact: N cells at `rho_i` with areas `a_i`, and a pressure that gives them their weights.
+    """A flat contact: N cells at `rho_i` with areas `a_i`, and a pressure that determines their weights.
 
     `w_i = p_i a_i / sum(p a)`, so that `sum(w) = 1` and cell i carries the normal force `w_i f_N`.
 
@@ -58,13 +58,13 @@ class ContactPatch(Anisotropy):
     pressure: Any = field(default_factory=Uniform)
     """Pressure law."""
     grid: Grid | None = None
-    """The regular grid that the cells were cut from, or None."""
+    """Regular grid from which the cells were cut, or None."""
     name: str = "patch"
     """Name for plots and tables."""
     cell_size: tuple[float, float] | None = None
-    """Width and height of a whole cell [m], its load spread evenly over it; None for points (lines: one is 0)."""
+    """Width and height of a whole cell [m], with its load spread evenly over it; None for points (lines: one is 0)."""
     outline: outlines.Outline | None = field(init=False, default=None)
-    """Outline that the class methods cut the cells from; None for other cells."""
+    """Outline from which the class methods cut the cells; None for other cells."""
     _fixed_weights: np.ndarray | None = field(init=False, default=None, compare=False)
 
     def __post_init__(self) -> None:
@@ -105,10 +105,10 @@ class ContactPatch(Anisotropy):
 
     @classmethod
     def disc(cls, radius: float, cells: int = 21, *, pressure: Any = None, name: str = "disc") -> ContactPatch:
-        """Disc of `radius` [m] about the origin on a grid of `cells` x `cells`, its rim cutting the cells.
+        """Disc of `radius` [m] about the origin on a grid of `cells` x `cells`; cells at the rim are cut.
 
-        Cells at the rim have the area inside it, and the centroid of that part as position. Raises InvalidValueError
-        for a parameter that breaks its rule.
+        A cut cell has the area of its part inside the disc, and its position is the centroid of that part. Raises
+        InvalidValueError for a parameter that breaks its rule.
         """
         radius = validation.positive("radius", radius)
         return outlines.clipped(cls, outlines.RoundOutline(0.0, radius), Grid.square(2 * radius, cells), pressure, name)
@@ -120,8 +120,8 @@ class ContactPatch(Anisotropy):
         """The published disc mask: whole cells of a grid `2 radius` [m] wide, within `cells // 2` cells of the centre.
 
         Distances are between cell centres and `cells` is odd, so the size of the mask depends on it: 317 of 21 x 21
-        cells have the area of a disc of radius 10.05 cells, not 10.5. To reproduce; `disc` is the true disc. Raises
-        InvalidValueError for an even number of cells.
+        cells have the area of a disc with a radius of 10.05 cells, not 10.5. Use it for reproduction; `disc` is the
+        true disc. Raises InvalidValueError for an even number of cells.
         """
         grid = Grid.square(2 * validation.positive("radius", radius), cells)
         if grid.columns % 2 == 0:
@@ -234,13 +234,14 @@ class ContactPatch(Anisotropy):
     def from_pressure(
         cls, pressure: Any, cell_size: float | Sequence[float], *, loads: Any = None, name: str | None = None
     ) -> ContactPatch:
-        """Patch of a measured pressure map: an array `[rows, columns]`, or the path of a CSV, NPY or grey image file.
+        """Patch from a measured pressure map: an array `[rows, columns]`, or the path of a CSV, NPY or grey image file.
 
         **Row 0 is the top** (largest y), column 0 the left; the middle of the map is the origin. `cell_size` [m] is the
         side of a cell or `(width, height)`. Only ratios of the pressures matter. Cells without pressure are dropped.
 
-        Maps measured at several loads: a mapping `{load [N]: map}`, or a list of maps (a stack `[L, rows, columns]`)
-        with their `loads` `[L]`; see `PressureMaps`. Raises FileError, InvalidValueError for what is no map.
+        For maps measured at several loads, give a mapping `{load [N]: map}`, or a list of maps (a stack `[L, rows,
+        columns]`) with their `loads` `[L]`; see `PressureMaps`. Raises FileError or InvalidValueError if this is not a
+        pressure map.
         """
         law, (rows, columns), file = read_maps(pressure, loads)
         size = validation.numbers("cell_size", cell_size)
@@ -251,10 +252,10 @@ class ContactPatch(Anisotropy):
         return cls(grid.centres(), np.full(rows * columns, grid.cell_area), law, grid, name)
 
     def refined(self, parts: int) -> ContactPatch:
-        """The same patch with every cell cut into `parts` x `parts` (a cell of a line into `parts`).
+        """The same patch with every cell divided into `parts` x `parts` (a cell of a line into `parts`).
 
-        Pressure laws are evaluated at the new cells, numbers per cell are repeated. Cells that a rim cuts are replaced
-        by cells of the same area and centroid. Points stay points. Raises InvalidValueError for too many cells.
+        Pressure laws are evaluated at the new cells; numbers per cell are repeated. Cells cut by a rim are replaced by
+        cells of the same area and centroid. Points remain points. Raises InvalidValueError for too many cells.
         """
         from planarfriction.patch.refinement import refined
 
@@ -263,11 +264,11 @@ class ContactPatch(Anisotropy):
     def compressed(
         self, degree: int = 5, *, cells: int | None = None, error: float | None = None, loads: Any = None
     ) -> ContactPatch:
-        """A few of the cells with new weights: all moments up to `degree` kept, the limit surface nearly.
+        """A few of the cells with new weights, with the same moments up to `degree` and nearly the same limit surface.
 
-        At most `cells` (default: 45, as many as moments of `degree + 3`); the patch itself where it has no more.
-        `error` raises the degree until no dissipation is off by more than that share. Shapes that depend on the load
-        need `loads`, (lowest, highest) [N]; see `patch.compressed`.
+        At most `cells` (default: 45, the number of moments up to `degree + 3`); if the patch has no more, it is
+        returned unchanged. `error` raises the degree until the relative error of every dissipation is below it. Shapes
+        that depend on the load need `loads`, (lowest, highest) [N]; see `patch.compressed`.
         """
         from planarfriction.patch.compressed import compressed
 
@@ -319,7 +320,8 @@ class ContactPatch(Anisotropy):
     def contact_radius(self, normal_force: ArrayLike | None = None) -> float | np.ndarray:
         """Contact radius `r = sum(w |rho - CoP|)` [m]: a pure spin about the CoP has the friction torque `mu f_N r`.
 
-        With a friction metric `sum(w |L J (rho - CoP)|)`, J a quarter turn; the second moment alike.
+        With a friction metric it is `sum(w |L J (rho - CoP)|)`, where J is a quarter turn, and the second moment
+        changes in the same way.
         """
         weights, *offset = self._about_centre_of_pressure(normal_force)
         return (weights * np.hypot(*self.lever_coordinates(*offset))).sum(-1)
@@ -395,5 +397,5 @@ class ContactPatch(Anisotropy):
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> ContactPatch:
-        """The patch that `to_dict` described; unknown and missing keys are errors that name them."""
+        """Restore the patch that `to_dict` described; unknown and missing keys raise an error that names them."""
         return plain_data.from_dict(cls, data)

@@ -28,13 +28,13 @@ GREY_MODES = ("1", "L", "I", "F", "I;16", "I;16B", "I;16L", "I;16N")
 def read_pressure_map(path: str | Path) -> np.ndarray:
     """Read a map of relative pressures, shape `[rows, columns]`, row 0 at the top.
 
-    The suffix tells the kind: `.csv` (numbers separated by commas, no header, lines that begin with # are skipped),
-    `.npy` (a two-dimensional array), or a grey image (brightness is pressure, black is none).
+    The suffix determines the format: `.csv` (numbers separated by commas, no header, lines that begin with # are
+    skipped), `.npy` (a two-dimensional array), or a grey image (brightness is pressure, black is none).
 
     Raises
     ------
     FileError
-        The file is missing, of an unknown kind, or does not hold what its suffix says.
+        The file is missing, of an unknown format, or does not contain what its suffix says.
     """
     path = validation.path("path", path)
     readers = {".csv": _read_csv, ".npy": _read_npy, **dict.fromkeys(IMAGE_SUFFIXES, _read_image)}

@@ -1,4 +1,4 @@
-"""The regular grid that the cells of a patch were cut from."""
+"""The regular grid from which the cells of a patch are cut."""
 
 from __future__ import annotations
 

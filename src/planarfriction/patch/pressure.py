@@ -1,4 +1,4 @@
-"""Pressure laws: how the normal load spreads over a patch. Only ratios matter, the patch scales to the load."""
+"""Pressure laws: how the normal load is distributed over a patch. Only ratios matter; a patch scales them to the load."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Pressure:
     """Base of the pressure laws: a relative pressure at each position, which may depend on the normal force."""
 
     law: ClassVar[str] = ""
-    """Name of the law in plain data."""
+    """Name of the law in files."""
 
     @property
     def depends_on_load(self) -> bool:
@@ -42,11 +42,11 @@ class Pressure:
         return self.relative(positions) > 0.0
 
     def only(self, kept: np.ndarray) -> Pressure:
-        """The law for those cells of a patch that are `kept`, `[N]` of bool."""
+        """The law for the cells of a patch that are `kept`, `[N]` of bool."""
         return self
 
     def repeated(self, times: int) -> Pressure:
-        """The law for a patch whose cells are each cut into `times` new ones."""
+        """The law for a patch whose cells are each divided into `times` new ones."""
         return self
 
     def to_dict(self) -> dict[str, Any] | list[float]:
@@ -59,7 +59,7 @@ class Pressure:
     def from_dict(data: Mapping[str, Any]) -> Pressure:
         """The law described by `{"law": name, parameter: value, ...}`.
 
-        Raises InvalidValueError for what is no such table, and for a law that is not there.
+        Raises InvalidValueError if this is not such a table, or the law does not exist.
         """
         from planarfriction.patch.pressure_maps import PressureMaps
 
@@ -87,9 +87,9 @@ class Uniform(Pressure):
 @described
 @dataclass(frozen=True)
 class LinearGradient(Pressure):
-    """Pressure that grows linearly over the patch: `p ~ 1 + gx x + gy y`.
+    """Pressure that changes linearly over the patch: `p ~ 1 + gx x + gy y`.
 
-    A patch on which it would be negative somewhere is refused when it is made.
+    A patch on which it would be negative anywhere is refused.
 
     Raises InvalidValueError for gradients that are not finite.
     """
@@ -127,11 +127,11 @@ class SoftFinger(Pressure):
     n: float = 0.0
     """Growth of the radius with the load [-]: 1/3 for Hertz contact, 0 for a radius that does not grow."""
     k: float | None = None
-    """Exponent of the profile [-]: 2 for Hertz contact, the larger the flatter."""
+    """Exponent of the profile [-]: 2 for Hertz contact; larger values give a flatter profile."""
     k_per_newton: float | None = None
     """Exponent of the profile per normal force [1/N]."""
     radius_max: float | None = None
-    """Radius that the contact cannot outgrow [m], or None."""
+    """Largest radius [m], or None."""
 
     def __post_init__(self) -> None:
         if (self.k is None) == (self.k_per_newton is None):

@@ -30,7 +30,7 @@ class PressureMaps(ByValue, Pressure):
     loads: Any
     """Normal forces of the measurements, ascending, shape `[L]` [N]."""
     values: Any
-    """Pressures as given, each map at its own scale, shape `[L, N]`: kept as they are, so that files restore them."""
+    """Pressures as given, each map at its own scale, shape `[L, N]`; not rescaled, so that files restore them."""
 
     def __post_init__(self) -> None:
         loads = validation.array("loads", self.loads, (None,))

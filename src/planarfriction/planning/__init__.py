@@ -1,4 +1,4 @@
-"""Plans: what to do with a grip, or with a pusher, so that a part ends where it should."""
+"""Planning of grip forces and pushes that bring an object to a goal."""
 
 from planarfriction.planning.contact_modes import motion_cone
 from planarfriction.planning.grip import GripPlan, plan_grip

@@ -1,8 +1,9 @@
-"""Which way a slider goes at this instant: it sticks to the pusher, or the pusher slides left or right along it.
+"""Instantaneous motion of a pushed slider: it sticks to the pusher, or the pusher slides left or right along it.
 
-A force `f` at a place of the slider has the wrench `F = (f, r x f)`; friction balances it, so that the twist is normal
-to the limit surface at F. The velocity of that place turns with the force, monotonically, since it is the normal to a
-section of the convex surface: the forces of the pusher's friction cone have the velocities of the **motion cone**.
+A force `f` at a point of the slider has the wrench `F = (f, r x f)`. Friction balances it, so the twist is normal to
+the limit surface at F. The velocity of that point turns monotonically with the force, since it is the normal to a
+section of the convex surface: the forces of the pusher's friction cone correspond to the velocities of the **motion
+cone**.
 """
 
 from __future__ import annotations
@@ -56,11 +57,12 @@ class Motion(NamedTuple):
 
 
 def motion_cone(surface: LimitSurface, at: ArrayLike, normal: ArrayLike, mu: float) -> np.ndarray:
-    """Edges of the motion cone `[2, 2]`: velocities of a slider's place for the friction cone's right and left edge.
+    """Edges of the motion cone `[2, 2]`: velocities of a point of the slider for the right and left edge of the
+    friction cone.
 
-    Velocities of the pusher between the two make it stick, others slide along the slider, which then moves as on the
-    nearer edge. `at` `[2]` [m] is the place, `normal` `[2]` the direction into the slider, in the axes of the surface;
-    unit vectors come back.
+    If the velocity of the pusher is between the two, it sticks; otherwise it slides along the slider, which then moves
+    as on the nearer edge. `at` `[2]` [m] is the point, `normal` `[2]` the direction into the slider, in the axes of the
+    surface; the result are unit vectors.
 
     Raises `InvalidValueError` for arguments out of range.
 

@@ -1,4 +1,4 @@
-"""Profiles of a grip force that let a held body turn or slide by as much as wanted, and then hold it."""
+"""Profiles of a grip force that let a held body turn or slide by a given amount, and then hold it."""
 
 from __future__ import annotations
 
@@ -36,24 +36,25 @@ MOST_KNOTS = 200
 
 @dataclass(frozen=True, eq=False, repr=False)
 class GripPlan(ByValue):
-    """A grip force over time that brings a body where it should be, and what becomes of it."""
+    """A grip force over time that brings a body to its goal, and the resulting motion."""
 
     scene: Scene
-    """The scene with the profile in place: `simulate(plan.scene)` runs the plan."""
+    """The scene with the planned grip: `simulate(plan.scene)` runs the plan."""
     signal: Signal
-    """Normal force of one of the identical contacts [N], lines between its knots, held after the last."""
+    """Normal force of one of the identical contacts [N], linear between its knots, constant after the last."""
     report: GripReport
-    """What the plan reaches, as the scene is and with other frictions."""
+    """What the plan achieves, with the scene's friction and with other values."""
     contact: str
     """Name of the contact that was planned."""
     frictions: tuple[Scene, ...] = field(default=(), compare=False)
-    """The plan with the frictions of the report."""
+    """Simulations of the plan with each friction of the report."""
 
     def __repr__(self) -> str:
         return str(self.report)
 
     def plot(self) -> Any:
-        """Draw the profile and the motion, as the scene is and with other frictions; returns a matplotlib Figure."""
+        """Draw the profile and the motion, with the scene's friction and with other values; returns a matplotlib
+        Figure."""
         from planarfriction.plots.planning import plot_grip
 
         return plot_grip(self)
@@ -70,34 +71,35 @@ def plan_grip(
     friction: float = 0.05,
     aim: str = "nominal",
 ) -> GripPlan:
-    """Plan the normal force of a contact so that a body that it holds turns or slides by as much as wanted, and stops.
+    """Plan the normal force of a contact so that the body it holds turns or slides by a given amount, and stops.
 
-    The load moves the body, friction brakes it. The search begins with profiles that let it go at a few levels below
-    the load that holds it, until the time that makes the goal (a root of one number), takes the best of them, and bends
-    its knots by least squares with the derivatives of `scene_sensitivities`.
+    The load on the body drives it, and friction brakes it. The search starts with profiles that release the body at a
+    few levels below the holding load, for the time that reaches the goal (a root of one variable). It takes the best of
+    them, and improves its knots by least squares with the derivatives of `scene_sensitivities`.
 
     Parameters
     ----------
     scene
         A free body, its contacts and the duration. With `start="equilibrium"` the grip begins with the scene's own
-        normal force, which has to hold the body; with bristles at rest it begins as is best.
+        normal force, which must hold the body; with relaxed bristles it may begin with any value.
     goal
-        `{"angle": radians}`: turn by that angle, and slide as little as can be; or `{"slide": (dx, dy)}`: slide by that
-        much [m], world axes, and turn as little as can be. Slide is that of the place under the grip.
+        `{"angle": radians}`: turn by that angle and slide as little as possible; or `{"slide": (dx, dy)}`: slide by
+        that distance [m], world axes, and turn as little as possible. Slide is the displacement of the point under the
+        grip.
     contact
         Name of the contact whose normal force is planned; None takes the only one.
     knots
-        How many, evenly over the first three quarters or the first fifth of the duration, whichever does better; or
-        their times [s]. The last value is held.
+        Number of knots, spread evenly over the first three quarters or the first fifth of the duration, whichever is
+        better; or their times [s]. The last value is held.
     bounds
         Least and largest normal force [N]; None for 0.02 and 4 times the load that holds the body.
     margin
-        By how much, as a share, the last knot and all in the last quarter of the duration exceed at least the
-        `holding_load` with mu_c at the goal.
+        Share by which the last knot, and all knots in the last quarter of the duration, must exceed the `holding_load`
+        with mu_c at the goal.
     friction
-        Uncertainty of mu_c and mu_s, as a share: the report says what it does.
+        Uncertainty of mu_c and mu_s, as a share; the report shows its effect.
     aim
-        "nominal": the goal as the scene is; "worst": the least that the worst of the frictions misses.
+        "nominal": reach the goal with the scene's friction; "worst": minimise the error for the worst of the frictions.
 
     Raises
     ------

@@ -18,12 +18,12 @@ def holding_load(wrench: ArrayLike, patch: ContactPatch, mu: float, margin: floa
     """Smallest normal force [N] whose friction holds a load `wrench` `(fx, fy, tau)` [N, N, N m] on a contact.
 
     The load acts on the body, about the origin of the contact frame. Friction can be anything inside the limit surface:
-    `f_N = max_V (wrench . V) / (mu Phi(V))`, which the twist V normal to the surface attains. A patch that follows its
-    load has the smallest root of `f_N = f_N(shape at f_N)`. The result is larger by the share `margin`; it is 0 without
-    a load.
+    `f_N = max_V (wrench . V) / (mu Phi(V))`, which is attained by the twist V normal to the surface. For a patch that
+    depends on the load, it is the smallest root of `f_N = f_N(shape at f_N)`. The result is increased by the share
+    `margin`; it is 0 without a load.
 
-    Take mu_s for what just holds and mu_c for what also stops. Raises `InvalidValueError` where the patch cannot hold
-    the load however hard it is pressed (a torque on a single point).
+    Use mu_s for a body that must just be held, and mu_c for one that must also be stopped. Raises `InvalidValueError`
+    if the patch cannot hold the load however hard it is pressed (a torque on a single point).
 
     Source: Goyal, Ruina, Papadopoulos 1991.
     """

@@ -1,4 +1,4 @@
-"""Open-loop pushes to a pose: a pusher that sticks, and the forces of its friction cone that lead there."""
+"""Open-loop pushes to a pose, with a pusher that sticks and forces inside its friction cone."""
 
 from __future__ import annotations
 
@@ -46,26 +46,26 @@ REACHED = 1e-6
 @described
 @dataclass(frozen=True)
 class PushReport:
-    """What a plan of a push reaches."""
+    """What a plan of a push achieves."""
 
     goal: tuple[float, float, float]
-    """What was wanted [m, m, rad]."""
+    """Goal [m, m, rad]."""
     end: tuple[float, float, float]
-    """Where the push ends that follows the path [m, m, rad]."""
+    """Final pose of a push that follows the path [m, m, rad]."""
     ellipsoid_end: tuple[float, float, float]
-    """Where it ends if the patch's limit surface is its ellipsoid [m, m, rad]."""
+    """Final pose if the limit surface of the patch were its ellipsoid [m, m, rad]."""
     edge: int
-    """Edge of the outline that is pushed: it begins at the corner of this number, counter-clockwise."""
+    """Number of the edge that is pushed; edge j begins at corner j, counter-clockwise."""
     place: tuple[float, float]
-    """Where, in the slider's axes [m]."""
+    """Point that is pushed, in the slider's axes [m]."""
     length: float
     """Length of the pusher's path [m]."""
     used: float
-    """Share of the friction cone's half angle that the plan uses at most [-]."""
+    """Largest share of the friction cone's half angle that the plan uses [-]."""
     sticks: bool
     """Whether the pusher sticks all the way."""
     wall_time: float
-    """Time that the plan took [s]."""
+    """Computing time of the plan [s]."""
 
     def __str__(self) -> str:
         rows = (("wanted", self.goal), ("reached", self.end), ("with an ellipsoid", self.ellipsoid_end))
@@ -82,9 +82,9 @@ class PushPlan(ByValue):
     path: Signal
     """Position of the pusher over time, at unit speed `[K, 2]` [m]."""
     push: Push
-    """The push that follows it."""
+    """The simulated push along this path."""
     report: PushReport
-    """What it reaches."""
+    """What the plan achieves."""
 
     def __repr__(self) -> str:
         return str(self.report)
@@ -103,18 +103,18 @@ def plan_push(
     margin: float = 0.2,
     edges: Sequence[int] | None = None,
 ) -> PushPlan:
-    """A short path of a point pusher that brings a slider to the pose `goal` `(x, y, theta)` [m, m, rad].
+    """Plan a short path of a point pusher that brings a slider to the pose `goal` `(x, y, theta)` [m, m, rad].
 
-    A pusher that sticks keeps its place on the slider, and a constant force in the slider's axes gives a constant twist
-    there, on every limit surface. So a plan is three parts of constant force, each within the friction cone but for a
-    `margin` of its half angle, whose motions are arcs; angles and lengths are found by shooting (SciPy) from
-    turns to either side, on the middle of each edge (or beside it), and the shortest is taken. As with a car that only
-    goes forward, a goal beside or behind takes a long way round.
+    A sticking pusher stays at one point of the slider, and a constant force in the slider's axes then gives a constant
+    twist, on every limit surface. A plan has three parts of constant force, each within the friction cone reduced by a
+    `margin` of its half angle; their motions are arcs. Angles and lengths are found by shooting (SciPy), starting from
+    turns to either side, at the middle of each edge (or beside it), and the shortest plan is returned. As with a car
+    that only drives forward, a goal beside or behind the slider needs a long path.
 
     `start` is the first pose, `edges` the edges that may be pushed (all by default).
 
-    Raises `InvalidValueError` for arguments out of range and a pusher without friction or with a face, `SolverError`
-    where no plan is found.
+    Raises `InvalidValueError` for arguments out of range and a pusher without friction or with a face, `SolverError` if
+    no plan is found.
 
     Source: Lynch and Mason 1996.
     """

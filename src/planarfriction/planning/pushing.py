@@ -1,4 +1,4 @@
-"""Quasi-static pushes: the path of a slider under the path of a pusher, with what the contact does at each instant."""
+"""Quasi-static pushes: the path of a slider for a given path of a pusher, with the contact mode at each instant."""
 
 from __future__ import annotations
 
@@ -33,12 +33,12 @@ MOST_PHASES = 2_000
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Push(ByValue):
-    """Where a slider goes, and how."""
+    """The motion of a pushed slider, and its contact with the pusher."""
 
     slider: Slider
-    """What was pushed."""
+    """The slider."""
     pusher: Pusher
-    """What pushed it."""
+    """The pusher."""
     time: np.ndarray
     """Instants `[T]` [s]."""
     pose: np.ndarray
@@ -46,9 +46,9 @@ class Push(ByValue):
     pusher_pose: np.ndarray
     """Pose of the pusher `[T, 3]` [m, m, rad]."""
     mode: np.ndarray
-    """"stick", "slide left", "slide right" (as the pusher looks) or "free", `[T]`."""
+    """"stick", "slide left", "slide right" (as seen from the pusher) or "free", `[T]`."""
     place: np.ndarray
-    """Where it is touched, in its own axes `[T, 2]` [m]; NaN where it is not. Of a face that lies flush the middle."""
+    """Point of contact in the slider's axes `[T, 2]` [m], NaN without contact; the middle of a face that lies flush."""
 
     @property
     def end(self) -> np.ndarray:
@@ -76,27 +76,28 @@ def push(
     samples: int = 101,
     rtol: float = 1e-7,
 ) -> Push:
-    """Follow a slider that is pushed slowly: at every instant friction balances the pusher, inertia plays no part.
+    """Predict the motion of a slider that is pushed slowly: friction balances the pusher at every instant, without
+    inertia.
 
-    The twist is normal to the limit surface where the pusher's wrench meets it; the pusher sticks while its velocity is
-    within the motion cone and slides along the slider otherwise. A face that lies flush sticks or slides too, or turns
-    about the end where its pressure is. A pusher that goes away leaves the slider where it is.
+    The twist is normal to the limit surface where the pusher's wrench meets it. The pusher sticks while its velocity is
+    inside the motion cone, and slides along the slider otherwise. A face that lies flush sticks or slides too, or turns
+    about the end that carries its pressure. A pusher that moves away leaves the slider where it is.
 
     Parameters
     ----------
     slider, pusher
-        What is pushed, and what pushes it.
+        The object, and what pushes it.
     path
-        Pose of the pusher over time, lines between its samples: `(x, y)` `[K, 2]` [m] of a point, `(x, y, angle)`
-        `[K, 3]` [m, m, rad] of a face, which looks along its own x axis. Only the way counts, not the speed.
+        Pose of the pusher over time, linear between its samples: `(x, y)` `[K, 2]` [m] of a point, `(x, y, angle)` `[K,
+        3]` [m, m, rad] of a face, which faces along its own x axis. Only the path matters, not the speed.
     start
         First pose `(x, y, theta)` of the slider's frame [m, m, rad].
     samples
-        Instants that are recorded, spread evenly over the path, both ends included.
+        Number of recorded instants, spread evenly over the path, including both ends.
     rtol
         Relative tolerance of each step of the integration.
 
-    Raises `InvalidValueError` for arguments out of range and a pusher that begins within the slider.
+    Raises `InvalidValueError` for arguments out of range and a pusher that begins inside the slider.
 
     Source: Mason 1986; Goyal, Ruina and Papadopoulos 1991; Lynch, Maekawa and Tanie 1992.
     """

@@ -1,4 +1,4 @@
-"""What a grip plan reaches, in numbers and as a table."""
+"""What a grip plan achieves, in numbers and as a table."""
 
 from __future__ import annotations
 
@@ -13,38 +13,38 @@ from planarfriction.equality import ByValue
 
 @dataclass(frozen=True, eq=False, repr=False)
 class GripReport(ByValue):
-    """What a plan reaches as the scene is and with F other frictions, and what it took."""
+    """What a plan achieves with the scene's friction and with F other values, and how long it took."""
 
     goal: dict[str, Any]
-    """What was wanted, as given."""
+    """The goal as given."""
     angle: float
-    """How far the body turns [rad]."""
+    """Angle by which the body turns [rad]."""
     slide: np.ndarray
-    """How far the place under the grip moves away from it `[2]`, world axes [m]."""
+    """Displacement `[2]` of the point of the body under the grip, world axes [m]."""
     speed: float
-    """Speed of that place at the end [m/s]."""
+    """Speed of that point at the end [m/s]."""
     grip: float
     """Normal force at the end [N]."""
     holding: float
-    """Normal force that would just hold the body there [N]."""
+    """Smallest normal force that would hold the body there [N]."""
     frictions: np.ndarray
     """Factors on mu_c and mu_s, ascending `[F]`."""
     angles: np.ndarray
-    """How far the body turns with each `[F]` [rad]."""
+    """Angle by which the body turns with each friction `[F]` [rad]."""
     slides: np.ndarray
-    """How far it slides with each `[F, 2]` [m]."""
+    """Slide with each friction `[F, 2]` [m]."""
     per_percent: float
-    """By how much one percent of friction moves the goal's own quantity: angle [rad] or slide [m]."""
+    """Change of the goal's quantity per percent of friction: angle [rad] or slide [m]."""
     simulations: int
-    """Simulations that the plan took."""
+    """Number of simulations."""
     jacobians: int
-    """Derivatives by all knots that it took."""
+    """Number of Jacobians with respect to all knots."""
     wall_time: float
-    """Time that it took [s]."""
+    """Computing time [s]."""
 
     @property
     def spread(self) -> float:
-        """Largest miss of the goal over all frictions: angle [rad] or slide [m]."""
+        """Largest error of the goal over all frictions: angle [rad] or slide [m]."""
         if "angle" in self.goal:
             return float(np.abs(self.angles - self.goal["angle"]).max())
         return float(np.hypot(*(self.slides - self.goal["slide"]).T).max())

@@ -1,4 +1,4 @@
-"""What is pushed and what pushes it: a convex outline over its limit surface, and a point or a flat face."""
+"""The slider and the pusher: a convex outline with its limit surface, and a point or a flat face."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ class Slider(ByValue):
     """
 
     surface: LimitSurface
-    """Limit surface of the patch that it stands on; its frame is the slider's."""
+    """Limit surface of the patch on which it stands; its frame is the slider's."""
     outline: np.ndarray
     """Corners of the convex outline `[M, 2]` in that frame [m], in either sense of rotation."""
 
@@ -68,9 +68,9 @@ class Slider(ByValue):
         return float(np.hypot(*self.outline.T).max())
 
     def gaps(self, point: np.ndarray) -> np.ndarray:
-        """Distances of a point `[2]` from the lines of all edges `[M]` [m], > 0 outside; it is outside if one is.
+        """Distances of a point `[2]` from the lines of all edges `[M]` [m], > 0 outside; it is outside if any is > 0.
 
-        Raises `InvalidValueError` for a point that is none.
+        Raises `InvalidValueError` unless it is a point.
         """
         return np.einsum("mi,mi->m", self.outline - validation.vector("point", point, 2), self.inward)
 
@@ -78,7 +78,7 @@ class Slider(ByValue):
 @described
 @dataclass(frozen=True)
 class Pusher:
-    """What pushes: a point, or a flat face that looks along its own x axis.
+    """The pusher: a point, or a flat face that faces along its own x axis.
 
     Raises `InvalidValueError` for numbers out of range.
     """
@@ -94,6 +94,6 @@ class Pusher:
 
     @property
     def ends(self) -> np.ndarray:
-        """Ends of the face in the pusher's axes, right and left as it looks `[2, 2]` [m]; of a point that `[1, 2]`."""
+        """Right and left end of the face, in the pusher's axes `[2, 2]` [m]; for a point that point `[1, 2]`."""
         half = 0.5 * self.width
         return np.array([[0.0, -half], [0.0, half]]) if half > 0.0 else np.zeros((1, 2))

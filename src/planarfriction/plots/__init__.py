@@ -1,8 +1,8 @@
-"""Plots: the contact patch, the limit surface, time histories and motion, each as a matplotlib `Figure`; moving ones.
+"""Plots: contact patch, limit surface, time histories and motion, each as a matplotlib `Figure`; animations.
 
 Figures are plain objects: save them with `figure.savefig(path)`, open them with `figure.show()`, or let a notebook show
-them. Nothing but `show` touches pyplot's global state. SI inside; the axes show mm, N, degrees and the like, with the
-unit in the label. Moving pictures are written to files.
+them. Only `show` touches pyplot's global state. The axes are in mm, N, degrees and the like, with the unit in the
+label. Animations are written to files.
 """
 
 from planarfriction.plots.animation import animate_solution

@@ -1,4 +1,4 @@
-"""Moving pictures of solutions."""
+"""Animations of solutions."""
 
 from __future__ import annotations
 
@@ -36,13 +36,14 @@ def animate_solution(
     dpi: float = 100.0,
     progress: Callable[[float], None] | None = None,
 ) -> Path:
-    """Write a moving picture of a solution to `path`, a `.gif`, `.mp4` or `.html`; returns the path.
+    """Write an animation of a solution to `path`, a `.gif`, `.mp4` or `.html` file; returns the path.
 
-    Left the body in the world: outline, contact patches, the path of its centre, the friction force on it at each
-    contact (world axes, all identical contacts) and its centre of rotation. Right, for each contact (the three that are
-    pressed hardest): its cells, from pale to blue as their bristles bend and orange where they slip, and its wrench in
-    its limit surface, for mu_c f_N = 1. Which cells slip is found by a distributed model with the contact's law on the
-    recorded path, whatever the model of the contact; samples that are far apart blur it.
+    On the left, the body in the world: outline, contact patches, the path of its centre, the friction force on it at
+    each contact (world axes, all identical contacts) and its centre of rotation. On the right, for each contact (the
+    three that are pressed hardest): its cells, from pale to blue as their bristles bend and orange where they slip, and
+    its wrench inside its limit surface, for mu_c f_N = 1. Which cells slip is computed by a distributed model with the
+    contact's law on the recorded path, whatever the model of the contact; samples that are far apart make this less
+    accurate.
 
     Parameters
     ----------
@@ -51,21 +52,21 @@ def animate_solution(
     path
         File to write; `.mp4` needs ffmpeg or the extra `[ffmpeg]`.
     slow
-        How many times slower than real time [-]; below 1 is faster. None: real time where that makes 75 to 300 frames,
+        How many times slower than real time [-]; below 1 is faster. None: real time if that makes 75 to 300 frames,
         else the next of 1, 2, 5, 10, ... that does.
     fps
-        Frames a second, at most 50.
+        Frames per second, at most 50.
     follow
-        Whether the view follows a body that goes much farther than it is large, rather than hold the whole motion.
+        Whether the view follows a body that moves much farther than its size, instead of showing the whole path.
     dpi
-        Size: a picture is 9.6 x 5.4 inches.
+        Resolution; a picture is 9.6 x 5.4 inches.
     progress
         Called with the time of each frame [s].
 
     Raises
     ------
     FileError
-        The file is of another kind, cannot be written, or needs ffmpeg and there is none; the solution has no scene.
+        The file is of another kind, cannot be written, or needs ffmpeg, which is missing; or the solution has no scene.
     InvalidValueError
         A parameter breaks its rule.
     """

@@ -38,11 +38,11 @@ _CONTACT = (
 
 
 def plot_histories(solutions: Solution | Mapping[str, Solution]) -> style.PlotFigure:
-    """Draw position, angle, speed, forces, torque and normal force over time.
+    """Plot position, angle, speed, forces, torque and normal force against time.
 
-    `solutions` is one solution or a mapping from label to solution; several are overlaid. Colour tells the runs apart,
-    line style their contacts. Left the body (world axes, centre of mass), right the contacts: the friction wrench on
-    the body about the origin of the contact frame and the normal force.
+    `solutions` is one solution or a mapping from label to solution; several are overlaid. Colours distinguish the runs,
+    line styles their contacts. Left the body (world axes, centre of mass), right the contacts: the friction wrench on
+    the body about the origin of the contact frame, and the normal force.
     """
     figure = style.new_figure(9.6, 8.0)
     draw_histories(figure, solutions)

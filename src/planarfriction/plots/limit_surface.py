@@ -1,4 +1,4 @@
-"""Limit surface in three dimensions, with another one beside it: a picture, or one to be turned with the mouse."""
+"""Limit surface in three dimensions, next to another one: as a picture, or interactive."""
 
 from __future__ import annotations
 
@@ -42,13 +42,13 @@ def sample_limit_surface(surface: Any, polar: np.ndarray, azimuth: np.ndarray) -
 
 
 def plot_limit_surface(surface: Any, *, beside: Any = "ellipsoid") -> style.PlotFigure:
-    """Draw the limit surface (fx, fy, tau/r) for mu f_N = 1 about the centre of pressure, with another one beside it.
+    """Draw the limit surface (fx, fy, tau/r) for mu f_N = 1 about the centre of pressure, next to another one.
 
     `surface` is any limit surface; `beside` another one, "ellipsoid" for that of the same patch, or None to draw
-    `surface` alone. Both panels share their limits and their colours, the height tau/r. All three axes are pure
-    numbers.
+    `surface` alone. Both panels have the same limits and the same colours, for the height tau/r. All three axes are
+    dimensionless.
 
-    Raises InvalidValueError if either is no limit surface.
+    Raises InvalidValueError unless both are limit surfaces.
     """
     shown = _with_names(surface, beside)
     scaled = [scaled_samples(each, *even_mesh(each)) for each, _ in shown]
@@ -62,12 +62,13 @@ def plot_limit_surface(surface: Any, *, beside: Any = "ellipsoid") -> style.Plot
 
 
 def interactive_limit_surface(surface: Any, *, beside: Any = "ellipsoid") -> Any:
-    """The picture of `plot_limit_surface` as a plotly figure, to be turned, zoomed and read with the mouse.
+    """The picture of `plot_limit_surface` as an interactive plotly figure, to rotate, zoom and read values with the
+    mouse.
 
-    `.show()` opens it in the browser, `.write_html(path)` writes it. Under the pointer stand the friction wrench and
-    the direction of sliding that it belongs to.
+    `.show()` opens it in the browser, `.write_html(path)` writes it. The label at the pointer shows the friction wrench
+    and the direction of sliding that belongs to it.
 
-    Raises MissingExtraError without plotly, the extra `[plotly]`, and InvalidValueError if either is no limit surface.
+    Raises MissingExtraError without plotly, the extra `[plotly]`, and InvalidValueError unless both are limit surfaces.
     """
     shown = _with_names(surface, beside)
     try:

@@ -31,10 +31,11 @@ _TIME_COLOURS = ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.92, 256))
 
 
 def plot_motion(solution: Solution) -> style.PlotFigure:
-    """Draw the outline of the body at 12 instants, evenly spaced in time and coloured by it, with the contact patches.
+    """Draw the outline of the body at 12 instants, evenly spaced in time and coloured by time, with the contact
+    patches.
 
-    World axes in mm, equal scales. Patches fixed to the world are drawn once, patches on the body and pads that are
-    driven at each instant; a body without an outline is drawn as a line from its centre of mass along its x axis. The
+    World axes in mm, equal scales. Patches fixed to the world are drawn once; patches on the body, and pads that are
+    driven, at each instant. A body without an outline is drawn as a line from its centre of mass along its x axis. The
     thin line is the path of the centre of mass.
     """
     figure = style.new_figure(6.4, 5.2)

@@ -17,13 +17,14 @@ _CORNERS = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
 
 
 def plot_patch(patch: ContactPatch, *, normal_force: float | None = None) -> style.PlotFigure:
-    """Draw where a patch carries load, and its centre of pressure.
+    """Draw the pressure on a patch, and its centre of pressure.
 
-    Cells of a grid are drawn in their true area at their true centroid and coloured by their pressure `w f_N / a`; a
+    Cells of a grid are drawn with their true area at their true centroid and coloured by their pressure `w f_N / a`; a
     patch without a grid is drawn as points coloured by the force on them, `w f_N`. Without `normal_force` [N] the
     colours show both per newton of load. Lengths in mm.
 
-    Raises InvalidValueError for what is no patch, a load below zero, and a missing load where the shape depends on it.
+    Raises InvalidValueError unless `patch` is a patch, for a load below zero, and for a missing load if the shape
+    depends on it.
     """
     from planarfriction.patch import ContactPatch
 

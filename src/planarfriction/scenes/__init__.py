@@ -1,4 +1,4 @@
-"""Scenes: a planar body, its contacts, the signals that drive them, scene files, and what a simulation returns."""
+"""Scenes: a planar body, its contacts, the signals that drive them, scene files, and the results of simulations."""
 
 from __future__ import annotations
 

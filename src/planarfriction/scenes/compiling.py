@@ -1,4 +1,4 @@
-"""One line that says why the first simulation after an installation takes so long."""
+"""One line that explains why the first simulation after an installation takes so long."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _LINE = "planarfriction compiles its solver, once after installation (planarfric
 
 
 def watched() -> bool:
-    """Whether somebody sits before this process: at a terminal, or in a notebook."""
+    """Whether somebody is watching this process: at a terminal, or in a notebook."""
     alone = multiprocessing.parent_process() is None
     return alone and ("ipykernel" in sys.modules or (sys.stderr is not None and sys.stderr.isatty()))
 

@@ -1,4 +1,4 @@
-"""Ready scenes: the published experiments and the two everyday ones, made from a friction model and a few numbers."""
+"""Ready scenes: the published experiments and two everyday ones, made from a friction model and a few numbers."""
 
 from __future__ import annotations
 
@@ -36,10 +36,10 @@ FINE: dict[str, Any] = {"rtol": 1e-6, "atol": 3e-6}
 def in_hand_load(load: Literal[1, 2], *, placement: Literal[1, 2] = 1, t_end: float = 2.0) -> Signal:
     """Normal force of one finger in the published in-hand runs [N], held over every 0.01 s.
 
-    Load 1 is a sine at 2 Hz, load 2 is constant with one drop. `placement` 1 is the centre of mass at (0.002, 0) m,
-    2 at (0.025, 0) m.
+    Load 1 is a sine at 2 Hz, load 2 is constant with one drop. `placement` 1 is the centre of mass at (0.002, 0) m, 2
+    at (0.025, 0) m.
 
-    Raises InvalidValueError for another load or placement.
+    Raises InvalidValueError for any other load or placement.
 
     Source: Waltersson and Karayiannidis 2024, section VI.
     """
@@ -93,10 +93,10 @@ def drift_force(load: Literal["tangential", "normal"], *, t_end: float = 5.0) ->
 
 
 def drift(model: Any, *, load: Literal["tangential", "normal"] = "tangential", t_end: float = 5.0) -> Scene:
-    """A disc of 1 kg and radius 0.05 m on a table, pushed by less than friction holds: does it creep?
+    """A disc of 1 kg and radius 0.05 m on a table, pushed with less than friction can hold: does it creep?
 
-    `load="tangential"`: the force oscillates, and from 2.8 s on a torque too; `load="normal"`: force and torque stay
-    and the normal force oscillates after 1 s. The contact is fixed to the world.
+    `load="tangential"`: the force oscillates, and from 2.8 s a torque does too; `load="normal"`: force and torque are
+    constant and the normal force oscillates after 1 s. The contact is fixed to the world.
 
     Raises InvalidValueError for a parameter that breaks its rule.
 
@@ -171,11 +171,11 @@ def driven(
     at: Literal["origin", "centre_of_pressure"] = "centre_of_pressure",
     t_end: float = 5.0,
 ) -> Scene:
-    """A patch that is moved with a prescribed `twist` `(vx, vy, omega)` in its own axes, to see the wrench it gives.
+    """A patch that is moved with a prescribed `twist` `(vx, vy, omega)` in its own axes, to record its wrench.
 
     `twist` is a signal `[T, 3]` or a constant (default: `published_velocity()`), `normal_force` [N] a signal or a
-    number. `at` says which point of the patch has the velocity: the origin of the contact frame, or the centre of
-    pressure (of a patch that changes with the load: the one at t = 0). Wrenches are about the contact frame's origin.
+    number. `at` is the point of the patch that has the velocity: the origin of the contact frame, or the centre of
+    pressure (if the patch changes with the load: the one at t = 0). Wrenches are about the contact frame's origin.
 
     Raises InvalidValueError for a parameter that breaks its rule.
     """
@@ -201,15 +201,15 @@ def pushed(
     size: Sequence[float] = (0.15, 0.08),
     t_end: float = 2.0,
 ) -> Scene:
-    """A plate on a table that a hand pushes along: two finger pads pinch it behind its centre and move as prescribed.
+    """A plate on a table that is pushed by a hand: two finger pads pinch it behind its centre and move as prescribed.
 
-    `model` is the friction of the patch that the plate of `size` (width, height) [m] and `mass` [kg] stands on, under
-    its weight, its frame at the centre of mass. The pads, with the model `pad` (default: the same), begin at `position`
-    [m] from there and press with `normal_force` [N] each, a signal or a number. `velocity` is their twist
+    `model` is the friction of the patch on which the plate of `size` (width, height) [m] and `mass` [kg] stands, under
+    its weight, with its frame at the centre of mass. The pads, with the model `pad` (default: the same), begin at
+    `position` [m] from there and press with `normal_force` [N] each, a signal or a number. `velocity` is their twist
     `(vx, vy, omega)`, world axes, `[T, 3]`: a signal or a constant (default: up to 0.05 m/s along x and back to rest,
     each in a tenth of the time). The pads may slip and turn on the plate; pushed from behind, it swings round.
 
-    A pusher at the edge of a plate, which touches a point of its outline, is not a patch: see `planning.push`.
+    A pusher that touches a point of the plate's outline is not a patch: see `planning.push`.
 
     Raises InvalidValueError for a parameter that breaks its rule.
     """

@@ -98,34 +98,35 @@ def checked_model(name: str, value: Any) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Contact(ByValue):
-    """A contact between body and world: a friction model, where it sits, and how hard it is pressed.
+    """A contact between body and world: a friction model, its position, and its normal force.
 
-    Contacts fixed to the world (fingers) keep their frame while the body moves past; contacts fixed to the body (a box
-    on a table) carry it along. The world's side of either may move: a pad that is driven, a belt that runs.
+    Contacts fixed to the world (fingers) keep their frame while the body moves past them; contacts fixed to the body (a
+    box on a table) move with it. In both cases the world's side may move as well: a pad that is driven, a belt that
+    runs.
 
-    Raises InvalidValueError for what is no friction model, a load below zero, and other parameters that break their
-    rule.
+    Raises InvalidValueError unless `model` is a friction model, for a load below zero, and for other parameters that
+    break their rule.
     """
 
     model: Any = field(repr=False)
-    """Friction model, as those of `planarfriction.models`."""
+    """Friction model, for example one of `planarfriction.models`."""
     normal_force: Signal
-    """Normal force [N], >= 0: a signal, or a number for a constant one."""
+    """Normal force [N], >= 0: a signal, or a number for a constant force."""
     mounted_on: Literal["world", "body"] = "world"
     """What the contact frame is fixed to: "world" or "body"."""
     position: tuple[float, float] = (0.0, 0.0)
-    """Origin of the contact frame, in the world or in the body's axes from its centre of mass [m]."""
+    """Origin of the contact frame [m], in the world or, on the body, in its axes from its centre of mass."""
     angle: float = 0.0
     """Angle of the contact frame's axes in the world or in the body [rad]."""
     count: int = 1
-    """Number of identical contacts (same place, same load) that share this one's state."""
+    """Number of identical contacts (same position, same load) that share this one's state."""
     name: str = "contact"
-    """Name in the results; unique in its scene."""
+    """Name in the results; unique within its scene."""
     velocity: Signal | None = None
     """Prescribed twist `(vx, vy, omega)` of the world's side, world axes, `[T, 3]` [m/s, m/s, rad/s]; None: at rest.
 
-    A pad fixed to the world carries the contact frame along: it is the twist at the frame's origin. Under a patch fixed
-    to the body it is the twist of the ground (a belt, a turntable) at the origin of the world.
+    For a pad fixed to the world it is the twist at the origin of the contact frame, which moves with the pad. Under a
+    patch fixed to the body it is the twist of the ground (a belt, a turntable) at the origin of the world.
     """
 
     if TYPE_CHECKING:  # what is given may be more than what is kept
@@ -167,7 +168,7 @@ class Contact(ByValue):
 class Scene(ByValue):
     """Everything that a simulation needs: body, contacts, forces or prescribed velocity, duration.
 
-    Raises InvalidValueError, naming the parameter, where the parts do not make a scene.
+    Raises InvalidValueError, naming the parameter, if the parts do not make a valid scene.
     """
 
     body: Body
@@ -181,8 +182,8 @@ class Scene(ByValue):
     velocity: Signal | None = None
     """Prescribed twist `(vx, vy, omega)` in **body axes**, `[T, 3]` [m/s, m/s, rad/s], or None for a free body.
 
-    It is the velocity of the origin of the body's axes. With it, mass, inertia, gravity and initial velocity play no
-    part.
+    It is the velocity of the origin of the body's axes. Mass, inertia, gravity and initial velocity then have no
+    effect.
     """
     stop_speed: float | None = None
     """Speed [m/s] below which the body counts as at rest, which ends the simulation; None to run until `t_end`."""
@@ -195,8 +196,9 @@ class Scene(ByValue):
     name: str = "scene"
     """Name of the scene."""
     start: Literal["rest", "equilibrium", "sliding"] = "rest"
-    """How the bristles start: not deflected; carrying the load of a body that stands still (with the least elastic
-    energy, which says how contacts share it); or in the steady state of the initial velocity."""
+    """State of the bristles at the start: "rest", relaxed; "equilibrium", carrying the load of a body at rest (with the
+    least elastic energy, which determines how contacts share it); "steady", the steady state of the initial velocity.
+    """
 
     if TYPE_CHECKING:  # what is given may be more than what is kept
 
@@ -290,7 +292,7 @@ class Scene(ByValue):
     def from_dict(cls, data: dict[str, Any], folder: str | Path | None = None) -> Scene:
         """Scene from a table as in scene files; relative paths in it start from `folder`.
 
-        Raises FileError in one line that says the table and the key.
+        Raises FileError in one line that names the table and the key.
         """
         from planarfriction.scenes.files import scene_from_dict
 
@@ -298,13 +300,13 @@ class Scene(ByValue):
 
     @classmethod
     def from_file(cls, path: str | Path) -> Scene:
-        """Scene from a TOML or JSON file. Raises FileError in one line that says the file, the table and the key."""
+        """Scene from a TOML or JSON file. Raises FileError in one line that names the file, the table and the key."""
         from planarfriction.scenes.files import read_scene
 
         return read_scene(path)
 
     def to_file(self, path: str | Path) -> None:
-        """Write the scene to `path` (`.toml` or `.json`). Raises FileError where that is not possible."""
+        """Write the scene to `path` (`.toml` or `.json`). Raises FileError if that is not possible."""
         from planarfriction.scenes.files import write_scene
 
         write_scene(self, path)

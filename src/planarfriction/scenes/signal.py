@@ -98,7 +98,7 @@ class Signal(ByValue):
 
     @classmethod
     def sampled(cls, times: ArrayLike, values: ArrayLike, hold: Hold = "previous") -> Signal:
-        """Signal through samples: `times` [s] of shape `[T]`, `values` of shape `[T]` or `[T, k]`."""
+        """Signal from samples: `times` [s] of shape `[T]`, `values` of shape `[T]` or `[T, k]`."""
         return cls(times, values, hold)
 
     @classmethod
@@ -131,10 +131,11 @@ class Signal(ByValue):
     def from_csv(
         cls, path: str | Path, *, time: str = "time", value: str | Sequence[str] = "value", hold: Hold = "previous"
     ) -> Signal:
-        """Signal from a CSV file with a header line: `time` names the column of times, `value` one column or a list.
+        """Signal from a CSV file with a header line: `time` is the name of the column of times, `value` one column or a
+        list.
 
-        Lines that start with # are comments. Raises FileError for a missing file, a missing column or a text among
-        the numbers, and InvalidValueError as the constructor does.
+        Lines that start with # are comments. Raises FileError for a missing file, a missing column or text among the
+        numbers, and InvalidValueError as the constructor does.
         """
         validation.path("path", path)
         validation.text("time", time)
@@ -148,7 +149,7 @@ class Signal(ByValue):
             raise InvalidValueError(f"{path}: {error.name}", error.rule, error.value) from None
 
     def held(self, dt: float) -> Signal:
-        """The same signal seen by a digital controller: sampled every `dt` [s] from the first time on, and held."""
+        """The same signal as seen by a digital controller: sampled every `dt` [s] from the first time on, and held."""
         times = self.times[0] + sample_times(self.times[-1] - self.times[0], dt)
         return Signal(times, self(times))
 
@@ -157,7 +158,7 @@ class Signal(ByValue):
         return self._value(t, "right")
 
     def left(self, t: ArrayLike) -> np.ndarray:
-        """Value just before the times `t` [s] (any shape): at a jump the value that ends there."""
+        """Value just before the times `t` [s] (any shape); at a jump, the value before the jump."""
         return self._value(t, "left")
 
     @property
@@ -167,7 +168,8 @@ class Signal(ByValue):
 
     @property
     def breaks(self) -> np.ndarray:
-        """Times [s] at which the value jumps or the slope changes, increasing; samples that change nothing are none."""
+        """Times [s] at which the value jumps or the slope changes, increasing; samples that change nothing are left
+        out."""
         if self.hold == "previous":
             change = np.diff(self.values, axis=0, prepend=self.values[:1])
         else:
@@ -176,10 +178,10 @@ class Signal(ByValue):
         return self.times[(change != 0.0).reshape(len(self.times), -1).any(axis=1)]
 
     def pieces(self, breaks: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-        """Straight pieces of the signal between `breaks` `[S + 1]` [s]: values at their starts and slopes.
+        """Linear pieces of the signal between `breaks` `[S + 1]` [s]: values at their starts, and slopes.
 
-        On piece s the signal is `start[s] + slope[s] (t - breaks[s])`; both have shape `[S]` or `[S, k]`, and the
-        slope of a held signal is exactly 0. Raises InvalidValueError where the signal breaks inside a piece.
+        On piece s the signal is `start[s] + slope[s] (t - breaks[s])`; both have shape `[S]` or `[S, k]`, and the slope
+        of a held signal is exactly 0. Raises InvalidValueError if the signal breaks inside a piece.
         """
         breaks = validation.array("breaks", breaks, (None,))
         if len(breaks) < 2 or (np.diff(breaks) <= 0.0).any():
@@ -199,7 +201,7 @@ class Signal(ByValue):
         return self.values[i] + slope * self._spread(breaks[:-1] - self.times[i]), slope
 
     def check_non_negative(self, name: str) -> None:
-        """Raises InvalidValueError with `name`, time and value where the signal is below zero."""
+        """Raise InvalidValueError with `name`, time and value if the signal is below zero anywhere."""
         below = np.argwhere(self.values < 0.0)
         if len(below):
             i = int(below[0][0])
@@ -214,7 +216,7 @@ class Signal(ByValue):
     def from_dict(cls, data: Any, folder: str | Path | None = None) -> Signal:
         """Signal from a number, a list of numbers (constants) or a table as in scene files (see `read_signal`).
 
-        Raises FileError for a table that is no signal, InvalidValueError for a `folder` that is no path.
+        Raises FileError if the table is not a signal, InvalidValueError if `folder` is not a path.
         """
         where = Section({"signal": data}, folder=None if folder is None else validation.path("folder", folder))
         return read_signal(where, "signal")

@@ -55,10 +55,10 @@ def simulate(
 
     Each step keeps its error below `rtol |y| + atol y_0`, for every component of the body's motion and for the mean
     over each contact's bristles. The natural scales `y_0` are mu_c/sigma_0 for bristles and positions and a tenth of
-    v_s for velocities (a hundredth with the published reduced model; both over the contact radius for angles), so that
-    `atol` is a share of a full bristle deflection. A step that turns the twist of a contact is looked into on its way.
-    The solver stops exactly at every break of a signal. The first run after an installation compiles the solver; if
-    there is no `progress`, a line on the terminal or in the notebook says so.
+    v_s for velocities (a hundredth with the published reduced model); for angles both are divided by the contact
+    radius. So `atol` is a share of a full bristle deflection. A step during which the twist of a contact turns is also
+    checked between its ends. The solver stops exactly at every break of a signal. The first run after an installation
+    compiles the solver; if there is no `progress`, a line on the terminal or in the notebook says so.
 
     Parameters
     ----------
@@ -67,8 +67,8 @@ def simulate(
     t_end
         End [s], at most the scene's own.
     rtol, atol
-        Relative and natural-scale tolerances [-], > 0; the scene's own by default. An `atol` that is not given follows
-        `rtol`, in the proportion of the scene's own.
+        Relative and natural-scale tolerances [-], > 0; the scene's own by default. If only `rtol` is given, `atol`
+        changes in proportion.
     save_every
         Recording interval [s]; the scene's own by default. The end is always recorded.
     bristles
@@ -76,16 +76,17 @@ def simulate(
     method
         `planarfriction.solvers.RODAS4` (default) or `RODAS3`.
     progress
-        Called with the simulated time [s] now and then.
+        Called with the simulated time [s] from time to time.
 
     Raises
     ------
     InvalidValueError
         A parameter breaks its rule.
     SolverError
-        The solver gave up; carries the solution so far and says the remedy.
+        The solver failed; carries the solution so far and suggests a remedy.
     SimulationInterrupted
-        Ctrl-C; carries the solution so far. Before anything is recorded, while compiling, it stays `KeyboardInterrupt`.
+        Ctrl-C; carries the solution so far. Before anything is recorded, for example during compilation, it is a plain
+        `KeyboardInterrupt`.
     """
     if not isinstance(scene, Scene):
         raise InvalidValueError("scene", "be a Scene", type(scene).__name__)

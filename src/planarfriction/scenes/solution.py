@@ -1,4 +1,4 @@
-"""Solutions: what a simulation returns, how it is stored, and how it comes back with its scene."""
+"""Solutions: the results of simulations, and how they are stored and loaded with their scenes."""
 
 from __future__ import annotations
 
@@ -69,13 +69,13 @@ class Solution:
     """Result of a simulation: histories, statistics, and the scene they belong to."""
 
     histories: Mapping[Any, History | xr.DataArray] = field(repr=False)
-    """What `data` is made of, by name, coordinates included: plain arrays, or a dataset that is there already."""
+    """Contents of `data` by name, including coordinates: plain arrays, or an existing dataset."""
     statistics: Statistics
-    """What the simulation took."""
+    """Number of steps and computing time."""
     status: str
-    """"success", "at rest", or what ended the simulation early: "interrupted", "step too small"."""
+    """"success", "at rest", or the reason why the simulation ended early: "interrupted", "step too small"."""
     message: str
-    """What happened, in one sentence; the remedy where the solver gave up."""
+    """What happened, in one sentence, with a remedy if the solver failed."""
     scene: Scene
     """The scene that was simulated; None in a solution that was loaded from a file without it."""
 
@@ -107,20 +107,20 @@ class Solution:
 
         Body (world axes, centre of mass): x, y [m], theta [rad], vx, vy [m/s], omega [rad/s]. Each contact: fx, fy [N],
         tau [N m], the friction wrench on the body about the contact frame's origin in its axes, of **one** of `count`
-        identical contacts, and normal_force [N]; at a jump the left limit. `attrs["scene"]` is the scene as JSON; empty
-        where it cannot be written, as with a model of your own that is not registered: `attrs["scene_left_out"]` says
-        why.
+        identical contacts, and normal_force [N]; at a jump the left limit. `attrs["scene"]` is the scene as JSON; it is
+        empty if the scene cannot be written, for example with a model of your own that is not registered, and
+        `attrs["scene_left_out"]` says why.
         """
         import xarray as xr
 
         return xr.Dataset(dict(self.histories), attrs=_scene_attributes(self.scene))
 
     def contact_twist(self, contact: str | None = None) -> np.ndarray:
-        """Twist of the body against one contact `[T, 3]` [m/s, m/s, rad/s], where `data` has that contact's wrench.
+        """Twist `[T, 3]` [m/s, m/s, rad/s] of the body relative to one contact, at the times of `data`.
 
         `(vx, vy, omega)` at the origin of the contact frame, in its axes. `contact` is a name; None takes the only one.
 
-        Raises InvalidValueError for a contact that is not there, FileError for a solution without its scene.
+        Raises InvalidValueError for a contact that does not exist, FileError for a solution without its scene.
         """
         chosen = scene_of(self, "a twist").contacts[self.contact_index(contact)]
         x, y, theta, vx, vy, omega = (
@@ -146,9 +146,9 @@ class Solution:
         return np.stack([cos * ux + sin * uy, cos * uy - sin * ux, omega], axis=-1)
 
     def contact_index(self, contact: str | None = None) -> int:
-        """Place of a contact, given by its name, along the axis `contact`; None takes the only one.
+        """Index of a contact, given by its name, along the axis `contact`; None takes the only one.
 
-        Raises InvalidValueError for a name that is not there, and for None where there are several.
+        Raises InvalidValueError for a name that does not exist, and for None if there are several.
         """
         names = [str(name) for name in self.histories["contact"].values]
         if contact is None and len(names) == 1:
@@ -158,13 +158,13 @@ class Solution:
         return names.index(validation.choice("contact", contact, names))
 
     def slip_events(self) -> tuple[SlipEvent, ...]:
-        """When each contact slips: onset, end, path and angle of each `SlipEvent`.
+        """Find when each contact slips: onset, end, path and angle of each `SlipEvent`.
 
-        A contact slips while more than half of its motion is not taken up by its bristles, `|u - zdot| > |u|/2`, and
-        if it gets further than a full deflection mu_c/sigma_0: no speed decides. Onset and end lie between samples, on
-        straight lines. Bristles have to be recorded: `simulate(scene, bristles="all")`.
+        A contact slips while its bristles take up less than half of its motion, `|u - zdot| > |u|/2`, and if it moves
+        further than a full deflection mu_c/sigma_0; there is no threshold on the speed. Onset and end are interpolated
+        linearly between samples. Bristles have to be recorded: `simulate(scene, bristles="all")`.
 
-        Raises InvalidValueError where they are not, FileError for a solution without its scene.
+        Raises InvalidValueError if they are not, FileError for a solution without its scene.
         """
         from planarfriction.scenes.slip import slip_events
 
@@ -192,24 +192,25 @@ class Solution:
         dpi: float = 100.0,
         progress: Callable[[float], None] | None = None,
     ) -> Path:
-        """Write a moving picture to `path` (`.gif`, `.mp4`, `.html`): body, slip of the cells, wrench in its surface.
+        """Write an animation to `path` (`.gif`, `.mp4`, `.html`): the body, the slip of the cells, the wrench in its
+        limit surface.
 
-        `slow` is how many times slower than real time it runs (chosen where left out: 75 to 300 frames), `fps` the
-        frames a second, `follow` whether the view goes with a body that goes far; `plots.animate_solution` says more.
+        `slow` is how many times slower than real time it runs (by default chosen to give 75 to 300 frames), `fps` the
+        frames per second, `follow` whether the view follows a body that moves far; see `plots.animate_solution`.
 
-        Raises FileError where the file cannot be written or the solution has no scene, InvalidValueError for a
-        parameter that breaks its rule.
+        Raises FileError if the file cannot be written or the solution has no scene, InvalidValueError for a parameter
+        that breaks its rule.
         """
         from planarfriction.plots import animate_solution
 
         return animate_solution(self, path, slow=slow, fps=fps, follow=follow, dpi=dpi, progress=progress)
 
     def save(self, path: str | Path) -> Path:
-        """Write everything, scene included, to the NetCDF file `path`; `load` brings it back.
+        """Write everything, including the scene, to the NetCDF file `path`; `load` reads it.
 
         A scene that cannot be written is left out; the attribute `scene_left_out` of the data says why.
 
-        Raises FileError where the file cannot be written.
+        Raises FileError if the file cannot be written.
         """
         attributes = {
             **({} if self.scene is None else _scene_attributes(self.scene)),
@@ -274,10 +275,10 @@ def _checksum(before: memoryview, after: memoryview) -> bytes:
 def load(path: str | Path) -> Solution:
     """Read a solution that `Solution.save` wrote, with its scene and the models in it.
 
-    What is loaded is what was saved, to the bit: the file holds a checksum of all its bytes. A file that another
-    program has changed is refused, on purpose or not; change the `data` of a solution and save that.
+    What is loaded is identical to what was saved, bit by bit: the file has a checksum of all its bytes. A file that
+    another program has changed, on purpose or not, is refused; change the `data` of a solution and save that instead.
 
-    Raises FileError for a missing file, for a damaged or a changed one, and for one that holds anything else.
+    Raises FileError for a missing file, for a damaged or a changed one, and for one with any other content.
     """
     import xarray as xr
 

@@ -1,4 +1,4 @@
-"""Ready scenes beyond the hand and the table: a part that pivots in the gripper, a foot that turns, a curling stone."""
+"""Ready scenes beyond hand and table: a part that pivots in a gripper, a foot that turns, a curling stone."""
 
 from __future__ import annotations
 
@@ -43,11 +43,11 @@ def pivot(
 ) -> Scene:
     """A part held level by one end between finger pads: the grip loosens, the part swings down and is caught.
 
-    The pads sit at the origin of the world; the centre of mass of the plate of `size` (width, height) [m] and `mass`
+    The pads are at the origin of the world; the centre of mass of the plate of `size` (width, height) [m] and `mass`
     [kg] starts `arm` [m] beside them. Each of the `fingers` presses with the full `normal_force` [N], a signal or a
-    number (default: 4 N; from 0.24 s 1 N, from 0.4 s 6 N). The part turns where `fingers mu f_N r < mass g arm`, and
-    the contact radius r of a soft finger grows with its load. Bristles `start` with the weight on them; a grip that
-    does not hold it has to start at "rest".
+    number (default: 4 N; from 0.24 s 1 N, from 0.4 s 6 N). The part turns while `fingers mu f_N r < mass g arm`, and
+    the contact radius r of a soft finger grows with its load. By default the bristles carry the weight at the `start`;
+    if the grip cannot hold the part, use "rest".
 
     Raises InvalidValueError for a parameter that breaks its rule.
     """
@@ -69,12 +69,12 @@ def foot(
     torque: Any = None,
     t_end: float = 2.0,
 ) -> Scene:
-    """A robot that stands on one foot, turns about its heel and back about its forefoot: a step aside without a step.
+    """A robot that stands on one foot turns about its heel and back about its forefoot: a sideways move without a step.
 
     Heel (`model`) and `forefoot` (a model; the heel's by default) are fixed to the body, `length` [m] apart along x,
     with the centre of mass of `mass` [kg] and `inertia` about the vertical [kg m^2] midway. `share` of the weight is on
-    the forefoot [-] (default: 0.1, from 1 s on 0.9), and the yaw `torque` [N m] turns the body (default: 20 N m for
-    0.3 s from 0.1 s on, -20 N m from 1.1 s on); each a signal or a number.
+    the forefoot [-] (default: 0.1, from 1 s on 0.9), and the yaw `torque` [N m] turns the body (default: 20 N m for 0.3
+    s from 0.1 s on, -20 N m from 1.1 s on); each a signal or a number.
 
     Raises InvalidValueError for a parameter that breaks its rule.
     """
@@ -111,12 +111,12 @@ def curling(
     t_end: float = 60.0,
     save_every: float = 0.05,
 ) -> Scene:
-    """A curling stone let go with the `twist` `(vx, vy, omega)`; ends when it has stopped.
+    """A curling stone released with the `twist` `(vx, vy, omega)`; ends when it has stopped.
 
-    The patch is fixed to the stone, its frame's origin at the centre of mass: a narrow ring, on real stones. `mass`
-    [kg], `inertia` about the vertical [kg m^2] (default: that of a cylinder of radius 0.14 m), `start` how the bristles
-    start, `save_every` [s] the time between samples. Friction that is the same in all directions on an even pressure
-    slows the stone and its spin, and does not make it curl.
+    The patch is fixed to the stone, with the origin of its frame at the centre of mass; on real stones it is a narrow
+    ring. `mass` [kg], `inertia` about the vertical [kg m^2] (default: that of a cylinder of radius 0.14 m), `start` the
+    initial state of the bristles, `save_every` [s] the time between samples. Friction that is the same in all
+    directions, under an even pressure, slows the stone and its spin but does not make it curl.
 
     Raises InvalidValueError for a parameter that breaks its rule.
     """

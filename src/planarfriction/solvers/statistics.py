@@ -1,4 +1,4 @@
-"""What a run cost."""
+"""Statistics of a run."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ from planarfriction.described import described
 @described
 @dataclass(frozen=True)
 class Statistics:
-    """What a run cost."""
+    """Number of steps and computing time of a run."""
 
     steps: int = 0
     """Accepted steps."""
     rejections: int = 0
-    """Steps that were tried and repeated with a smaller size."""
+    """Steps that were repeated with a smaller size."""
     evaluations: int = 0
     """Evaluations of the right-hand side."""
     jacobians: int = 0
-    """Linearisations."""
+    """Evaluations of the Jacobian."""
     wall_time: float = 0.0
     """Time in the solver, without compilation [s]."""
     compile_time: float = 0.0
-    """Time to compile the solver or to load it from the cache [s]; almost 0 after the first run of a process."""
+    """Time to compile the solver or to load it from the cache [s]; almost 0 after the first run in a process."""
 
     def as_dict(self) -> dict[str, int | float]:
         """The numbers by name."""

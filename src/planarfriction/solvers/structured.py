@@ -1,4 +1,4 @@
-"""The driver of the structured solver: runs the compiled loop in slices, keeps statistics, names remedies."""
+"""The driver of the structured solver: runs the compiled loop in slices, collects statistics, suggests remedies."""
 
 from __future__ import annotations
 
@@ -43,16 +43,16 @@ def start_of(state: np.ndarray) -> Progress:
 
 @dataclass(frozen=True, eq=False)
 class Integration(ByValue):
-    """Outcome of `integrate`; the arrays hold the requested times that were reached."""
+    """Outcome of `integrate`; the arrays contain the requested times that were reached."""
 
     output: Output
-    """What was recorded."""
+    """The recorded values."""
     status: str
     """How it ended, as in a `Solution`."""
     message: str
     """What happened, in one sentence."""
     statistics: Statistics
-    """What it took."""
+    """Number of steps and computing time."""
 
 
 def integrate(
@@ -65,12 +65,12 @@ def integrate(
     atol: np.ndarray,
     progress: Callable[[float], None] | None = None,
 ) -> Integration:
-    """Integrate a motion, which comes in windows, from its first break to its last and record at `output.time`.
+    """Integrate a motion, given in windows, from its first break to its last, and record it at `output.time`.
 
-    Each window goes on where the one before it ends, and is let go before the next one is asked for. `state` holds
-    bristles, body velocity and pose; `atol` is the absolute tolerance of each of its entries. `progress` is called with
-    the simulated time now and then, and before another window. Ctrl-C ends with the status "interrupted", or as it came
-    if nothing has been recorded yet.
+    Each window continues where the previous one ends, and is released before the next one is requested. `state`
+    contains bristles, body velocity and pose; `atol` is the absolute tolerance of each of its entries. `progress` is
+    called with the simulated time from time to time, and before each further window. Ctrl-C ends with the status
+    "interrupted", or with `KeyboardInterrupt` if nothing has been recorded yet.
 
     Raises `InvalidValueError` for `rtol <= 0`.
     """

@@ -1,4 +1,4 @@
-"""Sweeps: thousands of runs of a scene whose quantities vary, resumable, in threads, processes or on many machines."""
+"""Sweeps: many runs of a scene with varying quantities, resumable, in threads, processes or on several machines."""
 
 from planarfriction.sweeps.running import Progress, sweep
 

@@ -1,4 +1,4 @@
-"""`sweep`: run a scene for every combination of some quantities, and go on where an earlier sweep has ended."""
+"""`sweep`: run a scene for every combination of some quantities, and continue where an earlier sweep ended."""
 
 from __future__ import annotations
 
@@ -48,20 +48,20 @@ _ENDED = "the executor ended ({}): what is done is kept, sweep again to go on"
 
 @described
 class Progress(NamedTuple):
-    """How far a sweep is; as text one line for people."""
+    """Progress of a sweep; as text it is one line."""
 
     runs: int
-    """Runs of the sweep."""
+    """Number of runs in the sweep."""
     done: int
-    """Those that are done, found ones included."""
+    """Finished runs, including those found from an earlier sweep."""
     found: int
-    """Those of an earlier sweep."""
+    """Runs found from an earlier sweep."""
     failed: int
-    """Those that failed."""
+    """Runs that failed."""
     damaged: int
-    """Files of earlier runs that were damaged: those runs are done again."""
+    """Damaged files of earlier runs; these runs are repeated."""
     left: float | None
-    """Time until the end [s], from the time that runs have taken so far; None before the first."""
+    """Estimated remaining time [s], from the time of the runs so far; None before the first."""
 
     def __str__(self) -> str:
         counts = {"found": self.found, "failed": self.failed, "damaged and done again": self.damaged}
@@ -123,31 +123,32 @@ def sweep(
 ) -> xr.Dataset:
     """Simulate a scene for every combination of some quantities; returns a dataset with a dimension for each of them.
 
-    Runs that are in `out` are not done again: a run is known by its scene, its measurement and the equations, whatever
-    makes it. A kill at any moment loses no more than the runs in flight. Equal scenes give equal bits, in any order and
-    with any executor on the same kind of processor.
+    Runs that are already in `out` are not repeated: a run is identified by its scene, its measurement and the
+    equations, whatever code makes the scene. If the process is killed, only the runs in progress are lost. Equal scenes
+    give equal bits, in any order and with any executor on the same kind of processor.
 
-    A run that fails is no end: `status` holds how each run ended ("success", "at rest", "failed"), `failure` why it
-    failed, and `out` has its scene in `<run>.failed.json`. It is tried again by the next call. `run` names each run.
+    A failed run does not end the sweep: `status` says how each run ended ("success", "at rest", "failed"), `failure`
+    why it failed, and `out` has its scene in `<run>.failed.json`. The next call tries it again. `run` names each run.
 
     Parameters
     ----------
     make_scene
-        Function that returns the Scene of some values, which it gets by name; or a Scene, or the path of a scene file,
-        whose values have dotted names like "fingers.law.mu_c".
+        Function that returns the Scene for some values, which it receives by name; or a Scene, or the path of a scene
+        file, whose values have dotted names like "fingers.law.mu_c".
     values
-        Name of each quantity -> list of numbers, texts or truth values, or mapping from labels to values of any kind.
+        For the name of each quantity, a list of numbers, texts or booleans, or a mapping from labels to values of any
+        kind.
     out
-        Folder that keeps each run as a file, or the path of a store that ends in .zarr (the extra [sweep]), which keeps
-        results that memory need not hold; None to keep nothing.
+        Folder that keeps each run as a file, or the path of a store that ends in .zarr (the extra [sweep]), whose
+        results need not fit into memory; None to keep nothing.
     executor
         Any `concurrent.futures.Executor`; by default threads, one for each processor.
     measure
-        Function of a Solution that returns what the dataset is made of: a number, a mapping from names to numbers,
-        texts or arrays, or an xarray object. By default everything in `Solution.data`, over the instants that any of
-        the runs records: NaN where one has none, its last values where its body has come to rest before.
+        Function of a Solution that returns what the dataset should contain: a number, a mapping from names to numbers,
+        texts or arrays, or an xarray object. By default everything in `Solution.data`, at all instants that any of the
+        runs records: NaN where a run has no value, and its last values after its body has come to rest.
     progress
-        Called with a `Progress` now and then; `print` will do.
+        Called with a `Progress` from time to time; `print` is enough.
 
     Raises
     ------
@@ -158,7 +159,7 @@ def sweep(
     SweepError
         All runs failed, or the executor did.
     SweepInterrupted
-        Ctrl-C; carries the dataset so far. What is done stays in `out`.
+        Ctrl-C; carries the dataset so far. Finished runs stay in `out`.
     """
     grid = grid_of(values)
     make = _maker(make_scene, grid)

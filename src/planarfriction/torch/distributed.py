@@ -19,12 +19,12 @@ from planarfriction.torch.parameters import LAW
 class DistributedModel(FrictionModel):
     """Distributed LuGre friction, differentiable: a bristle `z_i` [m] in every cell, state `[2, N]`; for small patches.
 
-    `zdot_i = v_i - beta sigma_0 |v_i|/g z_i`, `W = sum w_i f_N [t_i ; rho_i x t_i]`,
-    `t_i = -(sigma_0 z_i + sigma_1 zdot_i + sigma_2 v_i)`; the same numbers as `planarfriction.DistributedModel`.
+    `zdot_i = v_i - beta sigma_0 |v_i|/g z_i`, `W = sum w_i f_N [t_i ; rho_i x t_i]`, `t_i = -(sigma_0 z_i + sigma_1
+    zdot_i + sigma_2 v_i)`; the same numbers as `planarfriction.DistributedModel`.
 
-    `trainable` names the parameters of the law that are `nn.Parameter`s, and `"weights"` for the pressure: the weights
-    `w_i` of the cells are the softmax of a raw parameter, so that they stay positive and add up to 1. A patch whose
-    shape depends on the load keeps that of `normal_force` [N].
+    `trainable` names the parameters of the law that are `nn.Parameter`s. With `"weights"` the pressure is trainable
+    too: the weights `w_i` of the cells are the softmax of a raw parameter, so that they stay positive and add up to 1.
+    If the shape of the patch depends on the load, the shape at `normal_force` [N] is kept.
 
     Source: Waltersson and Karayiannidis 2024, section III.
     """
@@ -65,5 +65,5 @@ class DistributedModel(FrictionModel):
         return torch.softmax(self.raw_weights, 0)
 
     def prepare(self, parameters: Tensor) -> tuple[Prepared]:
-        """The law and the cells."""
+        """Prepare the law and the cells for a roll-out."""
         return (Prepared(self._law(parameters), Cells(self.positions, self.weights)),)

@@ -50,14 +50,14 @@ class Surface(nn.Module):
 class ReducedModelPublished(FrictionModel):
     """Reduced LuGre friction, differentiable: three bristles `z = (z_x, z_y, z_tau)` [m, m, m^2] and a limit surface.
 
-    With `S = diag(1, 1, r)`, `V_S = S V`, `v_n = |V_S|`: `zdot = S h(V) v_n - beta sigma_0 v_n/g(v_n) z`,
-    `W = -(sigma_0 z + sigma_1 zdot + sigma_2 U V) f_N`; the same numbers as `planarfriction.ReducedModelPublished`.
+    With `S = diag(1, 1, r)`, `V_S = S V`, `v_n = |V_S|`: `zdot = S h(V) v_n - beta sigma_0 v_n/g(v_n) z`, `W =
+    -(sigma_0 z + sigma_1 zdot + sigma_2 U V) f_N`; the same numbers as `planarfriction.ReducedModelPublished`.
 
     `surface` is any limit surface (None: the published table). `trainable` names the physical parameters that are
     `nn.Parameter`s, of the law or of the shape (`contact_radius`, `second_moment`, `centre_x`, `centre_y`); the limit
     surface and all other parameters are buffers. A new contact radius scales the torque and leaves the form of the
-    limit surface as it is. The shape does not follow the load: of a patch that depends on it, `surface` fixes the shape
-    by its `normal_force`.
+    limit surface unchanged. The shape does not change with the load: if that of the patch does, it is fixed by the
+    `normal_force` of `surface`.
 
     Source: Waltersson and Karayiannidis 2024, section IV.
     """
@@ -66,7 +66,7 @@ class ReducedModelPublished(FrictionModel):
     components = (3,)
     axes = 1
     root: Tensor | None
-    """Symmetric root of the friction metric `[2, 2]`, of a patch that has one."""
+    """Symmetric root of the friction metric `[2, 2]`, if the patch has one."""
 
     def __init__(
         self,
@@ -96,7 +96,7 @@ class ReducedModelPublished(FrictionModel):
         return Compiled(pack, (self.surface.data,) if self.root is None else (self.surface.data, self.root), 1)
 
     def prepare(self, parameters: Tensor) -> tuple[Prepared]:
-        """The law, `r`, `<rho^2>`, the centre of pressure, and the limit surface."""
+        """Prepare the law, `r`, `<rho^2>`, the centre of pressure, and the limit surface for a roll-out."""
         radius, second_moment, x, y = parameters[..., len(LAW) :].split(1, -1)
         shape = PublishedNumbers(radius, second_moment, x, y, self.surface, self.root)
         return (Prepared(self._law(parameters), shape),)

@@ -26,26 +26,27 @@ PARAMETERS = tuple(name for name in LAW if name != "gamma")
 
 
 class ReducedModel(FrictionModel):
-    """Reduced LuGre friction of bristle moments, differentiable: three states `(z_x, z_y, z_theta)` [m] a part.
+    """Reduced LuGre friction of bristle moments, differentiable: three states `(z_x, z_y, z_theta)` [m] per part.
 
-    The equations and the numbers of `planarfriction.ReducedModel`, states of several parts `[..., P, 3]`; buffers hold
-    its patch with the maps of steady sliding. `trainable` names the parameters of the law that are `nn.Parameter`s;
-    `gamma` cannot be one, the maps are made for it. A patch whose shape depends on the load keeps that of
-    `normal_force` [N]; `parts`, `segments` and `speeds` as in `planarfriction.ReducedModel`.
+    The equations and the numbers of `planarfriction.ReducedModel`; with several parts the state has shape `[..., P,
+    3]`. The patch, with its maps of steady sliding, is stored in buffers. `trainable` names the parameters of the law
+    that are `nn.Parameter`s; `gamma` cannot be one, because the maps depend on it. If the shape of the patch depends on
+    the load, the shape at `normal_force` [N] is kept; `parts`, `segments` and `speeds` as in
+    `planarfriction.ReducedModel`.
 
-    Raises InvalidValueError where `trainable` names gamma, or something that the law has not.
+    Raises InvalidValueError if `trainable` names gamma, or something that is not a parameter of the law.
     """
 
     arrays = reduced_arrays
     axes = 1
     share: Tensor
-    """Of the load that each part carries, `[P]`."""
+    """Share of the load that each part carries, `[P]`."""
     factor: Tensor
     """F of each part, `[P, 3, 3]`."""
     map: Tensor
-    """Steady sliding of the parts, one behind the other; in single precision, as compiled roll-outs read it."""
+    """Steady sliding of all parts, one after the other; in single precision, as compiled roll-outs read it."""
     gamma: Tensor
-    """Stribeck exponent that the maps are made for [-]."""
+    """Stribeck exponent for which the maps were made [-]."""
 
     def __init__(
         self,
@@ -88,7 +89,7 @@ class ReducedModel(FrictionModel):
         super()._load_from_state_dict(state_dict, prefix, *rest)
 
     def law(self) -> LuGre:
-        """The law with the present values."""
+        """The law with the current values."""
         now = dict(zip(self.names, self.physical().tolist(), strict=True))
         elastic = ElastoPlastic(now.pop("breakaway_ratio"))
         return LuGre(**now, gamma=float(self.gamma), elasto_plastic=elastic if self.elasto_plastic else None)
@@ -99,7 +100,7 @@ class ReducedModel(FrictionModel):
         return Compiled(pack, (self.share, self.factor, self.map), len(self.components))
 
     def prepare(self, parameters: Tensor) -> tuple[Prepared, ...]:
-        """The law and the parts; their shapes are fixed."""
+        """Prepare the law and the parts for a roll-out; their shapes are fixed."""
         values = dict(zip(PARAMETERS, parameters[..., None].unbind(-2), strict=True))
         law = LawNumbers(**values, gamma=self.gamma, elasto_plastic=self.elasto_plastic)
         shapes = reduced_arrays.parts_of(self.factor, self.map, self.sizes)

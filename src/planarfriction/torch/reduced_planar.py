@@ -1,7 +1,7 @@
-"""The paper's reduced model built from numbers, for scripts that know it by this name.
+"""The paper's reduced model built from plain numbers, for scripts that use it under this name.
 
-The same model as `planarfriction.torch.ReducedModelPublished`, without a contact patch: eight trainable numbers, the
-ellipsoid as limit surface. With another limit surface it is the model as the library corrects it.
+The same model as `planarfriction.torch.ReducedModelPublished`, without a contact patch: eight trainable numbers, and
+the ellipsoid as limit surface. With another limit surface it is the corrected model of the library.
 """
 
 from __future__ import annotations
@@ -144,7 +144,8 @@ class ReducedPlanarLuGre(ReducedModelPublished):
         return load[..., None] * self.arrays.wrench(xp, law, shape, z, self._number("z_dot", z_dot), by)
 
     def step(self, z: Tensor, v: Tensor, f_n: Tensor | float, dt: Tensor | float) -> tuple[Tensor, Tensor]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Bristles after `dt` [s] of a held twist, and the wrench at the end: exact, stable at any `dt`."""
+        """Advance by `dt` [s] at a constant twist; returns the bristles and the wrench at the end. Exact, stable at any
+        `dt`."""
         return super().step(z, v, f_n, dt)
 
     def forward(self, z: Tensor, v: Tensor, f_n: Tensor | float) -> tuple[Tensor, Tensor]:  # pyright: ignore[reportIncompatibleMethodOverride]

@@ -20,7 +20,7 @@ METHODS = ("adjoint", "eager")
 
 @by_parts
 class Rollout(NamedTuple):
-    """A model stepped through T twists and loads."""
+    """Result of stepping a model through T twists and loads."""
 
     state: Tensor
     """State after the last step, `[..., *components]`."""
@@ -38,14 +38,14 @@ def rollout(
     parameters: Tensor | None = None,
     method: str | None = None,
 ) -> Rollout:
-    """The steps of a model from `state` (None: at rest) through `twist` `[..., T, 3]`, each held for `dt` [s].
+    """Step a model from `state` (None: at rest) through `twist` `[..., T, 3]`, each held for `dt` [s].
 
     `normal_force` broadcasts with `[..., T]`: one number, one for each step `[T]`, or one for each contact `[..., 1]`.
     Gradients reach the parameters of the model, `state`, `twist`, `normal_force` and `parameters`.
 
-    `method` is `"adjoint"`, the compiled roll-out with its discrete adjoint (reduced models on the processor, first
+    `method` is `"adjoint"`, the compiled roll-out with its discrete adjoint (reduced models on the CPU, first
     derivatives), or `"eager"`, PyTorch operations step by step (any model and device, derivatives of any order, also
-    to `dt`); None takes the adjoint where it can.
+    with respect to `dt`); None uses the adjoint if possible.
 
     Raises `InvalidValueError` as a step does (see `FrictionModel`), and for a method that is not possible.
     """
@@ -105,10 +105,10 @@ def tracking_loss(
     parameters: Tensor | None = None,
     method: str | None = None,
 ) -> Tensor:
-    """Mean squared error of a `rollout` against measured `wrenches` `[..., T, 3]`, as a share of the load.
+    """Mean squared error of a `rollout` compared with measured `wrenches` `[..., T, 3]`, relative to the load.
 
     `mean(((fx - fx*)/f_N)^2 + ((fy - fy*)/f_N)^2 + ((tau - tau*)/(f_N r))^2)` over the samples with load. The scales
-    are constants, r that of the patch. The other arguments are those of `rollout`.
+    are constants; r is that of the patch. The other arguments are those of `rollout`.
     """
     run = rollout(model, state, twist, normal_force, dt, parameters=parameters, method=method)
     measured, load = (
