@@ -320,8 +320,7 @@ class ContactPatch(Anisotropy):
     def contact_radius(self, normal_force: ArrayLike | None = None) -> float | np.ndarray:
         """Contact radius `r = sum(w |rho - CoP|)` [m]: a pure spin about the CoP has the friction torque `mu f_N r`.
 
-        With a friction metric it is `sum(w |L J (rho - CoP)|)`, where J is a quarter turn, and the second moment
-        changes in the same way.
+        With a friction metric `sum(w |L J (rho - CoP)|)`, J a quarter turn; the second moment likewise.
         """
         weights, *offset = self._about_centre_of_pressure(normal_force)
         return (weights * np.hypot(*self.lever_coordinates(*offset))).sum(-1)

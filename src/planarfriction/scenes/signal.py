@@ -201,7 +201,7 @@ class Signal(ByValue):
         return self.values[i] + slope * self._spread(breaks[:-1] - self.times[i]), slope
 
     def check_non_negative(self, name: str) -> None:
-        """Raise InvalidValueError with `name`, time and value if the signal is below zero anywhere."""
+        """Check that the signal is never below zero. Raises InvalidValueError with `name`, time and value otherwise."""
         below = np.argwhere(self.values < 0.0)
         if len(below):
             i = int(below[0][0])
