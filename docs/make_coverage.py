@@ -1,4 +1,4 @@
-"""Count how often intervals contain the true value, and write identification-coverage.md: `python docs/make_coverage.py`.
+"""Count how often intervals contain the true value; writes identification-coverage.md: `python docs/make_coverage.py`.
 
 The counts are kept in the file given by `--kept`, so that an interrupted run can be continued.
 """

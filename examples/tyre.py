@@ -77,13 +77,8 @@ def bend(z: np.ndarray, velocity: np.ndarray, dt: np.ndarray, law: LawNumbers) -
 def roll(slips: np.ndarray, steps: int = COLUMNS, *, slide_back: bool = True) -> Rolling:
     """Roll by `steps` columns from relaxed bristles, with each of `slips` `(vx, vy, omega)` per unit rolling speed.
 
-<<<<<<< HEAD
-    `slips` `[slips, 3]` [1, 1, 1/m] is the twist of the patch over the ground, less the rolling. With
-    `slide_back=False` bristles above their largest deflection relax as in LuGre.
-=======
     `slips` `[slips, 3]` [1, 1, 1/m] is the twist of the patch relative to the ground, without the rolling motion. With
     `slide_back=False`, bristles above their largest deflection relax according to the LuGre law instead.
->>>>>>> e804e5d (Plain English in the examples)
     """
     patch = patch_of_a_tyre()
     law, load = bristles(patch), LOAD * patch.weights()

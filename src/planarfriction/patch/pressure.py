@@ -1,4 +1,4 @@
-"""Pressure laws: how the normal load is distributed over a patch. Only ratios matter; a patch scales them to the load."""
+"""Pressure laws: how the normal load is distributed over a patch. Only ratios matter; the patch scales to the load."""
 
 from __future__ import annotations
 
