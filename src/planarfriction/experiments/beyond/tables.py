@@ -152,7 +152,7 @@ def _step(costs: dict[str, dict[str, list[float]]]) -> Table:
         for model, each in costs.items()
     ]
     note = "Medians, in brackets the quartiles; ratios within a round, in which all models take part."
-    return Table("Step in a compiled loop, disc", ("model", "time [µs]", "over the published model's"), rows, note)
+    return Table("Step in a compiled loop, disc", ("model", "time [µs]", "relative to the published model"), rows, note)
 
 
 def _spread(values: Iterable[float]) -> str:
