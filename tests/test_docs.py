@@ -185,6 +185,29 @@ def test_names_exist(page):
             assert resolve(name), f"{page.name}: {name}"
 
 
+EXPLANATION = ("physics", "exact-surfaces", "reduced-model", "solver", "contact-space", "anisotropy")
+"""Pages that give equations and say which code holds them."""
+
+
+def test_every_formula_stands_on_a_page():
+    from planarfriction import formulas
+
+    text = "".join(prose(ROOT / "docs" / f"{name}.md") for name in EXPLANATION)
+    own = [value for value in vars(formulas).values() if inspect.isfunction(value)]
+    public = [each.__name__ for each in own if each.__module__ == formulas.__name__ and each.__name__[0] != "_"]
+    missing = [name for name in public if f"`formulas.{name}`" not in text]
+    assert not missing
+
+
+@pytest.mark.parametrize("name", EXPLANATION)
+def test_equations_say_where_they_are_in_the_code(name):
+    """Each section with an equation set apart names a function, a method or a module of ours."""
+    text = prose(ROOT / "docs" / f"{name}.md")
+    for section in re.split(r"^(?=##+ )", text, flags=re.MULTILINE):
+        named = [each for each in NAME.findall(section) if each.split(".")[0] in MODULES | set(planarfriction.__all__)]
+        assert "$$" not in section or any(map(resolve, named)), section.splitlines()[0]
+
+
 def test_scenes_page_names_every_key_and_every_member():
     from planarfriction import SoftFinger
     from planarfriction.scenes import files

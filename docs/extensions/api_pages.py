@@ -18,7 +18,7 @@ from sphinx.application import Sphinx
 from sphinx.ext.napoleon import NumpyDocstring
 from sphinx.pycode import ModuleAnalyzer
 
-import planarfriction
+import planarfriction.kernels
 from planarfriction.described import HEADING
 
 OPTIONAL = ("torch", "jax", "adapters.mujoco", "adapters.mjx", "adapters.drake")
@@ -96,6 +96,8 @@ def kernels_page(pages: Path) -> list[str]:
         "Internal: no promise is made about them. They are here since the pages name them beside their equations.",
         "",
     ]
+    for each in sorted({name.split(".")[1] for name in named} - modules):
+        lines += entry(f"planarfriction.kernels.{each}", getattr(planarfriction.kernels, each))
     for module_name in sorted({name.split(".")[1] for name in named} & modules):
         module = importlib.import_module(f"planarfriction.kernels.{module_name}")
         lines += [*heading(f"kernels.{module_name}", "-"), f".. automodule:: {module.__name__}", "   :no-members:", ""]
