@@ -73,8 +73,10 @@ nitpick_ignore_regex = [
 
 # -- the gallery: every script is run, and again when it has changed
 
-NEEDS = {"torch": "torch", "jax": "jax", "mujoco": "mujoco", "pydrake": "drake"}
-WITHOUT = "|".join(f"_{NEEDS[name]}" for name in MISSING)
+ENDS = {"torch": "torch", "jax": "jax", "mujoco": "mujoco", "plotly": "interactive"}
+"""Package -> how the names of scripts end that need it: without it they are left out."""
+WITHOUT = "|".join(f"_{end}" for name, end in ENDS.items() if importlib.util.find_spec(name) is None)
+THEMES = ("patches", "laws", "limit_surfaces", "motion", "derivatives", "hosts")
 sphinx_gallery_conf = {
     "examples_dirs": ["../examples/gallery", "../examples/notebooks"],
     "gallery_dirs": ["gallery", "notebooks"],
@@ -88,6 +90,7 @@ sphinx_gallery_conf = {
     "download_all_examples": False,
     "write_computation_times": False,
     "nested_sections": False,
+    "subsection_order": [*(f"../examples/gallery/{theme}" for theme in THEMES), "*"],
     "within_subsection_order": "FileNameSortKey",
     "abort_on_example_error": False,
 }
@@ -97,6 +100,8 @@ sphinx_gallery_conf = {
 html_theme = "furo"
 html_title = f"planarfriction {version}"
 html_static_path = ["static"]
+if plotly := importlib.util.find_spec("plotly"):  # for figures that turn: nothing is loaded from elsewhere
+    html_static_path.append(str(Path(plotly.origin or "").parent / "package_data" / "plotly.min.js"))
 html_css_files = ["site.css"]
 html_show_sphinx = False
 html_copy_source = False

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -49,6 +50,16 @@ def test_equations_names_and_terms_are_links(site):
     assert 'href="glossary.html#term-limit-surface"' in physics
 
 
+def test_every_formula_and_loop_that_a_page_names_is_a_link(site):
+    named = r'(<a [^>]*>)?<code[^>]*><span class="pre">((?:formulas|kernels)\.(?!py<)[\w.]+)</span></code>'
+    found = 0
+    for page in site.glob("*.html"):
+        for link, name in re.findall(named, page.read_text(encoding="utf-8")):
+            assert link, f"{page.name}: {name}"
+            found += 1
+    assert found > 50
+
+
 def test_every_public_name_is_in_the_reference(site):
     import planarfriction
 
@@ -59,7 +70,19 @@ def test_every_public_name_is_in_the_reference(site):
 
 
 def test_the_gallery_has_a_picture_for_each_script(site):
-    scripts = [path.stem for path in (ROOT / "examples" / "gallery").glob("plot_*.py")]
-    assert len(scripts) >= 20
-    for name in scripts:
-        assert f"sphx_glr_{name}_001.png" in (site / "gallery" / f"{name}.html").read_text(encoding="utf-8"), name
+    scripts = list((ROOT / "examples" / "gallery").rglob("plot_*.py"))
+    assert len(scripts) >= 30
+    for path in scripts:
+        needs = {"torch": "torch", "jax": "jax", "mujoco": "mujoco", "interactive": "plotly"}.get(
+            path.stem.split("_")[-1]
+        )
+        if needs is None or importlib.util.find_spec(needs):
+            page = (site / "gallery" / path.parent.name / f"{path.stem}.html").read_text(encoding="utf-8")
+            assert f"sphx_glr_{path.stem}_001.png" in page, path.name
+
+
+def test_a_figure_that_turns_brings_its_code(site):
+    pytest.importorskip("plotly")
+    folder = site / "gallery" / "limit_surfaces"
+    (code,) = re.findall(r'<script src="([^"]*plotly[^"]*)">', (folder / "plot_26_interactive.html").read_text("utf-8"))
+    assert (folder / code).resolve().is_file()

@@ -12,8 +12,7 @@ patch = pf.ContactPatch.disc(0.01, cells=41, pressure=pf.SoftFinger(c=0.01, k=2.
 figure = patch.plot(normal_force=1.0)
 
 # %%
-# Half of what a patch does in a spin is its contact radius: a spin has the torque ``mu f_N r``. For this pressure
-# it is ``3 pi/16`` of the outer radius.
+# A pure spin has the torque ``mu f_N r``, r the contact radius: for this pressure ``3 pi/16`` of the outer radius.
 ratio = patch.contact_radius(1.0) / 0.01
 print(f"r/R = {ratio:.4f}")
 assert abs(ratio - 0.5890) < 2e-3
