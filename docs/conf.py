@@ -45,7 +45,7 @@ smartquotes = False  # options of commands have two hyphens
 
 # -- pages in Markdown: colon fences, so that the Python of a page stays easy to find for the tests
 
-myst_enable_extensions = ["amsmath", "attrs_inline", "colon_fence", "deflist", "dollarmath"]
+myst_enable_extensions = ["amsmath", "attrs_block", "attrs_inline", "colon_fence", "deflist", "dollarmath"]
 myst_heading_anchors = 4
 html_math_renderer = "mathml"  # by docutils: nothing is loaded from elsewhere when a page is read
 
