@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import subprocess
 import sys
@@ -16,10 +17,12 @@ from mpl_toolkits.mplot3d import Axes3D
 
 import planarfriction as pf
 import synthetic
+from pictures import faults
 from planarfriction import plots
 from planarfriction.errors import InvalidValueError, MissingExtraError
+from planarfriction.experiments import looks
 from planarfriction.patch import PUBLISHED_PATCHES
-from planarfriction.plots import motion, style
+from planarfriction.plots import histories, motion, style
 from planarfriction.plots.limit_surface import (
     AZIMUTH_SEGMENTS,
     POLAR_SEGMENTS,
@@ -437,7 +440,8 @@ def test_units_suit_the_numbers(kind, exponent, sign):
     assert unit == style.unit_for(kind, np.array([value]))
     names = {"N mm": 1e3, "N µm": 1e6, "mm/s": 1e3, "µm/s": 1e6, "nm/s": 1e9, "deg": 180 / np.pi, "µrad": 1e6}
     names |= {"m": 1, "mm": 1e3, "µm": 1e6, "nm": 1e9, "m/s": 1, "N": 1, "kN": 1e-3, "mN": 1e3, "N m": 1}
-    names |= {"MPa": 1e-6, "kPa": 1e-3, "Pa": 1}
+    names |= {"GPa": 1e-9, "MPa": 1e-6, "kPa": 1e-3, "Pa": 1, "µN": 1e6, "nN": 1e9, "kN m": 1e-3, "N nm": 1e9}
+    names |= {"km": 1e-3, "km/s": 1e-3, "h": 1 / 3600, "s": 1, "ms": 1e3, "µs": 1e6, "ns": 1e9}
     assert unit.factor == pytest.approx(names[unit.label])
 
 
@@ -466,3 +470,122 @@ def test_zero_is_shown_in_the_usual_unit():
 def test_what_cannot_be_drawn_is_named_in_one_line(call, message):
     with pytest.raises(InvalidValueError, match=message):
         call()
+
+
+# ---------------------------------------------------------------------- nothing cut, covered or empty
+
+
+def changed(run: pf.Solution, every: float = 1.0, **values) -> pf.Solution:
+    """The solution with other values of some variables, and its times so many times as long."""
+    run = with_values(run, **values)
+    return dataclasses.replace(run, histories=run.data.assign_coords(time=every * run.data["time"]))
+
+
+def scaled(by: float) -> pf.Solution:
+    """All lengths and forces so many times as large; the body and its patch stay as they are."""
+    run = synthetic.solution()
+    return with_values(run, **{name: by * run.data[name].values for name in ("x", "y", "vx", "vy", *FORCES)})
+
+
+def resting() -> pf.Solution:
+    run = synthetic.solution()
+    return with_values(run, **{name: 0.0 * run.data[name].values for name in ("x", "y", "theta", "vx", "vy", "omega")})
+
+
+FORCES = ("fx", "fy", "tau", "normal_force")
+LONG = "a name that is rather long for a plate in the hand of somebody"
+AWKWARD = {
+    "microseconds": lambda: changed(synthetic.solution(), 1e-6),
+    "days": lambda: changed(synthetic.solution(), 1e5),
+    "one sample": lambda: dataclasses.replace(synthetic.solution(), histories=synthetic.solution().data.isel(time=[0])),
+    "tiny": lambda: scaled(1e-9),
+    "far": lambda: with_values(synthetic.solution(), x=3e4 * np.linspace(0.0, 1.0, 201)),
+    "no outline": lambda: synthetic.solution(synthetic.scene(mounted_on="body", outline=None)),
+    "legs": lambda: synthetic.solution(synthetic.scene(patch=pf.ContactPatch.points([(0.0, 0.1), (-0.1, -0.05)]))),
+    "long names": lambda: synthetic.solution(synthetic.scene(contacts=3, name=LONG)),
+}
+
+
+@pytest.mark.parametrize("name", ["microseconds", "one sample", "tiny", "far", "no outline", "legs"])
+def test_nothing_is_wrong_with_the_picture_of_a_motion(name):
+    assert faults(plots.plot_motion(AWKWARD[name]())) == []
+
+
+@pytest.mark.parametrize("name", ["days", "tiny", "long names"])
+def test_nothing_is_wrong_with_histories(name):
+    assert faults(plots.plot_histories(AWKWARD[name]())) == []
+
+
+def test_one_sample_is_seen():
+    lines = plots.plot_histories(AWKWARD["one sample"]()).axes[0].get_lines()
+    assert [line.get_marker() for line in lines] == ["o"]
+
+
+@pytest.mark.parametrize("labels", [[f"mu_c = {i / 100:.2f}, mass = {i}" for i in range(30)], [LONG, 2 * LONG]])
+def test_many_runs_and_long_names_of_them_fit(labels):
+    runs = {label: synthetic.solution(scale=1.0 + 0.1 * i) for i, label in enumerate(labels)}
+    figure = plots.plot_histories(runs)
+    assert faults(figure) == []
+    assert len(figure.axes[1].get_lines()) == len(labels)
+    assert len(figure.legends[0].get_texts()) == min(len(labels), histories.NAMED)
+
+
+PATCHES = {
+    "one cell": lambda: (pf.ContactPatch.rectangle(0.01, 0.01, cells=1), 1.0),
+    "one point": lambda: (pf.ContactPatch.points([(0.0, 0.0)]), 1.0),
+    "wide": lambda: (pf.ContactPatch.rectangle(0.4, 0.004, cells=40), 2.0),
+    "tall": lambda: (pf.ContactPatch.rectangle(0.004, 0.4, cells=5), 2.0),
+    "line": lambda: (PUBLISHED_PATCHES["Line"](), None),
+    "map": lambda: (
+        pf.ContactPatch.from_pressure(np.ones((90, 120)), cell_size=1e-4, name=LONG + " there"),
+        123456.789,
+    ),
+    "without load": lambda: (pf.ContactPatch.disc(0.01, 11), 0.0),
+    "nanometres": lambda: (tiny_patch(), 1e-9),
+}
+
+
+def tiny_patch() -> pf.ContactPatch:
+    with pytest.warns(UserWarning, match="are its lengths in metres"):
+        return pf.ContactPatch.disc(1e-9, 11)
+
+
+@pytest.mark.parametrize("name", PATCHES)
+def test_nothing_is_wrong_with_the_picture_of_a_patch(name):
+    patch, load = PATCHES[name]()
+    assert faults(plots.plot_patch(patch, normal_force=load)) == []
+
+
+def test_a_model_has_its_colour_in_every_figure():
+    patch, law = pf.ContactPatch.disc_published(0.01, 7), pf.LuGre(mu_s=1.2)
+    models = {
+        "a": pf.ReducedModel(patch, law),
+        "b": pf.DistributedModel(patch, law),
+        "c": pf.ReducedModelPublished(patch, law),
+        "d": pf.ReducedModel(patch, law, parts=2),
+    }
+    scene = synthetic.scene()
+    runs = {
+        name: synthetic.solution(dataclasses.replace(scene, contacts=[pf.Contact(model, 2.0, name="pad")]))
+        for name, model in models.items()
+    }
+    drawn = [line.get_color() for line in plots.plot_histories(runs).axes[0].get_lines()]
+    assert drawn == [style.MOMENTS, style.DISTRIBUTED, style.PUBLISHED, style.PARTS]
+    assert tuple(drawn) == (looks.MOMENTS, looks.DISTRIBUTED, looks.REDUCED, looks.PARTS)
+
+
+def test_a_body_that_is_tiny_beside_its_path_is_drawn_larger_and_says_so():
+    figure = plots.plot_motion(AWKWARD["far"]())
+    times = float(figure.axes[0].get_title(loc="left").split()[2])
+    plate = outlines(figure)[0]
+    assert np.ptp(plate, axis=0) == pytest.approx(times * np.array([150.0, 80.0]), rel=1e-6)
+    assert plots.plot_motion(synthetic.solution()).axes[0].get_title(loc="left") == ""
+    assert plots.plot_motion(resting()).axes[0].get_title(loc="left") == "it does not move"
+
+
+def test_the_turn_of_a_round_body_shows():
+    angle = np.linspace(0.0, 2.0 * np.pi, 40)[:-1]
+    scene = synthetic.scene(outline=0.05 * np.stack([np.cos(angle), np.sin(angle)], -1))
+    lines = motion._body_lines(synthetic.solution(scene))
+    assert len(lines) == 2 and lines[1] == pytest.approx(np.array([[0.0, 0.0], [0.05, 0.0]]))
+    assert len(motion._body_lines(synthetic.solution())) == 1

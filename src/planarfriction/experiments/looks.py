@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from planarfriction.plots.style import PALETTE
+from planarfriction.plots.style import DISTRIBUTED, ELLIPSOID, EXACT, MOMENTS, OTHER, PARTS
+from planarfriction.plots.style import PUBLISHED as REDUCED
 
-DISTRIBUTED, REDUCED, ELLIPSOID, MOMENTS, PARTS, OTHER, EXACT = PALETTE
-"""Colours: sums over cells and their model, the published table and its model, the ellipsoid and its model,
-`ReducedModel` with one part, with several, something else, what is exact."""
+__all__ = ["DISTRIBUTED", "ELLIPSOID", "EXACT", "MOMENTS", "OF_CAUSE", "OF_MODEL", "OTHER", "PARTS", "REDUCED"]
 
 OF_MODEL = {"d": DISTRIBUTED, "r": REDUCED, "e": ELLIPSOID}
 """Letter of a model in the names of curves -> its colour."""

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch, Patch
+from matplotlib.patheffects import withStroke
 from matplotlib.transforms import Affine2D
 
 from planarfriction import geometry
@@ -64,9 +65,8 @@ class Film:
                 self.panels.append(SurfacePanel(self.figure.add_axes(surface, projection="3d"), each))
         self._draw_body(solution)
         self.views = _filling(_views(solution, track, follow), self.axes.bbox.width / self.axes.bbox.height)
-        self.axes.set(xlabel="x [mm]", ylabel="y [mm]")
+        style.show_lengths(self.axes, 1e-3 * float(np.abs(self.views).max()))
         self.axes.yaxis.set_label_coords(0.022, 0.5, transform=self.figure.transFigure)  # clear of any tick label
-        self.axes.ticklabel_format(useOffset=False)
         self.axes.locator_params(nbins=7)
         style.tidy(self.axes)
         self._legend()
@@ -120,6 +120,7 @@ class Film:
             cells.set_zorder(4)
             look = {"arrowstyle": "-|>,head_length=5,head_width=2.5", "linewidth": 2.2, "shrinkA": 0, "shrinkB": 0}
             arrow = FancyArrowPatch((0, 0), (1, 1), color=style.PALETTE[2], zorder=7, **look)
+            arrow.set_path_effects([withStroke(linewidth=4.2, foreground="white")])
             self.contacts.append((each, cells, axes.add_patch(arrow)))
         self.centre = centre_mark(axes)
         self.still = still_speed(track.twists)
@@ -152,9 +153,11 @@ class Film:
     def _moved(self, frame: int) -> str:
         """How far the body has come, in units that fit the whole motion."""
         way = self.track.poses - self.track.poses[0]
-        length, angle = style.unit_for("length", way[:, :2]), style.unit_for("angle", way[:, 2])
-        x, y, turn = np.round(way[frame] * (length.factor, length.factor, angle.factor), 2) + 0.0  # no -0.00
-        return f"moved by x {x:.2f}, y {y:.2f} {length.label}, turned by {turn:.2f} {angle.label}"
+        parts = []
+        for words, kind, column in (("moved by x", "length", 0), ("y", "length", 1), ("turned by", "angle", 2)):
+            unit = style.unit_for(kind, way[:, column])
+            parts.append(f"{words} {round(unit.factor * way[frame, column], 2) + 0.0:.2f} {unit.label}")  # no -0.00
+        return ", ".join(parts)
 
 
 def _places(contacts: int) -> tuple[tuple, list[tuple]]:

@@ -85,12 +85,24 @@ def _palette(frame: Callable[[int], np.ndarray], count: int) -> Image.Image:
     from PIL import Image
 
     chosen = np.unique(np.linspace(0, count - 1, PALETTE_FRAMES).round().astype(int))
-    sheet = Image.fromarray(np.concatenate([frame(int(each)) for each in chosen]))
+    pixels = np.concatenate([frame(int(each)).reshape(-1, 3) for each in chosen])
+    colours, counts = np.unique(pixels @ np.array([1 << 16, 1 << 8, 1]), return_counts=True)
+    often = np.repeat(colours, np.ceil(np.sqrt(counts)).astype(int))  # what is rare has its colours too
+    sheet = Image.fromarray(_colours(often)[None])
     found = sheet.quantize(256, method=Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
-    colours = np.array(found.getpalette(), dtype=np.uint8).reshape(-1, 3)
-    colours[colours.min(axis=1) >= WHITE] = 255  # the cut makes a mean of white and its neighbours
-    found.putpalette(colours.tobytes())
+    table = np.array(found.getpalette(), dtype=np.uint8).reshape(-1, 3)
+    order = np.argsort(counts)
+    each = _colours(colours[order])
+    nearest = np.asarray(Image.fromarray(each[None]).quantize(palette=found, dither=Image.Dither.NONE))[0]
+    table[nearest] = each  # the most frequent of those that it stands for comes last: means are colours of nothing
+    table[table.min(axis=1) >= WHITE] = 255  # Pillow looks for the nearest coarsely
+    found.putpalette(table.tobytes())
     return found
+
+
+def _colours(packed: np.ndarray) -> np.ndarray:
+    """Red, green and blue `[N, 3]`, each a byte, of colours in one number `[N]`."""
+    return np.stack([packed >> 16, packed >> 8 & 255, packed & 255], -1).astype(np.uint8)
 
 
 def _write_gif(file: io.BytesIO, frame: Callable[[int], np.ndarray], count: int, fps: float) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -21,6 +21,12 @@ LEAST_SPAN = 0.02
 
 KICK = 5.0
 """A first sample this many times larger than all others does not set the height of its panel."""
+
+NAMED = 6
+"""Runs that the legend names where there are more than colours."""
+
+LONGEST, LETTER, HANDLE = 60, 6.6, 48.0
+"""Letters in a line of the legend; width of a letter, and of a line with its gaps [pt]."""
 
 # Panels of the body and of the contacts: title, kind of unit, and how to get the values from the dataset.
 _BODY = (
@@ -41,8 +47,9 @@ def plot_histories(solutions: Solution | Mapping[str, Solution]) -> style.PlotFi
     """Plot position, angle, speed, forces, torque and normal force against time.
 
     `solutions` is one solution or a mapping from label to solution; several are overlaid. Colours distinguish the runs,
-    line styles their contacts. Left the body (world axes, centre of mass), right the contacts: the friction wrench on
-    the body about the origin of the contact frame, and the normal force.
+    the same for a model in every figure, line styles their contacts; with more than 7 runs the colours go from the
+    first to the last, and the legend names some. Left the body (world axes, centre of mass), right the contacts: the
+    friction wrench on the body about the origin of the contact frame, and the normal force.
     """
     figure = style.new_figure(9.6, 8.0)
     draw_histories(figure, solutions)
@@ -51,15 +58,18 @@ def plot_histories(solutions: Solution | Mapping[str, Solution]) -> style.PlotFi
 
 def draw_histories(figure: Any, solutions: Solution | Mapping[str, Solution]) -> None:
     """Draw the eight panels of `plot_histories` into a figure or subfigure."""
-    runs = {label: each.data for label, each in as_runs(solutions).items()}
+    known = as_runs(solutions)
+    runs = {label: each.data for label, each in known.items()}
+    colours = _colours(list(known.values()))
+    clock = style.unit_for("time", *(data["time"] for data in runs.values()))
     panels = figure.subplots(4, 2, sharex=True)
     for column, quantities in enumerate((_BODY, _CONTACT)):
         lines = [_lines(runs, get) for *_, get in quantities]
         for row, (title, kind, _) in enumerate(quantities):
             alike = [line.shown for other, each in enumerate(lines) if quantities[other][1] == kind for line in each]
-            _draw_panel(panels[row, column], title, kind, lines[row], alike)
+            _draw_panel(panels[row, column], title, kind, lines[row], alike, clock, colours)
     for axes in panels[-1]:
-        axes.set_xlabel("time [s]")
+        axes.set_xlabel(f"time [{clock.label}]")
     panels[0, 0].set_title("body: position, angle, speed", fontsize="medium")
     panels[0, 1].set_title("contacts: friction on the body, normal force", fontsize="medium")
     figure.align_ylabels(panels)
@@ -105,11 +115,20 @@ def _lines(runs: Mapping[str, xr.Dataset], get: Callable) -> list[_Line]:
     return lines
 
 
-def _draw_panel(axes: Any, title: str, kind: str, lines: list[_Line], alike: list[np.ndarray]) -> None:
+def _draw_panel(
+    axes: Any,
+    title: str,
+    kind: str,
+    lines: list[_Line],
+    alike: list[np.ndarray],
+    clock: style.Unit,
+    colours: list[Any],
+) -> None:
     """Draw one panel; `alike` are the values of all panels of its kind in this column, which share their unit."""
     unit = style.unit_for(kind, *alike)
     for line in lines:
-        axes.plot(line.time, unit.factor * line.values, **_look(line.run, line.contact))
+        look = _look(line.run, line.contact, colours) | ({"marker": "o"} if len(line.time) == 1 else {})
+        axes.plot(clock.factor * line.time, unit.factor * line.values, **look)
     low = unit.factor * min(line.shown.min() for line in lines)
     high = unit.factor * max(line.shown.max() for line in lines)
     least = LEAST_SPAN * unit.factor * max(np.abs(values).max() for values in alike)
@@ -121,10 +140,19 @@ def _draw_panel(axes: Any, title: str, kind: str, lines: list[_Line], alike: lis
     style.tidy(axes)
 
 
-def _look(run: int, contact: int) -> dict[str, Any]:
+def _colours(solutions: Sequence[Solution]) -> list[Any]:
+    """Colour of each run: that of its model where every run has another one, else one after the other."""
+    if len(solutions) > len(style.PALETTE):
+        return list(style.TIME_COLOURS(np.linspace(0.0, 1.0, len(solutions))))
+    own = [each.scene and style.model_colour(each.scene.contacts[0].model) for each in solutions]
+    return own if None not in own and len(set(own)) == len(own) else list(style.PALETTE[: len(solutions)])
+
+
+def _look(run: int, contact: int, colours: list[Any]) -> dict[str, Any]:
     # Later runs are drawn dashed over the earlier ones, so that curves that coincide are both seen.
-    line_style = style.LINE_STYLES[(run + contact) % len(style.LINE_STYLES)]
-    return {"color": style.PALETTE[run % len(style.PALETTE)], "linestyle": line_style, "linewidth": 1.4}
+    many = len(colours) > len(style.PALETTE)
+    line_style = style.LINE_STYLES[(contact if many else run + contact) % len(style.LINE_STYLES)]
+    return {"color": colours[run], "linestyle": line_style, "linewidth": 0.9 if many else 1.4}
 
 
 def _legend(figure: Any, axes: Any, runs: dict[str, xr.Dataset]) -> None:
@@ -134,11 +162,22 @@ def _legend(figure: Any, axes: Any, runs: dict[str, xr.Dataset]) -> None:
         [(next(lines), label if data.sizes["contact"] == 1 else f"{label}, {name}") for name in data["contact"].values]
         for label, data in runs.items()
     ]
+    title = None
+    if len(table) > len(style.PALETTE):
+        some = np.unique(np.linspace(0, len(table) - 1, NAMED).round().astype(int))
+        table, title = [table[each] for each in some], f"{len(some)} of {len(table)} runs, coloured in their order"
     columns = max(len(row) for row in table)
     if columns == 1:
         entries = [row[0] for row in table]
     else:  # matplotlib fills a legend column by column: runs of the same contact stand below each other
         entries = [row[column] for column in range(columns) for row in table if column < len(row)]
-    if len(entries) > 1:
-        ncols = min(4, len(entries) if columns == 1 else columns)
-        figure.legend(*zip(*entries, strict=True), loc="outside upper center", ncols=ncols, frameon=False)
+    if len(entries) == 1:
+        return
+    entries = [(line, style.wrapped(words, LONGEST)) for line, words in entries]
+    longest = max(len(line) for _, words in entries for line in words.splitlines())
+    room = int(72.0 * figure.bbox.width / figure.dpi / (LETTER * longest + HANDLE))
+    ncols = max(1, min(4, room, len(entries) if columns == 1 else columns))
+    figure.legend(
+        *zip(*entries, strict=True), loc="outside upper center", ncols=ncols, frameon=False, title=title,
+        title_fontsize="medium",
+    )  # fmt: skip

@@ -15,6 +15,9 @@ if TYPE_CHECKING:
 KINDS = {"N": "force", "N m": "torque", "m": "length", "rad": "angle"}
 """Unit of a channel -> kind of quantity."""
 
+MOST_NOISE = 5.0
+"""Largest residual over the noise that is drawn where it is [-]; the rest stand at the rim."""
+
 MOST_POINTS = 4000
 """Samples that are drawn; of more, evenly chosen ones."""
 
@@ -22,10 +25,11 @@ MOST_POINTS = 4000
 def plot_identification(result: Identification) -> style.PlotFigure:
     """Draw each measured channel with its fit (left) and the residual over the noise (right), logs one after another.
 
-    Residuals of a good fit fill the band of two spreads of the noise and show no pattern. With wrenches, the friction
-    coefficient over the sliding speed is drawn below with the fitted Stribeck curve: where it has no samples, the data
-    say nothing. Beside it the correlation of the residuals over time, which that of noise leaves at zero. At the
-    bottom what fits that saw neither a sample nor its block predict of it, over what was measured.
+    Residuals of a good fit fill the band of two spreads of the noise and show no pattern; triangles at the rim stand
+    for larger ones. With wrenches, the friction coefficient over the sliding speed is drawn below with the fitted
+    Stribeck curve: where it has no samples, the data say nothing. Beside it the correlation of the residuals over time,
+    which that of noise leaves at zero. At the bottom what fits that saw neither a sample nor its block predict of it,
+    over what was measured.
     """
     with_speed = "speed" in result.histories[0]
     rows = len(result.channels)
@@ -41,7 +45,7 @@ def plot_identification(result: Identification) -> style.PlotFigure:
     several = len(result.histories) > 1
     for axes in (left, right):
         axes.set_xlabel("time, one after another [s]" if several else "time [s]")
-    figure.axes[1].set_title("(measured - fitted) / noise", fontsize="medium")
+    figure.axes[1].set_title("(measured \N{MINUS SIGN} fitted) / noise", fontsize="medium")
     if with_speed:
         _draw_speeds(figure.add_subplot(grid[rows, 0]), result)
         _draw_correlations(figure.add_subplot(grid[rows, 1]), result)
@@ -82,11 +86,16 @@ def _draw_channel(left: Any, right: Any, result: Identification, i: int, places:
         off = (each["measured"][:, i] - each["predicted"][:, i]) / result.noise[i]
         every = max(1, len(time) // MOST_POINTS)
         right.plot(time[::every], off[::every], ".", color=style.PALETTE[0], markersize=1.5)
+        beyond = np.abs(off) > MOST_NOISE
+        for sign, marker in ((1.0, "^"), (-1.0, "v")):
+            there = time[beyond & (sign * off > 0.0)][::every]
+            rim = np.full(len(there), 0.96 * sign * MOST_NOISE)
+            right.plot(there, rim, marker, color=style.PALETTE[1], markersize=2.5)
     right.axhspan(-2.0, 2.0, color="0.92", zorder=0)
     left.set_ylabel(f"{name} [{shown.label}]")
     for axes in (left, right):
         style.tidy(axes)
-    right.set_ylim(-5.0, 5.0)
+    right.set_ylim(-MOST_NOISE, MOST_NOISE)
 
 
 def _draw_speeds(axes: Any, result: Identification) -> None:
@@ -136,7 +145,7 @@ def _draw_held_out(axes: Any, result: Identification, i: int) -> None:
     shown = style.unit_for(KINDS[unit], measured)
     every = max(1, len(measured) // MOST_POINTS)
     axes.plot(shown.factor * measured[::every], shown.factor * held_out[::every], ".", color="0.6", markersize=2.0)
-    edge = shown.factor * float(np.abs(measured).max())
-    axes.plot([-edge, edge], [-edge, edge], color=style.PALETTE[1], linewidth=0.9)
+    edges = shown.factor * np.array([measured.min(), measured.max()])
+    axes.plot(edges, edges, color=style.PALETTE[1], linewidth=0.9, zorder=1)
     axes.set(xlabel=f"measured {name} [{shown.label}]", ylabel=f"held-out prediction [{shown.label}]")
     style.tidy(axes)

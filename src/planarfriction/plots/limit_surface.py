@@ -53,7 +53,7 @@ def plot_limit_surface(surface: Any, *, beside: Any = "ellipsoid") -> style.Plot
     shown = _with_names(surface, beside)
     scaled = [scaled_samples(each, *even_mesh(each)) for each, _ in shown]
     limit = 1.05 * max(float(np.abs(mesh).max()) for _, mesh in scaled)
-    figure = style.new_figure(4.8 * len(shown), 4.8)
+    figure = style.new_figure(4.4 * len(shown), 4.3)
     for column, ((directions, mesh), (_, name)) in enumerate(zip(scaled, shown, strict=True)):
         axes = figure.add_subplot(1, len(shown), column + 1, projection="3d")
         draw_surface(axes, mesh, directions, limit)
@@ -151,14 +151,18 @@ def _kind(surface: Any) -> str:
     return (name and SURFACES.words(name)) or type(surface).__name__
 
 
-def draw_surface(axes: Any, mesh: np.ndarray, directions: np.ndarray, limit: float, *, opacity: float = 1.0) -> Any:
-    """Draw a limit surface, points `mesh` `[P, A, 3]` with their `directions`, into 3-D axes up to `limit`."""
+def draw_surface(axes: Any, mesh: np.ndarray, directions: np.ndarray, limit: float, *, paler: float = 0.0) -> Any:
+    """Draw a limit surface, points `mesh` `[P, A, 3]` with their `directions`, into 3-D axes up to `limit`.
+
+    `paler` is the share of white in its colours: facets that let light through would show every seam.
+    """
     # The outward normal of a limit surface is the twist itself: shading needs no differences of the mesh.
     normal = -0.25 * (directions[:-1, :-1] + directions[1:, :-1] + directions[:-1, 1:] + directions[1:, 1:])
     lightness = 0.62 + 0.38 * np.clip(normal @ (_LIGHT / np.linalg.norm(_LIGHT)), -0.6, 1.0)
-    colours = colormaps["cividis"](0.6 + 0.4 * mesh[:-1, :-1, 2] / limit)
+    height = 0.25 * (mesh[:-1, :-1, 2] + mesh[1:, :-1, 2] + mesh[:-1, 1:, 2] + mesh[1:, 1:, 2])
+    colours = colormaps["cividis"](0.6 + 0.4 * height / limit)
     colours[..., :3] *= lightness[..., None]
-    colours[..., 3] = opacity
+    colours[..., :3] += paler * (1.0 - colours[..., :3])
     drawn = axes.plot_surface(
         *np.moveaxis(mesh, -1, 0), rstride=1, cstride=1, facecolors=colours, linewidth=0, antialiased=False, shade=False
     )

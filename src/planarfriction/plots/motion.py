@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.artist import Artist
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import ListedColormap, Normalize
+from matplotlib.colors import Normalize
 from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
@@ -27,42 +26,107 @@ INSTANTS = 12
 PAD_OPACITY = 0.35
 """Opacity of contact patches, so that those of a strobe show through each other."""
 
-_TIME_COLOURS = ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.92, 256)))  # the last yellow is lost on white
+TINY, SEEN = 25.0, 0.08
+"""Of a side of the view this many times longer than the body, which is then drawn as this share of it [-]."""
+
+UNSEEN = 0.01
+"""Share of the size of the body by which it has to move for that to be seen [-]."""
+
+ROUND, CORNERS = 0.02, 12
+"""Share by which the radii of a round outline differ at most [-]; corners that it has at least."""
 
 
 def plot_motion(solution: Solution) -> style.PlotFigure:
     """Draw the outline of the body at 12 instants, evenly spaced in time and coloured by time, with the contact
     patches.
 
-    World axes in mm, equal scales. Patches fixed to the world are drawn once; patches on the body, and pads that are
-    driven, at each instant. A body without an outline is drawn as a line from its centre of mass along its x axis. The
-    thin line is the path of the centre of mass.
+    World axes, equal scales. Patches fixed to the world are drawn once; patches on the body, and pads that are driven,
+    at each instant. A body without an outline is drawn as the rim of its patches, with a line from its centre of mass
+    along its x axis. The thin line is the path of the centre of mass. A body that is tiny beside its path is drawn
+    larger, and the title says so, as it does where the body hardly moves.
     """
-    figure = style.new_figure(6.4, 5.2)
-    draw_motion(figure, solution)
+    strobe = _strobe(solution)
+    width, height = np.diff(strobe.limits, axis=-1)[:, 0]
+    figure = style.new_figure(6.4, float(np.clip(1.0 + 4.6 * height / width, 2.6, 5.6)))
+    _draw(figure, strobe)
+    figure.draw_without_rendering()  # the aspect sets the ticks, which the layout has to know
     return figure
 
 
 def draw_motion(figure: Any, solution: Solution) -> None:
     """Draw `plot_motion` into a figure or subfigure."""
+    _draw(figure, _strobe(solution))
+
+
+class _Strobe(NamedTuple):
+    solution: Solution
+    times: np.ndarray
+    """Instants that are drawn [s]."""
+    poses: np.ndarray
+    """Poses of the body at them `[N, 3]` [m, m, rad]."""
+    path: np.ndarray
+    """Poses at all samples `[T, 3]` [m, m, rad]."""
+    larger: float
+    """How many times larger than it is the body is drawn [-]."""
+    limits: np.ndarray
+    """Limits of both axes `[2, 2]` [mm]."""
+
+
+def _strobe(solution: Solution) -> _Strobe:
     from planarfriction.scenes import Solution
 
     validation.instance("solution", solution, Solution, "a Solution")
-    axes = figure.subplots()
     time, poses = np.asarray(solution.data["time"], dtype=float), _poses(solution)
     chosen = np.unique(np.linspace(0, len(time) - 1, min(INSTANTS, len(time))).round().astype(int))
-    scale = Normalize(time[0], time[-1] if time[-1] > time[0] else time[0] + 1.0)
-    for index in chosen:
-        _move(_draw_mount(axes, solution, "body", _TIME_COLOURS(scale(time[index]))), axes, poses[index])
+    limits = _limits(solution, time[chosen], poses[chosen], 1.0)
+    side, size = 1e-3 * float(np.diff(limits, axis=-1).max()), 2.0 * _reach(solution)
+    larger = 1.0
+    if TINY * size < side:
+        larger = float(f"{SEEN * side / size:.1g}")
+        limits = _limits(solution, time[chosen], poses[chosen], larger)
+    return _Strobe(solution, time[chosen], poses[chosen], poses, larger, limits)
+
+
+def _draw(figure: Any, strobe: _Strobe) -> None:
+    solution, times = strobe.solution, strobe.times
+    axes = figure.subplots()
+    scale = Normalize(times[0], times[-1] if times[-1] > times[0] else times[0] + 1.0)
+    for time, pose in zip(times, strobe.poses, strict=True):
+        colour = style.TIME_COLOURS(scale(time))
+        _move(_draw_mount(axes, solution, "body", colour), axes, pose, strobe.larger)
         for contact in _driven(solution):
-            pads = _draw_shape(axes, _pad_shape(contact), _TIME_COLOURS(scale(time[index])))
-            _move(pads, axes, _carried(contact, float(time[index])))
+            _move(_draw_shape(axes, _pad_shape(contact), colour), axes, _carried(contact, float(time)))
     _draw_mount(axes, solution, "world", style.PAD_COLOUR)
-    _finish(axes, _limits(solution, time[chosen], poses[chosen]))
-    axes.plot(*(1e3 * poses[:, :2].T), color="0.3", linewidth=0.9, zorder=4)
+    _finish(axes, strobe.limits)
+    axes.plot(*(1e3 * strobe.path[:, :2].T), color="0.3", linewidth=0.9, zorder=4)
     dots = {"s": 14, "edgecolor": "white", "linewidth": 0.5, "zorder": 5}
-    axes.scatter(*(1e3 * poses[chosen, :2].T), color=_TIME_COLOURS(scale(time[chosen])), **dots)
-    figure.colorbar(ScalarMappable(scale, _TIME_COLOURS), ax=axes, label="time [s]", aspect=30)
+    axes.scatter(*(1e3 * strobe.poses[:, :2].T), color=style.TIME_COLOURS(scale(times)), **dots)
+    axes.set_title(_remark(strobe), fontsize="small", loc="left")
+    if times[-1] > times[0]:
+        clock = style.unit_for("time", times)
+        shown = Normalize(clock.factor * times[0], clock.factor * times[-1])
+        figure.colorbar(ScalarMappable(shown, style.TIME_COLOURS), ax=axes, label=f"time [{clock.label}]", aspect=30)
+
+
+def _remark(strobe: _Strobe) -> str:
+    """What the drawing does not show: that the body is drawn larger, or how little it moves."""
+    if strobe.larger > 1.0:
+        return f"body drawn {strobe.larger:g} times as large"
+    way = strobe.path - strobe.path[0]
+    length, angle = float(np.hypot(way[:, 0], way[:, 1]).max()), float(np.abs(way[:, 2]).max())
+    if max(length, angle * _reach(strobe.solution)) > UNSEEN * _reach(strobe.solution):
+        return ""
+    if length == angle == 0.0:
+        return "it does not move"
+    far, turn = style.unit_for("length", length), style.unit_for("angle", angle)
+    return (
+        f"moves by up to {far.factor * length:.2g} {far.label}, turns by up to {turn.factor * angle:.2g} {turn.label}"
+    )
+
+
+def _reach(solution: Solution) -> float:
+    """Largest distance of the body's lines from its centre of mass [m]."""
+    return float(np.hypot(*np.concatenate(_body_lines(solution)).T).max()) or 1e-3
 
 
 def _poses(solution: Solution) -> np.ndarray:
@@ -109,21 +173,41 @@ def _carried(contact: Contact, time: float) -> np.ndarray:
     return np.array([*contact.position, contact.angle]) + displacement(contact.velocity, [time])[0]  # pyright: ignore
 
 
-def _move(artists: list[Artist], axes: Any, pose: np.ndarray) -> None:
-    """Put the frame of the artists at `pose` (x, y, angle) [m, m, rad] in the plane of the axes."""
-    transform = Affine2D().rotate(pose[2]).translate(*(1e3 * pose[:2])) + axes.transData
+def _move(artists: list[Artist], axes: Any, pose: np.ndarray, larger: float = 1.0) -> None:
+    """Put the frame of the artists at `pose` (x, y, angle) [m, m, rad] in the plane of the axes, `larger` times."""
+    transform = Affine2D().scale(larger).rotate(pose[2]).translate(*(1e3 * pose[:2])) + axes.transData
     for artist in artists:
         artist.set_transform(transform)
 
 
 def _body_lines(solution: Solution) -> list[np.ndarray]:
-    """What stands for the body, as lines `[M, 2]` [m] in its frame: the closed outline, or its x axis."""
+    """What stands for the body, as lines `[M, 2]` [m] in its frame: the outline, or the rim of the patches on it.
+
+    Where its turn would not show, on a round outline and without any, also a line along its x axis.
+    """
     outline = solution.scene.body.outline
     if outline is not None:
         outline = np.asarray(outline, dtype=float)
-        return [np.concatenate([outline, outline[:1]])]
+        radii = np.hypot(*outline.T)
+        round_one = len(outline) >= CORNERS and np.ptp(radii) <= ROUND * radii.max()
+        arm = [np.array([(0.0, 0.0), (radii.max(), 0.0)])] if round_one else []
+        return [np.concatenate([outline, outline[:1]]), *arm]
+    contacts = [each for each in solution.scene.contacts if each not in _driven(solution)]
     arm = max(float(np.abs(_pad_shape(contact).reshape(-1, 2)).max()) for contact in solution.scene.contacts)
-    return [np.array([(0.0, 0.0), (arm, 0.0)])]
+    on_body = [_on_mount(each).reshape(-1, 2) for each in contacts if each.mounted_on == "body"]
+    return [*_rim(on_body), np.array([(0.0, 0.0), (arm, 0.0)])]
+
+
+def _rim(shapes: list[np.ndarray]) -> list[np.ndarray]:
+    """The closed line around all points of the shapes; none where they lie on one line."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        points = np.concatenate(shapes)
+        corners = points[ConvexHull(points).vertices]
+    except (ValueError, QhullError):
+        return []
+    return [np.concatenate([corners, corners[:1]])]
 
 
 def _pad_shape(contact: Contact) -> np.ndarray:
@@ -144,9 +228,9 @@ def _on_mount(contact: Contact) -> np.ndarray:
     return _placed(_pad_shape(contact), np.array([*contact.position, contact.angle], dtype=float))
 
 
-def _limits(solution: Solution, times: np.ndarray, poses: np.ndarray) -> np.ndarray:
-    """Limits of both axes, `[2, 2]` [mm], that hold everything drawn at `times` and `poses` `[T, 3]`."""
-    points = [_placed(line, pose) for pose in poses for line in _body_lines(solution)]
+def _limits(solution: Solution, times: np.ndarray, poses: np.ndarray, larger: float) -> np.ndarray:
+    """Limits of both axes, `[2, 2]` [mm], that hold everything drawn at `times` and `poses`, the body `larger`."""
+    points = [_placed(larger * line, pose) for pose in poses for line in _body_lines(solution)]
     moving = _driven(solution)
     for contact in moving:
         shape = _pad_shape(contact).reshape(-1, 2)
@@ -155,7 +239,7 @@ def _limits(solution: Solution, times: np.ndarray, poses: np.ndarray) -> np.ndar
         if contact in moving:
             continue
         shape = _on_mount(contact).reshape(-1, 2)
-        points += [shape] if contact.mounted_on == "world" else [_placed(shape, pose) for pose in poses]
+        points += [shape] if contact.mounted_on == "world" else [_placed(larger * shape, pose) for pose in poses]
     everything = 1e3 * np.concatenate(points)
     low, high = everything.min(axis=0), everything.max(axis=0)
     margin = 0.04 * float((high - low).max())
@@ -163,7 +247,8 @@ def _limits(solution: Solution, times: np.ndarray, poses: np.ndarray) -> np.ndar
 
 
 def _finish(axes: Any, limits: np.ndarray) -> None:
-    axes.set(xlabel="x [mm]", ylabel="y [mm]")
+    style.show_lengths(axes, 1e-3 * float(np.abs(limits).max()))
+    axes.locator_params(nbins=7)
     axes.update_datalim(limits.T)
     axes.margins(0.0)
     axes.set_aspect("equal", adjustable="datalim")  # narrow motions fill the panel too

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from typing import Any
 
 import numpy as np
@@ -34,6 +35,9 @@ FARTHEST = 1.6
 TAIL = 25
 """Frames whose wrenches are drawn behind the wrench."""
 
+LONGEST = 24
+"""Letters of the name of a contact."""
+
 STILL, ARM = 1e-3, 1e-2
 """Share of the largest speed below which a body stands, and turns about no point [-]; lever of its spin in it [m]."""
 
@@ -55,7 +59,7 @@ def cell_polygons(patch: Any) -> np.ndarray:
 def cells_of(track: ContactTrack, *, edge: str) -> PolyCollection:
     """The cells of a contact [mm], to be coloured frame by frame; `edge` is the colour of their edges."""
     boxes = list(1e3 * cell_polygons(track.contact.model.patch))
-    cells = PolyCollection(boxes, edgecolor=edge, linewidth=0.3)
+    cells = PolyCollection(boxes, edgecolor=edge, linewidth=0.3, antialiased=edge != "face")  # seams would show
     if track.slip is not None:
         cells.set(cmap=CELLS, clim=(0.0, 1.0))
     return cells
@@ -83,8 +87,9 @@ class CellPanel:
         half = 0.56 * float((high - low).max())
         for set_limits, middle in zip((axes.set_xlim, axes.set_ylim), 0.5 * (low + high), strict=True):
             set_limits(middle - half, middle + half)
-        axes.set_xlabel("x [mm]", fontsize="small", labelpad=1)
-        axes.set_ylabel("y [mm]", fontsize="small", labelpad=1)
+        axes.set_xlabel("", fontsize="small", labelpad=1)
+        axes.set_ylabel("", fontsize="small", labelpad=1)
+        style.show_lengths(axes, 1e-3 * float(np.abs([axes.get_xlim(), axes.get_ylim()]).max()))
         axes.set_aspect("equal")
         axes.tick_params(labelsize="small")
         axes.locator_params(nbins=4)
@@ -108,7 +113,7 @@ class CellPanel:
         track = self.track
         colour_cells(self.cells, track, frame)
         put_centre(self.centre, track.twists[frame], np.zeros(2), still=still_speed(track.twists))
-        name = str(track.contact.name)
+        name = textwrap.shorten(str(track.contact.name), LONGEST, placeholder="...")
         if track.slip is not None:
             weights, _ = track.shape(frame)
             name += f": {100.0 * float(weights[track.slip.slips[frame]].sum()):.0f} % of the load slips"
@@ -129,10 +134,11 @@ class SurfacePanel:
         reach = max(float(np.abs(mesh).max()) for _, mesh in meshes.values())
         limit = 1.05 * max(reach, min(FARTHEST, float(np.abs(self.points).max())))
         self.drawn = {
-            level: draw_surface(axes, mesh, directions, limit, opacity=0.35)
+            level: draw_surface(axes, mesh, directions, limit, paler=0.45)
             for level, (directions, mesh) in meshes.items()
         }
         axes.tick_params(labelsize="x-small", pad=-2)
+        axes.set(xticks=[-0.5, 0.0, 0.5], yticks=[-0.5, 0.0, 0.5])  # those at the corner would meet
         axes.set_title("limit surface, $\\mu_c f_N = 1$", fontsize="small", y=0.98)
         self.floor = -limit
         (self.shadow,) = axes.plot([], [], [], color="0.45", linewidth=1.2, marker="o", markersize=3)

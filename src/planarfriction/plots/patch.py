@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.collections import PolyCollection
@@ -12,6 +12,12 @@ from planarfriction.plots import style
 
 if TYPE_CHECKING:
     from planarfriction.patch import ContactPatch, Grid
+
+MOST_EDGES = 5000
+"""Cells whose edges are drawn: those of more would hide them."""
+
+NARROWEST = 0.3
+"""Least side of the view over the other one [-]: ticks need room."""
 
 _CORNERS = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
 
@@ -42,8 +48,12 @@ def plot_patch(patch: ContactPatch, *, normal_force: float | None = None) -> sty
     mark = {"marker": "+", "markersize": 13, "linestyle": "none"}
     axes.plot(*centre, **mark, markeredgewidth=4.0, color="white")
     axes.plot(*centre, **mark, markeredgewidth=1.8, color=style.PAD_COLOUR, label="centre of pressure")
-    axes.set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal")
-    axes.locator_params(nbins=6)
+    axes.set_aspect("equal")
+    limits = 1e-3 * np.array([axes.get_xlim(), axes.get_ylim()])
+    sides = np.diff(limits, axis=-1)[:, 0]
+    for axis, share in zip((axes.xaxis, axes.yaxis), sides / sides.max(), strict=True):
+        axis.get_major_locator().set_params(nbins=max(2, round(6.0 * share)))
+    style.show_lengths(axes, float(np.abs(limits).max()))
     figure.suptitle(_title(patch, weights, normal_force), fontsize="medium")
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", frameon=False, fontsize="small")
     style.tidy(axes)
@@ -65,21 +75,20 @@ def _height(patch: ContactPatch) -> float:
     if patch.grid is None:
         return 4.6
     ratio = patch.grid.rows * patch.grid.cell_height / (patch.grid.columns * patch.grid.cell_width)
-    return float(np.clip(1.2 + 3.4 * ratio, 2.4, 5.6))
+    return float(np.clip(1.2 + 3.4 * ratio, 2.6, 5.6))
 
 
 def _draw_cells(axes, patch: ContactPatch, grid: Grid, pressure: np.ndarray, normal_force: float | None):
     unit = style.unit_for("pressure", pressure)
-    cells = PolyCollection(
-        list(1e3 * cell_boxes(patch, grid)), cmap=style.PRESSURE_MAP, edgecolor="white", linewidth=0.25
-    )
+    edges: Any = {"edgecolor": "white", "linewidth": 0.25} if len(pressure) < MOST_EDGES else {"edgecolor": "face"}
+    cells = PolyCollection(list(1e3 * cell_boxes(patch, grid)), cmap=style.PRESSURE_MAP, **edges)
     cells.set_array(unit.factor * pressure)
     cells.set_clim(0.0, unit.factor * float(pressure.max()) or 1.0)
     axes.add_collection(cells)
     width, height = 1e3 * grid.columns * grid.cell_width, 1e3 * grid.rows * grid.cell_height
-    margin = 0.03 * max(width, height)
-    axes.set_xlim(1e3 * grid.x_min - margin, 1e3 * grid.x_min + width + margin)
-    axes.set_ylim(1e3 * grid.y_min - margin, 1e3 * grid.y_min + height + margin)
+    for set_limits, low, side in ((axes.set_xlim, grid.x_min, width), (axes.set_ylim, grid.y_min, height)):
+        half = 0.5 * max(side, NARROWEST * max(width, height)) + 0.03 * max(width, height)
+        set_limits(1e3 * low + 0.5 * side - half, 1e3 * low + 0.5 * side + half)
     return cells, f"pressure [{unit.label}]" if normal_force is not None else f"pressure per load [{unit.label}/N]"
 
 
@@ -103,6 +112,10 @@ def _draw_points(axes, patch: ContactPatch, force: np.ndarray, normal_force: flo
 def _title(patch: ContactPatch, weights: np.ndarray, normal_force: float | None) -> str:
     loaded = int((weights > 0.0).sum())
     radius = style.unit_for("length", patch.contact_radius(normal_force))
-    text = f"{patch.name}: {loaded} loaded cells, r = {radius.factor * patch.contact_radius(normal_force):.3g} "
+    what = ("point" if patch.grid is None else "cell") + "s" * (loaded != 1)
+    text = f"{patch.name}: {loaded} loaded {what}, r = {radius.factor * patch.contact_radius(normal_force):.3g} "
     text += radius.label
-    return text if normal_force is None else f"{text}, load {normal_force:g} N"
+    if normal_force is not None:
+        force = style.unit_for("force", normal_force)
+        text += f", load {force.factor * normal_force:.6g} {force.label}"
+    return style.wrapped(text, 62)

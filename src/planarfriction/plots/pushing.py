@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib import colormaps
+from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
 from planarfriction import geometry
 from planarfriction.plots import style
+from planarfriction.plots.style import TIME_COLOURS
 
 if TYPE_CHECKING:
     from planarfriction.planning import Push
@@ -24,17 +25,18 @@ def plot_push(push: Push) -> style.PlotFigure:
     """Draw the outline of the slider at 8 instants, coloured by time, and the path of the pusher by what it does."""
     figure = style.new_figure(6.4, 4.8)
     draw_push(figure.subplots(), push)
+    figure.draw_without_rendering()  # the aspect sets the ticks, which the layout has to know
     return figure
 
 
 def draw_push(axes: Any, push: Push) -> None:
     """Draw `plot_push` into axes."""
-    colours, scale = colormaps["viridis"], Normalize(push.time[0], push.time[-1])
+    scale = Normalize(push.time[0], push.time[-1])
     chosen = np.unique(np.linspace(0, len(push.time) - 1, INSTANTS).round().astype(int))
     closed = np.concatenate([push.slider.outline, push.slider.outline[:1]])
     for k in chosen:
         corners = push.pose[k, :2] + geometry.rotate(closed, push.pose[k, 2])
-        axes.plot(*(1e3 * corners.T), color=colours(0.92 * scale(push.time[k])), linewidth=1.3, zorder=3)
+        axes.plot(*(1e3 * corners.T), color=TIME_COLOURS(scale(push.time[k])), linewidth=1.3, zorder=3)
         if push.pusher.width > 0.0:
             face = push.pusher_pose[k, :2] + geometry.rotate(push.pusher.ends, push.pusher_pose[k, 2])
             axes.plot(*(1e3 * face.T), color="0.3", linewidth=2.0, zorder=4)
@@ -44,7 +46,11 @@ def draw_push(axes: Any, push: Push) -> None:
         if here.any():
             dots = {"s": 9, "zorder": 5, "color": "0.75" if mode == "free" else style.PALETTE[i]}
             axes.scatter(*(1e3 * push.pusher_pose[here, :2].T), label=f"pusher: {mode}", **dots)
-    axes.set(xlabel="x [mm]", ylabel="y [mm]")
+    clock = style.unit_for("time", push.time)
+    shown = Normalize(clock.factor * push.time[0], clock.factor * push.time[-1])
+    bar = axes.figure.colorbar(ScalarMappable(shown, TIME_COLOURS), ax=axes, aspect=30)
+    bar.set_label(f"time [{clock.label}]")
+    style.show_lengths(axes, float(np.abs(push.pose[:, :2]).max()))
     axes.set_aspect("equal", adjustable="datalim")
     axes.legend(fontsize="small")
     style.tidy(axes)

@@ -3,21 +3,39 @@
 from __future__ import annotations
 
 import io
+import textwrap
 import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib import colormaps
+from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
+
+from planarfriction.families import MODELS
 
 PALETTE = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 """Line colours that colour-blind readers tell apart (Okabe and Ito), the most distinct first."""
+
+DISTRIBUTED, PUBLISHED, ELLIPSOID, MOMENTS, PARTS, OTHER, EXACT = PALETTE
+"""Colours in every figure: sums over cells and their model, the published table and its model, the ellipsoid and its
+model, `ReducedModel` with one part, with several, something else, what is exact."""
+
+MEASURED = "0.6"
+"""Colour of what was measured, drawn as a broad line below the rest."""
+
+OF_MODEL = {"distributed": DISTRIBUTED, "reduced": MOMENTS, "reduced-published": PUBLISHED}
+"""Name of a model -> its colour."""
 
 LINE_STYLES = ("-", (0, (5, 1.5)), (0, (1, 1.2)), (0, (5, 1.5, 1, 1.5)))
 """Line styles that tell contacts, or overlaid runs, apart in print."""
 
 PRESSURE_MAP = "cividis"
 """Colour map of loads and pressures: even in lightness, the same for colour-blind readers."""
+
+TIME_COLOURS = ListedColormap(colormaps["viridis"](np.linspace(0.0, 0.92, 256)), "time")
+"""Colour map of time, and of an order: the last yellow of viridis is lost on white."""
 
 PAD_COLOUR = "#D55E00"
 """Colour of contact patches in the plane."""
@@ -72,16 +90,30 @@ class Unit:
 
 # Each row: the largest absolute SI value from which on the unit is used, then the unit; the last row is the rest.
 _UNITS = {
-    "length": ((2.0, 1.0, "m"), (2e-5, 1e3, "mm"), (2e-8, 1e6, "µm"), (0.0, 1e9, "nm")),
-    "speed": ((2.0, 1.0, "m/s"), (2e-5, 1e3, "mm/s"), (2e-8, 1e6, "µm/s"), (0.0, 1e9, "nm/s")),
+    "length": ((2e4, 1e-3, "km"), (2.0, 1.0, "m"), (2e-5, 1e3, "mm"), (2e-8, 1e6, "µm"), (0.0, 1e9, "nm")),
+    "speed": ((2e4, 1e-3, "km/s"), (2.0, 1.0, "m/s"), (2e-5, 1e3, "mm/s"), (2e-8, 1e6, "µm/s"), (0.0, 1e9, "nm/s")),
     "angle": ((2e-3, 180 / np.pi, "deg"), (0.0, 1e6, "µrad")),
-    "force": ((2e3, 1e-3, "kN"), (1e-2, 1.0, "N"), (0.0, 1e3, "mN")),
-    "torque": ((2.0, 1.0, "N m"), (2e-5, 1e3, "N mm"), (0.0, 1e6, "N µm")),
-    "pressure": ((2e6, 1e-6, "MPa"), (2e2, 1e-3, "kPa"), (0.0, 1.0, "Pa")),
+    "force": ((2e3, 1e-3, "kN"), (1e-2, 1.0, "N"), (1e-5, 1e3, "mN"), (1e-8, 1e6, "µN"), (0.0, 1e9, "nN")),
+    "torque": (
+        (2e3, 1e-3, "kN m"),
+        (2.0, 1.0, "N m"),
+        (2e-5, 1e3, "N mm"),
+        (2e-8, 1e6, "N µm"),
+        (0.0, 1e9, "N nm"),
+    ),
+    "pressure": ((2e9, 1e-9, "GPa"), (2e6, 1e-6, "MPa"), (2e2, 1e-3, "kPa"), (0.0, 1.0, "Pa")),
+    "time": (
+        (2e4, 1.0 / 3600.0, "h"),
+        (2e-2, 1.0, "s"),
+        (2e-5, 1e3, "ms"),
+        (2e-8, 1e6, "µs"),
+        (0.0, 1e9, "ns"),
+    ),
 }
 
 # What fills no axis of its own (all zero) is shown in the unit that the reader expects.
-_USUAL = {"length": "mm", "speed": "mm/s", "angle": "deg", "force": "N", "torque": "N mm", "pressure": "kPa"}
+_USUAL = {"length": "mm", "speed": "mm/s", "angle": "deg", "force": "N", "torque": "N mm", "pressure": "kPa",
+          "time": "s"}  # fmt: skip
 
 
 def unit_for(kind: str, *values) -> Unit:
@@ -91,6 +123,25 @@ def unit_for(kind: str, *values) -> Unit:
     if largest == 0.0:
         return next(Unit(factor, label) for _, factor, label in rows if label == _USUAL[kind])
     return next(Unit(factor, label) for least, factor, label in rows if largest >= least)
+
+
+def model_colour(model: Any) -> str | None:
+    """Colour of a model of friction; None where it is none of the library's."""
+    name = MODELS.name_of(model)
+    return PARTS if name == "reduced" and model.parts > 1 else OF_MODEL.get(name or "")
+
+
+def show_lengths(axes: Any, largest: float) -> None:
+    """Name the axes of a plane that is drawn in mm, with ticks in the unit in which `largest` [m] reads well."""
+    unit = unit_for("length", largest)
+    for name, axis in (("x", axes.xaxis), ("y", axes.yaxis)):
+        axis.set_label_text(f"{name} [{unit.label}]")
+        axis.set_major_formatter(lambda value, _: f"{1e-3 * unit.factor * value:.10g}".replace("-", "\N{MINUS SIGN}"))
+
+
+def wrapped(text: str, width: int) -> str:
+    """The text in lines of at most `width` letters; a word that is longer is cut."""
+    return "\n".join(textwrap.wrap(text, width)) or text
 
 
 def tidy(axes) -> None:
