@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.collections import PolyCollection
+from matplotlib.ticker import MaxNLocator
 
 from planarfriction import validation
 from planarfriction.plots import style
@@ -52,7 +53,7 @@ def plot_patch(patch: ContactPatch, *, normal_force: float | None = None) -> sty
     limits = 1e-3 * np.array([axes.get_xlim(), axes.get_ylim()])
     sides = np.diff(limits, axis=-1)[:, 0]
     for axis, share in zip((axes.xaxis, axes.yaxis), sides / sides.max(), strict=True):
-        axis.get_major_locator().set_params(nbins=max(2, round(6.0 * share)))
+        axis.set_major_locator(MaxNLocator(max(2, round(6.0 * share)), steps=[1, 2, 2.5, 5, 10]))
     style.show_lengths(axes, float(np.abs(limits).max()))
     figure.suptitle(_title(patch, weights, normal_force), fontsize="medium")
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", frameon=False, fontsize="small")
