@@ -8,14 +8,13 @@ import tomllib
 
 import numpy as np
 import pytest
-from PIL import Image
 
 import planarfriction as pf
 from planarfriction.errors import FileError, FrictionError, InvalidValueError
-from planarfriction.explore import code, pictures
+from planarfriction.explore import code, films, pictures
 from planarfriction.explore.answers import answer
 from planarfriction.explore.drawing import MOST_SIDE, Drawing
-from planarfriction.explore.films import film
+from planarfriction.explore.films import film, read_scene, ready_scene
 from planarfriction.explore.ladder import RUNGS, climb
 from planarfriction.explore.state import State, law_parameters
 from planarfriction.laws import LAWS
@@ -162,9 +161,9 @@ def test_the_picture_of_the_map_has_its_top_row_at_the_top():
 def test_arrows_of_slip_turn_about_the_centre_of_rotation_and_stand_where_something_presses():
     state = State(Drawing.published("NonConvex1")).turning_about(0.002, 0.001)
     arrows = pictures.slip_arrows(state)
-    along = np.stack([arrows["x1"] - arrows["x0"], arrows["y1"] - arrows["y0"]])
-    lever = np.stack([arrows["x0"] - 2.0, arrows["y0"] - 1.0])
-    assert len(arrows["x0"]) > 2 and np.abs(arrows["y0"]).max() < 1.5
+    x0, y0, x1, y1 = (np.array(arrows[name]) for name in ("x0", "y0", "x1", "y1"))
+    along, lever = np.stack([x1 - x0, y1 - y0]), np.stack([x0 - 2.0, y0 - 1.0])
+    assert len(x0) > 2 and np.abs(y0).max() < 1.5
     np.testing.assert_allclose((along * lever).sum(axis=0), 0.0, atol=1e-12)
 
 
@@ -227,12 +226,64 @@ def test_the_models_are_compared_with_the_distributed_one_and_a_law_that_one_ref
     assert np.isnan(refused.error) and "no creep_speed" in refused.refusal
 
 
-@pytest.mark.slow  # a film takes seconds
 def test_a_scene_is_run_with_the_contact_on_the_screen():
-    with Image.open(io.BytesIO(film(State(), "free-slide", "reduced"))) as picture:
-        assert picture.format == "GIF" and picture.n_frames >= 75
+    state = State(Drawing.published("Line"), pf.Dahl(mu_c=0.4))
+    (contact,) = ready_scene(state, "free-slide", "reduced").contacts
+    assert isinstance(contact.model, pf.ReducedModel) and contact.model.law == state.law
+    np.testing.assert_array_equal(contact.model.patch.positions, state.drawing.patch.positions)
     with pytest.raises(FrictionError, match="creep_speed"):
-        film(State().with_law("coulomb-stribeck"), "free-slide", "reduced")
+        ready_scene(State().with_law("coulomb-stribeck"), "free-slide", "reduced")
+
+
+def test_a_film_has_a_player_asks_nobody_for_anything_and_is_given_up_when_it_is_told_to(monkeypatch):
+    monkeypatch.setattr(films, "DPI", 20.0)  # quick to draw
+    scene = ready_scene(State(Drawing.published("Line")), "free-slide", "reduced")
+    told: list[tuple[str, float]] = []
+    page = film(scene, lambda doing, share: told.append((doing, share)))
+    assert page.count("data:image/png;base64") >= 75 and "anim-slider" in page and "http" not in page
+    assert {doing for doing, _ in told} == {"simulating", "drawing"} and told[-1][1] == pytest.approx(1.0)
+
+    def stop(doing: str, share: float) -> None:
+        if doing == "drawing":
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        film(scene, stop)
+
+
+@pytest.mark.parametrize("suffix", [".toml", ".json"])
+def test_a_scene_file_is_the_scene_that_it_was_written_from(suffix, tmp_path):
+    scene = code.scene(State(PAINTED))
+    path = tmp_path / f"mine{suffix}"
+    scene.to_file(path)
+    assert read_scene(f"C:\\scenes\\mine{suffix}", path.read_bytes()) == scene
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("scene.txt", b"t_end = 1", "scene.txt: a scene file ends in .toml or .json"),
+        ("scene.toml", b"t_end = ", "scene.toml: not valid TOML"),
+        ("scene.toml", b"\xff\xfe", "scene.toml: not a text file"),
+        ("scene.toml", b"t_end = 1.0\n", "scene.toml: missing"),
+        ("scene.json", b"[]", "scene.json: "),
+        ("scene", b"", "scene: a scene file ends in"),
+    ],
+)
+def test_a_file_that_is_no_scene_is_one_line_with_its_name(name, content, words):
+    with pytest.raises(FrictionError) as error:
+        read_scene(name, content)
+    assert words in str(error.value) and "\n" not in str(error.value) and "/tmp" not in str(error.value)
+
+
+def test_files_that_a_scene_names_are_looked_for_where_the_explorer_was_started(tmp_path, monkeypatch):
+    drawing = Drawing.read("pad.npy", saved(np.ones((2, 2))), 1e-3)
+    text = code.toml(State(drawing)).encode()
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(FrictionError, match=r"pad\.npy: no such file"):
+        read_scene("scene.toml", text)
+    (tmp_path / "pad.npy").write_bytes(saved(np.ones((2, 2))))
+    assert read_scene("scene.toml", text).contacts[0].model.patch.cells == 4
 
 
 def test_without_panel_the_command_names_the_extra(monkeypatch, capsys):

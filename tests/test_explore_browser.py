@@ -13,6 +13,11 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+import planarfriction as pf
+from planarfriction.explore import code
+from planarfriction.explore.ladder import RUNGS
+from planarfriction.explore.state import State
+
 pytestmark = [pytest.mark.slow, pytest.mark.explore]
 
 pytest.importorskip("panel")
@@ -105,6 +110,22 @@ class Visitor:
         assert time is not None, "nothing changed"
         return self.text()
 
+    def ladder(self) -> str:
+        return self.page.locator("#ladder").inner_text()
+
+    def ladder_after(self, act, before: str) -> str:
+        """The whole ladder once `act` has changed it."""
+        act()
+        for _ in range(600):
+            whole = self.page.locator("#ladder tr").count() == 6 and "Of the patch" in self.status()
+            if whole and self.ladder() != before:
+                return self.ladder()
+            self.page.wait_for_timeout(200)
+        raise AssertionError("the ladder did not change")
+
+    def status(self) -> str:
+        return self.page.locator("#ladder-status").inner_text()
+
     def choose(self, control: str, value: str) -> None:
         self.page.locator(f".{control} select").select_option(value)
 
@@ -121,7 +142,7 @@ class Visitor:
         return tuple(
             self.page.evaluate(
                 """([x, y]) => {
-                    const view = Bokeh.index.query_one((each) => each.model.type === "Figure");
+                    const view = Bokeh.index.query_one((each) => each.model.name === "map");
                     const canvas = view.canvas_view.el.getBoundingClientRect(), frame = view.frame;
                     return [canvas.x + frame.x_scale.compute(x), canvas.y + frame.y_scale.compute(y)];
                 }""",
@@ -232,17 +253,76 @@ def test_what_is_on_the_screen_can_be_copied(visitor):
     assert 'kind = "lugre"' in visitor.page.evaluate("navigator.clipboard.readText()")
 
 
-def test_the_models_are_compared_and_a_scene_is_run_while_the_page_goes_on(visitor):
+def test_the_ladder_of_the_models_follows_what_is_on_the_screen(visitor):
     visitor.page.get_by_text("Models", exact=True).click()
-    visitor.page.locator(".compare button").click()
-    visitor.page.locator("#ladder tr").nth(5).wait_for(timeout=120_000)
+    visitor.ladder_after(lambda: None, "")
+    before = visitor.ladder()
+    assert [row.split("\t")[0] for row in before.splitlines()[1:]] == list(RUNGS)
+    after = visitor.ladder_after(lambda: visitor.drag((0.0, 10.0), (3.0, 5.0)), before)
+    visitor.choose("law", "coulomb-stribeck")
+    refused = visitor.ladder_after(lambda: None, after)
+    assert "no creep_speed" in refused
+    visitor.page.locator(".clear button").click()
+    visitor.page.locator("#ladder").wait_for(state="detached")
+
+
+def test_a_drag_is_not_held_up_by_the_ladder(visitor):
+    visitor.page.get_by_text("Models", exact=True).click()
+    visitor.page.locator("#ladder").wait_for(timeout=120_000)
+    for step in range(4):  # each begins in the pause in which the models of a new law are made
+        visitor.fill("sigma_0", str(2e5 + step))
+        visitor.page.wait_for_timeout(400)
+        visitor.after(lambda step=step: visitor.drag((0.0, 10.0), (3.0, 5.0 - step)))
+    visitor.ladder_after(lambda: None, "")
+    assert visitor.page.locator("#ladder tr").count() == 6
+
+
+def test_a_scene_is_run_and_watched_while_the_page_goes_on(visitor):
     visitor.page.get_by_text("Run a scene").click()
-    visitor.page.locator(".scene select").select_option("free-slide")
-    visitor.page.locator(".model select").select_option("distributed")
-    visitor.page.locator(".run button").click()
+    visitor.choose("scene", "free-slide")
+    visitor.choose("model", "distributed")
+    run = visitor.page.locator(".run button")
+    run.click()
+    visitor.page.get_by_text("Drawing:").wait_for(timeout=120_000)
+    assert run.inner_text() == "Stop"
+    run.click()
+    visitor.page.get_by_text("Stopped.").wait_for()
+    run.click()
     visitor.after(lambda: visitor.fill("load", "3"))  # meanwhile
-    visitor.page.locator("#film").wait_for(timeout=120_000)
-    assert visitor.page.locator("#film").evaluate("(each) => each.naturalWidth") > 300
+    film = visitor.page.frame_locator("#film")
+    picture, slider = film.locator("img"), film.locator("input[type=range]")
+    picture.wait_for(timeout=120_000)
+    assert picture.evaluate("(each) => each.naturalWidth") > 500 and run.inner_text() == "Run"
+    film.get_by_title("Pause").click()
+    slider.fill("40")
+    shown = picture.get_attribute("src")
+    film.get_by_title("Next frame").click()
+    assert slider.input_value() == "41" and picture.get_attribute("src") != shown
+    film.get_by_title("Play", exact=True).click()
+    visitor.page.wait_for_timeout(1000)
+    assert int(slider.input_value()) != 41
+
+
+def test_a_scene_file_is_run_as_it_is_and_a_wrong_one_is_one_line(visitor):
+    visitor.page.get_by_text("Run a scene").click()
+    wrong = {"name": "mine.toml", "mimeType": "", "buffer": b"t_end = "}
+    visitor.page.locator(".scene-file input").set_input_files(wrong)
+    assert "mine.toml: not valid TOML" in visitor.message()
+    text = code.toml(State(law=pf.Dahl(mu_c=0.3))).replace("t_end = 1.0", "t_end = 0.1")
+    visitor.page.locator(".scene-file input").set_input_files({**wrong, "buffer": text.encode()})
+    visitor.page.locator(".model").wait_for(state="hidden")
+    assert visitor.page.locator(".scene select").input_value() == "mine.toml"
+    visitor.page.locator(".run button").click()
+    visitor.page.frame_locator("#film").locator("img").wait_for(timeout=120_000)
+    assert not visitor.page.locator("#message").is_visible()
+
+
+def test_a_model_that_does_not_take_the_law_is_one_line(visitor):
+    visitor.choose("law", "coulomb-stribeck")
+    visitor.page.get_by_text("Run a scene").click()
+    visitor.page.locator(".run button").click()
+    assert "creep_speed" in visitor.message()
+    assert visitor.page.locator(".run button").inner_text() == "Run"
 
 
 def test_two_visitors_do_not_change_each_other(visitor, browser, address):

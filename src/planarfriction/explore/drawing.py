@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import tempfile
 from dataclasses import dataclass
-from pathlib import Path, PurePosixPath, PureWindowsPath
 from typing import Literal
 
 import numpy as np
 
 from planarfriction import geometry, validation
-from planarfriction.errors import FileError, InvalidValueError
+from planarfriction.errors import InvalidValueError
+from planarfriction.explore.uploads import as_file, plain_name
 from planarfriction.limit_surface import LimitSurfaceEllipsoid, LimitSurfaceExact
 from planarfriction.limit_surface.comparison import directions
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch, Grid, read_pressure_map
@@ -58,14 +57,9 @@ class Drawing:
 
         Raises `FileError` for what is no map, and `InvalidValueError` for one of more than `MOST_SIDE` rows or columns.
         """
-        name = PurePosixPath(PureWindowsPath(name).name).name  # browsers may send a path
-        with tempfile.TemporaryDirectory() as folder:
-            path = Path(folder) / f"map{Path(name).suffix}"
-            try:
-                path.write_bytes(content)
-                pressures = read_pressure_map(path)
-            except (FileError, OSError, ValueError) as error:
-                raise FileError(str(error).replace(str(path), name)) from None
+        name = plain_name(name)
+        with as_file(name, content) as path:
+            pressures = read_pressure_map(path)
         if max(pressures.shape) > MOST_SIDE:
             rule = f"have at most {MOST_SIDE} rows and columns here"
             raise InvalidValueError(f"the map in {name}", rule, "{} x {}".format(*pressures.shape))

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from planarfriction.errors import FrictionError
+from planarfriction.explore.drawing import Drawing
 from planarfriction.explore.state import State
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.scenes import Signal, driven, simulate
 
 T_END = 0.2
 """Duration of a run [s]."""
+
+REPEATS = 5
+"""Runs of each model, the fastest of which counts."""
 
 RUNGS: dict[str, Callable[[Any, Any], Any]] = {
     "distributed": DistributedModel,
@@ -40,6 +45,12 @@ class Rung(NamedTuple):
     """Why the model does not take this patch or law."""
 
 
+@functools.lru_cache(maxsize=32)
+def _model(name: str, drawing: Drawing, law: Any) -> Any:
+    """A model, kept while the twist is dragged: to make one takes longer than to run it."""
+    return RUNGS[name](drawing.patch, law)
+
+
 def motion(state: State) -> Signal:
     """The twist of the state, reached in a quarter of the run, turned round in the next half: stick, slip, reversal."""
     times = T_END * np.array([0.0, 0.25, 0.5, 0.75, 1.0])
@@ -50,12 +61,12 @@ def climb(state: State) -> Iterator[Rung]:
     """Each model of `RUNGS` in the same run, the distributed one first."""
     scale = state.law.numbers.mu_c * state.normal_force * np.array([1.0, 1.0, state.drawing.surface.contact_radius])
     reference = None
-    for name, make in RUNGS.items():
+    for name in RUNGS:
         try:
-            model = make(state.drawing.patch, state.law)
+            model = _model(name, state.drawing, state.law)
             scene = driven(model, twist=motion(state), normal_force=state.normal_force, at="origin", t_end=T_END)
             scene = dataclasses.replace(scene, save_every=T_END / 200)
-            runs = [simulate(scene) for _ in range(2)]  # the first may compile
+            runs = [simulate(scene) for _ in range(REPEATS)]  # the first may compile, others may be disturbed
         except FrictionError as error:
             yield Rung(name, 0, float("nan"), float("nan"), str(error))
             continue

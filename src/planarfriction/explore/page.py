@@ -8,35 +8,24 @@ from collections.abc import Callable
 from typing import Any
 
 import panel as pn
-from bokeh import events
-from bokeh.models import ColumnDataSource, LinearColorMapper, Range1d
-from bokeh.palettes import Cividis256
-from bokeh.plotting import figure
 
 from planarfriction.errors import FrictionError
-from planarfriction.explore import code, pictures
+from planarfriction.explore import code, looks, pictures
 from planarfriction.explore.answers import Answer, answer
-from planarfriction.explore.background import models_tab, scene_tab
+from planarfriction.explore.controls import OWN, Controls
 from planarfriction.explore.drawing import Drawing
+from planarfriction.explore.ladder_tab import LadderTab
+from planarfriction.explore.map_view import MapView
+from planarfriction.explore.numbers import numbers
 from planarfriction.explore.pacing import Paced
-from planarfriction.explore.state import State, law_parameters
-from planarfriction.laws import LAWS
-from planarfriction.patch import PUBLISHED_PATCHES
-
-TOOLS = {"Centre of rotation": "turn", "Velocity": "slide", "Brush": "brush", "Eraser": "erase"}
-"""What a drag over the map does."""
-
-OWN = "own map"
-"""Choice of the patch while it is none of the published ones."""
+from planarfriction.explore.scene_tab import SceneTab
+from planarfriction.explore.state import State
 
 FASTEST = 0.1
 """Velocity [m/s] that a drag from the middle to the edge of the map gives."""
 
-_CODE = "textarea {font-family: monospace; color: #222 !important; background: #FAFAFA; opacity: 1 !important}"
-
-_ALERT = "background:#FBE3E0;border:1px solid #C0392B;padding:6px 12px;font-size:110%"
-
-_TABLE = "font-variant-numeric:tabular-nums;border-collapse:collapse"
+LADDER = 2
+"""Number of the tab with the ladder of the models."""
 
 
 class Page:
@@ -46,62 +35,52 @@ class Page:
         self.state = State()
         self.answer: Answer | None = None
         self._figure: dict[str, Any] = {}
-        self._silent, self._pointer = False, None
+        self._pointer: tuple[float, float] | None = None
         self.slow = Paced(self._show_slow)
-        self._controls()
-        self._pictures()
+        self.controls = Controls(self.state)
+        self.map = MapView(self._dragged, self._released)
+        self.ladder = LadderTab(lambda: self.state)
+        self.scenes = SceneTab(lambda: self.state, self._try)
+        self.surface = pn.pane.Plotly(
+            None, config={"displaylogo": False, "responsive": True}, height=430, sizing_mode="stretch_width"
+        )
+        self.numbers = pn.pane.HTML("", css_classes=["numbers"], sizing_mode="stretch_width")
+        self.message = pn.pane.HTML("", visible=False, sizing_mode="stretch_width")
+        self.python, self.toml = _code_area("python"), _code_area("toml")
+        self.tabs = pn.Tabs(
+            ("Python", _copied(self.python)),
+            ("Scene file (TOML)", _copied(self.toml)),
+            ("Models", self.ladder.layout),
+            ("Run a scene", self.scenes.layout),
+            dynamic=True,
+            sizing_mode="stretch_width",
+            stylesheets=[looks.CARD],
+        )
+        self.tabs.param.watch(lambda _: self._follow_ladder(), "active")
+        self._listen()
         self._redraw()
         self._refresh()
 
-    # ------------------------------------------------------------------ controls
+    def _listen(self) -> None:
+        controls = self.controls
 
-    def _controls(self) -> None:
-        widgets = pn.widgets
-        self.patch = widgets.Select(name="Patch", options=[*PUBLISHED_PATCHES, OWN], value=self.state.drawing.name)
-        self.cell_size = widgets.FloatInput(name="Cell size [mm]", step=0.1, format="0[.]0000", width=140)
-        self.file = widgets.FileInput(name="Pressure map", accept="", sizing_mode="stretch_width")
-        self.clear = widgets.Button(name="Clear the map", width=140, align="end")
-        self.tool = widgets.RadioButtonGroup(options=TOOLS, value="turn")
-        self.brush = widgets.FloatSlider(name="Brush: radius [cells]", start=0.5, end=6.0, step=0.5, value=1.5)
-        self.pressure = widgets.FloatSlider(name="Brush: pressure", start=0.1, end=1.0, step=0.1, value=1.0)
-        self.law = widgets.Select(name="Law", options=list(LAWS), value=LAWS.name_of(self.state.law))
-        self.parameters: Any = pn.GridBox(ncols=2)
-        self.load = widgets.FloatInput(name="Normal force [N]", value=self.state.normal_force, step=0.5)
-        vx, vy, omega = self.state.twist
-        self.vx = widgets.FloatSlider(name="vx [mm/s]", start=-100.0, end=100.0, step=0.1, value=1e3 * vx)
-        self.vy = widgets.FloatSlider(name="vy [mm/s]", start=-100.0, end=100.0, step=0.1, value=1e3 * vy)
-        self.omega = widgets.FloatSlider(name="ω [rad/s]", start=-10.0, end=10.0, step=0.01, value=omega)
-        for name, widget in vars(self).items():  # a name for the widget in the page too
-            if isinstance(widget, widgets.Widget):
-                widget.css_classes = [name.replace("_", "-")]
+        def on(widget: Any, act: Callable[[Any], Any]) -> None:
+            controls.on(widget, lambda value: self._try(lambda: act(value)))
+
+        on(controls.patch, lambda name: self._draw(Drawing.published(name)) if name != OWN else None)
+        on(controls.cell_size, lambda size: self._draw(self.state.drawing.scaled(1e-3 * size)))
+        on(controls.file, self._read)
+        on(controls.law, self._choose_law)
+        on(controls.load, lambda load: self._change(normal_force=load))
+        for slider in (controls.vx, controls.vy, controls.omega):
+            on(slider, lambda _: self._slide())
+        controls.clear.on_click(lambda _: self._try(lambda: self._draw(self.state.drawing.cleared())))
         self._offer_parameters()
-        for slider in (self.vx, self.vy, self.omega):
-            slider.param.watch(self._slid, "value")
-        self._on(self.patch, lambda name: self._draw(Drawing.published(name)) if name != OWN else None)
-        self._on(self.cell_size, lambda size: self._draw(self.state.drawing.scaled(1e-3 * size)))
-        self._on(self.load, lambda load: self._change(normal_force=load))
-        self._on(self.law, self._choose_law)
-        self._on(self.file, self._read)
-        self.clear.on_click(lambda _: self._try(lambda: self._draw(self.state.drawing.cleared())))
 
-    def _on(self, widget: Any, act: Callable[[Any], Any]) -> None:
-        """Do `act` with each new value that the user gives."""
-
-        def changed(event: Any) -> None:
-            if not self._silent and event.new is not None:
-                self._try(lambda: act(event.new))
-
-        widget.param.watch(changed, "value")
+    # ------------------------------------------------------------------ wishes of the user
 
     def _offer_parameters(self) -> None:
-        """Fields for the parameters of the law; empty ones have a default that depends on others."""
-        inputs = [
-            pn.widgets.FloatInput(name=name, value=value, width=140, css_classes=["parameter", name])
-            for name, value in law_parameters(self.state.law).items()
-        ]
-        for each in inputs:
-            each.param.watch(lambda _: None if self._silent else self._try(self._set_law), "value")
-        self.parameters.objects = inputs
+        self.controls.offer_parameters(self.state.law, lambda _: self._try(self._set_law))
 
     def _choose_law(self, kind: str) -> None:
         self.state = self.state.with_law(kind)
@@ -109,24 +88,23 @@ class Page:
         self._refresh()
 
     def _set_law(self) -> None:
-        self.state = self.state.with_law(self.law.value, **{each.name: each.value for each in self.parameters})
+        self.state = self.state.with_law(str(self.controls.law.value), **self.controls.law_values())
         self._refresh()
 
     def _read(self, content: bytes) -> None:
-        self._draw(Drawing.read(self.file.filename or "map", content, 1e-3 * self.cell_size.value))
+        size = 1e-3 * self.controls.cell_size.value
+        self._draw(Drawing.read(self.controls.file.filename or "map", content, size))
 
-    def _slid(self, _: Any) -> None:
-        if not self._silent:
-            self._try(lambda: self._change(twist=(1e-3 * self.vx.value, 1e-3 * self.vy.value, self.omega.value)))
+    def _slide(self) -> None:
+        vx, vy, omega = (each.value for each in (self.controls.vx, self.controls.vy, self.controls.omega))
+        self._change(twist=(1e-3 * vx, 1e-3 * vy, omega))
 
-    # ------------------------------------------------------------------ drags over the map
-
-    def _dragged(self, event: Any) -> None:
+    def _dragged(self, x: float, y: float) -> None:
         """Keep where the pointer is; what it has passed while the page was at work is left out, but for the brush."""
-        if self.tool.value in ("brush", "erase"):
-            self._try(lambda: self._paint(1e-3 * event.x, 1e-3 * event.y))
+        if self.controls.tool.value in ("brush", "erase"):
+            self._try(lambda: self._paint(x, y))
             return
-        waiting, self._pointer = self._pointer is not None, (1e-3 * event.x, 1e-3 * event.y)
+        waiting, self._pointer = self._pointer is not None, (x, y)
         if not waiting:
             document: Any = pn.state.curdoc
             document.add_next_tick_callback(self._follow)
@@ -137,7 +115,7 @@ class Page:
             self._try(lambda: self._follow_to(*pointer))
 
     def _follow_to(self, x: float, y: float) -> None:
-        if self.tool.value == "turn":
+        if self.controls.tool.value == "turn":
             self.state = self.state.turning_about(x, y)
         else:
             speed = 2.0 * FASTEST / max(self.state.drawing.width, self.state.drawing.height)
@@ -145,28 +123,14 @@ class Page:
         self._refresh()
 
     def _paint(self, x: float, y: float) -> None:
-        drawing = self.state.drawing
-        pressure = 0.0 if self.tool.value == "erase" else self.pressure.value
-        radius = (self.brush.value - 0.5) * drawing.cell_size
+        drawing, controls = self.state.drawing, self.controls
+        pressure = 0.0 if controls.tool.value == "erase" else controls.pressure.value
+        radius = (controls.brush.value - 0.5) * drawing.cell_size
         self._draw(drawing.painted(x, y, radius=radius, pressure=pressure), quick=True)
 
-    def _released(self, _: Any) -> None:
-        if self.tool.value in ("brush", "erase"):
+    def _released(self) -> None:
+        if self.controls.tool.value in ("brush", "erase"):
             self._try(lambda: self._draw(self.state.drawing))
-
-    # ------------------------------------------------------------------ showing
-
-    def _try(self, act: Callable[[], Any]) -> None:
-        """Do what the user wants, or say in one line why not."""
-        try:
-            self.message.visible = False
-            act()
-        except FrictionError as error:
-            self._say(str(error))
-
-    def _say(self, text: str) -> None:
-        self.message.object = f"<div id='message' style='{_ALERT}'>{html.escape(text)}</div>"
-        self.message.visible = True
 
     def _change(self, **values: Any) -> None:
         self.state = self.state.changed(**values)
@@ -177,50 +141,21 @@ class Page:
         self._redraw(quick=quick)
         self._refresh()
 
-    def _pictures(self) -> None:
-        self.sources: dict[str, Any] = {name: ColumnDataSource() for name in ("map", "slip", "wrench", "centre")}
-        plot: Any = figure(
-            width=520, height=520, tools="", toolbar_location=None, x_axis_label="x [mm]", y_axis_label="y [mm]"
-        )
-        plot.grid.visible = False
-        self._ranges = plot.x_range, plot.y_range = Range1d(), Range1d()
-        shades = LinearColorMapper(palette=Cividis256, low=0.0, high=1.0, nan_color="#FFFFFF00")
-        plot.image("image", "x", "y", "dw", "dh", source=self.sources["map"], color_mapper=shades, alpha=0.85)
-        for name, colour, width, size in (("slip", "#444444", 1, 6), ("wrench", {"field": "colour"}, "width", 13)):
-            source = self.sources[name]
-            plot.segment("x0", "y0", "x1", "y1", source=source, color=colour, line_width=width)
-            plot.scatter("x1", "y1", angle="angle", marker="triangle", size=size, source=source, color=colour)
-        centre = {"source": self.sources["centre"], "size": 18, "line_width": 3, "color": "#D00000"}
-        plot.scatter("x", "y", marker="circle_cross", fill_alpha=0.0, **centre)
-        for kind in (events.PanStart, events.Pan, events.Tap):
-            plot.on_event(kind, self._dragged)
-        for kind in (events.PanEnd, events.Tap):
-            plot.on_event(kind, self._released)
-        self.map = plot
-        self.surface = pn.pane.Plotly(None, config={"displaylogo": False}, name="surface")
-        self.numbers = pn.pane.HTML("", css_classes=["numbers"])
-        self.message = pn.pane.HTML("", visible=False, sizing_mode="stretch_width")
-        self.python, self.toml = (
-            pn.widgets.TextAreaInput(
-                disabled=True,
-                height=330,
-                max_length=10**6,
-                sizing_mode="stretch_width",
-                stylesheets=[_CODE],
-                css_classes=[kind],
-            )
-            for kind in ("python", "toml")
-        )
+    # ------------------------------------------------------------------ showing
+
+    def _try(self, act: Callable[[], Any]) -> None:
+        """Do what the user wants, or say in one line why not; all that changes goes to the browser in one message."""
+        with pn.io.unlocked():
+            try:
+                self.message.visible = False
+                act()
+            except FrictionError as error:
+                self.message.object = f"<div id='message' style='{looks.ALERT}'>{html.escape(str(error))}</div>"
+                self.message.visible = True
 
     def _redraw(self, *, quick: bool = False) -> None:
         """What depends on the map alone."""
-        drawing = self.state.drawing
-        self.sources["map"].data = pictures.pressure_image(drawing)
-        half = 0.6e3 * max(drawing.width, drawing.height)
-        for each in self._ranges:
-            each.update(start=-half, end=half)
-        self._quietly({self.cell_size: 1e3 * drawing.cell_size})
-        self._quietly({self.patch: drawing.name if drawing.origin == "published" else OWN})
+        self.map.draw(self.state.drawing)
         try:
             self._figure = pictures.surface_figure(self.state, quick=quick)
         except FrictionError:
@@ -229,21 +164,19 @@ class Page:
     def _refresh(self) -> None:
         """What depends on the rest of the state."""
         begin = time.perf_counter()
-        self.sources["centre"].data = pictures.points_of_interest(self.state)
-        self.sources["slip"].data = pictures.slip_arrows(self.state)
-        vx, vy, omega = self.state.twist
-        self._quietly({self.vx: 1e3 * vx, self.vy: 1e3 * vy, self.omega: omega, self.load: self.state.normal_force})
+        self.controls.show(self.state)
         try:
-            self.answer = answer(self.state)
-            self.sources["wrench"].data = pictures.wrench_arrows(self.state, self.answer)
-            self.slow.ask()
-            text = numbers(self.state, self.answer, time.perf_counter() - begin)
+            self.answer = found = answer(self.state)
         except FrictionError:
             self.answer, self._figure, self.surface.object = None, {}, None
-            self.sources["wrench"].data = {name: [] for name in self.sources["wrench"].data}
             self.python.value = self.toml.value = self.numbers.object = ""
+            self.ladder.clear()
             raise
-        self.numbers.object = text
+        finally:
+            self.map.move(self.state, self.answer)
+        self.slow.ask()
+        self._follow_ladder()
+        self.numbers.object = numbers(self.state, found, time.perf_counter() - begin)
 
     def _show_slow(self) -> None:
         """What does not have to follow a drag: the picture in 3-D and the code."""
@@ -251,78 +184,56 @@ class Page:
             self.surface.object = pictures.moved(self._figure, self.answer)
             self.python.value, self.toml.value = code.python(self.state), code.toml(self.state)
 
-    def _quietly(self, values: dict[Any, Any]) -> None:
-        """Set controls to what the state is, without taking that for a wish of the user."""
-        self._silent = True
-        try:
-            for widget, value in values.items():
-                widget.value = value
-        finally:
-            self._silent = False
+    def _follow_ladder(self) -> None:
+        """The models are compared while somebody looks."""
+        if self.tabs.active == LADDER and self.answer is not None:
+            self.ladder.follow()
+        else:
+            self.ladder.stop()
 
     def layout(self) -> Any:
         """The whole page."""
-        left = pn.Column(
-            pn.pane.HTML("<h2 style='margin:0'>planarfriction explorer</h2>"),
-            self.patch,
-            pn.Row(self.cell_size, self.clear),
-            pn.pane.HTML("Pressure map (.csv, .npy, grey image):"),
-            self.file,
-            self.brush,
-            self.pressure,
-            pn.layout.Divider(),
-            self.law,
-            self.parameters,
-            self.load,
-            pn.layout.Divider(),
-            *(self.vx, self.vy, self.omega),
-            width=330,
+        words = "<b style='font-size:20px'>planarfriction explorer</b>"
+        title = pn.pane.HTML(words, margin=(8, 4, 0, 4))
+        hint = pn.pane.HTML("<b style='font-size:15px'>Drag over the map</b>", margin=(4, 0, 4, 0))
+        plane = pn.Column(
+            hint,
+            self.controls.tool,
+            pn.pane.Bokeh(self.map.figure, css_classes=["map"], sizing_mode="scale_width", aspect_ratio=1.0, margin=0),
+            stylesheets=[looks.CARD],
+            styles=looks.grows(330),
         )
-        middle = pn.Column(
-            pn.pane.HTML("A drag over the map moves:"), self.tool, pn.pane.Bokeh(self.map, css_classes=["map"])
+        space = pn.Column(self.numbers, self.surface, stylesheets=[looks.CARD], styles=looks.grows(360))
+        main = pn.Column(
+            pn.FlexBox(plane, space, gap="10px", align_items="stretch"),
+            pn.Spacer(height=10),
+            self.tabs,
+            styles=looks.grows(600),
         )
-        right = pn.Column(self.numbers, self.surface)
-        tabs = pn.Tabs(
-            ("Python", self._copied(self.python)),
-            ("Scene file (TOML)", self._copied(self.toml)),
-            ("Models", models_tab(lambda: self.state)),
-            ("Run a scene", scene_tab(lambda: self.state)),
-        )
+        hidden = (self.slow.asked, self.slow.drawn)
         return pn.Column(
-            self.message, self.slow.asked, self.slow.drawn, pn.Row(left, pn.Column(pn.Row(middle, right), tabs))
+            title,
+            self.message,
+            *hidden,
+            pn.FlexBox(self.controls.layout(), main, gap="10px", align_items="flex-start"),
+            sizing_mode="stretch_width",
+            styles={"padding": "0 10px 10px", "box-sizing": "border-box"},
         )
 
-    @staticmethod
-    def _copied(area: Any) -> Any:
-        """A text with a button that copies it."""
-        copy = pn.widgets.Button(name="Copy", css_classes=[f"copy-{area.css_classes[0]}"])
-        copy.js_on_click(args={"area": area}, code="navigator.clipboard.writeText(area.value)")
-        return pn.Column(copy, area, sizing_mode="stretch_width")
 
-
-def numbers(state: State, found: Answer, seconds: float) -> str:
-    """Table of the wrenches, and what else there is to say in numbers, as HTML."""
-    words = {"friction": "Friction, steady sliding", "surface": "Limit surface, μ<sub>c</sub> f<sub>N</sub>"}
-    words["ellipsoid"] = "Ellipsoid"
-    rows = "".join(
-        f"<tr><td style='color:{pictures.COLOURS[name]}'><b>{text}</b></td>"
-        + "".join(f"<td align=right style='padding-left:16px'>{value:.4f}</td>" for value in _shown(found, name))
-        + "</tr>"
-        for name, text in words.items()
-    )
-    (force, angle), centre = state.drawing.largest_errors, state.centre_of_rotation
-    where = "none, no spin" if centre is None else f"({1e3 * centre[0]:.2f}, {1e3 * centre[1]:.2f}) mm"
-    return (
-        f"<div id='answer'><table style='{_TABLE}'><tr><td></td><td align=right>fx [N]</td><td align=right>fy [N]</td>"
-        f"<td align=right>τ [N mm]</td></tr>{rows}</table>"
-        f"Centre of rotation: {where}; dissipated power {1e3 * found.power:.4g} mW<br>"
-        f"Error of the ellipsoid: {found.force_error:.3f} of μ<sub>c</sub> f<sub>N</sub> and {found.angle_error:.1f}° "
-        f"in the twist here, up to {max(force, found.force_error):.3f} and {max(angle, found.angle_error):.1f}° "
-        f"elsewhere<br><small>Answered in {1e3 * seconds:.1f} ms</small></div>"
+def _code_area(kind: str) -> Any:
+    return pn.widgets.TextAreaInput(
+        disabled=True,
+        height=330,
+        max_length=10**6,
+        sizing_mode="stretch_width",
+        stylesheets=[looks.CODE],
+        css_classes=[kind],
     )
 
 
-def _shown(found: Answer, name: str) -> list[float]:
-    """A wrench in N and N mm, without -0."""
-    fx, fy, tau = getattr(found, name)
-    return [round(each, 4) + 0.0 for each in (fx, fy, 1e3 * tau)]
+def _copied(area: Any) -> Any:
+    """A text with a button that copies it."""
+    copy = pn.widgets.Button(name="Copy", css_classes=[f"copy-{area.css_classes[0]}"])
+    copy.js_on_click(args={"area": area}, code="navigator.clipboard.writeText(area.value)")
+    return pn.Column(copy, area, sizing_mode="stretch_width")

@@ -39,7 +39,7 @@ def pressure_image(drawing: Drawing) -> dict[str, list[Any]]:
     return {"image": [image], "x": [-width / 2], "y": [-height / 2], "dw": [width], "dh": [height]}
 
 
-def slip_arrows(state: State) -> dict[str, np.ndarray]:
+def slip_arrows(state: State) -> dict[str, list[float]]:
     """Velocities of points that press, as arrows [mm] of which the fastest is as long as they are apart."""
     drawing = state.drawing
     rows, columns = drawing.pressures.shape
@@ -53,8 +53,10 @@ def slip_arrows(state: State) -> dict[str, np.ndarray]:
     return _arrows(points, ends)
 
 
-def wrench_arrows(state: State, answer: Answer) -> dict[str, Any]:
+def wrench_arrows(state: State, answer: Answer | None) -> dict[str, Any]:
     """Forces of law, surface and ellipsoid as arrows from the centre of pressure [mm], one on top of the other."""
+    if answer is None:
+        return {**_arrows(np.zeros((0, 2)), np.zeros((0, 2))), "colour": [], "width": []}
     start = np.tile(state.drawing.surface.centre_of_pressure, (3, 1))
     longest = REACH * max(state.drawing.width, state.drawing.height)
     return {
@@ -64,11 +66,15 @@ def wrench_arrows(state: State, answer: Answer) -> dict[str, Any]:
     }
 
 
-def _arrows(starts: np.ndarray, ends: np.ndarray) -> dict[str, np.ndarray]:
-    """Shafts, and angles [rad] of triangles at the tips, which point up at an angle of 0."""
+def _arrows(starts: np.ndarray, ends: np.ndarray) -> dict[str, list[float]]:
+    """Shafts, and angles [rad] of triangles at the tips, which point up at an angle of 0.
+
+    Lists, since each array goes to the browser as a message of its own.
+    """
     along = ends - starts
     names = zip(("x0", "y0", "x1", "y1"), [*starts.T, *ends.T], strict=True)
-    return {**{name: MM * each for name, each in names}, "angle": np.arctan2(along[:, 1], along[:, 0]) - np.pi / 2}
+    angle = np.arctan2(along[:, 1], along[:, 0]) - np.pi / 2
+    return {**{name: (MM * each).tolist() for name, each in names}, "angle": angle.tolist()}
 
 
 def points_of_interest(state: State) -> dict[str, list[float]]:
@@ -94,10 +100,8 @@ def surface_figure(state: State, *, quick: bool = False) -> dict[str, Any]:
         "name": "limit surface",
         **_coordinates(mesh),
         "surfacecolor": mesh[..., 2],
-        "colorscale": "Cividis",
-        "cmin": -1.6,  # only the light end of the colours, so that lines are seen on it
-        "cmax": 1.1,
-        "opacity": 0.75,
+        "colorscale": [[0.0, "#5B9BC8"], [1.0, "#CFE3F1"]],
+        "opacity": 0.45,  # the wrenches inside are seen
         "showscale": False,
         "hoverinfo": "skip",
     }
@@ -106,7 +110,7 @@ def surface_figure(state: State, *, quick: bool = False) -> dict[str, Any]:
         "name": "ellipsoid",
         "mode": "lines",
         **_coordinates(np.concatenate([rings, spokes])),
-        "line": {"color": COLOURS["ellipsoid"], "width": 1.5},
+        "line": {"color": COLOURS["ellipsoid"], "width": 2},
         "hoverinfo": "skip",
     }
     return {"data": [shell, wires, *(_marker(name, np.zeros(3)) for name in COLOURS)], "layout": _layout()}
@@ -135,7 +139,7 @@ def _marker(name: str, point: np.ndarray) -> dict[str, Any]:
         "name": {"friction": "friction of the law", "surface": "on the surface", "ellipsoid": "on the ellipsoid"}[name],
         "mode": "lines+markers",
         **_coordinates(np.stack([np.zeros(3), point])),
-        "line": {"color": COLOURS[name], "width": 5},
+        "line": {"color": COLOURS[name], "width": 6},
         "marker": {"color": COLOURS[name], "size": [0, 8]},
         "hovertemplate": "fx %{x:.4f}<br>fy %{y:.4f}<br>τ/r %{z:.4f}<extra></extra>",
     }
@@ -147,12 +151,11 @@ def _layout() -> dict[str, Any]:
         f"{name}axis": {"range": [-limit, limit], "title": {"text": text}}
         for name, text in zip("xyz", ("fx", "fy", "τ/r"), strict=True)
     }
-    camera = {"eye": {"x": 1.25, "y": -1.65, "z": 0.8}, "center": {"x": 0.0, "y": 0.0, "z": -0.12}}
+    camera = {"eye": {"x": 1.45, "y": -1.95, "z": 0.9}, "center": {"x": 0.0, "y": 0.0, "z": -0.12}}
     return {
         "scene": {**axes, "aspectmode": "cube", "camera": camera},
         "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
         "legend": {"orientation": "h", "y": 0},
         "uirevision": "kept",  # the view that was turned to stays
-        "width": 560,
-        "height": 520,
+        "autosize": True,
     }

@@ -39,9 +39,10 @@ def open_server(port: int) -> Any:
         import panel
     except ImportError:
         raise MissingExtraError("panel", "explore") from None
+    from planarfriction.explore import looks
     from planarfriction.explore.page import Page
 
-    panel.extension("plotly")
+    panel.extension("plotly", raw_css=[looks.PAGE])
     try:
         # No websocket_origin: pages of other sites, which a browser has open beside this one, are refused.
         return panel.serve(

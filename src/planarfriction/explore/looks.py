@@ -1,0 +1,52 @@
+"""How the page looks: what stands beside what, and the styles of tables, charts and cards."""
+
+from __future__ import annotations
+
+from typing import Any
+
+PAGE = """
+body {margin: 0; background: #F3F5F7; font-family: system-ui, "Segoe UI", Roboto, "DejaVu Sans", sans-serif;
+  --design-primary-color: #0072B2}
+"""
+"""Style of the whole page."""
+
+CARD = """:host {background: white; border: 1px solid #DFE3E8; border-radius: 8px; padding: 10px 14px;
+  box-sizing: border-box}"""
+"""Style of a part of the page."""
+
+SIDE = CARD + "\n@media (max-width: 760px) {:host {order: 2; max-width: none !important}}"
+"""Style of the controls, which stand below the map on a small screen."""
+
+CODE = """textarea {font-family: ui-monospace, "DejaVu Sans Mono", monospace; font-size: 13px; white-space: pre;
+  color: #222 !important; background: #FAFAFA; opacity: 1 !important}"""
+"""Style of code to copy."""
+
+ALERT = "background:#FBE3E0;border:1px solid #C0392B;border-radius:6px;padding:8px 12px;font-size:15px"
+"""Style of the line that says what is wrong."""
+
+TABLE = """<style>
+table {font-variant-numeric: tabular-nums; border-collapse: collapse}
+th {font-weight: 600; text-align: right; padding: 3px 0 3px 14px; color: #555; vertical-align: bottom}
+td {text-align: right; padding: 3px 0 3px 14px; border-top: 1px solid #E6E9ED}
+th:first-child, td:first-child, td.words {text-align: left}
+th:first-child, td:first-child {padding-left: 0}
+p {margin: 8px 0 0}
+</style>"""
+"""Style of a table, to stand before it."""
+
+
+def grows(least: int, *, most: int | None = None) -> dict[str, str]:
+    """Styles of a part that shares the room of its row and gets a row of its own below `least` pixels."""
+    limit = {} if most is None else {"max-width": f"{most}px"}
+    return {"flex": f"1 1 {least}px", "min-width": "0", "width": "auto", **limit}
+
+
+def tidy(plot: Any) -> None:
+    """Thin lines and plain letters for a chart."""
+    plot.outline_line_color = None
+    plot.background_fill_color = plot.border_fill_color = None
+    for axis in plot.axis:
+        axis.axis_label_text_font_style = "normal"
+        axis.minor_tick_line_color = None
+        axis.axis_line_color = axis.major_tick_line_color = "#9AA3AD"
+    plot.grid.grid_line_color = "#E6E9ED"
