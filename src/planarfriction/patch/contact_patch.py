@@ -14,17 +14,14 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.patch import outline as outlines
 from planarfriction.patch import plain_data, shapes
 from planarfriction.patch.grid import Grid
-from planarfriction.patch.metric import Anisotropy
+from planarfriction.patch.moments import Moments
 from planarfriction.patch.pressure import Uniform, as_law, check_not_negative, check_pressure, evaluated, pressure_array
 from planarfriction.patch.pressure_maps import read_maps
 from planarfriction.patch.size import MOST_CELLS, check_cells, warn_of_the_unit
 
-MOST_DEGREE = 40
-"""Degree of polynomial moments that are given: beyond it powers are rounding."""
-
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ContactPatch(Anisotropy):
+class ContactPatch(Moments):
     """A flat contact: N cells at `rho_i` with areas `a_i`, and a pressure that determines their weights.
 
     `w_i = p_i a_i / sum(p a)`, so that `sum(w) = 1` and cell i carries the normal force `w_i f_N`.
@@ -312,46 +309,6 @@ class ContactPatch(Anisotropy):
         weights = self._shares(self.pressure.relative(self.positions, np.where(loaded, load, 1.0)))
         return np.where(loaded[..., None], weights, 0.0)
 
-    def centre_of_pressure(self, normal_force: ArrayLike | None = None) -> np.ndarray:
-        """Centre of pressure `sum(w rho)`, shape `[..., 2]` [m]."""
-        weights = self.weights(normal_force)
-        return np.stack([(weights * coordinate).sum(-1) for coordinate in self.positions.T], -1)
-
-    def contact_radius(self, normal_force: ArrayLike | None = None) -> float | np.ndarray:
-        """Contact radius `r = sum(w |rho - CoP|)` [m]: a pure spin about the CoP has the friction torque `mu f_N r`.
-
-        With a friction metric `sum(w |L J (rho - CoP)|)`, J a quarter turn; the second moment likewise.
-        """
-        weights, *offset = self._about_centre_of_pressure(normal_force)
-        return (weights * np.hypot(*self.lever_coordinates(*offset))).sum(-1)
-
-    def second_moment(self, normal_force: ArrayLike | None = None) -> float | np.ndarray:
-        """Second moment `<rho^2> = sum(w |rho - CoP|^2)` [m^2]."""
-        weights, *offset = self._about_centre_of_pressure(normal_force)
-        dx, dy = self.lever_coordinates(*offset)
-        return (weights * (dx**2 + dy**2)).sum(-1)
-
-    def area(self, normal_force: ArrayLike | None = None) -> float | np.ndarray:
-        """Area of the cells under load [m^2]."""
-        return np.where(self.weights(normal_force) > 0.0, self.areas, 0.0).sum(-1)
-
-    def moments(self, degree: int, normal_force: ArrayLike | None = None, *, about: Any = None) -> np.ndarray:
-        """Polynomial moments of the pressure, `M[i, j] = sum(w (x - x0)^i (y - y0)^j)` for `i + j <= degree`.
-
-        Shape `[..., degree + 1, degree + 1]` [m^(i + j)], zero where `i + j > degree`. `about` is the point (x0, y0)
-        [m]: None for the centre of pressure (central moments), `(0, 0)` for the raw ones. Raises InvalidValueError for
-        a parameter that breaks its rule.
-        """
-        degree = validation.count("degree", degree, at_least=0, at_most=MOST_DEGREE)
-        weights, dx, dy = self._about_centre_of_pressure(normal_force)
-        if about is not None:
-            dx, dy = (self.positions - validation.vector("about", about, 2)).T
-        result = np.zeros((*weights.shape[:-1], degree + 1, degree + 1))
-        for i in range(degree + 1):
-            for j in range(degree + 1 - i):
-                result[..., i, j] = (weights * dx**i * dy**j).sum(-1)
-        return result
-
     def pressure_values(self, normal_force: ArrayLike) -> np.ndarray:
         """Pressure on each cell, `w_i f_N / a_i`, shape `[..., N]` [Pa].
 
@@ -375,12 +332,6 @@ class ContactPatch(Anisotropy):
         from planarfriction.plots.notebook import patch_html
 
         return patch_html(self)
-
-    def _about_centre_of_pressure(self, normal_force) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Weights and both coordinates of the cells relative to the CoP, each of shape `[..., N]`."""
-        weights = self.weights(normal_force)
-        dx, dy = ((x - (weights * x).sum(-1, keepdims=True)) for x in self.positions.T)
-        return weights, dx, dy
 
     def _shares(self, relative: np.ndarray) -> np.ndarray:
         """Weights `[..., N]` from relative pressures of the same shape, scaled first so that no sum can overflow."""

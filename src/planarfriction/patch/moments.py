@@ -1,0 +1,85 @@
+"""Sums over the pressure of a patch: its centre, the contact radius, the area, moments of any degree."""
+
+# pyright: reportAttributeAccessIssue=false
+# `positions`, `areas` and `weights` are those of the patch that is made from this.
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, overload
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from planarfriction import validation
+from planarfriction.patch.metric import Anisotropy
+
+MOST_DEGREE = 40
+"""Degree of polynomial moments that are given: beyond it powers are rounding."""
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Moments(Anisotropy):
+    """What follows from where the cells of a patch are and how the load spreads over them."""
+
+    def centre_of_pressure(self, normal_force: ArrayLike | None = None) -> np.ndarray:
+        """Centre of pressure `sum(w rho)`, shape `[..., 2]` [m].
+
+        Raises InvalidValueError without a load that is needed, as all sums here.
+        """
+        weights = self.weights(normal_force)
+        return np.stack([(weights * coordinate).sum(-1) for coordinate in self.positions.T], -1)
+
+    @overload
+    def contact_radius(self, normal_force: float | None = None) -> float: ...
+    @overload
+    def contact_radius(self, normal_force: np.ndarray | Sequence[Any]) -> np.ndarray: ...
+    def contact_radius(self, normal_force: Any = None) -> Any:
+        """Contact radius `r = sum(w |rho - CoP|)` [m]: a pure spin about the CoP has the friction torque `mu f_N r`.
+
+        With a friction metric `sum(w |L J (rho - CoP)|)`, J a quarter turn; the second moment likewise.
+        """
+        weights, *offset = self._about_centre_of_pressure(normal_force)
+        return (weights * np.hypot(*self.lever_coordinates(*offset))).sum(-1)
+
+    @overload
+    def second_moment(self, normal_force: float | None = None) -> float: ...
+    @overload
+    def second_moment(self, normal_force: np.ndarray | Sequence[Any]) -> np.ndarray: ...
+    def second_moment(self, normal_force: Any = None) -> Any:
+        """Second moment `<rho^2> = sum(w |rho - CoP|^2)` [m^2]."""
+        weights, *offset = self._about_centre_of_pressure(normal_force)
+        dx, dy = self.lever_coordinates(*offset)
+        return (weights * (dx**2 + dy**2)).sum(-1)
+
+    @overload
+    def area(self, normal_force: float | None = None) -> float: ...
+    @overload
+    def area(self, normal_force: np.ndarray | Sequence[Any]) -> np.ndarray: ...
+    def area(self, normal_force: Any = None) -> Any:
+        """Area of the cells under load [m^2]."""
+        return np.where(self.weights(normal_force) > 0.0, self.areas, 0.0).sum(-1)
+
+    def moments(self, degree: int, normal_force: ArrayLike | None = None, *, about: Any = None) -> np.ndarray:
+        """Polynomial moments of the pressure, `M[i, j] = sum(w (x - x0)^i (y - y0)^j)` for `i + j <= degree`.
+
+        Shape `[..., degree + 1, degree + 1]` [m^(i + j)], zero where `i + j > degree`. `about` is the point (x0, y0)
+        [m]: None for the centre of pressure (central moments), `(0, 0)` for the raw ones. Raises InvalidValueError for
+        a parameter that breaks its rule.
+        """
+        degree = validation.count("degree", degree, at_least=0, at_most=MOST_DEGREE)
+        weights, dx, dy = self._about_centre_of_pressure(normal_force)
+        if about is not None:
+            dx, dy = (self.positions - validation.vector("about", about, 2)).T
+        result = np.zeros((*weights.shape[:-1], degree + 1, degree + 1))
+        for i in range(degree + 1):
+            for j in range(degree + 1 - i):
+                result[..., i, j] = (weights * dx**i * dy**j).sum(-1)
+        return result
+
+    def _about_centre_of_pressure(self, normal_force: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Weights and both coordinates of the cells relative to the CoP, each of shape `[..., N]`."""
+        weights = self.weights(normal_force)
+        dx, dy = ((x - (weights * x).sum(-1, keepdims=True)) for x in self.positions.T)
+        return weights, dx, dy
