@@ -45,7 +45,10 @@ class FrictionLaw:
         return formulas.stribeck(np, speed, law) * share + law.sigma_2 * speed
 
     def rate(self, state: ArrayLike, velocity: ArrayLike, *, axis: int | None = None) -> np.ndarray:
-        """Rate `zdot = v - k z` [m/s] of bristles with deflection `state` [m]; both broadcast."""
+        """Rate `zdot = v - k z` [m/s] of bristles with deflection `state` [m]; both broadcast.
+
+        Raises InvalidValueError for shapes that do not broadcast.
+        """
         z, v = _bristles(state, velocity, axis)
         law, length, speed = self.numbers, _norm(z, axis), _norm(v, axis)
         product = z * v if axis is None else (z * v).sum(axis=axis, keepdims=True)

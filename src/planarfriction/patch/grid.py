@@ -16,7 +16,10 @@ from planarfriction.patch.size import MOST_CELLS, check_cells
 @described
 @dataclass(frozen=True)
 class Grid:
-    """A regular grid of boxes in the contact frame: x to the right, y up, **row 0 is the top row** (largest y)."""
+    """A regular grid of boxes in the contact frame: x to the right, y up, **row 0 is the top row** (largest y).
+
+    Raises InvalidValueError for sizes that are not > 0 and for counts below one.
+    """
 
     x_min: float
     """Left edge [m]."""

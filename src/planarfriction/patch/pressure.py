@@ -198,7 +198,10 @@ class SoftFinger(Pressure):
 
 @dataclass(frozen=True, eq=False)
 class PerCell(ByValue, Pressure):
-    """One relative pressure for each cell of a patch: measured maps, profiles, functions evaluated at the cells."""
+    """One relative pressure for each cell of a patch: measured maps, profiles, functions evaluated at the cells.
+
+    Raises InvalidValueError for what is not one row of finite numbers >= 0.
+    """
 
     values: np.ndarray
     """Relative pressures, shape `[N]` [-]."""

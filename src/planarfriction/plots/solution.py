@@ -13,7 +13,10 @@ if TYPE_CHECKING:
 
 
 def plot_solution(solution: Solution) -> style.PlotFigure:
-    """Draw the motion of the body (left) and the time histories of body and contacts (right)."""
+    """Draw the motion of the body (left) and the time histories of body and contacts (right).
+
+    Raises InvalidValueError for what is not a solution of a scene.
+    """
     figure = style.new_figure(14.0, 6.8)
     parts: Any = figure.subfigures(1, 2, width_ratios=(1.0, 1.45))
     motion, histories = parts

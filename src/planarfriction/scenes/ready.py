@@ -69,6 +69,8 @@ def in_hand(
     full `normal_force` [N] (a signal or a number; default: `in_hand_load(1)`). `centre_of_mass` [m] is where the
     centre of the plate of `size` (width, height) [m] and `mass` [kg] starts, at rest.
 
+    Raises InvalidValueError for a parameter that breaks its rule.
+
     Source: Waltersson and Karayiannidis 2024, section VI.
     """
     body = Body(
