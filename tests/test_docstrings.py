@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import dataclasses
+import functools
 import importlib
 import inspect
 import re
@@ -23,6 +24,13 @@ OF_PYTHON = {"NotImplementedError", "AttributeError", "TypeError", "StopIteratio
 """Raised for Python's own protocols, or by a method that a subclass has to write."""
 
 
+CHECKED_BEFORE = re.compile(
+    r"identify\.Identification\.to_dict|patch\.(PerCell|PressureMaps)\.(only|repeated|ever_loaded)"
+    r"|torch\.(ReducedModel\.law|ReducedPlanarLuGre\.(mu_.|v_s|gamma|sigma_.|radius))"
+)
+"""What calls checks that cannot fail, of numbers that were checked when the record was made."""
+
+
 class Public(NamedTuple):
     """A function, or a class as it is made, that users call."""
 
@@ -30,6 +38,8 @@ class Public(NamedTuple):
     code: Any
     """The function whose body is read."""
     doc: str
+    owner: type | None = None
+    """The class that it belongs to."""
 
 
 def members(where: str) -> Iterator[tuple[str, Any]]:
@@ -49,30 +59,59 @@ def callables(where: str) -> Iterator[Public]:
             yield Public(name, value, value.__doc__ or "")
             continue
         for attribute, member in vars(value).items():
-            code = member.__func__ if isinstance(member, (classmethod, staticmethod)) else member
-            code = code.fget if isinstance(code, property) else getattr(code, "func", code)
+            code = function_of(member)
             if not inspect.isfunction(code):
                 continue
             if attribute in ("__init__", "__post_init__"):
-                yield Public(name, code, value.__doc__ or "")
+                yield Public(name, code, value.__doc__ or "", value)
             elif not attribute.startswith("_"):
-                yield Public(f"{name}.{attribute}", code, inspect.getdoc(member) or "")
+                yield Public(f"{name}.{attribute}", code, inspect.getdoc(member) or "", value)
 
 
-def raises(code: Any) -> set[str]:
-    """Names of the errors that a function raises itself; "InvalidValueError" where it checks a parameter."""
+def function_of(member: Any) -> Any:
+    """The function behind a method, a property or a function that keeps its results."""
+    code = member.__func__ if isinstance(member, (classmethod, staticmethod)) else member
+    return code.fget if isinstance(code, property) else inspect.unwrap(getattr(code, "func", code))
+
+
+@functools.cache
+def tree(code: Any) -> ast.AST:
     try:
-        tree = ast.parse(textwrap.dedent(inspect.getsource(code)))
+        return ast.parse(textwrap.dedent(inspect.getsource(code)))
     except (OSError, SyntaxError):  # what `dataclass` wrote
+        return ast.Module([], [])
+
+
+def called(node: ast.expr, code: Any, owner: type | None) -> Any:
+    """What a name or a member stands for in a function, of what this package defines; None for all else."""
+    if isinstance(node, ast.Name):
+        return code.__globals__.get(node.id)
+    if not isinstance(node, ast.Attribute):
+        return None
+    if isinstance(node.value, ast.Name) and node.value.id in ("self", "cls") and owner is not None:
+        return inspect.getattr_static(owner, node.attr, None)
+    home = called(node.value, code, owner)
+    return inspect.getattr_static(home, node.attr, None) if inspect.isclass(home) or inspect.ismodule(home) else None
+
+
+def raises(code: Any, owner: type | None = None, seen: frozenset = frozenset()) -> set[str]:
+    """Names of the errors that a function raises, itself or in what it calls of this package but compiled loops."""
+    if not inspect.isfunction(code) or code in seen or not re.match(r"planarfriction\.(?!kernels)", code.__module__):
         return set()
-    found = set()
-    for node in ast.walk(tree):
+    found, seen = set(), seen | {code}
+    for node in ast.walk(tree(code)):
         if isinstance(node, ast.Raise) and node.exc is not None:
             made = node.exc.func if isinstance(node.exc, ast.Call) else node.exc
             found.add(ast.unparse(made))
-        if isinstance(node, ast.Call) and ast.unparse(node.func).startswith("validation."):
-            found.add("InvalidValueError")
-    return found - OF_PYTHON
+        if isinstance(node, ast.Call):
+            value = called(node.func, code, owner)
+            if inspect.isclass(value):
+                for name in ("__init__", "__post_init__", "__new__"):
+                    found |= raises(inspect.getattr_static(value, name, None), value, seen)
+            elif value is not None:
+                mine = re.match(r"(self|cls)\.\w+$", ast.unparse(node.func))
+                found |= raises(function_of(value), owner if mine else None, seen)
+    return {name for name in found if name.endswith("Error")} - OF_PYTHON
 
 
 def modules() -> list[Any]:
@@ -83,8 +122,8 @@ def modules() -> list[Any]:
 def test_what_raises_says_so(where):
     if where in FRONT_ENDS:
         pytest.importorskip(FRONT_ENDS[where])
-    silent = {each.name for each in callables(where) if raises(each.code) and not re.search(r"\bRaises\b", each.doc)}
-    assert not silent
+    said = {each.name: raises(each.code, each.owner) for each in callables(where) if "Raises" not in each.doc}
+    assert not {name: errors for name, errors in said.items() if errors and not CHECKED_BEFORE.fullmatch(name)}
 
 
 def records(where: str) -> list[tuple[str, Any]]:

@@ -96,12 +96,17 @@ def parameter_names(model: Any) -> tuple[str, ...]:
 
     Those of `ReducedModelPublished` are `PARAMETERS`. Those of `ReducedModel` are the parameters of the law without
     gamma, because its stored map depends on gamma, as it does on the shape of the patch.
+
+    Raises InvalidValueError for a model that has no roll-outs.
     """
     return _family(model).names
 
 
 def parameters_of(model: Any) -> np.ndarray:
-    """Parameters of a reduced model, shape `[P]`; for plain bristles the breakaway ratio is there but has no effect."""
+    """Parameters of a reduced model, shape `[P]`; for plain bristles the breakaway ratio is there but has no effect.
+
+    Raises InvalidValueError for a model that has no roll-outs.
+    """
     packed = pack(model)[0]
     return packed.rows[packed.family.columns]
 

@@ -113,7 +113,10 @@ def rollout(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, *, p
 def rollout_states(
     model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, *, parameters: Any = None
 ) -> RolloutStates:
-    """A `rollout` that keeps the state before each step, which saves `rollout_gradient` half of its work."""
+    """A `rollout` that keeps the state before each step, which saves `rollout_gradient` half of its work.
+
+    Raises InvalidValueError as `rollout` does.
+    """
     inputs = checked(model, state, twist, normal_force, dt, parameters)
     end, wrenches, states = _roll(inputs, len(inputs.dt))
     return RolloutStates(inputs.shaped(end), wrenches, inputs.shaped(states, len(inputs.dt)))

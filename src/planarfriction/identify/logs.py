@@ -120,6 +120,8 @@ class Log(ByValue):
         The pose is that of the contact frame in the world, the wrench is in the axes of the contact frame; the twist is
         obtained with `differentiated` and rotated into these axes. Jumps of theta by a whole turn, as from a tracker
         that limits it to one turn, are removed first and counted in `turns`; other jumps are refused.
+
+        Raises InvalidValueError for such jumps, wrong shapes and times that do not grow.
         """
         time, motion = _checked_motion(time, motion)
         motion[:, 2], turns = unwrapped(time, motion[:, 2], f"theta of {name}")

@@ -184,6 +184,8 @@ def predict_slide(model: Any, body: SlidingBody, slide: Slide, *, samples: int |
     """Poses `[T, 3]` of a slide, predicted by the model from its initial state.
 
     That is the measured one or, with `samples`, the one that `fit_start` finds from that many poses.
+
+    Raises InvalidValueError for what is not a body or a slide, SolverError where the simulation fails.
     """
     _check(body, slide)
     if samples is None:

@@ -35,6 +35,8 @@ class DistributedModel(FrictionModel):
 
     `W = sum w_i f_N [t_i ; rho_i x t_i]`. State: deflections `[2, N]` [m]. Leaves: the law's parameters, the cells'
     positions and weights. A patch whose shape depends on the load keeps that of `normal_force` [N].
+
+    Raises InvalidValueError for a parameter that breaks its rule.
     """
 
     arrays = distributed_arrays

@@ -63,6 +63,8 @@ class ReducedModelPublished(FrictionModel):
 
     `surface` None takes the published table. If the shape of the patch depends on the load, the surface must have a
     `normal_force`, and the shape at that load is kept.
+
+    Raises InvalidValueError for a parameter that breaks its rule.
     """
 
     arrays = published_arrays

@@ -55,6 +55,8 @@ class ReducedModel(FrictionModel):
     State `(z_x, z_y, z_theta)` [m], or `[P, 3]` for several parts. Leaves: the law's parameters, and the shape: F of
     the parts and their maps of steady sliding. If the shape of the patch depends on the load, the shape at
     `normal_force` [N] is kept; `parts`, `segments` and `speeds` as in `planarfriction.ReducedModel`.
+
+    Raises InvalidValueError for a parameter that breaks its rule.
     """
 
     arrays = reduced_arrays

@@ -210,12 +210,18 @@ class LimitSurface(ByValue):
         return -transformed(frame.T, self._direction(scaled))
 
     def dissipation(self, twist: ArrayLike) -> np.ndarray:
-        """Dissipated power `Phi(V) = -W . V >= 0` per unit `mu f_N`, shape `[...]` [m/s]."""
+        """Dissipated power `Phi(V) = -W . V >= 0` per unit `mu f_N`, shape `[...]` [m/s].
+
+        Raises InvalidValueError for a twist that is not `[..., 3]`, and without a load that is needed.
+        """
         scaled, _ = self._scaled(twist)
         return np.einsum("...i,...i", self._direction(scaled), scaled)
 
     def jacobian(self, twist: ArrayLike) -> np.ndarray:
-        """`dW/dV`, shape `[..., 3, 3]`; zero along `V` itself. At rest it is undefined and returned as zero."""
+        """`dW/dV`, shape `[..., 3, 3]`; zero along `V` itself. At rest it is undefined and returned as zero.
+
+        Raises InvalidValueError for a twist that is not `[..., 3]`, and without a load that is needed.
+        """
         scaled, frame = self._scaled(twist)
         flat = scaled.reshape(-1, 3)
         return -(frame.T @ self._direction_slope(flat) @ frame).reshape(*scaled.shape[:-1], 3, 3)

@@ -102,7 +102,10 @@ class LimitSurfaceQuartic(LimitSurface):
 
     @functools.cached_property
     def quartic(self) -> np.ndarray:
-        """The 15 coefficients."""
+        """The 15 coefficients.
+
+        Raises MissingExtraError without cvxpy where they are fitted, FrictionError where the fit fails.
+        """
         if self.coefficients is not None:
             return self.coefficients
         surface = self.surface or LimitSurfaceCells(self.patch, normal_force=self.normal_force)
@@ -115,7 +118,10 @@ class LimitSurfaceQuartic(LimitSurface):
 
     @functools.cached_property
     def convexity(self) -> float:
-        """Smallest eigenvalue of the certificate `Q`; if it is not negative, the surface is proven to be convex."""
+        """Smallest eigenvalue of the certificate `Q`; if it is not negative, the surface is proven to be convex.
+
+        Raises MissingExtraError without cvxpy, FrictionError where the fit fails.
+        """
         return float(np.linalg.eigvalsh(quartic_fit.certificate(self.quartic))[0])
 
     # ------------------------------------------------------------------ the protocol

@@ -32,6 +32,8 @@ class DistributedModel(FrictionModel):
     bristle decays towards `a_i g/sigma_0` instead of zero, `zdot_i = u_i - k_i (z_i - a_i g/sigma_0)`, `k_i = beta
     sigma_0 |u_i|/g`, where beta depends on the deflection measured from there.
 
+    Raises InvalidValueError for what is not a patch or a law, and for a law that creeps on a patch with an asymmetry.
+
     Source: Waltersson and Karayiannidis 2024, section III.
     """
 
@@ -46,12 +48,12 @@ class DistributedModel(FrictionModel):
         return (2, len(self.patch.positions))
 
     def rate(self, state: Any, twist: Any, normal_force: Any) -> np.ndarray:
-        """Bristle rates `zdot`, shape `[..., 2, N]` [m/s]."""
+        """Bristle rates `zdot`, shape `[..., 2, N]` [m/s]. Raises InvalidValueError as `step` does."""
         state, twist, load = self._inputs(state, twist, normal_force)
         return self._rates(state, twist, load)[0]
 
     def wrench(self, state: Any, twist: Any, normal_force: Any) -> np.ndarray:
-        """Friction wrench on the moving body, shape `[..., 3]` [N, N, N m]."""
+        """Friction wrench on the moving body, `[..., 3]` [N, N, N m]. Raises InvalidValueError as `step` does."""
         state, twist, load = self._inputs(state, twist, normal_force)
         return load[..., None] * self._rates(state, twist, load)[1]
 
@@ -61,6 +63,8 @@ class DistributedModel(FrictionModel):
         Plain LuGre is linear in z, and its step is exact. Elasto-plastic bristles use an exponential step with the
         average of the decay at the start and at the predicted end: second order, and limited to the largest deflection
         so that nothing overshoots.
+
+        Raises InvalidValueError for shapes that do not fit, numbers that are not finite, and a load or time below zero.
         """
         state, twist, load, dt = self._inputs(state, twist, normal_force, dt=dt)
         if self.patch.anisotropic:
@@ -81,7 +85,10 @@ class DistributedModel(FrictionModel):
         return out.reshape(state.shape), wrench.reshape(*batch, 3)
 
     def jacobians(self, state: Any, twist: Any, normal_force: Any) -> ModelJacobians:
-        """Analytic derivatives of `rate` and `wrench` (see `ModelJacobians`); one-sided at kinks."""
+        """Analytic derivatives of `rate` and `wrench` (see `ModelJacobians`); one-sided at kinks.
+
+        Raises InvalidValueError as `step` does.
+        """
         state, twist, load = self._inputs(state, twist, normal_force)
         law, identity = self.law.numbers, np.eye(2)[:, :, None]
         lin = linearised(self._of_all_cells(load), state.reshape(load.size, 2 * state.shape[-1]), twist.reshape(-1, 3))
@@ -107,7 +114,10 @@ class DistributedModel(FrictionModel):
         )
 
     def step_jacobians(self, state: Any, twist: Any, normal_force: Any, dt: Any) -> StepJacobians:
-        """Analytic derivatives of `step` (see `StepJacobians`); one-sided at kinks."""
+        """Analytic derivatives of `step` (see `StepJacobians`); one-sided at kinks.
+
+        Raises InvalidValueError as `step` does.
+        """
         state, twist, load, dt = self._inputs(state, twist, normal_force, dt=dt)
         if self.patch.anisotropic:
             return anisotropic.step_jacobians(self, state, self._cell_velocity(twist), load, dt)

@@ -101,7 +101,10 @@ class ReducedModel(ThreeStateModel):
         return (3,) if self.parts == 1 else (self.parts, 3)
 
     def shape_at(self, normal_force: float | None) -> ReducedShape:
-        """Second moments of slip and stored steady state of a model of one part at a load [N]; see `parts_at`."""
+        """Second moments of slip and stored steady state of a model of one part at a load [N]; see `parts_at`.
+
+        Raises InvalidValueError as `shapes_at` does.
+        """
         return self.shapes_at([normal_force])[0]
 
     def shapes_at(self, loads) -> list[ReducedShape]:
@@ -114,7 +117,10 @@ class ReducedModel(ThreeStateModel):
         return self._parts[0].at(self._checked(loads))
 
     def parts_at(self, normal_force: float | None) -> tuple[Part, ...]:
-        """Share of the load and shape of each part at a load [N]; recent loads are cached."""
+        """Share of the load and shape of each part at a load [N]; recent loads are cached.
+
+        Raises InvalidValueError for a load that is not > 0.
+        """
         if not self.patch.depends_on_load:
             return self._fixed_parts
         return self._parts_together([normal_force])[0]

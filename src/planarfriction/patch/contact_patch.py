@@ -347,5 +347,8 @@ class ContactPatch(Moments):
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> ContactPatch:
-        """Restore the patch that `to_dict` described; unknown and missing keys raise an error that names them."""
+        """Restore the patch that `to_dict` described; unknown and missing keys raise an error that names them.
+
+        Raises InvalidValueError for those, and for values that break a rule of the patch.
+        """
         return plain_data.from_dict(cls, data)

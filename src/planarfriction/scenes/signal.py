@@ -149,7 +149,10 @@ class Signal(ByValue):
             raise InvalidValueError(f"{path}: {error.name}", error.rule, error.value) from None
 
     def held(self, dt: float) -> Signal:
-        """The same signal as seen by a digital controller: sampled every `dt` [s] from the first time on, and held."""
+        """The same signal as seen by a digital controller: sampled every `dt` [s] from the first time on, and held.
+
+        Raises InvalidValueError for a `dt` that is not > 0, or that makes too many samples.
+        """
         times = self.times[0] + sample_times(self.times[-1] - self.times[0], dt)
         return Signal(times, self(times))
 
@@ -158,7 +161,10 @@ class Signal(ByValue):
         return self._value(t, "right")
 
     def left(self, t: ArrayLike) -> np.ndarray:
-        """Value just before the times `t` [s] (any shape); at a jump, the value before the jump."""
+        """Value just before the times `t` [s] (any shape); at a jump, the value before the jump.
+
+        Raises InvalidValueError for times that are not finite.
+        """
         return self._value(t, "left")
 
     @property

@@ -26,6 +26,8 @@ class DistributedModel(FrictionModel):
     too: the weights `w_i` of the cells are the softmax of a raw parameter, so that they stay positive and add up to 1.
     If the shape of the patch depends on the load, the shape at `normal_force` [N] is kept.
 
+    Raises InvalidValueError for a parameter that breaks its rule.
+
     Source: Waltersson and Karayiannidis 2024, section III.
     """
 

@@ -59,6 +59,8 @@ class ReducedModelPublished(FrictionModel):
     limit surface unchanged. The shape does not change with the load: if that of the patch does, it is fixed by the
     `normal_force` of `surface`.
 
+    Raises InvalidValueError for a parameter that breaks its rule.
+
     Source: Waltersson and Karayiannidis 2024, section IV.
     """
 

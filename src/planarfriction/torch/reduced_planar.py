@@ -114,7 +114,10 @@ class ReducedPlanarLuGre(ReducedModelPublished):
     # ------------------------------------------------------------------ the interface
 
     def g(self, speed: Tensor | float) -> Tensor:
-        """Friction coefficient in steady sliding, `g = mu_c + (mu_s - mu_c) exp(-|v/v_s|^gamma)`, any shape [-]."""
+        """Friction coefficient in steady sliding, `g = mu_c + (mu_s - mu_c) exp(-|v/v_s|^gamma)`, any shape [-].
+
+        Raises InvalidValueError for what is not a tensor of numbers.
+        """
         law = self._law(self.physical())
         speed = self._number("speed", speed)
         return formulas.stribeck(xp, speed[..., None].abs(), law)[..., 0]
@@ -123,6 +126,8 @@ class ReducedPlanarLuGre(ReducedModelPublished):
         """Bristles of steady sliding, `z_ss = S h g/sigma_0` `[..., 3]`, zero at rest.
 
         `v_scaled` `[..., 3]` [m/s] is the twist at the centre of pressure, `(vx, vy, r omega)`.
+
+        Raises InvalidValueError for what is not a tensor `[..., 3]`.
         """
         v_scaled = self._number("v_scaled", v_scaled)
         values = self.physical()
@@ -137,7 +142,10 @@ class ReducedPlanarLuGre(ReducedModelPublished):
         return self.forward(z, v, 1.0)[0]
 
     def force(self, z: Tensor, z_dot: Tensor, v: Tensor, f_n: Tensor | float) -> Tensor:
-        """Wrench `w = -(sigma_0 z + sigma_1 z_dot + sigma_2 U v) f_n` `[..., 3]` [N, N, N m]."""
+        """Wrench `w = -(sigma_0 z + sigma_1 z_dot + sigma_2 U v) f_n` `[..., 3]` [N, N, N m].
+
+        Raises InvalidValueError for tensors whose shapes do not fit.
+        """
         law, shape, _ = self.prepare(self.physical())[0]
         z, v, load = self._inputs(z, v, f_n)
         by = self.arrays.held(xp, law, shape, v)

@@ -109,6 +109,8 @@ def tracking_loss(
 
     `mean(((fx - fx*)/f_N)^2 + ((fy - fy*)/f_N)^2 + ((tau - tau*)/(f_N r))^2)` over the samples with load. The scales
     are constants; r is that of the patch. The other arguments are those of `rollout`.
+
+    Raises InvalidValueError as `rollout` does.
     """
     run = rollout(model, state, twist, normal_force, dt, parameters=parameters, method=method)
     measured, load = (
