@@ -61,7 +61,7 @@ def root(node: ast.AST) -> str:
     while not isinstance(node, ast.Name):
         if isinstance(node, ast.Attribute) and node.attr in OF_TENSORS:
             return node.attr
-        inner = getattr(node, "func", None) or getattr(node, "value", None) or getattr(node, "left", None)
+        inner = getattr(node, "func", None) or getattr(node, "value", None)
         if not isinstance(inner, ast.AST):
             return ""
         node = inner

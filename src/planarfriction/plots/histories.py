@@ -50,6 +50,8 @@ def plot_histories(solutions: Solution | Mapping[str, Solution]) -> style.PlotFi
     the same for a model in every figure, line styles their contacts; with more than 7 runs the colours go from the
     first to the last, and the legend names some. Left the body (world axes, centre of mass), right the contacts: the
     friction wrench on the body about the origin of the contact frame, and the normal force.
+
+    Raises InvalidValueError for what is not a solution.
     """
     figure = style.new_figure(9.6, 8.0)
     draw_histories(figure, solutions)

@@ -44,6 +44,8 @@ def plot_motion(solution: Solution) -> style.PlotFigure:
     at each instant. A body without an outline is drawn as the rim of its patches, with a line from its centre of mass
     along its x axis. The thin line is the path of the centre of mass. A body that is tiny beside its path is drawn
     larger, and the title says so, as it does where the body hardly moves.
+
+    Raises InvalidValueError for what is not a solution of a scene.
     """
     strobe = _strobe(solution)
     width, height = np.diff(strobe.limits, axis=-1)[:, 0]
