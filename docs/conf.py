@@ -84,6 +84,7 @@ sphinx_gallery_conf = {
     "ignore_pattern": rf"__init__\.py{f'|({WITHOUT}).py$' if WITHOUT else ''}",
     "capture_repr": (),
     "image_scrapers": ("figure_scraper",),
+    "reset_modules": ("matplotlib", "figure_scraper.thicker"),
     "remove_config_comments": True,
     "min_reported_time": 10,
     "show_signature": False,

@@ -46,7 +46,8 @@ def test_equations_names_and_terms_are_links(site):
     physics = (site / "physics.html").read_text(encoding="utf-8")
     assert "<math" in physics and "$$" not in physics
     assert 'href="api/formulas.html#planarfriction.formulas.stribeck"' in physics
-    assert 'href="api/kernels.html#planarfriction.kernels.exact.disc_sum"' in physics
+    exact = (site / "exact-surfaces.html").read_text(encoding="utf-8")
+    assert 'href="api/kernels.html#planarfriction.kernels.exact.disc_sum"' in exact
     assert 'href="glossary.html#term-limit-surface"' in physics
 
 
@@ -58,6 +59,26 @@ def test_every_formula_and_loop_that_a_page_names_is_a_link(site):
             assert link, f"{page.name}: {name}"
             found += 1
     assert found > 50
+
+
+def test_terms_are_links_where_a_page_uses_them_first(site):
+    terms = re.findall(r'<dt id="term-([\w-]+)"', (site / "glossary.html").read_text(encoding="utf-8"))
+    assert len(terms) > 20
+    found = 0
+    for page in (*site.glob("*.html"), *site.glob("gallery/*/*.html"), *site.glob("notebooks/*.html")):
+        name = page.relative_to(site).as_posix()
+        if name.startswith(("glossary", "changelog", "cli", "genindex", "search", "py-modindex", "notebooks/index")):
+            continue
+        _, _, article = page.read_text(encoding="utf-8").partition("<article")
+        article = article.partition("</article>")[0]
+        linked = set(re.findall(r'glossary\.html#term-([\w-]+)"', article))
+        plain = re.sub(
+            r"<(a|code|pre|math|h\d|thead|figcaption|script|style)\b.*?</\1>|<[^>]*>", " | ", article, flags=re.S
+        )
+        used = {term for term in terms if re.search(rf"(?<![\w-]){term.replace('-', ' ')}s?(?![\w-])", plain)}
+        assert used <= linked, f"{name}: {sorted(used - linked)}"
+        found += len(linked)
+    assert found > 200
 
 
 def test_every_public_name_is_in_the_reference(site):

@@ -9,11 +9,18 @@ import os
 from pathlib import Path
 from typing import Any
 
+import matplotlib
 from matplotlib.figure import Figure
 from sphinx_gallery.scrapers import figure_rst
 
 _SHOWN: dict[str, list[Any]] = {}
 """Script -> its figures that have been saved, kept so that no other takes their place in memory."""
+
+
+def thicker(gallery_conf: dict[str, Any], name: str) -> None:
+    """Lines that can be seen in a thumbnail, for every script."""
+    del gallery_conf, name
+    matplotlib.rcParams.update({"lines.linewidth": 2.0, "axes.labelsize": 11.0})
 
 
 def figures(block: Any, block_vars: dict[str, Any], gallery_conf: dict[str, Any]) -> str:

@@ -23,8 +23,15 @@ NOT_IN = (
     nodes.thead,
     nodes.raw,
 )
-LEFT_OUT = ("glossary", "changelog", "gallery/", "notebooks/", "api/", "cli")
+LEFT_OUT = ("glossary", "changelog", "gallery/index", "notebooks/index", "api/", "cli")
 """Pages on which terms stay plain: lists, and pages for those who look something up."""
+
+
+def spelled(term: str) -> str:
+    """A pattern of the term in singular and plural: centres of rotation, load families, contact radii."""
+    words = [re.escape(word) for word in term.lower().split()]
+    words = [re.sub("y$", "(?:y|ies)", re.sub("us$", "(?:us|i)", word)) + "(?:s|es)?" for word in words]
+    return r"\s+".join(words)
 
 
 class GlossaryLinks(SphinxPostTransform):
@@ -46,11 +53,12 @@ class GlossaryLinks(SphinxPostTransform):
                 self._link(text, left)
 
     def _link(self, text: nodes.Text, left: dict[str, tuple[str, str]]) -> None:
-        words = "|".join(re.escape(term).replace(r"\ ", r"\s+") for term in sorted(left, key=len, reverse=True))
+        terms = sorted(left, key=len, reverse=True)
+        words = "|".join(f"({spelled(term)})" for term in terms)
         pieces: list[nodes.Node] = []
         end, whole = 0, text.astext()
-        for match in re.finditer(rf"(?<![\w-])({words})(?:s|es)?(?![\w-])", whole, re.IGNORECASE):
-            place = left.pop(" ".join(match[1].lower().split()), None)
+        for match in re.finditer(rf"(?<![\w-])(?:{words})(?![\w-])", whole, re.IGNORECASE):
+            place = left.pop(terms[(match.lastindex or 1) - 1], None)
             if place is None:
                 continue
             pieces.append(nodes.Text(whole[end : match.start()]))

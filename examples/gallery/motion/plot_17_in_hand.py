@@ -20,6 +20,7 @@ figure = pf.plots.plot_histories(solutions)
 # %%
 # And the motion of the plate:
 motion = pf.plots.plot_motion(solutions["distributed"])
+# sphinx_gallery_thumbnail_number = 2
 
 # %%
 end = {name: 1e3 * float(solution.data.y[-1]) for name, solution in solutions.items()}
