@@ -34,19 +34,19 @@ class Controls:
 
     def __init__(self, state: State):
         widgets = pn.widgets
-        self.patch = widgets.Select(name="Patch", options=[*PUBLISHED_PATCHES, OWN], value=state.drawing.name)
+        self.patch = widgets.Select(label="Patch", options=[*PUBLISHED_PATCHES, OWN], value=state.drawing.name)
         self.file = widgets.FileInput(accept="")
-        self.cell_size = widgets.FloatInput(name="Cell size [mm]", step=0.1, format="0[.]0000")
-        self.clear = widgets.Button(name="Clear the map", align="end")
-        self.tool = widgets.RadioButtonGroup(options=TOOLS, value="turn", button_type="primary", button_style="outline")
-        self.brush = widgets.FloatSlider(name="Radius of the brush [cells]", start=0.5, end=6.0, step=0.5, value=1.5)
-        self.pressure = widgets.FloatSlider(name="Pressure of the brush", start=0.1, end=1.0, step=0.1, value=1.0)
-        self.law = widgets.Select(name="Law", options=list(LAWS), value=LAWS.name_of(state.law))
-        self.load = widgets.FloatInput(name="Normal force [N]", value=state.normal_force, step=0.5)
+        self.cell_size = widgets.FloatInput(label="Cell size [mm]", step=0.1, format="0[.]0000")
+        self.clear = widgets.Button(label="Clear the map", align="end")
+        self.tool = widgets.RadioButtonGroup(options=TOOLS, value="turn", color="primary", variant="outline")
+        self.brush = widgets.FloatSlider(label="Radius of the brush [cells]", start=0.5, end=6.0, step=0.5, value=1.5)
+        self.pressure = widgets.FloatSlider(label="Pressure of the brush", start=0.1, end=1.0, step=0.1, value=1.0)
+        self.law = widgets.Select(label="Law", options=list(LAWS), value=LAWS.name_of(state.law))
+        self.load = widgets.FloatInput(label="Normal force [N]", value=state.normal_force, step=0.5)
         vx, vy, omega = state.twist
-        self.vx = widgets.FloatSlider(name="vx [mm/s]", start=-100.0, end=100.0, step=0.1, value=1e3 * vx)
-        self.vy = widgets.FloatSlider(name="vy [mm/s]", start=-100.0, end=100.0, step=0.1, value=1e3 * vy)
-        self.omega = widgets.FloatSlider(name="ω [rad/s]", start=-10.0, end=10.0, step=0.01, value=omega)
+        self.vx = widgets.FloatSlider(label="vx [mm/s]", start=-100.0, end=100.0, step=0.1, value=1e3 * vx)
+        self.vy = widgets.FloatSlider(label="vy [mm/s]", start=-100.0, end=100.0, step=0.1, value=1e3 * vy)
+        self.omega = widgets.FloatSlider(label="ω [rad/s]", start=-10.0, end=10.0, step=0.01, value=omega)
         for name, widget in vars(self).items():  # a name for the widget in the page too
             widget.css_classes = [name.replace("_", "-")]
             widget.sizing_mode = "stretch_width"
@@ -65,7 +65,7 @@ class Controls:
             unit = f" [{UNITS[name]}]" if name in UNITS else ""
             fields.append(
                 pn.widgets.FloatInput(
-                    name=name + unit,
+                    label=name + unit,
                     value=value,
                     css_classes=["parameter", name],
                     tags=[name],

@@ -234,6 +234,6 @@ def _code_area(kind: str) -> Any:
 
 def _copied(area: Any) -> Any:
     """A text with a button that copies it."""
-    copy = pn.widgets.Button(name="Copy", css_classes=[f"copy-{area.css_classes[0]}"])
+    copy = pn.widgets.Button(label="Copy", css_classes=[f"copy-{area.css_classes[0]}"])
     copy.js_on_click(args={"area": area}, code="navigator.clipboard.writeText(area.value)")
     return pn.Column(copy, area, sizing_mode="stretch_width")

@@ -29,12 +29,12 @@ class SceneTab:
         self._state = state
         self._loaded: dict[str, Scene] = {}
         self._live = Live(failed=self._fail)
-        self.scene = pn.widgets.Select(name="Scene", options=list(SCENES), css_classes=["scene"], width=190)
+        self.scene = pn.widgets.Select(label="Scene", options=list(SCENES), css_classes=["scene"], width=190)
         self.model = pn.widgets.Select(
-            name="Model", options=list(MODELS), value="reduced", css_classes=["model"], width=190
+            label="Model", options=list(MODELS), value="reduced", css_classes=["model"], width=190
         )
-        self.file = pn.widgets.FileInput(name="Scene file", accept="", css_classes=["scene-file"], width=300)
-        self.button = pn.widgets.Button(name="Run", button_type="primary", css_classes=["run"], align="end", width=90)
+        self.file = pn.widgets.FileInput(label="Scene file", accept="", css_classes=["scene-file"], width=300)
+        self.button = pn.widgets.Button(label="Run", color="primary", css_classes=["run"], align="end", width=90)
         self.words = pn.pane.HTML("", css_classes=["run-status"], sizing_mode="stretch_width")
         self.result = pn.pane.HTML("", sizing_mode="stretch_width")
         self._running = False
@@ -58,7 +58,7 @@ class SceneTab:
             return
         name = str(self.scene.value)
         scene = self._loaded.get(name) or ready_scene(self._state(), name, str(self.model.value))
-        self._running, self.button.name, self.result.object = True, "Stop", ""
+        self._running, self.button.label, self.result.object = True, "Stop", ""
         self._say("Simulating (the first time this compiles) ...")
         self._live.now(lambda task: self._work(scene, task))
 
@@ -90,5 +90,5 @@ class SceneTab:
         self.words.object = html.escape(text)
 
     def _rest(self, text: str) -> None:
-        self._running, self.button.name = False, "Run"
+        self._running, self.button.label = False, "Run"
         self._say(text)

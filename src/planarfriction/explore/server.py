@@ -7,6 +7,7 @@ from typing import Any
 
 from planarfriction import validation
 from planarfriction.errors import FrictionError, InvalidValueError, MissingExtraError
+from planarfriction.scenes.compiling import said_when_compiling
 
 LOOPBACK = "127.0.0.1"
 """The one address that is listened to: nobody else in the network can reach it."""
@@ -24,12 +25,21 @@ def serve(port: int = 0, *, browser: bool = True, ready: Callable[[str], None] |
     `FrictionError` where it is taken.
     """
     server = open_server(port)
+    with said_when_compiling():
+        _rehearse()
     server.start()
     if browser:
         server.io_loop.add_callback(server.show, "/")
     if ready is not None:
         ready(f"http://localhost:{server.port}")
     server.run_until_shutdown()
+
+
+def _rehearse() -> None:
+    """Make a page that nobody sees, so that what has to be compiled is so before the first visitor comes."""
+    from planarfriction.explore.page import Page
+
+    Page()
 
 
 def open_server(port: int) -> Any:

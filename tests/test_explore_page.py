@@ -1,0 +1,192 @@
+"""The page of the explorer and its server without a browser: controls, messages, work in the background, loopback."""
+
+from __future__ import annotations
+
+import gc
+import re
+import threading
+import warnings
+from typing import Any
+
+import numpy as np
+import pytest
+
+from planarfriction.errors import FrictionError, InvalidValueError
+from planarfriction.explore.answers import answer
+
+pn = pytest.importorskip("panel")
+
+from planarfriction.explore.controls import OWN  # noqa: E402
+from planarfriction.explore.live import GivenUp, Live  # noqa: E402
+from planarfriction.explore.page import Page  # noqa: E402
+from planarfriction.explore.server import open_server  # noqa: E402
+
+
+@pytest.fixture
+def page() -> Page:
+    return Page()
+
+
+def shown(page: Page) -> np.ndarray:
+    """Wrenches of law, surface and ellipsoid that stand on the page [N, N, N mm], `[3, 3]`."""
+    cells = re.findall(r"<td>(-?[\d.]+)</td>", page.numbers.object)
+    return np.array(cells, dtype=float).reshape(3, 3)
+
+
+def test_what_stands_on_the_page_is_the_answer_to_what_is_set(page):
+    page.controls.patch.value = "NonConvex2"
+    page.controls.load.value = 2.5
+    page.controls.vy.value = -7.0
+    page.controls.omega.value = -2.0
+    assert page.state.twist == pytest.approx((0.01, -0.007, -2.0)) and page.state.normal_force == 2.5
+    found = answer(page.state)
+    wrenches = np.stack([found.friction, found.surface, found.ellipsoid]) * [1.0, 1.0, 1e3]
+    np.testing.assert_allclose(shown(page), wrenches, atol=5e-5)  # four digits are shown
+    assert f"{found.force_error:.3f}" in page.numbers.object and f"{found.angle_error:.1f}°" in page.numbers.object
+    x, y = 1e3 * np.array(page.state.centre_of_rotation)
+    assert (x, y) == pytest.approx((-3.5, -5.0)) and f"({x:.2f}, {y:.2f}) mm" in page.numbers.object
+
+
+def test_a_drag_over_the_map_does_what_the_tool_says(page):
+    page._follow_to(0.003, -0.004)
+    assert page.state.centre_of_rotation == pytest.approx((0.003, -0.004))
+    page.controls.tool.value = "slide"
+    page._follow_to(0.0, 0.005)
+    assert page.state.twist[:2] == pytest.approx((0.0, 0.05)) and page.controls.vy.value == pytest.approx(50.0)
+    page.controls.tool.value = "erase"
+    page._dragged(0.0, 0.0)
+    assert page.state.drawing.origin == "drawn" and page.controls.patch.value == OWN
+    assert page.state.drawing.pressures[10, 10] == 0.0
+
+
+def test_a_file_is_loaded_and_a_wrong_one_leaves_the_map_as_it_is(page):
+    before = page.state.drawing
+    page.controls.file.filename, page.controls.file.value = "pad.csv", b"1,x\n"
+    assert "pad.csv: line 1" in page.message.object and page.message.visible and page.state.drawing is before
+    page.controls.file.value = b"0,1\n2,0\n"
+    assert not page.message.visible
+    np.testing.assert_array_equal(page.state.drawing.pressures, [[0.0, 1.0], [2.0, 0.0]])
+
+
+def test_a_law_has_its_fields_and_a_value_that_breaks_a_rule_is_one_line(page):
+    page.controls.law.value = "dahl"
+    assert list(page.controls.law_values()) == ["mu_c", "sigma_0"]
+    law = page.state.law
+    page.controls.parameters[0].value = -1.0
+    assert "mu_c must be &gt; 0" in page.message.object and page.message.visible and page.state.law is law
+    page.controls.parameters[0].value = 0.4
+    assert page.state.law.mu_c == 0.4 and not page.message.visible
+
+
+def test_an_empty_map_leaves_no_numbers_of_another_one(page):
+    page.controls.clear.clicks += 1
+    assert "have a total &gt; 0" in page.message.object and page.numbers.object == page.python.value == ""
+    assert page.surface.object is None
+    page.controls.patch.value = "Line"
+    assert shown(page).any() and page.surface.object is not None and "'Line'" in page.python.value
+
+
+def test_a_scene_file_is_offered_and_a_wrong_one_is_one_line(page):
+    scenes = page.scenes
+    scenes.file.filename, scenes.file.value = "mine.toml", b"t_end ="
+    assert "mine.toml: not valid TOML" in page.message.object and scenes.scene.value == "in-hand"
+    scenes.file.value = page.toml.value.encode()
+    assert scenes.scene.value == "mine.toml" and not scenes.model.visible and not page.message.visible
+    scenes.scene.value = "free-slide"
+    assert scenes.model.visible
+
+
+# ---------------------------------------------------------------------- work in the background
+
+
+class Document:
+    """What work needs of a page: it notes what is to be done there."""
+
+    def __init__(self):
+        self.session_context = self
+        self.destroyed, self.told = False, []
+
+    def add_next_tick_callback(self, act: Any) -> None:
+        self.told.append(act)
+
+
+@pytest.fixture
+def document(monkeypatch) -> Document:
+    one = Document()
+    monkeypatch.setattr(type(pn.state), "curdoc", one)
+    return one
+
+
+def finished() -> None:
+    """Wait for the threads of work."""
+    for each in threading.enumerate():
+        if each is not threading.current_thread() and each.daemon and "run" in each.name:
+            each.join(10.0)
+
+
+def test_a_new_wish_gives_up_the_last_one_and_what_it_said_too_late(document):
+    said: list[str] = []
+    live, go_on, ends = Live(said.append), threading.Event(), []
+
+    def first(task: Any) -> None:
+        task.tell(said.append, "first")
+        go_on.wait(10.0)
+        try:
+            task.check()
+        except GivenUp:
+            ends.append("given up")
+            raise
+
+    live.now(first)
+    live.now(lambda task: task.tell(said.append, "second"))
+    go_on.set()
+    finished()
+    for act in document.told:
+        act()
+    assert said == ["second"] and ends == ["given up"]
+
+
+def test_work_that_is_refused_is_said_in_the_page_and_that_of_a_closed_one_ends(document):
+    said: list[str] = []
+    live = Live(said.append)
+
+    def refused(task: Any) -> None:
+        raise FrictionError("not with this law")
+
+    live.now(refused)
+    finished()
+    for act in document.told:
+        act()
+    assert said == ["not with this law"]
+    document.told.clear()
+    document.destroyed = True
+    live.now(lambda task: said.append("at work"))
+    finished()
+    assert said == ["not with this law"] and document.told == []
+
+
+# ---------------------------------------------------------------------- the server
+
+
+def test_the_server_listens_to_this_computer_alone_and_a_taken_port_is_one_line():
+    server = open_server(0)
+    try:
+        addresses = {each.getsockname()[0] for each in server._http._sockets.values()}
+        assert addresses == {"127.0.0.1"}
+        # Tornado leaves the socket that found no port to the garbage collector, which warns.
+        with warnings.catch_warnings(), pytest.raises(InvalidValueError, match="port must be free"):
+            warnings.simplefilter("ignore", ResourceWarning)
+            open_server(server.port)
+            gc.collect()
+    finally:
+        server.stop()
+    with pytest.raises(InvalidValueError, match="port"):
+        open_server(70000)
+
+
+def test_pages_of_other_sites_are_not_let_in():
+    server = open_server(0)
+    try:
+        assert server._tornado.websocket_origins == {f"localhost:{server.port}"}
+    finally:
+        server.stop()
