@@ -442,7 +442,7 @@ def test_an_ffmpeg_that_fails_is_named_and_one_that_is_stopped_is_not(tmp_path, 
             raise KeyboardInterrupt
 
     monkeypatch.setattr(FFMpegWriter, "finish", fails)
-    wanted = None if stopped else "cannot write .*: ffmpeg failed, write a .gif or an .html instead"
+    wanted = None if stopped else "cannot write .*: ffmpeg failed; write a .gif or .html file instead"
     count = iter(range(99))
     with pytest.raises(KeyboardInterrupt if stopped else FileError, match=wanted):
         path = tmp_path / "motion.mp4"
@@ -457,7 +457,7 @@ def test_an_ffmpeg_that_fails_is_named_and_one_that_is_stopped_is_not(tmp_path, 
         ({"path": 5}, "path must"),
         ({"slow": 0.0}, "slow must be > 0, got 0.0"),
         ({"slow": "fast"}, "slow must"),
-        ({"slow": 1e4}, "slow must make at most 3000 frames, at most 50 here, got 10000.0"),
+        ({"slow": 1e4}, "slow must be at most 50 here, for at most 3000 frames, got 10000.0"),
         ({"fps": 60}, "fps must be at most 50, got 60.0"),
         ({"fps": -1}, "fps must be > 0"),
         ({"follow": "body"}, "follow must be True or False, got body"),

@@ -95,7 +95,10 @@ def test_without_arguments_the_help_is_shown(capsys, monkeypatch):
         (["run", "in-hand", "--patch", "Circel"], "did you mean 'Circle'?"),
         (["run", "in-hand", "--patch", "missing.csv", "--cell-size", "0.001"], "missing.csv: no such file"),
         (["run", "in-hand", "--patch", "pad.csv"], "--cell-size must be given"),
-        (["run", "in-hand", "--patch", "Circle", "--cell-size", "0.001"], "--cell-size must come with a pressure map"),
+        (
+            ["run", "in-hand", "--patch", "Circle", "--cell-size", "0.001"],
+            "--cell-size must be given only for a pressure map",
+        ),
         (["run", "in-hand", "--t-end", "-1"], "--t-end must be > 0"),
         (["run", "in-hand", "--t-end", "nan"], "--t-end must be finite"),
         (["run", "in-hand", "--rtol", "0"], "--rtol must be > 0"),
@@ -399,7 +402,7 @@ def test_limit_surface_is_the_exact_one_alone_or_to_be_turned(capsys, tmp_path):
         assert two.width == 2 * one.width
     assert page.read_text(encoding="utf-8").count('"type":"surface"') >= 2
     assert main(["limit-surface", "--alone"]) == 2
-    assert "--alone must come with a picture to write (--out), got True" in capsys.readouterr().err
+    assert "--alone must be given together with --out, got True" in capsys.readouterr().err
 
 
 # ---------------------------------------------------------------------- bench

@@ -136,7 +136,7 @@ def test_what_is_not_said_is_not_guessed(capsys):
     """An empty patch was Circle, an empty folder the present one, and a cell size without a map was passed over."""
     assert "patch must be one of Square" in fails(capsys, "run", "in-hand", "--patch", "")
     assert "--out" in fails(capsys, "run", "in-hand", "--out", "")
-    assert "--cell-size must come with" in fails(capsys, "run", "scene.toml", "--cell-size", "0.001")
+    assert "--cell-size must be given only" in fails(capsys, "run", "scene.toml", "--cell-size", "0.001")
 
 
 def test_warnings_are_one_line_too(capsys):
@@ -159,7 +159,7 @@ def test_warnings_are_one_line_too(capsys):
         ("t_end = 0.01", "t_end = 2026-01-01", "t_end must be a number"),
         ("t_end = 0.01", "t_end = 1\nname = 2026-01-01", "name must be a text"),
         ("t_end = 0.01", "t_end = 1\nname = nan", "name must be a text"),
-        ("t_end = 0.01", "t_end = 1\nsave_every = 1e-12", "save_every must leave at most"),
+        ("t_end = 0.01", "t_end = 1\nsave_every = 1e-12", "save_every must be at least"),
         ("t_end = 0.01", "t_end = 1\nt_end = 2", "not valid TOML: Cannot overwrite"),
         ("t_end = 0.01", "", "missing key 't_end'"),
         ("mass = 1.0", f"mass = 1.0\n{LONG} = 1", "unknown key 'xxx"),

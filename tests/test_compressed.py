@@ -133,7 +133,7 @@ def test_files_restore_it(patch):
     ("arguments", "words"),
     [
         ({"degree": 0}, "degree must be an integer >= 1, got 0"),
-        ({"cells": 5}, "cells must be at least the number of kept sums, 24, got 5"),
+        ({"cells": 5}, "cells must be at least 24, the number of sums that are kept, got 5"),
         ({"cells": 2.5}, "cells must be an integer >= 1"),
         ({"error": -1.0}, "error must be > 0"),
         ({"error": 0.1, "cells": 30}, "compressed must have only one of cells and error"),

@@ -141,8 +141,8 @@ def test_completion_knows_the_members_and_their_words(own):
 
 def test_what_cannot_be_registered():
     for name, make, message in (
-        ("lugre", Bronze, "not be that of a member of the library, got lugre"),
-        ("My law", Bronze, "be of lower-case letters, digits and hyphens, got 'My law'"),
+        ("lugre", Bronze, "not be the name of a member of the library, got lugre"),
+        ("My law", Bronze, "consist of lower-case letters, digits and hyphens, got 'My law'"),
         ("bronze", Bronze(), "law must be a class, or a function that makes one"),
     ):
         with pytest.raises(InvalidValueError, match=message):
@@ -233,7 +233,7 @@ def a_solution(model) -> Solution:
 def test_a_scene_that_cannot_be_written_still_plots_and_saves(tmp_path):
     solution = a_solution(Coarse(DISC, LAW))
     known = "distributed, reduced, reduced-published"
-    reason = f"model must be one of {known}, or registered, to be written to a file, got Coarse"
+    reason = f"model must be one of {known}, or be registered, to be written to a file, got Coarse"
     assert solution.data.attrs == {"scene": "", "scene_left_out": reason}
     assert solution.plot().axes
     again = pf.load(solution.save(tmp_path / "run.nc"))

@@ -133,7 +133,7 @@ def test_misses_count_what_was_wanted():
 
 def test_goals_and_scenes_that_cannot_be_planned_are_refused_in_one_line():
     cases = {
-        "angle must be a goal that the load takes the body to": lambda: plan_grip(plate(), {"angle": HALF}, knots=4),
+        "angle must be within reach of the load on the body": lambda: plan_grip(plate(), {"angle": HALF}, knots=4),
         'goal must be {"angle"': lambda: plan_grip(plate(), {"angle": 1.0, "slide": (0, 1)}),
         "goal key must be one of angle, slide": lambda: plan_grip(plate(), {"turn": 1.0}),
         "goal must not be zero": lambda: plan_grip(plate(), {"angle": 0.0}),

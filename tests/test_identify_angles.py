@@ -64,7 +64,7 @@ def test_angles_without_jumps_stay_to_the_bit(speed):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (lambda a: np.where(TIME < 2.0, a, a + 2.0), "not jump otherwise than by whole turns, got a step of 2.03"),
+        (lambda a: np.where(TIME < 2.0, a, a + 2.0), "only jump by whole turns, got a step of 2.03"),
         (lambda a: np.where(TIME < 2.0, a, a + np.pi), "whole turns"),  # of a rectangle that looks the same
         (lambda a: np.degrees(wrapped(a)), "whole turns"),
         (lambda a: np.where(TIME < 2.0, a, a + 4.0 * np.pi), "whole turns"),  # one jump of an angle that goes on

@@ -270,7 +270,7 @@ def test_contacts_are_chosen_by_name(solution):
     pad = solution.scene.contacts[0]
     scene = dataclasses.replace(solution.scene, contacts=[pad, dataclasses.replace(pad, name="other")], t_end=0.02)
     both = pf.simulate(scene)
-    with pytest.raises(InvalidValueError, match=r"contact must be given where there are several \(pad, other\)"):
+    with pytest.raises(InvalidValueError, match=r"contact must be given if there are several \(pad, other\)"):
         Log.from_solution(both)
     assert Log.from_solution(both, "other").name == "pushed, other"
 

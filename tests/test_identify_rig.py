@@ -252,9 +252,7 @@ def test_bad_choices_are_named(log, options, words):
 
 def test_patches_that_follow_their_load_have_one_model(log):
     patch = pf.ContactPatch.disc(0.012, cells=11, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0))
-    with pytest.raises(
-        pf.FrictionError, match="model must be 'reduced-published' where the patch changes with the load"
-    ):
+    with pytest.raises(pf.FrictionError, match="model must be 'reduced-published' if the patch changes with the load"):
         identify_lugre(log, patch, model="distributed")
 
 

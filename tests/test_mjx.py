@@ -326,7 +326,7 @@ def test_what_does_not_fit_is_refused_in_one_line():
         ([patches[0], patches[0]], "patches must have each pair of geoms once"),
         ([Patch(scene.model, site="nowhere", geoms=geoms)], "site must be in the model, got nowhere"),
         ([Patch(scene.model, site=site, geoms=("floor", "none"))], "geoms must be in the model, got none"),
-        ([Patch(soft, site=site, geoms=geoms)], "model must have a shape that does not follow the load"),
+        ([Patch(soft, site=site, geoms=geoms)], "model must have a shape that does not change with the load"),
     ):
         with pytest.raises(InvalidValueError, match=message):
             Friction(m, wrong)

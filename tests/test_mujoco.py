@@ -333,7 +333,10 @@ def test_models_that_are_not_prepared_and_names_that_are_not_there_are_refused()
         ([Patch(PAD, site="nowhere", geoms=pads)], "site must be in the model, got nowhere"),
         ([Patch(PAD, site="left", geoms=("pad left", "nothing"))], "geoms must be in the model, got nothing"),
         ([Patch(PAD, site="left", geoms=("pad left", "pad right"))], "site must be on the body of one of the geoms"),
-        ([Patch(pf.ReducedModel(soft, LAW), "left", pads)], "model must have a shape that does not follow the load"),
+        (
+            [Patch(pf.ReducedModel(soft, LAW), "left", pads)],
+            "model must have a shape that does not change with the load",
+        ),
         ([PAD], "patches must be patches"),
     ):
         with pytest.raises(pf.errors.InvalidValueError, match=message):

@@ -40,9 +40,12 @@ GOOD = SQUARE.to_dict()
             r"positions must be finite, got inf at index \(1, 1\)",
         ),
         (lambda: pf.ContactPatch.points([(0, 0)], [-1]), "weights must be >= 0, got -1.0"),
-        (lambda: pf.ContactPatch.points([(0, 0)], [0]), "pressure must load at least one cell"),
+        (lambda: pf.ContactPatch.points([(0, 0)], [0]), "pressure must be > 0 on at least one cell"),
         (lambda: pf.ContactPatch.rectangle(0.02, pressure=lambda x, y: math.nan), "pressure must be finite, got nan"),
-        (lambda: pf.ContactPatch.rectangle(0.02, pressure=lambda x, y: 0.0), "pressure must load at least one cell"),
+        (
+            lambda: pf.ContactPatch.rectangle(0.02, pressure=lambda x, y: 0.0),
+            "pressure must be > 0 on at least one cell",
+        ),
         (
             lambda: pf.ContactPatch.rectangle(0.02, cells=3, pressure=LinearGradient((200.0, 0.0))),
             r"pressure must be >= 0, got -0.33\d* at index 0, position \(-0.00666667, 0.00666667\) m",
@@ -91,5 +94,5 @@ def test_a_law_of_ones_own_cannot_make_nan():
 
     patch = pf.ContactPatch.rectangle(0.02, cells=3, pressure=Vanishing())
     assert patch.weights(1.0) == pytest.approx([1 / 9] * 9)
-    with pytest.raises(InvalidValueError, match="pressure must load at least one cell at every load"):
+    with pytest.raises(InvalidValueError, match="pressure must be > 0 on at least one cell at every load"):
         patch.weights(3.0)

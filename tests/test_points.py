@@ -139,6 +139,6 @@ def test_a_fixed_patch_that_is_a_point_is_refused(share):
         pf.ContactPatch.points([(0.0, 0.0), (0.01, 0.0)], [1.0, share]) if share else pf.ContactPatch.points([(0, 0)])
     )
     with pytest.raises(
-        InvalidValueError, match="patch must carry more than 1e-06 of its load beside its heaviest cell"
+        InvalidValueError, match="patch must carry more than 1e-06 of its load outside its heaviest cell"
     ):
         pf.ReducedModel(patch, LAW)

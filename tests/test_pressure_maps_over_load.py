@@ -101,9 +101,9 @@ def test_scene_files(tmp_path):
 @pytest.mark.parametrize(
     ("maps", "loads", "message"),
     [
-        ([LIGHT, HEAVY], [6.0, 2.0], "loads must ascend and be > 0"),
-        ([LIGHT, HEAVY], [0.0, 2.0], "loads must ascend and be > 0"),
-        ([LIGHT, HEAVY], [2.0, 2.0], "loads must ascend and be > 0"),
+        ([LIGHT, HEAVY], [6.0, 2.0], "loads must be increasing and > 0"),
+        ([LIGHT, HEAVY], [0.0, 2.0], "loads must be increasing and > 0"),
+        ([LIGHT, HEAVY], [2.0, 2.0], "loads must be increasing and > 0"),
         ([LIGHT, HEAVY], [2.0], "pressure must have one map for each of 1 loads, got 2"),
         ("light.npy", [2.0, 6.0], "pressure must have one map for each of 2 loads, got 1"),
         ([LIGHT, HEAVY[:1]], LOADS, r"pressure must have the shape of the first, \[2, 3\]"),
@@ -112,7 +112,7 @@ def test_scene_files(tmp_path):
         ({2.0: LIGHT}, LOADS, "loads must be left out"),
         ({"two": LIGHT}, None, "load of a pressure map must be"),
         ({-1.0: LIGHT}, None, "load of a pressure map must be > 0"),
-        ([], [], "loads must ascend and be > 0"),
+        ([], [], "loads must be increasing and > 0"),
     ],
 )
 def test_broken_maps(maps, loads, message):

@@ -141,5 +141,5 @@ def test_an_input_that_changes_nothing_is_none():
 
 
 def test_a_prescribed_velocity_knows_no_rest():
-    with pytest.raises(pf.FrictionError, match="stop_speed must be None where the velocity is prescribed"):
+    with pytest.raises(pf.FrictionError, match="stop_speed must be None if the velocity is prescribed"):
         run(pf.DistributedModel(PATCH, LAWS[0]), level(), G, 0.1, velocity=[0.0, 0.0, 0.0])

@@ -91,7 +91,9 @@ def test_wrong_numbers_are_named():
         SceneFunction(scene(), ("r",))
     law = pf.CoulombStribeck(mu_c=0.3)
     own = dataclasses.replace(scene(), contacts=[pf.Contact(pf.DistributedModel(pf.ContactPatch.disc(0.01), law), 1.0)])
-    with pytest.raises(InvalidValueError, match="parameters must leave out mu: CoulombStribeck has more to scale"):
+    with pytest.raises(
+        InvalidValueError, match="parameters must not contain mu: CoulombStribeck has other friction coefficients too"
+    ):
         SceneFunction(own, ("mu",)).run(np.array([[1.1]]))
 
 

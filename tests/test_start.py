@@ -136,7 +136,7 @@ def test_starts_that_make_no_sense_are_refused():
     moving = dataclasses.replace(scene.body, velocity=(0.1, 0.0, 0.0))
     with pytest.raises(InvalidValueError, match="velocity of the body must be zero"):
         dataclasses.replace(scene, body=moving)
-    with pytest.raises(InvalidValueError, match="not be zero where start is 'sliding'"):
+    with pytest.raises(InvalidValueError, match="not be zero if start is 'sliding'"):
         dataclasses.replace(scene, start="sliding")
     running = dataclasses.replace(scene.contacts[0], velocity=(0.1, 0.0, 0.0))
     with pytest.raises(InvalidValueError, match="velocity of contact 'fingers' must be zero at first"):

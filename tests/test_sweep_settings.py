@@ -110,15 +110,15 @@ def test_contacts_are_called_what_they_are_called_in_results():
         ("fingers.lwa.mu_c", 1.0, "got 'lwa' (did you mean 'law'?)"),
         ("fingers.law.mu", 1.0, "fingers.law has kind, mu_c, mu_s, v_s, sigma_0, sigma_1"),
         ("fingers.patch.radios", 1.0, "got 'radios' (did you mean 'radius'?)"),
-        ("body.position.2", 1.0, "count the 2 parts of body.position from 0, got '2'"),
-        ("body.position.x", 1.0, "count the 2 parts of body.position from 0, got 'x'"),
+        ("body.position.2", 1.0, "be an index from 0 to 1 in body.position, got '2'"),
+        ("body.position.x", 1.0, "be an index from 0 to 1 in body.position, got 'x'"),
         ("body.mass.x", 1.0, "must end at body.mass, which is 0.2, got 'x' after it"),
         ("body", 1.0, "be one value, not a table of them: body.mass"),
         ("fingers", 1.0, "be one value, not a table of them: fingers.name"),
         ("force.values", 1.0, "the scene has no 'force'"),
         ("body.mass", -1.0, "mass must be > 0, got -1.0"),
         ("body.mass", "heavy", "mass must be a number, got 'heavy'"),
-        ("", 1.0, "lead to a value of the scene"),
+        ("", 1.0, "name a value of the scene"),
     ],
 )
 def test_paths_that_lead_nowhere_say_what_there_is(file, path, value, words):
@@ -190,7 +190,7 @@ def test_mistakes_of_the_commands_are_one_line(file, capsys):
     assert "must be one value (planarfriction sweep takes several)" in fails(capsys, "run", file, "--set", "t_end=1,2")
     assert "did you mean 'mass'?" in fails(capsys, "run", "in-hand", "--set", "mas=1", "--t-end", "0.01")
     assert "did you mean 'mu_c'?" in fails(capsys, "sweep", file, "--set", "fingers.law.muc=1:2:3")
-    assert "stand once" in fails(capsys, "sweep", file, "--set", "t_end=1", "--set", "t_end=2")
+    assert "be given once" in fails(capsys, "sweep", file, "--set", "t_end=1", "--set", "t_end=2")
     assert "Missing option '--set'" in fails(capsys, "sweep", file)
     assert "no such file" in fails(capsys, "sweep", "nothing.toml", "--set", "t_end=1")
     assert "--measure must be FILE.py:NAME" in fails(capsys, "sweep", file, "--set", "t_end=0.01", "--measure", "x")

@@ -111,7 +111,7 @@ def test_values_of_any_kind_have_labels():
     ("arguments", "words"),
     [
         ({"values": {}}, "values must be a mapping from names to lists of values"),
-        ({"values": {"grip": 1.0}}, "grip must be a list of numbers, of texts or of truth values"),
+        ({"values": {"grip": 1.0}}, "grip must be a list of numbers, texts or booleans"),
         ({"values": {"grip": []}}, "grip must have at least one value"),
         ({"values": {"grip": [1.0, 1.0]}}, "grip must have each value once, got 1.0 2 times"),
         ({"values": {"grip": [1.0, "a"]}}, "grip must be a list of numbers, of texts"),

@@ -212,7 +212,7 @@ def test_weights_stay_a_pressure_distribution():
     ("make", "message"),
     [
         (lambda: reduced(trainable=("mu_x",)), "trainable must be one of"),
-        (lambda: reduced(PLAIN, trainable=("breakaway_ratio",)), "not name breakaway_ratio for plain bristles"),
+        (lambda: reduced(PLAIN, trainable=("breakaway_ratio",)), "not contain breakaway_ratio for plain bristles"),
         (lambda: distributed(trainable=("contact_radius",)), "trainable must be one of"),
         (lambda: reduced("lugre"), "law must be a friction law of bristles"),
         (lambda: ReducedModelPublished("disc", PLAIN), "patch must be a ContactPatch"),

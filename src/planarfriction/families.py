@@ -80,9 +80,9 @@ class Family(Mapping[str, Any]):
         called = f"name of a {self.what}"
         if not (isinstance(name, str) and re.fullmatch(r"[a-z][a-z0-9]*(-[a-z0-9]+)*", name)):
             given = repr(name[:80]) if isinstance(name, str) else name
-            raise InvalidValueError(called, "be of lower-case letters, digits and hyphens", given)
+            raise InvalidValueError(called, "consist of lower-case letters, digits and hyphens", given)
         if name in self and isinstance(self._members[name].make, str):
-            raise InvalidValueError(called, "not be that of a member of the library", name)
+            raise InvalidValueError(called, "not be the name of a member of the library", name)
         if not callable(make):
             raise InvalidValueError(self.what, "be a class, or a function that makes one", make)
         self._members[name] = Member(words, make)

@@ -68,7 +68,7 @@ def check_writable(path: str | Path) -> Path:
     with _reporting(path):
         target = Path(os.path.realpath(path))
         if target.is_dir():
-            raise FileError(f"{path}: cannot be written: it is a folder, give the name of a file in it")
+            raise FileError(f"{path}: cannot be written: it is a folder; give the name of a file in it")
         if not target.parent.is_dir():
             raise FileError(f"{path}: cannot be written: there is no folder {target.parent}")
         with contextlib.suppress(FileNotFoundError):

@@ -52,7 +52,7 @@ class Knots:
         if not 1 <= len(times) <= MOST_KNOTS:
             raise InvalidValueError(at, f"be 1 to {MOST_KNOTS} times", len(times))
         if times[0] < 0.0 or times[-1] > scene.t_end or (np.diff(times) <= SAME_TIME).any():
-            raise InvalidValueError(at, f"increase from 0 s on to at most {scene.t_end:g} s", times.tolist())
+            raise InvalidValueError(at, f"increase, between 0 and {scene.t_end:g} s", times.tolist())
         self.name, self.times = name, times
         if name in _COLUMNS:
             self.kind = tangent.FORCE if name == "force" else tangent.VELOCITY
@@ -74,7 +74,7 @@ def _refuse_shapes(scene: Scene, parameters: Any, signals: Mapping[str, Any]) ->
     for contact in scene.contacts:
         for name in (*parameters, *signals):
             if contact.model.patch.depends_on_load and name in ("load", f"{contact.name}.normal_force"):
-                rule = f"leave out {name}: the patch of contact {contact.name!r} changes its shape with the load"
+                rule = f"not contain {name}: the shape of the patch of contact {contact.name!r} changes with the load"
                 raise InvalidValueError("parameters" if name == "load" else "signals", rule, name)
 
 
@@ -158,7 +158,7 @@ class Columns:
         refused = np.flatnonzero(say & ~np.isin(self._drives.kind, kinds))
         if len(refused):
             name = self.names[self._order[refused[0]]]
-            rule = f"be 'rest' for the derivative to {name}, which has a say in how the bristles start"
+            rule = f"be 'rest' for the derivative with respect to {name}, on which the initial bristles depend"
             raise InvalidValueError("start", rule, scene.start)
         d_loads, d_pull = np.zeros((count, len(scene.contacts))), np.zeros((count, 3))
         for p in np.flatnonzero(say):

@@ -152,7 +152,7 @@ def _refusal(model: ReducedModel | ReducedModelPublished) -> tuple[str, str, Any
     if isinstance(model, ReducedModel):
         if model.load_error > 0.0:
             return None
-        rule = "be > 0 for derivatives and parameters of roll-outs: between maps, the shape is blended over the load"
+        rule = "be > 0 for derivatives and parameters of roll-outs, which interpolate the shape over the load"
         return "load_error", rule, model.load_error
     return (
         "model",

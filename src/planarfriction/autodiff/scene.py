@@ -109,7 +109,7 @@ def prepared(scene: Scene, columns: Columns, t_end, rtol, atol, save_every) -> t
     windows = Windows(scene, end, times=times, sensitivities=True, marks=columns.marks)
     for contact, model in zip(scene.contacts, windows.models, strict=True):
         if None in model.functions:
-            rule = "have all of the functions of `kernels.contacts.ModelFunctions` for derivatives of scenes"
+            rule = "have all functions of kernels.contacts.ModelFunctions for derivatives of scenes"
             raise InvalidValueError(f"model of contact {contact.name!r}", rule, type(contact.model).__name__)
     return windows, times, rtol, absolute
 

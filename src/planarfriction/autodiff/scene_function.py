@@ -182,7 +182,9 @@ def _with_friction(law: Any, factor: float) -> Any:
     more = dataclasses.replace(law, **{name: factor * getattr(law, name) for name in names})
     wanted = law.numbers._replace(mu_c=factor * law.numbers.mu_c, mu_s=factor * law.numbers.mu_s)
     if not np.allclose(more.numbers, wanted, rtol=1e-12, atol=0.0):
-        raise InvalidValueError("parameters", f"leave out mu: {type(law).__name__} has more to scale", "mu")
+        raise InvalidValueError(
+            "parameters", f"not contain mu: {type(law).__name__} has other friction coefficients too", "mu"
+        )
     return more
 
 

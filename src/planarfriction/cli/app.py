@@ -48,7 +48,7 @@ def complete_parts(context: object, parameter: object, incomplete: str) -> list[
 @click.group(
     name="planarfriction",
     context_settings={"max_content_width": 100, "help_option_names": ["-h", "--help"]},
-    help="Friction of contact patches that slide and spin: simulate scenes, draw limit surfaces, measure speed.",
+    help="Friction of contact patches that slide and spin at the same time: simulate, fit to measurements, compare.",
 )
 @click.version_option(__version__, message="%(prog)s %(version)s")
 def app() -> None:
@@ -57,7 +57,7 @@ def app() -> None:
 
 @app.command(
     short_help="Simulate a ready scene or a scene file.",
-    help=f"""Simulate a ready scene or a scene file, with one friction model or with several side by side.
+    help=f"""Simulate a ready scene or a scene file with one friction model, or with several to compare them.
 
     SCENE is {", ".join(SCENES)}, or a file (.toml, .json).
 
@@ -76,22 +76,25 @@ def app() -> None:
     "--model",
     type=MemberOf(MODELS, "both"),
     multiple=True,
-    help="Friction model, may be repeated. Default: both for in-hand, else distributed or the file's.",
+    help="Friction model; may be repeated; both: distributed and reduced. Default: both for in-hand, else distributed"
+    " or the file's.",
 )
 @click.option(
     "--parts",
     metavar="COUNT|auto",
     shell_complete=complete_parts,
-    help=f"Parts of the reduced model; auto: {AUTO_PARTS}. Default: 1, or the file's.",
+    help=f"Number of parts of the reduced model; auto: {AUTO_PARTS}. Default: 1, or the file's.",
 )
 @patch_option("Default: the scene's (mostly Circle), or the file's.")
 @click.option("--cell-size", type=float, help="Side of a cell of a pressure map in m.")
 @click.option("--t-end", type=float, help="Duration in s. Default: the scene's.")
-@click.option("--rtol", type=float, help="Relative tolerance of the solver.")
-@click.option("--set", "settings", metavar="PATH=VALUE", multiple=True, help="A value of the scene; may be repeated.")
+@click.option("--rtol", type=float, help="Relative tolerance of the solver. Default: the scene's.")
+@click.option(
+    "--set", "settings", metavar="PATH=VALUE", multiple=True, help="Change a value of the scene; may be repeated."
+)
 @click.option("--out", type=FILE, help="Folder for the data (NetCDF, CSV) and the pictures.")
-@click.option("--plot", is_flag=True, help="Draw histories, motion and patch (PNG; to out/ by default).")
-@click.option("--animate", is_flag=True, help="Draw motion and slip as a moving GIF (to out/ by default).")
+@click.option("--plot", is_flag=True, help="Draw histories, motion and patch as PNG (in out/ by default).")
+@click.option("--animate", is_flag=True, help="Draw motion and slip as an animated GIF (in out/ by default).")
 def run(
     scene: str,
     model: tuple[str, ...],
@@ -121,11 +124,11 @@ def run(
 
 @app.command(
     name="limit-surface",
-    short_help="Numbers, picture and samples of a limit surface.",
-    help="""Limit surface of a contact patch: numbers, a picture beside the ellipsoid or alone, samples as CSV.
+    short_help="Print, draw or tabulate a limit surface.",
+    help="""Show the limit surface of a contact patch: numbers, a picture (next to its ellipsoid), a table as CSV.
 
-    The CSV has the columns vx vy omega fx fy tau: twists around the direction sphere and their friction wrenches for
-    mu f_N = 1, about the origin of the contact frame, in m/s, rad/s, 1 and m.
+    The CSV has the columns vx vy omega fx fy tau: twists in all directions and their friction wrenches for mu f_N = 1,
+    about the origin of the contact frame, in m/s, rad/s, 1 and m.
 
     \b
     Examples:
@@ -142,10 +145,10 @@ def run(
     type=MemberOf(SURFACES),
     default="exact",
     show_default=True,
-    help="How the surface is represented.",
+    help="Kind of limit surface.",
 )
-@click.option("--out", type=FILE, help="Picture to write (.png, .pdf, .svg; .html to turn it with the mouse).")
-@click.option("--alone", is_flag=True, help="Draw the surface without the ellipsoid beside it.")
+@click.option("--out", type=FILE, help="Picture to write (.png, .pdf, .svg, or .html to rotate it with the mouse).")
+@click.option("--alone", is_flag=True, help="Draw the surface without the ellipsoid.")
 @click.option("--csv", type=FILE, help="Table of samples to write (.csv).")
 def limit_surface(
     patch: str | None,
@@ -165,13 +168,14 @@ def limit_surface(
 
 @app.command(
     cls=FitOrPlan,
-    short_help="Estimate friction parameters from logs; identify plan: what to measure next.",
+    short_help="Estimate friction parameters from logs; plan the next measurement.",
     help="""Estimate friction parameters of a contact from logs of its motion and its friction wrench.
 
     Each LOG is a CSV file with a heading and the columns t, vx, vy, omega (or x, y, theta), fx, fy, tau, normal_force
-    in s, m/s, rad/s, N and N m: twist and wrench about the origin of the contact frame, in its axes, the wrench on the
-    moving body. Files that `planarfriction run` writes are such logs. Prints estimates, their errors, and what the data
-    do not determine. With `plan` as the first word it says which motion to measure next (a log of that name: ./plan).
+    in s, m/s, rad/s, N and N m. Twist and wrench are about the origin of the contact frame, in its axes; the wrench
+    acts on the moving body. The files that `planarfriction run` writes are such logs. Prints the estimates, their
+    errors, and what the data do not determine. The command `identify plan` suggests which motion to measure next (for a
+    log called plan, write ./plan).
 
     \b
     Examples:
@@ -184,18 +188,18 @@ def limit_surface(
 @click.argument("logs", metavar="LOG...", type=FILE, nargs=-1, required=True, shell_complete=complete_log)
 @patch_option("Default: Circle.")
 @click.option("--cell-size", type=float, help="Side of a cell of a pressure map in m.")
-@click.option("--width", type=float, help="Width of a patch that is given by name in m. Default: 0.02.")
-@click.option("--parameters", metavar="NAMES", help="What to estimate, separated by commas. Default: the law and r.")
-@click.option("--start", metavar="NAME=VALUE", multiple=True, help="Where to begin, or the value of what is held.")
-@click.option("--normal-force", type=float, help="Normal force in N, where the logs have no such column.")
-@click.option("--contact", metavar="NAME", help="Contact whose columns (NAME.vx) are read, where there are several.")
-@click.option("--noise", metavar="FX,FY,TAU", help="Spread of the measured wrench in N and N m. Default: estimated.")
-@click.option("--plain", is_flag=True, help="Plain LuGre bristles in place of elasto-plastic ones.")
+@click.option("--width", type=float, help="Width in m of a patch given by name. Default: 0.02.")
+@click.option("--parameters", metavar="NAMES", help="What to estimate, separated by commas. Default: law and radius.")
+@click.option("--start", metavar="NAME=VALUE", multiple=True, help="Initial guess, or fixed value if not estimated.")
+@click.option("--normal-force", type=float, help="Normal force in N, if the logs have no such column.")
+@click.option("--contact", metavar="NAME", help="Contact whose columns (NAME.vx) are read, if there are several.")
+@click.option("--noise", metavar="FX,FY,TAU", help="Noise of the measured wrench in N and N m. Default: estimated.")
+@click.option("--plain", is_flag=True, help="Use plain LuGre bristles instead of elasto-plastic ones.")
 @click.option("--steady", is_flag=True, help="The logs begin in steady sliding, not at rest.")
 @click.option("--model", default="auto", show_default=True, help="reduced-published, distributed, reduced, or auto.")
-@click.option("--nuisance", metavar="NAMES", help="What the rig may add: delay,bias,load,twist or none. Default: all.")
-@click.option("--starts", type=int, default=4, show_default=True, help="Number of starts of the search.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Seed that scatters the starts.")
+@click.option("--nuisance", metavar="NAMES", help="Rig disturbances: delay,bias,load,twist or none. Default: all.")
+@click.option("--starts", type=int, default=4, show_default=True, help="Number of starting points of the search.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Random seed of the starting points.")
 @click.option("--out", type=FILE, help="Folder for the estimates (JSON) and the residual plot (PNG).")
 def identify(
     logs: tuple[Path, ...],
@@ -240,10 +244,10 @@ def identify(
 
 
 @app.command(
-    short_help="Compile everything ahead.",
-    help="""Compile everything ahead, so that no later run has to; what was compiled before is read from the cache.
+    short_help="Compile everything in advance.",
+    help="""Compile everything in advance, so that later runs need not wait. Code in the cache is not recompiled.
 
-    Ctrl-C stops it; the parts that are done stay done.
+    Ctrl-C stops it; finished parts are kept.
     """,
 )
 def warm() -> None:
@@ -255,7 +259,7 @@ def warm() -> None:
 
 @app.command(
     short_help="Measure the speed of this installation.",
-    help="""Measure the speed of this installation; every line stands beside its baseline from the same run.
+    help="""Measure the speed of this installation, each benchmark next to its baseline from the same run.
 
     \b
     Examples:
@@ -264,8 +268,8 @@ def warm() -> None:
       planarfriction bench --full
     """,
 )
-@click.option("--only", metavar="NAME", multiple=True, help="Only this line; may be repeated.")
-@click.option("--full", is_flag=True, help="With the baselines that take minutes.")
+@click.option("--only", metavar="NAME", multiple=True, help="Only this benchmark; may be repeated.")
+@click.option("--full", is_flag=True, help="Include the baselines that take minutes.")
 @click.option("--json", is_flag=True, help="Print a JSON list and nothing else on stdout.")
 def bench(only: tuple[str, ...], full: bool, json: bool) -> None:
     """Measure (the help above is what users see)."""
@@ -277,11 +281,11 @@ def bench(only: tuple[str, ...], full: bool, json: bool) -> None:
 
 @app.command(
     short_help="Compare friction models on measured data.",
-    help="""Compare friction models on measured data of others, which comes with the package: three tasks, fixed splits.
+    help="""Compare friction models on published measurements, which come with the package: three tasks, fixed splits.
 
-    slides: from the first 8 poses of a cube on a table, its path and its end. pushes: the twist of an object that is
-    pushed slowly, from the wrench. series: twists and wrenches along whole pushes. Each model is fitted to the training
-    cases and scored on the others, with bootstrap intervals. --own adds a function of yours (docs/measured.md).
+    slides: the path and final pose of a cube on a table, from its first 8 poses. pushes: the twist of an object that is
+    pushed slowly, from the wrench. series: twists and wrenches during whole pushes. Each model is fitted to the
+    training cases and scored on the others, with bootstrap intervals. --own adds your own function (docs/measured.md).
 
     \b
     Examples:
@@ -296,7 +300,7 @@ def bench(only: tuple[str, ...], full: bool, json: bool) -> None:
 @click.option("--list", "list_only", is_flag=True, help="List models and tasks.")
 @click.option("--tables", type=FILE, help="Folder with the measured tables. Default: those of the package.")
 @click.option("--out", type=FILE, help="Folder for JSON and pictures.")
-@click.option("--seed", type=int, default=0, show_default=True, help="Of the bootstrap.")
+@click.option("--seed", type=int, default=0, show_default=True, help="Random seed of the bootstrap.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else on stdout.")
 def measured(
     tasks: tuple[str, ...],
@@ -319,11 +323,11 @@ def measured(
 
 @app.command(
     short_help="Reproduce the published experiments in one report.",
-    help="""Reproduce the experiments of the source paper: one HTML report, ours beside the published numbers.
+    help="""Reproduce the experiments of the source paper in one HTML report that compares the results with the paper's.
 
-    Writes report.html (figures inside), numbers.json, and for each experiment its figures (PNG, SVG) and curves
-    (NetCDF) to --out. Interrupted and started again, it goes on where it was; what is finished is not done again.
-    The exit code is 1 where a number is out of its tolerance.
+    Writes report.html (with figures), numbers.json, and the figures (PNG, SVG) and curves (NetCDF) of each experiment
+    to --out. If it is interrupted and started again, finished experiments are not repeated. The exit code is 1 if a
+    number is out of its tolerance.
 
     \b
     Examples:
@@ -337,8 +341,8 @@ def measured(
 @click.option("--list", "list_only", is_flag=True, help="List the experiments.")
 @click.option("--out", type=FILE, default=Path("reproduction"), show_default=True, help="Folder for the report.")
 @click.option("--quick", is_flag=True, help="A small part of everything, in seconds.")
-@click.option("--full", is_flag=True, help="Also what takes many minutes: published solvers, long baselines.")
-@click.option("--again", is_flag=True, help="Do everything anew.")
+@click.option("--full", is_flag=True, help="Include what takes many minutes: published solvers, long baselines.")
+@click.option("--again", is_flag=True, help="Repeat finished experiments.")
 def reproduce(only: tuple[str, ...], list_only: bool, out: Path, quick: bool, full: bool, again: bool) -> int:
     """Reproduce the paper (the help above is what users see)."""
     from planarfriction.cli import reproduce as command
@@ -350,14 +354,14 @@ def reproduce(only: tuple[str, ...], list_only: bool, out: Path, quick: bool, fu
 
 
 @app.command(
-    short_help="Compare with simulators' own friction.",
-    help="""Patch friction inside simulators beside their own friction at its best settings, in one run.
+    short_help="Compare with the friction of MuJoCo and Drake.",
+    help="""Compare patch friction inside MuJoCo and Drake with the simulators' own friction at several settings.
 
-    Creep of what is held, slip of what is shaken, discs that slide and spin to rest, a plate turned in the hand, and
-    the time of a step. Needs MuJoCo (pip install 'planarfriction[mujoco]').
+    Cases: creep of a held object, slip of a shaken one, discs that slide and spin to rest, a plate turned in the hand,
+    and the time of a step. Needs MuJoCo (pip install 'planarfriction[mujoco]'); Drake is used if it is installed.
 
-    Writes numbers.json and a figure to --out and prints the tables. Interrupted and started again, it goes on where it
-    was. The exit code is 1 where one of our numbers is out of its tolerance.
+    Prints the tables, and writes numbers.json and a figure to --out. If it is interrupted and started again, finished
+    cases are not repeated. The exit code is 1 if a result of patch friction is out of its tolerance.
 
     \b
     Examples:
@@ -367,7 +371,7 @@ def reproduce(only: tuple[str, ...], list_only: bool, out: Path, quick: bool, fu
 )
 @click.option("--out", type=FILE, default=Path("simulators"), show_default=True, help="Folder for numbers and figure.")
 @click.option("--quick", is_flag=True, help="A small part of everything, in seconds.")
-@click.option("--again", is_flag=True, help="Do everything anew.")
+@click.option("--again", is_flag=True, help="Repeat finished experiments.")
 def simulators(out: Path, quick: bool, again: bool) -> int:
     """Compare (the help above is what users see)."""
     from planarfriction.cli import simulators as command

@@ -6,11 +6,11 @@ import click
 
 
 @click.command(
-    short_help="Draw a contact and see its friction in the browser.",
-    help="""Open a page in the browser: draw or load a pressure map, choose a law, drag a twist, see the friction.
+    short_help="Explore the friction of a contact in the browser.",
+    help="""Open a page in the browser: draw or load a pressure map, choose a law, drag a twist, and see the friction.
 
-    It shows wrench, limit surface, centre of rotation and the error of the ellipsoid, and the Python or the scene file
-    to copy. Ctrl-C stops it. Nobody else in the network can reach it. Needs Panel
+    The page shows the wrench, the limit surface, the centre of rotation, the error of the ellipsoid, and the Python
+    code or scene file to copy. It can only be reached from this computer. Ctrl-C stops it. Needs Panel
     (pip install 'planarfriction[explore]').
 
     \b

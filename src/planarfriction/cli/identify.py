@@ -50,7 +50,7 @@ def parse_start(entries: Sequence[str]) -> dict[str, float]:
     for entry in entries:
         name, equals, value = entry.partition("=")
         if not equals:
-            raise InvalidValueError("--start", "be NAME=VALUE, as mu_c=0.4", entry)
+            raise InvalidValueError("--start", "be NAME=VALUE, such as mu_c=0.4", entry)
         start[name.strip()] = validation.number_in(f"--start {name.strip()}", value)
     return start
 

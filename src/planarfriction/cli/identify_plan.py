@@ -1,4 +1,4 @@
-"""`planarfriction identify plan`: the motion to measure next, and how `identify` comes to that command."""
+"""`planarfriction identify plan`: the motion to measure next, as a subcommand of `identify`."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 NAME = "plan"
 
-SHORT_HELP = "Which motion to measure next."
+SHORT_HELP = "Suggest which motion to measure next."
 
 
 class FitOrPlan(click.Command):
@@ -50,11 +50,10 @@ def complete_log(ctx: click.Context, parameter: object, incomplete: str) -> list
 @click.command(
     name=NAME,
     short_help=SHORT_HELP,
-    help="""Rank motions by the information that each is expected to add to that of the logs so far.
+    help="""Rank motions by the information that each is expected to add to the logs so far.
 
-    Each LOG is one as `planarfriction identify` reads; the logs are fitted first. Without any, the law is a guess:
-    --start.
-    Prints gains in bits, and the errors that are expected after the best motion; --out writes that motion.
+    Each LOG is a file as for `planarfriction identify`; the logs are fitted first. Without a log, the law is guessed
+    from --start. Prints the gains in bits, and the errors expected after the best motion; --out writes that motion.
 
     \b
     Examples:
@@ -66,19 +65,19 @@ def complete_log(ctx: click.Context, parameter: object, incomplete: str) -> list
 @click.argument("logs", metavar="[LOG]...", type=FILE, nargs=-1)
 @patch_option("Default: Circle.", "patch_name")
 @click.option("--cell-size", type=float, help="Side of a cell of a pressure map in m.")
-@click.option("--width", type=float, help="Width of a patch that is given by name in m. Default: 0.02.")
-@click.option("--parameters", metavar="NAMES", help="What to estimate, separated by commas. Default: the law and r.")
-@click.option("--wanted", metavar="NAMES", help="Those whose information counts. Default: all.")
-@click.option("--start", metavar="NAME=VALUE", multiple=True, help="Guess of a parameter, or value of what is held.")
-@click.option("--normal-force", type=float, multiple=True, help="Load in N, may be repeated. Default: the logs', or 1.")
+@click.option("--width", type=float, help="Width in m of a patch given by name. Default: 0.02.")
+@click.option("--parameters", metavar="NAMES", help="What to estimate, separated by commas. Default: law and radius.")
+@click.option("--wanted", metavar="NAMES", help="Parameters whose information counts. Default: all.")
+@click.option("--start", metavar="NAME=VALUE", multiple=True, help="Guess of a parameter, or fixed value.")
+@click.option("--normal-force", type=float, multiple=True, help="Load in N; may be repeated. Default: the logs', or 1.")
 @click.option("--speed", type=float, default=0.05, show_default=True, help="Largest speed in m/s.")
 @click.option("--spin", type=float, help="Largest angular speed in rad/s. Default: the rim as fast as --speed.")
 @click.option("--duration", type=float, default=2.0, show_default=True, help="Length of a motion in s.")
 @click.option("--rate", type=float, default=1000.0, show_default=True, help="Samples per second.")
 @click.option(
-    "--noise", metavar="FX,FY,TAU", help="Spread of the measured wrench in N and N m. Default: the logs', 1 %."
+    "--noise", metavar="FX,FY,TAU", help="Noise of the measured wrench in N and N m. Default: the logs', else 1 %."
 )
-@click.option("--out", type=FILE, help="Table of the best motion to write (.csv).")
+@click.option("--out", type=FILE, help="File for the best motion (.csv).")
 def plan(
     logs: tuple[Path, ...],
     patch_name: str | None,
@@ -122,7 +121,7 @@ def plan(
     print(found.table())
     if out is not None:
         output.write_csv(out, columns_of(found.best))
-        note(f"wrote {out}, with the wrench that is expected")
+        note(f"wrote {out}, with the expected wrench")
     return 0
 
 

@@ -38,7 +38,7 @@ def show(patch: ContactPatch, kind: str, *, picture: Path | None, alone: bool, t
     if picture is not None:
         check_picture(picture, also=(HTML,))
     elif alone:
-        raise InvalidValueError("--alone", "come with a picture to write (--out)", alone)
+        raise InvalidValueError("--alone", "be given together with --out", alone)
     if table is not None:
         check_table(table)
     surface = SURFACES[kind](patch)

@@ -45,7 +45,7 @@ def measured(
     for entry in own:
         name, model = load_function("--own", entry)
         if name in models or name in LIBRARY:
-            raise InvalidValueError("--own", "have a name that no model of the library has", name)
+            raise InvalidValueError("--own", "have a name that differs from those of the library's models", name)
         models[name] = model
     if folder is not None:
         make_folder(folder)
@@ -93,7 +93,7 @@ def load_function(option: str, entry: str) -> tuple[str, Callable[[Any], Any]]:
     except Exception as error:  # whatever a file of the user raises
         raise FileError(one_line(f"{path}: {type(error).__name__}: {' '.join(str(error).split())}")) from None
     if not callable(getattr(module, name, None)):
-        raise FileError(f"{path}: has nothing called {name} that can be called")
+        raise FileError(f"{path}: has no function called {name}")
     return name, getattr(module, name)
 
 

@@ -12,8 +12,8 @@ from click.shell_completion import CompletionItem
 from planarfriction.families import PUBLISHED_PATCHES, SCENES
 
 PATCH_HELP = (
-    f"{', '.join(PUBLISHED_PATCHES)}, another shape that its width describes (disc, rectangle), or a pressure map "
-    "(.csv, .npy, grey image; row 0 is the top) with --cell-size."
+    f"{', '.join(PUBLISHED_PATCHES)}, disc, rectangle, or a pressure map (.csv, .npy, grey image; row 0 is the top) "
+    "with --cell-size."
 )
 
 

@@ -118,7 +118,7 @@ def _in_parts(make: Any) -> bool:
 def _check_parts(parts: Any, makes: Iterable[Any]) -> None:
     if parts is not None and not any(map(_in_parts, makes)):
         kinds = ", ".join(kind for kind, make in MODELS.items() if _in_parts(make))
-        raise InvalidValueError("--parts", f"come with a model that has parts ({kinds})", parts)
+        raise InvalidValueError("--parts", f"be given only for a model that has parts ({kinds})", parts)
 
 
 def _make(make: Any, patch: ContactPatch, law: Any, parts: int | str | None) -> Any:
@@ -133,7 +133,7 @@ def _makers_from_file(
 
     make = Settable.of(path)
     if patch is None and cell_size is not None:
-        raise InvalidValueError("--cell-size", "come with the pressure map of --patch", cell_size)
+        raise InvalidValueError("--cell-size", "be given only if --patch is a pressure map", cell_size)
     contact_patch = None if patch is None else find_patch(patch, cell_size=cell_size)
     if not kinds and contact_patch is None and parts is None:
         return {"": make}

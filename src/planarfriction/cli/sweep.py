@@ -16,13 +16,13 @@ if TYPE_CHECKING:
 
 @click.command(
     short_help="Simulate a scene for every combination of values.",
-    help=f"""Simulate a scene for every combination of some of its values; a sweep that was stopped goes on.
+    help=f"""Simulate a scene for every combination of some of its values; an interrupted sweep can be continued.
 
-    SCENE is {", ".join(SCENES)}, or a file (.toml, .json). PATH leads to a value of it: body.mass, t_end, and of a
-    contact that is called fingers, fingers.law.mu_c; of a ready scene also what its function takes, such as mass.
+    SCENE is {", ".join(SCENES)}, or a file (.toml, .json). PATH is the name of a value in it, such as body.mass, t_end,
+    or fingers.law.mu_c for a contact called fingers; for a ready scene also an argument of its function, such as mass.
 
-    Each run is a file in --out, written whole or not at all; the same command does only those that are missing.
-    --out gets sweep.nc too, the dataset of all runs; a path that ends in .zarr is the dataset itself.
+    Each run is a file in --out; the same command simulates only the missing ones. The dataset of all runs is written to
+    sweep.nc in --out. If --out ends in .zarr, it is the dataset itself.
 
     \b
     Examples:
@@ -40,13 +40,15 @@ if TYPE_CHECKING:
     required=True,
     help="START:STOP:COUNT, both ends included, or VALUE,VALUE,...; may be repeated.",
 )
-@click.option("--model", metavar="NAME", help="Friction model. Default: the file's, else reduced.")
-@click.option("--parts", metavar="COUNT|auto", help="Parts of the reduced model. Default: 1, or the file's.")
+@click.option("--model", metavar="NAME", help="Friction model. Default: the file's, or reduced.")
+@click.option("--parts", metavar="COUNT|auto", help="Number of parts of the reduced model. Default: 1, or the file's.")
 @patch_option("Default: Circle, or the file's.")
 @click.option("--cell-size", type=float, help="Side of a cell of a pressure map in m.")
 @click.option("--t-end", type=float, help="Duration of a ready scene in s.")
-@click.option("--measure", metavar="FILE.py:NAME", help="Function of a solution: what to keep. Default: everything.")
-@click.option("--out", type=FILE, default=Path("sweep"), show_default=True, help="Folder of the runs, or .zarr store.")
+@click.option(
+    "--measure", metavar="FILE.py:NAME", help="Function of a solution that returns what to keep. Default: all."
+)
+@click.option("--out", type=FILE, default=Path("sweep"), show_default=True, help="Folder for the runs, or .zarr store.")
 def sweep(
     scene: str,
     settings: tuple[str, ...],
@@ -89,7 +91,7 @@ def sweep(
 
             data = sweeps.sweep(make, values, out=out, measure=function, progress=tell)
     except SweepInterrupted:
-        note(f"interrupted: {last[0]}; the same command goes on" if last else "interrupted")
+        note(f"interrupted: {last[0]}; the same command continues" if last else "interrupted")
         return INTERRUPTED
     note(str(last[0]))
     _show(data, out)
@@ -103,7 +105,7 @@ def _show(data: xr.Dataset, out: Path) -> None:
 
     failed = [str(each) for each in data.failure.values.ravel().tolist() if each]
     if failed:
-        note(f"{len(failed)} failed, the first: {failed[0]} (the reasons of all: variable failure)")
+        note(f"{len(failed)} failed; the first: {failed[0]} (for all reasons see the variable failure)")
     swept = data.status.dims
     if out.suffix == ".zarr":
         note(f"wrote {out}")
@@ -118,4 +120,4 @@ def _show(data: xr.Dataset, out: Path) -> None:
     title = f"{data.status.size} runs over {', '.join(map(str, swept))}"
     if "time" in data.dims:
         title += f", at {float(data.time[-1]):g} s"
-    print_table(title, ["", "least", "median", "greatest"], rows)
+    print_table(title, ["", "smallest", "median", "largest"], rows)

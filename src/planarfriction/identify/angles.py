@@ -37,7 +37,7 @@ def unwrapped(time: np.ndarray, angle: np.ndarray, name: str = "theta") -> tuple
         turns = np.zeros_like(turns)
     jump = np.abs(steps - _usual(steps)) > QUARTER
     if jump.any():
-        raise _refusal(time, np.diff(angle), jump, name, "not jump otherwise than by whole turns")
+        raise _refusal(time, np.diff(angle), jump, name, "only jump by whole turns")
     fast = np.abs(steps) > QUARTER
     if wrapped and fast.any():
         raise _refusal(time, steps, fast, name, "turn by less than a quarter turn between samples, or be unwrapped")

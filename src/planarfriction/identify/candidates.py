@@ -79,7 +79,7 @@ def candidate_motions(
     )
     samples = duration * rate
     if not SAMPLES[0] <= samples <= SAMPLES[1]:
-        raise InvalidValueError("duration * rate", f"lie between {SAMPLES[0]} and {SAMPLES[1]} samples", f"{samples:g}")
+        raise InvalidValueError("duration * rate", f"be between {SAMPLES[0]} and {SAMPLES[1]} samples", f"{samples:g}")
     time = np.arange(round(samples)) / rate
     result = []
     for load in loads:

@@ -76,12 +76,12 @@ def check_names(names: Sequence[str], known: Collection[str] = tuple(ALL)) -> tu
     names = tuple(validation.choices("parameters", (names,) if isinstance(names, str) else names, known))
     for name in names:
         if names.count(name) > 1:
-            raise InvalidValueError("parameters", "hold each name once", f"{name!r} {names.count(name)} times")
+            raise InvalidValueError("parameters", "contain each name once", f"{name!r} {names.count(name)} times")
     if not names:
-        raise InvalidValueError("parameters", "hold at least one name", "none")
+        raise InvalidValueError("parameters", "contain at least one name", "none")
     if any(name in SOFT_FINGER for name in names) and "contact_radius" in names:
         raise InvalidValueError(
-            "parameters", "hold contact_radius or soft-finger constants, not both", ", ".join(names)
+            "parameters", "contain contact_radius or soft-finger constants, not both", ", ".join(names)
         )
     return names
 

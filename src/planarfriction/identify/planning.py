@@ -150,7 +150,7 @@ def plan_motion(
     refuse_anisotropy(patch, "plan_motion")
     validation.instance("law", law, LuGre, "a LuGre law")
     if "breakaway_ratio" in names and law.elasto_plastic is None:
-        raise InvalidValueError("parameters", "hold breakaway_ratio only for elasto-plastic bristles", names)
+        raise InvalidValueError("parameters", "contain breakaway_ratio only for elasto-plastic bristles", names)
     groups, before = check_groups(nuisance), () if isinstance(logs, (list, tuple)) and not logs else as_logs(logs)
     chosen = names if wanted is None else known.check_names(wanted, names)
     if motions is None:

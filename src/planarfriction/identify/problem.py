@@ -285,7 +285,7 @@ def _check_finger(patch: ContactPatch, names: Sequence[str]) -> None:
         raise InvalidValueError("patch", f"have a SoftFinger pressure to estimate {', '.join(names)}", patch.name)
     for name in ("k", "k_per_newton"):
         if name in names and getattr(patch.pressure, name) is None:
-            raise InvalidValueError("parameters", f"hold {name} only where the SoftFinger has it", name)
+            raise InvalidValueError("parameters", f"contain {name} only if the SoftFinger has it", name)
 
 
 def mean_load(log: Log) -> float:
@@ -304,7 +304,7 @@ def _check_wrenches(logs: Sequence[Log]) -> None:
 def _check_constant(logs: Sequence[Log], loads: Sequence[float]) -> None:
     for log, load in zip(logs, loads, strict=True):
         if np.abs(log.normal_force / load - 1.0).max() > CONSTANT:
-            rule = "stay within 10 % of its mean where the patch changes with the load (make one log of each load)"
+            rule = "stay within 10 % of its mean if the patch changes with the load (make one log for each load)"
             raise InvalidValueError(
                 f"normal_force of {log.name}", rule, f"{log.normal_force.min():g} .. {log.normal_force.max():g} N"
             )

@@ -141,7 +141,7 @@ def _kinds(model: str, patch: ContactPatch, names: Sequence[str]) -> tuple[str, 
     """Names of the models to fit: of patches that follow their load only the published one knows how."""
     follows = patch.depends_on_load or any(name in known.SOFT_FINGER for name in names)
     if follows and model not in ("auto", MODELS[0]):
-        rule = f"be {MODELS[0]!r} where the patch changes with the load"
+        rule = f"be {MODELS[0]!r} if the patch changes with the load"
         raise InvalidValueError("model", rule, model)
     if follows:
         return MODELS[:1]

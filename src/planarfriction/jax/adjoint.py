@@ -152,7 +152,7 @@ def _linear_jvp(primitive: Primitive, count: int, by_operations: Callable[..., A
             return primitive.bind(*primals, **options), primitive.bind(*changed, **options)
         if kind.strict:
             raise FrictionError(
-                "the adjoint gives first derivatives: leave method out, or take 'eager', to differentiate twice"
+                "the adjoint gives first derivatives only: leave method out, or use 'eager', to differentiate twice"
             )
         end = -count - kept  # without the states on the way
         at, along = (tuple(_full(outer, (*values[:end], *values[-count:]))) for values in (primals, dots))

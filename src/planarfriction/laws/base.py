@@ -77,7 +77,7 @@ def _bristles(state: Any, velocity: Any, axis: int | None) -> tuple[np.ndarray, 
     least = min(z.ndim, v.ndim)
     validation.broadcast(state=z, velocity=v)
     if axis is not None and not (type(axis) is int and -least <= axis < least):
-        raise InvalidValueError("axis", f"be None or that of the components of both, of {least} axes", axis)
+        raise InvalidValueError("axis", f"be None or the axis of the components (of {least} axes)", axis)
     return z, v
 
 

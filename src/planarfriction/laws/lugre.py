@@ -91,5 +91,5 @@ def _elasto_plastic(value: Any) -> ElastoPlastic | None:
         validation.keys("elasto_plastic", value, ["breakaway_ratio"])
         value = value["breakaway_ratio"]
     if validation.refusal(value) is not None:
-        raise InvalidValueError("elasto_plastic", "be a breakaway ratio, an ElastoPlastic or None", value)
+        raise InvalidValueError("elasto_plastic", "be a breakaway ratio, an ElastoPlastic, or None", value)
     return ElastoPlastic(value)

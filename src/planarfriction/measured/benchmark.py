@@ -85,7 +85,7 @@ class Benchmark:
         for name, cases in self.cases.items():
             if len({TASKS[name].is_training(case) for case in cases}) != 2:
                 raise InvalidValueError(
-                    f"table of {name}", "hold cases to fit to and cases to test", f"{len(cases)} cases"
+                    f"table of {name}", "contain cases to fit and cases to test", f"{len(cases)} cases"
                 )
 
     def test(self, task: str) -> list[Case]:

@@ -171,7 +171,7 @@ class FrictionModel(ByValue):
         return self._state_of(deflections, validation.positive_load("normal_force", normal_force))
 
     def _state_of(self, deflections: np.ndarray, load: float) -> np.ndarray:
-        raise InvalidValueError("model", "be one that starts with a load: it has no _state_of", type(self).__name__)
+        raise InvalidValueError("model", "support a start under load (it has no _state_of)", type(self).__name__)
 
     def packed(self, loads: Sequence[float | None], between: tuple[float, float] | None = None) -> PackedModel:
         """The model at distinct `loads` [N] for the compiled solver; `[None]` if the patch does not depend on the load.
@@ -184,7 +184,7 @@ class FrictionModel(ByValue):
 
         Raises InvalidValueError for a model that cannot be simulated in a scene.
         """
-        rule = "be one that can be simulated in a scene: it has no packed(loads)"
+        rule = "support simulation in a scene (it has no packed(loads))"
         raise InvalidValueError("model", rule, type(self).__name__)
 
     @property
@@ -193,9 +193,7 @@ class FrictionModel(ByValue):
 
         Raises InvalidValueError for a model whose steps are not compiled.
         """
-        raise InvalidValueError(
-            "model", "be one whose steps are compiled: it has no step_function", type(self).__name__
-        )
+        raise InvalidValueError("model", "have compiled steps (it has no step_function)", type(self).__name__)
 
     def packed_steps(self, loads: Sequence[float | None]) -> PackedSteps:
         """The model at `loads` > 0 [N], with all of its states, for `coupling`; `[None]` if the patch ignores the

@@ -88,7 +88,7 @@ class ReducedModel(ThreeStateModel):
         parts = _count_of(self.parts, int(MOST_PARTS * min(1.0, 24.0 / self.segments) ** 2))
         if not self.patch.depends_on_load and is_point(self.patch):
             shown = f"{1.0 - self.patch.weights().max():.1g} of it"
-            raise InvalidValueError("patch", f"carry more than {POINT} of its load beside its heaviest cell", shown)
+            raise InvalidValueError("patch", f"carry more than {POINT} of its load outside its heaviest cell", shown)
         if parts is not None and parts > self.patch.cells:
             raise InvalidValueError("parts", f"be at most the {self.patch.cells} cells that can carry load", parts)
         object.__setattr__(self, "labels", labels_of(self.patch, parts))
@@ -113,7 +113,9 @@ class ReducedModel(ThreeStateModel):
         Raises InvalidValueError for a model in parts, and for loads that are not > 0.
         """
         if self.parts > 1:
-            raise InvalidValueError("parts", "be 1 for one shape (parts_at has that of each)", self.parts)
+            raise InvalidValueError(
+                "parts", "be 1 for shape_at and shapes_at (parts_at gives the shape of each part)", self.parts
+            )
         return self._parts[0].at(self._checked(loads))
 
     def parts_at(self, normal_force: float | None) -> tuple[Part, ...]:

@@ -140,10 +140,10 @@ def _nodes(patch: ContactPatch, loads: Any) -> np.ndarray | None:
     """Loads at which weights are fitted [N]; None for a patch of fixed shape."""
     if not patch.depends_on_load:
         if loads is not None:
-            raise InvalidValueError("loads", "be left out, the shape of this patch does not depend on them", loads)
+            raise InvalidValueError("loads", "be left out: the shape of this patch does not depend on the load", loads)
         return None
     if loads is None:
-        raise InvalidValueError("loads", "be (lowest, highest) [N], the shape of this patch depends on the load", None)
+        raise InvalidValueError("loads", "be (lowest, highest) [N]: the shape of this patch depends on the load", None)
     low, high = validation.vector("loads", loads, 2).tolist()
     if not 0.0 < low < high:
         raise InvalidValueError("loads", "be (lowest, highest) with 0 < lowest < highest", (low, high))
@@ -198,7 +198,7 @@ class _Problem(NamedTuple):
     def solution(self, most: int, favoured: np.ndarray) -> np.ndarray:
         """Weights `[N]` with at most `most` cells, where it can be those `favoured` `[N]`."""
         if most < len(self.moments):
-            raise InvalidValueError("cells", f"be at least the number of kept sums, {len(self.moments)}", most)
+            raise InvalidValueError("cells", f"be at least {len(self.moments)}, the number of sums that are kept", most)
         kept = np.ones(len(self.cells), dtype=bool)
         liked = favoured[self.cells]
         weights, share = self._weights(kept), SHARE_DROPPED

@@ -87,7 +87,7 @@ class ContactPatch(Moments):
             check_pressure(law.relative(positions), positions)
         kept = law.ever_loaded(positions)
         if not kept.any():
-            raise InvalidValueError("pressure", "load at least one cell", "zero pressure on all of them")
+            raise InvalidValueError("pressure", "be > 0 on at least one cell", "0 on all of them")
         self._check_anisotropy(kept)
         kept_values = {"positions": positions[kept], "areas": areas[kept], "pressure": law.only(kept)}
         for name, value in kept_values.items():
@@ -297,7 +297,7 @@ class ContactPatch(Moments):
         """
         if normal_force is None:
             if self._fixed_weights is None:
-                raise InvalidValueError("normal_force", "be given, the shape of this patch depends on it", "None")
+                raise InvalidValueError("normal_force", "be given: the shape of this patch depends on it", "None")
             return self._fixed_weights
         load = validation.non_negative_numbers("normal_force", normal_force)
         if load.size * self.cells > validation.MOST_NUMBERS:
@@ -337,7 +337,7 @@ class ContactPatch(Moments):
         """Weights `[..., N]` from relative pressures of the same shape, scaled first so that no sum can overflow."""
         peak = relative.max(-1, keepdims=True)
         if not (peak > 0.0).all():
-            raise InvalidValueError("pressure", "load at least one cell at every load", f"a peak of {peak.min()}")
+            raise InvalidValueError("pressure", "be > 0 on at least one cell at every load", f"a peak of {peak.min()}")
         load = relative / peak * self.areas
         return load / load.sum(-1, keepdims=True)
 

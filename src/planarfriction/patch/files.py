@@ -92,13 +92,13 @@ def _read_image(path: Path) -> np.ndarray:
             return np.asarray(image, dtype=float)
         red, green, blue, alpha = np.moveaxis(np.asarray(image.convert("RGBA"), dtype=float), -1, 0)
     if not ((red == green).all() and (red == blue).all()):
-        raise FileError(f"pressure map {path}: this is a colour image, brightness means pressure in a grey one only")
+        raise FileError(f"pressure map {path}: this is a colour image; brightness means pressure only in a grey image")
     if not (alpha == 255).all():
-        raise FileError(f"pressure map {path}: the image is partly transparent, save it without transparency")
+        raise FileError(f"pressure map {path}: the image is partly transparent; save it without transparency")
     return red
 
 
 def _check_size(path: Path, cells: int) -> None:
     """Raise, before memory is asked for, where a map has more cells than a patch may have."""
     if cells > MOST_CELLS:
-        raise FileError(f"pressure map {path}: has more than {MOST_CELLS} cells, the most that a patch may have")
+        raise FileError(f"pressure map {path}: has more than {MOST_CELLS} cells, the maximum for a patch")

@@ -18,7 +18,7 @@ def pressure_map(
     """
     given = {key: value for key, value in (("file", file), ("files", files), ("values", values)) if value is not None}
     if len(given) != 1:
-        rule = "have either file or values (or files, one for each of the loads)"
+        rule = "have either file or values (or files, one for each load)"
         raise InvalidValueError("pressure map", rule, " and ".join(given) or "none of them")
     if files is not None and loads is None:
         raise InvalidValueError("loads", "be given: the normal force of each of the files", "none")

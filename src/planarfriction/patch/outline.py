@@ -75,7 +75,7 @@ def outline_from_dict(data: Any) -> Outline | None:
         return polygon_outline(data["vertices"])
     inner, outer = validation.vector("radii", data["radii"], 2).tolist()
     if not 0.0 <= inner < outer:
-        raise InvalidValueError("radii", "grow from >= 0", f"{inner} and {outer}")
+        raise InvalidValueError("radii", "be (inner, outer) with 0 <= inner < outer", f"{inner} and {outer}")
     return RoundOutline(inner, outer)
 
 
@@ -105,9 +105,9 @@ def clipped(kind: type[ContactPatch], outline: Outline, grid: Grid, pressure: An
 
     polygon = shapely.Polygon(*outline.rims())
     if not polygon.is_valid:
-        raise InvalidValueError("vertices", "outline a simple polygon", shapely.is_valid_reason(polygon))
+        raise InvalidValueError("vertices", "form a simple polygon", shapely.is_valid_reason(polygon))
     try:
         cells = shapes.clip(polygon, grid)
     except shapely.errors.GEOSException as error:  # rounding of coordinates far apart in size
-        raise InvalidValueError("vertices", "outline a polygon that can be cut into cells", str(error)) from None
+        raise InvalidValueError("vertices", "form a polygon that can be cut into cells", str(error)) from None
     return with_outline(kind(*cells, pressure, grid, name), outline)

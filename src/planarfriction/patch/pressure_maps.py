@@ -35,7 +35,7 @@ class PressureMaps(ByValue, Pressure):
     def __post_init__(self) -> None:
         loads = validation.array("loads", self.loads, (None,))
         if len(loads) == 0 or not (loads[0] > 0.0 and (np.diff(loads) > 0.0).all()):
-            raise InvalidValueError("loads", "ascend and be > 0", loads.tolist())
+            raise InvalidValueError("loads", "be increasing and > 0", loads.tolist())
         values = check_not_negative("pressure", pressure_array("pressure", self.values, (len(loads), None)))
         peak = values.max(axis=1, initial=0.0)
         if not (peak > 0.0).all():
@@ -94,7 +94,7 @@ def read_maps(pressure: Any, loads: Any = None) -> tuple[Any, tuple[int, int], s
     """
     if isinstance(pressure, Mapping):
         if loads is not None:
-            raise InvalidValueError("loads", "be left out, the mapping has them", loads)
+            raise InvalidValueError("loads", "be left out, because the mapping has them", loads)
         loads = sorted(pressure, key=lambda load: validation.positive("load of a pressure map", load))
         pressure = [pressure[load] for load in loads]
     if loads is None:

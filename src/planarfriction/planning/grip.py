@@ -196,7 +196,7 @@ class _Search:
 
         if not len(self._values):
             name, goal = ("slide", self._aim.slide.tolist()) if self._aim.angle is None else ("angle", self._aim.angle)
-            rule = f"be a goal that the load takes the body to ({100.0 * self._reached:.3g} % of the way at most)"
+            rule = f"be within reach of the load on the body (it gets at most {100.0 * self._reached:.3g} % of the way)"
             raise InvalidValueError(name, rule, goal)
         values, best, least = self._values, self._values, np.inf
         rounds, tries = (1, TRIES) if len(self._factors) == 1 else (1 + ROUNDS, TRIES // 2)
@@ -269,7 +269,7 @@ def _contact_of(scene: Any, name: str | None) -> int:
             raise InvalidValueError(f"velocity of contact {each.name!r}", "be None for a grip plan", each.velocity)
     names = [each.name for each in scene.contacts]
     if name is None and len(names) > 1:
-        raise InvalidValueError("contact", f"be given where there are several ({', '.join(names)})", name)
+        raise InvalidValueError("contact", f"be given if there are several ({', '.join(names)})", name)
     return 0 if name is None else names.index(validation.choice("contact", name, names))
 
 
@@ -294,7 +294,7 @@ def _knots(scene: Scene, knots: Any) -> list[np.ndarray]:
         return [np.linspace(0.0, share * scene.t_end, count) for share in SPANS]
     times = validation.array("knots", knots, (None,))
     if not 4 <= len(times) <= MOST_KNOTS or times[0] != 0.0 or (np.diff(times) <= 0.0).any():
-        raise InvalidValueError("knots", f"be 4 to {MOST_KNOTS} times that increase from 0 s on", times.tolist())
+        raise InvalidValueError("knots", f"be 4 to {MOST_KNOTS} increasing times >= 0", times.tolist())
     if times[-1] >= scene.t_end:
         raise InvalidValueError("knots", f"end before the scene does, at {scene.t_end:g} s", times.tolist())
     return [times]

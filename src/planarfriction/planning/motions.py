@@ -141,7 +141,7 @@ def with_friction(contact: Contact, factor: float) -> Contact:
     law = contact.model.law
     scaled = {name: factor * getattr(law, name) for name in ("mu_c", "mu_s") if hasattr(law, name)}
     if not scaled:
-        rule = "be one of mu_c and mu_s, where friction is to be uncertain"
+        rule = "have mu_c and mu_s to plan with uncertain friction"
         raise InvalidValueError("law", rule, type(law).__name__)
     law, model = dataclasses.replace(law, **scaled), contact.model
     changed = model.with_law(law) if hasattr(model, "with_law") else dataclasses.replace(model, law=law)

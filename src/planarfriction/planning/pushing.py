@@ -176,7 +176,7 @@ def _follow(scenery: Scenery, start: np.ndarray, time: np.ndarray, rtol: float) 
             contact = scenery.flush(contact, now, q)
         else:
             contact = None
-    raise InvalidValueError("path", f"change what the pusher does at most {MOST_PHASES} times", f"t = {now:g} s")
+    raise InvalidValueError("path", f"change the contact of the pusher at most {MOST_PHASES} times", f"t = {now:g} s")
 
 
 def _neighbour(slider: Slider, place: Place, mu: float, velocity: np.ndarray, held: str) -> str:

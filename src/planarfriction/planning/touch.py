@@ -104,7 +104,7 @@ class Scenery:
         along = self.slider.inward @ [c, s]
         edge = int(along.argmax())
         if math.acos(min(along[edge], 1.0)) > _FLUSH:
-            raise InvalidValueError("path", "not wedge the slider between two places of the face", f"t = {t:g} s")
+            raise InvalidValueError("path", "not wedge the slider between two points of the face", f"t = {t:g} s")
         return Contact(FACE, edge)
 
     def within(self, contact: Contact, t: float, q: np.ndarray) -> float:

@@ -106,7 +106,7 @@ def frame_times(sampled: np.ndarray, slow: float | None, fps: float) -> tuple[np
         slow = validation.positive("slow", slow)
     wanted = slow * span * fps
     if wanted > MOST_FRAMES:
-        rule = f"make at most {MOST_FRAMES} frames, at most {MOST_FRAMES / (span * fps):.3g} here"
+        rule = f"be at most {MOST_FRAMES / (span * fps):.3g} here, for at most {MOST_FRAMES} frames"
         raise InvalidValueError("slow", rule, slow)
     count = max(round(wanted) + 1, 2) if span > 0.0 else LEAST_FRAMES
     if slow == 1.0 or span == 0.0:

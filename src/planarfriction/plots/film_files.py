@@ -159,7 +159,7 @@ def _writing(path: Path, drawn: Path, figure: Any, fps: Any) -> Iterator[Any]:
         except (subprocess.CalledProcessError, BrokenPipeError):
             if stopped:  # ffmpeg was stopped too, and says so
                 raise KeyboardInterrupt from None
-            raise FileError(f"cannot write {path}: ffmpeg failed, write a .gif or an .html instead") from None
+            raise FileError(f"cannot write {path}: ffmpeg failed; write a .gif or .html file instead") from None
 
 
 def _ffmpeg(path: Path) -> str:

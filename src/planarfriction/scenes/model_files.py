@@ -115,7 +115,7 @@ def _described(family: Family, member: Any) -> dict[str, Any]:
     """Kind and parameters of a member; a limit surface stays as it is."""
     kind = family.name_of(member)
     if kind is None:
-        rule = f"be one of {', '.join(family)}, or registered, to be written to a file"
+        rule = f"be one of {', '.join(family)}, or be registered, to be written to a file"
         raise InvalidValueError(family.what, rule, type(member).__name__)
     values = {name: _plain(member, name) for name in _parameters(family[kind])}
     return {"kind": kind, **{name: value for name, value in values.items() if value is not None}}

@@ -62,7 +62,7 @@ class Pieces:
                 fine = np.ceil(lengths / SHAPE_INTERVAL - 1e-9)
                 parts = np.where(slope != 0.0, np.maximum(fine, parts), parts)
         if parts.sum() > MOST_PIECES:
-            rule = f"be at most {MOST_PIECES * SHAPE_INTERVAL:g} s where a patch follows a changing load"
+            rule = f"be at most {MOST_PIECES * SHAPE_INTERVAL:g} s if the shape of a patch changes with the load"
             raise InvalidValueError("t_end", rule, t_end)
         self._first = np.concatenate([[0], np.cumsum(parts)]).astype(np.int64)
         """Number of the first piece behind each break, [S + 1]."""

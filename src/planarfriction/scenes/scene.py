@@ -197,8 +197,8 @@ class Scene(ByValue):
     """Name of the scene."""
     start: Literal["rest", "equilibrium", "sliding"] = "rest"
     """State of the bristles at the start: "rest", relaxed; "equilibrium", carrying the load of a body at rest (with the
-    least elastic energy, which determines how contacts share it); "steady", the steady state of the initial velocity.
-    """
+    least elastic energy, which determines how contacts share it); "sliding", in the steady state of the initial
+    velocity."""
 
     if TYPE_CHECKING:  # what is given may be more than what is kept
 
@@ -240,11 +240,11 @@ class Scene(ByValue):
         if self.velocity is not None:
             for name in ("force", "stop_speed"):
                 if getattr(self, name) is not None:
-                    raise InvalidValueError(name, "be None where the velocity is prescribed", getattr(self, name))
+                    raise InvalidValueError(name, "be None if the velocity is prescribed", getattr(self, name))
             for contact in self.contacts:
                 if contact.velocity is not None:
                     name = f"velocity of contact {contact.name!r}"
-                    raise InvalidValueError(name, "be None where the body's velocity is prescribed", contact.velocity)
+                    raise InvalidValueError(name, "be None if the body's velocity is prescribed", contact.velocity)
         sample_count(self.t_end, self.save_every, "save_every")
         validation.text("name", self.name)
         self._check_start()
@@ -255,12 +255,12 @@ class Scene(ByValue):
         driven |= {f"contact {c.name!r}": c.velocity(0.0).tolist() for c in self.contacts if c.velocity is not None}
         moves = [name for name, velocity in driven.items() if any(velocity)]
         if self.start == "equilibrium" and self.velocity is not None:
-            raise InvalidValueError("start", "be 'rest' or 'sliding' where the velocity is prescribed", self.start)
+            raise InvalidValueError("start", "be 'rest' or 'sliding' if the velocity is prescribed", self.start)
         if self.start == "equilibrium" and moves:
-            rule = "be zero at first where start is 'equilibrium'"
+            rule = "start at zero if start is 'equilibrium'"
             raise InvalidValueError(f"velocity of {moves[0]}", rule, driven[moves[0]])
         if self.start == "sliding" and not moves:
-            raise InvalidValueError("initial velocity", "not be zero where start is 'sliding'", driven["the body"])
+            raise InvalidValueError("initial velocity", "not be zero if start is 'sliding'", driven["the body"])
 
     def __repr__(self) -> str:
         contacts = "; ".join(repr(contact) for contact in self.contacts[:2])

@@ -38,7 +38,7 @@ def sample_count(span: float, step: float, name: str) -> int:
     """Steps of `step` [s] that fit into `span` [s]; raises, before memory is asked for, where they are too many."""
     count = span / step * (1.0 + 1e-12)  # so that the end itself is kept in spite of rounding
     if count > MOST_SAMPLES:
-        rule = f"leave at most {MOST_SAMPLES} samples, be at least {span / MOST_SAMPLES:.3g} s for {span:g} s"
+        rule = f"be at least {span / MOST_SAMPLES:.3g} s for {span:g} s (at most {MOST_SAMPLES} samples)"
         raise InvalidValueError(name, rule, step)
     return int(count)
 
@@ -140,7 +140,7 @@ class Signal(ByValue):
         validation.path("path", path)
         validation.text("time", time)
         if not isinstance(value, str) and not _is_texts(value):
-            raise InvalidValueError("value", "be the name of a column or a list of names", value)
+            raise InvalidValueError("value", "be the name of a column, or a list of names", value)
         names = [value] if isinstance(value, str) else list(value)
         table = Table(path).numbers([time, *names])
         try:

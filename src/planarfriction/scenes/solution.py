@@ -154,7 +154,7 @@ class Solution:
         if contact is None and len(names) == 1:
             return 0
         if contact is None:
-            raise InvalidValueError("contact", f"be given where there are several ({', '.join(names)})", contact)
+            raise InvalidValueError("contact", f"be given if there are several ({', '.join(names)})", contact)
         return names.index(validation.choice("contact", contact, names))
 
     def slip_events(self) -> tuple[SlipEvent, ...]:

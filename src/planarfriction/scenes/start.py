@@ -182,7 +182,7 @@ def _least_energy(cells: _Cells, pull: np.ndarray) -> np.ndarray:
     if np.abs(scale * (cells.load(bent) - pull)).max() > _BALANCED * size:
         at_most = _held(cells, pull, motion)
         friction = "" if at_most is None else f" (they hold {100.0 * at_most:.3g} % of the load at most)"
-        rule = f"be 'rest' or 'sliding' where the contacts do not hold the body{friction}"
+        rule = f"be 'rest' or 'sliding' if the contacts do not hold the body{friction}"
         raise InvalidValueError("start", rule, "equilibrium")
     return motion
 

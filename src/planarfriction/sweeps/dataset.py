@@ -117,7 +117,7 @@ class Collected:
         values = np.asarray(example.values)
         shape = (*self.grid.shape, *values.shape)
         if self.grid.size * values.size > MOST_NUMBERS:
-            rule = f"leave at most {MOST_NUMBERS} numbers in memory (name a .zarr store in out, or measure less)"
+            rule = f"need at most {MOST_NUMBERS} numbers in memory (use a .zarr store as out, or measure less)"
             raise InvalidValueError("values", rule, f"{self.grid.size} runs of {values.size}")
         if values.dtype.kind == "U":
             return np.full(shape, "", dtype=object)

@@ -191,7 +191,7 @@ class Runs:
         try:
             self._same = digest_of(LAYOUT, equations(), measure)
         except Exception:  # of parts that cannot be pickled, or that hold themselves
-            rule = "be a function whose content has a digest: give it plain data and functions, no open files or locks"
+            rule = "be a function that depends only on plain data and functions, not on open files or locks"
             raise InvalidValueError("measure", rule, measure) from None
         self._models: dict[str, Any] = {}
         self._digests: dict[int, tuple[Any, str]] = {}

@@ -67,7 +67,7 @@ def grid_of(values: Any) -> Grid:
 
 def _scalars(name: str, given: Any) -> list[Any]:
     """Values of a quantity as plain Python scalars."""
-    rule = "be a list of numbers, of texts or of truth values (of anything else: a mapping from labels to values)"
+    rule = "be a list of numbers, texts or booleans (for other values: a mapping from labels to values)"
     if isinstance(given, (str, bytes)) or not (isinstance(given, (Sequence, range)) or hasattr(given, "__array__")):
         raise InvalidValueError(name, rule, validation.quoted(given))
     if isinstance(given, (list, tuple)) and not _of_one_kind(given):

@@ -88,7 +88,7 @@ def _name_of(measure: Any) -> str:
 
 def _checked_name(name: Any) -> str:
     if not (isinstance(name, str) and name and name != _META):
-        raise InvalidValueError("measure", "name what it returns with texts", name)
+        raise InvalidValueError("measure", "use texts as names of what it returns", name)
     return name
 
 
@@ -102,7 +102,7 @@ def _variable(name: str, value: Any) -> History:
         values, attrs = np.asarray(value), {}
         dims = tuple(f"{name}_{axis}" if values.ndim > 1 else f"{name}_index" for axis in range(values.ndim))
     if values.dtype.kind not in "biufcU":
-        rule = f"return numbers, texts and arrays of them: {name!r} is neither"
+        rule = f"return numbers, texts, or arrays of them, which {name!r} is not"
         raise InvalidValueError("measure", rule, type(value).__name__)
     return History(dims, values, attrs)
 

@@ -43,7 +43,7 @@ _AHEAD = 4
 _WORKERS = 64
 """Workers of an executor that does not say how many it has."""
 
-_ENDED = "the executor ended ({}): what is done is kept, sweep again to go on"
+_ENDED = "the executor ended ({}): finished runs are kept, sweep again to continue"
 
 
 @described
@@ -239,7 +239,7 @@ def _check_travels(measure: Any) -> None:
     try:
         pickle.dumps(measure)
     except Exception as error:
-        rule = "be a function that other processes can import, as one that a module defines with def"
+        rule = "be a function that other processes can import, such as one defined in a module"
         raise InvalidValueError("measure", rule, reason_of(error)) from None
 
 

@@ -107,7 +107,7 @@ def _set(table: Any, parts: list[str], value: Any, path: str, where: str, valid:
     key, *rest = parts
     if isinstance(table, list):
         if not (key.isdecimal() and int(key) < len(table)):
-            raise InvalidValueError(path, f"count the {len(table)} parts of {where} from 0", repr(key))
+            raise InvalidValueError(path, f"be an index from 0 to {len(table) - 1} in {where}", repr(key))
         number = int(key)
         inner = _set(table[number], rest, value, path, f"{where}.{key}") if rest else value
         return [*table[:number], inner, *table[number + 1 :]]
@@ -117,12 +117,12 @@ def _set(table: Any, parts: list[str], value: Any, path: str, where: str, valid:
     if key not in valid:
         near = difflib.get_close_matches(key, valid, n=1)
         hint = f" (did you mean {near[0]!r}?)" if near else ""
-        raise InvalidValueError(path, f"lead to a value of the scene: {where} has {', '.join(valid)}", f"{key!r}{hint}")
+        raise InvalidValueError(path, f"name a value of the scene: {where} has {', '.join(valid)}", f"{key!r}{hint}")
     name = key if where == "the scene" else f"{where}.{key}"
     if not rest:
         return {**table, key: value}
     if key not in table:
-        raise InvalidValueError(path, f"lead into a table that is there: {where} has no {key!r}", repr(key))
+        raise InvalidValueError(path, f"name an existing table: {where} has no {key!r}", repr(key))
     inner = table[key]
     if isinstance(inner, str) and key in _BY_NAME:
         inner = {_BY_NAME[key]: inner}
@@ -173,7 +173,7 @@ def parse_all(texts: Sequence[str]) -> dict[str, dict[Any, Any]]:
     for text in texts:
         path, values = parse(text)
         if path in found:
-            raise InvalidValueError(f"--set {path}", "stand once", repr(text))
+            raise InvalidValueError(f"--set {path}", "be given once", repr(text))
         found[path] = values
     return found
 
@@ -184,14 +184,14 @@ def _spaced(path: str, spelled: str) -> list[float]:
     try:
         count = int(number)
     except ValueError:
-        raise InvalidValueError(f"--set {path}", "be START:STOP:COUNT with a whole number of values", spelled) from None
+        raise InvalidValueError(f"--set {path}", "be START:STOP:COUNT with a whole number as COUNT", spelled) from None
     validation.count(f"COUNT of --set {path}", count, 2, MOST_VALUES)
     start, stop = (
         validation.number_in(f"START of --set {path}", first),
         validation.number_in(f"STOP of --set {path}", last),
     )
     if start == stop:
-        raise InvalidValueError(f"--set {path}", "go from START to another STOP", spelled)
+        raise InvalidValueError(f"--set {path}", "have a STOP that differs from START", spelled)
     return np.linspace(start, stop, count).tolist()
 
 

@@ -96,7 +96,7 @@ class First(torch.autograd.Function):
 
     @staticmethod
     def backward(ctx, *bars):
-        raise FrictionError("the adjoint gives first derivatives: take method='eager' to differentiate twice")
+        raise FrictionError("the adjoint gives first derivatives only: use method='eager' to differentiate twice")
 
     jvp = backward
 

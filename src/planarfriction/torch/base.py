@@ -87,7 +87,7 @@ class FrictionModel(nn.Module):
         """The physical parameters, and what else a state dict holds of every model."""
         trainable = tuple(trainable)
         if "breakaway_ratio" in trainable and not self.elasto_plastic:
-            raise InvalidValueError("trainable", "not name breakaway_ratio for plain bristles", trainable)
+            raise InvalidValueError("trainable", "not contain breakaway_ratio for plain bristles", trainable)
         self.physical = self.physical_type(values, trainable, **kind)
         self.register_buffer("bristles", torch.tensor(self.elasto_plastic, device=kind["device"]))
         self.register_buffer("lever", torch.tensor(lever, **kind))

@@ -64,7 +64,9 @@ class ReducedModel(FrictionModel):
         super().__init__(patch, law)
         trainable = tuple(trainable)
         if "gamma" in trainable:
-            raise InvalidValueError("trainable", "not name gamma: the map of steady sliding is made for it", trainable)
+            raise InvalidValueError(
+                "trainable", "not contain gamma: the map of steady sliding depends on it", trainable
+            )
         kind = {"dtype": dtype or torch.get_default_dtype(), "device": device}
         model = models.ReducedModel(patch, law, parts=parts, segments=segments, speeds=speeds, load_error=0.0)
         shares, shapes = zip(*model.parts_at(normal_force), strict=True)

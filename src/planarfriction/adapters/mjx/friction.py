@@ -269,24 +269,24 @@ def _check(m: Any, placed: Sequence[Placed]) -> None:
         name = mujoco.mjtIntegrator(m.opt.integrator).name.removeprefix("mjINT_")
         raise InvalidValueError("integrator", rule, name)
     if m.opt.cone != mujoco.mjtCone.mjCONE_PYRAMIDAL:
-        rule = "be pyramidal: MJX knows contacts without friction with these alone"
+        rule = "be pyramidal: MJX supports contacts without friction only with these"
         raise InvalidValueError("cone", rule, mujoco.mjtCone(m.opt.cone).name.removeprefix("mjCONE_").lower())
     if m.opt.noslip_iterations > 0:
-        rule = "be 0: they change what has been solved"
+        rule = "be 0: they would change the solution"
         raise InvalidValueError("noslip_iterations", rule, m.opt.noslip_iterations)
     for each in placed:
         each.check_step(m)
 
 
 def _refuse_precision(given: str) -> None:
-    rule = 'be float64, as bristles need: jax.config.update("jax_enable_x64", True) before the data are made'
+    rule = 'be float64, which bristles need: call jax.config.update("jax_enable_x64", True) before making the data'
     raise InvalidValueError("precision", rule, given)
 
 
 def _in_jax(model: models.FrictionModel) -> FrictionModel:
     """The model of JAX that a model of NumPy is."""
     if model._follows_load:
-        rule = "have a shape that does not follow the load: models of JAX keep theirs"
+        rule = "have a shape that does not change with the load: models of JAX keep theirs"
         raise InvalidValueError("model", rule, type(model).__name__)
     if isinstance(model, models.ReducedModel):
         return ReducedModel(model.patch, model.law, parts=model.parts, segments=model.segments, speeds=model.speeds)

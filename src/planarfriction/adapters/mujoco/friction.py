@@ -61,7 +61,7 @@ class Friction:
         self.coupled = CoupledPatches([patch.model for patch in patches])
         for patch in patches:
             if patch.model._follows_load:
-                rule = "have a shape that does not follow the load: compiled steps need it in stored numbers"
+                rule = "have a shape that does not change with the load: compiled steps need fixed numbers"
                 raise InvalidValueError("model", rule, type(patch.model).__name__)
         self._check()
         needed = words(patches, m.nv)
@@ -76,11 +76,11 @@ class Friction:
             rule = f"be {', '.join(INTEGRATORS.values())}"
             raise InvalidValueError("integrator", rule, mujoco.mjtIntegrator(options.integrator).name[6:])
         if options.noslip_iterations > 0:
-            rule = "be 0: they change what has been solved"
+            rule = "be 0: they would change the solution"
             raise InvalidValueError("noslip_iterations", rule, options.noslip_iterations)
         sleep = getattr(mujoco.mjtEnableBit, "mjENBL_SLEEP", 0)
         if options.enableflags & int(sleep):
-            raise InvalidValueError("sleep", "be disabled: what sleeps does not answer to wrenches", "enabled")
+            raise InvalidValueError("sleep", "be disabled: sleeping bodies do not react to wrenches", "enabled")
         for placed in self.placed:
             placed.check_step(m)
 

@@ -136,7 +136,7 @@ def _check(parts: dict[str, Any]) -> None:
     for name in contact._fields[1:]:
         right &= getattr(d.contact, name).ctypes.data - d.contact.dist.ctypes.data == getattr(contact, name)
     if not right:
-        raise FrictionError(f"MuJoCo {mujoco.__version__} lays out its data otherwise than it says")
+        raise FrictionError(f"MuJoCo {mujoco.__version__} stores its data in another way than it documents")
 
 
 _OTHERWISE = ("time", "ncon", "nefc", "contact", "efc_J_rownnz", "efc_J_rowadr", "efc_J_colind")
