@@ -97,7 +97,7 @@ def test_without_arguments_the_help_is_shown(capsys, monkeypatch):
         (["run", "in-hand", "--patch", "pad.csv"], "--cell-size must be given"),
         (
             ["run", "in-hand", "--patch", "Circle", "--cell-size", "0.001"],
-            "--cell-size must be given only for a pressure map",
+            "--cell-size must be given only for a pressure",
         ),
         (["run", "in-hand", "--t-end", "-1"], "--t-end must be > 0"),
         (["run", "in-hand", "--t-end", "nan"], "--t-end must be finite"),

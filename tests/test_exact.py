@@ -342,7 +342,7 @@ def test_models_store_it_as_a_table():
 @pytest.mark.parametrize(
     ("outline", "message"),
     [
-        ({"radii": [0.2, 0.1]}, "radii must be \(inner, outer\) with 0 <= inner < outer"),
+        ({"radii": [0.2, 0.1]}, r"radii must be \(inner, outer\) with 0 <= inner < outer"),
         ({"vertices": [(0.0, 0.0)]}, "vertices must hold at least 3 points"),
         ({"corners": []}, "outline must be a table with either vertices or radii"),
     ],

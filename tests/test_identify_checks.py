@@ -50,9 +50,9 @@ def angle_of(log):
 
 @pytest.mark.parametrize("signs", [(-1, -1, -1), (-1, -1, 1)])
 def test_friction_that_drives_the_motion_is_refused(log, signs):
-    words = "fx, fy and tau of the other sign" if signs[2] < 0 else "fx and fy of the other sign"
+    words = "fx, fy and tau of opposite sign" if signs[2] < 0 else "fx and fy of opposite sign"
     with pytest.raises(
-        InvalidValueError, match=rf"against its motion \(so it does with {words}\), got power > 0 in \d+ %"
+        InvalidValueError, match=rf"against its motion \(it does with {words}\), got power > 0 in \d+ %"
     ):
         identify_lugre(changed(log, wrench=signs), PATCH)
 
@@ -60,8 +60,8 @@ def test_friction_that_drives_the_motion_is_refused(log, signs):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"wrench": (1, 1, -1)}, "with tau of the other sign"),
-        ({"wrench": (1, -1, 1)}, "with fy of the other sign"),
+        ({"wrench": (1, 1, -1)}, "with tau of opposite sign"),
+        ({"wrench": (1, -1, 1)}, "with fy of opposite sign"),
         ({"twist": (1, -1, -1)}, "where z points down"),
         ({"twist": (1e3, 1e3, 1)}, "vx and vy in mm/s, or tau in N mm"),
         ({"twist": (1e2, 1e2, 1)}, "vx and vy in cm/s"),
@@ -72,7 +72,7 @@ def test_friction_that_drives_the_motion_is_refused(log, signs):
 )
 def test_directions_tell_signs_and_units(log, change, words):
     (finding, *_) = check_log(changed(log, **change), PATCH)
-    assert str(finding).startswith("wrench of log should point as friction on the patch does"), finding
+    assert str(finding).startswith("wrench of log should point in the direction of friction on the patch"), finding
     assert words in str(finding) and not finding.refuses
 
 
@@ -137,9 +137,12 @@ def test_sampling_against_the_corner_of_the_bristles(log):
 
 
 def test_findings_stand_beside_the_estimates(log):
-    """A torque of the other sign: said, and not refused."""
+    """A torque of opposite sign: said, and not refused."""
     found = identify_lugre(changed(log, wrench=(1, 1, -1)), PATCH, parameters=("mu_c",), start=LAW, starts=1)
-    assert any("fit: wrench of log should point as friction on the patch does" in str(each) for each in found.verdicts)
+    assert any(
+        "fit: wrench of log should point in the direction of friction on the patch" in str(each)
+        for each in found.verdicts
+    )
     slow = noisy(clean_log(*excitation(duration=1.0, rate=200.0)), 1)
     told = identify_lugre(slow, PATCH, parameters=("sigma_0", "sigma_1"), start=LAW, starts=1)
     assert any("samples of log should be taken at" in str(verdict) for verdict in told.verdicts)

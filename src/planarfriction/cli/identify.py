@@ -38,7 +38,7 @@ def identify(
     samples = sum(len(log.time) for log in logs)
     title = f"{', '.join(log.name for log in logs)}: {samples} samples, {patch.name}"
     print(title, "", found.table(), sep="\n")
-    note(f"{found.starts[0]} of {found.starts[1]} starts ended here")
+    note(f"{found.starts[0]} of {found.starts[1]} starting points led to this minimum")
     if folder is not None:
         _write(found, folder, output.slug(logs[0].name))
     return 0

@@ -35,7 +35,7 @@ def comparison(solutions: Mapping[str, Solution]) -> list[list[str]]:
         ["times faster than real time", *(_speed(each) for each in every)],
     ]
     if any(each.compile_time > 0.1 for each in statistics):
-        rows.append(["loading or compiling before it [s]", *(f"{each.compile_time:.3g}" for each in statistics)])
+        rows.append(["loading or compiling the solver [s]", *(f"{each.compile_time:.3g}" for each in statistics)])
     if any(each.status != FINISHED for each in every):
         rows.append(["ended", *(each.status for each in every)])
     return rows

@@ -196,7 +196,7 @@ def check_work(log: Log, sliding: Sliding) -> Finding | None:
     if len(power) < LEAST or power[power > 0.0].sum() <= AGAINST * np.abs(power).sum():
         return None
     _, words = _best_reading(sliding)
-    rule = f"act on the moving body, against its motion (so it does {words})"
+    rule = f"act on the moving body, against its motion (it does {words})"
     found = f"power > 0 in {100.0 * np.mean(power > 0.0):.4g} % of the samples that slide"
     return Finding(f"wrench of {log.name}", rule, found, refuses=True)
 
@@ -216,8 +216,8 @@ def check_directions(log: Log, sliding: Sliding, size: float) -> Finding | None:
         found = angle, f"with a contact radius of {1e3 * scale * size:.3g} mm in place of {1e3 * size:.3g} mm{hint}"
     if found[0] > BETTER * as_read:
         return None
-    text = f"{as_read:.0f} deg off in the median, and {found[0]:.0f} deg {found[1]}"
-    return Finding(f"wrench of {log.name}", "point as friction on the patch does", text)
+    text = f"a median deviation of {as_read:.0f} deg, and {found[0]:.0f} deg {found[1]}"
+    return Finding(f"wrench of {log.name}", "point in the direction of friction on the patch", text)
 
 
 def _best_reading(sliding: Sliding) -> tuple[float, str]:
@@ -229,13 +229,13 @@ def _readings(sliding: Sliding) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
     """Ways in which a log may have been written: words, twist and wrench as they then are."""
     twist, wrench, turned = sliding.twist, sliding.wrench, sliding.turned
     for words, signs in (
-        ("with fx, fy and tau of the other sign", (-1, -1, -1)),
-        ("with fx and fy of the other sign", (-1, -1, 1)),
-        ("with tau of the other sign", (1, 1, -1)),
-        ("with fx of the other sign", (-1, 1, 1)),
-        ("with fy of the other sign", (1, -1, 1)),
-        ("with fy and tau of the other sign, as where z points down", (1, -1, -1)),
-        ("with fx and tau of the other sign, as where z points down", (-1, 1, -1)),
+        ("with fx, fy and tau of opposite sign", (-1, -1, -1)),
+        ("with fx and fy of opposite sign", (-1, -1, 1)),
+        ("with tau of opposite sign", (1, 1, -1)),
+        ("with fx of opposite sign", (-1, 1, 1)),
+        ("with fy of opposite sign", (1, -1, 1)),
+        ("with fy and tau of opposite sign, as if z points down", (1, -1, -1)),
+        ("with fx and tau of opposite sign, as if z points down", (-1, 1, -1)),
     ):
         yield words, twist, wrench * signs
     if np.ptp(turned) > LEAST_TURN:
@@ -263,7 +263,7 @@ def check_times(log: Log, size: float) -> Finding | None:
     speed = float(np.quantile(np.linalg.norm(log.twist * [1, 1, size], axis=1), 0.9))
     way = speed * log.interval
     seen = (
-        f"{1e3 * way:.3g} mm between two samples {log.interval:.3g} s apart, on a contact radius of {1e3 * size:.3g} mm"
+        f"{1e3 * way:.3g} mm between samples {log.interval:.3g} s apart, with a contact radius of {1e3 * size:.3g} mm"
     )
     if log.interval >= SLOW and way > TRAVEL * size:
         return Finding(f"t of {log.name}", "be in s", f"{seen}: is it in ms?")
@@ -283,7 +283,7 @@ def check_friction(log: Log, size: float) -> Finding | None:
     torque = np.abs(log.wrench[loaded, 2]) / (size * log.normal_force[loaded])
     force, torque = float(np.quantile(force, 0.9)), float(np.quantile(torque, 0.9))
     if force > HIGH:
-        text = f"friction of {force:.3g} times the load: is normal_force in kg or in kN?"
+        text = f"friction of {force:.3g} times the load: is normal_force in kg or kN?"
         return Finding(f"normal_force of {log.name}", "be in N", text)
     if torque > HIGH:
         text = f"a torque of {torque:.3g} times the load and the contact radius: is it in N mm, or about another point?"
@@ -297,7 +297,7 @@ def check_unloaded(log: Log, size: float) -> Finding | None:
     bare = log.normal_force == 0.0
     if bare.sum() < LEAST or not np.median(force[bare]) > STRONG * np.quantile(force, 0.95):
         return None
-    text = f"friction of {np.median(force[bare]):.3g} N there: has the load cell an offset?"
+    text = f"friction of {np.median(force[bare]):.3g} N there: does the load cell have an offset?"
     return Finding(
         f"normal_force of {log.name}", f"be > 0 where there is friction (it is 0 in {bare.sum()} samples)", text
     )
@@ -310,7 +310,7 @@ def check_loads(logs: Sequence[Log], names: Sequence[str]) -> list[Finding]:
     if not wanted or loads.max() > (1.0 + ALIKE) * loads.min():
         return []
     which = ", ".join(wanted)
-    return [Finding("normal_force", f"differ from log to log to show {which}", f"{loads.mean():.4g} N throughout")]
+    return [Finding("normal_force", f"differ between logs to determine {which}", f"{loads.mean():.4g} N throughout")]
 
 
 def check_sampling(log: Log, sigma_0: float, sigma_1: float) -> Finding | None:
@@ -320,9 +320,7 @@ def check_sampling(log: Log, sigma_0: float, sigma_1: float) -> Finding | None:
     corner, rate = sigma_0 / (2.0 * np.pi * sigma_1), 1.0 / log.interval
     if rate >= 2.0 * corner:
         return None
-    rule = (
-        f"be taken at {2.0 * corner:.3g} Hz or more to show sigma_1 (corner sigma_0/(2 pi sigma_1) at {corner:.3g} Hz)"
-    )
+    rule = f"be taken at {2.0 * corner:.3g} Hz or more to determine sigma_1 (corner frequency sigma_0/(2 pi sigma_1): {corner:.3g} Hz)"
     return Finding(f"samples of {log.name}", rule, f"{rate:.3g} Hz")
 
 

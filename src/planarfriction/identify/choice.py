@@ -56,5 +56,5 @@ def dependence(name: str, interval: tuple[float, float], chosen: ModelScore, oth
     low, high = interval
     for other in others:
         if other.model != chosen.model and not other.rejected and not low <= other.estimates[name] <= high:
-            return f"depends on the model: {other.model}, which fits too, has {other.estimates[name]:.3g}"
+            return f"depends on the model: {other.model}, which also fits, gives {other.estimates[name]:.3g}"
     return ""

@@ -316,9 +316,11 @@ class _Fit:
                 )
             elif vague and name != "sigma_2":
                 verdicts.append(
-                    Verdict(name, False, f"its standard error is {100 * errors[i] / abs(values[i]):.0f} % of it")
+                    Verdict(
+                        name, False, f"its standard error is {100 * errors[i] / abs(values[i]):.0f} % of the estimate"
+                    )
                 )
         count = int((self.weights > 0.0).sum())
         if count < 10:
-            verdicts.append(Verdict("fit", False, f"errors from {count} slides only"))
+            verdicts.append(Verdict("fit", False, f"the errors come from only {count} slides"))
         return (*verdicts, *verdicts_on_turns(self.slides))

@@ -108,7 +108,9 @@ def verdicts_on_slides(
     less = [slides[i].name for i in np.flatnonzero((weighed > 0.0) & (weighed < 1.0)).tolist()]
     if less:
         found.append(
-            Verdict("fit", True, f"{', '.join(less[:5])}{' ...' if len(less) > 5 else ''} count less: far off")
+            Verdict(
+                "fit", True, f"{', '.join(less[:5])}{' ...' if len(less) > 5 else ''} have less weight: large residuals"
+            )
         )
     known = np.isfinite(spread) & (spread > 0.0)
     share = np.divide(np.abs(moved), spread, out=np.zeros_like(moved), where=known & np.ones_like(moved, dtype=bool))

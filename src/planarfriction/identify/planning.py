@@ -75,7 +75,7 @@ class MotionPlan(ByValue):
     def table(self) -> str:
         """Text in 80 columns: the gain of each motion and the parameter it leaves least certain; the errors before and
         after the best one."""
-        lines = [f"{'motion':<38}{'gain [bit]':>10}   {'least known after it'}"]
+        lines = [f"{'motion':<38}{'gain [bit]':>10}   {'least certain afterwards'}"]
         for motion, gain, errors in zip(self.motions, self.gains, self.errors, strict=True):
             at = int(np.argmax(errors / self._sizes))
             lines.append(f"{motion.name[:37]:<38}{gain:>10.1f}   {self.names[at]}, {self._share(errors, at)}")
@@ -83,7 +83,7 @@ class MotionPlan(ByValue):
         for i, (name, value) in enumerate(zip(self.names, self.values, strict=True)):
             before, then = self._share(self.errors_so_far, i), self._share(self.errors[0], i)
             after.append(f"{name:<18}{value:>11.4g}   {before:>14}   {then:>14}   {ALL[name].unit}")
-        first = textwrap.fill(f"Move next: {self.best.name}.", WIDTH)
+        first = textwrap.fill(f"Next motion to measure: {self.best.name}.", WIDTH)
         return "\n\n".join([first, "\n".join(lines), "\n".join(after)])
 
     def __str__(self) -> str:

@@ -178,8 +178,13 @@ class Identification(ByValue):
             f"{_short(each):<27}{each.value:>11.3g}   {each.interval[0]:.3g} .. {each.interval[1]:.3g} {each.unit}"
             for each in self.rig
         ]
-        blocks = [self.summary(), "\n".join([heading, *lines]), "\n".join(remarks), "\n".join(["Of the rig:", *rig])]
-        return "\n\n".join(block for block in blocks if block and block != "Of the rig:")
+        blocks = [
+            self.summary(),
+            "\n".join([heading, *lines]),
+            "\n".join(remarks),
+            "\n".join(["Disturbances of the rig:", *rig]),
+        ]
+        return "\n\n".join(block for block in blocks if block and block != "Disturbances of the rig:")
 
     def __str__(self) -> str:
         return self.table()

@@ -43,7 +43,7 @@ class Fit:
     spread: list[np.ndarray]
     """Spread of each sample `[T, 3]` of each log."""
     starts: tuple[int, int]
-    """How many starts ended here, and how many there were."""
+    """How many starting points led to this minimum, and how many there were."""
     cost: float
     """Half the sum of the squared residuals."""
 

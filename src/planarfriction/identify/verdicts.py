@@ -92,16 +92,24 @@ def judge(
         text = f"{chosen.model} predicts held-out parts best, to {chosen.held_out:.3g} times the noise; {told}"
         verdicts.append(Verdict("fit", True, text))
     if skipped:
-        verdicts.append(Verdict("fit", True, f"{', '.join(skipped)}: not tried, as it would take minutes (ask for it)"))
+        verdicts.append(
+            Verdict(
+                "fit",
+                True,
+                f"{', '.join(skipped)}: not tried, because it would take minutes (choose it as model to try it)",
+            )
+        )
     if not evidence.torque:
-        text = "tau is 0 throughout, as of a rig without a torque sensor: the estimates follow from the force alone"
+        text = "tau is 0 throughout, as without a torque sensor: the estimates use the force alone"
         verdicts.append(Verdict("fit", True, text))
     for i, name in enumerate(evidence.names):
         verdict = _parameter(evidence, i)
         if verdict is None or verdict.identifiable:
             low, high = interval(name, evidence.values[i], evidence.errors[i])
             if u.rejected:
-                verdict = Verdict(name, False, f"{chosen.model} does not explain the data, so this follows its error")
+                verdict = Verdict(
+                    name, False, f"{chosen.model} does not explain the data, so this estimate is not meaningful"
+                )
             elif reason := dependence(name, (low, high), chosen, scores):
                 verdict = Verdict(name, False, reason)
         if verdict is not None:
@@ -113,16 +121,18 @@ def _on_fit(u: Uncertainty, chosen: ModelScore) -> str:
     """The test of the fit in words."""
     size = np.sqrt(u.excess)
     if not u.rejected:
-        return f"{chosen.model} explains the data: what it leaves is {size:.2f} times the noise of the sensors"
+        return f"{chosen.model} explains the data: its residuals are {size:.2f} times the noise of the sensors"
     if u.excess > u.limit:
-        text = f"{chosen.model} is rejected: what it leaves is {size:.2f} times the noise of the sensors, where "
-        text += f"{np.sqrt(u.limit):.2f} may be chance"
+        text = f"{chosen.model} is rejected: its residuals are {size:.2f} times the noise of the sensors, and "
+        text += f"chance explains at most {np.sqrt(u.limit):.2f}"
     else:
-        usual = f"off by {u.strain:.0f} times what is usual"
+        usual = f"off by {u.strain:.0f} times the usual error"
         text = f"{chosen.model} is rejected: it fits only with a load cell that is {usual}"
     if u.neighbours > CORRELATED:
         text += f", and neighbouring residuals are correlated ({u.neighbours:.2f})"
-    return f"{text}; the patch, the kind of bristles or the measurement is off, and intervals are no more than a hint"
+    return (
+        f"{text}; the patch, the kind of bristles or the measurement is wrong, and the intervals are only a rough guide"
+    )
 
 
 def _parameter(evidence: Evidence, i: int) -> Verdict | None:
@@ -148,7 +158,7 @@ def _parameter(evidence: Evidence, i: int) -> Verdict | None:
     if (partner := _partner(evidence, i)) is not None:
         other, correlation = partner
         if not evidence.torque and not {name, other}.isdisjoint(OF_TORQUE):
-            text = f"cannot be separated from {other} (correlation {correlation:.2f}): that takes the torque"
+            text = f"cannot be separated from {other} (correlation {correlation:.2f}) without the torque"
             return Verdict(name, False, f"{text}, and tau is 0 throughout")
         if error > WELL * size:
             return Verdict(name, True, f"strongly correlated with {other} ({correlation:.2f})")
@@ -168,10 +178,10 @@ def _why(evidence: Evidence, i: int, seen: float) -> str:
     if name in OF_TORQUE and not evidence.torque:
         return "only the torque depends on it, and tau is 0 throughout"
     if seen < UNSEEN:
-        return f"moves no sample by more than {seen:.2g} times the noise"
+        return f"changes no sample by more than {seen:.2g} times the noise"
     if (partner := _partner(evidence, i)) is not None:
         return f"cannot be separated from {partner[0]} (correlation {partner[1]:.2f})"
-    return f"its standard error is {100 * evidence.errors[i] / abs(evidence.values[i]):.0f} % of it"
+    return f"its standard error is {100 * evidence.errors[i] / abs(evidence.values[i]):.0f} % of the estimate"
 
 
 def _no_stribeck(evidence: Evidence) -> str:

@@ -68,10 +68,10 @@ class PushReport:
     """Computing time of the plan [s]."""
 
     def __str__(self) -> str:
-        rows = (("wanted", self.goal), ("reached", self.end), ("with an ellipsoid", self.ellipsoid_end))
+        rows = (("goal", self.goal), ("reached", self.end), ("with an ellipsoid", self.ellipsoid_end))
         lines = [f"{'':18}{'x [mm]':>10}{'y [mm]':>10}{'turn [deg]':>12}"]
         lines += [f"{name:18}{1e3 * x:>10.2f}{1e3 * y:>10.2f}{math.degrees(a):>12.2f}" for name, (x, y, a) in rows]
-        lines += [f"{1e3 * self.length:.4g} mm along edge {self.edge}, {self.used:.0%} of the friction cone."]
+        lines += [f"{1e3 * self.length:.4g} mm long, on edge {self.edge}, using {self.used:.0%} of the friction cone."]
         return "\n".join(lines)
 
 

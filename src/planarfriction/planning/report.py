@@ -57,15 +57,13 @@ class GripReport(ByValue):
         else:
             wanted = "slide by ({:.4g}, {:.4g}) mm".format(*(1e3 * np.array(self.goal["slide"])))
             per = f"{1e3 * self.per_percent:.2g} mm"
-        lines = [f"Grip plan: {wanted}", ""]
+        lines = [f"Grip plan: {wanted}.", ""]
         lines += [f"{'friction':>9}{'turn [deg]':>13}{'slide x [mm]':>15}{'slide y [mm]':>15}"]
         for factor, angle, (x, y) in zip(self.frictions, self.angles, self.slides, strict=True):
-            change = f"{100.0 * (factor - 1.0):+.3g} %" if factor != 1.0 else "as is"
+            change = f"{100.0 * (factor - 1.0):+.3g} %" if factor != 1.0 else "nominal"
             lines.append(f"{change:>9}{np.rad2deg(angle):>13.3f}{1e3 * x:>15.3f}{1e3 * y:>15.3f}")
-        lines += ["", f"One percent of friction moves the end by {per}."]
-        lines += [
-            f"At the end the grip is {self.grip:.3g} N, {self.grip / self.holding:.2f} times what holds the body."
-        ]
+        lines += ["", f"An error of one percent in friction changes the result by {per}."]
+        lines += [f"The final grip is {self.grip:.3g} N, {self.grip / self.holding:.2f} times the holding force."]
         lines += [f"{self.simulations} simulations, {self.jacobians} Jacobians, {self.wall_time:.2g} s."]
         return "\n".join(lines)
 
