@@ -97,11 +97,7 @@ def test_the_report_says_what_friction_does():
     assert report.per_percent == pytest.approx((report.angles[3] - report.angles[1]) / 2)
     assert report.spread == pytest.approx(np.abs(report.angles + HALF).max())
     shown = repr(turning())
-    assert (
-        "turn by -30 degrees" in shown
-        and "+5 %" in shown
-        and "An error of one percent in friction changes the result by" in shown
-    )
+    assert "turn by -30 degrees" in shown and "+5 %" in shown and "An error of one percent" in shown
 
 
 @pytest.mark.slow

@@ -107,7 +107,7 @@ def test_what_the_logs_tell_replaces_the_guess(slide):
 
 def test_the_table_fits_80_columns(motions):
     text = str(plan(motions.values()))
-    assert text.startswith("Move next: ") and max(map(len, text.splitlines())) <= 80
+    assert text.startswith("Next motion to measure: ") and max(map(len, text.splitlines())) <= 80
     assert all(name in text for name in (*motions, "sigma_1"))
 
 
@@ -178,7 +178,7 @@ def test_the_command_writes_a_motion_that_identify_reads(tmp_path, slide, capsys
     out = tmp_path / "next.csv"
     options = ["--patch", "disc", "--duration", "0.5", "--speed", "0.03", "--spin", "2", "--out", str(out)]
     assert main(["identify", "plan", str(tmp_path / "slide.csv"), *options, "--parameters", "mu_c,contact_radius"]) == 0
-    assert capsys.readouterr().out.startswith("Move next: ")
+    assert capsys.readouterr().out.startswith("Next motion to measure: ")
     motion = Log.from_csv(out)
     assert len(motion.time) == 500 and motion.twist.any() and np.abs(motion.twist[:, 2]).max() <= 2.0
     assert np.allclose(motion.normal_force, LOAD)

@@ -262,9 +262,7 @@ def check_times(log: Log, size: float) -> Finding | None:
     """A contact moves a small part of its size between two samples; more points to mm/s, or to times in ms."""
     speed = float(np.quantile(np.linalg.norm(log.twist * [1, 1, size], axis=1), 0.9))
     way = speed * log.interval
-    seen = (
-        f"{1e3 * way:.3g} mm between samples {log.interval:.3g} s apart, with a contact radius of {1e3 * size:.3g} mm"
-    )
+    seen = f"{1e3 * way:.3g} mm between samples {log.interval:.3g} s apart, contact radius {1e3 * size:.3g} mm"
     if log.interval >= SLOW and way > TRAVEL * size:
         return Finding(f"t of {log.name}", "be in s", f"{seen}: is it in ms?")
     if speed > SPEEDY or way > size:
@@ -320,7 +318,8 @@ def check_sampling(log: Log, sigma_0: float, sigma_1: float) -> Finding | None:
     corner, rate = sigma_0 / (2.0 * np.pi * sigma_1), 1.0 / log.interval
     if rate >= 2.0 * corner:
         return None
-    rule = f"be taken at {2.0 * corner:.3g} Hz or more to determine sigma_1 (corner frequency sigma_0/(2 pi sigma_1): {corner:.3g} Hz)"
+    rule = f"be taken at {2.0 * corner:.3g} Hz or more to determine sigma_1"
+    rule += f" (corner frequency sigma_0/(2 pi sigma_1): {corner:.3g} Hz)"
     return Finding(f"samples of {log.name}", rule, f"{rate:.3g} Hz")
 
 

@@ -316,9 +316,7 @@ class _Fit:
                 )
             elif vague and name != "sigma_2":
                 verdicts.append(
-                    Verdict(
-                        name, False, f"its standard error is {100 * errors[i] / abs(values[i]):.0f} % of the estimate"
-                    )
+                    Verdict(name, False, f"standard error {100 * errors[i] / abs(values[i]):.0f} % of the estimate")
                 )
         count = int((self.weights > 0.0).sum())
         if count < 10:

@@ -96,7 +96,7 @@ def judge(
             Verdict(
                 "fit",
                 True,
-                f"{', '.join(skipped)}: not tried, because it would take minutes (choose it as model to try it)",
+                f"{', '.join(skipped)}: not tried, would take minutes (choose it as model)",
             )
         )
     if not evidence.torque:
@@ -108,7 +108,7 @@ def judge(
             low, high = interval(name, evidence.values[i], evidence.errors[i])
             if u.rejected:
                 verdict = Verdict(
-                    name, False, f"{chosen.model} does not explain the data, so this estimate is not meaningful"
+                    name, False, f"{chosen.model} does not explain the data, so this value has no meaning"
                 )
             elif reason := dependence(name, (low, high), chosen, scores):
                 verdict = Verdict(name, False, reason)
@@ -181,7 +181,7 @@ def _why(evidence: Evidence, i: int, seen: float) -> str:
         return f"changes no sample by more than {seen:.2g} times the noise"
     if (partner := _partner(evidence, i)) is not None:
         return f"cannot be separated from {partner[0]} (correlation {partner[1]:.2f})"
-    return f"its standard error is {100 * evidence.errors[i] / abs(evidence.values[i]):.0f} % of the estimate"
+    return f"standard error {100 * evidence.errors[i] / abs(evidence.values[i]):.0f} % of the estimate"
 
 
 def _no_stribeck(evidence: Evidence) -> str:
