@@ -38,7 +38,7 @@ def test_ctrl_c_before_the_first_sample_is_no_traceback(monkeypatch, capsys):
 
 @pytest.fixture
 def simulated(monkeypatch) -> list[tuple[pf.Scene, dict]]:
-    """Put a stand-in in the place of `simulate`; returns what it was asked for."""
+    """Replace `simulate` by a stand-in; returns what it was asked for."""
     calls = []
 
     def simulate(scene, *, progress=None, **options):

@@ -179,7 +179,7 @@ def test_soft_finger_constants_from_three_loads():
     assert "one load only" in one.table()
 
 
-# ------------------------------------------------------------------------------------------------ what cannot be told
+# ------------------------------------------------------------------------------------- what cannot be determined
 
 
 def verdict(found, name):

@@ -77,7 +77,7 @@ class Made:
 
 @pytest.fixture
 def made(monkeypatch):
-    """Two made-up experiments in the place of the real ones."""
+    """Two made-up experiments instead of the real ones."""
     for name in list(experiments.EXPERIMENTS):
         monkeypatch.delitem(experiments.EXPERIMENTS, name)
     pair = Made("first"), Made("second")

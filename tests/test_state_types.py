@@ -1,4 +1,4 @@
-"""States and twists of other types: converted or refused before compiled code sees them, which never compiles anew."""
+"""States and twists of other types: converted or refused before compiled code sees them, which never compiles again."""
 
 from __future__ import annotations
 

@@ -113,7 +113,7 @@ MAKERS = {
 def test_objects_of_equal_content_are_equal_however_they_came(name):
     made = MAKERS[name]()
     others = {
-        "made anew": MAKERS[name](),
+        "made again": MAKERS[name](),
         "copied": copy.copy(made),
         "copied deeply": copy.deepcopy(made),
         "from a pickle": pickle.loads(pickle.dumps(made)),

@@ -1,8 +1,11 @@
-"""One vocabulary: models, methods and roll-outs bear the same names, with the same arguments, in every front end."""
+"""One vocabulary: the same names and arguments in every front end, and plain English in everything that is read."""
 
 from __future__ import annotations
 
 import inspect
+import re
+from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
@@ -10,6 +13,27 @@ import planarfriction as pf
 
 MODELS = ("DistributedModel", "ReducedModel", "ReducedModelPublished")
 ARGUMENTS = ["state", "twist", "normal_force", "dt"]
+
+ROOT = Path(__file__).parents[1]
+READ = ("*.md", "*.py", "*.j2", "*.ipynb", "*.toml")
+"""Files whose words somebody reads: pages, sources with their docstrings and messages, templates, notebooks."""
+
+STILTED = {
+    r"\banew\b": "again",
+    r"\bfor ever\b": "indefinitely, or leave it out",
+    r"\bin the place of\b": "instead of, or replaces",
+    r"\bhangs? together\b": "are correlated, or are related",
+    r"\btold (together|poorly)\b": "determined, or distinguished",
+    r"\b(not|cannot be|can be|be) told( from)?\b": "distinguished, or determined",
+    r"\brest bristles\b": "relaxed bristles",
+    r"\b(has|have|had) a say\b": "matters, or influences",
+    r"\bgoes on where\b": "continues",
+    r"\bso that (nobody|somebody|no one) has to\b": "say what it does for the reader",
+    r"\bof the other sign\b": "of opposite sign",
+    r"\bbreak(s|ing)? off and\b|\bbroken off\b": "interrupt",
+    "\N{EM DASH}": "a comma, a colon or a full stop",
+}
+"""Phrases that a native speaker would not write here, and what to write."""
 
 
 def front_ends() -> list:
@@ -59,3 +83,27 @@ def test_roll_outs_take_the_same_arguments_and_begin_with_the_same_results():
     for end in ends[1:]:
         assert not hasattr(end, "simulate")  # that is for scenes
         assert {"parameters", "method"} <= set(inspect.signature(end.rollout).parameters)
+
+
+def pages_and_sources() -> Iterator[Path]:
+    """Everything that is read; compiled sources are left out, as a changed comment compiles all of them again."""
+    yield from (ROOT / name for name in ("README.md", "CHANGELOG.md", "CONTRIBUTING.md", "pyproject.toml"))
+    for folder in ("docs", "examples", "src", "tests"):
+        for pattern in READ:
+            yield from (ROOT / folder).rglob(pattern)
+
+
+def test_no_page_docstring_or_message_is_stilted():
+    found, number = [], 0
+    for path in pages_and_sources():
+        inside = path.relative_to(ROOT)
+        if path == Path(__file__) or "kernels" in inside.parts or not path.is_file():
+            continue
+        number += 1
+        text = path.read_text(encoding="utf-8")
+        for pattern, better in STILTED.items():
+            for match in re.finditer(pattern, text, re.IGNORECASE):
+                line = text.count("\n", 0, match.start()) + 1
+                found.append(f"{inside}:{line}: {match[0]!r}: {better}")
+    assert number > 300
+    assert not found, "\n".join(found)

@@ -20,7 +20,7 @@ LINKS = {
 
 
 def rewrite(app: Sphinx, name: str, source: list[str]) -> None:
-    """Put the file in the place of its page, and make links lead to pages."""
+    """Replace the page by its file, and make links lead to pages."""
     if name in PAGES:
         path = Path(app.srcdir).parent / PAGES[name]
         app.env.note_dependency(path)

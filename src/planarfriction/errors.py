@@ -38,7 +38,7 @@ class _Travels:
     """Errors go through pickles, and so between processes, with their attributes."""
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # By default an error is made anew from its message alone, which these constructors do not take.
+        # By default an error is restored from its message alone, which these constructors do not take.
         kept = {name: value if _can_travel(value) else None for name, value in self.__dict__.items()}
         return _restored, (type(self), self.args, kept)  # pyright: ignore[reportAttributeAccessIssue]
 

@@ -278,5 +278,5 @@ def targets() -> list[Target]:
 
 
 def made(argument: Any) -> Any:
-    """The argument, made anew where it is a recipe."""
+    """The argument, made again where it is a recipe."""
     return argument.make() if isinstance(argument, Fresh) else argument

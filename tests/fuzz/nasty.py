@@ -1,4 +1,4 @@
-"""What people, files and other libraries hand over in the place of a number, an array, a name or an object."""
+"""What people, files and other libraries pass instead of a number, an array, a name or an object."""
 
 from __future__ import annotations
 
@@ -232,7 +232,7 @@ _ARRAYS = st.builds(
 
 
 def nasty() -> st.SearchStrategy[tuple[str, Callable[[], Any]]]:
-    """What it is called, and how to make it anew (a generator can be used once)."""
+    """Its name, and how to make it again (a generator can be used once)."""
     listed = st.sampled_from(sorted(NASTY.items()))
     drawn = (_NUMBERS | _NESTED | _ARRAYS).map(lambda value: (f"{type(value).__name__} {value!r:.60}", lambda: value))
     return st.one_of(listed, listed, drawn)

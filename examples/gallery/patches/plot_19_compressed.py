@@ -1,5 +1,5 @@
 """
-A few cells in the place of many
+A few cells instead of many
 ================================
 
 45 of 441 cells, with new weights, keep every moment of the pressure up to the fifth degree, and nearly the limit

@@ -66,7 +66,7 @@ class Knots:
         """For each knot what a change of one there adds to the signal."""
         before = times if hold == "previous" else np.append(0.0, times[:-1])
         self.begins = np.append(0.0, before[1:])
-        """When each knot begins to have a say [s]."""
+        """When each knot begins to have an effect [s]."""
 
 
 def _refuse_shapes(scene: Scene, parameters: Any, signals: Mapping[str, Any]) -> None:
@@ -178,7 +178,7 @@ class Columns:
         self._hats = [knots.hats.pieces(system.motion.breaks) for knots in self._knots]
 
     def at(self, piece: int, end: float) -> Drives:
-        """The numbers that have a say on a piece of the window, which ends at `end` [s]."""
+        """The numbers that affect a piece of the window, which ends at `end` [s]."""
         count = int(np.searchsorted(self._begin, end - SAME_TIME))
         drives = self._drives
         for (start, slope), (column, knot) in zip(self._hats, self._sources, strict=True):

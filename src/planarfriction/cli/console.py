@@ -62,10 +62,11 @@ def note(text: str) -> None:
 
 
 def print_table(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    """Print a table on stdout; the first column holds names, the others numbers."""
+    """Print a table on stdout: columns with numbers are aligned on the right, words on the left."""
     table = Table(title=title, title_justify="left", title_style="bold", header_style="bold")
     for number, heading in enumerate(headings):
-        table.add_column(heading, justify="left" if number == 0 else "right", overflow="fold")
+        numbers = number > 0 and any(character.isdigit() for row in rows for character in row[number][:2])
+        table.add_column(heading, justify="right" if numbers else "left", overflow="fold")
     for row in rows:
         table.add_row(*row)
     console = Console(markup=False, highlight=False)  # units in brackets are no markup

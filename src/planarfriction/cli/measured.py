@@ -21,8 +21,8 @@ def show_list() -> None:
     from planarfriction.measured.tasks import TASKS
 
     rows = [[name, entry.words, "" if entry.installed else f"[{entry.extra}]"] for name, entry in LIBRARY.items()]
-    print_table("Models", ["name", "what it is", "needs"], rows)
-    print_table("Tasks", ["name", "what is asked"], [[task.name, task.title] for task in TASKS.values()])
+    print_table("Models", ["name", "description", "needs"], rows)
+    print_table("Tasks", ["name", "description"], [[task.name, task.title] for task in TASKS.values()])
 
 
 def measured(

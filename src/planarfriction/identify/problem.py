@@ -28,7 +28,7 @@ COARSE = 0.2
 """Error that the steps make, as a share of a standard error, above which they are halved."""
 
 TOLD = 0.3
-"""Standard error, as a share of an estimate, up to which that estimate has a say in this."""
+"""Standard error, as a share of an estimate, up to which that estimate is used for this."""
 
 FINEST = 32
 """Most steps between two samples."""

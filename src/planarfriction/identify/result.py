@@ -255,4 +255,6 @@ def _sentence(text: str) -> str:
 
 def _short(each: Nuisance) -> str:
     """Name of a quantity of the rig, with its log."""
-    return f"{each.name} ({each.log})"[:26] if each.log else each.name
+    room = 24 - len(each.name)
+    log = each.log if len(each.log) <= room else f"{each.log[: max(room - 2, 0)]}.."
+    return f"{each.name} ({log})" if log else each.name

@@ -152,7 +152,7 @@ class DistributedSimulator(ScaledSimulator):
 
 
 class ReducedSimulator(ScaledSimulator):
-    """`ReducedModel`, whose map is built anew for each Stribeck exponent."""
+    """`ReducedModel`, whose map is rebuilt for each Stribeck exponent."""
 
     name = "reduced"
     changes: Mapping[str, float] = {"gamma": 1e-3}

@@ -30,18 +30,18 @@ class Entry(NamedTuple):
 
 
 LIBRARY = {
-    "uncoupled": Entry(lambda: UncoupledModel(False), "force and torque each as if the other were not there"),
-    "independent torsion": Entry(lambda: UncoupledModel(True), "the same with a fitted lever of the torque"),
+    "uncoupled": Entry(lambda: UncoupledModel(False), "separate limits of force and torque"),
+    "independent torsion": Entry(lambda: UncoupledModel(True), "the same with a fitted lever arm of the torque"),
     "ellipsoid": Entry(lambda: SurfaceModel(LimitSurfaceEllipsoid), "an ellipsoid as limit surface"),
     "quartic": Entry(lambda: SurfaceModel(LimitSurfaceQuartic), "a convex quartic of the patch", "cvxpy", "quartic"),
     "quartic of pushes": Entry(PushedQuartic, "a convex quartic fitted to the training pushes", "cvxpy", "quartic"),
     "exact surface": Entry(lambda: SurfaceModel(LimitSurfaceExact), "the limit surface of the patch itself"),
     "reduced": Entry(lambda: BristleModel(ReducedModel), "ReducedModel, stiff bristles"),
     "distributed": Entry(lambda: BristleModel(DistributedModel), "DistributedModel, stiff bristles"),
-    "mu(v) and radius": Entry(SpeedModel, "friction that grows with the speed, a fitted radius (slides only)"),
-    "toss by toss": Entry(TossModel, "the same, friction, radius and centre of each toss its own (slides only)"),
+    "mu(v) and radius": Entry(SpeedModel, "exact surface, friction that grows with speed, fitted radius (slides only)"),
+    "toss by toss": Entry(TossModel, "the same with the friction, radius and centre of each toss (slides only)"),
     "MuJoCo box": Entry(
-        MujocoBox, "MuJoCo's own contact of a box, elliptic, condim 3 (slides only)", "mujoco", "mujoco"
+        MujocoBox, "MuJoCo's own contact of a box, elliptic cone, condim 3 (slides only)", "mujoco", "mujoco"
     ),
 }
 """Models by name, from the simplest on."""

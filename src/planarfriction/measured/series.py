@@ -32,7 +32,7 @@ DOCUMENTED = (
 """Runs whose names say three outer feet; in the others these feet are an assumption."""
 
 WINDOW, EVERY = 0.25, 6
-"""Half width of the Hann window over the force [s]; every sixth row that slides is scored: they hang together."""
+"""Half width of the Hann window over the force [s]; every sixth sliding row is scored: neighbours are correlated."""
 
 MEASURES = (
     Measure("twist_named_deg", "twist, named feet [deg]", mean, "twists named"),

@@ -37,6 +37,6 @@ def _task(name: str, title: str, module: ModuleType) -> Task:
 TASKS = {
     "slides": _task("slides", "Free slides of a cube: path and end from the first 8 poses", slides),
     "pushes": _task("pushes", "Slow pushes on known feet: angle to the measured twist", pushes),
-    "series": _task("series", "Pushes in time: angles to the measured twist and wrench on the way", series),
+    "series": _task("series", "Pushes over time: angles to the measured twist and wrench", series),
 }
 """Task by name."""

@@ -5,7 +5,7 @@ its way, with the contact radius `r e^b`; `a`, `c` and `b` differ from toss to t
 With a start and these three free, the first poses are fitted by least squares with the spreads as priors.
 
 The poses miss the model for two reasons: the camera, and pushes that the model does not know, strong right after the
-cube has landed. Pushes make errors that hang together, so the poses are weighed with the covariance that white pushes
+cube has landed. Pushes make errors that are correlated, so the poses are weighed with the covariance that white pushes
 of intensity `q_0^2 exp(-t/tau) + q_1^2` leave behind, seen from the last of them.
 """
 

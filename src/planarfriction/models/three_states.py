@@ -36,7 +36,7 @@ _ARRAY, _FLOAT, _EMPTY = np.ndarray, np.dtype(float), np.empty
 _TRUTH = frozenset((bool, np.bool_))
 
 _HERE_ALONE = ("_fixed", "_contacts", "_quick", "_fixed_records", "_recent")
-"""What a copy makes anew: addresses hold in this process, and memories are shared by threads, not by models."""
+"""What a copy makes again: addresses hold in this process, and memories are shared by threads, not by models."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,7 @@
 """A few cells that represent many: same moments of the pressure, same wrench of a spin, nearly the same limit surface.
 
 Start from all cells and drop those with the least weight, a tenth at a time. After each round the weights x that are
-left are found anew, as near as possible to the limit surface of the weights w of all cells:
+left are computed again, as near as possible to the limit surface of the weights w of all cells:
 
     minimise sum_k (Phi_k(x)/Phi_k(w) - 1)^2   subject to   sum x p(rho) = sum w p(rho) for all p up to the degree
 

@@ -31,7 +31,7 @@ INTEGRATORS = {
 }
 
 PASSES = 4
-"""How often a step is solved anew where other constraints have become active through it."""
+"""How many times a step is solved again because it has activated other constraints."""
 
 SLACK = 1e-10
 """Speed [m/s] to which the active constraints have to hold."""

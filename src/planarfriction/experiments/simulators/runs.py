@@ -31,7 +31,7 @@ against slip besides; and with stiffer contacts besides, which hold best while t
 FRICTIONLESS = Native(condim=1)
 
 PATCHES = "patches"
-"""Our friction, in the place of a setting."""
+"""Our friction, listed among the settings."""
 
 KINDS: dict[str, type | None] = {"patches, reduced": None, "patches, distributed": DistributedModel}
 """Models of the patches; None: the reduced one of the scene."""

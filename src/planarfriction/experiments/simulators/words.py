@@ -91,9 +91,7 @@ def tables(found: Mapping[str, Any]) -> list[Table]:
                 for case, ways in found["steps"].items()
             ],
         ),
-        _table(
-            "A gripper shaken for 3 s: slip in the hand", found["shaken"], lambda v: f"{_short(1e6 * v['slip'])} um"
-        ),
+        _table("A gripper shaken for 3 s: slip in the hand", found["shaken"], lambda v: _length(v["slip"])),
         _table(
             "A disc that slides and spins to rest: errors of distance and angle",
             found["disc"],
@@ -112,7 +110,7 @@ def _drake_tables(found: Mapping[str, Any]) -> list[Table]:
         _table(
             "Drake, a box on an incline of 0.3 rad: creep",
             found["creep"],
-            lambda v: f"{_short(1e6 * abs(v['creep']))} um/s",
+            lambda v: _speed(v["creep"]),
         ),
         _table("Drake, the disc: errors of distance and angle", found["disc"], _stop),
         _table(
@@ -143,7 +141,9 @@ def _table(title: str, cases: Numbers, words: Callable[[Mapping[str, float]], st
 def _creep(values: Mapping[str, float]) -> str:
     if values["dropped"]:
         return "dropped"
-    return f"{_short(1e6 * values['creep'])} um/s, {_short(float(np.degrees(values['spin'])))} deg/s"
+    turning = abs(float(np.degrees(values["spin"])))
+    turns = f"{_short(turning)} deg/s" if turning >= 1e-3 else "< 0.001 deg/s"
+    return f"{_speed(values['creep'])}, {turns}"
 
 
 def _stop(values: Mapping[str, float]) -> str:
@@ -156,10 +156,24 @@ def _end(values: Mapping[str, float]) -> str:
     return f"{1e3 * values['y']:+.1f} mm, {np.degrees(values['theta']):+.1f} deg"
 
 
+def _length(metres: float) -> str:
+    """The size of a length in mm, um or nm, whichever reads best."""
+    size = abs(metres)
+    if size < 1e-12:
+        return "< 0.001 nm"
+    unit, scale = ("mm", 1e3) if size >= 1e-3 else ("um", 1e6) if size >= 1e-8 else ("nm", 1e9)
+    return f"{_short(scale * size) if unit != 'nm' else f'{scale * size:.1g}'} {unit}"
+
+
+def _speed(metres_per_second: float) -> str:
+    """The size of a speed in mm/s, um/s or nm/s."""
+    return f"{_length(metres_per_second)}/s"
+
+
 def _short(value: float) -> str:
-    """A number that is large, readable, or merely small."""
+    """A number with as many digits as are worth reading."""
     if value < 1e-2:
-        return f"{value:.0e}"
+        return f"{value:.1g}"
     return f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
 
 
@@ -170,30 +184,30 @@ def findings(found: Mapping[str, Any], versions: Mapping[str, str]) -> Sequence[
         return max(abs(case[way][key]) for case in found[kind].values() for key in keys)
 
     noslip, reduced = "noslip 10", next(iter(runs.KINDS))
-    creep = {way: _short(1e6 * worst("held", way, "creep")) for way in (OWN, noslip, PATCHES)}
-    slip = _short(1e6 * min(worst("shaken", way, "slip") for way in NATIVE))
+    creep = {way: _speed(worst("held", way, "creep")) for way in (OWN, noslip, PATCHES)}
+    slip = _length(min(worst("shaken", way, "slip") for way in NATIVE))
     touching = [f"{name}, {touch}" for touch in ("face", "point") for name, _ in TOUCHING]
     stops = 100.0 * min(worst("disc", way, "distance", "angle") for way in touching)
     ends = 1e3 * min(worst("in hand", way, "y") for way in NATIVE)
     ratios = [ways[PATCHES]["seconds"] / ways[OWN]["seconds"] for ways in found["cost"].values()]
     said = [
-        f"MuJoCo {versions['mujoco']}, steps of 2 ms. Where a thing is only held, noslip suffices: with 10 iterations"
-        f" it creeps by {creep[noslip]} um/s at most, with patches by {creep[PATCHES]} um/s. The elliptic cone alone"
-        f" lets it creep by up to {creep[OWN]} um/s.",
-        f"While the hand is shaken it does not: the best settings let the block slip by {slip} um, patches by "
-        f"{_short(1e6 * worst('shaken', PATCHES, 'slip'))} um, which is the yield of their bristles.",
-        f"What slides and turns at once needs the shape of the patch. Whatever its settings, MuJoCo's own friction is"
-        f" off by {stops:.0f} % in distance or angle of one of the discs, patches by "
-        f"{100.0 * worst('disc', reduced, 'distance', 'angle'):.2f} %; in the hand by {ends:.1f} mm, patches by "
-        f"{1e3 * worst('in hand', reduced, 'y'):.1f} mm.",
-        f"A step with patches takes {min(ratios):.2f} to {max(ratios):.2f} times that of the elliptic cone.",
+        f"MuJoCo {versions['mujoco']}, steps of 2 ms. For an object that is only held, noslip is enough: with 10"
+        f" iterations it creeps at {creep[noslip]} at most, with patches at {creep[PATCHES]}. With the elliptic cone"
+        f" alone it creeps at up to {creep[OWN]}.",
+        f"While the hand is shaken, noslip is not enough: with the best settings the block slips by {slip}, with"
+        f" patches by {_length(worst('shaken', PATCHES, 'slip'))}, which is the elastic deflection of their bristles.",
+        f"An object that slides and turns at once needs the shape of the patch. With any settings, MuJoCo's own"
+        f" friction has an error of {stops:.0f} % in distance or angle for one of the discs, patches"
+        f" {100.0 * worst('disc', reduced, 'distance', 'angle'):.2f} %; in the hand the error is {ends:.1f} mm, with"
+        f" patches {1e3 * worst('in hand', reduced, 'y'):.1f} mm.",
+        f"A step with patches takes {min(ratios):.2f} to {max(ratios):.2f} times as long as with the elliptic cone.",
     ]
     if "drake" in found:
         cases = found["drake"]["creep"].values()
         own = min(abs(value["creep"]) for case in cases for way, value in case.items() if not way.startswith(PATCHES))
         ours = max(abs(value["creep"]) for case in cases for way, value in case.items() if way.startswith(PATCHES))
         said.append(
-            f"Drake {versions['drake']}: a box on an incline creeps by {_short(1e6 * own)} um/s at least, with patches"
-            f" by {_short(1e6 * ours)} um/s at most."
+            f"Drake {versions['drake']}: a box on an incline creeps at {_speed(own)} at least, with patches at"
+            f" {_speed(ours)} at most."
         )
     return said
