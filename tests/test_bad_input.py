@@ -283,7 +283,7 @@ def test_a_choice_is_a_text(name, call):
         (lambda: pf.patch.surface_error(SQUARE, 5), "few must be a ContactPatch, got 5"),
         (lambda: pf.LimitSurfaceQuartic.fit(np.eye(3), np.eye(3), patch=5), "twist must have as many rows"),
         (lambda: pf.LimitSurfaceQuartic.fit(np.ones((5, 3)), np.ones((5, 3)), patch=5), "patch must be a ContactPatch"),
-        (lambda: pf.Signal.from_csv("x.csv", value=5), "value must be the name of a column or a list of names, got 5"),
+        (lambda: pf.Signal.from_csv("x.csv", value=5), "value must be the name of a column, or a list of names, got 5"),
         (lambda: pf.Signal.from_csv(5), "path must be a path"),
         (lambda: pf.Signal.from_dict(1.0, folder=5), "folder must be a path"),
         (lambda: Grid(0, 0, 1, 1, 2, 2).locate([1.0, 2.0, 3.0]), r"positions must have shape \[..., 2\]"),

@@ -37,7 +37,7 @@ def test_what_is_no_name_is_refused(what):
         " toe",
         "toe ",
     ):
-        with pytest.raises(InvalidValueError, match=r"name.* must be a text that is not empty, printable and"):
+        with pytest.raises(InvalidValueError, match=r"name.* must be a text that is not empty, is printable, and"):
             NAMED[what](name)
     for name in ("a\nb", "a\0", "\ud800", "\x1b[31m"):
         with pytest.raises(InvalidValueError, match="printable") as caught:

@@ -134,12 +134,12 @@ def test_files_and_solutions_keep_the_start(tmp_path):
 def test_starts_that_make_no_sense_are_refused():
     scene = held(MODELS[0])
     moving = dataclasses.replace(scene.body, velocity=(0.1, 0.0, 0.0))
-    with pytest.raises(InvalidValueError, match="velocity of the body must be zero"):
+    with pytest.raises(InvalidValueError, match="velocity of the body must start at zero"):
         dataclasses.replace(scene, body=moving)
     with pytest.raises(InvalidValueError, match="not be zero if start is 'sliding'"):
         dataclasses.replace(scene, start="sliding")
     running = dataclasses.replace(scene.contacts[0], velocity=(0.1, 0.0, 0.0))
-    with pytest.raises(InvalidValueError, match="velocity of contact 'fingers' must be zero at first"):
+    with pytest.raises(InvalidValueError, match="velocity of contact 'fingers' must start at zero"):
         dataclasses.replace(scene, contacts=[running])
     assert dataclasses.replace(scene, contacts=[running], start="sliding").start == "sliding"
     driven = pf.scenes.driven(MODELS[0], t_end=0.1)
@@ -177,10 +177,10 @@ def test_derivatives_follow_an_equilibrium():
 
 def test_derivatives_to_what_moves_the_start_are_refused():
     scene, knots = held(pf.ReducedModel(PATCH, LAW)), np.array([0.0, 0.05])
-    with pytest.raises(InvalidValueError, match="start must be 'rest' for the derivative to mu"):
+    with pytest.raises(InvalidValueError, match="start must be 'rest' for the derivative with respect to mu"):
         pf.autodiff.scene_sensitivities(scene, ["mass", "mu"])
     thrown = dataclasses.replace(pf.scenes.free_slide(scene.contacts[0].model, twist=(0.1, 0.0, 1.0)), start="sliding")
-    with pytest.raises(InvalidValueError, match=r"for the derivative to table.normal_force\[0\]"):
+    with pytest.raises(InvalidValueError, match=r"for the derivative with respect to table.normal_force\[0\]"):
         pf.autodiff.scene_sensitivities(thrown, (), signals={"table.normal_force": knots})
-    with pytest.raises(InvalidValueError, match="start must be 'rest' for the derivative to vx"):
+    with pytest.raises(InvalidValueError, match="start must be 'rest' for the derivative with respect to vx"):
         pf.autodiff.scene_gradient(scene, lambda time, motion: 0.0 * motion, initial=["vx"])

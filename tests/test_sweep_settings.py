@@ -216,7 +216,7 @@ def test_the_command_measures_with_a_function_of_a_file(file, capsys):
     Path("mine.py").write_text("def down(solution):\n    return -1e3 * solution.histories['y'].values[-1]\n")
     assert main(["sweep", file, "--set", "fingers.normal_force=-1,1,2", "--measure", "mine.py:down"]) == 0
     captured = capsys.readouterr()
-    assert "1 failed, the first: make_scene: scene.toml: [contact]: normal_force" in captured.err
+    assert "1 failed; the first: make_scene: scene.toml: [contact]: normal_force" in captured.err
     assert "down" in captured.out
     assert len(list(Path("sweep").glob("*.npz"))) == 2
 
@@ -228,7 +228,7 @@ def test_ctrl_c_says_how_to_go_on(file, capsys, monkeypatch):
 
     monkeypatch.setattr("planarfriction.sweeps.sweep", stopped)
     assert main(["sweep", file, "--set", "t_end=0.01,0.02"]) == INTERRUPTED
-    assert "interrupted: 4 of 10 runs (1 found), 3 s left; the same command goes on" in capsys.readouterr().err
+    assert "interrupted: 4 of 10 runs (1 found), 3 s left; the same command continues" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("command", ["", "run", "sweep", "bench", "identify", "warm"])

@@ -277,7 +277,7 @@ def instance(name: str, value: Any, kind: type | tuple[type, ...], what: str) ->
 def text(name: str, value: Any) -> str:
     """Return `value` if it is a text that can be a name: printable, not empty, not long, no spaces at its ends."""
     if not (isinstance(value, str) and value.isprintable() and value.strip() == value and value):
-        rule = "be a printable text that is not empty and has no spaces at its ends"
+        rule = "be a text that is not empty, is printable, and has no spaces at its ends"
         raise InvalidValueError(name, rule, quoted(value))
     if len(value) > LONGEST_NAME:
         raise InvalidValueError(name, f"have at most {LONGEST_NAME} characters", f"{len(value)}")

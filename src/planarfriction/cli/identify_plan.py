@@ -36,7 +36,7 @@ class FitOrPlan(click.Command):
         """The options, then the other command."""
         super().format_options(ctx, formatter)
         with formatter.section("Commands"):
-            formatter.write_dl([(NAME, f"{SHORT_HELP} See {ctx.command_path} {NAME} --help.")])
+            formatter.write_dl([(NAME, f"{SHORT_HELP} See identify {NAME} --help.")])
 
 
 def complete_log(ctx: click.Context, parameter: object, incomplete: str) -> list[CompletionItem]:
