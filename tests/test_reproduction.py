@@ -108,7 +108,7 @@ def test_other_options_and_broken_files_are_not_reused(made, tmp_path):
 def test_an_interrupted_run_goes_on_where_it_was(made, tmp_path, capsys):
     made[0].interrupt_at = "b"
     assert main(["reproduce", "--out", str(tmp_path)]) == 130
-    assert "goes on from there" in capsys.readouterr().err
+    assert "continues from there" in capsys.readouterr().err
     assert made[0].done == ["a"] and not made[1].done
     assert main(["reproduce", "--out", str(tmp_path)]) == 0
     assert made[0].done == ["a", "b"]  # a was read from its piece

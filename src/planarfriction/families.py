@@ -92,7 +92,7 @@ LAWS = Family(
     "law",
     {
         "lugre": ("LuGre bristles, plain or elasto-plastic, with Stribeck and viscous terms", "laws.lugre:LuGre"),
-        "dahl": ("Dahl's bristles: a force that depends on the way, not on the speed", "laws.dahl:Dahl"),
+        "dahl": ("Dahl's bristles: a force that depends on the distance, not on the speed", "laws.dahl:Dahl"),
         "coulomb-stribeck": (
             "Coulomb with Stribeck and viscous terms, regularised by a creep speed",
             "laws.coulomb_stribeck:CoulombStribeck",
@@ -116,7 +116,7 @@ MODELS = Family(
     "model",
     {
         "distributed": ("a bristle in every cell", "models.distributed:DistributedModel"),
-        "reduced": ("the moments of the bristles, three states a part", "models.reduced:ReducedModel"),
+        "reduced": ("the moments of the bristles, three states per part", "models.reduced:ReducedModel"),
         "reduced-published": (
             "three bristles and a limit surface, as published",
             "models.reduced_published:ReducedModelPublished",
@@ -149,7 +149,7 @@ PUBLISHED_PATCHES = Family(
         "LineGrad": ("a line along y, pressed harder at its top", "patch.published:line_grad"),
         "LineGradX": ("a line along x, pressed harder at its left", "patch.published:line_grad_x"),
         "NonConvex1": ("two square pads", "patch.published:non_convex_1"),
-        "NonConvex2": ("a lying T of two bars", "patch.published:non_convex_2"),
+        "NonConvex2": ("a T lying on its side, of two bars", "patch.published:non_convex_2"),
     },
 )
 """Name -> function of `(cells=21, width=0.02)` that makes the published patch."""

@@ -1,4 +1,4 @@
-"""What a motion depends on, as the compiled variational equation takes it: factors, knots of signals, the start."""
+"""The quantities with respect to which a motion is differentiated: factors, knots of signals, the initial state."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ SCENE_PARAMETERS = {
     "inertia": tangent.INERTIA,
     "load": tangent.LOAD,
 }
-"""What `scene_sensitivities` knows: factors, 1 as the scene is, of
+"""Parameters of `scene_sensitivities`, each a factor that is 1 for the scene as it is:
 
 - `mu`: mu_c and mu_s of every contact;
 - `r`: the size of every patch, about the origin of its contact frame (positions, contact radius, second moment);

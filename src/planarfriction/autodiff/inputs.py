@@ -1,4 +1,4 @@
-"""Inputs of roll-outs as compiled loops take them: checked, contact by contact and part by part; and threads."""
+"""Checked inputs of roll-outs, contact by contact and part by part, as compiled loops read them; and threads."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A scene as a function of numbers, with derivatives both ways: what the tensor front ends call."""
+"""A scene as a function of numbers, with forward and reverse derivatives, for the tensor front ends."""
 
 from __future__ import annotations
 

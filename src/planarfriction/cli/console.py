@@ -57,7 +57,7 @@ def _bar() -> Iterator[Progress]:
 
 
 def note(text: str) -> None:
-    """Say something beside the results: on stderr, one line."""
+    """Print a remark in one line on stderr, apart from the results."""
     print(text, file=sys.stderr, flush=True)
 
 

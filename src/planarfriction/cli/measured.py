@@ -1,4 +1,4 @@
-"""`planarfriction measured`: models compared on measured data."""
+"""`planarfriction measured`: compare models on measured data."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def measured(
             benchmark.run(progress)
     except KeyboardInterrupt:
         done = sum(map(len, benchmark.results.values()))
-        note(f"interrupted: {done} of {len(models) * len(benchmark.tasks)} results are there")
+        note(f"interrupted: {done} of {len(models) * len(benchmark.tasks)} results are finished")
         code = INTERRUPTED
     show(benchmark, as_json)
     if folder is not None and benchmark.results:

@@ -1,4 +1,4 @@
-"""Files that the commands write: asked for before the work, written after it."""
+"""Files that the commands write: the paths are checked before the work, the files are written after it."""
 
 from __future__ import annotations
 

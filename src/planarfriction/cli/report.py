@@ -1,4 +1,4 @@
-"""Numbers of one or several solutions side by side."""
+"""Numbers of one or several solutions, next to each other."""
 
 from __future__ import annotations
 

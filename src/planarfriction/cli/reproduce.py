@@ -54,7 +54,7 @@ def carry_out(reproduction: Reproduction, chosen: Sequence[str], *, again: bool)
             for quantity in missed:
                 note(f"  out of tolerance: {quantity}")
     except KeyboardInterrupt:
-        note(f"stopped in {name}: the same command goes on from there")
+        note(f"stopped in {name}: the same command continues from there")
         code = INTERRUPTED
     return code
 

@@ -1,4 +1,4 @@
-"""`planarfriction run`: simulate a scene with one or several models, compare, write and draw."""
+"""`planarfriction run`: simulate a scene with one or several models, compare, write files and draw."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`planarfriction simulators`: our friction inside simulators beside their own."""
+"""`planarfriction simulators`: compare patch friction inside simulators with their own friction."""
 
 from __future__ import annotations
 

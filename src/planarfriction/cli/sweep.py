@@ -1,4 +1,4 @@
-"""`planarfriction sweep`: a scene for every combination of some of its values."""
+"""`planarfriction sweep`: simulate a scene for every combination of some of its values."""
 
 from __future__ import annotations
 

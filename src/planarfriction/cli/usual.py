@@ -1,4 +1,4 @@
-"""What a ready scene is made of at the command line where nothing else is asked for: its patch and its law."""
+"""Default patch and law of each ready scene at the command line."""
 
 from __future__ import annotations
 

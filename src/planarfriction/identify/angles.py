@@ -1,4 +1,4 @@
-"""Angles of a measured motion: whole turns that a tracker takes out are put back, other jumps are refused."""
+"""Angles of a measured motion: whole turns that a tracker removes are restored, other jumps are refused."""
 
 from __future__ import annotations
 

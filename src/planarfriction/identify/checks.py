@@ -1,4 +1,4 @@
-"""Checks of logs before they are fitted: each finding is one line that says what was found and what it points to."""
+"""Checks of logs before they are fitted: each finding is one line that says what was found and what may be wrong."""
 
 from __future__ import annotations
 

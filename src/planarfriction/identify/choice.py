@@ -1,4 +1,4 @@
-"""Which of several models explains the data best, and which parameters depend on that choice."""
+"""Which of several models explains the data best, and which estimates depend on that choice."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Columns of log files: the names that are found against those that are needed."""
+"""Columns of log files: finding the required names among the existing ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the search begins: friction read off the wrenches, and a coarse grid of Stribeck speeds and stiffnesses."""
+"""Initial guesses: friction taken from the wrenches, and a coarse grid of Stribeck speeds and stiffnesses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bounded least squares from several starts, and what the Jacobian says about the result."""
+"""Bounded least squares from several starting points, and the covariance from the Jacobian."""
 
 from __future__ import annotations
 

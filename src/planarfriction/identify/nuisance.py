@@ -1,4 +1,4 @@
-"""What a rig adds to a wrench beside friction: a delay, zeros that are off and drift, a load cell that drifts.
+"""Disturbances that a rig adds to a wrench: a delay, zeros that are wrong and drift, a load cell that drifts.
 
     y(t) = (1 + scale + sum_k drift_k P_k(u)) W(t - delay) + bias + zero_drift u,    u from -1 to 1 over the log,
 

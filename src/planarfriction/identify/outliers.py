@@ -1,4 +1,4 @@
-"""Slides that are not what they are taken for: pushed, without contact, or far from what the others say."""
+"""Slides that cannot be explained by friction: pushed, without contact, or far from the others."""
 
 from __future__ import annotations
 

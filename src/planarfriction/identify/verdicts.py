@@ -1,4 +1,4 @@
-"""What the data do not determine, and why: each rule names the parameter and what is missing."""
+"""Which parameters the data do not determine, and why: each rule names the parameter and what is missing."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures of a comparison: all models with their intervals, beside an example of the task."""
+"""Figures of the comparison on measured data."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Friction models that are moved: along a measured motion, and steadily, to find which motion goes with a wrench."""
+"""Friction models moved along a measured motion, or steadily to find the motion that belongs to a wrench."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Small batches of steps, and derivatives of steps, of models of three states: straight to compiled code.
+"""Small batches of steps of models with three states, and their derivatives, passed directly to compiled code.
 
 What is not plain numbers or arrays of them, or not in order, gets None: then the checks of all models decide.
 """

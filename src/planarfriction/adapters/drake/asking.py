@@ -1,7 +1,7 @@
-"""A step of a plant with patch friction: solved in contact space, and asked for again with what was solved.
+"""A step of a plant with patch friction: solved in contact space, and repeated with the wrenches found.
 
-Drake does not say how its contacts answer to wrenches. The first answer taken is that of the bodies without contact,
-which is never too stiff; each time the plant's step is asked for, what came out corrects it.
+Drake does not tell how its contacts react to wrenches. The first guess of this reaction is that of the bodies without
+contact, which is never too stiff; each evaluation of the plant's step corrects it.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from planarfriction.adapters.drake.shadow import Shadow
 from planarfriction.coupling import CoupledPatches
 
 PASSES = 12
-"""How often the plant's step is asked for at most."""
+"""Largest number of evaluations of the plant's step."""
 
 MISFIT = 1e-7
 """Twists that come out [m/s] within which they are what was solved for: what Drake's own solver leaves open."""
@@ -31,20 +31,20 @@ _ONES = np.ones(3)
 
 
 class Asked(NamedTuple):
-    """The end of a step: as flat vectors, patch by patch."""
+    """The end of a step, as flat vectors patch by patch."""
 
     bristles: np.ndarray
     wrenches: np.ndarray
     force: np.ndarray
-    """Generalized force that the wrenches are `[nv]`."""
+    """Generalized force of the wrenches `[nv]`."""
     owed: np.ndarray
-    """How far the twists that came out are from those that the bristles have seen."""
+    """Difference between the twists of the plant and those that the bristles have seen."""
     twists: np.ndarray
     loads: np.ndarray
     touching: list[bool]
     twist_answers: np.ndarray
     load_answers: np.ndarray
-    """How twists and loads answered in the end, for the next step to start from."""
+    """Reaction of twists and loads to wrenches at the end, from which the next step starts."""
     report: tuple[float, ...]
     """Passes, iterations, residual, misfit, whether the step in contact space has converged."""
 

@@ -1,4 +1,4 @@
-"""A problem of coupled patches that is written and solved in place: a step of Drake has no time for more."""
+"""A problem of coupled patches that is written and solved in place, because a step of Drake has no time for more."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A copy of a plant that is asked what its next step would come to, with other forces.
+"""A copy of a plant that predicts what its next step would be with other forces.
 
 Discrete plants sample their forces before a step and their contacts at its end: what depends on both has to be known
 before the plant itself steps.

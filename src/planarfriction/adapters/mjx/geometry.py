@@ -1,6 +1,6 @@
 # pyright: reportAttributeAccessIssue=false, reportPrivateImportUsage=false
 # (MJX keeps what its contacts are in `_impl`.)
-"""Where the patches are: their frames and the Jacobians of their twists."""
+"""The positions of the patches: their frames and the Jacobians of their twists."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The step in contact space of `planarfriction.coupling` in operations of JAX, with derivatives.
+"""The step in contact space of `planarfriction.coupling`, written with JAX operations and with derivatives.
 
 The same steps of Newton's method as `kernels.coupling` takes, which says why; here as one flat loop with one evaluation
 of the models a round, so that environments side by side wait for each other as little as they can, and little is

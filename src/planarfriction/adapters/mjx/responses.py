@@ -1,6 +1,6 @@
 # pyright: reportAttributeAccessIssue=false, reportPrivateImportUsage=false
 # (MJX keeps what its constraints are in `_impl`.)
-"""How MJX's step answers to wrenches on patches, while the set of active constraints holds.
+"""How MJX's step reacts to wrenches on patches, for a fixed set of active constraints.
 
 As `planarfriction.adapters.mujoco.responses`, with the accelerations themselves: `H qacc = f + Jp' W + Jc' (D a + c)`
 over the rows in their quadratic range and those at their largest force c. It is what MJX's solver goes towards, exact,

@@ -1,6 +1,7 @@
 # pyright: reportAttributeAccessIssue=false
 # (MuJoCo describes few of its names to type checkers.)
-"""Where the installed version of MuJoCo keeps things, for compiled steps: by its own description of its structs."""
+"""Where the installed version of MuJoCo stores things, for compiled steps, taken from its own description of its
+structs."""
 
 from __future__ import annotations
 
