@@ -15,10 +15,10 @@ _REQUIRED: Any = object()
 
 
 class Section:
-    """One table of a scene file: knows where it stands, so that its errors do too.
+    """One table of a scene file, which knows its position so that errors can name it.
 
-    `where` is the dotted name of the table ("contact.law", "" at the top), `source` names the file in messages and
-    `folder` is the place that relative paths start from.
+    `where` is the dotted name of the table ("contact.law", "" at the top), `source` names the file in messages, and
+    relative paths start from `folder`.
     """
 
     def __init__(self, data: Any, where: str = "", source: str = "scene", folder: Path | None = None):

@@ -23,7 +23,7 @@ SAME_TIME = 1e-12
 
 
 MOST_SAMPLES = 10_000_000
-"""Samples of a signal or a recording that are taken: a gigabyte for one contact."""
+"""Largest number of samples of a signal or a recording: a gigabyte for one contact."""
 
 
 def breaks_between(times: np.ndarray, t_end: float) -> np.ndarray:
@@ -53,10 +53,10 @@ def sample_times(t_end: float, dt: float = 0.01) -> np.ndarray:
 class Signal(ByValue):
     """A sampled function of time, `[T]` or `[T, k]` values; constant before the first sample and after the last.
 
-    With `hold="previous"` each value holds until the next sample, with `hold="linear"` straight lines join them.
-    Signals are immutable and compare by content.
+    With `hold="previous"` each value is held until the next sample, with `hold="linear"` the samples are joined by
+    straight lines. Signals are immutable and compare by content.
 
-    Raises InvalidValueError where times are not increasing, values are not finite or shapes do not match.
+    Raises InvalidValueError if times do not increase, values are not finite or shapes do not match.
     """
 
     times: np.ndarray

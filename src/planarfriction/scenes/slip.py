@@ -12,11 +12,11 @@ if TYPE_CHECKING:
     from planarfriction.scenes.solution import Solution
 
 SLIPS = 0.5
-"""Share of the motion that slips from which on a contact counts as slipping [-]."""
+"""Share of the motion above which a contact counts as slipping [-]."""
 
 
 class SlipEvent(NamedTuple):
-    """A stretch of time in which a contact slips."""
+    """An interval of time during which a contact slips."""
 
     contact: str
     """Name of the contact."""
@@ -25,9 +25,9 @@ class SlipEvent(NamedTuple):
     end: float
     """When it sticks again [s]; the end of the run if it does not."""
     path: float
-    """How far its centre of pressure slides [m]."""
+    """Distance by which its centre of pressure slides [m]."""
     angle: float
-    """How far it turns, counter-clockwise [rad]."""
+    """Angle by which it turns, counter-clockwise [rad]."""
 
 
 def slip_events(solution: Solution) -> tuple[SlipEvent, ...]:

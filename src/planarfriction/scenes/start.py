@@ -1,4 +1,4 @@
-"""How the bristles of a scene start: at rest, carrying the load, or as in steady sliding."""
+"""Initial state of the bristles of a scene: relaxed, carrying the load, or as in steady sliding."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From what runs have left to one labelled dataset, with a dimension for each swept quantity."""
+"""One labelled dataset from the results of all runs, with a dimension for each swept quantity."""
 
 from __future__ import annotations
 

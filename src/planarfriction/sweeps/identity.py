@@ -1,6 +1,6 @@
-"""What makes a run the run it is: a digest of its scene, of what is measured, and of the equations behind both.
+"""What identifies a run: a digest of its scene, of what is measured, and of the equations behind both.
 
-Hashes of Python's own differ from process to process, and those of a scene's JSON cost a tenth of a short run.
+Python's own hashes differ from process to process, and those of a scene's JSON cost a tenth of a short run.
 """
 
 from __future__ import annotations

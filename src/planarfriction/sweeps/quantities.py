@@ -1,4 +1,4 @@
-"""What is swept: quantities with their values, and the grid of all their combinations."""
+"""Swept quantities with their values, and the grid of all their combinations."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ class Grid:
     """Quantities by name, each with labels and the values behind them."""
 
     labels: dict[str, list[Any]]
-    """What stands along each dimension: numbers, texts, truth values."""
+    """Labels along each dimension: numbers, texts, booleans."""
     values: dict[str, list[Any]]
-    """What `make_scene` gets."""
+    """Values that `make_scene` receives."""
 
     @property
     def shape(self) -> tuple[int, ...]:

@@ -1,4 +1,4 @@
-"""What a run leaves, and the folder of files in which it is found again: one a run, named by the run's digest."""
+"""Results of runs, and the folder in which they are stored: one file per run, named by the run's digest."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _META = "planarfriction"
 
 
 class Record(NamedTuple):
-    """What a run leaves."""
+    """The result of a run."""
 
     status: str
     """As that of a `Solution`, or "failed"."""

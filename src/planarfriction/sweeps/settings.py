@@ -1,4 +1,4 @@
-"""Values of a scene by dotted path, `fingers.law.mu_c`: of files, of scenes, and as a command line spells them."""
+"""Values of a scene by dotted path, such as `fingers.law.mu_c`, for files, scenes and the command line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A sweep in a zarr store, one chunk a run: for more runs than memory holds, and for readers on other machines."""
+"""A sweep in a zarr store, one chunk per run: for more runs than fit into memory, and for readers on other machines."""
 
 from __future__ import annotations
 
