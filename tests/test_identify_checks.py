@@ -62,7 +62,7 @@ def test_friction_that_drives_the_motion_is_refused(log, signs):
     [
         ({"wrench": (1, 1, -1)}, "with tau of opposite sign"),
         ({"wrench": (1, -1, 1)}, "with fy of opposite sign"),
-        ({"twist": (1, -1, -1)}, "where z points down"),
+        ({"twist": (1, -1, -1)}, "as if z points down"),
         ({"twist": (1e3, 1e3, 1)}, "vx and vy in mm/s, or tau in N mm"),
         ({"twist": (1e2, 1e2, 1)}, "vx and vy in cm/s"),
         ({"twist": (1, 1, 180 / np.pi)}, "omega in deg/s"),
@@ -125,13 +125,13 @@ def test_loads_that_never_vary(log):
     other = changed(log, load=2.0)
     assert check_loads([log, other], ("mu_c", "n")) == check_loads([log, log], ("mu_c",)) == []
     (found,) = check_loads([log, log], ("mu_c", "n"))
-    assert str(found) == "normal_force should differ from log to log to show n, got 2 N throughout"
+    assert str(found) == "normal_force should differ between logs to determine n, got 2 N throughout"
 
 
 def test_sampling_against_the_corner_of_the_bristles(log):
     """1 kHz shows damping up to 500 Hz: sigma_0 = 2e4 1/m with sigma_1 = 6.37 s/m."""
     assert check_sampling(log, 2e4, 7.0) is None
-    assert "1e+03 Hz or more to show sigma_1" in str(check_sampling(log, 2e4, 6.3))
+    assert "1e+03 Hz or more to determine sigma_1" in str(check_sampling(log, 2e4, 6.3))
     assert str(check_sampling(log, 2e4, 6.3)).endswith("got 1e+03 Hz")
     assert check_sampling(log, 2e4, 0.0) is None
 

@@ -82,7 +82,7 @@ def test_what_slides_cannot_tell():
     found = identify_motion(slides(3, spin=0.0), PATCH, BODY, start=LAW, model=ellipsoid)
     assert not found.identifiable("contact_radius")
     assert "no spin" in found.table()
-    assert "3 slides only" in found.table()
+    assert "only 3 slides" in found.table()
 
 
 def test_bad_input_is_named():

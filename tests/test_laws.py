@@ -197,7 +197,7 @@ SURFACE = pf.LimitSurfaceCells(pf.ContactPatch.rectangle(0.02, cells=3))
         (lambda: pf.LuGre(mu_c=None), "mu_c must be a number, got None"),
         (
             lambda: pf.LuGre(elasto_plastic="early"),
-            "elasto_plastic must be a breakaway ratio, an ElastoPlastic or None, got early",
+            "elasto_plastic must be a breakaway ratio, an ElastoPlastic, or None, got early",
         ),
         (lambda: pf.LuGre(elasto_plastic=1.0), "breakaway_ratio must be in [0, 1), got 1.0"),
         (lambda: pf.Dahl(mu_c=0.0), "mu_c must be > 0, got 0.0"),

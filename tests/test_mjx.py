@@ -304,7 +304,7 @@ BAD = {
         "integrator must be Euler, implicitfast, got IMPLICIT",
     ),
     "elliptic": ({"cone": mujoco.mjtCone.mjCONE_ELLIPTIC}, "cone must be pyramidal: .* got elliptic"),
-    "noslip": ({"noslip_iterations": 3}, "noslip_iterations must be 0: they change what has been solved, got 3"),
+    "noslip": ({"noslip_iterations": 3}, "noslip_iterations must be 0: they would change the solution, got 3"),
 }
 
 

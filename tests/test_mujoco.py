@@ -287,7 +287,7 @@ def test_roll_outs_agree_whatever_was_in_the_data_and_on_any_number_of_threads()
 
 BAD = {
     "RK4": ("integrator", 1, "integrator must be Euler, implicit, implicitfast, got RK4"),
-    "noslip": ("noslip_iterations", 3, "noslip_iterations must be 0: they change what has been solved, got 3"),
+    "noslip": ("noslip_iterations", 3, "noslip_iterations must be 0: they would change the solution, got 3"),
     "timestep": ("timestep", 0.011, r"timestep must be at most half of solref\[0\] = 0.02 s of the pair"),
 }
 if hasattr(mujoco.mjtIntegrator, "mjINT_DISCRETE"):

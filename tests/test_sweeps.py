@@ -114,7 +114,7 @@ def test_values_of_any_kind_have_labels():
         ({"values": {"grip": 1.0}}, "grip must be a list of numbers, texts or booleans"),
         ({"values": {"grip": []}}, "grip must have at least one value"),
         ({"values": {"grip": [1.0, 1.0]}}, "grip must have each value once, got 1.0 2 times"),
-        ({"values": {"grip": [1.0, "a"]}}, "grip must be a list of numbers, of texts"),
+        ({"values": {"grip": [1.0, "a"]}}, "grip must be a list of numbers, texts"),
         ({"values": {"grip": [PATCH]}}, "a mapping from labels to values"),
         ({"values": {"grop": [1.0]}}, "make_scene must take the swept quantities by name"),
         (
@@ -124,7 +124,7 @@ def test_values_of_any_kind_have_labels():
         ({"values": {"time": [1.0]}, "make_scene": lambda time: grip(time)}, "not be that of a variable"),
         ({"make_scene": lambda grip: 1.0}, "make_scene must return a Scene, got float"),
         ({"measure": 3}, "measure must be a function of a Solution"),
-        ({"measure": lambda solution: object()}, "must return numbers, texts and arrays of them"),
+        ({"measure": lambda solution: object()}, "must return numbers, texts, or arrays of them"),
         ({"progress": float}, "progress must be a function of a Progress, got TypeError: float() argument"),
         ({"executor": 3}, "executor must be a concurrent.futures.Executor"),
         ({"make_scene": lambda grip: 1 / 0}, "all 3 runs failed; the first: grip=1.0: make_scene: ZeroDivisionError"),
@@ -383,7 +383,7 @@ def leave(solution: pf.Solution) -> float:
 def test_an_executor_that_dies_is_an_error_in_one_line(tmp_path):
     with (
         concurrent.futures.ProcessPoolExecutor(1, FRESH) as pool,
-        pytest.raises(SweepError, match="what is done is kept"),
+        pytest.raises(SweepError, match="finished runs are kept"),
     ):
         pf.sweep(grip, {"grip": GRIPS}, executor=pool, measure=leave, out=tmp_path)
     with pytest.raises(SweepError, match="the executor ended"):  # it takes no more
