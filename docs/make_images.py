@@ -1,6 +1,6 @@
 """Make the pictures of README and docs from the library itself: `python docs/make_images.py [FOLDER]`.
 
-They go to `docs/images` unless a folder is named. Each stays below 150 kB. Those of the
+They go to `docs/images` unless a folder is named. Each stays below 200 kB. Those of the
 reproduction come from `make_tables.py`.
 """
 
@@ -15,7 +15,7 @@ import planarfriction as pf
 from planarfriction import plots
 from planarfriction.patch import PUBLISHED_PATCHES
 
-LARGEST = 150_000
+LARGEST = 200_000
 """Largest size of a picture [bytes]."""
 
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
@@ -63,10 +63,12 @@ def pre_sliding_cycles() -> plots.style.PlotFigure:
     law = pf.LuGre(mu_s=1.2, elasto_plastic=0.9, sigma_1=0.0, sigma_2=0.0)
     figure = plots.style.new_figure(8.0, 3.2)
     force, energy = figure.subplots(1, 2)
-    for name, kind in (("ReducedModelPublished", pf.ReducedModelPublished), ("ReducedModel", pf.ReducedModel)):
-        fx, taken = small_cycles(kind(PUBLISHED_PATCHES["Circle"](), law))
-        force.plot(fx, ".-", label=name)
-        energy.plot(1e9 * taken, ".-", label=name)
+    for kind in (pf.ReducedModelPublished, pf.ReducedModel):
+        model = kind(PUBLISHED_PATCHES["Circle"](), law)
+        fx, taken = small_cycles(model)
+        look = {"color": plots.style.model_colour(model), "label": kind.__name__}
+        force.plot(fx, ".-", **look)
+        energy.plot(1e9 * taken, ".-", **look)
     force.set(xlabel="cycles", ylabel="force left over, fx [N]")
     energy.set(xlabel="cycles", ylabel="energy that friction took [nJ]")
     for axes in (force, energy):
@@ -87,7 +89,7 @@ def main(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for name, figure in figures().items():
         path = folder / f"{name}.png"
-        figure.savefig(path, dpi=90, facecolor="white", metadata={"Software": None})
+        figure.savefig(path, dpi=120, facecolor="white", metadata={"Software": None})
         size = path.stat().st_size
         print(f"{name}.png: {size / 1000:.0f} kB")
         if size > LARGEST:

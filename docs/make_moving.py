@@ -8,16 +8,17 @@ from pathlib import Path
 import planarfriction as pf
 from planarfriction.patch import PUBLISHED_PATCHES
 
-LARGEST = 1_500_000
+LARGEST = 1_000_000
 """Largest size [bytes]."""
 
 
 def main(folder: Path) -> None:
     """Write the picture and say how large it is."""
     law = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
-    scene = pf.scenes.in_hand(pf.ReducedModel(PUBLISHED_PATCHES["Circle"](), law))
+    model = pf.ReducedModel(PUBLISHED_PATCHES["Circle"](), law)
+    scene = pf.scenes.in_hand(model, size=(0.09, 0.05), centre_of_mass=(0.006, 0.0))  # large pads, and it turns far
     folder.mkdir(parents=True, exist_ok=True)
-    path = pf.simulate(scene, save_every=2e-3).animate(folder / "in-hand.gif", slow=2.0, fps=25.0, dpi=80.0)
+    path = pf.simulate(scene, save_every=2e-3).animate(folder / "in-hand.gif", slow=2.0, fps=25.0, dpi=88.0)
     size = path.stat().st_size
     print(f"{path.name}: {size / 1000:.0f} kB")
     if size > LARGEST:

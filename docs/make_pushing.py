@@ -52,8 +52,8 @@ def picture(measured: list[followed.Followed]) -> None:
     draw_push(right, one.by(pf.LimitSurfaceExact, samples=101))
     closed = np.concatenate([one.outline, one.outline[:1]])
     for pose, colour, words in (
-        (one.end, "k", "measured end"),
-        (one.by(pf.LimitSurfaceEllipsoid).end, "tab:red", "end of an ellipsoid"),
+        (one.end, style.PALETTE[1], "measured end"),
+        (one.by(pf.LimitSurfaceEllipsoid).end, style.ELLIPSOID, "end by the ellipsoid"),
     ):
         corners = pose[:2] + pf.geometry.rotate(closed, pose[2])
         right.plot(*(1e3 * corners.T), "--", color=colour, linewidth=1.2, zorder=6, label=words)

@@ -16,9 +16,9 @@ from scipy.special import ellipe, ellipk
 
 import planarfriction as pf
 from planarfriction.plots.motion import draw_motion
-from planarfriction.plots.style import PALETTE, PRESSURE_MAP, PlotFigure, new_figure, tidy
+from planarfriction.plots.style import ELLIPSOID, EXACT, PALETTE, PRESSURE_MAP, PlotFigure, new_figure, tidy
 
-LARGEST = 150_000
+LARGEST = 250_000
 """Largest size of a picture [bytes]."""
 
 DOCS = Path(__file__).parent
@@ -40,7 +40,7 @@ def pivot() -> PlotFigure:
     """The part as it swings, and its angle for grips that are loosened for different times."""
     finger = pf.SoftFinger(c=0.006, n=1 / 3, k=2.0, radius_max=0.012)
     pads = pf.DistributedModel(pf.ContactPatch.disc(0.012, pressure=finger), LAW)
-    figure = new_figure(10.0, 4.2)
+    figure = new_figure(8.6, 3.8)
     parts: Any = figure.subfigures(1, 2, width_ratios=(1.1, 1.0))
     left, right = parts
     draw_motion(left, pf.simulate(pf.scenes.pivot(pads, t_end=0.5)))
@@ -52,7 +52,7 @@ def pivot() -> PlotFigure:
         angle.plot(data.time, np.degrees(data.theta), color=colour, label=f"{1e3 * length:.0f} ms")
     grip.set(ylabel="grip [N]", ylim=(0.0, 6.5))
     angle.set(xlabel="time [s]", ylabel="angle [deg]")
-    angle.legend(title="loosened for", fontsize=8, title_fontsize=8)
+    angle.legend(title="loosened for", fontsize="small", title_fontsize="small")
     tidy(grip)
     tidy(angle)
     return figure
@@ -62,23 +62,25 @@ def foot() -> PlotFigure:
     """The sole, the torque that it holds beside a side force, and the foot that walks sideways."""
     page = from_page("sole =")
     sole, outline, rays, centre = (page[name] for name in ("sole", "outline", "rays", "centre"))
-    figure = new_figure(11.0, 3.6)
-    parts: Any = figure.subfigures(1, 3, width_ratios=(0.75, 1.0, 1.15))
-    left, middle, right = parts
+    figure = new_figure(8.6, 5.8)
+    left, beside = figure.subfigures(1, 2, width_ratios=(0.62, 1.0))
+    middle, right = beside.subfigures(2, 1, height_ratios=(0.85, 1.0))
     axes = left.subplots()
-    shown = axes.scatter(*(1e3 * sole.positions[:, ::-1].T), c=sole.weights() / sole.areas, cmap=PRESSURE_MAP, s=11)
+    shown = axes.scatter(*(1e3 * sole.positions[:, ::-1].T), c=sole.weights() / sole.areas, cmap=PRESSURE_MAP, s=30)
     shown.set_clim(0.0)
     closed = 1e3 * np.concatenate([outline, outline[:1]])
     axes.plot(closed[:, 1], closed[:, 0], color="0.3", linewidth=1.0)
     turn = pf.LimitSurfaceExact(sole).twist((0.0, 0.0, -1.0))
-    axes.plot(1e3 * centre[1], 1e3 * centre[0], "o", color=PALETTE[1], label="centre of pressure")
-    axes.plot(1e3 * turn[0] / turn[2], -1e3 * turn[1] / turn[2], "^", color=PALETTE[3], label="turns about")
-    axes.set(xlabel="[mm]", ylabel="from the heel [mm]", aspect="equal", xlim=(55, -55))
-    left.legend(fontsize=7, loc="outside upper center")
+    mark: Any = {"markersize": 11, "markeredgecolor": "white", "markeredgewidth": 1.5}
+    axes.plot(1e3 * centre[1], 1e3 * centre[0], "o", color=PALETTE[1], label="centre of pressure", **mark)
+    axes.plot(1e3 * turn[0] / turn[2], -1e3 * turn[1] / turn[2], "^", color=PALETTE[3], label="turns about", **mark)
+    axes.set(xlabel="to the left [mm]", ylabel="from the heel [mm]", aspect="equal", xlim=(55, -55))
+    tidy(axes)
+    left.legend(fontsize="small", loc="outside upper center", frameon=False)
     axes = middle.subplots()
     for kind, label, look in (
-        (pf.LimitSurfaceExact, "exact", {"color": PALETTE[0]}),
-        (pf.LimitSurfaceEllipsoid, "ellipsoid", {"color": PALETTE[1], "linestyle": "--"}),
+        (pf.LimitSurfaceExact, "exact", {"color": EXACT}),
+        (pf.LimitSurfaceEllipsoid, "ellipsoid", {"color": ELLIPSOID, "linestyle": "--"}),
     ):
         surface = kind(sole)
         both = np.concatenate([rays[::-1] * [1.0, -1.0, 1.0], rays[1:]])
@@ -86,7 +88,7 @@ def foot() -> PlotFigure:
         _, side, torque = pf.geometry.wrench_at(beside, centre).T
         axes.plot(side, 1e3 * torque, label=label, **look)
     axes.set(xlabel="side force, to the left, over mu f_N", ylabel="torque over mu f_N [mm]", ylim=(0.0, None))
-    axes.legend(fontsize=8)
+    axes.legend(fontsize="small")
     tidy(axes)
     draw_motion(right, pf.simulate(pf.scenes.foot(pf.DistributedModel(pf.ContactPatch.disc(0.03), LAW))))
     return figure
@@ -121,7 +123,7 @@ def slide(gyration: float, ratio: float) -> tuple[np.ndarray, np.ndarray]:
 
 def curling() -> PlotFigure:
     """Ratios over the speed, where they end over the radius of gyration, and the stone."""
-    figure = new_figure(11.0, 3.5)
+    figure = new_figure(9.2, 3.2)
     speed, ends, stone = figure.subplots(1, 3)
     for ratio in (0.2, 0.4, 0.65, 1.0, 1.6, 3.0):
         v, found = slide(math.sqrt(0.5), ratio)
@@ -137,13 +139,13 @@ def curling() -> PlotFigure:
     for limit in (0.5, math.sqrt(2.0 / 3.0)):
         ends.axvline(limit, color="0.6", linewidth=0.8, linestyle=":")
     ends.set(xlabel="radius of gyration over R", ylabel="v/(omega R)", ylim=(1e-2, 1e3))
-    ends.legend(fontsize=8)
+    ends.legend(fontsize="small")
     ice = pf.LuGre(mu_c=0.01, sigma_0=1e5, sigma_1=10.0, sigma_2=0.0)
     data = pf.simulate(pf.scenes.curling(pf.ReducedModel(pf.ContactPatch.ring(0.0585, 0.0645), ice))).data
     stone.plot(data.time, data.vx, color=PALETTE[0], label="speed v")
     stone.plot(data.time, 0.0615 * data.omega, color=PALETTE[1], label="speed of the band, omega R")
-    stone.set(xlabel="time [s]", ylabel="curling stone [m/s]", ylim=(0.0, None))
-    stone.legend(fontsize=8)
+    stone.set(xlabel="time [s]", ylabel="curling stone [m/s]", ylim=(0.0, 3.0))
+    stone.legend(fontsize="small")
     for axes in (speed, ends, stone):
         tidy(axes)
     return figure
@@ -170,7 +172,7 @@ def main(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for make in (pivot, foot, curling, tyre):
         path = folder / f"worlds-{make.__name__}.png"
-        make().savefig(path, dpi=90, facecolor="white", metadata={"Software": None})
+        make().savefig(path, dpi=120, facecolor="white", metadata={"Software": None})
         size = path.stat().st_size
         print(f"{path.name}: {size / 1000:.0f} kB")
         if size > LARGEST:

@@ -18,7 +18,7 @@ import numpy as np
 import torch
 
 import planarfriction as pf
-from planarfriction.plots.style import PALETTE, PlotFigure, new_figure, tidy
+from planarfriction.plots.style import DISTRIBUTED, ELLIPSOID, EXACT, PlotFigure, new_figure, tidy
 from planarfriction.torch.reduced_planar import ReducedPlanarLuGre, simulate, tracking_loss
 
 PAD = pf.ContactPatch.rectangle(0.04, 0.02, cells=14)
@@ -95,26 +95,24 @@ def run(steps: int = 200) -> Comparison:
 
 def draw(compared: Comparison) -> PlotFigure:
     """Plot the torque of the unseen movement, and why the ellipsoid gets it wrong: the torque of steady sliding."""
-    figure = new_figure(10.0, 3.4)
+    figure = new_figure(9.2, 3.4)
     left, right = figure.subplots(1, 2, width_ratios=[1.9, 1.0])
     t, scale = np.arange(STEPS) * DT, 1e3
-    left.plot(t, scale * compared.truth[:, 2], color="0.2", linewidth=2.0, label="distributed, the truth")
-    for (name, fitted), colour in zip(compared.fits.items(), PALETTE[1::-1], strict=True):
+    left.plot(t, scale * compared.truth[:, 2], color=DISTRIBUTED, linewidth=2.6, label="distributed, the truth")
+    for (name, fitted), colour in zip(compared.fits.items(), (ELLIPSOID, EXACT), strict=True):
         left.plot(t, scale * fitted.wrenches[:, 2], color=colour, linewidth=1.0, label=f"fitted, {name}")
     left.set(xlabel="time [s]", ylabel="torque [N mm]", xlim=(0.5 * t[-1], t[-1]))
-    left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, frameon=False, fontsize=8)
+    left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3, frameon=False, fontsize="small")
     surface, angle = pf.LimitSurfaceTable(PAD), np.radians(np.linspace(0.0, 90.0, 181))
     r = surface.contact_radius
     for axis, style in (("x", "-"), ("y", "--")):
         twist = np.zeros((len(angle), 3))
         twist[:, "xy".index(axis)], twist[:, 2] = np.cos(angle), np.sin(angle) / r
         torque = -surface.wrench(twist)[:, 2] / r
-        right.plot(
-            np.degrees(angle), torque, color=PALETTE[0], linestyle=style, label=f"exact surface, slide along {axis}"
-        )
-    right.plot(np.degrees(angle), np.sin(angle), color=PALETTE[1], label="ellipsoid")
+        right.plot(np.degrees(angle), torque, color=EXACT, linestyle=style, label=f"exact surface, slide along {axis}")
+    right.plot(np.degrees(angle), np.sin(angle), color=ELLIPSOID, label="ellipsoid")
     right.set(xlabel="from slide (0) to spin (90) [deg]", ylabel="torque / (mu f_N r)", xticks=[0, 30, 60, 90])
-    right.legend(loc="lower right", frameon=False, fontsize=8)
+    right.legend(loc="lower right", frameon=False, fontsize="small")
     tidy(left)
     tidy(right)
     return figure

@@ -22,7 +22,7 @@ import numpy as np
 from scipy.optimize import brentq
 
 import planarfriction as pf
-from planarfriction.plots.style import PALETTE, new_figure, tidy
+from planarfriction.plots.style import DISTRIBUTED, EXACT, MOMENTS, PALETTE, new_figure, tidy
 
 G = 9.81  # [m/s^2]
 ANGLE, ALONG, ACROSS = np.radians(-50.0), 0.6, 1.0  # grooves from the x axis; coefficients relative to MU
@@ -84,14 +84,14 @@ def draw(slopes: np.ndarray, found: dict[str, list[float]], path: pf.Solution, s
     axes[0].plot([0.0, 0.0], [0.0, -far], color=PALETTE[6], linestyle=":", label="fall line")
     angle = drift(slope)
     axes[0].plot(
-        [0.0, far * np.sin(angle)], [0.0, -far * np.cos(angle)], "--", color=PALETTE[1], label="closed form", zorder=1
+        [0.0, far * np.sin(angle)], [0.0, -far * np.cos(angle)], "--", color=PALETTE[4], label="closed form", zorder=1
     )
     axes[0].set(xlabel="x [mm]", ylabel="y [mm]", aspect="equal", xlim=(-40.0, 130.0))
     axes[0].set_title(f"slope {np.degrees(slope):.0f} deg, {path.data.time[-1]:.2f} s", fontsize=9)
     axes[0].legend(fontsize=8, loc="upper right")
     fine = np.linspace(steepest_at_rest() + 1e-6, np.radians(62.0), 200)
-    axes[1].plot(np.degrees(fine), np.degrees([drift(s) for s in fine]), color=PALETTE[1], label="closed form")
-    for (kind, values), mark, colour in zip(found.items(), "ox", (PALETTE[0], PALETTE[6]), strict=True):
+    axes[1].plot(np.degrees(fine), np.degrees([drift(s) for s in fine]), color=EXACT, label="closed form")
+    for (kind, values), mark, colour in zip(found.items(), "ox", (DISTRIBUTED, MOMENTS), strict=True):
         axes[1].plot(np.degrees(slopes), np.degrees(values), mark, color=colour, label=kind, fillstyle="none")
     axes[1].axvspan(10.0, np.degrees(steepest_at_rest()), color="0.9", label="stays at rest")
     axes[1].set(xlabel="slope [deg]", ylabel="drift from the fall line [deg]", xlim=(10.0, 62.0), ylim=(0.0, None))

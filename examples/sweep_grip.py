@@ -72,10 +72,10 @@ def draw(data: xr.Dataset) -> Any:
     ):
         capped = values.transpose("mu_c", "grip").clip(0.0, 90.0 if "angle" in words else 20.0)
         mesh = axes.pcolormesh(data.grip, data.mu_c, capped, shading="nearest", rasterized=True)
-        figure.colorbar(mesh, ax=axes, label=words)
+        figure.colorbar(mesh, ax=axes, label=words, extend="max")  # what is more is cut
         axes.plot(holding_grip(RATIO * mu), mu, "w--", label="limit of holding")
         axes.set(xlabel="grip of each finger [N]", xlim=(float(data.grip[0]), float(data.grip[-1])))
-    panels[0].set_ylabel("mu_c")
+    panels[0].set_ylabel("friction coefficient mu_c [-]")
     panels[0].legend(loc="upper right", facecolor="tab:gray", labelcolor="white")
     return figure
 
@@ -89,7 +89,7 @@ def main(arguments: list[str] | None = None) -> None:
     agree = (abs(data.angle) < HELD) == (data.grip > holding_grip(RATIO * data.mu_c))
     print(f"held or not, as the limit surface predicts: {int(agree.sum())} of {agree.size} runs")
     path = options.out / "sweep_grip.png"
-    draw(data).savefig(path, dpi=90, facecolor="white", metadata={"Software": None})
+    draw(data).savefig(path, dpi=120, facecolor="white", metadata={"Software": None})
     print(f"wrote {path}")
 
 

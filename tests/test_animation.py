@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 import subprocess
 
 import numpy as np
@@ -390,6 +391,7 @@ def test_a_gif_has_its_frames_at_their_pace(tmp_path):
 def test_an_html_file_plays_by_itself(tmp_path):
     text = synthetic.solution().animate(tmp_path / "motion.html", **SMALL).read_text(encoding="utf-8")
     assert text.count("data:image/png;base64") == 7
+    assert re.search(r"(anim\w+) = new Animation\([^;]*; \1\.play_animation\(\);", text)
     assert "http" not in text.replace("http://www.w3.org", "")  # nothing is fetched
     assert all(each in text for each in ("&minus;</button>", " &gt;</button>", "+</button>"))
 

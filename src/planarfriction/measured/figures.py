@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,10 +17,20 @@ DRAWN = ("uncoupled", "ellipsoid", "exact surface", "toss by toss")
 """Models of an example, where they took part, besides those of the user."""
 
 
+COLOURS = {
+    "uncoupled": style.OTHER,
+    "ellipsoid": style.ELLIPSOID,
+    "exact surface": style.EXACT,
+    "toss by toss": style.PARTS,
+}
+"""Model -> its colour; the others take what is left, one after the other."""
+
+
 def draw(benchmark: Benchmark, task: str) -> style.PlotFigure:
     """The picture of a task."""
     rows = len(benchmark.results[task])
     figure = style.new_figure(10.0, max(3.2, 0.42 * rows + (3.4 if task == "slides" else 1.6)))
+    figure.get_layout_engine().set(w_pad=0.06)  # pyright: ignore[reportOptionalMemberAccess]
     parts: Any = figure.subfigures  # an array of them, which its annotation does not say
     if task == "slides":
         above, below = parts(2, 1, height_ratios=(0.42 * rows + 1.0, 2.6))
@@ -43,9 +53,7 @@ def _dots(part: Any, benchmark: Benchmark, task: str) -> None:
         scores = [result.scores[measure.key] for result in results.values()]
         value = np.array([score.value for score in scores])
         ends = np.array([[score.value - score.low, score.high - score.value] for score in scores]).T
-        axes.errorbar(
-            value, places, xerr=np.maximum(ends, 0.0), fmt="o", color=style.PALETTE[0], markersize=5, elinewidth=1.2
-        )
+        axes.errorbar(value, places, xerr=np.maximum(ends, 0.0), fmt="o", color="0.25", markersize=5, elinewidth=1.2)
         axes.set(xlim=(0.0, None), yticks=places, yticklabels=list(results))
         axes.set_xlabel(measure.heading.replace(", ", "\n"), fontsize="small")
         axes.tick_params(labelsize="small")
@@ -62,22 +70,30 @@ def _chosen(benchmark: Benchmark, task: str) -> dict[str, Any]:
     return {name: results[name] for name in wanted[: len(style.PALETTE)]}
 
 
+def _colours(chosen: Mapping[str, Any]) -> dict[str, str]:
+    """Colour of each of the chosen models."""
+    left = iter(colour for colour in style.PALETTE if colour not in COLOURS.values())
+    return {name: COLOURS.get(name) or next(left, style.OTHER) for name in chosen}
+
+
 def _draw_slides(part: Any, benchmark: Benchmark, count: int = 3) -> None:
     """Ways of a few slides as errors would hide them: how far each went and turned, measured and predicted."""
     test, chosen = benchmark.test("slides"), _chosen(benchmark, "slides")
     shown = slides.by_spin(test, count)
     sure = next((name for name, result in chosen.items() if result.regions is not None), None)
+    colours = _colours(chosen)
     widths = (1.2, 1.0) * count + (1.2,) * (sure is not None)
     every = part.subplots(1, len(widths), width_ratios=widths)
     if sure is not None:
-        _draw_ends(every[-1], test, chosen[sure], style.PALETTE[list(chosen).index(sure)])
+        _draw_ends(every[-1], test, chosen[sure], colours[sure])
     for i, case in enumerate(shown):
         way, turn = every[2 * i : 2 * i + 2]
         index = next(j for j, each in enumerate(test) if each is case)
         first, time = case.answer[0], case.question.time
-        way.plot(*_shift(case.answer, first), color="0.2", linewidth=2.4, label="measured")
-        turn.plot(time, np.degrees(case.answer[:, 2] - first[2]), color="0.2", linewidth=2.4)
-        for colour, (name, result) in zip(style.PALETTE, chosen.items(), strict=False):
+        way.plot(*_shift(case.answer, first), color=style.MEASURED, linewidth=3.0, label="measured")
+        turn.plot(time, np.degrees(case.answer[:, 2] - first[2]), color=style.MEASURED, linewidth=3.0)
+        for name, result in chosen.items():
+            colour = colours[name]
             poses = result.answers[index]
             way.plot(*_shift(poses, first), color=colour, linewidth=1.2, label=name)
             turned = np.degrees(poses[:, 2] - first[2])
@@ -93,12 +109,17 @@ def _draw_slides(part: Any, benchmark: Benchmark, count: int = 3) -> None:
         way.set_title(case.name, fontsize="small", loc="left")
     for axes in every:
         style.tidy(axes)
-        axes.tick_params(labelsize="small")
-        axes.xaxis.label.set_fontsize("small")
-        axes.yaxis.label.set_fontsize("small")
+        _small(axes)
     part.legend(
         *every[0].get_legend_handles_labels(), loc="outside lower center", ncols=6, frameon=False, fontsize="small"
     )
+
+
+def _small(axes: Any) -> None:
+    """Smaller letters on the axes."""
+    axes.tick_params(labelsize="small")
+    axes.xaxis.label.set_fontsize("small")
+    axes.yaxis.label.set_fontsize("small")
 
 
 def ellipse(region: np.ndarray) -> np.ndarray:
@@ -115,8 +136,8 @@ def _draw_ends(axes: Any, test: Sequence[Case], result: Result, colour: str) -> 
     off = np.einsum("kij,ki->kj", ways, off) / np.sqrt(squares)
     axes.plot(*off[:, ::-1].T, ".", color="0.2", markersize=3)
     axes.plot(*ellipse(np.eye(3)).T, color=colour, linewidth=1.2)
-    axes.set(aspect="equal", xlabel="along [half axes]", ylabel="across [half axes]")
-    axes.set_title(f"{len(test)} ends", fontsize="small", loc="left", color=colour)
+    axes.set(aspect="equal", xlabel="along", ylabel="across")
+    axes.set_title(f"{len(test)} ends,\nin half axes", fontsize="small", loc="left", color=colour)
 
 
 def _shift(poses: np.ndarray, first: np.ndarray) -> np.ndarray:
@@ -135,8 +156,8 @@ def _draw_centres(part: Any, benchmark: Benchmark) -> None:
     measured, predicted = 1e3 * centres(case.answer), 1e3 * centres(chosen[name].answers[number])
     for start, end in zip(measured, predicted, strict=True):
         axes.plot(*np.stack([start, end], axis=1), color="0.8", linewidth=0.8, zorder=1)
-    axes.plot(*measured.T, "o", color="0.2", markersize=4, label="measured")
-    axes.plot(*predicted.T, "x", color=style.PALETTE[0], markersize=5, label=name)
+    axes.plot(*measured.T, "o", color=style.MEASURED, markersize=5, label="measured")
+    axes.plot(*predicted.T, "x", color=_colours(chosen)[name], markersize=5, label=name)
     if len(corners) < 10:
         axes.plot(*1e3 * corners.T, "o", color="0.2", markersize=13, fillstyle="none", label="foot")
     limit = 1.6e3 * np.abs(corners).max()
@@ -144,6 +165,7 @@ def _draw_centres(part: Any, benchmark: Benchmark) -> None:
     axes.set_title(f"centres of rotation, {case.question.layout}", fontsize="small", loc="left")
     part.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize="small")
     style.tidy(axes)
+    _small(axes)
 
 
 def centres(twists: np.ndarray) -> np.ndarray:
@@ -162,13 +184,9 @@ def _draw_series(part: Any, benchmark: Benchmark) -> None:
     number = max(wrenches, key=lambda i: len(test[i].scored))
     case, axes = test[number], part.subplots(2, 1, sharex=True)
     time, rows = case.question.time[case.scored], case.scored
-    for colour, name, answer in [
-        ("0.2", "measured", case.answer),
-        *(
-            (c, n, r.answers[number])
-            for c, (n, r) in zip(style.PALETTE, _chosen(benchmark, "series").items(), strict=False)
-        ),
-    ]:
+    chosen = _chosen(benchmark, "series")
+    colours = {"measured": style.MEASURED} | _colours(chosen)
+    for name, answer in {"measured": case.answer, **{n: r.answers[number] for n, r in chosen.items()}}.items():
         fx, fy, tau = answer[rows].T
         way = np.unwrap(np.arctan2(fy, fx))
         way -= (
@@ -176,7 +194,7 @@ def _draw_series(part: Any, benchmark: Benchmark) -> None:
             * np.pi
             * np.round((np.median(way) - np.median(np.arctan2(*case.answer[rows, 1::-1].T))) / (2.0 * np.pi))
         )
-        width = 2.4 if name == "measured" else 1.2
+        colour, width = colours[name], 3.0 if name == "measured" else 1.2
         axes[0].plot(time, np.degrees(way), color=colour, linewidth=width, label=name)
         axes[1].plot(time, np.degrees(np.arctan2(tau / LENGTH, np.hypot(fx, fy))), color=colour, linewidth=width)
     axes[0].set(ylabel="direction of force [deg]")
@@ -187,3 +205,4 @@ def _draw_series(part: Any, benchmark: Benchmark) -> None:
     )
     for each in axes:
         style.tidy(each)
+        _small(each)

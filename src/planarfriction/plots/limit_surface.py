@@ -84,7 +84,7 @@ def interactive_limit_surface(surface: Any, *, beside: Any = "ellipsoid") -> Any
     for column, (directions, mesh) in enumerate(scaled):
         drawn = go.Surface(
             **dict(zip("xyz", np.moveaxis(mesh, -1, 0), strict=True)),
-            customdata=directions,
+            customdata=np.round(directions, 6).tolist(),  # the page reads arrays of two dimensions alone
             hovertemplate=_UNDER_THE_POINTER,
             colorscale="Cividis",
             cmin=-limit,
@@ -92,7 +92,7 @@ def interactive_limit_surface(surface: Any, *, beside: Any = "ellipsoid") -> Any
             showscale=False,
         )
         figure.add_trace(drawn, row=1, col=column + 1)
-    scene: dict[str, Any] = {"aspectmode": "cube", "camera": {"eye": {"x": 1.3, "y": -1.9, "z": 0.9}}}
+    scene: dict[str, Any] = {"aspectmode": "cube", "camera": {"eye": {"x": 1.5, "y": -2.2, "z": 1.0}}}
     for name, text in zip("xyz", _AXES, strict=True):
         scene[f"{name}axis"] = {"range": [-limit, limit], "title": {"text": text}}
     figure.update_scenes(scene)
