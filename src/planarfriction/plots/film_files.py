@@ -75,7 +75,7 @@ def check_kind(path: Path) -> None:
 
 
 def _self_contained(page: bytes) -> bytes:
-    """The page of a player that starts, with signs on its buttons that every browser has and no font from the network."""
+    """The page of a player that starts by itself, with signs on its buttons in place of a font from the network."""
     page = re.sub(rb"<link\b[^>]*>", b"", page)
     page = re.sub(rb"(\w+) = new Animation\([^;]*;", rb"\g<0> \1.play_animation();", page)
     return re.sub(rb'<i class="fa fa-([\w -]+)"></i>', lambda found: SIGNS.get(found[1].decode(), "?").encode(), page)
