@@ -18,7 +18,7 @@ import planarfriction as pf
 from planarfriction.plots.motion import draw_motion
 from planarfriction.plots.style import ELLIPSOID, EXACT, PALETTE, PRESSURE_MAP, PlotFigure, new_figure, tidy
 
-LARGEST = 250_000
+LARGEST = 200_000
 """Largest size of a picture [bytes]."""
 
 DOCS = Path(__file__).parent
@@ -172,7 +172,7 @@ def main(folder: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     for make in (pivot, foot, curling, tyre):
         path = folder / f"worlds-{make.__name__}.png"
-        make().savefig(path, dpi=120, facecolor="white", metadata={"Software": None})
+        make().savefig(path, dpi=110, facecolor="white", metadata={"Software": None})
         size = path.stat().st_size
         print(f"{path.name}: {size / 1000:.0f} kB")
         if size > LARGEST:

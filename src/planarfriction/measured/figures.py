@@ -30,7 +30,7 @@ def draw(benchmark: Benchmark, task: str) -> style.PlotFigure:
     """The picture of a task."""
     rows = len(benchmark.results[task])
     figure = style.new_figure(10.0, max(3.2, 0.42 * rows + (3.4 if task == "slides" else 1.6)))
-    figure.get_layout_engine().set(w_pad=0.06)  # pyright: ignore[reportOptionalMemberAccess]
+    figure.set_layout_engine("constrained", w_pad=0.06)
     parts: Any = figure.subfigures  # an array of them, which its annotation does not say
     if task == "slides":
         above, below = parts(2, 1, height_ratios=(0.42 * rows + 1.0, 2.6))
