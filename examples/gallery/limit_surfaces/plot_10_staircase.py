@@ -15,12 +15,12 @@ line = pf.ContactPatch.line(0.02, cells=9)
 centres = np.linspace(-0.012, 0.012, 601)  # of rotation, along the line
 twists = np.stack([centres, np.zeros_like(centres), np.ones_like(centres)], axis=1)  # about (0, y): vx = y omega
 figure, ax = plt.subplots(figsize=(6.0, 3.6), layout="constrained")
-for name, surface in (
-    ("sum over 9 cells", pf.LimitSurfaceCells(line)),
-    ("exact", pf.LimitSurfaceExact(line)),
-    ("table of the exact surface", pf.LimitSurfaceTable(line)),
+for name, style, surface in (
+    ("sum over 9 cells", "-", pf.LimitSurfaceCells(line)),
+    ("exact", "-", pf.LimitSurfaceExact(line)),
+    ("table of the exact surface", "k:", pf.LimitSurfaceTable(line)),
 ):
-    ax.plot(1e3 * centres, surface.wrench(twists)[:, 0], label=name)
+    ax.plot(1e3 * centres, surface.wrench(twists)[:, 0], style, label=name)
 ax.set(xlabel="centre of rotation, y [mm]", ylabel="fx over mu f_N [-]")
 ax.legend(fontsize=8)
 

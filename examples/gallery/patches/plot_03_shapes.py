@@ -24,8 +24,8 @@ patches = [
 figure, axes = plt.subplots(2, 3, figsize=(8.5, 5.4), layout="constrained", sharex=True, sharey=True)
 for ax, patch in zip(axes.flat, patches, strict=True):
     at = 1e3 * (patch.positions - patch.centre_of_pressure())
-    ax.scatter(*at.T, s=600 * patch.weights() ** 0.5, edgecolor="none")
-    ax.add_patch(plt.Circle((0, 0), 1e3 * patch.contact_radius(), fill=False, color="tab:red"))
+    ax.scatter(*at.T, s=600 * patch.weights() ** 0.5, color="tab:blue", alpha=0.6, edgecolor="none")
+    ax.add_patch(plt.Circle((0, 0), 1e3 * patch.contact_radius(), fill=False, color="tab:red", linewidth=2, zorder=3))
     ax.set(title=f"{patch.name}: {1e3 * patch.contact_radius():.1f} mm", aspect="equal")
 figure.supxlabel("x [mm], contact radius in red")
 

@@ -12,7 +12,7 @@ import planarfriction as pf
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction.patch.parts import split
 
-figure, axes = plt.subplots(1, 3, figsize=(8.4, 3.2), layout="constrained")
+figure, axes = plt.subplots(1, 3, figsize=(8.4, 3.2), layout="constrained", sharex=True, sharey=True)
 for ax, name in zip(axes, ("Circle", "NonConvex1", "NonConvex2"), strict=True):
     patch = PUBLISHED_PATCHES[name]()
     parts = pf.ReducedModel(patch, pf.LuGre(mu_s=1.2, elasto_plastic=0.9), parts="auto").parts
