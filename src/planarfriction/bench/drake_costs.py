@@ -17,7 +17,7 @@ DT, STEPS, ROUNDS = 2e-3, 100, 9
 
 def disc(full: bool, contact: Literal["point", "hydroelastic"]) -> Measurement:
     """Patch friction and Drake's own in turns. Raises `MissingExtraError` without Drake."""
-    from planarfriction.adapters import drake  # noqa: F401  (says how to install Drake)
+    import planarfriction.adapters.drake  # noqa: F401  (says how to install Drake)
 
     runs = [_thrown(Way(contact, patch=patch)) for patch in (True, False)]
     times = np.array([[once(run) for run in runs] for _ in range(ROUNDS)]) / STEPS
