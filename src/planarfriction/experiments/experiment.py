@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import re
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
 from zipfile import BadZipFile
 
 import numpy as np
@@ -24,6 +25,10 @@ THREADS = 2
 
 Arrays = dict[str, np.ndarray]
 
+Key = TypeVar("Key")
+
+Reference = Literal["published", "converged", "closed form"]
+
 
 @dataclass(frozen=True)
 class Comparison:
@@ -31,7 +36,7 @@ class Comparison:
 
     quantity: str
     """What is compared, in words."""
-    reference: Literal["published", "converged", "closed form"]
+    reference: Reference
     difference: float
     """Largest absolute difference over all samples."""
     tolerance: float
@@ -60,7 +65,7 @@ class Comparison:
 
 
 def compare_curve(
-    quantity: str, time: np.ndarray, values: np.ndarray, name: str, *, allowance: float, cause: str
+    quantity: str, time: np.ndarray, values: np.ndarray, name: str, allowance: float, cause: str
 ) -> Comparison:
     """Our curve (`values` at `time`) beside the published curve `name`, at the times of its vertices only.
 
@@ -85,7 +90,7 @@ def compare_curve(
 
 
 def compare_converged(
-    quantity: str, time: np.ndarray, values: np.ndarray, name: str, *, unit: str, allowance: float, cause: str
+    quantity: str, time: np.ndarray, values: np.ndarray, name: str, unit: str, allowance: float, cause: str
 ) -> Comparison:
     """Our curve beside the column `name` of a converged solution, such as `in_hand/Circle/d1/x`, at all its times."""
     solution, _, column = name.rpartition("/")
@@ -100,19 +105,13 @@ def compare_converged(
     )
 
 
-def compare_number(
-    quantity: str,
-    ours: float,
-    theirs: float,
-    *,
-    reference: Literal["published", "converged", "closed form"],
-    tolerance: float,
-    unit: str,
-    cause: str,
+def compare(
+    quantity: str, ours: Any, theirs: Any, reference: Reference, tolerance: float, unit: str, cause: str
 ) -> Comparison:
-    """One number beside its reference."""
-    ours, theirs = float(ours), float(theirs)
-    return Comparison(quantity, reference, abs(ours - theirs), tolerance, unit, 1, cause, ours, theirs)
+    """One number beside its reference, or an array of them, of which the farthest counts."""
+    difference = np.abs(np.asarray(ours) - theirs)
+    values = (None, None) if difference.ndim else (float(ours), float(theirs))
+    return Comparison(quantity, reference, float(difference.max()), tolerance, unit, difference.size, cause, *values)
 
 
 def _at(wanted: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
@@ -142,6 +141,42 @@ class Table:
     headings: Sequence[str]
     rows: Sequence[Sequence[str | float]]
     note: str = ""
+
+
+Item = TypeVar("Item")
+
+
+def table(
+    title: str,
+    items: Mapping[str, Item],
+    columns: Mapping[str, Callable[[Item], str | float]],
+    first: str = "",
+    note: str = "",
+) -> Table:
+    """A row for each item, which its name begins; columns by heading; `first` is the heading of the names."""
+    rows = [[name, *(cell(item) for cell in columns.values())] for name, item in items.items()]
+    return Table(title, [first, *columns], rows, note)
+
+
+def dataset(
+    runs: Mapping[tuple[str, ...], Mapping[str, np.ndarray]],
+    units: Mapping[str, str],
+    dims: Sequence[str],
+    along: tuple[str, np.ndarray, str],
+) -> xr.Dataset:
+    """Columns of runs by their labels, one for each of `dims`, over `along`: its name, values and unit."""
+    import xarray as xr
+
+    labels = [list(dict.fromkeys(each)) for each in zip(*runs, strict=True)]
+    shape = [*map(len, labels), -1]
+    name, values, unit = along
+    columns: dict[str, Any] = {
+        column: ((*dims, name), np.array([runs[key][column] for key in itertools.product(*labels)]).reshape(shape),
+                 {"units": unit})
+        for column, unit in units.items()
+    }  # fmt: skip
+    coordinates = dict(zip(dims, labels, strict=True))
+    return xr.Dataset(columns, coordinates | {name: (name, values, {"units": unit})})
 
 
 @dataclass(frozen=True)
@@ -193,12 +228,14 @@ class Work:
             _write_piece(path, self.fingerprint, arrays)
         return arrays
 
-    def pieces(self, computes: Mapping[str, Callable[[], Mapping[str, Any]]]) -> dict[str, Arrays]:
-        """Independent pieces by label, two at a time: compiled code runs beside other compiled code."""
+    def pieces(
+        self, computes: Mapping[Key, Callable[[], Mapping[str, Any]]], label: Callable[[Key], str] = str
+    ) -> dict[Key, Arrays]:
+        """Independent pieces by key, two at a time: compiled code runs beside other compiled code."""
         pool = ThreadPoolExecutor(THREADS)
         try:
-            futures = {label: pool.submit(self.piece, label, compute) for label, compute in computes.items()}
-            return {label: future.result() for label, future in futures.items()}
+            futures = {key: pool.submit(self.piece, label(key), compute) for key, compute in computes.items()}
+            return {key: future.result() for key, future in futures.items()}
         finally:
             pool.shutdown(cancel_futures=True)
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from planarfriction.experiments import facts
 from planarfriction.experiments.drift.figures import WORDS
 from planarfriction.experiments.drift.runs import MOTION, PERIOD, WIDTH, WINDOWS, Runs
-from planarfriction.experiments.experiment import Comparison, compare_converged, compare_curve, compare_number
+from planarfriction.experiments.experiment import Comparison, compare, compare_converged, compare_curve
 from planarfriction.scenes.ready import drift_force
 from planarfriction.scenes.signal import sample_times
 
@@ -22,7 +23,15 @@ def comparisons(found: Runs, numbers: dict[str, Any], share: float) -> list[Comp
         *_sideways_comparisons(found),
         *_plateau_comparisons(numbers["plateaus"]),
         *_creep_comparisons(found, numbers["creep"], share),
-        _width_comparison(numbers["implied width"]),
+        compare(
+            "width of the patch that the published angle implies",
+            WIDTH,
+            numbers["implied width"],
+            "published",
+            1e-5 * WIDTH,
+            "m",
+            _WIDTH,
+        ),
     ]
 
 
@@ -66,60 +75,38 @@ _SIDEWAYS = (
 
 def _sideways_comparisons(found: Runs) -> list[Comparison]:
     """The path that a disc takes which turns while its patch stays where it is."""
+    cause = r"The integral is taken over samples 0.01 s apart, between which $x$ and $\theta$ oscillate."
     rows = []
     for (load, model), run in found.items():
-        x, turn = run["x"], np.diff(run["theta"])
-        path = np.concatenate([[0.0], np.cumsum(0.5 * (x[1:] + x[:-1]) * turn)])
-        rows.append(
-            Comparison(
-                f"{load} load, {WORDS[model]}, y beside int x dtheta",
-                "closed form",
-                float(np.abs(run["y"] - path).max()),
-                0.1 * float(np.abs(path).max()),
-                "m",
-                len(path),
-                "The integral is taken over samples 0.01 s apart, between which $x$ and $\\theta$ oscillate.",
-            )
-        )
+        path = cumulative_trapezoid(run["x"], run["theta"], initial=0.0)
+        words, tolerance = f"{load} load, {WORDS[model]}, y beside int x dtheta", 0.1 * float(np.abs(path).max())
+        rows.append(compare(words, run["y"], path, "closed form", tolerance, "m", cause))
     return rows
 
 
-_SPRING = r"$x = F/(\sigma_0 f_N)$"
+_SPRING, _LEFT = r"$x = F/(\sigma_0 f_N)$", "what is left is our solver's error."
 
 
 def _plateau_comparisons(plateaus: dict[str, Any]) -> list[Comparison]:
     units, rows = dict(MOTION), []
-    tolerances = {"d_ep": 1e-6, "e_ep": 1e-5, "straight": 5e-4}
-    causes = {
-        "d_ep": rf"{_SPRING}, $\theta = \tau/(\sigma_0 f_N \langle\rho^2\rangle)$: what is left is our solver's error.",
-        "e_ep": rf"{_SPRING}, $\theta = \tau/(\sigma_0 f_N r^2)$: what is left is our solver's error.",
-        "straight": "The deflection along the twist with $h$ parallel to the load: what is left is the disc's mass.",
+    closed_forms = {
+        "d_ep": (1e-6, rf"{_SPRING}, $\theta = \tau/(\sigma_0 f_N \langle\rho^2\rangle)$: {_LEFT}"),
+        "e_ep": (1e-5, rf"{_SPRING}, $\theta = \tau/(\sigma_0 f_N r^2)$: {_LEFT}"),
+        "straight": (
+            5e-4,
+            "The deflection along the twist with $h$ parallel to the load: what is left is the disc's mass.",
+        ),
     }
     for model, closed in plateaus["closed form"].items():
+        share, cause = closed_forms[model]
         for name, value in closed.items():
-            rows.append(
-                compare_number(
-                    f"deflection at 1 s under force and torque, {WORDS[model]}, {name}",
-                    plateaus["measured"][model][name],
-                    value,
-                    reference="closed form",
-                    tolerance=tolerances[model] * value,
-                    unit=units[name],
-                    cause=causes[model],
-                )
-            )
+            words = f"deflection at 1 s under force and torque, {WORDS[model]}, {name}"
+            ours = plateaus["measured"][model][name]
+            rows.append(compare(words, ours, value, "closed form", share * value, units[name], cause))
+    spring = plateaus["closed form"]["d_ep"]["x"]
     for model, x in plateaus["in the tangential run"].items():
-        rows.append(
-            compare_number(
-                f"deflection at 1 s under force alone, {WORDS[model]}, x",
-                x,
-                plateaus["closed form"]["d_ep"]["x"],
-                reference="closed form",
-                tolerance=tolerances["d_ep"] * x,
-                unit="m",
-                cause=f"{_SPRING} with every model: what is left is our solver's error.",
-            )
-        )
+        words = f"deflection at 1 s under force alone, {WORDS[model]}, x"
+        rows.append(compare(words, x, spring, "closed form", 1e-6 * x, "m", f"{_SPRING} with every model: {_LEFT}"))
     return rows
 
 
@@ -136,17 +123,17 @@ def _creep_comparisons(found: Runs, creep: dict[str, Any], share: float) -> list
             words = f"drift per period, {what}, {WORDS[model]}, {name}"
             tolerance = share * float(np.ptp(found[load, model][name]))
             if model.endswith("_ep"):
-                row = compare_number(words, ours, 0.0, reference="closed form", tolerance=tolerance,
-                                     unit=units[name], cause=_NO_DRIFT)  # fmt: skip
+                rows.append(compare(words, ours, 0.0, "closed form", tolerance, units[name], _NO_DRIFT))
             elif load == "tangential":
-                row = compare_number(words, ours, _converged_creep(model, name, what), reference="converged",
-                                     tolerance=tolerance, unit=units[name], cause=_TWICE)  # fmt: skip
-            else:
-                continue
-            rows.append(row)
+                theirs = _converged_creep(model, name, what)
+                rows.append(compare(words, ours, theirs, "converged", tolerance, units[name], _TWICE))
     return rows
 
 
+_WIDTH = (
+    r"$\theta = \tau/(\sigma_0 f_N \langle\rho^2\rangle)$ at the largest torque: the patch of the figures is "
+    "0.05 m wide, where the article gives 0.05 m as its radius."
+)
 _NO_DRIFT = "Below the breakaway deflection elasto-plastic bristles are springs: what is left is our solver's error."
 
 
@@ -154,17 +141,3 @@ def _converged_creep(model: str, name: str, what: str) -> float:
     reference, (start, end) = facts.converged(f"drift/{model}"), WINDOWS[what]
     first, last = (reference[name][np.abs(reference["time"] - time).argmin()] for time in (start, end))
     return float(last - first) / round((end - start) / PERIOD)
-
-
-def _width_comparison(implied: float) -> Comparison:
-    return compare_number(
-        "width of the patch that the published angle implies",
-        WIDTH,
-        implied,
-        reference="published",
-        tolerance=1e-5 * WIDTH,
-        unit="m",
-        cause=r"$\theta = \tau/(\sigma_0 f_N \langle\rho^2\rangle)$ at the largest torque: the patch of the figures is "
-        "0.05 m wide, where "
-        "the article gives 0.05 m as its radius.",
-    )

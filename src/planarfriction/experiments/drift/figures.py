@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from planarfriction.experiments import facts, looks
+from planarfriction.experiments import looks
 from planarfriction.experiments.experiment import Arrays
 from planarfriction.experiments.runs import NAMES
 from planarfriction.plots.style import LINE_STYLES, PlotFigure, new_figure, tidy
@@ -25,6 +25,7 @@ WORDS = {
 ROWS = (("x", "$x$ [nm]", 1e9), ("theta", "$\\theta$ [µrad]", 1e6))
 LAW_LINES = {"": LINE_STYLES[1], "_ep": "-"}
 LAW_WORDS = {"": "plain", "_ep": "elasto-plastic"}
+DOTS: dict[str, Any] = {"ms": 2.4, "mew": 0.6}
 LOAD_COLOURS = {"fx": "0.15", "tau": "0.55", "normal": "0.55"}
 
 
@@ -40,14 +41,14 @@ def motion(load: Literal["tangential", "normal"], found: dict[tuple[str, str], A
                 run, colour = found[load, kind + law], looks.OF_MODEL[kind]
                 axes.plot(run["time"], factor * run[name], color=colour, ls=line, lw=1.3, label=LAW_WORDS[law])
                 if load == "tangential":
-                    _vertices(axes, f"drift/{kind}{law}/{name}", factor, colour)
+                    looks.vertices(axes, f"drift/{kind}{law}/{name}", factor, colour, **DOTS)
             if column == 0:
                 axes.set_ylabel(label)
             tidy(axes)
     for axes in panels[-1]:
         axes.set(xlabel="time [s]", xlim=(0.0, 5.0))
     figure.align_ylabels(panels[:, 0])
-    figure.legend(handles=_key(load), loc="outside upper center", ncols=4, frameon=False, fontsize=9)
+    looks.legend(figure, _key(load), 4, fontsize=9)
     return figure
 
 
@@ -71,8 +72,7 @@ def plateaus(found: dict[tuple[str, str], Arrays], straight: Arrays, numbers: di
                 axes.axhline(factor * closed[name], color=colour, ls=LINE_STYLES[2], lw=1.0, zorder=1)
         axes.set(xlabel="time [s]", ylabel=label, xlim=(0.0, 1.0), ylim=(0.0, None))
         tidy(axes)
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=4, frameon=False, fontsize=9)
+    looks.legend(figure, figure.axes[0], 4, fontsize=9)
     return figure
 
 
@@ -84,8 +84,8 @@ def _draw_load(axes: Any, load: Literal["tangential", "normal"], run: Arrays, *,
     other = axes.twinx()
     if load == "tangential":
         other.plot(time, 1e3 * applied[:, 2], color=LOAD_COLOURS["tau"], lw=1.0)
-        _vertices(axes, "drift/applied/fx", 1.0, LOAD_COLOURS["fx"], every=4)
-        _vertices(other, "drift/applied/tau", 1e3, LOAD_COLOURS["tau"], every=4)
+        looks.vertices(axes, "drift/applied/fx", 1.0, LOAD_COLOURS["fx"], slice(None, None, 4), **DOTS)
+        looks.vertices(other, "drift/applied/tau", 1e3, LOAD_COLOURS["tau"], slice(None, None, 4), **DOTS)
         other.set_ylim(0.0, 120.0)
         label = "$\\tau$ [N mm]"
     else:
@@ -102,24 +102,15 @@ def _draw_load(axes: Any, load: Literal["tangential", "normal"], run: Arrays, *,
     other.spines["top"].set_visible(False)
 
 
-def _vertices(axes: Any, name: str, factor: float, colour: str, *, every: int = 1) -> None:
-    curve = facts.published_curve(name)
-    time, values = curve.time[::every], factor * curve.values[::every]
-    axes.plot(time, values, ls="", marker="o", ms=2.4, mfc="white", mec=colour, mew=0.6, zorder=3)
-
-
 def _key(load: str) -> list[Any]:
-    from matplotlib.lines import Line2D
-
     lines = [
         (looks.OF_MODEL[kind], line, f"{NAMES[kind]}, {LAW_WORDS[law]}")
         for kind in "dr"
         for law, line in LAW_LINES.items()
     ]
-    lines.append((LOAD_COLOURS["fx"], "-", "applied $f_x$"))
     other = ("tau", "applied $\\tau$") if load == "tangential" else ("normal", "normal force")
-    lines.append((LOAD_COLOURS[other[0]], "-", other[1]))
-    handles = [Line2D([], [], color=colour, ls=line, lw=1.4, label=words) for colour, line, words in lines]
+    lines += [(LOAD_COLOURS["fx"], "-", "applied $f_x$"), (LOAD_COLOURS[other[0]], "-", other[1])]
+    handles = [looks.line_key(words, color=colour, ls=line, lw=1.4) for colour, line, words in lines]
     if load == "tangential":
-        handles.append(Line2D([], [], ls="", marker="o", ms=3, mfc="white", mec="0.3", label="published"))
+        handles.append(looks.line_key("published", ls="", marker="o", ms=3, mfc="white", mec="0.3"))
     return handles

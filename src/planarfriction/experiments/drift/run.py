@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from planarfriction.experiments.drift import figures
 from planarfriction.experiments.drift.comparisons import comparisons
+from planarfriction.experiments.drift.figures import LAW_WORDS, WORDS
 from planarfriction.experiments.drift.runs import (
-    LAWS,
     LOADS,
     MODELS,
     MOTION,
@@ -21,8 +20,8 @@ from planarfriction.experiments.drift.runs import (
     move,
     straight_ramp,
 )
-from planarfriction.experiments.drift.tables import creep_table, told
-from planarfriction.experiments.experiment import Result, Work
+from planarfriction.experiments.experiment import Result, Table, Work, dataset, table
+from planarfriction.experiments.runs import NAMES
 from planarfriction.experiments.wording import fill
 from planarfriction.scenes.ready import drift_force
 
@@ -33,17 +32,11 @@ if TYPE_CHECKING:
 def run(work: Work) -> Result:
     """Carry out the experiment."""
     rtol, atol, share = QUICK if work.quick else TIGHT
-    keys: list[tuple[Load, str]] = [(load, model) for load in LOADS for model in MODELS[load]]
-    pieces = work.pieces(
-        {
-            f"drift, {load}, {model}": lambda load=load, model=model: move(load, model, rtol, atol)
-            for load, model in keys
-        }
-    )
-    found: Runs = dict(zip(keys, pieces.values(), strict=True))
+    moved = {(load, model): partial(move, load, model, rtol, atol) for load in LOADS for model in MODELS[load]}
+    found = work.pieces(moved, lambda key: f"drift, {', '.join(key)}")
     straight = work.piece("drift, straight ramp", lambda: straight_ramp(rtol, atol))
     numbers = measure(found, straight)
-    return fill("drift", **told(numbers)).result(
+    return fill("drift", **_told(numbers)).result(
         {
             "drift_tangential": figures.motion("tangential", found),
             "drift_normal": figures.motion("normal", found),
@@ -51,22 +44,40 @@ def run(work: Work) -> Result:
         },
         comparisons=comparisons(found, numbers, share),
         numbers=numbers | {"rtol": rtol, "atol": atol},
-        tables=(creep_table(numbers),),
+        tables=(_creep_table(numbers),),
         data={load: _dataset(load, found) for load in LOADS},
     )
 
 
-def _dataset(load: Load, found: Runs) -> xr.Dataset:
-    import xarray as xr
+def _told(numbers: dict[str, Any]) -> dict[str, Any]:
+    """What the template names."""
+    creep = numbers["creep"]
+    grown = creep["normal force"]
+    return numbers | {
+        "still": {name: max(abs(each["d_ep"][name]) for each in creep.values()) for name in ("x", "theta")},
+        "share": max(abs(grown["r_ep"][name] / grown["r"][name]) for name in ("x", "theta")),
+        "measured": numbers["plateaus"]["measured"],
+        "closed": numbers["plateaus"]["closed form"],
+        "width": numbers["implied width"],
+    }
 
+
+def _creep_table(numbers: dict[str, Any]) -> Table:
+    """Drift per period of the load, by what oscillates."""
+    moved = {
+        f"{what}; {WORDS[model]}": each for what, models in numbers["creep"].items() for model, each in models.items()
+    }
+    columns = {
+        "x [nm]": lambda each: float(f"{1e9 * each['x']:.4g}"),
+        "theta [µrad]": lambda each: float(f"{1e6 * each['theta']:.4g}"),
+    }
+    return table("Drift per period of 1/3 s", moved, columns, "what oscillates; model")
+
+
+def _dataset(load: Load, found: Runs) -> xr.Dataset:
     time = found[load, "d"]["time"]
-    columns: dict[str, Any] = {}
-    for name, unit in MOTION:
-        values = [[found[load, kind + law][name] for law in LAWS] for kind in "dr"]
-        columns[name] = (("model", "bristles", "time"), np.array(values), {"units": unit})
-    applied = drift_force(load).left(time)
-    for name, unit, values in zip(("fx", "fy", "tau"), ("N", "N", "N m"), applied.T, strict=True):
-        columns[f"applied_{name}"] = ("time", values, {"units": unit})
-    columns["normal_force"] = ("time", found[load, "d"]["normal_force"], {"units": "N"})
-    coordinates = {"model": ["distributed", "reduced"], "bristles": ["plain", "elasto-plastic"]}
-    return xr.Dataset(columns, coordinates | {"time": ("time", time, {"units": "s"})})
+    runs = {(NAMES[kind], words): found[load, kind + law] for kind in "dr" for law, words in LAW_WORDS.items()}
+    result = dataset(runs, dict(MOTION), ("model", "bristles"), ("time", time, "s"))
+    applied = zip(("fx", "fy", "tau"), ("N", "N", "N m"), drift_force(load).left(time).T, strict=True)
+    columns = {f"applied_{name}": ("time", values, {"units": unit}) for name, unit, values in applied}
+    return result.assign(columns | {"normal_force": ("time", found[load, "d"]["normal_force"], {"units": "N"})})

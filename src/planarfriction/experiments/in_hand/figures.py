@@ -7,28 +7,29 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction.experiments import facts, looks
+from planarfriction.experiments import looks as report_looks
 from planarfriction.experiments.experiment import Arrays
+from planarfriction.experiments.looks import DISTRIBUTED, EXACT, OTHERS, REDUCED
 from planarfriction.plots.motion import draw_motion
-from planarfriction.plots.style import LINE_STYLES, PALETTE, PlotFigure, new_figure, tidy
+from planarfriction.plots.style import LINE_STYLES, PlotFigure, new_figure, tidy
 from planarfriction.scenes import Scene, Solution
 from planarfriction.scenes.solution import History
 from planarfriction.solvers.statistics import Statistics
 
 AXES = {
     "normal_force": ("normal force [N]", 1.0),
-    "x": ("x [mm]", 1e3),
-    "y": ("y [mm]", 1e3),
-    "theta": ("θ [deg]", 180.0 / np.pi),
-    "fx": ("fx [N]", 1.0),
-    "fy": ("fy [N]", 1.0),
-    "tau": ("τ [N mm]", 1e3),
+    "x": ("$x$ [mm]", 1e3),
+    "y": ("$y$ [mm]", 1e3),
+    "theta": ("$\\theta$ [deg]", 180.0 / np.pi),
+    "fx": ("$f_x$ [N]", 1.0),
+    "fy": ("$f_y$ [N]", 1.0),
+    "tau": ("$\\tau$ [N mm]", 1e3),
 }
 """Column of a run -> its label on an axis, shown units per SI unit."""
 
 LOOKS: dict[str, dict[str, Any]] = {
-    "distributed": {"color": looks.DISTRIBUTED, "linewidth": 1.5},
-    "reduced": {"color": looks.REDUCED, "linewidth": 1.5, "linestyle": LINE_STYLES[1]},
+    "distributed": {"color": DISTRIBUTED, "linewidth": 1.5},
+    "reduced": {"color": REDUCED, "linewidth": 1.5, "linestyle": LINE_STYLES[1]},
 }
 """Model -> how its line looks."""
 
@@ -67,10 +68,8 @@ def histories(
     for axes, name in zip(grid[:, 0], names, strict=True):
         axes.set_ylabel(AXES[name][0])
     figure.align_ylabels(grid)
-    handles, labels = grid[-1, 0].get_legend_handles_labels()
-    figure.legend(
-        handles, labels, loc="outside upper center", ncols=len(labels) if len(labels) < 5 else 3, frameon=False
-    )
+    labels = len(grid[-1, 0].get_legend_handles_labels()[1])
+    report_looks.legend(figure, grid[-1, 0], labels if labels < 5 else 3)
     return figure
 
 
@@ -86,16 +85,13 @@ def _draw_runs(axes: Any, name: str, runs: Mapping[str, Arrays], looks: Mapping[
 
 
 def _draw_published(axes: Any, name: str, keys: Mapping[str, str], looks: Mapping[str, Mapping[str, Any]]) -> None:
-    dots = {"linestyle": "none", "marker": "o", "markersize": 2.8, "markerfacecolor": "white", "markeredgewidth": 0.7}
     if name == "normal_force":
         for key in sorted({f"in_hand/load/{key[-1]}" for key in keys.values()}):
-            curve = facts.published_curve(key)
-            axes.plot(curve.time, curve.values, **dots, markeredgecolor="0.25")
+            report_looks.vertices(axes, key, 1.0, "0.25", ms=2.8)
         return
     for label, key in keys.items():
-        curve = facts.published_curve(f"{key}/{name}")
-        edge = {"markeredgecolor": looks[label]["color"], "label": f"{label}, published"}
-        axes.plot(curve.time, AXES[name][1] * curve.values, **dots, **edge)
+        words = f"{label}, published"
+        report_looks.vertices(axes, f"{key}/{name}", AXES[name][1], looks[label]["color"], ms=2.8, label=words)
 
 
 def distances(
@@ -109,32 +105,30 @@ def distances(
     row = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
     for axes, (title, lines) in zip(row, panels.items(), strict=True):
         for i, (words, (time, values)) in enumerate(lines.items()):
-            look = {"color": PALETTE[i % len(PALETTE)], "linestyle": LINE_STYLES[i % len(LINE_STYLES)]}
+            look = {"color": OTHERS[i % len(OTHERS)], "linestyle": LINE_STYLES[i % len(LINE_STYLES)]}
             axes.plot(time, 1e3 * values, label=words, **({"linewidth": 1.4} | look if looks is None else looks[words]))
         axes.set(title=title, xlabel="time [s]")
         axes.title.set_fontsize("medium")
         tidy(axes)
     row[0].set_ylabel(label)
     row[0].set_ylim(bottom=0.0)  # after all lines: it ends the scaling of the shared axis
-    figure.legend(
-        *row[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False, fontsize="small"
-    )
+    report_looks.legend(figure, row[0], 4, "lower", fontsize="small")
     return figure
 
 
-def end_shifts(rows: Mapping[str, Mapping[str, float]]) -> PlotFigure:
-    """What moves the end [m], by case and by cause, on a logarithmic axis."""
+def end_shifts(rows: Mapping[str, Mapping[str, float]], colours: Mapping[str, str], label: str) -> PlotFigure:
+    """What moves the end [m], by case and by cause, on a logarithmic axis called `label`; friction is black."""
     figure = new_figure(8.6, 1.5 + 0.36 * len(rows))
     axes = figure.subplots()
     causes = list(dict.fromkeys(cause for shifts in rows.values() for cause in shifts))
     for cause, marker in zip(causes, "<>oD^", strict=False):
         places = [j for j, shifts in enumerate(rows.values()) if cause in shifts]
         shown = [1e3 * shifts[cause] for shifts in rows.values() if cause in shifts]
-        colour = looks.OF_CAUSE.get(cause, looks.EXACT)
+        colour = colours.get(cause, EXACT)
         axes.plot(shown, places, linestyle="none", marker=marker, markersize=6.5, color=colour, label=cause)
-    axes.set(xscale="log", xlabel="shift of the end [mm]", ylim=(len(rows) - 0.5, -0.5))
+    axes.set(xscale="log", xlabel=label, ylim=(len(rows) - 0.5, -0.5))
     axes.margins(x=0.08)
     axes.set_yticks(range(len(rows)), list(rows))
     tidy(axes)
-    figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=3, frameon=False)
+    report_looks.legend(figure, axes, 3)
     return figure

@@ -78,8 +78,7 @@ def correspondence(surfaces: Mapping[str, LimitSurfaceCells]) -> PlotFigure:
         column = 1 if name in ACROSS_Y else 0
         _section(axes, surface, column)
         axes.set_title(IN_WORDS[name], fontsize="medium")
-    handles, labels = panels[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=3, frameon=False)
+    looks.legend(figure, panels[0, 0], 3)
     return figure
 
 
@@ -114,14 +113,13 @@ def gradient_line(surface: LimitSurfaceCells, numbers: dict[str, Any]) -> PlotFi
     figure = new_figure(10.0, 4.6)
     load, force, section = figure.subplots(1, 3, width_ratios=(0.55, 1.0, 1.25))
     centres = (
-        ("about the centre of pressure", numbers["cells"]["centre of pressure"], looks.OTHER, "D"),
-        ("about the middle of the load", numbers["cells"]["middle cell"], looks.MOMENTS, "o"),
+        ("about the centre of pressure", numbers["cells"]["centre of pressure"], looks.OTHERS[1], "D"),
+        ("about the middle of the load", numbers["cells"]["middle cell"], looks.OTHERS[2], "o"),
     )
     _load_panel(load, numbers, centres)
     _force_panel(force, surface, numbers, centres)
     _spin_panel(section, surface, numbers, centres)
-    handles, labels = section.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=3, frameon=False, fontsize="small")
+    looks.legend(figure, section, 3, fontsize="small")
     return figure
 
 

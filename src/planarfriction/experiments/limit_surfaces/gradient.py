@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from planarfriction import geometry
-from planarfriction.experiments.experiment import Comparison, compare_number
+from planarfriction.experiments.experiment import Comparison, compare
+from planarfriction.experiments.limit_surfaces.patches import LUMPED
 from planarfriction.limit_surface import LimitSurfaceCells, LimitSurfaceEllipsoid
 from planarfriction.patch import PUBLISHED_PATCHES
 
@@ -98,67 +99,37 @@ def gradient_comparisons(numbers: Numbers) -> list[Comparison]:
     beyond = total - k * (k + 1) // 2  # weights between that cell and the heavy end
     above = sum(range(math.ceil((2 * CELLS + 1) / 3), CELLS + 1))  # the centre of pressure lies at (2 N + 1)/3
     lumped = cell**2 / (12.0 * ours["radius"])
-    lumping = "Each cell's load stands at its middle, which shortens the mean distance by about cell^2/(24 distance)."
+    rounding = "Weights on both sides of {}: rounding."
     rows: list[tuple[str, float, float, float, str, str]] = [
         (
-            "centre of the spin without force",
-            ours["equal halves"],
-            (k - 0.5 * (CELLS + 1)) * cell,
-            1e-9,
-            "m",
+            "centre of the spin without force", ours["equal halves"], (k - 0.5 * (CELLS + 1)) * cell, 1e-9, "m",
             "The search for the twist of a torque ends next to the cell that holds the middle of the load.",
         ),
         (
-            "force of the spin about that cell",
-            ours["force at equal halves"],
-            (beyond - (total - beyond - k)) / total,
-            1e-12,
-            "N",
-            "Weights on both sides of a cell that adds nothing: rounding.",
+            "force of the spin about that cell", ours["force at equal halves"], (2 * beyond + k - total) / total, 1e-12,
+            "N", rounding.format("a cell that adds nothing"),
         ),
         (
-            "force of the spin about the centre of pressure",
-            ours["force"],
-            (2 * above - total) / total,
-            1e-12,
-            "N",
-            "Weights on both sides of the centre of pressure: rounding.",
+            "force of the spin about the centre of pressure", ours["force"], (2 * above - total) / total, 1e-12, "N",
+            rounding.format("the centre of pressure"),
         ),
         (
             "centre of the spin without force, line, linear pressure, beside a continuous one",
-            ours["equal halves"],
-            smooth["equal halves"],
-            0.5 * cell,
-            "m",
+            ours["equal halves"], smooth["equal halves"], 0.5 * cell, "m",
             "A sum over cells can change the sign of its force at a cell only: up to half a cell.",
         ),
         (
             "centre of pressure, line, linear pressure, beside a continuous one",
-            ours["centre of pressure"],
-            smooth["centre of pressure"],
-            cell / (6.0 * (CELLS + 1)) + 1e-12,
-            "m",
-            "Each cell's load stands at its middle instead of a little nearer to the heavy end: cell^2/(12 (s + "
-            "floor)).",
+            ours["centre of pressure"], smooth["centre of pressure"], cell / (6.0 * (CELLS + 1)) + 1e-12, "m",
+            "Each cell's load stands at its middle, that of a continuous line a little nearer to the heavy end.",
         ),
         (
             "contact radius, line, linear pressure, beside a continuous one",
-            ours["radius"],
-            smooth["radius"],
-            lumped,
-            "m",
-            lumping,
+            ours["radius"], smooth["radius"], lumped, "m", LUMPED,
         ),
         (
             "torque of the spin without force, line, linear pressure",
-            ours["torque"],
-            smooth["torque"],
-            lumped,
-            "m",
-            lumping,
+            ours["torque"], smooth["torque"], lumped, "m", LUMPED,
         ),
-    ]
-    return [
-        compare_number(name, found, expected, reference="closed form", tolerance=tolerance, unit=unit, cause=cause)
-        for name, found, expected, tolerance, unit, cause in rows
-    ]
+    ]  # fmt: skip
+    return [compare(name, found, expected, "closed form", *rest) for name, found, expected, *rest in rows]

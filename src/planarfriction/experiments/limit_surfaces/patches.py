@@ -6,8 +6,10 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
+import numpy as np
+
 from planarfriction.experiments import facts
-from planarfriction.experiments.experiment import Comparison, compare_number
+from planarfriction.experiments.experiment import Comparison, compare
 from planarfriction.experiments.runs import IN_WORDS
 from planarfriction.limit_surface import LimitSurfaceTablePublished
 from planarfriction.patch import ContactPatch
@@ -19,11 +21,11 @@ Numbers = dict[str, Any]
 
 LAST_DIGIT = {
     "loaded cells": (0.0, "1", "A count."),
-    "centre of pressure x [m]": (6e-10, "m", "Printed to 1e-9 m: rounding."),
-    "centre of pressure y [m]": (6e-10, "m", "Printed to 1e-9 m: rounding."),
-    "contact radius, plain sum [m]": (6e-12, "m", "Printed to 1e-11 m: rounding."),
-    "contact radius, as published [m]": (6e-12, "m", "Printed to 1e-11 m: rounding."),
-    "second moment [m^2]": (6e-12, "m^2", "Printed to 1e-11 m^2: rounding."),
+    "centre of pressure x [m]": (6e-10, "m", "Printed to $10^{-9}$ m: rounding."),
+    "centre of pressure y [m]": (6e-10, "m", "Printed to $10^{-9}$ m: rounding."),
+    "contact radius, plain sum [m]": (6e-12, "m", "Printed to $10^{-11}$ m: rounding."),
+    "contact radius, as published [m]": (6e-12, "m", "Printed to $10^{-11}$ m: rounding."),
+    "second moment [m^2]": (6e-12, "m^2", "Printed to $10^{-11}$ m²: rounding."),
 }
 """Column of the table of patches -> half a unit of its last digit and a little, unit, cause."""
 
@@ -50,9 +52,9 @@ def patch_comparisons(ours: Mapping[str, Numbers]) -> list[Comparison]:
     published = facts.published_table("patches")
     rows = []
     for column, (tolerance, unit, cause) in LAST_DIGIT.items():
-        difference = max(abs(ours[name][column] - row[column]) for name, row in published.items())
+        found, expected = (np.array([each[name][column] for name in published]) for each in (ours, published))
         quantity = f"table of patches, {column.partition(' [')[0]}"
-        rows.append(Comparison(quantity, "published", difference, tolerance, unit, len(published), cause))
+        rows.append(compare(quantity, found, expected, "published", tolerance, unit, cause))
     return rows
 
 
@@ -75,15 +77,12 @@ def disc_numbers(mask: ContactPatch) -> Numbers:
 def shape_comparisons(numbers: Numbers) -> list[Comparison]:
     """Moments of discs, square and lines beside closed forms; the ellipsoid's largest error on the lines too."""
     rows = [*_disc_rows(numbers), *_grid_rows(numbers["patches"]), *_line_rows(numbers)]
-    return [
-        compare_number(name, found, expected, reference="closed form", tolerance=tolerance, unit=unit, cause=cause)
-        for name, found, expected, tolerance, unit, cause in rows
-    ]
+    return [compare(name, found, expected, "closed form", *rest) for name, found, expected, *rest in rows]
 
 
 _Row = tuple[str, float, float, float, str, str]
 
-_LUMPED = (
+LUMPED = (
     r"Each cell's load stands at its middle: at the distance $d$ the mean distance lacks about $c^2/(24\,d)$, for "
     "cells of width $c$."
 )
@@ -96,20 +95,14 @@ def _disc_rows(numbers: Numbers) -> list[_Row]:
     lost = cell**2 / 6.0
     ragged = "Its cells stand in whole rows: the rim is ragged, and each cell's load stands at its middle."
     lumped = "Each cell's load stands at its middle: a cell's own second moment, $c^2/6$ for the width $c$, is missing."
+    grid = disc["contact radius on the grid"], disc["second moment on the grid"]
     rows: list[_Row] = []
-    for name, radius, found, causes in (
+    for name, radius, (first, second), causes in (
         ("mask of 317 cells", disc["equal-area radius"], _moments(mask), (ragged, ragged)),
-        (
-            "disc cut by its rim",
-            disc["radius"],
-            (disc["contact radius on the grid"], disc["second moment on the grid"]),
-            (_LUMPED, lumped),
-        ),
+        ("disc cut by its rim", disc["radius"], grid, (LUMPED, lumped)),
     ):
-        rows.append(
-            (f"contact radius, {name}", found[0], 2.0 * radius / 3.0, cell**2 / (12.0 * found[0]), "m", causes[0])
-        )
-        rows.append((f"second moment, {name}", found[1], 0.5 * radius**2, lost, "m^2", causes[1]))
+        rows.append((f"contact radius, {name}", first, 2.0 * radius / 3.0, cell**2 / (12.0 * first), "m", causes[0]))
+        rows.append((f"second moment, {name}", second, 0.5 * radius**2, lost, "m^2", causes[1]))
     return rows
 
 
@@ -134,32 +127,23 @@ def _grid_rows(patches: Mapping[str, Numbers]) -> list[_Row]:
     for name, value in (("Square", square), ("Line", 0.25 * WIDTH)):
         found = _moments(patches[name])[0]
         rows.append(
-            (f"contact radius, {IN_WORDS[name]}, without cells", found, value, cell**2 / (12.0 * found), "m", _LUMPED)
+            (f"contact radius, {IN_WORDS[name]}, without cells", found, value, cell**2 / (12.0 * found), "m", LUMPED)
         )
     return rows
 
 
 def _line_rows(numbers: Numbers) -> list[_Row]:
     """Largest distance of corresponding points: the whole line slides one way, the ellipsoid still sees a spin."""
-    cell = WIDTH / CELLS
-    rows: list[_Row] = []
+    cell, rows = WIDTH / CELLS, []
+    cause = "Centre of rotation just beyond the last cell: the force is 1 and the torque 0, of what the search finds."
     for name in ("Line", "LineGrad"):
         row = numbers["patches"][name]
         middle, radius = row["centre of pressure y [m]"], row["contact radius, plain sum [m]"]
         end = 0.5 * (CELLS - 1) * cell - middle  # the nearer one, at the heavy end
         expected = math.sqrt(2.0 - 2.0 * end / math.hypot(end, radius))
-        found = numbers["ellipsoid"][name]["points, max"]
-        cause = (
-            "Centre of rotation just beyond the last cell: the force is 1 and the torque 0, of what the search finds."
+        words, found = (
+            f"ellipsoid, largest distance of corresponding points, {IN_WORDS[name]}",
+            numbers["ellipsoid"][name],
         )
-        rows.append(
-            (
-                f"ellipsoid, largest distance of corresponding points, {IN_WORDS[name]}",
-                found,
-                expected,
-                1e-5,
-                "1",
-                cause,
-            )
-        )
+        rows.append((words, found["points, max"], expected, 1e-5, "1", cause))
     return rows

@@ -8,18 +8,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from planarfriction import geometry
-from planarfriction.experiments.experiment import Result, Work
+from planarfriction.experiments import facts
+from planarfriction.experiments.experiment import Result, Table, Work, table
 from planarfriction.experiments.limit_surfaces import figures
 from planarfriction.experiments.limit_surfaces.gradient import gradient_comparisons, gradient_numbers
 from planarfriction.experiments.limit_surfaces.patches import (
+    LAST_DIGIT,
     disc_numbers,
     patch_comparisons,
     patch_numbers,
     shape_comparisons,
 )
-from planarfriction.experiments.limit_surfaces.tables import tables, told
-from planarfriction.experiments.runs import SIX_SHAPES
-from planarfriction.experiments.wording import fill
+from planarfriction.experiments.runs import IN_WORDS, SIX_SHAPES
+from planarfriction.experiments.wording import fill, span
 from planarfriction.limit_surface import (
     LimitSurface,
     LimitSurfaceCells,
@@ -43,6 +44,10 @@ REFINEMENTS, REFINED = 30, 0.5
 STORED = {"published": LimitSurfaceTablePublished, "smooth": LimitSurfaceTable, "sum over cells": LimitSurfaceCells}
 """What is measured beside the exact surface."""
 
+Numbers = dict[str, Any]
+
+UNITS = {"fx": "N", "fy": "N", "tau": "N m"}
+
 COARSER = 2
 """The tables are measured at so many times fewer angles, and never at a node: an exact surface costs more."""
 
@@ -52,8 +57,9 @@ def run(work: Work) -> Result:
     patches = {name: make() for name, make in PUBLISHED_PATCHES.items()}
     surfaces = {name: LimitSurfaceCells(patches[name]) for name in SIX_SHAPES}
     count = (DIRECTIONS[0] // 4, DIRECTIONS[1] // 4) if work.quick else DIRECTIONS
-    found = work.pieces({f"{name}, {count[0]} polar angles": _measured(surfaces[name], count) for name in surfaces})
-    errors = {name: _by_name(arrays) for name, arrays in zip(surfaces, found.values(), strict=True)}
+    measured = {name: _measured(surface, count) for name, surface in surfaces.items()}
+    found = work.pieces(measured, lambda name: f"{name}, {count[0]} polar angles")
+    errors = {name: _by_name(arrays) for name, arrays in found.items()}
     gradient = gradient_numbers()
     numbers = {
         "patches": patch_numbers(patches),
@@ -62,7 +68,7 @@ def run(work: Work) -> Result:
         "tables": {name: {key: each[key] for key in STORED} for name, each in errors.items()},
         "gradient": gradient,
     }
-    return fill("limit_surfaces", **told(numbers)).result(
+    return fill("limit_surfaces", **_told(numbers)).result(
         {
             "surfaces": figures.overview(surfaces, coarse=work.quick),
             "correspondence": figures.correspondence(surfaces),
@@ -74,7 +80,7 @@ def run(work: Work) -> Result:
             *gradient_comparisons(gradient),
         ],
         numbers=numbers,
-        tables=tables(numbers),
+        tables=(_patches(numbers["patches"]), _ellipsoid(numbers["ellipsoid"]), _stored(numbers["tables"])),
         data={"surfaces": _dataset(surfaces)},
     )
 
@@ -172,12 +178,100 @@ def _dataset(surfaces: dict[str, LimitSurfaceCells]) -> xr.Dataset:
     import xarray as xr
 
     polar, azimuth = np.linspace(0.0, np.pi, 61), np.linspace(0.0, 2.0 * np.pi, 121)
-    columns: dict[str, Any] = {}
-    for name, surface in surfaces.items():
-        points = scaled_samples(surface, polar[:, None], azimuth[None, :])[1]
-        units = (("fx", "N", 1.0), ("fy", "N", 1.0), ("tau", "N m", surface.contact_radius))
-        for column, (component, unit, factor) in enumerate(units):
-            values = factor * points[..., column]
-            columns[f"{component}_{name}"] = (("polar", "azimuth"), values, {"units": unit})
+    scales = ([1.0, 1.0, each.contact_radius] for each in surfaces.values())
+    points = [
+        scaled_samples(each, polar[:, None], azimuth[None, :])[1] * r
+        for each, r in zip(surfaces.values(), scales, strict=True)
+    ]
+    columns: dict[str, Any] = {
+        name: (("shape", "polar", "azimuth"), np.array(points)[..., i], {"units": unit})
+        for i, (name, unit) in enumerate(UNITS.items())
+    }
     angles = {name: (name, values, {"units": "rad"}) for name, values in (("polar", polar), ("azimuth", azimuth))}
-    return xr.Dataset(columns, angles)
+    return xr.Dataset(columns, {"shape": list(surfaces), **angles})
+
+
+# ------------------------------------------------------------------ words and tables
+
+
+def _told(numbers: Numbers) -> dict[str, Any]:
+    """What the template names."""
+    errors, stored, gradient, disc = (numbers[name] for name in ("ellipsoid", "tables", "gradient", "disc"))
+    ratio = {name: each["points, mean"] / each["surfaces, mean"] for name, each in errors.items()}
+    least, most = (choose(ratio, key=ratio.__getitem__) for choose in (min, max))
+    worst = max(errors, key=lambda name: errors[name]["points, max"])
+    mask, radius = numbers["patches"]["Circle"], disc["radius"]
+
+    def over(kind: str, quantity: str) -> str:
+        """Errors of a kind over those of the smooth table, from the best shape to the worst."""
+        return span([each[kind][quantity] / each["smooth"][quantity] for each in stored.values()], ".0f")
+
+    return {
+        "surfaces": [each["surfaces, mean"] for each in errors.values()],
+        "points": [each["points, mean"] for each in errors.values()],
+        "least": {"shape": IN_WORDS[least], "ratio": ratio[least]},
+        "most": {"shape": IN_WORDS[most], "ratio": ratio[most]},
+        "worst": {"shape": IN_WORDS[worst], **errors[worst]},
+        "cells": gradient["cells"],
+        "ideal": gradient["continuous"],
+        "ellipsoid": gradient["ellipsoid"],
+        "mask": mask,
+        "disc": disc,
+        "radius": mask["contact radius, plain sum [m]"],
+        "lost": {
+            "radius": 1.0 - 1.5 * mask["contact radius, plain sum [m]"] / radius,
+            "second": 1.0 - 2.0 * mask["second moment [m^2]"] / radius**2,
+            "cut": 1.0 - 1.5 * disc["contact radius on the grid"] / radius,
+        },
+        "over": over,
+        "largest": {kind: max(each[kind]["force, max [N]"] for each in stored.values()) for kind in STORED},
+    }
+
+
+def _patches(ours: dict[str, Numbers]) -> Table:
+    """Ours, and the largest difference from the published row in its last column."""
+    published = facts.published_table("patches")
+    headings = (
+        "loaded cells",
+        "CoP x [mm]",
+        "CoP y [mm]",
+        "r, plain sum [mm]",
+        "r, as published [mm]",
+        "second moment [mm^2]",
+    )
+    factors = {"1": 1, "m": 1e3, "m^2": 1e6}
+    columns = {
+        heading: lambda row, column=column, factor=factors[unit]: round(factor * row[column], 9) + 0.0
+        for heading, (column, (_, unit, _)) in zip(headings, LAST_DIGIT.items(), strict=True)
+    }
+    lengths = [column for column in LAST_DIGIT if column.endswith("[m]")]
+    miss = {name: max(abs(row[column] - published[name][column]) for column in lengths) for name, row in ours.items()}
+    rows = {IN_WORDS[name]: row | {"miss": miss[name]} for name, row in ours.items()}
+    columns["farthest from the paper [mm]"] = lambda row: 1e3 * row["miss"]
+    note = "As published: r averages spins about the four corners of the cell that holds the centre of pressure."
+    return table("Patches: 21 x 21 cells, 20 mm wide", rows, columns, "patch", note)
+
+
+def _ellipsoid(errors: dict[str, Numbers]) -> Table:
+    names = ("surfaces, mean", "surfaces, max", "points, mean", "points, max", "angle, max [deg]", "force, max [N]")
+    columns = {name: lambda each, name=name: each[name] for name in names}
+    columns |= {"torque, max [N mm]": lambda each: 1e3 * each["torque, max [N m]"]}
+    return table(
+        "Distance of the ellipsoid from the sum over the cells",
+        {IN_WORDS[name]: each for name, each in errors.items()},
+        columns,
+        "patch",
+        "In $(f_x, f_y, \\tau/r)$ for $\\mu f_N = 1$. Surfaces: nearest points. Points: those of the same twist.",
+    )
+
+
+def _stored(errors: dict[str, Numbers]) -> Table:
+    rows = {f"{IN_WORDS[name]}, {kind}": error for name, each in errors.items() for kind, error in each.items()}
+    columns = {
+        "force, max [N]": lambda error: error["force, max [N]"],
+        "force, mean [N]": lambda error: error["force, mean [N]"],
+        "torque, max [N mm]": lambda error: 1e3 * error["torque, max [N m]"],
+        "torque, mean [N mm]": lambda error: 1e3 * error["torque, mean [N m]"],
+    }
+    title = "Error of tables of 20 segments, and of the sum, from the exact surface, mu f_N = 1 N"
+    return table(title, rows, columns, "patch, surface")

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction.experiments import facts, looks
+from planarfriction.experiments import looks
 from planarfriction.experiments.experiment import Arrays
 from planarfriction.plots.style import LINE_STYLES, PlotFigure, new_figure, tidy
 
@@ -26,7 +26,7 @@ def overview(time: np.ndarray, found: Arrays) -> PlotFigure:
     for axes, column in zip(panels, range(3), strict=True):
         _draw(axes, time, found, column, (0.0, 5.0), size=3.0)
     panels[-1].set_xlabel("time [s]")
-    _legend(figure, panels[0])
+    looks.legend(figure, panels[0], 5)
     return figure
 
 
@@ -45,7 +45,7 @@ def zoom(time: np.ndarray, found: Arrays, edge: dict[str, dict[str, float]]) -> 
         _draw(axes, time, found, column, limits)
         axes.set(title=title, xlabel="time [s]")
         axes.title.set_fontsize("medium")
-    _legend(figure, panels[0, 0])
+    looks.legend(figure, panels[0, 0], 5)
     return figure
 
 
@@ -57,23 +57,7 @@ def _draw(
     for name, words, line, width in LINES:
         axes.plot(time[part], factor * found[name][part, column], ls=line, lw=width, color=COLOURS[name], label=words)
     for name, marker in (("plain", "o"), ("bilinear", "s")):
-        curve = facts.published_curve(f"staircase/{name}/{component}")
-        inside = (curve.time >= limits[0]) & (curve.time <= limits[1])
-        axes.plot(
-            curve.time[inside],
-            factor * curve.values[inside],
-            ls="",
-            marker=marker,
-            ms=size,
-            mfc="white",
-            mec=COLOURS[name],
-            mew=0.9,
-            label=f"published, {name}",
-        )
+        look = {"ms": size, "mew": 0.9, "label": f"published, {name}"}
+        looks.vertices(axes, f"staircase/{name}/{component}", factor, COLOURS[name], limits, marker, **look)
     axes.set(ylabel=label, xlim=limits)
     tidy(axes)
-
-
-def _legend(figure: PlotFigure, axes: Any) -> None:
-    handles, labels = axes.get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside upper center", ncols=5, frameon=False)

@@ -11,13 +11,16 @@ from planarfriction.experiments import facts
 from planarfriction.experiments.experiment import (
     Arrays,
     Comparison,
+    Reference,
     Result,
+    Table,
     Work,
+    compare,
     compare_curve,
-    compare_number,
+    dataset,
+    table,
 )
 from planarfriction.experiments.staircase.figures import overview, zoom
-from planarfriction.experiments.staircase.tables import error_table, told
 from planarfriction.experiments.wording import fill
 from planarfriction.kernels import tables
 from planarfriction.limit_surface import LimitSurfaceCells
@@ -101,11 +104,11 @@ def run(work: Work) -> Result:
         "miss_if_labels_mean_the_state": shifts,
         "error_against_the_rod": {str(count): error for count, error in errors.items()},
     }
-    return fill("staircase", **told(numbers)).result(
+    return fill("staircase", **_told(numbers)).result(
         {"staircase": overview(time, found), "staircase_zoom": zoom(time, found, numbers["edge"])},
         comparisons=_comparisons(time, twist, found, steps, patch),
         numbers=numbers,
-        tables=(error_table(errors),),
+        tables=(_error_table(errors),),
         data={"line": _dataset(time, twist, found)},
     )
 
@@ -202,29 +205,15 @@ def _comparisons(
     time: np.ndarray, twist: np.ndarray, found: Arrays, steps: Arrays, patch: ContactPatch
 ) -> list[Comparison]:
     rows = []
+    same = "The same sum at the same samples: what is left is the error of reading the figure."
     for name, words in (("plain", "plain sum"), ("bilinear", "bilinear smoothing")):
-        for column, (component, unit) in enumerate(COMPONENTS):
-            rows.append(
-                compare_curve(
-                    f"steady state of the line, {words}, {component}",
-                    time,
-                    found[name][:, column],
-                    f"staircase/{name}/{component}",
-                    allowance=ALLOWANCE[unit],
-                    cause="The same sum at the same samples: what is left is the error of reading the figure.",
-                )
-            )
+        for (component, unit), values in zip(COMPONENTS, found[name].T, strict=True):
+            quantity, curve = f"steady state of the line, {words}, {component}", f"staircase/{name}/{component}"
+            rows.append(compare_curve(quantity, time, values, curve, ALLOWANCE[unit], same))
+    same = "The same profile, at each sample's own time: what is left is the error of reading the figure."
     for component, values in zip(("vx", "vy", "omega"), twist.T, strict=True):
-        rows.append(
-            compare_curve(
-                f"velocity profile, {component}",
-                time,
-                values,
-                f"convergence/velocity/{component}",
-                allowance=1e-12,
-                cause="The same profile, at each sample's own time: what is left is the error of reading the figure.",
-            )
-        )
+        quantity, curve = f"velocity profile, {component}", f"convergence/velocity/{component}"
+        rows.append(compare_curve(quantity, time, values, curve, 1e-12, same))
     return [*rows, *_plateaus(time, found), *_step_comparisons(steps, patch)]
 
 
@@ -233,89 +222,85 @@ def _plateaus(time: np.ndarray, found: Arrays) -> list[Comparison]:
     published = facts.published_table("patches")["Line"]
     spin = int(np.searchsorted(time, 0.7))
     cell = WIDTH / 21
-    closed = {
-        "plain": (
-            cell * (21**2 - 1) / (4 * 21),
-            "The plain sum over $N$ = 21 equal cells of width $c$ is $c\\,(N^2 - 1)/(4N)$: rounding.",
-        ),
-        "rod": (0.25 * WIDTH, "A rod of half-length $a$ has $r = a/2$: rounding."),
-    }
-    rows = []
-    for name, column in (("plain", "plain sum"), ("bilinear", "as published")):
-        rows.append(
-            compare_number(
-                f"torque of a pure spin, {name}",
-                found[name][spin, 2],
-                -published[f"contact radius, {column} [m]"],
-                reference="published",
-                tolerance=6e-12,
-                unit="N m",
-                cause="The table gives the contact radius to 1e-11 m: rounding.",
-            )
-        )
-    for name, (radius, cause) in closed.items():
-        rows.append(
-            compare_number(
-                f"torque of a pure spin, {name}",
-                found[name][spin, 2],
-                -radius,
-                reference="closed form",
-                tolerance=1e-15,
-                unit="N m",
-                cause=cause,
-            )
-        )
-    return rows
+    printed = "The table gives the contact radius to $10^{-11}$ m: rounding."
+    sums = "The plain sum over $N$ = 21 equal cells of width $c$ is $c\\,(N^2 - 1)/(4N)$: rounding."
+    rows: tuple[tuple[str, float, Reference, float, str], ...] = (
+        ("plain", published["contact radius, plain sum [m]"], "published", 6e-12, printed),
+        ("bilinear", published["contact radius, as published [m]"], "published", 6e-12, printed),
+        ("plain", cell * (21**2 - 1) / (4 * 21), "closed form", 1e-15, sums),
+        ("rod", 0.25 * WIDTH, "closed form", 1e-15, "A rod of half-length $a$ has $r = a/2$: rounding."),
+    )
+    return [
+        compare(f"torque of a pure spin, {name}", found[name][spin, 2], -radius, reference, within, "N m", cause)
+        for name, radius, reference, within, cause in rows
+    ]
 
 
 def _step_comparisons(steps: Arrays, patch: ContactPatch) -> list[Comparison]:
     """When and by how much plain fx steps."""
     theirs, _ = _published_steps()
     upward = steps["time"] < SLIDE_RAMP[1]
-    late = np.abs(_crossings(patch) - steps["time"][upward])
     # first and last the centre of rotation leaves and meets the middle cell
     heights = np.where(np.isin(np.arange(len(steps["height"])), [0, len(steps["height"]) - 1]), 1.0, 2.0) / patch.cells
     return [
-        Comparison(
-            "last sample before each step of plain fx",
-            "published",
-            float(np.abs(theirs - steps["time"]).max()),
-            0.5 * SAMPLE_TIME,
-            "s",
-            len(theirs),
+        compare(
+            "last sample before each step of plain fx", steps["time"], theirs, "published", 0.5 * SAMPLE_TIME, "s",
             "The same samples on both sides of every step: the labels of this figure are the times of the state.",
         ),
-        Comparison(
+        compare(
             "steps of plain fx while vx grows, from when the centre of rotation meets a cell to the last sample before",
-            "closed form",
-            float(late.max()),
-            SAMPLE_TIME,
-            "s",
-            len(late),
+            steps["time"][upward], _crossings(patch), "closed form", SAMPLE_TIME, "s",
             "A step shows at the first sample after the centre of rotation has met a cell: less than the sample time.",
         ),
-        Comparison(
-            "height of the steps of plain fx",
-            "closed form",
-            float(np.abs(steps["height"] - heights).max()),
-            ALLOWANCE["N"],
-            "N",
-            len(heights),
+        compare(
+            "height of the steps of plain fx", steps["height"], heights, "closed form", ALLOWANCE["N"], "N",
             "A cell that the centre of rotation passes turns round and changes fx by twice its load; the middle "
             "one, which adds nothing while the centre of rotation stands on it, by once.",
         ),
-    ]
+    ]  # fmt: skip
 
 
 def _dataset(time: np.ndarray, twist: np.ndarray, found: Arrays) -> xr.Dataset:
-    import xarray as xr
+    wrenches = {(name,): dict(zip(dict(COMPONENTS), wrench[::5].T, strict=True)) for name, wrench in found.items()}
+    result = dataset(wrenches, dict(COMPONENTS), ("surface",), ("time", time[::5], "s"))
+    speeds = zip(("vx", "vy", "omega"), ("m/s", "m/s", "rad/s"), twist[::5].T, strict=True)
+    return result.assign({name: ("time", values, {"units": unit}) for name, unit, values in speeds})
 
-    thinned = slice(None, None, 5)
-    columns = {
-        name: ("time", values[thinned], {"units": unit})
-        for name, unit, values in zip(("vx", "vy", "omega"), ("m/s", "m/s", "rad/s"), twist.T, strict=True)
+
+def _told(numbers: dict[str, Any]) -> dict[str, Any]:
+    """What the template names."""
+    radius, by_cells = numbers["radius"], numbers["error_against_the_rod"]
+    few, *_, many = by_cells
+    sums = ("plain", "bilinear")
+    return {
+        "sample_time": numbers["sample_time"],
+        "thinned": numbers["published_vertices_around_a_step"],
+        "steps": numbers["steps"],
+        "edge": numbers["edge"],
+        "shifts": numbers["miss_if_labels_mean_the_state"],
+        "kink": numbers["kink_of_tau"],
+        "radius": radius,
+        "lost": {name: 1.0 - radius[name] / radius["rod"] for name in sums},
+        "by_cells": by_cells,
+        "few": few,
+        "many": many,
+        "order": {name: _orders(by_cells, name) for name in sums},
     }
-    for name, wrench in found.items():
-        for column, (component, unit) in enumerate(COMPONENTS):
-            columns[f"{component}_{name}"] = ("time", wrench[thinned, column], {"units": unit})
-    return xr.Dataset(columns, {"time": ("time", time[thinned], {"units": "s"})})
+
+
+def _orders(by_cells: dict[str, dict[str, list[float]]], name: str) -> list[float]:
+    """Powers of the number of cells with which the largest and the mean error in force fall [-]."""
+    few, *_, many = by_cells
+    ratio = np.log(np.array(by_cells[few][name]) / by_cells[many][name]) / np.log(int(few) / int(many))
+    return ratio[:2].tolist()
+
+
+def _error_table(errors: dict[int, dict[str, list[float]]]) -> Table:
+    """Largest and mean errors of both sums against the rod, by the number of cells."""
+    rows = {f"{count}, {name}": values for count, error in errors.items() for name, values in error.items()}
+    headings = ("force, max [N]", "force, mean [N]", "torque, max [N mm]", "torque, mean [N mm]")
+    columns = {
+        heading: lambda values, i=i, factor=factor: factor * values[i]
+        for i, (heading, factor) in enumerate(zip(headings, (1.0, 1.0, 1e3, 1e3), strict=True))
+    }
+    return table("Distance from the exact rod along the profile", rows, columns, "cells, sum")

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from planarfriction.experiments import facts, runs
-from planarfriction.experiments.experiment import Arrays, Comparison, compare_number
+from planarfriction.experiments.experiment import Arrays, Comparison, compare
 from planarfriction.limit_surface import LimitSurfaceTablePublished
 from planarfriction.patch import PUBLISHED_PATCHES
 
@@ -123,18 +123,13 @@ def _box_comparisons(
 ) -> list[Comparison]:
     """One box beside its reference; the published plots hide the maximum."""
     ours, freedom = statistics(values), slack(values)
-    return [
-        compare_number(
-            f"error of the {WORDS[quantity]}, {runs.IN_WORDS[shape]}, {model}, {column}",
-            ours[column],
-            theirs,
-            reference=reference,
-            tolerance=_tolerance(reference, shape, quantity, model, column, freedom[column]),
-            unit=UNITS[quantity],
-            cause=_CAUSES[reference, model],
-        )
-        for column, theirs in reference_box(reference, shape, quantity, model).items()
-    ]
+    rows = []
+    for column, theirs in reference_box(reference, shape, quantity, model).items():
+        words = f"error of the {WORDS[quantity]}, {runs.IN_WORDS[shape]}, {model}, {column}"
+        within = _tolerance(reference, shape, quantity, model, column, freedom[column])
+        cause = _CAUSES[reference, model]
+        rows.append(compare(words, ours[column], theirs, reference, within, UNITS[quantity], cause))
+    return rows
 
 
 def reference_box(reference: Reference, shape: str, quantity: str, model: str) -> dict[str, float]:
@@ -161,11 +156,12 @@ _CAUSES = {
     "of both solvers.",
     ("published", "corrected"): "The figure's solver misses the first samples of the spin-up and the changes of "
     "velocity by more than the rest, so that a quartile or whisker may come from a neighbouring sample.",
-    ("published", "ellipsoid"): "The program behind the published ellipsoid adds 1e-10 m to |z| where it takes an "
-    "angle (5e-5 more friction), and its solver misses two samples of the spin-up, so that a quartile may come from a "
-    "neighbouring one.",
-    ("converged", "ellipsoid"): "The reference has the published program's guard of 1e-10 m and its loose solver in "
-    "the ellipsoid's rows: with both put in, the torques are met to 4e-8 N m, the maximum of the square included.",
+    ("published", "ellipsoid"): "The program behind the published ellipsoid adds $10^{-10}$ m to $|z|$ where it takes "
+    r"an angle ($5 \times 10^{-5}$ more friction), and its solver misses two samples of the spin-up, so that a "
+    "quartile may come from a neighbouring one.",
+    ("converged", "ellipsoid"): "The reference has the published program's guard of $10^{-10}$ m and its loose solver "
+    r"in the ellipsoid's rows: with both put in, the torques are met to $4 \times 10^{-8}$ N m, the maximum of the "
+    "square included.",
 }
 
 

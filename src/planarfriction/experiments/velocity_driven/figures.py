@@ -34,12 +34,12 @@ def profile(disc: Arrays) -> PlotFigure:
     speeds = (("vx", "$v_x$ [mm/s]", 1e3), ("vy", "$v_y$ [mm/s]", 1e3), ("omega", "$\\omega$ [rad/s]", 1.0))
     for axes, (name, label, factor), values in zip(above, speeds, velocity, strict=True):
         axes.plot(time, factor * values, color="0.15", lw=1.4)
-        _vertices(axes, f"driven/velocity/{name}", factor, "0.15", "o")
+        looks.vertices(axes, f"driven/velocity/{name}", factor, "0.15")
         axes.set_ylabel(label)
         tidy(axes)
     for axes, (name, label, factor), values in zip(below, COMPONENTS, disc["d"].T, strict=True):
         axes.plot(disc["time"], factor * values, color=looks.DISTRIBUTED, lw=1.4)
-        _vertices(axes, f"driven/Circle/d, alone/{name}", factor, looks.DISTRIBUTED, "o")
+        looks.vertices(axes, f"driven/Circle/d, alone/{name}", factor, looks.DISTRIBUTED)
         axes.set(xlabel="time [s]", ylabel=label, xlim=(0.0, 5.0))
         tidy(axes)
     return figure
@@ -54,10 +54,10 @@ def pair(shape: str, kind: str, wrenches: Arrays) -> PlotFigure:
         _draw(axes, wrenches, ("d", kind), column)
         for model, ending in (("d", beside), (kind, "")):
             curve = f"driven/{shape}/{model}{ending}/{name}"
-            _vertices(axes, curve, factor, looks.OF_MODEL[model], MARKERS[model])
+            looks.vertices(axes, curve, factor, looks.OF_MODEL[model], marker=MARKERS[model])
         axes.set(xlabel="time [s]", ylabel=label)
     handles = _key(("d", kind)) + _marker_key(("d", kind))
-    figure.legend(handles=handles, loc="outside upper center", ncols=4, frameon=False, fontsize=9)
+    looks.legend(figure, handles, 4, fontsize=9)
     return figure
 
 
@@ -73,7 +73,7 @@ def page(found: dict[str, Arrays]) -> PlotFigure:
     for axes in panels[-1]:
         axes.set_xlabel("time [s]")
     figure.align_ylabels(panels)
-    figure.legend(handles=_key(("d", "r", "e")), loc="outside upper center", ncols=3, frameon=False, fontsize=9)
+    looks.legend(figure, _key(("d", "r", "e")), 3, fontsize=9)
     return figure
 
 
@@ -91,7 +91,9 @@ def box_plots(every: dict[str, boxes.Errors]) -> PlotFigure:
         axes.grid(False, axis="x")
     panels[-1].set_xticks(range(len(every)), [runs.IN_WORDS[shape] for shape in every])
     figure.align_ylabels(panels)
-    figure.legend(handles=_box_key(), loc="outside upper center", ncols=5, frameon=False)
+    colours = {BOX_WORDS[model]: colour for model, colour in BOX_COLOURS.items()}
+    published = looks.box_key(colours, ", published", filled=False)
+    looks.legend(figure, [*looks.box_key(colours), *published, looks.line_key(**looks.MAXIMUM)], 5)
     return figure
 
 
@@ -99,43 +101,12 @@ def _draw_boxes(axes: Any, place: int, shape: str, quantity: str, errors: dict[s
     table = facts.published_table("box")
     for offset, (model, values) in zip((-0.28, 0.12), errors.items(), strict=True):
         colour = BOX_COLOURS[model]
-        ours = boxes.statistics(values)
-        _draw_box(axes, place + offset, ours, factor, colour, filled=True)
-        axes.plot(place + offset, factor * ours["maximum"], marker="x", ms=6, mew=1.6, color=colour)
+        ours = factor * np.array(list(boxes.statistics(values).values()))
+        looks.box(axes, place + offset, ours, colour, 0.14)
         published = table.get(f"{quantity}/{shape}/{model}")
         if published is not None:
-            _draw_box(axes, place + offset + 0.16, published, factor, colour, filled=False)
-
-
-def _draw_box(axes: Any, at: float, box: dict[str, float], factor: float, colour: str, *, filled: bool) -> None:
-    low, first, median, third, high = (factor * box[name] for name in boxes.COLUMNS[:5])
-    drawn = {"whislo": low, "q1": first, "med": median, "q3": third, "whishi": high}
-    line = {"color": colour, "linewidth": 1.1}
-    axes.bxp(
-        [drawn],
-        positions=[at],
-        widths=0.14,
-        showfliers=False,
-        patch_artist=True,
-        boxprops={"facecolor": colour if filled else "white", "edgecolor": colour, "linewidth": 1.1},
-        medianprops={"color": "white" if filled else colour, "linewidth": 1.6},
-        whiskerprops=line,
-        capprops=line,
-        manage_ticks=False,
-    )
-
-
-def _box_key() -> list[Any]:
-    from matplotlib.lines import Line2D
-    from matplotlib.patches import Patch
-
-    handles: list[Any] = []
-    for filled, words in ((True, ""), (False, ", published")):
-        for model, colour in BOX_COLOURS.items():
-            face = colour if filled else "white"
-            handles.append(Patch(facecolor=face, edgecolor=colour, label=BOX_WORDS[model] + words))
-    handles.append(Line2D([], [], ls="", marker="x", ms=6, mew=1.6, color="0.3", label="maximum"))
-    return handles
+            theirs = [factor * published[name] for name in boxes.COLUMNS[:5]]
+            looks.box(axes, place + offset + 0.16, theirs, colour, 0.14, filled=False)
 
 
 # ------------------------------------------------------------------ lines, markers, keys
@@ -154,24 +125,13 @@ def _look(kind: str) -> dict[str, Any]:
     return {"ls": style, "lw": width, "alpha": opacity, "color": looks.OF_MODEL[kind]}
 
 
-def _vertices(axes: Any, name: str, factor: float, colour: str, marker: str) -> None:
-    curve = facts.published_curve(name)
-    axes.plot(
-        curve.time, factor * curve.values, ls="", marker=marker, ms=3.2, mfc="white", mec=colour, mew=0.7, zorder=3
-    )
-
-
 def _key(kinds: tuple[str, ...]) -> list[Any]:
-    from matplotlib.lines import Line2D
-
-    return [Line2D([], [], label=runs.NAMES[kind], **_look(kind)) for kind in kinds]
+    return [looks.line_key(runs.NAMES[kind], **_look(kind)) for kind in kinds]
 
 
 def _marker_key(kinds: tuple[str, ...]) -> list[Any]:
-    from matplotlib.lines import Line2D
-
     marks = {"ls": "", "ms": 4, "mfc": "white"}
     return [
-        Line2D([], [], marker=MARKERS[kind], mec=looks.OF_MODEL[kind], label=f"{runs.NAMES[kind]}, published", **marks)
+        looks.line_key(f"{runs.NAMES[kind]}, published", marker=MARKERS[kind], mec=looks.OF_MODEL[kind], **marks)
         for kind in kinds
     ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,13 +12,15 @@ from planarfriction.experiments.experiment import (
     Arrays,
     Comparison,
     Result,
+    Table,
     Work,
+    compare,
     compare_converged,
     compare_curve,
-    compare_number,
+    dataset,
+    table,
 )
 from planarfriction.experiments.velocity_driven import boxes, figures
-from planarfriction.experiments.velocity_driven.tables import error_table, told
 from planarfriction.experiments.wording import fill
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction.plots.style import PlotFigure
@@ -68,12 +71,12 @@ def drive(shape: str) -> Arrays:
 def run(work: Work) -> Result:
     """Carry out the experiment."""
     shapes = QUICK_SHAPES if work.quick else runs.SIX_SHAPES
-    pieces = work.pieces({f"driven, {runs.IN_WORDS[shape]}": lambda shape=shape: drive(shape) for shape in shapes})
-    found: dict[str, Arrays] = dict(zip(shapes, pieces.values(), strict=True))
+    computes = {shape: partial(drive, shape) for shape in shapes}
+    found = work.pieces(computes, lambda shape: f"driven, {runs.IN_WORDS[shape]}")
     errors = {shape: boxes.errors(wrenches) for shape, wrenches in found.items()}
     numbers = _numbers(found, errors)
     velocity = published_velocity()
-    return fill("velocity_driven", **told(numbers)).result(
+    return fill("velocity_driven", **_told(numbers)).result(
         _figures(found, errors),
         comparisons=[
             *_curve_comparisons(found),
@@ -82,7 +85,7 @@ def run(work: Work) -> Result:
             *boxes.comparisons(errors),
         ],
         numbers=numbers,
-        tables=(error_table(numbers),),
+        tables=(_error_table(numbers),),
         data={"wrenches": _dataset(found, velocity)},
     )
 
@@ -113,13 +116,10 @@ def _curve_comparisons(found: dict[str, Arrays]) -> list[Comparison]:
                     if kind == "e":
                         rows += _ellipsoid_comparisons(words, *ours, name, shape, unit)
                     else:
-                        allowance = boxes.OWN[unit] + _rounded(name)
-                        rows.append(compare_curve(words, *ours, name, allowance=allowance, cause=_SOLVER))
+                        rows.append(compare_curve(words, *ours, name, boxes.OWN[unit] + _rounded(name), _SOLVER))
                 if kind in "dr" and shape in CONVERGED:
                     name, words = f"driven/{shape}/{kind}/{component}", f"{quantity}, {component}"
-                    rows.append(
-                        compare_converged(words, *ours, name, unit=unit, allowance=boxes.OWN[unit], cause=_TWICE)
-                    )
+                    rows.append(compare_converged(words, *ours, name, unit, boxes.OWN[unit], _TWICE))
     return rows
 
 
@@ -130,18 +130,15 @@ def _ellipsoid_comparisons(
     guard = boxes.OWN[unit] + boxes.guard_effect(shape)[unit]
     table_model = facts.published_curve(name.replace("/e/", "/r/")).deviation or 0.0
     if unit == "N":
-        return [compare_curve(quantity, time, values, name, allowance=guard + table_model, cause=_GUARDED)]
+        return [compare_curve(quantity, time, values, name, guard + table_model, _GUARDED)]
     early, curve = time < SPIN_UP, facts.published_curve(name)
     late = curve.time > SPIN_UP
-    difference = np.abs(values[np.rint(curve.time[late] / 0.01).astype(int)] - curve.values[late])
+    ours = values[np.rint(curve.time[late] / 0.01).astype(int)]
     tolerance = guard + boxes.solver_error()[unit] + curve.reading
-    spin_up = compare_curve(
-        f"{quantity}, spin-up", time[early], values[early], name, allowance=guard + table_model, cause=_SPIN_UP
-    )
-    after = Comparison(
-        f"{quantity}, after it", "published", float(difference.max()), tolerance, unit, int(late.sum()), _GUARDED
-    )
-    return [spin_up, after]
+    return [
+        compare_curve(f"{quantity}, spin-up", time[early], values[early], name, guard + table_model, _SPIN_UP),
+        compare(f"{quantity}, after it", ours, curve.values[late], "published", tolerance, unit, _GUARDED),
+    ]
 
 
 def _rounded(name: str) -> float:
@@ -168,31 +165,23 @@ _SPIN_UP = (
 
 def _velocity_comparisons(velocity: Any) -> list[Comparison]:
     time = sample_times(5.0)
-    rows = []
-    for column, name in enumerate(("vx", "vy", "omega")):
-        rows.append(
-            compare_curve(
-                f"velocity profile, {name}",
-                time,
-                velocity(time)[:, column],
-                f"driven/velocity/{name}",
-                allowance=1e-12,
-                cause="The same profile, labelled with its own time: what is left is the error of reading the figure.",
-            )
-        )
-    return rows
+    cause = "The same profile, labelled with its own time: what is left is the error of reading the figure."
+    return [
+        compare_curve(f"velocity profile, {name}", time, values, f"driven/velocity/{name}", 1e-12, cause)
+        for name, values in zip(("vx", "vy", "omega"), velocity(time).T, strict=True)
+    ]
 
 
 def _guard_comparison(disc: Arrays) -> Comparison:
     """The published ellipsoid's surplus of friction in steady pure slide beside what the guard explains."""
-    return compare_number(
+    return compare(
         "disc, surplus of the published ellipsoid's friction in a steady slide",
         _guard_surplus(disc),
         boxes.guard_effect("Circle")["N"],
-        reference="closed form",
-        tolerance=boxes.OWN["N"],
-        unit="N",
-        cause=r"With $|z| + \epsilon$ in the angle, $\epsilon = 10^{-10}$ m, $\beta$ is $(1 + |z|/(|z| + \epsilon))/2$ "
+        "closed form",
+        boxes.OWN["N"],
+        "N",
+        r"With $|z| + \epsilon$ in the angle, $\epsilon = 10^{-10}$ m, $\beta$ is $(1 + |z|/(|z| + \epsilon))/2$ "
         r"in a steady slide, so the bristles bend by $\epsilon/2$ further: what is left is of second order in "
         "that length.",
     )
@@ -249,16 +238,68 @@ def _centre_of_rotation(shape: str, sample: int) -> dict[str, float] | None:
 
 
 def _dataset(found: dict[str, Arrays], velocity: Any) -> xr.Dataset:
-    import xarray as xr
-
     time = next(iter(found.values()))["time"]
-    wrench = np.array([[wrenches[kind] for kind in runs.NAMES] for wrenches in found.values()])
-    columns: dict[str, Any] = {
-        name: (("shape", "model", "time"), wrench[..., column], {"units": unit})
-        for column, (name, unit) in enumerate(COMPONENTS)
+    wrenches = {
+        (shape, name): dict(zip(dict(COMPONENTS), each[kind].T, strict=True))
+        for shape, each in found.items()
+        for kind, name in runs.NAMES.items()
     }
-    before = velocity.left(time)  # a sampled wrench belongs to the velocity of the step just ended
-    for name, unit, values in zip(("vx", "vy", "omega"), ("m/s", "m/s", "rad/s"), before.T, strict=True):
-        columns[name] = ("time", values, {"units": unit})
-    coordinates = {"shape": list(found), "model": list(runs.NAMES.values()), "time": ("time", time, {"units": "s"})}
-    return xr.Dataset(columns, coordinates)
+    result = dataset(wrenches, dict(COMPONENTS), ("shape", "model"), ("time", time, "s"))
+    before = velocity.left(time).T  # a sampled wrench belongs to the velocity of the step just ended
+    speeds = zip(("vx", "vy", "omega"), ("m/s", "m/s", "rad/s"), before, strict=True)
+    return result.assign({name: ("time", values, {"units": unit}) for name, unit, values in speeds})
+
+
+# ------------------------------------------------------------------ words and table
+
+
+def _told(numbers: dict[str, Any]) -> dict[str, Any]:
+    """What the template names."""
+    errors = numbers["errors"]
+    quartiles: list[dict[str, Any]] = [
+        {"shape": runs.IN_WORDS[shape]}
+        | {name: each["ft"][model]["third quartile"] for name, model in (("table", "corrected"), ("ellipsoid",) * 2)}
+        for shape, each in errors.items()
+    ]
+    tables = {shape: each["ft"]["corrected"] for shape, each in errors.items()}
+    worst = max(tables, key=lambda shape: tables[shape]["maximum"] / tables[shape]["whisker high"])
+    convention, *others = numbers["misses_of_other_conventions"].values()
+    above = (
+        box["samples above the whisker"]
+        for quantities in errors.values()
+        for models in quantities.values()
+        for box in models.values()
+    )
+    return {
+        "shapes": [each["shape"] for each in quartiles],
+        "quartiles": quartiles,
+        "factors": [each["ellipsoid"] / each["table"] for each in quartiles],
+        "worst": {
+            "shape": runs.IN_WORDS[worst],
+            "box": tables[worst],
+            "centre": tables[worst]["centre of rotation at maximum"],
+        },
+        "most": max(above),
+        "samples": numbers["samples"],
+        "convention": convention,
+        "others": others,
+        "guard": numbers["guard"],
+        "spin_up": numbers["spin_up_error_of_the_figures"],
+    }
+
+
+def _error_table(numbers: dict[str, Any]) -> Table:
+    """Errors of both reduced models against the distributed one."""
+    rows = {
+        f"{runs.IN_WORDS[shape]}, {figures.BOX_WORDS[model]}": {name: each[model] for name, each in quantities.items()}
+        for shape, quantities in numbers["errors"].items()
+        for model in boxes.MODELS
+    }
+    columns = {
+        f"{words}, {column} [{unit}]": lambda each, quantity=quantity, column=column: float(
+            f"{1e3 * each[quantity][column]:.4g}"
+        )
+        for quantity, words, unit in (("ft", "force", "mN"), ("tau", "torque", "N mm"))
+        for column in ("median", "third quartile", "whisker high", "maximum")
+    }
+    return table("Errors against the distributed model, at 1 N", rows, columns, "shape, model")
