@@ -60,7 +60,7 @@ def test_the_wrong_sum_would_be_noticed(result):
     wrong = LimitSurfaceCells(PUBLISHED_PATCHES["Line"](cells=23)).wrench(twist)
     row = compare_curve("tau", time, wrong[:, 2], "staircase/plain/tau", allowance=1e-12, cause="23 cells")
     assert not row.holds
-    assert all(variable.attrs["units"] for variable in data.variables.values())
+    assert all(variable.attrs["units"] for variable in data.data_vars.values())
 
 
 @pytest.mark.parametrize(

@@ -21,9 +21,11 @@ from planarfriction.experiments.experiment import (
     Result,
     Table,
     Work,
+    compare,
     compare_converged,
     compare_curve,
-    compare_number,
+    dataset,
+    table,
 )
 from planarfriction.experiments.markup import name_to_html, to_html
 from planarfriction.experiments.report import write_report
@@ -47,14 +49,10 @@ class Made:
         figure = new_figure(3.0, 2.0)
         figure.subplots().plot([0.0, 1.0], [0.0, 1.0])
         ours = float(values[f"{self.name} b"]["value"])
-        row = compare_number(
-            "one", ours, self.theirs, reference="published", tolerance=1e-3, unit="m", cause="none & all"
-        )
+        row = compare("one", ours, self.theirs, "published", 1e-3, "m", "none & all")
         table = Table("Some", ["name", "value"], [["first", np.float64(0.123456)], ["second", 3]], note="a note")
         data = {"curves": xr.Dataset({"x": ("time", np.arange(3.0))})}
-        exact = compare_number(
-            "two, fx", ours, 2.0, reference="closed form", tolerance=1e-3, unit="m^2", cause="rounding"
-        )
+        exact = compare("two, fx", ours, 2.0, "closed form", 1e-3, "m^2", "rounding")
         picture = Picture("line", "A line.", figure)
         return Result(
             ["Found $x^2$."],
@@ -135,6 +133,44 @@ def test_a_piece_that_was_cut_off_or_is_of_other_code_is_computed_again(tmp_path
     assert len(calls) == 3
     Work().piece("a piece", compute)  # kept nowhere
     assert len(calls) == 4
+
+
+def test_a_piece_keeps_what_is_nested(tmp_path):
+    values = {"run": {"one": {"x": np.arange(3.0), "count": 3}, "two": {"x": np.zeros(1)}}, "seconds": 0.5}
+    work = Work(folder=tmp_path, fingerprint="one")
+    work.piece("nested", lambda: values)
+    for found in (work.piece("nested", dict), Work().piece("nested", lambda: values)):
+        np.testing.assert_equal(found, values)
+        assert isinstance(found["seconds"], float) and isinstance(found["run"]["one"]["count"], int)
+
+
+def test_pieces_by_key_have_labels(tmp_path):
+    told = []
+    found = Work(progress=told.append).pieces(
+        {("a", 1): lambda: {"x": 1.0}, ("b", 2): lambda: {"x": 2.0}}, "{0[0]}".format
+    )
+    assert found == {("a", 1): {"x": 1.0}, ("b", 2): {"x": 2.0}} and sorted(told) == ["a", "b"]
+
+
+def test_curves_by_their_labels():
+    time = np.linspace(0.0, 1.0, 3)
+    runs = {(a, b): {"x": time * n, "left out": time} for n, (a, b) in enumerate(("ps", "pt", "qs", "qt"))}
+    data = dataset(runs, {"x": "m"}, ("one", "two"), ("time", time, "s"))
+    assert dict(data.sizes) == {"one": 2, "two": 2, "time": 3} and set(data.data_vars) == {"x"}
+    np.testing.assert_array_equal(data.x.sel(one="q", two="s"), 2.0 * time)
+    assert data.x.attrs["units"] == "m" and data.time.attrs["units"] == "s"
+
+
+def test_a_table_has_a_row_for_each_item():
+    made = table("Some", {"a": 2.0, "b": 3.0}, {"x": lambda value: value, "square": lambda value: value**2}, "name")
+    assert made.headings == ["name", "x", "square"] and made.rows == [["a", 2.0, 4.0], ["b", 3.0, 9.0]]
+
+
+def test_numbers_and_arrays_are_compared():
+    one = compare("one", 1.0, 3.0, "published", 1.0, "m", "")
+    assert (one.ours, one.theirs, one.difference, one.samples, one.holds) == (1.0, 3.0, 2.0, 1, False)
+    many = compare("many", np.array([1.0, -2.0]), 0.0, "closed form", 2.0, "m", "")
+    assert (many.ours, many.theirs, many.difference, many.samples, many.holds) == (None, None, 2.0, 2, True)
 
 
 def test_the_command_writes_a_report_and_all_numbers(made, tmp_path, capsys):

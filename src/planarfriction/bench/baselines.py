@@ -1,4 +1,4 @@
-"""What to compare with: SciPy's solver on the same compiled right-hand side over a window of a scene, its minimiser."""
+"""What to compare with: SciPy's solver on the same compiled right-hand side over a window of a scene."""
 
 from __future__ import annotations
 
@@ -10,8 +10,6 @@ import numpy as np
 
 from planarfriction.kernels.body import system_of
 from planarfriction.kernels.integration import Method, Output
-from planarfriction.limit_surface import LimitSurface
-from planarfriction.patch import ContactPatch
 from planarfriction.scenes import Scene
 from planarfriction.scenes.packing import PackedScene, pack
 from planarfriction.solvers import RODAS4, Statistics, integrate
@@ -128,44 +126,3 @@ def _output(packed: PackedScene, times: np.ndarray, *, bristles: bool) -> Output
         np.empty((count, contacts)),
         np.empty(states),
     )
-
-
-def scipy_twist(surface: LimitSurface, wrench: np.ndarray) -> np.ndarray:
-    """`surface.twist(wrench)` as one would write it with the surface's dissipation, wrench and Jacobian."""
-    from scipy import optimize
-
-    scale = np.array([1.0, 1.0, surface.contact_radius])
-    target = -wrench / scale
-    start = target / (target @ target) / scale  # of unit power
-    basis = np.linalg.svd(target[None])[2][1:] / scale
-    solution = optimize.minimize(
-        lambda place: float(surface.dissipation(start + place @ basis)),
-        np.zeros(2),
-        jac=lambda place: -basis @ surface.wrench(start + place @ basis),
-        hess=lambda place: -basis @ surface.jacobian(start + place @ basis) @ basis.T,
-        method="trust-exact",
-        options={"gtol": 1e-10},
-    )
-    twist = start + solution.x @ basis
-    return twist / surface.dissipation(twist)
-
-
-def numpy_table(patch: ContactPatch, segments: int = 20) -> np.ndarray:
-    """Smoothed nodes of the published table as one would write them: four sums over the cells at every node."""
-    grid, radius, weights = patch.grid, patch.contact_radius(), patch.weights()
-    assert grid is not None
-    x, y = (patch.positions - patch.centre_of_pressure()).T
-    nodes = np.zeros((segments + 1, 4 * segments, 3))
-    for i in range(segments):
-        for j in range(4 * segments):
-            azimuth, distance = 0.5 * np.pi * j / segments, radius * np.tan(0.5 * np.pi * i / segments)
-            centre = np.array([-distance * np.sin(azimuth), distance * np.cos(azimuth)])
-            a, b = (centre - (grid.x_min, grid.y_min)) / (grid.cell_width, grid.cell_height)
-            for corner in range(4):
-                p, q = int(a) + corner % 2, int(b) + corner // 2
-                share = (1.0 - abs(a - p)) * (1.0 - abs(b - q))
-                dx = x - (grid.x_min + p * grid.cell_width)
-                dy = y - (grid.y_min + q * grid.cell_height)
-                scale = share * weights / np.hypot(dx, dy)
-                nodes[i, j] += -(scale @ dy), scale @ dx, scale @ (x * dx + y * dy) / radius
-    return nodes

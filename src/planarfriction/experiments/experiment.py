@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import hashlib
 import itertools
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -114,6 +115,14 @@ def compare(
     return Comparison(quantity, reference, float(difference.max()), tolerance, unit, difference.size, cause, *values)
 
 
+def compare_all(reference: Reference, rows: Iterable[tuple[str, Any, Any, float, str, str]]) -> list[Comparison]:
+    """Rows of what is compared, ours, theirs, tolerance, unit and cause."""
+    return [
+        compare(quantity, ours, theirs, reference, within, unit, cause)
+        for quantity, ours, theirs, within, unit, cause in rows
+    ]
+
+
 def _at(wanted: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
     """Recorded values at `wanted` times; each must be a recorded time, for between samples lie jumps."""
     index = np.clip(np.searchsorted(time, wanted - 1e-7), 0, len(time) - 1)
@@ -215,22 +224,21 @@ class Work:
     """Of the code and the options: pieces with another one are computed again."""
     progress: Callable[[str], None] | None = None
 
-    def piece(self, label: str, compute: Callable[[], Mapping[str, Any]]) -> Arrays:
-        """What `compute` returns, numbers and arrays by name, from the kept file if there is one."""
+    def piece(self, label: str, compute: Callable[[], Mapping[str, Any]]) -> dict[str, Any]:
+        """What `compute` returns, numbers and arrays in nested dictionaries, from the kept file if there is one."""
         if self.progress is not None:
             self.progress(label)
         path = None if self.folder is None else self.folder / f"{_slug(label)}.npz"
         kept = None if path is None else _read_piece(path, self.fingerprint)
-        if kept is not None:
-            return kept
-        arrays = {name: np.asarray(values) for name, values in compute().items()}
-        if path is not None:
-            _write_piece(path, self.fingerprint, arrays)
-        return arrays
+        if kept is None:
+            kept = dict(_flat(compute()))
+            if path is not None:
+                _write_piece(path, self.fingerprint, kept)
+        return _nested(kept)
 
     def pieces(
         self, computes: Mapping[Key, Callable[[], Mapping[str, Any]]], label: Callable[[Key], str] = str
-    ) -> dict[Key, Arrays]:
+    ) -> dict[Key, dict[str, Any]]:
         """Independent pieces by key, two at a time: compiled code runs beside other compiled code."""
         pool = ThreadPoolExecutor(THREADS)
         try:
@@ -238,6 +246,27 @@ class Work:
             return {key: future.result() for key, future in futures.items()}
         finally:
             pool.shutdown(cancel_futures=True)
+
+
+_INNER = "|"
+"""Between the names of nested dictionaries in the kept files."""
+
+
+def _flat(values: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, np.ndarray]]:
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{before}{name}{_INNER}")
+        else:
+            yield f"{before}{name}", np.asarray(value)
+
+
+def _nested(arrays: Arrays) -> dict[str, Any]:
+    result: dict[str, Any] = {}
+    for key, values in arrays.items():
+        *outer, name = key.split(_INNER)
+        home = functools.reduce(lambda place, each: place.setdefault(each, {}), outer, result)
+        home[name] = values if values.ndim else values.item()
+    return result
 
 
 def _slug(label: str) -> str:

@@ -16,6 +16,9 @@ from planarfriction.writing import write_text
 
 Rows = list[dict[str, Any]]
 
+WIDEST = 1440
+"""Width of most figures [px]; narrower ones are shown narrower, so that all have letters of one size."""
+
 
 def write_report(reproduction: Reproduction) -> Path:
     """Write `report.html` from all results kept in the folder; returns its path."""
@@ -86,9 +89,12 @@ def _summary(rows: Rows) -> dict[str, Any]:
     }
 
 
-def _image(path: Path) -> dict[str, str]:
-    """The source of an image that travels inside the page."""
+def _image(path: Path) -> dict[str, Any]:
+    """The source of an image that travels inside the page, and its width over that of the widest [%]."""
     try:
-        return {"source": "data:image/png;base64," + base64.b64encode(path.read_bytes()).decode()}
+        data = path.read_bytes()
     except OSError:
-        return {"source": ""}  # someone removed it: its caption still says what it was
+        return {"source": "", "width": 100}  # someone removed it: its caption still says what it was
+    width = int.from_bytes(data[16:20], "big")  # of the header of a PNG
+    source = "data:image/png;base64," + base64.b64encode(data).decode()
+    return {"source": source, "width": min(100, round(100 * width / WIDEST))}

@@ -7,15 +7,17 @@ from typing import Any
 import numpy as np
 
 from planarfriction.experiments import looks
+from planarfriction.experiments.beyond import grooves as grooved
 from planarfriction.experiments.beyond.driven import MODELS, Errors
-from planarfriction.experiments.beyond.others import GROOVED_MODELS, closed_drift
 from planarfriction.experiments.beyond.surfaces import KINDS
 from planarfriction.experiments.experiment import Arrays
 from planarfriction.experiments.runs import IN_WORDS
 from planarfriction.experiments.velocity_driven import boxes
 from planarfriction.plots.style import PlotFigure, new_figure, tidy
 
-COLOURS = dict(zip(KINDS, (looks.REDUCED, looks.MOMENTS, looks.DISTRIBUTED, looks.OTHER, looks.ELLIPSOID), strict=True))
+COLOURS = dict(
+    zip(KINDS, (looks.REDUCED, looks.MOMENTS, looks.DISTRIBUTED, looks.QUARTIC, looks.ELLIPSOID), strict=True)
+)
 
 MODEL_COLOURS = dict(zip(MODELS, (looks.REDUCED, looks.MOMENTS, looks.PARTS, looks.DISTRIBUTED), strict=True))
 
@@ -31,47 +33,17 @@ def surface_errors(errors: dict[str, Arrays]) -> PlotFigure:
             kinds = [kind for kind in KINDS if f"{kind}/{quantity}" in each]
             for i, kind in enumerate(kinds):
                 at = place + 0.15 * (i - 0.5 * (len(kinds) - 1))
-                _range(axes, at, factor * each[f"{kind}/{quantity}"], COLOURS[kind])
+                numbers = np.percentile(factor * each[f"{kind}/{quantity}"], [5, 25, 50, 75, 95, 100])
+                looks.box(axes, at, numbers, COLOURS[kind], 0.12)
         axes.set(yscale="log", ylabel=label)
         tidy(axes)
         axes.grid(False, axis="x")
     panels[1].set_xticks(range(len(errors)), [IN_WORDS[shape].replace(", ", ",\n") for shape in errors])
     figure.align_ylabels(panels)
     shown = [kind for kind in KINDS if any(f"{kind}/force" in each for each in errors.values())]
-    figure.legend(
-        handles=[_patch(COLOURS[kind], kind) for kind in shown] + [_cross()],
-        loc="outside upper center", ncols=6, frameon=False, fontsize="small",
-    )  # fmt: skip
+    key = looks.box_key({kind: COLOURS[kind] for kind in shown})
+    looks.legend(figure, [*key, looks.line_key(**looks.MAXIMUM)], 6, fontsize="small")
     return figure
-
-
-def _range(axes: Any, at: float, values: np.ndarray, colour: str) -> None:
-    """Box from first to third quartile, whiskers from 5 to 95 %, the maximum as a cross."""
-    low, first, median, third, high = np.percentile(values, [5, 25, 50, 75, 95])
-    box = {"whislo": low, "q1": first, "med": median, "q3": third, "whishi": high}
-    _box(axes, at, box, colour, 0.12)
-    axes.plot(at, values.max(), marker="x", ms=4.5, mew=1.3, color=colour)
-
-
-def _box(axes: Any, at: float, box: dict[str, float], colour: str, width: float) -> None:
-    line = {"color": colour, "linewidth": 1.0}
-    axes.bxp(
-        [box], positions=[at], widths=width, showfliers=False, patch_artist=True, manage_ticks=False,
-        boxprops={"facecolor": colour, "edgecolor": colour}, medianprops={"color": "white", "linewidth": 1.4},
-        whiskerprops=line, capprops=line,
-    )  # fmt: skip
-
-
-def _patch(colour: str, label: str) -> Any:
-    from matplotlib.patches import Patch
-
-    return Patch(facecolor=colour, edgecolor=colour, label=label)
-
-
-def _cross() -> Any:
-    from matplotlib.lines import Line2D
-
-    return Line2D([], [], ls="", marker="x", ms=5, mew=1.3, color="0.3", label="maximum")
 
 
 def staircase(stairs: Arrays) -> PlotFigure:
@@ -96,7 +68,7 @@ def staircase(stairs: Arrays) -> PlotFigure:
     for axes in panels[1]:
         axes.set_xlabel("centre of rotation from the middle [mm]")
     figure.align_ylabels(panels)
-    figure.legend(*panels[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=2, frameon=False)
+    looks.legend(figure, panels[0, 0], 2)
     return figure
 
 
@@ -110,16 +82,14 @@ def driven_boxes(errors: Errors) -> PlotFigure:
         for place, each in enumerate(errors.values()):
             for offset, (model, colour) in zip((-0.3, -0.1, 0.1, 0.3), MODEL_COLOURS.items(), strict=True):
                 values = [factor * each[model][before + name] for name in boxes.COLUMNS]
-                box: dict[str, float] = dict(zip(("whislo", "q1", "med", "q3", "whishi"), values[:5], strict=True))
-                _box(axes, place + offset, box, colour, 0.16)
-                axes.plot(place + offset, values[5], marker="x", ms=5, mew=1.4, color=colour)
+                looks.box(axes, place + offset, values, colour, 0.16)
         axes.set(ylabel=label, ylim=(0.0, None))
         tidy(axes)
         axes.grid(False, axis="x")
     panels[1].set_xticks(range(len(errors)), [IN_WORDS[shape] for shape in errors])
     figure.align_ylabels(panels)
-    handles = [_patch(colour, MODELS[model]) for model, colour in MODEL_COLOURS.items()] + [_cross()]
-    figure.legend(handles=handles, loc="outside upper center", ncols=5, frameon=False, fontsize="small")
+    key = looks.box_key({MODELS[model]: colour for model, colour in MODEL_COLOURS.items()})
+    looks.legend(figure, [*key, looks.line_key(**looks.MAXIMUM)], 5, fontsize="small")
     return figure
 
 
@@ -129,9 +99,11 @@ def grooves(numbers: dict[str, Any]) -> PlotFigure:
     axes: Any = figure.subplots()
     slopes = np.array(numbers["slope"])
     fine = np.linspace(slopes[0], slopes[-1], 100)
-    axes.plot(np.degrees(fine), np.degrees([closed_drift(s) for s in fine]), color=looks.EXACT, label="closed form")
+    axes.plot(
+        np.degrees(fine), np.degrees([grooved.closed_drift(s) for s in fine]), color=looks.EXACT, label="closed form"
+    )
     for kind, marker, colour in zip(
-        GROOVED_MODELS, "ox+", (looks.DISTRIBUTED, looks.MOMENTS, looks.REDUCED), strict=True
+        grooved.MODELS, "ox+", (looks.DISTRIBUTED, looks.MOMENTS, looks.REDUCED), strict=True
     ):
         axes.plot(
             np.degrees(slopes), np.degrees(numbers[kind]), marker, color=colour, label=kind, fillstyle="none", ms=7

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from planarfriction.experiments.in_hand.runs import CENTRES_OF_MASS, Case, distance
-from planarfriction.experiments.runs import LAW, SIX_SHAPES, at_centre_of_pressure, columns
+from planarfriction.experiments.runs import IN_WORDS, LAW, SIX_SHAPES, at_centre_of_pressure, columns
 from planarfriction.experiments.velocity_driven import boxes
 from planarfriction.limit_surface import LimitSurfaceEllipsoid, LimitSurfaceTable
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
@@ -60,6 +60,13 @@ class Row:
     torque [N m] at the centre of pressure, from a finer grid."""
     time: float = float("nan")
     """Time in the solver at the default tolerances over that of the full model; `run_times` measures it."""
+
+
+def shape_of(case: str) -> str:
+    """The patch of a case in words."""
+    if case.startswith("driven, "):
+        return IN_WORDS[case.removeprefix("driven, ")]
+    return case.rpartition(", load")[0].removesuffix(", far placement")
 
 
 @functools.lru_cache(maxsize=8)
@@ -147,13 +154,13 @@ def driven_rows(shapes: tuple[str, ...] = SIX_SHAPES) -> list[Row]:
     return rows
 
 
-def run_times(shape: str) -> dict[tuple[str, str], float]:
+def run_times(shape: str) -> dict[str, dict[str, float]]:
     """Time in the solver over that of the full model, by case and model; nothing else should run beside it."""
     result = {}
     for case, scene in scenes_of(shape).items():
         time_of = functools.cache(lambda model, scene=scene: _time(scene(model)))
         times = {name: time_of(model) for name, model in models(shape).items()}
-        result |= {(case, name): value / times["full"] for name, value in times.items()}
+        result[case] = {name: value / times["full"] for name, value in times.items()}
     return result
 
 

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 
 from planarfriction.experiments import looks
-from planarfriction.experiments.beyond.ladder import Row
-from planarfriction.experiments.runs import IN_WORDS
+from planarfriction.experiments.beyond.ladder import Row, shape_of
 from planarfriction.experiments.wording import span
 from planarfriction.plots.style import PlotFigure, new_figure, tidy
 
@@ -56,8 +55,8 @@ def draw_ladder(rows: list[Row]) -> PlotFigure:
     """Error over the time of a run: patches of many cells above, of few below; velocity-driven and in hand."""
     from matplotlib.ticker import FixedLocator, NullLocator
 
-    many = {_shape_of(row.case) for row in rows if row.model == "degree 5"}
-    groups = [group for few in (False, True) if (group := [row for row in rows if (_shape_of(row.case) in many) ^ few])]
+    many = {shape_of(row.case) for row in rows if row.model == "degree 5"}
+    groups = [group for few in (False, True) if (group := [row for row in rows if (shape_of(row.case) in many) ^ few])]
     figure = new_figure(10.5, 0.7 + 3.1 * len(groups))
     panels: Any = figure.subplots(len(groups), len(COLUMNS), sharex="row", squeeze=False)
     for line, group in zip(panels, groups, strict=True):
@@ -76,13 +75,9 @@ def draw_ladder(rows: list[Row]) -> PlotFigure:
     for axes in panels[-1]:
         axes.set_xlabel("time of a run / that of the whole grid")
     figure.align_ylabels(panels)
-    figure.legend(
-        handles=[_key(family) for family in FAMILIES],
-        loc="outside upper center",
-        ncols=len(FAMILIES),
-        frameon=False,
-        fontsize="small",
-    )
+    look = {"ls": "-", "lw": 1.4, "ms": 6.5, "mec": "white"}
+    key = [looks.line_key(each.words, marker=each.marker, color=each.colour, **look) for each in FAMILIES]
+    looks.legend(figure, key, len(FAMILIES), fontsize="small")
     return figure
 
 
@@ -104,18 +99,3 @@ def _draw_family(axes: Any, family: Family, rows: list[Row], quantity: str) -> N
         medians.append((cost, middle))
     if medians:
         axes.plot(*np.transpose(medians), "-", marker=family.marker, ms=6.5, mec="white", lw=1.4, color=family.colour)
-
-
-def _shape_of(case: str) -> str:
-    """The patch of a case in words."""
-    if case.startswith("driven, "):
-        return IN_WORDS[case.removeprefix("driven, ")]
-    return case.rpartition(", load")[0].removesuffix(", far placement")
-
-
-def _key(family: Family) -> Any:
-    from matplotlib.lines import Line2D
-
-    return Line2D(
-        [], [], ls="-", lw=1.4, marker=family.marker, ms=6.5, mec="white", color=family.colour, label=family.words
-    )

@@ -2,14 +2,23 @@
 
 from __future__ import annotations
 
-import dataclasses
-import functools
-from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from planarfriction.experiments.beyond import driven, figures, in_hand, ladder, others, surfaces, tables
+from planarfriction.experiments import looks
+from planarfriction.experiments.beyond import (
+    driven,
+    figures,
+    grooves,
+    in_hand,
+    ladder,
+    load_family,
+    plateaus,
+    surfaces,
+    tables,
+)
 from planarfriction.experiments.beyond import shapes as new_shapes
 from planarfriction.experiments.beyond.ladder_figure import draw_ladder
 from planarfriction.experiments.beyond.told import told
@@ -34,55 +43,70 @@ NEW_SHAPES, QUICK_NEW_SHAPES, QUICK_SEEDS = tuple(new_shapes.shapes()), ("three 
 def run(work: Work) -> Result:
     """Carry out the experiment."""
     shapes = QUICK_SHAPES if work.quick else SHAPES
+    six = [shape for shape in shapes if shape in SIX_SHAPES]
+    twists = QUICK_TWISTS if work.quick else surfaces.TWISTS
+    new, seeds = (QUICK_NEW_SHAPES, QUICK_SEEDS) if work.quick else (NEW_SHAPES, new_shapes.SEEDS)
     found = work.pieces(
-        {f"models, {IN_WORDS[shape]}": _runs_of(shape) for shape in shapes}
-        | {f"limit surface, {IN_WORDS[shape]}": _surface_of(shape, work.quick) for shape in shapes}
-    )
-    rows = [row for shape in shapes for row in _rows_of(found[f"models, {IN_WORDS[shape]}"])]
-    errors = {shape: found[f"limit surface, {IN_WORDS[shape]}"] for shape in shapes}
-    single: dict[str, Callable[[], dict[str, Any]]] = {
-        "plateaus": others.plateaus,
-        "grooves": lambda: others.grooves(work.quick),
-        "staircase": surfaces.staircase,
-    }
-    pieces = work.pieces(single)
-    spun = work.pieces(
-        {f"spin-up, {IN_WORDS[s]}": functools.partial(driven.spin_up, s) for s in shapes if s in SIX_SHAPES}
-    )
-    unseen = work.pieces(
-        {
-            f"new shapes, {name}": _new_shape(name, work.quick)
-            for name in (QUICK_NEW_SHAPES if work.quick else NEW_SHAPES)
+        {("models", shape): partial(_runs_of, shape) for shape in shapes}
+        | {("limit surface", shape): partial(surfaces.surface_errors, shape, twists) for shape in shapes}
+        | {
+            ("plateaus", ""): plateaus.plateaus,
+            ("grooves", ""): partial(grooves.grooves, work.quick),
+            ("staircase", ""): surfaces.staircase,
+            ("soft finger", ""): partial(load_family.load_family, work.quick),
         }
+        | {("spin-up", shape): partial(driven.spin_up, shape) for shape in six}
+        | {("new shapes", name): partial(new_shapes.largest_errors, name, seeds) for name in new},
+        lambda key: ", ".join((key[0], IN_WORDS.get(key[1], key[1]))),
     )
-    unseen = {name.removeprefix("new shapes, "): each for name, each in unseen.items()}
     # one after the other: these are measured with a clock
-    times = work.piece("time of runs", lambda: _times_of(shapes))
-    rows = [dataclasses.replace(row, time=float(times[f"{row.case}|{row.model}"])) for row in rows]
+    times = work.piece("time of runs", lambda: {shape: ladder.run_times(shape) for shape in shapes})
     costs = driven.step_numbers(work.piece("cost of a step", driven.step_costs))
-    family = work.piece("soft finger", lambda: others.load_family(work.quick))
-    grooved = {name: values.tolist() for name, values in pieces["grooves"].items()}
-    numbers = _numbers(rows, found, errors) | {
-        "jumps": surfaces.jumps(pieces["staircase"]),
-        "plateaus": _floats(pieces["plateaus"]),
+
+    def of(what: str) -> dict[str, dict[str, Any]]:
+        return {which: each for (name, which), each in found.items() if name == what}
+
+    rows = [
+        ladder.Row(case, model, int(errors["states"]), errors["errors"], times[shape][case][model])
+        for shape, each in of("models").items()
+        for case, models in each["runs"].items()
+        for model, errors in models.items()
+    ]
+    shifts = {case: value for each in of("models").values() for case, value in each["shifts"].items()}
+    stairs, unseen, errors = found["staircase", ""], of("new shapes"), of("limit surface")
+    grooved = {name: values.tolist() for name, values in found["grooves", ""].items()}
+    numbers = _numbers(rows, shifts, errors) | {
+        "jumps": surfaces.jumps(stairs),
+        "plateaus": found["plateaus", ""],
         "grooves": grooved,
-        "load family": _floats(family),
+        "load family": found["soft finger", ""],
         "step": costs,
-        "spin-up": {shape: _floats(spun[f"spin-up, {IN_WORDS[shape]}"]) for shape in shapes if shape in SIX_SHAPES},
+        "spin-up": of("spin-up"),
         "new shapes": {name: new_shapes.ratios(each) for name, each in unseen.items()},
     }
     return fill("beyond", **told(numbers)).result(
-        _figures(rows, errors, pieces["staircase"], numbers),
+        _figures(rows, errors, stairs, numbers),
         comparisons=[
-            *surfaces.comparisons(errors, pieces["staircase"]),
+            *surfaces.comparisons(errors, stairs),
             *driven.comparisons(numbers["driven"]),
             *in_hand.comparisons(numbers["in hand"]),
             *new_shapes.comparisons(unseen),
-            *others.comparisons(numbers["plateaus"], grooved),
+            *plateaus.comparisons(numbers["plateaus"]),
+            *grooves.comparisons(grooved),
         ],
         numbers=numbers,
         tables=(*tables.tables(rows, numbers), new_shapes.table(unseen)),
     )
+
+
+def _runs_of(shape: str) -> dict[str, Any]:
+    """A piece: every model of a shape in every run, and what friction does to the in-hand ones."""
+    cases = in_hand.cases_of(shape)
+    rows = ladder.in_hand_rows(cases) + (ladder.driven_rows((shape,)) if shape in SIX_SHAPES else [])
+    runs: dict[str, dict[str, Any]] = {}
+    for row in rows:
+        runs.setdefault(row.case, {})[row.model] = {"states": row.states, "errors": row.errors}
+    return {"runs": runs, "shifts": {case.words: in_hand.friction_shift(case) for case in cases}}
 
 
 def _figures(
@@ -92,74 +116,24 @@ def _figures(
         case: {in_hand.ENDS.get(name, FRICTION): each[name] for name in (*in_hand.ENDS, in_hand.SHIFT)}
         for case, each in numbers["in hand"].items()
     }
+    colours = dict(
+        zip(in_hand.ENDS.values(), (looks.REDUCED, looks.MOMENTS, looks.OTHERS[3], looks.PARTS), strict=True)
+    )
     return {
         "surface_errors": figures.surface_errors(errors),
         "surface_staircase": figures.staircase(stairs),
         "driven_models": figures.driven_boxes(numbers["driven"]),
-        "in_hand_ends": end_shifts(ends),
+        "in_hand_ends": end_shifts(ends, colours, "distance of the end from the distributed model's [mm]"),
         "ladder": draw_ladder(rows),
         "grooves": figures.grooves(numbers["grooves"]),
     }
 
 
-# ------------------------------------------------------------------ pieces
-
-
-def _surface_of(shape: str, quick: bool) -> Callable[[], dict[str, Any]]:
-    with_quartic = surfaces.has_quartic() and shape in surfaces.QUARTIC_SHAPES
-    kinds = tuple(name for name in surfaces.KINDS if name != "quartic" or with_quartic)
-    return lambda: surfaces.surface_errors(shape, QUICK_TWISTS if quick else surfaces.TWISTS, kinds)
-
-
-def _new_shape(name: str, quick: bool) -> Callable[[], dict[str, Any]]:
-    return lambda: new_shapes.largest_errors(name, QUICK_SEEDS if quick else new_shapes.SEEDS)
-
-
-def _runs_of(shape: str) -> Callable[[], dict[str, Any]]:
-    """A piece: every model of a shape in every run, and what friction does to the in-hand ones."""
-
-    def compute() -> dict[str, Any]:
-        cases = in_hand.cases_of(shape)
-        rows = ladder.in_hand_rows(cases)
-        if shape in SIX_SHAPES:
-            rows += ladder.driven_rows((shape,))
-        result: dict[str, Any] = {f"shift|{case.words}": in_hand.friction_shift(case) for case in cases}
-        for row in rows:
-            values = {"states": row.states, **row.errors}
-            result |= {f"{row.case}|{row.model}|{name}": value for name, value in values.items()}
-        return result
-
-    return compute
-
-
-def _floats(piece: Arrays) -> dict[str, float]:
-    return {name: float(value) for name, value in piece.items()}
-
-
-def _times_of(shapes: tuple[str, ...]) -> dict[str, float]:
-    measured = (ladder.run_times(shape) for shape in shapes)
-    return {f"{case}|{model}": value for each in measured for (case, model), value in each.items()}
-
-
-def _rows_of(piece: Arrays) -> list[ladder.Row]:
-    """The rows that a piece holds."""
-    runs: dict[tuple[str, str], dict[str, float]] = {}
-    for key, value in piece.items():
-        parts = key.split("|")
-        if len(parts) == 3:
-            runs.setdefault((parts[0], parts[1]), {})[parts[2]] = float(value)
-    return [ladder.Row(case, model, int(values.pop("states")), values) for (case, model), values in runs.items()]
-
-
-def _numbers(rows: list[ladder.Row], found: dict[str, Arrays], errors: dict[str, Arrays]) -> dict[str, Any]:
-    shifts = {
-        key.removeprefix("shift|"): float(value)
-        for piece in found.values()
-        for key, value in piece.items()
-        if key.startswith("shift|")
-    }
+def _numbers(rows: list[ladder.Row], shifts: dict[str, float], errors: dict[str, Arrays]) -> dict[str, Any]:
     moved = driven.driven_errors(rows)
     ends = in_hand.end_distances(rows, shifts)
+    models = dict.fromkeys(row.model for row in rows)
+    times = {(row.case, row.model): row.time for row in rows}
     return {
         "surfaces": {shape: _statistics(each) for shape, each in errors.items()},
         "quartic installed": surfaces.has_quartic(),
@@ -172,8 +146,15 @@ def _numbers(rows: list[ladder.Row], found: dict[str, Arrays], errors: dict[str,
             model: {f"load {load}": in_hand.score(ends, load, model) for load in (1, 2)}
             for model in ("reduced", ladder.AUTO)
         },
-        "run costs": _run_costs(rows),
-        "run ratios": _run_ratios(rows),
+        # median over all runs of the time in the solver over that of the distributed model
+        "run costs": {name: float(np.median([row.time for row in rows if row.model == name])) for name in models},
+        # median and quartiles of the same over that of the published model in the same run
+        "run ratios": {
+            name: driven.median_and_quartiles(
+                [value / times[case, "published"] for (case, other), value in times.items() if other == name]
+            )
+            for name in models
+        },
     }
 
 
@@ -181,21 +162,4 @@ def _statistics(errors: Arrays) -> dict[str, dict[str, float]]:
     return {
         name: {"median": float(np.median(each)), "mean": float(each.mean()), "max": float(each.max())}
         for name, each in errors.items()
-    }
-
-
-def _run_costs(rows: list[ladder.Row]) -> dict[str, float]:
-    """Median over all runs of the time in the solver over that of the distributed model."""
-    models = dict.fromkeys(row.model for row in rows)
-    return {model: float(np.median([row.time for row in rows if row.model == model])) for model in models}
-
-
-def _run_ratios(rows: list[ladder.Row]) -> dict[str, list[float]]:
-    """Median and quartiles over all runs of the time in the solver over that of the published model in the same run."""
-    times = {(row.case, row.model): row.time for row in rows}
-    return {
-        model: driven.median_and_quartiles(
-            [value / times[case, "published"] for (case, other), value in times.items() if other == model]
-        )
-        for model in dict.fromkeys(row.model for row in rows)
     }

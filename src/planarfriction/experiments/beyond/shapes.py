@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from planarfriction.experiments import experiment
 from planarfriction.experiments.beyond.ladder import AUTO, name_of_parts
 from planarfriction.experiments.experiment import Comparison, Table
 from planarfriction.experiments.runs import LAW, at_centre_of_pressure, columns
@@ -149,16 +150,16 @@ def comparisons(found: dict[str, dict[str, np.ndarray]]) -> list[Comparison]:
 def table(found: dict[str, dict[str, np.ndarray]]) -> Table:
     """Largest errors over the published model's: the median twist and the worst."""
     models = [name for name in next(iter(found.values())) if name != "published"]
-    rows = []
-    for shape, errors in found.items():
-        each = ratios(errors)
-        cells = (f"{np.median(each[m][q]):.2f} / {max(each[m][q]):.2f}" for q in QUANTITIES for m in models)
-        rows.append((shape, *cells))
     words = {"reduced": "1 part"}
-    headings = ("patch", *(f"{quantity}, {words.get(model, model)}" for quantity in QUANTITIES for model in models))
+    columns = {
+        f"{quantity}, {words.get(model, model)}": lambda each, m=model, q=quantity: (
+            f"{np.median(each[m][q]):.2f} / {max(each[m][q]):.2f}"
+        )
+        for quantity in QUANTITIES
+        for model in models
+    }
     note = (
         f"Smooth random twists of {T_END:g} s, samples every {1e3 * EVERY:g} ms; from a grid cut {FINER} times finer."
     )
-    return Table(
-        "New shapes: largest error over the published reduced model's, median / worst twist", headings, rows, note
-    )
+    title = "New shapes: largest error over the published reduced model's, median / worst twist"
+    return experiment.table(title, {shape: ratios(each) for shape, each in found.items()}, columns, "patch", note)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import statistics
 from typing import Any
 
+from planarfriction.experiments.beyond import grooves as grooved
 from planarfriction.experiments.beyond.driven import ROUNDS, STATISTICS
 from planarfriction.experiments.beyond.in_hand import SHIFT, depends_on_friction
 from planarfriction.experiments.beyond.ladder import AUTO
-from planarfriction.experiments.beyond.others import GROOVED_MODELS
 from planarfriction.experiments.beyond.shapes import QUANTITIES
 from planarfriction.experiments.beyond.surfaces import QUARTIC_SHAPES
 from planarfriction.experiments.runs import IN_WORDS
@@ -44,8 +44,8 @@ def told(numbers: Numbers) -> Numbers:
         "quartile": [each["degree 5"]["third quartile"] / each["full"]["third quartile"] for each in moved],
         "family": numbers["load family"],
         "grooves": {
-            "models": len(GROOVED_MODELS),
-            "miss": max(abs(a - b) for kind in GROOVED_MODELS
+            "models": len(grooved.MODELS),
+            "miss": max(abs(a - b) for kind in grooved.MODELS
                         for a, b in zip(grooves[kind], grooves["closed form"], strict=True)),
         },
     }  # fmt: skip

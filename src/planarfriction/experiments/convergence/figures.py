@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction.experiments import facts
+from planarfriction.experiments import looks
 from planarfriction.experiments.convergence.runs import LAWS, SHAPES, Case, Errors, Family, profile
+from planarfriction.experiments.looks import OTHERS
 from planarfriction.experiments.runs import IN_WORDS
-from planarfriction.plots.style import LINE_STYLES, PALETTE, PlotFigure, new_figure, tidy
+from planarfriction.plots.style import LINE_STYLES, PlotFigure, new_figure, tidy
 
 QUANTITIES = ("ft", "tau")
 """Force and torque in the names of the published curves."""
@@ -23,22 +24,19 @@ _ABSCISSAE: dict[Family, str] = {
 }
 
 
-def errors_over_counts(family: Family, counts: Sequence[int], errors: Mapping[Case, Errors]) -> PlotFigure:
-    """Relative errors of force and torque of one family, all shapes and parameters."""
-    figure = new_figure(9.6, 4.2)
-    panels = figure.subplots(1, 2)
-    _draw_errors(panels, family, counts, errors)
-    figure.legend(*_legend(panels[0]), loc="outside lower center", ncols=4, frameon=False, fontsize="small")
-    return figure
-
-
-def errors_and_profile(family: Family, counts: Sequence[int], errors: Mapping[Case, Errors]) -> PlotFigure:
-    """The same with the velocity profile beside it, as published."""
-    figure = new_figure(10.0, 4.2)
-    panels = figure.subplots(1, 3)
+def errors_over_counts(
+    family: Family, counts: Sequence[int], errors: Mapping[Case, Errors], *, with_profile: bool = False
+) -> PlotFigure:
+    """Relative errors of force and torque of one family, all shapes and parameters; on demand with the profile."""
+    figure = new_figure(10.0 if with_profile else 9.6, 4.2)
+    panels = figure.subplots(1, 3 if with_profile else 2)
     _draw_errors(panels[:2], family, counts, errors)
-    _draw_profile(panels[2])
-    figure.legend(*_legend(panels[0]), loc="outside lower center", ncols=4, frameon=False, fontsize="small")
+    if with_profile:
+        _draw_profile(panels[2])
+    handles = dict(zip(*reversed(panels[0].get_legend_handles_labels()), strict=True))  # each label once
+    published = handles.pop("published")
+    figure.legend([*handles.values(), published], [*handles, "published"], loc="outside lower center", ncols=4,
+                  frameon=False, fontsize="small")  # fmt: skip
     return figure
 
 
@@ -46,10 +44,10 @@ def radius_errors(counts: Sequence[int], mask: np.ndarray, cut: np.ndarray, torq
     """Error of the contact radius of the disc, as a mask and cut by its rim, beside the error of the torque."""
     figure = new_figure(6.4, 3.6)
     axes = figure.subplots()
-    axes.semilogy(counts, np.abs(mask), "o-", color=PALETTE[0], markersize=4, label="contact radius, mask")
-    axes.semilogy(counts, torque, "s--", color=PALETTE[1], markersize=4, label="torque over the run, mask")
+    axes.semilogy(counts, np.abs(mask), "o-", color=OTHERS[0], markersize=4, label="contact radius, mask")
+    axes.semilogy(counts, torque, "s--", color=OTHERS[1], markersize=4, label="torque over the run, mask")
     axes.semilogy(
-        counts, np.abs(cut), "^-", color=PALETTE[2], markersize=4, label="contact radius, cells cut by the rim"
+        counts, np.abs(cut), "^-", color=OTHERS[2], markersize=4, label="contact radius, cells cut by the rim"
     )
     axes.set(xlabel=_ABSCISSAE["cells_distributed"], ylabel="relative error [-]")
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False, fontsize="small")
@@ -61,31 +59,23 @@ def _draw_errors(panels: Any, family: Family, counts: Sequence[int], errors: Map
     for i, (axes, quantity, label) in enumerate(zip(panels, QUANTITIES, _ERROR_LABELS, strict=True)):
         for (shape, parameters), found in errors.items():
             look = {
-                "color": PALETTE[SHAPES.index(shape)],
+                "color": OTHERS[SHAPES.index(shape)],
                 "linestyle": LINE_STYLES[list(LAWS).index(parameters)],
-                "label": f"{IN_WORDS[shape]}, p = {parameters[1:]}",
+                "label": f"{IN_WORDS[shape]}, $p$ = {parameters[1:]}",
             }
             axes.semilogy(counts, found[family][:, i], linewidth=1.3, **look)
-            curve = facts.published_curve(f"convergence/{family}/{shape}/{parameters}/{quantity}")
-            axes.semilogy(curve.time, curve.values, ".", color="black", markersize=2.5, label="published")
+            curve = f"convergence/{family}/{shape}/{parameters}/{quantity}"
+            looks.vertices(axes, curve, 1.0, "black", marker=".", ms=2.5, mfc="black", label="published")
         axes.set(xlabel=_ABSCISSAE[family], ylabel=label)
         tidy(axes)
 
 
 def _draw_profile(axes: Any) -> None:
     velocity = profile()
-    rows = (("vx", "v$_x$ [cm/s]", 1e2), ("vy", "v$_y$ [cm/s]", 1e2), ("omega", "ω [rad/s]", 1.0))
+    rows = (("vx", "$v_x$ [cm/s]", 1e2), ("vy", "$v_y$ [cm/s]", 1e2), ("omega", "$\\omega$ [rad/s]", 1.0))
     for i, (name, label, factor) in enumerate(rows):
-        axes.plot(velocity.times, factor * velocity.values[:, i], color=PALETTE[3 + i], label=label)
-        curve = facts.published_curve(f"convergence/velocity/{name}")
-        axes.plot(curve.time, factor * curve.values, ".", color="black", markersize=3)
+        axes.plot(velocity.times, factor * velocity.values[:, i], color=OTHERS[i], label=label)
+        looks.vertices(axes, f"convergence/velocity/{name}", factor, "black", marker=".", mfc="black")
     axes.set(xlabel="time [s]", ylabel="velocity of the centre of pressure", ylim=(-0.1, 2.1))
     axes.legend(loc="upper right", frameon=False, fontsize="small")
     tidy(axes)
-
-
-def _legend(axes: Any) -> tuple[list[Any], list[str]]:
-    """Each label once, the published samples last."""
-    handles = dict(zip(*reversed(axes.get_legend_handles_labels()), strict=True))
-    published = handles.pop("published")
-    return [*handles.values(), published], [*handles, "published"]

@@ -17,8 +17,10 @@ from planarfriction.experiments.experiment import (
     Result,
     Table,
     Work,
+    compare,
     compare_curve,
-    compare_number,
+    dataset,
+    table,
 )
 from planarfriction.experiments.runs import IN_WORDS
 from planarfriction.experiments.wording import fill
@@ -86,28 +88,21 @@ def _slopes(counts: Sequence[int], errors: np.ndarray) -> dict[str, float]:
 
 def _cut_radius_comparison(counts: Sequence[int]) -> Comparison:
     finest = ContactPatch.disc(RADIUS, counts[-1])
-    return compare_number(
-        f"contact radius of the disc with cells cut by the rim, {counts[-1]} x {counts[-1]}",
-        float(finest.contact_radius()),
-        2.0 * RADIUS / 3.0,
-        reference="closed form",
-        tolerance=0.5 * RADIUS / counts[-1] ** 2,
-        unit="m",
-        cause="Each cell's pressure acts at its centroid: an error of second order in the size of the cells.",
-    )
+    words = f"contact radius of the disc with cells cut by the rim, {counts[-1]} x {counts[-1]}"
+    cause = "Each cell's pressure acts at its centroid: an error of second order in the size of the cells."
+    ours, within = float(finest.contact_radius()), 0.5 * RADIUS / counts[-1] ** 2
+    return compare(words, ours, 2.0 * RADIUS / 3.0, "closed form", within, "m", cause)
 
 
 def _profile_comparisons() -> list[Comparison]:
     velocity = runs.profile()
     cause = "None: straight lines between the same kinks, the velocity is not held over 0.01 s."
-    found = []
+    rows = []
     for i, name in enumerate(("vx", "vy", "omega")):
         curve = f"convergence/velocity/{name}"
         times = facts.published_curve(curve).time
-        found.append(
-            compare_curve(f"velocity profile, {name}", times, velocity(times)[:, i], curve, allowance=0.0, cause=cause)
-        )
-    return found
+        rows.append(compare_curve(f"velocity profile, {name}", times, velocity(times)[:, i], curve, 0.0, cause))
+    return rows
 
 
 def _comparisons(counts: Sequence[int], errors: Mapping[Case, Errors], work: Work) -> list[Comparison]:
@@ -125,36 +120,29 @@ def _comparisons(counts: Sequence[int], errors: Mapping[Case, Errors], work: Wor
 
 def _euler_comparisons(counts: Sequence[int], errors: Mapping[Case, Errors]) -> list[Comparison]:
     cause = "None: the same explicit Euler steps of $10^{-5}$ s and the same samples; rounding and reading the figure."
-    return [
-        comparison
-        for case in errors
-        for family in runs.FAMILIES
-        for comparison in _against_figure(
-            family, counts, case, errors[case][family], EULER_TOLERANCE, cause, "explicit Euler, "
-        )
-    ]
+    found = []
+    for case, each in errors.items():
+        for family in runs.FAMILIES:
+            found += _against_figure(family, counts, case, each[family], EULER_TOLERANCE, cause, "explicit Euler, ")
+    return found
 
 
 def _against_figure(
-    name: str,
-    counts: Sequence[int],
-    case: Case,
-    errors: np.ndarray,
-    tolerance: float,
-    cause: str,
-    method: str = "",
+    name: str, counts: Sequence[int], case: Case, errors: np.ndarray, tolerance: float, cause: str, method: str = ""
 ) -> list[Comparison]:
     """Force and torque of one case beside the figure, relative to the published error at each count."""
     found = []
     for i, quantity in enumerate(QUANTITIES):
         curve = facts.published_curve(f"convergence/{name}/{key(case)}/{quantity}")
         published = curve.values[np.searchsorted(curve.time, counts)]
-        difference = float(np.abs(errors[:, i] / published - 1.0).max())
-        words = f"{method}{_WORDS[name]}: {_QUANTITY_WORDS[quantity]} error, {IN_WORDS[case[0]]}, p = {case[1][1:]}"
-        reading = curve.reading / float(published.min())
-        unit = "of the published error"
-        found.append(Comparison(words, "published", difference, tolerance + reading, unit, len(counts), cause))
+        words = f"{method}{_WORDS[name]}: {_QUANTITY_WORDS[quantity]} error, {_words(case)}"
+        within, unit = tolerance + curve.reading / float(published.min()), "of the published error"
+        found.append(compare(words, errors[:, i] / published, 1.0, "published", within, unit, cause))
     return found
+
+
+def _words(case: Case) -> str:
+    return f"{IN_WORDS[case[0]]}, p = {case[1][1:]}"
 
 
 # ---------------------------------------------------------------------- figures, tables
@@ -164,7 +152,9 @@ def _figures(
     counts: Sequence[int], errors: Mapping[Case, Errors], mask: np.ndarray, cut: np.ndarray
 ) -> dict[str, PlotFigure]:
     result = {
-        "convergence_cells_distributed": figures.errors_and_profile("cells_distributed", counts, errors),
+        "convergence_cells_distributed": figures.errors_over_counts(
+            "cells_distributed", counts, errors, with_profile=True
+        ),
         "convergence_cells_reduced": figures.errors_over_counts("cells_reduced", counts, errors),
         "convergence_segments": figures.errors_over_counts("segments", counts, errors),
     }
@@ -175,32 +165,25 @@ def _figures(
 
 
 def _slope_table(slopes: Mapping[str, Mapping[str, Mapping[str, float]]], counts: Sequence[int]) -> Table:
-    cases = list(slopes[runs.FAMILIES[0]])
-    headings = ["", *(f"{_WORDS[family]}, {_QUANTITY_WORDS[q]}" for family in slopes for q in QUANTITIES)]
-    rows = [
-        [
-            f"{IN_WORDS[case.partition('/')[0]]}, p = {case[-1]}",
-            *(round(slopes[family][case][q], 2) for family in slopes for q in QUANTITIES),
-        ]
-        for case in cases
-    ]
+    cases = {_words(case): key(case) for case in runs.CASES if key(case) in slopes[runs.FAMILIES[0]]}
+    columns = {
+        f"{_WORDS[family]}, {_QUANTITY_WORDS[q]}": lambda case, family=family, q=q: round(slopes[family][case][q], 2)
+        for family in slopes
+        for q in QUANTITIES
+    }
     note = f"Straight lines through log error over log count, {counts[0]} to {counts[-1]}."
-    return Table("Slope of the error", headings, rows, note)
+    return table("Slope of the error", cases, columns, "", note)
 
 
 def _dataset(counts: Sequence[int], errors: Mapping[Case, Errors]) -> xr.Dataset:
     """Relative errors over shape, parameters and count, one variable for each family and quantity."""
-    import xarray as xr
-
-    shapes = [shape for shape in runs.SHAPES if (shape, "p0") in errors]
-    variables = {
-        f"{family}_{quantity}": (
-            ("shape", "parameters", "count"),
-            np.array([[errors[shape, law][family][:, i] for law in runs.LAWS] for shape in shapes]),
-            {"units": "1", "long_name": f"relative {_QUANTITY_WORDS[quantity]} error, {_WORDS[family]}"},
-        )
-        for family in runs.FAMILIES
-        for i, quantity in enumerate(QUANTITIES)
+    columns = {
+        case: {
+            f"{family}_{quantity}": each[family][:, i]
+            for family in runs.FAMILIES
+            for i, quantity in enumerate(QUANTITIES)
+        }
+        for case, each in errors.items()
     }
-    coordinates = {"shape": shapes, "parameters": list(runs.LAWS), "count": ("count", list(counts), {"units": "1"})}
-    return xr.Dataset(variables, coords=coordinates)
+    units = dict.fromkeys(next(iter(columns.values())), "1")
+    return dataset(columns, units, ("shape", "parameters"), ("count", np.array(counts), "1"))

@@ -133,22 +133,17 @@ def solve(cases: Sequence[Case], counts: Sequence[int], work: Work) -> dict[Case
     wanted = {
         (case, *key): partial(wrenches, key[0], key[1], case, key[2]) for case in cases for key in keys[case].values()
     }
-    labels = {key: _label(*key[:3]) for key in wanted}
-    bases = work.pieces({labels[key]: compute for key, compute in wanted.items()})
+    bases = work.pieces(wanted, lambda key: _label(*key[:3]))
 
     def errors(case: Case, family: Family, count: int) -> dict[str, np.ndarray]:
         key = keys[case][family]
         wrench = wrenches(family, count, case, key[2])["wrench"]
-        return {"errors": relative_errors(wrench, bases[labels[case, *key]]["wrench"])}
+        return {"errors": relative_errors(wrench, bases[case, *key]["wrench"])}
 
     runs = [(case, family, count) for family in FAMILIES for count in reversed(counts) for case in cases]
-    found = work.pieces(
-        {_label(case, family, count): partial(errors, case, family, count) for case, family, count in runs}
-    )
+    found = work.pieces({run: partial(errors, *run) for run in runs}, lambda run: _label(*run))
     return {
-        case: {
-            family: np.array([found[_label(case, family, count)]["errors"] for count in counts]) for family in FAMILIES
-        }
+        case: {family: np.array([found[case, family, count]["errors"] for count in counts]) for family in FAMILIES}
         for case in cases
     }
 
@@ -157,11 +152,10 @@ def _label(case: Case, family: Family, count: int) -> str:
     return f"convergence, {' '.join(case)}, {family} {count}"
 
 
-def solve_by_euler(cases: Sequence[Case], counts: Sequence[int], work: Work) -> dict[Case, Errors]:
+def solve_by_euler(cases: Sequence[Case], counts: Sequence[int], work: Work) -> Mapping[Case, Errors]:
     """The same with the published explicit Euler steps, all grids and tables of a case in one go."""
     labels = {case: f"convergence, {case[0]} {case[1]}, explicit Euler" for case in cases}
-    found = work.pieces({labels[case]: partial(_euler, case, counts, labels[case], work) for case in cases})
-    return {case: {family: found[labels[case]][family] for family in FAMILIES} for case in cases}
+    return work.pieces({case: partial(_euler, case, counts, labels[case], work) for case in cases}, labels.__getitem__)
 
 
 def _euler(case: Case, counts: Sequence[int], label: str, work: Work) -> dict[str, np.ndarray]:

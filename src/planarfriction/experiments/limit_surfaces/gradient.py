@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from planarfriction import geometry
-from planarfriction.experiments.experiment import Comparison, compare
+from planarfriction.experiments.experiment import Comparison, compare_all
 from planarfriction.experiments.limit_surfaces.patches import LUMPED
 from planarfriction.limit_surface import LimitSurfaceCells, LimitSurfaceEllipsoid
 from planarfriction.patch import PUBLISHED_PATCHES
@@ -132,4 +132,4 @@ def gradient_comparisons(numbers: Numbers) -> list[Comparison]:
             ours["torque"], smooth["torque"], lumped, "m", LUMPED,
         ),
     ]  # fmt: skip
-    return [compare(name, found, expected, "closed form", *rest) for name, found, expected, *rest in rows]
+    return compare_all("closed form", rows)

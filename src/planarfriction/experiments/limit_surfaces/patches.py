@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from planarfriction.experiments import facts
-from planarfriction.experiments.experiment import Comparison, compare
+from planarfriction.experiments.experiment import Comparison, compare, compare_all
 from planarfriction.experiments.runs import IN_WORDS
 from planarfriction.limit_surface import LimitSurfaceTablePublished
 from planarfriction.patch import ContactPatch
@@ -77,7 +77,7 @@ def disc_numbers(mask: ContactPatch) -> Numbers:
 def shape_comparisons(numbers: Numbers) -> list[Comparison]:
     """Moments of discs, square and lines beside closed forms; the ellipsoid's largest error on the lines too."""
     rows = [*_disc_rows(numbers), *_grid_rows(numbers["patches"]), *_line_rows(numbers)]
-    return [compare(name, found, expected, "closed form", *rest) for name, found, expected, *rest in rows]
+    return compare_all("closed form", rows)
 
 
 _Row = tuple[str, float, float, float, str, str]

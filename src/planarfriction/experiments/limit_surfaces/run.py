@@ -58,8 +58,7 @@ def run(work: Work) -> Result:
     surfaces = {name: LimitSurfaceCells(patches[name]) for name in SIX_SHAPES}
     count = (DIRECTIONS[0] // 4, DIRECTIONS[1] // 4) if work.quick else DIRECTIONS
     measured = {name: _measured(surface, count) for name, surface in surfaces.items()}
-    found = work.pieces(measured, lambda name: f"{name}, {count[0]} polar angles")
-    errors = {name: _by_name(arrays) for name, arrays in found.items()}
+    errors = work.pieces(measured, lambda name: f"{name}, {count[0]} polar angles")
     gradient = gradient_numbers()
     numbers = {
         "patches": patch_numbers(patches),
@@ -85,17 +84,8 @@ def run(work: Work) -> Result:
     )
 
 
-def _measured(surface: LimitSurfaceCells, count: tuple[int, int]) -> Callable[[], dict[str, float]]:
-    return lambda: ellipsoid_errors(surface, count) | table_errors(surface.patch, count)
-
-
-def _by_name(arrays: dict[str, np.ndarray]) -> dict[str, dict[str, float]]:
-    """`{"a/b": value}` as `{"a": {"b": value}}`."""
-    result: dict[str, dict[str, float]] = {}
-    for key, value in arrays.items():
-        group, _, name = key.partition("/")
-        result.setdefault(group, {})[name] = float(value)
-    return result
+def _measured(surface: LimitSurfaceCells, count: tuple[int, int]) -> Callable[[], dict[str, Any]]:
+    return lambda: {"ellipsoid": ellipsoid_errors(surface, count), **table_errors(surface.patch, count)}
 
 
 def _mesh(count: tuple[int, int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -139,7 +129,7 @@ def ellipsoid_errors(surface: LimitSurface, count: tuple[int, int]) -> dict[str,
         row, column = np.unravel_index(values.argmax(), values.shape)
         result[f"{name}, max"] = _largest(distance, polar[row, 0], azimuth[0, column], np.pi / count[0])
         result[f"{name}, mean"] = (share * values).sum()
-    return {f"ellipsoid/{name}": float(value) for name, value in result.items()}
+    return {name: float(value) for name, value in result.items()}
 
 
 def _largest(distance: Callable[..., np.ndarray], polar: float, azimuth: float, width: float) -> float:
@@ -155,7 +145,7 @@ def _largest(distance: Callable[..., np.ndarray], polar: float, azimuth: float, 
     return largest
 
 
-def table_errors(patch: ContactPatch, count: tuple[int, int]) -> dict[str, float]:
+def table_errors(patch: ContactPatch, count: tuple[int, int]) -> dict[str, dict[str, float]]:
     """Error of the tables of 20 segments, and of the sum over the cells, from the exact surface of the patch.
 
     In the wrench at the centre of pressure for mu f_N = 1 N, over directions of the twist.
@@ -163,13 +153,15 @@ def table_errors(patch: ContactPatch, count: tuple[int, int]) -> dict[str, float
     polar, azimuth, share = _mesh((max(count[0] // COARSER, 1), max(count[1] // COARSER, 1)))
     surface = LimitSurfaceExact(patch)
     twists, exact = sample_limit_surface(surface, polar, azimuth)
-    result = {}
+    result: dict[str, dict[str, float]] = {}
     for name, kind in STORED.items():
         miss = geometry.wrench_at(kind(patch).wrench(twists) - exact, surface.centre_of_pressure)
         force, torque = np.hypot(miss[..., 0], miss[..., 1]), np.abs(miss[..., 2])
-        for quantity, unit, values in (("force", "N", force), ("torque", "N m", torque)):
-            result[f"{name}/{quantity}, max [{unit}]"] = float(values.max())
-            result[f"{name}/{quantity}, mean [{unit}]"] = float((share * values).sum())
+        result[name] = {
+            f"{quantity}, {statistic} [{unit}]": float(value)
+            for quantity, unit, values in (("force", "N", force), ("torque", "N m", torque))
+            for statistic, value in (("max", values.max()), ("mean", (share * values).sum()))
+        }
     return result
 
 
@@ -240,7 +232,7 @@ def _patches(ours: dict[str, Numbers]) -> Table:
         "second moment [mm^2]",
     )
     factors = {"1": 1, "m": 1e3, "m^2": 1e6}
-    columns = {
+    columns: dict[str, Any] = {
         heading: lambda row, column=column, factor=factors[unit]: round(factor * row[column], 9) + 0.0
         for heading, (column, (_, unit, _)) in zip(headings, LAST_DIGIT.items(), strict=True)
     }

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import importlib.util
+from functools import partial
 from typing import Any
 
 from planarfriction.bench import coulomb_disc, drake_scenes, mujoco_scenes
 from planarfriction.bench.drake_scenes import Way
 from planarfriction.experiments.experiment import Work
+from planarfriction.experiments.simulators.runs import measured
 
 CONTACTS = ("point", "hydroelastic")
 
@@ -39,40 +41,24 @@ def run(work: Work) -> dict[str, Any]:
     duration, size = (0.6, {"steps": 20, "rounds": 2}) if work.quick else (3.0, {"steps": 100, "rounds": 30})
     plain = {name: way for name, way in ways.items() if name.startswith(("lagged", "patches"))}
     times = work.piece("Drake, cost", lambda: drake_scenes.cost(plain, **size))
+    starts = mujoco_scenes.STARTS[: 1 if work.quick else None]
+    creeps = {
+        f"{1e3 * dt:g} ms": {name: partial(drake_scenes.creep, way, dt, duration) for name, way in ways.items()}
+        for dt in TIME_STEPS
+    }
+    discs = {
+        f"{start[0]:g} m/s, {start[1]:g} rad/s": {name: partial(_disc, way, start) for name, way in ways.items()}
+        for start in starts
+    }
     return {
-        "creep": {
-            f"{1e3 * dt:g} ms": {
-                name: _piece(
-                    work,
-                    f"Drake, incline, {name}, {1e3 * dt:g} ms",
-                    lambda way=way, dt=dt: drake_scenes.creep(way, dt, duration),
-                )
-                for name, way in ways.items()
-            }
-            for dt in TIME_STEPS
-        },
-        "disc": {
-            f"{start[0]:g} m/s, {start[1]:g} rad/s": {
-                name: _piece(
-                    work, f"Drake, disc, {name}, {start[1]:g} rad/s", lambda way=way, start=start: _disc(way, start)
-                )
-                for name, way in ways.items()
-            }
-            for start in mujoco_scenes.STARTS[: 1 if work.quick else None]
-        },
+        "creep": measured(work, "Drake, incline", creeps),
+        "disc": measured(work, "Drake, disc", discs),
         "cost": {
-            f"{contact} contact": {
-                "lagged": {"seconds": float(times[f"lagged, {contact}"])},
-                "patches": {"seconds": float(times[f"patches, {contact}"])},
-            }
+            f"{contact} contact": {kind: {"seconds": times[f"{kind}, {contact}"]} for kind in ("lagged", "patches")}
             for contact in CONTACTS
             if f"lagged, {contact}" in plain
         },
     }
-
-
-def _piece(work: Work, label: str, job: Any) -> dict[str, float]:
-    return {key: float(value) for key, value in work.piece(label, job).items()}
 
 
 def _disc(way: Way, start: tuple[float, float]) -> dict[str, float]:

@@ -7,12 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction.plots.style import PALETTE, PlotFigure, new_figure, tidy
+from planarfriction.experiments import looks
+from planarfriction.plots.style import PlotFigure, new_figure, tidy
 
-COLOURS = {"patches": PALETTE[0], "without": PALETTE[6]}
-"""By how the name of a way begins; all others have `OTHER`."""
+COLOURS = {"patches, distributed": looks.DISTRIBUTED, "patches": looks.MOMENTS, "without": looks.EXACT}
+"""By how the name of a way begins; the simulator's own friction has `OWN`."""
 
-OTHER = PALETTE[1]
+OWN = looks.OTHERS[2]
 
 
 def overview(found: Mapping[str, Any], own: str) -> PlotFigure:
@@ -39,7 +40,7 @@ def overview(found: Mapping[str, Any], own: str) -> PlotFigure:
         ways = list(next(iter(found[kind].values())))
         for row, way in enumerate(ways):
             shown = [value(case[way], case) for case in found[kind].values()]
-            colour = next((COLOURS[begin] for begin in COLOURS if way.startswith(begin)), OTHER)
+            colour = next((COLOURS[begin] for begin in COLOURS if way.startswith(begin)), OWN)
             # beyond the axis: at its edge, an arrow
             for x in shown:
                 marker = "<" if x < limits[0] else ">" if x > limits[1] else "o"

@@ -16,6 +16,7 @@ import numpy as np
 from planarfriction.bench import coulomb_disc, mujoco_scenes
 from planarfriction.bench.mujoco_scenes import MujocoScene, Native
 from planarfriction.experiments import facts
+from planarfriction.experiments.experiment import Work
 from planarfriction.models import DistributedModel, FrictionModel
 
 NATIVE = {
@@ -46,6 +47,14 @@ Way = Native | str
 
 _disc, _plate = functools.cache(mujoco_scenes.disc), functools.cache(mujoco_scenes.plate)
 _stop = functools.cache(coulomb_disc.stop)
+
+
+def measured(work: Work, what: str, jobs: Mapping[str, Mapping[str, Callable[[], Any]]]) -> dict[str, dict[str, Any]]:
+    """Case -> way -> numbers, each a piece: an interrupted run goes on from the last."""
+    return {
+        case: {way: work.piece(f"{what}, {case}, {way}", job) for way, job in ways.items()}
+        for case, ways in jobs.items()
+    }
 
 
 def begin(
@@ -121,8 +130,8 @@ def in_hand(way: Way, load: Literal[1, 2], kind: type | None = None) -> dict[str
     }
 
 
-def cost(scene: MujocoScene, ways: Mapping[str, Way], *, steps: int, rounds: int) -> dict[str, float]:
-    """Time of a step by name [s]: the least of `rounds`, in turns, of `steps` from where the scene has settled."""
+def cost(scene: MujocoScene, ways: Mapping[str, Way], *, steps: int, rounds: int) -> dict[str, dict[str, float]]:
+    """Seconds of a step by name: the least of `rounds`, in turns, of `steps` from where the scene has settled."""
     runs = {}
     for name, way in ways.items():
         m, d, step = begin(dataclasses.replace(scene, time=0.0), way)
@@ -137,4 +146,4 @@ def cost(scene: MujocoScene, ways: Mapping[str, Way], *, steps: int, rounds: int
                 d.ctrl[:] = control
                 step()
             least[name] = min(least[name], (time.process_time() - start) / steps)
-    return least
+    return {name: {"seconds": value} for name, value in least.items()}

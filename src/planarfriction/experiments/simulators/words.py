@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 
-from planarfriction.experiments.experiment import Comparison, Table, compare_number
+from planarfriction.experiments.experiment import Comparison, Table, compare, table
 from planarfriction.experiments.simulators import runs
 from planarfriction.experiments.simulators.runs import NATIVE, PATCHES
+from planarfriction.experiments.wording import length, readable
 
 OWN = "impratio 10"
 """The setting that costs are relative to."""
@@ -65,60 +66,51 @@ def comparisons(found: Mapping[str, Any]) -> list[Comparison]:
                     (f"{what} of the disc, Drake, {start}, {way}", 100 * ways[way][what], what)
                     for what in ("distance", "angle")
                 ]
+    cause = "The time step, and the normal contact of the simulator."
     return [
-        compare_number(
-            quantity,
-            value,
-            0.0,
-            reference="converged" if kind in ("end", "turned") else "closed form",
-            tolerance=TOLERANCES[kind][0],
-            unit=TOLERANCES[kind][1],
-            cause="the time step, and the normal contact of the simulator",
-        )
-        for quantity, value, kind in rows
+        compare(name, value, 0.0, "converged" if kind in ("end", "turned") else "closed form", *TOLERANCES[kind], cause)
+        for name, value, kind in rows
     ]
 
 
 def tables(found: Mapping[str, Any]) -> list[Table]:
     """Ways as rows, cases as columns, each number with its unit."""
+    drake = found.get("drake")
     return [
-        _table("What is held: creep and turning", found["held"], _creep),
-        Table(
+        _by_way("What is held: creep and turning", found["held"], _creep),
+        table(
             "Patches at other time steps: creep, turning and largest displacement",
-            ["", *next(iter(found["steps"].values()))],
-            [
-                [case, *(f"{_creep(values)}; {1e6 * values['moved']:.2f} um" for values in ways.values())]
-                for case, ways in found["steps"].items()
-            ],
+            found["steps"],
+            {
+                dt: lambda ways, dt=dt: f"{_creep(ways[dt])}; {1e6 * ways[dt]['moved']:.2f} um"
+                for dt in next(iter(found["steps"].values()))
+            },
         ),
-        _table("A gripper shaken for 3 s: slip in the hand", found["shaken"], lambda v: _length(v["slip"])),
-        _table(
-            "A disc that slides and spins to rest: errors of distance and angle",
-            found["disc"],
-            _stop,
+        _by_way(
+            "A gripper shaken for 3 s: slip in the hand", found["shaken"], lambda v: length(v["slip"])
         ),
-        _table("The published in-hand run: errors of the end in height and angle", found["in hand"], _end),
-        _table(
+        _by_way("A disc that slides and spins to rest: errors of distance and angle", found["disc"], _stop),
+        _by_way("The published in-hand run: errors of the end in height and angle", found["in hand"], _end),
+        _by_way(
             "Time of a step, over that with impratio 10", _ratios(found["cost"], OWN), lambda v: f"{v['ratio']:.2f}"
         ),
-        *(_drake_tables(found["drake"]) if "drake" in found else ()),
-    ]
-
-
-def _drake_tables(found: Mapping[str, Any]) -> list[Table]:
-    return [
-        _table(
-            "Drake, a box on an incline of 0.3 rad: creep",
-            found["creep"],
-            lambda v: _speed(v["creep"]),
-        ),
-        _table("Drake, the disc: errors of distance and angle", found["disc"], _stop),
-        _table(
-            "Drake, time of a step of the box, over that without patches",
-            _ratios(found["cost"], "lagged"),
-            lambda v: f"{v['ratio']:.1f}",
-        ),
-    ]
+    ] + (
+        []
+        if drake is None
+        else [
+            _by_way(
+                "Drake, a box on an incline of 0.3 rad: creep",
+                drake["creep"],
+                lambda v: f"{length(v['creep'])}/s",
+            ),
+            _by_way("Drake, the disc: errors of distance and angle", drake["disc"], _stop),
+            _by_way(
+                "Drake, time of a step of the box, over that without patches",
+                _ratios(drake["cost"], "lagged"),
+                lambda v: f"{v['ratio']:.1f}",
+            ),
+        ]
+    )
 
 
 def _ratios(cases: Numbers, own: str) -> Numbers:
@@ -131,19 +123,18 @@ def _ratios(cases: Numbers, own: str) -> Numbers:
     }
 
 
-def _table(title: str, cases: Numbers, words: Callable[[Mapping[str, float]], str]) -> Table:
+def _by_way(title: str, cases: Numbers, words: Callable[[Mapping[str, float]], str]) -> Table:
     """Ways as rows, cases as columns."""
-    ways = next(iter(cases.values()))
-    rows = [[way, *(words(case[way]) for case in cases.values())] for way in ways]
-    return Table(title, ["", *cases], rows)
+    ways = {way: way for way in next(iter(cases.values()))}
+    return table(title, ways, {name: lambda way, case=case: words(case[way]) for name, case in cases.items()})
 
 
 def _creep(values: Mapping[str, float]) -> str:
     if values["dropped"]:
         return "dropped"
     turning = abs(float(np.degrees(values["spin"])))
-    turns = f"{_short(turning)} deg/s" if turning >= 1e-3 else "< 0.001 deg/s"
-    return f"{_speed(values['creep'])}, {turns}"
+    turns = f"{readable(turning)} deg/s" if turning >= 1e-3 else "< 0.001 deg/s"
+    return f"{length(values['creep'])}/s, {turns}"
 
 
 def _stop(values: Mapping[str, float]) -> str:
@@ -156,58 +147,31 @@ def _end(values: Mapping[str, float]) -> str:
     return f"{1e3 * values['y']:+.1f} mm, {np.degrees(values['theta']):+.1f} deg"
 
 
-def _length(metres: float) -> str:
-    """The size of a length in mm, um or nm, whichever reads best."""
-    size = abs(metres)
-    if size < 1e-12:
-        return "< 0.001 nm"
-    unit, scale = ("mm", 1e3) if size >= 1e-3 else ("um", 1e6) if size >= 1e-8 else ("nm", 1e9)
-    return f"{_short(scale * size) if unit != 'nm' else f'{scale * size:.1g}'} {unit}"
-
-
-def _speed(metres_per_second: float) -> str:
-    """The size of a speed in mm/s, um/s or nm/s."""
-    return f"{_length(metres_per_second)}/s"
-
-
-def _short(value: float) -> str:
-    """A number with as many digits as are worth reading."""
-    if value < 1e-2:
-        return f"{value:.1g}"
-    return f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
-
-
-def findings(found: Mapping[str, Any], versions: Mapping[str, str]) -> Sequence[str]:
-    """Where the simulator's own friction suffices, and where not, with the numbers of this run."""
+def told(found: Mapping[str, Any], versions: Mapping[str, str]) -> dict[str, Any]:
+    """What the template names."""
 
     def worst(kind: str, way: str, *keys: str) -> float:
         return max(abs(case[way][key]) for case in found[kind].values() for key in keys)
 
-    noslip, reduced = "noslip 10", next(iter(runs.KINDS))
-    creep = {way: _speed(worst("held", way, "creep")) for way in (OWN, noslip, PATCHES)}
-    slip = _length(min(worst("shaken", way, "slip") for way in NATIVE))
+    reduced = next(iter(runs.KINDS))
     touching = [f"{name}, {touch}" for touch in ("face", "point") for name, _ in TOUCHING]
-    stops = 100.0 * min(worst("disc", way, "distance", "angle") for way in touching)
-    ends = 1e3 * min(worst("in hand", way, "y") for way in NATIVE)
-    ratios = [ways[PATCHES]["seconds"] / ways[OWN]["seconds"] for ways in found["cost"].values()]
-    said = [
-        f"MuJoCo {versions['mujoco']}, steps of 2 ms. For an object that is only held, noslip is enough: with 10"
-        f" iterations it creeps at {creep[noslip]} at most, with patches at {creep[PATCHES]}. With the elliptic cone"
-        f" alone it creeps at up to {creep[OWN]}.",
-        f"While the hand is shaken, noslip is not enough: with the best settings the block slips by {slip}, with"
-        f" patches by {_length(worst('shaken', PATCHES, 'slip'))}, which is the elastic deflection of their bristles.",
-        f"An object that slides and turns at once needs the shape of the patch. With any settings, MuJoCo's own"
-        f" friction has an error of {stops:.0f} % in distance or angle for one of the discs, patches"
-        f" {100.0 * worst('disc', reduced, 'distance', 'angle'):.2f} %; in the hand the error is {ends:.1f} mm, with"
-        f" patches {1e3 * worst('in hand', reduced, 'y'):.1f} mm.",
-        f"A step with patches takes {min(ratios):.2f} to {max(ratios):.2f} times as long as with the elliptic cone.",
-    ]
-    if "drake" in found:
-        cases = found["drake"]["creep"].values()
-        own = min(abs(value["creep"]) for case in cases for way, value in case.items() if not way.startswith(PATCHES))
-        ours = max(abs(value["creep"]) for case in cases for way, value in case.items() if way.startswith(PATCHES))
-        said.append(
-            f"Drake {versions['drake']}: a box on an incline creeps at {_speed(own)} at least, with patches at"
-            f" {_speed(ours)} at most."
-        )
-    return said
+    creeps = [item for case in found.get("drake", {"creep": {}})["creep"].values() for item in case.items()]
+    drake = {
+        "own": min((abs(each["creep"]) for way, each in creeps if not way.startswith(PATCHES)), default=0.0),
+        "patches": max((abs(each["creep"]) for way, each in creeps if way.startswith(PATCHES)), default=0.0),
+    }
+    return {
+        "versions": versions,
+        "creep": {way: worst("held", way, "creep") for way in (OWN, "noslip 10", PATCHES)},
+        "slip": {
+            "own": min(worst("shaken", way, "slip") for way in NATIVE),
+            "patches": worst("shaken", PATCHES, "slip"),
+        },
+        "stops": {
+            "own": min(worst("disc", way, "distance", "angle") for way in touching),
+            "patches": worst("disc", reduced, "distance", "angle"),
+        },
+        "ends": {"own": min(worst("in hand", way, "y") for way in NATIVE), "patches": worst("in hand", reduced, "y")},
+        "ratios": [ways[PATCHES]["seconds"] / ways[OWN]["seconds"] for ways in found["cost"].values()],
+        "drake": drake if creeps else None,
+    }

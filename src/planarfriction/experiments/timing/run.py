@@ -5,21 +5,21 @@ from __future__ import annotations
 import os
 import platform
 from collections.abc import Mapping, Sequence
+from functools import partial
 from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from planarfriction.experiments import facts
-from planarfriction.experiments.experiment import Arrays, Comparison, Result, Table, Work
+from planarfriction.experiments import facts, looks
+from planarfriction.experiments.experiment import Arrays, Comparison, Result, Table, Work, compare, table
 from planarfriction.experiments.timing import runs
 from planarfriction.experiments.timing.runs import BREAKAWAY, CIRCLE, QUICK_WINDOW, ROWS, Problem
-from planarfriction.experiments.wording import fill, short
+from planarfriction.experiments.wording import fill, power, short
+from planarfriction.plots.style import PlotFigure, new_figure, tidy
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from planarfriction.plots.style import PlotFigure
 
 KINDS = ("distributed", "reduced")
 
@@ -145,7 +145,9 @@ def _agreements(
             continue
         tight = min(tolerances)
         poses = solved[solver, tight]["poses"]
-        cause = f"What a relative tolerance of {tight:.0e} leaves in {solver}; ours was run at {runs.REFERENCE:.0e}."
+        cause = (
+            f"What a relative tolerance of {power(tight)} leaves in {solver}; ours was run at {power(runs.REFERENCE)}."
+        )
         differences = (runs.position_error(poses, reference), "m"), (runs.angle_error(poses, reference), "rad")
         for (difference, unit), tolerance in zip(differences, AGREEMENT[problem.kind], strict=True):
             what = f"{problem.name}: {'position' if unit == 'm' else 'angle'}, RODAS4 beside {solver}"
@@ -160,14 +162,12 @@ def _against_converged(problem: Problem, reference: np.ndarray) -> list[Comparis
     index = np.abs(solution["time"][:, None] - times).argmin(axis=0)
     shared = np.abs(solution["time"][index] - times) < 1e-9
     found = []
+    cause = "Two solutions of the same equations at tight tolerances, by different methods."
     for i, (name, allowance) in enumerate(CONVERGED_ALLOWANCE.items()):
-        values = solution[name]
-        difference = float(np.abs(reference[shared, i] - values[index[shared]]).max())
+        values, words = solution[name], f"{problem.name}: {name} of the reference"
         tolerance = allowance + facts.CONVERGED_SHARE * float(np.ptp(values))
-        cause = "Two solutions of the same equations at tight tolerances, by different methods."
-        words = f"{problem.name}: {name} of the reference"
         unit = "rad" if name == "theta" else "m"
-        found.append(Comparison(words, "converged", difference, tolerance, unit, int(shared.sum()), cause))
+        found.append(compare(words, reference[shared, i], values[index[shared]], "converged", tolerance, unit, cause))
     return found
 
 
@@ -206,79 +206,67 @@ def _precision(problem: Problem, points: Points) -> dict[str, Any]:
         solver: runs.cheapest([(each["error"], [each[name] for name in TIMES]) for each in entries], level)
         for solver, entries in points.items()
     }
+    both = [times.get(solver) for solver in ("LSODA", "RODAS4")]
     return {
         "name": problem.name,
         "level": level,
+        "lsoda": both[0][0] / both[1][0] if both[0] and both[1] else None,
         "reached": {solver: _spread(np.array(each)) for solver, each in times.items() if each is not None},
         "missed": [solver for solver, each in times.items() if each is None],
     }
 
 
 def _figure(points: Mapping[Problem, Points]) -> PlotFigure:
-    from planarfriction.plots.style import PALETTE, new_figure, tidy
-
     figure = new_figure(9.6, 4.2)
     panels = figure.subplots(1, len(points), squeeze=False)[0]
     for axes, (problem, solvers) in zip(panels, points.items(), strict=True):
         for i, (solver, entries) in enumerate(solvers.items()):
             errors, times, first, third = (np.array([entry[name] for entry in entries]) for name in ("error", *TIMES))
             bars = {"yerr": [times - first, third - times], "capsize": 2.5, "elinewidth": 1.0}
-            look = {"color": PALETTE[i], "markersize": 5, "linewidth": 1.3, "label": solver}
+            look = {"color": looks.OTHERS[i], "markersize": 5, "linewidth": 1.3, "label": solver}
             axes.errorbar(errors, times, fmt="osD^"[i] + "-", **bars, **look)
         axes.set(xscale="log", yscale="log", xlabel="largest position error [m]", ylabel="wall time [s]")
         axes.set_title(problem.name, fontsize="medium")
         tidy(axes)
-    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=4, frameon=False)
+    looks.legend(figure, panels[0], 4, "lower")
     return figure
 
 
-def _published_table(table: Mapping[str, Mapping[str, Arrays]], baselines: Mapping[str, Mapping[str, Arrays]]) -> Table:
-    headings = ["contact", *(f"{kind} [s]" for kind in KINDS), "factor"]
-    headings += [*(f"{kind}, published [s]" for kind in KINDS), "factor, published"]
-    headings += [f"{kind}, LSODA here over ours" for kind in KINDS]
-    rows = []
-    for row, published in facts.published_table("timing").items():
-        numbers = _row_numbers(table[row], baselines.get(row, {}))
-        ratios = [numbers.get(f"{kind}, LSODA over ours") for kind in KINDS]
-        rows.append(
-            [
-                row,
-                *(_shown(numbers[f"{kind} [s]"]) for kind in KINDS),
-                _shown(numbers["ratio"]),
-                *(published[f"{kind} [s]"] for kind in KINDS),
-                published["ratio"],
-                *("not run" if ratio is None else _shown(ratio) for ratio in ratios),
-            ]
-        )
+def _published_table(times: Mapping[str, Mapping[str, Arrays]], baselines: Mapping[str, Mapping[str, Arrays]]) -> Table:
+    published = facts.published_table("timing")
+    rows = {row: (_row_numbers(times[row], baselines.get(row, {})), theirs) for row, theirs in published.items()}
+
+    def ours(row: Any, name: str) -> str:
+        return _shown(row[0][name]) if name in row[0] else "not run"
+
+    columns = {f"{kind} [s]": partial(ours, name=f"{kind} [s]") for kind in KINDS}
+    columns |= {"factor": partial(ours, name="ratio")}
+    columns |= {f"{kind}, published [s]": lambda row, kind=kind: row[1][f"{kind} [s]"] for kind in KINDS}
+    columns |= {"factor, published": lambda row: row[1]["ratio"]}
+    columns |= {f"{kind}, LSODA here over ours": partial(ours, name=f"{kind}, LSODA over ours") for kind in KINDS}
     note = (
         "Ours: all of `simulate`, default tolerances, median, in brackets quartiles. "
         "LSODA over ours: time in the solver over the same span, "
         f"the whole run or, where that takes minutes, {BREAKAWAY[0]:g} to {BREAKAWAY[1]:g} s (the plate breaks away; a "
-        f"quick look takes {QUICK_WINDOW[0]:g} to {QUICK_WINDOW[1]:g} s), without the tables. k = 2: the table is kept "
-        "and r follows the load; k = 2 f_N: all is rebuilt every 0.01 s."
+        f"quick look takes {QUICK_WINDOW[0]:g} to {QUICK_WINDOW[1]:g} s), without the tables. $k = 2$: the table is "
+        "kept and $r$ follows the load; $k = 2 f_N$: all is rebuilt every 0.01 s."
     )
-    return Table("In-hand run of 2 s", headings, rows, note)
+    return table("In-hand run of 2 s", rows, columns, "contact", note)
 
 
 def _points_table(problem: Problem, points: Points) -> Table:
-    rows = [
-        [
-            solver,
-            f"{entry['tolerance']:.0e}",
-            f"{entry['error']:.1e}",
-            _shown(_spread(np.array([1e3 * entry[name] for name in TIMES]))),
-            int(entry["evaluations"]),
-            int(entry["repeats"]),
-        ]
-        for solver, entries in points.items()
-        for entry in entries
-    ]
-    headings = ["solver", "relative tolerance", "position error [m]", "time [ms]", "evaluations", "runs"]
+    rows = {f"{solver}, {entry['tolerance']:.0e}": entry for solver, entries in points.items() for entry in entries}
+    columns = {
+        "position error [m]": lambda entry: f"{entry['error']:.1e}",
+        "time [ms]": lambda entry: _shown(_spread(np.array([1e3 * entry[name] for name in TIMES]))),
+        "evaluations": lambda entry: int(entry["evaluations"]),
+        "runs": lambda entry: int(entry["repeats"]),
+    }
     note = (
         f"{problem.window.states} states. Absolute tolerance: {runs.ATOL_PER_RTOL:g} times the relative one, as a "
         "share of the natural scales. Median of the runs; what takes over a second runs once."
     )
-    return Table(f"Work against precision, {problem.name}", headings, rows, note)
+    return table(f"Work against precision, {problem.name}", rows, columns, "solver, relative tolerance", note)
 
 
 def _shown(times: Mapping[str, float]) -> str:

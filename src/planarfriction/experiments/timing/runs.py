@@ -38,7 +38,7 @@ STRUCTURED = {"RODAS3": RODAS3, "RODAS4": RODAS4}
 """Our methods by name."""
 
 ROWS: dict[str, dict[str, Callable[[], Scene]]] = {
-    "circle, shape independent of the load": {
+    "disc, shape independent of the load": {
         "distributed": lambda: in_hand(published_model("d", "Circle")),
         "reduced": lambda: in_hand(published_model("r", "Circle")),
     },
