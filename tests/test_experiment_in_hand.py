@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -92,4 +93,7 @@ def test_what_is_drawn_and_stored(result):
     assert all("units" in data[name].attrs for name in data.data_vars)
     for table in result.tables:
         assert all(len(row) == len(table.headings) for row in table.rows)
+    page = Path(__file__).parent.parent / "docs" / "benchmarks.md"
+    if page.is_file():  # which shows the last of them
+        assert f"<!-- table: {result.tables[-1].title} -->" in page.read_text("utf-8")
     assert len(result.findings) <= 5 and not any("nan" in finding for finding in result.findings)
