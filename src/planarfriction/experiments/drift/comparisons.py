@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.integrate import cumulative_trapezoid
 
 from planarfriction.experiments import facts
 from planarfriction.experiments.drift.figures import WORDS
@@ -75,6 +74,8 @@ _SIDEWAYS = (
 
 def _sideways_comparisons(found: Runs) -> list[Comparison]:
     """The path that a disc takes which turns while its patch stays where it is."""
+    from scipy.integrate import cumulative_trapezoid
+
     cause = r"The integral is taken over samples 0.01 s apart, between which $x$ and $\theta$ oscillate."
     rows = []
     for (load, model), run in found.items():
