@@ -86,9 +86,7 @@ def tables(found: Mapping[str, Any]) -> list[Table]:
                 for dt in next(iter(found["steps"].values()))
             },
         ),
-        _by_way(
-            "A gripper shaken for 3 s: slip in the hand", found["shaken"], lambda v: length(v["slip"])
-        ),
+        _by_way("A gripper shaken for 3 s: slip in the hand", found["shaken"], lambda v: length(v["slip"])),
         _by_way("A disc that slides and spins to rest: errors of distance and angle", found["disc"], _stop),
         _by_way("The published in-hand run: errors of the end in height and angle", found["in hand"], _end),
         _by_way(
