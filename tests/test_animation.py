@@ -14,6 +14,7 @@ from PIL import Image
 
 import planarfriction as pf
 import synthetic
+from pictures import faults
 from planarfriction import plots
 from planarfriction.errors import FileError, InvalidValueError
 from planarfriction.plots import animation, film_files
@@ -368,6 +369,21 @@ def test_a_frame_of_it_is_drawn(name):
     assert first.shape == last.shape == (270, 480, 3)
     assert (first < 100).any()
     assert len(panels(film, SurfacePanel)) == {"one point": 0, "own model": 0, "three contacts": 3}.get(name, 1)
+
+
+@pytest.mark.parametrize("contacts", [1, 2, 3])
+def test_no_word_of_a_frame_is_cut_or_covered(contacts):
+    film = Film(
+        run := synthetic.solution(synthetic.scene(contacts=contacts)),
+        track_of(run, np.linspace(0.0, 2.0, 3)),
+        follow=True,
+        pace="   (2 x slower)",
+        dpi=100.0,
+    )
+    film.picture(1)
+    for artist in film.figure.findobj(lambda each: each.get_animated()):
+        artist.set_animated(False)
+    assert faults(film.figure) == []
 
 
 # ---------------------------------------------------------------------- files

@@ -62,10 +62,12 @@ class Film:
             shown = self.figure.add_axes(bar) if bar and each.slip is not None else None
             self.panels.append(CellPanel(self.figure.add_axes(cells), each, bar=shown))
             if has_surface(each):
-                self.panels.append(SurfacePanel(self.figure.add_axes(surface, projection="3d"), each))
+                axes = self.figure.add_axes(surface, projection="3d")
+                self.panels.append(SurfacePanel(axes, each, beside=len(chosen) - 1))
         self._draw_body(solution)
         self.views = _filling(_views(solution, track, follow), self.axes.bbox.width / self.axes.bbox.height)
-        style.show_lengths(self.axes, 1e-3 * float(np.abs(self.views).max()))
+        far, side = float(np.abs(self.views).max()), float(np.diff(self.views[0], axis=-1).max())
+        style.show_lengths(self.axes, 1e-3 * max(0.1 * far, side))
         self.axes.yaxis.set_label_coords(0.022, 0.5, transform=self.figure.transFigure)  # clear of any tick label
         self.axes.locator_params(nbins=7)
         style.tidy(self.axes)

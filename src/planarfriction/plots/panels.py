@@ -123,8 +123,8 @@ class CellPanel:
 class SurfacePanel:
     """The limit surface of a contact at its load, and the friction wrench in it, both for mu_c f_N = 1."""
 
-    def __init__(self, axes: Any, track: ContactTrack):
-        self.axes, self.track = axes, track
+    def __init__(self, axes: Any, track: ContactTrack, *, beside: int = 0):
+        self.axes, self.track = axes, track  # `beside` is the number of other contacts that are shown
         self.levels = _levels(track)
         self.surfaces = {level: surface_at(track.contact.model.patch, load) for level, load in self.levels.items()}
         polar = np.linspace(0.0, np.pi, POLAR + 1)[:, None]
@@ -139,6 +139,12 @@ class SurfacePanel:
         }
         axes.tick_params(labelsize="x-small", pad=-2)
         axes.set(xticks=[-0.5, 0.0, 0.5], yticks=[-0.5, 0.0, 0.5])  # those at the corner would meet
+        if beside:
+            axes.set_box_aspect((1.0, 1.0, 1.0), zoom=0.85 if beside == 1 else 0.72)
+            for axis in (axes.xaxis, axes.yaxis, axes.zaxis):  # no room for numbers
+                axis.set_ticklabels([])
+                axis.labelpad = -13.0
+                axis.label.set_fontsize("x-small")
         axes.set_title("limit surface, $\\mu_c f_N = 1$", fontsize="small", y=0.98)
         self.floor = -limit
         (self.shadow,) = axes.plot([], [], [], color="0.45", linewidth=1.2, marker="o", markersize=3)
