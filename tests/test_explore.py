@@ -138,6 +138,13 @@ def test_the_ellipsoid_is_right_in_a_spin_about_the_centre_of_pressure_and_nowhe
     assert 5.0 < max(each.angle_error for each in found) < 1.05 * worst[1]
 
 
+def test_the_error_of_the_ellipsoid_is_that_from_the_surface_whatever_the_law():
+    twist = (0.01, -0.003, 1.0)
+    one, other = (answer(State(law=law, twist=twist)) for law in (pf.Dahl(), pf.LuGre(mu_s=3.0, v_s=0.1)))
+    assert np.linalg.norm(one.friction - other.friction) > 0.1
+    assert (one.force_error, one.angle_error) == (other.force_error, other.angle_error)
+
+
 def test_at_rest_nothing_is_said_and_nothing_fails():
     found = answer(State(twist=(0.0, 0.0, 0.0)))
     assert not found.friction.any() and not found.points.any() and found.angle_error == 0.0
@@ -203,6 +210,7 @@ def test_the_code_gives_the_numbers_on_the_screen(origin, tmp_path, monkeypatch)
     assert scene.contacts[0].model.law == state.law and scene.velocity is not None
     np.testing.assert_array_equal(scene.velocity(0.3), state.twist)
     np.testing.assert_allclose(scene.contacts[0].model.patch.weights(), drawing.patch.weights(), rtol=1e-15)
+    np.testing.assert_allclose(scene.contacts[0].model.patch.positions, drawing.patch.positions, rtol=1e-12)
     assert float(scene.contacts[0].normal_force(0.3)) == 2.5
 
 

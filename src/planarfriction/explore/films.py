@@ -15,7 +15,7 @@ from planarfriction.scenes.files import read_table, scene_from_dict
 DPI = 80.0
 """Dots per inch of the film: 768 across."""
 
-_STYLE = """<style>
+_MORE = """<style>
 body {margin: 0; font: 14px system-ui, sans-serif; color: #222}
 .animation {display: block; max-width: 768px}
 .animation img {width: 100%}
@@ -23,8 +23,9 @@ input[type=range].anim-slider {width: 96%}
 .anim-buttons button {border: 1px solid #CCC; border-radius: 4px; background: #F5F5F5; padding: 4px 0;
   cursor: pointer}
 .anim-buttons button:hover {background: #E0E0E0}
-</style>"""
-"""The player of matplotlib, as wide as there is room for."""
+</style>
+<script>setTimeout(() => document.querySelector("button[title=Play]").click(), 100)</script>"""
+"""The player of matplotlib as wide as there is room for; it begins to play by itself."""
 
 
 def ready_scene(state: State, name: str, model: str) -> Scene:
@@ -59,4 +60,4 @@ def film(scene: Scene, progress: Callable[[str, float], None]) -> str:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "film.html"
         solution.animate(path, dpi=DPI, progress=lambda time: progress("drawing", time / end))
-        return path.read_text(encoding="utf-8") + _STYLE
+        return path.read_text(encoding="utf-8") + _MORE

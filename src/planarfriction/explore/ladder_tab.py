@@ -33,7 +33,9 @@ class LadderTab:
         self._live = Live(failed=self._say)
         self.status = pn.pane.HTML("")
         self.table = pn.pane.HTML("", styles=looks.grows(340))
-        self._source = ColumnDataSource({"seconds": [], "error": [], "name": [], "colour": []})
+        self._source = ColumnDataSource(
+            {"seconds": [], "error": [], "name": [], "colour": [], "align": [], "offset": []}
+        )
         self.layout = pn.Column(
             pn.pane.HTML(_WORDS, sizing_mode="stretch_width"),
             self.status,
@@ -69,11 +71,14 @@ class LadderTab:
 
     def _show_rungs(self, rungs: list[Rung]) -> None:
         self.table.object = table(rungs) if rungs else ""
+        reference = next(iter(RUNGS))  # the most costly as a rule, at the right
         ran = [each for each in rungs if not math.isnan(each.error)]
         self._source.data = {
             "seconds": [1e3 * each.seconds for each in ran],
             "error": [100.0 * each.error for each in ran],
             "name": [each.name for each in ran],
+            "align": ["right" if each.name == reference else "left" for each in ran],
+            "offset": [-9 if each.name == reference else 9 for each in ran],
             "colour": [PALETTE[list(RUNGS).index(each.name) % len(PALETTE)] for each in ran],
         }
 
@@ -110,6 +115,12 @@ def _chart(source: ColumnDataSource) -> Any:
     plot.x_range.range_padding = 0.4
     plot.xaxis.formatter = NumeralTickFormatter(format="0.[00]")
     plot.scatter("seconds", "error", size=12, color="colour", source=source)
-    look: dict[str, Any] = {"x_offset": 9, "y_offset": 5, "text_font_size": "12px", "text_color": "colour"}
+    look: dict[str, Any] = {
+        "x_offset": {"field": "offset"},
+        "text_align": {"field": "align"},
+        "y_offset": 5,
+        "text_font_size": "12px",
+        "text_color": "colour",
+    }
     plot.add_layout(LabelSet(x="seconds", y="error", text="name", source=source, **look))
     return plot

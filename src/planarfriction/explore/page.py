@@ -74,7 +74,7 @@ class Page:
         on(controls.load, lambda load: self._change(normal_force=load))
         for slider in (controls.vx, controls.vy, controls.omega):
             on(slider, lambda _: self._slide())
-        controls.clear.on_click(lambda _: self._try(lambda: self._draw(self.state.drawing.cleared())))
+        controls.clear.on_click(lambda _: self._try(self._clear))
         self._offer_parameters()
 
     # ------------------------------------------------------------------ wishes of the user
@@ -94,6 +94,10 @@ class Page:
     def _read(self, content: bytes) -> None:
         size = 1e-3 * self.controls.cell_size.value
         self._draw(Drawing.read(self.controls.file.filename or "map", content, size))
+
+    def _clear(self) -> None:
+        self.controls.tool.value = "brush"
+        self._draw(self.state.drawing.cleared())
 
     def _slide(self) -> None:
         vx, vy, omega = (each.value for each in (self.controls.vx, self.controls.vy, self.controls.omega))
@@ -168,10 +172,12 @@ class Page:
         try:
             self.answer = found = answer(self.state)
         except FrictionError:
-            self.answer, self._figure, self.surface.object = None, {}, None
+            self.answer, self._figure, self.surface.visible = None, {}, False
             self.python.value = self.toml.value = self.numbers.object = ""
             self.ladder.clear()
-            raise
+            if self.state.drawing.pressures.any():
+                raise
+            raise FrictionError("Nothing presses: paint with the brush, choose a patch or load a map.") from None
         finally:
             self.map.move(self.state, self.answer)
         self.slow.ask()
@@ -181,7 +187,7 @@ class Page:
     def _show_slow(self) -> None:
         """What does not have to follow a drag: the picture in 3-D and the code."""
         if self.answer is not None:
-            self.surface.object = pictures.moved(self._figure, self.answer)
+            self.surface.param.update(object=pictures.moved(self._figure, self.answer), visible=True)
             self.python.value, self.toml.value = code.python(self.state), code.toml(self.state)
 
     def _follow_ladder(self) -> None:
