@@ -15,7 +15,7 @@ from planarfriction.explore import code, films, pictures
 from planarfriction.explore.answers import answer
 from planarfriction.explore.drawing import MOST_SIDE, Drawing
 from planarfriction.explore.films import film, read_scene, ready_scene
-from planarfriction.explore.ladder import RUNGS, climb
+from planarfriction.explore.ladder import RUNGS, climb, motion
 from planarfriction.explore.state import State, law_parameters
 from planarfriction.laws import LAWS
 from planarfriction.patch import PUBLISHED_PATCHES
@@ -223,6 +223,12 @@ def test_the_code_of_every_law_makes_that_law(kind):
 
 
 # ---------------------------------------------------------------------- runs
+
+
+def test_the_ladder_moves_with_the_twist_and_turns_round():
+    state = State(twist=(0.01, -0.02, 3.0))
+    np.testing.assert_allclose(motion(state)(0.08), state.twist)
+    np.testing.assert_allclose(motion(state)(0.18), np.negative(state.twist))
 
 
 def test_the_models_are_compared_with_the_distributed_one_and_a_law_that_one_refuses_is_said():
