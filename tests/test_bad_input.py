@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import datetime
 import math
+import traceback
 import tracemalloc
 import warnings
 from decimal import Decimal
@@ -393,3 +394,54 @@ def test_usual_patches_come_without():
             lambda: pf.ContactPatch.points([(3.0, 4.0)]),
         ):
             make()
+
+
+REDUCED = pf.ReducedModelPublished(SQUARE, pf.LuGre())
+BODY = pf.Body(mass=0.2, inertia=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("mistake", "line"),
+    [
+        (lambda: pf.ReducedModel(pf.LuGre(), SQUARE), r"patch must be a ContactPatch, got LuGre\("),
+        (lambda: pf.LimitSurfaceExact(REDUCED), "patch must be a ContactPatch, got ReducedModelPublished"),
+        (lambda: pf.ReducedModel(SQUARE, 0.5), "law must be a friction law .* got 0.5"),
+        (lambda: pf.simulate(REDUCED), "scene must be a Scene, got ReducedModelPublished"),
+        (lambda: pf.Contact(SQUARE, 5.0), r"model .* must be a friction model .* got ContactPatch\("),
+        (lambda: pf.Contact(REDUCED, "5 N"), "normal_force .* must be a number, or a Signal of numbers, got '5 N'"),
+        (lambda: pf.Contact(REDUCED, [1.0, 2.0]), r"normal_force .* a Signal of numbers, got \[1.0, 2.0\]"),
+        (lambda: pf.Scene(BODY, [pf.Contact(REDUCED, 5.0)], 1.0, force=3.0), "force must have 3 columns: be 3 numbers"),
+        (lambda: pf.Scene([pf.Contact(REDUCED, 5.0)], BODY, 1.0), "body must be a Body, got"),
+        (lambda: pf.ContactPatch.disc(radius="1 cm"), "radius must be a number, got '1 cm'"),
+        (
+            lambda: pf.ContactPatch.disc(0.01, pressure="uniform"),
+            r"pressure must be a law such as Uniform\(\).*'uniform'",
+        ),
+        (
+            lambda: pf.ContactPatch.disc(0.01, pressure=pf.SoftFinger),
+            "pressure must be a law .* got <class .*SoftFinger",
+        ),
+        (
+            lambda: REDUCED.step(REDUCED.rest, (0.0, 0.0, 1.0), 1.0, 1e-3),
+            "state must be an array of numbers, got <bound",
+        ),
+        (
+            lambda: REDUCED.step(REDUCED.rest(), (0.01, 0.0), 1.0, 1e-3),
+            r"twist must have shape \[..., 3\], got shape \[2\]",
+        ),
+    ],
+)
+def test_a_first_mistake_gets_a_line_that_says_what_is_wanted(mistake, line):
+    with pytest.raises(InvalidValueError, match=f"^{line}") as raised:
+        mistake()
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("home", "name", "meant"), [(pf, "Contactpatch", "ContactPatch"), (pf.scenes, "inhand", "in_hand")]
+)
+def test_python_asks_which_name_was_meant(home, name, meant):
+    with pytest.raises(AttributeError) as raised:
+        getattr(home, name)
+    shown = "".join(traceback.format_exception(raised.value))
+    assert f"Did you mean: '{meant}'?" in shown

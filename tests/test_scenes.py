@@ -68,7 +68,7 @@ def test_a_scene_keeps_its_parts_and_makes_signals_of_numbers():
         ),
         (
             lambda: Contact(stand_in(), [1.0, 2.0]),
-            "normal_force of contact 'contact' must be a signal of plain numbers",
+            "normal_force of contact 'contact' must be a number, or a Signal of numbers",
         ),
         (lambda: Contact(stand_in(), "heavy"), "normal_force of contact 'contact' must be a signal or a constant"),
         (lambda: Contact(stand_in(), 1.0, mounted_on="wrld"), "(did you mean 'world'?)"),

@@ -7,6 +7,7 @@ Every public name lives here; the modules behind them load on first use, so that
 from __future__ import annotations
 
 import importlib
+import sys
 from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
@@ -72,7 +73,8 @@ def __getattr__(name: str) -> Any:
     elif name in _MODULES:
         value = importlib.import_module(f"planarfriction.{name}")
     else:
-        raise AttributeError(f"module 'planarfriction' has no attribute {name!r}")
+        words = f"module 'planarfriction' has no attribute {name!r}"
+        raise AttributeError(words, name=name, obj=sys.modules[__name__])  # Python then asks "Did you mean ...?"
     globals()[name] = value
     return value
 

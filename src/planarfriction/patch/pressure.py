@@ -233,6 +233,9 @@ def as_law(pressure: Any, positions: np.ndarray) -> Pressure:
         return Uniform()
     if isinstance(pressure, Pressure):
         return pressure
+    if isinstance(pressure, (str, type)):
+        rule = "be a law such as Uniform(), a function of x and y, or numbers"
+        raise InvalidValueError("pressure", rule, repr(pressure))
     if callable(pressure):
         pressure = evaluated("pressure", pressure, positions.tolist())
     return PerCell(pressure_array("pressure", pressure, (len(positions),)))

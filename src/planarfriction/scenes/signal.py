@@ -259,13 +259,16 @@ class Signal(ByValue):
 
 def as_signal(name: str, value: Any, columns: int | None) -> Signal:
     """`value` as a signal with `columns` columns (None: scalar); numbers and vectors become constants."""
+    wanted = f"have {columns} columns: be {columns} numbers, or a Signal of them"
+    wanted = "be a number, or a Signal of numbers" if columns is None else wanted
     try:
         signal = value if isinstance(value, Signal) else Signal.constant(value)
     except InvalidValueError as error:
-        raise InvalidValueError(name, f"be a signal or a constant that can {error.rule}", error.value) from None
+        rule = wanted if "array of numbers" in error.rule else error.rule
+        raise InvalidValueError(name, rule, error.value) from None
     if signal.columns != columns:
-        wanted = "be a signal of plain numbers" if columns is None else f"have {columns} columns"
-        raise InvalidValueError(name, wanted, f"a signal with values of shape {list(signal.values.shape)}")
+        given = "numbers" if signal.columns is None else f"rows of {signal.columns} numbers"
+        raise InvalidValueError(name, wanted, f"a Signal of {given}" if signal is value else value)
     validation.finite_numbers(name, signal.values)  # alone it may have any, in a scene it moves something
     return signal
 
