@@ -150,3 +150,15 @@ def test_pyright_accepts_the_python_of_every_page(tmp_path):
             if counts(each, tree, loose)
         ]
     assert not wrong, "\n".join(wrong)
+
+
+@pytest.mark.parametrize("stub", sorted((ROOT / "src").rglob("*.pyi")), ids=lambda path: path.stem)
+def test_a_stub_has_the_functions_of_its_module(stub):
+    """With the same arguments; the first of an intrinsic is Numba's own."""
+
+    def functions(path: Path) -> dict[str, list[str]]:
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        found = [each for each in tree.body if isinstance(each, ast.FunctionDef) and each.name[0] != "_"]
+        return {each.name: [arg.arg for arg in each.args.args if arg.arg != "typingctx"] for each in found}
+
+    assert functions(stub) == functions(stub.with_suffix(".py"))
