@@ -157,3 +157,9 @@ def test_help_says_what_each_argument_is(where):
             assert match, f"{kind}: {name}"
             if re.match(r"(float|np.ndarray)", of):
                 assert re.search(r"\[[^\]]+\]|\(units of", match[1]), f"{kind}: {name} has no unit"
+
+
+@pytest.mark.parametrize("where", [name for name in PLAIN if hasattr(getattr(pf, name), "__path__")])
+def test_the_tab_key_shows_public_names_alone(where):
+    module = getattr(pf, where)
+    assert dir(module) == sorted(module.__all__) and all(hasattr(module, name) for name in dir(module))

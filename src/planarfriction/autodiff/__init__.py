@@ -43,3 +43,7 @@ __all__ = [
     "scene_gradient",
     "scene_sensitivities",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

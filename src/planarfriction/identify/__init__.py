@@ -28,3 +28,7 @@ __all__ = [
     "plan_motion",
     "predict_slide",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -25,3 +25,7 @@ __all__ = [
 ]
 
 register = SURFACES.register
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

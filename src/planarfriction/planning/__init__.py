@@ -22,3 +22,7 @@ __all__ = [
     "plan_push",
     "push",
 ]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -47,3 +47,7 @@ def __getattr__(name: str) -> Any:
         globals()["simulate"] = simulate
         return simulate
     raise AttributeError(f"module 'planarfriction.scenes' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -22,3 +22,7 @@ def __getattr__(name: str) -> Any:
     value = getattr(importlib.import_module(f"planarfriction.solvers.{_HOME[name]}"), name)  # brings the compiled code
     globals()[name] = value
     return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

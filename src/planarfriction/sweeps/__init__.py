@@ -3,3 +3,7 @@
 from planarfriction.sweeps.running import Progress, sweep
 
 __all__ = ["Progress", "sweep"]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
