@@ -70,7 +70,10 @@ def test_a_scene_keeps_its_parts_and_makes_signals_of_numbers():
             lambda: Contact(stand_in(), [1.0, 2.0]),
             "normal_force of contact 'contact' must be a number, or a Signal of numbers",
         ),
-        (lambda: Contact(stand_in(), "heavy"), "normal_force of contact 'contact' must be a signal or a constant"),
+        (
+            lambda: Contact(stand_in(), "heavy"),
+            "normal_force of contact 'contact' must be a number, or a Signal of numbers",
+        ),
         (lambda: Contact(stand_in(), 1.0, mounted_on="wrld"), "(did you mean 'world'?)"),
         (lambda: Contact(stand_in(), 1.0, count=0), "count of contact 'contact' must be an integer >= 1, got 0"),
         (lambda: Contact(stand_in(), 1.0, name=""), "name of a contact must be a text that is not empty"),

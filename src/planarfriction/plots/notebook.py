@@ -136,5 +136,6 @@ def _beside(figure: style.PlotFigure | None, title: str, rows: dict[str, str]) -
         f'<tr><td style="text-align:left">{name}</td><td style="text-align:left">{html.escape(value)}</td></tr>'
         for name, value in rows.items()
     )
-    table = f"<div><b>{html.escape(title)}</b><table>{lines}</table></div>"
+    look = 'style="color:inherit;font:inherit"'
+    table = f"<div><b>{html.escape(title)}</b><table {look}>{lines}</table></div>"
     return f'<div style="display:flex;align-items:center;gap:1em">{picture}{table}</div>'
