@@ -17,7 +17,8 @@ import pytest
 
 import planarfriction as pf
 from planarfriction import warm
-from planarfriction.scenes import compiling, simulation
+from planarfriction.kernels import compiling
+from planarfriction.scenes import simulation
 
 COUNTING = """
 import numba.core.event as events

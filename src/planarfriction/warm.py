@@ -13,10 +13,10 @@ import numpy as np
 
 from planarfriction import autodiff, coupling, limit_surface, models
 from planarfriction.families import MODELS
+from planarfriction.kernels.compiling import watched
 from planarfriction.laws import LuGre
 from planarfriction.patch import ContactPatch, grain
 from planarfriction.scenes import in_hand, simulate
-from planarfriction.scenes.compiling import watched
 
 _INSTANT = 1e-3
 """Simulated time [s]: compiling does not depend on how far a run goes."""

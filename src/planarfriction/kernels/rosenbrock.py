@@ -44,7 +44,7 @@ _RESOLUTION = 1e-15
 _FAR, _FIRST, _LARGEST = 10.0, 1e-7, 0.1
 
 # How much faster than the stop speed a body at rest may become in swinging out, which takes bristles without damping
-# for ever: about what the change within the bristles' time lets through where they swing out in three periods.
+# a long time: about what the change within the bristles' time lets through where they swing out in three periods.
 _SWING = 4.0
 
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError, SimulationInterrupted, SolverError
+from planarfriction.kernels.compiling import said_when_compiling
 from planarfriction.kernels.integration import Method, Output
-from planarfriction.scenes.compiling import said_when_compiling
 from planarfriction.scenes.packing import Windows
 from planarfriction.scenes.scene import Scene
 from planarfriction.scenes.signal import SAME_TIME, sample_count

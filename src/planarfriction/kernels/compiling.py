@@ -8,7 +8,7 @@ import sys
 from collections.abc import Iterator
 from typing import Any
 
-from planarfriction.kernels.machine_code import numba  # only the kernels import it themselves
+from numba.core import event
 
 _LINE = "planarfriction compiles its solver, once after installation (planarfriction.warm_up() does all of it ahead)"
 
@@ -19,7 +19,7 @@ def watched() -> bool:
     return alone and ("ipykernel" in sys.modules or (sys.stderr is not None and sys.stderr.isatty()))
 
 
-class _Said(numba.core.event.Listener):
+class _Said(event.Listener):
     """Says it when the first function is compiled; what is read from the cache needs no words."""
 
     done = False
@@ -39,5 +39,5 @@ def said_when_compiling(silent: bool = False) -> Iterator[None]:
     if silent or _Said.done or not watched():
         yield
     else:
-        with numba.core.event.install_listener("numba:compile", _Said()):
+        with event.install_listener("numba:compile", _Said()):
             yield
