@@ -174,6 +174,17 @@ def test_arrows_of_slip_turn_about_the_centre_of_rotation_and_stand_where_someth
     np.testing.assert_allclose((along * lever).sum(axis=0), 0.0, atol=1e-12)
 
 
+def test_the_force_is_drawn_as_it_acts_and_the_mark_where_nothing_moves():
+    state = State(PAINTED).turning_about(0.002, -0.006)
+    found = answer(state)
+    arrows = pictures.wrench_arrows(state, found)
+    along = np.array([np.subtract(arrows["x1"], arrows["x0"]), np.subtract(arrows["y1"], arrows["y0"])])
+    shares = pictures.REACH * 1e3 * PAINTED.width * found.points[:, :2].T
+    np.testing.assert_allclose(along, shares, rtol=1e-12)
+    np.testing.assert_allclose([arrows["x0"][0], arrows["y0"][0]], 1e3 * PAINTED.surface.centre_of_pressure)
+    assert pictures.points_of_interest(state) == {"x": [pytest.approx(2.0)], "y": [pytest.approx(-6.0)]}
+
+
 def test_moving_the_twist_leaves_the_drawn_surface_as_it_is():
     state = State(PAINTED)
     figure = pictures.surface_figure(state)

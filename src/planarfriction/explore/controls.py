@@ -52,7 +52,7 @@ class Controls:
             widget.sizing_mode = "stretch_width"
             widget.margin = (3, 0, 5, 0)
         self._silent = False
-        self.parameters: Any = pn.GridBox(ncols=2, sizing_mode="stretch_width", margin=(0, -6, 0, 0))
+        self.parameters: Any = pn.FlexBox(gap="0 8px", sizing_mode="stretch_width")
 
     def on(self, widget: Any, act: Callable[[Any], Any]) -> None:
         """Do `act` with each new value that the user gives."""
@@ -69,8 +69,8 @@ class Controls:
                     value=value,
                     css_classes=["parameter", name],
                     tags=[name],
-                    sizing_mode="stretch_width",
-                    margin=(3, 6, 5, 0),
+                    styles=looks.grows(110),
+                    margin=(3, 0, 5, 0),
                 )
             )
             fields[-1].param.watch(lambda event: None if self._silent else changed(event.new), "value")
