@@ -92,7 +92,7 @@ def pictures() -> None:
         page.wait_for_timeout(2000)
         page.mouse.click(*place(page, 3, -3))
         page.get_by_text("Models", exact=True).click()
-        page.get_by_text("Of the patch, the law").wait_for(timeout=120_000)
+        page.get_by_text("For the patch, the law").wait_for(timeout=120_000)
         page.wait_for_timeout(4000)
         save(page, "explorer", full_page=True)
         page.get_by_text("Run a scene").click()

@@ -15,12 +15,14 @@ from planarfriction.explore import looks
 from planarfriction.explore.ladder import RUNGS, Rung, climb
 from planarfriction.explore.live import Live, Task
 from planarfriction.explore.state import State
-from planarfriction.plots.style import PALETTE
+from planarfriction.plots.style import DISTRIBUTED, MOMENTS, OTHER, PARTS, PUBLISHED
 
 _WORDS = (
-    "Every model moves with the twist of the screen: up to it, hold, round to the opposite, in 0.2 s, from rest. "
-    "The error is that from the distributed model, root mean square over the run."
+    "Every model starts from rest and follows the same motion for 0.2 s: up to the twist on the screen, hold, and over "
+    "to its opposite. The error is the root mean square difference from the distributed model."
 )
+
+_COLOURS = dict(zip(RUNGS, (DISTRIBUTED, OTHER, PARTS, MOMENTS, PUBLISHED), strict=True))
 
 _HEAD = ("model", "bristle states", "error [% of μ<sub>c</sub> f<sub>N</sub>]", "time in the solver [ms]")
 
@@ -66,7 +68,7 @@ class LadderTab:
 
     def _show(self, rungs: list[Rung]) -> None:
         done = f"Comparing: {len(rungs)} of {len(RUNGS)} models (the first time this compiles)."
-        self._say(done if len(rungs) < len(RUNGS) else "Of the patch, the law and the twist on the screen.")
+        self._say(done if len(rungs) < len(RUNGS) else "For the patch, the law and the twist on the screen.")
         self._show_rungs(rungs)
 
     def _show_rungs(self, rungs: list[Rung]) -> None:
@@ -79,7 +81,7 @@ class LadderTab:
             "name": [each.name for each in ran],
             "align": ["right" if each.name == reference else "left" for each in ran],
             "offset": [-9 if each.name == reference else 9 for each in ran],
-            "colour": [PALETTE[list(RUNGS).index(each.name) % len(PALETTE)] for each in ran],
+            "colour": [_COLOURS[each.name] for each in ran],
         }
 
     def _say(self, text: str) -> None:
@@ -120,7 +122,7 @@ def _chart(source: ColumnDataSource) -> Any:
         "text_align": {"field": "align"},
         "y_offset": 5,
         "text_font_size": "12px",
-        "text_color": "colour",
+        "text_color": "#333333",
     }
     plot.add_layout(LabelSet(x="seconds", y="error", text="name", source=source, **look))
     return plot

@@ -12,7 +12,7 @@ from planarfriction.explore.drawing import Drawing
 from planarfriction.explore.state import State
 from planarfriction.limit_surface import LimitSurfaceCells, LimitSurfaceTable
 from planarfriction.plots.limit_surface import scaled_samples
-from planarfriction.plots.style import PALETTE
+from planarfriction.plots.style import DISTRIBUTED, ELLIPSOID, EXACT
 
 MM = 1e3
 """Millimetres in a metre."""
@@ -26,7 +26,7 @@ POLAR, AZIMUTH = 37, 73
 REACH = 0.4
 """Length of the arrow of a force of mu_c f_N, as a share of the width of the map."""
 
-COLOURS = {"friction": PALETTE[1], "surface": PALETTE[0], "ellipsoid": PALETTE[3]}
+COLOURS = {"friction": DISTRIBUTED, "surface": EXACT, "ellipsoid": ELLIPSOID}
 """Colour of each wrench, the same in all pictures."""
 
 
