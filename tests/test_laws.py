@@ -215,7 +215,7 @@ SURFACE = pf.LimitSurfaceCells(pf.ContactPatch.rectangle(0.02, cells=3))
             lambda: pf.Coulomb(0.3).wrench(SURFACE, np.ones((2, 3)), np.ones(3)),
             "normal_force must broadcast with the twist, got shapes [3] and [2]",
         ),
-        (lambda: pf.DistributedModel("disc", pf.LuGre()), "patch must be a ContactPatch, got disc"),
+        (lambda: pf.DistributedModel("disc", pf.LuGre()), "patch must be a ContactPatch, got 'disc'"),
         (
             lambda: pf.DistributedModel(POINT, pf.Coulomb(0.3)),
             "law must be a friction law of bristles, such as LuGre, got Coulomb(mu=0.3)",

@@ -354,7 +354,7 @@ SQUARE = PUBLISHED_PATCHES["Square"]()
         (lambda s: s.twist([(1.0, 0.0, 0.0), (0.0, 0.0, 0.0)]), "wrench must not be zero"),
         (lambda s: s.twist((1.0, 0.0)), r"wrench must have shape \[..., 3\]"),
         (lambda s: s.twist((1.0, 0.0, math.nan)), "wrench must be finite"),
-        (lambda s: type(s)("square"), "patch must be a ContactPatch, got square"),
+        (lambda s: type(s)("square"), "patch must be a ContactPatch, got 'square'"),
         (lambda s: type(s)(SQUARE, normal_force=0.0), "normal_force must be > 0, got 0.0"),
         (lambda s: type(s)(SQUARE, normal_force=-1.0), "normal_force must be > 0, got -1.0"),
     ],

@@ -270,7 +270,7 @@ def _check_each(name: str, values: np.ndarray, good: np.ndarray, rule: str) -> N
 def instance(name: str, value: Any, kind: type | tuple[type, ...], what: str) -> Any:
     """Return `value` if it is one of the kind, which messages call `what` ("a ContactPatch"), or raise."""
     if not isinstance(value, kind):
-        raise InvalidValueError(name, f"be {what}", value)
+        raise InvalidValueError(name, f"be {what}", quoted(value))
     return value
 
 
