@@ -247,7 +247,7 @@ def test_a_roll_out_of_a_batch_has_the_gradients_of_its_members():
 )
 def test_second_derivatives_by_the_adjoint_are_one_line(twice):
     loss, (law, twists) = square("adjoint")
-    with pytest.raises(pf.FrictionError, match="leave method out, or take 'eager', to differentiate twice") as caught:
+    with pytest.raises(pf.FrictionError, match="leave method out, or use 'eager', to differentiate twice") as caught:
         twice(lambda law: loss(law, twists))(law)
     assert "\n" not in str(caught.value)
 

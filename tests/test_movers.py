@@ -136,7 +136,7 @@ def test_velocities_of_contacts_are_checked():
     with pytest.raises(pf.FrictionError, match="velocity of contact 'pad' must have 3 columns"):
         pf.Contact(MODELS["reduced"], 1.0, name="pad", velocity=(1.0, 0.0))
     body, moving = pf.Body(1.0, 1.0), pf.Contact(MODELS["reduced"], 1.0, name="pad", velocity=SWAY)
-    with pytest.raises(pf.FrictionError, match="velocity of contact 'pad' must be None where the body's"):
+    with pytest.raises(pf.FrictionError, match="velocity of contact 'pad' must be None if the body's"):
         pf.Scene(body, [moving], 1.0, velocity=(1.0, 0.0, 0.0))
 
 

@@ -81,7 +81,7 @@ SECOND = {
 def test_second_derivatives_by_the_adjoint_are_one_line(way):
     model = module("reduced")
     *held, parameters = inputs(model)
-    with pytest.raises(pf.FrictionError, match="take method='eager' to differentiate twice") as caught:
+    with pytest.raises(pf.FrictionError, match="use method='eager' to differentiate twice") as caught:
         SECOND[way](lambda p: wrenches(model, "adjoint")(*held, p).square().sum())(parameters)
     assert "\n" not in str(caught.value)
 

@@ -67,8 +67,7 @@ def candidate_motions(
     InvalidValueError
         A number that is not > 0, more than 20 loads, or fewer than 100 or more than 100000 samples.
     """
-    if not isinstance(patch, ContactPatch):
-        raise InvalidValueError("patch", "be a ContactPatch", type(patch).__name__)
+    validation.instance("patch", patch, ContactPatch, "a ContactPatch")
     validation.instance("law", law, LuGre, "a LuGre law")
     given = validation.numbers("normal_force", normal_force)
     if given.ndim > 1 or not 1 <= given.size <= LOADS:

@@ -119,8 +119,7 @@ def identify_motion(
         raise InvalidValueError("body", "be a SlidingBody", body)
     if type(start) is not LuGre:  # a subclass may compute something else from the parameters that are fitted
         raise InvalidValueError("start", "be a LuGre law", start)
-    if not isinstance(patch, ContactPatch):
-        raise InvalidValueError("patch", "be a ContactPatch", type(patch).__name__)
+    validation.instance("patch", patch, ContactPatch, "a ContactPatch")
     refuse_anisotropy(patch, "identify_motion")
     if samples is not None:
         samples = validation.count("samples", samples, at_least=5)

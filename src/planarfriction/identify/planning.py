@@ -145,8 +145,7 @@ def plan_motion(
         A parameter breaks its rule, or a motion does not move.
     """
     names = known.check_names(parameters)
-    if not isinstance(patch, ContactPatch):
-        raise InvalidValueError("patch", "be a ContactPatch", type(patch).__name__)
+    validation.instance("patch", patch, ContactPatch, "a ContactPatch")
     refuse_anisotropy(patch, "plan_motion")
     validation.instance("law", law, LuGre, "a LuGre law")
     if "breakaway_ratio" in names and law.elasto_plastic is None:

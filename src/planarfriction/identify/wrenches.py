@@ -99,8 +99,7 @@ def identify_lugre(
         A parameter breaks its rule.
     """
     logs, names = as_logs(log), known.check_names(parameters)
-    if not isinstance(patch, ContactPatch):
-        raise InvalidValueError("patch", "be a ContactPatch", type(patch).__name__)
+    validation.instance("patch", patch, ContactPatch, "a ContactPatch")
     refuse_anisotropy(patch, "identify_lugre")
     kinds = _kinds(validation.choice("model", model, ("auto", *MODELS)), patch, names)
     groups = check_groups(nuisance)

@@ -10,6 +10,7 @@ from typing import Any, ClassVar, Self
 import jax
 import jax.numpy as jnp
 
+from planarfriction import validation
 from planarfriction.autodiff.parameters import Packed
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
@@ -45,8 +46,7 @@ class FrictionModel:
         jax.tree_util.register_pytree_with_keys(cls, cls._flatten, cls._unflatten)
 
     def __init__(self, patch: ContactPatch, law: FrictionLaw) -> None:
-        if not isinstance(patch, ContactPatch):
-            raise InvalidValueError("patch", "be a ContactPatch", patch)
+        validation.instance("patch", patch, ContactPatch, "a ContactPatch")
         refuse_creep(law, f"jax.{type(self).__name__}")
         self.elasto_plastic = law.numbers.elasto_plastic > 0.0
 

@@ -85,8 +85,7 @@ class LimitSurface(ByValue):
     """Segments per quadrant of the table in which models store it [-]."""
 
     def __post_init__(self) -> None:
-        if not isinstance(self.patch, ContactPatch):
-            raise InvalidValueError("patch", "be a ContactPatch", self.patch)
+        validation.instance("patch", self.patch, ContactPatch, "a ContactPatch")
         if self.anisotropy != "any":
             refuse = refuse_anisotropy if self.anisotropy == "none" else refuse_cell_metrics
             refuse(self.patch, f"{type(self).__name__} (LimitSurfaceTable takes any)")

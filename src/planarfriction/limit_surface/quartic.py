@@ -90,8 +90,7 @@ class LimitSurfaceQuartic(LimitSurface):
         for name, rows in (("wrench", wrench), ("twist", twist)):
             if not (np.abs(rows).max(axis=1) > 0.0).all():
                 raise InvalidValueError(name, "not be zero in any row", rows.tolist())
-        if not isinstance(patch, ContactPatch):
-            raise InvalidValueError("patch", "be a ContactPatch", patch)
+        validation.instance("patch", patch, ContactPatch, "a ContactPatch")
         if normal_force is not None:
             normal_force = validation.positive_load("normal_force", normal_force)
         frame = scaling(patch.centre_of_pressure(normal_force), float(patch.contact_radius(normal_force)))

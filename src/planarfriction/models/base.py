@@ -131,8 +131,7 @@ class FrictionModel(ByValue):
     """Units of the state: one for all components, or one for each."""
 
     def __post_init__(self) -> None:
-        if not isinstance(self.patch, ContactPatch):
-            raise InvalidValueError("patch", "be a ContactPatch", self.patch)
+        validation.instance("patch", self.patch, ContactPatch, "a ContactPatch")
         if not isinstance(self.law, FrictionLaw):
             raise InvalidValueError("law", "be a friction law of bristles, such as LuGre", self.law)
 

@@ -77,8 +77,7 @@ class FrictionModel(nn.Module):
 
     def __init__(self, patch: ContactPatch, law: FrictionLaw) -> None:
         super().__init__()
-        if not isinstance(patch, ContactPatch):
-            raise InvalidValueError("patch", "be a ContactPatch", patch)
+        validation.instance("patch", patch, ContactPatch, "a ContactPatch")
         refuse_creep(law, f"torch.{type(self).__name__}")
         self.patch = patch
         self.elasto_plastic = bool(law.numbers.elasto_plastic)
