@@ -80,9 +80,9 @@ def place(page: Page, x: float, y: float) -> tuple[float, float]:
 
 
 def save(page: Page, name: str, **options: Any) -> None:
-    """Write what is seen."""
+    """Write what is seen, in all its colours: a palette loses those of small marks."""
     with Image.open(io.BytesIO(page.screenshot(**options))) as picture:
-        picture.convert("RGB").quantize(256).save(DOCS / "images" / f"{name}.png", optimize=True)
+        picture.convert("RGB").save(DOCS / "images" / f"{name}.png", optimize=True)
 
 
 def pictures() -> None:

@@ -84,8 +84,8 @@ def load_family(full: bool) -> Measurement:
     times = np.array([[once(lambda scene=scene: simulate(scene)) for scene in scenes] for _ in range(25)])
     value, theirs = np.median(times, axis=0).tolist()
     words = (
-        f"the same with a fixed shape (both: all of simulate); the family's {len(family.load_rungs)} maps took "
-        f"{built:.2g} s before, a map for every load in place of them takes {every:.2g} s"
+        f"the same with a fixed shape (both: all of simulate); building the family's {len(family.load_rungs)} maps "
+        f"first took {built:.2g} s; with a map built for every load, the run takes {every:.2g} s"
     )
     return line(value, "s", words, theirs)
 
