@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from planarfriction.experiments import EXPERIMENTS
-from planarfriction.experiments.beyond import driven as beyond_driven
 from planarfriction.experiments.beyond import grooves, in_hand, ladder, plateaus
 from planarfriction.experiments.beyond import run as beyond
 from planarfriction.experiments.beyond import surfaces as beyond_surfaces
@@ -75,14 +74,25 @@ def test_the_exact_surface_is_the_limit_of_ever_finer_sums():
     assert misses[1] < misses[0] / 2.0 and misses[2] < misses[1] / 2.0
 
 
-def test_reduced_model_stays_below_its_bounds_and_the_published_one_would_not(result):
-    driven = result.numbers["driven"]
-    assert set(driven) == set(beyond.QUICK_SHAPES)
-    swapped = {shape: each | {"reduced": each["published"]} for shape, each in driven.items()}
-    broken = [row for row in beyond_driven.comparisons(swapped) if not row.holds]
-    assert len(broken) == 2 * len(driven)  # the median and the third quartile; its maximum is its own
+def test_reduced_model_is_nearer_than_the_published_one(result):
+    assert set(result.numbers["driven"]) == set(beyond.QUICK_SHAPES)
+    for ratios in (*result.numbers["driven ratios"].values(), *result.numbers["driven ratios, auto"].values()):
+        # found: medians up to 0.13, third quartiles to 0.15, maxima to 0.93; 1 is a model that is no better
+        assert ratios["median"] < 0.25 and ratios["third quartile"] < 0.4
+        assert ratios["maximum"] < 1.0 and ratios["torque maximum"] < 1.0
     for ratios in result.numbers["driven ratios"].values():
-        assert ratios["torque median"] < 0.05 and ratios["torque maximum"] < 1.0
+        assert ratios["torque median"] < 0.05
+
+
+def test_parts_are_nearer_than_the_published_model_on_patches_that_no_table_holds(result):
+    for each in result.numbers["new shapes"].values():
+        for ratios in each[ladder.AUTO].values():
+            assert max(ratios) < 1.0
+
+
+def test_a_table_of_the_exact_surface_is_nearer_than_the_sum_over_cells(result):
+    for each in result.numbers["surfaces"].values():
+        assert each["table/force"]["mean"] < 0.25 * each["sum over cells/force"]["mean"]
 
 
 def test_plateaus(result):
@@ -130,9 +140,8 @@ def test_every_published_in_hand_run_is_there():
 def test_few_cells_are_a_rung_between_three_bristles_and_the_grid(result):
     ends = result.numbers["in hand"][f"{IN_WORDS['NonConvex2']}, load 1"]
     assert ends["degree 5"] < 0.1 * min(ends["reduced"], ends["published"])
-    far = {"a": ends | {"degree 5": 2.0 * ends[in_hand.SHIFT]}}
-    held = {row.quantity.split(": ")[1].split(",")[0]: row.holds for row in in_hand.comparisons(far)}
-    assert held == {"ReducedModel": True, "45 cells": False}
+    # 45 cells are off by less than 0.1 % of friction would do, three bristles by more, but less than 2 % would
+    assert ends["degree 5"] < ends[in_hand.SHIFT] < ends["reduced"] < 20.0 * ends[in_hand.SHIFT]
 
 
 def test_score_counts_by_load():

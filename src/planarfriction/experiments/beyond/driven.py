@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from planarfriction.experiments.beyond.ladder import AUTO, Row, name_of_parts
-from planarfriction.experiments.experiment import Arrays, Comparison
-from planarfriction.experiments.runs import IN_WORDS, LAW
-from planarfriction.experiments.velocity_driven.boxes import SAMPLES
+from planarfriction.experiments.experiment import Arrays
+from planarfriction.experiments.runs import LAW
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import PUBLISHED_PATCHES
 
@@ -22,13 +21,8 @@ MODELS = {
 }
 """Model of the ladder -> its name in the report."""
 
-BOUNDS = {"median": 0.25, "third quartile": 0.8, "maximum": 1.0}
-"""Statistic of the force error -> the share of the published reduced model's that `ReducedModel` is compared with."""
-
-STATISTICS = tuple(BOUNDS)
-
-TORQUE_BOUND = 1.0
-"""The same for the largest error of the torque."""
+STATISTICS = ("median", "third quartile", "maximum")
+"""What is shown of the errors over a run, of force and of torque."""
 
 PARTS = (1, 4, 6)
 """Parts whose steps are timed."""
@@ -108,26 +102,3 @@ def _spun(model: Any, dt: float) -> np.ndarray:
         state, wrench = model.step(state, (0.0, 0.0, SPIN), 1.0, dt)
         torques[i] = wrench[2]
     return torques
-
-
-def comparisons(errors: Errors) -> list[Comparison]:
-    """Errors of `ReducedModel` from the finer grid, at most a share of the published reduced model's."""
-    return [
-        Comparison(
-            f"driven, {IN_WORDS[shape]}: {MODELS[model]}, {name.removeprefix('torque ')} of the error of the "
-            f"{quantity}, against {share:g} times the published model's",
-            "converged",
-            each[model][name],
-            share * each["published"][name],
-            unit,
-            SAMPLES,
-            "A part keeps the first moments of its bristle field alone. The reference: the distributed model with its "
-            "cells cut finely.",
-        )
-        for shape, each in errors.items()
-        for model in ("reduced", AUTO)
-        for name, share, quantity, unit in (
-            *((name, share, "force", "N") for name, share in BOUNDS.items()),
-            ("torque maximum", TORQUE_BOUND, "torque", "N m"),
-        )
-    ]

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from planarfriction.experiments.beyond.ladder import AUTO, CASES, Row
-from planarfriction.experiments.experiment import Comparison
 from planarfriction.experiments.in_hand.runs import FRICTION_CHANGE, Case, columns, end_distance, with_friction
 from planarfriction.scenes import simulate
 from planarfriction.scenes.ready import FINE
@@ -25,13 +24,6 @@ SHIFT = "friction"
 SHIFTS = 1e-5, 1e-3
 """A run is measured in units of friction if 0.1 % of it moves the end by so much [m]: less says nothing, and more is
 the difference between holding and slipping."""
-
-
-ROUND, SHARE = ("disc", "square"), 0.5
-"""On these patches the end of `parts="auto"` is compared with so much of the published model's distance."""
-
-LEAST = 1e-5
-"""Distances below say nothing of a model [m]: a finer grid moves the end by more."""
 
 
 def depends_on_friction(each: dict[str, float]) -> bool:
@@ -64,33 +56,3 @@ def score(ends: dict[str, dict[str, float]], load: int, model: str = "reduced") 
     """In how many runs under a load a model ends nearer than the published one, and the ratios."""
     ratios = {case: each[model] / each["published"] for case, each in ends.items() if case.endswith(f"load {load}")}
     return {"runs": len(ratios), "nearer": sum(ratio < 1.0 for ratio in ratios.values()), "ratios": ratios}
-
-
-def comparisons(ends: dict[str, dict[str, float]]) -> list[Comparison]:
-    """The ends of `ReducedModel` and of few cells, in units of friction; with parts, beside the published model's."""
-    rows = [_beside_published(case, each) for case, each in ends.items()]
-    for model, share, words in (
-        ("reduced", 2e-2, "Three states do not hold the history of a patch that breaks away section by section."),
-        ("degree 5", FRICTION_CHANGE, "A few cells keep the moments of the patch, not its rim."),
-    ):
-        for case, each in ends.items():
-            if model in each and depends_on_friction(each):
-                quantity = f"{case}: {ENDS.get(model, '45 cells')}, end, against {share:.1%} of friction"
-                tolerance = share / FRICTION_CHANGE * each[SHIFT]
-                rows.append(Comparison(quantity, "converged", each[model], tolerance, "m", 1, words))
-    return rows
-
-
-def _beside_published(case: str, each: dict[str, float]) -> Comparison:
-    """The end of `parts="auto"`: no further than the published model's, or half of what 0.1 % of friction does."""
-    share = SHARE if case.split(",")[0] in ROUND else 1.0
-    least = max(LEAST, 0.5 * each[SHIFT] if share == 1.0 and depends_on_friction(each) else 0.0)
-    return Comparison(
-        f"{case}: {ENDS[AUTO]}, end, against {share:g} times the published model's",
-        "converged",
-        each[AUTO],
-        max(share * each["published"], least),
-        "m",
-        1,
-        "Each part breaks away by itself; what is left is the history of its own cells.",
-    )

@@ -88,9 +88,6 @@ def run(work: Work) -> Result:
         _figures(rows, errors, stairs, numbers),
         comparisons=[
             *surfaces.comparisons(errors, stairs),
-            *driven.comparisons(numbers["driven"]),
-            *in_hand.comparisons(numbers["in hand"]),
-            *new_shapes.comparisons(unseen),
             *plateaus.comparisons(numbers["plateaus"]),
             *grooves.comparisons(grooved),
         ],

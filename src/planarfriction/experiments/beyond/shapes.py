@@ -10,7 +10,7 @@ import numpy as np
 
 from planarfriction.experiments import experiment
 from planarfriction.experiments.beyond.ladder import AUTO, name_of_parts
-from planarfriction.experiments.experiment import Comparison, Table
+from planarfriction.experiments.experiment import Table
 from planarfriction.experiments.runs import LAW, at_centre_of_pressure, columns
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import ContactPatch
@@ -122,29 +122,6 @@ def ratios(errors: dict[str, np.ndarray]) -> dict[str, dict[str, list[float]]]:
         for name in errors
         if name != "published"
     }
-
-
-def comparisons(found: dict[str, dict[str, np.ndarray]]) -> list[Comparison]:
-    """Largest errors of `parts="auto"`, at most the published model's in the same run; of all twists the worst."""
-    rows = []
-    for shape, errors in found.items():
-        for i, (quantity, unit) in enumerate(QUANTITIES.items()):
-            ours, theirs = errors[AUTO][:, i], errors["published"][:, i]
-            worst = int((ours / theirs).argmax())
-            rows.append(
-                Comparison(
-                    f'new shapes, {shape}: ReducedModel, parts="auto", largest error of the {quantity}, against the '
-                    "published model's",
-                    "converged",
-                    float(ours[worst]),
-                    float(theirs[worst]),
-                    unit,
-                    len(ours),
-                    "Each part keeps the first moments of its own bristles; those of a part that turns about one of "
-                    "its own cells turn at different rates.",
-                )
-            )
-    return rows
 
 
 def table(found: dict[str, dict[str, np.ndarray]]) -> Table:

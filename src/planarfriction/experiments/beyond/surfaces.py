@@ -9,6 +9,7 @@ import numpy as np
 
 from planarfriction import geometry
 from planarfriction.experiments.experiment import Arrays, Comparison, compare_all
+from planarfriction.experiments.runs import IN_WORDS
 from planarfriction.limit_surface import (
     LimitSurface,
     LimitSurfaceCells,
@@ -115,14 +116,21 @@ def jumps(stairs: Arrays) -> dict[str, float]:
 def comparisons(errors: dict[str, Arrays], stairs: Arrays) -> list[Comparison]:
     """The exact surface beside closed forms, sums over ever finer cells, and the errors of the table."""
     finer = f"sum over cells cut in {PARTS} along each side, mean distance to the exact surface"
-    converges = "A sum converges at least in proportion to the size of its cells; the tolerance is 1.6 times that."
-    table = "table, mean distance to the exact surface, against a quarter of the sum over cells'"
-    left = "What interpolation between 20 segments leaves; the sum's own error is its staircase."
-    return [
-        *_closed_forms(stairs),
-        *_shares(errors, "finer sum", 1.6 / PARTS, finer, converges),
-        *_shares(errors, "table", 0.25, table, left),
+    cause = "A sum converges at least in proportion to the size of its cells; the tolerance is 1.6 times that."
+    sums = [
+        Comparison(
+            f"{IN_WORDS.get(shape, shape)}: {finer}",
+            "converged",
+            float(each["finer sum/force"].mean()),
+            1.6 / PARTS * float(each["sum over cells/force"].mean()),
+            "N",
+            len(each["finer sum/force"]),
+            cause,
+        )
+        for shape, each in errors.items()
+        if "finer sum/force" in each
     ]
+    return [*_closed_forms(stairs), *sums]
 
 
 def _closed_forms(stairs: Arrays) -> list[Comparison]:
@@ -143,20 +151,3 @@ def _closed_forms(stairs: Arrays) -> list[Comparison]:
             (words.format("force"), stairs[f"{line}, force"], place / half, 1e-12, "N", rounding),
         ),
     )
-
-
-def _shares(errors: dict[str, Arrays], kind: str, share: float, words: str, cause: str) -> list[Comparison]:
-    """Mean errors of the force, at most a share of those of the sum over the cells."""
-    return [
-        Comparison(
-            f"{shape}: {words}",
-            "converged",
-            float(each[f"{kind}/force"].mean()),
-            share * float(each["sum over cells/force"].mean()),
-            "N",
-            len(each[f"{kind}/force"]),
-            cause,
-        )
-        for shape, each in errors.items()
-        if f"{kind}/force" in each
-    ]
