@@ -103,7 +103,7 @@ def costs(lines: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
             line = found[name]
             beside = f"{shown(line['baseline_value'], line['unit'])}: {line['baseline']}"
             rows.append((words, shown(line["value"], line["unit"]), beside, line["ratio"], f"`{name}`"))
-    headings = ("what", "cost", "beside it, in the same run", "ratio", "name")
+    headings = ("what", "cost", "baseline, in the same run", "ratio", "name")
     return {"Cost": {"headings": headings, "rows": rows}} if rows else {}
 
 

@@ -112,10 +112,10 @@ def show(benchmark: Any, as_json: bool) -> None:
             f"{TASKS[name].title} ({counts} {'tosses' if name == 'slides' else 'tests'})", *table(benchmark, name)
         )
         for model, result in benchmark.results[name].items():
-            if result.told:
+            if result.fitted:
                 for key, value in result.checked.items():
                     note(f"{model}: {key} {value:.3g}")
-                note(f"{model}, fitted: {', '.join(f'{key} {value:.4g}' for key, value in result.told.items())}")
+                note(f"{model}, fitted: {', '.join(f'{key} {value:.4g}' for key, value in result.fitted.items())}")
     for text in benchmark.left_out:
         note(f"left out: {text}")
 

@@ -69,8 +69,8 @@ class Reproduction:
     ) -> Iterator[Record]:
         """Carry out the experiments `names` (all by default) and yield each result as it is stored.
 
-        What is kept is not done again, unless `again` asks for it. `progress` is told the piece in work. Ctrl-C passes
-        through; what is finished by then, pieces included, stays.
+        What is kept is not done again, unless `again` asks for it. `progress` is called with the piece in work. Ctrl-C
+        passes through; what is finished by then, pieces included, stays.
 
         Raises `InvalidValueError` for an unknown name, `FileError` where nothing can be written.
         """

@@ -1,4 +1,4 @@
-"""Work that takes longer than a drag: in a thread, told to the page piece by piece, given up when nobody wants it."""
+"""Work that takes longer than a drag: in a thread, reported to the page in pieces, given up when no longer wanted."""
 
 from __future__ import annotations
 

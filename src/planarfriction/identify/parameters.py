@@ -61,7 +61,7 @@ SOFT_FINGER = {
 ALL = {**LAW, **SHAPE, **SOFT_FINGER}
 
 USUAL = ("mu_c", "mu_s", "v_s", "gamma", "sigma_0", "sigma_1", "sigma_2", "contact_radius")
-"""What `identify_lugre` estimates unless told otherwise."""
+"""What `identify_lugre` estimates by default."""
 
 
 PRIOR = 3.0

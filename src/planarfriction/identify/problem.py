@@ -27,7 +27,7 @@ from planarfriction.patch import ContactPatch, SoftFinger
 COARSE = 0.2
 """Error that the steps make, as a share of a standard error, above which they are halved."""
 
-TOLD = 0.3
+KNOWN = 0.3
 """Standard error, as a share of an estimate, up to which that estimate is used for this."""
 
 FINEST = 32
@@ -105,9 +105,9 @@ class Problem:
         rows = np.concatenate([np.zeros((len(pull), count)), pull], axis=1)
         inverse = covariance(np.concatenate([jacobian, rows]), np.full(len(values), True))
         errors = np.sqrt(np.diag(inverse))[:count]
-        told = errors < TOLD * np.abs(values[:count])
+        known = errors < KNOWN * np.abs(values[:count])
         moved = (np.where(np.isfinite(inverse), inverse, 0.0) @ (jacobian.T @ (finer - off)))[:count]
-        most = float((np.abs(moved)[told] / (COARSE * errors[told])).max(initial=0.0))
+        most = float((np.abs(moved)[known] / (COARSE * errors[known])).max(initial=0.0))
         return min(int(2 ** np.ceil(0.5 * np.log2(most))), FINEST // self.refine) if most > 1.0 else 1
 
     def start_values(self, law: LuGre) -> np.ndarray:

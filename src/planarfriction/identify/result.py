@@ -148,16 +148,16 @@ class Identification(ByValue):
         intervals = self.intervals()
         for name, value, error in zip(self.names, self.values, self.standard_errors, strict=True):
             low, high = intervals[name]
-            told = self.identifiable(name)
+            identifiable = self.identifiable(name)
             remark = "; ".join(each.reason for each in self.verdicts if each.parameter == name)
             rows.append(
                 [
                     name,
                     f"{value:.5g}",
                     f"{error:.2g}" if np.isfinite(error) and error < 1e3 * max(abs(value), 1e-12) else "unknown",
-                    f"{low:.4g} .. {high:.4g}" if told else "",
+                    f"{low:.4g} .. {high:.4g}" if identifiable else "",
                     ALL[name].unit,
-                    remark if told else f"not identifiable, {remark}",
+                    remark if identifiable else f"not identifiable, {remark}",
                 ]
             )
         return rows
@@ -166,9 +166,9 @@ class Identification(ByValue):
         """The summary, then a table in 80 columns: estimates, 95 % intervals, cautions, and disturbances of the rig."""
         lines, remarks, intervals = [], [], self.intervals()
         for name, value in zip(self.names, self.values, strict=True):
-            told = self.identifiable(name)
+            identifiable = self.identifiable(name)
             low, high = intervals[name]
-            shown = f"{low:.4g} .. {high:.4g}" if told else "not identifiable"
+            shown = f"{low:.4g} .. {high:.4g}" if identifiable else "not identifiable"
             lines.append(f"{name:<16}{value:>11.5g}   {shown:<26}{ALL[name].unit}".rstrip())
             reasons = "; ".join(each.reason for each in self.verdicts if each.parameter == name)
             if reasons:

@@ -78,8 +78,8 @@ def refined(fit: Fit, *, known_noise: bool, fixed_steps: bool, say: Callable[[st
         if not known_noise:
             noise = problem.noise(values)
         spread = problem.spread(values, noise)
-        told = np.isfinite(noise)
-        settled = turn > 0 and bool((np.abs(noise[told] / before[told] - 1.0) < STEADY).all())
+        known = np.isfinite(noise)
+        settled = turn > 0 and bool((np.abs(noise[known] / before[known] - 1.0) < STEADY).all())
         factor = 1 if fixed_steps else problem.finer(values, spread)
         if factor > 1:
             problem.refine_by(factor)

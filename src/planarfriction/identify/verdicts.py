@@ -86,10 +86,10 @@ def judge(
     verdicts = [Verdict("fit", not u.rejected, _on_fit(u, chosen))]
     if len(scores) > 1:
         others = sorted((each for each in scores if each.model != chosen.model), key=lambda each: each.held_out)
-        told = ", ".join(
+        rest = ", ".join(
             f"{each.model} {each.held_out:.3g} ({each.held_out - chosen.held_out:+.2g})" for each in others
         )
-        text = f"{chosen.model} predicts held-out parts best, to {chosen.held_out:.3g} times the noise; {told}"
+        text = f"{chosen.model} predicts held-out parts best, to {chosen.held_out:.3g} times the noise; {rest}"
         verdicts.append(Verdict("fit", True, text))
     if skipped:
         verdicts.append(

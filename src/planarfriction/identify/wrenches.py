@@ -28,7 +28,7 @@ from planarfriction.patch.metric import refuse_anisotropy
 BEGINS = ("rest", "steady")
 
 START_MU_S = 1.2
-"""Static coefficient that a search starts with unless it is told otherwise: above `mu_c`, free to move."""
+"""Static coefficient that a search starts with by default: above `mu_c`, free to move."""
 
 USUAL_EVALUATIONS, PATIENCE = 60, 120.0
 """Evaluations that a search takes, and the time [s] that "auto" has for one of its models."""

@@ -43,7 +43,7 @@ class Result:
     """Answers to the test cases, in their order."""
     errors: tuple[np.ndarray, ...]
     """Errors `[rows, columns]` of each test case, as the task defines them."""
-    told: Mapping[str, float]
+    fitted: Mapping[str, float]
     """Fitted numbers by name."""
     checked: Mapping[str, float]
     """Checks of the model's own uncertainty on the test cases, if it states any."""
@@ -112,19 +112,19 @@ class Benchmark:
                 except NotImplementedError:
                     continue  # a model need not answer every task
                 errors = tuple(task.errors(case, answer) for case, answer in zip(test, answers, strict=True))
-                told = fitted.told() if hasattr(fitted, "told") and name == "slides" else {}
+                values = fitted.fitted_values() if hasattr(fitted, "fitted_values") and name == "slides" else {}
                 checked = fitted.check(test) if hasattr(fitted, "check") else {}
                 regions = fitted.regions([case.question for case in test]) if hasattr(fitted, "regions") else None
                 seconds = time.perf_counter() - begun
                 scores = score(task, test, errors, self.seed)
                 self.results.setdefault(name, {})[called] = Result(
-                    scores, tuple(answers), errors, told, checked, seconds, regions
+                    scores, tuple(answers), errors, values, checked, seconds, regions
                 )
         return self.results
 
 
 def library(left_out: list[str] | None = None) -> dict[str, Any]:
-    """The library's models that are installed, by name; what is missing is told in `left_out`."""
+    """The library's models that are installed, by name; what is missing is added to `left_out`."""
     for name, entry in LIBRARY.items():
         if not entry.installed and left_out is not None:
             left_out.append(f"{name}: needs {entry.needs}, pip install 'planarfriction[{entry.extra}]'")

@@ -51,7 +51,7 @@ class SurfaceModel:
         predict = lambda values, asked: glide.slides(lambda twist, _: values[0] * wrench(twist), asked)  # noqa: E731
         return dataclasses.replace(self, mu=float(fitting.fit_slides(predict, [fitting.MU], cases, radius)[0]))
 
-    def told(self) -> dict[str, float]:
+    def fitted_values(self) -> dict[str, float]:
         """What was fitted to slides."""
         return {"mu": self.mu}
 
@@ -135,7 +135,7 @@ class UncoupledModel:
 
         return dataclasses.replace(self, share=fitting.fit_angles(misfit, 0.2, 5.0))
 
-    def told(self) -> dict[str, float]:
+    def fitted_values(self) -> dict[str, float]:
         """What was fitted."""
         return {"mu": self.mu, "lever/radius": self.share}
 
@@ -246,7 +246,7 @@ class BristleModel:
         predict = lambda values, asked: dataclasses.replace(self, mu=float(values[0])).answer_all(asked)  # noqa: E731
         return dataclasses.replace(self, mu=float(fitting.fit_slides(predict, [fitting.MU], cases, radius)[0]))
 
-    def told(self) -> dict[str, float]:
+    def fitted_values(self) -> dict[str, float]:
         """What was fitted."""
         return {"mu": self.mu}
 

@@ -67,7 +67,7 @@ class MujocoBox:
             self, mu=float(fitting.fit_slides(predict, [fitting.MU], cases, radius)[0]), _made={}
         )
 
-    def told(self) -> dict[str, float]:
+    def fitted_values(self) -> dict[str, float]:
         """What was fitted."""
         return {"mu": self.mu}
 

@@ -66,7 +66,7 @@ def to_dict(benchmark: Benchmark) -> dict[str, Any]:
             errors = {case.name: np.round(rows, 4).tolist() for case, rows in zip(cases, result.errors, strict=True)}
             models[called] = {
                 "scores": scores,
-                "fitted": dict(result.told),
+                "fitted": dict(result.fitted),
                 "checked": dict(result.checked),
                 "seconds": round(result.seconds, 2),
                 "errors": errors,

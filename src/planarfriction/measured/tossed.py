@@ -97,7 +97,7 @@ class SpeedModel:
         found = fitting.fit_slides(predict, [self.mu_0, self.mu_1, self.share], cases, patch.contact_radius())
         return SpeedModel(*found.tolist())
 
-    def told(self) -> dict[str, float]:
+    def fitted_values(self) -> dict[str, float]:
         """What was fitted."""
         return {"mu": self.mu_0, "mu per m/s": self.mu_1, "lever/radius": self.share}
 
@@ -176,10 +176,10 @@ class TossModel:
         best = minimize(misfit, np.zeros(len(BEGIN) + 2), method="L-BFGS-B", options={"maxiter": STEPS}).x
         return dataclasses.replace(self, spreads=(*(BEGIN * np.exp(best[:-2])), *best[-2:]))
 
-    def told(self) -> dict[str, float]:
+    def fitted_values(self) -> dict[str, float]:
         """What was fitted."""
         a, c, b, a_0, b_0 = self.spreads[4:]
-        common = self.common.told()
+        common = self.common.fitted_values()
         common["mu"], common["mu per m/s"] = common["mu"] * np.exp(a_0), common["mu per m/s"] * np.exp(a_0)
         common["lever/radius"] *= np.exp(b_0)
         return common | {"spread of mu": a, "of the centre [mm]": 1e3 * c, "of the lever": b}

@@ -21,7 +21,7 @@ from planarfriction.experiments.beyond import (
 )
 from planarfriction.experiments.beyond import shapes as new_shapes
 from planarfriction.experiments.beyond.ladder_figure import draw_ladder
-from planarfriction.experiments.beyond.told import told
+from planarfriction.experiments.beyond.template_values import template_values
 from planarfriction.experiments.experiment import Arrays, Result, Work
 from planarfriction.experiments.in_hand.figures import end_shifts
 from planarfriction.experiments.runs import IN_WORDS, SIX_SHAPES
@@ -84,7 +84,7 @@ def run(work: Work) -> Result:
         "spin-up": of("spin-up"),
         "new shapes": {name: new_shapes.ratios(each) for name, each in unseen.items()},
     }
-    return fill("beyond", **told(numbers)).result(
+    return fill("beyond", **template_values(numbers)).result(
         _figures(rows, errors, stairs, numbers),
         comparisons=[
             *surfaces.comparisons(errors, stairs),

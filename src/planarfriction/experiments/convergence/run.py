@@ -11,7 +11,13 @@ from planarfriction.experiments import facts
 from planarfriction.experiments.convergence import figures, runs
 from planarfriction.experiments.convergence.figures import QUANTITIES
 from planarfriction.experiments.convergence.runs import Case, Errors
-from planarfriction.experiments.convergence.told import RADIUS, base_radius_error, key, radius_errors, told
+from planarfriction.experiments.convergence.template_values import (
+    RADIUS,
+    base_radius_error,
+    key,
+    radius_errors,
+    template_values,
+)
 from planarfriction.experiments.experiment import (
     Comparison,
     Result,
@@ -57,7 +63,7 @@ def run(work: Work) -> Result:
     mask, cut = radius_errors(counts)
     slopes = {family: {key(case): _slopes(counts, errors[case][family]) for case in cases} for family in runs.FAMILIES}
     comparisons = [*_profile_comparisons(), *_comparisons(counts, errors, work), *_euler_comparisons(counts, euler)]
-    return fill("convergence", **told(counts, errors, slopes, comparisons)).result(
+    return fill("convergence", **template_values(counts, errors, slopes, comparisons)).result(
         _figures(counts, errors, mask, cut),
         comparisons=[*comparisons, _cut_radius_comparison(counts)],
         numbers={

@@ -48,7 +48,7 @@ def run(work: Work) -> Result:
     if simulators_drake.installed():
         found["drake"] = simulators_drake.run(work)
         versions["drake"] = simulators_drake.version()
-    return fill("simulators", **words.told(found, versions)).result(
+    return fill("simulators", **words.template_values(found, versions)).result(
         {"simulators": overview(found, words.OWN)},
         comparisons=words.comparisons(found),
         numbers={"versions": versions, **found},

@@ -145,7 +145,7 @@ def _end(values: Mapping[str, float]) -> str:
     return f"{1e3 * values['y']:+.1f} mm, {np.degrees(values['theta']):+.1f} deg"
 
 
-def told(found: Mapping[str, Any], versions: Mapping[str, str]) -> dict[str, Any]:
+def template_values(found: Mapping[str, Any], versions: Mapping[str, str]) -> dict[str, Any]:
     """What the template names."""
 
     def worst(kind: str, way: str, *keys: str) -> float:

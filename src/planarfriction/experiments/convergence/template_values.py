@@ -37,7 +37,7 @@ def base_radius_error() -> float:
     return float(runs.patch("Circle", runs.BASE_CELLS).contact_radius()) * 1.5 / RADIUS - 1.0
 
 
-def told(
+def template_values(
     counts: Sequence[int], errors: Mapping[Case, Errors], slopes: Slopes, comparisons: Sequence[Comparison]
 ) -> dict[str, Any]:
     """What the template names."""

@@ -16,7 +16,7 @@ from planarfriction.experiments.runs import IN_WORDS
 Numbers = dict[str, Any]
 
 
-def told(numbers: Numbers) -> Numbers:
+def template_values(numbers: Numbers) -> Numbers:
     """The names by question."""
     surfaces, ends, grooves = (numbers[name] for name in ("surfaces", "in hand", "grooves"))
     few = [each for each in ends.values() if "degree 5" in each]
