@@ -45,7 +45,12 @@ class MapView:
         plot.grid.visible = False
         shades = LinearColorMapper(palette=Cividis256, low=0.0, high=1.0, nan_color="#FFFFFF00")
         plot.image("image", "x", "y", "dw", "dh", source=self._sources["map"], color_mapper=shades, alpha=0.85)
-        for name, colour, width, size in (("slip", "#444444", 1, 6), ("wrench", {"field": "colour"}, "width", 13)):
+        arrows = (  # those of slip with a pale rim, so that they show on dark cells too
+            ("slip", "#FFFFFF", 3, 10),
+            ("slip", "#333333", 1, 6),
+            ("wrench", {"field": "colour"}, "width", 13),
+        )
+        for name, colour, width, size in arrows:
             source = self._sources[name]
             plot.segment("x0", "y0", "x1", "y1", source=source, color=colour, line_width=width)
             plot.scatter("x1", "y1", angle="angle", marker="triangle", size=size, source=source, color=colour)

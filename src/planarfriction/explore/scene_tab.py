@@ -19,7 +19,7 @@ _WORDS = (
     "Paths in a file start from the folder in which the explorer was started."
 )
 
-_FRAME = "width:100%;max-width:790px;aspect-ratio:790/560;border:0"
+_FRAME = "width:100%;max-width:790px;aspect-ratio:790/560;min-height:350px;border:0"
 
 
 class SceneTab:
