@@ -42,7 +42,7 @@ class _Holding:
 def slopes_by_load(numbers: Callable[[np.ndarray], np.ndarray], loads: np.ndarray, middle: np.ndarray) -> np.ndarray:
     """Central differences of numbers, `middle` `[L, M]` at loads > 0 `[L]`, one-sided beside those of another kind.
 
-    The kind shows in the zeros of the last two numbers: contacts that shrink to a point, and parts that lose their load.
+    The kind shows in the zeros of the last two numbers: contacts that shrink to a point, parts without load.
     """
     sides = []
     for place in (loads * (1.0 - STEP), loads * (1.0 + STEP)):
