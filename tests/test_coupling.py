@@ -395,7 +395,7 @@ class _Uncompiled(pf.models.FrictionModel):
     [
         (MODELS["reduced"], "models must be a list of friction models, one for each patch"),
         ([], "models must hold at least one, got none"),
-        (["reduced"], "models must be friction models, one for each patch, got reduced"),
+        (["reduced"], "models must be friction models, one for each patch, got 'reduced'"),
         ([_Uncompiled(DISC, LAW)], r"model must have compiled steps \(it has no step_function\)"),
     ],
 )

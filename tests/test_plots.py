@@ -457,7 +457,7 @@ def test_zero_is_shown_in_the_usual_unit():
     [
         (lambda: plots.plot_motion(5), "solution must be a Solution, got 5"),
         (lambda: plots.plot_solution(None), "solution must be a Solution, got None"),
-        (lambda: plots.plot_histories("run"), "solutions must be a Solution or a table of them by name, got run"),
+        (lambda: plots.plot_histories("run"), "solutions must be a Solution or a table of them by name, got 'run'"),
         (lambda: plots.plot_histories({"run": 5}), "solutions must be Solutions, under 'run' too, got 5"),
         (lambda: plots.plot_histories({}), "solutions must hold at least one Solution"),
         (lambda: plots.plot_patch(5), "patch must be a ContactPatch, got 5"),
@@ -465,7 +465,7 @@ def test_zero_is_shown_in_the_usual_unit():
         (lambda: plots.plot_limit_surface(5), "surface must be a limit surface, got 5"),
         (
             lambda: plots.plot_limit_surface(pf.LimitSurfaceEllipsoid(pf.ContactPatch.disc(0.01)), beside="me"),
-            'beside must be a limit surface, "ellipsoid" or None, got me',
+            "beside must be a limit surface, \"ellipsoid\" or None, got 'me'",
         ),
     ],
 )
