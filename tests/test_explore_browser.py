@@ -117,7 +117,7 @@ class Visitor:
         """The whole ladder once `act` has changed it."""
         act()
         for _ in range(600):
-            whole = self.page.locator("#ladder tr").count() == 6 and "Of the patch" in self.status()
+            whole = self.page.locator("#ladder tr").count() == 6 and "For the patch" in self.status()
             if whole and self.ladder() != before:
                 return self.ladder()
             self.page.wait_for_timeout(200)
