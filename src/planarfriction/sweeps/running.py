@@ -348,15 +348,15 @@ class Sweeping:
     def _take(self, done: list[Future], pending: dict[Future, _Job]) -> None:
         for future in done:
             job = pending.pop(future)
-            try:
-                record = future.result()
-            except (BrokenExecutor, CancelledError) as error:
+            # Asked for, not raised: a Ctrl-C that this process hears here goes on its way.
+            error = CancelledError() if future.cancelled() else future.exception()
+            if isinstance(error, (BrokenExecutor, CancelledError)):
                 self._ended = _ENDED.format(reason_of(error))
                 continue
-            except KeyboardInterrupt:  # in a process that heard Ctrl-C too: this run is not done
+            if isinstance(error, KeyboardInterrupt):  # in a process that heard Ctrl-C too: this run is not done
                 continue
-            except Exception as error:  # of an executor that lost the run, or could not send it
-                record = Record(FAILED, reason_of(error), {})
+            # an error here is one of an executor that lost the run, or could not send it
+            record = future.result() if error is None else Record(FAILED, reason_of(error), {})
             self._keep(job.index, job.digest, record, job.scene)
         if self._ended:
             raise SweepError(self._ended)
