@@ -6,6 +6,7 @@ import os
 import signal
 import time
 import warnings
+from concurrent.futures import Future
 from pathlib import Path
 
 import numpy as np
@@ -117,6 +118,24 @@ def test_ctrl_c_keeps_what_is_in_the_store(zarr, tmp_path):
     done = int((stop.value.data.status == "success").sum())
     assert 2 <= done < 40 and int(stop.value.data.y.notnull().sum()) == done
     assert int((stop.value.data.status == "missing").sum()) == 40 - done
+
+
+def test_a_ctrl_c_while_a_result_is_collected_ends_the_sweep(monkeypatch, tmp_path):
+    asked: list[Future] = []
+
+    def pressed(ask):
+        def answer(future, timeout=None):
+            asked.append(future)
+            if len(asked) == 3:
+                raise KeyboardInterrupt
+            return ask(future, timeout)
+
+        return answer
+
+    for name in ("result", "exception"):
+        monkeypatch.setattr(Future, name, pressed(getattr(Future, name)))
+    with pytest.raises(SweepInterrupted):
+        pf.sweep(grip, VALUES, out=tmp_path, measure=end)
 
 
 def test_without_zarr_the_extra_is_named(tmp_path, monkeypatch):

@@ -348,14 +348,14 @@ class Sweeping:
     def _take(self, done: list[Future], pending: dict[Future, _Job]) -> None:
         for future in done:
             job = pending.pop(future)
-            # Asked for, not raised: a Ctrl-C that this process hears here goes on its way.
+            # `exception` returns the worker's error, so that a KeyboardInterrupt raised here is this process's own.
             error = CancelledError() if future.cancelled() else future.exception()
             if isinstance(error, (BrokenExecutor, CancelledError)):
                 self._ended = _ENDED.format(reason_of(error))
                 continue
             if isinstance(error, KeyboardInterrupt):  # in a process that heard Ctrl-C too: this run is not done
                 continue
-            # an error here is one of an executor that lost the run, or could not send it
+            # any other error means that the executor lost the run, or could not send it
             record = future.result() if error is None else Record(FAILED, reason_of(error), {})
             self._keep(job.index, job.digest, record, job.scene)
         if self._ended:
