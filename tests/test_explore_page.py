@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 import re
+import signal
 import threading
 import warnings
 from typing import Any
@@ -183,6 +184,12 @@ def test_the_server_listens_to_this_computer_alone_and_a_taken_port_is_one_line(
         server.stop()
     with pytest.raises(InvalidValueError, match="port"):
         open_server(70000)
+
+
+def test_a_server_leaves_ctrl_c_as_it_was():
+    heard = signal.getsignal(signal.SIGINT)
+    open_server(0).stop()
+    assert signal.getsignal(signal.SIGINT) is heard
 
 
 def test_pages_of_other_sites_are_not_let_in():

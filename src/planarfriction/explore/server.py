@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+import threading
 from collections.abc import Callable
 from typing import Any
 
@@ -53,6 +55,7 @@ def open_server(port: int) -> Any:
     from planarfriction.explore.page import Page
 
     panel.extension("plotly", raw_css=[looks.PAGE])
+    heard = signal.getsignal(signal.SIGINT)
     try:
         # No websocket_origin: pages of other sites, which a browser has open beside this one, are refused.
         return panel.serve(
@@ -68,3 +71,6 @@ def open_server(port: int) -> Any:
         if port == 0:
             raise FrictionError(f"no port can be opened: {error.strerror}") from None
         raise InvalidValueError("port", f"be free ({error.strerror})", port) from None
+    finally:  # Panel takes Ctrl-C for its server, for the rest of the process
+        if heard is not None and threading.current_thread() is threading.main_thread():
+            signal.signal(signal.SIGINT, heard)
