@@ -10,12 +10,12 @@ from scipy.linalg import block_diag
 from scipy.optimize import fsolve
 
 import planarfriction as pf
-from coupling_problems import random_bodies, random_patches, random_run
 from planarfriction.coupling import CoupledPatches, CoupledStep, HostStep
 from planarfriction.kernels import jit
 from planarfriction.kernels.pointers import address_of, call, place_of
 from planarfriction.kernels.step_slopes import NUMBERS, WORDS
 from planarfriction.patch import grain
+from tests.support.coupling_problems import random_bodies, random_patches, random_run
 
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
 PLAIN = pf.LuGre()

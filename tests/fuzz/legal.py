@@ -23,14 +23,14 @@ SQUARE = [(-0.01, -0.01), (0.01, -0.01), (0.01, 0.01), (-0.01, 0.01)]
 
 SKIPPED = {
     "warm_up": "compiles for minutes",
-    "plots.animate_solution": "draws for seconds; tests/test_animation.py attacks it",
+    "plots.animate_solution": "draws for seconds; tests/plots/test_animation.py attacks it",
     "plots.interactive_limit_surface": "needs plotly; checks what plot_limit_surface checks",
-    "Solution.animate": "draws for seconds; tests/test_animation.py attacks it",
+    "Solution.animate": "draws for seconds; tests/plots/test_animation.py attacks it",
     "solvers.integrate": "is called by `simulate` alone, which checks",
     "FrictionError": "an error",
     "identify.identify_motion": "fits for seconds; its logs are attacked as files",
-    "planning.plan_grip": "plans for a second; tests/test_grip_planning.py attacks it",
-    "planning.plan_push": "plans for seconds; tests/test_pushing.py attacks it",
+    "planning.plan_grip": "plans for a second; tests/planning/test_grip.py attacks it",
+    "planning.plan_push": "plans for seconds; tests/planning/test_pushing.py attacks it",
     "identify.identify_lugre": "fits for seconds; its logs are attacked as files",
     "identify.known_so_far": "takes what a fit returns",
 }

@@ -1,7 +1,7 @@
 """Many free slides at once under dry friction: a few thousand slides in the time of one by one simulations of fifty.
 
-Bristles are left out: friction is a function of the twist alone, as in steady sliding. `tests/test_measured.py` holds
-its ends against those of `simulate`.
+Bristles are left out: friction is a function of the twist alone, as in steady sliding. `tests/studies/test_measured.py`
+holds its ends against those of `simulate`.
 """
 
 from __future__ import annotations

@@ -1,0 +1,63 @@
+"""`planarfriction identify`: estimates on stdout, files in the folder, one line for what is wrong."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from planarfriction.cli import main
+from planarfriction.cli.output import write_csv
+from planarfriction.identify.logs import columns_of
+from tests.support.identification_logs import clean_log, excitation, noisy
+
+FAST = ["--parameters", "mu_c,contact_radius", "--starts", "1"]
+START = [f"--start={name}={value}" for name, value in {"mu_s": 0.65, "v_s": 2e-3, "gamma": 1.4, "sigma_0": 2e4, "sigma_1": 30, "sigma_2": 0.8}.items()]  # fmt: skip  # noqa: E501
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory):
+    path = tmp_path_factory.mktemp("logs") / "slow run.csv"
+    write_csv(path, columns_of(noisy(clean_log(*excitation(duration=0.5)), 1)))
+    return path
+
+
+def test_estimates_json_and_picture(path, tmp_path, capsys):
+    out = tmp_path / "new" / "folder"
+    assert main(["identify", str(path), "--patch", "disc", *FAST, *START, "--out", str(out)]) == 0
+    captured = capsys.readouterr()
+    assert "contact_radius" in captured.out and "slow run: 500 samples, disc" in captured.out
+    assert captured.err.count("wrote") == 2
+    data = json.loads((out / "slow-run-identification.json").read_text())
+    assert data["parameters"]["mu_c"]["estimate"] == pytest.approx(0.5, abs=0.01)
+    assert (out / "slow-run-residuals.png").read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        (["none.csv"], "no such file"),
+        ([], "LOG"),
+        (["LOG", "--patch", "disk"], "disc"),
+        (["LOG", "--parameters", "mu_c,v"], "parameters"),
+        (["LOG", "--start", "mu_c"], "NAME=VALUE"),
+        (["LOG", "--start", "mu_c=much"], "number"),
+        (["LOG", "--noise", "1,2"], "noise"),
+        (["LOG", "--starts", "0"], "starts"),
+        (["LOG", "--out", "LOG"], "folder"),
+    ],
+)
+def test_what_is_wrong_is_one_line(path, capsys, options, words):
+    assert main(["identify", *(str(path) if option == "LOG" else option for option in options)]) == 2
+    message = capsys.readouterr().err
+    assert message.startswith("error: ") and message.count("\n") == 1 and words in message, message
+
+
+def test_a_bad_line_is_named(path, tmp_path, capsys):
+    lines = path.read_text().splitlines()
+    lines[7] = lines[7].replace(",", ",x", 1)
+    bad = tmp_path / "bad.csv"
+    bad.write_text("\n".join(lines))
+    assert main(["identify", str(bad)]) == 2
+    message = capsys.readouterr().err
+    assert "line 8, column 'vx'" in message and message.count("\n") == 1

@@ -1,0 +1,189 @@
+"""The floors of the package: imports only go down, and the import of the package is light.
+
+The floors are those of the import-linter contract in pyproject.toml, read here so that the tests need no extra package.
+"""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = ROOT / "src" / "planarfriction"
+HEAVY = (
+    "PIL",
+    "click",
+    "jax",
+    "jinja2",
+    "llvmlite",
+    "matplotlib",
+    "mujoco",
+    "numba",
+    "pandas",
+    "pydrake",
+    "rich",
+    "scipy",
+    "shapely",
+    "torch",
+    "xarray",
+)
+"""Packages that `import planarfriction` must not load."""
+
+HOMES = {
+    "numba": "kernels",
+    "llvmlite": "kernels",
+    "matplotlib": "plots",
+    "rich": "cli",
+    "click": "cli",
+    "torch": "torch",
+    "mujoco": "adapters",
+    "pydrake": "adapters",
+    "jax": "jax",
+}
+"""Package -> the floor whose modules may import it when they load; no floor may load the rest of HEAVY that way."""
+
+SIMULATORS = {"planarfriction.adapters.mjx": "jax"}
+"""Adapters of simulators that calculate with a package which has a floor of its own."""
+
+
+def _contract() -> dict:
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    return settings["tool"]["importlinter"]["contracts"][0]
+
+
+def _floors() -> dict[str, int]:
+    """Module right below the package -> its floor, 0 at the bottom; modules on one floor do not see each other."""
+    names = [[name.strip(" ()") for name in floor.split("|")] for floor in reversed(_contract()["layers"])]
+    return {name: height for height, floor in enumerate(names) for name in floor}
+
+
+def _module_name(file: Path) -> str:
+    parts = file.relative_to(PACKAGE.parent).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+
+
+def _imports(tree: ast.AST, nested: bool) -> Iterator[str]:
+    """Dotted names that the code imports, `from a import b` as `a.b`; imports for type checkers do not count.
+
+    With `nested`, the imports inside functions too; without, only those that run when the module loads.
+    """
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.If) and "TYPE_CHECKING" in ast.dump(node.test):
+            continue
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "imports are absolute"
+            yield from (f"{node.module}.{alias.name}" for alias in node.names)
+        elif nested or not isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)):
+            yield from _imports(node, nested)
+
+
+def _sources() -> list[tuple[str, ast.AST]]:
+    return [(_module_name(file), ast.parse(file.read_text(encoding="utf-8"))) for file in sorted(PACKAGE.rglob("*.py"))]
+
+
+def _upward_imports(sources: list[tuple[str, ast.AST]]) -> list[str]:
+    floors = _floors()
+    allowed = [tuple(pair.split(" -> ")) for pair in _contract()["ignore_imports"]]
+    found = []
+    for module, tree in sources:
+        if module == "planarfriction":
+            continue
+        own = module.split(".")[1]
+        for target in _imports(tree, nested=True):
+            parts = target.split(".")
+            if parts[0] != "planarfriction" or len(parts) == 1 or parts[1] in (own, "__version__"):
+                continue
+            permitted = any(module == source and f"{target}.".startswith(f"{goal}.") for source, goal in allowed)
+            if floors[parts[1]] >= floors[own] and not permitted:
+                found.append(f"{module} -> {target}")
+    return found
+
+
+def test_every_module_has_a_floor():
+    floors = _floors()
+    for module, _ in _sources():
+        if module != "planarfriction":
+            assert module.split(".")[1] in floors, f"{module}: add it to the layers in pyproject.toml"
+
+
+def test_imports_only_go_down():
+    assert _upward_imports(_sources()) == []
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        "from planarfriction.scenes import Scene",
+        "import planarfriction.scenes.solution",
+        "from planarfriction import scenes",
+        "def later():\n    from planarfriction.plots import plot_patch",
+    ],
+)
+def test_an_import_that_goes_up_is_found(line):
+    # The checker itself can fail: each of these lines in a model would be reported.
+    assert len(_upward_imports([("planarfriction.models.new", ast.parse(line))])) == 1
+
+
+def test_the_allowed_looks_upward_still_exist():
+    sources = dict(_sources())
+    for pair in _contract()["ignore_imports"]:
+        source, goal = pair.split(" -> ")
+        assert any(f"{target}.".startswith(f"{goal}.") for target in _imports(sources[source], nested=True)), pair
+
+
+def test_heavy_packages_load_only_where_they_live():
+    for module, tree in _sources():
+        floor = module.removeprefix("planarfriction").strip(".").split(".")[0]
+        for target in _imports(tree, nested=False):
+            package = target.split(".")[0]
+            adapted = any(module.startswith(name) and package == its for name, its in SIMULATORS.items())
+            if package in HEAVY and not adapted:
+                assert HOMES.get(package) == floor, f"{module} imports {target} when it loads"
+
+
+def test_numba_stays_in_the_kernels():
+    for module, tree in _sources():
+        for target in _imports(tree, nested=True):
+            assert target.split(".")[0] != "numba" or module.split(".")[1] == "kernels", f"{module} imports {target}"
+
+
+def _loaded_after(code: str) -> set[str]:
+    program = f"import sys\n{code}\nprint(*sorted(sys.modules))"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=120)
+    return {name.split(".")[0] for name in done.stdout.split()}
+
+
+def test_import_of_the_package_is_light():
+    assert not _loaded_after("import planarfriction") & set(HEAVY)
+
+
+def test_describing_a_patch_and_a_scene_loads_no_heavy_package():
+    code = "pf.ContactPatch.rectangle(0.02)\npf.LuGre()\npf.Signal.constant(1.0)\npf.Body(1.0, 1.0)"
+    assert not _loaded_after(f"import planarfriction as pf\n{code}") & set(HEAVY)
+
+
+def test_the_help_of_the_command_line_loads_no_numerics():
+    code = "import contextlib, io\nwith contextlib.redirect_stdout(io.StringIO()):\n    main(['--help'])"
+    loaded = _loaded_after(f"from planarfriction.cli import main\n{code}")
+    assert not loaded & (set(HEAVY) - {"click"})
+
+
+def test_a_run_that_writes_nothing_loads_no_datasets_and_no_pictures():
+    # half a second of three; SciPy comes with Numba
+    code = "import contextlib, io\nwith contextlib.redirect_stdout(io.StringIO()):\n    main(['run', 'in-hand'])"
+    loaded = _loaded_after(f"from planarfriction.cli import main\n{code}")
+    assert "numba" in loaded
+    assert not loaded & {"PIL", "matplotlib", "pandas", "shapely", "xarray"}
+
+
+def test_files_stay_short():
+    for file in PACKAGE.rglob("*.py"):
+        assert len(file.read_text(encoding="utf-8").splitlines()) <= 400, f"{file.name} is two things"

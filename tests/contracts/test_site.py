@@ -1,0 +1,109 @@
+"""The site of the documentation builds without a warning: links, names, terms, docstrings, and every gallery script."""
+
+from __future__ import annotations
+
+import importlib.util
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+NEEDED = ("sphinx", "myst_parser", "sphinx_gallery", "sphinx_click", "sphinx_copybutton", "furo")
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not (ROOT / "docs" / "conf.py").exists(), reason="no docs beside these tests"),
+    pytest.mark.skipif(any(importlib.util.find_spec(name) is None for name in NEEDED), reason="needs the extra [docs]"),
+]
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The built site of a copy of the sources, so that what is generated does not land among them."""
+    copy = tmp_path_factory.mktemp("copy")
+    generated = (
+        shutil.ignore_patterns("api", "gallery", "notebooks") if not (ROOT / "docs" / "gallery").exists() else None
+    )
+    shutil.copytree(ROOT / "docs", copy / "docs", ignore=generated)
+    shutil.copytree(ROOT / "examples", copy / "examples", ignore=shutil.ignore_patterns("__pycache__"))
+    for name in ("CONTRIBUTING.md", "CHANGELOG.md", "README.md"):
+        shutil.copy(ROOT / name, copy)
+    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-n", "-q", "docs", "site"]
+    path = os.pathsep.join([str(ROOT / "src"), *filter(None, [os.environ.get("PYTHONPATH")])])
+    done = subprocess.run(
+        command, cwd=copy, env=os.environ | {"PYTHONPATH": path}, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    return copy / "site"
+
+
+def test_equations_names_and_terms_are_links(site):
+    physics = (site / "physics.html").read_text(encoding="utf-8")
+    assert "<math" in physics and "$$" not in physics
+    assert 'href="api/formulas.html#planarfriction.formulas.stribeck"' in physics
+    exact = (site / "exact-surfaces.html").read_text(encoding="utf-8")
+    assert 'href="api/kernels.html#planarfriction.kernels.exact.disc_sum"' in exact
+    assert 'href="glossary.html#term-limit-surface"' in physics
+
+
+def test_every_formula_and_loop_that_a_page_names_is_a_link(site):
+    named = r'(<a [^>]*>)?<code[^>]*><span class="pre">((?:formulas|kernels)\.(?!py<)[\w.]+)</span></code>'
+    found = 0
+    for page in site.glob("*.html"):
+        for link, name in re.findall(named, page.read_text(encoding="utf-8")):
+            assert link, f"{page.name}: {name}"
+            found += 1
+    assert found > 50
+
+
+def test_terms_are_links_where_a_page_uses_them_first(site):
+    terms = re.findall(r'<dt id="term-([\w-]+)"', (site / "glossary.html").read_text(encoding="utf-8"))
+    assert len(terms) > 20
+    found = 0
+    for page in (*site.glob("*.html"), *site.glob("gallery/*/*.html"), *site.glob("notebooks/*.html")):
+        name = page.relative_to(site).as_posix()
+        if name.startswith(("glossary", "changelog", "cli", "genindex", "search", "py-modindex", "notebooks/index")):
+            continue
+        _, _, article = page.read_text(encoding="utf-8").partition("<article")
+        article = article.partition("</article>")[0]
+        linked = set(re.findall(r'glossary\.html#term-([\w-]+)"', article))
+        plain = re.sub(
+            r"<(a|code|pre|math|h\d|thead|figcaption|script|style)\b.*?</\1>|<[^>]*>", " | ", article, flags=re.S
+        )
+        used = {term for term in terms if re.search(rf"(?<![\w-]){term.replace('-', ' ')}s?(?![\w-])", plain)}
+        assert used <= linked, f"{name}: {sorted(used - linked)}"
+        found += len(linked)
+    assert found > 200
+
+
+def test_every_public_name_is_in_the_reference(site):
+    import planarfriction
+
+    pages = "".join(page.read_text(encoding="utf-8") for page in (site / "api").glob("*.html"))
+    missing = [name for name in planarfriction._HOME if f'id="planarfriction.{name}"' not in pages]
+    missing += [name for name in planarfriction._MODULES if f'id="module-planarfriction.{name}"' not in pages]
+    assert not missing
+
+
+def test_the_gallery_has_a_picture_for_each_script(site):
+    scripts = list((ROOT / "examples" / "gallery").rglob("plot_*.py"))
+    assert len(scripts) >= 30
+    for path in scripts:
+        needs = {"torch": "torch", "jax": "jax", "mujoco": "mujoco", "interactive": "plotly"}.get(
+            path.stem.split("_")[-1]
+        )
+        if needs is None or importlib.util.find_spec(needs):
+            page = (site / "gallery" / path.parent.name / f"{path.stem}.html").read_text(encoding="utf-8")
+            assert f"sphx_glr_{path.stem}_001.png" in page, path.name
+
+
+def test_a_figure_that_turns_brings_its_code(site):
+    pytest.importorskip("plotly")
+    folder = site / "gallery" / "limit_surfaces"
+    (code,) = re.findall(r'<script src="([^"]*plotly[^"]*)">', (folder / "plot_26_interactive.html").read_text("utf-8"))
+    assert (folder / code).resolve().is_file()

@@ -1,0 +1,37 @@
+"""The example of the page on sweeps: what holds and what does not, by the limit surface, and its picture."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+SCRIPT = Path(__file__).parents[2] / "examples" / "sweep_grip.py"
+
+pytestmark = pytest.mark.skipif(not SCRIPT.exists(), reason="no examples beside these tests")
+
+
+@pytest.fixture(scope="module")
+def example():
+    specification = importlib.util.spec_from_file_location(SCRIPT.stem, SCRIPT)
+    module = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(module)
+    return module
+
+
+def test_the_limit_surface_says_what_holds(example):
+    """With a tenth less grip than it takes the plate turns; with a fifth more it holds, though let go all at once."""
+    limit = float(example.holding_grip(np.array(example.RATIO)))
+    for grip, holds in ((0.9 * limit, False), (1.2 * limit, True)):
+        angle = example.end(example.pf.simulate(example.plate(grip, 1.0)))["angle"]
+        assert (abs(angle) < example.HELD) == holds
+
+
+def test_it_sweeps_draws_and_goes_on(example, tmp_path, capsys):
+    for found in ("", "(4 found)"):
+        example.main(["--out", str(tmp_path), "--points", "2"])
+        printed = capsys.readouterr().out
+        assert "of 4 runs\n" in printed and found in printed
+    assert (tmp_path / "sweep_grip.png").stat().st_size > 10_000

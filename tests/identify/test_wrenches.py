@@ -1,0 +1,323 @@
+"""Identification from logs of twist and wrench: what went in comes out, errors are honest, gaps are named."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+import planarfriction as pf
+from planarfriction.errors import FileError, InvalidValueError
+from planarfriction.identify import Log, differentiated, identify_lugre
+from planarfriction.identify.least_squares import covariance
+from planarfriction.identify.logs import columns_of
+from planarfriction.identify.parameters import Coordinates, soft_finger_moments
+from planarfriction.identify.verdicts import speed_gap
+from tests.support.identification_logs import LAW, LOAD, PATCH, clean_log, excitation, noisy, truth
+
+
+@pytest.fixture(scope="module")
+def log():
+    """Every parameter moves this log far above 1 % of noise."""
+    return clean_log(*excitation(duration=1.0))
+
+
+def identify(log, patch=PATCH, **options):
+    """Of the model that the logs were made with, without anything that a rig adds."""
+    return identify_lugre(log, patch, **{"model": "reduced-published", "nuisance": (), **options})
+
+
+def z_scores(log, seeds):
+    """Errors over standard errors, `[seeds, F]`."""
+    expected = truth()
+    rows = []
+    for seed in seeds:
+        found = identify(noisy(log, seed), PATCH, starts=1)
+        assert all(found.identifiable(name) for name in found.names)
+        rows.append([(value - expected[name]) / found.errors[name] for name, value in found.estimates.items()])
+    return np.array(rows)
+
+
+# ------------------------------------------------------------------------------------------------ closed forms
+
+
+def test_covariance_of_a_line():
+    """y = a + b x with unit noise: variances 1/n and 1/sum(x^2) for x about its mean."""
+    x = np.linspace(-1.0, 1.0, 11)
+    spread = covariance(np.column_stack([np.ones(11), x]), np.array([True, True]))
+    assert spread == pytest.approx(np.diag([1 / 11, 1 / (x**2).sum()]), abs=1e-15)
+
+
+def test_covariance_of_what_is_not_seen():
+    """A column of zeros has no finite variance; two equal columns are told only together."""
+    x = np.linspace(-1.0, 1.0, 11)
+    spread = covariance(np.column_stack([x, np.zeros(11)]), np.array([True, True]))
+    assert spread[0, 0] == pytest.approx(1 / (x**2).sum())
+    assert np.isinf(spread[1, 1])
+    assert np.diag(covariance(np.column_stack([x, x]), np.array([True, True]))).min() > 1e15
+
+
+@pytest.mark.parametrize(("k", "radius", "second"), [(1.0, 1 / 2, 3 / 10), (2.0, 3 * np.pi / 16, 2 / 5)])
+def test_soft_finger_moments_in_closed_form(k, radius, second):
+    """A cone: <s> = 1/2, <s^2> = 3/10; Hertz: 3 pi/16 and 2/5, times R and R^2 with R = c f^n."""
+    finger = pf.SoftFinger(c=0.006, n=0.3, k=k)
+    (r, r_slopes), (m, m_slopes) = soft_finger_moments(finger, 3.0, {})
+    size = 0.006 * 3.0**0.3
+    assert (r, m) == pytest.approx((radius * size, second * size**2), rel=1e-12)
+    for name in ("c", "n", "k"):
+        value, change = getattr(finger, name), 1e-6 * getattr(finger, name)
+        high, low = (soft_finger_moments(finger, 3.0, {name: value + s * change}) for s in (1.0, -1.0))
+        assert r_slopes[name] == pytest.approx((high[0][0] - low[0][0]) / (2 * change), rel=1e-7)  # differences
+        assert m_slopes[name] == pytest.approx((high[1][0] - low[1][0]) / (2 * change), rel=1e-7)
+
+
+def test_coordinates_and_back():
+    names = ("mu_s", "sigma_1", "mu_c", "v_s", "centre_x")
+    values = np.array([0.7, 3.0, 0.5, 2e-3, 0.0])
+    coordinates = Coordinates(names, values, 1.0)
+    x = coordinates.of(values)
+    assert coordinates.values(x) == pytest.approx(values, rel=1e-14)
+    for i in range(len(names)):
+        change = 1e-6 * np.eye(len(names))[i]
+        slope = (coordinates.values(x + change) - coordinates.values(x - change)) / 2e-6
+        assert coordinates.slopes(x)[:, i] == pytest.approx(slope, rel=1e-8, abs=1e-9)
+    low, _ = coordinates.bounds()
+    lowest = coordinates.values(np.maximum(low, -3.0))
+    assert lowest[0] == lowest[2]  # mu_s is never below mu_c
+
+
+def test_differentiated_is_exact_for_parabolas():
+    """Turned into the body's axes: circling at constant speed along its own x axis."""
+    t = np.linspace(0.0, 1.0, 101)
+    pose = np.stack([0.2 * t, 0.5 * t**2, 0.3 * t], -1)
+    twist = differentiated(t, pose)
+    cos, sin = np.cos(0.3 * t), np.sin(0.3 * t)
+    assert twist == pytest.approx(np.stack([0.2 * cos + t * sin, t * cos - 0.2 * sin, 0.3 + 0 * t], -1), abs=1e-12)
+
+
+def test_speed_gaps():
+    speeds = np.concatenate([np.geomspace(1e-5, 1e-4, 50), np.geomspace(5e-3, 0.1, 50)])
+    assert speed_gap(speeds, 1e-3) == "no sample between 0.1 and 5 mm/s"
+    assert speed_gap(speeds, 0.02) == ""
+    assert speed_gap(speeds, 1.0) == "no sample above 1e+02 mm/s"
+    assert "no sample below 22 and above 98" in speed_gap(np.linspace(0.02, 0.1, 50), 1e-3)
+
+
+# ------------------------------------------------------------------------------------------------ what comes out
+
+
+def test_what_went_in_comes_out(log):
+    """Without noise: what is left is the two steps a sample in place of thirty-two, 1e-4 of the wrench."""
+    found = identify(log, PATCH, noise=1e-3 * np.abs(log.wrench).max(axis=0))
+    for name, value in truth().items():
+        assert found.estimates[name] == pytest.approx(value, rel=1e-2), name
+    assert all(each.identifiable for each in found.verdicts)
+    assert found.starts[0] == found.starts[1] == 4
+    assert found.model.surface.contact_radius == pytest.approx(found.estimates["contact_radius"], rel=1e-12)
+    assert found.law.mu_c == found.estimates["mu_c"]
+    assert found.law.elasto_plastic == pf.ElastoPlastic(0.9)
+
+
+def test_errors_are_honest(log):
+    """Ten seeds: 80 z-scores have unit spread within 3/sqrt(2 96), none beyond 4."""
+    z = z_scores(log, range(10))
+    assert abs(np.sqrt(np.mean(z**2)) - 1.0) < 3.0 / np.sqrt(2.0 * z.size)
+    assert np.abs(z).max() < 4.0
+
+
+@pytest.mark.slow
+def test_errors_are_honest_for_a_hundred_seeds():
+    """Every parameter within 3 standard errors for 95 seeds; spread of each within three of its own errors, 0.21."""
+    z = z_scores(clean_log(*excitation()), range(100))
+    assert (np.abs(z) < 3.0).all(axis=1).sum() >= 95
+    assert np.abs(np.sqrt(np.mean((z - z.mean(axis=0)) ** 2, axis=0)) - 1.0).max() < 0.21
+
+
+def test_noise_is_estimated_from_the_residuals(log):
+    found = identify(noisy(log, 3), PATCH, starts=1)
+    spread = 0.01 * np.sqrt(np.mean(log.wrench**2, axis=0))
+    assert found.noise == pytest.approx(spread, rel=4.0 / np.sqrt(2.0 * len(log.time)))  # four of its standard errors
+    assert np.std(np.concatenate(found.residuals)[1:]) == pytest.approx(1.0, rel=0.02)
+
+
+def test_uneven_samples(log):
+    kept = np.sort(np.random.default_rng(0).choice(len(log.time), 700, replace=False))
+    thinned = noisy(log, 5)
+    thinned = Log(thinned.time[kept], thinned.twist[kept], thinned.wrench[kept], LOAD)
+    found = identify(thinned, PATCH, starts=1)
+    assert all(abs(found.estimates[n] - v) < 4.0 * found.errors[n] + 2e-3 * v for n, v in truth().items())
+
+
+def test_stiff_bristles_get_finer_steps():
+    """A bristle that loads within half a sample: two steps a sample put sigma_0 off by 10 %."""
+    stiff = dataclasses.replace(LAW, sigma_0=1e6, sigma_1=800.0)
+    log = noisy(clean_log(*excitation(duration=1.0), law=stiff), 1)
+    options = {"parameters": ("mu_c", "sigma_0", "sigma_1"), "start": stiff, "starts": 1}
+    assert identify(log, PATCH, **options).estimates["sigma_0"] == pytest.approx(1e6, rel=0.02)
+    coarse = identify(log, PATCH, refine=1, **options)
+    assert abs(coarse.estimates["sigma_0"] / 1e6 - 1.0) > 0.04
+    assert any(each.parameter == "fit" for each in coarse.verdicts)
+
+
+def test_soft_finger_constants_from_three_loads():
+    """c and n from logs at three loads; the grid of the patch has the moments of the disc to 2 %."""
+    time, twist = excitation(duration=0.6)
+    patch = pf.ContactPatch.disc(0.012, cells=31, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0))
+    start = dataclasses.replace(LAW)
+    logs = []
+    for load in (1.0, 2.0, 4.0):
+        fixed = pf.ContactPatch(patch.positions, patch.areas, patch.weights(load) / patch.areas)
+        logs.append(noisy(clean_log(time, twist, patch=fixed, load=load, name=f"{load:g} N"), int(load)))
+    guess = pf.ContactPatch.disc(0.012, cells=31, pressure=pf.SoftFinger(c=0.0045, n=0.2, k=2.0))
+    found = identify(logs, guess, parameters=("mu_c", "c", "n"), start=start, starts=1)
+    assert found.estimates["c"] == pytest.approx(0.006, rel=0.02)
+    assert found.estimates["n"] == pytest.approx(1 / 3, abs=0.02)
+    assert found.model.patch.pressure.c == found.estimates["c"]
+    one = identify(logs[0], guess, parameters=("c", "n"), start=start, starts=1)
+    assert not one.identifiable("n")
+    assert "one load only" in one.table()
+
+
+# ------------------------------------------------------------------------------------- what cannot be determined
+
+
+def verdict(found, name):
+    return next((str(each) for each in found.verdicts if each.parameter == name), "")
+
+
+def test_fast_sliding_tells_no_stribeck_curve():
+    time = np.arange(1000) * 1e-3
+    twist = np.stack([0.05 + 0.02 * np.sin(9 * time), 0.02 * np.cos(7 * time), np.sin(5 * time)], -1)
+    found = identify(noisy(clean_log(time, twist), 1), PATCH, begins="steady", starts=1)
+    assert not found.identifiable("v_s") and not found.identifiable("gamma")
+    assert "not identifiable, no sample below 3" in verdict(found, "v_s")
+    assert found.estimates["mu_c"] == pytest.approx(LAW.mu_c, abs=4.0 * found.errors["mu_c"])
+    assert found.estimates["sigma_2"] == pytest.approx(LAW.sigma_2, abs=4.0 * found.errors["sigma_2"])
+
+
+def test_without_spin_the_radius_is_unknown():
+    time, twist = excitation(duration=0.6)
+    twist[:, 2] = 0.0
+    log = clean_log(time, twist)
+    found = identify(noisy(log, 1), PATCH, noise=[0.01, 0.01, 1e-4], starts=1)
+    assert verdict(found, "contact_radius") == "contact_radius: not identifiable, no spin"
+    assert found.identifiable("mu_c")
+    assert "contact_radius: no spin" in found.table()
+
+
+def test_a_contact_that_never_slips_tells_no_friction_coefficient():
+    time, twist = excitation(duration=0.6)
+    found = identify(noisy(clean_log(time, 5e-4 * twist), 1), PATCH, starts=1)
+    for name in ("mu_c", "mu_s", "v_s", "gamma"):
+        assert "never slips" in verdict(found, name)
+    assert found.estimates["sigma_0"] == pytest.approx(LAW.sigma_0, abs=4.0 * found.errors["sigma_0"])
+
+
+def test_absent_terms_are_bounded_from_above():
+    law = dataclasses.replace(LAW, sigma_2=0.0)
+    found = identify(noisy(clean_log(*excitation(duration=0.6), law=law), 2), PATCH, start=LAW, starts=1)
+    low, high = found.intervals()["sigma_2"]
+    assert low == 0.0 < high < 0.2
+    assert "at most" in verdict(found, "sigma_2")
+
+
+# ------------------------------------------------------------------------------------------------ files and input
+
+
+def test_json_and_plot(log, tmp_path):
+    import json
+
+    found = identify(noisy(log, 0), PATCH, parameters=("mu_c", "sigma_0"), start=LAW, starts=1)
+    data = json.loads(json.dumps(found.to_dict(), allow_nan=False))
+    assert data["parameters"]["mu_c"]["estimate"] == found.estimates["mu_c"]
+    assert data["starts"] == {"agreeing": 1, "total": 1}
+    figure = found.plot()
+    figure.savefig(tmp_path / "residuals.png")
+    assert (tmp_path / "residuals.png").read_bytes().startswith(b"\x89PNG")
+    assert len(figure.axes) == 11  # three channels three times, speeds, correlations
+
+
+def write(path, log, **changes):
+    columns = {**columns_of(log), **changes}
+    rows = zip(*columns.values(), strict=True)
+    path.write_text("\n".join([",".join(columns), *(",".join(map(str, row)) for row in rows)]) + "\n")
+    return path
+
+
+def test_log_from_csv_and_back(log, tmp_path):
+    read = Log.from_csv(write(tmp_path / "log.csv", log, note=["x"] * len(log.time)))
+    assert read.name == "log"
+    for name in ("time", "twist", "wrench", "normal_force"):
+        assert np.array_equal(getattr(read, name), getattr(log, name)), name
+
+
+def test_log_of_poses(log, tmp_path):
+    """The twist of a pose file is that of the file it was integrated from: 1e-3 of the largest, half a window apart."""
+    angle = np.concatenate([[0.0], np.cumsum(0.5 * (log.twist[1:, 2] + log.twist[:-1, 2]) * np.diff(log.time))])
+    cos, sin = np.cos(angle), np.sin(angle)
+    world = np.stack([cos * log.twist[:, 0] - sin * log.twist[:, 1], sin * log.twist[:, 0] + cos * log.twist[:, 1]], -1)
+    place = np.vstack([np.zeros(2), np.cumsum(0.5 * (world[1:] + world[:-1]) * np.diff(log.time)[:, None], axis=0)])
+    columns = columns_of(log)
+    kept = {name: columns[name] for name in ("t", "fx", "fy", "tau", "normal_force")}
+    path = tmp_path / "poses.csv"
+    kept |= {"x": place[:, 0], "y": place[:, 1], "theta": angle}
+    path.write_text("\n".join([",".join(kept), *(",".join(map(repr, row)) for row in zip(*(v.tolist() for v in kept.values()), strict=True))]))  # fmt: skip  # noqa: E501
+    read = Log.from_csv(path)
+    assert np.abs(read.twist - log.twist)[5:-5].max() < 5e-3 * np.abs(log.twist).max()
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", ["is empty"]),
+        ("t,vx,vy,omega,fx,fy\n0,0,0,0,0,0\n", ["no column tau, normal_force"]),
+        ("t,vx,vy,omega,fx,fy,tau,normal_force\n0,0,0,0,left,0,0,1\n", ["line 2", "column 'fx'", "'left'"]),
+        ("# made\nt,vx,vy,omega,fx,fy,tau,normal_force\n0,0,0,0,0,0,0\n", ["line 3", "7 columns"]),
+        ("t,vx,vy,omega,fx,fy,tau,normal_force\n0,0,0,nan,0,0,0,1\n", ["line 2", "column 'omega'", "not finite"]),
+        ("t,t,vx,vy,omega,fx,fy,tau,normal_force\n0,0,0,0,0,0,0,0,1\n", ["two columns 't'"]),
+        ("t,vx,vy,omega,fx,fy,tau,normal_force\n0,0,0,0,0,0,0,1\n", ["at least 10 samples"]),
+    ],
+)
+def test_bad_files_name_line_and_column(tmp_path, text, words):
+    path = tmp_path / "bad.csv"
+    path.write_text(text)
+    with pytest.raises(FileError) as error:
+        Log.from_csv(path)
+    assert str(path) in str(error.value)
+    assert all(word in str(error.value) for word in words), str(error.value)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"parameters": ("mu",)}, "mu_c"),
+        ({"parameters": ()}, "at least one"),
+        ({"parameters": ("mu_c", "mu_c")}, "once"),
+        ({"parameters": ("c", "contact_radius")}, "not both"),
+        ({"parameters": ("c",)}, "SoftFinger"),
+        ({"noise": [1.0, 0.0, 1.0]}, "noise must be > 0"),
+        ({"begins": "moving"}, "begins"),
+        ({"starts": 0}, "starts"),
+        ({"start": {"mu": 0.5}}, "start"),
+        ({"surface": "table"}, "surface"),
+    ],
+)
+def test_bad_options_are_named(log, options, words):
+    with pytest.raises(InvalidValueError, match=words):
+        identify(log, PATCH, **options)
+
+
+def test_bad_logs_are_named(log):
+    with pytest.raises(InvalidValueError, match="time of log must increase"):
+        Log(log.time[::-1], log.twist, log.wrench, LOAD)
+    with pytest.raises(InvalidValueError, match="wrench must have shape"):
+        Log(log.time, log.twist, log.wrench[:, :2], LOAD)
+    with pytest.raises(InvalidValueError, match="normal_force must be >= 0"):
+        Log(log.time, log.twist, log.wrench, -1.0)
+    with pytest.raises(InvalidValueError, match="patch must be a ContactPatch, got ReducedModel"):
+        identify(log, pf.ReducedModel(PATCH, pf.LuGre(mu_s=1.2), segments=4, speeds=5))
+    with pytest.raises(InvalidValueError, match=r"surface must be a class of limit surfaces, got .*ReducedModel"):
+        identify(log, PATCH, surface=pf.ReducedModel)
+    with pytest.raises(InvalidValueError, match="log must be a Log"):
+        identify([], PATCH)

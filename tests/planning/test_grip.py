@@ -1,0 +1,244 @@
+"""Grip plans reach what was asked for and hold, and the smallest grip is that of the limit surface."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import importlib.util
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import planarfriction as pf
+from planarfriction.errors import InvalidValueError
+from planarfriction.planning import holding_load, plan_grip
+from planarfriction.planning.motions import Aim, Grips, load_on, slide_of
+
+ROOT = Path(__file__).parents[2]
+LAW = pf.LuGre(mu_c=1.0, mu_s=1.2, elasto_plastic=0.9)
+PATCH = pf.ContactPatch.disc(0.01, cells=11)
+MODEL = pf.ReducedModel(PATCH, LAW)
+SOFT = pf.ContactPatch.disc(0.02, cells=11, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0))
+HALF = math.radians(30.0)
+
+
+def plate(offset: float = 0.025, model=MODEL) -> pf.Scene:
+    return pf.scenes.in_hand(model, centre_of_mass=(offset, 0.0), normal_force=4.0, t_end=1.0)
+
+
+@functools.cache
+def turning():
+    return plan_grip(plate(), {"angle": -HALF})
+
+
+def at_the_end(solution: pf.Solution) -> dict[str, float]:
+    return {name: float(solution.data[name][-1]) for name in ("x", "y", "theta", "vx", "vy", "omega")}
+
+
+# ---------------------------------------------------------------------- plans
+
+
+def test_a_plate_turns_by_thirty_degrees_slides_little_and_is_held():
+    """Within 0.05 degrees and 1.45 mm of slide; and it stays for another second. The scene is simulated as it is."""
+    plan = turning()
+    longer = dataclasses.replace(plan.scene, t_end=2.0)
+    data = pf.simulate(longer, save_every=0.5).data
+    for at in (1.0, 2.0):
+        assert math.degrees(float(data.theta.sel(time=at))) == pytest.approx(-30.0, abs=0.05)
+    end = at_the_end(pf.simulate(plan.scene))
+    assert np.hypot(*slide_of(plan.scene, 0, np.array([end["x"], end["y"], end["theta"]]))) < 1.45e-3
+    assert plan.report.angle == pytest.approx(end["theta"], abs=1e-9)
+    assert plan.report.speed < 1e-9
+    assert plan.scene.contacts[0].normal_force == plan.signal
+    assert plan.signal.values[-1] >= 1.5 * plan.report.holding * (1 - 1e-9)
+    assert (plan.signal.values[:3] < load_and_level(plan.scene)[1]).all()  # it starts where something gives way
+
+
+def load_and_level(scene: pf.Scene) -> tuple[np.ndarray, float]:
+    load = load_on(scene, 0, 0.0, np.zeros(2), 0.0)
+    return load, holding_load(load, PATCH, LAW.mu_c)
+
+
+@pytest.mark.parametrize("offset", [0.0, 0.002])
+def test_a_plate_slides_by_ten_millimetres_without_turning(offset):
+    """Within 0.05 mm and 0.3 degrees, with its centre of mass under the grip or 2 mm beside it."""
+    plan = plan_grip(plate(offset), {"slide": (0.0, -0.01)})
+    end = at_the_end(pf.simulate(plan.scene))
+    slide = slide_of(plan.scene, 0, np.array([end["x"], end["y"], end["theta"]]))
+    assert np.hypot(*(slide - [0.0, -0.01])) < 5e-5
+    assert abs(math.degrees(end["theta"])) < 0.3
+    assert abs(end["vy"]) < 1e-9
+
+
+def held_at_first(grip: float) -> pf.Scene:
+    scene = pf.scenes.in_hand(MODEL, centre_of_mass=(0.025, 0.0), normal_force=grip, t_end=1.0)
+    return dataclasses.replace(scene, start="equilibrium")
+
+
+def test_a_plan_goes_on_from_the_grip_that_holds_the_plate():
+    plan = plan_grip(held_at_first(5.0), {"angle": -HALF})
+    assert plan.signal.values[0] == pytest.approx(5.0, rel=1e-5)
+    data = pf.simulate(plan.scene).data
+    assert math.degrees(float(data.theta[-1])) == pytest.approx(-30.0, abs=0.05)
+    assert abs(float(data.omega[-1])) < 1e-9
+
+
+def test_the_report_says_what_friction_does():
+    """Its frictions are those of scenes whose law is scaled, and one percent is the slope between them."""
+    report = turning().report
+    law = dataclasses.replace(LAW, mu_c=1.05, mu_s=1.2 * 1.05)
+    contact = dataclasses.replace(turning().scene.contacts[0], model=pf.ReducedModel(PATCH, law))
+    changed = pf.simulate(dataclasses.replace(turning().scene, contacts=[contact]))
+    assert report.frictions.tolist() == [0.95, 0.99, 1.0, 1.01, 1.05]
+    assert report.angles[-1] == pytest.approx(float(changed.data.theta[-1]), abs=1e-9)
+    assert (np.diff(report.angles) > 0.0).all()  # the more friction, the less it turns
+    assert report.per_percent == pytest.approx((report.angles[3] - report.angles[1]) / 2)
+    assert report.spread == pytest.approx(np.abs(report.angles + HALF).max())
+    shown = repr(turning())
+    assert "turn by -30 degrees" in shown and "+5 %" in shown and "An error of one percent" in shown
+
+
+@pytest.mark.slow
+def test_the_worst_friction_misses_by_less_where_that_is_the_aim():
+    """A quick swing depends on friction five times less than a slow one, and slides more."""
+    worst = plan_grip(plate(), {"angle": -HALF}, aim="worst").report
+    assert worst.spread < 0.3 * turning().report.spread
+    assert np.hypot(*worst.slide) < 4e-3
+
+
+def test_slopes_of_outcomes_are_differences():
+    """Central differences over 1e-3 N, right to 1e-3 of the largest; speed, slide and angle of a plate that moves."""
+    scene = dataclasses.replace(plate(), t_end=0.2)
+    grips, times = Grips(scene, 0, [1.0]), np.array([0.0, 0.08, 0.15])
+    values = np.array([2.0, 2.8, 3.5])
+
+    def vector(change) -> np.ndarray:
+        (end,) = grips.outcomes(pf.Signal(times, values + change, "linear"), [1.0], rtol=1e-9)
+        return np.concatenate([end.speed, end.slide, [end.angle]])
+
+    (slopes,) = grips.slopes(pf.Signal(times, values, "linear"), [1.0])
+    step = 1e-3 * np.eye(3)
+    differences = np.stack([(vector(each) - vector(-each)) / 2e-3 for each in step], axis=1)
+    assert (np.abs(slopes - differences) < 1e-3 * np.abs(differences).max(axis=1)[:, None]).all()
+
+
+def test_misses_count_what_was_wanted():
+    aim = Aim(None, np.array([3e-3, 4e-3]), 0.005)
+    (end,) = Grips(plate(), 0, [1.0]).outcomes(pf.Signal.constant(50.0), [1.0])
+    assert aim.progress(end) == pytest.approx(0.0, abs=1e-3)
+    assert aim.misses(end)[3:5] == pytest.approx([-600.0, -800.0], abs=1.0)
+
+
+def test_goals_and_scenes_that_cannot_be_planned_are_refused_in_one_line():
+    cases = {
+        "angle must be within reach of the load on the body": lambda: plan_grip(plate(), {"angle": HALF}, knots=4),
+        'goal must be {"angle"': lambda: plan_grip(plate(), {"angle": 1.0, "slide": (0, 1)}),
+        "goal key must be one of angle, slide": lambda: plan_grip(plate(), {"turn": 1.0}),
+        "goal must not be zero": lambda: plan_grip(plate(), {"angle": 0.0}),
+        "contacts do not hold the body": lambda: plan_grip(held_at_first(2.0), {"angle": -1.0}),
+        "start must be 'rest' or 'equilibrium'": lambda: plan_grip(
+            dataclasses.replace(pf.scenes.free_slide(MODEL), stop_speed=None, start="sliding"), {"angle": -1.0}
+        ),
+        "bounds must reach": lambda: plan_grip(plate(), {"angle": -HALF}, bounds=(0.1, 4.0)),
+        "bounds must be the least": lambda: plan_grip(plate(), {"angle": -HALF}, bounds=(4.0, 2.0)),
+        "knots must": lambda: plan_grip(plate(), {"angle": -HALF}, knots=[0.0, 0.2, 0.1, 0.4]),
+        "aim must be one of": lambda: plan_grip(plate(), {"angle": -HALF}, aim="best"),
+        "friction must be": lambda: plan_grip(plate(), {"angle": -HALF}, friction=-0.1),
+        "contact must be one of": lambda: plan_grip(plate(), {"angle": -HALF}, contact="thumb"),
+        "velocity must be None": lambda: plan_grip(pf.scenes.driven(MODEL), {"angle": 1.0}),
+        "scene must be a Scene": lambda: plan_grip(None, {"angle": 1.0}),
+        "scene must have a load": lambda: plan_grip(
+            dataclasses.replace(plate(), body=dataclasses.replace(plate().body, gravity=(0.0, 0.0))), {"angle": 1.0}
+        ),
+    }
+    for message, attempt in cases.items():
+        with pytest.raises(InvalidValueError) as error:
+            attempt()
+        assert message in str(error.value) and "\n" not in str(error.value), error.value
+
+
+def test_a_plan_draws_itself():
+    figure = turning().plot()
+    assert [axes.get_ylabel() for axes in figure.axes] == ["grip [N]", "turn [deg]", "slide [mm]"]
+    assert len(figure.axes[1].lines) == 4  # three frictions and the goal
+
+
+@pytest.mark.parametrize("patch", [PATCH, SOFT])
+@pytest.mark.parametrize("kind", [pf.DistributedModel, pf.ReducedModel, pf.ReducedModelPublished])
+def test_a_model_with_another_law_is_that_model_to_the_bit(kind, patch):
+    """What is shared with the first is what the second would have built; another exponent makes another map."""
+    first = kind(patch, LAW)
+    twist, load, dt = (0.003, 0.001, 0.4), 2.3, 1e-3
+    first.step(first.rest(), twist, load, dt)
+    for law in (dataclasses.replace(LAW, mu_c=0.7), dataclasses.replace(LAW, gamma=1.5)):
+        shared, alone = first.with_law(law), kind(patch, law)
+        assert shared == alone
+        for mine, its in zip(
+            shared.step(shared.rest(), twist, load, dt), alone.step(alone.rest(), twist, load, dt), strict=True
+        ):
+            assert (mine == its).all()
+
+
+# ---------------------------------------------------------------------- the smallest grip
+
+
+def test_the_smallest_grip_of_a_force_of_a_torque_and_of_both():
+    """Closed forms of a disc: `F/mu`, `3 tau/(2 mu R)`; both together take more than either."""
+    force, torque = (0.0, -3.0, 0.0), (0.0, 0.0, 0.02)
+    assert holding_load(force, PATCH, 0.6) == pytest.approx(3.0 / 0.6, rel=1e-9)
+    assert holding_load(torque, PATCH, 0.6) == pytest.approx(1.5 * 0.02 / (0.6 * 0.01), rel=1e-9)
+    both = holding_load((0.0, -3.0, 0.02), PATCH, 0.6)
+    assert 5.0 < both < 10.0
+    assert holding_load((0.0, -3.0, 0.02), PATCH, 0.6, margin=0.25) == pytest.approx(1.25 * both)
+    assert holding_load(np.zeros(3), PATCH, 0.6) == 0.0
+
+
+@pytest.mark.parametrize("patch", [PATCH, SOFT, PATCH.with_friction_metric(pf.grain(0.3, 0.5, 1.0), (0.2, 0.1))])
+def test_the_smallest_grip_puts_the_load_on_the_limit_surface(patch):
+    """At that grip the wrench of its twist is the load, to 1e-6; a brushed patch holds less one way than the other."""
+    load = np.array([0.5, -2.0, 0.01])
+    grip = holding_load(load, patch, 0.8)
+    surface = pf.LimitSurfaceExact(patch, normal_force=grip)
+    friction = 0.8 * grip * surface.wrench(surface.twist(-load))
+    assert friction == pytest.approx(-load, rel=1e-5, abs=1e-7)
+    back = holding_load(-load, patch, 0.8)
+    assert (back == pytest.approx(grip, rel=1e-6)) == (not patch.asymmetric)
+
+
+def test_a_plate_holds_just_above_the_smallest_grip_and_slips_just_below():
+    """That of mu_s and the cells of the model; an exact disc differs from one of 11 x 11 cells by up to 2 %."""
+    load, _ = load_and_level(plate())
+    least = holding_load(load, PATCH, LAW.mu_s)
+    moved = {}
+    for share in (0.96, 1.04):
+        scene = pf.scenes.in_hand(MODEL, centre_of_mass=(0.025, 0.0), normal_force=share * least, t_end=0.2)
+        try:
+            data = pf.simulate(dataclasses.replace(scene, start="equilibrium")).data
+            moved[share] = abs(float(data.theta[-1]))
+        except InvalidValueError:
+            moved[share] = math.inf
+    assert moved[1.04] < 1e-12 and moved[0.96] > 0.1
+
+
+def test_what_no_grip_holds_is_refused():
+    point = pf.ContactPatch.points([(0.0, 0.0), (0.01, 0.0)], [1.0, 1.0])
+    assert holding_load((0.0, 1.0, 0.005), point, 1.0) == pytest.approx(1.0, rel=1e-6)  # through the middle
+    for message, bad in (
+        ("mu must be > 0", lambda: holding_load((0.0, 1.0, 0.0), PATCH, 0.0)),
+        ("margin must be >= 0", lambda: holding_load((0.0, 1.0, 0.0), PATCH, 1.0, margin=-0.1)),
+        ("wrench must have shape", lambda: holding_load((0.0, 1.0), PATCH, 1.0)),
+        ("patch must be a ContactPatch", lambda: holding_load((0.0, 1.0, 0.0), None, 1.0)),
+    ):
+        with pytest.raises(InvalidValueError, match=message):
+            bad()
+
+
+def test_the_example_turns_the_plate():
+    specification = importlib.util.spec_from_file_location("turning", ROOT / "examples" / "turn_in_hand.py")
+    assert specification is not None and specification.loader is not None
+    example = importlib.util.module_from_spec(specification)
+    specification.loader.exec_module(example)
+    plan = example.plan(degrees=-20.0, aim="nominal")
+    assert math.degrees(plan.report.angle) == pytest.approx(-20.0, abs=0.05)

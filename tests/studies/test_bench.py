@@ -1,0 +1,68 @@
+"""`planarfriction bench` and what the pages show of it: names, ratios, and tables that are made from its lines."""
+
+from __future__ import annotations
+
+import runpy
+from pathlib import Path
+
+import pytest
+
+from planarfriction import bench
+from planarfriction.bench.measurement import line
+from planarfriction.errors import InvalidValueError
+
+DOCS = Path(__file__).parents[2] / "docs"
+LINE = {"name": "in_hand.distributed", "value": 0.0931, "unit": "s", "baseline": "LSODA over the first 0.1 s",
+        "baseline_value": 0.668, "ratio": 129.4}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def pages():
+    """What puts numbers into pages."""
+    if not DOCS.is_dir():
+        pytest.skip("no docs beside these tests")
+    return runpy.run_path(str(DOCS / "make_tables.py"))
+
+
+def test_a_benchmark_is_run_by_its_name():
+    (found,) = bench.run(["table.build"])
+    assert found.name == "table.build" and found.value is not None and found.value > 0.0
+    assert found.ratio == pytest.approx(found.baseline_value / found.value)
+    with pytest.raises(InvalidValueError, match="name must be one of"):
+        bench.run(["nothing"])
+
+
+def test_a_ratio_is_that_of_the_values_unless_it_is_given():
+    assert line(2.0, "s", "theirs", 6.0).ratio == 3.0
+    assert line(2.0, "s", "theirs", 6.0, 5.0).ratio == 5.0
+
+
+def test_the_page_of_costs_names_benchmarks_that_there_are(pages):
+    assert set(pages["COST"]) <= set(bench.BENCHMARKS)
+
+
+def test_costs_become_a_table_and_readme_has_its_row_of_them(pages):
+    missing = {"name": "import", "value": None, "unit": "", "baseline": "left out", "baseline_value": None}
+    page = pages["with_tables"]("<!-- table: Cost -->\n\n| old |\n\nNext.\n", pages["costs"]([LINE, missing]))
+    assert "| 93 ms | 0.67 s: LSODA over the first 0.1 s | 130 | `in_hand.distributed` |\n\nNext." in page
+    assert "old" not in page and "import" not in page
+    row = "| LSODA, [2 s](docs/benchmarks.md) | 1 s | 2 ms |\n"
+    assert pages["with_speed"](row, [LINE]) == "| LSODA, [2 s](docs/benchmarks.md) | 0.67 s | 93 ms |\n"
+    # with --full LSODA is given the whole run, which is not what the row says
+    assert pages["with_speed"](row, [LINE | {"baseline": "LSODA over the whole run"}]) == row
+    assert pages["with_speed"]((DOCS.parent / "README.md").read_text("utf-8"), [LINE]).count("93 ms |") == 1
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "words"),
+    [(0.668, "s", "0.67 s"), (0.0931, "s", "93 ms"), (0.16, "us", "0.16 µs"), (3.7e3, "ns", "3700 ns")],
+)
+def test_times_as_one_reads_them(pages, value, unit, words):
+    assert pages["shown"](value, unit) == words
+
+
+def test_what_an_experiment_found_is_put_below_its_mark(pages):
+    page = "<!-- verdict: drift -->\n\nOld\nwords.\n\n![a picture](b.png)\n\n<!-- verdict: other -->\n\nKept.\n"
+    found = pages["with_verdicts"](page, {"drift": "It drifts."})
+    assert found == page.replace("Old\nwords.", "It drifts.")
+    assert pages["with_verdicts"](found, {"drift": "It drifts."}) == found

@@ -1,0 +1,203 @@
+"""Beyond the paper: exact surfaces, `ReducedModel`, few cells, loads and grooves, each against our own reference."""
+
+from __future__ import annotations
+
+import dataclasses
+import runpy
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from planarfriction.experiments import EXPERIMENTS
+from planarfriction.experiments.beyond import grooves, in_hand, ladder, plateaus
+from planarfriction.experiments.beyond import run as beyond
+from planarfriction.experiments.beyond import surfaces as beyond_surfaces
+from planarfriction.experiments.beyond.ladder_figure import FAMILIES
+from planarfriction.experiments.experiment import Work
+from planarfriction.experiments.in_hand.runs import Case
+from planarfriction.experiments.runs import IN_WORDS
+from planarfriction.limit_surface import LimitSurfaceCells, LimitSurfaceExact
+from planarfriction.patch import PUBLISHED_PATCHES
+
+
+@pytest.fixture(scope="module")
+def result():
+    return beyond.run(Work(quick=True))
+
+
+# ------------------------------------------------------------------ closed forms
+
+
+def test_a_drift_without_a_grain_is_straight_down(monkeypatch):
+    monkeypatch.setitem(grooves.GRAIN, "along", 1.0)
+    assert abs(grooves.closed_drift(np.radians(40.0))) < 1e-6
+
+
+def test_the_staircase_of_a_line_has_steps_of_two_cells(result):
+    jumps = result.numbers["jumps"]
+    assert jumps["Line/sum"] == pytest.approx(2.0 / 21.0, rel=1e-9)  # a cell of 1/21 of the load turns its force round
+    assert jumps["Line/exact"] < 2.0 / beyond_surfaces.STAIRS
+
+
+def test_random_twists_are_even_in_the_scaled_coordinates():
+    surface = LimitSurfaceExact(PUBLISHED_PATCHES["LineGrad"]())
+    twists = beyond_surfaces.random_twists(surface, 4000)
+    x, y = surface.centre_of_pressure
+    velocity = twists[:, :2] + twists[:, 2:] * [-y, x]
+    scaled = np.column_stack([velocity, surface.contact_radius * twists[:, 2]])
+    np.testing.assert_allclose(np.linalg.norm(scaled, axis=1), 1.0, rtol=1e-12)
+    np.testing.assert_allclose(np.cov(scaled.T), np.eye(3) / 3.0, atol=0.03)
+
+
+# ------------------------------------------------------------------ the experiment
+
+
+def test_it_is_registered_last():
+    assert list(EXPERIMENTS)[-1] == "beyond"
+
+
+def test_all_comparisons_hold(result):
+    assert [row.quantity for row in result.comparisons if not row.holds] == []
+    kinds = {row.reference for row in result.comparisons}
+    assert kinds == {"closed form", "converged"}  # nothing here is published
+
+
+def test_the_exact_surface_is_the_limit_of_ever_finer_sums():
+    patch = PUBLISHED_PATCHES["NonConvex2"]()
+    exact = LimitSurfaceExact(patch)
+    twists = beyond_surfaces.random_twists(exact, 300)
+    misses = [
+        beyond_surfaces.difference(LimitSurfaceCells(patch.refined(parts)), exact, twists)[0].mean()
+        for parts in (1, 3, 9)
+    ]
+    assert misses[1] < misses[0] / 2.0 and misses[2] < misses[1] / 2.0
+
+
+def test_reduced_model_is_nearer_than_the_published_one(result):
+    assert set(result.numbers["driven"]) == set(beyond.QUICK_SHAPES)
+    for ratios in (*result.numbers["driven ratios"].values(), *result.numbers["driven ratios, auto"].values()):
+        # found: medians up to 0.13, third quartiles to 0.15, maxima to 0.93; 1 is a model that is no better
+        assert ratios["median"] < 0.25 and ratios["third quartile"] < 0.4
+        assert ratios["maximum"] < 1.0 and ratios["torque maximum"] < 1.0
+    for ratios in result.numbers["driven ratios"].values():
+        assert ratios["torque median"] < 0.05
+
+
+def test_parts_are_nearer_than_the_published_model_on_patches_that_no_table_holds(result):
+    for each in result.numbers["new shapes"].values():
+        for ratios in each[ladder.AUTO].values():
+            assert max(ratios) < 1.0
+
+
+def test_a_table_of_the_exact_surface_is_nearer_than_the_sum_over_cells(result):
+    for each in result.numbers["surfaces"].values():
+        assert each["table/force"]["mean"] < 0.25 * each["sum over cells/force"]["mean"]
+
+
+def test_plateaus(result):
+    angles = result.numbers["plateaus"]
+    patch = PUBLISHED_PATCHES["Circle"](width=0.05)
+    radius, moment = patch.contact_radius(), patch.second_moment()
+    # the published torsional stiffness is sigma_0 r^2
+    expected = angles["closed form"] * moment / radius**2
+    assert angles["published reduced"] == pytest.approx(expected, rel=0.03)
+    swapped = angles | {"ReducedModel": angles["published reduced"]}
+    assert [row.holds for row in plateaus.comparisons(swapped)] == [False, False]
+
+
+def test_a_drift_a_tenth_of_a_degree_off_would_be_noticed(result):
+    found = result.numbers["grooves"]
+    wrong = found | {"distributed": [angle + np.radians(0.1) for angle in found["distributed"]]}
+    rows = grooves.comparisons(wrong)
+    assert [row.quantity for row in rows if not row.holds] == ["drift on grooves, distributed, all slopes"]
+
+
+def test_soft_finger(result):
+    family = result.numbers["load family"]
+    assert family["maps"] > 1
+    assert family["force from rebuilding [N]"] < 4e-3
+    assert family["torque from rebuilding [N m]"] < 4e-5
+
+
+def test_in_hand_ends_are_those_of_two_simulations(result):
+    case = Case("LineGrad", 2)
+    ends = result.numbers["in hand"][case.words]
+    assert 0.0 < ends["reduced"] < ends["published"]
+    rows = ladder.in_hand_rows((case,))
+    assert {row.model: row.errors["end"] for row in rows}["reduced"] == pytest.approx(ends["reduced"], rel=1e-9)
+    assert ends[in_hand.SHIFT] == pytest.approx(in_hand.friction_shift(case), rel=1e-9)
+
+
+def test_every_published_in_hand_run_is_there():
+    assert {(case.shape, case.placement) for case in ladder.CASES} == {
+        *((shape, 1) for shape in beyond.SHAPES),
+        ("Circle", 2),
+    }
+    assert all(len(in_hand.cases_of(shape)) % 2 == 0 for shape in beyond.SHAPES)
+
+
+def test_few_cells_are_a_rung_between_three_bristles_and_the_grid(result):
+    ends = result.numbers["in hand"][f"{IN_WORDS['NonConvex2']}, load 1"]
+    assert ends["degree 5"] < 0.1 * min(ends["reduced"], ends["published"])
+    # 45 cells are off by less than 0.1 % of friction would do, three bristles by more, but less than 2 % would
+    assert ends["degree 5"] < ends[in_hand.SHIFT] < ends["reduced"] < 20.0 * ends[in_hand.SHIFT]
+
+
+def test_score_counts_by_load():
+    ends = {"a, load 1": {"reduced": 2.0, "published": 1.0}, "a, load 2": {"reduced": 1.0, "published": 4.0}}
+    assert in_hand.score(ends, 1)["nearer"] == 0
+    assert in_hand.score(ends, 2) == {"runs": 1, "nearer": 1, "ratios": {"a, load 2": 0.25}}
+
+
+def test_references_are_finer_than_the_grids():
+    for shape in beyond.SHAPES:
+        patch = PUBLISHED_PATCHES[shape]()
+        fine = ladder.reference(patch)
+        assert fine.cells >= 9 * patch.cells
+        assert fine.cells <= max(ladder.REFERENCE_CELLS, 9 * patch.cells)
+
+
+def test_tables_and_pictures_are_complete(result):
+    assert len(result.pictures) == 6
+    for table in result.tables:
+        assert {len(row) for row in table.rows} == {len(table.headings)}, table.title
+    assert all("nan" not in paragraph for paragraph in result.findings)
+
+
+def test_tables_of_the_pages_are_those_of_the_report(result):
+    docs = Path(__file__).parents[2] / "docs"
+    if not docs.is_dir():
+        pytest.skip("no docs beside these tests")
+    make_tables = runpy.run_path(str(docs / "make_tables.py"))
+    with_tables, markdown, mark = (make_tables[name] for name in ("with_tables", "markdown", "MARK"))
+    tables = {table.title: dataclasses.asdict(table) for table in result.tables}
+    shown = 0
+    for path in docs.glob("*.md"):
+        page = with_tables(path.read_text(encoding="utf-8"), tables)
+        # tables of simulators, and of costs, are on pages of their own
+        assert path.name in ("simulators.md", "benchmarks.md") or {
+            found["title"] for found in mark.finditer(page)
+        } <= set(tables)
+        assert with_tables(page, tables) == page
+        shown += page.count("<!-- table: ")
+    assert shown >= 11
+    assert markdown({"headings": ("a", "b"), "rows": [("x", 0.123)]}) == "| a | b |\n| --- | --- |\n| x | 0.12 |\n"
+
+
+def test_the_ladder_draws_every_family_that_was_run(result):
+    figure = next(picture.figure for picture in result.pictures if picture.name == "ladder")
+    assert len(figure.axes) == 6  # patches of many cells and of few; velocity-driven, and two loads in hand
+    shown = {text.get_text() for axes in figure.axes for text in axes.texts}
+    assert shown == {"", *(words for family in FAMILIES for words in family.rungs.values())}
+    widest = max(axes.get_xlim()[1] / axes.get_xlim()[0] for axes in figure.axes)
+    assert widest < 1e3  # an axis of times without an empty half
+
+
+def test_parts_are_looked_at_as_many_as_auto_takes(result):
+    for shape in beyond.QUICK_SHAPES:
+        models = ladder.models(shape)
+        assert models[ladder.AUTO] is models["6 parts"]
+        assert len(models["16 parts"].rest()) == 16
+    for each in result.numbers["in hand"].values():
+        assert each[ladder.AUTO] == each["6 parts"]

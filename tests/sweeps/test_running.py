@@ -1,0 +1,405 @@
+"""Sweeps: the dataset, what identifies a run, resuming, failures, damaged files, kills, executors."""
+
+from __future__ import annotations
+
+import concurrent.futures
+import dataclasses
+import functools
+import json
+import multiprocessing
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import planarfriction as pf
+from planarfriction import sweeps
+from planarfriction.errors import SweepError, SweepInterrupted
+from planarfriction.sweeps import identity, records
+
+LAW = pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
+PATCH = pf.ContactPatch.disc(0.01, cells=7)
+MODEL = pf.ReducedModel(PATCH, LAW, segments=4, speeds=5)
+FRESH = multiprocessing.get_context("spawn")
+"""Forks of a process in which other tests have started JAX can hang."""
+
+GRIPS, MASSES = [1.0, 2.0, 3.0], [0.1, 0.2]
+
+
+def grip(grip: float, mass: float = 0.2, t_end: float = 0.03) -> pf.Scene:
+    return pf.scenes.in_hand(MODEL, normal_force=grip, mass=mass, t_end=t_end)
+
+
+def end(solution: pf.Solution) -> dict[str, float]:
+    return {name: each.values[-1] for name, each in solution.histories.items() if name in {"y", "theta"}}
+
+
+def crossed(grip: float, mass: float) -> pf.Scene:
+    """Fails in the solver's input where both are large."""
+    return pf.scenes.in_hand(MODEL, normal_force=grip if grip + mass < 3.0 else -grip, t_end=0.02)
+
+
+@functools.cache
+def reference():
+    """A sweep that keeps nothing, in threads."""
+    return pf.sweep(grip, {"grip": GRIPS, "mass": MASSES})
+
+
+# ---------------------------------------------------------------------- the dataset
+
+
+def test_a_sweep_has_a_dimension_for_each_quantity_and_the_variables_of_each_solution():
+    data = reference()
+    assert dict(data.sizes) == {"grip": 3, "mass": 2, "time": 4, "contact": 1}
+    assert data.grip.values.tolist() == GRIPS and data.mass.values.tolist() == MASSES
+    for load in GRIPS:
+        for mass in MASSES:
+            alone, there = pf.simulate(grip(load, mass)).data, data.sel(grip=load, mass=mass)
+            for name in alone.data_vars:
+                np.testing.assert_array_equal(there[name].values, alone[name].values, err_msg=name)
+                assert there[name].attrs == alone[name].attrs and there[name].dims == alone[name].dims
+    assert set(data.status.values.ravel()) == {"success"} and not data.failure.values.any()
+    assert len(set(data.run.values.ravel().tolist())) == 6
+
+
+def test_a_measurement_is_what_it_returns():
+    values = {"grip": GRIPS}
+    data = pf.sweep(grip, values, measure=end)
+    np.testing.assert_array_equal(data.y, [end(pf.simulate(grip(load)))["y"] for load in GRIPS])
+    number = pf.sweep(grip, values, measure=lambda solution: solution.statistics.steps)
+    assert number.measured.dims == ("grip",) and number.measured.dtype.kind == "i"
+    whole = pf.sweep(grip, values, measure=lambda solution: solution.data[["x", "fx"]].isel(time=slice(None, None, 3)))
+    assert whole.fx.dims == ("grip", "time", "contact") and whole.time.values.tolist() == [0.0, 0.03]
+    arrays = pf.sweep(grip, values, measure=lambda s: {"pair": np.arange(2.0), "how": s.status, "still": True})
+    assert arrays.pair.dims == ("grip", "pair_index") and arrays.how.values.tolist() == ["success"] * 3
+    assert arrays.still.dtype == bool
+
+
+def test_runs_of_different_length_share_their_instants():
+    def slide(speed: float, t_end: float) -> pf.Scene:
+        return pf.scenes.free_slide(MODEL, twist=(speed, 0.0, 0.0), t_end=t_end, save_every=0.01)
+
+    data = pf.sweep(slide, {"speed": [0.1, 1.0], "t_end": [0.05, 0.2]})
+    np.testing.assert_allclose(data.time, 0.01 * np.arange(21), atol=1e-12)
+    fast, slow = data.sel(speed=1.0, t_end=0.05), data.sel(speed=0.1, t_end=0.2)
+    assert fast.status == "success" and fast.x.notnull().sum() == 6  # NaN where it has no instants
+    alone = pf.simulate(slide(0.1, 0.2)).data
+    assert slow.status == "at rest" and len(alone.time) < 21
+    # what is at rest stays there: the end of every run is in the last instant that it was to record
+    assert float(slow.x[-1]) == float(alone.x[-1]) and slow.x.notnull().all()
+    assert data.sel(speed=0.1, t_end=0.05).x[6:].isnull().all()
+
+
+def test_values_of_any_kind_have_labels():
+    def with_model(model: pf.ReducedModel, kind: str, load: int) -> pf.Scene:
+        assert type(load) is int and isinstance(model, pf.ReducedModel)
+        return dataclasses.replace(pf.scenes.in_hand(model, normal_force=load, t_end=0.01), name=kind)
+
+    other = dataclasses.replace(MODEL, law=pf.LuGre())
+    values = {"model": {"sticky": MODEL, "plain": other}, "kind": ["a"], "load": np.array([1, 2])}
+    data = pf.sweep(with_model, values, measure=end)
+    assert data.model.values.tolist() == ["sticky", "plain"] and data.y.shape == (2, 1, 2)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ({"values": {}}, "values must be a mapping from names to lists of values"),
+        ({"values": {"grip": 1.0}}, "grip must be a list of numbers, texts or booleans"),
+        ({"values": {"grip": []}}, "grip must have at least one value"),
+        ({"values": {"grip": [1.0, 1.0]}}, "grip must have each value once, got 1.0 2 times"),
+        ({"values": {"grip": [1.0, "a"]}}, "grip must be a list of numbers, texts"),
+        ({"values": {"grip": [PATCH]}}, "a mapping from labels to values"),
+        ({"values": {"grop": [1.0]}}, "make_scene must take the swept quantities by name"),
+        (
+            {"values": {"status": [1.0]}, "make_scene": lambda status: grip(status)},
+            "not be one of status, failure, run",
+        ),
+        ({"values": {"time": [1.0]}, "make_scene": lambda time: grip(time)}, "not be that of a variable"),
+        ({"make_scene": lambda grip: 1.0}, "make_scene must return a Scene, got float"),
+        ({"measure": 3}, "measure must be a function of a Solution"),
+        ({"measure": lambda solution: object()}, "must return numbers, texts, or arrays of them"),
+        ({"progress": float}, "progress must be a function of a Progress, got TypeError: float() argument"),
+        ({"executor": 3}, "executor must be a concurrent.futures.Executor"),
+        ({"make_scene": lambda grip: 1 / 0}, "all 3 runs failed; the first: grip=1.0: make_scene: ZeroDivisionError"),
+    ],
+)
+def test_mistakes_are_one_line(arguments, words):
+    with pytest.raises(pf.FrictionError) as caught:
+        pf.sweep(**{"make_scene": grip, "values": {"grip": GRIPS}, **arguments})
+    assert words in str(caught.value) and "\n" not in str(caught.value)
+
+
+# ---------------------------------------------------------------------- what a run is
+
+
+def test_equal_scenes_are_one_run_and_others_are_others():
+    def digest(scene: pf.Scene, measure=None) -> str:
+        return identity.Runs(measure).digest(scene)
+
+    scene, rebuilt = grip(2.0), pf.Scene.from_dict(grip(2.0).to_dict())
+    assert digest(scene) == digest(rebuilt) and len(digest(scene)) == 32
+    pf.simulate(scene)  # what a model has built on the way is not part of it
+    assert digest(scene) == digest(rebuilt)
+    law = dataclasses.replace(MODEL, law=pf.LuGre(mu_s=1.2 + 1e-15))
+    others = [
+        grip(2.0 + 1e-15),
+        dataclasses.replace(scene, rtol=2e-5),
+        dataclasses.replace(scene, save_every=0.02),
+        pf.scenes.in_hand(law, normal_force=2.0, t_end=0.03),
+        pf.scenes.in_hand(pf.DistributedModel(PATCH, LAW), normal_force=2.0, t_end=0.03),
+    ]
+    assert len({digest(scene), *map(digest, others)}) == 6
+    assert digest(scene, end) != digest(scene)
+
+
+def test_a_measurement_counts_by_what_it_does():
+    def near(limit: float):
+        return lambda solution: float(abs(solution.data.y[-1]) < limit)
+
+    def also(solution):
+        return end(solution)["y"]
+
+    named = {"x", "y", "theta"}
+    same = [near(1.0), near(1.0)]
+    assert identity.digest_of(same[0]) == identity.digest_of(same[1])
+    functions = [near(1.0), near(2.0), also, end, functools.partial(also, k=1), lambda s: s.status in {"x", "y"}]
+    assert len({identity.digest_of(each) for each in functions}) == len(functions)
+    assert identity.digest_of(named) == identity.digest_of({"theta", "y", "x"})
+
+
+def test_numbers_and_functions_that_a_measurement_mentions_are_part_of_it():
+    def measure(lines: str):
+        space: dict = {"__name__": "mine"}
+        exec(lines + "\ndef measure(solution):\n    return helper(solution) * LIMIT", space)
+        return space["measure"]
+
+    first, helper = "LIMIT = 1.0", "\ndef helper(solution):\n    return 1.0"
+    digests = [measure(first + helper), measure("LIMIT = 2.0" + helper), measure(first + helper.replace("1.0", "2.0"))]
+    assert len({identity.digest_of(each) for each in digests}) == 3
+    assert identity.digest_of(measure(first + helper)) == identity.digest_of(digests[0])
+
+
+def test_a_run_of_other_equations_does_not_count(tmp_path, monkeypatch):
+    pf.sweep(grip, {"grip": [1.0]}, out=tmp_path)
+    monkeypatch.setattr(identity, "equations", lambda: "others")
+    assert found(tmp_path, [1.0]) == 0
+
+
+def found(folder: Path, grips: list[float], **options) -> int:
+    """How many runs of a sweep are there already."""
+    told: list[sweeps.Progress] = []
+    pf.sweep(grip, {"grip": grips}, out=folder, progress=told.append, **options)
+    assert told[-1].done == told[-1].runs == len(grips)
+    return told[-1].found
+
+
+# ---------------------------------------------------------------------- going on
+
+
+def test_a_sweep_goes_on_where_another_has_ended(tmp_path):
+    values = {"grip": GRIPS, "mass": MASSES}
+    pf.sweep(grip, {"mass": MASSES, "grip": GRIPS[:2]}, out=tmp_path)
+    told: list[sweeps.Progress] = []
+    data = pf.sweep(grip, values, out=tmp_path, progress=told.append)
+    assert data.identical(reference())  # whichever came from files
+    assert told[-1][:5] == (6, 6, 4, 0, 0) and str(told[-1]) == "6 of 6 runs (4 found)"
+    assert {file.stem for file in tmp_path.glob("*.npz")} == set(data.run.values.ravel().tolist())
+
+
+def test_damaged_files_do_not_count(tmp_path):
+    data = pf.sweep(grip, {"grip": GRIPS}, out=tmp_path)
+    whole, cut, changed = sorted(tmp_path.glob("*.npz"))
+    cut.write_bytes(cut.read_bytes()[:-40])
+    content = bytearray(changed.read_bytes())
+    content[len(content) // 2] ^= 1
+    changed.write_bytes(bytes(content))
+    (tmp_path / ".planarfriction-0123.part").write_bytes(whole.read_bytes()[:100])
+    told: list[sweeps.Progress] = []
+    again = pf.sweep(grip, {"grip": GRIPS}, out=tmp_path, progress=told.append)
+    assert told[-1].found == 1 and told[-1].damaged == 2 and "2 damaged and done again" in str(told[-1])
+    assert again.identical(data)
+
+
+def test_files_hold_what_runs_have_left_and_nothing_is_lost():
+    variables = {
+        "y": records.History(("time",), np.array([0.0, -0.0, np.nan]), {"units": "m"}),
+        "how many/ever φ": records.History((), np.array(3), {}),
+        "file": records.History(("n",), np.array(["a", "bcd"]), {}),
+    }
+    record = records.Record("success", "", variables, 1.5)
+    content = records.pack(record)
+    back = records.unpack(content)
+    assert records.pack(back) == content and back[:2] == record[:2] and back.end == 1.5
+    for name, each in variables.items():
+        assert back.variables[name] == each and back.variables[name].values.dtype == each.values.dtype
+
+
+def test_failures_are_recorded_with_reason_and_scene_and_are_no_end(tmp_path):
+    data = pf.sweep(crossed, {"grip": GRIPS, "mass": MASSES}, out=tmp_path / "a", measure=end)
+    assert data.status.values.tolist() == [["success"] * 2, ["success"] * 2, ["failed"] * 2]
+    assert data.y.isnull().values.tolist() == (data.status == "failed").values.tolist()
+    assert "normal_force of contact 'fingers' must be >= 0, got -3.0" in str(data.failure.values[2, 0])
+
+    def picky(solution: pf.Solution) -> float:
+        if solution.histories["normal_force"].values[-1, 0] == 2.0:
+            raise ValueError("two\nis bad")
+        return 1.0
+
+    data = pf.sweep(grip, {"grip": GRIPS}, out=tmp_path / "b", measure=picky)
+    assert data.failure.values.tolist() == ["", "measure: ValueError: two is bad", ""]
+    (file,) = (tmp_path / "b").glob("*.failed.json")
+    kept = json.loads(file.read_text())
+    assert kept["reason"] == "measure: ValueError: two is bad" and pf.Scene.from_dict(kept["scene"]) == grip(2.0)
+    assert file.name == f"{data.run.values[1]}.failed.json"
+    again = found(tmp_path / "b", GRIPS, measure=picky)
+    assert again == 2  # the failure is tried again
+
+
+def test_a_run_that_worked_at_last_is_no_failure_any_more(tmp_path, monkeypatch):
+    values, simulate = {"grip": [1.0, 2.0]}, pf.scenes.simulate
+
+    def full(scene, **options):
+        if scene == grip(2.0):
+            raise MemoryError
+        return simulate(scene, **options)
+
+    monkeypatch.setitem(vars(pf.scenes), "simulate", full)
+    assert pf.sweep(grip, values, out=tmp_path).failure.values.tolist() == ["", "MemoryError"]
+    assert len(list(tmp_path.glob("*.failed.json"))) == 1
+    monkeypatch.undo()
+    assert not pf.sweep(grip, values, out=tmp_path).failure.values.any()
+    assert not list(tmp_path.glob("*.failed.json"))
+
+
+def test_what_does_not_fit_the_first_run_is_a_failure():
+    def uneven(solution: pf.Solution) -> dict:
+        return {"a": np.zeros(2 if solution.histories["normal_force"].values[-1, 0] < 3.0 else 3)}
+
+    data = pf.sweep(grip, {"grip": GRIPS}, measure=uneven)
+    assert data.failure.values.tolist() == ["", "", "a has shape [3] where the first run has [2]"]
+    assert data.a[2].isnull().all()
+
+
+def test_ctrl_c_keeps_what_is_done(tmp_path):
+    """In this process, in its main thread, while threads work."""
+    main = threading.main_thread().ident
+
+    def press(progress: sweeps.Progress) -> None:
+        if progress.done >= 2 and not pressed:
+            pressed.append(progress.done)
+            signal.pthread_kill(main, signal.SIGINT)
+
+    def slow(solution: pf.Solution) -> dict[str, float]:
+        time.sleep(0.3)  # so that progress is asked for in between
+        return end(solution)
+
+    pressed: list[int] = []
+    values = {"grip": np.linspace(1.0, 2.0, 40)}
+    with pytest.raises(SweepInterrupted) as stop:
+        pf.sweep(grip, values, out=tmp_path, measure=slow, progress=press)
+    done = int((stop.value.data.status == "success").sum())
+    assert 2 <= done < 40 and done == len(list(tmp_path.glob("*.npz")))
+    assert int((stop.value.data.status == "missing").sum()) == 40 - done
+    assert int(stop.value.data.y.notnull().sum()) == done
+
+
+KILLED = """
+import sys, numpy as np, planarfriction as pf
+from tests.sweeps import test_running as t
+pf.sweep(t.grip, {"grip": np.linspace(1.0, 3.0, int(sys.argv[2]))}, out=sys.argv[1], measure=t.end)
+"""
+
+
+def kill_on_the_way(folder: Path, runs: int, after: int) -> int:
+    """Begin a sweep in another process, kill it when some files are there; returns how many there are then.
+
+    That they are found afterwards shows too that digests are the same in every process.
+    """
+    paths = os.pathsep.join([str(Path(__file__).parents[2]), *sys.path])
+    environment = {**os.environ, "PYTHONPATH": paths, "PYTHONHASHSEED": str(runs + after)}
+    process = subprocess.Popen([sys.executable, "-c", KILLED, str(folder), str(runs)], env=environment)
+    try:
+        limit = time.monotonic() + 300.0
+        while len(list(folder.glob("*.npz"))) < after:
+            assert process.poll() is None and time.monotonic() < limit
+            time.sleep(0.002)
+    finally:
+        process.kill()
+        process.wait()
+    return len(list(folder.glob("*.npz")))
+
+
+def after_a_kill(folder: Path, runs: int, after: int) -> None:
+    there = kill_on_the_way(folder, runs, after)
+    assert after <= there < runs
+    grips = np.linspace(1.0, 3.0, runs).tolist()
+    assert found(folder, grips, measure=end) == there  # none is lost, none is half
+    assert len(list(folder.glob("*.npz"))) == runs
+    assert found(folder, grips, measure=end) == runs
+
+
+def test_a_killed_sweep_goes_on(tmp_path):
+    after_a_kill(tmp_path, 400, 30)
+
+
+@pytest.mark.slow
+def test_ten_thousand_runs_go_on_after_kills(tmp_path):
+    for after in (500, 2000, 5000):
+        kill_on_the_way(tmp_path, 10_000, after)
+    after_a_kill(tmp_path, 10_000, 7000)
+
+
+# ---------------------------------------------------------------------- executors
+
+
+def test_any_executor_gives_the_same_bits():
+    with concurrent.futures.ThreadPoolExecutor(3) as pool:
+        data = pf.sweep(grip, {"grip": GRIPS, "mass": MASSES}, executor=pool)
+    assert data.identical(reference())
+    backwards = pf.sweep(grip, {"mass": MASSES[::-1], "grip": GRIPS[::-1]})
+    turned = backwards.transpose("grip", "mass", ...).sel(grip=GRIPS, mass=MASSES)
+    assert turned.x.identical(reference().x) and turned.run.identical(reference().run)
+
+
+def test_processes_give_the_same_bits_and_take_no_lambda():
+    with concurrent.futures.ProcessPoolExecutor(2, FRESH) as pool:
+        with pytest.raises(pf.FrictionError, match="measure must be a function that other processes can import"):
+            pf.sweep(grip, {"grip": GRIPS}, executor=pool, measure=lambda solution: 1.0)
+        data = pf.sweep(grip, {"grip": GRIPS, "mass": MASSES}, executor=pool)
+    assert data.identical(reference())
+
+
+def leave(solution: pf.Solution) -> float:
+    os._exit(1)
+
+
+def test_an_executor_that_dies_is_an_error_in_one_line(tmp_path):
+    with (
+        concurrent.futures.ProcessPoolExecutor(1, FRESH) as pool,
+        pytest.raises(SweepError, match="finished runs are kept"),
+    ):
+        pf.sweep(grip, {"grip": GRIPS}, executor=pool, measure=leave, out=tmp_path)
+    with pytest.raises(SweepError, match="the executor ended"):  # it takes no more
+        pf.sweep(grip, {"grip": GRIPS}, executor=pool)
+
+
+def test_models_are_built_once_for_equal_scenes():
+    """A `make_scene` that makes a new model for every run shares its maps all the same."""
+    seen = set()
+
+    def make(grip: float) -> pf.Scene:
+        return pf.scenes.in_hand(pf.ReducedModel(PATCH, LAW, segments=4, speeds=5), normal_force=grip, t_end=0.01)
+
+    def look(solution: pf.Solution) -> float:
+        seen.add(id(solution.scene.contacts[0].model))
+        return 0.0
+
+    pf.sweep(make, {"grip": GRIPS}, measure=look)
+    assert len(seen) == 1

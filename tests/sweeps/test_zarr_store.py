@@ -1,0 +1,173 @@
+"""Sweeps that need the extra [sweep]: zarr stores, and a dask cluster that loses a worker."""
+
+from __future__ import annotations
+
+import os
+import signal
+import time
+import warnings
+from concurrent.futures import Future
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import planarfriction as pf
+from planarfriction import sweeps
+from planarfriction.errors import SweepInterrupted
+from tests.sweeps.test_running import GRIPS, MASSES, MODEL, end, grip, reference
+
+pytestmark = pytest.mark.sweep
+
+VALUES = {"grip": GRIPS, "mass": MASSES}
+
+
+@pytest.fixture
+def zarr():
+    return pytest.importorskip("zarr", reason="needs zarr: pip install 'planarfriction[sweep]'")
+
+
+def same(stored, data) -> None:
+    """Whether a store holds what a sweep in memory has: texts may be of another kind there."""
+    assert set(stored.variables) == set(data.variables)
+    for name, each in data.variables.items():
+        there = stored[name]
+        assert there.dims == each.dims and there.attrs == each.attrs, name
+        np.testing.assert_array_equal(there.values.astype(each.dtype), each.values, err_msg=name)
+
+
+def test_a_store_holds_the_same_dataset_a_chunk_a_run(zarr, tmp_path):
+    path = tmp_path / "all.zarr"
+    stored = pf.sweep(grip, VALUES, out=path)
+    same(stored, reference())
+    arrays = zarr.open_group(path, mode="r")
+    assert arrays["fx"].chunks == (1, 1, 4, 1) and arrays["fx"].shape == (3, 2, 4, 1)
+    told: list[sweeps.Progress] = []
+    same(pf.sweep(grip, VALUES, out=path, progress=told.append), reference())
+    assert told[-1].found == 6
+
+
+def test_measurements_of_any_kind_are_stored(zarr, tmp_path):
+    def measure(solution: pf.Solution) -> dict:
+        return {**end(solution), "steps": solution.statistics.steps, "how": solution.status}
+
+    def rarely(grip: float, mass: float) -> pf.Scene:
+        return pf.scenes.in_hand(MODEL, normal_force=grip if grip < 3.0 else -1.0, mass=mass, t_end=0.02)
+
+    stored = pf.sweep(rarely, VALUES, out=tmp_path / "ends.zarr", measure=measure)
+    data = pf.sweep(rarely, VALUES, measure=measure)
+    assert stored.steps.isnull().sum() == 2  # of those that failed
+    for name in ("y", "theta", "steps", "status", "failure"):
+        np.testing.assert_array_equal(stored[name].values.astype(data[name].dtype), data[name].values)
+    assert stored.how.values.tolist() == data.how.values.tolist()
+
+
+def test_a_run_counts_once_the_journal_says_so(zarr, tmp_path):
+    path = tmp_path / "ends.zarr"
+    whole = pf.sweep(grip, VALUES, out=path, measure=end).load()
+    journal = path / "run" / "runs.jsonl"
+    lines = journal.read_bytes().splitlines(keepends=True)
+    journal.write_bytes(b"".join(lines[:4]) + lines[4][:20])  # killed while it wrote the fifth
+    told: list[sweeps.Progress] = []
+    again = pf.sweep(grip, VALUES, out=path, measure=end, progress=told.append)
+    assert told[-1].found == 4 and again.load().identical(whole)
+    told.clear()
+    assert pf.sweep(grip, VALUES, out=path, measure=end, progress=told.append).load().identical(whole)
+    assert told[-1].found == 6
+    told.clear()  # another measurement of the same layout: nothing of the old one counts
+    pf.sweep(grip, VALUES, out=path, measure=lambda s: {k: 2.0 * v for k, v in end(s).items()}, progress=told.append)
+    assert told[-1].found == 0
+
+
+def test_a_damaged_chunk_is_found_by_who_reads_it(zarr, tmp_path):
+    stored = pf.sweep(grip, VALUES, out=tmp_path / "all.zarr")
+    chunk = tmp_path / "all.zarr" / "x" / "c" / "1" / "0" / "0"
+    content = bytearray(chunk.read_bytes())
+    content[len(content) // 2] ^= 1
+    chunk.write_bytes(bytes(content))
+    with pytest.raises(ValueError, match="checksum"):
+        stored.x.load()
+
+
+def test_another_grid_needs_another_store(zarr, tmp_path):
+    path = tmp_path / "all.zarr"
+    pf.sweep(grip, VALUES, out=path, measure=end)
+    for values in ({"grip": [1.0, 2.0, 4.0], "mass": MASSES}, {"grip": GRIPS}, {"grip": GRIPS, "t_end": [0.01]}):
+        with pytest.raises(pf.FrictionError, match="holds") as caught:
+            pf.sweep(grip, values, out=path, measure=end)
+        assert "\n" not in str(caught.value)
+    (tmp_path / "file.zarr").touch()
+    with pytest.raises(pf.FrictionError):
+        pf.sweep(grip, VALUES, out=tmp_path / "file.zarr", measure=end)
+
+
+def test_ctrl_c_keeps_what_is_in_the_store(zarr, tmp_path):
+    def press(progress: sweeps.Progress) -> None:
+        if progress.done >= 2 and not pressed:
+            pressed.append(1)
+            os.kill(os.getpid(), signal.SIGINT)
+
+    def slow(solution: pf.Solution) -> dict[str, float]:
+        time.sleep(0.3)
+        return end(solution)
+
+    pressed: list[int] = []
+    values = {"grip": np.linspace(1.0, 2.0, 40)}
+    with pytest.raises(SweepInterrupted) as stop:
+        pf.sweep(grip, values, out=tmp_path / "a.zarr", measure=slow, progress=press)
+    done = int((stop.value.data.status == "success").sum())
+    assert 2 <= done < 40 and int(stop.value.data.y.notnull().sum()) == done
+    assert int((stop.value.data.status == "missing").sum()) == 40 - done
+
+
+def test_a_ctrl_c_while_a_result_is_collected_ends_the_sweep(monkeypatch, tmp_path):
+    asked: list[Future] = []
+
+    def pressed(ask):
+        def answer(future, timeout=None):
+            asked.append(future)
+            if len(asked) == 3:
+                raise KeyboardInterrupt
+            return ask(future, timeout)
+
+        return answer
+
+    for name in ("result", "exception"):
+        monkeypatch.setattr(Future, name, pressed(getattr(Future, name)))
+    with pytest.raises(SweepInterrupted):
+        pf.sweep(grip, VALUES, out=tmp_path, measure=end)
+
+
+def test_without_zarr_the_extra_is_named(tmp_path, monkeypatch):
+    monkeypatch.setitem(__import__("sys").modules, "zarr", None)
+    with pytest.raises(pf.errors.MissingExtraError, match=r"planarfriction\[sweep\]"):
+        pf.sweep(grip, VALUES, out=tmp_path / "all.zarr")
+
+
+def slow_end(solution: pf.Solution) -> dict[str, float]:
+    time.sleep(0.02)
+    return end(solution)
+
+
+def test_a_dask_cluster_that_loses_a_worker_gives_the_same_bits(tmp_path):
+    distributed = pytest.importorskip("distributed", reason="needs dask: pip install 'planarfriction[sweep]'")
+    values = {"grip": np.linspace(1.0, 3.0, 60)}
+    killed: list[int] = []
+
+    def kill(progress: sweeps.Progress) -> None:
+        if progress.done >= 5 and not killed:
+            killed.append(next(iter(cluster.workers.values())).process.pid)
+            os.kill(killed[0], signal.SIGKILL)
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # dask's own, about sockets and processes that end
+        with (
+            distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+            distributed.Client(cluster) as client,
+        ):
+            client.run(os.chdir, str(Path(__file__).parents[2]))
+            data = pf.sweep(grip, values, out=tmp_path, executor=client.get_executor(), measure=slow_end, progress=kill)
+    assert killed and set(data.status.values.tolist()) == {"success"}
+    alone = pf.sweep(grip, values, measure=end)
+    np.testing.assert_array_equal(data.y, alone.y)
+    assert len(list(tmp_path.glob("*.npz"))) == 60
