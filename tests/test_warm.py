@@ -165,7 +165,7 @@ def test_a_read_only_installation_uses_the_cache_of_the_user(tmp_path):
 
 
 @pytest.mark.slow
-def test_without_a_place_for_machine_code_the_command_line_runs_and_says_so_in_one_line(tmp_path):
+def test_without_a_folder_for_machine_code_commands_run_and_say_so(tmp_path):
     where = read_only_installation(tmp_path)
     (tmp_path / "cache").write_text("there is no home either")
     command = [sys.executable, "-c", COMMAND_LINE, "run", "in-hand", "--t-end", "0.01"]

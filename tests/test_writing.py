@@ -52,7 +52,7 @@ WRITER = """
 """
 
 
-def test_several_writers_leave_a_whole_file_of_one_of_them_at_every_moment(tmp_path):
+def test_several_writers_always_leave_a_whole_file_of_one_of_them(tmp_path):
     target, own = tmp_path / "run.nc", tmp_path / "run.nc.part"
     own.write_bytes(OLD)
     target.write_bytes(1_000_000 * b"o")

@@ -173,7 +173,7 @@ def test_twists_and_wrenches_are_in_the_axes_of_the_site():
 # ---------------------------------------------------------------------- the callback
 
 
-def test_installed_friction_steps_as_step_does_and_leaves_what_is_the_users():
+def test_installed_friction_steps_as_step_does_and_keeps_user_data():
     scene = mujoco_scenes.shaken()
     m, d, friction = _held(scene)
     other = copy.copy(d)
@@ -257,7 +257,7 @@ def test_data_restore_bit_for_bit():
     assert (friction.state(d) == 0.0).all() and (friction.wrenches(d) == 0.0).all()
 
 
-def test_roll_outs_agree_whatever_was_in_the_data_and_on_any_number_of_threads():
+def test_rollouts_agree_for_any_former_data_and_number_of_threads():
     scene = dataclasses.replace(mujoco_scenes.tray(2), time=0.0)
     m, d, friction = scene.ours()
     scene.run(m, d, lambda: friction.step(d))
@@ -309,7 +309,7 @@ def test_options_that_do_not_fit_are_refused(name):
     assert mujoco.get_mjcb_control() is None
 
 
-def test_models_that_are_not_prepared_and_names_that_are_not_there_are_refused():
+def test_unprepared_models_and_unknown_names_are_refused():
     scene = mujoco_scenes.grip()
     m, _, friction = scene.ours()
     patches, pads = friction.patches, ("pad left", "block")

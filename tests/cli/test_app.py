@@ -448,7 +448,7 @@ def test_bench_prints_a_table(capsys, measured):
     assert measured == [(None, False)]
 
 
-def test_a_shape_of_ones_own_without_parameters_leaves_the_names_of_patches_as_they_are(monkeypatch):
+def test_an_own_shape_without_parameters_keeps_the_names_of_patches(monkeypatch):
     from planarfriction.families import SHAPES
 
     monkeypatch.setattr(SHAPES, "_members", dict(SHAPES._members))

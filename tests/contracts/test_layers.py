@@ -182,8 +182,3 @@ def test_a_run_that_writes_nothing_loads_no_datasets_and_no_pictures():
     loaded = _loaded_after(f"from planarfriction.cli import main\n{code}")
     assert "numba" in loaded
     assert not loaded & {"PIL", "matplotlib", "pandas", "shapely", "xarray"}
-
-
-def test_files_stay_short():
-    for file in PACKAGE.rglob("*.py"):
-        assert len(file.read_text(encoding="utf-8").splitlines()) <= 400, f"{file.name} is two things"

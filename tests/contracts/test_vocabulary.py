@@ -67,7 +67,7 @@ def test_every_front_end_has_the_same_models_methods_and_arguments():
 
 @pytest.mark.torch
 @pytest.mark.jax
-def test_roll_outs_take_the_same_arguments_and_begin_with_the_same_results():
+def test_rollouts_share_their_arguments_and_first_results():
     ends = front_ends()
     for end in ends:
         assert positional(end.rollout) == ["model", *ARGUMENTS], end

@@ -192,7 +192,7 @@ def test_a_load_that_one_rung_serves_moves_on_along_the_blend(kind, error, monke
             assert float(served.normal_force) == pytest.approx((values[0] - values[1]) / (1e-6 * load), rel=2e-6)
 
 
-def test_steady_sliding_changes_with_the_load_as_that_of_the_distributed_model():
+def test_steady_sliding_depends_on_the_load_as_in_the_distributed_model():
     """Over one long step, where the closure has no say."""
     patch, law, twist = TIP.refined(3), pf.LuGre(mu_c=0.7, mu_s=1.2), 3e-3 * SIZES * [1.0, 0.5, 1.0]
     exact, step = pf.DistributedModel(patch, law), 1e-5

@@ -44,7 +44,7 @@ def test_one_spin_fits_its_wrenches_with_a_wrong_map(example, fits):
     assert example.moved_load(truth, poor.weights) > 0.3
 
 
-def test_a_torque_about_points_of_a_line_does_not_tell_mirror_images_apart(example):
+def test_torques_about_a_line_do_not_distinguish_mirror_images(example):
     truth = example.true_patch()
     mirrored = pf.ContactPatch.points(truth.positions * [1.0, -1.0], truth.weights())
     for c in np.linspace(-0.02, 0.02, 7):

@@ -148,7 +148,7 @@ def test_a_new_wish_gives_up_the_last_one_and_what_it_said_too_late(document):
     assert said == ["second"] and ends == ["given up"]
 
 
-def test_work_that_is_refused_is_said_in_the_page_and_that_of_a_closed_one_ends(document):
+def test_refused_work_is_reported_and_work_of_a_closed_page_ends(document):
     said: list[str] = []
     live = Live(said.append)
 
@@ -170,7 +170,7 @@ def test_work_that_is_refused_is_said_in_the_page_and_that_of_a_closed_one_ends(
 # ---------------------------------------------------------------------- the server
 
 
-def test_the_server_listens_to_this_computer_alone_and_a_taken_port_is_one_line():
+def test_the_server_is_local_and_a_taken_port_is_one_line():
     server = open_server(0)
     try:
         addresses = {each.getsockname()[0] for each in server._http._sockets.values()}

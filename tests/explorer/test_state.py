@@ -40,7 +40,7 @@ def test_the_map_of_a_published_patch_presses_as_the_patch_does(name):
     np.testing.assert_allclose(as_map.weights(), patch.weights(), rtol=1e-12)
 
 
-def test_a_brush_paints_the_cells_in_its_radius_and_leaves_the_drawing_it_was_given():
+def test_a_brush_paints_cells_in_its_radius_and_copies_the_drawing():
     before = Drawing(np.zeros((5, 7)), 1e-3)
     after = before.painted(0.002, 0.001, radius=1.01e-3, pressure=0.5)  # a cell and its four neighbours
     expected = np.zeros((5, 7))
@@ -49,7 +49,7 @@ def test_a_brush_paints_the_cells_in_its_radius_and_leaves_the_drawing_it_was_gi
     assert not before.pressures.any() and after.origin == "drawn"
 
 
-def test_a_brush_smaller_than_a_cell_paints_the_cell_under_it_and_outside_the_map_none():
+def test_a_small_brush_paints_one_cell_and_none_outside_the_map():
     blank = Drawing(np.zeros((3, 3)), 1e-3)
     assert blank.painted(0.0014, -0.0014, radius=0.0, pressure=1.0).pressures[2, 2] == 1.0
     assert not blank.painted(0.0016, 0.0, radius=0.0, pressure=1.0).pressures.any()
@@ -74,7 +74,7 @@ def test_a_file_is_read_and_a_path_in_its_name_left_out():
         ("pad.npy", saved(np.ones((1, MOST_SIDE + 1))), f"at most {MOST_SIDE} rows and columns"),
     ],
 )
-def test_a_file_that_is_no_map_is_one_line_without_the_place_where_it_was_kept(name, content, words):
+def test_a_file_that_is_no_map_is_one_line_without_its_folder(name, content, words):
     with pytest.raises(FrictionError) as error:
         Drawing.read(name, content, 1e-3)
     assert words in str(error.value) and "\n" not in str(error.value) and "/" not in str(error.value).split(":")[0]
@@ -117,7 +117,7 @@ def test_the_friction_is_that_of_a_model_that_has_slid_for_long(drawing, law):
     np.testing.assert_allclose(answer(state).friction, wrench, rtol=1e-4, atol=2e-7)
 
 
-def test_without_stribeck_and_viscous_friction_the_law_is_on_the_limit_surface_of_its_cells():
+def test_coulomb_friction_lies_on_the_limit_surface_of_its_cells():
     state = State(law=pf.Dahl(mu_c=0.5), normal_force=3.0)
     expected = 1.5 * pf.LimitSurfaceCells(state.drawing.patch).wrench(state.twist)
     found = answer(state)
@@ -128,7 +128,7 @@ def test_without_stribeck_and_viscous_friction_the_law_is_on_the_limit_surface_o
     assert np.linalg.norm(found.points[2]) == pytest.approx(1.0, abs=3e-3)
 
 
-def test_the_ellipsoid_is_right_in_a_spin_about_the_centre_of_pressure_and_nowhere_worse_than_said():
+def test_the_ellipsoid_is_exact_in_pure_spin_and_within_its_stated_error():
     centred = answer(State(twist=(0.0, 0.0, 2.0)))
     assert centred.force_error < 3e-3 and centred.angle_error < 1e-6  # its radius: see above
     worst = State().drawing.largest_errors
@@ -138,7 +138,7 @@ def test_the_ellipsoid_is_right_in_a_spin_about_the_centre_of_pressure_and_nowhe
     assert 5.0 < max(each.angle_error for each in found) < 1.05 * worst[1]
 
 
-def test_the_error_of_the_ellipsoid_is_that_from_the_surface_whatever_the_law():
+def test_the_error_of_the_ellipsoid_does_not_depend_on_the_law():
     twist = (0.01, -0.003, 1.0)
     one, other = (answer(State(law=law, twist=twist)) for law in (pf.Dahl(), pf.LuGre(mu_s=3.0, v_s=0.1)))
     assert np.linalg.norm(one.friction - other.friction) > 0.1
@@ -165,7 +165,7 @@ def test_the_picture_of_the_map_has_its_top_row_at_the_top():
     assert [columns[key][0] for key in ("x", "y", "dw", "dh")] == [-1.0, -1.5, 2.0, 3.0]
 
 
-def test_arrows_of_slip_turn_about_the_centre_of_rotation_and_stand_where_something_presses():
+def test_arrows_of_slip_turn_about_the_centre_on_loaded_cells():
     state = State(Drawing.published("NonConvex1")).turning_about(0.002, 0.001)
     arrows = pictures.slip_arrows(state)
     x0, y0, x1, y1 = (np.array(arrows[name]) for name in ("x0", "y0", "x1", "y1"))
@@ -242,7 +242,7 @@ def test_the_ladder_moves_with_the_twist_and_turns_round():
     np.testing.assert_allclose(motion(state)(0.18), np.negative(state.twist))
 
 
-def test_the_models_are_compared_with_the_distributed_one_and_a_law_that_one_refuses_is_said():
+def test_models_are_compared_with_the_distributed_one_or_refuse_the_law():
     rungs = {each.name: each for each in climb(State(Drawing.published("NonConvex1"), State().law))}
     assert list(rungs) == list(RUNGS) and rungs["distributed"].error == 0.0
     assert [each.states for each in rungs.values()] == [36, 36, 12, 3, 3]
@@ -260,7 +260,7 @@ def test_a_scene_is_run_with_the_contact_on_the_screen():
         ready_scene(State().with_law("coulomb-stribeck"), "free-slide", "reduced")
 
 
-def test_a_film_has_a_player_asks_nobody_for_anything_and_is_given_up_when_it_is_told_to(monkeypatch):
+def test_a_film_is_one_file_with_a_player_and_can_be_cancelled(monkeypatch):
     monkeypatch.setattr(films, "DPI", 20.0)  # quick to draw
     scene = ready_scene(State(Drawing.published("Line")), "free-slide", "reduced")
     told: list[tuple[str, float]] = []
@@ -301,7 +301,7 @@ def test_a_file_that_is_no_scene_is_one_line_with_its_name(name, content, words)
     assert words in str(error.value) and "\n" not in str(error.value) and "/tmp" not in str(error.value)
 
 
-def test_files_that_a_scene_names_are_looked_for_where_the_explorer_was_started(tmp_path, monkeypatch):
+def test_files_named_by_a_scene_are_relative_to_the_start_folder(tmp_path, monkeypatch):
     drawing = Drawing.read("pad.npy", saved(np.ones((2, 2))), 1e-3)
     text = code.toml(State(drawing)).encode()
     monkeypatch.chdir(tmp_path)

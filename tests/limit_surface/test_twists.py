@@ -130,7 +130,7 @@ def test_many_twists_share_the_wrench_of_a_line_that_slides_across_itself():
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_magnitude_of_a_wrench_does_not_matter_and_read_only_ones_will_do(kind):
+def test_wrenches_of_any_magnitude_and_read_only_ones_are_taken(kind):
     surface = KINDS[kind](PATCHES["L"])
     wrench = np.array([0.3, -0.2, 0.001])
     wrench.setflags(write=False)
@@ -202,7 +202,7 @@ def rings_of(surface):
     return exact._Rings(outline.inner, outline.outer, outline.outer, exact._EVEN)
 
 
-def test_a_fingertip_smaller_than_the_hole_of_its_ring_loads_the_cells_beside_the_hole():
+def test_a_fingertip_smaller_than_its_hole_loads_the_cells_beside_it():
     ring = pf.ContactPatch.ring(0.004, 0.01, 21, pressure=pf.SoftFinger(c=0.002, k=2.0))
     surface, cells = pf.LimitSurfaceExact(ring), pf.LimitSurfaceCells(ring)
     assert surface.contact_radius == pytest.approx(cells.contact_radius, rel=0.01)  # of a cell of 1 mm, at 4 mm

@@ -76,7 +76,7 @@ def test_wrong_models(call, message):
 
 
 @every_model
-def test_numbers_and_batches_without_bounds_are_refused_before_memory_is_asked_for(model):
+def test_huge_numbers_and_batches_are_refused_before_allocation(model):
     with pytest.raises(InvalidValueError, match="batch axes must hold at most"):
         model.step(model.rest(), (1, 0, 0), np.broadcast_to(1.0, (10**5, 10**5)), 1e-3)
     with pytest.raises(InvalidValueError, match="normal_force must be an array of numbers along at most 16 axes"):

@@ -262,7 +262,7 @@ def test_one_contact_and_a_batch_give_the_same_step(model):
         np.testing.assert_array_equal(wrench, wrenches[i])
 
 
-def test_the_step_is_exact_for_plain_and_of_second_order_for_elasto_plastic_bristles(model):
+def test_the_step_is_exact_for_plain_and_second_order_for_other_bristles(model):
     orders = []
     for seed in range(4):
         twist, z = twists(1, seed, (-3.0, -3.0))[0], 7e-7 * np.random.default_rng(seed).normal(size=3)
@@ -380,7 +380,7 @@ def test_a_patch_that_depends_on_the_load_has_a_shape_for_each():
 
 
 @pytest.mark.parametrize("shape", ["Circle", "NonConvex1"])
-def test_driven_it_is_closer_to_the_converged_model_than_the_published_one(shape):
+def test_driven_it_beats_the_published_model_against_the_converged_one(shape):
     patch = PUBLISHED_PATCHES[shape]()
     twist = pf.Signal.sampled([0.0, 0.2, 0.4], [[0, 0, 0], [0.02, 0.01, 3.0], [-0.02, 0.0, 1.0]], hold="linear")
     models = [

@@ -53,7 +53,7 @@ def test_as_many_parts_as_cells_are_the_distributed_model(law, patch):
     assert errors[1] < errors[0] / 16.0
 
 
-def test_a_scene_with_as_many_parts_as_cells_is_that_of_the_distributed_model():
+def test_a_scene_with_a_part_per_cell_is_that_of_the_distributed_model():
     ends = []
     for model in (pf.ReducedModel(T, ELASTIC, parts=T.cells), pf.DistributedModel(T, ELASTIC)):
         data = simulate(pf.scenes.free_slide(model), rtol=1e-7, atol=1e-7).histories
@@ -171,7 +171,7 @@ def test_sliding_parts_dissipate(patch):
     assert (np.einsum("bi,bi->b", wrench, held) < 0.0).all()
 
 
-def test_maps_of_parts_are_blended_over_the_load_as_closely_as_that_of_the_patch():
+def test_maps_of_parts_blend_over_the_load_as_that_of_the_patch():
     held, blended = twists(40, 6), pf.ReducedModel(SOFT, PLAIN, parts=4, **SMALL)
     exact = pf.ReducedModel(SOFT, PLAIN, parts=4, load_error=0.0, **SMALL)
     errors = []

@@ -75,7 +75,7 @@ def test_a_solution_of_one_instant_is_a_picture_too():
 # ---------------------------------------------------------------------- between the samples
 
 
-def test_frames_pass_through_the_samples_and_do_not_overshoot_between_them():
+def test_frames_pass_through_the_samples_without_overshoot():
     run = synthetic.solution(t_end=0.5)
     y = np.where(np.arange(51) < 25, 0.0, -0.01)  # a jump: a spline would ring
     run = changed(run, y=y)
@@ -212,7 +212,7 @@ def test_a_body_that_stands_turns_about_no_point():
 
 
 @pytest.mark.parametrize(("mounted_on", "turned"), [("world", 0.0), ("body", -0.3 * 1.5**2)])
-def test_the_arrow_of_friction_is_in_world_axes_and_of_all_identical_contacts(mounted_on, turned):
+def test_the_arrow_of_friction_is_in_world_axes_for_identical_contacts(mounted_on, turned):
     scene = synthetic.scene(mounted_on=mounted_on)
     scene = dataclasses.replace(scene, contacts=[dataclasses.replace(scene.contacts[0], angle=0.5, count=2)])
     run = synthetic.solution(scene)

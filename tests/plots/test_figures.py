@@ -65,7 +65,7 @@ def test_cells_are_drawn_in_their_true_size(patch):
     assert drawn.mean(axis=1) == pytest.approx(1e3 * patch.positions, abs=DRAWING)
 
 
-def test_pressure_map_has_the_heavy_end_at_the_top_and_its_numbers_in_kilopascal():
+def test_pressure_map_is_heavy_at_the_top_and_in_kilopascal():
     patch = PUBLISHED_PATCHES["LineGrad"]()
     figure = plots.plot_patch(patch, normal_force=2.0)
     (cells,) = patch_axes(figure).collections
@@ -136,7 +136,7 @@ def test_samples_are_about_the_origin_of_the_contact_frame():
     assert power == pytest.approx(surface.dissipation(twists), rel=1e-12)
 
 
-def test_the_ellipsoid_beside_the_surface_is_the_unit_sphere_in_the_same_limits(monkeypatch):
+def test_the_ellipsoid_beside_the_surface_is_a_sphere_in_equal_limits(monkeypatch):
     from planarfriction.plots import limit_surface
 
     monkeypatch.setattr(limit_surface, "POLAR_SEGMENTS", 16)

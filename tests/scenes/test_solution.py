@@ -206,7 +206,7 @@ def test_other_programs_read_the_file(tmp_path):
         assert np.array_equal(file.variables["time"][:], np.arange(5) * 0.01)
 
 
-def test_a_file_that_another_program_wrote_anew_is_refused_with_the_way_out(tmp_path):
+def test_a_file_rewritten_by_another_program_is_refused_with_a_remedy(tmp_path):
     path = a_solution().save(tmp_path / "run.nc")
     data = xr.load_dataset(path, engine="scipy")
     data["x"] = 2.0 * data["x"]

@@ -32,7 +32,7 @@ def held_torque(load: float) -> float:
     return 2.0 * load * 3.0 * math.pi / 16.0 * 0.006 * load ** (1.0 / 3.0)
 
 
-def test_the_part_turns_as_far_as_a_pendulum_on_a_pin_with_the_friction_of_the_pads():
+def test_the_part_turns_as_a_pendulum_with_the_friction_of_the_pads():
     scene = pivot(pf.DistributedModel(FINGERTIP, COULOMB))
     grip = scene.contacts[0].normal_force
     start = next(t for t in grip.times if held_torque(float(grip(t))) < MASS * G * ARM)
@@ -62,7 +62,7 @@ def test_the_part_turns_as_far_as_a_pendulum_on_a_pin_with_the_friction_of_the_p
 
 
 @pytest.mark.parametrize(("share", "holds"), [(0.97, False), (1.03, True)])
-def test_a_grip_holds_from_the_load_to_the_four_thirds_that_the_torque_needs(share, holds):
+def test_a_grip_holds_from_the_load_that_the_torque_needs(share, holds):
     """The weight asks for a hundredth of the force too, and takes 0.5 % of the torque."""
     needed = brentq(lambda load: held_torque(load) - MASS * G * ARM, 0.1, 10.0)
     scene = pivot(pf.DistributedModel(FINGERTIP, COULOMB), normal_force=share * needed, start="rest", t_end=0.5)

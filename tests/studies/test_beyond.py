@@ -84,7 +84,7 @@ def test_reduced_model_is_nearer_than_the_published_one(result):
         assert ratios["torque median"] < 0.05
 
 
-def test_parts_are_nearer_than_the_published_model_on_patches_that_no_table_holds(result):
+def test_parts_beat_the_published_model_on_patches_of_no_table(result):
     for each in result.numbers["new shapes"].values():
         for ratios in each[ladder.AUTO].values():
             assert max(ratios) < 1.0

@@ -76,7 +76,7 @@ def test_cell_that_holds_the_middle_of_the_load(cells):
     assert half_load_cell(cells) == 1 + np.searchsorted(load, 0.5 * load[-1])
 
 
-def test_the_spin_without_force_is_not_the_spin_about_the_centre_of_pressure(result):
+def test_the_spin_without_force_is_not_about_the_centre_of_pressure(result):
     gradient = result.numbers["gradient"]
     cells, beside = gradient["cells"], gradient["ellipsoid"]
     assert cells["middle cell"] == pytest.approx(4 * 0.02 / 21, rel=1e-12)

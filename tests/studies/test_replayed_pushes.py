@@ -16,7 +16,7 @@ from planarfriction.planning import Pusher, Slider, push
 EXAMPLE = Path(__file__).parents[2] / "examples" / "push_to_a_pose.py"
 
 
-def test_measured_pushes_in_time_end_nearer_on_their_feet_than_on_an_ellipsoid():
+def test_measured_pushes_end_nearer_on_feet_than_on_an_ellipsoid():
     measured = followed.pushes_in_time()
     assert len(measured) == 51
     named = [each for each in measured if "3out" in each.name]

@@ -189,7 +189,7 @@ def test_the_command_writes_a_report_and_all_numbers(made, tmp_path, capsys):
     assert all(source.startswith(("data:image/", "#")) for source in sources)
 
 
-def test_the_report_begins_with_its_verdict_and_tells_our_test_from_the_papers(made, tmp_path):
+def test_the_report_begins_with_its_verdict_and_separates_the_papers(made, tmp_path):
     main(["reproduce", "--out", str(tmp_path)])
     head, first, _ = re.split("<section", (tmp_path / "report.html").read_text())
     assert "All 4 comparisons are within their tolerance" in head

@@ -54,7 +54,7 @@ def reference():
 # ---------------------------------------------------------------------- the dataset
 
 
-def test_a_sweep_has_a_dimension_for_each_quantity_and_the_variables_of_each_solution():
+def test_a_sweep_has_a_dimension_for_each_quantity_and_all_variables():
     data = reference()
     assert dict(data.sizes) == {"grip": 3, "mass": 2, "time": 4, "contact": 1}
     assert data.grip.values.tolist() == GRIPS and data.mass.values.tolist() == MASSES

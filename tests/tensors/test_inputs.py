@@ -197,7 +197,7 @@ def test_where_values_are_unseen_friction_never_drives(front, kind):
 @pytest.mark.parametrize("name", ["twist", "normal_force", "dt"])
 @pytest.mark.parametrize("method", ["adjoint", "eager"])
 @pytest.mark.parametrize("kind", ["ReducedModel", "ReducedModelPublished"])
-def test_where_values_are_unseen_not_a_number_stays_so_and_no_other_contact_is_spoilt(kind, method, name):
+def test_nan_in_traced_values_stays_and_spoils_no_other_contact(kind, method, name):
     """Inside `jit` a load of NaN counted as none, and any NaN ended the adjoint in an error of its callback."""
     front = Jax()
     jax, model = front.jax, front.model(kind)

@@ -253,7 +253,7 @@ def test_second_derivatives_by_the_adjoint_are_one_line(twice):
 
 
 @pytest.mark.slow
-def test_without_a_method_what_the_adjoint_does_not_do_is_left_to_operations_of_jax():
+def test_without_a_method_jax_does_what_the_adjoint_cannot():
     def derivatives(method):
         loss, (law, twists) = square(method)
         hessian = jax.jit(jax.hessian(lambda law: loss(law, twists)))(law)

@@ -65,7 +65,7 @@ def assert_equal(tensors, arrays):
 
 
 @every_surface
-def test_the_steady_torque_of_a_spin_is_bounded_by_the_static_friction_times_the_contact_radius(surface):
+def test_the_steady_torque_of_a_spin_is_bounded_by_static_friction(surface):
     # A published snippet forgets one factor r in the torque: it gives mu f_N, 100 times too much here.
     law = pf.LuGre(mu_c=0.8, mu_s=1.0, sigma_2=0.0)
     load, model = 2.0, reduced(law, surface)
@@ -127,7 +127,7 @@ def test_one_contact_and_batches_that_broadcast():
     )
 
 
-def test_a_patch_whose_shape_follows_the_load_keeps_the_shape_of_its_surface():
+def test_a_patch_that_depends_on_the_load_keeps_its_surface_s_shape():
     patch = pf.ContactPatch.disc(0.01, cells=9, pressure=pf.SoftFinger(c=0.005, n=1 / 3, k=2.0))
     surface = pf.LimitSurfaceTable(patch, normal_force=2.0)
     model = ReducedModelPublished(patch, PLAIN, surface, dtype=torch.float64)

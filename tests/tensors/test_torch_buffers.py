@@ -56,7 +56,7 @@ def test_a_state_dict_carries_the_patch(kind, method):
     assert model.law() == other.law() and model.lever == other.lever
 
 
-def test_a_state_dict_carries_the_stribeck_exponent_that_the_map_is_made_for():
+def test_a_state_dict_carries_the_stribeck_exponent_of_its_map():
     steeper = pf.LuGre(mu_s=1.2, gamma=0.7, elasto_plastic=pf.ElastoPlastic(0.7))
     model, other = module("reduced"), module("reduced", law=steeper)
     model.load_state_dict(other.state_dict())
@@ -97,7 +97,7 @@ def _inside(values: dict) -> dict:
     return {f"model.{name}": value for name, value in values.items()}
 
 
-def test_the_adjoint_differentiates_stacked_models_with_respect_to_shared_inputs():
+def test_the_adjoint_of_stacked_models_takes_shared_inputs():
     models = [module("reduced"), module("reduced", OTHER)]
     parameters, buffers = torch.func.stack_module_state(models)
 

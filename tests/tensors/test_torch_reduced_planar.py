@@ -95,7 +95,7 @@ def test_shapes_of_one_contact_and_of_batches():
     assert tracking_loss(model, v_profile, torch.zeros(20, 3), 1.0).shape == ()
 
 
-def test_a_script_finds_the_friction_and_the_radius_that_made_its_wrenches():
+def test_a_script_recovers_the_friction_and_the_radius():
     truth, model = build(radius=0.02), build(mu_c=0.5, mu_s=0.6, radius=0.03)
     v_profile = profile(200)
     reference = simulate(truth, v_profile, f_n=2.0, dt=1e-3).detach()
@@ -156,7 +156,7 @@ def test_bristles_of_steady_sliding_rest(surface):
 
 @pytest.mark.parametrize("surface", [None, *SURFACES.values()], ids=["none", *SURFACES])
 @pytest.mark.parametrize("radius", [0.05, 0.004])
-def test_the_steady_torque_of_a_spin_is_bounded_by_the_static_friction_times_load_and_radius(surface, radius):
+def test_the_steady_torque_of_a_spin_is_bounded(surface, radius):
     # A published snippet forgets one factor r: it gives 1 N m where 0.05 N m is the bound.
     model, f_n = build(mu_c=1.0, mu_s=1.2, sigma_2=0.0, radius=radius, surface=surface), 2.0
     x, y = (0.0, 0.0) if surface is None else LOPSIDED.centre_of_pressure()

@@ -1,0 +1,58 @@
+"""Sizes that keep the code readable: lines of files and functions, characters of the names of tests."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+
+MAX_FILE = 400
+"""Lines of a source file; a longer one is two things."""
+
+MAX_FUNCTION = 60
+"""Lines of a function without its docstring."""
+
+MAX_TITLE = 69
+"""Characters of the name of a test."""
+
+TOO_LONG = {"newton.solve", "rosenbrock.advance", "tables.tables"}
+"""Functions that are longer still: they shrink, and none is added."""
+
+
+def functions(folder: str) -> Iterator[tuple[str, ast.FunctionDef]]:
+    """Yield each function below a folder, nested ones and methods too, with its module's and its own name."""
+    for file in sorted((ROOT / folder).rglob("*.py")):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
+                yield f"{file.stem}.{node.name}", node
+
+
+def lines(function: ast.FunctionDef) -> int:
+    """Return the number of lines of a function, from `def` on, without its docstring."""
+    first = function.body[0]
+    docstring = 0 if ast.get_docstring(function) is None else first.end_lineno - first.lineno + 1
+    return function.end_lineno - function.lineno + 1 - docstring
+
+
+def test_files_stay_short():
+    number = {file: len(file.read_text(encoding="utf-8").splitlines()) for file in (ROOT / "src").rglob("*.py")}
+    assert {str(file): count for file, count in number.items() if count > MAX_FILE} == {}
+
+
+def test_functions_stay_short():
+    number = {name: lines(function) for name, function in functions("src")}
+    assert {name for name, count in number.items() if count > MAX_FUNCTION} <= TOO_LONG
+
+
+def test_lines_of_a_function_are_counted_without_its_docstring():
+    code = 'def f(x):\n    """Return x.\n\n    Unchanged.\n    """\n    y = x\n    return y\n'
+    assert lines(ast.parse(code).body[0]) == 3
+    assert lines(ast.parse("def f(x):\n    return x").body[0]) == 2
+
+
+def test_names_of_tests_stay_short():
+    titles = [name for _, function in functions("tests") if (name := function.name).startswith("test_")]
+    assert len(titles) > 1000
+    assert [title for title in titles if len(title) > MAX_TITLE] == []
