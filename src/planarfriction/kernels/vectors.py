@@ -55,6 +55,31 @@ def plus(typingctx, a, c, b):
 
 
 @intrinsic
+def zeros(typingctx, a):
+    """Return a vector of zeros as long as a."""
+
+    def generate(context, builder, signature, args):
+        zero = context.get_constant(types.float64, 0.0)
+        return context.make_tuple(builder, signature.return_type, [zero] * len(a))
+
+    return types.UniTuple(types.float64, len(a))(a), generate
+
+
+@intrinsic(prefer_literal=True)
+def placed(typingctx, a, i, x):
+    """Return a vector of zeros as long as a, but for x in the constant place i."""
+    if not isinstance(i, types.IntegerLiteral):
+        return None
+
+    def generate(context, builder, signature, args):
+        items = [context.get_constant(types.float64, 0.0)] * len(a)
+        items[i.literal_value] = args[2]
+        return context.make_tuple(builder, signature.return_type, items)
+
+    return types.UniTuple(types.float64, len(a))(a, i, types.float64), generate
+
+
+@intrinsic
 def accumulate(typingctx, row, at, stride, record):
     """Add the numbers of a record, which may hold records, one by one to `row[at]`, `row[at + stride]`, ..."""
 

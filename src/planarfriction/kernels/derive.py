@@ -1,0 +1,490 @@
+"""Derivatives of straight-line functions, reverse mode from source to source.
+
+A straight-line function is assignments and one return, of numbers (`+ - * /`), of vectors (`plus`, `times`, `dot`,
+`norm`, `v[i]`, `(x, y)`), of records that are read by name, and of calls of other such functions. `derive` writes two
+functions for it: `forth(...)` returns `(results, tape)`, and `back(tape, bars)` the cotangents of chosen arguments from
+those of the results. Both are written as text and compiled like any other kernel.
+
+A function that is no straight line, one with a kink, or one whose derivative loses digits if it is written term by
+term, has a rule of its own: see `RULES` and `rule`.
+"""
+
+from __future__ import annotations
+
+import ast
+import functools
+import hashlib
+import inspect
+import linecache
+import math
+import textwrap
+from collections.abc import Callable, Iterable
+from typing import Any, NamedTuple
+
+from planarfriction import formulas
+from planarfriction.kernels import compiled_math as xp
+from planarfriction.kernels import kernel, vectors
+from planarfriction.kernels.vectors import dot, placed, plus, times, zeros
+
+
+class NotStraightError(TypeError):
+    """A function for which `derive` cannot write a derivative."""
+
+
+class Rule(NamedTuple):
+    """Derivative of a function that is not taken apart.
+
+    In its texts `{0}`, `{1}` stand for the arguments, `{t}` for the result (`{t0}`, `{t1}` for several) and `{b}` for
+    its cotangent.
+    """
+
+    results: str
+    """Kind of each result: "s" for a number, "v" for a vector."""
+    slopes: dict[Any, str] = {}
+    """Derivative of the result by argument i, or of result r by argument i for the key (r, i); kept on the tape."""
+    pulls: dict[int, str] = {}
+    """Cotangent of argument i, where a derivative of a vector would be a matrix."""
+    names: dict[str, Any] = {}
+    """Functions that the texts name, beside those of `NAMES`."""
+
+
+@kernel
+def per(x):
+    """Return `1/x` for x > 0; 0 at 0, and so is its slope."""
+    return 1.0 / xp.where(x > 0.0, x, math.inf)
+
+
+@kernel
+def _power_slope(x, exponent, raised):
+    """Derivative of `x^exponent` by x; at 0 the right-hand limit for exponents >= 1."""
+    return xp.where(x > 0.0, exponent * raised * per(x), xp.where(exponent == 1.0, 1.0, 0.0))
+
+
+@kernel
+def _log(x):
+    """Return `log x`; 0 at 0, where `x^e log x` vanishes."""
+    return xp.log(xp.where(x > 0.0, x, 1.0))
+
+
+@kernel
+def _slip_slope(deflection, breakaway):
+    """Derivative of `formulas.slip_fraction` by the deflection, exactly zero before breakaway and at full deflection.
+
+    It is multiplied by how far a long step would have gone, 1e9, or by one over hardly any deflection.
+    """
+    partly = (deflection > breakaway) & (deflection < 1.0)
+    return xp.where(partly, formulas.slip_fraction_slope(xp, deflection, breakaway), 0.0)
+
+
+@kernel
+def _slip_by_breakaway(deflection, breakaway):
+    """Derivative of `formulas.slip_fraction` by the breakaway ratio."""
+    return formulas.bristle_decay_by_breakaway(xp, _slip_slope(deflection, breakaway), deflection, breakaway)
+
+
+NAMES: dict[str, Any] = {
+    "dot": dot, "formulas": formulas, "log_or_0": _log, "per": per, "placed": placed, "plus": plus,
+    "power_slope": _power_slope, "slip_by_breakaway": _slip_by_breakaway, "slip_slope": _slip_slope, "times": times,
+    "xp": xp, "zeros": zeros,
+}  # fmt: skip
+"""Functions that generated code and the texts of rules name."""
+
+RULES: dict[Any, Rule] = {
+    ast.Add: Rule("s", {0: "1.0", 1: "1.0"}),
+    ast.Sub: Rule("s", {0: "1.0", 1: "-1.0"}),
+    ast.Mult: Rule("s", {0: "{1}", 1: "{0}"}),
+    ast.Div: Rule("s", {0: "1.0 / {1}"}),  # only the numerator: see `_Walk._quotient`
+    ast.USub: Rule("s", {0: "-1.0"}),
+    plus: Rule("v", {}, {0: "{b}", 1: "dot({b}, {2})", 2: "times({1}, {b})"}),
+    times: Rule("v", {}, {0: "dot({b}, {1})", 1: "times({0}, {b})"}),
+    dot: Rule("s", {}, {0: "times({b}, {1})", 1: "times({b}, {0})"}),
+    vectors.norm: Rule("s", {"per": "per({t})"}, {0: "times({b} * {per}, {0})"}),
+    math.sqrt: Rule("s", {0: "0.5 * per({t})"}),
+    per: Rule("s", {0: "-{t} * {t}"}),
+    xp.where: Rule("s", {1: "xp.where({0}, 1.0, 0.0)", 2: "xp.where({0}, 0.0, 1.0)"}),
+    # of equal numbers the slope is that of the first
+    xp.maximum: Rule("s", {0: "xp.where({0} >= {1}, 1.0, 0.0)", 1: "xp.where({0} >= {1}, 0.0, 1.0)"}),
+    xp.minimum: Rule("s", {0: "xp.where({0} <= {1}, 1.0, 0.0)", 1: "xp.where({0} <= {1}, 0.0, 1.0)"}),
+    xp.exp: Rule("s", {0: "{t}"}),
+    xp.log: Rule("s", {0: "1.0 / {0}"}),
+    xp.sin: Rule("s", {0: "xp.cos({0})"}),
+    xp.cos: Rule("s", {0: "-xp.sin({0})"}),
+    xp.power: Rule("s", {0: "power_slope({0}, {1}, {t})", 1: "{t} * log_or_0({0})"}),
+    formulas.relaxation: Rule("ss", {(0, 1): "-{t0}", (1, 1): "formulas.relaxation_slope(xp, {1}, {t0}, {t1})"}),
+    formulas.slip_fraction: Rule("s", {1: "slip_slope({1}, {2})", 2: "slip_by_breakaway({1}, {2})"}),
+}
+"""Rules by function or operator."""
+
+
+def rule(function: Callable, results: str, slopes: dict, pulls: dict | None = None, **names: Any) -> None:
+    """Give a function a `Rule`, whose texts may name the functions `names`."""
+    RULES[function] = Rule(results, slopes, pulls or {}, names)
+
+
+class _Step(NamedTuple):
+    """One step of a function, taken apart."""
+
+    targets: list[str]
+    atoms: list[str]
+    """Names or constants that the step reads."""
+    rule: Rule | Derivative
+    tape: str = ""
+    """Name of the tape that a derived function returns."""
+
+
+class _Walk:
+    """A function taken apart into steps that do one thing each, every variable assigned once."""
+
+    def __init__(self, function: Callable, by: Iterable[str], vectors: Iterable[str]):
+        self.function = getattr(function, "py_func", function)
+        self.where = f"{self.function.__module__}.{self.function.__qualname__}"
+        self.globals = {**self.function.__globals__, **inspect.getclosurevars(self.function).nonlocals, "xp": xp}
+        self.names: dict[str, Any] = dict(NAMES)
+        self.lines: list[str] = []
+        self.steps: list[_Step] = []
+        self.results: list[str] = []
+        self.count = 0
+        definition = self._definition()
+        self.arguments = [each.arg for each in definition.args.args]
+        self.first = {name: self._new(name) for name in self.arguments}
+        self.known = dict(self.first)
+        self.active = {self.outer(name) for name in by}
+        self.vectors = {self.outer(name) for name in vectors}
+        for statement in definition.body:
+            self._statement(statement)
+        if not self.results:
+            raise self._refusal(definition, "has no return")
+
+    def _definition(self) -> ast.FunctionDef:
+        try:
+            source = inspect.getsource(self.function)
+        except OSError as error:
+            raise NotStraightError(f"{self.where}: derivatives are written from its source, which is missing") from error
+        return ast.parse(textwrap.dedent(source)).body[0]  # type: ignore[return-value]
+
+    def _refusal(self, node: ast.AST, why: str) -> NotStraightError:
+        first = self.function.__code__.co_firstlineno
+        text = ast.unparse(node).splitlines()[0]
+        return NotStraightError(f"{self.where}, line {first + getattr(node, 'lineno', 1) - 1}: `{text}` {why}")
+
+    def outer(self, path: str) -> str:
+        """Return the generated name of an argument or of a field of one, `law.mu_c`."""
+        head, dot, rest = path.partition(".")
+        if head not in self.arguments:
+            raise NotStraightError(f"{self.where} has no argument {head}, only {', '.join(self.arguments)}")
+        return self.first[head] + dot + rest
+
+    def _new(self, name: str = "t") -> str:
+        self.count += 1
+        return f"{name}_{self.count}"
+
+    # ------------------------------------------------------------------ statements
+
+    def _statement(self, node: ast.stmt) -> None:
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):  # a docstring
+            return
+        if isinstance(node, ast.Return) and node.value is not None and not self.results:
+            several = node.value.elts if isinstance(node.value, ast.Tuple) else [node.value]
+            self.results = [self._atom(each) for each in several]
+        elif isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Name):
+            self.known[node.target.id] = self._atom(
+                ast.copy_location(ast.BinOp(ast.Name(node.target.id), node.op, node.value), node)
+            )
+        elif isinstance(node, ast.Assign):
+            for target in node.targets:
+                self._assign(target, node.value)
+        else:
+            raise self._refusal(node, "is no assignment and no return at the end: write it as one, or give it a `rule`")
+
+    def _assign(self, target: ast.expr, value: ast.expr) -> None:
+        if isinstance(target, ast.Name):
+            self.known[target.id] = self._atom(value)
+            return
+        names = target.elts if isinstance(target, ast.Tuple) else []
+        if isinstance(value, ast.Tuple) and len(value.elts) == len(names):
+            found = [self._atom(each) for each in value.elts]
+        else:
+            found = self._several(value, len(names))
+        for name, each in zip(names, found, strict=True):
+            if isinstance(name, ast.Tuple):
+                parts = [self._item(each, i) for i in range(len(name.elts))]
+                for inner, part in zip(name.elts, parts, strict=True):
+                    self.known[inner.id] = part  # type: ignore[attr-defined]
+            elif isinstance(name, ast.Name):
+                self.known[name.id] = each
+            else:
+                raise self._refusal(target, "is no name to assign to")
+
+    # ------------------------------------------------------------------ expressions
+
+    def _several(self, node: ast.expr, count: int) -> list[str]:
+        """Return the names of `count` values: results of a call, or components of a vector."""
+        found = self._call(node) if isinstance(node, ast.Call) else [self._atom(node)]
+        if len(found) == 1 and count > 1:
+            return [self._item(found[0], i) for i in range(count)]
+        if len(found) != count:
+            raise self._refusal(node, f"has {len(found)} results, not {count}")
+        return found
+
+    def _atom(self, node: ast.expr) -> str:
+        """Return the name, or the constant, that holds an expression, after the steps that find it."""
+        if isinstance(node, ast.Constant):
+            return repr(node.value)
+        if isinstance(node, ast.Name):
+            return self._name(node)
+        if isinstance(node, ast.Attribute):
+            return f"{self._atom(node.value)}.{node.attr}"
+        if isinstance(node, ast.Call):
+            results = self._call(node)
+            return results[0] if len(results) == 1 else self._vector(results)
+        if isinstance(node, ast.Tuple):
+            return self._vector([self._atom(each) for each in node.elts])
+        if isinstance(node, ast.Subscript) and isinstance(node.slice, ast.Constant):
+            return self._item(self._atom(node.value), node.slice.value)
+        if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub):
+            return self._number(node, "-{0}", [node.operand])
+        if isinstance(node, ast.BinOp) and type(node.op) in _SIGNS:
+            return self._number(node, f"{{0}} {_SIGNS[type(node.op)]} {{1}}", [node.left, node.right])
+        return self._condition(node)
+
+    def _name(self, node: ast.Name) -> str:
+        if node.id in self.known:
+            return self.known[node.id]
+        if node.id not in self.globals:
+            raise self._refusal(node, "is not known")
+        self._use(node.id, self.globals[node.id])
+        return node.id
+
+    def _use(self, name: str, value: Any) -> None:
+        if self.names.setdefault(name, value) is not value:
+            raise NotStraightError(f"{self.where} and a rule mean different things by {name}")
+
+    def _condition(self, node: ast.expr) -> str:
+        """Return a comparison, or several joined: what chooses has no derivative."""
+        if isinstance(node, ast.Compare):
+            text = self._atom(node.left)
+            for operator, right in zip(node.ops, node.comparators, strict=True):
+                text += f" {_COMPARISONS[type(operator)]} {self._atom(right)}"
+        elif isinstance(node, ast.BoolOp):
+            joined = " and " if isinstance(node.op, ast.And) else " or "
+            text = joined.join(self._atom(each) for each in node.values)
+        elif isinstance(node, ast.BinOp) and isinstance(node.op, (ast.BitAnd, ast.BitOr)):
+            text = f"{self._atom(node.left)} {'&' if isinstance(node.op, ast.BitAnd) else '|'} {self._atom(node.right)}"
+        else:
+            raise self._refusal(node, "is no straight line: use `xp.where`, or a function with a `rule`")
+        return self.emit(text)
+
+    def emit(self, text: str, name: str = "t") -> str:
+        target = self._new(name)
+        self.lines.append(f"{target} = {text}")
+        return target
+
+    def _number(self, node: ast.BinOp | ast.UnaryOp, text: str, operands: list[ast.expr]) -> str:
+        atoms = [self._atom(each) for each in operands]
+        if self.vectors.intersection(atoms):
+            raise self._refusal(node, "is of vectors: use `plus`, `times`, `dot`")
+        if isinstance(node.op, ast.Div) and atoms[1] in self.active:
+            return self._quotient(*atoms)
+        target = self.emit(text.format(*atoms))
+        return self._taken([target], atoms, RULES[type(node.op)])[0]
+
+    def _quotient(self, above: str, below: str) -> str:
+        inverse = self._taken([self.emit(f"1.0 / {below}")], [below], RULES[per])[0]
+        return self._taken([self.emit(f"{above} * {inverse}")], [above, inverse], RULES[ast.Mult])[0]
+
+    def _vector(self, items: list[str]) -> str:
+        target = self.emit(f"({', '.join(items)},)")
+        pulls = {i: f"{{b}}[{i}]" for i in range(len(items))}
+        return self._taken([target], items, Rule("v", {}, pulls))[0]
+
+    def _item(self, vector: str, i: int) -> str:
+        target = self.emit(f"{vector}[{i}]")
+        return self._taken([target], [vector], Rule("s", {}, {0: f"placed({{0}}, {i}, {{b}})"}))[0]
+
+    def _taken(self, targets: list[str], atoms: list[str], how: Rule | Derivative, tape: str = "") -> list[str]:
+        """Note a step and the kinds of its results."""
+        self.vectors.update(name for name, kind in zip(targets, how.results, strict=True) if kind == "v")
+        if any(name in self.active for atom in atoms for name in self._inside(atom)):
+            self.active.update(targets)
+            self.steps.append(_Step(targets, atoms, how, tape))
+        return targets
+
+    def _inside(self, atom: str) -> list[str]:
+        """Return the active names of an atom: itself, or its fields."""
+        return [name for name in self.active if name == atom or name.startswith(atom + ".")]
+
+    # ------------------------------------------------------------------ calls
+
+    def _call(self, node: ast.Call) -> list[str]:
+        function, path = self._resolve(node.func), ast.unparse(node.func)
+        if node.keywords or any(isinstance(each, ast.Starred) for each in node.args):
+            raise self._refusal(node, "has arguments by name or by star: write them one by one")
+        atoms = [self._atom(each) for each in node.args]
+        if function in RULES:
+            how: Rule | Derivative = RULES[function]
+            for name, value in how.names.items():
+                self._use(name, value)
+        else:
+            how = self._derived(function, atoms)
+        targets = [self._new() for _ in how.results]
+        text, tape = f"{path}({', '.join(atoms)})", ""
+        if isinstance(how, Rule) or not how.by:
+            self.lines.append(f"{', '.join(targets)} = {text}")
+        else:
+            tape = self._new("tape")
+            name = f"{how.name}{self.count}"
+            self.names[f"{name}_forth"], self.names[f"{name}_back"] = how.forth, how.back
+            self.lines.append(f"({', '.join(targets)},), {tape} = {name}_forth({', '.join(atoms)})")
+        return self._taken(targets, atoms, how, tape)
+
+    def _resolve(self, node: ast.expr) -> Any:
+        """Return the function that a call names, and note it for the generated code."""
+        if isinstance(node, ast.Attribute):
+            return getattr(self._resolve(node.value), node.attr)
+        if not isinstance(node, ast.Name) or (node.id in self.known and node.id != "xp"):
+            raise self._refusal(node, "is no function of its module")
+        value = self.globals.get(node.id)
+        if value is None:
+            raise self._refusal(node, "is not known")
+        self._use(node.id, value)
+        return value
+
+    def _derived(self, function: Any, atoms: list[str]) -> Derivative:
+        names = list(inspect.signature(getattr(function, "py_func", function)).parameters)
+        pairs = list(zip(names, atoms, strict=True))
+        by = tuple(name + found[len(atom) :] for name, atom in pairs for found in sorted(self._inside(atom)))
+        vectors = tuple(
+            name + found[len(atom) :]
+            for name, atom in pairs
+            for found in sorted(self.vectors)
+            if found == atom or found.startswith(atom + ".")
+        )
+        return derive(function, by, vectors)
+
+
+_SIGNS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
+_COMPARISONS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!="}
+
+
+class _WayBack:
+    """Cotangents through the steps of a function, last step first; partial derivatives that they take join its lines."""
+
+    def __init__(self, walk: _Walk):
+        self.walk, self.lines, self.count = walk, [], 0
+        self.bars: dict[str, str] = {}
+        for i, result in enumerate(walk.results):
+            self._add(result, f"bars[{i}]")
+        for step in reversed(walk.steps):
+            found = [self.bars.pop(target, "") for target in step.targets]
+            if not any(found):
+                continue
+            if isinstance(step.rule, Rule):
+                self._by_rule(step, step.rule, found)
+            else:
+                self._by_derivative(step, step.rule, found)
+
+    def emit(self, text: str, name: str = "bar") -> str:
+        self.count += 1
+        target = f"{name}_{self.count}"
+        self.lines.append(f"{target} = {text}")
+        return target
+
+    def _add(self, name: str, text: str) -> None:
+        """Add to the cotangent of a name."""
+        before = self.bars.get(name)
+        if before is None:
+            self.bars[name] = text if text.isidentifier() else self.emit(text)
+        else:
+            vector = name in self.walk.vectors
+            self.bars[name] = self.emit(f"plus({before}, 1.0, {text})" if vector else f"{before} + {text}")
+
+    def cotangent(self, name: str) -> str:
+        """Return the cotangent of a name, zero where the results do not depend on it."""
+        return self.bars.get(name) or (f"zeros({name})" if name in self.walk.vectors else "0.0")
+
+    def _by_rule(self, step: _Step, rule: Rule, found: list[str]) -> None:
+        results = {"t": step.targets[0], **{f"t{r}": target for r, target in enumerate(step.targets)}}
+        kept = {}
+        for key, text in rule.slopes.items():
+            r, i = key if isinstance(key, tuple) else (0, key)
+            if isinstance(i, str):
+                kept[i] = self._kept(text.format(*step.atoms, **results))
+            elif step.atoms[i] in self.walk.active and found[r]:
+                self._add(step.atoms[i], self._product(found[r], text.format(*step.atoms, **results), step.atoms[i]))
+        for i, text in rule.pulls.items():
+            if step.atoms[i] in self.walk.active:
+                self._add(step.atoms[i], text.format(*step.atoms, **results, **kept, b=found[0]))
+
+    def _product(self, bar: str, slope: str, atom: str) -> str:
+        if slope in ("1.0", "-1.0"):
+            return bar if slope == "1.0" else f"-{bar}"
+        slope = self._kept(slope)
+        return f"times({bar}, {slope})" if atom in self.walk.vectors else f"{bar} * {slope}"
+
+    def _kept(self, text: str) -> str:
+        """Return the name that holds a partial derivative, found on the way forth."""
+        return text if text.replace(".", "_").isidentifier() else self.walk.emit(text, "slope")
+
+    def _by_derivative(self, step: _Step, inner: Derivative, found: list[str]) -> None:
+        bars = [bar or self.cotangent(target) for bar, target in zip(found, step.targets, strict=True)]
+        name = f"{inner.name}{step.tape.removeprefix('tape_')}_back"
+        pulled = self.emit(f"{name}({step.tape}, ({', '.join(bars)},))", "bars")
+        for i, path in enumerate(inner.by):
+            head, dot, rest = path.partition(".")
+            self._add(step.atoms[inner.arguments.index(head)] + dot + rest, f"{pulled}[{i}]")
+
+
+class Derivative(NamedTuple):
+    """A function with its derivative, both compiled into their callers."""
+
+    name: str
+    arguments: tuple[str, ...]
+    by: tuple[str, ...]
+    """Arguments, or fields of them, whose cotangents `back` returns, in this order."""
+    results: str
+    """Kind of each result."""
+    source: str
+    """Text of `forth` and `back`."""
+    forth: Any
+    """Return the results and a tape, from the arguments of the function."""
+    back: Any
+    """Return the cotangents of `by`, from the tape and a tuple of those of the results."""
+
+
+@functools.cache
+def derive(function: Callable, by: tuple[str, ...], vectors: tuple[str, ...] = ()) -> Derivative:
+    """Write the derivative of a straight-line function.
+
+    `by` are the arguments to differentiate by, a field of a record as `law.mu_c`; `vectors` those that are vectors.
+    Raises `NotStraightError` with the line that cannot be taken apart. The text depends on nothing but the sources.
+    """
+    walk = _Walk(function, by, vectors)
+    back = _WayBack(walk)
+    wanted = [back.cotangent(walk.outer(name)) for name in by]
+    lines = [*back.lines, f"return ({''.join(name + ', ' for name in wanted)})"]
+    made = {target for line in walk.lines for target in _names(line.partition(" = ")[0])} | set(walk.first.values())
+    tape = "".join(f"{name}, " for name in sorted(made & {name for line in lines for name in _names(line)}))
+    forth = [*walk.lines, f"return ({''.join(name + ', ' for name in walk.results)}), ({tape})"]
+    heads = ", ".join(walk.first[name] for name in walk.arguments)
+    source = _text(f"forth({heads})", forth) + "\n\n" + _text("back(tape, bars)", [f"({tape}) = tape"] * bool(tape) + lines)
+    space = _compiled(walk.where, source, walk.names)
+    kinds = "".join("v" if result in walk.vectors else "s" for result in walk.results)
+    name = walk.function.__name__.strip("_")
+    return Derivative(name, tuple(walk.arguments), by, kinds, source, kernel(space["forth"]), kernel(space["back"]))
+
+
+def _names(text: str) -> set[str]:
+    return {node.id for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Name)}
+
+
+def _text(head: str, lines: list[str]) -> str:
+    return "\n    ".join([f"def {head}:", *lines]) + "\n"
+
+
+def _compiled(where: str, source: str, names: dict[str, Any]) -> dict[str, Any]:
+    """Run generated source, and let tracebacks show it."""
+    file = f"<derivative of {where} {hashlib.sha256(source.encode()).hexdigest()[:8]}>"
+    linecache.cache[file] = len(source), None, source.splitlines(True), file
+    space = dict(names)
+    exec(compile(source, file, "exec"), space)  # noqa: S102
+    return space

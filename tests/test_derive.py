@@ -1,0 +1,197 @@
+"""Derivatives that the computer writes: against 60 digits, and what is told where none can be written."""
+
+from __future__ import annotations
+
+import math
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numba import njit
+from referee import derivative, exact
+
+from planarfriction import formulas
+from planarfriction.formulas import LawNumbers
+from planarfriction.kernels import compiled_math as xp
+from planarfriction.kernels import kernel
+from planarfriction.kernels.derive import NotStraightError, derive, per, rule
+from planarfriction.kernels.vectors import dot, norm, plus, times
+
+LAW = LawNumbers(1e5, 300.0, 0.4, 0.5, 0.8, 1e-3, 1.7, 1.0, 0.3, 0.0)
+
+
+@kernel
+def _traction(law, z, u):
+    """A cell's friction while its bristle moves."""
+    speed, size = norm(u), norm(z)
+    grip = law.sigma_0 / formulas.stribeck(xp, speed, law)
+    along = dot(z, u) * per(size)
+    k = formulas.bristle_decay(xp, size * grip, along, speed, grip, law)
+    rate = plus(u, -k, z)
+    x, y = plus(times(-law.sigma_0, z), -law.sigma_1, rate)
+    x -= law.sigma_2 * u[0]
+    return (x, y - law.sigma_2 * u[1]), k
+
+
+BY = "z", "u", "law.sigma_0", "law.sigma_1", "law.mu_c", "law.mu_s", "law.v_s", "law.gamma", "law.breakaway_ratio"
+TRACTION = derive(_traction, BY, ("z", "u"))
+
+
+@njit
+def _pulled(forth, back, arguments, bars):
+    _, tape = forth(*arguments)
+    return back(tape, bars)
+
+
+def _flat(values):
+    return [x for value in values for x in (value if isinstance(value, tuple) else (value,))]
+
+
+def _changed(arguments, path, i, x):
+    """The arguments with one number in another's place: a field of the law, or component i of a vector."""
+    law, z, u = arguments
+    if path.startswith("law."):
+        return law._replace(**{path[4:]: x}), z, u
+    vector = z if path == "z" else u
+    vector = tuple(x if k == i else value for k, value in enumerate(vector))
+    return (law, vector, u) if path == "z" else (law, z, vector)
+
+
+def _expected(arguments):
+    """Derivatives of the three results by every number of `BY`, [3, numbers]."""
+    function, columns, sizes = exact(_traction), [], []
+    law, z, u = arguments
+    for path in BY:
+        values = {"z": z, "u": u}.get(path) or (getattr(law, path[4:]),)
+        for i, x in enumerate(values):
+            columns.append(derivative(lambda x, p=path, i=i: _flat(function(*_changed(arguments, p, i, x))), x))
+            sizes.append(abs(x))
+    return np.array(columns, float).T, np.array(sizes)
+
+
+exponent = st.floats(-9.0, 3.0)
+angle = st.floats(0.0, 2.0 * math.pi)
+
+
+@given(exponent, angle, exponent, angle)
+def test_derivatives_are_those_of_60_digits(far, of_bristle, fast, of_velocity):
+    size, speed = 10.0 ** (far - 8.0), 10.0 ** (fast - 3.0)
+    z = size * math.cos(of_bristle), size * math.sin(of_bristle)
+    u = speed * math.cos(of_velocity), speed * math.sin(of_velocity)
+    expected, sizes = _expected((LAW, z, u))
+    rows = [
+        _flat(_pulled(TRACTION.forth, TRACTION.back, (LAW, z, u), bars))
+        for bars in [((1.0, 0.0), 0.0), ((0.0, 1.0), 0.0), ((0.0, 0.0), 1.0)]
+    ]
+    # what a relative change of a number does, beside the largest that any does: digits of that are lost in sums
+    scale = np.abs(expected * sizes).max(axis=1, keepdims=True)
+    assert np.all(np.abs(np.array(rows) - expected) * sizes <= 1e-12 * scale + 1e-300)
+
+
+def test_at_kinks_the_conventions_hold():
+    @kernel
+    def kinks(x, y):
+        return xp.minimum(x, y) + 10.0 * xp.maximum(x, y), xp.power(x, y), norm((x, x)), per(x), math.sqrt(x)
+
+    derived = derive(kinks, ("x", "y"))
+
+    def pulled(x, y, i):
+        return _pulled(derived.forth, derived.back, (x, y), tuple(1.0 if i == k else 0.0 for k in range(5)))
+
+    assert pulled(2.0, 2.0, 0) == (11.0, 0.0)  # of equal numbers the first counts
+    assert pulled(0.0, 2.0, 1) == (0.0, 0.0)
+    assert pulled(0.0, 1.0, 1) == (1.0, 0.0)  # the limit from the right
+    assert pulled(0.0, 1.0, 2) == pulled(0.0, 1.0, 3) == pulled(0.0, 1.0, 4) == (0.0, 0.0)
+
+
+def test_a_rule_goes_before_the_source():
+    @kernel
+    def rounded(x):
+        return math.floor(x)
+
+    @kernel
+    def scaled(x, y):
+        return rounded(x) * y
+
+    with pytest.raises(NotStraightError, match=r"rounded, line 3: .*floor"):
+        derive(scaled, ("x",))
+    rule(rounded, "s", {0: "5.0"})
+    derived = derive(scaled, ("x", "y"))
+    assert _pulled(derived.forth, derived.back, (2.5, 3.0), (1.0,)) == (15.0, 2.0)
+
+
+def _loop(x):
+    for _ in range(3):
+        x = x * x
+    return x
+
+
+def _branch(x):
+    if x > 0.0:
+        return x
+    return -x
+
+
+def _chosen(x):
+    return x if x > 0.0 else -x
+
+
+def _raised(x):
+    return x**2
+
+
+def _vectors(x):
+    v = x, x
+    return v + v
+
+
+def _unknown(x):
+    return nowhere(x)  # noqa: F821
+
+
+def _none(x):
+    y = x  # noqa: F841
+
+
+@pytest.mark.parametrize(
+    "function, words",
+    [
+        (_loop, "_loop, line 2: `for _ in range(3):` is no assignment"),
+        (_branch, "_branch, line 2: `if x > 0.0:` is no assignment"),
+        (_chosen, "line 2: `x if x > 0.0 else -x` is no straight line: use `xp.where`"),
+        (_raised, r"`x \*\* 2` is no straight line"),
+        (_vectors, r"`v \+ v` is of vectors: use `plus`"),
+        (_unknown, "`nowhere` is not known"),
+        (_none, "has no return"),
+    ],
+)
+def test_what_is_no_straight_line_is_named_with_its_line(function, words):
+    with pytest.raises(NotStraightError, match=words):
+        derive(function, ("x",))
+
+
+def test_an_argument_that_is_none_is_named():
+    with pytest.raises(NotStraightError, match="has no argument y, only x"):
+        derive(_chosen, ("y",))
+
+
+PROGRAM = """
+import linecache
+linecache.cache.update({str(i): (1, None, [], "") for i in range(%d)})
+from planarfriction.kernels import derive, published_step
+derivatives = [derive.derive(published_step.scaled_twist, ("twist",), ("twist",))] if %d else []
+from planarfriction import formulas
+derived = derive.derive(formulas.bristle_decay, ("deflection", "along", "law.breakaway_ratio"))
+print(derived.source, derived.forth.py_func.__code__.co_filename)
+"""
+
+
+def test_generated_text_is_the_same_in_every_process():
+    texts = [
+        subprocess.run([sys.executable, "-c", PROGRAM % (n, n)], capture_output=True, text=True, check=True).stdout
+        for n in (0, 7)
+    ]
+    assert texts[0] == texts[1] and "slip_fraction" in texts[0]
