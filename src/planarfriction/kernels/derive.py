@@ -6,7 +6,7 @@ functions for it: `forth(...)` returns `(results, tape)`, and `back(tape, bars)`
 those of the results. Both are written as text and compiled like any other kernel.
 
 A function that is no straight line, one with a kink, or one whose derivative loses digits if it is written term by
-term, has a rule of its own: see `RULES` and `rule`.
+term, has a rule of its own: see `rules`.
 """
 
 from __future__ import annotations
@@ -16,109 +16,17 @@ import functools
 import hashlib
 import inspect
 import linecache
-import math
 import textwrap
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
-from planarfriction import formulas
 from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import kernel, vectors
-from planarfriction.kernels.vectors import dot, placed, plus, times, zeros
+from planarfriction.kernels import kernel
+from planarfriction.kernels.rules import NAMES, RULES, Rule, per
 
 
 class NotStraightError(TypeError):
     """A function for which `derive` cannot write a derivative."""
-
-
-class Rule(NamedTuple):
-    """Derivative of a function that is not taken apart.
-
-    In its texts `{0}`, `{1}` stand for the arguments, `{t}` for the result (`{t0}`, `{t1}` for several) and `{b}` for
-    its cotangent.
-    """
-
-    results: str
-    """Kind of each result: "s" for a number, "v" for a vector."""
-    slopes: dict[Any, str] = {}
-    """Derivative of the result by argument i, or of result r by argument i for the key (r, i); kept on the tape."""
-    pulls: dict[int, str] = {}
-    """Cotangent of argument i, where a derivative of a vector would be a matrix."""
-    names: dict[str, Any] = {}
-    """Functions that the texts name, beside those of `NAMES`."""
-
-
-@kernel
-def per(x):
-    """Return `1/x` for x > 0; 0 at 0, and so is its slope."""
-    return 1.0 / xp.where(x > 0.0, x, math.inf)
-
-
-@kernel
-def _power_slope(x, exponent, raised):
-    """Derivative of `x^exponent` by x; at 0 the right-hand limit for exponents >= 1."""
-    return xp.where(x > 0.0, exponent * raised * per(x), xp.where(exponent == 1.0, 1.0, 0.0))
-
-
-@kernel
-def _log(x):
-    """Return `log x`; 0 at 0, where `x^e log x` vanishes."""
-    return xp.log(xp.where(x > 0.0, x, 1.0))
-
-
-@kernel
-def _slip_slope(deflection, breakaway):
-    """Derivative of `formulas.slip_fraction` by the deflection, exactly zero before breakaway and at full deflection.
-
-    It is multiplied by how far a long step would have gone, 1e9, or by one over hardly any deflection.
-    """
-    partly = (deflection > breakaway) & (deflection < 1.0)
-    return xp.where(partly, formulas.slip_fraction_slope(xp, deflection, breakaway), 0.0)
-
-
-@kernel
-def _slip_by_breakaway(deflection, breakaway):
-    """Derivative of `formulas.slip_fraction` by the breakaway ratio."""
-    return formulas.bristle_decay_by_breakaway(xp, _slip_slope(deflection, breakaway), deflection, breakaway)
-
-
-NAMES: dict[str, Any] = {
-    "dot": dot, "formulas": formulas, "log_or_0": _log, "per": per, "placed": placed, "plus": plus,
-    "power_slope": _power_slope, "slip_by_breakaway": _slip_by_breakaway, "slip_slope": _slip_slope, "times": times,
-    "xp": xp, "zeros": zeros,
-}  # fmt: skip
-"""Functions that generated code and the texts of rules name."""
-
-RULES: dict[Any, Rule] = {
-    ast.Add: Rule("s", {0: "1.0", 1: "1.0"}),
-    ast.Sub: Rule("s", {0: "1.0", 1: "-1.0"}),
-    ast.Mult: Rule("s", {0: "{1}", 1: "{0}"}),
-    ast.Div: Rule("s", {0: "1.0 / {1}"}),  # only the numerator: see `_Walk._quotient`
-    ast.USub: Rule("s", {0: "-1.0"}),
-    plus: Rule("v", {}, {0: "{b}", 1: "dot({b}, {2})", 2: "times({1}, {b})"}),
-    times: Rule("v", {}, {0: "dot({b}, {1})", 1: "times({0}, {b})"}),
-    dot: Rule("s", {}, {0: "times({b}, {1})", 1: "times({b}, {0})"}),
-    vectors.norm: Rule("s", {"per": "per({t})"}, {0: "times({b} * {per}, {0})"}),
-    math.sqrt: Rule("s", {0: "0.5 * per({t})"}),
-    per: Rule("s", {0: "-{t} * {t}"}),
-    xp.where: Rule("s", {1: "xp.where({0}, 1.0, 0.0)", 2: "xp.where({0}, 0.0, 1.0)"}),
-    # of equal numbers the slope is that of the first
-    xp.maximum: Rule("s", {0: "xp.where({0} >= {1}, 1.0, 0.0)", 1: "xp.where({0} >= {1}, 0.0, 1.0)"}),
-    xp.minimum: Rule("s", {0: "xp.where({0} <= {1}, 1.0, 0.0)", 1: "xp.where({0} <= {1}, 0.0, 1.0)"}),
-    xp.exp: Rule("s", {0: "{t}"}),
-    xp.log: Rule("s", {0: "1.0 / {0}"}),
-    xp.sin: Rule("s", {0: "xp.cos({0})"}),
-    xp.cos: Rule("s", {0: "-xp.sin({0})"}),
-    xp.power: Rule("s", {0: "power_slope({0}, {1}, {t})", 1: "{t} * log_or_0({0})"}),
-    formulas.relaxation: Rule("ss", {(0, 1): "-{t0}", (1, 1): "formulas.relaxation_slope(xp, {1}, {t0}, {t1})"}),
-    formulas.slip_fraction: Rule("s", {1: "slip_slope({1}, {2})", 2: "slip_by_breakaway({1}, {2})"}),
-}
-"""Rules by function or operator."""
-
-
-def rule(function: Callable, results: str, slopes: dict, pulls: dict | None = None, **names: Any) -> None:
-    """Give a function a `Rule`, whose texts may name the functions `names`."""
-    RULES[function] = Rule(results, slopes, pulls or {}, names)
 
 
 class _Step(NamedTuple):
@@ -137,6 +45,8 @@ class _Walk:
 
     def __init__(self, function: Callable, by: Iterable[str], vectors: Iterable[str]):
         self.function = getattr(function, "py_func", function)
+        if not inspect.isfunction(self.function):
+            raise NotStraightError(f"{self.function!r} has no source to write derivatives from: give it a `rule`")
         self.where = f"{self.function.__module__}.{self.function.__qualname__}"
         self.globals = {**self.function.__globals__, **inspect.getclosurevars(self.function).nonlocals, "xp": xp}
         self.names: dict[str, Any] = dict(NAMES)
@@ -159,7 +69,7 @@ class _Walk:
         try:
             source = inspect.getsource(self.function)
         except OSError as error:
-            raise NotStraightError(f"{self.where}: derivatives are written from its source, which is missing") from error
+            raise NotStraightError(f"{self.where}: there is no source to write derivatives from") from error
         return ast.parse(textwrap.dedent(source)).body[0]  # type: ignore[return-value]
 
     def _refusal(self, node: ast.AST, why: str) -> NotStraightError:
@@ -343,11 +253,8 @@ class _Walk:
             return getattr(self._resolve(node.value), node.attr)
         if not isinstance(node, ast.Name) or (node.id in self.known and node.id != "xp"):
             raise self._refusal(node, "is no function of its module")
-        value = self.globals.get(node.id)
-        if value is None:
-            raise self._refusal(node, "is not known")
-        self._use(node.id, value)
-        return value
+        self._name(node)
+        return self.globals[node.id]
 
     def _derived(self, function: Any, atoms: list[str]) -> Derivative:
         names = list(inspect.signature(getattr(function, "py_func", function)).parameters)
@@ -367,7 +274,7 @@ _COMPARISONS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: 
 
 
 class _WayBack:
-    """Cotangents through the steps of a function, last step first; partial derivatives that they take join its lines."""
+    """Cotangents through the steps of a function, last step first, which add partial derivatives to its lines."""
 
     def __init__(self, walk: _Walk):
         self.walk, self.lines, self.count = walk, [], 0
@@ -466,7 +373,8 @@ def derive(function: Callable, by: tuple[str, ...], vectors: tuple[str, ...] = (
     tape = "".join(f"{name}, " for name in sorted(made & {name for line in lines for name in _names(line)}))
     forth = [*walk.lines, f"return ({''.join(name + ', ' for name in walk.results)}), ({tape})"]
     heads = ", ".join(walk.first[name] for name in walk.arguments)
-    source = _text(f"forth({heads})", forth) + "\n\n" + _text("back(tape, bars)", [f"({tape}) = tape"] * bool(tape) + lines)
+    unpack = [f"({tape}) = tape"] if tape else []
+    source = _text(f"forth({heads})", forth) + "\n\n" + _text("back(tape, bars)", unpack + lines)
     space = _compiled(walk.where, source, walk.names)
     kinds = "".join("v" if result in walk.vectors else "s" for result in walk.results)
     name = walk.function.__name__.strip("_")
@@ -486,5 +394,5 @@ def _compiled(where: str, source: str, names: dict[str, Any]) -> dict[str, Any]:
     file = f"<derivative of {where} {hashlib.sha256(source.encode()).hexdigest()[:8]}>"
     linecache.cache[file] = len(source), None, source.splitlines(True), file
     space = dict(names)
-    exec(compile(source, file, "exec"), space)  # noqa: S102
+    exec(compile(source, file, "exec"), space)
     return space

@@ -8,17 +8,18 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numba import njit
-from referee import derivative, exact
 
 from planarfriction import formulas
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels import kernel
-from planarfriction.kernels.derive import NotStraightError, derive, per, rule
+from planarfriction.kernels.derive import NotStraightError, derive
+from planarfriction.kernels.rules import per, rule
 from planarfriction.kernels.vectors import dot, norm, plus, times
+from tests.support.referee import derivative, exact
 
 LAW = LawNumbers(1e5, 300.0, 0.4, 0.5, 0.8, 1e-3, 1.7, 1.0, 0.3, 0.0)
 
@@ -76,6 +77,7 @@ exponent = st.floats(-9.0, 3.0)
 angle = st.floats(0.0, 2.0 * math.pi)
 
 
+@settings(deadline=None)
 @given(exponent, angle, exponent, angle)
 def test_derivatives_are_those_of_60_digits(far, of_bristle, fast, of_velocity):
     size, speed = 10.0 ** (far - 8.0), 10.0 ** (fast - 3.0)
@@ -116,7 +118,7 @@ def test_a_rule_goes_before_the_source():
     def scaled(x, y):
         return rounded(x) * y
 
-    with pytest.raises(NotStraightError, match=r"rounded, line 3: .*floor"):
+    with pytest.raises(NotStraightError, match=r"floor.* has no source to write derivatives from: give it a `rule`"):
         derive(scaled, ("x",))
     rule(rounded, "s", {0: "5.0"})
     derived = derive(scaled, ("x", "y"))
@@ -159,18 +161,22 @@ def _none(x):
 @pytest.mark.parametrize(
     "function, words",
     [
-        (_loop, "_loop, line 2: `for _ in range(3):` is no assignment"),
-        (_branch, "_branch, line 2: `if x > 0.0:` is no assignment"),
-        (_chosen, "line 2: `x if x > 0.0 else -x` is no straight line: use `xp.where`"),
-        (_raised, r"`x \*\* 2` is no straight line"),
-        (_vectors, r"`v \+ v` is of vectors: use `plus`"),
+        (_loop, "`for _ in range(3):` is no assignment"),
+        (_branch, "`if x > 0.0:` is no assignment"),
+        (_chosen, "`x if x > 0.0 else -x` is no straight line: use `xp.where`"),
+        (_raised, "`x ** 2` is no straight line"),
+        (_vectors, "`v + v` is of vectors: use `plus`"),
         (_unknown, "`nowhere` is not known"),
         (_none, "has no return"),
     ],
 )
 def test_what_is_no_straight_line_is_named_with_its_line(function, words):
-    with pytest.raises(NotStraightError, match=words):
+    with pytest.raises(NotStraightError) as refused:
         derive(function, ("x",))
+    assert words in str(refused.value)
+    line = function.__code__.co_firstlineno + (0 if function is _none else 1)
+    last = line + (1 if function is _vectors else 0)
+    assert f"{function.__name__}, line {last}: " in str(refused.value)
 
 
 def test_an_argument_that_is_none_is_named():

@@ -15,7 +15,7 @@ import mpmath
 from mpmath import mpf
 
 from planarfriction.kernels import compiled_math, vectors
-from planarfriction.kernels.derive import per
+from planarfriction.kernels.rules import per
 
 DIGITS = 60
 _STEP = mpf(10) ** -24

@@ -1,0 +1,109 @@
+"""Rules of `derive`: derivatives of functions and operators that it does not take apart.
+
+They name the conventions at the kinks, and the forms of derivatives that lose no digits.
+"""
+
+from __future__ import annotations
+
+import ast
+import math
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+from typing import Any, NamedTuple
+
+from planarfriction import formulas
+from planarfriction.kernels import compiled_math as xp
+from planarfriction.kernels import kernel, vectors
+from planarfriction.kernels.vectors import dot, placed, plus, times, zeros
+
+_NONE: Mapping = MappingProxyType({})
+
+
+class Rule(NamedTuple):
+    """Derivative of a function that is not taken apart.
+
+    In its texts `{0}`, `{1}` stand for the arguments, `{t}` for the result (`{t0}`, `{t1}` for several) and `{b}` for
+    its cotangent.
+    """
+
+    results: str
+    """Kind of each result: "s" for a number, "v" for a vector."""
+    slopes: Mapping[Any, str] = _NONE
+    """Derivative of the result by argument i, or of result r by argument i for the key (r, i); kept on the tape."""
+    pulls: Mapping[int, str] = _NONE
+    """Cotangent of argument i, where a derivative of a vector would be a matrix."""
+    names: Mapping[str, Any] = _NONE
+    """Functions that the texts name, beside those of `NAMES`."""
+
+
+@kernel
+def per(x):
+    """Return `1/x` for x > 0; 0 at 0, and so is its slope."""
+    return 1.0 / xp.where(x > 0.0, x, math.inf)
+
+
+@kernel
+def _power_slope(x, exponent, raised):
+    """Derivative of `x^exponent` by x; at 0 the right-hand limit for exponents >= 1."""
+    return xp.where(x > 0.0, exponent * raised * per(x), xp.where(exponent == 1.0, 1.0, 0.0))
+
+
+@kernel
+def _log(x):
+    """Return `log x`; 0 at 0, where `x^e log x` vanishes."""
+    return xp.log(xp.where(x > 0.0, x, 1.0))
+
+
+@kernel
+def _slip_slope(deflection, breakaway):
+    """Derivative of `formulas.slip_fraction` by the deflection, exactly zero before breakaway and at full deflection.
+
+    It is multiplied by how far a long step would have gone, 1e9, or by one over hardly any deflection.
+    """
+    partly = (deflection > breakaway) & (deflection < 1.0)
+    return xp.where(partly, formulas.slip_fraction_slope(xp, deflection, breakaway), 0.0)
+
+
+@kernel
+def _slip_by_breakaway(deflection, breakaway):
+    """Derivative of `formulas.slip_fraction` by the breakaway ratio."""
+    return formulas.bristle_decay_by_breakaway(xp, _slip_slope(deflection, breakaway), deflection, breakaway)
+
+
+NAMES: dict[str, Any] = {
+    "dot": dot, "formulas": formulas, "log_or_0": _log, "per": per, "placed": placed, "plus": plus,
+    "power_slope": _power_slope, "slip_by_breakaway": _slip_by_breakaway, "slip_slope": _slip_slope, "times": times,
+    "xp": xp, "zeros": zeros,
+}  # fmt: skip
+"""Functions that generated code and the texts of rules name."""
+
+RULES: dict[Any, Rule] = {
+    ast.Add: Rule("s", {0: "1.0", 1: "1.0"}),
+    ast.Sub: Rule("s", {0: "1.0", 1: "-1.0"}),
+    ast.Mult: Rule("s", {0: "{1}", 1: "{0}"}),
+    ast.Div: Rule("s", {0: "1.0 / {1}"}),  # only the numerator: `derive` writes other quotients as products
+    ast.USub: Rule("s", {0: "-1.0"}),
+    plus: Rule("v", {}, {0: "{b}", 1: "dot({b}, {2})", 2: "times({1}, {b})"}),
+    times: Rule("v", {}, {0: "dot({b}, {1})", 1: "times({0}, {b})"}),
+    dot: Rule("s", {}, {0: "times({b}, {1})", 1: "times({b}, {0})"}),
+    vectors.norm: Rule("s", {"per": "per({t})"}, {0: "times({b} * {per}, {0})"}),
+    math.sqrt: Rule("s", {0: "0.5 * per({t})"}),
+    per: Rule("s", {0: "-{t} * {t}"}),
+    xp.where: Rule("s", {1: "xp.where({0}, 1.0, 0.0)", 2: "xp.where({0}, 0.0, 1.0)"}),
+    # of equal numbers the slope is that of the first
+    xp.maximum: Rule("s", {0: "xp.where({0} >= {1}, 1.0, 0.0)", 1: "xp.where({0} >= {1}, 0.0, 1.0)"}),
+    xp.minimum: Rule("s", {0: "xp.where({0} <= {1}, 1.0, 0.0)", 1: "xp.where({0} <= {1}, 0.0, 1.0)"}),
+    xp.exp: Rule("s", {0: "{t}"}),
+    xp.log: Rule("s", {0: "1.0 / {0}"}),
+    xp.sin: Rule("s", {0: "xp.cos({0})"}),
+    xp.cos: Rule("s", {0: "-xp.sin({0})"}),
+    xp.power: Rule("s", {0: "power_slope({0}, {1}, {t})", 1: "{t} * log_or_0({0})"}),
+    formulas.relaxation: Rule("ss", {(0, 1): "-{t0}", (1, 1): "formulas.relaxation_slope(xp, {1}, {t0}, {t1})"}),
+    formulas.slip_fraction: Rule("s", {1: "slip_slope({1}, {2})", 2: "slip_by_breakaway({1}, {2})"}),
+}
+"""Rules by function or operator."""
+
+
+def rule(function: Callable, results: str, slopes: dict, pulls: dict | None = None, **names: Any) -> None:
+    """Give a function a `Rule`, whose texts may name the functions `names`."""
+    RULES[function] = Rule(results, slopes, pulls or {}, names)
