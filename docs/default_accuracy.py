@@ -22,7 +22,7 @@ MODELS: dict[str, Callable[[pf.ContactPatch], Any]] = {
     "reduced, parts": lambda patch: pf.ReducedModel(patch, LAW, parts="auto"),
     "published": lambda patch: pf.ReducedModelPublished(patch, LAW),
 }
-"""What makes each model of a patch."""
+"""Models by name, each as a function of its patch."""
 
 SHAPES = ("Circle", "Square", "Line", "LineGrad", "LineGradX", "NonConvex1", "NonConvex2")
 FACTORS = (0.5, 1.0, 1.5)

@@ -31,7 +31,7 @@ PLACE = """([x, y]) => {
     const canvas = view.canvas_view.el.getBoundingClientRect();
     return [canvas.x + view.frame.x_scale.compute(x), canvas.y + view.frame.y_scale.compute(y)];
 }"""
-"""Where a point of the map [mm] is on the screen."""
+"""Position on the screen of a point of the map [mm]."""
 
 WATCH = """() => {
     const find = (root) => {
@@ -75,7 +75,7 @@ def opened(width: int = 1280, height: int = 960) -> Iterator[Page]:
 
 
 def place(page: Page, x: float, y: float) -> tuple[float, float]:
-    """Where a point of the map [mm] is on the screen."""
+    """Position on the screen of a point of the map [mm]."""
     return tuple(page.evaluate(PLACE, [x, y]))
 
 

@@ -46,7 +46,7 @@ def ellipsoid(patch: pf.ContactPatch, law: pf.LuGre) -> pf.ReducedModelPublished
 
 @dataclass(frozen=True)
 class Case:
-    """What is fitted: a contact patch, a model of it, and the parameters."""
+    """Fitted quantities: a contact patch, a model of it, and the parameters."""
 
     name: str
     patch: pf.ContactPatch

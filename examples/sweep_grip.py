@@ -1,4 +1,4 @@
-"""How hard to grip a plate off its centre of mass: a sweep over grip force and friction shows if it turns or slips.
+"""Grip of a plate off its centre of mass: a sweep over grip force and friction shows if it turns or slips.
 
 The sweep has `N x N` runs. Finished runs are kept in the folder `--out`: if the script is stopped and started again, it
 continues, and with a finer grid only the new points are simulated.

@@ -1,4 +1,4 @@
-"""What a test run draws: the same examples each time, unless it is asked for others."""
+"""Settings of a test run: Hypothesis draws the same examples each time, unless other ones are requested."""
 
 from __future__ import annotations
 

@@ -66,7 +66,7 @@ INTERRUPTED = {
     "warm": [COMMAND_LINE, "warm"],
     "reproduce": [COMMAND_LINE, "reproduce", "--only", "drift", "--quick"],
 }
-"""What compiles for some seconds at least."""
+"""Runs that compile for some seconds at least."""
 
 
 def started(code: str, cache=None, *arguments: str) -> subprocess.Popen:

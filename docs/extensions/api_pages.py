@@ -32,7 +32,7 @@ def public_modules() -> list[str]:
 
 
 def public_names(module: ModuleType) -> list[str]:
-    """What `__all__` lists, or what the module defines; modules have pages of their own."""
+    """Return the names in `__all__`, or those that the module defines; modules have pages of their own."""
     own = [name for name, value in vars(module).items() if getattr(value, "__module__", None) == module.__name__]
     names = getattr(module, "__all__", [name for name in own if not name.startswith("_")])
     return [name for name in names if not inspect.ismodule(getattr(module, name, None))]

@@ -52,5 +52,5 @@ def interactive(figure: Any, block_vars: dict[str, Any], gallery_conf: dict[str,
 
 
 def _get_sg_image_scraper() -> Any:
-    """What the gallery asks a module for that its settings name."""
+    """Return the scraper: the gallery asks modules named in its settings for it by this function."""
     return figures

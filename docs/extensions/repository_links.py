@@ -1,4 +1,4 @@
-"""What the pages share with the repository: files beside `docs` that are pages here, and links to them."""
+"""Links between the pages and the repository: files beside `docs` that are pages here."""
 
 from __future__ import annotations
 

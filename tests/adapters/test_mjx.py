@@ -266,7 +266,7 @@ def test_the_step_in_contact_space_is_the_compiled_one_for_all_models(kind):
 
 
 def test_derivatives_of_the_step_in_contact_space_are_differences():
-    """Of a patch that slides and spins, whose load follows: by all that the host says, and by friction."""
+    """A patch slides and spins under a changing load: derivatives to the host's numbers and to friction."""
     model = _in_jax(pf.DistributedModel(pf.ContactPatch.disc(radius=0.01, cells=5), pf.LuGre(mu_s=1.2)))
     response = 0.01 * np.array([[1.0, 0.1, 0.0], [0.1, 1.0, 0.0], [0.0, 0.0, 1e4]])
     load_response = np.array([[0.2, -0.1, 3.0]])

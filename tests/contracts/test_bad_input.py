@@ -1,4 +1,4 @@
-"""What is no number is taken for none, everywhere: one clear line that names the parameter, the rule and the value."""
+"""Wrong input is refused everywhere with one line that names the parameter, the rule and the value."""
 
 from __future__ import annotations
 

@@ -153,7 +153,7 @@ def test_links_lead_somewhere(page):
 
 
 def resolve(name: str) -> bool:
-    """Whether a dotted name exists in the package: modules, functions, classes and the fields of classes."""
+    """Return True if a dotted name exists in the package: modules, functions, classes and the fields of classes."""
     parts = name.split(".")
     value = planarfriction
     for i, part in enumerate(parts):

@@ -1,4 +1,4 @@
-"""What the prompt and a notebook show of records: one short line, or a picture with a few numbers."""
+"""Records at the prompt and in notebooks: one short line, or a picture with a few numbers."""
 
 from __future__ import annotations
 

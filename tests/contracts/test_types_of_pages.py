@@ -22,7 +22,7 @@ FOREIGN = {name.partition(".")[0] for name in (*OPTIONAL, *RECIPES)} | {"numba",
 OF_TENSORS = {"backward", "grad", "tolist"}
 """Members of PyTorch's tensors whose types have gaps."""
 LAX = ("reportMissingTypeStubs", "reportUnknownLambdaType", "reportUnknownParameterType", "reportUnusedImport")
-"""Of a page's own making: functions and lambdas without types, imports for the next section."""
+"""Complaints about a page's own code: functions and lambdas without types, imports for the next section."""
 
 pytestmark = pytest.mark.skipif(not (ROOT / "docs").is_dir(), reason="no docs beside these tests")
 
@@ -39,7 +39,7 @@ def judged(page: Path) -> str:
 
 
 def gaps(tree: ast.AST) -> Iterator[tuple[int, int, str]]:
-    """Where arguments of functions and empty lists have no type, and the type to write there."""
+    """Return the positions of arguments and empty lists without a type, each with the type to write there."""
     for node in ast.walk(tree):
         if isinstance(node, ast.FunctionDef):
             for each in (*node.args.args, *node.args.kwonlyargs):
@@ -50,7 +50,7 @@ def gaps(tree: ast.AST) -> Iterator[tuple[int, int, str]]:
 
 
 def names(node: ast.AST) -> set[str]:
-    """What an expression speaks of: variables, imports, and members of tensors."""
+    """Return the variables, imports and members of tensors in an expression."""
     found = {each.id for each in ast.walk(node) if isinstance(each, ast.Name)}
     found |= {each.attr for each in ast.walk(node) if isinstance(each, ast.Attribute)} & OF_TENSORS
     return found | {each.asname or each.name for each in ast.walk(node) if isinstance(each, ast.alias)}
@@ -91,12 +91,12 @@ def origins(tree: ast.AST, until: int) -> dict[str, bool]:
 
 
 def from_ours(node: ast.AST, ours: dict[str, bool]) -> bool:
-    """Whether an expression is the library's: by the name that it begins with, else by all that it speaks of."""
+    """Return True if an expression is the library's: by the name that it begins with, else by all its names."""
     return ours.get(root(node), all(ours.get(name, True) for name in names(node)))
 
 
 def counts(diagnostic: dict, tree: ast.Module, loose: set[str]) -> bool:
-    """Whether the library is to blame: not for what is done with other packages, nor for names that are `loose`."""
+    """Return True if the library causes a complaint, rather than another package or a name that is `loose`."""
     if diagnostic["severity"] != "error":
         return False
     if diagnostic["rule"] == "reportMissingImports":

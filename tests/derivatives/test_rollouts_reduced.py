@@ -32,7 +32,7 @@ def model_of(law: str = "elasto-plastic") -> pf.ReducedModel:
 
 
 def scale_of(model) -> np.ndarray:
-    """What makes twists speeds."""
+    """Return the factors that turn speeds [m/s] into twists."""
     return np.array([1.0, 1.0, 1.0 / model.shape_at(LOAD).contact_radius])
 
 

@@ -46,7 +46,7 @@ def test_the_page_tells_what_the_example_prints(tyre, tmp_path, capsys):
 
 
 def test_a_step_of_the_bristles_is_that_of_the_distributed_model(tyre):
-    """Where all cells have the same law."""
+    """Both give one result if all cells have the same law."""
     patch = pf.ContactPatch.rectangle(0.12, 0.14, (6, 2))
     law = pf.LuGre(mu_c=0.9, sigma_0=300.0, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9)
     twist, z = np.array([0.1, 0.2, 1.0]), np.zeros((2, patch.cells))

@@ -95,7 +95,7 @@ class Visitor:
         return self.page.locator(f".{kind} textarea").input_value()
 
     def says(self, *words: str) -> bool:
-        """Whether the code has these words, within ten seconds: it follows in a pause."""
+        """Return True once the code has these words, False after ten seconds: it is written after a pause."""
         for _ in range(100):
             if all(each in self.code() for each in words):
                 return True
@@ -138,7 +138,7 @@ class Visitor:
         self.page.locator(".tool").get_by_text(name, exact=True).click()
 
     def place(self, x: float, y: float) -> tuple[float, float]:
-        """Where a point of the map [mm] is on the screen."""
+        """Return the position on the screen of a point of the map [mm]."""
         return tuple(
             self.page.evaluate(
                 """([x, y]) => {

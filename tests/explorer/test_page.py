@@ -102,7 +102,7 @@ def test_a_scene_file_is_offered_and_a_wrong_one_is_one_line(page):
 
 
 class Document:
-    """What work needs of a page: it notes what is to be done there."""
+    """A stand-in for the document of a page, which lists the callbacks that work adds."""
 
     def __init__(self):
         self.session_context = self

@@ -1,4 +1,4 @@
-"""What all attacks share: how they are declared, counted and run for an hour."""
+"""Attacks: declared once, counted, and repeated for an hour if asked."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Attack(NamedTuple):
     function: Callable[..., None]
     strategies: tuple[st.SearchStrategy, ...]
     examples: int
-    """How many of them the tests take."""
+    """Number of examples that a test run draws."""
 
     def test(self, **options: Any) -> Callable[[], None]:
         """The test that Hypothesis makes of it; seeds have no smaller ones, so that it looks for none."""

@@ -25,13 +25,13 @@ The longest legal ones, scenes of a million samples, take a tenth of it.
 """
 
 MEMORY = 1 << 30
-"""What a call may ask for [bytes]."""
+"""Memory that a call may allocate [bytes]."""
 
 LONGEST = 300
 """Characters of a message, besides the choices that it names."""
 
 CASES: collections.Counter[str] = collections.Counter()
-"""How many cases of each kind were judged, and how many of them were refused."""
+"""Number of cases judged, and of those refused, by kind."""
 
 
 class Broken(AssertionError):

@@ -42,7 +42,7 @@ RECORDS = """
     SurfaceComparison ModelJacobians PackedModel StepJacobians Statistics Integration
     LimitSurface FrictionLaw FrictionModel Pressure
 """
-"""What the library hands out, and bases of families: nobody calls their constructors."""
+"""Classes that the library makes itself, and bases of families: users do not call their constructors."""
 
 
 PROTOCOL = """
@@ -214,7 +214,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
         "wrench_slope": lambda time, wrenches: 0.0 * wrenches,
     },
 }
-"""Where a parameter of this name wants something else."""
+"""Legal values for functions where a parameter of the same name means something else."""
 
 
 def _public(prefix: str, value: Any) -> Iterator[tuple[str, Callable[..., Any]]]:

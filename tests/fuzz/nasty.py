@@ -1,4 +1,4 @@
-"""What people, files and other libraries pass instead of a number, an array, a name or an object."""
+"""Values that people, files and other libraries pass instead of a number, an array, a name or an object."""
 
 from __future__ import annotations
 

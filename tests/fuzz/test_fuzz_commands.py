@@ -40,7 +40,7 @@ LEGAL = {
     "reproduce": ["--list"],
     "bench": ["--only", "nothing"],
 }
-"""Where an attack begins; commands that are not here are asked for their help."""
+"""Arguments that attacks change; commands that are not listed are asked for their help."""
 
 TEXTS = """
     nan inf -inf 0 -1 1 2 0.5 1e-300 5e-324 1e300 1e9 1,2,3 mu_c=1e400 mu_c=nan mu_c=0.5 mu_c,mu_c a= = x - -- --help

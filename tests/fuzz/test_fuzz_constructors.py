@@ -46,13 +46,13 @@ def called(target: legal.Target, **changed: Any) -> Any:
 
 @functools.cache
 def compiled(name: str) -> None:
-    """What the target compiles at its first call is no fault of a wrong argument."""
+    """Call the target once with legal arguments: compilation must not count against a wrong argument."""
     with folder():
         judge("constructors: legal", lambda: called(targets()[name]), compiles=True)
 
 
 def numeric(value: Any) -> bool:
-    """Whether a legal argument is made of numbers, so that a text or a date in its place must be refused."""
+    """Return True if a legal argument is made of numbers, so that a text or a date instead of it must be refused."""
     if isinstance(value, (tuple, list)):
         return bool(value) and all(numeric(each) for each in value)
     return isinstance(value, (float, int, np.ndarray))

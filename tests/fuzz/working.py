@@ -1,4 +1,4 @@
-"""Whether what a call gave works: a small use of it has finite results."""
+"""Small uses of results: they must be finite."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def use(value: Any) -> None:
 
 @use.register
 def _(data: xr.Dataset) -> None:
-    """Of a sweep: every run says whether it failed, and why."""
+    """Check that each failed run of a sweep, and no other, gives a reason."""
     for status, each in zip(data.status.values.ravel(), data.failure.values.ravel(), strict=True):
         assert (status == "failed") == bool(each)
 

@@ -97,7 +97,7 @@ def test_times_that_do_not_increase_are_refused_before_slopes_are_taken():
 
 
 def identify(log, patch, **options):
-    """Of the model that the logs were made with, without anything that a rig adds."""
+    """Identify the model that made the logs, without effects of a rig."""
     return identify_lugre(log, patch, model="reduced-published", nuisance=(), **options)
 
 
@@ -163,7 +163,7 @@ def test_without_torques_the_force_tells_what_it_can():
 
 
 def test_what_would_need_the_torque_is_no_estimate(spun):
-    """Where spin dominates, the force tells the ratio of friction and radius only."""
+    """If spin dominates, the force determines only the ratio of friction and radius."""
     options = {"parameters": ("mu_c", "contact_radius"), "start": KNOWN, "starts": 1}
     found = identify(without_torque(spun), PATCH, **options)
     assert not found.identifiable("mu_c") and not found.identifiable("contact_radius")

@@ -1,4 +1,4 @@
-"""What a rig adds to a log: it is estimated, it widens intervals, and a model that does not fit tells nothing."""
+"""Effects of a rig on a log are estimated and widen intervals; a model that does not fit gives no estimate."""
 
 from __future__ import annotations
 
@@ -259,7 +259,7 @@ def test_patches_that_follow_their_load_have_one_model(log):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["exact", "delay", "drift", "bias", "twist", "distributed", "rim"])
 def test_intervals_hold_the_truth(name, monkeypatch):
-    """Of 6 seeds: 85 % of all (48 or none told; three of their standard deviations below 95 %)."""
+    """Six seeds must hold 85 % of up to 48 intervals: three standard deviations below 95 %."""
     monkeypatch.syspath_prepend(Path(__file__).parents[2] / "docs")
     script = importlib.import_module("make_coverage")
     row, count = script.ROWS[name], script.Count()

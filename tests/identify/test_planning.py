@@ -28,7 +28,7 @@ def motions():
 
 @pytest.fixture(scope="module")
 def slide(motions):
-    """What was measured of a slide in one direction, which never spins."""
+    """A noisy log of a slide in one direction, which never spins."""
     time, twist = motions["slide from slow to fast"].time, motions["slide from slow to fast"].twist
     log = clean_log(time, twist, load=LOAD, name="slide")
     noise = NOISE * np.random.default_rng(3).standard_normal(log.wrench.shape)

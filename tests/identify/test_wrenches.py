@@ -24,7 +24,7 @@ def log():
 
 
 def identify(log, patch=PATCH, **options):
-    """Of the model that the logs were made with, without anything that a rig adds."""
+    """Identify the model that made the logs, without effects of a rig."""
     return identify_lugre(log, patch, **{"model": "reduced-published", "nuisance": (), **options})
 
 

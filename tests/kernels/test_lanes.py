@@ -21,7 +21,7 @@ MODELS = {
     "published": pf.ReducedModelPublished(PATCH, ELASTIC),
 }
 CLOSE = 1e-12
-"""Of wrenches of 1 N and of gradients scaled to one: vector code sums in another order."""
+"""Largest difference of wrenches of 1 N and of gradients scaled to one: vector code sums in another order."""
 
 
 @pytest.fixture(params=MODELS)

@@ -91,7 +91,7 @@ PLACES = {"named": "named by the user", "beside": "sources/__pycache__", "user":
 
 @pytest.fixture(params=PLACES)
 def place(request, sources, tmp_path, monkeypatch) -> Path:
-    """Where machine code goes: the folder that the user names, beside the sources, or the user's cache."""
+    """Machine code goes to the folder that the user names, beside the sources, or to the user's cache."""
     folder = tmp_path / PLACES[request.param]
     if request.param == "named":
         monkeypatch.setattr(config, "CACHE_DIR", str(folder))

@@ -1,4 +1,4 @@
-"""What every limit surface must satisfy: dissipation, symmetry, covariance; and the way back from wrench to twist."""
+"""Properties of every limit surface: dissipation, symmetry, covariance, and the inverse from wrench to twist."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ del BUILT[EXACT, "feet"]  # points are integrated as they are summed
 checked = settings(deadline=None, max_examples=25)
 angles = st.floats(-math.pi, math.pi)
 polars = st.floats(0.01, math.pi - 0.01)
-"""Of the twist's direction; 0 is a spin about the centre of pressure."""
+"""Polar angles of the twist's direction; 0 is a spin about the centre of pressure."""
 
 
 def scales(surface) -> np.ndarray:
@@ -245,7 +245,7 @@ def test_dissipation_is_convex(kind, name):
 
 @pytest.mark.parametrize("name", PATCHES)
 def test_maximum_dissipation(name):
-    """Of all wrenches on the surface, the one of a twist resists it most."""
+    """A twist's own wrench resists it more than any other wrench of the surface."""
     surface = BUILT[CELLS, name]
     twists = np.random.default_rng(8).normal(size=(200, 3)) / scales(surface)
     power = -surface.wrench(twists) @ twists.T  # [wrench of, against]
@@ -334,7 +334,7 @@ def test_every_wrench_has_a_twist(kind, name):
 @pytest.mark.parametrize("spin", [1.0, -1.0])
 @pytest.mark.parametrize("share", [0.0, 0.5, 0.95])
 def test_facets_of_a_three_legged_object(foot, spin, share):
-    """Where one foot rests while the others turn about it, it bears any force below its friction: a flat facet."""
+    """A foot that rests while the others turn about it bears any force below its friction: a flat facet."""
     surface = BUILT[CELLS, "feet"]
     place, weight = FEET.positions[foot], FEET.weights()[foot]
     about_foot = spin * np.array([place[1], -place[0], 1.0])

@@ -44,7 +44,7 @@ KINDS = {
 
 
 def refused(kind: str, patch: str) -> bool:
-    """Whether a surface does not take a patch, or, a table of cells with metrics, is not convex there."""
+    """Return True if a surface does not take a patch, or is a table of cells with metrics, which is not convex."""
     each = patch == "a grain in each cell"
     grained = patch in ("grain", "feet with a grain") or each
     return (kind == "published table" and grained) or (kind in ("exact", "ellipsoid") and each)
@@ -56,7 +56,7 @@ CASES = [
 
 
 def scaled_frame(surface) -> np.ndarray:
-    """What makes scaled twists of twists: `W_S = F'^-1 W`."""
+    """Return the matrix that scales twists, `W_S = F'^-1 W`."""
     return surface._frame()
 
 
@@ -90,7 +90,7 @@ def test_the_wrench_of_the_twist_is_parallel(kind, name):
     ("kind", "name"), [case for case in CASES if case.values[0] not in ("table", "published table")]
 )
 def test_no_other_twist_resists_the_wrench_with_less_dissipation(kind, name):
-    """Of all twists of unit dissipation the one found gives the wrench most power: facets and kinks included."""
+    """The twist found gives the wrench more power than any other of unit dissipation, also at facets and kinks."""
     surface = KINDS[kind](PATCHES[name])
     asked = wrenches(surface, 20)
     found = surface.twist(asked)

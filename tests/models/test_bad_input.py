@@ -1,4 +1,4 @@
-"""What wrong input to a model is answered with: one clear line."""
+"""Wrong input to a model is refused in one clear line."""
 
 from __future__ import annotations
 

@@ -35,7 +35,7 @@ LOAD = 2.0
 checked = settings(deadline=None, max_examples=25)
 angles = st.floats(-math.pi, math.pi)
 polars = st.floats(0.0, math.pi)
-"""Of the twist's direction; 0 is a spin about the centre of pressure."""
+"""Polar angles of the twist's direction; 0 is a spin about the centre of pressure."""
 speeds = st.floats(1e-6, 10.0)
 
 
@@ -197,7 +197,7 @@ def test_turning_everything_turns_the_wrench_and_nothing_else(kind, law):
         twist = twist_towards(patch, polar, azimuth, speed)
 
         def turn(value):
-            """Of a state: the bristles are vectors, x then y; the reduced one turns like a wrench."""
+            """Rotate a state: bristles are vectors, x then y; the reduced state rotates like a wrench."""
             return (
                 np.swapaxes(geometry.rotate(value.T, angle), 0, 1)
                 if kind == "distributed"

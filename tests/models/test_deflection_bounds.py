@@ -1,4 +1,4 @@
-"""How far steps of any length deflect the bristles (docs/physics.md, "A step at a held twist")."""
+"""Largest deflections of the bristles after steps of any length (docs/physics.md, "A step at a held twist")."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ PATCHES = {"disc": pf.ContactPatch.disc(0.01, 9), "four cells": pf.ContactPatch.
 CONTACTS = 500
 
 ROUNDING = 1e-12
-"""Of forty steps, each of which rounds to 1e-15."""
+"""Relative error of forty steps, each of which rounds to 1e-15."""
 
 SAMPLED = 1e-2
 """By how much the longest of 20,000 wrenches falls short of the longest of all: they lie 0.03 rad apart."""

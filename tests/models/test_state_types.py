@@ -61,14 +61,14 @@ FORMS = {
     "subclass": (lambda a: a.view(Labelled), 0.0),
     "list": (lambda a: a.tolist(), 0.0),
 }
-"""How numbers may come, and the relative error that their type brings with it."""
+"""Types of arrays that hold the same numbers, with the relative error of each type."""
 
 every_model = pytest.mark.parametrize("model", MODELS.values(), ids=MODELS)
 every_form = pytest.mark.parametrize("form", FORMS)
 
 
 def compiled() -> dict[str, int]:
-    """How often each kernel has been compiled."""
+    """Return the number of compilations of each kernel."""
     modules = [module for name, module in sys.modules.items() if name.startswith("planarfriction.kernels")]
     found = {id(value): value for module in modules for value in vars(module).values() if isinstance(value, Dispatcher)}
     return {f"{each.__module__}.{each.__name__}": len(each.signatures) for each in found.values()}

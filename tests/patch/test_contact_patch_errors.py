@@ -1,4 +1,4 @@
-"""What a wrong contact patch is answered with."""
+"""Wrong contact patches are refused in one clear line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How a patch is split into compact parts, and parts as patches."""
+"""Compact parts of a patch, and parts as patches."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is written to plain data comes back to the last bit: files, digests and caches rely on it."""
+"""Plain data keep every bit: files, digests and caches rely on it."""
 
 from __future__ import annotations
 

@@ -168,7 +168,7 @@ def test_a_plan_draws_itself():
 @pytest.mark.parametrize("patch", [PATCH, SOFT])
 @pytest.mark.parametrize("kind", [pf.DistributedModel, pf.ReducedModel, pf.ReducedModelPublished])
 def test_a_model_with_another_law_is_that_model_to_the_bit(kind, patch):
-    """What is shared with the first is what the second would have built; another exponent makes another map."""
+    """Data taken over from the first model are those that the second builds; another exponent needs another map."""
     first = kind(patch, LAW)
     twist, load, dt = (0.003, 0.001, 0.4), 2.3, 1e-3
     first.step(first.rest(), twist, load, dt)

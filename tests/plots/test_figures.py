@@ -36,7 +36,7 @@ CUT = 1.0  # [pixel]: the box of a letter is rounded up to whole pixels
 
 
 def overhang(figure) -> float:
-    """How far the labels and other parts of a figure stick out of it [pixel], 0 if they do not."""
+    """Return the distance [pixel] by which labels or other parts of a figure stick out of it, 0 if none does."""
     canvas = FigureCanvasAgg(figure)
     canvas.draw()
     drawn = figure.get_tightbbox(canvas.get_renderer())

@@ -1,4 +1,4 @@
-"""What a contact touches may move: driven pads, belts, turntables, and the ready scene that they make."""
+"""Moving supports of contacts: driven pads, belts, turntables, and the ready scene with them."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ ROUNDING = 1e-14  # a few roundings of numbers of order one
 
 
 def stand_in(patch=None):
-    """What a scene needs to know of a model: nothing but its parts."""
+    """Return a stand-in for a model with its parts alone, all that a scene needs."""
     return SimpleNamespace(
         patch=patch or ContactPatch.points([[0.0, 0.0], [1.0, 0.0]]), law=LuGre(mu_s=1.2), surface=None
     )

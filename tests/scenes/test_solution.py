@@ -19,7 +19,7 @@ UNITS = {"fx": "N", "fy": "N", "tau": "N m", "normal_force": "N"}
 
 
 def a_solution(name="fingers"):
-    """What a simulation returns, without one."""
+    """Return a made-up solution, as a simulation returns it."""
     patch = pf.ContactPatch.disc(0.01, 5)
     scene = in_hand(pf.ReducedModelPublished(patch, pf.LuGre(mu_s=1.2), surface=pf.LimitSurfaceEllipsoid(patch)))
     scene = dataclasses.replace(scene, contacts=[dataclasses.replace(scene.contacts[0], name=name)])

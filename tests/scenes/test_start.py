@@ -1,4 +1,4 @@
-"""How bristles start: carrying the load of a body that stands still, or as in steady sliding."""
+"""Initial states of bristles: under the load of a body that stands still, or as in steady sliding."""
 
 from __future__ import annotations
 

@@ -18,7 +18,7 @@ LINE = {"name": "in_hand.distributed", "value": 0.0931, "unit": "s", "baseline":
 
 @pytest.fixture(scope="module")
 def pages():
-    """What puts numbers into pages."""
+    """The script that writes numbers into pages, as a dictionary of its functions."""
     if not DOCS.is_dir():
         pytest.skip("no docs beside these tests")
     return runpy.run_path(str(DOCS / "make_tables.py"))

@@ -1,4 +1,4 @@
-"""What the default tolerances are worth: ends of the published in-hand runs, also with other tolerances."""
+"""Accuracy of the default tolerances: ends of the published in-hand runs, also with other tolerances."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from planarfriction.patch import PUBLISHED_PATCHES
 
 SCRIPT = Path(__file__).parents[2] / "docs" / "default_accuracy.py"
 MOST = np.array([5e-6, 2e-5])
-"""What is promised of ends: distance [m] and angle [rad], of motions of 2 cm and up to 1.8 rad."""
+"""Promised errors of ends: distance [m] and angle [rad], for motions of 2 cm and up to 1.8 rad."""
 
 
 def _script():

@@ -41,7 +41,7 @@ def miss(case: Case, kind: str, parts: int | str = 1) -> float:
 
 
 def limit(case: Case, parts: int | str) -> float:
-    """How far from the distributed model's the end may be [m]: beside the published model's, or what friction does."""
+    """Return the allowed distance [m] from the distributed end: the published model's error, or friction's effect."""
     published = miss(case, "published")
     if case.shape in ROUND:
         return SHARES[parts] * published

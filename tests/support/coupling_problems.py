@@ -42,9 +42,9 @@ class Bodies(NamedTuple):
     """E rigid bodies on k patches each."""
 
     jacobian: np.ndarray
-    """Of the patches' twists, `[E, 3k, 3]`."""
+    """Jacobian of the patches' twists, `[E, 3k, 3]`."""
     mass: np.ndarray
-    """Of x, y and the angle, `[E, 3]`."""
+    """Masses of x and y [kg], moment of inertia of the angle [kg m^2], `[E, 3]`."""
     size: np.ndarray
     """`[E]` [m]"""
     response: np.ndarray

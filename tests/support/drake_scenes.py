@@ -34,7 +34,7 @@ class Running(NamedTuple):
     simulator: Any
     plant: Any
     context: Any
-    """Of the plant."""
+    """Context of the plant."""
     friction: Any
     own: Any
     """Context of the friction."""

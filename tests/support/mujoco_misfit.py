@@ -1,4 +1,4 @@
-"""What comes out of a step of MuJoCo, from its contacts and velocities, beside what was solved for."""
+"""Results of a step of MuJoCo, from its contacts and velocities, compared with the solved step."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy as np
 
 
 def twists_and_loads(friction, d) -> tuple[np.ndarray, np.ndarray]:
-    """Of all patches `[k, 3]`, `[k]`, after a step: positions in the data are still those at its beginning."""
+    """Return twists `[k, 3]` and loads `[k]` of all patches after a step; positions in the data are those before it."""
     m, k = friction.m, len(friction.patches)
     twists, loads = np.zeros((k, 3)), np.zeros(k)
     for p, placed in enumerate(friction.placed):

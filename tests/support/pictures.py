@@ -1,4 +1,4 @@
-"""What is wrong with a figure, in words: texts that are cut off or lie on each other, offsets of ticks, empty axes."""
+"""Faults of a figure in words: texts that are cut off or lie on each other, offsets of ticks, empty axes."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
 CUT = 1.0
-"""How far a text may stick out of a figure or into another [pixel]: the box of a letter is rounded up to whole ones."""
+"""Allowed overlap of a text with another or the edge of a figure [pixel]: boxes of letters are rounded up to pixels."""
 
 SMALLEST = 6.5
 """Smallest letters [pt]."""

@@ -193,7 +193,7 @@ def test_a_run_of_other_equations_does_not_count(tmp_path, monkeypatch):
 
 
 def found(folder: Path, grips: list[float], **options) -> int:
-    """How many runs of a sweep are there already."""
+    """Return the number of runs that a folder of a sweep holds."""
     told: list[sweeps.Progress] = []
     pf.sweep(grip, {"grip": grips}, out=folder, progress=told.append, **options)
     assert told[-1].done == told[-1].runs == len(grips)

@@ -28,7 +28,7 @@ def zarr():
 
 
 def same(stored, data) -> None:
-    """Whether a store holds what a sweep in memory has: texts may be of another kind there."""
+    """Check that a store holds the data of a sweep in memory; texts may have another type there."""
     assert set(stored.variables) == set(data.variables)
     for name, each in data.variables.items():
         there = stored[name]

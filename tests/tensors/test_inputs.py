@@ -1,4 +1,4 @@
-"""What steps and roll-outs of PyTorch and JAX answer to wrong input: one line, or friction that never drives."""
+"""Wrong input to steps and rollouts of PyTorch and JAX: refused in one line, or friction that never drives."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def front(request):
 
 
 def arguments(front, model, **changed):
-    """Of a step."""
+    """Return legal arguments of a step, some of them changed."""
     usual = {"state": model.rest(), "twist": front.array(TWIST), "normal_force": front.array(LOAD), "dt": DT}
     return {**usual, **changed}
 

@@ -1,4 +1,4 @@
-"""What a PyTorch module holds of its patch: its own numbers, for every way of evaluating it and in state dicts."""
+"""Buffers of PyTorch modules: each module holds its own numbers of its patch, for every method and in state dicts."""
 
 from __future__ import annotations
 
