@@ -10,8 +10,8 @@ from scipy.linalg import block_diag
 from scipy.optimize import fsolve
 
 import planarfriction as pf
+from planarfriction.compiler import jit
 from planarfriction.coupling import CoupledPatches, CoupledStep, HostStep
-from planarfriction.kernels import jit
 from planarfriction.kernels.pointers import address_of, call, place_of
 from planarfriction.kernels.step_slopes import NUMBERS, WORDS
 from planarfriction.patch import grain

@@ -17,7 +17,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction import warm
-from planarfriction.kernels import compiling
+from planarfriction.compiler import notice
 from planarfriction.scenes import simulation
 
 COUNTING = """
@@ -106,7 +106,7 @@ def compiled_anew(monkeypatch):
         return whole(*args, **options)
 
     monkeypatch.setattr(simulation, "integrate", integrate)
-    monkeypatch.setattr(compiling._Said, "done", False)
+    monkeypatch.setattr(notice._Said, "done", False)
 
 
 @pytest.mark.parametrize(
@@ -146,7 +146,7 @@ def read_only_installation(folder: Path) -> dict[str, str]:
     """Install the package where nothing can be written beside it; returns the environment that has it."""
     installed = folder / "planarfriction"
     shutil.copytree(Path(pf.__file__).parent, installed, ignore=shutil.ignore_patterns("__pycache__"))
-    (installed / "kernels" / "__pycache__").write_text("nothing can be written beside the sources")
+    (installed / "__pycache__").write_text("nothing can be written beside the sources")
     where = {**os.environ, "PYTHONPATH": str(folder), "XDG_CACHE_HOME": str(folder / "cache")}
     where.pop("NUMBA_CACHE_DIR", None)
     return where

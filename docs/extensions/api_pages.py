@@ -18,13 +18,16 @@ from sphinx.application import Sphinx
 from sphinx.ext.napoleon import NumpyDocstring
 from sphinx.pycode import ModuleAnalyzer
 
-import planarfriction.kernels
+import planarfriction
 from planarfriction.described import HEADING
 
 OPTIONAL = ("torch", "jax", "adapters.mujoco", "adapters.mjx", "adapters.drake")
 """Public modules that load a package of an extra, and so stand in no list of the package."""
 
-KERNEL = re.compile(r"\bkernels\.\w+(?:\.\w+)?")
+COMPILED = ("compiler", "kernels", "limit_surface.loops")
+"""Packages of compiled code that the pages name."""
+
+NAMED = re.compile(rf"(?<![\w.])(?:{'|'.join(COMPILED)})(?:\.\w+){{1,2}}")
 
 
 def public_modules() -> list[str]:
@@ -89,22 +92,30 @@ def page(name: str, documented: dict[int, str]) -> list[str]:
 
 def kernels_page(pages: Path) -> list[str]:
     """The compiled functions and modules that the pages name, with their words and their source."""
-    named = {name for path in pages.glob("*.md") for name in KERNEL.findall(path.read_text(encoding="utf-8"))}
-    modules = {module.name for module in pkgutil.iter_modules([str(Path(planarfriction.__path__[0]) / "kernels")])}
+    named = {name for path in pages.glob("*.md") for name in NAMED.findall(path.read_text(encoding="utf-8"))}
     lines = heading("Compiled loops")
     lines += [
         "Internal: no promise is made about them. They are here since the pages name them beside their equations.",
         "",
     ]
-    for each in sorted({name.split(".")[1] for name in named} - modules):
-        lines += entry(f"planarfriction.kernels.{each}", getattr(planarfriction.kernels, each))
-    for module_name in sorted({name.split(".")[1] for name in named} & modules):
-        module = importlib.import_module(f"planarfriction.kernels.{module_name}")
-        lines += [*heading(f"kernels.{module_name}", "-"), f".. automodule:: {module.__name__}", "   :no-members:", ""]
-        for name in sorted(name for name in named if name.startswith(f"kernels.{module_name}.")):
-            each = name.split(".")[2]
-            if hasattr(module, each):
-                lines += entry(f"{module.__name__}.{each}", getattr(module, each))
+    for package in COMPILED:
+        of_package = sorted(name for name in named if name.startswith(f"{package}."))
+        parent = importlib.import_module(f"planarfriction.{package}")
+        modules = {module.name for module in pkgutil.iter_modules(parent.__path__)}
+        of_modules: dict[str, list[str]] = {}
+        for name in of_package:
+            first, *inner = name.removeprefix(f"{package}.").split(".")
+            if first in modules:
+                of_modules.setdefault(first, []).extend(inner)
+            else:
+                lines += entry(f"planarfriction.{name}", getattr(parent, first))
+        for module_name, names in of_modules.items():
+            module = importlib.import_module(f"{parent.__name__}.{module_name}")
+            lines += heading(f"{package}.{module_name}", "-")
+            lines += [f".. automodule:: {module.__name__}", "   :no-members:", ""]
+            for each in names:
+                if hasattr(module, each):
+                    lines += entry(f"{module.__name__}.{each}", getattr(module, each))
     return lines
 
 

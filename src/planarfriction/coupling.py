@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import validation
+from planarfriction.compiler.threads import share
 from planarfriction.equality import ByValue, by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LARGEST
@@ -27,7 +28,6 @@ from planarfriction.kernels.coupling_rows import Patches, layout
 from planarfriction.kernels.pointers import address_of, place_of
 from planarfriction.kernels.records import row_of
 from planarfriction.kernels.step_slopes import WORDS
-from planarfriction.kernels.threads import share
 from planarfriction.models import FrictionModel
 from planarfriction.models.base import PackedSteps
 

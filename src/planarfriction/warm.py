@@ -12,8 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction import autodiff, coupling, limit_surface, models
+from planarfriction.compiler.notice import watched
 from planarfriction.families import MODELS
-from planarfriction.kernels.compiling import watched
 from planarfriction.laws import LuGre
 from planarfriction.patch import ContactPatch, grain
 from planarfriction.scenes import in_hand, simulate
@@ -110,9 +110,9 @@ def _couple(kinds: list[Any]) -> None:
 
 
 def _host() -> None:
-    from planarfriction.kernels import mujoco_step
+    from planarfriction.adapters.mujoco.loops import step
 
-    mujoco_step.compile_ahead()
+    step.compile_ahead()
 
 
 def _roll(model: Any) -> None:

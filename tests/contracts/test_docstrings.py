@@ -97,7 +97,8 @@ def called(node: ast.expr, code: Any, owner: type | None) -> Any:
 
 def raises(code: Any, owner: type | None = None, seen: frozenset = frozenset()) -> set[str]:
     """Names of the errors that a function raises, itself or in what it calls of this package but compiled loops."""
-    if not inspect.isfunction(code) or code in seen or not re.match(r"planarfriction\.(?!kernels)", code.__module__):
+    plain = r"planarfriction\.(?!kernels|compiler|[\w.]+\.loops)"
+    if not inspect.isfunction(code) or code in seen or not re.match(plain, code.__module__):
         return set()
     found, seen = set(), seen | {code}
     for node in ast.walk(tree(code)):

@@ -14,6 +14,8 @@ from pathlib import Path
 
 import pytest
 
+from planarfriction.compiler import FOLDERS
+
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "src" / "planarfriction"
 HEAVY = (
@@ -36,8 +38,8 @@ HEAVY = (
 """Packages that `import planarfriction` must not load."""
 
 HOMES = {
-    "numba": "kernels",
-    "llvmlite": "kernels",
+    "numba": "compiled",
+    "llvmlite": "compiled",
     "matplotlib": "plots",
     "rich": "cli",
     "click": "cli",
@@ -83,6 +85,13 @@ def _imports(tree: ast.AST, nested: bool) -> Iterator[str]:
             yield from (f"{node.module}.{alias.name}" for alias in node.names)
         elif nested or not isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef, ast.Lambda)):
             yield from _imports(node, nested)
+
+
+COMPILED = [folder.replace("/", ".") for folder in FOLDERS]
+
+
+def _is_compiled(module: str) -> bool:
+    return any(f"{module}.".startswith(f"planarfriction.{name}.") for name in COMPILED)
 
 
 def _sources() -> list[tuple[str, ast.AST]]:
@@ -142,6 +151,7 @@ def test_the_allowed_looks_upward_still_exist():
 def test_heavy_packages_load_only_where_they_live():
     for module, tree in _sources():
         floor = module.removeprefix("planarfriction").strip(".").split(".")[0]
+        floor = "compiled" if _is_compiled(module) else floor
         for target in _imports(tree, nested=False):
             package = target.split(".")[0]
             adapted = any(module.startswith(name) and package == its for name, its in SIMULATORS.items())
@@ -149,10 +159,27 @@ def test_heavy_packages_load_only_where_they_live():
                 assert HOMES.get(package) == floor, f"{module} imports {target} when it loads"
 
 
-def test_numba_stays_in_the_kernels():
+def test_numba_stays_where_code_is_compiled():
     for module, tree in _sources():
         for target in _imports(tree, nested=True):
-            assert target.split(".")[0] != "numba" or module.split(".")[1] == "kernels", f"{module} imports {target}"
+            assert target.split(".")[0] != "numba" or _is_compiled(module), f"{module} imports {target}"
+
+
+def test_compiled_functions_stand_in_folders_that_the_digest_of_machine_code_covers():
+    decorators = {f"planarfriction.compiler.{name}" for name in ("callback", "entry", "jit", "kernel")}
+    using = [module for module, tree in _sources() if decorators & set(_imports(tree, nested=True))]
+    assert {module.rsplit(".", 1)[0] for module in using} >= {f"planarfriction.{name}" for name in COMPILED[1:]}
+    assert [module for module in using if not _is_compiled(module)] == []
+
+
+def test_compiled_code_depends_on_nothing_outside_the_digest():
+    # a constant of another file would stay in the machine code after a change of that file
+    compiled = {"planarfriction.formulas", *(f"planarfriction.{name}" for name in COMPILED)}
+    for module, tree in _sources():
+        if _is_compiled(module) and module != "planarfriction.compiler.machine_code":  # nothing of it is compiled
+            for target in _imports(tree, nested=True):
+                inside = any(f"{target}.".startswith(f"{name}.") for name in compiled)
+                assert inside or not target.startswith("planarfriction"), f"{module} imports {target}"
 
 
 def _loaded_after(code: str) -> set[str]:

@@ -47,12 +47,13 @@ def test_equations_names_and_terms_are_links(site):
     assert "<math" in physics and "$$" not in physics
     assert 'href="api/formulas.html#planarfriction.formulas.stribeck"' in physics
     exact = (site / "exact-surfaces.html").read_text(encoding="utf-8")
-    assert 'href="api/kernels.html#planarfriction.kernels.exact.disc_sum"' in exact
+    assert 'href="api/kernels.html#planarfriction.limit_surface.loops.closed_forms.disc_sum"' in exact
     assert 'href="glossary.html#term-limit-surface"' in physics
 
 
 def test_every_formula_and_loop_that_a_page_names_is_a_link(site):
-    named = r'(<a [^>]*>)?<code[^>]*><span class="pre">((?:formulas|kernels)\.(?!py<)[\w.]+)</span></code>'
+    compiled = r"(?:formulas|kernels|compiler|limit_surface\.loops)\.(?!py<)[\w.]+"
+    named = rf'(<a [^>]*>)?<code[^>]*><span class="pre">({compiled})</span></code>'
     found = 0
     for page in site.glob("*.html"):
         for link, name in re.findall(named, page.read_text(encoding="utf-8")):

@@ -97,7 +97,7 @@ def test_no_page_docstring_or_message_is_stilted():
     found, number = [], 0
     for path in pages_and_sources():
         inside = path.relative_to(ROOT)
-        if path == Path(__file__) or "kernels" in inside.parts or not path.is_file():
+        if path == Path(__file__) or {"kernels", "compiler", "loops"} & set(inside.parts) or not path.is_file():
             continue
         number += 1
         text = path.read_text(encoding="utf-8")

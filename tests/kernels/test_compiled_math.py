@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numba import njit
 
-from planarfriction.kernels import compiled_math
+from planarfriction.compiler import compiled_math
 
 EPSILON = 2.0**-52
 NUMPY = EPSILON

@@ -14,8 +14,8 @@ from numba import njit
 
 from planarfriction import formulas
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import kernel
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import kernel
 from planarfriction.kernels.derive import NotStraightError, derive
 from planarfriction.kernels.rules import per, rule
 from planarfriction.kernels.vectors import dot, norm, plus, times

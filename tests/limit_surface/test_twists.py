@@ -9,8 +9,8 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError, SolverError
-from planarfriction.kernels.cell_twists import cell_twists
 from planarfriction.limit_surface import LimitSurface
+from planarfriction.limit_surface.loops.cell_twists import cell_twists
 from planarfriction.patch import PUBLISHED_PATCHES
 
 ELL = [(0.0, 0.0), (0.03, 0.0), (0.03, 0.005), (0.005, 0.005), (0.005, 0.02), (0.0, 0.02)]

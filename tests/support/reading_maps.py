@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from planarfriction.kernels import cube, jit
+from planarfriction.compiler import jit
+from planarfriction.kernels import cube
 
 
 @jit

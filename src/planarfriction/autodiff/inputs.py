@@ -10,8 +10,8 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.autodiff.parameters import Packed, pack
+from planarfriction.compiler import threads
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels import threads
 from planarfriction.kernels.law import LAW
 from planarfriction.kernels.rollouts import Inputs
 from planarfriction.models.shapes_by_load import ShapesByLoad, places_of

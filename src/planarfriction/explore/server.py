@@ -8,8 +8,8 @@ from collections.abc import Callable
 from typing import Any
 
 from planarfriction import validation
+from planarfriction.compiler.notice import said_when_compiling
 from planarfriction.errors import FrictionError, InvalidValueError, MissingExtraError
-from planarfriction.kernels.compiling import said_when_compiling
 
 LOOPBACK = "127.0.0.1"
 """The one address that is listened to: nobody else in the network can reach it."""

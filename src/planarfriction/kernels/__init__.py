@@ -1,51 +1,7 @@
-"""Compiled loops: nothing but loops around the formulas, compiled once and cached on disk."""
+"""Compiled loops over the formulas: steps, rates, their derivatives, and the solver of scenes."""
 
-from __future__ import annotations
-
-import functools
-import inspect
-from pathlib import Path
-from typing import Any
-
-from numba import njit
-from numba.extending import register_jitable
-
-from planarfriction import formulas
-from planarfriction.kernels.machine_code import Sources, kept
-
-_SOURCES = Sources([Path(formulas.__file__), *sorted(Path(__file__).parent.glob("*.py"))])
-
-_OPTIONS = {"error_model": "numpy", "fastmath": {"reassoc", "contract", "nsz", "arcp"}}
-
-
-def jit(function: Any) -> Any:
-    """Compile an entry point, callable from Python and from several threads at once, and keep it on disk.
-
-    Sums over cells may be reordered, so that they vectorise.
-    """
-    return kept(njit(nogil=True, no_cfunc_wrapper=True, **_OPTIONS)(function), _SOURCES)
-
-
-# Counting references to arrays is atomic: in a step of the reduced model it costs four times the physics. Inner
-# functions allocate nothing and keep no array, so they need no counting; they are called from compiled code only.
-_INNER = {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-
-# Inlined everywhere: a function left standing alone is optimised once by itself and once more in the module of each
-# caller. In the process that compiles, the first of these copies is called, and from the cache another: they differ in
-# the last bits. It is faster too, a third in the solver on three states.
-kernel: Any = functools.partial(njit, forceinline=True, **_INNER, **_OPTIONS)
-"""Compile an inner function into each of its callers: no allocation, no array assignments that might need a copy."""
-
-
-def entry(function: Any) -> Any:
-    """Compile a function that compiled code calls by its address (see `kernels.pointers`), and keep it on disk."""
-    return kept(njit(**_INNER, **_OPTIONS)(function), _SOURCES)
-
-
-def callback(function: Any) -> Any:
-    """Compile a function that C libraries call by its address (see `pointers.c_address_of`), and keep it on disk."""
-    return kept(njit(_nrt=False, no_cpython_wrapper=True, **_OPTIONS)(function), _SOURCES)
-
-
-for _name, _formula in inspect.getmembers(formulas, inspect.isfunction):
-    register_jitable(forceinline=True, **_INNER, **_OPTIONS)(_formula)
+from planarfriction.compiler import callback as callback
+from planarfriction.compiler import compiled_math as compiled_math
+from planarfriction.compiler import entry as entry
+from planarfriction.compiler import jit as jit
+from planarfriction.compiler import kernel as kernel

@@ -19,8 +19,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import jit, kernel
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import jit, kernel
 from planarfriction.kernels.body import load_of, read, record_of, seen_by, times
 from planarfriction.kernels.contacts import CALLS, PULL_BACK, SOLVE_TRANSPOSED
 from planarfriction.kernels.pointers import address, at, call, doubles, integers

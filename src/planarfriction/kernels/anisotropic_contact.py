@@ -14,9 +14,9 @@ import math
 from typing import NamedTuple
 
 from planarfriction import formulas
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import entry, kernel
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import entry, kernel
 from planarfriction.kernels.contacts import ModelFunctions
 from planarfriction.kernels.law import grip, grip_slope
 from planarfriction.kernels.pointers import doubles

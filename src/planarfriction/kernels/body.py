@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction.kernels import entry, jit, kernel
+from planarfriction.compiler import entry, jit, kernel
 from planarfriction.kernels.contacts import (
     BACK_SUBSTITUTE,
     CALLS,

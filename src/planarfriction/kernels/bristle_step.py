@@ -21,8 +21,8 @@ import math
 from typing import NamedTuple
 
 from planarfriction import formulas
-from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import kernel
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import kernel
 from planarfriction.kernels.vectors import dot, norm, plus, times
 
 ROUNDING = 1.0 + 256.0 * 2.220446049250313e-16

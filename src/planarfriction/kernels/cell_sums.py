@@ -11,8 +11,8 @@ import math
 
 import numpy as np
 
-from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import jit, kernel
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import jit, kernel
 
 DEPTH = 6
 """How often a cell at the centre of rotation is halved: its last parts hold 1/4096 of its load (of a segment 1/64)."""

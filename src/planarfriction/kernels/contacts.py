@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction.kernels import kernel
+from planarfriction.compiler import kernel
 from planarfriction.kernels.pointers import address_of
 
 WORLD, BODY, BODY_AXES = 0, 1, 2

@@ -18,8 +18,8 @@ from __future__ import annotations
 import functools
 import math
 
-from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import entry, jit, kernel
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import entry, jit, kernel
 from planarfriction.kernels.coupling_rows import INVALID, read
 from planarfriction.kernels.pointers import address, address_of, at, call, doubles, integers
 from planarfriction.kernels.small_matrices import leave_out_rising, solved

@@ -15,8 +15,8 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import kernel
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import kernel
 from planarfriction.kernels.four import patch, patch_of_levels
 from planarfriction.kernels.vectors import times
 

@@ -12,8 +12,9 @@ from typing import NamedTuple
 import numpy as np
 
 from planarfriction import formulas
-from planarfriction.kernels import bristle_step, jit, kernel
-from planarfriction.kernels import compiled_math as xp
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import jit, kernel
+from planarfriction.kernels import bristle_step
 from planarfriction.kernels.bristle_step import Bristle
 from planarfriction.kernels.law import grip, grip_slope, squared
 from planarfriction.kernels.vectors import norm, plus, times

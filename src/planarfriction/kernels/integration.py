@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction.kernels import entry
+from planarfriction.compiler import entry
 from planarfriction.kernels.body import System
 from planarfriction.kernels.pointers import address_of, doubles, matrix, place_of, vector
 from planarfriction.kernels.records import addresses_in, reader, row_of

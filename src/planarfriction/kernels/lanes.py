@@ -21,8 +21,8 @@ A step without load forgets its state, as in `rollouts`, whose `Inputs` come in;
 
 from __future__ import annotations
 
-from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import kernel
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import kernel
 from planarfriction.kernels.rollouts import row_of
 from planarfriction.kernels.vectors import accumulate, dot, three, times
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from planarfriction import formulas
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import kernel
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import kernel
 from planarfriction.kernels.records import reader
 
 LAW = len(LawNumbers._fields)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from planarfriction.kernels import entry, kernel
+from planarfriction.compiler import entry, kernel
 from planarfriction.kernels.contacts import (
     BACK_SUBSTITUTE,
     CHANGE,

@@ -16,7 +16,7 @@ from numba import types
 from numba.extending import intrinsic
 from numba.np.arrayobj import populate_array
 
-from planarfriction.kernels.interrupts import heard_between_passes
+from planarfriction.compiler.interrupts import heard_between_passes
 
 _DOUBLES, _FLOATS = types.CPointer(types.float64), types.CPointer(types.float32)
 

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import jit, kernel, lanes
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import jit, kernel
+from planarfriction.kernels import lanes
 from planarfriction.kernels.lanes import FIELDS, LANES, OMEGA, OWN, ROW, SLOTS, TWIST, put_slot, slot
 from planarfriction.kernels.law import LAW, LawNumbers
 from planarfriction.kernels.published_contact import Shape

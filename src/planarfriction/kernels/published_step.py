@@ -19,9 +19,10 @@ from typing import NamedTuple
 import numpy as np
 
 from planarfriction import formulas
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import entry, jit, kernel
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import bristle_step, entry, jit, kernel, rollouts
-from planarfriction.kernels import compiled_math as xp
+from planarfriction.kernels import bristle_step, rollouts
 from planarfriction.kernels.bristle_step import Bristle, BristleStep
 from planarfriction.kernels.pointers import address_of, doubles
 from planarfriction.kernels.published_contact import Shape

@@ -12,8 +12,8 @@ from typing import Any
 
 from numba import types
 
-from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import entry, jit, kernel
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import entry, jit, kernel
 from planarfriction.kernels.pointers import address, address_of, at, call, doubles, integers
 from planarfriction.kernels.records import reader, size_of
 from planarfriction.kernels.rollouts import Place

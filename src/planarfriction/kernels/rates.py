@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from planarfriction.kernels import jit
+from planarfriction.compiler import jit
 from planarfriction.kernels.pointers import address, call
 
 

@@ -13,8 +13,8 @@ shape begins and, if `blend > 0`, that of the other shape which has this share i
 from __future__ import annotations
 
 from planarfriction import formulas
-from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import kernel
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import kernel
 
 
 @kernel

@@ -11,9 +11,9 @@ from typing import NamedTuple
 from numba import types
 
 from planarfriction import formulas
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import entry, kernel
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import entry, kernel
 from planarfriction.kernels.contacts import ModelFunctions
 from planarfriction.kernels.pointers import at, doubles, floats
 from planarfriction.kernels.records import reader

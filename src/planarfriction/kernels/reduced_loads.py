@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from planarfriction import formulas
-from planarfriction.kernels import jit, kernel, reduced_step, rollouts
+from planarfriction.compiler import jit, kernel
+from planarfriction.kernels import reduced_step, rollouts
 from planarfriction.kernels.reduced_contact import Shape
 from planarfriction.kernels.reduced_step import NAMES, Held, cotangents, hold, linearise, pulled, shape_of
 from planarfriction.kernels.steady import FAR, STILL, blended, fourth_change, fourth_moments, scaled_twist, uneven

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import cube, jit, kernel, lanes
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import jit, kernel
+from planarfriction.kernels import cube, lanes
 from planarfriction.kernels.cube import Square
 from planarfriction.kernels.lanes import FIELDS, LANES, OWN, ROW, SLOTS, TWIST, TWIST_BAR, carried, put_slot, slot
 from planarfriction.kernels.law import LAW, LawNumbers

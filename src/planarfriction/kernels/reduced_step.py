@@ -20,9 +20,10 @@ import math
 from typing import NamedTuple
 
 from planarfriction import formulas
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import entry, kernel
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import entry, kernel, reduced, rollouts
+from planarfriction.kernels import reduced, rollouts
 from planarfriction.kernels.bristle_step import ROUNDING
 from planarfriction.kernels.pointers import address_of, floats
 from planarfriction.kernels.records import reader

@@ -27,8 +27,8 @@ import numpy as np
 from numba import types
 from numba.core.errors import NumbaError
 
-from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import jit, kernel
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import jit, kernel
 from planarfriction.kernels.law import LAW, law_of
 from planarfriction.kernels.pointers import address, at, call, doubles
 from planarfriction.kernels.records import reader, size_of

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import jit, kernel
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import jit, kernel
 from planarfriction.kernels.body import load_of, place_at, read, times
 from planarfriction.kernels.contacts import contact_map
 from planarfriction.kernels.integration import read_run

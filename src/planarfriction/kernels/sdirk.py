@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 
-from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import kernel
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import kernel
 from planarfriction.kernels.pointers import at, doubles, integers
 
 GAMMA = 0.25

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import kernel
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import kernel
 
 SWEEPS = 5
 """Of Jacobi rotations over a matrix [3, 3], which converge with their square from the second or third on."""

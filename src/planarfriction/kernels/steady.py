@@ -20,8 +20,9 @@ from typing import NamedTuple
 import numpy as np
 
 from planarfriction import formulas
-from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import cube, kernel
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import kernel
+from planarfriction.kernels import cube
 from planarfriction.kernels.vectors import applied_back, dot, plus, times
 
 QUARTIC = 8

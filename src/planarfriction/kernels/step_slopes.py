@@ -9,17 +9,16 @@ from __future__ import annotations
 
 import math
 
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import entry, kernel
 from planarfriction.kernels import (
     anisotropic_contact,
     distributed_contact,
-    entry,
-    kernel,
     published_contact,
     published_step,
     reduced_contact,
     reduced_step,
 )
-from planarfriction.kernels import compiled_math as xp
 from planarfriction.kernels.distributed_step import cell_slopes
 from planarfriction.kernels.law import grip, grip_slope, squared
 from planarfriction.kernels.pointers import doubles, floats

@@ -17,8 +17,8 @@ from __future__ import annotations
 
 import math
 
-from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import jit, kernel
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import jit, kernel
 
 BILINEAR, POTENTIAL, ELLIPSOID, CELLS = 0, 1, 2, 3
 

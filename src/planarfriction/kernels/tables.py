@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from planarfriction.kernels import jit
+from planarfriction.compiler import jit
 
 
 @jit

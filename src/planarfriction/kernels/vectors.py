@@ -8,7 +8,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from planarfriction.kernels import kernel
+from planarfriction.compiler import kernel
 
 _FLAGS = ("reassoc", "contract", "nsz", "arcp")
 

@@ -16,9 +16,9 @@ from planarfriction.equality import ByValue, by_parts, unusual
 from planarfriction.errors import FrictionError, InvalidValueError, SolverError
 from planarfriction.geometry import transformed
 from planarfriction.kernels import surfaces as kernels
-from planarfriction.kernels.twists import Table, table_twists
 from planarfriction.limit_surface.cell_metrics import scaled_levers
 from planarfriction.limit_surface.least_dissipation import across, descend, table_of
+from planarfriction.limit_surface.loops.twists import Table, table_twists
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.metric import refuse_anisotropy, refuse_cell_metrics, symmetric_root
 
@@ -274,7 +274,7 @@ class LimitSurface(ByValue):
 
     @functools.cached_property
     def _scaling(self) -> np.ndarray:
-        """What makes targets of wrenches and twists of scaled twists, and the lean: `kernels.twists` says how."""
+        """Numbers `[21]` between scaled and plain coordinates: the `frame` of `limit_surface.loops.twists`."""
         back = np.linalg.inv(self._frame())
         # conjugate coordinates: force and torque / r about the centre of pressure; -h balances the wrench
         return np.concatenate([-back.T.ravel(), back.ravel(), np.zeros(3) if self._lean is None else self._lean])

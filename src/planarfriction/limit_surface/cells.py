@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from planarfriction.kernels import surfaces as kernels
-from planarfriction.kernels.cell_twists import cell_twists
 from planarfriction.limit_surface.base import SurfaceNumbers
 from planarfriction.limit_surface.cell_metrics import cell_slopes, cell_sums
 from planarfriction.limit_surface.compiled import CompiledLimitSurface
+from planarfriction.limit_surface.loops.cell_twists import cell_twists
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from planarfriction.kernels import surfaces as kernels
-from planarfriction.kernels.twists import ellipsoid_twists
 from planarfriction.limit_surface.base import SurfaceNumbers
 from planarfriction.limit_surface.compiled import CompiledLimitSurface
+from planarfriction.limit_surface.loops.twists import ellipsoid_twists
 
 
 @dataclass(frozen=True, eq=False)

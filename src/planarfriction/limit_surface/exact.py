@@ -8,10 +8,10 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from planarfriction.kernels import exact as kernels
-from planarfriction.kernels.twists import exact_twists
 from planarfriction.limit_surface.base import LimitSurface, SurfaceNumbers, _norm
 from planarfriction.limit_surface.cells import LimitSurfaceCells
+from planarfriction.limit_surface.loops import closed_forms as kernels
+from planarfriction.limit_surface.loops.twists import exact_twists
 from planarfriction.patch import SoftFinger, Uniform
 from planarfriction.patch.outline import PolygonOutline, RoundOutline
 
@@ -250,7 +250,7 @@ def _cross(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 
 def _shape(corners: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """The coefficients `[N, 13]` that `kernels.exact` wants of elements and their weights."""
+    """The coefficients `[N, 13]` that `limit_surface.loops.closed_forms` wants of elements and their weights."""
     count = corners.shape[1]
     signs = {
         kernels.POINTS: [[1.0], [0.0], [0.0], [0.0]],

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planarfriction.kernels import surfaces
-from planarfriction.kernels.twists import Table
+from planarfriction.limit_surface.loops.twists import Table
 
 if TYPE_CHECKING:
     from planarfriction.limit_surface.base import LimitSurface
@@ -55,7 +55,7 @@ def descend(surface: LimitSurface, wrenches: np.ndarray, twists: np.ndarray) -> 
 def _least(surface: LimitSurface, target: np.ndarray, guess: np.ndarray) -> tuple[np.ndarray, float]:
     """Scaled twist of unit dissipation whose `h` is parallel to the unit vector `target`, and the angle [rad] left.
 
-    As `kernels.twists`: minimises the convex `Phi` over the plane `target . V = 1` by damped Newton steps.
+    As `limit_surface.loops.twists`: minimises the convex `Phi` over the plane `target . V = 1` by damped Newton steps.
     """
     basis = across(target)
     place = basis @ guess / (target @ guess)

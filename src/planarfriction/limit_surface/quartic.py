@@ -12,11 +12,11 @@ from numpy.typing import ArrayLike
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.geometry import transformed
-from planarfriction.kernels.twists import BAD_WRENCH
 from planarfriction.limit_surface import quartic_fit
 from planarfriction.limit_surface.base import MOST_SEGMENTS, LimitSurface, _rows, scaling
 from planarfriction.limit_surface.cells import LimitSurfaceCells
 from planarfriction.limit_surface.comparison import directions
+from planarfriction.limit_surface.loops.twists import BAD_WRENCH
 from planarfriction.patch import ContactPatch
 
 _SLOPE_LEFT = 1e-14

@@ -9,11 +9,11 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.kernels import surfaces as kernels
-from planarfriction.kernels.twists import table_twists
 from planarfriction.limit_surface.base import MOST_SEGMENTS, SurfaceNumbers
 from planarfriction.limit_surface.cell_metrics import potential_table
 from planarfriction.limit_surface.compiled import CompiledLimitSurface
 from planarfriction.limit_surface.exact import STORED_RULES, LimitSurfaceExact
+from planarfriction.limit_surface.loops.twists import table_twists
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,9 +10,9 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.kernels import surfaces as kernels
 from planarfriction.kernels import tables
-from planarfriction.kernels.published_twists import published_twists
 from planarfriction.limit_surface.base import MOST_SEGMENTS, SurfaceNumbers
 from planarfriction.limit_surface.compiled import CompiledLimitSurface
+from planarfriction.limit_surface.loops.published_twists import published_twists
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.compiler.notice import said_when_compiling
 from planarfriction.errors import InvalidValueError, SimulationInterrupted, SolverError
-from planarfriction.kernels.compiling import said_when_compiling
 from planarfriction.kernels.integration import Method, Output
 from planarfriction.scenes.packing import Windows
 from planarfriction.scenes.scene import Scene

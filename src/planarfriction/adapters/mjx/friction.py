@@ -18,12 +18,12 @@ from planarfriction import models
 from planarfriction.adapters.mjx import newton, responses
 from planarfriction.adapters.mjx.geometry import Places, geometry, places
 from planarfriction.adapters.mujoco.friction import Report
+from planarfriction.adapters.mujoco.loops.records import Memory
 from planarfriction.adapters.mujoco.patches import Patch, Placed, check_once, memory, words
 from planarfriction.coupling import ITERATIONS, TOLERANCE
 from planarfriction.errors import InvalidValueError
 from planarfriction.jax import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.jax.base import FrictionModel
-from planarfriction.kernels.mujoco_records import Memory
 
 INTEGRATORS = {
     int(mujoco.mjtIntegrator.mjINT_EULER): "Euler",

@@ -15,12 +15,12 @@ import numpy as np
 
 from planarfriction.adapters.mujoco.draw import draw_patch
 from planarfriction.adapters.mujoco.library import layout
+from planarfriction.adapters.mujoco.loops import step as loops
+from planarfriction.adapters.mujoco.loops.records import Host
 from planarfriction.adapters.mujoco.patches import Patch, Placed, check_once, memory, words
 from planarfriction.coupling import CoupledPatches
 from planarfriction.errors import FrictionError, InvalidValueError
 from planarfriction.kernels import coupling as kernels
-from planarfriction.kernels import mujoco_step
-from planarfriction.kernels.mujoco_records import Host
 from planarfriction.kernels.pointers import place_of
 from planarfriction.kernels.records import row_of
 
@@ -145,7 +145,7 @@ class Friction:
         Raises `InvalidValueError` for a state that is not finite.
         """
         mujoco.mj_step1(self.m, d)
-        mujoco_step.plan_step(self._row, self.m._address, d._address)
+        loops.plan_step(self._row, self.m._address, d._address)
         mujoco.mj_step2(self.m, d)
         if d.userdata[self._memory.iterations] < 0.0:
             raise InvalidValueError("state", "be finite", "a number that is not")
@@ -159,15 +159,15 @@ class Friction:
         Raises `FrictionError` if another control callback is installed.
         """
         self._check()
-        if mujoco.get_mjcb_control() is not None or mujoco_step.INSTALLED[0] != 0:
+        if mujoco.get_mjcb_control() is not None or loops.INSTALLED[0] != 0:
             raise FrictionError("a control callback is installed already: remove it with mujoco.set_mjcb_control(None)")
-        mujoco_step.INSTALLED[0] = place_of(self._row)
+        loops.INSTALLED[0] = place_of(self._row)
         mujoco.set_mjcb_control(_callback())
         try:
             yield self
         finally:
             mujoco.set_mjcb_control(None)
-            mujoco_step.INSTALLED[0] = 0
+            loops.INSTALLED[0] = 0
 
     @functools.cached_property
     def _row(self) -> np.ndarray:
@@ -193,7 +193,7 @@ class Friction:
                 problem=place_of(problem),
                 patches=place_of(packed.row),
                 solve=kernels.solve_address(),
-                plan=mujoco_step.plan_address(),
+                plan=loops.plan_address(),
                 free_count=len(joints),
                 free_joints=place_of(free),
                 free_dofs=place_of(free) + 8 * len(joints),
@@ -207,4 +207,4 @@ class Friction:
 @functools.cache
 def _callback() -> Any:
     """The compiled control callback."""
-    return ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(mujoco_step.control_address())
+    return ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(loops.control_address())

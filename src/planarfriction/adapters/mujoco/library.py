@@ -13,8 +13,8 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
+from planarfriction.adapters.mujoco.loops import records
 from planarfriction.errors import FrictionError
-from planarfriction.kernels import mujoco_records as records
 
 _SIZES = {"int": 4, "float": 4, "char": 1, "mjtByte": 1, "mjtBool": 1}
 _SIZES |= dict.fromkeys(("mjtNum", "double", "mjtSize", "size_t", "uint64_t", "uintptr_t"), 8)

@@ -13,8 +13,8 @@ import mujoco
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.adapters.mujoco.loops.records import Memory
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels.mujoco_records import Memory
 from planarfriction.models import FrictionModel
 
 CENTRES = ("site", "contact")
@@ -49,7 +49,7 @@ class Patch:
 
 
 def words(patches: Sequence[Patch], nv: int) -> int:
-    """Numbers that patches keep in `userdata` (see `kernels.mujoco_records.Memory`)."""
+    """Numbers that patches keep in `userdata` (see `mujoco.loops.records.Memory`)."""
     return memory(patches, nv, 0).converged + 1
 
 

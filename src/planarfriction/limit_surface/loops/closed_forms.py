@@ -24,8 +24,8 @@ from typing import NamedTuple
 import numpy as np
 
 from planarfriction import formulas
-from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import jit, kernel
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import jit, kernel
 from planarfriction.kernels.vectors import accumulate, put_all
 
 POINTS, SEGMENTS, QUADS = 1, 2, 4

@@ -156,7 +156,7 @@ class Host(NamedTuple):
     solve: int
     """Address of `coupling.solve`."""
     plan: int
-    """Address of `mujoco_step.plan`."""
+    """Address of `step.plan`."""
     sites: int
     """Where the sites of the patches are, int [k]; so with what follows."""
     own: int

@@ -7,9 +7,9 @@ twists answer with `A = dt J Mh^-1 M X`, loads with `B = -sum D Jc X` over the r
 
 from __future__ import annotations
 
-from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import kernel
-from planarfriction.kernels.elimination import backward, eliminate, multiply
+from planarfriction.adapters.mujoco.loops.elimination import backward, eliminate, multiply
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import kernel
 from planarfriction.kernels.pointers import at, call_c, doubles, integers, integers32
 
 MISFIT = 3e-9

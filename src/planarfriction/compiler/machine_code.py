@@ -1,10 +1,9 @@
-"""Machine code on disk, under the digest of everything that it was made from.
+"""Cache of machine code on disk, under a digest of every source that it may be made from.
 
-Numba's own cache looks at the file of the cached function alone: after a change of a formula that the function calls it
-gives old results. It also takes a file for what its index says, which two processes that write at once, or one that is
-killed, can make wrong; and it fails where no folder can be written. Here a function has one file for each signature and
-processor, written whole, with a checksum over its content and what that was made from. What fits in any way but this is
-compiled anew.
+Numba's own cache looks at the file of the cached function alone, so it is stale after a change of a formula that the
+function calls; two writers, or one that is killed, can damage it; and it fails where no folder can be written. Here a
+function has one file for each signature and processor, written whole and sealed with its origin and a checksum. A file
+that does not fit is compiled anew.
 """
 
 from __future__ import annotations
@@ -30,39 +29,39 @@ from numba.core.serialize import dumps
 from numba.core.sigutils import normalize_signature
 from numba.misc.appdirs import AppDirs
 
-from planarfriction.kernels.interrupts import heard_between_passes
+from planarfriction.compiler.interrupts import heard_between_passes
 from planarfriction.writing import replacing
 
 _SETTINGS = ("OPT", "BOUNDSCHECK", "DEBUGINFO_DEFAULT", "LOOP_VECTORIZE", "SLP_VECTORIZE", "USING_SVML")
-"""Numba's settings that change machine code; the processor and its features are in the key of the target."""
+"""Settings of Numba that change machine code; the processor and its features are in the key of the target."""
 
 _VERSIONS_KEPT = 8
-"""Folders of machine code that stay in one place, 4 MB each: other versions, or other sources of a developer."""
-
+"""Number of folders of machine code that stay in one place (10 MB each after `warm`), for versions and for changes."""
 
 _SEAL = 36
-"""Bytes at the beginning of a file that say what it is made from, and whether it is whole."""
+"""Length [bytes] of the beginning of a file that certifies its origin and its content."""
 
 
 class Sources:
-    """Files whose functions any kept function may call, as they were when they were imported."""
+    """Files of a package whose functions any function of it may call, as they were when they were imported."""
 
-    def __init__(self, paths: Iterable[Path]):
-        self.paths = tuple(paths)
+    def __init__(self, root: Path, files: Iterable[Path]):
+        self.root, self.files = root, sorted(files)
         self.digest = self._digest_now()
 
     def _digest_now(self) -> str | None:
         versions = (numba.__version__, llvmlite.__version__, np.__version__, sys.implementation.cache_tag)
-        digest = hashlib.sha256(repr(versions).encode())
-        try:
-            for path in self.paths:
-                digest.update(hashlib.sha256(path.read_bytes()).digest())
-        except OSError:  # inside an archive, or installed without its sources
+        parts = [repr(versions), *((self.name_of(file), _digest_of(file)) for file in self.files)]
+        if not all(map(all, parts[1:])):  # inside an archive, or installed without its sources
             return None
-        return digest.hexdigest()[:16]
+        return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]
+
+    def name_of(self, file: Path) -> str:
+        """Return the name of one of the files within the package, which is the same wherever it is installed."""
+        return file.relative_to(self.root).as_posix() if file in self.files else str(file)
 
     def unchanged(self) -> bool:
-        """Whether the files are still those that were imported."""
+        """Return True if no source file changed since import."""
         return self.digest is not None and self.digest == self._digest_now()
 
 
@@ -71,7 +70,7 @@ def kept(dispatcher: Any, sources: Sources) -> Any:
     if config.DISABLE_JIT:
         return dispatcher
     function = dispatcher.py_func
-    own = _digest_of(function.__code__.co_filename)
+    own = _digest_of(Path(function.__code__.co_filename))
     if own is not None and sources.digest is not None and function.__closure__ is None:
         dispatcher._cache = MachineCode(function, own, sources)
     compile_deaf = dispatcher.compile
@@ -84,55 +83,53 @@ def kept(dispatcher: Any, sources: Sources) -> Any:
     return dispatcher
 
 
-def _digest_of(path: str) -> str | None:
+def _digest_of(file: Path) -> str | None:
     try:
-        return hashlib.sha256(Path(path).read_bytes()).hexdigest()
+        return hashlib.sha256(file.read_bytes()).hexdigest()
     except OSError:  # typed into a prompt
         return None
 
 
 class MachineCode(NullCache):
-    """The machine code of one function on disk, in the interface that Numba asks."""
+    """Machine code of one function on disk, with the interface that Numba expects of a cache."""
 
     told = False
-    """Whether the user knows that nothing can be kept."""
+    """True once the user has been told that nothing can be kept."""
 
     def __init__(self, function: Any, own: str, sources: Sources):
-        self._path, self._sources = Path(function.__code__.co_filename), sources
-        place = self._path.name if self._path in sources.paths else str(self._path)
-        self._name, self._identity = f"{self._path.stem}.{function.__qualname__}", (place, function.__qualname__, own)
+        path, name = Path(function.__code__.co_filename), function.__qualname__
+        self._sources, self._name = sources, f"{path.stem}.{name}"
+        self._identity = (sources.name_of(path), name, own)
 
     @property
     def cache_path(self) -> str:
-        """The first folder that is tried."""
+        """Folder that is tried first."""
         return str(next(self._folders()))
 
     def _folders(self) -> Iterator[Path]:
-        """Where machine code may be, in the order in which it is looked for and written."""
+        """Yield the folders for machine code in the order in which they are read and written."""
         if config.CACHE_DIR:
             places = [Path(config.CACHE_DIR)]
         else:
             user = Path(AppDirs("planarfriction", appauthor=False).user_cache_dir)
-            places = [self._path.parent / "__pycache__", *([user] if user.is_absolute() else [])]
+            places = [self._sources.root / "__pycache__", *([user] if user.is_absolute() else [])]
         return (place / f"planarfriction-{self._sources.digest}" for place in places)
 
     def _file(self, arguments: tuple, codegen: Any) -> tuple[str, bytes]:
-        """Name of the file for a signature, and what its machine code is made from."""
+        """Return the name of the file for a signature, and the origin of its machine code."""
         settings = [str(getattr(config, name, None)) for name in _SETTINGS]
         variant = repr((self._identity[0], str(arguments), codegen.magic_tuple(), settings))
         name = f"{self._name}-{hashlib.sha256(variant.encode()).hexdigest()[:16]}.machine"
         return name.replace("<", "").replace(">", ""), repr((self._sources.digest, self._identity, variant)).encode()
 
     def load_overload(self, sig: Any, target_context: Any) -> CompileResult | None:
-        """The function for a signature, or None where its machine code is missing, of another origin, or damaged."""
+        """Read the function for a signature; None if its file is missing, of another origin or damaged."""
         target_context.refresh()
         arguments, _ = normalize_signature(sig)
         name, origin = self._file(arguments, target_context.codegen())
-        for folder in self._folders():
-            path = folder / name
+        for path in (folder / name for folder in self._folders()):
             try:
-                content = path.read_bytes()
-                return _unpacked(content, origin, arguments, target_context)
+                return _unpacked(path.read_bytes(), origin, arguments, target_context)
             except (FileNotFoundError, NotADirectoryError):
                 continue
             except Exception:  # whatever a damaged file does, compiling is the remedy
@@ -145,30 +142,36 @@ class MachineCode(NullCache):
         if data.library.has_dynamic_globals or data.lifted or not self._sources.unchanged():
             return
         name, origin = self._file(normalize_signature(sig)[0], data.codegen)
-        content = _packed(data, origin)
+        content = dumps(data._reduce())
         for folder in self._folders():
             try:
                 _make(folder)
                 with replacing(folder / name) as file:
-                    file.write(content)
+                    file.write(_seal(origin, content) + content)
+                return
             except OSError as error:
                 reason = str(error)
-            else:
-                return
-        _tell(reason)
+        self._tell(reason)
 
-
-def _packed(compiled: CompileResult, origin: bytes) -> bytes:
-    content = dumps(compiled._reduce())
-    return _seal(origin, content) + content
+    @classmethod
+    def _tell(cls, reason: str) -> None:
+        """Warn the user, once in a process."""
+        if not cls.told:
+            cls.told = True
+            warnings.warn(
+                f"compiled code is not kept, each process compiles anew ({reason}): "
+                "name a folder that can be written in NUMBA_CACHE_DIR",
+                RuntimeWarning,
+                stacklevel=3,
+            )
 
 
 def _seal(origin: bytes, content: bytes) -> bytes:
     return hashlib.sha256(origin).digest() + zlib.crc32(content).to_bytes(4)
 
 
-def _unpacked(content: bytes, origin: bytes, arguments: tuple, target_context: Any) -> CompileResult:
-    seal, content = content[:_SEAL], content[_SEAL:]
+def _unpacked(file: bytes, origin: bytes, arguments: tuple, target_context: Any) -> CompileResult:
+    seal, content = file[:_SEAL], file[_SEAL:]
     if seal != _seal(origin, content):
         raise ValueError("damaged, or made from other sources")
     compiled = CompileResult._rebuild(target_context, *pickle.loads(content))
@@ -178,7 +181,7 @@ def _unpacked(content: bytes, origin: bytes, arguments: tuple, target_context: A
 
 
 def _make(folder: Path) -> None:
-    """Make a folder, and drop the oldest of those beside it that hold other versions."""
+    """Make a folder for machine code, and delete the oldest of those beside it that hold other versions."""
     if folder.is_dir():
         return
     folder.mkdir(parents=True, exist_ok=True)
@@ -186,15 +189,3 @@ def _make(folder: Path) -> None:
         others = [one for one in folder.parent.glob("planarfriction-" + "[0-9a-f]" * 16) if one != folder]
         for old in sorted(others, key=lambda one: one.stat().st_mtime)[: 1 - _VERSIONS_KEPT]:
             shutil.rmtree(old, ignore_errors=True)
-
-
-def _tell(reason: str) -> None:
-    """Warn the user, once in a process."""
-    if not MachineCode.told:
-        MachineCode.told = True
-        warnings.warn(
-            f"compiled code is not kept, each process compiles anew ({reason}): "
-            "name a folder that can be written in NUMBA_CACHE_DIR",
-            RuntimeWarning,
-            stacklevel=2,
-        )

@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import jit, kernel
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import jit, kernel
 from planarfriction.kernels.surfaces import BILINEAR, sliding
-from planarfriction.kernels.twists import BAD_WRENCH, is_wrench, plane, put_twist, target_of
 from planarfriction.kernels.vectors import dot, times
+from planarfriction.limit_surface.loops.twists import BAD_WRENCH, is_wrench, plane, put_twist, target_of
 
 _SAME_ANSWER = 1e-12
 """Angle [rad] between a stored wrench and the wanted one below which a direction answers: rounding of the quadratic."""
@@ -77,7 +77,7 @@ def _positions(corners):
 
 @jit
 def published_twists(data, size, frame, wrenches, twists):
-    """As `kernels.twists.table_twists` for a `BILINEAR` surface: of several answers the one of least dissipation."""
+    """Find twists as `table_twists` does, for a `BILINEAR` surface; of several answers take the least dissipation."""
     columns = 4 * size + 1
     across, sides = np.empty((2, columns, 2)), np.empty((2, columns), np.int8)
     worst = 0.0

@@ -9,9 +9,9 @@ import math
 
 import numpy as np
 
-from planarfriction.kernels import jit, kernel
-from planarfriction.kernels.twists import BAD_WRENCH, is_wrench, newton_move, plane, put_twist, target_of
+from planarfriction.compiler import jit, kernel
 from planarfriction.kernels.vectors import dot, plus
+from planarfriction.limit_surface.loops.twists import BAD_WRENCH, is_wrench, newton_move, plane, put_twist, target_of
 
 _BALANCED = 1e-13
 """Slope of the dissipation at which a rounded minimum is found, per `mu f_N` [-]."""
@@ -105,7 +105,7 @@ def _unborne(seen, weights, a, b, ga, gb):
 
 @jit
 def cell_twists(levers, weights, frame, wrenches, twists):
-    """Twists of wrenches `[M, 3]` into `twists [M, 3]`; returns as `kernels.twists.table_twists`.
+    """Twists of wrenches `[M, 3]` into `twists [M, 3]`; returns as `limit_surface.loops.twists.table_twists`.
 
     `levers [2, 3, n]` are the C of the cells. The kinks are rounded off by a speed that shrinks to nothing, where plain
     Newton steps would stall on them. A cell that rests bears any force up to its friction: a wrench is reached if one

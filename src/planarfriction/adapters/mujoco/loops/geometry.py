@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from planarfriction.kernels import kernel
+from planarfriction.compiler import kernel
 from planarfriction.kernels.pointers import at, call_c, doubles, integers, integers32
 
 

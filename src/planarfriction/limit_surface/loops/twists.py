@@ -15,10 +15,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import exact, jit, kernel
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import jit, kernel
 from planarfriction.kernels.surfaces import POTENTIAL, sliding, sliding_jacobian
 from planarfriction.kernels.vectors import dot, norm, plus, put_all, times
+from planarfriction.limit_surface.loops import closed_forms
 
 BAD_WRENCH = -1.0
 """In place of an angle: a wrench that is zero or not finite."""
@@ -56,9 +57,9 @@ class Table(NamedTuple):
 
 
 class _Exact(NamedTuple):
-    elements: exact.Elements
-    discs: exact.Discs
-    rings: exact.Rings
+    elements: closed_forms.Elements
+    discs: closed_forms.Discs
+    rings: closed_forms.Rings
     block: np.ndarray
     held: np.ndarray
 
@@ -148,11 +149,11 @@ def _exact_at(surface, lean, v, scratch):
     per = 1.0 / norm(v)
     n = times(per, v)
     if surface.rings.share.shape[0] > 0:
-        exact.ring_sum(surface.rings, n[0], n[1], n[2], scratch)
+        closed_forms.ring_sum(surface.rings, n[0], n[1], n[2], scratch)
     elif surface.discs.radii.shape[0] > 0:
-        put_all(scratch, exact.disc_sum(surface.discs, n[0], n[1], n[2]))
+        put_all(scratch, closed_forms.disc_sum(surface.discs, n[0], n[1], n[2]))
     else:
-        exact.element_sum(surface.elements, n[0], n[1], n[2], surface.block, surface.held, scratch)
+        closed_forms.element_sum(surface.elements, n[0], n[1], n[2], surface.block, surface.held, scratch)
     second = (
         per * scratch[3], per * scratch[4], per * scratch[5],
         per * scratch[6], per * scratch[7], per * scratch[8],

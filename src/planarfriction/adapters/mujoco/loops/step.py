@@ -11,14 +11,14 @@ from typing import NamedTuple
 
 from numba import types
 
-from planarfriction.kernels import callback, entry, jit, kernel
-from planarfriction.kernels import compiled_math as xp
+from planarfriction.adapters.mujoco.loops.geometry import place, take
+from planarfriction.adapters.mujoco.loops.records import Host, read
+from planarfriction.adapters.mujoco.loops.responses import is_sparse, leaves_range, respond
+from planarfriction.compiler import callback, entry, jit, kernel
+from planarfriction.compiler import compiled_math as xp
 from planarfriction.kernels.coupling import evaluate
 from planarfriction.kernels.coupling_rows import Row
 from planarfriction.kernels.coupling_rows import read as read_patches
-from planarfriction.kernels.mujoco_geometry import place, take
-from planarfriction.kernels.mujoco_records import Host, read
-from planarfriction.kernels.mujoco_responses import is_sparse, leaves_range, respond
 from planarfriction.kernels.pointers import (
     address,
     address_of,

@@ -1,0 +1,1 @@
+"""Compiled part of the adapter: contacts, responses and friction of a step, called by MuJoCo itself."""
