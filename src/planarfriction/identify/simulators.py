@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from planarfriction.autodiff import PARAMETERS, rollout, rollout_sensitivities
+from planarfriction.compiler import threads
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import distributed_step, threads
+from planarfriction.kernels import distributed_step
 from planarfriction.laws import LuGre
 from planarfriction.limit_surface import LimitSurface
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
