@@ -165,7 +165,7 @@ def test_numba_stays_where_code_is_compiled():
             assert target.split(".")[0] != "numba" or _is_compiled(module), f"{module} imports {target}"
 
 
-def test_compiled_functions_stand_in_folders_that_the_digest_of_machine_code_covers():
+def test_compiled_functions_stand_in_folders_that_the_digest_covers():
     decorators = {f"planarfriction.compiler.{name}" for name in ("callback", "entry", "jit", "kernel")}
     using = [module for module, tree in _sources() if decorators & set(_imports(tree, nested=True))]
     assert {module.rsplit(".", 1)[0] for module in using} >= {f"planarfriction.{name}" for name in COMPILED[1:]}

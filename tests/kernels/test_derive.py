@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from numba import njit
 
 from planarfriction import formulas
-from planarfriction.formulas import LawNumbers
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
+from planarfriction.formulas import LawNumbers
 from planarfriction.kernels.derive import NotStraightError, derive
 from planarfriction.kernels.rules import per, rule
 from planarfriction.kernels.vectors import dot, norm, plus, times

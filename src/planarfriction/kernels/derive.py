@@ -20,8 +20,8 @@ import textwrap
 from collections.abc import Callable, Iterable
 from typing import Any, NamedTuple
 
-from planarfriction.kernels import compiled_math as xp
-from planarfriction.kernels import kernel
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import kernel
 from planarfriction.kernels.rules import NAMES, RULES, Rule, per
 
 

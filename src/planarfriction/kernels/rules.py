@@ -12,7 +12,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from planarfriction import formulas
-from planarfriction.kernels import compiled_math as xp
+from planarfriction.compiler import compiled_math as xp
 from planarfriction.kernels import kernel, vectors
 from planarfriction.kernels.vectors import dot, placed, plus, times, zeros
 
