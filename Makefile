@@ -23,7 +23,7 @@ test: $(VENV)/.test
 	$(BIN)/python -m pytest -n 2 --dist loadfile $(ARGS)
 
 # What compiled loops and BLAS may round differently elsewhere: surfaces, models, steps, solver, derivatives, fits, plans.
-NUMERIC := derivatives identify kernels limit_surface models patch planning solvers sweeps tensors \
+NUMERIC := compiler derivatives identify kernels limit_surface models patch planning solvers sweeps tensors \
 	test_coupling.py test_formulas.py
 
 test-generic: $(VENV)/.test
