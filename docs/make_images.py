@@ -52,7 +52,7 @@ def small_cycles(model: pf.ReducedModel | pf.ReducedModelPublished, cycles: int 
     leg, steps, dt = 1e-7, 50, 1e-3
     push, turn = np.array([leg, 0.0, 0.0]), np.array([0.0, 0.0, leg / model.patch.contact_radius()])
     twists = np.tile(np.repeat(np.array([push, turn, -(push + turn)]) / (steps * dt), steps, axis=0), (cycles, 1))
-    wrenches = np.concatenate([np.zeros((1, 3)), pf.autodiff.rollout(model, None, twists, 1.0, dt).wrenches])
+    wrenches = np.concatenate([np.zeros((1, 3)), pf.derivatives.rollout(model, None, twists, 1.0, dt).wrenches])
     work = -0.5 * np.einsum("ti,ti->t", wrenches[1:] + wrenches[:-1], twists) * dt
     taken = np.concatenate([[0.0], work.cumsum()])
     return wrenches[:: 3 * steps, 0], taken[:: 3 * steps]

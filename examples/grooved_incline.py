@@ -28,7 +28,7 @@ G = 9.81  # [m/s^2]
 ANGLE, ALONG, ACROSS = np.radians(-50.0), 0.6, 1.0  # grooves from the x axis; coefficients relative to MU
 MU, MASS, WIDTH, HEIGHT = 0.5, 0.4, 0.06, 0.04  # [-], [kg], [m], [m]
 LAW = pf.LuGre(mu_c=MU, mu_s=MU, sigma_0=1e5, sigma_1=200.0, sigma_2=0.0, elasto_plastic=0.9)
-METRIC = pf.grain(ANGLE, ALONG, ACROSS)
+METRIC = pf.friction_metric(ANGLE, ALONG, ACROSS)
 DOWN = np.array([0.0, -1.0])  # the fall line in the plane
 
 

@@ -24,7 +24,7 @@ import mujoco
 import numpy as np
 
 import planarfriction as pf
-from planarfriction.adapters.mujoco import Friction, Patch, prepare
+from planarfriction.adapters.mujoco import Friction, PatchContact, prepare
 from planarfriction.plots.style import new_figure
 
 MU, RADIUS, MASS, ARM = 1.0, 0.012, 0.1, 0.04  # [-], pads [m], plate [kg], from the pads to its centre of mass [m]
@@ -70,7 +70,7 @@ def hand() -> tuple[mujoco.MjModel, mujoco.MjData, Friction]:
     """Build the model, its data, and the friction of the pads."""
     law = pf.LuGre(mu_c=MU, mu_s=MU, sigma_0=1e5, sigma_1=300.0, sigma_2=10.0, elasto_plastic=0.9)
     pad = pf.ReducedModel(pf.ContactPatch.disc(radius=RADIUS, cells=21), law)
-    patches = [Patch(pad, site=side, geoms=(side, "plate")) for side in ("near", "far")]
+    patches = [PatchContact(pad, site=side, geoms=(side, "plate")) for side in ("near", "far")]
     spec = mujoco.MjSpec.from_string(HAND)
     spec.geom("near").contype = spec.geom("far").contype = 0  # they touch the plate through its pairs alone
     prepare(spec, patches)

@@ -236,12 +236,12 @@ def test_a_scene_that_cannot_be_written_still_plots_and_saves(tmp_path):
     reason = f"model must be one of {known}, or be registered, to be written to a file, got Coarse"
     assert solution.data.attrs == {"scene": "", "scene_left_out": reason}
     assert solution.plot().axes
-    again = pf.load(solution.save(tmp_path / "run.nc"))
+    again = pf.Solution.load(solution.save(tmp_path / "run.nc"))
     assert again.scene is None and again.data.attrs == solution.data.attrs
     assert np.array_equal(again.data.fx, solution.data.fx)
     with pytest.raises(FileError, match="the file has no scene, which the plot needs: model must be one of"):
         again.plot()
-    twice = pf.load(again.save(tmp_path / "twice.nc"))
+    twice = pf.Solution.load(again.save(tmp_path / "twice.nc"))
     assert twice.data.attrs == again.data.attrs
     with pytest.raises(InvalidValueError, match="got Coarse"):
         solution.scene.to_file(tmp_path / "scene.toml")

@@ -38,15 +38,14 @@ _HOME = {
     "SoftFinger": "planarfriction.patch",
     "Solution": "planarfriction.scenes",
     "Uniform": "planarfriction.patch",
-    "grain": "planarfriction.patch",
-    "load": "planarfriction.scenes",
-    "rollout": "planarfriction.autodiff",
+    "friction_metric": "planarfriction.patch",
+    "rollout": "planarfriction.derivatives",
     "simulate": "planarfriction.scenes",
     "sweep": "planarfriction.sweeps",
     "warm_up": "planarfriction.warm",
 }
 _MODULES = (
-    "autodiff",
+    "derivatives",
     "coupling",
     "errors",
     "families",
@@ -85,7 +84,7 @@ def __dir__() -> list[str]:
 
 if TYPE_CHECKING:  # for editors and type checkers: the same names as above, public by `as`
     from planarfriction import (
-        autodiff as autodiff,
+        derivatives as derivatives,
         coupling as coupling,
         errors as errors,
         families as families,
@@ -102,7 +101,7 @@ if TYPE_CHECKING:  # for editors and type checkers: the same names as above, pub
         solvers as solvers,
         sweeps as sweeps,
     )
-    from planarfriction.autodiff import rollout as rollout
+    from planarfriction.derivatives import rollout as rollout
     from planarfriction.errors import FrictionError as FrictionError
     from planarfriction.laws import (
         Coulomb as Coulomb,
@@ -130,7 +129,7 @@ if TYPE_CHECKING:  # for editors and type checkers: the same names as above, pub
         PressureMaps as PressureMaps,
         SoftFinger as SoftFinger,
         Uniform as Uniform,
-        grain as grain,
+        friction_metric as friction_metric,
     )
     from planarfriction.scenes import (
         Body as Body,
@@ -138,7 +137,6 @@ if TYPE_CHECKING:  # for editors and type checkers: the same names as above, pub
         Scene as Scene,
         Signal as Signal,
         Solution as Solution,
-        load as load,
         simulate as simulate,
     )
     from planarfriction.sweeps import sweep as sweep

@@ -306,7 +306,7 @@ def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _Packed:
     for p, (model, own) in enumerate(zip(models, pieces, strict=True)):
         functions[own], owners[own] = address_of(model.step_function, WORDS), p
         firsts[own] = np.linspace(bounds[p], bounds[p + 1], counts[p], endpoint=False)
-        if model._follows_load:
+        if model.depends_on_load:
             following.append((p, own))
             continue
         steps = known.setdefault(id(model), None) or model.packed_steps([None])

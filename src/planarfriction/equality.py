@@ -37,7 +37,7 @@ class ByValue:
     def __eq__(self, other: object) -> bool:
         if type(self) is not type(other):
             return NotImplemented
-        return self is other or all(same(getattr(self, name), getattr(other, name)) for name in _compared(self))
+        return self is other or all(equal(getattr(self, name), getattr(other, name)) for name in _compared(self))
 
     def __hash__(self) -> int:
         return hash((type(self), *(_key(getattr(self, name)) for name in _compared(self))))
@@ -46,28 +46,28 @@ class ByValue:
 def by_parts(kind: _KindT) -> _KindT:
     """Decorator for named tuples with arrays: they are compared by content and have a `repr` of one line."""
 
-    def equal(self: Any, other: object) -> bool:
+    def content_equal(self: Any, other: object) -> bool:
         return type(self) is type(other) and _same_items(self, other)
 
     def differ(self: Any, other: object) -> bool:
-        return not equal(self, other)
+        return not content_equal(self, other)
 
     def show(self: Any) -> str:
         return _record(self, self._asdict())
 
-    for name, method in (("__eq__", equal), ("__ne__", differ), ("__hash__", None), ("__repr__", show)):
+    for name, method in (("__eq__", content_equal), ("__ne__", differ), ("__hash__", None), ("__repr__", show)):
         setattr(kind, name, method)
     return described(kind)
 
 
-def brief(value: Any) -> str:
-    """`value` in few words: arrays by their shape and long sequences by their length, where they are not short."""
+def short_repr(value: Any) -> str:
+    """Return a short text for `value`: long arrays by their shape, long sequences by their length."""
     if isinstance(value, np.ndarray):
         return np.array2string(value, separator=", ") if value.size <= _SHORT and value.ndim < 2 else _shape(value)
     if isinstance(value, (tuple, list)) and type(value) in (tuple, list):
         if len(value) > _SHORT:
             return f"{type(value).__name__} of {len(value)}"
-        items = ", ".join(map(brief, value))
+        items = ", ".join(map(short_repr, value))
         return f"[{items}]" if isinstance(value, list) else f"({items}{',' if len(value) == 1 else ''})"
     if isinstance(value, Mapping) and len(value) > _SHORT:
         return f"{type(value).__name__} of {len(value)}"
@@ -77,22 +77,22 @@ def brief(value: Any) -> str:
 def unusual(record: Any, but: tuple[str, ...] = ()) -> list[str]:
     """Arguments of a dataclass that are not as by default, as `name=value`; those in `but` are left out."""
     return [
-        f"{field.name}={brief(getattr(record, field.name))}"
+        f"{field.name}={short_repr(getattr(record, field.name))}"
         for field in dataclasses.fields(record)
-        if field.init and field.repr and field.name not in but and not same(getattr(record, field.name), field.default)
+        if field.init and field.repr and field.name not in but and not equal(getattr(record, field.name), field.default)
     ]
 
 
 def _record(record: Any, parts: Mapping[str, Any]) -> str:
-    return f"{type(record).__name__}({', '.join(f'{name}={brief(part)}' for name, part in parts.items())})"
+    return f"{type(record).__name__}({', '.join(f'{name}={short_repr(part)}' for name, part in parts.items())})"
 
 
 def _shape(array: np.ndarray) -> str:
     return f"array {list(array.shape)}"
 
 
-def same(one: Any, other: Any) -> bool:
-    """Whether two parts are equal: arrays by shape and numbers (NaN equals NaN), containers item by item."""
+def equal(one: Any, other: Any) -> bool:
+    """Return True if two values are equal: arrays by shape and numbers (NaN equals NaN), containers item by item."""
     if one is other:
         return True
     if isinstance(one, np.ndarray) or isinstance(other, np.ndarray):
@@ -102,16 +102,16 @@ def same(one: Any, other: Any) -> bool:
     if isinstance(one, (tuple, list)) and isinstance(other, (tuple, list)):
         return _same_items(one, other)
     if isinstance(one, Mapping) and isinstance(other, Mapping):
-        return one.keys() == other.keys() and all(same(one[key], other[key]) for key in one)
+        return one.keys() == other.keys() and all(equal(one[key], other[key]) for key in one)
     try:
-        equal = one == other
-        return bool(equal.all() if hasattr(equal, "all") else equal)  # tensors and data frames
+        found = one == other
+        return bool(found.all() if hasattr(found, "all") else found)  # tensors and data frames
     except Exception:  # parts of a user's own: what cannot be compared is not equal
         return False
 
 
 def _same_items(one: Any, other: Any) -> bool:
-    return len(one) == len(other) and all(map(same, one, other))
+    return len(one) == len(other) and all(map(equal, one, other))
 
 
 def _compared(record: Any) -> list[str]:

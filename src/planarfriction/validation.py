@@ -1,6 +1,7 @@
 """Checks of user input, used at construction: each names the parameter, the rule and the value.
 
-What counts as a number is decided in one place, `refusal`: plain real numbers and arrays of them. Texts, truth values,
+What counts as a number is decided in one place, `why_not_numeric`: plain real numbers and arrays of them. Texts, truth
+values,
 complex numbers, dates and times, masked entries and tensors with a gradient are refused, never converted. The same for
 what states a unit (Pint, Astropy, a DataArray with `attrs["units"]`) other than plain SI, as "m/s" or "N m": nothing is
 rescaled, so that 20 mm cannot become 20 m.
@@ -46,7 +47,7 @@ _OF_KIND = {
 }
 
 
-def refusal(value: Any, depth: int = 0) -> str | None:
+def why_not_numeric(value: Any, depth: int = 0) -> str | None:
     """What is wrong with `value` as a number or an array of numbers, as what follows "be a number"; None: nothing."""
     if type(value) in _PLAIN:
         return None
@@ -73,7 +74,7 @@ def refusal(value: Any, depth: int = 0) -> str | None:
             found = np.asarray(value)
         except Exception:  # tensors on a device, tracers: the reasons are theirs
             return ""
-        return refusal(found)
+        return why_not_numeric(found)
     return None if hasattr(type(value), "__float__") or hasattr(type(value), "__index__") else ""
 
 
@@ -83,7 +84,7 @@ def _refusal_inside(values: Sequence[Any], depth: int) -> str | None:
         return f" in lists at most {DEEPEST} deep"
     if _PLAIN.issuperset(map(type, values)):
         return None
-    return next((reason for each in values if (reason := refusal(each, depth + 1)) is not None), None)
+    return next((reason for each in values if (reason := why_not_numeric(each, depth + 1)) is not None), None)
 
 
 def _unit(value: Any) -> Any:
@@ -109,7 +110,7 @@ def numbers(name: str, value: Any) -> np.ndarray:
         return value
     if type(value) is float:
         return np.array(value)
-    reason = refusal(value)
+    reason = why_not_numeric(value)
     if reason is not None:
         raise InvalidValueError(name, f"be an array of numbers{reason}", quoted(value))
     _check_size(name, value)
@@ -139,7 +140,7 @@ def number(name: str, value: Any) -> float:
 
 def _scalar(name: str, value: Any) -> float:
     """`value` as a float, where it is one number of any kind."""
-    reason = refusal(value)
+    reason = why_not_numeric(value)
     if reason is None and getattr(value, "ndim", isinstance(value, Sequence)) == 0:
         try:
             return float(value)

@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction import autodiff, coupling, limit_surface, models
+from planarfriction import derivatives, coupling, limit_surface, models
 from planarfriction.compiler.notice import watched
 from planarfriction.families import MODELS
 from planarfriction.laws import LuGre
-from planarfriction.patch import ContactPatch, grain
+from planarfriction.patch import ContactPatch, friction_metric
 from planarfriction.scenes import in_hand, simulate
 
 _INSTANT = 1e-3
@@ -66,7 +66,7 @@ def _parts() -> list[Part]:
     kinds = {name: MODELS[name](patch, law) for name in ("distributed", "reduced", "reduced-published")}
     three_states = {name: model for name, model in kinds.items() if name != "distributed"}
     sum_of_parts = models.ReducedModel(patch, law, parts=2)
-    grooved = models.DistributedModel(patch.with_friction_metric(grain(0.0, along=1.0, across=0.8)), law)
+    grooved = models.DistributedModel(patch.with_friction_metric(friction_metric(0.0, along=1.0, across=0.8)), law)
     return [
         *(Part(f"scenes, {name}", functools.partial(_simulate, model)) for name, model in kinds.items()),
         Part("scenes, friction with a grain", functools.partial(_simulate, grooved)),
@@ -86,11 +86,11 @@ def _simulate(model: Any) -> None:
 
 
 def _derive(model: Any) -> None:
-    autodiff.scene_sensitivities(in_hand(model), t_end=_INSTANT)
+    derivatives.scene_sensitivities(in_hand(model), t_end=_INSTANT)
 
 
 def _reverse(model: Any) -> None:
-    autodiff.scene_gradient(in_hand(model), lambda time, motion: np.ones_like(motion), ["mu"], t_end=_INSTANT)
+    derivatives.scene_gradient(in_hand(model), lambda time, motion: np.ones_like(motion), ["mu"], t_end=_INSTANT)
 
 
 def _step(model: Any) -> None:
@@ -117,10 +117,10 @@ def _host() -> None:
 
 def _roll(model: Any) -> None:
     arguments = None, np.tile((0.01, 0.0, 1.0), (2, 1)), 1.0, 1e-4
-    autodiff.rollout(model, *arguments)
-    autodiff.rollout_gradient(model, *arguments, np.ones((2, 3)))
-    autodiff.rollout_sensitivities(model, *arguments)
-    autodiff.rollout_tangent(model, *arguments)
+    derivatives.rollout(model, *arguments)
+    derivatives.rollout_vjp(model, *arguments, np.ones((2, 3)))
+    derivatives.rollout_jacobian(model, *arguments)
+    derivatives.rollout_jvp(model, *arguments)
 
 
 def _surfaces(patch: ContactPatch) -> None:

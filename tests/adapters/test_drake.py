@@ -23,7 +23,7 @@ from pydrake.systems.framework import EventStatus
 from pydrake.systems.primitives import ConstantValueSource, ConstantVectorSource, LogVectorOutput
 
 from planarfriction import bench
-from planarfriction.adapters.drake import Patch, PatchFriction, prepare
+from planarfriction.adapters.drake import Friction, PatchContact, prepare
 from planarfriction.bench.coulomb_disc import stop
 from planarfriction.errors import InvalidValueError, MissingExtraError
 from tests.support.drake_scenes import CONTACTS, bare, gripped, on_the_floor, running, sliding
@@ -40,8 +40,8 @@ MISFIT = 1e-6
 """Twists [m/s] that are taken where they get no closer: Drake's own contact solver leaves 1e-8 to 1e-7 open."""
 
 
-def _patches(box: str = "box") -> list[Patch]:
-    return [Patch(BOX, frame="bottom", geometries=("floor", box))]
+def _patches(box: str = "box") -> list[PatchContact]:
+    return [PatchContact(BOX, frame="bottom", geometries=("floor", box))]
 
 
 # ---------------------------------------------------------------------- what comes out
@@ -143,9 +143,9 @@ def test_free_bodies_answer_as_the_joints_are_damped():
 def test_answers_learnt_are_differences_of_steps():
     """A box on four feet, each a patch: what pulls at one shifts the loads of all."""
     builder, plant, scene_graph = on_the_floor("box", "point", 2e-3)
-    patches = [Patch(PAD, frame="bottom", geometries=("floor", f"foot {i}"), centre="contact") for i in range(4)]
+    patches = [PatchContact(PAD, frame="bottom", geometries=("floor", f"foot {i}"), centre="contact") for i in range(4)]
     prepare(plant, scene_graph, patches)
-    run = running(builder, plant, PatchFriction.AddToBuilder(builder, plant, scene_graph, patches))
+    run = running(builder, plant, Friction.AddToBuilder(builder, plant, scene_graph, patches))
     run.to(0.3)
     asking, shadow = run.friction._asking, run.friction._shadow
     shadow.begin(run.plant.GetPositionsAndVelocities(run.context), {})
@@ -235,7 +235,7 @@ def test_what_else_drives_the_plant_is_seen():
         prepare(plant, scene_graph, patches)
         pull = builder.AddSystem(ConstantVectorSource([0.0, 0.0, 0.0, force, 0.0, 0.0]))
         builder.Connect(pull.get_output_port(), plant.get_applied_generalized_force_input_port())
-        run = running(builder, plant, PatchFriction.AddToBuilder(builder, plant, scene_graph, patches))
+        run = running(builder, plant, Friction.AddToBuilder(builder, plant, scene_graph, patches))
         run.to(0.4)
         assert run.friction.GetReport(run.own).misfit <= MISFIT
         return run.plant.GetPositions(run.context)[4], run.friction.get_wrenches_output_port().Eval(run.own)[0]
@@ -276,7 +276,7 @@ def test_ports_can_be_logged_watched_and_drawn():
     builder, plant, scene_graph = on_the_floor("box", "point", 2e-3, tilt=0.3)
     patches = _patches()
     prepare(plant, scene_graph, patches)
-    friction = PatchFriction.AddToBuilder(builder, plant, scene_graph, patches)
+    friction = Friction.AddToBuilder(builder, plant, scene_graph, patches)
     ports = {
         "wrenches": friction.get_wrenches_output_port(), "twists": friction.get_twists_output_port(),
         "loads": friction.get_loads_output_port(), "report": friction.get_report_output_port(),
@@ -307,7 +307,7 @@ def test_what_is_connected_later_is_refused_by_drake():
     builder, plant, scene_graph = on_the_floor("box", "point", 2e-3)
     patches = _patches()
     prepare(plant, scene_graph, patches)
-    PatchFriction.AddToBuilder(builder, plant, scene_graph, patches)
+    Friction.AddToBuilder(builder, plant, scene_graph, patches)
     late = builder.AddSystem(ConstantVectorSource(np.zeros(6)))
     with pytest.raises((RuntimeError, SystemExit), match=r"AlreadyWired|already"):
         builder.Connect(late.get_output_port(), plant.get_applied_generalized_force_input_port())
@@ -323,7 +323,7 @@ def test_spatial_forces_are_seen():
     pull.F_Bq_W = SpatialForce(np.zeros(3), np.array([0.0, 1.2, 0.0]))
     source = builder.AddSystem(ConstantValueSource(Value[list[ExternallyAppliedSpatialForce]]([pull])))
     builder.Connect(source.get_output_port(), plant.get_applied_spatial_force_input_port())
-    run = running(builder, plant, PatchFriction.AddToBuilder(builder, plant, scene_graph, patches))
+    run = running(builder, plant, Friction.AddToBuilder(builder, plant, scene_graph, patches))
     run.to(0.3)
     assert run.friction.GetReport(run.own).misfit <= MISFIT
     assert run.friction.get_wrenches_output_port().Eval(run.own)[1] == pytest.approx(-1.2, rel=1e-3)
@@ -332,17 +332,17 @@ def test_spatial_forces_are_seen():
 # ---------------------------------------------------------------------- bad input
 
 
-def _refused(message: str, patches: list[Patch], *, ready: bool = True, scene=None) -> None:
+def _refused(message: str, patches: list[PatchContact], *, ready: bool = True, scene=None) -> None:
     builder, plant, scene_graph = on_the_floor("box", "point", 2e-3) if scene is None else scene
     if ready:
         prepare(plant, scene_graph, _patches())
     with pytest.raises(InvalidValueError, match=message):
-        PatchFriction.AddToBuilder(builder, plant, scene_graph, patches)
+        Friction.AddToBuilder(builder, plant, scene_graph, patches)
 
 
 def test_names_that_are_not_there_and_patches_that_do_not_fit_are_refused():
     def patch(**changes):
-        return Patch(**{"model": BOX, "frame": "bottom", "geometries": ("floor", "box"), **changes})
+        return PatchContact(**{"model": BOX, "frame": "bottom", "geometries": ("floor", "box"), **changes})
 
     _refused("frame must be a frame of the plant, got nowhere", [patch(frame="nowhere")])
     _refused(
@@ -396,7 +396,10 @@ def test_a_name_that_means_two_geometries_is_refused_with_both():
     plant.Finalize()
     message = r"geometries must be one geometry \(.*one::ball or .*two::ball\), got ball"
     _refused(
-        message, [Patch(PAD, frame="one", geometries=("ball", "two"))], ready=False, scene=(builder, plant, scene_graph)
+        message,
+        [PatchContact(PAD, frame="one", geometries=("ball", "two"))],
+        ready=False,
+        scene=(builder, plant, scene_graph),
     )
 
 

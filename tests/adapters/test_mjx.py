@@ -17,7 +17,7 @@ import jax.numpy as jnp  # noqa: E402
 import mujoco  # noqa: E402
 
 from planarfriction.adapters import mujoco as adapter  # noqa: E402
-from planarfriction.adapters.mjx import Friction, Patch, newton, prepare  # noqa: E402
+from planarfriction.adapters.mjx import Friction, PatchContact, newton, prepare  # noqa: E402
 from planarfriction.adapters.mjx.friction import _in_jax  # noqa: E402
 from planarfriction.bench import coulomb_disc  # noqa: E402
 from planarfriction.bench.mujoco_scenes import STARTS, Native, disc, grip  # noqa: E402
@@ -42,7 +42,7 @@ def made(scene, model=None, dt=DT, **options):
     spec = mujoco.MjSpec.from_string(text)
     for name, value in options.items():
         setattr(spec.option, name, value)
-    patches = [Patch(model or scene.model, site=site, geoms=geoms) for site, geoms in scene.patches]
+    patches = [PatchContact(model or scene.model, site=site, geoms=geoms) for site, geoms in scene.patches]
     prepare(spec, patches)
     m = spec.compile()
     return m, mujoco.MjData(m), patches
@@ -160,7 +160,9 @@ BALL = """<mujoco><option timestep="0.002"/><worldbody><geom name="floor" type="
 def test_gradients_are_differences_by_velocity_and_friction():
     """Backwards through MJX's solver, whose loop has no derivative, and through the step of the patches."""
     law = pf.LuGre(mu_s=0.5, mu_c=0.3, v_s=0.1, sigma_0=1e5, elasto_plastic=0.9)
-    patches = [Patch(pf.DistributedModel(pf.ContactPatch.disc(radius=0.01, cells=5), law), "ball", ("floor", "ball"))]
+    patches = [
+        PatchContact(pf.DistributedModel(pf.ContactPatch.disc(radius=0.01, cells=5), law), "ball", ("floor", "ball"))
+    ]
     spec = mujoco.MjSpec.from_string(BALL)
     prepare(spec, patches)
     m = spec.compile()
@@ -324,9 +326,9 @@ def test_what_does_not_fit_is_refused_in_one_line():
     soft = pf.DistributedModel(pf.ContactPatch.rectangle(0.02, cells=9, pressure=finger), scene.model.law)
     for wrong, message in (
         ([patches[0], patches[0]], "patches must have each pair of geoms once"),
-        ([Patch(scene.model, site="nowhere", geoms=geoms)], "site must be in the model, got nowhere"),
-        ([Patch(scene.model, site=site, geoms=("floor", "none"))], "geoms must be in the model, got none"),
-        ([Patch(soft, site=site, geoms=geoms)], "model must have a shape that does not change with the load"),
+        ([PatchContact(scene.model, site="nowhere", geoms=geoms)], "site must be in the model, got nowhere"),
+        ([PatchContact(scene.model, site=site, geoms=("floor", "none"))], "geoms must be in the model, got none"),
+        ([PatchContact(soft, site=site, geoms=geoms)], "model must have a shape that does not change with the load"),
     ):
         with pytest.raises(InvalidValueError, match=message):
             Friction(m, wrong)

@@ -14,7 +14,7 @@ mujoco = pytest.importorskip("mujoco")
 
 from mujoco import rollout  # noqa: E402
 
-from planarfriction.adapters.mujoco import Friction, Patch, prepare  # noqa: E402
+from planarfriction.adapters.mujoco import Friction, PatchContact, prepare  # noqa: E402
 from planarfriction.bench import mujoco_scenes  # noqa: E402
 from tests.support.mujoco_misfit import misfit, step_checked, twists_and_loads  # noqa: E402
 
@@ -66,7 +66,7 @@ def test_twists_and_loads_come_out_as_they_were_solved_for(integrator, jacobian)
     <geom name="box" type="box" size="0.02 0.015 0.025" mass="0.3" contype="0" conaffinity="1"/>
     <site name="box" pos="0 0 -0.025" euler="0 0 30"/></body></worldbody>
     <actuator><position joint="x" kp="300" kv="5"/></actuator></mujoco>"""
-    _, d, friction = _made(text, [Patch(PAD, site="box", geoms=("box", "tray"), centre="contact")])
+    _, d, friction = _made(text, [PatchContact(PAD, site="box", geoms=("box", "tray"), centre="contact")])
     seen = {"slid": 0.0, "passes": 0, "followed": 0.0}
     for i in range(600):
         d.ctrl[:] = 0.04 * np.sin(25.0 * d.time)
@@ -107,7 +107,7 @@ def test_other_contacts_keep_mujocos_own_friction(cone, solver):
     <body name="upper" pos="0.005 0 0.06"><freejoint/>
     <geom name="upper" type="box" size="0.03 0.03 0.02" mass="0.5" contype="0" conaffinity="1"/>
     <site name="upper" pos="0 0 -0.02"/></body></worldbody></mujoco>"""
-    _, d, friction = _made(text, [Patch(PAD, site="upper", geoms=("lower", "upper"))])
+    _, d, friction = _made(text, [PatchContact(PAD, site="upper", geoms=("lower", "upper"))])
     slid = np.zeros(2)
     for _ in range(400):
         d.qfrc_applied[6] = 6.0 * np.sin(12.0 * d.time)
@@ -141,7 +141,7 @@ def test_models_of_all_kinds_hold_and_pads_may_differ():
     text = scene.text(mujoco_scenes.Native(solref=0.02), 2e-3, "Euler")
     for kind in kinds:
         models = PAD, kind
-        patches = [Patch(model, site=s, geoms=g) for model, (s, g) in zip(models, scene.patches, strict=True)]
+        patches = [PatchContact(model, site=s, geoms=g) for model, (s, g) in zip(models, scene.patches, strict=True)]
         _, d, friction = _made(text, patches)
         d.ctrl[:] = 6.0
         for _ in range(200):
@@ -156,7 +156,7 @@ def test_twists_and_wrenches_are_in_the_axes_of_the_site():
     text = scene.text(mujoco_scenes.Native(solref=0.02), 2e-3, "Euler").replace(
         'site name="block 0" pos="0 0 -0.02"', 'site name="block 0" pos="0 0 -0.02" euler="0 0 40"'
     )
-    m, d, friction = _made(text, [Patch(PAD, site="block 0", geoms=("tray", "block 0"))])
+    m, d, friction = _made(text, [PatchContact(PAD, site="block 0", geoms=("tray", "block 0"))])
     m.opt.gravity[0] = 2.0
     for _ in range(300):
         friction.step(d)
@@ -330,11 +330,11 @@ def test_unprepared_models_and_unknown_names_are_refused():
     soft = pf.ContactPatch.rectangle(0.02, cells=9, pressure=pf.SoftFinger(c=0.01, n=0.3, k=2.0))
     for wrong, message in (
         ([patches[0], patches[0]], "patches must have each pair of geoms once, got block, pad left"),
-        ([Patch(PAD, site="nowhere", geoms=pads)], "site must be in the model, got nowhere"),
-        ([Patch(PAD, site="left", geoms=("pad left", "nothing"))], "geoms must be in the model, got nothing"),
-        ([Patch(PAD, site="left", geoms=("pad left", "pad right"))], "site must be on the body of one of the geoms"),
+        ([PatchContact(PAD, site="nowhere", geoms=pads)], "site must be in the model, got nowhere"),
+        ([PatchContact(PAD, site="left", geoms=("pad left", "nothing"))], "geoms must be in the model, got nothing"),
+        ([PatchContact(PAD, site="left", geoms=("pad left", "pad right"))], "site must be on the body of one of the geoms"),
         (
-            [Patch(pf.ReducedModel(soft, LAW), "left", pads)],
+            [PatchContact(pf.ReducedModel(soft, LAW), "left", pads)],
             "model must have a shape that does not change with",
         ),
         ([PAD], "patches must be patches"),
@@ -342,14 +342,14 @@ def test_unprepared_models_and_unknown_names_are_refused():
         with pytest.raises(pf.errors.InvalidValueError, match=message):
             Friction(m, wrong)
     for wrong, message in (
-        ([Patch(PAD, site="nowhere", geoms=pads)], "site must be in the model, got nowhere"),
-        ([Patch(PAD, site="left", geoms=("pad left", "nothing"))], "geoms must be in the model, got nothing"),
+        ([PatchContact(PAD, site="nowhere", geoms=pads)], "site must be in the model, got nowhere"),
+        ([PatchContact(PAD, site="left", geoms=("pad left", "nothing"))], "geoms must be in the model, got nothing"),
         ([patches[0], patches[0]], "patches must have each pair of geoms once"),
     ):
         with pytest.raises(pf.errors.InvalidValueError, match=message):
             prepare(mujoco.MjSpec.from_string(text), wrong)
     with pytest.raises(pf.errors.InvalidValueError, match="centre must be one of site, contact"):
-        Patch(PAD, site="L", geoms=pads, centre="middle")
+        PatchContact(PAD, site="L", geoms=pads, centre="middle")
 
 
 def test_one_callback_at_a_time():
@@ -377,7 +377,7 @@ def test_a_state_that_is_not_finite_is_told():
 
 def test_new_pairs_have_what_their_geoms_say_and_old_ones_what_they_say():
     text = mujoco_scenes.grip().text(mujoco_scenes.Native(solref=0.008), 2e-3, "Euler")
-    patches = [Patch(PAD, site="left", geoms=("pad left", "block"))]
+    patches = [PatchContact(PAD, site="left", geoms=("pad left", "block"))]
     m, _, _ = _made(text, patches)
     assert m.pair_solref[0, 0] == 0.008 and m.pair_dim[0] == 1
     pair = '<contact><pair geom1="block" geom2="pad left" solref="0.03 1" condim="4"/></contact></mujoco>'

@@ -214,7 +214,7 @@ def test_run_writes_what_can_be_read_back(simulated, tmp_path):
     folder = tmp_path / "new" / "out"
     assert main(["run", "in-hand", "--model", "reduced", "--t-end", "1", "--out", str(folder)]) == 0
     assert sorted(path.name for path in folder.iterdir()) == ["in-hand-reduced.csv", "in-hand-reduced.nc"]
-    stored = pf.load(folder / "in-hand-reduced.nc")
+    stored = pf.Solution.load(folder / "in-hand-reduced.nc")
     assert stored.scene.to_dict() == simulated[0][0].to_dict()
     columns = read_csv(folder / "in-hand-reduced.csv")
     expected = synthetic.solution(simulated[0][0], scale=1.1, t_end=1.0).data
@@ -279,8 +279,8 @@ def test_ctrl_c_keeps_what_is_done(capsys, tmp_path, monkeypatch):
     captured = capsys.readouterr()
     assert "stopped at t = 0.5 s of the reduced run" in captured.err
     assert "simulated time [s]" in captured.out
-    assert pf.load(tmp_path / "in-hand-distributed.nc").data["time"][-1] == 2.0
-    assert pf.load(tmp_path / "in-hand-reduced.nc").data["time"][-1] == 0.5
+    assert pf.Solution.load(tmp_path / "in-hand-distributed.nc").data["time"][-1] == 2.0
+    assert pf.Solution.load(tmp_path / "in-hand-reduced.nc").data["time"][-1] == 0.5
 
 
 def test_ctrl_c_elsewhere_is_no_traceback(capsys, monkeypatch):
@@ -297,7 +297,7 @@ def test_a_solver_that_gives_up_keeps_what_is_done(capsys, tmp_path, monkeypatch
     monkeypatch.setitem(vars(scenes), "simulate", stand_in)
     assert main(["run", "drift", "--out", str(tmp_path)]) == 2
     assert capsys.readouterr().err.splitlines()[-1] == "error: step size fell below the least: raise rtol"
-    assert pf.load(tmp_path / "drift-tangential-distributed.nc").data["time"][-1] == 0.5
+    assert pf.Solution.load(tmp_path / "drift-tangential-distributed.nc").data["time"][-1] == 0.5
 
 
 def test_differences_cover_the_time_that_both_runs_have():
@@ -337,7 +337,7 @@ def test_a_slide_ends_when_the_puck_has_stopped(capsys):
 def test_example_scene_files_run(path, tmp_path):
     assert main(["run", str(path), "--t-end", "0.02", "--out", str(tmp_path)]) == 0
     (stored,) = tmp_path.glob("*.nc")
-    assert pf.load(stored).data["time"][-1] == 0.02
+    assert pf.Solution.load(stored).data["time"][-1] == 0.02
 
 
 def test_ctrl_c_in_the_solver_keeps_what_is_done(capsys, tmp_path, monkeypatch):
@@ -353,7 +353,7 @@ def test_ctrl_c_in_the_solver_keeps_what_is_done(capsys, tmp_path, monkeypatch):
     monkeypatch.setattr(command, "simulation_progress", impatient)
     assert main(["run", "in-hand", "--out", str(tmp_path)]) == 130
     assert "stopped at t = " in capsys.readouterr().err
-    part = pf.load(tmp_path / "in-hand-distributed.nc")
+    part = pf.Solution.load(tmp_path / "in-hand-distributed.nc")
     assert part.status == "interrupted"
     assert 0.0 < part.data["time"][-1] < 2.0
 

@@ -247,7 +247,7 @@ def test_file_names_that_are_no_utf_8(capsys):
     Path(name).write_text(SCENE)
     out = os.fsdecode(b"s\xf6lution")
     assert main(["run", name, "--out", out]) == 0
-    assert pf.load(Path(out) / "scene-distributed.nc").status == "success"
+    assert pf.Solution.load(Path(out) / "scene-distributed.nc").status == "success"
     Path(name).rename(pad := os.fsdecode(b"p\xe4d.csv"))
     Path(pad).write_text("1,1\n")
     done = subprocess.run(

@@ -89,7 +89,7 @@ def test_results_are_reached_by_any_name(tmp_path):
     contacts = [pf.Contact(model, 1.0, name=name) for model, name in zip(models, ODD_NAMES, strict=True)]
     scene = pf.Scene(pf.Body(1, 1), contacts, 0.02, name="φ")
     solution = pf.simulate(scene, bristles="all")
-    again = pf.load(solution.save(tmp_path / "x.nc"))
+    again = pf.Solution.load(solution.save(tmp_path / "x.nc"))
     assert again == solution
     for name, model in zip(ODD_NAMES, models, strict=True):
         for data in (solution.data, again.data):

@@ -55,7 +55,7 @@ def test_large_parts_of_a_record_are_shown_by_their_size():
         long: np.ndarray
         hidden: int = dataclasses.field(default=0, repr=False)
 
-    class Pair(pf.autodiff.Rollout):
+    class Pair(pf.derivatives.Rollout):
         pass
 
     for long, shown in ((np.ones((40, 3)), "[40, 3]"), (np.ones((2, 2)), "[2, 2]"), (np.ones(20), "[20]")):

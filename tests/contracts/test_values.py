@@ -72,7 +72,7 @@ MAKERS = {
     "polygon": lambda: pf.ContactPatch.polygon([(0, 0), (0.1, 0), (0, 0.1)], 5),
     "outline": lambda: pf.ContactPatch.polygon([(0, 0), (0.1, 0), (0, 0.1)], 5).outline,
     "points": lambda: pf.ContactPatch.points([(0.0, 0.0), (0.1, 0.0)], [1.0, 2.0]),
-    "grain": lambda: SQUARE.with_friction_metric(pf.grain(0.3, 1.0, 2.0), (0.1, 0.2)),
+    "grain": lambda: SQUARE.with_friction_metric(pf.friction_metric(0.3, 1.0, 2.0), (0.1, 0.2)),
     "maps": lambda: pf.ContactPatch.from_pressure([np.ones((2, 2)), np.eye(2)], 0.01, loads=[1.0, 2.0]),
     "grid": lambda: pf.ContactPatch.disc(0.01, 6).grid,
     "uniform": pf.Uniform,
@@ -150,7 +150,7 @@ def test_solutions(tmp_path):
     for other in (
         copy.deepcopy(solution),
         pickle.loads(pickle.dumps(solution)),
-        pf.load(solution.save(tmp_path / "x.nc")),
+        pf.Solution.load(solution.save(tmp_path / "x.nc")),
     ):
         assert (solution == other) is True and hash(solution) == hash(other)
         other.data.x[-1] += 1.0

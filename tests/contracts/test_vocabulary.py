@@ -75,11 +75,11 @@ def test_rollouts_share_their_arguments_and_first_results():
         results = inspect.signature(end.rollout).return_annotation
         assert results == "Rollout", end
     assert positional(ends[1].tracking_loss) == ["model", *ARGUMENTS, "wrenches"]
-    for rollout in (pf.autodiff.Rollout, ends[1].Rollout, ends[2].Rollout):
+    for rollout in (pf.derivatives.Rollout, ends[1].Rollout, ends[2].Rollout):
         assert rollout._fields == ("state", "wrenches")
-    for function in (pf.autodiff.rollout_states, pf.autodiff.rollout_gradient, pf.autodiff.rollout_sensitivities):
+    for function in (pf.derivatives.rollout_states, pf.derivatives.rollout_vjp, pf.derivatives.rollout_jacobian):
         assert positional(function)[:5] == ["model", *ARGUMENTS], function
-    assert pf.autodiff.RolloutGradient._fields == (*ARGUMENTS[:-1], "parameters")
+    assert pf.derivatives.RolloutVJP._fields == (*ARGUMENTS[:-1], "parameters")
     for end in ends[1:]:
         assert not hasattr(end, "simulate")  # that is for scenes
         assert {"parameters", "method"} <= set(inspect.signature(end.rollout).parameters)

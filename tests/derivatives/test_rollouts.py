@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import planarfriction as pf
-from planarfriction import autodiff
-from planarfriction.autodiff import PARAMETERS
+from planarfriction import derivatives
+from planarfriction.derivatives import PARAMETERS
 from planarfriction.errors import InvalidValueError
 
 PLAIN = pf.LuGre(mu_s=1.2)
@@ -54,13 +54,13 @@ def drive(model, seed: int = 0, steps: int = T):
 
 def inputs_of(model, seed: int = 0):
     state, twists, loads = drive(model, seed)
-    return {"state": state, "twist": twists, "normal_force": loads, "parameters": autodiff.parameters_of(model)}
+    return {"state": state, "twist": twists, "normal_force": loads, "parameters": derivatives.parameters_of(model)}
 
 
 def units_of(model) -> dict:
     """The natural size of each input."""
     r = radius(model)
-    parameters = np.abs(autodiff.parameters_of(model)) + (np.arange(12) >= 10) * r
+    parameters = np.abs(derivatives.parameters_of(model)) + (np.arange(12) >= 10) * r
     return {
         "state": 1e-6 * np.array([1.0, 1.0, r]),
         "twist": 3e-3 * np.array([1.0, 1.0, 1.0 / r]),
@@ -69,8 +69,8 @@ def units_of(model) -> dict:
     }
 
 
-def rolled(model, inputs) -> autodiff.Rollout:
-    return autodiff.rollout(
+def rolled(model, inputs) -> derivatives.Rollout:
+    return derivatives.rollout(
         model, inputs["state"], inputs["twist"], inputs["normal_force"], DT, parameters=inputs["parameters"]
     )
 
@@ -84,8 +84,8 @@ def test_a_rollout_takes_the_steps_of_the_model(kind, law):
     model = model_of(kind, law)
     state, twists, loads = drive(model)
     loads[5] = 0.0
-    end, wrenches = autodiff.rollout(model, state, twists, loads, DT)
-    on_the_way = autodiff.rollout_states(model, state, twists, loads, DT)
+    end, wrenches = derivatives.rollout(model, state, twists, loads, DT)
+    on_the_way = derivatives.rollout_states(model, state, twists, loads, DT)
     assert np.array_equal(on_the_way.wrenches, wrenches) and np.array_equal(on_the_way.state, end)
     for t in range(T):
         # The same code, inlined elsewhere: sums may be ordered differently.
@@ -99,8 +99,8 @@ def test_parameters_take_the_place_of_the_models_own():
     model, other = model_of("ellipsoid"), pf.LuGre(0.4, 0.9, 2e-3, 3e5, 50.0, 0.7, 1.3, pf.ElastoPlastic(0.5))
     changed = pf.ReducedModelPublished(PATCH, other, surface=pf.LimitSurfaceEllipsoid(PATCH))
     state, twists, loads = drive(model)
-    got = autodiff.rollout(model, state, twists, loads, DT, parameters=autodiff.parameters_of(changed))
-    assert np.array_equal(got.wrenches, autodiff.rollout(changed, state, twists, loads, DT).wrenches)
+    got = derivatives.rollout(model, state, twists, loads, DT, parameters=derivatives.parameters_of(changed))
+    assert np.array_equal(got.wrenches, derivatives.rollout(changed, state, twists, loads, DT).wrenches)
 
 
 # ---------------------------------------------------------------------- closed forms
@@ -125,7 +125,7 @@ def test_a_contact_at_rest_is_a_spring_and_two_dampers(law):
 def test_a_long_step_ends_in_the_steady_state_of_its_parameters(kind, law):
     """`W = -(g(v) S h + sigma_2 U V) f_N`: neither stiffness nor damping nor the start matter."""
     model, twist = model_of(kind, law), np.array([2e-3, -1e-3, 0.3])
-    _, wrenches, slopes = autodiff.rollout_sensitivities(model, model.rest(), twist[None], LOAD, 1e6)
+    _, wrenches, slopes = derivatives.rollout_jacobian(model, model.rest(), twist[None], LOAD, 1e6)
     by = dict(zip(PARAMETERS, slopes[0].T, strict=True))
     numbers, shape = model.law, model.shape_at(LOAD)
     unit = LOAD * model.surface.wrench(twist)
@@ -168,7 +168,7 @@ def test_gradients_are_finite_at_every_kink(kind, law):
         for twist in twists:
             for load in (0.0, LOAD):
                 for dt in (0.0, 1e-12, DT, 1e9):
-                    gradient = autodiff.rollout_gradient(
+                    gradient = derivatives.rollout_vjp(
                         model, state, np.tile(twist, (2, 1)), load, dt, np.ones((2, 3)), np.ones(3)
                     )
                     for name, value in gradient._asdict().items():
@@ -181,15 +181,13 @@ def test_without_load_nothing_passes_but_the_load(kind):
     state, twists, loads = drive(model)
     loads[6] = 0.0
     bar = np.ones((T, 3))
-    gradient = autodiff.rollout_gradient(
-        model, state, twists, loads, DT, bar * (np.arange(T) >= 6)[:, None], np.ones(3)
-    )
-    _, wrenches = autodiff.rollout(model, state, twists, loads, DT)
+    gradient = derivatives.rollout_vjp(model, state, twists, loads, DT, bar * (np.arange(T) >= 6)[:, None], np.ones(3))
+    _, wrenches = derivatives.rollout(model, state, twists, loads, DT)
     assert str(wrenches[6]) == "[0. 0. 0.]"  # not even a negative zero
     assert not gradient.state.any() and not gradient.twist[:7].any() and not gradient.normal_force[:6].any()
     assert gradient.twist[7:].all()
     # The slope to the load: the wrench per newton that a small load would have.
-    before = autodiff.rollout_states(model, state, twists, loads, DT).states[6]
+    before = derivatives.rollout_states(model, state, twists, loads, DT).states[6]
     assert gradient.normal_force[6] == pytest.approx(model.step(before, twists[6], 1e-3, DT)[1].sum() / 1e-3, rel=1e-10)
 
 
@@ -208,7 +206,7 @@ def test_the_gradient_of_a_rollout_is_that_of_differences(kind, law):
         end, wrenches = rolled(model, changed)
         return (bars[0] * wrenches).sum() + (bars[1] * end).sum()
 
-    gradient = autodiff.rollout_gradient(
+    gradient = derivatives.rollout_vjp(
         model, inputs["state"], inputs["twist"], inputs["normal_force"], DT, *bars, parameters=inputs["parameters"]
     )
     for name, of in gradient._asdict().items():
@@ -343,10 +341,12 @@ def test_the_adjoint_is_the_transpose_of_the_sensitivities(kind, law):
     model = model_of(kind, law)
     state, twists, loads = drive(model, seed=5)
     bar = np.random.default_rng(2).normal(size=(T, 3)) / (1.0, 1.0, radius(model))
-    _, wrenches, slopes = autodiff.rollout_sensitivities(model, state, twists, loads, DT)
-    assert wrenches == pytest.approx(autodiff.rollout(model, state, twists, loads, DT).wrenches, rel=1e-12, abs=1e-14)
+    _, wrenches, slopes = derivatives.rollout_jacobian(model, state, twists, loads, DT)
+    assert wrenches == pytest.approx(
+        derivatives.rollout(model, state, twists, loads, DT).wrenches, rel=1e-12, abs=1e-14
+    )
     terms = np.einsum("ti,tip->tip", bar, slopes)
-    gradient = autodiff.rollout_gradient(model, state, twists, loads, DT, bar)
+    gradient = derivatives.rollout_vjp(model, state, twists, loads, DT, bar)
     # Sums in another order.
     assert (np.abs(gradient.parameters - terms.sum((0, 1))) <= 1e-12 * np.abs(terms).sum((0, 1))).all()
     if law == "plain":
@@ -363,7 +363,7 @@ def test_the_adjoint_is_the_transpose_of_the_jacobians(kind, law):
     bar, end_bar = random.normal(size=(T, 3)) / (1.0, 1.0, radius(model)), random.normal(size=3) / units["state"]
     change = random.normal(size=3) * units["state"]
     turns, pushes = random.normal(size=(T, 3)) * units["twist"], random.normal(size=T)
-    gradient = autodiff.rollout_gradient(model, state, twists, loads, DT, bar, end_bar)
+    gradient = derivatives.rollout_vjp(model, state, twists, loads, DT, bar, end_bar)
     backwards = [
         (gradient.state * change).sum(),
         (gradient.twist * turns).sum(),
@@ -371,7 +371,13 @@ def test_the_adjoint_is_the_transpose_of_the_jacobians(kind, law):
     ]
     forwards = []
     for before, twist, load, turn, push, w_bar in zip(
-        autodiff.rollout_states(model, state, twists, loads, DT).states, twists, loads, turns, pushes, bar, strict=True
+        derivatives.rollout_states(model, state, twists, loads, DT).states,
+        twists,
+        loads,
+        turns,
+        pushes,
+        bar,
+        strict=True,
     ):
         j = model.step_jacobians(before, twist, load, DT)
         forwards.append(w_bar @ (j.wrench_state @ change + j.wrench_twist @ turn + j.wrench_load * push))
@@ -383,8 +389,8 @@ def test_the_adjoint_is_the_transpose_of_the_jacobians(kind, law):
 def test_sensitivities_of_chosen_parameters():
     model = model_of("published")
     state, twists, loads = drive(model)
-    *_, slopes = autodiff.rollout_sensitivities(model, state, twists, loads, DT)
-    *_, chosen = autodiff.rollout_sensitivities(model, state, twists, loads, DT, ("v_s", "mu_c"))
+    *_, slopes = derivatives.rollout_jacobian(model, state, twists, loads, DT)
+    *_, chosen = derivatives.rollout_jacobian(model, state, twists, loads, DT, ("v_s", "mu_c"))
     assert np.array_equal(chosen, slopes[..., [PARAMETERS.index("v_s"), PARAMETERS.index("mu_c")]])
 
 
@@ -396,11 +402,11 @@ def test_a_batch_is_a_loop():
     states = np.stack([drive(model, seed)[0] for seed in range(3)])[:, None]  # [3, 1]
     twists = np.stack([drive(model, seed)[1] for seed in range(2)])  # [2]
     loads, dt = drive(model)[2], random.uniform(0.5e-4, 1e-4, T)
-    parameters = autodiff.parameters_of(model) * random.uniform(0.9, 1.0, (3, 1, 12))
+    parameters = derivatives.parameters_of(model) * random.uniform(0.9, 1.0, (3, 1, 12))
     bar, end_bar = random.normal(size=(3, 2, T, 3)), random.normal(size=(3, 2, 3))
-    ends, wrenches = autodiff.rollout(model, states, twists, loads, dt, parameters=parameters)
-    gradient = autodiff.rollout_gradient(model, states, twists, loads, dt, bar, end_bar, parameters=parameters)
-    slopes = autodiff.rollout_sensitivities(
+    ends, wrenches = derivatives.rollout(model, states, twists, loads, dt, parameters=parameters)
+    gradient = derivatives.rollout_vjp(model, states, twists, loads, dt, bar, end_bar, parameters=parameters)
+    slopes = derivatives.rollout_jacobian(
         model, states, twists, loads, dt, PARAMETERS, parameters=parameters
     ).d_wrenches
     assert wrenches.shape == (3, 2, T, 3) and ends.shape == (3, 2, 3) and slopes.shape == (3, 2, T, 3, 12)
@@ -408,16 +414,16 @@ def test_a_batch_is_a_loop():
     total = [np.zeros_like(g) for g in gradient]
     for i, j in np.ndindex(3, 2):
         one = states[i, 0], twists[j], loads, dt
-        single = autodiff.rollout(model, *one, parameters=parameters[i, 0])
+        single = derivatives.rollout(model, *one, parameters=parameters[i, 0])
         # Contacts abreast go through vector code, which rounds differently.
         assert wrenches[i, j] == pytest.approx(single.wrenches, rel=1e-12, abs=1e-14)
         assert ends[i, j] == pytest.approx(single.state, rel=1e-12, abs=1e-20)
-        alone = autodiff.rollout_gradient(model, *one, bar[i, j], end_bar[i, j], parameters=parameters[i, 0])
+        alone = derivatives.rollout_vjp(model, *one, bar[i, j], end_bar[i, j], parameters=parameters[i, 0])
         for sum_of, where, g in zip(total, ((i, 0), j, ..., (i, 0)), alone, strict=True):
             sum_of[where] += g
         assert np.array_equal(
             slopes[i, j],
-            autodiff.rollout_sensitivities(model, *one, PARAMETERS, parameters=parameters[i, 0]).d_wrenches,
+            derivatives.rollout_jacobian(model, *one, PARAMETERS, parameters=parameters[i, 0]).d_wrenches,
         )
     for got, wanted in zip(gradient, total, strict=True):
         assert got == pytest.approx(wanted, rel=1e-11)  # sums in another order
@@ -428,20 +434,20 @@ def test_kept_states_and_several_threads_change_nothing():
     state, twists, loads = drive(model, steps=500)
     scales = np.linspace(0.5, 1.0, 150)[:, None, None]  # 75,000 steps: enough for more than one thread
     bar = np.ones((500, 3))
-    states = autodiff.rollout_states(model, state, scales * twists, loads, DT).states
-    kept = autodiff.rollout_gradient(model, state, scales * twists, loads, DT, bar, states=states)
-    again = autodiff.rollout_gradient(model, state, scales * twists, loads, DT, bar)
+    states = derivatives.rollout_states(model, state, scales * twists, loads, DT).states
+    kept = derivatives.rollout_vjp(model, state, scales * twists, loads, DT, bar, states=states)
+    again = derivatives.rollout_vjp(model, state, scales * twists, loads, DT, bar)
     for first, second in zip(kept, again, strict=True):
         assert np.array_equal(first, second)
-    last = autodiff.rollout_gradient(model, state, scales[-1] * twists, loads, DT, bar)
+    last = derivatives.rollout_vjp(model, state, scales[-1] * twists, loads, DT, bar)
     assert kept.twist[-1] == pytest.approx(last.twist, rel=1e-9, abs=1e-9 * np.abs(last.twist).max())  # rounding
 
 
 def test_one_load_for_all_steps_gets_the_sum():
     model = model_of("ellipsoid")
     state, twists, _ = drive(model)
-    whole = autodiff.rollout_gradient(model, state, twists, LOAD, DT, np.ones((T, 3)))
-    each = autodiff.rollout_gradient(model, state, twists, np.full(T, LOAD), DT, np.ones((T, 3)))
+    whole = derivatives.rollout_vjp(model, state, twists, LOAD, DT, np.ones((T, 3)))
+    each = derivatives.rollout_vjp(model, state, twists, np.full(T, LOAD), DT, np.ones((T, 3)))
     assert whole.normal_force.shape == () and float(whole.normal_force) == pytest.approx(
         each.normal_force.sum(), rel=1e-13
     )
@@ -450,11 +456,13 @@ def test_one_load_for_all_steps_gets_the_sum():
 def test_one_load_for_each_contact_and_rest():
     model = model_of("ellipsoid")
     _, twists, _ = drive(model)
-    each = autodiff.rollout(model, None, twists, [[1.0], [2.0]], DT)
+    each = derivatives.rollout(model, None, twists, [[1.0], [2.0]], DT)
     assert each.wrenches.shape == (2, T, 3)
     # Contacts abreast go through vector code, which rounds differently.
-    assert each.wrenches[1] == pytest.approx(autodiff.rollout(model, model.rest(), twists, 2.0, DT).wrenches, rel=1e-12)
-    gradient = autodiff.rollout_gradient(model, None, twists, [[1.0], [2.0]], DT, np.ones((T, 3)))
+    assert each.wrenches[1] == pytest.approx(
+        derivatives.rollout(model, model.rest(), twists, 2.0, DT).wrenches, rel=1e-12
+    )
+    gradient = derivatives.rollout_vjp(model, None, twists, [[1.0], [2.0]], DT, np.ones((T, 3)))
     assert gradient.state.shape == (3,) and gradient.normal_force.shape == (2, 1)
 
 
@@ -496,12 +504,12 @@ def test_a_shape_that_follows_the_load_is_refused_and_a_kept_one_is_not():
     surface = pf.LimitSurfaceEllipsoid(FINGER, normal_force=1.0)
     kept = pf.ReducedModelPublished(FINGER, ELASTIC, surface=surface, on_load_change="keep")
     _, twists, loads = drive(kept)
-    _, wrenches = autodiff.rollout(kept, kept.rest(), twists, loads, DT)
+    _, wrenches = derivatives.rollout(kept, kept.rest(), twists, loads, DT)
     assert wrenches[0] == pytest.approx(kept.step(kept.rest(), twists[0], loads[0], DT)[1], rel=1e-12)
     for how in ("rebuild", "rescale"):
         model = pf.ReducedModelPublished(FINGER, ELASTIC, surface=surface, on_load_change=how)
         with pytest.raises(InvalidValueError, match=f"shape that does not follow the load.*on_load_change='{how}'"):
-            autodiff.rollout_states(model, model.rest(), twists, loads, DT)
+            derivatives.rollout_states(model, model.rest(), twists, loads, DT)
 
 
 @pytest.mark.parametrize(
@@ -533,7 +541,7 @@ def test_wrong_input_is_one_clear_line(changed, message):
         "wrenches_bar": np.ones((T, 3)),
     }
     with pytest.raises(InvalidValueError, match=message):
-        autodiff.rollout_gradient(**{**inputs, **changed})
+        derivatives.rollout_vjp(**{**inputs, **changed})
 
 
 def test_a_roll_out_of_no_model_names_all_models():
@@ -545,4 +553,4 @@ def test_a_roll_out_of_no_model_names_all_models():
 def test_unknown_names_are_refused():
     model = model_of("ellipsoid")
     with pytest.raises(InvalidValueError, match="did you mean 'mu_s'"):
-        autodiff.rollout_sensitivities(model, *drive(model), DT, names=["mu_k"])
+        derivatives.rollout_jacobian(model, *drive(model), DT, names=["mu_k"])

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction import autodiff
+from planarfriction import derivatives
 
 PLAIN = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
-GRAIN = pf.grain(0.6, along=0.5, across=1.0)
+GRAIN = pf.friction_metric(0.6, along=0.5, across=1.0)
 LAW = pf.LuGre(mu_c=0.7, mu_s=1.2, gamma=1.5, elasto_plastic=pf.ElastoPlastic(0.6))
 PATCHES = {
     "grain": PLAIN.with_friction_metric(GRAIN),
-    "of each cell": PLAIN.with_friction_metric([pf.grain(0.3 * i, 0.6, 1.1) for i in range(PLAIN.cells)]),
+    "of each cell": PLAIN.with_friction_metric([pf.friction_metric(0.3 * i, 0.6, 1.1) for i in range(PLAIN.cells)]),
     "asymmetric": PLAIN.with_friction_metric(GRAIN, asymmetry=[0.2, -0.1]),
 }
 MODELS = [*(("reduced", patch) for patch in PATCHES), ("parts", "grain"), ("published", "grain")]
@@ -48,7 +48,7 @@ def bars(model, seed: int = 1):
 def test_a_roll_out_takes_the_steps_of_the_model(kind, patch):
     model = model_of(kind, patch)
     state, twists, loads = drive(model)
-    end, wrenches = autodiff.rollout(model, state, twists, loads, DT)
+    end, wrenches = derivatives.rollout(model, state, twists, loads, DT)
     for twist, load, wrench in zip(twists, loads, wrenches, strict=True):
         state, wanted = model.step(state, twist, load, DT)
         assert wrench == pytest.approx(wanted, rel=1e-11, abs=1e-13)  # sums in another order
@@ -60,9 +60,9 @@ def test_the_gradient_is_that_of_differences(kind, patch):
     model = model_of(kind, patch)
     state, twists, loads = drive(model, 2)
     bar, end_bar = bars(model)
-    parameters = autodiff.parameters_of(model)
+    parameters = derivatives.parameters_of(model)
     inputs = {"state": state, "twist": twists, "normal_force": loads, "parameters": parameters}
-    gradient = autodiff.rollout_gradient(model, state, twists, loads, DT, bar, end_bar)
+    gradient = derivatives.rollout_vjp(model, state, twists, loads, DT, bar, end_bar)
     units = {
         "state": np.array([1e-7, 1e-7, 1e-9]),
         "twist": np.array([1e-3, 1e-3, 0.15]),
@@ -72,7 +72,7 @@ def test_the_gradient_is_that_of_differences(kind, patch):
 
     def value(inputs):
         parameters = inputs["parameters"]
-        run = autodiff.rollout(model, *(inputs[n] for n in list(inputs)[:3]), DT, parameters=parameters)
+        run = derivatives.rollout(model, *(inputs[n] for n in list(inputs)[:3]), DT, parameters=parameters)
         return (bar * run.wrenches).sum() + (end_bar * run.state).sum()
 
     random = np.random.default_rng(5)
@@ -87,17 +87,17 @@ def test_the_gradient_is_that_of_differences(kind, patch):
 def test_forwards_is_the_transpose_of_backwards(kind, patch):
     model, random = model_of(kind, patch), np.random.default_rng(3)
     inputs, (bar, end_bar) = drive(model, 4), bars(model)
-    parameters = autodiff.parameters_of(model)
+    parameters = derivatives.parameters_of(model)
     changes = [*drive(model, 7), parameters * random.normal(size=len(parameters))]
-    found = autodiff.rollout_tangent(model, *inputs, DT, *changes)
-    gradient = autodiff.rollout_gradient(model, *inputs, DT, bar, end_bar)
+    found = derivatives.rollout_jvp(model, *inputs, DT, *changes)
+    gradient = derivatives.rollout_vjp(model, *inputs, DT, bar, end_bar)
     forwards = [*(bar * found.wrenches_dot).ravel(), *(end_bar * found.state_dot).ravel()]
     backwards = np.concatenate([(g * x).ravel() for g, x in zip(gradient, changes, strict=True)])
     size = np.abs(forwards).sum() + np.abs(backwards).sum()
     assert sum(forwards) == pytest.approx(backwards.sum(), abs=1e-11 * size)
-    slopes = autodiff.rollout_sensitivities(model, *inputs, DT).d_wrenches
+    slopes = derivatives.rollout_jacobian(model, *inputs, DT).d_wrenches
     by_parameters = np.einsum("ti,tip->p", bar, slopes)
-    alone = autodiff.rollout_gradient(model, *inputs, DT, bar).parameters
+    alone = derivatives.rollout_vjp(model, *inputs, DT, bar).parameters
     assert (np.abs(by_parameters - alone) <= 1e-11 * np.abs(bar[..., None] * slopes).sum((0, 1))).all()
 
 
@@ -117,12 +117,12 @@ def test_pytorch_has_the_same_numbers_and_gradients(kind, patch):
     assert got[0].detach().numpy() == pytest.approx(model.rate(state, twists[3], loads[3]), rel=1e-12, abs=1e-18)
     assert got[1].detach().numpy() == pytest.approx(model.wrench(state, twists[3], loads[3]), rel=1e-12, abs=1e-15)
     bar, end_bar = map(torch.tensor, bars(model))
-    wanted = autodiff.rollout_gradient(model, state, twists, loads, DT, bar.numpy(), end_bar.numpy())
+    wanted = derivatives.rollout_vjp(model, state, twists, loads, DT, bar.numpy(), end_bar.numpy())
     for method in ("adjoint", "eager"):
         free = [torch.tensor(value, requires_grad=True) for value in (state, twists, loads)]
         free.append(module.physical().detach().requires_grad_())
         run = rollout(module, *free[:3], DT, parameters=free[3], method=method)
-        exact = autodiff.rollout(model, state, twists, loads, DT)
+        exact = derivatives.rollout(model, state, twists, loads, DT)
         assert run.wrenches.detach().numpy() == pytest.approx(exact.wrenches, rel=1e-12, abs=1e-13), method
         slopes = torch.autograd.grad((bar * run.wrenches).sum() + (end_bar * run.state).sum(), free)
         for slope, want in zip(slopes, wanted, strict=True):
@@ -156,7 +156,7 @@ def test_jax_has_the_same_numbers_and_gradients(kind, patch):
             return (bar * run.wrenches).sum() + (end_bar * run.state).sum()
 
         by, *slopes = jax.grad(value, (0, 1, 2, 3))(pytree.parameters, state, twists, loads)
-        wanted = autodiff.rollout_gradient(model, state, twists, loads, DT, bar, end_bar)
+        wanted = derivatives.rollout_vjp(model, state, twists, loads, DT, bar, end_bar)
         for slope, want in zip((*slopes, np.stack(by)), wanted, strict=True):
             assert np.asarray(slope) == pytest.approx(want, rel=1e-11, abs=1e-12 * np.abs(want).max())
     finally:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction import autodiff
+from planarfriction import derivatives
 from planarfriction.errors import InvalidValueError
 
 PATCH = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
@@ -41,15 +41,15 @@ def test_forwards_is_the_transpose_of_backwards(kind):
     """`<bar, J x> = <J' bar, x>` for changes x of all inputs."""
     model, random = model_of(kind), np.random.default_rng(3)
     inputs, changes = drive(1, model.state_shape)
-    parameters = autodiff.parameters_of(model)
+    parameters = derivatives.parameters_of(model)
     changes.append(parameters * random.normal(size=len(parameters)))
     bar = random.normal(size=(T, 3)) * [1.0, 1.0, 150.0]
     end_bar = random.normal(size=model.state_shape) * [1e6, 1e6, 1e8]
-    found = autodiff.rollout_tangent(model, *inputs, DT, *changes)
-    plain = autodiff.rollout(model, *inputs, DT)
+    found = derivatives.rollout_jvp(model, *inputs, DT, *changes)
+    plain = derivatives.rollout(model, *inputs, DT)
     assert found.wrenches == pytest.approx(plain.wrenches, rel=1e-11, abs=1e-13)  # sums in another order
     assert found.state == pytest.approx(plain.state, rel=1e-11, abs=1e-20)
-    gradient = autodiff.rollout_gradient(model, *inputs, DT, bar, end_bar)
+    gradient = derivatives.rollout_vjp(model, *inputs, DT, bar, end_bar)
     forwards = [*(bar * found.wrenches_dot).ravel(), *(end_bar * found.state_dot).ravel()]
     backwards = [*np.concatenate([(g * x).ravel() for g, x in zip(gradient, changes, strict=True)])]
     assert sum(forwards) == pytest.approx(sum(backwards), abs=1e-11 * np.abs(forwards + backwards).sum())
@@ -59,10 +59,10 @@ def test_forwards_is_the_transpose_of_backwards(kind):
 def test_changes_of_parameters_are_the_sensitivities(kind):
     model = model_of(kind)
     inputs, _ = drive(2, model.state_shape)
-    by = autodiff.rollout_sensitivities(model, *inputs, DT, ["mu_c", "sigma_1"]).d_wrenches
-    places = [autodiff.parameter_names(model).index(name) for name in ("mu_c", "sigma_1")]
-    directions = np.eye(len(autodiff.parameter_names(model)))[places]  # a batch of two
-    found = autodiff.rollout_tangent(model, *inputs, DT, parameters_dot=directions)
+    by = derivatives.rollout_jacobian(model, *inputs, DT, ["mu_c", "sigma_1"]).d_wrenches
+    places = [derivatives.parameter_names(model).index(name) for name in ("mu_c", "sigma_1")]
+    directions = np.eye(len(derivatives.parameter_names(model)))[places]  # a batch of two
+    found = derivatives.rollout_jvp(model, *inputs, DT, parameters_dot=directions)
     assert found.wrenches_dot.shape == (2, T, 3) and found.state_dot.shape == (2, *model.state_shape)
     assert found.wrenches_dot == pytest.approx(np.moveaxis(by, -1, 0), rel=1e-11, abs=1e-13)
 
@@ -70,12 +70,12 @@ def test_changes_of_parameters_are_the_sensitivities(kind):
 def test_changes_broadcast_with_contacts():
     model, (inputs, changes) = model_of("reduced"), drive(4)
     twists = inputs[1] * np.array([0.5, 1.0, 2.0])[:, None, None]
-    found = autodiff.rollout_tangent(model, inputs[0], twists, 2.0, DT, changes[0], 0.0, 1.0)
+    found = derivatives.rollout_jvp(model, inputs[0], twists, 2.0, DT, changes[0], 0.0, 1.0)
     assert found.wrenches_dot.shape == (3, T, 3)
     for each, twist in zip(found.wrenches_dot, twists, strict=True):
-        alone = autodiff.rollout_tangent(model, inputs[0], twist, 2.0, DT, changes[0], normal_force_dot=np.ones(T))
+        alone = derivatives.rollout_jvp(model, inputs[0], twist, 2.0, DT, changes[0], normal_force_dot=np.ones(T))
         assert np.array_equal(each, alone.wrenches_dot)
-    held = autodiff.rollout_tangent(model, *inputs, DT)
+    held = derivatives.rollout_jvp(model, *inputs, DT)
     assert not held.wrenches_dot.any() and not held.state_dot.any()
 
 
@@ -90,11 +90,11 @@ def test_changes_broadcast_with_contacts():
 )
 def test_wrong_changes_are_one_clear_line(changes, message):
     with pytest.raises(InvalidValueError, match=message) as caught:
-        autodiff.rollout_tangent(model_of("reduced"), *drive()[0], DT, **changes)
+        derivatives.rollout_jvp(model_of("reduced"), *drive()[0], DT, **changes)
     assert "\n" not in str(caught.value)
 
 
 def test_ragged_twists_are_one_clear_line():
     with pytest.raises(InvalidValueError, match=r"^twist must") as caught:
-        autodiff.rollout_tangent(model_of("reduced"), None, [[], [1.0, None], []], 1.0, 1e-3)
+        derivatives.rollout_jvp(model_of("reduced"), None, [[], [1.0, None], []], 1.0, 1e-3)
     assert "\n" not in str(caught.value)

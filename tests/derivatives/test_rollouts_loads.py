@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction import autodiff
+from planarfriction import derivatives
 from planarfriction.errors import InvalidValueError
 
 X, Y = np.meshgrid(np.arange(-3, 4) * 1e-3, np.arange(3, -4, -1) * 1e-3)
@@ -22,8 +22,12 @@ MODELS = {
     "plain": (TIP, pf.LuGre(mu_c=0.7, mu_s=1.2), 1),
     "elasto-plastic": (TIP, ELASTIC, 1),
     "parts": (TIP, ELASTIC, 3),
-    "grain": (TIP.with_friction_metric(pf.grain(0.6, along=0.5, across=1.0)), ELASTIC, 1),
-    "asymmetric": (TIP.with_friction_metric(pf.grain(0.6, along=0.5, across=1.0), asymmetry=[0.2, -0.1]), ELASTIC, 2),
+    "grain": (TIP.with_friction_metric(pf.friction_metric(0.6, along=0.5, across=1.0)), ELASTIC, 1),
+    "asymmetric": (
+        TIP.with_friction_metric(pf.friction_metric(0.6, along=0.5, across=1.0), asymmetry=[0.2, -0.1]),
+        ELASTIC,
+        2,
+    ),
 }
 LOADS = np.linspace(1.031, 3.063, 12)
 """A ramp over many rungs."""
@@ -69,7 +73,7 @@ def test_a_roll_out_takes_the_steps_of_the_model(kind):
     state, twists = drive(model)
     loads = LOADS.copy()
     loads[[3, 5]] = 0.0, 1.0  # a step without load, and a rung alone
-    found = autodiff.rollout_states(model, state, twists, loads, DT)
+    found = derivatives.rollout_states(model, state, twists, loads, DT)
     again = pf.rollout(model, state, twists, loads, DT)
     for t in range(T):
         assert found.states[t] == pytest.approx(state, rel=1e-11, abs=1e-20)
@@ -84,13 +88,13 @@ def test_a_batch_is_a_loop():
     states, twists = np.stack([drive(model, i)[0] for i in range(3)])[:, None], drive(model)[1]
     loads = LOADS * np.array([[0.7], [1.0]])
     bar, end_bar = bars_of(model)
-    inputs = autodiff.parameters_of(model) * np.array([0.9, 1.0])[:, None]
-    found = autodiff.rollout_gradient(model, states, twists, loads, DT, bar, end_bar, parameters=inputs)
+    inputs = derivatives.parameters_of(model) * np.array([0.9, 1.0])[:, None]
+    found = derivatives.rollout_vjp(model, states, twists, loads, DT, bar, end_bar, parameters=inputs)
     assert [g.shape for g in found] == [np.shape(x) for x in (states, twists, loads, inputs)]
     whole = [np.zeros_like(g) for g in found]
     for i, j in np.ndindex(3, 2):
         one = states[i, 0], twists, loads[j], DT
-        alone = autodiff.rollout_gradient(model, *one, bar, end_bar, parameters=inputs[j])
+        alone = derivatives.rollout_vjp(model, *one, bar, end_bar, parameters=inputs[j])
         for total, at, g in zip(whole, ((i, 0), ..., j, j), alone, strict=True):
             total[at] += g
     for got, wanted in zip(found, whole, strict=True):
@@ -110,7 +114,7 @@ def test_the_torque_of_a_slide_follows_the_centre_of_pressure():
         patch = pf.ContactPatch(feet.positions, feet.areas, pf.PressureMaps((1.0, 3.0), shares))
         model = pf.ReducedModel(patch, law, parts=parts, segments=8, speeds=6)
         load, bar = 1.6, np.array([[0.0, 0.0, 1.0]])
-        found = autodiff.rollout_gradient(model, None, [[0.01, 0.0, 0.0]], load, 1e6, bar)
+        found = derivatives.rollout_vjp(model, None, [[0.01, 0.0, 0.0]], load, 1e6, bar)
         low, high = shares @ y
         centre, slope = low + (load - 1.0) * (high - low) / 2.0, (high - low) / 2.0
         # Slopes of F err by 1e-10; along one direction maps are in single precision, whose part in the torque is 1e-6
@@ -133,7 +137,7 @@ def test_a_family_that_stays_as_it_is_has_the_gradient_of_a_fixed_patch(kind):
     bars = bars_of(family)
     loads = LOADS.copy()
     loads[4] = 0.0
-    found, wanted = (autodiff.rollout_gradient(m, state, twists, loads, DT, *bars) for m in (family, single))
+    found, wanted = (derivatives.rollout_vjp(m, state, twists, loads, DT, *bars) for m in (family, single))
     for got, want in zip(found, wanted, strict=True):
         # weights at another load differ by rounding, and so do slopes of the shape: 1e-16 over the step of 1e-5
         assert got == pytest.approx(want, rel=1e-8, abs=1e-9 * np.abs(want).max())
@@ -147,14 +151,14 @@ def test_a_family_that_stays_as_it_is_has_the_gradient_of_a_fixed_patch(kind):
 def test_the_gradient_is_that_of_differences(kind):
     model = model_of(kind)
     (state, twists), loads = drive(model, 2), blended_loads(model)
-    parameters, bars = autodiff.parameters_of(model), bars_of(model)
+    parameters, bars = derivatives.parameters_of(model), bars_of(model)
     inputs = {"state": state, "twist": twists, "normal_force": loads, "parameters": parameters}
     units = {"state": 1e-7, "twist": 1e-3 * SIZES, "normal_force": 1.0, "parameters": np.maximum(parameters, 1e-3)}
-    gradient = autodiff.rollout_gradient(model, state, twists, loads, DT, *bars)
+    gradient = derivatives.rollout_vjp(model, state, twists, loads, DT, *bars)
 
     def value(name: str, change: np.ndarray) -> float:
         of = {**inputs, name: inputs[name] + change * units[name]}
-        run = autodiff.rollout(model, *(of[n] for n in list(of)[:3]), DT, parameters=of["parameters"])
+        run = derivatives.rollout(model, *(of[n] for n in list(of)[:3]), DT, parameters=of["parameters"])
         return float((bars[0] * run.wrenches).sum() + (bars[1] * run.state).sum())
 
     for name, found in gradient._asdict().items():
@@ -180,7 +184,7 @@ def test_a_load_that_one_rung_serves_moves_on_along_the_blend(kind, error, monke
         for load in (rung * (1.0 + 1e-6), rung * (1.0 - 1e-6)):
             for part, data in zip(model.parts_at(load), at_rung, strict=True):
                 assert part.shape.other is None and np.array_equal(part.shape.data, data)
-            served = autodiff.rollout_gradient(model, state, twists, load, DT, *bars)
+            served = derivatives.rollout_vjp(model, state, twists, load, DT, *bars)
             with monkeypatch.context() as patched:
                 for part in model._parts:
                     patched.setattr(part._family, "_error", 1e-12)
@@ -199,7 +203,7 @@ def test_steady_sliding_depends_on_the_load_as_in_the_distributed_model():
     for parts in (1, 2):
         model = pf.ReducedModel(patch, law, parts=parts, segments=12, load_error=2e-3)
         for load in (1.3, 2.2):
-            tangent = autodiff.rollout_tangent(model, None, twist[None], load, 1e6, normal_force_dot=1.0)
+            tangent = derivatives.rollout_jvp(model, None, twist[None], load, 1e6, normal_force_dot=1.0)
             ends = [exact.step(exact.rest(), twist, load * (1.0 + h), 1e6)[1] for h in (step, -step)]
             wanted = (ends[0] - ends[1]) / (2.0 * step * load)
             held = ends[0] / load  # with the shape held
@@ -219,10 +223,10 @@ def test_forwards_is_the_transpose_of_backwards(kind):
     loads = LOADS.copy()
     loads[[2, 5, 6]] = 0.0, 1.0, 2.0 - 1e-9
     twists[8] = 0.0
-    parameters, (bar, end_bar) = autodiff.parameters_of(model), bars_of(model)
+    parameters, (bar, end_bar) = derivatives.parameters_of(model), bars_of(model)
     changes = [*drive(model, 5), random.normal(size=T), parameters * random.normal(size=len(parameters))]
-    found = autodiff.rollout_tangent(model, state, twists, loads, DT, *changes)
-    gradient = autodiff.rollout_gradient(model, state, twists, loads, DT, bar, end_bar)
+    found = derivatives.rollout_jvp(model, state, twists, loads, DT, *changes)
+    gradient = derivatives.rollout_vjp(model, state, twists, loads, DT, bar, end_bar)
     forwards = [*(bar * found.wrenches_dot).ravel(), *(end_bar * found.state_dot).ravel()]
     backwards = [*np.concatenate([(g * x).ravel() for g, x in zip(gradient, changes, strict=True)])]
     assert sum(forwards) == pytest.approx(sum(backwards), abs=1e-11 * np.abs(forwards + backwards).sum())
@@ -234,9 +238,9 @@ def test_forwards_is_the_transpose_of_backwards(kind):
 def test_changes_of_parameters_are_the_sensitivities(kind):
     model = model_of(kind)
     state, twists = drive(model, 6)
-    by = autodiff.rollout_sensitivities(model, state, twists, LOADS, DT)
-    directions = np.eye(len(autodiff.parameter_names(model)))
-    found = autodiff.rollout_tangent(model, state, twists, LOADS, DT, parameters_dot=directions)
+    by = derivatives.rollout_jacobian(model, state, twists, LOADS, DT)
+    directions = np.eye(len(derivatives.parameter_names(model)))
+    found = derivatives.rollout_jvp(model, state, twists, LOADS, DT, parameters_dot=directions)
     assert found.wrenches_dot == pytest.approx(np.moveaxis(by.d_wrenches, -1, 0), rel=1e-10, abs=1e-12)
     assert by.wrenches == pytest.approx(pf.rollout(model, state, twists, LOADS, DT).wrenches, rel=1e-11, abs=1e-13)
 
@@ -250,12 +254,12 @@ def test_without_load_the_slope_is_the_wrench_per_newton_of_a_small_one():
     loads = LOADS.copy()
     loads[4] = 0.0
     bar = np.ones((T, 3)) * (np.arange(T) == 4)[:, None]
-    found = autodiff.rollout_gradient(model, state, twists, loads, DT, bar)
-    before = autodiff.rollout_states(model, state, twists, loads, DT).states[4]
+    found = derivatives.rollout_vjp(model, state, twists, loads, DT, bar)
+    before = derivatives.rollout_states(model, state, twists, loads, DT).states[4]
     small = model.step(before, twists[4], 1e-6, DT)[1].sum() / 1e-6
     assert found.normal_force[4] == pytest.approx(small, rel=1e-9)
     assert not found.twist.any() and not found.normal_force[:4].any()
-    alone = autodiff.rollout_gradient(model, before, twists[4:5], 0.0, DT, bar[4:5])
+    alone = derivatives.rollout_vjp(model, before, twists[4:5], 0.0, DT, bar[4:5])
     assert float(alone.normal_force) == pytest.approx(small, rel=1e-9)
 
 
@@ -265,7 +269,7 @@ def test_a_contact_that_shrinks_to_a_point_has_finite_slopes():
     model = pf.ReducedModel(patch, ELASTIC, segments=8, speeds=6)
     loads = np.array([1.1 * (1.0 - 1e-7), 1.1, 1.1 * (1.0 + 5e-6), 1.105, 0.5, 5e-324])
     twists = np.tile([1e-3, 1e-3, 0.1], (len(loads), 1))
-    found = autodiff.rollout_gradient(model, None, twists, loads, DT, np.ones((len(loads), 3)))
+    found = derivatives.rollout_vjp(model, None, twists, loads, DT, np.ones((len(loads), 3)))
     assert all(np.isfinite(g).all() for g in found)
     # a point has a wrench in proportion to its load
     ends = [pf.rollout(model, None, twists, loads + h * (np.arange(6) == 4), DT).wrenches.sum() for h in (1e-3, -1e-3)]
@@ -282,7 +286,7 @@ def test_a_contact_that_has_just_ceased_to_be_a_point_looks_ahead_alone():
         middle = 0.5 * (low + high)
         low, high = (middle, high) if model.shape_at(middle).contact_radius == 0.0 else (low, middle)
     load, twist, bar = high * (1.0 + 2e-6), [[0.0, 0.0, 0.1]], [[0.0, 0.0, 1.0]]
-    found = autodiff.rollout_gradient(model, None, twist, load, DT, bar)
+    found = derivatives.rollout_vjp(model, None, twist, load, DT, bar)
     ends = [pf.rollout(model, None, twist, load * (1.0 + h), DT).wrenches[0, 2] for h in (1e-6, -1e-6)]
     # the radius bends by 1e-5 of itself over the step; rounding is 1e-16 over 1e-6
     assert float(found.normal_force) == pytest.approx((ends[0] - ends[1]) / (2e-6 * load), rel=1e-4)
@@ -290,12 +294,12 @@ def test_a_contact_that_has_just_ceased_to_be_a_point_looks_ahead_alone():
 
 def test_no_steps_and_shared_loads():
     model = model_of("plain")
-    nothing = autodiff.rollout_gradient(model, None, np.empty((0, 3)), 1.0, DT, np.empty((0, 3)), np.ones(3))
+    nothing = derivatives.rollout_vjp(model, None, np.empty((0, 3)), 1.0, DT, np.empty((0, 3)), np.ones(3))
     assert np.array_equal(nothing.state, np.ones(3)) and nothing.normal_force == 0.0
     state, twists = drive(model)
     bar = np.ones((T, 3))
-    whole = autodiff.rollout_gradient(model, state, twists, 1.3, DT, bar)
-    each = autodiff.rollout_gradient(model, state, twists, np.full(T, 1.3), DT, bar)
+    whole = derivatives.rollout_vjp(model, state, twists, 1.3, DT, bar)
+    each = derivatives.rollout_vjp(model, state, twists, np.full(T, 1.3), DT, bar)
     assert float(whole.normal_force) == pytest.approx(each.normal_force.sum(), rel=1e-12)
 
 
@@ -303,6 +307,6 @@ def test_a_map_for_each_load_is_refused_in_one_line():
     model = pf.ReducedModel(TIP, ELASTIC, segments=8, speeds=6, load_error=0.0)
     state, twists = drive(model)
     with pytest.raises(InvalidValueError, match=r"^load_error must be > 0 for derivatives .*, got 0.0$") as caught:
-        autodiff.rollout_tangent(model, state, twists, LOADS, DT)
+        derivatives.rollout_jvp(model, state, twists, LOADS, DT)
     assert "\n" not in str(caught.value)
     assert pf.rollout(model, state, twists[:2], LOADS[:2], DT).wrenches.shape == (2, 3)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction import autodiff
+from planarfriction import derivatives
 from planarfriction.errors import InvalidValueError
 
 LAWS = {
@@ -57,8 +57,8 @@ def test_a_rollout_takes_the_steps_of_the_model(law):
     model = model_of(law)
     state, twists, loads = drive(model)
     loads[5], twists[8] = 0.0, 0.0
-    end, wrenches = autodiff.rollout(model, state, twists, loads, DT)
-    on_the_way = autodiff.rollout_states(model, state, twists, loads, DT)
+    end, wrenches = derivatives.rollout(model, state, twists, loads, DT)
+    on_the_way = derivatives.rollout_states(model, state, twists, loads, DT)
     assert np.array_equal(on_the_way.wrenches, wrenches) and np.array_equal(on_the_way.state, end)
     for t in range(T):
         # The same code, inlined elsewhere: sums may be ordered differently.
@@ -69,13 +69,13 @@ def test_a_rollout_takes_the_steps_of_the_model(law):
 
 
 def test_parameters_take_the_place_of_the_models_own():
-    assert autodiff.parameter_names(model_of()) == NAMES
-    assert autodiff.parameter_names(pf.ReducedModelPublished(PATCH, LAWS["plain"])) == autodiff.PARAMETERS
-    assert autodiff.parameters_of(model_of("early")).tolist() == [1e6, 800.0, 0.2, 0.7, 1.2, 1e-3, 0.3]
+    assert derivatives.parameter_names(model_of()) == NAMES
+    assert derivatives.parameter_names(pf.ReducedModelPublished(PATCH, LAWS["plain"])) == derivatives.PARAMETERS
+    assert derivatives.parameters_of(model_of("early")).tolist() == [1e6, 800.0, 0.2, 0.7, 1.2, 1e-3, 0.3]
     other = pf.LuGre(0.4, 0.9, 2e-3, 3e5, 50.0, 0.7, elasto_plastic=pf.ElastoPlastic(0.5))
     changed, (state, twists, loads) = pf.ReducedModel(PATCH, other, segments=8, speeds=8), drive(model_of())
-    got = autodiff.rollout(model_of(), state, twists, loads, DT, parameters=autodiff.parameters_of(changed))
-    assert np.array_equal(got.wrenches, autodiff.rollout(changed, state, twists, loads, DT).wrenches)
+    got = derivatives.rollout(model_of(), state, twists, loads, DT, parameters=derivatives.parameters_of(changed))
+    assert np.array_equal(got.wrenches, derivatives.rollout(changed, state, twists, loads, DT).wrenches)
 
 
 # ---------------------------------------------------------------------- closed forms
@@ -85,7 +85,7 @@ def test_parameters_take_the_place_of_the_models_own():
 def test_steady_sliding_scales_with_the_friction_and_with_the_speed(law):
     """`W_d` dry, `W_v` viscous: `mu_c W_c + mu_s W_s = W_d` and `W_V V = W_v - v_s W_vs`; bristles leave no trace."""
     model, twist = model_of(law), np.array([2e-3, -1e-3, 0.3])
-    _, wrenches, slopes = autodiff.rollout_sensitivities(model, model.rest(), twist[None], LOAD, 1e6)
+    _, wrenches, slopes = derivatives.rollout_jacobian(model, model.rest(), twist[None], LOAD, 1e6)
     by, numbers = dict(zip(NAMES, slopes[0].T, strict=True)), model.law
     factor = model.shape_at(LOAD).factor
     viscous = -LOAD * numbers.sigma_2 * factor.T @ factor @ twist
@@ -106,13 +106,13 @@ def test_at_rest_the_state_stays_and_pulls_as_a_spring(law):
     model, state = model_of(law), np.array([3e-7, -2e-7, 1e-7])
     numbers, factor, (wrench_bar, state_bar) = model.law, model.shape_at(LOAD).factor, bars_of(model)
     bar = wrench_bar[:1]
-    got = autodiff.rollout_gradient(model, state, np.zeros((1, 3)), LOAD, DT, bar, state_bar)
+    got = derivatives.rollout_vjp(model, state, np.zeros((1, 3)), LOAD, DT, bar, state_bar)
     push = numbers.sigma_0 * DT + numbers.sigma_1 + numbers.sigma_2
     assert got.state == pytest.approx(state_bar - numbers.sigma_0 * LOAD * factor @ bar[0], rel=1e-13)
     assert got.twist[0] == pytest.approx(factor.T @ (DT * state_bar - push * LOAD * factor @ bar[0]), rel=1e-12)
     assert got.parameters == pytest.approx([-LOAD * bar[0] @ factor.T @ state, 0, 0, 0, 0, 0, 0], rel=1e-13)
     assert float(got.normal_force) == pytest.approx(got.parameters[0] * numbers.sigma_0 / LOAD, rel=1e-13)
-    _, wrenches, slopes = autodiff.rollout_sensitivities(model, state, np.zeros((2, 3)), LOAD, DT)
+    _, wrenches, slopes = derivatives.rollout_jacobian(model, state, np.zeros((2, 3)), LOAD, DT)
     assert wrenches[1] == pytest.approx(-LOAD * numbers.sigma_0 * factor.T @ state, rel=1e-13)
     assert slopes[1, :, 0] == pytest.approx(wrenches[1] / numbers.sigma_0, rel=1e-13)
     assert not slopes[..., 1:].any()
@@ -133,8 +133,8 @@ def test_gradients_are_finite_at_every_kink(law):
     held = np.repeat(np.array(twists)[:, None, None], 2, axis=2)  # [9, 1, 2, 3]
     loads = np.array([[0.0, 0.0], [LOAD, LOAD]])
     for dt in (0.0, 1e-12, DT, 1e9):
-        gradient = autodiff.rollout_gradient(model, states, held, loads, dt, np.ones((2, 3)), np.ones(3))
-        slopes = autodiff.rollout_sensitivities(model, states, held, loads, dt)
+        gradient = derivatives.rollout_vjp(model, states, held, loads, dt, np.ones((2, 3)), np.ones(3))
+        slopes = derivatives.rollout_jacobian(model, states, held, loads, dt)
         for value in (*gradient, *slopes):
             assert np.isfinite(value).all(), dt
 
@@ -144,14 +144,14 @@ def test_without_load_nothing_passes_but_the_load():
     state, twists, loads = drive(model)
     loads[6] = 0.0
     bar = np.ones((T, 3)) * (np.arange(T) >= 6)[:, None]
-    gradient = autodiff.rollout_gradient(model, state, twists, loads, DT, bar, np.ones(3))
-    _, wrenches, slopes = autodiff.rollout_sensitivities(model, state, twists, loads, DT)
-    assert str(wrenches[6]) == "[0. 0. 0.]" == str(autodiff.rollout(model, state, twists, loads, DT).wrenches[6])
+    gradient = derivatives.rollout_vjp(model, state, twists, loads, DT, bar, np.ones(3))
+    _, wrenches, slopes = derivatives.rollout_jacobian(model, state, twists, loads, DT)
+    assert str(wrenches[6]) == "[0. 0. 0.]" == str(derivatives.rollout(model, state, twists, loads, DT).wrenches[6])
     assert not slopes[6].any() and slopes[5].any()
     assert not gradient.state.any() and not gradient.twist[:7].any() and not gradient.normal_force[:6].any()
     assert gradient.twist[7:].all()
     # The slope to the load: the wrench per newton that a small load would have.
-    before = autodiff.rollout_states(model, state, twists, loads, DT).states[6]
+    before = derivatives.rollout_states(model, state, twists, loads, DT).states[6]
     assert gradient.normal_force[6] == pytest.approx(model.step(before, twists[6], 1e-3, DT)[1].sum() / 1e-3, rel=1e-10)
 
 
@@ -163,7 +163,7 @@ def differences(model, inputs: dict, units: dict, bars, name: str) -> np.ndarray
 
     def value(change: np.ndarray) -> float:
         of = {**inputs, name: inputs[name] + change * units[name]}
-        end, wrenches = autodiff.rollout(
+        end, wrenches = derivatives.rollout(
             model, of["state"], of["twist"], of["normal_force"], DT, parameters=of["parameters"]
         )
         return float((bars[0] * wrenches).sum() + (bars[1] * end).sum())
@@ -185,7 +185,7 @@ def compare_with_differences(model, state, twists, loads, speed, parameters) -> 
         "parameters": np.maximum(parameters, 1e-3),
     }
     bars = bars_of(model)
-    gradient = autodiff.rollout_gradient(model, state, twists, loads, DT, *bars, parameters=parameters)
+    gradient = derivatives.rollout_vjp(model, state, twists, loads, DT, *bars, parameters=parameters)
     for name, of in gradient._asdict().items():
         scaled, expected = of * units[name], differences(model, inputs, units, bars, name)
         # Differences lose 1e-16/1e-5 to rounding of numbers near 100 and (1e-5)^2 to truncation, but 1e-6 or so of the
@@ -198,30 +198,30 @@ def compare_with_differences(model, state, twists, loads, speed, parameters) -> 
 @pytest.mark.parametrize("regime", SPEEDS)
 def test_the_gradient_of_a_rollout_is_that_of_differences(law, regime):
     model, speed = model_of(law), SPEEDS[regime]
-    compare_with_differences(model, *drive(model, 3, speed), speed, autodiff.parameters_of(model))
+    compare_with_differences(model, *drive(model, 3, speed), speed, derivatives.parameters_of(model))
 
 
 def test_the_gradient_holds_where_the_floor_carries_the_steady_state():
     """Static friction far below dynamic friction, and slow: less dissipation than the floor allows."""
-    model, parameters = model_of(), autodiff.parameters_of(model_of())
+    model, parameters = model_of(), derivatives.parameters_of(model_of())
     parameters[4] = 0.1 * parameters[3]
     state, twists, loads = drive(model, 3, 2e-4)
     compare_with_differences(model, state, twists, loads, 2e-4, parameters)
-    slopes = autodiff.rollout_sensitivities(
+    slopes = derivatives.rollout_jacobian(
         model, state, twists[:1], LOAD, 1e6, ["mu_c"], parameters=parameters
     ).d_wrenches
     assert np.abs(slopes).max() > 0.1 * LOAD  # the floor is a share of mu_c
 
 
 def test_the_slope_to_a_breakaway_at_once_is_that_of_its_right_side():
-    model, parameters = model_of("early"), autodiff.parameters_of(model_of("early"))
+    model, parameters = model_of("early"), derivatives.parameters_of(model_of("early"))
     parameters[-1] = 0.0
     state, twists, loads = drive(model, 3)
-    slopes = autodiff.rollout_sensitivities(
+    slopes = derivatives.rollout_jacobian(
         model, state, twists, loads, DT, ["breakaway_ratio"], parameters=parameters
     ).d_wrenches
     values = [
-        autodiff.rollout(model, state, twists, loads, DT, parameters=[*parameters[:-1], b]).wrenches
+        derivatives.rollout(model, state, twists, loads, DT, parameters=[*parameters[:-1], b]).wrenches
         for b in (0.0, 1e-5, 2e-5)
     ]
     expected = (4.0 * values[1] - 3.0 * values[0] - values[2]) / 2e-5
@@ -238,15 +238,17 @@ def test_the_adjoint_is_the_transpose_of_the_sensitivities(law):
     state, twists, loads = drive(model, seed=5)
     twists[4] = 0.0
     bar, _ = bars_of(model, 2)
-    _, wrenches, slopes = autodiff.rollout_sensitivities(model, state, twists, loads, DT)
-    assert wrenches == pytest.approx(autodiff.rollout(model, state, twists, loads, DT).wrenches, rel=1e-11, abs=1e-13)
+    _, wrenches, slopes = derivatives.rollout_jacobian(model, state, twists, loads, DT)
+    assert wrenches == pytest.approx(
+        derivatives.rollout(model, state, twists, loads, DT).wrenches, rel=1e-11, abs=1e-13
+    )
     terms = np.einsum("ti,tip->tip", bar, slopes)
-    gradient = autodiff.rollout_gradient(model, state, twists, loads, DT, bar)
+    gradient = derivatives.rollout_vjp(model, state, twists, loads, DT, bar)
     # Sums in another order.
     assert (np.abs(gradient.parameters - terms.sum((0, 1))) <= 1e-11 * np.abs(terms).sum((0, 1))).all()
     if law == "plain":
         assert gradient.parameters[-1] == 0.0
-    *_, chosen = autodiff.rollout_sensitivities(model, state, twists, loads, DT, ("v_s", "mu_c"))
+    *_, chosen = derivatives.rollout_jacobian(model, state, twists, loads, DT, ("v_s", "mu_c"))
     assert np.array_equal(chosen, slopes[..., [5, 3]])
 
 
@@ -260,7 +262,7 @@ def test_the_adjoint_is_the_transpose_of_the_jacobians(law, regime):
     bar, end_bar = bars_of(model, 7)
     change = random.normal(size=3) * 1e-6
     turns, pushes = random.normal(size=(T, 3)) * speed * scale_of(model), random.normal(size=T)
-    gradient = autodiff.rollout_gradient(model, state, twists, loads, DT, bar, end_bar)
+    gradient = derivatives.rollout_vjp(model, state, twists, loads, DT, bar, end_bar)
     backwards = [
         (gradient.state * change).sum(),
         (gradient.twist * turns).sum(),
@@ -268,7 +270,13 @@ def test_the_adjoint_is_the_transpose_of_the_jacobians(law, regime):
     ]
     forwards = []
     for before, twist, load, turn, push, w_bar in zip(
-        autodiff.rollout_states(model, state, twists, loads, DT).states, twists, loads, turns, pushes, bar, strict=True
+        derivatives.rollout_states(model, state, twists, loads, DT).states,
+        twists,
+        loads,
+        turns,
+        pushes,
+        bar,
+        strict=True,
     ):
         j = model.step_jacobians(before, twist, load, DT)
         forwards.append(w_bar @ (j.wrench_state @ change + j.wrench_twist @ turn + j.wrench_load * push))
@@ -285,25 +293,25 @@ def test_a_batch_is_a_loop():
     states = np.stack([drive(model, seed)[0] for seed in range(3)])[:, None]  # [3, 1]
     twists = np.stack([drive(model, seed)[1] for seed in range(2)])  # [2]
     loads, dt = drive(model)[2], random.uniform(0.5e-4, 1e-4, T)
-    parameters = autodiff.parameters_of(model) * random.uniform(0.9, 1.0, (3, 1, 7))
+    parameters = derivatives.parameters_of(model) * random.uniform(0.9, 1.0, (3, 1, 7))
     bar, end_bar = random.normal(size=(3, 2, T, 3)), random.normal(size=(3, 2, 3))
-    ends, wrenches = autodiff.rollout(model, states, twists, loads, dt, parameters=parameters)
-    gradient = autodiff.rollout_gradient(model, states, twists, loads, dt, bar, end_bar, parameters=parameters)
-    slopes = autodiff.rollout_sensitivities(model, states, twists, loads, dt, NAMES, parameters=parameters).d_wrenches
+    ends, wrenches = derivatives.rollout(model, states, twists, loads, dt, parameters=parameters)
+    gradient = derivatives.rollout_vjp(model, states, twists, loads, dt, bar, end_bar, parameters=parameters)
+    slopes = derivatives.rollout_jacobian(model, states, twists, loads, dt, NAMES, parameters=parameters).d_wrenches
     assert wrenches.shape == (3, 2, T, 3) and ends.shape == (3, 2, 3) and slopes.shape == (3, 2, T, 3, 7)
     assert [g.shape for g in gradient] == [a.shape for a in (states, twists, loads, parameters)]
     total = [np.zeros_like(g) for g in gradient]
     for i, j in np.ndindex(3, 2):
         one = states[i, 0], twists[j], loads, dt
-        single = autodiff.rollout(model, *one, parameters=parameters[i, 0])
+        single = derivatives.rollout(model, *one, parameters=parameters[i, 0])
         # abreast with others a contact is rounded in another order on some processors
         for abreast, lone in ((wrenches[i, j], single.wrenches), (ends[i, j], single.state)):
             np.testing.assert_allclose(abreast, lone, rtol=0.0, atol=1e-12 * np.abs(lone).max())
-        alone = autodiff.rollout_gradient(model, *one, bar[i, j], end_bar[i, j], parameters=parameters[i, 0])
+        alone = derivatives.rollout_vjp(model, *one, bar[i, j], end_bar[i, j], parameters=parameters[i, 0])
         for sum_of, where, g in zip(total, ((i, 0), j, ..., (i, 0)), alone, strict=True):
             sum_of[where] += g
         assert np.array_equal(
-            slopes[i, j], autodiff.rollout_sensitivities(model, *one, NAMES, parameters=parameters[i, 0]).d_wrenches
+            slopes[i, j], derivatives.rollout_jacobian(model, *one, NAMES, parameters=parameters[i, 0]).d_wrenches
         )
     for got, wanted in zip(gradient, total, strict=True):
         assert got == pytest.approx(wanted, rel=1e-11)  # sums in another order
@@ -314,17 +322,17 @@ def test_kept_states_several_threads_and_no_steps():
     state, twists, loads = drive(model, steps=500)
     scales = np.linspace(0.5, 1.0, 150)[:, None, None]  # 75,000 steps: enough for more than one thread
     bar = np.ones((500, 3))
-    states = autodiff.rollout_states(model, state, scales * twists, loads, DT).states
-    kept = autodiff.rollout_gradient(model, state, scales * twists, loads, DT, bar, states=states)
-    again = autodiff.rollout_gradient(model, state, scales * twists, loads, DT, bar)
+    states = derivatives.rollout_states(model, state, scales * twists, loads, DT).states
+    kept = derivatives.rollout_vjp(model, state, scales * twists, loads, DT, bar, states=states)
+    again = derivatives.rollout_vjp(model, state, scales * twists, loads, DT, bar)
     for first, second in zip(kept, again, strict=True):
         assert np.array_equal(first, second)
-    last = autodiff.rollout_gradient(model, state, scales[-1] * twists, loads, DT, bar)
+    last = derivatives.rollout_vjp(model, state, scales[-1] * twists, loads, DT, bar)
     # abreast with others it is summed in another order
     np.testing.assert_allclose(kept.twist[-1], last.twist, rtol=1e-10, atol=1e-13 * np.abs(last.twist).max())
-    end, wrenches = autodiff.rollout(model, state, np.empty((0, 3)), LOAD, DT)
+    end, wrenches = derivatives.rollout(model, state, np.empty((0, 3)), LOAD, DT)
     assert wrenches.shape == (0, 3) and np.array_equal(end, state)
-    nothing = autodiff.rollout_gradient(model, state, np.empty((0, 3)), LOAD, DT, np.empty((0, 3)), np.ones(3))
+    nothing = derivatives.rollout_vjp(model, state, np.empty((0, 3)), LOAD, DT, np.empty((0, 3)), np.ones(3))
     assert np.array_equal(nothing.state, np.ones(3)) and not nothing.parameters.any()
 
 
@@ -352,11 +360,11 @@ def test_wrong_input_is_one_clear_line(changed, message):
     state, twists, loads = drive(model_of())
     inputs = {"model": model_of(), "state": state, "twist": twists, "normal_force": loads, "dt": DT}
     with pytest.raises(InvalidValueError, match=message) as caught:
-        autodiff.rollout_gradient(**{**inputs, "wrenches_bar": np.ones((T, 3)), **changed})
+        derivatives.rollout_vjp(**{**inputs, "wrenches_bar": np.ones((T, 3)), **changed})
     assert "\n" not in str(caught.value)
 
 
 @pytest.mark.parametrize("name", ["gamma", "contact_radius", "mu_k"])
 def test_what_the_map_holds_is_no_parameter(name):
     with pytest.raises(InvalidValueError, match=f"names must be .*{name}"):
-        autodiff.rollout_sensitivities(model_of(), *drive(model_of()), DT, names=[name])
+        derivatives.rollout_jacobian(model_of(), *drive(model_of()), DT, names=[name])

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.autodiff import SCENE_PARAMETERS, scene_sensitivities
-from planarfriction.autodiff import scene as scene_module
+from planarfriction.derivatives import SCENE_PARAMETERS, scene_sensitivities
+from planarfriction.derivatives import scene as scene_module
 from planarfriction.errors import InvalidValueError
 
 LAW = pf.LuGre(

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.autodiff import scene_sensitivities
-from planarfriction.autodiff.scene_function import SceneFunction
+from planarfriction.derivatives import scene_sensitivities
+from planarfriction.derivatives.scene_function import SceneFunction
 from planarfriction.errors import FrictionError, InvalidValueError
 from tests.derivatives.test_scene import model_of
 

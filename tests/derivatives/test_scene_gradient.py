@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.autodiff import scene_gradient, scene_sensitivities
+from planarfriction.derivatives import scene_gradient, scene_sensitivities
 from planarfriction.errors import InvalidValueError
 from planarfriction.scenes import packing
 from tests.derivatives.test_scene import LAW, MOTION, model_of, slide
@@ -142,8 +142,8 @@ def test_the_reverse_takes_contacts_that_move():
     model, load = model_of("ellipsoid"), pf.Signal([0.0, 0.1], [2.0, 3.0], "linear")
     sway = pf.Signal([0.0, 0.05, 0.1], [(0.02, 0.0, 0.3), (0.0, 0.01, -0.5), (0.01, 0.0, 0.2)], "linear")
     contacts = [
-        pf.Contact(model, load, position=(0.03, 0.01), angle=0.4, name="pad", velocity=sway),
-        pf.Contact(model, 2.0, mounted_on="body", name="table", velocity=(0.0, 0.0, 0.5)),
+        pf.Contact(model, load, position=(0.03, 0.01), angle=0.4, name="pad", support_velocity=sway),
+        pf.Contact(model, 2.0, mounted_on="body", name="table", support_velocity=(0.0, 0.0, 0.5)),
     ]
     body = pf.Body(0.4, 6e-4, velocity=(0.05, 0.0, 0.5), gravity=(0.0, 0.0))
     scene = pf.Scene(body, contacts, 0.1, save_every=0.02)
@@ -160,7 +160,7 @@ def test_derivatives_through_friction_that_depends_on_the_direction(kind):
         patch = pf.ContactPatch.points(
             r * np.array([[0.01, 0.0], [-0.008, 0.009], [-0.006, -0.01], [0.002, 0.004]]), [1.0, 2.0, 1.5, 0.5]
         )
-        metrics = np.array([pf.grain(0.3 * i, along=1.0, across=0.6) for i in range(4)])
+        metrics = np.array([pf.friction_metric(0.3 * i, along=1.0, across=0.6) for i in range(4)])
         lean = np.array([[0.2, 0.1]])
         if kind == "cells":
             patch = patch.with_friction_metric(metrics, np.tile(lean, (4, 1)))

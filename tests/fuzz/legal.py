@@ -37,7 +37,7 @@ SKIPPED = {
 """Not attacked, and why."""
 
 RECORDS = """
-    Rollout RolloutGradient RolloutSensitivities RolloutStates RolloutTangent SceneGradient SceneSensitivities
+    Rollout RolloutVJP RolloutJacobian RolloutStates RolloutJVP SceneGradient SceneSensitivities
     Identification Verdict MotionPlan GripPlan GripReport Push PushPlan PushReport Solution Progress
     SurfaceComparison ModelJacobians PackedModel StepJacobians Statistics Integration
     LimitSurface FrictionLaw FrictionModel Pressure
@@ -202,11 +202,11 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "scenes.pivot": {"normal_force": None, "mass": 0.02, "start": "equilibrium"},
     "scenes.curling": {"twist": (1.0, 0.0, 10.0), "start": "sliding"},
     "rollout": {"twist": TWISTS},
-    "autodiff.rollout_states": {"twist": TWISTS},
-    "autodiff.rollout_gradient": {"twist": TWISTS},
-    "autodiff.rollout_sensitivities": {"twist": TWISTS, "names": ("mu_c",)},
-    "autodiff.scene_sensitivities": {"parameters": ("mu",), "signals": {}, "initial": ("x",)},
-    "autodiff.scene_gradient": {
+    "derivatives.rollout_states": {"twist": TWISTS},
+    "derivatives.rollout_vjp": {"twist": TWISTS},
+    "derivatives.rollout_jacobian": {"twist": TWISTS, "names": ("mu_c",)},
+    "derivatives.scene_sensitivities": {"parameters": ("mu",), "signals": {}, "initial": ("x",)},
+    "derivatives.scene_gradient": {
         "parameters": ("mu",),
         "signals": {},
         "initial": ("x",),

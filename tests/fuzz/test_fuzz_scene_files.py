@@ -50,7 +50,11 @@ SCENES = [
     table(contact={"patch": {"shape": "polygon", "vertices": [[0, 0], [0.01, 0], [0, 0.01]], "cells": [4, 5]}}),
     table(contact={"patch": {"shape": "points", "positions": [[0, 0], [0.01, 0]], "weights": [1, 2]}}),
     table(contact={"patch": {"shape": "published", "name": "LineGrad", "cells": 7}, "model": "reduced"}),
-    table(contact={"velocity": {"times": [0.0, 0.01], "values": [[0.1, 0.0, 1.0], [0.0, 0.1, 0.0]], "hold": "linear"}}),
+    table(
+        contact={
+            "support_velocity": {"times": [0.0, 0.01], "values": [[0.1, 0.0, 1.0], [0.0, 0.1, 0.0]], "hold": "linear"}
+        }
+    ),
     table(contact={"patch": DISC | {"metric": {"along": 0.4, "across": 0.6, "angle": 0.1}}, "model": "distributed"}),
 ]
 ERRORS = ("scene",)

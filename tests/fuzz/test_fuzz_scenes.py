@@ -33,7 +33,7 @@ def test_scenes_run_and_come_back(draw: random.Random) -> None:
         return
     use(solution)
     with folder() as here:
-        loaded = judge("scenes: saved and loaded", lambda: pf.load(solution.save(here / "solution.nc")))
+        loaded = judge("scenes: saved and loaded", lambda: pf.Solution.load(solution.save(here / "solution.nc")))
         name = draw.choice(["scene.toml", "scene.json"])
         scene.to_file(here / name)
         read = judge("scenes: written and read", lambda: pf.Scene.from_file(here / name))

@@ -38,7 +38,7 @@ def test_the_untouched_file_is_the_solution():
     with folder() as here:
         path = here / "solution.nc"
         path.write_bytes(saved())
-        assert same(pf.load(path), solution())
+        assert same(pf.Solution.load(path), solution())
 
 
 @attack("solution files", 300)
@@ -48,7 +48,7 @@ def test_a_file_with_other_bytes(draw: random.Random) -> None:
     with folder() as here:
         path = here / "solution.nc"
         path.write_bytes(changed)
-        loaded = judge("solution files", lambda: pf.load(path), names=("solution.nc",))
+        loaded = judge("solution files", lambda: pf.Solution.load(path), names=("solution.nc",))
     if loaded is not None and not same(loaded, solution()):
         raise Broken("the file was damaged, and loads as something else")
 

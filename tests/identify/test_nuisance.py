@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.autodiff import PARAMETERS, parameters_of
+from planarfriction.derivatives import PARAMETERS, parameters_of
 from planarfriction.identify import Log, identify_lugre, search
 from planarfriction.identify.fitted import moved_patch
 from planarfriction.identify.least_squares import condensed

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction import autodiff
-from planarfriction.autodiff.parameters import pack_shape
+from planarfriction import derivatives
+from planarfriction.derivatives.parameters import pack_shape
 from planarfriction.kernels.lanes import LANES, SLOTS
 from planarfriction.patch import PUBLISHED_PATCHES
 
@@ -47,7 +47,7 @@ def close(ours, theirs) -> None:
 @pytest.mark.parametrize("contacts", [1, LANES - 1, LANES, 2 * LANES + 3])
 def test_contacts_abreast_take_the_steps_of_the_model(model, contacts):
     twist, loads, dt = runs(contacts, 30)
-    ours, state = autodiff.rollout_states(model, None, twist, loads, dt), np.zeros((contacts, *model.state_shape))
+    ours, state = derivatives.rollout_states(model, None, twist, loads, dt), np.zeros((contacts, *model.state_shape))
     for t in range(30):
         close(ours.states[:, t], state)
         state, wrench = model.step(state, twist[:, t], loads[:, t], dt[t])
@@ -58,7 +58,7 @@ def test_contacts_abreast_take_the_steps_of_the_model(model, contacts):
 @pytest.mark.parametrize("steps", [0, 1, SLOTS // LANES, SLOTS - 1, SLOTS, SLOTS + 1])
 def test_any_number_of_steps_fills_the_chunks(model, steps):
     twist, loads, dt = runs(2, steps)
-    ours = autodiff.rollout(model, None, twist, loads, dt)
+    ours = derivatives.rollout(model, None, twist, loads, dt)
     for b in range(2):
         state = model.rest()
         for t in range(steps):
@@ -73,10 +73,10 @@ def test_gradients_abreast_are_those_of_each_alone(model, contacts, steps):
     generator = np.random.default_rng(1)
     pulls, last = generator.normal(size=twist.shape), generator.normal(size=(contacts, *model.state_shape))
     start = 1e-7 * generator.normal(size=last.shape)
-    own = np.tile(autodiff.parameters_of(model), (contacts, 1)) * generator.uniform(0.9, 1.0, (contacts, 1))
-    ours = autodiff.rollout_gradient(model, start, twist, loads, dt, pulls, last, parameters=own)
+    own = np.tile(derivatives.parameters_of(model), (contacts, 1)) * generator.uniform(0.9, 1.0, (contacts, 1))
+    ours = derivatives.rollout_vjp(model, start, twist, loads, dt, pulls, last, parameters=own)
     for b in range(contacts):
-        alone = autodiff.rollout_gradient(model, start[b], twist[b], loads[b], dt, pulls[b], last[b], parameters=own[b])
+        alone = derivatives.rollout_vjp(model, start[b], twist[b], loads[b], dt, pulls[b], last[b], parameters=own[b])
         # what is left of the first state after all steps may be nothing beside the stiffness that it acts through
         np.testing.assert_allclose(ours.state[b], alone.state, rtol=1e-12, atol=1e-12 * model.law.sigma_0)
         for one, other in zip(ours[1:], alone[1:], strict=True):
@@ -85,14 +85,14 @@ def test_gradients_abreast_are_those_of_each_alone(model, contacts, steps):
 
 def test_threads_share_contacts_and_parts(model, monkeypatch):
     twist, loads, dt = runs(21, 50)
-    whole = autodiff.rollout(model, None, twist, loads, dt)
-    gradient = autodiff.rollout_gradient(model, None, twist, loads, dt, whole.wrenches)
-    monkeypatch.setattr("planarfriction.autodiff.inputs._WORTH_A_THREAD", 100)
+    whole = derivatives.rollout(model, None, twist, loads, dt)
+    gradient = derivatives.rollout_vjp(model, None, twist, loads, dt, whole.wrenches)
+    monkeypatch.setattr("planarfriction.derivatives.inputs._WORTH_A_THREAD", 100)
     monkeypatch.setattr("os.sched_getaffinity", lambda _: range(5), raising=False)
-    shared = autodiff.rollout(model, None, twist, loads, dt)
+    shared = derivatives.rollout(model, None, twist, loads, dt)
     close(shared.wrenches, whole.wrenches)
     for one, other in zip(
-        autodiff.rollout_gradient(model, None, twist, loads, dt, whole.wrenches), gradient, strict=True
+        derivatives.rollout_vjp(model, None, twist, loads, dt, whole.wrenches), gradient, strict=True
     ):
         close(one, other)
 
@@ -100,11 +100,11 @@ def test_threads_share_contacts_and_parts(model, monkeypatch):
 def test_parts_abreast_are_the_sum_of_models_of_one_part():
     twist, loads, dt = runs(LANES // 2 + 1, 40)
     model = MODELS["three parts"]
-    ours = autodiff.rollout_states(model, None, twist, loads, dt)
+    ours = derivatives.rollout_states(model, None, twist, loads, dt)
     total = np.zeros_like(twist)
     for k, part in enumerate(model.parts_at(None)):
         packed = pack_shape(model.law.numbers, part.shape)
-        one = autodiff.rollout_states(packed, None, twist, loads, dt)
+        one = derivatives.rollout_states(packed, None, twist, loads, dt)
         close(ours.states[..., k, :], one.states)
         total += part.share * one.wrenches
     close(ours.wrenches, total)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.autodiff import rollout, rollout_sensitivities
+from planarfriction.derivatives import rollout, rollout_jacobian
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 
@@ -107,7 +107,7 @@ def test_regularised_coulomb_creeps_under_a_held_force(share):
 
 def test_the_creep_of_a_scene_has_the_slope_of_its_closed_form():
     """`dv/d(log mu) = -v_c F mu f_N/(mu f_N - F)^2`"""
-    found = pf.autodiff.scene_sensitivities(creeping_block(0.6), ("mu", "load"))
+    found = pf.derivatives.scene_sensitivities(creeping_block(0.6), ("mu", "load"))
     assert found.d_motion[-1, 0] == pytest.approx(-1e-4 * 0.6 / 0.4**2, rel=1e-4)  # of the solver
 
 
@@ -227,8 +227,8 @@ def test_the_reduced_model_takes_dahl_and_refuses_creep():
 def test_sensitivities_of_other_laws_are_those_of_differences(law):
     model = pf.ReducedModelPublished(DISC, law, surface=pf.LimitSurfaceEllipsoid(DISC))
     given = (model.rest(), np.array([[1e-3, 2e-4, 0.1]] * 12), np.full(12, LOAD), np.full(12, 1e-3))
-    names, base = pf.autodiff.parameter_names(model), pf.autodiff.parameters_of(model)
-    slopes = rollout_sensitivities(model, *given).d_wrenches
+    names, base = pf.derivatives.parameter_names(model), pf.derivatives.parameters_of(model)
+    slopes = rollout_jacobian(model, *given).d_wrenches
     for name in ("sigma_0", "mu_c"):
         i = names.index(name)
         change = 1e-6 * base[i] * np.eye(len(base))[i]

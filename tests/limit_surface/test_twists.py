@@ -16,7 +16,7 @@ from planarfriction.patch import PUBLISHED_PATCHES
 ELL = [(0.0, 0.0), (0.03, 0.0), (0.03, 0.005), (0.005, 0.005), (0.005, 0.02), (0.0, 0.02)]
 FEET = pf.ContactPatch.points([(0.0, 0.0), (0.03, 0.01), (0.01, 0.02)], [1.0, 2.0, 1.5])
 TEE = PUBLISHED_PATCHES["NonConvex2"](cells=9)
-GRAIN, LEAN = pf.grain(0.3, along=1.0, across=0.5), (0.2, -0.3)
+GRAIN, LEAN = pf.friction_metric(0.3, along=1.0, across=0.5), (0.2, -0.3)
 PATCHES = {
     "disc": pf.ContactPatch.disc(0.01, 9),
     "ring": pf.ContactPatch.ring(0.004, 0.01, 9),
@@ -30,7 +30,7 @@ PATCHES = {
     "grain": TEE.with_friction_metric(GRAIN, LEAN),
     "feet with a grain": FEET.with_friction_metric(GRAIN, LEAN),
     "a grain in each cell": TEE.with_friction_metric(
-        np.where(TEE.positions[:, :1, None] > 0.0, GRAIN, pf.grain(-0.5, along=0.7, across=1.2)),
+        np.where(TEE.positions[:, :1, None] > 0.0, GRAIN, pf.friction_metric(-0.5, along=0.7, across=1.2)),
         np.where(TEE.positions[:, 1:] > 0.0, [0.4, 0.0], [0.0, -0.2]),
     ),
 }

@@ -107,7 +107,7 @@ def test_easier_one_way_than_the_other():
 
 def test_a_line_spins_against_its_coefficient_across():
     line = pf.ContactPatch.line(0.02, 9, direction="x")
-    grained = line.with_friction_metric(pf.grain(0.0, 0.3, 0.7))
+    grained = line.with_friction_metric(pf.friction_metric(0.0, 0.3, 0.7))
     assert grained.contact_radius() == pytest.approx(0.7 * line.contact_radius(), rel=1e-14)
     assert grained.second_moment() == pytest.approx(0.49 * line.second_moment(), rel=1e-14)
     # the viscous torque of a spin, in steady sliding beside the dry one
@@ -171,7 +171,7 @@ def test_the_anisotropic_code_agrees_with_the_isotropic_one():
 @given(seed=st.integers(0, 1000), polar=st.floats(0.02, 3.1), azimuth=angles)
 def test_sliding_dissipates_and_is_the_gradient_of_a_convex_potential(seed, polar, azimuth):
     random = np.random.default_rng(seed)
-    metrics = np.array([pf.grain(*random.uniform(0.3, 2.0, 3)) for _ in range(PLAIN.cells)])
+    metrics = np.array([pf.friction_metric(*random.uniform(0.3, 2.0, 3)) for _ in range(PLAIN.cells)])
     asymmetry = random.uniform(-0.7, 0.7, (PLAIN.cells, 2))
     patch = PLAIN.with_friction_metric(metrics, asymmetry)
     for surface in surfaces(patch):
@@ -224,7 +224,9 @@ def test_a_half_sphere_and_three_numbers_are_exact_for_all_directions(name):
 
 def test_fine_tables_agree_with_the_cells_on_the_whole_sphere():
     fine = PUBLISHED_PATCHES["Square"]()
-    side = np.where(fine.positions[:, :1, None] > 0.0, pf.grain(0.3, 1.0, 0.5), pf.grain(-0.5, 0.7, 1.2))
+    side = np.where(
+        fine.positions[:, :1, None] > 0.0, pf.friction_metric(0.3, 1.0, 0.5), pf.friction_metric(-0.5, 0.7, 1.2)
+    )
     patch = fine.with_friction_metric(side, np.where(fine.positions[:, 1:] > 0.0, [0.4, 0.0], [0.0, -0.2]))
     table, cells = pf.LimitSurfaceTable(patch, segments=40), pf.LimitSurfaceCells(patch)
     random = RANDOM.normal(size=(300, 3)) / [1.0, 1.0, cells.contact_radius]
@@ -246,12 +248,12 @@ def test_the_twist_of_a_wrench_comes_back(name):
 def test_a_metric_per_cell_is_the_sum_of_its_parts():
     left = PLAIN.positions[:, 0] < 0.0
     metric, lean = (
-        np.where(left[:, None, None], GRAIN, pf.grain(1.0, 0.5, 0.9)),
+        np.where(left[:, None, None], GRAIN, pf.friction_metric(1.0, 0.5, 0.9)),
         np.where(left[:, None], LEAN, [0.0, 0.1]),
     )
     whole = PLAIN.with_friction_metric(metric, lean)
     weights, total = PLAIN.weights(), np.zeros(3)
-    for part, of, a in ((left, GRAIN, LEAN), (~left, pf.grain(1.0, 0.5, 0.9), [0.0, 0.1])):
+    for part, of, a in ((left, GRAIN, LEAN), (~left, pf.friction_metric(1.0, 0.5, 0.9), [0.0, 0.1])):
         patch = pf.ContactPatch.points(PLAIN.positions[part], weights[part]).with_friction_metric(of, a)
         total += weights[part].sum() * steady(patch, TWIST, STRIBECK)
     np.testing.assert_allclose(steady(whole, TWIST, STRIBECK), total, rtol=1e-12)

@@ -104,4 +104,4 @@ def test_an_empty_batch_has_empty_derivatives(model):
 def test_a_gradient_takes_no_cotangent_that_is_not_finite(wrong):
     inputs = {"wrenches_bar": np.ones((5, 3)), **wrong}
     with pytest.raises(InvalidValueError, match=next(iter(wrong))):
-        pf.autodiff.rollout_gradient(MODELS["reduced"], None, np.zeros((5, 3)), 1.0, 1e-3, **inputs)
+        pf.derivatives.rollout_vjp(MODELS["reduced"], None, np.zeros((5, 3)), 1.0, 1e-3, **inputs)

@@ -28,7 +28,7 @@ def cycle() -> np.ndarray:
 def run(model):
     """State at the end, energy taken by each cycle over the energy that went in or out in it."""
     twists = np.tile(np.repeat(cycle(), STEPS, axis=0), (CYCLES, 1))
-    end, wrenches = pf.autodiff.rollout(model, None, twists, 1.0, DT)
+    end, wrenches = pf.derivatives.rollout(model, None, twists, 1.0, DT)
     wrenches = np.concatenate([np.zeros((1, 3)), wrenches])
     work = -0.5 * np.einsum("ti,ti->t", wrenches[1:] + wrenches[:-1], twists) * DT  # exact: forces are linear in time
     work = work.reshape(CYCLES, -1)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction import autodiff
+from planarfriction import derivatives
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LARGEST
 
@@ -77,7 +77,7 @@ def test_larger_ones_are_refused(model, name, value):
     calls = [
         lambda: model.step(**given),
         lambda: model.step_jacobians(**given),
-        lambda: autodiff.rollout(model, **sequence),
+        lambda: derivatives.rollout(model, **sequence),
     ]
     for call in calls:
         with pytest.raises(InvalidValueError, match=rf"{name} must be between -1e\+50 and 1e\+50"):

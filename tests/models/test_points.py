@@ -7,7 +7,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
-from planarfriction.patch import grain
+from planarfriction.patch import friction_metric
 from planarfriction.scenes import Signal
 
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
@@ -17,7 +17,7 @@ ASIDE = pf.ContactPatch(
     [(0.03, -0.02), (0.03, -0.01)], [1e-6, 1e-6], pf.PressureMaps((0.1, 1.0), np.array([[1.0, 0.0], [0.4, 0.6]]))
 )
 """Two cells far from the frame's origin, of which the second is loaded from 0.1 N on."""
-GRAINED = ASIDE.with_friction_metric(grain(0.4, along=1.0, across=0.7), asymmetry=(0.1, 0.2))
+GRAINED = ASIDE.with_friction_metric(friction_metric(0.4, along=1.0, across=0.7), asymmetry=(0.1, 0.2))
 MODELS = {
     "reduced": lambda patch: pf.ReducedModel(patch, LAW, segments=8, speeds=28),
     "published": lambda patch: pf.ReducedModelPublished(patch, LAW),
@@ -28,7 +28,7 @@ every_model = pytest.mark.parametrize("kind", MODELS)
 
 def run(model, load, twists, dt=1e-5):
     """Wrenches of steps from rest."""
-    return pf.autodiff.rollout(model, None, twists, load, dt).wrenches
+    return pf.derivatives.rollout(model, None, twists, load, dt).wrenches
 
 
 @pytest.mark.parametrize("load", [1e-300, 1e-6, 9e-3])

@@ -12,9 +12,9 @@ from planarfriction.patch import PUBLISHED_PATCHES
 
 LAW = pf.LuGre(mu_s=1.2)
 PLAIN = PUBLISHED_PATCHES["NonConvex2"](cells=11)
-GRAIN = pf.grain(0.4, 1.3, 0.6)
+GRAIN = pf.friction_metric(0.4, 1.3, 0.6)
 _RANDOM = np.random.default_rng(1)
-GRAINS = np.array([pf.grain(angle, 1.2, 0.7) for angle in _RANDOM.uniform(-3.0, 3.0, PLAIN.cells)])
+GRAINS = np.array([pf.friction_metric(angle, 1.2, 0.7) for angle in _RANDOM.uniform(-3.0, 3.0, PLAIN.cells)])
 LEAN, LEANS = np.array([0.3, -0.2]), _RANDOM.uniform(-0.4, 0.4, (PLAIN.cells, 2))
 PATCHES = {
     "metric": PLAIN.with_friction_metric(GRAIN),

@@ -11,7 +11,7 @@ from planarfriction.patch import PUBLISHED_PATCHES
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
 PATCH = PUBLISHED_PATCHES["NonConvex2"]()
 FEET = pf.ContactPatch.points([(0.01, 0.0), (-0.01, 0.002), (0.0, 0.012)], [1.0, 2.0, 3.0])
-GRAIN = pf.grain(0.4, 1.3, 0.6)
+GRAIN = pf.friction_metric(0.4, 1.3, 0.6)
 
 
 def _evenness(model: pf.ReducedModel, z: np.ndarray) -> np.ndarray:

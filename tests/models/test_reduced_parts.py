@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction import autodiff
+from planarfriction import derivatives
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch, SoftFinger
 from planarfriction.patch.parts import part_of
 from planarfriction.scenes import simulate
@@ -15,8 +15,8 @@ PLAIN, ELASTIC = pf.LuGre(mu_s=1.2), pf.LuGre(mu_s=1.2, elasto_plastic=pf.Elasto
 LAWS = {"plain": PLAIN, "elasto-plastic": ELASTIC}
 T = PUBLISHED_PATCHES["NonConvex2"](11)
 FEET = ContactPatch.points([(0.01, 0.0), (-0.01, 0.002), (0.0, 0.012)], [1.0, 2.0, 3.0])
-ROUGH = T.with_friction_metric(pf.grain(0.4, along=1.0, across=0.7))
-BRUSHED = T.with_friction_metric(pf.grain(0.4, along=1.0, across=0.7), (0.2, 0.1))
+ROUGH = T.with_friction_metric(pf.friction_metric(0.4, along=1.0, across=0.7))
+BRUSHED = T.with_friction_metric(pf.friction_metric(0.4, along=1.0, across=0.7), (0.2, 0.1))
 SOFT = ContactPatch.disc(0.01, 11, pressure=SoftFinger(c=0.006, n=1 / 3, k=2.0))
 SMALL = {"segments": 8, "speeds": 8}
 
@@ -78,7 +78,7 @@ def test_steps_one_by_one_in_batches_and_rolled_out_are_the_same(patch):
     together = model.step(np.array(states[:-1]), held, loads, dt)
     np.testing.assert_allclose(together[0], states[1:], rtol=1e-12, atol=1e-18)
     np.testing.assert_allclose(together[1], wrenches, rtol=1e-12, atol=1e-12)
-    rolled = autodiff.rollout(model, None, np.stack([held, held]), loads, dt)
+    rolled = derivatives.rollout(model, None, np.stack([held, held]), loads, dt)
     np.testing.assert_allclose(rolled.wrenches[1], wrenches, rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(rolled.state, [states[-1]] * 2, rtol=1e-12, atol=1e-18)
 
@@ -86,10 +86,10 @@ def test_steps_one_by_one_in_batches_and_rolled_out_are_the_same(patch):
 def test_a_roll_out_is_that_of_its_parts():
     model = pf.ReducedModel(T, ELASTIC, parts=3)
     held, total = twists(30), 0.0
-    kept = autodiff.rollout_states(model, model.rest(), held, 2.0, 1e-3)
+    kept = derivatives.rollout_states(model, model.rest(), held, 2.0, 1e-3)
     for k in range(3):
         part = part_of(T, model.labels == k)
-        rolled = autodiff.rollout_states(
+        rolled = derivatives.rollout_states(
             pf.ReducedModel(part, ELASTIC), None, held, 2.0 * model.parts_at(None)[k].share, 1e-3
         )
         total = total + rolled.wrenches
@@ -101,25 +101,25 @@ def test_gradients_and_sensitivities_are_differences_of_roll_outs():
     model = pf.ReducedModel(T, ELASTIC, parts=3)
     generator = np.random.default_rng(5)
     held, loads, dt = twists(20, 4), np.linspace(1.0, 2.0, 20), 1e-3
-    own, start = autodiff.parameters_of(model), 1e-7 * generator.normal(size=(3, 3))
+    own, start = derivatives.parameters_of(model), 1e-7 * generator.normal(size=(3, 3))
     w_bar, z_bar = generator.normal(size=(20, 3)) * [1.0, 1.0, 100.0], 1e5 * generator.normal(size=(3, 3))
     inputs = {"state": start, "twist": held, "normal_force": loads, "parameters": own}
 
     def value(**given) -> float:
         given = {**inputs, **given}
-        end, wrenches = autodiff.rollout(model, *list(given.values())[:3], dt, parameters=given["parameters"])
+        end, wrenches = derivatives.rollout(model, *list(given.values())[:3], dt, parameters=given["parameters"])
         return float((w_bar * wrenches).sum() + (z_bar * end).sum())
 
-    gradient = autodiff.rollout_gradient(model, start, held, loads, dt, w_bar, z_bar, parameters=own)
+    gradient = derivatives.rollout_vjp(model, start, held, loads, dt, w_bar, z_bar, parameters=own)
     for name, at in inputs.items():
         along = generator.normal(size=at.shape) * (np.abs(at) if name != "state" else 1e-7)
         ahead, behind = (value(**{name: at + sign * 1e-6 * along}) for sign in (1, -1))
         slope = float((getattr(gradient, name) * along).sum())
         # differences of a sum of kinked steps: they hold to 1e-6 away from kinks
         assert slope == pytest.approx((ahead - behind) / 2e-6, rel=2e-5, abs=1e-7)
-    found = autodiff.rollout_sensitivities(model, start, held, loads, dt, ("mu_c", "sigma_1"))
-    columns = [autodiff.parameter_names(model).index(name) for name in ("mu_c", "sigma_1")]
-    only = autodiff.rollout_gradient(model, start, held, loads, dt, w_bar).parameters[columns]
+    found = derivatives.rollout_jacobian(model, start, held, loads, dt, ("mu_c", "sigma_1"))
+    columns = [derivatives.parameter_names(model).index(name) for name in ("mu_c", "sigma_1")]
+    only = derivatives.rollout_vjp(model, start, held, loads, dt, w_bar).parameters[columns]
     np.testing.assert_allclose(np.einsum("ti,tip->p", w_bar, found.d_wrenches), only, rtol=1e-9)
 
 

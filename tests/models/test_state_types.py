@@ -9,7 +9,7 @@ import pytest
 from numba.core.dispatcher import Dispatcher
 
 import planarfriction as pf
-from planarfriction import autodiff
+from planarfriction import derivatives
 from planarfriction.errors import InvalidValueError
 
 PATCH = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
@@ -85,11 +85,11 @@ def calls(model):
 
 def roll_outs(model):
     """The same of roll-outs, with twists `[T, 3]`."""
-    yield lambda state, twist: autodiff.rollout(model, state, twist, LOAD, DT)
+    yield lambda state, twist: derivatives.rollout(model, state, twist, LOAD, DT)
     if model is MODELS["reduced"] or model is MODELS["published"]:
-        yield lambda state, twist: autodiff.rollout_states(model, state, twist, LOAD, DT)
-        yield lambda state, twist: autodiff.rollout_sensitivities(model, state, twist, LOAD, DT)
-        yield lambda state, twist: autodiff.rollout_gradient(model, state, twist, LOAD, DT, twist)
+        yield lambda state, twist: derivatives.rollout_states(model, state, twist, LOAD, DT)
+        yield lambda state, twist: derivatives.rollout_jacobian(model, state, twist, LOAD, DT)
+        yield lambda state, twist: derivatives.rollout_vjp(model, state, twist, LOAD, DT, twist)
 
 
 @pytest.fixture(scope="module", autouse=True)

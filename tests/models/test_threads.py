@@ -144,7 +144,7 @@ SURFACES = {
 def test_a_surface_is_built_by_many_threads_as_by_one(name):
     """All eight come first: what a surface makes on first use is made by all of them at once."""
     twist = np.random.default_rng(2).normal(size=(20, 3)) * [1.0, 1.0, 100.0]
-    for grain in (None, pf.patch.grain(0.3, 1.0, 0.6)):
+    for grain in (None, pf.patch.friction_metric(0.3, 1.0, 0.6)):
         patch = FIXED.with_friction_metric(grain)
         if grain is not None and name == "published table":
             continue

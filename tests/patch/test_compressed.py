@@ -188,7 +188,7 @@ def test_in_hand_positions_of_every_shape(case):
 
 
 def test_a_friction_metric_is_kept():
-    patch = pf.ContactPatch.rectangle(0.02).with_friction_metric(pf.grain(0.3, 1.0, 0.5), [0.1, 0.2])
+    patch = pf.ContactPatch.rectangle(0.02).with_friction_metric(pf.friction_metric(0.3, 1.0, 0.5), [0.1, 0.2])
     few = patch.compressed()
     assert few.cells < patch.cells
     np.testing.assert_array_equal(few.metric, patch.metric)

@@ -94,7 +94,7 @@ def test_thousands_of_cells_are_split_in_a_moment():
 
 def test_a_grain_is_split_as_the_scaled_places_are():
     disc = ContactPatch.disc(0.01, 15)
-    rough = disc.with_friction_metric(pf.grain(0.0, along=1.0, across=3.0))
+    rough = disc.with_friction_metric(pf.friction_metric(0.0, along=1.0, across=3.0))
     # a spin moves cells along y across the grain: it sees them further apart along x
     labels = labels_of(rough, 4)
     spans = [np.ptp(disc.positions[labels == k], axis=0) for k in range(4)]

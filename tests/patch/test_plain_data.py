@@ -30,14 +30,14 @@ def patches(seed: int) -> list[pf.ContactPatch]:
     loads = np.cumsum(random.uniform(0.1, 2.0, 3))
     star = random.uniform(0.005, 0.02, 7)[:, None] * [(np.cos(a), np.sin(a)) for a in np.arange(7.0) * 0.9]
     lean = random.uniform(-0.5, 0.5, 2)
-    grains = np.array([pf.grain(*numbers) for numbers in random.uniform(0.5, 1.5, (12, 3))])
+    grains = np.array([pf.friction_metric(*numbers) for numbers in random.uniform(0.5, 1.5, (12, 3))])
     over_load = pf.ContactPatch.from_pressure(maps(random, 3), tuple(sizes), loads=loads)
     grid = pf.ContactPatch.rectangle(*sizes, (4, 3), pressure=random.random(12) + 0.1)
     soft = pf.SoftFinger(c=sizes[0], n=random.uniform(0.1, 0.5), k_per_newton=random.uniform(0.5, 3.0))
     return [
         over_load,
         over_load.refined(2),
-        over_load.with_friction_metric(pf.grain(*random.uniform(0.5, 1.5, 3)), lean),
+        over_load.with_friction_metric(pf.friction_metric(*random.uniform(0.5, 1.5, 3)), lean),
         pf.ContactPatch.from_pressure(maps(random, 1)[0], sizes[0]),
         pf.ContactPatch.from_pressure(maps(random, 1), sizes[0], loads=[1.0]),
         pf.ContactPatch.disc(sizes[0], 9, pressure=soft),

@@ -195,7 +195,9 @@ def test_the_smallest_grip_of_a_force_of_a_torque_and_of_both():
     assert holding_load(np.zeros(3), PATCH, 0.6) == 0.0
 
 
-@pytest.mark.parametrize("patch", [PATCH, SOFT, PATCH.with_friction_metric(pf.grain(0.3, 0.5, 1.0), (0.2, 0.1))])
+@pytest.mark.parametrize(
+    "patch", [PATCH, SOFT, PATCH.with_friction_metric(pf.friction_metric(0.3, 0.5, 1.0), (0.2, 0.1))]
+)
 def test_the_smallest_grip_puts_the_load_on_the_limit_surface(patch):
     """At that grip the wrench of its twist is the load, to 1e-6; a brushed patch holds less one way than the other."""
     load = np.array([0.5, -2.0, 0.01])

@@ -93,7 +93,7 @@ def test_the_way_of_a_contact_is_that_of_its_twist(mounted_on, moves):
     What it stands on, or the pad, may move as well.
     """
     scene = synthetic.scene(contacts=2, mounted_on=mounted_on)
-    contacts = [dataclasses.replace(each, angle=0.4, velocity=moves) for each in scene.contacts]
+    contacts = [dataclasses.replace(each, angle=0.4, support_velocity=moves) for each in scene.contacts]
     scene = dataclasses.replace(scene, contacts=contacts)
     run, time = synthetic.solution(scene), np.linspace(0.0, 2.0, 201)
     turn, arm = 1.5 * time, 0.05

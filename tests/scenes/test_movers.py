@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.autodiff import scene_sensitivities
+from planarfriction.derivatives import scene_sensitivities
 from planarfriction.scenes import pushed
 from planarfriction.scenes.movers import displacement
 from planarfriction.solvers import RODAS4
@@ -29,9 +29,9 @@ def led(model, frame=(0.0, 0.0), mass: float = 0.3) -> pf.Scene:
     """A plate on a table, led by a pad, seen from a frame that moves with minus `frame` [m/s]."""
     body = pf.Body(mass, 4e-4, velocity=(*frame, 0.0), gravity=(0.0, 0.0))
     drift = np.array([*frame, 0.0])
-    table = pf.Contact(model, 3.0, mounted_on="body", position=(2e-3, 1e-3), name="table", velocity=drift)
+    table = pf.Contact(model, 3.0, mounted_on="body", position=(2e-3, 1e-3), name="table", support_velocity=drift)
     sway = pf.Signal(SWAY.times, SWAY.values + drift, "linear")
-    pad = pf.Contact(model, 4.0, position=(0.03, 0.01), angle=0.4, count=2, name="pad", velocity=sway)
+    pad = pf.Contact(model, 4.0, position=(0.03, 0.01), angle=0.4, count=2, name="pad", support_velocity=sway)
     return pf.Scene(body, [table, pad], 0.4, save_every=0.02)
 
 
@@ -63,7 +63,7 @@ def test_motion_is_the_same_in_a_frame_that_moves(name):
 def test_a_body_that_sticks_to_a_turntable_goes_round_with_it():
     model, spin = MODELS["reduced"], 2.0
     start = pf.Body(0.2, 1e-4, (0.05, 0.0), velocity=(0.0, 0.05 * spin, spin), gravity=(0.0, 0.0))
-    table = pf.Contact(model, 0.2 * 9.81, mounted_on="body", name="table", velocity=(0.0, 0.0, spin))
+    table = pf.Contact(model, 0.2 * 9.81, mounted_on="body", name="table", support_velocity=(0.0, 0.0, spin))
     run = pf.simulate(pf.Scene(start, [table], 1.0, save_every=0.1))
     time = run.data.time.values
     # it creeps outwards by the deflection of the bristles, some um at 0.2 m/s^2
@@ -91,7 +91,7 @@ def test_order_with_something_that_moves():
     law = dataclasses.replace(LAW, v_s=0.3, sigma_0=2e3, sigma_1=5.0)
     model = pf.DistributedModel(PATCH, law)
     fast = pf.Signal.sampled([0.0, 0.4], [[0.3, 0.1, 4.0], [1.5, -0.6, 9.0]], "linear")
-    pad = pf.Contact(model, 6.0, position=(0.02, 0.0), name="pad", velocity=fast)
+    pad = pf.Contact(model, 6.0, position=(0.02, 0.0), name="pad", support_velocity=fast)
     table = pf.Contact(model, 2.0, mounted_on="body", name="table")
     scene = pf.Scene(pf.Body(1.0, 2e-3, gravity=(0.0, 0.0)), [pad, table], 0.4)
     reference = pf.simulate(scene, rtol=1e-11, atol=1e-9)
@@ -129,14 +129,14 @@ def test_velocities_of_contacts_survive_files(kind, tmp_path):
     assert pf.Scene.from_file(tmp_path / f"scene{kind}") == scene
     assert pf.Scene.from_file(tmp_path / f"scene{kind}").digest() == scene.digest()
     pf.simulate(scene, t_end=0.02).save(tmp_path / "run.nc")
-    assert pf.load(tmp_path / "run.nc").scene == scene
+    assert pf.Solution.load(tmp_path / "run.nc").scene == scene
 
 
 def test_velocities_of_contacts_are_checked():
-    with pytest.raises(pf.FrictionError, match="velocity of contact 'pad' must have 3 columns"):
-        pf.Contact(MODELS["reduced"], 1.0, name="pad", velocity=(1.0, 0.0))
-    body, moving = pf.Body(1.0, 1.0), pf.Contact(MODELS["reduced"], 1.0, name="pad", velocity=SWAY)
-    with pytest.raises(pf.FrictionError, match="velocity of contact 'pad' must be None if the body's"):
+    with pytest.raises(pf.FrictionError, match="support_velocity of contact 'pad' must have 3 columns"):
+        pf.Contact(MODELS["reduced"], 1.0, name="pad", support_velocity=(1.0, 0.0))
+    body, moving = pf.Body(1.0, 1.0), pf.Contact(MODELS["reduced"], 1.0, name="pad", support_velocity=SWAY)
+    with pytest.raises(pf.FrictionError, match="support_velocity of contact 'pad' must be None if the body's"):
         pf.Scene(body, [moving], 1.0, velocity=(1.0, 0.0, 0.0))
 
 
@@ -144,7 +144,7 @@ def test_nothing_rests_while_something_moves():
     model = MODELS["reduced"]
     body = pf.Body(0.2, 1e-4, gravity=(0.0, 0.0))
     contact = pf.Contact(
-        model, 2.0, mounted_on="body", velocity=pf.Signal.sampled([0.0, 0.3], [[0.0] * 3, [0.1, 0, 0]])
+        model, 2.0, mounted_on="body", support_velocity=pf.Signal.sampled([0.0, 0.3], [[0.0] * 3, [0.1, 0, 0]])
     )
     run = pf.simulate(pf.Scene(body, [contact], 0.5, stop_speed=1e-4))
     assert run.status == "success"
@@ -167,7 +167,7 @@ def test_what_is_pulled_comes_round_and_what_is_pushed_swings_away():
 def test_a_body_that_starts_sliding_slides_against_what_moves(mounted_on):
     body = pf.Body(0.2, 1e-4, (0.02, -0.01), velocity=(0.3, 0.1, 2.0), gravity=(0.0, 0.0))
     place, moves = (0.01, 0.03), (-0.1, 0.2, -3.0)
-    contact = pf.Contact(MODELS["reduced"], 1.0, mounted_on, place, angle=0.5, name="pad", velocity=moves)
+    contact = pf.Contact(MODELS["reduced"], 1.0, mounted_on, place, angle=0.5, name="pad", support_velocity=moves)
     run = pf.simulate(pf.Scene(body, [contact], 1e-6, start="sliding", save_every=1e-6))
     steady = MODELS["reduced"].step(MODELS["reduced"].rest(), run.contact_twist("pad")[0], 1.0, 1e6)[1]
     found = run.data.isel(time=0, contact=0)

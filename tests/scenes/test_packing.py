@@ -10,7 +10,7 @@ import pytest
 import planarfriction as pf
 from planarfriction.models import base
 from planarfriction.scenes import packing
-from planarfriction.scenes.packing import Pieces, Windows
+from planarfriction.scenes.packing import SegmentBatches, Segments
 
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
 FINGER = pf.SoftFinger(c=6 * 0.02 / 9, n=1 / 3, k_per_newton=2.0, radius_max=0.01)
@@ -70,14 +70,14 @@ def test_windows_leave_no_trace(monkeypatch, name, of):
     assert_same(recorded(of(MODELS[name]())), whole)
 
 
-@pytest.mark.parametrize("limit", ["ROOM", "SPELL"])
+@pytest.mark.parametrize("limit", ["MAX_PACK_BYTES", "MAX_PACK_SECONDS"])
 @pytest.mark.parametrize("name", MODELS)
 def test_windows_end_where_shapes_take_too_much_room_or_time(monkeypatch, name, limit):
     whole = recorded(free(MODELS[name]()))
     monkeypatch.setattr(base, limit, 0.0)
     scene = free(MODELS[name]())
-    if limit == "ROOM":
-        sizes = [len(window.motion.row) for window in Windows(scene, 0.01)]
+    if limit == "MAX_PACK_BYTES":
+        sizes = [len(window.motion.row) for window in SegmentBatches(scene, 0.01)]
         assert sizes[0] == 1 or name == "reduced"  # many of its loads share one map
         assert sum(sizes) > len(sizes) / 2
     assert_same(recorded(scene), whole)
@@ -85,7 +85,7 @@ def test_windows_end_where_shapes_take_too_much_room_or_time(monkeypatch, name, 
 
 @pytest.mark.parametrize("name", MODELS)
 def test_one_window_holds_all_shapes_whatever_they_take(monkeypatch, name):
-    for limit in ("ROOM", "SPELL"):
+    for limit in ("MAX_PACK_BYTES", "MAX_PACK_SECONDS"):
         monkeypatch.setattr(base, limit, 0.0)
     packed = packing.pack(free(MODELS[name]()), 0.02)
     assert packed.system.motion.breaks[-1] == 0.02 and len(packed.system.motion.row) > 5
@@ -94,8 +94,8 @@ def test_one_window_holds_all_shapes_whatever_they_take(monkeypatch, name):
 def test_windows_are_those_of_the_whole_motion():
     """Inputs, breaks and shapes of windows, put together, are those of one window."""
     scene = free(MODELS["distributed"]())
-    (whole,) = Windows(scene, 0.035, most=10**6)
-    parts = list(Windows(scene, 0.035, most=4))
+    (whole,) = SegmentBatches(scene, 0.035, most=10**6)
+    parts = list(SegmentBatches(scene, 0.035, most=4))
     assert len(parts) > 5
     np.testing.assert_array_equal(np.concatenate([p.motion.breaks[:-1] for p in parts]), whole.motion.breaks[:-1])
     for name in ("load", "force", "acceleration"):
@@ -107,13 +107,13 @@ def test_shapes_are_refined_only_while_their_load_changes():
     soft = pf.DistributedModel(SOFT, LAW)
     load = ramp((0.0, 1.0), (0.1, 1.0), (0.1055, 2.0), (0.5, 2.0))
     scene = pf.Scene(pf.Body(1.0, 1.0), [pf.Contact(soft, load)], 0.5)
-    pieces = Pieces(scene, 0.5)
+    pieces = Segments(scene, 0.5)
     breaks = pieces.breaks(np.arange(pieces.count + 1))
     assert pieces.count == 1 + 6 + 1
     np.testing.assert_allclose(breaks, [0.0, *np.linspace(0.1, 0.1055, 7), 0.5], rtol=1e-14)
     assert pieces.between(0) == pytest.approx((1.0, 2.0))
     assert pieces.settled == 0.1055
-    assert Pieces(scene, 0.102).settled == 0.102  # still changing at the end
+    assert Segments(scene, 0.102).settled == 0.102  # still changing at the end
     np.testing.assert_allclose(pieces.held(0, np.array([0, 3, 7])), [1.0, 1.0 + 2.5 / 6.0, 2.0], rtol=1e-12)
 
 
@@ -128,14 +128,14 @@ def test_cells_that_are_loaded_between_two_loads():
 @pytest.mark.parametrize("name", ["distributed", "reduced", "published"])
 def test_sensitivities_in_windows_and_in_parts(monkeypatch, name):
     scene = free(MODELS[name]())
-    from planarfriction.autodiff import scene as module
+    from planarfriction.derivatives import scene as module
 
     numbers = {"parameters": ("mu", "r", "mass"), "t_end": 0.025, "save_every": 1e-3}
-    whole = pf.autodiff.scene_sensitivities(scene, **numbers)
+    whole = pf.derivatives.scene_sensitivities(scene, **numbers)
     monkeypatch.setattr(packing, "WINDOW", 3)
-    windows = pf.autodiff.scene_sensitivities(scene, **numbers)
+    windows = pf.derivatives.scene_sensitivities(scene, **numbers)
     monkeypatch.setattr(module, "NUMBERS", 1.0)  # one step at a time
-    parts = pf.autodiff.scene_sensitivities(scene, **numbers)
+    parts = pf.derivatives.scene_sensitivities(scene, **numbers)
     for one in (windows, parts):
         for field in ("time", "motion", "wrenches"):
             np.testing.assert_array_equal(getattr(one, field), getattr(whole, field), err_msg=field)
@@ -207,7 +207,7 @@ def test_memory_does_not_grow_with_the_time_simulated(monkeypatch, name):
     """With room for the shapes of 20 pieces, runs of 50 and of 200 pieces take the same."""
     size = {"distributed": 8 * 69, "published": 5 * 17 * 4 * 8}[name]
     peak(0.005, name)  # compiles, which takes memory too
-    monkeypatch.setattr(base, "ROOM", 20.0 * size)
+    monkeypatch.setattr(base, "MAX_PACK_BYTES", 20.0 * size)
     monkeypatch.setattr("planarfriction.models.three_states.REMEMBERED", 4)
     assert peak(0.2, name) < 1.2 * peak(0.05, name)
 

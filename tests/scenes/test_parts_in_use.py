@@ -11,7 +11,7 @@ import pytest
 from click.shell_completion import CompletionItem
 
 import planarfriction as pf
-from planarfriction import autodiff, scenes
+from planarfriction import derivatives, scenes
 from planarfriction.cli import main
 from planarfriction.cli.app import complete_parts
 from planarfriction.models.rates import rates
@@ -95,12 +95,12 @@ def test_sensitivities_of_a_scene_are_differences_of_scenes():
     def slide(**law) -> Scene:
         return scenes.free_slide(pf.ReducedModel(T, dataclasses.replace(LAW, **law), parts=3), t_end=0.05)
 
-    found = autodiff.scene_sensitivities(slide(), ("mu", "r", "load"))
+    found = derivatives.scene_sensitivities(slide(), ("mu", "r", "load"))
     ahead, behind = (path_of(slide(mu_c=LAW.mu_c * factor, mu_s=LAW.mu_s * factor)) for factor in (1.0001, 0.9999))
     wanted = (ahead - behind) / 2e-4
     # differences of runs at 1e-8: 1e-4 of the largest
     np.testing.assert_allclose(found.d_motion[:, 3:, 0], wanted, atol=3e-4 * np.abs(wanted).max(0).max())
-    one = autodiff.scene_sensitivities(scenes.free_slide(pf.ReducedModel(T, LAW), t_end=0.05), ("mu", "r", "load"))
+    one = derivatives.scene_sensitivities(scenes.free_slide(pf.ReducedModel(T, LAW), t_end=0.05), ("mu", "r", "load"))
     largest = np.abs(one.d_motion[:, 3:]).max(0)
     assert (np.abs(found.d_motion[:, 3:] - one.d_motion[:, 3:]).max(0) < 5e-3 * largest.max(0)).all()
 
@@ -110,7 +110,7 @@ def test_states_on_the_way_are_those_of_each_part(tmp_path):
     (bristles,) = [variable for name, variable in solution.histories.items() if name.startswith("bristles_")]
     assert bristles.values.shape[1:] == (3, 3)
     solution.save(tmp_path / "slide.nc")
-    again = pf.load(tmp_path / "slide.nc")
+    again = pf.Solution.load(tmp_path / "slide.nc")
     assert again.scene == solution.scene
     (kept,) = [name for name in again.histories if name.startswith("bristles_")]
     np.testing.assert_array_equal(again.histories[kept].values, bristles.values)
@@ -161,7 +161,7 @@ def test_copies_and_equality_know_the_parts():
 def test_run_takes_parts(tmp_path):
     arguments = ["run", "in-hand", "--model", "both", "--patch", "Line", "--t-end", "0.3", "--out", str(tmp_path)]
     assert main([*arguments, "--parts", "3"]) == 0
-    solution = pf.load(tmp_path / "in-hand-reduced.nc")
+    solution = pf.Solution.load(tmp_path / "in-hand-reduced.nc")
     model = pf.ReducedModel(PUBLISHED_PATCHES["Line"](), LAW, parts=3)
     assert solution.scene.contacts[0].model == model
     wanted = pf.simulate(scenes.in_hand(model, t_end=0.3))
@@ -175,7 +175,7 @@ def test_run_puts_parts_into_a_scene_file(tmp_path):
         out = tmp_path / more[1]
         assert main(["run", str(tmp_path / "slide.toml"), *more, "--out", str(out)]) == 0
         (stored,) = out.glob("*.nc")
-        model = pf.load(stored).scene.contacts[0].model
+        model = pf.Solution.load(stored).scene.contacts[0].model
         assert (model.parts, model.segments) == (parts, segments)
 
 

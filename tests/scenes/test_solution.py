@@ -11,7 +11,7 @@ from scipy.io import netcdf_file
 import planarfriction as pf
 from planarfriction import FrictionError, Solution
 from planarfriction.errors import FileError
-from planarfriction.scenes import Statistics, in_hand, load
+from planarfriction.scenes import Statistics, in_hand
 from planarfriction.scenes.solution import History, write_dataset
 from planarfriction.writing import check_writable
 
@@ -34,7 +34,7 @@ def a_solution(name="fingers"):
 def test_a_saved_solution_comes_back_to_the_bit(tmp_path):
     solution = a_solution()
     assert solution.save(tmp_path / "run.nc") == tmp_path / "run.nc"
-    again = load(tmp_path / "run.nc")
+    again = Solution.load(tmp_path / "run.nc")
     xr.testing.assert_identical(again.data, solution.data)
     assert {name: again.data[name].attrs["units"] for name in UNITS} == UNITS
     assert again.statistics == solution.statistics
@@ -42,8 +42,7 @@ def test_a_saved_solution_comes_back_to_the_bit(tmp_path):
     assert again.scene.digest() == solution.scene.digest()
     assert isinstance(again.scene.contacts[0].model, pf.ReducedModelPublished)
     again.save(tmp_path / "twice.nc")
-    assert load(tmp_path / "twice.nc").data.identical(again.data)
-    assert pf.load is load
+    assert Solution.load(tmp_path / "twice.nc").data.identical(again.data)
 
 
 def test_the_dataset_is_made_once_and_is_what_the_arrays_say():
@@ -60,7 +59,7 @@ def test_what_is_added_to_the_data_is_saved(tmp_path):
     solution = a_solution()
     solution.data["power"] = solution.data.x * 2.0
     solution.data.attrs["note"] = "third attempt"
-    again = load(solution.save(tmp_path / "run.nc"))
+    again = Solution.load(solution.save(tmp_path / "run.nc"))
     xr.testing.assert_identical(again.data, solution.data)
 
 
@@ -74,13 +73,13 @@ def test_saving_through_a_link_keeps_the_link(tmp_path):
     (tmp_path / "link.nc").symlink_to(tmp_path / "run.nc")
     a_solution().save(tmp_path / "link.nc")
     assert (tmp_path / "link.nc").is_symlink()
-    assert load(tmp_path / "run.nc").status == "done"
+    assert Solution.load(tmp_path / "run.nc").status == "done"
 
 
 def test_names_outside_ascii_and_empty_messages_survive(tmp_path):
     solution = dataclasses.replace(a_solution("Prüffinger µ"), message="")
     solution.save(tmp_path / "run.nc")
-    again = load(tmp_path / "run.nc")
+    again = Solution.load(tmp_path / "run.nc")
     assert again.data["contact"].values.tolist() == ["Prüffinger µ"]
     assert again.scene.contacts[0].name == "Prüffinger µ"
     assert again.message == ""
@@ -129,7 +128,7 @@ def test_files_that_are_no_solutions_get_one_line(tmp_path):
     (tmp_path / "empty.nc").write_bytes(b"")
     (tmp_path / "hdf.nc").write_bytes(b"\x89HDF\r\n")
     xr.Dataset({"a": ("x", [1.0])}).to_netcdf(tmp_path / "other.nc", engine="scipy")
-    strange = load(tmp_path / "good.nc").data.assign_attrs(scene="{}", statistics="{}", status="", message="")
+    strange = Solution.load(tmp_path / "good.nc").data.assign_attrs(scene="{}", statistics="{}", status="", message="")
     write_dataset(strange, tmp_path / "strange.nc")
     write_dataset(strange.drop_attrs(), tmp_path / "bare.nc")
     (tmp_path / "folder.nc").mkdir()
@@ -145,7 +144,7 @@ def test_files_that_are_no_solutions_get_one_line(tmp_path):
         "strange.nc": "the scene in this file cannot be read: scene: missing key",
     }.items():
         with pytest.raises(FrictionError) as caught:
-            load(tmp_path / name)
+            Solution.load(tmp_path / name)
         assert name in str(caught.value)
         assert reason in str(caught.value)
         assert "\n" not in str(caught.value)
@@ -180,7 +179,7 @@ def test_a_damaged_file_loads_as_it_was_saved_or_not_at_all(tmp_path):
         bad = damaged(good, random)
         path.write_bytes(bad)
         try:
-            again = load(path)
+            again = Solution.load(path)
         except FileError as error:
             assert "\n" not in str(error) and "run.nc" in str(error)
             refused += bad != good
@@ -195,7 +194,7 @@ def test_every_byte_counts(tmp_path):
     for place in {*range(0, len(good), 7), *range(len(good) - 200, len(good))}:
         (tmp_path / "run.nc").write_bytes(good[:place] + bytes([good[place] ^ 1]) + good[place + 1 :])
         with pytest.raises(FileError):
-            load(tmp_path / "run.nc")
+            Solution.load(tmp_path / "run.nc")
 
 
 def test_other_programs_read_the_file(tmp_path):
@@ -215,10 +214,10 @@ def test_a_file_rewritten_by_another_program_is_refused_with_a_remedy(tmp_path):
     data.to_netcdf(tmp_path / "stripped.nc", engine="scipy")
     for name, reason in (("edited.nc", "changed by another program"), ("stripped.nc", "no checksum")):
         with pytest.raises(FileError, match=rf"{name}: .*{reason}.*xarray.load_dataset"):
-            load(tmp_path / name)
-    solution = load(path)  # the way to change a solution
+            Solution.load(tmp_path / name)
+    solution = Solution.load(path)  # the way to change a solution
     solution.data["x"] = 2.0 * solution.data["x"]
-    assert np.array_equal(load(solution.save(path)).data["x"], data["x"])
+    assert np.array_equal(Solution.load(solution.save(path)).data["x"], data["x"])
     assert "planarfriction_checksum" not in solution.data.attrs
 
 
@@ -229,7 +228,7 @@ def test_additions_that_no_file_can_hold_get_one_line(tmp_path):
         solution.data.attrs[name] = value
         with pytest.raises(FileError, match=r"run.nc: cannot be written"):
             solution.save(tmp_path / "run.nc")
-        load(tmp_path / "run.nc")
+        Solution.load(tmp_path / "run.nc")
 
 
 @pytest.mark.parametrize("name", ["pipe.nc", "/dev/zero", "a\0b", "\udcff.nc"])
@@ -237,5 +236,5 @@ def test_what_is_no_file_is_no_solution(tmp_path, name):
     if name == "pipe.nc":
         os.mkfifo(tmp_path / name)
     with pytest.raises(FileError) as caught:
-        load(tmp_path / name)
+        Solution.load(tmp_path / name)
     assert "\n" not in str(caught.value)

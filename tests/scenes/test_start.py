@@ -15,8 +15,8 @@ LAW = pf.LuGre(mu_c=0.8, mu_s=1.0, sigma_0=1e5, elasto_plastic=0.9)
 COULOMB = pf.LuGre(mu_c=0.5, sigma_0=1e5, sigma_2=0.0, elasto_plastic=0.9)
 PATCH = pf.ContactPatch.disc(0.01, cells=7)
 SOFT = pf.ContactPatch.rectangle(0.02, cells=7, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0))
-GRAINED = PATCH.with_friction_metric(pf.grain(0.3, 0.7, 1.0))
-BRUSHED = PATCH.with_friction_metric(pf.grain(0.3, 0.7, 1.0), (0.2, 0.1))
+GRAINED = PATCH.with_friction_metric(pf.friction_metric(0.3, 0.7, 1.0))
+BRUSHED = PATCH.with_friction_metric(pf.friction_metric(0.3, 0.7, 1.0), (0.2, 0.1))
 WEIGHT = 0.2 * 9.81
 
 
@@ -124,7 +124,7 @@ def test_files_and_solutions_keep_the_start(tmp_path):
         scene.to_file(tmp_path / name)
         assert pf.Scene.from_file(tmp_path / name) == scene
     solution = pf.simulate(scene, t_end=0.02)
-    assert pf.load(solution.save(tmp_path / "run.nc")).scene.start == "equilibrium"
+    assert pf.Solution.load(solution.save(tmp_path / "run.nc")).scene.start == "equilibrium"
     assert "start" not in held(MODELS[0], start="rest").to_dict()
     data = scene.to_dict() | {"start": "slide"}
     with pytest.raises(FileError, match="start must be one of rest, equilibrium, sliding"):
@@ -138,8 +138,8 @@ def test_starts_that_make_no_sense_are_refused():
         dataclasses.replace(scene, body=moving)
     with pytest.raises(InvalidValueError, match="not be zero if start is 'sliding'"):
         dataclasses.replace(scene, start="sliding")
-    running = dataclasses.replace(scene.contacts[0], velocity=(0.1, 0.0, 0.0))
-    with pytest.raises(InvalidValueError, match="velocity of contact 'fingers' must start at zero"):
+    running = dataclasses.replace(scene.contacts[0], support_velocity=(0.1, 0.0, 0.0))
+    with pytest.raises(InvalidValueError, match="support_velocity of contact 'fingers' must start at zero"):
         dataclasses.replace(scene, contacts=[running])
     assert dataclasses.replace(scene, contacts=[running], start="sliding").start == "sliding"
     driven = pf.scenes.driven(MODELS[0], t_end=0.1)
@@ -163,7 +163,7 @@ def held_by_two(change: str = "", by: float = 0.0) -> pf.Scene:
 def test_derivatives_follow_an_equilibrium():
     """Central differences of tight runs, right to 1e-6 of the largest, of a knot at t = 0, a push and the mass."""
     knots = {"grip.normal_force": np.array([0.0, 0.02, 0.06]), "force": np.array([0.0, 0.06])}
-    found = pf.autodiff.scene_sensitivities(held_by_two(), ("mass", "inertia"), signals=knots)
+    found = pf.derivatives.scene_sensitivities(held_by_two(), ("mass", "inertia"), signals=knots)
 
     def end(change: str, by: float) -> np.ndarray:
         histories = pf.simulate(held_by_two(change, by), rtol=1e-10, atol=1e-10).histories
@@ -178,9 +178,9 @@ def test_derivatives_follow_an_equilibrium():
 def test_derivatives_to_what_moves_the_start_are_refused():
     scene, knots = held(pf.ReducedModel(PATCH, LAW)), np.array([0.0, 0.05])
     with pytest.raises(InvalidValueError, match="start must be 'rest' for the derivative with respect to mu"):
-        pf.autodiff.scene_sensitivities(scene, ["mass", "mu"])
+        pf.derivatives.scene_sensitivities(scene, ["mass", "mu"])
     thrown = dataclasses.replace(pf.scenes.free_slide(scene.contacts[0].model, twist=(0.1, 0.0, 1.0)), start="sliding")
     with pytest.raises(InvalidValueError, match=r"for the derivative with respect to table.normal_force\[0\]"):
-        pf.autodiff.scene_sensitivities(thrown, (), signals={"table.normal_force": knots})
+        pf.derivatives.scene_sensitivities(thrown, (), signals={"table.normal_force": knots})
     with pytest.raises(InvalidValueError, match="start must be 'rest' for the derivative with respect to vx"):
-        pf.autodiff.scene_gradient(scene, lambda time, motion: 0.0 * motion, initial=["vx"])
+        pf.derivatives.scene_gradient(scene, lambda time, motion: 0.0 * motion, initial=["vx"])

@@ -50,7 +50,7 @@ def moving_scene() -> pf.Scene:
     finger, foot, pad = scene.contacts
     sway = pf.Signal.sampled([0.0, 1.0], [[0.1, -0.2, 3.0], [0.5, 0.3, -8.0]], hold="linear")
     return dataclasses.replace(
-        scene, contacts=[dataclasses.replace(each, velocity=sway) for each in (finger, foot)] + [pad]
+        scene, contacts=[dataclasses.replace(each, support_velocity=sway) for each in (finger, foot)] + [pad]
     )
 
 
@@ -65,7 +65,7 @@ def driven_scene() -> pf.Scene:
 def test_structured_solve_is_the_solve_with_the_full_jacobian(scene):
     packed = pack(scene, 1.0)
     generator = np.random.default_rng(3)
-    natural = packed.natural.copy()
+    natural = packed.state_scale.copy()
     natural[-6:-3] *= 100.0  # velocities of the size of v_s: changes of a creep are too small for differences
     y = packed.state + 0.8 * natural * generator.normal(size=len(packed.state))
     if scene.velocity is not None:
@@ -137,12 +137,12 @@ def test_agrees_with_another_integrator():
         right_hand_side(packed.system.address, 0, t, np.ascontiguousarray(y), out)
         return out
 
-    atol = 1e-9 * packed.natural
+    atol = 1e-9 * packed.state_scale
     theirs = solve_ivp(rate, (0.0, 0.02), packed.state, method="Radau", rtol=1e-9, atol=atol).y[-6:, -1]
     ours = pf.simulate(scene, t_end=0.02, rtol=1e-8, atol=1e-7).data.isel(time=-1)
     for i, name in enumerate(("vx", "vy", "omega", "x", "y", "theta")):
         # both are asked for 1e-9..1e-7 of the natural scales per step, over some hundred steps
-        assert float(ours[name]) == pytest.approx(theirs[i], abs=2e-5 * packed.natural[-6 + i], rel=1e-7)
+        assert float(ours[name]) == pytest.approx(theirs[i], abs=2e-5 * packed.state_scale[-6 + i], rel=1e-7)
 
 
 def test_turning_the_whole_scene_turns_the_solution():

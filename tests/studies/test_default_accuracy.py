@@ -94,7 +94,7 @@ def test_velocities_are_measured_against_the_slowest_creep():
     natural = {}
     for name, kinds in {"plain": ["plain"], "both": ["plain", "fine"]}.items():
         contacts = [pf.Contact(models[kind], pf.Signal.constant(1.0), name=kind) for kind in kinds]
-        natural[name] = pack(pf.Scene(pf.Body(0.2, 5e-4), contacts, 1.0), 1.0).natural[-6:-3]
+        natural[name] = pack(pf.Scene(pf.Body(0.2, 5e-4), contacts, 1.0), 1.0).state_scale[-6:-3]
     np.testing.assert_allclose(natural["plain"][:2], 0.1 * LAW.v_s, rtol=1e-12)
     np.testing.assert_allclose(natural["both"][:2], 0.01 * LAW.v_s, rtol=1e-12)
     # spins are those that move the lever arm as fast

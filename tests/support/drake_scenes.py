@@ -23,7 +23,7 @@ from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
 import planarfriction as pf
-from planarfriction.adapters.drake import Patch, PatchFriction, prepare
+from planarfriction.adapters.drake import Friction, PatchContact, prepare
 
 CONTACTS = ("point", "hydroelastic")
 
@@ -99,9 +99,9 @@ def on_the_floor(shape: str, contact: str, dt: float, *, tilt: float = 0.0, **op
 def sliding(shape: str, contact: str, dt: float, model: pf.models.FrictionModel, **options: Any) -> Running:
     """`on_the_floor` with a patch under it."""
     builder, plant, scene_graph = on_the_floor(shape, contact, dt, **options)
-    patches = [Patch(model, frame="bottom", geometries=("floor", shape))]
+    patches = [PatchContact(model, frame="bottom", geometries=("floor", shape))]
     prepare(plant, scene_graph, patches)
-    return running(builder, plant, PatchFriction.AddToBuilder(builder, plant, scene_graph, patches))
+    return running(builder, plant, Friction.AddToBuilder(builder, plant, scene_graph, patches))
 
 
 def gripper(contact: str, dt: float) -> tuple[Any, Any, Any, Any]:
@@ -135,7 +135,8 @@ def gripper(contact: str, dt: float) -> tuple[Any, Any, Any, Any]:
 def gripped(contact: str, dt: float, model: pf.models.FrictionModel) -> Running:
     builder, plant, scene_graph, _ = gripper(contact, dt)
     patches = [
-        Patch(model, frame=side, geometries=(side + " pad", "block"), centre="contact") for side in ("left", "right")
+        PatchContact(model, frame=side, geometries=(side + " pad", "block"), centre="contact")
+        for side in ("left", "right")
     ]
     prepare(plant, scene_graph, patches)
-    return running(builder, plant, PatchFriction.AddToBuilder(builder, plant, scene_graph, patches))
+    return running(builder, plant, Friction.AddToBuilder(builder, plant, scene_graph, patches))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import planarfriction as pf
-from planarfriction.autodiff import parameters_of
+from planarfriction.derivatives import parameters_of
 from planarfriction.identify import Log
 from planarfriction.identify.prediction import Prediction
 from planarfriction.identify.simulators import PublishedSimulator

@@ -5,7 +5,7 @@ from typing import assert_type
 import numpy as np
 
 import planarfriction as pf
-from planarfriction.autodiff import scene_gradient
+from planarfriction.derivatives import scene_gradient
 from planarfriction.identify import Log, identify_lugre
 from planarfriction.planning import holding_load
 

@@ -179,7 +179,7 @@ def test_the_adjoint_is_that_of_numpy():
     numpy_model, model = pair("elasto-plastic")
     (_, run), (by_law, by_twist) = loss_and_slopes("adjoint")(model.parameters, sway(40))
     _, wrenches = pf.rollout(numpy_model, None, sway(40), 2.0, 1e-4)
-    exact = pf.autodiff.rollout_gradient(numpy_model, None, sway(40), 2.0, 1e-4, 2.0 * WEIGHTS**2 * wrenches)
+    exact = pf.derivatives.rollout_vjp(numpy_model, None, sway(40), 2.0, 1e-4, 2.0 * WEIGHTS**2 * wrenches)
     np.testing.assert_allclose(run.wrenches, wrenches, rtol=1e-13)  # the same code
     np.testing.assert_allclose(np.stack(by_law), exact.parameters, rtol=1e-12)
     np.testing.assert_allclose(by_twist, exact.twist, rtol=1e-12)

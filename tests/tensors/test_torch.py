@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.autodiff import PARAMETERS
+from planarfriction.derivatives import PARAMETERS
 
 torch = pytest.importorskip("torch", reason="needs PyTorch: pip install 'planarfriction[torch]'")
 

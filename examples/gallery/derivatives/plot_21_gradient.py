@@ -10,14 +10,14 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import planarfriction as pf
-from planarfriction import autodiff
+from planarfriction import derivatives
 
 patch = pf.ContactPatch.disc(0.01, cells=11)
 model = pf.ReducedModel(patch, pf.LuGre(mu_c=1.0, mu_s=1.2, elasto_plastic=0.9))
 dt, steps = 1e-3, 400
 twists = np.outer(np.sin(np.linspace(0.0, 9.0, steps)), (0.01, 0.0, 1.0))
 wrenches = pf.rollout(model, None, twists, 2.0, dt).wrenches
-gradient = autodiff.rollout_gradient(model, model.rest(), twists, 2.0, dt, np.tile([1.0, 0.0, 0.0], (steps, 1)))
+gradient = derivatives.rollout_vjp(model, model.rest(), twists, 2.0, dt, np.tile([1.0, 0.0, 0.0], (steps, 1)))
 
 figure, (upper, lower) = plt.subplots(2, 1, figsize=(6.4, 4.6), layout="constrained", sharex=True)
 upper.plot(dt * np.arange(steps), wrenches[:, 0])

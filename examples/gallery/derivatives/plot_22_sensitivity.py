@@ -9,7 +9,7 @@ friction, in proportion.
 import matplotlib.pyplot as plt
 
 import planarfriction as pf
-from planarfriction.autodiff import scene_sensitivities
+from planarfriction.derivatives import scene_sensitivities
 
 law = pf.LuGre(mu_c=0.3, mu_s=0.3, sigma_0=1e4, sigma_1=20.0, sigma_2=0.0, elasto_plastic=0.9)
 model = pf.ReducedModel(pf.ContactPatch.disc(0.04, cells=11), law)

@@ -11,7 +11,7 @@ import mujoco
 import numpy as np
 
 import planarfriction as pf
-from planarfriction.adapters.mujoco import Friction, Patch, prepare
+from planarfriction.adapters.mujoco import Friction, PatchContact, prepare
 
 PADS = "".join(
     f"""<body name="{side}" pos="{sign * 0.015} 0.012 0.5"><joint type="slide" axis="{-sign} 0 0" name="{side}"/>
@@ -44,7 +44,7 @@ def heights(patches):
 
 
 own = heights([])
-ours = heights([Patch(PAD, site=side, geoms=(f"pad {side}", "block")) for side in ("left", "right")])
+ours = heights([PatchContact(PAD, site=side, geoms=(f"pad {side}", "block")) for side in ("left", "right")])
 figure, ax = plt.subplots(figsize=(6.4, 3.6), layout="constrained")
 time = 0.005 * np.arange(1, 401)
 ax.plot(time, 1e3 * own, label="MuJoCo's friction, condim 4")

@@ -11,7 +11,7 @@ import numpy as np
 
 import planarfriction as pf
 
-metric = pf.grain(np.radians(40.0), along=0.5, across=1.0)
+metric = pf.friction_metric(np.radians(40.0), along=0.5, across=1.0)
 sole = pf.ContactPatch.rectangle(0.06, 0.04, 9).with_friction_metric(metric)
 heading = np.radians(np.arange(0, 360, 5))
 twists = np.stack([np.cos(heading), np.sin(heading), 0 * heading], axis=1)

@@ -65,11 +65,11 @@ class DrakeScene:
         plant, scene_graph = AddMultibodyPlant(MultibodyPlantConfig(time_step=dt, **options), builder)
         self._furnish(plant, way.contact)
         if way.patch:
-            from planarfriction.adapters.drake import Patch, PatchFriction, prepare
+            from planarfriction.adapters.drake import Friction, PatchContact, prepare
 
-            patches = [Patch(self.model, frame="bottom", geometries=("floor", "body"))]
+            patches = [PatchContact(self.model, frame="bottom", geometries=("floor", "body"))]
             prepare(plant, scene_graph, patches)
-            PatchFriction.AddToBuilder(builder, plant, scene_graph, patches)
+            Friction.AddToBuilder(builder, plant, scene_graph, patches)
         simulator = Simulator(builder.Build())
         return simulator, plant, plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
 

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction.autodiff import scene_gradient, scene_sensitivities
 from planarfriction.bench.measurement import Measurement, line, median
 from planarfriction.bench.workloads import AGAINST_PUBLISHED, disc, law, mixed_twists
+from planarfriction.derivatives import scene_gradient, scene_sensitivities
 from planarfriction.models import ReducedModel, ReducedModelPublished
 from planarfriction.scenes import Scene, Signal, in_hand, simulate
 
@@ -37,23 +37,23 @@ def reduced(full: bool) -> Measurement:
 
 def _value_and_gradient(model: ReducedModel | ReducedModelPublished, shape: tuple[int, ...], repeats: int) -> float:
     """Time of half the squared wrenches of roll-outs with their gradient to all inputs [s]; steps are the last axis."""
-    from planarfriction import autodiff
+    from planarfriction import derivatives
 
     inputs = model.rest(), *_inputs(shape)
 
     def value_and_gradient() -> None:
-        _, wrenches, states = autodiff.rollout_states(model, *inputs)
-        autodiff.rollout_gradient(model, *inputs, wrenches, states=states)
+        _, wrenches, states = derivatives.rollout_states(model, *inputs)
+        derivatives.rollout_vjp(model, *inputs, wrenches, states=states)
 
     return median(value_and_gradient, repeats)
 
 
 def _alone(model: ReducedModel | ReducedModelPublished, shape: tuple[int, ...], repeats: int) -> float:
     """Time of the roll-outs alone [s]."""
-    from planarfriction import autodiff
+    from planarfriction import derivatives
 
     inputs = model.rest(), *_inputs(shape)
-    return median(lambda: autodiff.rollout(model, *inputs), repeats)
+    return median(lambda: derivatives.rollout(model, *inputs), repeats)
 
 
 def _inputs(shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray, float]:
@@ -63,14 +63,14 @@ def _inputs(shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray, float]:
 
 def published(full: bool) -> Measurement:
     """Half the squared wrenches of a roll-out, with its gradient to all parameters, twists, loads and the state."""
-    from planarfriction import autodiff
+    from planarfriction import derivatives
 
     model = ReducedModelPublished(disc(), law())
     value = _value_and_gradient(model, (STEPS,), 15)
     try:
         return line(value, "s", "PyTorch, eager, the same roll-out", _eager_gradient(model, full))
     except ImportError:
-        inputs, once = len(autodiff.PARAMETERS) + 3 + 4 * STEPS, _alone(model, (STEPS,), 15)
+        inputs, once = len(derivatives.PARAMETERS) + 3 + 4 * STEPS, _alone(model, (STEPS,), 15)
         words = f"central differences, 2 x {inputs} roll-outs of {once * 1e3:.2g} ms (PyTorch is not installed)"
         return line(value, "s", words, 2 * inputs * once)
 

@@ -6,8 +6,8 @@ import time
 
 import numpy as np
 
-from planarfriction.autodiff import rollout
 from planarfriction.bench.measurement import Measurement, line
+from planarfriction.derivatives import rollout
 from planarfriction.identify import Log, identify_lugre
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.models import DistributedModel, ReducedModelPublished

@@ -54,7 +54,7 @@ def _ours(adapter: Any) -> tuple[Any, Any, Any]:
     import mujoco
 
     scene = disc(1.0, 10.0)
-    patches = [adapter.Patch(scene.model, site=site, geoms=geoms) for site, geoms in scene.patches]
+    patches = [adapter.PatchContact(scene.model, site=site, geoms=geoms) for site, geoms in scene.patches]
     native = Native(cone="pyramidal", impratio=1.0, condim=1, solref=0.02)
     spec = mujoco.MjSpec.from_string(scene.text(native, 2e-3, "Euler"))
     adapter.prepare(spec, patches)

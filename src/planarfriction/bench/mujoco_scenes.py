@@ -76,9 +76,9 @@ class MujocoScene:
         """Model, data, and the friction of its patches; `model` in place of the scene's own."""
         import mujoco
 
-        from planarfriction.adapters.mujoco import Friction, Patch, prepare
+        from planarfriction.adapters.mujoco import Friction, PatchContact, prepare
 
-        patches = [Patch(model or self.model, site=site, geoms=geoms) for site, geoms in self.patches]
+        patches = [PatchContact(model or self.model, site=site, geoms=geoms) for site, geoms in self.patches]
         spec = mujoco.MjSpec.from_string(self._text(Native(condim=1, impratio=1.0, solref=solref), dt, integrator))
         prepare(spec, patches)
         m = spec.compile()

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction.autodiff import PARAMETERS
+from planarfriction.derivatives import PARAMETERS
 from planarfriction.identify import parameters as known
 from planarfriction.identify.choice import Candidate
 from planarfriction.identify.least_squares import correlations

@@ -1,6 +1,6 @@
 """What can be identified: names, units, bounds, and how each parameter enters the reduced model.
 
-A *vector* below is the model's own: `autodiff.PARAMETERS` in order. *Values* are what is asked for, by name; the
+A *vector* below is the model's own: `derivatives.PARAMETERS` in order. *Values* are what is asked for, by name; the
 optimiser sees *coordinates*, in which a factor counts the same up and down (a logarithm) wherever a value must be > 0.
 """
 
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.autodiff import PARAMETERS
+from planarfriction.derivatives import PARAMETERS
 from planarfriction.errors import InvalidValueError
 
 

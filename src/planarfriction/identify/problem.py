@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.autodiff import PARAMETERS, parameters_of
+from planarfriction.derivatives import PARAMETERS, parameters_of
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify import parameters as known
 from planarfriction.identify.least_squares import covariance

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction.autodiff import PARAMETERS, rollout, rollout_sensitivities
+from planarfriction.derivatives import PARAMETERS, rollout, rollout_jacobian
 from planarfriction.compiler import threads
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import distributed_step
@@ -40,7 +40,7 @@ GAMMA = PARAMETERS.index("gamma")
 
 
 class Simulator:
-    """Wrenches of a model whose vector of parameters (`autodiff.PARAMETERS`) varies, from bristles at rest.
+    """Wrenches of a model whose vector of parameters (`derivatives.PARAMETERS`) varies, from bristles at rest.
 
     Twists `[N, 3]` and loads `[N]` are held for `dt` each; wrenches `[N, 3]` and their derivatives `[N, 3, P]` by the
     parameters `names` are at the ends of the steps.
@@ -73,7 +73,7 @@ class PublishedSimulator(Simulator):
         return rollout(self.model, None, twists, loads, dt, parameters=vector).wrenches
 
     def sensitivities(self, twists, loads, dt, vector, names):
-        found = rollout_sensitivities(self.model, None, twists, loads, dt, names, parameters=vector)
+        found = rollout_jacobian(self.model, None, twists, loads, dt, names, parameters=vector)
         return found.wrenches, found.d_wrenches
 
     def work(self, parameters):
@@ -183,7 +183,7 @@ class ReducedSimulator(ScaledSimulator):
             model, numbers = self._model(float(vector[GAMMA])), np.delete(vector[:8], GAMMA)
 
             def of_law(inner):
-                return rollout_sensitivities(model, None, inner, loads, dt, known, parameters=numbers).d_wrenches
+                return rollout_jacobian(model, None, inner, loads, dt, known, parameters=numbers).d_wrenches
 
             slopes[..., [names.index(name) for name in known]] = self._placed(vector, twists, of_law)
         if rest:

@@ -1,4 +1,4 @@
-"""The compiled roll-out with its derivatives (`planarfriction.autodiff`) as primitives that JAX differentiates.
+"""The compiled roll-out with its derivatives (`planarfriction.derivatives`) as primitives that JAX differentiates.
 
 `roll` has the linear `push`, forwards, as its derivative, whose transpose is `pull`, backwards: the discrete adjoint.
 What they do not do, higher derivatives and those by dt and by the numbers of the patch, is left to the roll-out of

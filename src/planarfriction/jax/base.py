@@ -11,7 +11,7 @@ import jax
 import jax.numpy as jnp
 
 from planarfriction import validation
-from planarfriction.autodiff.parameters import Packed
+from planarfriction.derivatives.parameters import Packed
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.jax import inputs

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-from planarfriction import autodiff
+from planarfriction import derivatives
 from planarfriction.formulas import LARGEST
 
 
@@ -46,7 +46,7 @@ def forward(kind: Kind, kept: bool, dtypes: Sequence[Any], *arrays: Any) -> tupl
 
     def run(parts, dt, *inputs):
         good, dt, (parameters, state, twist, load) = _usable(kind, kind.inner, dt, inputs)
-        roll = autodiff.rollout_states if kept else autodiff.rollout
+        roll = derivatives.rollout_states if kept else derivatives.rollout
         return _spoilt(good, *roll(parts, state, twist, load, dt, parameters=parameters))
 
     return _by_contact(kind, run, dtypes, arrays, 4)
@@ -59,7 +59,7 @@ def push(kind: Kind, kept: bool, dtypes: Sequence[Any], *arrays: Any) -> tuple[n
         inputs = (*inputs[:4], *inputs[-4:])
         good, dt, usable = _usable(kind, kind.inner * 2, dt, inputs)
         (parameters, state, twist, load), (by, z, turns, pushes) = usable[:4], usable[4:]
-        found = autodiff.rollout_tangent(parts, state, twist, load, dt, z, turns, pushes, by, parameters=parameters)
+        found = derivatives.rollout_jvp(parts, state, twist, load, dt, z, turns, pushes, by, parameters=parameters)
         return _spoilt(good, found.state_dot, found.wrenches_dot)
 
     return _by_contact(kind, run, dtypes, arrays, 8 + kept)
@@ -72,7 +72,7 @@ def pull(kind: Kind, kept: bool, dtypes: Sequence[Any], *arrays: Any) -> tuple[n
         inner = (*kind.inner, *(1 + kind.axes,) * kept, kind.axes, 2)
         good, dt, usable = _usable(kind, inner, dt, inputs)
         (parameters, state, twist, load), states, (state_bar, bar) = usable[:4], usable[4:-2], usable[-2:]
-        found = autodiff.rollout_gradient(
+        found = derivatives.rollout_vjp(
             parts, state, twist, load, dt, bar, state_bar, parameters=parameters, states=(*states, None)[0]
         )
         shared = tuple(i for i, length in enumerate(parameters.shape[:-1]) if length == 1)

@@ -10,7 +10,7 @@ import jax
 import jax.numpy as jnp
 
 from planarfriction import models
-from planarfriction.autodiff.parameters import Packed, pack_surface
+from planarfriction.derivatives.parameters import Packed, pack_surface
 from planarfriction.equality import ByValue, by_parts
 from planarfriction.jax import namespace as xp
 from planarfriction.jax.base import FrictionModel

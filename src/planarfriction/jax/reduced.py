@@ -11,7 +11,7 @@ import jax.numpy as jnp
 import numpy as np
 
 from planarfriction import models
-from planarfriction.autodiff.parameters import Packed, pack_maps
+from planarfriction.derivatives.parameters import Packed, pack_maps
 from planarfriction.equality import ByValue, by_parts
 from planarfriction.jax.base import FrictionModel
 from planarfriction.laws import FrictionLaw

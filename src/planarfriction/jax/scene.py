@@ -10,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax.interpreters import ad
 
-from planarfriction.autodiff.scene_function import SceneFunction
+from planarfriction.derivatives.scene_function import SceneFunction
 from planarfriction.equality import by_parts
 from planarfriction.errors import FrictionError, InvalidValueError
 from planarfriction.jax import inputs
@@ -44,14 +44,15 @@ def simulate_scene(
     """Simulate a scene as a differentiable function of arrays.
 
     `parameters` gives factors `[...]` (1 leaves the scene as it is) on mu, mass, inertia and load. `signals` gives
-    knots [s], which must be concrete numbers, and values by the name of a signal as in `autodiff.scene_sensitivities`,
+    knots [s], which must be concrete numbers, and values by the name of a signal as in
+    `derivatives.scene_sensitivities`,
     `(times [K], values [..., K])`, for `force` and `velocity` `[..., K, 3]`. They replace the scene's own signal and
     are interpolated in the same way. `initial` gives components `[...]` of the initial state: vx, vy, omega, x, y,
     theta. Leading axes broadcast, and each set of numbers is a separate simulation on its own thread; `vmap` adds an
     axis in front.
 
-    Reverse derivatives are those of `autodiff.scene_gradient`, which simulates once more; forward derivatives are those
-    of `scene_sensitivities`. First derivatives only; computed in double precision on the CPU.
+    Reverse derivatives are those of `derivatives.scene_gradient`, which simulates once more; forward derivatives are
+    those of `scene_sensitivities`. First derivatives only; computed in double precision on the CPU.
 
     Raises `InvalidValueError` for names and numbers out of range, and `SolverError` if the solver fails; inside `jit`
     these end in an error of JAX whose last line names them.

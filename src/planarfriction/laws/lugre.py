@@ -90,6 +90,6 @@ def _elasto_plastic(value: Any) -> ElastoPlastic | None:
     if isinstance(value, Mapping):
         validation.keys("elasto_plastic", value, ["breakaway_ratio"])
         value = value["breakaway_ratio"]
-    if validation.refusal(value) is not None:
+    if validation.why_not_numeric(value) is not None:
         raise InvalidValueError("elasto_plastic", "be a breakaway ratio, an ElastoPlastic, or None", value)
     return ElastoPlastic(value)

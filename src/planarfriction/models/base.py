@@ -58,14 +58,14 @@ class StepJacobians(NamedTuple):
     """d wrench / d normal_force, `[..., 3]`."""
 
 
-ROOM = 64e6
+MAX_PACK_BYTES = 64e6
 """Bytes of shapes that a model packs at a time, if that is more than one shape."""
 
-SPELL = 0.25
+MAX_PACK_SECONDS = 0.25
 """Time [s] for which a model builds the shapes that it packs at a time, if that is more than one shape."""
 
 
-CREEP = 0.1
+VELOCITY_SCALE = 0.1
 """Natural scale of the velocity of a body on a patch, as a share of v_s [-] (see `PackedModel`)."""
 
 
@@ -81,15 +81,15 @@ class PackedModel(NamedTuple):
     """Number of bristle states of a contact."""
     workspace: int
     """Number of values that a linearisation needs."""
-    natural: np.ndarray
+    state_scale: np.ndarray
     """Natural scale of each state, `[states]`: its value at full deflection."""
     radius: float
     """Lever arm [m] that turns the spin of the patch into a speed."""
-    kept: tuple[np.ndarray, ...]
+    keepalive: tuple[np.ndarray, ...]
     """Arrays whose addresses are in the records; the caller of the functions must keep them alive."""
     cells: np.ndarray | None = None
     """Which cells of the model have bristles here, bool `[N]`, where states are those of cells."""
-    creep: float = CREEP
+    velocity_scale: float = VELOCITY_SCALE
     """Natural scale of the body's velocity, as a share of v_s [-].
 
     A body that is about to slip, or has just stopped, creeps at 1e-4 to 1e-2 of v_s, and friction depends on the
@@ -106,7 +106,7 @@ class PackedSteps(NamedTuple):
     """Data of each part for the model's function of `kernels.step_slopes`, `[R, P, words]`."""
     shares: np.ndarray
     """Share of the load that each part carries, `[R, P]`."""
-    kept: tuple[np.ndarray, ...]
+    keepalive: tuple[np.ndarray, ...]
     """As in `PackedModel`."""
 
 
@@ -178,8 +178,8 @@ class FrictionModel(ByValue):
         A model needs this to be simulated in a scene; the solver calls its functions by address. A patch that depends
         on the load is packed during the run, in several calls: `between` gives the lowest and the highest load of the
         whole run, which determine the bristles and the natural scales. As many of the first of `loads` are packed as
-        `ROOM` and `SPELL` allow, so there may be fewer records than loads, but at least one. Without `between`, these
-        are all loads of the run, and each has its record.
+        `MAX_PACK_BYTES` and `MAX_PACK_SECONDS` allow, so there may be fewer records than loads, but at least one.
+        Without `between`, these are all loads of the run, and each has its record.
 
         Raises InvalidValueError for a model that cannot be simulated in a scene.
         """
@@ -205,7 +205,7 @@ class FrictionModel(ByValue):
         return 1
 
     @property
-    def _follows_load(self) -> bool:
+    def depends_on_load(self) -> bool:
         """Whether what the model knows of its patch changes with the load."""
         return self.patch.depends_on_load
 

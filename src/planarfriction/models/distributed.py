@@ -145,7 +145,7 @@ class DistributedModel(FrictionModel):
             weights = np.atleast_2d([self.patch.weights(load) for load in loads])
             return self._packed(weights, weights.max(axis=0) > 0.0)
         chosen = self.patch.pressure.ever_loaded(self.patch.positions, between)
-        most = max(int(base.ROOM / (8.0 * chosen.sum())), 1)
+        most = max(int(base.MAX_PACK_BYTES / (8.0 * chosen.sum())), 1)
         return self._packed(np.array([self.patch.weights(load)[chosen] for load in loads[:most]]), chosen)
 
     @property
@@ -157,7 +157,7 @@ class DistributedModel(FrictionModel):
         """See `FrictionModel.packed_steps`."""
         weights = np.array([self.patch.weights(load) for load in loads])
         packed = self._packed(weights, np.ones(weights.shape[1], bool))
-        return PackedSteps(packed.records[:, None], np.ones((len(loads), 1)), packed.kept)
+        return PackedSteps(packed.records[:, None], np.ones((len(loads), 1)), packed.keepalive)
 
     def _packed(self, weights: np.ndarray, chosen: np.ndarray) -> PackedModel:
         """The chosen cells as the solver sees them, with each row of weights `[R, n]` of theirs or `[R, N]` of all."""

@@ -105,6 +105,6 @@ def together(parts: Sequence[PackedModel], shares: np.ndarray) -> PackedModel:
         records=rows_of(record, len(shares), records=place_of(records) + row, shares=place_of(shares) + row),
         states=count * one.states,
         workspace=count * one.workspace,
-        natural=np.tile(one.natural, count),
-        kept=(calls, records, shares, *(array for part in parts for array in (part.records, *part.kept))),
+        state_scale=np.tile(one.state_scale, count),
+        keepalive=(calls, records, shares, *(array for part in parts for array in (part.records, *part.keepalive))),
     )

@@ -29,7 +29,7 @@ ON_LOAD_CHANGE = ("rebuild", "rescale", "keep")
 
 # Natural scale of a creep, as a share of v_s. The published map has several directions into which a patch that has come
 # to a halt may go on, and 1e-5 of v_s decides which: two pads end 9 um apart.
-_CREEP = 0.01
+_VELOCITY_SCALE = 0.01
 
 
 class _OfPoint(NamedTuple):
@@ -143,7 +143,9 @@ class ReducedModelPublished(ThreeStateModel):
         )
         natural = self.law.largest_deflection * np.array([1.0, 1.0, radius or 1.0])
         size, kept = published_contact.LINEAR, tuple(data)
-        return PackedModel(published_contact.FUNCTIONS, rows, 3, size, natural, radius, kept, creep=_CREEP)
+        return PackedModel(
+            published_contact.FUNCTIONS, rows, 3, size, natural, radius, kept, velocity_scale=_VELOCITY_SCALE
+        )
 
     # ------------------------------------------------------------------ axes of the friction metric
 
@@ -219,7 +221,7 @@ class ReducedModelPublished(ThreeStateModel):
         return slopes
 
     @property
-    def _follows_load(self) -> bool:
+    def depends_on_load(self) -> bool:
         return self.patch.depends_on_load and self.on_load_change != "keep"
 
     def _maps(self, shape: PublishedShape) -> tuple[np.ndarray, np.ndarray]:

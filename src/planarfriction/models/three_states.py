@@ -203,7 +203,7 @@ class ThreeStateModel(FrictionModel):
 
     def packed(self, loads: Sequence[float | None], between: tuple[float, float] | None = None) -> PackedModel:
         """See `FrictionModel.packed`; the lever arm of a run is that at its highest load."""
-        if not self._follows_load:
+        if not self.depends_on_load:
             return self._packed([self.parts_at(None)] * len(loads), loads)
         if between is None:
             return self._packed(list(self._parts_at(loads)), loads)
@@ -211,11 +211,11 @@ class ThreeStateModel(FrictionModel):
 
     def packed_steps(self, loads: Sequence[float | None]) -> PackedSteps:
         """See `FrictionModel.packed_steps`."""
-        parts = list(self._parts_at(loads)) if self._follows_load else [self.parts_at(None)] * len(loads)
+        parts = list(self._parts_at(loads)) if self.depends_on_load else [self.parts_at(None)] * len(loads)
         each = [self._records([part.shape for part in same], 0.0) for same in zip(*parts, strict=True)]
         shares = np.array([[part.share for part in loaded] for loaded in parts])
         records = np.stack([part.records for part in each], 1)
-        return PackedSteps(records, shares, tuple(data for part in each for data in part.kept))
+        return PackedSteps(records, shares, tuple(data for part in each for data in part.keepalive))
 
     @property
     def _pieces(self) -> int:
@@ -230,7 +230,7 @@ class ThreeStateModel(FrictionModel):
         return self.shape_at(load).contact_radius  # pyright: ignore[reportArgumentType]
 
     def _first_parts(self, loads: Sequence[float | None]) -> list[tuple[Part, ...]]:
-        """Parts at the first of `loads`, as many as `ROOM` and `SPELL` allow."""
+        """Parts at the first of `loads`, as many as `MAX_PACK_BYTES` and `MAX_PACK_SECONDS` allow."""
         parts, counted, size, begin = [], set(), 0, time.perf_counter()
         for each in self._parts_at(loads):
             parts.append(each)
@@ -239,9 +239,9 @@ class ThreeStateModel(FrictionModel):
             if new:  # no other array takes the place of one, as `parts` holds it
                 counted.update(new)
                 size += sum(new.values())
-                if size > base.ROOM and len(parts) > 1:
+                if size > base.MAX_PACK_BYTES and len(parts) > 1:
                     return parts[:-1]
-                if time.perf_counter() - begin > base.SPELL:
+                if time.perf_counter() - begin > base.MAX_PACK_SECONDS:
                     break
         return parts
 
@@ -259,7 +259,7 @@ class ThreeStateModel(FrictionModel):
 
     def _record(self, shape: Any) -> PackedModel:
         """One shape as the solver sees it; twists and wrenches as `_inputs` gives and `_out` takes them."""
-        known = None if self._follows_load else self._fixed_records.get(id(shape))
+        known = None if self.depends_on_load else self._fixed_records.get(id(shape))
         return self._records([shape], shape.contact_radius) if known is None else known
 
     @functools.cached_property
@@ -353,7 +353,7 @@ class ThreeStateModel(FrictionModel):
 
     def _loads_of(self, loads: np.ndarray) -> Iterator[tuple[float | None, tuple[Part, ...]]]:
         """The different loads > 0 with the parts there, one after another; None for all where they are the same."""
-        if not self._follows_load:
+        if not self.depends_on_load:
             return iter([(None, self.parts_at(None))])
         different = np.unique(loads[loads > 0.0])
         return zip(different, self._parts_at(different), strict=True)  # pyright: ignore[reportArgumentType]

@@ -5,7 +5,7 @@ from planarfriction.patch.compressed import surface_error
 from planarfriction.patch.contact_patch import ContactPatch
 from planarfriction.patch.files import read_pressure_map
 from planarfriction.patch.grid import Grid
-from planarfriction.patch.metric import grain
+from planarfriction.patch.metric import friction_metric
 from planarfriction.patch.pressure import LinearGradient, PerCell, Pressure, SoftFinger, Uniform
 from planarfriction.patch.pressure_maps import PressureMaps
 
@@ -20,7 +20,7 @@ __all__ = [
     "PressureMaps",
     "SoftFinger",
     "Uniform",
-    "grain",
+    "friction_metric",
     "read_pressure_map",
     "register",
     "surface_error",

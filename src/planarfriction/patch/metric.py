@@ -24,7 +24,7 @@ _SAME = 1e-12
 _PatchT = TypeVar("_PatchT", bound="Anisotropy")
 
 
-def grain(angle: float, along: float, across: float) -> np.ndarray:
+def friction_metric(angle: float, along: float, across: float) -> np.ndarray:
     """Metric `[2, 2]` of a surface with a grain: `R diag(along^2, across^2) R'` with R the rotation by `angle` [rad].
 
     `along` and `across` are the friction coefficients along and across the grain relative to those of the law, > 0;
@@ -51,7 +51,8 @@ class Anisotropy(ByValue):
     def with_friction_metric(self: _PatchT, metric: Any, asymmetry: Any = None) -> _PatchT:
         """The same patch with friction that depends on the direction; None and None for friction that does not.
 
-        `metric` `M`: sliding along a unit vector e meets the coefficient `mu sqrt(e' M e)`; see `grain`. `asymmetry`
+        `metric` `M`: sliding along a unit vector e meets the coefficient `mu sqrt(e' M e)`; see `friction_metric`.
+        `asymmetry`
         `a`: sliding along e, a principal axis of M, meets `1 + a . e` times that, so that it is easiest against a. Both
         are in the axes of the contact frame and turn with it: the grain belongs to the patch.
 

@@ -265,8 +265,10 @@ def _contact_of(scene: Any, name: str | None) -> int:
     if scene.stop_speed is not None:
         raise InvalidValueError("stop_speed", "be None for a plan, which has to hold until the end", scene.stop_speed)
     for each in scene.contacts:
-        if each.velocity is not None:
-            raise InvalidValueError(f"velocity of contact {each.name!r}", "be None for a grip plan", each.velocity)
+        if each.support_velocity is not None:
+            raise InvalidValueError(
+                f"support_velocity of contact {each.name!r}", "be None for a grip plan", each.support_velocity
+            )
     names = [each.name for each in scene.contacts]
     if name is None and len(names) > 1:
         raise InvalidValueError("contact", f"be given if there are several ({', '.join(names)})", name)

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction.autodiff import scene_sensitivities
+from planarfriction.derivatives import scene_sensitivities
 from planarfriction.errors import InvalidValueError
 from planarfriction.scenes import Contact, Scene, Signal, simulate
 from planarfriction.scenes.start import contact_map

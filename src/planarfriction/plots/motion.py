@@ -165,14 +165,16 @@ def _draw_shape(axes: Any, shape: np.ndarray, colour: Any) -> list[Artist]:
 
 def _driven(solution: Solution) -> list[Contact]:
     """Contacts whose frame is carried by something that moves as prescribed."""
-    return [each for each in solution.scene.contacts if each.mounted_on == "world" and each.velocity is not None]
+    return [
+        each for each in solution.scene.contacts if each.mounted_on == "world" and each.support_velocity is not None
+    ]
 
 
 def _carried(contact: Contact, time: float) -> np.ndarray:
     """Pose (x, y, angle) of the frame of a driven contact [m, m, rad]."""
     from planarfriction.scenes.movers import displacement
 
-    return np.array([*contact.position, contact.angle]) + displacement(contact.velocity, [time])[0]  # pyright: ignore
+    return np.array([*contact.position, contact.angle]) + displacement(contact.support_velocity, [time])[0]  # pyright: ignore
 
 
 def _move(artists: list[Artist], axes: Any, pose: np.ndarray, larger: float = 1.0) -> None:

@@ -119,7 +119,9 @@ def _carried(contact: Contact, times: np.ndarray) -> np.ndarray:
     """How far the world's side of a contact has moved as prescribed `[T, 3]` [m, m, rad]."""
     from planarfriction.scenes.movers import displacement
 
-    return np.zeros((len(times), 3)) if contact.velocity is None else displacement(contact.velocity, times)
+    return (
+        np.zeros((len(times), 3)) if contact.support_velocity is None else displacement(contact.support_velocity, times)
+    )
 
 
 def _ways(contact: Contact, times: np.ndarray, poses: np.ndarray, at: np.ndarray) -> np.ndarray:

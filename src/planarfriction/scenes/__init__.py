@@ -8,7 +8,7 @@ from planarfriction.families import SCENES
 from planarfriction.scenes.ready import drift, driven, free_slide, in_hand, in_hand_load, published_velocity, pushed
 from planarfriction.scenes.scene import Body, Contact, Scene
 from planarfriction.scenes.signal import Signal
-from planarfriction.scenes.solution import Solution, Statistics, load
+from planarfriction.scenes.solution import Solution, Statistics
 from planarfriction.scenes.worlds import curling, foot, pivot
 
 if TYPE_CHECKING:
@@ -29,7 +29,6 @@ __all__ = [
     "free_slide",
     "in_hand",
     "in_hand_load",
-    "load",
     "pivot",
     "published_velocity",
     "pushed",

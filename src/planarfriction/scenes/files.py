@@ -31,7 +31,7 @@ SCENE_KEYS = (
 _OPTIONS = ("save_every", "stop_speed", "rtol", "atol", "name", "start")
 BODY_KEYS = ("mass", "inertia", "position", "angle", "velocity", "gravity", "outline", "size")
 CONTACT_KEYS = (
-    *("name", "mounted_on", "position", "angle", "count", "normal_force", "velocity"),
+    *("name", "mounted_on", "position", "angle", "count", "normal_force", "support_velocity"),
     *("model", "patch", "law"),
 )
 
@@ -75,7 +75,7 @@ def _contact_to_dict(contact: Contact) -> dict[str, Any]:
         "angle": contact.angle,
         "count": contact.count,
         "normal_force": contact.normal_force.to_dict(),
-        **({} if contact.velocity is None else {"velocity": contact.velocity.to_dict()}),
+        **({} if contact.support_velocity is None else {"support_velocity": contact.support_velocity.to_dict()}),
         **model_to_dict(contact.model),
     }
 
@@ -124,8 +124,8 @@ def _contacts(scene: Section) -> list[Contact]:
         if "name" not in table and len(tables) > 1:
             options["name"] = f"contact {number}"
         load, model = read_signal(table, "normal_force"), model_from_dict(table)
-        if "velocity" in table:
-            options["velocity"] = read_signal(table, "velocity")
+        if "support_velocity" in table:
+            options["support_velocity"] = read_signal(table, "support_velocity")
         with table.located():
             contacts.append(Contact(model, load, **options))
     return contacts

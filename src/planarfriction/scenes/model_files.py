@@ -60,7 +60,7 @@ def patch_from_dict(table: Section) -> Any:
     """Contact patch of a table: `shape` names what makes it, the other keys are its parameters; files are paths.
 
     Every shape takes `metric` and `asymmetry` as `ContactPatch.with_friction_metric` does; `metric` may also be a table
-    with the parameters of `grain`: `along`, `across` and `angle` [rad], 0 if left out.
+    with the parameters of `friction_metric`: `along`, `across` and `angle` [rad], 0 if left out.
     """
     directions = {key: table.get(key) for key in ("metric", "asymmetry") if key in table}
     rest = {key: value for key, value in table.data.items() if key not in directions}
@@ -68,11 +68,11 @@ def patch_from_dict(table: Section) -> Any:
     if not directions:
         return patch
     if isinstance(directions.get("metric"), dict):
-        from planarfriction.patch import grain
+        from planarfriction.patch import friction_metric
 
         metric = table.section("metric").only(["angle", "along", "across"])
         with metric.located():
-            directions["metric"] = grain(metric.get("angle", 0.0), metric.get("along"), metric.get("across"))
+            directions["metric"] = friction_metric(metric.get("angle", 0.0), metric.get("along"), metric.get("across"))
     with table.located():
         return patch.with_friction_metric(directions.get("metric"), directions.get("asymmetry"))
 

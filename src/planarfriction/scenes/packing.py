@@ -21,10 +21,11 @@ SHAPE_INTERVAL = 1e-3
 """Longest time [s] that a patch keeps its shape while the load it depends on changes; held loads need no limit."""
 
 WINDOW = 4096
-"""Pieces between breaks that are packed at a time; fewer where their shapes take more room (see `models.base.ROOM`)."""
+"""Segments between breaks that are packed at a time; fewer where their shapes take more room (see
+`models.base.MAX_PACK_BYTES`)."""
 
 MOST_PIECES = 10**12
-"""Pieces of a motion, each of which the solver has to stop at."""
+"""Segments of a motion, each of which the solver has to stop at."""
 
 
 class PackedScene(NamedTuple):
@@ -33,19 +34,19 @@ class PackedScene(NamedTuple):
     system: System
     state: np.ndarray
     """Bristles as the scene starts, body velocity, pose."""
-    natural: np.ndarray
-    """Natural scale of each state (see `Windows.natural`)."""
+    state_scale: np.ndarray
+    """Natural scale of each state (see `SegmentBatches.state_scale`)."""
     models: list[PackedModel]
     """The model of each contact."""
     loading: float
     """Time to compile the models' functions and the solver's, or to load them from the cache [s]."""
 
 
-class Pieces:
+class Segments:
     """The inputs of a scene from 0 to `t_end` [s], linear on each piece between two breaks.
 
     Breaks are those of the signals; where the load of a patch whose shape follows it changes continuously, pieces are
-    no longer than `SHAPE_INTERVAL`. Pieces go by their number, so that there may be more of them than memory holds.
+    no longer than `SHAPE_INTERVAL`. Segments go by their number, so that there may be more of them than memory holds.
     """
 
     def __init__(self, scene, t_end: float, marks=()) -> None:
@@ -55,7 +56,7 @@ class Pieces:
         self._load = [contact.normal_force.pieces(self._breaks) for contact in scene.contacts]
         self._force = None if scene.force is None else scene.force.pieces(self._breaks)
         self._velocity = None if scene.velocity is None else scene.velocity.pieces(self._breaks)
-        self._mover = [_mover(contact.velocity, self._breaks) for contact in scene.contacts]
+        self._mover = [_mover(contact.support_velocity, self._breaks) for contact in scene.contacts]
         lengths, parts = np.diff(self._breaks), np.ones(len(self._breaks) - 1)
         for contact, (_, slope) in zip(scene.contacts, self._load, strict=True):
             if contact.model.patch.depends_on_load:
@@ -131,7 +132,7 @@ class Pieces:
         return start + slope * (since[:, None] if slope.ndim == 2 else since), slope
 
 
-class Windows:
+class SegmentBatches:
     """The motion of a scene from 0 to `t_end` [s] in consecutive windows, to be gone through once.
 
     A window holds `most` pieces (default: `WINDOW`), or as many as its shapes have room for. Where it ends leaves no
@@ -144,7 +145,7 @@ class Windows:
     ) -> None:
         self._scene, self._times, self._most = scene, times, WINDOW if most is None else most
         self._ahead = self._most
-        self._pieces, self._done = Pieces(scene, t_end, marks), 0
+        self._pieces, self._done = Segments(scene, t_end, marks), 0
         contacts = scene.contacts
         follows = [contact.model.patch.depends_on_load for contact in contacts]
         self._between = [self._pieces.between(c) if follows[c] else None for c in range(len(contacts))]
@@ -166,15 +167,17 @@ class Windows:
         )
         self._length = min(contact.model.law.largest_deflection for contact in contacts)
         laws = [contact.model.law.numbers for contact in contacts]
-        speed = min(model.creep * law.v_s for model, law in zip(self.models, laws, strict=True))
+        speed = min(model.velocity_scale * law.v_s for model, law in zip(self.models, laws, strict=True))
         # a single point has no lever arm: its spin is measured in rad/s
         self._radius = max(model.radius for model in self.models) or 1.0
         arm, body = np.array([1.0, 1.0, 1.0 / self._radius]), scene.body
         self.state = np.concatenate([self._first(), body.velocity, body.position, [body.angle]])
         """Bristles as the scene starts, body velocity, pose."""
-        self.natural = np.concatenate([*(model.natural for model in self.models), speed * arm, self._length * arm])
+        self.state_scale = np.concatenate(
+            [*(model.state_scale for model in self.models), speed * arm, self._length * arm]
+        )
         """Natural scale of each state: mu_c/sigma_0 for deflections and positions, a share of v_s for velocities (that
-        of a creep, `models.base.PackedModel.creep`), angles over r.
+        of a creep, `models.base.PackedModel.velocity_scale`), angles over r.
 
         The least of all contacts. Velocities are not measured against v_s itself: below it friction hardly changes with
         speed, but it does with direction.
@@ -276,9 +279,9 @@ class Windows:
 
 def pack(scene, t_end: float, *, sensitivities: bool = False) -> PackedScene:
     """Flat arrays of the scene from 0 to `t_end` [s] in one window, whatever room and time its shapes take."""
-    whole = Windows(scene, t_end, sensitivities=sensitivities, most=MOST_PIECES)
+    whole = SegmentBatches(scene, t_end, sensitivities=sensitivities, most=MOST_PIECES)
     system = next(iter(whole))
-    return PackedScene(system, whole.state, whole.natural, whole.models, whole.loading)
+    return PackedScene(system, whole.state, whole.state_scale, whole.models, whole.loading)
 
 
 def _in_order(loads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -223,6 +223,11 @@ def pushed(
     weight: Any = GRAVITY * body.mass
     table = Contact(model, weight, mounted_on="body", name="table")
     pads = Contact(
-        model if pad is None else pad, normal_force, position=position, count=fingers, name="fingers", velocity=velocity
+        model if pad is None else pad,
+        normal_force,
+        position=position,
+        count=fingers,
+        name="fingers",
+        support_velocity=velocity,
     )
     return Scene(body, [table, pads], t_end, name="pushed")

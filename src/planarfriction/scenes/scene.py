@@ -122,7 +122,7 @@ class Contact(ByValue):
     """Number of identical contacts (same position, same load) that share this one's state."""
     name: str = "contact"
     """Name in the results; unique within its scene."""
-    velocity: Signal | None = None
+    support_velocity: Signal | None = None
     """Prescribed twist `(vx, vy, omega)` of the world's side, world axes, `[T, 3]` [m/s, m/s, rad/s]; None: at rest.
 
     For a pad fixed to the world it is the twist at the origin of the contact frame, which moves with the pad. Under a
@@ -140,7 +140,7 @@ class Contact(ByValue):
             angle: float = 0.0,
             count: int = 1,
             name: str = "contact",
-            velocity: Signal | ArrayLike | None = None,
+            support_velocity: Signal | ArrayLike | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -154,12 +154,14 @@ class Contact(ByValue):
         object.__setattr__(self, "position", _floats(f"position {of_contact}", self.position, 2))
         object.__setattr__(self, "angle", validation.number(f"angle {of_contact}", self.angle))
         object.__setattr__(self, "count", validation.count(f"count {of_contact}", self.count, at_most=MOST_CONTACTS))
-        if self.velocity is not None:
-            object.__setattr__(self, "velocity", as_signal(f"velocity {of_contact}", self.velocity, 3))
+        if self.support_velocity is not None:
+            object.__setattr__(
+                self, "support_velocity", as_signal(f"support_velocity {of_contact}", self.support_velocity, 3)
+            )
 
     def __repr__(self) -> str:
         count = f"{self.count} x " if self.count > 1 else ""
-        moved = "" if self.velocity is None else ", which moves"
+        moved = "" if self.support_velocity is None else ", which moves"
         load = between(self.normal_force)
         return f"Contact({self.name!r}: {count}{self.model!r} on the {self.mounted_on}{moved}, {load} N)"
 
@@ -242,9 +244,10 @@ class Scene(ByValue):
                 if getattr(self, name) is not None:
                     raise InvalidValueError(name, "be None if the velocity is prescribed", getattr(self, name))
             for contact in self.contacts:
-                if contact.velocity is not None:
-                    name = f"velocity of contact {contact.name!r}"
-                    raise InvalidValueError(name, "be None if the body's velocity is prescribed", contact.velocity)
+                if contact.support_velocity is not None:
+                    name = f"support_velocity of contact {contact.name!r}"
+                    rule = "be None if the body's velocity is prescribed"
+                    raise InvalidValueError(name, rule, contact.support_velocity)
         sample_count(self.t_end, self.save_every, "save_every")
         validation.text("name", self.name)
         self._check_start()
@@ -252,13 +255,16 @@ class Scene(ByValue):
     def _check_start(self) -> None:
         validation.choice("start", self.start, STARTS)
         driven = {"the body": self.body.velocity if self.velocity is None else self.velocity(0.0).tolist()}
-        driven |= {f"contact {c.name!r}": c.velocity(0.0).tolist() for c in self.contacts if c.velocity is not None}
+        for contact in self.contacts:
+            if contact.support_velocity is not None:
+                driven[f"contact {contact.name!r}"] = contact.support_velocity(0.0).tolist()
         moves = [name for name, velocity in driven.items() if any(velocity)]
         if self.start == "equilibrium" and self.velocity is not None:
             raise InvalidValueError("start", "be 'rest' or 'sliding' if the velocity is prescribed", self.start)
         if self.start == "equilibrium" and moves:
             rule = "start at zero if start is 'equilibrium'"
-            raise InvalidValueError(f"velocity of {moves[0]}", rule, driven[moves[0]])
+            what = "velocity" if moves[0] == "the body" else "support_velocity"
+            raise InvalidValueError(f"{what} of {moves[0]}", rule, driven[moves[0]])
         if self.start == "sliding" and not moves:
             raise InvalidValueError("initial velocity", "not be zero if start is 'sliding'", driven["the body"])
 
@@ -278,7 +284,7 @@ class Scene(ByValue):
         """
         t_end = self.t_end if t_end is None else validation.positive("t_end", t_end)
         signals = [contact.normal_force for contact in self.contacts]
-        signals += [contact.velocity for contact in self.contacts if contact.velocity is not None]
+        signals += [contact.support_velocity for contact in self.contacts if contact.support_velocity is not None]
         signals += [signal for signal in (self.force, self.velocity) if signal is not None]
         return breaks_between(np.concatenate([signal.breaks for signal in signals]), t_end)
 

@@ -11,7 +11,7 @@ from planarfriction import validation
 from planarfriction.compiler.notice import said_when_compiling
 from planarfriction.errors import InvalidValueError, SimulationInterrupted, SolverError
 from planarfriction.kernels.integration import Method, Output
-from planarfriction.scenes.packing import Windows
+from planarfriction.scenes.packing import SegmentBatches
 from planarfriction.scenes.scene import Scene
 from planarfriction.scenes.signal import SAME_TIME, sample_count
 from planarfriction.scenes.solution import History, Solution
@@ -103,9 +103,9 @@ def simulate(
         raise InvalidValueError("progress", "be a function of the simulated time, or None", progress)
     times = recording_times(end, every)
     with said_when_compiling(silent=progress is not None):
-        windows = Windows(scene, end, times=times)
+        windows = SegmentBatches(scene, end, times=times)
         output = _output(times, windows, bristles)
-        scales = atol * windows.natural
+        scales = atol * windows.state_scale
         run = integrate(windows, output, windows.state, method=method, rtol=rtol, atol=scales, progress=progress)
     cost = replace(run.statistics, compile_time=run.statistics.compile_time + windows.loading)
     solution = Solution(_histories(scene, windows, run.output), cost, run.status, run.message, scene)
@@ -122,7 +122,7 @@ def recording_times(end: float, every: float) -> np.ndarray:
     return np.append(times, end) if end - times[-1] > SAME_TIME else times
 
 
-def _output(times: np.ndarray, windows: Windows, bristles: str) -> Output:
+def _output(times: np.ndarray, windows: SegmentBatches, bristles: str) -> Output:
     count, contacts, states = len(times), len(windows.models), int(windows.bristles[-1])
     if bristles == "all" and count * states > MOST_NUMBERS:
         shown = f"{count} samples of {states} numbers"
@@ -136,7 +136,7 @@ def _output(times: np.ndarray, windows: Windows, bristles: str) -> Output:
     )
 
 
-def _histories(scene: Scene, windows: Windows, output: Output) -> dict[str, History]:
+def _histories(scene: Scene, windows: SegmentBatches, output: Output) -> dict[str, History]:
     """What was recorded, by name, with units."""
 
     def history(name: str, dims: tuple[str, ...], values: np.ndarray, unit: str) -> History:

@@ -127,9 +127,9 @@ class Solution:
             np.asarray(self.histories[name].values) for name in ("x", "y", "theta", "vx", "vy", "omega")
         )
         (dx, dy), angle = chosen.position, chosen.angle + 0.0 * theta
-        if chosen.velocity is not None:
+        if chosen.support_velocity is not None:
             time = np.asarray(self.histories["time"].values)
-            moves, way = chosen.velocity.left(time).T, displacement(chosen.velocity, time).T
+            moves, way = chosen.support_velocity.left(time).T, displacement(chosen.support_velocity, time).T
             to = np.zeros(2)
             if chosen.mounted_on == "world":
                 dx, dy, angle = dx + way[0], dy + way[1], angle + way[2]
@@ -206,7 +206,7 @@ class Solution:
         return animate_solution(self, path, slow=slow, fps=fps, follow=follow, dpi=dpi, progress=progress)
 
     def save(self, path: str | Path) -> Path:
-        """Write everything, including the scene, to the NetCDF file `path`; `load` reads it.
+        """Write everything, including the scene, to the NetCDF file `path`; `Solution.load` reads it.
 
         A scene that cannot be written is left out; the attribute `scene_left_out` of the data says why.
 
@@ -219,6 +219,18 @@ class Solution:
             "message": self.message,
         }
         return write_dataset(self.data.assign_attrs(attributes), path)
+
+    @staticmethod
+    def load(path: str | Path) -> Solution:
+        """Read a solution that `Solution.save` wrote, with its scene and the models in it.
+
+        What is loaded is identical to what was saved, bit by bit: the file has a checksum of all its bytes. A file that
+        another program has changed, on purpose or not, is refused; change the `data` of a solution and save that
+        instead.
+
+        Raises FileError for a missing file, for a damaged or a changed one, and for one with any other content.
+        """
+        return _read(path)
 
 
 def scene_of(solution: Solution, what: str) -> Scene:
@@ -272,14 +284,8 @@ def _checksum(before: memoryview, after: memoryview) -> bytes:
     return digest.hexdigest().encode()
 
 
-def load(path: str | Path) -> Solution:
-    """Read a solution that `Solution.save` wrote, with its scene and the models in it.
-
-    What is loaded is identical to what was saved, bit by bit: the file has a checksum of all its bytes. A file that
-    another program has changed, on purpose or not, is refused; change the `data` of a solution and save that instead.
-
-    Raises FileError for a missing file, for a damaged or a changed one, and for one with any other content.
-    """
+def _read(path: str | Path) -> Solution:
+    """Read and check a file that `Solution.save` wrote."""
     import xarray as xr
 
     what = "a saved solution"

@@ -89,10 +89,10 @@ def _sliding(scene: Any, shaped: np.ndarray) -> list[np.ndarray]:
 
 def _carried(body: Any, contact: Any) -> np.ndarray:
     """Velocity `[3]` that the centre of mass would have at t = 0 on what the contact touches."""
-    if contact.velocity is None:
+    if contact.support_velocity is None:
         return np.zeros(3)
     x, y = np.subtract(body.position, contact.position if contact.mounted_on == "world" else (0.0, 0.0))
-    vx, vy, omega = contact.velocity(0.0)
+    vx, vy, omega = contact.support_velocity(0.0)
     return np.array([vx - omega * y, vy + omega * x, omega])
 
 

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import torch
 from torch import Tensor
 
-from planarfriction import autodiff
-from planarfriction.autodiff.parameters import Packed
+from planarfriction import derivatives
+from planarfriction.derivatives.parameters import Packed
 from planarfriction.errors import FrictionError
 from planarfriction.torch.base import Compiled
 
@@ -31,7 +31,7 @@ class _Kind(NamedTuple):
 
 
 def roll_out(model: Compiled, dt: float, *inputs: Tensor) -> tuple[Tensor, Tensor]:
-    """The last state and wrenches `[..., T, 3]` of `autodiff.rollout`.
+    """The last state and wrenches `[..., T, 3]` of `derivatives.rollout`.
 
     `inputs` are state `[..., 3]`, of several parts `[..., P, 3]`, twist `[..., T, 3]`, normal_force `[..., T]` and
     parameters `[..., P]`, whose batch axes broadcast.
@@ -47,7 +47,7 @@ class _Rollout(torch.autograd.Function):
     @staticmethod
     def forward(kind: _Kind, dt, kept, *tensors):
         (state, twist, load, parameters), model = _numbers(kind, tensors, _INPUTS)
-        roll = autodiff.rollout_states if kept else autodiff.rollout
+        roll = derivatives.rollout_states if kept else derivatives.rollout
         end, wrenches, *states = roll(model, state, twist, load, dt, parameters=parameters)
         both = (_like(array, tensors[:_INPUTS]) for array in (end, wrenches))
         return *both, torch.from_numpy(states[0]) if kept else torch.empty(0)
@@ -110,7 +110,7 @@ class _Gradient(First):
     @staticmethod
     def forward(kind: _Kind, dt, count, *tensors):
         (state, twist, load, parameters, state_bar, wrenches_bar, *states), model = _numbers(kind, tensors, count)
-        gradient = autodiff.rollout_gradient(
+        gradient = derivatives.rollout_vjp(
             model, state, twist, load, dt, wrenches_bar, state_bar, parameters=parameters, states=(*states, None)[0]
         )
         return tuple(_like(array, (tensor,)) for array, tensor in zip(gradient, tensors[:_INPUTS], strict=True))
@@ -134,7 +134,7 @@ class _Tangent(First):
     @staticmethod
     def forward(kind: _Kind, dt, *tensors):
         (state, twist, load, parameters, *changes), model = _numbers(kind, tensors, 2 * _INPUTS)
-        found = autodiff.rollout_tangent(model, state, twist, load, dt, *changes, parameters=parameters)
+        found = derivatives.rollout_jvp(model, state, twist, load, dt, *changes, parameters=parameters)
         return tuple(_like(array, tensors[:_INPUTS]) for array in found[2:])
 
     @staticmethod

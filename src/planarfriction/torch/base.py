@@ -11,7 +11,7 @@ import torch
 from torch import Tensor, nn
 
 from planarfriction import validation
-from planarfriction.autodiff.parameters import Packed
+from planarfriction.derivatives.parameters import Packed
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.laws import ElastoPlastic, FrictionLaw, LuGre

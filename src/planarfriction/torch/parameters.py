@@ -25,7 +25,7 @@ import torch
 from torch import Tensor, nn
 
 from planarfriction import validation
-from planarfriction.autodiff import PARAMETERS
+from planarfriction.derivatives import PARAMETERS
 from planarfriction.errors import InvalidValueError
 from planarfriction.torch import inputs
 

@@ -10,7 +10,7 @@ import torch
 from torch import Tensor, nn
 
 from planarfriction import models
-from planarfriction.autodiff.parameters import pack_surface
+from planarfriction.derivatives.parameters import pack_surface
 from planarfriction.errors import InvalidValueError
 from planarfriction.laws import FrictionLaw
 from planarfriction.limit_surface import LimitSurface, surface_arrays

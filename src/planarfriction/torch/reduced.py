@@ -11,7 +11,7 @@ import torch
 from torch import Tensor
 
 from planarfriction import models
-from planarfriction.autodiff.parameters import pack_maps
+from planarfriction.derivatives.parameters import pack_maps
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.laws import ElastoPlastic, FrictionLaw, LuGre

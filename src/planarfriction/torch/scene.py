@@ -9,7 +9,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from planarfriction.autodiff.scene_function import SceneFunction
+from planarfriction.derivatives.scene_function import SceneFunction
 from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.scenes.scene import Scene
@@ -43,13 +43,14 @@ def simulate_scene(
     """Simulate a scene as a differentiable function of tensors.
 
     `parameters` gives factors `[...]` (1 leaves the scene as it is) on mu, mass, inertia and load. `signals` gives
-    knots [s] and values by the name of a signal as in `autodiff.scene_sensitivities`, `(times [K], values [..., K])`,
+    knots [s] and values by the name of a signal as in `derivatives.scene_sensitivities`, `(times [K], values [...,
+    K])`,
     for `force` and `velocity` `[..., K, 3]`. They replace the scene's own signal and are interpolated in the same way.
     `initial` gives components `[...]` of the initial state: vx, vy, omega, x, y, theta. Leading axes broadcast, and
     each set of numbers is a separate simulation on its own thread.
 
-    Gradients with respect to all of the tensors are those of `autodiff.scene_gradient`; forward derivatives (`jvp`) are
-    those of `scene_sensitivities`. First derivatives only; computed in double precision on the CPU.
+    Gradients with respect to all of the tensors are those of `derivatives.scene_gradient`; forward derivatives (`jvp`)
+    are those of `scene_sensitivities`. First derivatives only; computed in double precision on the CPU.
 
     Raises `InvalidValueError` for names and numbers out of range, and `SolverError` if the solver fails.
     """

@@ -11,7 +11,7 @@ except ImportError:
 
     raise MissingExtraError("drake", "drake") from None
 
-from planarfriction.adapters.drake.friction import PatchFriction, Report
-from planarfriction.adapters.drake.patches import Patch, prepare
+from planarfriction.adapters.drake.friction import Friction, Report
+from planarfriction.adapters.drake.patches import PatchContact, prepare
 
-__all__ = ["Patch", "PatchFriction", "Report", "prepare"]
+__all__ = ["Friction", "PatchContact", "Report", "prepare"]

@@ -21,7 +21,7 @@ from pydrake.systems.primitives import ConstantValueSource, ConstantVectorSource
 
 from planarfriction import validation
 from planarfriction.adapters.drake.asking import Asking
-from planarfriction.adapters.drake.patches import Patch, found
+from planarfriction.adapters.drake.patches import PatchContact, found
 from planarfriction.adapters.drake.shadow import Shadow
 from planarfriction.coupling import CoupledPatches
 from planarfriction.errors import InvalidValueError
@@ -44,7 +44,7 @@ class Report(NamedTuple):
     converged: bool
 
 
-class PatchFriction(LeafSystem):
+class Friction(LeafSystem):
     """Patch friction for a discrete plant, as a system that `AddToBuilder` adds to a diagram next to the plant.
 
     The context holds the states of the bristles, the wrenches, twists and loads; the output ports give those of the
@@ -55,7 +55,7 @@ class PatchFriction(LeafSystem):
     pairs with friction of their own.
     """
 
-    def __init__(self, plant: MultibodyPlant, scene_graph: SceneGraph, patches: Iterable[Patch]) -> None:
+    def __init__(self, plant: MultibodyPlant, scene_graph: SceneGraph, patches: Iterable[PatchContact]) -> None:
         super().__init__()
         self.set_name("patch_friction")
         _check(plant, scene_graph)
@@ -88,8 +88,8 @@ class PatchFriction(LeafSystem):
 
     @staticmethod
     def AddToBuilder(
-        builder: DiagramBuilder, plant: MultibodyPlant, scene_graph: SceneGraph, patches: Iterable[Patch]
-    ) -> PatchFriction:
+        builder: DiagramBuilder, plant: MultibodyPlant, scene_graph: SceneGraph, patches: Iterable[PatchContact]
+    ) -> Friction:
         """Add patch friction to a builder and connect it; connect all other inputs of the plant before.
 
         What was connected to the plant's `applied_generalized_force` is added to the friction.
@@ -97,7 +97,7 @@ class PatchFriction(LeafSystem):
         Raises `InvalidValueError` as the class does, and for inputs of the plant that are exported.
         """
         validation.instance("builder", builder, DiagramBuilder, "a DiagramBuilder")
-        friction = PatchFriction(plant, scene_graph, patches)
+        friction = Friction(plant, scene_graph, patches)
         sources = _sources(builder, plant)
         builder.AddSystem(friction)
         builder.Connect(plant.get_state_output_port(), friction.GetInputPort("state"))

@@ -22,7 +22,7 @@ _MATERIAL = ("material", "coulomb_friction")
 
 
 @dataclass(frozen=True)
-class Patch:
+class PatchContact:
     """A contact patch between two geometries, attached to the body of a frame.
 
     The x axis of the patch is that of the frame, projected on the contact plane; its normal points into the frame's
@@ -56,7 +56,7 @@ class Patch:
 class Placed:
     """A patch found in a plant."""
 
-    def __init__(self, plant: Any, scene_graph: Any, patch: Patch) -> None:
+    def __init__(self, plant: Any, scene_graph: Any, patch: PatchContact) -> None:
         self.patch, self.frame = patch, _frame(plant, patch.frame)
         sides = [_geometries(plant, scene_graph, name) for name in patch.geometries]
         bodies = [_body_of(plant, scene_graph, side[0]) for side in sides]
@@ -81,7 +81,7 @@ class Placed:
             raise InvalidValueError("friction", f"be 0 on {between}, on one of the two (prepare does that)", least)
 
 
-def prepare(plant: Any, scene_graph: Any, patches: Iterable[Patch]) -> None:
+def prepare(plant: Any, scene_graph: Any, patches: Iterable[PatchContact]) -> None:
     """Remove Drake's own friction from the first of the two `geometries` of each patch.
 
     In Drake, friction belongs to geometries, not to pairs of them: the first geometry then slides without friction on
@@ -97,14 +97,14 @@ def prepare(plant: Any, scene_graph: Any, patches: Iterable[Patch]) -> None:
             scene_graph.AssignRole(plant.get_source_id(), geometry, properties, RoleAssign.kReplace)
 
 
-def checked(patches: Iterable[Patch]) -> list[Patch]:
+def checked(patches: Iterable[PatchContact]) -> list[PatchContact]:
     """Raise for what is no patch."""
-    if isinstance(patches, Patch) or not isinstance(patches, Iterable):
+    if isinstance(patches, PatchContact) or not isinstance(patches, Iterable):
         raise InvalidValueError("patches", "be a list of patches", patches)
-    return [validation.instance("patches", patch, Patch, "patches") for patch in patches]
+    return [validation.instance("patches", patch, PatchContact, "patches") for patch in patches]
 
 
-def found(plant: Any, scene_graph: Any, patches: Iterable[Patch]) -> list[Placed]:
+def found(plant: Any, scene_graph: Any, patches: Iterable[PatchContact]) -> list[Placed]:
     """The patches in a plant; raises for the same pair of geometries twice."""
     placed = [Placed(plant, scene_graph, patch) for patch in checked(patches)]
     if not placed:

@@ -17,6 +17,6 @@ except ImportError:
     raise MissingExtraError("mjx", "mjx") from None
 
 from planarfriction.adapters.mjx.friction import Friction
-from planarfriction.adapters.mujoco import Patch, prepare
+from planarfriction.adapters.mujoco import PatchContact, prepare
 
-__all__ = ["Friction", "Patch", "prepare"]
+__all__ = ["Friction", "PatchContact", "prepare"]

@@ -19,7 +19,7 @@ from planarfriction.adapters.mjx import newton, responses
 from planarfriction.adapters.mjx.geometry import Places, geometry, places
 from planarfriction.adapters.mujoco.friction import Report
 from planarfriction.adapters.mujoco.loops.records import Memory
-from planarfriction.adapters.mujoco.patches import Patch, Placed, check_once, memory, words
+from planarfriction.adapters.mujoco.patches import PatchContact, Placed, check_once, memory, words
 from planarfriction.coupling import ITERATIONS, TOLERANCE
 from planarfriction.errors import InvalidValueError
 from planarfriction.jax import DistributedModel, ReducedModel, ReducedModelPublished
@@ -80,7 +80,7 @@ class Friction:
     and shapes that change with the load.
     """
 
-    def __init__(self, m: Any, patches: Sequence[Patch]) -> None:
+    def __init__(self, m: Any, patches: Sequence[PatchContact]) -> None:
         check_once(patches)
         placed = [Placed(m, patch) for patch in patches]
         _check(m, placed)
@@ -285,7 +285,7 @@ def _refuse_precision(given: str) -> None:
 
 def _in_jax(model: models.FrictionModel) -> FrictionModel:
     """The model of JAX that a model of NumPy is."""
-    if model._follows_load:
+    if model.depends_on_load:
         rule = "have a shape that does not change with the load: models of JAX keep theirs"
         raise InvalidValueError("model", rule, type(model).__name__)
     if isinstance(model, models.ReducedModel):

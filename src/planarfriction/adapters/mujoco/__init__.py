@@ -11,6 +11,6 @@ except ImportError:
     raise MissingExtraError("mujoco", "mujoco") from None
 
 from planarfriction.adapters.mujoco.friction import Friction
-from planarfriction.adapters.mujoco.patches import Patch, prepare
+from planarfriction.adapters.mujoco.patches import PatchContact, prepare
 
-__all__ = ["Friction", "Patch", "prepare"]
+__all__ = ["Friction", "PatchContact", "prepare"]

@@ -17,7 +17,7 @@ from planarfriction.adapters.mujoco.draw import draw_patch
 from planarfriction.adapters.mujoco.library import layout
 from planarfriction.adapters.mujoco.loops import step as loops
 from planarfriction.adapters.mujoco.loops.records import Host
-from planarfriction.adapters.mujoco.patches import Patch, Placed, check_once, memory, words
+from planarfriction.adapters.mujoco.patches import PatchContact, Placed, check_once, memory, words
 from planarfriction.coupling import CoupledPatches
 from planarfriction.errors import FrictionError, InvalidValueError
 from planarfriction.kernels import coupling as kernels
@@ -55,12 +55,12 @@ class Friction:
     data, names that are not in the model, pairs with friction of their own, and shapes that change with the load.
     """
 
-    def __init__(self, m: Any, patches: Sequence[Patch]) -> None:
+    def __init__(self, m: Any, patches: Sequence[PatchContact]) -> None:
         check_once(patches)
         self.m, self.patches, self.placed = m, tuple(patches), [Placed(m, patch) for patch in patches]
         self.coupled = CoupledPatches([patch.model for patch in patches])
         for patch in patches:
-            if patch.model._follows_load:
+            if patch.model.depends_on_load:
                 rule = "have a shape that does not change with the load: compiled steps need fixed numbers"
                 raise InvalidValueError("model", rule, type(patch.model).__name__)
         self._check()

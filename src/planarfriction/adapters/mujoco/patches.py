@@ -21,7 +21,7 @@ CENTRES = ("site", "contact")
 
 
 @dataclass(frozen=True)
-class Patch:
+class PatchContact:
     """A contact patch between two geoms, attached to the body of a site.
 
     The x axis of the patch is that of the site, projected on the contact plane; its normal points into the site's body.
@@ -48,12 +48,12 @@ class Patch:
         validation.choice("centre", self.centre, CENTRES)
 
 
-def words(patches: Sequence[Patch], nv: int) -> int:
+def words(patches: Sequence[PatchContact], nv: int) -> int:
     """Numbers that patches keep in `userdata` (see `mujoco.loops.records.Memory`)."""
     return memory(patches, nv, 0).converged + 1
 
 
-def memory(patches: Sequence[Patch], nv: int, first: int) -> Memory:
+def memory(patches: Sequence[PatchContact], nv: int, first: int) -> Memory:
     """Where in the user data, from word `first` on."""
     states, k = sum(math.prod(patch.model.state_shape) for patch in patches), len(patches)
     sizes = [states, states, 3 * k, 3 * k, 3 * k, k, nv, nv, nv]
@@ -61,7 +61,7 @@ def memory(patches: Sequence[Patch], nv: int, first: int) -> Memory:
     return Memory(*np.cumsum([first, *sizes[:-1]]).tolist())
 
 
-def prepare(spec: Any, patches: Sequence[Patch]) -> None:
+def prepare(spec: Any, patches: Sequence[PatchContact]) -> None:
     """Prepare an `MjSpec` for the patches: add a contact pair without friction for each, and room in the user data.
 
     An existing pair keeps its settings except for friction; a new pair takes those of its geoms.
@@ -84,10 +84,10 @@ def prepare(spec: Any, patches: Sequence[Patch]) -> None:
     spec.nuserdata = max(spec.nuserdata, 0) + words(patches, nv)
 
 
-def check_once(patches: Sequence[Patch]) -> None:
+def check_once(patches: Sequence[PatchContact]) -> None:
     """Raise for what is no patch, and for the same pair twice."""
     for patch in patches:
-        validation.instance("patches", patch, Patch, "patches")
+        validation.instance("patches", patch, PatchContact, "patches")
     pairs = [frozenset(patch.geoms) for patch in patches]
     for pair in pairs:
         if pairs.count(pair) > 1:
@@ -97,7 +97,7 @@ def check_once(patches: Sequence[Patch]) -> None:
 class Placed:
     """A patch found in a compiled model."""
 
-    def __init__(self, m: Any, patch: Patch) -> None:
+    def __init__(self, m: Any, patch: PatchContact) -> None:
         self.patch, self.site = patch, _named(m, "site", patch.site, mujoco.mjtObj.mjOBJ_SITE)
         self.geoms = np.array([_named(m, "geoms", name, mujoco.mjtObj.mjOBJ_GEOM) for name in patch.geoms])
         bodies, owner = m.geom_bodyid[self.geoms], m.site_bodyid[self.site]

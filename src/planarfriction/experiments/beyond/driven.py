@@ -55,7 +55,7 @@ def ratios(errors: Errors, model: str = "reduced", over: str = "published") -> d
 
 def step_costs(shape: str = "Circle") -> dict[str, Any]:
     """Times of a step in a compiled loop [s] by reduced model, one of each round in which all take part."""
-    from planarfriction.autodiff import rollout
+    from planarfriction.derivatives import rollout
 
     patch = PUBLISHED_PATCHES[shape]()
     directions = np.random.default_rng(7).normal(size=(STEPS, 3)) * [1.0, 1.0, 150.0]

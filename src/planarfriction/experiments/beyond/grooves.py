@@ -11,7 +11,7 @@ from planarfriction.experiments.runs import columns
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.limit_surface import LimitSurfaceTable
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
-from planarfriction.patch import ContactPatch, grain
+from planarfriction.patch import ContactPatch, friction_metric
 from planarfriction.scenes import Body, Contact, Scene, simulate
 from planarfriction.scenes.ready import GRAVITY
 
@@ -31,7 +31,7 @@ MASS, BLOCK, SLIDE = 0.4, (0.06, 0.04), 0.55
 
 def metric() -> np.ndarray:
     """Friction metric `[2, 2]` of the grooved sole."""
-    return grain(GRAIN["angle"], GRAIN["along"], GRAIN["across"])
+    return friction_metric(GRAIN["angle"], GRAIN["along"], GRAIN["across"])
 
 
 def closed_drift(slope: float) -> float:

@@ -12,7 +12,7 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.kernels import tangent
 from planarfriction.kernels.body import System
 from planarfriction.kernels.tangent import Drives
-from planarfriction.scenes.packing import Windows
+from planarfriction.scenes.packing import SegmentBatches
 from planarfriction.scenes.scene import Scene
 from planarfriction.scenes.signal import SAME_TIME, Signal
 
@@ -130,9 +130,9 @@ class Columns:
         """Where the solver has to stop [s]."""
         return np.concatenate([np.zeros(0), *(knots.times for knots in self._knots)])
 
-    def start(self, scene: Scene, windows: Windows, slope: np.ndarray) -> None:
+    def start(self, scene: Scene, windows: SegmentBatches, slope: np.ndarray) -> None:
         """Choose the units in which errors are judged, and write the derivatives [P, n] at the start."""
-        natural, start = windows.natural[-6:], np.abs(windows.state[-6:])
+        natural, start = windows.state_scale[-6:], np.abs(windows.state[-6:])
         grip = sum(contact.count * np.abs(contact.normal_force.values).max() for contact in scene.contacts) or 1.0
         arm = natural[3] / natural[5]
         for p, (kind, place) in enumerate(zip(self._drives.kind, self._drives.place, strict=True)):
@@ -148,7 +148,7 @@ class Columns:
         if scene.start != "rest":
             self._start_held(scene, windows, slope)
 
-    def _start_held(self, scene: Scene, windows: Windows, slope: np.ndarray) -> None:
+    def _start_held(self, scene: Scene, windows: SegmentBatches, slope: np.ndarray) -> None:
         """Write the derivatives of bristles that carry the load at the start; refuse those of others."""
         count = len(slope)
         say = self._drives.kind != tangent.INERTIA

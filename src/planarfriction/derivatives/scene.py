@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.autodiff.drives import Columns
+from planarfriction.derivatives.drives import Columns
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError, SolverError
 from planarfriction.kernels import rosenbrock, tangent
 from planarfriction.kernels.body import System
 from planarfriction.kernels.integration import Output, run_of
 from planarfriction.kernels.tangent import Drives, Path
-from planarfriction.scenes.packing import Windows
+from planarfriction.scenes.packing import SegmentBatches
 from planarfriction.scenes.scene import Scene
 from planarfriction.scenes.simulation import recording_times
 from planarfriction.solvers import RODAS4
@@ -93,11 +93,12 @@ def scene_sensitivities(
     windows, times, rtol, absolute = prepared(scene, columns, t_end, rtol, atol, save_every)
     derivatives = _Derivatives(windows, times, columns, rtol)
     columns.start(scene, windows, derivatives.slope)
-    _integrate(windows, derivatives, rtol, absolute * windows.natural)
+    _integrate(windows, derivatives, rtol, absolute * windows.state_scale)
     return SceneSensitivities(columns.names, columns.of, *derivatives.recorded())
 
 
-def prepared(scene: Scene, columns: Columns, t_end, rtol, atol, save_every) -> tuple[Windows, np.ndarray, float, float]:
+def prepared(scene: Scene, columns: Columns, t_end, rtol, atol, save_every) -> tuple[SegmentBatches, np.ndarray, float,
+float]:
     """The windows of a motion whose derivatives are wanted, the instants to record, tolerances."""
     end = scene.t_end if t_end is None else validation.positive("t_end", t_end)
     if end > scene.t_end:
@@ -106,7 +107,7 @@ def prepared(scene: Scene, columns: Columns, t_end, rtol, atol, save_every) -> t
     rtol = validation.positive("rtol", rtol)
     absolute = rtol if atol is None else validation.positive("atol", atol)
     times = recording_times(end, every)
-    windows = Windows(scene, end, times=times, sensitivities=True, marks=columns.marks)
+    windows = SegmentBatches(scene, end, times=times, sensitivities=True, marks=columns.marks)
     for contact, model in zip(scene.contacts, windows.models, strict=True):
         if None in model.functions:
             rule = "have all functions of kernels.contacts.ModelFunctions for derivatives of scenes"
@@ -114,7 +115,7 @@ def prepared(scene: Scene, columns: Columns, t_end, rtol, atol, save_every) -> t
     return windows, times, rtol, absolute
 
 
-def _integrate(windows: Windows, derivatives: _Derivatives, rtol: float, atol: np.ndarray) -> None:
+def _integrate(windows: SegmentBatches, derivatives: _Derivatives, rtol: float, atol: np.ndarray) -> None:
     """Integrate the motion as `simulate` does, and carry the derivatives along a part of its steps after another."""
     now, n, outcome = start_of(windows.state), len(windows.state), rosenbrock.DONE
     path = tangent.path_for(max(int(NUMBERS / n), LEAST_NODES), n)
@@ -140,13 +141,13 @@ def check_outcome(outcome: int) -> None:
 class _Derivatives:
     """The derivatives of a motion, carried along its steps as they come, and what is recorded of both."""
 
-    def __init__(self, windows: Windows, times: np.ndarray, columns: Columns, rtol: float) -> None:
+    def __init__(self, windows: SegmentBatches, times: np.ndarray, columns: Columns, rtol: float) -> None:
         n, count, many, instants = len(windows.state), len(columns.names), len(windows.models), len(times)
         body, wrench, load = np.empty((instants, 6)), np.empty((instants, many, 3)), np.empty((instants, many))
         self.output = Output(times, body, wrench, load, np.empty((0, 0)))
         """What the integration of the motion records."""
         self.columns, self._accuracy = columns, SHARE * rtol**POWER
-        self._space, self._atol = tangent.slopes_for(count, columns.inputs, n), self._accuracy * windows.natural
+        self._space, self._atol = tangent.slopes_for(count, columns.inputs, n), self._accuracy * windows.state_scale
         self.slope, self._state, self._scratch = np.zeros((count, n)), np.empty(n), np.empty((2, n))
         self._d_body, self._d_wrench = np.zeros((instants, 6, count)), np.zeros((instants, many, 3, count))
         self._count, self._wrench = 0, np.empty((many, 3))

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.autodiff.parameters import Packed, pack
+from planarfriction.derivatives.parameters import Packed, pack
 from planarfriction.compiler import threads
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels.law import LAW

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.autodiff.inputs import (
+from planarfriction.derivatives.inputs import (
     RolloutInputs,
     by_part,
     checked,
@@ -18,7 +18,7 @@ from planarfriction.autodiff.inputs import (
     share,
     sum_to,
 )
-from planarfriction.autodiff.parameters import Packed, is_compiled, pack
+from planarfriction.derivatives.parameters import Packed, is_compiled, pack
 from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
@@ -49,7 +49,7 @@ class RolloutStates(NamedTuple):
 
 
 @by_parts
-class RolloutSensitivities(NamedTuple):
+class RolloutJacobian(NamedTuple):
     """A roll-out with the derivatives of its wrenches with respect to P parameters."""
 
     state: np.ndarray
@@ -61,7 +61,7 @@ class RolloutSensitivities(NamedTuple):
 
 
 @by_parts
-class RolloutTangent(NamedTuple):
+class RolloutJVP(NamedTuple):
     """A roll-out and its change for given changes of the inputs."""
 
     state: np.ndarray
@@ -75,7 +75,7 @@ class RolloutTangent(NamedTuple):
 
 
 @by_parts
-class RolloutGradient(NamedTuple):
+class RolloutVJP(NamedTuple):
     """Gradient of a scalar with respect to the inputs of a roll-out, each of the shape of that input."""
 
     state: np.ndarray
@@ -113,7 +113,7 @@ def rollout(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, *, p
 def rollout_states(
     model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, *, parameters: Any = None
 ) -> RolloutStates:
-    """A `rollout` that keeps the state before each step, which saves `rollout_gradient` half of its work.
+    """A `rollout` that keeps the state before each step, which saves `rollout_vjp` half of its work.
 
     Raises InvalidValueError as `rollout` does.
     """
@@ -122,7 +122,7 @@ def rollout_states(
     return RolloutStates(inputs.shaped(end), wrenches, inputs.shaped(states, len(inputs.dt)))
 
 
-def rollout_gradient(
+def rollout_vjp(
     model: Any,
     state: Any,
     twist: Any,
@@ -133,7 +133,7 @@ def rollout_gradient(
     *,
     parameters: Any = None,
     states: Any = None,
-) -> RolloutGradient:
+) -> RolloutVJP:
     """Gradient of `sum(wrenches_bar wrenches) + sum(state_bar state)` of a `rollout` with respect to its inputs.
 
     This is the discrete adjoint: exact for the steps taken, and a few times as expensive as the roll-out whatever the
@@ -163,7 +163,7 @@ def rollout_gradient(
     share(compiled, count, lambda *span: family.gradient(compiled, on_the_way, cotangents, span, bars))
     given = parameters if parameters is not None else inputs.parts[0].rows[..., family.columns]
     start = np.empty(inner) if state is None else state
-    return RolloutGradient(
+    return RolloutVJP(
         sum_to(np.shape(start), inputs.shaped(z_bar)),
         sum_to(np.shape(twist), inputs.of_all(turned(bars.twist))),
         sum_to(np.shape(normal_force), inputs.of_all(bars.load)),
@@ -171,7 +171,7 @@ def rollout_gradient(
     )
 
 
-def rollout_sensitivities(
+def rollout_jacobian(
     model: Any,
     state: Any,
     twist: Any,
@@ -180,7 +180,7 @@ def rollout_sensitivities(
     names: Sequence[str] | None = None,
     *,
     parameters: Any = None,
-) -> RolloutSensitivities:
+) -> RolloutJacobian:
     """A `rollout` of a reduced model with the derivatives of its wrenches with respect to the parameters `names`.
 
     Computed forward in time, for least squares, which needs the derivatives of each wrench; the initial state is held
@@ -199,10 +199,10 @@ def rollout_sensitivities(
     share(compiled, count, lambda *span: family.sensitivities(compiled, span, end, columns, wrenches, slopes))
     turned = inputs.parts[0].turned
     slopes = np.swapaxes(turned(np.swapaxes(inputs.of_all(slopes), -1, -2)), -1, -2)
-    return RolloutSensitivities(inputs.shaped(end), turned(inputs.of_all(wrenches)), slopes)
+    return RolloutJacobian(inputs.shaped(end), turned(inputs.of_all(wrenches)), slopes)
 
 
-def rollout_tangent(
+def rollout_jvp(
     model: Any,
     state: Any,
     twist: Any,
@@ -214,13 +214,13 @@ def rollout_tangent(
     parameters_dot: Any = 0.0,
     *,
     parameters: Any = None,
-) -> RolloutTangent:
+) -> RolloutJVP:
     """A `rollout` of a reduced model with its change for given changes of the inputs.
 
-    Computed forward in time, at about six times the cost of `rollout_gradient`: it gives `J x` where that gives `J' x`.
+    Computed forward in time, at about six times the cost of `rollout_vjp`: it gives `J x` where that gives `J' x`.
     The changes have the shapes of their inputs; leading axes broadcast, so that one roll-out can take many directions.
 
-    Raises `InvalidValueError` as `rollout_gradient` does.
+    Raises `InvalidValueError` as `rollout_vjp` does.
     """
     parts = pack(model, parameters)
     family, each = parts[0].family, inner_of(parts)
@@ -245,7 +245,7 @@ def rollout_tangent(
     both = [np.zeros((count, *steps, 3)) for _ in range(2)]
     share(compiled, count, lambda *span: family.tangent(compiled, span, end, changed, *both))
     wrenches, slopes = (turned(inputs.of_all(values)) for values in both)
-    return RolloutTangent(inputs.shaped(end), wrenches, inputs.shaped(moved), slopes)
+    return RolloutJVP(inputs.shaped(end), wrenches, inputs.shaped(moved), slopes)
 
 
 def _roll(inputs: RolloutInputs, kept: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.autodiff.drives import SCENE_PARAMETERS, STATES, Columns
-from planarfriction.autodiff.scene import scene_sensitivities
-from planarfriction.autodiff.scene_gradient import Followed
+from planarfriction.derivatives.drives import SCENE_PARAMETERS, STATES, Columns
+from planarfriction.derivatives.scene import scene_sensitivities
+from planarfriction.derivatives.scene_gradient import Followed
 from planarfriction.errors import InvalidValueError
 from planarfriction.scenes.scene import Contact, Scene
 from planarfriction.scenes.signal import Signal

@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.autodiff.drives import Columns
-from planarfriction.autodiff.scene import LEAST_NODES, NUMBERS, POWER, SHARE, check_outcome, prepared
+from planarfriction.derivatives.drives import Columns
+from planarfriction.derivatives.scene import LEAST_NODES, NUMBERS, POWER, SHARE, check_outcome, prepared
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels import adjoint, rosenbrock, tangent
 from planarfriction.kernels.body import System
 from planarfriction.kernels.integration import Output, run_of
 from planarfriction.kernels.tangent import Drives, Path
-from planarfriction.scenes.packing import Windows
+from planarfriction.scenes.packing import SegmentBatches
 from planarfriction.scenes.scene import Scene
 from planarfriction.solvers import RODAS4
 from planarfriction.solvers.structured import start_of
@@ -93,7 +93,7 @@ class Followed:
         self._parts: list[tuple[System, Path]] = []
         room = tangent.path_for(max(min(int(NUMBERS / n), 4096), LEAST_NODES), n)
         for system in windows:
-            run = run_of(system, RODAS4, output, now, rtol=self._rtol, atol=absolute * windows.natural)
+            run = run_of(system, RODAS4, output, now, rtol=self._rtol, atol=absolute * windows.state_scale)
             now.cursor[0], outcome = 0, rosenbrock.PAUSED
             while outcome == rosenbrock.PAUSED:
                 nodes, outcome = tangent.follow(run.address, room)
@@ -114,7 +114,7 @@ class _Adjoint:
     """The adjoint of a motion on its way back, and what the cost gains by then."""
 
     def __init__(
-        self, scene: Scene, windows: Windows, columns: Columns, seeds: tuple[np.ndarray, np.ndarray], rtol: float
+        self, scene: Scene, windows: SegmentBatches, columns: Columns, seeds: tuple[np.ndarray, np.ndarray], rtol: float
     ) -> None:
         n = len(windows.state)
         (self._seeds, self._wrench_seeds), self._columns = seeds, columns
@@ -124,10 +124,10 @@ class _Adjoint:
         self._gain, self._moments = np.zeros(len(columns.names)), np.zeros((columns.inputs, 2))
         self._accuracy = SHARE * rtol**POWER
         grip = max(np.abs(contact.normal_force.values).max() for contact in scene.contacts)
-        wrench = grip * np.array([1.0, 1.0, windows.natural[-3] / windows.natural[-1]])
-        scaled = np.append(self._seeds * windows.natural[-6:], self._wrench_seeds * wrench)
+        wrench = grip * np.array([1.0, 1.0, windows.state_scale[-3] / windows.state_scale[-1]])
+        scaled = np.append(self._seeds * windows.state_scale[-6:], self._wrench_seeds * wrench)
         level = np.abs(scaled).max(initial=0.0) or 1.0
-        self._atol = self._accuracy * level / windows.natural
+        self._atol = self._accuracy * level / windows.state_scale
         self._space, self._known = adjoint.workspace_for(columns.inputs, n), 0.0
 
     def back(self, parts: list[tuple[System, Path]], time: np.ndarray) -> np.ndarray:

@@ -147,7 +147,7 @@ def is_compiled(model: Any) -> bool:
 
 def _refusal(model: ReducedModel | ReducedModelPublished) -> tuple[str, str, Any] | None:
     """The rule that a model breaks that compiled roll-outs do not know, as an `InvalidValueError` takes it."""
-    if not model._follows_load:
+    if not model.depends_on_load:
         return None
     if isinstance(model, ReducedModel):
         if model.load_error > 0.0:
@@ -167,7 +167,7 @@ def _packed(model: Any) -> tuple[Packed, ...]:
     if refusal is not None:
         raise InvalidValueError(*refusal)
     law = model.law.numbers
-    if not model._follows_load:
+    if not model.depends_on_load:
         return tuple(pack_shape(law, shape)._replace(share=share) for share, shape in model.parts_at(1.0))
     row = np.array([*law, *np.zeros(len(reduced_step.NAMES) - len(law))])
     part = Packed(row, np.zeros(3, dtype=int), np.zeros(0, dtype=np.float32), REDUCED_BY_LOAD, at_loads=model._at_loads)

@@ -1,0 +1,49 @@
+"""Roll-outs with exact derivatives, on which the tensor front ends and identification are built.
+
+`rollout` steps a model through given twists and loads. For reduced models, `rollout_vjp` is its discrete adjoint,
+`rollout_jvp` its directional derivative, and `rollout_jacobian` gives the derivatives of each wrench with
+respect to the parameters. All are derivatives of the steps themselves, not of the continuous model, so they agree with
+finite differences of `rollout` to rounding. Kinks are described in `planarfriction.kernels.bristle_step`.
+"""
+
+from planarfriction.derivatives.drives import SCENE_PARAMETERS
+from planarfriction.derivatives.parameters import PARAMETERS, parameter_names, parameters_of
+from planarfriction.derivatives.rollouts import (
+    Rollout,
+    RolloutJacobian,
+    RolloutJVP,
+    RolloutStates,
+    RolloutVJP,
+    rollout,
+    rollout_jacobian,
+    rollout_jvp,
+    rollout_states,
+    rollout_vjp,
+)
+from planarfriction.derivatives.scene import SceneSensitivities, scene_sensitivities
+from planarfriction.derivatives.scene_gradient import SceneGradient, scene_gradient
+
+__all__ = [
+    "PARAMETERS",
+    "SCENE_PARAMETERS",
+    "Rollout",
+    "RolloutJVP",
+    "RolloutJacobian",
+    "RolloutStates",
+    "RolloutVJP",
+    "SceneGradient",
+    "SceneSensitivities",
+    "parameter_names",
+    "parameters_of",
+    "rollout",
+    "rollout_jacobian",
+    "rollout_jvp",
+    "rollout_states",
+    "rollout_vjp",
+    "scene_gradient",
+    "scene_sensitivities",
+]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
