@@ -25,7 +25,7 @@ READERS = {
     "map.csv": read_pressure_map,
     "map.npy": read_pressure_map,
     "map.png": read_pressure_map,
-    "run.nc": pf.load,
+    "run.nc": pf.Solution.load,
 }
 """A file of each kind, and what reads it."""
 

@@ -16,7 +16,7 @@ from sphinx.util.nodes import make_refnode
 
 NAME = re.compile(r"[A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*$")
 CALL = re.compile(r"\(.*\)$")
-PLAIN_WORDS = {"load", "grain", "step", "state", "twist", "wrench", "rate"}
+PLAIN_WORDS = {"step", "state", "twist", "wrench", "rate"}
 """Names that are words too: parameters and columns are called so."""
 PARENTS = (nodes.reference, nodes.title, nodes.term)
 

@@ -166,7 +166,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "Body": {"velocity": (0.1, 0.0, 1.0)},
     "ReducedModelPublished": {"surface": None},
     "Signal.sine": {"t_end": 0.5},
-    "load": {"path": Fresh(lambda: objects()["solution"].save("solution.nc"))},
+    "Solution.load": {"path": Fresh(lambda: objects()["solution"].save("solution.nc"))},
     "Signal.from_csv": {"path": EXAMPLES / "load.csv", "value": "normal_force", "time": "time"},
     "Scene.from_file": {"path": EXAMPLES / "drift.toml"},
     "Scene.to_file": {"path": "scene.toml"},

@@ -166,7 +166,7 @@ def test_scenes_share_the_maps_without_a_copy():
     packed = pack(pf.Scene(pf.Body(1.0, 1.0), contacts, 0.1), 0.1)
     for of, load, there in zip((one, two), (1.2, 1.3), packed.models, strict=True):
         data = of.shape_at(load).data
-        assert data is there.kept[0]
+        assert data is there.keepalive[0]
         assert data.ctypes.data == there.records.view(np.int64)[0, -2]
 
 

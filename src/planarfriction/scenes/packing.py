@@ -273,7 +273,7 @@ class SegmentBatches:
         )
         if self._times is not None:
             _meet(self._times, breaks)
-        kept = tuple(array for model in models for array in (model.records, *model.kept))
+        kept = tuple(array for model in models for array in (model.records, *model.keepalive))
         return system_of(self._contacts, motion, kept)
 
 
