@@ -106,7 +106,7 @@ def scene(draw: random.Random) -> pf.Scene:
         options = {"mounted_on": draw.choice(["world", "body"]), "angle": draw.uniform(-math.pi, math.pi)}
         options |= {"position": (draw.uniform(-0.1, 0.1), draw.uniform(-0.1, 0.1)), "count": draw.randint(1, 3)}
         if velocity is None and draw.random() < 0.2:
-            options["velocity"] = signal(draw, t_end, lambda: [draw.uniform(-1, 1), 0.0, draw.uniform(-10, 10)])
+            options["support_velocity"] = signal(draw, t_end, lambda: [draw.uniform(-1, 1), 0.0, draw.uniform(-10, 10)])
         return pf.Contact(model(draw), signal(draw, t_end, load), name=f"{draw.choice('aφ')} {number}", **options)
 
     velocity, force = None, None
