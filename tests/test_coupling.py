@@ -20,7 +20,9 @@ from tests.support.coupling_problems import random_bodies, random_patches, rando
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
 PLAIN = pf.LuGre()
 DISC = pf.ContactPatch.disc(radius=0.01, cells=9)
-GRAINED = pf.ContactPatch.rectangle(0.02, 0.01, cells=7).with_friction_metric(friction_metric(0.3, along=1.0, across=0.7))
+GRAINED = pf.ContactPatch.rectangle(0.02, 0.01, cells=7).with_friction_metric(
+    friction_metric(0.3, along=1.0, across=0.7)
+)
 LOPSIDED = GRAINED.with_friction_metric(friction_metric(0.3, along=1.0, across=0.7), asymmetry=(0.2, 0.1))
 ASIDE = pf.ContactPatch.polygon([(0.0, 0.0), (0.03, 0.0), (0.03, 0.01), (0.01, 0.02)], cells=7)
 FINGER = pf.SoftFinger(c=0.0085, n=1 / 3, k=2.0, radius_max=0.01)

@@ -332,7 +332,10 @@ def test_unprepared_models_and_unknown_names_are_refused():
         ([patches[0], patches[0]], "patches must have each pair of geoms once, got block, pad left"),
         ([PatchContact(PAD, site="nowhere", geoms=pads)], "site must be in the model, got nowhere"),
         ([PatchContact(PAD, site="left", geoms=("pad left", "nothing"))], "geoms must be in the model, got nothing"),
-        ([PatchContact(PAD, site="left", geoms=("pad left", "pad right"))], "site must be on the body of one of the geoms"),
+        (
+            [PatchContact(PAD, site="left", geoms=("pad left", "pad right"))],
+            "site must be on the body of one of the geoms",
+        ),
         (
             [PatchContact(pf.ReducedModel(soft, LAW), "left", pads)],
             "model must have a shape that does not change with",

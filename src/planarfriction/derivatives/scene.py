@@ -97,8 +97,9 @@ def scene_sensitivities(
     return SceneSensitivities(columns.names, columns.of, *derivatives.recorded())
 
 
-def prepared(scene: Scene, columns: Columns, t_end, rtol, atol, save_every) -> tuple[SegmentBatches, np.ndarray, float,
-float]:
+def prepared(
+    scene: Scene, columns: Columns, t_end, rtol, atol, save_every
+) -> tuple[SegmentBatches, np.ndarray, float, float]:
     """The windows of a motion whose derivatives are wanted, the instants to record, tolerances."""
     end = scene.t_end if t_end is None else validation.positive("t_end", t_end)
     if end > scene.t_end:
