@@ -52,8 +52,8 @@ def write_picture(figure: Any, path: Path) -> Path:
 
 
 def write_solution(solution: Solution, folder: Path, label: str) -> list[Path]:
-    """Write a solution as NetCDF (with its scene, `planarfriction.Solution.load` reads it) and as CSV; returns the
-    paths.""" stem = f"{slug(solution.scene.name)}-{slug(label)}"
+    """Write a solution as NetCDF, which `planarfriction.Solution.load` reads, and as CSV; return both paths."""
+    stem = f"{slug(solution.scene.name)}-{slug(label)}"
     stored, table = folder / f"{stem}.nc", folder / f"{stem}.csv"
     solution.save(stored)
     write_csv(table, history_columns(solution))
