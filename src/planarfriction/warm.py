@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction import derivatives, coupling, limit_surface, models
+from planarfriction import coupling, derivatives, limit_surface, models
 from planarfriction.compiler.notice import watched
 from planarfriction.families import MODELS
 from planarfriction.laws import LuGre

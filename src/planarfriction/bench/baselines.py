@@ -50,7 +50,7 @@ class Window:
             return cls(packed)
         before = _pieces(packed, slice(0, first))
         output = _output(before, breaks[first : first + 1], bristles=True)
-        tolerance = START_TOLERANCE * before.natural
+        tolerance = START_TOLERANCE * before.state_scale
         run = integrate([before.system], output, before.state, method=RODAS4, rtol=START_TOLERANCE, atol=tolerance)
         assert run.status == "success", run.message
         state = np.concatenate([run.output.bristles[-1], run.output.body[-1]])
@@ -70,7 +70,7 @@ class Window:
         """Solve with the structured solver; `atol` is a share of the natural scales."""
         packed = self.packed
         output = _output(packed, self.ends, bristles=False)
-        run = integrate([packed.system], output, packed.state, method=method, rtol=rtol, atol=atol * packed.natural)
+        run = integrate([packed.system], output, packed.state, method=method, rtol=rtol, atol=atol * packed.state_scale)
         assert run.status == "success", run.message
         return Poses(run.statistics.wall_time, run.output.body[:, 3:], run.statistics.evaluations), run.statistics
 

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.derivatives.parameters import Packed, pack
 from planarfriction.compiler import threads
+from planarfriction.derivatives.parameters import Packed, pack
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels.law import LAW
 from planarfriction.kernels.rollouts import Inputs

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction.derivatives import PARAMETERS, rollout, rollout_jacobian
 from planarfriction.compiler import threads
+from planarfriction.derivatives import PARAMETERS, rollout, rollout_jacobian
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import distributed_step
 from planarfriction.laws import LuGre

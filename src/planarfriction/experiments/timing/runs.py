@@ -100,7 +100,7 @@ def solve(problem: Problem, solver: str, tolerance: float) -> Poses:
     window, atol = problem.window, ATOL_PER_RTOL * tolerance
     if solver in STRUCTURED:
         return window.ours(rtol=tolerance, atol=atol, method=STRUCTURED[solver])[0]
-    return window.general(method=solver, rtol=tolerance, atol=atol * window.packed.natural)
+    return window.general(method=solver, rtol=tolerance, atol=atol * window.packed.state_scale)
 
 
 def reference(problem: Problem, work: Work) -> np.ndarray:
