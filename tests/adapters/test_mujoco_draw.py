@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import importlib.util
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch import PUBLISHED_PATCHES
+from tests.support.repository import script
 
 mujoco = pytest.importorskip("mujoco", reason="needs MuJoCo: pip install 'planarfriction[mujoco]'")
 
 from planarfriction.adapters.mujoco.draw import CENTRE, FRICTION, OUTLINE, draw_patch, outlines  # noqa: E402
 
-SCRIPT = Path(__file__).parents[2] / "examples" / "mujoco_gripper.py"
 FRAME = np.array([1.0, 2.0, 3.0]), np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
 """Along the world's y, z, x."""
 
@@ -67,12 +64,8 @@ def test_a_full_scene_is_refused():
         draw_patch(scene, pf.ContactPatch.disc(radius=0.02), FRAME, np.ones(3), np.zeros(3), 0.1)
 
 
-@pytest.mark.skipif(not SCRIPT.exists(), reason="no examples beside these tests")
 def test_the_gripper_of_the_example_lets_the_plate_hang_where_theory_says():
-    specification = importlib.util.spec_from_file_location("mujoco_gripper", SCRIPT)
-    assert specification is not None and specification.loader is not None
-    example = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(example)
+    example = script("examples/mujoco_gripper.py")
     rows, pictures = example.run(draw=False)
     time, angle, beside, _ = rows.T
     assert not pictures

@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
-from pathlib import Path
 
 import pytest
 
+from tests.support.repository import ROOT, script
+
 pytest.importorskip("torch", reason="needs PyTorch: pip install 'planarfriction[torch]'")
 
-ROOT = Path(__file__).parents[2]
-SCRIPT, PAGE = ROOT / "examples" / "from_a_script.py", ROOT / "docs" / "from-a-script.md"
+PAGE = ROOT / "docs" / "from-a-script.md"
 
-pytestmark = [pytest.mark.torch, pytest.mark.skipif(not SCRIPT.exists(), reason="no examples beside these tests")]
+pytestmark = pytest.mark.torch
 
 
 @pytest.fixture(scope="module")
 def example():
-    specification = importlib.util.spec_from_file_location(SCRIPT.stem, SCRIPT)
-    module = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(module)
-    return module
+    return script("examples/from_a_script.py")
 
 
 def numbers_of_the_page() -> dict[str, list[float]]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +12,8 @@ import planarfriction as pf
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify import Slide, SlidingBody, fit_start
 from planarfriction.measured.tables import TABLES
+from tests.support.repository import script
 
-SCRIPT = Path(__file__).parents[2] / "examples" / "identify_slides.py"
 MU = 0.31
 RATE = 148.0  # samples per second, as measured
 
@@ -64,14 +62,7 @@ def turned(x, y, angle):
 @pytest.fixture(scope="module")
 def example():
     """The script as a module."""
-    sys.path.insert(0, str(SCRIPT.parent))
-    spec = importlib.util.spec_from_file_location(SCRIPT.stem, SCRIPT)
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[SCRIPT.stem] = module
-    spec.loader.exec_module(module)
-    yield module
-    sys.path.remove(str(SCRIPT.parent))
-    del sys.modules[SCRIPT.stem]
+    return script("examples/identify_slides.py")
 
 
 def test_friction_radius_and_ends_come_out(example, tmp_path, monkeypatch, capsys):

@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-import importlib.util
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 import planarfriction as pf
+from tests.support.repository import script
 
 torch = pytest.importorskip("torch", reason="needs PyTorch: pip install 'planarfriction[torch]'")
 
-SCRIPT = Path(__file__).parents[2] / "examples" / "learn_pressure.py"
-
-pytestmark = [pytest.mark.torch, pytest.mark.skipif(not SCRIPT.exists(), reason="no examples beside these tests")]
+pytestmark = pytest.mark.torch
 
 
 @pytest.fixture(scope="module")
 def example():
-    specification = importlib.util.spec_from_file_location("learn_pressure", SCRIPT)
-    module = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(module)
-    return module
+    return script("examples/learn_pressure.py")
 
 
 @pytest.fixture(scope="module")

@@ -2,23 +2,15 @@
 
 from __future__ import annotations
 
-import importlib.util
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-SCRIPT = Path(__file__).parents[2] / "examples" / "sweep_grip.py"
-
-pytestmark = pytest.mark.skipif(not SCRIPT.exists(), reason="no examples beside these tests")
+from tests.support.repository import script
 
 
 @pytest.fixture(scope="module")
 def example():
-    specification = importlib.util.spec_from_file_location(SCRIPT.stem, SCRIPT)
-    module = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(module)
-    return module
+    return script("examples/sweep_grip.py")
 
 
 def test_the_limit_surface_says_what_holds(example):

@@ -2,27 +2,20 @@
 
 from __future__ import annotations
 
-import importlib.util
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import planarfriction as pf
+from tests.support.repository import ROOT, script
 
-ROOT = Path(__file__).parents[2]
-SCRIPT, PAGE = ROOT / "examples" / "tyre.py", ROOT / "docs" / "other-worlds.md"
-
-pytestmark = pytest.mark.skipif(not SCRIPT.exists(), reason="no examples beside these tests")
+PAGE = ROOT / "docs" / "other-worlds.md"
 
 
 @pytest.fixture(scope="module")
 def tyre():
-    specification = importlib.util.spec_from_file_location(SCRIPT.stem, SCRIPT)
-    module = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(module)
-    return module
+    return script("examples/tyre.py")
 
 
 def test_the_closed_form_is_the_integral_over_the_patch(tyre):

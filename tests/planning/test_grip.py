@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import importlib.util
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,8 +13,8 @@ import planarfriction as pf
 from planarfriction.errors import InvalidValueError
 from planarfriction.planning import holding_load, plan_grip
 from planarfriction.planning.motions import Aim, Grips, load_on, slide_of
+from tests.support.repository import script
 
-ROOT = Path(__file__).parents[2]
 LAW = pf.LuGre(mu_c=1.0, mu_s=1.2, elasto_plastic=0.9)
 PATCH = pf.ContactPatch.disc(0.01, cells=11)
 MODEL = pf.ReducedModel(PATCH, LAW)
@@ -238,9 +236,5 @@ def test_what_no_grip_holds_is_refused():
 
 
 def test_the_example_turns_the_plate():
-    specification = importlib.util.spec_from_file_location("turning", ROOT / "examples" / "turn_in_hand.py")
-    assert specification is not None and specification.loader is not None
-    example = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(example)
-    plan = example.plan(degrees=-20.0, aim="nominal")
+    plan = script("examples/turn_in_hand.py").plan(degrees=-20.0, aim="nominal")
     assert math.degrees(plan.report.angle) == pytest.approx(-20.0, abs=0.05)

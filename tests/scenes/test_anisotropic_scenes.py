@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,15 +12,13 @@ import planarfriction as pf
 from planarfriction.errors import FileError, InvalidValueError
 from planarfriction.scenes import driven, in_hand
 from tests.support.anisotropic import GRAIN, GRAINS, LEANS, PATCHES, PLAIN, STRIBECK, reduced
+from tests.support.repository import script
 
-ROOT = Path(__file__).parents[2]
 every_patch = pytest.mark.parametrize("name", PATCHES)
 
 
 def test_a_block_with_a_grooved_sole_drifts_as_the_closed_form_says():
-    specification = importlib.util.spec_from_file_location("grooved", ROOT / "examples" / "grooved_incline.py")
-    example = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(example)
+    example = script("examples/grooved_incline.py")
     slope = math.radians(25.0)
     for kind in ("distributed", "reduced"):
         assert example.drift_of(example.slide(slope, kind)) == pytest.approx(example.drift(slope), abs=1e-4)

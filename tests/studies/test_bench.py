@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import runpy
 from pathlib import Path
 
 import pytest
@@ -10,6 +9,7 @@ import pytest
 from planarfriction import bench
 from planarfriction.bench.measurement import line
 from planarfriction.errors import InvalidValueError
+from tests.support.repository import script
 
 DOCS = Path(__file__).parents[2] / "docs"
 LINE = {"name": "in_hand.distributed", "value": 0.0931, "unit": "s", "baseline": "LSODA over the first 0.1 s",
@@ -19,9 +19,7 @@ LINE = {"name": "in_hand.distributed", "value": 0.0931, "unit": "s", "baseline":
 @pytest.fixture(scope="module")
 def pages():
     """The script that writes numbers into pages, as a dictionary of its functions."""
-    if not DOCS.is_dir():
-        pytest.skip("no docs beside these tests")
-    return runpy.run_path(str(DOCS / "make_tables.py"))
+    return vars(script("docs/make_tables.py"))
 
 
 def test_a_benchmark_is_run_by_its_name():

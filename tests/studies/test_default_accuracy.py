@@ -2,32 +2,19 @@
 
 from __future__ import annotations
 
-import importlib.util
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 import planarfriction as pf
 from planarfriction.experiments.runs import LAW
 from planarfriction.patch import PUBLISHED_PATCHES
+from tests.support.repository import script
 
-SCRIPT = Path(__file__).parents[2] / "docs" / "default_accuracy.py"
 MOST = np.array([5e-6, 2e-5])
 """Promised errors of ends: distance [m] and angle [rad], for motions of 2 cm and up to 1.8 rad."""
 
 
-def _script():
-    specification = importlib.util.spec_from_file_location("default_accuracy", SCRIPT)
-    assert specification is not None and specification.loader is not None
-    module = importlib.util.module_from_spec(specification)
-    sys.modules["default_accuracy"] = module
-    specification.loader.exec_module(module)
-    return module
-
-
-accuracy = _script()
+accuracy = script("docs/default_accuracy.py")
 
 
 @pytest.mark.parametrize("kind", accuracy.MODELS)

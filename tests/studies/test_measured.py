@@ -20,8 +20,8 @@ from planarfriction.measured.figures import draw, ellipse
 from planarfriction.measured.mujoco_box import MujocoBox
 from planarfriction.measured.scores import angles, drawings, interval, mean
 from planarfriction.measured.tables import TABLES, shipped
+from tests.support.repository import script
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 MU = 0.31
 
 
@@ -339,9 +339,7 @@ def test_files_that_are_no_tables_are_refused(content, tmp_path, capsys):
 
 @pytest.mark.parametrize("name", ["measured_slides", "measured_pushes"])
 def test_the_examples_are_the_command(name, tmp_path, capsys):
-    spec = importlib.util.spec_from_file_location(name, EXAMPLES / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    module = script(f"examples/{name}.py")
     assert module.main([str(tmp_path)]) == 2  # a folder without tables
     assert "no such file" in capsys.readouterr().err
     assert module.main(["--only", "ellipsoid"]) == 0

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -12,8 +9,7 @@ import planarfriction as pf
 from planarfriction.bench import plans
 from planarfriction.measured import followed
 from planarfriction.planning import Pusher, Slider, push
-
-EXAMPLE = Path(__file__).parents[2] / "examples" / "push_to_a_pose.py"
+from tests.support.repository import script
 
 
 def test_measured_pushes_end_nearer_on_feet_than_on_an_ellipsoid():
@@ -46,10 +42,7 @@ def test_a_push_is_that_of_least_power_in_small_steps():
 
 
 def test_the_example_reaches_its_pose():
-    specification = importlib.util.spec_from_file_location("push_to_a_pose", EXAMPLE)
-    assert specification is not None and specification.loader is not None
-    example = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(example)
+    example = script("examples/push_to_a_pose.py")
     found = example.plan()
     assert found.push.end == pytest.approx(example.GOAL, abs=1e-4)
     assert found.report.sticks

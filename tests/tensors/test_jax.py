@@ -6,7 +6,6 @@ import functools
 import importlib
 import importlib.util
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +14,7 @@ from hypothesis import strategies as st
 
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError, MissingExtraError
+from tests.support.repository import script
 
 jax = pytest.importorskip("jax", reason="needs the extra [jax]")
 import jax.numpy as jnp  # noqa: E402
@@ -420,10 +420,7 @@ def test_a_missing_package_names_its_extra(monkeypatch):
 @pytest.mark.slow
 def test_the_example_with_diffrax_sticks_slips_and_turns(tmp_path):
     pytest.importorskip("diffrax", reason="needs diffrax")
-    path = Path(__file__).parents[2] / "examples" / "diffrax_contact.py"
-    specification = importlib.util.spec_from_file_location(path.stem, path)
-    example = importlib.util.module_from_spec(specification)
-    specification.loader.exec_module(example)
+    example = script("examples/diffrax_contact.py")
     times, states, forces = example.run(duration=1.6)
     # The hook is off the middle: the block gives way, turning, where the wrench of the spring is on the limit surface,
     square = pf.LimitSurfaceExact(pf.ContactPatch.rectangle(example.SIDE, cells=11))
