@@ -16,6 +16,9 @@ import matplotlib  # noqa: E402
 matplotlib.use("Agg")
 
 import planarfriction  # noqa: E402
+from planarfriction.cli.app import app  # noqa: E402
+
+app.add_installed()  # `sphinx_click` does not ask for commands that other packages add
 
 project = "planarfriction"
 author = "the authors of planarfriction"

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 import planarfriction as pf
-from planarfriction.experiments.in_hand.runs import CENTRES_OF_MASS
-from planarfriction.experiments.runs import IN_WORDS, LAW
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction.scenes.scene import RTOL
+from planarfriction_studies.experiments.in_hand.runs import CENTRES_OF_MASS
+from planarfriction_studies.experiments.runs import IN_WORDS, LAW
 
 MODELS: dict[str, Callable[[pf.ContactPatch], Any]] = {
     "distributed": lambda patch: pf.DistributedModel(patch, LAW),

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from planarfriction.cli import main as planarfriction
-from planarfriction.measured import TASKS
+from planarfriction_studies.measured import TASKS
 
 MARK = re.compile(r"<!-- measured: (?P<name>.+?) -->\n\n(?:(?:\|.*\n)+\n)?")
 PICTURES = {"measured-slides.png", "measured-pushes.png", "measured-series.png"}

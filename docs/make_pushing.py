@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 import planarfriction as pf
-from planarfriction.measured import followed
-from planarfriction.measured.scores import drawings, interval, mean
 from planarfriction.plots import style
 from planarfriction.plots.pushing import draw_push
+from planarfriction_studies.measured import followed
+from planarfriction_studies.measured.scores import drawings, interval, mean
 
 PAGE = Path(__file__).parent / "pushing.md"
 MARK = re.compile(r"<!-- followed pushes -->\n\n(?:\|.*\n)+")

@@ -22,9 +22,9 @@ import planarfriction as pf
 from planarfriction.cli.console import print_table, work_progress
 from planarfriction.errors import FrictionError
 from planarfriction.identify import Slide, SlidingBody, identify_motion, predict_slide
-from planarfriction.measured import Case as Toss
-from planarfriction.measured import slides as measured
-from planarfriction.measured.scores import rms
+from planarfriction_studies.measured import Case as Toss
+from planarfriction_studies.measured import slides as measured
+from planarfriction_studies.measured.scores import rms
 
 BODY = SlidingBody(measured.MASS, measured.INERTIA)
 SQUARE = measured.face()

@@ -22,10 +22,10 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import EventStatus
 from pydrake.systems.primitives import ConstantValueSource, ConstantVectorSource, LogVectorOutput
 
-from planarfriction import bench
 from planarfriction.adapters.drake import Friction, PatchContact, prepare
-from planarfriction.bench.coulomb_disc import stop
 from planarfriction.errors import InvalidValueError, MissingExtraError
+from planarfriction_studies import bench
+from planarfriction_studies.bench.coulomb_disc import stop
 from tests.support.drake_scenes import CONTACTS, bare, gripped, on_the_floor, running, sliding
 
 pytestmark = pytest.mark.drake

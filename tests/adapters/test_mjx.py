@@ -19,8 +19,8 @@ import mujoco  # noqa: E402
 from planarfriction.adapters import mujoco as adapter  # noqa: E402
 from planarfriction.adapters.mjx import Friction, PatchContact, newton, prepare  # noqa: E402
 from planarfriction.adapters.mjx.friction import _in_jax  # noqa: E402
-from planarfriction.bench import coulomb_disc  # noqa: E402
-from planarfriction.bench.mujoco_scenes import STARTS, Native, disc, grip  # noqa: E402
+from planarfriction_studies.bench import coulomb_disc  # noqa: E402
+from planarfriction_studies.bench.mujoco_scenes import STARTS, Native, disc, grip  # noqa: E402
 from tests.support.coupling_problems import random_bodies, random_patches, random_run  # noqa: E402
 
 pytestmark = pytest.mark.mjx

@@ -14,8 +14,12 @@ mujoco = pytest.importorskip("mujoco")
 
 from mujoco import rollout  # noqa: E402
 
-from planarfriction.adapters.mujoco import Friction, PatchContact, prepare  # noqa: E402
-from planarfriction.bench import mujoco_scenes  # noqa: E402
+from planarfriction.adapters.mujoco import (  # noqa: E402
+    Friction,
+    PatchContact,
+    prepare,
+)
+from planarfriction_studies.bench import mujoco_scenes  # noqa: E402
 from tests.support.mujoco_misfit import misfit, step_checked, twists_and_loads  # noqa: E402
 
 pytestmark = pytest.mark.mujoco

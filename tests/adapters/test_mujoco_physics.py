@@ -11,8 +11,8 @@ import planarfriction as pf
 
 mujoco = pytest.importorskip("mujoco")
 
-from planarfriction.bench import coulomb_disc, mujoco_scenes  # noqa: E402
 from planarfriction.scenes import in_hand, in_hand_load, simulate  # noqa: E402
+from planarfriction_studies.bench import coulomb_disc, mujoco_scenes  # noqa: E402
 from tests.support.mujoco_misfit import step_checked  # noqa: E402
 
 pytestmark, SLOW = pytest.mark.mujoco, pytest.mark.slow

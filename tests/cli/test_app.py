@@ -10,13 +10,16 @@ import sys
 from pathlib import Path
 from types import SimpleNamespace
 
+import click
 import numpy as np
 import pytest
 from PIL import Image
 
 import planarfriction as pf
 from planarfriction import __version__, scenes
-from planarfriction.cli import main, output
+from planarfriction.cli import commands, main, output
+from planarfriction.cli.app import app
+from planarfriction.cli.commands import PACKAGES
 from planarfriction.cli.patches import find_patch
 from planarfriction.cli.report import largest_differences
 from planarfriction.cli.run import build_scenes
@@ -430,7 +433,7 @@ def measured(monkeypatch) -> list:
         progress("import")
         return LINES
 
-    monkeypatch.setitem(sys.modules, "planarfriction.bench", SimpleNamespace(run=run))
+    monkeypatch.setitem(sys.modules, "planarfriction_studies.bench", SimpleNamespace(run=run))
     monkeypatch.setattr(pf, "bench", SimpleNamespace(run=run), raising=False)
     return calls
 
@@ -454,3 +457,44 @@ def test_an_own_shape_without_parameters_keeps_the_names_of_patches(monkeypatch)
     monkeypatch.setattr(SHAPES, "_members", dict(SHAPES._members))
     SHAPES.register("thumb", lambda: pf.ContactPatch.disc(0.01))
     assert find_patch("disc", cell_size=None).name == "disc"
+
+
+# ---------------------------------------------------------------------- commands of other packages
+
+
+def test_every_command_of_the_distribution_is_there():
+    assert set(PACKAGES) <= set(app.list_commands(click.Context(app)))
+
+
+@pytest.mark.parametrize("stripped", ["no entry points", "no modules"])
+def test_a_command_whose_package_is_missing_says_what_to_install(monkeypatch, capsys, stripped):
+    monkeypatch.setattr(app, "commands", {name: app.commands[name] for name in app.commands if name not in PACKAGES})
+    if stripped == "no entry points":
+        monkeypatch.setattr(commands, "entry_points", lambda *, group: [])
+    else:
+        for name in set(PACKAGES.values()):
+            for loaded in [each for each in sys.modules if each.partition(".")[0] == name]:
+                monkeypatch.delitem(sys.modules, loaded)
+            monkeypatch.setitem(sys.modules, name, None)
+    for name, package in PACKAGES.items():
+        assert main([name, "--quick"]) == 2
+        said = capsys.readouterr().err
+        assert said == (
+            f"error: planarfriction {name} needs the package {package}, which comes with planarfriction:"
+            " run pip install --force-reinstall --no-deps planarfriction\n"
+        )
+    assert main(["--help"]) == 0
+    assert "bench" not in capsys.readouterr().out
+
+
+def test_commands_of_ones_own_package_are_added_but_replace_none(monkeypatch, capsys):
+    @click.command()
+    def hello() -> None:
+        print("hello")
+
+    entries = [SimpleNamespace(name=name, load=lambda: hello) for name in ("hello", "run")]
+    monkeypatch.setattr(app, "commands", dict(app.commands))
+    monkeypatch.setattr(commands, "entry_points", lambda *, group: entries)
+    assert main(["hello"]) == 0
+    assert capsys.readouterr().out == "hello\n"
+    assert app.commands["run"] is not hello

@@ -10,7 +10,7 @@ import io
 import pkgutil
 import re
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import matplotlib
 import pytest
@@ -152,10 +152,9 @@ def test_links_lead_somewhere(page):
             assert anchor in anchors(target), f"{page.name}: {link} (headings: {sorted(anchors(target))})"
 
 
-def resolve(name: str) -> bool:
-    """Return True if a dotted name exists in the package: modules, functions, classes and the fields of classes."""
-    parts = name.split(".")
-    value = planarfriction
+def resolve(name: str, package: Any = planarfriction) -> bool:
+    """Return True if a package has a dotted name: modules, functions, classes and the fields of classes."""
+    parts, value = name.split("."), package
     for i, part in enumerate(parts):
         fields = getattr(value, "__dataclass_fields__", None) or dict.fromkeys(getattr(value, "_fields", ()))
         if hasattr(value, part):
@@ -164,7 +163,7 @@ def resolve(name: str) -> bool:
             return i == len(parts) - 1
         else:
             try:
-                value = importlib.import_module(".".join(["planarfriction", *parts[: i + 1]]))
+                value = importlib.import_module(".".join([package.__name__, *parts[: i + 1]]))
             except ImportError:
                 return False
     return True
@@ -181,6 +180,8 @@ def test_names_exist(page):
             continue  # a name of that package itself, or one that cannot be looked up without it
         if first in ("pf", "planarfriction"):
             assert resolve(rest), f"{page.name}: {name}"
+        elif first in ("planarfriction_studies", "planarfriction_explorer"):
+            assert resolve(rest, importlib.import_module(first)), f"{page.name}: {name}"
         elif (first in MODULES or first in planarfriction.__all__) and not name.endswith((".py", ".md")):
             assert resolve(name), f"{page.name}: {name}"
 

@@ -77,8 +77,8 @@ def origins(tree: ast.AST, until: int) -> dict[str, bool]:
         if isinstance(node, (ast.Import, ast.ImportFrom)):
             for each in node.names:
                 package = (getattr(node, "module", None) or each.name).partition(".")[0]
-                if package in (*FOREIGN, "planarfriction"):
-                    ours[each.asname or each.name.partition(".")[0]] = package == "planarfriction"
+                if package in FOREIGN or package.startswith("planarfriction"):
+                    ours[each.asname or each.name.partition(".")[0]] = package.startswith("planarfriction")
         if isinstance(node, ast.Lambda):
             ours.update(dict.fromkeys((each.arg for each in node.args.args), False))
         if isinstance(node, (ast.Assign, ast.For, ast.comprehension)):

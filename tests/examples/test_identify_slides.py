@@ -11,7 +11,7 @@ import pytest
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify import Slide, SlidingBody, fit_start
-from planarfriction.measured.tables import TABLES
+from planarfriction_studies.measured.tables import TABLES
 from tests.support.repository import script
 
 MU = 0.31

@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.explore import code
-from planarfriction.explore.ladder import RUNGS
-from planarfriction.explore.state import State
+from planarfriction_explorer import code
+from planarfriction_explorer.ladder import RUNGS
+from planarfriction_explorer.state import State
 
 pytestmark = [pytest.mark.slow, pytest.mark.explore]
 

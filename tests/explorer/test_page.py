@@ -13,14 +13,14 @@ import numpy as np
 import pytest
 
 from planarfriction.errors import FrictionError, InvalidValueError
-from planarfriction.explore.answers import answer
+from planarfriction_explorer.answers import answer
 
 pn = pytest.importorskip("panel", reason="needs Panel, the extra [explore]")
 
-from planarfriction.explore.controls import OWN  # noqa: E402
-from planarfriction.explore.live import GivenUp, Live  # noqa: E402
-from planarfriction.explore.page import Page  # noqa: E402
-from planarfriction.explore.server import open_server  # noqa: E402
+from planarfriction_explorer.controls import OWN  # noqa: E402
+from planarfriction_explorer.live import GivenUp, Live  # noqa: E402
+from planarfriction_explorer.page import Page  # noqa: E402
+from planarfriction_explorer.server import open_server  # noqa: E402
 
 
 @pytest.fixture

@@ -11,11 +11,11 @@ from hypothesis import strategies as st
 
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
-from planarfriction.experiments.in_hand.runs import CENTRES_OF_MASS, TIGHT, Case, distance
-from planarfriction.experiments.runs import LAW, columns
 from planarfriction.patch import PUBLISHED_PATCHES, surface_error
 from planarfriction.patch.compressed import number_of_moments
 from planarfriction.scenes.ready import in_hand, in_hand_load
+from planarfriction_studies.experiments.in_hand.runs import CENTRES_OF_MASS, TIGHT, Case, distance
+from planarfriction_studies.experiments.runs import LAW, columns
 
 SQUARE = pf.ContactPatch.rectangle(0.02)
 SOFT = pf.ContactPatch.disc(0.01, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k_per_newton=2.0, radius_max=0.01))

@@ -18,7 +18,6 @@ from mpl_toolkits.mplot3d import Axes3D
 import planarfriction as pf
 from planarfriction import plots
 from planarfriction.errors import InvalidValueError, MissingExtraError
-from planarfriction.experiments import looks
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction.plots import histories, motion, style
 from planarfriction.plots.limit_surface import (

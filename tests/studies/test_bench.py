@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from planarfriction import bench
-from planarfriction.bench.measurement import line
 from planarfriction.errors import InvalidValueError
+from planarfriction_studies import bench
+from planarfriction_studies.bench.measurement import line
 from tests.support.repository import script
 
 DOCS = Path(__file__).parents[2] / "docs"

@@ -9,16 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planarfriction.experiments import EXPERIMENTS
-from planarfriction.experiments.beyond import grooves, in_hand, ladder, plateaus
-from planarfriction.experiments.beyond import run as beyond
-from planarfriction.experiments.beyond import surfaces as beyond_surfaces
-from planarfriction.experiments.beyond.ladder_figure import FAMILIES
-from planarfriction.experiments.experiment import Work
-from planarfriction.experiments.in_hand.runs import Case
-from planarfriction.experiments.runs import IN_WORDS
 from planarfriction.limit_surface import LimitSurfaceCells, LimitSurfaceExact
 from planarfriction.patch import PUBLISHED_PATCHES
+from planarfriction_studies.experiments import EXPERIMENTS
+from planarfriction_studies.experiments.beyond import grooves, in_hand, ladder, plateaus
+from planarfriction_studies.experiments.beyond import run as beyond
+from planarfriction_studies.experiments.beyond import surfaces as beyond_surfaces
+from planarfriction_studies.experiments.beyond.ladder_figure import FAMILIES
+from planarfriction_studies.experiments.experiment import Work
+from planarfriction_studies.experiments.in_hand.runs import Case
+from planarfriction_studies.experiments.runs import IN_WORDS
 
 
 @pytest.fixture(scope="module")

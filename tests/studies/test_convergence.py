@@ -7,11 +7,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from planarfriction.experiments import facts
-from planarfriction.experiments.convergence import run as convergence
-from planarfriction.experiments.convergence import runs
-from planarfriction.experiments.experiment import Work
 from planarfriction.scenes import Signal
+from planarfriction_studies.experiments import facts
+from planarfriction_studies.experiments.convergence import run as convergence
+from planarfriction_studies.experiments.convergence import runs
+from planarfriction_studies.experiments.experiment import Work
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.experiments.runs import LAW
 from planarfriction.patch import PUBLISHED_PATCHES
+from planarfriction_studies.experiments.runs import LAW
 from tests.support.repository import script
 
 MOST = np.array([5e-6, 2e-5])

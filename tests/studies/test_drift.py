@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from planarfriction.experiments import facts
-from planarfriction.experiments.drift import run as drift
-from planarfriction.experiments.experiment import Work, compare_curve
+from planarfriction_studies.experiments import facts
+from planarfriction_studies.experiments.drift import run as drift
+from planarfriction_studies.experiments.experiment import Work, compare_curve
 
 
 @pytest.fixture(scope="module")

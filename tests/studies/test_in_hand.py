@@ -8,17 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from planarfriction.experiments import facts
-from planarfriction.experiments.experiment import Result, Work
-from planarfriction.experiments.in_hand.run import CASES, KINDS, LESS, MORE, REDUCED, run
-from planarfriction.experiments.in_hand.runs import (
+from planarfriction_studies.experiments import facts
+from planarfriction_studies.experiments.experiment import Result, Work
+from planarfriction_studies.experiments.in_hand.run import CASES, KINDS, LESS, MORE, REDUCED, run
+from planarfriction_studies.experiments.in_hand.runs import (
     Case,
     compare_with_converged,
     compare_with_published,
     simulated,
     with_friction,
 )
-from planarfriction.experiments.runs import LAW
+from planarfriction_studies.experiments.runs import LAW
 
 
 @pytest.fixture(scope="module")

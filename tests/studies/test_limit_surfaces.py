@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from scipy import integrate
 
-from planarfriction.experiments import facts
-from planarfriction.experiments.experiment import Work
-from planarfriction.experiments.limit_surfaces import run as limit_surfaces
-from planarfriction.experiments.limit_surfaces.gradient import half_load_cell, linear_line
-from planarfriction.experiments.limit_surfaces.patches import patch_comparisons
-from planarfriction.experiments.runs import SIX_SHAPES
 from planarfriction.limit_surface import LimitSurfaceCells, LimitSurfaceEllipsoid
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
+from planarfriction_studies.experiments import facts
+from planarfriction_studies.experiments.experiment import Work
+from planarfriction_studies.experiments.limit_surfaces import run as limit_surfaces
+from planarfriction_studies.experiments.limit_surfaces.gradient import half_load_cell, linear_line
+from planarfriction_studies.experiments.limit_surfaces.patches import patch_comparisons
+from planarfriction_studies.experiments.runs import SIX_SHAPES
 
 
 @pytest.fixture(scope="module")

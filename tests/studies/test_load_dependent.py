@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from planarfriction.experiments import facts
-from planarfriction.experiments.experiment import Result, Work
-from planarfriction.experiments.in_hand.runs import compare_with_converged, simulated
-from planarfriction.experiments.load_dependent.models import (
+from planarfriction_studies.experiments import facts
+from planarfriction_studies.experiments.experiment import Result, Work
+from planarfriction_studies.experiments.in_hand.runs import compare_with_converged, simulated
+from planarfriction_studies.experiments.load_dependent.models import (
     DISTRIBUTED,
     KEPT,
     KEPT_LARGEST,
@@ -22,7 +22,7 @@ from planarfriction.experiments.load_dependent.models import (
     soft_patch,
     soft_scene,
 )
-from planarfriction.experiments.load_dependent.run import run
+from planarfriction_studies.experiments.load_dependent.run import run
 
 
 @pytest.fixture(scope="module")

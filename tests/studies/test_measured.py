@@ -15,11 +15,11 @@ import pytest
 import planarfriction as pf
 from planarfriction.cli import main
 from planarfriction.errors import InvalidValueError
-from planarfriction.measured import TASKS, Benchmark, glide, models, pushes, series, steady, tossed
-from planarfriction.measured.figures import draw, ellipse
-from planarfriction.measured.mujoco_box import MujocoBox
-from planarfriction.measured.scores import angles, drawings, interval, mean
-from planarfriction.measured.tables import TABLES, shipped
+from planarfriction_studies.measured import TASKS, Benchmark, glide, models, pushes, series, steady, tossed
+from planarfriction_studies.measured.figures import draw, ellipse
+from planarfriction_studies.measured.mujoco_box import MujocoBox
+from planarfriction_studies.measured.scores import angles, drawings, interval, mean
+from planarfriction_studies.measured.tables import TABLES, shipped
 from tests.support.repository import script
 
 MU = 0.31

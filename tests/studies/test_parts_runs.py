@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.experiments.beyond import ladder
-from planarfriction.experiments.beyond import shapes as new_shapes
-from planarfriction.experiments.in_hand.runs import FRICTION_CHANGE, Case, columns, end_distance, with_friction
-from planarfriction.experiments.runs import LAW
 from planarfriction.patch import PUBLISHED_PATCHES
+from planarfriction_studies.experiments.beyond import ladder
+from planarfriction_studies.experiments.beyond import shapes as new_shapes
+from planarfriction_studies.experiments.in_hand.runs import FRICTION_CHANGE, Case, columns, end_distance, with_friction
+from planarfriction_studies.experiments.runs import LAW
 
 ROUND = ("Circle", "Square")
 

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.experiments.facts import converged
 from planarfriction.geometry import wrench_at
 from planarfriction.patch import PUBLISHED_PATCHES
+from planarfriction_studies.experiments.facts import converged
 
 ELASTIC = pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
 PLAIN = pf.LuGre(mu_s=1.2)

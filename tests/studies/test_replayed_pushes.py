@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.bench import plans
-from planarfriction.measured import followed
 from planarfriction.planning import Pusher, Slider, push
+from planarfriction_studies.bench import plans
+from planarfriction_studies.measured import followed
 from tests.support.repository import script
 
 

@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from jinja2 import UndefinedError
 
-from planarfriction import experiments
 from planarfriction.cli import main
 from planarfriction.errors import InvalidValueError
-from planarfriction.experiments import facts
-from planarfriction.experiments.experiment import (
+from planarfriction_studies import experiments
+from planarfriction_studies.experiments import facts
+from planarfriction_studies.experiments.experiment import (
     Picture,
     Result,
     Table,
@@ -27,10 +27,10 @@ from planarfriction.experiments.experiment import (
     dataset,
     table,
 )
-from planarfriction.experiments.markup import name_to_html, to_html
-from planarfriction.experiments.report import write_report
-from planarfriction.experiments.reproduction import Reproduction
-from planarfriction.experiments.wording import environment, fill, fmt, number, power, short, span
+from planarfriction_studies.experiments.markup import name_to_html, to_html
+from planarfriction_studies.experiments.report import write_report
+from planarfriction_studies.experiments.reproduction import Reproduction
+from planarfriction_studies.experiments.wording import environment, fill, fmt, number, power, short, span
 
 
 class Made:
@@ -328,7 +328,7 @@ def test_a_full_disk_ends_in_one_line_and_keeps_what_was_there(tmp_path, monkeyp
     """The pieces of an experiment and its results are written as everything is: whole, or not at all."""
     from planarfriction import writing
     from planarfriction.errors import FileError
-    from planarfriction.experiments.experiment import Work
+    from planarfriction_studies.experiments.experiment import Work
 
     kept = Work(folder=tmp_path, fingerprint="one").piece("a piece", lambda: {"x": np.arange(3.0)})
 

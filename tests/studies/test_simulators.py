@@ -8,15 +8,15 @@ from pathlib import Path
 import pytest
 
 from planarfriction.cli import main
-from planarfriction.experiments.experiment import Work
+from planarfriction_studies.experiments.experiment import Work
 
 pytest.importorskip("mujoco", reason="needs MuJoCo: pip install 'planarfriction[mujoco]'")
 
-from planarfriction.bench import mujoco_scenes
-from planarfriction.experiments.simulators import drake as simulators_drake
-from planarfriction.experiments.simulators import run as simulators
-from planarfriction.experiments.simulators import runs as simulators_runs
-from planarfriction.experiments.simulators.runs import NATIVE, PATCHES
+from planarfriction_studies.bench import mujoco_scenes
+from planarfriction_studies.experiments.simulators import drake as simulators_drake
+from planarfriction_studies.experiments.simulators import run as simulators
+from planarfriction_studies.experiments.simulators import runs as simulators_runs
+from planarfriction_studies.experiments.simulators.runs import NATIVE, PATCHES
 
 pytestmark = pytest.mark.mujoco
 

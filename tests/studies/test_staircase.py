@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy import integrate
 
-from planarfriction.experiments import facts
-from planarfriction.experiments.experiment import Work, compare_curve
-from planarfriction.experiments.staircase import run as staircase
 from planarfriction.limit_surface import LimitSurfaceCells
 from planarfriction.patch import PUBLISHED_PATCHES
+from planarfriction_studies.experiments import facts
+from planarfriction_studies.experiments.experiment import Work, compare_curve
+from planarfriction_studies.experiments.staircase import run as staircase
 
 
 @pytest.fixture(scope="module")

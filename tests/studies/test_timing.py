@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.bench.baselines import LSODA, Window
-from planarfriction.experiments import facts
-from planarfriction.experiments.experiment import Work
-from planarfriction.experiments.runs import published_model
-from planarfriction.experiments.timing import run as timing
-from planarfriction.experiments.timing import runs
 from planarfriction.scenes import in_hand
+from planarfriction_studies.bench.baselines import LSODA, Window
+from planarfriction_studies.experiments import facts
+from planarfriction_studies.experiments.experiment import Work
+from planarfriction_studies.experiments.runs import published_model
+from planarfriction_studies.experiments.timing import run as timing
+from planarfriction_studies.experiments.timing import runs
 
 
 @pytest.fixture(scope="module")

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from planarfriction.experiments import facts
-from planarfriction.experiments.experiment import Work
-from planarfriction.experiments.velocity_driven import boxes
-from planarfriction.experiments.velocity_driven import run as velocity_driven
+from planarfriction_studies.experiments import facts
+from planarfriction_studies.experiments.experiment import Work
+from planarfriction_studies.experiments.velocity_driven import boxes
+from planarfriction_studies.experiments.velocity_driven import run as velocity_driven
 
 
 @pytest.fixture(scope="module")

@@ -64,7 +64,7 @@ def sweep(
     from planarfriction import sweeps, validation
     from planarfriction.cli import INTERRUPTED
     from planarfriction.cli.console import count_progress, note
-    from planarfriction.cli.measured import load_function
+    from planarfriction.cli.own_function import load_function
     from planarfriction.cli.run import scene_makers
     from planarfriction.errors import FrictionError, SweepInterrupted
     from planarfriction.families import MODELS

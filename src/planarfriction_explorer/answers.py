@@ -1,0 +1,59 @@
+"""What friction answers to the state: the wrench of steady sliding, and what limit surface and ellipsoid say of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from planarfriction import geometry
+from planarfriction_explorer.state import State
+
+
+@dataclass(frozen=True)
+class Answer:
+    """The friction of a state; wrenches `(fx, fy, tau)` [N, N, N m] on the body, about the contact frame's origin."""
+
+    friction: np.ndarray
+    """Wrench of steady sliding with the law, `[3]`."""
+    surface: np.ndarray
+    """Wrench of the exact limit surface at `mu_c f_N`, `[3]`: no Stribeck, no viscous friction."""
+    ellipsoid: np.ndarray
+    """Wrench of the ellipsoid at `mu_c f_N`, `[3]`."""
+    points: np.ndarray
+    """The three as points `(fx, fy, tau/r)/(mu_c f_N)` about the centre of pressure, `[3, 3]` [-]."""
+    force_error: float
+    """Distance of the ellipsoid's point from the surface's [-]."""
+    angle_error: float
+    """Angle [deg] between the twist and the one that the ellipsoid gives for the wrench of the surface."""
+    power: float
+    """Dissipated power [W]."""
+
+
+def answer(state: State) -> Answer:
+    """The friction of a state. Raises `InvalidValueError` where nothing presses, or a single point alone."""
+    surface, ellipsoid = state.drawing.surface, state.drawing.ellipsoid
+    twist, strength = np.array(state.twist), state.law.numbers.mu_c * state.normal_force
+    unit = surface.wrench(twist)
+    friction, on_surface, on_ellipsoid = steady_wrench(state), strength * unit, strength * ellipsoid.wrench(twist)
+    wrenches = np.stack([friction, on_surface, on_ellipsoid])
+    scale = np.array([1.0, 1.0, surface.contact_radius])
+    points = geometry.wrench_at(wrenches, surface.centre_of_pressure) / (strength * scale)
+    angle = 0.0
+    if unit.any():
+        both = np.stack([twist, ellipsoid.twist(unit)])
+        here, there = geometry.twist_at(both, surface.centre_of_pressure) * scale
+        angle = float(np.degrees(np.arctan2(np.linalg.norm(np.cross(here, there)), here @ there)))
+    error = float(np.linalg.norm(points[2] - points[1]))
+    return Answer(friction, on_surface, on_ellipsoid, points, error, angle, float(-friction @ twist))
+
+
+def steady_wrench(state: State) -> np.ndarray:
+    """Wrench `[3]` of steady sliding, `-f_N sum(w_i F(|v_i|) B_i' v_i/|v_i|)` with the friction F of the law."""
+    patch = state.drawing.patch
+    x, y = patch.positions.T
+    vx, vy, _ = geometry.twist_at(np.array(state.twist), patch.positions).T
+    speed = np.hypot(vx, vy)
+    share = patch.weights() * state.law.steady_friction(speed) / np.where(speed > 0.0, speed, 1.0)
+    fx, fy = -state.normal_force * share * vx, -state.normal_force * share * vy
+    return np.array([fx.sum(), fy.sum(), (x * fy - y * fx).sum()])

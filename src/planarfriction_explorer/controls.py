@@ -1,0 +1,129 @@
+"""The fields and sliders of the page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import panel as pn
+
+from planarfriction.laws import LAWS
+from planarfriction.patch import PUBLISHED_PATCHES
+from planarfriction_explorer import looks
+from planarfriction_explorer.state import State, law_parameters
+
+TOOLS = {"Centre of rotation": "turn", "Velocity": "slide", "Brush": "brush", "Eraser": "erase"}
+"""What a drag over the map does."""
+
+OWN = "own map"
+"""Choice of the patch while it is none of the published ones."""
+
+UNITS = {
+    "v_s": "m/s",
+    "sigma_0": "1/m",
+    "sigma_1": "s/m",
+    "sigma_2": "s/m",
+    "creep_speed": "m/s",
+    "relaxation_time": "s",
+}
+"""Units of the parameters of laws that have one."""
+
+
+class Controls:
+    """All that can be set; `values` of a law are in `parameters`, a field each."""
+
+    def __init__(self, state: State):
+        widgets = pn.widgets
+        self.patch = widgets.Select(label="Patch", options=[*PUBLISHED_PATCHES, OWN], value=state.drawing.name)
+        self.file = widgets.FileInput(accept="")
+        self.cell_size = widgets.FloatInput(label="Cell size [mm]", step=0.1, format="0[.]0000")
+        self.clear = widgets.Button(label="Clear the map", align="end")
+        self.tool = widgets.RadioButtonGroup(options=TOOLS, value="turn", color="primary", variant="outline")
+        self.brush = widgets.FloatSlider(label="Radius of the brush [cells]", start=0.5, end=6.0, step=0.5, value=1.5)
+        self.pressure = widgets.FloatSlider(label="Pressure of the brush", start=0.1, end=1.0, step=0.1, value=1.0)
+        self.law = widgets.Select(label="Law", options=list(LAWS), value=LAWS.name_of(state.law))
+        self.load = widgets.FloatInput(label="Normal force [N]", value=state.normal_force, step=0.5)
+        vx, vy, omega = state.twist
+        self.vx = widgets.FloatSlider(label="vx [mm/s]", start=-100.0, end=100.0, step=0.1, value=1e3 * vx)
+        self.vy = widgets.FloatSlider(label="vy [mm/s]", start=-100.0, end=100.0, step=0.1, value=1e3 * vy)
+        self.omega = widgets.FloatSlider(label="ω [rad/s]", start=-10.0, end=10.0, step=0.01, value=omega)
+        for name, widget in vars(self).items():  # a name for the widget in the page too
+            widget.css_classes = [name.replace("_", "-")]
+            widget.sizing_mode = "stretch_width"
+            widget.margin = (3, 0, 5, 0)
+        self._silent = False
+        self.parameters: Any = pn.FlexBox(gap="0 8px", sizing_mode="stretch_width")
+
+    def on(self, widget: Any, act: Callable[[Any], Any]) -> None:
+        """Do `act` with each new value that the user gives."""
+        widget.param.watch(lambda event: None if self._silent or event.new is None else act(event.new), "value")
+
+    def offer_parameters(self, law: Any, changed: Callable[[Any], Any]) -> None:
+        """Fields for the parameters of the law; empty ones have a default that depends on others."""
+        fields = []
+        for name, value in law_parameters(law).items():
+            unit = f" [{UNITS[name]}]" if name in UNITS else ""
+            fields.append(
+                pn.widgets.FloatInput(
+                    label=name + unit,
+                    value=value,
+                    css_classes=["parameter", name],
+                    tags=[name],
+                    styles=looks.grows(110),
+                    margin=(3, 0, 5, 0),
+                )
+            )
+            fields[-1].param.watch(lambda event: None if self._silent else changed(event.new), "value")
+        self.parameters.objects = fields
+
+    def law_values(self) -> dict[str, float | None]:
+        """What stands in the fields of the law."""
+        return {each.tags[0]: each.value for each in self.parameters}
+
+    def show(self, state: State) -> None:
+        """Set the controls to the state, without taking that for a wish of the user."""
+        vx, vy, omega = state.twist
+        drawing = state.drawing
+        values: dict[Any, Any] = {
+            self.vx: 1e3 * vx,
+            self.vy: 1e3 * vy,
+            self.omega: omega,
+            self.load: state.normal_force,
+            self.cell_size: 1e3 * drawing.cell_size,
+            self.patch: drawing.name if drawing.origin == "published" else OWN,
+        }
+        self._silent = True
+        try:
+            for widget, value in values.items():
+                if widget.value != value:
+                    widget.value = value
+        finally:
+            self._silent = False
+
+    def layout(self) -> Any:
+        """All but the tool, one below the other."""
+        return pn.Column(
+            _heading("Contact"),
+            self.patch,
+            _label("Pressure map from a file (.csv, .npy, grey image)"),
+            self.file,
+            pn.Row(self.cell_size, pn.Spacer(width=8), self.clear, sizing_mode="stretch_width"),
+            self.brush,
+            self.pressure,
+            _heading("Friction"),
+            self.law,
+            self.parameters,
+            self.load,
+            _heading("Motion of the origin"),
+            *(self.vx, self.vy, self.omega),
+            stylesheets=[looks.SIDE],
+            styles=looks.grows(270, most=320),
+        )
+
+
+def _heading(text: str) -> Any:
+    return pn.pane.HTML(f"<b style='font-size:15px'>{text}</b>", margin=(8, 0, 2, 0))
+
+
+def _label(text: str) -> Any:
+    return pn.pane.HTML(text, margin=(3, 0, 0, 0))

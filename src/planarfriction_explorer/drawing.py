@@ -1,0 +1,136 @@
+"""What presses: a map of relative pressures that is chosen, read from a file, or painted."""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from planarfriction import geometry, validation
+from planarfriction.errors import InvalidValueError
+from planarfriction.limit_surface import LimitSurfaceEllipsoid, LimitSurfaceExact
+from planarfriction.limit_surface.comparison import directions
+from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch, Grid, read_pressure_map
+from planarfriction_explorer.uploads import as_file, plain_name
+
+MOST_SIDE = 64
+"""Most rows and columns of a map: with more, a stroke of the brush would no longer follow the hand."""
+
+SAMPLES = 100
+"""Directions in which ellipsoid and surface are compared."""
+
+DRAWN = "drawn"
+"""Name of a map that was painted."""
+
+
+@dataclass(frozen=True, eq=False)
+class Drawing:
+    """Relative pressures on square cells about the origin, row 0 at the top, and where they come from."""
+
+    pressures: np.ndarray
+    """Relative pressures, shape `[rows, columns]` [-]; only their ratios matter."""
+    cell_size: float
+    """Side of a cell [m]."""
+    name: str = DRAWN
+    """Name of the published patch, of the file, or `DRAWN`."""
+    origin: Literal["published", "file", "drawn"] = "drawn"
+    """Where the pressures come from."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "cell_size", validation.positive("cell_size", self.cell_size))
+        self.pressures.setflags(write=False)
+
+    @classmethod
+    def published(cls, name: str) -> Drawing:
+        """The published patch `name`."""
+        patch = PUBLISHED_PATCHES.choose(name)()
+        pressures = np.zeros((patch.grid.rows, patch.grid.columns))
+        pressures[_places(patch.grid, patch.positions)] = patch.weights() / patch.weights().max()
+        return cls(pressures, patch.grid.cell_width, name, "published")
+
+    @classmethod
+    def read(cls, name: str, content: bytes, cell_size: float) -> Drawing:
+        """The pressure map in a file called `name`, of which the `content` is at hand.
+
+        Raises `FileError` for what is no map, and `InvalidValueError` for one of more than `MOST_SIDE` rows or columns.
+        """
+        name = plain_name(name)
+        with as_file(name, content) as path:
+            pressures = read_pressure_map(path)
+        if max(pressures.shape) > MOST_SIDE:
+            rule = f"have at most {MOST_SIDE} rows and columns here"
+            raise InvalidValueError(f"the map in {name}", rule, "{} x {}".format(*pressures.shape))
+        drawing = cls(pressures, cell_size, name, "file")
+        _ = drawing.patch  # refuses what is negative or empty now
+        return drawing
+
+    def painted(self, x: float, y: float, *, radius: float, pressure: float) -> Drawing:
+        """The map with a `pressure` on all cells whose middle is within `radius` [m] of the point (x, y) [m]."""
+        centres = self.grid.centres().reshape(*self.pressures.shape, 2)
+        under = np.hypot(centres[..., 0] - x, centres[..., 1] - y) <= radius
+        under[_places(self.grid, np.array([[x, y]]))] |= abs(x) < self.width / 2 and abs(y) < self.height / 2
+        return Drawing(np.where(under, pressure, self.pressures), self.cell_size)
+
+    def cleared(self) -> Drawing:
+        """The map without any pressure, ready to be painted."""
+        return Drawing(np.zeros_like(self.pressures), self.cell_size)
+
+    def scaled(self, cell_size: float) -> Drawing:
+        """The map with cells of another size [m]; a published patch has its own and becomes a painted map."""
+        if self.origin == "published":
+            return Drawing(self.pressures, cell_size)
+        return dataclasses.replace(self, cell_size=cell_size)
+
+    @property
+    def width(self) -> float:
+        """Width of the map [m]."""
+        return self.pressures.shape[1] * self.cell_size
+
+    @property
+    def height(self) -> float:
+        """Height of the map [m]."""
+        return self.pressures.shape[0] * self.cell_size
+
+    @property
+    def grid(self) -> Grid:
+        """The grid of the map."""
+        rows, columns = self.pressures.shape
+        return Grid.around_origin(self.width, self.height, columns, rows)
+
+    @functools.cached_property
+    def patch(self) -> ContactPatch:
+        """The contact patch. Raises `InvalidValueError` where nothing presses."""
+        if self.origin == "published":
+            return PUBLISHED_PATCHES[self.name]()
+        return ContactPatch.from_pressure(self.pressures, self.cell_size, name=self.name)
+
+    @functools.cached_property
+    def surface(self) -> LimitSurfaceExact:
+        """Its exact limit surface."""
+        return LimitSurfaceExact(self.patch)
+
+    @functools.cached_property
+    def ellipsoid(self) -> LimitSurfaceEllipsoid:
+        """The ellipsoid that is often put in its place."""
+        return LimitSurfaceEllipsoid(self.patch)
+
+    @functools.cached_property
+    def largest_errors(self) -> tuple[float, float]:
+        """How far the ellipsoid is off over all directions: distance of (fx, fy, tau/r) for the same twist [-], and
+        angle between the twists (vx, vy, r omega) of the same wrench [deg]."""
+        units, scale = directions(SAMPLES), np.array([1.0, 1.0, self.surface.contact_radius])
+        twists = geometry.twist_at(units / scale, -self.surface.centre_of_pressure)
+        apart = self.ellipsoid.wrench(twists) - self.surface.wrench(twists)
+        apart = geometry.wrench_at(apart, self.surface.centre_of_pressure) / scale
+        angle = self.ellipsoid.compare(self.surface, samples=SAMPLES).angle.largest
+        return float(np.linalg.norm(apart, axis=1).max()), angle
+
+
+def _places(grid: Grid, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rows and columns of the cells that hold `positions` `[N, 2]` [m], or that lie nearest."""
+    columns = np.floor((positions[:, 0] - grid.x_min) / grid.cell_width).astype(int)
+    from_below = np.floor((positions[:, 1] - grid.y_min) / grid.cell_height).astype(int)
+    return np.clip(grid.rows - 1 - from_below, 0, grid.rows - 1), np.clip(columns, 0, grid.columns - 1)

@@ -1,0 +1,63 @@
+"""A scene as a moving picture with a player: a ready one with the contact on the screen, or one from a file."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from planarfriction.families import MODELS, SCENES
+from planarfriction.scenes import Scene, simulate
+from planarfriction.scenes.files import read_table, scene_from_dict
+from planarfriction_explorer.state import State
+from planarfriction_explorer.uploads import as_file, plain_name
+
+DPI = 80.0
+"""Dots per inch of the film: 768 across."""
+
+_MORE = """<style>
+body {margin: 0; font: 14px system-ui, sans-serif; color: #222}
+.animation {display: block; max-width: 768px}
+.animation img {width: 100%}
+input[type=range].anim-slider {width: 96%}
+.anim-buttons button {border: 1px solid #CCC; border-radius: 4px; background: #F5F5F5; padding: 4px 0;
+  cursor: pointer}
+.anim-buttons button:hover {background: #E0E0E0}
+</style>
+<script>setTimeout(() => document.querySelector("button[title=Play]").click(), 100)</script>"""
+"""The player of matplotlib as wide as there is room for; it begins to play by itself."""
+
+
+def ready_scene(state: State, name: str, model: str) -> Scene:
+    """The ready scene `name` with patch and law of the state in the `model`.
+
+    Raises `FrictionError` where the model does not take the law, or the scene not the patch.
+    """
+    return SCENES.choose(name)(MODELS.choose(model)(state.drawing.patch, state.law))
+
+
+def read_scene(name: str, content: bytes) -> Scene:
+    """The scene in a file called `name`, of which the `content` is at hand.
+
+    Paths of other files in it start from the folder in which the explorer was started.
+
+    Raises `FrictionError` in one line for what is no scene.
+    """
+    name = plain_name(name)
+    with as_file(name, content) as path:
+        table = read_table(path)
+    return scene_from_dict(table, folder=Path.cwd(), source=name)
+
+
+def film(scene: Scene, progress: Callable[[str, float], None]) -> str:
+    """Simulate the scene; its film as a page with a player.
+
+    `progress` is called now and then with what is being done and the share of the run that is done; what it raises
+    ends the work.
+    """
+    solution = simulate(scene, progress=lambda time: progress("simulating", time / scene.t_end))
+    end = float(solution.histories["time"].values[-1]) or 1.0
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "film.html"
+        solution.animate(path, dpi=DPI, progress=lambda time: progress("drawing", time / end))
+        return path.read_text(encoding="utf-8") + _MORE

@@ -1,0 +1,76 @@
+"""The map in the plane: what presses, how it slips, the forces, and the centre of rotation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from bokeh import events
+from bokeh.models import ColumnDataSource, LinearColorMapper, Range1d
+from bokeh.palettes import Cividis256
+from bokeh.plotting import figure
+
+from planarfriction_explorer import looks, pictures
+from planarfriction_explorer.answers import Answer
+from planarfriction_explorer.drawing import Drawing
+from planarfriction_explorer.state import State
+
+ROOM = 0.6
+"""Half of the side of the view, in the longer side of the map [-]."""
+
+
+class MapView:
+    """The picture of the map, as `figure`; `dragged` is called with a place [m], `released` at the end of a drag."""
+
+    def __init__(self, dragged: Callable[[float, float], None], released: Callable[[], None]):
+        self._sources: dict[str, Any] = {name: ColumnDataSource() for name in ("map", "slip", "wrench", "centre")}
+        plot: Any = figure(
+            name="map",
+            sizing_mode="scale_width",
+            aspect_ratio=1.0,
+            width=400,
+            height=400,
+            tools="",
+            toolbar_location=None,
+            x_axis_label="x [mm]",
+            y_axis_label="y [mm]",
+            x_range=Range1d(),
+            y_range=Range1d(),
+            min_border_left=56,  # borders of equal sums: the frame is as square as the whole, and so are the cells
+            min_border_right=10,
+            min_border_top=10,
+            min_border_bottom=56,
+        )
+        looks.tidy(plot)
+        plot.grid.visible = False
+        shades = LinearColorMapper(palette=Cividis256, low=0.0, high=1.0, nan_color="#FFFFFF00")
+        plot.image("image", "x", "y", "dw", "dh", source=self._sources["map"], color_mapper=shades, alpha=0.85)
+        arrows = (  # those of slip with a pale rim, so that they show on dark cells too
+            ("slip", "#FFFFFF", 3, 10),
+            ("slip", "#333333", 1, 6),
+            ("wrench", {"field": "colour"}, "width", 13),
+        )
+        for name, colour, width, size in arrows:
+            source = self._sources[name]
+            plot.segment("x0", "y0", "x1", "y1", source=source, color=colour, line_width=width)
+            plot.scatter("x1", "y1", angle="angle", marker="triangle", size=size, source=source, color=colour)
+        centre = {"source": self._sources["centre"], "size": 18, "line_width": 3, "color": "#D00000"}
+        plot.scatter("x", "y", marker="circle_cross", fill_alpha=0.0, **centre)
+        for kind in (events.PanStart, events.Pan, events.Tap):
+            plot.on_event(kind, lambda event: dragged(1e-3 * event.x, 1e-3 * event.y))
+        for kind in (events.PanEnd, events.Tap):
+            plot.on_event(kind, lambda _: released())
+        self.figure = plot
+
+    def draw(self, drawing: Drawing) -> None:
+        """Show another map."""
+        self._sources["map"].data = pictures.pressure_image(drawing)
+        half = ROOM * pictures.MM * max(drawing.width, drawing.height)
+        for each in (self.figure.x_range, self.figure.y_range):
+            each.update(start=-half, end=half)
+
+    def move(self, state: State, answer: Answer | None) -> None:
+        """Show another twist, and the forces of the answer if there is one."""
+        self._sources["centre"].data = pictures.points_of_interest(state)
+        self._sources["slip"].data = pictures.slip_arrows(state)
+        self._sources["wrench"].data = pictures.wrench_arrows(state, answer)

@@ -1,0 +1,245 @@
+"""The page in the browser: makes a new state of every change and shows what the pure functions say of it."""
+
+from __future__ import annotations
+
+import html
+import time
+from collections.abc import Callable
+from typing import Any
+
+import panel as pn
+
+from planarfriction.errors import FrictionError
+from planarfriction_explorer import code, looks, pictures
+from planarfriction_explorer.answers import Answer, answer
+from planarfriction_explorer.controls import OWN, Controls
+from planarfriction_explorer.drawing import Drawing
+from planarfriction_explorer.ladder_tab import LadderTab
+from planarfriction_explorer.map_view import MapView
+from planarfriction_explorer.numbers import numbers
+from planarfriction_explorer.pacing import Paced
+from planarfriction_explorer.scene_tab import SceneTab
+from planarfriction_explorer.state import State
+
+FASTEST = 0.1
+"""Velocity [m/s] that a drag from the middle to the edge of the map gives."""
+
+LADDER = 2
+"""Number of the tab with the ladder of the models."""
+
+
+class Page:
+    """One session: its state, its controls and its pictures."""
+
+    def __init__(self) -> None:
+        self.state = State()
+        self.answer: Answer | None = None
+        self._figure: dict[str, Any] = {}
+        self._pointer: tuple[float, float] | None = None
+        self.slow = Paced(self._show_slow)
+        self.controls = Controls(self.state)
+        self.map = MapView(self._dragged, self._released)
+        self.ladder = LadderTab(lambda: self.state)
+        self.scenes = SceneTab(lambda: self.state, self._try)
+        self.surface = pn.pane.Plotly(
+            None, config={"displaylogo": False, "responsive": True}, height=430, sizing_mode="stretch_width"
+        )
+        self.numbers = pn.pane.HTML("", css_classes=["numbers"], sizing_mode="stretch_width")
+        self.message = pn.pane.HTML("", visible=False, sizing_mode="stretch_width")
+        self.python, self.toml = _code_area("python"), _code_area("toml")
+        self.tabs = pn.Tabs(
+            ("Python", _copied(self.python)),
+            ("Scene file (TOML)", _copied(self.toml)),
+            ("Models", self.ladder.layout),
+            ("Run a scene", self.scenes.layout),
+            dynamic=True,
+            sizing_mode="stretch_width",
+            stylesheets=[looks.CARD],
+        )
+        self.tabs.param.watch(lambda _: self._follow_ladder(), "active")
+        self._listen()
+        self._redraw()
+        self._refresh()
+
+    def _listen(self) -> None:
+        controls = self.controls
+
+        def on(widget: Any, act: Callable[[Any], Any]) -> None:
+            controls.on(widget, lambda value: self._try(lambda: act(value)))
+
+        on(controls.patch, lambda name: self._draw(Drawing.published(name)) if name != OWN else None)
+        on(controls.cell_size, lambda size: self._draw(self.state.drawing.scaled(1e-3 * size)))
+        on(controls.file, self._read)
+        on(controls.law, self._choose_law)
+        on(controls.load, lambda load: self._change(normal_force=load))
+        for slider in (controls.vx, controls.vy, controls.omega):
+            on(slider, lambda _: self._slide())
+        controls.clear.on_click(lambda _: self._try(self._clear))
+        self._offer_parameters()
+
+    # ------------------------------------------------------------------ wishes of the user
+
+    def _offer_parameters(self) -> None:
+        self.controls.offer_parameters(self.state.law, lambda _: self._try(self._set_law))
+
+    def _choose_law(self, kind: str) -> None:
+        self.state = self.state.with_law(kind)
+        self._offer_parameters()
+        self._refresh()
+
+    def _set_law(self) -> None:
+        self.state = self.state.with_law(str(self.controls.law.value), **self.controls.law_values())
+        self._refresh()
+
+    def _read(self, content: bytes) -> None:
+        size = 1e-3 * self.controls.cell_size.value
+        self._draw(Drawing.read(self.controls.file.filename or "map", content, size))
+
+    def _clear(self) -> None:
+        self.controls.tool.value = "brush"
+        self._draw(self.state.drawing.cleared())
+
+    def _slide(self) -> None:
+        vx, vy, omega = (each.value for each in (self.controls.vx, self.controls.vy, self.controls.omega))
+        self._change(twist=(1e-3 * vx, 1e-3 * vy, omega))
+
+    def _dragged(self, x: float, y: float) -> None:
+        """Keep where the pointer is; what it has passed while the page was at work is left out, but for the brush."""
+        if self.controls.tool.value in ("brush", "erase"):
+            self._try(lambda: self._paint(x, y))
+            return
+        waiting, self._pointer = self._pointer is not None, (x, y)
+        if not waiting:
+            document: Any = pn.state.curdoc
+            document.add_next_tick_callback(self._follow)
+
+    def _follow(self) -> None:
+        pointer, self._pointer = self._pointer, None
+        if pointer is not None:
+            self._try(lambda: self._follow_to(*pointer))
+
+    def _follow_to(self, x: float, y: float) -> None:
+        if self.controls.tool.value == "turn":
+            self.state = self.state.turning_about(x, y)
+        else:
+            speed = 2.0 * FASTEST / max(self.state.drawing.width, self.state.drawing.height)
+            self.state = self.state.sliding(speed * x, speed * y)
+        self._refresh()
+
+    def _paint(self, x: float, y: float) -> None:
+        drawing, controls = self.state.drawing, self.controls
+        pressure = 0.0 if controls.tool.value == "erase" else controls.pressure.value
+        radius = (controls.brush.value - 0.5) * drawing.cell_size
+        self._draw(drawing.painted(x, y, radius=radius, pressure=pressure), quick=True)
+
+    def _released(self) -> None:
+        if self.controls.tool.value in ("brush", "erase"):
+            self._try(lambda: self._draw(self.state.drawing))
+
+    def _change(self, **values: Any) -> None:
+        self.state = self.state.changed(**values)
+        self._refresh()
+
+    def _draw(self, drawing: Drawing, *, quick: bool = False) -> None:
+        self.state = self.state.changed(drawing=drawing)
+        self._redraw(quick=quick)
+        self._refresh()
+
+    # ------------------------------------------------------------------ showing
+
+    def _try(self, act: Callable[[], Any]) -> None:
+        """Do what the user wants, or say in one line why not; all that changes goes to the browser in one message."""
+        with pn.io.unlocked():
+            try:
+                self.message.visible = False
+                act()
+            except FrictionError as error:
+                self.message.object = f"<div id='message' style='{looks.ALERT}'>{html.escape(str(error))}</div>"
+                self.message.visible = True
+
+    def _redraw(self, *, quick: bool = False) -> None:
+        """What depends on the map alone."""
+        self.map.draw(self.state.drawing)
+        try:
+            self._figure = pictures.surface_figure(self.state, quick=quick)
+        except FrictionError:
+            self._figure = {}  # nothing presses: `_refresh` says so
+
+    def _refresh(self) -> None:
+        """What depends on the rest of the state."""
+        begin = time.perf_counter()
+        self.controls.show(self.state)
+        try:
+            self.answer = found = answer(self.state)
+        except FrictionError:
+            self.answer, self._figure, self.surface.visible = None, {}, False
+            self.python.value = self.toml.value = self.numbers.object = ""
+            self.ladder.clear()
+            if self.state.drawing.pressures.any():
+                raise
+            raise FrictionError("Nothing presses: paint with the brush, choose a patch or load a map.") from None
+        finally:
+            self.map.move(self.state, self.answer)
+        self.slow.ask()
+        self._follow_ladder()
+        self.numbers.object = numbers(self.state, found, time.perf_counter() - begin)
+
+    def _show_slow(self) -> None:
+        """What does not have to follow a drag: the picture in 3-D and the code."""
+        if self.answer is not None:
+            self.surface.param.update(object=pictures.moved(self._figure, self.answer), visible=True)
+            self.python.value, self.toml.value = code.python(self.state), code.toml(self.state)
+
+    def _follow_ladder(self) -> None:
+        """The models are compared while somebody looks."""
+        if self.tabs.active == LADDER and self.answer is not None:
+            self.ladder.follow()
+        else:
+            self.ladder.stop()
+
+    def layout(self) -> Any:
+        """The whole page."""
+        words = "<b style='font-size:20px'>planarfriction explorer</b>"
+        title = pn.pane.HTML(words, margin=(8, 4, 0, 4))
+        hint = pn.pane.HTML("<b style='font-size:15px'>Drag over the map</b>", margin=(4, 0, 4, 0))
+        plane = pn.Column(
+            hint,
+            self.controls.tool,
+            pn.pane.Bokeh(self.map.figure, css_classes=["map"], sizing_mode="scale_width", aspect_ratio=1.0, margin=0),
+            stylesheets=[looks.CARD],
+            styles=looks.grows(330),
+        )
+        space = pn.Column(self.numbers, self.surface, stylesheets=[looks.CARD], styles=looks.grows(360))
+        main = pn.Column(
+            pn.FlexBox(plane, space, gap="10px", align_items="stretch"),
+            pn.Spacer(height=10),
+            self.tabs,
+            styles=looks.grows(600),
+        )
+        hidden = (self.slow.asked, self.slow.drawn)
+        return pn.Column(
+            title,
+            self.message,
+            *hidden,
+            pn.FlexBox(self.controls.layout(), main, gap="10px", align_items="flex-start"),
+            sizing_mode="stretch_width",
+            styles={"padding": "0 10px 10px", "box-sizing": "border-box"},
+        )
+
+
+def _code_area(kind: str) -> Any:
+    return pn.widgets.TextAreaInput(
+        disabled=True,
+        height=330,
+        max_length=10**6,
+        sizing_mode="stretch_width",
+        stylesheets=[looks.CODE],
+        css_classes=[kind],
+    )
+
+
+def _copied(area: Any) -> Any:
+    """A text with a button that copies it."""
+    copy = pn.widgets.Button(label="Copy", css_classes=[f"copy-{area.css_classes[0]}"])
+    copy.js_on_click(args={"area": area}, code="navigator.clipboard.writeText(area.value)")
+    return pn.Column(copy, area, sizing_mode="stretch_width")

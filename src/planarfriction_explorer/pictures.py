@@ -1,0 +1,161 @@
+"""What is drawn of a state, as plain arrays and tables: lengths in mm, limit surfaces without units."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from planarfriction import geometry
+from planarfriction.limit_surface import LimitSurfaceCells, LimitSurfaceTable
+from planarfriction.plots.limit_surface import scaled_samples
+from planarfriction.plots.style import DISTRIBUTED, ELLIPSOID, EXACT
+from planarfriction_explorer.answers import Answer
+from planarfriction_explorer.drawing import Drawing
+from planarfriction_explorer.state import State
+
+MM = 1e3
+"""Millimetres in a metre."""
+
+ARROWS = 11
+"""Most arrows of the slip field along a side."""
+
+POLAR, AZIMUTH = 37, 73
+"""Points of the mesh of a limit surface: from pole to pole, and around."""
+
+REACH = 0.4
+"""Length of the arrow of a force of mu_c f_N, as a share of the width of the map."""
+
+COLOURS = {"friction": DISTRIBUTED, "surface": EXACT, "ellipsoid": ELLIPSOID}
+"""Colour of each wrench, the same in all pictures."""
+
+
+def pressure_image(drawing: Drawing) -> dict[str, list[Any]]:
+    """The map as the columns of one image whose rows run from the bottom up [mm]."""
+    width, height = MM * drawing.width, MM * drawing.height
+    peak = drawing.pressures.max(initial=0.0)
+    shown = drawing.pressures[::-1] / (peak if peak > 0.0 else 1.0)
+    image = np.where(shown > 0.0, shown, np.nan)  # what does not press is left white
+    return {"image": [image], "x": [-width / 2], "y": [-height / 2], "dw": [width], "dh": [height]}
+
+
+def slip_arrows(state: State) -> dict[str, list[float]]:
+    """Velocities of points that press, as arrows [mm] of which the fastest is as long as they are apart."""
+    drawing = state.drawing
+    rows, columns = drawing.pressures.shape
+    step = int(np.ceil(max(rows, columns) / ARROWS))
+    chosen = np.zeros((rows, columns), dtype=bool)
+    chosen[(rows // 2) % step :: step, (columns // 2) % step :: step] = True
+    points = drawing.grid.centres()[(chosen & (drawing.pressures > 0.0)).ravel()]
+    velocity = geometry.twist_at(np.array(state.twist), points)[:, :2]
+    fastest = np.hypot(*velocity.T).max(initial=0.0)
+    ends = points + velocity * (step * drawing.cell_size / fastest if fastest > 0.0 else 0.0)
+    return _arrows(points, ends)
+
+
+def wrench_arrows(state: State, answer: Answer | None) -> dict[str, Any]:
+    """Forces of law, surface and ellipsoid as arrows from the centre of pressure [mm], one on top of the other."""
+    if answer is None:
+        return {**_arrows(np.zeros((0, 2)), np.zeros((0, 2))), "colour": [], "width": []}
+    start = np.tile(state.drawing.surface.centre_of_pressure, (3, 1))
+    longest = REACH * max(state.drawing.width, state.drawing.height)
+    return {
+        **_arrows(start, start + longest * answer.points[:, :2]),
+        "colour": list(COLOURS.values()),
+        "width": [8, 5, 2],
+    }
+
+
+def _arrows(starts: np.ndarray, ends: np.ndarray) -> dict[str, list[float]]:
+    """Shafts, and angles [rad] of triangles at the tips, which point up at an angle of 0.
+
+    Lists, since each array goes to the browser as a message of its own.
+    """
+    along = ends - starts
+    names = zip(("x0", "y0", "x1", "y1"), [*starts.T, *ends.T], strict=True)
+    angle = np.arctan2(along[:, 1], along[:, 0]) - np.pi / 2
+    return {**{name: (MM * each).tolist() for name, each in names}, "angle": angle.tolist()}
+
+
+def points_of_interest(state: State) -> dict[str, list[float]]:
+    """The centre of rotation [mm], in no row where there is none."""
+    centre = state.centre_of_rotation
+    return {"x": [], "y": []} if centre is None else {"x": [MM * centre[0]], "y": [MM * centre[1]]}
+
+
+def surface_figure(state: State, *, quick: bool = False) -> dict[str, Any]:
+    """Limit surface and ellipsoid in 3-D with the wrenches of the state, as a plotly figure of plain tables.
+
+    The surface is that of the smooth table of the patch. While a brush moves, `quick` takes a sum over the cells, which
+    has lumps.
+    """
+    drawing = state.drawing
+    surface = (LimitSurfaceCells if quick else LimitSurfaceTable)(drawing.patch)
+    polar, azimuth = np.linspace(0.0, np.pi, POLAR)[:, None], np.linspace(0.0, 2.0 * np.pi, AZIMUTH)[None]
+    mesh = scaled_samples(surface, polar, azimuth)[1]
+    rings = _wires(scaled_samples(drawing.ellipsoid, polar[::6], azimuth)[1])
+    spokes = _wires(np.swapaxes(scaled_samples(drawing.ellipsoid, polar, azimuth[:, ::6])[1], 0, 1))
+    shell = {
+        "type": "surface",
+        "name": "limit surface",
+        **_coordinates(mesh),
+        "surfacecolor": mesh[..., 2],
+        "colorscale": [[0.0, "#5B9BC8"], [1.0, "#CFE3F1"]],
+        "opacity": 0.45,  # the wrenches inside are seen
+        "showscale": False,
+        "hoverinfo": "skip",
+    }
+    wires = {
+        "type": "scatter3d",
+        "name": "ellipsoid",
+        "mode": "lines",
+        **_coordinates(np.concatenate([rings, spokes])),
+        "line": {"color": COLOURS["ellipsoid"], "width": 2},
+        "hoverinfo": "skip",
+    }
+    return {"data": [shell, wires, *(_marker(name, np.zeros(3)) for name in COLOURS)], "layout": _layout()}
+
+
+def moved(figure: dict[str, Any], answer: Answer) -> dict[str, Any]:
+    """The figure of a limit surface with the wrenches of an answer; what has not changed is the same object."""
+    markers = [_marker(name, point) for name, point in zip(COLOURS, answer.points, strict=True)]
+    return {**figure, "data": [*figure["data"][:2], *markers]}
+
+
+def _wires(lines: np.ndarray) -> np.ndarray:
+    """Lines `[K, M, 3]` as one with gaps."""
+    gaps = np.full((len(lines), 1, 3), np.nan)
+    return np.concatenate([lines, gaps], axis=1).reshape(-1, 3)
+
+
+def _coordinates(points: np.ndarray) -> dict[str, np.ndarray]:
+    return {name: np.ascontiguousarray(each) for name, each in zip("xyz", np.moveaxis(points, -1, 0), strict=True)}
+
+
+def _marker(name: str, point: np.ndarray) -> dict[str, Any]:
+    """A line from the middle to the wrench with a ball at its end."""
+    return {
+        "type": "scatter3d",
+        "name": {"friction": "friction of the law", "surface": "on the surface", "ellipsoid": "on the ellipsoid"}[name],
+        "mode": "lines+markers",
+        **_coordinates(np.stack([np.zeros(3), point])),
+        "line": {"color": COLOURS[name], "width": 6},
+        "marker": {"color": COLOURS[name], "size": [0, 8]},
+        "hovertemplate": "fx %{x:.4f}<br>fy %{y:.4f}<br>τ/r %{z:.4f}<extra></extra>",
+    }
+
+
+def _layout() -> dict[str, Any]:
+    limit = 1.35  # room for what Stribeck and viscous terms add
+    axes = {
+        f"{name}axis": {"range": [-limit, limit], "title": {"text": text}}
+        for name, text in zip("xyz", ("fx", "fy", "τ/r"), strict=True)
+    }
+    camera = {"eye": {"x": 1.45, "y": -1.95, "z": 0.9}, "center": {"x": 0.0, "y": 0.0, "z": -0.12}}
+    return {
+        "scene": {**axes, "aspectmode": "cube", "camera": camera},
+        "margin": {"l": 0, "r": 0, "t": 0, "b": 0},
+        "legend": {"orientation": "h", "y": 0},
+        "uirevision": "kept",  # the view that was turned to stays
+        "autosize": True,
+    }

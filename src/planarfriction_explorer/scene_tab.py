@@ -1,0 +1,94 @@
+"""A scene, ready or from a file, run and watched."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Callable
+from typing import Any
+
+import panel as pn
+
+from planarfriction.families import MODELS, SCENES
+from planarfriction.scenes import Scene
+from planarfriction_explorer.films import film, read_scene, ready_scene
+from planarfriction_explorer.live import Live, Task
+from planarfriction_explorer.state import State
+
+_WORDS = (
+    "A ready scene runs with the patch and the law of the screen, a scene file (.toml, .json) with its own. "
+    "Paths in a file start from the folder in which the explorer was started."
+)
+
+_FRAME = "width:100%;max-width:790px;aspect-ratio:790/560;min-height:350px;border:0"
+
+
+class SceneTab:
+    """What is chosen to run, and its film."""
+
+    def __init__(self, state: Callable[[], State], attempt: Callable[[Callable[[], Any]], None]):
+        self._state = state
+        self._loaded: dict[str, Scene] = {}
+        self._live = Live(failed=self._fail)
+        self.scene = pn.widgets.Select(label="Scene", options=list(SCENES), css_classes=["scene"], width=190)
+        self.model = pn.widgets.Select(
+            label="Model", options=list(MODELS), value="reduced", css_classes=["model"], width=190
+        )
+        self.file = pn.widgets.FileInput(label="Scene file", accept="", css_classes=["scene-file"], width=300)
+        self.button = pn.widgets.Button(label="Run", color="primary", css_classes=["run"], align="end", width=90)
+        self.words = pn.pane.HTML("", css_classes=["run-status"], sizing_mode="stretch_width")
+        self.result = pn.pane.HTML("", sizing_mode="stretch_width")
+        self._running = False
+        self.scene.param.watch(lambda event: self.model.param.update(visible=event.new in SCENES), "value")
+        self.file.param.watch(lambda event: attempt(lambda: self._read(event.new)) if event.new else None, "value")
+        self.button.on_click(lambda _: attempt(self._pressed))
+        choices = pn.FlexBox(self.scene, self.model, self.file, self.button, align_items="flex-end")
+        note = pn.pane.HTML(_WORDS, sizing_mode="stretch_width")
+        self.layout = pn.Column(note, choices, self.words, self.result, sizing_mode="stretch_width")
+
+    def _read(self, content: bytes) -> None:
+        name = self.file.filename or "scene.toml"
+        scene = read_scene(name, content)
+        self._loaded[name] = scene
+        self.scene.param.update(options=[*SCENES, *self._loaded], value=name)
+
+    def _pressed(self) -> None:
+        if self._running:
+            self._live.stop()
+            self._rest("Stopped.")
+            return
+        name = str(self.scene.value)
+        scene = self._loaded.get(name) or ready_scene(self._state(), name, str(self.model.value))
+        self._running, self.button.label, self.result.object = True, "Stop", ""
+        self._say("Simulating (the first time this compiles) ...")
+        self._live.now(lambda task: self._work(scene, task))
+
+    def _work(self, scene: Scene, task: Task) -> None:
+        said = ""
+
+        def progress(doing: str, share: float) -> None:
+            nonlocal said
+            task.check()
+            text = f"{doing.capitalize()}: {share:.0%}"
+            if text != said:
+                said = text
+                task.tell(self._say, text)
+
+        task.tell(self._show, film(scene, progress))
+
+    def _show(self, page: str) -> None:
+        self._rest("")
+        self.result.object = (
+            f"<iframe id='film' title='film of the scene' sandbox='allow-scripts' style='{_FRAME}' "
+            f'srcdoc="{html.escape(page)}"></iframe>'
+        )
+
+    def _fail(self, text: str) -> None:
+        self._rest("")
+        self.words.object = f"<span id='refusal'>{html.escape(text)}</span>"
+
+    def _say(self, text: str) -> None:
+        self.words.object = html.escape(text)
+
+    def _rest(self, text: str) -> None:
+        self._running, self.button.label = False, "Run"
+        self._say(text)

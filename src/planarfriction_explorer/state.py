@@ -1,0 +1,67 @@
+"""What is on the screen of the explorer, as a value: every change makes another one."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+from planarfriction import validation
+from planarfriction.laws import LAWS, FrictionLaw, LuGre
+from planarfriction_explorer.drawing import Drawing
+
+FIRST_PATCH = "Circle"
+"""Patch of a new page."""
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A pressure map, a law, a load and a twist; raises `InvalidValueError` for what breaks a rule."""
+
+    drawing: Drawing = field(default_factory=lambda: Drawing.published(FIRST_PATCH))
+    """What presses."""
+    law: FrictionLaw = field(default_factory=lambda: LuGre(mu_s=1.2, elasto_plastic=0.9))
+    """Friction law."""
+    normal_force: float = 1.0
+    """Load [N]."""
+    twist: tuple[float, float, float] = (0.01, 0.0, 1.0)
+    """Twist `(vx, vy, omega)` of the body at the origin of the contact frame [m/s, m/s, rad/s]."""
+
+    def __post_init__(self) -> None:
+        load = validation.positive_load("normal_force", self.normal_force)
+        object.__setattr__(self, "normal_force", load)
+        object.__setattr__(self, "twist", tuple(validation.vector("twist", self.twist, 3).tolist()))
+
+    def changed(self, **values: Any) -> State:
+        """The state with other values of its fields."""
+        return dataclasses.replace(self, **values)
+
+    def sliding(self, vx: float, vy: float) -> State:
+        """The state with another velocity of the origin [m/s]."""
+        return self.changed(twist=(vx, vy, self.twist[2]))
+
+    def turning_about(self, x: float, y: float) -> State:
+        """The state with the centre of rotation (x, y) [m] at the same spin; one of 1 rad/s where there was none."""
+        omega = self.twist[2] or 1.0
+        return self.changed(twist=(omega * y, -omega * x, omega))
+
+    def with_law(self, kind: str, **parameters: Any) -> State:
+        """The state with the law `kind` of those `parameters`; what is left out or None has its default."""
+        given = {name: value for name, value in parameters.items() if value is not None}
+        return self.changed(law=LAWS.choose(kind)(**given))
+
+    @property
+    def centre_of_rotation(self) -> tuple[float, float] | None:
+        """The point (x, y) [m] that does not move: `(-vy/omega, vx/omega)`; None without a spin."""
+        vx, vy, omega = self.twist
+        if omega == 0.0:
+            return None
+        x, y = 0.0 - vy / omega, vx / omega
+        return (x, y) if math.isfinite(x) and math.isfinite(y) else None
+
+
+def law_parameters(law: Any) -> dict[str, float | None]:
+    """Parameters of a law by name, as numbers; None where the default of the law depends on others."""
+    given = {each.name: getattr(law, each.name) for each in dataclasses.fields(law) if each.init}
+    return {name: getattr(value, "breakaway_ratio", value) for name, value in given.items()}

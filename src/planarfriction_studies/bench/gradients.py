@@ -1,0 +1,142 @@
+"""What derivatives cost: of roll-outs, and of scenes."""
+
+from __future__ import annotations
+
+import importlib
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from planarfriction.derivatives import scene_gradient, scene_sensitivities
+from planarfriction.models import ReducedModel, ReducedModelPublished
+from planarfriction.scenes import Scene, Signal, in_hand, simulate
+from planarfriction_studies.bench.measurement import Measurement, line, median
+from planarfriction_studies.bench.workloads import AGAINST_PUBLISHED, disc, law, mixed_twists
+
+STEPS = 2000
+"""Of the roll-out that stands alone."""
+
+TIGHT: dict[str, Any] = {"rtol": 1e-9, "atol": 1e-9}
+"""Tolerances of the scenes."""
+
+KNOTS = np.linspace(0.0, 0.5, 20)
+"""Times of the grip that derivatives are taken to [s]."""
+
+SIGNALS = {"fingers.normal_force": KNOTS}
+
+
+def reduced(full: bool) -> Measurement:
+    """A roll-out with its gradient, as `gradient.published`."""
+    ours, theirs = (
+        _value_and_gradient(model(disc(), law()), (STEPS,), 15) for model in (ReducedModel, ReducedModelPublished)
+    )
+    return line(ours, "s", AGAINST_PUBLISHED, theirs)
+
+
+def _value_and_gradient(model: ReducedModel | ReducedModelPublished, shape: tuple[int, ...], repeats: int) -> float:
+    """Time of half the squared wrenches of roll-outs with their gradient to all inputs [s]; steps are the last axis."""
+    from planarfriction import derivatives
+
+    inputs = model.rest(), *_inputs(shape)
+
+    def value_and_gradient() -> None:
+        _, wrenches, states = derivatives.rollout_states(model, *inputs)
+        derivatives.rollout_vjp(model, *inputs, wrenches, states=states)
+
+    return median(value_and_gradient, repeats)
+
+
+def _alone(model: ReducedModel | ReducedModelPublished, shape: tuple[int, ...], repeats: int) -> float:
+    """Time of the roll-outs alone [s]."""
+    from planarfriction import derivatives
+
+    inputs = model.rest(), *_inputs(shape)
+    return median(lambda: derivatives.rollout(model, *inputs), repeats)
+
+
+def _inputs(shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray, float]:
+    """Twists, loads [N] and time step [s]."""
+    return mixed_twists(math.prod(shape)).reshape(*shape, 3), np.full(shape, 2.0), 1e-4
+
+
+def published(full: bool) -> Measurement:
+    """Half the squared wrenches of a roll-out, with its gradient to all parameters, twists, loads and the state."""
+    from planarfriction import derivatives
+
+    model = ReducedModelPublished(disc(), law())
+    value = _value_and_gradient(model, (STEPS,), 15)
+    try:
+        return line(value, "s", "PyTorch, eager, the same roll-out", _eager_gradient(model, full))
+    except ImportError:
+        inputs, once = len(derivatives.PARAMETERS) + 3 + 4 * STEPS, _alone(model, (STEPS,), 15)
+        words = f"central differences, 2 x {inputs} roll-outs of {once * 1e3:.2g} ms (PyTorch is not installed)"
+        return line(value, "s", words, 2 * inputs * once)
+
+
+def _eager_gradient(model: ReducedModelPublished, full: bool) -> float:
+    """Time of the same value and gradient, step by step through `planarfriction.torch` and autograd [s]."""
+    import torch
+
+    front = importlib.import_module("planarfriction.torch")
+    module = front.ReducedModelPublished(model.patch, model.law, dtype=torch.float64)
+    twists, loads, dt = _inputs((STEPS,))
+    profile, loads = (torch.tensor(each, requires_grad=True) for each in (twists, loads))
+
+    def value_and_gradient() -> None:
+        start = torch.zeros(3, dtype=torch.float64, requires_grad=True)
+        wrenches = front.rollout(module, start, profile, loads, dt, method="eager").wrenches
+        (0.5 * wrenches * wrenches).sum().backward()
+
+    return median(value_and_gradient, 3 if full else 1)
+
+
+def published_batch(full: bool) -> Measurement:
+    both, once = _batch(ReducedModelPublished(disc(), law()))
+    words = "the roll-out alone (the ratio is the share of its speed)"
+    return line(both, "million contact-steps/s", words, once, both / once)
+
+
+def reduced_batch(full: bool) -> Measurement:
+    (both, once), (theirs, alone) = (_batch(model(disc(), law())) for model in (ReducedModel, ReducedModelPublished))
+    words = f"{AGAINST_PUBLISHED} (the roll-outs alone: {once:.3g} and {alone:.3g})"
+    return line(both, "million contact-steps/s", words, theirs, both / theirs)
+
+
+def _batch(model: ReducedModel | ReducedModelPublished) -> tuple[float, float]:
+    """Million contact-steps/s of a thousand roll-outs with their gradient, and of the roll-outs alone."""
+    shape = 1000, 1000
+    steps = 1e-6 * math.prod(shape)
+    return steps / _value_and_gradient(model, shape, 5), steps / _alone(model, shape, 5)
+
+
+def scene_to_friction(full: bool) -> Measurement:
+    """Derivatives of the motion of a scene to the friction."""
+    return _beside_simulation(
+        in_hand(ReducedModel(disc(), law()), t_end=0.5), lambda scene: scene_sensitivities(scene, ("mu",), **TIGHT)
+    )
+
+
+def scene_to_knots(full: bool) -> Measurement:
+    """Derivatives of the motion of a scene to twenty knots of the grip."""
+    return _beside_simulation(_gripped(), lambda scene: scene_sensitivities(scene, (), signals=SIGNALS, **TIGHT))
+
+
+def cost_to_knots(full: bool) -> Measurement:
+    """Derivatives of one cost to those knots."""
+    return _beside_simulation(
+        _gripped(),
+        lambda scene: scene_gradient(scene, lambda _, motion: np.ones_like(motion), signals=SIGNALS, **TIGHT),
+    )
+
+
+def _gripped() -> Scene:
+    """The in-hand scene with a grip of twenty knots."""
+    grip = Signal(KNOTS, 1.73 - 0.91 * np.sin(4.0 * np.pi * KNOTS), "linear")
+    return in_hand(ReducedModel(disc(), law()), normal_force=grip, t_end=0.5)
+
+
+def _beside_simulation(scene: Scene, derivatives: Callable[[Scene], Any]) -> Measurement:
+    alone = median(lambda: simulate(scene, **TIGHT), 3)
+    return line(median(lambda: derivatives(scene), 3), "s", "the same simulation alone", alone)

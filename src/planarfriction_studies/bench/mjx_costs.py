@@ -1,0 +1,94 @@
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo and JAX describe few of their names to type checkers.)
+"""Discs that slide and spin in MJX, side by side: what patch friction costs over its own."""
+
+from __future__ import annotations
+
+import statistics
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from planarfriction_studies.bench.measurement import Measurement, line, once
+from planarfriction_studies.bench.mujoco_scenes import Native, disc
+
+ENVIRONMENTS = 16
+
+STEPS, ROUNDS = 100, 5
+"""Of a roll-out that is timed: 0.2 s, in which all slide; and how often, in turns."""
+
+
+def discs(full: bool) -> Measurement:
+    """A step of one of `ENVIRONMENTS` that `vmap` steps at once, with patch friction and with MJX's own in turns.
+
+    Both in double precision. Raises `MissingExtraError` without MJX.
+    """
+    adapter = _adapter()
+    import jax
+    from mujoco import mjx
+
+    before = jax.config.jax_enable_x64
+    jax.config.update("jax_enable_x64", True)
+    try:
+        m, prepared, friction = _ours(adapter)
+        runs = _rolled(friction.step, m, prepared), _rolled(mjx.step, *disc(1.0, 10.0).native(Native()))
+        times = np.array([[once(run) for run in runs] for _ in range(ROUNDS)]) / (STEPS * ENVIRONMENTS)
+    finally:
+        jax.config.update("jax_enable_x64", before)
+    value, theirs = (statistics.median(column) * 1e6 for column in times.T)
+    words = (
+        f"MJX's own friction, condim 4, elliptic, impratio 10 (patch friction costs {value / theirs:.2g} times as much)"
+    )
+    return line(value, "us per step", words, theirs)
+
+
+def _adapter() -> Any:
+    """First of all, as it says which extra is missing."""
+    from planarfriction.adapters import mjx
+
+    return mjx
+
+
+def _ours(adapter: Any) -> tuple[Any, Any, Any]:
+    import mujoco
+
+    scene = disc(1.0, 10.0)
+    patches = [adapter.PatchContact(scene.model, site=site, geoms=geoms) for site, geoms in scene.patches]
+    native = Native(cone="pyramidal", impratio=1.0, condim=1, solref=0.02)
+    spec = mujoco.MjSpec.from_string(scene.text(native, 2e-3, "Euler"))
+    adapter.prepare(spec, patches)
+    m = spec.compile()
+    return m, mujoco.MjData(m), adapter.Friction(m, patches)
+
+
+def _rolled(step: Callable[..., Any], m: Any, d: Any) -> Callable[[], None]:
+    """A compiled roll-out of discs with different starts, whose contact has settled."""
+    import jax
+    import jax.numpy as jnp
+    import mujoco
+    from mujoco import mjx
+
+    for _ in range(300):
+        mujoco.mj_step(m, d)
+    mx, data = mjx.put_model(m), mjx.put_data(m, d)
+    speeds, spins = jnp.linspace(0.8, 1.2, ENVIRONMENTS), jnp.linspace(20.0, 5.0, ENVIRONMENTS)
+
+    @jax.jit
+    def roll(mx, speeds, spins):
+        def one(speed, spin):
+            start = data.replace(qvel=jnp.array([speed, 0.0, 0.0, spin]))
+
+            def next_step(d, _):
+                # in double precision MJX makes long integers of some that came in short
+                return jax.tree.map(lambda after, given: after.astype(given.dtype), step(mx, d), d), None
+
+            return jax.lax.scan(next_step, start, None, length=STEPS)[0].qpos
+
+        return jax.vmap(one)(speeds, spins)
+
+    def run() -> None:
+        roll(mx, speeds, spins).block_until_ready()
+
+    run()
+    return run

@@ -1,0 +1,93 @@
+"""The benchmarks by name, and what runs them.
+
+Machines are shared and noisy: every value is a median, and `ratio` (baseline over value) says more than either.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Sequence
+from functools import partial
+
+from planarfriction import validation
+from planarfriction.errors import MissingExtraError
+from planarfriction.limit_surface import LimitSurfaceExact, LimitSurfaceTable
+from planarfriction_studies.bench import (
+    drake_costs,
+    gradients,
+    identified_log,
+    mjx_costs,
+    mujoco_costs,
+    plans,
+    steps,
+    surfaces,
+    sweep_costs,
+    whole_runs,
+)
+from planarfriction_studies.bench.measurement import Measurement
+
+BENCHMARKS: dict[str, Callable[[bool], Measurement]] = {
+    "in_hand.distributed": whole_runs.distributed,
+    "in_hand.distributed.101": whole_runs.distributed_101,
+    "in_hand.published": whole_runs.published,
+    "in_hand.published.load_2": partial(whole_runs.published, load=2),
+    "in_hand.published.load_dependent": whole_runs.load_dependent,
+    "in_hand.reduced": whole_runs.reduced,
+    "in_hand.reduced.load_family": whole_runs.load_family,
+    "table.build": surfaces.table_build,
+    "twist.table.call": partial(surfaces.twist, kind=LimitSurfaceTable),
+    "twist.table.batch": partial(surfaces.twist, kind=LimitSurfaceTable, count=1000),
+    "twist.exact.call": partial(surfaces.twist, kind=LimitSurfaceExact),
+    "twist.exact.batch": partial(surfaces.twist, kind=LimitSurfaceExact, count=1000),
+    "step.published.loop": steps.published_loop,
+    "step.distributed.loop": steps.distributed_loop,
+    "step.published.call": steps.published_call,
+    "step.reduced.loop": steps.reduced_loop,
+    "step.reduced.parts4.loop": partial(steps.reduced_loop, parts=4),
+    "step.reduced.call": steps.reduced_call,
+    "step.reduced.slopes": steps.reduced_slopes,
+    "step.reduced.four": steps.reduced_four,
+    "coupled.four_feet.call": steps.coupled,
+    "coupled.four_feet.batch": partial(steps.coupled, environments=1000),
+    "mujoco.tray.1": partial(mujoco_costs.tray, blocks=1),
+    "mujoco.tray.2": partial(mujoco_costs.tray, blocks=2),
+    "mujoco.tray.8": partial(mujoco_costs.tray, blocks=8),
+    "mujoco.grip": mujoco_costs.grip,
+    "mujoco.rollout": mujoco_costs.rollout,
+    "mjx.discs": mjx_costs.discs,
+    "drake.disc.point": partial(drake_costs.disc, contact="point"),
+    "drake.disc.hydroelastic": partial(drake_costs.disc, contact="hydroelastic"),
+    "gradient.published": gradients.published,
+    "gradient.published.batch": gradients.published_batch,
+    "gradient.reduced": gradients.reduced,
+    "gradient.reduced.batch": gradients.reduced_batch,
+    "sensitivities.reduced": gradients.scene_to_friction,
+    "sensitivities.knots": gradients.scene_to_knots,
+    "sensitivities.gradient": gradients.cost_to_knots,
+    "planning.grip": plans.grip,
+    "planning.push": plans.push,
+    "identify.log": identified_log.identification,
+    "identify.log.distributed": partial(identified_log.identification, model="distributed"),
+    "sweep": sweep_costs.sweep,
+    "import": whole_runs.importing,
+}
+"""Benchmarks by name: functions of whether the baselines that take minutes run in full, too."""
+
+
+def run(
+    names: Sequence[str] | None = None, *, full: bool = False, progress: Callable[[str], None] | None = None
+) -> list[Measurement]:
+    """Measure the benchmarks `names` (all by default); `full` also runs the baselines that take minutes.
+
+    Raises `InvalidValueError` for an unknown name.
+    """
+    chosen = list(BENCHMARKS) if names is None else [validation.choice("name", name, BENCHMARKS) for name in names]
+    results = []
+    for name in chosen:
+        if progress is not None:
+            progress(name)
+        try:
+            results.append(dataclasses.replace(BENCHMARKS[name](full), name=name))
+        except MissingExtraError as missing:
+            results.append(Measurement(name, None, "", f"left out: {missing}", None, None))
+    return results

@@ -1,0 +1,111 @@
+"""What a step costs: in a compiled loop, in a call from Python, and where contacts are coupled."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from planarfriction.coupling import CoupledPatches, CoupledStep, HostStep
+from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
+from planarfriction_studies.bench.measurement import Measurement, line, median
+from planarfriction_studies.bench.workloads import AGAINST_PUBLISHED, disc, law, mixed_twists
+
+FEET = ((0.05, 0.03), (0.05, -0.03), (-0.05, 0.03), (-0.05, -0.03))
+"""Where the feet of a box stand [m]."""
+
+
+def _compiled_loop(model: ReducedModel | ReducedModelPublished, twists: np.ndarray) -> float:
+    """Time of a model's steps through `twists`, compiled [s]."""
+    from planarfriction.derivatives.inputs import checked
+
+    inputs = checked(model, None, twists, 1.0, 1e-4, None)
+    compiled, family = inputs.compiled(), inputs.parts[0].family
+    wrench, states = np.empty((1, *twists.shape)), np.empty((len(inputs.parts), 1, 0, 3))
+    return median(lambda: family.rollout(compiled, (0, 1), inputs.state.copy(), wrench, states), 9)
+
+
+def published_loop(full: bool) -> Measurement:
+    """A step of the published reduced model, in a compiled loop."""
+    twists = mixed_twists(20_000)
+    model = ReducedModelPublished(disc(), law())
+    loop, call = _compiled_loop(model, twists), _python_step(model, 1000)
+    return line(loop / len(twists) * 1e6, "us", "one Python call of the same step", call * 1e6)
+
+
+def distributed_loop(full: bool) -> Measurement:
+    """A step of the distributed model, in a compiled loop."""
+    from planarfriction.kernels import distributed_step as kernels
+
+    model, twists = DistributedModel(disc(), law()), mixed_twists(1000)
+    x, y = (np.ascontiguousarray(column) for column in model.patch.positions.T)
+    cells = kernels.Cells(x, y, model.patch.weights()[None])
+    z = model.rest().reshape(-1)
+    scratch, wrench = np.empty_like(z), np.empty_like(twists)
+    arguments = cells, 1.0, 1e-4, scratch, wrench
+    loop = median(lambda: kernels.step_sequence(model.law.numbers, z, twists, *arguments), 9)
+    call = _python_step(model, 100)
+    return line(loop / len(twists) * 1e6, "us", "one Python call of the same step", call * 1e6)
+
+
+def _python_step(model: Any, inner: int) -> float:
+    state, twist = model.rest(), (0.01, 0.0, 1.0)
+    return median(lambda: model.step(state, twist, 1.0, 1e-3), 9, inner)
+
+
+def published_call(full: bool) -> Measurement:
+    """A step of the published reduced model, from Python."""
+    model = ReducedModelPublished(disc(), law())
+    state, twist = model.rest(), np.array([0.01, 0.0, 1.0])
+    rate = median(lambda: model.rate(state, twist, 1.0), 9, 100)
+    return line(_python_step(model, 2000) * 1e6, "us", "one Python call of rate", rate * 1e6)
+
+
+def reduced_loop(full: bool, parts: int = 1) -> Measurement:
+    """A step of `ReducedModel`, in a compiled loop."""
+    twists = mixed_twists(20_000)
+    models = ReducedModel(disc(), law(), parts=parts), ReducedModelPublished(disc(), law())
+    ours, theirs = (_compiled_loop(model, twists) for model in models)
+    return line(ours / len(twists) * 1e6, "us", AGAINST_PUBLISHED, theirs / len(twists) * 1e6)
+
+
+def reduced_call(full: bool) -> Measurement:
+    """A step of `ReducedModel`, from Python."""
+    ours, theirs = (_python_step(model(disc(), law()), 2000) for model in (ReducedModel, ReducedModelPublished))
+    return line(ours * 1e6, "us", AGAINST_PUBLISHED, theirs * 1e6)
+
+
+def reduced_slopes(full: bool) -> Measurement:
+    """The derivatives of a step of `ReducedModel`, in one Python call."""
+    model = ReducedModel(disc(), law())
+    return _beside_a_step(model, lambda: model.step_jacobians(np.zeros(3), (0.01, 0.0, 1.0), 1.0, 1e-3))
+
+
+def reduced_four(full: bool) -> Measurement:
+    """The steps of four contacts, in one Python call."""
+    model = ReducedModel(disc(), law())
+    states, twists, loads = np.zeros((4, 3)), np.tile((0.01, 0.0, 1.0), (4, 1)), np.ones(4)
+    return _beside_a_step(model, lambda: model.step(states, twists, loads, 1e-3))
+
+
+def _beside_a_step(model: ReducedModel, action: Callable[[], Any]) -> Measurement:
+    return line(median(action, 9, 2000) * 1e6, "us", "one Python call of step", _python_step(model, 2000) * 1e6)
+
+
+def coupled(full: bool, environments: int = 1) -> Measurement:
+    """A box on four feet slides and turns: an implicit step, in one Python call for all environments."""
+    model = ReducedModel(disc(), law())
+    step = _four_feet(model, environments)
+    value, rounds = median(step, 9, 1 + 500 // environments) / environments, float(step().iterations.mean())
+    words = f"one Python call of a model's step (four patches, {rounds:.1f} rounds)"
+    return line(value * 1e6, "us per step", words, _python_step(model, 2000) * 1e6)
+
+
+def _four_feet(model: ReducedModel, environments: int, dt: float = 1e-3) -> Callable[[], CoupledStep]:
+    """An implicit step of boxes of 0.2 kg with random velocities, one for each environment, from bristles at rest."""
+    rows = np.concatenate([[[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]] for x, y in FEET])
+    response, patches = dt * rows @ np.diag([5.0, 5.0, 5e3]) @ rows.T, CoupledPatches([model] * 4)
+    velocity = np.random.default_rng(7).normal(size=(environments, 3)) * [0.05, 0.05, 0.5]
+    host = HostStep((velocity @ rows.T).reshape(-1, 4, 3), np.full(4, 0.5), np.zeros((4, 3)), response)
+    return lambda: patches.step(patches.rest(), host, dt)

@@ -1,0 +1,110 @@
+"""What a whole in-hand run costs, and the import before it."""
+
+from __future__ import annotations
+
+import statistics
+import subprocess
+import sys
+from typing import Any, Literal
+
+import numpy as np
+
+from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
+from planarfriction.patch import ContactPatch, SoftFinger
+from planarfriction.scenes import Scene, Solution, in_hand, in_hand_load, simulate
+from planarfriction.scenes.ready import IN_HAND_LOADS
+from planarfriction_studies.bench.baselines import lsoda_time
+from planarfriction_studies.bench.measurement import Measurement, line, median, once
+from planarfriction_studies.bench.workloads import disc, law
+
+WINDOW = 0.1
+"""Part of the in-hand run [s] that the general solver is given where the whole run would take it minutes."""
+
+
+def _solver_time(scene: Scene, repeats: int, **options: Any) -> tuple[float, Solution]:
+    """Median time in the solver [s], and the last solution."""
+    simulate(scene, **{**options, "t_end": 0.02})
+    solutions = [simulate(scene, **options) for _ in range(repeats)]
+    return statistics.median(s.statistics.wall_time for s in solutions), solutions[-1]
+
+
+def distributed(full: bool) -> Measurement:
+    """The distributed model on 21 x 21 cells."""
+    scene = in_hand(DistributedModel(disc(), law()))
+    value, _ = _solver_time(scene, 5)
+    if full:
+        return line(value, "s", "SciPy LSODA over the whole run", lsoda_time(scene, scene.t_end))
+    ours, _ = _solver_time(scene, 5, t_end=WINDOW)
+    theirs = lsoda_time(scene, WINDOW)
+    words = f"SciPy LSODA over the first {WINDOW} s (the ratio is to the {ours * 1e3:.2g} ms of that window here)"
+    return line(value, "s", words, theirs, theirs / ours)
+
+
+def distributed_101(full: bool) -> Measurement:
+    """The same on 101 x 101 cells, per cell and step."""
+    costs = {}
+    for cells in (101, 21):
+        patch = disc(cells)
+        value, solution = _solver_time(in_hand(DistributedModel(patch, law())), 3, t_end=WINDOW)
+        trials = solution.statistics.steps + solution.statistics.rejections
+        costs[cells] = value / trials / patch.cells * 1e9
+    return line(costs[101], "ns per loaded cell and step", "the same on 21 x 21 cells", costs[21])
+
+
+def published(full: bool, load: Literal[1, 2] = 1) -> Measurement:
+    """The published reduced model."""
+    scene = in_hand(ReducedModelPublished(disc(), law()), normal_force=in_hand_load(load))
+    value, _ = _solver_time(scene, 9)
+    return line(value, "s", "SciPy LSODA over the whole run", lsoda_time(scene, scene.t_end))
+
+
+def reduced(full: bool) -> Measurement:
+    """`ReducedModel`."""
+    kinds = (ReducedModel, ReducedModelPublished)
+    value, theirs = (_solver_time(in_hand(kind(disc(), law())), 9)[0] for kind in kinds)
+    return line(value, "s", "the published reduced model", theirs)
+
+
+def _soft() -> ContactPatch:
+    """The published soft finger whose profile follows the load."""
+    width = 0.02
+    finger = SoftFinger(c=6.0 * width / 21, n=1.0 / 3.0, k_per_newton=2.0, radius_max=0.5 * width)
+    return ContactPatch.rectangle(width, cells=21, pressure=finger)
+
+
+def load_family(full: bool) -> Measurement:
+    """Runs in turn, so that a noisy machine disturbs both alike; what is built is built before."""
+    soft = _soft()
+    fixed = ContactPatch(soft.positions, soft.areas, soft.weights(IN_HAND_LOADS[1, 1][0]), soft.grid)
+    family, rebuilt = ReducedModel(soft, law()), ReducedModel(soft, law(), load_error=0.0)
+    scenes = [in_hand(family), in_hand(ReducedModel(fixed, law()))]
+    simulate(scenes[1], t_end=0.02)
+    built = once(lambda: simulate(scenes[0]))
+    every = once(lambda: simulate(in_hand(rebuilt)))
+    times = np.array([[once(lambda scene=scene: simulate(scene)) for scene in scenes] for _ in range(25)])
+    value, theirs = np.median(times, axis=0).tolist()
+    words = (
+        f"the same with a fixed shape (both: all of simulate); building the family's {len(family.load_rungs)} maps "
+        f"first took {built:.2g} s; with a map built for every load, the run takes {every:.2g} s"
+    )
+    return line(value, "s", words, theirs)
+
+
+def load_dependent(full: bool) -> Measurement:
+    """The published reduced model, rebuilt as the load changes."""
+    soft = _soft()
+    rebuilt = median(lambda: simulate(in_hand(ReducedModelPublished(soft, law()))), 3)
+    fixed = median(lambda: simulate(in_hand(ReducedModelPublished(disc(), law()))), 3)
+    return line(rebuilt, "s", "the same with a fixed shape (both: all of simulate)", fixed)
+
+
+def importing(full: bool) -> Measurement:
+    """`import planarfriction`, in a process of its own."""
+
+    def seconds(module: str) -> float:
+        code = f"import time; t = time.perf_counter(); import {module}; print(time.perf_counter() - t)"
+        command = [sys.executable, "-c", code]
+        return float(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+
+    ours, theirs = (statistics.median(seconds(module) for _ in range(7)) for module in ("planarfriction", "numpy"))
+    return line(ours, "s", "import numpy", theirs)

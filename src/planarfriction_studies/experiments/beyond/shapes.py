@@ -1,0 +1,142 @@
+"""Reduced models on patches that no table holds, moved by smooth random twists: their largest errors."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
+from planarfriction.patch import ContactPatch
+from planarfriction.scenes import simulate
+from planarfriction.scenes.ready import driven
+from planarfriction.scenes.signal import Signal
+from planarfriction_studies.experiments import experiment
+from planarfriction_studies.experiments.beyond.ladder import AUTO, name_of_parts
+from planarfriction_studies.experiments.experiment import Table
+from planarfriction_studies.experiments.runs import LAW, at_centre_of_pressure, columns
+
+PARTS = (1, 4, AUTO)
+"""What `ReducedModel` is split into."""
+
+SEEDS = tuple(range(10))
+"""Of the twists."""
+
+T_END, DT = 2.0, 5e-3
+"""End of a twist, and the time between its samples [s]; it is linear in between."""
+
+WAVES = 5
+"""Half waves of a twist over its time, at most."""
+
+SLOWEST, FASTEST = -3.3, -1.7
+"""Powers of ten between which the speed of a twist is drawn [m/s]: from half of v_s to twenty times it."""
+
+ARM = 6.5e-3
+"""Speed over angular speed of a twist, as large as the patches [m]."""
+
+START = 0.2
+"""Time over which a twist grows from zero [s]."""
+
+EVERY = 1e-3
+"""Time between samples of the errors [s]: a patch breaks away within a few milliseconds, and samples 10 ms apart miss
+the largest error of the one model and meet that of the other."""
+
+FINER = 3
+"""Parts into which a side of a cell is cut for the reference."""
+
+QUANTITIES = {"force": "N", "torque": "N m"}
+
+
+def shapes() -> dict[str, Callable[[], ContactPatch]]:
+    """Patches by name: not convex, in separate places, and pressed unevenly."""
+    return {"L": _corner, "annulus sector": _sector, "three feet": _feet, "Gaussian off centre": _gaussian}
+
+
+def _corner() -> ContactPatch:
+    outline = [(0.0, 0.0), (0.02, 0.0), (0.02, 0.006), (0.006, 0.006), (0.006, 0.02), (0.0, 0.02)]
+    return ContactPatch.polygon(outline, 21, name="L")
+
+
+def _sector() -> ContactPatch:
+    angle = np.linspace(0.0, 1.9, 25)
+    outer, inner = (radius * np.column_stack([np.cos(angle), np.sin(angle)]) for radius in (0.012, 0.006))
+    return ContactPatch.polygon(np.concatenate([outer, inner[::-1]]), 21, name="annulus sector")
+
+
+def _feet() -> ContactPatch:
+    places = np.array([(0.0, 0.010), (-0.009, -0.006), (0.008, -0.005)])
+    grid = 6e-4 * (np.stack(np.meshgrid(range(4), range(4)), axis=-1).reshape(-1, 2) - 1.5)
+    return ContactPatch.points((places[:, None] + grid).reshape(-1, 2), name="three feet")
+
+
+def _gaussian() -> ContactPatch:
+    def pressure(x: float, y: float) -> float:
+        return float(np.exp(-((x - 0.004) ** 2 + (y + 0.003) ** 2) / (2.0 * 0.004**2)))
+
+    return ContactPatch.rectangle(0.02, pressure=pressure, name="Gaussian off centre")
+
+
+def twist(seed: int) -> Signal:
+    """A smooth random twist that starts from rest: half waves of random size and phase, at a random speed."""
+    rng = np.random.default_rng([seed, 17])
+    time = np.arange(0.0, T_END + 0.5 * DT, DT)
+    waves = np.arange(1, WAVES + 1)[:, None, None]
+    sizes, phases = rng.normal(size=(WAVES, 1, 3)) / waves, rng.uniform(0.0, 2.0 * np.pi, (WAVES, 1, 3))
+    sums = (sizes * np.sin(np.pi * waves * time[:, None] / T_END + phases)).sum(axis=0)
+    speed = 10.0 ** rng.uniform(SLOWEST, FASTEST)
+    return Signal.sampled(time, np.minimum(time / START, 1.0)[:, None] * speed * sums * [1.0, 1.0, 1.0 / ARM], "linear")
+
+
+def largest_errors(shape: str, seeds: tuple[int, ...] = SEEDS) -> dict[str, np.ndarray]:
+    """Largest error of the force [N] and of the torque [N m] about the centre of pressure by model, `[twists, 2]`.
+
+    The reference is the distributed model with its cells cut finely; points stay as they are.
+    """
+    patch = shapes()[shape]()
+    fine = patch.refined(FINER) if (patch.cell_extents() > 0.0).any() else patch
+    models: dict[str, Any] = {"published": ReducedModelPublished(patch, LAW)}
+    models |= {name_of_parts(parts): ReducedModel(patch, LAW, parts=parts) for parts in PARTS}
+    reference = DistributedModel(fine, LAW)
+    result = {}
+    for seed in seeds:
+        wrench = functools.partial(_wrench, twist=twist(seed))
+        wanted = wrench(reference)
+        for name, model in models.items():
+            miss = wrench(model) - wanted
+            worst = [np.hypot(miss[:, 0], miss[:, 1]).max(), np.abs(miss[:, 2]).max()]
+            result.setdefault(name, []).append(worst)
+    return {name: np.array(errors) for name, errors in result.items()}
+
+
+def _wrench(model: Any, twist: Signal) -> np.ndarray:
+    scene = driven(model, twist=twist, t_end=T_END)
+    return at_centre_of_pressure(columns(simulate(scene, save_every=EVERY)), model.patch)
+
+
+def ratios(errors: dict[str, np.ndarray]) -> dict[str, dict[str, list[float]]]:
+    """Largest errors of `ReducedModel` over the published model's, by model and quantity, one for each twist."""
+    return {
+        name: {quantity: (errors[name] / errors["published"])[:, i].tolist() for i, quantity in enumerate(QUANTITIES)}
+        for name in errors
+        if name != "published"
+    }
+
+
+def table(found: dict[str, dict[str, np.ndarray]]) -> Table:
+    """Largest errors over the published model's: the median twist and the worst."""
+    models = [name for name in next(iter(found.values())) if name != "published"]
+    words = {"reduced": "1 part"}
+    columns = {
+        f"{quantity}, {words.get(model, model)}": lambda each, m=model, q=quantity: (
+            f"{np.median(each[m][q]):.2f} / {max(each[m][q]):.2f}"
+        )
+        for quantity in QUANTITIES
+        for model in models
+    }
+    note = (
+        f"Smooth random twists of {T_END:g} s, samples every {1e3 * EVERY:g} ms; from a grid cut {FINER} times finer."
+    )
+    title = "New shapes: largest error over the published reduced model's, median / worst twist"
+    return experiment.table(title, {shape: ratios(each) for shape, each in found.items()}, columns, "patch", note)

@@ -1,0 +1,153 @@
+"""Every kind of limit surface beside the exact one, over the same random twists, and the staircase of a sum."""
+
+from __future__ import annotations
+
+import importlib.util
+from typing import Any
+
+import numpy as np
+
+from planarfriction import geometry
+from planarfriction.limit_surface import (
+    LimitSurface,
+    LimitSurfaceCells,
+    LimitSurfaceEllipsoid,
+    LimitSurfaceExact,
+    LimitSurfaceQuartic,
+    LimitSurfaceTable,
+    LimitSurfaceTablePublished,
+)
+from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
+from planarfriction_studies.experiments.experiment import Arrays, Comparison, compare_all
+from planarfriction_studies.experiments.runs import IN_WORDS
+
+TWISTS = 2000
+"""Random twists, their directions even over the sphere of (vx, vy, r omega) about the centre of pressure."""
+
+WIDTH = 0.02
+"""Width of the patches, length of the line [m]."""
+
+KINDS: dict[str, type[LimitSurface]] = {
+    "published table": LimitSurfaceTablePublished,
+    "table": LimitSurfaceTable,
+    "sum over cells": LimitSurfaceCells,
+    "quartic": LimitSurfaceQuartic,
+    "ellipsoid": LimitSurfaceEllipsoid,
+}
+"""What stands in for the exact surface, by its name in the report."""
+
+QUARTIC_SHAPES = ("Circle", "NonConvex1")
+"""Shapes with a quartic: a fit takes seconds."""
+
+CHECKED = ("Circle", "Square", "NonConvex1", "NonConvex2")
+"""Grids whose sum over cells is checked to come closer with smaller cells."""
+
+PARTS = 5
+"""Parts along each side into which the cells of that check are cut."""
+
+STAIRS = 1501
+"""Centres of rotation in the figure of the staircase."""
+
+
+def has_quartic() -> bool:
+    """Whether the package that fits quartics is installed."""
+    return importlib.util.find_spec("cvxpy") is not None
+
+
+def random_twists(surface: LimitSurface, count: int) -> np.ndarray:
+    """Twists `[count, 3]` about the origin, always the same directions."""
+    directions = np.random.default_rng(5).normal(size=(count, 3))
+    directions /= np.linalg.norm(directions, axis=1, keepdims=True)
+    x, y = surface.centre_of_pressure
+    omega = directions[:, 2] / surface.contact_radius
+    return np.stack([directions[:, 0] + omega * y, directions[:, 1] - omega * x, omega], axis=1)
+
+
+def difference(surface: LimitSurface, exact: LimitSurface, twists: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Force [N] and torque [N m] at the exact centre of pressure between two surfaces, same twists, mu f_N = 1 N."""
+    miss = geometry.wrench_at(surface.wrench(twists) - exact.wrench(twists), exact.centre_of_pressure)
+    return np.hypot(miss[:, 0], miss[:, 1]), np.abs(miss[:, 2])
+
+
+def surface_errors(shape: str, count: int) -> dict[str, Any]:
+    """By kind: force errors `[count]` [N] and torque errors `[count]` [N m] of a published patch."""
+    patch = PUBLISHED_PATCHES[shape](width=WIDTH)
+    exact = LimitSurfaceExact(patch)
+    twists = random_twists(exact, count)
+    result: dict[str, Any] = {}
+    for name, kind in KINDS.items():
+        if name != "quartic" or (has_quartic() and shape in QUARTIC_SHAPES):
+            result[f"{name}/force"], result[f"{name}/torque"] = difference(kind(patch), exact, twists)
+    if shape in CHECKED:
+        result["finer sum/force"], result["finer sum/torque"] = difference(
+            LimitSurfaceCells(patch.refined(PARTS)), exact, twists
+        )
+    return result
+
+
+def staircase(cells: int = 21) -> dict[str, Any]:
+    """Torque of unit spins [N m] of disc and line, mu f_N = 1 N, over the centre of rotation on the x or y axis [m].
+
+    The centre of rotation moves along the x axis of the disc, and along the line; torque about the centre of pressure.
+    """
+    place = np.linspace(0.0, 0.5 * WIDTH, STAIRS)
+    zero, one = np.zeros_like(place), np.ones_like(place)
+    result = {"place": place}
+    for shape, twists in (
+        ("Circle", np.stack([zero, -place, one], axis=1)),
+        ("Line", np.stack([place, zero, one], axis=1)),
+    ):
+        patch = PUBLISHED_PATCHES[shape](cells, WIDTH)
+        for name, surface in (("sum", LimitSurfaceCells(patch)), ("exact", LimitSurfaceExact(patch))):
+            result[f"{shape}/{name}"] = -surface.wrench(twists)[:, 2]
+            result[f"{shape}/{name}, force"] = np.hypot(*surface.wrench(twists)[:, :2].T)
+    return result
+
+
+def jumps(stairs: Arrays) -> dict[str, float]:
+    """Largest change of force [N] between neighbouring centres of rotation, by shape and surface."""
+    return {
+        name.removesuffix(", force"): float(np.abs(np.diff(values)).max())
+        for name, values in stairs.items()
+        if name.endswith(", force")
+    }
+
+
+def comparisons(errors: dict[str, Arrays], stairs: Arrays) -> list[Comparison]:
+    """The exact surface beside closed forms, sums over ever finer cells, and the errors of the table."""
+    finer = f"sum over cells cut in {PARTS} along each side, mean distance to the exact surface"
+    cause = "A sum converges at least in proportion to the size of its cells; the tolerance is 1.6 times that."
+    sums = [
+        Comparison(
+            f"{IN_WORDS.get(shape, shape)}: {finer}",
+            "converged",
+            float(each["finer sum/force"].mean()),
+            1.6 / PARTS * float(each["sum over cells/force"].mean()),
+            "N",
+            len(each["finer sum/force"]),
+            cause,
+        )
+        for shape, each in errors.items()
+        if "finer sum/force" in each
+    ]
+    return [*_closed_forms(stairs), *sums]
+
+
+def _closed_forms(stairs: Arrays) -> list[Comparison]:
+    place, half = stairs["place"], 0.5 * WIDTH
+    rounding = "A closed form beside another one: rounding."
+    square = LimitSurfaceExact(ContactPatch.rectangle(WIDTH)).contact_radius
+    disc = LimitSurfaceExact(ContactPatch.disc(half)).contact_radius
+    # a line of half length a, spun about the point s on it: torque (a^2 - s^2)/(2 a) about its middle, force s/a
+    torque = (half**2 - place**2) / (2.0 * half)
+    words, line = "exact, line: {} over the centre of rotation", "Line/exact"
+    exact = WIDTH * (np.sqrt(2.0) + np.arcsinh(1.0)) / 6.0, 2.0 * half / 3.0
+    return compare_all(
+        "closed form",
+        (
+            ("exact, contact radius of a square", square, exact[0], 1e-15, "m", rounding),
+            ("exact, contact radius of a disc", disc, exact[1], 1e-14, "m", rounding),
+            (words.format("torque"), stairs[line], torque, 1e-14, "N m", rounding),
+            (words.format("force"), stairs[f"{line}, force"], place / half, 1e-12, "N", rounding),
+        ),
+    )

@@ -1,0 +1,290 @@
+"""What an experiment is: a function of `Work` that returns a `Result` of data, figures and numbers."""
+
+from __future__ import annotations
+
+import functools
+import hashlib
+import itertools
+import re
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from zipfile import BadZipFile
+
+import numpy as np
+
+from planarfriction.writing import make_folder, replacing
+from planarfriction_studies.experiments import facts
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+THREADS = 2
+"""Pieces computed at once by `Work.pieces`."""
+
+Arrays = dict[str, np.ndarray]
+
+Key = TypeVar("Key")
+
+Reference = Literal["published", "converged", "closed form"]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One of our numbers or curves beside a reference, with the tolerance that the reference supports."""
+
+    quantity: str
+    """What is compared, in words."""
+    reference: Reference
+    difference: float
+    """Largest absolute difference over all samples."""
+    tolerance: float
+    unit: str
+    samples: int
+    cause: str
+    """Where the difference comes from, one sentence."""
+    ours: float | None = None
+    """Our value, where it is a single number."""
+    theirs: float | None = None
+    """The reference's value, where it is a single number."""
+    span: float | None = None
+    """Largest less smallest value of the reference's curve; None: not a curve."""
+    paper: float | None = None
+    """Distance of a published curve from the converged solution, which is most of its tolerance; None: not known."""
+
+    @property
+    def share(self) -> float | None:
+        """The difference as a share of the span [-]; None where the reference is zero, up to the tolerance."""
+        return self.difference / self.span if self.span and self.span > self.tolerance else None
+
+    @property
+    def holds(self) -> bool:
+        """Whether the difference is within the tolerance."""
+        return bool(self.difference <= self.tolerance)
+
+
+def compare_curve(
+    quantity: str, time: np.ndarray, values: np.ndarray, name: str, allowance: float, cause: str
+) -> Comparison:
+    """Our curve (`values` at `time`) beside the published curve `name`, at the times of its vertices only.
+
+    The tolerance is the error of the figure's solver, plus that of reading it, plus `allowance`, which is our own
+    error (or, where the figure's solver error is unknown, an estimate that `cause` explains).
+    """
+    curve = facts.published_curve(name)
+    inside = curve.time <= time[-1] + 1e-9  # a run may be shorter than the figure
+    difference = np.abs(_at(curve.time[inside], time, values) - curve.values[inside])
+    tolerance = (curve.deviation or 0.0) + curve.reading + allowance
+    return Comparison(
+        quantity,
+        "published",
+        float(difference.max()),
+        tolerance,
+        curve.unit,
+        int(inside.sum()),
+        cause,
+        span=float(np.ptp(curve.values)),
+        paper=curve.deviation,
+    )
+
+
+def compare_converged(
+    quantity: str, time: np.ndarray, values: np.ndarray, name: str, unit: str, allowance: float, cause: str
+) -> Comparison:
+    """Our curve beside the column `name` of a converged solution, such as `in_hand/Circle/d1/x`, at all its times."""
+    solution, _, column = name.rpartition("/")
+    reference = facts.converged(solution)
+    inside = reference["time"] <= time[-1] + 1e-9
+    expected = reference[column][inside]
+    difference = np.abs(_at(reference["time"][inside], time, values) - expected)
+    span = float(np.ptp(reference[column]))
+    tolerance = allowance + facts.CONVERGED_SHARE * span
+    return Comparison(
+        quantity, "converged", float(difference.max()), tolerance, unit, int(inside.sum()), cause, span=span
+    )
+
+
+def compare(
+    quantity: str, ours: Any, theirs: Any, reference: Reference, tolerance: float, unit: str, cause: str
+) -> Comparison:
+    """One number beside its reference, or an array of them, of which the farthest counts."""
+    difference = np.abs(np.asarray(ours) - theirs)
+    values = (None, None) if difference.ndim else (float(ours), float(theirs))
+    return Comparison(quantity, reference, float(difference.max()), tolerance, unit, difference.size, cause, *values)
+
+
+def compare_all(reference: Reference, rows: Iterable[tuple[str, Any, Any, float, str, str]]) -> list[Comparison]:
+    """Rows of what is compared, ours, theirs, tolerance, unit and cause."""
+    return [
+        compare(quantity, ours, theirs, reference, within, unit, cause)
+        for quantity, ours, theirs, within, unit, cause in rows
+    ]
+
+
+def _at(wanted: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Recorded values at `wanted` times; each must be a recorded time, for between samples lie jumps."""
+    index = np.clip(np.searchsorted(time, wanted - 1e-7), 0, len(time) - 1)
+    assert np.abs(time[index] - wanted).max() < 1e-6, "the reference has times that were not recorded"
+    return values[index]
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure of the report."""
+
+    name: str
+    """File name without its ending."""
+    caption: str
+    """What to see, one or two sentences."""
+    figure: Any
+    """The matplotlib figure."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of the report; the first column names the rows."""
+
+    title: str
+    headings: Sequence[str]
+    rows: Sequence[Sequence[str | float]]
+    note: str = ""
+
+
+Item = TypeVar("Item")
+
+
+def table(
+    title: str,
+    items: Mapping[str, Item],
+    columns: Mapping[str, Callable[[Item], str | float]],
+    first: str = "",
+    note: str = "",
+) -> Table:
+    """A row for each item, which its name begins; columns by heading; `first` is the heading of the names."""
+    rows = [[name, *(cell(item) for cell in columns.values())] for name, item in items.items()]
+    return Table(title, [first, *columns], rows, note)
+
+
+def dataset(
+    runs: Mapping[tuple[str, ...], Mapping[str, np.ndarray]],
+    units: Mapping[str, str],
+    dims: Sequence[str],
+    along: tuple[str, np.ndarray, str],
+) -> xr.Dataset:
+    """Columns of runs by their labels, one for each of `dims`, over `along`: its name, values and unit."""
+    import xarray as xr
+
+    labels = [list(dict.fromkeys(each)) for each in zip(*runs, strict=True)]
+    shape = [*map(len, labels), -1]
+    name, values, unit = along
+    columns: dict[str, Any] = {
+        column: ((*dims, name), np.array([runs[key][column] for key in itertools.product(*labels)]).reshape(shape),
+                 {"units": unit})
+        for column, unit in units.items()
+    }  # fmt: skip
+    coordinates = dict(zip(dims, labels, strict=True))
+    return xr.Dataset(columns, coordinates | {name: (name, values, {"units": unit})})
+
+
+@dataclass(frozen=True)
+class Result:
+    """What an experiment found."""
+
+    findings: Sequence[str]
+    """Paragraphs of Markdown: what it shows, with the numbers measured in this run."""
+    pictures: Sequence[Picture]
+    comparisons: Sequence[Comparison]
+    numbers: Mapping[str, Any]
+    """Every number worth keeping, in nested dictionaries and lists."""
+    tables: Sequence[Table] = ()
+    data: Mapping[str, xr.Dataset] = field(default_factory=dict)
+    """Curves by name, with units; written as NetCDF."""
+    asked: str = ""
+    """What was asked, Markdown."""
+    verdict: str = ""
+    """One or two sentences for the top of the report, Markdown."""
+
+
+@dataclass(frozen=True)
+class Work:
+    """How to work: how much, where finished pieces are kept, whom to tell.
+
+    An experiment wraps what takes long in pieces. A piece that an interrupted run has finished is read from its file.
+    """
+
+    quick: bool = False
+    """A small part of everything, to see that it works."""
+    full: bool = False
+    """Also what takes more than minutes."""
+    folder: Path | None = None
+    """Where finished pieces are kept; None: nowhere."""
+    fingerprint: str = ""
+    """Of the code and the options: pieces with another one are computed again."""
+    progress: Callable[[str], None] | None = None
+
+    def piece(self, label: str, compute: Callable[[], Mapping[str, Any]]) -> dict[str, Any]:
+        """What `compute` returns, numbers and arrays in nested dictionaries, from the kept file if there is one."""
+        if self.progress is not None:
+            self.progress(label)
+        path = None if self.folder is None else self.folder / f"{_slug(label)}.npz"
+        kept = None if path is None else _read_piece(path, self.fingerprint)
+        if kept is None:
+            kept = dict(_flat(compute()))
+            if path is not None:
+                _write_piece(path, self.fingerprint, kept)
+        return _nested(kept)
+
+    def pieces(
+        self, computes: Mapping[Key, Callable[[], Mapping[str, Any]]], label: Callable[[Key], str] = str
+    ) -> dict[Key, dict[str, Any]]:
+        """Independent pieces by key, two at a time: compiled code runs beside other compiled code."""
+        pool = ThreadPoolExecutor(THREADS)
+        try:
+            futures = {key: pool.submit(self.piece, label(key), compute) for key, compute in computes.items()}
+            return {key: future.result() for key, future in futures.items()}
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+_INNER = "|"
+"""Between the names of nested dictionaries in the kept files."""
+
+
+def _flat(values: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, np.ndarray]]:
+    for name, value in values.items():
+        if isinstance(value, Mapping):
+            yield from _flat(value, f"{before}{name}{_INNER}")
+        else:
+            yield f"{before}{name}", np.asarray(value)
+
+
+def _nested(arrays: Arrays) -> dict[str, Any]:
+    result: dict[str, Any] = {}
+    for key, values in arrays.items():
+        *outer, name = key.split(_INNER)
+        home = functools.reduce(lambda place, each: place.setdefault(each, {}), outer, result)
+        home[name] = values if values.ndim else values.item()
+    return result
+
+
+def _slug(label: str) -> str:
+    """The label as a file name; its digest tells labels apart that differ only in what a file name cannot hold."""
+    return re.sub(r"[^\w.]+", "-", label).strip("-") + "-" + hashlib.sha256(label.encode()).hexdigest()[:8]
+
+
+def _read_piece(path: Path, fingerprint: str) -> Arrays | None:
+    try:
+        with path.open("rb") as file, np.load(file) as stored:
+            arrays = dict(stored)
+    except (OSError, ValueError, EOFError, BadZipFile):  # none, or cut off while it was written
+        return None
+    return arrays if str(arrays.pop("fingerprint", "")) == fingerprint else None
+
+
+def _write_piece(path: Path, fingerprint: str, arrays: Arrays) -> None:
+    make_folder(path.parent)
+    contents: dict[str, Any] = {"fingerprint": np.array(fingerprint), **arrays}
+    with replacing(path) as file:
+        np.savez_compressed(file, **contents)

@@ -1,0 +1,173 @@
+"""Figures of the limit surfaces: all six, which point belongs to which twist, and the gradient line."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from planarfriction import geometry
+from planarfriction.limit_surface import LimitSurfaceCells, LimitSurfaceEllipsoid
+from planarfriction.plots.limit_surface import draw_surface, scaled_samples
+from planarfriction.plots.style import LINE_STYLES, PlotFigure, new_figure, tidy
+from planarfriction_studies.experiments import looks
+from planarfriction_studies.experiments.runs import IN_WORDS
+
+SUM, BESIDE, LINK = looks.DISTRIBUTED, looks.ELLIPSOID, "0.45"
+"""Colours of the sum over the cells, of the ellipsoid, and of what joins them."""
+
+ACROSS_Y = ("NonConvex1", "NonConvex2")
+"""Shapes that extend along x: their section is that of twists (0, vy, omega), of the others (vx, 0, omega)."""
+
+MATCHED = 28
+"""Twists marked on both surfaces of a section."""
+
+
+def overview(surfaces: Mapping[str, LimitSurfaceCells], *, coarse: bool = False) -> PlotFigure:
+    """The six limit surfaces, with circles of the ellipsoid (there the unit sphere) around them."""
+    figure = new_figure(10.0, 6.6)
+    count = 10 if coarse else 48
+    polar = np.linspace(0.0, np.pi, count + 1)[:, None]
+    azimuth = np.linspace(0.0, 2.0 * np.pi, 2 * count + 1)[None, :]
+    for place, (name, surface) in enumerate(surfaces.items()):
+        axes: Any = figure.add_subplot(2, 3, place + 1, projection="3d")
+        directions, mesh = scaled_samples(surface, polar, azimuth)
+        draw_surface(axes, mesh, directions, 1.05)
+        for each in axes.collections:
+            each.set_rasterized(True)  # thousands of facets
+        axes.set_proj_type("ortho")  # the outline of a sphere is then a great circle
+        axes.set_box_aspect((1.0, 1.0, 1.0), zoom=0.84)
+        axes.tick_params(labelsize="x-small", pad=0)
+        axes.set(
+            xlabel="$f_x$ [-]",
+            ylabel="$f_y$ [-]",
+            zlabel="$\\tau/r$ [-]",
+            **{f"{name}ticks": [-1, 0, 1] for name in "xyz"},
+        )
+        axes.zaxis.labelpad = -6
+        _circles(axes)
+        axes.set_title(IN_WORDS[name], fontsize="medium", y=0.95)
+    return figure
+
+
+def _circles(axes: Any) -> None:
+    """Outline of the unit sphere, and the near halves of its equator and two meridians."""
+    elevation, azimuth = np.radians([axes.elev, axes.azim])
+    towards = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
+    around = np.linspace(0.0, 2.0 * np.pi, 181)
+    level = np.zeros_like(around)
+    rings = [
+        np.stack([np.cos(around), np.sin(around), level]),
+        np.stack([np.cos(around), level, np.sin(around)]),
+        np.stack([level, np.cos(around), np.sin(around)]),
+    ]
+    for ring in rings:
+        near = np.where(towards @ ring > 0.0, ring, np.nan)
+        axes.plot(*near, color=BESIDE, lw=0.9, zorder=10)
+    right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
+    outline = np.outer(right, np.cos(around)) + np.outer(np.cross(towards, right), np.sin(around))
+    axes.plot(*outline, color=BESIDE, lw=1.3, zorder=10)
+
+
+def correspondence(surfaces: Mapping[str, LimitSurfaceCells]) -> PlotFigure:
+    """A section of both surfaces of each shape, the same twists marked on both and joined."""
+    figure = new_figure(9.6, 7.0)
+    panels: Any = figure.subplots(2, 3)
+    for axes, (name, surface) in zip(panels.flat, surfaces.items(), strict=True):
+        column = 1 if name in ACROSS_Y else 0
+        _section(axes, surface, column)
+        axes.set_title(IN_WORDS[name], fontsize="medium")
+    looks.legend(figure, panels[0, 0], 3)
+    return figure
+
+
+def _section(axes: Any, surface: LimitSurfaceCells, column: int, count: int = MATCHED) -> None:
+    """Points (f, tau/r) of twists (v, r omega) with velocity along one axis, f the force along it."""
+    ellipsoid = LimitSurfaceEllipsoid(surface.patch)
+    fine = (_points_of(each, column, 1441) for each in (surface, ellipsoid))
+    for points, colour, name in zip(fine, (SUM, BESIDE), ("sum over the cells", "ellipsoid"), strict=True):
+        axes.plot(*points, color=colour, lw=1.4, label=name)
+    marked = [_points_of(each, column, count, closed=False) for each in (surface, ellipsoid)]
+    for exact, beside in zip(*(points.T for points in marked), strict=True):
+        axes.plot(*np.stack([exact, beside]).T, color=LINK, lw=0.8, zorder=1)
+    axes.plot(*marked[0], ls="", marker="o", ms=3.8, color=SUM)
+    axes.plot(*marked[1], ls="", marker="s", ms=3.4, color=BESIDE)
+    axes.plot([], [], color=LINK, lw=0.8, label="same twist")
+    force = ("$f_x$", "$f_y$")[column]
+    axes.set(xlabel=f"{force} [-]", ylabel="$\\tau/r$ [-]", aspect="equal", xlim=(-1.12, 1.12), ylim=(-1.12, 1.12))
+    axes.set(xticks=[-1, -0.5, 0, 0.5, 1], yticks=[-1, -0.5, 0, 0.5, 1])
+    tidy(axes)
+
+
+def _points_of(surface: Any, column: int, count: int, *, closed: bool = True) -> np.ndarray:
+    """Force along axis `column` and torque over r, `[2, count]`, of twists at equal angles around the section."""
+    angle = np.linspace(0.0, 2.0 * np.pi, count, endpoint=closed)
+    azimuth = np.where(angle <= np.pi, 0.0, np.pi) + 0.5 * np.pi * column
+    points = scaled_samples(surface, np.where(angle <= np.pi, angle, 2.0 * np.pi - angle), azimuth)[1]
+    return points[:, [column, 2]].T
+
+
+def gradient_line(surface: LimitSurfaceCells, numbers: dict[str, Any]) -> PlotFigure:
+    """The line and its load, the force over the centre of rotation, and the section with the two spins marked."""
+    figure = new_figure(10.0, 4.6)
+    load, force, section = figure.subplots(1, 3, width_ratios=(0.55, 1.0, 1.25))
+    centres = (
+        ("about the centre of pressure", numbers["cells"]["centre of pressure"], looks.OTHERS[1], "D"),
+        ("about the middle of the load", numbers["cells"]["middle cell"], looks.OTHERS[2], "o"),
+    )
+    _load_panel(load, numbers, centres)
+    _force_panel(force, surface, numbers, centres)
+    _spin_panel(section, surface, numbers, centres)
+    looks.legend(figure, section, 3, fontsize="small")
+    return figure
+
+
+def _load_panel(axes: Any, numbers: dict[str, Any], centres: Any) -> None:
+    cell = 1e3 * numbers["cell"]
+    places, loads = 1e3 * np.array(numbers["places"]), np.array(numbers["loads"])
+    axes.barh(places, loads, height=0.85 * cell, color="0.75")
+    for _, y, colour, marker in centres:
+        axes.axhline(1e3 * y, color=colour, lw=1.2)
+        axes.plot([0.0], [1e3 * y], marker=marker, ms=7, color=colour, clip_on=False)
+    axes.set(xlabel="load of a cell [N]", ylabel="y [mm]", ylim=(-10.5, 10.5), xlim=(0.0, 0.1))
+    tidy(axes)
+
+
+def _force_panel(axes: Any, surface: LimitSurfaceCells, numbers: dict[str, Any], centres: Any) -> None:
+    half = 0.5 * numbers["cell"] * len(numbers["loads"])
+    y = np.linspace(-1.25 * half, 1.25 * half, 2001)
+    continuous = 1.0 - 2.0 * np.clip((y + half) / (2.0 * half), 0.0, 1.0) ** 2
+    axes.plot(_force_of(surface, y), 1e3 * y, color=SUM, lw=1.4)
+    axes.plot(_force_of(LimitSurfaceEllipsoid(surface.patch), y), 1e3 * y, color=BESIDE, lw=1.4)
+    axes.plot(continuous, 1e3 * y, color=looks.EXACT, lw=1.0, ls=LINE_STYLES[1])
+    for _, at, colour, marker in centres:
+        axes.axhline(1e3 * at, color=colour, lw=0.8)
+        for each in (surface, LimitSurfaceEllipsoid(surface.patch)):
+            axes.plot(_force_of(each, np.array([at])), [1e3 * at], marker=marker, ms=5, color=colour, ls="")
+    axes.set(xlabel="$f_x$ [N]", ylabel="centre of rotation, y [mm]", ylim=(-10.5, 10.5), xlim=(-1.05, 1.05))
+    tidy(axes)
+
+
+def _force_of(surface: Any, y: np.ndarray) -> np.ndarray:
+    """fx of unit spins about the points (0, y)."""
+    zero = np.zeros_like(y)
+    return surface.wrench(np.stack([y, zero, zero + 1.0], -1))[:, 0]
+
+
+def _spin_panel(axes: Any, surface: LimitSurfaceCells, numbers: dict[str, Any], centres: Any) -> None:
+    """The upper half of the section, turned to positive torque: what balances the friction of a negative spin."""
+    ellipsoid = LimitSurfaceEllipsoid(surface.patch)
+    for each, colour, name in ((surface, SUM, "sum over the cells"), (ellipsoid, BESIDE, "ellipsoid")):
+        axes.plot(*_points_of(each, 0, 2881), color=colour, lw=1.4, label=name)
+    axes.plot([], [], color=looks.EXACT, lw=1.0, ls=LINE_STYLES[1], label="continuous pressure")
+    for name, y, colour, marker in centres:
+        points = []
+        for each in (surface, ellipsoid):
+            wrench = geometry.wrench_at(each.wrench([y, 0.0, 1.0]), each.centre_of_pressure)
+            points.append((wrench[0], wrench[2] / each.contact_radius))
+        axes.plot(*np.array(points).T, color=colour, lw=0.9, marker=marker, ms=5.5, label=f"spin {name}")
+    torque = numbers["cells"]["torque"] / surface.contact_radius
+    axes.plot([0.0], [-torque], marker="*", ms=10, ls="", color=looks.EXACT, label="torque without force", zorder=1)
+    axes.set(xlabel="$f_x$ [-]", ylabel="$\\tau/r$ [-]", xlim=(-0.32, 0.32), ylim=(-1.01, -0.86))
+    tidy(axes)

@@ -1,0 +1,149 @@
+"""The table of patches beside ours, the size of the disc mask, and moments with closed forms."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from planarfriction.limit_surface import LimitSurfaceTablePublished
+from planarfriction.patch import ContactPatch
+from planarfriction_studies.experiments import facts
+from planarfriction_studies.experiments.experiment import Comparison, compare, compare_all
+from planarfriction_studies.experiments.runs import IN_WORDS
+
+WIDTH, CELLS = 0.02, 21
+"""Width [m] of the published patches and cells along it."""
+
+Numbers = dict[str, Any]
+
+LAST_DIGIT = {
+    "loaded cells": (0.0, "1", "A count."),
+    "centre of pressure x [m]": (6e-10, "m", "Printed to $10^{-9}$ m: rounding."),
+    "centre of pressure y [m]": (6e-10, "m", "Printed to $10^{-9}$ m: rounding."),
+    "contact radius, plain sum [m]": (6e-12, "m", "Printed to $10^{-11}$ m: rounding."),
+    "contact radius, as published [m]": (6e-12, "m", "Printed to $10^{-11}$ m: rounding."),
+    "second moment [m^2]": (6e-12, "m^2", "Printed to $10^{-11}$ m²: rounding."),
+}
+"""Column of the table of patches -> half a unit of its last digit and a little, unit, cause."""
+
+
+def patch_numbers(patches: Mapping[str, ContactPatch]) -> dict[str, Numbers]:
+    """The columns of the published table of patches, as ours."""
+    result = {}
+    for name, patch in patches.items():
+        x, y = patch.centre_of_pressure()
+        values = (
+            int((patch.weights() > 0.0).sum()),
+            float(x),
+            float(y),
+            float(patch.contact_radius()),
+            LimitSurfaceTablePublished(patch).contact_radius,
+            float(patch.second_moment()),
+        )
+        result[name] = dict(zip(LAST_DIGIT, values, strict=True))
+    return result
+
+
+def patch_comparisons(ours: Mapping[str, Numbers]) -> list[Comparison]:
+    """Each column of the table of patches over all its rows."""
+    published = facts.published_table("patches")
+    rows = []
+    for column, (tolerance, unit, cause) in LAST_DIGIT.items():
+        found, expected = (np.array([each[name][column] for name in published]) for each in (ours, published))
+        quantity = f"table of patches, {column.partition(' [')[0]}"
+        rows.append(compare(quantity, found, expected, "published", tolerance, unit, cause))
+    return rows
+
+
+def disc_numbers(mask: ContactPatch) -> Numbers:
+    """Size of the published disc mask [m], and the moments of a true disc on the same grid."""
+    disc = ContactPatch.disc(0.5 * WIDTH, CELLS)
+    grid = mask.grid
+    assert grid is not None, "the mask is cut from a grid"
+    return {
+        "cell": grid.cell_width,
+        "equal-area radius": math.sqrt(float(mask.area()) / math.pi),
+        "equal-area radius in cells": math.sqrt(float(mask.area()) / math.pi) / grid.cell_width,
+        "half width in cells": 0.5 * grid.columns,
+        "radius": 0.5 * WIDTH,
+        "contact radius on the grid": float(disc.contact_radius()),
+        "second moment on the grid": float(disc.second_moment()),
+    }
+
+
+def shape_comparisons(numbers: Numbers) -> list[Comparison]:
+    """Moments of discs, square and lines beside closed forms; the ellipsoid's largest error on the lines too."""
+    rows = [*_disc_rows(numbers), *_grid_rows(numbers["patches"]), *_line_rows(numbers)]
+    return compare_all("closed form", rows)
+
+
+_Row = tuple[str, float, float, float, str, str]
+
+LUMPED = (
+    r"Each cell's load stands at its middle: at the distance $d$ the mean distance lacks about $c^2/(24\,d)$, for "
+    "cells of width $c$."
+)
+
+
+def _disc_rows(numbers: Numbers) -> list[_Row]:
+    """`r = 2 R/3` and `<rho^2> = R^2/2`: of the mask with the radius of equal area, of a disc cut by its rim."""
+    disc, mask = numbers["disc"], numbers["patches"]["Circle"]
+    cell = disc["cell"]
+    lost = cell**2 / 6.0
+    ragged = "Its cells stand in whole rows: the rim is ragged, and each cell's load stands at its middle."
+    lumped = "Each cell's load stands at its middle: a cell's own second moment, $c^2/6$ for the width $c$, is missing."
+    grid = disc["contact radius on the grid"], disc["second moment on the grid"]
+    rows: list[_Row] = []
+    for name, radius, (first, second), causes in (
+        ("mask of 317 cells", disc["equal-area radius"], _moments(mask), (ragged, ragged)),
+        ("disc cut by its rim", disc["radius"], grid, (LUMPED, lumped)),
+    ):
+        rows.append((f"contact radius, {name}", first, 2.0 * radius / 3.0, cell**2 / (12.0 * first), "m", causes[0]))
+        rows.append((f"second moment, {name}", second, 0.5 * radius**2, lost, "m^2", causes[1]))
+    return rows
+
+
+def _moments(row: Numbers) -> tuple[float, float]:
+    return row["contact radius, plain sum [m]"], row["second moment [m^2]"]
+
+
+def _grid_rows(patches: Mapping[str, Numbers]) -> list[_Row]:
+    """Second moments of regular grids, exactly; contact radii of the square and the rod, whose cells lack a little."""
+    cell = WIDTH / CELLS
+    square = WIDTH * (math.sqrt(2.0) + math.asinh(1.0)) / 6.0
+    exact = "Sums of squares of whole numbers: rounding."
+    second = {
+        "Square": (CELLS**2 - 1) * cell**2 / 6.0,
+        "Line": (CELLS**2 - 1) * cell**2 / 12.0,
+        "LineGrad": (CELLS - 1) * (CELLS + 2) * cell**2 / 18.0,
+    }
+    rows: list[_Row] = [
+        (f"second moment, {IN_WORDS[name]}", _moments(patches[name])[1], value, 1e-17, "m^2", exact)
+        for name, value in second.items()
+    ]
+    for name, value in (("Square", square), ("Line", 0.25 * WIDTH)):
+        found = _moments(patches[name])[0]
+        rows.append(
+            (f"contact radius, {IN_WORDS[name]}, without cells", found, value, cell**2 / (12.0 * found), "m", LUMPED)
+        )
+    return rows
+
+
+def _line_rows(numbers: Numbers) -> list[_Row]:
+    """Largest distance of corresponding points: the whole line slides one way, the ellipsoid still sees a spin."""
+    cell, rows = WIDTH / CELLS, []
+    cause = "Centre of rotation just beyond the last cell: the force is 1 and the torque 0, of what the search finds."
+    for name in ("Line", "LineGrad"):
+        row = numbers["patches"][name]
+        middle, radius = row["centre of pressure y [m]"], row["contact radius, plain sum [m]"]
+        end = 0.5 * (CELLS - 1) * cell - middle  # the nearer one, at the heavy end
+        expected = math.sqrt(2.0 - 2.0 * end / math.hypot(end, radius))
+        words, found = (
+            f"ellipsoid, largest distance of corresponding points, {IN_WORDS[name]}",
+            numbers["ellipsoid"][name],
+        )
+        rows.append((words, found["points, max"], expected, 1e-5, "1", cause))
+    return rows

@@ -1,0 +1,71 @@
+"""How things look in every figure of the report: one colour for each model, others for what is none."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from planarfriction.plots.style import DISTRIBUTED, ELLIPSOID, EXACT, MOMENTS, OTHER, PARTS, PUBLISHED, PlotFigure
+from planarfriction_studies.experiments import facts
+
+__all__ = ["DISTRIBUTED", "ELLIPSOID", "EXACT", "MOMENTS", "PARTS", "QUARTIC", "REDUCED"]
+
+REDUCED, QUARTIC = PUBLISHED, OTHER
+
+OTHERS = ("#332288", "#882255", "#999933", "0.45")
+"""Colours of what is no model: shapes, solvers, components, loads, causes."""
+
+OF_MODEL = {"d": DISTRIBUTED, "r": REDUCED, "e": ELLIPSOID}
+"""Letter of a model in the names of curves -> its colour."""
+
+
+def vertices(
+    axes: Any, name: str, factor: float, colour: str, shown: Any = slice(None), marker: str = "o", **look: Any
+) -> None:
+    """Vertices of a published curve, in shown units per SI unit; `shown`: which, or from when to when [s]."""
+    curve = facts.published_curve(name)
+    part = shown if isinstance(shown, slice) else (curve.time >= shown[0]) & (curve.time <= shown[1])
+    look = {"ms": 3.0, "mfc": "white", "mec": colour, "mew": 0.7, "zorder": 3} | look
+    axes.plot(curve.time[part], factor * curve.values[part], ls="", marker=marker, **look)
+
+
+def box(axes: Any, at: float, numbers: Any, colour: str, width: float, filled: bool = True) -> None:
+    """A box of low whisker, first quartile, median, third quartile, high whisker; where a sixth is, a cross at it."""
+    low, first, median, third, high, *most = numbers
+    line = {"color": colour, "linewidth": 1.1}
+    axes.bxp(
+        [{"whislo": low, "q1": first, "med": median, "q3": third, "whishi": high}],
+        positions=[at], widths=width, showfliers=False, patch_artist=True, manage_ticks=False,
+        boxprops={"facecolor": colour if filled else "white", "edgecolor": colour, "linewidth": 1.1},
+        medianprops={"color": "white" if filled else colour, "linewidth": 1.5}, whiskerprops=line, capprops=line,
+    )  # fmt: skip
+    if most:
+        axes.plot(at, *most, marker="x", ms=5, mew=1.4, color=colour)
+
+
+def box_key(colours: dict[str, str], ending: str = "", filled: bool = True) -> list[Any]:
+    """Legend of boxes by their words."""
+    from matplotlib.patches import Patch
+
+    return [
+        Patch(facecolor=colour if filled else "white", edgecolor=colour, label=words + ending)
+        for words, colour in colours.items()
+    ]
+
+
+def line_key(label: str, **look: Any) -> Any:
+    """An entry of a legend."""
+    from matplotlib.lines import Line2D
+
+    return Line2D([], [], label=label, **look)
+
+
+MAXIMUM = {"label": "maximum", "ls": "", "marker": "x", "ms": 5, "mew": 1.4, "color": "0.3"}
+"""Legend of the crosses."""
+
+
+def legend(figure: PlotFigure, handles: Any, columns: int, place: str = "upper", **options: Any) -> None:
+    """The legend of a whole figure, above or below it; `handles`: entries, or axes that have them."""
+    if not isinstance(handles, list):
+        handles, options["labels"] = handles.get_legend_handles_labels()
+    loc: Any = f"outside {place} center"
+    figure.legend(handles=handles, loc=loc, ncols=columns, frameon=False, **options)

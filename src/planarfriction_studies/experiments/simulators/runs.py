@@ -1,0 +1,149 @@
+"""The runs of the comparison of simulators: scenes with MuJoCo's own friction at several settings, and with patches.
+
+Each function returns plain numbers; what they are named after is in `simulators`.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import functools
+import time
+from collections.abc import Callable, Mapping
+from typing import Any, Literal
+
+import numpy as np
+
+from planarfriction.models import DistributedModel, FrictionModel
+from planarfriction_studies.bench import coulomb_disc, mujoco_scenes
+from planarfriction_studies.bench.mujoco_scenes import MujocoScene, Native
+from planarfriction_studies.experiments import facts
+from planarfriction_studies.experiments.experiment import Work
+
+NATIVE = {
+    "pyramid": Native("pyramidal", 1.0),
+    "impratio 10": Native(),
+    "noslip 3": Native(noslip=3),
+    "noslip 10": Native(noslip=10),
+    "stiff": Native(impratio=100.0, noslip=10, solref=4e-3),
+}
+"""MuJoCo's own friction: as it comes; with the elliptic cone and the ratio advised against slip; with iterations
+against slip besides; and with stiffer contacts besides, which hold best while they are shaken."""
+
+FRICTIONLESS = Native(condim=1)
+
+PATCHES = "patches"
+"""Our friction, listed among the settings."""
+
+KINDS: dict[str, type | None] = {"patches, reduced": None, "patches, distributed": DistributedModel}
+"""Models of the patches; None: the reduced one of the scene."""
+
+DT = 2e-3
+
+DROPPED = 0.05
+"""A block that has sunk by this [m] is no longer held."""
+
+Way = Native | str
+"""Settings of MuJoCo's own friction, or `PATCHES`."""
+
+_disc, _plate = functools.cache(mujoco_scenes.disc), functools.cache(mujoco_scenes.plate)
+_stop = functools.cache(coulomb_disc.stop)
+
+
+def measured(work: Work, what: str, jobs: Mapping[str, Mapping[str, Callable[[], Any]]]) -> dict[str, dict[str, Any]]:
+    """Case -> way -> numbers, each a piece: an interrupted run goes on from the last."""
+    return {
+        case: {way: work.piece(f"{what}, {case}, {way}", job) for way, job in ways.items()}
+        for case, ways in jobs.items()
+    }
+
+
+def begin(
+    scene: MujocoScene, way: Way, dt: float = DT, integrator: str = "Euler", model: FrictionModel | None = None
+) -> tuple[Any, Any, Callable[[], None]]:
+    """Model, data, and what makes a step."""
+    import mujoco
+
+    if isinstance(way, Native):
+        m, d = scene.native(way, dt, integrator)
+        return m, d, lambda: mujoco.mj_step(m, d)  # pyright: ignore[reportAttributeAccessIssue]
+    m, d, friction = scene.ours(dt, integrator, model=model)
+    return m, d, lambda: friction.step(d)
+
+
+def held(scene: MujocoScene, way: Way, dt: float = DT, body: int = 0) -> dict[str, float]:
+    """How fast what is held moves and turns, over the second half; `body`: where its pose begins in the positions."""
+    m, d, step = begin(scene, way, dt)
+    path = scene.run(m, d, step)[:, body : body + 7]
+    places, turns = path[:, :3], 2.0 * path[:, 4:]  # half-angles about the axes of the world: it starts upright
+    half, seconds = len(path) // 2, 0.5 * scene.time
+    moved, turned = places[-1] - places[half], turns[-1] - turns[half]
+    return {
+        "creep": float(np.linalg.norm(moved) / seconds),
+        "spin": float(np.linalg.norm(turned) / seconds),
+        "moved": float(np.linalg.norm(places - places[0], axis=1).max()),
+        "dropped": float(places[0, 2] - places[-1, 2] > DROPPED),
+    }
+
+
+def shaken(way: Way, integrator: str, scene: MujocoScene) -> dict[str, float]:
+    """How far the block comes away from its place in the hand while that is shaken [m]."""
+    m, d, step = begin(scene, way, integrator=integrator)
+    places = []
+
+    def recorded() -> None:
+        step()
+        places.append(mujoco_scenes.in_the_hand(d))
+
+    steps = len(scene.run(m, d, recorded)) - 1
+    shaking = min(steps, round(mujoco_scenes.SHAKEN / m.opt.timestep))
+    return {"slip": float(np.ptp(places[-steps:][:shaking], axis=0).max())}
+
+
+def disc(
+    way: Way, start: tuple[float, float], touch: Literal["face", "point"] = "face", kind: type | None = None
+) -> dict[str, float]:
+    """Relative errors of distance and angle against the exact Coulomb disc, less the stepper's own `v dt/2`."""
+    speed, spin = start
+    scene = _disc(speed, spin, joint="free", touch=touch)
+    model = None if kind is None else kind(scene.model.patch, scene.model.law)
+    m, d, step = begin(scene, way, model=model)
+    path = scene.run(m, d, step)
+    stop, angle = _stop(speed, spin), np.unwrap(2.0 * np.arctan2(path[:, 6], path[:, 3]))
+    distance = float(np.hypot(*(path[-1, :2] - path[0, :2]))) + 0.5 * DT * speed
+    return {
+        "distance": distance / stop.distance - 1.0,
+        "angle": float(angle[-1] - angle[0] + 0.5 * DT * spin) / stop.angle - 1.0,
+    }
+
+
+def in_hand(way: Way, load: Literal[1, 2], kind: type | None = None) -> dict[str, float]:
+    """Where the plate of the published run ends, less the converged end of the distributed model."""
+    scene = _plate(load)
+    model = None if kind is None else kind(scene.model.patch, scene.model.law)
+    m, d, step = begin(scene, way, model=model)
+    x, y, _, theta, _ = scene.run(m, d, step)[-1]
+    reference = facts.converged(f"in_hand/Circle/d{load}")
+    return {
+        "x": x + 2e-3 - reference["x"][-1],
+        "y": y - reference["y"][-1],
+        "theta": theta - reference["theta"][-1],
+    }
+
+
+def cost(scene: MujocoScene, ways: Mapping[str, Way], *, steps: int, rounds: int) -> dict[str, dict[str, float]]:
+    """Seconds of a step by name: the least of `rounds`, in turns, of `steps` from where the scene has settled."""
+    runs = {}
+    for name, way in ways.items():
+        m, d, step = begin(dataclasses.replace(scene, time=0.0), way)
+        dataclasses.replace(scene, time=0.0).run(m, d, step)
+        runs[name] = (m, d, step)
+    least = dict.fromkeys(runs, np.inf)
+    for i in range(rounds):
+        for name, (m, d, step) in runs.items():
+            controls = [scene.control((i * steps + j) * m.opt.timestep) for j in range(steps)]
+            start = time.process_time()
+            for control in controls:
+                d.ctrl[:] = control
+                step()
+            least[name] = min(least[name], (time.process_time() - start) / steps)
+    return {name: {"seconds": value} for name, value in least.items()}

@@ -1,0 +1,287 @@
+"""What the runs cost: the paper's table on this machine, and work against precision for ours and SciPy's solvers."""
+
+from __future__ import annotations
+
+import os
+import platform
+from collections.abc import Mapping, Sequence
+from functools import partial
+from importlib import metadata
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from planarfriction.plots.style import PlotFigure, new_figure, tidy
+from planarfriction_studies.experiments import facts, looks
+from planarfriction_studies.experiments.experiment import Arrays, Comparison, Result, Table, Work, compare, table
+from planarfriction_studies.experiments.timing import runs
+from planarfriction_studies.experiments.timing.runs import BREAKAWAY, CIRCLE, QUICK_WINDOW, ROWS, Problem
+from planarfriction_studies.experiments.wording import fill, power, short
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+KINDS = ("distributed", "reduced")
+
+AGREEMENT = {"reduced": (1e-6, 1e-5), "distributed": (1e-8, 1e-7)}
+"""Allowed difference of a general solver at its tightest tolerance from our reference: position [m], angle [rad].
+
+The whole reduced run amplifies errors at every breakaway; the distributed window has one.
+"""
+
+CONVERGED = {"reduced": "in_hand/Circle/r1", "distributed": "in_hand/Circle/d1"}
+"""Converged solutions of the same runs."""
+
+CONVERGED_ALLOWANCE = {"x": 1e-7, "y": 1e-7, "theta": 1e-6}
+"""Accuracy of our reference and of the start of the window [m, m, rad]."""
+
+PUBLISHED_STEP_RATIO = 80
+"""How many times cheaper one step of the reduced model is, according to the paper."""
+
+LEVELS = {"reduced": 1e-6, "distributed": 1e-8}
+"""Position errors [m] at which times are compared."""
+
+TIMES = ("time", "first quartile", "third quartile")
+"""Median and quartiles of the time in the entries of `Points`."""
+
+Points = dict[str, list[dict[str, float]]]
+"""Solver -> its runs: tolerance, error [m], median and quartiles of the time [s], evaluations, repeats."""
+
+
+def run(work: Work) -> Result:
+    """Carry out the experiment."""
+    table = {row: {kind: runs.whole_runs(row, kind, work) for kind in KINDS} for row in ROWS}
+    baselines = _baselines(work)
+    problems = runs.problems(work)
+    references = {problem: runs.reference(problem, work) for problem in problems}
+    solved = {problem: runs.work_precision(problem, work) for problem in problems}
+    points = {problem: _points(solved[problem], references[problem]) for problem in problems}
+    comparisons = [c for p in problems for c in _agreements(p, solved[p], references[p])]
+    comparisons += [c for p in problems for c in _against_converged(p, references[p])]
+    machine = _machine()
+    return fill("timing", **_told(table, baselines, points, comparisons, machine)).result(
+        {"timing_work_precision": _figure(points)},
+        comparisons=comparisons,
+        numbers={
+            "machine": machine,
+            "table": {row: _row_numbers(table[row], baselines.get(row, {})) for row in ROWS},
+            "work_precision": {problem.name: points[problem] for problem in problems},
+            "step_ratio": _step_ratio(table),
+        },
+        tables=[_published_table(table, baselines), *(_points_table(problem, points[problem]) for problem in problems)],
+        data={f"work_precision_{problem.kind}": _dataset(points[problem]) for problem in problems},
+    )
+
+
+def _machine() -> dict[str, Any]:
+    """What the times depend on."""
+    versions = {name: metadata.version(name) for name in ("numpy", "scipy", "numba")}
+    load = os.getloadavg()[0] if hasattr(os, "getloadavg") else -1.0
+    return {
+        "platform": platform.platform(),
+        "machine": platform.machine(),
+        "cpus": os.cpu_count() or 0,
+        "load average": load,
+        "python": platform.python_version(),
+        **versions,
+    }
+
+
+def _baselines(work: Work) -> dict[str, dict[str, Arrays]]:
+    """Row -> kind -> LSODA beside ours; the distributed model over a window unless all is wanted."""
+    if work.quick:
+        return {CIRCLE: {kind: runs.beside_lsoda(CIRCLE, kind, *QUICK_WINDOW, work) for kind in KINDS}}
+    spans = {"distributed": (0.0, 2.0) if work.full else BREAKAWAY, "reduced": (0.0, 2.0)}
+    return {row: {kind: runs.beside_lsoda(row, kind, *spans[kind], work) for kind in KINDS} for row in ROWS}
+
+
+def _points(solved: Mapping[tuple[str, float], Arrays], reference: np.ndarray) -> Points:
+    points: Points = {}
+    for (solver, tolerance), found in solved.items():
+        entry = {
+            "tolerance": tolerance,
+            "error": runs.position_error(found["poses"], reference),
+            **dict(zip(TIMES, found["time"].tolist(), strict=True)),
+            **{name: float(found[name]) for name in ("evaluations", "repeats")},
+        }
+        points.setdefault(solver, []).append(entry)
+    return points
+
+
+def _row_numbers(row: Mapping[str, Arrays], baselines: Mapping[str, Arrays]) -> dict[str, Any]:
+    numbers: dict[str, Any] = {f"{kind} [s]": _spread(row[kind]["time"]) for kind in KINDS}
+    numbers["ratio"] = _ratio(row["distributed"]["time"], row["reduced"]["time"])
+    numbers |= {f"{kind}, LSODA over ours": _ratio(each["lsoda"], each["ours"]) for kind, each in baselines.items()}
+    numbers |= {f"{kind}, solver [s]": _spread(row[kind]["solver"]) for kind in KINDS}
+    return numbers | {f"{kind}, LSODA [s]": _spread(each["lsoda"]) for kind, each in baselines.items()}
+
+
+def _step_ratio(table: Mapping[str, Mapping[str, Arrays]]) -> dict[str, float]:
+    """Cost of one step of the distributed model over one of the reduced model."""
+    cost = {kind: run["solver"] / run["trials"] for kind, run in table[CIRCLE].items()}
+    return _ratio(cost["distributed"], cost["reduced"])
+
+
+def _spread(times: np.ndarray) -> dict[str, float]:
+    """Median and quartiles by name."""
+    return dict(zip(("middle", "least", "most"), map(float, times), strict=True))
+
+
+def _ratio(times: np.ndarray, others: np.ndarray) -> dict[str, float]:
+    """Ratio of the medians, and the least and the greatest that the quartiles allow."""
+    return _spread(times / others[[0, 2, 1]])
+
+
+# ---------------------------------------------------------------------- comparisons
+
+
+def _agreements(
+    problem: Problem, solved: Mapping[tuple[str, float], Arrays], reference: np.ndarray
+) -> list[Comparison]:
+    """General solvers at their tightest tolerances beside our reference."""
+    found = []
+    for solver, tolerances in problem.tolerances.items():
+        if solver in runs.STRUCTURED:
+            continue
+        tight = min(tolerances)
+        poses = solved[solver, tight]["poses"]
+        cause = (
+            f"What a relative tolerance of {power(tight)} leaves in {solver}; ours was run at {power(runs.REFERENCE)}."
+        )
+        differences = (runs.position_error(poses, reference), "m"), (runs.angle_error(poses, reference), "rad")
+        for (difference, unit), tolerance in zip(differences, AGREEMENT[problem.kind], strict=True):
+            what = f"{problem.name}: {'position' if unit == 'm' else 'angle'}, RODAS4 beside {solver}"
+            found.append(Comparison(what, "converged", difference, tolerance, unit, len(poses), cause))
+    return found
+
+
+def _against_converged(problem: Problem, reference: np.ndarray) -> list[Comparison]:
+    """Our reference beside the converged solution, at the times they share."""
+    solution = facts.converged(CONVERGED[problem.kind])
+    times = problem.window.ends
+    index = np.abs(solution["time"][:, None] - times).argmin(axis=0)
+    shared = np.abs(solution["time"][index] - times) < 1e-9
+    found = []
+    cause = "Two solutions of the same equations at tight tolerances, by different methods."
+    for i, (name, allowance) in enumerate(CONVERGED_ALLOWANCE.items()):
+        values, words = solution[name], f"{problem.name}: {name} of the reference"
+        tolerance = allowance + facts.CONVERGED_SHARE * float(np.ptp(values))
+        unit = "rad" if name == "theta" else "m"
+        found.append(compare(words, reference[shared, i], values[index[shared]], "converged", tolerance, unit, cause))
+    return found
+
+
+# ---------------------------------------------------------------------- words, figure, tables
+
+
+def _told(
+    table: Mapping[str, Mapping[str, Arrays]],
+    baselines: Mapping[str, Mapping[str, Arrays]],
+    points: Mapping[Problem, Points],
+    comparisons: Sequence[Comparison],
+    machine: Mapping[str, Any],
+) -> dict[str, Any]:
+    """What the template names."""
+    published = facts.published_table("timing")
+    return {
+        "ours": {kind: _spread(table[CIRCLE][kind]["time"]) for kind in KINDS},
+        "between": _ratio(*(table[CIRCLE][kind]["time"] for kind in KINDS)),
+        "beside": {kind: _ratio(each["lsoda"], each["ours"]) for kind, each in baselines[CIRCLE].items()},
+        "step": _step_ratio(table),
+        "rebuilding": _ratio(*(table[row]["reduced"]["time"] for row in ("k = 2 f_N", "k = 2"))),
+        "solver": {row: float(kinds["reduced"]["solver"][0]) for row, kinds in table.items()},
+        "published": published[CIRCLE],
+        "published_step": PUBLISHED_STEP_RATIO,
+        "published_rebuilding": published["k = 2 f_N"]["reduced [s]"] / published["k = 2"]["reduced [s]"],
+        "precision": [_precision(problem, each) for problem, each in points.items()],
+        "machine": machine,
+        "agreed": max(c.difference for c in comparisons if c.unit == "m" and "beside" in c.quantity),
+    }
+
+
+def _precision(problem: Problem, points: Points) -> dict[str, Any]:
+    """The time of each solver to the same error, and the solvers that do not reach it."""
+    level = LEVELS[problem.kind]
+    times = {
+        solver: runs.cheapest([(each["error"], [each[name] for name in TIMES]) for each in entries], level)
+        for solver, entries in points.items()
+    }
+    both = [times.get(solver) for solver in ("LSODA", "RODAS4")]
+    return {
+        "name": problem.name,
+        "level": level,
+        "lsoda": both[0][0] / both[1][0] if both[0] and both[1] else None,
+        "reached": {solver: _spread(np.array(each)) for solver, each in times.items() if each is not None},
+        "missed": [solver for solver, each in times.items() if each is None],
+    }
+
+
+def _figure(points: Mapping[Problem, Points]) -> PlotFigure:
+    figure = new_figure(9.6, 4.2)
+    panels = figure.subplots(1, len(points), squeeze=False)[0]
+    for axes, (problem, solvers) in zip(panels, points.items(), strict=True):
+        for i, (solver, entries) in enumerate(solvers.items()):
+            errors, times, first, third = (np.array([entry[name] for entry in entries]) for name in ("error", *TIMES))
+            bars = {"yerr": [times - first, third - times], "capsize": 2.5, "elinewidth": 1.0}
+            look = {"color": looks.OTHERS[i], "markersize": 5, "linewidth": 1.3, "label": solver}
+            axes.errorbar(errors, times, fmt="osD^"[i] + "-", **bars, **look)
+        axes.set(xscale="log", yscale="log", xlabel="largest position error [m]", ylabel="wall time [s]")
+        axes.set_title(problem.name, fontsize="medium")
+        tidy(axes)
+    looks.legend(figure, panels[0], 4, "lower")
+    return figure
+
+
+def _published_table(times: Mapping[str, Mapping[str, Arrays]], baselines: Mapping[str, Mapping[str, Arrays]]) -> Table:
+    published = facts.published_table("timing")
+    rows = {row: (_row_numbers(times[row], baselines.get(row, {})), theirs) for row, theirs in published.items()}
+
+    def ours(row: Any, name: str) -> str:
+        return _shown(row[0][name]) if name in row[0] else "not run"
+
+    columns = {f"{kind} [s]": partial(ours, name=f"{kind} [s]") for kind in KINDS}
+    columns |= {"factor": partial(ours, name="ratio")}
+    columns |= {f"{kind}, published [s]": lambda row, kind=kind: row[1][f"{kind} [s]"] for kind in KINDS}
+    columns |= {"factor, published": lambda row: row[1]["ratio"]}
+    columns |= {f"{kind}, LSODA here over ours": partial(ours, name=f"{kind}, LSODA over ours") for kind in KINDS}
+    note = (
+        "Ours: all of `simulate`, default tolerances, median, in brackets quartiles. "
+        "LSODA over ours: time in the solver over the same span, "
+        f"the whole run or, where that takes minutes, {BREAKAWAY[0]:g} to {BREAKAWAY[1]:g} s (the plate breaks away; a "
+        f"quick look takes {QUICK_WINDOW[0]:g} to {QUICK_WINDOW[1]:g} s), without the tables. $k = 2$: the table is "
+        "kept and $r$ follows the load; $k = 2 f_N$: all is rebuilt every 0.01 s."
+    )
+    return table("In-hand run of 2 s", rows, columns, "contact", note)
+
+
+def _points_table(problem: Problem, points: Points) -> Table:
+    rows = {f"{solver}, {entry['tolerance']:.0e}": entry for solver, entries in points.items() for entry in entries}
+    columns = {
+        "position error [m]": lambda entry: f"{entry['error']:.1e}",
+        "time [ms]": lambda entry: _shown(_spread(np.array([1e3 * entry[name] for name in TIMES]))),
+        "evaluations": lambda entry: int(entry["evaluations"]),
+        "runs": lambda entry: int(entry["repeats"]),
+    }
+    note = (
+        f"{problem.window.states} states. Absolute tolerance: {runs.ATOL_PER_RTOL:g} times the relative one, as a "
+        "share of the natural scales. Median of the runs; what takes over a second runs once."
+    )
+    return table(f"Work against precision, {problem.name}", rows, columns, "solver, relative tolerance", note)
+
+
+def _shown(times: Mapping[str, float]) -> str:
+    """The median, and in brackets the quartiles where they differ."""
+    middle, least, most = (short(times[name]) for name in ("middle", "least", "most"))
+    return middle if least == most else f"{middle} ({least} to {most})"
+
+
+def _dataset(points: Points) -> xr.Dataset:
+    """Error and time over the runs, one after the other."""
+    import xarray as xr
+
+    entries = [(solver, entry) for solver, found in points.items() for entry in found]
+    units = {"tolerance": "1", "error": "m", "time": "s", "evaluations": "1"}
+    variables = {
+        name: ("run", np.array([entry[name] for _, entry in entries]), {"units": unit}) for name, unit in units.items()
+    }
+    return xr.Dataset(variables, coords={"solver": ("run", [solver for solver, _ in entries])})

@@ -1,0 +1,186 @@
+"""Timed runs: whole in-hand runs as in the paper's table, and solvers against each other on a window."""
+
+from __future__ import annotations
+
+import functools
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from planarfriction.scenes import Scene, in_hand, simulate
+from planarfriction.solvers import RODAS3, RODAS4
+from planarfriction_studies.bench.baselines import LSODA, Poses, Window
+from planarfriction_studies.experiments.experiment import Arrays, Work
+from planarfriction_studies.experiments.load_dependent.models import DISTRIBUTED, REBUILT, RESCALED, soft_scene
+from planarfriction_studies.experiments.runs import published_model
+
+ATOL_PER_RTOL = 30.0
+"""Absolute tolerance, as a share of the natural scales, over the relative one: between those of the ready scenes."""
+
+REFERENCE = 1e-10
+"""Relative tolerance of the solution that errors are measured from."""
+
+ENOUGH = 1.0
+"""Runs are repeated until this time [s] is spent: what takes longer runs once."""
+
+MOST_REPEATS = 9
+
+BREAKAWAY = (0.36, 0.38)
+"""Window [s] in which the plate breaks away: a general solver takes too long for all of the distributed run."""
+
+QUICK_WINDOW = (0.36, 0.37)
+"""Window of a quick look [s]."""
+
+STRUCTURED = {"RODAS3": RODAS3, "RODAS4": RODAS4}
+"""Our methods by name."""
+
+ROWS: dict[str, dict[str, Callable[[], Scene]]] = {
+    "disc, shape independent of the load": {
+        "distributed": lambda: in_hand(published_model("d", "Circle")),
+        "reduced": lambda: in_hand(published_model("r", "Circle")),
+    },
+    "k = 2": {
+        "distributed": lambda: soft_scene(1, DISTRIBUTED),
+        "reduced": lambda: soft_scene(1, RESCALED),
+    },
+    "k = 2 f_N": {
+        "distributed": lambda: soft_scene(2, DISTRIBUTED),
+        "reduced": lambda: soft_scene(2, REBUILT),
+    },
+}
+"""Rows of the published table, and what makes their scenes: with models that have computed nothing yet."""
+
+CIRCLE = next(iter(ROWS))
+"""The row without a load-dependent shape."""
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """What solvers are compared on."""
+
+    name: str
+    kind: str
+    """"distributed" or "reduced"."""
+    begin: float
+    end: float
+    tolerances: dict[str, tuple[float, ...]]
+    """Solver -> relative tolerances."""
+
+    @functools.cached_property
+    def window(self) -> Window:
+        """The scene between the two times."""
+        return Window.of(ROWS[CIRCLE][self.kind](), self.begin, self.end)
+
+
+def problems(work: Work) -> list[Problem]:
+    """Reduced: the whole run; distributed: a short window, without Radau, which takes a minute for it, unless all is
+    wanted. A quick look takes a short window for both.
+    """
+    if work.quick:
+        tolerances = {"RODAS4": (1e-6,), "LSODA": (1e-6,)}
+        with_radau = {**tolerances, "Radau": (1e-6,)}
+        return [_problem("reduced", *QUICK_WINDOW, with_radau), _problem("distributed", *QUICK_WINDOW, tolerances)]
+    several = dict.fromkeys(STRUCTURED, (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)) | {"LSODA": (1e-4, 1e-6, 1e-8)}
+    reduced, distributed = ((1e-4, 1e-6, 1e-8),) * 2 if work.full else ((1e-4, 1e-6), ())
+    return [
+        _problem("reduced", 0.0, 2.0, {**several, "Radau": reduced}),
+        _problem("distributed", *BREAKAWAY, several | ({"Radau": distributed} if distributed else {})),
+    ]
+
+
+def _problem(kind: str, begin: float, end: float, tolerances: dict[str, tuple[float, ...]]) -> Problem:
+    return Problem(f"{kind}, {begin:g} to {end:g} s", kind, begin, end, tolerances)
+
+
+def solve(problem: Problem, solver: str, tolerance: float) -> Poses:
+    """One run; absolute tolerances are the same share of the natural scales for all solvers."""
+    window, atol = problem.window, ATOL_PER_RTOL * tolerance
+    if solver in STRUCTURED:
+        return window.ours(rtol=tolerance, atol=atol, method=STRUCTURED[solver])[0]
+    return window.general(method=solver, rtol=tolerance, atol=atol * window.packed.state_scale)
+
+
+def reference(problem: Problem, work: Work) -> np.ndarray:
+    """Poses at the ends of the window's pieces, [S, 3], by RODAS4 at a tight tolerance."""
+    label = f"timing, {problem.name}, reference"
+    return work.piece(label, lambda: {"poses": solve(problem, "RODAS4", REFERENCE).poses})["poses"]
+
+
+def work_precision(problem: Problem, work: Work) -> dict[tuple[str, float], Arrays]:
+    """Solver and tolerance -> `time` [s] (median, quartiles), `poses`, `evaluations`, `repeats`."""
+    found = {}
+    for solver, tolerances in problem.tolerances.items():
+        for tolerance in tolerances:
+            label = f"timing, {problem.name}, {solver} at {tolerance:.0e}"
+            action = functools.partial(solve, problem, solver, tolerance)
+            compute = functools.partial(_repeated, action, 1 if work.quick else MOST_REPEATS)
+            found[solver, tolerance] = work.piece(label, compute)
+    return found
+
+
+def _repeated(action: Callable[[], Poses], repeats: int) -> dict[str, Any]:
+    poses = action()
+    times = [poses.wall_time]
+    while sum(times) < ENOUGH and len(times) < repeats:
+        times.append(action().wall_time)
+    return {"time": _spread(times), "poses": poses.poses, "evaluations": poses.evaluations, "repeats": len(times)}
+
+
+def _spread(times: Sequence[float]) -> list[float]:
+    return np.percentile(times, [50.0, 25.0, 75.0]).tolist()
+
+
+# ---------------------------------------------------------------------- the table
+
+
+def whole_runs(row: str, kind: str, work: Work) -> Arrays:
+    """All of `simulate` at default tolerances, tables included: `time`, `solver` [s] (median, quartiles), `trials`."""
+    return work.piece(
+        f"timing, {row}, {kind}, whole run",
+        functools.partial(_whole_runs, ROWS[row][kind], 1 if work.quick else MOST_REPEATS),
+    )
+
+
+def _whole_runs(scene: Callable[[], Scene], repeats: int) -> dict[str, Any]:
+    simulate(scene(), t_end=0.02)  # compiles
+    totals, solver, trials = [], [], 0
+    while sum(totals) < ENOUGH and len(totals) < repeats:
+        fresh = scene()
+        begin = time.perf_counter()
+        run = simulate(fresh).statistics
+        totals.append(time.perf_counter() - begin - run.compile_time)
+        solver.append(run.wall_time)
+        trials = run.steps + run.rejections
+    return {"time": _spread(totals), "solver": _spread(solver), "trials": trials}
+
+
+def beside_lsoda(row: str, kind: str, begin: float, end: float, work: Work) -> Arrays:
+    """LSODA as published, and ours at default tolerances, over a window: `lsoda` and `ours` [s] (median, quartiles)."""
+    label = f"timing, {row}, {kind}, LSODA as published, {begin:g} to {end:g} s"
+    return work.piece(label, functools.partial(_beside_lsoda, ROWS[row][kind], begin, end))
+
+
+def _beside_lsoda(scene: Callable[[], Scene], begin: float, end: float) -> dict[str, Any]:
+    fresh = scene()
+    window = Window.of(fresh, begin, end)
+    ours = [window.ours(rtol=fresh.rtol, atol=fresh.atol)[0].wall_time for _ in range(MOST_REPEATS)]
+    lsoda = _repeated(lambda: window.general(**LSODA), MOST_REPEATS)["time"]
+    return {"lsoda": lsoda, "ours": _spread(ours)}
+
+
+def position_error(poses: np.ndarray, reference: np.ndarray) -> float:
+    """Largest distance between two histories of the centre of mass [m]."""
+    return float(np.hypot(*(poses - reference)[:, :2].T).max())
+
+
+def angle_error(poses: np.ndarray, reference: np.ndarray) -> float:
+    """Largest difference of the angle [rad]."""
+    return float(np.abs(poses - reference)[:, 2].max())
+
+
+def cheapest(points: Sequence[tuple[float, list[float]]], error: float) -> list[float] | None:
+    """Shortest of the times (median first) among the points (error, times) at least as good as `error`; None: none."""
+    return min((times for found, times in points if found <= error), default=None)

@@ -1,0 +1,112 @@
+"""What is said about an experiment: a template beside its code, filled with the numbers of a run.
+
+A template is Markdown with formulas between dollar signs. Its parts begin with `## verdict`, `## asked`, `## found` and
+`## figure NAME` for each figure.
+"""
+
+from __future__ import annotations
+
+import functools
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from planarfriction_studies.experiments.experiment import Picture, Result
+
+if TYPE_CHECKING:
+    import jinja2
+
+
+@dataclass(frozen=True)
+class Words:
+    """The parts of a filled template."""
+
+    parts: Mapping[str, str]
+    """Heading -> Markdown."""
+
+    def result(self, figures: Mapping[str, Any], **rest: Any) -> Result:
+        """The result with these words and `figures` by name; `rest` are its other fields."""
+        pictures = [Picture(name, self.parts[f"figure {name}"], figure) for name, figure in figures.items()]
+        found = self.parts["found"].split("\n\n")
+        return Result(found, pictures, asked=self.parts["asked"], verdict=self.parts["verdict"], **rest)
+
+
+def fill(home: str, **numbers: Any) -> Words:
+    """Fill the template `findings.md.j2` of the experiment in the folder `home` with the numbers of a run."""
+    return Words(_parts(environment().get_template(f"{home}/findings.md.j2").render(**numbers)))
+
+
+def _parts(text: str) -> dict[str, str]:
+    _, *pieces = re.split(r"^## (.+)\n", text, flags=re.M)
+    return {
+        heading.strip(): re.sub(r"\n{3,}", "\n\n", body.strip())
+        for heading, body in zip(pieces[::2], pieces[1::2], strict=True)
+    }
+
+
+@functools.cache
+def environment() -> jinja2.Environment:
+    """Templates of the experiments and of the report, with filters for numbers; an unknown name is an error."""
+    import jinja2
+
+    made = jinja2.Environment(
+        loader=jinja2.PackageLoader("planarfriction_studies.experiments", ""),
+        autoescape=lambda name: bool(name and name.endswith(".html.j2")),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    made.filters |= {"fmt": fmt, "short": short, "power": power, "length_of": length, "span": span, "number": number}
+    return made
+
+
+def fmt(value: Any, spec: str) -> str:
+    """A number in a format of Python's; no zero has a sign."""
+    text = format(value, spec)
+    return text if re.search("[1-9]", text) else text.lstrip("+-")
+
+
+def short(value: float, digits: int = 3) -> str:
+    """A number with so many digits, without an exponent where it reads well without."""
+    return fmt(float(f"{value:.{digits}g}"), "g")
+
+
+def readable(value: float) -> str:
+    """A number with as many digits as are worth reading."""
+    if value < 1e-2:
+        return f"{value:.1g}"
+    return f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
+
+
+def length(metres: float) -> str:
+    """The size of a length in mm, um or nm, whichever reads best."""
+    size = abs(metres)
+    if size < 1e-12:
+        return "< 0.001 nm"
+    unit, scale = ("mm", 1e3) if size >= 1e-3 else ("um", 1e6) if size >= 1e-8 else ("nm", 1e9)
+    return f"{readable(scale * size) if unit != 'nm' else f'{scale * size:.1g}'} {unit}"
+
+
+def power(value: float, digits: int = 0) -> str:
+    """A number with a power of ten, as a formula."""
+    if value == 0.0:
+        return "0"
+    mantissa, exponent = f"{value:.{digits}e}".split("e")
+    factor = "" if mantissa == "1" else rf"{mantissa} \times "
+    return rf"${factor}10^{{{int(exponent)}}}$"
+
+
+def span(values: Sequence[float], spec: str = ".2f", factor: float = 1) -> str:
+    """From the smallest to the largest; once where both read the same."""
+    low, high = (fmt(factor * choose(values), spec) for choose in (min, max))
+    return low if low == high else f"{low} to {high}"
+
+
+def number(value: Any) -> str:
+    """A number as text with four digits; other things as they are; nothing for None."""
+    if value is None:
+        return ""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return str(value)
+    return f"{value:d}" if isinstance(value, int) else fmt(value, ".4g")

@@ -1,0 +1,171 @@
+"""Every model on every task: fitted to the training cases, scored on the others."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.errors import InvalidValueError
+from planarfriction_studies.measured.library import LIBRARY
+from planarfriction_studies.measured.questions import Case
+from planarfriction_studies.measured.scores import Measure, drawings, interval
+from planarfriction_studies.measured.tasks import TASKS, Task
+
+AT_ONCE = 16
+"""Questions between two reports of progress."""
+
+
+@dataclass(frozen=True)
+class Score:
+    """The value of one measure for a model."""
+
+    value: float
+    low: float
+    """Lower end of the 95 % interval, from a bootstrap over independent cases."""
+    high: float
+    cases: int
+    """Number of independent cases: tosses with their copies, or pushes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """The result of one model on one task."""
+
+    scores: Mapping[str, Score]
+    """Scores by the key of the measure."""
+    answers: tuple[np.ndarray, ...]
+    """Answers to the test cases, in their order."""
+    errors: tuple[np.ndarray, ...]
+    """Errors `[rows, columns]` of each test case, as the task defines them."""
+    fitted: Mapping[str, float]
+    """Fitted numbers by name."""
+    checked: Mapping[str, float]
+    """Checks of the model's own uncertainty on the test cases, if it states any."""
+    seconds: float
+    """Time of fit and prediction [s]."""
+    regions: np.ndarray | None = None
+    """Regions of the final poses of slides `[K, 3, 3]`, for models that have `regions`."""
+
+
+@dataclass
+class Benchmark:
+    """Models compared on measured data. `run` fills `results` model by model, so that an interrupt loses nothing.
+
+    Raises `InvalidValueError` for names that are not known and models that cannot be called.
+    """
+
+    models: Mapping[str, Callable[[Any], np.ndarray]] | None = None
+    """Models by name; by default those of the library that are installed."""
+    tasks: Sequence[str] = tuple(TASKS)
+    """Names of tasks."""
+    folder: Path | None = None
+    """Folder with the tables; by default those of the package."""
+    seed: int = 0
+    """Seed of the bootstrap."""
+    results: dict[str, dict[str, Result]] = field(default_factory=dict, init=False)
+    """Results by task and model."""
+    left_out: list[str] = field(default_factory=list, init=False)
+    """What was not run, and why."""
+
+    def __post_init__(self) -> None:
+        self.tasks = [validation.choice("task", name, TASKS) for name in self.tasks]
+        self.seed = validation.count("seed", self.seed, 0)
+        if self.models is None:
+            self.models = library(self.left_out)
+        for name, model in self.models.items():
+            if not callable(model):
+                raise InvalidValueError(f"model {name}", "be a function of a question", model)
+        self.cases = {name: TASKS[name].read(self.folder) for name in self.tasks}
+        for name, cases in self.cases.items():
+            if len({TASKS[name].is_training(case) for case in cases}) != 2:
+                raise InvalidValueError(
+                    f"table of {name}", "contain cases to fit and cases to test", f"{len(cases)} cases"
+                )
+
+    def test(self, task: str) -> list[Case]:
+        """The cases that are scored."""
+        return [case for case in self.cases[task] if not TASKS[task].is_training(case)]
+
+    def run(self, progress: Callable[[str], None] | None = None) -> dict[str, dict[str, Result]]:
+        """Fit and score every model on every task; returns `results`.
+
+        Raises `InvalidValueError` if an answer has the wrong shape or contains numbers that are not finite.
+        """
+        say = (lambda text: None) if progress is None else progress
+        for name in self.tasks:
+            task, test = TASKS[name], self.test(name)
+            training = [case for case in self.cases[name] if task.is_training(case)]
+            for called, model in (self.models or {}).items():
+                say(f"{name}: {called}, fit")
+                begun = time.perf_counter()
+                try:
+                    fitted = model.fit(training) if hasattr(model, "fit") else model  # pyright: ignore
+                    answers = _answers(
+                        fitted, called, task, test, lambda part, n=name, c=called: say(f"{n}: {c}, {part}")
+                    )
+                except NotImplementedError:
+                    continue  # a model need not answer every task
+                errors = tuple(task.errors(case, answer) for case, answer in zip(test, answers, strict=True))
+                values = fitted.fitted_values() if hasattr(fitted, "fitted_values") and name == "slides" else {}
+                checked = fitted.check(test) if hasattr(fitted, "check") else {}
+                regions = fitted.regions([case.question for case in test]) if hasattr(fitted, "regions") else None
+                seconds = time.perf_counter() - begun
+                scores = score(task, test, errors, self.seed)
+                self.results.setdefault(name, {})[called] = Result(
+                    scores, tuple(answers), errors, values, checked, seconds, regions
+                )
+        return self.results
+
+
+def library(left_out: list[str] | None = None) -> dict[str, Any]:
+    """The library's models that are installed, by name; what is missing is added to `left_out`."""
+    for name, entry in LIBRARY.items():
+        if not entry.installed and left_out is not None:
+            left_out.append(f"{name}: needs {entry.needs}, pip install 'planarfriction[{entry.extra}]'")
+    return {name: entry.make() for name, entry in LIBRARY.items() if entry.installed}
+
+
+def _answers(model: Any, name: str, task: Task, cases: Sequence[Case], say: Callable[[str], None]) -> list[np.ndarray]:
+    answers: list[np.ndarray] = []
+    questions = [case.question for case in cases]
+    for first in range(0, len(cases), AT_ONCE):
+        say(f"{first} of {len(cases)}")
+        part = questions[first : first + AT_ONCE]
+        answers += model.answer_all(part) if hasattr(model, "answer_all") else [model(each) for each in part]
+    checked = []
+    for case, answer in zip(cases, answers, strict=True):
+        shape = task.shape(case.question)
+        checked.append(validation.array(f"answer of {name} to {case.name}", answer, shape))
+    return checked
+
+
+def score(task: Task, cases: Sequence[Case], errors: Sequence[np.ndarray], seed: int) -> dict[str, Score]:
+    """Each measure of a task over its cases, with the interval of a bootstrap over independent ones."""
+    found = {}
+    for measure in task.measures:
+        values, groups = rows_of(task, measure, cases, errors)
+        if not len(values):
+            continue
+        drawn = drawings(groups, seed)
+        drawn = drawn[drawn.sum(axis=1) > 0.0]
+        low, high = interval(measure.total(values, drawn))
+        found[measure.key] = Score(float(measure.total(values)), low, high, len(set(groups)))
+    return found
+
+
+def rows_of(task: Task, measure: Measure, cases: Sequence[Case], errors: Sequence[np.ndarray]):
+    """Errors `[N]` that a measure counts, and the groups that they belong to."""
+    column = task.measures.index(measure) if task.name == "slides" else 0
+    values, groups = [], []
+    for case, rows in zip(cases, errors, strict=True):
+        if measure.board in ("", case.board):
+            values.append(rows[:, column])
+            one_each = task.name == "pushes"  # there each row is a push, in the others a case is one
+            groups += [f"{case.name} {i}" for i in range(len(rows))] if one_each else [case.group] * len(rows)
+    return (np.concatenate(values) if values else np.zeros(0)), groups

@@ -1,0 +1,208 @@
+"""Figures of the comparison on measured data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from planarfriction.plots import style
+from planarfriction_studies.measured import pushes, slides
+from planarfriction_studies.measured.benchmark import Benchmark, Result
+from planarfriction_studies.measured.questions import Case
+from planarfriction_studies.measured.tasks import TASKS
+
+DRAWN = ("uncoupled", "ellipsoid", "exact surface", "toss by toss")
+"""Models of an example, where they took part, besides those of the user."""
+
+
+COLOURS = {
+    "uncoupled": style.OTHER,
+    "ellipsoid": style.ELLIPSOID,
+    "exact surface": style.EXACT,
+    "toss by toss": style.PARTS,
+}
+"""Model -> its colour; the others take what is left, one after the other."""
+
+
+def draw(benchmark: Benchmark, task: str) -> style.PlotFigure:
+    """The picture of a task."""
+    rows = len(benchmark.results[task])
+    figure = style.new_figure(10.0, max(3.2, 0.42 * rows + (3.4 if task == "slides" else 1.6)))
+    figure.set_layout_engine("constrained", w_pad=0.06)
+    parts: Any = figure.subfigures  # an array of them, which its annotation does not say
+    if task == "slides":
+        above, below = parts(2, 1, height_ratios=(0.42 * rows + 1.0, 2.6))
+        _dots(above, benchmark, task)
+        _draw_slides(below, benchmark)
+    else:
+        left, right = parts(1, 2, width_ratios=(1.5, 1.0))
+        _dots(left, benchmark, task)
+        (_draw_centres if task == "pushes" else _draw_series)(right, benchmark)
+    return figure
+
+
+def _dots(part: Any, benchmark: Benchmark, task: str) -> None:
+    """Each measure of each model, with its interval."""
+    results = benchmark.results[task]
+    measures = [m for m in TASKS[task].measures if all(m.key in result.scores for result in results.values())]
+    every = part.subplots(1, len(measures), sharey=True, squeeze=False)[0]
+    places = -np.arange(len(results))
+    for axes, measure in zip(every, measures, strict=True):
+        scores = [result.scores[measure.key] for result in results.values()]
+        value = np.array([score.value for score in scores])
+        ends = np.array([[score.value - score.low, score.high - score.value] for score in scores]).T
+        axes.errorbar(value, places, xerr=np.maximum(ends, 0.0), fmt="o", color="0.25", markersize=5, elinewidth=1.2)
+        axes.set(xlim=(0.0, None), yticks=places, yticklabels=list(results))
+        axes.set_xlabel(measure.heading.replace(", ", "\n"), fontsize="small")
+        axes.tick_params(labelsize="small")
+        style.tidy(axes)
+
+
+def _chosen(benchmark: Benchmark, task: str) -> dict[str, Any]:
+    """Results that an example shows: a few of the library, and those of the user."""
+    from planarfriction_studies.measured.library import LIBRARY
+
+    results = benchmark.results[task]
+    own = [name for name in results if name not in LIBRARY]
+    wanted = [name for name in (*DRAWN, *own) if name in results] or list(results)
+    return {name: results[name] for name in wanted[: len(style.PALETTE)]}
+
+
+def _colours(chosen: Mapping[str, Any]) -> dict[str, str]:
+    """Colour of each of the chosen models."""
+    left = iter(colour for colour in style.PALETTE if colour not in COLOURS.values())
+    return {name: COLOURS.get(name) or next(left, style.OTHER) for name in chosen}
+
+
+def _draw_slides(part: Any, benchmark: Benchmark, count: int = 3) -> None:
+    """Ways of a few slides as errors would hide them: how far each went and turned, measured and predicted."""
+    test, chosen = benchmark.test("slides"), _chosen(benchmark, "slides")
+    shown = slides.by_spin(test, count)
+    sure = next((name for name, result in chosen.items() if result.regions is not None), None)
+    colours = _colours(chosen)
+    widths = (1.2, 1.0) * count + (1.2,) * (sure is not None)
+    every = part.subplots(1, len(widths), width_ratios=widths)
+    if sure is not None:
+        _draw_ends(every[-1], test, chosen[sure], colours[sure])
+    for i, case in enumerate(shown):
+        way, turn = every[2 * i : 2 * i + 2]
+        index = next(j for j, each in enumerate(test) if each is case)
+        first, time = case.answer[0], case.question.time
+        way.plot(*_shift(case.answer, first), color=style.MEASURED, linewidth=3.0, label="measured")
+        turn.plot(time, np.degrees(case.answer[:, 2] - first[2]), color=style.MEASURED, linewidth=3.0)
+        for name, result in chosen.items():
+            colour = colours[name]
+            poses = result.answers[index]
+            way.plot(*_shift(poses, first), color=colour, linewidth=1.2, label=name)
+            turned = np.degrees(poses[:, 2] - first[2])
+            turn.plot(time, turned, color=colour, linewidth=1.2)
+            if result.regions is not None:
+                edge = 1e3 * (poses[-1, :2] - first[:2] + ellipse(result.regions[index]))
+                way.plot(*edge.T, color=colour, linewidth=0.9)
+                half = float(np.degrees(np.sqrt(result.regions[index][2, 2])))
+                turn.errorbar(time[-1], turned[-1], yerr=half, color=colour, elinewidth=0.9, capsize=2.5)
+        way.set(aspect="equal", xlabel="x [mm]", ylabel="y [mm]")
+        way.set_adjustable("datalim")
+        turn.set(xlabel="time [s]", ylabel="turned [deg]")
+        way.set_title(case.name, fontsize="small", loc="left")
+    for axes in every:
+        style.tidy(axes)
+        _small(axes)
+    part.legend(
+        *every[0].get_legend_handles_labels(), loc="outside lower center", ncols=6, frameon=False, fontsize="small"
+    )
+
+
+def _small(axes: Any) -> None:
+    """Smaller letters on the axes."""
+    axes.tick_params(labelsize="small")
+    axes.xaxis.label.set_fontsize("small")
+    axes.yaxis.label.set_fontsize("small")
+
+
+def ellipse(region: np.ndarray) -> np.ndarray:
+    """Points `[P, 2]` on the edge of the region of a place, `d' S^-1 d = 1`."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 61)
+    return np.stack([np.cos(angle), np.sin(angle)], axis=1) @ np.linalg.cholesky(region[:2, :2]).T
+
+
+def _draw_ends(axes: Any, test: Sequence[Case], result: Result, colour: str) -> None:
+    """Measured ends of all slides about the predicted ones, each in half axes of its own ellipse."""
+    assert result.regions is not None
+    off = np.array([case.answer[-1] - poses[-1] for case, poses in zip(test, result.answers, strict=True)])[:, :2]
+    squares, ways = np.linalg.eigh(result.regions[:, :2, :2])
+    off = np.einsum("kij,ki->kj", ways, off) / np.sqrt(squares)
+    axes.plot(*off[:, ::-1].T, ".", color="0.2", markersize=3)
+    axes.plot(*ellipse(np.eye(3)).T, color=colour, linewidth=1.2)
+    axes.set(aspect="equal", xlabel="along", ylabel="across")
+    axes.set_title(f"{len(test)} ends,\nin half axes", fontsize="small", loc="left", color=colour)
+
+
+def _shift(poses: np.ndarray, first: np.ndarray) -> np.ndarray:
+    """x and y from the start [mm], `[2, T]`."""
+    return 1e3 * (poses[:, :2] - first[:2]).T
+
+
+def _draw_centres(part: Any, benchmark: Benchmark) -> None:
+    """Measured and predicted centres of rotation of the pushes of one layout on feet."""
+    test, axes = benchmark.test("pushes"), part.subplots()
+    number = next((i for i, case in enumerate(test) if "hard_10_90_10" in case.name), 0)
+    case = test[number]
+    corners = case.question.patch.positions
+    chosen = _chosen(benchmark, "pushes")
+    name = "exact surface" if "exact surface" in chosen else list(chosen)[-1]
+    measured, predicted = 1e3 * centres(case.answer), 1e3 * centres(chosen[name].answers[number])
+    for start, end in zip(measured, predicted, strict=True):
+        axes.plot(*np.stack([start, end], axis=1), color="0.8", linewidth=0.8, zorder=1)
+    axes.plot(*measured.T, "o", color=style.MEASURED, markersize=5, label="measured")
+    axes.plot(*predicted.T, "x", color=_colours(chosen)[name], markersize=5, label=name)
+    if len(corners) < 10:
+        axes.plot(*1e3 * corners.T, "o", color="0.2", markersize=13, fillstyle="none", label="foot")
+    limit = 1.6e3 * np.abs(corners).max()
+    axes.set(xlim=(-limit, limit), ylim=(-limit, limit), aspect="equal", xlabel="x [mm]", ylabel="y [mm]")
+    axes.set_title(f"centres of rotation, {case.question.layout}", fontsize="small", loc="left")
+    part.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize="small")
+    style.tidy(axes)
+    _small(axes)
+
+
+def centres(twists: np.ndarray) -> np.ndarray:
+    """Centres of rotation `[M, 2]` [m] of twists; far away where there is no spin."""
+    scale = np.linalg.norm(twists * [1.0, 1.0, pushes.LENGTH], axis=1)
+    spin = twists[:, 2] + 1e-9 * scale / pushes.LENGTH
+    return np.stack([-twists[:, 1], twists[:, 0]], axis=1) / spin[:, None]
+
+
+def _draw_series(part: Any, benchmark: Benchmark) -> None:
+    """Direction of the wrench over time in the longest push: torque over force, as an angle."""
+    from planarfriction_studies.measured.series import LENGTH
+
+    test = benchmark.test("series")
+    wrenches = [i for i, case in enumerate(test) if case.question.wanted == "wrenches"]
+    number = max(wrenches, key=lambda i: len(test[i].scored))
+    case, axes = test[number], part.subplots(2, 1, sharex=True)
+    time, rows = case.question.time[case.scored], case.scored
+    chosen = _chosen(benchmark, "series")
+    colours = {"measured": style.MEASURED} | _colours(chosen)
+    for name, answer in {"measured": case.answer, **{n: r.answers[number] for n, r in chosen.items()}}.items():
+        fx, fy, tau = answer[rows].T
+        way = np.unwrap(np.arctan2(fy, fx))
+        way -= (
+            2.0
+            * np.pi
+            * np.round((np.median(way) - np.median(np.arctan2(*case.answer[rows, 1::-1].T))) / (2.0 * np.pi))
+        )
+        colour, width = colours[name], 3.0 if name == "measured" else 1.2
+        axes[0].plot(time, np.degrees(way), color=colour, linewidth=width, label=name)
+        axes[1].plot(time, np.degrees(np.arctan2(tau / LENGTH, np.hypot(fx, fy))), color=colour, linewidth=width)
+    axes[0].set(ylabel="direction of force [deg]")
+    axes[1].set(xlabel="time [s]", ylabel="torque against force [deg]")
+    axes[0].set_title(case.name.removesuffix(", wrenches"), fontsize="small", loc="left")
+    part.legend(
+        *axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False, fontsize="small"
+    )
+    for each in axes:
+        style.tidy(each)
+        _small(each)

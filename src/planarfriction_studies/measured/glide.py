@@ -1,0 +1,122 @@
+"""Many free slides at once under dry friction: a few thousand slides in the time of one by one simulations of fifty.
+
+Bristles are left out: friction is a function of the twist alone, as in steady sliding. `tests/studies/test_measured.py`
+holds its ends against those of `simulate`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from planarfriction.scenes.ready import GRAVITY
+from planarfriction_studies.measured.questions import FIRST_POSES, SlideQuestion
+
+STEP = 3.4e-3
+"""Step [s], half a sample: ends move by less than 0.01 mm and 0.01 deg where it is halved."""
+
+CHANGES = np.array([2e-3, 2e-3, 2e-2])
+"""Changes of the initial twist that derivatives are taken over [m/s, m/s, rad/s]."""
+
+TURNS = 2
+"""Gauss-Newton steps from the velocity of a parabola to that of the model: a third moves it by less than 1e-5 m/s."""
+
+Friction = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""Friction wrenches `[K, 3]` over the weight [1, 1, m] of twists `[K, 3]`, both in the axes of the bodies.
+
+The second argument are numbers of each slide's own, `[K, P]`, the columns of its start behind pose and twist."""
+
+
+def glide(friction: Friction, starts: np.ndarray, time: np.ndarray, radius_squared: float) -> np.ndarray:
+    """Poses `[K, T, 3]` at `time` `[T]` from 0 of slides from `starts` `[K, 6 + P]`: pose, twist, numbers of their own.
+
+    `radius_squared` is the inertia over the mass [m^2]. The fourth order method of Runge and Kutta; a body whose last
+    step would turn it round stops where its deceleration ends.
+    """
+    end = float(time[-1])
+    steps = max(int(np.ceil(end / STEP)), 1)
+    step, state, own = end / steps, starts[:, :6].copy(), starts[:, 6:]
+    per = GRAVITY * np.array([1.0, 1.0, 1.0 / radius_squared])
+    energy = np.array([1.0, 1.0, radius_squared])
+
+    def rates(state: np.ndarray, own: np.ndarray) -> np.ndarray:
+        cos, sin = np.cos(state[:, 2]), np.sin(state[:, 2])
+        vx, vy, omega = state[:, 3:].T
+        fx, fy, tau = friction(np.stack([cos * vx + sin * vy, cos * vy - sin * vx, omega], axis=1), own).T
+        return np.concatenate(
+            [state[:, 3:], np.stack([cos * fx - sin * fy, sin * fx + cos * fy, tau], 1) * per], axis=1
+        )
+
+    states, moving = np.empty((steps + 1, *state.shape)), np.ones(len(state), dtype=bool)
+    states[0] = state
+    for i in range(steps):
+        now, state = state[moving], state.copy()
+        if len(now):
+            mine = own[moving]
+            a = rates(now, mine)
+            speed, brake = np.sqrt(now[:, 3:] ** 2 @ energy), np.sqrt(a[:, 3:] ** 2 @ energy)
+            left = np.divide(speed, brake, out=np.full(len(now), np.inf), where=brake > 0.0)
+            stops = left <= step
+            b = rates(now + 0.5 * step * a, mine)
+            c = rates(now + 0.5 * step * b, mine)
+            d = rates(now + step * c, mine)
+            after = now + step / 6.0 * (a + 2.0 * b + 2.0 * c + d)
+            after[stops, :3] = now[stops, :3] + 0.5 * left[stops, None] * now[stops, 3:]
+            after[stops, 3:] = 0.0
+            state[moving] = after
+            moving[moving] = ~stops
+        states[i + 1] = state
+    return _between(states, step, time)
+
+
+def _between(states: np.ndarray, step: float, time: np.ndarray) -> np.ndarray:
+    """Poses `[K, T, 3]` by the cubic through the poses and twists of `states` `[steps + 1, K, 6]`."""
+    left = np.clip((time / step).astype(int), 0, len(states) - 2)
+    share = (time / step - left)[:, None, None]
+    rest = 1.0 - share
+    p0, p1, v0, v1 = states[left, :, :3], states[left + 1, :, :3], states[left, :, 3:], states[left + 1, :, 3:]
+    poses = (1.0 + 2.0 * share) * rest**2 * p0 + share**2 * (3.0 - 2.0 * share) * p1
+    return np.moveaxis(poses + step * share * rest * (rest * v0 - share * v1), 0, 1)
+
+
+def parabolas(questions: Sequence[SlideQuestion]) -> np.ndarray:
+    """Starts `[K, 6]`: pose and velocity at the first sample of a parabola through the first poses."""
+    found = []
+    for question in questions:
+        fit = np.polynomial.polynomial.polyfit(question.time[:FIRST_POSES], question.first, 2)
+        found.append(np.concatenate([fit[0], fit[1]]))
+    return np.array(found)
+
+
+def starts(friction: Friction, questions: Sequence[SlideQuestion], radius_squared: float) -> np.ndarray:
+    """Starts `[K, 6]` with which the slides go through their first poses best: least squares over pose and twist.
+
+    An angle counts as its way at the radius of gyration.
+    """
+    found, count = parabolas(questions), len(questions)
+    weights, spread = np.array([1.0, 1.0, np.sqrt(radius_squared)]), np.eye(6)[3:] * CHANGES[:, None]
+    first, time = np.array([each.first for each in questions]), questions[0].time[:FIRST_POSES]
+    for _ in range(TURNS):
+        tried = np.concatenate([found, *(found + change for change in spread)])
+        poses = glide(friction, tried, time, radius_squared).reshape(4, count, FIRST_POSES, 3)
+        slopes = np.zeros((count, FIRST_POSES, 3, 6))
+        slopes[..., [0, 1, 2], [0, 1, 2]] = 1.0
+        slopes[..., 3:] = np.moveaxis((poses[1:] - poses[0]) / CHANGES[:, None, None, None], 0, -1)
+        rows, off = slopes * weights[:, None], (first - poses[0]) * weights
+        normal = np.einsum("ktci,ktcj->kij", rows, rows)
+        found = found + np.linalg.solve(normal, np.einsum("ktci,ktc->ki", rows, off)[..., None])[..., 0]
+    return found
+
+
+def slides(friction: Friction, questions: Sequence[SlideQuestion]) -> list[np.ndarray]:
+    """Poses `[T, 3]` of each slide at its own times, from its first poses.
+
+    The samples of all slides are taken to be equally far apart.
+    """
+    first = questions[0]
+    radius_squared = first.inertia / first.mass
+    begun = starts(friction, questions, radius_squared)
+    longest = max((each.time for each in questions), key=len)
+    poses = glide(friction, begun, longest, radius_squared)
+    return [poses[i, : len(each.time)] for i, each in enumerate(questions)]

@@ -1,0 +1,47 @@
+"""The models that the comparison begins with, and which of them are installed."""
+
+from __future__ import annotations
+
+import importlib.util
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+from planarfriction.limit_surface import LimitSurfaceEllipsoid, LimitSurfaceExact, LimitSurfaceQuartic
+from planarfriction.models import DistributedModel, ReducedModel
+from planarfriction_studies.measured.models import BristleModel, PushedQuartic, SurfaceModel, UncoupledModel
+from planarfriction_studies.measured.mujoco_box import MujocoBox
+from planarfriction_studies.measured.tossed import SpeedModel, TossModel
+
+
+class Entry(NamedTuple):
+    """A model of the comparison."""
+
+    make: Callable[[], Any]
+    words: str
+    """What it is, in one line."""
+    needs: str = ""
+    """Package of an extra that it needs, and the extra."""
+    extra: str = ""
+
+    @property
+    def installed(self) -> bool:
+        """Whether what it needs is there."""
+        return not self.needs or importlib.util.find_spec(self.needs) is not None
+
+
+LIBRARY = {
+    "uncoupled": Entry(lambda: UncoupledModel(False), "separate limits of force and torque"),
+    "independent torsion": Entry(lambda: UncoupledModel(True), "the same with a fitted lever arm of the torque"),
+    "ellipsoid": Entry(lambda: SurfaceModel(LimitSurfaceEllipsoid), "an ellipsoid as limit surface"),
+    "quartic": Entry(lambda: SurfaceModel(LimitSurfaceQuartic), "a convex quartic of the patch", "cvxpy", "quartic"),
+    "quartic of pushes": Entry(PushedQuartic, "a convex quartic fitted to the training pushes", "cvxpy", "quartic"),
+    "exact surface": Entry(lambda: SurfaceModel(LimitSurfaceExact), "the limit surface of the patch itself"),
+    "reduced": Entry(lambda: BristleModel(ReducedModel), "ReducedModel, stiff bristles"),
+    "distributed": Entry(lambda: BristleModel(DistributedModel), "DistributedModel, stiff bristles"),
+    "mu(v) and radius": Entry(SpeedModel, "exact surface, friction that grows with speed, fitted radius (slides only)"),
+    "toss by toss": Entry(TossModel, "the same with the friction, radius and centre of each toss (slides only)"),
+    "MuJoCo box": Entry(
+        MujocoBox, "MuJoCo's own contact of a box, elliptic cone, condim 3 (slides only)", "mujoco", "mujoco"
+    ),
+}
+"""Models by name, from the simplest on."""

@@ -1,0 +1,42 @@
+"""The three tasks: what is asked, which cases are there to fit to, and how answers are scored."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from planarfriction_studies.measured import pushes, series, slides
+from planarfriction_studies.measured.questions import Case
+from planarfriction_studies.measured.scores import Measure
+
+
+class Task(NamedTuple):
+    """A task of the comparison."""
+
+    name: str
+    title: str
+    read: Callable[[Path | None], list[Case]]
+    """All cases, from the tables of the package or of a folder."""
+    is_training: Callable[[Case], bool]
+    """Whether a case is there to fit to: the split is fixed, by number."""
+    errors: Callable[[Case, np.ndarray], np.ndarray]
+    """Errors `[rows, columns]` of an answer to a case."""
+    shape: Callable[[Any], tuple[int, ...]]
+    """Shape of the answer to a question."""
+    measures: tuple[Measure, ...]
+
+
+def _task(name: str, title: str, module: ModuleType) -> Task:
+    return Task(name, title, module.read, module.is_training, module.errors, module.shape, module.MEASURES)
+
+
+TASKS = {
+    "slides": _task("slides", "Free slides of a cube: path and end from the first 8 poses", slides),
+    "pushes": _task("pushes", "Slow pushes on known feet: angle to the measured twist", pushes),
+    "series": _task("series", "Pushes over time: angles to the measured twist and wrench", series),
+}
+"""Task by name."""

@@ -1,0 +1,303 @@
+"""Slides whose friction is their own: what differs from toss to toss is estimated from the first poses of each.
+
+A slide has friction `(mu_0 W(V) - mu_1 (vx, vy, k^2 omega)) e^a` about a centre of pressure that is off by `c` across
+its way, with the contact radius `r e^b`; `a`, `c` and `b` differ from toss to toss with spreads that all tosses share.
+With a start and these three free, the first poses are fitted by least squares with the spreads as priors.
+
+The poses miss the model for two reasons: the camera, and pushes that the model does not know, strong right after the
+cube has landed. Pushes make errors that are correlated, so the poses are weighed with the covariance that white pushes
+of intensity `q_0^2 exp(-t/tau) + q_1^2` leave behind, seen from the last of them.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from planarfriction.limit_surface import LimitSurfaceExact
+from planarfriction.patch import ContactPatch
+from planarfriction_studies.measured import fitting, glide
+from planarfriction_studies.measured.models import quick
+from planarfriction_studies.measured.questions import FIRST_POSES, Case, SlideQuestion
+
+LANDED = 3.4e-3
+"""Time over which the pushes of the landing die away [s]: half a sample."""
+
+SEEN = np.array([2e-5, 2e-5, 5e-4])
+"""Noise of the camera [m, m, rad]: what a smooth curve leaves over."""
+
+CHANGES = np.array([*glide.CHANGES, 0.02, 1e-3, 0.05])
+"""Changes of twist, a, c and b that derivatives are taken over."""
+
+BEGIN = np.array([0.3, 0.02, 8.0, 1.0, 0.05, 4e-3, 0.2])
+"""Where the fit of the spreads begins: q_0 and q_1 of the way [m s^-1.5], of the angle, spreads of a, c [m] and b."""
+
+LOOSE = 1.5
+"""Spread of their logarithms about `BEGIN`, which keeps what the tosses do not tell from running away."""
+
+STEPS = 25
+"""Steps of the fit of the spreads: more change the errors by less than 0.01 mm and 0.01 deg."""
+
+FOLDS = 4
+"""Parts of the training tosses, each left out once to size the regions of the end."""
+
+INSIDE = 0.95
+"""Share of ends that a region is to hold."""
+
+
+def friction(patch: ContactPatch, mu_0: float, mu_1: float, share: float) -> glide.Friction:
+    """Friction of slides with numbers of their own `(a, c_x, c_y, b)`, in the axes of the body, or with none.
+
+    `share` is the contact radius over that of the patch.
+    """
+    wrench, radius_squared = quick(LimitSurfaceExact(patch)), patch.weights() @ (patch.positions**2).sum(axis=1)
+
+    def of(twist: np.ndarray, own: np.ndarray) -> np.ndarray:
+        a, x, y, b = own.T if own.shape[1] else np.zeros((4, len(twist)))
+        size = share * np.exp(b)
+        vx, vy, spin = twist[:, 0] - twist[:, 2] * y, twist[:, 1] + twist[:, 2] * x, size * twist[:, 2]
+        fx, fy, tau = mu_0 * wrench(np.stack([vx, vy, spin], axis=1)).T
+        fx, fy = np.exp(a) * (fx - mu_1 * vx), np.exp(a) * (fy - mu_1 * vy)
+        tau = np.exp(a) * size * (tau - mu_1 * radius_squared * spin)
+        return np.stack([fx, fy, tau + x * fy - y * fx], axis=1)
+
+    return of
+
+
+@dataclass(frozen=True)
+class SpeedModel:
+    """The limit surface of the patch, friction that grows with the speed, and a fitted contact radius; slides only."""
+
+    mu_0: float = 0.2
+    mu_1: float = 0.05
+    """Per speed [s/m]."""
+    share: float = 1.2
+    """Contact radius over that of the patch [-]."""
+
+    def __call__(self, question: SlideQuestion) -> np.ndarray:
+        """The answer to one question."""
+        return self.answer_all([question])[0]
+
+    def answer_all(self, questions: Sequence[Any]) -> list[np.ndarray]:
+        """Poses of slides."""
+        if questions[0].task != "slides":
+            raise NotImplementedError
+        return glide.slides(friction(questions[0].patch, self.mu_0, self.mu_1, self.share), questions)
+
+    def fit(self, cases: Sequence[Case]) -> SpeedModel:
+        """With the three numbers of the training slides."""
+        patch = cases[0].question.patch
+        if cases[0].question.task != "slides":
+            raise NotImplementedError
+        predict = lambda values, asked: glide.slides(friction(patch, *values), asked)  # noqa: E731
+        found = fitting.fit_slides(predict, [self.mu_0, self.mu_1, self.share], cases, patch.contact_radius())
+        return SpeedModel(*found.tolist())
+
+    def fitted_values(self) -> dict[str, float]:
+        """What was fitted."""
+        return {"mu": self.mu_0, "mu per m/s": self.mu_1, "lever/radius": self.share}
+
+
+class Linear(NamedTuple):
+    """Slides about a start each, as linear functions of it and of their own numbers."""
+
+    start: np.ndarray
+    """Pose, twist, a, c, b `[K, 9]`."""
+    poses: np.ndarray
+    """`[K, T, 3]`."""
+    slopes: np.ndarray
+    """`[K, T, 3, 9]`."""
+    time: np.ndarray
+    """`[T]`."""
+
+    def rows(self, which: np.ndarray) -> Linear:
+        """Some of the slides."""
+        return Linear(self.start[which], self.poses[which], self.slopes[which], self.time)
+
+
+@dataclass(frozen=True)
+class TossModel:
+    """`SpeedModel` with friction, radius and centre of pressure of each toss, from its first poses; slides only."""
+
+    common: SpeedModel = SpeedModel()
+    spreads: tuple[float, ...] = (*BEGIN, 0.0, 0.0)
+    """As `BEGIN`, then the means of a and b."""
+    reach: tuple[float, float] = (1.0, 1.0)
+    """Sizes of the regions of the end, in covariances: of the place, of the angle."""
+
+    def __call__(self, question: SlideQuestion) -> np.ndarray:
+        """The answer to one question."""
+        return self.answer_all([question])[0]
+
+    def answer_all(self, questions: Sequence[Any]) -> list[np.ndarray]:
+        """Poses of slides."""
+        if questions[0].task != "slides":
+            raise NotImplementedError
+        linear = self.linear(questions)
+        found = linear.start + estimate(np.array(self.spreads), linear, questions)[0]
+        poses = glide.glide(self._friction(questions), _state(found, _ways(questions)), linear.time, _radius(questions))
+        return [poses[i, : len(each.time)] for i, each in enumerate(questions)]
+
+    def fit(self, cases: Sequence[Case]) -> TossModel:
+        """With common friction, spreads between tosses and regions of the end from the training slides."""
+        if cases[0].question.task != "slides":
+            raise NotImplementedError
+        model = dataclasses.replace(self, common=self.common.fit(cases))
+        linear = model.linear([case.question for case in cases])
+        full = model._with_spreads(linear, cases)
+        # regions are sized on tosses that spreads were not fitted to, their errors over those that they were fitted to
+        names = sorted({case.group for case in cases})
+        fold = np.array([names.index(case.group) % FOLDS for case in cases])
+        far = []
+        for k in range(min(FOLDS, len(names)) if len(names) > 1 else 0):
+            known, other = [np.flatnonzero(side) for side in (fold != k, fold == k)]
+            part = model._with_spreads(linear.rows(known), [cases[int(i)] for i in known])
+            fitted, unseen = (part.distances([cases[int(i)] for i in rows]) for rows in (known, other))
+            far.append(unseen / fitted.mean(axis=0))
+        own = full.distances(cases)
+        sizes = np.concatenate(far) * own.mean(axis=0) if far else own
+        rank = min(int(np.ceil(INSIDE * (len(sizes) + 1))), len(sizes)) - 1
+        return dataclasses.replace(full, reach=tuple(np.sort(sizes, axis=0)[rank].tolist()))
+
+    def _with_spreads(self, linear: Linear, cases: Sequence[Case]) -> TossModel:
+        """With the spreads that predict the training slides best."""
+        from scipy.optimize import minimize
+
+        scale = _squares(np.array([*BEGIN, 0.0, 0.0]), linear, cases)
+
+        def misfit(x: np.ndarray) -> float:
+            spreads = np.array([*(BEGIN * np.exp(x[:-2])), *x[-2:]])
+            return float((_squares(spreads, linear, cases) / scale).sum() + 1e-3 * (x[:-2] ** 2).sum() / LOOSE**2)
+
+        best = minimize(misfit, np.zeros(len(BEGIN) + 2), method="L-BFGS-B", options={"maxiter": STEPS}).x
+        return dataclasses.replace(self, spreads=(*(BEGIN * np.exp(best[:-2])), *best[-2:]))
+
+    def fitted_values(self) -> dict[str, float]:
+        """What was fitted."""
+        a, c, b, a_0, b_0 = self.spreads[4:]
+        common = self.common.fitted_values()
+        common["mu"], common["mu per m/s"] = common["mu"] * np.exp(a_0), common["mu per m/s"] * np.exp(a_0)
+        common["lever/radius"] *= np.exp(b_0)
+        return common | {"spread of mu": a, "of the centre [mm]": 1e3 * c, "of the lever": b}
+
+    def check(self, cases: Sequence[Case]) -> dict[str, float]:
+        """Share of ends inside their regions, and how large these are."""
+        far, spread = self.distances(cases), self.ends([case.question for case in cases])[1]
+        axes = 1e3 * np.sqrt(np.linalg.eigvalsh(spread[:, :2, :2]) * self.reach[0])
+        return {
+            "ends inside the ellipse [%]": 100.0 * float((far[:, 0] <= self.reach[0]).mean()),
+            "half axis along the way, median [mm]": float(np.median(axes[:, 1])),
+            "half axis across, median [mm]": float(np.median(axes[:, 0])),
+            "angles inside the interval [%]": 100.0 * float((far[:, 1] <= self.reach[1]).mean()),
+            "half width of it, median [deg]": float(np.degrees(np.median(np.sqrt(spread[:, 2, 2] * self.reach[1])))),
+        }
+
+    def ends(self, questions: Sequence[SlideQuestion]) -> tuple[np.ndarray, np.ndarray]:
+        """Predicted poses at the last sample `[K, 3]` and their covariances `[K, 3, 3]`.
+
+        The ellipse `d' S^-1 d <= reach[0]`, with S the part of x and y, is to hold 95 % of ends; `reach[1]` the same of
+        the angle.
+        """
+        linear, answers = self.linear(questions), self.answer_all(questions)
+        _, spread = estimate(np.array(self.spreads), linear, questions)
+        found = []
+        for i, each in enumerate(questions):
+            last = len(each.time) - 1
+            left = each.time[last] - each.time[FIRST_POSES - 1]
+            slope = linear.slopes[i, last]
+            pushed = np.array([self.spreads[1], self.spreads[1], self.spreads[3]]) ** 2 * left**3 / 3.0
+            found.append(slope @ spread[i] @ slope.T + np.diag(pushed))
+        return np.array([answer[-1] for answer in answers]), np.array(found)
+
+    def regions(self, questions: Sequence[SlideQuestion]) -> np.ndarray:
+        """Matrices S `[K, 3, 3]` of what is to hold 95 % of ends: places with `d' S^-1 d <= 1`, angles within its root.
+
+        S is the part of x and y for the place, and that of the angle.
+        """
+        size = np.sqrt([self.reach[0], self.reach[0], self.reach[1]])
+        return self.ends(questions)[1] * np.outer(size, size)
+
+    def distances(self, cases: Sequence[Case]) -> np.ndarray:
+        """Squares of the errors of place and angle at the end over their covariances, `[K, 2]`."""
+        ends, spread = self.ends([case.question for case in cases])
+        off = ends - np.array([case.answer[-1] for case in cases])
+        place = np.einsum("ki,kij,kj->k", off[:, :2], np.linalg.inv(spread[:, :2, :2]), off[:, :2])
+        return np.stack([place, off[:, 2] ** 2 / spread[:, 2, 2]], axis=1)
+
+    def linear(self, questions: Sequence[SlideQuestion]) -> Linear:
+        """About the start that fits the first poses best when no toss has friction of its own."""
+        law, ways = self._friction(questions), _ways(questions)
+        begun = glide.starts(law, questions, _radius(questions))
+        start = np.concatenate([begun, np.zeros((len(begun), 3))], axis=1)
+        moved = [start, *(start + change * row for change, row in zip(CHANGES, np.eye(9)[3:], strict=True))]
+        time = max((each.time for each in questions), key=len)
+        states = np.concatenate([_state(each, ways) for each in moved])
+        poses = glide.glide(law, states, time, _radius(questions)).reshape(7, len(start), len(time), 3)
+        slopes = np.zeros((*poses.shape[1:], 9))
+        slopes[..., [0, 1, 2], [0, 1, 2]] = 1.0
+        slopes[..., 3:] = np.moveaxis((poses[1:] - poses[0]) / CHANGES[:, None, None, None], 0, -1)
+        return Linear(start, poses[0], slopes, time)
+
+    def _friction(self, questions: Sequence[SlideQuestion]) -> glide.Friction:
+        return friction(questions[0].patch, *dataclasses.astuple(self.common))
+
+
+def _radius(questions: Sequence[SlideQuestion]) -> float:
+    return questions[0].inertia / questions[0].mass
+
+
+def _ways(questions: Sequence[SlideQuestion]) -> np.ndarray:
+    """Unit vectors `[K, 2]` along the first velocities, in the axes of the bodies."""
+    begun = glide.parabolas(questions)
+    cos, sin = np.cos(begun[:, 2]), np.sin(begun[:, 2])
+    way = np.stack([cos * begun[:, 3] + sin * begun[:, 4], cos * begun[:, 4] - sin * begun[:, 3]], axis=1)
+    return way / np.linalg.norm(way, axis=1)[:, None]
+
+
+def _state(start: np.ndarray, ways: np.ndarray) -> np.ndarray:
+    """Starts `[K, 6 + 4]` with the centre of pressure across the way."""
+    a, c, b = start[:, 6:].T
+    return np.column_stack([start[:, :6], a, -c * ways[:, 1], c * ways[:, 0], b])
+
+
+def estimate(spreads: np.ndarray, linear: Linear, questions: Sequence[SlideQuestion]) -> tuple[np.ndarray, np.ndarray]:
+    """Changes `[K, 9]` of starts and own numbers that the first poses ask for, and their covariances `[K, 9, 9]`."""
+    time, count = linear.time[:FIRST_POSES], len(questions)
+    weights = np.zeros((FIRST_POSES, 3, FIRST_POSES, 3))
+    for i, (begin, on) in enumerate((spreads[:2], spreads[:2], spreads[2:4])):
+        weights[:, i, :, i] = np.linalg.inv(pushed(time, begin, on, SEEN[i]))
+    weights = weights.reshape(3 * FIRST_POSES, -1)
+    slopes = linear.slopes[:, :FIRST_POSES].reshape(count, -1, 9)
+    off = (np.array([each.first for each in questions]) - linear.poses[:, :FIRST_POSES]).reshape(count, -1, 1)
+    prior, mean = np.zeros(9), np.zeros(9)
+    prior[6:], mean[[6, 8]] = 1.0 / spreads[4:7] ** 2, spreads[7:]
+    turned = np.swapaxes(slopes, 1, 2) @ weights
+    spread = np.linalg.inv(turned @ slopes + np.diag(prior))
+    return (spread @ (turned @ off + (prior * mean)[:, None]))[..., 0], spread
+
+
+def pushed(time: np.ndarray, begin: float, on: float, seen: float) -> np.ndarray:
+    """Covariance `[T, T]` of poses about the motion that goes through the last of them undisturbed.
+
+    `R(s, t) = seen^2 [s = t] + integral of (u - s)+ (u - t)+ (begin^2 exp(-u/tau) + on^2) du` up to the last time.
+    """
+    middle = (np.arange(64) + 0.5) / 64 * time[-1]
+    since = np.maximum(middle - time[:, None], 0.0)
+    intensity = begin**2 * np.exp(-middle / LANDED) + on**2
+    return seen**2 * np.eye(len(time)) + (since * intensity * time[-1] / 64) @ since.T
+
+
+def _squares(spreads: np.ndarray, linear: Linear, cases: Sequence[Case]) -> np.ndarray:
+    """Mean squares of the errors in place and angle along the way and at the end, `[4]`, of the linear slides."""
+    changes, _ = estimate(spreads, linear, [case.question for case in cases])
+    poses = linear.poses + np.einsum("ktci,ki->ktc", linear.slopes, changes)
+    total = np.zeros(4)
+    for case, found in zip(cases, poses, strict=True):
+        off = found[: len(case.answer)] - case.answer
+        place, angle = off[:, 0] ** 2 + off[:, 1] ** 2, off[:, 2] ** 2
+        total += [place.mean(), angle.mean(), place[-1], angle[-1]]
+    return total / len(cases)
