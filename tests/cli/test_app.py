@@ -433,8 +433,7 @@ def measured(monkeypatch) -> list:
         progress("import")
         return LINES
 
-    monkeypatch.setitem(sys.modules, "planarfriction_studies.bench", SimpleNamespace(run=run))
-    monkeypatch.setattr(pf, "bench", SimpleNamespace(run=run), raising=False)
+    monkeypatch.setattr("planarfriction_studies.bench.run", run)
     return calls
 
 

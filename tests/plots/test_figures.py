@@ -27,6 +27,7 @@ from planarfriction.plots.limit_surface import (
     sample_limit_surface,
     scaled_samples,
 )
+from planarfriction_studies.experiments import looks
 from tests.support import synthetic
 from tests.support.pictures import faults
 
