@@ -10,7 +10,7 @@ import numpy as np
 import planarfriction as pf
 from planarfriction.plots import style
 from planarfriction.plots.pushing import draw_push
-from planarfriction_studies.measured import followed
+from planarfriction_studies.measured import replayed_pushes
 from planarfriction_studies.measured.scores import drawings, interval, mean
 
 PAGE = Path(__file__).parent / "pushing.md"
@@ -26,12 +26,12 @@ def cell(values: np.ndarray, unit: float) -> str:
     return f"{unit * values.mean():.2f} ({low:.2f} to {high:.2f}), {unit * np.median(values):.2f}"
 
 
-def table(measured: list[followed.Followed]) -> str:
+def table(measured: list[replayed_pushes.ReplayedPush]) -> str:
     """Rows of the page: one for each surface and kind of push."""
     lines = ["| pushes | number | limit surface | position [mm] | angle [deg] |", "|---|---|---|---|---|"]
     for board, words in BOARDS.items():
         some = [each for each in measured if each.board == board]
-        found = {name: followed.errors(some, make) for name, make in SURFACES.items()}
+        found = {name: replayed_pushes.errors(some, make) for name, make in SURFACES.items()}
         found["it does not move"] = np.array([each.error(each.start) for each in some])
         for name, values in found.items():
             cells = cell(values[:, 0], 1e3), cell(values[:, 1], np.degrees(1.0))
@@ -39,7 +39,7 @@ def table(measured: list[followed.Followed]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def picture(measured: list[followed.Followed]) -> None:
+def picture(measured: list[replayed_pushes.ReplayedPush]) -> None:
     """A planned push, and a measured one with where it ends."""
     square = np.array([[-0.045, -0.045], [0.045, -0.045], [0.045, 0.045], [-0.045, 0.045]])
     slider = pf.planning.Slider(pf.LimitSurfaceExact(pf.ContactPatch.rectangle(0.09)), square)
@@ -64,7 +64,7 @@ def picture(measured: list[followed.Followed]) -> None:
 
 def main() -> None:
     """Rewrite the page and the picture."""
-    measured = followed.single_pushes() + followed.pushes_in_time()
+    measured = replayed_pushes.single_pushes() + replayed_pushes.pushes_in_time()
     picture(measured)
     text = PAGE.read_text(encoding="utf-8")
     PAGE.write_text(MARK.sub(lambda _: f"<!-- followed pushes -->\n\n{table(measured)}", text), encoding="utf-8")

@@ -15,7 +15,16 @@ import pytest
 import planarfriction as pf
 from planarfriction.cli import main
 from planarfriction.errors import InvalidValueError
-from planarfriction_studies.measured import TASKS, Benchmark, glide, models, pushes, series, steady, tossed
+from planarfriction_studies.measured import (
+    TASKS,
+    Benchmark,
+    contactnets,
+    models,
+    push_series,
+    pushes,
+    slide_integrator,
+    steady,
+)
 from planarfriction_studies.measured.figures import draw, ellipse
 from planarfriction_studies.measured.mujoco_box import MujocoBox
 from planarfriction_studies.measured.scores import angles, drawings, interval, mean
@@ -39,7 +48,7 @@ def made_slides(measured, mu=MU):
     """Cases whose answers are slides of a uniform square, begun as the measured ones."""
     questions = [case.question for case in measured]
     friction, first = square(questions[0], mu), questions[0]
-    poses = glide.slides(friction, questions)
+    poses = slide_integrator.slides(friction, questions)
     return [
         case._replace(question=replace(case.question, first=p[:8]), answer=p)
         for case, p in zip(measured, poses, strict=True)
@@ -69,7 +78,7 @@ def test_splits_keep_copies_and_pushes_together(cases):
 
 def test_the_wrench_of_a_pusher_goes_with_the_motion(cases):
     """A wrong sign, or axes of the one and not of the other, would spoil the power."""
-    assert series.to_object(np.array([[1.0, 0.0, 2.0]]), np.array([np.pi / 2])) == pytest.approx(
+    assert push_series.to_object(np.array([[1.0, 0.0, 2.0]]), np.array([np.pi / 2])) == pytest.approx(
         np.array([[0.0, -1.0, 2.0]])
     )
     for case in cases["pushes"]:
@@ -88,7 +97,7 @@ def test_glide_goes_where_the_simulation_goes(cases):
     test = cases["slides"][5:12]
     model = pf.DistributedModel(test[0].question.patch, models.stiff(MU))
     for case, glided in zip(
-        test, glide.slides(square(test[0].question), [case.question for case in test]), strict=True
+        test, slide_integrator.slides(square(test[0].question), [case.question for case in test]), strict=True
     ):
         simulated = models._slide(model, case.question)
         # 0.05 mm and 0.05 deg: the start is found through differences of either
@@ -100,7 +109,7 @@ def test_glide_in_closed_form():
     """Straight: v^2/(2 mu g) in v/(mu g); a spin alone: omega^2 k^2/(2 mu g r)."""
     wrench = lambda twist, _: MU * models.uncoupled(twist, 0.04)  # noqa: E731
     starts = np.array([[0.1, 0.2, 0.3, 0.3, -0.4, 0.0], [0.0, 0.0, 0.0, 0.0, 0.0, -3.0]])
-    end = glide.glide(wrench, starts, np.linspace(0.0, 0.5, 60), 0.002)[:, -1]
+    end = slide_integrator.integrate(wrench, starts, np.linspace(0.0, 0.5, 60), 0.002)[:, -1]
     way = 0.25 / (2.0 * MU * 9.81)
     # the last step is a parabola too: the order of the method leaves rounding
     assert end[0] == pytest.approx([0.1 + 0.6 * way, 0.2 - 0.8 * way, 0.3], abs=1e-9)
@@ -135,7 +144,7 @@ def test_surfaces_explain_the_pushes_they_made(cases):
 
 
 def test_bristles_follow_a_push_to_the_wrench_of_their_surface():
-    patch, time = series.feet(), np.linspace(0.0, 3.0, 181)
+    patch, time = push_series.feet(), np.linspace(0.0, 3.0, 181)
     twists = np.tile([3e-3, 1e-3, 0.05], (181, 1))
     model = pf.DistributedModel(patch, models.stiff(0.5))
     wrenches = steady.follow(model, time, twists, 1.3)
@@ -352,14 +361,14 @@ def test_the_examples_are_the_command(name, tmp_path, capsys):
 def tossed_slides(measured, seed=0, spread=0.06):
     """Slides with friction and centre of pressure of their own, and poses with 0.02 mm of noise."""
     random, questions = np.random.default_rng(seed), [case.question for case in measured]
-    law, begun = tossed.friction(questions[0].patch, 0.2, 0.05, 1.2), glide.parabolas(questions)
+    law, begun = contactnets.friction(questions[0].patch, 0.2, 0.05, 1.2), slide_integrator.parabolas(questions)
     a, c = spread * random.normal(size=len(begun)), 3e-3 * random.normal(size=len(begun))
     own = np.column_stack([begun, a, c, np.zeros(len(begun))])
     time = max((each.time for each in questions), key=len)
-    poses = glide.glide(
-        law, tossed._state(own, tossed._ways(questions)), time, questions[0].inertia / questions[0].mass
+    poses = slide_integrator.integrate(
+        law, contactnets._state(own, contactnets._ways(questions)), time, questions[0].inertia / questions[0].mass
     )
-    poses = poses + random.normal(size=poses.shape) * tossed.SEEN
+    poses = poses + random.normal(size=poses.shape) * contactnets.SEEN
     cut = [each[: len(question.time)] for each, question in zip(poses, questions, strict=True)]
     return [
         case._replace(question=replace(case.question, first=p[:8]), answer=p)
@@ -371,7 +380,7 @@ def tossed_slides(measured, seed=0, spread=0.06):
 def test_friction_of_single_tosses_is_found_and_regions_hold_their_ends(cases):
     made = tossed_slides(cases["slides"][:120])
     training, test = made[:80], made[80:]
-    plain, model = tossed.SpeedModel().fit(training), tossed.TossModel().fit(training)
+    plain, model = contactnets.SpeedModel().fit(training), contactnets.TossModel().fit(training)
     assert plain.mu_0 + 0.3 * plain.mu_1 == pytest.approx(
         0.215, rel=0.02
     )  # 6 % over the root of 80; each alone is told worse
@@ -386,6 +395,6 @@ def test_friction_of_single_tosses_is_found_and_regions_hold_their_ends(cases):
 def test_pushes_leave_errors_of_the_integral_behind():
     """Constant intensity: R(t, t) = on^2 (T - t)^3 / 3; nothing at the last pose."""
     time = np.linspace(0.0, 0.047, 8)
-    found = tossed.pushed(time, 0.0, 0.5, 0.0)
+    found = contactnets.pushed(time, 0.0, 0.5, 0.0)
     assert np.diag(found) == pytest.approx(0.25 * (time[-1] - time) ** 3 / 3.0, rel=2e-2, abs=1e-9)
     assert found[-1].max() == 0.0

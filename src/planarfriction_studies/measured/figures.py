@@ -177,7 +177,7 @@ def centres(twists: np.ndarray) -> np.ndarray:
 
 def _draw_series(part: Any, benchmark: Benchmark) -> None:
     """Direction of the wrench over time in the longest push: torque over force, as an angle."""
-    from planarfriction_studies.measured.series import LENGTH
+    from planarfriction_studies.measured.push_series import LENGTH
 
     test = benchmark.test("series")
     wrenches = [i for i, case in enumerate(test) if case.question.wanted == "wrenches"]

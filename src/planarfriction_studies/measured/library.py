@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 
 from planarfriction.limit_surface import LimitSurfaceEllipsoid, LimitSurfaceExact, LimitSurfaceQuartic
 from planarfriction.models import DistributedModel, ReducedModel
+from planarfriction_studies.measured.contactnets import SpeedModel, TossModel
 from planarfriction_studies.measured.models import BristleModel, PushedQuartic, SurfaceModel, UncoupledModel
 from planarfriction_studies.measured.mujoco_box import MujocoBox
-from planarfriction_studies.measured.tossed import SpeedModel, TossModel
 
 
 class Entry(NamedTuple):

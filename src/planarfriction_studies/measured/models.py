@@ -19,7 +19,7 @@ from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceExact, LimitSurfaceQuartic
 from planarfriction.limit_surface.base import scaling
 from planarfriction.patch import ContactPatch
-from planarfriction_studies.measured import fitting, glide
+from planarfriction_studies.measured import fitting, slide_integrator
 from planarfriction_studies.measured.questions import Case, Question, SlideQuestion
 
 
@@ -39,7 +39,7 @@ class SurfaceModel:
         made = surfaces(self.surface, questions)
         if questions[0].task == "slides":
             wrench = quick(made[0])
-            return glide.slides(lambda twist, _: self.mu * wrench(twist), questions)
+            return slide_integrator.slides(lambda twist, _: self.mu * wrench(twist), questions)
         return [_direction(surface, question) for surface, question in zip(made, questions, strict=True)]
 
     def fit(self, cases: Sequence[Case]) -> SurfaceModel:
@@ -48,7 +48,7 @@ class SurfaceModel:
             return self
         (made,), radius = surfaces(self.surface, [cases[0].question]), cases[0].question.patch.contact_radius()
         wrench = quick(made)
-        predict = lambda values, asked: glide.slides(lambda twist, _: values[0] * wrench(twist), asked)  # noqa: E731
+        predict = lambda values, asked: slide_integrator.slides(lambda twist, _: values[0] * wrench(twist), asked)  # noqa: E731
         return dataclasses.replace(self, mu=float(fitting.fit_slides(predict, [fitting.MU], cases, radius)[0]))
 
     def fitted_values(self) -> dict[str, float]:
@@ -108,7 +108,7 @@ class UncoupledModel:
         """Answers to questions of one task."""
         if questions[0].task == "slides":
             lever = self._lever(questions[0])
-            return glide.slides(lambda twist, _: self.mu * uncoupled(twist, lever), questions)
+            return slide_integrator.slides(lambda twist, _: self.mu * uncoupled(twist, lever), questions)
         return [self._direction(question, self._lever(question)) for question in questions]
 
     def fit(self, cases: Sequence[Case]) -> UncoupledModel:
@@ -121,7 +121,7 @@ class UncoupledModel:
 
             def predict(values: np.ndarray, asked: Sequence[Any]) -> list[np.ndarray]:
                 lever = radius * (values[1] if self.fitted_lever else self.share)
-                return glide.slides(lambda twist, _: values[0] * uncoupled(twist, lever), asked)
+                return slide_integrator.slides(lambda twist, _: values[0] * uncoupled(twist, lever), asked)
 
             found = fitting.fit_slides(predict, begin, cases, radius)
             return dataclasses.replace(self, mu=float(found[0]), share=float([*found, self.share][1]))
@@ -258,8 +258,8 @@ def _slide(model: Any, question: SlideQuestion) -> np.ndarray:
 
     body = SlidingBody(question.mass, question.inertia)
     first = len(question.first)
-    begun = glide.parabolas([question])[0]
+    begun = slide_integrator.parabolas([question])[0]
     part = Slide(question.time[:first], question.first, begun[3:])
     noise = np.array([1.0, 1.0, 1.0 / np.sqrt(question.inertia / question.mass)])
-    begun = improve_start(model, body, part, begun, noise, glide.TURNS - 1)
+    begun = improve_start(model, body, part, begun, noise, slide_integrator.TURNS - 1)
     return slide_poses(model, body, question.time, begun[:3], begun[3:])

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction_studies.measured import fitting, glide
+from planarfriction_studies.measured import fitting, slide_integrator
 from planarfriction_studies.measured.questions import FIRST_POSES, Case, SlideQuestion
 
 STEP = 2e-3
@@ -73,12 +73,12 @@ class MujocoBox:
 
     def _start(self, question: SlideQuestion) -> np.ndarray:
         """One Gauss-Newton step from a parabola through the first poses, as for the other models."""
-        begun, time = glide.parabolas([question])[0], question.time[:FIRST_POSES]
+        begun, time = slide_integrator.parabolas([question])[0], question.time[:FIRST_POSES]
         weights = np.array([1.0, 1.0, np.sqrt(question.inertia / question.mass)])
         poses = self._poses(question, begun, time)
         slopes = np.zeros((FIRST_POSES, 3, 6))
         slopes[:, [0, 1, 2], [0, 1, 2]] = 1.0
-        for i, change in enumerate(glide.CHANGES):
+        for i, change in enumerate(slide_integrator.CHANGES):
             moved = begun + change * np.eye(6)[3 + i]
             slopes[:, :, 3 + i] = (self._poses(question, moved, time) - poses) / change
         rows, off = (slopes * weights[:, None]).reshape(-1, 6), ((question.first - poses) * weights).ravel()

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction_studies.measured import pushes, series, slides
+from planarfriction_studies.measured import push_series, pushes, slides
 from planarfriction_studies.measured.questions import Case
 from planarfriction_studies.measured.scores import Measure
 
@@ -37,6 +37,6 @@ def _task(name: str, title: str, module: ModuleType) -> Task:
 TASKS = {
     "slides": _task("slides", "Free slides of a cube: path and end from the first 8 poses", slides),
     "pushes": _task("pushes", "Slow pushes on known feet: angle to the measured twist", pushes),
-    "series": _task("series", "Pushes over time: angles to the measured twist and wrench", series),
+    "series": _task("series", "Pushes over time: angles to the measured twist and wrench", push_series),
 }
 """Task by name."""

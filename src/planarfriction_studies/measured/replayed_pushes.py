@@ -19,13 +19,13 @@ from planarfriction.limit_surface import LimitSurface, LimitSurfaceEllipsoid
 from planarfriction.patch import ContactPatch
 from planarfriction.planning import Push, Pusher, Slider, push
 from planarfriction.scenes import Signal
-from planarfriction_studies.measured import pushes, series
+from planarfriction_studies.measured import push_series, pushes
 from planarfriction_studies.measured.tables import read_table
 
 TRIANGLE = np.array([[-0.05, -0.05], [0.1, -0.05], [-0.05, 0.1]])
 """Outline of the object of the single pushes about its centre of mass [m]."""
 
-WOODEN = np.array([[0.0, 0.0], [0.101, 0.0], [0.0, 0.099]]) - series.CENTRE
+WOODEN = np.array([[0.0, 0.0], [0.101, 0.0], [0.0, 0.099]]) - push_series.CENTRE
 """Outline of the object of the pushes in time [m]."""
 
 EDGES = {0: 2, 1: 1}
@@ -40,7 +40,7 @@ SHORTEST = 30
 RTOL = 1e-5
 
 
-class Followed(NamedTuple):
+class ReplayedPush(NamedTuple):
     """A measured push."""
 
     board: str
@@ -67,7 +67,7 @@ class Followed(NamedTuple):
         return np.array([np.hypot(*(end - self.end)[:2]), abs(end[2] - self.end[2])])
 
 
-def single_pushes(folder: Path | None = None) -> list[Followed]:
+def single_pushes(folder: Path | None = None) -> list[ReplayedPush]:
     """The 250 single pushes with an odd number; those with an even one say how far off the edges their places are."""
     places = ["px0_m", "py0_m", "px1_m", "py1_m"]
     table = read_table("pushes", ["push", "dx_m", "dy_m", "dtheta_rad", *places], ["config"], folder=folder)
@@ -89,16 +89,18 @@ def single_pushes(folder: Path | None = None) -> list[Followed]:
             begin = begin + inside[edge[i]] * edges.inward[edge[i]]
         path = Signal.sampled([0.0, 1.0], [begin, end[:2] + rotate(last[i] + shift, end[2])], "linear")
         name = f"{row.config} {row.push:g}"
-        found.append(Followed(board, name, patch, TRIANGLE, MU_TRIANGLE, path, np.zeros(3), end))
+        found.append(ReplayedPush(board, name, patch, TRIANGLE, MU_TRIANGLE, path, np.zeros(3), end))
     return found
 
 
-def pushes_in_time(folder: Path | None = None) -> list[Followed]:
+def pushes_in_time(folder: Path | None = None) -> list[ReplayedPush]:
     """The pushes of the wooden triangle on three outer feet, from where it begins to slide to where it ends."""
     columns = ["push_id", "t_s", "x_m", "y_m", "yaw_rad", "px_m", "py_m", "sliding", "edge"]
-    table, patch, edges = read_table("series", columns, ["run"], folder=folder), series.feet(), _slider(WOODEN)
+    table, patch, edges = read_table("series", columns, ["run"], folder=folder), push_series.feet(), _slider(WOODEN)
     found = []
-    for (run, number), rows in table[~table["run"].isin(series.OTHER_FEET)].groupby(["run", "push_id"], sort=False):
+    for (run, number), rows in table[~table["run"].isin(push_series.OTHER_FEET)].groupby(
+        ["run", "push_id"], sort=False
+    ):
         slides = np.flatnonzero(rows["sliding"].to_numpy() > 0)
         if len(slides) < SHORTEST:
             continue
@@ -112,17 +114,17 @@ def pushes_in_time(folder: Path | None = None) -> list[Followed]:
         path = path + rotate(gap * edges.inward[edge], start[2])
         signal = Signal.sampled(rows["t_s"].to_numpy()[kept], path, "linear")
         name = f"{run} {number:g}"
-        found.append(Followed("in time", name, patch, WOODEN, MU_WOODEN, signal, start, pose[last]))
+        found.append(ReplayedPush("in time", name, patch, WOODEN, MU_WOODEN, signal, start, pose[last]))
     return found
 
 
-def errors(followed: Sequence[Followed], make: Callable[[ContactPatch], LimitSurface]) -> np.ndarray:
+def errors(pushes_replayed: Sequence[ReplayedPush], make: Callable[[ContactPatch], LimitSurface]) -> np.ndarray:
     """Distances [m] and angles [rad] between the ends with a limit surface and the measured ones `[N, 2]`."""
     made: dict[int, LimitSurface] = {}
-    for each in followed:
+    for each in pushes_replayed:
         if id(each.patch) not in made:
             made[id(each.patch)] = make(each.patch)
-    return np.array([each.error(each.by(lambda patch: made[id(patch)]).end) for each in followed])
+    return np.array([each.error(each.by(lambda patch: made[id(patch)]).end) for each in pushes_replayed])
 
 
 def _slider(outline: np.ndarray) -> Slider:

@@ -20,7 +20,7 @@ import numpy as np
 
 from planarfriction.limit_surface import LimitSurfaceExact
 from planarfriction.patch import ContactPatch
-from planarfriction_studies.measured import fitting, glide
+from planarfriction_studies.measured import fitting, slide_integrator
 from planarfriction_studies.measured.models import quick
 from planarfriction_studies.measured.questions import FIRST_POSES, Case, SlideQuestion
 
@@ -30,7 +30,7 @@ LANDED = 3.4e-3
 SEEN = np.array([2e-5, 2e-5, 5e-4])
 """Noise of the camera [m, m, rad]: what a smooth curve leaves over."""
 
-CHANGES = np.array([*glide.CHANGES, 0.02, 1e-3, 0.05])
+CHANGES = np.array([*slide_integrator.CHANGES, 0.02, 1e-3, 0.05])
 """Changes of twist, a, c and b that derivatives are taken over."""
 
 BEGIN = np.array([0.3, 0.02, 8.0, 1.0, 0.05, 4e-3, 0.2])
@@ -49,7 +49,7 @@ INSIDE = 0.95
 """Share of ends that a region is to hold."""
 
 
-def friction(patch: ContactPatch, mu_0: float, mu_1: float, share: float) -> glide.Friction:
+def friction(patch: ContactPatch, mu_0: float, mu_1: float, share: float) -> slide_integrator.Friction:
     """Friction of slides with numbers of their own `(a, c_x, c_y, b)`, in the axes of the body, or with none.
 
     `share` is the contact radius over that of the patch.
@@ -86,14 +86,14 @@ class SpeedModel:
         """Poses of slides."""
         if questions[0].task != "slides":
             raise NotImplementedError
-        return glide.slides(friction(questions[0].patch, self.mu_0, self.mu_1, self.share), questions)
+        return slide_integrator.slides(friction(questions[0].patch, self.mu_0, self.mu_1, self.share), questions)
 
     def fit(self, cases: Sequence[Case]) -> SpeedModel:
         """With the three numbers of the training slides."""
         patch = cases[0].question.patch
         if cases[0].question.task != "slides":
             raise NotImplementedError
-        predict = lambda values, asked: glide.slides(friction(patch, *values), asked)  # noqa: E731
+        predict = lambda values, asked: slide_integrator.slides(friction(patch, *values), asked)  # noqa: E731
         found = fitting.fit_slides(predict, [self.mu_0, self.mu_1, self.share], cases, patch.contact_radius())
         return SpeedModel(*found.tolist())
 
@@ -139,7 +139,9 @@ class TossModel:
             raise NotImplementedError
         linear = self.linear(questions)
         found = linear.start + estimate(np.array(self.spreads), linear, questions)[0]
-        poses = glide.glide(self._friction(questions), _state(found, _ways(questions)), linear.time, _radius(questions))
+        poses = slide_integrator.integrate(
+            self._friction(questions), _state(found, _ways(questions)), linear.time, _radius(questions)
+        )
         return [poses[i, : len(each.time)] for i, each in enumerate(questions)]
 
     def fit(self, cases: Sequence[Case]) -> TossModel:
@@ -231,18 +233,18 @@ class TossModel:
     def linear(self, questions: Sequence[SlideQuestion]) -> Linear:
         """About the start that fits the first poses best when no toss has friction of its own."""
         law, ways = self._friction(questions), _ways(questions)
-        begun = glide.starts(law, questions, _radius(questions))
+        begun = slide_integrator.starts(law, questions, _radius(questions))
         start = np.concatenate([begun, np.zeros((len(begun), 3))], axis=1)
         moved = [start, *(start + change * row for change, row in zip(CHANGES, np.eye(9)[3:], strict=True))]
         time = max((each.time for each in questions), key=len)
         states = np.concatenate([_state(each, ways) for each in moved])
-        poses = glide.glide(law, states, time, _radius(questions)).reshape(7, len(start), len(time), 3)
+        poses = slide_integrator.integrate(law, states, time, _radius(questions)).reshape(7, len(start), len(time), 3)
         slopes = np.zeros((*poses.shape[1:], 9))
         slopes[..., [0, 1, 2], [0, 1, 2]] = 1.0
         slopes[..., 3:] = np.moveaxis((poses[1:] - poses[0]) / CHANGES[:, None, None, None], 0, -1)
         return Linear(start, poses[0], slopes, time)
 
-    def _friction(self, questions: Sequence[SlideQuestion]) -> glide.Friction:
+    def _friction(self, questions: Sequence[SlideQuestion]) -> slide_integrator.Friction:
         return friction(questions[0].patch, *dataclasses.astuple(self.common))
 
 
@@ -252,7 +254,7 @@ def _radius(questions: Sequence[SlideQuestion]) -> float:
 
 def _ways(questions: Sequence[SlideQuestion]) -> np.ndarray:
     """Unit vectors `[K, 2]` along the first velocities, in the axes of the bodies."""
-    begun = glide.parabolas(questions)
+    begun = slide_integrator.parabolas(questions)
     cos, sin = np.cos(begun[:, 2]), np.sin(begun[:, 2])
     way = np.stack([cos * begun[:, 3] + sin * begun[:, 4], cos * begun[:, 4] - sin * begun[:, 3]], axis=1)
     return way / np.linalg.norm(way, axis=1)[:, None]

@@ -28,7 +28,7 @@ Friction = Callable[[np.ndarray, np.ndarray], np.ndarray]
 The second argument are numbers of each slide's own, `[K, P]`, the columns of its start behind pose and twist."""
 
 
-def glide(friction: Friction, starts: np.ndarray, time: np.ndarray, radius_squared: float) -> np.ndarray:
+def integrate(friction: Friction, starts: np.ndarray, time: np.ndarray, radius_squared: float) -> np.ndarray:
     """Poses `[K, T, 3]` at `time` `[T]` from 0 of slides from `starts` `[K, 6 + P]`: pose, twist, numbers of their own.
 
     `radius_squared` is the inertia over the mass [m^2]. The fourth order method of Runge and Kutta; a body whose last
@@ -99,7 +99,7 @@ def starts(friction: Friction, questions: Sequence[SlideQuestion], radius_square
     first, time = np.array([each.first for each in questions]), questions[0].time[:FIRST_POSES]
     for _ in range(TURNS):
         tried = np.concatenate([found, *(found + change for change in spread)])
-        poses = glide(friction, tried, time, radius_squared).reshape(4, count, FIRST_POSES, 3)
+        poses = integrate(friction, tried, time, radius_squared).reshape(4, count, FIRST_POSES, 3)
         slopes = np.zeros((count, FIRST_POSES, 3, 6))
         slopes[..., [0, 1, 2], [0, 1, 2]] = 1.0
         slopes[..., 3:] = np.moveaxis((poses[1:] - poses[0]) / CHANGES[:, None, None, None], 0, -1)
@@ -118,5 +118,5 @@ def slides(friction: Friction, questions: Sequence[SlideQuestion]) -> list[np.nd
     radius_squared = first.inertia / first.mass
     begun = starts(friction, questions, radius_squared)
     longest = max((each.time for each in questions), key=len)
-    poses = glide(friction, begun, longest, radius_squared)
+    poses = integrate(friction, begun, longest, radius_squared)
     return [poses[i, : len(each.time)] for i, each in enumerate(questions)]
