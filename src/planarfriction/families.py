@@ -124,6 +124,16 @@ MODELS = Family(
     },
 )
 
+PRESSURES = Family(
+    "pressure law",
+    {
+        "uniform": ("the same everywhere", "patch.pressure:Uniform"),
+        "linear_gradient": ("linear over the patch", "patch.pressure:LinearGradient"),
+        "soft_finger": ("a soft fingertip that grows with the load", "patch.pressure:SoftFinger"),
+        "pressure_maps": ("maps measured at several loads", "patch.pressure_maps:PressureMaps"),
+    },
+)
+
 SHAPES = Family(
     "shape",
     {

@@ -20,8 +20,8 @@ from planarfriction.plots.animation import frame_times
 from planarfriction.plots.film import Film
 from planarfriction.plots.limit_surface import scaled_samples
 from planarfriction.plots.panels import CellPanel, SurfacePanel
-from planarfriction.plots.slip import bristles_of, slip_field
 from planarfriction.plots.track import track_of
+from planarfriction.scenes.slip import bristles_of, slip_field
 from tests.support import synthetic
 from tests.support.pictures import faults
 

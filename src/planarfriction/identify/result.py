@@ -18,6 +18,7 @@ from planarfriction.identify.choice import ModelScore
 from planarfriction.identify.nuisance import Nuisance
 from planarfriction.identify.parameters import ALL
 from planarfriction.laws import LuGre
+from planarfriction.pictures import picture
 
 TWO_SIDED = 1.96
 """Standard errors on either side of the estimate that hold 95 % of a normal distribution."""
@@ -239,9 +240,7 @@ class Identification(ByValue):
 
     def plot(self) -> Any:
         """Draw measured and fitted channels with their residuals; returns a matplotlib Figure."""
-        from planarfriction.plots.identification import plot_identification
-
-        return plot_identification(self)
+        return picture("identification", self)
 
 
 WIDTH = 80

@@ -21,6 +21,7 @@ from planarfriction.limit_surface.least_dissipation import across, descend, tabl
 from planarfriction.limit_surface.loops.twists import Table, table_twists
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.metric import refuse_anisotropy, refuse_cell_metrics, symmetric_root
+from planarfriction.pictures import picture
 
 if TYPE_CHECKING:
     from planarfriction.limit_surface.comparison import SurfaceComparison
@@ -103,9 +104,7 @@ class LimitSurface(ByValue):
         return f"{type(self).__name__}({', '.join(parts)})"
 
     def _repr_html_(self) -> str:
-        from planarfriction.plots.notebook import surface_html
-
-        return surface_html(self)
+        return picture("limit surface in a notebook", self)
 
     def at(self, normal_force: float) -> LimitSurface:
         """The same kind of surface for the shape at another load; returns itself if the shape does not depend on the

@@ -18,6 +18,7 @@ from planarfriction.patch.moments import Moments
 from planarfriction.patch.pressure import Uniform, as_law, check_not_negative, check_pressure, evaluated, pressure_array
 from planarfriction.patch.pressure_maps import read_maps
 from planarfriction.patch.size import MOST_CELLS, check_cells, warn_of_the_unit
+from planarfriction.pictures import picture
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -319,9 +320,7 @@ class ContactPatch(Moments):
 
     def plot(self, *, normal_force: float | None = None) -> Any:
         """Draw the pressure map with its centre of pressure; returns a matplotlib Figure."""
-        from planarfriction import plots
-
-        return plots.plot_patch(self, normal_force=normal_force)
+        return picture("patch", self, normal_force=normal_force)
 
     def __repr__(self) -> str:
         grid = "" if self.grid is None else f" of {self.grid.columns} x {self.grid.rows}"
@@ -329,9 +328,7 @@ class ContactPatch(Moments):
         return f"ContactPatch({self.name!r}, {self.cells} cells{grid}, {law} pressure)"
 
     def _repr_html_(self) -> str:
-        from planarfriction.plots.notebook import patch_html
-
-        return patch_html(self)
+        return picture("patch in a notebook", self)
 
     def _shares(self, relative: np.ndarray) -> np.ndarray:
         """Weights `[..., N]` from relative pressures of the same shape, scaled first so that no sum can overflow."""

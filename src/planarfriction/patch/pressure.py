@@ -14,6 +14,7 @@ from planarfriction import formulas, validation
 from planarfriction.described import described
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError, shown
+from planarfriction.families import PRESSURES
 
 SAME_DISTANCE = 1e-9
 """Relative difference below which two cells are equally far from the origin (rounding: 1e-16, cells: 1e-2)."""
@@ -61,12 +62,9 @@ class Pressure:
 
         Raises InvalidValueError if this is not such a table, or the law does not exist.
         """
-        from planarfriction.patch.pressure_maps import PressureMaps
-
-        laws = {kind.law: kind for kind in (Uniform, LinearGradient, SoftFinger, PressureMaps)}
         if not isinstance(data, Mapping) or "law" not in data:
-            raise InvalidValueError("pressure", f"be a table with law = {' or '.join(laws)}", data)
-        kind = laws[validation.choice("pressure law", data["law"], laws)]
+            raise InvalidValueError("pressure", f"be a table with law = {' or '.join(PRESSURES)}", data)
+        kind = PRESSURES.choose(data["law"])
         given = {name: value for name, value in data.items() if name != "law"}
         fields = dataclasses.fields(kind)
         required = [field.name for field in fields if field.default is dataclasses.MISSING]

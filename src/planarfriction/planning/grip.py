@@ -12,6 +12,7 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
+from planarfriction.pictures import picture
 from planarfriction.planning.holding import holding_load
 from planarfriction.planning.motions import ROUGH, Aim, Grips, load_on
 from planarfriction.planning.report import GripReport, report_of
@@ -55,9 +56,7 @@ class GripPlan(ByValue):
     def plot(self) -> Any:
         """Draw the profile and the motion, with the scene's friction and with other values; returns a matplotlib
         Figure."""
-        from planarfriction.plots.planning import plot_grip
-
-        return plot_grip(self)
+        return picture("grip", self)
 
 
 def plan_grip(

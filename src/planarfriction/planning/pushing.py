@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from planarfriction import validation
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
+from planarfriction.pictures import picture
 from planarfriction.planning.contact_modes import LEFT, RIGHT, STICK, Place, motion_at
 from planarfriction.planning.slider import Pusher, Slider
 from planarfriction.planning.touch import Contact, Scenery, flush_after, place_of, touch_after
@@ -62,9 +63,7 @@ class Push(ByValue):
 
     def plot(self) -> Any:
         """Draw the slider at instants of the push, with the path of the pusher; returns a matplotlib Figure."""
-        from planarfriction.plots.pushing import plot_push
-
-        return plot_push(self)
+        return picture("push", self)
 
 
 def push(

@@ -10,7 +10,7 @@ import numpy as np
 
 from planarfriction import geometry
 from planarfriction.plots.histories import KICK
-from planarfriction.plots.slip import SlipField, bristles_of, slip_field
+from planarfriction.scenes.slip import SlipField, bristles_of, slip_field
 
 if TYPE_CHECKING:
     from planarfriction.models import DistributedModel

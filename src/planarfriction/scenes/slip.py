@@ -1,4 +1,4 @@
-"""When contacts slip: the share of their motion that their bristles do not take up."""
+"""Slip of contacts: the share of their motion that their bristles do not take up, as events and cell by cell."""
 
 from __future__ import annotations
 
@@ -6,13 +6,19 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from planarfriction import formulas
 from planarfriction.errors import FileError, InvalidValueError
+from planarfriction.families import MODELS
 
 if TYPE_CHECKING:
+    from planarfriction.models import DistributedModel
     from planarfriction.scenes.solution import Solution
 
 SLIPS = 0.5
-"""Share of the motion above which a contact counts as slipping [-]."""
+"""Share of the motion, left over by the bristles, above which a contact or a cell counts as slipping [-]."""
+
+AT_REST = 1e-3
+"""Share of the largest deflection: a cell that moves less than that between two frames counts as resting [-]."""
 
 
 class SlipEvent(NamedTuple):
@@ -21,17 +27,26 @@ class SlipEvent(NamedTuple):
     contact: str
     """Name of the contact."""
     onset: float
-    """When it begins to slip [s]; 0 if it slips from the start."""
+    """Time at which it begins to slip [s]; 0 if it slips from the start."""
     end: float
-    """When it sticks again [s]; the end of the run if it does not."""
+    """Time at which it sticks again [s]; the end of the run if it does not."""
     path: float
     """Distance by which its centre of pressure slides [m]."""
     angle: float
     """Angle by which it turns, counter-clockwise [rad]."""
 
 
+class SlipField(NamedTuple):
+    """Deflection and slip of the cells of a contact at F frames."""
+
+    bent: np.ndarray
+    """Deflection of each bristle over its largest, `[F, N]` [-]."""
+    slips: np.ndarray
+    """True where a cell slips, bool `[F, N]`."""
+
+
 def slip_events(solution: Solution) -> tuple[SlipEvent, ...]:
-    """Slips of all contacts of a solution, one contact after another, each in the order of time."""
+    """Return the slips of all contacts of a solution, contact by contact, each in the order of time."""
     if solution.scene is None:
         raise FileError("the file has no scene, which slip events need")
     found = []
@@ -61,9 +76,9 @@ def _events(solution: Solution, contact: Any) -> list[SlipEvent]:
 
 
 def slip_fraction(model: Any, states: np.ndarray, twists: np.ndarray, loads: np.ndarray) -> np.ndarray:
-    """Share `|u - zdot|/|u|` of the motion u of a contact that its bristles do not take up `[T]`, in [0, 1].
+    """Compute the share `|u - zdot|/|u|` of the motion u of a contact that its bristles do not take up `[T]`.
 
-    In the mean square over the bristles. 0 where it does not move; 1 without load.
+    The norms are root mean squares over the bristles. The share lies in [0, 1]: 0 without motion, 1 without load.
     """
     loaded = loads > 0.0
     share = np.where(loaded, 0.0, 1.0)
@@ -79,7 +94,7 @@ def slip_fraction(model: Any, states: np.ndarray, twists: np.ndarray, loads: np.
 
 
 def _weights(model: Any, loads: np.ndarray) -> np.ndarray:
-    """What each state counts: cells by their load, others over their natural scale."""
+    """Return the weight of each state in the mean square: that of its cell, or one over the square of its scale."""
     shape, cells = tuple(model.state_shape), len(model.patch.positions)
     if shape == (2, cells):
         weights = np.array([model.patch.weights(load) for load in loads]) if model.patch.depends_on_load else (
@@ -94,7 +109,7 @@ def _weights(model: Any, loads: np.ndarray) -> np.ndarray:
 
 
 def centres(patch: Any, loads: np.ndarray) -> np.ndarray:
-    """Centre of pressure at each load `[T, 2]` [m]; that at the largest where there is none."""
+    """Return the centre of pressure at each load `[T, 2]` [m]; without load, that at the largest load."""
     if not patch.depends_on_load:
         return np.broadcast_to(patch.centre_of_pressure(), (len(loads), 2))
     known = {load: patch.centre_of_pressure(load) for load in np.unique(loads[loads > 0.0]).tolist()}
@@ -103,7 +118,7 @@ def centres(patch: Any, loads: np.ndarray) -> np.ndarray:
 
 
 def reach(patch: Any) -> float:
-    """Largest distance of a cell from the middle of the patch [m]."""
+    """Return the largest distance of a cell from the middle of the patch [m]."""
     return float(np.hypot(*(patch.positions - patch.positions.mean(axis=0)).T).max())
 
 
@@ -112,10 +127,63 @@ def _integral(time: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def _stretches(time: np.ndarray, above: np.ndarray) -> list[tuple[float, float]]:
-    """Where samples joined by straight lines are above zero, [onset, end] of each stretch."""
+    """Return onset and end of each stretch of time in which samples, joined by straight lines, are above zero."""
     on = above > 0.0
     changes = np.flatnonzero(on[1:] != on[:-1])
     share = above[changes] / (above[changes] - above[changes + 1])
     at = (time[changes] + share * (time[changes + 1] - time[changes])).tolist()
     at = ([float(time[0])] if on[0] else []) + at + ([float(time[-1])] if on[-1] else [])
     return list(zip(at[::2], at[1::2], strict=True))
+
+
+def bristles_of(model: Any) -> DistributedModel | None:
+    """Return the distributed model of a contact's patch and law; None where they have no bristles."""
+    try:
+        return MODELS["distributed"](model.patch, model.law)
+    except InvalidValueError:
+        return None
+
+
+def slip_field(
+    bristles: DistributedModel,
+    state: np.ndarray,
+    times: np.ndarray,
+    ways: np.ndarray,
+    loads: np.ndarray,
+    frames: np.ndarray,
+    first: np.ndarray,
+) -> SlipField:
+    """Compute the slip field of a contact at `frames` (indices into `times`) from the bristles `state` `[2, N]` [m].
+
+    `ways` `[T - 1, 3]` [m, m, rad] are the displacements of the body on the contact from one of `times` `[T]` [s] to
+    the next, in the frame of the contact; `loads` are `[T]` [N]; `first` `[3]` is the first twist [m/s, m/s, rad/s]. A
+    cell displaced by `u` while its bristle goes from z_0 to z_1 slips by `u - (z_1 - z_0)`.
+    """
+    law, count, largest = bristles.law.numbers, len(bristles.patch.positions), bristles.law.largest_deflection
+    levers, lean = bristles.patch.levers(), bristles.patch.asymmetries().T
+    bent, slips = np.zeros((len(frames), count)), np.zeros((len(frames), count), dtype=bool)
+    way, slip, frame = np.zeros(count), np.zeros(count), 1
+    bent[0] = _bent(state, levers @ first, lean, law)
+    for k, (step, dt) in enumerate(zip(ways, np.diff(times), strict=True)):
+        if not dt > 0.0:
+            continue
+        before = state
+        state, _ = bristles.step(state, step / dt, max(0.5 * (loads[k] + loads[k + 1]), 0.0), dt)
+        moved = (levers @ step).T
+        length = np.hypot(*moved)
+        way += length
+        slip += np.hypot(*(moved - (state - before)))
+        if frame < len(frames) and k + 1 == frames[frame]:
+            bent[frame] = _bent(state, moved.T / dt, lean, law)
+            slips[frame] = (slip > SLIPS * way) & (way > AT_REST * largest)
+            way[:], slip[:], frame = 0.0, 0.0, frame + 1
+    if len(frames) > 1:  # what moves at first has no way behind it, and does as right after it
+        span = times[frames[1]] - times[frames[0]]
+        slips[0] = slips[1] & (np.hypot(*(levers @ first).T) * span > AT_REST * largest)
+    return SlipField(bent, slips)
+
+
+def _bent(state: np.ndarray, velocity: np.ndarray, lean: np.ndarray, law: Any) -> np.ndarray:
+    """Return the deflections of bristles `[2, N]` over their largest at the velocities `[N, 2]` of the cells, `[N]`."""
+    steady = formulas.stribeck(np, np.hypot(*velocity.T), law) / law.sigma_0
+    return np.hypot(*(state - lean * steady)) / steady

@@ -20,6 +20,7 @@ from planarfriction import validation
 from planarfriction.described import described
 from planarfriction.equality import by_parts
 from planarfriction.errors import FileError, FrictionError, InvalidValueError
+from planarfriction.pictures import picture
 from planarfriction.reading import read_bytes
 from planarfriction.scenes.movers import displacement
 from planarfriction.scenes.scene import Scene
@@ -97,9 +98,7 @@ class Solution:
         return f"Solution({name}, {self.status}: {until}, {', '.join([*end, cost])})"
 
     def _repr_html_(self) -> str:
-        from planarfriction.plots.notebook import solution_html
-
-        return solution_html(self)
+        return picture("solution in a notebook", self)
 
     @functools.cached_property
     def data(self) -> xr.Dataset:
@@ -178,9 +177,7 @@ class Solution:
         Raises FileError for a solution that was loaded from a file without its scene.
         """
         scene_of(self, "the plot")
-        from planarfriction.plots import plot_solution
-
-        return plot_solution(self)
+        return picture("solution", self)
 
     def animate(
         self,
@@ -201,9 +198,7 @@ class Solution:
         Raises FileError if the file cannot be written or the solution has no scene, InvalidValueError for a parameter
         that breaks its rule.
         """
-        from planarfriction.plots import animate_solution
-
-        return animate_solution(self, path, slow=slow, fps=fps, follow=follow, dpi=dpi, progress=progress)
+        return picture("animation", self, path, slow=slow, fps=fps, follow=follow, dpi=dpi, progress=progress)
 
     def save(self, path: str | Path) -> Path:
         """Write everything, including the scene, to the NetCDF file `path`; `Solution.load` reads it.
