@@ -31,7 +31,8 @@ NAMED = re.compile(rf"(?<![\w.])(?:{'|'.join(COMPILED)})(?:\.\w+){{1,2}}")
 
 
 def public_modules() -> list[str]:
-    return ["planarfriction", *(f"planarfriction.{name}" for name in (*planarfriction._MODULES, *OPTIONAL))]
+    modules = [name for name in planarfriction.__all__ if inspect.ismodule(getattr(planarfriction, name))]
+    return ["planarfriction", *(f"planarfriction.{name}" for name in (*modules, *OPTIONAL))]
 
 
 def public_names(module: ModuleType) -> list[str]:

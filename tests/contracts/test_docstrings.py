@@ -20,7 +20,8 @@ from planarfriction.described import HEADING
 
 FRONT_ENDS = {"torch": "torch", "jax": "jax", "adapters.mujoco": "mujoco", "adapters.mjx": "mujoco.mjx"}
 FRONT_ENDS |= {"adapters.drake": "pydrake"}
-PLAIN = [name for name in pf._MODULES if name not in ("errors", "families", "formulas")]
+MODULES = [name for name in pf.__all__ if inspect.ismodule(getattr(pf, name))]
+PLAIN = [name for name in MODULES if name not in ("errors", "families", "formulas")]
 OF_PYTHON = {"NotImplementedError", "AttributeError", "TypeError", "StopIteration", "KeyError"}
 """Raised for Python's own protocols, or by a method that a subclass has to write."""
 

@@ -1,0 +1,56 @@
+"""The public names of planarfriction and the modules behind them, each listed once: `__init__.py` reads this file."""
+
+from . import coupling as coupling
+from . import derivatives as derivatives
+from . import errors as errors
+from . import families as families
+from . import formulas as formulas
+from . import geometry as geometry
+from . import identify as identify
+from . import laws as laws
+from . import limit_surface as limit_surface
+from . import models as models
+from . import patch as patch
+from . import planning as planning
+from . import plots as plots
+from . import scenes as scenes
+from . import solvers as solvers
+from . import sweeps as sweeps
+from .coupling import HostStep as HostStep
+from .derivatives import rollout as rollout
+from .errors import FrictionError as FrictionError
+from .identify import Log as Log
+from .identify import Slide as Slide
+from .laws import Coulomb as Coulomb
+from .laws import CoulombStribeck as CoulombStribeck
+from .laws import Dahl as Dahl
+from .laws import ElastoPlastic as ElastoPlastic
+from .laws import LuGre as LuGre
+from .limit_surface import LimitSurfaceCells as LimitSurfaceCells
+from .limit_surface import LimitSurfaceEllipsoid as LimitSurfaceEllipsoid
+from .limit_surface import LimitSurfaceExact as LimitSurfaceExact
+from .limit_surface import LimitSurfaceQuartic as LimitSurfaceQuartic
+from .limit_surface import LimitSurfaceTable as LimitSurfaceTable
+from .limit_surface import LimitSurfaceTablePublished as LimitSurfaceTablePublished
+from .models import DistributedModel as DistributedModel
+from .models import ReducedModel as ReducedModel
+from .models import ReducedModelPublished as ReducedModelPublished
+from .patch import ContactPatch as ContactPatch
+from .patch import Grid as Grid
+from .patch import LinearGradient as LinearGradient
+from .patch import PressureMaps as PressureMaps
+from .patch import SoftFinger as SoftFinger
+from .patch import Uniform as Uniform
+from .patch import friction_metric as friction_metric
+from .planning import Pusher as Pusher
+from .planning import Slider as Slider
+from .scenes import Body as Body
+from .scenes import Contact as Contact
+from .scenes import Scene as Scene
+from .scenes import Signal as Signal
+from .scenes import Solution as Solution
+from .scenes import simulate as simulate
+from .sweeps import sweep as sweep
+from .warm import warm_up as warm_up
+
+__version__: str
