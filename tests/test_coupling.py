@@ -52,7 +52,7 @@ def _called(function, record, z, v, dt, new, out):
 @pytest.mark.parametrize("name", MODELS)
 def test_compiled_steps_and_their_slopes_are_those_of_the_model(name):
     model, generator = MODELS[name], np.random.default_rng(1)
-    steps, function = model.packed_steps([None]), address_of(model.step_function, WORDS)
+    steps, function = model.compiled.packed_steps([None]), address_of(model.compiled.step_function, WORDS)
     for _ in range(40):
         twist = generator.normal(size=3) * [1.0, 1.0, 100.0] * 10.0 ** generator.uniform(-5.0, -1.0)
         dt = 10.0 ** generator.uniform(-5.0, -2.0)
@@ -398,7 +398,7 @@ class _Uncompiled(pf.models.FrictionModel):
         (MODELS["reduced"], "models must be a list of friction models, one for each patch"),
         ([], "models must hold at least one, got none"),
         (["reduced"], "models must be friction models, one for each patch, got 'reduced'"),
-        ([_Uncompiled(DISC, LAW)], r"model must have compiled steps \(it has no step_function\)"),
+        ([_Uncompiled(DISC, LAW)], r"model must have compiled steps \(it has no machine form\)"),
     ],
 )
 def test_models_are_checked(models, message):

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import validation
+from planarfriction.compiled.packed import PackedSteps
 from planarfriction.compiler.threads import share
 from planarfriction.equality import ByValue, by_parts
 from planarfriction.errors import InvalidValueError
@@ -29,7 +30,6 @@ from planarfriction.kernels.pointers import address_of, place_of
 from planarfriction.kernels.records import row_of
 from planarfriction.kernels.step_slopes import WORDS
 from planarfriction.models import FrictionModel
-from planarfriction.models.base import PackedSteps
 
 TOLERANCE = 1e-9
 """Default error of the twists [m/s]: a bristle is off by a thousandth of its largest deflection after a second."""
@@ -238,7 +238,7 @@ class CoupledPatches(ByValue):
             chosen = np.flatnonzero((loads[:, p] > 0.0) & (loads[:, p] <= LARGEST))
             records[:, pieces] = 0
             if chosen.size:
-                steps = self.models[p].packed_steps(loads[chosen, p])
+                steps = self.models[p].compiled.packed_steps(loads[chosen, p])
                 records[chosen, pieces], shares[chosen, pieces] = _addresses(steps), steps.shares
                 kept.append(steps)
         return kept
@@ -298,18 +298,18 @@ class _Packed(NamedTuple):
 
 
 def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _Packed:
-    counts = [model._pieces for model in models]
+    counts = [model.compiled.parts for model in models]
     ends = np.cumsum([0, *counts]).tolist()
     pieces = [slice(*each) for each in itertools.pairwise(ends)]
     functions, owners, firsts = np.zeros((3, ends[-1]), np.int64)
     records, shares, known, following = np.zeros(ends[-1], np.int64), np.zeros(ends[-1]), {}, []
     for p, (model, own) in enumerate(zip(models, pieces, strict=True)):
-        functions[own], owners[own] = address_of(model.step_function, WORDS), p
+        functions[own], owners[own] = address_of(model.compiled.step_function, WORDS), p
         firsts[own] = np.linspace(bounds[p], bounds[p + 1], counts[p], endpoint=False)
         if model.depends_on_load:
             following.append((p, own))
             continue
-        steps = known.setdefault(id(model), None) or model.packed_steps([None])
+        steps = known.setdefault(id(model), None) or model.compiled.packed_steps([None])
         known[id(model)] = steps
         records[own], shares[own] = _addresses(steps)[0], steps.shares[0]
     # all cells, whatever load they carry: a lever arm that does not follow the load

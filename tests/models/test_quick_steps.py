@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.models import quick_steps
 
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=0.9)
 DISC = pf.ContactPatch.disc(radius=0.01, cells=9)
@@ -31,7 +30,7 @@ def test_batches_step_as_their_members_do(name, load):
     model = MODELS[name]
     states = _states(model)
     new, wrenches = model.step(states, TWISTS, load, 1e-3)
-    assert quick_steps.step_of_many(model._quick, states, TWISTS, load, 1e-3) is not None
+    assert model.compiled.step_batch(states, TWISTS, load, 1e-3) is not None
     for b in range(4):
         own = float(np.broadcast_to(load, 4)[b])
         one, wrench = model.step(states[b], TWISTS[b].tolist(), own, 1e-3)
@@ -46,7 +45,7 @@ def test_derivatives_are_differences_of_steps(name, load):
     model = MODELS[name]
     state, twist, dt = _states(model)[0], TWISTS[0], 1e-4
     found = model.step_jacobians(state, twist, load, dt)
-    assert quick_steps.jacobians_of_one(model._quick, state, twist, load, dt) is not None
+    assert model.compiled.jacobians_one(state, twist, load, dt) is not None
 
     def change(by_state, by_twist):
         ends = [model.step(state + sign * by_state, twist + sign * by_twist, load, dt) for sign in (1.0, -1.0)]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.models import base
+from planarfriction.compiled import packed as limits
 from planarfriction.scenes import packing
 from planarfriction.scenes.packing import SegmentBatches, Segments
 
@@ -74,7 +74,7 @@ def test_windows_leave_no_trace(monkeypatch, name, of):
 @pytest.mark.parametrize("name", MODELS)
 def test_windows_end_where_shapes_take_too_much_room_or_time(monkeypatch, name, limit):
     whole = recorded(free(MODELS[name]()))
-    monkeypatch.setattr(base, limit, 0.0)
+    monkeypatch.setattr(limits, limit, 0.0)
     scene = free(MODELS[name]())
     if limit == "MAX_PACK_BYTES":
         sizes = [len(window.motion.row) for window in SegmentBatches(scene, 0.01)]
@@ -86,7 +86,7 @@ def test_windows_end_where_shapes_take_too_much_room_or_time(monkeypatch, name, 
 @pytest.mark.parametrize("name", MODELS)
 def test_one_window_holds_all_shapes_whatever_they_take(monkeypatch, name):
     for limit in ("MAX_PACK_BYTES", "MAX_PACK_SECONDS"):
-        monkeypatch.setattr(base, limit, 0.0)
+        monkeypatch.setattr(limits, limit, 0.0)
     packed = packing.pack(free(MODELS[name]()), 0.02)
     assert packed.system.motion.breaks[-1] == 0.02 and len(packed.system.motion.row) > 5
 
@@ -177,7 +177,7 @@ def test_interruption_in_a_later_window_keeps_what_is_done(monkeypatch):
 def test_interruption_while_shapes_are_built_keeps_what_is_done(monkeypatch):
     monkeypatch.setattr(packing, "WINDOW", 3)
     model = MODELS["published"]()
-    build, calls = type(model)._shape_at, []
+    build, calls = type(model.shapes)._built, []
 
     def slow(self, load):
         calls.append(load)
@@ -185,7 +185,7 @@ def test_interruption_while_shapes_are_built_keeps_what_is_done(monkeypatch):
             raise KeyboardInterrupt
         return build(self, load)
 
-    monkeypatch.setattr(type(model), "_shape_at", slow)
+    monkeypatch.setattr(type(model.shapes), "_built", slow)
     with pytest.raises(pf.errors.SimulationInterrupted) as caught:
         pf.simulate(free(model))
     assert 0.003 < float(caught.value.solution.data.time[-1]) < 0.012
@@ -207,8 +207,8 @@ def test_memory_does_not_grow_with_the_time_simulated(monkeypatch, name):
     """With room for the shapes of 20 pieces, runs of 50 and of 200 pieces take the same."""
     size = {"distributed": 8 * 69, "published": 5 * 17 * 4 * 8}[name]
     peak(0.005, name)  # compiles, which takes memory too
-    monkeypatch.setattr(base, "MAX_PACK_BYTES", 20.0 * size)
-    monkeypatch.setattr("planarfriction.models.three_states.REMEMBERED", 4)
+    monkeypatch.setattr(limits, "MAX_PACK_BYTES", 20.0 * size)
+    monkeypatch.setattr("planarfriction.models.published_shapes.REMEMBERED", 4)
     assert peak(0.2, name) < 1.2 * peak(0.05, name)
 
 

@@ -14,7 +14,7 @@ import planarfriction as pf
 from planarfriction import derivatives, scenes
 from planarfriction.cli import main
 from planarfriction.cli.app import complete_parts
-from planarfriction.models.rates import rates
+from planarfriction.compiled.rates import rates
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch, SoftFinger
 from planarfriction.patch.parts import part_of
 from planarfriction.scenes import Scene, simulate

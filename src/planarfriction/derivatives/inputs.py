@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.compiled.shapes_by_load import ShapesByLoad, places_of
 from planarfriction.compiler import threads
 from planarfriction.derivatives.parameters import Packed, pack
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels.law import LAW
 from planarfriction.kernels.rollouts import Inputs
-from planarfriction.models.shapes_by_load import ShapesByLoad, places_of
 
 _WORTH_A_THREAD = 20_000
 """Steps [-] below which starting a thread costs more than it saves."""

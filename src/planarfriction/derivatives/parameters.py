@@ -8,15 +8,15 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.compiled.shapes_by_load import ShapesByLoad
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.geometry import transformed
 from planarfriction.kernels import published_rollout, published_step, reduced_loads, reduced_rollout, reduced_step
 from planarfriction.models import ReducedModel, ReducedModelPublished
+from planarfriction.models.published_shapes import PublishedShape, axes_of
 from planarfriction.models.reduced_arrays import MapSizes, starts_of
 from planarfriction.models.reduced_map import ReducedShape
-from planarfriction.models.reduced_published import PublishedShape, axes_of
-from planarfriction.models.shapes_by_load import ShapesByLoad
 
 PARAMETERS = (
     "sigma_0",
@@ -84,7 +84,7 @@ class Packed(NamedTuple):
     axes: np.ndarray | None = None
     """Symmetric `[3, 3]`, or None: twists go in through it, wrenches come out."""
     at_loads: Callable[[np.ndarray, bool], ShapesByLoad] | None = None
-    """Of a model whose shape follows the load: all parts at given loads (see `ThreeStateModel._at_loads`)."""
+    """Of a model whose shape follows the load: all parts at given loads (see `CompiledThreeStates.at_loads`)."""
 
     def turned(self, vectors: np.ndarray) -> np.ndarray:
         """Twists into the axes of the compiled loops or wrenches out of them, `[..., 3]`."""
@@ -170,7 +170,9 @@ def _packed(model: Any) -> tuple[Packed, ...]:
     if not model.depends_on_load:
         return tuple(pack_shape(law, shape)._replace(share=share) for share, shape in model.parts_at(1.0))
     row = np.array([*law, *np.zeros(len(reduced_step.NAMES) - len(law))])
-    part = Packed(row, np.zeros(3, dtype=int), np.zeros(0, dtype=np.float32), REDUCED_BY_LOAD, at_loads=model._at_loads)
+    part = Packed(
+        row, np.zeros(3, dtype=int), np.zeros(0, dtype=np.float32), REDUCED_BY_LOAD, at_loads=model.compiled.at_loads
+    )
     return (part,) * model.parts
 
 

@@ -76,7 +76,7 @@ class ReducedModelPublished(FrictionModel):
     def __init__(self, patch: ContactPatch, law: FrictionLaw, surface: LimitSurface | None = None) -> None:
         super().__init__(patch, law)
         when = "keep" if surface is not None else "rebuild"
-        shape = models.ReducedModelPublished(patch, law, surface, on_load_change=when)._reference  # pyright: ignore
+        shape = models.ReducedModelPublished(patch, law, surface, on_load_change=when).shapes.reference  # pyright: ignore
         kind, size, data = shape.surface.numbers
         centre_x, centre_y = shape.centre_of_pressure
         values = {

@@ -1,7 +1,8 @@
 """Friction models of a contact patch: parameters, and pure functions of (state, twist, load)."""
 
+from planarfriction.compiled import PackedModel, StepJacobians
 from planarfriction.families import MODELS
-from planarfriction.models.base import FrictionModel, ModelJacobians, PackedModel, StepJacobians
+from planarfriction.models.base import FrictionModel, ModelJacobians
 from planarfriction.models.distributed import DistributedModel
 from planarfriction.models.reduced import ReducedModel
 from planarfriction.models.reduced_published import ReducedModelPublished

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import validation
+from planarfriction.compiled.base import CompiledModel, StepJacobians
+from planarfriction.compiled.packed import PackedModel
 from planarfriction.equality import ByValue, by_parts, unusual
 from planarfriction.errors import InvalidValueError
 from planarfriction.laws import FrictionLaw
@@ -35,79 +37,6 @@ class ModelJacobians(NamedTuple):
     """d wrench / d twist at a held state, `[..., 3, 3]`."""
     wrench_load: np.ndarray
     """d wrench / d normal_force of a fixed shape, `[..., 3]`."""
-
-
-@by_parts
-class StepJacobians(NamedTuple):
-    """Derivatives of the results of `step`: the new state, and the wrench at the end of the step.
-
-    The shape of the patch is held fixed. Without load a step resets its bristles: all derivatives are zero except
-    `wrench_load`, which is the wrench per unit load in the limit of a small load.
-    """
-
-    state_state: np.ndarray
-    """d new state / d state: distributed `[..., 2, 2, N]` (cell by cell), reduced `[..., 3, 3]`, of P parts
-    `[..., P, 3, 3]` (part by part)."""
-    state_twist: np.ndarray
-    """d new state / d twist: distributed `[..., 2, N, 3]`, reduced `[..., 3, 3]`, of P parts `[..., P, 3, 3]`."""
-    wrench_state: np.ndarray
-    """d wrench / d state: distributed `[..., 3, 2, N]`, reduced `[..., 3, 3]`, of P parts `[..., 3, P, 3]`."""
-    wrench_twist: np.ndarray
-    """d wrench / d twist, `[..., 3, 3]`; an implicit simulator adds this, times `dt`, to its mass matrix."""
-    wrench_load: np.ndarray
-    """d wrench / d normal_force, `[..., 3]`."""
-
-
-MAX_PACK_BYTES = 64e6
-"""Bytes of shapes that a model packs at a time, if that is more than one shape."""
-
-MAX_PACK_SECONDS = 0.25
-"""Time [s] for which a model builds the shapes that it packs at a time, if that is more than one shape."""
-
-
-VELOCITY_SCALE = 0.1
-"""Natural scale of the velocity of a body on a patch, as a share of v_s [-] (see `PackedModel`)."""
-
-
-@by_parts
-class PackedModel(NamedTuple):
-    """A model at R loads, in the form that the compiled solver reads."""
-
-    functions: Any
-    """Its `kernels.contacts.ModelFunctions`."""
-    records: np.ndarray
-    """Data of the contact for these functions, a row of words for each load, `[R, words]` (`kernels.records`)."""
-    states: int
-    """Number of bristle states of a contact."""
-    workspace: int
-    """Number of values that a linearisation needs."""
-    state_scale: np.ndarray
-    """Natural scale of each state, `[states]`: its value at full deflection."""
-    radius: float
-    """Lever arm [m] that turns the spin of the patch into a speed."""
-    keepalive: tuple[np.ndarray, ...]
-    """Arrays whose addresses are in the records; the caller of the functions must keep them alive."""
-    cells: np.ndarray | None = None
-    """Which cells of the model have bristles here, bool `[N]`, where states are those of cells."""
-    velocity_scale: float = VELOCITY_SCALE
-    """Natural scale of the body's velocity, as a share of v_s [-].
-
-    A body that is about to slip, or has just stopped, creeps at 1e-4 to 1e-2 of v_s, and friction depends on the
-    direction of its twist however slow it is. If errors were measured against v_s itself, that direction would be
-    noise, and a patch that just holds could give way, or the other way round.
-    """
-
-
-@by_parts
-class PackedSteps(NamedTuple):
-    """A model at R loads, in the form that `coupling` reads, in P parts that share the twist and the load."""
-
-    records: np.ndarray
-    """Data of each part for the model's function of `kernels.step_slopes`, `[R, P, words]`."""
-    shares: np.ndarray
-    """Share of the load that each part carries, `[R, P]`."""
-    keepalive: tuple[np.ndarray, ...]
-    """As in `PackedModel`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,10 +63,6 @@ class FrictionModel(ByValue):
         validation.instance("patch", self.patch, ContactPatch, "a ContactPatch")
         if not isinstance(self.law, FrictionLaw):
             raise InvalidValueError("law", "be a friction law of bristles, such as LuGre", self.law)
-
-    def __getstate__(self) -> dict[str, Any]:
-        """What a copy or another process gets, at one instant: another thread may be about to build something."""
-        return dict(self.__dict__)
 
     def __repr__(self) -> str:
         parts = [f"{self.patch.name!r} of {self.patch.cells} cells", _named(self.law)]
@@ -172,42 +97,88 @@ class FrictionModel(ByValue):
     def _state_of(self, deflections: np.ndarray, load: float) -> np.ndarray:
         raise InvalidValueError("model", "support a start under load (it has no _state_of)", type(self).__name__)
 
-    def packed(self, loads: Sequence[float | None], between: tuple[float, float] | None = None) -> PackedModel:
-        """The model at distinct `loads` [N] for the compiled solver; `[None]` if the patch does not depend on the load.
+    # ------------------------------------------------------------------ equations
 
-        A model needs this to be simulated in a scene; the solver calls its functions by address. A patch that depends
-        on the load is packed during the run, in several calls: `between` gives the lowest and the highest load of the
-        whole run, which determine the bristles and the natural scales. As many of the first of `loads` are packed as
-        `MAX_PACK_BYTES` and `MAX_PACK_SECONDS` allow, so there may be fewer records than loads, but at least one.
-        Without `between`, these are all loads of the run, and each has its record.
+    def rate(self, state: Any, twist: Any, normal_force: Any) -> np.ndarray:
+        """Return the rates of the state, shape `[..., *state_shape]`, in its units per second.
 
-        Raises InvalidValueError for a model that cannot be simulated in a scene.
+        Raises InvalidValueError as `step` does.
         """
-        rule = "support simulation in a scene (it has no packed(loads))"
-        raise InvalidValueError("model", rule, type(self).__name__)
+        return self.compiled.evaluate(*self._inputs(state, twist, normal_force))[0]
+
+    def wrench(self, state: Any, twist: Any, normal_force: Any) -> np.ndarray:
+        """Return the friction wrench on the moving body, shape `[..., 3]` [N, N, N m].
+
+        Raises InvalidValueError as `step` does.
+        """
+        state, twist, load = self._inputs(state, twist, normal_force)
+        return load[..., None] * self.compiled.evaluate(state, twist, load)[1]
+
+    def step(self, state: Any, twist: Any, normal_force: Any, dt: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Advance by `dt` [s] at a held twist; return the new state and the wrench at the end. Stable at any `dt`.
+
+        Plain LuGre is linear in z, and its step is exact. Elasto-plastic bristles use an exponential step with the mean
+        of the decay at the start and at the predicted end: second order, and limited to the largest deflection so that
+        nothing overshoots.
+
+        Raises InvalidValueError for shapes that do not fit, numbers that are not finite, and a load or time below zero.
+        """
+        compiled = self.compiled
+        return (
+            compiled.step_one(state, twist, normal_force, dt)
+            or compiled.step_batch(state, twist, normal_force, dt)
+            or compiled.step(*self._inputs(state, twist, normal_force, dt=dt))
+        )
+
+    def step_jacobians(self, state: Any, twist: Any, normal_force: Any, dt: Any) -> StepJacobians:
+        """Return the analytic derivatives of `step` (see `StepJacobians`); one-sided at kinks.
+
+        Raises InvalidValueError as `step` does.
+        """
+        done = self.compiled.jacobians_one(state, twist, normal_force, dt)
+        return done or self.compiled.step_jacobians(*self._inputs(state, twist, normal_force, dt=dt))
+
+    # ------------------------------------------------------------------ machine form
 
     @property
-    def step_function(self) -> Any:
-        """The model's function of `kernels.step_slopes`.
+    def compiled(self) -> CompiledModel:
+        """Machine form of the model, made once: fast steps, and what the solver, `coupling` and roll-outs read.
 
         Raises InvalidValueError for a model whose steps are not compiled.
         """
-        raise InvalidValueError("model", "have compiled steps (it has no step_function)", type(self).__name__)
+        raise InvalidValueError("model", "have compiled steps (it has no machine form)", type(self).__name__)
 
-    def packed_steps(self, loads: Sequence[float | None]) -> PackedSteps:
-        """The model at `loads` > 0 [N], with all of its states, for `coupling`; `[None]` if the patch ignores the
-        load."""
-        raise NotImplementedError
+    def packed(self, loads: Sequence[float | None], between: tuple[float, float] | None = None) -> PackedModel:
+        """Pack the model at distinct `loads` [N] for the compiled solver; `[None]` if the patch ignores the load.
 
-    @property
-    def _pieces(self) -> int:
-        """Parts of `packed_steps`, of as many states each."""
-        return 1
+        A model of one's own needs this to be simulated in a scene; the solver calls its functions by address. A patch
+        that depends on the load is packed during the run, in several calls: `between` gives the lowest and the highest
+        load of the whole run, which determine the bristles and the natural scales. As many of the first of `loads` are
+        packed as `MAX_PACK_BYTES` and `MAX_PACK_SECONDS` allow, so there may be fewer records than loads, but at least
+        one. Without `between`, these are all loads of the run, and each has its record.
+
+        Raises InvalidValueError for a model that cannot be simulated in a scene.
+        """
+        try:
+            compiled = self.compiled
+        except InvalidValueError:
+            rule = "support simulation in a scene (it has no packed(loads))"
+            raise InvalidValueError("model", rule, type(self).__name__) from None
+        return compiled.packed(loads, between)
 
     @property
     def depends_on_load(self) -> bool:
-        """Whether what the model knows of its patch changes with the load."""
+        """True if the shape of the patch in this model changes with the load."""
         return self.patch.depends_on_load
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy or another process gets, at one instant: another thread may be about to build something.
+
+        Addresses hold in this process alone: a copy makes its own machine form.
+        """
+        return {name: value for name, value in self.__dict__.copy().items() if name != "compiled"}
+
+    # ------------------------------------------------------------------ inputs
 
     def _inputs(self, state: ArrayLike, twist: ArrayLike, normal_force: ArrayLike, **more) -> list[np.ndarray]:
         """Check the inputs and broadcast their batch axes against each other.
@@ -245,7 +216,7 @@ class FrictionModel(ByValue):
 
 
 def _named(law: FrictionLaw) -> str:
-    """A law in few words: what it is, and how much friction there is."""
+    """Return a law in few words, with its friction coefficients."""
     numbers = law.numbers
     static = "" if numbers.mu_s == numbers.mu_c else f", mu_s={numbers.mu_s:g}"
     return f"{type(law).__name__}(mu_c={numbers.mu_c:g}{static}, ...)"

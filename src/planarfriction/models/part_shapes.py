@@ -1,56 +1,52 @@
-"""What the reduced model knows of one of its parts, at any load."""
+"""Shapes of the parts of a reduced model at any load."""
 
 from __future__ import annotations
 
+import functools
+import itertools
 import threading
 import weakref
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
-from planarfriction.equality import by_parts
-from planarfriction.kernels.contacts import calls_of
-from planarfriction.kernels.parts import FUNCTIONS, PartsContact
-from planarfriction.kernels.pointers import place_of
-from planarfriction.kernels.records import rows_of
-from planarfriction.models.base import PackedModel
+from planarfriction import validation
+from planarfriction.compiled.parts import Part
+from planarfriction.compiled.remembered import Remembered
 from planarfriction.models.load_family import LoadFamily
-from planarfriction.models.reduced_map import ReducedShape, reduced_shape
-from planarfriction.models.remembered import Remembered
+from planarfriction.models.reduced_map import ReducedShape, reduced_shape, slip_factor
 from planarfriction.patch import ContactPatch
+from planarfriction.patch.parts import part_of
 
 REMEMBERED = 64
-"""Loads whose shapes are remembered where each has a map of its own."""
+"""Number of loads whose shapes are remembered where each has a map of its own."""
+
+STEP = 1e-5
+"""Relative step of a central difference by the load: it errs by 1e-10 of the number through its third derivative, and
+by a few 1e-11 through rounding. Closer than that to a load at which a cell gets its first load it mixes both sides."""
+
+_TOGETHER = 32
+"""Number of loads whose shapes and weights are asked for at once: those of all would not fit into the memory."""
 
 _FIXED: weakref.WeakKeyDictionary[ContactPatch, dict[tuple[float, int, int], ReducedShape]] = (
     weakref.WeakKeyDictionary()
 )
-"""What models on the same patch have in common, whatever their friction, as long as the patch is in use."""
+"""Shapes that models on the same patch have in common, whatever their friction, as long as the patch is in use."""
 
 _LOCK = threading.Lock()
 
 
 def fixed_shape(patch: ContactPatch, maps: tuple[float, int, int]) -> ReducedShape:
-    """The shape of a patch that does not depend on the load, built once for all models on it that live together."""
+    """Return the shape of a patch that does not depend on the load, built once for all models on it that coexist."""
     with _LOCK:
         known = _FIXED.setdefault(patch, {})
     found = known.get(maps)
     return known.setdefault(maps, reduced_shape(patch, None, *maps)) if found is None else found
 
 
-@by_parts
-class Part(NamedTuple):
-    """A part of a contact at one load."""
-
-    share: float
-    """Of the load."""
-    shape: Any
-    """What the model knows of its cells."""
-
-
-class PartShapes:
-    """The shapes of one of `parts` parts, built where loads are asked for; any number of threads may ask.
+class OnePart:
+    """Shapes of one of `parts` parts, built where loads are asked for; any number of threads may ask.
 
     `maps` are the exponent, the segments and the speeds of its maps, `error` the largest from blending them, relative
     to the whole patch; 0 builds a map for each load.
@@ -62,49 +58,120 @@ class PartShapes:
         self._forget()
 
     def _forget(self) -> None:
-        self._family = LoadFamily(self.patch, *self._maps, self._parts * self._error, self._parts)
+        self.family = LoadFamily(self.patch, *self._maps, self._parts * self._error, self._parts)
         self._recent: Remembered[ReducedShape] = Remembered(REMEMBERED)
 
     def at(self, loads: Sequence[float | None]) -> list[ReducedShape]:
-        """Shapes at loads > 0 of the whole patch [N], which costs less than one by one."""
+        """Return shapes at loads > 0 of the whole patch [N], which costs less than one by one."""
         if self._fixed is not None:
             return [self._fixed for _ in loads]
-        return self._family.shapes(loads) if self._error > 0.0 else [self._built(load) for load in loads]  # pyright: ignore
-
-    def followed(self, loads: list[float], shapes: list[ReducedShape]) -> list[tuple[ReducedShape, float]]:
-        """See `LoadFamily.followed`."""
-        return self._family.followed(loads, shapes)
-
-    @property
-    def rungs(self) -> list[float]:
-        """Loads [N] at which maps have been built and not been forgotten, ascending."""
-        return self._family.rungs
+        return self.family.shapes(loads) if self._error > 0.0 else [self._built(load) for load in loads]  # pyright: ignore
 
     def _built(self, load: float) -> ReducedShape:
         return self._recent.get(load, lambda: reduced_shape(self.patch, load, *self._maps))
 
     def __getstate__(self) -> dict[str, Any]:
-        """What a copy gets: memories are shared by threads, not by models."""
-        return {name: value for name, value in self.__dict__.items() if name not in ("_family", "_recent")}
+        """Return what a copy gets: memories are shared by threads, not by models."""
+        return {name: value for name, value in self.__dict__.items() if name not in ("family", "_recent")}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
         self.__dict__.update(state)
         self._forget()
 
 
-def together(parts: Sequence[PackedModel], shares: np.ndarray) -> PackedModel:
-    """A contact of P parts as the solver sees it, from its parts at the same R loads and their shares `[R, P]`."""
-    one, count = parts[0], len(parts)
-    calls = calls_of(one.functions, change=True)
-    records = np.stack([place_of(part.records) + part.records.strides[0] * np.arange(len(shares)) for part in parts], 1)
-    records, shares = np.ascontiguousarray(records), np.ascontiguousarray(shares)
-    row = 8 * count * np.arange(len(shares))
-    record = PartsContact(count, one.states, one.workspace, place_of(calls), 0, 0)
-    return one._replace(
-        functions=FUNCTIONS,
-        records=rows_of(record, len(shares), records=place_of(records) + row, shares=place_of(shares) + row),
-        states=count * one.states,
-        workspace=count * one.workspace,
-        state_scale=np.tile(one.state_scale, count),
-        keepalive=(calls, records, shares, *(array for part in parts for array in (part.records, *part.keepalive))),
-    )
+class ReducedShapes:
+    """Shapes of the parts of a patch at any load (see `compiled.three_states.Shapes`).
+
+    `labels` `[N]` are the parts to which cells belong; `maps` and `error` as in `OnePart`.
+    """
+
+    def __init__(self, patch: ContactPatch, labels: np.ndarray, maps: tuple[float, int, int], error: float) -> None:
+        self._patch, self.count, self.depends_on_load = patch, int(labels.max()) + 1, patch.depends_on_load
+        self._cells = [labels == k for k in range(self.count)]
+        patches = [patch] if self.count == 1 else [part_of(patch, each) for each in self._cells]
+        self._each = [OnePart(part, maps, error, self.count) for part in patches]
+
+    def at(self, loads: Sequence[float | None]) -> Iterator[tuple[Part, ...]]:
+        """Yield the parts at each load."""
+        if not self.depends_on_load:
+            return itertools.repeat(self.fixed, len(loads))
+        spans = (loads[first : first + _TOGETHER] for first in range(0, len(loads), _TOGETHER))
+        return itertools.chain.from_iterable(map(self._together, spans))
+
+    @functools.cached_property
+    def fixed(self) -> tuple[Part, ...]:
+        """Parts of a patch that does not depend on the load."""
+        return self._together([None])[0]
+
+    @property
+    def rungs(self) -> list[float]:
+        """Loads [N] for which maps have been computed and not been forgotten, ascending."""
+        return sorted({load for part in self._each for load in part.family.rungs})
+
+    def lever_arm(self, load: float | None) -> float:
+        """Return the radius of gyration [m] of the whole patch."""
+        return float(slip_factor(self._patch, load)[2, 2])
+
+    def arrays(self, shape: ReducedShape) -> tuple[np.ndarray, ...]:
+        """Return the maps of a shape."""
+        return (shape.data,) if shape.other is None else (shape.data, shape.other)
+
+    def _together(self, loads: Sequence[float | None]) -> list[tuple[Part, ...]]:
+        loads = self._checked(loads)
+        shapes = zip(*(part.at(loads) for part in self._each), strict=True)
+        if self.count == 1:
+            return [(Part(1.0, shape),) for (shape,) in shapes]
+        weights = self._patch.weights(None if loads[0] is None else np.array(loads)).reshape(-1, self._patch.cells)
+        # rows that lie in one piece: NumPy sums others in an order that depends on how many there are
+        shares = np.stack([np.ascontiguousarray(weights[:, mine]).sum(-1) for mine in self._cells], -1).tolist()
+        return [tuple(map(Part, *loaded)) for loaded in zip(shares, shapes, strict=True)]
+
+    def _checked(self, loads: Any) -> list[float | None]:
+        if not self.depends_on_load:
+            return list(loads)
+        if isinstance(loads, np.ndarray) and (loads > 0.0).all() and (loads < np.inf).all():
+            return loads.tolist()  # one by one takes longer than all else
+        return [validation.positive_load("normal_force", load) for load in loads]
+
+    # ------------------------------------------------------------------ slopes by the load
+
+    def by_load(
+        self, loads: np.ndarray, parts: Sequence[tuple[Part, ...]]
+    ) -> tuple[list[tuple[Part, ...]], np.ndarray]:
+        """Return the `parts` at loads `[L]` with the maps on both sides, and slopes by the load `[P, L, 8]` [1/N].
+
+        Slopes are those of the numbers of each shape and of its share; blends move along the chord between two maps.
+        """
+        beside, slopes = [], []
+        for k, one in enumerate(self._each):
+            shapes = [each[k].shape for each in parts]
+            numbers = np.array([[*shape.numbers[:6], each[k].share] for shape, each in zip(shapes, parts, strict=True)])
+            found = one.family.followed(loads.tolist(), shapes)
+            beside.append([shape for shape, _ in found])
+            smooth = self._differences(k, loads, numbers)
+            slopes.append(np.insert(smooth, 6, [slope for _, slope in found], axis=1))
+        moved = [
+            tuple(Part(part.share, shape) for part, shape in zip(each, shapes, strict=True))
+            for each, *shapes in zip(parts, *beside, strict=True)
+        ]
+        return moved, np.array(slopes)
+
+    def _differences(self, k: int, loads: np.ndarray, middle: np.ndarray) -> np.ndarray:
+        """Return central differences `[L, 7]` of factor and share of part k, one-sided beside those of another kind.
+
+        The kind shows in the zeros of the last two numbers: contacts that shrink to a point, parts without load.
+        """
+        patch, sides = self._each[k].patch, []
+
+        def numbers(loads: np.ndarray) -> np.ndarray:
+            share = np.ones(len(loads)) if self.count == 1 else self._patch.weights(loads)[:, self._cells[k]].sum(-1)
+            return np.column_stack([slip_factor(patch, loads)[:, *np.triu_indices(3)], share])
+
+        for place in (loads * (1.0 - STEP), loads * (1.0 + STEP)):
+            spans = (place[first : first + _TOGETHER] for first in range(0, len(place), _TOGETHER))
+            end = np.concatenate([numbers(span) for span in spans])
+            same = ((end[:, -2:] == 0.0) == (middle[:, -2:] == 0.0)).all(axis=1)
+            sides.append((np.where(same[:, None], end, middle), np.where(same, place, loads)))
+        (low, begin), (high, end) = sides
+        wide = np.where(end > begin, end - begin, np.inf)
+        return (high - low) / wide[:, None]

@@ -3,34 +3,25 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from typing import Any
 
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.compiled.reduced import REDUCED
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels import reduced_contact, reduced_step, step_slopes
-from planarfriction.kernels.pointers import place_of
-from planarfriction.kernels.records import rows_of
-from planarfriction.kernels.reduced_contact import ReducedContact, Shape
 from planarfriction.laws.base import refuse_creep
-from planarfriction.models.base import PackedModel
-from planarfriction.models.part_shapes import Part, PartShapes, together
-from planarfriction.models.reduced_map import POINT, ReducedShape, is_point, slip_factor
-from planarfriction.models.shapes_by_load import ShapesByLoad, places_of, slopes_by_load
+from planarfriction.models.part_shapes import ReducedShapes
+from planarfriction.models.reduced_map import POINT, ReducedShape, is_point
 from planarfriction.models.three_states import ThreeStateModel
-from planarfriction.patch.parts import labels_of, part_of
+from planarfriction.patch.parts import labels_of
 
 MOST_SEGMENTS, MOST_SPEEDS = 256, 64
 """Sizes of the maps that are taken: some 0.6 GB for a fixed shape; errors fall with their fourth power."""
 
 MOST_PARTS = 1024
 """Parts that are taken with maps of 24 segments or less, a GB; of larger ones as many as take that."""
-
-_TOGETHER = 32
-"""Loads whose shapes are asked for at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,9 +52,7 @@ class ReducedModel(ThreeStateModel):
     range.
     """
 
-    _kernels = reduced_step
-    step_function, jacobian_function = step_slopes.reduced, step_slopes.reduced_jacobian
-    _shared = ("_parts",)
+    _kind = REDUCED
 
     _: KW_ONLY
     parts: Any = 1
@@ -93,7 +82,7 @@ class ReducedModel(ThreeStateModel):
             raise InvalidValueError("parts", f"be at most the {self.patch.cells} cells that can carry load", parts)
         object.__setattr__(self, "labels", labels_of(self.patch, parts))
         object.__setattr__(self, "parts", int(self.labels.max()) + 1)
-        _ = self._parts
+        _ = self.shapes
 
     @property
     def state_shape(self) -> tuple[int, ...]:
@@ -116,129 +105,22 @@ class ReducedModel(ThreeStateModel):
             raise InvalidValueError(
                 "parts", "be 1 for shape_at and shapes_at (parts_at gives the shape of each part)", self.parts
             )
-        return self._parts[0].at(self._checked(loads))
-
-    def parts_at(self, normal_force: float | None) -> tuple[Part, ...]:
-        """Share of the load and shape of each part at a load [N]; recent loads are cached.
-
-        Raises InvalidValueError for a load that is not > 0.
-        """
-        if not self.patch.depends_on_load:
-            return self._fixed_parts
-        return self._parts_together([normal_force])[0]
+        return [part.shape for (part,) in self.shapes.at(loads)]
 
     @property
     def load_rungs(self) -> list[float]:
         """Loads [N] for which maps have been computed so far, if the patch depends on the load."""
-        return sorted({load for part in self._parts for load in part.rungs})
+        return self.shapes.rungs
 
-    def _checked(self, loads) -> list[float | None]:
-        if not self.patch.depends_on_load:
-            return list(loads)
-        if isinstance(loads, np.ndarray) and (loads > 0.0).all() and (loads < np.inf).all():
-            return loads.tolist()  # one by one takes longer than all else
-        return [validation.positive_load("normal_force", load) for load in loads]
-
-    def _parts_at(self, loads: Sequence[float | None]) -> Iterator[tuple[Part, ...]]:
-        for first in range(0, len(loads), _TOGETHER):
-            yield from self._parts_together(loads[first : first + _TOGETHER])
-
-    def _parts_together(self, loads: Sequence[float | None]) -> list[tuple[Part, ...]]:
-        """`parts_at` of loads [N]."""
-        loads = self._checked(loads)
-        shapes = zip(*(part.at(loads) for part in self._parts), strict=True)
-        if self.parts == 1:
-            return [(Part(1.0, shape),) for (shape,) in shapes]
-        weights = self.patch.weights(None if loads[0] is None else np.array(loads)).reshape(-1, self.patch.cells)
-        # rows that lie in one piece: NumPy sums others in an order that depends on how many there are
-        each = (np.ascontiguousarray(weights[:, self.labels == k]) for k in range(self.parts))
-        shares = np.stack([part.sum(-1) for part in each], -1).tolist()
-        return [tuple(map(Part, *loaded)) for loaded in zip(shares, shapes, strict=True)]
+    @functools.cached_property
+    def shapes(self) -> ReducedShapes:
+        """Shapes of the parts at any load."""
+        maps = self.law.numbers.gamma, self.segments, self.speeds
+        return ReducedShapes(self.patch, self.labels, maps, self.load_error)
 
     @property
     def _labels(self) -> np.ndarray:
         return self.labels
-
-    # ------------------------------------------------------------------ parts
-
-    @functools.cached_property
-    def _parts(self) -> tuple[PartShapes, ...]:
-        maps = self.law.numbers.gamma, self.segments, self.speeds
-        cells = (self.labels == k for k in range(self.parts))
-        patches = [self.patch] if self.parts == 1 else [part_of(self.patch, each) for each in cells]
-        return tuple(PartShapes(patch, maps, self.load_error, self.parts) for patch in patches)
-
-    @functools.cached_property
-    def _fixed_parts(self) -> tuple[Part, ...]:
-        return self._parts_together([None])[0]
-
-    def _radius(self, load: float | None) -> float:
-        return float(slip_factor(self.patch, load)[2, 2])
-
-    def _arrays(self, shape: ReducedShape) -> tuple[np.ndarray, ...]:
-        return (shape.data,) if shape.other is None else (shape.data, shape.other)
-
-    def _packed(self, parts: Sequence[tuple[Part, ...]], widest: Sequence[float | None]) -> PackedModel:
-        if self.parts == 1:
-            return super()._packed(parts, widest)
-        radius = max(map(self._radius, widest))
-        each = [self._records([loaded[k].shape for loaded in parts], radius) for k in range(self.parts)]
-        return together(each, np.array([[part.share for part in loaded] for loaded in parts]))
-
-    def _records(self, shapes: Sequence[ReducedShape], radius: float) -> PackedModel:
-        maps = {id(data): data for shape in shapes for data in (shape.data, shape.other) if data is not None}
-        at = {name: place_of(data) for name, data in maps.items()}
-        data = np.array([at[id(shape.data)] for shape in shapes])
-        other = np.array([at[id(shape.data if shape.other is None else shape.other)] for shape in shapes])
-        factors = np.array([shape.factor for shape in shapes])[:, *np.triu_indices(3)]
-        numbers = np.column_stack([factors, [shape.blend for shape in shapes]])
-        record = ReducedContact(self.law.numbers, Shape(*numbers[0]), 0, 0)
-        kept = tuple(maps.values())
-        rows = rows_of(record, len(shapes), shape=numbers, data=data, other=(other - data) // kept[0].itemsize)
-        natural = np.full(3, self.law.largest_deflection)
-        return PackedModel(reduced_contact.FUNCTIONS, rows, 3, reduced_contact.LINEAR, natural, radius, kept)
-
-    def _maps(self, shape: ReducedShape) -> tuple[np.ndarray, np.ndarray]:
-        if shape.other is None:
-            return np.zeros(3, dtype=int), shape.data
-        # compiled loops reach both maps from the one that lies first in memory: they take no negative numbers
-        apart = (place_of(shape.other) - place_of(shape.data)) // shape.data.itemsize
-        return np.array([max(-apart, 0), max(apart, 0), 0]), shape.data if apart > 0 else shape.other
-
-    def _at_loads(self, loads: np.ndarray, slopes: bool) -> ShapesByLoad:
-        parts = list(self._parts_at(loads.tolist()))
-        shares = np.array([[part.share for part in loaded] for loaded in parts]).T
-        shapes = [[loaded[k].shape for loaded in parts] for k in range(self.parts)]
-        numbers, by_load = np.array([[shape.numbers for shape in each] for each in shapes]), None
-        if slopes:
-            found = [part.followed(loads.tolist(), each) for part, each in zip(self._parts, shapes, strict=True)]
-            shapes = [[shape for shape, _ in each] for each in found]
-            blends = np.array([[slope for _, slope in each] for each in found])
-            by_load = [self._slopes(k, loads, numbers[k], shares[k], blends[k]) for k in range(self.parts)]
-        maps = [(shape.data, shape.data if shape.other is None else shape.other) for each in shapes for shape in each]
-        begin, data = places_of([data for pair in maps for data in pair])
-        surface = np.zeros((*shares.shape, 3), dtype=int)
-        surface[:, :, :2] = begin.reshape(*shares.shape, 2)
-        by_load = np.zeros((*shares.shape, 8)) if by_load is None else np.array(by_load)
-        return ShapesByLoad(np.ascontiguousarray(shares), surface, numbers, by_load, data)
-
-    def _slopes(self, k: int, loads: np.ndarray, shape: np.ndarray, share: np.ndarray, blend: np.ndarray) -> np.ndarray:
-        """Slopes of the numbers of part k and of its share by the load `[L, 8]`, given those of the blend."""
-        mine, patch = self.labels == k, self._parts[k].patch
-
-        def factor_and_share(loads: np.ndarray) -> np.ndarray:
-            share = np.ones(len(loads)) if self.parts == 1 else self.patch.weights(loads)[:, mine].sum(-1)
-            return np.column_stack([slip_factor(patch, loads)[:, *np.triu_indices(3)], share])
-
-        middle = np.column_stack([shape[:, :6], share])
-        return np.insert(slopes_by_load(factor_and_share, loads, middle), 6, blend, axis=1)
-
-    def _levers(self, shape: ReducedShape) -> tuple[np.ndarray, np.ndarray]:
-        return shape.factor, shape.factor
-
-    def _rate_slopes(self, shape: ReducedShape, lin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        by_z, by_v = (lin[:, at : at + 9].reshape(-1, 3, 3) for at in (reduced_contact.BY_Z, reduced_contact.BY_V))
-        return by_z, by_v @ shape.factor
 
 
 def _count_of(parts: Any, most: int) -> int | None:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction.equality import by_parts
+from planarfriction.kernels.reduced_contact import BY_V, BY_Z
 from planarfriction.kernels.steady import HEADER, QUARTIC
 from planarfriction.models import cube_map
 from planarfriction.models.steady_sums import ScaledCells, ScaledPoint
@@ -48,6 +49,18 @@ class ReducedShape(NamedTuple):
     def contact_radius(self) -> float:
         """Radius of gyration [m]: turns spins into speeds; 0 of a point."""
         return float(self.factor[2, 2])
+
+    @property
+    def lever(self) -> np.ndarray:
+        """Map `[3, 3]` of twists to `V_G`: F."""
+        return self.factor
+
+    viscous_lever = lever
+
+    def rate_slopes(self, lin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return d rate / d state and d rate / d twist `[B, 3, 3]` from linearisations `[B, L]`."""
+        by_z, by_v = (lin[:, at : at + 9].reshape(-1, 3, 3) for at in (BY_Z, BY_V))
+        return by_z, by_v @ self.factor
 
 
 def reduced_shape(

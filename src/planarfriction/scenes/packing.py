@@ -8,11 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from planarfriction.compiled.packed import PackedModel
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels.body import Motion, System, system_of
 from planarfriction.kernels.contacts import BODY, BODY_AXES, WORLD, Contacts, calls_of
 from planarfriction.kernels.pointers import place_of
-from planarfriction.models.base import PackedModel
 from planarfriction.scenes.movers import displacement
 from planarfriction.scenes.signal import SAME_TIME, Signal, breaks_between
 from planarfriction.scenes.start import first_slopes, first_states
@@ -22,7 +22,7 @@ SHAPE_INTERVAL = 1e-3
 
 WINDOW = 4096
 """Segments between breaks that are packed at a time; fewer where their shapes take more room (see
-`models.base.MAX_PACK_BYTES`)."""
+`compiled.packed.MAX_PACK_BYTES`)."""
 
 MOST_PIECES = 10**12
 """Segments of a motion, each of which the solver has to stop at."""
@@ -177,7 +177,7 @@ class SegmentBatches:
             [*(model.state_scale for model in self.models), speed * arm, self._length * arm]
         )
         """Natural scale of each state: mu_c/sigma_0 for deflections and positions, a share of v_s for velocities (that
-        of a creep, `models.base.PackedModel.velocity_scale`), angles over r.
+        of a creep, `compiled.PackedModel.velocity_scale`), angles over r.
 
         The least of all contacts. Velocities are not measured against v_s itself: below it friction hardly changes with
         speed, but it does with direction.

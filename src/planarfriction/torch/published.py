@@ -82,7 +82,7 @@ class ReducedModelPublished(FrictionModel):
     ):
         super().__init__(patch, law)
         when = "keep" if surface is not None else "rebuild"
-        shape = models.ReducedModelPublished(patch, law, surface, on_load_change=when)._reference  # pyright: ignore
+        shape = models.ReducedModelPublished(patch, law, surface, on_load_change=when).shapes.reference  # pyright: ignore
         kind = {"dtype": dtype or torch.get_default_dtype(), "device": device}
         self.surface = Surface(shape.surface, **kind)
         self.register_buffer("root", None if patch.root is None else torch.tensor(shape.root, **kind))

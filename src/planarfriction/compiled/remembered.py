@@ -1,4 +1,4 @@
-"""A memory for what a model builds, which any number of threads may use."""
+"""A memory of bounded length for what a model builds, which any number of threads may use."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ T = TypeVar("T")
 
 
 class Remembered(Generic[T]):
-    """What was built for the last `most` keys; none of it changes, and nothing that someone holds is taken away.
+    """Results for the last `most` keys; none of them changes, and nothing that someone holds is taken away.
 
     Threads build at the same time. Where two of them build for one key, both get what the first one has put in.
     """
 
     def __init__(self, most: int) -> None:
         self._most = most
-        self._kept: dict[Hashable, T] = {}
+        self._results: dict[Hashable, T] = {}
         self._lock = threading.Lock()
 
     def get(self, key: Hashable, build: Callable[[], T]) -> T:
-        """What was built for `key`, or `build()`."""
-        found = self._kept.get(key)
+        """Return the result for `key`; `build` makes it if it is missing."""
+        found = self._results.get(key)
         if found is None:
             built = build()
             with self._lock:
-                found = self._kept.setdefault(key, built)
-                while len(self._kept) > self._most:
-                    del self._kept[next(iter(self._kept))]
+                found = self._results.setdefault(key, built)
+                while len(self._results) > self._most:
+                    del self._results[next(iter(self._results))]
         return found

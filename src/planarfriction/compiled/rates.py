@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
+from planarfriction.compiled.packed import PackedModel
 from planarfriction.kernels import rates as kernels
 from planarfriction.kernels.contacts import WORDS
 from planarfriction.kernels.pointers import address_of
-from planarfriction.models.base import PackedModel
 
 
 def rates(packed: PackedModel, state: np.ndarray, twist: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rates as `state` `[B, ...]` and wrenches per unit load `[B, 3]` of contiguous states and twists `[B, 3]`."""
+    """Return rates as `state` `[B, ...]` and wrenches per unit load `[B, 3]` at contiguous states and twists `[B, 3]`.
+
+    `packed` has one record, or one for each contact.
+    """
     rate, wrench = np.empty((len(twist), packed.states)), np.empty((len(twist), 3))
     function = address_of(packed.functions.evaluate, WORDS[0])
     kernels.evaluate(function, packed.records, state.reshape(rate.shape), twist, rate, wrench)
@@ -19,7 +22,7 @@ def rates(packed: PackedModel, state: np.ndarray, twist: np.ndarray) -> tuple[np
 
 
 def linearised(packed: PackedModel, state: np.ndarray, twist: np.ndarray) -> np.ndarray:
-    """The workspace of a linearisation `[B, workspace]`; what it holds, each model's kernels say."""
+    """Return linearisations `[B, workspace]`; the kernels of each kind of model say what they hold."""
     lin = np.empty((len(twist), packed.workspace))
     function = address_of(packed.functions.linearise, WORDS[1])
     kernels.linearise(function, packed.records, state.reshape(len(twist), packed.states), twist, lin)

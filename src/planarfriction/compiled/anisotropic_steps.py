@@ -1,4 +1,4 @@
-"""Steps of the distributed model where friction depends on the direction: cell by cell what one cell alone would do.
+"""Steps of the distributed model where friction depends on the direction: each cell steps as one cell alone would.
 
 In a step the twist is held, and with it the place `c = a g/sigma_0` that a bristle decays towards: `z - c` steps as the
 bristle of an isotropic cell driven by `u = L v`, and its traction is that cell's less `sigma_0 c = g a`.
@@ -11,22 +11,21 @@ from typing import Any
 import numpy as np
 
 from planarfriction import formulas
+from planarfriction.compiled.base import StepJacobians
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import distributed_step as kernels
-from planarfriction.models.base import StepJacobians
-from planarfriction.patch import ContactPatch
 
 _ALONE = kernels.Cells(np.zeros(1), np.zeros(1), np.ones((1, 1)))
 
 
-def cell_numbers(patch: ContactPatch, cells: np.ndarray) -> np.ndarray:
-    """The numbers of the chosen cells, `[7, n]`, as `kernels.anisotropic_contact` reads them."""
+def cell_numbers(patch: Any, cells: np.ndarray) -> np.ndarray:
+    """Return the numbers of the chosen cells, `[7, n]`, as `kernels.anisotropic_contact` reads them."""
     levers, asymmetry = patch.levers()[cells], patch.asymmetries()[cells]
     return np.array([*(levers[:, i, j] for i, j in ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2))), *asymmetry.T])
 
 
 def centres(law: LawNumbers, asymmetry: np.ndarray, velocity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """`c = a g(|u|)/sigma_0` `[..., 2, N]` of `a` `[2, N]` and `u` `[..., 2, N]`, and `dc/du` `[..., 2, 2, N]`."""
+    """Return `c = a g(|u|)/sigma_0` `[..., 2, N]` and `dc/du` `[..., 2, 2, N]` of `a` `[2, N]`, `u` `[..., 2, N]`."""
     speed = np.hypot(velocity[..., 0, :], velocity[..., 1, :])
     g, slope = formulas.stribeck(np, speed, law), formulas.stribeck_slope(np, speed, law)
     heading = velocity / np.where(speed > 0.0, speed, 1.0)[..., None, :]
@@ -34,27 +33,35 @@ def centres(law: LawNumbers, asymmetry: np.ndarray, velocity: np.ndarray) -> tup
     return asymmetry * (g / law.sigma_0)[..., None, :], along * (slope / law.sigma_0)[..., None, None, :]
 
 
-def step(model: Any, state: np.ndarray, velocity: np.ndarray, load: np.ndarray, dt: np.ndarray):
-    """`DistributedModel.step` for checked inputs; `velocity` is `u` `[..., 2, N]`."""
-    law = model.law.numbers
-    centre = 0.0 if model._asymmetry is None else centres(law, model._asymmetry, velocity)[0]
+def step(
+    compiled: Any, state: np.ndarray, twist: np.ndarray, load: np.ndarray, dt: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Step the cells of a `CompiledDistributed` (see `CompiledModel.step`)."""
+    law, patch = compiled.law.numbers, compiled.patch
+    lever, asymmetry = compiled.lever, compiled.asymmetry
+    velocity = np.einsum("...d,dcn->...cn", twist, lever)
+    centre = 0.0 if asymmetry is None else centres(law, asymmetry, velocity)[0]
     z, u, steps = _alone(state - centre, velocity, dt)
     new, pull = np.empty_like(z), np.empty_like(u)
     ones = np.ones(len(z))
     kernels.step_batch(law, z, u, _ALONE, ones, steps, new, pull)
     loaded = (load > 0.0)[..., None, None]
     traction = _together(pull[:, :2], state) - law.sigma_0 * centre
-    share = load[..., None] * model.patch.weights(load)
-    wrench = np.einsum("...cn,dcn->...d", traction * share[..., None, :], model._lever)
+    share = load[..., None] * patch.weights(load)
+    wrench = np.einsum("...cn,dcn->...d", traction * share[..., None, :], lever)
     return np.where(loaded, _together(new, state) + centre, 0.0), wrench
 
 
-def step_jacobians(model: Any, state: np.ndarray, velocity: np.ndarray, load: np.ndarray, dt: np.ndarray):
-    """`DistributedModel.step_jacobians` for checked inputs; `velocity` is `u` `[..., 2, N]`."""
-    law, lever = model.law.numbers, model._lever
+def step_jacobians(
+    compiled: Any, state: np.ndarray, twist: np.ndarray, load: np.ndarray, dt: np.ndarray
+) -> StepJacobians:
+    """Differentiate steps of the cells of a `CompiledDistributed` (see `CompiledModel.step_jacobians`)."""
+    law, patch = compiled.law.numbers, compiled.patch
+    lever, asymmetry = compiled.lever, compiled.asymmetry
+    velocity = np.einsum("...d,dcn->...cn", twist, lever)
     centre, centre_u = 0.0, None
-    if model._asymmetry is not None:
-        centre, centre_u = centres(law, model._asymmetry, velocity)
+    if asymmetry is not None:
+        centre, centre_u = centres(law, asymmetry, velocity)
     z, u, steps = _alone(state - centre, velocity, dt)
     count = len(z)
     slopes = kernels.CellJacobians(
@@ -67,7 +74,7 @@ def step_jacobians(model: Any, state: np.ndarray, velocity: np.ndarray, load: np
     if centre_u is not None:
         new_u = new_u + centre_u - np.einsum("...abn,...bcn->...acn", new_z, centre_u)
         pull_u = pull_u - law.sigma_0 * centre_u - np.einsum("...abn,...bcn->...acn", pull_z, centre_u)
-    weights, loaded = model.patch.weights(load), (load > 0.0)[..., None, None, None]
+    weights, loaded = patch.weights(load), (load > 0.0)[..., None, None, None]
     share = (load[..., None] * weights)[..., None, None, :]
     traction = (_together(pull[:, :2], state) - law.sigma_0 * centre) * weights[..., None, :]
     return StepJacobians(
@@ -80,7 +87,7 @@ def step_jacobians(model: Any, state: np.ndarray, velocity: np.ndarray, load: np
 
 
 def _alone(state: np.ndarray, velocity: np.ndarray, dt: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Bristles `[K, 2]`, twists `[K, 3]` and step lengths `[K]` of all cells of a batch, each as a contact alone."""
+    """Return bristles `[K, 2]`, twists `[K, 3]` and steps `[K]` of all cells of a batch, each as a contact alone."""
     z = np.ascontiguousarray(np.moveaxis(state, -2, -1).reshape(-1, 2))
     u = np.zeros((len(z), 3))
     u[:, :2] = np.moveaxis(velocity, -2, -1).reshape(-1, 2)
@@ -88,7 +95,7 @@ def _alone(state: np.ndarray, velocity: np.ndarray, dt: np.ndarray) -> tuple[np.
 
 
 def _together(values: np.ndarray, state: np.ndarray) -> np.ndarray:
-    """`[K, ...]` of all cells of a batch as `[batch, ..., N]`."""
+    """Return `[K, ...]` of all cells of a batch as `[batch, ..., N]`."""
     inner = values.shape[1:]
     apart = values.reshape(*state.shape[:-2], state.shape[-1], *inner)
     return np.moveaxis(apart, state.ndim - 2, -1)

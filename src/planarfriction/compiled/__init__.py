@@ -1,0 +1,15 @@
+"""Machine forms of friction models: the numbers and addresses that compiled code reads, made once for each model.
+
+`model.compiled` is one cached object. Its `step_one` and `step_batch` are the fast doors of a step from Python;
+`packed` is read by the solver, `packed_steps` by `coupling`, `at_loads` by roll-outs. Addresses hold in one process:
+copies of a model make their own machine form.
+"""
+
+from planarfriction.compiled.base import CompiledModel, StepJacobians
+from planarfriction.compiled.packed import PackedModel, PackedSteps
+
+__all__ = ["CompiledModel", "PackedModel", "PackedSteps", "StepJacobians"]
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

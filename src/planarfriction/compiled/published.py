@@ -1,0 +1,61 @@
+"""Records of `ReducedModelPublished`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from planarfriction.compiled.packed import PackedModel
+from planarfriction.compiled.parts import Frame, Kind
+from planarfriction.kernels import published_contact, published_step, step_slopes
+from planarfriction.kernels.pointers import place_of
+from planarfriction.kernels.published_contact import PublishedContact, Root, Shape
+from planarfriction.kernels.records import rows_of
+
+_VELOCITY_SCALE = 0.01
+"""Natural scale of the velocity, as a share of v_s [-].
+
+The published map has several directions into which a patch that has come to a halt may go on, and 1e-5 of v_s decides
+which: two pads end 9 um apart.
+"""
+
+
+def records(law: Any, shapes: Sequence[Any], radius: float) -> PackedModel:
+    """Pack a contact with the law at each of the `shapes` (`PublishedShape`); `radius` is the lever arm [m]."""
+    data = [np.ascontiguousarray(shape.surface.numbers.data, dtype=float) for shape in shapes]
+    root = shapes[0].root
+    record = PublishedContact(law.numbers, Shape(*shapes[0].numbers), Root(root[0, 0], root[0, 1], root[1, 1]), 0, 0, 0)
+    rows = rows_of(
+        record,
+        len(shapes),
+        shape=np.array([shape.numbers for shape in shapes]),
+        kind=np.array([shape.surface.numbers.kind for shape in shapes]),
+        size=np.array([shape.surface.numbers.size for shape in shapes]),
+        data=np.array([place_of(each) for each in data]),
+    )
+    scale = law.largest_deflection * np.array([1.0, 1.0, radius or 1.0])
+    functions, size = published_contact.FUNCTIONS, published_contact.LINEAR
+    return PackedModel(functions, rows, 3, size, scale, radius, tuple(data), velocity_scale=_VELOCITY_SCALE)
+
+
+def surface_of(shape: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return kind, start and size of the limit surface of a `PublishedShape`, int `[3]`, and its numbers."""
+    kind, size, data = shape.surface.numbers
+    return np.array([kind, 0, size]), data
+
+
+def framed(shape: Any) -> tuple[Any, Frame | None]:
+    """Return the shape that steps, and its frame: the axes of a friction metric, or those of a point at itself.
+
+    A point slides as a patch of any size does that does not spin.
+    """
+    if shape.contact_radius == 0.0:
+        slider = shape._replace(centre_of_pressure=np.zeros(2), contact_radius=1.0, second_moment=0.0)
+        return slider, Frame(np.diag([1.0, 1.0, 0.0]) @ shape.lever, False)
+    return shape, None if (shape.root == np.eye(2)).all() else Frame(shape.axes, True)
+
+
+PUBLISHED = Kind(published_step, step_slopes.published, step_slopes.published_jacobian, records, surface_of, framed)
+"""Kind of `ReducedModelPublished`."""

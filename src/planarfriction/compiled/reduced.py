@@ -1,0 +1,45 @@
+"""Records of `ReducedModel`, and its shapes at many loads as compiled roll-outs read them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from planarfriction.compiled.packed import PackedModel
+from planarfriction.compiled.parts import Kind
+from planarfriction.kernels import reduced_contact, reduced_step, step_slopes
+from planarfriction.kernels.pointers import place_of
+from planarfriction.kernels.records import rows_of
+from planarfriction.kernels.reduced_contact import ReducedContact, Shape
+
+
+def records(law: Any, shapes: Sequence[Any], radius: float) -> PackedModel:
+    """Pack one part with the law at each of the `shapes` (`ReducedShape`); `radius` is the lever arm [m]."""
+    maps = {id(data): data for shape in shapes for data in (shape.data, shape.other) if data is not None}
+    at = {name: place_of(data) for name, data in maps.items()}
+    data = np.array([at[id(shape.data)] for shape in shapes])
+    other = np.array([at[id(shape.data if shape.other is None else shape.other)] for shape in shapes])
+    factors = np.array([shape.factor for shape in shapes])[:, *np.triu_indices(3)]
+    numbers = np.column_stack([factors, [shape.blend for shape in shapes]])
+    record = ReducedContact(law.numbers, Shape(*numbers[0]), 0, 0)
+    keepalive = tuple(maps.values())
+    rows = rows_of(record, len(shapes), shape=numbers, data=data, other=(other - data) // keepalive[0].itemsize)
+    scale = np.full(3, law.largest_deflection)
+    return PackedModel(reduced_contact.FUNCTIONS, rows, 3, reduced_contact.LINEAR, scale, radius, keepalive)
+
+
+def maps_of(shape: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return where the two maps of a `ReducedShape` begin, int `[3]`, in the array at the lower address.
+
+    Compiled loops reach both maps from the one that lies first in memory: they take no negative numbers.
+    """
+    if shape.other is None:
+        return np.zeros(3, dtype=int), shape.data
+    apart = (place_of(shape.other) - place_of(shape.data)) // shape.data.itemsize
+    return np.array([max(-apart, 0), max(apart, 0), 0]), shape.data if apart > 0 else shape.other
+
+
+REDUCED = Kind(reduced_step, step_slopes.reduced, step_slopes.reduced_jacobian, records, maps_of)
+"""Kind of `ReducedModel`."""

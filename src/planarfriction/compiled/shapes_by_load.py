@@ -1,0 +1,56 @@
+"""Shapes of a model at many loads with their slopes by the load, as compiled roll-outs read them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from planarfriction.compiled.parts import Part
+from planarfriction.kernels.pointers import place_of
+
+
+class ShapesByLoad(NamedTuple):
+    """P parts at L loads (see `kernels.rollouts.Inputs`)."""
+
+    shares: np.ndarray
+    """Shares of the load `[P, L]`."""
+    surface: np.ndarray
+    """Integers of the limit surface or the maps, int `[P, L, 3]`."""
+    shapes: np.ndarray
+    """Numbers of the shapes `[P, L, S]`."""
+    by_load: np.ndarray
+    """Slopes of these numbers and of the share by the load `[P, L, S + 1]` [1/N]."""
+    data: np.ndarray
+    """Numbers of the map that lies first in memory, from which those of all others are reached."""
+
+
+class _Holding:
+    """An array that holds others, too."""
+
+    def __init__(self, first: np.ndarray, others: Sequence[np.ndarray]) -> None:
+        self.__array_interface__, self.others = first.__array_interface__, others
+
+
+def shapes_by_load(loaded: Sequence[Sequence[Part]], by_load: np.ndarray | None) -> ShapesByLoad:
+    """Pack the parts of a `ReducedModel` at L loads, with their slopes `[P, L, S + 1]` or zeros."""
+    parts = [[each[k] for each in loaded] for k in range(len(loaded[0]))]
+    shares = np.array([[part.share for part in each] for each in parts])
+    numbers = np.array([[part.shape.numbers for part in each] for each in parts])
+    shapes = [part.shape for each in parts for part in each]
+    begin, data = places_of([data for s in shapes for data in (s.data, s.data if s.other is None else s.other)])
+    surface = np.zeros((*shares.shape, 3), dtype=int)
+    surface[:, :, :2] = begin.reshape(*shares.shape, 2)
+    if by_load is None:
+        by_load = np.zeros((*shares.shape, numbers.shape[-1] + 1))
+    return ShapesByLoad(shares, surface, numbers, by_load, data)
+
+
+def places_of(maps: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the offset of each map from the lowest address, and the array at that address, which holds all maps."""
+    own = {id(data): data for data in maps}
+    at = {name: place_of(data) for name, data in own.items()}
+    first = min(own, key=at.__getitem__)
+    begin = {name: (place - at[first]) // own[first].itemsize for name, place in at.items()}
+    return np.array([begin[id(data)] for data in maps]), np.asarray(_Holding(own[first], tuple(own.values())))
