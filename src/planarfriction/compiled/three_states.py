@@ -33,6 +33,7 @@ _ARRAY, _FLOAT, _EMPTY, _MAKE = np.ndarray, np.dtype(float), np.empty, np.array
 _TRUTH = frozenset((bool, np.bool_))
 _PLAIN = frozenset((float, int, np.float64))
 _REFUSED = (*UNFIT, OverflowError)
+_NEW, _WRENCH = slice(3), slice(3, 6)
 
 
 class Shapes(Protocol):
@@ -66,8 +67,8 @@ class CompiledThreeStates(CompiledModel):
         self._kind, self._law, self.shapes = kind, law, shapes
         self.step_function, self.parts = kind.step_function, shapes.count
         self.state_shape = (3,) if self.parts == 1 else (self.parts, 3)
-        self._size = n = 3 * self.parts
-        self._room, self._new, self._wrench = n + 11, slice(n), slice(n, n + 3)
+        self._size, self._places = 3 * self.parts, None
+        self._room, self._new, self._wrench = self._size + 11, slice(self._size), slice(self._size, self._size + 3)
 
     # ------------------------------------------------------------------ fast doors
 
@@ -81,11 +82,12 @@ class CompiledThreeStates(CompiledModel):
         """The contact, if it steps in its own frame at any load."""
         return None if self.shapes.depends_on_load or self.fixed.frame is not None else self.fixed
 
-    @functools.cached_property
-    def _place_of_one(self) -> np.ndarray | None:
+    def _opened(self) -> np.ndarray | None:
+        """Return the places of the parts for `step_one`, and keep them; None if there is no such door."""
         if (contact := self._direct) is not None:
             compile_step_one()
-            return contact.places
+            self._places = contact.places
+        return self._places
 
     @functools.cached_property
     def _quick(self) -> ContactAtLoad | None:
@@ -95,31 +97,33 @@ class CompiledThreeStates(CompiledModel):
 
     def step_one(self, state: Any, twist: Any, normal_force: Any, dt: Any) -> tuple[np.ndarray, np.ndarray] | None:
         """See `CompiledModel`; the compiled step checks its numbers, but takes True for 1.0."""
-        kind = type(twist)
+        kind, places = type(twist), self._places
         if kind is tuple or kind is list:
             held = twist
         elif kind is _ARRAY and twist.ndim == 1 and twist.dtype is _FLOAT:
             held = twist.tolist()
         else:
             return None
-        if type(state) is not _ARRAY or (places := self._place_of_one) is None:
+        if type(state) is not _ARRAY or (places is None and (places := self._opened()) is None):
             return None
-        result, several = _EMPTY(self._room), self.parts > 1
         try:
             vx, vy, omega = held
             if (
-                (state.shape == self.state_shape if several else state.size == 3)
-                and not (
-                    bool is type(vx)
-                    or bool is type(vy)
-                    or bool is type(omega)
-                    or type(normal_force) in _TRUTH
-                    or bool is type(dt)
-                )
-                and step_one(places, state.ravel() if several else state, vx, vy, omega, normal_force, dt, result)
+                bool is type(vx)
+                or bool is type(vy)
+                or bool is type(omega)
+                or type(normal_force) in _TRUTH
+                or bool is type(dt)
             ):
-                new = result[self._new]
-                return new.reshape(self.state_shape) if several else new, result[self._wrench]
+                return None
+            if self.parts == 1:
+                result = _EMPTY(14)
+                if state.size == 3 and step_one(places, state, vx, vy, omega, normal_force, dt, result):
+                    return result[_NEW], result[_WRENCH]
+            elif state.shape == (inner := self.state_shape):
+                result = _EMPTY(self._room)
+                if step_one(places, state.ravel(), vx, vy, omega, normal_force, dt, result):
+                    return result[self._new].reshape(inner), result[self._wrench]
         except UNFIT:  # not plain numbers, or a batch
             pass
         return None
