@@ -186,9 +186,9 @@ def test_a_load_that_one_rung_serves_moves_on_along_the_blend(kind, error, monke
                 assert part.shape.other is None and np.array_equal(part.shape.data, data)
             served = derivatives.rollout_vjp(model, state, twists, load, DT, *bars)
             with monkeypatch.context() as patched:
-                for part in model._parts:
-                    patched.setattr(part._family, "_error", 1e-12)
-                    patched.setattr(part._family, "_shapes", {})
+                for part in model.shapes.each:
+                    patched.setattr(part.family, "_error", 1e-12)
+                    patched.setattr(part.family, "_shapes", {})
                 assert all(part.shape.blend > 0.0 for part in model.parts_at(load))
                 ends = [pf.rollout(model, state, twists, load * (1.0 + h), DT) for h in (5e-7, -5e-7)]
             values = [(bars[0] * run.wrenches).sum() + (bars[1] * run.state).sum() for run in ends]

@@ -189,7 +189,7 @@ def test_a_family_forgets_shapes_too(monkeypatch):
     monkeypatch.setattr(load_family, "REMEMBERED", 5)
     family = model()
     shapes = family.shapes_at(np.linspace(1.0, 2.0, 23))
-    assert len(family._parts[0]._family._shapes) <= 5
+    assert len(family.shapes.each[0].family._shapes) <= 5
     assert [shape.factor.tobytes() for shape in shapes] == [
         shape.factor.tobytes() for shape in model().shapes_at(np.linspace(1.0, 2.0, 23))
     ]

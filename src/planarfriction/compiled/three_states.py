@@ -20,6 +20,7 @@ from planarfriction.compiled.packed import PackedModel, PackedSteps
 from planarfriction.compiled.parts import ContactAtLoad, Kind, Part, packed_parts
 from planarfriction.compiled.rates import linearised, rates
 from planarfriction.compiled.shapes_by_load import ShapesByLoad, shapes_by_load
+from planarfriction.geometry import transformed
 from planarfriction.kernels.quick_steps import (
     NUMBERS,
     compile_quick_steps,
@@ -197,7 +198,8 @@ class CompiledThreeStates(CompiledModel):
 
     def linearisation(self, contact: ContactAtLoad, state: np.ndarray, twist: np.ndarray) -> np.ndarray:
         """Return linearisations of the parts `[B, P, L]` at flat states and twists (see the kernels of the model)."""
-        return linearised(contact.packed, state, twist).reshape(len(twist), self.parts, -1)
+        lin = linearised(contact.packed, state, twist)
+        return lin.reshape(len(lin), self.parts, lin.shape[1] // self.parts)
 
     def step(
         self, state: np.ndarray, twist: np.ndarray, load: np.ndarray, dt: np.ndarray
@@ -210,10 +212,10 @@ class CompiledThreeStates(CompiledModel):
             begin, moved = z[rows], v[rows]
             end, pull = np.empty_like(begin), np.empty_like(moved)
             if (frame := contact.frame) is not None:
-                given, begin, moved = begin, _entering(frame, begin), moved @ frame.lever.T
+                given, begin, moved = begin, _entering(frame, begin), transformed(frame.lever, moved)
             step_many(contact.places, begin, moved, f[rows], h[rows], end, pull, np.empty(14))
             if frame is not None:
-                pull = pull @ frame.lever
+                pull = transformed(frame.lever.T, pull)
                 if not frame.spins:
                     end[:, 2] = given[:, 2]
             new[rows], wrench[rows] = end, pull
@@ -230,7 +232,7 @@ class CompiledThreeStates(CompiledModel):
             begin, held, frame = z[rows], given[rows], contact.frame
             if frame is not None:
                 begin, held = _entering(frame, begin), held.copy()
-                held[:, :3] = held[:, :3] @ frame.lever.T
+                held[:, :3] = transformed(frame.lever, held[:, :3])
             result = np.empty((len(held), 9 * self._size + NUMBERS))
             jacobians_many(contact.jacobian_places, begin, held, result)
             slopes = _apart(result, (len(held),), inner)
@@ -300,7 +302,7 @@ def _leaving(frame: Any, slopes: StepJacobians) -> StepJacobians:
         by_twist @ lever,
         lever.T @ by_state,
         lever.T @ slopes.wrench_twist @ lever,
-        slopes.wrench_load @ lever,
+        transformed(lever.T, slopes.wrench_load),
     )
 
 

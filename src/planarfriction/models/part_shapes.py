@@ -89,7 +89,7 @@ class ReducedShapes:
         self._patch, self.count, self.depends_on_load = patch, int(labels.max()) + 1, patch.depends_on_load
         self._cells = [labels == k for k in range(self.count)]
         patches = [patch] if self.count == 1 else [part_of(patch, each) for each in self._cells]
-        self._each = [OnePart(part, maps, error, self.count) for part in patches]
+        self.each = [OnePart(part, maps, error, self.count) for part in patches]
 
     def at(self, loads: Sequence[float | None]) -> Iterator[tuple[Part, ...]]:
         """Yield the parts at each load."""
@@ -106,7 +106,7 @@ class ReducedShapes:
     @property
     def rungs(self) -> list[float]:
         """Loads [N] for which maps have been computed and not been forgotten, ascending."""
-        return sorted({load for part in self._each for load in part.family.rungs})
+        return sorted({load for part in self.each for load in part.family.rungs})
 
     def lever_arm(self, load: float | None) -> float:
         """Return the radius of gyration [m] of the whole patch."""
@@ -118,7 +118,7 @@ class ReducedShapes:
 
     def _together(self, loads: Sequence[float | None]) -> list[tuple[Part, ...]]:
         loads = self._checked(loads)
-        shapes = zip(*(part.at(loads) for part in self._each), strict=True)
+        shapes = zip(*(part.at(loads) for part in self.each), strict=True)
         if self.count == 1:
             return [(Part(1.0, shape),) for (shape,) in shapes]
         weights = self._patch.weights(None if loads[0] is None else np.array(loads)).reshape(-1, self._patch.cells)
@@ -143,7 +143,7 @@ class ReducedShapes:
         Slopes are those of the numbers of each shape and of its share; blends move along the chord between two maps.
         """
         beside, slopes = [], []
-        for k, one in enumerate(self._each):
+        for k, one in enumerate(self.each):
             shapes = [each[k].shape for each in parts]
             numbers = np.array([[*shape.numbers[:6], each[k].share] for shape, each in zip(shapes, parts, strict=True)])
             found = one.family.followed(loads.tolist(), shapes)
@@ -161,7 +161,7 @@ class ReducedShapes:
 
         The kind shows in the zeros of the last two numbers: contacts that shrink to a point, parts without load.
         """
-        patch, sides = self._each[k].patch, []
+        patch, sides = self.each[k].patch, []
 
         def numbers(loads: np.ndarray) -> np.ndarray:
             share = np.ones(len(loads)) if self.count == 1 else self._patch.weights(loads)[:, self._cells[k]].sum(-1)
