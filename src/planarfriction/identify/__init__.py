@@ -1,18 +1,20 @@
 """Identification: parameters of the friction models from measurements, with their uncertainty.
 
-`identify_lugre` reads logs of motion and wrench, `identify_motion` slides without a force sensor; `plan_motion`
+`identify_lugre` reads logs of motion and wrench, `identify_motion` slides without a force sensor; `design_experiment`
 suggests which motion to measure next.
 """
 
-from planarfriction.identify.candidates import candidate_motions
+from planarfriction.identify.experiments import MotionPlan, candidate_motions, current_estimate, design_experiment
 from planarfriction.identify.logs import Log, differentiated
 from planarfriction.identify.motion import identify_motion
-from planarfriction.identify.planning import MotionPlan, known_so_far, plan_motion
-from planarfriction.identify.result import Identification, Verdict
+from planarfriction.identify.problem import FitOptions
+from planarfriction.identify.result import Identification
 from planarfriction.identify.slides import Slide, SlidingBody, fit_start, predict_slide
+from planarfriction.identify.verdicts import Verdict
 from planarfriction.identify.wrenches import identify_lugre
 
 __all__ = [
+    "FitOptions",
     "Identification",
     "Log",
     "MotionPlan",
@@ -20,12 +22,12 @@ __all__ = [
     "SlidingBody",
     "Verdict",
     "candidate_motions",
+    "current_estimate",
+    "design_experiment",
     "differentiated",
     "fit_start",
     "identify_lugre",
     "identify_motion",
-    "known_so_far",
-    "plan_motion",
     "predict_slide",
 ]
 

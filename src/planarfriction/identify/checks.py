@@ -10,7 +10,8 @@ import numpy as np
 
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify.logs import Log
-from planarfriction.identify.result import Identification, Verdict
+from planarfriction.identify.result import Identification
+from planarfriction.identify.verdicts import Verdict
 from planarfriction.patch import ContactPatch
 
 FAST = 0.2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,21 +13,50 @@ from numpy.typing import ArrayLike
 
 from planarfriction import validation
 from planarfriction.equality import ByValue
-from planarfriction.errors import FileError, InvalidValueError
-from planarfriction.identify.angles import unwrapped
-from planarfriction.identify.columns import MOTION, TWIST, WRENCH, find_columns
+from planarfriction.errors import FileError, InvalidValueError, shown
 from planarfriction.reading import Table
 from planarfriction.scenes import Solution
 
 LEAST_SAMPLES = 10
-"""Fewer samples say nothing about a law."""
+"""Least number of samples of a log."""
 
 EVEN = 1e-3
-"""Samples whose times stray from an even grid by at most this share of the sampling time lie on it: rounded stamps."""
-
-
+"""Largest distance of a sample from an even grid of times, as a share of the sampling time: time stamps are rounded."""
 LEVER = 1e-9
-"""Torque over force [m] up to which the torque is rounding: a nanometre is no size of a contact, nor off any centre."""
+"""Torque over force [m] up to which the torque is rounding: no contact and no offset is as small as a nanometre."""
+
+TIME = ("t",)
+TWIST = ("vx", "vy", "omega")
+MOTION = ("x", "y", "theta")
+WRENCH = ("fx", "fy", "tau")
+LOAD = ("normal_force",)
+
+ALIASES = {"time": "t", "time_s": "t", "t_s": "t", "fn": "normal_force", "wz": "omega"}
+"""Other names of columns, in small letters."""
+
+UNITS = {
+    "t": ("s",),
+    **dict.fromkeys(("vx", "vy"), ("m/s",)),
+    "omega": ("rad/s", "1/s"),
+    **dict.fromkeys(("x", "y"), ("m",)),
+    "theta": ("rad",),
+    **dict.fromkeys(("fx", "fy", "normal_force"), ("n",)),
+    "tau": ("nm", "n*m", "n.m", "n·m"),
+}
+"""Units that may stand in brackets behind a name, in small letters and without spaces."""
+
+_HEADING = re.compile(r"(?P<name>[^\[(]*?)\s*(?:[\[(](?P<unit>[^\])]*)[\])])?")
+
+TURN = 2.0 * np.pi
+
+QUARTER = 0.25 * TURN
+"""Largest step of an angle, or change of its step, between two samples for which turns can be counted [rad]."""
+
+ROUNDED = 1e-3
+"""Excess of the range of a wrapped angle over one turn that is put down to rounding [turns]."""
+
+NEIGHBOURS = 3
+"""Number of steps on either side with which a step is compared."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,7 +118,7 @@ class Log(ByValue):
 
     @property
     def channels(self) -> np.ndarray:
-        """Which of fx, fy, tau were measured, `[3]` of bool; a tau that is always 0, up to rounding, was not."""
+        """Mask `[3]` of the measured ones of fx, fy, tau; a tau that is always 0, up to rounding, was not measured."""
         largest = np.abs(self.wrench).max(axis=0)
         return np.array([True, True, bool(largest[2] > LEVER * largest[:2].max())])
 
@@ -99,7 +129,7 @@ class Log(ByValue):
 
     @property
     def even(self) -> bool:
-        """Whether the samples are evenly spaced in time."""
+        """True if the samples are evenly spaced in time."""
         steps = np.arange(len(self.time)) * (self.time[-1] - self.time[0]) / (len(self.time) - 1)
         return bool(np.abs(self.time - self.time[0] - steps).max() <= EVEN * self.interval)
 
@@ -160,7 +190,7 @@ class Log(ByValue):
 
     @classmethod
     def from_solution(cls, solution: Solution, contact: str | None = None) -> Log:
-        """Make a log of one contact of a simulation: what ideal sensors would have measured.
+        """Make the log that ideal sensors would record of one contact of a simulation.
 
         `contact` is a name; None takes the only contact. The wrench is that of one of `count` identical contacts.
 
@@ -176,7 +206,7 @@ class Log(ByValue):
 
 
 def as_logs(log: Log | Sequence[Log]) -> tuple[Log, ...]:
-    """One log or several as a tuple."""
+    """Return one log or several as a tuple, or raise InvalidValueError."""
     logs = (log,) if isinstance(log, Log) else tuple(log) if isinstance(log, Sequence) else ()
     if not logs or not all(isinstance(each, Log) for each in logs):
         raise InvalidValueError("log", "be a Log or a list of them", log)
@@ -184,10 +214,10 @@ def as_logs(log: Log | Sequence[Log]) -> tuple[Log, ...]:
 
 
 def differentiated(time: ArrayLike, motion: ArrayLike, *, window: int = 7) -> np.ndarray:
-    """Twist `[T, 3]` in the axes of a moving frame, from its pose x, y, theta `[T, 3]` [m, m, rad] at `time` `[T]` [s].
+    """Compute the twist `[T, 3]` of a frame, in its axes, from poses x, y, theta `[T, 3]` [m, m, rad] over time [s].
 
-    The slope of a parabola through `window` neighbouring samples (fewer at the ends). Jumps of theta by whole turns are
-    removed first.
+    The twist is the slope of a parabola through `window` neighbouring samples (fewer at the ends). Jumps of theta by
+    whole turns are removed first.
 
     Raises InvalidValueError for times that do not increase and for other jumps of theta.
     """
@@ -210,7 +240,7 @@ def differentiated(time: ArrayLike, motion: ArrayLike, *, window: int = 7) -> np
 
 
 def _checked_motion(time, motion) -> tuple[np.ndarray, np.ndarray]:
-    """Times `[T]` that increase, and a copy of the poses `[T, 3]`."""
+    """Return increasing times `[T]` and a copy of the poses `[T, 3]`, or raise InvalidValueError."""
     time = validation.array("time", time, (None,))
     if not (np.diff(time) > 0.0).all():
         row = int(np.argmax(np.diff(time) <= 0.0)) + 1
@@ -219,6 +249,119 @@ def _checked_motion(time, motion) -> tuple[np.ndarray, np.ndarray]:
 
 
 def columns_of(log: Log) -> Mapping[str, np.ndarray]:
-    """The columns of a log as `Log.from_csv` reads them."""
+    """Return the columns of a log by the names that `Log.from_csv` reads."""
     names = ("t", *TWIST, *WRENCH, "normal_force")
     return dict(zip(names, [log.time, *log.twist.T, *log.wrench.T, log.normal_force], strict=True))
+
+
+# ---------------------------------------------------------------------- angles
+
+
+def unwrapped(time: np.ndarray, angle: np.ndarray, name: str = "theta") -> tuple[np.ndarray, int]:
+    """Remove the jumps by whole turns from an angle `[T]` [rad]; returns the angle and the number of jumps.
+
+    An angle whose range exceeds a turn was not wrapped and stays as it is.
+
+    Raises InvalidValueError for a jump that no whole turn explains, and where a wrapped angle turns by more than a
+    quarter of a turn between two samples, so that its direction is unknown.
+    """
+    if len(angle) < 2:
+        return angle, 0
+    steps = np.diff(angle)
+    turns = np.round(steps / TURN)
+    wrapped = bool(turns.any()) and np.ptp(angle) <= (1.0 + ROUNDED) * TURN
+    if wrapped:
+        steps = steps - TURN * turns
+    else:
+        turns = np.zeros_like(turns)
+    jump = np.abs(steps - _usual(steps)) > QUARTER
+    if jump.any():
+        raise _refusal(time, np.diff(angle), jump, name, "only jump by whole turns")
+    fast = np.abs(steps) > QUARTER
+    if wrapped and fast.any():
+        raise _refusal(time, steps, fast, name, "turn by less than a quarter turn between samples, or be unwrapped")
+    return angle - TURN * np.concatenate([[0.0], np.cumsum(turns)]), int(np.count_nonzero(turns))
+
+
+def _usual(steps: np.ndarray) -> np.ndarray:
+    """Compute the median of each step and its neighbours, `[T - 1]`."""
+    padded = np.pad(steps, NEIGHBOURS, mode="reflect" if len(steps) > NEIGHBOURS else "edge")
+    return np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * NEIGHBOURS + 1), axis=1)
+
+
+def _refusal(time: np.ndarray, steps: np.ndarray, where: np.ndarray, name: str, rule: str) -> InvalidValueError:
+    i = int(np.argmax(where))
+    return InvalidValueError(f"{name} [rad]", rule, f"a step of {steps[i]:.3g} at t = {time[i + 1]:g} s")
+
+
+# ---------------------------------------------------------------------- columns of a file
+
+
+def find_columns(path: Path, headings: Sequence[str], *, contact: str | None, with_load: bool) -> dict[str, str]:
+    """Find the heading of each column of a log: `t`, twist or else motion, wrench, and normal force if it is there.
+
+    Names are read without regard to case and may carry a unit in brackets; `ALIASES` are known. If columns are named
+    "contact.vx", those of `contact` are taken, or of the only contact that has them all.
+
+    Raises FileError for a column that is missing, that is there twice, or that has another unit.
+    """
+    named = _named(path, headings)
+    contacts = sorted({name.rpartition(".")[0] for name in named} - {""})
+    if contact is not None:
+        try:
+            contact = validation.choice("contact", contact, contacts)
+        except InvalidValueError as error:
+            raise FileError(f"{path}: {error}") from None
+    elif _missing(named, "", with_load):
+        whole = [each for each in contacts if not _missing(named, f"{each}.", with_load)]
+        if len(whole) > 1:
+            raise FileError(f"{path}: has the contacts {shown(', '.join(whole))}: choose one of them")
+        contact = whole[0] if whole else None
+    prefix = "" if contact is None else f"{contact}."
+    if missing := _missing(named, prefix, with_load):
+        raise FileError(
+            f"{path}: has no column {', '.join(missing)}; found {shown(', '.join(headings))}; needed t, "
+            f"{', '.join(TWIST)} (or {', '.join(MOTION)}), {', '.join((*WRENCH, *LOAD))}"
+        )
+    motion = _motion(named, prefix)
+    wanted = [name for name in (*motion, *WRENCH, *LOAD) if prefix + name in named]
+    found = {"t": named.get(f"{prefix}t") or named["t"], **{name: named[prefix + name] for name in wanted}}
+    for name, heading in found.items():
+        unit = _parts(heading)[1]
+        if unit is not None and unit.lower().replace(" ", "") not in UNITS[name]:
+            raise FileError(f"{path}: column {shown(repr(heading))} must be in SI units, got {shown(unit)}")
+    return found
+
+
+def _named(path: Path, headings: Sequence[str]) -> dict[str, str]:
+    """Map names of columns to headings; an alias counts only where the name itself is missing."""
+    named: dict[str, str] = {}
+    for heading in headings:
+        prefix, dot, name = _parts(heading)[0].rpartition(".")
+        name = prefix + dot + name.lower()
+        if name in named:
+            raise FileError(f"{path}: columns {shown(repr(named[name]))} and {shown(repr(heading))} are the same")
+        if name:
+            named[name] = heading
+    for name in list(named):
+        prefix, dot, last = name.rpartition(".")
+        if last in ALIASES:
+            named.setdefault(prefix + dot + ALIASES[last], named[name])
+    return named
+
+
+def _parts(heading: str) -> tuple[str, str | None]:
+    """Split a heading such as "vx [m/s]" into name and unit."""
+    match = _HEADING.fullmatch(heading)
+    return (heading, None) if match is None else (match["name"].strip(), match["unit"])
+
+
+def _motion(named: dict[str, str], prefix: str) -> Sequence[str]:
+    twist, motion = (all(prefix + name in named for name in names) for names in (TWIST, MOTION))
+    return MOTION if motion and not twist else TWIST
+
+
+def _missing(named: dict[str, str], prefix: str, with_load: bool) -> list[str]:
+    wanted = (*_motion(named, prefix), *WRENCH, *(LOAD if with_load else ()))
+    lacking = [name for name in wanted if prefix + name not in named]
+    return [*([] if "t" in named or f"{prefix}t" in named else TIME), *lacking]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Sequence
 from typing import Any, Literal
 
@@ -10,27 +9,32 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
-from planarfriction.identify.least_squares import correlations, covariance, minimise
-from planarfriction.identify.outliers import contradictions, verdicts_on_slides, weights
-from planarfriction.identify.parameters import Coordinates, check_names
-from planarfriction.identify.result import Identification, Verdict, verdicts_on_turns
+from planarfriction.identify.parameters import check_names, fitted_law, scaled_patch
+from planarfriction.identify.problem import Problem
+from planarfriction.identify.result import Identification
+from planarfriction.identify.search import Fit, Report, multistart, refine
 from planarfriction.identify.slides import (
     Slide,
     SlidingBody,
     as_slides,
+    contradictions,
     improve_start,
     slide_poses,
     start_of,
     start_slopes,
+    verdicts_on_influence,
+    verdicts_on_weights,
+    weights,
 )
-from planarfriction.identify.verdicts import NO_SPIN, TOGETHER, VAGUE
+from planarfriction.identify.uncertainty import correlations, uncertainty_over_slides
+from planarfriction.identify.verdicts import Evidence, Verdict, judge_parameter, verdicts_on_turns
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.models import ReducedModelPublished
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.metric import refuse_anisotropy
 
 MOTION_PARAMETERS = ("mu_c", "mu_s", "v_s", "gamma", "sigma_2", "contact_radius")
-"""What slides can determine; `mu_s` follows `mu_c` where it is not asked for."""
+"""Parameters that slides can determine; `mu_s` equals `mu_c` if only the latter is estimated."""
 
 DRY = LuGre(mu_c=0.3, mu_s=0.3, v_s=1e-3, sigma_0=1e6, sigma_1=20.0, sigma_2=0.0, elasto_plastic=ElastoPlastic(0.9))
 """Dry friction with bristles so stiff that only the coefficient counts."""
@@ -38,26 +42,26 @@ DRY = LuGre(mu_c=0.3, mu_s=0.3, v_s=1e-3, sigma_0=1e6, sigma_1=20.0, sigma_2=0.0
 CHANNELS = (("x", "m"), ("y", "m"), ("theta", "rad"))
 
 FIRST_NOISE = 1e-3
-"""Spread of the positions in the first fit [m]; of the angles this over the contact radius."""
+"""Noise of the positions in the first fit [m]; that of the angles is this over the contact radius."""
 
-NOISE_ROUNDS, MOST_ROUNDS = 2, 8
-"""Times that noise and weights are estimated from the residuals, each with a fit after it: more until they settle."""
-
-SETTLED = 0.02
-"""Change of a weight that asks for no other round."""
-
-TOLERANCE = 1e-4
-"""The search ends when coordinates or cost change by less than this share: far below the standard errors."""
+LEAST_NOISE = 1e-9
+"""Least noise of a channel [m, rad]."""
 
 CHANGE = 0.01
-"""Share of a parameter that derivatives are taken over (at least of its start).
+"""Step of difference quotients as a share of a parameter (at least of its start).
 
 Differences, not `scene_sensitivities`: for slides this short and tolerances this loose those take four times as long
 through a table and as long through an ellipsoid, and they know neither v_s nor sigma_2.
 """
 
+FEW = 10
+"""Number of slides below which their spread gives only a rough error."""
+
+FADING = np.linspace(1.0, 0.0, 50)
+"""Speeds of a slide on its way to rest over its first one."""
+
 Build = Callable[..., Any]
-"""Makes a friction model from a patch and a law."""
+"""Function that makes a friction model from a patch and a law."""
 
 
 def identify_motion(
@@ -115,8 +119,7 @@ def identify_motion(
     """
     slides = as_slides(slides)
     names = check_names(parameters, MOTION_PARAMETERS)
-    if not isinstance(body, SlidingBody):
-        raise InvalidValueError("body", "be a SlidingBody", body)
+    validation.instance("body", body, SlidingBody, "a SlidingBody")
     if type(start) is not LuGre:  # a subclass may compute something else from the parameters that are fitted
         raise InvalidValueError("start", "be a LuGre law", start)
     validation.instance("patch", patch, ContactPatch, "a ContactPatch")
@@ -126,106 +129,109 @@ def identify_motion(
     robust = validation.choice("loss", loss, ("robust", "squares")) == "robust"
     strange = contradictions(slides, body) if robust else {}
     if 2 * len(strange) >= len(slides):
-        strange = {}  # where most are strange, none is: the fit itself will be poor
-    left_out = {slides[i].name: why for i, why in strange.items()}
+        strange = {}  # if most slides are strange, the fit itself will be poor
+    left_out = [Verdict("fit", True, f"{slides[i].name} is left out: {why}") for i, why in strange.items()]
     slides = tuple(slide for i, slide in enumerate(slides) if i not in strange)
-    fit = _Fit(slides, patch, body, names, start, model, samples, progress)
-    values = fit.start_values()
-    coordinates = Coordinates(names, values, start.mu_c)
-    x, noise = coordinates.of(values), np.array([FIRST_NOISE, FIRST_NOISE, FIRST_NOISE / patch.contact_radius()])
-    for turn in range(MOST_ROUNDS + 1):
-        known = fit.weights
-        if turn > 0:
-            offs = fit.offs(coordinates.values(x))
-            if robust:
-                fit.weights = weights(np.array([np.sqrt(np.mean((off / noise) ** 2)) for off in offs]))
-            noise = fit.spread(offs)
-        minimum = minimise(fit.residuals(coordinates, noise), [x], coordinates.bounds(), tolerance=TOLERANCE)
-        x = minimum.x
-        if turn >= NOISE_ROUNDS and np.abs(fit.weights - known).max() < SETTLED:
-            break
-    return fit.result(coordinates, minimum, noise, left_out)
+    report = (lambda text: None) if progress is None else progress
+    problem = SlideProblem(slides, patch, body, names, start, model, samples, robust, report)
+    noise = np.array([FIRST_NOISE, FIRST_NOISE, FIRST_NOISE / float(patch.contact_radius())])
+    fit = refine(multistart(problem, [problem.start_values()], noise=noise, report=report), report=report)
+    return _identification(fit, problem, left_out)
 
 
-class _Fit:
-    """Slides with their starts, which are estimated along with the parameters."""
+class SlideProblem(Problem):
+    """Slides and a model that predicts their poses; the start of each slide follows the values.
 
-    def __init__(self, slides, patch, body, names, law, build, samples, progress):
+    Noise is that of the channels of each slide, `[S, 3]`: slides with large residuals count as noisier.
+    """
+
+    least_change = 1e-4  # far below the standard errors, and above the errors of the solver
+
+    def __init__(
+        self,
+        slides: Sequence[Slide],
+        patch: ContactPatch,
+        body: SlidingBody,
+        names: tuple[str, ...],
+        law: LuGre,
+        build: Build,
+        samples: int | None,
+        robust: bool,
+        report: Report,
+    ) -> None:
         self.slides, self.patch, self.body, self.names = slides, patch, body, names
-        self.law, self.build, self.samples = law, build, samples
-        self.say = (lambda text: None) if progress is None else progress
+        self.law, self.build, self.samples, self.robust, self.report = law, build, samples, robust, report
         self.starts: list[np.ndarray] = [start_of(slide) for slide in slides]
-        self.weights = np.ones(len(slides))
         self._turns = 3  # of the first evaluation; later ones begin where the last one ended
 
+    @property
+    def numbers(self) -> int:
+        """Number of measured numbers."""
+        return sum(self.sizes())
+
+    def sizes(self) -> list[int]:
+        """Return the number of residuals of each slide."""
+        return [slide.pose.size for slide in self.slides]
+
     def start_values(self) -> np.ndarray:
-        """Values `[F]` of the names in the start."""
+        """Return the values `[F]` of the names in the start."""
         radius = float(self.patch.contact_radius())
         return np.array([radius if name == "contact_radius" else getattr(self.law, name) for name in self.names])
 
     def fitted_law(self, values: np.ndarray) -> LuGre:
-        """The law with the values."""
+        """Return the law with values `[F]`; `mu_s` equals `mu_c` if only the latter is estimated."""
         given = dict(zip(self.names, values.tolist(), strict=True))
-        given.pop("contact_radius", None)
-        mu_c = given.get("mu_c", self.law.mu_c)
-        given["mu_s"] = max(given.get("mu_s", mu_c if "mu_c" in given else self.law.mu_s), mu_c)
-        return dataclasses.replace(self.law, **given)
+        if "mu_c" in given:
+            given.setdefault("mu_s", given["mu_c"])
+        return fitted_law(self.law, given)
 
     def fitted_model(self, values: np.ndarray) -> Any:
-        """The friction model with the values."""
+        """Make the friction model with values `[F]`."""
         patch = self.patch
         if "contact_radius" in self.names:
-            centre = patch.centre_of_pressure()
-            scale = values[self.names.index("contact_radius")] / patch.contact_radius()
-            positions = centre + scale * (patch.positions - centre)
-            patch = ContactPatch(positions, scale**2 * patch.areas, patch.weights() / patch.areas, None, patch.name)
+            patch = scaled_patch(patch, values[self.names.index("contact_radius")] / patch.contact_radius())
         return self.build(patch, self.fitted_law(values))
 
-    def spread(self, offs: Sequence[np.ndarray]) -> np.ndarray:
-        """Spread of the residuals of each channel `[3]`; that of x and y is the same."""
-        counts = np.array([len(slide.time) for slide in self.slides])
-        total = 3 * float(self.weights @ counts)
-        free = total / max(total - len(self.names) - 6 * float(self.weights.sum()), 1.0)
-        each = np.array([np.sum(off**2, axis=0) for off in offs])
-        squares = free * (self.weights @ each) / (self.weights @ counts)
-        across = np.sqrt(0.5 * (squares[0] + squares[1]))
-        return np.maximum([across, across, np.sqrt(squares[2])], 1e-9)
-
-    def offs(self, values: np.ndarray) -> list[np.ndarray]:
-        """Measured minus simulated poses of each slide `[T, 3]`."""
+    def poses(self, values: np.ndarray) -> list[np.ndarray]:
+        """Simulate the poses `[T, 3]` of each slide from its best start so far."""
         model, both = self.fitted_model(values), zip(self.slides, self.starts, strict=True)
-        return [slide.pose - slide_poses(model, self.body, slide.time, s[:3], s[3:]) for slide, s in both]
+        return [slide_poses(model, self.body, slide.time, s[:3], s[3:]) for slide, s in both]
 
-    def residuals(self, coordinates: Coordinates, noise: np.ndarray):
-        """Function of the coordinates: residuals at the best starts and their derivatives with the starts free."""
+    def even_sigma(self, noise: np.ndarray) -> list[np.ndarray]:
+        """Return the same noise for all samples, `[T, 3]` of each slide."""
+        rows = np.broadcast_to(noise, (len(self.slides), 3))
+        return [np.broadcast_to(row, slide.pose.shape) for row, slide in zip(rows, self.slides, strict=True)]
 
-        def evaluate(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            offs, slopes = self.weighted(*self.linearised(coordinates.values(x), noise))
-            pull, per_pull = coordinates.prior(x)
-            return np.concatenate([*offs, pull]), np.concatenate(
-                [np.concatenate(slopes) @ coordinates.slopes(x), per_pull]
-            )
+    def estimate_noise(self, values: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Estimate the noise `[S, 3]`, equal for x and y, from the residuals at `values`, and sigma of each sample."""
+        residuals = [slide.pose - poses for slide, poses in zip(self.slides, self.poses(values), strict=True)]
+        weighed = np.ones(len(self.slides))
+        if self.robust:
+            before = np.atleast_2d(noise).min(axis=0)
+            weighed = weights(np.array([np.sqrt(np.mean((each / before) ** 2)) for each in residuals]))
+        counts = weighed @ [len(slide.time) for slide in self.slides]
+        unknown = len(self.names) + 6.0 * weighed.sum()
+        squares = weighed @ [np.sum(each**2, axis=0) for each in residuals] / counts
+        squares = squares * 3.0 * counts / max(3.0 * counts - unknown, 1.0)
+        across = np.sqrt(0.5 * (squares[0] + squares[1]))
+        channels = np.maximum([across, across, np.sqrt(squares[2])], LEAST_NOISE)
+        with np.errstate(divide="ignore"):
+            noise = channels / np.sqrt(weighed)[:, None]
+        return noise, self.even_sigma(noise)
 
-        return evaluate
+    def linearised(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """Compute the residuals over `sigma`, `[M]`, at the best starts, and derivatives `[M, F]` with the starts free.
 
-    def weighted(self, offs: list[np.ndarray], slopes: list[np.ndarray]) -> tuple[list[np.ndarray], list[np.ndarray]]:
-        """Residuals and derivatives of each slide with the root of its weight."""
-        roots = np.sqrt(self.weights)
-        pairs = zip(roots, offs, slopes, strict=True)
-        both = [(root * off, root * slope) for root, off, slope in pairs]
-        return [off for off, _ in both], [slope for _, slope in both]
-
-    def linearised(self, values: np.ndarray, noise: np.ndarray) -> tuple[list[np.ndarray], list[np.ndarray]]:
-        """Scaled residuals `[3 T]` of each slide and derivatives `[3 T, F]`, the start of each following."""
+        The start answers every change: `q' = -B^+ (r, J)` with B of the poses from which it is estimated.
+        """
+        noise = np.min([each[0] for each in sigma], axis=0)
         model = self.fitted_model(values)
         changes = CHANGE * np.maximum(np.abs(values), np.abs(self.start_values()) + 1e-2 * (values == 0.0))
-        changed = [
-            self.fitted_model(values + change * row) for change, row in zip(changes, np.eye(len(values)), strict=True)
-        ]
-        offs, slopes = [], []
+        changed = [self.fitted_model(values + row) for row in np.diag(changes)]
+        residuals, jacobian = [], []
         for i, slide in enumerate(self.slides):
             if i % 20 == 0:
-                self.say(f"slide {i + 1} of {len(self.slides)}, " + ", ".join(f"{v:.4g}" for v in values))
+                self.report(f"slide {i + 1} of {len(self.slides)}, " + ", ".join(f"{v:.4g}" for v in values))
             if self._turns > 0:
                 part = slide if self.samples is None else slide.first(self.samples)
                 self.starts[i] = improve_start(model, self.body, part, self.starts[i], noise, self._turns)
@@ -235,89 +241,72 @@ class _Fit:
                 (slide_poses(each, self.body, slide.time, start[:3], start[3:]) - poses) / change
                 for each, change in zip(changed, changes, strict=True)
             ]
-            off = ((poses - slide.pose) / noise).ravel()
-            slope = (np.stack(of_values, -1) / noise[:, None]).reshape(len(off), -1)
-            # The start answers to every change: q' = -B+ (off, slope) with B of the poses it is estimated from.
-            basis = (of_start / noise[:, None]).reshape(len(off), 6)
+            residual = ((poses - slide.pose) / noise).ravel()
+            slope = (np.stack(of_values, -1) / noise[:, None]).reshape(len(residual), -1)
+            basis = (of_start / noise[:, None]).reshape(len(residual), 6)
             known = None if self.samples is None else 3 * self.samples
-            answer = np.linalg.lstsq(basis[:known], np.column_stack([off, slope])[:known], rcond=None)[0]
+            answer = np.linalg.lstsq(basis[:known], np.column_stack([residual, slope])[:known], rcond=None)[0]
             self.starts[i] = start - answer[:, 0]
-            offs.append(off - basis @ answer[:, 0])
-            slopes.append(slope - basis @ answer[:, 1:])
+            weight = (noise / sigma[i]).reshape(-1)
+            residuals.append(weight * (residual - basis @ answer[:, 0]))
+            jacobian.append(weight[:, None] * (slope - basis @ answer[:, 1:]))
         self._turns = 0
-        return offs, slopes
+        return np.concatenate(residuals), np.concatenate(jacobian)
 
-    def result(self, coordinates: Coordinates, minimum, noise: np.ndarray, left_out: dict[str, str]) -> Identification:
-        values = coordinates.values(minimum.x)
-        offs, slopes = self.linearised(values, noise)
-        plain = np.array([np.sqrt(np.mean(off**2)) for off in offs])
-        offs, slopes = self.weighted(offs, slopes)
-        spread = self._covariance(offs, slopes, ~minimum.at_bound)
-        votes = np.stack([slope.T @ off for off, slope in zip(offs, slopes, strict=True)])
-        alone = covariance(np.concatenate(slopes), ~minimum.at_bound)
-        moved = votes @ alone if np.isfinite(alone).all() else np.zeros_like(votes)
-        errors, together = np.sqrt(np.diag(spread)), correlations(spread)
-        model = self.fitted_model(values)
-        histories = []
-        for slide, start in zip(self.slides, self.starts, strict=True):
-            poses = slide_poses(model, self.body, slide.time, start[:3], start[3:])
-            histories.append(
-                {"name": slide.name, "time": slide.time, "measured": slide.pose, "predicted": poses, "start": start}
-            )
-        return Identification(
-            names=self.names,
-            values=values,
-            standard_errors=errors,
-            correlations=together,
-            verdicts=(
-                *self._verdicts(values, errors, together, minimum.at_bound),
-                *verdicts_on_slides(
-                    left_out, plain / np.median(plain), self.weights, self.slides, moved, self.names, errors
-                ),
-            ),
-            noise=noise,
-            channels=CHANNELS,
-            histories=tuple(histories),
-            law=self.fitted_law(values),
-            model=model,
-            starts=(minimum.agreeing, 1),
-        )
 
-    def _covariance(self, offs, slopes, free) -> np.ndarray:
-        """Covariance `[F, F]` in which each slide votes as one: `H^-1 (sum g g') H^-1 n/(n - 1)`, vote `g = J' r`."""
-        plain = covariance(np.concatenate(slopes), free)
-        if np.count_nonzero(self.weights) < 2 or not np.isfinite(plain).all():
-            return plain
-        votes = np.stack([slope.T @ off for off, slope in zip(offs, slopes, strict=True)])
-        return plain @ (votes.T @ votes) @ plain * len(votes) / (len(votes) - 1)
+def _identification(fit: Fit, problem: SlideProblem, left_out: Sequence[Verdict]) -> Identification:
+    """Make the result of a fit of slides."""
+    noise = fit.noise.min(axis=0)
+    covariance, moved, jacobian = uncertainty_over_slides(fit)
+    errors, together = np.sqrt(np.diag(covariance)), correlations(covariance)
+    poses, starts = problem.poses(fit.values), np.stack(problem.starts)
+    left = [np.sqrt(np.mean(((s.pose - p) / noise) ** 2)) for s, p in zip(problem.slides, poses, strict=True)]
+    evidence = Evidence(
+        names=problem.names,
+        values=fit.values,
+        errors=errors,
+        correlations=together,
+        at_bound=fit.at_bound,
+        jacobian=jacobian,
+        speeds=np.outer(np.hypot(starts[:, 3], starts[:, 4]), FADING).ravel(),
+        spins=np.outer(float(problem.patch.contact_radius()) * np.abs(starts[:, 5]), FADING).ravel(),
+        loads=np.array([problem.body.mass * problem.body.gravity]),
+    )
+    weighed = np.min((noise / fit.noise) ** 2, axis=1)
+    verdicts = (
+        *_verdicts(evidence, int((weighed > 0.0).sum())),
+        *verdicts_on_turns(problem.slides),
+        *left_out,
+        *verdicts_on_weights(problem.slides, weighed, left / np.median(left)),
+        *verdicts_on_influence(problem.slides, moved, problem.names, errors),
+    )
+    histories = [
+        {"name": slide.name, "time": slide.time, "measured": slide.pose, "predicted": predicted, "start": start}
+        for slide, start, predicted in zip(problem.slides, problem.starts, poses, strict=True)
+    ]
+    return Identification(
+        names=problem.names,
+        values=fit.values,
+        standard_errors=errors,
+        correlations=together,
+        verdicts=verdicts,
+        noise=noise,
+        channels=CHANNELS,
+        histories=tuple(histories),
+        law=problem.fitted_law(fit.values),
+        model=problem.fitted_model(fit.values),
+        starts=fit.starts,
+    )
 
-    def _verdicts(self, values, errors, together, at_bound) -> tuple[Verdict, ...]:
-        verdicts = []
-        starts = np.stack(self.starts)
-        speed = np.hypot(starts[:, 3], starts[:, 4])
-        spin = float(self.patch.contact_radius()) * np.abs(starts[:, 5])
-        for i, name in enumerate(self.names):
-            vague = not errors[i] < VAGUE * abs(values[i])
-            row = np.abs(together[i]) * (np.arange(len(values)) != i)
-            other = int(np.argmax(row))
-            if at_bound[i]:
-                verdicts.append(Verdict(name, False, f"the fit ran into the bound {values[i]:.3g}"))
-            elif name == "contact_radius" and np.sqrt(np.mean(spin**2)) < NO_SPIN * np.sqrt(np.mean(speed**2)):
-                verdicts.append(Verdict(name, False, "no spin"))
-            elif row[other] > TOGETHER:
-                text = f"cannot be separated from {self.names[other]} (correlation {together[i, other]:.2f})"
-                verdicts.append(Verdict(name, not vague or name == "sigma_2", text))
-            elif name == "sigma_2" and values[i] < 1.96 * errors[i]:
-                verdicts.append(
-                    Verdict(
-                        name, True, f"cannot be distinguished from 0, at most {values[i] + 1.96 * errors[i]:.3g} s/m"
-                    )
-                )
-            elif vague and name != "sigma_2":
-                verdicts.append(
-                    Verdict(name, False, f"standard error {100 * errors[i] / abs(values[i]):.0f} % of the estimate")
-                )
-        count = int((self.weights > 0.0).sum())
-        if count < 10:
-            verdicts.append(Verdict("fit", False, f"the errors come from only {count} slides"))
-        return (*verdicts, *verdicts_on_turns(self.slides))
+
+def _verdicts(evidence: Evidence, slides: int) -> list[Verdict]:
+    """Return the verdicts on the parameters, and on the number of slides."""
+    found = []
+    for i, name in enumerate(evidence.names):
+        verdict = judge_parameter(evidence, i)
+        if name == "contact_radius" and not evidence.spinning:  # the spread over few slides may be small by chance
+            verdict = Verdict(name, False, "no spin")
+        found += [] if verdict is None else [verdict]
+    if slides < FEW:
+        found.append(Verdict("fit", False, f"the errors come from only {slides} slides"))
+    return found

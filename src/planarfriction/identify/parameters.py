@@ -1,12 +1,13 @@
-"""What can be identified: names, units, bounds, and how each parameter enters the reduced model.
+"""Parameters that can be identified: names, units, bounds, and how each enters the law, the patch and the model.
 
-A *vector* below is the model's own: `derivatives.PARAMETERS` in order. *Values* are what is asked for, by name; the
+A *vector* is the model's own: `derivatives.PARAMETERS` in order. *Values* are the requested parameters by name; the
 optimiser sees *coordinates*, in which a factor counts the same up and down (a logarithm) wherever a value must be > 0.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+import dataclasses
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,11 +16,13 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.derivatives import PARAMETERS
 from planarfriction.errors import InvalidValueError
+from planarfriction.laws import ElastoPlastic, LuGre
+from planarfriction.patch import ContactPatch
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One quantity that can be identified."""
+    """Quantity that can be identified."""
 
     unit: str
     """SI unit."""
@@ -28,7 +31,7 @@ class Parameter:
     high: float
     """Largest value that the fit may try [unit]."""
     logarithmic: bool = True
-    """Whether the optimiser sees its logarithm."""
+    """True if the optimiser sees the logarithm of the quantity."""
 
 
 LAW = {
@@ -61,18 +64,17 @@ SOFT_FINGER = {
 ALL = {**LAW, **SHAPE, **SOFT_FINGER}
 
 USUAL = ("mu_c", "mu_s", "v_s", "gamma", "sigma_0", "sigma_1", "sigma_2", "contact_radius")
-"""What `identify_lugre` estimates by default."""
-
+"""Parameters that `identify_lugre` estimates by default."""
 
 PRIOR = 3.0
-"""Spread of the logarithms that the search takes for granted: a factor of 20."""
+"""Standard deviation of logarithms a priori: a factor of 20."""
 
 SHAPE_PRIOR = 1.0
-"""That of the Stribeck exponent's logarithm and of `mu_s/mu_c - 1`."""
+"""Standard deviation a priori of the logarithm of the Stribeck exponent, and of `mu_s/mu_c - 1`."""
 
 
 def check_names(names: Sequence[str], known: Collection[str] = tuple(ALL)) -> tuple[str, ...]:
-    """The names, each one of the `known` and given once."""
+    """Return the names as a tuple, each one of the `known` and given once, or raise InvalidValueError."""
     names = tuple(validation.choices("parameters", (names,) if isinstance(names, str) else names, known))
     for name in names:
         if names.count(name) > 1:
@@ -87,80 +89,111 @@ def check_names(names: Sequence[str], known: Collection[str] = tuple(ALL)) -> tu
 
 
 class Coordinates:
-    """Between values `[F]` of the chosen parameters and the optimiser's coordinates `[F]`.
+    """Map between values `[F + K]` of the contact and of the rig and the optimiser's coordinates `[F + K]`.
 
-    `mu_s` becomes its excess `mu_s/mu_c - 1 >= 0`, so that no step can bring it below `mu_c`; other parameters > 0
-    become the logarithm of their ratio to the start, the rest multiples of their scale.
+    `mu_s` becomes `mu_s/mu_c - 1 >= 0`, so that no step can bring it below `mu_c`; other parameters > 0 become the
+    logarithm of their ratio to the start, the rest multiples of their scale. Values of the rig begin at zero and become
+    multiples of their `widths` `[K]`, up to `limits` `[K]` of them.
     """
 
-    def __init__(self, names: Sequence[str], start: np.ndarray, held_mu_c: float):
-        self.names = tuple(names)
-        self.start = np.asarray(start, dtype=float)
-        self._held_mu_c = held_mu_c
-        self._excess = self.names.index("mu_s") if "mu_s" in self.names else None
+    def __init__(
+        self, names: Sequence[str], start: np.ndarray, held_mu_c: float, widths: Any = (), limits: Any = ()
+    ) -> None:
+        self.names, count = tuple(names), len(names)
+        self.rig = np.arange(count + len(widths)) >= count
+        self.start = np.concatenate([np.asarray(start, dtype=float)[:count], np.zeros(len(widths))])
+        self._held_mu_c, self._limits = held_mu_c, np.asarray(limits, dtype=float)
+        self._mu_s = self.names.index("mu_s") if "mu_s" in self.names else None
         self._mu_c = self.names.index("mu_c") if "mu_c" in self.names else None
-        self.logarithmic = np.array([ALL[name].logarithmic and name != "mu_s" for name in self.names])
-        scale = np.where(self.start != 0.0, np.abs(self.start), 1.0)
-        self.scale = np.where([name == "mu_s" for name in self.names], 1.0, scale)
+        self.logarithmic = np.zeros(len(self.start), dtype=bool)
+        self.logarithmic[:count] = [ALL[name].logarithmic and name != "mu_s" for name in self.names]
+        self.scale = np.where(self.start != 0.0, np.abs(self.start), 1.0)
+        self.scale[:count][[name == "mu_s" for name in self.names]] = 1.0
+        self.scale[self.rig] = widths
 
     def bounds(self) -> tuple[np.ndarray, np.ndarray]:
-        """Bounds of the coordinates."""
-        low = np.array([ALL[name].low for name in self.names])
-        high = np.array([ALL[name].high for name in self.names])
-        bounds = []
-        for edge in (low, high):
-            bound = edge / self.scale
+        """Return the lower and the upper bounds of the coordinates, `[F + K]` each."""
+        low, high = -np.inf * np.ones(len(self.start)), np.inf * np.ones(len(self.start))
+        low[self.rig], high[self.rig] = -self._limits, self._limits
+        for bound, edges in ((low, [ALL[name].low for name in self.names]), (high, [ALL[n].high for n in self.names])):
+            bound[~self.rig] = edges / self.scale[~self.rig]
             bound[self.logarithmic] = np.log(bound[self.logarithmic])
-            bounds.append(bound)
-        if self._excess is not None:
-            bounds[0][self._excess], bounds[1][self._excess] = 0.0, 5.0
-        return bounds[0], bounds[1]
+        if self._mu_s is not None:
+            low[self._mu_s], high[self._mu_s] = 0.0, 5.0
+        return low, high
 
     def of(self, values: np.ndarray) -> np.ndarray:
-        """Coordinates of values, moved inside the bounds."""
-        result = np.asarray(values, dtype=float) / self.scale
+        """Return the coordinates of values `[F]` or `[F + K]`, moved inside the bounds; the rig's are 0 without any."""
+        padded = np.concatenate([values, np.zeros(len(self.scale) - len(values))])
+        result = padded / self.scale
         result[self.logarithmic] = np.log(np.maximum(result[self.logarithmic], 1e-300))
-        if self._excess is not None:
-            result[self._excess] = values[self._excess] / self._mu(values) - 1.0
+        if self._mu_s is not None:
+            result[self._mu_s] = values[self._mu_s] / self._mu(values) - 1.0
         return np.clip(result, *self.bounds())
 
     def prior(self, coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Weak pull to the start, `[F]` and its derivatives `[F, F]`: keeps what the data leave open where it began.
+        """Compute a weak pull to the start, `[F + K]`, and its derivatives `[F + K, F + K]`.
 
-        In units of the noise of one residual, one for every factor of `PRIOR`: what the data give to 10 % is moved by a
-        thousandth of its error. The linear coordinates, whose scale is a guess, are left alone.
+        It keeps at the start what the data leave open. In units of the noise of one residual it is one for every factor
+        of `PRIOR`, so that a parameter known to 10 % is moved by a thousandth of its error. The linear coordinates of
+        the contact, whose scale is a guess, are left alone.
         """
-        width = np.where(self.logarithmic, PRIOR, np.inf)
-        for name, value in (("gamma", SHAPE_PRIOR), ("mu_s", SHAPE_PRIOR)):
+        width = np.where(self.rig, 1.0, np.where(self.logarithmic, PRIOR, np.inf))
+        for name in ("gamma", "mu_s"):
             if name in self.names:
-                width[self.names.index(name)] = value
+                width[self.names.index(name)] = SHAPE_PRIOR
         return (coordinates - self.of(self.start)) / width, np.diag(1.0 / width)
 
     def values(self, coordinates: np.ndarray) -> np.ndarray:
-        """Values `[F]` of coordinates."""
+        """Return the values `[F + K]` of coordinates."""
         result = self.scale * np.where(
             self.logarithmic, np.exp(np.where(self.logarithmic, coordinates, 0.0)), coordinates
         )
-        if self._excess is not None:
-            result[self._excess] = self._mu(result) * (1.0 + coordinates[self._excess])
+        if self._mu_s is not None:
+            result[self._mu_s] = self._mu(result) * (1.0 + coordinates[self._mu_s])
         return result
 
     def slopes(self, coordinates: np.ndarray) -> np.ndarray:
-        """`d values / d coordinates`, `[F, F]`."""
+        """Compute the derivatives of the values with respect to the coordinates, `[F + K, F + K]`."""
         values = self.values(coordinates)
         result = np.diag(np.where(self.logarithmic, values, self.scale))
-        if self._excess is not None:
-            result[self._excess, self._excess] = self._mu(values)
+        if self._mu_s is not None:
+            result[self._mu_s, self._mu_s] = self._mu(values)
             if self._mu_c is not None:
-                result[self._excess, self._mu_c] = (1.0 + coordinates[self._excess]) * values[self._mu_c]
+                result[self._mu_s, self._mu_c] = (1.0 + coordinates[self._mu_s]) * values[self._mu_c]
         return result
 
     def _mu(self, values: np.ndarray) -> float:
         return self._held_mu_c if self._mu_c is None else float(values[self._mu_c])
 
 
-class Shape:
-    """How the values enter the vector of the model at one load: the law directly, the shape through its constants."""
+def fitted_law(law: LuGre, given: Mapping[str, float]) -> LuGre:
+    """Return the law with estimates by name; a `mu_s` that was held grows with a `mu_c` that passes it."""
+    fields: dict[str, Any] = {name: given[name] for name in LAW if name in given and name != "breakaway_ratio"}
+    fields["mu_s"] = max(fields.get("mu_s", law.mu_s), fields.get("mu_c", law.mu_c))
+    if "breakaway_ratio" in given:
+        fields["elasto_plastic"] = ElastoPlastic(given["breakaway_ratio"])
+    return dataclasses.replace(law, **fields)
+
+
+def scaled_patch(patch: ContactPatch, scale: float, centre: Any = None) -> ContactPatch:
+    """Return the patch times `scale` about its centre of pressure, its grid too, with that centre moved to `centre`.
+
+    The new centre `[2]` [m] is the old one by default.
+    """
+    old = patch.centre_of_pressure()
+    new = old if centre is None else centre
+    grid = patch.grid
+    if grid is not None:
+        x, y = new + scale * (np.array([grid.x_min, grid.y_min]) - old)
+        size = {"cell_width": scale * grid.cell_width, "cell_height": scale * grid.cell_height}
+        grid = dataclasses.replace(grid, x_min=float(x), y_min=float(y), **size)
+    positions = new + scale * (patch.positions - old)
+    return ContactPatch(positions, scale**2 * patch.areas, patch.weights() / patch.areas, grid, patch.name)
+
+
+class VectorMap:
+    """Map from values to the vector of the model at one load: the law directly, the shape through its constants."""
 
     def __init__(self, names: Sequence[str], base: np.ndarray, patch: Any, normal_force: float):
         self.names, self.base = tuple(names), np.array(base, dtype=float)
@@ -169,11 +202,11 @@ class Shape:
         self._finger = patch.pressure if any(name in SOFT_FINGER for name in names) else None
 
     def vector(self, values: np.ndarray) -> np.ndarray:
-        """Vector `[P]` of the model for values `[F]`."""
+        """Return the vector `[P]` of the model for values `[F]`."""
         return self._evaluate(values)[0]
 
     def slopes(self, values: np.ndarray) -> np.ndarray:
-        """`d vector / d values`, `[P, F]`."""
+        """Compute the derivatives of the vector with respect to the values, `[P, F]`."""
         return self._evaluate(values)[1]
 
     def _evaluate(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -201,9 +234,10 @@ class Shape:
 
 
 def soft_finger_moments(finger: Any, normal_force: float, given: dict[str, Any]):
-    """Contact radius and `<rho^2>` of a soft finger at a load, each with its slopes: `((r, {name: dr}), (m, {...}))`.
+    """Compute contact radius and `<rho^2>` of a soft finger with their derivatives: `((r, {name: dr}), (m, {...}))`.
 
-    Of the profile `p ~ (1 - (s/R)^k)^(1/k)` on the continuous disc: `<s^j> = R^j B((j+2)/k, 1+1/k) / B(2/k, 1+1/k)`.
+    The profile `p ~ (1 - (s/R)^k)^(1/k)` on the continuous disc has the moments
+    `<s^j> = R^j B((j+2)/k, 1+1/k) / B(2/k, 1+1/k)`.
     `given` replaces constants of the `finger` by name.
     """
     from scipy.special import betaln
@@ -226,7 +260,7 @@ def soft_finger_moments(finger: Any, normal_force: float, given: dict[str, Any])
 
 
 def _log_beta_slope(a: float, k: float) -> float:
-    """`d/dk log B(a/k, 1 + 1/k)`."""
+    """Compute `d/dk log B(a/k, 1 + 1/k)`."""
     from scipy.special import digamma
 
     both = digamma((a + 1) / k + 1)

@@ -1,8 +1,9 @@
-"""The least-squares problem: logs, a model whose parameters vary, residuals over the noise."""
+"""Least-squares problems: predictions of a model whose parameters vary minus measurements, over their noise."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,168 +12,273 @@ from planarfriction import validation
 from planarfriction.derivatives import PARAMETERS, parameters_of
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify import parameters as known
-from planarfriction.identify.least_squares import covariance
 from planarfriction.identify.logs import Log
-from planarfriction.identify.nuisance import GROUPS, Rig
-from planarfriction.identify.parameters import Coordinates, Shape
-from planarfriction.identify.prediction import Prediction
-from planarfriction.identify.sensors import QUIET, SmoothTwist, as_measured, smoothed, wrench_noise
-from planarfriction.identify.simulators import MODELS, RADIUS, simulator
-from planarfriction.laws import LuGre
-from planarfriction.limit_surface import LimitSurface
+from planarfriction.identify.parameters import Coordinates, VectorMap
+from planarfriction.identify.rig import GROUPS, Rig, as_measured, check_groups, smoothed, wrench_noise
+from planarfriction.identify.simulators import RADIUS, SIMULATORS, Prediction
+from planarfriction.identify.uncertainty import covariance
+from planarfriction.laws import ElastoPlastic, LuGre
+from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
 from planarfriction.limit_surface.base import scaling
 from planarfriction.models import ReducedModelPublished
 from planarfriction.patch import ContactPatch, SoftFinger
 
+BEGINS = ("rest", "steady")
+
 COARSE = 0.2
-"""Error that the steps make, as a share of a standard error, above which they are halved."""
+"""Largest error of an estimate from the size of the steps, as a share of its standard error."""
 
 KNOWN = 0.3
-"""Standard error, as a share of an estimate, up to which that estimate is used for this."""
+"""Standard error, as a share of an estimate, up to which that estimate decides on the steps."""
 
 FINEST = 32
 """Most steps between two samples."""
 
 CONSTANT = 0.1
-"""Share by which the load of a log may stray from its mean where the patch changes with the load."""
+"""Share by which the load of a log may stray from its mean if the patch changes with the load."""
+
+
+@dataclass(frozen=True)
+class FitOptions:
+    """Options of `identify_lugre` that few fits change.
+
+    Raises InvalidValueError for an option that breaks its rule.
+    """
+
+    nuisance: Sequence[str] = GROUPS
+    """Disturbances that the rig may add: "delay" between motion and wrench, "bias" (zeros of the wrench and their
+    drift), "load" (scale and drift of the load cell), "twist" (noise of the twist). All by default."""
+    noise: Sequence[float] | None = None
+    """Standard deviation of the measured fx, fy [N] and tau [N m]; None estimates each from its jitter."""
+    begins: str = "rest"
+    """Bristles at the begin of every log: relaxed ("rest"), or as in steady sliding at the first twist ("steady")."""
+    refine: int | None = None
+    """Steps between two samples; None doubles them until no estimate changes by more than a fifth of its error."""
+    starts: int = 4
+    """Number of starting points."""
+    seed: int = 0
+    """Random seed that scatters the starting points."""
+    elasto_plastic: ElastoPlastic | float | None = ElastoPlastic(0.9)  # noqa: RUF009 (frozen)
+    """Kind of bristles, unless a whole law is given as start."""
+    surface: type[LimitSurface] = LimitSurfaceTablePublished
+    """Class of the limit surface of the model "reduced-published"."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "nuisance", check_groups(self.nuisance))
+        if self.noise is not None:
+            object.__setattr__(self, "noise", tuple(check_noise(self.noise).tolist()))
+        validation.choice("begins", self.begins, BEGINS)
+        if self.refine is not None:
+            validation.count("refine", self.refine)
+        validation.count("starts", self.starts)
+        validation.count("seed", self.seed, 0)
+        if not (isinstance(self.surface, type) and issubclass(self.surface, LimitSurface)):
+            raise InvalidValueError("surface", "be a class of limit surfaces", self.surface)
 
 
 class Problem:
-    """Logs, a model, the rig, and the values that vary: F of the contact, then K of the rig."""
+    """Measurements, a model, and the values that vary: F of the contact, then K of the rig.
 
-    def __init__(self, logs, patch, names, law, surface: Any, begins, refine, model="reduced-published", groups=GROUPS):
-        self.logs, self.names, self.law, self.patch = logs, names, law, patch
-        self.kind, self.surface = model, surface
-        finger = [name for name in names if name in known.SOFT_FINGER]
-        if finger:
-            _check_finger(patch, finger)
+    Subclasses predict what was measured, and estimate its noise.
+    """
+
+    names: tuple[str, ...]
+    """Names of the parameters of the contact, `[F]`."""
+    law: LuGre
+    """Law that holds the values of parameters that are not estimated."""
+    least_change = 0.0
+    """Least relative change of the cost for which a search goes on."""
+    steps = 1
+    """Number of steps between two samples."""
+
+    def coordinates(self, start: np.ndarray) -> Coordinates:
+        """Return the optimiser's coordinates for a search from values `[F]`."""
+        return Coordinates(self.names, start, self.law.mu_c)
+
+    @property
+    def numbers(self) -> int:
+        """Number of measured numbers."""
+        raise NotImplementedError
+
+    def linearised(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """Compute the residuals over `sigma`, `[M]`, and their derivatives `[M, F + K]` with respect to the values."""
+        raise NotImplementedError
+
+    def sizes(self) -> list[int]:
+        """Return the number of residuals of each log or slide."""
+        raise NotImplementedError
+
+    def even_sigma(self, noise: np.ndarray) -> list[np.ndarray]:
+        """Return the same noise for all samples, `[T, 3]` of each log or slide."""
+        raise NotImplementedError
+
+    def estimate_noise(self, values: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Estimate the noise at `values`, from the `noise` of before; returns it with sigma `[T, 3]` of each sample."""
+        raise NotImplementedError
+
+    def refine_steps(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> bool:
+        """Take more steps between two samples if the estimates ask for it; returns True if they do."""
+        return False
+    def residuals(
+        self, coordinates: Coordinates, sigma: Sequence[np.ndarray]
+    ) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
+        """Return the function of the coordinates that least squares minimises, with its derivatives."""
+
+        def evaluate(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            residual, jacobian = self.linearised(coordinates.values(x), sigma)
+            pull, per_pull = coordinates.prior(x)
+            return np.concatenate([residual, pull]), np.concatenate([jacobian @ coordinates.slopes(x), per_pull])
+
+        return evaluate
+
+    def by_log(self, rows: np.ndarray) -> Iterator[np.ndarray]:
+        """Yield the rows `[T, 3, C]` of each log or slide among flat ones `[M, C]`."""
+        at = 0
+        for size in self.sizes():
+            yield rows[at : at + size].reshape(-1, 3, rows.shape[1])
+            at += size
+
+
+class LogProblem(Problem):
+    """Logs of twist and wrench, a model, and the rig that measured them."""
+
+    def __init__(
+        self,
+        logs: Sequence[Log],
+        patch: ContactPatch,
+        names: tuple[str, ...],
+        law: LuGre,
+        options: FitOptions,
+        model: str = "reduced-published",
+    ) -> None:
+        self.logs, self.patch, self.names, self.law = logs, patch, names, law
+        self.options, self.model = options, model
+        _check_finger(patch, [name for name in names if name in known.SOFT_FINGER])
         loads = [mean_load(log) for log in logs]
         _check_wrenches(logs)
+        self.reference_load = float(np.median(loads))
+        self.fixed_patch = patch
         if patch.depends_on_load:
             _check_constant(logs, loads)
-        self.reference = float(np.median(loads))
-        self.model = fixed_model(patch, law, surface, self.reference)
-        base = parameters_of(self.model)
-        self.shapes = [Shape(names, base, patch, load) for load in loads]
-        if patch.depends_on_load and not finger:
-            for shape, load in zip(self.shapes, loads, strict=True):
-                _follow_load(shape.base, patch, load)
-        self.begins, self.refine = begins, refine
-        self.rig = Rig(logs, groups)
-        self.twists = [smoothed(log) if "twist" in groups else as_measured(log) for log in logs]
+            density = patch.weights(self.reference_load) / patch.areas
+            self.fixed_patch = ContactPatch(patch.positions, patch.areas, density, patch.grid, patch.name)
+        self.maps = self._maps(loads)
+        self.rig = Rig(logs, options.nuisance)
+        self.twists = [smoothed(log) if "twist" in options.nuisance else as_measured(log) for log in logs]
         # A log at rest has no sample before its first step; its first wrench shows bristles that nobody knows.
-        self.used = [slice(1 if begins == "rest" else 0, None) for _ in logs]
-        self.use(model)
-
-    def use(self, kind: str) -> None:
-        """Predict by another model from now on."""
-        self.kind = kind
-        self.simulator = simulator(kind, self.model.patch, self.law, self.surface)
-        if kind != MODELS[0]:  # a contact radius as the patch has it, where that of a surface is a number of its own
-            for shape in self.shapes:
-                shape.base[RADIUS] = float(self.model.patch.contact_radius())
-        self.predictions = self._predictions(self.refine)
+        self.used = [slice(1 if options.begins == "rest" else 0, None) for _ in logs]
+        self.simulator = SIMULATORS[model](self.fixed_patch, law, options.surface)
+        self.steps = options.refine or 1
+        self.predictions = self._predictions(self.steps)
         self._last: tuple[np.ndarray, list[tuple[np.ndarray, np.ndarray]]] | None = None
 
-    def _predictions(self, refine: int) -> list[Prediction]:
-        return [
-            Prediction(self.simulator, log, twist.values, begins=self.begins, refine=refine)
-            for log, twist in zip(self.logs, self.twists, strict=True)
-        ]
+    def _maps(self, loads: Sequence[float]) -> list[VectorMap]:
+        """Make the map from values to the vector of the model at the load of each log."""
+        patch = self.patch
+        base = parameters_of(SIMULATORS["reduced-published"].model(self.fixed_patch, self.law, self.options.surface))
+        self.base = dict(zip(PARAMETERS, base.tolist(), strict=True))
+        maps = [VectorMap(self.names, base, patch, load) for load in loads]
+        for each, load in zip(maps, loads, strict=True):
+            if patch.depends_on_load and not any(name in known.SOFT_FINGER for name in self.names):
+                x, y = patch.centre_of_pressure(load)
+                shape = {"contact_radius": patch.contact_radius(load), "second_moment": patch.second_moment(load)}
+                for name, value in {**shape, "centre_x": x, "centre_y": y}.items():
+                    each.base[PARAMETERS.index(name)] = float(value)
+            if not SIMULATORS[self.model].own_radius:  # the radius of the cells, where that of a surface is its own
+                each.base[RADIUS] = float(self.fixed_patch.contact_radius())
+        return maps
+
+    def _predictions(self, steps: int, twists: Sequence[np.ndarray] | None = None) -> list[Prediction]:
+        twists = [each.values for each in self.twists] if twists is None else twists
+        begins = self.options.begins
+        both = zip(self.logs, twists, strict=True)
+        return [Prediction(self.simulator, log, twist, begins=begins, refine=steps) for log, twist in both]
 
     @property
     def work(self) -> float:
         """Rough time of one evaluation with derivatives [s]."""
         return 2e-6 * sum(each.steps for each in self.predictions) * self.simulator.work(len(self.names))
 
-    def refine_by(self, factor: int) -> None:
-        """Take so many times as many steps."""
-        self.refine *= factor
-        self.predictions = self._predictions(self.refine)
-        self._last = None
+    @property
+    def numbers(self) -> int:
+        """Number of measured numbers."""
+        return sum(int(log.channels.sum()) * len(log.time) for log in self.logs)
 
-    def finer(self, values: np.ndarray, spread: Sequence[np.ndarray]) -> int:
-        """Factor of steps that keeps an estimate from moving by more than `COARSE` of its standard error; 1 if none.
+    def coordinates(self, start: np.ndarray) -> Coordinates:
+        """Return the optimiser's coordinates for a search from values `[F]`, with those of the rig."""
+        return Coordinates(self.names, start, self.law.mu_c, self.rig.widths, self.rig.limits)
 
-        From what twice as many steps would move, as errors fall with the square of their number.
+    def sizes(self) -> list[int]:
+        """Return the number of residuals of each log."""
+        return [3 * len(log.time[used]) for log, used in zip(self.logs, self.used, strict=True)]
+
+    def refine_steps(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> bool:
+        """Take as many steps as keep the estimates within `COARSE` standard errors; returns True if these are more.
+
+        Their number follows from the change of the residuals with twice as many steps, as errors fall with its square.
         """
-        if self.refine >= FINEST:
-            return 1
-        off, jacobian = self.linearised(values, spread)
-        finer = self._scaled(self.shown(values, self._predictions(2 * self.refine)), spread)
+        if self.options.refine is not None or self.steps >= FINEST:
+            return False
+        residual, jacobian = self.linearised(values, sigma)
+        twice = self._scaled(self.shown(values, self._predictions(2 * self.steps)), sigma)
         count = len(self.names)
         pull = np.diag(1.0 / self.rig.widths)
         rows = np.concatenate([np.zeros((len(pull), count)), pull], axis=1)
         inverse = covariance(np.concatenate([jacobian, rows]), np.full(len(values), True))
         errors = np.sqrt(np.diag(inverse))[:count]
-        known = errors < KNOWN * np.abs(values[:count])
-        moved = (np.where(np.isfinite(inverse), inverse, 0.0) @ (jacobian.T @ (finer - off)))[:count]
-        most = float((np.abs(moved)[known] / (COARSE * errors[known])).max(initial=0.0))
-        return min(int(2 ** np.ceil(0.5 * np.log2(most))), FINEST // self.refine) if most > 1.0 else 1
+        sure = errors < KNOWN * np.abs(values[:count])
+        moved = (np.where(np.isfinite(inverse), inverse, 0.0) @ (jacobian.T @ (twice - residual)))[:count]
+        most = float((np.abs(moved)[sure] / (COARSE * errors[sure])).max(initial=0.0))
+        if most <= 1.0:
+            return False
+        self.steps *= min(int(2 ** np.ceil(0.5 * np.log2(most))), FINEST // self.steps)
+        self.predictions, self._last = self._predictions(self.steps), None
+        return True
 
-    def start_values(self, law: LuGre) -> np.ndarray:
-        """Values `[F]` of the names in a law, a patch and its pressure."""
-        base = dict(zip(PARAMETERS, parameters_of(self.model), strict=True))
-        values = {**base, **{name: getattr(law, name) for name in known.LAW if name != "breakaway_ratio"}}
+    def start_values(self) -> np.ndarray:
+        """Return the values `[F]` of the names in the law, the patch and its pressure."""
+        values = {**self.base, **{name: getattr(self.law, name) for name in known.LAW if name != "breakaway_ratio"}}
         if any(name in known.SOFT_FINGER for name in self.names):
             values |= {name: getattr(self.patch.pressure, name) for name in known.SOFT_FINGER}
         return np.array([float(values[name]) for name in self.names])
 
     def split(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Values of the contact `[F]` and of the rig `[K]` (zeros where there are none)."""
+        """Split values into those of the contact `[F]` and of the rig `[K]` (zeros if there are none)."""
         count = len(self.names)
         rig = values[count:] if len(values) > count else np.zeros(len(self.rig.columns))
         return values[:count], rig
 
     def shown(self, values: np.ndarray, predictions: Sequence[Prediction] | None = None) -> list[np.ndarray]:
-        """Wrenches `[T, 3]` that the sensors of each log should show, for values `[F]` or `[F + K]`."""
+        """Compute the wrenches `[T, 3]` that the sensors of each log should show, for values `[F]` or `[F + K]`."""
         if predictions is None and self._last is not None and np.array_equal(self._last[0], values):
             return [shown for shown, _ in self._last[1]]
         contact, rig = self.split(values)
         result = []
-        for i, (p, shape) in enumerate(zip(predictions or self.predictions, self.shapes, strict=True)):
-            wrench = p.wrenches(shape.vector(contact), self.rig.delay(rig))
+        for i, (prediction, each) in enumerate(zip(predictions or self.predictions, self.maps, strict=True)):
+            wrench = prediction.wrenches(each.vector(contact), self.rig.delay(rig))
             result.append(self.rig.added(i, rig, wrench, np.zeros_like(wrench))[0])
         return result
 
-    def residuals(self, coordinates: Coordinates, spread: Sequence[np.ndarray]):
-        """Function of the coordinates that returns predicted minus measured over their spread, and derivatives.
-
-        Coordinates `[F + K]`: those of the contact, then the values of the rig over their widths.
-        """
-        count, widths = len(self.names), self.rig.widths
-
-        def evaluate(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            off, slopes = self.linearised(np.concatenate([coordinates.values(x[:count]), x[count:] * widths]), spread)
-            pull, per_pull = coordinates.prior(x[:count])
-            inner = block_diag(coordinates.slopes(x[:count]), np.diag(widths))
-            return (
-                np.concatenate([off, pull, x[count:]]),
-                np.concatenate([slopes @ inner, block_diag(per_pull, np.eye(len(widths)))]),
-            )
-
-        return evaluate
-
-    def linearised(self, values: np.ndarray, spread: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        """Scaled residuals `[M]` and their derivatives `[M, F + K]` with respect to the values."""
-        offs, slopes = [], []
-        both = zip(self._derived(values), self.logs, self.used, spread, strict=True)
+    def linearised(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
+        """Compute the residuals over `sigma`, `[M]`, and their derivatives `[M, F + K]` with respect to the values."""
+        residuals, slopes = [], []
+        both = zip(self._derived(values), self.logs, self.used, sigma, strict=True)
         for (shown, derivatives), log, used, each in both:
             seen = (log.channels / each)[used]
-            offs.append(((shown - log.wrench)[used] * seen).ravel())
+            residuals.append(((shown - log.wrench)[used] * seen).ravel())
             slopes.append((derivatives[used] * seen[:, :, None]).reshape(-1, derivatives.shape[-1]))
-        return np.concatenate(offs), np.concatenate(slopes)
+        return np.concatenate(residuals), np.concatenate(slopes)
 
     def _derived(self, values: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Wrenches `[T, 3]` that the sensors should show and their derivatives `[T, 3, F + K]`; the last are kept."""
+        """Compute shown wrenches `[T, 3]` and their derivatives `[T, 3, F + K]`; the last ones are remembered."""
         if self._last is None or not np.array_equal(self._last[0], values):
             contact, rig = self.split(values)
             found = []
-            for i, (prediction, shape) in enumerate(zip(self.predictions, self.shapes, strict=True)):
-                per_value = shape.slopes(contact)
+            for i, (prediction, each) in enumerate(zip(self.predictions, self.maps, strict=True)):
+                per_value = each.slopes(contact)
                 rows = np.flatnonzero(per_value.any(axis=1))
                 wrench, slope, later = prediction.sensitivities(
-                    shape.vector(contact), [PARAMETERS[row] for row in rows], self.rig.delay(rig)
+                    each.vector(contact), [PARAMETERS[row] for row in rows], self.rig.delay(rig)
                 )
                 shown, factor, of_rig = self.rig.added(i, rig, wrench, later)
                 slope = factor[:, None, None] * (slope @ per_value[rows])
@@ -180,119 +286,98 @@ class Problem:
             self._last = values.copy(), found
         return self._last[1]
 
-    def off(self, values: np.ndarray, spread: Sequence[np.ndarray]) -> np.ndarray:
-        """Scaled residuals `[M]`."""
-        return self._scaled(self.shown(values), spread)
+    def residual(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> np.ndarray:
+        """Compute the residuals over `sigma`, `[M]`."""
+        return self._scaled(self.shown(values), sigma)
 
-    def _scaled(self, wrenches: Sequence[np.ndarray], spread: Sequence[np.ndarray]) -> np.ndarray:
-        """Wrenches minus the measured ones over their spread, all used samples flat."""
-        both = zip(wrenches, self.logs, self.used, spread, strict=True)
+    def _scaled(self, wrenches: Sequence[np.ndarray], sigma: Sequence[np.ndarray]) -> np.ndarray:
+        """Subtract the measured wrenches and divide by `sigma`; returns all used samples flat."""
+        both = zip(wrenches, self.logs, self.used, sigma, strict=True)
         return np.concatenate(
             [((wrench - log.wrench) * (log.channels / each))[used].ravel() for wrench, log, used, each in both]
         )
 
-    def noise(self, values: np.ndarray) -> np.ndarray:
-        """Noise of each channel `[3]`, from the jitter of the signals or of the residuals."""
-        return wrench_noise(self.logs, [m - log.wrench for m, log in zip(self.shown(values), self.logs, strict=True)])
-
-    def evenly(self, noise: np.ndarray) -> list[np.ndarray]:
-        """The same noise for all samples, `[T, 3]` of each log."""
+    def even_sigma(self, noise: np.ndarray) -> list[np.ndarray]:
+        """Return the same noise for all samples, `[T, 3]` of each log."""
         return [np.broadcast_to(noise, log.wrench.shape) for log in self.logs]
 
-    def spread(self, values: np.ndarray, noise: np.ndarray) -> list[np.ndarray]:
-        """Spread of the residuals `[T, 3]` of each log: noise of the wrench, and what that of the twist makes of it.
+    def estimate_noise(self, values: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
+        """Estimate the noise of each channel `[3]`, unless it is given, and sigma `[T, 3]` of each log's residuals."""
+        if self.options.noise is None:
+            both = zip(self.shown(values), self.logs, strict=True)
+            noise = wrench_noise(self.logs, [shown - log.wrench for shown, log in both])
+        return noise, self.sigma(values, noise)
 
-        To first order: how each sample answers if the twists before it were all off by what smoothing left of them.
+    def sigma(self, values: np.ndarray, noise: np.ndarray) -> list[np.ndarray]:
+        """Compute the standard deviation `[T, 3]` of each log's residuals from the noise `[3]` and that of the twist.
+
+        The latter adds, to first order, the change of each sample if the twists before it were all off by the error
+        that smoothing left of them.
         """
         contact, _ = self.split(values)
-        result = []
-        for p, shape, log, twist in zip(self.predictions, self.shapes, self.logs, self.twists, strict=True):
+        sigma = []
+        for prediction, each, log, twist in zip(self.predictions, self.maps, self.logs, self.twists, strict=True):
             square = np.broadcast_to(noise**2, log.wrench.shape).copy()
-            vector = shape.vector(contact)
-            base = None
-            for k in np.flatnonzero(self._noisy(twist)):
-                base = p.wrenches(vector) if base is None else base
-                square += (p.moved(vector, twist.left[k] * np.eye(3)[k]) - base) ** 2
-            result.append(np.sqrt(square))
-        return result
+            vector = each.vector(contact)
+            channels = np.flatnonzero(twist.noisy & ("twist" in self.rig.groups))
+            base = prediction.wrenches(vector) if len(channels) else None
+            for k in channels:
+                square += (prediction.moved(vector, twist.left[k] * np.eye(3)[k]) - base) ** 2
+            sigma.append(np.sqrt(square))
+        return sigma
 
-    def _noisy(self, twist: SmoothTwist) -> np.ndarray:
-        """Channels whose noise counts, `[3]` of bool."""
-        size = np.maximum(np.sqrt(np.mean(twist.values**2, axis=0)), np.finfo(float).tiny)
-        return (twist.left > QUIET * size) & ("twist" in self.rig.groups)
+    def twist_residuals(self, values: np.ndarray, sigma: Sequence[np.ndarray], draws: int) -> np.ndarray | None:
+        """Compute the changes `[draws, M]` of the residuals over `sigma` for drawn errors of the twists.
 
-    def shaken(self, values: np.ndarray, spread: Sequence[np.ndarray], draws: int) -> np.ndarray | None:
-        """What `draws` errors of the twists make of the scaled residuals, `[draws, M]`; None without noise.
-
-        The draws are always the same ones.
+        The draws are always the same ones. Returns None if no twist has noise.
         """
-        if not any(self._noisy(twist).any() for twist in self.twists):
+        noisy = [twist.noisy & ("twist" in self.rig.groups) for twist in self.twists]
+        if not np.any(noisy):
             return None
-        contact, rig = self.split(values)
         random, base = np.random.default_rng(0), self.shown(values)
         result = []
         for _ in range(draws):
-            shown = []
-            for i, (log, twist, shape) in enumerate(zip(self.logs, self.twists, self.shapes, strict=True)):
-                moved = twist.values + np.where(self._noisy(twist), twist.error(random), 0.0)
-                p = Prediction(self.simulator, log, moved, begins=self.begins, refine=self.refine)
-                wrench = p.wrenches(shape.vector(contact), self.rig.delay(rig))
-                shown.append(self.rig.added(i, rig, wrench, np.zeros_like(wrench))[0])
+            both = zip(self.twists, noisy, strict=True)
+            drawn = [twist.values + np.where(on, twist.error(random), 0.0) for twist, on in both]
+            shown = self.shown(values, self._predictions(self.steps, drawn))
             change = [new - old + log.wrench for new, old, log in zip(shown, base, self.logs, strict=True)]
-            result.append(self._scaled(change, spread))
+            result.append(self._scaled(change, sigma))
         return np.array(result)
 
     def sliding(self, values: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-        """Sliding speed `|V_S|` and its part from spin [m/s], `[T]` each, of each log."""
+        """Compute the sliding speed `|V_S|` and its part from spin [m/s], `[T]` each, of each log."""
         contact, _ = self.split(values)
         result = []
-        for twist, shape in zip(self.twists, self.shapes, strict=True):
-            vector = dict(zip(PARAMETERS, shape.vector(contact), strict=True))
+        for twist, each in zip(self.twists, self.maps, strict=True):
+            vector = dict(zip(PARAMETERS, each.vector(contact), strict=True))
             centre = np.array([vector["centre_x"], vector["centre_y"]])
             scaled = twist.values @ scaling(centre, vector["contact_radius"]).T
             result.append((np.linalg.norm(scaled, axis=1), np.abs(scaled[:, 2])))
         return result
 
 
-def block_diag(one: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Two matrices along a diagonal."""
-    result = np.zeros((one.shape[0] + other.shape[0], one.shape[1] + other.shape[1]))
-    result[: one.shape[0], : one.shape[1]] = one
-    result[one.shape[0] :, one.shape[1] :] = other
-    return result
-
-
-def fixed_model(patch: ContactPatch, law: LuGre, surface: Any, load: float) -> ReducedModelPublished:
-    """The reduced model of the patch's shape at one load."""
-    if not (isinstance(surface, type) and issubclass(surface, LimitSurface)):
-        raise InvalidValueError("surface", "be a class of limit surfaces", surface)
-    if patch.depends_on_load:
-        weights = patch.weights(load)
-        patch = ContactPatch(patch.positions, patch.areas, weights / patch.areas, patch.grid, patch.name)
-    return ReducedModelPublished(patch, law, surface=surface(patch))
-
-
-def _follow_load(vector: np.ndarray, patch: ContactPatch, load: float) -> None:
-    """Write the moments of the patch at a load into the vector of the model."""
-    x, y = patch.centre_of_pressure(load)
-    shape = {"contact_radius": patch.contact_radius(load), "second_moment": patch.second_moment(load)}
-    for name, value in {**shape, "centre_x": x, "centre_y": y}.items():
-        vector[PARAMETERS.index(name)] = float(value)
-
-
-def _check_finger(patch: ContactPatch, names: Sequence[str]) -> None:
-    if not isinstance(patch.pressure, SoftFinger):
-        raise InvalidValueError("patch", f"have a SoftFinger pressure to estimate {', '.join(names)}", patch.name)
-    for name in ("k", "k_per_newton"):
-        if name in names and getattr(patch.pressure, name) is None:
-            raise InvalidValueError("parameters", f"contain {name} only if the SoftFinger has it", name)
+def check_noise(noise: Any) -> np.ndarray:
+    """Return the noise `[3]`, all of it > 0, or raise InvalidValueError."""
+    values = validation.vector("noise", noise, 3)
+    if not (values > 0.0).all():
+        raise InvalidValueError("noise", "be > 0", values.tolist())
+    return values
 
 
 def mean_load(log: Log) -> float:
+    """Return the mean of the loads > 0 of a log [N], or raise InvalidValueError."""
     loaded = log.normal_force[log.normal_force > 0.0]
     if not len(loaded):
         raise InvalidValueError(f"normal_force of {log.name}", "be > 0 somewhere", "0 everywhere")
     return float(loaded.mean())
+
+
+def _check_finger(patch: ContactPatch, names: Sequence[str]) -> None:
+    if names and not isinstance(patch.pressure, SoftFinger):
+        raise InvalidValueError("patch", f"have a SoftFinger pressure to estimate {', '.join(names)}", patch.name)
+    for name in ("k", "k_per_newton"):
+        if name in names and getattr(patch.pressure, name) is None:
+            raise InvalidValueError("parameters", f"contain {name} only if the SoftFinger has it", name)
 
 
 def _check_wrenches(logs: Sequence[Log]) -> None:
@@ -308,10 +393,3 @@ def _check_constant(logs: Sequence[Log], loads: Sequence[float]) -> None:
             raise InvalidValueError(
                 f"normal_force of {log.name}", rule, f"{log.normal_force.min():g} .. {log.normal_force.max():g} N"
             )
-
-
-def given_noise(noise: Any) -> np.ndarray:
-    values = validation.vector("noise", noise, 3)
-    if not (values > 0.0).all():
-        raise InvalidValueError("noise", "be > 0", values.tolist())
-    return values

@@ -5,59 +5,22 @@ from __future__ import annotations
 import dataclasses
 import html
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.described import described
 from planarfriction.equality import ByValue
-from planarfriction.identify.choice import ModelScore
-from planarfriction.identify.nuisance import Nuisance
 from planarfriction.identify.parameters import ALL
+from planarfriction.identify.rig import Nuisance
+from planarfriction.identify.verdicts import ModelScore, Verdict, interval
 from planarfriction.laws import LuGre
 from planarfriction.pictures import picture
 
-TWO_SIDED = 1.96
-"""Standard errors on either side of the estimate that hold 95 % of a normal distribution."""
-
-
-@described
-@dataclass(frozen=True)
-class Verdict:
-    """What the data show about one parameter, or about the fit as a whole (`parameter` is then "fit")."""
-
-    parameter: str
-    """Name of the parameter, or "fit"."""
-    identifiable: bool
-    """Whether the data determine the parameter; for the fit, whether nothing is wrong."""
-    reason: str
-    """Why not, or a caution."""
-
-    def __str__(self) -> str:
-        if self.parameter == "fit":
-            return f"fit: {self.reason}"
-        return f"{self.parameter}: {'' if self.identifiable else 'not identifiable, '}{self.reason}"
-
-
-def verdicts_on_turns(measured: Sequence[Any]) -> list[Verdict]:
-    """What was done to the angles of logs or slides."""
-    turned = {each.name: each.turns for each in measured if each.turns}
-    if not turned:
-        return []
-    count = f"{sum(turned.values())} jumps of theta by a whole turn were taken out"
-    return [Verdict("fit", True, f"{count}, in {', '.join(list(turned)[:3])}{' ...' if len(turned) > 3 else ''}")]
-
-
-def interval(name: str, value: float, error: float) -> tuple[float, float]:
-    """95 % interval [SI]: symmetric as factors for parameters that are > 0, else as differences."""
-    if ALL[name].logarithmic and value > 0.0:
-        with np.errstate(over="ignore"):
-            factor = float(np.exp(TWO_SIDED * error / value))
-        return float(value / factor), float(value * factor)
-    return max(float(value - TWO_SIDED * error), ALL[name].low), float(value + TWO_SIDED * error)
+WIDTH = 80
+"""Columns of a table."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -69,7 +32,7 @@ class Identification(ByValue):
     values: np.ndarray
     """Estimates [SI], `[F]`."""
     standard_errors: np.ndarray
-    """Their standard errors [SI], `[F]`; infinite if the data do not determine a value, zero for one at its bound."""
+    """Standard errors [SI], `[F]`; infinite if the data do not determine a value, zero for one at its bound."""
     correlations: np.ndarray
     """Correlations of the estimates [-], `[F, F]`."""
     verdicts: tuple[Verdict, ...]
@@ -79,15 +42,16 @@ class Identification(ByValue):
     channels: tuple[tuple[str, str], ...]
     """Name and unit of the measured channels, such as ("fx", "N"), `[C]`."""
     histories: tuple[Mapping[str, Any], ...] = field(repr=False)
-    """Of each log or slide: "name", "time" `[T]`, "measured" (NaN for what was not) and "predicted" `[T, C]`. For logs
-    with wrenches also "held_out" `[T, C]`, as fits predict it that saw neither the sample nor its block (NaN at a start
-    from rest), "speed" `[T]` [m/s], the sliding speed `|V_S|`, and "coefficient" `[T]` [-], friction by load."""
+    """History of each log or slide: "name", "time" `[T]`, "measured" (NaN for what was not) and "predicted" `[T, C]`.
+    For logs with wrenches also "held_out" `[T, C]`, as fits predict it that saw neither the sample nor its block (NaN
+    at a start from rest), "speed" `[T]` [m/s], the sliding speed `|V_S|`, and "coefficient" `[T]` [-], friction by
+    load."""
     law: LuGre
     """The fitted law; parameters that were not estimated are as given."""
     model: Any = field(repr=False)
     """The fitted friction model."""
     starts: tuple[int, int]
-    """How many starting points ended in this minimum, and how many there were."""
+    """Number of starting points that ended in this minimum, and number of all."""
     rig: tuple[Nuisance, ...] = ()
     """Estimated disturbances of the rig: delay, zeros, drift of the load cell, noise of the twist."""
     scores: tuple[ModelScore, ...] = ()
@@ -97,31 +61,32 @@ class Identification(ByValue):
 
     @property
     def residuals(self) -> list[np.ndarray]:
-        """(Measured - predicted) / noise, `[T, C]` for each log or slide; NaN where nothing was measured."""
+        """Residuals (measured - predicted) / noise, `[T, C]` for each log or slide; NaN where nothing was measured."""
         return [(each["measured"] - each["predicted"]) / self.noise for each in self.histories]
 
     @property
     def estimates(self) -> dict[str, float]:
-        """The estimates by name [SI]."""
+        """Estimates by name [SI]."""
         return dict(zip(self.names, self.values.tolist(), strict=True))
 
     @property
     def errors(self) -> dict[str, float]:
-        """The standard errors by name [SI]."""
+        """Standard errors by name [SI]."""
         return dict(zip(self.names, self.standard_errors.tolist(), strict=True))
 
     def intervals(self) -> dict[str, tuple[float, float]]:
-        """95 % intervals [SI]: symmetric as factors for parameters that are > 0, else as differences."""
+        """Compute the 95 % intervals [SI]: symmetric as factors for parameters that are > 0, else as differences."""
         both = zip(self.names, self.values, self.standard_errors, strict=True)
         return {name: interval(name, value, error) for name, value, error in both}
 
     def identifiable(self, name: str) -> bool:
-        """Whether the data determine this parameter."""
+        """Return True if the data determine this parameter."""
         return not any(each.parameter == name and not each.identifiable for each in self.verdicts)
 
     def residual_correlations(self, lags: int = 50) -> np.ndarray:
-        """Autocorrelations of the residuals at 0 to `lags` samples, `[lags + 1, C]`; for pure noise all but the first
-        are 0.
+        """Compute the autocorrelations of the residuals at 0 to `lags` samples, `[lags + 1, C]`.
+
+        Those of pure noise are 0 from a lag of one sample on.
 
         Raises InvalidValueError unless `lags` is a count.
         """
@@ -135,7 +100,7 @@ class Identification(ByValue):
         return sums / np.where(sums[0] > 0.0, sums[0], 1.0)
 
     def summary(self) -> str:
-        """The verdict in plain words: what the data determine, and whether the fit can be trusted."""
+        """Return the verdict in plain words: the parameters that the data determine, and the trust in the fit."""
         known = [name for name in self.names if self.identifiable(name)]
         lines = [f"Identified: {', '.join(known)}." if known else "None of the parameters is identifiable."]
         if 0 < len(known) < len(self.names):
@@ -144,7 +109,7 @@ class Identification(ByValue):
         return "\n".join(textwrap.fill(line, WIDTH) for line in lines)
 
     def rows(self) -> list[list[str]]:
-        """Table of text: name, estimate, standard error, 95 % interval, unit, verdict; one row for each parameter."""
+        """Return a row of text for each parameter: name, estimate, standard error, 95 % interval, unit, verdict."""
         rows = []
         intervals = self.intervals()
         for name, value, error in zip(self.names, self.values, self.standard_errors, strict=True):
@@ -164,7 +129,7 @@ class Identification(ByValue):
         return rows
 
     def table(self) -> str:
-        """The summary, then a table in 80 columns: estimates, 95 % intervals, cautions, and disturbances of the rig."""
+        """Return the summary and a table in 80 columns: estimates, 95 % intervals, cautions, and the rig."""
         lines, remarks, intervals = [], [], self.intervals()
         for name, value in zip(self.names, self.values, strict=True):
             identifiable = self.identifiable(name)
@@ -197,7 +162,7 @@ class Identification(ByValue):
         return f"<pre>{html.escape(self.table())}</pre>"
 
     def to_dict(self) -> dict[str, Any]:
-        """Everything except the histories as plain data for JSON (None for infinite values)."""
+        """Return everything except the histories as plain data for JSON (None for infinite values)."""
 
         def plain(value: float) -> float | None:
             return float(value) if np.isfinite(value) else None
@@ -243,17 +208,13 @@ class Identification(ByValue):
         return picture("identification", self)
 
 
-WIDTH = 80
-"""Columns of a table."""
-
-
 def _sentence(text: str) -> str:
-    """Words as a sentence."""
+    """Return words as a sentence."""
     return f"{text[0].upper()}{text[1:]}."
 
 
 def _short(each: Nuisance) -> str:
-    """Name of a quantity of the rig, with its log."""
+    """Return the name of a quantity of the rig, with its log, in 27 letters."""
     room = 24 - len(each.name)
     log = each.log if len(each.log) <= room else f"{each.log[: max(room - 2, 0)]}.."
     return f"{each.name} ({log})" if log else each.name

@@ -1,16 +1,17 @@
-"""The search for the best values: several starts, noise from the signal, steps as fine as the errors ask for."""
+"""The search for the best values: starting points, bounded least squares, noise from what is left, finer steps."""
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from planarfriction.identify.guess import misfit
-from planarfriction.identify.least_squares import Minimum, minimise
-from planarfriction.identify.parameters import Coordinates
-from planarfriction.identify.problem import Problem
+from planarfriction.identify.parameters import ALL, Coordinates
+from planarfriction.identify.problem import LogProblem, Problem
+from planarfriction.identify.simulators import RADIUS
+from planarfriction.laws import LuGre
 
 ROUGH, FINE = 0.1, 1e-3
 """Changes of the cost (half a sum of squares) below which a search ends, for rough starts and in the end: 0.001 is a
@@ -20,15 +21,30 @@ ROUNDS = 6
 """Most rounds of noise and finer steps."""
 
 STEADY = 0.02
-"""Share by which the noise may still change from round to round."""
+"""Largest change of the noise, as a share, from round to round for which it is settled."""
 
 NEAR = 4.0
 """Mean square of the residuals over that of the noise up to which a rough fit is near the data: steps are coarse."""
 
+SAME_COST = 1e-3
+"""Largest difference of costs, as a share, between starts that found the same minimum."""
+
+MOST_EVALUATIONS = 100
+"""Most evaluations of one start."""
+
+SPEEDS, STIFFNESSES = 6, 7
+"""Size of the grid of Stribeck speeds and stiffnesses from which a search starts."""
+
+SCATTER = 0.7
+"""Standard deviation of the logarithms of starts around a given one."""
+
+Report = Callable[[str], None]
+"""Function that receives lines of text about the progress."""
+
 
 @dataclass(frozen=True)
 class Fit:
-    """A model at its best values."""
+    """Problem with its best values."""
 
     problem: Problem
     coordinates: Coordinates
@@ -37,99 +53,196 @@ class Fit:
     values: np.ndarray
     """Values `[F + K]`."""
     at_bound: np.ndarray
-    """Which coordinates lie on a bound, `[F + K]` of bool."""
+    """Mask of the coordinates that lie on a bound, `[F + K]`."""
     noise: np.ndarray
-    """Noise of the wrench `[3]`."""
-    spread: list[np.ndarray]
-    """Spread of each sample `[T, 3]` of each log."""
+    """Noise of each channel, `[3]`, or of the channels of each slide, `[S, 3]`."""
+    sigma: list[np.ndarray]
+    """Standard deviation of each residual, `[T, 3]` of each log or slide."""
     starts: tuple[int, int]
-    """How many starting points led to this minimum, and how many there were."""
+    """Number of starting points that led to this minimum, and number of all."""
     cost: float
     """Half the sum of the squared residuals."""
 
     @property
     def near(self) -> bool:
-        """Whether hardly more than noise is left."""
-        return 2.0 * self.cost <= NEAR * _measured(self.problem)
+        """True if hardly more than noise is left."""
+        return 2.0 * self.cost <= NEAR * self.problem.numbers
 
 
-def look(problem: Problem, starts: Sequence[np.ndarray], *, noise: np.ndarray, say: Callable[[str], None]) -> Fit:
-    """The best rough fit from starts `[F]` or `[F + K]`, with the same noise for all samples of a channel."""
-    count, widths = len(problem.names), problem.rig.widths
-    coordinates = Coordinates(problem.names, starts[0][:count], problem.law.mu_c)
-    spread, points = problem.evenly(noise), []
-    for each in starts:
-        values, rig = problem.split(each)
-        points.append(np.concatenate([coordinates.of(values), rig / widths]))
-    found = _best(problem, coordinates, points, spread, ROUGH, say)
-    values = _values(problem, coordinates, found.x)
-    return Fit(
-        problem, coordinates, found.x, values, found.at_bound, noise, spread, (found.agreeing, len(starts)), found.cost
-    )
+def multistart(problem: Problem, starts: Sequence[np.ndarray], *, noise: np.ndarray, report: Report) -> Fit:
+    """Find the best rough fit from starts `[F]` or `[F + K]`, with the same noise for all samples of a channel."""
+    coordinates, sigma = problem.coordinates(starts[0]), problem.even_sigma(noise)
+    points = [coordinates.of(each) for each in starts]
+    return _best(problem, coordinates, points, noise, sigma, ROUGH, report)
 
 
-def refined(fit: Fit, *, known_noise: bool, fixed_steps: bool, say: Callable[[str], None]) -> Fit:
-    """The best fit that a rough one leads to: noise from what is left, steps as fine as the errors ask for."""
-    problem, coordinates, x, noise = fit.problem, fit.coordinates, fit.x, fit.noise
-    spread = fit.spread
+def refine(fit: Fit, *, report: Report) -> Fit:
+    """Find the best fit that a rough one leads to: noise from what is left, steps as fine as the errors ask for."""
+    problem, coordinates, starts = fit.problem, fit.coordinates, fit.starts
     for turn in range(ROUNDS):
-        values = _values(problem, coordinates, x)
-        before = noise
-        if not known_noise:
-            noise = problem.noise(values)
-        spread = problem.spread(values, noise)
-        known = np.isfinite(noise)
-        settled = turn > 0 and bool((np.abs(noise[known] / before[known] - 1.0) < STEADY).all())
-        factor = 1 if fixed_steps else problem.finer(values, spread)
-        if factor > 1:
-            problem.refine_by(factor)
-            say(f"{problem.refine} steps between two samples")
+        noise, sigma = problem.estimate_noise(fit.values, fit.noise)
+        settled = turn > 0 and np.allclose(noise, fit.noise, rtol=STEADY, atol=0.0)
+        finer = problem.refine_steps(fit.values, sigma)
+        if finer:
+            report(f"{problem.steps} steps between two samples")
         elif settled:
             break
-        x = _best(problem, coordinates, [x], spread, ROUGH if factor > 1 else FINE, say).x
-    found = _best(problem, coordinates, [x], spread, FINE, say)
-    values = _values(problem, coordinates, found.x)
-    return Fit(problem, coordinates, found.x, values, found.at_bound, noise, spread, fit.starts, found.cost)
+        fit = _best(problem, coordinates, [fit.x], noise, sigma, ROUGH if finer else FINE, report)
+    found = _best(problem, coordinates, [fit.x], noise, sigma, FINE, report)
+    return dataclasses.replace(found, starts=starts)
 
 
-def follow(
-    problem: Problem, lead: Fit, guesses: Sequence[np.ndarray], *, noise: np.ndarray, say: Callable[[str], None]
+def warm_start(
+    problem: LogProblem, lead: Fit, guesses: Sequence[np.ndarray], *, noise: np.ndarray, report: Report
 ) -> Fit:
-    """The best rough fit of another model than that of `lead`.
+    """Find the best rough fit of another model than that of `lead`.
 
-    It begins where the lead ended, if that is near the data, else at the best of the `guesses` `[F]`: a model that does
-    not fit ends far away. Where this does not come near the data, the other start is tried too.
+    The search begins where the lead ended, if that is near the data, else at the best of the `guesses` `[F]`: a model
+    that does not fit ends far away. If this does not come near the data, the other start is tried too.
     """
     guess = min(guesses, key=lambda values: misfit(problem, values, noise))
     fits = []
     for start in (lead.values, guess) if lead.near else (guess, lead.values):
-        fits.append(look(problem, [start], noise=noise, say=say))
+        fits.append(multistart(problem, [start], noise=noise, report=report))
         if fits[-1].near:
             break
     return min(fits, key=lambda fit: fit.cost)
-
-
-def _measured(problem: Problem) -> int:
-    """Count of measured numbers."""
-    return sum(int(log.channels.sum()) * len(log.time) for log in problem.logs)
-
-
-def _values(problem: Problem, coordinates: Coordinates, x: np.ndarray) -> np.ndarray:
-    """Values `[F + K]` of coordinates."""
-    count = len(problem.names)
-    return np.concatenate([coordinates.values(x[:count]), x[count:] * problem.rig.widths])
 
 
 def _best(
     problem: Problem,
     coordinates: Coordinates,
     points: Sequence[np.ndarray],
-    spread: Sequence[np.ndarray],
+    noise: np.ndarray,
+    sigma: list[np.ndarray],
     change: float,
-    say: Callable[[str], None],
-) -> Minimum:
-    """The least cost from coordinates, until it changes by less than `change`."""
-    (low, high), (rig_low, rig_high) = coordinates.bounds(), problem.rig.bounds()
-    bounds = np.concatenate([low, rig_low]), np.concatenate([high, rig_high])
-    tolerance = change / (0.5 * _measured(problem))
-    return minimise(problem.residuals(coordinates, spread), points, bounds, tolerance=tolerance, progress=say)
+    report: Report,
+) -> Fit:
+    """Minimise the sum of squares from coordinates `[F + K]` until the cost changes by less than `change`.
+
+    Coordinates at a bound are set to it.
+    """
+    from scipy.optimize import least_squares
+
+    residuals, bounds = problem.residuals(coordinates, sigma), coordinates.bounds()
+    memory: dict[bytes, tuple[np.ndarray, np.ndarray]] = {}
+
+    def evaluate(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        key = x.tobytes()
+        if key not in memory:  # least_squares asks for the residuals, then for their derivatives
+            memory.clear()
+            memory[key] = condensed(*residuals(x))
+        return memory[key]
+
+    found = []
+    for number, point in enumerate(points, start=1):
+        report(f"start {number} of {len(points)}")
+        each = least_squares(
+            lambda x: evaluate(x)[0],
+            point,
+            jac=lambda x: evaluate(x)[1],  # pyright: ignore
+            bounds=bounds,
+            x_scale="jac",
+            xtol=1e-9,
+            ftol=max(change / (0.5 * problem.numbers), problem.least_change),
+            gtol=1e-12,
+            max_nfev=MOST_EVALUATIONS,
+        )
+        found.append(each)
+    best = min(found, key=lambda each: each.cost)
+    agreeing = sum(bool(each.cost <= best.cost * (1.0 + SAME_COST)) for each in found)
+    x = np.where(best.active_mask < 0, bounds[0], np.where(best.active_mask > 0, bounds[1], best.x))
+    starts, cost = (agreeing, len(points)), float(best.cost)
+    return Fit(problem, coordinates, x, coordinates.values(x), best.active_mask != 0, noise, sigma, starts, cost)
+
+
+def condensed(residual: np.ndarray, jacobian: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Reduce residuals `[M]` and derivatives `[M, F]` to `F + 1` rows with the same sums of squares and products.
+
+    They are the triangle of `[J, r] = Q R`: all that least squares needs, at a fraction of the cost.
+    """
+    triangle = np.asarray(np.linalg.qr(np.column_stack([jacobian, residual]), mode="r"))
+    return triangle[:, -1], triangle[:, :-1]
+
+
+# ---------------------------------------------------------------------- starting points
+
+
+def guess_starts(
+    problem: LogProblem, given: dict[str, float] | None, *, starts: int, seed: int, noise: np.ndarray
+) -> list[np.ndarray]:
+    """Return `starts` vectors of values `[F]`, the best first.
+
+    A whole law as start (`given` is None) leads, scattered copies follow. Otherwise the best points of a grid over
+    Stribeck speed and stiffness are taken, with the values `given` by name.
+    """
+    random = np.random.default_rng(seed)
+    if given is None:
+        first = problem.start_values()
+        return [first, *(_scattered(first, problem.names, random) for _ in range(starts - 1))]
+    ranked = sorted(_grid(problem, given), key=lambda values: misfit(problem, values, noise))
+    return ranked[:starts] + [_scattered(ranked[0], problem.names, random) for _ in range(starts - len(ranked))]
+
+
+def _grid(problem: LogProblem, given: dict[str, float]) -> list[np.ndarray]:
+    """Return the values at all points of the grid; a parameter that is not estimated or is given has one value."""
+    base = problem.start_values()
+    speeds = [each[0] for each in problem.sliding(base)]
+    mu_c, mu_s = _friction(problem, speeds)
+    wanted = [name for name in problem.names if name not in given]
+    interval = min(log.interval for log in problem.logs)
+    results = []
+    for v_s in _speeds(np.concatenate(speeds)) if "v_s" in wanted else [problem.law.v_s]:
+        for sigma_0 in _stiffnesses(problem, speeds, mu_c) if "sigma_0" in wanted else [problem.law.sigma_0]:
+            guess = {"mu_c": mu_c, "mu_s": mu_s, "v_s": v_s, "gamma": 1.5, "sigma_0": sigma_0}
+            guess |= {"sigma_1": 0.3 * sigma_0 * interval, "sigma_2": 0.02 * mu_c / max(np.max(speeds[0]), 1e-9)}
+            values = [
+                guess[name] if name in wanted and name in guess else base[i] for i, name in enumerate(problem.names)
+            ]
+            results.append(np.array(values))
+    return results
+
+
+def _friction(problem: LogProblem, speeds: list[np.ndarray]) -> tuple[float, float]:
+    """Estimate the friction coefficients of fast sliding and of the largest friction."""
+    coefficients = []
+    for log, each in zip(problem.logs, problem.maps, strict=True):
+        radius = each.vector(problem.start_values())[RADIUS]
+        force = np.linalg.norm(log.wrench / [1.0, 1.0, radius], axis=1)
+        coefficients.append(force / np.where(log.normal_force > 0.0, log.normal_force, np.nan))
+    coefficient, speed = np.concatenate(coefficients), np.concatenate(speeds)
+    usable = np.isfinite(coefficient)
+    coefficient, speed = coefficient[usable], speed[usable]
+    fast = coefficient[speed >= np.quantile(speed, 0.7)]
+    mu_c = float(np.clip(np.median(fast), 0.01, 10.0))
+    return mu_c, float(np.clip(np.quantile(coefficient, 0.98), 1.1 * mu_c, 2.0 * mu_c))
+
+
+def _speeds(speeds: np.ndarray) -> np.ndarray:
+    """Return Stribeck speeds to try [m/s], spread over the sliding speeds of the logs."""
+    moving = speeds[speeds > 0.0]
+    if not len(moving):
+        return np.array([LuGre.v_s])
+    low, high = np.quantile(moving, [0.05, 0.9])
+    return np.geomspace(max(low, 1e-3 * high), high, SPEEDS)
+
+
+def _stiffnesses(problem: LogProblem, speeds: list[np.ndarray], mu_c: float) -> np.ndarray:
+    """Return stiffnesses to try [1/m]: full deflection after a tenth of a usual step up to a tenth of all travel."""
+    steps = np.concatenate([s[1:] * np.diff(log.time) for s, log in zip(speeds, problem.logs, strict=True)])
+    moving = steps[steps > 0.0]
+    if not len(moving):
+        return np.array([LuGre.sigma_0])
+    short, long = 0.1 * np.median(moving), 0.1 * moving.sum()
+    return np.geomspace(mu_c / short, mu_c / max(long, 10.0 * short), STIFFNESSES)
+
+
+def misfit(problem: LogProblem, values: np.ndarray, noise: np.ndarray) -> float:
+    """Compute the sum of the squared residuals of values `[F]` or `[F + K]` over the noise `[3]`."""
+    return float((problem.residual(values, problem.even_sigma(noise)) ** 2).sum())
+
+
+def _scattered(values: np.ndarray, names: Sequence[str], random: np.random.Generator) -> np.ndarray:
+    factor = np.exp(SCATTER * random.standard_normal(len(values)))
+    positive = np.array([ALL[name].logarithmic or name.startswith("sigma") for name in names])
+    return np.where(positive, values * factor, values)

@@ -1,4 +1,4 @@
-"""The models that can be fitted: wrenches over a row of short steps, and their derivatives by the parameters."""
+"""Models that can be fitted to logs: predicted wrenches at the samples, and their derivatives by the parameters."""
 
 from __future__ import annotations
 
@@ -11,26 +11,30 @@ import numpy as np
 from planarfriction.compiler import threads
 from planarfriction.derivatives import PARAMETERS, rollout, rollout_jacobian
 from planarfriction.formulas import LawNumbers
+from planarfriction.identify.logs import Log
 from planarfriction.kernels import distributed_step
 from planarfriction.laws import LuGre
-from planarfriction.limit_surface import LimitSurface
+from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import ContactPatch
 
-MODELS = ("reduced-published", "distributed", "reduced")
-"""Names of the models that can be fitted, the quickest first."""
-
 CHANGE = 1e-6
-"""Share of a parameter that difference quotients are taken over: rounding and curvature both stay below 1e-5."""
+"""Step of difference quotients as a share of the parameter: rounding and curvature both stay below 1e-5."""
 
 LEAST_CHANGE = {"centre_x": 1e-3, "centre_y": 1e-3}
-"""Sizes [m] that stand for a centre at zero, as shares of nothing are nothing."""
+"""Least sizes [m] of which `CHANGE` is a share: a centre may lie at zero."""
 
 MAP = {"segments": 12, "speeds": 12}
-"""Size of the maps of `ReducedModel` while it is fitted: errors of 2e-4, in a third of the time."""
+"""Size of the maps of `ReducedModel` during a fit: errors of 2e-4, in a third of the time."""
 
 CELLS, DEGREE = 120, 9
-"""Cells of a patch above which it is compressed, and the degree of the moments that this keeps."""
+"""Number of cells above which a patch is compressed, and the degree of the moments that compression keeps."""
+
+STEADY_STEPS = 400
+"""Number of steps with the first twist before a log that begins in steady sliding."""
+
+MOST_STEPS = 2_000_000
+"""Largest number of steps of one log: only very uneven sample times ask for more."""
 
 LAW_NAMES = PARAMETERS[:8]
 
@@ -42,38 +46,54 @@ GAMMA = PARAMETERS.index("gamma")
 class Simulator:
     """Wrenches of a model whose vector of parameters (`derivatives.PARAMETERS`) varies, from bristles at rest.
 
-    Twists `[N, 3]` and loads `[N]` are held for `dt` each; wrenches `[N, 3]` and their derivatives `[N, 3, P]` by the
-    parameters `names` are at the ends of the steps.
+    Twists `[N, 3]` and loads `[N]` are held for `dt` each; wrenches `[N, 3]` and their derivatives `[N, 3, P]` with
+    respect to the parameters `names` are those at the ends of the steps.
     """
 
-    name: str
+    model_class: type
+    """Class of the friction model."""
+    own_radius = False
+    """True if the contact radius is a number of its own, not that of the cells; the patch may then change with load."""
 
+    def __init__(self, patch: ContactPatch, law: LuGre, surface: type[LimitSurface] = LimitSurfaceTablePublished):
+        """Prepare the simulation of a patch of fixed shape."""
+
+    @classmethod
+    def model(cls, patch: ContactPatch, law: LuGre, surface: type[LimitSurface]) -> Any:
+        """Make the friction model of a patch and a law."""
+        return cls.model_class(patch, law)
     def wrenches(self, twists: np.ndarray, loads: np.ndarray, dt: float, vector: np.ndarray) -> np.ndarray:
+        """Compute the wrenches `[N, 3]`."""
         raise NotImplementedError
 
     def sensitivities(
         self, twists: np.ndarray, loads: np.ndarray, dt: float, vector: np.ndarray, names: Sequence[str]
     ) -> tuple[np.ndarray, np.ndarray]:
+        """Compute the wrenches `[N, 3]` and their derivatives `[N, 3, P]`."""
         raise NotImplementedError
 
     def work(self, parameters: int) -> float:
-        """Cost of the derivatives of one step [us], roughly."""
+        """Estimate the time that the derivatives of one step take [us]."""
         raise NotImplementedError
 
 
 class PublishedSimulator(Simulator):
-    """`ReducedModelPublished`, in which contact radius and second moment are numbers of their own."""
+    """Simulator of `ReducedModelPublished`, in which contact radius and second moment are numbers of their own."""
 
-    name = "reduced-published"
+    model_class = ReducedModelPublished
+    own_radius = True
 
-    def __init__(self, model: ReducedModelPublished):
-        self.model = model
+    def __init__(self, patch, law, surface=LimitSurfaceTablePublished):
+        self._model = self.model(patch, law, surface)
+    @classmethod
+    def model(cls, patch, law, surface):
+        return ReducedModelPublished(patch, law, surface=surface(patch))
 
     def wrenches(self, twists, loads, dt, vector):
-        return rollout(self.model, None, twists, loads, dt, parameters=vector).wrenches
+        return rollout(self._model, None, twists, loads, dt, parameters=vector).wrenches
 
     def sensitivities(self, twists, loads, dt, vector, names):
-        found = rollout_jacobian(self.model, None, twists, loads, dt, names, parameters=vector)
+        found = rollout_jacobian(self._model, None, twists, loads, dt, names, parameters=vector)
         return found.wrenches, found.d_wrenches
 
     def work(self, parameters):
@@ -81,17 +101,18 @@ class PublishedSimulator(Simulator):
 
 
 class ScaledSimulator(Simulator):
-    """A model of a fixed patch that is scaled and moved: through its twists and wrenches, which is exact.
+    """Simulator of a fixed patch that is scaled and moved through its twists and wrenches, which is exact.
 
     A point at `p = c + s (p0 - c0)` has the velocity that its image `p0` has at the twist `(v + omega x d, s omega)`,
     `d = c - s c0`, and the torque is `s tau0 + d x f`.
     """
 
     changes: Mapping[str, float] = {}
-    """Other shares than `CHANGE`."""
+    """Steps of difference quotients, as shares of the parameter, of parameters for which `CHANGE` is too small."""
 
-    def __init__(self, patch: ContactPatch, elasto_plastic: bool):
-        self.patch, self.elasto_plastic = _few(patch), elasto_plastic
+    def __init__(self, patch, law, surface=LimitSurfaceTablePublished):
+        self.patch = patch.compressed(degree=DEGREE) if len(patch.positions) > CELLS else patch
+        self._law = law
         self._radius, self._centre = float(patch.contact_radius()), patch.centre_of_pressure()
 
     def wrenches(self, twists, loads, dt, vector):
@@ -109,7 +130,7 @@ class ScaledSimulator(Simulator):
         raise NotImplementedError
 
     def _differences(self, twists, loads, dt, vector, names, base):
-        """Difference quotients, on all processors."""
+        """Compute difference quotients of the wrenches, on all processors."""
         slopes = np.empty((*base.shape, len(names)))
 
         def work(first: int, last: int) -> None:
@@ -125,14 +146,15 @@ class ScaledSimulator(Simulator):
 
 
 class DistributedSimulator(ScaledSimulator):
-    """`DistributedModel`."""
+    """Simulator of `DistributedModel`."""
 
-    name = "distributed"
+    model_class = DistributedModel
 
-    def __init__(self, patch: ContactPatch, elasto_plastic: bool):
-        super().__init__(patch, elasto_plastic)
+    def __init__(self, patch, law, surface=LimitSurfaceTablePublished):
+        super().__init__(patch, law)
         x, y = (np.ascontiguousarray(column) for column in self.patch.positions.T)
         self._cells = distributed_step.Cells(x, y, np.ascontiguousarray(np.atleast_2d(self.patch.weights())))
+
 
     def sensitivities(self, twists, loads, dt, vector, names):
         base = self.wrenches(twists, loads, dt, vector)
@@ -142,7 +164,8 @@ class DistributedSimulator(ScaledSimulator):
         return 0.03 * len(self.patch.positions) * (parameters + 1)
 
     def _inner(self, twists, loads, dt, vector):
-        law = LawNumbers._make([*vector[:7].tolist(), float(self.elasto_plastic), float(vector[7]), 0.0])
+        plastic = float(self._law.elasto_plastic is not None)
+        law = LawNumbers._make([*vector[:7].tolist(), plastic, float(vector[7]), 0.0])
         wrenches = np.zeros((len(twists), 3))
         edges = np.flatnonzero(np.diff(np.concatenate([[0], loads > 0.0, [0]]).astype(int)))
         for first, last in edges.reshape(-1, 2):  # without load the bristles are forgotten
@@ -153,15 +176,14 @@ class DistributedSimulator(ScaledSimulator):
 
 
 class ReducedSimulator(ScaledSimulator):
-    """`ReducedModel`, whose map is rebuilt for each Stribeck exponent."""
+    """Simulator of `ReducedModel`, whose map is rebuilt for each Stribeck exponent."""
 
-    name = "reduced"
+    model_class = ReducedModel
     changes: Mapping[str, float] = {"gamma": 1e-3}
 
-    def __init__(self, patch: ContactPatch, elasto_plastic: bool, law: LuGre):
-        super().__init__(patch, elasto_plastic)
-        self._law, self._models = law, {}
-
+    def __init__(self, patch, law, surface=LimitSurfaceTablePublished):
+        super().__init__(patch, law)
+        self._models: dict[float, ReducedModel] = {}
     def _model(self, gamma: float) -> ReducedModel:
         if gamma not in self._models:
             if len(self._models) > 3:
@@ -195,22 +217,73 @@ class ReducedSimulator(ScaledSimulator):
         return 0.6 * parameters
 
 
-def simulator(name: str, patch: ContactPatch, law: LuGre, surface: type[LimitSurface]) -> Simulator:
-    """The simulator of a model of a patch of fixed shape."""
-    if name == "reduced-published":
-        return PublishedSimulator(ReducedModelPublished(patch, law, surface=surface(patch)))
-    if name == "distributed":
-        return DistributedSimulator(patch, law.elasto_plastic is not None)
-    return ReducedSimulator(patch, law.elasto_plastic is not None, law)
+SIMULATORS: dict[str, type[Simulator]] = {
+    "reduced-published": PublishedSimulator,
+    "distributed": DistributedSimulator,
+    "reduced": ReducedSimulator,
+}
+"""Simulators by the names of their models, the quickest first: a new model needs one class and one line."""
 
 
-def _few(patch: ContactPatch) -> ContactPatch:
-    """The patch with few cells that dissipate as all do; what has few already stays as it is."""
-    return patch.compressed(degree=DEGREE) if len(patch.positions) > CELLS else patch
+class Prediction:
+    """Simulated wrenches of one log, by a model whose vector of parameters varies.
 
+    Between two samples the twist follows cubics that do not overshoot (Akima 1970) and the load is linear; both are
+    held over half steps: node j holds from half a step before it to half a step after it. The displacement of a bristle
+    is then that of the trapezoidal rule, and the wrench belongs to the twist of its sample; the error is of second
+    order in `interval/refine`. Wrenches that come later than the motion by a `delay` [s] are read between the nodes, by
+    cubic polynomials with continuous slopes.
+    """
 
-def model_of(name: str, patch: ContactPatch, law: LuGre, surface: type[LimitSurface]) -> Any:
-    """The friction model by its name."""
-    if name == "reduced-published":
-        return ReducedModelPublished(patch, law, surface=surface(patch))
-    return DistributedModel(patch, law) if name == "distributed" else ReducedModel(patch, law)
+    def __init__(self, simulator: Simulator, log: Log, twist: np.ndarray, *, begins: str = "rest", refine: int = 1):
+        from scipy.interpolate import Akima1DInterpolator
+
+        self.simulator, self.log = simulator, log
+        length = log.time[-1] - log.time[0]
+        steps = len(log.time) - 1 if log.even else int(np.ceil(length / np.diff(log.time).min()))
+        self.steps = min(steps * refine, MOST_STEPS)
+        self._half = 0.5 * length / self.steps
+        grid = np.linspace(log.time[0], log.time[-1], self.steps + 1)
+        twists = Akima1DInterpolator(log.time, twist)(np.clip(grid, log.time[0], log.time[-1]))
+        loads = np.interp(grid, log.time, log.normal_force)
+        order = np.repeat(np.arange(self.steps + 1), 2)[1:-1]  # 0, 1, 1, 2, 2, ..., steps
+        before = np.zeros(STEADY_STEPS if begins == "steady" else 1, dtype=int)
+        order = np.concatenate([before, order])
+        self._inputs = twists[order], loads[order], self._half
+        self._first = len(before) - 1
+
+    def wrenches(self, vector: np.ndarray, delay: float = 0.0) -> np.ndarray:
+        """Compute the wrenches `[T, 3]` at the samples."""
+        return self._read(self._nodes(self.simulator.wrenches(*self._inputs, vector)), delay)[0]
+
+    def moved(self, vector: np.ndarray, change: Sequence[float]) -> np.ndarray:
+        """Compute the wrenches `[T, 3]` at the samples with `change` `[3]` added to all twists."""
+        twists, loads, half = self._inputs
+        return self._read(self._nodes(self.simulator.wrenches(twists + change, loads, half, vector)), 0.0)[0]
+
+    def sensitivities(
+        self, vector: np.ndarray, names: Sequence[str], delay: float = 0.0
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Compute wrenches `[T, 3]` at the samples, derivatives by `names` `[T, 3, P]` and by the delay `[T, 3]`."""
+        values, slopes = self.simulator.sensitivities(*self._inputs, vector, names)
+        wrenches, per_second = self._read(self._nodes(values), delay)
+        return wrenches, self._read(self._nodes(slopes), delay)[0], -per_second
+
+    def _nodes(self, values: np.ndarray) -> np.ndarray:
+        """Return the values at the nodes among those at the ends of all steps."""
+        return values[self._first :: 2]
+
+    def _read(self, nodes: np.ndarray, delay: float) -> tuple[np.ndarray, np.ndarray]:
+        """Interpolate values at the samples, later by `delay` [s]; returns them and their derivatives over time."""
+        step = 2.0 * self._half
+        wanted = (self.log.time - self.log.time[0] - delay) / step
+        place = np.clip(wanted, 0.0, self.steps)
+        node = np.minimum(place.astype(int), self.steps - 1)
+        share = place - node
+        share = np.where(np.abs(share - np.round(share)) < 1e-9, np.round(share), share)
+        t = share.reshape(-1, *(1,) * (nodes.ndim - 1))
+        a, b, c, d = (nodes[np.clip(node + k, 0, self.steps)] for k in (-1, 0, 1, 2))
+        one, two, three = 0.5 * (c - a), a - 2.5 * b + 2.0 * c - 0.5 * d, 0.5 * (d - a) + 1.5 * (b - c)
+        inside = (wanted == place).reshape(t.shape)  # before the log the contact rests
+        slopes = np.where(inside, (one + t * (2.0 * two + 3.0 * t * three)) / step, 0.0)
+        return b + t * (one + t * (two + t * three)), slopes

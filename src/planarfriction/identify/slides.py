@@ -1,4 +1,7 @@
-"""Free slides: a body that was thrown onto a level table and measured until it stops, and its simulated motion."""
+"""Free slides: a body that was thrown onto a level table and measured until it stops, and its simulated motion.
+
+Slides that friction alone cannot explain (pushed, without contact, far from the others) are found too.
+"""
 
 from __future__ import annotations
 
@@ -12,20 +15,36 @@ from planarfriction import validation
 from planarfriction.described import described
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
-from planarfriction.identify.angles import unwrapped
+from planarfriction.identify.logs import unwrapped
+from planarfriction.identify.verdicts import Verdict
 from planarfriction.scenes import simulate
 from planarfriction.scenes.ready import free_slide
 
 TOLERANCES: dict[str, Any] = {"rtol": 1e-5, "atol": 0.05}
-"""Of the solver: ends exact to a few um, so that differences of two simulations are derivatives."""
+"""Tolerances of the solver: ends are exact to a few um, so that differences of two simulations are derivatives."""
 
 CHANGES = np.array([2e-3, 2e-3, 2e-2])
-"""Changes of the initial twist that derivatives are taken over [m/s, m/s, rad/s]: some mm at the end."""
+"""Changes of the initial twist for derivatives [m/s, m/s, rad/s]: some mm at the end."""
+
+WINDOW = 8
+"""Number of samples of a window whose poses give a speed."""
+
+GROWS, NOISE = 0.1, 6.0
+"""Growth of the speed, as a share of the largest and over the sigma of its noise, beyond which a body was pushed."""
+
+FREE, LONG = 0.2, 0.25
+"""Deceleration, as a share of the usual one, and duration, as a share of the motion, of a body without friction."""
+
+MODEST, FAR = 2.5, 6.0
+"""Error of a slide over that of the median slide from which it counts less, and beyond which it does not count."""
+
+STRONG = 0.7
+"""Standard errors by which one slide alone moves an estimate if it is to be named: it makes half of the variance."""
 
 
 @dataclass(frozen=True, eq=False)
 class Slide(ByValue):
-    """One measured slide of a body on a level table, T samples.
+    """Measured slide of a body on a level table, T samples.
 
     Raises InvalidValueError for fewer than five samples, wrong shapes, numbers that are not finite, times that do not
     increase, and an angle that jumps by anything but whole turns.
@@ -57,7 +76,7 @@ class Slide(ByValue):
         object.__setattr__(self, "turns", turns)
 
     def first(self, samples: int) -> Slide:
-        """The first samples of the slide, at least five.
+        """Return the first samples of the slide, at least five.
 
         Raises InvalidValueError for fewer samples than a slide needs.
         """
@@ -68,7 +87,7 @@ class Slide(ByValue):
 @described
 @dataclass(frozen=True)
 class SlidingBody:
-    """The body that slides: its mass and inertia, and gravity.
+    """Body that slides: its mass and inertia, and gravity.
 
     Raises InvalidValueError for a mass, an inertia or a load that is not > 0.
     """
@@ -86,13 +105,13 @@ class SlidingBody:
 
 
 def parabola(time: np.ndarray, pose: np.ndarray, samples: int = 8) -> np.ndarray:
-    """Velocity `[3]` at the first sample: slope of a parabola through the first poses."""
+    """Estimate the velocity `[3]` at the first sample: the slope of a parabola through the first poses."""
     count = min(samples, len(time))
     return np.polynomial.polynomial.polyfit(time[:count] - time[0], pose[:count], 2)[1]
 
 
 def slide_poses(model: Any, body: SlidingBody, time: np.ndarray, pose: Any, twist: Any) -> np.ndarray:
-    """Simulated poses x, y, theta `[T, 3]` at `time` `[T]` of a body on `model`, from a start pose and twist `[3]`.
+    """Simulate poses x, y, theta `[T, 3]` at `time` `[T]` of a body on `model`, from a start pose and twist `[3]` each.
 
     A body that stopped stays where it is.
     """
@@ -122,17 +141,17 @@ def slide_poses(model: Any, body: SlidingBody, time: np.ndarray, pose: Any, twis
 
 
 def _hermite(share, step, p0, p1, v0, v1):
-    """Cubic through two places with two speeds, at `share` of the way between them."""
+    """Evaluate the cubic through two positions with two speeds, at `share` of the step between them."""
     rest = 1.0 - share
     value = (1.0 + 2.0 * share) * rest**2 * p0 + share**2 * (3.0 - 2.0 * share) * p1
     return value + step * share * rest * (rest * v0 - share * v1)
 
 
 def start_slopes(model: Any, body: SlidingBody, slide: Slide, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Poses `[T, 3]` from a start (pose, then twist, `[6]`) and their derivatives `[T, 3, 6]`, by differences.
+    """Simulate poses `[T, 3]` from a start (pose, then twist, `[6]`), with derivatives `[T, 3, 6]` by differences.
 
-    The start pose shifts the motion as a whole (what an angle changes beyond that, for a contact that is not round, is
-    left out).
+    The start pose shifts the motion as a whole; the start angle of a contact that is not round changes more than that,
+    which is left out.
     """
     poses = slide_poses(model, body, slide.time, start[:3], start[3:])
     slopes = np.zeros((*poses.shape, 6))
@@ -146,7 +165,7 @@ def start_slopes(model: Any, body: SlidingBody, slide: Slide, start: np.ndarray)
 def fit_start(
     model: Any, body: SlidingBody, slide: Slide, *, samples: int | None = None, noise: Any = (1e-3, 1e-3, 2e-2)
 ) -> np.ndarray:
-    """Initial pose and twist `[6]` for which the simulated slide best fits the first `samples` poses (None: all).
+    """Estimate the initial pose and twist `[6]` of a slide from its first `samples` poses (None: all).
 
     Least squares, a few Gauss-Newton steps from the measured start; `noise` `[3]` weights metres against radians.
 
@@ -167,23 +186,23 @@ def _check(body: Any, slide: Any) -> None:
 
 
 def start_of(slide: Slide) -> np.ndarray:
-    """Measured start pose and twist `[6]`."""
+    """Return the measured start pose and twist `[6]`."""
     return np.concatenate([slide.pose[0], np.asarray(slide.twist)])
 
 
 def improve_start(model: Any, body: SlidingBody, slide: Slide, start: np.ndarray, noise: np.ndarray, turns: int):
-    """A start `[6]` after some Gauss-Newton steps."""
+    """Improve a start `[6]` by some Gauss-Newton steps."""
     for _ in range(turns):
         poses, slopes = start_slopes(model, body, slide, start)
-        off = ((slide.pose - poses) / noise).ravel()
-        start = start + np.linalg.lstsq((slopes / noise[:, None]).reshape(-1, 6), off, rcond=None)[0]
+        residual = ((slide.pose - poses) / noise).ravel()
+        start = start + np.linalg.lstsq((slopes / noise[:, None]).reshape(-1, 6), residual, rcond=None)[0]
     return start
 
 
 def predict_slide(model: Any, body: SlidingBody, slide: Slide, *, samples: int | None = None) -> np.ndarray:
-    """Poses `[T, 3]` of a slide, predicted by the model from its initial state.
+    """Predict the poses `[T, 3]` of a slide by the model from its initial state.
 
-    That is the measured one or, with `samples`, the one that `fit_start` finds from that many poses.
+    The initial state is the measured one or, with `samples`, the one that `fit_start` finds from that many poses.
 
     Raises InvalidValueError for what is not a body or a slide, SolverError where the simulation fails.
     """
@@ -195,8 +214,102 @@ def predict_slide(model: Any, body: SlidingBody, slide: Slide, *, samples: int |
 
 
 def as_slides(slides: Slide | Sequence[Slide]) -> tuple[Slide, ...]:
-    """One slide or several as a tuple."""
+    """Return one slide or several as a tuple, or raise InvalidValueError."""
     result = (slides,) if isinstance(slides, Slide) else tuple(slides)
     if not result or not all(isinstance(each, Slide) for each in result):
         raise InvalidValueError("slides", "be a Slide or a list of them", slides)
     return result
+
+
+# ---------------------------------------------------------------------- slides that friction cannot explain
+
+
+def speeds(slide: Slide, body: SlidingBody) -> tuple[np.ndarray, np.ndarray, float]:
+    """Compute middle times of windows, speeds `sqrt(v^2 + I omega^2/m)` in them, and the sigma of their noise."""
+    count = max(len(slide.time) // WINDOW, 1)
+    scale = np.array([1.0, 1.0, np.sqrt(body.inertia / body.mass)])
+    times, found, left = [], [], []
+    for rows in np.array_split(np.arange(len(slide.time)), count):
+        since = slide.time[rows] - slide.time[rows].mean()
+        poses = slide.pose[rows] * scale
+        fit = np.polynomial.polynomial.polyfit(since, poses, 2 if len(rows) > 4 else 1)
+        left.append(poses - np.polynomial.polynomial.polyval(since, fit).T)
+        times.append(slide.time[rows].mean())
+        found.append(np.linalg.norm(fit[1]))
+    length = np.median(np.diff(slide.time)) * WINDOW
+    sigma = np.std(np.concatenate(left)) * np.sqrt(12.0 / WINDOW) / length
+    return np.array(times), np.array(found), float(sigma)
+
+
+def contradictions(slides: Sequence[Slide], body: SlidingBody) -> dict[int, str]:
+    """Find the slides that friction alone cannot have made; returns their indices with the reason."""
+    seen = [speeds(slide, body) for slide in slides]
+    brakes = [brake for time, speed, _ in seen if (brake := _brake(time, speed)) > 0.0]
+    usual = float(np.median(brakes)) if brakes else 0.0
+    found = {}
+    for i, (time, speed, noise) in enumerate(seen):
+        grown = speed - np.minimum.accumulate(speed)
+        last = int(grown.argmax())
+        first = int(speed[: last + 1].argmin())
+        free = _free(time, speed, FREE * usual)
+        if grown[last] > max(GROWS * speed.max(), NOISE * noise):
+            found[i] = f"its speed grows from {speed[first]:.2g} to {speed[last]:.2g} m/s: it was pushed"
+        elif len(slides) > 2 and free > max(
+            LONG * (time[-1] - time[0]), 1.5 * (time[1] - time[0] if len(time) > 1 else 0)
+        ):
+            found[i] = f"its speed hardly falls for {1e3 * free:.0f} ms: it lost contact, or was pushed"
+    return found
+
+
+def _brake(time: np.ndarray, speed: np.ndarray) -> float:
+    """Compute the mean deceleration until the speed is a tenth of the first [m/s^2]."""
+    slow = np.flatnonzero(speed < 0.1 * speed[0])
+    last = slow[0] if len(slow) else len(speed) - 1
+    return float((speed[0] - speed[last]) / (time[last] - time[0])) if last > 0 else 0.0
+
+
+def _free(time: np.ndarray, speed: np.ndarray, least: float) -> float:
+    """Compute the longest time over which a moving body decelerates by less than `least` [m/s^2]."""
+    brakes = -np.diff(speed) / np.diff(time) if len(time) > 1 else np.zeros(0)
+    longest = since = 0.0
+    for brake, before, after, step in zip(brakes, speed[:-1], speed[1:], np.diff(time), strict=True):
+        moves = min(before, after) > 0.25 * speed.max()
+        since = since + step if moves and brake < least else 0.0
+        longest = max(longest, since)
+    return longest
+
+
+def weights(errors: np.ndarray) -> np.ndarray:
+    """Compute the weights `[S]` of slides from their root mean square residuals: 1 near the median, 0 beyond `FAR`."""
+    middle = float(np.median(errors))
+    ratio = errors / middle if middle > 0.0 else np.ones(len(errors))
+    return np.where(ratio > FAR, 0.0, np.minimum(1.0, MODEST / np.maximum(ratio, 1e-300)) ** 2)
+
+
+def verdicts_on_weights(slides: Sequence[Slide], weighed: np.ndarray, errors: np.ndarray) -> list[Verdict]:
+    """Return verdicts on slides whose weight `[S]` is 0 or below 1; `errors` are residuals over the median slide's."""
+    found = []
+    for i in np.flatnonzero(weighed == 0.0).tolist():
+        why = f"its residuals are {errors[i]:.2g} times those of the median slide"
+        found.append(Verdict("fit", True, f"{slides[i].name} is left out: {why}"))
+    less = [slides[i].name for i in np.flatnonzero((weighed > 0.0) & (weighed < 1.0)).tolist()]
+    if less:
+        names = f"{', '.join(less[:5])}{' ...' if len(less) > 5 else ''}"
+        found.append(Verdict("fit", True, f"{names} have less weight: large residuals"))
+    return found
+
+
+def verdicts_on_influence(
+    slides: Sequence[Slide], moved: np.ndarray, names: Sequence[str], errors: np.ndarray
+) -> list[Verdict]:
+    """Return a verdict on the slide that moves an estimate most, if that is much.
+
+    `moved` `[S, F]` is the change of the estimates `names` without each slide, `errors` `[F]` their standard errors.
+    """
+    known = np.isfinite(errors) & (errors > 0.0)
+    share = np.divide(np.abs(moved), errors, out=np.zeros_like(moved), where=known & np.ones_like(moved, dtype=bool))
+    if len(slides) <= 2 or share.max() <= STRONG:
+        return []
+    i, j = (int(place) for place in np.unravel_index(int(share.argmax()), share.shape))
+    change = f"{names[j]} would change by {moved[i, j]:+.2g} ({share[i, j]:.1f} standard errors)"
+    return [Verdict("fit", True, f"without {slides[i].name}, {change}")]

@@ -1,120 +1,136 @@
-"""How sure a fit is: whether it leaves more than noise, how far off values may be, how it predicts what is held out.
+"""Uncertainty of a fit: covariance of its values, a test for more than noise, and the prediction of held-out parts.
 
 The noise is estimated from the jitter of the signals, not from what a fit leaves; so a fit can be rejected. Where
-residuals are correlated in time, intervals follow that (Newey and West 1987), and are never narrower than without.
+residuals are correlated in time, intervals follow that (Newey and West 1987), and are never narrower than without. Of
+slides, each counts as one observation.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from planarfriction.identify.least_squares import covariance
-from planarfriction.identify.search import Fit
+if TYPE_CHECKING:
+    from planarfriction.identify.search import Fit
 
 EXCESS = 1.25
-"""Mean square of the residuals over that of the noise that is still put down to the noise's own estimate."""
+"""Largest reduced chi-square that is still put down to the estimate of the noise."""
 
 CHANCE = 4.0
-"""Standard deviations of that mean square, for independent residuals, that are put down to chance; and of the scale of
-the load cell."""
+"""Standard deviations of the reduced chi-square, for independent residuals, that are put down to chance; and of the
+scale of the load cell."""
 
 BLOCKS, FOLDS = 20, 5
-"""Blocks that each log is cut into, every fifth of which is held out in turn."""
+"""Number of blocks that each log is cut into, every fifth of which is held out in turn."""
 
 LONGEST = 0.1
-"""Longest lag that residuals are correlated over, as a share of the log."""
+"""Longest lag over which residuals may be correlated, as a share of the log."""
 
 DRAWS = 24
-"""Errors of the twists that are drawn."""
+"""Number of errors of the twists that are drawn."""
 
 ALLOWANCE = 1.1
 """Factor on all standard errors for what linear ones leave out: curvature, steps, and the error of the noise itself."""
 
 HUGE = 1e200
-"""Variance that stands for an infinite one while it is turned into other coordinates."""
+"""Variance that stands for an infinite one during a change of coordinates."""
 
 RIDGE = 1e-10
-"""Share of the largest curvature that keeps what no sample depends on where it is."""
+"""Share of the largest curvature that holds parameters on which no sample depends."""
 
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """What is left of a fit, and what follows."""
+    """Covariance and residuals of a fit of logs, with its tests."""
 
     covariance: np.ndarray
-    """Of the values of contact and rig, `[F + K, F + K]`."""
+    """Covariance of the values of contact and rig, `[F + K, F + K]`."""
     jacobian: np.ndarray
-    """Derivatives of the scaled residuals `[M, F + K]`."""
-    excess: float
+    """Derivatives of the scaled residuals with respect to the values, `[M, F + K]`."""
+    reduced_chi2: float
     """Mean square of the residuals over that of the noise [-]."""
     limit: float
-    """Above which excess the fit is rejected."""
+    """Largest reduced chi-square for which the fit is not rejected."""
     strain: float
-    """How many times its width the scale of the load cell was moved [-]."""
+    """Scale of the load cell over its standard deviation a priori [-]."""
     neighbours: float
     """Correlation of residuals one sample apart [-]."""
     held_out: np.ndarray
-    """Root mean square over the noise of what a fit without it leaves of each fold [-], `[FOLDS]`."""
+    """Root mean square over the noise of the residuals of each fold for a fit without it [-], `[FOLDS]`."""
     unseen: np.ndarray
-    """Scaled residuals `[M]` of each sample where a fit without its fold predicts it."""
+    """Scaled residuals `[M]` of each sample for a fit without its fold."""
 
     @property
     def rejected(self) -> bool:
-        """Whether the fit leaves more than the noise, or only a load cell that nobody has would make it do so."""
-        return bool(self.excess > self.limit or self.strain > CHANCE)
+        """True if the fit leaves more than the noise, or avoids that only by a load cell that no rig has."""
+        return bool(self.reduced_chi2 > self.limit or self.strain > CHANCE)
 
     @property
     def score(self) -> float:
-        """Root mean square over the noise of what was held out [-]."""
+        """Root mean square over the noise of the held-out residuals [-]."""
         return float(np.sqrt(np.mean(self.held_out**2)))
 
 
 def uncertainty(fit: Fit) -> Uncertainty:
-    """The uncertainty of a fit."""
-    problem, count = fit.problem, len(fit.problem.names)
-    off, jacobian = problem.linearised(fit.values, fit.spread)
+    """Compute the uncertainty of a fit of logs."""
+    problem: Any = fit.problem
+    count = len(problem.names)
+    residual, jacobian = problem.linearised(fit.values, fit.sigma)
     pull = _pull(fit)
-    # What rests on zero is as uncertain as its neighbours let it be; other bounds are no estimates.
+    # A value that rests on zero is as uncertain as its neighbours let it be; other bounds are no estimates.
     low = fit.coordinates.bounds()[0] == 0.0
     free = ~fit.at_bound
-    free[:count] |= low & (fit.values[:count] <= 1e-9 + np.abs(fit.coordinates.scale) * 1e-9)
-    excess, neighbours = _left(fit, off)
+    free |= low & (fit.values <= 1e-9 + fit.coordinates.scale * 1e-9)
+    reduced_chi2, neighbours = _left(fit, residual)
     measured = sum(
         int(log.channels.sum()) * len(log.time[used]) for log, used in zip(problem.logs, problem.used, strict=True)
     )
-    plain = _covariance(fit, np.concatenate([jacobian, pull]), free) * max(excess, 1.0)
-    widths = _over_time(fit, off, jacobian, pull, neighbours, free)
+    plain = _covariance(fit, np.concatenate([jacobian, pull]), free) * max(reduced_chi2, 1.0)
+    widths = _over_time(fit, residual, jacobian, pull, neighbours, free)
     factor = np.sqrt(np.maximum(widths / np.diag(plain), 1.0))
     factor = np.where(np.isfinite(factor), factor, 1.0)
-    spread = plain * np.outer(factor, factor) + _of_twists(fit, jacobian, pull, free)
+    whole = plain * np.outer(factor, factor) + _of_twists(fit, jacobian, pull, free)
     return Uncertainty(
-        spread * ALLOWANCE**2,
+        whole * ALLOWANCE**2,
         jacobian,
-        excess,
+        reduced_chi2,
         EXCESS + CHANCE * np.sqrt(2.0 / measured),
         problem.rig.strain(fit.values[count:]),
         neighbours,
-        *_held_out(fit, off, jacobian, pull),
+        *_held_out(fit, residual, jacobian, pull),
     )
 
 
+def uncertainty_over_slides(fit: Fit) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Compute the covariance `[F, F]` of a fit of slides from the spread over them.
+
+    Each slide votes as one observation: `H^-1 (sum g g') H^-1 n/(n - 1)` with its vote `g = J' r`. Also returns the
+    change `[S, F]` of the values without each slide, and the derivatives `[M, F]` of the scaled residuals.
+    """
+    residual, jacobian = fit.problem.linearised(fit.values, fit.sigma)
+    votes = np.array([rows.sum(axis=(0, 1)) for rows in fit.problem.by_log(jacobian * residual[:, None])])
+    bread = _covariance(fit, jacobian, ~fit.at_bound)
+    if not np.isfinite(bread).all():
+        return bread, np.zeros_like(votes), jacobian
+    counted = sum(bool(np.isfinite(each).all()) for each in fit.sigma)
+    covariance = bread if counted < 2 else bread @ (votes.T @ votes) @ bread * len(votes) / (len(votes) - 1)
+    return covariance, votes @ bread, jacobian
+
+
 def _pull(fit: Fit) -> np.ndarray:
-    """Derivatives `[F + K, F + K]` of what pulls contact and rig to their starts."""
-    count, widths = len(fit.problem.names), fit.problem.rig.with_drift(fit.values[len(fit.problem.names) :])
-    result = np.zeros((count + len(widths),) * 2)
-    slopes = fit.coordinates.slopes(fit.x[:count])
-    result[:count, :count] = fit.coordinates.prior(fit.x[:count])[1] @ np.linalg.pinv(slopes)
-    result[count:, count:] = np.diag(1.0 / widths)
+    """Compute the derivatives `[F + K, F + K]` of the pull of contact and rig to their starts."""
+    problem: Any = fit.problem
+    count = len(problem.names)
+    result = np.linalg.solve(fit.coordinates.slopes(fit.x).T, fit.coordinates.prior(fit.x)[1]).T
+    result[count:, count:] = np.diag(1.0 / problem.rig.with_drift(fit.values[count:]))
     return result
 
 
 def _covariance(fit: Fit, rows: np.ndarray, free: np.ndarray) -> np.ndarray:
-    """Covariance of the values, with what is `free` of the coordinates; infinite where the data say nothing."""
-    count = len(fit.problem.names)
-    slopes = np.eye(len(fit.values))
-    slopes[:count, :count] = fit.coordinates.slopes(fit.x[:count])
+    """Compute the covariance of the values with the `free` coordinates; infinite where the data say nothing."""
+    slopes = fit.coordinates.slopes(fit.x)
     inner = np.minimum(covariance(rows @ slopes, free), HUGE)
     result = slopes @ inner @ slopes.T
     diagonal = np.diag(result)
@@ -122,11 +138,11 @@ def _covariance(fit: Fit, rows: np.ndarray, free: np.ndarray) -> np.ndarray:
     return result
 
 
-def _left(fit: Fit, off: np.ndarray) -> tuple[float, float]:
-    """Mean square of the scaled residuals, and their correlation one sample apart."""
+def _left(fit: Fit, residual: np.ndarray) -> tuple[float, float]:
+    """Compute the mean square of the scaled residuals, and their correlation one sample apart."""
     squares = products = pairs = 0.0
     samples = 0
-    for rows, log in _by_log(fit, off[:, None]):
+    for rows, log in zip(fit.problem.by_log(residual[:, None]), fit.problem.logs, strict=True):
         each = rows[:, log.channels, 0]
         samples += each.size
         squares += float((each**2).sum())
@@ -135,17 +151,8 @@ def _left(fit: Fit, off: np.ndarray) -> tuple[float, float]:
     return squares / max(samples, 1), products / pairs if pairs > 0.0 else 0.0
 
 
-def _by_log(fit: Fit, rows: np.ndarray):
-    """Rows `[T, 3, C]` of each log out of flat ones `[M, C]`."""
-    at = 0
-    for log, used in zip(fit.problem.logs, fit.problem.used, strict=True):
-        size = 3 * len(log.time[used])
-        yield rows[at : at + size].reshape(-1, 3, rows.shape[1]), log
-        at += size
-
-
-def _over_time(fit: Fit, off, jacobian, pull, neighbours: float, free: np.ndarray) -> np.ndarray:
-    """Variances `[F + K]` with the covariance that the votes `J' r` of the samples have over time.
+def _over_time(fit: Fit, residual, jacobian, pull, neighbours: float, free: np.ndarray) -> np.ndarray:
+    """Compute variances `[F + K]` with the covariance that the votes `J' r` of the samples have over time.
 
     Weights fall linearly with the lag; the longest is three times the memory of the residuals, `(1 + c)/(1 - c)`
     samples of their correlation c, and at least the cube root of the number of samples.
@@ -153,7 +160,7 @@ def _over_time(fit: Fit, off, jacobian, pull, neighbours: float, free: np.ndarra
     bread = _covariance(fit, np.concatenate([jacobian, pull]), free)
     bread = np.where(np.isfinite(bread), bread, 0.0)
     filling = pull.T @ pull
-    for votes, _ in _by_log(fit, jacobian * off[:, None]):
+    for votes in fit.problem.by_log(jacobian * residual[:, None]):
         vote = votes.sum(axis=1)
         vote = vote - vote.mean(axis=0)
         near = min(max(neighbours, 0.0), 0.999)
@@ -167,8 +174,8 @@ def _over_time(fit: Fit, off, jacobian, pull, neighbours: float, free: np.ndarra
 
 
 def _of_twists(fit: Fit, jacobian: np.ndarray, pull: np.ndarray, free: np.ndarray) -> np.ndarray:
-    """Covariance of the values from the errors that the twists still have: how far errors drawn as theirs move them."""
-    moved = fit.problem.shaken(fit.values, fit.spread, DRAWS)
+    """Compute the covariance of the values from drawn errors of the twists."""
+    moved = fit.problem.twist_residuals(fit.values, fit.sigma, DRAWS)
     if moved is None:
         return np.zeros((len(fit.values),) * 2)
     bread = _covariance(fit, np.concatenate([jacobian, pull]), free)
@@ -176,23 +183,57 @@ def _of_twists(fit: Fit, jacobian: np.ndarray, pull: np.ndarray, free: np.ndarra
     return shifts.T @ shifts / len(shifts)
 
 
-def _held_out(fit: Fit, off, jacobian, pull) -> tuple[np.ndarray, np.ndarray]:
-    """Residuals of each fold where the others alone were fitted, to first order: root mean squares, and all `[M]`."""
-    count = len(fit.values)
+def _held_out(fit: Fit, residual, jacobian, pull) -> tuple[np.ndarray, np.ndarray]:
+    """Compute the residuals of each fold for a fit of the others, to first order: root mean squares, and all `[M]`."""
     fold, seen = [], []
-    for rows, log in _by_log(fit, off[:, None]):
+    for rows, log in zip(fit.problem.by_log(residual[:, None]), fit.problem.logs, strict=True):
         place = np.arange(len(rows)) * BLOCKS // len(rows) % FOLDS
         fold.append(np.repeat(place, 3))
         seen.append(np.tile(log.channels, len(rows)))
     fold, seen = np.concatenate(fold), np.concatenate(seen)
     size = np.maximum(np.linalg.norm(np.concatenate([jacobian, pull]), axis=0), np.finfo(float).tiny)
     slopes, base = jacobian / size, pull / size
-    whole = slopes.T @ slopes + base.T @ base + RIDGE * np.eye(count)
-    result, unseen = [], np.empty_like(off)
+    whole = slopes.T @ slopes + base.T @ base + RIDGE * np.eye(len(fit.values))
+    result, unseen = [], np.empty_like(residual)
     for k in range(FOLDS):
         out = fold == k
         kept = whole - slopes[out].T @ slopes[out]
-        move = np.linalg.lstsq(kept, slopes[out].T @ off[out], rcond=None)[0]
-        unseen[out] = off[out] + slopes[out] @ move
+        move = np.linalg.lstsq(kept, slopes[out].T @ residual[out], rcond=None)[0]
+        unseen[out] = residual[out] + slopes[out] @ move
         result.append(np.sqrt(np.mean(unseen[out & seen] ** 2)))
     return np.array(result), unseen
+
+
+# ---------------------------------------------------------------------- covariance of least squares
+
+
+def covariance(jacobian: np.ndarray, free: np.ndarray) -> np.ndarray:
+    """Compute the covariance `(J' J)^-1`, `[F, F]`, of least squares whose residuals have unit variance.
+
+    Parameters that are not `free` (`[F]` of bool: on a bound) have the variance of a fit of that parameter alone, and
+    no part in the others. One that moves no residual has an infinite variance; a combination that moves none
+    has a huge one, so that all in it show it.
+    """
+    count = jacobian.shape[1]
+    jacobian = np.asarray(np.linalg.qr(jacobian, mode="r"))
+    size = np.linalg.norm(jacobian, axis=0)
+    seen = free & (size > 0.0)
+    result = np.zeros((count, count))
+    result[np.diag_indices(count)] = np.where(size > 0.0, 1.0 / np.where(size > 0.0, size, 1.0) ** 2, np.inf)
+    if seen.any():
+        _, strengths, axes = np.linalg.svd(jacobian[:, seen] / size[seen], full_matrices=False)
+        strengths = np.maximum(strengths, 1e-12 * strengths[0])
+        inner = (axes.T / strengths**2) @ axes
+        result[np.ix_(seen, seen)] = inner / np.outer(size[seen], size[seen])
+    return result
+
+
+def correlations(covariance: np.ndarray) -> np.ndarray:
+    """Return the correlation matrix `[F, F]`; zero with a parameter that has no finite variance."""
+    errors = np.sqrt(np.diag(covariance))
+    usable = np.isfinite(errors) & (errors > 0.0)
+    safe = np.where(usable, errors, 1.0)
+    result = np.where(np.outer(usable, usable), np.where(np.isfinite(covariance), covariance, 0.0), 0.0)
+    result = result / np.outer(safe, safe)
+    result[np.diag_indices(len(errors))] = 1.0
+    return np.clip(result, -1.0, 1.0)

@@ -1,16 +1,23 @@
-"""Which parameters the data do not determine, and why: each rule names the parameter and what is missing."""
+"""Verdicts on a fit and on its parameters: which ones the data do not determine, and why.
+
+Each rule names the parameter and what is missing in the data.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
-from planarfriction.identify.choice import Candidate, ModelScore, dependence
+from planarfriction.described import described
 from planarfriction.identify.parameters import ALL, SOFT_FINGER
-from planarfriction.identify.result import Verdict, interval
+from planarfriction.identify.search import Fit
 from planarfriction.identify.uncertainty import Uncertainty
+
+TWO_SIDED = 1.96
+"""Standard errors on either side of the estimate that hold 95 % of a normal distribution."""
 
 VAGUE = 0.3
 """Standard error, as a share of the estimate, above which a parameter that must be > 0 counts as unknown."""
@@ -22,13 +29,13 @@ WELL = 0.02
 """Standard error, as a share of the estimate, below which it does not matter what an estimate is correlated with."""
 
 UNSEEN = 1.0
-"""A parameter whose whole size moves no sample by this many spreads of the noise is not seen."""
+"""Change of a sample, over the noise, that the whole size of a parameter must make in order to be seen."""
 
 OF_TORQUE = ("contact_radius", "centre_x", "centre_y", *SOFT_FINGER)
-"""What the force depends on only where the contact spins while it slides."""
+"""Parameters that change the force only if the contact spins while it slides."""
 
 GAP = 3.0
-"""Sliding speeds with this ratio and no sample between leave a gap."""
+"""Ratio of sliding speeds without a sample between them that counts as a gap."""
 
 NARROW = 10.0
 """Ratio of the fastest to the slowest sliding (but for 2 % at either end) below which no Stribeck curve shows."""
@@ -46,42 +53,141 @@ CORRELATED = 0.3
 """Correlation of neighbouring residuals above which they are no noise."""
 
 
+@described
+@dataclass(frozen=True)
+class Verdict:
+    """Finding about one parameter, or about the fit as a whole (`parameter` is then "fit")."""
+
+    parameter: str
+    """Name of the parameter, or "fit"."""
+    identifiable: bool
+    """True if the data determine the parameter; for the fit, if nothing is wrong."""
+    reason: str
+    """Reason why the data do not, or a caution."""
+
+    def __str__(self) -> str:
+        if self.parameter == "fit":
+            return f"fit: {self.reason}"
+        return f"{self.parameter}: {'' if self.identifiable else 'not identifiable, '}{self.reason}"
+
+
+def verdicts_on_turns(measured: Sequence[Any]) -> list[Verdict]:
+    """Return a verdict that counts the jumps by whole turns which were removed from the angles of logs or slides."""
+    turned = {each.name: each.turns for each in measured if each.turns}
+    if not turned:
+        return []
+    count = f"{sum(turned.values())} jumps of theta by a whole turn were taken out"
+    return [Verdict("fit", True, f"{count}, in {', '.join(list(turned)[:3])}{' ...' if len(turned) > 3 else ''}")]
+
+
+def interval(name: str, value: float, error: float) -> tuple[float, float]:
+    """Compute the 95 % interval [SI]: symmetric as factors for parameters that are > 0, else as differences."""
+    if ALL[name].logarithmic and value > 0.0:
+        with np.errstate(over="ignore"):
+            factor = float(np.exp(TWO_SIDED * error / value))
+        return float(value / factor), float(value * factor)
+    return max(float(value - TWO_SIDED * error), ALL[name].low), float(value + TWO_SIDED * error)
+
+
+# ---------------------------------------------------------------------- choice of the model
+
+
+@dataclass(frozen=True)
+class ModelScore:
+    """Measures of how well one model explains the data."""
+
+    model: str
+    """Name of the model, as `identify_lugre` takes it."""
+    held_out: float
+    """Root mean square of the residuals of held-out parts over the noise [-]; 1 is noise alone."""
+    held_out_error: float
+    """Standard error of `held_out`, from part to part [-]."""
+    reduced_chi2: float
+    """Mean square of the residuals over that of the noise [-]."""
+    rejected: bool
+    """True if the fit leaves more than noise."""
+    estimates: dict[str, float]
+    """Estimates of the parameters by name [SI]."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Model that was fitted, with its uncertainty."""
+
+    fit: Fit
+    uncertainty: Uncertainty
+
+    @property
+    def score(self) -> ModelScore:
+        """Measures of how well the model explains the data."""
+        problem: Any = self.fit.problem
+        u = self.uncertainty
+        error = float(np.std(u.held_out) / np.sqrt(max(len(u.held_out) - 1, 1)))
+        estimates = dict(zip(problem.names, self.fit.values.tolist(), strict=False))
+        return ModelScore(problem.model, u.score, error, u.reduced_chi2, u.rejected, estimates)
+
+
+def best_of(candidates: Sequence[Candidate]) -> Candidate:
+    """Return the candidate that predicts held-out parts best."""
+    return min(candidates, key=lambda each: each.uncertainty.score)
+
+
+def dependence(name: str, interval: tuple[float, float], chosen: ModelScore, others: Sequence[ModelScore]) -> str:
+    """Return a text if another model that is not rejected has an estimate outside the interval, or nothing."""
+    low, high = interval
+    for other in others:
+        if other.model != chosen.model and not other.rejected and not low <= other.estimates[name] <= high:
+            return f"depends on the model: {other.model}, which also fits, gives {other.estimates[name]:.3g}"
+    return ""
+
+
+# ---------------------------------------------------------------------- rules
+
+
 @dataclass(frozen=True)
 class Evidence:
-    """What the rules look at."""
+    """Estimates and measurements on which the rules decide."""
 
     names: tuple[str, ...]
+    """Names of the parameters, `[F]`."""
     values: np.ndarray
+    """Estimates [SI], `[F]`."""
     errors: np.ndarray
-    """Standard errors, `[F]`."""
+    """Standard errors [SI], `[F]`."""
     correlations: np.ndarray
-    """`[F, F]`."""
+    """Correlations of the estimates, `[F, F]`."""
     at_bound: np.ndarray
-    """`[F]` of bool."""
+    """Mask of the estimates that lie on a bound, `[F]`."""
     jacobian: np.ndarray
     """Derivatives of the scaled residuals, `[M, F]`."""
     speeds: np.ndarray
     """Sliding speeds `|V_S|` of all samples [m/s]."""
     spins: np.ndarray
-    """Their part from spin, `r |omega|` [m/s]."""
+    """Part of the sliding speeds that comes from spin, `r |omega|` [m/s]."""
     loads: np.ndarray
     """Normal force of each log [N]."""
-    torque: bool
-    """Whether any log has measured torques."""
-    without_slip: float
-    """How much the cost grows if the contact may not slip at all."""
-    largest_coefficient: float
+    torque: bool = True
+    """True if any log has measured torques."""
+    without_slip: float = np.inf
+    """Growth of the cost if the contact may not slip at all."""
+    largest_coefficient: float = np.inf
     """Largest friction over load that was fitted [-]."""
 
     def value(self, name: str, otherwise: float) -> float:
-        """The estimate of a parameter, or `otherwise` if it was not estimated."""
+        """Return the estimate of a parameter, or `otherwise` if it was not estimated."""
         return float(self.values[self.names.index(name)]) if name in self.names else otherwise
+
+    @property
+    def spinning(self) -> bool:
+        """True if spin is a part of the sliding."""
+        speed = max(np.sqrt(np.mean(self.speeds**2)), 1e-300)
+        return bool(np.sqrt(np.mean(self.spins**2)) >= NO_SPIN * speed)
 
 
 def judge(
     evidence: Evidence, best: Candidate, candidates: Sequence[Candidate], skipped: Sequence[str]
 ) -> tuple[Verdict, ...]:
-    """The verdicts on the fit, then on all parameters: where it is rejected, none of them is identifiable."""
+    """Return the verdicts on the fit, then on all parameters: if it is rejected, none of them is identifiable."""
     u, chosen, scores = best.uncertainty, best.score, [each.score for each in candidates]
     verdicts = [Verdict("fit", not u.rejected, _on_fit(u, chosen))]
     if len(scores) > 1:
@@ -92,24 +198,18 @@ def judge(
         text = f"{chosen.model} predicts held-out parts best, to {chosen.held_out:.3g} times the noise; {rest}"
         verdicts.append(Verdict("fit", True, text))
     if skipped:
-        verdicts.append(
-            Verdict(
-                "fit",
-                True,
-                f"{', '.join(skipped)}: not tried, would take minutes (choose it as model)",
-            )
-        )
+        text = f"{', '.join(skipped)}: not tried, would take minutes (choose it as model)"
+        verdicts.append(Verdict("fit", True, text))
     if not evidence.torque:
         text = "tau is 0 throughout, as without a torque sensor: the estimates use the force alone"
         verdicts.append(Verdict("fit", True, text))
     for i, name in enumerate(evidence.names):
-        verdict = _parameter(evidence, i)
+        verdict = judge_parameter(evidence, i)
         if verdict is None or verdict.identifiable:
             low, high = interval(name, evidence.values[i], evidence.errors[i])
             if u.rejected:
-                verdict = Verdict(
-                    name, False, f"{chosen.model} does not explain the data, so this value has no meaning"
-                )
+                text = f"{chosen.model} does not explain the data, so this value has no meaning"
+                verdict = Verdict(name, False, text)
             elif reason := dependence(name, (low, high), chosen, scores):
                 verdict = Verdict(name, False, reason)
         if verdict is not None:
@@ -118,11 +218,11 @@ def judge(
 
 
 def _on_fit(u: Uncertainty, chosen: ModelScore) -> str:
-    """The test of the fit in words."""
-    size = np.sqrt(u.excess)
+    """Put the test of the fit into words."""
+    size = np.sqrt(u.reduced_chi2)
     if not u.rejected:
         return f"{chosen.model} explains the data: its residuals are {size:.2f} times the noise of the sensors"
-    if u.excess > u.limit:
+    if u.reduced_chi2 > u.limit:
         text = f"{chosen.model} is rejected: its residuals are {size:.2f} times the noise of the sensors, and "
         text += f"chance explains at most {np.sqrt(u.limit):.2f}"
     else:
@@ -135,7 +235,8 @@ def _on_fit(u: Uncertainty, chosen: ModelScore) -> str:
     )
 
 
-def _parameter(evidence: Evidence, i: int) -> Verdict | None:
+def judge_parameter(evidence: Evidence, i: int) -> Verdict | None:
+    """Return the verdict on parameter i, or None if there is nothing to say."""
     name, value, error = evidence.names[i], float(evidence.values[i]), float(evidence.errors[i])
     kind = ALL[name]
     if name in ("mu_c", "mu_s", "v_s", "gamma") and evidence.without_slip < SLIPPED:
@@ -153,8 +254,8 @@ def _parameter(evidence: Evidence, i: int) -> Verdict | None:
         return Verdict(name, False, _why(evidence, i, seen))
     if not kind.logarithmic and not np.isfinite(error):
         return Verdict(name, False, _why(evidence, i, seen))
-    if kind.low == 0.0 and value < 1.96 * error:
-        return Verdict(name, True, f"cannot be distinguished from 0, at most {value + 1.96 * error:.3g} {kind.unit}")
+    if kind.low == 0.0 and value < TWO_SIDED * error:
+        return Verdict(name, True, f"cannot be distinguished from 0, at most {value + TWO_SIDED * error:.3g} {kind.unit}")
     if (partner := _partner(evidence, i)) is not None:
         other, correlation = partner
         if not evidence.torque and not {name, other}.isdisjoint(OF_TORQUE):
@@ -166,12 +267,11 @@ def _parameter(evidence: Evidence, i: int) -> Verdict | None:
 
 
 def _why(evidence: Evidence, i: int, seen: float) -> str:
-    """The reason why a parameter is vague: what the data do not cover, else another parameter, else the noise."""
+    """Return the reason why a parameter is vague: a gap in the data, else another parameter, else the noise."""
     name = evidence.names[i]
     if name in ("v_s", "gamma", "mu_s") and (gap := speed_gap(evidence.speeds, evidence.value("v_s", 1e-3))):
         return gap
-    spin = np.sqrt(np.mean(evidence.spins**2)) / max(np.sqrt(np.mean(evidence.speeds**2)), 1e-300)
-    if name in ("contact_radius", *SOFT_FINGER) and spin < NO_SPIN:
+    if name in ("contact_radius", *SOFT_FINGER) and not evidence.spinning:
         return "no spin"
     if name in SOFT_FINGER and name != "c" and evidence.loads.max() < ONE_LOAD * evidence.loads.min():
         return "one load only"
@@ -185,16 +285,15 @@ def _why(evidence: Evidence, i: int, seen: float) -> str:
 
 
 def _no_stribeck(evidence: Evidence) -> str:
-    """Why the Stribeck curve has no shape: mu_s may be mu_c."""
+    """Return the reason why the Stribeck curve has no shape, if mu_s may be mu_c, or nothing."""
     if "mu_s" not in evidence.names or "mu_c" not in evidence.names:
         return ""
     s, c = evidence.names.index("mu_s"), evidence.names.index("mu_c")
-    excess = evidence.values[s] - evidence.values[c]
-    spread = np.inf
+    difference, error = evidence.values[s] - evidence.values[c], np.inf
     if np.isfinite(evidence.errors[[s, c]]).all():
         both = evidence.correlations[s, c] * evidence.errors[s] * evidence.errors[c]
-        spread = np.sqrt(max(evidence.errors[s] ** 2 + evidence.errors[c] ** 2 - 2.0 * both, 0.0))
-    if evidence.at_bound[s] or not excess > 1.96 * spread:
+        error = np.sqrt(max(evidence.errors[s] ** 2 + evidence.errors[c] ** 2 - 2.0 * both, 0.0))
+    if evidence.at_bound[s] or not difference > TWO_SIDED * error:
         gap = speed_gap(evidence.speeds, evidence.value("v_s", 1e-3))
         return gap or "mu_s cannot be distinguished from mu_c"
     return ""
@@ -216,7 +315,7 @@ def _partner(evidence: Evidence, i: int) -> tuple[str, float] | None:
 
 
 def speed_gap(speeds: np.ndarray, around: float) -> str:
-    """Text that names the range of sliding speeds about `around` [m/s] without a sample, or nothing."""
+    """Return a text on the range of sliding speeds about `around` [m/s] that has no sample, or nothing."""
     moving = speeds[speeds > 0.0]
     if not len(moving):
         return "nothing moves"

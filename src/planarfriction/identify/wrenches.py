@@ -2,36 +2,39 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from planarfriction import validation
+from planarfriction.derivatives import PARAMETERS
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify import parameters as known
 from planarfriction.identify.checks import check_logs, with_findings
-from planarfriction.identify.choice import Candidate, best_of
-from planarfriction.identify.fitted import assemble
-from planarfriction.identify.guess import guess_starts
 from planarfriction.identify.logs import Log, as_logs
-from planarfriction.identify.nuisance import GROUPS, check_groups
-from planarfriction.identify.problem import Problem, given_noise
+from planarfriction.identify.parameters import fitted_law, scaled_patch
+from planarfriction.identify.problem import FitOptions, LogProblem, mean_load
 from planarfriction.identify.result import Identification
-from planarfriction.identify.search import follow, look, refined
-from planarfriction.identify.sensors import first_noise
-from planarfriction.identify.simulators import MODELS
-from planarfriction.identify.uncertainty import uncertainty
+from planarfriction.identify.rig import CHANNELS, Nuisance, first_noise
+from planarfriction.identify.search import Report, guess_starts, multistart, refine, warm_start
+from planarfriction.identify.simulators import SIMULATORS
+from planarfriction.identify.uncertainty import correlations, uncertainty
+from planarfriction.identify.verdicts import Candidate, Evidence, best_of, judge, verdicts_on_turns
 from planarfriction.laws import ElastoPlastic, LuGre
-from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
+from planarfriction.models import ReducedModelPublished
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.metric import refuse_anisotropy
-
-BEGINS = ("rest", "steady")
 
 START_MU_S = 1.2
 """Static coefficient that a search starts with by default: above `mu_c`, free to move."""
 
 USUAL_EVALUATIONS, PATIENCE = 60, 120.0
-"""Evaluations that a search takes, and the time [s] that "auto" has for one of its models."""
+"""Number of evaluations of a search, and the time [s] that "auto" has for one of its models."""
+
+NO_SLIP = 50.0
+"""Factor on the friction coefficients that keeps any contact from slipping."""
 
 
 def identify_lugre(
@@ -40,20 +43,13 @@ def identify_lugre(
     *,
     parameters: Sequence[str] = known.USUAL,
     model: str = "auto",
-    nuisance: Sequence[str] = GROUPS,
     start: LuGre | Mapping[str, float] | None = None,
-    elasto_plastic: ElastoPlastic | float | None = ElastoPlastic(0.9),  # noqa: B008 (frozen)
-    surface: type[LimitSurface] = LimitSurfaceTablePublished,
-    noise: Sequence[float] | None = None,
-    begins: str = "rest",
-    refine: int | None = None,
-    starts: int = 4,
-    seed: int = 0,
+    options: FitOptions = FitOptions(),  # noqa: B008 (frozen)
     progress: Callable[[str], None] | None = None,
 ) -> Identification:
     """Estimate parameters of a LuGre contact from logs of twist and wrench, and find which model explains them.
 
-    Bounded nonlinear least squares for the wrenches of a fixed-step roll-out; residuals are divided by the noise, and
+    Bounded nonlinear least squares for the wrenches of a fixed-step rollout; residuals are divided by the noise, and
     parameters that must be > 0 are fitted as logarithms. Disturbances of the rig (delay, zeros, drift) are estimated
     too.
 
@@ -71,25 +67,11 @@ def identify_lugre(
     model
         "reduced-published", "distributed", "reduced", or "auto": the one of them that predicts held-out parts best;
         models whose fit would take minutes are left out.
-    nuisance
-        Disturbances that the rig may add: "delay" between motion and wrench, "bias" (zeros of the wrench and their
-        drift), "load" (scale and drift of the load cell), "twist" (noise of the twist). All by default.
     start
         Initial guess, and the values of parameters that are not estimated: a law, or values by name. Missing values are
         guessed.
-    elasto_plastic
-        Kind of bristles (if `start` is a law, that of the law).
-    surface
-        Class of the limit surface of "reduced-published".
-    noise
-        Standard deviation of the measured fx, fy [N] and tau [N m]; None estimates each from its jitter.
-    begins
-        "rest": every log begins with relaxed bristles. "steady": it begins with those of steady sliding at its first
-        twist.
-    refine
-        Steps between two samples; None doubles them until no estimate changes by more than a fifth of its error.
-    starts, seed
-        Number of starting points, and the random seed that scatters them.
+    options
+        Noise, disturbances of the rig, starting points and the like.
     progress
         Called with a text from time to time.
 
@@ -101,59 +83,61 @@ def identify_lugre(
     logs, names = as_logs(log), known.check_names(parameters)
     validation.instance("patch", patch, ContactPatch, "a ContactPatch")
     refuse_anisotropy(patch, "identify_lugre")
-    kinds = _kinds(validation.choice("model", model, ("auto", *MODELS)), patch, names)
-    groups = check_groups(nuisance)
-    validation.choice("begins", begins, BEGINS)
-    starts = validation.count("starts", starts)
-    law, given = _start_law(start, elasto_plastic)
+    models = _models_to_fit(validation.choice("model", model, ("auto", *SIMULATORS)), patch, names)
+    validation.instance("options", options, FitOptions, "a FitOptions record")
+    law, given = _start_law(start, options.elasto_plastic)
     findings = check_logs(logs, patch, names)
-    steps = 1 if refine is None else validation.count("refine", refine)
-    say = (lambda text: None) if progress is None else progress
-    spread = first_noise(logs) if noise is None else given_noise(noise)
+    report = (lambda text: None) if progress is None else progress
+    noise = first_noise(logs) if options.noise is None else np.array(options.noise)
     # The quickest model leads: it finds where the others begin.
-    guesses, found, skipped, lead = [], [], [], None
-    for kind in dict.fromkeys((MODELS[0], *kinds)):
-        problem = Problem(logs, patch, names, law, surface, begins, steps, kind, groups)
-
-        def tell(text: str, kind: str = kind) -> None:
-            say(f"{kind}: {text}")
-
+    guesses, candidates, skipped, lead = [], [], [], None
+    for name in dict.fromkeys((next(iter(SIMULATORS)), *models)):
+        problem = LogProblem(logs, patch, names, law, options, name)
+        tell = _named_report(report, name)
         if lead is None:
             tell("looking for starts")
-            chance = validation.count("seed", seed, 0)
-            guesses = guess_starts(problem, given, starts=starts, seed=chance, noise=spread)
-            fit = look(problem, guesses, noise=spread, say=tell)
+            guesses = guess_starts(problem, given, starts=options.starts, seed=options.seed, noise=noise)
+            fit = multistart(problem, guesses, noise=noise, report=tell)
         elif model == "auto" and problem.work * USUAL_EVALUATIONS > PATIENCE:
-            skipped.append(kind)
+            skipped.append(name)
             continue
         else:
-            fit = follow(problem, lead, guesses, noise=spread, say=tell)
-        if kind in kinds:
-            fit = refined(fit, known_noise=noise is not None, fixed_steps=refine is not None, say=tell)
-            found.append(Candidate(fit, uncertainty(fit)))
+            fit = warm_start(problem, lead, guesses, noise=noise, report=tell)
+        if name in models:
+            fit = refine(fit, report=tell)
+            candidates.append(Candidate(fit, uncertainty(fit)))
         lead = fit if lead is None else lead
     assert lead is not None
-    return with_findings(assemble(best_of(found), found, skipped, lead.starts), logs, findings)
+    found = _identification(best_of(candidates), candidates, skipped, lead.starts)
+    return with_findings(found, logs, findings)
 
 
-def _kinds(model: str, patch: ContactPatch, names: Sequence[str]) -> tuple[str, ...]:
-    """Names of the models to fit: of patches that follow their load only the published one knows how."""
-    follows = patch.depends_on_load or any(name in known.SOFT_FINGER for name in names)
-    if follows and model not in ("auto", MODELS[0]):
-        rule = f"be {MODELS[0]!r} if the patch changes with the load"
-        raise InvalidValueError("model", rule, model)
-    if follows:
-        return MODELS[:1]
-    return MODELS if model == "auto" else (model,)
+def _named_report(report: Report, name: str) -> Report:
+    """Return a report whose lines begin with the name of the model."""
+    return lambda text: report(f"{name}: {text}")
+
+
+def _models_to_fit(model: str, patch: ContactPatch, names: Sequence[str]) -> tuple[str, ...]:
+    """Return the names of the models to fit; only some take a patch that changes with its load."""
+    able = tuple(SIMULATORS)
+    if patch.depends_on_load or any(name in known.SOFT_FINGER for name in names):
+        able = tuple(name for name, each in SIMULATORS.items() if each.own_radius)
+        if model not in ("auto", *able):
+            rule = f"be {' or '.join(map(repr, able))} if the patch changes with the load"
+            raise InvalidValueError("model", rule, model)
+    return able if model == "auto" else (model,)
 
 
 def guessed_law(values: Mapping[str, float]) -> LuGre:
-    """The law that a search without data would begin with, for values by name; usual ones where there are none."""
+    """Return the law with which a search without data would begin: the `values` by name, usual ones for the others."""
     return _start_law(values, ElastoPlastic(0.9))[0]
 
 
 def _start_law(start: Any, elasto_plastic: ElastoPlastic | float | None) -> tuple[LuGre, dict[str, float] | None]:
-    """The law that holds what is not estimated, and the values given by name (None: a whole law was given)."""
+    """Return the law that holds the parameters that are not estimated, and the values given by name.
+
+    The values are None if a whole law was given.
+    """
     if type(start) is LuGre:
         return start, None
     if not isinstance(start, Mapping | None):
@@ -170,3 +154,119 @@ def _start_law(start: Any, elasto_plastic: ElastoPlastic | float | None) -> tupl
     if "mu_s" in fields and "mu_c" not in fields:
         fields["mu_c"] = min(LuGre.mu_c, fields["mu_s"])
     return LuGre(**fields, elasto_plastic=elasto_plastic), given
+
+
+# ---------------------------------------------------------------------- from the best fit to the result
+
+
+def _identification(
+    best: Candidate, candidates: Sequence[Candidate], skipped: Sequence[str], starts: tuple[int, int]
+) -> Identification:
+    """Make the result from the best of several models: errors, verdicts, histories, the fitted law and model."""
+    fit, u = best.fit, best.uncertainty
+    problem: Any = fit.problem
+    count = len(problem.names)
+    values, rig = problem.split(fit.values)
+    errors = np.sqrt(np.diag(u.covariance))
+    histories = _histories(best)
+    evidence = _evidence(best, errors[:count], histories)
+    law = fitted_law(problem.law, dict(zip(problem.names, values.tolist(), strict=True)))
+    return Identification(
+        names=problem.names,
+        values=values,
+        standard_errors=errors[:count],
+        correlations=evidence.correlations,
+        verdicts=(*judge(evidence, best, candidates, skipped), *verdicts_on_turns(problem.logs)),
+        noise=fit.noise,
+        channels=CHANNELS,
+        histories=tuple(histories),
+        law=law,
+        model=_fitted_model(problem, values, law),
+        starts=starts,
+        rig=(*problem.rig.found(rig, errors[count:]), *_noise_of_twists(problem)),
+        scores=tuple(each.score for each in candidates),
+        chosen=problem.model,
+    )
+
+
+def _evidence(best: Candidate, errors: np.ndarray, histories: Sequence[Mapping[str, Any]]) -> Evidence:
+    """Collect the evidence for verdicts on estimates with `errors` `[F]`."""
+    fit, u = best.fit, best.uncertainty
+    problem: Any = fit.problem
+    count = len(problem.names)
+    values, _ = problem.split(fit.values)
+    still = fit.values.copy()
+    still[:count] *= np.where(np.isin(problem.names, ("mu_c", "mu_s")), NO_SLIP, 1.0)
+    costs = [0.5 * float((problem.residual(each, fit.sigma) ** 2).sum()) for each in (fit.values, still)]
+    sliding = problem.sliding(values)
+    return Evidence(
+        names=problem.names,
+        values=values,
+        errors=errors,
+        correlations=correlations(u.covariance)[:count, :count],
+        at_bound=fit.at_bound[:count],
+        jacobian=u.jacobian[:, :count],
+        speeds=np.concatenate([each[0] for each in sliding]),
+        spins=np.concatenate([each[1] for each in sliding]),
+        loads=np.array([mean_load(log) for log in problem.logs]),
+        torque=any(log.channels[2] for log in problem.logs),
+        without_slip=costs[1] - costs[0],
+        largest_coefficient=max(float(np.nanquantile(each["coefficient"], 0.99)) for each in histories),
+    )
+
+
+def _histories(best: Candidate) -> list[dict[str, Any]]:
+    """Return measured and predicted wrenches of each log, held-out predictions, and sliding speeds."""
+    fit = best.fit
+    problem: Any = fit.problem
+    values, _ = problem.split(fit.values)
+    shown, sliding = problem.shown(fit.values), problem.sliding(values)
+    unseen = problem.by_log(best.uncertainty.unseen[:, None])
+    histories = []
+    for i, (log, used, sigma, rows) in enumerate(zip(problem.logs, problem.used, fit.sigma, unseen, strict=True)):
+        held_out = np.full_like(log.wrench, np.nan)
+        held_out[used] = log.wrench[used] + rows[:, :, 0] * np.where(log.channels, sigma[used], np.nan)
+        radius = problem.maps[i].vector(values)[PARAMETERS.index("contact_radius")]
+        force = np.linalg.norm(log.wrench / [1.0, 1.0, radius], axis=1)
+        histories.append(
+            {
+                "name": log.name,
+                "time": log.time,
+                "measured": np.where(log.channels, log.wrench, np.nan),
+                "predicted": shown[i],
+                "held_out": held_out,
+                "speed": sliding[i][0],
+                "coefficient": force / np.where(log.normal_force > 0.0, log.normal_force, np.nan),
+            }
+        )
+    return histories
+
+
+def _noise_of_twists(problem: LogProblem) -> list[Nuisance]:
+    """Return the noise of the twists of each log as quantities of the rig, if it is estimated."""
+    if "twist" not in problem.rig.groups:
+        return []
+    result = []
+    for log, twist in zip(problem.logs, problem.twists, strict=True):
+        name = log.name if len(problem.logs) > 1 else ""
+        error = twist.noise / np.sqrt(0.3 * len(log.time))
+        for k, (channel, unit) in enumerate((("vx", "m/s"), ("vy", "m/s"), ("omega", "rad/s"))):
+            result.append(Nuisance(f"noise_{channel}", unit, float(twist.noise[k]), float(error[k]), name))
+    return result
+
+
+def _fitted_model(problem: LogProblem, values: np.ndarray, law: LuGre) -> Any:
+    """Make the fitted model, with the patch scaled about its centre of pressure or fitted soft-finger constants."""
+    given = dict(zip(problem.names, values.tolist(), strict=True))
+    patch, surface = problem.fixed_patch, problem.options.surface
+    finger = {name: given[name] for name in known.SOFT_FINGER if name in given}
+    if finger:
+        pressure = dataclasses.replace(problem.patch.pressure, **finger)
+        fitted = ContactPatch(problem.patch.positions, problem.patch.areas, pressure, problem.patch.grid, patch.name)
+        return ReducedModelPublished(fitted, law, surface=surface(fitted, normal_force=problem.reference_load))
+    if any(name in known.SHAPE for name in given):
+        centre, vector = patch.centre_of_pressure(), problem.maps[0].base
+        radius = float(vector[PARAMETERS.index("contact_radius")])
+        new = np.array([given.get("centre_x", centre[0]), given.get("centre_y", centre[1])])
+        patch = scaled_patch(patch, given.get("contact_radius", radius) / radius, new)
+    return SIMULATORS[problem.model].model(patch, law, surface)

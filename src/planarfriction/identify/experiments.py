@@ -1,11 +1,11 @@
-"""`plan_motion`: which motion adds most information to the logs so far.
+"""`design_experiment`: the motion that adds most information to the logs so far.
 
 With the derivatives J of the wrenches over their noise, information adds up over logs,
 
     C_0 = (P + sum over logs J' J)^-1,    C_m = (C_0^-1 + J_m' J_m)^-1,    gain = log2(det C_0 / det C_m) / 2   [bit],
 
-P that of what is taken for granted. What the rig adds is estimated too: zeros and drift for each log, delay and
-scale of the load cell once for all. To first order in the parameters, so the gain holds near the law that is given.
+with P the information a priori. Disturbances of the rig are estimated too: zeros and drift for each log, delay and
+scale of the load cell once for all. The gain is of first order in the parameters, so it holds near the given law.
 
 Sources: Lindley 1956 (gain of information); Chaloner and Verdinelli 1995 (its form for normal errors, section 4).
 """
@@ -24,20 +24,17 @@ from planarfriction import validation
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify import parameters as known
-from planarfriction.identify.candidates import candidate_motions
 from planarfriction.identify.logs import Log, as_logs
-from planarfriction.identify.nuisance import GROUPS, check_groups
 from planarfriction.identify.parameters import ALL, PRIOR, SHAPE_PRIOR, Coordinates
-from planarfriction.identify.problem import Problem, block_diag, given_noise
+from planarfriction.identify.problem import FitOptions, LogProblem, check_noise
 from planarfriction.identify.result import WIDTH, Identification
-from planarfriction.identify.sensors import first_noise
+from planarfriction.identify.rig import GROUPS, check_groups, first_noise
 from planarfriction.laws import LuGre
-from planarfriction.limit_surface import LimitSurfaceTablePublished
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.metric import refuse_anisotropy
 
 NOISE = 0.01
-"""Noise over the largest sliding friction where nobody says it."""
+"""Noise over the largest sliding friction, unless it is given."""
 
 REFINE = 4
 """Steps between two samples."""
@@ -49,17 +46,38 @@ KNOWN = 0.5
 FAINT = 1e-14
 """Share of the largest information below which rounding decides."""
 
+SAMPLES = 100, 100_000
+"""Fewest samples that show a motion, and most samples of a plan."""
+
+LOADS = 20
+"""Most loads of a plan."""
+
+SINES = (2.3, 1.7, 3.1)
+"""Frequencies of vx, vy and omega [Hz]: no two periods meet again soon."""
+
+SLOWEST = 1e-3
+"""Speed at the begin of a slide over its largest speed."""
+
+STROKE = 3.0
+"""Amplitude of reversals over the displacement at which bristles break away, `mu_s/sigma_0`."""
+
+SLOW = 1.0
+"""Frequency of slow reversals [Hz]."""
+
+PER_PERIOD = 25.0
+"""Samples of a period of the quickest reversals."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class MotionPlan(ByValue):
-    """Motions ranked by the information that they are expected to add, the best first; M motions, F parameters."""
+    """Plan of an experiment: M motions ranked by the information they should add on F parameters, the best first."""
 
     names: tuple[str, ...]
     """Names of the parameters."""
     values: np.ndarray
-    """Their values, near which the plan is valid [SI], `[F]`."""
+    """Values of the parameters, near which the plan is valid [SI], `[F]`."""
     motions: tuple[Log, ...]
-    """The motions, with their expected wrenches."""
+    """Motions with their expected wrenches."""
     gains: np.ndarray
     """Information that each motion is expected to add [bit], `[M]`."""
     errors_so_far: np.ndarray
@@ -69,12 +87,11 @@ class MotionPlan(ByValue):
 
     @property
     def best(self) -> Log:
-        """The motion that adds the most information."""
+        """Motion that adds the most information."""
         return self.motions[0]
 
     def table(self) -> str:
-        """Text in 80 columns: the gain of each motion and the parameter it leaves least certain; the errors before and
-        after the best one."""
+        """Return a text in 80 columns: the gain of each motion, and the errors before and after the best one."""
         lines = [f"{'motion':<38}{'gain [bit]':>10}   {'least certain afterwards'}"]
         for motion, gain, errors in zip(self.motions, self.gains, self.errors, strict=True):
             at = int(np.argmax(errors / self._sizes))
@@ -103,7 +120,7 @@ class MotionPlan(ByValue):
         return f"{100.0 * share:.2g} %" if share < KNOWN else "unknown"
 
 
-def plan_motion(
+def design_experiment(
     patch: ContactPatch,
     law: LuGre,
     *,
@@ -122,7 +139,7 @@ def plan_motion(
     Parameters
     ----------
     patch, law
-        The contact, as far as it is known: a guess before the first log, then `known_so_far`.
+        The contact, as far as it is known: a guess before the first log, then `current_estimate`.
     logs
         Logs measured so far; none before the first experiment.
     motions
@@ -146,7 +163,7 @@ def plan_motion(
     """
     names = known.check_names(parameters)
     validation.instance("patch", patch, ContactPatch, "a ContactPatch")
-    refuse_anisotropy(patch, "plan_motion")
+    refuse_anisotropy(patch, "design_experiment")
     validation.instance("law", law, LuGre, "a LuGre law")
     if "breakaway_ratio" in names and law.elasto_plastic is None:
         raise InvalidValueError("parameters", "contain breakaway_ratio only for elasto-plastic bristles", names)
@@ -159,30 +176,35 @@ def plan_motion(
     for each in candidates:
         if not each.twist.any():
             raise InvalidValueError(f"twist of {each.name}", "move the contact", "0 throughout")
-    spread = _noise(noise, before, candidates, patch, law)
-    task = _Task(patch, law, names, tuple(group for group in groups if group != "twist"), spread)
-    so_far = task.granted() + (task.of_logs(before, groups) if before else 0.0)
-    pick = [names.index(name) for name in chosen]
-    start, expected, gains, errors = task.covariance(so_far), [], [], []
-    for each in candidates:
-        shown = task.expected(each)
+    sigma = _noise(noise, before, candidates, patch, law)
+    information = _Information(patch, law, names, tuple(group for group in groups if group != "twist"), sigma)
+    so_far = information.prior() + (information.of_logs(before, groups) if before else 0.0)
+    return _ranked(information, so_far, candidates, [names.index(name) for name in chosen])
+
+
+def _ranked(information: _Information, so_far: np.ndarray, motions: Sequence[Log], pick: Sequence[int]) -> MotionPlan:
+    """Rank motions by the information on the picked parameters that they add to that so far, `[F + S, F + S]`."""
+    start, expected, gains, errors = information.covariance(so_far), [], [], []
+    for each in motions:
+        shown = information.expected(each)
         expected.append(shown)
-        after = task.covariance(so_far + task.of_logs((task.measured(shown),), task.groups))
+        added = information.of_logs((information.measured(shown),), information.groups)
+        after = information.covariance(so_far + added)
         gains.append(_entropy(start, pick) - _entropy(after, pick))
-        errors.append(task.errors(after))
+        errors.append(information.errors(after))
     order = np.argsort(-np.array(gains), kind="stable")
     return MotionPlan(
-        names,
-        task.values,
+        information.names,
+        information.values,
         tuple(expected[i] for i in order),
         np.array(gains)[order],
-        task.errors(start),
+        information.errors(start),
         np.array(errors)[order],
     )
 
 
-def known_so_far(found: Identification, patch: ContactPatch, law: LuGre) -> tuple[ContactPatch, LuGre]:
-    """The patch and the law to plan with: values that `found` knows to within a factor of about two, else those given.
+def current_estimate(found: Identification, patch: ContactPatch, law: LuGre) -> tuple[ContactPatch, LuGre]:
+    """Return patch and law to plan with: the values that `found` knows to a factor of about two, else those given.
 
     A value of `law` that lies outside the interval of `found` is moved to its middle.
 
@@ -205,52 +227,50 @@ def known_so_far(found: Identification, patch: ContactPatch, law: LuGre) -> tupl
     return (found.model.patch if moved else patch), dataclasses.replace(law, **fields)
 
 
-class _Task:
-    """The information of logs about the coordinates `[F]` of the contact and what all logs share of the rig `[S]`."""
+class _Information:
+    """Information of logs on the coordinates `[F]` of the contact and the disturbances `[S]` that all logs share."""
 
-    def __init__(self, patch: Any, law: LuGre, names: tuple[str, ...], groups: tuple[str, ...], noise: np.ndarray):
+    def __init__(
+        self, patch: ContactPatch, law: LuGre, names: tuple[str, ...], groups: tuple[str, ...], noise: np.ndarray
+    ) -> None:
         self.patch, self.law, self.names, self.groups, self.noise = patch, law, names, groups, noise
+        time = np.linspace(0.0, 1.0, 10)
+        self._probe = self.problem([Log(time, np.ones((10, 3)), np.ones((10, 3)), np.ones(10))], groups)
+        self.values = self._probe.start_values()
+        coordinates = Coordinates(names, self.values, law.mu_c)
+        self._scale, self._slopes = coordinates.scale, coordinates.slopes(coordinates.of(self.values))
 
-    def problem(self, logs: Sequence[Log], groups: Sequence[str]) -> Problem:
-        """The fit of these logs."""
-        return Problem(
-            logs, self.patch, self.names, self.law, LimitSurfaceTablePublished, "rest", REFINE, groups=groups
-        )
+    def problem(self, logs: Sequence[Log], groups: Sequence[str]) -> LogProblem:
+        """Make the problem of a fit of these logs."""
+        return LogProblem(logs, self.patch, self.names, self.law, FitOptions(nuisance=groups, refine=REFINE))
 
-    def granted(self) -> np.ndarray:
-        """Information `[F + S, F + S]` that is taken for granted: a factor of 20 either way, and the rig's widths."""
-        probe = self._probe()
-        self.values = probe.start_values(self.law)
-        self.coordinates = Coordinates(self.names, self.values, self.law.mu_c)
-        self.slopes = self.coordinates.slopes(self.coordinates.of(self.values))
+    def prior(self) -> np.ndarray:
+        """Return the information `[F + S, F + S]` a priori: a factor of 20 either way, and the rig's widths."""
         width = np.full(len(self.names), PRIOR)
         for i, name in enumerate(self.names):
             if name in ("gamma", "mu_s"):
                 width[i] = SHAPE_PRIOR
             elif name in ("centre_x", "centre_y"):
-                width[i] = float(probe.model.patch.contact_radius()) / self.coordinates.scale[i]
-        shared = sum(column.log is None for column in probe.rig.columns)
+                width[i] = float(self._probe.fixed_patch.contact_radius()) / self._scale[i]
+        shared = sum(column.log is None for column in self._probe.rig.columns)
         return np.diag(np.concatenate([width**-2.0, np.ones(shared)]))
 
-    def _probe(self) -> Problem:
-        time = np.linspace(0.0, 1.0, 10)
-        return self.problem([Log(time, np.ones((10, 3)), np.ones((10, 3)), np.ones(10))], self.groups)
-
     def expected(self, motion: Log) -> Log:
-        """The motion with its wrenches."""
+        """Return the motion with its expected wrenches."""
         problem = self.problem([dataclasses.replace(motion, wrench=np.ones_like(motion.twist))], ())
         return dataclasses.replace(motion, wrench=problem.shown(self.values)[0])
 
     def measured(self, log: Log) -> Log:
-        """The log with wrenches off by their noise: a torque of 0 throughout would count as not measured."""
+        """Return the log with its noise added to the wrenches: a torque of 0 throughout would count as not measured."""
         return dataclasses.replace(log, wrench=log.wrench + np.where(np.isfinite(self.noise), self.noise, 0.0))
 
     def of_logs(self, logs: Sequence[Log], groups: Sequence[str]) -> np.ndarray:
-        """Information `[F + S, F + S]` of logs, with what each adds of its own estimated along."""
+        """Compute the information `[F + S, F + S]` of logs, with the disturbances of each log estimated along."""
         problem, count = self.problem(logs, groups), len(self.names)
-        values = np.concatenate([self.values, np.zeros(len(problem.rig.columns))])
-        jacobian = problem.linearised(values, problem.spread(values, self.noise))[1]
-        jacobian = jacobian @ block_diag(self.slopes, np.diag(problem.rig.widths))
+        coordinates = problem.coordinates(self.values)
+        values = coordinates.values(coordinates.of(self.values))
+        jacobian = problem.linearised(values, problem.sigma(values, self.noise))[1]
+        jacobian = jacobian @ coordinates.slopes(coordinates.of(values))
         whole = jacobian.T @ jacobian
         own = np.array([False] * count + [column.log is not None for column in problem.rig.columns])
         inner = whole[np.ix_(own, own)] + np.eye(int(own.sum()))
@@ -258,7 +278,7 @@ class _Task:
         return whole[np.ix_(~own, ~own)] - both @ np.linalg.solve(inner, both.T)
 
     def covariance(self, information: np.ndarray) -> np.ndarray:
-        """Covariance `[F, F]` of the coordinates of the contact."""
+        """Compute the covariance `[F, F]` of the coordinates of the contact."""
         size = 1.0 / np.sqrt(np.diag(information))
         strengths, axes = np.linalg.eigh(information * np.outer(size, size))
         strengths = np.maximum(strengths, FAINT * strengths[-1])
@@ -266,22 +286,102 @@ class _Task:
         return inverse[: len(self.names), : len(self.names)]
 
     def errors(self, covariance: np.ndarray) -> np.ndarray:
-        """Standard errors `[F]` of the values."""
-        return np.sqrt(np.diag(self.slopes @ covariance @ self.slopes.T))
+        """Return the standard errors `[F]` of the values."""
+        return np.sqrt(np.diag(self._slopes @ covariance @ self._slopes.T))
 
 
 def _entropy(covariance: np.ndarray, pick: Sequence[int]) -> float:
-    """Entropy of the picked coordinates [bit], but for a constant."""
+    """Compute the entropy of the picked coordinates [bit], up to a constant."""
     return float(0.5 * np.linalg.slogdet(covariance[np.ix_(pick, pick)])[1] / np.log(2.0))
 
 
 def _noise(given: Any, logs: Sequence[Log], motions: Sequence[Log], patch: ContactPatch, law: LuGre) -> np.ndarray:
-    """Noise `[3]` of the wrenches: as given, that of the logs, or a share of friction."""
+    """Return the noise `[3]` of the wrenches: as given, that of the logs, or a share of friction."""
     if given is not None:
-        return given_noise(given)
+        return check_noise(given)
     if logs:
         return first_noise(logs)
     load = max(float(motion.normal_force.max()) for motion in motions)
     validation.positive("normal_force of the motions", load)
     force = NOISE * law.mu_c * load
     return np.array([force, force, force * float(patch.contact_radius(load))])
+
+
+# ---------------------------------------------------------------------- motions to choose from
+
+
+def candidate_motions(
+    patch: ContactPatch,
+    law: LuGre,
+    *,
+    normal_force: float | Sequence[float] = 1.0,
+    speed: float = 0.05,
+    spin: float | None = None,
+    duration: float = 2.0,
+    rate: float = 1000.0,
+) -> tuple[Log, ...]:
+    """Make motions to choose from for an experiment: six for each load, from rest, as logs whose wrenches are zero.
+
+    They are: growing sines of slide and spin, a slide that becomes faster, slow and quick reversals over three times
+    the distance at which bristles break away, spin alone, and spin during a slide.
+
+    Parameters
+    ----------
+    patch, law
+        The contact, as far as it is known.
+    normal_force
+        One load or several [N].
+    speed, spin
+        The largest that the rig can produce [m/s, rad/s]; None for `spin` moves the rim of the contact as fast as
+        `speed`.
+    duration, rate
+        Length of each motion [s] and samples per second [Hz].
+
+    Raises
+    ------
+    InvalidValueError
+        A number that is not > 0, more than 20 loads, or fewer than 100 or more than 100000 samples.
+    """
+    validation.instance("patch", patch, ContactPatch, "a ContactPatch")
+    validation.instance("law", law, LuGre, "a LuGre law")
+    given = validation.numbers("normal_force", normal_force)
+    if given.ndim > 1 or not 1 <= given.size <= LOADS:
+        raise InvalidValueError("normal_force", f"be one load or a list of up to {LOADS}", f"shape {given.shape}")
+    loads = [validation.positive("normal_force", each) for each in given.reshape(-1)]
+    speed, duration, rate = (
+        validation.positive(name, value) for name, value in (("speed", speed), ("duration", duration), ("rate", rate))
+    )
+    samples = duration * rate
+    if not SAMPLES[0] <= samples <= SAMPLES[1]:
+        raise InvalidValueError("duration * rate", f"be between {SAMPLES[0]} and {SAMPLES[1]} samples", f"{samples:g}")
+    time = np.arange(round(samples)) / rate
+    result = []
+    for load in loads:
+        turn = speed / float(patch.contact_radius(load)) if spin is None else validation.positive("spin", spin)
+        for name, twist in _twists(time, speed, turn, law.mu_s / law.sigma_0, rate).items():
+            called = f"{name}, {load:g} N" if len(loads) > 1 else name
+            result.append(Log(time, twist, np.zeros_like(twist), np.full_like(time, load), called))
+    return tuple(result)
+
+
+def _twists(time: np.ndarray, speed: float, spin: float, breakaway: float, rate: float) -> dict[str, np.ndarray]:
+    """Return the twists `[T, 3]` of the motions by name."""
+    share, zero = time / time[-1], np.zeros_like(time)
+    grown = SLOWEST ** (1.0 - share) - SLOWEST * (1.0 - share)  # from 0, soon by the same factor in the same time
+    sines = [np.sin(2.0 * np.pi * hertz * time) for hertz in SINES]
+    swept = (0.03 + 0.97 * share**2) * np.array(sines)
+
+    def reversals(hertz: float) -> np.ndarray:
+        hertz = min(hertz, speed / (2.0 * np.pi * STROKE * breakaway))
+        pace = 2.0 * np.pi * hertz
+        return STROKE * breakaway * pace * np.sin(pace * time)
+
+    columns: dict[str, tuple[Any, Any, Any]] = {
+        "grown sines": (speed * swept[0], 0.7 * speed * swept[1], spin * swept[2]),
+        "slide from slow to fast": (speed * grown, zero, zero),
+        "slow reversals": (reversals(SLOW), zero, zero),
+        "quick reversals": (reversals(rate / PER_PERIOD), zero, zero),
+        "spin": (zero, zero, spin * swept[2]),
+        "spin during a slide": (speed * grown, zero, spin * grown * sines[2]),
+    }
+    return {name: np.stack(column, -1) for name, column in columns.items()}

@@ -1,0 +1,330 @@
+"""The measuring rig: noise of its sensors, and what it adds to a wrench: delay, zero offsets, drift of the load cell.
+
+    y(t) = (1 + scale + sum_k drift_k P_k(u)) W(t - delay) + bias + zero_drift u,    u from -1 to 1 over the log,
+
+with Legendre polynomials `P_k`. All of it is estimated along with the parameters of the contact, each held loosely at
+zero, so that what looks like friction in the data shows as a wider interval of both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.identify.logs import Log
+
+GROUPS = ("delay", "bias", "load", "twist")
+"""Groups of disturbances: delay, zeros of the channels, scale and drift of the load cell, noise of the twist."""
+
+CHANNELS = (("fx", "N"), ("fy", "N"), ("tau", "N m"))
+
+DELAY, LONGEST = 0.01, 0.05
+"""Standard deviation of the delay a priori, and the longest delay that is tried [s]."""
+
+BIAS, ZERO_DRIFT = 0.1, 0.05
+"""Standard deviations of the zeros and of their drift a priori, as shares of the largest value of the channel."""
+
+LEAST_FORCE = 1e-3
+"""Least value that a force channel counts as, also if it stays at 0, as a share of the largest force."""
+
+DRIFT = (0.05, 0.02, 0.02)
+"""Standard deviations of the drift of the load cell by degree [-]; the first is half of the change over the log."""
+
+SCALE = 0.005
+"""Standard deviation of the scale of a calibrated load cell [-]."""
+
+EDGE = 1.5
+"""Half the range of a load cell's drift over the standard deviation of its scale: it is unknown when it was right."""
+
+ORDER = 3
+"""Order of the differences that give the noise: motions at a tenth of the sampling rate leave 2 % of themselves."""
+
+SIZE = float(np.sqrt(20.0))
+"""Standard deviation of third differences of unit noise: 1 + 9 + 9 + 1 under the root."""
+
+MEDIAN = 1.4826
+"""Standard deviation of a normal distribution over its median absolute value."""
+
+CLIP, CLIP_VARIANCE, CLIPPED = 3.0, 0.9733, 5
+"""Sigmas beyond which a difference is left out, variance of a unit normal distribution cut there, and rounds."""
+
+LEAST_NOISE = 1e-3
+"""Least noise of a sensor, as a share of the largest force or torque."""
+
+QUIET = 1e-3
+"""Noise of a twist, as a share of its root mean square, below which it is not smoothed."""
+
+LEAST_TO_SMOOTH = 50
+"""Least number of samples of a twist that is smoothed."""
+
+SMOOTHNESS = 10.0 ** np.arange(0.0, 10.0, 0.25)
+"""Weights of the third differences among which a smooth twist is chosen."""
+
+
+@dataclass(frozen=True)
+class Nuisance:
+    """Quantity of the rig that was estimated along with the contact."""
+
+    name: str
+    unit: str
+    value: float
+    """Estimate [unit]."""
+    error: float
+    """Standard error [unit]."""
+    log: str = ""
+    """Name of the log, empty for what all logs share."""
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """95 % interval [unit]."""
+        return self.value - 1.96 * self.error, self.value + 1.96 * self.error
+
+
+@dataclass(frozen=True)
+class _Column:
+    name: str
+    unit: str
+    log: int | None
+    width: float
+    """Standard deviation a priori [unit]."""
+
+
+class Rig:
+    """Nuisance parameters of logs, K of them, in the order of `columns`."""
+
+    def __init__(self, logs: Sequence[Log], groups: Sequence[str]):
+        self.logs, self.groups = logs, tuple(groups)
+        columns = []
+        if "delay" in groups:
+            columns.append(_Column("delay", "s", None, DELAY))
+        if "load" in groups:
+            columns.append(_Column("load_scale", "-", None, SCALE))
+        for i, log in enumerate(logs):
+            largest = np.abs(log.wrench).max(axis=0)
+            largest[:2] = np.maximum(largest[:2], LEAST_FORCE * largest[:2].max())
+            for k, (channel, unit) in enumerate(CHANNELS):
+                if "bias" in groups and log.channels[k]:
+                    columns.append(_Column(f"bias_{channel}", unit, i, BIAS * largest[k]))
+                    columns.append(_Column(f"zero_drift_{channel}", unit, i, ZERO_DRIFT * largest[k]))
+            if "load" in groups:
+                names = ["load_drift", *(f"load_drift_{k}" for k in range(2, len(DRIFT) + 1))]
+                columns += [_Column(name, "-", i, width) for name, width in zip(names, DRIFT, strict=True)]
+        self.columns = tuple(columns)
+        self.widths = np.array([each.width for each in columns])
+
+    @property
+    def limits(self) -> np.ndarray:
+        """Largest sizes of the values, over their widths, `[K]`."""
+        return np.array([LONGEST / DELAY if each.name == "delay" else np.inf for each in self.columns])
+
+    def delay(self, values: np.ndarray) -> float:
+        """Return the delay [s] among the values `[K]`."""
+        return float(values[0]) if "delay" in self.groups else 0.0
+
+    def added(
+        self, i: int, values: np.ndarray, wrench: np.ndarray, later: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Compute the wrench `[T, 3]` that sensors of log i show, the factor `[T]` on it, and derivatives `[T, 3, K]`.
+
+        `later` is the derivative of the wrench with respect to the delay.
+        """
+        u = self._course(i)
+        slopes, factor, added = np.zeros((*wrench.shape, len(self.columns))), np.ones(len(u)), np.zeros(wrench.shape)
+        shapes = self._shapes(u)
+        for j, column in enumerate(self.columns):
+            if column.log not in (None, i) or column.name == "delay":
+                continue
+            if column.name in shapes:
+                factor = factor + values[j] * shapes[column.name]
+                slopes[:, :, j] = shapes[column.name][:, None] * wrench
+            else:
+                k = [channel for channel, _ in CHANNELS].index(column.name.rsplit("_", 1)[1])
+                slopes[:, k, j] = u if column.name.startswith("zero") else 1.0
+                added[:, k] += values[j] * slopes[:, k, j]
+        if "delay" in self.groups:
+            slopes[:, :, 0] = factor[:, None] * later
+        return factor[:, None] * wrench + added, factor, slopes
+
+    def range_of_drift(self, values: np.ndarray) -> float:
+        """Compute half of the largest change of the load cell's factor over a log [-]."""
+        most = 0.0
+        for i in range(len(self.logs)):
+            shapes = self._shapes(self._course(i))
+            here = [(v, c) for v, c in zip(values, self.columns, strict=True) if c.log == i and c.name in shapes]
+            if here:
+                most = max(most, 0.5 * float(np.ptp(sum(v * shapes[c.name] for v, c in here))))
+        return most
+
+    def with_drift(self, values: np.ndarray) -> np.ndarray:
+        """Return the widths `[K]`, that of the load cell's scale grown by the cell's drift."""
+        widths = self.widths.copy()
+        for j, column in enumerate(self.columns):
+            if column.name == "load_scale":
+                widths[j] = np.hypot(SCALE, self.range_of_drift(values) / EDGE)
+        return widths
+
+    def strain(self, values: np.ndarray) -> float:
+        """Compute the scale of the load cell over its width: friction does not show this scale."""
+        at = [j for j, column in enumerate(self.columns) if column.name == "load_scale"]
+        return float(np.abs(values / self.with_drift(values))[at].max(initial=0.0))
+
+    def found(self, values: np.ndarray, errors: np.ndarray) -> tuple[Nuisance, ...]:
+        """Return the estimates `[K]` with their standard errors `[K]` as records."""
+        several = len(self.logs) > 1
+        return tuple(
+            Nuisance(c.name, c.unit, float(v), float(e), self.logs[c.log].name if several and c.log is not None else "")
+            for c, v, e in zip(self.columns, values, errors, strict=True)
+        )
+
+    def _course(self, i: int) -> np.ndarray:
+        time = self.logs[i].time
+        return 2.0 * (time - time[0]) / (time[-1] - time[0]) - 1.0
+
+    @staticmethod
+    def _shapes(u: np.ndarray) -> dict[str, np.ndarray]:
+        """Return the shapes of the load cell's factor over a log, `[T]` each, by name."""
+        return {
+            "load_scale": np.ones_like(u),
+            "load_drift": u,
+            "load_drift_2": 0.5 * (3.0 * u**2 - 1.0),
+            "load_drift_3": 0.5 * (5.0 * u**3 - 3.0 * u),
+        }
+
+
+def check_groups(nuisance: Any) -> tuple[str, ...]:
+    """Return the names of disturbances as a tuple, each one of `GROUPS`, or raise InvalidValueError."""
+    return tuple(dict.fromkeys(validation.choices("nuisance", nuisance, GROUPS)))
+
+
+# ---------------------------------------------------------------------- noise of the sensors
+
+
+def jitter(values: np.ndarray) -> np.ndarray:
+    """Estimate the standard deviation `[C]` of white noise on the columns `[T, C]` from their third differences.
+
+    Slow changes leave hardly any third differences; those that are too large for noise come from sharp changes and are
+    left out.
+    """
+    differences = np.abs(np.diff(values, ORDER, axis=0)) / SIZE
+    sigma = MEDIAN * np.median(differences, axis=0)
+    for _ in range(CLIPPED):
+        kept = differences <= CLIP * sigma
+        sigma = np.sqrt(np.sum(np.where(kept, differences, 0.0) ** 2, axis=0) / np.maximum(kept.sum(axis=0), 1))
+        sigma = sigma / np.sqrt(CLIP_VARIANCE)
+    return sigma
+
+
+def least_noise(logs: Sequence[Log]) -> np.ndarray:
+    """Return the least noise `[3]` of a wrench that sensors can have."""
+    largest = np.max([np.abs(log.wrench).max(axis=0) for log in logs], axis=0)
+    force = max(largest[:2].max(), np.finfo(float).tiny)
+    return LEAST_NOISE * np.array([force, force, max(largest[2], np.finfo(float).tiny)])
+
+
+def first_noise(logs: Sequence[Log]) -> np.ndarray:
+    """Estimate the noise `[3]` of the wrenches from the logs alone."""
+    return wrench_noise(logs, [log.wrench for log in logs])
+
+
+def wrench_noise(logs: Sequence[Log], residuals: Sequence[np.ndarray]) -> np.ndarray:
+    """Estimate the noise `[3]` of the wrench from the jitter of the logs or of the residuals `[T, 3]`, if that is less.
+
+    A fit takes the sharp turns of friction out of the signal; its errors extend over many samples and so leave the
+    jitter alone. The noise of a channel that no log has is infinite.
+    """
+    sigmas = []
+    for values in ([log.wrench for log in logs], residuals):
+        squares = [len(v) * np.where(log.channels, jitter(v), 0.0) ** 2 for log, v in zip(logs, values, strict=True)]
+        samples = np.sum([len(log.time) * log.channels for log in logs], axis=0)
+        sigmas.append(np.sqrt(np.sum(squares, axis=0) / np.maximum(samples, 1)))
+    measured = np.any([log.channels for log in logs], axis=0)
+    return np.where(measured, np.maximum(np.minimum(*sigmas), least_noise(logs)), np.inf)
+
+
+@dataclass(frozen=True)
+class SmoothTwist:
+    """Twist from which noise was removed as far as possible."""
+
+    values: np.ndarray
+    """Twist without noise [m/s, m/s, rad/s], `[T, 3]`."""
+    noise: np.ndarray
+    """Standard deviation of the noise of the measured twist, `[3]`."""
+    left: np.ndarray
+    """Root mean square of the remaining error, `[3]`."""
+    weights: np.ndarray
+    """Weights of the third differences in the smoother, `[3]`; 0 for a channel that was not smoothed."""
+
+    @property
+    def noisy(self) -> np.ndarray:
+        """Mask `[3]` of the channels whose remaining error counts."""
+        size = np.maximum(np.sqrt(np.mean(self.values**2, axis=0)), np.finfo(float).tiny)
+        return self.left > QUIET * size
+
+    def error(self, random: np.random.Generator) -> np.ndarray:
+        """Draw an error that the values may have, `[T, 3]`: noise through the same smoother."""
+        drawn = random.standard_normal(self.values.shape)
+        for k, weight in enumerate(self.weights):
+            if weight > 0.0:
+                drawn[:, k] = _solved(drawn[:, k], weight)
+            drawn[:, k] *= self.left[k] / max(np.sqrt(np.mean(drawn[:, k] ** 2)), np.finfo(float).tiny)
+        return drawn
+
+
+def smoothed(log: Log) -> SmoothTwist:
+    """Remove the noise from the twist of a log.
+
+    Samples that are not evenly spaced in time, and twists with hardly any noise, stay as they are.
+    """
+    found = as_measured(log)
+    if not log.even or len(log.time) < LEAST_TO_SMOOTH:
+        return found
+    values, noise, left, weights = log.twist.copy(), found.noise, found.left, found.weights
+    size = np.maximum(np.sqrt(np.mean(log.twist**2, axis=0)), np.finfo(float).tiny)
+    for k in np.flatnonzero(noise > QUIET * size):
+        values[:, k], noise[k], left[k], weights[k] = _smooth(log.twist[:, k])
+    return SmoothTwist(values, noise, left, weights)
+
+
+def as_measured(log: Log) -> SmoothTwist:
+    """Return the twist of a log as it was measured, with the noise that it has."""
+    noise = jitter(log.twist)
+    return SmoothTwist(log.twist, noise, noise.copy(), np.zeros(3))
+
+
+def _smooth(values: np.ndarray) -> tuple[np.ndarray, float, float, float]:
+    """Smooth values `[T]`; returns them with their noise, their remaining error, and the weight of third differences.
+
+    The weight minimises the generalised cross-validation; the remaining error is Stein's estimate.
+
+    Sources: Eilers 2003 (the smoother); Golub, Heath, Wahba 1979 (the weight); Stein 1981.
+    """
+    count = len(values)
+    stiffness = (2.0 - 2.0 * np.cos(np.linspace(0.0, np.pi, 4001))) ** ORDER
+    best = (np.inf, values, 0.0, 0.0, 0.0)
+    for weight in SMOOTHNESS:
+        smooth = _solved(values, weight)
+        freedom = float(np.mean(1.0 / (1.0 + weight * stiffness))) + ORDER / count
+        square = float(np.mean((values - smooth) ** 2))
+        score = square / (1.0 - freedom) ** 2
+        if score < best[0]:
+            variance = square / (1.0 - freedom)
+            error = max(square + 2.0 * variance * freedom - variance, variance * freedom)
+            best = score, smooth, float(np.sqrt(variance)), float(np.sqrt(error)), float(weight)
+    return best[1:]
+
+
+def _solved(values: np.ndarray, weight: float) -> np.ndarray:
+    """Solve `(1 + weight D'D) x = values` for x `[T]`, with D the matrix of third differences."""
+    from scipy.linalg import solveh_banded
+
+    count, row = len(values), (-1.0, 3.0, -3.0, 1.0)
+    bands = np.zeros((ORDER + 1, count))
+    for shift in range(ORDER + 1):  # upper bands
+        for i in range(ORDER + 1 - shift):
+            bands[ORDER - shift, i + shift : count - ORDER + i + shift] += weight * row[i] * row[i + shift]
+    bands[ORDER] += 1.0
+    return solveh_banded(bands, values)
