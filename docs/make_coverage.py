@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 import planarfriction as pf
-from planarfriction.identify import Log, identify_lugre
+from planarfriction.identify import FitOptions, Log, identify_lugre
 
 NAMES = ("mu_c", "mu_s", "v_s", "gamma", "sigma_0", "sigma_1", "sigma_2", "contact_radius")
 
@@ -103,7 +103,7 @@ def observed(row: Row, made: tuple, seed: int) -> Log:
 
 def counted(row: Row, made: tuple, seed: int, count: Count) -> None:
     """Fit one log and count."""
-    found = identify_lugre(observed(row, made, seed), DISC, model=row.model, starts=1)
+    found = identify_lugre(observed(row, made, seed), DISC, model=row.model, options=FitOptions(starts=1))
     count.seeds += 1
     count.rejected += found.scores[0].rejected
     for name, (low, high) in found.intervals().items():

@@ -32,7 +32,7 @@ SKIPPED = {
     "planning.plan_grip": "plans for a second; tests/planning/test_grip.py attacks it",
     "planning.plan_push": "plans for seconds; tests/planning/test_pushing.py attacks it",
     "identify.identify_lugre": "fits for seconds; its logs are attacked as files",
-    "identify.known_so_far": "takes what a fit returns",
+    "identify.current_estimate": "takes what a fit returns",
 }
 """Not attacked, and why."""
 
@@ -177,7 +177,7 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "identify.Log.from_motion": {"wrench": TWISTS},
     "identify.SlidingBody": {"gravity": 9.81},
     "identify.Slide": {"time": TIMES, "pose": TWISTS, "twist": None},
-    "identify.plan_motion": {
+    "identify.design_experiment": {
         "logs": (),
         "motions": Fresh(lambda: objects()["log"]),
         "parameters": ("mu_c",),

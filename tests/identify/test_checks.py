@@ -11,10 +11,10 @@ import planarfriction as pf
 from planarfriction.cli import main
 from planarfriction.cli.output import history_columns, write_csv
 from planarfriction.errors import FileError, InvalidValueError
-from planarfriction.identify import Log, identify_lugre
+from planarfriction.identify import Log
 from planarfriction.identify.checks import check_loads, check_log, check_logs, check_sampling
 from planarfriction.identify.logs import columns_of
-from tests.support.identification_logs import LAW, LOAD, PATCH, clean_log, excitation, noisy
+from tests.support.identification_logs import LAW, LOAD, PATCH, clean_log, excitation, fitted, noisy
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +54,7 @@ def test_friction_that_drives_the_motion_is_refused(log, signs):
     with pytest.raises(
         InvalidValueError, match=rf"against its motion \(it does with {words}\), got power > 0 in \d+ %"
     ):
-        identify_lugre(changed(log, wrench=signs), PATCH)
+        fitted(changed(log, wrench=signs), PATCH)
 
 
 @pytest.mark.parametrize(
@@ -138,13 +138,13 @@ def test_sampling_against_the_corner_of_the_bristles(log):
 
 def test_findings_stand_beside_the_estimates(log):
     """A torque of opposite sign: said, and not refused."""
-    found = identify_lugre(changed(log, wrench=(1, 1, -1)), PATCH, parameters=("mu_c",), start=LAW, starts=1)
+    found = fitted(changed(log, wrench=(1, 1, -1)), PATCH, parameters=("mu_c",), start=LAW, starts=1)
     assert any(
         "fit: wrench of log should point in the direction of friction on the patch" in str(each)
         for each in found.verdicts
     )
     slow = noisy(clean_log(*excitation(duration=1.0, rate=200.0)), 1)
-    told = identify_lugre(slow, PATCH, parameters=("sigma_0", "sigma_1"), start=LAW, starts=1)
+    told = fitted(slow, PATCH, parameters=("sigma_0", "sigma_1"), start=LAW, starts=1)
     assert any("samples of log should be taken at" in str(verdict) for verdict in told.verdicts)
 
 
@@ -152,7 +152,7 @@ def test_sampling_is_no_matter_where_sigma_1_may_be_zero():
     """Its corner may then lie anywhere: no rate of 1e+11 Hz is asked for."""
     law = dataclasses.replace(LAW, sigma_1=0.0)
     log = noisy(clean_log(*excitation(duration=1.0, rate=200.0), law=law), 1)
-    told = identify_lugre(log, PATCH, parameters=("sigma_0", "sigma_1"), start=LAW, starts=1, model="reduced-published")
+    told = fitted(log, PATCH, parameters=("sigma_0", "sigma_1"), start=LAW, starts=1, model="reduced-published")
     assert told.intervals()["sigma_1"][0] == 0.0
     assert not any("samples of log" in str(verdict) for verdict in told.verdicts)
 
@@ -222,7 +222,7 @@ def test_a_simulation_gives_its_law_back(solution):
     """Twists between samples are taken as smooth, and forces jump: 1e-3 of the wrench, which moves gamma by 5 %."""
     begin = dataclasses.replace(LAW, mu_c=0.4)
     log = Log.from_solution(solution)
-    found = identify_lugre(log, PATCH, start=begin, starts=1, model="reduced-published", nuisance=())
+    found = fitted(log, PATCH, start=begin, starts=1, model="reduced-published", nuisance=())
     expected = {name: getattr(LAW, name) for name in found.names if name != "contact_radius"}
     for name, value in expected.items():
         assert found.estimates[name] == pytest.approx(value, rel=0.08), name

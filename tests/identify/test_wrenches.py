@@ -9,12 +9,12 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.errors import FileError, InvalidValueError
-from planarfriction.identify import Log, differentiated, identify_lugre
-from planarfriction.identify.least_squares import covariance
+from planarfriction.identify import Log, differentiated
 from planarfriction.identify.logs import columns_of
 from planarfriction.identify.parameters import Coordinates, soft_finger_moments
+from planarfriction.identify.uncertainty import covariance
 from planarfriction.identify.verdicts import speed_gap
-from tests.support.identification_logs import LAW, LOAD, PATCH, clean_log, excitation, noisy, truth
+from tests.support.identification_logs import LAW, LOAD, PATCH, clean_log, excitation, fitted, noisy, truth
 
 
 @pytest.fixture(scope="module")
@@ -25,7 +25,7 @@ def log():
 
 def identify(log, patch=PATCH, **options):
     """Identify the model that made the logs, without effects of a rig."""
-    return identify_lugre(log, patch, **{"model": "reduced-published", "nuisance": (), **options})
+    return fitted(log, patch, **{"model": "reduced-published", "nuisance": (), **options})
 
 
 def z_scores(log, seeds):

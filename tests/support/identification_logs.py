@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
 import planarfriction as pf
 from planarfriction.derivatives import parameters_of
-from planarfriction.identify import Log
-from planarfriction.identify.prediction import Prediction
-from planarfriction.identify.simulators import PublishedSimulator
+from planarfriction.identify import FitOptions, Identification, Log, identify_lugre
+from planarfriction.identify.simulators import Prediction, PublishedSimulator
 
 LAW = pf.LuGre(
     mu_c=0.5,
@@ -39,7 +40,7 @@ def clean_log(time, twist, *, law=LAW, patch=PATCH, load=LOAD, name="log") -> Lo
     """The log of a contact without noise."""
     model = pf.ReducedModelPublished(patch, law)
     empty = Log(time, twist, np.zeros_like(twist), load, name)
-    wrench = Prediction(PublishedSimulator(model), empty, twist, refine=16).wrenches(parameters_of(model))
+    wrench = Prediction(PublishedSimulator(patch, law), empty, twist, refine=16).wrenches(parameters_of(model))
     return Log(time, twist, wrench, load, name)
 
 
@@ -54,3 +55,10 @@ def truth(law=LAW, patch=PATCH) -> dict[str, float]:
     """The parameters that went in."""
     numbers = {name: getattr(law, name) for name in ("mu_c", "mu_s", "v_s", "gamma", "sigma_0", "sigma_1", "sigma_2")}
     return {**numbers, "contact_radius": pf.ReducedModelPublished(patch, law).surface.contact_radius}
+
+
+def fitted(log, patch=PATCH, **given) -> Identification:
+    """Fit logs with keyword arguments of `identify_lugre` and fields of `FitOptions` alike."""
+    names = {field.name for field in dataclasses.fields(FitOptions)}
+    options = FitOptions(**{name: given.pop(name) for name in names & given.keys()})
+    return identify_lugre(log, patch, options=options, **given)

@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import planarfriction as pf
-from planarfriction.identify import Log, identify_lugre
+from planarfriction.identify import FitOptions, Log, identify_lugre
 
 patch = pf.ContactPatch.disc(0.01, cells=11)
 truth = pf.LuGre(mu_c=0.5, mu_s=0.65, v_s=2e-3, sigma_0=2e4, sigma_1=30.0, sigma_2=0.8, elasto_plastic=0.9)
@@ -29,7 +29,7 @@ wrench += [0.01, 0.01, 5e-5] * np.random.default_rng(0).standard_normal(wrench.s
 time = np.arange(1, 801) * 1e-3
 log = Log(time, twist_at(time), wrench, normal_force=2.0)
 names = ("mu_c", "mu_s", "v_s", "sigma_2")
-found = identify_lugre(log, patch, model="reduced", parameters=names, start=start, nuisance=())
+found = identify_lugre(log, patch, model="reduced", parameters=names, start=start, options=FitOptions(nuisance=()))
 print(found)
 
 # %%

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,16 +25,20 @@ def identify(
     folder: Path | None,
     normal_force: float | None,
     contact: str | None,
+    parameters: Sequence[str],
+    start: Mapping[str, float],
+    model: str,
     **options: Any,
 ) -> int:
     """Estimate the parameters from the logs, print them, and write JSON and picture into `folder`."""
-    from planarfriction.identify import Log, identify_lugre
+    from planarfriction.identify import FitOptions, Log, identify_lugre
 
     if folder is not None:
         make_folder(folder)
     logs = [Log.from_csv(path, normal_force=normal_force, contact=contact) for path in paths]
     with work_progress("identifying") as progress:
-        found = identify_lugre(logs, patch, progress=progress, **options)
+        chosen = {"parameters": parameters, "start": start, "model": model}
+        found = identify_lugre(logs, patch, **chosen, options=FitOptions(**options), progress=progress)
     samples = sum(len(log.time) for log in logs)
     title = f"{', '.join(log.name for log in logs)}: {samples} samples, {patch.name}"
     print(title, "", found.table(), sep="\n")
@@ -64,7 +68,7 @@ def parse_names(text: str | None) -> tuple[str, ...]:
 
 def parse_nuisance(text: str | None) -> tuple[str, ...]:
     """Names of `--nuisance`, separated by commas; all without it."""
-    from planarfriction.identify.nuisance import GROUPS
+    from planarfriction.identify.rig import GROUPS
 
     if text is None:
         return GROUPS

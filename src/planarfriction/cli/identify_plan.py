@@ -98,7 +98,7 @@ def plan(
     from planarfriction.cli import identify, output
     from planarfriction.cli.console import note
     from planarfriction.cli.patches import WIDTH, find_patch
-    from planarfriction.identify import Log, candidate_motions, plan_motion
+    from planarfriction.identify import Log, candidate_motions, design_experiment
     from planarfriction.identify.logs import columns_of
 
     patch = find_patch(patch_name, cell_size=cell_size, width=WIDTH if width is None else width)
@@ -109,7 +109,7 @@ def plan(
     patch, law = _known(measured, patch, names, values, spread)
     loads = list(normal_force) or sorted({float(f"{log.normal_force.mean():.3g}") for log in measured}) or [1.0]
     motions = candidate_motions(patch, law, normal_force=loads, speed=speed, spin=spin, duration=duration, rate=rate)
-    found = plan_motion(
+    found = design_experiment(
         patch,
         law,
         logs=measured,
@@ -130,15 +130,14 @@ def _known(
 ) -> tuple[ContactPatch, LuGre]:
     """Patch and law as the logs show them, or as guessed where there are none."""
     from planarfriction.cli.console import note, work_progress
-    from planarfriction.identify import identify_lugre, known_so_far
+    from planarfriction.identify import FitOptions, current_estimate, identify_lugre
     from planarfriction.identify.wrenches import guessed_law
 
     law = guessed_law(start)
     if not logs:
         return patch, law
     with work_progress("identifying") as progress:
-        found = identify_lugre(
-            logs, patch, parameters=names, start=start, noise=noise, model="reduced-published", progress=progress
-        )
+        chosen = {"parameters": names, "start": start, "model": "reduced-published"}
+        found = identify_lugre(logs, patch, **chosen, options=FitOptions(noise=noise), progress=progress)
     note(found.summary().replace("\n", " "))
-    return known_so_far(found, patch, law)
+    return current_estimate(found, patch, law)

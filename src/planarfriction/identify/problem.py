@@ -20,7 +20,6 @@ from planarfriction.identify.uncertainty import covariance
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
 from planarfriction.limit_surface.base import scaling
-from planarfriction.models import ReducedModelPublished
 from planarfriction.patch import ContactPatch, SoftFinger
 
 BEGINS = ("rest", "steady")
@@ -119,6 +118,7 @@ class Problem:
     def refine_steps(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> bool:
         """Take more steps between two samples if the estimates ask for it; returns True if they do."""
         return False
+
     def residuals(
         self, coordinates: Coordinates, sigma: Sequence[np.ndarray]
     ) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:

@@ -62,6 +62,7 @@ class Simulator:
     def model(cls, patch: ContactPatch, law: LuGre, surface: type[LimitSurface]) -> Any:
         """Make the friction model of a patch and a law."""
         return cls.model_class(patch, law)
+
     def wrenches(self, twists: np.ndarray, loads: np.ndarray, dt: float, vector: np.ndarray) -> np.ndarray:
         """Compute the wrenches `[N, 3]`."""
         raise NotImplementedError
@@ -85,6 +86,7 @@ class PublishedSimulator(Simulator):
 
     def __init__(self, patch, law, surface=LimitSurfaceTablePublished):
         self._model = self.model(patch, law, surface)
+
     @classmethod
     def model(cls, patch, law, surface):
         return ReducedModelPublished(patch, law, surface=surface(patch))
@@ -155,7 +157,6 @@ class DistributedSimulator(ScaledSimulator):
         x, y = (np.ascontiguousarray(column) for column in self.patch.positions.T)
         self._cells = distributed_step.Cells(x, y, np.ascontiguousarray(np.atleast_2d(self.patch.weights())))
 
-
     def sensitivities(self, twists, loads, dt, vector, names):
         base = self.wrenches(twists, loads, dt, vector)
         return base, self._differences(twists, loads, dt, vector, names, base)
@@ -184,6 +185,7 @@ class ReducedSimulator(ScaledSimulator):
     def __init__(self, patch, law, surface=LimitSurfaceTablePublished):
         super().__init__(patch, law)
         self._models: dict[float, ReducedModel] = {}
+
     def _model(self, gamma: float) -> ReducedModel:
         if gamma not in self._models:
             if len(self._models) > 3:

@@ -255,7 +255,9 @@ def judge_parameter(evidence: Evidence, i: int) -> Verdict | None:
     if not kind.logarithmic and not np.isfinite(error):
         return Verdict(name, False, _why(evidence, i, seen))
     if kind.low == 0.0 and value < TWO_SIDED * error:
-        return Verdict(name, True, f"cannot be distinguished from 0, at most {value + TWO_SIDED * error:.3g} {kind.unit}")
+        return Verdict(
+            name, True, f"cannot be distinguished from 0, at most {value + TWO_SIDED * error:.3g} {kind.unit}"
+        )
     if (partner := _partner(evidence, i)) is not None:
         other, correlation = partner
         if not evidence.torque and not {name, other}.isdisjoint(OF_TORQUE):

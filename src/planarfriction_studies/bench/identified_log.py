@@ -7,7 +7,7 @@ import time
 import numpy as np
 
 from planarfriction.derivatives import rollout
-from planarfriction.identify import Log, identify_lugre
+from planarfriction.identify import FitOptions, Log, identify_lugre
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.models import DistributedModel, ReducedModelPublished
 from planarfriction.patch import ContactPatch
@@ -31,11 +31,11 @@ def identification_times(model: str) -> tuple[float, float]:
     law = LuGre(0.5, 0.65, 2e-3, 2e4, 30.0, 0.8, 1.4, ElastoPlastic(0.9))
     contact = (DistributedModel if model == "distributed" else ReducedModelPublished)(patch.compressed(), law)
     log = _log(contact, DURATION)
-    identify_lugre(_log(contact, 0.1), patch, model=model, starts=1)
+    identify_lugre(_log(contact, 0.1), patch, model=model, options=FitOptions(starts=1))
     times = []
     for nuisance in (("delay", "bias", "load", "twist"), ()):
         begin = time.perf_counter()
-        identify_lugre(log, patch, model=model, nuisance=nuisance)
+        identify_lugre(log, patch, model=model, options=FitOptions(nuisance=nuisance))
         times.append(time.perf_counter() - begin)
     return times[0], times[1]
 

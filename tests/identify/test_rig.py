@@ -12,13 +12,12 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.derivatives import PARAMETERS, parameters_of
-from planarfriction.identify import Log, identify_lugre, search
-from planarfriction.identify.fitted import moved_patch
-from planarfriction.identify.least_squares import condensed
-from planarfriction.identify.prediction import Prediction
-from planarfriction.identify.sensors import jitter, smoothed
-from planarfriction.identify.simulators import DistributedSimulator, PublishedSimulator, ReducedSimulator
-from tests.support.identification_logs import LAW, LOAD, PATCH, clean_log, excitation, noisy, truth
+from planarfriction.identify import Log, search
+from planarfriction.identify.parameters import scaled_patch
+from planarfriction.identify.rig import jitter, smoothed
+from planarfriction.identify.search import condensed
+from planarfriction.identify.simulators import SIMULATORS, DistributedSimulator, Prediction, ReducedSimulator
+from tests.support.identification_logs import LAW, LOAD, PATCH, clean_log, excitation, fitted, noisy, truth
 
 KNOWN = {name: getattr(LAW, name) for name in ("mu_s", "v_s", "gamma", "sigma_0", "sigma_1", "sigma_2")}
 FEW = {"parameters": ("mu_c", "contact_radius"), "start": KNOWN, "starts": 1, "model": "reduced-published"}
@@ -77,8 +76,8 @@ def test_smoothing_leaves_what_it_says_and_no_more_than_half():
 def test_a_scaled_and_moved_patch_through_its_twists(kind):
     """The same as the model of the patch that was really scaled and moved, to rounding; maps to 2e-3 of the wrench."""
     patch = pf.ContactPatch.rectangle(0.02, 0.01, (6, 4))
-    simulator = kind(patch, True, LAW) if kind is ReducedSimulator else kind(patch, True)
-    moved = moved_patch(patch, patch.centre_of_pressure(), np.array([0.002, -0.003]), 1.3)
+    simulator = kind(patch, LAW)
+    moved = scaled_patch(patch, 1.3, np.array([0.002, -0.003]))
     model = (pf.DistributedModel if kind is DistributedSimulator else pf.ReducedModel)(moved, LAW)
     vector = parameters_of(pf.ReducedModelPublished(patch, LAW))
     vector[[PARAMETERS.index(name) for name in ("contact_radius", "centre_x", "centre_y")]] = (
@@ -99,19 +98,14 @@ def test_without_load_the_bristles_are_forgotten():
     vector[PARAMETERS.index("contact_radius")] = PATCH.contact_radius()
     twists, loads = np.tile([1e-3, 0.0, 0.0], (30, 1)), np.full(30, LOAD)
     loads[10:15] = 0.0
-    found = DistributedSimulator(PATCH, True).wrenches(twists, loads, 1e-3, vector)
+    found = DistributedSimulator(PATCH, LAW).wrenches(twists, loads, 1e-3, vector)
     assert found == pytest.approx(pf.rollout(model, None, twists, loads, 1e-3).wrenches, rel=1e-9, abs=1e-12)
 
 
 @pytest.mark.parametrize("kind", ["reduced-published", "distributed", "reduced"])
 def test_derivatives_of_all_models_agree_with_differences(kind, log):
     """Central differences over 1e-4: the same in the mean to 1 %, not in the few samples whose bristles meet a kink."""
-    simulator = {
-        "reduced-published": lambda: PublishedSimulator(pf.ReducedModelPublished(PATCH, LAW)),
-        "distributed": lambda: DistributedSimulator(PATCH, True),
-        "reduced": lambda: ReducedSimulator(PATCH, True, LAW),
-    }[kind]()
-    prediction = Prediction(simulator, log, log.twist)
+    prediction = Prediction(SIMULATORS[kind](PATCH, LAW), log, log.twist)
     vector = parameters_of(pf.ReducedModelPublished(PATCH, LAW))
     names = ["mu_c", "gamma", "sigma_1", "contact_radius"]
     _, slopes, later = prediction.sensitivities(vector, names, 1.3e-3)
@@ -133,7 +127,7 @@ def test_a_delay_is_found_and_makes_the_damping_uncertain(log):
     late = np.vstack([np.repeat(log.wrench[:1], 4, axis=0), log.wrench[:-4]])
     seen = noisy(changed(log, wrench=late), 1)
     options = {"starts": 1, "model": "reduced-published"}
-    found, without = identify_lugre(seen, PATCH, **options), identify_lugre(seen, PATCH, nuisance=("bias",), **options)
+    found, without = fitted(seen, PATCH, **options), fitted(seen, PATCH, nuisance=("bias",), **options)
     delay = rig(found)["delay"]
     assert delay.value == pytest.approx(4e-3, abs=3.0 * delay.error)
     assert delay.error < 4e-4
@@ -142,14 +136,14 @@ def test_a_delay_is_found_and_makes_the_damping_uncertain(log):
     assert abs(without.estimates["sigma_1"] - 30.0) > 4.0 * found.errors["sigma_1"] or not without.identifiable(
         "sigma_1"
     )
-    free = identify_lugre(noisy(log, 1), PATCH, **options)
-    held = identify_lugre(noisy(log, 1), PATCH, nuisance=(), **options)
+    free = fitted(noisy(log, 1), PATCH, **options)
+    held = fitted(noisy(log, 1), PATCH, nuisance=(), **options)
     assert free.errors["sigma_1"] > 2.0 * held.errors["sigma_1"]
 
 
 def test_zeros_that_are_off_are_found(log):
     offset = np.array([0.05, -0.03, 2e-4])
-    found = identify_lugre(noisy(changed(log, wrench=log.wrench + offset), 2), PATCH, **FEW)
+    found = fitted(noisy(changed(log, wrench=log.wrench + offset), 2), PATCH, **FEW)
     for name, value in zip(("bias_fx", "bias_fy", "bias_tau"), offset, strict=True):
         assert rig(found)[name].value == pytest.approx(value, abs=4.0 * rig(found)[name].error)
     assert found.identifiable("mu_c")
@@ -161,7 +155,7 @@ def test_a_load_cell_that_drifts_is_found_and_makes_friction_uncertain(log):
     drift = 1.0 + 0.05 * log.time / log.time[-1]
     seen = noisy(changed(log, normal_force=LOAD * drift), 3)
     options = {"starts": 1, "model": "reduced-published"}
-    found, fixed = (identify_lugre(each, PATCH, **options) for each in (seen, noisy(log, 3)))
+    found, fixed = (fitted(each, PATCH, **options) for each in (seen, noisy(log, 3)))
     drift = rig(found)["load_drift"]
     assert drift.value == pytest.approx(-0.025, abs=4.0 * drift.error)  # half of the change
     low, high = found.intervals()["mu_c"]
@@ -172,7 +166,7 @@ def test_a_load_cell_that_drifts_is_found_and_makes_friction_uncertain(log):
 def test_noise_of_the_twist_is_reported_and_widens(log):
     spread = 0.01 * np.sqrt(np.mean(log.twist**2, axis=0))
     seen = changed(log, twist=log.twist + spread * np.random.default_rng(5).standard_normal(log.twist.shape))
-    found, quiet = identify_lugre(noisy(seen, 4), PATCH, **FEW), identify_lugre(noisy(log, 4), PATCH, **FEW)
+    found, quiet = fitted(noisy(seen, 4), PATCH, **FEW), fitted(noisy(log, 4), PATCH, **FEW)
     assert rig(found)["noise_vx"].value == pytest.approx(spread[0], rel=0.15)
     # without the errors of the twists in the intervals, 1.7 and 1.9 times those of a quiet twist
     assert found.errors["mu_c"] > 2.5 * quiet.errors["mu_c"]
@@ -196,7 +190,7 @@ def distributed():
 
 @pytest.fixture(scope="module")
 def chosen(distributed):
-    return identify_lugre(distributed, PATCH, starts=1)
+    return fitted(distributed, PATCH, starts=1)
 
 
 def test_the_model_that_made_the_data_is_chosen(chosen):
@@ -212,7 +206,7 @@ def test_the_model_that_made_the_data_is_chosen(chosen):
 
 
 def test_nothing_is_told_by_a_model_that_is_rejected(distributed):
-    found = identify_lugre(distributed, PATCH, starts=1, model="reduced-published")
+    found = fitted(distributed, PATCH, starts=1, model="reduced-published")
     assert found.scores[0].rejected
     assert not any(found.identifiable(name) for name in found.names)
     data = json.loads(json.dumps(found.to_dict(), allow_nan=False))
@@ -226,11 +220,11 @@ def test_a_load_cell_that_only_the_fit_needs_rejects_it():
     model = pf.ReducedModelPublished(PATCH, pf.LuGre(mu_c=0.8, sigma_0=1e5, sigma_1=200.0, elasto_plastic=0.9))
     log = Log.from_solution(pf.simulate(pf.scenes.driven(model), rtol=1e-7, save_every=1e-3))
     given = {"parameters": ("mu_c", "mu_s", "contact_radius"), "start": model.law, "model": "reduced-published"}
-    found = identify_lugre(log, PATCH, starts=1, **given)
+    found = fitted(log, PATCH, starts=1, **given)
     assert abs(rig(found)["load_scale"].value) > 0.02
     assert found.scores[0].rejected and not any(map(found.identifiable, found.names))
     assert "load cell" in found.summary()
-    assert identify_lugre(log, PATCH, starts=1, nuisance=(), **given).estimates["mu_c"] == pytest.approx(0.8, rel=2e-3)
+    assert fitted(log, PATCH, starts=1, nuisance=(), **given).estimates["mu_c"] == pytest.approx(0.8, rel=2e-3)
 
 
 def test_a_table_fits_eighty_columns_and_a_repl(chosen):
@@ -247,13 +241,13 @@ def test_a_table_fits_eighty_columns_and_a_repl(chosen):
 )
 def test_bad_choices_are_named(log, options, words):
     with pytest.raises(pf.FrictionError, match=words):
-        identify_lugre(log, PATCH, **options)
+        fitted(log, PATCH, **options)
 
 
 def test_patches_that_follow_their_load_have_one_model(log):
     patch = pf.ContactPatch.disc(0.012, cells=11, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0))
     with pytest.raises(pf.FrictionError, match="model must be 'reduced-published' if the patch changes with the load"):
-        identify_lugre(log, patch, model="distributed")
+        fitted(log, patch, model="distributed")
 
 
 @pytest.mark.slow
@@ -287,11 +281,11 @@ def test_a_model_begins_where_the_lead_ended_if_that_is_near_the_data(monkeypatc
     """Else at the guess that misfits least, and at both where neither comes near; the lower cost is taken."""
     seen = []
 
-    def look(problem, starts, *, noise, say):
+    def multistart(problem, starts, *, noise, report):
         seen.append(float(starts[0][0]))
         return SimpleNamespace(cost=starts[0][0], near=starts[0][0] in near)
 
-    monkeypatch.setattr(search, "look", look)
+    monkeypatch.setattr(search, "multistart", multistart)
     monkeypatch.setattr(search, "misfit", lambda problem, values, noise: values[0])
-    found = search.follow(None, lead, [np.array([3.0]), np.array([2.0])], noise=None, say=None)
+    found = search.warm_start(None, lead, [np.array([3.0]), np.array([2.0])], noise=None, report=None)
     assert seen == tried and found.cost == best

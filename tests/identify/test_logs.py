@@ -9,9 +9,9 @@ from hypothesis import strategies as st
 
 import planarfriction as pf
 from planarfriction.errors import InvalidValueError
-from planarfriction.identify import Log, Slide, differentiated, identify_lugre
-from planarfriction.identify.angles import unwrapped
-from tests.support.identification_logs import LAW, LOAD, PATCH, clean_log, excitation, noisy, truth
+from planarfriction.identify import Log, Slide, differentiated
+from planarfriction.identify.logs import unwrapped
+from tests.support.identification_logs import LAW, LOAD, PATCH, clean_log, excitation, fitted, noisy, truth
 
 TIME = np.arange(400) * 1e-2
 KNOWN = {name: getattr(LAW, name) for name in ("mu_s", "v_s", "gamma", "sigma_0", "sigma_1", "sigma_2")}
@@ -98,7 +98,7 @@ def test_times_that_do_not_increase_are_refused_before_slopes_are_taken():
 
 def identify(log, patch, **options):
     """Identify the model that made the logs, without effects of a rig."""
-    return identify_lugre(log, patch, model="reduced-published", nuisance=(), **options)
+    return fitted(log, patch, model="reduced-published", nuisance=(), **options)
 
 
 @pytest.fixture(scope="module")

@@ -13,9 +13,9 @@ from planarfriction.cli import main
 from planarfriction.cli.app import app
 from planarfriction.cli.output import write_csv
 from planarfriction.errors import InvalidValueError
-from planarfriction.identify import Log, candidate_motions, identify_lugre, known_so_far, plan_motion
+from planarfriction.identify import Log, candidate_motions, current_estimate, design_experiment
 from planarfriction.identify.logs import columns_of
-from tests.support.identification_logs import LAW, LOAD, PATCH, clean_log, excitation, noisy
+from tests.support.identification_logs import LAW, LOAD, PATCH, clean_log, excitation, fitted, noisy
 
 NOISE = (0.01, 0.01, 6e-5)
 
@@ -36,7 +36,7 @@ def slide(motions):
 
 
 def plan(motions, **options):
-    return plan_motion(PATCH, LAW, **{"motions": list(motions), "noise": NOISE, **options})
+    return design_experiment(PATCH, LAW, **{"motions": list(motions), "noise": NOISE, **options})
 
 
 def test_friction_of_a_slide_in_closed_form():
@@ -44,7 +44,7 @@ def test_friction_of_a_slide_in_closed_form():
     law = pf.LuGre(mu_c=0.5, mu_s=0.5, sigma_0=1e6, sigma_1=0.0, sigma_2=0.0)
     time = np.arange(1000) / 1000
     motion = Log(time, np.outer(np.full(1000, 0.02), [1.0, 0.0, 0.0]), np.zeros((1000, 3)), 2.0)
-    found = plan_motion(PATCH, law, motions=motion, parameters=["mu_c"], noise=NOISE, nuisance=())
+    found = design_experiment(PATCH, law, motions=motion, parameters=["mu_c"], noise=NOISE, nuisance=())
     # mu_s is held, 1 of 1000 samples lies before the bristles are loaded
     assert found.errors[0, 0] == pytest.approx(0.01 / (2.0 * np.sqrt(999)), rel=2e-3)
     assert found.gains[0] == pytest.approx(np.log2(found.errors_so_far[0] / found.errors[0, 0]), rel=1e-9)
@@ -53,8 +53,8 @@ def test_friction_of_a_slide_in_closed_form():
 def test_errors_are_those_that_a_fit_has():
     """With 10 % more in a fit's, which allows for what linear errors leave out."""
     log = noisy(clean_log(*excitation(duration=1.0)), 1)
-    fit = identify_lugre(log, PATCH, model="reduced-published", starts=1)
-    found = plan_motion(PATCH, LAW, motions=log, noise=fit.noise)
+    fit = fitted(log, PATCH, model="reduced-published", starts=1)
+    found = design_experiment(PATCH, LAW, motions=log, noise=fit.noise)
     ratio = fit.standard_errors / found.errors[0]
     assert (ratio > 0.9).all() and (ratio < 1.4).all(), (
         ratio
@@ -89,8 +89,8 @@ def test_a_second_load_tells_how_a_soft_finger_grows():
     motions = candidate_motions(patch, LAW, normal_force=[2.0, 6.0], duration=0.5)
     spins = [each for each in motions if each.name.startswith("spin during")]
     options = {"parameters": ("mu_c", "c", "n"), "noise": NOISE, "nuisance": ()}
-    log = plan_motion(patch, LAW, motions=spins[0], **options).best
-    found = plan_motion(patch, LAW, logs=log, motions=spins, **options)
+    log = design_experiment(patch, LAW, motions=spins[0], **options).best
+    found = design_experiment(patch, LAW, logs=log, motions=spins, **options)
     assert found.best.name.endswith("6 N")
     errors = dict(zip([each.name[-3:] for each in found.motions], found.errors[:, 2], strict=True))
     assert errors["6 N"] < 0.05 < 0.3 < errors["2 N"]
@@ -98,8 +98,8 @@ def test_a_second_load_tells_how_a_soft_finger_grows():
 
 def test_what_the_logs_tell_replaces_the_guess(slide):
     guess = dataclasses.replace(LAW, mu_c=0.3, mu_s=0.9, sigma_1=5e3)
-    fit = identify_lugre(slide, PATCH, model="reduced-published", starts=1)
-    patch, law = known_so_far(fit, PATCH, guess)
+    fit = fitted(slide, PATCH, model="reduced-published", starts=1)
+    patch, law = current_estimate(fit, PATCH, guess)
     assert patch is PATCH  # a slide tells no radius
     assert law.mu_c == fit.estimates["mu_c"] and law.mu_s == fit.estimates["mu_s"]
     assert law.sigma_1 == pytest.approx(0.5 * sum(fit.intervals()["sigma_1"]))
@@ -126,7 +126,7 @@ def test_the_table_fits_80_columns(motions):
 )
 def test_what_is_wrong_is_one_line(options, words):
     with pytest.raises(InvalidValueError, match=words):
-        plan_motion(PATCH, LAW, **options)
+        design_experiment(PATCH, LAW, **options)
 
 
 @pytest.mark.parametrize(
@@ -149,7 +149,7 @@ def test_motions_keep_to_what_the_rig_can_do():
 
 def test_held_out_parts_are_predicted_by_fits_that_did_not_see_them():
     log = noisy(clean_log(*excitation(duration=0.5)), 1)
-    fit = identify_lugre(log, PATCH, model="reduced-published", starts=1, nuisance=())
+    fit = fitted(log, PATCH, model="reduced-published", starts=1, nuisance=())
     history = fit.histories[0]
     assert np.isnan(history["held_out"][0]).all() and np.isfinite(history["held_out"][1:]).all()
     seen, unseen = (
@@ -166,7 +166,7 @@ def test_held_out_parts_are_predicted_by_fits_that_did_not_see_them():
 def test_a_force_that_stays_at_zero_is_no_obstacle(slide):
     """As of a simulated slide along x."""
     still = dataclasses.replace(slide, wrench=slide.wrench * [1.0, 0.0, 0.0])
-    fit = identify_lugre(still, PATCH, parameters=["mu_c"], start=LAW, model="reduced-published", starts=1)
+    fit = fitted(still, PATCH, parameters=["mu_c"], start=LAW, model="reduced-published", starts=1)
     assert fit.estimates["mu_c"] == pytest.approx(LAW.mu_c, rel=0.1)
 
 
