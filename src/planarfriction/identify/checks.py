@@ -18,32 +18,31 @@ FAST = 0.2
 """Share of the usual largest speed from which a sample counts as sliding: bristles that load or turn are slower."""
 
 STRONG = 0.2
-"""The same of the wrench: what is smaller is noise, or a contact without load."""
+"""Share of the usual largest wrench below which a sample is noise, or that of a contact without load."""
 
 LEAST = 20
-"""Fewer sliding samples say nothing."""
+"""Least number of sliding samples that a check needs."""
 
 MOST = 120
-"""Sliding samples that are looked at, evenly chosen."""
+"""Most sliding samples of a check, evenly chosen."""
 
 MOST_CELLS = 500
-"""Cells of a patch above which a few of them stand for all."""
+"""Number of cells of a patch above which a check uses a compressed one."""
 
 AGAINST = 0.7
-"""Share of the work with which friction drives the motion, above which its sign is wrong: friction takes work, but for
-what bristles give back."""
+"""Largest share of the work with which friction may drive the motion: bristles give some work back."""
 
-OFF = 5.0
+MISREAD = 5.0
 """Median angle between the wrench and that of sliding friction [deg] from which a log may have been misread."""
 
 BETTER = 0.4
-"""Share to which another reading of the log must lower that angle to be named: noise is lowered by none."""
+"""Share to which another reading of the log must lower that angle to be named: no reading lowers noise."""
 
 NEAR = np.geomspace(1.0 / 3.0, 3.0, 9)
 """Factors on the size of the patch that count as the same patch: its size is estimated."""
 
 FAR = np.concatenate([np.geomspace(1e-4, 0.25, 28), np.geomspace(4.0, 1e4, 28)])
-"""Factors that do not."""
+"""Factors on the size of the patch that make it another one."""
 
 LEVERS = {
     1e-3: "the patch in mm",
@@ -55,13 +54,13 @@ LEVERS = {
 """Factors on the contact radius that a unit explains; it shows as the root of `tau v/(f omega)`."""
 
 SAME_LEVER = 2.0
-"""Factor within which a contact radius counts as one of these."""
+"""Factor within which a contact radius counts as one of `LEVERS`."""
 
 HIGH = 4.0
 """Friction over load above which one of both has another unit or another scale."""
 
 TRAVEL = 0.1
-"""Way between two samples, as a share of the contact radius, that is long for slow sampling."""
+"""Displacement between two samples, as a share of the contact radius, that is long for slow sampling."""
 
 SLOW = 0.2
 """Time between two samples [s] that is long for a log of friction."""
@@ -81,23 +80,23 @@ LEAST_TURN = 0.5
 
 @dataclass(frozen=True)
 class Finding:
-    """Something about a log that does not look as it should."""
+    """Property of a log that does not look as it should."""
 
     name: str
-    """What it is about, such as "wrench of log"."""
+    """Name of the quantity, such as "wrench of log"."""
     rule: str
-    """What is expected of it, continuing "<name> should ..."."""
+    """Rule that it should follow, continuing "<name> should ..."."""
     found: str
-    """What was found, and what it points to."""
+    """Value that was found, and its likely cause."""
     refuses: bool = False
-    """Whether no fit can make sense of it."""
+    """True if no fit can make sense of it."""
 
     def __str__(self) -> str:
         return f"{self.name} should {self.rule}, got {self.found}"
 
 
 def check_logs(logs: Sequence[Log], patch: ContactPatch, names: Sequence[str] = ()) -> tuple[Finding, ...]:
-    """What is odd about logs of a contact on `patch` from which `names` are to be estimated.
+    """Check logs of a contact on `patch` from which `names` are to be estimated; returns what is odd about them.
 
     Raises InvalidValueError, one line, for what no fit can make sense of.
     """
@@ -110,7 +109,7 @@ def check_logs(logs: Sequence[Log], patch: ContactPatch, names: Sequence[str] = 
 
 
 def with_findings(result: Identification, logs: Sequence[Log], findings: Sequence[Finding]) -> Identification:
-    """The result with the findings, and what its estimates say about the sampling, among its verdicts."""
+    """Return the result with verdicts on the findings, and on the sampling rate that its estimates ask for."""
     found = [*findings]
     estimates, least = result.estimates, {name: low for name, (low, _) in result.intervals().items()}
     # where sigma_1 may be 0, or nobody knows it, its corner may lie anywhere
@@ -122,7 +121,7 @@ def with_findings(result: Identification, logs: Sequence[Log], findings: Sequenc
 
 
 def check_log(log: Log, patch: ContactPatch) -> list[Finding]:
-    """Findings about one log: sign of the work, axes and units, way between samples, friction against load."""
+    """Check one log: sign of the work, axes and units, displacement between samples, friction against load."""
     size, sliding = _size(log, patch), Sliding.of(log, patch)
     work = check_work(log, sliding)
     found = [work] if work else [check_directions(log, sliding, size)]
@@ -135,24 +134,24 @@ def check_log(log: Log, patch: ContactPatch) -> list[Finding]:
 
 @dataclass(frozen=True)
 class Sliding:
-    """Samples of a log that slide, S of them, beside the cells of its patch."""
+    """Samples of a log that slide, S of them, and the N cells of its patch."""
 
     twist: np.ndarray
-    """`[S, 3]`"""
+    """Twists [m/s, m/s, rad/s], `[S, 3]`."""
     wrench: np.ndarray
-    """`[S, 3]`"""
+    """Wrenches [N, N, N m], `[S, 3]`."""
     turned: np.ndarray
-    """Angle since the log began [rad], `[S]`."""
+    """Angle since the begin of the log [rad], `[S]`."""
     cells: np.ndarray
-    """Positions `[N, 2]` [m]."""
+    """Positions of the cells [m], `[N, 2]`."""
     weights: np.ndarray
-    """Shares of the load `[N]`."""
+    """Shares of the load [-], `[N]`."""
     channels: np.ndarray
-    """`[3]` of bool."""
+    """Mask of the measured channels, `[3]`."""
 
     @classmethod
     def of(cls, log: Log, patch: ContactPatch) -> Sliding:
-        """The fast samples under load, at most `MOST` of them."""
+        """Select the fast samples under load, at most `MOST` of them."""
         many = patch.cells > MOST_CELLS and not patch.depends_on_load and not patch.anisotropic
         few = patch.compressed() if many else patch
         weights = few.weights(_load(log)) if few.depends_on_load else few.weights()
@@ -171,7 +170,7 @@ class Sliding:
         return np.einsum("si,si->s", self.twist, self.wrench)
 
     def friction(self, twist: np.ndarray, scale: float) -> np.ndarray:
-        """Wrenches `[S, 3]` of dry friction under a load of 1 at the twists, on the patch times `scale`."""
+        """Compute wrenches `[S, 3]` of dry friction under a load of 1 at the twists, on the patch times `scale`."""
         x, y = scale * self.cells.T
         vx, vy = twist[:, :1] - twist[:, 2:] * y, twist[:, 1:2] + twist[:, 2:] * x
         speed = np.hypot(vx, vy)
@@ -179,7 +178,7 @@ class Sliding:
         return np.stack([(weights * each).sum(axis=1) for each in (vx, vy, x * vy - y * vx)], -1)
 
     def angle(self, twist: np.ndarray, wrench: np.ndarray, scale: float) -> float:
-        """Median angle [deg] between wrenches and those of dry friction."""
+        """Compute the median angle [deg] between wrenches and those of dry friction."""
         size = float(np.sqrt((self.weights * (self.cells**2).sum(axis=1)).sum()))
         a, b = ((each / [1.0, 1.0, size])[:, self.channels] for each in (self.friction(twist, scale), wrench))
         lengths = np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1)
@@ -187,12 +186,12 @@ class Sliding:
         return float(np.degrees(np.median(np.arccos(np.clip(cosines, -1.0, 1.0)))))
 
     def best(self, twist: np.ndarray, wrench: np.ndarray, scales: np.ndarray = NEAR) -> tuple[float, float]:
-        """The least of these angles over sizes of the patch, and the size that has it."""
+        """Return the least median angle [deg] over sizes of the patch, and the size that has it."""
         return min((self.angle(twist, wrench, scale), scale) for scale in scales)
 
 
 def check_work(log: Log, sliding: Sliding) -> Finding | None:
-    """Friction on the moving body takes work from it; a wrench that gives work has the wrong sign."""
+    """Check that friction takes work from the moving body; a wrench that gives work has the wrong sign."""
     power = sliding.power
     if len(power) < LEAST or power[power > 0.0].sum() <= AGAINST * np.abs(power).sum():
         return None
@@ -203,11 +202,11 @@ def check_work(log: Log, sliding: Sliding) -> Finding | None:
 
 
 def check_directions(log: Log, sliding: Sliding, size: float) -> Finding | None:
-    """The wrench of sliding friction points against the twist as the patch says; another reading may fit far better."""
+    """Check that the wrench points against the sliding as the patch says, or name a reading that fits far better."""
     if len(sliding.twist) < LEAST:
         return None
     as_read, _ = sliding.best(sliding.twist, sliding.wrench)
-    if as_read < OFF:
+    if as_read < MISREAD:
         return None
     found = _best_reading(sliding)
     angle, scale = sliding.best(sliding.twist, sliding.wrench, FAR)
@@ -222,12 +221,12 @@ def check_directions(log: Log, sliding: Sliding, size: float) -> Finding | None:
 
 
 def _best_reading(sliding: Sliding) -> tuple[float, str]:
-    """The reading of the log that has the directions of friction, its angle [deg] and words for it."""
+    """Return the angle [deg] of the reading of the log that best has the directions of friction, and words for it."""
     return min((sliding.best(twist, wrench)[0], words) for words, twist, wrench in _readings(sliding))
 
 
 def _readings(sliding: Sliding) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
-    """Ways in which a log may have been written: words, twist and wrench as they then are."""
+    """Yield ways in which a log may have been written: words, and the twist and wrench that follow."""
     twist, wrench, turned = sliding.twist, sliding.wrench, sliding.turned
     for words, signs in (
         ("with fx, fy and tau of opposite sign", (-1, -1, -1)),
@@ -250,7 +249,7 @@ def _readings(sliding: Sliding) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
 
 
 def _rotated(vectors: np.ndarray, angle: float | np.ndarray) -> np.ndarray:
-    """Planar vectors with a third component `[S, 3]`, turned by an angle."""
+    """Rotate planar vectors with a third component, `[S, 3]`, by an angle."""
     cos, sin = np.cos(angle), np.sin(angle)
     x, y, z = vectors.T
     return np.stack([cos * x - sin * y, sin * x + cos * y, z], -1)
@@ -260,7 +259,7 @@ def _rotated(vectors: np.ndarray, angle: float | np.ndarray) -> np.ndarray:
 
 
 def check_times(log: Log, size: float) -> Finding | None:
-    """A contact moves a small part of its size between two samples; more points to mm/s, or to times in ms."""
+    """Check that the contact moves a small part of its size between two samples; more points to mm/s, or to ms."""
     speed = float(np.quantile(np.linalg.norm(log.twist * [1, 1, size], axis=1), 0.9))
     way = speed * log.interval
     seen = f"{1e3 * way:.3g} mm between samples {log.interval:.3g} s apart, contact radius {1e3 * size:.3g} mm"
@@ -274,7 +273,7 @@ def check_times(log: Log, size: float) -> Finding | None:
 
 
 def check_friction(log: Log, size: float) -> Finding | None:
-    """Friction many times the load points to another unit of one of both."""
+    """Check that friction is not many times the load, as it is if one of both has another unit."""
     loaded = log.normal_force > 0.0
     if not loaded.any():
         return None
@@ -291,7 +290,7 @@ def check_friction(log: Log, size: float) -> Finding | None:
 
 
 def check_unloaded(log: Log, size: float) -> Finding | None:
-    """Friction where there is no load points to a load cell with an offset."""
+    """Check that there is no friction without load, as there is with a load cell that has an offset."""
     force = np.linalg.norm(log.wrench / [1.0, 1.0, size], axis=1)
     bare = log.normal_force == 0.0
     if bare.sum() < LEAST or not np.median(force[bare]) > STRONG * np.quantile(force, 0.95):
@@ -303,7 +302,7 @@ def check_unloaded(log: Log, size: float) -> Finding | None:
 
 
 def check_loads(logs: Sequence[Log], names: Sequence[str]) -> list[Finding]:
-    """What depends on the load shows at different loads only."""
+    """Check that loads differ if a parameter is wanted that shows only then."""
     wanted = [name for name in names if name in ("n", "k", "k_per_newton")]
     loads = np.array([_load(log) for log in logs])
     if not wanted or loads.max() > (1.0 + ALIKE) * loads.min():
@@ -313,7 +312,7 @@ def check_loads(logs: Sequence[Log], names: Sequence[str]) -> list[Finding]:
 
 
 def check_sampling(log: Log, sigma_0: float, sigma_1: float) -> Finding | None:
-    """The damping of bristles shows above their corner `sigma_0/(2 pi sigma_1)` only, which samples must reach."""
+    """Check that samples reach the corner `sigma_0/(2 pi sigma_1)` above which the damping of bristles shows."""
     if not sigma_0 > 0.0 or not sigma_1 > 0.0:
         return None
     corner, rate = sigma_0 / (2.0 * np.pi * sigma_1), 1.0 / log.interval
@@ -330,5 +329,5 @@ def _load(log: Log) -> float:
 
 
 def _size(log: Log, patch: ContactPatch) -> float:
-    """Length that turns spin into speed [m]: the contact radius at the load of the log."""
+    """Return the length that turns spin into speed [m]: the contact radius at the load of the log."""
     return float(patch.contact_radius(_load(log)) if patch.depends_on_load else patch.contact_radius())

@@ -10,6 +10,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.derivatives import PARAMETERS, parameters_of
+from planarfriction.described import described
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify import parameters as known
 from planarfriction.identify.logs import Log
@@ -37,6 +38,7 @@ CONSTANT = 0.1
 """Share by which the load of a log may stray from its mean if the patch changes with the load."""
 
 
+@described
 @dataclass(frozen=True)
 class FitOptions:
     """Options of `identify_lugre` that few fits change.
