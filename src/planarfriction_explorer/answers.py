@@ -1,4 +1,4 @@
-"""What friction answers to the state: the wrench of steady sliding, and what limit surface and ellipsoid say of it."""
+"""Answers of friction to a state: the wrench of steady sliding, and the wrenches of limit surface and ellipsoid."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Answer:
 
 
 def answer(state: State) -> Answer:
-    """The friction of a state. Raises `InvalidValueError` where nothing presses, or a single point alone."""
+    """Return the friction of a state. Raises `InvalidValueError` where nothing presses, or a single point alone."""
     surface, ellipsoid = state.drawing.surface, state.drawing.ellipsoid
     twist, strength = np.array(state.twist), state.law.numbers.mu_c * state.normal_force
     unit = surface.wrench(twist)
@@ -49,7 +49,8 @@ def answer(state: State) -> Answer:
 
 
 def steady_wrench(state: State) -> np.ndarray:
-    """Wrench `[3]` of steady sliding, `-f_N sum(w_i F(|v_i|) B_i' v_i/|v_i|)` with the friction F of the law."""
+    """Return the wrench `[3]` of steady sliding, `-f_N sum(w_i F(|v_i|) B_i' v_i/|v_i|)` with the friction F of the
+    law."""
     patch = state.drawing.patch
     x, y = patch.positions.T
     vx, vy, _ = geometry.twist_at(np.array(state.twist), patch.positions).T

@@ -18,7 +18,7 @@ T_END = 1.0
 
 
 def python(state: State) -> str:
-    """A script that prints the wrench of limit surface and ellipsoid, then that of the law in a simulation."""
+    """Return a script that prints the wrench of limit surface and ellipsoid, then that of the law in a simulation."""
     lines = ["import planarfriction as pf"]
     law, imported = _law(state.law)
     return "\n".join(
@@ -43,20 +43,20 @@ def python(state: State) -> str:
 
 
 def toml(state: State) -> str:
-    """A scene file, for `planarfriction run`, that moves the patch with the twist of the state."""
+    """Return a scene file, for `planarfriction run`, that moves the patch with the twist of the state."""
     data = scene(state).to_dict()
     data["contact"][0]["patch"] = _described(state.drawing)
     return to_toml(data)
 
 
 def scene(state: State) -> Scene:
-    """The scene that moves the patch with the twist of the state."""
+    """Return the scene that moves the patch with the twist of the state."""
     model = DistributedModel(state.drawing.patch, state.law)
     return driven(model, twist=state.twist, normal_force=state.normal_force, at="origin", t_end=T_END)
 
 
 def _described(drawing: Drawing) -> dict[str, Any]:
-    """The patch as a table of a scene file."""
+    """Return the patch as a table of a scene file."""
     if drawing.origin == "published":
         return {"shape": "published", "name": drawing.name}
     if drawing.origin == "file":
@@ -74,7 +74,7 @@ def _patch(drawing: Drawing) -> str:
 
 
 def _law(law: Any) -> tuple[str, list[str]]:
-    """A law with the parameters that are not the defaults, and the lines that import it."""
+    """Return a law with the parameters that are not the defaults, and the lines that import it."""
     kind = type(law)
     given = []
     for each in dataclasses.fields(law):

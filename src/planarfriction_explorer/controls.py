@@ -13,7 +13,7 @@ from planarfriction_explorer import looks
 from planarfriction_explorer.state import State, law_parameters
 
 TOOLS = {"Centre of rotation": "turn", "Velocity": "slide", "Brush": "brush", "Eraser": "erase"}
-"""What a drag over the map does."""
+"""Actions of a drag over the map."""
 
 OWN = "own map"
 """Choice of the patch while it is none of the published ones."""
@@ -55,11 +55,11 @@ class Controls:
         self.parameters: Any = pn.FlexBox(gap="0 8px", sizing_mode="stretch_width")
 
     def on(self, widget: Any, act: Callable[[Any], Any]) -> None:
-        """Do `act` with each new value that the user gives."""
+        """Call `act` with each new value that the user gives."""
         widget.param.watch(lambda event: None if self._silent or event.new is None else act(event.new), "value")
 
     def offer_parameters(self, law: Any, changed: Callable[[Any], Any]) -> None:
-        """Fields for the parameters of the law; empty ones have a default that depends on others."""
+        """Put up fields for the parameters of the law; empty ones have a default that depends on others."""
         fields = []
         for name, value in law_parameters(law).items():
             unit = f" [{UNITS[name]}]" if name in UNITS else ""
@@ -77,7 +77,7 @@ class Controls:
         self.parameters.objects = fields
 
     def law_values(self) -> dict[str, float | None]:
-        """What stands in the fields of the law."""
+        """Return the values in the fields of the law, by parameter; None where a field is empty."""
         return {each.tags[0]: each.value for each in self.parameters}
 
     def show(self, state: State) -> None:
@@ -101,7 +101,7 @@ class Controls:
             self._silent = False
 
     def layout(self) -> Any:
-        """All but the tool, one below the other."""
+        """Return the controls, except for the tool, one below the other."""
         return pn.Column(
             _heading("Contact"),
             self.patch,

@@ -1,4 +1,4 @@
-"""What presses: a map of relative pressures that is chosen, read from a file, or painted."""
+"""Pressure map of the explorer: relative pressures that are chosen, read from a file, or painted."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ class Drawing:
     name: str = DRAWN
     """Name of the published patch, of the file, or `DRAWN`."""
     origin: Literal["published", "file", "drawn"] = "drawn"
-    """Where the pressures come from."""
+    """Origin of the pressures."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "cell_size", validation.positive("cell_size", self.cell_size))
@@ -45,7 +45,7 @@ class Drawing:
 
     @classmethod
     def published(cls, name: str) -> Drawing:
-        """The published patch `name`."""
+        """Return the published patch `name`."""
         patch = PUBLISHED_PATCHES.choose(name)()
         pressures = np.zeros((patch.grid.rows, patch.grid.columns))
         pressures[_places(patch.grid, patch.positions)] = patch.weights() / patch.weights().max()
@@ -53,7 +53,7 @@ class Drawing:
 
     @classmethod
     def read(cls, name: str, content: bytes, cell_size: float) -> Drawing:
-        """The pressure map in a file called `name`, of which the `content` is at hand.
+        """Return the pressure map in a file called `name`, of which the `content` is at hand.
 
         Raises `FileError` for what is no map, and `InvalidValueError` for one of more than `MOST_SIDE` rows or columns.
         """
@@ -68,18 +68,18 @@ class Drawing:
         return drawing
 
     def painted(self, x: float, y: float, *, radius: float, pressure: float) -> Drawing:
-        """The map with a `pressure` on all cells whose middle is within `radius` [m] of the point (x, y) [m]."""
+        """Return the map with a `pressure` on all cells whose middle is within `radius` [m] of the point (x, y) [m]."""
         centres = self.grid.centres().reshape(*self.pressures.shape, 2)
         under = np.hypot(centres[..., 0] - x, centres[..., 1] - y) <= radius
         under[_places(self.grid, np.array([[x, y]]))] |= abs(x) < self.width / 2 and abs(y) < self.height / 2
         return Drawing(np.where(under, pressure, self.pressures), self.cell_size)
 
     def cleared(self) -> Drawing:
-        """The map without any pressure, ready to be painted."""
+        """Return the map without any pressure, ready to be painted."""
         return Drawing(np.zeros_like(self.pressures), self.cell_size)
 
     def scaled(self, cell_size: float) -> Drawing:
-        """The map with cells of another size [m]; a published patch has its own and becomes a painted map."""
+        """Return the map with cells of another size [m]; a published patch has its own and becomes a painted map."""
         if self.origin == "published":
             return Drawing(self.pressures, cell_size)
         return dataclasses.replace(self, cell_size=cell_size)
@@ -119,8 +119,8 @@ class Drawing:
 
     @functools.cached_property
     def largest_errors(self) -> tuple[float, float]:
-        """How far the ellipsoid is off over all directions: distance of (fx, fy, tau/r) for the same twist [-], and
-        angle between the twists (vx, vy, r omega) of the same wrench [deg]."""
+        """Return the largest errors of the ellipsoid over all directions: distance of (fx, fy, tau/r) for the same
+        twist [-], and angle between the twists (vx, vy, r omega) of the same wrench [deg]."""
         units, scale = directions(SAMPLES), np.array([1.0, 1.0, self.surface.contact_radius])
         twists = geometry.twist_at(units / scale, -self.surface.centre_of_pressure)
         apart = self.ellipsoid.wrench(twists) - self.surface.wrench(twists)
@@ -130,7 +130,7 @@ class Drawing:
 
 
 def _places(grid: Grid, positions: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rows and columns of the cells that hold `positions` `[N, 2]` [m], or that lie nearest."""
+    """Return rows and columns of the cells that hold `positions` `[N, 2]` [m], or that lie nearest."""
     columns = np.floor((positions[:, 0] - grid.x_min) / grid.cell_width).astype(int)
     from_below = np.floor((positions[:, 1] - grid.y_min) / grid.cell_height).astype(int)
     return np.clip(grid.rows - 1 - from_below, 0, grid.rows - 1), np.clip(columns, 0, grid.columns - 1)

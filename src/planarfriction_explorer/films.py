@@ -29,7 +29,7 @@ input[type=range].anim-slider {width: 96%}
 
 
 def ready_scene(state: State, name: str, model: str) -> Scene:
-    """The ready scene `name` with patch and law of the state in the `model`.
+    """Return the ready scene `name` with patch and law of the state in the `model`.
 
     Raises `FrictionError` where the model does not take the law, or the scene not the patch.
     """
@@ -37,7 +37,7 @@ def ready_scene(state: State, name: str, model: str) -> Scene:
 
 
 def read_scene(name: str, content: bytes) -> Scene:
-    """The scene in a file called `name`, of which the `content` is at hand.
+    """Return the scene in a file called `name`, of which the `content` is at hand.
 
     Paths of other files in it start from the folder in which the explorer was started.
 

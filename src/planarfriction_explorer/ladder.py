@@ -42,23 +42,24 @@ class Rung(NamedTuple):
     seconds: float
     """Time in the solver [s]."""
     refusal: str = ""
-    """Why the model does not take this patch or law."""
+    """Reason why the model refuses this patch or law, in one line; empty if it accepts both."""
 
 
 @functools.lru_cache(maxsize=32)
 def _model(name: str, drawing: Drawing, law: Any) -> Any:
-    """A model, kept while the twist is dragged: to make one takes longer than to run it."""
+    """Return a model, kept while the twist is dragged: to make one takes longer than to run it."""
     return RUNGS[name](drawing.patch, law)
 
 
 def motion(state: State) -> Signal:
-    """The twist of the state, reached in a quarter of the run, turned round in the next half: stick, slip, reversal."""
+    """Return the twist of the state, reached in a quarter of the run, turned round in the next half: stick, slip,
+    reversal."""
     times = T_END * np.array([0.0, 0.25, 0.5, 0.75, 1.0])
     return Signal.sampled(times, np.outer([0.0, 1.0, 1.0, -1.0, -1.0], state.twist), "linear")
 
 
 def climb(state: State) -> Iterator[Rung]:
-    """Each model of `RUNGS` in the same run, the distributed one first."""
+    """Return each model of `RUNGS` in the same run, the distributed one first."""
     scale = state.law.numbers.mu_c * state.normal_force * np.array([1.0, 1.0, state.drawing.surface.contact_radius])
     reference = None
     for name in RUNGS:

@@ -89,7 +89,7 @@ class LadderTab:
 
 
 def table(rungs: list[Rung]) -> str:
-    """The ladder as HTML."""
+    """Return the ladder as HTML."""
     head = "".join(f"<th>{text}</th>" for text in _HEAD)
     rows = "".join(f"<tr><td>{each.name}</td>{_cells(each)}</tr>" for each in rungs)
     return f"{looks.TABLE}<table id='ladder'><tr>{head}</tr>{rows}</table>"

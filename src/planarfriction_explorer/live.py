@@ -24,19 +24,19 @@ class GivenUp(Exception):
 
 
 class Task:
-    """What work is given: a way to tell the page something, and to see whether it is still wanted."""
+    """Handle of a piece of work: it calls the page, and checks that the work is still wanted."""
 
     def __init__(self, live: Live, document: Any):
         self._live, self._document, self._number = live, document, live.newest
 
     def check(self) -> None:
-        """Raises `GivenUp` where another wish has come, or the page was closed."""
+        """Check that the work is still wanted: raise `GivenUp` if another wish has come, or the page was closed."""
         session = self._document.session_context
         if self._number != self._live.newest or session is None or session.destroyed:
             raise GivenUp
 
     def tell(self, what: Callable[..., None], *values: Any) -> None:
-        """Have the page call `what` with the values. Raises `GivenUp` as `check` does."""
+        """Tell the page to call `what` with the values. Raises `GivenUp` as `check` does."""
 
         def in_page() -> None:
             if self._number == self._live.newest:
@@ -59,12 +59,12 @@ class Live:
         sys.setswitchinterval(TURN)
 
     def soon(self, work: Callable[[Task], None]) -> None:
-        """Do the work in the next pause."""
+        """Begin the work in the next pause."""
         document = self._give_up()
         self._timer = document.add_timeout_callback(lambda: self._begin(document, work), PAUSE)
 
     def now(self, work: Callable[[Task], None]) -> None:
-        """Do the work at once."""
+        """Begin the work at once."""
         self._begin(self._give_up(), work)
 
     def stop(self) -> None:

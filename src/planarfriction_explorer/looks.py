@@ -1,4 +1,4 @@
-"""How the page looks: what stands beside what, and the styles of tables, charts and cards."""
+"""Layout of the page, and the styles of tables, charts and cards."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ p {margin: 8px 0 0}
 
 
 def grows(least: int, *, most: int | None = None) -> dict[str, str]:
-    """Styles of a part that shares the room of its row and gets a row of its own below `least` pixels."""
+    """Return styles of a part that shares the room of its row and gets a row of its own below `least` pixels."""
     limit = {} if most is None else {"max-width": f"{most}px"}
     return {"flex": f"1 1 {least}px", "min-width": "0", "width": "auto", **limit}
 
 
 def tidy(plot: Any) -> None:
-    """Thin lines and plain letters for a chart."""
+    """Give a chart thin lines and plain letters."""
     plot.outline_line_color = None
     plot.background_fill_color = plot.border_fill_color = None
     for axis in plot.axis:

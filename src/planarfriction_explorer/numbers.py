@@ -1,4 +1,4 @@
-"""What there is to say of a state in numbers, as HTML."""
+"""Numbers of a state as an HTML table."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _ROWS = {
 
 
 def numbers(state: State, found: Answer, seconds: float) -> str:
-    """Table of the wrenches, centre of rotation, power, and the error of the ellipsoid."""
+    """Return the table of the wrenches, centre of rotation, power, and the error of the ellipsoid."""
     rows = "".join(
         f"<tr><td style='color:{pictures.COLOURS[name]}'><b>{text}</b></td>"
         + "".join(f"<td>{value:.4f}</td>" for value in _shown(found, name))
@@ -33,6 +33,6 @@ def numbers(state: State, found: Answer, seconds: float) -> str:
 
 
 def _shown(found: Answer, name: str) -> list[float]:
-    """A wrench in N and N mm, without -0."""
+    """Return a wrench in N and N mm, without -0."""
     fx, fy, tau = getattr(found, name)
     return [round(each, 4) + 0.0 for each in (fx, fy, 1e3 * tau)]

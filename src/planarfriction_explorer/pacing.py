@@ -1,4 +1,4 @@
-"""What a browser may be slow to draw waits until it keeps up, so that the rest follows the hand."""
+"""Pacing of slow pictures: they wait until the browser keeps up, so that the rest follows the hand."""
 
 from __future__ import annotations
 

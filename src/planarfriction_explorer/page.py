@@ -148,7 +148,8 @@ class Page:
     # ------------------------------------------------------------------ showing
 
     def _try(self, act: Callable[[], Any]) -> None:
-        """Do what the user wants, or say in one line why not; all that changes goes to the browser in one message."""
+        """Carry out a wish of the user, or say in one line why not; all that changes goes to the browser in one
+        message."""
         with pn.io.unlocked():
             try:
                 self.message.visible = False
@@ -158,7 +159,7 @@ class Page:
                 self.message.visible = True
 
     def _redraw(self, *, quick: bool = False) -> None:
-        """What depends on the map alone."""
+        """Draw the pictures that depend on the map alone."""
         self.map.draw(self.state.drawing)
         try:
             self._figure = pictures.surface_figure(self.state, quick=quick)
@@ -166,7 +167,7 @@ class Page:
             self._figure = {}  # nothing presses: `_refresh` says so
 
     def _refresh(self) -> None:
-        """What depends on the rest of the state."""
+        """Draw the pictures that depend on the twist, the load or the law."""
         begin = time.perf_counter()
         self.controls.show(self.state)
         try:
@@ -185,20 +186,20 @@ class Page:
         self.numbers.object = numbers(self.state, found, time.perf_counter() - begin)
 
     def _show_slow(self) -> None:
-        """What does not have to follow a drag: the picture in 3-D and the code."""
+        """Show the picture in 3-D and the code, which need not follow a drag."""
         if self.answer is not None:
             self.surface.param.update(object=pictures.moved(self._figure, self.answer), visible=True)
             self.python.value, self.toml.value = code.python(self.state), code.toml(self.state)
 
     def _follow_ladder(self) -> None:
-        """The models are compared while somebody looks."""
+        """Run the comparison of the models while its tab is open."""
         if self.tabs.active == LADDER and self.answer is not None:
             self.ladder.follow()
         else:
             self.ladder.stop()
 
     def layout(self) -> Any:
-        """The whole page."""
+        """Return the whole page."""
         words = "<b style='font-size:20px'>planarfriction explorer</b>"
         title = pn.pane.HTML(words, margin=(8, 4, 0, 4))
         hint = pn.pane.HTML("<b style='font-size:15px'>Drag over the map</b>", margin=(4, 0, 4, 0))
@@ -239,7 +240,7 @@ def _code_area(kind: str) -> Any:
 
 
 def _copied(area: Any) -> Any:
-    """A text with a button that copies it."""
+    """Return a text with a button that copies it."""
     copy = pn.widgets.Button(label="Copy", css_classes=[f"copy-{area.css_classes[0]}"])
     copy.js_on_click(args={"area": area}, code="navigator.clipboard.writeText(area.value)")
     return pn.Column(copy, area, sizing_mode="stretch_width")

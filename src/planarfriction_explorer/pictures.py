@@ -1,4 +1,4 @@
-"""What is drawn of a state, as plain arrays and tables: lengths in mm, limit surfaces without units."""
+"""Pictures of a state as plain arrays and tables: lengths in mm, limit surfaces without units."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ COLOURS = {"friction": DISTRIBUTED, "surface": EXACT, "ellipsoid": ELLIPSOID}
 
 
 def pressure_image(drawing: Drawing) -> dict[str, list[Any]]:
-    """The map as the columns of one image whose rows run from the bottom up [mm]."""
+    """Return the map as the columns of one image whose rows run from the bottom up [mm]."""
     width, height = MM * drawing.width, MM * drawing.height
     peak = drawing.pressures.max(initial=0.0)
     shown = drawing.pressures[::-1] / (peak if peak > 0.0 else 1.0)
@@ -40,7 +40,7 @@ def pressure_image(drawing: Drawing) -> dict[str, list[Any]]:
 
 
 def slip_arrows(state: State) -> dict[str, list[float]]:
-    """Velocities of points that press, as arrows [mm] of which the fastest is as long as they are apart."""
+    """Return velocities of points that press, as arrows [mm] of which the fastest is as long as they are apart."""
     drawing = state.drawing
     rows, columns = drawing.pressures.shape
     step = int(np.ceil(max(rows, columns) / ARROWS))
@@ -54,7 +54,8 @@ def slip_arrows(state: State) -> dict[str, list[float]]:
 
 
 def wrench_arrows(state: State, answer: Answer | None) -> dict[str, Any]:
-    """Forces of law, surface and ellipsoid as arrows from the centre of pressure [mm], one on top of the other."""
+    """Return forces of law, surface and ellipsoid as arrows from the centre of pressure [mm], one on top of the
+    other."""
     if answer is None:
         return {**_arrows(np.zeros((0, 2)), np.zeros((0, 2))), "colour": [], "width": []}
     start = np.tile(state.drawing.surface.centre_of_pressure, (3, 1))
@@ -67,7 +68,7 @@ def wrench_arrows(state: State, answer: Answer | None) -> dict[str, Any]:
 
 
 def _arrows(starts: np.ndarray, ends: np.ndarray) -> dict[str, list[float]]:
-    """Shafts, and angles [rad] of triangles at the tips, which point up at an angle of 0.
+    """Return shafts, and angles [rad] of triangles at the tips, which point up at an angle of 0.
 
     Lists, since each array goes to the browser as a message of its own.
     """
@@ -78,13 +79,13 @@ def _arrows(starts: np.ndarray, ends: np.ndarray) -> dict[str, list[float]]:
 
 
 def points_of_interest(state: State) -> dict[str, list[float]]:
-    """The centre of rotation [mm], in no row where there is none."""
+    """Return the centre of rotation [mm], in no row where there is none."""
     centre = state.centre_of_rotation
     return {"x": [], "y": []} if centre is None else {"x": [MM * centre[0]], "y": [MM * centre[1]]}
 
 
 def surface_figure(state: State, *, quick: bool = False) -> dict[str, Any]:
-    """Limit surface and ellipsoid in 3-D with the wrenches of the state, as a plotly figure of plain tables.
+    """Return the limit surface and ellipsoid in 3-D with the wrenches of the state, as a plotly figure of plain tables.
 
     The surface is that of the smooth table of the patch. While a brush moves, `quick` takes a sum over the cells, which
     has lumps.
@@ -117,13 +118,13 @@ def surface_figure(state: State, *, quick: bool = False) -> dict[str, Any]:
 
 
 def moved(figure: dict[str, Any], answer: Answer) -> dict[str, Any]:
-    """The figure of a limit surface with the wrenches of an answer; what has not changed is the same object."""
+    """Return the figure of a limit surface with the wrenches of an answer; what has not changed is the same object."""
     markers = [_marker(name, point) for name, point in zip(COLOURS, answer.points, strict=True)]
     return {**figure, "data": [*figure["data"][:2], *markers]}
 
 
 def _wires(lines: np.ndarray) -> np.ndarray:
-    """Lines `[K, M, 3]` as one with gaps."""
+    """Join lines `[K, M, 3]` to one with gaps."""
     gaps = np.full((len(lines), 1, 3), np.nan)
     return np.concatenate([lines, gaps], axis=1).reshape(-1, 3)
 
@@ -133,7 +134,7 @@ def _coordinates(points: np.ndarray) -> dict[str, np.ndarray]:
 
 
 def _marker(name: str, point: np.ndarray) -> dict[str, Any]:
-    """A line from the middle to the wrench with a ball at its end."""
+    """Return a line from the middle to the wrench with a ball at its end."""
     return {
         "type": "scatter3d",
         "name": {"friction": "friction of the law", "surface": "on the surface", "ellipsoid": "on the ellipsoid"}[name],

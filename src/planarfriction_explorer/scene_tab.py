@@ -23,7 +23,7 @@ _FRAME = "width:100%;max-width:790px;aspect-ratio:790/560;min-height:350px;borde
 
 
 class SceneTab:
-    """What is chosen to run, and its film."""
+    """Tab with the choice of a scene to run, and its film."""
 
     def __init__(self, state: Callable[[], State], attempt: Callable[[Callable[[], Any]], None]):
         self._state = state

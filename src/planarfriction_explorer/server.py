@@ -45,7 +45,7 @@ def _rehearse() -> None:
 
 
 def open_server(port: int) -> Any:
-    """The server, which holds its port and answers once it is started."""
+    """Return the server, which holds its port and answers once it is started."""
     port = validation.count("port", port, at_least=0, at_most=65535)
     try:
         import panel

@@ -1,4 +1,4 @@
-"""What is on the screen of the explorer, as a value: every change makes another one."""
+"""State of the explorer's screen, as a value: every change makes another one."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class State:
     """A pressure map, a law, a load and a twist; raises `InvalidValueError` for what breaks a rule."""
 
     drawing: Drawing = field(default_factory=lambda: Drawing.published(FIRST_PATCH))
-    """What presses."""
+    """Pressure map."""
     law: FrictionLaw = field(default_factory=lambda: LuGre(mu_s=1.2, elasto_plastic=0.9))
     """Friction law."""
     normal_force: float = 1.0
@@ -34,20 +34,21 @@ class State:
         object.__setattr__(self, "twist", tuple(validation.vector("twist", self.twist, 3).tolist()))
 
     def changed(self, **values: Any) -> State:
-        """The state with other values of its fields."""
+        """Return the state with other values of its fields."""
         return dataclasses.replace(self, **values)
 
     def sliding(self, vx: float, vy: float) -> State:
-        """The state with another velocity of the origin [m/s]."""
+        """Return the state with another velocity of the origin [m/s]."""
         return self.changed(twist=(vx, vy, self.twist[2]))
 
     def turning_about(self, x: float, y: float) -> State:
-        """The state with the centre of rotation (x, y) [m] at the same spin; one of 1 rad/s where there was none."""
+        """Return the state with the centre of rotation (x, y) [m] at the same spin; one of 1 rad/s where there was
+        none."""
         omega = self.twist[2] or 1.0
         return self.changed(twist=(omega * y, -omega * x, omega))
 
     def with_law(self, kind: str, **parameters: Any) -> State:
-        """The state with the law `kind` of those `parameters`; what is left out or None has its default."""
+        """Return the state with the law `kind` of those `parameters`; what is left out or None has its default."""
         given = {name: value for name, value in parameters.items() if value is not None}
         return self.changed(law=LAWS.choose(kind)(**given))
 
@@ -62,6 +63,6 @@ class State:
 
 
 def law_parameters(law: Any) -> dict[str, float | None]:
-    """Parameters of a law by name, as numbers; None where the default of the law depends on others."""
+    """Return parameters of a law by name, as numbers; None where the default of the law depends on others."""
     given = {each.name: getattr(law, each.name) for each in dataclasses.fields(law) if each.init}
     return {name: getattr(value, "breakaway_ratio", value) for name, value in given.items()}

@@ -11,13 +11,13 @@ from planarfriction.errors import FileError
 
 
 def plain_name(name: str) -> str:
-    """The name of a file without the path that a browser may send with it."""
+    """Return the name of a file without the path that a browser may send with it."""
     return PurePosixPath(PureWindowsPath(name).name).name
 
 
 @contextlib.contextmanager
 def as_file(name: str, content: bytes) -> Iterator[Path]:
-    """The content in a file of the same suffix; errors that rise meanwhile name the file as the user does.
+    """Yield a file of the same suffix with the content; errors raised meanwhile name the file as the user does.
 
     Raises `FileError` for what a reader does not take.
     """

@@ -53,7 +53,7 @@ def _run(arguments: list[str]) -> int:
 
 
 def _warn(message: Warning | str, *where: Any) -> None:
-    """One line for a warning too, without the place in the code that it comes from."""
+    """Print a warning in one line, without the place in the code that it comes from."""
     print("warning:", " ".join(str(message).split()), file=sys.stderr)
 
 

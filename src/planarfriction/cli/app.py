@@ -32,16 +32,16 @@ class MemberOf(click.Choice):
 
     @choices.setter
     def choices(self, value: object) -> None:
-        """Nothing to keep."""
+        """Ignore the names that click sets: the family has them."""
 
     def shell_complete(self, ctx: click.Context, param: click.Parameter, incomplete: str) -> list[CompletionItem]:
-        """Members that begin so, with their words."""
+        """Return the members that begin with the typed text, with their descriptions."""
         words = {name: self.family.words(name) for name in self.family} | dict.fromkeys(self.more)
         return [CompletionItem(name, help=help) for name, help in words.items() if name.startswith(incomplete)]
 
 
 def complete_parts(context: object, parameter: object, incomplete: str) -> list[CompletionItem]:
-    """What `--parts` may be."""
+    """Return completions of `--parts`."""
     return [CompletionItem("auto", help=AUTO_PARTS)] if "auto".startswith(incomplete) else []
 
 
@@ -53,7 +53,7 @@ def complete_parts(context: object, parameter: object, incomplete: str) -> list[
 )
 @click.version_option(__version__, message="%(prog)s %(version)s")
 def app() -> None:
-    """The root of the commands (the help above is what users see)."""
+    """Run a command (the help above is what users see)."""
 
 
 @app.command(

@@ -1,4 +1,4 @@
-"""What the commands share on the terminal: progress on stderr, tables on stdout."""
+"""Terminal output of the commands: progress on stderr, tables on stdout."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from rich.table import Table
 
 @contextmanager
 def simulation_progress(label: str, t_end: float) -> Iterator[Callable[[float], None]]:
-    """Progress bar over simulated time [s]; a spinner until the first report, while kernels are compiled."""
+    """Show a progress bar over simulated time [s]; a spinner until the first report, while kernels are compiled."""
     with _bar() as bar:
         task = bar.add_task(f"{label}: preparing (compiles once after installation)", total=None)
 
@@ -25,7 +25,7 @@ def simulation_progress(label: str, t_end: float) -> Iterator[Callable[[float], 
 
 @contextmanager
 def work_progress(label: str) -> Iterator[Callable[[str], None]]:
-    """Spinner that names what is being worked on."""
+    """Show a spinner that names the current work."""
     with _bar() as bar:
         task = bar.add_task(label, total=None)
         yield lambda name: bar.update(task, description=f"{label}: {name}")
@@ -33,7 +33,7 @@ def work_progress(label: str) -> Iterator[Callable[[str], None]]:
 
 @contextmanager
 def count_progress(label: str) -> Iterator[Callable[[int, int, str], None]]:
-    """Progress bar over things that are done, of all, with words that say more."""
+    """Show a progress bar over finished things of all, with a description."""
     with _bar() as bar:
         task = bar.add_task(label, total=None)
         yield lambda done, of, words: bar.update(task, completed=done, total=of, description=f"{label}: {words}")

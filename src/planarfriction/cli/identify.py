@@ -49,7 +49,7 @@ def identify(
 
 
 def parse_start(entries: Sequence[str]) -> dict[str, float]:
-    """Values of `--start NAME=VALUE` by name."""
+    """Parse the values of `--start NAME=VALUE`, by name."""
     start = {}
     for entry in entries:
         name, equals, value = entry.partition("=")
@@ -60,14 +60,14 @@ def parse_start(entries: Sequence[str]) -> dict[str, float]:
 
 
 def parse_names(text: str | None) -> tuple[str, ...]:
-    """Names of `--parameters`, separated by commas; the usual ones without it."""
+    """Parse the names of `--parameters`, separated by commas; the usual ones without it."""
     from planarfriction.identify.parameters import USUAL, check_names
 
     return USUAL if text is None else check_names([name.strip() for name in text.split(",") if name.strip()])
 
 
 def parse_nuisance(text: str | None) -> tuple[str, ...]:
-    """Names of `--nuisance`, separated by commas; all without it."""
+    """Parse the names of `--nuisance`, separated by commas; all without it."""
     from planarfriction.identify.rig import GROUPS
 
     if text is None:
@@ -76,7 +76,7 @@ def parse_nuisance(text: str | None) -> tuple[str, ...]:
 
 
 def parse_noise(text: str | None) -> list[float] | None:
-    """The three numbers of `--noise`."""
+    """Parse the three numbers of `--noise`."""
     return None if text is None else [validation.number_in("--noise", part) for part in text.split(",")]
 
 

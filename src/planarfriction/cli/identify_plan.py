@@ -27,20 +27,20 @@ class FitOrPlan(click.Command):
     def make_context(
         self, info_name: str | None, args: list[str], parent: click.Context | None = None, **extra: Any
     ) -> click.Context:
-        """The context of the fit, or that of the plan."""
+        """Make the context of the fit, or of the plan."""
         if args[:1] == [NAME]:
             return plan.make_context(f"{info_name} {NAME}", args[1:], parent, **extra)
         return super().make_context(info_name, args, parent, **extra)
 
     def format_options(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """The options, then the other command."""
+        """Write the options, then the other command."""
         super().format_options(ctx, formatter)
         with formatter.section("Commands"):
             formatter.write_dl([(NAME, f"{SHORT_HELP} See identify {NAME} --help.")])
 
 
 def complete_log(ctx: click.Context, parameter: object, incomplete: str) -> list[CompletionItem]:
-    """Files, and the word of the plan where it may stand."""
+    """Return completions of a log: files, and the word `plan` where it may stand."""
     words = (
         [CompletionItem(NAME, help=SHORT_HELP)] if not ctx.params.get("logs") and NAME.startswith(incomplete) else []
     )
@@ -128,7 +128,7 @@ def plan(
 def _known(
     logs: list[Log], patch: ContactPatch, names: tuple[str, ...], start: dict[str, float], noise: list[float] | None
 ) -> tuple[ContactPatch, LuGre]:
-    """Patch and law as the logs show them, or as guessed where there are none."""
+    """Find patch and law as the logs show them, or as guessed where there are none."""
     from planarfriction.cli.console import note, work_progress
     from planarfriction.identify import FitOptions, current_estimate, identify_lugre
     from planarfriction.identify.wrenches import guessed_law

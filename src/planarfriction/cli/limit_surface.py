@@ -25,7 +25,7 @@ POLAR_SAMPLES, AZIMUTH_SAMPLES = 37, 72
 
 
 def choose_patch(patch: str | None, pressure: Path | None, cell_size: float | None) -> ContactPatch:
-    """The patch of `--patch` or of `--pressure`, of which at most one is given; Circle without either."""
+    """Return the patch of `--patch` or of `--pressure`, of which at most one is given; Circle without either."""
     if patch is not None and pressure is not None:
         raise InvalidValueError("--patch", "not be given together with --pressure", patch)
     if pressure is not None:
@@ -74,7 +74,7 @@ def _draw(surface: Any, picture: Path, beside: str | None) -> None:
 
 
 def _directions() -> tuple[np.ndarray, np.ndarray]:
-    """Polar angle and azimuth [rad] of the samples, `[M]`: every direction once."""
+    """Return the polar angle and azimuth [rad] of the samples, `[M]`: every direction once."""
     polar, azimuth = np.meshgrid(
         np.linspace(0.0, np.pi, POLAR_SAMPLES)[1:-1],
         np.linspace(0.0, 2 * np.pi, AZIMUTH_SAMPLES, endpoint=False),
@@ -84,7 +84,8 @@ def _directions() -> tuple[np.ndarray, np.ndarray]:
 
 
 def _distance_from_ellipsoid(surface: Any) -> float:
-    """Largest distance between (fx, fy, tau/r) of the surface and of the ellipsoid at the same direction of sliding."""
+    """Compute the largest distance between (fx, fy, tau/r) of the surface and of the ellipsoid at the same direction of
+    sliding."""
     from planarfriction.limit_surface import LimitSurfaceEllipsoid
     from planarfriction.plots.limit_surface import scaled_samples
 

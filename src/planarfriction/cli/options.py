@@ -1,4 +1,4 @@
-"""What the options of several commands share."""
+"""Options that several commands share."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ class FilePath(click.Path):
     """A path that the commands check themselves, and that is one."""
 
     def convert(self, value: object, param: click.Parameter | None, ctx: click.Context | None) -> Path:
-        """The path; an empty text, as of a variable that a script has not set, is none."""
+        """Return the path; refuse an empty text, as of a variable that a script has not set."""
         if not str(value) or "\0" in str(value):
             self.fail("the name of a file or a folder is needed, got an empty one", param, ctx)
         return Path(str(value))
@@ -31,13 +31,13 @@ FILE = FilePath()
 
 
 def complete_scene(context: object, parameter: object, incomplete: str) -> list[CompletionItem]:
-    """Ready scenes that begin so, and files."""
+    """Return completions of a scene: ready scenes that begin with the typed text, and files."""
     names = [CompletionItem(name, help=SCENES.words(name)) for name in SCENES if name.startswith(incomplete)]
     return [*names, CompletionItem(incomplete, type="file")]
 
 
 def complete_patch(context: object, parameter: object, incomplete: str) -> list[CompletionItem]:
-    """Patches by name that begin so, however they are written, and files."""
+    """Return completions of a patch: names that begin with the typed text in any case, and files."""
     from planarfriction.cli.patches import patch_names
 
     names = [CompletionItem(name) for name in patch_names() if name.lower().startswith(incomplete.lower())]
@@ -45,6 +45,6 @@ def complete_patch(context: object, parameter: object, incomplete: str) -> list[
 
 
 def patch_option(default: str, name: str = "patch") -> Callable[[Any], Any]:
-    """The option `--patch`, given to a command as `name`; `default` says what is taken without it."""
+    """Make the option `--patch`, given to a command as `name`; `default` says what is taken without it."""
     words = f"Contact patch: {PATCH_HELP} {default}"
     return click.option("--patch", name, metavar="PATCH", shell_complete=complete_patch, help=words)

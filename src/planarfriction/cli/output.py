@@ -61,7 +61,8 @@ def write_solution(solution: Solution, folder: Path, label: str) -> list[Path]:
 
 
 def history_columns(solution: Solution) -> dict[str, np.ndarray]:
-    """Histories as columns [SI]: time, the body, then of each contact what `Log.from_csv` reads (`name.vx`)."""
+    """Return the histories as columns [SI]: time, the body, then of each contact what `Log.from_csv` reads
+    (`name.vx`)."""
 
     def values(name: str) -> np.ndarray:
         return solution.histories[name].values
@@ -75,5 +76,5 @@ def history_columns(solution: Solution) -> dict[str, np.ndarray]:
 
 
 def slug(text: str) -> str:
-    """`text` as part of a file name: letters, digits, dots and hyphens."""
+    """Return `text` as part of a file name: letters, digits, dots and hyphens."""
     return re.sub(r"[^\w.]+", "-", text).strip("-.") or "unnamed"

@@ -11,7 +11,7 @@ from planarfriction.errors import FileError, InvalidValueError, one_line
 
 
 def load_function(option: str, entry: str) -> tuple[str, Callable[[Any], Any]]:
-    """Name and function, or object that can be called, of the `FILE.py:NAME` that an option has.
+    """Load the function, or object that can be called, and its name from the `FILE.py:NAME` that an option has.
 
     Raises FileError in one line where the file or what is in it cannot be had.
     """

@@ -27,7 +27,7 @@ _PER_WIDTH = {"width": 1.0, "length": 1.0, "radius": 0.5}
 
 
 def find_patch(text: str | None, *, cell_size: float | None, width: float = WIDTH) -> ContactPatch:
-    """The patch called `text` (case does not matter), `width` [m] wide, or the pressure map in the file `text`.
+    """Return the patch called `text` (case does not matter), `width` [m] wide, or the pressure map in the file `text`.
 
     Circle for None, not for an empty text.
 
@@ -53,12 +53,12 @@ def find_patch(text: str | None, *, cell_size: float | None, width: float = WIDT
 
 
 def patch_names() -> list[str]:
-    """Names that `find_patch` knows."""
+    """Return names that `find_patch` knows."""
     return [*PUBLISHED_PATCHES, *(name for name in _shapes(WIDTH) if name.title() not in PUBLISHED_PATCHES)]
 
 
 def _shapes(width: float) -> dict[str, Callable[[], ContactPatch]]:
-    """The shapes that their width alone describes, by name."""
+    """Return the shapes that their width alone describes, by name."""
     makers = {}
     for name, make in SHAPES.items():
         parameters = list(inspect.signature(make).parameters.values())  # none, in a shape of one's own
@@ -70,7 +70,7 @@ def _shapes(width: float) -> dict[str, Callable[[], ContactPatch]]:
 
 
 def pressure_map(path: str | Path, cell_size: float | None) -> ContactPatch:
-    """The patch of a pressure map file with cells of `cell_size` [m]."""
+    """Return the patch of a pressure map file with cells of `cell_size` [m]."""
     from planarfriction.patch import ContactPatch
 
     if cell_size is None:

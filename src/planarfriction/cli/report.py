@@ -15,7 +15,7 @@ FINISHED = "success"
 
 
 def comparison(solutions: Mapping[str, Solution]) -> list[list[str]]:
-    """Rows of text for a table with one column for each solution; differences are those from the first."""
+    """Return rows of text for a table with one column for each solution; differences are those from the first."""
     every = list(solutions.values())
     rows = [
         ["final x [mm]", *(f"{1e3 * _last(each, 'x'):.6g}" for each in every)],
@@ -42,7 +42,8 @@ def comparison(solutions: Mapping[str, Solution]) -> list[list[str]]:
 
 
 def largest_differences(solution: Solution, reference: Solution) -> tuple[float, float]:
-    """Largest distance of the positions [m] and largest difference of the angles [rad] over the time both cover."""
+    """Return the largest distance of the positions [m] and largest difference of the angles [rad] over the time both
+    cover."""
     time, own = reference.histories["time"].values, solution.histories["time"].values
     time = time[time <= own[-1]]
     dx, dy, dtheta = (

@@ -27,7 +27,7 @@ SLIDE_SAMPLING = 1e-3
 """Time between samples of the free slide [s], which lasts a tenth of a second."""
 
 BOTH = ("distributed", "reduced")
-"""What "both" means."""
+"""Models that "both" stands for."""
 
 
 def build_scenes(
@@ -40,7 +40,7 @@ def build_scenes(
     t_end: float | None = None,
     settings: Mapping[str, Any] | None = None,
 ) -> dict[str, Scene]:
-    """The scenes to simulate, by the label of their model, with the values of `settings` by their paths."""
+    """Return the scenes to simulate, by the label of their model, with the values of `settings` by their paths."""
     makers = scene_makers(name, models, parts=parts, patch=patch, cell_size=cell_size, t_end=t_end)
     scenes = {kind: make(**(settings or {})) for kind, make in makers.items()}
     return {kind or _label(scene): scene for kind, scene in scenes.items()}
@@ -55,7 +55,7 @@ def scene_makers(
     cell_size: float | None = None,
     t_end: float | None = None,
 ) -> dict[str, Callable[..., Scene]]:
-    """What makes the scenes of some values, by the kind of their model; "" for the file's own."""
+    """Return functions that make the scenes of some values, by the kind of their model; "" for the file's own."""
     if t_end is not None:
         validation.positive("--t-end", t_end)
     kinds = list(dict.fromkeys(kind for each in models for kind in (BOTH if each == "both" else [each])))
@@ -78,7 +78,7 @@ def scene_makers(
 
 
 def _ready(make: Callable[..., Scene], model: Any, options: dict[str, Any], **values: Any) -> Scene:
-    """A ready scene: values that its function takes, such as `mass`, go there, the others to what it returns."""
+    """Make a ready scene: values that its function takes, such as `mass`, go there, the others to what it returns."""
     from planarfriction.sweeps.settings import Settable
 
     own = [name for name in inspect.signature(make).parameters if name != "model"]
@@ -88,7 +88,7 @@ def _ready(make: Callable[..., Scene], model: Any, options: dict[str, Any], **va
 
 
 def one_each(settings: Sequence[str]) -> dict[str, Any]:
-    """Values of `--set path=value` by their paths."""
+    """Parse the values of `--set path=value`, by path."""
     if not settings:
         return {}
     from planarfriction.sweeps.settings import parse_all
@@ -102,7 +102,7 @@ def one_each(settings: Sequence[str]) -> dict[str, Any]:
 
 
 def _parts(text: str | None) -> int | str | None:
-    """A count, "auto" or nothing, as a model takes it."""
+    """Parse a count, "auto" or nothing, as a model takes it."""
     if text is None or text == "auto":
         return text
     if not (text.isdecimal() and len(text) < 10):
@@ -111,7 +111,7 @@ def _parts(text: str | None) -> int | str | None:
 
 
 def _in_parts(make: Any) -> bool:
-    """Whether models of a class have parts."""
+    """Return True if models of a class have parts."""
     return "parts" in inspect.signature(make).parameters
 
 
@@ -122,7 +122,7 @@ def _check_parts(parts: Any, makes: Iterable[Any]) -> None:
 
 
 def _make(make: Any, patch: ContactPatch, law: Any, parts: int | str | None) -> Any:
-    """A model of a class, in `parts` where it has some."""
+    """Make a model of a class, in `parts` where it has some."""
     return make(patch, law, **({"parts": parts} if parts is not None and _in_parts(make) else {}))
 
 
@@ -147,13 +147,13 @@ def _makers_from_file(
 
 
 def _label(scene: Scene) -> str:
-    """The kind of model that all contacts of a scene have, or "mixed"."""
+    """Return the kind of model that all contacts of a scene have, or "mixed"."""
     kinds = {MODELS.name_of(contact.model) for contact in scene.contacts}
     return (kinds.pop() if len(kinds) == 1 else None) or "mixed"
 
 
 def _with_models(scene: Scene, kind: str, patch: ContactPatch | None, parts: int | str | None) -> Scene:
-    """The scene with models of one kind on its own patches or on `patch`, laws as they are.
+    """Return the scene with models of one kind on its own patches or on `patch`, laws as they are.
 
     The kind is "" for that of the scene, "mixed" for each as it is. In `parts` where they have some, by default in as
     many as they have.

@@ -24,33 +24,34 @@ class Usual(NamedTuple):
 
 
 def usual(name: str) -> Usual:
-    """Patch and law of the ready scene `name`; those of most where it has none of its own."""
+    """Return patch and law of the ready scene `name`; those of most where it has none of its own."""
     return _USUAL.get(name, Usual())
 
 
 def published_law() -> LuGre:
-    """The law of the published experiments."""
+    """Return the law of the published experiments."""
     from planarfriction.laws import ElastoPlastic, LuGre
 
     return LuGre(mu_s=1.2, elasto_plastic=ElastoPlastic(0.9))
 
 
 def _fingertip() -> ContactPatch:
-    """A soft finger on a disc that it fills at 8 N: Hertz contact, of radius 6 mm at 1 N."""
+    """Make a soft finger on a disc that it fills at 8 N: Hertz contact, of radius 6 mm at 1 N."""
     from planarfriction.patch import ContactPatch, SoftFinger
 
     return ContactPatch.disc(0.012, pressure=SoftFinger(c=0.006, n=1 / 3, k=2.0, radius_max=0.012))
 
 
 def _running_band() -> ContactPatch:
-    """The ring that a curling stone stands on, 6 mm wide and 123 mm across."""
+    """Make the ring that a curling stone stands on, 6 mm wide and 123 mm across."""
     from planarfriction.patch import ContactPatch
 
     return ContactPatch.ring(0.0585, 0.0645)
 
 
 def _ice() -> LuGre:
-    """Granite on pebbled ice; bristles of 0.1 um, without viscous friction, which is for speeds of centimetres."""
+    """Return the law of granite on pebbled ice; bristles of 0.1 um, without viscous friction, which is for speeds of
+    centimetres."""
     from planarfriction.laws import LuGre
 
     return LuGre(mu_c=0.01, sigma_0=1e5, sigma_1=10.0, sigma_2=0.0)

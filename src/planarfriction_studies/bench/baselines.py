@@ -1,4 +1,4 @@
-"""What to compare with: SciPy's solver on the same compiled right-hand side over a window of a scene."""
+"""Baseline solvers: SciPy's solver on the same compiled right-hand side over a window of a scene."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ START_TOLERANCE = 1e-8
 
 
 class Poses(NamedTuple):
-    """What a solver found."""
+    """Poses found by a solver."""
 
     wall_time: float
     """Time in the solver, without compilation [s]."""
@@ -41,7 +41,7 @@ class Window:
 
     @classmethod
     def of(cls, scene: Scene, begin: float, end: float) -> Window:
-        """From `begin` to `end` [s]: 0 or jumps of a signal, or the end of the scene."""
+        """Make the window from `begin` to `end` [s]: 0 or jumps of a signal, or the end of the scene."""
         packed = pack(scene, end)
         breaks = packed.system.motion.breaks
         first = int(np.argmin(np.abs(breaks - begin)))
@@ -107,7 +107,7 @@ def lsoda_time(scene: Scene, t_end: float) -> float:
 
 
 def _pieces(packed: PackedScene, kept: slice) -> PackedScene:
-    """The pieces `kept` of the motion."""
+    """Return the pieces `kept` of the motion."""
     motion = packed.system.motion
     per_piece = {name: getattr(motion, name)[kept] for name in ("load", "force", "acceleration", "row")}
     velocity = motion.velocity[kept] if len(motion.velocity) else motion.velocity

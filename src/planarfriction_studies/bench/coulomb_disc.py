@@ -17,7 +17,7 @@ _STOPPED = 1e-5
 
 
 class Stop(NamedTuple):
-    """Where a disc comes to rest."""
+    """Place of rest of a disc."""
 
     time: float
     """[s]"""
@@ -28,7 +28,8 @@ class Stop(NamedTuple):
 
 
 def wrench(ratio: float) -> tuple[float, float]:
-    """Force over `mu N` and torque over `mu N R` of a disc, against its motion; `ratio` is speed over rim speed."""
+    """Return the force over `mu N` and torque over `mu N R` of a disc, against its motion; `ratio` is speed over rim
+    speed."""
     from scipy.special import ellipe, ellipkm1
 
     if ratio < 1e-9:
@@ -49,7 +50,7 @@ def wrench(ratio: float) -> tuple[float, float]:
 
 
 def stop(speed: float, spin: float, *, radius: float = 0.1, mu: float = 0.3) -> Stop:
-    """Where a disc of homogeneous mass comes to rest that starts with `speed` [m/s] and `spin` [rad/s]."""
+    """Compute the place of rest of a disc of homogeneous mass that starts with `speed` [m/s] and `spin` [rad/s]."""
     from scipy.integrate import solve_ivp
 
     def rates(_, y):

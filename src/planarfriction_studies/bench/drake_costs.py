@@ -16,7 +16,7 @@ DT, STEPS, ROUNDS = 2e-3, 100, 9
 
 
 def disc(full: bool, contact: Literal["point", "hydroelastic"]) -> Measurement:
-    """Patch friction and Drake's own in turns. Raises `MissingExtraError` without Drake."""
+    """Measure patch friction and Drake's own in turns. Raises `MissingExtraError` without Drake."""
     import planarfriction.adapters.drake  # noqa: F401  (says how to install Drake)
 
     runs = [_thrown(Way(contact, patch=patch)) for patch in (True, False)]
@@ -27,7 +27,8 @@ def disc(full: bool, contact: Literal["point", "hydroelastic"]) -> Measurement:
 
 
 def _thrown(way: Way) -> Callable[[], None]:
-    """What throws the disc at 1 m/s and 10 rad/s and runs it for some steps, over and over."""
+    """Return a function that throws the disc at 1 m/s and 10 rad/s and runs it for a number of steps, again at each
+    call."""
     simulator, plant, context = DISC.build(way, DT)
     simulator.AdvanceTo(100.5 * DT)
 

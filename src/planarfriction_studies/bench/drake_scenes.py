@@ -23,13 +23,13 @@ GRAVITY = 9.81
 
 
 class Way(NamedTuple):
-    """How a contact is computed."""
+    """Settings of a contact."""
 
     contact: Literal["point", "hydroelastic"]
     approximation: str = "lagged"
-    """Of the contact solver: tamsi, sap, similar, lagged."""
+    """Approximation of the contact solver: tamsi, sap, similar, lagged."""
     patch: bool = False
-    """Whether friction is ours."""
+    """True for the friction of a patch, False for Drake's own."""
 
 
 @dataclass(frozen=True)
@@ -39,11 +39,11 @@ class DrakeScene:
     shape: Literal["disc", "box"]
     mu: float
     tilt: float = 0.0
-    """Of the floor [rad]."""
+    """Tilt of the floor [rad]."""
 
     @property
     def height(self) -> float:
-        """Of its centre of mass over its bottom [m]."""
+        """Height of the centre of mass above the bottom face [m]."""
         return 0.002 if self.shape == "disc" else 0.02
 
     @property
@@ -55,7 +55,7 @@ class DrakeScene:
         return ReducedModel(ContactPatch.rectangle(0.1, cells=21), law)
 
     def build(self, way: Way, dt: float) -> tuple[Any, Any, Any]:
-        """A simulator, its plant, and the plant's context."""
+        """Return a simulator, its plant, and the plant's context."""
         from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlantConfig
         from pydrake.systems.analysis import Simulator
         from pydrake.systems.framework import DiagramBuilder
@@ -121,7 +121,7 @@ SETTLED = 0.3
 
 
 def creep(way: Way, dt: float, duration: float = 3.0) -> dict[str, float]:
-    """Speed [m/s] of the box down the incline: mean places of the two halves of the last two thirds."""
+    """Return the speed [m/s] of the box down the incline: mean places of the two halves of the last two thirds."""
     simulator, plant, context = INCLINE.build(way, dt)
     places = []
     for i in range(round(duration / dt)):
@@ -132,7 +132,7 @@ def creep(way: Way, dt: float, duration: float = 3.0) -> dict[str, float]:
 
 
 def slide(way: Way, start: tuple[float, float], dt: float = 2e-3) -> tuple[float, float]:
-    """Distance [m] and angle [rad] of the disc to rest, from a speed [m/s] and a spin [rad/s]."""
+    """Return the distance [m] and angle [rad] of the disc to rest, from a speed [m/s] and a spin [rad/s]."""
     from pydrake.multibody.math import SpatialVelocity
 
     simulator, plant, context = DISC.build(way, dt)

@@ -1,4 +1,4 @@
-"""What derivatives cost: of roll-outs, and of scenes."""
+"""Costs of derivatives of roll-outs and scenes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from planarfriction_studies.bench.measurement import Measurement, line, median
 from planarfriction_studies.bench.workloads import AGAINST_PUBLISHED, disc, law, mixed_twists
 
 STEPS = 2000
-"""Of the roll-out that stands alone."""
+"""Steps of the single roll-out."""
 
 TIGHT: dict[str, Any] = {"rtol": 1e-9, "atol": 1e-9}
 """Tolerances of the scenes."""
@@ -28,7 +28,7 @@ SIGNALS = {"fingers.normal_force": KNOTS}
 
 
 def reduced(full: bool) -> Measurement:
-    """A roll-out with its gradient, as `gradient.published`."""
+    """Measure a roll-out with its gradient, as `gradient.published`."""
     ours, theirs = (
         _value_and_gradient(model(disc(), law()), (STEPS,), 15) for model in (ReducedModel, ReducedModelPublished)
     )
@@ -57,12 +57,13 @@ def _alone(model: ReducedModel | ReducedModelPublished, shape: tuple[int, ...], 
 
 
 def _inputs(shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray, float]:
-    """Twists, loads [N] and time step [s]."""
+    """Return twists, loads [N] and time step [s]."""
     return mixed_twists(math.prod(shape)).reshape(*shape, 3), np.full(shape, 2.0), 1e-4
 
 
 def published(full: bool) -> Measurement:
-    """Half the squared wrenches of a roll-out, with its gradient to all parameters, twists, loads and the state."""
+    """Measure half the squared wrenches of a roll-out, with their gradient to all parameters, twists, loads and the
+    state."""
     from planarfriction import derivatives
 
     model = ReducedModelPublished(disc(), law())
@@ -105,26 +106,27 @@ def reduced_batch(full: bool) -> Measurement:
 
 
 def _batch(model: ReducedModel | ReducedModelPublished) -> tuple[float, float]:
-    """Million contact-steps/s of a thousand roll-outs with their gradient, and of the roll-outs alone."""
+    """Return the millions of contact-steps per second of a thousand roll-outs with their gradient, and of the roll-outs
+    alone."""
     shape = 1000, 1000
     steps = 1e-6 * math.prod(shape)
     return steps / _value_and_gradient(model, shape, 5), steps / _alone(model, shape, 5)
 
 
 def scene_to_friction(full: bool) -> Measurement:
-    """Derivatives of the motion of a scene to the friction."""
+    """Measure derivatives of the motion of a scene to the friction."""
     return _beside_simulation(
         in_hand(ReducedModel(disc(), law()), t_end=0.5), lambda scene: scene_sensitivities(scene, ("mu",), **TIGHT)
     )
 
 
 def scene_to_knots(full: bool) -> Measurement:
-    """Derivatives of the motion of a scene to twenty knots of the grip."""
+    """Measure derivatives of the motion of a scene to twenty knots of the grip."""
     return _beside_simulation(_gripped(), lambda scene: scene_sensitivities(scene, (), signals=SIGNALS, **TIGHT))
 
 
 def cost_to_knots(full: bool) -> Measurement:
-    """Derivatives of one cost to those knots."""
+    """Measure derivatives of one cost to twenty knots of the grip."""
     return _beside_simulation(
         _gripped(),
         lambda scene: scene_gradient(scene, lambda _, motion: np.ones_like(motion), signals=SIGNALS, **TIGHT),
@@ -132,7 +134,7 @@ def cost_to_knots(full: bool) -> Measurement:
 
 
 def _gripped() -> Scene:
-    """The in-hand scene with a grip of twenty knots."""
+    """Return the in-hand scene with a grip of twenty knots."""
     grip = Signal(KNOTS, 1.73 - 0.91 * np.sin(4.0 * np.pi * KNOTS), "linear")
     return in_hand(ReducedModel(disc(), law()), normal_force=grip, t_end=0.5)
 

@@ -20,13 +20,14 @@ SHARE = 0.01
 
 
 def identification(full: bool, model: str = "reduced-published") -> Measurement:
-    """A fit with the distributed model, or with the published reduced one."""
+    """Measure a fit with the distributed model, or with the published reduced one."""
     value, plain = identification_times(model)
     return line(value, "s", "the same fit without nuisance parameters", plain)
 
 
 def identification_times(model: str) -> tuple[float, float]:
-    """Seconds of a fit of eight parameters, with all nuisance parameters and without, after one that compiles."""
+    """Return seconds of a fit of eight parameters, with all nuisance parameters and without, after one that
+    compiles."""
     patch = ContactPatch.disc(0.01, cells=21)
     law = LuGre(0.5, 0.65, 2e-3, 2e4, 30.0, 0.8, 1.4, ElastoPlastic(0.9))
     contact = (DistributedModel if model == "distributed" else ReducedModelPublished)(patch.compressed(), law)

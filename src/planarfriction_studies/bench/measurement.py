@@ -14,25 +14,26 @@ class Measurement:
     """One line of the benchmark; without numbers where what it needs is not installed, as `baseline` then says."""
 
     name: str
-    """Of the benchmark."""
+    """Name of the benchmark."""
     value: float | None
     """Median."""
     unit: str
     baseline: str
-    """What it is compared with, in words."""
+    """Baseline that the value is compared with, in words."""
     baseline_value: float | None
     """Median of the baseline, same unit."""
     ratio: float | None
-    """How many times cheaper than the baseline: baseline over value, unless `baseline` says otherwise."""
+    """Ratio of baseline over value, above 1 where the baseline is dearer, unless `baseline` says otherwise."""
 
 
 def line(value: float, unit: str, baseline: str, baseline_value: float, ratio: float | None = None) -> Measurement:
-    """A measurement without a name yet; `ratio` is that of the two values unless it is given."""
+    """Make a measurement that has no name yet; `ratio` is that of the two values unless it is given."""
     return Measurement("", value, unit, baseline, baseline_value, baseline_value / value if ratio is None else ratio)
 
 
 def median(action: Callable[[], Any], repeats: int, inner: int = 1) -> float:
-    """Median time of `action` [s] over `repeats` rounds of `inner` calls, after one call that does not count."""
+    """Measure the median time of `action` [s] over `repeats` rounds of `inner` calls, after one call that does not
+    count."""
     action()
     times = []
     for _ in range(repeats):

@@ -16,11 +16,12 @@ from planarfriction_studies.bench.mujoco_scenes import Native, disc
 ENVIRONMENTS = 16
 
 STEPS, ROUNDS = 100, 5
-"""Of a roll-out that is timed: 0.2 s, in which all slide; and how often, in turns."""
+"""Steps of a timed roll-out (0.2 s, in which all discs slide), and rounds in which both ways take turns."""
 
 
 def discs(full: bool) -> Measurement:
-    """A step of one of `ENVIRONMENTS` that `vmap` steps at once, with patch friction and with MJX's own in turns.
+    """Measure a step of one of `ENVIRONMENTS` that `vmap` steps at once, with patch friction and with MJX's own in
+    turns.
 
     Both in double precision. Raises `MissingExtraError` without MJX.
     """
@@ -44,7 +45,7 @@ def discs(full: bool) -> Measurement:
 
 
 def _adapter() -> Any:
-    """First of all, as it says which extra is missing."""
+    """Import the adapter, before anything else: its error names the missing extra."""
     from planarfriction.adapters import mjx
 
     return mjx
@@ -63,7 +64,7 @@ def _ours(adapter: Any) -> tuple[Any, Any, Any]:
 
 
 def _rolled(step: Callable[..., Any], m: Any, d: Any) -> Callable[[], None]:
-    """A compiled roll-out of discs with different starts, whose contact has settled."""
+    """Return a compiled roll-out of discs with different starts, whose contact has settled."""
     import jax
     import jax.numpy as jnp
     import mujoco

@@ -1,6 +1,6 @@
 # pyright: reportAttributeAccessIssue=false
 # (MuJoCo describes few of its names to type checkers.)
-"""What patch friction costs in MuJoCo, beside MuJoCo's own in turns: a tray of blocks, a grip at rest, roll-outs."""
+"""Costs of patch friction in MuJoCo, beside MuJoCo's own in turns: a tray of blocks, a grip at rest, roll-outs."""
 
 from __future__ import annotations
 
@@ -21,22 +21,22 @@ ENVIRONMENTS, THREADS = 16, 2
 
 
 def tray(full: bool, blocks: int) -> Measurement:
-    """A step of a tray with so many blocks."""
+    """Measure a step of a tray with so many blocks."""
     return _beside_own(mujoco_scenes.tray, blocks)
 
 
 def grip(full: bool) -> Measurement:
-    """A step of a grip at rest."""
+    """Measure a step of a grip at rest."""
     return _beside_own(mujoco_scenes.grip)
 
 
 def rollout(full: bool) -> Measurement:
-    """A step of a tray of two blocks, in roll-outs on threads."""
+    """Measure a step of a tray of two blocks, in roll-outs on threads."""
     return _beside_own(mujoco_scenes.tray, 2, rolled=True)
 
 
 def _beside_own(make: Callable[..., MujocoScene], *arguments: int, rolled: bool = False) -> Measurement:
-    """Raises `MissingExtraError` without MuJoCo."""
+    """Measure a scene with patches and with MuJoCo's own friction. Raises `MissingExtraError` without MuJoCo."""
     from planarfriction.adapters.mujoco import Friction  # noqa: F401  (says how to install MuJoCo)
 
     scene = make(*arguments)
@@ -52,7 +52,7 @@ def _beside_own(make: Callable[..., MujocoScene], *arguments: int, rolled: bool 
 
 
 def _in_turns(*actions: Callable[[], float]) -> tuple[float, float]:
-    """Medians of what they return."""
+    """Return the median of each action's results, over rounds in which they take turns."""
     for action in actions:
         action()
     one, other = np.median([[action() for action in actions] for _ in range(ROUNDS)], axis=0)
@@ -74,7 +74,7 @@ def _native(scene: MujocoScene) -> tuple[Any, Any]:
 
 
 def _steps(scene: MujocoScene, m: Any, d: Any, step: Callable[[Any], None] | None = None) -> Callable[[], float]:
-    """Seconds per step, always of the same steps."""
+    """Return seconds per step, always of the same steps."""
     import mujoco
 
     saved = np.zeros(mujoco.mj_stateSize(m, mujoco.mjtState.mjSTATE_INTEGRATION))
@@ -94,7 +94,7 @@ def _steps(scene: MujocoScene, m: Any, d: Any, step: Callable[[Any], None] | Non
 
 
 def _rollouts(scene: MujocoScene, m: Any, d: Any) -> Callable[[], float]:
-    """Seconds per step of one environment, of `ENVIRONMENTS` on `THREADS`."""
+    """Return seconds per step of one environment, of `ENVIRONMENTS` on `THREADS`."""
     import mujoco
     from mujoco import rollout
 

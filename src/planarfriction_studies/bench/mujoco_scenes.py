@@ -22,7 +22,7 @@ from planarfriction.scenes.ready import GRAVITY, in_hand_load
 PADS = ("sphere", "box", "cylinder")
 
 STARTS = ((1.0, 10.0), (1.0, 20.0), (1.0, 3.0))
-"""Of the disc: speed [m/s] and spin [rad/s]."""
+"""Initial speeds [m/s] and spins [rad/s] of the disc."""
 
 
 class Native(NamedTuple):
@@ -47,20 +47,20 @@ class MujocoScene:
     model: FrictionModel
     """Friction of each."""
     control: Callable[[float], Sequence[float]]
-    """Of the actuators at a time [s]."""
+    """Controls of the actuators at a time [s]."""
     time: float
-    """How long it lasts [s]."""
+    """Duration [s]."""
     settle: float = 0.0
     """Time [s] before it, with the controls of time 0."""
     weightless: bool = False
-    """Whether gravity begins after that."""
+    """True if gravity begins after the settling time."""
     start: tuple[float, ...] | None = None
     """Velocities then; None as they are."""
     solref: float = 0.02
     """Time constant of contacts [s]."""
 
     def native(self, settings: Native, dt: float = 2e-3, integrator: str = "Euler") -> tuple[Any, Any]:
-        """Model and data with MuJoCo's own friction."""
+        """Return the model and data with MuJoCo's own friction."""
         import mujoco
 
         m = mujoco.MjModel.from_xml_string(self._text(settings, dt, integrator))
@@ -73,7 +73,7 @@ class MujocoScene:
         solref: float | None = None,
         model: FrictionModel | None = None,
     ) -> tuple[Any, Any, Any]:
-        """Model, data, and the friction of its patches; `model` in place of the scene's own."""
+        """Return the model, data, and the friction of its patches; `model` in place of the scene's own."""
         import mujoco
 
         from planarfriction.adapters.mujoco import Friction, PatchContact, prepare
@@ -89,7 +89,8 @@ class MujocoScene:
         return self.text(settings._replace(solref=solref), dt, integrator)
 
     def run(self, m: Any, d: Any, step: Callable[[], None]) -> np.ndarray:
-        """Positions `[steps + 1, nq]`, from when it has settled: `step` is `mj_step` or takes its place."""
+        """Run the scene and return positions `[steps + 1, nq]` after it has settled; `step` is `mj_step` or replaces
+        it."""
         gravity, dt = m.opt.gravity.copy(), float(m.opt.timestep)
         if self.weightless:
             m.opt.gravity[:] = 0.0
@@ -110,7 +111,7 @@ class MujocoScene:
 
 
 def _document(settings: Native, dt: float, integrator: str, torsion: float, body: str, mu: float) -> str:
-    """A whole model; `torsion` is mu times the lever arm of friction against spin [m]."""
+    """Return a whole model; `torsion` is mu times the lever arm of friction against spin [m]."""
     options = f'cone="{settings.cone}" impratio="{settings.impratio}" noslip_iterations="{settings.noslip}"'
     contact = f'condim="{settings.condim}" friction="{mu} {torsion} 0" solref="{settings.solref} 1"'
     return f"""<mujoco><option timestep="{dt}" integrator="{integrator}" {options}/>
@@ -136,7 +137,7 @@ _HELD = ("left", ("pad left", "block")), ("right", ("pad right", "block"))
 
 
 def grip(pad: str = "box", *, squeeze: float = 3.0, beside: float = 4e-3) -> MujocoScene:
-    """A block of 0.2 kg between two pads that press with `squeeze` [N], held `beside` its centre of mass [m]."""
+    """Build a block of 0.2 kg between two pads that press with `squeeze` [N], held `beside` its centre of mass [m]."""
     depth, geom = _SHAPES[pad]
     pads = "".join(
         f"""<body pos="{sign * (0.01 + depth)} {beside} 0.5"><joint name="{side}" type="slide" axis="{-sign} 0 0"/>
@@ -159,11 +160,11 @@ def grip(pad: str = "box", *, squeeze: float = 3.0, beside: float = 4e-3) -> Muj
 
 
 SHAKEN = 3.0
-"""How long the gripper is shaken [s]."""
+"""Time for which the gripper is shaken [s]."""
 
 
 def shaken(pad: str = "box", *, squeeze: float = 6.0) -> MujocoScene:
-    """The same block in a gripper that is moved up and down, and turned, for 3 s, and then held for 2 s."""
+    """Build the block of `grip` in a gripper that is moved up and down, and turned, for 3 s, and then held for 2 s."""
     depth, geom = _SHAPES[pad]
     fingers = "".join(
         f"""<body pos="{sign * (0.01 + depth)} 0 0">
@@ -194,7 +195,7 @@ def shaken(pad: str = "box", *, squeeze: float = 6.0) -> MujocoScene:
 
 
 def in_the_hand(d: Any) -> np.ndarray:
-    """Where the block of `shaken` is in the gripper [m]."""
+    """Return the position of the block of `shaken` in the gripper's frame [m]."""
     arm = d.body("arm")
     return arm.xmat.reshape(3, 3).T @ (d.body("block").xpos - arm.xpos)
 
@@ -208,7 +209,7 @@ def disc(
     joint: Literal["plane", "free"] = "plane",
     touch: Literal["face", "point"] = "face",
 ) -> MujocoScene:
-    """A disc of 0.2 kg that starts with `speed` [m/s] and `spin` [rad/s] on the floor.
+    """Build a disc of 0.2 kg that starts with `speed` [m/s] and `spin` [rad/s] on the floor.
 
     `coulomb_disc.stop` says where it comes to rest. It moves on joints of its plane, or freely, which MuJoCo's own
     friction does better with; it touches with its face, or in a point with the torsion of a disc that only spins,
@@ -237,7 +238,7 @@ def disc(
 
 
 def plate(load: Literal[1, 2] = 1, *, model: FrictionModel | None = None) -> MujocoScene:
-    """The published in-hand run: a plate held upright between two pads slips and turns as the grip varies.
+    """Build the published in-hand run: a plate held upright between two pads slips and turns as the grip varies.
 
     Its plane is that of x and y, gravity is along -y; positions are x (less 2 mm), y, z, the angle, and that of the
     upper pad.
@@ -268,7 +269,8 @@ def plate(load: Literal[1, 2] = 1, *, model: FrictionModel | None = None) -> Muj
 
 
 def tray(blocks: int = 2) -> MujocoScene:
-    """A tray shaken to and fro with `blocks` of 0.1 kg on it, which slip and turn; it comes first in the positions."""
+    """Build a tray shaken to and fro with `blocks` of 0.1 kg on it, which slip and turn; it comes first in the
+    positions."""
     places = [(0.1 * (i % 4 - 1.5), 0.1 * (i // 4 - 0.5)) for i in range(blocks)]
     carried = "".join(
         f"""<body name="block {i}" pos="{x} {y} 0.025"><freejoint/>
@@ -292,7 +294,7 @@ def tray(blocks: int = 2) -> MujocoScene:
 
 
 def capsule() -> MujocoScene:
-    """A capsule of 45 g pinched between two flat pads that move into it by 2 mm: it touches along lines.
+    """Build a capsule of 45 g pinched between two flat pads that move into it by 2 mm: it touches along lines.
 
     Source: MuJoCo issue 3328.
     """

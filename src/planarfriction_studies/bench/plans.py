@@ -1,4 +1,4 @@
-"""What plans cost: a grip beside one simulation of its scene, a push beside small steps of least power."""
+"""Costs of plans: a grip beside one simulation of its scene, a push beside small steps of least power."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ STEPS = 100
 
 
 def grip(full: bool) -> Measurement:
-    """Thirty degrees with 20 knots, and the run of the plan."""
+    """Measure a plan of a turn by 30 degrees with 20 knots, beside one simulation of it."""
     model = ReducedModel(disc(), law())
     scene = in_hand(model, centre_of_mass=(0.025, 0.0), normal_force=4.0, t_end=1.0)
     goal = {"angle": math.radians(-30.0)}
@@ -40,7 +40,7 @@ def grip(full: bool) -> Measurement:
 
 
 def push(full: bool) -> Measurement:
-    """A push of 50 mm that turns a square, on its exact limit surface."""
+    """Measure a push of 50 mm that turns a square, on its exact limit surface."""
     square = 0.045 * np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
     surface = LimitSurfaceExact(ContactPatch.rectangle(0.09))
     slider, path = Slider(surface, square), Signal.sampled([0.0, 1.0], [BEGIN, END], "linear")
@@ -51,7 +51,8 @@ def push(full: bool) -> Measurement:
 
 
 def least_power(surface: LimitSurface) -> np.ndarray:
-    """Where the same push ends in small steps: of all spins about the pusher the one that costs the least power."""
+    """Compute the end of the same push in small steps: of all spins about the pusher, each takes the one of least
+    power."""
     from scipy.optimize import minimize_scalar
 
     pose, (x, y) = np.zeros(3), BEGIN

@@ -1,4 +1,4 @@
-"""What a step costs: in a compiled loop, in a call from Python, and where contacts are coupled."""
+"""Costs of a step: in a compiled loop, in a call from Python, and where contacts are coupled."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from planarfriction_studies.bench.measurement import Measurement, line, median
 from planarfriction_studies.bench.workloads import AGAINST_PUBLISHED, disc, law, mixed_twists
 
 FEET = ((0.05, 0.03), (0.05, -0.03), (-0.05, 0.03), (-0.05, -0.03))
-"""Where the feet of a box stand [m]."""
+"""Positions of the feet of a box [m]."""
 
 
 def _compiled_loop(model: ReducedModel | ReducedModelPublished, twists: np.ndarray) -> float:
@@ -27,7 +27,7 @@ def _compiled_loop(model: ReducedModel | ReducedModelPublished, twists: np.ndarr
 
 
 def published_loop(full: bool) -> Measurement:
-    """A step of the published reduced model, in a compiled loop."""
+    """Measure a step of the published reduced model, in a compiled loop."""
     twists = mixed_twists(20_000)
     model = ReducedModelPublished(disc(), law())
     loop, call = _compiled_loop(model, twists), _python_step(model, 1000)
@@ -35,7 +35,7 @@ def published_loop(full: bool) -> Measurement:
 
 
 def distributed_loop(full: bool) -> Measurement:
-    """A step of the distributed model, in a compiled loop."""
+    """Measure a step of the distributed model, in a compiled loop."""
     from planarfriction.kernels import distributed_step as kernels
 
     model, twists = DistributedModel(disc(), law()), mixed_twists(1000)
@@ -55,7 +55,7 @@ def _python_step(model: Any, inner: int) -> float:
 
 
 def published_call(full: bool) -> Measurement:
-    """A step of the published reduced model, from Python."""
+    """Measure a step of the published reduced model, from Python."""
     model = ReducedModelPublished(disc(), law())
     state, twist = model.rest(), np.array([0.01, 0.0, 1.0])
     rate = median(lambda: model.rate(state, twist, 1.0), 9, 100)
@@ -63,7 +63,7 @@ def published_call(full: bool) -> Measurement:
 
 
 def reduced_loop(full: bool, parts: int = 1) -> Measurement:
-    """A step of `ReducedModel`, in a compiled loop."""
+    """Measure a step of `ReducedModel`, in a compiled loop."""
     twists = mixed_twists(20_000)
     models = ReducedModel(disc(), law(), parts=parts), ReducedModelPublished(disc(), law())
     ours, theirs = (_compiled_loop(model, twists) for model in models)
@@ -71,19 +71,19 @@ def reduced_loop(full: bool, parts: int = 1) -> Measurement:
 
 
 def reduced_call(full: bool) -> Measurement:
-    """A step of `ReducedModel`, from Python."""
+    """Measure a step of `ReducedModel`, from Python."""
     ours, theirs = (_python_step(model(disc(), law()), 2000) for model in (ReducedModel, ReducedModelPublished))
     return line(ours * 1e6, "us", AGAINST_PUBLISHED, theirs * 1e6)
 
 
 def reduced_slopes(full: bool) -> Measurement:
-    """The derivatives of a step of `ReducedModel`, in one Python call."""
+    """Measure the derivatives of a step of `ReducedModel`, in one Python call."""
     model = ReducedModel(disc(), law())
     return _beside_a_step(model, lambda: model.step_jacobians(np.zeros(3), (0.01, 0.0, 1.0), 1.0, 1e-3))
 
 
 def reduced_four(full: bool) -> Measurement:
-    """The steps of four contacts, in one Python call."""
+    """Measure the steps of four contacts, in one Python call."""
     model = ReducedModel(disc(), law())
     states, twists, loads = np.zeros((4, 3)), np.tile((0.01, 0.0, 1.0), (4, 1)), np.ones(4)
     return _beside_a_step(model, lambda: model.step(states, twists, loads, 1e-3))
@@ -94,7 +94,7 @@ def _beside_a_step(model: ReducedModel, action: Callable[[], Any]) -> Measuremen
 
 
 def coupled(full: bool, environments: int = 1) -> Measurement:
-    """A box on four feet slides and turns: an implicit step, in one Python call for all environments."""
+    """Measure an implicit step of a box that slides and turns on four feet, in one Python call for all environments."""
     model = ReducedModel(disc(), law())
     step = _four_feet(model, environments)
     value, rounds = median(step, 9, 1 + 500 // environments) / environments, float(step().iterations.mean())
@@ -103,7 +103,8 @@ def coupled(full: bool, environments: int = 1) -> Measurement:
 
 
 def _four_feet(model: ReducedModel, environments: int, dt: float = 1e-3) -> Callable[[], CoupledStep]:
-    """An implicit step of boxes of 0.2 kg with random velocities, one for each environment, from bristles at rest."""
+    """Return an implicit step of boxes of 0.2 kg with random velocities, one for each environment, from bristles at
+    rest."""
     rows = np.concatenate([[[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]] for x, y in FEET])
     response, patches = dt * rows @ np.diag([5.0, 5.0, 5e3]) @ rows.T, CoupledPatches([model] * 4)
     velocity = np.random.default_rng(7).normal(size=(environments, 3)) * [0.05, 0.05, 0.5]

@@ -1,4 +1,4 @@
-"""What a table of a limit surface costs, and the twist of a wrench."""
+"""Costs of a table of a limit surface, and of the twist of a wrench."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ from planarfriction_studies.bench.workloads import disc
 
 
 def table_build(full: bool) -> Measurement:
-    """The published table of 20 segments."""
+    """Measure the construction of the published table of 20 segments."""
     patch = disc()
     value = median(lambda: LimitSurfaceTablePublished(patch).numbers, 31)
     return line(value, "s", "the same nodes by NumPy, node by node", median(lambda: numpy_table(patch), 3))
 
 
 def twist(full: bool, kind: type[LimitSurface], count: int | None = None) -> Measurement:
-    """The twist of a wrench, of an L that is a polygon: one a call, or `count` in a call."""
+    """Measure the twist of a wrench, of an L that is a polygon: one a call, or `count` in a call."""
     corners = [(0.0, 0.0), (0.03, 0.0), (0.03, 0.005), (0.005, 0.005), (0.005, 0.02), (0.0, 0.02)]
     surface = kind(ContactPatch.polygon(corners, 21))
     wrenches = np.random.default_rng(7).normal(size=(count or 1, 3)) * [1.0, 1.0, 0.01]
@@ -30,7 +30,7 @@ def twist(full: bool, kind: type[LimitSurface], count: int | None = None) -> Mea
 
 
 def scipy_twist(surface: LimitSurface, wrench: np.ndarray) -> np.ndarray:
-    """`surface.twist(wrench)` as one would write it with the surface's dissipation, wrench and Jacobian."""
+    """Compute `surface.twist(wrench)` as one would write it with the surface's dissipation, wrench and Jacobian."""
     from scipy import optimize
 
     scale = np.array([1.0, 1.0, surface.contact_radius])
@@ -50,7 +50,8 @@ def scipy_twist(surface: LimitSurface, wrench: np.ndarray) -> np.ndarray:
 
 
 def numpy_table(patch: ContactPatch, segments: int = 20) -> np.ndarray:
-    """Smoothed nodes of the published table as one would write them: four sums over the cells at every node."""
+    """Return the smoothed nodes of the published table as one would write them: four sums over the cells at every
+    node."""
     grid, radius, weights = patch.grid, patch.contact_radius(), patch.weights()
     assert grid is not None
     x, y = (patch.positions - patch.centre_of_pressure()).T

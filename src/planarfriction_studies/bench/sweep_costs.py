@@ -1,4 +1,4 @@
-"""What a sweep costs beside the solver's own time: in-hand runs in threads, each with its file."""
+"""Costs of a sweep beside the solver's own time: in-hand runs in threads, each with its file."""
 
 from __future__ import annotations
 
@@ -19,7 +19,8 @@ _MASSES, _OFFSETS, _GRIPS = np.linspace(0.1, 0.25, 25), np.linspace(0.0, 0.009, 
 
 
 def sweep(full: bool) -> Measurement:
-    """A thousand runs of 2 s in blocks of 250, each of which is also simulated one run after another right before."""
+    """Measure a thousand runs of 2 s in blocks of 250, each of which is also simulated one run after another right
+    before."""
     model = ReducedModel(disc(), law())
     held = in_hand_load(1)
     loads = {float(grip): Signal(held.times, grip * held.values) for grip in _GRIPS}
@@ -51,12 +52,12 @@ def sweep(full: bool) -> Measurement:
 
 
 def end(solution: Solution) -> dict[str, float]:
-    """Where the plate is at last."""
+    """Return the last pose of the plate."""
     return {name: float(solution.histories[name].values[-1]) for name in ("x", "y", "theta")}
 
 
 def _memory() -> float:
-    """The most that this process has taken so far [MB]."""
+    """Return the peak memory of this process so far [MB]."""
     try:
         import resource
     except ImportError:  # on Windows

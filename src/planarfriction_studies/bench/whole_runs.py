@@ -1,4 +1,4 @@
-"""What a whole in-hand run costs, and the import before it."""
+"""Costs of a whole in-hand run, and of the import before it."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ WINDOW = 0.1
 
 
 def _solver_time(scene: Scene, repeats: int, **options: Any) -> tuple[float, Solution]:
-    """Median time in the solver [s], and the last solution."""
+    """Return the median time in the solver [s], and the last solution."""
     simulate(scene, **{**options, "t_end": 0.02})
     solutions = [simulate(scene, **options) for _ in range(repeats)]
     return statistics.median(s.statistics.wall_time for s in solutions), solutions[-1]
 
 
 def distributed(full: bool) -> Measurement:
-    """The distributed model on 21 x 21 cells."""
+    """Measure the distributed model on 21 x 21 cells."""
     scene = in_hand(DistributedModel(disc(), law()))
     value, _ = _solver_time(scene, 5)
     if full:
@@ -41,7 +41,7 @@ def distributed(full: bool) -> Measurement:
 
 
 def distributed_101(full: bool) -> Measurement:
-    """The same on 101 x 101 cells, per cell and step."""
+    """Measure the distributed model on 101 x 101 cells, per cell and step."""
     costs = {}
     for cells in (101, 21):
         patch = disc(cells)
@@ -52,28 +52,29 @@ def distributed_101(full: bool) -> Measurement:
 
 
 def published(full: bool, load: Literal[1, 2] = 1) -> Measurement:
-    """The published reduced model."""
+    """Measure the published reduced model."""
     scene = in_hand(ReducedModelPublished(disc(), law()), normal_force=in_hand_load(load))
     value, _ = _solver_time(scene, 9)
     return line(value, "s", "SciPy LSODA over the whole run", lsoda_time(scene, scene.t_end))
 
 
 def reduced(full: bool) -> Measurement:
-    """`ReducedModel`."""
+    """Measure `ReducedModel`."""
     kinds = (ReducedModel, ReducedModelPublished)
     value, theirs = (_solver_time(in_hand(kind(disc(), law())), 9)[0] for kind in kinds)
     return line(value, "s", "the published reduced model", theirs)
 
 
 def _soft() -> ContactPatch:
-    """The published soft finger whose profile follows the load."""
+    """Return the published soft finger whose profile follows the load."""
     width = 0.02
     finger = SoftFinger(c=6.0 * width / 21, n=1.0 / 3.0, k_per_newton=2.0, radius_max=0.5 * width)
     return ContactPatch.rectangle(width, cells=21, pressure=finger)
 
 
 def load_family(full: bool) -> Measurement:
-    """Runs in turn, so that a noisy machine disturbs both alike; what is built is built before."""
+    """Measure a run with maps of a load family beside one with a fixed map, in turns, so that noise disturbs both
+    alike."""
     soft = _soft()
     fixed = ContactPatch(soft.positions, soft.areas, soft.weights(IN_HAND_LOADS[1, 1][0]), soft.grid)
     family, rebuilt = ReducedModel(soft, law()), ReducedModel(soft, law(), load_error=0.0)
@@ -91,7 +92,7 @@ def load_family(full: bool) -> Measurement:
 
 
 def load_dependent(full: bool) -> Measurement:
-    """The published reduced model, rebuilt as the load changes."""
+    """Measure the published reduced model, rebuilt as the load changes."""
     soft = _soft()
     rebuilt = median(lambda: simulate(in_hand(ReducedModelPublished(soft, law()))), 3)
     fixed = median(lambda: simulate(in_hand(ReducedModelPublished(disc(), law()))), 3)
@@ -99,7 +100,7 @@ def load_dependent(full: bool) -> Measurement:
 
 
 def importing(full: bool) -> Measurement:
-    """`import planarfriction`, in a process of its own."""
+    """Measure `import planarfriction`, in a process of its own."""
 
     def seconds(module: str) -> float:
         code = f"import time; t = time.perf_counter(); import {module}; print(time.perf_counter() - t)"

@@ -1,4 +1,4 @@
-"""What several benchmarks work on: the published law and disc, and twists of all speeds."""
+"""Workloads of several benchmarks: the published law and disc, and twists of all speeds."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ AGAINST_PUBLISHED = "the same of ReducedModelPublished"
 
 
 def law() -> LuGre:
-    """The published friction parameters."""
+    """Return the published friction parameters."""
     return LuGre(mu_s=1.2, elasto_plastic=ElastoPlastic(0.9))
 
 
 def disc(cells: int = 21) -> ContactPatch:
-    """The published disc."""
+    """Return the published disc."""
     return PUBLISHED_PATCHES["Circle"](cells=cells)
 
 
 def mixed_twists(count: int) -> np.ndarray:
-    """Twists that slide and spin at all speeds around the Stribeck speed, in random directions."""
+    """Return twists that slide and spin at all speeds around the Stribeck speed, in random directions."""
     generator = np.random.default_rng(7)
     directions = generator.normal(size=(count, 3)) * [1.0, 1.0, 150.0]
     return directions * 10.0 ** generator.uniform(-4.0, -1.5, size=(count, 1))

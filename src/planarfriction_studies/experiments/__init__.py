@@ -49,9 +49,9 @@ EXPERIMENTS = {
 """Experiment by name, in the order of the paper, and what goes beyond it."""
 
 COMPARISONS = {"simulators": Experiment("simulators", "Patch friction inside simulators, beside their own")}
-"""What compares us with others and needs their packages: no part of a reproduction."""
+"""Comparisons with other simulators, which need their packages: no part of a reproduction."""
 
 
 def find_experiment(name: str) -> Experiment:
-    """The experiment called `name`; raises `InvalidValueError` for an unknown one."""
+    """Return the experiment called `name`; raises `InvalidValueError` for an unknown one."""
     return EXPERIMENTS[validation.choice("experiment", name, EXPERIMENTS)]

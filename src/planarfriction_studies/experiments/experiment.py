@@ -1,4 +1,4 @@
-"""What an experiment is: a function of `Work` that returns a `Result` of data, figures and numbers."""
+"""Experiments as functions of `Work` that return a `Result` of data, figures and numbers."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Comparison:
     """One of our numbers or curves beside a reference, with the tolerance that the reference supports."""
 
     quantity: str
-    """What is compared, in words."""
+    """Compared quantity, in words."""
     reference: Reference
     difference: float
     """Largest absolute difference over all samples."""
@@ -44,7 +44,7 @@ class Comparison:
     unit: str
     samples: int
     cause: str
-    """Where the difference comes from, one sentence."""
+    """Cause of the difference, one sentence."""
     ours: float | None = None
     """Our value, where it is a single number."""
     theirs: float | None = None
@@ -61,14 +61,14 @@ class Comparison:
 
     @property
     def holds(self) -> bool:
-        """Whether the difference is within the tolerance."""
+        """True if the difference is within the tolerance."""
         return bool(self.difference <= self.tolerance)
 
 
 def compare_curve(
     quantity: str, time: np.ndarray, values: np.ndarray, name: str, allowance: float, cause: str
 ) -> Comparison:
-    """Our curve (`values` at `time`) beside the published curve `name`, at the times of its vertices only.
+    """Compare our curve (`values` at `time`) with the published curve `name`, at the times of its vertices only.
 
     The tolerance is the error of the figure's solver, plus that of reading it, plus `allowance`, which is our own
     error (or, where the figure's solver error is unknown, an estimate that `cause` explains).
@@ -93,7 +93,8 @@ def compare_curve(
 def compare_converged(
     quantity: str, time: np.ndarray, values: np.ndarray, name: str, unit: str, allowance: float, cause: str
 ) -> Comparison:
-    """Our curve beside the column `name` of a converged solution, such as `in_hand/Circle/d1/x`, at all its times."""
+    """Compare our curve with the column `name` of a converged solution, such as `in_hand/Circle/d1/x`, at all its
+    times."""
     solution, _, column = name.rpartition("/")
     reference = facts.converged(solution)
     inside = reference["time"] <= time[-1] + 1e-9
@@ -109,14 +110,14 @@ def compare_converged(
 def compare(
     quantity: str, ours: Any, theirs: Any, reference: Reference, tolerance: float, unit: str, cause: str
 ) -> Comparison:
-    """One number beside its reference, or an array of them, of which the farthest counts."""
+    """Compare one number with its reference, or an array of them, of which the farthest counts."""
     difference = np.abs(np.asarray(ours) - theirs)
     values = (None, None) if difference.ndim else (float(ours), float(theirs))
     return Comparison(quantity, reference, float(difference.max()), tolerance, unit, difference.size, cause, *values)
 
 
 def compare_all(reference: Reference, rows: Iterable[tuple[str, Any, Any, float, str, str]]) -> list[Comparison]:
-    """Rows of what is compared, ours, theirs, tolerance, unit and cause."""
+    """Compare rows of quantity, ours, theirs, tolerance, unit and cause."""
     return [
         compare(quantity, ours, theirs, reference, within, unit, cause)
         for quantity, ours, theirs, within, unit, cause in rows
@@ -124,7 +125,7 @@ def compare_all(reference: Reference, rows: Iterable[tuple[str, Any, Any, float,
 
 
 def _at(wanted: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Recorded values at `wanted` times; each must be a recorded time, for between samples lie jumps."""
+    """Return the recorded values at `wanted` times; each must be a recorded time, for between samples lie jumps."""
     index = np.clip(np.searchsorted(time, wanted - 1e-7), 0, len(time) - 1)
     assert np.abs(time[index] - wanted).max() < 1e-6, "the reference has times that were not recorded"
     return values[index]
@@ -137,7 +138,7 @@ class Picture:
     name: str
     """File name without its ending."""
     caption: str
-    """What to see, one or two sentences."""
+    """Description of the picture, one or two sentences."""
     figure: Any
     """The matplotlib figure."""
 
@@ -162,7 +163,7 @@ def table(
     first: str = "",
     note: str = "",
 ) -> Table:
-    """A row for each item, which its name begins; columns by heading; `first` is the heading of the names."""
+    """Return a row for each item, which its name begins; columns by heading; `first` is the heading of the names."""
     rows = [[name, *(cell(item) for cell in columns.values())] for name, item in items.items()]
     return Table(title, [first, *columns], rows, note)
 
@@ -173,7 +174,7 @@ def dataset(
     dims: Sequence[str],
     along: tuple[str, np.ndarray, str],
 ) -> xr.Dataset:
-    """Columns of runs by their labels, one for each of `dims`, over `along`: its name, values and unit."""
+    """Return columns of runs by their labels, one for each of `dims`, over `along`: its name, values and unit."""
     import xarray as xr
 
     labels = [list(dict.fromkeys(each)) for each in zip(*runs, strict=True)]
@@ -190,7 +191,7 @@ def dataset(
 
 @dataclass(frozen=True)
 class Result:
-    """What an experiment found."""
+    """Findings of an experiment."""
 
     findings: Sequence[str]
     """Paragraphs of Markdown: what it shows, with the numbers measured in this run."""
@@ -202,14 +203,14 @@ class Result:
     data: Mapping[str, xr.Dataset] = field(default_factory=dict)
     """Curves by name, with units; written as NetCDF."""
     asked: str = ""
-    """What was asked, Markdown."""
+    """Question of the experiment, Markdown."""
     verdict: str = ""
     """One or two sentences for the top of the report, Markdown."""
 
 
 @dataclass(frozen=True)
 class Work:
-    """How to work: how much, where finished pieces are kept, whom to tell.
+    """Options of a run: its extent, the folder of finished pieces, and the receiver of progress.
 
     An experiment wraps what takes long in pieces. A piece that an interrupted run has finished is read from its file.
     """
@@ -219,13 +220,14 @@ class Work:
     full: bool = False
     """Also what takes more than minutes."""
     folder: Path | None = None
-    """Where finished pieces are kept; None: nowhere."""
+    """Folder that keeps finished pieces; None keeps none."""
     fingerprint: str = ""
-    """Of the code and the options: pieces with another one are computed again."""
+    """Fingerprint of the code and the options: pieces with another one are computed again."""
     progress: Callable[[str], None] | None = None
 
     def piece(self, label: str, compute: Callable[[], Mapping[str, Any]]) -> dict[str, Any]:
-        """What `compute` returns, numbers and arrays in nested dictionaries, from the kept file if there is one."""
+        """Return the result of `compute`, numbers and arrays in nested dictionaries, from the kept file if there is
+        one."""
         if self.progress is not None:
             self.progress(label)
         path = None if self.folder is None else self.folder / f"{_slug(label)}.npz"
@@ -239,7 +241,7 @@ class Work:
     def pieces(
         self, computes: Mapping[Key, Callable[[], Mapping[str, Any]]], label: Callable[[Key], str] = str
     ) -> dict[Key, dict[str, Any]]:
-        """Independent pieces by key, two at a time: compiled code runs beside other compiled code."""
+        """Compute independent pieces by key, two at a time: compiled code runs beside other compiled code."""
         pool = ThreadPoolExecutor(THREADS)
         try:
             futures = {key: pool.submit(self.piece, label(key), compute) for key, compute in computes.items()}
@@ -270,7 +272,8 @@ def _nested(arrays: Arrays) -> dict[str, Any]:
 
 
 def _slug(label: str) -> str:
-    """The label as a file name; its digest tells labels apart that differ only in what a file name cannot hold."""
+    """Return the label as a file name; its digest tells labels apart that differ only in what a file name cannot
+    hold."""
     return re.sub(r"[^\w.]+", "-", label).strip("-") + "-" + hashlib.sha256(label.encode()).hexdigest()[:8]
 
 

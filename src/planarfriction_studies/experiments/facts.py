@@ -29,10 +29,10 @@ class PublishedCurve:
     """One curve of a figure."""
 
     figure: str
-    """What the figure shows, in words."""
+    """Content of the figure, in words."""
     unit: str
     time: np.ndarray
-    """When the values hold [s]; other abscissae (number of cells or segments) as they are."""
+    """Times of the values [s]; other abscissae (number of cells or segments) as they are."""
     values: np.ndarray
     deviation: float | None
     """Largest distance of the curve from a converged solution, the error of the figure's solver; None: not known."""
@@ -41,7 +41,8 @@ class PublishedCurve:
 
 
 def published_curve(name: str) -> PublishedCurve:
-    """A published curve, such as `in_hand/Circle/d1/x`; its times are those of the state, not the (late) labels."""
+    """Return a published curve, such as `in_hand/Circle/d1/x`; its times are those of the state, not the (late)
+    labels."""
     curves = _published()["curves"]
     entry = curves[validation.choice("curve", name, curves)]
     time = np.array(entry["at"]) + entry["late"]
@@ -50,14 +51,15 @@ def published_curve(name: str) -> PublishedCurve:
 
 
 def published_table(name: str) -> dict[str, dict[str, float]]:
-    """A published table (`patches`, `box` or `timing`): row -> column -> number."""
+    """Return a published table (`patches`, `box` or `timing`): row -> column -> number."""
     tables = _published()
     columns, *rows = tables[validation.choice("table", name, ("patches", "box", "timing"))].items()
     return {row: dict(zip(columns[1], values, strict=True)) for row, values in rows}
 
 
 def converged(name: str) -> dict[str, np.ndarray]:
-    """A converged solution, such as `in_hand/Circle/d1`: `time` [s] and the columns x, y, theta, fx, fy, tau it has."""
+    """Return a converged solution, such as `in_hand/Circle/d1`: `time` [s] and the columns x, y, theta, fx, fy, tau it
+    has."""
     columns = {key.rpartition("/")[2]: values for key, values in _converged().items() if key.startswith(f"{name}/")}
     if not columns:
         validation.choice("solution", name, sorted({key.rpartition("/")[0] for key in _converged()}))

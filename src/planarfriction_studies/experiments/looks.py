@@ -1,4 +1,4 @@
-"""How things look in every figure of the report: one colour for each model, others for what is none."""
+"""Style of the report's figures: one colour for each model, others for shapes, solvers and loads."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ OF_MODEL = {"d": DISTRIBUTED, "r": REDUCED, "e": ELLIPSOID}
 def vertices(
     axes: Any, name: str, factor: float, colour: str, shown: Any = slice(None), marker: str = "o", **look: Any
 ) -> None:
-    """Vertices of a published curve, in shown units per SI unit; `shown`: which, or from when to when [s]."""
+    """Draw the vertices of a published curve, in shown units per SI unit; `shown`: which, or from when to when [s]."""
     curve = facts.published_curve(name)
     part = shown if isinstance(shown, slice) else (curve.time >= shown[0]) & (curve.time <= shown[1])
     look = {"ms": 3.0, "mfc": "white", "mec": colour, "mew": 0.7, "zorder": 3} | look
@@ -29,7 +29,8 @@ def vertices(
 
 
 def box(axes: Any, at: float, numbers: Any, colour: str, width: float, filled: bool = True) -> None:
-    """A box of low whisker, first quartile, median, third quartile, high whisker; where a sixth is, a cross at it."""
+    """Draw a box of low whisker, first quartile, median, third quartile, high whisker; where a sixth is, a cross at
+    it."""
     low, first, median, third, high, *most = numbers
     line = {"color": colour, "linewidth": 1.1}
     axes.bxp(
@@ -43,7 +44,7 @@ def box(axes: Any, at: float, numbers: Any, colour: str, width: float, filled: b
 
 
 def box_key(colours: dict[str, str], ending: str = "", filled: bool = True) -> list[Any]:
-    """Legend of boxes by their words."""
+    """Return the legend of boxes by their words."""
     from matplotlib.patches import Patch
 
     return [
@@ -53,7 +54,7 @@ def box_key(colours: dict[str, str], ending: str = "", filled: bool = True) -> l
 
 
 def line_key(label: str, **look: Any) -> Any:
-    """An entry of a legend."""
+    """Return an entry of a legend."""
     from matplotlib.lines import Line2D
 
     return Line2D([], [], label=label, **look)
@@ -64,7 +65,7 @@ MAXIMUM = {"label": "maximum", "ls": "", "marker": "x", "ms": 5, "mew": 1.4, "co
 
 
 def legend(figure: PlotFigure, handles: Any, columns: int, place: str = "upper", **options: Any) -> None:
-    """The legend of a whole figure, above or below it; `handles`: entries, or axes that have them."""
+    """Draw the legend of a whole figure, above or below it; `handles`: entries, or axes that have them."""
     if not isinstance(handles, list):
         handles, options["labels"] = handles.get_legend_handles_labels()
     loc: Any = f"outside {place} center"

@@ -46,24 +46,24 @@ _SYMBOL = re.compile(
 
 
 def to_html(text: str) -> str:
-    """Paragraphs of Markdown as HTML."""
+    """Convert paragraphs of Markdown to HTML."""
     return _parser().render(text)
 
 
 def inline(text: str) -> str:
-    """One line of Markdown as HTML, without a paragraph around it."""
+    """Convert one line of Markdown to HTML, without a paragraph around it."""
     return _parser().renderInline(text)
 
 
 def name_to_html(text: str) -> str:
-    """The name of a quantity or a column, whose symbols are plain words, as HTML with typeset symbols."""
+    """Return the name of a quantity or a column, whose symbols are plain words, as HTML with typeset symbols."""
     parts = _SYMBOL.split(re.sub(r"(?<=\d) x (?=\d)", " × ", text))
     return "".join(SYMBOLS[part] if i % 2 else html.escape(part) for i, part in enumerate(parts))
 
 
 @functools.cache
 def formula(source: str) -> str:
-    """A formula in TeX as an HTML image whose height and baseline fit the text around it."""
+    """Return a formula in TeX as an HTML image whose height and baseline fit the text around it."""
     from matplotlib.font_manager import FontProperties
     from matplotlib.mathtext import math_to_image
 
@@ -93,7 +93,7 @@ def _parser() -> MarkdownIt:
 
 
 def _find_formula(state: Any, silent: bool) -> bool:
-    """Rule of the parser: what stands between two dollar signs."""
+    """Parse a formula between two dollar signs (a rule of the parser)."""
     end = state.src.find("$", state.pos + 1) if state.src[state.pos] == "$" else -1
     if end < 0:
         return False

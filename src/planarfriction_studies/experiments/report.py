@@ -49,12 +49,12 @@ def write_report(reproduction: Reproduction) -> Path:
 
 
 def percent(share: float | None) -> str:
-    """A share as a percentage with two digits; nothing for None."""
+    """Return a share as a percentage with two digits; nothing for None."""
     return "" if share is None else f"{100.0 * share:.2g}"
 
 
 def _section(record: Record, home: Path, counter: Any) -> Record:
-    """A record with its pictures as data, numbered, and its comparisons apart by what they can show."""
+    """Return a record with its pictures as numbered data, and its comparisons split by their kind of reference."""
     comparisons = record["comparisons"]
     return record | {
         "pictures": [
@@ -67,7 +67,7 @@ def _section(record: Record, home: Path, counter: Any) -> Record:
 
 
 def _by_kind(rows: Rows) -> dict[str, Any]:
-    """Rows beside what is exact or converged, and rows beside the paper."""
+    """Split rows by their reference: exact or converged, and published."""
     return {
         "exact": _summary([row for row in rows if row["reference"] != "published"]),
         "paper": _summary([row for row in rows if row["reference"] == "published"]),
@@ -75,7 +75,7 @@ def _by_kind(rows: Rows) -> dict[str, Any]:
 
 
 def _summary(rows: Rows) -> dict[str, Any]:
-    """The rows, those out of tolerance, the rows by cause, and the largest shares of span, ours and the paper's."""
+    """Summarise rows: all, those out of tolerance, by cause, and the largest shares of span, ours and the paper's."""
     causes = dict.fromkeys(row["cause"] for row in rows)
     shares = [row["share"] for row in rows if row["share"] is not None]
     paper = [row["paper"] / row["span"] for row in rows if row["paper"] and row["span"]]
@@ -90,7 +90,7 @@ def _summary(rows: Rows) -> dict[str, Any]:
 
 
 def _image(path: Path) -> dict[str, Any]:
-    """The source of an image that travels inside the page, and its width over that of the widest [%]."""
+    """Return the source of an image that travels inside the page, and its width over that of the widest [%]."""
     try:
         data = path.read_bytes()
     except OSError:

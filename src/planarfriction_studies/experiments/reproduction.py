@@ -36,7 +36,7 @@ Record = dict[str, Any]
 
 @dataclass(frozen=True)
 class Reproduction:
-    """Where results are kept, and how much is done."""
+    """Folder of results and options of a reproduction."""
 
     folder: Path
     quick: bool = False
@@ -46,11 +46,11 @@ class Reproduction:
 
     @property
     def fingerprint(self) -> str:
-        """Of the code, the packages beneath it and the options: results with another one are not reused."""
+        """Fingerprint of the code, the packages beneath it and the options: results with another one are not reused."""
         return hashlib.sha256(f"{_code()} {self.quick} {self.full}".encode()).hexdigest()
 
     def kept(self, name: str) -> Record | None:
-        """The result of an experiment that an earlier run with the same code and options has finished."""
+        """Return the result of an experiment that an earlier run with the same code and options has finished."""
         try:
             record = json.loads((self.folder / name / "result.json").read_text(encoding="utf-8"))
         except (OSError, ValueError):
@@ -58,7 +58,7 @@ class Reproduction:
         return record if isinstance(record, dict) and record.get("fingerprint") == self.fingerprint else None
 
     def records(self) -> list[Record]:
-        """All results kept in the folder, in the order of the experiments."""
+        """Return all results kept in the folder, in the order of the experiments."""
         return [record for name in self.experiments if (record := self.kept(name)) is not None]
 
     def run(
@@ -107,7 +107,7 @@ class Reproduction:
         return record
 
     def numbers(self) -> Record:
-        """Every number of the kept results, with what they were measured on."""
+        """Return every number of the kept results, with what they were measured on."""
         keys = ("title", "seconds", "numbers", "comparisons")
         every = {record["name"]: {key: record[key] for key in keys} for record in self.records()}
         options = {"quick": self.quick, "full": self.full}
@@ -115,7 +115,7 @@ class Reproduction:
 
 
 def machine() -> dict[str, Any]:
-    """What the numbers were computed on."""
+    """Return the machine and the versions that the numbers were computed with."""
     packages = {name: metadata.version(name) for name in ("numpy", "scipy", "numba", "matplotlib")}
     return {
         "processors": os.cpu_count(),
@@ -143,7 +143,7 @@ def _record(each: Experiment, result: Result) -> Record:
 
 
 def _plain(value: Any) -> Any:
-    """The value with mappings, lists and Python's own numbers only, as JSON wants it."""
+    """Convert a value to mappings, lists and Python's own numbers, which JSON accepts."""
     if isinstance(value, dict):
         return {str(key): _plain(each) for key, each in value.items()}
     if isinstance(value, (list, tuple)):

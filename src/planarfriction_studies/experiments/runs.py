@@ -1,4 +1,5 @@
-"""What the experiments share: the published parameters, the models by their letters in the paper, sampled results."""
+"""Code that the experiments share: the published parameters, the models by their letters in the paper, sampled
+results."""
 
 from __future__ import annotations
 
@@ -49,7 +50,8 @@ class PublishedEllipsoid(LimitSurfaceEllipsoid):
 
 
 def published_model(kind: Kind, shape: str | ContactPatch, law: LuGre = LAW, *, width: float = 0.02) -> Any:
-    """The distributed model ("d"), the published reduced one ("r"), or that on the ellipsoid ("e") of a patch."""
+    """Return the distributed model ("d"), the published reduced one ("r"), or that on the ellipsoid ("e") of a
+    patch."""
     patch = PUBLISHED_PATCHES[shape](width=width) if isinstance(shape, str) else shape
     if kind == "d":
         return DistributedModel(patch, law)
@@ -66,5 +68,5 @@ def columns(solution: Solution) -> dict[str, np.ndarray]:
 
 
 def at_centre_of_pressure(run: dict[str, np.ndarray], patch: ContactPatch) -> np.ndarray:
-    """Friction wrench `[T, 3]` of a run about the centre of pressure of the patch."""
+    """Return the friction wrench `[T, 3]` of a run about the centre of pressure of the patch."""
     return wrench_at(np.stack([run[name] for name in ("fx", "fy", "tau")], axis=-1), patch.centre_of_pressure())

@@ -1,4 +1,4 @@
-"""What is said about an experiment: a template beside its code, filled with the numbers of a run.
+"""Texts about an experiment: a template beside its code, filled with the numbers of a run.
 
 A template is Markdown with formulas between dollar signs. Its parts begin with `## verdict`, `## asked`, `## found` and
 `## figure NAME` for each figure.
@@ -26,7 +26,7 @@ class Words:
     """Heading -> Markdown."""
 
     def result(self, figures: Mapping[str, Any], **rest: Any) -> Result:
-        """The result with these words and `figures` by name; `rest` are its other fields."""
+        """Return the result with these words and `figures` by name; `rest` are its other fields."""
         pictures = [Picture(name, self.parts[f"figure {name}"], figure) for name, figure in figures.items()]
         found = self.parts["found"].split("\n\n")
         return Result(found, pictures, asked=self.parts["asked"], verdict=self.parts["verdict"], **rest)
@@ -47,7 +47,8 @@ def _parts(text: str) -> dict[str, str]:
 
 @functools.cache
 def environment() -> jinja2.Environment:
-    """Templates of the experiments and of the report, with filters for numbers; an unknown name is an error."""
+    """Return the environment of the templates of experiments and report, with filters for numbers; an unknown name is
+    an error."""
     import jinja2
 
     made = jinja2.Environment(
@@ -62,25 +63,25 @@ def environment() -> jinja2.Environment:
 
 
 def fmt(value: Any, spec: str) -> str:
-    """A number in a format of Python's; no zero has a sign."""
+    """Return a number in a format of Python's; no zero has a sign."""
     text = format(value, spec)
     return text if re.search("[1-9]", text) else text.lstrip("+-")
 
 
 def short(value: float, digits: int = 3) -> str:
-    """A number with so many digits, without an exponent where it reads well without."""
+    """Return a number with so many digits, without an exponent where it reads well without."""
     return fmt(float(f"{value:.{digits}g}"), "g")
 
 
 def readable(value: float) -> str:
-    """A number with as many digits as are worth reading."""
+    """Return a number with as many digits as are worth reading."""
     if value < 1e-2:
         return f"{value:.1g}"
     return f"{value:.0f}" if value >= 100.0 else f"{value:.3g}"
 
 
 def length(metres: float) -> str:
-    """The size of a length in mm, um or nm, whichever reads best."""
+    """Return the size of a length in mm, um or nm, whichever reads best."""
     size = abs(metres)
     if size < 1e-12:
         return "< 0.001 nm"
@@ -89,7 +90,7 @@ def length(metres: float) -> str:
 
 
 def power(value: float, digits: int = 0) -> str:
-    """A number with a power of ten, as a formula."""
+    """Return a number with a power of ten, as a formula."""
     if value == 0.0:
         return "0"
     mantissa, exponent = f"{value:.{digits}e}".split("e")
@@ -98,13 +99,13 @@ def power(value: float, digits: int = 0) -> str:
 
 
 def span(values: Sequence[float], spec: str = ".2f", factor: float = 1) -> str:
-    """From the smallest to the largest; once where both read the same."""
+    """Write a range from the smallest to the largest number; once where both read the same."""
     low, high = (fmt(factor * choose(values), spec) for choose in (min, max))
     return low if low == high else f"{low} to {high}"
 
 
 def number(value: Any) -> str:
-    """A number as text with four digits; other things as they are; nothing for None."""
+    """Return a number as text with four digits; other things as they are; nothing for None."""
     if value is None:
         return ""
     if isinstance(value, bool) or not isinstance(value, (int, float)):

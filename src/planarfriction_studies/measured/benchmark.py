@@ -71,7 +71,7 @@ class Benchmark:
     results: dict[str, dict[str, Result]] = field(default_factory=dict, init=False)
     """Results by task and model."""
     left_out: list[str] = field(default_factory=list, init=False)
-    """What was not run, and why."""
+    """Models that were not run, with the reason."""
 
     def __post_init__(self) -> None:
         self.tasks = [validation.choice("task", name, TASKS) for name in self.tasks]
@@ -89,7 +89,7 @@ class Benchmark:
                 )
 
     def test(self, task: str) -> list[Case]:
-        """The cases that are scored."""
+        """Return the cases that are scored."""
         return [case for case in self.cases[task] if not TASKS[task].is_training(case)]
 
     def run(self, progress: Callable[[str], None] | None = None) -> dict[str, dict[str, Result]]:
@@ -124,7 +124,7 @@ class Benchmark:
 
 
 def library(left_out: list[str] | None = None) -> dict[str, Any]:
-    """The library's models that are installed, by name; what is missing is added to `left_out`."""
+    """Return the library's models that are installed, by name; what is missing is added to `left_out`."""
     for name, entry in LIBRARY.items():
         if not entry.installed and left_out is not None:
             left_out.append(f"{name}: needs {entry.needs}, pip install 'planarfriction[{entry.extra}]'")
@@ -146,7 +146,7 @@ def _answers(model: Any, name: str, task: Task, cases: Sequence[Case], say: Call
 
 
 def score(task: Task, cases: Sequence[Case], errors: Sequence[np.ndarray], seed: int) -> dict[str, Score]:
-    """Each measure of a task over its cases, with the interval of a bootstrap over independent ones."""
+    """Compute each measure of a task over its cases, with the interval of a bootstrap over independent ones."""
     found = {}
     for measure in task.measures:
         values, groups = rows_of(task, measure, cases, errors)
@@ -160,7 +160,7 @@ def score(task: Task, cases: Sequence[Case], errors: Sequence[np.ndarray], seed:
 
 
 def rows_of(task: Task, measure: Measure, cases: Sequence[Case], errors: Sequence[np.ndarray]):
-    """Errors `[N]` that a measure counts, and the groups that they belong to."""
+    """Return errors `[N]` that a measure counts, and the groups that they belong to."""
     column = task.measures.index(measure) if task.name == "slides" else 0
     values, groups = [], []
     for case, rows in zip(cases, errors, strict=True):

@@ -34,7 +34,7 @@ CHANGES = np.array([*slide_integrator.CHANGES, 0.02, 1e-3, 0.05])
 """Changes of twist, a, c and b that derivatives are taken over."""
 
 BEGIN = np.array([0.3, 0.02, 8.0, 1.0, 0.05, 4e-3, 0.2])
-"""Where the fit of the spreads begins: q_0 and q_1 of the way [m s^-1.5], of the angle, spreads of a, c [m] and b."""
+"""Initial guess of the spreads: q_0 and q_1 of the position [m s^-1.5], of the angle, spreads of a, c [m] and b."""
 
 LOOSE = 1.5
 """Spread of their logarithms about `BEGIN`, which keeps what the tosses do not tell from running away."""
@@ -50,7 +50,8 @@ INSIDE = 0.95
 
 
 def friction(patch: ContactPatch, mu_0: float, mu_1: float, share: float) -> slide_integrator.Friction:
-    """Friction of slides with numbers of their own `(a, c_x, c_y, b)`, in the axes of the body, or with none.
+    """Return the friction of slides with numbers of their own `(a, c_x, c_y, b)`, in the axes of the body, or with
+    none.
 
     `share` is the contact radius over that of the patch.
     """
@@ -79,17 +80,17 @@ class SpeedModel:
     """Contact radius over that of the patch [-]."""
 
     def __call__(self, question: SlideQuestion) -> np.ndarray:
-        """The answer to one question."""
+        """Return the answer to one question."""
         return self.answer_all([question])[0]
 
     def answer_all(self, questions: Sequence[Any]) -> list[np.ndarray]:
-        """Poses of slides."""
+        """Return poses of slides."""
         if questions[0].task != "slides":
             raise NotImplementedError
         return slide_integrator.slides(friction(questions[0].patch, self.mu_0, self.mu_1, self.share), questions)
 
     def fit(self, cases: Sequence[Case]) -> SpeedModel:
-        """With the three numbers of the training slides."""
+        """Fit the three numbers to the training slides."""
         patch = cases[0].question.patch
         if cases[0].question.task != "slides":
             raise NotImplementedError
@@ -98,7 +99,7 @@ class SpeedModel:
         return SpeedModel(*found.tolist())
 
     def fitted_values(self) -> dict[str, float]:
-        """What was fitted."""
+        """Return the fitted numbers by name."""
         return {"mu": self.mu_0, "mu per m/s": self.mu_1, "lever/radius": self.share}
 
 
@@ -115,7 +116,7 @@ class Linear(NamedTuple):
     """`[T]`."""
 
     def rows(self, which: np.ndarray) -> Linear:
-        """Some of the slides."""
+        """Return the slides `which`."""
         return Linear(self.start[which], self.poses[which], self.slopes[which], self.time)
 
 
@@ -130,11 +131,11 @@ class TossModel:
     """Sizes of the regions of the end, in covariances: of the place, of the angle."""
 
     def __call__(self, question: SlideQuestion) -> np.ndarray:
-        """The answer to one question."""
+        """Return the answer to one question."""
         return self.answer_all([question])[0]
 
     def answer_all(self, questions: Sequence[Any]) -> list[np.ndarray]:
-        """Poses of slides."""
+        """Return poses of slides."""
         if questions[0].task != "slides":
             raise NotImplementedError
         linear = self.linear(questions)
@@ -145,7 +146,7 @@ class TossModel:
         return [poses[i, : len(each.time)] for i, each in enumerate(questions)]
 
     def fit(self, cases: Sequence[Case]) -> TossModel:
-        """With common friction, spreads between tosses and regions of the end from the training slides."""
+        """Fit common friction, spreads between tosses and regions of the end to the training slides."""
         if cases[0].question.task != "slides":
             raise NotImplementedError
         model = dataclasses.replace(self, common=self.common.fit(cases))
@@ -166,7 +167,7 @@ class TossModel:
         return dataclasses.replace(full, reach=tuple(np.sort(sizes, axis=0)[rank].tolist()))
 
     def _with_spreads(self, linear: Linear, cases: Sequence[Case]) -> TossModel:
-        """With the spreads that predict the training slides best."""
+        """Fit the spreads that predict the training slides best."""
         from scipy.optimize import minimize
 
         scale = _squares(np.array([*BEGIN, 0.0, 0.0]), linear, cases)
@@ -179,7 +180,7 @@ class TossModel:
         return dataclasses.replace(self, spreads=(*(BEGIN * np.exp(best[:-2])), *best[-2:]))
 
     def fitted_values(self) -> dict[str, float]:
-        """What was fitted."""
+        """Return the fitted numbers by name."""
         a, c, b, a_0, b_0 = self.spreads[4:]
         common = self.common.fitted_values()
         common["mu"], common["mu per m/s"] = common["mu"] * np.exp(a_0), common["mu per m/s"] * np.exp(a_0)
@@ -187,7 +188,7 @@ class TossModel:
         return common | {"spread of mu": a, "of the centre [mm]": 1e3 * c, "of the lever": b}
 
     def check(self, cases: Sequence[Case]) -> dict[str, float]:
-        """Share of ends inside their regions, and how large these are."""
+        """Return the share of ends inside their regions, and the sizes of the regions."""
         far, spread = self.distances(cases), self.ends([case.question for case in cases])[1]
         axes = 1e3 * np.sqrt(np.linalg.eigvalsh(spread[:, :2, :2]) * self.reach[0])
         return {
@@ -199,7 +200,7 @@ class TossModel:
         }
 
     def ends(self, questions: Sequence[SlideQuestion]) -> tuple[np.ndarray, np.ndarray]:
-        """Predicted poses at the last sample `[K, 3]` and their covariances `[K, 3, 3]`.
+        """Return the predicted poses at the last sample `[K, 3]` and their covariances `[K, 3, 3]`.
 
         The ellipse `d' S^-1 d <= reach[0]`, with S the part of x and y, is to hold 95 % of ends; `reach[1]` the same of
         the angle.
@@ -216,7 +217,8 @@ class TossModel:
         return np.array([answer[-1] for answer in answers]), np.array(found)
 
     def regions(self, questions: Sequence[SlideQuestion]) -> np.ndarray:
-        """Matrices S `[K, 3, 3]` of what is to hold 95 % of ends: places with `d' S^-1 d <= 1`, angles within its root.
+        """Return matrices S `[K, 3, 3]` of the regions that are to hold 95 % of the ends: places with `d' S^-1 d <= 1`,
+        angles within its root.
 
         S is the part of x and y for the place, and that of the angle.
         """
@@ -224,14 +226,14 @@ class TossModel:
         return self.ends(questions)[1] * np.outer(size, size)
 
     def distances(self, cases: Sequence[Case]) -> np.ndarray:
-        """Squares of the errors of place and angle at the end over their covariances, `[K, 2]`."""
+        """Return squares of the errors of place and angle at the end over their covariances, `[K, 2]`."""
         ends, spread = self.ends([case.question for case in cases])
         off = ends - np.array([case.answer[-1] for case in cases])
         place = np.einsum("ki,kij,kj->k", off[:, :2], np.linalg.inv(spread[:, :2, :2]), off[:, :2])
         return np.stack([place, off[:, 2] ** 2 / spread[:, 2, 2]], axis=1)
 
     def linear(self, questions: Sequence[SlideQuestion]) -> Linear:
-        """About the start that fits the first poses best when no toss has friction of its own."""
+        """Linearise slides about the start that fits the first poses best when no toss has friction of its own."""
         law, ways = self._friction(questions), _ways(questions)
         begun = slide_integrator.starts(law, questions, _radius(questions))
         start = np.concatenate([begun, np.zeros((len(begun), 3))], axis=1)
@@ -253,7 +255,7 @@ def _radius(questions: Sequence[SlideQuestion]) -> float:
 
 
 def _ways(questions: Sequence[SlideQuestion]) -> np.ndarray:
-    """Unit vectors `[K, 2]` along the first velocities, in the axes of the bodies."""
+    """Return the unit vectors `[K, 2]` along the first velocities, in the axes of the bodies."""
     begun = slide_integrator.parabolas(questions)
     cos, sin = np.cos(begun[:, 2]), np.sin(begun[:, 2])
     way = np.stack([cos * begun[:, 3] + sin * begun[:, 4], cos * begun[:, 4] - sin * begun[:, 3]], axis=1)
@@ -261,13 +263,14 @@ def _ways(questions: Sequence[SlideQuestion]) -> np.ndarray:
 
 
 def _state(start: np.ndarray, ways: np.ndarray) -> np.ndarray:
-    """Starts `[K, 6 + 4]` with the centre of pressure across the way."""
+    """Return starts `[K, 6 + 4]` with the centre of pressure across the way."""
     a, c, b = start[:, 6:].T
     return np.column_stack([start[:, :6], a, -c * ways[:, 1], c * ways[:, 0], b])
 
 
 def estimate(spreads: np.ndarray, linear: Linear, questions: Sequence[SlideQuestion]) -> tuple[np.ndarray, np.ndarray]:
-    """Changes `[K, 9]` of starts and own numbers that the first poses ask for, and their covariances `[K, 9, 9]`."""
+    """Return changes `[K, 9]` of starts and own numbers that the first poses ask for, and their covariances `[K, 9,
+    9]`."""
     time, count = linear.time[:FIRST_POSES], len(questions)
     weights = np.zeros((FIRST_POSES, 3, FIRST_POSES, 3))
     for i, (begin, on) in enumerate((spreads[:2], spreads[:2], spreads[2:4])):
@@ -283,7 +286,7 @@ def estimate(spreads: np.ndarray, linear: Linear, questions: Sequence[SlideQuest
 
 
 def pushed(time: np.ndarray, begin: float, on: float, seen: float) -> np.ndarray:
-    """Covariance `[T, T]` of poses about the motion that goes through the last of them undisturbed.
+    """Return the covariance `[T, T]` of poses about the motion that goes through the last of them undisturbed.
 
     `R(s, t) = seen^2 [s = t] + integral of (u - s)+ (u - t)+ (begin^2 exp(-u/tau) + on^2) du` up to the last time.
     """
@@ -294,7 +297,8 @@ def pushed(time: np.ndarray, begin: float, on: float, seen: float) -> np.ndarray
 
 
 def _squares(spreads: np.ndarray, linear: Linear, cases: Sequence[Case]) -> np.ndarray:
-    """Mean squares of the errors in place and angle along the way and at the end, `[4]`, of the linear slides."""
+    """Return the mean squares of the errors in place and angle along the way and at the end, `[4]`, of the linear
+    slides."""
     changes, _ = estimate(spreads, linear, [case.question for case in cases])
     poses = linear.poses + np.einsum("ktci,ki->ktc", linear.slopes, changes)
     total = np.zeros(4)

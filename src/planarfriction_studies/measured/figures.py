@@ -27,7 +27,7 @@ COLOURS = {
 
 
 def draw(benchmark: Benchmark, task: str) -> style.PlotFigure:
-    """The picture of a task."""
+    """Draw the picture of a task."""
     rows = len(benchmark.results[task])
     figure = style.new_figure(10.0, max(3.2, 0.42 * rows + (3.4 if task == "slides" else 1.6)))
     figure.set_layout_engine("constrained", w_pad=0.06)
@@ -44,7 +44,7 @@ def draw(benchmark: Benchmark, task: str) -> style.PlotFigure:
 
 
 def _dots(part: Any, benchmark: Benchmark, task: str) -> None:
-    """Each measure of each model, with its interval."""
+    """Draw each measure of each model, with its interval."""
     results = benchmark.results[task]
     measures = [m for m in TASKS[task].measures if all(m.key in result.scores for result in results.values())]
     every = part.subplots(1, len(measures), sharey=True, squeeze=False)[0]
@@ -61,7 +61,7 @@ def _dots(part: Any, benchmark: Benchmark, task: str) -> None:
 
 
 def _chosen(benchmark: Benchmark, task: str) -> dict[str, Any]:
-    """Results that an example shows: a few of the library, and those of the user."""
+    """Return the results that an example shows: a few of the library, and those of the user."""
     from planarfriction_studies.measured.library import LIBRARY
 
     results = benchmark.results[task]
@@ -71,13 +71,13 @@ def _chosen(benchmark: Benchmark, task: str) -> dict[str, Any]:
 
 
 def _colours(chosen: Mapping[str, Any]) -> dict[str, str]:
-    """Colour of each of the chosen models."""
+    """Return the colour of each of the chosen models."""
     left = iter(colour for colour in style.PALETTE if colour not in COLOURS.values())
     return {name: COLOURS.get(name) or next(left, style.OTHER) for name in chosen}
 
 
 def _draw_slides(part: Any, benchmark: Benchmark, count: int = 3) -> None:
-    """Ways of a few slides as errors would hide them: how far each went and turned, measured and predicted."""
+    """Draw a few slides, measured and predicted: path and angle."""
     test, chosen = benchmark.test("slides"), _chosen(benchmark, "slides")
     shown = slides.by_spin(test, count)
     sure = next((name for name, result in chosen.items() if result.regions is not None), None)
@@ -116,20 +116,20 @@ def _draw_slides(part: Any, benchmark: Benchmark, count: int = 3) -> None:
 
 
 def _small(axes: Any) -> None:
-    """Smaller letters on the axes."""
+    """Set smaller letters on the axes."""
     axes.tick_params(labelsize="small")
     axes.xaxis.label.set_fontsize("small")
     axes.yaxis.label.set_fontsize("small")
 
 
 def ellipse(region: np.ndarray) -> np.ndarray:
-    """Points `[P, 2]` on the edge of the region of a place, `d' S^-1 d = 1`."""
+    """Return points `[P, 2]` on the edge of the region of a place, `d' S^-1 d = 1`."""
     angle = np.linspace(0.0, 2.0 * np.pi, 61)
     return np.stack([np.cos(angle), np.sin(angle)], axis=1) @ np.linalg.cholesky(region[:2, :2]).T
 
 
 def _draw_ends(axes: Any, test: Sequence[Case], result: Result, colour: str) -> None:
-    """Measured ends of all slides about the predicted ones, each in half axes of its own ellipse."""
+    """Draw the measured ends of all slides about the predicted ones, each in half axes of its own ellipse."""
     assert result.regions is not None
     off = np.array([case.answer[-1] - poses[-1] for case, poses in zip(test, result.answers, strict=True)])[:, :2]
     squares, ways = np.linalg.eigh(result.regions[:, :2, :2])
@@ -141,12 +141,12 @@ def _draw_ends(axes: Any, test: Sequence[Case], result: Result, colour: str) -> 
 
 
 def _shift(poses: np.ndarray, first: np.ndarray) -> np.ndarray:
-    """x and y from the start [mm], `[2, T]`."""
+    """Return x and y from the start [mm], `[2, T]`."""
     return 1e3 * (poses[:, :2] - first[:2]).T
 
 
 def _draw_centres(part: Any, benchmark: Benchmark) -> None:
-    """Measured and predicted centres of rotation of the pushes of one layout on feet."""
+    """Draw the measured and predicted centres of rotation of the pushes of one layout on feet."""
     test, axes = benchmark.test("pushes"), part.subplots()
     number = next((i for i, case in enumerate(test) if "hard_10_90_10" in case.name), 0)
     case = test[number]
@@ -169,14 +169,14 @@ def _draw_centres(part: Any, benchmark: Benchmark) -> None:
 
 
 def centres(twists: np.ndarray) -> np.ndarray:
-    """Centres of rotation `[M, 2]` [m] of twists; far away where there is no spin."""
+    """Return centres of rotation `[M, 2]` [m] of twists; far away where there is no spin."""
     scale = np.linalg.norm(twists * [1.0, 1.0, pushes.LENGTH], axis=1)
     spin = twists[:, 2] + 1e-9 * scale / pushes.LENGTH
     return np.stack([-twists[:, 1], twists[:, 0]], axis=1) / spin[:, None]
 
 
 def _draw_series(part: Any, benchmark: Benchmark) -> None:
-    """Direction of the wrench over time in the longest push: torque over force, as an angle."""
+    """Draw the direction of the wrench over time in the longest push: torque over force, as an angle."""
     from planarfriction_studies.measured.push_series import LENGTH
 
     test = benchmark.test("series")

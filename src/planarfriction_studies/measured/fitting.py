@@ -9,7 +9,7 @@ import numpy as np
 from planarfriction_studies.measured.questions import Case, SlideQuestion
 
 MU = 0.22
-"""Where fits of the friction coefficient of a slide begin [-]."""
+"""Initial guess of the friction coefficient of a slide [-]."""
 
 DIFFERENCE = 0.02
 """Share of a number over which its derivative is taken."""
@@ -19,7 +19,8 @@ Slides = Callable[[np.ndarray, Sequence[SlideQuestion]], list[np.ndarray]]
 
 
 def fit_slides(predict: Slides, begin: Sequence[float], cases: Sequence[Case], length: float) -> np.ndarray:
-    """Numbers with the least mean square of the position error at the end and `length` times the error in yaw."""
+    """Return numbers with the least mean square of the position error at the end and `length` times the error in
+    yaw."""
     from scipy.optimize import least_squares
 
     questions, ends = [case.question for case in cases], np.array([case.answer[-1] for case in cases])
@@ -35,7 +36,8 @@ def fit_slides(predict: Slides, begin: Sequence[float], cases: Sequence[Case], l
 
 
 def fit_angles(errors: Callable[[float], float], low: float, high: float) -> float:
-    """The number between `low` and `high` with the least mean error, by a search over 24 of them and a finer one."""
+    """Return the number between `low` and `high` with the least mean error, by a search over 24 of them and a finer
+    one."""
     tried = np.geomspace(low, high, 24)
     best = tried[np.argmin([errors(value) for value in tried])]
     fine = best * np.geomspace(low / high, high / low, 25) ** (1.0 / 23.0)

@@ -18,14 +18,14 @@ class Entry(NamedTuple):
 
     make: Callable[[], Any]
     words: str
-    """What it is, in one line."""
+    """Description in one line."""
     needs: str = ""
     """Package of an extra that it needs, and the extra."""
     extra: str = ""
 
     @property
     def installed(self) -> bool:
-        """Whether what it needs is there."""
+        """True if the package that the model needs is installed."""
         return not self.needs or importlib.util.find_spec(self.needs) is not None
 
 

@@ -31,11 +31,11 @@ class SurfaceModel:
     mu: float = fitting.MU
 
     def __call__(self, question: Question) -> np.ndarray:
-        """The answer to one question."""
+        """Return the answer to one question."""
         return self.answer_all([question])[0]
 
     def answer_all(self, questions: Sequence[Any]) -> list[np.ndarray]:
-        """Answers to questions of one task."""
+        """Return answers to questions of one task."""
         made = surfaces(self.surface, questions)
         if questions[0].task == "slides":
             wrench = quick(made[0])
@@ -43,7 +43,7 @@ class SurfaceModel:
         return [_direction(surface, question) for surface, question in zip(made, questions, strict=True)]
 
     def fit(self, cases: Sequence[Case]) -> SurfaceModel:
-        """With the friction coefficient of the training slides; directions need none."""
+        """Fit the friction coefficient to the training slides; directions need none."""
         if cases[0].question.task != "slides":
             return self
         (made,), radius = surfaces(self.surface, [cases[0].question]), cases[0].question.patch.contact_radius()
@@ -52,12 +52,13 @@ class SurfaceModel:
         return dataclasses.replace(self, mu=float(fitting.fit_slides(predict, [fitting.MU], cases, radius)[0]))
 
     def fitted_values(self) -> dict[str, float]:
-        """What was fitted to slides."""
+        """Return the numbers fitted to slides, by name."""
         return {"mu": self.mu}
 
 
 def quick(surface: LimitSurface) -> Callable[[np.ndarray], np.ndarray]:
-    """`surface.wrench` of twists `[K, 3]` from the numbers that compiled loops take: errors of 1e-5 at most."""
+    """Return a function that computes `surface.wrench` of twists `[K, 3]` from the numbers that compiled loops take:
+    errors of 1e-5 at most."""
     numbers, frame = surface.numbers, scaling(surface.centre_of_pressure, surface.contact_radius)
 
     def wrench(twist: np.ndarray) -> np.ndarray:
@@ -70,7 +71,7 @@ def quick(surface: LimitSurface) -> Callable[[np.ndarray], np.ndarray]:
 
 
 def surfaces(make: Callable[[ContactPatch], LimitSurface], questions: Sequence[Any]) -> list[LimitSurface]:
-    """A surface for each question, one for each different patch."""
+    """Return a surface for each question, one for each different patch."""
     made: dict[int, LimitSurface] = {}
     for question in questions:
         if id(question.patch) not in made:
@@ -79,7 +80,7 @@ def surfaces(make: Callable[[ContactPatch], LimitSurface], questions: Sequence[A
 
 
 def _direction(surface: LimitSurface, question: Any) -> np.ndarray:
-    """Twists of wrenches of a pusher, or the other way round; zero where nothing is given."""
+    """Return twists of wrenches of a pusher, or the other way round; zero where nothing is given."""
     given = question.wrenches if question.task == "pushes" else question.given
     backwards = question.task == "pushes" or question.wanted == "twists"
     moved, answer = np.abs(given).max(axis=1) > 0.0, np.zeros_like(given)
@@ -101,18 +102,18 @@ class UncoupledModel:
     mu: float = fitting.MU
 
     def __call__(self, question: Question) -> np.ndarray:
-        """The answer to one question."""
+        """Return the answer to one question."""
         return self.answer_all([question])[0]
 
     def answer_all(self, questions: Sequence[Any]) -> list[np.ndarray]:
-        """Answers to questions of one task."""
+        """Return answers to questions of one task."""
         if questions[0].task == "slides":
             lever = self._lever(questions[0])
             return slide_integrator.slides(lambda twist, _: self.mu * uncoupled(twist, lever), questions)
         return [self._direction(question, self._lever(question)) for question in questions]
 
     def fit(self, cases: Sequence[Case]) -> UncoupledModel:
-        """With friction coefficient and lever of the training cases."""
+        """Fit friction coefficient and lever to the training cases."""
         from planarfriction_studies.measured.tasks import TASKS
 
         question = cases[0].question
@@ -136,14 +137,14 @@ class UncoupledModel:
         return dataclasses.replace(self, share=fitting.fit_angles(misfit, 0.2, 5.0))
 
     def fitted_values(self) -> dict[str, float]:
-        """What was fitted."""
+        """Return the fitted numbers by name."""
         return {"mu": self.mu, "lever/radius": self.share}
 
     def _lever(self, question: Any) -> float:
         return self.share * float(question.patch.contact_radius())
 
     def _direction(self, question: Any, lever: float) -> np.ndarray:
-        """About the centre of mass, which is where it is pushed about."""
+        """Return directions of twists or wrenches about the centre of mass."""
         given = question.wrenches if question.task == "pushes" else question.given
         if question.task == "series" and question.wanted == "wrenches":
             return -uncoupled(given, lever)
@@ -152,7 +153,7 @@ class UncoupledModel:
 
 
 def uncoupled(twist: np.ndarray, lever: float) -> np.ndarray:
-    """Friction `(-v/|v|, -lever sign(omega))` of twists `[K, 3]`; none of either where it is zero."""
+    """Return the friction `(-v/|v|, -lever sign(omega))` of twists `[K, 3]`; none of either where it is zero."""
     speed = np.hypot(twist[:, 0], twist[:, 1])[:, None]
     force = -np.divide(twist[:, :2], speed, out=np.zeros((len(twist), 2)), where=speed > 0.0)
     return np.column_stack([force, -lever * np.sign(twist[:, 2])])
@@ -165,13 +166,13 @@ class PushedQuartic:
     made: Mapping[str, LimitSurface] = dataclasses.field(default_factory=dict)
 
     def __call__(self, question: Question) -> np.ndarray:
-        """The answer to one question; slides have no pushes to learn from."""
+        """Return the answer to one question; slides have no pushes to learn from."""
         if question.task == "slides":
             raise NotImplementedError
         return _direction(self.made[_layout(question)], question)
 
     def fit(self, cases: Sequence[Case]) -> PushedQuartic:
-        """With a quartic for each layout of the training pushes, all of one size: that of the median limit force."""
+        """Fit a quartic to each layout of the training pushes, all of one size: that of the median limit force."""
         if cases[0].question.task == "slides":
             raise NotImplementedError
         pairs: dict[str, list[tuple[Any, np.ndarray, np.ndarray]]] = {}
@@ -194,7 +195,7 @@ def _layout(question: Any) -> str:
 
 
 def stiff(mu: float) -> LuGre:
-    """Dry friction with bristles so stiff that only mu counts.
+    """Return a law of dry friction with bristles so stiff that only mu counts.
 
     They deflect by mu um; ten times stiffer ones move no end of a slide by 0.03 mm or 0.02 deg.
     """
@@ -213,13 +214,13 @@ class BristleModel:
     mu: float = fitting.MU
 
     def __call__(self, question: Question) -> np.ndarray:
-        """The answer to one question."""
+        """Return the answer to one question."""
         if question.task == "slides":
             return _slide(self.build(question.patch, stiff(self.mu)), question)
         return self.answer_all([question])[0]
 
     def answer_all(self, questions: Sequence[Any]) -> list[np.ndarray]:
-        """Answers to questions of one task."""
+        """Return answers to questions of one task."""
         from planarfriction_studies.measured.steady import follow, twists_of
 
         models: dict[int, Any] = {}
@@ -239,7 +240,7 @@ class BristleModel:
         return answers
 
     def fit(self, cases: Sequence[Case]) -> BristleModel:
-        """With the friction coefficient of the training slides; directions need none."""
+        """Fit the friction coefficient to the training slides; directions need none."""
         if cases[0].question.task != "slides":
             return self
         radius = cases[0].question.patch.contact_radius()
@@ -247,12 +248,12 @@ class BristleModel:
         return dataclasses.replace(self, mu=float(fitting.fit_slides(predict, [fitting.MU], cases, radius)[0]))
 
     def fitted_values(self) -> dict[str, float]:
-        """What was fitted."""
+        """Return the fitted numbers by name."""
         return {"mu": self.mu}
 
 
 def _slide(model: Any, question: SlideQuestion) -> np.ndarray:
-    """Simulated from the start that fits the first poses best."""
+    """Simulate a slide from the start that fits the first poses best."""
     from planarfriction.identify import Slide, SlidingBody
     from planarfriction.identify.slides import improve_start, slide_poses
 

@@ -35,7 +35,7 @@ SCENE = """
 
 
 def _mujoco() -> Any:
-    """The package, whose names come from compiled code that type checkers do not see."""
+    """Import MuJoCo, whose names come from compiled code that type checkers do not see."""
     return importlib.import_module("mujoco")
 
 
@@ -47,18 +47,18 @@ class MujocoBox:
     _made: dict[float, Any] = field(default_factory=dict, repr=False, compare=False)
 
     def __call__(self, question: SlideQuestion) -> np.ndarray:
-        """Poses of one slide."""
+        """Return poses of one slide."""
         if question.task != "slides":
             raise NotImplementedError
         begun = self._start(question)
         return self._poses(question, begun, question.time)
 
     def answer_all(self, questions: Sequence[Any]) -> list[np.ndarray]:
-        """Poses of all slides."""
+        """Return poses of all slides."""
         return [self(question) for question in questions]
 
     def fit(self, cases: Sequence[Case]) -> MujocoBox:
-        """With the friction coefficient of the training slides."""
+        """Fit the friction coefficient to the training slides."""
         if cases[0].question.task != "slides":
             return self
         radius = cases[0].question.patch.contact_radius()
@@ -68,11 +68,12 @@ class MujocoBox:
         )
 
     def fitted_values(self) -> dict[str, float]:
-        """What was fitted."""
+        """Return the fitted numbers by name."""
         return {"mu": self.mu}
 
     def _start(self, question: SlideQuestion) -> np.ndarray:
-        """One Gauss-Newton step from a parabola through the first poses, as for the other models."""
+        """Improve the start by one Gauss-Newton step from a parabola through the first poses, as for the other
+        models."""
         begun, time = slide_integrator.parabolas([question])[0], question.time[:FIRST_POSES]
         weights = np.array([1.0, 1.0, np.sqrt(question.inertia / question.mass)])
         poses = self._poses(question, begun, time)
@@ -105,7 +106,7 @@ class MujocoBox:
         return np.stack([np.interp(time, at, column) for column in rows.T], axis=1)
 
     def _box(self, question: SlideQuestion) -> tuple[Any, Any, np.ndarray]:
-        """Model, data, and the place of the box when it stands on the table."""
+        """Return the model, data, and the place of the box when it stands on the table."""
         if self.mu not in self._made:
             mujoco = _mujoco()
             half = 0.5 * float(np.sqrt(question.patch.areas.sum()))

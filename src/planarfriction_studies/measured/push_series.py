@@ -44,12 +44,12 @@ MEASURES = (
 
 
 def feet() -> ContactPatch:
-    """The three outer feet with their shares of the load, about the centre of mass."""
+    """Return the patch of the three outer feet with their shares of the load, about the centre of mass."""
     return ContactPatch.points(FEET, SHARES, name="three outer feet")
 
 
 def read(folder: Path | None = None) -> list[Case]:
-    """Two cases for each push: its twists and its wrenches."""
+    """Read two cases for each push: its twists and its wrenches."""
     motion, force = ["vx_mps", "vy_mps", "wz_radps"], ["fx_N", "fy_N", "tau_Nm"]
     columns = ["push_id", "t_s", "yaw_rad", *motion, *force, "sliding"]
     table = read_table("series", columns, ["run"], folder=folder)
@@ -72,30 +72,30 @@ def read(folder: Path | None = None) -> list[Case]:
 
 
 def to_object(vectors: np.ndarray, yaw: np.ndarray) -> np.ndarray:
-    """World vectors `(x, y, about z)` `[T, 3]` in the axes of the object."""
+    """Return the world vectors `(x, y, about z)` `[T, 3]` in the axes of the object."""
     cos, sin = np.cos(yaw), np.sin(yaw)
     x, y, about = vectors.T
     return np.stack([cos * x + sin * y, cos * y - sin * x, about], axis=1)
 
 
 def smooth(time: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Means of `values` `[T, 3]` under a Hann window."""
+    """Return means of `values` `[T, 3]` under a Hann window."""
     apart = np.clip((time[:, None] - time) / WINDOW, -1.0, 1.0)
     weights = 0.5 + 0.5 * np.cos(np.pi * apart)
     return weights @ values / weights.sum(axis=1, keepdims=True)
 
 
 def is_training(case: Case) -> bool:
-    """The pushes whose number is a multiple of 4 are there to fit to, the others to be predicted."""
+    """Return True for cases to fit to: the pushes whose number is a multiple of 4; the others are predicted."""
     return int(case.group) % 4 == 0
 
 
 def errors(case: Case, answer: np.ndarray) -> np.ndarray:
-    """Angle of each scored row [deg], `[S, 1]`."""
+    """Return the angle of each scored row [deg], `[S, 1]`."""
     length = LENGTH if case.question.wanted == "twists" else 1.0 / LENGTH
     return angles(answer[case.scored], case.answer[case.scored], length)[:, None]
 
 
 def shape(question: SeriesQuestion) -> tuple[int, ...]:
-    """Shape of an answer."""
+    """Return the shape of an answer."""
     return question.given.shape

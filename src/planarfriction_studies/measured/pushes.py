@@ -1,4 +1,4 @@
-"""Slow pushes of a triangle on known feet: which way does it go under a measured wrench?"""
+"""Slow pushes of a triangle on known feet: its motion is predicted from the measured wrench."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ MEASURES = (
 
 
 def read(folder: Path | None = None) -> list[Case]:
-    """All pushes, two cases for each layout: the pushes with an even number, to fit to, and the others."""
+    """Read all pushes, two cases for each layout: the pushes with an even number, to fit to, and the others."""
     motion = ["fx_N", "fy_N", "tau_Nm", "dx_m", "dy_m", "dtheta_rad"]
     pushes = read_table("pushes", ["push", *motion], ["config", "surface"], folder=folder)
     feet = read_table(
@@ -65,17 +65,18 @@ def read(folder: Path | None = None) -> list[Case]:
 
 
 def is_training(case: Case) -> bool:
-    """The pushes with an even number are there to fit to, the odd ones to be predicted."""
+    """Return True for cases to fit to: the pushes with an even number; the odd ones are predicted."""
     return case.group == "0"
 
 
 def errors(case: Case, answer: np.ndarray) -> np.ndarray:
-    """Angle of each push [deg], `[M, 1]`."""
+    """Return the angle of each push [deg], `[M, 1]`."""
     return angles(answer, case.answer, LENGTH)[:, None]
 
 
 def published(folder: Path | None = None) -> dict[str, dict[str, float]]:
-    """What the authors recorded: method -> board -> mean angle [deg] on held-out pushes after a fit to 30 others.
+    """Return the errors that the authors recorded: method -> board -> mean angle [deg] on held-out pushes after a fit
+    to 30 others.
 
     Means over 15 random splits of each layout on feet, so not over the pushes that are the test here.
     """
@@ -92,5 +93,5 @@ def published(folder: Path | None = None) -> dict[str, dict[str, float]]:
 
 
 def shape(question: PushQuestion) -> tuple[int, ...]:
-    """Shape of an answer."""
+    """Return the shape of an answer."""
     return question.wrenches.shape

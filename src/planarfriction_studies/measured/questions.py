@@ -15,7 +15,8 @@ FIRST_POSES = 8
 
 @dataclass(frozen=True, eq=False)
 class SlideQuestion:
-    """Where does a body that slides freely on a level table go? Answer: its poses `[T, 3]` at `time`, world axes.
+    """Question of a free slide on a level table: the path of the body. Answer: its poses `[T, 3]` at `time`, world
+    axes.
 
     The first poses are measured; the model predicts the rest.
     """
@@ -37,7 +38,8 @@ class SlideQuestion:
 
 @dataclass(frozen=True, eq=False)
 class PushQuestion:
-    """Which way does an object move when it is pushed slowly? Answer: a twist `[M, 3]` for each wrench, of any length.
+    """Question of slow pushes: the motion of the pushed object. Answer: a twist `[M, 3]` for each wrench, of any
+    length.
 
     Twists `(vx, vy, omega)` and wrenches `(fx, fy, tau)` are about the centre of mass, in the axes of the object.
     """
@@ -63,7 +65,7 @@ class SeriesQuestion:
     given: np.ndarray
     """Wrenches of the pusher on the object [N, N, N m], or twists of the object [m/s, m/s, rad/s], `[T, 3]`."""
     wanted: Literal["twists", "wrenches"]
-    """Which of the two the model must predict; wrenches are those of the pusher, friction is their negative."""
+    """Quantity that the model must predict; wrenches are those of the pusher, friction is their negative."""
     patch: ContactPatch
     """The feet with their shares of the load."""
     normal_force: float

@@ -1,4 +1,4 @@
-"""Measured pushes followed from their start: the path of the pusher is known, where does the object end?
+"""Measured pushes replayed from their start: the end of the object is predicted from the path of the pusher.
 
 The pushes are those of the tasks `pushes` and `series`; nothing of a limit surface is fitted. What belongs to the
 pusher comes from the measured places and forces: the friction between pusher and object is the median ratio of the two
@@ -51,24 +51,25 @@ class ReplayedPush(NamedTuple):
     mu: float
     """Friction between pusher and object [-]."""
     path: Signal
-    """Of the pusher `[K, 2]` [m]."""
+    """Path of the pusher `[K, 2]` [m]."""
     start: np.ndarray
     """First pose `[3]` [m, m, rad]."""
     end: np.ndarray
     """Last measured pose `[3]` [m, m, rad]."""
 
     def by(self, make: Callable[[ContactPatch], LimitSurface], samples: int = 2) -> Push:
-        """The same push as it goes with a limit surface of the patch."""
+        """Replay the push with a limit surface of the patch."""
         slider = Slider(make(self.patch), self.outline)
         return push(slider, Pusher(self.mu), self.path, start=self.start, samples=samples, rtol=RTOL)
 
     def error(self, end: np.ndarray) -> np.ndarray:
-        """Distance [m] and angle [rad] of a pose from the measured end `[2]`."""
+        """Return the distance [m] and angle [rad] of a pose from the measured end `[2]`."""
         return np.array([np.hypot(*(end - self.end)[:2]), abs(end[2] - self.end[2])])
 
 
 def single_pushes(folder: Path | None = None) -> list[ReplayedPush]:
-    """The 250 single pushes with an odd number; those with an even one say how far off the edges their places are."""
+    """Read the 250 single pushes with an odd number; those with an even one give the offset of the places from the
+    edges."""
     places = ["px0_m", "py0_m", "px1_m", "py1_m"]
     table = read_table("pushes", ["push", "dx_m", "dy_m", "dtheta_rad", *places], ["config"], folder=folder)
     cases = {case.question.layout: (case.question.patch, case.board) for case in pushes.read(folder)}
@@ -94,7 +95,7 @@ def single_pushes(folder: Path | None = None) -> list[ReplayedPush]:
 
 
 def pushes_in_time(folder: Path | None = None) -> list[ReplayedPush]:
-    """The pushes of the wooden triangle on three outer feet, from where it begins to slide to where it ends."""
+    """Read the pushes of the wooden triangle on three outer feet, from where it begins to slide to where it ends."""
     columns = ["push_id", "t_s", "x_m", "y_m", "yaw_rad", "px_m", "py_m", "sliding", "edge"]
     table, patch, edges = read_table("series", columns, ["run"], folder=folder), push_series.feet(), _slider(WOODEN)
     found = []
@@ -119,7 +120,7 @@ def pushes_in_time(folder: Path | None = None) -> list[ReplayedPush]:
 
 
 def errors(pushes_replayed: Sequence[ReplayedPush], make: Callable[[ContactPatch], LimitSurface]) -> np.ndarray:
-    """Distances [m] and angles [rad] between the ends with a limit surface and the measured ones `[N, 2]`."""
+    """Return distances [m] and angles [rad] between the ends with a limit surface and the measured ones `[N, 2]`."""
     made: dict[int, LimitSurface] = {}
     for each in pushes_replayed:
         if id(each.patch) not in made:
@@ -128,5 +129,5 @@ def errors(pushes_replayed: Sequence[ReplayedPush], make: Callable[[ContactPatch
 
 
 def _slider(outline: np.ndarray) -> Slider:
-    """An outline with its edges; its surface plays no part."""
+    """Return an outline with its edges; its surface plays no part."""
     return Slider(LimitSurfaceEllipsoid(ContactPatch.points(outline)), outline)

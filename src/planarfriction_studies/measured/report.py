@@ -1,4 +1,4 @@
-"""What a comparison says: tables for people, and everything as plain data."""
+"""Report of a comparison: tables for people, and everything as plain data."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ REFERENCE = "exact surface"
 
 
 def table(benchmark: Benchmark, task: str) -> tuple[list[str], list[list[str]]]:
-    """Headings and rows: one model a row, each measure with its 95 % interval."""
+    """Return headings and rows: one model a row, each measure with its 95 % interval."""
     measures, results = TASKS[task].measures, benchmark.results[task]
     headings = ["model", *(measure.heading for measure in measures)]
     rows = []
@@ -31,7 +31,7 @@ def _cell(score: Score) -> str:
 
 
 def differences(benchmark: Benchmark, task: str, reference: str) -> dict[str, dict[str, tuple[float, float, float]]]:
-    """Model -> measure -> its value minus that of `reference`, with the ends of the 95 % interval of that.
+    """Return by model and measure its value minus that of `reference`, with the ends of the 95 % interval of that.
 
     The same drawings for both: what all models find hard does not blur their difference.
     """
@@ -53,7 +53,7 @@ def differences(benchmark: Benchmark, task: str, reference: str) -> dict[str, di
 
 
 def to_dict(benchmark: Benchmark) -> dict[str, Any]:
-    """Everything as plain data: scores, what was fitted, the errors of every test case."""
+    """Return everything as plain data: scores, fitted numbers, the errors of every test case."""
     tasks = {}
     for name, results in benchmark.results.items():
         cases = benchmark.test(name)

@@ -21,33 +21,35 @@ class Measure(NamedTuple):
     total: Callable[..., Any]
     """`rms` or `mean`."""
     board: str = ""
-    """Which cases count: those of this board; all where it is empty."""
+    """Board whose cases count; all cases if empty."""
 
 
 def rms(values: np.ndarray, weights: np.ndarray | None = None) -> Any:
-    """Root mean square of values `[N]`, with weights `[..., N]`."""
+    """Return the root mean square of values `[N]`, with weights `[..., N]`."""
     return np.sqrt(mean(np.square(values), weights))
 
 
 def mean(values: np.ndarray, weights: np.ndarray | None = None) -> Any:
-    """Mean of values `[N]`, with weights `[..., N]`."""
+    """Return the mean of values `[N]`, with weights `[..., N]`."""
     return np.mean(values) if weights is None else weights @ values / weights.sum(axis=-1)
 
 
 def angles(first: np.ndarray, second: np.ndarray, length: float) -> np.ndarray:
-    """Angles [deg] between vectors `(x, y, length z)` of rows `[M, 3]`; a row of zeros is 90 deg off everything."""
+    """Return angles [deg] between vectors `(x, y, length z)` of rows `[M, 3]`; a row of zeros is 90 deg off
+    everything."""
     a, b = first * [1.0, 1.0, length], second * [1.0, 1.0, length]
     return np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b), axis=1), np.einsum("mi,mi->m", a, b)))
 
 
 def drawings(groups: Sequence[str], seed: int) -> np.ndarray:
-    """How often each of N cases is drawn, `[SAMPLES, N]`, when whole groups are drawn with replacement."""
+    """Draw bootstrap samples: counts of each of N cases, `[SAMPLES, N]`, when whole groups are drawn with
+    replacement."""
     names, which = np.unique(np.asarray(groups), return_inverse=True)
     drawn = np.random.default_rng(seed).multinomial(len(names), np.full(len(names), 1 / len(names)), size=SAMPLES)
     return drawn[:, which].astype(float)
 
 
 def interval(values: np.ndarray) -> tuple[float, float]:
-    """The middle 95 % of drawings."""
+    """Return the middle 95 % of drawings."""
     low, high = np.percentile(values, [2.5, 97.5])
     return float(low), float(high)

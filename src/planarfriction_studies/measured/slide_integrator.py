@@ -29,7 +29,8 @@ The second argument are numbers of each slide's own, `[K, P]`, the columns of it
 
 
 def integrate(friction: Friction, starts: np.ndarray, time: np.ndarray, radius_squared: float) -> np.ndarray:
-    """Poses `[K, T, 3]` at `time` `[T]` from 0 of slides from `starts` `[K, 6 + P]`: pose, twist, numbers of their own.
+    """Integrate slides: poses `[K, T, 3]` at `time` `[T]` from 0 from `starts` `[K, 6 + P]`: pose, twist, numbers of
+    their own.
 
     `radius_squared` is the inertia over the mass [m^2]. The fourth order method of Runge and Kutta; a body whose last
     step would turn it round stops where its deceleration ends.
@@ -71,7 +72,7 @@ def integrate(friction: Friction, starts: np.ndarray, time: np.ndarray, radius_s
 
 
 def _between(states: np.ndarray, step: float, time: np.ndarray) -> np.ndarray:
-    """Poses `[K, T, 3]` by the cubic through the poses and twists of `states` `[steps + 1, K, 6]`."""
+    """Interpolate poses `[K, T, 3]` by the cubic through the poses and twists of `states` `[steps + 1, K, 6]`."""
     left = np.clip((time / step).astype(int), 0, len(states) - 2)
     share = (time / step - left)[:, None, None]
     rest = 1.0 - share
@@ -81,7 +82,7 @@ def _between(states: np.ndarray, step: float, time: np.ndarray) -> np.ndarray:
 
 
 def parabolas(questions: Sequence[SlideQuestion]) -> np.ndarray:
-    """Starts `[K, 6]`: pose and velocity at the first sample of a parabola through the first poses."""
+    """Return starts `[K, 6]`: pose and velocity at the first sample of a parabola through the first poses."""
     found = []
     for question in questions:
         fit = np.polynomial.polynomial.polyfit(question.time[:FIRST_POSES], question.first, 2)
@@ -90,7 +91,8 @@ def parabolas(questions: Sequence[SlideQuestion]) -> np.ndarray:
 
 
 def starts(friction: Friction, questions: Sequence[SlideQuestion], radius_squared: float) -> np.ndarray:
-    """Starts `[K, 6]` with which the slides go through their first poses best: least squares over pose and twist.
+    """Return starts `[K, 6]` with which the slides go through their first poses best: least squares over pose and
+    twist.
 
     An angle counts as its way at the radius of gyration.
     """
@@ -110,7 +112,7 @@ def starts(friction: Friction, questions: Sequence[SlideQuestion], radius_square
 
 
 def slides(friction: Friction, questions: Sequence[SlideQuestion]) -> list[np.ndarray]:
-    """Poses `[T, 3]` of each slide at its own times, from its first poses.
+    """Return poses `[T, 3]` of each slide at its own times, from its first poses.
 
     The samples of all slides are taken to be equally far apart.
     """

@@ -1,4 +1,4 @@
-"""Free slides of a cube that was tossed on a table: from its first poses, where does it go and where does it end?"""
+"""Free slides of a cube that was tossed on a table: its path and end are predicted from its first poses."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ MEASURES = (
 
 @lru_cache(maxsize=1)
 def face() -> ContactPatch:
-    """The face of the cube, uniform pressure."""
+    """Return the face of the cube, uniform pressure."""
     return ContactPatch.rectangle(SIDE, cells=CELLS, name="face of the cube")
 
 
 def read(folder: Path | None = None) -> list[Case]:
-    """All slides; cases with one `group` are turned copies of one toss."""
+    """Read all slides; cases with one `group` are turned copies of one toss."""
     pose = ["x_m", "y_m", "yaw_rad"]
     table = read_table("slides", ["toss", "unique_id", "t_s", *pose], folder=folder)
     cases = []
@@ -51,23 +51,23 @@ def read(folder: Path | None = None) -> list[Case]:
 
 
 def is_training(case: Case) -> bool:
-    """The tosses whose unique_id is a multiple of 4 are there to fit to, the others to be predicted."""
+    """Return True for cases to fit to: the tosses whose unique_id is a multiple of 4; the others are predicted."""
     return int(case.group) % 4 == 0
 
 
 def errors(case: Case, answer: np.ndarray) -> np.ndarray:
-    """One row: RMS position [mm] and yaw [deg] over the samples, then both at the last one, `[1, 4]`."""
+    """Return one row: RMS position [mm] and yaw [deg] over the samples, then both at the last one, `[1, 4]`."""
     off = answer - case.answer
     position, yaw = 1e3 * np.hypot(off[:, 0], off[:, 1]), np.degrees(np.abs(off[:, 2]))
     return np.array([[rms(position), rms(yaw), position[-1], yaw[-1]]])
 
 
 def shape(question: SlideQuestion) -> tuple[int, ...]:
-    """Shape of an answer."""
+    """Return the shape of an answer."""
     return (len(question.time), 3)
 
 
 def by_spin(cases: Sequence[Case], count: int) -> list[Case]:
-    """`count` slides from the median turn to the largest, to draw."""
+    """Return `count` slides from the median turn to the largest, to draw."""
     turned = sorted(cases, key=lambda case: abs(case.answer[-1, 2] - case.answer[0, 2]))
     return [turned[i] for i in np.linspace(len(turned) // 2, len(turned) - 1, count).astype(int)]

@@ -19,7 +19,7 @@ WAY, SEGMENTS = 1e-3, 4
 
 
 def follow(model: Any, time: np.ndarray, twists: np.ndarray, load: float) -> np.ndarray:
-    """Friction wrenches `[T, 3]` of a model that is moved from rest with the measured twists `[T, 3]`."""
+    """Return the friction wrenches `[T, 3]` of a model that is moved from rest with the measured twists `[T, 3]`."""
     state, wrenches = model.rest(), np.zeros_like(twists)
     for i in range(1, len(time)):
         state, wrenches[i] = model.step(state, 0.5 * (twists[i - 1] + twists[i]), load, float(time[i] - time[i - 1]))
@@ -27,7 +27,8 @@ def follow(model: Any, time: np.ndarray, twists: np.ndarray, load: float) -> np.
 
 
 def steady(model: Any, twists: np.ndarray, length: float) -> np.ndarray:
-    """Directions `(fx, fy, tau/length)` of the friction of steady motions along twists `[K, 3]` of unit speed."""
+    """Return directions `(fx, fy, tau/length)` of the friction of steady motions along twists `[K, 3]` of unit
+    speed."""
     state, wrenches = np.zeros((len(twists), *model.rest().shape)), np.zeros_like(twists)
     for _ in range(SEGMENTS):
         state, wrenches = model.step(state, twists, 1.0, WAY / SEGMENTS)
@@ -35,7 +36,7 @@ def steady(model: Any, twists: np.ndarray, length: float) -> np.ndarray:
 
 
 def twists_of(model: Any, friction: np.ndarray) -> np.ndarray:
-    """Twists `[M, 3]` whose steady friction has the directions of `friction` `[M, 3]`, by search."""
+    """Return twists `[M, 3]` whose steady friction has the directions of `friction` `[M, 3]`, by search."""
     length = float(model.patch.contact_radius())
     wanted, back = unit(friction / [1.0, 1.0, length]), np.array([1.0, 1.0, 1.0 / length])
     tried = directions(DIRECTIONS)
@@ -52,6 +53,6 @@ def twists_of(model: Any, friction: np.ndarray) -> np.ndarray:
 
 
 def unit(vectors: np.ndarray) -> np.ndarray:
-    """Vectors `[..., 3]` at length 1; zeros stay."""
+    """Scale vectors `[..., 3]` to length 1; zeros stay."""
     size = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return np.divide(vectors, size, out=np.zeros_like(vectors), where=size > 0.0)

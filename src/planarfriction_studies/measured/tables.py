@@ -19,18 +19,18 @@ TABLES = {
     "published": "zhou_icra16_published_errors.csv",
     "series": "mlab_pushes.csv.gz",
 }
-"""What the tables are called, and their files."""
+"""Files of the tables by name."""
 
 
 def shipped() -> Any:
-    """The folder of the tables inside the package, with their NOTICE."""
+    """Return the folder of the tables inside the package, with their NOTICE."""
     return importlib.resources.files("planarfriction_studies.measured") / "data"
 
 
 def read_table(
     name: str, numbers: Sequence[str], words: Sequence[str] = (), *, folder: Path | None = None, optional=()
 ) -> Any:  # a pandas.DataFrame, whose type no checker follows
-    """Columns of the table `name`: `numbers` as finite numbers (but for those of `optional`), `words` as they are.
+    """Read columns of the table `name`: `numbers` as finite numbers (but for those of `optional`), `words` as they are.
 
     Raises FileError in one line that names the file, and the column and row that are wrong.
     """
@@ -59,5 +59,5 @@ def read_table(
 
 
 def refuse(name: str, folder: Path | None, what: str) -> FileError:
-    """An error about the table `name`."""
+    """Return an error about the table `name`."""
     return FileError(f"{(shipped() if folder is None else Path(folder)) / TABLES[name]}: {what}")

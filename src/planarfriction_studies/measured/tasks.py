@@ -22,7 +22,7 @@ class Task(NamedTuple):
     read: Callable[[Path | None], list[Case]]
     """All cases, from the tables of the package or of a folder."""
     is_training: Callable[[Case], bool]
-    """Whether a case is there to fit to: the split is fixed, by number."""
+    """Function that returns True for cases to fit to: the split is fixed, by number."""
     errors: Callable[[Case, np.ndarray], np.ndarray]
     """Errors `[rows, columns]` of an answer to a case."""
     shape: Callable[[Any], tuple[int, ...]]

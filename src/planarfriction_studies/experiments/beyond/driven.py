@@ -22,7 +22,7 @@ MODELS = {
 """Model of the ladder -> its name in the report."""
 
 STATISTICS = ("median", "third quartile", "maximum")
-"""What is shown of the errors over a run, of force and of torque."""
+"""Statistics of the errors over a run, of force and of torque."""
 
 PARTS = (1, 4, 6)
 """Parts whose steps are timed."""
@@ -38,7 +38,7 @@ Errors = dict[str, dict[str, dict[str, float]]]
 
 
 def driven_errors(rows: list[Row]) -> Errors:
-    """The rows of the velocity-driven runs by shape and model."""
+    """Return the rows of the velocity-driven runs by shape and model."""
     result: Errors = {}
     for row in rows:
         before, _, shape = row.case.partition(", ")
@@ -48,13 +48,13 @@ def driven_errors(rows: list[Row]) -> Errors:
 
 
 def ratios(errors: Errors, model: str = "reduced", over: str = "published") -> dict[str, dict[str, float]]:
-    """Error of a model of the ladder over that of another, by shape and statistic, force and torque."""
+    """Return the error of a model of the ladder over that of another, by shape and statistic, force and torque."""
     names = [f"{before}{name}" for before in ("", "torque ") for name in STATISTICS]
     return {shape: {name: each[model][name] / each[over][name] for name in names} for shape, each in errors.items()}
 
 
 def step_costs(shape: str = "Circle") -> dict[str, Any]:
-    """Times of a step in a compiled loop [s] by reduced model, one of each round in which all take part."""
+    """Return times of a step in a compiled loop [s] by reduced model, one of each round in which all take part."""
     from planarfriction.derivatives import rollout
 
     patch = PUBLISHED_PATCHES[shape]()
@@ -73,7 +73,8 @@ def step_costs(shape: str = "Circle") -> dict[str, Any]:
 
 
 def step_numbers(times: Arrays) -> dict[str, dict[str, list[float]]]:
-    """Median and quartiles of the time of a step [s], and of its ratio to the published model's in the same round."""
+    """Return the median and quartiles of the time of a step [s], and of its ratio to the published model's in the same
+    round."""
     return {
         name: {"time": median_and_quartiles(each), "ratio": median_and_quartiles(each / times["published"])}
         for name, each in times.items()
@@ -81,12 +82,13 @@ def step_numbers(times: Arrays) -> dict[str, dict[str, list[float]]]:
 
 
 def median_and_quartiles(values: Any) -> list[float]:
-    """Median, first and third quartile."""
+    """Return the median, first and third quartile."""
     return np.percentile(values, [50.0, 25.0, 75.0]).tolist()
 
 
 def spin_up(shape: str) -> dict[str, float]:
-    """Largest error of the torque [N m] of a spin from rest until the patch slides, from its own cells, by model."""
+    """Return the largest error of the torque [N m] of a spin from rest until the patch slides, from its own cells, by
+    model."""
     patch = PUBLISHED_PATCHES[shape]()
     models: dict[str, Any] = {"published": ReducedModelPublished(patch, LAW)}
     models |= {name_of_parts(parts): ReducedModel(patch, LAW, parts=parts) for parts in (1, AUTO)}
@@ -96,7 +98,7 @@ def spin_up(shape: str) -> dict[str, float]:
 
 
 def _spun(model: Any, dt: float) -> np.ndarray:
-    """Torque [N m] of a spin from rest, step by step."""
+    """Return the torque [N m] of a spin from rest, step by step."""
     state, torques = model.rest(), np.empty(SPIN_STEPS)
     for i in range(SPIN_STEPS):
         state, wrench = model.step(state, (0.0, 0.0, SPIN), 1.0, dt)

@@ -23,7 +23,7 @@ MODEL_COLOURS = dict(zip(MODELS, (looks.REDUCED, looks.MOMENTS, looks.PARTS, loo
 
 
 def surface_errors(errors: dict[str, Arrays]) -> PlotFigure:
-    """Errors of force [N] and torque [N mm] of each kind of surface from the exact one."""
+    """Draw errors of force [N] and torque [N mm] of each kind of surface from the exact one."""
     figure = new_figure(9.6, 6.8)
     panels: Any = figure.subplots(2, 1, sharex=True)
     for axes, (quantity, factor, label) in zip(
@@ -47,7 +47,7 @@ def surface_errors(errors: dict[str, Arrays]) -> PlotFigure:
 
 
 def staircase(stairs: Arrays) -> PlotFigure:
-    """Torque [N mm] and force [N] of a spin over its centre [mm], summed and exact, for line and disc."""
+    """Draw the torque [N mm] and force [N] of a spin over its centre [mm], summed and exact, for line and disc."""
     figure = new_figure(9.6, 6.0)
     panels: Any = figure.subplots(2, 2, sharex=True)
     place = 1e3 * stairs["place"]
@@ -73,7 +73,7 @@ def staircase(stairs: Arrays) -> PlotFigure:
 
 
 def driven_boxes(errors: Errors) -> PlotFigure:
-    """Errors of force [mN] and torque [N mm] of the models, from the finer grid."""
+    """Draw errors of force [mN] and torque [N mm] of the models, from the finer grid."""
     figure = new_figure(9.6, 7.0)
     panels: Any = figure.subplots(2, 1, sharex=True)
     rows = (("", 1e3, "error of the force [mN]", 1e-2), ("torque ", 1e3, "error of the torque [N mm]", 1e-4))
@@ -94,7 +94,7 @@ def driven_boxes(errors: Errors) -> PlotFigure:
 
 
 def grooves(numbers: dict[str, Any]) -> PlotFigure:
-    """Drift of the grooved block [deg] over the slope [deg], simulated and in closed form."""
+    """Draw the drift of the grooved block [deg] over the slope [deg], simulated and in closed form."""
     figure = new_figure(5.4, 3.6)
     axes: Any = figure.subplots()
     slopes = np.array(numbers["slope"])

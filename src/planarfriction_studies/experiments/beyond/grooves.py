@@ -23,19 +23,19 @@ LAW = LuGre(mu_c=0.5, mu_s=0.5, sigma_0=1e5, sigma_1=200.0, sigma_2=0.0, elasto_
 MODELS = ("distributed", "ReducedModel", "published reduced, LimitSurfaceTable")
 
 SLOPES = (22.0, 25.0, 30.0, 40.0, 50.0, 60.0)
-"""Of the incline [deg]."""
+"""Slopes of the incline [deg]."""
 
 MASS, BLOCK, SLIDE = 0.4, (0.06, 0.04), 0.55
 """Mass [kg] and sides [m] of the block, and for how long it slides [s]."""
 
 
 def metric() -> np.ndarray:
-    """Friction metric `[2, 2]` of the grooved sole."""
+    """Return the friction metric `[2, 2]` of the grooved sole."""
     return friction_metric(GRAIN["angle"], GRAIN["along"], GRAIN["across"])
 
 
 def closed_drift(slope: float) -> float:
-    """Angle [rad] from the fall line in which a block slides from rest down an incline of `slope` [rad].
+    """Return the angle [rad] from the fall line in which a block slides from rest down an incline of `slope` [rad].
 
     With M the metric, d the fall line and e the direction: `e x (tan(slope) d - mu M e/sqrt(e'Me)) = 0`.
     """
@@ -53,7 +53,7 @@ def closed_drift(slope: float) -> float:
 
 
 def slid(slope: float, model: Any) -> float:
-    """Angle [rad] from the fall line to where the block went, simulated with bristles."""
+    """Return the angle [rad] from the fall line to where the block went, simulated with bristles."""
     body = Body(MASS, MASS / 12.0 * (BLOCK[0] ** 2 + BLOCK[1] ** 2), gravity=(0.0, -GRAVITY * np.sin(slope)))
     sole = Contact(model, MASS * GRAVITY * np.cos(slope), mounted_on="body", name="sole")
     end = columns(simulate(Scene(body, [sole], SLIDE, name="grooves"), rtol=1e-7, atol=1e-5))
@@ -61,7 +61,7 @@ def slid(slope: float, model: Any) -> float:
 
 
 def grooves(quick: bool) -> dict[str, Any]:
-    """Drift [rad] over the slope [rad], simulated with every model of `MODELS` and in closed form."""
+    """Return the drift [rad] over the slope [rad], simulated with every model of `MODELS` and in closed form."""
     slopes = np.radians(SLOPES[1:4:2] if quick else SLOPES)
     patch = ContactPatch.rectangle(*BLOCK, 15).with_friction_metric(metric())
     table = ReducedModelPublished(patch, LAW, surface=LimitSurfaceTable(patch))
@@ -75,7 +75,7 @@ def grooves(quick: bool) -> dict[str, Any]:
 
 
 def comparisons(found: dict[str, Any]) -> list[Comparison]:
-    """Directions of drift beside the closed form."""
+    """Compare directions of drift with the closed form."""
     cause = "The bristles bend before they slide: a way of micrometres, in the direction of the pull."
     return [
         compare(

@@ -27,24 +27,25 @@ the difference between holding and slipping."""
 
 
 def depends_on_friction(each: dict[str, float]) -> bool:
-    """Whether the distances of a run are measured in units of friction."""
+    """Return True if the distances of a run are measured in units of friction."""
     return SHIFTS[0] < each[SHIFT] < SHIFTS[1]
 
 
 def cases_of(shape: str) -> tuple[Case, ...]:
-    """The in-hand runs of a shape."""
+    """Return the in-hand runs of a shape."""
     return tuple(case for case in CASES if case.shape == shape)
 
 
 def friction_shift(case: Case) -> float:
-    """Distance [m] by which 0.1 % more and 0.1 % less friction move the end of the distributed model, their mean."""
+    """Return the distance [m] by which 0.1 % more and 0.1 % less friction move the end of the distributed model, their
+    mean."""
     base = columns(simulate(case.scene("d"), **FINE))
     changed = (columns(simulate(case.scene("d", with_friction(s * FRICTION_CHANGE)), **FINE)) for s in (1.0, -1.0))
     return 0.5 * sum(end_distance(run, base) for run in changed)
 
 
 def end_distances(rows: list[Row], shifts: dict[str, float]) -> dict[str, dict[str, float]]:
-    """By case: distance of the end [m] from the distributed model's by model, and the shift by friction."""
+    """Return by case the distance of the end [m] from the distributed model's by model, and the shift by friction."""
     result: dict[str, dict[str, float]] = {}
     for row in rows:
         if "end" in row.errors and row.model != "full":
@@ -53,6 +54,6 @@ def end_distances(rows: list[Row], shifts: dict[str, float]) -> dict[str, dict[s
 
 
 def score(ends: dict[str, dict[str, float]], load: int, model: str = "reduced") -> dict[str, Any]:
-    """In how many runs under a load a model ends nearer than the published one, and the ratios."""
+    """Count the runs under a load in which a model ends nearer than the published one, and compute the ratios."""
     ratios = {case: each[model] / each["published"] for case, each in ends.items() if case.endswith(f"load {load}")}
     return {"runs": len(ratios), "nearer": sum(ratio < 1.0 for ratio in ratios.values()), "ratios": ratios}

@@ -63,7 +63,7 @@ class Row:
 
 
 def shape_of(case: str) -> str:
-    """The patch of a case in words."""
+    """Return the patch of a case in words."""
     if case.startswith("driven, "):
         return IN_WORDS[case.removeprefix("driven, ")]
     return case.rpartition(", load")[0].removesuffix(", far placement")
@@ -71,7 +71,8 @@ def shape_of(case: str) -> str:
 
 @functools.lru_cache(maxsize=8)
 def models(shape: str) -> dict[str, Any]:
-    """The models of a published patch by name, each number of cells once; kept, for fitting few cells takes seconds.
+    """Return the models of a published patch by name, each number of cells once; kept, for fitting few cells takes
+    seconds.
 
     `AUTO` is one of the others by another name, where its number of parts is among `PARTS`.
     """
@@ -96,12 +97,12 @@ def models(shape: str) -> dict[str, Any]:
 
 
 def name_of_parts(parts: Any) -> str:
-    """Name of `ReducedModel` with so many parts, or with `AUTO`."""
+    """Return the name of `ReducedModel` with so many parts, or with `AUTO`."""
     return {1: "reduced", AUTO: AUTO}.get(parts, f"{parts} parts")
 
 
 def scenes_of(shape: str) -> dict[str, Callable[[Any], Scene]]:
-    """What makes the scene of each run of a shape from a model, by case."""
+    """Return functions that make the scene of each run of a shape from a model, by case."""
     result: dict[str, Callable[[Any], Scene]] = {}
     for case in CASES:
         if case.shape == shape:
@@ -114,7 +115,7 @@ def scenes_of(shape: str) -> dict[str, Callable[[Any], Scene]]:
 
 
 def in_hand_rows(cases: tuple[Case, ...] = CASES) -> list[Row]:
-    """Every model in every in-hand run, against the full distributed model of the same grid."""
+    """Run every model in every in-hand run, against the full distributed model of the same grid."""
     rows = []
     for case in cases:
         scene = scenes_of(case.shape)[case.words]
@@ -128,14 +129,15 @@ def in_hand_rows(cases: tuple[Case, ...] = CASES) -> list[Row]:
 
 
 def reference(patch: ContactPatch) -> ContactPatch:
-    """The patch with each cell cut along its sides into an odd number of parts, as many as `REFERENCE_CELLS` allow."""
+    """Return the patch with each cell cut along its sides into an odd number of parts, as many as `REFERENCE_CELLS`
+    allow."""
     sides = int((patch.cell_extents() > 0.0).any(axis=0).sum())
     most = (REFERENCE_CELLS / patch.cells) ** (1.0 / sides)
     return patch.refined(int(np.clip((int(most) - 1) // 2 * 2 + 1, LEAST_PARTS, MOST_PARTS)))
 
 
 def driven_rows(shapes: tuple[str, ...] = SIX_SHAPES) -> list[Row]:
-    """Every model in the velocity-driven runs, against the distributed model of a finer grid."""
+    """Run every model in the velocity-driven runs, against the distributed model of a finer grid."""
     rows = []
     for shape in shapes:
         patch = PUBLISHED_PATCHES[shape]()
@@ -165,7 +167,7 @@ def run_times(shape: str) -> dict[str, dict[str, float]]:
 
 
 def _time(scene: Scene) -> float:
-    """Least time in the solver [s] of a few runs: other work beside them only ever adds to it."""
+    """Return the least time in the solver [s] of a few runs: other work beside them only ever adds to it."""
     simulate(scene, t_end=SHORT)
     first = simulate(scene).statistics.wall_time
     return min([first, *(simulate(scene).statistics.wall_time for _ in range(REPEATS * (first < LONG)))])

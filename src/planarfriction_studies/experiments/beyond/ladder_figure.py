@@ -23,7 +23,7 @@ class Family:
     colour: str
     marker: str
     place: tuple[int, int] = (5, 4)
-    """Of those words from the marker [points]."""
+    """Offset of the words from the marker [points]."""
 
 
 FAMILIES = (
@@ -43,7 +43,7 @@ COLUMNS = (
     ("load 2", "end", "in hand, load 2 (slips at once)", "distance of the end [mm]"),
     ("load 1", "end", "in hand, load 1 (barely slips)", "distance of the end [mm]"),
 )
-"""What the cases of a column have in their name, the error that is shown, its title, and its axis [thousandths]."""
+"""Columns: part of the name of their cases, the error that is shown, its title, and its axis [thousandths]."""
 
 FLOOR = 1e-4
 """Smallest error that is drawn [mN, mm]."""
@@ -52,7 +52,7 @@ TICKS = (0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10)
 
 
 def draw_ladder(rows: list[Row]) -> PlotFigure:
-    """Error over the time of a run: patches of many cells above, of few below; velocity-driven and in hand."""
+    """Draw the error over the time of a run: patches of many cells above, of few below; velocity-driven and in hand."""
     from matplotlib.ticker import FixedLocator, NullLocator
 
     many = {shape_of(row.case) for row in rows if row.model == "degree 5"}
@@ -82,7 +82,8 @@ def draw_ladder(rows: list[Row]) -> PlotFigure:
 
 
 def _draw_family(axes: Any, family: Family, rows: list[Row], quantity: str) -> None:
-    """Medians joined by a line, bars from the smallest to the largest; the reference, which has no error, dotted."""
+    """Draw medians joined by a line, and bars from the smallest to the largest; the reference, which has no error,
+    dotted."""
     medians = []
     for model, words in family.rungs.items():
         found = [row for row in rows if row.model == model]

@@ -19,7 +19,7 @@ LOADS = (0.83, 1.37)
 
 
 def load_family(quick: bool) -> dict[str, float]:
-    """How many maps the model builds in the in-hand run (k = 2 f_N), and what blending them costs in accuracy.
+    """Compute the number of maps that the model builds in the in-hand run (k = 2 f_N), and the error of blending them.
 
     That is the largest distance of steady wrenches at 1 N [N, N m] from a model that builds a map at every load (at
     few loads, for it is slow).
@@ -38,7 +38,7 @@ def load_family(quick: bool) -> dict[str, float]:
 
 
 def _steady_apart(model: Any, rebuilt: Any, load: float) -> np.ndarray:
-    """Largest difference `[3]` of steady wrenches at 1 N between two models at a load [N]."""
+    """Return the largest difference `[3]` of steady wrenches at 1 N between two models at a load [N]."""
     generator = np.random.default_rng(3)
     twists = generator.normal(size=(200, 3)) * [1.0, 1.0, 150.0] * 10.0 ** generator.uniform(-4.0, -1.5, (200, 1))
     wrenches = [each.step(np.zeros((200, 3)), twists, load, 10.0)[1] for each in (model, rebuilt)]

@@ -1,4 +1,4 @@
-"""How far each model turns a disc under a torque that friction holds."""
+"""Plateaus: the angle by which each model turns a disc under a torque that friction holds."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from planarfriction_studies.experiments.runs import LAW, columns
 MODELS = {"distributed": DistributedModel, "published reduced": ReducedModelPublished, "ReducedModel": ReducedModel}
 
 SHARE = 1e-3
-"""What the plateau of `ReducedModel` may differ from the distributed model's by, as a share of it."""
+"""Tolerance of the plateau of `ReducedModel` against the distributed model's, as a share of it."""
 
 
 def plateaus() -> dict[str, float]:
-    """Angle [rad] of the published disc under a torque that friction holds, by model, and in closed form."""
+    """Return the angle [rad] of the published disc under a torque that friction holds, by model, and in closed form."""
     patch = PUBLISHED_PATCHES["Circle"](width=WIDTH)
     result = {}
     for name, model in MODELS.items():
@@ -27,7 +27,7 @@ def plateaus() -> dict[str, float]:
 
 
 def comparisons(angles: dict[str, float]) -> list[Comparison]:
-    """Plateaus beside the distributed model and the closed form."""
+    """Compare plateaus with the distributed model and the closed form."""
     stiff = (
         r"The same torsional stiffness, $\sigma_0 \langle\rho^2\rangle$; what is left is that bristles near the "
         "threshold give way."

@@ -35,7 +35,7 @@ QUICK_SHAPES = ("LineGrad", "NonConvex2")
 QUICK_TWISTS = 500
 
 FRICTION = "0.1 % of friction"
-"""What moves the end beside the models, in the figure of the ends."""
+"""Label of the friction, which moves the end as the models do, in the figure of the ends."""
 
 NEW_SHAPES, QUICK_NEW_SHAPES, QUICK_SEEDS = tuple(new_shapes.shapes()), ("three feet",), (0, 1)
 
@@ -97,7 +97,7 @@ def run(work: Work) -> Result:
 
 
 def _runs_of(shape: str) -> dict[str, Any]:
-    """A piece: every model of a shape in every run, and what friction does to the in-hand ones."""
+    """Compute a piece: every model of a shape in every run, and the effect of friction on the in-hand ones."""
     cases = in_hand.cases_of(shape)
     rows = ladder.in_hand_rows(cases) + (ladder.driven_rows((shape,)) if shape in SIX_SHAPES else [])
     runs: dict[str, dict[str, Any]] = {}

@@ -19,10 +19,10 @@ from planarfriction_studies.experiments.experiment import Table
 from planarfriction_studies.experiments.runs import LAW, at_centre_of_pressure, columns
 
 PARTS = (1, 4, AUTO)
-"""What `ReducedModel` is split into."""
+"""Numbers of parts of `ReducedModel`."""
 
 SEEDS = tuple(range(10))
-"""Of the twists."""
+"""Seeds of the twists."""
 
 T_END, DT = 2.0, 5e-3
 """End of a twist, and the time between its samples [s]; it is linear in between."""
@@ -50,7 +50,7 @@ QUANTITIES = {"force": "N", "torque": "N m"}
 
 
 def shapes() -> dict[str, Callable[[], ContactPatch]]:
-    """Patches by name: not convex, in separate places, and pressed unevenly."""
+    """Return patches by name: not convex, in separate places, and pressed unevenly."""
     return {"L": _corner, "annulus sector": _sector, "three feet": _feet, "Gaussian off centre": _gaussian}
 
 
@@ -79,7 +79,7 @@ def _gaussian() -> ContactPatch:
 
 
 def twist(seed: int) -> Signal:
-    """A smooth random twist that starts from rest: half waves of random size and phase, at a random speed."""
+    """Return a smooth random twist that starts from rest: half waves of random size and phase, at a random speed."""
     rng = np.random.default_rng([seed, 17])
     time = np.arange(0.0, T_END + 0.5 * DT, DT)
     waves = np.arange(1, WAVES + 1)[:, None, None]
@@ -90,7 +90,8 @@ def twist(seed: int) -> Signal:
 
 
 def largest_errors(shape: str, seeds: tuple[int, ...] = SEEDS) -> dict[str, np.ndarray]:
-    """Largest error of the force [N] and of the torque [N m] about the centre of pressure by model, `[twists, 2]`.
+    """Return the largest error of the force [N] and of the torque [N m] about the centre of pressure by model,
+    `[twists, 2]`.
 
     The reference is the distributed model with its cells cut finely; points stay as they are.
     """
@@ -116,7 +117,8 @@ def _wrench(model: Any, twist: Signal) -> np.ndarray:
 
 
 def ratios(errors: dict[str, np.ndarray]) -> dict[str, dict[str, list[float]]]:
-    """Largest errors of `ReducedModel` over the published model's, by model and quantity, one for each twist."""
+    """Return the largest errors of `ReducedModel` over the published model's, by model and quantity, one for each
+    twist."""
     return {
         name: {quantity: (errors[name] / errors["published"])[:, i].tolist() for i, quantity in enumerate(QUANTITIES)}
         for name in errors
@@ -125,7 +127,7 @@ def ratios(errors: dict[str, np.ndarray]) -> dict[str, dict[str, list[float]]]:
 
 
 def table(found: dict[str, dict[str, np.ndarray]]) -> Table:
-    """Largest errors over the published model's: the median twist and the worst."""
+    """Return the largest errors over the published model's: the median twist and the worst."""
     models = [name for name in next(iter(found.values())) if name != "published"]
     words = {"reduced": "1 part"}
     columns = {

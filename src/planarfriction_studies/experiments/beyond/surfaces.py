@@ -34,7 +34,7 @@ KINDS: dict[str, type[LimitSurface]] = {
     "quartic": LimitSurfaceQuartic,
     "ellipsoid": LimitSurfaceEllipsoid,
 }
-"""What stands in for the exact surface, by its name in the report."""
+"""Approximations of the exact surface, by their names in the report."""
 
 QUARTIC_SHAPES = ("Circle", "NonConvex1")
 """Shapes with a quartic: a fit takes seconds."""
@@ -50,12 +50,12 @@ STAIRS = 1501
 
 
 def has_quartic() -> bool:
-    """Whether the package that fits quartics is installed."""
+    """Return True if the package that fits quartics is installed."""
     return importlib.util.find_spec("cvxpy") is not None
 
 
 def random_twists(surface: LimitSurface, count: int) -> np.ndarray:
-    """Twists `[count, 3]` about the origin, always the same directions."""
+    """Return twists `[count, 3]` about the origin, always the same directions."""
     directions = np.random.default_rng(5).normal(size=(count, 3))
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     x, y = surface.centre_of_pressure
@@ -64,13 +64,14 @@ def random_twists(surface: LimitSurface, count: int) -> np.ndarray:
 
 
 def difference(surface: LimitSurface, exact: LimitSurface, twists: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Force [N] and torque [N m] at the exact centre of pressure between two surfaces, same twists, mu f_N = 1 N."""
+    """Return the force [N] and torque [N m] at the exact centre of pressure between two surfaces, same twists, mu f_N =
+    1 N."""
     miss = geometry.wrench_at(surface.wrench(twists) - exact.wrench(twists), exact.centre_of_pressure)
     return np.hypot(miss[:, 0], miss[:, 1]), np.abs(miss[:, 2])
 
 
 def surface_errors(shape: str, count: int) -> dict[str, Any]:
-    """By kind: force errors `[count]` [N] and torque errors `[count]` [N m] of a published patch."""
+    """Return by kind the force errors `[count]` [N] and torque errors `[count]` [N m] of a published patch."""
     patch = PUBLISHED_PATCHES[shape](width=WIDTH)
     exact = LimitSurfaceExact(patch)
     twists = random_twists(exact, count)
@@ -86,7 +87,8 @@ def surface_errors(shape: str, count: int) -> dict[str, Any]:
 
 
 def staircase(cells: int = 21) -> dict[str, Any]:
-    """Torque of unit spins [N m] of disc and line, mu f_N = 1 N, over the centre of rotation on the x or y axis [m].
+    """Return the torque of unit spins [N m] of disc and line, mu f_N = 1 N, over the centre of rotation on the x or y
+    axis [m].
 
     The centre of rotation moves along the x axis of the disc, and along the line; torque about the centre of pressure.
     """
@@ -105,7 +107,7 @@ def staircase(cells: int = 21) -> dict[str, Any]:
 
 
 def jumps(stairs: Arrays) -> dict[str, float]:
-    """Largest change of force [N] between neighbouring centres of rotation, by shape and surface."""
+    """Return the largest change of force [N] between neighbouring centres of rotation, by shape and surface."""
     return {
         name.removesuffix(", force"): float(np.abs(np.diff(values)).max())
         for name, values in stairs.items()
@@ -114,7 +116,7 @@ def jumps(stairs: Arrays) -> dict[str, float]:
 
 
 def comparisons(errors: dict[str, Arrays], stairs: Arrays) -> list[Comparison]:
-    """The exact surface beside closed forms, sums over ever finer cells, and the errors of the table."""
+    """Compare the exact surface with closed forms, sums over ever finer cells, and the errors of the table."""
     finer = f"sum over cells cut in {PARTS} along each side, mean distance to the exact surface"
     cause = "A sum converges at least in proportion to the size of its cells; the tolerance is 1.6 times that."
     sums = [

@@ -34,13 +34,13 @@ MODEL_WORDS = {
 
 
 def shown(value: float) -> str:
-    """Two digits, without an exponent where the number is easily read so."""
+    """Write a number with two digits, without an exponent where it is easily read so."""
     rounded = float(f"{value:.2g}")
     return np.format_float_positional(rounded, trim="-") if 1e-4 <= abs(rounded) < 1e5 else f"{rounded:.2g}"
 
 
 def tables(rows: list[Row], numbers: Numbers) -> tuple[Table, ...]:
-    """Surfaces, models in both kinds of runs, every combination, spin-up, costs and plateaus."""
+    """Return surfaces, models in both kinds of runs, every combination, spin-up, costs and plateaus."""
     surfaces, ends = numbers["surfaces"], numbers["in hand"]
     kinds = [kind for kind in KINDS if any(f"{kind}/force" in each for each in surfaces.values())]
     spins, steps, angles = numbers["spin-up"], numbers["step"], numbers["plateaus"]
@@ -112,7 +112,7 @@ def _by_shape(found: dict[str, Any]) -> dict[str, Any]:
 
 
 def _scaled(name: str) -> Callable[[dict[str, float]], str]:
-    """The entry `name` in thousandths of its unit."""
+    """Return the entry `name` in thousandths of its unit."""
     return lambda each: shown(1e3 * each[name])
 
 
@@ -126,7 +126,8 @@ def _ratios(ratios: dict[str, dict[str, float]], title: str) -> Table:
 
 
 def _combinations(rows: list[Row], quantity: str, run: str, factor: float, title: str) -> Table:
-    """Every model on the six shapes: one statistic of one kind of run, and what the runs cost."""
+    """Return the table of every model on the six shapes: one statistic of one kind of run, and the costs of the
+    runs."""
     chosen = [row for row in rows if run in row.case and quantity in row.errors and "far" not in row.case]
     shapes = [shape for shape in SIX_SHAPES if any(shape_of(row.case) == IN_WORDS[shape] for row in chosen)]
     result = []

@@ -1,4 +1,4 @@
-"""What the template of the experiment beyond the paper names."""
+"""Values that the template of the experiment beyond the paper names."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Numbers = dict[str, Any]
 
 
 def template_values(numbers: Numbers) -> Numbers:
-    """The names by question."""
+    """Return the values that the template names."""
     surfaces, ends, grooves = (numbers[name] for name in ("surfaces", "in hand", "grooves"))
     few = [each for each in ends.values() if "degree 5" in each]
     moved = [each for each in numbers["driven"].values() if "degree 5" in each]
@@ -63,7 +63,7 @@ def _driven(numbers: Numbers) -> Numbers:
 
 
 def _by_statistic(ratios: dict[str, dict[str, float]]) -> dict[str, dict[str, list[float]]]:
-    """Ratios of all shapes by quantity and statistic."""
+    """Return ratios of all shapes by quantity and statistic."""
     return {
         quantity: {name: [each[before + name] for each in ratios.values()] for name in STATISTICS}
         for quantity, before in (("force", ""), ("torque", "torque "))
@@ -82,7 +82,8 @@ def _unseen(ratios: Numbers) -> Numbers:
 
 
 def _score(found: Numbers) -> Numbers:
-    """In how many runs a model ends nearer than the published one, where it does not, and the ratios."""
+    """Count the runs in which a model ends nearer than the published one; return those in which it does not, and the
+    ratios."""
     ratios = found["ratios"]
     return {
         "nearer": found["nearer"],
@@ -94,6 +95,6 @@ def _score(found: Numbers) -> Numbers:
 
 
 def _friction_shares(ends: dict[str, dict[str, float]], model: str) -> tuple[float, float]:
-    """Median and largest distance of an end, as the share of friction that does the same."""
+    """Return the median and largest distance of an end, as the share of friction that does the same."""
     shares = sorted(1e-3 * each[model] / each[SHIFT] for each in ends.values() if depends_on_friction(each))
     return shares[len(shares) // 2], shares[-1]

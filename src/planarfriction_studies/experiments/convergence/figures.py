@@ -27,7 +27,8 @@ _ABSCISSAE: dict[Family, str] = {
 def errors_over_counts(
     family: Family, counts: Sequence[int], errors: Mapping[Case, Errors], *, with_profile: bool = False
 ) -> PlotFigure:
-    """Relative errors of force and torque of one family, all shapes and parameters; on demand with the profile."""
+    """Draw the relative errors of force and torque of one family, all shapes and parameters; on demand with the
+    profile."""
     figure = new_figure(10.0 if with_profile else 9.6, 4.2)
     panels = figure.subplots(1, 3 if with_profile else 2)
     _draw_errors(panels[:2], family, counts, errors)
@@ -41,7 +42,8 @@ def errors_over_counts(
 
 
 def radius_errors(counts: Sequence[int], mask: np.ndarray, cut: np.ndarray, torque: np.ndarray) -> PlotFigure:
-    """Error of the contact radius of the disc, as a mask and cut by its rim, beside the error of the torque."""
+    """Draw the error of the contact radius of the disc, as a mask and cut by its rim, beside the error of the
+    torque."""
     figure = new_figure(6.4, 3.6)
     axes = figure.subplots()
     axes.semilogy(counts, np.abs(mask), "o-", color=OTHERS[0], markersize=4, label="contact radius, mask")

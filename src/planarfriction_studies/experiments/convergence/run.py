@@ -84,7 +84,7 @@ def run(work: Work) -> Result:
 
 
 def _slopes(counts: Sequence[int], errors: np.ndarray) -> dict[str, float]:
-    """Slope of log error over log count, for force and torque: minus the order of convergence."""
+    """Return the slope of log error over log count, for force and torque: minus the order of convergence."""
     fits = [np.polyfit(np.log(counts), np.log(errors[:, i]), 1)[0] for i in range(2)]
     return dict(zip(QUANTITIES, map(float, fits), strict=True))
 
@@ -136,7 +136,7 @@ def _euler_comparisons(counts: Sequence[int], errors: Mapping[Case, Errors]) -> 
 def _against_figure(
     name: str, counts: Sequence[int], case: Case, errors: np.ndarray, tolerance: float, cause: str, method: str = ""
 ) -> list[Comparison]:
-    """Force and torque of one case beside the figure, relative to the published error at each count."""
+    """Compare the force and torque of one case with the figure, relative to the published error at each count."""
     found = []
     for i, quantity in enumerate(QUANTITIES):
         curve = facts.published_curve(f"convergence/{name}/{key(case)}/{quantity}")
@@ -182,7 +182,7 @@ def _slope_table(slopes: Mapping[str, Mapping[str, Mapping[str, float]]], counts
 
 
 def _dataset(counts: Sequence[int], errors: Mapping[Case, Errors]) -> xr.Dataset:
-    """Relative errors over shape, parameters and count, one variable for each family and quantity."""
+    """Return the relative errors over shape, parameters and count, one variable for each family and quantity."""
     columns = {
         case: {
             f"{family}_{quantity}": each[family][:, i]

@@ -45,7 +45,7 @@ COARSE_INTERVAL = 5e-4
 """The same where 50 000 samples of 10 000 cells would cost more than the run [s]; a multiple of the published one."""
 
 REDUCED_TOLERANCES: dict[str, Any] = {"rtol": 1e-8, "atol": 3e-8}
-"""Of the reduced model: the error of a fine table is 3e-4 of the force, and a percent of that is wanted."""
+"""Tolerances of the reduced model: the error of a fine table is 3e-4 of the force, and a percent of that is wanted."""
 
 T_END = 5.0
 EULER_STEP = 1e-5
@@ -66,14 +66,14 @@ Errors = Mapping[Family, np.ndarray]
 
 
 def profile() -> Signal:
-    """The published velocity of the centre of pressure, not held but continuous; its kinks lie on samples."""
+    """Return the published velocity of the centre of pressure, not held but continuous; its kinks lie on samples."""
     held = published_velocity()
     kinks = [0, 60, 80, 140, 160, 220, 240, 270, 340, 400, 430, 460, 500]
     return Signal.sampled(held.times[kinks], held.values[kinks], hold="linear")
 
 
 def patch(shape: str, cells: int) -> ContactPatch:
-    """The published patch on a grid of `cells` x `cells`."""
+    """Return the published patch on a grid of `cells` x `cells`."""
     return PUBLISHED_PATCHES[shape](cells=cells)
 
 
@@ -84,19 +84,19 @@ def interval(case: Case, family: Family, work: Work) -> float:
 
 
 def base_of(family: Family) -> tuple[Family, int]:
-    """Family and count of the run that the others are measured against."""
+    """Return the family and count of the run that the others are measured against."""
     return ("segments", BASE_SEGMENTS) if family == "segments" else ("cells_distributed", BASE_CELLS)
 
 
 def relative_errors(wrench: np.ndarray, base: np.ndarray) -> np.ndarray:
-    """Root mean square errors of force and torque over the base's largest force and torque [-]."""
+    """Return the root mean square errors of force and torque over the base's largest force and torque [-]."""
     square = np.mean((wrench - base) ** 2, axis=0)
     force, torque = np.hypot(base[:, 0], base[:, 1]).max(), np.abs(base[:, 2]).max()
     return np.sqrt([square[0] + square[1], square[2]]) / [force, torque]
 
 
 def contact(family: Family, count: int, case: Case) -> Contact:
-    """Patch of one run, placed so that the body's origin is the point that has the velocity.
+    """Return the patch of one run, placed so that the body's origin is the point that has the velocity.
 
     That point is the centre of pressure of the finest grid of the family, though a coarser patch may have its own a
     little beside it.
@@ -114,12 +114,13 @@ def contact(family: Family, count: int, case: Case) -> Contact:
 
 
 def scene(contacts: Sequence[Contact]) -> Scene:
-    """Contacts that are moved together as published."""
+    """Return the scene of contacts that are moved together as published."""
     return Scene(Body(1.0, 1.0, gravity=(0.0, 0.0)), list(contacts), T_END, velocity=profile(), **FINE)
 
 
 def wrenches(family: Family, count: int, case: Case, every: float) -> dict[str, np.ndarray]:
-    """Friction wrench about the patch's own centre of pressure at multiples of `every` [s], `wrench` [T, 3]."""
+    """Return the friction wrench about the patch's own centre of pressure at multiples of `every` [s], `wrench` [T,
+    3]."""
     here = contact(family, count, case)
     tolerances = FINE if family == "cells_distributed" else REDUCED_TOLERANCES
     histories = simulate(scene([here]), save_every=every, **tolerances).histories
@@ -128,7 +129,7 @@ def wrenches(family: Family, count: int, case: Case, every: float) -> dict[str, 
 
 
 def solve(cases: Sequence[Case], counts: Sequence[int], work: Work) -> dict[Case, Errors]:
-    """Errors of every case, with the structured solver: the bases first, then everything else, two at a time."""
+    """Return errors of every case, with the structured solver: the bases first, then everything else, two at a time."""
     keys = {case: {family: (*base_of(family), interval(case, family, work)) for family in FAMILIES} for case in cases}
     wanted = {
         (case, *key): partial(wrenches, key[0], key[1], case, key[2]) for case in cases for key in keys[case].values()
@@ -153,13 +154,14 @@ def _label(case: Case, family: Family, count: int) -> str:
 
 
 def solve_by_euler(cases: Sequence[Case], counts: Sequence[int], work: Work) -> Mapping[Case, Errors]:
-    """The same with the published explicit Euler steps, all grids and tables of a case in one go."""
+    """Compute the errors of every case with the published explicit Euler steps, all grids and tables of a case in one
+    go."""
     labels = {case: f"convergence, {case[0]} {case[1]}, explicit Euler" for case in cases}
     return work.pieces({case: partial(_euler, case, counts, labels[case], work) for case in cases}, labels.__getitem__)
 
 
 def _euler(case: Case, counts: Sequence[int], label: str, work: Work) -> dict[str, np.ndarray]:
-    """Errors by family of one case."""
+    """Compute the errors of one case by family."""
     runs = [(family, count) for family in FAMILIES for count in counts]
     runs += sorted({base_of(family) for family in FAMILIES})
     contacts = [contact(family, count, case) for family, count in runs]
@@ -179,7 +181,8 @@ def _euler(case: Case, counts: Sequence[int], label: str, work: Work) -> dict[st
 
 
 def _euler_part(contacts: Sequence[Contact], part: int, state: np.ndarray | None) -> dict[str, np.ndarray]:
-    """One of `_EULER_PARTS` equal parts: wrenches `[T, contacts, 3]` before the step at each sample, and the state."""
+    """Return one of `_EULER_PARTS` equal parts: wrenches `[T, contacts, 3]` before the step at each sample, and the
+    state."""
     from planarfriction.kernels.body import right_hand_side
     from planarfriction.scenes.packing import pack
 

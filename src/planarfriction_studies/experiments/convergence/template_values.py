@@ -1,4 +1,4 @@
-"""What the template of the convergence experiment names, and what the size of the disc's mask does."""
+"""Values that the template of the convergence experiment names, and the effect of the size of the disc's mask."""
 
 from __future__ import annotations
 
@@ -20,12 +20,13 @@ Slopes = Mapping[str, Mapping[str, Mapping[str, float]]]
 
 
 def key(case: Case) -> str:
-    """A case in the names of the published curves."""
+    """Return the name of a case in the names of the published curves."""
     return "/".join(case)
 
 
 def radius_errors(counts: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
-    """Relative errors of the contact radius: of the mask from the base's mask, of the cut disc from 2 R/3."""
+    """Return the relative errors of the contact radius: of the mask from the base's mask, of the cut disc from 2
+    R/3."""
     base = float(runs.patch("Circle", runs.BASE_CELLS).contact_radius())
     mask = [float(runs.patch("Circle", count).contact_radius()) / base - 1.0 for count in counts]
     cut = [float(ContactPatch.disc(RADIUS, count).contact_radius()) * 1.5 / RADIUS - 1.0 for count in counts]
@@ -33,14 +34,14 @@ def radius_errors(counts: Sequence[int]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def base_radius_error() -> float:
-    """Relative error of the contact radius of the base's mask, from the disc that it stands for."""
+    """Return the relative error of the contact radius of the base's mask, from the disc that it stands for."""
     return float(runs.patch("Circle", runs.BASE_CELLS).contact_radius()) * 1.5 / RADIUS - 1.0
 
 
 def template_values(
     counts: Sequence[int], errors: Mapping[Case, Errors], slopes: Slopes, comparisons: Sequence[Comparison]
 ) -> dict[str, Any]:
-    """What the template names."""
+    """Return the values that the template names."""
     measured = [c for c in comparisons if c.unit == "of the published error" and not c.quantity.startswith("explicit")]
     euler = [c.difference for c in comparisons if c.quantity.startswith("explicit")]
     thinned = any("means over" in c.cause for c in measured)
@@ -61,7 +62,8 @@ def template_values(
 
 
 def _on_cell(counts: Sequence[int], errors: Mapping[Case, Errors]) -> dict[str, Any] | None:
-    """The grids of the line whose centre of pressure is the middle of a cell, and their errors over the trend."""
+    """Return the grids of the line whose centre of pressure is the middle of a cell, and their errors over the
+    trend."""
     force, all_counts = errors["LineGrad", "p0"]["cells_distributed"][:, 0], np.array(counts)
     through = np.array([_centre_on_cell(count) for count in counts])
     if through.sum() < 2 or (~through).sum() < 2:
@@ -72,7 +74,7 @@ def _on_cell(counts: Sequence[int], errors: Mapping[Case, Errors]) -> dict[str, 
 
 
 def _centre_on_cell(count: int) -> bool:
-    """Whether the centre of pressure of the line with linear pressure is the middle of one of its cells."""
+    """Return True if the centre of pressure of the line with linear pressure is the middle of one of its cells."""
     line = runs.patch("LineGrad", count)
     distance = np.abs(line.positions[:, 1] - line.centre_of_pressure()[1])
     return bool(distance.min() < 1e-6 * RADIUS)

@@ -15,7 +15,7 @@ from planarfriction_studies.experiments.experiment import Comparison, compare, c
 
 
 def comparisons(found: Runs, numbers: dict[str, Any], share: float) -> list[Comparison]:
-    """All of them; `share` is the error of our solver as a share of a curve's span."""
+    """Compare all quantities of the experiment; `share` is the error of our solver as a share of a curve's span."""
     return [
         *_applied_comparisons(),
         *_motion_comparisons(found, share),
@@ -73,7 +73,7 @@ _SIDEWAYS = (
 
 
 def _sideways_comparisons(found: Runs) -> list[Comparison]:
-    """The path that a disc takes which turns while its patch stays where it is."""
+    """Compare the path of a disc that turns while its patch stays in place."""
     from scipy.integrate import cumulative_trapezoid
 
     cause = r"The integral is taken over samples 0.01 s apart, between which $x$ and $\theta$ oscillate."
@@ -112,7 +112,7 @@ def _plateau_comparisons(plateaus: dict[str, Any]) -> list[Comparison]:
 
 
 def _creep_comparisons(found: Runs, creep: dict[str, Any], share: float) -> list[Comparison]:
-    """Drift per period: that of plain bristles beside converged solutions, none with elasto-plastic ones."""
+    """Compare the drift per period: that of plain bristles with converged solutions, none with elasto-plastic ones."""
     units, rows = dict(MOTION), []
     for what, (model, moved) in ((what, item) for what, models in creep.items() for item in models.items()):
         if (what, model) == ("normal force", "r_ep"):  # creeps a little: the table's own doing, see the findings

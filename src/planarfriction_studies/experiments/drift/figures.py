@@ -30,7 +30,7 @@ LOAD_COLOURS = {"fx": "0.15", "tau": "0.55", "normal": "0.55"}
 
 
 def motion(load: Literal["tangential", "normal"], found: dict[tuple[str, str], Arrays]) -> PlotFigure:
-    """Applied load, x [nm] and theta [µrad] over time: left the distributed model, right the reduced one."""
+    """Draw the applied load, x [nm] and theta [µrad] over time: left the distributed model, right the reduced one."""
     figure = new_figure(9.6, 7.0)
     panels = figure.subplots(3, 2, sharex=True, sharey="row")
     for column, (kind, title) in enumerate((("d", "distributed"), ("r", "reduced"))):
@@ -53,7 +53,7 @@ def motion(load: Literal["tangential", "normal"], found: dict[tuple[str, str], A
 
 
 def plateaus(found: dict[tuple[str, str], Arrays], straight: Arrays, numbers: dict[str, Any]) -> PlotFigure:
-    """Deflections x [nm] and theta [µrad] in the first second of the normal-load run, elasto-plastic bristles."""
+    """Draw deflections x [nm] and theta [µrad] in the first second of the normal-load run, elasto-plastic bristles."""
     figure = new_figure(9.6, 3.9)
     lines = {
         "d_ep": (looks.DISTRIBUTED, "-", 3.4, 0.5),
@@ -77,7 +77,7 @@ def plateaus(found: dict[tuple[str, str], Arrays], straight: Arrays, numbers: di
 
 
 def _draw_load(axes: Any, load: Literal["tangential", "normal"], run: Arrays, *, last: bool) -> None:
-    """Applied force [N] and torque [N mm], or under the normal load force and normal force."""
+    """Draw the applied force [N] and torque [N mm], or under the normal load force and normal force."""
     time = np.arange(0.0, 5.0, 0.001)
     applied = drift_force(load)(time)
     axes.plot(time, applied[:, 0], color=LOAD_COLOURS["fx"], lw=1.0)

@@ -50,7 +50,7 @@ def run(work: Work) -> Result:
 
 
 def _told(numbers: dict[str, Any]) -> dict[str, Any]:
-    """What the template names."""
+    """Return the values that the template names."""
     creep = numbers["creep"]
     grown = creep["normal force"]
     return numbers | {
@@ -63,7 +63,7 @@ def _told(numbers: dict[str, Any]) -> dict[str, Any]:
 
 
 def _creep_table(numbers: dict[str, Any]) -> Table:
-    """Drift per period of the load, by what oscillates."""
+    """Return the drift per period of the load, by what oscillates."""
     moved = {
         f"{what}; {WORDS[model]}": each for what, models in numbers["creep"].items() for model, each in models.items()
     }

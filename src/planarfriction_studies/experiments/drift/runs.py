@@ -1,4 +1,4 @@
-"""What the drift experiment runs, and what its equations say in closed form."""
+"""Runs of the drift experiment, and closed forms of its equations."""
 
 from __future__ import annotations
 
@@ -32,10 +32,10 @@ LAWS = {"": runs.PLAIN, "_ep": runs.LAW}
 MOTION = (("x", "m"), ("y", "m"), ("theta", "rad"))
 
 PERIOD = 1.0 / 3.0
-"""Of the oscillating load [s]."""
+"""Period of the oscillating load [s]."""
 
 WINDOWS = {"force": (1.67, 2.67), "force and torque": (4.0, 5.0), "normal force": (4.0, 5.0)}
-"""What oscillates -> start and end [s] of three whole periods over which drift is measured."""
+"""Windows by oscillating load: start and end [s] of three whole periods over which drift is measured."""
 
 QUICK, TIGHT = (1e-6, 3e-6, 2e-4), (1e-8, 3e-8, 5e-6)
 """Tolerances `rtol`, `atol`, and the error that they leave in 5 s as a share of a curve's span: drift adds up."""
@@ -45,21 +45,21 @@ Runs = dict[tuple[str, str], Arrays]
 
 
 def move(load: Load, model: str, rtol: float, atol: float) -> Arrays:
-    """One run of the disc, by its load and its model with the ending of its law."""
+    """Simulate one run of the disc, given by its load and by its model with the ending of its law."""
     law = LAWS[model[1:]]
     scene = drift(runs.published_model(model[0], "Circle", law, width=WIDTH), load=load)  # pyright: ignore[reportArgumentType]
     return runs.columns(simulate(scene, rtol=rtol, atol=atol))
 
 
 def straight_ramp(rtol: float, atol: float) -> Arrays:
-    """The reduced model under force and torque that rise in proportion, without steps, slowly beside its vibrations."""
+    """Simulate the reduced model under force and torque that rise in proportion, slowly beside its vibrations."""
     scene = drift(runs.published_model("r", "Circle", width=WIDTH), load="normal", t_end=1.0)
     ramp = Signal.sampled([0.0, 0.8], [[0.0, 0.0, 0.0], [FORCE, 0.0, TORQUE]], "linear")
     return runs.columns(simulate(dataclasses.replace(scene, force=ramp), rtol=rtol, atol=atol))
 
 
 def measure(found: Runs, straight: Arrays) -> dict[str, Any]:
-    """Every number of the experiment but its comparisons."""
+    """Compute every number of the experiment except its comparisons."""
     at = 100  # the last sample before the normal force begins to oscillate
     measured = {model: _place(found["normal", model], at) for model in ("d_ep", "r_ep", "e_ep")}
     measured["straight"] = _place(straight, at)
@@ -87,7 +87,8 @@ def _patch_numbers() -> dict[str, float]:
 
 
 def _closed_forms() -> dict[str, dict[str, float]]:
-    """Deflections `x` [m], `theta` [rad] under both loads, bristles elastic: by model, where the path does not matter.
+    """Return deflections `x` [m], `theta` [rad] under both loads, bristles elastic: by model, where the path does not
+    matter.
 
     The table's: along a straight path of the load the velocity keeps the direction whose h is parallel to the load.
     """
@@ -105,7 +106,7 @@ def _closed_forms() -> dict[str, dict[str, float]]:
 
 
 def _creep(found: Runs) -> dict[str, dict[str, dict[str, float]]]:
-    """Motion per period of the load: what oscillates -> model -> x [m], theta [rad]."""
+    """Return the motion per period of the load: what oscillates -> model -> x [m], theta [rad]."""
     result = {}
     for what, (start, end) in WINDOWS.items():
         first, last = round(100 * start), round(100 * end)
@@ -120,7 +121,7 @@ def _creep(found: Runs) -> dict[str, dict[str, dict[str, float]]]:
 
 
 def implied_width() -> float:
-    """Width of the patch that the published angle at the largest torque implies [m], bristles elastic."""
+    """Return the width of the patch that the published angle at the largest torque implies [m], bristles elastic."""
     curve = facts.published_curve("drift/d_ep/theta")
     moment = GREATEST_TORQUE / (runs.LAW.sigma_0 * GRAVITY * curve.values.max())
     return WIDTH * float(np.sqrt(moment / _patch_numbers()["second moment"]))

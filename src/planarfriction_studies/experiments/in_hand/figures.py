@@ -35,7 +35,7 @@ LOOKS: dict[str, dict[str, Any]] = {
 
 
 def strobes(panels: Mapping[str, tuple[Scene, Arrays]]) -> PlotFigure:
-    """Outlines of the plate at twelve instants, one panel for each scene and its run."""
+    """Draw outlines of the plate at twelve instants, one panel for each scene and its run."""
     figure = new_figure(5.0 * len(panels), 4.4)
     parts: Any = figure.subfigures(1, len(panels), squeeze=False)[0]
     for part, (title, (scene, run)) in zip(parts, panels.items(), strict=True):
@@ -52,7 +52,7 @@ def histories(
     looks: Mapping[str, Mapping[str, Any]] = LOOKS,
     published: Mapping[str, Mapping[str, str]] | None = None,
 ) -> PlotFigure:
-    """Columns `names` over time: one column of panels for each title, one line for each label of a run.
+    """Draw columns `names` over time: one column of panels for each title, one line for each label of a run.
 
     `published` holds, by title and label, the keys of published curves, drawn as markers.
     """
@@ -100,7 +100,7 @@ def distances(
     *,
     looks: Mapping[str, Mapping[str, Any]] | None = None,
 ) -> PlotFigure:
-    """Distances [m] over time [s], one panel for each title, one line for each label; `label` names the axis."""
+    """Draw distances [m] over time [s], one panel for each title, one line for each label; `label` names the axis."""
     figure = new_figure(9.6, 3.9)
     row = figure.subplots(1, len(panels), sharey=True, squeeze=False)[0]
     for axes, (title, lines) in zip(row, panels.items(), strict=True):
@@ -117,7 +117,7 @@ def distances(
 
 
 def end_shifts(rows: Mapping[str, Mapping[str, float]], colours: Mapping[str, str], label: str) -> PlotFigure:
-    """What moves the end [m], by case and by cause, on a logarithmic axis called `label`; friction is black."""
+    """Draw the shifts of the end [m], by case and by cause, on a logarithmic axis called `label`; friction is black."""
     figure = new_figure(8.6, 1.5 + 0.36 * len(rows))
     axes = figure.subplots()
     causes = list(dict.fromkeys(cause for shifts in rows.values() for cause in shifts))

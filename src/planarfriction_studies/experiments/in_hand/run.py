@@ -42,7 +42,7 @@ FINER = 63
 
 REDUCED, DEFAULTS, FINER_GRID = "reduced model instead", "default tolerances", "three times finer grid"
 CHANGES = {MORE: MORE, LESS: LESS, REDUCED: "r", DEFAULTS: "d, defaults", FINER_GRID: FINER_GRID}
-"""What is changed to see how far the end moves -> the name of the run that has it."""
+"""Changes that shift the end -> the name of the run that has it."""
 
 Runs = dict[tuple[Case, str], Arrays]
 
@@ -64,7 +64,7 @@ def run(work: Work) -> Result:
 
 
 def _group(case: Case, cases: tuple[Case, ...]) -> list[Case]:
-    """All loads of the shape and the placement of a case."""
+    """Return all loads of the shape and the placement of a case."""
     return [each for each in cases if each.group == case.group]
 
 
@@ -75,7 +75,7 @@ def _dataset(group: list[Case], found: Runs) -> Any:
 
 
 def _simulate_all(work: Work, cases: tuple[Case, ...]) -> Runs:
-    """Every run by its case and what it is: a model's letter, or the name of a change."""
+    """Simulate every run, by its case and a model's letter or the name of a change."""
     computes = {}
     for case in cases:
         for kind in KINDS:
@@ -90,7 +90,7 @@ def _simulate_all(work: Work, cases: tuple[Case, ...]) -> Runs:
 
 
 def _shifts(case: Case, found: Runs) -> dict[str, float]:
-    """How far each change moves the end of the distributed model's run [m]."""
+    """Return the distance by which each change moves the end of the distributed model's run [m]."""
     base = found[case, "d"]
     there = {words: found[case, name] for words, name in CHANGES.items() if (case, name) in found}
     return {words: runs.end_distance(run, base) for words, run in there.items()}
@@ -113,7 +113,8 @@ def _numbers(case: Case, found: Runs, shifts: dict[str, float]) -> dict[str, Any
 
 
 def _accuracy(cases: tuple[Case, ...], found: Runs) -> dict[str, dict[str, dict[str, float]]]:
-    """Largest distance from the converged solution by run: ours at two tolerances, and the published curve's."""
+    """Return the largest distance from the converged solution by run: ours at two tolerances, and the published
+    curve's."""
     result = {}
     for case in cases:
         for kind in KINDS if case.has_references else ():
@@ -142,7 +143,8 @@ def _comparisons(cases: tuple[Case, ...], found: Runs) -> list[Comparison]:
 
 
 def _compare_load(case: Case, found: Runs) -> Comparison:
-    """The published load at its own labels: each value holds until the next sample, where it is recorded."""
+    """Compare the published load with ours at its own labels: each value holds until the next sample, where it is
+    recorded."""
     run = found[case, "d"]
     return compare_curve(
         f"load {case.load}", run["time"][:-1], run["normal_force"][1:], f"in_hand/load/{case.load}", allowance=1e-8,
@@ -151,7 +153,8 @@ def _compare_load(case: Case, found: Runs) -> Comparison:
 
 
 def _compare_rest(case: Case, run: Arrays, words: str) -> list[Comparison]:
-    """The wrench of one finger on the plate at rest, at the end of load 2: it carries its share of the weight."""
+    """Compare the wrench of one finger on the plate at rest, at the end of load 2: it carries its share of the
+    weight."""
     scene = case.scene("d")
     weight = scene.body.mass * GRAVITY / scene.contacts[0].count
     closed = {"fx": (0.0, "N"), "fy": (weight, "N"), "tau": (weight * float(run["x"][-1]), "N m")}
@@ -165,7 +168,7 @@ def _compare_rest(case: Case, run: Arrays, words: str) -> list[Comparison]:
 def _told(
     cases: tuple[Case, ...], found: Runs, numbers: dict[str, dict[str, Any]], accuracy: dict[str, Any]
 ) -> dict[str, Any]:
-    """What the template names."""
+    """Return the values that the template names."""
     worst = {
         who: {name: max(row[who][name] for row in accuracy.values()) for name in ("y", "theta", "fy")}
         for who in ("report", "default", "published")
@@ -208,7 +211,7 @@ def _stem(case: Case) -> str:
 
 
 def _where_forces_differ(cases: tuple[Case, ...], found: Runs) -> dict[str, Any]:
-    """The run and the time [s] at which fy at the default tolerances is farthest from the converged one."""
+    """Return the run and the time [s] at which fy at the default tolerances is farthest from the converged one."""
     every = []
     for case in cases:
         for kind in KINDS if case.has_references else ():
@@ -244,7 +247,7 @@ def _figures(cases: tuple[Case, ...], found: Runs, shifts: dict[Case, dict[str, 
 
 
 def _histories(case: Case, group: list[Case], found: Runs) -> dict[str, PlotFigure]:
-    """Motion and forces of one shape and placement under both loads."""
+    """Return the motion and forces of one shape and placement under both loads."""
     panels = {f"load {each.load}": {NAMES[kind]: found[each, kind] for kind in KINDS} for each in group}
     published = {
         f"load {each.load}": {NAMES[kind]: each.key(kind) for kind in KINDS} for each in group if each.has_references

@@ -1,4 +1,4 @@
-"""What the in-hand experiments share: cases, scenes, runs as arrays, distances between runs, comparisons."""
+"""Code that the in-hand experiments share: cases, scenes, runs as arrays, distances between runs, comparisons."""
 
 from __future__ import annotations
 
@@ -70,21 +70,22 @@ class Case:
 
     @property
     def has_references(self) -> bool:
-        """Whether published curves and converged solutions are known."""
+        """True if published curves and converged solutions are known."""
         return self.placement == 1 and self.shape in ("Circle", "Square")
 
     def key(self, kind: Kind) -> str:
-        """Name of the run of a model in the facts."""
+        """Return the name of the run of a model in the facts."""
         return f"in_hand/{self.shape}/{kind}{self.load}"
 
     def scene(self, kind: Kind, law: LuGre = LAW, *, cells: int = 21) -> Scene:
-        """The scene with the distributed ("d") or the reduced ("r") model."""
+        """Return the scene with the distributed ("d") or the reduced ("r") model."""
         model = published_model(kind, PUBLISHED_PATCHES[self.shape](cells=cells), law)
         load = scenes.in_hand_load(self.load, placement=self.placement)
         return scenes.in_hand(model, normal_force=load, centre_of_mass=CENTRES_OF_MASS[self.placement])
 
     def holding_load(self, x: float) -> float:
-        """Least normal force of one finger [N] that holds the plate with its centre of mass at `x` [m], in theory.
+        """Return the least normal force of one finger [N] that holds the plate with its centre of mass at `x` [m], in
+        theory.
 
         At this load the weight lies on the limit surface of the cells with mu_s.
         """
@@ -96,44 +97,44 @@ class Case:
 
 
 def simulated(scene: Scene, **tolerances: Any) -> Callable[[], Arrays]:
-    """A piece of work: the columns of the run of a scene."""
+    """Return the columns of the run of a scene, a piece of work."""
     return lambda: columns(simulate(scene, **tolerances))
 
 
 def with_friction(share: float) -> LuGre:
-    """The published law with both friction coefficients times `1 + share`."""
+    """Return the published law with both friction coefficients times `1 + share`."""
     return dataclasses.replace(LAW, mu_c=LAW.mu_c * (1.0 + share), mu_s=LAW.mu_s * (1.0 + share))
 
 
 def distance(run: Arrays, other: Arrays) -> np.ndarray:
-    """Distance of the centre of mass between two runs over time [m]."""
+    """Return the distance of the centre of mass between two runs over time [m]."""
     return np.hypot(run["x"] - other["x"], run["y"] - other["y"])
 
 
 def end_distance(run: Arrays, other: Arrays) -> float:
-    """Distance between the ends of two runs [m]."""
+    """Return the distance between the ends of two runs [m]."""
     return float(distance(run, other)[-1])
 
 
 def end(run: Arrays) -> dict[str, float]:
-    """End position [m, m, rad]."""
+    """Return the end position [m, m, rad]."""
     return {name: float(run[name][-1]) for name in ("x", "y", "theta")}
 
 
 def errors(run: Arrays, key: str) -> dict[str, float]:
-    """Largest distance from the converged solution `key` by column."""
+    """Return the largest distance from the converged solution `key` by column."""
     return {row.quantity: row.difference for row in _converged(run, key, "", ALLOWANCE, OF_BOTH)}
 
 
 def compare_with_converged(run: Arrays, key: str, words: str, *, default: bool = False) -> list[Comparison]:
-    """A run beside the converged solution `key`; of a run at default tolerances its motion only."""
+    """Compare a run with the converged solution `key`; of a run at default tolerances its motion only."""
     if default:
         return _converged(run, key, f"{words}, default tolerances, ", DEFAULT_ALLOWANCE, OF_DEFAULTS)
     return _converged(run, key, f"{words}, ", ALLOWANCE, OF_BOTH)
 
 
 def compare_with_published(run: Arrays, key: str, words: str) -> list[Comparison]:
-    """A run beside the published curves `key`."""
+    """Compare a run with the published curves `key`."""
     return [
         compare_curve(f"{words}, {name}", run["time"], run[name], f"{key}/{name}", ALLOWANCE[unit], OF_THE_FIGURE)
         for name, unit in COLUMNS.items()
@@ -141,7 +142,7 @@ def compare_with_published(run: Arrays, key: str, words: str) -> list[Comparison
 
 
 def _converged(run: Arrays, key: str, before: str, allowance: dict[str, float], cause: str) -> list[Comparison]:
-    """The columns whose units have an allowance."""
+    """Compare the columns whose units have an allowance."""
     return [
         compare_converged(f"{before}{name}", run["time"], run[name], f"{key}/{name}", unit, allowance[unit], cause)
         for name, unit in COLUMNS.items()

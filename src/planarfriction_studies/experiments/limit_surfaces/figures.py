@@ -25,7 +25,7 @@ MATCHED = 28
 
 
 def overview(surfaces: Mapping[str, LimitSurfaceCells], *, coarse: bool = False) -> PlotFigure:
-    """The six limit surfaces, with circles of the ellipsoid (there the unit sphere) around them."""
+    """Draw the six limit surfaces, with circles of the ellipsoid (there the unit sphere) around them."""
     figure = new_figure(10.0, 6.6)
     count = 10 if coarse else 48
     polar = np.linspace(0.0, np.pi, count + 1)[:, None]
@@ -52,7 +52,7 @@ def overview(surfaces: Mapping[str, LimitSurfaceCells], *, coarse: bool = False)
 
 
 def _circles(axes: Any) -> None:
-    """Outline of the unit sphere, and the near halves of its equator and two meridians."""
+    """Draw the outline of the unit sphere, and the near halves of its equator and two meridians."""
     elevation, azimuth = np.radians([axes.elev, axes.azim])
     towards = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
     around = np.linspace(0.0, 2.0 * np.pi, 181)
@@ -71,7 +71,7 @@ def _circles(axes: Any) -> None:
 
 
 def correspondence(surfaces: Mapping[str, LimitSurfaceCells]) -> PlotFigure:
-    """A section of both surfaces of each shape, the same twists marked on both and joined."""
+    """Draw a section of both surfaces of each shape, the same twists marked on both and joined."""
     figure = new_figure(9.6, 7.0)
     panels: Any = figure.subplots(2, 3)
     for axes, (name, surface) in zip(panels.flat, surfaces.items(), strict=True):
@@ -83,7 +83,7 @@ def correspondence(surfaces: Mapping[str, LimitSurfaceCells]) -> PlotFigure:
 
 
 def _section(axes: Any, surface: LimitSurfaceCells, column: int, count: int = MATCHED) -> None:
-    """Points (f, tau/r) of twists (v, r omega) with velocity along one axis, f the force along it."""
+    """Return points (f, tau/r) of twists (v, r omega) with velocity along one axis, f the force along it."""
     ellipsoid = LimitSurfaceEllipsoid(surface.patch)
     fine = (_points_of(each, column, 1441) for each in (surface, ellipsoid))
     for points, colour, name in zip(fine, (SUM, BESIDE), ("sum over the cells", "ellipsoid"), strict=True):
@@ -101,7 +101,8 @@ def _section(axes: Any, surface: LimitSurfaceCells, column: int, count: int = MA
 
 
 def _points_of(surface: Any, column: int, count: int, *, closed: bool = True) -> np.ndarray:
-    """Force along axis `column` and torque over r, `[2, count]`, of twists at equal angles around the section."""
+    """Return the force along axis `column` and torque over r, `[2, count]`, of twists at equal angles around the
+    section."""
     angle = np.linspace(0.0, 2.0 * np.pi, count, endpoint=closed)
     azimuth = np.where(angle <= np.pi, 0.0, np.pi) + 0.5 * np.pi * column
     points = scaled_samples(surface, np.where(angle <= np.pi, angle, 2.0 * np.pi - angle), azimuth)[1]
@@ -109,7 +110,7 @@ def _points_of(surface: Any, column: int, count: int, *, closed: bool = True) ->
 
 
 def gradient_line(surface: LimitSurfaceCells, numbers: dict[str, Any]) -> PlotFigure:
-    """The line and its load, the force over the centre of rotation, and the section with the two spins marked."""
+    """Draw the line and its load, the force over the centre of rotation, and the section with the two spins marked."""
     figure = new_figure(10.0, 4.6)
     load, force, section = figure.subplots(1, 3, width_ratios=(0.55, 1.0, 1.25))
     centres = (
@@ -150,13 +151,13 @@ def _force_panel(axes: Any, surface: LimitSurfaceCells, numbers: dict[str, Any],
 
 
 def _force_of(surface: Any, y: np.ndarray) -> np.ndarray:
-    """fx of unit spins about the points (0, y)."""
+    """Return fx of unit spins about the points (0, y)."""
     zero = np.zeros_like(y)
     return surface.wrench(np.stack([y, zero, zero + 1.0], -1))[:, 0]
 
 
 def _spin_panel(axes: Any, surface: LimitSurfaceCells, numbers: dict[str, Any], centres: Any) -> None:
-    """The upper half of the section, turned to positive torque: what balances the friction of a negative spin."""
+    """Draw the upper half of the section, turned to positive torque: what balances the friction of a negative spin."""
     ellipsoid = LimitSurfaceEllipsoid(surface.patch)
     for each, colour, name in ((surface, SUM, "sum over the cells"), (ellipsoid, BESIDE, "ellipsoid")):
         axes.plot(*_points_of(each, 0, 2881), color=colour, lw=1.4, label=name)

@@ -20,7 +20,8 @@ Numbers = dict[str, Any]
 
 
 def linear_line(length: float, floor: float = 0.0) -> dict[str, float]:
-    """Closed forms of a line whose pressure grows as `s + floor` [m] from its light end, s from 0 to `length` [m].
+    """Return the closed forms of a line whose pressure grows as `s + floor` [m] from its light end, s from 0 to
+    `length` [m].
 
     Places are measured from the middle towards the heavy end [m]: the centre of pressure, and the centre of rotation
     that splits the load into equal halves, `s^2/2 + floor s = load/2`. `radius` and `torque` [m] are the torques of
@@ -31,7 +32,7 @@ def linear_line(length: float, floor: float = 0.0) -> dict[str, float]:
     halves = math.sqrt(floor**2 + load) - floor
 
     def beyond(place: float) -> tuple[float, float]:
-        """Share of the load nearer to the light end than `place`, and mean distance of the load from it."""
+        """Return the share of the load nearer to the light end than `place`, and mean distance of the load from it."""
         below = (0.5 * place**2 + floor * place) / load
         lever = 2.0 * (place**3 / 6.0 + 0.5 * floor * place**2) / load + middle - place
         return below, lever
@@ -47,12 +48,12 @@ def linear_line(length: float, floor: float = 0.0) -> dict[str, float]:
 
 
 def spin_about(surface: Any, y: float) -> np.ndarray:
-    """Wrench `(fx, fy, tau)` [1, 1, m] at the centre of pressure of a spin about the point (0, y) [m]."""
+    """Return the wrench `(fx, fy, tau)` [1, 1, m] at the centre of pressure of a spin about the point (0, y) [m]."""
     return geometry.wrench_at(surface.wrench([y, 0.0, 1.0]), surface.centre_of_pressure)
 
 
 def gradient_numbers() -> Numbers:
-    """The two spins of the line of 21 cells, of the ellipsoid, and of continuous lines; places along y [m]."""
+    """Return the two spins of the line of 21 cells, of the ellipsoid, and of continuous lines; places along y [m]."""
     patch = PUBLISHED_PATCHES["LineGrad"](CELLS, LENGTH)
     cells, ellipsoid = LimitSurfaceCells(patch), LimitSurfaceEllipsoid(patch)
     middle = float(patch.centre_of_pressure()[1])
@@ -84,7 +85,8 @@ def gradient_numbers() -> Numbers:
 
 
 def half_load_cell(cells: int) -> int:
-    """Number of the cell, 1 to `cells` from the light end, that holds the middle of weights 1, 2, ..., `cells`.
+    """Return the number of the cell, 1 to `cells` from the light end, that holds the middle of weights 1, 2, ...,
+    `cells`.
 
     The smallest k with `k (k + 1) >= cells (cells + 1)/2`.
     """
@@ -92,7 +94,7 @@ def half_load_cell(cells: int) -> int:
 
 
 def gradient_comparisons(numbers: Numbers) -> list[Comparison]:
-    """The spins of the gradient line beside their closed forms."""
+    """Compare the spins of the gradient line with their closed forms."""
     ours, smooth, cell = numbers["cells"], numbers["continuous, as the cells"], numbers["cell"]
     total = CELLS * (CELLS + 1) // 2
     k = half_load_cell(CELLS)

@@ -31,7 +31,7 @@ LAST_DIGIT = {
 
 
 def patch_numbers(patches: Mapping[str, ContactPatch]) -> dict[str, Numbers]:
-    """The columns of the published table of patches, as ours."""
+    """Return the columns of the published table of patches, as ours."""
     result = {}
     for name, patch in patches.items():
         x, y = patch.centre_of_pressure()
@@ -48,7 +48,7 @@ def patch_numbers(patches: Mapping[str, ContactPatch]) -> dict[str, Numbers]:
 
 
 def patch_comparisons(ours: Mapping[str, Numbers]) -> list[Comparison]:
-    """Each column of the table of patches over all its rows."""
+    """Compare each column of the table of patches over all its rows."""
     published = facts.published_table("patches")
     rows = []
     for column, (tolerance, unit, cause) in LAST_DIGIT.items():
@@ -59,7 +59,7 @@ def patch_comparisons(ours: Mapping[str, Numbers]) -> list[Comparison]:
 
 
 def disc_numbers(mask: ContactPatch) -> Numbers:
-    """Size of the published disc mask [m], and the moments of a true disc on the same grid."""
+    """Return the size of the published disc mask [m], and the moments of a true disc on the same grid."""
     disc = ContactPatch.disc(0.5 * WIDTH, CELLS)
     grid = mask.grid
     assert grid is not None, "the mask is cut from a grid"
@@ -75,7 +75,7 @@ def disc_numbers(mask: ContactPatch) -> Numbers:
 
 
 def shape_comparisons(numbers: Numbers) -> list[Comparison]:
-    """Moments of discs, square and lines beside closed forms; the ellipsoid's largest error on the lines too."""
+    """Compare moments of discs, square and lines with closed forms; the ellipsoid's largest error on the lines too."""
     rows = [*_disc_rows(numbers), *_grid_rows(numbers["patches"]), *_line_rows(numbers)]
     return compare_all("closed form", rows)
 
@@ -89,7 +89,7 @@ LUMPED = (
 
 
 def _disc_rows(numbers: Numbers) -> list[_Row]:
-    """`r = 2 R/3` and `<rho^2> = R^2/2`: of the mask with the radius of equal area, of a disc cut by its rim."""
+    """Return `r = 2 R/3` and `<rho^2> = R^2/2`: of the mask with the radius of equal area, of a disc cut by its rim."""
     disc, mask = numbers["disc"], numbers["patches"]["Circle"]
     cell = disc["cell"]
     lost = cell**2 / 6.0
@@ -111,7 +111,8 @@ def _moments(row: Numbers) -> tuple[float, float]:
 
 
 def _grid_rows(patches: Mapping[str, Numbers]) -> list[_Row]:
-    """Second moments of regular grids, exactly; contact radii of the square and the rod, whose cells lack a little."""
+    """Return the second moments of regular grids, exactly; contact radii of the square and the rod, whose cells lack a
+    little."""
     cell = WIDTH / CELLS
     square = WIDTH * (math.sqrt(2.0) + math.asinh(1.0)) / 6.0
     exact = "Sums of squares of whole numbers: rounding."
@@ -133,7 +134,8 @@ def _grid_rows(patches: Mapping[str, Numbers]) -> list[_Row]:
 
 
 def _line_rows(numbers: Numbers) -> list[_Row]:
-    """Largest distance of corresponding points: the whole line slides one way, the ellipsoid still sees a spin."""
+    """Return the largest distance of corresponding points: the whole line slides one way, the ellipsoid still sees a
+    spin."""
     cell, rows = WIDTH / CELLS, []
     cause = "Centre of rotation just beyond the last cell: the force is 1 and the torque 0, of what the search finds."
     for name in ("Line", "LineGrad"):

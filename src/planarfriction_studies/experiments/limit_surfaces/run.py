@@ -39,10 +39,11 @@ DIRECTIONS = (200, 400)
 """Polar angles and azimuths at which the errors are measured; a table's 20 segments fall between them."""
 
 REFINEMENTS, REFINED = 30, 0.5
-"""How often the neighbourhood of a largest distance is searched again, each time over this share of its width."""
+"""Number of further searches of the neighbourhood of a largest distance, and the share of its width that each
+covers."""
 
 STORED = {"published": LimitSurfaceTablePublished, "smooth": LimitSurfaceTable, "sum over cells": LimitSurfaceCells}
-"""What is measured beside the exact surface."""
+"""Surfaces that are compared with the exact surface."""
 
 Numbers = dict[str, Any]
 
@@ -89,7 +90,8 @@ def _measured(surface: LimitSurfaceCells, count: tuple[int, int]) -> Callable[[]
 
 
 def _mesh(count: tuple[int, int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Polar angles and azimuths of the middles of equal boxes on the direction sphere, and their shares of its area."""
+    """Return the polar angles and azimuths of the middles of equal boxes on the direction sphere, and their shares of
+    its area."""
     polar = np.pi * (np.arange(count[0])[:, None] + 0.5) / count[0]
     azimuth = 2.0 * np.pi * (np.arange(count[1])[None, :] + 0.5) / count[1]
     share = np.broadcast_to(np.sin(polar), count) / (np.sin(polar).sum() * count[1])
@@ -97,7 +99,7 @@ def _mesh(count: tuple[int, int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def ellipsoid_errors(surface: LimitSurface, count: tuple[int, int]) -> dict[str, float]:
-    """How far the ellipsoid is from the sum over the cells: as a surface, and point by point of the same twist.
+    """Compute the distances of the ellipsoid from the sum over the cells: as a surface, and for the same twists.
 
     In the coordinates (fx, fy, tau/r) the ellipsoid is the unit sphere, and the distance of a point to it is
     `||h| - 1|`; the distance of corresponding points is `|h - V_S/|V_S||`. Both for mu f_N = 1, means over all
@@ -133,7 +135,8 @@ def ellipsoid_errors(surface: LimitSurface, count: tuple[int, int]) -> dict[str,
 
 
 def _largest(distance: Callable[..., np.ndarray], polar: float, azimuth: float, width: float) -> float:
-    """Largest distance in the neighbourhood of a direction: where the centre of rotation meets a cell it is a jump."""
+    """Return the largest distance in the neighbourhood of a direction: where the centre of rotation meets a cell it is
+    a jump."""
     largest = float(distance(np.array([[polar]]), np.array([[azimuth]]))[0, 0])
     for _ in range(REFINEMENTS):
         offsets = width * np.linspace(-1.0, 1.0, 9)
@@ -146,7 +149,8 @@ def _largest(distance: Callable[..., np.ndarray], polar: float, azimuth: float, 
 
 
 def table_errors(patch: ContactPatch, count: tuple[int, int]) -> dict[str, dict[str, float]]:
-    """Error of the tables of 20 segments, and of the sum over the cells, from the exact surface of the patch.
+    """Return the error of the tables of 20 segments, and of the sum over the cells, from the exact surface of the
+    patch.
 
     In the wrench at the centre of pressure for mu f_N = 1 N, over directions of the twist.
     """
@@ -166,7 +170,8 @@ def table_errors(patch: ContactPatch, count: tuple[int, int]) -> dict[str, dict[
 
 
 def _dataset(surfaces: dict[str, LimitSurfaceCells]) -> xr.Dataset:
-    """Limit surfaces for mu f_N = 1 N about the centres of pressure, over the direction of the scaled twist."""
+    """Return the limit surfaces for mu f_N = 1 N about the centres of pressure, over the direction of the scaled
+    twist."""
     import xarray as xr
 
     polar, azimuth = np.linspace(0.0, np.pi, 61), np.linspace(0.0, 2.0 * np.pi, 121)
@@ -187,7 +192,7 @@ def _dataset(surfaces: dict[str, LimitSurfaceCells]) -> xr.Dataset:
 
 
 def _told(numbers: Numbers) -> dict[str, Any]:
-    """What the template names."""
+    """Return the values that the template names."""
     errors, stored, gradient, disc = (numbers[name] for name in ("ellipsoid", "tables", "gradient", "disc"))
     ratio = {name: each["points, mean"] / each["surfaces, mean"] for name, each in errors.items()}
     least, most = (choose(ratio, key=ratio.__getitem__) for choose in (min, max))
@@ -195,7 +200,7 @@ def _told(numbers: Numbers) -> dict[str, Any]:
     mask, radius = numbers["patches"]["Circle"], disc["radius"]
 
     def over(kind: str, quantity: str) -> str:
-        """Errors of a kind over those of the smooth table, from the best shape to the worst."""
+        """Return errors of a kind over those of the smooth table, from the best shape to the worst."""
         return span([each[kind][quantity] / each["smooth"][quantity] for each in stored.values()], ".0f")
 
     return {
@@ -221,7 +226,7 @@ def _told(numbers: Numbers) -> dict[str, Any]:
 
 
 def _patches(ours: dict[str, Numbers]) -> Table:
-    """Ours, and the largest difference from the published row in its last column."""
+    """Return the table of our patches, with the largest difference from the published row in its last column."""
     published = facts.published_table("patches")
     headings = (
         "loaded cells",

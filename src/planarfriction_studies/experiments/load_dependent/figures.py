@@ -15,7 +15,7 @@ Moments = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 def lines(labels: tuple[str, ...]) -> dict[str, dict[str, Any]]:
-    """Lines of the distributed model, the first, and of the reduced ones, which their style tells apart."""
+    """Draw lines of the distributed model, the first, and of the reduced ones, which differ in style."""
     first, *reduced = labels
     return {first: {"color": looks.DISTRIBUTED, "linewidth": 1.5}} | {
         label: {"color": looks.REDUCED, "linestyle": style, "linewidth": 1.5}
@@ -24,7 +24,7 @@ def lines(labels: tuple[str, ...]) -> dict[str, dict[str, Any]]:
 
 
 def profiles(panels: Mapping[str, tuple[ContactPatch, Moments]], loads: tuple[float, ...]) -> PlotFigure:
-    """Cuts through the patches at some loads [N], r and <rho^2> over the load with their closed forms."""
+    """Draw cuts through the patches at some loads [N], r and <rho^2> over the load with their closed forms."""
     figure = new_figure(9.6, 6.6)
     parts: Any = figure.subfigures(2, 1)
     cuts, below = parts

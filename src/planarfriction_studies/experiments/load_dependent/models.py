@@ -48,24 +48,24 @@ VARIANTS: dict[str, tuple[Literal["rebuild", "rescale", "keep"] | None, float | 
 
 
 def finger(pressure: int) -> SoftFinger:
-    """Soft finger of a pressure law of the paper."""
+    """Return the soft finger of a pressure law of the paper."""
     exponent: dict[str, float] = {"k": 2.0} if pressure == 1 else {"k_per_newton": 2.0}
     return SoftFinger(c=RADIUS_AT_1_N, n=1.0 / 3.0, radius_max=0.5 * WIDTH, **exponent)
 
 
 def soft_patch(pressure: int, *, cells: int = CELLS) -> ContactPatch:
-    """The square grid under a soft finger."""
+    """Return the square grid under a soft finger."""
     return ContactPatch.rectangle(WIDTH, cells=cells, pressure=finger(pressure))
 
 
 def profile_moment(k: float, power: int) -> float:
-    """`int_0^1 s^power (1 - s^k)^(1/k) ds = B((power + 1)/k, 1 + 1/k)/k`."""
+    """Return `int_0^1 s^power (1 - s^k)^(1/k) ds = B((power + 1)/k, 1 + 1/k)/k`."""
     a, b = (power + 1.0) / k, 1.0 + 1.0 / k
     return math.exp(math.lgamma(a) + math.lgamma(b) - math.lgamma(a + b)) / k
 
 
 def round_moments(pressure: int, loads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Contact radius r [m] and <rho^2> [m^2] of the round contact without a grid, in closed form."""
+    """Return the contact radius r [m] and <rho^2> [m^2] of the round contact without a grid, in closed form."""
     law = finger(pressure)
     radius = law.radius(loads)
     first, second = (
@@ -76,7 +76,7 @@ def round_moments(pressure: int, loads: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 def soft_scene(pressure: int, variant: str, law: LuGre = LAW) -> Scene:
-    """In-hand scene under load 1, with a model that has computed nothing yet."""
+    """Return the in-hand scene under load 1, with a model that has computed nothing yet."""
     on_load_change, load = VARIANTS[variant]
     patch = soft_patch(pressure)
     if on_load_change is None:

@@ -99,7 +99,7 @@ def _comparisons(pressures: tuple[int, ...], found: Runs, loads: np.ndarray) -> 
 
 
 def _compare_moments(pressure: int, cells: int, loads: np.ndarray) -> list[Comparison]:
-    """r and <rho^2> of a grid beside those of the round contact."""
+    """Compare r and <rho^2> of a grid with those of the round contact."""
     patch = soft_patch(pressure, cells=cells)
     cause = (
         "Profiles are sampled at the centres of cells; a round rim on a grid errs by a share of $(c/R)^{1.5}$ for the "
@@ -121,7 +121,7 @@ def _compare_moments(pressure: int, cells: int, loads: np.ndarray) -> list[Compa
 
 
 def _told(numbers: dict[str, Any], found: Runs, loads: np.ndarray) -> dict[str, Any]:
-    """What the template names."""
+    """Return the values that the template names."""
     first, *others = numbers.values()
     miss = {variant: runs.errors(found[1, variant], key) for (_, variant), key in REFERENCES.items()}
     return {

@@ -22,19 +22,19 @@ TIME_STEPS = (2e-3, 1e-2)
 
 
 def installed() -> bool:
-    """Whether Drake is there."""
+    """Return True if Drake is installed."""
     return importlib.util.find_spec("pydrake") is not None
 
 
 def version() -> str:
-    """Of Drake."""
+    """Return the version of Drake."""
     from importlib import metadata
 
     return metadata.version("drake")
 
 
 def run(work: Work) -> dict[str, Any]:
-    """Numbers by kind, case and way."""
+    """Measure all cases in Drake; return the numbers by kind, case and way."""
     ways = {**OWN, **PATCHES}
     if work.quick:
         ways = {name: ways[name] for name in ("lagged, point", "patches, point")}
@@ -62,7 +62,7 @@ def run(work: Work) -> dict[str, Any]:
 
 
 def _disc(way: Way, start: tuple[float, float]) -> dict[str, float]:
-    """Relative errors, less the stepper's own `v dt/2`."""
+    """Compute the relative errors of distance and angle, less the stepper's own `v dt/2`."""
     stop, (distance, angle) = coulomb_disc.stop(*start), drake_scenes.slide(way, start)
     return {
         "distance": (distance + 1e-3 * start[0]) / stop.distance - 1.0,

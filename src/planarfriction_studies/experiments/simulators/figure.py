@@ -17,7 +17,7 @@ OWN = looks.OTHERS[2]
 
 
 def overview(found: Mapping[str, Any], own: str) -> PlotFigure:
-    """Six panels: a row for each way, a point for each case."""
+    """Draw six panels: a row for each way, a point for each case."""
 
     def times(values: Mapping[str, float], case: Mapping[str, Any]) -> float:
         return values["seconds"] / case[own]["seconds"]

@@ -50,7 +50,7 @@ _stop = functools.cache(coulomb_disc.stop)
 
 
 def measured(work: Work, what: str, jobs: Mapping[str, Mapping[str, Callable[[], Any]]]) -> dict[str, dict[str, Any]]:
-    """Case -> way -> numbers, each a piece: an interrupted run goes on from the last."""
+    """Return numbers by case and way, each a piece: an interrupted run continues after the last."""
     return {
         case: {way: work.piece(f"{what}, {case}, {way}", job) for way, job in ways.items()}
         for case, ways in jobs.items()
@@ -60,7 +60,7 @@ def measured(work: Work, what: str, jobs: Mapping[str, Mapping[str, Callable[[],
 def begin(
     scene: MujocoScene, way: Way, dt: float = DT, integrator: str = "Euler", model: FrictionModel | None = None
 ) -> tuple[Any, Any, Callable[[], None]]:
-    """Model, data, and what makes a step."""
+    """Return MuJoCo's model and data, and a function that makes a step."""
     import mujoco
 
     if isinstance(way, Native):
@@ -71,7 +71,8 @@ def begin(
 
 
 def held(scene: MujocoScene, way: Way, dt: float = DT, body: int = 0) -> dict[str, float]:
-    """How fast what is held moves and turns, over the second half; `body`: where its pose begins in the positions."""
+    """Compute the speeds at which a held object creeps and turns in the second half; `body`: index of its pose in
+    qpos."""
     m, d, step = begin(scene, way, dt)
     path = scene.run(m, d, step)[:, body : body + 7]
     places, turns = path[:, :3], 2.0 * path[:, 4:]  # half-angles about the axes of the world: it starts upright
@@ -86,7 +87,7 @@ def held(scene: MujocoScene, way: Way, dt: float = DT, body: int = 0) -> dict[st
 
 
 def shaken(way: Way, integrator: str, scene: MujocoScene) -> dict[str, float]:
-    """How far the block comes away from its place in the hand while that is shaken [m]."""
+    """Compute the range of positions of the block in the hand while the hand is shaken [m]."""
     m, d, step = begin(scene, way, integrator=integrator)
     places = []
 
@@ -102,7 +103,8 @@ def shaken(way: Way, integrator: str, scene: MujocoScene) -> dict[str, float]:
 def disc(
     way: Way, start: tuple[float, float], touch: Literal["face", "point"] = "face", kind: type | None = None
 ) -> dict[str, float]:
-    """Relative errors of distance and angle against the exact Coulomb disc, less the stepper's own `v dt/2`."""
+    """Return the relative errors of distance and angle against the exact Coulomb disc, less the stepper's own `v
+    dt/2`."""
     speed, spin = start
     scene = _disc(speed, spin, joint="free", touch=touch)
     model = None if kind is None else kind(scene.model.patch, scene.model.law)
@@ -117,7 +119,7 @@ def disc(
 
 
 def in_hand(way: Way, load: Literal[1, 2], kind: type | None = None) -> dict[str, float]:
-    """Where the plate of the published run ends, less the converged end of the distributed model."""
+    """Compute the end of the plate of the published run, less the converged end of the distributed model."""
     scene = _plate(load)
     model = None if kind is None else kind(scene.model.patch, scene.model.law)
     m, d, step = begin(scene, way, model=model)
@@ -131,7 +133,8 @@ def in_hand(way: Way, load: Literal[1, 2], kind: type | None = None) -> dict[str
 
 
 def cost(scene: MujocoScene, ways: Mapping[str, Way], *, steps: int, rounds: int) -> dict[str, dict[str, float]]:
-    """Seconds of a step by name: the least of `rounds`, in turns, of `steps` from where the scene has settled."""
+    """Measure the seconds of a step by name: the least of `rounds`, in turns, of `steps` from where the scene has
+    settled."""
     runs = {}
     for name, way in ways.items():
         m, d, step = begin(dataclasses.replace(scene, time=0.0), way)

@@ -1,4 +1,4 @@
-"""What the comparison of simulators says: its tables, our numbers beside those of theory, and its findings."""
+"""Words of the comparison of simulators: its tables, our numbers beside those of theory, and its findings."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ TOLERANCES = {
     "creep": (1e-3, "um/s"), "turning": (1e-6, "deg/s"), "displacement": (1.0, "um"), "slip": (1.0, "um"),
     "distance": (0.05, "%"), "angle": (0.2, "%"), "end": (2.5, "mm"), "turned": (0.5, "deg"),
 }  # fmt: skip
-"""How far patches may be from the closed form, or from the converged run, before it is said."""
+"""Tolerances of patches against the closed form or the converged run."""
 
 Numbers = dict[str, dict[str, dict[str, float]]]
 """Case -> way -> quantity."""
 
 
 def comparisons(found: Mapping[str, Any]) -> list[Comparison]:
-    """Our numbers against rest, and against the exact disc and the converged run."""
+    """Compare our numbers with rest, with the exact disc and with the converged run."""
     rows: list[tuple[str, float, str]] = []
     for case, ways in found["steps"].items():
         for dt, values in ways.items():
@@ -74,7 +74,7 @@ def comparisons(found: Mapping[str, Any]) -> list[Comparison]:
 
 
 def tables(found: Mapping[str, Any]) -> list[Table]:
-    """Ways as rows, cases as columns, each number with its unit."""
+    """Return the tables: ways as rows, cases as columns, each number with its unit."""
     drake = found.get("drake")
     return [
         _by_way("What is held: creep and turning", found["held"], _creep),
@@ -112,7 +112,7 @@ def tables(found: Mapping[str, Any]) -> list[Table]:
 
 
 def _ratios(cases: Numbers, own: str) -> Numbers:
-    """Times over those of one way."""
+    """Return times over those of one way."""
     return {
         f"{case} ({1e6 * ways[own]['seconds']:.0f} us)": {
             way: {"ratio": values["seconds"] / ways[own]["seconds"]} for way, values in ways.items()
@@ -122,7 +122,7 @@ def _ratios(cases: Numbers, own: str) -> Numbers:
 
 
 def _by_way(title: str, cases: Numbers, words: Callable[[Mapping[str, float]], str]) -> Table:
-    """Ways as rows, cases as columns."""
+    """Return a table with ways as rows and cases as columns."""
     ways = {way: way for way in next(iter(cases.values()))}
     return table(title, ways, {name: lambda way, case=case: words(case[way]) for name, case in cases.items()})
 
@@ -146,7 +146,7 @@ def _end(values: Mapping[str, float]) -> str:
 
 
 def template_values(found: Mapping[str, Any], versions: Mapping[str, str]) -> dict[str, Any]:
-    """What the template names."""
+    """Return the values that the template names."""
 
     def worst(kind: str, way: str, *keys: str) -> float:
         return max(abs(case[way][key]) for case in found[kind].values() for key in keys)

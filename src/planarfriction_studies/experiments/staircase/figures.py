@@ -20,7 +20,7 @@ COLOURS = {"plain": looks.DISTRIBUTED, "bilinear": looks.REDUCED, "rod": looks.E
 
 
 def overview(time: np.ndarray, found: Arrays) -> PlotFigure:
-    """Force [N] and torque [N mm] over the whole profile."""
+    """Draw the force [N] and torque [N mm] over the whole profile."""
     figure = new_figure(9.0, 7.2)
     panels = figure.subplots(3, 1, sharex=True)
     for axes, column in zip(panels, range(3), strict=True):
@@ -31,7 +31,7 @@ def overview(time: np.ndarray, found: Arrays) -> PlotFigure:
 
 
 def zoom(time: np.ndarray, found: Arrays, edge: dict[str, dict[str, float]]) -> PlotFigure:
-    """The first steps of fx and of the torque; where the smoothing ends, at the times that `edge` holds."""
+    """Draw the first steps of fx and of the torque; where the smoothing ends, at the times that `edge` holds."""
     figure = new_figure(9.6, 6.4)
     panels = figure.subplots(2, 2)
     high, low = edge["high"]["time"], edge["low"]["time"]

@@ -50,7 +50,7 @@ STEP = 0.02
 
 
 def rod_wrench(twist: np.ndarray, half_length: float) -> np.ndarray:
-    """Sliding wrench `[..., 3]` [1, 1, m] of a uniform rod along y about its middle, exact; zero at rest.
+    """Return the sliding wrench `[..., 3]` [1, 1, m] of a uniform rod along y about its middle, exact; zero at rest.
 
     `W = -dPhi/dV` of `Phi = [F(u1) - F(u0)]/(4 a omega)`, `F(u) = u s + vy^2 asinh(u/|vy|)`, `s = sqrt(u^2 + vy^2)`,
     where `u1, u0 = vx +- omega a` are the speeds of the ends across the rod and `a` is `half_length` [m].
@@ -71,7 +71,8 @@ def rod_wrench(twist: np.ndarray, half_length: float) -> np.ndarray:
 
 
 def smoothed_wrench(twist: np.ndarray, patch: ContactPatch) -> np.ndarray:
-    """Sliding wrench `[T, 3]` [1, 1, m] with the published bilinear smoothing; the patch is centred on the origin.
+    """Return the sliding wrench `[T, 3]` [1, 1, m] with the published bilinear smoothing; the patch is centred on the
+    origin.
 
     Source: Waltersson and Karayiannidis 2024, section IV.
     """
@@ -122,21 +123,22 @@ def _wrenches(twist: np.ndarray, patch: ContactPatch) -> Arrays:
 
 
 def _steps(time: np.ndarray, fx: np.ndarray) -> Arrays:
-    """Last sample before each step of fx, and the height of the step, while vx changes."""
+    """Return the last sample before each step of fx, and the height of the step, while vx changes."""
     change = np.abs(np.diff(fx))
     at = np.flatnonzero(change > STEP)
     return {"time": time[at], "height": change[at]}
 
 
 def _published_steps() -> tuple[np.ndarray, float]:
-    """Last published vertex before each step of plain fx, and the time to the next one [s], the same at every step."""
+    """Return the last published vertex before each step of plain fx, and the time to the next one [s], the same at
+    every step."""
     curve = facts.published_curve("staircase/plain/fx")
     before = np.flatnonzero(np.abs(np.diff(curve.values)) > STEP)
     return curve.time[before], float(np.diff(curve.time)[before].max())
 
 
 def _label_shifts(profile: Any, patch: ContactPatch) -> dict[str, float]:
-    """How far plain fx and fy [N] miss the published vertices if a label means the state one sample before or after."""
+    """Compute the errors of plain fx and fy [N] at the published vertices if labels mean the sample before or after."""
     surface = LimitSurfaceCells(patch)
     result = {}
     for words, shift in (("before", -SAMPLE_TIME), ("at", 0.0), ("after", SAMPLE_TIME)):
@@ -150,7 +152,8 @@ def _label_shifts(profile: Any, patch: ContactPatch) -> dict[str, float]:
 
 
 def _errors(work: Work, twist: np.ndarray, count: int) -> dict[str, list[float]]:
-    """Largest and mean distance from the rod, tangential [N] and torque [N m], of both sums over `count` cells."""
+    """Return the largest and mean distance from the rod, tangential [N] and torque [N m], of both sums over `count`
+    cells."""
     patch = PUBLISHED_PATCHES["Line"](cells=count, width=WIDTH)
     found = work.piece(f"line, {count} cells", lambda: _wrenches(twist, patch))
     moving = np.abs(twist).max(axis=1) > 0.0
@@ -163,7 +166,7 @@ def _errors(work: Work, twist: np.ndarray, count: int) -> dict[str, list[float]]
 
 
 def _crossings(patch: ContactPatch) -> np.ndarray:
-    """When the centre of rotation, at y = vx/omega, meets the centres of cells during the ramp of vx [s]."""
+    """Compute the times [s] at which the centre of rotation, y = vx/omega, meets centres of cells on the ramp of vx."""
     start, end, speed = SLIDE_RAMP
     y = np.sort(patch.positions[:, 1])
     return start + (end - start) * y[y > -1e-9] / speed
@@ -218,7 +221,7 @@ def _comparisons(
 
 
 def _plateaus(time: np.ndarray, found: Arrays) -> list[Comparison]:
-    """Torque of a pure spin: published plateaus, and what plain sum and rod must give."""
+    """Compare the torque of a pure spin: published plateaus, plain sum and rod."""
     published = facts.published_table("patches")["Line"]
     spin = int(np.searchsorted(time, 0.7))
     cell = WIDTH / 21
@@ -237,7 +240,7 @@ def _plateaus(time: np.ndarray, found: Arrays) -> list[Comparison]:
 
 
 def _step_comparisons(steps: Arrays, patch: ContactPatch) -> list[Comparison]:
-    """When and by how much plain fx steps."""
+    """Compare the times and heights of the steps of plain fx."""
     theirs, _ = _published_steps()
     upward = steps["time"] < SLIDE_RAMP[1]
     # first and last the centre of rotation leaves and meets the middle cell
@@ -268,7 +271,7 @@ def _dataset(time: np.ndarray, twist: np.ndarray, found: Arrays) -> xr.Dataset:
 
 
 def _told(numbers: dict[str, Any]) -> dict[str, Any]:
-    """What the template names."""
+    """Return the values that the template names."""
     radius, by_cells = numbers["radius"], numbers["error_against_the_rod"]
     few, *_, many = by_cells
     sums = ("plain", "bilinear")
@@ -289,14 +292,14 @@ def _told(numbers: dict[str, Any]) -> dict[str, Any]:
 
 
 def _orders(by_cells: dict[str, dict[str, list[float]]], name: str) -> list[float]:
-    """Powers of the number of cells with which the largest and the mean error in force fall [-]."""
+    """Return powers of the number of cells with which the largest and the mean error in force fall [-]."""
     few, *_, many = by_cells
     ratio = np.log(np.array(by_cells[few][name]) / by_cells[many][name]) / np.log(int(few) / int(many))
     return ratio[:2].tolist()
 
 
 def _error_table(errors: dict[int, dict[str, list[float]]]) -> Table:
-    """Largest and mean errors of both sums against the rod, by the number of cells."""
+    """Return the largest and mean errors of both sums against the rod, by the number of cells."""
     rows = {f"{count}, {name}": values for count, error in errors.items() for name, values in error.items()}
     headings = ("force, max [N]", "force, mean [N]", "torque, max [N mm]", "torque, mean [N mm]")
     columns = {

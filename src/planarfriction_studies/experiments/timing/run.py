@@ -1,4 +1,4 @@
-"""What the runs cost: the paper's table on this machine, and work against precision for ours and SciPy's solvers."""
+"""Costs of the runs: the paper's table on this machine, and work against precision for ours and SciPy's solvers."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ CONVERGED_ALLOWANCE = {"x": 1e-7, "y": 1e-7, "theta": 1e-6}
 """Accuracy of our reference and of the start of the window [m, m, rad]."""
 
 PUBLISHED_STEP_RATIO = 80
-"""How many times cheaper one step of the reduced model is, according to the paper."""
+"""Ratio of the costs of one step, distributed over reduced, according to the paper."""
 
 LEVELS = {"reduced": 1e-6, "distributed": 1e-8}
 """Position errors [m] at which times are compared."""
@@ -74,7 +74,7 @@ def run(work: Work) -> Result:
 
 
 def _machine() -> dict[str, Any]:
-    """What the times depend on."""
+    """Return the properties of the machine that the times depend on."""
     versions = {name: metadata.version(name) for name in ("numpy", "scipy", "numba")}
     load = os.getloadavg()[0] if hasattr(os, "getloadavg") else -1.0
     return {
@@ -88,7 +88,7 @@ def _machine() -> dict[str, Any]:
 
 
 def _baselines(work: Work) -> dict[str, dict[str, Arrays]]:
-    """Row -> kind -> LSODA beside ours; the distributed model over a window unless all is wanted."""
+    """Time LSODA beside ours, by row and kind; the distributed model over a window unless all is wanted."""
     if work.quick:
         return {CIRCLE: {kind: runs.beside_lsoda(CIRCLE, kind, *QUICK_WINDOW, work) for kind in KINDS}}
     spans = {"distributed": (0.0, 2.0) if work.full else BREAKAWAY, "reduced": (0.0, 2.0)}
@@ -117,18 +117,18 @@ def _row_numbers(row: Mapping[str, Arrays], baselines: Mapping[str, Arrays]) -> 
 
 
 def _step_ratio(table: Mapping[str, Mapping[str, Arrays]]) -> dict[str, float]:
-    """Cost of one step of the distributed model over one of the reduced model."""
+    """Return the cost of one step of the distributed model over one of the reduced model."""
     cost = {kind: run["solver"] / run["trials"] for kind, run in table[CIRCLE].items()}
     return _ratio(cost["distributed"], cost["reduced"])
 
 
 def _spread(times: np.ndarray) -> dict[str, float]:
-    """Median and quartiles by name."""
+    """Return the median and quartiles by name."""
     return dict(zip(("middle", "least", "most"), map(float, times), strict=True))
 
 
 def _ratio(times: np.ndarray, others: np.ndarray) -> dict[str, float]:
-    """Ratio of the medians, and the least and the greatest that the quartiles allow."""
+    """Return the ratio of the medians, and the least and the greatest that the quartiles allow."""
     return _spread(times / others[[0, 2, 1]])
 
 
@@ -138,7 +138,7 @@ def _ratio(times: np.ndarray, others: np.ndarray) -> dict[str, float]:
 def _agreements(
     problem: Problem, solved: Mapping[tuple[str, float], Arrays], reference: np.ndarray
 ) -> list[Comparison]:
-    """General solvers at their tightest tolerances beside our reference."""
+    """Compare the general solvers at their tightest tolerances with our reference."""
     found = []
     for solver, tolerances in problem.tolerances.items():
         if solver in runs.STRUCTURED:
@@ -156,7 +156,7 @@ def _agreements(
 
 
 def _against_converged(problem: Problem, reference: np.ndarray) -> list[Comparison]:
-    """Our reference beside the converged solution, at the times they share."""
+    """Compare our reference with the converged solution, at the times they share."""
     solution = facts.converged(CONVERGED[problem.kind])
     times = problem.window.ends
     index = np.abs(solution["time"][:, None] - times).argmin(axis=0)
@@ -181,7 +181,7 @@ def _told(
     comparisons: Sequence[Comparison],
     machine: Mapping[str, Any],
 ) -> dict[str, Any]:
-    """What the template names."""
+    """Return the values that the template names."""
     published = facts.published_table("timing")
     return {
         "ours": {kind: _spread(table[CIRCLE][kind]["time"]) for kind in KINDS},
@@ -200,7 +200,7 @@ def _told(
 
 
 def _precision(problem: Problem, points: Points) -> dict[str, Any]:
-    """The time of each solver to the same error, and the solvers that do not reach it."""
+    """Return the time of each solver to the same error, and the solvers that do not reach it."""
     level = LEVELS[problem.kind]
     times = {
         solver: runs.cheapest([(each["error"], [each[name] for name in TIMES]) for each in entries], level)
@@ -270,13 +270,13 @@ def _points_table(problem: Problem, points: Points) -> Table:
 
 
 def _shown(times: Mapping[str, float]) -> str:
-    """The median, and in brackets the quartiles where they differ."""
+    """Write the median, and in brackets the quartiles where they differ."""
     middle, least, most = (short(times[name]) for name in ("middle", "least", "most"))
     return middle if least == most else f"{middle} ({least} to {most})"
 
 
 def _dataset(points: Points) -> xr.Dataset:
-    """Error and time over the runs, one after the other."""
+    """Return the error and time over the runs, one after the other."""
     import xarray as xr
 
     entries = [(solver, entry) for solver, found in points.items() for entry in found]

@@ -59,7 +59,7 @@ CIRCLE = next(iter(ROWS))
 
 @dataclass(frozen=True, eq=False)
 class Problem:
-    """What solvers are compared on."""
+    """Problem that solvers are compared on."""
 
     name: str
     kind: str
@@ -76,9 +76,8 @@ class Problem:
 
 
 def problems(work: Work) -> list[Problem]:
-    """Reduced: the whole run; distributed: a short window, without Radau, which takes a minute for it, unless all is
-    wanted. A quick look takes a short window for both.
-    """
+    """Return the problems. Reduced: the whole run; distributed: a short window, without Radau, which takes a minute for
+    it, unless all is wanted. A quick look takes a short window for both."""
     if work.quick:
         tolerances = {"RODAS4": (1e-6,), "LSODA": (1e-6,)}
         with_radau = {**tolerances, "Radau": (1e-6,)}
@@ -96,7 +95,7 @@ def _problem(kind: str, begin: float, end: float, tolerances: dict[str, tuple[fl
 
 
 def solve(problem: Problem, solver: str, tolerance: float) -> Poses:
-    """One run; absolute tolerances are the same share of the natural scales for all solvers."""
+    """Solve one run; absolute tolerances are the same share of the natural scales for all solvers."""
     window, atol = problem.window, ATOL_PER_RTOL * tolerance
     if solver in STRUCTURED:
         return window.ours(rtol=tolerance, atol=atol, method=STRUCTURED[solver])[0]
@@ -104,13 +103,13 @@ def solve(problem: Problem, solver: str, tolerance: float) -> Poses:
 
 
 def reference(problem: Problem, work: Work) -> np.ndarray:
-    """Poses at the ends of the window's pieces, [S, 3], by RODAS4 at a tight tolerance."""
+    """Return poses at the ends of the window's pieces, [S, 3], by RODAS4 at a tight tolerance."""
     label = f"timing, {problem.name}, reference"
     return work.piece(label, lambda: {"poses": solve(problem, "RODAS4", REFERENCE).poses})["poses"]
 
 
 def work_precision(problem: Problem, work: Work) -> dict[tuple[str, float], Arrays]:
-    """Solver and tolerance -> `time` [s] (median, quartiles), `poses`, `evaluations`, `repeats`."""
+    """Return by solver and tolerance `time` [s] (median, quartiles), `poses`, `evaluations`, `repeats`."""
     found = {}
     for solver, tolerances in problem.tolerances.items():
         for tolerance in tolerances:
@@ -137,7 +136,8 @@ def _spread(times: Sequence[float]) -> list[float]:
 
 
 def whole_runs(row: str, kind: str, work: Work) -> Arrays:
-    """All of `simulate` at default tolerances, tables included: `time`, `solver` [s] (median, quartiles), `trials`."""
+    """Time all of `simulate` at default tolerances, tables included: `time`, `solver` [s] (median, quartiles),
+    `trials`."""
     return work.piece(
         f"timing, {row}, {kind}, whole run",
         functools.partial(_whole_runs, ROWS[row][kind], 1 if work.quick else MOST_REPEATS),
@@ -158,7 +158,8 @@ def _whole_runs(scene: Callable[[], Scene], repeats: int) -> dict[str, Any]:
 
 
 def beside_lsoda(row: str, kind: str, begin: float, end: float, work: Work) -> Arrays:
-    """LSODA as published, and ours at default tolerances, over a window: `lsoda` and `ours` [s] (median, quartiles)."""
+    """Time LSODA as published, and ours at default tolerances, over a window: `lsoda` and `ours` [s] (median,
+    quartiles)."""
     label = f"timing, {row}, {kind}, LSODA as published, {begin:g} to {end:g} s"
     return work.piece(label, functools.partial(_beside_lsoda, ROWS[row][kind], begin, end))
 
@@ -172,15 +173,16 @@ def _beside_lsoda(scene: Callable[[], Scene], begin: float, end: float) -> dict[
 
 
 def position_error(poses: np.ndarray, reference: np.ndarray) -> float:
-    """Largest distance between two histories of the centre of mass [m]."""
+    """Return the largest distance between two histories of the centre of mass [m]."""
     return float(np.hypot(*(poses - reference)[:, :2].T).max())
 
 
 def angle_error(poses: np.ndarray, reference: np.ndarray) -> float:
-    """Largest difference of the angle [rad]."""
+    """Return the largest difference of the angle [rad]."""
     return float(np.abs(poses - reference)[:, 2].max())
 
 
 def cheapest(points: Sequence[tuple[float, list[float]]], error: float) -> list[float] | None:
-    """Shortest of the times (median first) among the points (error, times) at least as good as `error`; None: none."""
+    """Return the shortest of the times (median first) among the points (error, times) at least as good as `error`;
+    None: none."""
     return min((times for found, times in points if found <= error), default=None)

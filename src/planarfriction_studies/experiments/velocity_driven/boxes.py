@@ -55,7 +55,7 @@ WRONG_SAMPLES = 2
 
 
 def errors(wrenches: Arrays) -> Errors:
-    """Distance of both reduced models from the distributed one at every sample after t = 0."""
+    """Return the distance of both reduced models from the distributed one at every sample after t = 0."""
     miss = {name: (wrenches[kind] - wrenches["d"])[1:] for name, kind in MODELS.items()}
     return {
         "ft": {name: np.hypot(each[:, 0], each[:, 1]) for name, each in miss.items()},
@@ -64,7 +64,7 @@ def errors(wrenches: Arrays) -> Errors:
 
 
 def statistics(values: np.ndarray, method: str = "linear") -> dict[str, float]:
-    """Numbers of a box plot (`COLUMNS`) of the errors `values`; `method` is that of `numpy.percentile`."""
+    """Return numbers of a box plot (`COLUMNS`) of the errors `values`; `method` is that of `numpy.percentile`."""
     first, median, third = np.percentile(values, [25, 50, 75], method=method)  # pyright: ignore[reportCallIssue, reportArgumentType]
     reach = 1.5 * (third - first)
     low, high = values[values >= first - reach].min(), values[values <= third + reach].max()
@@ -72,7 +72,8 @@ def statistics(values: np.ndarray, method: str = "linear") -> dict[str, float]:
 
 
 def slack(values: np.ndarray, samples: int = WRONG_SAMPLES) -> dict[str, float]:
-    """How far each statistic can move if that many samples are wrong: to its neighbours in the sorted errors."""
+    """Compute the largest move of each statistic if that many samples are wrong: to its neighbours in the sorted
+    errors."""
     ordered, box = np.sort(values), statistics(values)
     rank = np.arange(len(ordered))
     result = {}
@@ -84,7 +85,8 @@ def slack(values: np.ndarray, samples: int = WRONG_SAMPLES) -> dict[str, float]:
 
 
 def guard_effect(shape: str) -> dict[str, float]:
-    """What the guard adds to the friction of a steady slide [N] and spin [N m] at 1 N: `sigma_0 GUARD/2`."""
+    """Compute the friction that the guard adds to that of a steady slide [N] and spin [N m] at 1 N: `sigma_0
+    GUARD/2`."""
     force = 0.5 * runs.LAW.sigma_0 * GUARD
     return {"N": force, "N m": force * _contact_radius(shape)}
 
@@ -95,18 +97,20 @@ def _contact_radius(shape: str) -> float:
 
 
 def spin_up_error() -> float:
-    """Error of the figures' solver in the spin-up, where all reduced models of the disc are the same [N m]."""
+    """Return the error of the figures' solver in the spin-up, where all reduced models of the disc are the same [N
+    m]."""
     return facts.published_curve("driven/Circle/r/tau").deviation or 0.0
 
 
 def solver_error() -> dict[str, float]:
-    """Error of the figures' solver elsewhere: that of the distributed model of the disc in fx [N] and tau [N m]."""
+    """Return the error of the figures' solver elsewhere: that of the distributed model of the disc in fx [N] and tau [N
+    m]."""
     curves = {"N": "driven/Circle/d/fx", "N m": "driven/Circle/d/tau"}
     return {unit: facts.published_curve(name).deviation or 0.0 for unit, name in curves.items()}
 
 
 def comparisons(every: dict[str, Errors]) -> list[Comparison]:
-    """Every published and every converged number of the box plots beside ours."""
+    """Compare every published and every converged number of the box plots with ours."""
     return [
         row
         for shape, each in every.items()
@@ -121,7 +125,7 @@ def comparisons(every: dict[str, Errors]) -> list[Comparison]:
 def _box_comparisons(
     reference: Reference, shape: str, quantity: str, model: str, values: np.ndarray
 ) -> list[Comparison]:
-    """One box beside its reference; the published plots hide the maximum."""
+    """Compare one box with its reference; the published plots hide the maximum."""
     ours, freedom = statistics(values), slack(values)
     rows = []
     for column, theirs in reference_box(reference, shape, quantity, model).items():
@@ -133,7 +137,7 @@ def _box_comparisons(
 
 
 def reference_box(reference: Reference, shape: str, quantity: str, model: str) -> dict[str, float]:
-    """A published or converged box, by `COLUMNS`; without the maximum where it is published."""
+    """Return a published or converged box, by `COLUMNS`; without the maximum where it is published."""
     if reference == "published":
         return facts.published_table("box")[f"{quantity}/{shape}/{model}"]
     return dict(zip(COLUMNS, facts.converged(f"box/{quantity}/{shape}")[model].tolist(), strict=True))
@@ -166,7 +170,8 @@ _CAUSES = {
 
 
 def convention_misses(every: dict[str, Errors]) -> dict[str, float]:
-    """Largest distance [N] of the table model's force quartiles from the converged ones, by convention of sampling."""
+    """Return the largest distance [N] of the table model's force quartiles from the converged ones, by convention of
+    sampling."""
     conventions = {
         "500 samples, linear": statistics,
         "501 samples, linear": lambda values: statistics(np.append(values, 0.0)),

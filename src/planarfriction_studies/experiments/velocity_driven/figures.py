@@ -26,7 +26,7 @@ BOX_PANELS = (("ft", "error of the force [N]", 1.0, 1e-5), ("tau", "error of the
 
 
 def profile(disc: Arrays) -> PlotFigure:
-    """Velocity profile [mm/s, rad/s], and the wrench of the distributed model of the disc [N, N mm]."""
+    """Draw the velocity profile [mm/s, rad/s], and the wrench of the distributed model of the disc [N, N mm]."""
     figure = new_figure(9.6, 4.6)
     above, below = figure.subplots(2, 3, sharex=True)
     time = np.arange(0.0, 5.0, 0.001)
@@ -46,7 +46,7 @@ def profile(disc: Arrays) -> PlotFigure:
 
 
 def pair(shape: str, kind: str, wrenches: Arrays) -> PlotFigure:
-    """Forces [N] and torque [N mm] of one reduced model on top of those of the distributed one, as published."""
+    """Draw forces [N] and torque [N mm] of one reduced model on top of those of the distributed one, as published."""
     figure = new_figure(9.6, 3.4)
     panels = figure.subplots(1, 3)
     beside = ", beside the ellipsoid" if kind == "e" else ""
@@ -62,7 +62,7 @@ def pair(shape: str, kind: str, wrenches: Arrays) -> PlotFigure:
 
 
 def page(found: dict[str, Arrays]) -> PlotFigure:
-    """Forces [N] and torque [N mm] of several shapes, a row for each, with all three models."""
+    """Draw forces [N] and torque [N mm] of several shapes, a row for each, with all three models."""
     figure = new_figure(9.6, 2.1 * len(found) + 0.7)
     panels = figure.subplots(len(found), 3, sharex=True, squeeze=False)
     for row, (shape, wrenches) in zip(panels, found.items(), strict=True):
@@ -78,7 +78,8 @@ def page(found: dict[str, Arrays]) -> PlotFigure:
 
 
 def box_plots(every: dict[str, boxes.Errors]) -> PlotFigure:
-    """Errors of force [N] and torque [N mm] of all shapes, ours filled and the published boxes open beside them."""
+    """Draw errors of force [N] and torque [N mm] of all shapes, ours filled and the published boxes open beside
+    them."""
     figure = new_figure(9.6, 7.4)
     panels = figure.subplots(2, 1, sharex=True)
     for axes, (quantity, label, factor, linear) in zip(panels, BOX_PANELS, strict=True):

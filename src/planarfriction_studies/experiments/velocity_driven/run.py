@@ -126,7 +126,7 @@ def _curve_comparisons(found: dict[str, Arrays]) -> list[Comparison]:
 def _ellipsoid_comparisons(
     quantity: str, time: np.ndarray, values: np.ndarray, name: str, shape: str, unit: str
 ) -> list[Comparison]:
-    """A curve of the ellipsoid, whose own solver error is not known; of the torque, the spin-up apart."""
+    """Compare a curve of the ellipsoid, whose own solver error is not known; of the torque, the spin-up apart."""
     guard = boxes.OWN[unit] + boxes.guard_effect(shape)[unit]
     table_model = facts.published_curve(name.replace("/e/", "/r/")).deviation or 0.0
     if unit == "N":
@@ -142,7 +142,7 @@ def _ellipsoid_comparisons(
 
 
 def _rounded(name: str) -> float:
-    """What the known error of a figure, which is kept to three digits, may have lost."""
+    """Return the rounding error of a figure's known error, which is kept to three digits."""
     return 5e-3 * (facts.published_curve(name).deviation or 0.0)
 
 
@@ -173,7 +173,7 @@ def _velocity_comparisons(velocity: Any) -> list[Comparison]:
 
 
 def _guard_comparison(disc: Arrays) -> Comparison:
-    """The published ellipsoid's surplus of friction in steady pure slide beside what the guard explains."""
+    """Compare the published ellipsoid's surplus of friction in steady pure slide with what the guard explains."""
     return compare(
         "disc, surplus of the published ellipsoid's friction in a steady slide",
         _guard_surplus(disc),
@@ -226,7 +226,8 @@ def _statistics(shape: str, errors: np.ndarray) -> dict[str, Any]:
 
 
 def _centre_of_rotation(shape: str, sample: int) -> dict[str, float] | None:
-    """Its distances from the centre of pressure and from the nearest loaded cell [m] at a sample; None in a slide."""
+    """Return the distances of the centre of rotation from the centre of pressure and from the nearest loaded cell [m]
+    at a sample; None in a slide."""
     vx, vy, omega = published_velocity().left(0.01 * sample - 0.005)
     if omega == 0.0:
         return None
@@ -254,7 +255,7 @@ def _dataset(found: dict[str, Arrays], velocity: Any) -> xr.Dataset:
 
 
 def _told(numbers: dict[str, Any]) -> dict[str, Any]:
-    """What the template names."""
+    """Return the values that the template names."""
     errors = numbers["errors"]
     quartiles: list[dict[str, Any]] = [
         {"shape": runs.IN_WORDS[shape]}
@@ -289,7 +290,7 @@ def _told(numbers: dict[str, Any]) -> dict[str, Any]:
 
 
 def _error_table(numbers: dict[str, Any]) -> Table:
-    """Errors of both reduced models against the distributed one."""
+    """Return errors of both reduced models against the distributed one."""
     rows = {
         f"{runs.IN_WORDS[shape]}, {figures.BOX_WORDS[model]}": {name: each[model] for name, each in quantities.items()}
         for shape, quantities in numbers["errors"].items()
