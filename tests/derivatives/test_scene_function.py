@@ -177,5 +177,5 @@ def test_jax_agrees_with_the_derivatives_forwards():
         assert mapped[0] == pytest.approx(expected[:, 1].sum(), rel=1e-5)
         with pytest.raises(FrictionError, match="first derivatives only"):
             jax.grad(jax.grad(lambda v: motion(at[0], at[1], v).sum()))(0.08)
-        with pytest.raises(InvalidValueError, match="mu must be >= 0"):
+        with pytest.raises(InvalidValueError, match="mu must be > 0"):
             motion(-1.0, at[1], at[2])

@@ -21,8 +21,8 @@ import jax.numpy as jnp  # noqa: E402
 from jax.flatten_util import ravel_pytree  # noqa: E402
 
 import planarfriction.jax as pj  # noqa: E402
-from planarfriction.jax import namespace as xp  # noqa: E402
-from planarfriction.limit_surface import surface_arrays  # noqa: E402
+from planarfriction.jax.namespace import xp  # noqa: E402
+from planarfriction.tensors import surfaces  # noqa: E402
 
 pytestmark = pytest.mark.jax
 
@@ -184,7 +184,7 @@ NEAR_THE_AXIS = [[1e-6, 0.0, 1.0], [2e-6, -1e-6, -1.0], [-1e-7, 1e-9, -1.0]]
 def test_derivative_of_sliding_is_that_of_the_kernel(kind):
     numpy_model, model = pairs(kind, "plain")
     surface = model.surface
-    sliding = functools.partial(surface_arrays.sliding, xp, surface.kind, surface.size, surface.data)
+    sliding = functools.partial(surfaces.sliding, xp, surface.kind, surface.size, surface.data)
     slope = jax.jit(jax.vmap(jax.jacrev(lambda twist: sliding(twist, xp.norm(twist, -1)))))
     scaled = np.concatenate([twists(60)[20:] * (1.0, 1.0, 0.005), EDGES, NEAR_THE_AXIS])
     assert np.abs(slope(scaled) - numpy_model.surface._sliding_slope(scaled)).max() < 1e-11

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.models import reduced_arrays
+from planarfriction.tensors import reduced
 
 torch = pytest.importorskip("torch", reason="needs PyTorch: pip install 'planarfriction[torch]'")
 
 from planarfriction.torch import ReducedModel, rollout, tracking_loss  # noqa: E402
-from planarfriction.torch import namespace as xp  # noqa: E402
+from planarfriction.torch.namespace import xp  # noqa: E402
 from planarfriction.torch.reduced import PARAMETERS  # noqa: E402
 
 pytestmark = pytest.mark.torch
@@ -89,11 +89,11 @@ def test_a_stuck_patch_is_a_spring():
 
 def test_a_map_of_six_faces_is_read_as_the_odd_one_that_it_repeats():
     model, reference = module(), compiled("elasto-plastic")
-    law, three, _ = model.prepare(model.physical())[0]
+    law, three, _ = model._parts_at(None)[0]
     signs = tensor([-1.0, 1.0, 1.0, -1.0])
     flat, rest = (torch.cat([part, part.flip(1, 2) * signs]) for part in (three.flat, three.rest))
     twist = tensor(samples(reference)[1])
-    odd, other = (reduced_arrays.held(xp, law, s, twist).q for s in (three, three._replace(flat=flat, rest=rest)))
+    odd, other = (reduced.drive(xp, law, s, twist).q for s in (three, three._replace(flat=flat, rest=rest)))
     torch.testing.assert_close(odd, other, rtol=1e-12, atol=1e-20)
 
 

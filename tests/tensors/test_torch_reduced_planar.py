@@ -247,8 +247,8 @@ def test_roll_outs_take_the_compiled_adjoint(monkeypatch):
     from planarfriction.torch import adjoint
 
     calls = []
-    roll_out = adjoint.roll_out
-    monkeypatch.setattr(adjoint, "roll_out", lambda *inputs: calls.append(1) or roll_out(*inputs))
+    original = adjoint.rollout
+    monkeypatch.setattr(adjoint, "rollout", lambda *inputs: calls.append(1) or original(*inputs))
     simulate(build(), profile(5), 1.0)
     assert calls
 

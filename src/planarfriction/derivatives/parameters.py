@@ -14,8 +14,9 @@ from planarfriction.formulas import LawNumbers
 from planarfriction.geometry import transformed
 from planarfriction.kernels import published_rollout, published_step, reduced_loads, reduced_rollout, reduced_step
 from planarfriction.models import ReducedModel, ReducedModelPublished
+from planarfriction.models.map_sizes import MapSizes, maps_of
 from planarfriction.models.published_shapes import PublishedShape, axes_of
-from planarfriction.models.reduced_arrays import MapSizes, starts_of
+from planarfriction.models.reduced_map import ReducedShape
 from planarfriction.models.reduced_map import ReducedShape
 
 PARAMETERS = (
@@ -194,8 +195,7 @@ def pack_maps(
     `shares` `[P]` of the load, F `[P, 3, 3]`, and the maps one behind the other.
     """
     law, data = _any_law(elasto_plastic), np.ascontiguousarray(data, dtype=np.float32)
-    maps = (data[at : at + size.count] for at, size in zip(starts_of(sizes), sizes, strict=True))
-    shapes = (ReducedShape(factor, each) for factor, each in zip(factors, maps, strict=True))
+    shapes = (ReducedShape(factor, each) for factor, each in zip(factors, maps_of(data, sizes), strict=True))
     return tuple(
         pack_shape(law, shape)._replace(share=float(share)) for share, shape in zip(shares, shapes, strict=True)
     )

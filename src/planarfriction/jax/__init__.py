@@ -15,8 +15,10 @@ except ImportError as error:
 from planarfriction.jax.distributed import DistributedModel, LawParameters
 from planarfriction.jax.published import PublishedParameters, ReducedModelPublished, Surface
 from planarfriction.jax.reduced import ReducedModel, ReducedParameters
-from planarfriction.jax.rollouts import Rollout, rate, rest, rollout, step, wrench
-from planarfriction.jax.scene import SceneMotion, simulate_scene
+from planarfriction.jax.rollouts import rate, rest, rollout, step, wrench
+from planarfriction.jax.scene import simulate_scene
+from planarfriction.tensors.rollouts import Rollout
+from planarfriction.tensors.scenes import SceneMotion
 
 __all__ = [
     "DistributedModel",

@@ -1,7 +1,7 @@
-"""Compiled roll-outs and their derivatives on the arrays that JAX hands to a callback, in NumPy.
+"""Operations on the NumPy arrays that JAX hands to a callback.
 
-Arrays have leading axes that `vmap` has put there, of length 1 where it did not map that array. There is nobody to whom
-an error could be raised: NaN comes out where NaN went in, as from the operations of JAX.
+Arrays have `outer` leading axes that `vmap` has put there, of length 1 where it did not map that array. No error can be
+raised to a caller: NaN comes out where NaN went in, as from the operations of JAX.
 """
 
 from __future__ import annotations
@@ -13,123 +13,150 @@ from typing import Any, NamedTuple
 import jax
 import numpy as np
 
-from planarfriction import derivatives
+from planarfriction.derivatives.scene_function import SceneFunction
 from planarfriction.formulas import LARGEST
+from planarfriction.tensors.operations import Arrays, RolloutOperation, SceneOperation
+
+_PARAMETERS = 3
+"""Index of the parameters among the inputs of a rollout: state, twist, load, parameters."""
 
 
-class Kind(NamedTuple):
-    """What is fixed when a function is compiled; all else are arrays."""
+class HostScene(NamedTuple):
+    """Motion and wrenches of a scene, of its numbers; fixed when a function is compiled."""
+
+    function: SceneFunction
+    inner, outer = SceneOperation.inner, SceneOperation.outer
+    like, keeps, strict = 0, False, True
+    first_only = "the motion of a scene has first derivatives only"
+
+    def shapes(self, numbers: Any) -> list[tuple[int, ...]]:
+        """Return the shapes of motion and wrenches."""
+        return [(*numbers.shape[:-1], *shape) for shape in self.function.results]
+
+    def host(self, name: str, outer: int, held: Arrays, inputs: Arrays, memory: Arrays, last: Arrays, kept: bool):
+        """Return the results of a method of `SceneOperation`."""
+        operation = SceneOperation(self.function)
+        if name == "run":
+            return operation.run(held, inputs, kept)[0]
+        return operation.push(held, inputs, last) if name == "push" else operation.pull(held, inputs, last, memory)
+
+
+class HostRollout(NamedTuple):
+    """Last state and wrenches of a rollout; fixed when a function is compiled, as all else are arrays.
+
+    Inputs are state, twist, load and parameters; `dt` and the model's other leaves are held.
+    """
 
     structure: Any
-    """Of the model as a pytree: its parameters, then what is held."""
+    """Structure of the model as a pytree: its parameters, then the leaves that are held."""
     parameters: int
-    """How many it has."""
+    """Number of parameters."""
     axes: int
-    """Of the state of a contact."""
+    """Axes of the state of a contact."""
     leaf: str
-    """What the model knows of its patch."""
+    """Name of the leaf with the numbers of the patch."""
     strict: bool
-    """Whether what the adjoint does not do is an error, and not left to operations of JAX."""
+    """True if a derivative that the adjoint does not have is an error, and not left to operations of JAX."""
+    like, keeps = 1, True
+    first_only = "the adjoint gives first derivatives only: leave method out, or use 'eager', to differentiate twice"
 
     @property
-    def inner(self) -> tuple[int, int, int, int]:
-        """Axes of parameters, state, twists and loads behind those of the batch."""
-        return 1, self.axes, 2, 1
+    def inner(self) -> tuple[int, ...]:
+        """Number of inner axes of each input."""
+        return RolloutOperation(tuple, self.axes).inner
 
-    def model(self, held: Sequence[Any], parameters: Sequence[Any]) -> Any:
-        """The model from its leaves."""
+    @property
+    def outer(self) -> tuple[int, ...]:
+        """Number of inner axes of last state and wrenches."""
+        return RolloutOperation(tuple, self.axes).outer
+
+    def shapes(self, state: Any, twist: Any, load: Any, parameters: Any) -> list[tuple[int, ...]]:
+        """Return the shapes of last state, wrenches and the states before each step."""
+        return [state.shape, twist.shape, (*twist.shape[:-1], *state.shape[state.ndim - self.axes :])]
+
+    def refusal(self, by_dt: bool) -> tuple[str, str]:
+        """Return the name of an operand without derivative, and the rule for it."""
+        rule = (
+            "be held fixed with method='adjoint': differentiate with respect to the parameters, state, twist and "
+            "normal_force, or leave method out"
+        )
+        return "dt" if by_dt else self.leaf, rule
+
+    def by_operations(self, dt: Any, *arrays: Any) -> Any:
+        """Return last state and wrenches by operations of JAX."""
+        *held, state, twist, load, parameters = arrays
+        return self._model(held, tuple(parameters)).rollout(state, twist, load, dt)
+
+    def _model(self, held: Sequence[Any], parameters: Sequence[Any]) -> Any:
         return jax.tree.unflatten(self.structure, [*parameters, *held])
 
+    def host(self, name: str, outer: int, held: Arrays, inputs: Arrays, memory: Arrays, last: Arrays, kept: bool):
+        """Return the results of a method of `RolloutOperation`, NaN for contacts without usable inputs."""
 
-def forward(kind: Kind, kept: bool, dtypes: Sequence[Any], *arrays: Any) -> tuple[np.ndarray, ...]:
-    """Last state, wrenches and, if `kept`, the states before each step."""
+        def run(operation: RolloutOperation, held: Arrays, inputs: Arrays) -> Sequence[np.ndarray]:
+            good, held, usable = _usable(operation, held, inputs)
+            results, states = operation.run(held, usable, kept)
+            return _spoilt(good, *results, *states)
 
-    def run(parts, dt, *inputs):
-        good, dt, (parameters, state, twist, load) = _usable(kind, kind.inner, dt, inputs)
-        roll = derivatives.rollout_states if kept else derivatives.rollout
-        return _spoilt(good, *roll(parts, state, twist, load, dt, parameters=parameters))
+        def push(operation: RolloutOperation, held: Arrays, arrays: Arrays) -> Sequence[np.ndarray]:
+            good, held, usable = _usable(operation, held, arrays, operation.inner)
+            return _spoilt(good, *operation.push(held, usable[:4], usable[4:]))
 
-    return _by_contact(kind, run, dtypes, arrays, 4)
+        def pull(operation: RolloutOperation, held: Arrays, arrays: Arrays) -> Sequence[np.ndarray]:
+            more = *operation.outer, *(1 + operation.axes for _ in memory)
+            good, held, usable = _usable(operation, held, arrays, more)
+            *found, slopes = operation.pull(held, usable[:4], usable[4:6], usable[6:])
+            lengths = usable[_PARAMETERS].shape[:-1]
+            shared = tuple(i for i, length in enumerate(lengths) if length == 1)
+            (slopes,) = _spoilt(np.asarray(good.all(axis=shared, keepdims=True)), slopes)
+            return *_spoilt(good, *found), slopes.reshape(arrays[_PARAMETERS].shape)
 
+        if name == "run":
+            return self._by_contact(run, outer, held, inputs)
+        if name == "push":  # the states before each step are not needed
+            return self._by_contact(push, outer, held, [*inputs, *last])
+        return self._by_contact(pull, outer, held, [*inputs, *last, *memory])
 
-def push(kind: Kind, kept: bool, dtypes: Sequence[Any], *arrays: Any) -> tuple[np.ndarray, ...]:
-    """Changes of last state and wrenches; the states before each step, if `kept`, are not needed."""
+    def _by_contact(self, function: Callable[..., Any], outer: int, held: Arrays, arrays: Arrays) -> Arrays:
+        """Return `function(operation, held, arrays)` of all contacts; one call each if what is held differs."""
+        lead = np.broadcast_shapes(*(value.shape[:outer] for value in (*held, *arrays)))
+        wide = [np.broadcast_to(value, (*lead, *value.shape[outer:])) for value in arrays]
 
-    def run(parts, dt, *inputs):
-        inputs = (*inputs[:4], *inputs[-4:])
-        good, dt, usable = _usable(kind, kind.inner * 2, dt, inputs)
-        (parameters, state, twist, load), (by, z, turns, pushes) = usable[:4], usable[4:]
-        found = derivatives.rollout_jvp(parts, state, twist, load, dt, z, turns, pushes, by, parameters=parameters)
-        return _spoilt(good, found.state_dot, found.wrenches_dot)
+        def alone(index, arrays):
+            pack = lambda *leaves: self._model(leaves, [1.0] * self.parameters).compiled()  # noqa: E731
+            return function(RolloutOperation(pack, self.axes), [value[index] for value in held], arrays)
 
-    return _by_contact(kind, run, dtypes, arrays, 8 + kept)
-
-
-def pull(kind: Kind, kept: bool, dtypes: Sequence[Any], *arrays: Any) -> tuple[np.ndarray, ...]:
-    """Cotangents of parameters, state, twists and loads from those of last state and wrenches."""
-
-    def run(parts, dt, *inputs):
-        inner = (*kind.inner, *(1 + kind.axes,) * kept, kind.axes, 2)
-        good, dt, usable = _usable(kind, inner, dt, inputs)
-        (parameters, state, twist, load), states, (state_bar, bar) = usable[:4], usable[4:-2], usable[-2:]
-        found = derivatives.rollout_vjp(
-            parts, state, twist, load, dt, bar, state_bar, parameters=parameters, states=(*states, None)[0]
-        )
-        shared = tuple(i for i, length in enumerate(parameters.shape[:-1]) if length == 1)
-        (slopes,) = _spoilt(np.asarray(good.all(axis=shared, keepdims=True)), found.parameters)
-        return slopes.reshape(inputs[0].shape), *_spoilt(good, found.state, found.twist, found.normal_force)
-
-    return _by_contact(kind, run, dtypes, arrays, 6 + kept)
+        if all(value.shape[:outer] == (1,) * outer for value in held):
+            return alone((0,) * outer, wide)
+        held = [np.broadcast_to(value, (*lead, *value.shape[outer:])) for value in held]
+        found = [alone(index, [value[index] for value in wide]) for index in np.ndindex(lead)]
+        return [np.stack(part).reshape(*lead, *part[0].shape) for part in zip(*found, strict=True)]
 
 
-def _usable(kind: Kind, inner: Sequence[int], dt, inputs) -> tuple[np.ndarray, Any, list[np.ndarray]]:
-    """Which contacts are given numbers, bool `[...]`, and all inputs with harmless ones for the other contacts.
+def _usable(operation: RolloutOperation, held: Arrays, arrays: Arrays, more: tuple[int, ...] = ()):
+    """Return True for contacts that are given numbers, `[...]`, what is held, and all arrays with harmless numbers.
 
-    Parameters get axes of length 1 for the batch axes that only contacts have, and so do changes of them, which are the
-    fifth of eight.
+    `more` are the inner axes of the arrays behind the inputs. Parameters, and changes of them, get axes of length 1 for
+    the batch axes that only contacts have.
     """
-    own = inputs[1].ndim - kind.axes - (inputs[0].ndim - 1)
-    wide = list(inputs)
-    for i in range(0, len(inputs), 4) if len(inputs) == 8 else (0,):
+    inner, wide = (*operation.inner, *more), list(arrays)
+    own = wide[0].ndim - operation.axes - (wide[_PARAMETERS].ndim - 1)
+    for i in (_PARAMETERS, _PARAMETERS + 4) if more == operation.inner else (_PARAMETERS,):
         wide[i] = wide[i].reshape(*wide[i].shape[:-1], *(1,) * own, wide[i].shape[-1])
     fit = [(np.abs(value) <= LARGEST).all(axis=tuple(range(-axes, 0))) for value, axes in zip(wide, inner, strict=True)]
-    good = functools.reduce(np.logical_and, fit) & (dt <= LARGEST)
+    good = functools.reduce(np.logical_and, fit) & (held[0] <= LARGEST)
     if good.all():
-        return good, dt, wide
-    harmless = (0.5, *(0.0 for _ in wide[1:]))
+        return good, held, wide
+    harmless = [0.5 if i == _PARAMETERS else 0.0 for i in range(len(wide))]
     usable = [
         np.where(own.reshape(own.shape + (1,) * axes), value, number)
         for own, value, axes, number in zip(fit, wide, inner, harmless, strict=True)
     ]
-    return good, dt if dt <= LARGEST else 0.0, usable
+    return good, [held[0] if held[0] <= LARGEST else 0.0, *held[1:]], usable
 
 
 def _spoilt(good: np.ndarray, *results: np.ndarray) -> list[np.ndarray]:
-    """Results, NaN for contacts that are not good."""
+    """Return the results, NaN for contacts that are not good."""
     if good.all():
         return list(results)
     return [np.where(good.reshape(good.shape + (1,) * (r.ndim - good.ndim)), r, np.nan) for r in results]
-
-
-def _by_contact(kind: Kind, run: Callable[..., Any], dtypes: Sequence[Any], arrays, count: int):
-    """`run` on the parts of the model, dt and the last `count` arrays; before those come dt and what is held.
-
-    One call for all contacts; only if what is held or dt differ between contacts, one for each.
-    """
-    axes = arrays[0].ndim
-    dt, *held = (np.asarray(value) for value in arrays[:-count])
-    wide = [np.asarray(value, float) for value in arrays[-count:]]
-    outer = np.broadcast_shapes(*(value.shape[:axes] for value in (dt, *held, *wide)))
-    wide = [np.broadcast_to(value, (*outer, *value.shape[axes:])) for value in wide]
-
-    def alone(index, inputs):
-        model = kind.model([value[index] for value in held], [1.0] * kind.parameters)
-        return run(model.compiled(), float(dt[index]), *inputs)
-
-    if all(value.shape[:axes] == (1,) * axes for value in (dt, *held)):
-        results = alone((0,) * axes, wide)
-    else:
-        dt, *held = (np.broadcast_to(value, (*outer, *value.shape[axes:])) for value in (dt, *held))
-        found = [alone(index, [value[index] for value in wide]) for index in np.ndindex(outer)]
-        results = [np.stack(part).reshape(*outer, *part[0].shape) for part in zip(*found, strict=True)]
-    return tuple(value.astype(dtype) for value, dtype in zip(results, dtypes, strict=True))

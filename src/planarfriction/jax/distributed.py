@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 
 from planarfriction.equality import by_parts
-from planarfriction.jax.base import FrictionModel
+from planarfriction.formulas import LawNumbers
+from planarfriction.jax.base import FrictionPytree, record_of
 from planarfriction.laws import FrictionLaw
-from planarfriction.models import distributed_arrays
-from planarfriction.models.distributed_arrays import Cells
 from planarfriction.patch import ContactPatch
-from planarfriction.patch.metric import refuse_anisotropy
+from planarfriction.tensors import distributed
+from planarfriction.tensors.steps import Part
 
 
 @by_parts
@@ -30,7 +31,7 @@ class LawParameters(NamedTuple):
     breakaway_ratio: jax.Array
 
 
-class DistributedModel(FrictionModel):
+class DistributedModel(FrictionPytree):
     """The distributed model (`planarfriction.DistributedModel`) as a pytree, for small patches.
 
     `W = sum w_i f_N [t_i ; rho_i x t_i]`. State: deflections `[2, N]` [m]. Leaves: the law's parameters, the cells'
@@ -39,8 +40,7 @@ class DistributedModel(FrictionModel):
     Raises InvalidValueError for a parameter that breaks its rule.
     """
 
-    arrays = distributed_arrays
-    axes = 2
+    equations = distributed
     leaves = ("parameters", "positions", "weights")
     parameters: LawParameters
     positions: jax.Array
@@ -50,15 +50,14 @@ class DistributedModel(FrictionModel):
 
     def __init__(self, patch: ContactPatch, law: FrictionLaw, normal_force: float | None = None) -> None:
         super().__init__(patch, law)
-        refuse_anisotropy(patch, f"jax.{type(self).__name__} (ReducedModel takes any)")
-        numbers, names = law.numbers, LawParameters._fields
-        self.parameters = LawParameters(*(jnp.asarray(getattr(numbers, name), dtype=float) for name in names))
-        self.positions = jnp.asarray(patch.positions.T)
-        self.weights = jnp.asarray(patch.weights(normal_force))
+        cells = distributed.cells_of(patch, normal_force, "jax")
+        self.parameters = record_of(LawParameters, law.numbers._asdict())
+        self.positions, self.weights = map(jnp.asarray, cells)
 
-    def rest(self) -> jax.Array:
-        """State of a contact at rest, `[2, N]`."""
-        return jnp.zeros_like(self.positions)
+    @property
+    def state_shape(self) -> tuple[int, ...]:
+        """Shape of the state of one contact, `(2, N)`."""
+        return self.positions.shape
 
-    def _parts(self) -> list[tuple[float, Cells]]:
-        return [(1.0, Cells(self.positions, self.weights))]
+    def _parts(self, law: LawNumbers, values: Mapping[str, jax.Array]) -> tuple[Part]:
+        return (Part(law, distributed.Cells(self.positions, self.weights)),)

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 
-from planarfriction import models
 from planarfriction.derivatives.parameters import Packed, pack_surface
 from planarfriction.equality import ByValue, by_parts
-from planarfriction.jax import namespace as xp
-from planarfriction.jax.base import FrictionModel
+from planarfriction.formulas import LawNumbers
+from planarfriction.jax.base import FrictionPytree, record_of
+from planarfriction.jax.namespace import xp
 from planarfriction.laws import FrictionLaw
-from planarfriction.limit_surface import LimitSurface, surface_arrays
-from planarfriction.models import published_arrays
-from planarfriction.models.published_arrays import PublishedNumbers
+from planarfriction.limit_surface import LimitSurface
 from planarfriction.patch import ContactPatch
+from planarfriction.tensors import published
+from planarfriction.tensors.steps import Part
 
 
 @by_parts
@@ -55,7 +56,7 @@ class Surface(ByValue):
     """Symmetric root of the friction metric `[2, 2]`, if the patch has one."""
 
 
-class ReducedModelPublished(FrictionModel):
+class ReducedModelPublished(FrictionPytree):
     """The published reduced model (`planarfriction.ReducedModelPublished`) as a pytree.
 
     `zdot = S h v_n - k z`, `W = -(sigma_0 z + sigma_1 zdot + sigma_2 U V) f_N`. State `(z_x, z_y, z_tau)` [m, m, m^2].
@@ -67,40 +68,23 @@ class ReducedModelPublished(FrictionModel):
     Raises InvalidValueError for a parameter that breaks its rule.
     """
 
-    arrays = published_arrays
-    axes = 1
+    equations = published
+    state_shape = (3,)
     leaves = ("parameters", "surface")
     parameters: PublishedParameters
     surface: Surface
 
     def __init__(self, patch: ContactPatch, law: FrictionLaw, surface: LimitSurface | None = None) -> None:
         super().__init__(patch, law)
-        when = "keep" if surface is not None else "rebuild"
-        shape = models.ReducedModelPublished(patch, law, surface, on_load_change=when).shapes.reference  # pyright: ignore
+        shape = published.shape_of(patch, law, surface)
         kind, size, data = shape.surface.numbers
-        centre_x, centre_y = shape.centre_of_pressure
-        values = {
-            **law.numbers._asdict(),
-            "contact_radius": shape.contact_radius,
-            "second_moment": shape.second_moment,
-            "centre_x": centre_x,
-            "centre_y": centre_y,
-        }
-        names = PublishedParameters._fields
-        self.parameters = PublishedParameters(*(jnp.asarray(values[name], dtype=float) for name in names))
+        self.parameters = record_of(PublishedParameters, published.values_of(law, shape))
         self.surface = Surface(kind, size, jnp.asarray(data), None if patch.root is None else jnp.asarray(shape.root))
 
-    def rest(self) -> jax.Array:
-        """State of a contact at rest, `[3]`."""
-        return jnp.zeros(3, self.parameters.sigma_0.dtype)
-
     def compiled(self) -> tuple[Packed]:
-        """See `FrictionModel`."""
+        """Return the model as compiled rollouts take it."""
         s = self.surface
         return pack_surface(self.elasto_plastic, s.kind, s.size, s.data, s.root)  # pyright: ignore[reportArgumentType]
 
-    def _parts(self) -> list[tuple[float, PublishedNumbers]]:
-        p, s = self.parameters, self.surface
-        radius, second_moment, x, y = (value[..., None] for value in p[-4:])
-        surface = functools.partial(surface_arrays.sliding, xp, s.kind, s.size, s.data)
-        return [(1.0, PublishedNumbers(radius, second_moment, x, y, surface, s.root))]
+    def _parts(self, law: LawNumbers, values: Mapping[str, jax.Array]) -> tuple[Part]:
+        return (Part(law, published.numbers_of(xp, values, self.surface, self.surface.root)),)

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
-import numpy as np
 
-from planarfriction import models
 from planarfriction.derivatives.parameters import Packed, pack_maps
 from planarfriction.equality import ByValue, by_parts
-from planarfriction.jax.base import FrictionModel
+from planarfriction.formulas import LawNumbers
+from planarfriction.jax.base import FrictionPytree, record_of
 from planarfriction.laws import FrictionLaw
-from planarfriction.models import reduced_arrays
-from planarfriction.models.reduced_arrays import MapSizes, ReducedNumbers
+from planarfriction.models.map_sizes import MapSizes
 from planarfriction.patch import ContactPatch
+from planarfriction.tensors import reduced
+from planarfriction.tensors.steps import Part
 
 
 @by_parts
@@ -37,19 +38,19 @@ class ReducedParameters(NamedTuple):
 
 @functools.partial(jax.tree_util.register_dataclass, data_fields=["share", "factor", "map"], meta_fields=["sizes"])
 @dataclass(frozen=True, eq=False)
-class Shape(ByValue):
-    """What the model knows of its patch."""
+class Maps(ByValue):
+    """The parts of a patch and their maps of steady sliding."""
 
     sizes: tuple[MapSizes, ...]
     share: jax.Array
-    """Of the load that each part carries, `[P]`."""
+    """Share of the load that each part carries, `[P]`."""
     factor: jax.Array
     """F of each part, `[P, 3, 3]`."""
     map: jax.Array
     """Steady sliding of the parts, one behind the other (see `planarfriction.kernels.steady`)."""
 
 
-class ReducedModel(FrictionModel):
+class ReducedModel(FrictionPytree):
     """The reduced model of bristle moments (`planarfriction.ReducedModel`) as a pytree.
 
     State `(z_x, z_y, z_theta)` [m], or `[P, 3]` for several parts. Leaves: the law's parameters, and the shape: F of
@@ -59,11 +60,10 @@ class ReducedModel(FrictionModel):
     Raises InvalidValueError for a parameter that breaks its rule.
     """
 
-    arrays = reduced_arrays
-    axes = 1
+    equations = reduced
     leaves = ("parameters", "shape")
     parameters: ReducedParameters
-    shape: Shape
+    shape: Maps
 
     def __init__(
         self,
@@ -76,28 +76,20 @@ class ReducedModel(FrictionModel):
         speeds: int = 16,
     ) -> None:
         super().__init__(patch, law)
-        numbers, names = law.numbers, ReducedParameters._fields
-        self.parameters = ReducedParameters(*(jnp.asarray(getattr(numbers, name), dtype=float) for name in names))
-        model = models.ReducedModel(patch, law, parts=parts, segments=segments, speeds=speeds, load_error=0.0)
-        shares, shapes = zip(*model.parts_at(normal_force), strict=True)
-        self.shape = Shape(
-            tuple(reduced_arrays.sizes_of(shape.data) for shape in shapes),
-            jnp.asarray(shares, dtype=float),
-            jnp.asarray(np.stack([shape.factor for shape in shapes])),
-            jnp.asarray(np.concatenate([shape.data for shape in shapes])),
-        )
+        self.parameters = record_of(ReducedParameters, law.numbers._asdict())
+        found = reduced.parts_of(patch, law, normal_force, parts=parts, segments=segments, speeds=speeds)
+        share, factor = (jnp.asarray(each, dtype=float) for each in found[1:3])
+        self.shape = Maps(found.sizes, share, factor, jnp.asarray(found.map))
 
-    def rest(self) -> jax.Array:
-        """State of a contact at rest, `[3]` or `[P, 3]`."""
-        count = len(self.shape.sizes)
-        return jnp.zeros(3 if count == 1 else (count, 3), self.parameters.sigma_0.dtype)
+    @property
+    def state_shape(self) -> tuple[int, ...]:
+        """Shape of the state of one contact, `(3,)`, of P parts `(P, 3)`."""
+        return (3,) if len(self.shape.sizes) == 1 else (len(self.shape.sizes), 3)
 
     def compiled(self) -> tuple[Packed, ...]:
-        """See `FrictionModel`."""
+        """Return the model as compiled rollouts take it."""
         s = self.shape
         return pack_maps(self.elasto_plastic, s.sizes, s.share, s.factor, s.map)  # pyright: ignore[reportArgumentType]
 
-    def _parts(self) -> list[tuple[jax.Array, ReducedNumbers]]:
-        s = self.shape
-        shapes = reduced_arrays.parts_of(s.factor, s.map, s.sizes)
-        return [(s.share[k], shape) for k, shape in enumerate(shapes)]
+    def _parts(self, law: LawNumbers, values: Mapping[str, jax.Array]) -> tuple[Part, ...]:
+        return tuple(Part(law, shape, self.shape.share[k]) for k, shape in enumerate(reduced.numbers_of(self.shape)))

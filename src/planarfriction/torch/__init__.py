@@ -1,4 +1,4 @@
-"""The friction models for PyTorch: modules with trainable physical parameters, and differentiable roll-outs.
+"""The friction models for PyTorch: modules with trainable physical parameters, and differentiable rollouts.
 
 Needs PyTorch: `pip install 'planarfriction[torch]'`.
 """
@@ -10,12 +10,14 @@ except ImportError:
 
     raise MissingExtraError("torch", "torch") from None
 
+from planarfriction.tensors.rollouts import Rollout
+from planarfriction.tensors.scenes import SceneMotion
 from planarfriction.torch.distributed import DistributedModel
 from planarfriction.torch.published import ReducedModelPublished
 from planarfriction.torch.reduced import ReducedModel
 from planarfriction.torch.reduced_planar import ReducedPlanarLuGre
-from planarfriction.torch.rollout import Rollout, rollout, tracking_loss
-from planarfriction.torch.scene import SceneMotion, simulate_scene
+from planarfriction.torch.rollout import rollout, tracking_loss
+from planarfriction.torch.scene import simulate_scene
 
 __all__ = [
     "DistributedModel",

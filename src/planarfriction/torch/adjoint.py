@@ -1,93 +1,76 @@
-"""The compiled roll-out with its derivatives, backwards and forwards, as functions of PyTorch.
-
-For tensors on the processor, and first derivatives.
-"""
+"""Compiled computations with their derivatives, backwards and forwards, as functions of PyTorch; first derivatives."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple
+import functools
+from collections.abc import Sequence
+from typing import Any
 
 import torch
 from torch import Tensor
 
-from planarfriction import derivatives
-from planarfriction.derivatives.parameters import Packed
 from planarfriction.errors import FrictionError
+from planarfriction.tensors.operations import Operation, RolloutOperation
 from planarfriction.torch.base import Compiled
 
-_INNER = (2, 1, 1)
-"""Axes of twist `[T, 3]`, normal_force `[T]` and parameters `[P]` behind the batch axes."""
 
-_INPUTS = 1 + len(_INNER)
-"""The state comes first."""
+def rollout(
+    model: Compiled, axes: int, state: Tensor, twist: Tensor, load: Tensor, parameters: Tensor, dt: Tensor
+) -> tuple[Tensor, ...]:
+    """Return the last state and the wrenches `[..., T, 3]` of a model whose state has `axes`, by compiled loops.
 
-
-class _Kind(NamedTuple):
-    """What a model is without its tensors (see `Compiled`)."""
-
-    pack: Callable[..., tuple[Packed, ...]]
-    axes: int
-
-
-def roll_out(model: Compiled, dt: float, *inputs: Tensor) -> tuple[Tensor, Tensor]:
-    """The last state and wrenches `[..., T, 3]` of `derivatives.rollout`.
-
-    `inputs` are state `[..., 3]`, of several parts `[..., P, 3]`, twist `[..., T, 3]`, normal_force `[..., T]` and
-    parameters `[..., P]`, whose batch axes broadcast.
+    Shapes are `[..., *state_shape]`, `[..., T, 3]`, `[..., T]` and `[..., P]`, whose batch axes broadcast; tensors are
+    on the processor.
     """
-    kept = torch.is_grad_enabled() and any(tensor.requires_grad for tensor in inputs)
-    found: Any = _Rollout.apply(_Kind(model.pack, model.axes), dt, kept, *inputs, *model.buffers)
-    return found[0], found[1]
+    return call(RolloutOperation(model.pack, axes), (dt, *model.buffers), state, twist, load, parameters)
 
 
-class _Rollout(torch.autograd.Function):
-    """Last state, wrenches and, if they are `kept` for the way back, the states before each step in float64."""
+def call(operation: Operation, held: Sequence[Tensor], *inputs: Tensor) -> tuple[Tensor, ...]:
+    """Return the results of an operation, with derivatives by the inputs; `held` are tensors without."""
+    keep = torch.is_grad_enabled() and any(tensor.requires_grad for tensor in inputs)
+    found: Any = _Run.apply(operation, keep, *inputs, *held)
+    return found[: len(operation.outer)]
+
+
+class _Run(torch.autograd.Function):
+    """The results and, if `keep`, the operation's array for the way back in double precision."""
 
     @staticmethod
-    def forward(kind: _Kind, dt, kept, *tensors):
-        (state, twist, load, parameters), model = _numbers(kind, tensors, _INPUTS)
-        roll = derivatives.rollout_states if kept else derivatives.rollout
-        end, wrenches, *states = roll(model, state, twist, load, dt, parameters=parameters)
-        both = (_like(array, tensors[:_INPUTS]) for array in (end, wrenches))
-        return *both, torch.from_numpy(states[0]) if kept else torch.empty(0)
+    def forward(operation: Operation, keep, *tensors):
+        count = len(operation.inner)
+        results, kept = operation.run(_plain(tensors[count:]), _doubles(tensors[:count]), keep)
+        return *_like(results, tensors[:count]), *(torch.from_numpy(array) for array in kept)
 
     @staticmethod
     def setup_context(ctx, inputs, output):
-        ctx.kind, ctx.dt, ctx.kept = inputs[:3]
-        ctx.mark_non_differentiable(output[2])
-        ctx.save_for_backward(*inputs[3:], output[2])
-        ctx.save_for_forward(*inputs[3:])
+        ctx.operation = inputs[0]
+        kept = output[len(ctx.operation.outer) :]
+        ctx.mark_non_differentiable(*kept)
+        ctx.save_for_backward(*inputs[2:], *kept)
+        ctx.save_for_forward(*inputs[2:])
+        ctx.count, ctx.kept = len(inputs) - 2, len(kept)
 
     @staticmethod
     def backward(ctx, *bars):
-        *tensors, states = ctx.saved_tensors
-        inputs, buffers = tensors[:_INPUTS], tensors[_INPUTS:]
-        given = (*inputs, *bars[:2], states) if ctx.kept else (*inputs, *bars[:2])
-        slopes: Any = _Gradient.apply(ctx.kind, ctx.dt, len(given), *given, *buffers)
-        return None, None, None, *slopes, *(None for _ in buffers)
+        count, tensors, kept = len(ctx.operation.inner), ctx.saved_tensors[: ctx.count], ctx.saved_tensors[ctx.count :]
+        given = *tensors[:count], *bars[: len(ctx.operation.outer)], *kept
+        found: Any = _Pull.apply(ctx.operation, len(given), *given, *tensors[count:])
+        return None, None, *found, *(None for _ in tensors[count:])
 
     @staticmethod
     def jvp(ctx, *tangents):
-        inputs, buffers = ctx.saved_tensors[:_INPUTS], ctx.saved_tensors[_INPUTS:]
-        changes = (
-            torch.zeros_like(x) if dot is None else dot
-            for x, dot in zip(inputs, tangents[3 : 3 + _INPUTS], strict=True)
-        )
-        found: Any = _Tangent.apply(ctx.kind, ctx.dt, *inputs, *changes, *buffers)
-        return *found, None
+        count, tensors = len(ctx.operation.inner), ctx.saved_tensors
+        inputs, dots = tensors[:count], tangents[2 : 2 + count]
+        changes = [torch.zeros_like(x) if dot is None else dot for x, dot in zip(inputs, dots, strict=True)]
+        found: Any = _Push.apply(ctx.operation, 2 * count, *inputs, *changes, *tensors[count : ctx.count])
+        return *found, *(None for _ in range(ctx.kept))
 
     @staticmethod
-    def vmap(info, in_dims, kind, dt, kept, *tensors):
-        size, dims = info.batch_size, in_dims[3:]
-        if any(dim is not None for dim in dims[_INPUTS:]):
-            return _one_by_one(_Rollout, size, dims, (kind, dt, kept), tensors)
-        aligned = _aligned(size, dims[:_INPUTS], tensors[:_INPUTS], (kind.axes, *_INNER))
-        end, wrenches, states = _Rollout.apply(kind, dt, kept, *aligned, *tensors[_INPUTS:])  # pyright: ignore
-        return (end, wrenches, states), (0, 0, 0 if kept else None)
+    def vmap(info, in_dims, operation: Operation, keep, *tensors):
+        return _mapped(_Run, info, in_dims[2:], (operation, keep), tensors, operation.inner)
 
 
-class First(torch.autograd.Function):
+class _First(torch.autograd.Function):
     """A first derivative, itself without derivative."""
 
     @staticmethod
@@ -101,87 +84,78 @@ class First(torch.autograd.Function):
     jvp = backward
 
 
-class _Gradient(First):
-    """Cotangents of the inputs from those of last state and wrenches.
+class _Pull(_First):
+    """Cotangents of the inputs; the first `count` tensors are inputs, cotangents of the results and what was kept."""
 
-    The first `count` tensors are the inputs, both cotangents and, if they were kept, the states before each step.
+    @staticmethod
+    def forward(operation: Operation, count: int, *tensors):
+        own, several = len(operation.inner), len(operation.inner) + len(operation.outer)
+        numbers = _doubles(tensors[:count])
+        found = operation.pull(_plain(tensors[count:]), numbers[:own], numbers[own:several], numbers[several:])
+        return tuple(_like([array], [tensor])[0] for array, tensor in zip(found, tensors[:own], strict=True))
+
+    @staticmethod
+    def vmap(info, in_dims, operation: Operation, count: int, *tensors):
+        own, dims = len(operation.inner), in_dims[2:]
+        inner = *operation.inner, *operation.outer
+        inner += tuple(1 + operation.outer[0] for _ in range(count - len(inner)))  # states before each step
+        found, out = _mapped(_Pull, info, dims, (operation, count), tensors, inner)
+        shapes = [
+            [length for axis, length in enumerate(tensor.shape) if axis != dim]
+            for tensor, dim in zip(tensors[:own], dims[:own], strict=True)
+        ]
+        return tuple(g.reshape(info.batch_size, *shape) for g, shape in zip(found, shapes, strict=True)), out
+
+
+class _Push(_First):
+    """Changes of the results; the first `count` tensors are the inputs and their changes."""
+
+    @staticmethod
+    def forward(operation: Operation, count: int, *tensors):
+        own, numbers = len(operation.inner), _doubles(tensors[:count])
+        return _like(operation.push(_plain(tensors[count:]), numbers[:own], numbers[own:]), tensors[:own])
+
+    @staticmethod
+    def vmap(info, in_dims, operation: Operation, count: int, *tensors):
+        return _mapped(_Push, info, in_dims[2:], (operation, count), tensors, operation.inner * 2)
+
+
+def _doubles(tensors: Sequence[Tensor]) -> list[Any]:
+    return [tensor.detach().to("cpu", torch.float64).numpy() for tensor in tensors]
+
+
+def _plain(tensors: Sequence[Tensor]) -> list[Any]:
+    return [tensor.detach().cpu().numpy() for tensor in tensors]
+
+
+def _like(arrays: Sequence[Any], tensors: Sequence[Tensor]) -> tuple[Tensor, ...]:
+    """Return arrays as tensors of the number type that the given ones have together."""
+    dtype = functools.reduce(torch.promote_types, (tensor.dtype for tensor in tensors))
+    return tuple(torch.from_numpy(array).to(tensors[0].device, dtype) for array in arrays)
+
+
+def _mapped(function: Any, info, dims, fixed: tuple, tensors, inner: tuple[int, ...]):
+    """Return a function's results for a mapped axis, which becomes the first batch axis; held tensors come last.
+
+    The mapped axis is put in front of every tensor, with axes of length 1 behind it until the batch axes match. If a
+    held tensor is mapped, the function is called once for each of its values.
     """
-
-    @staticmethod
-    def forward(kind: _Kind, dt, count, *tensors):
-        (state, twist, load, parameters, state_bar, wrenches_bar, *states), model = _numbers(kind, tensors, count)
-        gradient = derivatives.rollout_vjp(
-            model, state, twist, load, dt, wrenches_bar, state_bar, parameters=parameters, states=(*states, None)[0]
-        )
-        return tuple(_like(array, (tensor,)) for array, tensor in zip(gradient, tensors[:_INPUTS], strict=True))
-
-    @staticmethod
-    def vmap(info, in_dims, kind, dt, count, *tensors):
-        size, dims = info.batch_size, in_dims[3:]
-        if any(dim is not None for dim in dims[count:]):
-            return _one_by_one(_Gradient, size, dims, (kind, dt, count), tensors)
-        aligned = _aligned(
-            size, dims[:count], tensors[:count], (kind.axes, *_INNER, kind.axes, 2, 1 + kind.axes)[:count]
-        )
-        gradients: Any = _Gradient.apply(kind, dt, count, *aligned, *tensors[count:])
-        shapes = [_logical(tensor, dim) for tensor, dim in zip(tensors[:_INPUTS], dims, strict=False)]
-        return tuple(g.reshape(size, *shape) for g, shape in zip(gradients, shapes, strict=True)), (0,) * _INPUTS
-
-
-class _Tangent(First):
-    """Changes of last state and wrenches along those of the inputs, which follow these."""
-
-    @staticmethod
-    def forward(kind: _Kind, dt, *tensors):
-        (state, twist, load, parameters, *changes), model = _numbers(kind, tensors, 2 * _INPUTS)
-        found = derivatives.rollout_jvp(model, state, twist, load, dt, *changes, parameters=parameters)
-        return tuple(_like(array, tensors[:_INPUTS]) for array in found[2:])
-
-    @staticmethod
-    def vmap(info, in_dims, kind, dt, *tensors):
-        size, dims, count = info.batch_size, in_dims[2:], 2 * _INPUTS
-        if any(dim is not None for dim in dims[count:]):
-            return _one_by_one(_Tangent, size, dims, (kind, dt), tensors)
-        aligned = _aligned(size, dims[:count], tensors[:count], (kind.axes, *_INNER) * 2)
-        return _Tangent.apply(kind, dt, *aligned, *tensors[count:]), (0, 0)
-
-
-def _numbers(kind: _Kind, tensors, count: int) -> tuple[list[Any], tuple[Packed, ...]]:
-    """The first `count` tensors in NumPy, and the model from its buffers behind them."""
-    inputs = [tensor.detach().to(torch.float64).numpy() for tensor in tensors[:count]]
-    return inputs, kind.pack(*(buffer.detach().numpy() for buffer in tensors[count:]))
-
-
-def _one_by_one(function: Any, size: int, dims, fixed: tuple, tensors) -> tuple[tuple[Tensor, ...], tuple[int, ...]]:
-    """A `vmap` over different models: a call for each."""
-    parts = [
-        function.apply(*fixed, *(t if dim is None else t.select(dim, i) for t, dim in zip(tensors, dims, strict=True)))
-        for i in range(size)
-    ]
-    together = tuple(torch.stack(part) for part in zip(*parts, strict=True))
-    return together, (0,) * len(together)
-
-
-def _like(array, tensors) -> Tensor:
-    dtype = tensors[0].dtype
-    for tensor in tensors[1:]:
-        dtype = torch.promote_types(dtype, tensor.dtype)
-    return torch.from_numpy(array).to(dtype)
-
-
-def _logical(tensor: Tensor, dim: int | None) -> list[int]:
-    """Shape as the mapped function sees it."""
-    return [length for axis, length in enumerate(tensor.shape) if axis != dim]
-
-
-def _aligned(size: int, dims, tensors, inner: tuple[int, ...]) -> list[Tensor]:
-    """Put the mapped axis in front of every tensor, and axes of length 1 behind it until the batch axes match."""
+    size, count = info.batch_size, len(inner)
+    if any(dim is not None for dim in dims[count:]):
+        each = [
+            function.apply(*fixed, *(t if d is None else t.select(d, i) for t, d in zip(tensors, dims, strict=True)))
+            for i in range(size)
+        ]
+        found = tuple(torch.stack(part) for part in zip(*each, strict=True))
+        return found, (0,) * len(found)
     fronted = [
         tensor[None].expand(size, *tensor.shape) if dim is None else tensor.movedim(dim, 0)
-        for tensor, dim in zip(tensors, dims, strict=True)
+        for tensor, dim in zip(tensors[:count], dims[:count], strict=True)
     ]
     rank = max(tensor.ndim - axes for tensor, axes in zip(fronted, inner, strict=True))
-    return [
+    aligned = [
         tensor.reshape(size, *(1,) * (rank - (tensor.ndim - axes)), *tensor.shape[1:])
         for tensor, axes in zip(fronted, inner, strict=True)
     ]
+    found = function.apply(*fixed, *aligned, *tensors[count:])
+    return found, (0,) * len(found)

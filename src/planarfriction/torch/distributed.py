@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import torch
 from torch import Tensor, nn
 
+from planarfriction.formulas import LawNumbers
 from planarfriction.laws import FrictionLaw
-from planarfriction.models import distributed_arrays
-from planarfriction.models.distributed_arrays import Cells
 from planarfriction.patch import ContactPatch
-from planarfriction.patch.metric import refuse_anisotropy
-from planarfriction.torch.base import TRAINABLE, FrictionModel, Prepared
-from planarfriction.torch.parameters import LAW
+from planarfriction.tensors import distributed
+from planarfriction.tensors.steps import LAW, Part
+from planarfriction.torch.base import TRAINABLE, FrictionModule
 
 
-class DistributedModel(FrictionModel):
+class DistributedModel(FrictionModule):
     """Distributed LuGre friction, differentiable: a bristle `z_i` [m] in every cell, state `[2, N]`; for small patches.
 
     `zdot_i = v_i - beta sigma_0 |v_i|/g z_i`, `W = sum w_i f_N [t_i ; rho_i x t_i]`, `t_i = -(sigma_0 z_i + sigma_1
@@ -31,8 +30,7 @@ class DistributedModel(FrictionModel):
     Source: Waltersson and Karayiannidis 2024, section III.
     """
 
-    arrays = distributed_arrays
-    axes = 2
+    equations = distributed
     positions: Tensor
     """Positions of the cells `[2, N]` [m]."""
 
@@ -47,15 +45,14 @@ class DistributedModel(FrictionModel):
         device: torch.device | str | None = None,
     ):
         super().__init__(patch, law)
-        refuse_anisotropy(patch, f"torch.{type(self).__name__} (ReducedModel takes any)")
-        self.components = (2, patch.cells)
+        cells = distributed.cells_of(patch, normal_force, "torch")
         kind = {"dtype": dtype or torch.get_default_dtype(), "device": device}
         numbers, chosen = law.numbers._asdict(), tuple(trainable)
         lever = float(patch.contact_radius(normal_force))
         physical = [name for name in chosen if name != "weights"]
         self._adopt({name: numbers[name] for name in LAW}, physical, lever, **kind)
-        self.register_buffer("positions", torch.tensor(patch.positions.T.copy(), **kind))
-        raw = torch.tensor(patch.weights(normal_force), **kind).log()
+        self.register_buffer("positions", torch.tensor(cells.positions, **kind))
+        raw = torch.tensor(cells.weights, **kind).log()
         if "weights" in chosen:
             self.raw_weights = nn.Parameter(raw)
         else:
@@ -66,6 +63,10 @@ class DistributedModel(FrictionModel):
         """Share of the load on each cell `[N]`, with its gradient."""
         return torch.softmax(self.raw_weights, 0)
 
-    def prepare(self, parameters: Tensor) -> tuple[Prepared]:
-        """Prepare the law and the cells for a roll-out."""
-        return (Prepared(self._law(parameters), Cells(self.positions, self.weights)),)
+    @property
+    def state_shape(self) -> tuple[int, ...]:
+        """Shape of the state of one contact, `(2, N)`."""
+        return tuple(self.positions.shape)
+
+    def _parts(self, law: LawNumbers, values: Mapping[str, Tensor]) -> tuple[Part]:
+        return (Part(law, distributed.Cells(self.positions, self.weights)),)

@@ -25,12 +25,8 @@ import torch
 from torch import Tensor, nn
 
 from planarfriction import validation
-from planarfriction.derivatives import PARAMETERS
 from planarfriction.errors import InvalidValueError
-from planarfriction.torch import inputs
-
-LAW = PARAMETERS[:8]
-"""Parameters of the friction law; the others describe the shape of the patch."""
+from planarfriction.torch.namespace import xp
 
 _POSITIVE = ("sigma_0", "mu_c", "v_s", "gamma", "contact_radius", "second_moment")
 _AT_MU_S = "mu_c has been trained up to mu_s, which is fixed and which it cannot exceed: name mu_s in trainable too"
@@ -90,7 +86,7 @@ class PhysicalParameters(nn.Module):
     def forward(self) -> Tensor:
         """The physical values `[P]`, in the order of `names`."""
         if "mu_c" in self.raw and "mu_s" not in self.raw:
-            seen = inputs.extremes("mu_c", self.raw["mu_c"])
+            seen = xp.extremes("mu_c", self.raw["mu_c"])
             if seen is not None and seen[0] <= 0.0:  # beyond 0 it goes down again
                 warnings.warn(_AT_MU_S, stacklevel=4)
         return self._physical()

@@ -3,27 +3,26 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import torch
 from torch import Tensor, nn
 
-from planarfriction import models
-from planarfriction.derivatives.parameters import pack_surface
+from planarfriction.derivatives.parameters import PARAMETERS, pack_surface
 from planarfriction.errors import InvalidValueError
+from planarfriction.formulas import LawNumbers
 from planarfriction.laws import FrictionLaw
-from planarfriction.limit_surface import LimitSurface, surface_arrays
-from planarfriction.models import published_arrays
-from planarfriction.models.published_arrays import PublishedNumbers
+from planarfriction.limit_surface import LimitSurface
 from planarfriction.patch import ContactPatch
-from planarfriction.torch import namespace as xp
-from planarfriction.torch.base import TRAINABLE, Compiled, FrictionModel, Prepared
-from planarfriction.torch.parameters import LAW
+from planarfriction.tensors import published
+from planarfriction.tensors.steps import Part
+from planarfriction.torch.base import TRAINABLE, Compiled, FrictionModule
+from planarfriction.torch.namespace import xp
 
 
-class Surface(nn.Module):
-    """A limit surface in a buffer; `forward(scaled, speed)` gives `u = h(V) |V_S|` `[..., 3]`."""
+class SurfaceBuffers(nn.Module):
+    """The numbers of a limit surface in buffers (see `planarfriction.kernels.surfaces`)."""
 
     data: Tensor
     form: Tensor
@@ -42,12 +41,8 @@ class Surface(nn.Module):
             raise InvalidValueError("state_dict", f"{rule} as the model, {self.form.tolist()}", given.tolist())
         super()._load_from_state_dict(state_dict, prefix, *rest)
 
-    def forward(self, scaled: Tensor, speed: Tensor) -> Tensor:
-        """`u` of scaled twists `[..., 3]` and their norms `[..., 1]`."""
-        return surface_arrays.sliding(xp, self.kind, self.size, self.data, scaled, speed)
 
-
-class ReducedModelPublished(FrictionModel):
+class ReducedModelPublished(FrictionModule):
     """Reduced LuGre friction, differentiable: three bristles `z = (z_x, z_y, z_tau)` [m, m, m^2] and a limit surface.
 
     With `S = diag(1, 1, r)`, `V_S = S V`, `v_n = |V_S|`: `zdot = S h(V) v_n - beta sigma_0 v_n/g(v_n) z`, `W =
@@ -64,9 +59,8 @@ class ReducedModelPublished(FrictionModel):
     Source: Waltersson and Karayiannidis 2024, section IV.
     """
 
-    arrays = published_arrays
-    components = (3,)
-    axes = 1
+    equations = published
+    state_shape = (3,)
     root: Tensor | None
     """Symmetric root of the friction metric `[2, 2]`, if the patch has one."""
 
@@ -81,24 +75,17 @@ class ReducedModelPublished(FrictionModel):
         device: torch.device | str | None = None,
     ):
         super().__init__(patch, law)
-        when = "keep" if surface is not None else "rebuild"
-        shape = models.ReducedModelPublished(patch, law, surface, on_load_change=when).shapes.reference  # pyright: ignore
+        shape = published.shape_of(patch, law, surface)
         kind = {"dtype": dtype or torch.get_default_dtype(), "device": device}
-        self.surface = Surface(shape.surface, **kind)
+        self.surface = SurfaceBuffers(shape.surface, **kind)
         self.register_buffer("root", None if patch.root is None else torch.tensor(shape.root, **kind))
-        x, y = shape.centre_of_pressure.tolist()
-        numbers = law.numbers._asdict()
-        values = {name: numbers[name] for name in LAW}
-        values |= {"contact_radius": shape.contact_radius, "second_moment": shape.second_moment}
-        self._adopt(values | {"centre_x": x, "centre_y": y}, trainable, shape.contact_radius, **kind)
+        values = published.values_of(law, shape)
+        self._adopt({name: values[name] for name in PARAMETERS}, trainable, shape.contact_radius, **kind)
 
     def compiled(self) -> Compiled:
-        """See `FrictionModel`."""
+        """Return the model as compiled rollouts take it."""
         pack = functools.partial(pack_surface, self.elasto_plastic, self.surface.kind, self.surface.size)
-        return Compiled(pack, (self.surface.data,) if self.root is None else (self.surface.data, self.root), 1)
+        return Compiled(pack, (self.surface.data,) if self.root is None else (self.surface.data, self.root))
 
-    def prepare(self, parameters: Tensor) -> tuple[Prepared]:
-        """Prepare the law, `r`, `<rho^2>`, the centre of pressure, and the limit surface for a roll-out."""
-        radius, second_moment, x, y = parameters[..., len(LAW) :].split(1, -1)
-        shape = PublishedNumbers(radius, second_moment, x, y, self.surface, self.root)
-        return (Prepared(self._law(parameters), shape),)
+    def _parts(self, law: LawNumbers, values: Mapping[str, Tensor]) -> tuple[Part]:
+        return (Part(law, published.numbers_of(xp, values, self.surface, self.root)),)

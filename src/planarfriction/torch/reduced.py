@@ -3,29 +3,28 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from typing import Any
 
-import numpy as np
 import torch
 from torch import Tensor
 
-from planarfriction import models
 from planarfriction.derivatives.parameters import pack_maps
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
-from planarfriction.laws import ElastoPlastic, FrictionLaw, LuGre
-from planarfriction.models import reduced_arrays
+from planarfriction.laws import FrictionLaw
+from planarfriction.models.map_sizes import maps_of, sizes_of
 from planarfriction.models.reduced_map import slip_factor
 from planarfriction.patch import ContactPatch
-from planarfriction.torch.base import Compiled, FrictionModel, Prepared
-from planarfriction.torch.parameters import LAW
+from planarfriction.tensors import reduced
+from planarfriction.tensors.steps import LAW, Part
+from planarfriction.torch.base import Compiled, FrictionModule
 
 PARAMETERS = tuple(name for name in LAW if name != "gamma")
 """Physical parameters, in the order of their vector: the law but gamma, for which the map is made."""
 
 
-class ReducedModel(FrictionModel):
+class ReducedModel(FrictionModule):
     """Reduced LuGre friction of bristle moments, differentiable: three states `(z_x, z_y, z_theta)` [m] per part.
 
     The equations and the numbers of `planarfriction.ReducedModel`; with several parts the state has shape `[..., P,
@@ -37,8 +36,7 @@ class ReducedModel(FrictionModel):
     Raises InvalidValueError if `trainable` names gamma, or something that is not a parameter of the law.
     """
 
-    arrays = reduced_arrays
-    axes = 1
+    equations = reduced
     share: Tensor
     """Share of the load that each part carries, `[P]`."""
     factor: Tensor
@@ -68,12 +66,11 @@ class ReducedModel(FrictionModel):
                 "trainable", "not contain gamma: the map of steady sliding depends on it", trainable
             )
         kind = {"dtype": dtype or torch.get_default_dtype(), "device": device}
-        model = models.ReducedModel(patch, law, parts=parts, segments=segments, speeds=speeds, load_error=0.0)
-        shares, shapes = zip(*model.parts_at(normal_force), strict=True)
-        self.components, self.sizes = model.state_shape, tuple(reduced_arrays.sizes_of(shape.data) for shape in shapes)
-        self.register_buffer("share", torch.tensor(shares, **kind))
-        self.register_buffer("factor", torch.tensor(np.stack([shape.factor for shape in shapes]), **kind))
-        self.register_buffer("map", torch.tensor(np.concatenate([shape.data for shape in shapes]), device=device))
+        found = reduced.parts_of(patch, law, normal_force, parts=parts, segments=segments, speeds=speeds)
+        self.sizes = found.sizes
+        self.register_buffer("share", torch.tensor(found.share, **kind))
+        self.register_buffer("factor", torch.tensor(found.factor, **kind))
+        self.register_buffer("map", torch.tensor(found.map, device=device))
         numbers = law.numbers._asdict()
         self.register_buffer("gamma", torch.tensor(numbers["gamma"], **kind))
         lever = float(slip_factor(patch, normal_force)[2, 2])
@@ -84,26 +81,24 @@ class ReducedModel(FrictionModel):
         if shares is not None and len(shares) != len(self.sizes):
             raise InvalidValueError("state_dict", f"hold as many parts as the model, {len(self.sizes)}", len(shares))
         if maps is not None:
-            for start, own in zip(reduced_arrays.starts_of(self.sizes), self.sizes, strict=True):
-                if (other := reduced_arrays.sizes_of(maps[start:])) != own:
+            for one, own in zip(maps_of(maps, self.sizes), self.sizes, strict=True):
+                if (other := sizes_of(one)) != own:
                     rule = f"hold maps of the same sizes as the model (faces, segments, ...), {tuple(own)}"
                     raise InvalidValueError("state_dict", rule, tuple(other))
         super()._load_from_state_dict(state_dict, prefix, *rest)
 
-    def law(self) -> LuGre:
-        """The law with the current values."""
-        now = dict(zip(self.names, self.physical().tolist(), strict=True))
-        elastic = ElastoPlastic(now.pop("breakaway_ratio"))
-        return LuGre(**now, gamma=float(self.gamma), elasto_plastic=elastic if self.elasto_plastic else None)
+    @property
+    def state_shape(self) -> tuple[int, ...]:
+        """Shape of the state of one contact, `(3,)`, of P parts `(P, 3)`."""
+        return (3,) if len(self.sizes) == 1 else (len(self.sizes), 3)
 
     def compiled(self) -> Compiled:
-        """See `FrictionModel`."""
+        """Return the model as compiled rollouts take it."""
         pack = functools.partial(pack_maps, self.elasto_plastic, self.sizes)
-        return Compiled(pack, (self.share, self.factor, self.map), len(self.components))
+        return Compiled(pack, (self.share, self.factor, self.map))
 
-    def prepare(self, parameters: Tensor) -> tuple[Prepared, ...]:
-        """Prepare the law and the parts for a roll-out; their shapes are fixed."""
-        values = dict(zip(PARAMETERS, parameters[..., None].unbind(-2), strict=True))
-        law = LawNumbers(**values, gamma=self.gamma, elasto_plastic=self.elasto_plastic)
-        shapes = reduced_arrays.parts_of(self.factor, self.map, self.sizes)
-        return tuple(Prepared(law, shape, self.share[k]) for k, shape in enumerate(shapes))
+    def _law_values(self) -> dict[str, float]:
+        return super()._law_values() | {"gamma": float(self.gamma)}
+
+    def _parts(self, law: LawNumbers, values: Mapping[str, Tensor]) -> tuple[Part, ...]:
+        return tuple(Part(law, shape, self.share[k]) for k, shape in enumerate(reduced.numbers_of(self)))

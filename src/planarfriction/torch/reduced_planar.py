@@ -16,10 +16,10 @@ from planarfriction import formulas, validation
 from planarfriction.errors import FrictionError, InvalidValueError
 from planarfriction.laws import LuGre
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceEllipsoid
-from planarfriction.models import published_arrays
 from planarfriction.patch import ContactPatch
-from planarfriction.torch import namespace as xp
+from planarfriction.tensors import published
 from planarfriction.torch.base import TRAINABLE
+from planarfriction.torch.namespace import xp
 from planarfriction.torch.parameters import PhysicalParameters
 from planarfriction.torch.published import ReducedModelPublished
 from planarfriction.torch.rollout import rollout
@@ -114,64 +114,58 @@ class ReducedPlanarLuGre(ReducedModelPublished):
     # ------------------------------------------------------------------ the interface
 
     def g(self, speed: Tensor | float) -> Tensor:
-        """Friction coefficient in steady sliding, `g = mu_c + (mu_s - mu_c) exp(-|v/v_s|^gamma)`, any shape [-].
+        """Return the friction coefficient in steady sliding, `g = mu_c + (mu_s - mu_c) exp(-|v/v_s|^gamma)` [-].
 
         Raises InvalidValueError for what is not a tensor of numbers.
         """
-        law = self._law(self.physical())
-        speed = self._number("speed", speed)
+        law, speed = self._parts_at(None)[0].law, self._number("speed", speed)
         return formulas.stribeck(xp, speed[..., None].abs(), law)[..., 0]
 
     def steady_state_z(self, v_scaled: Tensor) -> Tensor:
-        """Bristles of steady sliding, `z_ss = S h g/sigma_0` `[..., 3]`, zero at rest.
+        """Return the bristles of steady sliding, `z_ss = S h g/sigma_0` `[..., 3]`, zero at rest.
 
         `v_scaled` `[..., 3]` [m/s] is the twist at the centre of pressure, `(vx, vy, r omega)`.
 
         Raises InvalidValueError for what is not a tensor `[..., 3]`.
         """
         v_scaled = self._number("v_scaled", v_scaled)
-        values = self.physical()
-        law, speed = self._law(values), xp.norm(v_scaled, -1)
-        moving = speed > 0.0
-        h = self.surface(v_scaled, speed) / torch.where(moving, speed, 1.0)  # zero at rest
-        scale = published_arrays.scale(xp, self.prepare(values)[0].shape)
-        return scale * h * formulas.stribeck(xp, speed, law) / law.sigma_0
+        (law, shape, _), speed = self._parts_at(None)[0], xp.norm(v_scaled, -1)
+        h = shape.surface(v_scaled, speed) / torch.where(speed > 0.0, speed, 1.0)  # zero at rest
+        return published.scale(xp, shape) * h * formulas.stribeck(xp, speed, law) / law.sigma_0
 
     def bristle_rate(self, z: Tensor, v: Tensor) -> Tensor:
-        """`z_dot = S h |v_s| - sigma_0 |v_s|/g z` `[..., 3]` [m/s, m/s, m^2/s]."""
+        """Return `z_dot = S h |v_s| - sigma_0 |v_s|/g z` `[..., 3]` [m/s, m/s, m^2/s]."""
         return self.forward(z, v, 1.0)[0]
 
     def force(self, z: Tensor, z_dot: Tensor, v: Tensor, f_n: Tensor | float) -> Tensor:
-        """Wrench `w = -(sigma_0 z + sigma_1 z_dot + sigma_2 U v) f_n` `[..., 3]` [N, N, N m].
+        """Return the wrench `w = -(sigma_0 z + sigma_1 z_dot + sigma_2 U v) f_n` `[..., 3]` [N, N, N m].
 
         Raises InvalidValueError for tensors whose shapes do not fit.
         """
-        law, shape, _ = self.prepare(self.physical())[0]
+        law, shape, _ = self._parts_at(None)[0]
         z, v, load = self._inputs(z, v, f_n)
-        by = self.arrays.held(xp, law, shape, v)
-        return load[..., None] * self.arrays.wrench(xp, law, shape, z, self._number("z_dot", z_dot), by)
+        by = published.drive(xp, law, shape, v)
+        return load[..., None] * published.wrench(xp, law, shape, z, self._number("z_dot", z_dot), by)
 
     def step(self, z: Tensor, v: Tensor, f_n: Tensor | float, dt: Tensor | float) -> tuple[Tensor, Tensor]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """Advance by `dt` [s] at a constant twist; returns the bristles and the wrench at the end. Exact, stable at any
-        `dt`."""
+        """Return the bristles after `dt` [s] of a constant twist, and the wrench at the end. Stable at any `dt`."""
         return super().step(z, v, f_n, dt)
 
     def forward(self, z: Tensor, v: Tensor, f_n: Tensor | float) -> tuple[Tensor, Tensor]:  # pyright: ignore[reportIncompatibleMethodOverride]
-        """`bristle_rate` and `force`: `(z_dot, wrench)`."""
+        """Return `bristle_rate` and `force`: `(z_dot, wrench)`."""
         return super().forward(z, v, f_n)
 
 
 def _ring(radius: float) -> ContactPatch:
-    """Four points at one distance: `r = radius`, `<rho^2> = radius^2`; an ellipsoid asks for no more."""
+    """Return four points at one distance, with `r = radius` and `<rho^2> = radius^2`."""
     points = [[radius, 0.0], [0.0, radius], [-radius, 0.0], [0.0, -radius]]
     return ContactPatch.points(points, name="ring")
 
 
 def simulate(model: ReducedPlanarLuGre, v_profile: Tensor, f_n: Tensor | float, dt: Tensor | float = 1e-4) -> Tensor:
-    """Wrenches `[T, 3]` at the end of each of the steps `dt` [s] of `v_profile` `[T, 3]`, from rest.
+    """Return the wrenches `[T, 3]` at the end of each of the steps `dt` [s] of `v_profile` `[T, 3]`, from rest.
 
-    By the compiled roll-out and its adjoint where it can, see `planarfriction.torch.rollout`; batches `[..., T, 3]`
-    and loads `[T]` too.
+    Batches `[..., T, 3]` and loads `[T]` are possible, as in `planarfriction.torch.rollout`, which chooses the method.
     """
     return rollout(model, None, v_profile, f_n, dt).wrenches
 
@@ -183,9 +177,9 @@ def tracking_loss(
     f_n: Tensor | float,
     dt: Tensor | float = 1e-4,
 ) -> Tensor:
-    """Mean squared error of `simulate` against wrenches `[T, 3]`, forces by the load and torques by load and radius.
+    """Return the mean squared error of `simulate` against wrenches `[T, 3]`, relative to the load.
 
-    See `planarfriction.torch.tracking_loss`; the radius is that of the start.
+    Torques are divided by load and radius. See `planarfriction.torch.tracking_loss`; the radius is that of the start.
     """
     return weighted_loss(model, None, v_profile, f_n, dt, reference)
 

@@ -23,7 +23,7 @@ from planarfriction.adapters.mujoco.patches import PatchContact, Placed, check_o
 from planarfriction.coupling import ITERATIONS, TOLERANCE
 from planarfriction.errors import InvalidValueError
 from planarfriction.jax import DistributedModel, ReducedModel, ReducedModelPublished
-from planarfriction.jax.base import FrictionModel
+from planarfriction.jax.base import FrictionPytree
 
 INTEGRATORS = {
     int(mujoco.mjtIntegrator.mjINT_EULER): "Euler",
@@ -85,23 +85,23 @@ class Friction:
         placed = [Placed(m, patch) for patch in patches]
         _check(m, placed)
         known = list({id(patch.model): patch.model for patch in patches}.values())
-        self.models: tuple[FrictionModel, ...] = tuple(map(_in_jax, known))
+        self.models: tuple[FrictionPytree, ...] = tuple(map(_in_jax, known))
         needed = words(patches, m.nv)
         if m.nuserdata < needed:
             raise InvalidValueError("nuserdata", f"be at least {needed} (prepare adds them)", m.nuserdata)
         which = tuple(next(i for i, model in enumerate(known) if model is patch.model) for patch in patches)
         radius = np.array([np.sqrt((patch.model.patch.positions**2).sum(1).mean()) for patch in patches])
-        shapes = tuple(self.models[i].rest().shape for i in which)
+        shapes = tuple(self.models[i].state_shape for i in which)
         at = memory(patches, m.nv, m.nuserdata - needed)
         self._fixed = _Fixed(places(placed), which, shapes, radius, at, m.nuserdata)
 
-    def replace(self, models: Sequence[FrictionModel]) -> Self:
+    def replace(self, models: Sequence[FrictionPytree]) -> Self:
         """The same patches with other models, which must be of the same kinds in the same order.
 
         Raises InvalidValueError for models of other kinds.
         """
         kinds, given = ([type(model).__name__ for model in each] for each in (self.models, models))
-        if given != kinds or not all(isinstance(model, FrictionModel) for model in models):
+        if given != kinds or not all(isinstance(model, FrictionPytree) for model in models):
             rule = f"be models of planarfriction.jax: {', '.join(kinds)}"
             raise InvalidValueError("models", rule, ", ".join(given))
         return self.tree_unflatten(self._fixed, (tuple(models),))
@@ -283,7 +283,7 @@ def _refuse_precision(given: str) -> None:
     raise InvalidValueError("precision", rule, given)
 
 
-def _in_jax(model: models.FrictionModel) -> FrictionModel:
+def _in_jax(model: models.FrictionModel) -> FrictionPytree:
     """The model of JAX that a model of NumPy is."""
     if model.depends_on_load:
         rule = "have a shape that does not change with the load: models of JAX keep theirs"

@@ -1,8 +1,6 @@
-"""Limit surfaces for arrays of PyTorch and JAX: `kernels.surfaces` as `f(xp, ...)`.
+"""Limit surfaces over `xp`: `kernels.surfaces` for arrays.
 
-`xp` is the namespace of the formulas with `stack`, `moveaxis`, `atan2`, `norm` along an axis, `root` (square root,
-slope 0 at 0), `whole` (integer part within bounds), `held` (the value, without its derivative) and `epsilon` (rounding
-error). `kind`, `size` and `data` are the numbers of a surface. Derivatives are those of `kernels.surfaces`: at rest the
+`kind`, `size` and `data` are the numbers of a surface. Derivatives are those of `kernels.surfaces`: at rest the
 ellipsoid's, at the edge of a table's cell that of the cell that the lookup uses, and within a small angle of the spin
 axis the one at that angle.
 """
@@ -14,14 +12,14 @@ import math
 from planarfriction.kernels.surfaces import _AT_REST, _AXIS, BILINEAR, CELLS, ELLIPSOID
 
 _ROUNDING = 2.0**-52
-"""Of the numbers that `_AT_REST` is made for."""
+"""Rounding error of the numbers that `_AT_REST` is made for."""
 
 _UNDER = 1.0 - 1e-10
-"""A direction moved out to `_AXIS` has its own sine, which rounding makes smaller by 2e-11 of itself."""
+"""Share of `sin(_AXIS)` that a direction moved out to `_AXIS` keeps: rounding takes 2e-11 of it."""
 
 
 def sliding(xp, kind: int, size: int, data, scaled, speed):
-    """`u = h(V) |V_S|` of scaled twists `[..., 3]` and their norms `[..., 1]`."""
+    """Return `u = h(V) |V_S|` of scaled twists `[..., 3]` and their norms `[..., 1]`."""
     if kind == ELLIPSOID:
         return scaled
     moving = speed > 0.0
@@ -31,7 +29,7 @@ def sliding(xp, kind: int, size: int, data, scaled, speed):
 
 
 def _cells(xp, size: int, data, scaled):
-    """`|V_S| sum w_i [v_i/|v_i| ; rho_i x v_i/|v_i|]`; a cell in the centre of rotation adds nothing."""
+    """Return `|V_S| sum w_i [v_i/|v_i| ; rho_i x v_i/|v_i|]`; a cell in the centre of rotation adds nothing."""
     px, py, weights = data[:size], data[size : 2 * size], data[2 * size : 3 * size]
     speed = xp.norm(scaled, -1)
     heading = scaled / speed
@@ -48,16 +46,19 @@ def _cells(xp, size: int, data, scaled):
 
 
 def _table(xp, kind: int, size: int, data, scaled):
-    """Near the spin axis the value of one place with the derivative of another; both places are looked up at once."""
+    """Return `u` of a table: near the spin axis its value at one place with the derivative at another.
+
+    Both places are looked up at once.
+    """
     lookup = _bilinear if kind == BILINEAR else _potential
-    here = xp.held(scaled)
+    here = xp.stop_gradient(scaled)
     near, moved = _off_axis(xp, here)
     u = lookup(xp, size, data, xp.stack([scaled + xp.where(near, moved - here, 0.0), here], 0))
-    return u[0] + xp.where(near, xp.held(u[1] - u[0]), 0.0)
+    return u[0] + xp.where(near, xp.stop_gradient(u[1] - u[0]), 0.0)
 
 
 def _upper(xp, scaled):
-    """Length, and sign and components in the upper half sphere, which the lower mirrors, of the direction."""
+    """Return a twist's length, and sign and components of its direction, mirrored into the upper half sphere."""
     length = xp.norm(scaled, -1)
     heading = scaled / length
     one = xp.ones_like(heading[..., 2])
@@ -66,15 +67,15 @@ def _upper(xp, scaled):
 
 
 def _angles(xp, x, y, s):
-    """Polar angle from the spin axis and azimuth, from 0 to 2 pi; 0 on the axis."""
+    """Return the polar angle from the spin axis and azimuth, from 0 to 2 pi; 0 on the axis."""
     across = xp.root(x * x + y * y)
     on_axis = across == 0.0
-    azimuth = xp.atan2(xp.where(on_axis, 0.0, y), xp.where(on_axis, 1.0, x))
-    return xp.atan2(across, s), xp.where(azimuth < 0.0, azimuth + 2.0 * math.pi, azimuth)
+    azimuth = xp.arctan2(xp.where(on_axis, 0.0, y), xp.where(on_axis, 1.0, x))
+    return xp.arctan2(across, s), xp.where(azimuth < 0.0, azimuth + 2.0 * math.pi, azimuth)
 
 
 def _off_axis(xp, scaled):
-    """Which twists are nearer to the spin axis than `_AXIS` [rad], `[..., 1]`, and all moved out to it."""
+    """Return True for twists nearer to the spin axis than `_AXIS` [rad], `[..., 1]`, and all twists moved to it."""
     length, mirror, x, y, s = _upper(xp, scaled)
     polar, azimuth = _angles(xp, x, y, s)
     across = math.sin(_AXIS)
@@ -83,7 +84,7 @@ def _off_axis(xp, scaled):
 
 
 def _place(xp, size: int, data, polar, azimuth):
-    """Numbers at the corners of the table cell `[..., 2, 2, 4]`, polar angle first, and the position within it."""
+    """Return the numbers at the corners of the table cell, `[..., 2, 2, 4]`, polar angle first, and the place in it."""
     per_segment = size / (0.5 * math.pi)
     a, b = polar * per_segment, azimuth * per_segment
     i, j = xp.whole(a, size - 1), xp.whole(b, 4 * size - 1)
@@ -93,7 +94,7 @@ def _place(xp, size: int, data, polar, azimuth):
 
 
 def _bilinear(xp, size: int, data, scaled):
-    """The published table: `h` bilinear in the two angles."""
+    """Return `u` of the published table: `h` bilinear in the two angles."""
     length, mirror, x, y, s = _upper(xp, scaled)
     corners, a, b = _place(xp, size, data, *_angles(xp, x, y, s))
     a, b = a[..., None], b[..., None]
@@ -103,7 +104,7 @@ def _bilinear(xp, size: int, data, scaled):
 
 
 def _potential(xp, size: int, data, scaled):
-    """The smooth table: the dissipation bicubic in the two angles, `h` its gradient, with the tilt about the axis."""
+    """Return `u` of the smooth table: the gradient of the dissipation, bicubic in the two angles, and of its tilt."""
     length, mirror, x, y, s = _upper(xp, scaled)
     polar, azimuth = _angles(xp, x, y, s)
     corners, a, b = _place(xp, size, data, polar, azimuth)
@@ -123,7 +124,7 @@ def _potential(xp, size: int, data, scaled):
 
 
 def _blend(xp, corners, a, b, segment: float):
-    """Value of the bicubic patch and its derivatives along polar angle and azimuth, `[...]`.
+    """Return the value of the bicubic patch and its derivatives along polar angle and azimuth, `[...]`.
 
     Neighbours enter by their differences: near the spin axis, where they are equal but for little, the azimuth's second
     derivative is divided by the square of the distance, and the rounding of two large terms would be too.
@@ -140,12 +141,15 @@ def _blend(xp, corners, a, b, segment: float):
 
 
 def _last(numbers):
-    """The slopes at both ends, behind the values."""
+    """Return the slopes at both ends, behind the values."""
     return numbers[..., 2, :], numbers[..., 3, :]
 
 
 def _hermite(xp, t, segment: float):
-    """Cubic Hermite basis on [0, 1] and its slope `[..., 2, 4]`: of value 0, value 1 less value 0, slope 0, slope 1."""
+    """Return the cubic Hermite basis on [0, 1] and its slope `[..., 2, 4]`.
+
+    Its members multiply value 0, value 1 less value 0, slope 0 and slope 1.
+    """
     u, one = 1.0 - t, xp.ones_like(t)
     value = [one, t * t * (3.0 - 2.0 * t), segment * t * u * u, -segment * t * t * u]
     slope = [0.0 * one, 6.0 * t * u / segment, u * (1.0 - 3.0 * t), t * (3.0 * t - 2.0)]

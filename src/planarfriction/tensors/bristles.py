@@ -1,9 +1,7 @@
-"""Bristles for arrays of PyTorch and JAX: `kernels.bristle_step` as `f(xp, ...)`, for any dimension of a bristle.
+"""Bristles of any dimension: `kernels.bristle_step` as `f(xp, ...)`, with derivatives that are finite everywhere.
 
-`xp` is the namespace of the formulas with `norm` and `dot` along an axis, which stays with length 1, and `epsilon`, the
-rounding error of an array's numbers. A bristle lies along `axis`: two components in every cell of the distributed
-model, three in the published one. All else, the law's parameters too, broadcasts with the length of a bristle.
-Derivatives are finite everywhere.
+A bristle lies along `axis`: two components in every cell of the distributed model, three in the published one. All
+else, the law's parameters too, broadcasts with the length of a bristle, whose axis has length 1.
 """
 
 from __future__ import annotations
@@ -21,7 +19,7 @@ Steady sliding sits on the largest deflection to the last bit: rounding must not
 
 
 class Drive(NamedTuple):
-    """What drives bristles at a held twist."""
+    """Velocities that drive bristles at a constant twist."""
 
     velocity: Any
     """`u`: velocity of a cell, `h(V) v_n` in the published model [m/s]."""
@@ -32,22 +30,22 @@ class Drive(NamedTuple):
     grip: Any
     """`sigma_0/g(speed)` [1/m]."""
     viscous: Any
-    """What viscous friction sees: the velocity of a cell, `U V` in the published model."""
+    """Velocity that viscous friction opposes: that of a cell, `U V` in the published model."""
 
 
 def drive(xp, law: LawNumbers, velocity, speed, size, viscous) -> Drive:
-    """The drive of bristles, with the grip at its speed."""
+    """Return the drive of bristles, with the grip at its speed."""
     return Drive(velocity, speed, size, law.sigma_0 / formulas.stribeck(xp, speed, law), viscous)
 
 
 def rate(xp, law: LawNumbers, z, by: Drive, axis: int):
-    """`zdot = u - k z`."""
+    """Return `zdot = u - k z`."""
     z_norm = xp.norm(z, axis)
     return by.velocity - _decay(xp, law, z_norm * (by.grip / by.size), _along(xp, z, z_norm, by, axis), by) * z
 
 
 def step(xp, law: LawNumbers, z, by: Drive, dt, axis: int):
-    """Bristles and their rates after `dt` of a held drive (see `formulas.relaxation`)."""
+    """Return the bristles after `dt` of a constant drive, and their rates (see `formulas.relaxation`)."""
     u, to_deflection = by.velocity, by.grip / by.size
     z_norm = xp.norm(z, axis)
     deflection = z_norm * to_deflection
@@ -68,7 +66,7 @@ def step(xp, law: LawNumbers, z, by: Drive, dt, axis: int):
 
 
 def back_onto(xp, deflection, largest):
-    """Factor that brings a bristle back onto the ball that it may not leave; rounding is no excess."""
+    """Return the factor that brings a bristle back onto the ball that it may not leave; rounding is no excess."""
     margin = 1.0 + ROUNDING * xp.epsilon(deflection)
     return formulas.cap(xp, xp.where(deflection > margin * largest, deflection, 0.0), largest)
 
@@ -78,7 +76,7 @@ def _decay(xp, law: LawNumbers, deflection, along, by: Drive):
 
 
 def _along(xp, z, z_norm, by: Drive, axis: int):
-    """Speed at which a bristle is stretched, `z/|z| . u/size`; 0 with derivative 0 for a bristle at rest."""
+    """Return the speed at which a bristle is stretched, `z/|z| . u/size`; 0 with derivative 0 for a bristle at rest."""
     deflected = z_norm > 0.0
     stretch = xp.dot(z, by.velocity, axis) / (by.size * xp.where(deflected, z_norm, 1.0))
     return xp.where(deflected, stretch, 0.0)

@@ -1,46 +1,33 @@
-"""The reduced model for arrays of PyTorch and JAX: `kernels.steady` and `kernels.reduced` as `f(xp, ...)`.
+"""The reduced model over `xp`: `kernels.steady` and `kernels.reduced` for arrays.
 
-`xp` is the namespace of the formulas with `stack`, `root` (square root, slope 0 at 0), `whole` (integer part within
-bounds) and `epsilon` (rounding error). Vectors are `[..., 3]`, scalars and the law's parameters `[..., 1]` or plain
-numbers. Derivatives are finite everywhere and those of `kernels.reduced_step`: at rest the step is that of a
-vanishing twist, `z + u dt`.
+Vectors are `[..., 3]`, scalars and the law's parameters `[..., 1]` or plain numbers. Derivatives are finite everywhere
+and those of `kernels.reduced_step`: at rest the step is that of a vanishing twist, `z + u dt`.
 """
 
 from __future__ import annotations
 
-import itertools
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction import formulas
+from planarfriction import formulas, models
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels.steady import HEADER, QUARTIC
-from planarfriction.models.bristle_arrays import back_onto
+from planarfriction.laws import FrictionLaw
+from planarfriction.models.map_sizes import MapSizes, maps_of, sizes_of
+from planarfriction.patch import ContactPatch
+from planarfriction.tensors.bristles import back_onto
+
+AXIS = -1
+"""Axis of the components of a state, its only axis."""
 
 _SQUARES = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]
 _FOURTHS = [list(each) for each in zip(*((i, j) for i in range(3) for j in range(i, 6)), strict=True)]
 """Factors of the products of two and of four components in the order of `quartic`."""
 
 
-class MapSizes(NamedTuple):
-    """How many numbers a map has, as `kernels.steady` names them."""
-
-    faces: int
-    segments: int
-    coarse: int
-    levels: int
-
-    @property
-    def count(self) -> int:
-        """Numbers of the map."""
-        nodes, own = 2 * self.segments + 1, 2 * self.coarse + 1
-        return HEADER + self.faces * 12 * (nodes * nodes + own * own * self.levels)
-
-
 class ReducedNumbers(NamedTuple):
-    """What `models.reduced_map.ReducedShape` holds, as arrays."""
+    """A `models.reduced_map.ReducedShape` as arrays."""
 
     factor: Any
     """F `[3, 3]`, upper triangular."""
@@ -54,8 +41,8 @@ class ReducedNumbers(NamedTuple):
     """The Stribeck part with its levels, `[faces, 2 m + 1, 2 m + 1, levels, 3, 4]`."""
 
 
-class Held(NamedTuple):
-    """What a step holds: a twist and its steady state (any that move, where the patch is at rest)."""
+class Sliding(NamedTuple):
+    """A twist and its steady state, which stay the same during a step; at rest, those of some other twist."""
 
     u: Any
     """`V_G` [m/s], also at rest."""
@@ -71,38 +58,43 @@ class Held(NamedTuple):
     moves: Any
 
 
-def sizes_of(data: np.ndarray) -> MapSizes:
-    """The sizes of a map, from the numbers that compiled loops read."""
-    return MapSizes(*(int(value) for value in data[:4]))
+class ReducedParts(NamedTuple):
+    """The parts of a patch at one load, as NumPy arrays."""
+
+    sizes: tuple[MapSizes, ...]
+    share: np.ndarray
+    """Share of the load that each part carries, `[P]`."""
+    factor: np.ndarray
+    """F of each part, `[P, 3, 3]`."""
+    map: np.ndarray
+    """Steady sliding of the parts, one map behind the other (see `planarfriction.kernels.steady`)."""
 
 
-def starts_of(sizes: Sequence[MapSizes]) -> list[int]:
-    """Where maps begin that lie one behind the other."""
-    ends = itertools.accumulate(size.count for size in sizes)
-    return [0, *ends][: len(sizes)]
+def parts_of(patch: ContactPatch, law: FrictionLaw, normal_force: float | None, **options: Any) -> ReducedParts:
+    """Return the parts of a patch at a load [N]; `parts`, `segments` and `speeds` as in `ReducedModel`."""
+    model = models.ReducedModel(patch, law, load_error=0.0, **options)
+    shares, shapes = zip(*model.parts_at(normal_force), strict=True)
+    data = [shape.data for shape in shapes]
+    factor = np.stack([shape.factor for shape in shapes])
+    return ReducedParts(tuple(map(sizes_of, data)), np.array(shares), factor, np.concatenate(data))
 
 
-def parts_of(factors, data, sizes: Sequence[MapSizes]) -> list[ReducedNumbers]:
-    """`numbers_of` parts, from their F `[P, 3, 3]` and their maps, one behind the other."""
-    places = zip(starts_of(sizes), sizes, strict=True)
-    return [numbers_of(factors[k], data[at : at + size.count], size) for k, (at, size) in enumerate(places)]
-
-
-def numbers_of(factor, data, sizes: MapSizes) -> ReducedNumbers:
-    """The parts of F and the numbers of a map, arrays of any kind, of which they are views."""
-    faces, n, m, levels = sizes
-    middle = HEADER + faces * (2 * n + 1) ** 2 * 12
-    return ReducedNumbers(
-        factor,
-        data[QUARTIC:HEADER],
-        data[4:8],
-        data[HEADER:middle].reshape(faces, 2 * n + 1, 2 * n + 1, 3, 4),
-        data[middle:].reshape(faces, 2 * m + 1, 2 * m + 1, levels, 3, 4),
-    )
+def numbers_of(parts: Any) -> list[ReducedNumbers]:
+    """Return the numbers of each part as views of `parts`, which is like `ReducedParts`, with arrays of any kind."""
+    return [
+        ReducedNumbers(
+            parts.factor[k],
+            data[QUARTIC:HEADER],
+            data[4:8],
+            data[HEADER : size.middle].reshape(size.faces, *(2 * size.segments + 1,) * 2, 3, 4),
+            data[size.middle :].reshape(size.faces, *(2 * size.coarse + 1,) * 2, size.levels, 3, 4),
+        )
+        for k, (data, size) in enumerate(zip(maps_of(parts.map, parts.sizes), parts.sizes, strict=True))
+    ]
 
 
 def dot(a, b):
-    """`a . b`, which keeps its axis."""
+    """Return `a . b`, which keeps its axis."""
     return (a * b).sum(-1)[..., None]
 
 
@@ -110,7 +102,7 @@ def dot(a, b):
 
 
 def _spot(xp, direction, stretch, faces: int):
-    """Face, place on it and sign of what is read there (see `kernels.cube.locate`) for unit vectors, `[...]`."""
+    """Return face, place on it and sign of the value there (see `kernels.cube.locate`) for unit vectors, `[...]`."""
     x, y, s = direction[..., 0], direction[..., 1], stretch * direction[..., 2]
     ax, ay, a_s = abs(x), abs(y), abs(s)
     on_x, on_y = (ax >= ay) & (ax >= a_s), ay >= a_s
@@ -123,7 +115,7 @@ def _spot(xp, direction, stretch, faces: int):
 
 
 def _interval(xp, a, nodes: int):
-    """Both ends of the interval that holds `a`, `[..., 2]`, and their weights of value and slope, `[..., 2, 2]`."""
+    """Return both ends of the interval around `a`, `[..., 2]`, and their weights of value and slope, `[..., 2, 2]`."""
     n = (nodes - 1) // 2
     t = (a + 1.0) * n
     i = xp.whole(t, 2 * n - 1)
@@ -135,7 +127,7 @@ def _interval(xp, a, nodes: int):
 
 
 def _square(xp, a, b, nodes: int):
-    """Rows and columns of the four nodes around a place, and the weights of their four numbers, `[..., 2, 2, 4]`."""
+    """Return rows and columns of the four nodes around a place, and the weights of their numbers, `[..., 2, 2, 4]`."""
     i, by_a = _interval(xp, a, nodes)
     j, by_b = _interval(xp, b, nodes)
     weights = by_a[..., :, None, None, :] * by_b[..., None, :, :, None]
@@ -143,7 +135,7 @@ def _square(xp, a, b, nodes: int):
 
 
 def _levels(xp, t, count: int):
-    """The four levels around t in [0, 1], `[..., 4]`, and their weights: a uniform cubic B-spline."""
+    """Return the four levels around t in [0, 1], `[..., 4]`, and their weights: a uniform cubic B-spline."""
     u = t * (count - 3)
     i = xp.whole(u, count - 4)
     u = u - i
@@ -153,7 +145,7 @@ def _levels(xp, t, count: int):
 
 
 def _sliding(xp, law: LawNumbers, shape: ReducedNumbers, n, t):
-    """`sigma_0 z_ss` of unit vectors n at `t` `[..., 1]`."""
+    """Return `sigma_0 z_ss` of unit vectors n at `t` `[..., 1]`."""
     face, a, b, sign = _spot(xp, n, shape.scale[2], shape.flat.shape[0])
     face = face[..., None, None]
     i, j, w = _square(xp, a, b, shape.flat.shape[1])
@@ -167,7 +159,10 @@ def _sliding(xp, law: LawNumbers, shape: ReducedNumbers, n, t):
 
 
 def _evenness(xp, shape: ReducedNumbers, z):
-    """`formulas.evenness` of states; 1 without deflection. Their size goes first, whose fourth power float32 lacks."""
+    """Return `formulas.evenness` of states, 1 without deflection.
+
+    States are divided by their size first, whose fourth power leaves the range of float32.
+    """
     bent = dot(z, z) > 0.0
     safe = xp.where(bent, z, 1.0)
     n = safe / xp.root(dot(safe, safe))
@@ -179,8 +174,8 @@ def _evenness(xp, shape: ReducedNumbers, z):
 # ---------------------------------------------------------------------- a twist
 
 
-def held(xp, law: LawNumbers, shape: ReducedNumbers, twist) -> Held:
-    """The scaled twist, its steady state and what follows from both."""
+def drive(xp, law: LawNumbers, shape: ReducedNumbers, twist) -> Sliding:
+    """Return the scaled twist, its steady state and the numbers that follow from both."""
     f = shape.factor
     vx, vy, omega = twist[..., 0], twist[..., 1], twist[..., 2]
     scaled = [f[0, 0] * vx + f[0, 1] * vy + f[0, 2] * omega, f[1, 1] * vy + f[1, 2] * omega, f[2, 2] * omega]
@@ -195,38 +190,38 @@ def held(xp, law: LawNumbers, shape: ReducedNumbers, twist) -> Held:
     q = (q + (formulas.floored(xp, power, law.mu_c * least) - power) * n) / law.sigma_0
     power, per_q2 = dot(q, n), 1.0 / dot(q, q)
     decay = v / power
-    return Held(u, q, safe - decay * q, decay, v * power * per_q2, per_q2, moves)
+    return Sliding(u, q, safe - decay * q, decay, v * power * per_q2, per_q2, moves)
 
 
 def _closure(xp, law: LawNumbers, shape: ReducedNumbers, z, deflection, share):
-    """`beta` of a state z, which may be given times any factor (see `kernels.reduced.closure`)."""
+    """Return `beta` of a state z, which may be given times any factor (see `kernels.reduced.closure`)."""
     even = _evenness(xp, shape, z) if law.elasto_plastic else 1.0
     deflected = deflection > 0.0
     cosine = xp.where(deflected, share / xp.where(deflected, deflection, 1.0), 0.0)
     return formulas.slip_share(xp, deflection, cosine, even, law)
 
 
-def _place(xp, z, by: Held):
-    """`|z|/|z_ss|` and `s = z . z_ss/|z_ss|^2`."""
+def _place(xp, z, by: Sliding):
+    """Return `|z|/|z_ss|` and `s = z . z_ss/|z_ss|^2`."""
     return xp.root(dot(z, z) * by.per_q2), dot(z, by.q) * by.per_q2
 
 
-def rate(xp, law: LawNumbers, shape: ReducedNumbers, z, by: Held):
-    """`zdot = V_G - beta (lambda z + s m)`."""
+def rate(xp, law: LawNumbers, shape: ReducedNumbers, z, by: Sliding):
+    """Return `zdot = V_G - beta (lambda z + s m)`."""
     deflection, share = _place(xp, z, by)
     beta = _closure(xp, law, shape, z, deflection, share)
     return by.u - xp.where(by.moves, beta * (by.decay * z + share * by.m), 0.0)
 
 
-def wrench(xp, law: LawNumbers, shape: ReducedNumbers, z, zdot, by: Held):
-    """Wrench about the origin per unit load, `F' g`."""
+def wrench(xp, law: LawNumbers, shape: ReducedNumbers, z, zdot, by: Sliding):
+    """Return the wrench about the origin per unit load, `F' g`."""
     g = formulas.traction(z, zdot, by.u, law)
     f, x, y, s = shape.factor, g[..., 0], g[..., 1], g[..., 2]
     return xp.stack([f[0, 0] * x, f[0, 1] * x + f[1, 1] * y, f[0, 2] * x + f[1, 2] * y + f[2, 2] * s], -1)
 
 
-def advance(xp, law: LawNumbers, shape: ReducedNumbers, z, by: Held, dt):
-    """Moments and their rates after `dt` of a held twist (see `kernels.reduced_step`)."""
+def advance(xp, law: LawNumbers, shape: ReducedNumbers, z, by: Sliding, dt):
+    """Return the moments after `dt` of a constant twist, and their rates (see `kernels.reduced_step`)."""
     size, share = _place(xp, z, by)
     start = end = _closure(xp, law, shape, z, size, share)
     if law.elasto_plastic:

@@ -1,0 +1,61 @@
+"""The distributed model over `xp`: a bristle `[..., 2, N]` in every cell.
+
+Twists are `[..., 3]`; the law's parameters and time steps are `[..., 1, 1]`, or plain numbers.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from planarfriction import formulas
+from planarfriction.formulas import LawNumbers
+from planarfriction.patch import ContactPatch
+from planarfriction.patch.metric import refuse_anisotropy
+from planarfriction.tensors import bristles
+from planarfriction.tensors.bristles import Drive
+
+AXIS = -2
+"""Axis of the components of a bristle, the first axis of a state."""
+
+
+class Cells(NamedTuple):
+    """A patch as arrays."""
+
+    positions: Any
+    """x then y [m], `[2, N]`."""
+    weights: Any
+    """Share of the load that each cell carries [-], `[N]`."""
+
+
+def cells_of(patch: ContactPatch, normal_force: float | None, front: str) -> Cells:
+    """Return the cells of a patch at a load [N] as NumPy arrays; `front` names the front end in messages."""
+    refuse_anisotropy(patch, f"{front}.DistributedModel (ReducedModel takes any)")
+    return Cells(np.ascontiguousarray(patch.positions.T), patch.weights(normal_force))
+
+
+def drive(xp, law: LawNumbers, cells: Cells, twist) -> Drive:
+    """Return the drive of the bristles at a twist: the velocities of the cells."""
+    x, y = cells.positions[0], cells.positions[1]
+    vx, vy, omega = twist[..., 0, None], twist[..., 1, None], twist[..., 2, None]
+    velocity = xp.stack([vx - omega * y, vy + omega * x], -2)
+    return bristles.drive(xp, law, velocity, xp.norm(velocity, AXIS), 1.0, velocity)
+
+
+def rate(xp, law: LawNumbers, cells: Cells, z, by: Drive):
+    """Return `zdot = v - k z`."""
+    return bristles.rate(xp, law, z, by, AXIS)
+
+
+def advance(xp, law: LawNumbers, cells: Cells, z, by: Drive, dt):
+    """Return the bristles after `dt` of a constant twist, and their rates."""
+    return bristles.step(xp, law, z, by, dt, AXIS)
+
+
+def wrench(xp, law: LawNumbers, cells: Cells, z, zdot, by: Drive):
+    """Return the wrench about the origin per unit load `[..., 3]`: `sum w_i [t_i ; rho_i x t_i]`."""
+    x, y = cells.positions[0], cells.positions[1]
+    force = cells.weights * formulas.traction(z, zdot, by.viscous, law)
+    fx, fy = force[..., 0, :], force[..., 1, :]
+    return xp.stack([fx.sum(-1), fy.sum(-1), (x * fy - y * fx).sum(-1)], -1)

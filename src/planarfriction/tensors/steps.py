@@ -1,0 +1,169 @@
+"""Evaluations and steps of a model over `xp`: sums over its parts, and the interface of every tensor model."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from types import ModuleType
+from typing import Any, ClassVar, NamedTuple
+
+from planarfriction import validation
+from planarfriction.derivatives.parameters import PARAMETERS
+from planarfriction.formulas import LawNumbers
+from planarfriction.laws import FrictionLaw
+from planarfriction.laws.base import refuse_creep
+from planarfriction.patch import ContactPatch
+from planarfriction.tensors.inputs import broadcast, finite, non_negative, shaped
+from planarfriction.tensors.namespace import Namespace
+
+LAW = PARAMETERS[:8]
+"""Parameters of the friction law; the others describe the shape of the patch."""
+
+
+class Part(NamedTuple):
+    """A part of a model, ready for one evaluation or for all steps of a rollout."""
+
+    law: LawNumbers
+    """Broadcasts with the lengths of bristles."""
+    shape: Any
+    """Numbers of the patch as the model's equations know them."""
+    share: Any = 1.0
+    """Share of the load that the part carries; most models have one part, which carries all of it."""
+
+
+def evaluate(xp: Any, equations: Any, parts: tuple[Part, ...], state: Any, twist: Any, load: Any) -> tuple[Any, Any]:
+    """Return the rate of the state, and the wrench `[..., 3]`."""
+
+    def one(part: Part, z: Any) -> tuple[Any, Any]:
+        by = equations.drive(xp, part.law, part.shape, twist)
+        rate = equations.rate(xp, part.law, part.shape, z, by)
+        return rate, equations.wrench(xp, part.law, part.shape, z, rate, by)
+
+    rate, unit = sum_parts(xp, parts, state, one)
+    return rate, load[..., None] * unit
+
+
+def step(
+    xp: Any, equations: Any, parts: tuple[Part, ...], state: Any, twist: Any, load: Any, dt: Any
+) -> tuple[Any, Any]:
+    """Return the state after `dt` [s] of a constant twist, and the wrench at the end; without load bristles relax."""
+    given, dt = (parts[0].law.sigma_0, state, twist), inner(equations, dt)
+    state, twist = xp.widened(state), xp.widened(twist)
+
+    def one(part: Part, z: Any) -> tuple[Any, Any]:
+        by = equations.drive(xp, part.law, part.shape, twist)
+        new, rate = equations.advance(xp, part.law, part.shape, z, by, dt)
+        return relaxed(xp, equations, new, load), equations.wrench(xp, part.law, part.shape, new, rate, by)
+
+    new, unit = sum_parts(xp, parts, state, one)
+    return xp.narrowed(new, *given), xp.narrowed(load[..., None] * unit, *given)
+
+
+def sum_parts(xp: Any, parts: tuple[Part, ...], state: Any, one: Callable[..., Any]) -> tuple[Any, Any]:
+    """Return the states that `one(part, state)` gives for each part, side by side, and the sum of the wrenches."""
+    if len(parts) == 1:
+        return one(parts[0], state)
+    found = [one(part, state[..., k, :]) for k, part in enumerate(parts)]
+    return xp.stack([new for new, _ in found], -2), sum(
+        part.share * wrench for part, (_, wrench) in zip(parts, found, strict=True)
+    )
+
+
+def relaxed(xp: Any, equations: Any, state: Any, load: Any) -> Any:
+    """Return the states of contacts with load, and zeros for those without."""
+    return xp.where(inner(equations, load > 0.0), state, 0.0)
+
+
+def inner(equations: Any, value: Any) -> Any:
+    """Return one value for each contact `[...]` with axes of length 1 for those of a part's state."""
+    return value.reshape(value.shape + (1,) * -equations.AXIS)
+
+
+class TensorModel:
+    """A friction model over `xp`; the caller holds the state, and everything is about the contact frame's origin.
+
+    `twist` `[..., 3]` is `(vx, vy, omega)` of the moving body, the wrench `(fx, fy, tau)` acts on it, `normal_force`
+    `[...]` is >= 0; leading batch axes of these, of the state and of `dt` broadcast. `parameters`, physical values by
+    number in the model's order, replace the model's own.
+
+    Raises InvalidValueError for inputs that are no numbers and for wrong shapes; where values can be read without
+    waiting, also for values that are not finite and for loads and steps below zero. Elsewhere, as on a device and
+    inside `jit`, `vmap`, `grad` and `torch.compile`, these count as zero (friction never drives), and NaN stays NaN.
+    """
+
+    xp: ClassVar[Namespace]
+    equations: ClassVar[ModuleType]
+    """Module of the model's `drive`, `rate`, `advance` and `wrench`."""
+    elasto_plastic: bool
+
+    @staticmethod
+    def refuse(patch: ContactPatch, law: FrictionLaw, name: str) -> None:
+        """Raise InvalidValueError unless patch and law are ones that the model `name` can be made of."""
+        validation.instance("patch", patch, ContactPatch, "a ContactPatch")
+        refuse_creep(law, name)
+
+    @property
+    def state_shape(self) -> tuple[int, ...]:
+        """Shape of the state of one contact."""
+        raise NotImplementedError
+
+    def rate(self, state: Any, twist: Any, normal_force: Any, *, parameters: Any = None) -> Any:
+        """Return the rate of the state, of its shape; it does not depend on the load."""
+        return self._evaluated(state, twist, normal_force, parameters)[0]
+
+    def wrench(self, state: Any, twist: Any, normal_force: Any, *, parameters: Any = None) -> Any:
+        """Return the friction wrench on the moving body, `[..., 3]` [N, N, N m]."""
+        return self._evaluated(state, twist, normal_force, parameters)[1]
+
+    def step(self, state: Any, twist: Any, normal_force: Any, dt: Any, *, parameters: Any = None) -> tuple[Any, Any]:
+        """Return the state after `dt` [s] of a constant twist, and the wrench at the end.
+
+        Stable at any `dt`; the bristles of a contact without load relax.
+        """
+        parts = self._parts_at(parameters)
+        inputs = self._inputs(state, twist, normal_force)
+        dt = non_negative(self.xp, "dt", self._number("dt", dt))
+        return step(self.xp, self.equations, parts, *inputs, dt)
+
+    def rollout(self, state: Any, twist: Any, normal_force: Any, dt: Any, *, parameters: Any = None) -> Any:
+        """Return the last state and the wrenches `[..., T, 3]` of steps through twists `[..., T, 3]` and loads.
+
+        Each step is an operation of the tensor library; inputs are arrays that have been checked.
+        """
+        raise NotImplementedError
+
+    def _values(self, parameters: Any) -> dict[str, Any]:
+        """Return physical values by name, from `parameters` or, if None, the model's own."""
+        raise NotImplementedError
+
+    def _parts(self, law: LawNumbers, values: Mapping[str, Any]) -> tuple[Part, ...]:
+        """Return the parts of the model; law and physical values broadcast with the lengths of bristles."""
+        raise NotImplementedError
+
+    def _number(self, name: str, value: Any) -> Any:
+        return self.xp.real(name, value)
+
+    def _parts_at(self, parameters: Any) -> tuple[Part, ...]:
+        return self._prepared(self._values(parameters))
+
+    def _prepared(self, values: Mapping[str, Any]) -> tuple[Part, ...]:
+        """Return the parts of the model at physical values `[...]`."""
+        wide = {name: inner(self.equations, value) for name, value in values.items()}
+        # a map of steady sliding, not the law, contains the exponent of a model without gamma
+        law = {name: wide.get(name, math.nan) for name in LAW}
+        return self._parts(LawNumbers(**law, elasto_plastic=float(self.elasto_plastic)), wide)
+
+    def _evaluated(self, state: Any, twist: Any, normal_force: Any, parameters: Any) -> tuple[Any, Any]:
+        parts = self._parts_at(parameters)
+        return evaluate(self.xp, self.equations, parts, *self._inputs(state, twist, normal_force))
+
+    def _inputs(self, state: Any, twist: Any, normal_force: Any) -> tuple[Any, Any, Any]:
+        """Return checked state, twist and load as arrays whose batch axes broadcast."""
+        z = shaped("state", self._number("state", state), self.state_shape)
+        v = shaped("twist", self._number("twist", twist), (3,))
+        load = self._number("normal_force", normal_force)
+        batch = z.shape[: z.ndim - len(self.state_shape)]
+        shapes = {"state": batch, "twist": v.shape[:-1], "normal_force": load.shape}
+        broadcast(self.xp, "batch axes", "broadcast", shapes)
+        load = non_negative(self.xp, "normal_force", load)
+        return finite(self.xp, "state", z), finite(self.xp, "twist", v), load
