@@ -17,7 +17,6 @@ from planarfriction.models import ReducedModel, ReducedModelPublished
 from planarfriction.models.map_sizes import MapSizes, maps_of
 from planarfriction.models.published_shapes import PublishedShape, axes_of
 from planarfriction.models.reduced_map import ReducedShape
-from planarfriction.models.reduced_map import ReducedShape
 
 PARAMETERS = (
     "sigma_0",

@@ -153,7 +153,8 @@ def _run_jvp(primals, tangents, *, operation, outer: int, kept: bool):
         memory = memory[: int(kept)]
     else:
         if operation.strict:
-            raise InvalidValueError(*operation.refusal(type(tangents[0]) is not ad.Zero), "a derivative of it")
+            name, rule = operation.refusal(type(tangents[0]) is not ad.Zero)
+            raise InvalidValueError(name, rule, "a derivative of it")
         results, changes = jax.jvp(_by_operations(operation, outer), _full(outer, primals), _full(outer, dots))
         memory = _run.bind(*primals, **options, kept=True)[len(operation.outer) :] if kept else []
     return [*results, *memory], [*changes, *(jnp.zeros_like(value) for value in memory)]

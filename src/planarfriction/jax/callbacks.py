@@ -63,12 +63,12 @@ class HostRollout(NamedTuple):
     @property
     def inner(self) -> tuple[int, ...]:
         """Number of inner axes of each input."""
-        return RolloutOperation(tuple, self.axes).inner
+        return self.axes, 2, 1, 1
 
     @property
     def outer(self) -> tuple[int, ...]:
         """Number of inner axes of last state and wrenches."""
-        return RolloutOperation(tuple, self.axes).outer
+        return self.axes, 2
 
     def shapes(self, state: Any, twist: Any, load: Any, parameters: Any) -> list[tuple[int, ...]]:
         """Return the shapes of last state, wrenches and the states before each step."""

@@ -69,7 +69,6 @@ class ReducedModelPublished(FrictionPytree):
     """
 
     equations = published
-    state_shape = (3,)
     leaves = ("parameters", "surface")
     parameters: PublishedParameters
     surface: Surface

@@ -98,17 +98,17 @@ class SceneOperation(NamedTuple):
     def run(self, held: Arrays, inputs: Arrays, keep: bool) -> tuple[Arrays, Arrays]:
         """Return motion `[..., M, 6]` and wrenches `[..., M, C, 3]`."""
         batch, rows = _rows(inputs, self.inner)
-        return _shaped(batch, self.function.run(*rows, self.memory if keep else None)), ()
+        return _shaped(batch, self.function.run(rows[0], self.memory if keep else None)), ()
 
     def push(self, held: Arrays, inputs: Arrays, changes: Arrays) -> Arrays:
         """Return the changes of motion and wrenches."""
         batch, rows = _rows((*inputs, *changes), self.inner * 2)
-        return _shaped(batch, self.function.push(*rows))
+        return _shaped(batch, self.function.push(rows[0], rows[1]))
 
     def pull(self, held: Arrays, inputs: Arrays, bars: Arrays, kept: Arrays) -> Arrays:
         """Return the cotangent of the numbers."""
         batch, rows = _rows((*inputs, *bars), (*self.inner, *self.outer))
-        return _shaped(batch, (self.function.pull(*rows, self.memory),))
+        return _shaped(batch, (self.function.pull(*rows[:3], self.memory),))
 
 
 def _rows(arrays: Arrays, inner: Sequence[int]) -> tuple[tuple[int, ...], list[np.ndarray]]:

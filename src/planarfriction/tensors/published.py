@@ -6,7 +6,7 @@ State and twist are `[..., 3]`; the parameters of law and shape and time steps a
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 from planarfriction import formulas, models
@@ -41,7 +41,7 @@ class PublishedNumbers(NamedTuple):
 def shape_of(patch: ContactPatch, law: FrictionLaw, surface: LimitSurface | None) -> PublishedShape:
     """Return the shape of a patch at the load of `surface`, and with None the published table's."""
     when = "keep" if surface is not None else "rebuild"
-    return models.ReducedModelPublished(patch, law, surface, on_load_change=when).shapes.reference
+    return models.ReducedModelPublished(patch, law, surface, on_load_change=when).shapes.reference  # pyright: ignore
 
 
 def values_of(law: FrictionLaw, shape: PublishedShape) -> dict[str, float]:
@@ -51,7 +51,7 @@ def values_of(law: FrictionLaw, shape: PublishedShape) -> dict[str, float]:
     return law.numbers._asdict() | own | {"centre_x": x, "centre_y": y}
 
 
-def numbers_of(xp, values: dict[str, Any], surface: Any, root: Any) -> PublishedNumbers:
+def numbers_of(xp, values: Mapping[str, Any], surface: Any, root: Any) -> PublishedNumbers:
     """Return a shape at values of its parameters `[..., 1]`; `surface` has the `kind`, `size` and `data` of its law."""
     own = {name: values[name] for name in PublishedNumbers._fields[:4]}
     sliding = functools.partial(surfaces.sliding, xp, surface.kind, surface.size, surface.data)

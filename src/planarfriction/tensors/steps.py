@@ -105,6 +105,10 @@ class TensorModel:
     @property
     def state_shape(self) -> tuple[int, ...]:
         """Shape of the state of one contact."""
+        return (3,)
+
+    def rest(self) -> Any:
+        """Return the state of a contact at rest, `[*state_shape]`."""
         raise NotImplementedError
 
     def rate(self, state: Any, twist: Any, normal_force: Any, *, parameters: Any = None) -> Any:

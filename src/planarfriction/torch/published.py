@@ -60,7 +60,6 @@ class ReducedModelPublished(FrictionModule):
     """
 
     equations = published
-    state_shape = (3,)
     root: Tensor | None
     """Symmetric root of the friction metric `[2, 2]`, if the patch has one."""
 

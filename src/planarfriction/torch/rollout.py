@@ -45,8 +45,9 @@ def rollout(
         raise InvalidValueError("method", f"be 'eager' {obstacle}", repr(method))
     if method == "eager" or obstacle or compiled is None:
         return Rollout(*model.rollout(*inputs, parameters=parameters))
-    *arrays, dt = inputs
-    return Rollout(*adjoint.rollout(compiled, len(model.state_shape), *arrays, model._vector(parameters), dt))
+    start, twist, load, step = inputs
+    vector, axes = model._vector(parameters), len(model.state_shape)
+    return Rollout(*adjoint.rollout(compiled, axes, start, twist, load, vector, step))
 
 
 def _obstacle(model: FrictionModule, compiled: Compiled | None, *tensors: Tensor) -> str:
