@@ -6,6 +6,7 @@ The floors are those of the import-linter contracts in pyproject.toml, read here
 from __future__ import annotations
 
 import ast
+import functools
 import importlib
 import subprocess
 import sys
@@ -101,6 +102,7 @@ def _is_compiled(module: str) -> bool:
     return any(f"{module}.".startswith(f"planarfriction.{name}.") for name in COMPILED)
 
 
+@functools.cache
 def _sources() -> list[tuple[str, ast.AST]]:
     files = [file for package in (LIBRARY, STUDIES, EXPLORER) for file in sorted((SOURCES / package).rglob("*.py"))]
     return [(_module_name(file), ast.parse(file.read_text(encoding="utf-8"))) for file in files]
