@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import os
 import signal
 
 from hypothesis import settings
+
+os.environ.setdefault("JAX_DISABLE_MOST_OPTIMIZATIONS", "1")  # most of what its tests take is compilation
 
 settings.register_profile("repeatable", derandomize=True)
 settings.register_profile("random", derandomize=False)
