@@ -16,7 +16,7 @@ from planarfriction.compiler.notice import watched
 from planarfriction.families import MODELS
 from planarfriction.laws import LuGre
 from planarfriction.patch import ContactPatch, friction_metric
-from planarfriction.scenes import in_hand, simulate
+from planarfriction.scenes import SolverOptions, in_hand, simulate
 
 _INSTANT = 1e-3
 """Simulated time [s]: compiling does not depend on how far a run goes."""
@@ -86,11 +86,12 @@ def _simulate(model: Any) -> None:
 
 
 def _derive(model: Any) -> None:
-    derivatives.scene_sensitivities(in_hand(model), t_end=_INSTANT)
+    derivatives.scene_sensitivities(in_hand(model), options=SolverOptions(t_end=_INSTANT))
 
 
 def _reverse(model: Any) -> None:
-    derivatives.scene_gradient(in_hand(model), lambda time, motion: np.ones_like(motion), ["mu"], t_end=_INSTANT)
+    options = SolverOptions(t_end=_INSTANT)
+    derivatives.scene_gradient(in_hand(model), lambda time, motion: np.ones_like(motion), ["mu"], options=options)
 
 
 def _step(model: Any) -> None:

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.derivatives import SCENE_PARAMETERS, scene_sensitivities
-from planarfriction.derivatives import scene as scene_module
+from planarfriction.derivatives import SCENE_PARAMETERS, path, scene_sensitivities
 from planarfriction.errors import InvalidValueError
+from planarfriction.scenes import SolverOptions
 
 LAW = pf.LuGre(
     mu_c=0.3, mu_s=0.4, v_s=5e-3, sigma_0=1e5, sigma_1=50.0, sigma_2=0.2, elasto_plastic=pf.ElastoPlastic(0.5)
@@ -103,7 +103,7 @@ def test_a_fast_spin_has_a_torque_proportional_to_the_size():
 
 @pytest.mark.parametrize("kind", ["distributed", "table"])
 def test_only_the_ratio_of_load_and_mass_counts_without_other_forces(kind):
-    found = scene_sensitivities(slide(kind, force=False), ("mass", "inertia", "load"), t_end=0.2)
+    found = scene_sensitivities(slide(kind, force=False), ("mass", "inertia", "load"), options=SolverOptions(t_end=0.2))
     total = np.abs(found.d_motion.sum(axis=-1)).max(axis=0)
     assert (
         total < 1e-9 * np.abs(found.d_motion).max(axis=(0, 2))
@@ -123,7 +123,7 @@ def test_motion_and_wrenches_are_those_of_simulate(kind):
 def test_a_part_of_the_motion_at_a_time_gives_the_same(monkeypatch):
     """Parts of sixteen nodes: steps of the derivatives end elsewhere, which moves them by less than their accuracy."""
     whole = sensitivities("ellipsoid")
-    monkeypatch.setattr(scene_module, "NUMBERS", 1.0)
+    monkeypatch.setattr(path, "NUMBERS", 1.0)
     parts = scene_sensitivities(slide("ellipsoid"), NAMES)
     assert parts.motion == pytest.approx(whole.motion, abs=1e-9)
     largest = np.abs(whole.d_motion).max(axis=0)
@@ -166,8 +166,8 @@ def test_wrong_input_is_named():
     with pytest.raises(InvalidValueError, match="parameters must be one of mu, r, mass, inertia, load"):
         scene_sensitivities(scene, ("my",))
     with pytest.raises(InvalidValueError, match=r"t_end must be at most the scene's 0\.4 s"):
-        scene_sensitivities(scene, t_end=1.0)
+        scene_sensitivities(scene, options=SolverOptions(t_end=1.0))
     with pytest.raises(InvalidValueError, match="rtol must be > 0"):
-        scene_sensitivities(scene, rtol=0.0)
+        scene_sensitivities(scene, options=SolverOptions(rtol=0.0))
     with pytest.raises(InvalidValueError, match="scene must be a Scene"):
         scene_sensitivities("in-hand")

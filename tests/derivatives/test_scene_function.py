@@ -11,6 +11,7 @@ import planarfriction as pf
 from planarfriction.derivatives import scene_sensitivities
 from planarfriction.derivatives.scene_function import SceneFunction
 from planarfriction.errors import FrictionError, InvalidValueError
+from planarfriction.scenes import SolverOptions
 from tests.derivatives.test_scene import model_of
 
 KNOTS = [0.0, 0.03, 0.06]
@@ -167,7 +168,11 @@ def test_jax_agrees_with_the_derivatives_forwards():
 
         at = jnp.array(1.0), jnp.array(LOAD), jnp.array(0.08)
         expected = scene_sensitivities(
-            scene(), ("mu",), signals={"fixed.normal_force": KNOTS}, initial=("vx",), save_every=0.06
+            scene(),
+            ("mu",),
+            signals={"fixed.normal_force": KNOTS},
+            initial=("vx",),
+            options=SolverOptions(save_every=0.06),
         ).d_motion[-1]
         for transform in (jax.jacrev, jax.jacfwd, lambda *f: jax.jit(jax.jacrev(*f))):
             by_mu, by_load, by_vx = transform(motion, (0, 1, 2))(*at)

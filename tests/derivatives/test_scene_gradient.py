@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import dataclasses
 import functools
-import sys
 
 import numpy as np
 import pytest
 
 import planarfriction as pf
-from planarfriction.derivatives import scene_gradient, scene_sensitivities
+from planarfriction.derivatives import path, scene_gradient, scene_sensitivities
 from planarfriction.errors import InvalidValueError
-from planarfriction.scenes import packing
+from planarfriction.scenes import SolverOptions, packing
 from tests.derivatives.test_scene import LAW, MOTION, model_of, slide
 
-reverse_module = sys.modules[scene_gradient.__module__]
 KNOTS = np.array([0.0, 0.05, 0.15, 0.3, 0.34])
 SIGNALS = {"own.normal_force": KNOTS, "force": KNOTS}
 START = {"vx": 1e-5, "omega": 1e-4, "x": 1e-6, "theta": 1e-4}
@@ -97,11 +95,11 @@ def agree(scene: pf.Scene, numbers: dict, of_motion: float, of_wrenches: float) 
     rng = np.random.default_rng(1)
     motion = rng.normal(size=forwards.motion.shape) / np.maximum(np.abs(forwards.motion).max(axis=0), 1e-9)
     wrenches = rng.normal(size=forwards.wrenches.shape) / np.abs(forwards.wrenches).max(axis=(0, 1))
-    for slope, wrench_slope, allowed in (
+    for slope, wrench_cotangent, allowed in (
         (lambda time, motion_: motion, None, of_motion),
         (None, lambda time, wrenches_: wrenches, of_wrenches),
     ):
-        reverse = scene_gradient(scene, slope, wrench_slope=wrench_slope, **numbers)
+        reverse = scene_gradient(scene, slope, wrench_cotangent=wrench_cotangent, **numbers)
         assert reverse.names == forwards.names
         assert reverse.motion == pytest.approx(forwards.motion, abs=1e-12)
         assert reverse.wrenches == pytest.approx(forwards.wrenches, abs=1e-9)
@@ -195,7 +193,7 @@ def test_what_has_no_derivative_is_refused():
         scene_sensitivities(scene, (), signals={"soft.normal_force": [0.0]})
     with pytest.raises(InvalidValueError, match="parameters must not contain load"):
         scene_gradient(scene, lambda time, motion: motion, ["load"])
-    assert scene_sensitivities(scene, ("mu",), t_end=0.01).d_motion.shape[2] == 1
+    assert scene_sensitivities(scene, ("mu",), options=SolverOptions(t_end=0.01)).d_motion.shape[2] == 1
 
     class Own(pf.DistributedModel):
         def packed(self, *loads):
@@ -240,14 +238,15 @@ def test_windows_parts_and_a_shorter_motion_leave_no_trace(monkeypatch):
     scene = slide("ellipsoid")
 
     def gradient(end: float) -> np.ndarray:
-        return scene_gradient(scene, lambda time, motion: np.ones_like(motion), signals=SIGNALS, t_end=end).gradient
+        options = SolverOptions(t_end=end)
+        return scene_gradient(scene, lambda _, motion: np.ones_like(motion), signals=SIGNALS, options=options).gradient
 
     whole, short = gradient(0.4), gradient(0.1)
     monkeypatch.setattr(packing, "WINDOW", 3)
     assert gradient(0.4) == pytest.approx(whole, rel=1e-6, abs=1e-7 * np.abs(whole).max())
-    monkeypatch.setattr(reverse_module, "NUMBERS", 1.0)
+    monkeypatch.setattr(path, "NUMBERS", 1.0)
     assert gradient(0.4) == pytest.approx(whole, rel=1e-6, abs=1e-7 * np.abs(whole).max())
-    knots = scene_sensitivities(scene, (), signals=SIGNALS, t_end=0.1)
+    knots = scene_sensitivities(scene, (), signals=SIGNALS, options=SolverOptions(t_end=0.1))
     expected = knots.d_motion.sum(axis=(0, 1))
     assert short == pytest.approx(expected, abs=2e-6 * np.abs(expected).max())
     assert (short[3:5] == 0.0).all()  # knots behind the end
@@ -267,11 +266,11 @@ def test_wrong_input_is_named():
         scene_sensitivities(scene, initial=["angle"])
     with pytest.raises(InvalidValueError, match="signals must be a table of knots"):
         scene_gradient(scene, lambda time, motion: motion, signals=["force"])
-    with pytest.raises(InvalidValueError, match="slope must be a function of time and motion"):
+    with pytest.raises(InvalidValueError, match="cotangent must be a function of time and motion"):
         scene_gradient(scene, np.zeros(6))
-    with pytest.raises(InvalidValueError, match="wrench_slope must be a function of time and motion, or wrenches"):
-        scene_gradient(scene, None, wrench_slope=np.zeros(3))
-    with pytest.raises(InvalidValueError, match=r"wrench_slope of the cost must have shape"):
-        scene_gradient(scene, None, wrench_slope=lambda time, wrenches: wrenches[0], signals=SIGNALS)
-    with pytest.raises(InvalidValueError, match=r"slope of the cost must have shape"):
+    with pytest.raises(InvalidValueError, match="wrench_cotangent must be a function of time and motion, or wrenches"):
+        scene_gradient(scene, None, wrench_cotangent=np.zeros(3))
+    with pytest.raises(InvalidValueError, match=r"wrench_cotangent of the cost must have shape"):
+        scene_gradient(scene, None, wrench_cotangent=lambda time, wrenches: wrenches[0], signals=SIGNALS)
+    with pytest.raises(InvalidValueError, match=r"cotangent of the cost must have shape"):
         scene_gradient(scene, lambda time, motion: motion[0], signals=SIGNALS)

@@ -109,7 +109,7 @@ def test_derivatives_follow_what_moves():
         law = dataclasses.replace(LAW, mu_c=mu * LAW.mu_c, mu_s=mu * LAW.mu_s)
         return led(pf.DistributedModel(PATCH, law), mass=0.3 * mass)
 
-    found = scene_sensitivities(run(), ("mu", "mass"), t_end=0.2)
+    found = scene_sensitivities(run(), ("mu", "mass"), options=pf.scenes.SolverOptions(t_end=0.2))
     ends, step = [], 1e-4
     for change in ({"mu": 1.0 + step}, {"mu": 1.0 - step}, {"mass": 1.0 + step}, {"mass": 1.0 - step}):
         motion = pf.simulate(run(**change), rtol=1e-10, t_end=0.2).data

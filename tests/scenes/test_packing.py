@@ -128,9 +128,9 @@ def test_cells_that_are_loaded_between_two_loads():
 @pytest.mark.parametrize("name", ["distributed", "reduced", "published"])
 def test_sensitivities_in_windows_and_in_parts(monkeypatch, name):
     scene = free(MODELS[name]())
-    from planarfriction.derivatives import scene as module
+    from planarfriction.derivatives import path as module
 
-    numbers = {"parameters": ("mu", "r", "mass"), "t_end": 0.025, "save_every": 1e-3}
+    numbers = {"parameters": ("mu", "r", "mass"), "options": pf.scenes.SolverOptions(t_end=0.025, save_every=1e-3)}
     whole = pf.derivatives.scene_sensitivities(scene, **numbers)
     monkeypatch.setattr(packing, "WINDOW", 3)
     windows = pf.derivatives.scene_sensitivities(scene, **numbers)

@@ -34,12 +34,12 @@ def measure(run: pf.Solution) -> dict[str, float]:
     return {"y": float(run.histories["y"].values[-1])}
 
 
-def slope(time: np.ndarray, motion: np.ndarray) -> np.ndarray:
+def cotangent(time: np.ndarray, motion: np.ndarray) -> np.ndarray:
     return np.zeros_like(motion) + time[:, None]
 
 
 data = pf.sweep(make, {"mu": [0.5, 0.6], "grip": [3.0, 4.0]}, measure=measure)
-print(data.y.sel(mu=0.5).values, scene_gradient(make(0.5, 3.0), slope, ["mu"]).gradient[0])
+print(data.y.sel(mu=0.5).values, scene_gradient(make(0.5, 3.0), cotangent, ["mu"]).gradient[0])
 
 log = Log(time=np.arange(9.0), twist=np.ones((9, 3)), wrench=np.ones((9, 3)), normal_force=2.0)
 print(identify_lugre(log, patch).law.mu_c)

@@ -14,7 +14,7 @@ from planarfriction.derivatives import scene_sensitivities
 law = pf.LuGre(mu_c=0.3, mu_s=0.3, sigma_0=1e4, sigma_1=20.0, sigma_2=0.0, elasto_plastic=0.9)
 model = pf.ReducedModel(pf.ContactPatch.disc(0.04, cells=11), law)
 scene = pf.scenes.free_slide(model, twist=(0.8, 0.0, 10.0), save_every=5e-3)
-found = scene_sensitivities(scene, ("mu", "r"), t_end=0.2, rtol=1e-7)
+found = scene_sensitivities(scene, ("mu", "r"), options=pf.scenes.SolverOptions(t_end=0.2, rtol=1e-7))
 
 figure, (upper, lower) = plt.subplots(2, 1, figsize=(6.4, 4.4), layout="constrained", sharex=True)
 upper.plot(found.time, 1e3 * found.motion[:, 3])

@@ -6,7 +6,6 @@ respect to the parameters. All are derivatives of the steps themselves, not of t
 finite differences of `rollout` to rounding. Kinks are described in `planarfriction.kernels.bristle_step`.
 """
 
-from planarfriction.derivatives.drives import SCENE_PARAMETERS
 from planarfriction.derivatives.parameters import PARAMETERS, parameter_names, parameters_of
 from planarfriction.derivatives.rollouts import (
     Rollout,
@@ -20,8 +19,9 @@ from planarfriction.derivatives.rollouts import (
     rollout_states,
     rollout_vjp,
 )
-from planarfriction.derivatives.scene import SceneSensitivities, scene_sensitivities
 from planarfriction.derivatives.scene_gradient import SceneGradient, scene_gradient
+from planarfriction.derivatives.scene_inputs import SCENE_PARAMETERS
+from planarfriction.derivatives.scene_sensitivities import SceneSensitivities, scene_sensitivities
 
 __all__ = [
     "PARAMETERS",

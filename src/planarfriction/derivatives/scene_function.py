@@ -12,16 +12,20 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.derivatives.drives import SCENE_PARAMETERS, STATES, Columns
-from planarfriction.derivatives.scene import scene_sensitivities
-from planarfriction.derivatives.scene_gradient import Followed
+from planarfriction.derivatives.path import RTOL
+from planarfriction.derivatives.scene_gradient import KeptMotion
+from planarfriction.derivatives.scene_inputs import SCENE_PARAMETERS, STATES, SceneInputs
+from planarfriction.derivatives.scene_sensitivities import scene_sensitivities
 from planarfriction.errors import InvalidValueError
+from planarfriction.scenes.options import SolverOptions
 from planarfriction.scenes.scene import Contact, Scene
 from planarfriction.scenes.signal import Signal
-from planarfriction.scenes.simulation import recording_times
 
 FACTORS = tuple(name for name in SCENE_PARAMETERS if name != "r")
 """Parameters of a scene that a function may take: the size of its patches is not among them."""
+
+_OF_BODY = ("force", "velocity")
+"""Signals with three components."""
 
 
 class SceneFunction:
@@ -29,7 +33,8 @@ class SceneFunction:
 
     The numbers are factors of parameters, components of the start, and the values of signals at their knots (all
     components of a knot together), in the order in which they are named. A motion that ends early stays as it ended.
-    Different sets are simulated at the same time, in as many threads as there are processors.
+    Different sets are simulated at the same time, in as many threads as there are processors. `options` are those of
+    `SolverOptions`.
     """
 
     def __init__(
@@ -38,102 +43,95 @@ class SceneFunction:
         parameters: Sequence[str] = (),
         signals: Mapping[str, Any] | None = None,
         initial: Sequence[str] = (),
-        *,
-        t_end: float | None = None,
-        rtol: float = 1e-9,
-        atol: float | None = None,
-        save_every: float | None = None,
+        **options: float | None,
     ) -> None:
         self._parameters = validation.choices("parameters", parameters, FACTORS)
         self._knots = {name: validation.array(f"knots of {name}", t, (None,)) for name, t in (signals or {}).items()}
-        self._options = {"t_end": t_end, "rtol": rtol, "atol": atol, "save_every": save_every}
-        columns = Columns(scene, self._parameters, self._knots, initial)
-        self._scene, self._initial = scene, tuple(initial)
-        self.count = len(columns.names)
-        """P"""
-        self.shapes = {
-            name: (len(times), *(3,) * (name in ("force", "velocity"))) for name, times in self._knots.items()
-        }
+        self._scene, self._initial, self._options = scene, tuple(initial), SolverOptions(**options)
+        self.count = len(self._inputs(scene).names)
+        """Number P of numbers."""
+        self.shapes = {name: (len(times), *(3,) * (name in _OF_BODY)) for name, times in self._knots.items()}
         """Shape of the values of each signal: `[K]`, of force and velocity `[K, 3]`."""
-        end = scene.t_end if t_end is None else validation.positive("t_end", t_end)
-        every = scene.save_every if save_every is None else validation.positive("save_every", save_every)
-        self.time = recording_times(end, every)
-        """`[M]` [s]"""
+        self.time = self._options.plan(scene, RTOL).times
+        """Instants that are recorded `[M]` [s]."""
         self.results = (len(self.time), 6), (len(self.time), len(scene.contacts), 3)
         """Shapes of motion and wrenches."""
 
-    def run(self, values: np.ndarray, kept: dict[bytes, Followed] | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Motion `[B, M, 6]` and wrenches `[B, M, C, 3]` at `values` `[B, P]`; the ways that they took into `kept`."""
+    def run(self, values: np.ndarray, kept: dict[bytes, KeptMotion] | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Return motion `[B, M, 6]` and wrenches `[B, M, C, 3]` at `values` `[B, P]`; keep the motions in `kept`."""
 
         def one(row: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            done = self._followed(row)
+            done = self._motion_at(row)
             if kept is not None:
                 kept[row.tobytes()] = done
             return self._filled(done.motion), self._filled(done.wrenches)
 
         return self._stacked(_in_threads(one, list(values)))
 
-    def pull(self, values, of_motion, of_wrenches, kept: dict[bytes, Followed] | None = None) -> np.ndarray:
-        """Slopes `[B, P]` of costs from their slopes by motion and wrenches, shaped as these."""
+    def pull(self, values, of_motion, of_wrenches, kept: dict[bytes, KeptMotion] | None = None) -> np.ndarray:
+        """Return derivatives `[B, P]` of costs from those by motion and wrenches, shaped as these."""
         different, which = np.unique(values, axis=0, return_inverse=True)
         gradient = np.empty_like(values)
 
         def some(i: int) -> None:
             row = different[i]
-            done = (kept or {}).get(row.tobytes()) or self._followed(row)
+            done = (kept or {}).get(row.tobytes()) or self._motion_at(row)
             for b in np.flatnonzero(which.reshape(-1) == i):
-                seeds = (self._folded(bar[b], len(done.time)) for bar in (of_motion, of_wrenches))
-                gradient[b] = done.back(*seeds) * self._slopes(row)
+                bars = (self._folded(bar[b], len(done.time)) for bar in (of_motion, of_wrenches))
+                gradient[b] = done.gradient(*bars) * self._per_factor(row)
 
         _in_threads(some, range(len(different)))
         return gradient
 
     def push(self, values: np.ndarray, changes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Changes of motion and wrenches with those of the values `[B, P]`."""
+        """Return changes of motion and wrenches with those of the values `[B, P]`."""
 
-        def one(pair) -> tuple[np.ndarray, np.ndarray]:
+        def one(pair: tuple[np.ndarray, np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
             row, change = pair
-            names = self._parameters, self._knots, self._initial
-            found = scene_sensitivities(
-                self._scene_at(row), names[0], signals=names[1], initial=names[2], **self._options
-            )
-            change = change * self._slopes(row)
+            given: dict[str, Any] = {"signals": self._knots, "initial": self._initial, "options": self._options}
+            found = scene_sensitivities(self._scene_at(row), self._parameters, **given)
+            change = change * self._per_factor(row)
             return self._filled(found.d_motion @ change), self._filled(found.d_wrenches @ change)
 
         return self._stacked(_in_threads(one, list(zip(values, changes, strict=True))))
 
-    def _followed(self, row: np.ndarray) -> Followed:
-        numbers = self._parameters, self._knots, self._initial
-        return Followed(self._scene_at(row), *numbers, *self._options.values())
+    def _inputs(self, scene: Scene) -> SceneInputs:
+        return SceneInputs(scene, self._parameters, self._knots, self._initial)
+
+    def _motion_at(self, row: np.ndarray) -> KeptMotion:
+        scene = self._scene_at(row)
+        return KeptMotion(scene, self._inputs(scene), self._options)
 
     def _stacked(self, results: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
         motion, wrenches = (np.array([result[i] for result in results]).reshape(-1, *self.results[i]) for i in (0, 1))
         return motion, wrenches
 
     def _filled(self, values: np.ndarray) -> np.ndarray:
-        """Values at all instants, from those up to the end of the motion."""
+        """Return values at all instants, from those up to the end of the motion."""
         return values[np.minimum(np.arange(len(self.time)), len(values) - 1)]
 
     def _folded(self, bar: np.ndarray, count: int) -> np.ndarray:
-        """The transpose of `_filled`."""
+        """Apply the transpose of `_filled`."""
         result = bar[:count].copy()
         result[-1] += bar[count:].sum(axis=0)
         return result
 
-    def _slopes(self, row: np.ndarray) -> np.ndarray:
-        """Derivative by each number per derivative of `scene_sensitivities`, which is that by a factor at 1."""
+    def _per_factor(self, row: np.ndarray) -> np.ndarray:
+        """Return the derivative by each number per derivative by a factor that is 1, as those of scenes are."""
         slopes, factors = np.ones(self.count), dict(zip(self._parameters, row, strict=False))
         slopes[: len(factors)] = 1.0 / row[: len(factors)]
         first = len(factors) + len(self._initial)
         for name, shape in self.shapes.items():
             last = first + int(np.prod(shape))
-            if name not in ("force", "velocity"):
+            if name not in _OF_BODY:
                 slopes[first:last] = factors.get("load", 1.0)
             first = last
         return slopes
 
+    # ------------------------------------------------------------------ the scene with other numbers
+
     def _scene_at(self, row: np.ndarray) -> Scene:
-        """The scene with these numbers in it."""
+        """Return the scene with these numbers in it."""
         values = iter(np.asarray(row, float).tolist())
         factors = {name: validation.positive(name, next(values)) for name in self._parameters}
         start = {name: next(values) for name in self._initial}
@@ -142,9 +140,8 @@ class SceneFunction:
             for name, shape in self.shapes.items()
         }
         scene, body = self._scene, self._scene.body
-        state = [
-            start.get(name, now) for name, now in zip(STATES, (*body.velocity, *body.position, body.angle), strict=True)
-        ]
+        now = zip(STATES, (*body.velocity, *body.position, body.angle), strict=True)
+        state = [start.get(name, value) for name, value in now]
         body = dataclasses.replace(
             body,
             mass=body.mass * factors.get("mass", 1.0),
@@ -156,18 +153,17 @@ class SceneFunction:
         changed: dict[str, Any] = {
             name: self._signal(name, getattr(scene, name), values)
             for name, values in signals.items()
-            if name in ("force", "velocity")
+            if name in _OF_BODY
         }
         contacts = [self._contact(contact, signals, factors) for contact in scene.contacts]
         return dataclasses.replace(scene, body=body, contacts=contacts, **changed)
 
     def _contact(self, contact: Contact, signals: dict[str, np.ndarray], factors: dict[str, float]) -> Contact:
-        name, load = f"{contact.name}.normal_force", contact.normal_force
+        name, load, model = f"{contact.name}.normal_force", contact.normal_force, contact.model
         if name in signals:
             load = self._signal(name, load, signals[name])
         if "load" in factors:
             load = dataclasses.replace(load, values=factors["load"] * load.values)
-        model = contact.model
         if factors.get("mu", 1.0) != 1.0:
             model = dataclasses.replace(model, law=_with_friction(model.law, factors["mu"]))
         return dataclasses.replace(contact, model=model, normal_force=load)
@@ -177,19 +173,18 @@ class SceneFunction:
 
 
 def _with_friction(law: Any, factor: float) -> Any:
-    """The law with `factor` times the friction."""
+    """Return the law with `factor` times the friction."""
     names = [field.name for field in dataclasses.fields(law) if field.name in ("mu_c", "mu_s")]
     more = dataclasses.replace(law, **{name: factor * getattr(law, name) for name in names})
     wanted = law.numbers._replace(mu_c=factor * law.numbers.mu_c, mu_s=factor * law.numbers.mu_s)
     if not np.allclose(more.numbers, wanted, rtol=1e-12, atol=0.0):
-        raise InvalidValueError(
-            "parameters", f"not contain mu: {type(law).__name__} has other friction coefficients too", "mu"
-        )
+        rule = f"not contain mu: {type(law).__name__} has other friction coefficients too"
+        raise InvalidValueError("parameters", rule, "mu")
     return more
 
 
 def _in_threads(work: Callable[[Any], Any], items: Sequence[Any]) -> list[Any]:
-    """`work` on each of the items, whose compiled loops hold no lock."""
+    """Apply `work` to each of the items in threads; its compiled loops hold no lock."""
     if len(items) <= 1:
         return [work(item) for item in items]
     with ThreadPoolExecutor(min(len(items), _processors())) as pool:

@@ -12,7 +12,7 @@ import numpy as np
 
 from planarfriction.derivatives import scene_sensitivities
 from planarfriction.errors import InvalidValueError
-from planarfriction.scenes import Contact, Scene, Signal, simulate
+from planarfriction.scenes import Contact, Scene, Signal, SolverOptions, simulate
 from planarfriction.scenes.start import contact_map
 
 MOTION = ("vx", "vy", "omega", "x", "y", "theta")
@@ -108,7 +108,8 @@ class Grips:
 
         def one(factor: float) -> np.ndarray:
             scene, knots = self.scene_of(profile, factor), {self.name: profile.times}
-            found = scene_sensitivities(scene, (), signals=knots, rtol=TIGHT, save_every=scene.t_end)
+            options = SolverOptions(rtol=TIGHT, save_every=scene.t_end)
+            found = scene_sensitivities(scene, (), signals=knots, options=options)
             slopes = found.d_motion[-1].copy()
             x, y = self._arm(found.motion[-1, 3:])
             slopes[3:5] += np.outer([-y, x], slopes[5])

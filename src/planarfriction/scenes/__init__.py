@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from planarfriction.families import SCENES
+from planarfriction.scenes.options import SolverOptions
 from planarfriction.scenes.ready import drift, driven, free_slide, in_hand, in_hand_load, published_velocity, pushed
 from planarfriction.scenes.scene import Body, Contact, Scene
 from planarfriction.scenes.signal import Signal
@@ -21,6 +22,7 @@ __all__ = [
     "Scene",
     "Signal",
     "Solution",
+    "SolverOptions",
     "Statistics",
     "curling",
     "drift",

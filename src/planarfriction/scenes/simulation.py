@@ -11,9 +11,9 @@ from planarfriction import validation
 from planarfriction.compiler.notice import said_when_compiling
 from planarfriction.errors import InvalidValueError, SimulationInterrupted, SolverError
 from planarfriction.kernels.integration import Method, Output
+from planarfriction.scenes.options import SolverOptions
 from planarfriction.scenes.packing import SegmentBatches
 from planarfriction.scenes.scene import Scene
-from planarfriction.scenes.signal import SAME_TIME, sample_count
 from planarfriction.scenes.solution import History, Solution
 from planarfriction.solvers import RODAS4, integrate
 
@@ -90,23 +90,17 @@ def simulate(
     """
     if not isinstance(scene, Scene):
         raise InvalidValueError("scene", "be a Scene", type(scene).__name__)
-    end = scene.t_end if t_end is None else validation.positive("t_end", t_end)
-    if end > scene.t_end:
-        raise InvalidValueError("t_end", f"be at most the scene's {scene.t_end:g} s", end)
-    rtol = scene.rtol if rtol is None else validation.positive("rtol", rtol)
-    atol = scene.atol * (rtol / scene.rtol) if atol is None else validation.positive("atol", atol)
-    every = scene.save_every if save_every is None else validation.positive("save_every", save_every)
+    plan = SolverOptions(t_end, rtol, atol, save_every).plan(scene)
     validation.choice("bristles", bristles, BRISTLES)
     if not isinstance(method, Method):
         raise InvalidValueError("method", "be solvers.RODAS4 or solvers.RODAS3", method)
     if not (progress is None or callable(progress)):
         raise InvalidValueError("progress", "be a function of the simulated time, or None", progress)
-    times = recording_times(end, every)
     with said_when_compiling(silent=progress is not None):
-        windows = SegmentBatches(scene, end, times=times)
-        output = _output(times, windows, bristles)
-        scales = atol * windows.state_scale
-        run = integrate(windows, output, windows.state, method=method, rtol=rtol, atol=scales, progress=progress)
+        windows = SegmentBatches(scene, plan.end, times=plan.times)
+        output = _output(plan.times, windows, bristles)
+        scales = plan.atol * windows.state_scale
+        run = integrate(windows, output, windows.state, method=method, rtol=plan.rtol, atol=scales, progress=progress)
     cost = replace(run.statistics, compile_time=run.statistics.compile_time + windows.loading)
     solution = Solution(_histories(scene, windows, run.output), cost, run.status, run.message, scene)
     if run.status == "interrupted":
@@ -114,12 +108,6 @@ def simulate(
     if run.status not in ("success", "at rest"):
         raise SolverError(f"at t = {run.output.time[-1]:g} s: {run.message}", solution)
     return solution
-
-
-def recording_times(end: float, every: float) -> np.ndarray:
-    """Every multiple of `every` up to the end, and the end."""
-    times = np.arange(sample_count(end, every, "save_every") + 1) * every
-    return np.append(times, end) if end - times[-1] > SAME_TIME else times
 
 
 def _output(times: np.ndarray, windows: SegmentBatches, bristles: str) -> Output:

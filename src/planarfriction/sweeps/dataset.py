@@ -32,7 +32,7 @@ OWN = {
 
 def instants(ends: Iterable[tuple[float, float]]) -> np.ndarray:
     """Times at which any of several runs records [s], of their ends and intervals."""
-    from planarfriction.scenes.simulation import recording_times
+    from planarfriction.scenes.options import recording_times
 
     times = np.unique(np.concatenate([recording_times(*each) for each in sorted(set(ends))]))
     return times[np.diff(times, prepend=-np.inf) > SAME_TIME]

@@ -11,7 +11,7 @@ import numpy as np
 
 from planarfriction.derivatives import scene_gradient, scene_sensitivities
 from planarfriction.models import ReducedModel, ReducedModelPublished
-from planarfriction.scenes import Scene, Signal, in_hand, simulate
+from planarfriction.scenes import Scene, Signal, SolverOptions, in_hand, simulate
 from planarfriction_studies.bench.measurement import Measurement, line, median
 from planarfriction_studies.bench.workloads import AGAINST_PUBLISHED, disc, law, mixed_twists
 
@@ -19,6 +19,7 @@ STEPS = 2000
 """Steps of the single roll-out."""
 
 TIGHT: dict[str, Any] = {"rtol": 1e-9, "atol": 1e-9}
+OPTIONS = SolverOptions(**TIGHT)
 """Tolerances of the scenes."""
 
 KNOTS = np.linspace(0.0, 0.5, 20)
@@ -116,20 +117,23 @@ def _batch(model: ReducedModel | ReducedModelPublished) -> tuple[float, float]:
 def scene_to_friction(full: bool) -> Measurement:
     """Measure derivatives of the motion of a scene to the friction."""
     return _beside_simulation(
-        in_hand(ReducedModel(disc(), law()), t_end=0.5), lambda scene: scene_sensitivities(scene, ("mu",), **TIGHT)
+        in_hand(ReducedModel(disc(), law()), t_end=0.5),
+        lambda scene: scene_sensitivities(scene, ("mu",), options=OPTIONS),
     )
 
 
 def scene_to_knots(full: bool) -> Measurement:
     """Measure derivatives of the motion of a scene to twenty knots of the grip."""
-    return _beside_simulation(_gripped(), lambda scene: scene_sensitivities(scene, (), signals=SIGNALS, **TIGHT))
+    return _beside_simulation(
+        _gripped(), lambda scene: scene_sensitivities(scene, (), signals=SIGNALS, options=OPTIONS)
+    )
 
 
 def cost_to_knots(full: bool) -> Measurement:
     """Measure derivatives of one cost to twenty knots of the grip."""
     return _beside_simulation(
         _gripped(),
-        lambda scene: scene_gradient(scene, lambda _, motion: np.ones_like(motion), signals=SIGNALS, **TIGHT),
+        lambda scene: scene_gradient(scene, lambda _, motion: np.ones_like(motion), signals=SIGNALS, options=OPTIONS),
     )
 
 

@@ -1,0 +1,119 @@
+"""A motion whose derivatives are wanted: simulated as `simulate` does, with the path of its steps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.derivatives.scene_inputs import SceneInputs
+from planarfriction.equality import ByValue
+from planarfriction.errors import InvalidValueError, SolverError
+from planarfriction.kernels import rosenbrock, tangent
+from planarfriction.kernels.body import System
+from planarfriction.kernels.integration import Output, run_of
+from planarfriction.kernels.tangent import Path
+from planarfriction.scenes.options import SolverOptions
+from planarfriction.scenes.packing import SegmentBatches
+from planarfriction.scenes.scene import Scene
+from planarfriction.solvers import RODAS4
+from planarfriction.solvers.structured import start_of
+
+RTOL = 1e-9
+"""Default relative tolerance of a motion whose derivatives are wanted [-]."""
+
+SHARE, POWER = 0.1, 2.0 / 3.0
+"""Accuracy of each step of the derivatives, relative and in natural scales: a share of a power of `rtol`."""
+
+NUMBERS = 4e6
+"""Numbers of the states that a part of the path holds, and as many of their rates: 64 MB together."""
+
+LEAST_NODES = 16
+"""Least number of ends of steps that a part of the path holds."""
+
+
+@dataclass(frozen=True, eq=False)
+class SceneDerivatives(ByValue):
+    """A motion and the P numbers by which it is differentiated.
+
+    Parameters are factors with the value 1: divide the derivative by the value of a parameter to get the derivative
+    with respect to the parameter itself. Knots and initial values have the units of the signal and of the state.
+    """
+
+    names: tuple[str, ...]
+    """Names of the numbers; `fingers.normal_force[2]` is knot 2 of a signal."""
+    columns: dict[str, slice]
+    """Derivatives that belong to a parameter, a signal (all its knots) or an initial value, by name."""
+    time: np.ndarray
+    """Times `[M]` [s]."""
+    motion: np.ndarray
+    """Motion of the body, vx, vy, omega, x, y, theta `[M, 6]`, as in a solution's data."""
+    wrenches: np.ndarray
+    """Wrench of one of the identical contacts `[M, C, 3]` [N, N, N m]."""
+
+
+class MotionPath:
+    """A motion of a scene on its way, with what it records."""
+
+    def __init__(self, scene: Scene, inputs: SceneInputs, options: SolverOptions | None) -> None:
+        options = SolverOptions() if options is None else options
+        plan = validation.instance("options", options, SolverOptions, "SolverOptions").plan(scene, RTOL)
+        self.batches = SegmentBatches(scene, plan.end, times=plan.times, sensitivities=True, marks=inputs.marks)
+        for contact, model in zip(scene.contacts, self.batches.models, strict=True):
+            if None in model.functions:
+                rule = "have all functions of kernels.contacts.ModelFunctions for derivatives of scenes"
+                raise InvalidValueError(f"model of contact {contact.name!r}", rule, type(contact.model).__name__)
+        self.instants, contacts = len(plan.times), len(scene.contacts)
+        self._rtol, self._atol, self.scale = plan.rtol, plan.atol * self.batches.state_scale, self.batches.state_scale
+        self.accuracy = SHARE * plan.rtol**POWER
+        """Relative accuracy of each step of the derivatives."""
+        wrenches, loads = np.empty((self.instants, contacts, 3)), np.empty((self.instants, contacts))
+        self._output = Output(plan.times, np.empty((self.instants, 6)), wrenches, loads, np.empty((0, 0)))
+        self.reached = 0
+        """Number of instants that have been recorded."""
+
+    def steps(self, most: float = np.inf) -> Iterator[tuple[System, Path]]:
+        """Simulate; yield the ends of the next steps, at most `most`, in arrays that are used again afterwards.
+
+        Raises SolverError if the solver fails.
+        """
+        now, outcome, n = start_of(self.batches.state), rosenbrock.DONE, len(self.scale)
+        room = tangent.path_for(max(int(min(NUMBERS / n, most)), LEAST_NODES), n)
+        for system in self.batches:
+            run = run_of(system, RODAS4, self._output, now, rtol=self._rtol, atol=self._atol)
+            now.cursor[0], outcome = 0, rosenbrock.PAUSED
+            while outcome == rosenbrock.PAUSED:
+                nodes, outcome = tangent.follow(run.address, room)
+                self.reached = int(now.cursor[1])
+                yield system, Path(*(each[:nodes] for each in room))
+            del system, run
+            if outcome != rosenbrock.DONE:
+                break
+        if outcome == rosenbrock.STEP_TOO_SMALL:
+            raise SolverError("the step size fell below the resolution of time: loosen rtol, or check the scene")
+
+    @property
+    def time(self) -> np.ndarray:
+        """Instants that have been recorded `[M]` [s]."""
+        return self._output.time[: self.reached]
+
+    @property
+    def motion(self) -> np.ndarray:
+        """Recorded motion of the body `[M, 6]`."""
+        return self._output.body[: self.reached]
+
+    @property
+    def wrenches(self) -> np.ndarray:
+        """Recorded wrenches of the contacts `[M, C, 3]`."""
+        return self._output.wrench[: self.reached]
+
+
+def pieces_of(path: Path) -> list[tuple[int, int]]:
+    """Return the first and the last node on each piece between two breaks that a part of a path crosses."""
+    if not len(path.piece):
+        return []
+    starts = np.append(0, np.flatnonzero(np.diff(path.piece)) + 1)
+    ends = np.append(starts[1:], len(path.piece)) - 1
+    return list(zip(starts.tolist(), ends.tolist(), strict=True))

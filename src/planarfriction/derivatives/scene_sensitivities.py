@@ -1,0 +1,120 @@
+"""Forward sensitivities of a simulated scene: derivatives of its motion by friction, size, mass, loads and start."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from planarfriction.derivatives.path import MotionPath, SceneDerivatives, pieces_of
+from planarfriction.derivatives.scene_inputs import SceneInputs
+from planarfriction.kernels import tangent
+from planarfriction.kernels.body import System
+from planarfriction.kernels.tangent import Drives, Path
+from planarfriction.scenes.options import SolverOptions
+from planarfriction.scenes.scene import Scene
+
+
+@dataclass(frozen=True, eq=False)
+class SceneSensitivities(SceneDerivatives):
+    """A motion and its derivatives with respect to P numbers (see `SceneDerivatives`)."""
+
+    d_motion: np.ndarray
+    """Derivatives of the motion `[M, 6, P]`."""
+    d_wrenches: np.ndarray
+    """Derivatives of the wrenches `[M, C, 3, P]`."""
+
+
+def scene_sensitivities(
+    scene: Scene,
+    parameters: Sequence[str] = ("mu", "r", "mass", "load"),
+    *,
+    signals: Mapping[str, Any] | None = None,
+    initial: Sequence[str] = (),
+    options: SolverOptions | None = None,
+) -> SceneSensitivities:
+    """Compute derivatives of a simulated motion by the scene's parameters, its signals and its initial state.
+
+    `parameters` are factors (see `SCENE_PARAMETERS`). `signals` gives knots [s] by the name of a signal: `force`,
+    `velocity`, or `NAME.normal_force` for the contact of that name. The derivative is with respect to a number added to
+    the signal at the knot and interpolated in time like the signal's own samples (`hold`): `sum_k d_k hat_k(t)`. If the
+    knots are the times of the samples, it is the derivative with respect to the sampled values. `initial` names
+    components of the body's initial state: vx, vy, omega, x, y, theta.
+
+    The scene is simulated with tight tolerances (`options`; 1e-9 by default). Along the accepted steps the variational
+    equation `s' = J s + df/dp` is solved with the solver's own analytic Jacobian, by an L-stable method of order 4
+    whose steps span several steps of the motion, each accurate to `0.1 rtol^(2/3)` of the derivatives. At the default
+    tolerance the derivatives agree with central differences of tight simulations to 5e-6 of the largest, and to 2e-5
+    with tables, whose Jacobian jumps from cell to cell.
+
+    A bristle that begins to slip or to stick bends the right-hand side but does not make it jump: the derivative
+    continues through such a transition, and describes a motion that makes the same transitions slightly earlier or
+    later. It is large if the motion depends very sensitively on friction, as in a slip that barely happens. On a kink
+    (a velocity that stays zero, the edge of a table's cell) it is the derivative of one side. The instants at which
+    signals jump, and at which a slide counts as stopped, are held fixed.
+
+    Raises `InvalidValueError` for unknown names or numbers out of range, and `SolverError` if the solver fails.
+    """
+    inputs = SceneInputs(scene, parameters, signals, initial)
+    motion = MotionPath(scene, inputs, options)
+    tangents = _Tangents(motion, inputs)
+    for system, path in motion.steps():
+        tangents.carry(system, path)
+        del system, path  # the next batch of segments is packed when this one is gone
+    d_motion, d_wrenches = (inputs.in_order(values[: motion.reached]) for values in tangents.recorded)
+    return SceneSensitivities(
+        inputs.names, inputs.columns, motion.time, motion.motion, motion.wrenches, d_motion, d_wrenches
+    )
+
+
+class _Tangents:
+    """Derivatives of a motion `[P, n]`, carried along its steps, and those that are recorded."""
+
+    def __init__(self, motion: MotionPath, inputs: SceneInputs) -> None:
+        self._motion, self._inputs = motion, inputs
+        self._slopes = inputs.start(motion.batches)
+        (count, n), instants, contacts = self._slopes.shape, motion.instants, len(motion.batches.models)
+        self._space, self._atol = tangent.slopes_for(count, inputs.inputs, n), motion.accuracy * motion.scale
+        self._state, self._scratch, self._wrench = np.empty(n), np.empty((2, n)), np.empty((contacts, 3))
+        self.recorded = np.zeros((instants, 6, count)), np.zeros((instants, contacts, 3, count))
+        """Derivatives of motion and wrenches at the instants."""
+        self._next = 0
+        """Number of the instant to be recorded next."""
+        self._entered: System | None = None
+
+    def carry(self, system: System, path: Path) -> None:
+        """Go along a part of the path, and record the instants that the motion has recorded on it."""
+        if system is not self._entered:
+            self._inputs.enter(system)
+            self._entered = system
+        breaks, instants = system.motion.breaks, self._motion.time
+        for first, last in pieces_of(path):
+            piece, since, reach = int(path.piece[first]), float(path.since[first]), float(path.since[last])
+            begin, length = breaks[piece], breaks[piece + 1] - breaks[piece]
+            time = breaks[piece + 1] if reach == length else begin + reach
+            drives = self._inputs.at(piece, float(breaks[piece + 1]))
+            if since == 0.0:
+                self._inputs.begin(drives, self._slopes)
+            while self._next < len(instants) and instants[self._next] <= time:
+                instant = instants[self._next]
+                here = reach if instant == time else float(instant - begin)
+                self._propagate(system, path, drives, first, last, since, here)
+                self._record(system, path, drives, first, last, here)
+                since = here
+            self._propagate(system, path, drives, first, last, since, reach)
+            if reach == length:
+                tangent.forget(system.address, piece, self._slopes)
+
+    def _propagate(self, system: System, path: Path, drives: Drives, *span: float) -> None:
+        along = self._slopes, drives, self._motion.accuracy, self._atol, self._space
+        tangent.propagate(system.address, path, *span, *along)
+
+    def _record(self, system: System, path: Path, drives: Drives, first: int, last: int, since: float) -> None:
+        d_motion, d_wrenches = (values[self._next] for values in self.recorded)
+        tangent.state_at(path, first, last, since, self._state)
+        at = system.address, int(path.piece[first]), since, self._state, drives, self._slopes
+        tangent.wrench_slopes(*at, self._wrench, d_wrenches, self._scratch)
+        d_motion[:] = self._slopes[:, -6:].T
+        self._next += 1

@@ -1,0 +1,64 @@
+"""Options of the simulation of a scene: its end, its accuracy, and how often it is recorded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from planarfriction import validation
+from planarfriction.described import described
+from planarfriction.errors import InvalidValueError
+from planarfriction.scenes.signal import SAME_TIME, sample_count
+
+if TYPE_CHECKING:
+    from planarfriction.scenes.scene import Scene
+
+
+class Plan(NamedTuple):
+    """Checked options of one simulation."""
+
+    end: float
+    """End [s]."""
+    times: np.ndarray
+    """Instants to record `[M]` [s]."""
+    rtol: float
+    """Relative tolerance [-]."""
+    atol: float
+    """Absolute tolerance, as a share of the natural scales [-]."""
+
+
+@described
+@dataclass(frozen=True)
+class SolverOptions:
+    """Options of the simulation of a scene; None takes those of the scene, or of the function that gets them."""
+
+    t_end: float | None = None
+    """End [s], at most the scene's own."""
+    rtol: float | None = None
+    """Relative tolerance [-], > 0."""
+    atol: float | None = None
+    """Tolerance as a share of the natural scales [-], > 0 (see `simulate`); it follows `rtol` by default."""
+    save_every: float | None = None
+    """Recording interval [s]; the end is always recorded."""
+
+    def plan(self, scene: Scene, rtol: float | None = None) -> Plan:
+        """Check the options for a scene; with `rtol` given, both tolerances are that by default.
+
+        Raises InvalidValueError for numbers that are not > 0, and for an end after the scene's own.
+        """
+        end = scene.t_end if self.t_end is None else validation.positive("t_end", self.t_end)
+        if end > scene.t_end:
+            raise InvalidValueError("t_end", f"be at most the scene's {scene.t_end:g} s", end)
+        least, default = (scene.atol, scene.rtol) if rtol is None else (rtol, rtol)
+        relative = default if self.rtol is None else validation.positive("rtol", self.rtol)
+        absolute = least * (relative / default) if self.atol is None else validation.positive("atol", self.atol)
+        every = scene.save_every if self.save_every is None else validation.positive("save_every", self.save_every)
+        return Plan(end, recording_times(end, every), relative, absolute)
+
+
+def recording_times(end: float, every: float) -> np.ndarray:
+    """Return every multiple of `every` up to the end, and the end [s]."""
+    times = np.arange(sample_count(end, every, "save_every") + 1) * every
+    return np.append(times, end) if end - times[-1] > SAME_TIME else times
