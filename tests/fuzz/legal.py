@@ -47,7 +47,7 @@ RECORDS = """
 
 PROTOCOL = """
     direction direction_slope sums lever_coordinates packed relative ever_loaded only repeated shape_at shapes_at
-    parts_at pieces check_non_negative step_function jacobian_function packed_steps
+    parts_at pieces check_non_negative step_function jacobian_function packed_steps plan
 """
 """Methods that the library calls, with what it has checked."""
 
@@ -106,7 +106,7 @@ def objects() -> dict[str, Any]:
         "deflections": np.zeros((2, PATCH.cells)),
         "loads": [1.0, 2.0], "values": [1.0, 2.0], "times": [0.0, 0.1], "value": 2.0, "pressure": None,
         "twist": TWISTS[9], "wrench": np.array([0.5, 0.1, 0.001]), "state": Fresh(lambda: np.zeros(3)),
-        "about": (0.0, 0.0),
+        "about": (0.0, 0.0), "options": pf.scenes.SolverOptions(rtol=1e-4, atol=1e-3),
         "wrenches_bar": np.ones((20, 3)), "state_bar": np.zeros(3), "metric": np.eye(2) * 0.25, "asymmetry": (0.1, 0.0),
         "motion": TWISTS, "pose": pose, "breaks": [0.0, 0.1, 0.2], "noise": (1e-3, 1e-3, 0.02), "window": 7,
         "velocity_weight": 1.0, "kept": np.array([True, False, True]), "coefficients": None,
@@ -210,8 +210,8 @@ SPECIAL: dict[str, dict[str, Any]] = {
         "parameters": ("mu",),
         "signals": {},
         "initial": ("x",),
-        "slope": lambda time, motion: 0.0 * motion,
-        "wrench_slope": lambda time, wrenches: 0.0 * wrenches,
+        "cotangent": lambda time, motion: 0.0 * motion,
+        "wrench_cotangent": lambda time, wrenches: 0.0 * wrenches,
     },
 }
 """Legal values for functions where a parameter of the same name means something else."""

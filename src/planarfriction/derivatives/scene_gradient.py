@@ -55,7 +55,7 @@ def scene_gradient(
     """
     functions = {"cotangent": cotangent, "wrench_cotangent": wrench_cotangent}
     for name, function in functions.items():
-        if not (callable(function) or (function is None and any(functions.values()))):
+        if not callable(function) and (function is not None or cotangent is wrench_cotangent):
             raise InvalidValueError(name, "be a function of time and motion, or wrenches", function)
     motion = KeptMotion(scene, SceneInputs(scene, parameters, signals, initial), options)
     bars = [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -32,7 +33,10 @@ class Plan(NamedTuple):
 @described
 @dataclass(frozen=True)
 class SolverOptions:
-    """Options of the simulation of a scene; None takes those of the scene, or of the function that gets them."""
+    """Options of the simulation of a scene; None takes those of the scene, or of the function that gets them.
+
+    Raises InvalidValueError for numbers that are not > 0.
+    """
 
     t_end: float | None = None
     """End [s], at most the scene's own."""
@@ -43,18 +47,23 @@ class SolverOptions:
     save_every: float | None = None
     """Recording interval [s]; the end is always recorded."""
 
-    def plan(self, scene: Scene, rtol: float | None = None) -> Plan:
-        """Check the options for a scene; with `rtol` given, both tolerances are that by default.
+    def __post_init__(self) -> None:
+        for name, value in dataclasses.asdict(self).items():
+            if value is not None:
+                validation.positive(name, value)
 
-        Raises InvalidValueError for numbers that are not > 0, and for an end after the scene's own.
+    def plan(self, scene: Scene, rtol: float | None = None) -> Plan:
+        """Return what the options say for a scene; with `rtol` given, both tolerances are that by default.
+
+        Raises InvalidValueError for an end after the scene's own.
         """
-        end = scene.t_end if self.t_end is None else validation.positive("t_end", self.t_end)
+        end = scene.t_end if self.t_end is None else float(self.t_end)
         if end > scene.t_end:
             raise InvalidValueError("t_end", f"be at most the scene's {scene.t_end:g} s", end)
         least, default = (scene.atol, scene.rtol) if rtol is None else (rtol, rtol)
-        relative = default if self.rtol is None else validation.positive("rtol", self.rtol)
-        absolute = least * (relative / default) if self.atol is None else validation.positive("atol", self.atol)
-        every = scene.save_every if self.save_every is None else validation.positive("save_every", self.save_every)
+        relative = default if self.rtol is None else float(self.rtol)
+        absolute = least * (relative / default) if self.atol is None else float(self.atol)
+        every = scene.save_every if self.save_every is None else float(self.save_every)
         return Plan(end, recording_times(end, every), relative, absolute)
 
 
