@@ -29,28 +29,28 @@ class RolloutInputs(NamedTuple):
 
     parts: tuple[Packed, ...]
     rows: list[np.ndarray]
-    """[B or 1, N] of each part."""
+    """Numbers of law and shape of each part, `[B or 1, N]`."""
     state: np.ndarray
-    """[P, B, 3]"""
+    """States before the first step `[P, B, 3]`."""
     twist: np.ndarray
-    """[B or 1, T, 3]"""
+    """Twists `[B or 1, T, 3]`."""
     normal_force: np.ndarray
-    """[B or 1, T]"""
+    """Loads `[B or 1, T]`."""
     dt: np.ndarray
-    """[T]"""
+    """Steps `[T]` [s]."""
     batch: tuple[int, ...]
 
     def shaped(self, values: np.ndarray, *inner: int) -> np.ndarray:
-        """Values of each part and contact `[P, B, *inner, 3]` as `[*batch, *inner, P, 3]`; of one part without."""
+        """Return values of parts `[P, B, *inner, 3]` as `[*batch, *inner, P, 3]`; without P for one part."""
         each = values[0] if len(values) == 1 else np.moveaxis(values, 0, -2)
         return each.reshape(*self.batch, *inner, *self.inner)
 
     def of_all(self, values: np.ndarray) -> np.ndarray:
-        """Values of each contact `[B, ...]` as `[*batch, ...]`."""
+        """Return values of each contact `[B, ...]` as `[*batch, ...]`."""
         return values.reshape(*self.batch, *values.shape[1:])
 
     def compiled(self, slopes: bool = False) -> Inputs:
-        """All parts at once, as compiled loops take them; with the `slopes` of their shapes by the load."""
+        """Return all parts as compiled loops take them, with the `slopes` of their shapes by the load."""
         rows, at_loads = np.array(self.rows), self.parts[0].at_loads
         if at_loads is None:
             which, shapes = np.zeros((1, len(self.dt)), dtype=int), _fixed(self.parts)
@@ -72,7 +72,7 @@ class RolloutInputs(NamedTuple):
 
 
 def _fixed(parts: tuple[Packed, ...]) -> ShapesByLoad:
-    """Parts of a fixed shape: their rows hold its numbers."""
+    """Return parts of a fixed shape, whose rows hold its numbers."""
     data = [part.data for part in parts]
     begin, first = (np.zeros(1, dtype=int), data[0]) if len(data) == 1 else places_of(data)
     surface = np.array([part.surface for part in parts])[:, None]
@@ -83,7 +83,7 @@ def _fixed(parts: tuple[Packed, ...]) -> ShapesByLoad:
 
 
 def sequences(twist: Any, normal_force: Any, dt: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Twists `[..., T, 3]`, loads `[..., T]` and steps `[T]`."""
+    """Return twists `[..., T, 3]`, loads `[..., T]` and steps `[T]`."""
     twist, load, dt = (
         validation.numbers(n, v) for n, v in (("twist", twist), ("normal_force", normal_force), ("dt", dt))
     )
@@ -100,7 +100,7 @@ def sequences(twist: Any, normal_force: Any, dt: Any) -> tuple[np.ndarray, np.nd
 def checked(
     model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, parameters: Any, more: Sequence[tuple] = ()
 ) -> RolloutInputs:
-    """Inputs of a roll-out; `more`: batch axes of what else belongs to it."""
+    """Check the inputs of a roll-out; `more` are batch axes of other arrays that belong to it."""
     parts = pack(model, parameters)
     inner = inner_of(parts)
     state = np.zeros(inner) if state is None else validation.numbers("state", state)
@@ -132,17 +132,17 @@ def checked(
 
 
 def inner_of(parts: tuple[Packed, ...]) -> tuple[int, ...]:
-    """Shape of the state of one contact."""
+    """Return the shape of the state of one contact."""
     return (3,) if len(parts) == 1 else (len(parts), 3)
 
 
 def by_part(values: np.ndarray, parts: int) -> np.ndarray:
-    """States of contacts `[B, ..., P, 3]`, of one part `[B, ..., 3]`, as those of each part `[P, B, ..., 3]`."""
+    """Return states of contacts `[B, ..., P, 3]`, of one part `[B, ..., 3]`, as those of each part `[P, B, ..., 3]`."""
     return values[None] if parts == 1 else np.ascontiguousarray(np.moveaxis(values, -2, 0))
 
 
 def rows_of(name: str, value: Any, inner: tuple[int, ...], batch: tuple[int, ...]) -> np.ndarray:
-    """`value` `[..., *inner]` as `[B, *inner]`, or as one row where the contacts share it."""
+    """Return `value` `[..., *inner]` as `[B, *inner]`, or as one row where the contacts share it."""
     value = validation.finite_numbers(name, value)
     if value.size != np.prod(inner) or value.shape[value.ndim - len(inner) :] != inner:
         try:

@@ -39,12 +39,12 @@ _NON_NEGATIVE = ("sigma_1", "sigma_2", "second_moment")
 
 
 class Family(NamedTuple):
-    """What the roll-outs of one kind of model need to know of it."""
+    """Parameters and compiled roll-outs of one kind of model."""
 
     names: tuple[str, ...]
-    """Its parameters."""
+    """Names of its parameters."""
     columns: np.ndarray
-    """Where each parameter stands in a row."""
+    """Column of each parameter in a row."""
     rollout: Callable[..., None]
     gradient: Callable[..., None]
     sensitivities: Callable[..., None]
@@ -73,26 +73,26 @@ class Packed(NamedTuple):
     """A part of a reduced model as compiled loops see it; most models have one."""
 
     rows: np.ndarray
-    """`[..., N]`, batch axes as those of the parameters."""
+    """Numbers of law and shape `[..., N]`, batch axes as those of the parameters."""
     surface: np.ndarray
     """Kind, start and size of the limit surface, int [3]; where the maps of a shape begin."""
     data: np.ndarray
     """Numbers of the limit surface or of the map, flat."""
     family: Family = PUBLISHED
     share: float = 1.0
-    """Of the load."""
+    """Share of the load [-]."""
     axes: np.ndarray | None = None
     """Symmetric `[3, 3]`, or None: twists go in through it, wrenches come out."""
     at_loads: Callable[[np.ndarray, bool], ShapesByLoad] | None = None
-    """Of a model whose shape follows the load: all parts at given loads (see `CompiledThreeStates.at_loads`)."""
+    """All parts at given loads, of a model whose shape depends on the load (see `CompiledThreeStates.at_loads`)."""
 
     def turned(self, vectors: np.ndarray) -> np.ndarray:
-        """Twists into the axes of the compiled loops or wrenches out of them, `[..., 3]`."""
+        """Turn twists into the axes of the compiled loops, or wrenches out of them, `[..., 3]`."""
         return vectors if self.axes is None else transformed(self.axes, vectors)
 
 
 def parameter_names(model: Any) -> tuple[str, ...]:
-    """Names of the P parameters of a reduced model, in the order of the parameter vector.
+    """Return the names of the P parameters of a reduced model, in the order of the parameter vector.
 
     Those of `ReducedModelPublished` are `PARAMETERS`. Those of `ReducedModel` are the parameters of the law without
     gamma, because its stored map depends on gamma, as it does on the shape of the patch.
@@ -103,7 +103,7 @@ def parameter_names(model: Any) -> tuple[str, ...]:
 
 
 def parameters_of(model: Any) -> np.ndarray:
-    """Parameters of a reduced model, shape `[P]`; for plain bristles the breakaway ratio is there but has no effect.
+    """Return the parameters of a reduced model `[P]`; the breakaway ratio of plain bristles has no effect.
 
     Raises InvalidValueError for a model that has no roll-outs.
     """
@@ -112,7 +112,7 @@ def parameters_of(model: Any) -> np.ndarray:
 
 
 def pack(model: Any, parameters: Any = None) -> tuple[Packed, ...]:
-    """The parts of a model as compiled loops see them, with `parameters` `[..., P]` instead of its own if given.
+    """Return the parts of a model as compiled loops see them, with `parameters` `[..., P]` if given, else its own.
 
     A friction coefficient `mu_s` below `mu_c`, which a law refuses, is let through: the formulas are smooth there.
     A model that is packed already, as the tensor front ends hold them, is taken as it is.
@@ -141,12 +141,12 @@ def _family(model: Any) -> Family:
 
 
 def is_compiled(model: Any) -> bool:
-    """Whether a model is a reduced one that compiled roll-outs know."""
+    """Return True for a reduced model that compiled roll-outs know."""
     return isinstance(model, ReducedModel | ReducedModelPublished) and not _refusal(model)
 
 
 def _refusal(model: ReducedModel | ReducedModelPublished) -> tuple[str, str, Any] | None:
-    """The rule that a model breaks that compiled roll-outs do not know, as an `InvalidValueError` takes it."""
+    """Return the rule that keeps a model from compiled roll-outs, as `InvalidValueError` takes it, or None."""
     if not model.depends_on_load:
         return None
     if isinstance(model, ReducedModel):
@@ -177,7 +177,7 @@ def _packed(model: Any) -> tuple[Packed, ...]:
 
 
 def pack_shape(law: LawNumbers, shape: ReducedShape | PublishedShape) -> Packed:
-    """A law and what a patch is at one load, as compiled loops see them."""
+    """Return a law and the shape of a patch at one load as compiled loops see them."""
     row = np.array([*law, *shape.numbers])
     if isinstance(shape, ReducedShape):
         return Packed(row, np.zeros(3, dtype=int), shape.data, REDUCED)
@@ -189,7 +189,7 @@ def pack_shape(law: LawNumbers, shape: ReducedShape | PublishedShape) -> Packed:
 def pack_maps(
     elasto_plastic: bool, sizes: Sequence[MapSizes], shares: np.ndarray, factors: np.ndarray, data: np.ndarray
 ) -> tuple[Packed, ...]:
-    """`ReducedModel` by its parts, for roll-outs at given parameters, which take the place of those here.
+    """Return a `ReducedModel` by its parts, for roll-outs at given parameters, which take the place of those here.
 
     `shares` `[P]` of the load, F `[P, 3, 3]`, and the maps one behind the other.
     """
@@ -203,7 +203,7 @@ def pack_maps(
 def pack_surface(
     elasto_plastic: bool, kind: int, size: int, data: np.ndarray, root: np.ndarray | None = None
 ) -> tuple[Packed]:
-    """`ReducedModelPublished` by its limit surface, for roll-outs at given parameters of law and shape."""
+    """Return a `ReducedModelPublished` by its limit surface, for roll-outs at given parameters of law and shape."""
     row = np.array([*_any_law(elasto_plastic), *np.zeros(len(published_step.NAMES) - len(LawNumbers._fields))])
     data = np.ascontiguousarray(data, dtype=float)
     return (Packed(row, np.array([kind, 0, size]), data, PUBLISHED, axes=None if root is None else axes_of(root)),)

@@ -41,9 +41,9 @@ class RolloutStates(NamedTuple):
     """A roll-out together with its intermediate states."""
 
     state: np.ndarray
-    """As in `Rollout`."""
+    """State after the last step, as in `Rollout`."""
     wrenches: np.ndarray
-    """As in `Rollout`."""
+    """Wrenches, as in `Rollout`."""
     states: np.ndarray
     """State before each step, `[..., T, *state_shape]`."""
 
@@ -53,11 +53,11 @@ class RolloutJacobian(NamedTuple):
     """A roll-out with the derivatives of its wrenches with respect to P parameters."""
 
     state: np.ndarray
-    """As in `Rollout`."""
+    """State after the last step, as in `Rollout`."""
     wrenches: np.ndarray
-    """As in `Rollout`."""
+    """Wrenches, as in `Rollout`."""
     d_wrenches: np.ndarray
-    """`[..., T, 3, P]`"""
+    """Derivatives of the wrenches by the parameters `[..., T, 3, P]`."""
 
 
 @by_parts
@@ -65,13 +65,13 @@ class RolloutJVP(NamedTuple):
     """A roll-out and its change for given changes of the inputs."""
 
     state: np.ndarray
-    """As in `Rollout`."""
+    """State after the last step, as in `Rollout`."""
     wrenches: np.ndarray
-    """As in `Rollout`."""
+    """Wrenches, as in `Rollout`."""
     state_dot: np.ndarray
-    """`[..., *state_shape]`"""
+    """Change of the state `[..., *state_shape]`."""
     wrenches_dot: np.ndarray
-    """`[..., T, 3]`"""
+    """Changes of the wrenches `[..., T, 3]`."""
 
 
 @by_parts
@@ -79,13 +79,13 @@ class RolloutVJP(NamedTuple):
     """Gradient of a scalar with respect to the inputs of a roll-out, each of the shape of that input."""
 
     state: np.ndarray
-    """With respect to the state before the first step, of its shape [1/unit of the state]."""
+    """Gradient with respect to the state before the first step, of its shape [1/unit of the state]."""
     twist: np.ndarray
-    """With respect to the twists, `[..., T, 3]` [s/m, s/m, s/rad]."""
+    """Gradient with respect to the twists, `[..., T, 3]` [s/m, s/m, s/rad]."""
     normal_force: np.ndarray
-    """With respect to the loads, of their shape [1/N]."""
+    """Gradient with respect to the loads, of their shape [1/N]."""
     parameters: np.ndarray
-    """With respect to the parameters, `[..., P]` [1/unit of each]."""
+    """Gradient with respect to the parameters, `[..., P]` [1/unit of each]."""
 
 
 def rollout(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, *, parameters: Any = None) -> Rollout:
@@ -113,7 +113,7 @@ def rollout(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, *, p
 def rollout_states(
     model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, *, parameters: Any = None
 ) -> RolloutStates:
-    """A `rollout` that keeps the state before each step, which saves `rollout_vjp` half of its work.
+    """Step a model as `rollout` does and keep the state before each step, which saves `rollout_vjp` half of its work.
 
     Raises InvalidValueError as `rollout` does.
     """
@@ -134,7 +134,7 @@ def rollout_vjp(
     parameters: Any = None,
     states: Any = None,
 ) -> RolloutVJP:
-    """Gradient of `sum(wrenches_bar wrenches) + sum(state_bar state)` of a `rollout` with respect to its inputs.
+    """Compute the gradient of `sum(wrenches_bar wrenches) + sum(state_bar state)` of a `rollout` by its inputs.
 
     This is the discrete adjoint: exact for the steps taken, and a few times as expensive as the roll-out whatever the
     number of inputs. `wrenches_bar` `[..., T, 3]` and `state_bar` `[..., *state_shape]` (None: zero) broadcast. The
@@ -181,7 +181,7 @@ def rollout_jacobian(
     *,
     parameters: Any = None,
 ) -> RolloutJacobian:
-    """A `rollout` of a reduced model with the derivatives of its wrenches with respect to the parameters `names`.
+    """Step a reduced model as `rollout` does, with derivatives of the wrenches by the parameters `names`.
 
     Computed forward in time, for least squares, which needs the derivatives of each wrench; the initial state is held
     fixed. `names` are some of `parameter_names`, or None for all.
@@ -215,7 +215,7 @@ def rollout_jvp(
     *,
     parameters: Any = None,
 ) -> RolloutJVP:
-    """A `rollout` of a reduced model with its change for given changes of the inputs.
+    """Step a reduced model as `rollout` does, with the change of the result for given changes of the inputs.
 
     Computed forward in time, at about six times the cost of `rollout_vjp`: it gives `J x` where that gives `J' x`.
     The changes have the shapes of their inputs; leading axes broadcast, so that one roll-out can take many directions.
@@ -249,7 +249,7 @@ def rollout_jvp(
 
 
 def _roll(inputs: RolloutInputs, kept: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """States at the end `[P, B, 3]`, wrenches `[..., T, 3]`, and with `kept = T` the states before each step.
+    """Return states at the end `[P, B, 3]`, wrenches `[..., T, 3]`, and with `kept = T` the states before each step.
 
     These are `[P, B, T, 3]`; `kept = 0` for none.
     """
@@ -261,7 +261,7 @@ def _roll(inputs: RolloutInputs, kept: int) -> tuple[np.ndarray, np.ndarray, np.
 
 
 def _stepped(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any) -> Rollout:
-    """The steps of any model; it checks their numbers itself."""
+    """Step any model, which checks the numbers itself."""
     state = model.rest() if state is None else validation.numbers("state", state)
     twist, load, dt = sequences(twist, normal_force, dt)
     inner = model.state_shape

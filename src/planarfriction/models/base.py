@@ -75,16 +75,15 @@ class FrictionModel(ByValue):
         raise NotImplementedError
 
     def rest(self) -> np.ndarray:
-        """State of a contact at rest, with relaxed bristles."""
+        """Return the state of a contact at rest, with relaxed bristles."""
         return np.zeros(self.state_shape)
 
     def with_law(self, law: FrictionLaw) -> Self:
-        """The same model with another law; precomputed properties of the patch that do not depend on the law are
-        shared."""
+        """Return the model with another law; both share what was computed of the patch alone."""
         return dataclasses.replace(self, law=law)
 
     def state_of(self, deflections: ArrayLike, normal_force: ArrayLike) -> np.ndarray:
-        """State of a contact at rest whose bristles have the `deflections` `[2, N]` [m] under a load > 0 [N].
+        """Return the state of a contact at rest with the `deflections` `[2, N]` [m] of bristles under a load > 0 [N].
 
         Its wrench is that of the bristles, `-sum w_i B_i' sigma_0 z_i f_N`, whichever state variables a model uses.
 

@@ -26,7 +26,7 @@ _INNER = slice(GHOSTS, -GHOSTS)
 
 
 def face_nodes(n: int) -> np.ndarray:
-    """Directions of the nodes of the six faces with their ghosts, `[6, K, K, 3]`, `K = 2 n + 1 + 2 GHOSTS`."""
+    """Return directions of the nodes of the six faces and their ghosts, `[6, K, K, 3]`, `K = 2 n + 1 + 2 GHOSTS`."""
     a, b = np.meshgrid(_coordinates(n, GHOSTS), _coordinates(n, GHOSTS), indexing="ij")
     result = np.empty((6, *a.shape, 3))
     for face in range(6):
@@ -37,14 +37,14 @@ def face_nodes(n: int) -> np.ndarray:
 
 
 def mirrored(values: np.ndarray) -> np.ndarray:
-    """Values `[6, K, K, ...]` of an odd function from those on the positive faces `[3, K, K, ...]`."""
+    """Return values `[6, K, K, ...]` of an odd function from those on the positive faces `[3, K, K, ...]`."""
     return np.concatenate([values, -values[:, ::-1, ::-1]])
 
 
 def hermite(values: np.ndarray) -> np.ndarray:
-    """Numbers of the nodes of all faces, `[6, 2 n + 1, 2 n + 1, 4, M]`, from values `[6, K, K, M]` at `face_nodes(n)`.
+    """Return the numbers of all nodes `[6, 2 n + 1, 2 n + 1, 4, M]`, from values `[6, K, K, M]` at `face_nodes(n)`.
 
-    The four numbers are the value, its slopes by a and b and the mixed slope, per coordinate of the face.
+    The four numbers of a node are the value, its slopes by a and b and the mixed slope, per coordinate of the face.
     """
     n = (values.shape[1] - 1) // 2 - GHOSTS
     slope = _spline_slope(n, GHOSTS)[_INNER]
@@ -60,7 +60,7 @@ def hermite(values: np.ndarray) -> np.ndarray:
 
 
 def level_matrix(count: int) -> np.ndarray:
-    """`[count + 2, count]`: coefficients of the uniform cubic B-spline through `count` values over [0, 1].
+    """Return the matrix `[count + 2, count]` from values over [0, 1] to coefficients of their cubic B-spline.
 
     The fourth differences at both ends vanish, so that the first two and the last two pieces are one polynomial each.
     """
@@ -72,7 +72,7 @@ def level_matrix(count: int) -> np.ndarray:
 
 
 def flat(numbers: np.ndarray, components: int, faces: int) -> np.ndarray:
-    """`hermite`'s numbers, M = levels x components, as `kernels.cube` reads them, slopes per spacing of the nodes.
+    """Return the numbers of `hermite`, M = levels x components, as `kernels.cube` reads them, slopes per node spacing.
 
     Single precision. What both sides of an edge store is rounded alike, so that values and the slopes along it stay
     the same; those across it then differ by 1e-7 of them.
@@ -95,7 +95,7 @@ def _coordinates(n: int, ghosts: int = 0) -> np.ndarray:
 
 @functools.lru_cache(maxsize=16)
 def _spline_slope(n: int, ghosts: int = 0) -> np.ndarray:
-    """Matrix from values at the nodes to the slopes of the cubic spline through them, there."""
+    """Return the matrix from values at the nodes to the slopes there of the cubic spline through them."""
     from scipy.interpolate import CubicSpline
 
     nodes = _coordinates(n, ghosts)
@@ -104,7 +104,7 @@ def _spline_slope(n: int, ghosts: int = 0) -> np.ndarray:
 
 @functools.lru_cache(maxsize=16)
 def _clamped_spline(n: int) -> tuple[np.ndarray, np.ndarray]:
-    """Matrices from values at the nodes and the slopes at both ends to slopes and second derivatives at the nodes."""
+    """Return matrices from values at nodes and slopes at both ends to slopes and second derivatives at the nodes."""
     from scipy.interpolate import CubicSpline
 
     nodes, count = _coordinates(n), 2 * n + 1
@@ -115,13 +115,13 @@ def _clamped_spline(n: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _nodes_at(numbers: np.ndarray, k: int, point: tuple) -> np.ndarray:
-    """Nodes of the face of axis k at a point on the cube: a coordinate is 1, -1 or a slice."""
+    """Return the nodes of the face of axis k at a point on the cube, whose coordinates are 1, -1 or a slice."""
     place = [p if isinstance(p, slice) else (-1 if p > 0 else 0) for p in (point[(k + 1) % 3], point[(k + 2) % 3])]
     return numbers[k if point[k] > 0 else k + 3][tuple(place)]
 
 
 def _entry(k: int, axis: int) -> int:
-    """Which number of a node on a face of axis k is the slope along `axis`."""
+    """Return the index of the slope along `axis` among the numbers of a node on a face of axis k."""
     return 1 if axis == (k + 1) % 3 else 2
 
 
@@ -129,7 +129,7 @@ _CORNERS = tuple(itertools.product((1.0, -1.0), repeat=3))
 
 
 def _match_corners(numbers: np.ndarray) -> dict[tuple, np.ndarray]:
-    """One value and one gradient at each corner: the means of its three faces. Returns the gradients `[3, M]`."""
+    """Give each corner one value and one gradient, the means of its three faces; return the gradients `[3, M]`."""
     result = {}
     for p in _CORNERS:
         nodes = [_nodes_at(numbers, k, p) for k in range(3)]
@@ -147,7 +147,7 @@ def _match_corners(numbers: np.ndarray) -> dict[tuple, np.ndarray]:
 
 
 def _match_edges(numbers: np.ndarray, gradients: dict[tuple, np.ndarray]) -> dict[tuple, np.ndarray]:
-    """Values and slopes along the edges, at their inner nodes; returns `z F_j + F_jj` at each corner, by edge."""
+    """Match values and slopes along the edges at their inner nodes; return `z F_j + F_jj` at each corner, by edge."""
     n = (numbers.shape[1] - 1) // 2
     slope, z, inner = _spline_slope(n), _coordinates(n)[:, None], slice(1, -1)
     to_slope, to_bend = _clamped_spline(n)
@@ -180,7 +180,7 @@ def _match_edges(numbers: np.ndarray, gradients: dict[tuple, np.ndarray]) -> dic
 
 
 def _mix_corners(numbers: np.ndarray, bends: dict[tuple, np.ndarray]) -> None:
-    """Mixed slopes at the corners: N_k = p_i p_j F_ij of face k obeys N_i + N_k = -(p_j F_j + F_jj) for each edge j."""
+    """Write mixed slopes at the corners: N_k = p_i p_j F_ij of face k obeys N_i + N_k = -(p_j F_j + F_jj) at edge j."""
     for p in _CORNERS:
         for k in range(3):
             i, j = (k + 1) % 3, (k + 2) % 3

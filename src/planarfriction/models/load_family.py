@@ -12,13 +12,16 @@ from planarfriction.models.steady_sums import ScaledCells
 from planarfriction.patch import ContactPatch
 
 HALVINGS = 6
-"""How often an octave of the load is halved at most: the closest rungs are 0.8 to 1.6 % apart."""
+"""Largest number of halvings of an octave of the load: the closest rungs are 0.8 to 1.6 % apart."""
 
 CHECKED = 64
 """Directions at which the blend of two rungs is compared with the sum over the cells."""
 
 _WITHIN = (0.25, 0.5, 0.75)
-"""Where between two rungs: a cell that gets its first load beside the middle leaves no trace in the middle."""
+"""Places between two rungs that are checked.
+
+A cell that gets its first load beside the middle leaves no trace in the middle.
+"""
 
 ALIKE = 1e-7
 """Relative difference up to which two rungs are the same but for the rounding of their maps."""
@@ -67,7 +70,7 @@ class LoadFamily:
             return sorted(self._maps)
 
     def shapes(self, loads: list[float]) -> list[ReducedShape]:
-        """Shapes at loads > 0 [N]: F of each load, and references to the maps of its two neighbours.
+        """Return shapes at loads > 0 [N]: F of each load, and references to the maps of its two neighbours.
 
         Where one neighbour is so light that it is a point, the other is taken alone.
         """
@@ -80,7 +83,7 @@ class LoadFamily:
         return [found[load] for load in loads]  # pyright: ignore[reportReturnType]
 
     def followed(self, loads: list[float], shapes: list[ReducedShape]) -> list[tuple[ReducedShape, float]]:
-        """The `shapes` at loads > 0 [N] with the maps of both neighbours, and the slopes of their blends [1/N].
+        """Return the `shapes` at loads > 0 [N] with the maps of both neighbours, and the slopes of their blends [1/N].
 
         A load that one rung serves alone has that rung's value, but moves on towards the other one all the same.
         """
@@ -99,7 +102,7 @@ class LoadFamily:
         return shape._replace(other=self._map_at(low)), -1.0 / (high - low)
 
     def _built(self, loads: list[float]) -> dict[float, ReducedShape]:
-        """Shapes at loads that were missing, unless another thread has built them since."""
+        """Build the shapes at loads that were missing, unless another thread has built them since."""
         shapes = {}
         for load, factor in zip(loads, slip_factor(self._patch, np.array(loads)), strict=True):
             shape = self._shapes.get(load)
@@ -112,7 +115,7 @@ class LoadFamily:
         return shapes
 
     def _blend(self, load: float, factor: np.ndarray, low: float, high: float | None = None) -> ReducedShape:
-        """Two rungs blended linearly in the load, or one alone where that is as close as wanted."""
+        """Blend two rungs linearly in the load, or take one alone where that is as close as wanted."""
         if high is None:
             return ReducedShape(factor, self._map_at(low))
         alone = self._served(load, low, high)
@@ -121,14 +124,14 @@ class LoadFamily:
         return ReducedShape(factor, self._map_at(low), self._map_at(high), (load - low) / (high - low))
 
     def _served(self, load: float, low: float, high: float) -> float | None:
-        """The one of two rungs that is as close as wanted to a load, if any."""
+        """Return the rung of two that is as close as wanted to a load, if any."""
         share, apart = (load - low) / (high - low), self._apart(low, high)
         if share * apart <= 0.5 * self._error:
             return low
         return high if (1.0 - share) * apart <= 0.5 * self._error else None
 
     def _neighbours(self, load: float) -> list[float]:
-        """The two rungs around a load, without those that are points."""
+        """Return the two rungs around a load, without those that are points."""
         low = float(np.ldexp(0.5, np.frexp(load)[1]))  # the power of 2 below
         high = 2.0 * low
         for _ in range(HALVINGS):
@@ -139,7 +142,7 @@ class LoadFamily:
         return [rung for rung in (low, high) if self._sum(rung) is not None]
 
     def _is_good(self, low: float, high: float) -> bool:
-        """Whether the blend of two rungs is as close as wanted."""
+        """Return True if the blend of two rungs is as close as wanted."""
         if (low, high) not in self._good:
             worst = np.inf
             first, last = self._sum(low), self._sum(high)
@@ -152,7 +155,7 @@ class LoadFamily:
         return self._good[low, high]
 
     def _apart(self, low: float, high: float) -> float:
-        """Largest relative difference of two rungs."""
+        """Return the largest relative difference of two rungs."""
         if (low, high) not in self._gaps:
             first, last = self._sum(low), self._sum(high)
             assert first is not None and last is not None
@@ -160,7 +163,7 @@ class LoadFamily:
         return self._gaps[low, high]
 
     def _sum(self, load: float) -> np.ndarray | None:
-        """Steady sliding at a rung in the checked directions, None where one point carries the load."""
+        """Return steady sliding at a rung in the checked directions, None where one point carries the load."""
         if load not in self._sums:
             self._sums[load] = None if is_point(self._patch, load) else self._cell_sums(load)
         return self._sums[load]
@@ -170,7 +173,7 @@ class LoadFamily:
         return cells.sums(_directions(), np.empty(0), self._map[0])[:, 0]
 
     def _map_at(self, rung: float) -> np.ndarray:
-        """The map of a rung."""
+        """Return the map of a rung."""
         found = self._maps.get(rung)
         if found is None:
             cells = ScaledCells(self._patch, rung, slip_factor(self._patch, rung))
@@ -182,13 +185,13 @@ class LoadFamily:
 
 
 def _largest(error: np.ndarray, of: np.ndarray) -> float:
-    """The largest relative length of vectors `[M, 3]`."""
+    """Return the largest relative length of vectors `[M, 3]`."""
     return float((np.linalg.norm(error, axis=1) / np.linalg.norm(of, axis=1)).max())
 
 
 @functools.lru_cache(maxsize=1)
 def _directions() -> np.ndarray:
-    """Directions `[CHECKED, 3]` spread evenly over the half of the sphere that spins counter-clockwise.
+    """Return directions `[CHECKED, 3]` spread evenly over the half of the sphere that spins counter-clockwise.
 
     They are on a golden spiral; both halves of an asymmetric patch differ by what is the same for all directions.
     """

@@ -90,14 +90,14 @@ class ReducedModel(ThreeStateModel):
         return (3,) if self.parts == 1 else (self.parts, 3)
 
     def shape_at(self, normal_force: float | None) -> ReducedShape:
-        """Second moments of slip and stored steady state of a model of one part at a load [N]; see `parts_at`.
+        """Return second moments of slip and stored steady state of a model of one part at a load [N] (see `parts_at`).
 
         Raises InvalidValueError as `shapes_at` does.
         """
         return self.shapes_at([normal_force])[0]
 
     def shapes_at(self, loads) -> list[ReducedShape]:
-        """`shape_at` for many loads [N] at once, which is cheaper than one by one.
+        """Return the shapes at many loads [N] at once (see `shape_at`), which is cheaper than one by one.
 
         Raises InvalidValueError for a model in parts, and for loads that are not > 0.
         """
@@ -124,7 +124,7 @@ class ReducedModel(ThreeStateModel):
 
 
 def _count_of(parts: Any, most: int) -> int | None:
-    """A number of parts, None for "auto"."""
+    """Return a number of parts, None for "auto"."""
     if isinstance(parts, str):
         if parts != "auto":
             raise InvalidValueError("parts", 'be "auto" or an integer >= 1', validation.quoted(parts))

@@ -1,4 +1,4 @@
-"""What the reduced model stores of a patch: second moments of slip and steady sliding, a map over directions."""
+"""Shape of a patch as the reduced model stores it: second moments of slip and steady sliding, a map over directions."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ LEAST_SHARE = 0.25
 
 @by_parts
 class ReducedShape(NamedTuple):
-    """What the reduced model knows of its patch at one load."""
+    """A patch at one load, as the reduced model knows it."""
 
     factor: np.ndarray
     """F [3, 3], upper triangular: `|F V|` is the root mean square of the cells' speeds."""
@@ -66,7 +66,7 @@ class ReducedShape(NamedTuple):
 def reduced_shape(
     patch: ContactPatch, normal_force: float | None, gamma: float, segments: int, speeds: int
 ) -> ReducedShape:
-    """What a patch is at a load; `segments` and `speeds` as in `ReducedModel`."""
+    """Build the shape of a patch at a load; `segments` and `speeds` as in `ReducedModel`."""
     factor = slip_factor(patch, normal_force)
     if factor[2, 2] == 0.0:
         return ReducedShape(factor, point_map(patch, normal_force, factor, gamma, segments, speeds))
@@ -74,7 +74,7 @@ def reduced_shape(
 
 
 def is_point(patch: ContactPatch, normal_force: ArrayLike | None = None):
-    """Whether one cell carries the load but for a share `POINT` of it, `[...]` of bool."""
+    """Return True, `[...]`, if one cell carries the load but for a share `POINT` of it."""
     return _one_carries(patch.weights(normal_force))
 
 
@@ -83,7 +83,7 @@ def _one_carries(weights: np.ndarray):
 
 
 def slip_factor(patch: ContactPatch, normal_force: ArrayLike | None = None) -> np.ndarray:
-    """F `[..., 3, 3]`, upper triangular, with `F'F = sum(w B'B)`: what the cells see of a twist V is `B V`.
+    """Return F `[..., 3, 3]`, upper triangular, with `F'F = sum(w B'B)`, where a cell moves at `B V` under a twist V.
 
     Cells as points, as the distributed model takes them: docs/reduced-model.md, "Cells as points or as areas".
 
@@ -103,7 +103,7 @@ def slip_factor(patch: ContactPatch, normal_force: ArrayLike | None = None) -> n
 
 
 def _metric_factor(patch: ContactPatch, weights: np.ndarray, gyration: np.ndarray) -> np.ndarray:
-    """F from Cholesky's factor of the second moments about the middle of the cells, which cancels no digits.
+    """Return F from Cholesky's factor of the second moments about the middle of the cells, which cancels no digits.
 
     That of a point has rank 2: QR of what its cell sees.
     """
@@ -123,7 +123,7 @@ def _metric_factor(patch: ContactPatch, weights: np.ndarray, gyration: np.ndarra
 def point_map(
     patch: ContactPatch, normal_force: float | None, factor: np.ndarray, gamma: float, segments: int, speeds: int
 ) -> np.ndarray:
-    """The map of a point, which is the same for all points of one asymmetry."""
+    """Return the map of a point, which is the same for all points of one asymmetry."""
     heaviest = int(patch.weights(normal_force).argmax())
     lean = (0.0, 0.0)
     if patch.asymmetric:
@@ -138,7 +138,7 @@ def _point_map(lean: tuple[float, float], asymmetric: bool, gamma: float, segmen
 
 
 def reduced_map(cells: ScaledCells | ScaledPoint, gamma: float, segments: int, speeds: int) -> np.ndarray:
-    """Numbers of the map of `cells`, as `kernels.steady` reads them; with an asymmetry for all six faces.
+    """Return the numbers of the map of `cells`, as `kernels.steady` reads them; with an asymmetry for all six faces.
 
     `h_0`, which has the kinks, takes `segments` squares each way on a quarter of a face; the rest
     `r = h_1 - (1 - t) h_0` of the Stribeck part, which is smooth, a third of them, with `speeds` nodes in t.
@@ -163,7 +163,7 @@ def reduced_map(cells: ScaledCells | ScaledPoint, gamma: float, segments: int, s
 
 
 def _numbers(values: np.ndarray) -> np.ndarray:
-    """Stored numbers of a map from its values `[faces, K, K, levels, 3]`; an odd one has three faces."""
+    """Return the stored numbers of a map from its values `[faces, K, K, levels, 3]`; an odd one has three faces."""
     faces = len(values)
     flat = values.reshape(*values.shape[:3], -1)
     return cube_map.flat(cube_map.hermite(flat if faces == 6 else cube_map.mirrored(flat)), 3, faces)

@@ -11,10 +11,10 @@ from planarfriction.kernels.cell_sums import steady_sums
 from planarfriction.patch import ContactPatch
 
 _BLOCK = 128
+"""Number of directions that are summed at once."""
 
 _PRODUCTS = (0, 1, 2, 0, 0, 1), (0, 1, 2, 1, 2, 2)
 """Factors of the products m of three components."""
-"""Directions that are summed at once."""
 
 EVEN = 0.5
 """Mean distance from the centre of pressure over its root mean square above which maps need no stretch (disc: 0.94)."""
@@ -27,19 +27,19 @@ class ScaledCells:
 
     def __init__(self, patch: ContactPatch, normal_force: float | None, factor: np.ndarray) -> None:
         self.asymmetric = patch.asymmetric
-        """Whether `sums` has a part that is even in the direction."""
+        """True if `sums` has a part that is even in the direction."""
         one_metric = patch.root is None or patch.root.ndim == 2
         weights = patch.weights(normal_force)
         loaded = weights > 0.0
         share, self.stretch = _spread(patch, weights)
-        """Of `s` in the map (see `kernels.steady`)."""
+        """Stretch of `s` in the map (see `kernels.steady`)."""
         extents = share * patch.cell_extents()[loaded]
         self._cells = _parallelograms(patch, normal_force, factor, loaded, extents) if one_metric else None
         self._levers = patch.levers()[loaded] @ np.linalg.inv(factor), weights[loaded]
         self._points = None if one_metric and not self.asymmetric else _points(patch, weights, factor, loaded, extents)
 
     def sums(self, directions: np.ndarray, exponents: np.ndarray, gamma: float) -> np.ndarray:
-        """`sum(w e C'(u/|u| + a))` `[..., 1 + E, 3]` of scaled twists `[..., 3]` of any length.
+        """Return `sum(w e C'(u/|u| + a))` `[..., 1 + E, 3]` of scaled twists `[..., 3]` of any length.
 
         `e` is 1, then `exp(-exponents[k] |u|^gamma)` for the unit directions; `exponents` [E] ascend.
         """
@@ -55,14 +55,14 @@ class ScaledCells:
         return out.reshape(*directions.shape[:-1], -1, 3)
 
     def fourth_moments(self) -> np.ndarray:
-        """Coefficients of `<u^4>` `[15]` (see `kernels.steady`), cells as points."""
+        """Return the coefficients of `<u^4>` `[15]` (see `kernels.steady`), cells as points."""
         levers, weights = self._levers
         square = np.swapaxes(levers, 1, 2) @ levers  # |u|^2 = V_G' square V_G
         products = square[:, *_PRODUCTS] * np.array([1.0, 1.0, 1.0, 2.0, 2.0, 2.0])
         return _collected(np.einsum("n,ni,nj->ij", weights, products, products))
 
     def _point_sums(self, unit: np.ndarray, exponents: np.ndarray, gamma: float) -> np.ndarray:
-        """The whole sum for a metric per cell, else its even part; `[M, 1 + E, 3]`."""
+        """Return the whole sum for a metric per cell, else its even part; `[M, 1 + E, 3]`."""
         assert self._points is not None
         levers, lean, weights = self._points
         u = np.einsum("mc,nic->mni", unit, levers, optimize=True)
@@ -90,14 +90,14 @@ class ScaledPoint:
         return pull[..., None, :] * np.exp(-np.concatenate([[0.0], exponents]))[:, None]
 
     def fourth_moments(self) -> np.ndarray:
-        """Coefficients of `|V_G|^4`."""
+        """Return the coefficients of `|V_G|^4`."""
         moments = np.zeros((6, 6))
         moments[:3, :3] = 1.0
         return _collected(moments)
 
 
 def _collected(matrix: np.ndarray) -> np.ndarray:
-    """The coefficients of `m' K m` `[15]` from K `[6, 6]` (see `kernels.steady`)."""
+    """Return the coefficients of `m' K m` `[15]` from K `[6, 6]` (see `kernels.steady`)."""
     powers = np.eye(3, dtype=int)[np.array(_PRODUCTS)].sum(0)
     products = powers[:, None] + powers
     rows, columns = np.triu_indices(3, m=6)
@@ -106,7 +106,7 @@ def _collected(matrix: np.ndarray) -> np.ndarray:
 
 
 def _spread(patch: ContactPatch, weights: np.ndarray) -> tuple[float, float]:
-    """The share of their extents over which cells spread their load, and the stretch of the map.
+    """Return the share of their extents over which cells spread their load, and the stretch of the map.
 
     No cell spreads its load further than the patch does: one that carries nearly all of it becomes a point as the rest
     goes. Where most of the load is that close to the centre of pressure, most of what turns is far from it, and all
@@ -123,7 +123,7 @@ def _spread(patch: ContactPatch, weights: np.ndarray) -> tuple[float, float]:
 def _parallelograms(
     patch: ContactPatch, normal_force, factor: np.ndarray, loaded: np.ndarray, extents: np.ndarray
 ) -> np.ndarray:
-    """Cells `[N, 7]` of a patch with one metric, as `kernels.cell_sums` reads them.
+    """Return the cells `[N, 7]` of a patch with one metric, as `kernels.cell_sums` reads them.
 
     With T the upper left block of F and rho_g its last entry, a cell at `rho` about the centre of pressure sees
     `u = (V_G,x - V_G,s p_y, V_G,y + V_G,s p_x)` at `p = (T_11 rho_x, T_00 rho_y - T_01 rho_x)/rho_g`.
@@ -140,7 +140,7 @@ def _parallelograms(
 
 
 def _points(patch: ContactPatch, weights: np.ndarray, factor: np.ndarray, loaded: np.ndarray, extents: np.ndarray):
-    """`C` `[P, 2, 3]`, asymmetries `[P, 2]` and weights `[P]` of a 2 x 2 Gauss rule in each loaded cell."""
+    """Return `C` `[P, 2, 3]`, asymmetries `[P, 2]` and weights `[P]` of a 2 x 2 Gauss rule in each loaded cell."""
     along = [np.array([-_GAUSS, _GAUSS]) if side > 0.0 else np.zeros(1) for side in extents.max(axis=0)]
     inside = np.stack([axis.ravel() for axis in np.meshgrid(*along)], -1)
     count = len(inside)

@@ -1,4 +1,4 @@
-"""From a scene to the flat arrays of the compiled solver, window after window of the motion."""
+"""Scenes as flat arrays of the compiled solver, batch after batch of the motion's segments."""
 
 from __future__ import annotations
 
@@ -74,41 +74,41 @@ class Segments:
         moving |= any((mover[-1, 3:] != 0.0).any() for mover in self._mover)
         changing = moving or any(slope[-1] != 0.0 for _, slope in self._load)
         self.settled = float(own[-1 if changing else -2])
-        """When the last of the inputs has changed for the last time [s]."""
+        """Time of the last change of an input [s]."""
 
     def breaks(self, pieces: np.ndarray) -> np.ndarray:
-        """Times [s] at which pieces begin; that of number `count` is the end."""
+        """Return the times [s] at which pieces begin; that of number `count` is the end."""
         here = self._behind(pieces)
         begin = (pieces - self._first[here]) * self._step[here] + self._breaks[here]
         return np.where(pieces == self.count, self._breaks[-1], begin)
 
     def load(self, c: int, pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Normal force of contact c at the start of pieces, and its slope."""
+        """Return the normal force of contact c at the start of pieces, and its slope."""
         return self._linear(self._load[c], pieces)
 
     def held(self, c: int, pieces: np.ndarray) -> np.ndarray:
-        """Load whose shape contact c has on pieces: that in their middle [N]."""
+        """Return the load in the middle of pieces [N], whose shape contact c has on them."""
         load, slope = self.load(c, pieces)
         return load + slope * (0.5 * (self.breaks(pieces + 1) - self.breaks(pieces)))
 
     def between(self, c: int) -> tuple[float, float]:
-        """Lowest load > 0 and highest of contact c whose shape it takes [N]; both 1 where it never has a load."""
+        """Return the lowest load > 0 and the highest whose shape contact c takes [N]; both 1 if it never has a load."""
         held = self.held(c, np.concatenate([self._first[:-1], self._first[1:] - 1]))
         held = held[held > 0.0]
         return (float(held.min()), float(held.max())) if len(held) else (1.0, 1.0)
 
     def force(self, pieces: np.ndarray) -> np.ndarray:
-        """Applied wrench at the start of pieces, and its slope, [S, 2, 3]."""
+        """Return the applied wrench at the start of pieces, and its slope, [S, 2, 3]."""
         if self._force is None:
             return np.zeros((len(pieces), 2, 3))
         return np.stack(self._linear(self._force, pieces), axis=1)
 
     def velocity(self, pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-        """Prescribed velocity at the start of pieces, and its slope, [S, 3] each; or None."""
+        """Return the prescribed velocity at the start of pieces, and its slope, [S, 3] each; or None."""
         return None if self._velocity is None else self._linear(self._velocity, pieces)
 
     def mover(self, pieces: np.ndarray) -> np.ndarray:
-        """Displacement, velocity and acceleration of the world's side of each contact as pieces begin, [S, C, 9].
+        """Return displacement, velocity and acceleration of each contact's support as pieces begin, [S, C, 9].
 
         Empty [0, C, 9] where all stand still.
         """
@@ -122,7 +122,7 @@ class Segments:
         return np.concatenate([by, velocity + since * slope, slope], axis=-1)
 
     def _behind(self, pieces: np.ndarray) -> np.ndarray:
-        """Break of the signals that pieces lie behind."""
+        """Return the break of the signals that pieces lie behind."""
         return np.minimum(np.searchsorted(self._first, pieces, side="right") - 1, len(self._step) - 1)
 
     def _linear(self, signal: tuple[np.ndarray, np.ndarray], pieces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -183,20 +183,20 @@ class SegmentBatches:
         speed, but it does with direction.
         """
         self.bristles = self._contacts.state
-        """Where the bristles of each contact begin in the state, int [C + 1]."""
+        """First index of the bristles of each contact in the state, int [C + 1]."""
         self.cells = [model.cells for model in self.models]
-        """Which cells of each contact have bristles."""
+        """Mask of the cells of each contact that have bristles, or None."""
         self._ready: System | None = self._system(row, pieces)
 
     def _first(self) -> np.ndarray:
-        """The bristles with which the scene starts, those that the solver has."""
+        """Return the bristles with which the scene starts, those that the solver has."""
         states = first_states(self._scene, self._shaped)
         return (
             np.zeros(self._contacts.state[-1]) if states is None else self._flat([state[None] for state in states])[0]
         )
 
     def first_slopes(self, d_loads: np.ndarray, d_pull: np.ndarray) -> np.ndarray:
-        """Changes of those of an equilibrium, `[K, n]`; see `start.first_slopes`."""
+        """Return changes `[K, n]` of the bristles of an equilibrium (see `start.first_slopes`)."""
         return self._flat(first_slopes(self._scene, self._shaped, d_loads, d_pull))
 
     @property
@@ -205,7 +205,7 @@ class SegmentBatches:
         return np.array([self._pieces.held(c, np.zeros(1, np.int64))[0] for c in range(len(self.models))])
 
     def _flat(self, states: list[np.ndarray]) -> np.ndarray:
-        """States `[K, *state_shape]` of the contacts as the solver has them, `[K, n]`."""
+        """Return states `[K, *state_shape]` of the contacts as the solver has them, `[K, n]`."""
         chosen = [each if m.cells is None else each[..., m.cells] for each, m in zip(states, self.models, strict=True)]
         return np.concatenate([each.reshape(len(each), -1) for each in chosen], axis=1)
 
@@ -214,7 +214,7 @@ class SegmentBatches:
             yield self._taken()
 
     def _taken(self) -> System:
-        """The next window, which nobody but the caller holds."""
+        """Return the next batch, which nobody but the caller holds."""
         ready, self._ready = self._ready, None
         if ready is None:
             records, row, pieces = self._pack()
@@ -278,14 +278,14 @@ class SegmentBatches:
 
 
 def pack(scene, t_end: float, *, sensitivities: bool = False) -> PackedScene:
-    """Flat arrays of the scene from 0 to `t_end` [s] in one window, whatever room and time its shapes take."""
+    """Return flat arrays of the scene from 0 to `t_end` [s] in one batch, whatever room and time its shapes take."""
     whole = SegmentBatches(scene, t_end, sensitivities=sensitivities, most=MOST_PIECES)
     system = next(iter(whole))
     return PackedScene(system, whole.state, whole.state_scale, whole.models, whole.loading)
 
 
 def _in_order(loads: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """The different loads in the order of their first appearance, and which of them each is."""
+    """Return the different loads in the order of their first appearance, and the index of each load among them."""
     different, first, which = np.unique(loads, return_index=True, return_inverse=True)
     order = np.argsort(first)
     place = np.empty(len(order), np.int64)
@@ -306,7 +306,7 @@ def _starts(sizes: list[int]) -> np.ndarray:
 
 
 def _mover(velocity: Signal | None, breaks: np.ndarray) -> np.ndarray:
-    """Displacement, velocity and acceleration of what moves at the start of each piece between `breaks`, [S, 9]."""
+    """Return displacement, velocity and acceleration of a support at the start of each piece, [S, 9]."""
     if velocity is None:
         return np.zeros((len(breaks) - 1, 9))
     return np.concatenate([displacement(velocity, breaks[:-1]), *velocity.pieces(breaks)], axis=1)
