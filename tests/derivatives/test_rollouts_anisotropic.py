@@ -89,7 +89,7 @@ def test_forwards_is_the_transpose_of_backwards(kind, patch):
     inputs, (bar, end_bar) = drive(model, 4), bars(model)
     parameters = derivatives.parameters_of(model)
     changes = [*drive(model, 7), parameters * random.normal(size=len(parameters))]
-    found = derivatives.rollout_jvp(model, *inputs, DT, *changes)
+    found = derivatives.rollout_jvp(model, *inputs, DT, derivatives.RolloutTangent(*changes))
     gradient = derivatives.rollout_vjp(model, *inputs, DT, bar, end_bar)
     forwards = [*(bar * found.wrenches_dot).ravel(), *(end_bar * found.state_dot).ravel()]
     backwards = np.concatenate([(g * x).ravel() for g, x in zip(gradient, changes, strict=True)])

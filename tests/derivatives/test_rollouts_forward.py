@@ -45,7 +45,7 @@ def test_forwards_is_the_transpose_of_backwards(kind):
     changes.append(parameters * random.normal(size=len(parameters)))
     bar = random.normal(size=(T, 3)) * [1.0, 1.0, 150.0]
     end_bar = random.normal(size=model.state_shape) * [1e6, 1e6, 1e8]
-    found = derivatives.rollout_jvp(model, *inputs, DT, *changes)
+    found = derivatives.rollout_jvp(model, *inputs, DT, derivatives.RolloutTangent(*changes))
     plain = derivatives.rollout(model, *inputs, DT)
     assert found.wrenches == pytest.approx(plain.wrenches, rel=1e-11, abs=1e-13)  # sums in another order
     assert found.state == pytest.approx(plain.state, rel=1e-11, abs=1e-20)
@@ -62,7 +62,7 @@ def test_changes_of_parameters_are_the_sensitivities(kind):
     by = derivatives.rollout_jacobian(model, *inputs, DT, ["mu_c", "sigma_1"]).d_wrenches
     places = [derivatives.parameter_names(model).index(name) for name in ("mu_c", "sigma_1")]
     directions = np.eye(len(derivatives.parameter_names(model)))[places]  # a batch of two
-    found = derivatives.rollout_jvp(model, *inputs, DT, parameters_dot=directions)
+    found = derivatives.rollout_jvp(model, *inputs, DT, derivatives.RolloutTangent(parameters=directions))
     assert found.wrenches_dot.shape == (2, T, 3) and found.state_dot.shape == (2, *model.state_shape)
     assert found.wrenches_dot == pytest.approx(np.moveaxis(by, -1, 0), rel=1e-11, abs=1e-13)
 
@@ -70,10 +70,11 @@ def test_changes_of_parameters_are_the_sensitivities(kind):
 def test_changes_broadcast_with_contacts():
     model, (inputs, changes) = model_of("reduced"), drive(4)
     twists = inputs[1] * np.array([0.5, 1.0, 2.0])[:, None, None]
-    found = derivatives.rollout_jvp(model, inputs[0], twists, 2.0, DT, changes[0], 0.0, 1.0)
+    found = derivatives.rollout_jvp(model, inputs[0], twists, 2.0, DT, derivatives.RolloutTangent(changes[0], 0.0, 1.0))
     assert found.wrenches_dot.shape == (3, T, 3)
     for each, twist in zip(found.wrenches_dot, twists, strict=True):
-        alone = derivatives.rollout_jvp(model, inputs[0], twist, 2.0, DT, changes[0], normal_force_dot=np.ones(T))
+        tangent = derivatives.RolloutTangent(changes[0], normal_force=np.ones(T))
+        alone = derivatives.rollout_jvp(model, inputs[0], twist, 2.0, DT, tangent)
         assert np.array_equal(each, alone.wrenches_dot)
     held = derivatives.rollout_jvp(model, *inputs, DT)
     assert not held.wrenches_dot.any() and not held.state_dot.any()
@@ -82,15 +83,15 @@ def test_changes_broadcast_with_contacts():
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"twist_dot": np.zeros((T, 2))}, r"twist_dot must have shape \[..., 14, 3\], got shape \[14, 2\]"),
-        ({"parameters_dot": np.zeros(12)}, r"parameters_dot must have shape \[..., 7\]"),
-        ({"state_dot": [np.nan, 0.0, 0.0]}, "state_dot must be finite"),
-        ({"normal_force_dot": np.zeros((4, T)), "state_dot": np.zeros((5, 3))}, "batch axes must broadcast"),
+        ({"twist": np.zeros((T, 2))}, r"tangent.twist must have shape \[..., 14, 3\], got shape \[14, 2\]"),
+        ({"parameters": np.zeros(12)}, r"tangent.parameters must have shape \[..., 7\]"),
+        ({"state": [np.nan, 0.0, 0.0]}, "tangent.state must be finite"),
+        ({"normal_force": np.zeros((4, T)), "state": np.zeros((5, 3))}, "batch axes must broadcast"),
     ],
 )
 def test_wrong_changes_are_one_clear_line(changes, message):
     with pytest.raises(InvalidValueError, match=message) as caught:
-        derivatives.rollout_jvp(model_of("reduced"), *drive()[0], DT, **changes)
+        derivatives.rollout_jvp(model_of("reduced"), *drive()[0], DT, derivatives.RolloutTangent(**changes))
     assert "\n" not in str(caught.value)
 
 

@@ -203,7 +203,9 @@ def test_steady_sliding_depends_on_the_load_as_in_the_distributed_model():
     for parts in (1, 2):
         model = pf.ReducedModel(patch, law, parts=parts, segments=12, load_error=2e-3)
         for load in (1.3, 2.2):
-            tangent = derivatives.rollout_jvp(model, None, twist[None], load, 1e6, normal_force_dot=1.0)
+            tangent = derivatives.rollout_jvp(
+                model, None, twist[None], load, 1e6, derivatives.RolloutTangent(normal_force=1.0)
+            )
             ends = [exact.step(exact.rest(), twist, load * (1.0 + h), 1e6)[1] for h in (step, -step)]
             wanted = (ends[0] - ends[1]) / (2.0 * step * load)
             held = ends[0] / load  # with the shape held
@@ -225,7 +227,7 @@ def test_forwards_is_the_transpose_of_backwards(kind):
     twists[8] = 0.0
     parameters, (bar, end_bar) = derivatives.parameters_of(model), bars_of(model)
     changes = [*drive(model, 5), random.normal(size=T), parameters * random.normal(size=len(parameters))]
-    found = derivatives.rollout_jvp(model, state, twists, loads, DT, *changes)
+    found = derivatives.rollout_jvp(model, state, twists, loads, DT, derivatives.RolloutTangent(*changes))
     gradient = derivatives.rollout_vjp(model, state, twists, loads, DT, bar, end_bar)
     forwards = [*(bar * found.wrenches_dot).ravel(), *(end_bar * found.state_dot).ravel()]
     backwards = [*np.concatenate([(g * x).ravel() for g, x in zip(gradient, changes, strict=True)])]
@@ -240,7 +242,7 @@ def test_changes_of_parameters_are_the_sensitivities(kind):
     state, twists = drive(model, 6)
     by = derivatives.rollout_jacobian(model, state, twists, LOADS, DT)
     directions = np.eye(len(derivatives.parameter_names(model)))
-    found = derivatives.rollout_jvp(model, state, twists, LOADS, DT, parameters_dot=directions)
+    found = derivatives.rollout_jvp(model, state, twists, LOADS, DT, derivatives.RolloutTangent(parameters=directions))
     assert found.wrenches_dot == pytest.approx(np.moveaxis(by.d_wrenches, -1, 0), rel=1e-10, abs=1e-12)
     assert by.wrenches == pytest.approx(pf.rollout(model, state, twists, LOADS, DT).wrenches, rel=1e-11, abs=1e-13)
 

@@ -37,7 +37,7 @@ SKIPPED = {
 """Not attacked, and why."""
 
 RECORDS = """
-    Rollout RolloutVJP RolloutJacobian RolloutStates RolloutJVP SceneGradient SceneSensitivities
+    Rollout RolloutVJP RolloutJacobian RolloutStates RolloutTangent RolloutJVP SceneGradient SceneSensitivities
     Identification Verdict MotionPlan GripPlan GripReport Push PushPlan PushReport Solution Progress
     SurfaceComparison ModelJacobians PackedModel StepJacobians Statistics Integration
     LimitSurface FrictionLaw FrictionModel Pressure

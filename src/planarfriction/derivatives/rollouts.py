@@ -61,6 +61,20 @@ class RolloutJacobian(NamedTuple):
 
 
 @by_parts
+class RolloutTangent(NamedTuple):
+    """Changes of the inputs of a roll-out, each of the shape of that input; leading axes broadcast."""
+
+    state: Any = 0.0
+    """Change of the state before the first step."""
+    twist: Any = 0.0
+    """Changes of the twists `[..., T, 3]`."""
+    normal_force: Any = 0.0
+    """Changes of the loads `[..., T]` [N]."""
+    parameters: Any = 0.0
+    """Changes of the parameters `[..., P]`."""
+
+
+@by_parts
 class RolloutJVP(NamedTuple):
     """A roll-out and its change for given changes of the inputs."""
 
@@ -208,40 +222,33 @@ def rollout_jvp(
     twist: Any,
     normal_force: Any,
     dt: Any,
-    state_dot: Any = 0.0,
-    twist_dot: Any = 0.0,
-    normal_force_dot: Any = 0.0,
-    parameters_dot: Any = 0.0,
+    tangent: RolloutTangent | None = None,
     *,
     parameters: Any = None,
 ) -> RolloutJVP:
-    """Step a reduced model as `rollout` does, with the change of the result for given changes of the inputs.
+    """Step a reduced model as `rollout` does, with the change of the result for changes of the inputs (`tangent`).
 
     Computed forward in time, at about six times the cost of `rollout_vjp`: it gives `J x` where that gives `J' x`.
-    The changes have the shapes of their inputs; leading axes broadcast, so that one roll-out can take many directions.
 
     Raises `InvalidValueError` as `rollout_vjp` does.
     """
     parts = pack(model, parameters)
     family, each = parts[0].family, inner_of(parts)
     steps = validation.numbers("twist", twist).shape[-2:-1]
-    inner = {
-        "state_dot": each,
-        "twist_dot": (*steps, 3),
-        "normal_force_dot": steps,
-        "parameters_dot": (len(family.names),),
-    }
-    given = zip(inner, (state_dot, twist_dot, normal_force_dot, parameters_dot), strict=True)
-    changes = {name: validation.finite_numbers(name, value) for name, value in given}
-    more = [value.shape[: max(value.ndim - len(inner[name]), 0)] for name, value in changes.items()]
+    tangent = RolloutTangent() if tangent is None else tangent
+    validation.instance("tangent", tangent, RolloutTangent, "a RolloutTangent")
+    names, inner = [f"tangent.{name}" for name in tangent._fields], (each, (*steps, 3), steps, (len(family.names),))
+    changes = [validation.finite_numbers(name, value) for name, value in zip(names, tangent, strict=True)]
+    more = [value.shape[: max(value.ndim - len(shape), 0)] for value, shape in zip(changes, inner, strict=True)]
     inputs = checked(parts, state, twist, normal_force, dt, None, more)
-    z, twists, loads, values = (rows_of(name, value, inner[name], inputs.batch) for name, value in changes.items())
-    rows = np.zeros((len(values), inputs.rows[0].shape[-1]))
-    rows[:, family.columns] = values
+    given = zip(names, changes, inner, strict=True)
+    z, twists, loads, values = (rows_of(*each, inputs.batch) for each in given)
+    numbers = np.zeros((len(values), inputs.rows[0].shape[-1]))
+    numbers[:, family.columns] = values
     end, count = inputs.state.copy(), inputs.state.shape[1]
     moved, turned = np.zeros_like(end), parts[0].turned
     moved[:] = by_part(z, len(parts))
-    changed, compiled = Bars(moved, turned(twists), loads, rows), inputs.compiled(slopes=bool(loads.any()))
+    changed, compiled = Bars(moved, turned(twists), loads, numbers), inputs.compiled(slopes=bool(loads.any()))
     both = [np.zeros((count, *steps, 3)) for _ in range(2)]
     share(compiled, count, lambda *span: family.tangent(compiled, span, end, changed, *both))
     wrenches, slopes = (turned(inputs.of_all(values)) for values in both)

@@ -72,7 +72,8 @@ class RolloutOperation(NamedTuple):
         """Return the changes of the last state and of the wrenches."""
         state, twist, load, parameters = inputs
         model, dt = self._model(held), float(held[0])
-        return derivatives.rollout_jvp(model, state, twist, load, dt, *changes, parameters=parameters)[2:]
+        tangent = derivatives.RolloutTangent(*changes)
+        return derivatives.rollout_jvp(model, state, twist, load, dt, tangent, parameters=parameters)[2:]
 
     def pull(self, held: Arrays, inputs: Arrays, bars: Arrays, kept: Arrays) -> Arrays:
         """Return the cotangents of state, twist, load and parameters."""
