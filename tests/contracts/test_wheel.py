@@ -12,6 +12,9 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 
+MAX_WHEEL = 2.5e6
+"""Size [bytes] above which the studies with their data become a distribution of their own."""
+
 LOG = """
 import numpy as np
 import planarfriction as pf
@@ -48,10 +51,15 @@ def test_wheel_in_an_empty_environment(tmp_path):
     run(sys.executable, "-m", "venv", tmp_path / "empty")
     python = tmp_path / "empty" / "bin" / "python"
     run(python, "-m", "pip", "install", *tmp_path.glob("*.whl"))
+    (wheel,) = tmp_path.glob("*.whl")
+    assert wheel.stat().st_size < MAX_WHEEL
     run(python, "-c", LOG)
     command = python.with_name("planarfriction")
     assert "times faster than real time" in run(command, "run", "in-hand")
     assert "0 out of tolerance" in run(command, "reproduce", "--only", "drift", "--quick")
+    assert "exact surface" in run(command, "measured", "--list") and "in_hand" in run(command, "bench", "--help")
+    asked = subprocess.run([command, "explore"], env=environment, capture_output=True, text=True, check=False)
+    assert asked.returncode == 2 and "run pip install 'planarfriction[explore]'" in asked.stderr
     start = ["--start=mu_s=0.65", "--start=v_s=2e-3", "--start=sigma_0=2e4", "--start=sigma_1=30"]
     found = run(
         command,

@@ -102,7 +102,7 @@ class Window:
 
 
 def lsoda_time(scene: Scene, t_end: float) -> float:
-    """Time of SciPy's LSODA, as published, over the scene from 0 to `t_end` [s]."""
+    """Measure the time of SciPy's LSODA, as published, over the scene from 0 to `t_end` [s]."""
     return Window.of(scene, 0.0, t_end).general(**LSODA).wall_time
 
 

@@ -149,7 +149,7 @@ def slide(way: Way, start: tuple[float, float], dt: float = 2e-3) -> tuple[float
 
 
 def cost(ways: Mapping[str, Way], *, steps: int, rounds: int, dt: float = 2e-3) -> dict[str, float]:
-    """Time of a step of the box on the incline by name [s]: the least of `rounds`, in turns."""
+    """Measure the time of a step of the box on the incline by name [s]: the least of `rounds`, in turns."""
     simulators = {name: INCLINE.build(way, dt)[0] for name, way in ways.items()}
     for simulator in simulators.values():
         simulator.AdvanceTo(SETTLED)

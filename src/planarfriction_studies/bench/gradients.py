@@ -37,7 +37,8 @@ def reduced(full: bool) -> Measurement:
 
 
 def _value_and_gradient(model: ReducedModel | ReducedModelPublished, shape: tuple[int, ...], repeats: int) -> float:
-    """Time of half the squared wrenches of roll-outs with their gradient to all inputs [s]; steps are the last axis."""
+    """Measure the time [s] of half the squared wrenches of roll-outs with their gradient to all inputs; steps are the
+    last axis."""
     from planarfriction import derivatives
 
     inputs = model.rest(), *_inputs(shape)
@@ -50,7 +51,7 @@ def _value_and_gradient(model: ReducedModel | ReducedModelPublished, shape: tupl
 
 
 def _alone(model: ReducedModel | ReducedModelPublished, shape: tuple[int, ...], repeats: int) -> float:
-    """Time of the roll-outs alone [s]."""
+    """Measure the time of the roll-outs alone [s]."""
     from planarfriction import derivatives
 
     inputs = model.rest(), *_inputs(shape)
@@ -78,7 +79,7 @@ def published(full: bool) -> Measurement:
 
 
 def _eager_gradient(model: ReducedModelPublished, full: bool) -> float:
-    """Time of the same value and gradient, step by step through `planarfriction.torch` and autograd [s]."""
+    """Measure the time of the same value and gradient, step by step through `planarfriction.torch` and autograd [s]."""
     import torch
 
     front = importlib.import_module("planarfriction.torch")

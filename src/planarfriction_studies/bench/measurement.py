@@ -45,7 +45,7 @@ def median(action: Callable[[], Any], repeats: int, inner: int = 1) -> float:
 
 
 def once(action: Callable[[], Any]) -> float:
-    """Time of `action` [s]."""
+    """Measure the time of `action` [s]."""
     begin = time.perf_counter()
     action()
     return time.perf_counter() - begin

@@ -17,7 +17,7 @@ FEET = ((0.05, 0.03), (0.05, -0.03), (-0.05, 0.03), (-0.05, -0.03))
 
 
 def _compiled_loop(model: ReducedModel | ReducedModelPublished, twists: np.ndarray) -> float:
-    """Time of a model's steps through `twists`, compiled [s]."""
+    """Measure the time of a model's steps through `twists`, compiled [s]."""
     from planarfriction.derivatives.inputs import checked
 
     inputs = checked(model, None, twists, 1.0, 1e-4, None)

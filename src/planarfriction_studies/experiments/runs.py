@@ -61,7 +61,7 @@ def published_model(kind: Kind, shape: str | ContactPatch, law: LuGre = LAW, *, 
 
 
 def columns(solution: Solution) -> dict[str, np.ndarray]:
-    """Time, motion and the friction wrench of the first contact (about the contact frame's origin), as arrays [SI]."""
+    """Return time, motion and the wrench of the first contact about the contact frame's origin, as arrays [SI]."""
     values = {name: history.values for name, history in solution.histories.items()}
     body = {name: values[name] for name in ("time", "x", "y", "theta", "vx", "vy", "omega")}
     return body | {name: values[name][:, 0] for name in ("fx", "fy", "tau", "normal_force")}

@@ -106,9 +106,7 @@ class Benchmark:
                 begun = time.perf_counter()
                 try:
                     fitted = model.fit(training) if hasattr(model, "fit") else model  # pyright: ignore
-                    answers = _answers(
-                        fitted, called, task, test, lambda part, n=name, c=called: say(f"{n}: {c}, {part}")
-                    )
+                    answers = _answers(fitted, called, test, lambda part, n=name, c=called: say(f"{n}: {c}, {part}"))
                 except NotImplementedError:
                     continue  # a model need not answer every task
                 errors = tuple(task.errors(case, answer) for case, answer in zip(test, answers, strict=True))
@@ -131,18 +129,17 @@ def library(left_out: list[str] | None = None) -> dict[str, Any]:
     return {name: entry.make() for name, entry in LIBRARY.items() if entry.installed}
 
 
-def _answers(model: Any, name: str, task: Task, cases: Sequence[Case], say: Callable[[str], None]) -> list[np.ndarray]:
+def _answers(model: Any, name: str, cases: Sequence[Case], say: Callable[[str], None]) -> list[np.ndarray]:
     answers: list[np.ndarray] = []
     questions = [case.question for case in cases]
     for first in range(0, len(cases), AT_ONCE):
         say(f"{first} of {len(cases)}")
         part = questions[first : first + AT_ONCE]
         answers += model.answer_all(part) if hasattr(model, "answer_all") else [model(each) for each in part]
-    checked = []
-    for case, answer in zip(cases, answers, strict=True):
-        shape = task.shape(case.question)
-        checked.append(validation.array(f"answer of {name} to {case.name}", answer, shape))
-    return checked
+    return [
+        validation.array(f"answer of {name} to {case.name}", answer, case.answer.shape)
+        for case, answer in zip(cases, answers, strict=True)
+    ]
 
 
 def score(task: Task, cases: Sequence[Case], errors: Sequence[np.ndarray], seed: int) -> dict[str, Score]:

@@ -22,7 +22,7 @@ from planarfriction.limit_surface import LimitSurfaceExact
 from planarfriction.patch import ContactPatch
 from planarfriction_studies.measured import fitting, slide_integrator
 from planarfriction_studies.measured.models import quick
-from planarfriction_studies.measured.questions import FIRST_POSES, Case, SlideQuestion
+from planarfriction_studies.measured.questions import FIRST_POSES, BatchModel, Case, SlideQuestion
 
 LANDED = 3.4e-3
 """Time over which the pushes of the landing die away [s]: half a sample."""
@@ -70,7 +70,7 @@ def friction(patch: ContactPatch, mu_0: float, mu_1: float, share: float) -> sli
 
 
 @dataclass(frozen=True)
-class SpeedModel:
+class SpeedModel(BatchModel):
     """The limit surface of the patch, friction that grows with the speed, and a fitted contact radius; slides only."""
 
     mu_0: float = 0.2
@@ -78,10 +78,6 @@ class SpeedModel:
     """Per speed [s/m]."""
     share: float = 1.2
     """Contact radius over that of the patch [-]."""
-
-    def __call__(self, question: SlideQuestion) -> np.ndarray:
-        """Return the answer to one question."""
-        return self.answer_all([question])[0]
 
     def answer_all(self, questions: Sequence[Any]) -> list[np.ndarray]:
         """Return poses of slides."""
@@ -121,7 +117,7 @@ class Linear(NamedTuple):
 
 
 @dataclass(frozen=True)
-class TossModel:
+class TossModel(BatchModel):
     """`SpeedModel` with friction, radius and centre of pressure of each toss, from its first poses; slides only."""
 
     common: SpeedModel = SpeedModel()
@@ -129,10 +125,6 @@ class TossModel:
     """As `BEGIN`, then the means of a and b."""
     reach: tuple[float, float] = (1.0, 1.0)
     """Sizes of the regions of the end, in covariances: of the place, of the angle."""
-
-    def __call__(self, question: SlideQuestion) -> np.ndarray:
-        """Return the answer to one question."""
-        return self.answer_all([question])[0]
 
     def answer_all(self, questions: Sequence[Any]) -> list[np.ndarray]:
         """Return poses of slides."""

@@ -20,19 +20,15 @@ from planarfriction.limit_surface import LimitSurface, LimitSurfaceExact, LimitS
 from planarfriction.limit_surface.base import scaling
 from planarfriction.patch import ContactPatch
 from planarfriction_studies.measured import fitting, slide_integrator
-from planarfriction_studies.measured.questions import Case, Question, SlideQuestion
+from planarfriction_studies.measured.questions import BatchModel, Case, Question, SlideQuestion
 
 
 @dataclass(frozen=True)
-class SurfaceModel:
+class SurfaceModel(BatchModel):
     """A limit surface of the given patch, friction normal to it; on slides times a fitted friction coefficient."""
 
     surface: Callable[[ContactPatch], LimitSurface]
     mu: float = fitting.MU
-
-    def __call__(self, question: Question) -> np.ndarray:
-        """Return the answer to one question."""
-        return self.answer_all([question])[0]
 
     def answer_all(self, questions: Sequence[Any]) -> list[np.ndarray]:
         """Return answers to questions of one task."""
@@ -89,7 +85,7 @@ def _direction(surface: LimitSurface, question: Any) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class UncoupledModel:
+class UncoupledModel(BatchModel):
     """Force against the velocity and torque against the spin, each at its full value as if the other were not there.
 
     The torque has a lever: that of the patch in pure spin, or a fitted one. A wrench then moves the object along its
@@ -100,10 +96,6 @@ class UncoupledModel:
     share: float = 1.0
     """The lever over the contact radius of the patch, which is the lever of a pure spin [-]."""
     mu: float = fitting.MU
-
-    def __call__(self, question: Question) -> np.ndarray:
-        """Return the answer to one question."""
-        return self.answer_all([question])[0]
 
     def answer_all(self, questions: Sequence[Any]) -> list[np.ndarray]:
         """Return answers to questions of one task."""
@@ -203,7 +195,7 @@ def stiff(mu: float) -> LuGre:
 
 
 @dataclass(frozen=True)
-class BristleModel:
+class BristleModel(BatchModel):
     """One of the library's friction models with stiff bristles, simulated as it stands.
 
     A push in time is followed from rest with its measured twist. A twist of a wrench is searched among those whose
@@ -212,12 +204,6 @@ class BristleModel:
 
     build: Callable[[ContactPatch, LuGre], Any]
     mu: float = fitting.MU
-
-    def __call__(self, question: Question) -> np.ndarray:
-        """Return the answer to one question."""
-        if question.task == "slides":
-            return _slide(self.build(question.patch, stiff(self.mu)), question)
-        return self.answer_all([question])[0]
 
     def answer_all(self, questions: Sequence[Any]) -> list[np.ndarray]:
         """Return answers to questions of one task."""

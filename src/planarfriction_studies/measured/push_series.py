@@ -94,8 +94,3 @@ def errors(case: Case, answer: np.ndarray) -> np.ndarray:
     """Return the angle of each scored row [deg], `[S, 1]`."""
     length = LENGTH if case.question.wanted == "twists" else 1.0 / LENGTH
     return angles(answer[case.scored], case.answer[case.scored], length)[:, None]
-
-
-def shape(question: SeriesQuestion) -> tuple[int, ...]:
-    """Return the shape of an answer."""
-    return question.given.shape

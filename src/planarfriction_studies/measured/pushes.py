@@ -90,8 +90,3 @@ def published(folder: Path | None = None) -> dict[str, dict[str, float]]:
         boards = {"hardboard_deg": "hard", "plywood_deg": "wood"}
         found[words] = {key: float(means[board]) for key, board in boards.items() if board in means}
     return found
-
-
-def shape(question: PushQuestion) -> tuple[int, ...]:
-    """Return the shape of an answer."""
-    return question.wrenches.shape

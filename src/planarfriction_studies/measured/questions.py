@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple
 
@@ -92,3 +93,15 @@ class Case(NamedTuple):
     """Rows of the answer that are scored, or all."""
     board: str = ""
     """The board it slid on, or the kind of contact."""
+
+
+class BatchModel:
+    """Base of models that answer many questions at once."""
+
+    def __call__(self, question: Question) -> np.ndarray:
+        """Return the answer to one question."""
+        return self.answer_all([question])[0]
+
+    def answer_all(self, questions: Sequence[Any]) -> list[np.ndarray]:
+        """Return the answers to questions of one task."""
+        raise NotImplementedError

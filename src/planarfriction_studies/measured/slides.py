@@ -62,11 +62,6 @@ def errors(case: Case, answer: np.ndarray) -> np.ndarray:
     return np.array([[rms(position), rms(yaw), position[-1], yaw[-1]]])
 
 
-def shape(question: SlideQuestion) -> tuple[int, ...]:
-    """Return the shape of an answer."""
-    return (len(question.time), 3)
-
-
 def by_spin(cases: Sequence[Case], count: int) -> list[Case]:
     """Return `count` slides from the median turn to the largest, to draw."""
     turned = sorted(cases, key=lambda case: abs(case.answer[-1, 2] - case.answer[0, 2]))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,13 +25,11 @@ class Task(NamedTuple):
     """Function that returns True for cases to fit to: the split is fixed, by number."""
     errors: Callable[[Case, np.ndarray], np.ndarray]
     """Errors `[rows, columns]` of an answer to a case."""
-    shape: Callable[[Any], tuple[int, ...]]
-    """Shape of the answer to a question."""
     measures: tuple[Measure, ...]
 
 
 def _task(name: str, title: str, module: ModuleType) -> Task:
-    return Task(name, title, module.read, module.is_training, module.errors, module.shape, module.MEASURES)
+    return Task(name, title, module.read, module.is_training, module.errors, module.MEASURES)
 
 
 TASKS = {

@@ -78,7 +78,7 @@ def patch(shape: str, cells: int) -> ContactPatch:
 
 
 def interval(case: Case, family: Family, work: Work) -> float:
-    """Time between samples [s]."""
+    """Return the time between samples [s]."""
     cheap = family == "segments" or case[0] == "LineGrad" or work.full
     return PUBLISHED_INTERVAL if cheap else COARSE_INTERVAL
 

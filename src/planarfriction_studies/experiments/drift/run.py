@@ -36,7 +36,7 @@ def run(work: Work) -> Result:
     found = work.pieces(moved, lambda key: f"drift, {', '.join(key)}")
     straight = work.piece("drift, straight ramp", lambda: straight_ramp(rtol, atol))
     numbers = measure(found, straight)
-    return fill("drift", **_told(numbers)).result(
+    return fill("drift", **_template_values(numbers)).result(
         {
             "drift_tangential": figures.motion("tangential", found),
             "drift_normal": figures.motion("normal", found),
@@ -49,7 +49,7 @@ def run(work: Work) -> Result:
     )
 
 
-def _told(numbers: dict[str, Any]) -> dict[str, Any]:
+def _template_values(numbers: dict[str, Any]) -> dict[str, Any]:
     """Return the values that the template names."""
     creep = numbers["creep"]
     grown = creep["normal force"]

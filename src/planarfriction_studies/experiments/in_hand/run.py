@@ -54,7 +54,7 @@ def run(work: Work) -> Result:
     shifts = {case: _shifts(case, found) for case in cases}
     numbers = {case.words: _numbers(case, found, shifts[case]) for case in cases}
     accuracy = _accuracy(cases, found)
-    return fill("in_hand", **_told(cases, found, numbers, accuracy)).result(
+    return fill("in_hand", **_template_values(cases, found, numbers, accuracy)).result(
         _figures(cases, found, shifts),
         comparisons=_comparisons(cases, found),
         numbers={"cases": numbers, "accuracy": accuracy, "tolerances": {"report": TIGHT, "friction and grid": FINE}},
@@ -165,7 +165,7 @@ def _compare_rest(case: Case, run: Arrays, words: str) -> list[Comparison]:
     ]
 
 
-def _told(
+def _template_values(
     cases: tuple[Case, ...], found: Runs, numbers: dict[str, dict[str, Any]], accuracy: dict[str, Any]
 ) -> dict[str, Any]:
     """Return the values that the template names."""

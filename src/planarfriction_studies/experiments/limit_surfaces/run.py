@@ -68,7 +68,7 @@ def run(work: Work) -> Result:
         "tables": {name: {key: each[key] for key in STORED} for name, each in errors.items()},
         "gradient": gradient,
     }
-    return fill("limit_surfaces", **_told(numbers)).result(
+    return fill("limit_surfaces", **_template_values(numbers)).result(
         {
             "surfaces": figures.overview(surfaces, coarse=work.quick),
             "correspondence": figures.correspondence(surfaces),
@@ -191,7 +191,7 @@ def _dataset(surfaces: dict[str, LimitSurfaceCells]) -> xr.Dataset:
 # ------------------------------------------------------------------ words and tables
 
 
-def _told(numbers: Numbers) -> dict[str, Any]:
+def _template_values(numbers: Numbers) -> dict[str, Any]:
     """Return the values that the template names."""
     errors, stored, gradient, disc = (numbers[name] for name in ("ellipsoid", "tables", "gradient", "disc"))
     ratio = {name: each["points, mean"] / each["surfaces, mean"] for name, each in errors.items()}

@@ -40,7 +40,7 @@ def run(work: Work) -> Result:
     numbers = {PRESSURES[pressure]: _numbers(pressure, found, loads) for pressure in pressures}
     stored = {(PRESSURES[p], variant): found[p, variant] for p in pressures for variant in VARIANTS}
     time = "time", found[1, DISTRIBUTED]["time"], "s"
-    return fill("load_dependent", **_told(numbers, found, loads)).result(
+    return fill("load_dependent", **_template_values(numbers, found, loads)).result(
         _figures(pressures, found, loads),
         comparisons=_comparisons(pressures, found, loads),
         numbers={"pressure laws": numbers, "tolerances": TIGHT},
@@ -120,7 +120,7 @@ def _compare_moments(pressure: int, cells: int, loads: np.ndarray) -> list[Compa
     return rows
 
 
-def _told(numbers: dict[str, Any], found: Runs, loads: np.ndarray) -> dict[str, Any]:
+def _template_values(numbers: dict[str, Any], found: Runs, loads: np.ndarray) -> dict[str, Any]:
     """Return the values that the template names."""
     first, *others = numbers.values()
     miss = {variant: runs.errors(found[1, variant], key) for (_, variant), key in REFERENCES.items()}

@@ -105,7 +105,7 @@ def run(work: Work) -> Result:
         "miss_if_labels_mean_the_state": shifts,
         "error_against_the_rod": {str(count): error for count, error in errors.items()},
     }
-    return fill("staircase", **_told(numbers)).result(
+    return fill("staircase", **_template_values(numbers)).result(
         {"staircase": overview(time, found), "staircase_zoom": zoom(time, found, numbers["edge"])},
         comparisons=_comparisons(time, twist, found, steps, patch),
         numbers=numbers,
@@ -270,7 +270,7 @@ def _dataset(time: np.ndarray, twist: np.ndarray, found: Arrays) -> xr.Dataset:
     return result.assign({name: ("time", values, {"units": unit}) for name, unit, values in speeds})
 
 
-def _told(numbers: dict[str, Any]) -> dict[str, Any]:
+def _template_values(numbers: dict[str, Any]) -> dict[str, Any]:
     """Return the values that the template names."""
     radius, by_cells = numbers["radius"], numbers["error_against_the_rod"]
     few, *_, many = by_cells

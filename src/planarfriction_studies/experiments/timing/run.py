@@ -59,7 +59,7 @@ def run(work: Work) -> Result:
     comparisons = [c for p in problems for c in _agreements(p, solved[p], references[p])]
     comparisons += [c for p in problems for c in _against_converged(p, references[p])]
     machine = _machine()
-    return fill("timing", **_told(table, baselines, points, comparisons, machine)).result(
+    return fill("timing", **_template_values(table, baselines, points, comparisons, machine)).result(
         {"timing_work_precision": _figure(points)},
         comparisons=comparisons,
         numbers={
@@ -174,7 +174,7 @@ def _against_converged(problem: Problem, reference: np.ndarray) -> list[Comparis
 # ---------------------------------------------------------------------- words, figure, tables
 
 
-def _told(
+def _template_values(
     table: Mapping[str, Mapping[str, Arrays]],
     baselines: Mapping[str, Mapping[str, Arrays]],
     points: Mapping[Problem, Points],

@@ -59,7 +59,7 @@ CONVERGED = ("Circle", "Square", "Line", "NonConvex1")
 
 
 def drive(shape: str) -> Arrays:
-    """Time [s], and the wrench `[T, 3]` [N, N, N m] about the centre of pressure with each model of a patch."""
+    """Simulate a patch: time [s], and the wrench `[T, 3]` [N, N, N m] about the centre of pressure with each model."""
     patch = PUBLISHED_PATCHES[shape](width=boxes.WIDTH)
     result = {}
     for kind in ("d", "r", "e"):
@@ -76,7 +76,7 @@ def run(work: Work) -> Result:
     errors = {shape: boxes.errors(wrenches) for shape, wrenches in found.items()}
     numbers = _numbers(found, errors)
     velocity = published_velocity()
-    return fill("velocity_driven", **_told(numbers)).result(
+    return fill("velocity_driven", **_template_values(numbers)).result(
         _figures(found, errors),
         comparisons=[
             *_curve_comparisons(found),
@@ -254,7 +254,7 @@ def _dataset(found: dict[str, Arrays], velocity: Any) -> xr.Dataset:
 # ------------------------------------------------------------------ words and table
 
 
-def _told(numbers: dict[str, Any]) -> dict[str, Any]:
+def _template_values(numbers: dict[str, Any]) -> dict[str, Any]:
     """Return the values that the template names."""
     errors = numbers["errors"]
     quartiles: list[dict[str, Any]] = [
