@@ -109,7 +109,7 @@ class Drawing:
 
     @functools.cached_property
     def surface(self) -> LimitSurfaceExact:
-        """Its exact limit surface."""
+        """Exact limit surface of the map."""
         return LimitSurfaceExact(self.patch)
 
     @functools.cached_property

@@ -28,7 +28,7 @@ RUNGS: dict[str, Callable[[Any, Any], Any]] = {
     "reduced": ReducedModel,
     "reduced, as published": lambda patch, law: ReducedModelPublished(patch, law),
 }
-"""From the reference down to three states."""
+"""Models of the ladder, from the reference down to three states."""
 
 
 class Rung(NamedTuple):

@@ -15,7 +15,7 @@ PAUSE = 250
 """Time [ms] without a change after which a browser that does not keep up draws all the same."""
 
 _ANSWER = "requestAnimationFrame(() => requestAnimationFrame(() => { drawn.value = asked.value }))"
-"""In the browser: two frames later what was asked for is on the screen."""
+"""Script for the browser: it answers two frames later, when the picture is on the screen."""
 
 
 class Paced:

@@ -1,4 +1,4 @@
-"""Serves the explorer on this computer alone."""
+"""Server of the explorer, for this computer alone."""
 
 from __future__ import annotations
 

@@ -218,7 +218,7 @@ class Work:
     quick: bool = False
     """A small part of everything, to see that it works."""
     full: bool = False
-    """Also what takes more than minutes."""
+    """True to include the parts that take more than minutes."""
     folder: Path | None = None
     """Folder that keeps finished pieces; None keeps none."""
     fingerprint: str = ""
@@ -251,7 +251,7 @@ class Work:
 
 
 _INNER = "|"
-"""Between the names of nested dictionaries in the kept files."""
+"""Separator between the names of nested dictionaries in the kept files."""
 
 
 def _flat(values: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, np.ndarray]]:

@@ -42,7 +42,7 @@ class Reproduction:
     quick: bool = False
     full: bool = False
     experiments: Mapping[str, Experiment] = field(default_factory=lambda: EXPERIMENTS)
-    """Those that there are, by name."""
+    """Experiments by name."""
 
     @property
     def fingerprint(self) -> str:

@@ -75,7 +75,7 @@ class SpeedModel(BatchModel):
 
     mu_0: float = 0.2
     mu_1: float = 0.05
-    """Per speed [s/m]."""
+    """Growth of the friction coefficient per speed [s/m]."""
     share: float = 1.2
     """Contact radius over that of the patch [-]."""
 
@@ -122,7 +122,7 @@ class TossModel(BatchModel):
 
     common: SpeedModel = SpeedModel()
     spreads: tuple[float, ...] = (*BEGIN, 0.0, 0.0)
-    """As `BEGIN`, then the means of a and b."""
+    """Spreads as in `BEGIN`, then the means of a and b."""
     reach: tuple[float, float] = (1.0, 1.0)
     """Sizes of the regions of the end, in covariances: of the place, of the angle."""
 

@@ -17,7 +17,7 @@ class Measure(NamedTuple):
     key: str
     """Name in the JSON, with the unit."""
     heading: str
-    """In the table."""
+    """Heading in the table."""
     total: Callable[..., Any]
     """`rms` or `mean`."""
     board: str = ""

@@ -25,7 +25,7 @@ PARTS = (1, 4, 6, 16)
 """Parts of `ReducedModel`."""
 
 AUTO = "auto"
-"""As many parts as the model takes by itself, and the name of that model."""
+"""Value of `parts` with which the model chooses their number, and the name of that model."""
 
 CASES = (
     *(Case(shape, load) for shape in (*SIX_SHAPES, "LineGradX") for load in (1, 2)),

@@ -30,7 +30,7 @@ LAWS = {
     "p0": LuGre(mu_s=1.0, sigma_2=0.0, elasto_plastic=ElastoPlastic(0.9)),
     "p1": LuGre(mu_s=1.2, sigma_2=0.2, elasto_plastic=ElastoPlastic(0.9)),
 }
-"""Without Stribeck and viscous friction, and with both."""
+"""Laws of the experiment: without Stribeck and viscous friction, and with both."""
 
 COUNTS = tuple(range(5, 36, 2))
 """Numbers of cells along the width, or of segments of a quadrant."""

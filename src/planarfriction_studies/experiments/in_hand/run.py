@@ -33,7 +33,7 @@ CASES = (
     *(Case(shape, load) for shape in ("Circle", "Square", "LineGradX") for load in LOADS),
     *(Case("Circle", load, 2) for load in LOADS),
 )
-"""In the order of the report."""
+"""Cases in the order of the report."""
 
 KINDS: tuple[Kind, Kind] = ("d", "r")
 

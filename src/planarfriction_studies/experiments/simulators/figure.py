@@ -11,7 +11,7 @@ from planarfriction.plots.style import PlotFigure, new_figure, tidy
 from planarfriction_studies.experiments import looks
 
 COLOURS = {"patches, distributed": looks.DISTRIBUTED, "patches": looks.MOMENTS, "without": looks.EXACT}
-"""By how the name of a way begins; the simulator's own friction has `OWN`."""
+"""Colours by the beginning of a way's name; the simulator's own friction has `OWN`."""
 
 OWN = looks.OTHERS[2]
 

@@ -24,7 +24,7 @@ from planarfriction_studies.experiments.wording import fill, length, readable
 WAYS: dict[str, Way] = {**NATIVE, PATCHES: PATCHES}
 
 TIME_STEPS = (1e-3, 2e-3, 5e-3, 1e-2)
-"""At which the grip is held [s]."""
+"""Time steps at which the grip is held [s]."""
 
 INTEGRATORS = ("Euler", "implicitfast")
 

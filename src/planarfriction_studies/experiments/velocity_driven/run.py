@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 QUICK_SHAPES = ("Circle", "NonConvex1")
-"""Those whose curves are published."""
+"""Shapes whose curves are published."""
 
 RTOL, ATOL = 1e-8, 3e-8
 """Tolerances that leave errors below `boxes.OWN`, so that what is seen are those of the references."""
