@@ -5,7 +5,9 @@ from __future__ import annotations
 import concurrent.futures
 import dataclasses
 import functools
+import importlib.util
 import json
+import linecache
 import multiprocessing
 import os
 import signal
@@ -21,7 +23,7 @@ import pytest
 import planarfriction as pf
 from planarfriction import sweeps
 from planarfriction.errors import SweepError, SweepInterrupted
-from planarfriction.sweeps import identity, records
+from planarfriction.sweeps import keys, records
 
 LAW = pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
 PATCH = pf.ContactPatch.disc(0.01, cells=7)
@@ -141,7 +143,7 @@ def test_mistakes_are_one_line(arguments, words):
 
 def test_equal_scenes_are_one_run_and_others_are_others():
     def digest(scene: pf.Scene, measure=None) -> str:
-        return identity.Runs(measure).digest(scene)
+        return keys.Keys(measure, kept=False).key(scene)
 
     scene, rebuilt = grip(2.0), pf.Scene.from_dict(grip(2.0).to_dict())
     assert digest(scene) == digest(rebuilt) and len(digest(scene)) == 32
@@ -159,36 +161,51 @@ def test_equal_scenes_are_one_run_and_others_are_others():
     assert digest(scene, end) != digest(scene)
 
 
-def test_a_measurement_counts_by_what_it_does():
+def measure_in(file: Path, lines: str):
+    """Return the function `measure` of a file with these lines."""
+    file.write_text(lines)
+    linecache.checkcache()
+    spec = importlib.util.spec_from_file_location("mine", file)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module.measure
+
+
+def test_a_measurement_counts_by_its_name_and_source(tmp_path):
+    text = "def measure(solution):\n    return 1.0\n"
+    names = [keys.name_of(measure_in(tmp_path / "a.py", lines), kept=True) for lines in (text, "# moved\n\n" + text)]
+    assert names[0] == names[1] and names[0] != keys.name_of(end, kept=True)
+    assert keys.name_of(measure_in(tmp_path / "a.py", text.replace("1.0", "2.0")), kept=True) != names[0]
+
+
+def test_runs_of_a_nameless_measurement_are_not_kept(tmp_path):
+    """They could not be found again; in memory it may be anything."""
+
     def near(limit: float):
-        return lambda solution: float(abs(solution.data.y[-1]) < limit)
+        return lambda solution: float(solution.histories["y"].values[-1] < limit)
 
-    def also(solution):
-        return end(solution)["y"]
-
-    named = {"x", "y", "theta"}
-    same = [near(1.0), near(1.0)]
-    assert identity.digest_of(same[0]) == identity.digest_of(same[1])
-    functions = [near(1.0), near(2.0), also, end, functools.partial(also, k=1), lambda s: s.status in {"x", "y"}]
-    assert len({identity.digest_of(each) for each in functions}) == len(functions)
-    assert identity.digest_of(named) == identity.digest_of({"theta", "y", "x"})
+    for nameless in (near(1.0), functools.partial(end), lambda solution: 1.0):
+        with pytest.raises(pf.FrictionError, match="measure must be a function with a name") as caught:
+            pf.sweep(grip, {"grip": [1.0]}, out=tmp_path, measure=nameless)
+        assert "\n" not in str(caught.value)
+    assert pf.sweep(grip, {"grip": [1.0]}, measure=near(1.0)).measured.values.tolist() == [1.0]
 
 
-def test_numbers_and_functions_that_a_measurement_mentions_are_part_of_it():
-    def measure(lines: str):
-        space: dict = {"__name__": "mine"}
-        exec(lines + "\ndef measure(solution):\n    return helper(solution) * LIMIT", space)
-        return space["measure"]
+def test_runs_of_a_model_that_files_do_not_know_are_not_kept(tmp_path):
+    class Mine(pf.DistributedModel):
+        """A class that is not registered."""
 
-    first, helper = "LIMIT = 1.0", "\ndef helper(solution):\n    return 1.0"
-    digests = [measure(first + helper), measure("LIMIT = 2.0" + helper), measure(first + helper.replace("1.0", "2.0"))]
-    assert len({identity.digest_of(each) for each in digests}) == 3
-    assert identity.digest_of(measure(first + helper)) == identity.digest_of(digests[0])
+    def make(grip: float) -> pf.Scene:
+        return pf.scenes.in_hand(Mine(PATCH, LAW), normal_force=grip, t_end=0.01)
+
+    assert pf.sweep(make, {"grip": [1.0, 2.0]}, measure=end).status.values.tolist() == ["success"] * 2
+    with pytest.raises(pf.FrictionError, match=r"model must be one of .*registered"):
+        pf.sweep(make, {"grip": [1.0]}, out=tmp_path)
 
 
-def test_a_run_of_other_equations_does_not_count(tmp_path, monkeypatch):
+def test_a_run_of_another_library_does_not_count(tmp_path, monkeypatch):
     pf.sweep(grip, {"grip": [1.0]}, out=tmp_path)
-    monkeypatch.setattr(identity, "equations", lambda: "others")
+    monkeypatch.setattr(keys, "library_version", lambda: "another")
     assert found(tmp_path, [1.0]) == 0
 
 

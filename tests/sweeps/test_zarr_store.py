@@ -62,6 +62,10 @@ def test_measurements_of_any_kind_are_stored(zarr, tmp_path):
     assert stored.how.values.tolist() == data.how.values.tolist()
 
 
+def twice(solution: pf.Solution) -> dict[str, float]:
+    return {name: 2.0 * value for name, value in end(solution).items()}
+
+
 def test_a_run_counts_once_the_journal_says_so(zarr, tmp_path):
     path = tmp_path / "ends.zarr"
     whole = pf.sweep(grip, VALUES, out=path, measure=end).load()
@@ -75,7 +79,7 @@ def test_a_run_counts_once_the_journal_says_so(zarr, tmp_path):
     assert pf.sweep(grip, VALUES, out=path, measure=end, progress=told.append).load().identical(whole)
     assert told[-1].found == 6
     told.clear()  # another measurement of the same layout: nothing of the old one counts
-    pf.sweep(grip, VALUES, out=path, measure=lambda s: {k: 2.0 * v for k, v in end(s).items()}, progress=told.append)
+    pf.sweep(grip, VALUES, out=path, measure=twice, progress=told.append)
     assert told[-1].found == 0
 
 

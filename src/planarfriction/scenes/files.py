@@ -9,7 +9,7 @@ from __future__ import annotations
 import json
 import os
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,7 @@ from planarfriction.reading import read_text
 from planarfriction.scenes.model_files import model_from_dict, model_to_dict
 from planarfriction.scenes.scene import Body, Contact, Scene
 from planarfriction.scenes.section import Section
-from planarfriction.scenes.signal import read_signal
+from planarfriction.scenes.signal import Signal, read_signal
 from planarfriction.scenes.toml_writer import to_toml
 from planarfriction.writing import write_text
 
@@ -48,8 +48,16 @@ def rectangle_inertia(mass: float, size: Sequence[float]) -> float:
     return validation.positive("mass", mass) / 12.0 * (width**2 + height**2)
 
 
-def scene_to_dict(scene: Scene) -> dict[str, Any]:
-    """The scene as numbers, texts, lists and tables; parts that it does not have are left out."""
+def _part_to_dict(part: Any) -> dict[str, Any]:
+    """Return a signal or the entries of a model as numbers, texts, lists and tables."""
+    return part.to_dict() if isinstance(part, Signal) else model_to_dict(part)
+
+
+def scene_to_dict(scene: Scene, of_part: Callable[[Any], dict[str, Any]] = _part_to_dict) -> dict[str, Any]:
+    """Return the scene as numbers, texts, lists and tables, without parts that it does not have.
+
+    `of_part` makes the tables of signals and the entries of a contact's model.
+    """
     body = scene.body
     data: dict[str, Any] = {key: getattr(scene, key) for key in ("name", "t_end", "save_every", "rtol", "atol")}
     if scene.stop_speed is not None:
@@ -62,21 +70,21 @@ def scene_to_dict(scene: Scene) -> dict[str, Any]:
         data["body"]["outline"] = body.outline.tolist()
     for name in ("force", "velocity"):
         if getattr(scene, name) is not None:
-            data[name] = getattr(scene, name).to_dict()
-    data["contact"] = [_contact_to_dict(contact) for contact in scene.contacts]
+            data[name] = of_part(getattr(scene, name))
+    data["contact"] = [_contact_to_dict(contact, of_part) for contact in scene.contacts]
     return data
 
 
-def _contact_to_dict(contact: Contact) -> dict[str, Any]:
+def _contact_to_dict(contact: Contact, of_part: Callable[[Any], dict[str, Any]]) -> dict[str, Any]:
     return {
         "name": contact.name,
         "mounted_on": contact.mounted_on,
         "position": list(contact.position),
         "angle": contact.angle,
         "count": contact.count,
-        "normal_force": contact.normal_force.to_dict(),
-        **({} if contact.support_velocity is None else {"support_velocity": contact.support_velocity.to_dict()}),
-        **model_to_dict(contact.model),
+        "normal_force": of_part(contact.normal_force),
+        **({} if contact.support_velocity is None else {"support_velocity": of_part(contact.support_velocity)}),
+        **of_part(contact.model),
     }
 
 

@@ -15,12 +15,12 @@ from planarfriction import validation
 from planarfriction.errors import InvalidValueError, shown
 
 MOST_RUNS = 100_000_000
-"""Runs of a sweep."""
+"""Largest number of runs of a sweep."""
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Quantities by name, each with labels and the values behind them."""
+    """Swept quantities by name, each with labels and the values behind them."""
 
     labels: dict[str, list[Any]]
     """Labels along each dimension: numbers, texts, booleans."""
@@ -38,17 +38,17 @@ class Grid:
         return math.prod(self.shape)
 
     def points(self) -> Iterator[tuple[tuple[int, ...], dict[str, Any]]]:
-        """Places in the grid, the last quantity fastest, each with its values by name."""
+        """Yield the places in the grid, the last quantity fastest, each with its values by name."""
         for index in itertools.product(*map(range, self.shape)):
             yield index, {name: each[i] for (name, each), i in zip(self.values.items(), index, strict=True)}
 
     def words(self, index: tuple[int, ...]) -> str:
-        """A point for people: "mass=0.2, pad=disc"."""
+        """Describe a point in words: "mass=0.2, pad=disc"."""
         return ", ".join(f"{name}={shown(each[i])}" for (name, each), i in zip(self.labels.items(), index, strict=True))
 
 
 def grid_of(values: Any) -> Grid:
-    """The grid of a mapping from names to lists of scalars, or to mappings from labels to anything.
+    """Make the grid of a mapping from names to lists of scalars, or to mappings from labels to anything.
 
     Raises InvalidValueError for what is neither, for empty lists and for values that are there twice.
     """
@@ -66,7 +66,7 @@ def grid_of(values: Any) -> Grid:
 
 
 def _scalars(name: str, given: Any) -> list[Any]:
-    """Values of a quantity as plain Python scalars."""
+    """Return the values of a quantity as plain Python scalars, or raise InvalidValueError."""
     rule = "be a list of numbers, texts or booleans (for other values: a mapping from labels to values)"
     if isinstance(given, (str, bytes)) or not (isinstance(given, (Sequence, range)) or hasattr(given, "__array__")):
         raise InvalidValueError(name, rule, validation.quoted(given))
@@ -87,14 +87,14 @@ def _scalars(name: str, given: Any) -> list[Any]:
 
 
 def _of_one_kind(values: Sequence[Any]) -> bool:
-    """Whether all are numbers, or all texts, or all truth values."""
+    """Return True if all are numbers, or all texts, or all truth values."""
     return any(all(isinstance(value, kind) for value in values) for kind in (str, (bool, np.bool_))) or all(
         isinstance(value, (int, float, np.number)) and not isinstance(value, bool) for value in values
     )
 
 
 def check_takes(make_scene: Any, names: Sequence[str]) -> Callable[..., Any]:
-    """`make_scene` if it can be called with these names, or raise."""
+    """Return `make_scene` if it can be called with these names, or raise InvalidValueError."""
     if not callable(make_scene):
         raise InvalidValueError("make_scene", "be a function that returns a Scene", make_scene)
     try:

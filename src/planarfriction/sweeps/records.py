@@ -1,22 +1,18 @@
-"""Results of runs, and the folder in which they are stored: one file per run, named by the run's digest."""
+"""Results of runs: simulating and measuring a scene, and the bytes of the file that keeps a result."""
 
 from __future__ import annotations
 
-import contextlib
 import io
 import json
-import os
 import re
 import zipfile
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from planarfriction.errors import FrictionError, InvalidValueError, one_line
 from planarfriction.scenes.solution import History, Solution
-from planarfriction.writing import make_folder, put
 
 if TYPE_CHECKING:
     from planarfriction.scenes import Scene
@@ -25,33 +21,33 @@ FAILED = "failed"
 """Status of a run that ended with an error; the others are those of a `Solution`."""
 
 _META = "planarfriction"
-"""Entry of a file that describes the others: never the name of a variable."""
+"""Entry of a file that describes the others; no variable may have this name."""
 
 
 class Record(NamedTuple):
-    """The result of a run."""
+    """Result of a run."""
 
     status: str
-    """As that of a `Solution`, or "failed"."""
+    """Status of the `Solution`, or "failed"."""
     reason: str
-    """Why it failed, in one line; empty where it did not."""
+    """Reason of a failure in one line, or nothing."""
     variables: dict[str, History]
-    """What was measured, by name."""
+    """Measured variables by name."""
     end: float = 0.0
-    """When it was to end [s]."""
+    """Time at which the run was to end [s]."""
 
 
 def run(scene: Scene, measure: Callable[[Solution], Any] | None, stopped: Callable[[], bool] | None = None) -> Record:
-    """Simulate a scene and measure it, in any thread or process; what goes wrong is part of the record."""
+    """Simulate a scene and measure it, in any thread or process; errors become part of the record."""
     from planarfriction.scenes import simulate
 
-    def look(time: float) -> None:
+    def check(time: float) -> None:
         if stopped is not None and stopped():
             raise Stopped
 
     where = ""
     try:
-        solution = simulate(scene, progress=look)
+        solution = simulate(scene, progress=check)
         where = "measure: "
         found = solution.histories if measure is None else measure(solution)
         return Record(solution.status, "", variables(found, measure), scene.t_end)
@@ -60,11 +56,11 @@ def run(scene: Scene, measure: Callable[[Solution], Any] | None, stopped: Callab
 
 
 class Stopped(BaseException):
-    """Ends a run whose result nobody waits for any longer."""
+    """Exception that ends a run whose result nobody waits for any longer."""
 
 
 def reason_of(error: BaseException) -> str:
-    """An error as one line; the kind too, where it is not one of the library."""
+    """Return an error as one line, with its class if it is not one of the library."""
     words = " ".join(str(error).split())
     return one_line(
         words if isinstance(error, FrictionError) else f"{type(error).__name__}: {words}".removesuffix(": ")
@@ -72,7 +68,7 @@ def reason_of(error: BaseException) -> str:
 
 
 def variables(found: Any, measure: Callable[..., Any] | None = None) -> dict[str, History]:
-    """What a measurement returned as named arrays: a number, a mapping of names, or an xarray object."""
+    """Convert the result of a measurement to named arrays: a number, a mapping of names, or an xarray object."""
     if hasattr(found, "data_vars"):  # a Dataset
         axes = {str(name): found[name] for name in found.coords if found[name].dims == (name,)}
         found = {**{str(name): found[name] for name in found.data_vars}, **axes}
@@ -108,7 +104,7 @@ def _variable(name: str, value: Any) -> History:
 
 
 def pack(record: Record) -> bytes:
-    """A record as the bytes of an NPZ file, which has a checksum of each entry; equal records give equal bytes.
+    """Convert a record to the bytes of an NPZ file with a checksum of each entry; equal records give equal bytes.
 
     Single numbers and texts are in the entry that describes the others, as JSON.
     """
@@ -129,7 +125,7 @@ def pack(record: Record) -> bytes:
 
 
 def unpack(content: bytes) -> Record:
-    """The record of a file; any exception for one that is damaged."""
+    """Convert the bytes of a file to its record; raises any exception if they are damaged."""
     with np.load(io.BytesIO(content), allow_pickle=False) as file:
         meta, found = json.loads(file[_META].tobytes()), {}
         for name, (dims, attrs, kind, value) in meta["variables"].items():
@@ -139,46 +135,12 @@ def unpack(content: bytes) -> Record:
 
 
 def _entry(name: str) -> str:
-    """Name of a variable in a file: letters of any alphabet are there, what paths are made of is not."""
+    """Return the name of a variable in a file: characters of paths are replaced, letters of any alphabet stay."""
     return re.sub(r"[^\w.+-]", lambda match: f"%{ord(match[0]):X}", name)
 
 
-class Folder:
-    """A folder with a file for each run that is done; one of scene and reason for each that failed."""
-
-    def __init__(self, path: str | Path) -> None:
-        self.path = make_folder(path)
-        self._begin = f"{self.path}{os.sep}"
-        self.damaged = 0
-        """Files that were found and did not count."""
-
-    def find(self, digest: str, index: tuple[int, ...]) -> Record | None:
-        """What the run has left; None where it has not been done, and where its file is not whole."""
-        try:
-            with open(f"{self._begin}{digest}.npz", "rb", buffering=0) as file:
-                content = file.read()
-        except OSError:
-            return None
-        try:
-            return unpack(content)
-        except Exception:  # whatever a damaged file does, the run is done again
-            self.damaged += 1
-            return None
-
-    def put(self, digest: str, index: tuple[int, ...], record: Record, scene: Scene | None) -> Record:
-        """Keep what a run has left; a kill leaves the file out or whole. Returns it."""
-        failed = f"{self._begin}{digest}.failed.json"
-        if record.status == FAILED:
-            put(failed, failure(record.reason, scene).encode())
-            return record
-        put(f"{self._begin}{digest}.npz", pack(record))
-        with contextlib.suppress(OSError):
-            os.unlink(failed)
-        return record
-
-
 def failure(reason: str, scene: Scene | None) -> str:
-    """Reason and scene of a run that failed, as JSON: `Scene.from_dict` reads the scene."""
+    """Return reason and scene of a failed run as JSON; `Scene.from_dict` reads the scene."""
     try:
         table: Any = None if scene is None else scene.to_dict()
     except FrictionError as error:  # with a model that is not registered

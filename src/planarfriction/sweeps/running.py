@@ -17,16 +17,16 @@ from concurrent.futures import (
     ThreadPoolExecutor,
 )
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from planarfriction import validation
 from planarfriction.described import described
 from planarfriction.errors import InvalidValueError, SweepError, SweepInterrupted
 from planarfriction.scenes import Scene
-from planarfriction.sweeps.dataset import OWN, Collected, instants
-from planarfriction.sweeps.identity import Runs
+from planarfriction.sweeps.bookkeeping import OWN, Bookkeeper, FolderBookkeeper, Index, instants
+from planarfriction.sweeps.keys import Keys
 from planarfriction.sweeps.quantities import Grid, check_takes, grid_of
-from planarfriction.sweeps.records import FAILED, Folder, Record, reason_of, run
+from planarfriction.sweeps.records import FAILED, Record, reason_of, run
 from planarfriction.sweeps.settings import Settable
 
 if TYPE_CHECKING:
@@ -38,10 +38,10 @@ _BETWEEN = 0.5
 """Time between two reports of progress [s]."""
 
 _AHEAD = 4
-"""Runs that each worker of an executor has waiting, so that none is idle and none keeps memory for nothing."""
+"""Number of runs that wait for each worker of an executor, so that none is idle and little memory is used."""
 
 _WORKERS = 64
-"""Workers of an executor that does not say how many it has."""
+"""Number of workers of an executor that does not tell it."""
 
 _ENDED = "the executor ended ({}): finished runs are kept, sweep again to continue"
 
@@ -78,37 +78,15 @@ def _duration(seconds: float) -> str:
 
 
 def processors() -> int:
-    """How many this process may use."""
+    """Return the number of processors that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-class Store(Protocol):
-    """Where runs are kept and found again."""
-
-    damaged: int
-
-    def find(self, digest: str, index: tuple[int, ...]) -> Record | None: ...
-
-    def put(self, digest: str, index: tuple[int, ...], record: Record, scene: Scene | None) -> Record: ...
-
-
-class _Memory:
-    """Keeps nothing."""
-
-    damaged = 0
-
-    def find(self, digest: str, index: tuple[int, ...]) -> Record | None:
-        return None
-
-    def put(self, digest: str, index: tuple[int, ...], record: Record, scene: Scene | None) -> Record:
-        return record
-
-
 class _Job(NamedTuple):
-    """A run that has been handed out."""
+    """Run that has been handed out."""
 
-    index: tuple[int, ...]
-    digest: str
+    index: Index
+    key: str
     scene: Scene
 
 
@@ -123,9 +101,9 @@ def sweep(
 ) -> xr.Dataset:
     """Simulate a scene for every combination of some quantities; returns a dataset with a dimension for each of them.
 
-    Runs that are already in `out` are not repeated: a run is identified by its scene, its measurement and the
-    equations, whatever code makes the scene. If the process is killed, only the runs in progress are lost. Equal scenes
-    give equal bits, in any order and with any executor on the same kind of processor.
+    Runs that are already in `out` are not repeated: a run is identified by its scene, the name and source of its
+    measurement, and the library, whatever code makes the scene. If the process is killed, only the runs in progress are
+    lost. Equal scenes give equal bits, in any order and with any executor on the same kind of processor.
 
     A failed run does not end the sweep: `status` says how each run ended ("success", "at rest", "failed"), `failure`
     why it failed, and `out` has its scene in `<run>.failed.json`. The next call tries it again. `run` names each run.
@@ -145,8 +123,9 @@ def sweep(
         Any `concurrent.futures.Executor`; by default threads, one for each processor.
     measure
         Function of a Solution that returns what the dataset should contain: a number, a mapping from names to numbers,
-        texts or arrays, or an xarray object. By default everything in `Solution.data`, at all instants that any of the
-        runs records: NaN where a run has no value, and its last values after its body has come to rest.
+        texts or arrays, or an xarray object; with `out`, a function that is defined with a name. By default everything
+        in `Solution.data`, at all instants that any of the runs records: NaN where a run has no value, and its last
+        values after its body has come to rest.
     progress
         Called with a `Progress` from time to time; `print` is enough.
 
@@ -174,58 +153,45 @@ def sweep(
         raise InvalidValueError("executor", "be a concurrent.futures.Executor, or None", executor)
     if isinstance(executor, ProcessPoolExecutor):
         _check_travels(measure)
-    runs = Runs(measure)
-    if out is not None and validation.path("out", out).suffix == ".zarr":
-        return _to_zarr(make, grid, runs, measure, Path(out), executor, progress)
-    collected = Collected(grid)
-    store = _Memory() if out is None else Folder(out)
-    sweeping = Sweeping(make, grid, runs, measure, store, collected.put, progress)
+    keys = Keys(measure, kept=out is not None)
+    book = _bookkeeper(out, make, grid, timed=measure is None)
+    sweeping = Sweeping(make, grid, keys, measure, book, progress)
     try:
         sweeping.go(executor)
     except KeyboardInterrupt:
-        raise SweepInterrupted(str(sweeping.progress()), collected.dataset(sweeping.ends, measure is None)) from None
-    sweeping.check_some_worked()
-    return collected.dataset(sweeping.ends, measure is None)
-
-
-def _to_zarr(
-    make: Callable[..., Scene],
-    grid: Grid,
-    runs: Runs,
-    measure: Callable[[Solution], Any] | None,
-    path: Path,
-    executor: Executor | None,
-    progress: Callable[[Progress], object] | None,
-) -> xr.Dataset:
-    """A sweep whose results go to a store; its instants must be known before the first run."""
-    from planarfriction.sweeps.zarr_store import ZarrStore
-
-    time = None if measure is not None else instants(_ends(make, grid))
-    store = ZarrStore(path, grid, time)
-    sweeping = Sweeping(make, grid, runs, measure, store, store.note, progress)
-    try:
-        sweeping.go(executor)
-    except KeyboardInterrupt:
-        raise SweepInterrupted(str(sweeping.progress()), store.dataset()) from None
+        raise SweepInterrupted(str(sweeping.progress()), book.dataset()) from None
     finally:
-        store.close()
-    sweeping.check_some_worked()
-    return store.dataset()
+        book.close()
+    if book.failed == grid.size:  # the mistake is in what all runs share
+        raise SweepError(f"all {book.failed} runs failed; the first: {book.first_failure}")
+    return book.dataset()
+
+
+def _bookkeeper(out: str | Path | None, make: Callable[..., Scene], grid: Grid, timed: bool) -> Bookkeeper:
+    """Make the bookkeeper for a folder, for a store, or for the memory."""
+    if out is None:
+        return Bookkeeper(grid, timed)
+    if validation.path("out", out).suffix != ".zarr":
+        return FolderBookkeeper(grid, timed, out)
+    from planarfriction.sweeps.zarr_store import ZarrBookkeeper
+
+    # The instants of a store must be known before the first run.
+    return ZarrBookkeeper(grid, instants(_ends(make, grid)) if timed else None, Path(out))
 
 
 def _ends(make: Callable[..., Scene], grid: Grid) -> Iterator[tuple[float, float]]:
-    """End and sampling interval of all scenes that can be made [s]."""
+    """Yield end and sampling interval [s] of all scenes that can be made."""
     for _, values in grid.points():
         try:
             scene = make(**values)
-        except Exception:  # it fails again, and is recorded, when its turn comes
+        except Exception:  # the run fails again, and is recorded, when its turn comes
             continue
         if isinstance(scene, Scene):
             yield scene.t_end, scene.save_every
 
 
 def _maker(make_scene: Any, grid: Grid) -> Callable[..., Scene]:
-    """The function that makes scenes, whatever it is given as."""
+    """Return the function that makes scenes, for a function, a scene or a path."""
     if callable(make_scene):
         return check_takes(make_scene, list(grid.values))
     if not isinstance(make_scene, (Scene, str, Path)):
@@ -244,41 +210,33 @@ def _check_travels(measure: Any) -> None:
 
 
 class Sweeping:
-    """A sweep that is going on."""
+    """Sweep in progress: hands out the runs and gives their results to the bookkeeper."""
 
     def __init__(
         self,
         make_scene: Callable[..., Scene],
         grid: Grid,
-        runs: Runs,
+        keys: Keys,
         measure: Callable[[Solution], Any] | None,
-        store: Store,
-        put: Callable[[tuple[int, ...], str, Record], None],
+        book: Bookkeeper,
         report: Callable[[Progress], object] | None,
     ) -> None:
-        self._make_scene, self._grid, self._runs, self._measure = make_scene, grid, runs, measure
-        self._store, self._put, self._report = store, put, report
-        self.ends: set[tuple[float, float]] = set()
-        """End and sampling interval of all scenes [s]."""
-        self._found = self._new = self._failed = 0
-        self._reason = self._ended = ""
+        self._make_scene, self._grid, self._keys, self._measure = make_scene, grid, keys, measure
+        self._book, self._report = book, report
+        self._ended = ""
         self._begin = self._reported = time.monotonic()
         self._stopped = threading.Event()
 
     def progress(self) -> Progress:
-        """How far it is."""
-        done = self._found + self._new
+        """Return the progress so far."""
+        book, runs = self._book, self._grid.size
+        done = book.found + book.new
         spent = time.monotonic() - self._begin
-        left = spent / self._new * (self._grid.size - done) if self._new else None
-        return Progress(self._grid.size, done, self._found, self._failed, self._store.damaged, left)
-
-    def check_some_worked(self) -> None:
-        """Raise where every run failed: the mistake is in what they share."""
-        if self._failed == self._grid.size:
-            raise SweepError(f"all {self._failed} runs failed; the first: {self._reason}")
+        left = spent / book.new * (runs - done) if book.new else None
+        return Progress(runs, done, book.found, book.failed, book.damaged, left)
 
     def go(self, executor: Executor | None) -> None:
-        """Do all runs that are not done, at most so many at a time that memory stays as it is."""
+        """Do all runs that are not done, so few at a time that the use of memory does not grow."""
         if executor is not None:
             self._go(executor, _AHEAD * (getattr(executor, "_max_workers", None) or _WORKERS), None)
             return
@@ -314,28 +272,24 @@ class Sweeping:
             self._tell(at_once=True)
 
     def _jobs(self) -> Iterator[_Job]:
-        """Runs that are to be done; those that are there, or have no scene, are dealt with."""
+        """Yield the runs that are to be done, after noting those that are found, or have no scene, on the way."""
         for index, values in self._grid.points():
             try:
                 scene = self._make_scene(**values)
             except Exception as error:
-                self._keep(index, "", Record(FAILED, f"make_scene: {reason_of(error)}", {}), None)
+                self._book.add(index, "", Record(FAILED, f"make_scene: {reason_of(error)}", {}), None)
                 continue
             if not isinstance(scene, Scene):
                 raise InvalidValueError("make_scene", "return a Scene", type(scene).__name__)
-            scene = self._runs.shared(scene)
-            self.ends.add((scene.t_end, scene.save_every))
-            digest = self._runs.digest(scene)
-            record = self._store.find(digest, index)
-            if record is None:
-                yield _Job(index, digest, scene)
-            else:
-                self._found += 1
-                self._put(index, digest, record)
+            scene = self._keys.shared(scene)
+            key = self._keys.key(scene)
+            if self._book.look_up(index, key, scene):
                 self._tell()
+            else:
+                yield _Job(index, key, scene)
 
     def _collect(self, done: queue.SimpleQueue[Future], pending: dict[Future, _Job]) -> None:
-        """Take what is done, at least one, or say after a while that nothing is."""
+        """Take the runs that are done, at least one, or report after a while that none is."""
         try:
             found = [done.get(timeout=_BETWEEN)]
             while not done.empty():
@@ -357,18 +311,9 @@ class Sweeping:
                 continue
             # any other error means that the executor lost the run, or could not send it
             record = future.result() if error is None else Record(FAILED, reason_of(error), {})
-            self._keep(job.index, job.digest, record, job.scene)
+            self._book.add(job.index, job.key, record, job.scene)
         if self._ended:
             raise SweepError(self._ended)
-
-    def _keep(self, index: tuple[int, ...], digest: str, record: Record, scene: Scene | None) -> None:
-        if digest:
-            record = self._store.put(digest, index, record, scene)
-        self._put(index, digest, record)
-        self._new += 1
-        if record.status == FAILED:
-            self._failed += 1
-            self._reason = self._reason or f"{self._grid.words(index)}: {record.reason}"
 
     def _tell(self, at_once: bool = False) -> None:
         now = time.monotonic()

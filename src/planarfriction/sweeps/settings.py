@@ -19,7 +19,7 @@ from planarfriction.scenes import Scene
 from planarfriction.scenes.files import BODY_KEYS, CONTACT_KEYS, SCENE_KEYS, read_table, scene_from_dict
 
 MOST_VALUES = 1_000_000
-"""Values of a setting."""
+"""Largest number of values of a setting."""
 
 _BY_NAME = {"model": "kind", "surface": "kind", "law": "kind", "pressure": "law"}
 """Tables that may be written as a name alone, and the key that the name then has."""
@@ -30,11 +30,11 @@ _FAMILIES: dict[str, tuple[Family, str]] = {
     "patch": (SHAPES, "shape"),
     "surface": (SURFACES, "kind"),
 }
-"""Tables of a member of a family, and the key that says which."""
+"""Tables of a member of a family, and the key that names the member."""
 
 
 class Settable:
-    """A scene as a table, some of whose values change: each call makes the scene of some values."""
+    """Scene as a table whose values can be set: each call makes the scene of some values."""
 
     def __init__(
         self,
@@ -47,7 +47,7 @@ class Settable:
 
     @classmethod
     def of(cls, scene: Scene | str | Path, others: Sequence[str] = ()) -> Settable:
-        """The table of a scene, or of a scene file; `others` are names that messages list too.
+        """Read the table of a scene, or of a scene file; `others` are names that messages list too.
 
         Raises FileError for a file that holds no table.
         """
@@ -60,14 +60,14 @@ class Settable:
         return cls(table, str(path), path.parent)
 
     def __call__(self, **values: Any) -> Scene:
-        """The scene with these values, by their paths. Raises InvalidValueError for a path that leads nowhere."""
+        """Make the scene with values by their paths. Raises InvalidValueError for a path that leads nowhere."""
         table: Any = self._table
         for path, value in values.items():
             table = self._changed(table, path, value)
         return scene_from_dict(table, folder=self._folder, source=self._source)
 
     def check(self, values: Mapping[str, list[Any]]) -> None:
-        """Raise where neither the first nor the last of the values make a scene: then it is a path that is wrong."""
+        """Check that the first or the last of the values make a scene; if neither does, a path is wrong."""
         for path, each in values.items():
             self._changed(self._table, path, each[0])
         try:
@@ -91,7 +91,7 @@ class Settable:
 
     @staticmethod
     def _contacts(tables: list[Any]) -> list[str]:
-        """Names of the contacts, as a solution has them."""
+        """Return the names of the contacts, as a solution has them."""
         default = "contact" if len(tables) == 1 else "contact {}"
         given = [each.get("name") if isinstance(each, Mapping) else None for each in tables]
         return [str(name or default.format(number)) for number, name in enumerate(given, 1)]
@@ -103,7 +103,7 @@ def _tables(table: Mapping[str, Any]) -> list[Any]:
 
 
 def _set(table: Any, parts: list[str], value: Any, path: str, where: str, valid: Sequence[str] | None = None) -> Any:
-    """A copy of a table, or of a list, with a value changed; what does not change is shared."""
+    """Return a copy of a table, or of a list, with a value changed; other parts are shared."""
     key, *rest = parts
     if isinstance(table, list):
         if not (key.isdecimal() and int(key) < len(table)):
@@ -130,7 +130,7 @@ def _set(table: Any, parts: list[str], value: Any, path: str, where: str, valid:
 
 
 def _keys(key: str, table: Any) -> list[str] | None:
-    """Keys that a table may have, whether they are written or not; None: those that are."""
+    """Return the keys that a table may have, or None if only those that are written are known."""
     if key == "body":
         return list(BODY_KEYS)
     family, kind = _FAMILIES.get(key, (None, ""))
@@ -145,7 +145,7 @@ def _keys(key: str, table: Any) -> list[str] | None:
 
 
 def parse(text: str) -> tuple[str, dict[Any, Any]]:
-    """Path and values of `path=value`, `path=value,value,...` or `path=start:stop:count`; labels -> values.
+    """Parse `path=value`, `path=value,value,...` or `path=start:stop:count` into the path and values by label.
 
     A value is a number, true, false, a list in brackets, or a text.
 
@@ -168,7 +168,7 @@ def parse(text: str) -> tuple[str, dict[Any, Any]]:
 
 
 def parse_all(texts: Sequence[str]) -> dict[str, dict[Any, Any]]:
-    """What `parse` makes of several texts, each of another path."""
+    """Parse several texts, each with another path, into values by path and label."""
     found: dict[str, dict[Any, Any]] = {}
     for text in texts:
         path, values = parse(text)
@@ -179,7 +179,7 @@ def parse_all(texts: Sequence[str]) -> dict[str, dict[Any, Any]]:
 
 
 def _spaced(path: str, spelled: str) -> list[float]:
-    """Evenly spaced numbers, both ends included."""
+    """Return evenly spaced numbers, both ends included."""
     first, last, number = spelled.split(":")
     try:
         count = int(number)
@@ -196,7 +196,7 @@ def _spaced(path: str, spelled: str) -> list[float]:
 
 
 def _separated(spelled: str) -> list[str]:
-    """Pieces between commas that are in no brackets and no quotes."""
+    """Split at commas that are in no brackets and no quotes."""
     pieces, depth, quote = [""], 0, ""
     for letter in spelled:
         if letter in "\"'" and quote in ("", letter):

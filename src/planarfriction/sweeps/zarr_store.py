@@ -12,7 +12,7 @@ import numpy as np
 
 from planarfriction.errors import FileError, MissingExtraError
 from planarfriction.scenes.solution import History
-from planarfriction.sweeps.dataset import MISSING, OWN, check_names, difference, on_instants
+from planarfriction.sweeps.bookkeeping import OWN, Bookkeeper, Index, Outcome, check_names, difference, on_instants
 from planarfriction.sweeps.quantities import Grid
 from planarfriction.sweeps.records import FAILED, Record, failure, reason_of
 from planarfriction.writing import make_folder, put
@@ -23,28 +23,28 @@ if TYPE_CHECKING:
     from planarfriction.scenes import Scene
 
 _JOURNAL = "runs.jsonl"
-"""What says which runs are in the store: a line for each, written after its chunks. It lies in the folder of the array
-`run`, where readers of zarr do not look."""
+"""File with a line for each run that is in the store, written after its chunks. It lies in the folder of the array
+`run`, which readers of zarr do not list."""
 
 
-class ZarrStore:
-    """Runs as regions of the arrays of a store; finds again what the journal says is whole.
+class ZarrBookkeeper(Bookkeeper):
+    """Bookkeeper whose results are regions of the arrays of a store; runs count that its journal lists.
 
     The first run that is done decides which arrays there are.
     """
 
-    def __init__(self, path: Path, grid: Grid, time: np.ndarray | None) -> None:
+    def __init__(self, grid: Grid, time: np.ndarray | None, path: Path) -> None:
+        super().__init__(grid, time is not None)
         try:
             import zarr
         except ImportError:
             raise MissingExtraError("zarr", "sweep") from None
-        self.path, self.grid, self.damaged = path, grid, 0
-        self._time = time
+        self.path, self._time = path, time
         make_folder(path.parent)
         self._layout: dict[str, History] | None = None
         self._arrays: dict[str, Any] = {}
-        self._outcomes: dict[int, tuple[str, str, str]] = {}
-        """Place of a run in the grid -> its digest, its status, why it failed."""
+        self._listed: dict[Index, Outcome] = {}
+        """Outcomes in the journal."""
         try:
             self._group: Any = zarr.open_group(path, mode="a", zarr_format=3)
             self._begin()
@@ -57,13 +57,13 @@ class ZarrStore:
             self._journal.write(b"\n")
 
     def close(self) -> None:
-        """Let go of the journal."""
+        """Close the journal."""
         self._journal.close()
 
     # ------------------------------------------------------------------ arrays
 
     def _begin(self) -> None:
-        """Make the axes of what is swept, or see that the store has them, and read the journal."""
+        """Make the axes of the swept quantities, or check that the store has them, and read the journal."""
         names = sorted(self._group)
         if not names:
             for name, labels in self.grid.labels.items():
@@ -93,7 +93,7 @@ class ZarrStore:
                 raise FileError(f"{self.path}: holds a sweep with other instants: name another path")
 
     def _write(self, name: str, dims: tuple[str, ...], values: np.ndarray, attrs: Mapping[str, str]) -> None:
-        """Make an array in one chunk, or fill the one that is there."""
+        """Make an array in one chunk, or fill an existing one."""
         text = values.dtype.kind == "U"
         array = self._group.get(name)
         if array is None:
@@ -108,7 +108,7 @@ class ZarrStore:
         array[...] = values.astype(object) if text else values
 
     def _make(self, variables: Mapping[str, History]) -> None:
-        """Make the arrays for all runs, empty, from what the first one has left."""
+        """Make the empty arrays of all runs from the variables of the first one."""
         from zarr.codecs import Crc32cCodec, ZstdCodec
 
         check_names(self.grid, variables)
@@ -133,15 +133,17 @@ class ZarrStore:
 
     # ------------------------------------------------------------------ runs
 
-    def find(self, digest: str, index: tuple[int, ...]) -> Record | None:
-        """That the run is there, without its variables; None where it is not."""
-        there = self._outcomes.get(self._number(index))
-        if there is None or there[0] != digest or there[1] == FAILED:
+    def _find(self, index: Index, key: str) -> Record | None:
+        """Return the record of a run that is in the store, without its variables, or None."""
+        listed = self._listed.get(index)
+        if listed is None or listed.run != key or listed.status == FAILED:
             return None
-        return Record(there[1], "", {})
+        return Record(listed.status, "", {})
 
-    def put(self, digest: str, index: tuple[int, ...], record: Record, scene: Scene | None) -> Record:
-        """Write the chunks of a run, then the line that makes them count; returns what it is now."""
+    def _store(self, index: Index, key: str, record: Record, scene: Scene | None) -> Record:
+        """Write the chunks of a run, then the line that makes them count; returns the record as it counts."""
+        if not key:  # no scene was made
+            return record
         if record.status != FAILED:
             found = record.variables if self._time is None else on_instants(record, self._time)
             if self._layout is None:
@@ -156,49 +158,37 @@ class ZarrStore:
                         self._arrays[name][index] = values.astype(object) if values.dtype.kind == "U" else values
         if record.status == FAILED:
             folder = make_folder(self.path.with_suffix(".failed"))
-            put(str(folder / f"{digest}.json"), failure(record.reason, scene).encode())
-        number = self._number(index)
-        line = json.dumps([number, digest, record.status, record.reason])
+            put(str(folder / f"{key}.json"), failure(record.reason, scene).encode())
+        line = json.dumps([index, key, record.status, record.reason])
         self._journal.write(f"{line}\n".encode())
         return record
 
-    def note(self, index: tuple[int, ...], digest: str, record: Record) -> None:
-        """Remember how a run ended."""
-        self._outcomes[self._number(index)] = digest, record.status, record.reason
-
-    def _number(self, index: tuple[int, ...]) -> int:
-        return int(np.ravel_multi_index(index, self.grid.shape))
+    def _note(self, index: Index, key: str, record: Record) -> None:
+        self.outcomes[index] = Outcome(key, record.status, record.reason)
 
     def _read_journal(self) -> None:
-        """The last word on each run; a line that a kill has cut counts as no line."""
+        """Read the last outcome of each run; a line that a kill has cut counts as no line."""
         try:
             lines = (self.path / "run" / _JOURNAL).read_bytes().split(b"\n")
         except FileNotFoundError:
             return
         for line in lines:
             try:
-                number, digest, status, reason = json.loads(line)
-                if line:
-                    self._outcomes[int(number)] = str(digest), str(status), str(reason)
+                index, *outcome = json.loads(line)
+                self._listed[tuple(index)] = Outcome(*outcome)
             except (ValueError, TypeError):
                 continue
 
     def _ends_a_line(self) -> bool:
-        """Whether the journal ends as it should: a kill may have cut its last line."""
+        """Return True if the journal ends with a whole line: a kill may have cut the last one."""
         self._journal.seek(-1, os.SEEK_END)
         return self._journal.read() == b"\n"
 
-    # ------------------------------------------------------------------ the whole
-
     def dataset(self) -> xr.Dataset:
-        """Write how each run ended, and open everything: variables are read when they are looked at."""
+        """Write the outcomes of all runs, and open the store: variables are read on demand."""
         import xarray as xr
 
-        own = {name: np.full(self.grid.size, text, dtype=object) for name, text in (("run", ""), ("status", MISSING))}
-        own["failure"] = np.full(self.grid.size, "", dtype=object)
-        for number, outcome in self._outcomes.items():
-            for name, text in zip(("run", "status", "failure"), outcome, strict=True):
-                own[name][number] = text
-        for name, values in own.items():
-            self._write(name, tuple(self.grid.labels), values.reshape(self.grid.shape).astype(str), {})
+        self.outcomes = {**self._listed, **self.outcomes}  # an interrupted sweep does not reach all of the journal
+        for name, values in self._outcome_arrays().items():
+            self._write(name, tuple(self.grid.labels), values, {})
         return xr.open_zarr(self.path, chunks=None, consolidated=False)

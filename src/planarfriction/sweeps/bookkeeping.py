@@ -1,0 +1,268 @@
+"""Bookkeeping of a sweep: the outcome of each run, the files that keep its results, and the dataset of them all."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from planarfriction.errors import InvalidValueError
+from planarfriction.scenes.signal import SAME_TIME
+from planarfriction.scenes.solution import History
+from planarfriction.sweeps.quantities import Grid
+from planarfriction.sweeps.records import FAILED, Record, failure, pack, unpack
+from planarfriction.writing import make_folder, put
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from planarfriction.scenes import Scene
+
+MOST_NUMBERS = 2 * 10**9
+"""Largest number of numbers of one variable in memory: 16 GB."""
+
+MISSING = "missing"
+"""Status of a run that has not been done, in the dataset of an interrupted sweep."""
+
+OWN = {
+    "status": "how the run ended",
+    "failure": "why the run failed, empty where it did not",
+    "run": "digest of scene, measurement and library",
+}
+"""Variables of every sweep, with their descriptions."""
+
+Index = tuple[int, ...]
+"""Place of a run in the grid."""
+
+
+class Outcome(NamedTuple):
+    """End of a run, without its results."""
+
+    run: str
+    """Key of the run."""
+    status: str
+    """Status of its `Solution`, or "failed"."""
+    failure: str
+    """Reason of a failure in one line, or nothing."""
+
+
+class Bookkeeper:
+    """Outcomes and results of the runs of a sweep; this one keeps them in memory, others also on disk."""
+
+    def __init__(self, grid: Grid, timed: bool) -> None:
+        self.grid, self.timed = grid, timed
+        self.outcomes: dict[Index, Outcome] = {}
+        self.found = self.new = self.failed = self.damaged = 0
+        self.first_failure = ""
+        self._ends: set[tuple[float, float]] = set()
+        self._records: dict[Index, Record] = {}
+
+    def look_up(self, index: Index, key: str, scene: Scene) -> bool:
+        """Return True if the run with this key was done before, and take it over."""
+        self._ends.add((scene.t_end, scene.save_every))
+        record = self._find(index, key)
+        if record is not None:
+            self.found += 1
+            self._note(index, key, record)
+        return record is not None
+
+    def add(self, index: Index, key: str, record: Record, scene: Scene | None) -> None:
+        """Keep the record of a run that has just ended."""
+        record = self._store(index, key, record, scene)
+        self.new += 1
+        if record.status == FAILED:
+            self.failed += 1
+            self.first_failure = self.first_failure or f"{self.grid.words(index)}: {record.reason}"
+        self._note(index, key, record)
+
+    def close(self) -> None:
+        """Close what is open on disk."""
+
+    def dataset(self) -> xr.Dataset:
+        """Return the whole as one dataset; if the axis is the time, runs may have gone along it differently far."""
+        import xarray as xr
+
+        variables = self._results()
+        variables |= {
+            name: History(tuple(self.grid.labels), values, {"long_name": OWN[name]})
+            for name, values in self._outcome_arrays().items()
+        }
+        variables |= {name: ((name,), np.array(labels)) for name, labels in self.grid.labels.items()}
+        coordinates = [name for name, each in variables.items() if each[0] == (name,)]
+        return xr.Dataset(variables).set_coords(coordinates)
+
+    # ------------------------------------------------------------------ overridden by those that keep files
+
+    def _find(self, index: Index, key: str) -> Record | None:
+        """Return the record of a run that was done before, or None."""
+        return None
+
+    def _store(self, index: Index, key: str, record: Record, scene: Scene | None) -> Record:
+        """Write the record of a run; returns it as it counts."""
+        return record
+
+    def _note(self, index: Index, key: str, record: Record) -> None:
+        self.outcomes[index] = Outcome(key, record.status, record.reason)
+        self._records[index] = record
+
+    # ------------------------------------------------------------------ arrays
+
+    def _outcome_arrays(self) -> dict[str, np.ndarray]:
+        """Return the outcomes as arrays of texts over the grid."""
+        arrays = {name: np.full(self.grid.shape, "", dtype=object) for name in ("run", "status", "failure")}
+        arrays["status"][...] = MISSING
+        for index, outcome in self.outcomes.items():
+            for name, text in outcome._asdict().items():
+                arrays[name][index] = text
+        return {name: values.astype(str) for name, values in arrays.items()}
+
+    def _results(self) -> dict[str, Any]:
+        """Return the variables of all runs over the grid; a run that differs from the first one has failed."""
+        done = {index: each for index, each in self._records.items() if each.variables}
+        if not done:
+            return {}
+        first = done[min(done)].variables
+        time = None
+        if self.timed:
+            time = instants(self._ends)
+            first = on_instants(done[min(done)], time)
+        check_names(self.grid, first)
+        axes = [name for name, each in first.items() if each.dims == (name,)]
+        arrays = {name: self._empty(each, done) for name, each in first.items() if name not in axes}
+        for index in sorted(done):
+            found = done[index].variables if time is None else on_instants(done[index], time)
+            self._place(index, found, first, arrays)
+        variables: dict[str, Any] = {
+            name: History((*self.grid.labels, *first[name].dims), values, first[name].attrs)
+            for name, values in arrays.items()
+        }
+        return variables | {name: first[name] for name in axes}
+
+    def _empty(self, example: History, done: Mapping[Index, Record]) -> np.ndarray:
+        """Return an array for all runs whose entries say that they are missing."""
+        values = np.asarray(example.values)
+        shape = (*self.grid.shape, *values.shape)
+        if self.grid.size * values.size > MOST_NUMBERS:
+            rule = f"need at most {MOST_NUMBERS} numbers in memory (use a .zarr store as out, or measure less)"
+            raise InvalidValueError("values", rule, f"{self.grid.size} runs of {values.size}")
+        if values.dtype.kind == "U":
+            return np.full(shape, "", dtype=object)
+        complete = len(done) == self.grid.size
+        kind = values.dtype if complete or values.dtype.kind in "fc" else np.dtype(float)
+        return np.full(shape, np.nan if kind.kind in "fc" else 0, kind)
+
+    def _place(
+        self,
+        index: Index,
+        found: Mapping[str, History],
+        first: Mapping[str, History],
+        arrays: dict[str, np.ndarray],
+    ) -> None:
+        """Write the variables of a run into the arrays, or note that it failed."""
+        if differing := difference(found, first):
+            self.outcomes[index] = self.outcomes[index]._replace(status=FAILED, failure=differing)
+            return
+        for name, array in list(arrays.items()):
+            values = np.asarray(found[name].values)
+            if array.dtype.kind != "O" and not np.can_cast(values.dtype, array.dtype, "same_kind"):
+                arrays[name] = array = array.astype(np.result_type(array, values))
+            array[index] = values
+        self._records[index] = self._records[index]._replace(variables={})  # they are in the arrays now
+
+
+class FolderBookkeeper(Bookkeeper):
+    """Bookkeeper with a folder: one file for each run that is done, one of scene and reason for each that failed."""
+
+    def __init__(self, grid: Grid, timed: bool, path: str | Path) -> None:
+        super().__init__(grid, timed)
+        self._begin = f"{make_folder(path)}{os.sep}"
+
+    def _find(self, index: Index, key: str) -> Record | None:
+        """Read the file of a run; one that is not whole does not count."""
+        try:
+            with open(f"{self._begin}{key}.npz", "rb", buffering=0) as file:
+                content = file.read()
+        except OSError:
+            return None
+        try:
+            return unpack(content)
+        except Exception:  # whatever a damaged file does, the run is done again
+            self.damaged += 1
+            return None
+
+    def _store(self, index: Index, key: str, record: Record, scene: Scene | None) -> Record:
+        """Write the file of a run, which a kill leaves out or whole."""
+        if not key:  # no scene was made
+            return record
+        failed = f"{self._begin}{key}.failed.json"
+        if record.status == FAILED:
+            put(failed, failure(record.reason, scene).encode())
+            return record
+        put(f"{self._begin}{key}.npz", pack(record))
+        with contextlib.suppress(OSError):
+            os.unlink(failed)
+        return record
+
+
+# ---------------------------------------------------------------------- variables of a run in those of all
+
+
+def instants(ends: Iterable[tuple[float, float]]) -> np.ndarray:
+    """Return the times at which any of several runs records [s], from their ends and intervals."""
+    from planarfriction.scenes.options import recording_times
+
+    times = np.unique(np.concatenate([recording_times(*each) for each in sorted(set(ends))]))
+    return times[np.diff(times, prepend=-np.inf) > SAME_TIME]
+
+
+def on_instants(record: Record, time: np.ndarray) -> dict[str, History]:
+    """Return the variables of a run over common instants, NaN at those that it does not have.
+
+    A body that came to rest keeps its last values until its run would have ended.
+    """
+    own = np.asarray(record.variables["time"].values)
+    at = np.searchsorted(time, own - SAME_TIME)
+    on = (at < len(time)) & (np.abs(time[np.minimum(at, len(time) - 1)] - own) <= SAME_TIME)
+    result = {}
+    for name, each in record.variables.items():
+        if name == "time" or "time" not in each.dims:
+            result[name] = each
+            continue
+        values = np.asarray(each.values, dtype=float)
+        full = np.full((len(time), *values.shape[1:]), np.nan)
+        full[at[on]] = values[on]
+        if record.status == "at rest":
+            full[(time > own[-1]) & (time <= record.end + SAME_TIME)] = values[-1]
+        result[name] = each._replace(values=full)
+    result["time"] = record.variables["time"]._replace(values=time)
+    return result
+
+
+def check_names(grid: Grid, variables: Mapping[str, History]) -> None:
+    """Check that no swept quantity has the name of something else."""
+    taken = {*OWN, *variables, *(dim for each in variables.values() for dim in each.dims)}
+    for name in grid.labels:
+        if name in taken:
+            raise InvalidValueError("name of a swept quantity", "not be that of a variable or of its axis", name)
+    for name in OWN:
+        if name in variables:
+            raise InvalidValueError("measure", f"not return anything called {', '.join(OWN)}", name)
+
+
+def difference(found: Mapping[str, History], first: Mapping[str, History]) -> str:
+    """Return the reason why the variables of a run do not fit those of the first one, or nothing."""
+    if found.keys() != first.keys():
+        return f"measured {', '.join(found) or 'nothing'} where the first run has {', '.join(first)}"
+    for name, each in found.items():
+        mine, other = np.asarray(each.values), np.asarray(first[name].values)
+        if mine.shape != other.shape:
+            return f"{name} has shape {list(mine.shape)} where the first run has {list(other.shape)}"
+        if (mine.dtype.kind == "U") != (other.dtype.kind == "U"):
+            return f"{name} is {mine.dtype} where the first run has {other.dtype}"
+        if each.dims == (name,) and not np.array_equal(mine, other):
+            return f"the axis {name} differs from that of the first run: measure what has the same axes in all runs"
+    return ""
