@@ -247,8 +247,8 @@ def test_roll_outs_take_the_compiled_adjoint(monkeypatch):
     from planarfriction.torch import adjoint
 
     calls = []
-    original = adjoint.rollout
-    monkeypatch.setattr(adjoint, "rollout", lambda *inputs: calls.append(1) or original(*inputs))
+    original = adjoint.call
+    monkeypatch.setattr(adjoint, "call", lambda *inputs: calls.append(1) or original(*inputs))
     simulate(build(), profile(5), 1.0)
     assert calls
 

@@ -7,13 +7,14 @@ raised to a caller: NaN comes out where NaN went in, as from the operations of J
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import jax
 import numpy as np
 
 from planarfriction.derivatives.scene_function import SceneFunction
+from planarfriction.errors import FrictionError, InvalidValueError
 from planarfriction.formulas import LARGEST
 from planarfriction.tensors.operations import Arrays, RolloutOperation, SceneOperation
 
@@ -21,24 +22,32 @@ _PARAMETERS = 3
 """Index of the parameters among the inputs of a rollout: state, twist, load, parameters."""
 
 
+def _called(operation: Any, name: str, held: Arrays, inputs: Arrays, memory: Arrays, linear: Arrays, kept: bool):
+    """Return the results of a method of an operation, and what it keeps."""
+    if name == "run":
+        results, states = operation.run(held, inputs, kept)
+        return *results, *states
+    return operation.push(held, inputs, linear) if name == "push" else operation.pull(held, inputs, linear, memory)
+
+
 class HostScene(NamedTuple):
     """Motion and wrenches of a scene, of its numbers; fixed when a function is compiled."""
 
     function: SceneFunction
     inner, outer = SceneOperation.inner, SceneOperation.outer
-    like, keeps, strict = 0, False, True
-    first_only = "the motion of a scene has first derivatives only"
+    like, keeps = 0, False
 
     def shapes(self, numbers: Any) -> list[tuple[int, ...]]:
         """Return the shapes of motion and wrenches."""
         return [(*numbers.shape[:-1], *shape) for shape in self.function.results]
 
-    def host(self, name: str, outer: int, held: Arrays, inputs: Arrays, memory: Arrays, last: Arrays, kept: bool):
+    def refuse_if_strict(self, name: str, by_dt: bool) -> None:
+        """Raise FrictionError for a second derivative."""
+        raise FrictionError("the motion of a scene has first derivatives only")
+
+    def on_host(self, name: str, outer: int, *arrays: Any) -> Arrays:
         """Return the results of a method of `SceneOperation`."""
-        operation = SceneOperation(self.function)
-        if name == "run":
-            return operation.run(held, inputs, kept)[0]
-        return operation.push(held, inputs, last) if name == "push" else operation.pull(held, inputs, last, memory)
+        return _called(SceneOperation(self.function), name, *arrays)
 
 
 class HostRollout(NamedTuple):
@@ -58,105 +67,88 @@ class HostRollout(NamedTuple):
     strict: bool
     """True if a derivative that the adjoint does not have is an error, and not left to operations of JAX."""
     like, keeps = 1, True
-    first_only = "the adjoint gives first derivatives only: leave method out, or use 'eager', to differentiate twice"
-
-    @property
-    def inner(self) -> tuple[int, ...]:
-        """Number of inner axes of each input."""
-        return self.axes, 2, 1, 1
-
-    @property
-    def outer(self) -> tuple[int, ...]:
-        """Number of inner axes of last state and wrenches."""
-        return self.axes, 2
+    inner, outer = RolloutOperation.inner, RolloutOperation.outer
 
     def shapes(self, state: Any, twist: Any, load: Any, parameters: Any) -> list[tuple[int, ...]]:
         """Return the shapes of last state, wrenches and the states before each step."""
         return [state.shape, twist.shape, (*twist.shape[:-1], *state.shape[state.ndim - self.axes :])]
 
-    def refusal(self, by_dt: bool) -> tuple[str, str]:
-        """Return the name of an operand without derivative, and the rule for it."""
-        rule = (
-            "be held fixed with method='adjoint': differentiate with respect to the parameters, state, twist and "
-            "normal_force, or leave method out"
-        )
-        return "dt" if by_dt else self.leaf, rule
+    def refuse_if_strict(self, name: str, by_dt: bool) -> None:
+        """Raise FrictionError, if strict, for a derivative that the adjoint does not have."""
+        if self.strict and name == "run":
+            rule = (
+                "be held fixed with method='adjoint': differentiate with respect to the parameters, state, twist and "
+                "normal_force, or leave method out"
+            )
+            raise InvalidValueError("dt" if by_dt else self.leaf, rule, "a derivative of it")
+        if self.strict:
+            raise FrictionError(
+                "the adjoint gives first derivatives only: leave method out, or use 'eager', to differentiate twice"
+            )
 
     def by_operations(self, dt: Any, *arrays: Any) -> Any:
         """Return last state and wrenches by operations of JAX."""
         *held, state, twist, load, parameters = arrays
-        return self._model(held, tuple(parameters)).rollout(state, twist, load, dt)
+        return self._model(tuple(parameters), held).rollout(state, twist, load, dt)
 
-    def _model(self, held: Sequence[Any], parameters: Sequence[Any]) -> Any:
-        return jax.tree.unflatten(self.structure, [*parameters, *held])
-
-    def host(self, name: str, outer: int, held: Arrays, inputs: Arrays, memory: Arrays, last: Arrays, kept: bool):
-        """Return the results of a method of `RolloutOperation`, NaN for contacts without usable inputs."""
-
-        def run(operation: RolloutOperation, held: Arrays, inputs: Arrays) -> Sequence[np.ndarray]:
-            good, held, usable = _usable(operation, held, inputs)
-            results, states = operation.run(held, usable, kept)
-            return _spoilt(good, *results, *states)
-
-        def push(operation: RolloutOperation, held: Arrays, arrays: Arrays) -> Sequence[np.ndarray]:
-            good, held, usable = _usable(operation, held, arrays, operation.inner)
-            return _spoilt(good, *operation.push(held, usable[:4], usable[4:]))
-
-        def pull(operation: RolloutOperation, held: Arrays, arrays: Arrays) -> Sequence[np.ndarray]:
-            more = *operation.outer, *(1 + operation.axes for _ in memory)
-            good, held, usable = _usable(operation, held, arrays, more)
-            *found, slopes = operation.pull(held, usable[:4], usable[4:6], usable[6:])
-            lengths = usable[_PARAMETERS].shape[:-1]
-            shared = tuple(i for i, length in enumerate(lengths) if length == 1)
-            (slopes,) = _spoilt(np.asarray(good.all(axis=shared, keepdims=True)), slopes)
-            return *_spoilt(good, *found), slopes.reshape(arrays[_PARAMETERS].shape)
-
-        if name == "run":
-            return self._by_contact(run, outer, held, inputs)
-        if name == "push":  # the states before each step are not needed
-            return self._by_contact(push, outer, held, [*inputs, *last])
-        return self._by_contact(pull, outer, held, [*inputs, *last, *memory])
-
-    def _by_contact(self, function: Callable[..., Any], outer: int, held: Arrays, arrays: Arrays) -> Arrays:
-        """Return `function(operation, held, arrays)` of all contacts; one call each if what is held differs."""
-        lead = np.broadcast_shapes(*(value.shape[:outer] for value in (*held, *arrays)))
-        wide = [np.broadcast_to(value, (*lead, *value.shape[outer:])) for value in arrays]
-
-        def alone(index, arrays):
-            pack = lambda *leaves: self._model(leaves, [1.0] * self.parameters).compiled()  # noqa: E731
-            return function(RolloutOperation(pack, self.axes), [value[index] for value in held], arrays)
-
+    def on_host(
+        self, name: str, outer: int, held: Arrays, inputs: Arrays, memory: Arrays, linear: Arrays, kept: bool
+    ) -> Arrays:
+        """Return the results of a method of `RolloutOperation`, one call for each contact if what is held differs."""
+        numbers = inputs, memory, linear
+        lead = np.broadcast_shapes(*(value.shape[:outer] for value in (*held, *inputs, *memory, *linear)))
+        wide = [[np.broadcast_to(value, (*lead, *value.shape[outer:])) for value in each] for each in numbers]
         if all(value.shape[:outer] == (1,) * outer for value in held):
-            return alone((0,) * outer, wide)
+            return self._results(name, [value[(0,) * outer] for value in held], *wide, kept)
         held = [np.broadcast_to(value, (*lead, *value.shape[outer:])) for value in held]
-        found = [alone(index, [value[index] for value in wide]) for index in np.ndindex(lead)]
+        found = [
+            self._results(name, [value[i] for value in held], *([value[i] for value in each] for each in wide), kept)
+            for i in np.ndindex(lead)
+        ]
         return [np.stack(part).reshape(*lead, *part[0].shape) for part in zip(*found, strict=True)]
 
+    def _results(self, name: str, held: Arrays, inputs: Arrays, memory: Arrays, linear: Arrays, kept: bool) -> Arrays:
+        """Return the results of a method, NaN for contacts that are not given numbers."""
+        operation = RolloutOperation(lambda *leaves: self._model([1.0] * self.parameters, leaves).compiled(), self.axes)
+        shape, memory = inputs[_PARAMETERS].shape, memory if name == "pull" else []  # `push` does not need it
+        inner = self.inner, (1 + self.axes,) * len(memory), self.inner if name == "push" else self.outer
+        good, numbers = _usable(self.axes, (inputs, memory, linear), inner)
+        good, dt = good & (held[0] <= LARGEST), held[0] if held[0] <= LARGEST else 0.0
+        found = _called(operation, name, [dt, *held[1:]], *numbers, kept)
+        if name != "pull":
+            return [_spoilt(good, value) for value in found]
+        *found, slopes = found
+        shared = tuple(i for i, length in enumerate(slopes.shape[:-1]) if length == 1)
+        slopes = _spoilt(np.asarray(good.all(axis=shared, keepdims=True)), slopes)
+        return [*(_spoilt(good, value) for value in found), slopes.reshape(shape)]
 
-def _usable(operation: RolloutOperation, held: Arrays, arrays: Arrays, more: tuple[int, ...] = ()):
-    """Return True for contacts that are given numbers, `[...]`, what is held, and all arrays with harmless numbers.
+    def _model(self, parameters: Sequence[Any], held: Sequence[Any]) -> Any:
+        return jax.tree.unflatten(self.structure, [*parameters, *held])
 
-    `more` are the inner axes of the arrays behind the inputs. Parameters, and changes of them, get axes of length 1 for
-    the batch axes that only contacts have.
+
+def _usable(axes: int, numbers: Sequence[Arrays], inner: Sequence[Sequence[int]]) -> tuple[np.ndarray, list[list[Any]]]:
+    """Return True for contacts that are given numbers, `[...]`, and all arrays, with harmless numbers for the others.
+
+    Parameters, and changes of them, get axes of length 1 for the batch axes that only contacts have.
     """
-    inner, wide = (*operation.inner, *more), list(arrays)
-    own = wide[0].ndim - operation.axes - (wide[_PARAMETERS].ndim - 1)
-    for i in (_PARAMETERS, _PARAMETERS + 4) if more == operation.inner else (_PARAMETERS,):
-        wide[i] = wide[i].reshape(*wide[i].shape[:-1], *(1,) * own, wide[i].shape[-1])
-    fit = [(np.abs(value) <= LARGEST).all(axis=tuple(range(-axes, 0))) for value, axes in zip(wide, inner, strict=True)]
-    good = functools.reduce(np.logical_and, fit) & (held[0] <= LARGEST)
-    if good.all():
-        return good, held, wide
-    harmless = [0.5 if i == _PARAMETERS else 0.0 for i in range(len(wide))]
-    usable = [
-        np.where(own.reshape(own.shape + (1,) * axes), value, number)
-        for own, value, axes, number in zip(fit, wide, inner, harmless, strict=True)
-    ]
-    return good, [held[0] if held[0] <= LARGEST else 0.0, *held[1:]], usable
+    (state, *_, parameters), found, fit = numbers[0], [], []
+    own = (1,) * (state.ndim - axes - (parameters.ndim - 1))
+    for each, of_each in zip(numbers, inner, strict=True):
+        found.append([])
+        for i, (value, count) in enumerate(zip(each, of_each, strict=len(each) > 0)):
+            if i == _PARAMETERS:
+                value = value.reshape(*value.shape[:-1], *own, value.shape[-1])
+            fits = (np.abs(value) <= LARGEST).all(axis=tuple(range(-count, 0)))
+            fit.append(fits)
+            harmless = 0.5 if i == _PARAMETERS and each is numbers[0] else 0.0
+            found[-1].append(
+                value if fits.all() else np.where(fits.reshape(fits.shape + (1,) * count), value, harmless)
+            )
+    return functools.reduce(np.logical_and, fit), found
 
 
-def _spoilt(good: np.ndarray, *results: np.ndarray) -> list[np.ndarray]:
-    """Return the results, NaN for contacts that are not good."""
-    if good.all():
-        return list(results)
-    return [np.where(good.reshape(good.shape + (1,) * (r.ndim - good.ndim)), r, np.nan) for r in results]
+def _spoilt(good: np.ndarray, result: np.ndarray) -> np.ndarray:
+    """Return the result, NaN for contacts that are not good."""
+    return (
+        result if good.all() else np.where(good.reshape(good.shape + (1,) * (result.ndim - good.ndim)), result, np.nan)
+    )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from typing import Any
 
 _SAME = (
@@ -13,18 +12,26 @@ _SAME = (
 """Functions that PyTorch and JAX have with the same name and the same leading arguments."""
 
 
-class Namespace(ABC):
-    """Operations on the arrays of one library, as formulas and checks of inputs need them."""
+class Namespace:
+    """Operations on the arrays of one library, as formulas and checks of inputs need them; some are the library's own:
 
-    def __init__(self, library: Any) -> None:
+    - `broadcast_arrays(*arrays)`; `stop_gradient(x)`, a constant for differentiation; `integers(x)`, towards zero
+    - `real(name, value, like=None)`: an array of real numbers, which keeps its precision and its device. Anything else
+      takes both from `like`, if given; InvalidValueError if it is not numeric.
+    - `extremes(name, value)`: smallest and largest number, or None if there is none to read without waiting;
+      InvalidValueError outside the range of `validation.within_range`.
+    - `to_numpy(value)`, where anything but an array of the library stays; `from_numpy(array, like)`, a copy with the
+      number type and the device of `like`
+    - `widened(x)`, numbers of a step in the precision in which the library computes it; `narrowed(result, *inputs)`,
+      its result in the precision of the inputs
+    """
+
+    def __init__(self, library: Any, **own: Any) -> None:
         self._where = library.where
-        for name in _SAME:
-            setattr(self, name, getattr(library, name))
+        vars(self).update({name: getattr(library, name) for name in _SAME}, **own)
 
     def __getattr__(self, name: str) -> Any:
         raise AttributeError(f"the array namespace has no {name}")
-
-    # ------------------------------------------------------------------ operations
 
     def where(self, condition: Any, a: Any, b: Any) -> Any:
         """Return `a` where the condition holds, else `b`; a plain bool selects one of them as it is."""
@@ -69,47 +76,3 @@ class Namespace(ABC):
     def epsilon(self, x: Any) -> float:
         """Return the rounding error of the number type of `x`."""
         return float(self.finfo(x.dtype).eps)
-
-    @abstractmethod
-    def broadcast_arrays(self, *arrays: Any) -> Any:
-        """Return the arrays with one common shape."""
-
-    @abstractmethod
-    def stop_gradient(self, x: Any) -> Any:
-        """Return the value as a constant for differentiation."""
-
-    @abstractmethod
-    def integers(self, x: Any) -> Any:
-        """Return the numbers rounded towards zero, of an integer type that indexes arrays."""
-
-    # ------------------------------------------------------------------ inputs and results
-
-    @abstractmethod
-    def real(self, name: str, value: Any, like: Any = None) -> Any:
-        """Return `value` as an array of real numbers; an array keeps its precision and its device.
-
-        Anything else takes both from `like`, if it is given. Raises InvalidValueError if `value` is not numeric.
-        """
-
-    @abstractmethod
-    def extremes(self, name: str, value: Any) -> tuple[float, float] | None:
-        """Return the smallest and the largest number, or None if there is none to read without waiting.
-
-        Raises InvalidValueError for numbers outside the range of `validation.within_range`.
-        """
-
-    @abstractmethod
-    def to_numpy(self, value: Any) -> Any:
-        """Return an array of the library as a NumPy array, anything else unchanged."""
-
-    @abstractmethod
-    def from_numpy(self, array: Any, like: Any) -> Any:
-        """Return a copy of a NumPy array, with the number type and the device of `like`."""
-
-    def widened(self, x: Any) -> Any:
-        """Return the numbers of a step in the precision in which the library computes it."""
-        return x
-
-    def narrowed(self, result: Any, *inputs: Any) -> Any:
-        """Return the result of a step in the precision of its inputs."""
-        return result

@@ -7,6 +7,7 @@ from torch import Tensor
 
 from planarfriction.errors import InvalidValueError
 from planarfriction.tensors import rollouts
+from planarfriction.tensors.operations import RolloutOperation
 from planarfriction.tensors.rollouts import Rollout
 from planarfriction.torch import adjoint
 from planarfriction.torch.base import Compiled, FrictionModule
@@ -46,8 +47,8 @@ def rollout(
     if method == "eager" or obstacle or compiled is None:
         return Rollout(*model.rollout(*inputs, parameters=parameters))
     start, twist, load, step = inputs
-    vector, axes = model._vector(parameters), len(model.state_shape)
-    return Rollout(*adjoint.rollout(compiled, axes, start, twist, load, vector, step))
+    operation, held = RolloutOperation(compiled.pack, len(model.state_shape)), (step, *compiled.buffers)
+    return Rollout(*adjoint.call(operation, held, start, twist, load, model._vector(parameters)))
 
 
 def _obstacle(model: FrictionModule, compiled: Compiled | None, *tensors: Tensor) -> str:
