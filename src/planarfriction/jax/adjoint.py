@@ -17,7 +17,7 @@ from jax.core import ShapedArray
 from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 
-from planarfriction.jax.callbacks import HostRollout
+from planarfriction.jax.callbacks import HostRollout, Numbers
 
 _host = Primitive("planarfriction_host")
 _host.multiple_results = True
@@ -67,8 +67,8 @@ def _apply(*operands, operation, name: str, outer: int, kept: bool) -> list[jax.
 
     def on_host(*arrays) -> tuple[np.ndarray, ...]:
         held, *numbers = _split([np.asarray(array) for array in arrays], operation, name, kept)
-        inputs, memory, linear = ([np.asarray(array, float) for array in each] for each in numbers)
-        results = operation.on_host(name, outer, held, inputs, memory, linear, kept)
+        numbers = Numbers(*([np.asarray(array, float) for array in each] for each in numbers))
+        results = operation.on_host(name, outer, held, numbers, kept)
         return tuple(value.astype(of.dtype) for value, of in zip(results, found, strict=True))
 
     return jax.pure_callback(on_host, [jax.ShapeDtypeStruct(of.shape, of.dtype) for of in found], *operands)

@@ -22,8 +22,19 @@ _PARAMETERS = 3
 """Index of the parameters among the inputs of a rollout: state, twist, load, parameters."""
 
 
-def _called(operation: Any, name: str, held: Arrays, inputs: Arrays, memory: Arrays, linear: Arrays, kept: bool):
+class Numbers(NamedTuple):
+    """Operands in double precision that are not held."""
+
+    inputs: Arrays
+    memory: Arrays
+    """Arrays that `run` kept for `pull`, if any."""
+    linear: Arrays
+    """Changes of the inputs, or cotangents of the results."""
+
+
+def _called(operation: Any, name: str, held: Arrays, numbers: Numbers, kept: bool) -> Arrays:
     """Return the results of a method of an operation, and what it keeps."""
+    inputs, memory, linear = numbers
     if name == "run":
         results, states = operation.run(held, inputs, kept)
         return *results, *states
@@ -45,9 +56,9 @@ class HostScene(NamedTuple):
         """Raise FrictionError for a second derivative."""
         raise FrictionError("the motion of a scene has first derivatives only")
 
-    def on_host(self, name: str, outer: int, *arrays: Any) -> Arrays:
+    def on_host(self, name: str, outer: int, held: Arrays, numbers: Numbers, kept: bool) -> Arrays:
         """Return the results of a method of `SceneOperation`."""
-        return _called(SceneOperation(self.function), name, *arrays)
+        return _called(SceneOperation(self.function), name, held, numbers, kept)
 
 
 class HostRollout(NamedTuple):
@@ -91,64 +102,60 @@ class HostRollout(NamedTuple):
         *held, state, twist, load, parameters = arrays
         return self._model(tuple(parameters), held).rollout(state, twist, load, dt)
 
-    def on_host(
-        self, name: str, outer: int, held: Arrays, inputs: Arrays, memory: Arrays, linear: Arrays, kept: bool
-    ) -> Arrays:
+    def on_host(self, name: str, outer: int, held: Arrays, numbers: Numbers, kept: bool) -> Arrays:
         """Return the results of a method of `RolloutOperation`, one call for each contact if what is held differs."""
-        numbers = inputs, memory, linear
-        lead = np.broadcast_shapes(*(value.shape[:outer] for value in (*held, *inputs, *memory, *linear)))
+        lead = np.broadcast_shapes(*(value.shape[:outer] for each in (held, *numbers) for value in each))
         wide = [[np.broadcast_to(value, (*lead, *value.shape[outer:])) for value in each] for each in numbers]
         if all(value.shape[:outer] == (1,) * outer for value in held):
-            return self._results(name, [value[(0,) * outer] for value in held], *wide, kept)
+            return self._results(name, [value[(0,) * outer] for value in held], Numbers(*wide), kept)
         held = [np.broadcast_to(value, (*lead, *value.shape[outer:])) for value in held]
         found = [
-            self._results(name, [value[i] for value in held], *([value[i] for value in each] for each in wide), kept)
+            self._results(name, [v[i] for v in held], Numbers(*([v[i] for v in each] for each in wide)), kept)
             for i in np.ndindex(lead)
         ]
         return [np.stack(part).reshape(*lead, *part[0].shape) for part in zip(*found, strict=True)]
 
-    def _results(self, name: str, held: Arrays, inputs: Arrays, memory: Arrays, linear: Arrays, kept: bool) -> Arrays:
+    def _results(self, name: str, held: Arrays, numbers: Numbers, kept: bool) -> Arrays:
         """Return the results of a method, NaN for contacts that are not given numbers."""
         operation = RolloutOperation(lambda *leaves: self._model([1.0] * self.parameters, leaves).compiled(), self.axes)
-        shape, memory = inputs[_PARAMETERS].shape, memory if name == "pull" else []  # `push` does not need it
-        inner = self.inner, (1 + self.axes,) * len(memory), self.inner if name == "push" else self.outer
-        good, numbers = _usable(self.axes, (inputs, memory, linear), inner)
+        numbers = numbers if name == "pull" else numbers._replace(memory=())
+        inner = self.inner, (1 + self.axes,) * len(numbers.memory), self.inner if name == "push" else self.outer
+        good, usable = _usable(self.axes, numbers, inner)
         good, dt = good & (held[0] <= LARGEST), held[0] if held[0] <= LARGEST else 0.0
-        found = _called(operation, name, [dt, *held[1:]], *numbers, kept)
+        found = _called(operation, name, [dt, *held[1:]], usable, kept)
         if name != "pull":
             return [_spoilt(good, value) for value in found]
         *found, slopes = found
         shared = tuple(i for i, length in enumerate(slopes.shape[:-1]) if length == 1)
         slopes = _spoilt(np.asarray(good.all(axis=shared, keepdims=True)), slopes)
-        return [*(_spoilt(good, value) for value in found), slopes.reshape(shape)]
+        return [*(_spoilt(good, value) for value in found), slopes.reshape(numbers.inputs[_PARAMETERS].shape)]
 
     def _model(self, parameters: Sequence[Any], held: Sequence[Any]) -> Any:
         return jax.tree.unflatten(self.structure, [*parameters, *held])
 
 
-def _usable(axes: int, numbers: Sequence[Arrays], inner: Sequence[Sequence[int]]) -> tuple[np.ndarray, list[list[Any]]]:
+def _usable(axes: int, numbers: Numbers, inner: Sequence[Sequence[int]]) -> tuple[np.ndarray, Numbers]:
     """Return True for contacts that are given numbers, `[...]`, and all arrays, with harmless numbers for the others.
 
     Parameters, and changes of them, get axes of length 1 for the batch axes that only contacts have.
     """
-    (state, *_, parameters), found, fit = numbers[0], [], []
+    (state, *_, parameters), found, fit = numbers.inputs, [], []
     own = (1,) * (state.ndim - axes - (parameters.ndim - 1))
     for each, of_each in zip(numbers, inner, strict=True):
         found.append([])
         for i, (value, count) in enumerate(zip(each, of_each, strict=len(each) > 0)):
             if i == _PARAMETERS:
                 value = value.reshape(*value.shape[:-1], *own, value.shape[-1])
-            fits = (np.abs(value) <= LARGEST).all(axis=tuple(range(-count, 0)))
-            fit.append(fits)
-            harmless = 0.5 if i == _PARAMETERS and each is numbers[0] else 0.0
-            found[-1].append(
-                value if fits.all() else np.where(fits.reshape(fits.shape + (1,) * count), value, harmless)
-            )
-    return functools.reduce(np.logical_and, fit), found
+            fit.append((np.abs(value) <= LARGEST).all(axis=tuple(range(-count, 0))))
+            if not fit[-1].all():
+                harmless = 0.5 if i == _PARAMETERS and each is numbers.inputs else 0.0
+                value = np.where(fit[-1].reshape(fit[-1].shape + (1,) * count), value, harmless)
+            found[-1].append(value)
+    return functools.reduce(np.logical_and, fit), Numbers(*found)
 
 
 def _spoilt(good: np.ndarray, result: np.ndarray) -> np.ndarray:
     """Return the result, NaN for contacts that are not good."""
-    return (
-        result if good.all() else np.where(good.reshape(good.shape + (1,) * (result.ndim - good.ndim)), result, np.nan)
-    )
+    if good.all():
+        return result
+    return np.where(good.reshape(good.shape + (1,) * (result.ndim - good.ndim)), result, np.nan)

@@ -40,19 +40,21 @@ class RolloutOperation(NamedTuple):
 
     def run(self, held: Arrays, inputs: Arrays, keep: bool) -> tuple[Arrays, Arrays]:
         """Return the last state and the wrenches, and with `keep` the states before each step."""
-        (*state_twist_load, parameters), roll = inputs, derivatives.rollout_states if keep else derivatives.rollout
-        found = roll(self.pack(*held[1:]), *state_twist_load, float(held[0]), parameters=parameters)
+        state, twist, load, parameters = inputs
+        roll = derivatives.rollout_states if keep else derivatives.rollout
+        found = roll(self.pack(*held[1:]), state, twist, load, float(held[0]), parameters=parameters)
         return found[:2], found[2:]
 
     def push(self, held: Arrays, inputs: Arrays, changes: Arrays) -> Arrays:
         """Return the changes of the last state and of the wrenches."""
-        model, dt = self.pack(*held[1:]), float(held[0])
-        return derivatives.rollout_jvp(model, *inputs[:3], dt, *changes, parameters=inputs[3])[2:]
+        (state, twist, load, parameters), model = inputs, self.pack(*held[1:])
+        return derivatives.rollout_jvp(model, state, twist, load, float(held[0]), *changes, parameters=parameters)[2:]
 
     def pull(self, held: Arrays, inputs: Arrays, bars: Arrays, kept: Arrays) -> Arrays:
         """Return the cotangents of state, twist, load and parameters."""
-        model, dt, more = self.pack(*held[1:]), float(held[0]), {"parameters": inputs[3], "states": (*kept, None)[0]}
-        return derivatives.rollout_vjp(model, *inputs[:3], dt, bars[1], bars[0], **more)
+        (state, twist, load, parameters), model = inputs, self.pack(*held[1:])
+        more = {"parameters": parameters, "states": kept[0] if kept else None}
+        return derivatives.rollout_vjp(model, state, twist, load, float(held[0]), bars[1], bars[0], **more)
 
 
 class SceneOperation(NamedTuple):
