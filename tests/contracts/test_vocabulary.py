@@ -73,7 +73,7 @@ def test_rollouts_share_their_arguments_and_first_results():
         assert positional(end.rollout) == ["model", *ARGUMENTS], end
         assert inspect.signature(end.rollout).parameters["parameters"].default is None, end
         results = inspect.signature(end.rollout).return_annotation
-        assert results == "Rollout", end
+        assert results.split("[")[0] == "Rollout", end
     assert positional(ends[1].tracking_loss) == ["model", *ARGUMENTS, "wrenches"]
     for rollout in (pf.derivatives.Rollout, ends[1].Rollout, ends[2].Rollout):
         assert rollout._fields == ("state", "wrenches")

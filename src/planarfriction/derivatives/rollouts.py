@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -25,14 +25,16 @@ from planarfriction.families import MODELS
 from planarfriction.kernels.rollouts import Bars
 from planarfriction.models import FrictionModel
 
+ArrayT = TypeVar("ArrayT")
+
 
 @by_parts
-class Rollout(NamedTuple):
-    """Result of stepping a model through T twists and loads."""
+class Rollout(NamedTuple, Generic[ArrayT]):
+    """Result of stepping a model through T twists and loads, as arrays of NumPy, PyTorch or JAX."""
 
-    state: np.ndarray
+    state: ArrayT
     """State after the last step, `[..., *state_shape]`."""
-    wrenches: np.ndarray
+    wrenches: ArrayT
     """Wrench on the moving body at the end of each step, `[..., T, 3]` [N, N, N m]."""
 
 
@@ -102,7 +104,9 @@ class RolloutVJP(NamedTuple):
     """Gradient with respect to the parameters, `[..., P]` [1/unit of each]."""
 
 
-def rollout(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, *, parameters: Any = None) -> Rollout:
+def rollout(
+    model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, *, parameters: Any = None
+) -> Rollout[np.ndarray]:
     """Step a model from `state` (None: at rest) through `twist` `[..., T, 3]`, each held for `dt` [s].
 
     The steps are those of `model.step`. `normal_force` broadcasts with `[..., T]`: one number, one for each step, or
@@ -267,7 +271,7 @@ def _roll(inputs: RolloutInputs, kept: int) -> tuple[np.ndarray, np.ndarray, np.
     return end, inputs.of_all(inputs.parts[0].turned(wrenches)), states
 
 
-def _stepped(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any) -> Rollout:
+def _stepped(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any) -> Rollout[np.ndarray]:
     """Step any model, which checks the numbers itself."""
     state = model.rest() if state is None else validation.numbers("state", state)
     twist, load, dt = sequences(twist, normal_force, dt)

@@ -12,12 +12,12 @@ try:
 except ImportError as error:
     raise MissingExtraError("jax", "jax") from error
 
+from planarfriction.derivatives import Rollout
 from planarfriction.jax.distributed import DistributedModel, LawParameters
 from planarfriction.jax.published import PublishedParameters, ReducedModelPublished, Surface
 from planarfriction.jax.reduced import ReducedModel, ReducedParameters
 from planarfriction.jax.rollouts import rate, rest, rollout, step, wrench
 from planarfriction.jax.scene import simulate_scene
-from planarfriction.tensors.rollouts import Rollout
 from planarfriction.tensors.scenes import SceneMotion
 
 __all__ = [

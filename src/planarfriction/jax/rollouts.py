@@ -7,11 +7,11 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 
+from planarfriction.derivatives import Rollout
 from planarfriction.errors import InvalidValueError
 from planarfriction.jax import adjoint
 from planarfriction.jax.base import FrictionPytree
 from planarfriction.tensors import rollouts
-from planarfriction.tensors.rollouts import Rollout
 
 
 def rest(model: FrictionPytree) -> jax.Array:
@@ -43,7 +43,7 @@ def rollout(
     *,
     parameters: Any = None,
     method: str | None = None,
-) -> Rollout:
+) -> Rollout[jax.Array]:
     """Step a model from `state` (None: at rest) through `twist` `[..., T, 3]`, each held for `dt` [s].
 
     `normal_force` broadcasts with `[..., T]`: one number, one for each step `[T]`, or one for each contact `[..., 1]`.

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 from planarfriction import validation
-from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
 from planarfriction.tensors.inputs import broadcast, finite, non_negative, shaped
@@ -15,34 +14,12 @@ METHODS = ("adjoint", "eager")
 """The compiled rollout with its discrete adjoint; each step as operations of the tensor library."""
 
 
-@by_parts
-class Rollout(NamedTuple):
-    """Result of stepping a model through T twists and loads."""
-
-    state: Any
-    """State after the last step, `[..., *state_shape]`."""
-    wrenches: Any
-    """Wrench on the moving body at the end of each step, `[..., T, 3]` [N, N, N m]."""
-
-
-class RolloutInputs(NamedTuple):
-    """Checked inputs of a rollout, as arrays whose batch axes broadcast."""
-
-    state: Any
-    """State before the first step, `[..., *state_shape]`."""
-    twist: Any
-    """`[..., T, 3]`"""
-    normal_force: Any
-    """`[..., T]`"""
-    dt: Any
-
-
 def checked(
     model: TensorModel, kind: type, front: str, state: Any, twist: Any, normal_force: Any, dt: Any, method: str | None
-) -> RolloutInputs:
-    """Return the inputs of a rollout of a model, which must be of the front end's `kind`, from `state` (None: at rest).
+) -> tuple[Any, Any, Any, Any]:
+    """Return state (at rest if None), twist `[..., T, 3]`, load `[..., T]` and dt, whose batch axes broadcast.
 
-    Raises InvalidValueError, naming the input.
+    Raises InvalidValueError for a model that is not of the front end's `kind`, and for wrong input, by its name.
     """
     if not isinstance(model, kind):
         given = f"{type(model).__module__}.{type(model).__name__}"
@@ -63,4 +40,4 @@ def checked(
     batch = start.shape[: start.ndim - len(inner)]
     shapes = {"state": (*batch, 1), "twist": twist.shape[:-1], "normal_force": load.shape}
     broadcast(xp, "batch axes", "broadcast", shapes)
-    return RolloutInputs(start, twist, xp.broadcast_to(load, shape), dt)
+    return start, twist, xp.broadcast_to(load, shape), dt

@@ -10,7 +10,7 @@ except ImportError:
 
     raise MissingExtraError("torch", "torch") from None
 
-from planarfriction.tensors.rollouts import Rollout
+from planarfriction.derivatives import Rollout
 from planarfriction.tensors.scenes import SceneMotion
 from planarfriction.torch.distributed import DistributedModel
 from planarfriction.torch.published import ReducedModelPublished

@@ -5,10 +5,10 @@ from __future__ import annotations
 import torch
 from torch import Tensor
 
+from planarfriction.derivatives import Rollout
 from planarfriction.errors import InvalidValueError
 from planarfriction.tensors import rollouts
 from planarfriction.tensors.operations import RolloutOperation
-from planarfriction.tensors.rollouts import Rollout
 from planarfriction.torch import adjoint
 from planarfriction.torch.base import Compiled, FrictionModule
 
@@ -22,7 +22,7 @@ def rollout(
     *,
     parameters: Tensor | None = None,
     method: str | None = None,
-) -> Rollout:
+) -> Rollout[Tensor]:
     """Step a model from `state` (None: at rest) through `twist` `[..., T, 3]`, each held for `dt` [s].
 
     `normal_force` broadcasts with `[..., T]`: one number, one for each step `[T]`, or one for each contact `[..., 1]`.
@@ -36,17 +36,17 @@ def rollout(
     """
     front = "planarfriction.torch"
     inputs = rollouts.checked(model, FrictionModule, front, state, twist, normal_force, dt, method)
-    if inputs.dt.ndim:
-        raise InvalidValueError("dt", "be one number", f"shape {list(inputs.dt.shape)}")
-    if inputs.twist.shape[-2] == 0:
-        raise InvalidValueError("twist", "have T > 0 steps", f"shape {list(inputs.twist.shape)}")
+    start, twist, load, step = inputs
+    if step.ndim:
+        raise InvalidValueError("dt", "be one number", f"shape {list(step.shape)}")
+    if twist.shape[-2] == 0:
+        raise InvalidValueError("twist", "have T > 0 steps", f"shape {list(twist.shape)}")
     compiled = model.compiled()
     obstacle = _obstacle(model, compiled, *inputs)
     if method == "adjoint" and obstacle:
         raise InvalidValueError("method", f"be 'eager' {obstacle}", repr(method))
     if method == "eager" or obstacle or compiled is None:
         return Rollout(*model.rollout(*inputs, parameters=parameters))
-    start, twist, load, step = inputs
     operation, held = RolloutOperation(compiled.pack, len(model.state_shape)), (step, *compiled.buffers)
     return Rollout(*adjoint.call(operation, held, start, twist, load, model._vector(parameters)))
 
