@@ -42,13 +42,13 @@ class PhysicalParameters(nn.Module):
     scale: Tensor
     """Physical size of a raw step of 1, where it has one, `[P]`."""
     places: Tensor
-    """Where the raw numbers stand in the vector, `[number of trainable ones]`."""
+    """Indices of the raw numbers in the vector, `[number of trainable ones]`."""
     grows: Tensor
-    """Which values are `p_0 exp(w)`, bool `[P]`."""
+    """True for values that are `p_0 exp(w)`, `[P]`."""
     moves: Tensor
-    """Which values are `p_0 + scale w`, bool `[P]`."""
+    """True for values that are `p_0 + scale w`, `[P]`."""
     folds: Tensor
-    """Which values are `scale |w|`, bool `[P]`."""
+    """True for values that are `scale |w|`, `[P]`."""
 
     def __init__(self, values: Mapping[str, float], trainable: Iterable[str], **kind):
         super().__init__()
@@ -84,7 +84,7 @@ class PhysicalParameters(nn.Module):
                 self.raw[name].fill_(raw)
 
     def forward(self) -> Tensor:
-        """The physical values `[P]`, in the order of `names`."""
+        """Return the physical values `[P]`, in the order of `names`."""
         if "mu_c" in self.raw and "mu_s" not in self.raw:
             seen = xp.extremes("mu_c", self.raw["mu_c"])
             if seen is not None and seen[0] <= 0.0:  # beyond 0 it goes down again
@@ -118,7 +118,7 @@ class PhysicalParameters(nn.Module):
 
 
 def _raw(name: str, values: Mapping[str, float], *, fixed_static: bool) -> tuple[float, float]:
-    """Scale and raw number of a value; a value of zero takes a natural size as its scale."""
+    """Return scale and raw number of a value; a value of zero takes a natural size as its scale."""
     value, mu_c = values[name], values["mu_c"]
     if name == "mu_s" or (name == "mu_c" and fixed_static):
         excess = (values["mu_s"] - mu_c) / mu_c
