@@ -48,7 +48,8 @@ class RolloutOperation(NamedTuple):
     def push(self, held: Arrays, inputs: Arrays, changes: Arrays) -> Arrays:
         """Return the changes of the last state and of the wrenches."""
         (state, twist, load, parameters), model = inputs, self.pack(*held[1:])
-        return derivatives.rollout_jvp(model, state, twist, load, float(held[0]), *changes, parameters=parameters)[2:]
+        tangent = derivatives.RolloutTangent(*changes)
+        return derivatives.rollout_jvp(model, state, twist, load, float(held[0]), tangent, parameters=parameters)[2:]
 
     def pull(self, held: Arrays, inputs: Arrays, bars: Arrays, kept: Arrays) -> Arrays:
         """Return the cotangents of state, twist, load and parameters."""
