@@ -11,8 +11,9 @@ from scipy.optimize import fsolve
 
 import planarfriction as pf
 from planarfriction.compiler import jit
+from planarfriction.compiler.calls import address_of, call
+from planarfriction.compiler.memory import place_of
 from planarfriction.coupling import CoupledPatches, CoupledStep, HostStep
-from planarfriction.kernels.pointers import address_of, call, place_of
 from planarfriction.kernels.step_slopes import NUMBERS, WORDS
 from planarfriction.patch import friction_metric
 from tests.support.coupling_problems import random_bodies, random_patches, random_run

@@ -20,14 +20,14 @@ from numpy.typing import ArrayLike
 
 from planarfriction import validation
 from planarfriction.compiled.packed import PackedSteps
+from planarfriction.compiler.calls import address_of
+from planarfriction.compiler.memory import place_of, row_of
 from planarfriction.compiler.threads import share
 from planarfriction.equality import ByValue, by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LARGEST
 from planarfriction.kernels import coupling as kernels
 from planarfriction.kernels.coupling_rows import Patches, layout
-from planarfriction.kernels.pointers import address_of, place_of
-from planarfriction.kernels.records import row_of
 from planarfriction.kernels.step_slopes import WORDS
 from planarfriction.models import FrictionModel
 

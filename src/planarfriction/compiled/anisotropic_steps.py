@@ -19,7 +19,7 @@ _ALONE = kernels.Cells(np.zeros(1), np.zeros(1), np.ones((1, 1)))
 
 
 def cell_numbers(patch: Any, cells: np.ndarray) -> np.ndarray:
-    """Return the numbers of the chosen cells, `[7, n]`, as `kernels.anisotropic_contact` reads them."""
+    """Return the numbers of the chosen cells, `[7, n]`, as `kernels.cells` reads them."""
     levers, asymmetry = patch.levers()[cells], patch.asymmetries()[cells]
     return np.array([*(levers[:, i, j] for i, j in ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2))), *asymmetry.T])
 

@@ -12,12 +12,10 @@ from planarfriction.compiled import anisotropic_steps, packed
 from planarfriction.compiled.base import CompiledModel, StepJacobians
 from planarfriction.compiled.packed import PackedModel, PackedSteps
 from planarfriction.compiled.rates import linearised, rates
-from planarfriction.kernels import anisotropic_contact, distributed_contact, step_slopes
+from planarfriction.compiler.memory import places_of, rows_of
+from planarfriction.kernels import cells as contacts
 from planarfriction.kernels import distributed_step as kernels
-from planarfriction.kernels.anisotropic_contact import AnisotropicContact
-from planarfriction.kernels.distributed_contact import DistributedContact
-from planarfriction.kernels.pointers import place_of
-from planarfriction.kernels.records import rows_of
+from planarfriction.kernels import step_slopes
 
 
 class CompiledDistributed(CompiledModel):
@@ -33,7 +31,7 @@ class CompiledDistributed(CompiledModel):
         return rate.reshape(state.shape), wrench.reshape(twist.shape)
 
     def linearisation(self, state: np.ndarray, twist: np.ndarray, load: np.ndarray) -> np.ndarray:
-        """Return linearisations cell by cell `[..., L, N]` (see the kernels of the contacts)."""
+        """Return linearisations cell by cell `[..., L, N]` (see `kernels.cells.Linear`)."""
         cells = state.shape[-1]
         lin = linearised(self._all_cells(load), state.reshape(load.size, 2 * cells), twist.reshape(-1, 3))
         return lin.reshape(*load.shape, lin.shape[-1] // cells, cells)
@@ -84,23 +82,20 @@ class CompiledDistributed(CompiledModel):
             chosen = np.ones(weights.shape[1], bool)
         weights, positions = np.ascontiguousarray(weights), self.patch.positions[chosen]
         count, law = len(positions), self.law.numbers
-        at = place_of(weights) + weights.strides[0] * np.arange(len(weights))
         if self.patch.anisotropic:
-            cells = anisotropic_steps.cell_numbers(self.patch, chosen)
-            record, held = AnisotropicContact(law, count, place_of(cells), 0), (cells,)
-            functions, numbers = anisotropic_contact.FUNCTIONS, anisotropic_contact.LINEAR_NUMBERS
+            numbers = anisotropic_steps.cell_numbers(self.patch, chosen)
+            functions = contacts.ASYMMETRIC if self.patch.asymmetric else contacts.TURNED
         else:
-            x, y = np.ascontiguousarray(positions[:, 0]), np.ascontiguousarray(positions[:, 1])
-            record, held = DistributedContact(law, count, place_of(x), place_of(y), 0), (x, y)
-            functions, numbers = distributed_contact.FUNCTIONS, distributed_contact.LINEAR
+            numbers, functions = np.ascontiguousarray(positions.T), contacts.ISOTROPIC
+        record = contacts.Cells(law, count, numbers, weights)
         return PackedModel(
             functions,
-            rows_of(record, len(weights), weights=at),
+            rows_of(record, len(weights), weights=places_of(weights)),
             2 * count,
-            numbers * count,
+            (contacts.LEANING if self.patch.asymmetric else contacts.STRAIGHT) * count,
             np.full(2 * count, self.law.largest_deflection),
             float(np.hypot(*(positions - positions.mean(axis=0)).T).mean()),
-            (weights, *held),
+            (weights, numbers),
             chosen,
         )
 

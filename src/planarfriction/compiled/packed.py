@@ -25,7 +25,7 @@ class PackedModel(NamedTuple):
     functions: Any
     """Compiled `kernels.contacts.ModelFunctions` of the model."""
     records: np.ndarray
-    """Data of the contact for these functions, a row of words for each load, `[R, words]` (`kernels.records`)."""
+    """Data of the contact for these functions, a row of words for each load, `[R, words]` (`compiler.memory`)."""
     states: int
     """Number of bristle states of a contact."""
     workspace: int

@@ -10,12 +10,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction.compiled.packed import PackedModel
+from planarfriction.compiler.calls import address_of
+from planarfriction.compiler.memory import place_of, places_of, row_of, rows_of
 from planarfriction.equality import by_parts
 from planarfriction.kernels.contacts import calls_of
 from planarfriction.kernels.parts import FUNCTIONS, PartsContact
-from planarfriction.kernels.pointers import address_of, place_of
 from planarfriction.kernels.quick_steps import JACOBIAN, jacobians_address
-from planarfriction.kernels.records import row_of, rows_of
 from planarfriction.kernels.rollouts import Place
 
 
@@ -117,13 +117,12 @@ def _joined(parts: Sequence[PackedModel], shares: np.ndarray) -> PackedModel:
     """Join P packed parts at the same R loads, with their shares `[R, P]`, to one contact."""
     one, count = parts[0], len(parts)
     calls = calls_of(one.functions, change=True)
-    records = np.stack([place_of(part.records) + part.records.strides[0] * np.arange(len(shares)) for part in parts], 1)
-    records, shares = np.ascontiguousarray(records), np.ascontiguousarray(shares)
-    row = 8 * count * np.arange(len(shares))
-    record = PartsContact(count, one.states, one.workspace, place_of(calls), 0, 0)
+    records = np.stack([places_of(part.records) for part in parts], axis=1)
+    shares = np.ascontiguousarray(shares)
+    record = PartsContact(count, one.states, one.workspace, calls, records, shares)
     return one._replace(
         functions=FUNCTIONS,
-        records=rows_of(record, len(shares), records=place_of(records) + row, shares=place_of(shares) + row),
+        records=rows_of(record, len(shares), records=places_of(records), shares=places_of(shares)),
         states=count * one.states,
         workspace=count * one.workspace,
         state_scale=np.tile(one.state_scale, count),

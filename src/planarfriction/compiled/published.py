@@ -9,10 +9,10 @@ import numpy as np
 
 from planarfriction.compiled.packed import PackedModel
 from planarfriction.compiled.parts import Frame, Kind
+from planarfriction.compiler.memory import place_of, rows_of
 from planarfriction.kernels import published_contact, published_step, step_slopes
-from planarfriction.kernels.pointers import place_of
+from planarfriction.kernels.moments import LINEAR
 from planarfriction.kernels.published_contact import PublishedContact, Root, Shape
-from planarfriction.kernels.records import rows_of
 
 _VELOCITY_SCALE = 0.01
 """Natural scale of the velocity, as a share of v_s [-].
@@ -26,7 +26,9 @@ def records(law: Any, shapes: Sequence[Any], radius: float) -> PackedModel:
     """Pack a contact with the law at each of the `shapes` (`PublishedShape`); `radius` is the lever arm [m]."""
     data = [np.ascontiguousarray(shape.surface.numbers.data, dtype=float) for shape in shapes]
     root = shapes[0].root
-    record = PublishedContact(law.numbers, Shape(*shapes[0].numbers), Root(root[0, 0], root[0, 1], root[1, 1]), 0, 0, 0)
+    record = PublishedContact(
+        law.numbers, Shape(*shapes[0].numbers), Root(root[0, 0], root[0, 1], root[1, 1]), 0, 0, data[0]
+    )
     rows = rows_of(
         record,
         len(shapes),
@@ -36,7 +38,7 @@ def records(law: Any, shapes: Sequence[Any], radius: float) -> PackedModel:
         data=np.array([place_of(each) for each in data]),
     )
     scale = law.largest_deflection * np.array([1.0, 1.0, radius or 1.0])
-    functions, size = published_contact.FUNCTIONS, published_contact.LINEAR
+    functions, size = published_contact.FUNCTIONS, LINEAR.size
     return PackedModel(functions, rows, 3, size, scale, radius, tuple(data), velocity_scale=_VELOCITY_SCALE)
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from planarfriction.compiled.packed import PackedModel
+from planarfriction.compiler.calls import address_of
 from planarfriction.kernels import rates as kernels
 from planarfriction.kernels.contacts import WORDS
-from planarfriction.kernels.pointers import address_of
 
 
 def rates(packed: PackedModel, state: np.ndarray, twist: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -9,9 +9,9 @@ import numpy as np
 
 from planarfriction.compiled.packed import PackedModel
 from planarfriction.compiled.parts import Kind
+from planarfriction.compiler.memory import place_of, rows_of
 from planarfriction.kernels import reduced_contact, reduced_step, step_slopes
-from planarfriction.kernels.pointers import place_of
-from planarfriction.kernels.records import rows_of
+from planarfriction.kernels.moments import LINEAR
 from planarfriction.kernels.reduced_contact import ReducedContact, Shape
 
 
@@ -23,11 +23,11 @@ def records(law: Any, shapes: Sequence[Any], radius: float) -> PackedModel:
     other = np.array([at[id(shape.data if shape.other is None else shape.other)] for shape in shapes])
     factors = np.array([shape.factor for shape in shapes])[:, *np.triu_indices(3)]
     numbers = np.column_stack([factors, [shape.blend for shape in shapes]])
-    record = ReducedContact(law.numbers, Shape(*numbers[0]), 0, 0)
+    record = ReducedContact(law.numbers, Shape(*numbers[0]), shapes[0].data, 0)
     keepalive = tuple(maps.values())
     rows = rows_of(record, len(shapes), shape=numbers, data=data, other=(other - data) // keepalive[0].itemsize)
     scale = np.full(3, law.largest_deflection)
-    return PackedModel(reduced_contact.FUNCTIONS, rows, 3, reduced_contact.LINEAR, scale, radius, keepalive)
+    return PackedModel(reduced_contact.FUNCTIONS, rows, 3, LINEAR.size, scale, radius, keepalive)
 
 
 def maps_of(shape: Any) -> tuple[np.ndarray, np.ndarray]:

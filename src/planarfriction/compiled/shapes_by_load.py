@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planarfriction.compiled.parts import Part
-from planarfriction.kernels.pointers import place_of
+from planarfriction.compiler.memory import place_of
 
 
 class ShapesByLoad(NamedTuple):

@@ -49,12 +49,12 @@ kernel: Any = functools.partial(njit, forceinline=True, **_INNER, **_OPTIONS)
 
 
 def entry(function: Any) -> Any:
-    """Compile a function that compiled code calls by its address (see `kernels.pointers`), and keep it on disk."""
+    """Compile a function that compiled code calls by its address (see `compiler.calls`), and keep it on disk."""
     return kept(njit(**_INNER, **_OPTIONS)(function), SOURCES)
 
 
 def callback(function: Any) -> Any:
-    """Compile a function that C libraries call by its address (see `pointers.c_address_of`), and keep it on disk."""
+    """Compile a function that C libraries call by its address (see `calls.c_address_of`), and keep it on disk."""
     return kept(njit(_nrt=False, no_cpython_wrapper=True, **_OPTIONS)(function), SOURCES)
 
 

@@ -11,10 +11,11 @@ from planarfriction import validation
 from planarfriction.derivatives.scene_inputs import SceneInputs
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError, SolverError
-from planarfriction.kernels import rosenbrock, tangent
+from planarfriction.kernels import path as paths
+from planarfriction.kernels import rosenbrock
 from planarfriction.kernels.body import System
-from planarfriction.kernels.integration import Output, run_of
-from planarfriction.kernels.tangent import Path
+from planarfriction.kernels.integration import Output
+from planarfriction.kernels.path import Path
 from planarfriction.scenes.options import SolverOptions
 from planarfriction.scenes.packing import SegmentBatches
 from planarfriction.scenes.scene import Scene
@@ -80,12 +81,12 @@ class MotionPath:
         Raises SolverError if the solver fails.
         """
         now, outcome, n = start_of(self.batches.state), rosenbrock.DONE, len(self.scale)
-        room = tangent.path_for(max(int(min(NUMBERS / n, most)), LEAST_NODES), n)
+        room = paths.path_for(max(int(min(NUMBERS / n, most)), LEAST_NODES), n)
         for system in self.batches:
-            run = run_of(system, RODAS4, self._output, now, rtol=self._rtol, atol=self._atol)
+            run = rosenbrock.Run(system, RODAS4, self._output, now, rtol=self._rtol, atol=self._atol)
             now.cursor[0], outcome = 0, rosenbrock.PAUSED
             while outcome == rosenbrock.PAUSED:
-                nodes, outcome = tangent.follow(run.address, room)
+                nodes, outcome = paths.follow(run.address, room)
                 self.reached = int(now.cursor[1])
                 yield system, Path(*(each[:nodes] for each in room))
             del system, run

@@ -13,8 +13,11 @@ from planarfriction.derivatives.path import MotionPath, SceneDerivatives, pieces
 from planarfriction.derivatives.scene_inputs import SceneInputs
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels import adjoint, tangent
+from planarfriction.kernels import path as paths
 from planarfriction.kernels.body import System
-from planarfriction.kernels.tangent import Drives, Path
+from planarfriction.kernels.path import Path
+from planarfriction.kernels.sdirk import workspace_for
+from planarfriction.kernels.tangent import Drives
 from planarfriction.scenes.options import SolverOptions
 from planarfriction.scenes.scene import Scene
 
@@ -95,7 +98,7 @@ class _Adjoint:
         count, n = self._initial.shape
         self._state, self._gain, self._moments = np.zeros(n), np.zeros(count), np.zeros((self._inputs.inputs, 2))
         self._atol = self._accuracy * level / motion.scale
-        self._space, self._known = adjoint.workspace_for(self._inputs.inputs, n), 0.0
+        self._space, self._known = workspace_for(1, self._inputs.inputs, n), 0.0
         self._next = len(self._time) - 1
         """Number of the instant whose cotangents come next."""
 
@@ -138,14 +141,14 @@ class _Adjoint:
         """Add the cotangents at the next instant, `here` seconds into the piece."""
         wrenches = self._wrench_bars[self._next]
         if wrenches.any():
-            tangent.state_at(path, first, last, here, self._space.state)
+            paths.state_at(path, first, last, here, self._space.record.state)
             at = system.address, int(path.piece[first]), here, wrenches
-            adjoint.jump(*at, self._state, drives, self._moments, self._space)
+            adjoint.jump(*at, self._state, drives, self._moments, self._space.address)
         self._state[-6:] += self._bars[self._next]
 
     def _propagate(self, system: System, path: Path, first: int, last: int, drives: Drives, *span: float) -> None:
         since, until = span
         if until < since:
-            numbers = self._state, drives, self._moments, self._known, self._accuracy, self._atol, self._space
+            numbers = self._state, drives, self._moments, self._known, self._accuracy, self._atol, self._space.address
             adjoint.propagate_back(system.address, path, first, last, since, until, *numbers)
             self._known = 1.0

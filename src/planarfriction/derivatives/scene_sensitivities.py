@@ -10,9 +10,12 @@ import numpy as np
 
 from planarfriction.derivatives.path import MotionPath, SceneDerivatives, pieces_of
 from planarfriction.derivatives.scene_inputs import SceneInputs
+from planarfriction.kernels import path as paths
 from planarfriction.kernels import tangent
 from planarfriction.kernels.body import System
-from planarfriction.kernels.tangent import Drives, Path
+from planarfriction.kernels.path import Path
+from planarfriction.kernels.sdirk import workspace_for
+from planarfriction.kernels.tangent import Drives
 from planarfriction.scenes.options import SolverOptions
 from planarfriction.scenes.scene import Scene
 
@@ -76,7 +79,7 @@ class _Tangents:
         self._motion, self._inputs = motion, inputs
         self._slopes = inputs.start(motion.batches)
         (count, n), instants, contacts = self._slopes.shape, motion.instants, len(motion.batches.models)
-        self._space, self._atol = tangent.slopes_for(count, inputs.inputs, n), motion.accuracy * motion.scale
+        self._space, self._atol = workspace_for(count, inputs.inputs, n), motion.accuracy * motion.scale
         self._state, self._scratch, self._wrench = np.empty(n), np.empty((2, n)), np.empty((contacts, 3))
         self.recorded = np.zeros((instants, 6, count)), np.zeros((instants, contacts, 3, count))
         """Derivatives of motion and wrenches at the instants."""
@@ -108,12 +111,12 @@ class _Tangents:
                 tangent.forget(system.address, piece, self._slopes)
 
     def _propagate(self, system: System, path: Path, drives: Drives, *span: float) -> None:
-        along = self._slopes, drives, self._motion.accuracy, self._atol, self._space
+        along = self._slopes, drives, self._motion.accuracy, self._atol, self._space.address
         tangent.propagate(system.address, path, *span, *along)
 
     def _record(self, system: System, path: Path, drives: Drives, first: int, last: int, since: float) -> None:
         d_motion, d_wrenches = (values[self._next] for values in self.recorded)
-        tangent.state_at(path, first, last, since, self._state)
+        paths.state_at(path, first, last, since, self._state)
         at = system.address, int(path.piece[first]), since, self._state, drives, self._slopes
         tangent.wrench_slopes(*at, self._wrench, d_wrenches, self._scratch)
         d_motion[:] = self._slopes[:, -6:].T

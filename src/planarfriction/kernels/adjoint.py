@@ -15,85 +15,81 @@ body, 3 x 3 for the velocity with the inverse that `factor` made, what the body 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
-
-import numpy as np
 
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import jit, kernel
-from planarfriction.kernels.body import load_of, read, record_of, seen_by, times
-from planarfriction.kernels.contacts import CALLS, PULL_BACK, SOLVE_TRANSPOSED
-from planarfriction.kernels.pointers import address, at, call, doubles, integers
-from planarfriction.kernels.sdirk import AGAIN, ERROR, GAMMA, PLACES, STAGES, START, excess_of, pace_after, stage_base
-from planarfriction.kernels.tangent import (
-    FRICTION,
-    LOAD,
-    MOST,
-    NORMAL_FORCE,
-    SHORTEST,
-    SIZE,
-    _change,
-    _interpolate,
-    _partial,
+from planarfriction.compiler.calls import call, pointer
+from planarfriction.compiler.memory import arrays_at, at
+from planarfriction.kernels.body import (
+    function_of,
+    linearisation_of,
+    load_of,
+    maps_of,
+    read,
+    record_of,
+    seen_by,
+    total_load,
 )
-
-
-class Workspace(NamedTuple):
-    """Room for the adjoint of n states with U kinds of inputs."""
-
-    stages: np.ndarray
-    """`G` of each stage, [5, n]."""
-    gain: np.ndarray
-    """`l' df/dp` at each stage, [5, U]."""
-    gain_before: np.ndarray
-    """The same at the end of the step before, [U]."""
-    most: np.ndarray
-    """Largest gain on a piece so far, [U]."""
-    level: np.ndarray
-    """Largest adjoint so far, [n]."""
-    forcing: np.ndarray
-    """`df/dp`, [n]."""
-    new: np.ndarray
-    before: np.ndarray
-    state: np.ndarray
-    rate: np.ndarray
-    base: np.ndarray
-    right: np.ndarray
-    zero: np.ndarray
-    """Vectors [n], as in `tangent.Slopes`."""
-    pace: np.ndarray
-    """Length of the next step, in steps of the motion, [1]."""
-
-
-def workspace_for(inputs: int, n: int) -> Workspace:
-    """Workspace (made outside compiled code, where an allocation costs compile time)."""
-    gains = np.zeros((5, inputs)), *np.zeros((2, inputs))
-    return Workspace(np.zeros((5, n)), *gains, *np.zeros((9, n)), np.ones(1))
+from planarfriction.kernels.contacts import PULL_BACK, ROWS, SOLVE_TRANSPOSED
+from planarfriction.kernels.path import hold, node_before
+from planarfriction.kernels.sdirk import (
+    AGAIN,
+    ERROR,
+    GAMMA,
+    PLACES,
+    STAGES,
+    START,
+    accept,
+    derivative_of,
+    error_of,
+    keep_stage,
+    read_workspace,
+    stage_base,
+)
+from planarfriction.kernels.small_matrices import applied, applied_transposed
+from planarfriction.kernels.step_control import judged, length
+from planarfriction.kernels.tangent import FRICTION, LOAD, MOST, NORMAL_FORCE, SIZE, change_of, partial_of
+from planarfriction.kernels.vectors import dot, plus, put, three, times
 
 
 @kernel
-def _pulled(own, piece, c, y, given, w):
-    """Pull back `given` of the bristle rates and `own.rows[3]` of the wrench per unit load of contact c.
+def _pulled(own, piece, c, y, given, wrench, w):
+    """Pull back `given` of the bristle rates and `wrench` of the wrench per unit load of contact c.
 
-    Addresses of all states; that by the bristles goes to `w.forcing`, that by the twist to `own.rows[2]`.
+    Pointers to all states; that by the bristles goes to `w.forcing`. Returns that by the body's velocity and pose.
     """
-    first, lin = integers(own.state)[c], at(own.workspace, integers(own.linear)[c])
-    states = at(y, first), lin, at(given, first), own.rows, address(w.forcing, first)
-    call(integers(own.calls)[CALLS * c + PULL_BACK], (record_of(own, piece, c), *states))
+    first, rows, (a, g, _) = own.contacts.state[c], arrays_at(ROWS, own.work.rows), maps_of(own, c)
+    put(rows.d_wrench, wrench)
+    states = at(y, first), linearisation_of(own, c), at(given, first), own.work.rows, at(w.forcing, first)
+    call(function_of(own, c, PULL_BACK), (record_of(own, piece, c), *states))
+    return applied_transposed(a, rows.d_twist), applied_transposed(g, rows.d_twist)
 
 
 @kernel
-def _to_body(own, c, velocity, pose):
-    """Add what the twist of contact c pulls back, `own.rows[2]`, to that of the body's velocity and pose."""
-    a, g, rows = doubles(at(own.maps, 27 * c)), doubles(at(own.maps, 27 * c + 9)), doubles(own.rows)
-    for i in range(3):
-        velocity[i] += a[i] * rows[6] + a[3 + i] * rows[7] + a[6 + i] * rows[8]
-        pose[i] += g[i] * rows[6] + g[3 + i] * rows[7] + g[6 + i] * rows[8]
+def _solve_bristles(own, piece, c, y, b, out):
+    first = own.contacts.state[c]
+    states = record_of(own, piece, c), at(y, first), at(b, first), linearisation_of(own, c), at(out, first)
+    call(function_of(own, c, SOLVE_TRANSPOSED), states)
+
+
+@kernel
+def _body_solved(own, shift, body, velocity, pose, out):
+    """Solve the equations of velocity and pose (see `_solve`); return the velocity."""
+    (x, y, s), per_shift, cos, sin = pose, 1.0 / shift, 1.0, 0.0
+    if own.motion.body_axes:
+        cos, sin = math.cos(body[5]), math.sin(body[5])
+        s -= per_shift * (sin * body[0] + cos * body[1]) * x
+        s += per_shift * (cos * body[0] - sin * body[1]) * y
+    velocity = plus(velocity, per_shift, (cos * x + sin * y, cos * y - sin * x, s))
+    u = applied_transposed(own.work.inverse, velocity)
+    put(out, u)
+    put(at(out, 3), plus(applied_transposed(own.work.to_pose, u), per_shift, (x, y, s)))
+    return u
 
 
 @kernel
 def _solve(own, piece, since, shift, b, w, out):
-    """Solve `(shift I - J') out = b` (addresses) with the matrix that `factor` prepared at the state `w.state`.
+    """Solve `(shift I - J') out = b` with the matrix that `factor` prepared at the state `w.state`.
 
     With the wrench `e = (d z'/dV)' D^-T b_z` and S = dW/dV of each contact, its load `f` and the mass matrix M,
 
@@ -102,172 +98,135 @@ def _solve(own, piece, since, shift, b, w, out):
 
     whose second for a free body holds the transpose of what `factor` kept as `to_pose`.
     """
-    o, y, rows = own.bristles, address(w.state, 0), doubles(own.rows)
-    velocity, pose = doubles(own.body), doubles(own.twist)
-    for i in range(3):
-        velocity[i], pose[i] = doubles(b)[o + i], doubles(b)[o + 3 + i]
-    for c in range(own.contacts):
-        first, lin = integers(own.state)[c], at(own.workspace, integers(own.linear)[c])
-        states = at(y, first), at(b, first), lin, at(out, first)
-        call(integers(own.calls)[CALLS * c + SOLVE_TRANSPOSED], (record_of(own, piece, c), *states))
-        rows[9], rows[10], rows[11] = 0.0, 0.0, 0.0
-        _pulled(own, piece, c, y, out, w)
-        _to_body(own, c, velocity, pose)
-    u, p = doubles(at(out, o)), doubles(at(out, o + 3))
-    inverse, to_pose, inverse_mass = doubles(own.inverse), doubles(own.to_pose), doubles(own.inverse_mass)
-    per_shift, cos, sin = 1.0 / shift, 1.0, 0.0
-    if own.body_axes:
-        cos, sin = math.cos(w.state[o + 5]), math.sin(w.state[o + 5])
-        pose[2] -= per_shift * (sin * w.state[o] + cos * w.state[o + 1]) * pose[0]
-        pose[2] += per_shift * (cos * w.state[o] - sin * w.state[o + 1]) * pose[1]
-    velocity[0] += per_shift * (cos * pose[0] + sin * pose[1])
-    velocity[1] += per_shift * (cos * pose[1] - sin * pose[0])
-    velocity[2] += per_shift * pose[2]
-    for i in range(3):
-        u[i] = inverse[i] * velocity[0] + inverse[3 + i] * velocity[1] + inverse[6 + i] * velocity[2]
-    for i in range(3):
-        p[i] = per_shift * pose[i] + to_pose[i] * u[0] + to_pose[3 + i] * u[1] + to_pose[6 + i] * u[2]
-    if own.body_axes:  # the wrench does not move the body
+    o, y, inverse_mass, none = own.bristles, w.state, own.motion.inverse_mass, (0.0, 0.0, 0.0)
+    velocity, pose = three(at(b, o)), three(at(b, o + 3))
+    for c in range(own.size):
+        _solve_bristles(own, piece, c, y, b, out)
+        by_velocity, by_pose = _pulled(own, piece, c, y, out, none, w)
+        velocity, pose = plus(velocity, 1.0, by_velocity), plus(pose, 1.0, by_pose)
+    u = _body_solved(own, shift, at(y, o), velocity, pose, at(out, o))
+    if own.motion.body_axes:  # the wrench does not move the body
         return
-    for c in range(own.contacts):
-        first, last, a = integers(own.state)[c], integers(own.state)[c + 1], doubles(at(own.maps, 27 * c))
-        load = doubles(own.count)[c] * load_of(own, piece, since, c)
-        for i in range(3):
-            pull = a[3 * i] * inverse_mass[0] * u[0] + a[3 * i + 1] * inverse_mass[1] * u[1]
-            rows[9 + i] = load * (pull + a[3 * i + 2] * inverse_mass[2] * u[2])
-        _pulled(own, piece, c, y, address(w.zero, 0), w)
-        for m in range(first, last):
-            w.forcing[m] += doubles(b)[m]
-        states = at(y, first), address(w.forcing, first), at(own.workspace, integers(own.linear)[c]), at(out, first)
-        call(integers(own.calls)[CALLS * c + SOLVE_TRANSPOSED], (record_of(own, piece, c), *states))
+    for c in range(own.size):
+        pull = inverse_mass[0] * u[0], inverse_mass[1] * u[1], inverse_mass[2] * u[2]
+        wrench = times(total_load(own, piece, since, c), applied(maps_of(own, c)[0], pull))
+        _pulled(own, piece, c, y, w.zero, wrench, w)
+        for m in range(own.contacts.state[c], own.contacts.state[c + 1]):
+            w.forcing[m] += b[m]
+        _solve_bristles(own, piece, c, y, w.forcing, out)
 
 
 @kernel
-def _node(path, k, first, since):
-    """The last node up to k, but from `first` on, that is before `since`."""
-    while k > first and path.since[k] >= since:
-        k -= 1
-    return k
-
-
-@kernel
-def _step(system, path, k, first, since, h, adjoint, drives, w):
+def _step(system, own, path, k, first, since, h, d, drives, w):
     """Carry the adjoint back over `h` seconds into `w.new`, as `tangent` does its slopes forwards."""
-    own, piece, n = read(system), path.piece[k], w.state.shape[0]
-    shift = 1.0 / (h * GAMMA)
+    piece, n, shift, inputs = path.piece[k], path.state.shape[1], 1.0 / (h * GAMMA), drives.input_kind.shape[0]
     for i in range(PLACES.shape[0]):
         time = since - h * PLACES[i]
-        _interpolate(path, _node(path, k, first, time), time, w.state)
-        call(own.rates, (system, piece, time, w.state, w.rate))
-        call(own.linearise, (system, piece, w.state))
-        call(own.factor, (system, piece, time, w.state, shift))
-        stage_base(i, h, n, address(adjoint, 0), address(w.stages, 0), address(w.base, 0))
+        hold(system, own, path, node_before(path, k, first, time), time, shift, w)
+        stage_base(i, h, n, d, w.base)
         for m in range(n):
             w.right[m] = shift * w.base[m]
-        _solve(own, piece, time, shift, address(w.right, 0), w, address(w.new, 0))
-        for m in range(n):
-            w.stages[i, m] = shift * (w.new[m] - w.base[m])
-        for u in range(drives.input_kind.shape[0]):
-            _partial(own, piece, time, w, drives.input_kind[u], drives.input_place[u], w.forcing)
+        _solve(own, piece, time, shift, w.right, w, d.new)
+        keep_stage(i, shift, n, d, w.base)
+        for u in range(inputs):
+            partial_of(own, piece, time, w, drives.input_kind[u], drives.input_place[u], w.forcing)
             gain = 0.0
             for m in range(n):
-                gain += w.new[m] * w.forcing[m]
-            w.gain[i, u] = gain
+                gain += d.new[m] * w.forcing[m]
+            w.gain[i * inputs + u] = gain
 
 
 @kernel
-def _gained(u, h, w):
-    """What the cost gains by input u in a step."""
-    total = GAMMA * w.gain[4, u]
-    for i in range(4):
-        total += STAGES[4, i] * w.gain[i, u]
-    return h * total
+def _weight(i):
+    """Return the weight of stage i in the solution."""
+    return STAGES[4, i] if i < 4 else GAMMA
 
 
 @kernel
-def _excess_of_gains(h, known, rtol, w):
-    """The larger error estimate of what the cost gains in a step, in units of what is allowed."""
+def _error_of_gains(inputs, h, known, rtol, w):
+    """Return the larger error estimate of what the cost gains in a step, per tolerance."""
     largest = 0.0
-    for u in range(w.gain.shape[1]):
-        one, other = 0.0, START * w.gain_before[u]
+    for u in range(inputs):
+        one, other, gained = 0.0, START * w.gain_before[u], 0.0
         for i in range(PLACES.shape[0]):
-            one += ERROR[i] * w.gain[i, u]
-            other += AGAIN[i] * w.gain[i, u]
-        error, size = h * xp.maximum(abs(one), known * abs(other)), xp.maximum(w.most[u], abs(_gained(u, h, w)))
+            gain = w.gain[i * inputs + u]
+            one += ERROR[i] * gain
+            other += AGAIN[i] * gain
+            gained += _weight(i) * gain
+        error, size = h * xp.maximum(abs(one), known * abs(other)), xp.maximum(w.most[u], abs(h * gained))
         if not xp.is_finite(error + size):
             return math.inf
         largest = xp.maximum(largest, error / (rtol * xp.where(size > 0.0, size, 1.0)))
     return largest
 
 
+@kernel
+def _gain(since, h, moments, w):
+    """Add what the cost gains in a step to the moments of the inputs."""
+    inputs = moments.shape[0]
+    for u in range(inputs):
+        w.gain_before[u] = w.gain[4 * inputs + u]
+        for i in range(PLACES.shape[0]):
+            gain = h * _weight(i) * w.gain[i * inputs + u]
+            moments[u, 0] += gain
+            moments[u, 1] += gain * (since - h * PLACES[i])
+        w.most[u] = xp.maximum(w.most[u], abs(moments[u, 0]))
+
+
 @jit
-def propagate_back(system, path, first, last, begin, until, adjoint, drives, moments, known, rtol, atol, w):
+def propagate_back(system, path, first, last, begin, until, adjoint, drives, moments, known, rtol, atol, workspace):
     """Carry `adjoint` [n] from `begin` back to `until` seconds into a piece; add to the `moments` [U, 2] of its inputs.
 
-    The nodes of the piece are `first` to `last` of a path; `known` is 0 where the adjoint has just jumped. Returns how
-    many steps that took.
+    The nodes of the piece are `first` to `last` of a path; `known` is 0 where the adjoint has just jumped. Returns the
+    number of steps.
     """
-    own, taken, n, k, since = read(system), 0, w.state.shape[0], last - 1, begin
+    own, w, n, atol = read(system), read_workspace(workspace), adjoint.shape[0], pointer(atol)
+    d, taken, k, since = derivative_of(w, pointer(adjoint), 0, 0, n), 0, last - 1, begin
     while since > until:
-        k = _node(path, k, first, since)
+        k = node_before(path, k, first, since)
         local, remaining = path.since[k + 1] - path.since[k], since - until
-        wanted = w.pace[0] * local
-        reach = xp.minimum(wanted, since - path.since[xp.maximum(k + 1 - MOST, first)])
-        h = reach if 2.0 * reach <= remaining else (remaining if reach >= remaining else 0.5 * remaining)
-        _step(system, path, k, first, since, h, adjoint, drives, w)
+        h = length(w.pace[0], local, since - path.since[xp.maximum(k + 1 - MOST, first)], remaining)
+        _step(system, own, path, k, first, since, h, d, drives, w)
         taken += 1
-        both, others = (address(adjoint, 0), address(w.new, 0)), (address(w.level, 0), address(w.before, 0))
-        places = both[0], both[1], others[0], others[1], address(w.stages, 0), address(atol, 0)
-        largest = xp.maximum(excess_of(own, n, places, h, known, rtol), _excess_of_gains(h, known, rtol, w))
-        ideal = pace_after(largest) * h / local
-        if largest > 1.0 and h > SHORTEST * local:
-            w.pace[0] = ideal
-            continue
-        w.pace[0] = xp.maximum(ideal, w.pace[0] if h < wanted else SHORTEST)
-        for u in range(w.gain.shape[1]):
-            w.gain_before[u] = w.gain[4, u]
-            for i in range(PLACES.shape[0]):
-                gain = h * (STAGES[4, i] if i < 4 else GAMMA) * w.gain[i, u]
-                moments[u, 0] += gain
-                moments[u, 1] += gain * (since - h * PLACES[i])
-            w.most[u] = xp.maximum(w.most[u], abs(moments[u, 0]))
-        known = 1.0
-        since = until if h == remaining else since - h
-        for m in range(n):
-            adjoint[m], w.before[m] = w.new[m], w.stages[4, m]
-            w.level[m] = xp.maximum(w.level[m], abs(w.new[m]))
+        of_gains = _error_of_gains(moments.shape[0], h, known, rtol, w)
+        error = xp.maximum(error_of(own, n, d, h, known, rtol, atol), of_gains)
+        accepted, w.pace[0] = judged(w.pace[0], error, h, local)
+        if accepted:
+            _gain(since, h, moments, w)
+            accept(n, d)
+            since, known = until if h == remaining else since - h, 1.0
     return taken
 
 
 @jit
-def jump(system, piece, since, seeds, adjoint, drives, moments, w):
-    """The jump of `adjoint` [n], and of the `moments` [U, 2], where a cost sees wrenches: `seeds` [C, 3] are its slope.
+def jump(system, piece, since, seeds, adjoint, drives, moments, workspace):
+    """Add the jump of `adjoint` [n], and of `moments` [U, 2], where a cost sees wrenches: `seeds` [C, 3] are its slope.
 
-    The held state is in `w.state`.
+    The held state is in the workspace.
     """
-    own, y, dy = read(system), address(w.state, 0), address(w.rate, 0)
-    o, rows = own.bristles, doubles(own.rows)
-    call(own.rates, (system, piece, since, w.state, w.rate))
-    call(own.linearise, (system, piece, w.state))
-    for c in range(own.contacts):
-        load, unit = load_of(own, piece, since, c), doubles(at(own.wrench, 3 * c))
-        times(doubles(at(own.maps, 27 * c)), doubles(seen_by(own, c, y)), rows)
+    own, w, rows = read(system), read_workspace(workspace), arrays_at(ROWS, read(system).work.rows)
+    y, o, none = w.state, own.bristles, (0.0, 0.0, 0.0)
+    call(own.rates, (system, piece, since, y, w.rate))
+    call(own.linearise, (system, piece, y))
+    for c in range(own.size):
+        load, unit = load_of(own, piece, since, c), three(at(own.work.wrench, 3 * c))
+        seed = seeds[c, 0], seeds[c, 1], seeds[c, 2]
+        put(rows.twist, applied(maps_of(own, c)[0], seen_by(own, c, y)))
         for u in range(moments.shape[0]):
-            kind, gain = drives.input_kind[u], 0.0
-            for i in range(3):
-                rows[3 + i], rows[6 + i], rows[9 + i] = unit[i], 0.0, 0.0
+            kind = drives.input_kind[u]
+            put(rows.wrench, unit)
+            put(rows.d_twist, none)
+            put(rows.d_wrench, none)
             if kind in (FRICTION, SIZE):
-                _change(own, piece, c, y, dy, address(w.zero, 0), kind, address(w.forcing, 0))
-            for i in range(3):
-                slope = load * (unit[i] if kind == LOAD else rows[9 + i])
-                if kind == NORMAL_FORCE and drives.input_place[u] == c:
-                    slope = unit[i]
-                gain += seeds[c, i] * slope
-            moments[u, 0] += gain
-            moments[u, 1] += gain * since
-        for i in range(3):
-            rows[9 + i] = load * seeds[c, i]
-        _pulled(own, piece, c, y, address(w.zero, 0), w)
-        for m in range(integers(own.state)[c], integers(own.state)[c + 1]):
+                change_of(own, piece, c, y, w.rate, w.zero, kind, w.forcing)
+            slope = times(load, unit if kind == LOAD else three(rows.d_wrench))
+            if kind == NORMAL_FORCE and drives.input_place[u] == c:
+                slope = unit
+            moments[u, 0] += dot(seed, slope)
+            moments[u, 1] += dot(seed, slope) * since
+        by_velocity, by_pose = _pulled(own, piece, c, y, w.zero, times(load, seed), w)
+        for m in range(own.contacts.state[c], own.contacts.state[c + 1]):
             adjoint[m] += w.forcing[m]
-        _to_body(own, c, doubles(address(adjoint, o)), doubles(address(adjoint, o + 3)))
+        for i in range(3):
+            adjoint[o + i] += by_velocity[i]
+            adjoint[o + 3 + i] += by_pose[i]

@@ -14,6 +14,8 @@ from typing import NamedTuple
 import numpy as np
 
 from planarfriction.compiler import entry, jit, kernel
+from planarfriction.compiler.calls import address_of, call
+from planarfriction.compiler.memory import Doubles, Integers, Layout, Packed, at, exists, viewer
 from planarfriction.kernels.contacts import (
     BACK_SUBSTITUTE,
     CALLS,
@@ -26,258 +28,233 @@ from planarfriction.kernels.contacts import (
     contact_map,
     contact_map_slopes,
 )
-from planarfriction.kernels.pointers import address_of, at, call, doubles, integers, place_of
-from planarfriction.kernels.records import addresses_in, reader, row_of
+from planarfriction.kernels.small_matrices import applied, applied_transposed, inverse
+from planarfriction.kernels.vectors import plus, put, put_all, three
 
 
 class Motion(NamedTuple):
     """A planar body and its inputs on the S pieces between breaks, each linear in the time since the piece began."""
 
-    inverse_mass: np.ndarray
+    inverse_mass: Doubles
     """1/m, 1/m, 1/I; zeros where the velocity is prescribed, [3]."""
     body_axes: bool
-    """The velocity is prescribed, in body axes."""
-    breaks: np.ndarray
+    """True if the velocity is prescribed, in body axes."""
+    breaks: Doubles
     """Times [S + 1]."""
-    load: np.ndarray
+    load: Doubles
     """Normal force per contact, at the start of the piece and its slope, [S, 2, C]."""
-    force: np.ndarray
+    force: Doubles
     """Applied force and torque at the centre of mass, start and slope, [S, 2, 3]."""
-    velocity: np.ndarray
+    velocity: Doubles
     """Prescribed velocity at the start of each piece, [S, 3]; empty [0, 3] for a free body."""
-    acceleration: np.ndarray
+    acceleration: Doubles
     """Gravity, or the slope of the prescribed velocity, [S, 3]."""
-    row: np.ndarray
-    """Shape of each contact on each piece, int [S, C]."""
-    mover: np.ndarray
+    row: Integers
+    """Shape of each contact on each piece, [S, C]."""
+    mover: Doubles
     """Displacement, velocity and acceleration `(x, y, angle)` of the world's side of each contact at the start of each
     piece, world axes, [S, C, 9]; empty [0, C, 9] where all stand still."""
     stop_speed: float
-    """End when the body is at rest: its speed is below this [m/s] and stays so (see `rosenbrock`); 0: never."""
+    """Speed [m/s] of a body at rest: the run ends when its speed is below and stays so (see `rest`); 0: never."""
     stop_radius: float
     """Lever arm that turns spin into speed for that test [m]."""
     stop_time: float
-    """The bristles' time, sigma_1/sigma_0 [s]."""
+    """Time of the bristles, sigma_1/sigma_0 [s]."""
     stop_length: float
-    """The bristles' full deflection [m]."""
+    """Full deflection of the bristles [m]."""
     settled: float
-    """When the last of the inputs has changed for the last time [s]."""
+    """Time at which the last of the inputs changes for the last time [s]."""
 
 
 class Work(NamedTuple):
     """Workspace of the linear algebra for C contacts."""
 
-    workspace: np.ndarray
+    workspace: Doubles
     """Linearisations of the contacts, flat."""
-    maps: np.ndarray
+    maps: Doubles
     """`A`, `G`, `H` of each contact (see `kernels.contacts`), [C, 3, 3, 3]."""
-    wrench: np.ndarray
+    wrench: Doubles
     """Wrench of each contact per unit load, [C, 3]."""
-    twist: np.ndarray
+    twist: Doubles
     """Twist of one contact, [3]."""
-    stiffness: np.ndarray
+    stiffness: Doubles
     """d wrench / d twist of one contact, [3, 3]."""
-    matrix: np.ndarray
-    """The body's matrix, [3, 3]."""
-    inverse: np.ndarray
-    """Its inverse, [3, 3]."""
-    to_pose: np.ndarray
+    matrix: Doubles
+    """Matrix of the body, [3, 3]."""
+    inverse: Doubles
+    """Inverse of the matrix, [3, 3]."""
+    to_pose: Doubles
     """Acceleration per residual of the pose, [3, 3]."""
-    body: np.ndarray
+    body: Doubles
     """A vector of the body, [3]."""
-    rows: np.ndarray
-    """Twist and wrench of one contact and their changes, [4, 3] (see `contacts.ModelFunctions`)."""
-    moved: np.ndarray
-    """Where each contact frame is, as in `Contacts.place`, and the velocity it sees (see `place_at`), with the spin of
-    the world's side, where something moves, [C, 8]."""
+    rows: Doubles
+    """Twist and wrench of one contact and their changes (see `contacts.Rows`), [4, 3]."""
+    moved: Doubles
+    """Place of each contact frame, as in `Contacts.place`, and the velocity that it sees (see `place_at`), with the
+    spin of the world's side, where something moves, [C, 8]."""
 
 
-SystemRecord = NamedTuple(
-    "SystemRecord",
-    [
-        *((name, int) for name in ("contacts", "bristles", "pieces", "body_axes")),
-        *((name, float) for name in ("stop_speed", "stop_radius", "stop_time", "stop_length", "settled")),
-        *((name, int) for name in addresses_in(Contacts, Motion, Work)),
-        *((name, int) for name in ("rates", "linearise", "factor", "solve")),
-    ],
-)
-"""A body on its contacts as compiled functions read it: numbers, arrays by their addresses (0: a body is not driven by
-a velocity, nothing it touches moves), and the functions of this module."""
-
-read = reader(SystemRecord)
-
-
-class System(NamedTuple):
-    """A body on its contacts, with what its linear algebra works in."""
+class SystemRecord(NamedTuple):
+    """A body on its contacts as compiled functions read it."""
 
     contacts: Contacts
     motion: Motion
     work: Work
-    words: np.ndarray
-    """Its `SystemRecord`, as a row."""
-    kept: tuple[np.ndarray, ...] = ()
-    """Arrays whose addresses are in the records of the contacts: they live as long as this does."""
-
-    @property
-    def address(self) -> int:
-        """What compiled functions take."""
-        return place_of(self.words)
-
-
-def system_of(contacts: Contacts, motion: Motion, kept: tuple[np.ndarray, ...] = ()) -> System:
-    """A system with its workspace (made outside compiled code, where an allocation costs compile time)."""
-    n = len(contacts.count)
-    work = Work(
-        workspace=np.zeros(contacts.linear[n]),
-        maps=np.zeros((n, 3, 3, 3)),
-        wrench=np.zeros((n, 3)),
-        twist=np.zeros(3),
-        stiffness=np.zeros((3, 3)),
-        matrix=np.zeros((3, 3)),
-        inverse=np.zeros((3, 3)),
-        to_pose=np.zeros((3, 3)),
-        body=np.zeros(3),
-        rows=np.zeros((4, 3)),
-        moved=np.zeros((n, 8)),
-    )
-    record = SystemRecord(
-        contacts=n,
-        bristles=int(contacts.state[n]),
-        **{name: place_of(array) for name, array in contacts._asdict().items()},
-        **{name: place_of(array) for name, array in motion._asdict().items() if isinstance(array, np.ndarray)},
-        **{name: place_of(array) for name, array in work._asdict().items()},
-        pieces=len(motion.breaks) - 1,
-        body_axes=int(motion.body_axes),
-        stop_speed=motion.stop_speed,
-        stop_radius=motion.stop_radius,
-        stop_time=motion.stop_time,
-        stop_length=motion.stop_length,
-        settled=motion.settled,
-        rates=address_of(rates, "ppfpp"),
-        linearise=address_of(linearise, "ppp"),
-        factor=address_of(factor, "ppfpf"),
-        solve=address_of(solve, "ppfpfpp"),
-    )
-    if not len(motion.velocity):
-        record = record._replace(velocity=0)
-    if not len(motion.mover):
-        record = record._replace(mover=0)
-    return System(contacts, motion, work, row_of(record), kept)
+    size: int
+    """Number C of contacts."""
+    bristles: int
+    """Number of bristle states."""
+    pieces: int
+    """Number S of pieces."""
+    rates: int
+    """Address of `rates`, and of the functions below."""
+    linearise: int
+    factor: int
+    solve: int
 
 
-@kernel
-def times(a, u, v):
-    """`v = a u` for a 3 x 3 matrix."""
-    for i in range(3):
-        v[i] = a[3 * i] * u[0] + a[3 * i + 1] * u[1] + a[3 * i + 2] * u[2]
+read = viewer(SystemRecord)
+
+
+class System(Packed):
+    """A body on its contacts, with the memory that its linear algebra works in.
+
+    `keepalive` are arrays whose addresses are in the records of the contacts: they live as long as this does.
+    """
+
+    def __init__(self, contacts: Contacts, motion: Motion, keepalive: tuple[np.ndarray, ...] = ()) -> None:
+        n, square = len(contacts.count), (3, 3)
+        layout = Layout(
+            Work, workspace=int(contacts.linear[n]), maps=(n, 3, 3, 3), wrench=(n, 3), twist=3, stiffness=square,
+            matrix=square, inverse=square, to_pose=square, body=3, rows=(4, 3), moved=(n, 8),
+        )  # fmt: skip
+        functions = (rates, "ppfdd"), (linearise, "ppd"), (factor, "ppfdf"), (solve, "ppfdfdd")
+        addresses = [address_of(*each) for each in functions]
+        sizes = n, int(contacts.state[n]), len(motion.breaks) - 1
+        super().__init__(SystemRecord(contacts, motion, layout.made(), *sizes, *addresses))
+        self.contacts, self.motion, self.work, self.keepalive = contacts, motion, self.record.work, keepalive
 
 
 @kernel
 def load_of(own, piece, since, c):
-    """Normal force of one of the identical contacts that contact c stands for."""
-    load, at = doubles(own.load), 2 * piece * own.contacts + c
-    return load[at] + since * load[at + own.contacts]
+    """Return the normal force of one of the identical contacts that contact c stands for."""
+    load, first = own.motion.load, 2 * piece * own.size + c
+    return load[first] + since * load[first + own.size]
+
+
+@kernel
+def total_load(own, piece, since, c):
+    """Return the normal force of all identical contacts that contact c stands for."""
+    return own.contacts.count[c] * load_of(own, piece, since, c)
 
 
 @kernel
 def record_of(own, piece, c):
-    """Address of the record of contact c with the shape that it has on a piece."""
-    return integers(own.record)[integers(own.row)[piece * own.contacts + c]]
+    """Return the address of the record of contact c with the shape that it has on a piece."""
+    return own.contacts.record[own.motion.row[piece * own.size + c]]
 
 
 @kernel
-def place_at(own, piece, since, c, state):
-    """Address of where the frame of contact c is (see `Contacts.place`), and that of the velocity it sees [3].
+def function_of(own, c, which):
+    """Return the address of one of the functions of contact c, `EVALUATE` to `PULL_BACK`."""
+    return own.contacts.calls[CALLS * c + which]
 
-    That is the body's at `state` (address of its velocity and pose), less the one that the world's side of the contact
-    would have there. What carries the frame moves and turns it; ground under a patch on the body turns about the
-    world's origin.
+
+@kernel
+def maps_of(own, c):
+    """Return the places of A, G and H of contact c."""
+    maps = at(own.work.maps, 27 * c)
+    return maps, at(maps, 9), at(maps, 18)
+
+
+@kernel
+def linearisation_of(own, c):
+    """Return the workspace of the linearisation of contact c."""
+    return at(own.work.workspace, own.contacts.linear[c])
+
+
+@kernel
+def place_at(own, piece, since, c, body):
+    """Return the place of the frame of contact c (see `Contacts.place`), and the velocity [3] that the contact sees.
+
+    That is the body's at `body` (velocity and pose), less the one that the world's side of the contact would have
+    there. What carries the frame moves and turns it; ground under a patch on the body turns about the world's origin.
     """
-    if own.mover == 0:
-        return at(own.place, 4 * c), state
-    mount, place, y = integers(own.mount)[c], doubles(at(own.place, 4 * c)), doubles(state)
-    mover = doubles(at(own.mover, 9 * (piece * own.contacts + c)))
-    moved = doubles(at(own.moved, 8 * c))
-    vx, vy = mover[3] + since * mover[6], mover[4] + since * mover[7]
-    omega, dx, dy = mover[5] + since * mover[8], y[3], y[4]
+    if not exists(own.motion.mover):
+        return at(own.contacts.place, 4 * c), body
+    place, moved = at(own.contacts.place, 4 * c), at(own.work.moved, 8 * c)
+    mover = at(own.motion.mover, 9 * (piece * own.size + c))
+    vx, vy, omega = mover[3] + since * mover[6], mover[4] + since * mover[7], mover[5] + since * mover[8]
+    dx, dy = body[3], body[4]
     for i in range(4):
         moved[i] = place[i]
-    if mount == WORLD:
+    if own.contacts.mount[c] == WORLD:
         half = 0.5 * since
         turned = mover[2] + since * (mover[5] + half * mover[8])
-        c_t, s_t = math.cos(turned), math.sin(turned)
+        cos, sin = math.cos(turned), math.sin(turned)
         moved[0] += mover[0] + since * (mover[3] + half * mover[6])
         moved[1] += mover[1] + since * (mover[4] + half * mover[7])
-        moved[2], moved[3] = c_t * place[2] - s_t * place[3], s_t * place[2] + c_t * place[3]
+        moved[2], moved[3] = cos * place[2] - sin * place[3], sin * place[2] + cos * place[3]
         dx, dy = dx - moved[0], dy - moved[1]
-    moved[4] = y[0] - (vx - omega * dy)
-    moved[5] = y[1] - (vy + omega * dx)
-    moved[6] = y[2] - omega
+    moved[4], moved[5], moved[6] = body[0] - (vx - omega * dy), body[1] - (vy + omega * dx), body[2] - omega
     moved[7] = omega
-    return at(own.moved, 8 * c), at(own.moved, 8 * c + 4)
+    return moved, at(moved, 4)
 
 
 @kernel
 def seen_by(own, c, y):
-    """Address of the velocity that contact c sees [3], as `rates` of the state `y` left it."""
-    return at(y, own.bristles) if own.mover == 0 else at(own.moved, 8 * c + 4)
+    """Return the velocity [3] that contact c sees, as `rates` of the state `y` left it."""
+    return at(own.work.moved, 8 * c + 4) if exists(own.motion.mover) else at(y, own.bristles)
 
 
 @entry
 def rates(system, piece, since, y, dy):
-    """Right-hand side `dy` at `since` seconds into a piece; wrenches per unit load into the workspace."""
+    """Write the right-hand side `dy` at `since` seconds into a piece, and wrenches per unit load into the workspace."""
     own = read(system)
-    o, six = own.bristles, 6 * piece
-    u, pose, out = doubles(at(y, o)), doubles(at(y, o + 3)), doubles(at(dy, o))
-    a, total, force = doubles(own.stiffness), doubles(own.body), doubles(own.force)
+    work, body, out, a = own.work, at(y, own.bristles), at(dy, own.bristles), own.work.stiffness
+    force = at(own.motion.force, 6 * piece)
+    total = plus(three(force), since, three(at(force, 3)))
+    for c in range(own.size):
+        first, w = own.contacts.state[c], at(work.wrench, 3 * c)
+        place, seen = place_at(own, piece, since, c, body)
+        contact_map(own.contacts.mount[c], place, at(body, 3), a)
+        put(work.twist, applied(a, seen))
+        call(function_of(own, c, EVALUATE), (record_of(own, piece, c), at(y, first), work.twist, at(dy, first), w))
+        total = plus(total, total_load(own, piece, since, c), applied_transposed(a, w))
     for i in range(3):
-        total[i] = force[six + i] + since * force[six + 3 + i]
-    for c in range(own.contacts):
-        first, w = integers(own.state)[c], at(own.wrench, 3 * c)
-        place, seen = place_at(own, piece, since, c, at(y, o))
-        contact_map(integers(own.mount)[c], doubles(place), pose, a)
-        times(a, doubles(seen), doubles(own.twist))
-        call(
-            integers(own.calls)[CALLS * c + EVALUATE],
-            (record_of(own, piece, c), at(y, first), own.twist, at(dy, first), w),
-        )
-        load = doubles(own.count)[c] * load_of(own, piece, since, c)
-        for i in range(3):
-            for p in range(3):
-                total[i] += load * a[3 * p + i] * doubles(w)[p]
-    for i in range(3):
-        out[i] = doubles(own.acceleration)[3 * piece + i] + doubles(own.inverse_mass)[i] * total[i]
-    if own.body_axes:
-        cos, sin = math.cos(pose[2]), math.sin(pose[2])
-        out[3] = cos * u[0] - sin * u[1]
-        out[4] = sin * u[0] + cos * u[1]
-    else:
-        out[3] = u[0]
-        out[4] = u[1]
-    out[5] = u[2]
+        out[i] = own.motion.acceleration[3 * piece + i] + own.motion.inverse_mass[i] * total[i]
+    put(at(out, 3), _turned(own, body, three(body)))
+
+
+@kernel
+def _turned(own, body, u):
+    """Return a velocity of the body in world axes."""
+    x, y, s = u
+    if own.motion.body_axes:
+        cos, sin = math.cos(body[5]), math.sin(body[5])
+        x, y = cos * x - sin * y, sin * x + cos * y
+    return x, y, s
 
 
 @entry
 def linearise(system, piece, y):
     """Linearise every contact about `y`, whose `rates` were evaluated last."""
     own = read(system)
-    o = own.bristles
-    pose, v = doubles(at(y, o + 3)), doubles(own.twist)
-    for c in range(own.contacts):
-        mount, maps = integers(own.mount)[c], at(own.maps, 27 * c)
-        a, g, h = doubles(maps), doubles(at(maps, 9)), doubles(at(maps, 18))
-        place = at(own.place if own.mover == 0 else own.moved, (4 if own.mover == 0 else 8) * c)
+    work, moves = own.work, exists(own.motion.mover)
+    for c in range(own.size):
+        mount, (a, g, h) = own.contacts.mount[c], maps_of(own, c)
         seen = seen_by(own, c, y)
-        contact_map(mount, doubles(place), pose, a)
-        contact_map_slopes(mount, a, doubles(seen), doubles(at(own.wrench, 3 * c)), g, h)
-        if own.mover != 0:
-            omega = doubles(own.moved)[8 * c + 7]  # elsewhere, the other side has another velocity
+        place = at(work.moved, 8 * c) if moves else at(own.contacts.place, 4 * c)
+        contact_map(mount, place, at(y, own.bristles + 3), a)
+        contact_map_slopes(mount, a, seen, at(work.wrench, 3 * c), g, h)
+        if moves:
+            omega = work.moved[8 * c + 7]  # elsewhere, the other side has another velocity
             for i in range(3):
                 g[3 * i] -= omega * a[3 * i + 1]
                 g[3 * i + 1] += omega * a[3 * i]
-        times(a, doubles(seen), v)
-        z, lin = at(y, integers(own.state)[c]), at(own.workspace, integers(own.linear)[c])
-        call(integers(own.calls)[CALLS * c + LINEARISE], (record_of(own, piece, c), z, own.twist, lin))
+        put(work.twist, applied(a, seen))
+        z = at(y, own.contacts.state[c])
+        call(function_of(own, c, LINEARISE), (record_of(own, piece, c), z, work.twist, linearisation_of(own, c)))
 
 
 @entry
@@ -288,85 +265,53 @@ def factor(system, piece, since, y, shift):
     `(A + G/shift) u + G r_pose/shift`. (A prescribed velocity does not see the pose at all.)
     """
     own = read(system)
-    s, m, to_pose = doubles(own.stiffness), doubles(own.matrix), doubles(own.to_pose)
-    b, v, inverse, inverse_mass = doubles(own.body), doubles(own.twist), doubles(own.inverse), doubles(own.inverse_mass)
+    s, m, to_pose = own.work.stiffness, own.work.matrix, own.work.to_pose
     for i in range(9):
-        m[i] = shift if i % 4 == 0 else 0.0
-        to_pose[i] = 0.0
-    for c in range(own.contacts):
-        z, lin = at(y, integers(own.state)[c]), at(own.workspace, integers(own.linear)[c])
-        call(integers(own.calls)[CALLS * c + FACTOR], (record_of(own, piece, c), z, shift, lin, own.stiffness))
-        load = doubles(own.count)[c] * load_of(own, piece, since, c)
-        maps = at(own.maps, 27 * c)
-        a, g, h = doubles(maps), doubles(at(maps, 9)), doubles(at(maps, 18))
+        m[i], to_pose[i] = 0.0, 0.0
+    for c in range(own.size):
+        z, (a, g, h) = at(y, own.contacts.state[c]), maps_of(own, c)
+        call(function_of(own, c, FACTOR), (record_of(own, piece, c), z, shift, linearisation_of(own, c), s))
+        load = total_load(own, piece, since, c)
         for j in range(3):
-            for p in range(3):
-                b[p] = s[3 * p] * a[j] + s[3 * p + 1] * a[3 + j] + s[3 * p + 2] * a[6 + j]
-                v[p] = s[3 * p] * g[j] + s[3 * p + 1] * g[3 + j] + s[3 * p + 2] * g[6 + j]
+            by_u = applied_transposed(a, applied(s, (a[j], a[3 + j], a[6 + j])))
+            bpy = applied_transposed(a, applied(s, (g[j], g[3 + j], g[6 + j])))
             for i in range(3):
-                per_velocity = a[i] * b[0] + a[3 + i] * b[1] + a[6 + i] * b[2]
-                per_pose = h[3 * i + j] + a[i] * v[0] + a[3 + i] * v[1] + a[6 + i] * v[2]
-                weight = inverse_mass[i] * load
-                to_pose[3 * i + j] += weight * per_pose / shift
-                m[3 * i + j] -= weight * (per_velocity + per_pose / shift)
-    for i in range(3):
-        for j in range(3):
-            inverse[3 * i + j] = _cofactor(m, j, i)
-    determinant = m[0] * inverse[0] + m[1] * inverse[3] + m[2] * inverse[6]
-    for i in range(9):
-        inverse[i] /= determinant
-
-
-@kernel
-def _cofactor(m, i, j):
-    """Signed cofactor of a 3 x 3 matrix; cyclic neighbours carry the sign."""
-    i1, i2, j1, j2 = (i + 1) % 3, (i + 2) % 3, (j + 1) % 3, (j + 2) % 3
-    return m[3 * i1 + j1] * m[3 * i2 + j2] - m[3 * i1 + j2] * m[3 * i2 + j1]
+                weight, per_pose = own.motion.inverse_mass[i] * load, (h[3 * i + j] + bpy[i]) / shift
+                to_pose[3 * i + j] += weight * per_pose
+                m[3 * i + j] += weight * (by_u[i] + per_pose)
+    put_all(own.work.inverse, inverse(shift, m))
 
 
 @entry
 def solve(system, piece, since, y, shift, r, out):
     """Solve `(shift I - J) out = r` with the matrix that `factor` prepared."""
     own = read(system)
-    o, state, linear, calls = own.bristles, integers(own.state), integers(own.linear), integers(own.calls)
-    w, v, b = doubles(own.stiffness), doubles(own.twist), doubles(own.body)
-    r_body, r_pose, to_pose = doubles(at(r, o)), doubles(at(r, o + 3)), doubles(own.to_pose)
-    times(to_pose, r_pose, b)
-    for i in range(3):
-        b[i] += r_body[i]
-    for c in range(own.contacts):
-        first, lin = state[c], at(own.workspace, linear[c])
-        call(
-            calls[CALLS * c + ELIMINATE],
-            (record_of(own, piece, c), at(y, first), shift, at(r, first), lin, own.stiffness),
-        )
-        load = doubles(own.count)[c] * load_of(own, piece, since, c)
-        a = doubles(at(own.maps, 27 * c))
-        for i in range(3):
-            force = a[i] * w[0] + a[3 + i] * w[1] + a[6 + i] * w[2]
-            b[i] += doubles(own.inverse_mass)[i] * load * force
-    u, pose, held = doubles(at(out, o)), doubles(at(out, o + 3)), doubles(at(y, o))
-    times(doubles(own.inverse), b, u)
-    per_shift = 1.0 / shift
-    pose[2] = per_shift * (r_pose[2] + u[2])
-    if own.body_axes:
-        cos, sin = math.cos(held[5]), math.sin(held[5])
-        pose[0] = per_shift * (r_pose[0] + cos * u[0] - sin * u[1] - (sin * held[0] + cos * held[1]) * pose[2])
-        pose[1] = per_shift * (r_pose[1] + sin * u[0] + cos * u[1] + (cos * held[0] - sin * held[1]) * pose[2])
-    else:
-        pose[0] = per_shift * (r_pose[0] + u[0])
-        pose[1] = per_shift * (r_pose[1] + u[1])
-    for c in range(own.contacts):
-        first, lin, maps = state[c], at(own.workspace, linear[c]), at(own.maps, 27 * c)
-        a, g = doubles(maps), doubles(at(maps, 9))
-        for i in range(3):
-            turn = g[3 * i] * pose[0] + g[3 * i + 1] * pose[1] + g[3 * i + 2] * pose[2]
-            v[i] = a[3 * i] * u[0] + a[3 * i + 1] * u[1] + a[3 * i + 2] * u[2] + turn
-        record = record_of(own, piece, c)
-        call(calls[CALLS * c + BACK_SUBSTITUTE], (record, at(y, first), at(r, first), own.twist, lin, at(out, first)))
+    w, v, body, inverse_mass = own.work.stiffness, own.work.twist, at(y, own.bristles), own.motion.inverse_mass
+    r_body, r_pose = at(r, own.bristles), at(r, own.bristles + 3)
+    b = plus(three(r_body), 1.0, applied(own.work.to_pose, r_pose))
+    for c in range(own.size):
+        first = own.contacts.state[c]
+        states = record_of(own, piece, c), at(y, first), shift, at(r, first), linearisation_of(own, c), w
+        call(function_of(own, c, ELIMINATE), states)
+        load, force = total_load(own, piece, since, c), applied_transposed(maps_of(own, c)[0], w)
+        b = plus(b, load, (inverse_mass[0] * force[0], inverse_mass[1] * force[1], inverse_mass[2] * force[2]))
+    u, pose, per_shift = at(out, own.bristles), at(out, own.bristles + 3), 1.0 / shift
+    put(u, applied(own.work.inverse, b))
+    px, py, s = plus(three(r_pose), 1.0, _turned(own, body, three(u)))
+    pose[2] = per_shift * s
+    if own.motion.body_axes:
+        cos, sin = math.cos(body[5]), math.sin(body[5])
+        px -= (sin * body[0] + cos * body[1]) * pose[2]
+        py += (cos * body[0] - sin * body[1]) * pose[2]
+    pose[0], pose[1] = per_shift * px, per_shift * py
+    for c in range(own.size):
+        first, (a, g, _) = own.contacts.state[c], maps_of(own, c)
+        put(v, plus(applied(a, u), 1.0, applied(g, pose)))
+        states = record_of(own, piece, c), at(y, first), at(r, first), v, linearisation_of(own, c), at(out, first)
+        call(function_of(own, c, BACK_SUBSTITUTE), states)
 
 
 @jit
 def right_hand_side(system, piece, since, y, dy):
-    """`rates` for callers in Python, as an explicit or a general implicit solver needs it; contiguous arrays."""
+    """Write `rates` for callers in Python, as an explicit or a general implicit solver needs it; contiguous arrays."""
     call(read(system).rates, (system, piece, since, y, dy))

@@ -7,13 +7,16 @@ body needs to know of a contact; what is behind its wrench is called by address 
 
 from __future__ import annotations
 
+import inspect
 import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction.compiler import kernel
-from planarfriction.kernels.pointers import address_of
+from planarfriction.compiler import entry, kernel
+from planarfriction.compiler.calls import address_of
+from planarfriction.compiler.memory import Doubles, Integers, Layout
+from planarfriction.kernels.vectors import plus, times
 
 WORLD, BODY, BODY_AXES = 0, 1, 2
 """Fixed to the world; fixed to the body; fixed to a body whose prescribed velocity is given in its own axes."""
@@ -25,10 +28,23 @@ CALLS = 8
 """How many there are."""
 
 
-class ModelFunctions(NamedTuple):
-    """The compiled functions of a kind of model, for the bristles z of one contact, per unit normal load.
+class Rows(NamedTuple):
+    """Twist and wrench of a contact and their changes, [3] each."""
 
-    Their first argument is the address of the contact's record, the others are addresses of doubles but for `shift`
+    twist: Doubles
+    wrench: Doubles
+    d_twist: Doubles
+    d_wrench: Doubles
+
+
+ROWS = Layout(Rows, twist=3, wrench=3, d_twist=3, d_wrench=3).offsets
+"""Rows [4, 3] as `ModelFunctions` take them (see `memory.arrays_at`)."""
+
+
+class ModelFunctions(NamedTuple):
+    """Compiled functions of a kind of model, for the bristles z of one contact, per unit normal load.
+
+    Their first argument is the address of the contact's record, the others are pointers to doubles but for `shift`
     and the two changes. With `z' = f(z, V)`, `D = shift I - df/dz` and the wrench `W(z, V)`:
     """
 
@@ -45,45 +61,70 @@ class ModelFunctions(NamedTuple):
     change: Any = None
     """`(contact, z, z', lin, dz, dz', rows, friction, size)`: write the change `dz'` of z' and that of the wrench.
 
-    `rows` [4, 3] holds V, W, dV and takes dW. The changes come from `dz`, `dV` and from relative changes of all
+    `rows` are `Rows` that hold V, W, dV and take dW. The changes come from `dz`, `dV` and from relative changes of all
     coefficients of friction and of the size of the patch. None: the model takes no part in derivatives of scenes."""
     solve_transposed: Any = None
     """`(contact, z, r, lin, out)`: solve `D' out = r` with the D that `factor` prepared."""
     pull_back: Any = None
     """`(contact, z, lin, l, rows, out)`: the transpose of `change`, at held coefficients.
 
-    From `l` of z' and `rows[3]` of the wrench write `(df/dz)' l + (dW/dz)' rows[3]` to `out` and the same by V to
-    `rows[2]`."""
+    From `l` of z' and the wrench's `rows.d_wrench` write `(df/dz)' l + (dW/dz)' d_wrench` to `out` and the same by V to
+    `rows.d_twist`."""
 
 
-WORDS = ("ppppp", "pppp", "ppfpp", "ppfppp", "pppppp", "pppppppff", "ppppp", "pppppp")
-"""Arguments of `ModelFunctions` (see `pointers.address_of`)."""
+WORDS = ("pdddd", "pddd", "pdfdd", "pdfddd", "pddddd", "pddddddff", "pdddd", "pddddd")
+"""Arguments of `ModelFunctions` (see `calls.address_of`)."""
+
+
+def functions_of(name: str, templates: tuple, model: Any) -> ModelFunctions:
+    """Return the functions of a model: each template with it as first argument, as entry point `<name>_<template>`."""
+    return ModelFunctions(*(_bound(template, model, name) for template in templates))
+
+
+def _bound(template: Any, model: Any, name: str) -> Any:
+    """Write a function that calls a template with a model; a closure could not be kept on disk."""
+    function = template.py_func
+    arguments = ", ".join(list(inspect.signature(function).parameters)[1:])
+    title = f"{name}_{function.__name__}"
+    source = f"def {title}({arguments}):\n    template(model, {arguments})\n"
+    space = {"template": template, "model": model, "__name__": function.__module__}
+    exec(compile(source, function.__code__.co_filename, "exec"), space)
+    return entry(space[title])
 
 
 def calls_of(functions: ModelFunctions, *, change: bool = False) -> np.ndarray:
-    """Addresses of the functions of a model, compiled or read from the cache, [8]; from `change` on only if asked."""
+    """Return the addresses of the functions of a model, compiled or read from the cache, [8].
+
+    Those from `change` on are 0 unless asked for.
+    """
     wanted = functions if change else functions[:CHANGE]
     found = [address_of(each, words) if each else 0 for each, words in zip(wanted, WORDS, strict=False)]
     return np.array(found + [0] * (CALLS - len(found)), np.int64)
 
 
+@kernel
+def traction(law, z, rate, u):
+    """Return `-(sigma_0 z + sigma_1 z' + sigma_2 u)` of a bristle of any dimension."""
+    return plus(plus(times(-law.sigma_0, z), -law.sigma_1, rate), -law.sigma_2, u)
+
+
 class Contacts(NamedTuple):
     """C contacts and the R shapes they take."""
 
-    calls: np.ndarray
-    """Addresses of each contact's `ModelFunctions`, int [C, 8]."""
-    record: np.ndarray
-    """Addresses of the records of contacts, one for each shape, int [R]."""
-    mount: np.ndarray
-    """`WORLD`, `BODY` or `BODY_AXES`, int [C]."""
-    place: np.ndarray
+    calls: Integers
+    """Addresses of each contact's `ModelFunctions`, [C, 8]."""
+    record: Integers
+    """Addresses of the records of contacts, one for each shape, [R]."""
+    mount: Integers
+    """`WORLD`, `BODY` or `BODY_AXES`, [C]."""
+    place: Doubles
     """Position of the contact frame on its mount, cosine and sine of its angle, [C, 4]."""
-    count: np.ndarray
-    """How many identical contacts share the state, [C]."""
-    state: np.ndarray
-    """Where the bristles of each contact begin in the state vector, int [C + 1]."""
-    linear: np.ndarray
-    """Where the linearisation of each contact begins in its workspace, int [C + 1]."""
+    count: Doubles
+    """Number of identical contacts that share the state, [C]."""
+    state: Integers
+    """Number of the state at which the bristles of each contact begin, [C + 1]."""
+    linear: Integers
+    """Number of the workspace at which the linearisation of each contact begins, [C + 1]."""
 
 
 @kernel

@@ -20,8 +20,9 @@ import math
 
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import entry, jit, kernel
+from planarfriction.compiler.calls import address, address_of, call
+from planarfriction.compiler.memory import at, doubles, integers
 from planarfriction.kernels.coupling_rows import INVALID, read
-from planarfriction.kernels.pointers import address, address_of, at, call, doubles, integers
 from planarfriction.kernels.small_matrices import leave_out_rising, solved
 
 DOWNHILL = 0.5

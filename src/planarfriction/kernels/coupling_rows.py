@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction.kernels.records import reader
+from planarfriction.compiler.memory import reader
 from planarfriction.kernels.step_slopes import NUMBERS
 
 

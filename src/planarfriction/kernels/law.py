@@ -5,8 +5,8 @@ from __future__ import annotations
 from planarfriction import formulas
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
+from planarfriction.compiler.memory import reader
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels.records import reader
 
 LAW = len(LawNumbers._fields)
 """Numbers of a law, with which the row of a contact begins."""

@@ -1,4 +1,4 @@
-"""A contact of several parts, as the solver calls it (see `contacts.ModelFunctions`).
+"""A contact of several parts as the solver sees it (see `contacts.ModelFunctions`): a loop over their records.
 
 Parts see the same twist, share the load and know nothing of each other: the wrench is the sum of theirs, each times the
 share of the part, and everything else is done part by part, by the functions of a contact of one part.
@@ -9,6 +9,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from planarfriction.compiler import entry, kernel
+from planarfriction.compiler.calls import call
+from planarfriction.compiler.memory import Doubles, Integers, arrays_at, at, viewer
 from planarfriction.kernels.contacts import (
     BACK_SUBSTITUTE,
     CHANGE,
@@ -17,11 +19,12 @@ from planarfriction.kernels.contacts import (
     FACTOR,
     LINEARISE,
     PULL_BACK,
+    ROWS,
     SOLVE_TRANSPOSED,
     ModelFunctions,
 )
-from planarfriction.kernels.pointers import at, call, doubles, integers
-from planarfriction.kernels.records import reader
+from planarfriction.kernels.small_matrices import nine
+from planarfriction.kernels.vectors import plus, put, put_all, three, times
 
 
 class PartsContact(NamedTuple):
@@ -29,120 +32,111 @@ class PartsContact(NamedTuple):
 
     count: int
     states: int
-    """States of a part."""
+    """Number of states of a part."""
     workspace: int
-    """Numbers that a linearisation of a part takes."""
-    calls: int
-    """Where the addresses of the functions of a part are, [8]."""
-    records: int
-    """Where the addresses of the records of the parts are, [count]."""
-    shares: int
-    """Where their shares of the load are, [count]."""
+    """Number of words that a linearisation of a part takes."""
+    calls: Integers
+    """Addresses of the functions of a part, [8]."""
+    records: Integers
+    """Addresses of the records of the parts, [count]."""
+    shares: Doubles
+    """Shares of the parts in the load, [count]."""
 
 
-read = reader(PartsContact)
+read = viewer(PartsContact)
 
 
 @kernel
-def _part(own, k):
-    """Record of part k, where its states and its linearisation begin, and its share."""
-    return integers(own.records)[k], k * own.states, k * own.workspace, doubles(own.shares)[k]
+def _part(own, k, z, lin):
+    """Return the record of part k, the pointers to its states and its linearisation, and its first state."""
+    first = k * own.states
+    return own.records[k], at(z, first), at(lin, k * own.workspace), first
 
 
 @entry
 def evaluate(contact, z, v, zdot, w):
-    """See `ModelFunctions`."""
-    own, one = read(contact), doubles(w)
-    x, y, tau = 0.0, 0.0, 0.0
+    """Write the rates of all parts, and the sum of their wrenches."""
+    own, total = read(contact), (0.0, 0.0, 0.0)
     for k in range(own.count):
-        part, first, _, share = _part(own, k)
-        call(integers(own.calls)[EVALUATE], (part, at(z, first), v, at(zdot, first), w))
-        x, y, tau = x + share * one[0], y + share * one[1], tau + share * one[2]
-    one[0], one[1], one[2] = x, y, tau
+        first = k * own.states
+        call(own.calls[EVALUATE], (own.records[k], at(z, first), v, at(zdot, first), w))
+        total = plus(total, own.shares[k], three(w))
+    put(w, total)
 
 
 @entry
 def linearise(contact, z, v, lin):
-    """See `ModelFunctions`."""
+    """Linearise all parts."""
     own = read(contact)
     for k in range(own.count):
-        part, first, work, _ = _part(own, k)
-        call(integers(own.calls)[LINEARISE], (part, at(z, first), v, at(lin, work)))
+        part, z_k, lin_k, _ = _part(own, k, z, lin)
+        call(own.calls[LINEARISE], (part, z_k, v, lin_k))
 
 
 @entry
 def factor(contact, z, shift, lin, stiffness):
-    """See `ModelFunctions`."""
-    own, one = read(contact), doubles(stiffness)
-    a, b, c, d, e, f, g, h, i = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    """Prepare D of all parts, and write the sum of their stiffnesses."""
+    own, total = read(contact), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for k in range(own.count):
-        part, first, work, share = _part(own, k)
-        call(integers(own.calls)[FACTOR], (part, at(z, first), shift, at(lin, work), stiffness))
-        a, b, c = a + share * one[0], b + share * one[1], c + share * one[2]
-        d, e, f = d + share * one[3], e + share * one[4], f + share * one[5]
-        g, h, i = g + share * one[6], h + share * one[7], i + share * one[8]
-    one[0], one[1], one[2], one[3], one[4], one[5], one[6], one[7], one[8] = a, b, c, d, e, f, g, h, i
+        part, z_k, lin_k, _ = _part(own, k, z, lin)
+        call(own.calls[FACTOR], (part, z_k, shift, lin_k, stiffness))
+        total = plus(total, own.shares[k], nine(stiffness))
+    put_all(stiffness, total)
 
 
 @entry
 def eliminate(contact, z, shift, r, lin, w):
-    """See `ModelFunctions`."""
-    own, one = read(contact), doubles(w)
-    x, y, tau = 0.0, 0.0, 0.0
+    """Write the sum of the wrenches that the residuals of all parts cause."""
+    own, total = read(contact), (0.0, 0.0, 0.0)
     for k in range(own.count):
-        part, first, work, share = _part(own, k)
-        call(integers(own.calls)[ELIMINATE], (part, at(z, first), shift, at(r, first), at(lin, work), w))
-        x, y, tau = x + share * one[0], y + share * one[1], tau + share * one[2]
-    one[0], one[1], one[2] = x, y, tau
+        part, z_k, lin_k, first = _part(own, k, z, lin)
+        call(own.calls[ELIMINATE], (part, z_k, shift, at(r, first), lin_k, w))
+        total = plus(total, own.shares[k], three(w))
+    put(w, total)
 
 
 @entry
 def back_substitute(contact, z, r, dv, lin, out):
-    """See `ModelFunctions`."""
+    """Solve for the states of all parts."""
     own = read(contact)
     for k in range(own.count):
-        part, first, work, _ = _part(own, k)
-        call(
-            integers(own.calls)[BACK_SUBSTITUTE], (part, at(z, first), at(r, first), dv, at(lin, work), at(out, first))
-        )
+        part, z_k, lin_k, first = _part(own, k, z, lin)
+        call(own.calls[BACK_SUBSTITUTE], (part, z_k, at(r, first), dv, lin_k, at(out, first)))
 
 
 @entry
 def change(contact, z, zdot, lin, dz, dzdot, rows, friction, size):
-    """See `ModelFunctions`; a part sees the wrench of all in the place of its own, as shares add up to one."""
-    own, one = read(contact), doubles(at(rows, 9))
-    x, y, tau = 0.0, 0.0, 0.0
+    """Write the changes of all parts; a part sees the wrench of all as its own, since shares add up to one."""
+    own, total, changes = read(contact), (0.0, 0.0, 0.0), arrays_at(ROWS, rows)
     for k in range(own.count):
-        part, first, work, share = _part(own, k)
-        states = at(z, first), at(zdot, first), at(lin, work), at(dz, first), at(dzdot, first)
-        call(integers(own.calls)[CHANGE], (part, *states, rows, friction, size))
-        x, y, tau = x + share * one[0], y + share * one[1], tau + share * one[2]
-    one[0], one[1], one[2] = x, y, tau
+        part, z_k, lin_k, first = _part(own, k, z, lin)
+        states = part, z_k, at(zdot, first), lin_k, at(dz, first), at(dzdot, first)
+        call(own.calls[CHANGE], (*states, rows, friction, size))
+        total = plus(total, own.shares[k], three(changes.d_wrench))
+    put(changes.d_wrench, total)
 
 
 @entry
 def solve_transposed(contact, z, r, lin, out):
-    """See `ModelFunctions`."""
+    """Solve the transposed equations of all parts."""
     own = read(contact)
     for k in range(own.count):
-        part, first, work, _ = _part(own, k)
-        call(integers(own.calls)[SOLVE_TRANSPOSED], (part, at(z, first), at(r, first), at(lin, work), at(out, first)))
+        part, z_k, lin_k, first = _part(own, k, z, lin)
+        call(own.calls[SOLVE_TRANSPOSED], (part, z_k, at(r, first), lin_k, at(out, first)))
 
 
 @entry
 def pull_back(contact, z, lin, dzdot, rows, out):
-    """See `ModelFunctions`; a part takes its share of the wrench."""
-    own, v, w = read(contact), doubles(at(rows, 6)), doubles(at(rows, 9))
-    fx, fy, tau = w[0], w[1], w[2]
-    x, y, s = 0.0, 0.0, 0.0
+    """Write the transpose of `change`; a part takes its share of the wrench."""
+    own, total, changes = read(contact), (0.0, 0.0, 0.0), arrays_at(ROWS, rows)
+    wrench = three(changes.d_wrench)
     for k in range(own.count):
-        part, first, work, share = _part(own, k)
-        w[0], w[1], w[2] = share * fx, share * fy, share * tau
-        states = at(z, first), at(lin, work), at(dzdot, first), rows, at(out, first)
-        call(integers(own.calls)[PULL_BACK], (part, *states))
-        x, y, s = x + v[0], y + v[1], s + v[2]
-    v[0], v[1], v[2] = x, y, s
-    w[0], w[1], w[2] = fx, fy, tau
+        part, z_k, lin_k, first = _part(own, k, z, lin)
+        put(changes.d_wrench, times(own.shares[k], wrench))
+        call(own.calls[PULL_BACK], (part, z_k, lin_k, at(dzdot, first), rows, at(out, first)))
+        total = plus(total, 1.0, three(changes.d_twist))
+    put(changes.d_twist, total)
+    put(changes.d_wrench, wrench)
 
 
 FUNCTIONS = ModelFunctions(evaluate, linearise, factor, eliminate, back_substitute, change, solve_transposed, pull_back)

@@ -21,12 +21,12 @@ import numpy as np
 from planarfriction import formulas
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import entry, jit, kernel
+from planarfriction.compiler.calls import address_of
+from planarfriction.compiler.memory import doubles, reader
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import bristle_step, rollouts
 from planarfriction.kernels.bristle_step import Bristle, BristleStep
-from planarfriction.kernels.pointers import address_of, doubles
 from planarfriction.kernels.published_contact import Shape
-from planarfriction.kernels.records import reader
 from planarfriction.kernels.rollouts import Cotangents
 from planarfriction.kernels.surfaces import sliding, sliding_jacobian
 from planarfriction.kernels.vectors import applied_back, dot, norm, plus

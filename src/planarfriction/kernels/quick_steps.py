@@ -14,8 +14,8 @@ from numba import types
 
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import entry, jit, kernel
-from planarfriction.kernels.pointers import address, address_of, at, call, doubles, integers
-from planarfriction.kernels.records import reader, size_of
+from planarfriction.compiler.calls import address, address_of, call
+from planarfriction.compiler.memory import at, doubles, integers, reader, size_of
 from planarfriction.kernels.rollouts import Place
 
 _place = reader(Place)

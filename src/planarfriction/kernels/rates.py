@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from planarfriction.compiler import jit
-from planarfriction.kernels.pointers import address, call
+from planarfriction.compiler.calls import address, call
 
 
 @jit

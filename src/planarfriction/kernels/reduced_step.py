@@ -22,11 +22,11 @@ from typing import NamedTuple
 from planarfriction import formulas
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import entry, kernel
+from planarfriction.compiler.calls import address_of
+from planarfriction.compiler.memory import floats, reader
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import reduced, rollouts
 from planarfriction.kernels.bristle_step import ROUNDING
-from planarfriction.kernels.pointers import address_of, floats
-from planarfriction.kernels.records import reader
 from planarfriction.kernels.reduced import to_origin
 from planarfriction.kernels.reduced_contact import Shape
 from planarfriction.kernels.rollouts import Cotangents

@@ -29,9 +29,9 @@ from numba.core.errors import NumbaError
 
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import jit, kernel
+from planarfriction.compiler.calls import address, call
+from planarfriction.compiler.memory import at, doubles, reader, size_of
 from planarfriction.kernels.law import LAW, law_of
-from planarfriction.kernels.pointers import address, at, call, doubles
-from planarfriction.kernels.records import reader, size_of
 from planarfriction.kernels.vectors import accumulate, dot, plus, put, three, times
 
 SCRATCH = 9

@@ -4,22 +4,31 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from planarfriction.compiler import compiled_math as xp
-from planarfriction.compiler import jit, kernel
-from planarfriction.kernels.body import load_of, place_at, read, times
+from planarfriction.compiler import entry, jit, kernel
+from planarfriction.compiler.calls import address_of, call
+from planarfriction.compiler.memory import Layout, Packed, at, exists
+from planarfriction.kernels.body import System, load_of, maps_of, place_at, read
 from planarfriction.kernels.contacts import contact_map
-from planarfriction.kernels.integration import read_run
-from planarfriction.kernels.pointers import at, call, doubles, integers
+from planarfriction.kernels.integration import Method, Output, Progress, RunRecord, Stages, combine, read_run
+from planarfriction.kernels.rest import at_rest, speed_of
+from planarfriction.kernels.small_matrices import applied, applied_transposed
+from planarfriction.kernels.step_control import MOTION, fitted, growth
+from planarfriction.kernels.vectors import norm, plus, put, three, times
 
 DONE, PAUSED, STEP_TOO_SMALL, AT_REST = 0, 1, 2, 3
 """Outcomes of `advance`."""
 
 STEPS, REJECTIONS, EVALUATIONS, JACOBIANS = 0, 1, 2, 3
-"""Rows of the statistics."""
+"""Numbers of `Progress.statistics`."""
 
-# Step control. A decaying transient is followed through all its scales only if the steps do not grow too fast: a
-# factor of 2.5 needs 8 % fewer steps than 6 for the same error of the in-hand runs.
-_SAFETY, _GROWTH, _SHRINKAGE = 0.8, 2.5, 0.1
+PIECE, SAMPLE = 0, 1
+"""Numbers of `Progress.cursor`."""
+
+SINCE, STEP, FIRST = 0, 1, 2
+"""Numbers of `Progress.clock`."""
 
 # Friction goes by the direction of a contact's twist. While a patch comes to a halt that direction may sweep across a
 # pad, which holds the patch as soon as it is all that stands still, and a step from one side of it to the other has a
@@ -39,23 +48,16 @@ _NUDGE = 1e-6
 # Smallest step relative to the time (at least 1 s): a few units in the last place of the clock.
 _RESOLUTION = 1e-15
 
-# How far a body is moved to see whether it rests, in full deflections of the bristles: on that way they go from one
-# side to the other, all but exp(-10) of it. Steps grow from one far below any swing to one that no bristle overshoots.
-_FAR, _FIRST, _LARGEST = 10.0, 1e-7, 0.1
-
-# How much faster than the stop speed a body at rest may become in swinging out, which takes bristles without damping
-# a long time: about what the change within the bristles' time lets through where they swing out in three periods.
-_SWING = 4.0
-
 
 @kernel
-def error_norm(own, y, new, error, rtol, atol):
-    """Largest of the body's components and of each contact's mean over its bristles, in units of the tolerance.
+def _error(run, own):
+    """Return the largest error of the body's components and of each contact's bristles (mean), per tolerance.
 
     Infinite where anything is not finite.
     """
-    largest, state = 0.0, integers(own.state)
-    for c in range(own.contacts):
+    y, new, error, atol, rtol = run.progress.y, run.stages.new, run.stages.error, run.atol, run.rtol
+    largest, state = 0.0, own.contacts.state
+    for c in range(own.size):
         total, count = 0.0, state[c + 1] - state[c]
         for i in range(state[c], state[c + 1]):
             e = error[i] / (atol[i] + rtol * xp.maximum(abs(y[i]), abs(new[i])))
@@ -73,54 +75,53 @@ def error_norm(own, y, new, error, rtol, atol):
 
 
 @kernel
-def _record(run, own, piece, since, state, m):
-    """Write sample m from the state at an address."""
-    many, y = own.contacts, doubles(state)
-    call(own.rates, (run.system, piece, since, state, run.rate))
+def _record(run, own, piece, since, state):
+    """Write the next sample from a state."""
+    out, m = run.output, run.progress.cursor[SAMPLE]
+    call(own.rates, (run.system, piece, since, state, run.stages.rate))
     for i in range(6):
-        doubles(run.body)[6 * m + i] = y[own.bristles + i]
-    for c in range(many):
-        load = load_of(own, piece, since, c)
-        doubles(run.load)[m * many + c] = load
-        for i in range(3):
-            doubles(run.wrench)[3 * (m * many + c) + i] = load * doubles(own.wrench)[3 * c + i]
-    if run.bristle_samples > 0:
+        out.body[6 * m + i] = state[own.bristles + i]
+    for c in range(own.size):
+        load, row = load_of(own, piece, since, c), m * own.size + c
+        out.load[row] = load
+        put(at(out.wrench, 3 * row), times(load, three(at(own.work.wrench, 3 * c))))
+    if exists(out.bristles):
         for i in range(own.bristles):
-            doubles(run.bristles)[m * own.bristles + i] = y[i]
+            out.bristles[m * own.bristles + i] = state[i]
+    run.progress.cursor[SAMPLE] = m + 1
 
 
 @kernel
 def _time_slope(own, piece, slope):
-    """`df/dt` of the body's accelerations [3]: forces and loads are linear in time."""
-    many, maps, wrench = own.contacts, doubles(own.maps), doubles(own.wrench)
+    """Write `df/dt` of the body's accelerations [3]: forces and loads are linear in time."""
+    motion, total = own.motion, three(at(own.motion.force, 6 * piece + 3))
+    for c in range(own.size):
+        load = own.contacts.count[c] * motion.load[(2 * piece + 1) * own.size + c]
+        total = plus(total, load, applied_transposed(maps_of(own, c)[0], at(own.work.wrench, 3 * c)))
     for i in range(3):
-        total = doubles(own.force)[6 * piece + 3 + i]
-        for c in range(many):
-            load = doubles(own.count)[c] * doubles(own.load)[(2 * piece + 1) * many + c]
-            for p in range(3):
-                total += load * maps[27 * c + 3 * p + i] * wrench[3 * c + p]
-        slope[i] = doubles(own.inverse_mass)[i] * total
+        slope[i] = motion.inverse_mass[i] * total[i]
 
 
 @kernel
 def _drift(run, own, piece, since, step):
-    """`df/dt` of all states [n] where what a contact touches moves: a difference over a small share of a step.
+    """Write `df/dt` of all states [n] where what a contact touches moves: a difference over a small share of a step.
 
     That is right to `_NUDGE` and costs one evaluation, while each model would have to know what its bristles say.
     """
-    by, now, out = _NUDGE * step, doubles(run.start_rate), doubles(run.drift)
-    call(own.rates, (run.system, piece, since + by, run.y, run.rate))
+    by, now, rate = _NUDGE * step, run.stages.start_rate, run.stages.rate
+    call(own.rates, (run.system, piece, since + by, run.progress.y, rate))
     for i in range(run.states):
-        out[i] = (doubles(run.rate)[i] - now[i]) / by
+        run.stages.drift[i] = (rate[i] - now[i]) / by
+    run.progress.statistics[EVALUATIONS] += 1
 
 
 @kernel
 def forget_unloaded(own, piece, y):
-    """A contact without load on the whole piece keeps no memory: it starts again from rest."""
-    load, first = doubles(own.load), 2 * piece * own.contacts
-    for c in range(own.contacts):
-        if load[first + c] == 0.0 and load[first + own.contacts + c] == 0.0:
-            for i in range(integers(own.state)[c], integers(own.state)[c + 1]):
+    """Clear the bristles of contacts without load on the whole piece: they start again from rest."""
+    load, first = own.motion.load, 2 * piece * own.size
+    for c in range(own.size):
+        if load[first + c] == 0.0 and load[first + own.size + c] == 0.0:
+            for i in range(own.contacts.state[c], own.contacts.state[c + 1]):
                 y[i] = 0.0
 
 
@@ -130,255 +131,201 @@ def _extend(run, share, value, slope, base, out):
 
     It is `(1 - s) y + s (new + (1 - s) (d_1 + s (d_2 + ...)))` with `new = y + sum m_j k_j`: a sum of stages.
     """
-    s, q, m, dense, coupling = (
-        run.stage_count,
-        run.order_of_dense,
-        doubles(run.m),
-        doubles(run.dense),
-        doubles(run.coupling),
-    )
+    s, m, dense, coupling = run.stage_count, run.method.m, run.method.dense, run.stages.coupling
     for j in range(s):
         inner, change = 0.0, 0.0
-        for p in range(q - 1, -1, -1):
+        for p in range(run.order_of_dense - 1, -1, -1):
             change = inner + share * change
             inner = dense[p * s + j] + share * inner
         coupling[j] = value * share * (m[j] + (1.0 - share) * inner)
         coupling[j] += slope * (m[j] + (1.0 - 2.0 * share) * inner + share * (1.0 - share) * change)
-    call(run.combine, (run.coupling, run.k, s, run.states, base, out))
+    call(run.combine, (coupling, run.stages.k, s, run.states, base, out))
 
 
 @kernel
 def _step(run, own, piece, since, step):
-    """The stages of one step from `y`: solution into `new`, its error estimate into `error`."""
-    n, s, k, right, coupling = run.states, run.stage_count, run.k, doubles(run.right), doubles(run.coupling)
-    shift = 1.0 / (step * run.gamma)
-    call(own.factor, (run.system, piece, since, run.y, shift))
+    """Go through the stages of one step from `y`: solution into `new`, its error estimate into `error`."""
+    n, s, method, work, y = run.states, run.stage_count, run.method, run.stages, run.progress.y
+    k, right, shift, moves = work.k, work.right, 1.0 / (step * method.gamma), exists(own.motion.mover)
+    call(own.factor, (run.system, piece, since, y, shift))
     for i in range(s):
         for j in range(i):
-            coupling[j] = doubles(run.c)[i * s + j] / step
+            work.coupling[j] = method.c[i * s + j] / step
         if i > 0:
-            call(run.combine, (at(run.a, i * s), k, i, n, run.y, run.argument))
-            time = since + doubles(run.alpha)[i] * step
-            call(own.rates, (run.system, piece, time, run.argument, run.rate))
-        call(run.combine, (run.coupling, k, i, n, run.rate if i > 0 else run.start_rate, run.right))
-        slope = doubles(run.time_gamma)[i] * step
-        if own.mover != 0:
+            call(run.combine, (at(method.a, i * s), k, i, n, y, work.argument))
+            call(own.rates, (run.system, piece, since + method.alpha[i] * step, work.argument, work.rate))
+        call(run.combine, (work.coupling, k, i, n, work.rate if i > 0 else work.start_rate, right))
+        slope = method.time_gamma[i] * step
+        if moves:
             for p in range(n):
-                right[p] += slope * doubles(run.drift)[p]
+                right[p] += slope * work.drift[p]
         else:
             for p in range(3):
-                right[n - 6 + p] += slope * doubles(run.time_slope)[p]
-        call(own.solve, (run.system, piece, since, run.y, shift, run.right, at(k, i * n)))
-    call(run.combine, (run.m, k, s, n, run.y, run.new))
-    call(run.combine, (run.e, k, s, n, run.zero, run.error))
+                right[n - 6 + p] += slope * work.time_slope[p]
+        call(own.solve, (run.system, piece, since, y, shift, right, at(k, i * n)))
+    call(run.combine, (method.m, k, s, n, y, work.new))
+    call(run.combine, (method.e, k, s, n, work.zero, work.error))
 
 
 @kernel
-def _length(own, vector):
-    """Length of a velocity or acceleration of the body [3], its spin times the lever arm."""
-    arm = own.stop_radius
-    return math.sqrt(vector[0] * vector[0] + vector[1] * vector[1] + arm * arm * vector[2] * vector[2])
-
-
-@kernel
-def _direction(own, piece, since, c, state, out):
-    """Write the direction of the twist of contact c in a state into `out` [3]; zeros at rest."""
-    a, v, y = doubles(own.stiffness), doubles(own.twist), at(state, own.bristles)
-    place, seen = place_at(own, piece, since, c, y)
-    contact_map(integers(own.mount)[c], doubles(place), doubles(at(y, 3)), a)
-    times(a, doubles(seen), v)
-    size = _length(own, v)
-    per_size = 1.0 / xp.where(size > 0.0, size, 1.0)
-    out[0], out[1], out[2] = per_size * v[0], per_size * v[1], per_size * own.stop_radius * v[2]
+def _direction(own, piece, since, c, state):
+    """Return the direction of the twist of contact c in a state; zeros at rest."""
+    a, v, body = own.work.stiffness, own.work.twist, at(state, own.bristles)
+    place, seen = place_at(own, piece, since, c, body)
+    contact_map(own.contacts.mount[c], place, at(body, 3), a)
+    put(v, applied(a, seen))
+    size = speed_of(own, v)
+    x, y, s = times(1.0 / xp.where(size > 0.0, size, 1.0), three(v))
+    return x, y, own.motion.stop_radius * s
 
 
 @kernel
 def _turn(run, own, piece, since, step):
-    """Largest change of direction of the twist of a contact of few states from `y` to `new`, as an angle [rad]."""
-    before, after, largest = doubles(own.body), doubles(own.matrix), 0.0
-    for c in range(own.contacts):
-        if integers(own.state)[c + 1] - integers(own.state)[c] > _MANY:
-            continue
-        _direction(own, piece, since, c, run.y, before)
-        _direction(own, piece, since + step, c, run.new, after)
-        x, y, z = after[0] - before[0], after[1] - before[1], after[2] - before[2]
-        largest = xp.maximum(largest, math.sqrt(x * x + y * y + z * z))
+    """Return the largest change of direction [rad] of the twist of a contact of few states from `y` to `new`."""
+    largest = 0.0
+    for c in range(own.size):
+        if own.contacts.state[c + 1] - own.contacts.state[c] <= _MANY:
+            before = _direction(own, piece, since, c, run.progress.y)
+            after = _direction(own, piece, since + step, c, run.stages.new)
+            largest = xp.maximum(largest, norm(plus(after, -1.0, before)))
     return largest
 
 
 @kernel
-def _look_inside(run, own, piece, since, step):
-    """Norm of what a step that turns a contact's twist misses on its way, and how many places were looked at.
+def _missed_inside(run, own, piece, since, step):
+    """Return the error of a step that turns a contact's twist at places on its way, per tolerance.
 
     The residual of the continuous extension, through the matrix of the step, is what a stage there would have added.
     """
     looks = xp.minimum(_LOOKS, int(_turn(run, own, piece, since, step) / _ANGLE))
-    shift, largest = 1.0 / (step * run.gamma), 0.0
+    work, shift, largest = run.stages, 1.0 / (step * run.method.gamma), 0.0
     for i in range(looks):
         share = (i + 1.0) / (looks + 1.0)
-        _extend(run, share, 1.0, 0.0, run.y, run.argument)
-        call(own.rates, (run.system, piece, since + share * step, run.argument, run.rate))
-        _extend(run, share, 0.0, -1.0 / step, run.rate, run.right)
-        call(own.solve, (run.system, piece, since, run.y, shift, run.right, run.error))
-        norm = error_norm(own, doubles(run.y), doubles(run.new), doubles(run.error), run.rtol, doubles(run.atol))
-        largest = xp.maximum(largest, norm / _DOUBT)
-    return largest, looks
+        _extend(run, share, 1.0, 0.0, run.progress.y, work.argument)
+        call(own.rates, (run.system, piece, since + share * step, work.argument, work.rate))
+        _extend(run, share, 0.0, -1.0 / step, work.rate, work.right)
+        call(own.solve, (run.system, piece, since, run.progress.y, shift, work.right, work.error))
+        largest = xp.maximum(largest, _error(run, own) / _DOUBT)
+    run.progress.statistics[EVALUATIONS] += looks
+    return largest
+
+
+@entry
+def attempt(run, piece, since, step, fresh):
+    """Try a step, and write its error into `verdict`; `fresh` is 1 if the linearisation is yet to be made at y."""
+    run = read_run(run)
+    own, y, statistics, fresh = read(run.system), run.progress.y, run.progress.statistics, fresh == 1
+    if fresh:
+        call(own.rates, (run.system, piece, since, y, run.stages.start_rate))
+        call(own.linearise, (run.system, piece, y))
+        _time_slope(own, piece, run.stages.time_slope)
+        if exists(own.motion.mover):
+            _drift(run, own, piece, since, step)
+        statistics[JACOBIANS] += 1
+    _step(run, own, piece, since, step)
+    statistics[EVALUATIONS] += run.stage_count if fresh else run.stage_count - 1
+    error = _error(run, own)
+    if error <= 1.0:
+        error = xp.maximum(error, _missed_inside(run, own, piece, since, step))
+    run.stages.verdict[0] = error
 
 
 @kernel
-def _at_rest(run, own, piece, since):
-    """Whether the body is at rest: slow, and held by friction for good.
+def _start(run, own, piece):
+    """Start a piece: the prescribed velocity, a first step, and a sample where the motion begins."""
+    progress, motion = run.progress, own.motion
+    if exists(motion.velocity):
+        put(at(progress.y, run.states - 6), three(at(motion.velocity, 3 * piece)))
+    progress.clock[STEP] = xp.minimum(progress.clock[STEP], progress.clock[FIRST])
+    if piece == 0 and progress.cursor[SAMPLE] == 0 and run.output.time[0] == motion.breaks[0]:
+        _record(run, own, piece, 0.0, progress.y)
 
-    Slow: its speed, and what that changes by within the bristles' time, are together below the stop speed. For good: no
-    input changes any more. Held: driven by its speed and the net force, it comes to a stop before it has moved by
-    `_FAR` full deflections of the bristles or is faster than `_SWING` stop speeds, and so it does when it swings back.
-    That is tried: the body moves along the line of the net force, at the speed that follows from the work done on it
-    (damping is left out), and the bristles follow. So nothing rests in free fall, without load, on a slope steeper than
-    friction, or at a turning point while the bristles still push it back, however slow it is.
-    """
-    bristles, y, rate, push = own.bristles, doubles(run.argument), doubles(run.rate), doubles(run.time_slope)
-    speed = _length(own, doubles(at(run.y, bristles)))
-    change = _length(own, doubles(at(run.start_rate, bristles)))
-    if doubles(own.breaks)[piece] < own.settled or not speed + own.stop_time * change < own.stop_speed:
-        return False
+
+@kernel
+def _accept(run, own, piece, step, last):
+    """Take the new state after a step, and record the samples on its way."""
+    progress, samples, begin = run.progress, run.output.time, own.motion.breaks[piece]
+    since, end = progress.clock[SINCE], own.motion.breaks[piece + 1]
+    reached = end - begin if last else since + step
+    time = end if last else begin + reached
+    while progress.cursor[SAMPLE] < run.samples and samples[progress.cursor[SAMPLE]] <= time:
+        sample = samples[progress.cursor[SAMPLE]]
+        here = reached if sample == time else sample - begin
+        _extend(run, (here - since) / step, 1.0, 0.0, progress.y, run.stages.argument)
+        _record(run, own, piece, here, run.stages.argument)
     for i in range(run.states):
-        y[i] = doubles(run.y)[i]
-    for i in range(3):
-        push[i] = 0.0
-    force = _force(run, own, piece, since, push)
-    for i in range(3):
-        push[i] = rate[bristles + i] if force > 0.0 else doubles(run.y)[bristles + i]
-    size = _length(own, push)
-    if not size > 0.0:
-        return True
-    for i in range(3):
-        push[i] /= size
-    energy, most = 0.5 * speed * speed, 0.5 * (_SWING * own.stop_speed) ** 2
-    for _ in range(2):
-        way, step, force = 0.0, _FIRST, _force(run, own, piece, since, push)
-        while energy > 0.0 or way == 0.0:
-            if way > _FAR or energy > most:
-                return False
-            pace, moved = xp.maximum(math.sqrt(2.0 * energy), own.stop_speed), step * own.stop_length
-            _move(y, bristles, push, pace)
-            call(own.rates, (run.system, piece, since, run.argument, run.rate))
-            for i in range(bristles):
-                y[i] += moved / pace * rate[i]
-            before, force = force, _force(run, own, piece, since, push)
-            energy += 0.5 * (before + force) * moved
-            way, step = way + step, xp.minimum(_GROWTH * step, _LARGEST)
-        energy = 0.0
-        for i in range(3):
-            push[i] = -push[i]
-    return True
-
-
-@kernel
-def _force(run, own, piece, since, push):
-    """Acceleration of the body, if it stood still, along a direction; its size for no direction."""
-    rate, arm = doubles(at(run.rate, own.bristles)), own.stop_radius
-    _move(doubles(run.argument), own.bristles, push, 0.0)
-    call(own.rates, (run.system, piece, since, run.argument, run.rate))
-    along = push[0] * rate[0] + push[1] * rate[1] + arm * arm * push[2] * rate[2]
-    return along if push[0] != 0.0 or push[1] != 0.0 or push[2] != 0.0 else _length(own, rate)
-
-
-@kernel
-def _move(y, bristles, push, factor):
-    """Give the body a multiple of a velocity."""
-    for i in range(3):
-        y[bristles + i] = factor * push[i]
+        progress.y[i] = run.stages.new[i]
+    progress.statistics[STEPS] += 1
+    progress.clock[SINCE] = reached
+    return time
 
 
 @jit
 def advance(run, max_steps):
-    """Integrate the run at an address from where it stands to the last break, or for `max_steps` trials; an outcome.
+    """Integrate the run at an address from where it stands to the last break, or for `max_steps` trials.
 
-    The step that ends at a break is recorded (left limit) before the next piece begins.
+    The step that ends at a break is recorded (left limit) before the next piece begins. Returns an outcome.
     """
-    run = read_run(run)
-    own, n, s, samples = read(run.system), run.states, run.stage_count, run.samples
-    y, breaks, times, clock = doubles(run.y), doubles(own.breaks), doubles(run.time), doubles(run.clock)
-    cursor, statistics = integers(run.cursor), integers(run.statistics)
-    piece, m = cursor[0], cursor[1]
-    since, h, first_step = clock[0], clock[1], clock[2]
-    taken = 0
-    fresh = True  # the linearisation is yet to be made at y
-    outcome = DONE
-    while piece < own.pieces and outcome == DONE:
-        begin, end = breaks[piece], breaks[piece + 1]
-        starting = since == 0.0
+    place, run = run, read_run(run)
+    own, progress, clock, taken = read(run.system), run.progress, run.progress.clock, 0
+    while progress.cursor[PIECE] < own.pieces:
+        piece = progress.cursor[PIECE]
+        begin = own.motion.breaks[piece]
+        span, starting, fresh = own.motion.breaks[piece + 1] - begin, clock[SINCE] == 0.0, True
         if starting:
-            if own.velocity != 0:
-                for i in range(3):
-                    y[n - 6 + i] = doubles(own.velocity)[3 * piece + i]
-            h = xp.minimum(h, first_step)
-            if piece == 0 and m == 0 and times[0] == begin:
-                _record(run, own, piece, 0.0, run.y, m)
-                m += 1
-        while since < end - begin:
-            # stretch the last step to the break, or halve what is left, so that no sliver of a step remains
-            remaining = end - begin - since
-            step = h
-            if 2.0 * h > remaining:
-                step = remaining if h >= remaining else 0.5 * remaining
-            last = step == remaining
-            if taken >= max_steps or step <= _RESOLUTION * xp.maximum(1.0, abs(begin)):
-                outcome = PAUSED if taken >= max_steps else STEP_TOO_SMALL
-                break
-            if fresh:
-                call(own.rates, (run.system, piece, since, run.y, run.start_rate))
-                call(own.linearise, (run.system, piece, run.y))
-                _time_slope(own, piece, doubles(run.time_slope))
-                if own.mover != 0:
-                    _drift(run, own, piece, since, step)
-                    statistics[EVALUATIONS] += 1
-                statistics[JACOBIANS] += 1
-            _step(run, own, piece, since, step)
-            taken += 1
-            statistics[EVALUATIONS] += s if fresh else s - 1
-            norm = error_norm(own, y, doubles(run.new), doubles(run.error), run.rtol, doubles(run.atol))
-            if norm <= 1.0:
-                missed, looks = _look_inside(run, own, piece, since, step)
-                norm = xp.maximum(norm, missed)
-                statistics[EVALUATIONS] += looks
+            _start(run, own, piece)
+        while clock[SINCE] < span:
+            remaining = span - clock[SINCE]
+            step = fitted(clock[STEP], remaining)
+            if taken >= max_steps:
+                return PAUSED
+            if step <= _RESOLUTION * xp.maximum(1.0, abs(begin)):
+                return STEP_TOO_SMALL
+            call(run.attempt, (place, piece, clock[SINCE], step, 1 if fresh else 0))
+            taken, error = taken + 1, run.stages.verdict[0]
             # no growth right after a rejection, whose reason is still near
-            growth = _GROWTH if fresh else 1.0
-            scale = _SHRINKAGE
-            if xp.is_finite(norm):
-                ideal = _SAFETY * xp.maximum(norm, 1e-10) ** (-1.0 / run.order)
-                scale = xp.minimum(growth, xp.maximum(_SHRINKAGE, ideal))
-            fresh = norm <= 1.0
+            longer = step * growth(MOTION, error, run.method.order, MOTION.growth if fresh else 1.0)
+            fresh = error <= 1.0
             if not fresh:
-                statistics[REJECTIONS] += 1
-                h = step * scale
+                progress.statistics[REJECTIONS] += 1
+                clock[STEP] = longer
                 continue
-            statistics[STEPS] += 1
-            reached = end - begin if last else since + step
-            time = end if last else begin + reached
-            while m < samples and times[m] <= time:
-                here = reached if times[m] == time else times[m] - begin
-                _extend(run, (here - since) / step, 1.0, 0.0, run.y, run.argument)
-                _record(run, own, piece, here, run.argument, m)
-                m += 1
+            time = _accept(run, own, piece, step, step == remaining)
             if starting:
-                first_step = step * scale
-                starting = False
-            for i in range(n):
-                y[i] = doubles(run.new)[i]
-            since = reached
-            h = xp.maximum(step * scale, h) if last else step * scale
-            if own.stop_speed > 0.0 and _at_rest(run, own, piece, since):
-                outcome = AT_REST
-                if m < samples:
-                    times[m] = time
-                    _record(run, own, piece, since, run.y, m)
-                    m += 1
-                break
-        if outcome == DONE:
-            forget_unloaded(own, piece, y)
-            piece += 1
-            since = 0.0
-    cursor[0], cursor[1] = piece, m
-    clock[0], clock[1], clock[2] = since, h, first_step
-    return outcome
+                clock[FIRST], starting = longer, False
+            clock[STEP] = xp.maximum(longer, clock[STEP]) if step == remaining else longer
+            if own.motion.stop_speed > 0.0 and _rests(run, own, place, piece, time):
+                return AT_REST
+        forget_unloaded(own, piece, progress.y)
+        progress.cursor[PIECE], clock[SINCE] = piece + 1, 0.0
+    return DONE
+
+
+@kernel
+def _rests(run, own, place, piece, time):
+    """Return True if the body is at rest, after a sample of its place."""
+    progress, since = run.progress, run.progress.clock[SINCE]
+    call(run.at_rest, (place, piece, since))
+    if run.stages.verdict[1] == 0.0:
+        return False
+    if progress.cursor[SAMPLE] < run.samples:
+        run.output.time[progress.cursor[SAMPLE]] = time
+        _record(run, own, piece, since, progress.y)
+    return True
+
+
+class Run(Packed):
+    """An integration on which `advance` works: its steps keep their error below `rtol |y| + atol`, `atol` [n]."""
+
+    def __init__(
+        self, system: System, method: Method, output: Output, progress: Progress, *, rtol: float, atol: np.ndarray
+    ) -> None:
+        n, s = len(progress.y), len(method.m)
+        shapes = dict.fromkeys(Stages._fields, n) | {"k": (s, n), "time_slope": 3, "coupling": s, "verdict": 2}
+        stages, sizes = Layout(Stages, **shapes).made(), (n, s, len(method.dense), len(output.time))
+        atol = np.ascontiguousarray(atol, dtype=float)
+        functions = (combine, "ddppdd"), (attempt, "ppffp"), (at_rest, "ppf")
+        addresses = [address_of(*each) for each in functions]
+        parts = system.address, method, output, progress, stages, atol, float(rtol)
+        super().__init__(RunRecord(*parts, *sizes, *addresses))
+        self.system = system

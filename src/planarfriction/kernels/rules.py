@@ -13,7 +13,8 @@ from typing import Any, NamedTuple
 
 from planarfriction import formulas
 from planarfriction.compiler import compiled_math as xp
-from planarfriction.kernels import kernel, vectors
+from planarfriction.compiler import kernel
+from planarfriction.kernels import vectors
 from planarfriction.kernels.vectors import dot, placed, plus, times, zeros
 
 _NONE: Mapping = MappingProxyType({})

@@ -7,12 +7,13 @@ Wanner, Solving ODEs II, table IV.6.5.
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
-from planarfriction.kernels.pointers import at, doubles, integers
+from planarfriction.compiler.memory import Doubles, Layout, Packed, at, viewer
 
 GAMMA = 0.25
 PLACES = np.array([0.25, 0.75, 0.55, 0.5, 1.0])
@@ -34,24 +35,77 @@ START, AGAIN = 0.125, np.array([-11.0 / 32.0, -11.0 / 64.0, 25.0 / 64.0, 0.0, 0.
 before the first stage would go unseen without it."""
 
 OTHERS = 0.05
-"""A derivative need not be known better than to this share of the largest so far of its kind: that of a knot whose say
+"""Share of the largest derivative so far of its kind, better than to which none need be known: that of a knot whose say
 has just begun is small, and follows a contact's swings that matter to nobody."""
 
-# Step control, as that of the motion: cautious, and no faster growth than a transient that is followed needs.
-_SAFETY, _GROWTH, _SHRINKAGE = 0.85, 2.0, 0.2
+
+class Workspace(NamedTuple):
+    """Memory for P derivatives of n states by way of U inputs; the adjoint is one vector that all inputs share."""
+
+    stages: Doubles
+    """`G` of each stage, [P, 5, n]."""
+    new: Doubles
+    """Derivatives after a step, [P, n]."""
+    before: Doubles
+    """Rates of the derivatives at the end of the step before, [P, n]."""
+    level: Doubles
+    """Largest derivatives so far by the numbers of each input, [U, n]."""
+    forcing: Doubles
+    """`df/dp` of the inputs, [U, n]."""
+    gain: Doubles
+    """`l' df/dp` of the adjoint l at each stage, [5, U]."""
+    gain_before: Doubles
+    """`l' df/dp` at the end of the step before, [U]."""
+    most: Doubles
+    """Largest gain on a piece so far, [U]."""
+    state: Doubles
+    """Held state, [n]."""
+    rate: Doubles
+    """Rate of the held state, [n]."""
+    base: Doubles
+    """Base of a stage, [n]."""
+    right: Doubles
+    """Right-hand side of a stage, [n]."""
+    zero: Doubles
+    """Zeros, [n]."""
+    pace: Doubles
+    """Length of the next step, in steps of the motion, [1]."""
+
+
+read_workspace = viewer(Workspace)
+
+
+def workspace_for(count: int, inputs: int, n: int) -> Packed:
+    """Return a workspace for `count` derivatives of n states (made outside compiled code, which it would slow down)."""
+    shapes = dict.fromkeys(Workspace._fields, n) | dict.fromkeys(("level", "forcing"), (max(inputs, 1), n))
+    shapes |= {"stages": (count, len(PLACES), n), "new": (count, n), "before": (count, n)}
+    shapes |= {"gain": (len(PLACES), inputs), "gain_before": inputs, "most": inputs, "pace": 1}
+    return Packed(Layout(Workspace, **shapes).made(pace=np.ones(1)))
+
+
+class Derivative(NamedTuple):
+    """One of the derivatives, each [n]."""
+
+    value: Doubles
+    new: Doubles
+    before: Doubles
+    level: Doubles
+    stages: Doubles
+    """[5, n]"""
 
 
 @kernel
-def pace_after(excess):
-    """How much longer the next step is than one whose error exceeds what is allowed by this factor."""
-    return xp.minimum(_GROWTH, xp.maximum(_SHRINKAGE, _SAFETY * xp.maximum(excess, 1e-10) ** -0.25))
+def derivative_of(w, values, p, u, n):
+    """Return derivative p of `values` [P, n], which goes by input u."""
+    return Derivative(
+        at(values, p * n), at(w.new, p * n), at(w.before, p * n), at(w.level, u * n), at(w.stages, 5 * p * n)
+    )
 
 
 @kernel
-def stage_base(i, h, n, start, stages, base):
-    """Write `b_i = start + h sum_{j<i} a_ij G_j` of n numbers, in one pass; addresses, stages [5, n]."""
-    y, b = doubles(start), doubles(base)
-    k_0, k_1, k_2, k_3 = doubles(stages), doubles(at(stages, n)), doubles(at(stages, 2 * n)), doubles(at(stages, 3 * n))
+def stage_base(i, h, n, d, base):
+    """Write `b_i = s + h sum_{j<i} a_ij G_j` of a derivative s, in one pass."""
+    y, b, k_0, k_1, k_2, k_3 = d.value, base, d.stages, at(d.stages, n), at(d.stages, 2 * n), at(d.stages, 3 * n)
     a_0, a_1, a_2, a_3 = h * STAGES[i, 0], h * STAGES[i, 1], h * STAGES[i, 2], h * STAGES[i, 3]
     if i == 0:
         for m in range(n):
@@ -71,25 +125,38 @@ def stage_base(i, h, n, start, stages, base):
 
 
 @kernel
-def excess_of(own, n, places, h, known, rtol):
-    """The larger error estimate of a step of n numbers in units of what is allowed, as `rosenbrock.error_norm`.
+def keep_stage(i, shift, n, d, base):
+    """Keep `G_i = (S_i - b_i)/(h gamma)` of the solution S_i in `d.new`."""
+    for m in range(n):
+        d.stages[i * n + m] = shift * (d.new[m] - base[m])
 
-    `places` are addresses: the numbers before and after the step, the largest so far, the rates before the step and the
-    stages [5, n] of the step, absolute tolerances.
+
+@kernel
+def accept(n, d):
+    """Take the derivative after a step."""
+    for m in range(n):
+        d.value[m], d.before[m] = d.new[m], d.stages[4 * n + m]
+        d.level[m] = xp.maximum(d.level[m], abs(d.new[m]))
+
+
+@kernel
+def error_of(own, n, d, h, known, rtol, atol):
+    """Return the larger error estimate of a step of a derivative per tolerance, as that of the motion.
+
+    One of the two counts only if it is `known` (1 or 0) how fast the derivative changes at the start, `d.before`.
     """
-    old, new, level, before = doubles(places[0]), doubles(places[1]), doubles(places[2]), doubles(places[3])
-    k, atol, largest, state = doubles(places[4]), doubles(places[5]), 0.0, integers(own.state)
-    for c in range(own.contacts + 6):
-        first, last, mean = own.bristles + c - own.contacts, own.bristles + c - own.contacts + 1, 1.0
-        if c < own.contacts:
+    k, state, largest = d.stages, own.contacts.state, 0.0
+    for c in range(own.size + 6):
+        first, last, mean = own.bristles + c - own.size, own.bristles + c - own.size + 1, 1.0
+        if c < own.size:
             first, last = state[c], state[c + 1]
             mean = 1.0 / xp.where(last > first, last - first, 1)
         one, other = 0.0, 0.0
         for m in range(first, last):
-            size = xp.maximum(xp.maximum(abs(old[m]), abs(new[m])), OTHERS * level[m])
+            size = xp.maximum(xp.maximum(abs(d.value[m]), abs(d.new[m])), OTHERS * d.level[m])
             per = h / (atol[m] + rtol * size)
             e = ERROR[0] * k[m] + ERROR[1] * k[n + m] + ERROR[2] * k[2 * n + m] + ERROR[4] * k[4 * n + m]
-            a = START * before[m] + AGAIN[0] * k[m] + AGAIN[1] * k[n + m] + AGAIN[2] * k[2 * n + m]
+            a = START * d.before[m] + AGAIN[0] * k[m] + AGAIN[1] * k[n + m] + AGAIN[2] * k[2 * n + m]
             one += (e * per) * (e * per)
             other += (a * per) * (a * per)
         if not xp.is_finite(one + other):

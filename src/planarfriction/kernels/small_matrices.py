@@ -6,9 +6,45 @@ import math
 
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
+from planarfriction.kernels.vectors import times
 
 SWEEPS = 5
 """Of Jacobi rotations over a matrix [3, 3], which converge with their square from the second or third on."""
+
+
+@kernel
+def nine(m):
+    """Return the numbers of a matrix [3, 3] in memory."""
+    return m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8]
+
+
+@kernel
+def applied(m, a):
+    """Return `M a` of a matrix [3, 3] in memory."""
+    return (
+        m[0] * a[0] + m[1] * a[1] + m[2] * a[2],
+        m[3] * a[0] + m[4] * a[1] + m[5] * a[2],
+        m[6] * a[0] + m[7] * a[1] + m[8] * a[2],
+    )
+
+
+@kernel
+def applied_transposed(m, a):
+    """Return `M' a` of a matrix [3, 3] in memory."""
+    return (
+        m[0] * a[0] + m[3] * a[1] + m[6] * a[2],
+        m[1] * a[0] + m[4] * a[1] + m[7] * a[2],
+        m[2] * a[0] + m[5] * a[1] + m[8] * a[2],
+    )
+
+
+@kernel
+def inverse(shift, m):
+    """Return `(shift I - M)^-1` of a matrix [3, 3] in memory, nine numbers."""
+    a, b, c, d, e, f, g, h, i = shift - m[0], -m[1], -m[2], -m[3], shift - m[4], -m[5], -m[6], -m[7], shift - m[8]
+    r, p, w = e * i - f * h, f * g - d * i, d * h - e * g
+    cofactors = r, c * h - b * i, b * f - c * e, p, a * i - c * g, c * d - a * f, w, b * g - a * h, a * e - b * d
+    return times(1.0 / (a * r + b * p + c * w), cofactors)
 
 
 @kernel

@@ -11,9 +11,9 @@ import math
 
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import entry, kernel
+from planarfriction.compiler.memory import at, doubles, floats
 from planarfriction.kernels import (
-    anisotropic_contact,
-    distributed_contact,
+    cells,
     published_contact,
     published_step,
     reduced_contact,
@@ -21,12 +21,11 @@ from planarfriction.kernels import (
 )
 from planarfriction.kernels.distributed_step import cell_slopes
 from planarfriction.kernels.law import grip, grip_slope, squared
-from planarfriction.kernels.pointers import doubles, floats
 from planarfriction.kernels.rollouts import Contact
 from planarfriction.kernels.vectors import dot, norm, plus, put, three, times
 
 WORDS = "pppfpp"
-"""Arguments of these functions (see `pointers.address_of`)."""
+"""Arguments of these functions (see `calls.address_of`)."""
 
 NUMBERS = 12
 """Numbers of `out`."""
@@ -119,7 +118,7 @@ def published(contact, z, v, dt, new, out):
 
 @kernel
 def _distributed(law, own, z, v, dt, new, out):
-    n, x, y, weights = own.count, doubles(own.x), doubles(own.y), doubles(own.weights)
+    n, x, y, weights = own.count, own.cells, at(own.cells, own.count), own.weights
     vx, vy, omega = v[0], v[1], v[2]
     fx, fy, tau = 0.0, 0.0, 0.0
     xx, xy, xt, yx, yy, yt, tx, ty, tt = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
@@ -151,7 +150,7 @@ def _distributed(law, own, z, v, dt, new, out):
 @entry
 def distributed(contact, z, v, dt, new, out):
     """A contact of `DistributedModel`."""
-    own = distributed_contact.read(contact)
+    own = cells.read(contact)
     if own.law.gamma == 2.0:
         _distributed(squared(own.law), own, doubles(z), doubles(v), dt, doubles(new), doubles(out))
     else:
@@ -160,19 +159,19 @@ def distributed(contact, z, v, dt, new, out):
 
 @entry
 def anisotropic(contact, z, v, dt, new, out):
-    """A contact of `DistributedModel` with friction that depends on the direction (see `anisotropic_contact`).
+    """A contact of `DistributedModel` with friction that depends on the direction (see `kernels.cells`).
 
     `z - c` with `c = a/q`, which the twist holds, steps as the bristle of an isotropic cell does, and the traction is
     that of one less `sigma_0 c`.
     """
-    own, z, v, new, out = anisotropic_contact.read(contact), doubles(z), three(doubles(v)), doubles(new), doubles(out)
-    n, law, cells, weights = own.count, own.law, doubles(own.cells), doubles(own.weights)
+    own, z, v, new, out = cells.read(contact), doubles(z), three(doubles(v)), doubles(new), doubles(out)
+    n, law, numbers, weights = own.count, own.law, own.cells, own.weights
     for i in range(NUMBERS):
         out[i] = 0.0
     for i in range(n):
-        one = cells[i], cells[n + i], cells[3 * n + i]
-        other = cells[n + i], cells[2 * n + i], cells[4 * n + i]
-        a, u = (cells[5 * n + i], cells[6 * n + i]), (dot(one, v), dot(other, v))
+        one = numbers[i], numbers[n + i], numbers[3 * n + i]
+        other = numbers[n + i], numbers[2 * n + i], numbers[4 * n + i]
+        a, u = (numbers[5 * n + i], numbers[6 * n + i]), (dot(one, v), dot(other, v))
         speed = norm(u)
         q = grip(law, speed)
         c = times(1.0 / q, a)

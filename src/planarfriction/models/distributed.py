@@ -52,13 +52,12 @@ class DistributedModel(FrictionModel):
         state, twist, load = self._inputs(state, twist, normal_force)
         law, identity = self.law.numbers, np.eye(2)[:, :, None]
         lin, lever = self.compiled.linearisation(state, twist, load), self.compiled.lever
-        if self.patch.anisotropic:
-            rate_state = -lin[..., :4, :].reshape(*load.shape, 2, 2, state.shape[-1])
-            rate_velocity = lin[..., 4:8, :].reshape(*load.shape, 2, 2, state.shape[-1])
-        else:
-            k, k_z, k_v = lin[..., :1, None, :], lin[..., None, 1:3, :], lin[..., None, 3:5, :]
-            rate_state = -k * identity - state[..., :, None, :] * k_z
-            rate_velocity = identity - state[..., :, None, :] * k_v
+        bristle = lin[..., 7:9, :] if self.patch.asymmetric else state
+        k, k_z, k_v = lin[..., :1, None, :], lin[..., None, 1:3, :], lin[..., None, 3:5, :]
+        rate_state = -k * identity - bristle[..., :, None, :] * k_z
+        rate_velocity = identity - bristle[..., :, None, :] * k_v
+        if self.patch.asymmetric:
+            rate_velocity = rate_velocity + lin[..., 9:11, None, :] * lin[..., None, 11:13, :]
         rate_twist = np.einsum("...abn,dbn->...and", rate_velocity, lever)
         share = load[..., None] * self.patch.weights(load)
         force_state = -(law.sigma_0 * identity + law.sigma_1 * rate_state) * share[..., None, None, :]

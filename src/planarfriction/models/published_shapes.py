@@ -12,6 +12,7 @@ import numpy as np
 from planarfriction.compiled.parts import Part
 from planarfriction.compiled.remembered import Remembered
 from planarfriction.equality import by_parts
+from planarfriction.kernels.moments import slopes_in
 from planarfriction.kernels.surfaces import ELLIPSOID
 from planarfriction.limit_surface import LimitSurface
 from planarfriction.limit_surface.base import SurfaceNumbers
@@ -65,8 +66,7 @@ class PublishedShape(NamedTuple):
     def rate_slopes(self, lin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return d rate / d state and d rate / d twist `[B, 3, 3]` from linearisations `[B, L]`."""
         scale = np.array([1.0, 1.0, self.contact_radius])
-        k, k_z, z, scaled = lin[:, 0], lin[:, 1:4], lin[:, 4:7], lin[:, 7:16].reshape(-1, 3, 3)
-        rate_state = -k[:, None, None] * np.eye(3) - z[:, :, None] * k_z[:, None, :]
+        rate_state, scaled = slopes_in(lin)
         per_scale = np.where(scale > 0.0, 1.0 / np.where(scale > 0.0, scale, 1.0), 0.0)
         return scale[:, None] * rate_state * per_scale, scale[:, None] * scaled * scale @ self.lever
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction.equality import by_parts
-from planarfriction.kernels.reduced_contact import BY_V, BY_Z
+from planarfriction.kernels.moments import slopes_in
 from planarfriction.kernels.steady import HEADER, QUARTIC
 from planarfriction.models import cube_map
 from planarfriction.models.steady_sums import ScaledCells, ScaledPoint
@@ -59,7 +59,7 @@ class ReducedShape(NamedTuple):
 
     def rate_slopes(self, lin: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return d rate / d state and d rate / d twist `[B, 3, 3]` from linearisations `[B, L]`."""
-        by_z, by_v = (lin[:, at : at + 9].reshape(-1, 3, 3) for at in (BY_Z, BY_V))
+        by_z, by_v = slopes_in(lin)
         return by_z, by_v @ self.factor
 
 

@@ -9,10 +9,10 @@ from typing import NamedTuple
 import numpy as np
 
 from planarfriction.compiled.packed import PackedModel
+from planarfriction.compiler.memory import places_of
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels.body import Motion, System, system_of
+from planarfriction.kernels.body import Motion, System
 from planarfriction.kernels.contacts import BODY, BODY_AXES, WORLD, Contacts, calls_of
-from planarfriction.kernels.pointers import place_of
 from planarfriction.scenes.movers import displacement
 from planarfriction.scenes.signal import SAME_TIME, Signal, breaks_between
 from planarfriction.scenes.start import first_slopes, first_states
@@ -242,7 +242,7 @@ class SegmentBatches:
         first = _starts([len(model.records) for model in self.models])
         self._done += count
         self._ahead = min(self._most, 2 * count)  # one contact does not pack much more than another has room for
-        addresses = [place_of(m.records) + m.records.strides[0] * np.arange(len(m.records)) for m in self.models]
+        addresses = [places_of(model.records) for model in self.models]
         row = np.stack([row[:count] for row in rows], axis=1) + first[:-1]
         return np.concatenate(addresses), row, pieces[:count]
 
@@ -274,7 +274,7 @@ class SegmentBatches:
         if self._times is not None:
             _meet(self._times, breaks)
         kept = tuple(array for model in models for array in (model.records, *model.keepalive))
-        return system_of(self._contacts, motion, kept)
+        return System(self._contacts, motion, kept)
 
 
 def pack(scene, t_end: float, *, sensitivities: bool = False) -> PackedScene:

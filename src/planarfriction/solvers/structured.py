@@ -12,7 +12,7 @@ from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.kernels import rosenbrock as kernels
 from planarfriction.kernels.body import System
-from planarfriction.kernels.integration import Method, Output, Progress, run_of
+from planarfriction.kernels.integration import Method, Output, Progress
 from planarfriction.solvers.statistics import Statistics
 
 _STATES_PER_SLICE = 400_000
@@ -85,11 +85,11 @@ def integrate(
         for system in windows:
             if kernels.advance not in _loaded:
                 begin = time.perf_counter()
-                first = run_of(system, method, output, start_of(state), rtol=rtol, atol=atol)
+                first = kernels.Run(system, method, output, start_of(state), rtol=rtol, atol=atol)
                 kernels.advance(first.address, 0)  # compiles, or loads from the cache, and takes no step
                 compile_time = time.perf_counter() - begin
                 _loaded.add(kernels.advance)
-            run, breaks = run_of(system, method, output, at, rtol=rtol, atol=atol), system.motion.breaks
+            run, breaks = kernels.Run(system, method, output, at, rtol=rtol, atol=atol), system.motion.breaks
             at.cursor[0], outcome = 0, kernels.PAUSED
             while outcome == kernels.PAUSED:
                 begin = time.perf_counter()

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction.kernels.body import system_of
+from planarfriction.kernels.body import System
 from planarfriction.kernels.integration import Method, Output
 from planarfriction.scenes import Scene
 from planarfriction.scenes.packing import PackedScene, pack
@@ -113,7 +113,7 @@ def _pieces(packed: PackedScene, kept: slice) -> PackedScene:
     velocity = motion.velocity[kept] if len(motion.velocity) else motion.velocity
     breaks = motion.breaks[kept.start : kept.stop + 1]
     motion = motion._replace(breaks=breaks, velocity=velocity, **per_piece)
-    return packed._replace(system=system_of(packed.system.contacts, motion, packed.system.kept))
+    return packed._replace(system=System(packed.system.contacts, motion, packed.system.keepalive))
 
 
 def _output(packed: PackedScene, times: np.ndarray, *, bristles: bool) -> Output:

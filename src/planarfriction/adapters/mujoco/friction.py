@@ -18,11 +18,10 @@ from planarfriction.adapters.mujoco.library import layout
 from planarfriction.adapters.mujoco.loops import step as loops
 from planarfriction.adapters.mujoco.loops.records import Host
 from planarfriction.adapters.mujoco.patches import PatchContact, Placed, check_once, memory, words
+from planarfriction.compiler.memory import place_of, row_of
 from planarfriction.coupling import CoupledPatches
 from planarfriction.errors import FrictionError, InvalidValueError
 from planarfriction.kernels import coupling as kernels
-from planarfriction.kernels.pointers import place_of
-from planarfriction.kernels.records import row_of
 
 INTEGRATORS = {
     int(mujoco.mjtIntegrator.mjINT_EULER): "Euler",

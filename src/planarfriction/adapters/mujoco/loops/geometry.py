@@ -6,7 +6,8 @@ import math
 from typing import NamedTuple
 
 from planarfriction.compiler import kernel
-from planarfriction.kernels.pointers import at, call_c, doubles, integers, integers32
+from planarfriction.compiler.calls import call_c
+from planarfriction.compiler.memory import at, doubles, integers, integers32
 
 
 class Scratch(NamedTuple):

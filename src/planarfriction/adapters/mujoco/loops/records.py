@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from planarfriction.kernels.records import reader
+from planarfriction.compiler.memory import reader
 
 
 class ModelOffsets(NamedTuple):

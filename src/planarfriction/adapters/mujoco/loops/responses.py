@@ -10,7 +10,8 @@ from __future__ import annotations
 from planarfriction.adapters.mujoco.loops.elimination import backward, eliminate, multiply
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
-from planarfriction.kernels.pointers import at, call_c, doubles, integers, integers32
+from planarfriction.compiler.calls import call_c
+from planarfriction.compiler.memory import at, doubles, integers, integers32
 
 MISFIT = 3e-9
 """Speed [m/s] by which a constraint may leave its range without a new solution."""

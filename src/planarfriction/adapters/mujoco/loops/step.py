@@ -16,21 +16,11 @@ from planarfriction.adapters.mujoco.loops.records import Host, read
 from planarfriction.adapters.mujoco.loops.responses import is_sparse, leaves_range, respond
 from planarfriction.compiler import callback, entry, jit, kernel
 from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler.calls import address, address_of, c_address_of, call, call_c, shared_word
+from planarfriction.compiler.memory import at, doubles, integers, integers32
 from planarfriction.kernels.coupling import evaluate
 from planarfriction.kernels.coupling_rows import Row
 from planarfriction.kernels.coupling_rows import read as read_patches
-from planarfriction.kernels.pointers import (
-    address,
-    address_of,
-    at,
-    c_address_of,
-    call,
-    call_c,
-    doubles,
-    integers,
-    integers32,
-    shared_word,
-)
 
 PASSES = 10
 """How often a step is solved anew where other constraints have become active through it."""

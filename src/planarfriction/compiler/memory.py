@@ -1,0 +1,336 @@
+"""Memory shared by Python and compiled code: records, arrays by their addresses, and layouts of scratch memory.
+
+A record is a `NamedTuple` whose fields are numbers (`float`), counts and addresses of functions (`int`), arrays
+(`Doubles`, `Integers`, `Floats`) or records. In memory it is a row of 8-byte words, an array being the address of its
+first number; compiled code reads the row as the same `NamedTuple`, whose arrays are then pointers: `own.twist[i]`.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+import typing
+from typing import Annotated, Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.core.imputils import lower_getattr_generic
+from numba.core.typing.templates import AttributeTemplate
+from numba.extending import infer_getattr, intrinsic, models, register_model
+
+Doubles = Annotated[np.ndarray, types.float64]
+"""Field of a record that holds a contiguous array of doubles; in compiled code a pointer."""
+
+Floats = Annotated[np.ndarray, types.float32]
+"""Field of a record that holds a contiguous array of single precision."""
+
+Integers = Annotated[np.ndarray, types.int64]
+"""Field of a record that holds a contiguous array of 64-bit integers."""
+
+_WORD = 8
+"""Bytes of a word."""
+
+# ---------------------------------------------------------------------- records as rows of words
+
+
+@functools.cache
+def _fields(record: Any) -> tuple[tuple[str, Any], ...]:
+    return tuple(typing.get_type_hints(record, include_extras=True).items())
+
+
+def _number_of(kind: Any) -> Any:
+    """Return the type of the numbers of an array field, None for other fields."""
+    return kind.__metadata__[0] if hasattr(kind, "__metadata__") else None
+
+
+def _is_integer(kind: Any) -> bool:
+    return kind in (int, bool) or _number_of(kind) is not None
+
+
+def addresses_in(*records: Any) -> list[str]:
+    """Return the names of the fields that hold arrays, which compiled code reads by their addresses."""
+    return [name for record in records for name, kind in _fields(record) if kind is np.ndarray]
+
+
+def place_of(array: np.ndarray) -> int:
+    """Return the address of the first number of a contiguous array, which the caller keeps alive."""
+    assert array.dtype in (np.float32, np.float64, np.int64) and array.flags.c_contiguous
+    return array.ctypes.data
+
+
+def places_of(rows: np.ndarray) -> np.ndarray:
+    """Return the address of each row of a contiguous array [R, ...], int [R]."""
+    return place_of(rows) + rows.strides[0] * np.arange(len(rows))
+
+
+def size_of(record: Any) -> int:
+    """Return the number of words of a record."""
+    return sum(size_of(kind) if hasattr(kind, "_fields") else 1 for _, kind in _fields(record))
+
+
+def row_of(record: Any) -> np.ndarray:
+    """Return the words of a record as a row of doubles; integers and addresses lie in them bit by bit.
+
+    An array without numbers has the address 0. The caller keeps arrays alive.
+    """
+    row = np.empty(size_of(type(record)))
+    _write(row, record)
+    return row
+
+
+def _write(row: np.ndarray, record: Any) -> None:
+    at = 0
+    for name, kind in _fields(type(record)):
+        value = getattr(record, name)
+        if hasattr(kind, "_fields"):
+            count = size_of(kind)
+            _write(row[at : at + count], value)
+            at += count
+            continue
+        if isinstance(value, np.ndarray):
+            assert str(value.dtype) == str(_number_of(kind)), (name, value.dtype)
+            value = place_of(value) if value.size else 0
+        (row.view(np.int64) if _is_integer(kind) else row)[at] = value
+        at += 1
+
+
+def rows_of(record: Any, count: int, **columns: np.ndarray) -> np.ndarray:
+    """Return the words of `count` records `[count, size]`: those of `record` but for the fields in `columns`.
+
+    A column holds one row for each record; that of an array holds addresses.
+    """
+    rows = np.tile(row_of(record), (count, 1))
+    at = 0
+    for name, kind in _fields(type(record)):
+        width = size_of(kind) if hasattr(kind, "_fields") else 1
+        if name in columns:
+            target = rows.view(np.int64) if _is_integer(kind) else rows
+            target[:, at : at + width] = np.reshape(columns[name], (count, width))
+        at += width
+    return rows
+
+
+class Packed:
+    """A record, its words, and their address, which compiled functions take; it keeps the arrays alive."""
+
+    def __init__(self, record: Any) -> None:
+        self.record, self.words = record, row_of(record)
+        self.address = place_of(self.words)
+
+
+# ---------------------------------------------------------------------- records in compiled code
+
+
+def _field_type(kind: Any) -> Any:
+    number = _number_of(kind)
+    return types.CPointer(number) if number else (types.int64 if _is_integer(kind) else types.float64)
+
+
+def _type_of(record: Any) -> Any:
+    parts = [_type_of(kind) if hasattr(kind, "_fields") else _field_type(kind) for _, kind in _fields(record)]
+    return types.BaseTuple.from_types(parts, record)
+
+
+def _load(context, builder, kind, words, at):
+    """Load a value of a type whose words begin at number `at`; return it and where the next begins.
+
+    No compiled function changes the words of a record: LLVM may load them once for a whole loop.
+    """
+    if isinstance(kind, types.BaseTuple):
+        values = []
+        for part in kind:
+            value, at = _load(context, builder, part, words, at)
+            values.append(value)
+        return context.make_tuple(builder, kind, values), at
+    place = builder.gep(words, [ir.Constant(ir.IntType(64), at)])
+    value = builder.load(builder.bitcast(place, context.get_value_type(kind).as_pointer()))
+    value.set_metadata("invariant.load", builder.module.add_metadata([]))
+    return value, at + 1
+
+
+def _pointer(context, builder, kind, value, target):
+    """Return an address, a pointer or an array as a pointer to numbers of another type."""
+    if isinstance(kind, types.Array):
+        value = context.make_array(kind)(context, builder, value).data
+    place = context.get_value_type(types.CPointer(target))
+    return builder.inttoptr(value, place) if isinstance(kind, types.Integer) else builder.bitcast(value, place)
+
+
+def reader(record: Any) -> Any:
+    """Make the compiled function that reads a record from the beginning of a row, from a pointer or an address."""
+    result = _type_of(record)
+
+    @intrinsic
+    def read(typingctx, row):
+        def generate(context, builder, signature, args):
+            words = _pointer(context, builder, row, args[0], types.float64)
+            return _load(context, builder, result, words, 0)[0]
+
+        return result(row), generate
+
+    return read
+
+
+class _View(types.Type):
+    """A record at an address, whose fields are loaded where they are named."""
+
+    def __init__(self, record: Any) -> None:
+        self.record = record
+        super().__init__(name=f"view of {record.__module__}.{record.__qualname__}")
+
+
+@register_model(_View)
+class _ViewModel(models.OpaqueModel):
+    """A view is a bare address."""
+
+
+def _holds_arrays(kind: Any) -> bool:
+    """Return True for a record that holds arrays, itself or in a record of its own."""
+    return any(_number_of(each) or (hasattr(each, "_fields") and _holds_arrays(each)) for _, each in _fields(kind))
+
+
+def _type_in_view(kind: Any) -> Any:
+    if hasattr(kind, "_fields"):
+        return _View(kind) if _holds_arrays(kind) else _type_of(kind)
+    return _field_type(kind)
+
+
+@infer_getattr
+class _Fields(AttributeTemplate):
+    """Types of the fields of a view: records that hold arrays are views too."""
+
+    key = _View
+
+    def generic_resolve(self, view: Any, name: str) -> Any:
+        kind = dict(_fields(view.record)).get(name)
+        return None if kind is None else _type_in_view(kind)
+
+
+@lower_getattr_generic(_View)
+def _load_field(context, builder, view, value, name):
+    words, first = builder.bitcast(value, ir.DoubleType().as_pointer()), 0
+    for field, kind in _fields(view.record):
+        if field == name:
+            break
+        first += size_of(kind) if hasattr(kind, "_fields") else 1
+    result = _type_in_view(kind)
+    if isinstance(result, _View):
+        place = builder.gep(words, [ir.Constant(ir.IntType(64), first)])
+        return builder.bitcast(place, context.get_value_type(result))
+    return _load(context, builder, result, words, first)[0]
+
+
+def viewer(record: Any) -> Any:
+    """Make the compiled function that views a record at an address, or at the beginning of a row.
+
+    Fields are loaded where they are named, so that functions pass large records for the price of an address.
+    """
+    result = _View(record)
+
+    @intrinsic
+    def view(typingctx, row):
+        def generate(context, builder, signature, args):
+            words = _pointer(context, builder, row, args[0], types.float64)
+            return builder.bitcast(words, context.get_value_type(result))
+
+        return result(row), generate
+
+    return view
+
+
+def _view(number: Any) -> Any:
+    """Make the compiled function that takes an address or a pointer for one to numbers of a type."""
+
+    @intrinsic
+    def view(typingctx, place):
+        if not isinstance(place, (types.Integer, types.CPointer)):
+            return None
+
+        def generate(context, builder, signature, args):
+            return _pointer(context, builder, place, args[0], number)
+
+        return types.CPointer(number)(place), generate
+
+    return view
+
+
+doubles, floats, integers, integers32 = (
+    _view(number) for number in (types.float64, types.float32, types.int64, types.int32)
+)
+
+
+@intrinsic
+def at(typingctx, place, i):
+    """Return the place, pointer or address, of the number i of 8 bytes from a place on."""
+    if not isinstance(i, types.Integer) or not isinstance(place, (types.Integer, types.CPointer)):
+        return None
+    if isinstance(place, types.CPointer):
+        return place(place, types.int64), lambda context, builder, signature, args: builder.gep(args[0], [args[1]])
+
+    def generate(context, builder, signature, args):
+        return builder.add(args[0], builder.mul(args[1], ir.Constant(ir.IntType(64), _WORD)))
+
+    return types.int64(types.int64, types.int64), generate
+
+
+@intrinsic
+def exists(typingctx, place):
+    """Return True unless a pointer is that of an array without numbers."""
+    if not isinstance(place, types.CPointer):
+        return None
+
+    def generate(context, builder, signature, args):
+        return cgutils.is_not_null(builder, args[0])
+
+    return types.boolean(place), generate
+
+
+# ---------------------------------------------------------------------- scratch memory
+
+
+@functools.cache
+def offsets_of(record: Any) -> Any:
+    """Return the record of the same names whose arrays are offsets in words (`arrays_at` makes it a record again)."""
+    twin = typing.NamedTuple(f"{record.__name__}Offsets", [(name, int) for name, _ in _fields(record)])
+    twin.record = record
+    return twin
+
+
+class Layout:
+    """Arrays of a record one behind the other in a block of words; shapes are given by name, numbers stand for [n]."""
+
+    def __init__(self, record: Any, **shapes: Any) -> None:
+        self._record, self._shapes = record, {name: shapes[name] for name in record._fields}
+        sizes = [math.prod(shape) if isinstance(shape, tuple) else shape for shape in self._shapes.values()]
+        ends = np.cumsum([0, *sizes]).tolist()
+        self.size: int = ends[-1]
+        """Words of the block."""
+        self.offsets = offsets_of(record)(*ends[:-1])
+        """Where arrays begin (see `arrays_at`)."""
+        self.slices = {name: slice(*each) for name, *each in zip(self._shapes, ends[:-1], ends[1:], strict=True)}
+        """The numbers of each array in a block."""
+
+    def made(self, **given: np.ndarray) -> Any:
+        """Return the record with its arrays in a new block of zeros, but for those that are `given`."""
+        block, arrays = np.zeros(self.size), {}
+        for name, kind in _fields(self._record):
+            flat = block[self.slices[name]]
+            flat = flat.view(np.int64) if _number_of(kind) == types.int64 else flat
+            arrays[name] = flat.reshape(self._shapes[name])
+        return self._record(**{**arrays, **given})
+
+
+@intrinsic
+def arrays_at(typingctx, offsets, place):
+    """Return the record of a `Layout` whose block begins at a place, from the offsets of its arrays."""
+    result = _type_of(offsets.instance_class.record)
+
+    def generate(context, builder, signature, args):
+        first, fields = _pointer(context, builder, place, args[1], types.float64), []
+        for kind, offset in zip(result, cgutils.unpack_tuple(builder, args[0]), strict=True):
+            fields.append(builder.bitcast(builder.gep(first, [offset]), context.get_value_type(kind)))
+        return context.make_tuple(builder, result, fields)
+
+    return result(offsets, place), generate

@@ -1,0 +1,106 @@
+"""The path of a computed motion: the ends of its steps, between which derivatives interpolate its state."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from planarfriction.compiler import jit, kernel
+from planarfriction.compiler.calls import call
+from planarfriction.compiler.memory import at, exists
+from planarfriction.kernels.body import read
+from planarfriction.kernels.integration import read_run
+from planarfriction.kernels.rosenbrock import PAUSED, PIECE, SINCE, STEPS, advance
+from planarfriction.kernels.vectors import put, three
+
+
+class Path(NamedTuple):
+    """The ends of accepted steps of a motion, K of them; between two of the same piece lies a step."""
+
+    piece: np.ndarray
+    """Piece between breaks, int [K]."""
+    since: np.ndarray
+    """Seconds into the piece, [K]."""
+    state: np.ndarray
+    """[K, n]; at the end of a piece before a contact whose load ends forgets its bristles."""
+    rate: np.ndarray
+    """Rate of the state, [K, n]."""
+
+
+def path_for(most: int, n: int) -> Path:
+    """Return room for the ends of steps (made outside compiled code)."""
+    return Path(np.zeros(most, np.int64), np.zeros(most), np.zeros((most, n)), np.zeros((most, n)))
+
+
+@jit
+def follow(run, path):
+    """Go on with the run at an address until it ends or `path` is full; return its number of nodes and the outcome."""
+    integration, count, outcome = read_run(run), 0, PAUSED
+    own, n, progress = read(integration.system), integration.states, integration.progress
+    cursor, clock, counts, breaks = progress.cursor, progress.clock, progress.statistics, own.motion.breaks
+    while outcome == PAUSED and count + 2 <= path.piece.shape[0]:
+        piece, since, accepted = cursor[PIECE], clock[SINCE], counts[STEPS]
+        starting = count == 0 or path.piece[count - 1] != piece
+        if starting:
+            if since == 0.0 and exists(own.motion.velocity):
+                put(at(progress.y, n - 6), three(at(own.motion.velocity, 3 * piece)))
+            path.piece[count], path.since[count] = piece, since
+            for i in range(n):
+                path.state[count, i] = progress.y[i]
+        outcome = advance(run, 1)
+        if counts[STEPS] == accepted:
+            continue
+        count += starting
+        ended = cursor[PIECE] != piece
+        path.piece[count], path.since[count] = piece, breaks[piece + 1] - breaks[piece] if ended else clock[SINCE]
+        for i in range(n):
+            path.rate[count - 1, i], path.state[count, i] = integration.stages.start_rate[i], integration.stages.new[i]
+        if ended or outcome != PAUSED or count + 3 > path.piece.shape[0]:  # else the next trial evaluates it
+            call(own.rates, (integration.system, piece, path.since[count], path.state[count], path.rate[count]))
+        count += 1
+    return count, outcome
+
+
+@kernel
+def interpolate(path, k, since, state):
+    """Write the state at `since` seconds into the piece, in the step after node k: the cubic Hermite interpolant."""
+    h = path.since[k + 1] - path.since[k]
+    right = (since - path.since[k]) / h
+    left = 1.0 - right
+    start, end, start_rate, end_rate = path.state[k], path.state[k + 1], path.rate[k], path.rate[k + 1]
+    for m in range(path.state.shape[1]):
+        bend = (left - right) * (end[m] - start[m]) + h * (right * end_rate[m] - left * start_rate[m])
+        state[m] = left * start[m] + right * end[m] - left * right * bend
+
+
+@kernel
+def node_after(path, k, last, since):
+    """Return the last node from k on, but for `last`, that is not behind `since`."""
+    while k + 1 < last and path.since[k + 1] <= since:
+        k += 1
+    return k
+
+
+@kernel
+def node_before(path, k, first, since):
+    """Return the last node up to k, but from `first` on, that is before `since`."""
+    while k > first and path.since[k] >= since:
+        k -= 1
+    return k
+
+
+@kernel
+def hold(system, own, path, k, since, shift, w):
+    """Hold the state in the step after node k: interpolate it into `w.state`, linearise there, factor."""
+    piece = path.piece[k]
+    interpolate(path, k, since, w.state)
+    call(own.rates, (system, piece, since, w.state, w.rate))
+    call(own.linearise, (system, piece, w.state))
+    call(own.factor, (system, piece, since, w.state, shift))
+
+
+@jit
+def state_at(path, first, last, since, state):
+    """Write the state at `since` seconds into the piece whose nodes are `first` to `last` of a path."""
+    interpolate(path, node_after(path, first, last, since), since, state)

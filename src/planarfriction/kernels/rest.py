@@ -1,0 +1,98 @@
+"""Test whether a body is at rest for good: slow, and held by friction."""
+
+from __future__ import annotations
+
+import math
+
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import entry, kernel
+from planarfriction.compiler.calls import call
+from planarfriction.compiler.memory import at
+from planarfriction.kernels.body import read
+from planarfriction.kernels.integration import read_run
+from planarfriction.kernels.vectors import put, three, times
+
+# Distance that a body is moved to see whether it rests, in full deflections of the bristles: on that way they go from
+# one side to the other, all but exp(-10) of it. Steps grow from one far below any swing to one that no bristle
+# overshoots.
+_FAR, _FIRST, _GROWTH, _LARGEST = 10.0, 1e-7, 2.5, 0.1
+
+# Speed, in stop speeds, that a body at rest may reach in swinging out, which takes bristles without damping a long
+# time: about what the change within the bristles' time lets through where they swing out in three periods.
+_SWING = 4.0
+
+
+@kernel
+def speed_of(own, velocity):
+    """Return the length of a velocity or acceleration of the body [3], its spin times the lever arm."""
+    arm = own.motion.stop_radius
+    return math.sqrt(velocity[0] * velocity[0] + velocity[1] * velocity[1] + arm * arm * velocity[2] * velocity[2])
+
+
+@entry
+def at_rest(run, piece, since):
+    """Write into `verdict` whether the body is at rest: slow, and held by friction for good.
+
+    Slow: its speed, and what that changes by within the bristles' time, are together below the stop speed. For good: no
+    input changes any more. Held: driven by its speed and the net force, it comes to a stop before it has moved by
+    `_FAR` full deflections of the bristles or is faster than `_SWING` stop speeds, and so it does when it swings back.
+    That is tried: the body moves along the line of the net force, at the speed that follows from the work done on it
+    (damping is left out), and the bristles follow. So nothing rests in free fall, without load, on a slope steeper than
+    friction, or at a turning point while the bristles still push it back, however slow it is.
+    """
+    run = read_run(run)
+    own = read(run.system)
+    y, push, motion, verdict = run.stages.argument, run.stages.time_slope, own.motion, run.stages.verdict
+    velocity = at(run.progress.y, own.bristles)
+    speed, change = speed_of(own, velocity), speed_of(own, at(run.stages.start_rate, own.bristles))
+    verdict[1] = 0.0
+    if motion.breaks[piece] < motion.settled or not speed + motion.stop_time * change < motion.stop_speed:
+        return
+    for i in range(run.states):
+        y[i] = run.progress.y[i]
+    put(push, (0.0, 0.0, 0.0))
+    force = _force(run, own, piece, since)
+    put(push, three(at(run.stages.rate, own.bristles) if force > 0.0 else velocity))
+    size, energy = speed_of(own, push), 0.5 * speed * speed
+    for way in range(2 if size > 0.0 else 0):
+        put(push, times((1.0 if way == 0 else -1.0) / size, three(push)))
+        if not _is_held(run, own, piece, since, energy):
+            return
+        size, energy = 1.0, 0.0
+    verdict[1] = 1.0
+
+
+@kernel
+def _is_held(run, own, piece, since, energy):
+    """Return True if friction stops the body, given energy per mass, on its way along the direction `time_slope`."""
+    y, rate, motion = run.stages.argument, run.stages.rate, own.motion
+    most = 0.5 * (_SWING * motion.stop_speed) ** 2
+    way, step, force = 0.0, _FIRST, _force(run, own, piece, since)
+    while energy > 0.0 or way == 0.0:
+        if way > _FAR or energy > most:
+            return False
+        pace, moved = xp.maximum(math.sqrt(2.0 * energy), motion.stop_speed), step * motion.stop_length
+        _move(run, own, pace)
+        call(own.rates, (run.system, piece, since, y, rate))
+        for i in range(own.bristles):
+            y[i] += moved / pace * rate[i]
+        before, force = force, _force(run, own, piece, since)
+        energy += 0.5 * (before + force) * moved
+        way, step = way + step, xp.minimum(_GROWTH * step, _LARGEST)
+    return True
+
+
+@kernel
+def _force(run, own, piece, since):
+    """Return the acceleration of the body, if it stood still, along the direction `time_slope`; its size for none."""
+    push, rate, arm = run.stages.time_slope, at(run.stages.rate, own.bristles), own.motion.stop_radius
+    _move(run, own, 0.0)
+    call(own.rates, (run.system, piece, since, run.stages.argument, run.stages.rate))
+    along = push[0] * rate[0] + push[1] * rate[1] + arm * arm * push[2] * rate[2]
+    return along if push[0] != 0.0 or push[1] != 0.0 or push[2] != 0.0 else speed_of(own, rate)
+
+
+@kernel
+def _move(run, own, factor):
+    """Give the body a multiple of the velocity `time_slope`."""
+    put(at(run.stages.argument, own.bristles), times(factor, three(run.stages.time_slope)))
