@@ -314,20 +314,20 @@ def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _Packed:
         records[own], shares[own] = _addresses(steps)[0], steps.shares[0]
     # all cells, whatever load they carry: a lever arm that does not follow the load
     radius = np.array([np.sqrt((model.patch.positions**2).sum(1).mean()) for model in models])
-    row, parts, words = layout(len(models), ends[-1], int(bounds[-1]))
+    rows = layout(len(models), ends[-1], int(bounds[-1]))
     patches = Patches(
         count=len(models),
         pieces=ends[-1],
         states=int(bounds[-1]),
         solve=kernels.solve_address(),
-        functions=place_of(functions),
-        owners=place_of(owners),
-        firsts=place_of(firsts),
-        radius=place_of(radius),
-        row=row,
+        functions=functions,
+        owners=owners,
+        firsts=firsts,
+        radius=radius,
+        row=rows.offsets,
     )
     kept = [functions, owners, firsts, radius, *known.values()]
-    return _Packed(row_of(patches), parts, words, records, shares, following, kept)
+    return _Packed(row_of(patches), rows.slices, rows.size, records, shares, following, kept)
 
 
 def _addresses(steps: PackedSteps) -> np.ndarray:

@@ -21,15 +21,15 @@ import math
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import entry, jit, kernel
 from planarfriction.compiler.calls import address, address_of, call
-from planarfriction.compiler.memory import at, doubles, integers
+from planarfriction.compiler.memory import arrays_at, at, doubles
 from planarfriction.kernels.coupling_rows import INVALID, read
 from planarfriction.kernels.small_matrices import leave_out_rising, solved
 
 DOWNHILL = 0.5
-"""How far beyond the root along a Newton step it may end, as a share of the slope at its start."""
+"""Largest slope beyond the root along a Newton step at which it may end, as a share of that at its start."""
 
 SHORTENINGS = 6
-"""How often a Newton step that went too far is shortened."""
+"""Times at most that a Newton step which went too far is shortened."""
 
 JOINT, ROUND = 8, 24
 """Of every ROUND iterations the first JOINT let the loads move with the wrenches, in the others they follow behind:
@@ -41,252 +41,233 @@ ROUNDING = 1e-13
 
 @kernel
 def _applied(m, i, n, x, start):
-    """Element i of `m x + start`, m of n columns."""
+    """Return element i of `m x + start`, m of n columns."""
     for j in range(n):
         start += m[n * i + j] * x[j]
     return start
 
 
 @kernel
-def evaluate(own, problem):
-    """Step all pieces at the twists of the row: new state, and wrenches with their slopes per unit load."""
-    row = own.row
-    unit, slopes = doubles(at(problem, row.unit)), doubles(at(problem, row.unit_slopes))
-    dt, step = doubles(at(problem, row.dt))[0], doubles(at(problem, row.step))
+def step_all(own, p):
+    """Step all pieces at the twists of a problem: write the new state, and wrenches with their slopes per unit load."""
     for i in range(3 * own.count):
-        unit[i] = 0.0
+        p.unit[i] = 0.0
     for i in range(9 * own.count):
-        slopes[i] = 0.0
+        p.unit_slopes[i] = 0.0
     for c in range(own.pieces):
-        p, first, record = integers(own.owners)[c], integers(own.firsts)[c], integers(at(problem, row.records))[c]
+        k, first, record, share = own.owners[c], own.firsts[c], p.records[c], p.shares[c]
         if record == 0:
             continue
-        places = record, at(problem, row.state + first), at(problem, row.twist + 3 * p)
-        call(integers(own.functions)[c], (*places, dt, at(problem, row.new + first), at(problem, row.step)))
-        share = doubles(at(problem, row.shares))[c]
+        call(own.functions[c], (record, at(p.state, first), at(p.twist, 3 * k), p.dt[0], at(p.new, first), p.step))
         for i in range(3):
-            unit[3 * p + i] += share * step[i]
+            p.unit[3 * k + i] += share * p.step[i]
         for i in range(9):
-            slopes[9 * p + i] += share * step[3 + i]
+            p.unit_slopes[9 * k + i] += share * p.step[3 + i]
 
 
 @kernel
-def _host(own, problem, w, held):
-    """Twists and, unless they are held, loads of the row as they follow from wrenches w."""
-    row, n = own.row, 3 * own.count
-    a, b = doubles(at(problem, row.response)), doubles(at(problem, row.load_response))
-    twist, load = doubles(at(problem, row.twist)), doubles(at(problem, row.load))
+def _host(own, p, held):
+    """Write the twists and, unless they are held, the loads that follow from the wrenches."""
+    n = 3 * own.count
     for i in range(n):
-        twist[i] = _applied(a, i, n, w, doubles(at(problem, row.twist_0))[i])
+        p.twist[i] = _applied(p.response, i, n, p.wrench, p.twist_0[i])
     if not held:
-        for p in range(own.count):
-            load[p] = xp.maximum(_applied(b, p, n, w, doubles(at(problem, row.load_0))[p]), 0.0)
+        for k in range(own.count):
+            p.load[k] = xp.maximum(_applied(p.load_response, k, n, p.wrench, p.load_0[k]), 0.0)
 
 
 @kernel
-def _misfit(own, problem):
-    """How far the twists and loads of the row are from those that the models' wrenches there cause [m/s].
+def _misfit(own, p):
+    """Return the difference of the twists and loads from those that the models' wrenches there cause [m/s].
 
     A load counts as the speed that all of it would cause as friction.
     """
-    row, k, n = own.row, own.count, 3 * own.count
-    a, b = doubles(at(problem, row.response)), doubles(at(problem, row.load_response))
-    twist, load, unit = doubles(at(problem, row.twist)), doubles(at(problem, row.load)), doubles(at(problem, row.unit))
-    w, largest, finite = doubles(at(problem, row.change)), 0.0, True
+    n, w, largest, finite = 3 * own.count, p.change, 0.0, True
     for i in range(n):
-        w[i] = load[i // 3] * unit[i]
-    for p in range(k):
-        missing = xp.maximum(_applied(b, p, n, w, doubles(at(problem, row.load_0))[p]), 0.0) - load[p]
-        for i in range(3 * p, 3 * p + 3):
-            gap = abs(_applied(a, i, n, w, doubles(at(problem, row.twist_0))[i]) - twist[i])
-            if i == 3 * p + 2:
-                gap *= doubles(own.radius)[p]
+        w[i] = p.load[i // 3] * p.unit[i]
+    for k in range(own.count):
+        missing = xp.maximum(_applied(p.load_response, k, n, w, p.load_0[k]), 0.0) - p.load[k]
+        for i in range(3 * k, 3 * k + 3):
+            gap = abs(_applied(p.response, i, n, w, p.twist_0[i]) - p.twist[i])
+            if i == 3 * k + 2:
+                gap *= own.radius[k]
             else:
-                gap = xp.maximum(gap, a[n * i + i] * abs(missing))
+                gap = xp.maximum(gap, p.response[n * i + i] * abs(missing))
             finite = finite and xp.is_finite(gap)
             largest = xp.maximum(largest, gap)
     return largest if finite else math.inf
 
 
 @kernel
-def _newton(own, problem, w, held, falling):
-    """The Newton step from wrenches w into `change` and `move` of the row. Whether it leads downhill.
+def _newton(own, p, held, falling):
+    """Write the Newton step from the wrenches into `change` and `move`; return True if it leads downhill.
 
-    `falling`: without the directions in which slopes rise. The twists and loads of the row need not be those that w
-    causes: what they lack of these goes into the step.
+    `falling`: without the directions in which slopes rise. Twists and loads need not be those that the wrenches cause:
+    what they lack of these goes into the step.
     """
-    row, k, n = own.row, own.count, 3 * own.count
-    a, b = doubles(at(problem, row.response)), doubles(at(problem, row.load_response))
-    twist, load, gap = doubles(at(problem, row.twist)), doubles(at(problem, row.load)), doubles(at(problem, row.gap))
-    unit, unit_slopes = doubles(at(problem, row.unit)), doubles(at(problem, row.unit_slopes))
-    m, change, move = doubles(at(problem, row.matrix)), doubles(at(problem, row.change)), doubles(at(problem, row.move))
+    n, a, w, gap, change = 3 * own.count, p.response, p.wrench, p.gap, p.change
     for i in range(n):
-        gap[i] = _applied(a, i, n, w, doubles(at(problem, row.twist_0))[i]) - twist[i]
-    for p in range(k):
-        slopes = doubles(at(problem, row.slopes + 9 * p))
+        gap[i] = _applied(a, i, n, w, p.twist_0[i]) - p.twist[i]
+    for k in range(own.count):
+        slopes, load = at(p.slopes, 9 * k), p.load[k]
         for i in range(9):
-            slopes[i] = load[p] * unit_slopes[9 * p + i]
+            slopes[i] = load * p.unit_slopes[9 * k + i]
         if falling:
-            s, q = doubles(at(problem, row.turned)), doubles(at(problem, row.turned + 9))
-            leave_out_rising(slopes, doubles(at(problem, row.scale + 3 * p)), s, q)
-        lacks = _applied(b, p, n, w, doubles(at(problem, row.load_0))[p]) - load[p]
-        follows = 0.0 if held or (load[p] == 0.0 and lacks < 0.0) else 1.0
+            leave_out_rising(slopes, at(p.scale, 3 * k), p.turned, at(p.turned, 9))
+        lacks = _applied(p.load_response, k, n, w, p.load_0[k]) - load
+        follows = 0.0 if held or (load == 0.0 and lacks < 0.0) else 1.0
         for i in range(3):
-            one, x, y, s = 3 * p + i, slopes[3 * i], slopes[3 * i + 1], slopes[3 * i + 2]
-            change[one] = (load[p] + follows * lacks) * unit[one] - w[one]
-            change[one] += x * gap[3 * p] + y * gap[3 * p + 1] + s * gap[3 * p + 2]
+            one, x, y, s = 3 * k + i, slopes[3 * i], slopes[3 * i + 1], slopes[3 * i + 2]
+            change[one] = (load + follows * lacks) * p.unit[one] - w[one]
+            change[one] += x * gap[3 * k] + y * gap[3 * k + 1] + s * gap[3 * k + 2]
             for j in range(n):
-                caused = x * a[n * 3 * p + j] + y * a[n * (3 * p + 1) + j] + s * a[n * (3 * p + 2) + j]
-                m[n * one + j] = (1.0 if j == one else 0.0) - caused - follows * unit[one] * b[n * p + j]
-    sign, downhill = solved(m, change, n), 0.0
-    for i in range(n):
-        move[i] = _applied(a, i, n, change, 0.0)
-    for i in range(n):
-        p = i // 3
-        caused = unit_slopes[3 * i] * move[3 * p] + unit_slopes[3 * i + 1] * move[3 * p + 1]
-        downhill += move[i] * (change[i] - load[p] * (caused + unit_slopes[3 * i + 2] * move[3 * p + 2]))
+                caused = x * a[n * 3 * k + j] + y * a[n * (3 * k + 1) + j] + s * a[n * (3 * k + 2) + j]
+                loaded = follows * p.unit[one] * p.load_response[n * k + j]
+                p.matrix[n * one + j] = (1.0 if j == one else 0.0) - caused - loaded
+    sign, downhill = solved(p.matrix, change, n), _downhill(own, p)
     return sign > 0.0 and downhill > 0.0
 
 
 @kernel
-def _slope(own, problem, w):
-    """`A dW . s` at wrenches w."""
-    row, total = own.row, 0.0
-    load, unit, move = doubles(at(problem, row.load)), doubles(at(problem, row.unit)), doubles(at(problem, row.move))
+def _downhill(own, p):
+    """Write `A dW` into `move`; return `A dW . (dW - dV.P dV)` with P as it is, rising directions and all."""
+    n, move, downhill = 3 * own.count, p.move, 0.0
+    for i in range(n):
+        move[i] = _applied(p.response, i, n, p.change, 0.0)
+    for i in range(n):
+        k = i // 3
+        caused = p.unit_slopes[3 * i] * move[3 * k] + p.unit_slopes[3 * i + 1] * move[3 * k + 1]
+        downhill += move[i] * (p.change[i] - p.load[k] * (caused + p.unit_slopes[3 * i + 2] * move[3 * k + 2]))
+    return downhill
+
+
+@kernel
+def _slope(own, p):
+    """Return `A dW . s` at the wrenches."""
+    total = 0.0
     for i in range(3 * own.count):
-        total += move[i] * (load[i // 3] * unit[i] - w[i])
+        total += p.move[i] * (p.load[i // 3] * p.unit[i] - p.wrench[i])
     return total
 
 
 @kernel
-def _go(own, problem, w, held, whole):
-    """Go along the Newton step from wrenches w, and, unless it is to be `whole`, back where it goes too far."""
-    row, n = own.row, 3 * own.count
-    start, change = doubles(at(problem, row.start)), doubles(at(problem, row.change))
-    first, far = _slope(own, problem, w), 1.0
+def _go(own, p, held, whole):
+    """Go along the Newton step from the wrenches, and, unless it is to be `whole`, back where it goes too far."""
+    n, w, first, far = 3 * own.count, p.wrench, _slope(own, p), 1.0
     for i in range(n):
-        start[i] = w[i]
+        p.start[i] = w[i]
     for shortening in range(SHORTENINGS + 1):
         for i in range(n):
-            w[i] = start[i] + far * change[i]
-        _host(own, problem, w, held)
-        evaluate(own, problem)
-        here = _slope(own, problem, w)
+            w[i] = p.start[i] + far * p.change[i]
+        _host(own, p, held)
+        step_all(own, p)
+        here = _slope(own, p)
         if whole or here >= -DOWNHILL * first or not first > 0.0 or shortening == SHORTENINGS:
             break
         far *= xp.minimum(xp.maximum(first / (first - here), 0.1), 0.7)
     if held:
-        _host(own, problem, w, False)
+        _host(own, p, False)
 
 
 @kernel
-def _valid(own, problem):
-    """Whether all inputs are in range, and none is negative that must not be."""
-    row, given = own.row, doubles(problem)
-    valid = given[row.dt] >= 0.0
-    for i in range(row.records):
-        valid = valid and xp.in_range(given[i])
-    for p in range(own.count):
-        valid = valid and given[row.free_load + p] >= 0.0
+def _valid(own, p, words):
+    """Return True if all inputs are in range, and none is negative that must not be."""
+    valid = p.dt[0] >= 0.0
+    for i in range(own.row.records):
+        valid = valid and xp.in_range(words[i])
+    for k in range(own.count):
+        valid = valid and p.free_load[k] >= 0.0
     for i in range(3 * own.count):
-        valid = valid and given[row.response + (3 * own.count + 1) * i] >= 0.0
+        valid = valid and p.response[(3 * own.count + 1) * i] >= 0.0
     return valid
 
 
 @kernel
-def _prepare(own, problem):
-    """Twists and loads without wrenches, and the scale. The largest speed [m/s] that goes into a twist."""
-    row, n, largest = own.row, 3 * own.count, 0.0
-    a, b, guess = doubles(at(problem, row.response)), doubles(at(problem, row.load_response)), at(problem, row.guess)
-    twist_0, load_0, scale = at(problem, row.twist_0), at(problem, row.load_0), doubles(at(problem, row.scale))
+def _prepare(own, p):
+    """Write twists and loads without wrenches, and the scale; return the largest speed [m/s] that goes into a twist."""
+    n, a, largest = 3 * own.count, p.response, 0.0
     for i in range(n):
-        free = doubles(at(problem, row.free_twist))[i]
-        caused = _applied(a, i, n, doubles(guess), 0.0)
-        doubles(twist_0)[i] = free - caused
-        lever = doubles(own.radius)[i // 3] if i % 3 == 2 else 1.0
-        largest = xp.maximum(largest, lever * (abs(free) + abs(caused)))
-        scale[i] = math.sqrt(a[n * i + i]) if a[n * i + i] > 0.0 else 1.0
-    for p in range(own.count):
-        doubles(load_0)[p] = doubles(at(problem, row.free_load))[p] - _applied(b, p, n, doubles(guess), 0.0)
+        caused = _applied(a, i, n, p.guess, 0.0)
+        p.twist_0[i] = p.free_twist[i] - caused
+        lever = own.radius[i // 3] if i % 3 == 2 else 1.0
+        largest = xp.maximum(largest, lever * (abs(p.free_twist[i]) + abs(caused)))
+        p.scale[i] = math.sqrt(a[n * i + i]) if a[n * i + i] > 0.0 else 1.0
+    for k in range(own.count):
+        p.load_0[k] = p.free_load[k] - _applied(p.load_response, k, n, p.guess, 0.0)
     return largest
 
 
 @kernel
-def _start(own, problem, w, tolerance):
-    """Evaluate the better of the twists that wrenches w cause and of rest. The misfit, and whether it is rest."""
-    row, n = own.row, 3 * own.count
-    _host(own, problem, w, False)
-    evaluate(own, problem)
-    misfit = _misfit(own, problem)
+def _start(own, p, tolerance):
+    """Step at the better of the twists that the wrenches cause and of rest; return the misfit, and True for rest."""
+    _host(own, p, False)
+    step_all(own, p)
+    misfit = _misfit(own, p)
     if misfit > tolerance:
-        twist = doubles(at(problem, row.twist))
-        for i in range(n):
-            twist[i] = 0.0
-        evaluate(own, problem)
-        at_rest = _misfit(own, problem)
+        for i in range(3 * own.count):
+            p.twist[i] = 0.0
+        step_all(own, p)
+        at_rest = _misfit(own, p)
         if at_rest <= misfit:
             return at_rest, True
-        _host(own, problem, w, False)
-        evaluate(own, problem)
+        _host(own, p, False)
+        step_all(own, p)
     return misfit, False
+
+
+@kernel
+def _copy(own, twist, load, to_twist, to_load):
+    for i in range(3 * own.count):
+        to_twist[i] = twist[i]
+    for k in range(own.count):
+        to_load[k] = load[k]
 
 
 @entry
 def solve(patches, problem):
     """Solve the problem of one row, whose address comes in; `patches` is that of its `Patches`."""
     own = read(patches)
-    row, k, n, given, w = own.row, own.count, 3 * own.count, doubles(problem), doubles(at(problem, own.row.wrench))
-    given[row.iterations], given[row.residual] = INVALID, math.inf
-    if not _valid(own, problem):
+    p = arrays_at(own.row, problem)
+    p.iterations[0], p.residual[0] = INVALID, math.inf
+    if not _valid(own, p, doubles(problem)):
         return
-    tolerance = xp.maximum(given[row.tolerance], ROUNDING * _prepare(own, problem))
-    misfit, rest = _start(own, problem, w, tolerance)
+    tolerance = xp.maximum(p.tolerance[0], ROUNDING * _prepare(own, p))
+    misfit, rest = _start(own, p, tolerance)
     best, iterations = math.inf, 0
     while True:
         if misfit < best:
             best = misfit
-            for i in range(n):
-                given[row.best_twist + i] = given[row.twist + i]
-            for p in range(k):
-                given[row.best_load + p] = given[row.load + p]
-        if misfit <= tolerance or iterations >= given[row.most] or misfit == math.inf:
+            _copy(own, p.twist, p.load, p.best_twist, p.best_load)
+        if misfit <= tolerance or iterations >= p.most[0] or misfit == math.inf:
             break
         held = iterations % ROUND >= JOINT
-        if not _newton(own, problem, w, held, False):
-            _newton(own, problem, w, held, True)
-        _go(own, problem, w, held, rest)
+        if not _newton(own, p, held, False):
+            _newton(own, p, held, True)
+        _go(own, p, held, rest)
         iterations, rest = iterations + 1, False
-        misfit = _misfit(own, problem)
+        misfit = _misfit(own, p)
     if not misfit <= best:
-        for i in range(n):
-            given[row.twist + i] = given[row.best_twist + i]
-        for p in range(k):
-            given[row.load + p] = given[row.best_load + p]
-        evaluate(own, problem)
-    for i in range(n):
-        w[i] = given[row.load + i // 3] * given[row.unit + i]
-    _forget_unloaded(own, problem)
-    given[row.iterations], given[row.residual], given[row.converged] = (
-        iterations,
-        best,
-        1.0 if best <= tolerance else 0.0,
-    )
+        _copy(own, p.best_twist, p.best_load, p.twist, p.load)
+        step_all(own, p)
+    for i in range(3 * own.count):
+        p.wrench[i] = p.load[i // 3] * p.unit[i]
+    _forget_unloaded(own, p)
+    p.iterations[0], p.residual[0], p.converged[0] = iterations, best, 1.0 if best <= tolerance else 0.0
 
 
 @kernel
-def _forget_unloaded(own, problem):
-    """A patch without load keeps no memory."""
-    row, states = own.row, doubles(at(problem, own.row.new))
+def _forget_unloaded(own, p):
+    """Clear the states of patches without load: they keep no memory."""
     for c in range(own.pieces):
-        last = integers(own.firsts)[c + 1] if c + 1 < own.pieces else own.states
-        if doubles(at(problem, row.load))[integers(own.owners)[c]] == 0.0:
-            for i in range(integers(own.firsts)[c], last):
-                states[i] = 0.0
+        last = own.firsts[c + 1] if c + 1 < own.pieces else own.states
+        if p.load[own.owners[c]] == 0.0:
+            for i in range(own.firsts[c], last):
+                p.new[i] = 0.0
 
 
 @functools.cache
 def solve_address() -> int:
-    """Where `solve` is in this process."""
+    """Return the address of `solve` in this process."""
     return address_of(solve, "pp")
 
 

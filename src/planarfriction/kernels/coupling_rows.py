@@ -4,116 +4,119 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
-from planarfriction.compiler.memory import reader
+from planarfriction.compiler.memory import Doubles, Integers, Layout, offsets_of, reader
 from planarfriction.kernels.step_slopes import NUMBERS
 
 
-class Row(NamedTuple):
-    """Where the parts of a problem begin in its row."""
+class Problem(NamedTuple):
+    """A problem of k patches."""
 
-    dt: int
-    tolerance: int
-    """Of the twists [m/s]."""
-    most: int
-    """Iterations."""
-    response: int
+    dt: Doubles
+    """Length of the step [s], [1]."""
+    tolerance: Doubles
+    """Tolerance of the twists [m/s], [1]."""
+    most: Doubles
+    """Iterations at most, [1]."""
+    response: Doubles
     """A, [3k, 3k]."""
-    load_response: int
+    load_response: Doubles
     """B, [k, 3k]."""
-    free_twist: int
+    free_twist: Doubles
     """V_0, [3k]."""
-    free_load: int
+    free_load: Doubles
     """N_0, [k]."""
-    guess: int
+    guess: Doubles
     """W_0, [3k]."""
-    state: int
-    records: int
-    """Addresses of the pieces' records, int [pieces]; 0 of one that carries nothing at its load."""
-    shares: int
-    """Of the pieces in the loads of their patches, [pieces]."""
-    wrench: int
-    """W, [3k]; comes in as where to start."""
-    twist: int
+    state: Doubles
+    """State at the start of the step."""
+    records: Integers
+    """Addresses of the pieces' records, [pieces]; 0 of one that carries nothing at its load."""
+    shares: Doubles
+    """Shares of the pieces in the loads of their patches, [pieces]."""
+    wrench: Doubles
+    """W, [3k]; comes in as a first guess."""
+    twist: Doubles
     """V, [3k]."""
-    load: int
+    load: Doubles
     """N, [k]."""
-    new: int
-    """State."""
-    iterations: int
-    """`INVALID` where a number is out of range, or negative where it must not be."""
-    residual: int
-    """[m/s]"""
-    converged: int
-    """1 or 0."""
-    unit: int
+    new: Doubles
+    """State at the end of the step."""
+    iterations: Doubles
+    """Number of iterations, [1]; `INVALID` where a number is out of range, or negative where it must not be."""
+    residual: Doubles
+    """Residual [m/s], [1]."""
+    converged: Doubles
+    """1 or 0, [1]."""
+    unit: Doubles
     """Wrenches of the models per unit load, [3k]; this and all that follows is scratch."""
-    unit_slopes: int
-    """[k, 9]"""
-    slopes: int
+    unit_slopes: Doubles
+    """Slopes of the wrenches per unit load, [k, 9]."""
+    slopes: Doubles
     """P, [k, 9]."""
-    twist_0: int
+    twist_0: Doubles
     """V at W = 0, [3k]."""
-    load_0: int
-    """[k]"""
-    scale: int
+    load_0: Doubles
+    """N at W = 0, [k]."""
+    scale: Doubles
     """Twists of unit energy, [3k]."""
-    gap: int
-    """[3k]"""
-    change: int
+    gap: Doubles
+    """Difference between the twists that wrenches cause and V, [3k]."""
+    change: Doubles
     """dW, [3k]."""
-    move: int
+    move: Doubles
     """A dW, [3k]."""
-    start: int
+    start: Doubles
     """W before a step, [3k]."""
-    best_twist: int
-    best_load: int
-    matrix: int
-    """[3k, 3k]"""
-    step: int
-    """What a piece's step writes."""
-    turned: int
-    """[2, 9]"""
+    best_twist: Doubles
+    """V of the least residual so far, [3k]."""
+    best_load: Doubles
+    """N of the least residual so far, [k]."""
+    matrix: Doubles
+    """Matrix of the Newton step, [3k, 3k]."""
+    step: Doubles
+    """Result of a piece's step (see `step_slopes`)."""
+    turned: Doubles
+    """Scratch of `leave_out_rising`, [2, 9]."""
 
+
+Offsets = offsets_of(Problem)
+"""Places of the arrays of a problem in its row."""
 
 INVALID = -1.0
-"""In place of a number of iterations."""
+"""Stands in place of a number of iterations."""
 
 
-def layout(patches: int, pieces: int, states: int) -> tuple[Row, dict[str, slice], int]:
-    """Rows for k patches: where their parts begin, the same as slices, and how long they are."""
+def layout(patches: int, pieces: int, states: int) -> Layout:
+    """Return the layout of rows for k patches."""
     k, n = patches, 3 * patches
-    sizes = dict.fromkeys(Row._fields, n)
-    sizes |= dict.fromkeys(("dt", "tolerance", "most", "iterations", "residual", "converged"), 1)
-    sizes |= dict.fromkeys(("free_load", "load", "load_0", "best_load"), k)
-    sizes |= dict.fromkeys(("state", "new"), states) | dict.fromkeys(("records", "shares"), pieces)
-    sizes |= dict.fromkeys(("unit_slopes", "slopes"), 9 * k) | dict.fromkeys(("response", "matrix"), n * n)
-    sizes |= {"load_response": k * n, "step": NUMBERS, "turned": 18}
-    ends = np.cumsum(list(sizes.values())).tolist()
-    begins = [0, *ends[:-1]]
-    return Row(*begins), {name: slice(*each) for name, *each in zip(sizes, begins, ends, strict=True)}, ends[-1]
+    shapes = dict.fromkeys(Problem._fields, n)
+    shapes |= dict.fromkeys(("dt", "tolerance", "most", "iterations", "residual", "converged"), 1)
+    shapes |= dict.fromkeys(("free_load", "load", "load_0", "best_load"), k)
+    shapes |= dict.fromkeys(("state", "new"), states) | dict.fromkeys(("records", "shares"), pieces)
+    shapes |= dict.fromkeys(("unit_slopes", "slopes"), 9 * k) | dict.fromkeys(("response", "matrix"), n * n)
+    return Layout(Problem, **shapes | {"load_response": k * n, "step": NUMBERS, "turned": 18})
 
 
 class Patches(NamedTuple):
-    """What all problems of the same patches share."""
+    """Data that all problems of the same patches share."""
 
     count: int
-    """k"""
+    """Number k of patches."""
     pieces: int
-    """A patch is one piece, or several that share its twist and its load."""
+    """Number of pieces; a patch is one, or several that share its twist and its load."""
     states: int
+    """Number of states."""
     solve: int
-    """Address of `solve`."""
-    functions: int
-    """Where the addresses of the pieces' functions are (see `step_slopes`), int [pieces]."""
-    owners: int
-    """Where the patches that they belong to are, int [pieces]."""
-    firsts: int
-    """Where their states begin in the state, int [pieces]."""
-    radius: int
-    """Where the lever arms of the patches are that turn spins into speeds [m], [k]."""
-    row: Row
+    """Address of `coupling.solve`."""
+    functions: Integers
+    """Addresses of the pieces' functions (see `step_slopes`), [pieces]."""
+    owners: Integers
+    """Patches of the pieces, [pieces]."""
+    firsts: Integers
+    """First state of each piece, [pieces]."""
+    radius: Doubles
+    """Lever arms of the patches that turn spins into speeds [m], [k]."""
+    row: Offsets
 
 
 read = reader(Patches)

@@ -17,9 +17,9 @@ from planarfriction.adapters.mujoco.loops.responses import is_sparse, leaves_ran
 from planarfriction.compiler import callback, entry, jit, kernel
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler.calls import address, address_of, c_address_of, call, call_c, shared_word
-from planarfriction.compiler.memory import at, doubles, integers, integers32
-from planarfriction.kernels.coupling import evaluate
-from planarfriction.kernels.coupling_rows import Row
+from planarfriction.compiler.memory import arrays_at, at, doubles, integers, integers32
+from planarfriction.kernels.coupling import step_all
+from planarfriction.kernels.coupling_rows import Offsets
 from planarfriction.kernels.coupling_rows import read as read_patches
 
 PASSES = 10
@@ -37,7 +37,7 @@ INSTALLED, _installed = shared_word("planarfriction_mujoco")
 
 class _Own(NamedTuple):
     host: Host
-    row: Row
+    row: Offsets
 
 
 @kernel
@@ -129,7 +129,7 @@ def _slope(own, patches, s):
     problem, row, n = doubles(s.problem), own.row, 3 * own.host.count
     _copy(doubles(at(s.problem, row.free_twist)), doubles(at(s.problem, row.twist)), n)
     _copy(doubles(at(s.problem, row.free_load)), doubles(at(s.problem, row.load)), own.host.count)
-    evaluate(patches, s.problem)
+    step_all(patches, arrays_at(patches.row, s.problem))
     total = 0.0
     for i in range(n):
         gap = problem[row.load + i // 3] * problem[row.unit + i] - problem[row.guess + i]
