@@ -31,7 +31,7 @@ class CompiledDistributed(CompiledModel):
         return rate.reshape(state.shape), wrench.reshape(twist.shape)
 
     def linearisation(self, state: np.ndarray, twist: np.ndarray, load: np.ndarray) -> np.ndarray:
-        """Return linearisations cell by cell `[..., L, N]` (see `kernels.cells.Linear`)."""
+        """Return linearisations cell by cell `[..., L, N]` (see `kernels.cells.LinearCells`)."""
         cells = state.shape[-1]
         lin = linearised(self._all_cells(load), state.reshape(load.size, 2 * cells), twist.reshape(-1, 3))
         return lin.reshape(*load.shape, lin.shape[-1] // cells, cells)
@@ -87,7 +87,7 @@ class CompiledDistributed(CompiledModel):
             functions = contacts.ASYMMETRIC if self.patch.asymmetric else contacts.TURNED
         else:
             numbers, functions = np.ascontiguousarray(positions.T), contacts.ISOTROPIC
-        record = contacts.Cells(law, count, numbers, weights)
+        record = contacts.CellsContact(law, count, numbers, weights)
         return PackedModel(
             functions,
             rows_of(record, len(weights), weights=places_of(weights)),

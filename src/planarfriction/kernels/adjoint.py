@@ -40,16 +40,16 @@ from planarfriction.kernels.sdirk import (
     STAGES,
     START,
     accept,
-    derivative_of,
     error_of,
     keep_stage,
     read_workspace,
     stage_base,
+    variation_of,
 )
-from planarfriction.kernels.small_matrices import applied, applied_transposed
+from planarfriction.kernels.small_matrices import applied
 from planarfriction.kernels.step_control import judged, length
 from planarfriction.kernels.tangent import FRICTION, LOAD, MOST, NORMAL_FORCE, SIZE, change_of, partial_of
-from planarfriction.kernels.vectors import dot, plus, put, three, times
+from planarfriction.kernels.vectors import applied_back, dot, plus, put, three, times
 
 
 @kernel
@@ -62,7 +62,7 @@ def _pulled(own, piece, c, y, given, wrench, w):
     put(rows.d_wrench, wrench)
     states = at(y, first), linearisation_of(own, c), at(given, first), own.work.rows, at(w.forcing, first)
     call(function_of(own, c, PULL_BACK), (record_of(own, piece, c), *states))
-    return applied_transposed(a, rows.d_twist), applied_transposed(g, rows.d_twist)
+    return applied_back(a, rows.d_twist), applied_back(g, rows.d_twist)
 
 
 @kernel
@@ -81,9 +81,9 @@ def _body_solved(own, shift, body, velocity, pose, out):
         s -= per_shift * (sin * body[0] + cos * body[1]) * x
         s += per_shift * (cos * body[0] - sin * body[1]) * y
     velocity = plus(velocity, per_shift, (cos * x + sin * y, cos * y - sin * x, s))
-    u = applied_transposed(own.work.inverse, velocity)
+    u = applied_back(own.work.inverse, velocity)
     put(out, u)
-    put(at(out, 3), plus(applied_transposed(own.work.to_pose, u), per_shift, (x, y, s)))
+    put(at(out, 3), plus(applied_back(own.work.to_pose, u), per_shift, (x, y, s)))
     return u
 
 
@@ -181,7 +181,7 @@ def propagate_back(system, path, first, last, begin, until, adjoint, drives, mom
     number of steps.
     """
     own, w, n, atol = read(system), read_workspace(workspace), adjoint.shape[0], pointer(atol)
-    d, taken, k, since = derivative_of(w, pointer(adjoint), 0, 0, n), 0, last - 1, begin
+    d, taken, k, since = variation_of(w, pointer(adjoint), 0, 0, n), 0, last - 1, begin
     while since > until:
         k = node_before(path, k, first, since)
         local, remaining = path.since[k + 1] - path.since[k], since - until

@@ -28,8 +28,8 @@ from planarfriction.kernels.contacts import (
     contact_map,
     contact_map_slopes,
 )
-from planarfriction.kernels.small_matrices import applied, applied_transposed, inverse
-from planarfriction.kernels.vectors import plus, put, put_all, three
+from planarfriction.kernels.small_matrices import applied, inverse
+from planarfriction.kernels.vectors import applied_back, plus, put, put_all, three
 
 
 class Motion(NamedTuple):
@@ -220,7 +220,7 @@ def rates(system, piece, since, y, dy):
         contact_map(own.contacts.mount[c], place, at(body, 3), a)
         put(work.twist, applied(a, seen))
         call(function_of(own, c, EVALUATE), (record_of(own, piece, c), at(y, first), work.twist, at(dy, first), w))
-        total = plus(total, total_load(own, piece, since, c), applied_transposed(a, w))
+        total = plus(total, total_load(own, piece, since, c), applied_back(a, w))
     for i in range(3):
         out[i] = own.motion.acceleration[3 * piece + i] + own.motion.inverse_mass[i] * total[i]
     put(at(out, 3), _turned(own, body, three(body)))
@@ -273,8 +273,8 @@ def factor(system, piece, since, y, shift):
         call(function_of(own, c, FACTOR), (record_of(own, piece, c), z, shift, linearisation_of(own, c), s))
         load = total_load(own, piece, since, c)
         for j in range(3):
-            by_u = applied_transposed(a, applied(s, (a[j], a[3 + j], a[6 + j])))
-            bpy = applied_transposed(a, applied(s, (g[j], g[3 + j], g[6 + j])))
+            by_u = applied_back(a, applied(s, (a[j], a[3 + j], a[6 + j])))
+            bpy = applied_back(a, applied(s, (g[j], g[3 + j], g[6 + j])))
             for i in range(3):
                 weight, per_pose = own.motion.inverse_mass[i] * load, (h[3 * i + j] + bpy[i]) / shift
                 to_pose[3 * i + j] += weight * per_pose
@@ -293,7 +293,7 @@ def solve(system, piece, since, y, shift, r, out):
         first = own.contacts.state[c]
         states = record_of(own, piece, c), at(y, first), shift, at(r, first), linearisation_of(own, c), w
         call(function_of(own, c, ELIMINATE), states)
-        load, force = total_load(own, piece, since, c), applied_transposed(maps_of(own, c)[0], w)
+        load, force = total_load(own, piece, since, c), applied_back(maps_of(own, c)[0], w)
         b = plus(b, load, (inverse_mass[0] * force[0], inverse_mass[1] * force[1], inverse_mass[2] * force[2]))
     u, pose, per_shift = at(out, own.bristles), at(out, own.bristles + 3), 1.0 / shift
     put(u, applied(own.work.inverse, b))

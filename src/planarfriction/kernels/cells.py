@@ -26,7 +26,7 @@ from planarfriction.kernels.law import grip, grip_slope, squared
 from planarfriction.kernels.vectors import dot, norm, plus, put, put_all, three, times
 
 
-class Cells(NamedTuple):
+class CellsContact(NamedTuple):
     """A contact of n cells."""
 
     law: LawNumbers
@@ -38,7 +38,7 @@ class Cells(NamedTuple):
     """[n]"""
 
 
-read = viewer(Cells)
+read = viewer(CellsContact)
 
 
 class Lever(NamedTuple):
@@ -55,7 +55,7 @@ class Lever(NamedTuple):
     """True if bristles decay towards a centre other than zero."""
 
 
-class Linear(NamedTuple):
+class LinearCells(NamedTuple):
     """Rows [n] of a linearisation."""
 
     k: Doubles
@@ -79,13 +79,13 @@ class Linear(NamedTuple):
     heading_y: Doubles
 
 
-STRAIGHT, LEANING = 7, len(Linear._fields)
+STRAIGHT, LEANING = 7, len(LinearCells._fields)
 """Rows of a linearisation where bristles decay towards zero, and where they lean."""
 
 
 @kernel
 def _linear(lin, n):
-    return Linear(
+    return LinearCells(
         lin, at(lin, n), at(lin, 2 * n), at(lin, 3 * n), at(lin, 4 * n), at(lin, 5 * n), at(lin, 6 * n), at(lin, 7 * n),
         at(lin, 8 * n), at(lin, 9 * n), at(lin, 10 * n), at(lin, 11 * n), at(lin, 12 * n),
     )  # fmt: skip

@@ -25,7 +25,7 @@ EVALUATE, LINEARISE, FACTOR, ELIMINATE, BACK_SUBSTITUTE, CHANGE, SOLVE_TRANSPOSE
 """Columns of `Contacts.calls`; derivatives of scenes need those from `CHANGE` on."""
 
 CALLS = 8
-"""How many there are."""
+"""Number of columns of `Contacts.calls`."""
 
 
 class Rows(NamedTuple):

@@ -32,8 +32,8 @@ SHORTENINGS = 6
 """Times at most that a Newton step which went too far is shortened."""
 
 JOINT, ROUND = 8, 24
-"""Of every ROUND iterations the first JOINT let the loads move with the wrenches, in the others they follow behind:
-where both turn against each other, one of the two ways gets on."""
+"""Number of iterations at the start of a round in which loads move with the wrenches, and length of a round; in its
+others loads follow behind: where both turn against each other, one of the two ways gets on."""
 
 ROUNDING = 1e-13
 """Error of a twist, in the largest speed that goes into it, below which no step gets."""

@@ -17,8 +17,8 @@ import numpy as np
 from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import Doubles, Layout, arrays_at
 from planarfriction.kernels.contacts import ROWS, traction
-from planarfriction.kernels.small_matrices import applied, applied_transposed, inverse
-from planarfriction.kernels.vectors import plus, put, put_all, three, times
+from planarfriction.kernels.small_matrices import applied, inverse
+from planarfriction.kernels.vectors import applied_back, plus, put, put_all, three, times
 
 
 class ThreeStates(NamedTuple):
@@ -41,10 +41,10 @@ class ThreeStates(NamedTuple):
     rate: Any
     """`(own, z, u)`: return `f(z, u)`."""
     slopes: Any
-    """`(own, z, u, lin)`: write `f_z` and `f_u` into a `Linear`."""
+    """`(own, z, u, lin)`: write `f_z` and `f_u` into a `LinearMoments`."""
 
 
-class Linear(NamedTuple):
+class LinearMoments(NamedTuple):
     """Workspace of a linearisation, each [3, 3] row by row."""
 
     by_z: Doubles
@@ -57,7 +57,7 @@ class Linear(NamedTuple):
     """Numbers that `ThreeStates.slopes` may use, [15]."""
 
 
-LINEAR = Layout(Linear, by_z=9, by_u=9, inverse=9, scratch=15)
+LINEAR = Layout(LinearMoments, by_z=9, by_u=9, inverse=9, scratch=15)
 _LINEAR = LINEAR.offsets
 
 
@@ -130,7 +130,7 @@ def change(model, contact, z, zdot, lin, dz, dzdot, rows, friction, size):
 def solve_transposed(model, contact, z, r, lin, out):
     """Solve `D' out = r`; a cotangent is scaled as a state is made raw."""
     own, m = model.read(contact), arrays_at(_LINEAR, lin)
-    put(out, model.scaled(own, applied_transposed(m.inverse, model.raw(own, three(r)))))
+    put(out, model.scaled(own, applied_back(m.inverse, model.raw(own, three(r)))))
 
 
 @kernel
@@ -140,8 +140,8 @@ def pull_back(model, contact, z, lin, dzdot, rows, out):
     law, wrench = own.law, three(rows.d_wrench)
     t = model.seen(own, wrench)
     rate = plus(model.raw(own, three(dzdot)), -law.sigma_1, t)
-    put(out, model.scaled(own, plus(applied_transposed(m.by_z, rate), -law.sigma_0, t)))
-    u = plus(applied_transposed(m.by_u, rate), -law.sigma_2, model.viscous(own, wrench))
+    put(out, model.scaled(own, plus(applied_back(m.by_z, rate), -law.sigma_0, t)))
+    u = plus(applied_back(m.by_u, rate), -law.sigma_2, model.viscous(own, wrench))
     put(rows.d_twist, model.wrench(own, u))
 
 

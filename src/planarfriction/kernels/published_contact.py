@@ -20,9 +20,9 @@ from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import moments
 from planarfriction.kernels.contacts import functions_of
 from planarfriction.kernels.derive import derive, per
-from planarfriction.kernels.small_matrices import applied, applied_transposed
+from planarfriction.kernels.small_matrices import applied
 from planarfriction.kernels.surfaces import sliding, sliding_jacobian
-from planarfriction.kernels.vectors import dot, norm, plus
+from planarfriction.kernels.vectors import applied_back, dot, norm, plus
 
 
 class Shape(NamedTuple):
@@ -135,7 +135,7 @@ def _slopes(own, z, twist, m):
     sliding_jacobian(own.kind, own.data, 0, own.size, x, y, s, norm(twist), j)
     (k,), tape = _forth(own.law, z, applied(j, twist), twist)
     by_z, by_u, by_twist = _back(tape, (1.0,))
-    by_twist = plus(by_twist, 1.0, applied_transposed(j, by_u))
+    by_twist = plus(by_twist, 1.0, applied_back(j, by_u))
     for i in range(3):
         for p in range(3):
             m.by_z[3 * i + p] = (-k if i == p else 0.0) - z[i] * by_z[p]

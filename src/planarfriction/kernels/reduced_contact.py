@@ -17,9 +17,8 @@ from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import moments
 from planarfriction.kernels.contacts import functions_of
 from planarfriction.kernels.reduced import closure, closure_partials, to_origin
-from planarfriction.kernels.small_matrices import applied_transposed
 from planarfriction.kernels.steady import STILL, evenness, fourth_moments, scaled_twist, steady, steady_slopes
-from planarfriction.kernels.vectors import dot, norm, plus, put_all, times
+from planarfriction.kernels.vectors import applied_back, dot, norm, plus, put_all, times
 
 
 class Shape(NamedTuple):
@@ -116,9 +115,9 @@ def _slopes_at(own, z, u, v, m):
     # slopes of beta, lambda and s, by z and by V_G
     beta_z = times(per_q2, plus(times(by_deflection * per_deflection, z), by_share, q))
     beta_z = plus(beta_z, own.law.breakaway_ratio * by_breakaway, even_z)
-    q_u = times(per_q2, applied_transposed(j, q))
-    decay_u = times(per_power, plus(times(2.0, u), -decay, plus(q, 1.0, applied_transposed(j, u))))
-    share_u = plus(times(per_q2, applied_transposed(j, z)), -2.0 * share, q_u)
+    q_u = times(per_q2, applied_back(j, q))
+    decay_u = times(per_power, plus(times(2.0, u), -decay, plus(q, 1.0, applied_back(j, u))))
+    share_u = plus(times(per_q2, applied_back(j, z)), -2.0 * share, q_u)
     beta_u = plus(times(by_share, share_u), -by_deflection * deflection, q_u)
     for i in range(3):
         for k in range(3):

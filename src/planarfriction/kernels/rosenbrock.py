@@ -14,9 +14,9 @@ from planarfriction.kernels.body import System, load_of, maps_of, place_at, read
 from planarfriction.kernels.contacts import contact_map
 from planarfriction.kernels.integration import Method, Output, Progress, RunRecord, Stages, combine, read_run
 from planarfriction.kernels.rest import at_rest, speed_of
-from planarfriction.kernels.small_matrices import applied, applied_transposed
+from planarfriction.kernels.small_matrices import applied
 from planarfriction.kernels.step_control import MOTION, fitted, growth
-from planarfriction.kernels.vectors import norm, plus, put, three, times
+from planarfriction.kernels.vectors import applied_back, norm, plus, put, three, times
 
 DONE, PAUSED, STEP_TOO_SMALL, AT_REST = 0, 1, 2, 3
 """Outcomes of `advance`."""
@@ -97,7 +97,7 @@ def _time_slope(own, piece, slope):
     motion, total = own.motion, three(at(own.motion.force, 6 * piece + 3))
     for c in range(own.size):
         load = own.contacts.count[c] * motion.load[(2 * piece + 1) * own.size + c]
-        total = plus(total, load, applied_transposed(maps_of(own, c)[0], at(own.work.wrench, 3 * c)))
+        total = plus(total, load, applied_back(maps_of(own, c)[0], at(own.work.wrench, 3 * c)))
     for i in range(3):
         slope[i] = motion.inverse_mass[i] * total[i]
 

@@ -83,8 +83,8 @@ def workspace_for(count: int, inputs: int, n: int) -> Packed:
     return Packed(Layout(Workspace, **shapes).made(pace=np.ones(1)))
 
 
-class Derivative(NamedTuple):
-    """One of the derivatives, each [n]."""
+class Variation(NamedTuple):
+    """One of the derivatives of a motion, its arrays [n] each."""
 
     value: Doubles
     new: Doubles
@@ -95,9 +95,9 @@ class Derivative(NamedTuple):
 
 
 @kernel
-def derivative_of(w, values, p, u, n):
+def variation_of(w, values, p, u, n):
     """Return derivative p of `values` [P, n], which goes by input u."""
-    return Derivative(
+    return Variation(
         at(values, p * n), at(w.new, p * n), at(w.before, p * n), at(w.level, u * n), at(w.stages, 5 * p * n)
     )
 

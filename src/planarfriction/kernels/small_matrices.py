@@ -9,7 +9,7 @@ from planarfriction.compiler import kernel
 from planarfriction.kernels.vectors import times
 
 SWEEPS = 5
-"""Of Jacobi rotations over a matrix [3, 3], which converge with their square from the second or third on."""
+"""Sweeps of Jacobi rotations over a matrix [3, 3], which converge with their square from the second or third on."""
 
 
 @kernel
@@ -29,16 +29,6 @@ def applied(m, a):
 
 
 @kernel
-def applied_transposed(m, a):
-    """Return `M' a` of a matrix [3, 3] in memory."""
-    return (
-        m[0] * a[0] + m[3] * a[1] + m[6] * a[2],
-        m[1] * a[0] + m[4] * a[1] + m[7] * a[2],
-        m[2] * a[0] + m[5] * a[1] + m[8] * a[2],
-    )
-
-
-@kernel
 def inverse(shift, m):
     """Return `(shift I - M)^-1` of a matrix [3, 3] in memory, nine numbers."""
     a, b, c, d, e, f, g, h, i = shift - m[0], -m[1], -m[2], -m[3], shift - m[4], -m[5], -m[6], -m[7], shift - m[8]
@@ -49,7 +39,7 @@ def inverse(shift, m):
 
 @kernel
 def _rotate(s, q, i, j):
-    """One Jacobi rotation of the symmetric matrix s [3, 3], after which `s_ij = 0`; its axes are the columns of q."""
+    """Rotate the symmetric matrix s [3, 3], so that `s_ij = 0`; its axes are the columns of q."""
     off = s[3 * i + j]
     half = 0.5 * (s[4 * j] - s[4 * i]) / (off if off != 0.0 else 1.0)
     tangent = (1.0 if half >= 0.0 else -1.0) / (abs(half) + math.sqrt(half * half + 1.0))
@@ -84,7 +74,7 @@ def leave_out_rising(p, scale, s, q):
 
 @kernel
 def solved(m, x, n):
-    """Solve `m x' = x` in place, by elimination with pivots; the sign of the determinant.
+    """Solve `m x' = x` in place, by elimination with pivots; return the sign of the determinant.
 
     m [n, n] is lost. Where it is singular, the numbers that it does not determine are 0.
     """

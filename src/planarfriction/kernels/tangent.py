@@ -40,15 +40,15 @@ from planarfriction.kernels.sdirk import (
     GAMMA,
     PLACES,
     accept,
-    derivative_of,
     error_of,
     keep_stage,
     read_workspace,
     stage_base,
+    variation_of,
 )
-from planarfriction.kernels.small_matrices import applied, applied_transposed
+from planarfriction.kernels.small_matrices import applied
 from planarfriction.kernels.step_control import judged, length
-from planarfriction.kernels.vectors import plus, put, three, times
+from planarfriction.kernels.vectors import applied_back, plus, put, three, times
 
 FRICTION, SIZE, MASS, INERTIA, LOAD = 0, 1, 2, 3, 4
 """Parameters; each is a factor, 1 as the scene is."""
@@ -123,7 +123,7 @@ def _partial_of_contacts(own, piece, since, w, parameter, place, out):
             put(rows.d_twist, (0.0, 0.0, 0.0))
             change_of(own, piece, c, w.state, w.rate, w.zero, parameter, out)
         load = own.contacts.count[c] if parameter == NORMAL_FORCE else total_load(own, piece, since, c)
-        total = plus(total, load, applied_transposed(a, rows.d_wrench))
+        total = plus(total, load, applied_back(a, rows.d_wrench))
     for i in range(3):
         out[own.bristles + i] = own.motion.inverse_mass[i] * total[i]
 
@@ -147,7 +147,7 @@ def _step(system, own, path, k, last, since, h, slope, drives, w):
         for u in range(drives.input_kind.shape[0]):
             partial_of(own, piece, time, w, drives.input_kind[u], drives.input_place[u], at(w.forcing, u * n))
         for p in range(drives.kind.shape[0]):
-            d, forcing = derivative_of(w, slope, p, drives.input[p], n), at(w.forcing, drives.input[p] * n)
+            d, forcing = variation_of(w, slope, p, drives.input[p], n), at(w.forcing, drives.input[p] * n)
             stage_base(i, h, n, d, w.base)
             share = _share(drives, p, time)
             for m in range(n):
@@ -175,13 +175,13 @@ def propagate(system, path, first, last, begin, until, slope, drives, rtol, atol
         taken += 1
         error, known = 0.0, 1.0 if since > 0.0 else 0.0
         for p in range(drives.kind.shape[0]):
-            d = derivative_of(w, slope, p, drives.input[p], n)
+            d = variation_of(w, slope, p, drives.input[p], n)
             error = xp.maximum(error, error_of(own, n, d, h, known, rtol, atol))
         accepted, w.pace[0] = judged(w.pace[0], error, h, local)
         if accepted:
             since = until if h == remaining else since + h
             for p in range(drives.kind.shape[0]):
-                accept(n, derivative_of(w, slope, p, drives.input[p], n))
+                accept(n, variation_of(w, slope, p, drives.input[p], n))
     return taken
 
 

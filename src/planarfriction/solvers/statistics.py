@@ -27,5 +27,5 @@ class Statistics:
     """Time to compile the solver or to load it from the cache [s]; almost 0 after the first run in a process."""
 
     def as_dict(self) -> dict[str, int | float]:
-        """The statistics as a dictionary."""
+        """Return the statistics as a dictionary."""
         return dataclasses.asdict(self)

@@ -32,25 +32,25 @@ _MESSAGES = {
 }
 
 _loaded: set[Callable[..., int]] = set()
-"""The compiled loop, once it is there: later runs of a process need not ask."""
+"""Compiled loops that are in this process: later runs need not ask."""
 
 
 def start_of(state: np.ndarray) -> Progress:
-    """An integration that has yet to begin."""
+    """Return the progress of an integration that has yet to begin."""
     clock = np.array([0.0, _FIRST_STEP, np.inf])
     return Progress(np.array(state, dtype=float), np.zeros(2, np.int64), clock, np.zeros(4, np.int64))
 
 
 @dataclass(frozen=True, eq=False)
 class Integration(ByValue):
-    """Outcome of `integrate`; the arrays contain the requested times that were reached."""
+    """Outcome of `integrate`; its arrays contain the requested times that were reached."""
 
     output: Output
     """The recorded values."""
     status: str
-    """How it ended, as in a `Solution`."""
+    """Status at the end, as in a `Solution`."""
     message: str
-    """What happened, in one sentence."""
+    """Reason for the end, in one sentence."""
     statistics: Statistics
     """Number of steps and computing time."""
 
