@@ -133,20 +133,21 @@ def _type_of(record: Any) -> Any:
     return types.BaseTuple.from_types(parts, record)
 
 
-def _load(context, builder, kind, words, at):
+def _load(context, builder, kind, words, at, constant=False):
     """Load a value of a type whose words begin at number `at`; return it and where the next begins.
 
-    No compiled function changes the words of a record: LLVM may load them once for a whole loop.
+    Words that are `constant` as long as the function runs may be loaded once for a whole loop.
     """
     if isinstance(kind, types.BaseTuple):
         values = []
         for part in kind:
-            value, at = _load(context, builder, part, words, at)
+            value, at = _load(context, builder, part, words, at, constant)
             values.append(value)
         return context.make_tuple(builder, kind, values), at
     place = builder.gep(words, [ir.Constant(ir.IntType(64), at)])
     value = builder.load(builder.bitcast(place, context.get_value_type(kind).as_pointer()))
-    value.set_metadata("invariant.load", builder.module.add_metadata([]))
+    if constant:
+        value.set_metadata("invariant.load", builder.module.add_metadata([]))
     return value, at + 1
 
 
@@ -158,23 +159,8 @@ def _pointer(context, builder, kind, value, target):
     return builder.inttoptr(value, place) if isinstance(kind, types.Integer) else builder.bitcast(value, place)
 
 
-def reader(record: Any) -> Any:
-    """Make the compiled function that reads a record from the beginning of a row, from a pointer or an address."""
-    result = _type_of(record)
-
-    @intrinsic
-    def read(typingctx, row):
-        def generate(context, builder, signature, args):
-            words = _pointer(context, builder, row, args[0], types.float64)
-            return _load(context, builder, result, words, 0)[0]
-
-        return result(row), generate
-
-    return read
-
-
 class _View(types.Type):
-    """A record at an address, whose fields are loaded where they are named."""
+    """A record at an address, whose fields are loaded where they are named; no compiled function changes its words."""
 
     def __init__(self, record: Any) -> None:
         self.record = record
@@ -219,25 +205,28 @@ def _load_field(context, builder, view, value, name):
     if isinstance(result, _View):
         place = builder.gep(words, [ir.Constant(ir.IntType(64), first)])
         return builder.bitcast(place, context.get_value_type(result))
-    return _load(context, builder, result, words, first)[0]
+    return _load(context, builder, result, words, first, constant=True)[0]
 
 
-def viewer(record: Any) -> Any:
-    """Make the compiled function that views a record at an address, or at the beginning of a row.
+def reader(record: Any) -> Any:
+    """Make the compiled function that reads a record at an address, a pointer, or the beginning of a row.
 
-    Fields are loaded where they are named, so that functions pass large records for the price of an address.
+    A record that holds arrays is read field by field, where they are named: functions pass it for the price of an
+    address.
     """
-    result = _View(record)
+    result = _type_in_view(record)
 
     @intrinsic
-    def view(typingctx, row):
+    def read(typingctx, row):
         def generate(context, builder, signature, args):
             words = _pointer(context, builder, row, args[0], types.float64)
-            return builder.bitcast(words, context.get_value_type(result))
+            if isinstance(result, _View):
+                return builder.bitcast(words, context.get_value_type(result))
+            return _load(context, builder, result, words, 0)[0]
 
         return result(row), generate
 
-    return view
+    return read
 
 
 def _view(number: Any) -> Any:

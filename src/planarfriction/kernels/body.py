@@ -15,7 +15,7 @@ import numpy as np
 
 from planarfriction.compiler import entry, jit, kernel
 from planarfriction.compiler.calls import address_of, call
-from planarfriction.compiler.memory import Doubles, Integers, Layout, Packed, at, exists, viewer
+from planarfriction.compiler.memory import Doubles, Integers, Layout, Packed, at, exists, reader
 from planarfriction.kernels.contacts import (
     BACK_SUBSTITUTE,
     CALLS,
@@ -113,7 +113,7 @@ class SystemRecord(NamedTuple):
     solve: int
 
 
-read = viewer(SystemRecord)
+read = reader(SystemRecord)
 
 
 class System(Packed):

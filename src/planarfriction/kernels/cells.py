@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 from planarfriction import formulas
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
-from planarfriction.compiler.memory import Doubles, arrays_at, at, viewer
+from planarfriction.compiler.memory import Doubles, arrays_at, at, reader
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels.contacts import ROWS, functions_of, traction
 from planarfriction.kernels.derive import derive, per
@@ -38,7 +38,7 @@ class CellsContact(NamedTuple):
     """[n]"""
 
 
-read = viewer(CellsContact)
+read = reader(CellsContact)
 
 
 class Lever(NamedTuple):

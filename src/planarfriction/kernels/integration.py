@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from planarfriction.compiler import entry
-from planarfriction.compiler.memory import Doubles, Integers, at, viewer
+from planarfriction.compiler.memory import Doubles, Integers, at, reader
 
 
 class Method(NamedTuple):
@@ -129,4 +129,4 @@ class RunRecord(NamedTuple):
     """Address of `rest.at_rest`."""
 
 
-read_run = viewer(RunRecord)
+read_run = reader(RunRecord)

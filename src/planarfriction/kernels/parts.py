@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from planarfriction.compiler import entry, kernel
 from planarfriction.compiler.calls import call
-from planarfriction.compiler.memory import Doubles, Integers, arrays_at, at, viewer
+from planarfriction.compiler.memory import Doubles, Integers, arrays_at, at, reader
 from planarfriction.kernels.contacts import (
     BACK_SUBSTITUTE,
     CHANGE,
@@ -43,7 +43,7 @@ class PartsContact(NamedTuple):
     """Shares of the parts in the load, [count]."""
 
 
-read = viewer(PartsContact)
+read = reader(PartsContact)
 
 
 @kernel

@@ -13,7 +13,7 @@ import numpy as np
 
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
-from planarfriction.compiler.memory import Doubles, Layout, Packed, at, viewer
+from planarfriction.compiler.memory import Doubles, Layout, Packed, at, reader
 
 GAMMA = 0.25
 PLACES = np.array([0.25, 0.75, 0.55, 0.5, 1.0])
@@ -72,7 +72,7 @@ class Workspace(NamedTuple):
     """Length of the next step, in steps of the motion, [1]."""
 
 
-read_workspace = viewer(Workspace)
+read_workspace = reader(Workspace)
 
 
 def workspace_for(count: int, inputs: int, n: int) -> Packed:

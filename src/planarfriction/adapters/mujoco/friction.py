@@ -46,7 +46,7 @@ class Friction:
     """Patch friction for a model that `prepare` has prepared.
 
     Either call `step(d)` instead of `mj_step`, or use `with friction.install():`, which adds friction to `mj_step`
-    itself, the viewer and `mujoco.rollout`. States are stored in the data, in the last numbers of `userdata`: copying
+    itself, the reader and `mujoco.rollout`. States are stored in the data, in the last numbers of `userdata`: copying
     or restoring these includes the friction. One object can be used with any number of data of its model, on any number
     of threads.
 
@@ -151,7 +151,7 @@ class Friction:
 
     @contextmanager
     def install(self) -> Iterator[Friction]:
-        """Add friction to `mj_step` within a `with` block, and so to the viewer, `mujoco.rollout` and derivatives.
+        """Add friction to `mj_step` within a `with` block, and so to the reader, `mujoco.rollout` and derivatives.
 
         This applies to all data of this model and of its copies. MuJoCo calls compiled code, on any number of threads.
 
