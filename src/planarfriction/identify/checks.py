@@ -261,11 +261,11 @@ def _rotated(vectors: np.ndarray, angle: float | np.ndarray) -> np.ndarray:
 def check_times(log: Log, size: float) -> Finding | None:
     """Check that the contact moves a small part of its size between two samples; more points to mm/s, or to ms."""
     speed = float(np.quantile(np.linalg.norm(log.twist * [1, 1, size], axis=1), 0.9))
-    way = speed * log.interval
-    seen = f"{1e3 * way:.3g} mm between samples {log.interval:.3g} s apart, contact radius {1e3 * size:.3g} mm"
-    if log.interval >= SLOW and way > TRAVEL * size:
+    moved = speed * log.interval
+    seen = f"{1e3 * moved:.3g} mm between samples {log.interval:.3g} s apart, contact radius {1e3 * size:.3g} mm"
+    if log.interval >= SLOW and moved > TRAVEL * size:
         return Finding(f"t of {log.name}", "be in s", f"{seen}: is it in ms?")
-    if speed > SPEEDY or way > size:
+    if speed > SPEEDY or moved > size:
         return Finding(
             f"twist of {log.name}", "be in m/s and rad/s", f"{seen}: are vx and vy in mm/s, or omega in deg/s?"
         )
