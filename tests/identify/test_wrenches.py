@@ -9,7 +9,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.errors import FileError, InvalidValueError
-from planarfriction.identify import Log, differentiated
+from planarfriction.identify import FitOptions, Log, differentiated, identify_lugre
 from planarfriction.identify.logs import columns_of
 from planarfriction.identify.parameters import Coordinates, soft_finger_moments
 from planarfriction.identify.uncertainty import covariance
@@ -306,6 +306,12 @@ def test_bad_files_name_line_and_column(tmp_path, text, words):
 def test_bad_options_are_named(log, options, words):
     with pytest.raises(InvalidValueError, match=words):
         identify(log, PATCH, **options)
+
+
+def test_options_are_a_record(log):
+    with pytest.raises(InvalidValueError, match="options must be a FitOptions record, got {'starts'"):
+        identify_lugre(log, PATCH, options={"starts": 1})
+    assert FitOptions(noise=[1, 2, 3]) == FitOptions(noise=np.array([1.0, 2.0, 3.0]))
 
 
 def test_bad_logs_are_named(log):
