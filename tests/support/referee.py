@@ -7,6 +7,7 @@ numbers lie.
 
 from __future__ import annotations
 
+import math
 import types
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -14,7 +15,8 @@ from typing import Any
 import mpmath
 from mpmath import mpf
 
-from planarfriction.kernels import compiled_math, vectors
+from planarfriction.compiler import compiled_math
+from planarfriction.kernels import vectors
 from planarfriction.kernels.rules import per
 
 DIGITS = 60
@@ -42,7 +44,8 @@ def _plus(a: Sequence, c: Any, b: Sequence) -> tuple:
     return tuple(x + c * y for x, y in zip(a, b, strict=True))
 
 
-_EXCHANGED = {
+_EXCHANGED: dict[int, Any] = {
+    id(math): mpmath,
     id(compiled_math): _NUMBERS,
     id(vectors.dot): _dot,
     id(vectors.plus): _plus,
@@ -54,15 +57,12 @@ _EXCHANGED = {
 
 def exact(function: Any) -> Callable:
     """Return the function that a kernel was compiled from, with the numbers and functions of mpmath."""
-    if id(function) in _EXCHANGED:
-        return _EXCHANGED[id(function)]
-    if not hasattr(function, "py_func"):
-        return function
-    plain = function.py_func
-    names = {name: value for name, value in plain.__globals__.items() if name in plain.__code__.co_names}
-    if "math" in names:
-        names["math"] = mpmath
-    return types.FunctionType(plain.__code__, {name: exact(value) for name, value in names.items()}, plain.__name__)
+    if id(function) in _EXCHANGED or not hasattr(function, "py_func"):
+        return _EXCHANGED.get(id(function), function)
+    plain, names = function.py_func, {}
+    _EXCHANGED[id(function)] = found = types.FunctionType(plain.__code__, names, plain.__name__)
+    names.update((name, exact(value)) for name, value in plain.__globals__.items() if name in plain.__code__.co_names)
+    return found
 
 
 def derivative(function: Callable[[mpf], Sequence], x: float) -> list:

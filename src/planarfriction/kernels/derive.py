@@ -36,8 +36,8 @@ class _Step(NamedTuple):
     atoms: list[str]
     """Names or constants that the step reads."""
     rule: Rule | Derivative
-    tape: str = ""
-    """Name of the tape that a derived function returns."""
+    line: int
+    """Line of the step, written anew where it has to keep a tape."""
 
 
 class _Walk:
@@ -94,8 +94,11 @@ class _Walk:
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):  # a docstring
             return
         if isinstance(node, ast.Return) and node.value is not None and not self.results:
-            several = node.value.elts if isinstance(node.value, ast.Tuple) else [node.value]
-            self.results = [self._atom(each) for each in several]
+            if isinstance(node.value, ast.Call):
+                self.results = self._call(node.value)
+            else:
+                several = node.value.elts if isinstance(node.value, ast.Tuple) else [node.value]
+                self.results = [self._atom(each) for each in several]
         elif isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Name):
             self.known[node.target.id] = self._atom(
                 ast.copy_location(ast.BinOp(ast.Name(node.target.id), node.op, node.value), node)
@@ -211,12 +214,12 @@ class _Walk:
         target = self.emit(f"{vector}[{i}]")
         return self._taken([target], [vector], Rule("s", {}, {0: f"placed({{0}}, {i}, {{b}})"}))[0]
 
-    def _taken(self, targets: list[str], atoms: list[str], how: Rule | Derivative, tape: str = "") -> list[str]:
+    def _taken(self, targets: list[str], atoms: list[str], how: Rule | Derivative) -> list[str]:
         """Note a step and the kinds of its results."""
         self.vectors.update(name for name, kind in zip(targets, how.results, strict=True) if kind == "v")
-        if any(name in self.active for atom in atoms for name in self._inside(atom)):
+        if any(self._inside(atom) for atom in atoms):
             self.active.update(targets)
-            self.steps.append(_Step(targets, atoms, how, tape))
+            self.steps.append(_Step(targets, atoms, how, len(self.lines) - 1))
         return targets
 
     def _inside(self, atom: str) -> list[str]:
@@ -237,15 +240,16 @@ class _Walk:
         else:
             how = self._derived(function, atoms)
         targets = [self._new() for _ in how.results]
-        text, tape = f"{path}({', '.join(atoms)})", ""
-        if isinstance(how, Rule) or not how.by:
-            self.lines.append(f"{', '.join(targets)} = {text}")
-        else:
-            tape = self._new("tape")
-            name = f"{how.name}{self.count}"
-            self.names[f"{name}_forth"], self.names[f"{name}_back"] = how.forth, how.back
-            self.lines.append(f"({', '.join(targets)},), {tape} = {name}_forth({', '.join(atoms)})")
-        return self._taken(targets, atoms, how, tape)
+        self.lines.append(f"{', '.join(targets)} = {path}({', '.join(atoms)})")
+        return self._taken(targets, atoms, how)
+
+    def keep_tape(self, step: _Step, inner: Derivative) -> tuple[str, str]:
+        """Let the step of a derived function keep its tape; return the name of that and of its way back."""
+        tape = self._new("tape")
+        name = f"{inner.function.__name__.strip('_')}_{self.count}"
+        self.names[f"forth_{name}"], self.names[f"back_{name}"] = inner.forth, inner.back
+        self.lines[step.line] = f"({', '.join(step.targets)},), {tape} = forth_{name}({', '.join(step.atoms)})"
+        return tape, f"back_{name}"
 
     def _resolve(self, node: ast.expr) -> Any:
         """Return the function that a call names, and note it for the generated code."""
@@ -276,11 +280,11 @@ _COMPARISONS = {ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: 
 class _WayBack:
     """Cotangents through the steps of a function, last step first, which add partial derivatives to its lines."""
 
-    def __init__(self, walk: _Walk):
+    def __init__(self, walk: _Walk, live: tuple[int, ...]):
         self.walk, self.lines, self.count = walk, [], 0
         self.bars: dict[str, str] = {}
-        for i, result in enumerate(walk.results):
-            self._add(result, f"bars[{i}]")
+        for i, result in enumerate(live):
+            self._add(walk.results[result], f"bars[{i}]")
         for step in reversed(walk.steps):
             found = [self.bars.pop(target, "") for target in step.targets]
             if not any(found):
@@ -333,9 +337,9 @@ class _WayBack:
         return text if text.replace(".", "_").isidentifier() else self.walk.emit(text, "slope")
 
     def _by_derivative(self, step: _Step, inner: Derivative, found: list[str]) -> None:
-        bars = [bar or self.cotangent(target) for bar, target in zip(found, step.targets, strict=True)]
-        name = f"{inner.name}{step.tape.removeprefix('tape_')}_back"
-        pulled = self.emit(f"{name}({step.tape}, ({', '.join(bars)},))", "bars")
+        inner = derive(inner.function, inner.by, inner.vectors, tuple(i for i, bar in enumerate(found) if bar))
+        tape, name = self.walk.keep_tape(step, inner)
+        pulled = self.emit(f"{name}({tape}, ({''.join(bar + ', ' for bar in found if bar)}))", "bars")
         for i, path in enumerate(inner.by):
             head, dot, rest = path.partition(".")
             self._add(step.atoms[inner.arguments.index(head)] + dot + rest, f"{pulled}[{i}]")
@@ -344,10 +348,11 @@ class _WayBack:
 class Derivative(NamedTuple):
     """A function with its derivative, both compiled into their callers."""
 
-    name: str
+    function: Callable
     arguments: tuple[str, ...]
     by: tuple[str, ...]
     """Arguments, or fields of them, whose cotangents `back` returns, in this order."""
+    vectors: tuple[str, ...]
     results: str
     """Kind of each result."""
     source: str
@@ -355,18 +360,21 @@ class Derivative(NamedTuple):
     forth: Any
     """Return the results and a tape, from the arguments of the function."""
     back: Any
-    """Return the cotangents of `by`, from the tape and a tuple of those of the results."""
+    """Return the cotangents of `by`, from the tape and a tuple of those of the results (that are `live`)."""
 
 
 @functools.cache
-def derive(function: Callable, by: tuple[str, ...], vectors: tuple[str, ...] = ()) -> Derivative:
+def derive(
+    function: Callable, by: tuple[str, ...], vectors: tuple[str, ...] = (), live: tuple[int, ...] | None = None
+) -> Derivative:
     """Write the derivative of a straight-line function.
 
-    `by` are the arguments to differentiate by, a field of a record as `law.mu_c`; `vectors` those that are vectors.
+    `by` are the arguments to differentiate by, a field of a record as `law.mu_c`; `vectors` those that are vectors,
+    `live` the results that have a cotangent, unless all do.
     Raises `NotStraightError` with the line that cannot be taken apart. The text depends on nothing but the sources.
     """
     walk = _Walk(function, by, vectors)
-    back = _WayBack(walk)
+    back = _WayBack(walk, tuple(range(len(walk.results))) if live is None else live)
     wanted = [back.cotangent(walk.outer(name)) for name in by]
     lines = [*back.lines, f"return ({''.join(name + ', ' for name in wanted)})"]
     made = {target for line in walk.lines for target in _names(line.partition(" = ")[0])} | set(walk.first.values())
@@ -377,8 +385,8 @@ def derive(function: Callable, by: tuple[str, ...], vectors: tuple[str, ...] = (
     source = _text(f"forth({heads})", forth) + "\n\n" + _text("back(tape, bars)", unpack + lines)
     space = _compiled(walk.where, source, walk.names)
     kinds = "".join("v" if result in walk.vectors else "s" for result in walk.results)
-    name = walk.function.__name__.strip("_")
-    return Derivative(name, tuple(walk.arguments), by, kinds, source, kernel(space["forth"]), kernel(space["back"]))
+    forward, backward = kernel(space["forth"]), kernel(space["back"])
+    return Derivative(walk.function, tuple(walk.arguments), by, vectors, kinds, source, forward, backward)
 
 
 def _names(text: str) -> set[str]:

@@ -6,17 +6,14 @@ docs/physics.md, "Distributed model".
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction import formulas
-from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import jit, kernel
 from planarfriction.kernels import bristle_step
-from planarfriction.kernels.bristle_step import Bristle
-from planarfriction.kernels.law import grip, grip_slope, squared
+from planarfriction.kernels.derive import derive
+from planarfriction.kernels.law import grip, squared
 from planarfriction.kernels.vectors import norm, plus, times
 
 
@@ -46,17 +43,21 @@ class CellJacobians(NamedTuple):
 
 
 @kernel
-def _bristle(law, z, u):
-    """A cell's bristle at the beginning of a step."""
-    speed = norm(u)
-    return Bristle(z, u, speed, 1.0, grip(law, speed))
+def _traction(law, new, k, u):
+    """Return the traction of a cell at the end of its step, per unit load."""
+    return plus(plus(times(-law.sigma_0, new), -law.sigma_1, plus(u, -k, new)), -law.sigma_2, u)
 
 
 @kernel
-def _traction(law, u, end):
-    """Traction of a cell at the end of its step, per unit load."""
-    rate = plus(u, -end.stage.k, end.new)
-    return formulas.traction(end.new[0], rate[0], u[0], law), formulas.traction(end.new[1], rate[1], u[1], law)
+def cell(law, z, u, dt):
+    """Return the new bristle and the traction of a cell that moves at u."""
+    speed = norm(u)
+    new, k = bristle_step.step(law, z, u, speed, 1.0, grip(law, speed), dt)
+    return new, _traction(law, new, k, u)
+
+
+_CELL = derive(cell, ("z", "u"), ("z", "u"))
+_forth, _back = _CELL.forth, _CELL.back
 
 
 @kernel
@@ -66,13 +67,16 @@ def _step(law, z, twist, x, y, w, dt, out):
     vx, vy, omega = twist
     fx, fy, tau = 0.0, 0.0, 0.0
     for i in range(n):  # apart: in one loop the vectors do not fit into the processor's registers
-        bristle = _bristle(law, (zx[i], zy[i]), (vx - omega * y[i], vy + omega * x[i]))
-        ox[i] = bristle_step.predict(law, bristle, dt).decay_dt
+        u = vx - omega * y[i], vy + omega * x[i]
+        speed = norm(u)
+        ox[i] = bristle_step.predict(law, (zx[i], zy[i]), u, speed, 1.0, grip(law, speed), dt)[1]
     for i in range(n):
-        bristle = _bristle(law, (zx[i], zy[i]), (vx - omega * y[i], vy + omega * x[i]))
-        end = bristle_step.finish(law, bristle, dt, ox[i])
-        ox[i], oy[i] = end.new
-        tx, ty = times(w[i], _traction(law, bristle.u, end))
+        u, bristle = (vx - omega * y[i], vy + omega * x[i]), (zx[i], zy[i])
+        speed = norm(u)
+        q = grip(law, speed)
+        new, k = bristle_step.finish(law, bristle, u, speed, 1.0, q, dt, norm(bristle) * q, ox[i])
+        ox[i], oy[i] = new
+        tx, ty = times(w[i], _traction(law, new, k, u))
         fx += tx
         fy += ty
         tau += x[i] * ty - y[i] * tx
@@ -114,34 +118,32 @@ def step_sequence(law, z, twist, cells, load, dt, out, wrench):
             z[i] = out[i]
 
 
-@kernel
-def _pull_back(law, step, new_bar, k_bar):
-    """Cotangents of `z` and of the cell's velocity from those of the new bristle and of its decay."""
-    bar, (_, u, speed, _, q) = bristle_step.pull_back(step, new_bar, k_bar), step.bristle
-    per = 1.0 / xp.where(speed > 0.0, speed, math.inf)
-    return bar.z, plus(bar.u, (bar.v + bar.q * grip_slope(law, speed, q)) * per, u)
-
-
 class CellSlopes(NamedTuple):
-    """A step of a cell, with the slopes of its traction row by row."""
+    """A step of a cell with its derivatives by the bristle and by the velocity of the cell, [2, 2] row by row."""
 
     new: tuple
     traction: tuple
     """Per unit load."""
-    by_z: tuple
-    by_u: tuple
-    """By the velocity of the cell."""
+    new_z: tuple
+    new_u: tuple
+    traction_z: tuple
+    traction_u: tuple
 
 
 @kernel
 def cell_slopes(law, z, u, dt):
-    """`CellSlopes` of a step from the bristle z at the velocity u."""
-    step = bristle_step.linearise(law, _bristle(law, z, u), dt)
-    new, k = step.end.new, step.end.stage.k
-    pull, damped = law.sigma_1 * k - law.sigma_0, -(law.sigma_1 + law.sigma_2)
-    (a, b), (c, d) = _pull_back(law, step, (pull, 0.0), law.sigma_1 * new[0])
-    (e, f), (g, h) = _pull_back(law, step, (0.0, pull), law.sigma_1 * new[1])
-    return CellSlopes(new, _traction(law, u, step.end), (a, b, e, f), (c + damped, d, g, h + damped))
+    """Return `CellSlopes` of a step from the bristle z at the velocity u."""
+    (new, traction), tape = _forth(law, z, u, dt)
+    none, x, y = (0.0, 0.0), (1.0, 0.0), (0.0, 1.0)
+    (new_zx, new_ux), (new_zy, new_uy) = _back(tape, (x, none)), _back(tape, (y, none))
+    (zx, ux), (zy, uy) = _back(tape, (none, x)), _back(tape, (none, y))
+    return CellSlopes(new, traction, (*new_zx, *new_zy), (*new_ux, *new_uy), (*zx, *zy), (*ux, *uy))
+
+
+@kernel
+def by_twist(by_x, by_y, x, y):
+    """Return derivatives by the twist from those by the velocity of a cell at (x, y)."""
+    return by_x, by_y, x * by_y - y * by_x
 
 
 @jit
@@ -152,32 +154,23 @@ def jacobians(law, z, twist, cells, load, dt, out):
         for m in range(weights.shape[0]):
             px, py = cells.x[m], cells.y[m]
             u = twist[b, 0] - twist[b, 2] * py, twist[b, 1] + twist[b, 2] * px
-            step = bristle_step.linearise(law, _bristle(law, (z[b, 0, m], z[b, 1, m]), u), dt[b])
-            new, k = step.end.new, step.end.stage.k
-            fx, fy = times(weights[m], _traction(law, u, step.end))
+            cell = cell_slopes(law, (z[b, 0, m], z[b, 1, m]), u, dt[b])
+            fx, fy = times(weights[m], cell.traction)
             out.wrench_load[b, 0] += fx
             out.wrench_load[b, 1] += fy
             out.wrench_load[b, 2] += px * fy - py * fx
             if load[b] == 0.0:
                 continue
-            share = load[b] * weights[m]
-            pull = share * (law.sigma_0 - law.sigma_1 * k)
             for i in range(2):
-                unit = (1.0, 0.0) if i == 0 else (0.0, 1.0)
-                a, v = _pull_back(law, step, unit, 0.0)
-                out.state_state[b, i, 0, m], out.state_state[b, i, 1, m] = a
+                for j in range(2):
+                    out.state_state[b, i, j, m] = cell.new_z[2 * i + j]
                 slopes = out.state_twist[b, i, m]
-                slopes[0], slopes[1], slopes[2] = v[0], v[1], px * v[1] - py * v[0]
-                # the force of the cell, -(sigma_0 n + sigma_1 (u - k n) + sigma_2 u)
-                k_bar = share * law.sigma_1 * (new[0] if i == 0 else new[1])
-                a, v = _pull_back(law, step, times(-pull, unit), k_bar)
-                v = plus(v, -share * (law.sigma_1 + law.sigma_2), unit)
-                lever, turn = (-py if i == 0 else px), px * v[1] - py * v[0]
-                out.wrench_state[b, i, 0, m], out.wrench_state[b, i, 1, m] = a
-                out.wrench_state[b, 2, 0, m] += lever * a[0]
-                out.wrench_state[b, 2, 1, m] += lever * a[1]
-                for row, arm in ((i, 1.0), (2, lever)):
-                    slopes = out.wrench_twist[b, row]
-                    slopes[0] += arm * v[0]
-                    slopes[1] += arm * v[1]
-                    slopes[2] += arm * turn
+                slopes[0], slopes[1], slopes[2] = by_twist(cell.new_u[2 * i], cell.new_u[2 * i + 1], px, py)
+            by_z, by_u = times(load[b] * weights[m], cell.traction_z), times(load[b] * weights[m], cell.traction_u)
+            for i in range(3):  # the wrench is the traction times (1, 0), (0, 1) and the lever
+                x, y = (1.0, 0.0) if i == 0 else ((0.0, 1.0) if i == 1 else (-py, px))
+                out.wrench_state[b, i, 0, m] = x * by_z[0] + y * by_z[2]
+                out.wrench_state[b, i, 1, m] = x * by_z[1] + y * by_z[3]
+                vx, vy, omega = by_twist(x * by_u[0] + y * by_u[2], x * by_u[1] + y * by_u[3], px, py)
+                slopes = out.wrench_twist[b, i]
+                slopes[0], slopes[1], slopes[2] = slopes[0] + vx, slopes[1] + vy, slopes[2] + omega

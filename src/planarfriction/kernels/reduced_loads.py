@@ -11,12 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction import formulas
 from planarfriction.compiler import jit, kernel
 from planarfriction.kernels import reduced_step, rollouts
+from planarfriction.kernels.derive import derive
+from planarfriction.kernels.reduced import to_origin
 from planarfriction.kernels.reduced_contact import Shape
-from planarfriction.kernels.reduced_step import NAMES, Held, cotangents, hold, linearise, pulled, shape_of
-from planarfriction.kernels.steady import FAR, STILL, blended, fourth_change, fourth_moments, scaled_twist, uneven
+from planarfriction.kernels.reduced_step import NAMES, Held, Quartic, Step, cotangents, hold, shape_of, through_steady
+from planarfriction.kernels.steady import FAR, STILL, blended, fourth_change, fourth_moments, scaled_twist
 from planarfriction.kernels.vectors import dot, norm
 
 
@@ -43,34 +44,32 @@ def hold_slopes(contact, twist, work):
     return Held(none, 0.0, (FAR, 0.0, 0.0)), Slopes(reduced_step.Slopes(still, none, none, none), none, twist)
 
 
+_DERIVATIVE = derive(reduced_step.advance_alone, (*reduced_step.BY, "quartic.blend"), ("z", "u", "q"))
+_forth, _back = _DERIVATIVE.forth, _DERIVATIVE.back
+
+
 @kernel
-def _through_evenness(contact, step, ratio):
-    """Cotangent of the blend through the evenness, a share of which moves the breakaway as that share of the ratio."""
-    law, shape, surface, data = contact.law, contact.shape, contact.surface, contact.data
-    fourth, change = fourth_moments(shape, surface, data), fourth_change(surface, data)
-    at_start, ahead = uneven(law, fourth, change, step.start.z), uneven(law, fourth, change, step.predicted.z)
-    at_end = uneven(law, fourth, change, step.free)
-    return law.breakaway_ratio * dot(ratio, (at_start, ahead, at_end))
+def linearise(contact, held, z, dt):
+    """Return `reduced_step.Step` from the state z."""
+    shape, surface, data = contact.shape, contact.surface, contact.data
+    quartic = Quartic(fourth_moments(shape, surface, data), fourth_change(surface, data), shape[6])
+    (new, traction), tape = _forth(contact.law, quartic, held.u, held.q, z, dt)
+    return Step(held, tape, new, traction, to_origin(shape, *traction))
 
 
 @kernel
 def pull_back(contact, step, slopes, new, wrench):
-    """`Cotangents` from those of the new state and of the wrench."""
-    law, u = contact.law, step.held.u
-    pull, bar = pulled(contact, step, slopes.held, new, wrench)
-    (vx, vy, omega), (wx, wy, wt), (ux, uy, us) = slopes.twist, wrench, bar.u
-    gx = formulas.traction(step.new[0], step.rate[0], u[0], law)
-    gy = formulas.traction(step.new[1], step.rate[1], u[1], law)
-    gs = formulas.traction(step.new[2], step.rate[2], u[2], law)
-    blend = dot(slopes.q_blend, bar.q)
-    if contact.surface[1] != contact.surface[0]:
-        blend += _through_evenness(contact, step, bar.ratio)
+    """Return `Cotangents` from those of the new state and of the wrench."""
+    bars = _back(step.tape, (new, scaled_twist(contact.shape, *wrench)))
+    known, blend = through_steady(contact, step, slopes.held, bars[:7]), bars[7]
+    (vx, vy, omega), (wx, wy, wt), (gx, gy, gs) = slopes.twist, wrench, step.traction
+    ux, uy, us = known[1]
     by_shape = Shape(
         ux * vx + gx * wx, ux * vy + gx * wy, ux * omega + gx * wt,
         uy * vy + gy * wy, uy * omega + gy * wt, us * omega + gs * wt,
-        blend,
+        blend + dot(slopes.q_blend, known[2]),
     )  # fmt: skip
-    return cotangents(contact, step, slopes.held, pull, bar, by_shape)
+    return cotangents(contact, slopes.held, known, by_shape)
 
 
 # ---------------------------------------------------------------------- bound to this model

@@ -14,8 +14,9 @@ from planarfriction.kernels import cube, lanes
 from planarfriction.kernels.cube import Square
 from planarfriction.kernels.lanes import FIELDS, LANES, OWN, ROW, SLOTS, TWIST, TWIST_BAR, carried, put_slot, slot
 from planarfriction.kernels.law import LAW, LawNumbers
+from planarfriction.kernels.reduced import to_origin
 from planarfriction.kernels.reduced_contact import Shape
-from planarfriction.kernels.reduced_step import NAMES, Held, Slopes, advance, pull_back
+from planarfriction.kernels.reduced_step import NAMES, Held, Quartic, Slopes, advance, pull_back, step_of
 from planarfriction.kernels.rollouts import Contact
 from planarfriction.kernels.steady import (
     FAR,
@@ -223,16 +224,17 @@ def _held(w, c):
 
 @kernel
 def _advance(w, own, c, z, none, dt):
-    even = own[_EVEN + c], (0.0, 0.0, 0.0)  # its slopes are those of the way back
-    step = advance(_contact(own, c), _fourth(own, c), _held(w, c), z, own[_SIZE + c], even, dt)
-    own[_EVEN + c], own[_SIZE + c] = xp.where(none, 1.0, step.even[0]), xp.where(none, 0.0, step.norm)
-    return step.new, step.wrench
+    contact, rows, held = _contact(own, c), _fourth(own, c), _held(w, c)
+    quartic = Quartic(rows, rows, 0.0)
+    new, traction, size, even = advance(contact.law, quartic, held.u, held.q, z, own[_SIZE + c], own[_EVEN + c], dt)
+    own[_EVEN + c], own[_SIZE + c] = xp.where(none, 1.0, even), xp.where(none, 0.0, size)
+    return new, to_origin(contact.shape, *traction)
 
 
 @kernel
 def _retreat(w, own, c, z, dt, new, pull):
-    contact, fourth, m = _contact(own, c), _fourth(own, c), gathered(w, _BY_X + c, SLOTS, 18)
-    step = advance(contact, fourth, _held(w, c), z, norm(z), evenness(contact.law, fourth, z), dt)
+    contact, m = _contact(own, c), gathered(w, _BY_X + c, SLOTS, 18)
+    step = step_of(contact, _fourth(own, c), _held(w, c), z, dt)
     return step.wrench, pull_back(contact, step, Slopes(m[:9], m[9:12], m[12:15], m[15:]), new, pull)
 
 

@@ -87,6 +87,7 @@ RULES: dict[Any, Rule] = {
     plus: Rule("v", {}, {0: "{b}", 1: "dot({b}, {2})", 2: "times({1}, {b})"}),
     times: Rule("v", {}, {0: "dot({b}, {1})", 1: "times({0}, {b})"}),
     dot: Rule("s", {}, {0: "times({b}, {1})", 1: "times({b}, {0})"}),
+    vectors.square: Rule("s", {}, {0: "times(2.0 * {b}, {0})"}),
     vectors.norm: Rule("s", {"per": "per({t})"}, {0: "times({b} * {per}, {0})"}),
     math.sqrt: Rule("s", {0: "0.5 * per({t})"}),
     per: Rule("s", {0: "-{t} * {t}"}),

@@ -130,7 +130,7 @@ def _distributed(law, own, z, v, dt, new, out):
         fx += ax
         fy += ay
         tau += px * ay - py * ax
-        axx, axy, ayx, ayy = times(w, cell.by_u)
+        axx, axy, ayx, ayy = times(w, cell.traction_u)
         axt, ayt = px * axy - py * axx, px * ayy - py * ayx
         xx += axx
         xy += axy
@@ -180,7 +180,7 @@ def anisotropic(contact, z, v, dt, new, out):
         x, y = times(weights[i], plus(cell.traction, -law.sigma_0, c))
         # c changes with the speed, and the start of the step with it
         back = grip_slope(law, speed, q) / (q * q * xp.where(speed > 0.0, speed, math.inf))
-        (xx, xy, yx, yy), (zxx, zxy, zyx, zyy) = cell.by_u, cell.by_z
+        (xx, xy, yx, yy), (zxx, zxy, zyx, zyy) = cell.traction_u, cell.traction_z
         by_x = times(weights[i], plus((xx, xy), back * (dot((zxx, zxy), a) + law.sigma_0 * a[0]), u))
         by_y = times(weights[i], plus((yx, yy), back * (dot((zyx, zyy), a) + law.sigma_0 * a[1]), u))
         across, along = plus(times(by_x[0], one), by_x[1], other), plus(times(by_y[0], one), by_y[1], other)

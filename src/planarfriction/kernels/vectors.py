@@ -120,6 +120,12 @@ def gathered(typingctx, row, at, stride, count):
 
 
 @kernel
+def square(a):
+    """Return `a . a`."""
+    return dot(a, a)
+
+
+@kernel
 def norm(a):
     """`|a|`"""
     return math.sqrt(dot(a, a))
