@@ -33,8 +33,7 @@ def _traction(law, z, u):
     k = formulas.bristle_decay(xp, size * grip, along, speed, grip, law)
     rate = plus(u, -k, z)
     x, y = plus(times(-law.sigma_0, z), -law.sigma_1, rate)
-    x -= law.sigma_2 * u[0]
-    return (x, y - law.sigma_2 * u[1]), k
+    return (x - law.sigma_2 * u[0], y - law.sigma_2 * u[1]), k
 
 
 BY = "z", "u", "law.sigma_0", "law.sigma_1", "law.mu_c", "law.mu_s", "law.v_s", "law.gamma", "law.breakaway_ratio"

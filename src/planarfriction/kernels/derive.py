@@ -99,10 +99,6 @@ class _Walk:
             else:
                 several = node.value.elts if isinstance(node.value, ast.Tuple) else [node.value]
                 self.results = [self._atom(each) for each in several]
-        elif isinstance(node, ast.AugAssign) and isinstance(node.target, ast.Name):
-            self.known[node.target.id] = self._atom(
-                ast.copy_location(ast.BinOp(ast.Name(node.target.id), node.op, node.value), node)
-            )
         elif isinstance(node, ast.Assign):
             for target in node.targets:
                 self._assign(target, node.value)
@@ -119,14 +115,9 @@ class _Walk:
         else:
             found = self._several(value, len(names))
         for name, each in zip(names, found, strict=True):
-            if isinstance(name, ast.Tuple):
-                parts = [self._item(each, i) for i in range(len(name.elts))]
-                for inner, part in zip(name.elts, parts, strict=True):
-                    self.known[inner.id] = part  # type: ignore[attr-defined]
-            elif isinstance(name, ast.Name):
-                self.known[name.id] = each
-            else:
+            if not isinstance(name, ast.Name):
                 raise self._refusal(target, "is no name to assign to")
+            self.known[name.id] = each
 
     # ------------------------------------------------------------------ expressions
 
