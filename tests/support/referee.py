@@ -9,14 +9,17 @@ from __future__ import annotations
 
 import math
 import types
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import mpmath
+import numpy as np
 from mpmath import mpf
+from numba import njit
 
 from planarfriction.compiler import compiled_math
 from planarfriction.kernels import vectors
+from planarfriction.kernels.derive import Derivative
 from planarfriction.kernels.rules import per
 
 DIGITS = 60
@@ -55,13 +58,29 @@ _EXCHANGED: dict[int, Any] = {
 }
 
 
-def exact(function: Any) -> Callable:
-    """Return the function that a kernel was compiled from, with the numbers and functions of mpmath."""
-    if id(function) in _EXCHANGED or not hasattr(function, "py_func"):
-        return _EXCHANGED.get(id(function), function)
-    plain, names = function.py_func, {}
-    _EXCHANGED[id(function)] = found = types.FunctionType(plain.__code__, names, plain.__name__)
-    names.update((name, exact(value)) for name, value in plain.__globals__.items() if name in plain.__code__.co_names)
+def exact(function: Any, exchanged: dict[Any, Callable] | None = None) -> Callable:
+    """Return the function that a kernel was compiled from, with numbers of mpmath, and functions of it `exchanged`."""
+    return _exact(function, {**_EXCHANGED, **{id(key): value for key, value in (exchanged or {}).items()}})
+
+
+def _exact(function: Any, known: dict[int, Any]) -> Callable:
+    plain, names = getattr(function, "py_func", function), {}
+    known[id(function)] = found = types.FunctionType(plain.__code__, names, plain.__name__)
+    used = set(plain.__code__.co_names)
+    names.update(_exchanged(plain.__globals__, used, known))
+    for name, value in names.items():
+        if isinstance(value, types.ModuleType) and value.__name__.startswith("planarfriction.kernels"):
+            names[name] = types.SimpleNamespace(**_exchanged(vars(value), used, known))
+    return found
+
+
+def _exchanged(values: dict[str, Any], used: set[str], known: dict[int, Any]) -> dict[str, Any]:
+    """Return those of some named values that a function uses, with kernels in exact numbers."""
+    found = {}
+    for name in used & set(values):
+        value = values[name]
+        kernel = id(value) not in known and hasattr(value, "py_func")
+        found[name] = _exact(value, known) if kernel else known.get(id(value), value)
     return found
 
 
@@ -71,3 +90,69 @@ def derivative(function: Callable[[mpf], Sequence], x: float) -> list:
         step = _STEP * (abs(mpf(x)) if x else mpf(1))
         after, before = function(mpf(x) + step), function(mpf(x) - step)
         return [(b - a) / (2 * step) for a, b in zip(before, after, strict=True)]
+
+
+@njit
+def pulled(forth: Any, back: Any, arguments: tuple, bars: tuple) -> tuple:
+    """Return the cotangents that `back` finds of some arguments."""
+    _, tape = forth(*arguments)
+    return back(tape, bars)
+
+
+def flat(values: Any) -> list:
+    """Return the numbers of nested tuples one behind the other."""
+    return [x for each in values for x in (flat(each) if isinstance(each, tuple) else (each,))]
+
+
+def _units(results: tuple) -> Iterator[tuple]:
+    """Yield the shape of some results with a 1 at each number in turn, zeros elsewhere."""
+    kinds = [len(each) if isinstance(each, tuple) else 0 for each in results]
+    for chosen, length in enumerate(kinds):
+        for i in range(max(length, 1)):
+            yield tuple(
+                tuple(float(at == chosen and k == i) for k in range(n)) if n else float(at == chosen)
+                for at, n in enumerate(kinds)
+            )
+
+
+def _with(value: Any, path: str, i: int, x: Any) -> Any:
+    """Return an argument with x in one place: a field of a record, component i of a vector, or itself."""
+    if path:
+        head, _, rest = path.partition(".")
+        return value._replace(**{head: _with(getattr(value, head), rest, i, x)})
+    return tuple(x if k == i else each for k, each in enumerate(value)) if isinstance(value, tuple) else x
+
+
+def jacobians(derivative_of: Derivative, arguments: tuple, function: Any = None) -> tuple[np.ndarray, np.ndarray]:
+    """Return all results by all numbers of `by`, [results, numbers]: in compiled code, and in 60 digits.
+
+    Each column is multiplied by the size of its number, or of the vector that it is a component of. `function`: another
+    one than was derived, as the referee sees it.
+    """
+    function = exact(derivative_of.function) if function is None else function
+    rows = [
+        flat(pulled(derivative_of.forth, derivative_of.back, arguments, bars)) for bars in _units(function(*arguments))
+    ]
+    columns, sizes = [], []
+    for path in derivative_of.by:
+        name, _, rest = path.partition(".")
+        at = derivative_of.arguments.index(name)
+        value = arguments[at]
+        for field in filter(None, rest.split(".")):
+            value = getattr(value, field)
+        size = float(np.linalg.norm(value))
+        for i, x in enumerate(value if isinstance(value, tuple) else (value,)):
+
+            def change(x, at=at, rest=rest, i=i):
+                return flat(function(*arguments[:at], _with(arguments[at], rest, i, x), *arguments[at + 1 :]))
+
+            columns.append(derivative(change, x))
+            sizes.append(size)
+    return np.array(rows) * sizes, np.array(columns, float).T * sizes
+
+
+def misfit(derivative_of: Derivative, arguments: tuple, function: Any = None) -> float:
+    """Return the largest error of `jacobians`, each row in the largest of its numbers."""
+    found, expected = jacobians(derivative_of, arguments, function)
+    largest = np.abs(expected).max(axis=1, keepdims=True)
+    return float(np.max(np.abs(found - expected) / np.where(largest > 0.0, largest, 1.0)))

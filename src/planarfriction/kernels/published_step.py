@@ -99,8 +99,8 @@ def _step(law, shape, twist, omega, u, z, dt):
 
 _BY_LAW = "sigma_0", "sigma_1", "sigma_2", "mu_c", "mu_s", "v_s", "gamma", "breakaway_ratio"
 _BY = "z", "u", "twist", "omega", *(f"law.{name}" for name in _BY_LAW), *(f"shape.{name}" for name in Shape._fields)
-_DERIVATIVE = derive(_step, _BY, ("z", "u", "twist"))
-_forth, _back = _DERIVATIVE.forth, _DERIVATIVE.back
+DERIVATIVE = derive(_step, _BY, ("z", "u", "twist"))
+_forth, _back = DERIVATIVE.forth, DERIVATIVE.back
 
 
 @kernel

@@ -185,8 +185,8 @@ def advance_alone(law, quartic, u, q, z, dt):
 BY = "z", "u", "q", "law.sigma_0", "law.sigma_1", "law.sigma_2", "law.breakaway_ratio"
 """Arguments by which a step of a fixed shape has derivatives."""
 
-_DERIVATIVE = derive(advance_alone, BY, ("z", "u", "q"))
-_forth, _back = _DERIVATIVE.forth, _DERIVATIVE.back
+DERIVATIVE = derive(advance_alone, BY, ("z", "u", "q"))
+_forth, _back = DERIVATIVE.forth, DERIVATIVE.back
 
 
 @kernel
