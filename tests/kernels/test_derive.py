@@ -6,9 +6,8 @@ import math
 import subprocess
 import sys
 
+import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from planarfriction import formulas
 from planarfriction.compiler import compiled_math as xp
@@ -38,17 +37,17 @@ BY = "z", "u", "law.sigma_0", "law.sigma_1", "law.mu_c", "law.mu_s", "law.v_s", 
 TRACTION = derive(_traction, BY, ("z", "u"))
 
 
-exponent = st.floats(-9.0, 3.0)
-angle = st.floats(0.0, 2.0 * math.pi)
-
-
-@settings(deadline=None)
-@given(exponent, angle, exponent, angle)
-def test_derivatives_are_those_of_60_digits(far, of_bristle, fast, of_velocity):
-    size, speed = 10.0 ** (far - 8.0), 10.0 ** (fast - 3.0)
-    z = size * math.cos(of_bristle), size * math.sin(of_bristle)
-    u = speed * math.cos(of_velocity), speed * math.sin(of_velocity)
-    assert misfit(TRACTION, (LAW, z, u)) < 1e-12
+def test_derivatives_are_those_of_60_digits():
+    rng, worst = np.random.default_rng(0), 0.0
+    for _ in range(100):
+        (size, speed), (of_bristle, of_velocity) = (
+            10.0 ** rng.uniform([-12.0, -12.0], [-4.0, 0.0]),
+            rng.uniform(0, 6.28, 2),
+        )
+        z = float(size * math.cos(of_bristle)), float(size * math.sin(of_bristle))
+        u = float(speed * math.cos(of_velocity)), float(speed * math.sin(of_velocity))
+        worst = max(worst, misfit(TRACTION, (LAW, z, u)))
+    assert worst < 1e-12
 
 
 def test_at_kinks_the_conventions_hold():
