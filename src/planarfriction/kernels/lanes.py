@@ -6,7 +6,8 @@ of `SLOTS` numbers, a slot for each step and lane. What belongs to a lane alone 
 fields meet, and indices are sums of constants and a counter, so that it sees that none is negative. What does not
 depend on the bristles (limit surface, steady sliding) is done for all slots of a chunk first.
 
-The loops are written once; the files of the models bind them to functions, which are compiled into them. These take
+The loops are written once; `bind` makes them entry points of a model, whose functions are compiled into them. These
+take
 `w`, whose slots begin at its start, and `own`, with the number c of a lane:
 
 - `begin(own, c, surface, data)`: what the lane needs beside the row of its contact, which is in place;
@@ -21,8 +22,12 @@ A step without load forgets its state, as in `rollouts`, whose `Inputs` come in;
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
+import numpy as np
+
 from planarfriction.compiler import compiled_math as xp
-from planarfriction.compiler import kernel
+from planarfriction.compiler import kernel, template
 from planarfriction.kernels.rollouts import row_of
 from planarfriction.kernels.vectors import accumulate, dot, three, times
 
@@ -171,7 +176,7 @@ def _put_or_add(p, w, field, values, lanes, c, begin, end):
 
 
 @kernel
-def roll(begin, scaled, prepare, advance, inputs, span, z, wrench, states, w, own):
+def _rollout(begin, scaled, prepare, advance, inputs, span, z, wrench, states, w, own):
     """Steps of the contacts `span[0]` to `span[1]`: `z` [P, B, 3] in place, wrenches into `wrench` [B, T, 3].
 
     The state before each step goes into `states` [P, B, T, 3], unless that is empty.
@@ -198,7 +203,7 @@ def roll(begin, scaled, prepare, advance, inputs, span, z, wrench, states, w, ow
 
 
 @kernel
-def gradient(begin, scaled, prepare, retreat, inputs, states, wrench_bar, span, bars, w, own):
+def _gradient(begin, scaled, prepare, retreat, inputs, states, wrench_bar, span, bars, w, own):
     """Adjoint of `roll` with its `states`, from the cotangents of the wrenches [B or 1, T, 3], into `bars`.
 
     `bars` are those of `rollouts`, of each part those of state [P, B, 3] and rows [P, B, N].
@@ -229,3 +234,32 @@ def gradient(begin, scaled, prepare, retreat, inputs, states, wrench_bar, span, 
             bars.state[p, b, 0], bars.state[p, b, 1], bars.state[p, b, 2] = carried(own, c)
             for m in range(bars.rows.shape[2]):
                 bars.rows[p, b, m] = own[ROW_BAR + m * LANES + c]
+
+
+# ---------------------------------------------------------------------- entry points of a model
+
+
+class LaneModel(NamedTuple):
+    """Functions of a model to which `bind` binds the loops, and the lengths of its `w` and `own`."""
+
+    begin: Any
+    scaled: Any
+    prepare: Any
+    advance: Any
+    retreat: Any
+    numbers: int
+    own_numbers: int
+
+
+@template
+def rollout(begin, scaled, prepare, advance, numbers, own_numbers, inputs, span, z, wrench, states):
+    """See `_rollout`."""
+    w, own = np.empty(numbers), np.empty(own_numbers)
+    _rollout(begin, scaled, prepare, advance, inputs, span, z, wrench, states, w, own)
+
+
+@template
+def gradient(begin, scaled, prepare, retreat, numbers, own_numbers, inputs, states, wrench_bar, span, bars):
+    """See `_gradient`."""
+    w, own = np.empty(numbers), np.empty(own_numbers)
+    _gradient(begin, scaled, prepare, retreat, inputs, states, wrench_bar, span, bars, w, own)

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import jit, kernel
 from planarfriction.kernels import lanes
-from planarfriction.kernels.lanes import FIELDS, LANES, OMEGA, OWN, ROW, SLOTS, TWIST, put_slot, slot
+from planarfriction.kernels.bind import bind
+from planarfriction.kernels.lanes import FIELDS, LANES, OMEGA, OWN, ROW, SLOTS, TWIST, LaneModel, put_slot, slot
 from planarfriction.kernels.law import LAW, LawNumbers
 from planarfriction.kernels.published_contact import Shape
 from planarfriction.kernels.published_step import NAMES, Held, linearise, pull_back, scaled_twist
@@ -176,15 +175,6 @@ def _retreat(w, own, c, z, dt, new, pull):
     return step.wrench, pull_back(contact, step, gathered(w, _SLOPES + c, SLOTS, 9), new, pull)
 
 
-@jit
-def rollout(inputs, span, z, wrench, states):
-    """See `lanes.roll`."""
-    w, own = np.empty(_END), np.empty(OWN + 9)
-    lanes.roll(_begin, _scaled, _prepare, _advance, inputs, span, z, wrench, states, w, own)
-
-
-@jit
-def gradient(inputs, states, wrench_bar, span, bars):
-    """See `lanes.gradient`."""
-    w, own = np.empty(_END), np.empty(OWN + 9)
-    lanes.gradient(_begin, _scaled, _prepare, _retreat, inputs, states, wrench_bar, span, bars, w, own)
+_MODEL = LaneModel(_begin, _scaled, _prepare, _advance, _retreat, _END, OWN + 9)
+rollout = bind(lanes.rollout, _MODEL, "published_rollout", jit)
+gradient = bind(lanes.gradient, _MODEL, "published_gradient", jit)

@@ -11,8 +11,6 @@ from __future__ import annotations
 import functools
 from typing import NamedTuple
 
-import numpy as np
-
 from planarfriction import formulas
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import entry, jit, kernel
@@ -20,9 +18,10 @@ from planarfriction.compiler.calls import address_of
 from planarfriction.compiler.memory import doubles, reader
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import bristle_step, rollouts
+from planarfriction.kernels.bind import bind
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.published_contact import Shape
-from planarfriction.kernels.rollouts import Cotangents
+from planarfriction.kernels.rollouts import Cotangents, StepModel
 from planarfriction.kernels.rules import per
 from planarfriction.kernels.surfaces import sliding, sliding_jacobian
 from planarfriction.kernels.vectors import applied_back, norm, plus
@@ -129,10 +128,8 @@ def pull_back(contact, step, slopes, new, wrench):
 # ---------------------------------------------------------------------- bound to this model
 
 
-@entry
-def step(row, data, inputs, out):
-    """See `rollouts.step`."""
-    rollouts.step(shape_of, doubles, hold, linearise, row, data, inputs, out)
+MODEL = StepModel(shape_of, doubles, hold, hold_slopes, linearise, pull_back)
+step = bind(rollouts.step, MODEL, "published_step", entry)
 
 
 @functools.cache
@@ -141,16 +138,5 @@ def step_address() -> int:
     return address_of(step, "pppp")
 
 
-@jit
-def sensitivities(inputs, span, z, columns, wrenches, slopes):
-    """See `rollouts.sensitivities`."""
-    work = np.empty(rollouts.SCRATCH), np.empty((6, 7 + len(NAMES))), np.empty((6, columns.shape[0]))
-    results = wrenches, slopes
-    rollouts.sensitivities(shape_of, hold_slopes, linearise, pull_back, inputs, span, z, columns, results, work)
-
-
-@jit
-def tangent(inputs, span, z, changes, wrenches, slopes):
-    """See `rollouts.tangent`."""
-    work = np.empty(rollouts.SCRATCH), np.empty((6, 7 + len(NAMES)))
-    rollouts.tangent(shape_of, hold_slopes, linearise, pull_back, inputs, span, z, changes, (wrenches, slopes), work)
+sensitivities = bind(rollouts.sensitivities, MODEL, "published_sensitivities", jit)
+tangent = bind(rollouts.tangent, MODEL, "published_tangent", jit)

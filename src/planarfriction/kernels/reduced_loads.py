@@ -9,14 +9,15 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
 from planarfriction.compiler import jit, kernel
+from planarfriction.compiler.memory import floats
 from planarfriction.kernels import reduced_step, rollouts
+from planarfriction.kernels.bind import bind
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.reduced import to_origin
 from planarfriction.kernels.reduced_contact import Shape
-from planarfriction.kernels.reduced_step import NAMES, Held, Quartic, Step, cotangents, hold, shape_of, through_steady
+from planarfriction.kernels.reduced_step import Held, Quartic, Step, cotangents, hold, shape_of, through_steady
+from planarfriction.kernels.rollouts import StepModel
 from planarfriction.kernels.steady import FAR, STILL, blended, fourth_change, fourth_moments, scaled_twist
 from planarfriction.kernels.vectors import dot, norm
 
@@ -74,30 +75,8 @@ def pull_back(contact, step, slopes, new, wrench):
 
 # ---------------------------------------------------------------------- bound to this model
 
-
-@jit
-def rollout(inputs, span, z, wrench, states):
-    """See `rollouts.roll`."""
-    rollouts.roll(shape_of, hold, linearise, inputs, span, z, wrench, states)
-
-
-@jit
-def gradient(inputs, states, wrench_bar, span, bars):
-    """See `rollouts.gradient`."""
-    work = np.empty(rollouts.SCRATCH)
-    rollouts.gradient(shape_of, hold_slopes, linearise, pull_back, inputs, states, wrench_bar, span, bars, work)
-
-
-@jit
-def sensitivities(inputs, span, z, columns, wrenches, slopes):
-    """See `rollouts.sensitivities`."""
-    work = np.empty(rollouts.SCRATCH), np.empty((6, 7 + len(NAMES))), np.empty((6, columns.shape[0]))
-    results = wrenches, slopes
-    rollouts.sensitivities(shape_of, hold_slopes, linearise, pull_back, inputs, span, z, columns, results, work)
-
-
-@jit
-def tangent(inputs, span, z, changes, wrenches, slopes):
-    """See `rollouts.tangent`."""
-    work = np.empty(rollouts.SCRATCH), np.empty((6, 7 + len(NAMES)))
-    rollouts.tangent(shape_of, hold_slopes, linearise, pull_back, inputs, span, z, changes, (wrenches, slopes), work)
+_MODEL = StepModel(shape_of, floats, hold, hold_slopes, linearise, pull_back)
+rollout = bind(rollouts.rollout, _MODEL, "reduced_rollout", jit)
+gradient = bind(rollouts.gradient, _MODEL, "reduced_gradient", jit)
+sensitivities = bind(rollouts.sensitivities, _MODEL, "reduced_sensitivities", jit)
+tangent = bind(rollouts.tangent, _MODEL, "reduced_tangent", jit)

@@ -11,8 +11,21 @@ import numpy as np
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import jit, kernel
 from planarfriction.kernels import cube, lanes
+from planarfriction.kernels.bind import bind
 from planarfriction.kernels.cube import Square
-from planarfriction.kernels.lanes import FIELDS, LANES, OWN, ROW, SLOTS, TWIST, TWIST_BAR, carried, put_slot, slot
+from planarfriction.kernels.lanes import (
+    FIELDS,
+    LANES,
+    OWN,
+    ROW,
+    SLOTS,
+    TWIST,
+    TWIST_BAR,
+    LaneModel,
+    carried,
+    put_slot,
+    slot,
+)
 from planarfriction.kernels.law import LAW, LawNumbers
 from planarfriction.kernels.reduced import to_origin
 from planarfriction.kernels.reduced_contact import Shape
@@ -238,15 +251,6 @@ def _retreat(w, own, c, z, dt, new, pull):
     return step.wrench, pull_back(contact, step, Slopes(m[:9], m[9:12], m[12:15], m[15:]), new, pull)
 
 
-@jit
-def rollout(inputs, span, z, wrench, states):
-    """See `lanes.roll`."""
-    w, own = np.empty(_END), np.empty(_OWN)
-    lanes.roll(_begin, _scaled, _prepare, _advance, inputs, span, z, wrench, states, w, own)
-
-
-@jit
-def gradient(inputs, states, wrench_bar, span, bars):
-    """See `lanes.gradient`."""
-    w, own = np.empty(_END), np.empty(_OWN)
-    lanes.gradient(_begin, _scaled, _prepare, _retreat, inputs, states, wrench_bar, span, bars, w, own)
+_MODEL = LaneModel(_begin, _scaled, _prepare, _advance, _retreat, _END, _OWN)
+rollout = bind(lanes.rollout, _MODEL, "reduced_rollout", jit)
+gradient = bind(lanes.gradient, _MODEL, "reduced_gradient", jit)

@@ -25,11 +25,12 @@ from planarfriction.compiler.calls import address_of
 from planarfriction.compiler.memory import floats, reader
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import rollouts, steady
+from planarfriction.kernels.bind import bind
 from planarfriction.kernels.bristle_step import cap
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.reduced import closure, to_origin
 from planarfriction.kernels.reduced_contact import Shape
-from planarfriction.kernels.rollouts import Cotangents
+from planarfriction.kernels.rollouts import Cotangents, StepModel
 from planarfriction.kernels.rules import rule
 from planarfriction.kernels.steady import FAR, STILL, fourth_moments, scaled_twist, sliding
 from planarfriction.kernels.vectors import applied_back, dot, norm, plus, square, times
@@ -231,10 +232,8 @@ def pull_back(contact, step, slopes, new, wrench):
 # ---------------------------------------------------------------------- bound to this model
 
 
-@entry
-def step(row, data, inputs, out):
-    """See `rollouts.step`."""
-    rollouts.step(shape_of, floats, hold, linearise, row, data, inputs, out)
+MODEL = StepModel(shape_of, floats, hold, hold_slopes, linearise, pull_back)
+step = bind(rollouts.step, MODEL, "reduced_step", entry)
 
 
 @functools.cache

@@ -1,6 +1,6 @@
 """Steps and roll-outs of a reduced model, their discrete adjoint and their derivatives, one contact after another.
 
-Each is written once for all models of three states; the files of the models bind it to the functions of a model, which
+Each is written once for all models of three states; `bind` makes it an entry point of a model, whose functions
 are compiled into it: with a contact `c`, a twist V, a state z and a step dt,
 
 - `shape_of(row)`: the shape, from the numbers behind those of the law;
@@ -21,21 +21,31 @@ from __future__ import annotations
 
 import functools
 import threading
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import types
 from numba.core.errors import NumbaError
 
 from planarfriction.compiler import compiled_math as xp
-from planarfriction.compiler import jit, kernel
-from planarfriction.compiler.calls import address, call
-from planarfriction.compiler.memory import at, doubles, reader, size_of
+from planarfriction.compiler import jit, kernel, template
 from planarfriction.kernels.law import LAW, law_of
 from planarfriction.kernels.vectors import accumulate, dot, plus, put, three, times
 
 SCRATCH = 9
 """Numbers that `hold_slopes` may write to."""
+
+
+class StepModel(NamedTuple):
+    """Functions of a model of three states, to which `bind` binds the loops."""
+
+    shape_of: Any
+    numbers_at: Any
+    """Address of the numbers of a limit surface or map, as doubles or in single precision."""
+    hold: Any
+    hold_slopes: Any
+    linearise: Any
+    pull_back: Any
 
 
 class Contact(NamedTuple):
@@ -210,8 +220,8 @@ def compile_step_one() -> None:
 
 
 @kernel
-def roll(shape_of, hold, linearise, inputs, span, z, wrench, states):
-    """See `lanes.roll`, but that the wrenches are added to what is in `wrench`."""
+def rollout(shape_of, hold, linearise, inputs, span, z, wrench, states):
+    """See `lanes.rollout`, but that the wrenches are added to what is in `wrench`."""
     steps, kept = inputs.dt.shape[0], states.shape[2] > 0
     for b in range(span[0], span[1]):
         twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
@@ -230,7 +240,7 @@ def roll(shape_of, hold, linearise, inputs, span, z, wrench, states):
 
 
 @kernel
-def gradient(shape_of, hold_slopes, linearise, pull_back, inputs, states, wrench_bar, span, bars, work):
+def _gradient(shape_of, hold_slopes, linearise, pull_back, inputs, states, wrench_bar, span, bars, work):
     """See `lanes.gradient`, but that the cotangents are added to what is in `bars`."""
     for b in range(span[0], span[1]):
         twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
@@ -251,6 +261,13 @@ def gradient(shape_of, hold_slopes, linearise, pull_back, inputs, states, wrench
                 bars.load[b, t] += heavier * dot(pull, step.wrench) + dot(bar.shape, shape_of(slopes))
                 accumulate(bars.rows[p, b], 0, 1, (bar.law, bar.shape))
             put(bars.state[p, b], own)
+
+
+@template
+def gradient(shape_of, hold_slopes, linearise, pull_back, inputs, states, wrench_bar, span, bars):
+    """See `_gradient`."""
+    work = np.empty(SCRATCH)
+    _gradient(shape_of, hold_slopes, linearise, pull_back, inputs, states, wrench_bar, span, bars, work)
 
 
 # ---------------------------------------------------------------------- derivatives
@@ -287,73 +304,74 @@ def _loads(inputs, load, p, at):
 
 
 @kernel
-def sensitivities(shape_of, hold_slopes, linearise, pull_back, inputs, span, z, columns, results, work):
-    """Roll-outs with the derivatives of the wrenches by the numbers `columns` [P], forward in time.
-
-    `dz' = d new/dz dz + d new/d number`. `results`, to which is added: wrenches [B, T, 3] and their derivatives
-    [B, T, 3, P]; `work`: arrays [SCRATCH], [6, 7 + N] and [6, P].
-    """
-    (wrenches, slopes), (scratch, here, change) = results, work
-    for b in range(span[0], span[1]):
-        twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
-        which = inputs.which[row_of(inputs.which, b)]
-        for part in range(inputs.shares.shape[0]):
-            rows, own = inputs.rows[part], three(z[part, b])
-            row = rows[row_of(rows, b)]
-            for i in range(6):
-                for p in range(change.shape[1]):
-                    change[i, p] = 0.0
-            for t in range(inputs.dt.shape[0]):
-                load, at, contact = loads[t], which[t], _part(shape_of, inputs, row, part, which[t])
-                weights, twist = _loads(inputs, load, part, at), three(twists[t])
-                step = _jacobian(
-                    hold_slopes, linearise, pull_back, contact, own, twist, weights, inputs.dt[t], scratch, here
-                )
-                own = step.new if load != 0.0 else (0.0, 0.0, 0.0)
-                _add(wrenches[b, t], _weighed(step.wrench, weights[1]))
-                for p in range(change.shape[1]):
-                    before, column = (change[0, p], change[1, p], change[2, p]), 7 + columns[p]
-                    for i in range(6):
-                        change[i, p] = here[i, column] + dot(three(here[i]), before)
-                    for i in range(3):
-                        slopes[b, t, i, p] += change[3 + i, p]
-            put(z[part, b], own)
+def _by_number(here, i, d, inputs, columns, b, t, follows):
+    """Return row i of a step's derivatives by number `columns[d]` of the contact."""
+    return here[i, 7 + columns[d]]
 
 
 @kernel
-def tangent(shape_of, hold_slopes, linearise, pull_back, inputs, span, z, changes, results, work):
-    """Roll-outs with their change along given ones of the inputs, forward in time.
+def _along(here, i, d, inputs, changes, b, t, follows):
+    """Return the change of row i along `changes` of the inputs of contact b, but that of the state."""
+    turns, pushes = changes.twist[row_of(changes.twist, b)], changes.load[row_of(changes.load, b)]
+    by = changes.rows[row_of(changes.rows, b)]
+    change = dot(three(here[i, 3:]), three(turns[t])) + here[i, 6] * pushes[t]
+    for m in range(by.shape[0]):
+        change += here[i, 7 + m] * by[m]
+    for m in range(follows.shape[0] - 1):
+        change += here[i, 7 + LAW + m] * follows[m] * pushes[t]
+    return change
 
-    `changes` of the inputs: as `Bars`, one row where all contacts share one; that of the state, and `z`, in place.
-    `results`, to which is added: wrenches [B, T, 3] and their changes; `work`: arrays [SCRATCH], [6, 7 + N].
+
+@kernel
+def _forward(shape_of, hold_slopes, linearise, pull_back, seed, inputs, span, z, given, moved, results, work):
+    """Roll-outs with their changes along D directions, forward in time: `dz' = d new/dz dz + seed`.
+
+    `seed(here, i, d, inputs, given, b, t, follows)` is the part of the change of row i that does not come from the
+    state; `moved` [P, B, 3, D] are the changes of the state, and `z`, in place. `results`, to which is added: wrenches
+    [B, T, 3] and their changes [B, T, 3, D]; `work`: arrays [SCRATCH] and [6, 7 + N].
     """
     (wrenches, slopes), (scratch, here) = results, work
     for b in range(span[0], span[1]):
         twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
-        turns, pushes = changes.twist[row_of(changes.twist, b)], changes.load[row_of(changes.load, b)]
-        which, by = inputs.which[row_of(inputs.which, b)], changes.rows[row_of(changes.rows, b)]
+        which = inputs.which[row_of(inputs.which, b)]
         for p in range(inputs.shares.shape[0]):
-            rows, own, moved = inputs.rows[p], three(z[p, b]), three(changes.state[p, b])
+            rows, own, change = inputs.rows[p], three(z[p, b]), moved[p, b]
             row = rows[row_of(rows, b)]
             for t in range(inputs.dt.shape[0]):
                 load, at, contact = loads[t], which[t], _part(shape_of, inputs, row, p, which[t])
-                weights, twist, turn = _loads(inputs, load, p, at), three(twists[t]), three(turns[t])
+                weights, twist = _loads(inputs, load, p, at), three(twists[t])
                 step = _jacobian(
                     hold_slopes, linearise, pull_back, contact, own, twist, weights, inputs.dt[t], scratch, here
                 )
                 own = step.new if load != 0.0 else (0.0, 0.0, 0.0)
                 _add(wrenches[b, t], _weighed(step.wrench, weights[1]))
-                new, follows = (0.0, 0.0, 0.0), inputs.by_load[p, at]
-                for i in range(6):
-                    change = dot(three(here[i]), moved) + dot(three(here[i, 3:]), turn) + here[i, 6] * pushes[t]
-                    for m in range(by.shape[0]):
-                        change += here[i, 7 + m] * by[m]
-                    for m in range(follows.shape[0] - 1):
-                        change += here[i, 7 + LAW + m] * follows[m] * pushes[t]
-                    if i < 3:
-                        new = new[1], new[2], change
-                    else:
-                        slopes[b, t, i - 3] += change
-                moved = new
+                for d in range(change.shape[1]):
+                    before = change[0, d], change[1, d], change[2, d]
+                    for i in range(6):
+                        now = dot(three(here[i]), before) + seed(here, i, d, inputs, given, b, t, inputs.by_load[p, at])
+                        if i < 3:
+                            change[i, d] = now
+                        else:
+                            slopes[b, t, i - 3, d] += now
             put(z[p, b], own)
-            put(changes.state[p, b], moved)
+
+
+@template
+def sensitivities(shape_of, hold_slopes, linearise, pull_back, inputs, span, z, columns, wrenches, slopes):
+    """Roll-outs with the derivatives of the wrenches by the numbers `columns` [D]; see `_forward`."""
+    work = np.empty(SCRATCH), np.empty((6, 7 + inputs.rows.shape[2]))
+    moved = np.zeros((inputs.shares.shape[0], z.shape[1], 3, columns.shape[0]))
+    results = wrenches, slopes
+    _forward(shape_of, hold_slopes, linearise, pull_back, _by_number, inputs, span, z, columns, moved, results, work)
+
+
+@template
+def tangent(shape_of, hold_slopes, linearise, pull_back, inputs, span, z, changes, wrenches, slopes):
+    """Roll-outs with their change along given ones of the inputs; see `_forward`.
+
+    `changes` of the inputs: as `Bars`, one row where all contacts share one; that of the state in place.
+    """
+    work = np.empty(SCRATCH), np.empty((6, 7 + inputs.rows.shape[2]))
+    parts, count, steps = inputs.shares.shape[0], z.shape[1], inputs.dt.shape[0]
+    moved, results = changes.state.reshape(parts, count, 3, 1), (wrenches, slopes.reshape(count, steps, 3, 1))
+    _forward(shape_of, hold_slopes, linearise, pull_back, _along, inputs, span, z, changes, moved, results, work)
