@@ -29,6 +29,8 @@ from numba.core.errors import NumbaError
 
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import jit, kernel, template
+from planarfriction.compiler.calls import address, call
+from planarfriction.compiler.memory import at, doubles, reader, size_of
 from planarfriction.kernels.law import LAW, law_of
 from planarfriction.kernels.vectors import accumulate, dot, plus, put, three, times
 
