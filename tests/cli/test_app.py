@@ -7,6 +7,7 @@ import csv
 import dataclasses
 import json
 import sys
+import tomllib
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -19,7 +20,7 @@ import planarfriction as pf
 from planarfriction import __version__, scenes
 from planarfriction.cli import commands, main, output
 from planarfriction.cli.app import app
-from planarfriction.cli.commands import PACKAGES
+from planarfriction.cli.commands import OWN
 from planarfriction.cli.patches import find_patch
 from planarfriction.cli.report import largest_differences
 from planarfriction.cli.run import build_scenes
@@ -461,24 +462,36 @@ def test_an_own_shape_without_parameters_keeps_the_names_of_patches(monkeypatch)
 # ---------------------------------------------------------------------- commands of other packages
 
 
-def test_every_command_of_the_distribution_is_there():
-    assert set(PACKAGES) <= set(app.list_commands(click.Context(app)))
+@pytest.fixture
+def only_the_library(monkeypatch):
+    """Take the commands of other packages away, as before the first look for them."""
+    monkeypatch.setattr(app, "commands", {name: app.commands[name] for name in app.commands if name not in OWN})
 
 
-@pytest.mark.parametrize("stripped", ["no entry points", "no modules"])
-def test_a_command_whose_package_is_missing_says_what_to_install(monkeypatch, capsys, stripped):
-    monkeypatch.setattr(app, "commands", {name: app.commands[name] for name in app.commands if name not in PACKAGES})
-    if stripped == "no entry points":
+@pytest.mark.parametrize("installed", [True, False])
+def test_every_command_of_the_distribution_is_there(only_the_library, monkeypatch, installed):
+    if not installed:  # or installed before there were entry points
         monkeypatch.setattr(commands, "entry_points", lambda *, group: [])
-    else:
-        for name in set(PACKAGES.values()):
-            for loaded in [each for each in sys.modules if each.partition(".")[0] == name]:
-                monkeypatch.delitem(sys.modules, loaded)
-            monkeypatch.setitem(sys.modules, name, None)
-    for name, package in PACKAGES.items():
+    assert set(OWN) <= set(app.list_commands(click.Context(app)))
+
+
+def test_entry_points_are_those_of_the_project():
+    project = Path(__file__).parents[2] / "pyproject.toml"
+    if not project.exists():
+        pytest.skip("no project beside these tests")
+    settings = tomllib.loads(project.read_text(encoding="utf-8"))["project"]
+    assert settings["entry-points"][commands.GROUP] == OWN
+
+
+def test_a_command_whose_package_is_missing_says_what_to_install(only_the_library, monkeypatch, capsys):
+    for package in ("planarfriction_studies", "planarfriction_explorer"):
+        for loaded in [each for each in sys.modules if each.partition(".")[0] == package]:
+            monkeypatch.delitem(sys.modules, loaded)
+        monkeypatch.setitem(sys.modules, package, None)
+    for name, where in OWN.items():
+        package = where.partition(".")[0]
         assert main([name, "--quick"]) == 2
-        said = capsys.readouterr().err
-        assert said == (
+        assert capsys.readouterr().err == (
             f"error: planarfriction {name} needs the package {package}, which comes with planarfriction:"
             " run pip install --force-reinstall --no-deps planarfriction\n"
         )

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 
 import click
 
 GROUP = "planarfriction.commands"
 """Group of the entry points: name of the command = module:command of click."""
 
-PACKAGES = dict.fromkeys(("bench", "measured", "reproduce", "simulators"), "planarfriction_studies") | {
-    "explore": "planarfriction_explorer"
+OWN = {
+    "bench": "planarfriction_studies.commands.definitions:bench",
+    "measured": "planarfriction_studies.commands.definitions:measured",
+    "reproduce": "planarfriction_studies.commands.definitions:reproduce",
+    "simulators": "planarfriction_studies.commands.definitions:simulators",
+    "explore": "planarfriction_explorer.command:explore",
 }
-"""Package of each command that comes with the library without being a part of it."""
+"""Entry points of the packages that come with the library, also where an installation of a checkout is older."""
 
 
 class Commands(click.Group):
@@ -34,16 +38,17 @@ class Commands(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """Return name, command and remaining arguments; a command whose package is missing is a usage error."""
         name = args[0]
-        if name in PACKAGES and not ctx.resilient_parsing and self.get_command(ctx, name) is None:
+        if name in OWN and not ctx.resilient_parsing and self.get_command(ctx, name) is None:
             ctx.fail(
-                f"planarfriction {name} needs the package {PACKAGES[name]}, which comes with planarfriction:"
+                f"planarfriction {name} needs the package {OWN[name].partition('.')[0]}, which comes with planarfriction:"
                 " run pip install --force-reinstall --no-deps planarfriction"
             )
         return super().resolve_command(ctx, args)
 
     def add_installed(self) -> None:
         """Add the commands of other packages, without those whose package cannot be imported."""
-        for entry in entry_points(group=GROUP):
+        own = [EntryPoint(name, value, GROUP) for name, value in OWN.items()]
+        for entry in (*own, *entry_points(group=GROUP)):
             if entry.name not in self.commands:
                 try:
                     self.add_command(entry.load(), entry.name)
