@@ -39,8 +39,9 @@ class Commands(click.Group):
         """Return name, command and remaining arguments; a command whose package is missing is a usage error."""
         name = args[0]
         if name in OWN and not ctx.resilient_parsing and self.get_command(ctx, name) is None:
+            package = OWN[name].partition(".")[0]
             ctx.fail(
-                f"planarfriction {name} needs the package {OWN[name].partition('.')[0]}, which comes with planarfriction:"
+                f"planarfriction {name} needs the package {package}, which comes with planarfriction:"
                 " run pip install --force-reinstall --no-deps planarfriction"
             )
         return super().resolve_command(ctx, args)
