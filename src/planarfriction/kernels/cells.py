@@ -5,10 +5,10 @@ traction `t = -(sigma_0 z + sigma_1 z' + sigma_2 u)`; `B` is its lever (see `Lev
 `c = a g(|u|)/sigma_0`, which is zero but for asymmetric friction. With `h = z - c` and `k = bristle_decay`
 (docs/physics.md, docs/solver.md),
 
-    z' = u - k h,      dz'/dz = -k I - h (x) k_h,      dz'/du = I - h (x) k_u + e (x) u/|u|
+    z' = u - k h,      dz'/dz = -k I - h (x) k_h,      dz'/du = I - h (x) k_u + dz'/dh dh/du
 
-where `e` is what moves with the centre c. So `D = shift I - dz'/dz` is a multiple of the identity plus a rank-one term
-and has a closed inverse, and every function is linear in the number of cells.
+where the last term is 0 unless the centre c moves. So `D = shift I - dz'/dz` is a multiple of the identity plus a
+rank-one term and has a closed inverse, and every function is linear in the number of cells.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ class LinearCells(NamedTuple):
     """k_h"""
     by_y: Doubles
     by_ux: Doubles
-    """k_u, with the part of the centre that goes along h."""
+    """k_u; not where bristles lean."""
     by_uy: Doubles
     diagonal: Doubles
     """One over the diagonal of D, and over its rank-one part."""
@@ -71,12 +71,11 @@ class LinearCells(NamedTuple):
     x: Doubles
     """h; this and all that follows only where bristles lean."""
     y: Doubles
-    moved_x: Doubles
-    """e"""
-    moved_y: Doubles
-    heading_x: Doubles
-    """u/|u|"""
-    heading_y: Doubles
+    xx: Doubles
+    """dz'/du, row by row."""
+    xy: Doubles
+    yx: Doubles
+    yy: Doubles
 
 
 STRAIGHT, LEANING = 7, len(LinearCells._fields)
@@ -106,10 +105,9 @@ def _solved(m, i, h, a):
 @kernel
 def _driven(lever, m, i, h, u):
     """Return `dz'/du u`."""
-    rate = plus(u, -(m.by_ux[i] * u[0] + m.by_uy[i] * u[1]), h)
     if lever.leans:
-        rate = plus(rate, m.heading_x[i] * u[0] + m.heading_y[i] * u[1], (m.moved_x[i], m.moved_y[i]))
-    return rate
+        return m.xx[i] * u[0] + m.xy[i] * u[1], m.yx[i] * u[0] + m.yy[i] * u[1]
+    return plus(u, -(m.by_ux[i] * u[0] + m.by_uy[i] * u[1]), h)
 
 
 @kernel
@@ -174,11 +172,12 @@ def _linearise(lever, law, own, z, v, m):
             heading, s = times(per(speed), u), times(grip_slope(law, speed, q) / q, centre)
             by_u = plus(by_u, dot(by_h, s), heading)
             m.x[i], m.y[i] = h
-            m.moved_x[i], m.moved_y[i] = times(-k, s)
-            m.heading_x[i], m.heading_y[i] = heading
+            m.xx[i], m.xy[i] = plus(plus((1.0, 0.0), -h[0], by_u), -k * s[0], heading)
+            m.yx[i], m.yy[i] = plus(plus((0.0, 1.0), -h[1], by_u), -k * s[1], heading)
+        else:
+            m.by_ux[i], m.by_uy[i] = by_u
         m.k[i] = k
         m.by_x[i], m.by_y[i] = by_h
-        m.by_ux[i], m.by_uy[i] = by_u
 
 
 @kernel
@@ -202,17 +201,17 @@ def factor(lever, contact, z, shift, lin, stiffness):
     n, law, m = own.count, own.law, _linear(lin, own.count)
     pull, total = law.sigma_0 + law.sigma_1 * shift, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for i in range(n):
-        h, by_h, by_u = _bristle(lever, m, z, i, n), (m.by_x[i], m.by_y[i]), (m.by_ux[i], m.by_uy[i])
+        h, by_h = _bristle(lever, m, z, i, n), (m.by_x[i], m.by_y[i])
         diagonal = shift + m.k[i]
         m.diagonal[i], rank = 1.0 / diagonal, 1.0 / (diagonal + dot(by_h, h))
         m.rank[i] = rank
-        x, y = times(rank, plus(times(diagonal, by_u), 1.0, by_h))
         c, d = -pull * m.diagonal[i], -law.sigma_2
-        p = c * (1.0 - h[0] * x) + d, -c * h[0] * y, -c * h[1] * x, c * (1.0 - h[1] * y) + d
         if lever.leans:
-            e = _solved(m, i, h, (m.moved_x[i], m.moved_y[i]))
-            heading = m.heading_x[i], m.heading_y[i]
-            p = plus(p, -pull, (e[0] * heading[0], e[0] * heading[1], e[1] * heading[0], e[1] * heading[1]))
+            a, b = _solved(m, i, h, (m.xx[i], m.yx[i])), _solved(m, i, h, (m.xy[i], m.yy[i]))
+            p = d - pull * a[0], -pull * b[0], -pull * a[1], d - pull * b[1]
+        else:
+            x, y = times(rank, plus(times(diagonal, (m.by_ux[i], m.by_uy[i])), 1.0, by_h))
+            p = c * (1.0 - h[0] * x) + d, -c * h[0] * y, -c * h[1] * x, c * (1.0 - h[1] * y) + d
         total = plus(total, own.weights[i], lever.around(lever.of(own, i), p))
     put_all(stiffness, total)
 
@@ -281,11 +280,11 @@ def pull_back(lever, contact, z, lin, dzdot, rows, out):
         rate = plus((dzdot[i], dzdot[n + i]), -law.sigma_1, t)
         c = dot(h, rate)
         out[i], out[n + i] = plus(plus(times(-m.k[i], rate), -c, (m.by_x[i], m.by_y[i])), -law.sigma_0, t)
-        u = plus(plus(rate, -c, (m.by_ux[i], m.by_uy[i])), -law.sigma_2, t)
         if lever.leans:
-            moved = m.moved_x[i] * rate[0] + m.moved_y[i] * rate[1]
-            u = plus(u, moved, (m.heading_x[i], m.heading_y[i]))
-        total = plus(total, 1.0, lever.wrench(cell, u))
+            u = m.xx[i] * rate[0] + m.yx[i] * rate[1], m.xy[i] * rate[0] + m.yy[i] * rate[1]
+        else:
+            u = plus(rate, -c, (m.by_ux[i], m.by_uy[i]))
+        total = plus(total, 1.0, lever.wrench(cell, plus(u, -law.sigma_2, t)))
     put(rows.d_twist, total)
 
 

@@ -57,7 +57,7 @@ class DistributedModel(FrictionModel):
         rate_state = -k * identity - bristle[..., :, None, :] * k_z
         rate_velocity = identity - bristle[..., :, None, :] * k_v
         if self.patch.asymmetric:
-            rate_velocity = rate_velocity + lin[..., 9:11, None, :] * lin[..., None, 11:13, :]
+            rate_velocity = lin[..., 9:13, :].reshape(rate_state.shape)
         rate_twist = np.einsum("...abn,dbn->...and", rate_velocity, lever)
         share = load[..., None] * self.patch.weights(load)
         force_state = -(law.sigma_0 * identity + law.sigma_1 * rate_state) * share[..., None, None, :]
