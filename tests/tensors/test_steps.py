@@ -1,0 +1,74 @@
+"""The tensor floor: it imports neither PyTorch nor JAX, and any array library can take its steps."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import planarfriction as pf
+from planarfriction.tensors import distributed, published, reduced, steps
+from planarfriction.tensors.namespace import Namespace
+from planarfriction.tensors.steps import LAW, Part
+
+PATCH = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
+LAW_OF_TEST = pf.LuGre(mu_s=1.2, sigma_1=30.0, gamma=1.7, elasto_plastic=0.7)
+NUMPY = Namespace(
+    SimpleNamespace(**{**vars(np), "pow": np.power}),  # which older NumPy does not call so
+    broadcast_arrays=np.broadcast_arrays,
+    stop_gradient=lambda x: x,
+    integers=lambda x: x.astype(int),
+    widened=lambda x: x,
+    narrowed=lambda result, *inputs: result,
+)
+
+
+def parts_of_model(kind: str):
+    """Return the equations of a model, its parts over NumPy, and the model itself."""
+    numbers = LAW_OF_TEST.numbers
+    if kind == "distributed":
+        cells = distributed.cells_of(PATCH, None, "numpy")
+        return distributed, (Part(numbers, cells),), pf.DistributedModel(PATCH, LAW_OF_TEST)
+    if kind == "published":
+        shape = published.shape_of(PATCH, LAW_OF_TEST, None)
+        values = {name: np.array([value]) for name, value in published.values_of(LAW_OF_TEST, shape).items()}
+        numeric = published.numbers_of(NUMPY, values, shape.surface.numbers, None)
+        return published, (Part(numbers, numeric),), pf.ReducedModelPublished(PATCH, LAW_OF_TEST)
+    count = 1 if kind == "reduced" else 2
+    found = reduced.parts_of(PATCH, LAW_OF_TEST, None, parts=count, segments=8, speeds=8)
+    parts = tuple(Part(numbers, shape, found.share[k]) for k, shape in enumerate(reduced.numbers_of(found)))
+    return reduced, parts, pf.ReducedModel(PATCH, LAW_OF_TEST, parts=count, segments=8, speeds=8)
+
+
+@pytest.mark.parametrize("kind", ["distributed", "published", "reduced", "reduced of two parts"])
+def test_steps_over_numpy_are_those_of_the_compiled_models(kind):
+    equations, parts, model = parts_of_model(kind)
+    rng = np.random.default_rng(3)
+    state = rng.normal(size=(40, *model.state_shape)) * (1e-9 if kind == "published" else 1e-6)
+    twist, load = rng.normal(size=(40, 3)) * [1e-3, 1e-3, 0.2], rng.uniform(0.2, 3.0, 40)
+    state[:4], load[4], twist[5:8] = 0.0, 0.0, 0.0
+    found = [
+        *steps.evaluate(NUMPY, equations, parts, state, twist, load),
+        *steps.step(NUMPY, equations, parts, state, twist, load, np.array(1e-4)),
+    ]
+    wanted = [model.rate(state, twist, load), model.wrench(state, twist, load), *model.step(state, twist, load, 1e-4)]
+    for got, want in zip(found, wanted, strict=True):
+        # sums of a few hundred terms, each with a rounding of 1e-16
+        np.testing.assert_allclose(got, want, rtol=1e-12, atol=1e-12 * np.abs(want).max())
+
+
+def test_the_parameters_of_the_law_come_first():
+    assert pf.derivatives.PARAMETERS[: len(LAW)] == LAW and LAW[-1] == "breakaway_ratio"
+
+
+def test_the_floor_imports_neither_pytorch_nor_jax():
+    code = (
+        "import sys, pkgutil, importlib, planarfriction.tensors as floor\n"
+        "for module in pkgutil.iter_modules(floor.__path__, 'planarfriction.tensors.'):\n"
+        "    importlib.import_module(module.name)\n"
+        "assert not {'torch', 'jax'} & set(sys.modules)\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, timeout=120)
