@@ -52,7 +52,7 @@ class Kind(NamedTuple):
     surface: Callable[[Any], tuple[np.ndarray, np.ndarray]]
     """Three integers of the limit surface or the maps of a shape, and their flat numbers."""
     framed: Callable[[Any], tuple[Any, Frame | None]] = lambda shape: (shape, None)
-    """Shape that steps in the place of another one, and the frame that leads there; None for the contact's own."""
+    """Shape that steps instead of another one, and the frame that leads there; None for the contact's own."""
 
     def row(self, law: Any, shape: Any) -> np.ndarray:
         """Return the numbers of law and shape."""

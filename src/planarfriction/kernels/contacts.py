@@ -7,8 +7,8 @@ body needs to know of a contact; what is behind its wrench is called by address 
 
 from __future__ import annotations
 
-import inspect
 import math
+from collections import namedtuple
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,6 +16,7 @@ import numpy as np
 from planarfriction.compiler import entry, kernel
 from planarfriction.compiler.calls import address_of
 from planarfriction.compiler.memory import Doubles, Integers, Layout
+from planarfriction.kernels.bind import bind
 from planarfriction.kernels.vectors import plus, times
 
 WORLD, BODY, BODY_AXES = 0, 1, 2
@@ -76,20 +77,10 @@ WORDS = ("pdddd", "pddd", "pdfdd", "pdfddd", "pddddd", "pddddddff", "pdddd", "pd
 """Arguments of `ModelFunctions` (see `calls.address_of`)."""
 
 
-def functions_of(name: str, templates: tuple, model: Any) -> ModelFunctions:
-    """Return the functions of a model: each template with it as first argument, as entry point `<name>_<template>`."""
-    return ModelFunctions(*(_bound(template, model, name) for template in templates))
-
-
-def _bound(template: Any, model: Any, name: str) -> Any:
-    """Write a function that calls a template with a model; a closure could not be kept on disk."""
-    function = template.py_func
-    arguments = ", ".join(list(inspect.signature(function).parameters)[1:])
-    title = f"{name}_{function.__name__}"
-    source = f"def {title}({arguments}):\n    template(model, {arguments})\n"
-    space = {"template": template, "model": model, "__name__": function.__module__}
-    exec(compile(source, function.__code__.co_filename, "exec"), space)
-    return entry(space[title])
+def functions_of(name: str, templates: tuple, **model: Any) -> ModelFunctions:
+    """Return the functions of a model, entry points `<name>_<template>`: templates that are bound to its argument."""
+    own = namedtuple("Own", model)(**model)
+    return ModelFunctions(*(bind(each, own, f"{name}_{each.py_func.__name__}", entry) for each in templates))
 
 
 def calls_of(functions: ModelFunctions, *, change: bool = False) -> np.ndarray:

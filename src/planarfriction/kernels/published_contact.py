@@ -143,4 +143,4 @@ def _slopes(own, z, twist, m):
 
 
 _MODEL = moments.ThreeStates(_read, _seen, _wrench, _viscous, _scaled, _raw, 1.0, _rate, _slopes)
-FUNCTIONS = functions_of("published", moments.TEMPLATES, _MODEL)
+FUNCTIONS = functions_of("published", moments.TEMPLATES, model=_MODEL)

@@ -128,4 +128,4 @@ def _slopes_at(own, z, u, v, m):
 
 
 _MODEL = moments.ThreeStates(_read, _seen, _wrench, _seen, _as_it_is, _as_it_is, 0.0, _rate, _slopes)
-FUNCTIONS = functions_of("reduced", moments.TEMPLATES, _MODEL)
+FUNCTIONS = functions_of("reduced", moments.TEMPLATES, model=_MODEL)
