@@ -1,13 +1,13 @@
 """The physics, once: every formula as `f(xp, ...)` for scalars and for tensors.
 
-`xp` is the namespace that supplies `exp`, `sin`, `cos`, `power`, `where`, `minimum` and `maximum`: NumPy, torch and
-jax.numpy pass themselves, compiled loops pass `planarfriction.compiler.compiled_math`. A formula is assignments and one
-return; it has no loop and no branch, and chooses what to divide rather than whether to: of that, compilers make a
-branch, and processors do not foresee it. Symbols as in Waltersson and Karayiannidis 2024, sections III and IV; each
-formula names the section of docs/physics.md, or the page of docs, where it stands and comes from.
+`xp` is the namespace that supplies `exp`, `expm1`, `log`, `sin`, `cos`, `power`, `where`, `minimum` and `maximum`:
+NumPy, torch and jax.numpy pass themselves, compiled loops pass `planarfriction.compiler.compiled_math`. A formula is
+assignments and one return; it has no loop and no branch, and chooses what to divide rather than whether to: of that,
+compilers make a branch, and processors do not foresee it. Symbols as in Waltersson and Karayiannidis 2024, sections III
+and IV; each formula names the section of docs/physics.md, or the page of docs, where it stands and comes from.
 
 A bristle is a vector `z` driven by a velocity `u`, of any dimension: two for a cell of the distributed model
-(`u = v`), three for the reduced model (`u = h(V) v_n`). The formulas see only norms and projections:
+(`u = v`), three for the published reduced model (`u = h(V) v_n`). The formulas see only norms and projections:
 
 - `z_norm = |z|`, `speed`, `along = z/|z| . u/|u| speed` (the speed at which the bristle is being stretched).
 """

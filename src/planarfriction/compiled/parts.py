@@ -16,7 +16,7 @@ from planarfriction.equality import by_parts
 from planarfriction.kernels.contacts import calls_of
 from planarfriction.kernels.parts import FUNCTIONS, PartsContact
 from planarfriction.kernels.quick_steps import JACOBIAN, jacobians_address
-from planarfriction.kernels.rollouts import Place
+from planarfriction.kernels.rollouts import PartAddresses
 
 
 @by_parts
@@ -84,10 +84,10 @@ class ContactAtLoad:
 
     @functools.cached_property
     def places(self) -> np.ndarray:
-        """Places of the parts (`kernels.rollouts.Place`) for steps, flat."""
+        """Places of the parts (`kernels.rollouts.PartAddresses`) for steps, flat."""
         step = self._kind.steps.step_address()
         both = zip(self.parts, self._rows, strict=True)
-        places = [Place(step, place_of(row), place_of(data), part.share) for part, (row, data) in both]
+        places = [PartAddresses(step, place_of(row), place_of(data), part.share) for part, (row, data) in both]
         return np.concatenate([row_of(place) for place in places])
 
     @functools.cached_property
@@ -96,7 +96,7 @@ class ContactAtLoad:
         calls = np.array([jacobians_address()], np.int64).view(float)
         function = address_of(self._kind.jacobian_function, JACOBIAN)
         both = zip(self.parts, self._records, strict=True)
-        places = [Place(function, place_of(record.records), 0, part.share) for part, record in both]
+        places = [PartAddresses(function, place_of(record.records), 0, part.share) for part, record in both]
         return np.concatenate([calls, *(row_of(place) for place in places)])
 
     @functools.cached_property

@@ -6,7 +6,7 @@ import numpy as np
 
 from planarfriction.compiled.packed import PackedModel
 from planarfriction.compiler.calls import address_of
-from planarfriction.kernels import rates as kernels
+from planarfriction.kernels import batched_rates as kernels
 from planarfriction.kernels.contacts import WORDS
 
 

@@ -117,7 +117,7 @@ def _sum(vx, vy, spin, cells, exponents, gamma, stack, points, out):
 
 @jit
 def steady_sums(directions, cells, exponents, gamma, out):
-    """`sum w e u/|u|` and its moment of M scaled twists into `out` [M, 1 + E, 3].
+    """Write `sum w e u/|u|` and its moment for M scaled twists to `out` [M, 1 + E, 3].
 
     `directions` [M, 3] need not be unit vectors; `cells` [N, 7]: centre (x, y) and the two edges (x, y, x, y) over the
     radius of gyration, and the weight. `e` is 1 in row 0 and `exp(-exponents[k] |u|^gamma)` of the unit direction in

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
-from planarfriction.kernels.four import patch, patch_of_levels
+from planarfriction.kernels.hermite import patch, patch_of_levels
 from planarfriction.kernels.vectors import times
 
 NODE = 12
@@ -53,7 +53,7 @@ class Square(NamedTuple):
 
 @kernel
 def locate(x, y, s, faces):
-    """`Spot` of a direction; not all of it may be zero."""
+    """Return `Spot` of a direction; not all of it may be zero."""
     ax, ay, a_s = abs(x), abs(y), abs(s)
     on_x, on_y = (ax >= ay) & (ax >= a_s), ay >= a_s
     largest = xp.where(on_x, x, xp.where(on_y, y, s))
@@ -68,7 +68,7 @@ def locate(x, y, s, faces):
 
 @kernel
 def _cell(a, n):
-    """Which of the `2 n` intervals holds `a`, and how far along."""
+    """Return the number of the interval, of `2 n`, that holds `a`, and the share of it before `a`."""
     u = (a + 1.0) * n
     i = xp.minimum(xp.maximum(math.floor(u), 0.0), 2.0 * n - 1.0)
     return i, u - i
@@ -76,7 +76,7 @@ def _cell(a, n):
 
 @kernel
 def square(spot, n):
-    """`Square` of a face of `2 n` intervals each way."""
+    """Return `Square` of a face of `2 n` intervals each way."""
     i, u = _cell(spot.a, n)
     j, v = _cell(spot.b, n)
     return Square((spot.face * (2.0 * n + 1.0) + i) * (2.0 * n + 1.0) + j, u, v)
@@ -84,7 +84,7 @@ def square(spot, n):
 
 @kernel
 def levels(t, count):
-    """First of the four levels around `t` in [0, 1] of `count`, their weights, and the derivatives of these by t.
+    """Return the first of the four levels around `t` in [0, 1] of `count`, their weights, and their slopes by t.
 
     A uniform cubic B-spline.
     """
@@ -99,14 +99,14 @@ def levels(t, count):
 
 @kernel
 def read(data, n, q):
-    """A map of one level and its slopes by a and by b, three components each; `q.at` counts all of `data`."""
+    """Read a map of one level and its slopes by a and by b, three components each; `q.at` counts all of `data`."""
     value, by_u, by_v = patch(data, int(q.at), NODE, NODE * (2 * int(n) + 1), q.u, q.v)
     return value, times(n, by_u), times(n, by_v)
 
 
 @kernel
 def read_level(data, n, count, q, weights, slopes):
-    """A map of `count` levels, its slopes by a and by b and that by t, three components each.
+    """Read a map of `count` levels, its slopes by a and by b and that by t, three components each.
 
     `q.at` counts all of `data` and begins with the first of the four levels of `weights` and `slopes` (see `levels`).
     """
@@ -117,7 +117,7 @@ def read_level(data, n, count, q, weights, slopes):
 
 @kernel
 def gradient(spot, by_a, by_b):
-    """The gradient by the direction's components, from the slopes on the face."""
+    """Return the gradient by the direction's components, from the slopes on the face."""
     largest, first, second = -(spot.a * by_a + spot.b * by_b) * spot.by_axis, by_a * spot.by_side, by_b * spot.by_side
     on_x, on_y = spot.axis == 0.0, spot.axis == 1.0
     return (

@@ -93,7 +93,7 @@ def step(law, z, twist, x, y, w, dt, out):
 
 @jit
 def step_batch(law, z, twist, cells, load, dt, out, wrench):
-    """`step` for a batch: `z`, `out` [B, 2n], `twist`, `wrench` [B, 3], `load`, `dt` [B].
+    """Take a `step` of each contact: `z`, `out` [B, 2n], `twist`, `wrench` [B, 3], `load`, `dt` [B].
 
     Without load the bristles are forgotten.
     """
@@ -108,7 +108,7 @@ def step_batch(law, z, twist, cells, load, dt, out, wrench):
 
 @jit
 def step_sequence(law, z, twist, cells, load, dt, out, wrench):
-    """`step` through the twists [T, 3] of one contact, `z` in place (`out`: scratch), wrenches into `wrench` [T, 3]."""
+    """Take a `step` at each twist [T, 3] of one contact, `z` in place (`out`: scratch), `wrench` [T, 3]."""
     n = z.shape[0]
     for t in range(twist.shape[0]):
         held = twist[t, 0], twist[t, 1], twist[t, 2]
@@ -148,7 +148,10 @@ def by_twist(by_x, by_y, x, y):
 
 @jit
 def jacobians(law, z, twist, cells, load, dt, out):
-    """`CellJacobians` of steps into `out`, which comes in as zeros: `z` [B, 2, n], `twist` [B, 3], `load`, `dt` [B]."""
+    """Write `CellJacobians` of steps to `out`, which comes in as zeros.
+
+    `z` [B, 2, n], `twist` [B, 3], `load`, `dt` [B].
+    """
     for b in range(z.shape[0]):
         weights = cells.weights[min(b, cells.weights.shape[0] - 1)]
         for m in range(weights.shape[0]):

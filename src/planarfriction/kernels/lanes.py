@@ -7,8 +7,7 @@ fields meet, and indices are sums of constants and a counter, so that it sees th
 depend on the bristles (limit surface, steady sliding) is done for all slots of a chunk first.
 
 The loops are written once; `bind` makes them entry points of a model, whose functions are compiled into them. These
-take
-`w`, whose slots begin at its start, and `own`, with the number c of a lane:
+take `w`, whose slots begin at its start, and `own`, with the number c of a lane:
 
 - `begin(own, c, surface, data)`: what the lane needs beside the row of its contact, which is in place;
 - `scaled(own, c, twist)`: the twist as the model sees it;
@@ -48,7 +47,7 @@ load; those of the model begin at `OWN`."""
 
 @kernel
 def slot(w, field, i):
-    """Three fields of a slot."""
+    """Return the three fields of a slot."""
     return w[field + i], w[field + SLOTS + i], w[field + 2 * SLOTS + i]
 
 
@@ -70,7 +69,7 @@ def carry(own, c, a):
 
 @kernel
 def _lane(span, lane):
-    """Part and contact of a lane, counted over all contacts of a part after the other."""
+    """Return the part and contact of a lane, counted over all contacts of a part after the other."""
     count = span[1] - span[0]
     return lane // count, span[0] + lane % count
 
@@ -91,7 +90,7 @@ def _forward_one(advance, w, own, c, dt):
 
 @kernel
 def _forward(advance, w, own, lanes, dt):
-    """One step of the contacts, whose slots begin at the start of `w`."""
+    """Step the contacts, whose slots begin at the start of `w`."""
     for c in range(lanes):  # the body apart: kernel later, it leaves the compiler a loop that it can count
         _forward_one(advance, w, own, c, dt)
 
@@ -109,7 +108,7 @@ def _backward_one(retreat, w, own, c, dt):
 
 @kernel
 def _backward(retreat, w, own, lanes, dt):
-    """One step of the contacts backwards: carries the cotangent of the state."""
+    """Step the contacts backwards, carrying the cotangent of the state."""
     for c in range(lanes):
         _backward_one(retreat, w, own, c, dt)
 
@@ -119,7 +118,7 @@ def _backward(retreat, w, own, lanes, dt):
 
 @kernel
 def _begin(begin, own, inputs, span, carried, first, lanes):
-    """Rows of the lanes from `first` on, and what they carry; no gradient yet."""
+    """Write the rows of the lanes from `first` on and the states that they carry, with zero gradients."""
     for c in range(lanes):
         p, b = _lane(span, first + c)
         rows = inputs.rows[p]
@@ -134,7 +133,7 @@ def _begin(begin, own, inputs, span, carried, first, lanes):
 
 @kernel
 def _read(scaled, w, own, inputs, span, first, lanes, begin, end):
-    """Scaled twists, spins and loads of the steps from `begin` to `end`."""
+    """Read scaled twists, spins and loads of the steps from `begin` to `end`."""
     for c in range(lanes):
         _, b = _lane(span, first + c)
         twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
@@ -146,14 +145,14 @@ def _read(scaled, w, own, inputs, span, first, lanes, begin, end):
 
 @kernel
 def _copy_in(w, field, values, lanes, c, begin, end):
-    """Three components of each step into the slots of a lane."""
+    """Copy three components of each step to the slots of a lane."""
     for t in range(begin, end):
         put_slot(w, field, (t - begin) * lanes + c, (values[t, 0], values[t, 1], values[t, 2]))
 
 
 @kernel
 def _copy_out(w, field, values, lanes, c, begin, end):
-    """The slots of a lane into three components of each step."""
+    """Copy the slots of a lane to three components of each step."""
     for t in range(begin, end):
         values[t, 0], values[t, 1], values[t, 2] = slot(w, field, (t - begin) * lanes + c)
 
@@ -168,7 +167,7 @@ def _add(w, field, values, lanes, c, begin, end):
 
 @kernel
 def _put_or_add(p, w, field, values, lanes, c, begin, end):
-    """What the parts have together: the first one's, and then that of each."""
+    """Write the slots of the first part, and add those of the others."""
     if p == 0:
         _copy_out(w, field, values, lanes, c, begin, end)
     else:
@@ -177,7 +176,7 @@ def _put_or_add(p, w, field, values, lanes, c, begin, end):
 
 @kernel
 def _rollout(begin, scaled, prepare, advance, inputs, span, z, wrench, states, w, own):
-    """Steps of the contacts `span[0]` to `span[1]`: `z` [P, B, 3] in place, wrenches into `wrench` [B, T, 3].
+    """Step the contacts `span[0]` to `span[1]`: `z` [P, B, 3] in place, wrenches into `wrench` [B, T, 3].
 
     The state before each step goes into `states` [P, B, T, 3], unless that is empty.
     """
@@ -204,7 +203,7 @@ def _rollout(begin, scaled, prepare, advance, inputs, span, z, wrench, states, w
 
 @kernel
 def _gradient(begin, scaled, prepare, retreat, inputs, states, wrench_bar, span, bars, w, own):
-    """Adjoint of `roll` with its `states`, from the cotangents of the wrenches [B or 1, T, 3], into `bars`.
+    """Write the adjoint of `_rollout` with its `states`, from cotangents of the wrenches [B or 1, T, 3], to `bars`.
 
     `bars` are those of `rollouts`, of each part those of state [P, B, 3] and rows [P, B, N].
     """
@@ -253,13 +252,13 @@ class LaneModel(NamedTuple):
 
 @template
 def rollout(begin, scaled, prepare, advance, numbers, own_numbers, inputs, span, z, wrench, states):
-    """See `_rollout`."""
+    """Allocate the scratch of `_rollout` and run it."""
     w, own = np.empty(numbers), np.empty(own_numbers)
     _rollout(begin, scaled, prepare, advance, inputs, span, z, wrench, states, w, own)
 
 
 @template
 def gradient(begin, scaled, prepare, retreat, numbers, own_numbers, inputs, states, wrench_bar, span, bars):
-    """See `_gradient`."""
+    """Allocate the scratch of `_gradient` and run it."""
     w, own = np.empty(numbers), np.empty(own_numbers)
     _gradient(begin, scaled, prepare, retreat, inputs, states, wrench_bar, span, bars, w, own)

@@ -17,7 +17,7 @@ law_of = reader(LawNumbers)
 
 @kernel
 def squared(law):
-    """The law with the exponent 2 as a constant: the compiler then drops the general power from a loop."""
+    """Return a law with the exponent 2 as a constant: the compiler then drops the general power from a loop."""
     return LawNumbers(
         law.sigma_0, law.sigma_1, law.sigma_2, law.mu_c, law.mu_s, law.v_s, 2.0,
         law.elasto_plastic, law.breakaway_ratio, law.creep_speed,
@@ -26,11 +26,11 @@ def squared(law):
 
 @kernel
 def grip(law, speed):
-    """`sigma_0/g(v)` [1/m]: one over the steady deflection of a bristle."""
+    """Return `sigma_0/g(v)` [1/m]: one over the steady deflection of a bristle."""
     return law.sigma_0 / formulas.stribeck(xp, speed, law)
 
 
 @kernel
 def grip_slope(law, speed, grip):
-    """Derivative of `sigma_0/g(v)` with respect to the speed [s/m^2]."""
+    """Return the derivative of `sigma_0/g(v)` with respect to the speed [s/m^2]."""
     return -grip * grip * (1.0 / law.sigma_0) * formulas.stribeck_slope(xp, speed, law)

@@ -9,7 +9,7 @@ from planarfriction.kernels.bind import bind
 from planarfriction.kernels.lanes import FIELDS, LANES, OMEGA, OWN, ROW, SLOTS, TWIST, LaneModel, put_slot, slot
 from planarfriction.kernels.law import LAW, LawNumbers
 from planarfriction.kernels.published_contact import Shape
-from planarfriction.kernels.published_step import NAMES, Held, linearise, pull_back, scaled_twist
+from planarfriction.kernels.published_step import NAMES, HeldTwist, pull_back, scaled_twist, taped_step
 from planarfriction.kernels.rollouts import Contact
 from planarfriction.kernels.surfaces import (
     BILINEAR,
@@ -36,7 +36,7 @@ _SCRATCH = OWN
 
 @kernel
 def _places(w, count, size):
-    """Corner and position in the bilinear table of each twist, and its polar angle."""
+    """Find the corner and the position of each twist in the bilinear table, and its polar angle."""
     row = 4 * (4 * size + 1)
     for i in range(count):
         x, y, s = slot(w, TWIST, i)
@@ -48,7 +48,7 @@ def _places(w, count, size):
 
 @kernel
 def _corners(w, count, data, start, size):
-    """The four corners of `h`, where `u` and its slopes will lie."""
+    """Read the four corners of `h` to the place where `u` and its slopes will lie."""
     row = 4 * (4 * size + 1)
     for i in range(count):
         p = start + int(w[_PLACE + i])
@@ -66,7 +66,7 @@ def _corner(w, c, i, a, b):
 
 @kernel
 def _slope_row(corner, frame, moving, c):
-    """A row of `du/dV_S`; that of the ellipsoid at rest."""
+    """Return a row of `du/dV_S`; that of the ellipsoid at rest."""
     radial, polar, azimuth = frame
     x = corner[0] * radial[0] + corner[1] * polar[0] + corner[2] * azimuth[0]
     y = corner[0] * radial[1] + corner[1] * polar[1] + corner[2] * azimuth[1]
@@ -80,7 +80,7 @@ def _slope_row(corner, frame, moving, c):
 
 @kernel
 def _bilinear_one(w, i, a, b):
-    """`u` in a slot; its speed and on which side of the equator it lies."""
+    """Return `u` of a slot, its speed, and the twist mirrored to the positive side of the equator."""
     twist = slot(w, TWIST, i)
     v, mirror = norm(twist), xp.where(twist[2] < 0.0, -1.0, 1.0)
     h = _corner(w, 0, i, a, b)[0], _corner(w, 1, i, a, b)[0], _corner(w, 2, i, a, b)[0]
@@ -89,14 +89,14 @@ def _bilinear_one(w, i, a, b):
 
 @kernel
 def _bilinear(w, count):
-    """`u` from the corners."""
+    """Compute `u` from the corners."""
     for i in range(count):
         put_slot(w, _SLIDING, i, _bilinear_one(w, i, w[_PLACE + SLOTS + i], w[_PLACE + 2 * SLOTS + i])[0])
 
 
 @kernel
 def _bilinear_slopes(w, count, size):
-    """`u` and its Jacobian from the corners."""
+    """Compute `u` and its Jacobian from the corners."""
     for i in range(count):
         a, b, polar = slot(w, _PLACE + SLOTS, i)
         u, v, (x, y, s) = _bilinear_one(w, i, a, b)
@@ -112,7 +112,7 @@ def _bilinear_slopes(w, count, size):
 
 @kernel
 def _surface(w, count, surface, data, slopes, j):
-    """`u` and, with `slopes`, its Jacobian for all slots; `j` [9]: scratch."""
+    """Compute `u` and, with `slopes`, its Jacobian for all slots; `j` [9]: scratch."""
     kind, start, size = surface[0], surface[1], surface[2]
     if kind == BILINEAR:
         _places(w, count, size)
@@ -159,7 +159,7 @@ def _prepare(w, own, inputs, lanes, steps, slopes):
 @kernel
 def _step(w, contact, c, z, dt):
     twist = slot(w, TWIST, c)
-    return linearise(contact, Held(twist, w[OMEGA + c], norm(twist), slot(w, _SLIDING, c)), z, dt)
+    return taped_step(contact, HeldTwist(twist, w[OMEGA + c], norm(twist), slot(w, _SLIDING, c)), z, dt)
 
 
 @kernel

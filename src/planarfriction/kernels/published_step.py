@@ -32,7 +32,7 @@ NAMES = (*LawNumbers._fields, *Shape._fields)
 shape_of = reader(Shape)
 
 
-class Held(NamedTuple):
+class HeldTwist(NamedTuple):
     """Twist of a step, and what follows from it alone."""
 
     twist: tuple
@@ -43,10 +43,10 @@ class Held(NamedTuple):
     u: tuple
 
 
-class Step(NamedTuple):
+class PublishedStep(NamedTuple):
     """A step and the tape of its derivatives."""
 
-    held: Held
+    held: HeldTwist
     tape: tuple
     new: tuple
     """State after the step."""
@@ -63,16 +63,16 @@ def scaled_twist(shape, twist):
 
 @kernel
 def hold(contact, twist):
-    """Return `Held` at a twist."""
+    """Return `HeldTwist` at a twist."""
     surface, scaled = contact.surface, scaled_twist(contact.shape, twist)
     v = norm(scaled)
     u = sliding(surface[0], contact.data, surface[1], surface[2], scaled[0], scaled[1], scaled[2], v)
-    return Held(scaled, twist[2], v, u)
+    return HeldTwist(scaled, twist[2], v, u)
 
 
 @kernel
 def hold_slopes(contact, twist, work):
-    """Return `Held`, and `du/dV_S` row by row."""
+    """Return `HeldTwist`, and `du/dV_S` row by row."""
     held, surface, j = hold(contact, twist), contact.surface, work
     x, y, s = held.twist
     sliding_jacobian(surface[0], contact.data, surface[1], surface[2], x, y, s, held.v, j)
@@ -103,10 +103,10 @@ _forth, _back = DERIVATIVE.forth, DERIVATIVE.back
 
 
 @kernel
-def linearise(contact, held, z, dt):
-    """Return `Step` from the raw state z."""
+def taped_step(contact, held, z, dt):
+    """Return `PublishedStep` from the raw state z."""
     (new, wrench), tape = _forth(contact.law, contact.shape, held.twist, held.omega, held.u, z, dt)
-    return Step(held, tape, new, wrench)
+    return PublishedStep(held, tape, new, wrench)
 
 
 @kernel
@@ -128,13 +128,13 @@ def pull_back(contact, step, slopes, new, wrench):
 # ---------------------------------------------------------------------- bound to this model
 
 
-MODEL = StepModel(shape_of, doubles, hold, hold_slopes, linearise, pull_back)
+MODEL = StepModel(shape_of, doubles, hold, hold_slopes, taped_step, pull_back)
 step = bind(rollouts.step, MODEL, "published_step", entry)
 
 
 @functools.cache
 def step_address() -> int:
-    """Where `step` is in this process."""
+    """Return the address of `step` in this process."""
     return address_of(step, "pppp")
 
 

@@ -1,7 +1,8 @@
 """Steps of models of three states as Python calls them, where every check in Python would take longer than they do.
 
 Each checks what it is given, and answers false where that is not in order; of types that it was not compiled for it
-says so for free (`rollouts.UNFIT`). Places are those of parts (`rollouts.Place`), a row of words for each, flat.
+says so for free (`rollouts.UNFIT`). Places are the
+`rollouts.PartAddresses` of the parts, a row of words for each, flat.
 """
 
 from __future__ import annotations
@@ -16,10 +17,10 @@ from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import entry, jit, kernel
 from planarfriction.compiler.calls import address, address_of, call
 from planarfriction.compiler.memory import at, doubles, integers, reader, size_of
-from planarfriction.kernels.rollouts import Place
+from planarfriction.kernels.rollouts import PartAddresses
 
-_place = reader(Place)
-_WORDS = size_of(Place)
+_place = reader(PartAddresses)
+_WORDS = size_of(PartAddresses)
 
 JACOBIAN = "pppfp"
 """Arguments of the functions `..._jacobian` of `step_slopes`, which `jacobians` calls."""
@@ -35,7 +36,7 @@ def _in_order(row, n):
 
 @jit
 def step_many(places, z, twist, load, dt, new, wrench, scratch):
-    """Steps of B contacts of P parts each: `z`, `new` [B, 3 P], `twist`, `wrench` [B, 3], `load`, `dt` [B or 1].
+    """Step B contacts of P parts: `z`, `new` [B, 3 P], `twist`, `wrench` [B, 3], `load`, `dt` [B or 1].
 
     `scratch` [14].
     """
@@ -68,7 +69,7 @@ def step_many(places, z, twist, load, dt, new, wrench, scratch):
 
 @entry
 def jacobians(places, parts, z, given, result):
-    """Derivatives of a step of one contact with the state z [3 P] and `given` twist, load and dt [5].
+    """Write derivatives of a step of one contact with the state z [3 P] and `given` twist, load and dt [5].
 
     Into `result` go, one behind the other: new state by state [P, 3, 3] and by twist [P, 3, 3], wrench by state
     [3, P, 3], by twist [3, 3] and by load [3]; the last 42 of its `NUMBERS` are scratch.
@@ -97,7 +98,7 @@ NUMBERS = 54
 
 @functools.cache
 def jacobians_address() -> int:
-    """Where `jacobians` is in this process."""
+    """Return the address of `jacobians` in this process."""
     return address_of(jacobians, "ppppp")
 
 
@@ -106,7 +107,7 @@ def jacobians_address() -> int:
 
 @jit
 def jacobians_one(places, z, vx, vy, omega, load, dt, result):
-    """`jacobians` of one contact, into `result` [27 P + NUMBERS + 5]."""
+    """Write `jacobians` of one contact to `result` [27 P + NUMBERS + 5]."""
     parts = (places.shape[0] - 1) // _WORDS
     valid = xp.in_range(vx) and xp.in_range(vy) and xp.in_range(omega) and xp.in_range(load) and xp.in_range(dt)
     if not (valid and load >= 0.0 and dt >= 0.0 and z.shape[0] == 3 * parts and _in_order(z, 3 * parts)):
@@ -120,7 +121,7 @@ def jacobians_one(places, z, vx, vy, omega, load, dt, result):
 
 @jit
 def jacobians_many(places, z, given, result):
-    """`jacobians` of B contacts: z [B, 3 P], given [B, 5], result [B, 27 P + NUMBERS]."""
+    """Write `jacobians` of B contacts: z [B, 3 P], given [B, 5], result [B, 27 P + NUMBERS]."""
     parts, function = (places.shape[0] - 1) // _WORDS, integers(address(places, 0))[0]
     for b in range(z.shape[0]):
         own = address(z, 3 * parts * b), address(given, 5 * b), address(result, result.shape[1] * b)

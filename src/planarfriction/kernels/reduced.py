@@ -18,17 +18,8 @@ from planarfriction.compiler import kernel
 
 
 @kernel
-def wrench(law, shape, zx, zy, zs, dx, dy, ds, x, y, s):
-    """Wrench about the origin from state, rate and twist in scaled coordinates."""
-    gx = formulas.traction(zx, dx, x, law)
-    gy = formulas.traction(zy, dy, y, law)
-    gs = formulas.traction(zs, ds, s, law)
-    return to_origin(shape, gx, gy, gs)
-
-
-@kernel
 def to_origin(shape, gx, gy, gs):
-    """`F' g`."""
+    """Return `F' g`."""
     return shape[0] * gx, shape[1] * gx + shape[3] * gy, shape[2] * gx + shape[4] * gy + shape[5] * gs
 
 
@@ -37,20 +28,14 @@ def to_origin(shape, gx, gy, gs):
 
 @kernel
 def closure(law, deflection, share, even):
-    """`beta` of a state z: `deflection = |z|/|z_ss|`, `share` = s, `even`: its evenness."""
+    """Return `beta` of a state z: `deflection = |z|/|z_ss|`, `share` = s, `even`: its evenness."""
     cosine = share / xp.where(deflection > 0.0, deflection, 1.0)
     return formulas.slip_share(xp, deflection, cosine, even, law)
 
 
 @kernel
 def closure_partials(law, deflection, share, even):
-    """`beta` and its partial derivatives with respect to `deflection`, `share` and the breakaway `s_ba even`."""
+    """Return `beta` and its partial derivatives with respect to `deflection`, `share` and the breakaway `s_ba even`."""
     per = xp.where(deflection > 0.0, 1.0 / xp.where(deflection > 0.0, deflection, 1.0), 0.0)
     beta, by_deflection, by_cosine, by_breakaway = formulas.slip_share_partials(xp, deflection, share * per, even, law)
     return beta, by_deflection - by_cosine * share * per * per, by_cosine * per, by_breakaway
-
-
-@kernel
-def part_rate(beta, share, decay, z, u, q):
-    """One component of `z'`."""
-    return u - beta * (decay * z + share * (u - decay * q))

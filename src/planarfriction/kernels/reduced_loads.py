@@ -16,33 +16,43 @@ from planarfriction.kernels.bind import bind
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.reduced import to_origin
 from planarfriction.kernels.reduced_contact import Shape
-from planarfriction.kernels.reduced_step import Held, Quartic, Step, cotangents, hold, shape_of, through_steady
+from planarfriction.kernels.reduced_step import (
+    Quartic,
+    ReducedStep,
+    SteadyTwist,
+    cotangents,
+    hold,
+    shape_of,
+    through_steady,
+)
 from planarfriction.kernels.rollouts import StepModel
 from planarfriction.kernels.steady import FAR, STILL, blended, fourth_change, fourth_moments, scaled_twist
 from planarfriction.kernels.vectors import dot, norm
 
 
-class Slopes(NamedTuple):
-    """Slopes of the steady state, and what those by the shape take."""
+class BlendSlopes(NamedTuple):
+    """BlendSlopes of the steady state, and what those by the shape take."""
 
     held: tuple
-    """`reduced_step.Slopes`"""
+    """`reduced_step.SteadySlopes`"""
     q_blend: tuple
     twist: tuple
 
 
 @kernel
 def hold_slopes(contact, twist, work):
-    """`Held` and `Slopes` at a twist; none at rest, where they have no effect."""
+    """Return `SteadyTwist` and `BlendSlopes` at a twist; none at rest, where they have no effect."""
     law, shape = contact.law, contact.shape
     u, none = scaled_twist(shape, twist[0], twist[1], twist[2]), (0.0, 0.0, 0.0)
     v = norm(u)
     if v > STILL:
         found, q_blend = blended(law, shape, contact.surface, contact.data, u, v)
-        slopes = reduced_step.Slopes(found.by_u, found.by_mu_c, found.by_mu_s, found.by_v_s)
-        return Held(u, v, found.q), Slopes(slopes, q_blend, twist)
+        slopes = reduced_step.SteadySlopes(found.by_u, found.by_mu_c, found.by_mu_s, found.by_v_s)
+        return SteadyTwist(u, v, found.q), BlendSlopes(slopes, q_blend, twist)
     still = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    return Held(none, 0.0, (FAR, 0.0, 0.0)), Slopes(reduced_step.Slopes(still, none, none, none), none, twist)
+    return SteadyTwist(none, 0.0, (FAR, 0.0, 0.0)), BlendSlopes(
+        reduced_step.SteadySlopes(still, none, none, none), none, twist
+    )
 
 
 _DERIVATIVE = derive(reduced_step.advance_alone, (*reduced_step.BY, "quartic.blend"), ("z", "u", "q"))
@@ -50,12 +60,12 @@ _forth, _back = _DERIVATIVE.forth, _DERIVATIVE.back
 
 
 @kernel
-def linearise(contact, held, z, dt):
-    """Return `reduced_step.Step` from the state z."""
+def taped_step(contact, held, z, dt):
+    """Return `reduced_step.ReducedStep` from the state z."""
     shape, surface, data = contact.shape, contact.surface, contact.data
     quartic = Quartic(fourth_moments(shape, surface, data), fourth_change(surface, data), shape[6])
     (new, traction), tape = _forth(contact.law, quartic, held.u, held.q, z, dt)
-    return Step(held, tape, new, traction, to_origin(shape, *traction))
+    return ReducedStep(held, tape, new, traction, to_origin(shape, *traction))
 
 
 @kernel
@@ -75,7 +85,7 @@ def pull_back(contact, step, slopes, new, wrench):
 
 # ---------------------------------------------------------------------- bound to this model
 
-_MODEL = StepModel(shape_of, floats, hold, hold_slopes, linearise, pull_back)
+_MODEL = StepModel(shape_of, floats, hold, hold_slopes, taped_step, pull_back)
 rollout = bind(rollouts.rollout, _MODEL, "reduced_rollout", jit)
 gradient = bind(rollouts.gradient, _MODEL, "reduced_gradient", jit)
 sensitivities = bind(rollouts.sensitivities, _MODEL, "reduced_sensitivities", jit)

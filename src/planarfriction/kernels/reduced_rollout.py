@@ -29,14 +29,14 @@ from planarfriction.kernels.lanes import (
 from planarfriction.kernels.law import LAW, LawNumbers
 from planarfriction.kernels.reduced import to_origin
 from planarfriction.kernels.reduced_contact import Shape
-from planarfriction.kernels.reduced_step import NAMES, Held, Quartic, Slopes, advance, pull_back, step_of
+from planarfriction.kernels.reduced_step import NAMES, Quartic, SteadySlopes, SteadyTwist, advance, pull_back, step_of
 from planarfriction.kernels.rollouts import Contact
 from planarfriction.kernels.steady import (
     FAR,
     QUARTIC,
     STILL,
     Head,
-    Places,
+    MapSquares,
     Readings,
     combined,
     evenness,
@@ -99,7 +99,7 @@ def _scaled(own, c, twist):
 
 @kernel
 def _moving(w, i):
-    """A twist that moves, and its speed: any for a patch at rest."""
+    """Return a twist that moves, and its speed: any for a patch at rest."""
     (x, y, s), v = slot(w, TWIST, i), w[_SPEED + i]
     moves = v > 0.0
     return (xp.where(moves, x, 1.0), y, s), xp.where(moves, v, 1.0)
@@ -118,7 +118,7 @@ def _put_four(w, field, i, a):
 
 @kernel
 def _place(w, i, own, c, slopes, squared):
-    """Where the twist of a slot lies in the map; `squared`: its exponent is 2."""
+    """Find the place of a slot's twist in the map; `squared`: its exponent is 2."""
     twist, head = slot(w, TWIST, i), _head(own, c)
     v = norm(twist)
     moves = v > STILL
@@ -138,11 +138,11 @@ def _place(w, i, own, c, slopes, squared):
 
 @kernel
 def _look(w, i, own, c, data, slopes):
-    """What the map holds there."""
+    """Read the map at the place of a slot."""
     weights = gathered(w, _WEIGHTS + i, SLOTS, 4)
     changes = gathered(w, _WEIGHT_SLOPES + i, SLOTS, 4) if slopes else (0.0, 0.0, 0.0, 0.0)
     flat, rest = Square(*slot(w, _FLAT_PLACE, i)), Square(*slot(w, _REST_PLACE, i))
-    read = readings(data, _head(own, c), Places(flat, rest, 0.0, weights, changes))
+    read = readings(data, _head(own, c), MapSquares(flat, rest, 0.0, weights, changes))
     put_slot(w, _FLAT, i, read.flat)
     put_slot(w, _REST, i, read.rest)
     if slopes:
@@ -166,7 +166,7 @@ def _read(w, i, slopes):
 
 @kernel
 def _finish(w, i, own, c, slopes):
-    """The steady state of a slot and its slopes."""
+    """Write the steady state of a slot and its slopes."""
     contact, head = _contact(own, c), _head(own, c)
     (u, v), moves = _moving(w, i), w[_SPEED + i] > 0.0
     spot, t = cube.locate(u[0], u[1], head.stretch * u[2], head.faces), w[_T + i]
@@ -208,7 +208,7 @@ def _finish_row(w, own, lanes, slopes):
 
 @kernel
 def _prepare(w, own, inputs, lanes, steps, slopes):
-    """Steady states of all slots: in vector code over the lanes, or over the steps of a single one."""
+    """Compute steady states of all slots: in vector code over the lanes, or over the steps of a single one."""
     alone, squared = np.int64(0), True
     for c in range(lanes):
         squared = squared and _head(own, c).gamma == 2.0
@@ -232,7 +232,7 @@ def _prepare(w, own, inputs, lanes, steps, slopes):
 
 @kernel
 def _held(w, c):
-    return Held(slot(w, TWIST, c), w[_SPEED + c], slot(w, _STEADY, c))
+    return SteadyTwist(slot(w, TWIST, c), w[_SPEED + c], slot(w, _STEADY, c))
 
 
 @kernel
@@ -248,7 +248,7 @@ def _advance(w, own, c, z, none, dt):
 def _retreat(w, own, c, z, dt, new, pull):
     contact, m = _contact(own, c), gathered(w, _BY_X + c, SLOTS, 18)
     step = step_of(contact, _fourth(own, c), _held(w, c), z, dt)
-    return step.wrench, pull_back(contact, step, Slopes(m[:9], m[9:12], m[12:15], m[15:]), new, pull)
+    return step.wrench, pull_back(contact, step, SteadySlopes(m[:9], m[9:12], m[12:15], m[15:]), new, pull)
 
 
 _MODEL = LaneModel(_begin, _scaled, _prepare, _advance, _retreat, _END, _OWN)

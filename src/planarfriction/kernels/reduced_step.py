@@ -41,7 +41,7 @@ NAMES = (*LawNumbers._fields, *Shape._fields)
 shape_of = reader(Shape)
 
 
-class Held(NamedTuple):
+class SteadyTwist(NamedTuple):
     """Scaled twist of a step and its steady state."""
 
     u: tuple
@@ -50,8 +50,8 @@ class Held(NamedTuple):
     q: tuple
 
 
-class Slopes(NamedTuple):
-    """Slopes of the steady state."""
+class SteadySlopes(NamedTuple):
+    """SteadySlopes of the steady state."""
 
     q_u: tuple
     """By u, row by row."""
@@ -66,14 +66,14 @@ class Quartic(NamedTuple):
     rows: tuple
     """Coefficients of `<u^4>` (see `steady.fourth_moments`)."""
     change: tuple
-    """Slopes of the coefficients by the blend of two maps."""
+    """SteadySlopes of the coefficients by the blend of two maps."""
     blend: float
 
 
-class Step(NamedTuple):
+class ReducedStep(NamedTuple):
     """A step and the tape of its derivatives."""
 
-    held: Held
+    held: SteadyTwist
     tape: tuple
     new: tuple
     """State after the step."""
@@ -85,24 +85,24 @@ class Step(NamedTuple):
 
 @kernel
 def hold(contact, twist):
-    """Return `Held` at a twist."""
+    """Return `SteadyTwist` at a twist."""
     vx, vy, omega = twist
     x, y, s, v, qx, qy, qs = sliding(contact.law, vx, vy, omega, contact.shape, contact.surface, contact.data)
-    return Held((x, y, s), v, (qx, qy, qs))
+    return SteadyTwist((x, y, s), v, (qx, qy, qs))
 
 
 @kernel
 def hold_slopes(contact, twist, work):
-    """Return `Held` and `Slopes` at a twist; none at rest, where they have no effect."""
+    """Return `SteadyTwist` and `SteadySlopes` at a twist; none at rest, where they have no effect."""
     law, shape, surface, data = contact.law, contact.shape, contact.surface, contact.data
     vx, vy, omega = twist
     u = scaled_twist(shape, vx, vy, omega)
     v, none = norm(u), (0.0, 0.0, 0.0)
     if v > STILL:
         found = steady.steady(law, shape, surface, data, u, v)
-        return Held(u, v, found.q), Slopes(found.by_u, found.by_mu_c, found.by_mu_s, found.by_v_s)
+        return SteadyTwist(u, v, found.q), SteadySlopes(found.by_u, found.by_mu_c, found.by_mu_s, found.by_v_s)
     still = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    return Held(none, 0.0, (FAR, 0.0, 0.0)), Slopes(still, none, none, none)
+    return SteadyTwist(none, 0.0, (FAR, 0.0, 0.0)), SteadySlopes(still, none, none, none)
 
 
 # ---------------------------------------------------------------------- the step
@@ -191,17 +191,17 @@ _forth, _back = DERIVATIVE.forth, DERIVATIVE.back
 
 
 @kernel
-def linearise(contact, held, z, dt):
-    """Return `Step` from the state z."""
+def taped_step(contact, held, z, dt):
+    """Return `ReducedStep` from the state z."""
     rows = fourth_moments(contact.shape, contact.surface, contact.data)
     return step_of(contact, rows, held, z, dt)
 
 
 @kernel
 def step_of(contact, rows, held, z, dt):
-    """Return `Step` from the state z, with the coefficients `rows` of `<u^4>`."""
+    """Return `ReducedStep` from the state z, with the coefficients `rows` of `<u^4>`."""
     (new, traction), tape = _forth(contact.law, Quartic(rows, rows, 0.0), held.u, held.q, z, dt)
-    return Step(held, tape, new, traction, to_origin(contact.shape, *traction))
+    return ReducedStep(held, tape, new, traction, to_origin(contact.shape, *traction))
 
 
 @kernel
@@ -232,11 +232,11 @@ def pull_back(contact, step, slopes, new, wrench):
 # ---------------------------------------------------------------------- bound to this model
 
 
-MODEL = StepModel(shape_of, floats, hold, hold_slopes, linearise, pull_back)
+MODEL = StepModel(shape_of, floats, hold, hold_slopes, taped_step, pull_back)
 step = bind(rollouts.step, MODEL, "reduced_step", entry)
 
 
 @functools.cache
 def step_address() -> int:
-    """Where `step` is in this process."""
+    """Return the address of `step` in this process."""
     return address_of(step, "pppp")

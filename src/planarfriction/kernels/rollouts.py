@@ -6,7 +6,7 @@ are compiled into it: with a contact `c`, a twist V, a state z and a step dt,
 - `shape_of(row)`: the shape, from the numbers behind those of the law;
 - `hold(c, V)`: what a step holds that does not depend on z;
 - `hold_slopes(c, V, work)`: that, and its slopes;
-- `linearise(c, held, z, dt)`: the step, with `new` state and `wrench` per unit load;
+- `taped_step(c, held, z, dt)`: the step, with `new` state and `wrench` per unit load;
 - `pull_back(c, step, slopes, new, wrench)`: `Cotangents` of z, V and the contact's numbers from those of the new state
   and of the wrench.
 
@@ -46,7 +46,7 @@ class StepModel(NamedTuple):
     """Address of the numbers of a limit surface or map, as doubles or in single precision."""
     hold: Any
     hold_slopes: Any
-    linearise: Any
+    taped_step: Any
     pull_back: Any
 
 
@@ -110,7 +110,7 @@ class Cotangents(NamedTuple):
 
 @kernel
 def _part(shape_of, inputs, row, p, at):
-    """Part p as it is at one of the loads."""
+    """Return the part p as it is at one of the loads."""
     surface, shape = inputs.surface[p, at], plus(shape_of(row[LAW:]), 1.0, shape_of(inputs.shapes[p, at]))
     return Contact(law_of(row), shape, (surface[0], surface[1], surface[2]), inputs.data)
 
@@ -122,13 +122,13 @@ def _add(row, a):
 
 @kernel
 def row_of(values, b):
-    """Which row of `values` belongs to contact b: its own, or the one that all share."""
+    """Return the row of `values` for contact b: its own, or the one that all share."""
     return b if values.shape[0] > 1 else 0
 
 
 @kernel
 def _weighed(wrench, load):
-    """The wrench of a load; zero without, whatever it is per unit load."""
+    """Return the wrench of a load; zero without, whatever it is per unit load."""
     return times(load, wrench) if load != 0.0 else (0.0, 0.0, 0.0)
 
 
@@ -140,8 +140,8 @@ def _weighed(wrench, load):
 
 
 @kernel
-def step(shape_of, numbers_at, hold, linearise, row, data, inputs, out):
-    """A step of one contact: `inputs` are its z, twist, load and dt [8], `out` the new state and the wrench [6].
+def step(shape_of, numbers_at, hold, taped_step, row, data, inputs, out):
+    """Step one contact: `inputs` are its z, twist, load and dt [8], `out` the new state and the wrench [6].
 
     All are addresses; `numbers_at(data)` are the numbers of the surface. Behind law and shape the row holds the three
     of `Contact.surface`.
@@ -150,13 +150,13 @@ def step(shape_of, numbers_at, hold, linearise, row, data, inputs, out):
     last, given, out = doubles(at(row, LAW + len(shape))), doubles(inputs), doubles(out)
     contact = Contact(law_of(row), shape, (int(last[0]), int(last[1]), int(last[2])), numbers_at(data))
     z, twist, load = (given[0], given[1], given[2]), (given[3], given[4], given[5]), given[6]
-    result = linearise(contact, hold(contact, twist), z, given[7])
+    result = taped_step(contact, hold(contact, twist), z, given[7])
     new, wrench = result.new if load != 0.0 else (0.0, 0.0, 0.0), _weighed(result.wrench, load)
     out[0], out[1], out[2] = new
     out[3], out[4], out[5] = wrench
 
 
-class Place(NamedTuple):
+class PartAddresses(NamedTuple):
     """Where compiled code finds a part of a contact: addresses of the model's `step`, and of its row and data."""
 
     step: int
@@ -166,13 +166,13 @@ class Place(NamedTuple):
     """Of the load."""
 
 
-_place = reader(Place)
-_WORDS = size_of(Place)
+_place = reader(PartAddresses)
+_WORDS = size_of(PartAddresses)
 
 
 @jit
 def step_one(places, z, vx, vy, omega, load, dt, result):
-    """A step of one contact whose P parts are at the `places`, a row of words for each, flat; false for invalid inputs.
+    """Step one contact of P parts at the `places`, a row of words for each, flat; return False for invalid inputs.
 
     `z` [3 P]. New state and wrench go into the first of `result` [3 P + 11]: each part writes its wrench where the next
     one's state comes. Called from Python: every argument costs a quarter of a microsecond on the way in.
@@ -222,8 +222,8 @@ def compile_step_one() -> None:
 
 
 @kernel
-def rollout(shape_of, hold, linearise, inputs, span, z, wrench, states):
-    """See `lanes.rollout`, but that the wrenches are added to what is in `wrench`."""
+def rollout(shape_of, hold, taped_step, inputs, span, z, wrench, states):
+    """Roll out contacts as `lanes.rollout` does, but add the wrenches to what is in `wrench`."""
     steps, kept = inputs.dt.shape[0], states.shape[2] > 0
     for b in range(span[0], span[1]):
         twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
@@ -235,15 +235,15 @@ def rollout(shape_of, hold, linearise, inputs, span, z, wrench, states):
                 if kept:
                     put(states[p, b, t], own)
                 load, contact = loads[t], _part(shape_of, inputs, row, p, which[t])
-                step = linearise(contact, hold(contact, three(twists[t])), own, inputs.dt[t])
+                step = taped_step(contact, hold(contact, three(twists[t])), own, inputs.dt[t])
                 own = step.new if load != 0.0 else (0.0, 0.0, 0.0)
                 _add(wrench[b, t], _weighed(step.wrench, inputs.shares[p, which[t]] * load))
             put(z[p, b], own)
 
 
 @kernel
-def _gradient(shape_of, hold_slopes, linearise, pull_back, inputs, states, wrench_bar, span, bars, work):
-    """See `lanes.gradient`, but that the cotangents are added to what is in `bars`."""
+def _gradient(shape_of, hold_slopes, taped_step, pull_back, inputs, states, wrench_bar, span, bars, work):
+    """Compute what `lanes.gradient` does, but add the cotangents to what is in `bars`."""
     for b in range(span[0], span[1]):
         twists, loads = inputs.twist[row_of(inputs.twist, b)], inputs.load[row_of(inputs.load, b)]
         which, pulls = inputs.which[row_of(inputs.which, b)], wrench_bar[row_of(wrench_bar, b)]
@@ -254,7 +254,7 @@ def _gradient(shape_of, hold_slopes, linearise, pull_back, inputs, states, wrenc
                 load, at, pull, slopes = loads[t], which[t], three(pulls[t]), inputs.by_load[p, which[t]]
                 share, contact = inputs.shares[p, at], _part(shape_of, inputs, row, p, at)
                 held, known = hold_slopes(contact, three(twists[t]), work)
-                step = linearise(contact, held, three(before[t]), inputs.dt[t])
+                step = taped_step(contact, held, three(before[t]), inputs.dt[t])
                 new = times(0.0 if load == 0.0 else 1.0, own)
                 bar = pull_back(contact, step, known, new, times(share * load, pull))
                 own = bar.state
@@ -266,24 +266,24 @@ def _gradient(shape_of, hold_slopes, linearise, pull_back, inputs, states, wrenc
 
 
 @template
-def gradient(shape_of, hold_slopes, linearise, pull_back, inputs, states, wrench_bar, span, bars):
-    """See `_gradient`."""
+def gradient(shape_of, hold_slopes, taped_step, pull_back, inputs, states, wrench_bar, span, bars):
+    """Allocate the scratch of `_gradient` and run it."""
     work = np.empty(SCRATCH)
-    _gradient(shape_of, hold_slopes, linearise, pull_back, inputs, states, wrench_bar, span, bars, work)
+    _gradient(shape_of, hold_slopes, taped_step, pull_back, inputs, states, wrench_bar, span, bars, work)
 
 
 # ---------------------------------------------------------------------- derivatives
 
 
 @kernel
-def _jacobian(hold_slopes, linearise, pull_back, contact, z, twist, loads, dt, work, out):
-    """Derivatives of the new state and of the wrench (6 rows) into `out` [6, 7 + N]; returns the step.
+def _jacobian(hold_slopes, taped_step, pull_back, contact, z, twist, loads, dt, work, out):
+    """Write derivatives of the new state and of the wrench (6 rows) to `out` [6, 7 + N]; return the step.
 
     Columns: state (3), twist (3), load with the shape held, and the N numbers of the contact. `loads`: 0 where there is
     none, else 1; that of the contact; its slope.
     """
     held, slopes = hold_slopes(contact, twist, work)
-    step = linearise(contact, held, z, dt)
+    step = taped_step(contact, held, z, dt)
     loaded, load, heavier = loads
     for i in range(6):
         unit = (1.0 if i % 3 == 0 else 0.0), (1.0 if i % 3 == 1 else 0.0), (1.0 if i % 3 == 2 else 0.0)
@@ -300,7 +300,7 @@ def _jacobian(hold_slopes, linearise, pull_back, contact, z, twist, loads, dt, w
 
 @kernel
 def _loads(inputs, load, p, at):
-    """`loads` of `_jacobian` for a part."""
+    """Return `loads` of `_jacobian` for a part."""
     share, by_load = inputs.shares[p, at], inputs.by_load[p, at]
     return (0.0 if load == 0.0 else 1.0), share * load, share + load * by_load[by_load.shape[0] - 1]
 
@@ -325,7 +325,7 @@ def _along(here, i, d, inputs, changes, b, t, follows):
 
 
 @kernel
-def _forward(shape_of, hold_slopes, linearise, pull_back, seed, inputs, span, z, given, moved, results, work):
+def _forward(shape_of, hold_slopes, taped_step, pull_back, seed, inputs, span, z, given, moved, results, work):
     """Roll-outs with their changes along D directions, forward in time: `dz' = d new/dz dz + seed`.
 
     `seed(here, i, d, inputs, given, b, t, follows)` is the part of the change of row i that does not come from the
@@ -343,7 +343,7 @@ def _forward(shape_of, hold_slopes, linearise, pull_back, seed, inputs, span, z,
                 load, at, contact = loads[t], which[t], _part(shape_of, inputs, row, p, which[t])
                 weights, twist = _loads(inputs, load, p, at), three(twists[t])
                 step = _jacobian(
-                    hold_slopes, linearise, pull_back, contact, own, twist, weights, inputs.dt[t], scratch, here
+                    hold_slopes, taped_step, pull_back, contact, own, twist, weights, inputs.dt[t], scratch, here
                 )
                 own = step.new if load != 0.0 else (0.0, 0.0, 0.0)
                 _add(wrenches[b, t], _weighed(step.wrench, weights[1]))
@@ -359,16 +359,16 @@ def _forward(shape_of, hold_slopes, linearise, pull_back, seed, inputs, span, z,
 
 
 @template
-def sensitivities(shape_of, hold_slopes, linearise, pull_back, inputs, span, z, columns, wrenches, slopes):
+def sensitivities(shape_of, hold_slopes, taped_step, pull_back, inputs, span, z, columns, wrenches, slopes):
     """Roll-outs with the derivatives of the wrenches by the numbers `columns` [D]; see `_forward`."""
     work = np.empty(SCRATCH), np.empty((6, 7 + inputs.rows.shape[2]))
     moved = np.zeros((inputs.shares.shape[0], z.shape[1], 3, columns.shape[0]))
     results = wrenches, slopes
-    _forward(shape_of, hold_slopes, linearise, pull_back, _by_number, inputs, span, z, columns, moved, results, work)
+    _forward(shape_of, hold_slopes, taped_step, pull_back, _by_number, inputs, span, z, columns, moved, results, work)
 
 
 @template
-def tangent(shape_of, hold_slopes, linearise, pull_back, inputs, span, z, changes, wrenches, slopes):
+def tangent(shape_of, hold_slopes, taped_step, pull_back, inputs, span, z, changes, wrenches, slopes):
     """Roll-outs with their change along given ones of the inputs; see `_forward`.
 
     `changes` of the inputs: as `Bars`, one row where all contacts share one; that of the state in place.
@@ -376,4 +376,4 @@ def tangent(shape_of, hold_slopes, linearise, pull_back, inputs, span, z, change
     work = np.empty(SCRATCH), np.empty((6, 7 + inputs.rows.shape[2]))
     parts, count, steps = inputs.shares.shape[0], z.shape[1], inputs.dt.shape[0]
     moved, results = changes.state.reshape(parts, count, 3, 1), (wrenches, slopes.reshape(count, steps, 3, 1))
-    _forward(shape_of, hold_slopes, linearise, pull_back, _along, inputs, span, z, changes, moved, results, work)
+    _forward(shape_of, hold_slopes, taped_step, pull_back, _along, inputs, span, z, changes, moved, results, work)

@@ -45,7 +45,7 @@ def per(x):
 
 @kernel
 def _power_slope(x, exponent, raised):
-    """Derivative of `x^exponent` by x; at 0 the right-hand limit for exponents >= 1."""
+    """Return the derivative of `x^exponent` by x; at 0 the right-hand limit for exponents >= 1."""
     return xp.where(x > 0.0, exponent * raised * per(x), xp.where(exponent == 1.0, 1.0, 0.0))
 
 
@@ -57,7 +57,7 @@ def _log(x):
 
 @kernel
 def _slip_slope(deflection, breakaway):
-    """Derivative of `formulas.slip_fraction` by the deflection, exactly zero before breakaway and at full deflection.
+    """Return the derivative of `slip_fraction` by the deflection, zero before breakaway and at full deflection.
 
     It is multiplied by how far a long step would have gone, 1e9, or by one over hardly any deflection.
     """
@@ -67,7 +67,7 @@ def _slip_slope(deflection, breakaway):
 
 @kernel
 def _slip_by_breakaway(deflection, breakaway):
-    """Derivative of `formulas.slip_fraction` by the breakaway ratio."""
+    """Return the derivative of `formulas.slip_fraction` by the breakaway ratio."""
     return formulas.bristle_decay_by_breakaway(xp, _slip_slope(deflection, breakaway), deflection, breakaway)
 
 

@@ -44,13 +44,13 @@ HEADER = QUARTIC + 15
 
 @kernel
 def scaled_twist(shape, vx, vy, omega):
-    """`V_G = F V`."""
+    """Return `V_G = F V`."""
     return shape[0] * vx + shape[1] * vy + shape[2] * omega, shape[3] * vy + shape[4] * omega, shape[5] * omega
 
 
 @kernel
 def number(data, i):
-    """Number i of a map, in double precision."""
+    """Return the number i of a map, in double precision."""
     return np.float64(data[i])
 
 
@@ -84,7 +84,7 @@ class Head(NamedTuple):
 
 @kernel
 def head_of(data, start):
-    """`Head` of the map that begins at `start`."""
+    """Return `Head` of the map that begins at `start`."""
     return Head(
         number(data, start), number(data, start + 1), number(data, start + 2), number(data, start + 3),
         number(data, start + 4), number(data, start + 5), number(data, start + 6), number(data, start + 7),
@@ -103,7 +103,7 @@ class Readings(NamedTuple):
     rest_t: tuple
 
 
-class Places(NamedTuple):
+class MapSquares(NamedTuple):
     """Where to read a map: both parts, of which each `at` counts all data, and t with what belongs to it."""
 
     flat: cube.Square
@@ -115,7 +115,7 @@ class Places(NamedTuple):
 
 @kernel
 def located(law, head, start, u, v):
-    """`Spot` and `Places` of a scaled twist that moves at v, in the map that begins at `start`."""
+    """Return `Spot` and `MapSquares` of a scaled twist that moves at v, in the map that begins at `start`."""
     spot = cube.locate(u[0], u[1], head.stretch * u[2], head.faces)
     t = formulas.stribeck_place(xp, v, law.v_s, head.gamma, head.knee)
     flat, rest = cube.square(spot, head.n), cube.square(spot, head.coarse)
@@ -124,12 +124,12 @@ def located(law, head, start, u, v):
     second = first + head.faces * side * side * cube.NODE
     flat = cube.Square(first + cube.NODE * flat.at, flat.u, flat.v)
     rest = cube.Square(second + cube.NODE * (head.levels * rest.at + level), rest.u, rest.v)
-    return spot, Places(flat, rest, t, weights, slopes)
+    return spot, MapSquares(flat, rest, t, weights, slopes)
 
 
 @kernel
 def readings(data, head, places):
-    """`Readings` of a map."""
+    """Return `Readings` of a map."""
     value, by_a, by_b = cube.read(data, head.n, places.flat)
     rest, rest_a, rest_b, rest_t = cube.read_level(
         data, head.coarse, head.levels, places.rest, places.weights, places.slopes
@@ -139,13 +139,13 @@ def readings(data, head, places):
 
 @kernel
 def _drawn(slope, stretch):
-    """A slope by `(x, y, stretch s)` as one by (x, y, s)."""
+    """Return a slope by `(x, y, stretch s)` as one by (x, y, s)."""
     return slope[0], slope[1], stretch * slope[2]
 
 
 @kernel
 def combined(law, head, u, v, spot, t, read):
-    """`Steady` of one map from its `Readings`, in front of the floor of the dissipation."""
+    """Return `Steady` of one map from its `Readings`, in front of the floor of the dissipation."""
     drop = law.mu_s - law.mu_c
     flat, rest = times(spot.sign, read.flat), times(spot.sign, read.rest)
     by_t = times(drop, plus(times(spot.sign, read.rest_t), -1.0, flat))
@@ -165,7 +165,7 @@ def combined(law, head, u, v, spot, t, read):
 
 @kernel
 def _map(law, data, start, u, v):
-    """`Steady` of one map, in front of the floor of the dissipation."""
+    """Return `Steady` of one map, in front of the floor of the dissipation."""
     head = head_of(data, start)
     spot, places = located(law, head, float(start), u, v)
     return combined(law, head, u, v, spot, places.t, readings(data, head, places))
@@ -185,7 +185,7 @@ def _mixed(one, other, share):
 
 @kernel
 def steady(law, shape, surface, data, u, v):
-    """`Steady` at the scaled twist, which moves at `v > STILL`; its dissipation is never below the least."""
+    """Return `Steady` at the scaled twist, which moves at `v > STILL`; its dissipation is never below the least."""
     # Read in a loop over the maps it would be compiled once, but a step of a fixed shape would take a tenth longer.
     found = _map(law, data, surface[0], u, v)
     if shape[6] > 0.0:
@@ -195,7 +195,7 @@ def steady(law, shape, surface, data, u, v):
 
 @kernel
 def floored(law, u, v, found):
-    """`Steady` with a dissipation that is never below the least, and divided by sigma_0."""
+    """Return `Steady` with a dissipation that is never below the least, and divided by sigma_0."""
     per_v, per, least = 1.0 / v, 1.0 / law.sigma_0, found.least
     n = times(per_v, u)
     power = dot(found.q, n)
@@ -220,7 +220,7 @@ def floored(law, u, v, found):
 
 @kernel
 def blended(law, shape, surface, data, u, v):
-    """`steady`, and the slope of z_ss by the blend, also where that is 0."""
+    """Return `steady`, and the slope of z_ss by the blend, also where that is 0."""
     one = found = _map(law, data, surface[0], u, v)
     change, per = (0.0, 0.0, 0.0), 1.0 / law.sigma_0
     if surface[1] != surface[0]:
@@ -235,7 +235,7 @@ def blended(law, shape, surface, data, u, v):
 
 @kernel
 def steady_slopes(law, shape, surface, data, x, y, s, v, j):
-    """`dz_ss/dV_G` [s] into `j` [9], row by row. Returns `z_ss`."""
+    """Write `dz_ss/dV_G` [s] to `j` [9], row by row, and return `z_ss`."""
     found = steady(law, shape, surface, data, (x, y, s), v)
     for i in range(9):
         j[i] = found.by_u[i]
@@ -244,7 +244,7 @@ def steady_slopes(law, shape, surface, data, x, y, s, v, j):
 
 @kernel
 def _fourth(data, k):
-    """The coefficients of `<u^4>`, row by row."""
+    """Return the coefficients of `<u^4>`, row by row."""
     return (
         (
             number(data, k),
@@ -270,7 +270,7 @@ def _mixed_fourth(one, other, share):
 
 @kernel
 def fourth_moments(shape, surface, data):
-    """The coefficients of `<u^4>` of a shape, row by row."""
+    """Return the coefficients of `<u^4>` of a shape, row by row."""
     rows = _fourth(data, surface[0] + QUARTIC)
     if shape[6] > 0.0:
         rows = _mixed_fourth(rows, _fourth(data, surface[1] + QUARTIC), shape[6])
@@ -279,14 +279,14 @@ def fourth_moments(shape, surface, data):
 
 @kernel
 def fourth_change(surface, data):
-    """The slopes of `fourth_moments` by the blend."""
+    """Return the slopes of `fourth_moments` by the blend."""
     one, other = _fourth(data, surface[0] + QUARTIC), _fourth(data, surface[1] + QUARTIC)
     return plus(other[0], -1.0, one[0]), plus(other[1], -1.0, one[1]), plus(other[2], -1.0, one[2])
 
 
 @kernel
 def uneven(law, fourth, change, z):
-    """The slope of the logarithm of `evenness` where its `fourth` moments change."""
+    """Return the slope of the logarithm of `evenness` where its `fourth` moments change."""
     grip = law.sigma_0 / law.mu_s
     x, y, s = p = times(grip, z)
     square = dot(p, p)
@@ -298,14 +298,14 @@ def uneven(law, fourth, change, z):
 
 @kernel
 def _quartic(rows, m):
-    """`<u^4>` from the products of two components each."""
+    """Return `<u^4>` from the products of two components each."""
     m0, m1, m2, m3, m4, m5 = m
     return m0 * dot(rows[0], m) + m1 * dot(rows[1], (m1, m2, m3, m4, m5)) + m2 * dot(rows[2], (m2, m3, m4, m5))
 
 
 @kernel
 def evenness(law, fourth, z):
-    """`formulas.evenness` of a state, and its slopes by z; 1 for plain bristles. `fourth`: see `fourth_moments`."""
+    """Return `formulas.evenness` of a state, and its slopes by z; 1 for plain bristles. `fourth`: `fourth_moments`."""
     grip = law.sigma_0 / law.mu_s
     x, y, s = z
     px, py, ps = p = times(grip * grip, z)
@@ -328,7 +328,7 @@ def evenness(law, fourth, z):
 
 @kernel
 def sliding(law, vx, vy, omega, shape, surface, data):
-    """Scaled twist, its norm and its steady state (any where the patch is at rest): what a step holds."""
+    """Return the scaled twist, its norm and its steady state (any where the patch is at rest)."""
     x, y, s = scaled_twist(shape, vx, vy, omega)
     v = math.sqrt(x * x + y * y + s * s)
     if v > STILL:

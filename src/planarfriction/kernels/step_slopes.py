@@ -35,7 +35,7 @@ NUMBERS = 12
 
 @kernel
 def _pull_rows(pull_back, contact, step, slopes, out):
-    """Wrench of a step, and its slopes row by row."""
+    """Write the wrench of a step, and its slopes row by row."""
     put(out, step.wrench)
     for i in range(3):
         unit = (1.0 if i == 0 else 0.0), (1.0 if i == 1 else 0.0), (1.0 if i == 2 else 0.0)
@@ -45,20 +45,20 @@ def _pull_rows(pull_back, contact, step, slopes, out):
 
 @entry
 def reduced(contact, z, v, dt, new, out):
-    """A contact of `ReducedModel`, or one of its parts."""
+    """Step a contact of `ReducedModel`, or one of its parts."""
     own, out = reduced_contact.read(contact), doubles(out)
     contact = Contact(own.law, own.shape, (0, own.other, 0), floats(own.data))
     held, slopes = reduced_step.hold_slopes(contact, three(doubles(v)), out)
-    step = reduced_step.linearise(contact, held, three(doubles(z)), dt)
+    step = reduced_step.taped_step(contact, held, three(doubles(z)), dt)
     put(doubles(new), step.new)
     _pull_rows(reduced_step.pull_back, contact, step, slopes, out)
 
 
 @kernel
-def _jacobian(hold_slopes, linearise, pull_back, contact, z, v, dt, out):
-    """Derivatives of the new state and of the wrench per unit load, by state, twist and load, into `out` [6, 7]."""
+def _jacobian(hold_slopes, taped_step, pull_back, contact, z, v, dt, out):
+    """Write derivatives of new state and wrench per unit load, by state, twist and load, to `out` [6, 7]."""
     held, slopes = hold_slopes(contact, three(doubles(v)), out)
-    step = linearise(contact, held, three(doubles(z)), dt)
+    step = taped_step(contact, held, three(doubles(z)), dt)
     for i in range(6):
         unit = (1.0 if i % 3 == 0 else 0.0), (1.0 if i % 3 == 1 else 0.0), (1.0 if i % 3 == 2 else 0.0)
         of_state, of_wrench = times(1.0 if i < 3 else 0.0, unit), times(0.0 if i < 3 else 1.0, unit)
@@ -70,25 +70,25 @@ def _jacobian(hold_slopes, linearise, pull_back, contact, z, v, dt, out):
 
 @entry
 def reduced_jacobian(contact, z, v, dt, out):
-    """`_jacobian` of a contact of `ReducedModel`, or one of its parts."""
+    """Write the `_jacobian` of a contact of `ReducedModel`, or of one of its parts."""
     own = reduced_contact.read(contact)
     contact = Contact(own.law, own.shape, (0, own.other, 0), floats(own.data))
-    hold_slopes, linearise, pull_back = reduced_step.hold_slopes, reduced_step.linearise, reduced_step.pull_back
-    _jacobian(hold_slopes, linearise, pull_back, contact, z, v, dt, doubles(out))
+    hold_slopes, taped_step, pull_back = reduced_step.hold_slopes, reduced_step.taped_step, reduced_step.pull_back
+    _jacobian(hold_slopes, taped_step, pull_back, contact, z, v, dt, doubles(out))
 
 
 @entry
 def published_jacobian(contact, z, v, dt, out):
-    """`_jacobian` of a contact of `ReducedModelPublished` that is no point, in the axes of its friction metric."""
+    """Write the `_jacobian` of a contact of `ReducedModelPublished`, no point, in the axes of its friction metric."""
     own = published_contact.read(contact)
     contact = Contact(own.law, own.shape, (own.kind, 0, own.size), doubles(own.data))
-    hold_slopes, linearise, pull_back = published_step.hold_slopes, published_step.linearise, published_step.pull_back
-    _jacobian(hold_slopes, linearise, pull_back, contact, z, v, dt, doubles(out))
+    hold_slopes, taped_step, pull_back = published_step.hold_slopes, published_step.taped_step, published_step.pull_back
+    _jacobian(hold_slopes, taped_step, pull_back, contact, z, v, dt, doubles(out))
 
 
 @entry
 def published(contact, z, v, dt, new, out):
-    """A contact of `ReducedModelPublished`; a point slides as a patch of any size does that does not spin."""
+    """Step a contact of `ReducedModelPublished`; a point slides as a patch of any size that does not spin."""
     own, given, v, moved, out = published_contact.read(contact), doubles(z), doubles(v), doubles(new), doubles(out)
     (cx, cy, r, second_moment), root = own.shape, own.root
     spins = 1.0 if r > 0.0 else 0.0
@@ -96,7 +96,7 @@ def published(contact, z, v, dt, new, out):
     contact = Contact(own.law, shape, (own.kind, 0, own.size), doubles(own.data))
     twist = root.xx * v[0] + root.xy * v[1] - cy * v[2], root.xy * v[0] + root.yy * v[1] + cx * v[2], spins * v[2]
     held, slopes = published_step.hold_slopes(contact, twist, out)
-    step = published_step.linearise(contact, held, (given[0], given[1], spins * given[2]), dt)
+    step = published_step.taped_step(contact, held, (given[0], given[1], spins * given[2]), dt)
     moved[0], moved[1] = step.new[0], step.new[1]
     moved[2] = step.new[2] if r > 0.0 else given[2]
     _pull_rows(published_step.pull_back, contact, step, slopes, out)
@@ -149,7 +149,7 @@ def _distributed(law, own, z, v, dt, new, out):
 
 @entry
 def distributed(contact, z, v, dt, new, out):
-    """A contact of `DistributedModel`."""
+    """Step a contact of `DistributedModel`."""
     own = cells.read(contact)
     if own.law.gamma == 2.0:
         _distributed(squared(own.law), own, doubles(z), doubles(v), dt, doubles(new), doubles(out))
@@ -159,7 +159,7 @@ def distributed(contact, z, v, dt, new, out):
 
 @entry
 def anisotropic(contact, z, v, dt, new, out):
-    """A contact of `DistributedModel` with friction that depends on the direction (see `kernels.cells`).
+    """Step a contact of `DistributedModel` with friction that depends on the direction (see `kernels.cells`).
 
     `z - c` with `c = a/q`, which the twist holds, steps as the bristle of an isotropic cell does, and the traction is
     that of one less `sigma_0 c`.

@@ -15,7 +15,7 @@ _FLAGS = ("reassoc", "contract", "nsz", "arcp")
 
 @intrinsic
 def dot(typingctx, a, b):
-    """`a . b`"""
+    """Return `a . b`."""
 
     def generate(context, builder, signature, args):
         parts = zip(*(cgutils.unpack_tuple(builder, vector) for vector in args), strict=True)
@@ -30,7 +30,7 @@ def dot(typingctx, a, b):
 
 @intrinsic
 def times(typingctx, c, a):
-    """`c a`"""
+    """Return `c a`."""
 
     def generate(context, builder, signature, args):
         parts = cgutils.unpack_tuple(builder, args[1])
@@ -43,7 +43,7 @@ def times(typingctx, c, a):
 
 @intrinsic
 def plus(typingctx, a, c, b):
-    """`a + c b`, a record if a is one."""
+    """Return `a + c b`, a record if a is one."""
 
     def generate(context, builder, signature, args):
         parts = zip(cgutils.unpack_tuple(builder, args[0]), cgutils.unpack_tuple(builder, args[2]), strict=True)
@@ -103,7 +103,7 @@ def accumulate(typingctx, row, at, stride, record):
 
 @intrinsic(prefer_literal=True)
 def gathered(typingctx, row, at, stride, count):
-    """`row[at]`, `row[at + stride]`, ... as a tuple of a constant count."""
+    """Return `row[at]`, `row[at + stride]`, ... as a tuple of a constant count."""
     if not isinstance(count, types.IntegerLiteral):
         return None
     result = types.UniTuple(types.float64, count.literal_value)
@@ -127,13 +127,13 @@ def square(a):
 
 @kernel
 def norm(a):
-    """`|a|`"""
+    """Return `|a|`."""
     return math.sqrt(dot(a, a))
 
 
 @kernel
 def three(row):
-    """The first three numbers of a row."""
+    """Return the first three numbers of a row."""
     return row[0], row[1], row[2]
 
 
@@ -152,7 +152,7 @@ def put_all(row, numbers):
 
 @kernel
 def applied_back(m, a):
-    """`M' a`"""
+    """Return `M' a`."""
     return (
         m[0] * a[0] + m[3] * a[1] + m[6] * a[2],
         m[1] * a[0] + m[4] * a[1] + m[7] * a[2],

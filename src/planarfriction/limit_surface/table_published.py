@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.kernels import spin_sums
 from planarfriction.kernels import surfaces as kernels
-from planarfriction.kernels import tables
 from planarfriction.limit_surface.base import MOST_SEGMENTS, SurfaceNumbers
 from planarfriction.limit_surface.compiled import CompiledLimitSurface
 from planarfriction.limit_surface.loops.published_twists import published_twists
@@ -51,14 +51,14 @@ class LimitSurfaceTablePublished(CompiledLimitSurface):
 
     def _radius(self) -> float:
         place, corners = self._grid()
-        return float(tables.smoothed_spin_sum(corners, place, *self._loaded_cells(), 0.0, 0.0)[2])
+        return float(spin_sums.smoothed_spin_sum(corners, place, *self._loaded_cells(), 0.0, 0.0)[2])
 
     @functools.cached_property
     def numbers(self) -> SurfaceNumbers:
         """`h` at the nodes."""
         place, corners = self._grid()
         nodes = np.zeros((self.segments + 1, 4 * self.segments + 1, 4))
-        tables.smoothed_nodes(corners, place, *self._loaded_cells(), self.contact_radius, self.segments, nodes)
+        spin_sums.smoothed_nodes(corners, place, *self._loaded_cells(), self.contact_radius, self.segments, nodes)
         return SurfaceNumbers(self.kind, self.segments, nodes.reshape(-1))
 
     def _find_twists(self, wrenches: np.ndarray, found: np.ndarray) -> float:

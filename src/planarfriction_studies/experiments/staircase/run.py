@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from planarfriction.kernels import tables
+from planarfriction.kernels import spin_sums
 from planarfriction.limit_surface import LimitSurfaceCells
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
 from planarfriction.scenes.ready import published_velocity
@@ -86,7 +86,7 @@ def smoothed_wrench(twist: np.ndarray, patch: ContactPatch) -> np.ndarray:
     wrench = LimitSurfaceCells(patch).wrench(twist)
     for i in np.flatnonzero(twist[:, 2] > 0.0):
         vx, vy, omega = twist[i]
-        wrench[i] = -np.array(tables.smoothed_spin_sum(corners, place, x, y, weights, -vy / omega, vx / omega))
+        wrench[i] = -np.array(spin_sums.smoothed_spin_sum(corners, place, x, y, weights, -vy / omega, vx / omega))
     return wrench
 
 

@@ -36,7 +36,7 @@ def _plus(builder, total, a, b):
 
 
 def _polynomials(builder, x, both, order):
-    """A vector of two polynomials of x, number `order[i]` of `both` in its place i."""
+    """Return a vector of two polynomials of x, number `order[i]` of `both` in its place i."""
     result = None
     for coefficients in reversed(tuple(zip(*both, strict=True))):
         constant = ir.Constant(_VECTOR, [coefficients[k] for k in order])
@@ -47,7 +47,7 @@ def _polynomials(builder, x, both, order):
 
 
 def _weights(builder, u, v):
-    """Weights of a node's four numbers for the four nodes: of the value, of the slope by u and of that by v."""
+    """Return the weights of the four numbers of four nodes: of the value, of the slope by u and of that by v."""
     rows, columns = (0, 1, 0, 1), (0, 0, 1, 1)
     u, v = _splat(builder, u), _splat(builder, v)
     along = [_polynomials(builder, u, both, rows) for both in (_NEAR, _NEXT, _NEAR_SLOPES, _NEXT_SLOPES)]
@@ -75,7 +75,7 @@ def _sum(builder, vector):
 
 
 def _weighed(builder, weights, numbers):
-    """The sum over the four nodes."""
+    """Return the sum over the four nodes."""
     total = None
     for w, four in zip(weights, numbers, strict=True):
         total = _plus(builder, total, four, w)
@@ -88,14 +88,14 @@ def _corners(builder, first, node, row):
 
 
 def _vectors(context, builder, kind, values):
-    """A tuple of tuples of three numbers."""
+    """Return a tuple of tuples of three numbers."""
     three = types.UniTuple(types.float64, 3)
     return context.make_tuple(builder, kind, [context.make_tuple(builder, three, each) for each in values])
 
 
 @intrinsic
 def patch(typingctx, data, at, node, row, u, v):
-    """Components, slopes by u and slopes by v, three each, of the patch whose first node is at `data[at]`.
+    """Read components, slopes by u and slopes by v, three each, of the patch whose first node is at `data[at]`.
 
     Its nodes are at `at, at + node, at + row, at + row + node`; `data` is contiguous.
     """
@@ -116,7 +116,7 @@ def patch(typingctx, data, at, node, row, u, v):
 
 @intrinsic
 def patch_of_levels(typingctx, data, at, node, row, t, t_slopes, u, v):
-    """`patch` of a sum over four levels, 12 numbers apart, with weights `t`; fourth, that with `t_slopes`."""
+    """Read a `patch` of a sum over four levels, 12 numbers apart, with weights `t`; fourth, that with `t_slopes`."""
     result = types.UniTuple(types.UniTuple(types.float64, 3), 4)
 
     def generate(context, builder, signature, args):

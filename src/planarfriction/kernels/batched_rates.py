@@ -8,7 +8,7 @@ from planarfriction.compiler.calls import address, call
 
 @jit
 def evaluate(function, records, state, twist, rate, wrench):
-    """`ModelFunctions.evaluate` of B contacts: `state`, `rate` [B, S], `twist`, `wrench` [B, 3] (per unit load).
+    """Call `ModelFunctions.evaluate` of B contacts: `state`, `rate` [B, S], `twist`, `wrench` [B, 3] (per unit load).
 
     `function` is its address; `records` [B or 1, words] has a row for each contact, or the one that all share.
     """
@@ -19,7 +19,7 @@ def evaluate(function, records, state, twist, rate, wrench):
 
 @jit
 def linearise(function, records, state, twist, lin):
-    """`ModelFunctions.linearise` of B contacts into `lin` [B, workspace]; the rest as in `evaluate`."""
+    """Call `ModelFunctions.linearise` of B contacts into `lin` [B, workspace]; the rest as in `evaluate`."""
     for b in range(state.shape[0]):
         own = address(records, b * records.shape[1] if records.shape[0] > 1 else 0)
         call(function, (own, state[b], twist[b], lin[b]))

@@ -12,7 +12,7 @@ from planarfriction.compiler import jit
 
 @jit
 def spin_sum(x, y, w, cx, cy):
-    """`sum w v/|v|` and `sum w rho x v/|v|` of a unit spin about the point `(cx, cy)`; a cell there adds nothing."""
+    """Return `sum w v/|v|` and `sum w rho x v/|v|` of a unit spin about `(cx, cy)`; a cell there adds nothing."""
     hx, hy, ht = 0.0, 0.0, 0.0
     for i in range(x.shape[0]):
         dx, dy = x[i] - cx, y[i] - cy
@@ -26,7 +26,7 @@ def spin_sum(x, y, w, cx, cy):
 
 @jit
 def smoothed_spin_sum(corners, grid, x, y, w, cx, cy):
-    """`spin_sum` blended bilinearly over the corners of the grid cell that holds the centre of rotation.
+    """Return `spin_sum` blended bilinearly over the corners of the grid cell that holds the centre of rotation.
 
     As published: the cell index is truncated toward zero, so up to one cell outside the low edges the first cell is
     used and its weights extrapolate; further outside the grid the plain sum is taken. `grid` is `(x_min, y_min,
@@ -55,7 +55,7 @@ def smoothed_spin_sum(corners, grid, x, y, w, cx, cy):
 
 @jit
 def smoothed_nodes(corners, grid, x, y, w, radius, size, nodes):
-    """`h` at `[size + 1, 4 size + 1]` directions of the scaled twist, from the smoothed sums; torque over `radius`."""
+    """Write `h` at `[size + 1, 4 size + 1]` directions of the scaled twist from smoothed sums; torque over `radius`."""
     segment = 0.5 * math.pi / size
     for i in range(size + 1):
         for j in range(4 * size):
