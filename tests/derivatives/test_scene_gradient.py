@@ -242,7 +242,7 @@ def test_windows_parts_and_a_shorter_motion_leave_no_trace(monkeypatch):
         return scene_gradient(scene, lambda _, motion: np.ones_like(motion), signals=SIGNALS, options=options).gradient
 
     whole, short = gradient(0.4), gradient(0.1)
-    monkeypatch.setattr(packing, "WINDOW", 3)
+    monkeypatch.setattr(packing, "BATCH", 3)
     assert gradient(0.4) == pytest.approx(whole, rel=1e-6, abs=1e-7 * np.abs(whole).max())
     monkeypatch.setattr(path, "NUMBERS", 1.0)
     assert gradient(0.4) == pytest.approx(whole, rel=1e-6, abs=1e-7 * np.abs(whole).max())

@@ -66,7 +66,7 @@ def assert_same(one: dict[str, np.ndarray], other: dict[str, np.ndarray]) -> Non
 @pytest.mark.parametrize("name", MODELS)
 def test_windows_leave_no_trace(monkeypatch, name, of):
     whole = recorded(of(MODELS[name]()))
-    monkeypatch.setattr(packing, "WINDOW", 3)
+    monkeypatch.setattr(packing, "BATCH", 3)
     assert_same(recorded(of(MODELS[name]())), whole)
 
 
@@ -132,7 +132,7 @@ def test_sensitivities_in_windows_and_in_parts(monkeypatch, name):
 
     numbers = {"parameters": ("mu", "r", "mass"), "options": pf.scenes.SolverOptions(t_end=0.025, save_every=1e-3)}
     whole = pf.derivatives.scene_sensitivities(scene, **numbers)
-    monkeypatch.setattr(packing, "WINDOW", 3)
+    monkeypatch.setattr(packing, "BATCH", 3)
     windows = pf.derivatives.scene_sensitivities(scene, **numbers)
     monkeypatch.setattr(module, "NUMBERS", 1.0)  # one step at a time
     parts = pf.derivatives.scene_sensitivities(scene, **numbers)
@@ -152,13 +152,13 @@ def test_a_body_comes_to_rest_in_a_later_window(monkeypatch):
     load = ramp((0.0, 1.5), (0.02, 2.0))
     scene = pf.scenes.free_slide(model, mass=0.2, twist=(0.1, 0.0, 0.0), normal_force=load, t_end=1.0)
     whole = recorded(scene)
-    monkeypatch.setattr(packing, "WINDOW", 3)
+    monkeypatch.setattr(packing, "BATCH", 3)
     assert_same(recorded(scene), whole)
     assert pf.simulate(scene).status == "at rest"
 
 
 def test_interruption_in_a_later_window_keeps_what_is_done(monkeypatch):
-    monkeypatch.setattr(packing, "WINDOW", 3)
+    monkeypatch.setattr(packing, "BATCH", 3)
     seen = []
 
     def stop(time: float) -> None:
@@ -175,7 +175,7 @@ def test_interruption_in_a_later_window_keeps_what_is_done(monkeypatch):
 
 
 def test_interruption_while_shapes_are_built_keeps_what_is_done(monkeypatch):
-    monkeypatch.setattr(packing, "WINDOW", 3)
+    monkeypatch.setattr(packing, "BATCH", 3)
     model = MODELS["published"]()
     build, calls = type(model.shapes)._built, []
 

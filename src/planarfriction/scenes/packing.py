@@ -20,7 +20,7 @@ from planarfriction.scenes.start import first_slopes, first_states
 SHAPE_INTERVAL = 1e-3
 """Longest time [s] that a patch keeps its shape while the load it depends on changes; held loads need no limit."""
 
-WINDOW = 4096
+BATCH = 4096
 """Segments between breaks that are packed at a time; fewer where their shapes take more room (see
 `compiled.packed.MAX_PACK_BYTES`)."""
 
@@ -46,7 +46,7 @@ class Segments:
     """The inputs of a scene from 0 to `t_end` [s], linear on each piece between two breaks.
 
     Breaks are those of the signals; where the load of a patch whose shape follows it changes continuously, pieces are
-    no longer than `SHAPE_INTERVAL`. Segments go by their number, so that there may be more of them than memory holds.
+    no longer than `SHAPE_INTERVAL`. Pieces go by their number, so that there may be more of them than memory holds.
     """
 
     def __init__(self, scene, t_end: float, marks=()) -> None:
@@ -133,17 +133,17 @@ class Segments:
 
 
 class SegmentBatches:
-    """The motion of a scene from 0 to `t_end` [s] in consecutive windows, to be gone through once.
+    """The motion of a scene from 0 to `t_end` [s] in consecutive batches, to be gone through once.
 
-    A window holds `most` pieces (default: `WINDOW`), or as many as its shapes have room for. Where it ends leaves no
+    A batch holds `most` pieces (default: `BATCH`), or as many as its shapes have room for. Where it ends leaves no
     trace in the results. `times` to record become breaks where they equal one up to rounding, so that they record the
-    left limit. With `sensitivities` windows hold what derivatives need too, and the solver stops at `marks` [s].
+    left limit. With `sensitivities` batches hold what derivatives need too, and the solver stops at `marks` [s].
     """
 
     def __init__(
         self, scene, t_end: float, *, times=None, sensitivities=False, marks=(), most: int | None = None
     ) -> None:
-        self._scene, self._times, self._most = scene, times, WINDOW if most is None else most
+        self._scene, self._times, self._most = scene, times, BATCH if most is None else most
         self._ahead = self._most
         self._pieces, self._done = Segments(scene, t_end, marks), 0
         contacts = scene.contacts

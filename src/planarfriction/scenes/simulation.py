@@ -97,12 +97,12 @@ def simulate(
     if not (progress is None or callable(progress)):
         raise InvalidValueError("progress", "be a function of the simulated time, or None", progress)
     with said_when_compiling(silent=progress is not None):
-        windows = SegmentBatches(scene, plan.end, times=plan.times)
-        output = _output(plan.times, windows, bristles)
-        scales = plan.atol * windows.state_scale
-        run = integrate(windows, output, windows.state, method=method, rtol=plan.rtol, atol=scales, progress=progress)
-    cost = replace(run.statistics, compile_time=run.statistics.compile_time + windows.loading)
-    solution = Solution(_histories(scene, windows, run.output), cost, run.status, run.message, scene)
+        batches = SegmentBatches(scene, plan.end, times=plan.times)
+        output = _output(plan.times, batches, bristles)
+        scales = plan.atol * batches.state_scale
+        run = integrate(batches, output, batches.state, method=method, rtol=plan.rtol, atol=scales, progress=progress)
+    cost = replace(run.statistics, compile_time=run.statistics.compile_time + batches.loading)
+    solution = Solution(_histories(scene, batches, run.output), cost, run.status, run.message, scene)
     if run.status == "interrupted":
         raise SimulationInterrupted(solution)
     if run.status not in ("success", "at rest"):
@@ -110,8 +110,8 @@ def simulate(
     return solution
 
 
-def _output(times: np.ndarray, windows: SegmentBatches, bristles: str) -> Output:
-    count, contacts, states = len(times), len(windows.models), int(windows.bristles[-1])
+def _output(times: np.ndarray, batches: SegmentBatches, bristles: str) -> Output:
+    count, contacts, states = len(times), len(batches.models), int(batches.bristles[-1])
     if bristles == "all" and count * states > MOST_NUMBERS:
         shown = f"{count} samples of {states} numbers"
         raise InvalidValueError("bristles", f"be 'none' above {MOST_NUMBERS} numbers (raise save_every)", shown)
@@ -124,7 +124,7 @@ def _output(times: np.ndarray, windows: SegmentBatches, bristles: str) -> Output
     )
 
 
-def _histories(scene: Scene, windows: SegmentBatches, output: Output) -> dict[str, History]:
+def _histories(scene: Scene, batches: SegmentBatches, output: Output) -> dict[str, History]:
     """What was recorded, by name, with units."""
 
     def history(name: str, dims: tuple[str, ...], values: np.ndarray, unit: str) -> History:
@@ -141,7 +141,7 @@ def _histories(scene: Scene, windows: SegmentBatches, output: Output) -> dict[st
     histories["normal_force"] = history("normal_force", ("time", "contact"), output.load, "N")
     if len(output.bristles):
         for c, contact in enumerate(scene.contacts):
-            first, cells = windows.bristles, windows.cells[c]
+            first, cells = batches.bristles, batches.cells[c]
             part = output.bristles[:, first[c] : first[c + 1]]
             name = f"bristles_{contact.name}"
             if cells is not None:
