@@ -66,6 +66,19 @@ def test_at_kinks_the_conventions_hold():
     assert pull(0.0, 1.0, 2) == pull(0.0, 1.0, 3) == pull(0.0, 1.0, 4) == (0.0, 0.0)
 
 
+@kernel
+def _decay(deflection, law):
+    return formulas.bristle_decay(xp, deflection, 0.3, 1.0, 1e5, law)
+
+
+def test_no_dust_where_a_bristle_sticks_or_is_fully_deflected():
+    """Long steps multiply the slope by 1e9, small deflections by one over them: rounding of a cosine would show."""
+    derived = derive(_decay, ("deflection", "law.breakaway_ratio"))
+    for deflection in (0.0, 0.1, LAW.breakaway_ratio, 1.0, 1.5):
+        assert pulled(derived.forth, derived.back, (deflection, LAW), (1.0,)) == (0.0, 0.0)
+    assert pulled(derived.forth, derived.back, (0.6, LAW), (1.0,))[0] > 1e3
+
+
 def test_a_rule_goes_before_the_source():
     @kernel
     def rounded(x):
