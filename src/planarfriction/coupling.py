@@ -103,7 +103,7 @@ class CoupledPatches(ByValue):
     def __post_init__(self) -> None:
         if isinstance(self.models, FrictionModel) or not isinstance(self.models, Iterable):
             raise InvalidValueError("models", "be a list of friction models, one for each patch", self.models)
-        object.__setattr__(self, "models", tuple(self.models))
+        self._set(models=tuple(self.models))
         for model in self.models:
             validation.instance("models", model, FrictionModel, "friction models, one for each patch")
         if not self.models:

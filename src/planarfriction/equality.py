@@ -7,7 +7,7 @@ prints every number.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
 import numpy as np
@@ -20,7 +20,31 @@ _SHORT = 9
 """Numbers of an array, items of a sequence, that a `repr` shows."""
 
 
-class ByValue:
+def checked(check: Callable[..., Any], *arguments: Any, **options: Any) -> Any:
+    """Return a dataclass field that keeps `check(name, value, *arguments)`, such as `validation.positive`.
+
+    `options` are those of `dataclasses.field`. A default of None is kept without a check.
+    """
+    return dataclasses.field(metadata={"check": (check, arguments)}, **options)
+
+
+class Checked:
+    """Base of frozen dataclasses whose fields are checked and converted when a record is made (see `checked`)."""
+
+    def __post_init__(self) -> None:
+        for each in dataclasses.fields(self):  # pyright: ignore[reportArgumentType]
+            value = getattr(self, each.name, None)
+            if "check" in each.metadata and not (value is None and each.default is None):
+                check, arguments = each.metadata["check"]
+                self._set(**{each.name: check(each.name, value, *arguments)})
+
+    def _set(self, **values: Any) -> None:
+        """Set fields of a record that is being made; later it is frozen."""
+        for name, value in values.items():
+            object.__setattr__(self, name, value)
+
+
+class ByValue(Checked):
     """Base of frozen dataclasses (`eq=False`) that are compared by type and content and have a `repr` of one line."""
 
     def __init_subclass__(cls, **more: Any) -> None:

@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import formulas, validation
+from planarfriction.equality import Checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 
 
-class FrictionLaw:
+class FrictionLaw(Checked):
     """A friction law per unit normal load: a frozen record of parameters that enter the formulas by name.
 
     `zdot = v - k z`, `f = -(sigma_0 z + sigma_1 zdot + sigma_2 v) f_N`, with the decay k of `formulas.bristle_decay`

@@ -10,22 +10,20 @@ from numpy.typing import ArrayLike
 
 from planarfriction import validation
 from planarfriction.described import described
+from planarfriction.equality import Checked, checked
 from planarfriction.errors import InvalidValueError
 
 
 @described
 @dataclass(frozen=True)
-class Coulomb:
+class Coulomb(Checked):
     """Coulomb friction: the wrench lies on the limit surface scaled by `mu f_N`.
 
     Raises InvalidValueError for a `mu` that is not > 0.
     """
 
-    mu: float
+    mu: float = checked(validation.positive)
     """Friction coefficient [-]."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "mu", validation.positive("mu", self.mu))
 
     def wrench(self, surface: Any, twist: ArrayLike, normal_force: ArrayLike) -> np.ndarray:
         """Friction wrench `mu f_N W(V)` on the sliding body about the contact frame's origin [N, N, N m].

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from planarfriction import validation
 from planarfriction.described import described
+from planarfriction.equality import checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.laws.base import FrictionLaw
@@ -32,27 +33,25 @@ class CoulombStribeck(FrictionLaw):
     -> 0`, the regularisation `v/(|v| + v_c)`.
     """
 
-    mu_c: float = 1.0
+    mu_c: float = checked(validation.positive, default=1.0)
     """Coulomb coefficient [-]."""
-    mu_s: float = None  # pyright: ignore[reportAssignmentType]
+    mu_s: float = checked(validation.positive, default=None)
     """Static coefficient [-], at least `mu_c`; equal to `mu_c` by default."""
-    v_s: float = 1e-3
+    v_s: float = checked(validation.positive, default=1e-3)
     """Stribeck speed [m/s]."""
-    gamma: float = 2.0
+    gamma: float = checked(validation.positive, default=2.0)
     """Stribeck exponent [-]."""
-    sigma_2: float = 0.0
+    sigma_2: float = checked(validation.non_negative, default=0.0)
     """Viscous friction per unit normal load [s/m]."""
-    creep_speed: float = 1e-5
+    creep_speed: float = checked(validation.positive, default=1e-5)
     """v_c [m/s]: speed at which friction is half of that in fast sliding."""
-    relaxation_time: float = 1e-2
+    relaxation_time: float = checked(validation.positive, default=1e-2)
     """tau [s]: time in which the force at rest decays to 1/e."""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.mu_s is None:
-            object.__setattr__(self, "mu_s", self.mu_c)
-        for name in ("mu_c", "mu_s", "v_s", "gamma", "creep_speed", "relaxation_time"):
-            object.__setattr__(self, name, validation.positive(name, getattr(self, name)))
-        object.__setattr__(self, "sigma_2", validation.non_negative("sigma_2", self.sigma_2))
+            self._set(mu_s=self.mu_c)
         if self.mu_s < self.mu_c:
             raise InvalidValueError("mu_s", "be >= mu_c", f"mu_s={self.mu_s}, mu_c={self.mu_c}")
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from planarfriction import validation
 from planarfriction.described import described
+from planarfriction.equality import checked
 from planarfriction.formulas import LawNumbers
 from planarfriction.laws.base import FrictionLaw
 
@@ -26,14 +27,10 @@ class Dahl(FrictionLaw):
     Sources: Dahl 1968, "A solid friction model"; Dahl 1976, "Solid friction damping of mechanical vibrations".
     """
 
-    mu_c: float = 1.0
+    mu_c: float = checked(validation.positive, default=1.0)
     """Coulomb coefficient [-]."""
-    sigma_0: float = 1e6
+    sigma_0: float = checked(validation.positive, default=1e6)
     """Bristle stiffness per unit normal load [1/m]."""
-
-    def __post_init__(self) -> None:
-        for name in ("mu_c", "sigma_0"):
-            object.__setattr__(self, name, validation.positive(name, getattr(self, name)))
 
     @property
     def numbers(self) -> LawNumbers:

@@ -8,14 +8,23 @@ from typing import Any
 
 from planarfriction import validation
 from planarfriction.described import described
+from planarfriction.equality import Checked, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.laws.base import FrictionLaw
 
 
+def _below_one(name: str, value: Any) -> float:
+    """Return `value` as a number in [0, 1), or raise."""
+    value = validation.number(name, value)
+    if not 0.0 <= value < 1.0:
+        raise InvalidValueError(name, "be in [0, 1)", value)
+    return value
+
+
 @described
 @dataclass(frozen=True)
-class ElastoPlastic:
+class ElastoPlastic(Checked):
     """Elasto-plastic bristles: purely elastic below breakaway, so that a sticking contact does not creep.
 
     Raises InvalidValueError for a `breakaway_ratio` outside [0, 1).
@@ -23,14 +32,20 @@ class ElastoPlastic:
     Source: Dupont, Hayward, Armstrong, Altpeter 2002.
     """
 
-    breakaway_ratio: float = 0.9
+    breakaway_ratio: float = checked(_below_one, default=0.9)
     """s_ba = z_ba / z_max [-]: bristles deflected less than this share of their maximum do not slip."""
 
-    def __post_init__(self) -> None:
-        value = validation.number("breakaway_ratio", self.breakaway_ratio)
-        if not 0.0 <= value < 1.0:
-            raise InvalidValueError("breakaway_ratio", "be in [0, 1)", value)
-        object.__setattr__(self, "breakaway_ratio", value)
+
+def _elasto_plastic(name: str, value: Any) -> ElastoPlastic:
+    """Return the extension that was given as itself, as its breakaway ratio or as the table that holds it; or raise."""
+    if isinstance(value, ElastoPlastic):
+        return value
+    if isinstance(value, Mapping):
+        validation.keys(name, value, ["breakaway_ratio"])
+        value = value["breakaway_ratio"]
+    if validation.why_not_numeric(value) is not None:
+        raise InvalidValueError(name, "be a breakaway ratio, an ElastoPlastic, or None", value)
+    return ElastoPlastic(value)
 
 
 @described
@@ -46,33 +61,29 @@ class LuGre(FrictionLaw):
     Sources: Canudas de Wit et al. 1995; parameters as in Waltersson and Karayiannidis 2024.
     """
 
-    mu_c: float = 1.0
+    mu_c: float = checked(validation.positive, default=1.0)
     """Coulomb coefficient [-]."""
-    mu_s: float = None  # pyright: ignore[reportAssignmentType]
+    mu_s: float = checked(validation.positive, default=None)
     """Static (breakaway) coefficient [-], at least `mu_c`; equal to `mu_c` by default."""
-    v_s: float = 1e-3
+    v_s: float = checked(validation.positive, default=1e-3)
     """Stribeck speed [m/s]."""
-    sigma_0: float = 1e6
+    sigma_0: float = checked(validation.positive, default=1e6)
     """Bristle stiffness per unit normal load [1/m]."""
-    sigma_1: float = 8e2
+    sigma_1: float = checked(validation.non_negative, default=8e2)
     """Bristle damping per unit normal load [s/m]."""
-    sigma_2: float = 0.2
+    sigma_2: float = checked(validation.non_negative, default=0.2)
     """Viscous friction per unit normal load [s/m]."""
-    gamma: float = 2.0
+    gamma: float = checked(validation.positive, default=2.0)
     """Stribeck exponent [-]."""
-    elasto_plastic: ElastoPlastic | float | None = None
+    elasto_plastic: ElastoPlastic | float | None = checked(_elasto_plastic, default=None)
     """Elasto-plastic extension, None for plain LuGre; a number is taken as the breakaway ratio of `ElastoPlastic`."""
 
     def __post_init__(self) -> None:
+        super().__post_init__()
         if self.mu_s is None:
-            object.__setattr__(self, "mu_s", self.mu_c)
-        for name in ("mu_c", "mu_s", "v_s", "sigma_0", "gamma"):
-            object.__setattr__(self, name, validation.positive(name, getattr(self, name)))
-        for name in ("sigma_1", "sigma_2"):
-            object.__setattr__(self, name, validation.non_negative(name, getattr(self, name)))
+            self._set(mu_s=self.mu_c)
         if self.mu_s < self.mu_c:
             raise InvalidValueError("mu_s", "be >= mu_c", f"mu_s={self.mu_s}, mu_c={self.mu_c}")
-        object.__setattr__(self, "elasto_plastic", _elasto_plastic(self.elasto_plastic))
 
     @property
     def numbers(self) -> LawNumbers:
@@ -81,15 +92,3 @@ class LuGre(FrictionLaw):
         if not isinstance(self.elasto_plastic, ElastoPlastic):
             return plain
         return plain._replace(elasto_plastic=1.0, breakaway_ratio=self.elasto_plastic.breakaway_ratio)
-
-
-def _elasto_plastic(value: Any) -> ElastoPlastic | None:
-    """The extension as given: itself, its breakaway ratio, or the table that holds it."""
-    if value is None or isinstance(value, ElastoPlastic):
-        return value
-    if isinstance(value, Mapping):
-        validation.keys("elasto_plastic", value, ["breakaway_ratio"])
-        value = value["breakaway_ratio"]
-    if validation.why_not_numeric(value) is not None:
-        raise InvalidValueError("elasto_plastic", "be a breakaway ratio, an ElastoPlastic, or None", value)
-    return ElastoPlastic(value)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import validation
+from planarfriction.equality import checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.geometry import transformed
 from planarfriction.limit_surface import quartic_fit
@@ -48,11 +49,10 @@ class LimitSurfaceQuartic(LimitSurface):
     coefficients: np.ndarray | None = dataclasses.field(default=None, kw_only=True)
     """Coefficients of the 15 monomials `quartic_fit.POWERS`, `[15]`; by default fitted to `surface`, for each load."""
 
-    segments: int = dataclasses.field(default=20, kw_only=True)
+    segments: int = checked(validation.count, 2, MOST_SEGMENTS, default=20, kw_only=True)
     """Segments per quadrant of the table for compiled code [-]."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "segments", validation.count("segments", self.segments, 2, MOST_SEGMENTS))
         if self.surface is not None and not isinstance(self.surface, LimitSurface):
             raise InvalidValueError("surface", "be a limit surface", self.surface)
         super().__post_init__()
@@ -61,7 +61,7 @@ class LimitSurfaceQuartic(LimitSurface):
             if not np.linalg.eigvalsh(quartic_fit.certificate(given))[0] > 0.0:
                 raise InvalidValueError("coefficients", "be those of a convex quartic", given.tolist())
             given.setflags(write=False)
-            object.__setattr__(self, "coefficients", given)
+            self._set(coefficients=given)
 
     @classmethod
     def fit(

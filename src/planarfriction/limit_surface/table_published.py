@@ -28,14 +28,10 @@ class LimitSurfaceTablePublished(CompiledLimitSurface):
     Source: Waltersson and Karayiannidis 2024, section IV.
     """
 
-    segments: int = 20
+    segments: int = checked(validation.count, 2, MOST_SEGMENTS, default=20)
     """Segments per quadrant [-]."""
 
     kind = kernels.BILINEAR
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "segments", validation.count("segments", self.segments, 2, MOST_SEGMENTS))
-        super().__post_init__()
 
     def _grid(self) -> tuple[tuple[float, float, float, float], np.ndarray]:
         """The patch's grid about the centre of pressure, and a place for the sums at its corners, of the caller alone.

@@ -76,9 +76,9 @@ class ContactPatch(Moments):
             size = validation.vector("cell_size", self.cell_size, 2)
             if not (size >= 0.0).all():
                 raise InvalidValueError("cell_size", "be >= 0", float(size.min()))
-            object.__setattr__(self, "cell_size", tuple(size.tolist()))
+            self._set(cell_size=tuple(size.tolist()))
         elif self.grid is not None:
-            object.__setattr__(self, "cell_size", (self.grid.cell_width, self.grid.cell_height))
+            self._set(cell_size=(self.grid.cell_width, self.grid.cell_height))
         check_cells(len(positions))
         areas = validation.array("areas", self.areas, (len(positions),))
         if not (areas > 0.0).all():
@@ -90,15 +90,13 @@ class ContactPatch(Moments):
         if not kept.any():
             raise InvalidValueError("pressure", "be > 0 on at least one cell", "0 on all of them")
         self._check_anisotropy(kept)
-        kept_values = {"positions": positions[kept], "areas": areas[kept], "pressure": law.only(kept)}
-        for name, value in kept_values.items():
-            object.__setattr__(self, name, value)
+        self._set(positions=positions[kept], areas=areas[kept], pressure=law.only(kept))
         self.positions.setflags(write=False)
         self.areas.setflags(write=False)
         if not law.depends_on_load:
             fixed = self._shares(self.pressure.relative(self.positions))
             fixed.setflags(write=False)
-            object.__setattr__(self, "_fixed_weights", fixed)
+            self._set(_fixed_weights=fixed)
         warn_of_the_unit(self.name, self.positions, self.cell_size)
 
     @classmethod

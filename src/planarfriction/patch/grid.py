@@ -9,42 +9,34 @@ from numpy.typing import ArrayLike
 
 from planarfriction import validation
 from planarfriction.described import described
+from planarfriction.equality import Checked, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch.size import MOST_CELLS, check_cells
 
 
 @described
 @dataclass(frozen=True)
-class Grid:
+class Grid(Checked):
     """A regular grid of boxes in the contact frame: x to the right, y up, **row 0 is the top row** (largest y).
 
     Raises InvalidValueError for sizes that are not > 0 and for counts below one.
     """
 
-    x_min: float
+    x_min: float = checked(validation.number)
     """Left edge [m]."""
-    y_min: float
+    y_min: float = checked(validation.number)
     """Bottom edge [m]."""
-    cell_width: float
+    cell_width: float = checked(validation.positive)
     """Width of a cell, along x [m]."""
-    cell_height: float
+    cell_height: float = checked(validation.positive)
     """Height of a cell, along y [m]."""
-    columns: int
+    columns: int = checked(validation.count)
     """Number of cells along x."""
-    rows: int
+    rows: int = checked(validation.count)
     """Number of cells along y."""
 
     def __post_init__(self) -> None:
-        checks = {
-            "x_min": validation.number,
-            "y_min": validation.number,
-            "cell_width": validation.positive,
-            "cell_height": validation.positive,
-            "columns": validation.count,
-            "rows": validation.count,
-        }
-        for name, check in checks.items():
-            object.__setattr__(self, name, check(name, getattr(self, name)))
+        super().__post_init__()
         check_cells(self.rows * self.columns)
 
     @classmethod

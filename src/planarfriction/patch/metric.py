@@ -121,7 +121,7 @@ class Anisotropy(ByValue):
             value = (_positive_definite if name == "metric" else _less_than_one)(value)
             value = value[kept] if per_cell else value
             value.setflags(write=False)
-            object.__setattr__(self, name, value)
+            self._set(**{name: value})
 
     def _anisotropy_to_dict(self) -> dict[str, list]:
         """Plain data of what there is."""

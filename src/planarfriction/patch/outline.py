@@ -95,7 +95,7 @@ def box_outline(width: float, height: float) -> PolygonOutline:
 
 def with_outline(patch: ContactPatch, outline: Outline | None) -> ContactPatch:
     """The new `patch`, knowing that its cells were cut from that outline."""
-    object.__setattr__(patch, "outline", outline)
+    patch._set(outline=outline)
     return patch
 
 

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from planarfriction import formulas, validation
 from planarfriction.described import described
-from planarfriction.equality import ByValue
+from planarfriction.equality import ByValue, Checked, checked
 from planarfriction.errors import InvalidValueError, shown
 from planarfriction.families import PRESSURES
 
@@ -20,7 +20,7 @@ SAME_DISTANCE = 1e-9
 """Relative difference below which two cells are equally far from the origin (rounding: 1e-16, cells: 1e-2)."""
 
 
-class Pressure:
+class Pressure(Checked):
     """Base of the pressure laws: a relative pressure at each position, which may depend on the normal force."""
 
     law: ClassVar[str] = ""
@@ -97,7 +97,7 @@ class LinearGradient(Pressure):
     """(gx, gy): change of the pressure per metre, relative to the pressure at the origin [1/m]."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "gradient", tuple(validation.vector("gradient", self.gradient, 2).tolist()))
+        self._set(gradient=tuple(validation.vector("gradient", self.gradient, 2).tolist()))
 
     def relative(self, positions: np.ndarray, normal_force: np.ndarray | None = None) -> np.ndarray:
         gx, gy = self.gradient
@@ -120,28 +120,24 @@ class SoftFinger(Pressure):
     """
 
     law = "soft_finger"
-    c: float
+    c: float = checked(validation.positive)
     """Radius of the contact at 1 N [m]."""
-    n: float = 0.0
+    n: float = checked(validation.non_negative, default=0.0)
     """Growth of the radius with the load [-]: 1/3 for Hertz contact, 0 for a radius that does not grow."""
-    k: float | None = None
+    k: float | None = checked(validation.positive, default=None)
     """Exponent of the profile [-]: 2 for Hertz contact; larger values give a flatter profile."""
-    k_per_newton: float | None = None
+    k_per_newton: float | None = checked(validation.positive, default=None)
     """Exponent of the profile per normal force [1/N]."""
-    radius_max: float | None = None
+    radius_max: float | None = checked(validation.positive, default=None)
     """Largest radius [m], or None."""
 
     def __post_init__(self) -> None:
         if (self.k is None) == (self.k_per_newton is None):
             given = f"k={shown(self.k)}, k_per_newton={shown(self.k_per_newton)}"
             raise InvalidValueError("SoftFinger", "have exactly one of k and k_per_newton", given)
-        object.__setattr__(self, "c", validation.positive("c", self.c))
-        object.__setattr__(self, "n", validation.non_negative("n", self.n))
+        super().__post_init__()
         if self.n > 1.0:
             raise InvalidValueError("n", "be at most 1: a contact does not grow faster than its load", self.n)
-        for name in ("k", "k_per_newton", "radius_max"):
-            if getattr(self, name) is not None:
-                object.__setattr__(self, name, validation.positive(name, getattr(self, name)))
 
     @property
     def depends_on_load(self) -> bool:
@@ -207,7 +203,7 @@ class PerCell(ByValue, Pressure):
     def __post_init__(self) -> None:
         values = pressure_array("pressure", self.values, (None,))
         values.setflags(write=False)
-        object.__setattr__(self, "values", values)
+        self._set(values=values)
 
     def relative(self, positions: np.ndarray, normal_force: np.ndarray | None = None) -> np.ndarray:
         """Relative pressures of the cells, `[N]`. Raises InvalidValueError for another number of positions."""

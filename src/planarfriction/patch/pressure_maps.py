@@ -40,9 +40,9 @@ class PressureMaps(ByValue, Pressure):
         peak = values.max(axis=1, initial=0.0)
         if not (peak > 0.0).all():
             raise InvalidValueError("pressure", "have a total > 0 at every load", f"0 at {loads[peak.argmin()]:g} N")
-        for name, array in (("loads", loads), ("values", values)):
+        for array in (loads, values):
             array.setflags(write=False)
-            object.__setattr__(self, name, array)
+        self._set(loads=loads, values=values)
         _ = self._shares  # now, and not while another thread copies what there is
 
     @functools.cached_property

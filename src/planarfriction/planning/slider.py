@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from planarfriction import validation
 from planarfriction.described import described
-from planarfriction.equality import ByValue
+from planarfriction.equality import ByValue, Checked, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.limit_surface import LimitSurface
 
@@ -49,7 +49,7 @@ class Slider(ByValue):
         if turns[0] < 0.0:
             corners = corners[::-1].copy()
         corners.setflags(write=False)
-        object.__setattr__(self, "outline", corners)
+        self._set(outline=corners)
 
     @cached_property
     def along(self) -> np.ndarray:
@@ -77,20 +77,16 @@ class Slider(ByValue):
 
 @described
 @dataclass(frozen=True)
-class Pusher:
+class Pusher(Checked):
     """The pusher: a point, or a flat face that faces along its own x axis.
 
     Raises `InvalidValueError` for numbers out of range.
     """
 
-    mu: float = 0.0
+    mu: float = checked(validation.non_negative, default=0.0)
     """Coefficient of friction between pusher and slider [-]."""
-    width: float = 0.0
+    width: float = checked(validation.non_negative, default=0.0)
     """Width of the face along the pusher's y axis [m]; 0 is a point."""
-
-    def __post_init__(self) -> None:
-        for name in ("mu", "width"):
-            object.__setattr__(self, name, validation.non_negative(name, getattr(self, name)))
 
     @property
     def ends(self) -> np.ndarray:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import validation
-from planarfriction.equality import ByValue
+from planarfriction.equality import ByValue, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import MODELS
 from planarfriction.scenes.signal import Signal, as_signal, breaks_between, sample_count
@@ -31,7 +31,17 @@ MOST_CONTACTS = 1_000_000
 
 
 def _floats(name: str, value: Any, size: int) -> tuple[float, ...]:
+    """Return `value` as a tuple of `size` finite numbers, or raise."""
     return tuple(validation.vector(name, value, size).tolist())
+
+
+def _polygon(name: str, value: Any) -> np.ndarray:
+    """Return `value` as a read-only polygon `[M, 2]` with at least three corners, or raise."""
+    corners = validation.array(name, value, (None, 2))
+    if len(corners) < 3:
+        raise InvalidValueError(name, "have at least 3 points", f"{len(corners)}")
+    corners.setflags(write=False)
+    return corners
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,19 +51,19 @@ class Body(ByValue):
     Raises InvalidValueError for a mass or an inertia that is not > 0, and for vectors of the wrong length.
     """
 
-    mass: float
+    mass: float = checked(validation.positive)
     """Mass [kg]."""
-    inertia: float
+    inertia: float = checked(validation.positive)
     """Moment of inertia about the centre of mass [kg m^2]."""
-    position: tuple[float, float] = (0.0, 0.0)
+    position: tuple[float, float] = checked(_floats, 2, default=(0.0, 0.0))
     """Initial position of the centre of mass in the world [m]."""
-    angle: float = 0.0
+    angle: float = checked(validation.number, default=0.0)
     """Initial angle of the body's axes in the world [rad]."""
-    velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    velocity: tuple[float, float, float] = checked(_floats, 3, default=(0.0, 0.0, 0.0))
     """Initial twist `(vx, vy, omega)` of the centre of mass, world axes [m/s, m/s, rad/s]."""
-    gravity: tuple[float, float] = (0.0, -9.81)
+    gravity: tuple[float, float] = checked(_floats, 2, default=(0.0, -9.81))
     """Gravity in the plane of motion, world axes [m/s^2]."""
-    outline: np.ndarray | None = field(default=None, repr=False)
+    outline: np.ndarray | None = checked(_polygon, default=None, repr=False)
     """Polygon for drawings, in body axes with the centre of mass at the origin, shape `[M, 2]` [m], or None."""
 
     if TYPE_CHECKING:  # what is given may be more than what is kept
@@ -68,19 +78,6 @@ class Body(ByValue):
             gravity: ArrayLike = (0.0, -9.81),
             outline: ArrayLike | None = None,
         ) -> None: ...
-
-    def __post_init__(self) -> None:
-        for name in ("mass", "inertia"):
-            object.__setattr__(self, name, validation.positive(name, getattr(self, name)))
-        for name, size in (("position", 2), ("velocity", 3), ("gravity", 2)):
-            object.__setattr__(self, name, _floats(name, getattr(self, name), size))
-        object.__setattr__(self, "angle", validation.number("angle", self.angle))
-        if self.outline is not None:
-            outline = validation.array("outline", self.outline, (None, 2))
-            if len(outline) < 3:
-                raise InvalidValueError("outline", "have at least 3 points", f"{len(outline)}")
-            outline.setflags(write=False)
-            object.__setattr__(self, "outline", outline)
 
 
 def between(signal: Signal) -> str:
@@ -149,21 +146,40 @@ class Contact(ByValue):
         of_contact = f"of contact {self.name!r}"
         load = as_signal(f"normal_force {of_contact}", self.normal_force, None)
         load.check_non_negative(f"normal_force {of_contact}")
-        object.__setattr__(self, "normal_force", load)
+        self._set(normal_force=load)
         validation.choice(f"mounted_on {of_contact}", self.mounted_on, ("world", "body"))
-        object.__setattr__(self, "position", _floats(f"position {of_contact}", self.position, 2))
-        object.__setattr__(self, "angle", validation.number(f"angle {of_contact}", self.angle))
-        object.__setattr__(self, "count", validation.count(f"count {of_contact}", self.count, at_most=MOST_CONTACTS))
+        self._set(
+            position=_floats(f"position {of_contact}", self.position, 2),
+            angle=validation.number(f"angle {of_contact}", self.angle),
+            count=validation.count(f"count {of_contact}", self.count, at_most=MOST_CONTACTS),
+        )
         if self.support_velocity is not None:
-            object.__setattr__(
-                self, "support_velocity", as_signal(f"support_velocity {of_contact}", self.support_velocity, 3)
-            )
+            self._set(support_velocity=as_signal(f"support_velocity {of_contact}", self.support_velocity, 3))
 
     def __repr__(self) -> str:
         count = f"{self.count} x " if self.count > 1 else ""
         moved = "" if self.support_velocity is None else ", which moves"
         load = between(self.normal_force)
         return f"Contact({self.name!r}: {count}{self.model!r} on the {self.mounted_on}{moved}, {load} N)"
+
+
+def _body(name: str, value: Any) -> Body:
+    """Return `value` if it is a body, or raise."""
+    return validation.instance(name, value, Body, "a Body")
+
+
+def _contacts(name: str, value: Any) -> tuple[Contact, ...]:
+    """Return one contact or a list of contacts as a tuple; raise for none, and for two of the same name."""
+    contacts = (value,) if isinstance(value, Contact) else value
+    if not isinstance(contacts, (list, tuple)) or not all(isinstance(contact, Contact) for contact in contacts):
+        raise InvalidValueError(name, "be a list of Contact", value)
+    if not contacts:
+        raise InvalidValueError(name, "hold at least one contact", "none")
+    names = [contact.name for contact in contacts]
+    for each in names:
+        if names.count(each) > 1:
+            raise InvalidValueError(name, "have different names", f"{each!r} {names.count(each)} times")
+    return tuple(contacts)
 
 
 @dataclass(frozen=True, eq=False)
@@ -173,27 +189,27 @@ class Scene(ByValue):
     Raises InvalidValueError, naming the parameter, if the parts do not make a valid scene.
     """
 
-    body: Body
+    body: Body = checked(_body)
     """The body that moves."""
-    contacts: Sequence[Contact]
+    contacts: Sequence[Contact] = checked(_contacts)
     """The contacts it slides on, at least one."""
-    t_end: float
+    t_end: float = checked(validation.positive)
     """Duration [s]."""
-    force: Signal | None = None
+    force: Signal | None = checked(as_signal, 3, default=None)
     """Applied wrench `(fx, fy, tau)` at the centre of mass, world axes, `[T, 3]` [N, N, N m], or None."""
-    velocity: Signal | None = None
+    velocity: Signal | None = checked(as_signal, 3, default=None)
     """Prescribed twist `(vx, vy, omega)` in **body axes**, `[T, 3]` [m/s, m/s, rad/s], or None for a free body.
 
     It is the velocity of the origin of the body's axes. Mass, inertia, gravity and initial velocity then have no
     effect.
     """
-    stop_speed: float | None = None
+    stop_speed: float | None = checked(validation.positive, default=None)
     """Speed [m/s] below which the body counts as at rest, which ends the simulation; None to run until `t_end`."""
-    save_every: float = 0.01
+    save_every: float = checked(validation.positive, default=0.01)
     """Time between saved samples [s]."""
-    rtol: float = RTOL
+    rtol: float = checked(validation.positive, default=RTOL)
     """Relative tolerance of the solver [-]."""
-    atol: float = ATOL
+    atol: float = checked(validation.positive, default=ATOL)
     """Tolerance as a share of the natural scales (see `simulate`) [-]."""
     name: str = "scene"
     """Name of the scene."""
@@ -220,25 +236,7 @@ class Scene(ByValue):
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        if not isinstance(self.body, Body):
-            raise InvalidValueError("body", "be a Body", self.body)
-        contacts = (self.contacts,) if isinstance(self.contacts, Contact) else self.contacts
-        if not isinstance(contacts, (list, tuple)) or not all(isinstance(contact, Contact) for contact in contacts):
-            raise InvalidValueError("contacts", "be a list of Contact", self.contacts)
-        if not contacts:
-            raise InvalidValueError("contacts", "hold at least one contact", "none")
-        names = [contact.name for contact in contacts]
-        for name in names:
-            if names.count(name) > 1:
-                raise InvalidValueError("contacts", "have different names", f"{name!r} {names.count(name)} times")
-        object.__setattr__(self, "contacts", tuple(contacts))
-        for name in ("t_end", "save_every", "rtol", "atol"):
-            object.__setattr__(self, name, validation.positive(name, getattr(self, name)))
-        for name in ("force", "velocity"):
-            if getattr(self, name) is not None:
-                object.__setattr__(self, name, as_signal(name, getattr(self, name), 3))
-        if self.stop_speed is not None:
-            object.__setattr__(self, "stop_speed", validation.positive("stop_speed", self.stop_speed))
+        super().__post_init__()
         if self.velocity is not None:
             for name in ("force", "stop_speed"):
                 if getattr(self, name) is not None:

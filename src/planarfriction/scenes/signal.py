@@ -93,8 +93,7 @@ class Signal(ByValue):
         validation.choice("hold", self.hold, ("previous", "linear"))
         times.setflags(write=False)
         values.setflags(write=False)
-        object.__setattr__(self, "times", times)
-        object.__setattr__(self, "values", values)
+        self._set(times=times, values=values)
 
     @classmethod
     def sampled(cls, times: ArrayLike, values: ArrayLike, hold: Hold = "previous") -> Signal:

@@ -13,6 +13,7 @@ from pydrake.multibody.plant import CoulombFriction
 from pydrake.multibody.tree import BodyIndex, FrameIndex
 
 from planarfriction import validation
+from planarfriction.equality import Checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.models import FrictionModel
 
@@ -22,7 +23,7 @@ _MATERIAL = ("material", "coulomb_friction")
 
 
 @dataclass(frozen=True)
-class PatchContact:
+class PatchContact(Checked):
     """A contact patch between two geometries, attached to the body of a frame.
 
     The x axis of the patch is that of the frame, projected on the contact plane; its normal points into the frame's
@@ -48,8 +49,7 @@ class PatchContact:
             isinstance(self.geometries, Sequence) and len(self.geometries) == 2
         ):
             raise InvalidValueError("geometries", "be the names of two geometries or bodies", self.geometries)
-        names = tuple(validation.text("geometries", name) for name in self.geometries)
-        object.__setattr__(self, "geometries", names)
+        self._set(geometries=tuple(validation.text("geometries", name) for name in self.geometries))
         validation.choice("centre", self.centre, CENTRES)
 
 

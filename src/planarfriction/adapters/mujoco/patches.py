@@ -14,6 +14,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.adapters.mujoco.loops.records import Memory
+from planarfriction.equality import Checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.models import FrictionModel
 
@@ -21,7 +22,7 @@ CENTRES = ("site", "contact")
 
 
 @dataclass(frozen=True)
-class PatchContact:
+class PatchContact(Checked):
     """A contact patch between two geoms, attached to the body of a site.
 
     The x axis of the patch is that of the site, projected on the contact plane; its normal points into the site's body.
@@ -44,7 +45,7 @@ class PatchContact:
         validation.text("site", self.site)
         if not (isinstance(self.geoms, Sequence) and len(self.geoms) == 2):
             raise InvalidValueError("geoms", "be the names of two geoms", self.geoms)
-        object.__setattr__(self, "geoms", tuple(validation.text("geoms", name) for name in self.geoms))
+        self._set(geoms=tuple(validation.text("geoms", name) for name in self.geoms))
         validation.choice("centre", self.centre, CENTRES)
 
 
