@@ -35,7 +35,7 @@ class FrictionLaw(Checked):
         return self.numbers.mu_c / self.numbers.sigma_0
 
     def steady_friction(self, speed: ArrayLike) -> np.ndarray:
-        """Friction force over normal force [-] in steady sliding at `speed` >= 0 `[...]` [m/s].
+        """Return the friction force over normal force [-] in steady sliding at `speed` >= 0 `[...]` [m/s].
 
         `g(v) v/(v + v_c) + sigma_2 v`; laws without creep (v_c = 0) have `g(0)` at rest.
 
@@ -46,7 +46,7 @@ class FrictionLaw(Checked):
         return formulas.stribeck(np, speed, law) * share + law.sigma_2 * speed
 
     def rate(self, state: ArrayLike, velocity: ArrayLike, *, axis: int | None = None) -> np.ndarray:
-        """Rate `zdot = v - k z` [m/s] of bristles with deflection `state` [m]; both broadcast.
+        """Return the rate `zdot = v - k z` [m/s] of bristles with deflection `state` [m]; both broadcast.
 
         Raises InvalidValueError for shapes that do not broadcast.
         """
@@ -60,7 +60,8 @@ class FrictionLaw(Checked):
     def force(
         self, state: ArrayLike, velocity: ArrayLike, normal_force: ArrayLike, *, axis: int | None = None
     ) -> np.ndarray:
-        """Friction force [N] on the moving body; `normal_force` [N] broadcasts with bristles, not with components.
+        """Return the friction force [N] on the moving body; `normal_force` [N] broadcasts with bristles, not with
+        components.
 
         Raises InvalidValueError for a load below zero, and for shapes that do not broadcast.
         """
@@ -73,7 +74,7 @@ class FrictionLaw(Checked):
 
 
 def _bristles(state: Any, velocity: Any, axis: int | None) -> tuple[np.ndarray, np.ndarray]:
-    """Both inputs as arrays that broadcast and have such an axis."""
+    """Return both inputs as arrays that broadcast and have such an axis."""
     z, v = validation.finite_numbers("state", state), validation.finite_numbers("velocity", velocity)
     least = min(z.ndim, v.ndim)
     validation.broadcast(state=z, velocity=v)

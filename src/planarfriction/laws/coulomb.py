@@ -26,7 +26,7 @@ class Coulomb(Checked):
     """Friction coefficient [-]."""
 
     def wrench(self, surface: Any, twist: ArrayLike, normal_force: ArrayLike) -> np.ndarray:
-        """Friction wrench `mu f_N W(V)` on the sliding body about the contact frame's origin [N, N, N m].
+        """Return the friction wrench `mu f_N W(V)` on the sliding body about the contact frame's origin [N, N, N m].
 
         `surface` is any limit surface, `twist` has shape `[..., 3]` [m/s, m/s, rad/s], `normal_force` `[...]` [N]. At
         rest the wrench is zero: Coulomb's law alone does not determine the force of a sticking contact.

@@ -95,7 +95,7 @@ class LimitSurface(ByValue):
             _ = self.contact_radius  # refuses a patch of one point now rather than later
 
     def __getstate__(self) -> dict[str, Any]:
-        """What a copy or another process gets, at one instant: another thread may be about to build something."""
+        """Return the fields for a copy or another process in one step: another thread may be adding one meanwhile."""
         return dict(self.__dict__)
 
     def __repr__(self) -> str:
@@ -106,8 +106,8 @@ class LimitSurface(ByValue):
         return picture("limit surface in a notebook", self)
 
     def at(self, normal_force: float) -> LimitSurface:
-        """The same kind of surface for the shape at another load; returns itself if the shape does not depend on the
-        load.
+        """Return the same kind of surface for the shape at another load; returns itself if the shape does not depend on
+        the load.
 
         Raises InvalidValueError for a load that is not > 0.
         """
@@ -136,7 +136,8 @@ class LimitSurface(ByValue):
         return float(self.patch.contact_radius(self.normal_force))
 
     def _loaded_cells(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Positions about the centre of pressure (see `lever_coordinates`) and weights of the cells that carry load."""
+        """Return the positions about the centre of pressure (see `lever_coordinates`) and weights of the cells that
+        carry load."""
         weights = self.patch.weights(self.normal_force)
         loaded = weights > 0.0
         offset = self.patch.positions - self.centre_of_pressure
@@ -147,7 +148,7 @@ class LimitSurface(ByValue):
 
     @property
     def _one_metric(self) -> bool:
-        """Whether the cells have one metric, which lever coordinates and frame then take care of."""
+        """True if all cells have one metric, for which lever coordinates and frame account."""
         return self.patch.root is None or self.patch.root.ndim == 2
 
     @functools.cached_property
@@ -162,7 +163,7 @@ class LimitSurface(ByValue):
 
     @functools.cached_property
     def _lean(self) -> np.ndarray | None:
-        """What the asymmetry adds to `h`, `[3]`, or None."""
+        """Contribution of the asymmetry to `h`, `[3]`, or None."""
         if not self.patch.asymmetric:
             return None
         weights = self.patch.weights(self.normal_force)
@@ -172,7 +173,7 @@ class LimitSurface(ByValue):
     # ------------------------------------------------------------------ what a surface says of itself
 
     def direction(self, units: np.ndarray) -> np.ndarray:
-        """Negative friction `h` `[M, 3]` for unit scaled twists `[M, 3]`; every surface must define this.
+        """Return the negative friction `h` `[M, 3]` for unit scaled twists `[M, 3]`; every surface must define this.
 
         Scaled twists are `V_S = (vx, vy, r omega)` about the centre of pressure, with `r` the `contact_radius`, and `h
         = -(fx, fy, tau/r)` is the gradient of the dissipation with respect to them. It depends only on the direction of
@@ -181,7 +182,7 @@ class LimitSurface(ByValue):
         raise NotImplementedError(f"{type(self).__name__} has to implement direction(units)")
 
     def direction_slope(self, units: np.ndarray) -> np.ndarray:
-        """`dh/dV_S` `[M, 3, 3]` at unit scaled twists `[M, 3]`: by central differences unless overridden."""
+        """Return `dh/dV_S` `[M, 3, 3]` at unit scaled twists `[M, 3]`: by central differences unless overridden."""
         slope = np.zeros((len(units), 3, 3))
         for axis in np.moveaxis(across(units), -2, 0):
             ends = [self.direction(_unit(units + sign * _DIFFERENCE * axis)) for sign in (1.0, -1.0)]
@@ -199,7 +200,7 @@ class LimitSurface(ByValue):
     # ------------------------------------------------------------------ the protocol
 
     def wrench(self, twist: ArrayLike) -> np.ndarray:
-        """Friction wrench `W(V)` on the moving body, shape `[..., 3]` [1, 1, m]; zero at rest.
+        """Return the friction wrench `W(V)` on the moving body, shape `[..., 3]` [1, 1, m]; zero at rest.
 
         Raises `InvalidValueError` if `twist` is not finite or not of shape `[..., 3]`.
         """
@@ -207,7 +208,7 @@ class LimitSurface(ByValue):
         return -transformed(frame.T, self._direction(scaled))
 
     def dissipation(self, twist: ArrayLike) -> np.ndarray:
-        """Dissipated power `Phi(V) = -W . V >= 0` per unit `mu f_N`, shape `[...]` [m/s].
+        """Return the dissipated power `Phi(V) = -W . V >= 0` per unit `mu f_N`, shape `[...]` [m/s].
 
         Raises InvalidValueError for a twist that is not `[..., 3]`, and without a load that is needed.
         """
@@ -215,7 +216,7 @@ class LimitSurface(ByValue):
         return np.einsum("...i,...i", self._direction(scaled), scaled)
 
     def jacobian(self, twist: ArrayLike) -> np.ndarray:
-        """`dW/dV`, shape `[..., 3, 3]`; zero along `V` itself. At rest it is undefined and returned as zero.
+        """Return `dW/dV`, shape `[..., 3, 3]`; zero along `V` itself. At rest it is undefined and returned as zero.
 
         Raises InvalidValueError for a twist that is not `[..., 3]`, and without a load that is needed.
         """
@@ -224,7 +225,8 @@ class LimitSurface(ByValue):
         return -(frame.T @ self._direction_slope(flat) @ frame).reshape(*scaled.shape[:-1], 3, 3)
 
     def twist(self, wrench: ArrayLike) -> np.ndarray:
-        """Twist of unit dissipation normal to the surface where the ray of `wrench` meets it, shape `[..., 3]`.
+        """Return the twist of unit dissipation normal to the surface where the ray of `wrench` meets it, shape
+        `[..., 3]`.
 
         `argmin Phi(V)` subject to `-W . V = 1`, scaled to `Phi(V) = 1`; the magnitude of `wrench` does not matter. The
         wrench of the returned twist is parallel to the given one within `CERTIFIED`. If the patch turns about a loaded
@@ -259,7 +261,7 @@ class LimitSurface(ByValue):
     # ------------------------------------------------------------------ scaled coordinates
 
     def _frame(self) -> np.ndarray:
-        """`V_S = frame @ V`: from the origin to the centre of pressure, spin times the contact radius.
+        """Return `V_S = frame @ V`: from the origin to the centre of pressure, spin times the contact radius.
 
         With a friction metric the velocity there is `L v`; metrics per cell share the root of their mean.
         """
@@ -287,7 +289,7 @@ class LimitSurface(ByValue):
         return transformed(frame, _rows("twist", twist)), frame
 
     def _direction(self, scaled: np.ndarray) -> np.ndarray:
-        """`h` of scaled twists `[..., 3]`, with what the asymmetry adds; zero at rest."""
+        """Return `h` of scaled twists `[..., 3]`, with what the asymmetry adds; zero at rest."""
         flat = scaled.reshape(-1, 3)
         moving, h = _norm(flat) > 0.0, np.zeros_like(flat)
         h[moving] = self.direction(_unit(flat[moving]))
@@ -296,14 +298,15 @@ class LimitSurface(ByValue):
         return h.reshape(scaled.shape)
 
     def _direction_slope(self, scaled: np.ndarray) -> np.ndarray:
-        """`dh/dV_S` for scaled twists `[M, 3]`, shape `[M, 3, 3]`; zero at rest."""
+        """Return `dh/dV_S` for scaled twists `[M, 3]`, shape `[M, 3, 3]`; zero at rest."""
         speed, slope = _norm(scaled), np.zeros((len(scaled), 3, 3))
         moving = speed > 0.0
         slope[moving] = self.direction_slope(_unit(scaled[moving])) / speed[moving, None, None]
         return slope
 
     def _sliding_slope(self, scaled: np.ndarray) -> np.ndarray:
-        """`du/dV_S` of `u = h |V_S|` without asymmetry, for `[M, 3]`, shape `[M, 3, 3]`; at rest the ellipsoid's."""
+        """Return `du/dV_S` of `u = h |V_S|` without asymmetry, for `[M, 3]`, shape `[M, 3, 3]`; at rest the
+        ellipsoid's."""
         slope, moving = np.tile(np.eye(3), (len(scaled), 1, 1)), _norm(scaled) > 0.0
         units = _unit(scaled[moving])
         slope[moving] = self.direction_slope(units) + np.einsum("mi,mj->mij", self.direction(units), units)
@@ -319,18 +322,19 @@ class LimitSurface(ByValue):
 
 
 def scaling(centre_of_pressure: np.ndarray, contact_radius: float) -> np.ndarray:
-    """`F` of `V_S = F V`: from the contact frame's origin to the centre of pressure, spin times the contact radius."""
+    """Return `F` of `V_S = F V`: from the contact frame's origin to the centre of pressure, spin times the contact
+    radius."""
     x, y = centre_of_pressure
     return np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, contact_radius]])
 
 
 def _norm(scaled: np.ndarray) -> np.ndarray:
-    """Lengths `[M]` of scaled twists `[M, 3]`, however large or small."""
+    """Return the lengths `[M]` of scaled twists `[M, 3]`, however large or small."""
     return np.hypot(np.hypot(scaled[:, 0], scaled[:, 1]), scaled[:, 2])
 
 
 def _unit(scaled: np.ndarray) -> np.ndarray:
-    """Directions `[M, 3]` of scaled twists that are not at rest."""
+    """Return the directions `[M, 3]` of scaled twists that are not at rest."""
     return scaled / _norm(scaled)[:, None]
 
 
@@ -346,7 +350,7 @@ def _rows(name: str, value) -> np.ndarray:
 
 
 def _no_twist(wrench: np.ndarray, angle: float) -> FrictionError:
-    """Why there is no twist of `wrench` `[..., 3]`; raises that itself if it is not finite."""
+    """Return the error that says why there is no twist of `wrench` `[..., 3]`; raise at once if it is not finite."""
     validation.finite_numbers("wrench", wrench, largest=math.inf)
     if not (np.abs(wrench).max(axis=-1) > 0.0).all():
         return InvalidValueError("wrench", "not be zero", wrench.tolist())

@@ -12,7 +12,7 @@ _AT_ONCE = 500_000
 
 
 def scaled_levers(x: np.ndarray, y: np.ndarray, root: np.ndarray | None, frame: np.ndarray) -> np.ndarray:
-    """`C_i = [L_i frame^-1 | (-y_i, x_i)]`, shape `[n, 2, 3]`, of lever coordinates in contact radii.
+    """Return `C_i = [L_i frame^-1 | (-y_i, x_i)]`, shape `[n, 2, 3]`, of lever coordinates in contact radii.
 
     `root` holds the `L_i` `[n, 2, 2]`, None where all of them are `frame` `[2, 2]`.
     """
@@ -23,7 +23,7 @@ def scaled_levers(x: np.ndarray, y: np.ndarray, root: np.ndarray | None, frame: 
 
 
 def cell_sums(levers: np.ndarray, weights: np.ndarray, scaled: np.ndarray) -> np.ndarray:
-    """`u = h |V_S|` for scaled twists `[M, 3]`, shape `[M, 3]`."""
+    """Return `u = h |V_S|` for scaled twists `[M, 3]`, shape `[M, 3]`."""
     result = np.empty((len(scaled), 3))
     for part in _parts(scaled, levers):
         speed, _, unit = _headings(levers, scaled[part])
@@ -32,7 +32,7 @@ def cell_sums(levers: np.ndarray, weights: np.ndarray, scaled: np.ndarray) -> np
 
 
 def cell_slopes(levers: np.ndarray, weights: np.ndarray, scaled: np.ndarray) -> np.ndarray:
-    """`du/dV_S` for scaled twists `[M, 3]`, shape `[M, 3, 3]`; at rest the unit matrix."""
+    """Return `du/dV_S` for scaled twists `[M, 3]`, shape `[M, 3, 3]`; at rest the unit matrix."""
     result = np.empty((len(scaled), 3, 3))
     for part in _parts(scaled, levers):
         twist = scaled[part]
@@ -47,7 +47,7 @@ def cell_slopes(levers: np.ndarray, weights: np.ndarray, scaled: np.ndarray) -> 
 
 
 def potential_table(levers: np.ndarray, weights: np.ndarray, segments: int) -> np.ndarray:
-    """Numbers of a `POTENTIAL` surface of `kernels.surfaces`, flat, from sums over the cells."""
+    """Return the numbers of a `POTENTIAL` surface of `kernels.surfaces`, flat, from sums over the cells."""
     segment = 0.5 * np.pi / segments
     polar, azimuth = np.arange(segments + 1)[:, None] * segment, np.arange(4 * segments) * segment
     sin_p, cos_p = np.sin(polar), np.cos(polar)
@@ -77,13 +77,13 @@ def _parts(scaled: np.ndarray, levers: np.ndarray) -> list[slice]:
 
 
 def _direction(levers: np.ndarray, weights: np.ndarray, unit: np.ndarray) -> np.ndarray:
-    """`h` `[m, 3]` of `u_i/|u_i|` `[m, n, 2]`: sums that run over the cells alike for one twist and for many."""
+    """Return `h` `[m, 3]` of `u_i/|u_i|` `[m, n, 2]`: sums that run over the cells alike for one twist and for many."""
     pull = np.ascontiguousarray((weights[:, None, None] * levers).reshape(-1, 3).T)
     return np.einsum("mk,dk->md", unit.reshape(len(unit), -1), pull)
 
 
 def _headings(levers: np.ndarray, scaled: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """`|V_S|` `[m, 1]`, and `|u_i|` `[m, n]` and `u_i/|u_i|` `[m, n, 2]`, both zero for cells at rest."""
+    """Return `|V_S|` `[m, 1]`, and `|u_i|` `[m, n]` and `u_i/|u_i|` `[m, n, 2]`, both zero for cells at rest."""
     speed = np.linalg.norm(scaled, axis=1)[:, None]
     seen = np.einsum("ncd,md->mnc", levers, scaled)
     size = np.hypot(seen[..., 0], seen[..., 1])

@@ -45,5 +45,6 @@ class LimitSurfaceCells(CompiledLimitSurface):
         return np.ascontiguousarray(np.moveaxis(levers, 0, -1)), weights
 
     def _find_twists(self, wrenches: np.ndarray, found: np.ndarray) -> float:
-        """The minimum often lies on a kink: a wrench inside a flat facet of the surface turns the body about a cell."""
+        """Find twists; the minimum often lies on a kink, as a wrench inside a flat facet turns the body about a
+        cell."""
         return cell_twists(*self._cell_rows, self._scaling, wrenches, found)

@@ -1,4 +1,4 @@
-"""How far two limit surfaces differ: in force, and in the twist that belongs to a wrench."""
+"""Comparison of two limit surfaces: their wrenches of the same twist, and their twists of the same wrench."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Spread:
 
     @classmethod
     def of(cls, values: np.ndarray) -> Spread:
-        """Those of values `[M]`."""
+        """Return the statistics of values `[M]`."""
         size = np.abs(values)
         return cls(float(size.max()), float(size.mean()), float(np.sqrt(np.mean(size**2))))
 
@@ -44,7 +44,8 @@ class SurfaceComparison:
     torque: Spread
     """Difference between their torques about the reference's centre of pressure, divided by its contact radius [-]."""
     radius: Spread
-    """How much further out the surface is in the direction of the same wrench, relative to the reference [-]."""
+    """Distance of the surface from the origin in the direction of a wrench, over that of the reference, less one
+    [-]."""
     angle: Spread
     """Angle between the twists `(vx, vy, r omega)` of the same wrench [deg]."""
     samples: int
@@ -61,7 +62,7 @@ class SurfaceComparison:
 
 
 def directions(count: int) -> np.ndarray:
-    """`count` unit vectors spread evenly over the sphere, always the same, `[count, 3]`.
+    """Return `count` unit vectors spread evenly over the sphere, always the same, `[count, 3]`.
 
     Points of a golden spiral: heights at equal steps, each turned from the last by the golden angle.
     """
@@ -72,7 +73,7 @@ def directions(count: int) -> np.ndarray:
 
 
 def compare(surface: LimitSurface, reference: LimitSurface, samples: int) -> SurfaceComparison:
-    """See `LimitSurface.compare`."""
+    """Implement `LimitSurface.compare`."""
     from planarfriction.limit_surface.base import LimitSurface
 
     if not isinstance(reference, LimitSurface):
@@ -93,6 +94,6 @@ def compare(surface: LimitSurface, reference: LimitSurface, samples: int) -> Sur
 
 
 def angles(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Angles between vectors `[..., 3]` [deg]."""
+    """Return the angles between vectors `[..., 3]` [deg]."""
     across = np.linalg.norm(np.cross(first, second), axis=-1)
     return np.degrees(np.arctan2(across, np.einsum("...i,...i", first, second)))

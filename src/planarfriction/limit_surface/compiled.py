@@ -23,15 +23,15 @@ class CompiledLimitSurface(LimitSurface):
         raise NotImplementedError
 
     def direction(self, units: np.ndarray) -> np.ndarray:
-        """As compiled loops compute it."""
+        """Evaluate the compiled loops."""
         return self._sliding(np.ascontiguousarray(units))
 
     def direction_slope(self, units: np.ndarray) -> np.ndarray:
-        """As compiled loops compute it."""
+        """Evaluate the compiled loops."""
         return self._sliding_slope(units) - np.einsum("mi,mj->mij", self.direction(units), units)
 
     def _sliding(self, scaled: np.ndarray) -> np.ndarray:
-        """`u = h |V_S|` for scaled twists `[M, 3]`, without what the asymmetry adds."""
+        """Return `u = h |V_S|` for scaled twists `[M, 3]`, without what the asymmetry adds."""
         u, numbers = np.empty_like(scaled), self.numbers
         kernels.sliding_batch(self.kind, numbers.data, 0, numbers.size, scaled, u)
         return u

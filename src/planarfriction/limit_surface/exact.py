@@ -47,7 +47,8 @@ Rules = tuple[tuple[float, int], ...]
 
 
 class _Parts(Protocol):
-    """What a surface is integrated over: sums `[M, 9]` at unit twists `[M, 3]`, in the unit of length `unit` [m]."""
+    """Domain that a surface is integrated over: gives sums `[M, 9]` at unit twists `[M, 3]`, in the unit of length
+    `unit` [m]."""
 
     def sums(self, twists: np.ndarray, unit: float, rules: Rules) -> np.ndarray: ...
 
@@ -68,7 +69,7 @@ class _Elements(NamedTuple):
         return sums
 
     def rows(self, unit: float, rules: Rules = EXACT_RULES) -> kernels.Elements:
-        """As compiled loops know them."""
+        """Return the record of the domain for compiled loops."""
         corners = self.corners / unit
         return kernels.Elements(corners, _shape(corners, self.weights), *_gauss_rules(corners.shape[1], rules))
 
@@ -87,7 +88,7 @@ class _Discs(NamedTuple):
         return sums
 
     def rows(self, unit: float) -> kernels.Discs:
-        """As compiled loops know them."""
+        """Return the record of the domain for compiled loops."""
         return kernels.Discs(self.radii / unit, self.loads)
 
 
@@ -108,7 +109,7 @@ class _Rings(NamedTuple):
         return sums
 
     def rows(self, unit: float) -> kernels.Rings:
-        """As compiled loops know them."""
+        """Return the record of the domain for compiled loops."""
         radii = (self.inner / unit, min(self.outer, self.reach) / unit, self.reach / unit)
         return kernels.Rings(*_double_exponential(), *radii, self.exponent)
 
@@ -162,7 +163,7 @@ class LimitSurfaceExact(LimitSurface):
 
     @property
     def _soft(self) -> tuple[float, float]:
-        """Where the pressure on a disc or ring ends [m], and the exponent of its profile."""
+        """Radius at which the pressure on a disc or ring ends [m], and the exponent of its profile."""
         pressure, load = self.patch.pressure, self.normal_force or 1.0
         if isinstance(pressure, SoftFinger):
             return float(pressure.radius(load)), float(pressure.exponent(load))
@@ -170,7 +171,7 @@ class LimitSurfaceExact(LimitSurface):
 
     @functools.cached_property
     def _parts(self) -> _Parts:
-        """What is integrated over."""
+        """Domain that the surface is integrated over."""
         outline, pressure = self._outline, self.patch.pressure
         self.patch.weights(self.normal_force)  # refuses a missing normal force
         if isinstance(outline, RoundOutline):
@@ -191,14 +192,15 @@ class LimitSurfaceExact(LimitSurface):
         return _Elements(corners, weights)
 
     def _lever_corners(self, corners: np.ndarray) -> np.ndarray:
-        """Corners `[..., 2]` in the lever coordinates of a friction metric, which maps quads to quads."""
+        """Return the corners `[..., 2]` in the lever coordinates of a friction metric, which maps quads to quads."""
         return np.stack(self.patch.lever_coordinates(corners[..., 0], corners[..., 1]), -1)
 
     def _radius(self) -> float:
         return float(self._parts.sums(np.array([[0.0, 0.0, 1.0]]), 1.0, EXACT_RULES)[0, 2])
 
     def sums(self, scaled: np.ndarray, rules: Rules = EXACT_RULES) -> tuple[np.ndarray, np.ndarray]:
-        """Gradient `[M, 3]` and second derivatives `[M, 3, 3]` of the dissipation, for scaled twists `[M, 3]`."""
+        """Return the gradient `[M, 3]` and second derivatives `[M, 3, 3]` of the dissipation, for scaled twists
+        `[M, 3]`."""
         speed = _norm(scaled)
         moving = speed > 0.0
         sums = np.zeros((len(scaled), 9))
@@ -209,11 +211,12 @@ class LimitSurfaceExact(LimitSurface):
         return sums[:, :3], slopes.reshape(-1, 3, 3)
 
     def direction(self, units: np.ndarray) -> np.ndarray:
-        """Negative friction `h` `[M, 3]` for unit scaled twists `[M, 3]`, in closed form where there is one."""
+        """Return the negative friction `h` `[M, 3]` for unit scaled twists `[M, 3]`, in closed form where there is
+        one."""
         return self.sums(units)[0]
 
     def direction_slope(self, units: np.ndarray) -> np.ndarray:
-        """`dh/dV_S` `[M, 3, 3]`, integrated in the same way."""
+        """Return `dh/dV_S` `[M, 3, 3]`, integrated in the same way."""
         return self.sums(units)[1]
 
     @functools.cached_property
@@ -224,7 +227,7 @@ class LimitSurfaceExact(LimitSurface):
 
     @functools.cached_property
     def _loops(self) -> tuple[kernels.Elements, kernels.Discs, kernels.Rings]:
-        """What compiled loops integrate over: of the three only that which is not empty."""
+        """Domains for compiled loops: elements, discs and rings, of which only one is not empty."""
         none = np.zeros(0)
         elements = _Elements(np.zeros((0, 2, 2)), none).rows(1.0)
         discs, rings = kernels.Discs(none, none), kernels.Rings(none, none, 0.0, 1.0, 1.0, 1.0)
@@ -240,7 +243,7 @@ class LimitSurfaceExact(LimitSurface):
 
 
 def _area(triangles: np.ndarray) -> np.ndarray:
-    """Signed areas `[N]` [m^2] of triangles `[N, 3, 2]` [m]."""
+    """Return the signed areas `[N]` [m^2] of triangles `[N, 3, 2]` [m]."""
     first, second = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     return 0.5 * _cross(first, second)
 
@@ -250,7 +253,7 @@ def _cross(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 
 def _shape(corners: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """The coefficients `[N, 13]` that `limit_surface.loops.closed_forms` wants of elements and their weights."""
+    """Return the coefficients `[N, 13]` that `limit_surface.loops.closed_forms` wants of elements and their weights."""
     count = corners.shape[1]
     signs = {
         kernels.POINTS: [[1.0], [0.0], [0.0], [0.0]],
@@ -277,7 +280,8 @@ def _shape(corners: np.ndarray, weights: np.ndarray) -> np.ndarray:
 
 @functools.cache
 def _gauss_rules(count: int, rules: Rules) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The rules for elements of so many corners: nodes `[J, 3, K]` (xi, eta, weight), numbers and distances `[J]`."""
+    """Return the rules for elements of so many corners: nodes `[J, 3, K]` (xi, eta, weight), numbers and distances
+    `[J]`."""
     if count == kernels.POINTS:
         return np.array([[[0.0], [0.0], [1.0]]]), np.array([1]), np.zeros(1)
     nodes = np.zeros((len(rules), 3, max(side for _, side in rules) ** 2))
@@ -293,7 +297,8 @@ def _gauss_rules(count: int, rules: Rules) -> tuple[np.ndarray, np.ndarray, np.n
 
 @functools.cache
 def _double_exponential() -> tuple[np.ndarray, np.ndarray]:
-    """Nodes in (0, 1) and weights of the double-exponential rule: any singularity at the ends may be integrated."""
+    """Return the nodes in (0, 1) and weights of the double-exponential rule: any singularity at the ends may be
+    integrated."""
     t = np.linspace(-_ENDS, _ENDS, _RADII)
     step = np.exp(-np.pi * np.abs(np.sinh(t)))
     share = np.where(t < 0.0, step, 1.0) / (1.0 + step)

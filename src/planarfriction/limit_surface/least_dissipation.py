@@ -23,7 +23,7 @@ _MOST_STEPS = 60
 
 
 def table_of(surface: LimitSurface) -> Table:
-    """The stored potential of a surface, and its directions over their dissipation."""
+    """Return the stored potential of a surface, and its directions over their dissipation."""
     _, size, data = surface.numbers
     angle = 0.5 * np.pi / size * np.arange(4 * size)
     polar, azimuth = angle[: size + 1, None], angle[None, :]
@@ -40,7 +40,8 @@ def table_of(surface: LimitSurface) -> Table:
 
 
 def descend(surface: LimitSurface, wrenches: np.ndarray, twists: np.ndarray) -> float:
-    """Improve twists `[M, 3]` of wrenches `[M, 3]`; the largest angle [rad] that is left, in scaled coordinates."""
+    """Improve twists `[M, 3]` of wrenches `[M, 3]`; return the largest angle [rad] that is left, in scaled
+    coordinates."""
     scaling, worst = surface._scaling, 0.0
     back = scaling[9:18].reshape(3, 3)
     for wrench, twist in zip(wrenches, twists, strict=True):
@@ -53,7 +54,8 @@ def descend(surface: LimitSurface, wrenches: np.ndarray, twists: np.ndarray) -> 
 
 
 def _least(surface: LimitSurface, target: np.ndarray, guess: np.ndarray) -> tuple[np.ndarray, float]:
-    """Scaled twist of unit dissipation whose `h` is parallel to the unit vector `target`, and the angle [rad] left.
+    """Return the scaled twist of unit dissipation whose `h` is parallel to the unit vector `target`, and the angle
+    [rad] left.
 
     As `limit_surface.loops.twists`: minimises the convex `Phi` over the plane `target . V = 1` by damped Newton steps.
     """
@@ -87,7 +89,7 @@ def _least(surface: LimitSurface, target: np.ndarray, guess: np.ndarray) -> tupl
 
 
 def _dissipation_over(surface: LimitSurface, target, basis, place) -> tuple[float, np.ndarray, float]:
-    """`Phi`, its slope `[2]` and the angle between h and the target at a place in the plane `target . V = 1`."""
+    """Return `Phi`, its slope `[2]` and the angle between h and the target at a place in the plane `target . V = 1`."""
     point = target + place @ basis
     h = surface._direction(point[None])[0]
     slope = basis @ h
@@ -95,7 +97,7 @@ def _dissipation_over(surface: LimitSurface, target, basis, place) -> tuple[floa
 
 
 def across(normal: np.ndarray) -> np.ndarray:
-    """Two unit vectors `[..., 2, 3]` that span the plane across the unit vector `normal` `[..., 3]`."""
+    """Return two unit vectors `[..., 2, 3]` that span the plane across the unit vector `normal` `[..., 3]`."""
     first = np.cross(normal, np.eye(3)[np.argmin(np.abs(normal), axis=-1)])
     first /= np.linalg.norm(first, axis=-1)[..., None]
     return np.stack([first, np.cross(normal, first)], axis=-2)

@@ -24,13 +24,14 @@ for _row, _powers in enumerate(POWERS):
 
 
 def monomials(points: np.ndarray) -> np.ndarray:
-    """The 15 monomials at points `[M, 3]`, shape `[M, 15]`."""
+    """Return the 15 monomials at points `[M, 3]`, shape `[M, 15]`."""
     return np.prod(points[:, None, :] ** POWERS, axis=-1)
 
 
 @functools.cache
 def _differentiated(order: int) -> tuple[np.ndarray, np.ndarray]:
-    """Factors `[15, 3, ...]` and powers `[15, 3, ..., 3]` of the monomials' derivatives of first or second order."""
+    """Return the factors `[15, 3, ...]` and powers `[15, 3, ..., 3]` of the monomials' derivatives of first or second
+    order."""
     factors, powers = np.ones(15), POWERS.astype(float)
     for _ in range(order):
         factors = factors[..., None] * powers
@@ -39,20 +40,20 @@ def _differentiated(order: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def gradients(points: np.ndarray) -> np.ndarray:
-    """Gradients of the monomials, shape `[M, 15, 3]`."""
+    """Return the gradients of the monomials, shape `[M, 15, 3]`."""
     factors, powers = _differentiated(1)
     return factors * np.prod(points[:, None, None, :] ** powers, axis=-1)
 
 
 def hessians(points: np.ndarray) -> np.ndarray:
-    """Second derivatives of the monomials, shape `[M, 15, 3, 3]`."""
+    """Return the second derivatives of the monomials, shape `[M, 15, 3, 3]`."""
     factors, powers = _differentiated(2)
     return factors * np.prod(points[:, None, None, None, :] ** powers, axis=-1)
 
 
 @functools.cache
 def _certificate_equations() -> tuple[np.ndarray, np.ndarray]:
-    """`C [36, 15]` and `Y [36, 81]` of `z' H(x) z = y' Q y` as `C c = Y vec(Q)`, `y = (x_i z_j)`.
+    """Return `C [36, 15]` and `Y [36, 81]` of `z' H(x) z = y' Q y` as `C c = Y vec(Q)`, `y = (x_i z_j)`.
 
     One row for each monomial `x_i x_j z_k z_l`, i <= j, k <= l.
     """
@@ -70,7 +71,7 @@ def _certificate_equations() -> tuple[np.ndarray, np.ndarray]:
 
 
 def certificate(coefficients: np.ndarray) -> np.ndarray:
-    """Matrix `Q [9, 9]` of the quartic with the largest smallest eigenvalue, exact in its equations.
+    """Return the matrix `Q [9, 9]` of the quartic with the largest smallest eigenvalue, exact in its equations.
 
     Positive semidefinite: the quartic is convex, as `z' H(x) z = y' Q y >= 0` for all x, z.
     """
@@ -87,7 +88,7 @@ def certificate(coefficients: np.ndarray) -> np.ndarray:
 
 
 def _exactly(matrix: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """The nearest symmetric matrix that fulfils the equations to rounding."""
+    """Return the nearest symmetric matrix that fulfils the equations to rounding."""
     _, of_matrix = _certificate_equations()
     matrix = 0.5 * (matrix + matrix.T)
     missing = wanted - of_matrix @ matrix.reshape(81)
@@ -95,7 +96,8 @@ def _exactly(matrix: np.ndarray, wanted: np.ndarray) -> np.ndarray:
 
 
 def least_squares(rows: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Coefficients `[15]` of the convex quartic with the least `|rows c - values|`; rows `[M, 15]`, values `[M]`.
+    """Return the coefficients `[15]` of the convex quartic with the least `|rows c - values|`; rows `[M, 15]`, values
+    `[M]`.
 
     Without the constraint where that is convex anyway: then to rounding, otherwise to the solver's tolerance.
     """

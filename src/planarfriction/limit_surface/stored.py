@@ -8,7 +8,8 @@ import numpy as np
 
 
 def stored_potential(direction: Callable[[np.ndarray], np.ndarray], segments: int) -> np.ndarray:
-    """Numbers of kind `POTENTIAL` from `h(V_S)` `[..., 3]`: potential, its slopes and the mixed one, then the tilt.
+    """Return the numbers of kind `POTENTIAL` from `h(V_S)` `[..., 3]`: potential, its slopes and the mixed one, then
+    the tilt.
 
     What `limit_surface.cell_metrics.potential_table` makes of sums over cells, from any `direction`.
     """

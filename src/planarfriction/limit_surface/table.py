@@ -59,7 +59,8 @@ class LimitSurfaceTable(CompiledLimitSurface):
 
 
 def _nodes(exact: LimitSurfaceExact, segments: int) -> np.ndarray:
-    """The numbers of `kernels.surfaces.POTENTIAL`: `phi` less the tilt and its derivatives at the nodes, and the tilt.
+    """Return the numbers of `kernels.surfaces.POTENTIAL`: `phi` less the tilt and its derivatives at the nodes, and the
+    tilt.
 
     With the unit vectors `n` of a direction, `e` and `t` of growing polar angle p and azimuth:
     `dphi/dp = h . e`, `dphi/da = sin p (h . t)`, `d2phi/dp da = sin p (t . dh/dn e) + cos p (h . t)`.

@@ -34,7 +34,7 @@ class LimitSurfaceTablePublished(CompiledLimitSurface):
     kind = kernels.BILINEAR
 
     def _grid(self) -> tuple[tuple[float, float, float, float], np.ndarray]:
-        """The patch's grid about the centre of pressure, and a place for the sums at its corners, of the caller alone.
+        """Return the patch's grid about the centre of pressure, and new memory for the sums at its corners.
 
         Compiled loops fill it as they go: two threads with one place would see each other's corners half done.
         """
@@ -58,5 +58,6 @@ class LimitSurfaceTablePublished(CompiledLimitSurface):
         return SurfaceNumbers(self.kind, self.segments, nodes.reshape(-1))
 
     def _find_twists(self, wrenches: np.ndarray, found: np.ndarray) -> float:
-        """Where the stored map folds and several directions answer, the one of least dissipation."""
+        """Find twists; where several directions answer because the stored map folds, take the one of least
+        dissipation."""
         return published_twists(self.numbers.data, self.segments, self._scaling, wrenches, found)

@@ -73,14 +73,14 @@ HIGHEST_DEGREE = 16
 
 
 def number_of_moments(degree: int) -> int:
-    """Number of monomials in x and y up to `degree`: `(degree + 1)(degree + 2)/2`."""
+    """Return the number of monomials in x and y up to `degree`: `(degree + 1)(degree + 2)/2`."""
     return (degree + 1) * (degree + 2) // 2
 
 
 def compressed(
     patch: ContactPatch, degree: int = 5, *, cells: int | None = None, error: float | None = None, loads: Any = None
 ) -> ContactPatch:
-    """See `ContactPatch.compressed`."""
+    """Implement `ContactPatch.compressed`."""
     refuse_cell_metrics(patch, "compressed")
     degree = validation.count("degree", degree, at_most=2 * HIGHEST_DEGREE)
     if error is not None:
@@ -103,8 +103,8 @@ def compressed(
 
 
 def surface_error(patch: ContactPatch, few: ContactPatch, normal_force: ArrayLike | None = None) -> float:
-    """Largest relative error of the dissipation of `few` compared with that of `patch`, over twists of all directions
-    [-].
+    """Return the largest relative error of the dissipation of `few` compared with that of `patch`, over twists of all
+    directions [-].
 
     Twists are spread evenly over the sphere of `(vx, vy, omega r)` about the centre of pressure.
 
@@ -124,7 +124,7 @@ def surface_error(patch: ContactPatch, few: ContactPatch, normal_force: ArrayLik
 
 
 def _to_error(patch: ContactPatch, degree: int, cells: int | None, error: float, loads: Any) -> ContactPatch:
-    """The compressed patch of the lowest degree from `degree` on that meets the error at every node."""
+    """Return the compressed patch of the lowest degree from `degree` on that meets the error at every node."""
     if cells is not None:
         raise InvalidValueError("compressed", "have only one of cells and error", f"cells={cells}, error={error}")
     nodes = _nodes(patch, loads)
@@ -137,7 +137,7 @@ def _to_error(patch: ContactPatch, degree: int, cells: int | None, error: float,
 
 
 def _nodes(patch: ContactPatch, loads: Any) -> np.ndarray | None:
-    """Loads at which weights are fitted [N]; None for a patch of fixed shape."""
+    """Return the loads at which weights are fitted [N]; None for a patch of fixed shape."""
     if not patch.depends_on_load:
         if loads is not None:
             raise InvalidValueError("loads", "be left out: the shape of this patch does not depend on the load", loads)
@@ -151,7 +151,7 @@ def _nodes(patch: ContactPatch, loads: Any) -> np.ndarray | None:
 
 
 def _few(patch: ContactPatch, weights: np.ndarray, nodes: np.ndarray | None) -> ContactPatch:
-    """The patch of those cells that have weight at a node; each stands for the same area."""
+    """Return the patch of those cells that have weight at a node; each stands for the same area."""
     from planarfriction.patch.contact_patch import ContactPatch
 
     kept = (weights > 0.0).any(axis=0)
@@ -168,7 +168,7 @@ def _few(patch: ContactPatch, weights: np.ndarray, nodes: np.ndarray | None) -> 
 
 
 class _Problem(NamedTuple):
-    """What is kept, over the C cells that may be chosen (`cells`) out of N."""
+    """Constraints on the weights of a compressed patch, over the C cells that may be chosen (`cells`) out of N."""
 
     every: int
     """N."""
@@ -183,7 +183,7 @@ class _Problem(NamedTuple):
 
     @classmethod
     def of(cls, positions: np.ndarray, weights: np.ndarray, degree: int) -> _Problem:
-        """The problem of compressing `weights` `[N]` at `positions` `[N, 2]`."""
+        """Return the problem of compressing `weights` `[N]` at `positions` `[N, 2]`."""
         loaded = np.flatnonzero(weights > 0.0)
         scaled, twists = rows.scaled_positions(positions[loaded], weights[loaded]), rows.directions(DIRECTIONS)
         chosen = rows.thinned(scaled)
@@ -196,7 +196,7 @@ class _Problem(NamedTuple):
         return cls(len(positions), loaded[chosen], moments, wanted, speeds, surface_wanted)
 
     def solution(self, most: int, favoured: np.ndarray) -> np.ndarray:
-        """Weights `[N]` with at most `most` cells, where it can be those `favoured` `[N]`."""
+        """Return the weights `[N]` with at most `most` cells, where it can be those `favoured` `[N]`."""
         if most < len(self.moments):
             raise InvalidValueError("cells", f"be at least {len(self.moments)}, the number of sums that are kept", most)
         kept = np.ones(len(self.cells), dtype=bool)
@@ -220,19 +220,20 @@ class _Problem(NamedTuple):
         return self._everywhere(kept, self._polished(kept, weights))
 
     def refit(self, chosen: np.ndarray) -> np.ndarray | None:
-        """Weights `[N]` of the cells `chosen` `[N]` alone, or None where they cannot have the moments."""
+        """Return the weights `[N]` of the cells `chosen` `[N]` alone, or None where they cannot have the moments."""
         kept = chosen[self.cells]
         found = self._positive(kept, np.empty(0, dtype=int))
         return None if found is None else self._everywhere(*found)
 
     def _everywhere(self, kept: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """The weights of the cells `kept` among zeros, `[N]`."""
+        """Return the weights of the cells `kept` among zeros, `[N]`."""
         result = np.zeros(self.every)
         result[self.cells[kept]] = weights
         return result
 
     def _weights(self, kept: np.ndarray) -> np.ndarray | None:
-        """Weights of the cells `kept` that fit the surface best and have the moments; None where none have them."""
+        """Return the weights of the cells `kept` that fit the surface best and have the moments; None where none have
+        them."""
         moments, surface = self.moments[:, kept], self.surface[:, kept]
         count, conditions = moments.shape[1], len(moments)
         if count < conditions:
@@ -248,13 +249,13 @@ class _Problem(NamedTuple):
         return weights if np.abs(moments @ weights - self.moments_wanted).max() < KEPT else None
 
     def _by_weight(self, kept: np.ndarray, weights: np.ndarray, liked: np.ndarray) -> np.ndarray:
-        """The cells `kept`, those with the least weight first."""
+        """Return the cells `kept`, those with the least weight first."""
         score = np.round(weights / weights.max(), rows.SCORE_DIGITS) + liked[kept]
         cells = np.flatnonzero(kept)
         return cells[np.lexsort([(cells * GOLDEN) % 1.0, score])]
 
     def _without(self, kept: np.ndarray, dropped: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-        """What is left without the cells `dropped` and the few more whose weights then are negative; None if many."""
+        """Drop the cells `dropped`, and the few more whose weights then are negative; return None if they are many."""
         fewer = kept.copy()
         fewer[dropped] = False
         for _ in range(MOST_CORRECTIONS):
@@ -270,7 +271,7 @@ class _Problem(NamedTuple):
         return None
 
     def _positive(self, kept: np.ndarray, dropped: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-        """What is left without `dropped` and those whose weights vanish under a fit with no negative ones."""
+        """Drop `dropped` and the cells whose weights vanish under a fit without negative weights."""
         from scipy import optimize
 
         for count in dict.fromkeys((len(dropped), min(1, len(dropped)))):
@@ -293,7 +294,7 @@ class _Problem(NamedTuple):
         return None
 
     def _vertex(self, kept: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Weights of as few of the cells `kept` as there are moments."""
+        """Return the weights of as few of the cells `kept` as there are moments."""
         from scipy import optimize
 
         found, _ = optimize.nnls(self.moments[:, kept], self.moments_wanted, maxiter=100 * len(self.cells))
@@ -302,7 +303,7 @@ class _Problem(NamedTuple):
         return kept, found[found > 0.0]
 
     def _polished(self, kept: np.ndarray, weights: np.ndarray) -> np.ndarray:
-        """The weights with the last digits of the moments put right."""
+        """Return the weights with the last digits of the moments put right."""
         moments = self.moments[:, kept]
         for _ in range(2):
             weights = weights - np.linalg.lstsq(moments, moments @ weights - self.moments_wanted, rcond=None)[0]

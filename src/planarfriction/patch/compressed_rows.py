@@ -1,4 +1,4 @@
-"""What compressed patches keep, as rows over the cells: moments and dissipations."""
+"""Rows over the cells that compressed patches preserve: moments and dissipations."""
 
 from __future__ import annotations
 
@@ -23,14 +23,15 @@ SCORE_DIGITS = 5
 
 
 def scaled_positions(positions: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Positions about the centre of pressure in contact radii, `[N, 2]`."""
+    """Return the positions about the centre of pressure in contact radii, `[N, 2]`."""
     offset = positions - weights @ positions
     radius = float(weights @ np.hypot(*offset.T))
     return offset / (radius or 1.0)
 
 
 def directions(count: int) -> np.ndarray:
-    """Directions of `(vx, vy, omega r)` spread evenly over half the sphere, on a Fibonacci spiral, `[count, 3]`."""
+    """Return the directions of `(vx, vy, omega r)` spread evenly over half the sphere, on a Fibonacci spiral,
+    `[count, 3]`."""
     step = np.arange(count) + 0.5
     z, turn = step / count, math.pi * (1.0 + math.sqrt(5.0)) * step
     level = np.sqrt(1.0 - z**2)
@@ -38,13 +39,13 @@ def directions(count: int) -> np.ndarray:
 
 
 def speeds(scaled: np.ndarray, twists: np.ndarray) -> np.ndarray:
-    """Speed of each cell at each twist, `[K, N]`."""
+    """Return the speed of each cell at each twist, `[K, N]`."""
     vx, vy, spin = twists.T[:, :, None]
     return np.hypot(vx - spin * scaled[:, 1], vy + spin * scaled[:, 0])
 
 
 def dissipation(scaled: np.ndarray, weights: np.ndarray, twists: np.ndarray) -> np.ndarray:
-    """`Phi = sum w |v|` at each twist, `[K]`."""
+    """Return `Phi = sum w |v|` at each twist, `[K]`."""
     parts = range(0, len(scaled), ROWS_AT_ONCE)
     return sum(
         (speeds(scaled[i : i + ROWS_AT_ONCE], twists) @ weights[i : i + ROWS_AT_ONCE] for i in parts),
@@ -53,7 +54,7 @@ def dissipation(scaled: np.ndarray, weights: np.ndarray, twists: np.ndarray) -> 
 
 
 def polynomials(scaled: np.ndarray, degree: int) -> np.ndarray:
-    """Chebyshev products `T_i(x) T_j(y)`, `i + j <= degree`, over the box around the cells, `[M, N]`."""
+    """Return the Chebyshev products `T_i(x) T_j(y)`, `i + j <= degree`, over the box around the cells, `[M, N]`."""
     low, high = scaled.min(axis=0), scaled.max(axis=0)
     half = (high - low) / 2
     unit = (scaled - (low + high) / 2) / np.where(half > 0.0, half, 1.0)
@@ -62,7 +63,7 @@ def polynomials(scaled: np.ndarray, degree: int) -> np.ndarray:
 
 
 def spin(scaled: np.ndarray) -> np.ndarray:
-    """Wrench of each cell in a spin about the centre of pressure, `|rho|`, `x/|rho|`, `y/|rho|`, `[3, N]`.
+    """Return a wrench of each cell in a spin about the centre of pressure, `|rho|`, `x/|rho|`, `y/|rho|`, `[3, N]`.
 
     A cell nearer than rounding to the centre has no direction.
     """
@@ -72,14 +73,14 @@ def spin(scaled: np.ndarray) -> np.ndarray:
 
 
 def independent(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Orthonormal rows that span those of `rows` `[M, C]`, and the matrix that makes them from it."""
+    """Return the orthonormal rows that span those of `rows` `[M, C]`, and the matrix that makes them from it."""
     left, values, right = np.linalg.svd(rows, full_matrices=False)
     rank = int((values > INDEPENDENT * values[0]).sum())
     return right[:rank], left[:, :rank].T / values[:rank, None]
 
 
 def thinned(scaled: np.ndarray) -> np.ndarray:
-    """Indices of at most about `MOST_CANDIDATES` cells: all, or one in each box of a grid."""
+    """Return the indices of at most about `MOST_CANDIDATES` cells: all, or one in each box of a grid."""
     if len(scaled) <= MOST_CANDIDATES:
         return np.arange(len(scaled))
     extent = np.ptp(scaled, axis=0)

@@ -101,7 +101,7 @@ class ContactPatch(Moments):
 
     @classmethod
     def disc(cls, radius: float, cells: int = 21, *, pressure: Any = None, name: str = "disc") -> ContactPatch:
-        """Disc of `radius` [m] about the origin on a grid of `cells` x `cells`; cells at the rim are cut.
+        """Return a disc of `radius` [m] about the origin on a grid of `cells` x `cells`; cells at the rim are cut.
 
         A cut cell has the area of its part inside the disc, and its position is the centroid of that part. Raises
         InvalidValueError for a parameter that breaks its rule.
@@ -113,7 +113,8 @@ class ContactPatch(Moments):
     def disc_published(
         cls, radius: float = 0.01, cells: int = 21, *, pressure: Any = None, name: str = "disc_published"
     ) -> ContactPatch:
-        """The published disc mask: whole cells of a grid `2 radius` [m] wide, within `cells // 2` cells of the centre.
+        """Return the published disc mask: whole cells of a grid `2 radius` [m] wide, within `cells // 2` cells of the
+        centre.
 
         Distances are between cell centres and `cells` is odd, so the size of the mask depends on it: 317 of 21 x 21
         cells have the area of a disc with a radius of 10.05 cells, not 10.5. Use it for reproduction; `disc` is the
@@ -138,7 +139,7 @@ class ContactPatch(Moments):
         pressure: Any = None,
         name: str = "rectangle",
     ) -> ContactPatch:
-        """Rectangle of `width` x `height` [m] about the origin; without `height` a square.
+        """Return a rectangle of `width` x `height` [m] about the origin; without `height` a square.
 
         `cells` counts along the longer side (cells as square as possible), or is `(columns, rows)`. Raises
         InvalidValueError for a parameter that breaks its rule.
@@ -154,7 +155,7 @@ class ContactPatch(Moments):
     def ring(
         cls, inner_radius: float, outer_radius: float, cells: int = 21, *, pressure: Any = None, name: str = "ring"
     ) -> ContactPatch:
-        """Ring between two radii [m] about the origin on a grid of `cells` x `cells`, cut at both rims.
+        """Return a ring between two radii [m] about the origin on a grid of `cells` x `cells`, cut at both rims.
 
         Raises InvalidValueError unless 0 < inner_radius < outer_radius.
         """
@@ -174,7 +175,7 @@ class ContactPatch(Moments):
         profile: Any = None,
         name: str = "line",
     ) -> ContactPatch:
-        """Line of `length` [m] along `direction` ("y" or "x") through the origin, one cell wide.
+        """Return a line of `length` [m] along `direction` ("y" or "x") through the origin, one cell wide.
 
         `profile` holds the relative pressures `[cells]` from the top down (y) or from the left to the right (x), or is
         a function of the coordinate along the line [m]; None is uniform. The grid is square with the line in its middle
@@ -199,7 +200,8 @@ class ContactPatch(Moments):
     def polygon(
         cls, vertices: Any, cells: int | Sequence[int] = 21, *, pressure: Any = None, name: str = "polygon"
     ) -> ContactPatch:
-        """Polygon with `vertices` `[M, 2]` [m], convex or not, on a grid over its bounding box, cut along its sides.
+        """Return a polygon with `vertices` `[M, 2]` [m], convex or not, on a grid over its bounding box, cut along its
+        sides.
 
         `cells` counts along the longer side of the bounding box, or is `(columns, rows)`. Raises InvalidValueError for
         vertices that outline no simple polygon.
@@ -216,7 +218,7 @@ class ContactPatch(Moments):
 
     @classmethod
     def points(cls, positions: Any, weights: Any = None, *, area: float = 1e-6, name: str = "points") -> ContactPatch:
-        """Any set of contact points `[N, 2]` [m] with relative `weights` `[N]` (equal if None), such as feet.
+        """Return a patch of contact points `[N, 2]` [m] with relative `weights` `[N]` (equal if None), such as feet.
 
         `area` [m^2] is what each point stands for; only `areas`, `area` and `pressure_values` look at it. Raises
         InvalidValueError for weights below zero.
@@ -230,7 +232,8 @@ class ContactPatch(Moments):
     def from_pressure(
         cls, pressure: Any, cell_size: float | Sequence[float], *, loads: Any = None, name: str | None = None
     ) -> ContactPatch:
-        """Patch from a measured pressure map: an array `[rows, columns]`, or the path of a CSV, NPY or grey image file.
+        """Return a patch from a measured pressure map: an array `[rows, columns]`, or the path of a CSV, NPY or grey
+        image file.
 
         **Row 0 is the top** (largest y), column 0 the left; the middle of the map is the origin. `cell_size` [m] is the
         side of a cell or `(width, height)`. Only ratios of the pressures matter. Cells without pressure are dropped.
@@ -248,7 +251,7 @@ class ContactPatch(Moments):
         return cls(grid.centres(), np.full(rows * columns, grid.cell_area), law, grid, name)
 
     def refined(self, parts: int) -> ContactPatch:
-        """The same patch with every cell divided into `parts` x `parts` (a cell of a line into `parts`).
+        """Return the same patch with every cell divided into `parts` x `parts` (a cell of a line into `parts`).
 
         Pressure laws are evaluated at the new cells; numbers per cell are repeated. Cells cut by a rim are replaced by
         cells of the same area and centroid. Points remain points. Raises InvalidValueError for too many cells.
@@ -260,7 +263,7 @@ class ContactPatch(Moments):
     def compressed(
         self, degree: int = 5, *, cells: int | None = None, error: float | None = None, loads: Any = None
     ) -> ContactPatch:
-        """A few of the cells with new weights, with the same moments up to `degree` and nearly the same limit surface.
+        """Return a patch of a few of the cells, with the same moments up to `degree` and nearly the same limit surface.
 
         At most `cells` (default: 45, the number of moments up to `degree + 3`); if the patch has no more, it is
         returned unchanged. `error` raises the degree until the relative error of every dissipation is below it. Shapes
@@ -271,7 +274,8 @@ class ContactPatch(Moments):
         return compressed(self, degree, cells=cells, error=error, loads=loads)
 
     def cell_extents(self) -> np.ndarray:
-        """Width and height over which the load of each cell is spread, `[N, 2]` [m]; a cut cell's are smaller."""
+        """Return the width and height over which the load of each cell is spread, `[N, 2]` [m]; a cut cell's are
+        smaller."""
         if self.cell_size is None:
             return np.zeros((self.cells, 2))
         width, height = self.cell_size
@@ -286,11 +290,11 @@ class ContactPatch(Moments):
 
     @property
     def depends_on_load(self) -> bool:
-        """Whether the weights change with the normal force."""
+        """True if the weights change with the normal force."""
         return self.pressure.depends_on_load
 
     def weights(self, normal_force: ArrayLike | None = None) -> np.ndarray:
-        """Share of the normal force on each cell, `w_i = p_i a_i / sum(p a)`, shape `[..., N]` [-].
+        """Return the share of the normal force on each cell, `w_i = p_i a_i / sum(p a)`, shape `[..., N]` [-].
 
         Raises InvalidValueError without a load that is needed.
         """
@@ -309,7 +313,7 @@ class ContactPatch(Moments):
         return np.where(loaded[..., None], weights, 0.0)
 
     def pressure_values(self, normal_force: ArrayLike) -> np.ndarray:
-        """Pressure on each cell, `w_i f_N / a_i`, shape `[..., N]` [Pa].
+        """Return the pressure on each cell, `w_i f_N / a_i`, shape `[..., N]` [Pa].
 
         Raises InvalidValueError for a load below zero.
         """
@@ -329,7 +333,8 @@ class ContactPatch(Moments):
         return picture("patch in a notebook", self)
 
     def _shares(self, relative: np.ndarray) -> np.ndarray:
-        """Weights `[..., N]` from relative pressures of the same shape, scaled first so that no sum can overflow."""
+        """Return the weights `[..., N]` from relative pressures of the same shape, scaled first so that no sum can
+        overflow."""
         peak = relative.max(-1, keepdims=True)
         if not (peak > 0.0).all():
             raise InvalidValueError("pressure", "be > 0 on at least one cell at every load", f"a peak of {peak.min()}")
@@ -337,7 +342,7 @@ class ContactPatch(Moments):
         return load / load.sum(-1, keepdims=True)
 
     def to_dict(self) -> dict[str, Any]:
-        """The patch as numbers, strings and lists, ready for JSON; `from_dict` restores it to the last bit."""
+        """Return the patch as numbers, strings and lists, ready for JSON; `from_dict` restores it to the last bit."""
         return plain_data.to_dict(self)
 
     @classmethod

@@ -41,7 +41,7 @@ class Grid(Checked):
 
     @classmethod
     def around_origin(cls, width: float, height: float, columns: int, rows: int) -> Grid:
-        """Grid of `columns` x `rows` cells on the box of `width` x `height` [m] whose middle is the origin.
+        """Return a grid of `columns` x `rows` cells on the box of `width` x `height` [m] whose middle is the origin.
 
         Raises InvalidValueError for sides that are not > 0, and for too many cells.
         """
@@ -53,7 +53,7 @@ class Grid(Checked):
 
     @classmethod
     def square(cls, width: float, cells: int) -> Grid:
-        """Grid of `cells` x `cells` on the square `width` [m] wide about the origin.
+        """Return a grid of `cells` x `cells` on the square `width` [m] wide about the origin.
 
         Raises InvalidValueError for a width that is not > 0, and for too many cells.
         """
@@ -66,7 +66,7 @@ class Grid(Checked):
         return self.cell_width * self.cell_height
 
     def centres(self) -> np.ndarray:
-        """Centres of all cells, row by row from the top left, shape `[rows * columns, 2]` [m]."""
+        """Return the centres of all cells, row by row from the top left, shape `[rows * columns, 2]` [m]."""
         # Counted from the middle, so that a grid around the origin is symmetric to the last digit.
         x_middle = self.x_min + self.columns * self.cell_width / 2
         y_middle = self.y_min + self.rows * self.cell_height / 2
@@ -75,7 +75,7 @@ class Grid(Checked):
         return np.stack([np.tile(x, self.rows), np.repeat(y, self.columns)], -1)
 
     def locate(self, positions: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-        """Row and column of the cell that holds each of `positions` `[..., 2]` [m]; row 0 is the top.
+        """Return the row and column of the cell that holds each of `positions` `[..., 2]` [m]; row 0 is the top.
 
         Positions outside the grid get rows or columns outside `0 .. rows - 1` and `0 .. columns - 1`.
 

@@ -25,7 +25,8 @@ _PatchT = TypeVar("_PatchT", bound="Anisotropy")
 
 
 def friction_metric(angle: float, along: float, across: float) -> np.ndarray:
-    """Metric `[2, 2]` of a surface with a grain: `R diag(along^2, across^2) R'` with R the rotation by `angle` [rad].
+    """Return the metric `[2, 2]` of a surface with a grain: `R diag(along^2, across^2) R'` with R the rotation by
+    `angle` [rad].
 
     `along` and `across` are the friction coefficients along and across the grain relative to those of the law, > 0;
     `angle` is that of the grain from the contact frame's x axis. Oblique sliding in a direction `e` dissipates
@@ -41,7 +42,7 @@ def friction_metric(angle: float, along: float, across: float) -> np.ndarray:
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Anisotropy(ByValue):
-    """What a patch knows of directions; see `with_friction_metric`."""
+    """Friction of a patch that depends on the direction; see `with_friction_metric`."""
 
     metric: Any = None
     """Metric of the friction, `[2, 2]` or one per cell `[N, 2, 2]` [-]; None: the same in all directions."""
@@ -49,7 +50,7 @@ class Anisotropy(ByValue):
     """Asymmetry `a`, `[2]` or one per cell `[N, 2]` [-], `|a| < 1`; None: the same forwards and backwards."""
 
     def with_friction_metric(self: _PatchT, metric: Any, asymmetry: Any = None) -> _PatchT:
-        """The same patch with friction that depends on the direction; None and None for friction that does not.
+        """Return the same patch with friction that depends on the direction; None and None for friction that does not.
 
         `metric` `M`: sliding along a unit vector e meets the coefficient `mu sqrt(e' M e)`; see `friction_metric`.
         `asymmetry`
@@ -62,22 +63,23 @@ class Anisotropy(ByValue):
         return with_outline(patch, self.outline)  # pyright: ignore
 
     def __getstate__(self) -> dict[str, Any]:
-        """What a copy or another process gets, at one instant: another thread may be about to look at the metric."""
+        """Return the fields for a copy or another process in one step: another thread may be adding the metric
+        meanwhile."""
         return dict(self.__dict__)
 
     @functools.cached_property
     def anisotropic(self) -> bool:
-        """Whether friction depends on the direction; metrics of ones and asymmetries of zero do not make it so."""
+        """True if friction depends on the direction; metrics of ones and asymmetries of zero do not make it so."""
         same = self.metric is None or (self.metric == np.eye(2)).all()
         return not same or self.asymmetric
 
     @functools.cached_property
     def asymmetric(self) -> bool:
-        """Whether friction differs forwards and backwards."""
+        """True if friction differs forwards and backwards."""
         return self.asymmetry is not None and bool(self.asymmetry.any())
 
     def levers(self) -> np.ndarray:
-        """`B` with `u_i = B_i V` for the twist V about the contact frame's origin, shape `[N, 2, 3]`.
+        """Return `B` with `u_i = B_i V` for the twist V about the contact frame's origin, shape `[N, 2, 3]`.
 
         `B_i = L_i [[1, 0, -y_i], [0, 1, x_i]]`; the wrench of a traction `t` of cell i is `B_i' t`.
         """
@@ -87,7 +89,7 @@ class Anisotropy(ByValue):
         return plain if self.root is None else self.root @ plain
 
     def asymmetries(self) -> np.ndarray:
-        """Asymmetry `a_i` of each cell, shape `[N, 2]`; zeros where there is none."""
+        """Return the asymmetry `a_i` of each cell, shape `[N, 2]`; zeros where there is none."""
         shape = self.positions.shape  # pyright: ignore[reportAttributeAccessIssue]
         return np.zeros(shape) if self.asymmetry is None else np.broadcast_to(self.asymmetry, shape).copy()
 
@@ -100,7 +102,8 @@ class Anisotropy(ByValue):
         return root[0] if root.ndim == 3 and (root == root[0]).all() else root
 
     def lever_coordinates(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """`(x', y')` `[..., N]` with `L (-y, x) = (-y', x')`: what a cell sees of a spin is that of a cell there.
+        """Return `(x', y')` `[..., N]` with `L (-y, x) = (-y', x')`: what a cell sees of a spin is that of a cell
+        there.
 
         For a metric per cell the last axis of `x` and `y` runs over all cells of the patch.
         """
@@ -124,13 +127,13 @@ class Anisotropy(ByValue):
             self._set(**{name: value})
 
     def _anisotropy_to_dict(self) -> dict[str, list]:
-        """Plain data of what there is."""
+        """Return metric and asymmetry as plain data, without those that are None."""
         both = {"metric": self.metric, "asymmetry": self.asymmetry}
         return {name: value.tolist() for name, value in both.items() if value is not None}
 
 
 def symmetric_root(metric: np.ndarray) -> np.ndarray:
-    """`L` with `L L = M`, symmetric and positive definite, for metrics `[..., 2, 2]`."""
+    """Return `L` with `L L = M`, symmetric and positive definite, for metrics `[..., 2, 2]`."""
     values, axes = np.linalg.eigh(metric)
     return _symmetric((axes * np.sqrt(values)[..., None, :]) @ np.swapaxes(axes, -1, -2))
 
@@ -149,7 +152,7 @@ def refuse_cell_metrics(patch: Anisotropy, by: str) -> None:
 
 
 def same_metric(one: Anisotropy, other: Anisotropy) -> bool:
-    """Whether two patches have the same metric for all cells."""
+    """Return True if two patches have the same metric for all cells."""
     if one.root is None or other.root is None:
         return one.root is other.root
     return bool(np.array_equal(one.root, other.root))
@@ -160,7 +163,8 @@ def _symmetric(matrix: np.ndarray) -> np.ndarray:
 
 
 def _positive_definite(metric: np.ndarray) -> np.ndarray:
-    """The metrics `[..., 2, 2]`, exactly symmetric, or an error that shows the first that cannot be one."""
+    """Return the metrics `[..., 2, 2]`, exactly symmetric, or raise an error that shows the first that cannot be
+    one."""
     skew = np.abs(metric[..., 0, 1] - metric[..., 1, 0]) > _SAME * np.abs(metric).max(axis=(-1, -2))
     lowest = np.linalg.eigvalsh(_symmetric(metric))[..., 0]
     bad = skew | ~(lowest > 0.0)

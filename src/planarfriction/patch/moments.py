@@ -21,10 +21,10 @@ MOST_DEGREE = 40
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Moments(Anisotropy):
-    """What follows from where the cells of a patch are and how the load spreads over them."""
+    """Moments of a patch: sums over the positions of its cells, weighted with their shares of the load."""
 
     def centre_of_pressure(self, normal_force: ArrayLike | None = None) -> np.ndarray:
-        """Centre of pressure `sum(w rho)`, shape `[..., 2]` [m].
+        """Return the centre of pressure `sum(w rho)`, shape `[..., 2]` [m].
 
         Raises InvalidValueError without a load that is needed, as all sums here.
         """
@@ -36,7 +36,8 @@ class Moments(Anisotropy):
     @overload
     def contact_radius(self, normal_force: np.ndarray | Sequence[Any]) -> np.ndarray: ...
     def contact_radius(self, normal_force: Any = None) -> Any:
-        """Contact radius `r = sum(w |rho - CoP|)` [m]: a pure spin about the CoP has the friction torque `mu f_N r`.
+        """Return the contact radius `r = sum(w |rho - CoP|)` [m]: a pure spin about the CoP has the friction torque
+        `mu f_N r`.
 
         With a friction metric `sum(w |L J (rho - CoP)|)`, J a quarter turn; the second moment likewise.
         """
@@ -48,7 +49,7 @@ class Moments(Anisotropy):
     @overload
     def second_moment(self, normal_force: np.ndarray | Sequence[Any]) -> np.ndarray: ...
     def second_moment(self, normal_force: Any = None) -> Any:
-        """Second moment `<rho^2> = sum(w |rho - CoP|^2)` [m^2]."""
+        """Return the second moment `<rho^2> = sum(w |rho - CoP|^2)` [m^2]."""
         weights, *offset = self._about_centre_of_pressure(normal_force)
         dx, dy = self.lever_coordinates(*offset)
         return (weights * (dx**2 + dy**2)).sum(-1)
@@ -58,11 +59,12 @@ class Moments(Anisotropy):
     @overload
     def area(self, normal_force: np.ndarray | Sequence[Any]) -> np.ndarray: ...
     def area(self, normal_force: Any = None) -> Any:
-        """Area of the cells under load [m^2]."""
+        """Return the area of the cells under load [m^2]."""
         return np.where(self.weights(normal_force) > 0.0, self.areas, 0.0).sum(-1)
 
     def moments(self, degree: int, normal_force: ArrayLike | None = None, *, about: Any = None) -> np.ndarray:
-        """Polynomial moments of the pressure, `M[i, j] = sum(w (x - x0)^i (y - y0)^j)` for `i + j <= degree`.
+        """Return the polynomial moments of the pressure, `M[i, j] = sum(w (x - x0)^i (y - y0)^j)` for
+        `i + j <= degree`.
 
         Shape `[..., degree + 1, degree + 1]` [m^(i + j)], zero where `i + j > degree`. `about` is the point (x0, y0)
         [m]: None for the centre of pressure (central moments), `(0, 0)` for the raw ones. Raises InvalidValueError for
@@ -79,7 +81,7 @@ class Moments(Anisotropy):
         return result
 
     def _about_centre_of_pressure(self, normal_force: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Weights and both coordinates of the cells relative to the CoP, each of shape `[..., N]`."""
+        """Return the weights and both coordinates of the cells relative to the CoP, each of shape `[..., N]`."""
         weights = self.weights(normal_force)
         dx, dy = ((x - (weights * x).sum(-1, keepdims=True)) for x in self.positions.T)
         return weights, dx, dy

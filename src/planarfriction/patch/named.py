@@ -12,7 +12,8 @@ from planarfriction.patch.contact_patch import ContactPatch
 def pressure_map(
     cell_size: Any, file: Any = None, files: Any = None, values: Any = None, loads: Any = None, name: str | None = None
 ) -> ContactPatch:
-    """The patch of one map (a file or its values, rows from the top) or of several with the loads they belong to [N].
+    """Return the patch of one map (a file or its values, rows from the top) or of several with the loads they belong to
+    [N].
 
     Raises `InvalidValueError` unless exactly one of `file`, `files` and `values` is given.
     """
@@ -26,7 +27,7 @@ def pressure_map(
 
 
 def published(name: str, cells: Any = None, width: Any = None) -> ContactPatch:
-    """The published patch `name` of so many `cells` along a side, `width` [m] wide."""
+    """Return the published patch `name` of so many `cells` along a side, `width` [m] wide."""
     size = {key: value for key, value in (("cells", cells), ("width", width)) if value is not None}
     return PUBLISHED_PATCHES.choose(name)(**size)
 
@@ -40,7 +41,7 @@ def cells(
     outline: Any = None,
     name: Any = None,
 ) -> ContactPatch:
-    """The patch that `ContactPatch.to_dict` described."""
+    """Return the patch that `ContactPatch.to_dict` described."""
     given = {"positions": positions, "areas": areas, "pressure": pressure, "grid": grid}
     given |= {"cell_size": cell_size, "outline": outline, "name": name}
     return ContactPatch.from_dict({key: value for key, value in given.items() if value is not None})

@@ -26,16 +26,16 @@ class PolygonOutline(ByValue):
     """Vertices in either sense, shape `[M, 2]` [m]."""
 
     def rims(self) -> tuple[np.ndarray, list[np.ndarray]]:
-        """The polygon that bounds it, and its holes (none), `[M, 2]` [m] each."""
+        """Return the polygon that bounds it, and its holes (none), `[M, 2]` [m] each."""
         return self.vertices, []
 
     def triangles(self) -> np.ndarray:
-        """Triangles `[M - 2, 3, 2]` [m] from the first vertex; their signed sum is the polygon."""
+        """Return triangles `[M - 2, 3, 2]` [m] from the first vertex; their signed sum is the polygon."""
         others = self.vertices[1:]
         return np.stack([np.broadcast_to(self.vertices[0], others[1:].shape), others[:-1], others[1:]], 1)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data, as `outline_from_dict` reads it."""
+        """Return the outline as plain data, which `outline_from_dict` reads."""
         return {"vertices": self.vertices.tolist()}
 
 
@@ -49,11 +49,12 @@ class RoundOutline:
     """Outer radius [m]."""
 
     def rims(self) -> tuple[np.ndarray, list[np.ndarray]]:
-        """Polygons of the same areas as its outer circle and its hole, if any, `[shapes.CIRCLE_SIDES, 2]` [m] each."""
+        """Return polygons of the areas of its outer circle and its hole, if any, `[shapes.CIRCLE_SIDES, 2]` [m]
+        each."""
         return shapes.circle(self.outer), [shapes.circle(self.inner)] if self.inner > 0.0 else []
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain data, as `outline_from_dict` reads it."""
+        """Return the outline as plain data, which `outline_from_dict` reads."""
         return {"radii": [self.inner, self.outer]}
 
 
@@ -61,12 +62,12 @@ Outline = PolygonOutline | RoundOutline
 
 
 def outline_to_dict(outline: Outline | None) -> dict[str, Any]:
-    """The entry `outline` of a patch's plain data, none without an outline."""
+    """Return the entry `outline` of a patch's plain data, none without an outline."""
     return {} if outline is None else {"outline": outline.to_dict()}
 
 
 def outline_from_dict(data: Any) -> Outline | None:
-    """The outline of `{"vertices": [[x, y], ...]}` or `{"radii": [inner, outer]}`; None of None."""
+    """Return the outline of `{"vertices": [[x, y], ...]}` or `{"radii": [inner, outer]}`; None of None."""
     if data is None:
         return None
     if not isinstance(data, Mapping) or list(data) not in (["vertices"], ["radii"]):
@@ -80,7 +81,7 @@ def outline_from_dict(data: Any) -> Outline | None:
 
 
 def polygon_outline(vertices: Any) -> PolygonOutline:
-    """The outline with those `vertices` `[M, 2]` [m]."""
+    """Return the outline with those `vertices` `[M, 2]` [m]."""
     vertices = validation.array("vertices", vertices, (None, 2))
     if len(vertices) < 3:
         raise InvalidValueError("vertices", "hold at least 3 points", f"{len(vertices)}")
@@ -89,18 +90,18 @@ def polygon_outline(vertices: Any) -> PolygonOutline:
 
 
 def box_outline(width: float, height: float) -> PolygonOutline:
-    """Rectangle of that size [m] about the origin."""
+    """Return a rectangle of that size [m] about the origin."""
     return polygon_outline(np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]) * (0.5 * width, 0.5 * height))
 
 
 def with_outline(patch: ContactPatch, outline: Outline | None) -> ContactPatch:
-    """The new `patch`, knowing that its cells were cut from that outline."""
+    """Record in the new `patch` the outline from which its cells were cut, and return it."""
     patch._set(outline=outline)
     return patch
 
 
 def clipped(kind: type[ContactPatch], outline: Outline, grid: Grid, pressure: Any, name: str) -> ContactPatch:
-    """Patch of the parts of the grid's boxes inside an outline."""
+    """Return a patch of the parts of the grid's boxes inside an outline."""
     import shapely
 
     polygon = shapely.Polygon(*outline.rims())

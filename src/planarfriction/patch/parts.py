@@ -42,7 +42,7 @@ Where the pressure peaks, the bristles of a part differ most around the peak, an
 
 
 def split(positions: np.ndarray, weights: np.ndarray, parts: int) -> np.ndarray:
-    """Labels `[N]`, 0 to parts - 1, of N cells in compact parts; with `parts` >= N each cell is its own.
+    """Return the labels `[N]`, 0 to parts - 1, of N cells in compact parts; with `parts` >= N each cell is its own.
 
     Again and again the part with the largest second moment `sum(w |rho - CoP|^2)` is halved by the line through its
     centre of pressure that takes most of it away: `|s|^2 (1/w_one + 1/w_other)`, s the sum of `w (rho - CoP)` over one
@@ -75,7 +75,7 @@ def split(positions: np.ndarray, weights: np.ndarray, parts: int) -> np.ndarray:
 
 
 def automatic(positions: np.ndarray, weights: np.ndarray) -> int:
-    """How many parts "auto" means: `MANY` for slender or separate shapes, where they are `WORTH` it, else `FEW`.
+    """Return the number of parts for "auto": `MANY` for slender or separate shapes that are `WORTH` it, else `FEW`.
 
     Of the others, those that are `PEAKED` take `MOST`.
     """
@@ -89,7 +89,8 @@ def automatic(positions: np.ndarray, weights: np.ndarray) -> int:
 
 
 def kurtosis(positions: np.ndarray, weights: np.ndarray) -> float:
-    """`<(rho' C^-1 rho)^2>`, rho from the centre of pressure and C the second moments `<rho rho'>`, in the plane."""
+    """Return `<(rho' C^-1 rho)^2>`, rho from the centre of pressure and C the second moments `<rho rho'>`, in the
+    plane."""
     w = weights / weights.sum()
     x = positions - w @ positions
     moments = (w[:, None] * x).T @ x
@@ -99,18 +100,18 @@ def kurtosis(positions: np.ndarray, weights: np.ndarray) -> float:
 
 
 def moment_left(positions: np.ndarray, weights: np.ndarray, labels: np.ndarray) -> float:
-    """What parts leave of the second moment: the sum of their own, about their own centres."""
+    """Compute the second moment that is left within parts: the sum of their own, about their own centres."""
     parts = (labels == label for label in range(labels.max() + 1))
     return sum(second_moment(positions[part], weights[part]) for part in parts)
 
 
 def second_moment(positions: np.ndarray, weights: np.ndarray) -> float:
-    """`sum(w |rho - CoP|^2)`."""
+    """Return `sum(w |rho - CoP|^2)`."""
     return float(weights @ ((positions - weights @ positions / weights.sum()) ** 2).sum(1))
 
 
 def _far_side(x: np.ndarray, w: np.ndarray, outwards: np.ndarray) -> np.ndarray:
-    """The cells beyond the best line through the centre of pressure, seen from the first cell; `[N]` of bool.
+    """Return the cells beyond the best line through the centre of pressure, seen from the first cell; `[N]` of bool.
 
     A line that turns half a turn passes all cells, those in one direction at once: between two directions lies one
     candidate, whose sums differ from the last one's by the cells in between. Cells in the middle stay with the first.
@@ -144,7 +145,8 @@ def _far_side(x: np.ndarray, w: np.ndarray, outwards: np.ndarray) -> np.ndarray:
 
 
 def _passing(r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Whether each cell `[N, 2]` lies ahead of a line that begins to turn, and as which one the line passes it."""
+    """Return for each cell `[N, 2]` whether it lies ahead of a line that begins to turn, and its rank in the order in
+    which the line passes the cells."""
     angle = np.arctan2(r[:, 1], r[:, 0])
     lines = np.sort(angle % np.pi)
     gaps = np.diff(lines, append=lines[0] + np.pi)
@@ -162,7 +164,7 @@ def _passing(r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def labels_of(patch: ContactPatch, parts: int | None) -> np.ndarray:
-    """`split` of the cells of a patch `[N]`, None for as many parts as `automatic` says.
+    """Return `split` of the cells of a patch `[N]`, None for as many parts as `automatic` says.
 
     By the load where all loads spread alike; a patch that depends on the load is split once for all loads, by the areas
     of its cells. One friction metric for all cells: by the places at which they see spins (`lever_coordinates`).
@@ -175,7 +177,8 @@ def labels_of(patch: ContactPatch, parts: int | None) -> np.ndarray:
 
 
 def part_of(patch: ContactPatch, cells: np.ndarray) -> ContactPatch:
-    """The `cells` `[N]` (bool) of a patch as a patch, whose weights are their shares in what they carry together.
+    """Return the `cells` `[N]` (bool) of a patch as a patch, whose weights are their shares in what they carry
+    together.
 
     A normal force is that of the whole patch. Where it leaves these cells without load, they carry none of it evenly.
     """
@@ -199,9 +202,9 @@ class OfPart(ByValue, Pressure):
 
     whole: Pressure
     positions: np.ndarray
-    """Of all cells, `[N, 2]` [m]."""
+    """Positions of all cells, `[N, 2]` [m]."""
     cells: np.ndarray
-    """Which of them, bool `[N]`."""
+    """Mask of the cells that belong to the part, bool `[N]`."""
 
     @property
     def depends_on_load(self) -> bool:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def to_dict(patch: ContactPatch) -> dict[str, Any]:
-    """See `ContactPatch.to_dict`."""
+    """Implement `ContactPatch.to_dict`."""
     data = {
         "shape": "cells",
         "name": patch.name,
@@ -32,7 +32,7 @@ def to_dict(patch: ContactPatch) -> dict[str, Any]:
 
 
 def from_dict(make: type[ContactPatch], data: Mapping[str, Any]) -> ContactPatch:
-    """See `ContactPatch.from_dict`."""
+    """Implement `ContactPatch.from_dict`."""
     optional = ("shape", "name", "pressure", "grid", "cell_size", "metric", "asymmetry", "outline")
     validation.keys("patch", data, required=("positions", "areas"), optional=optional)
     validation.choice("patch shape", data.get("shape", "cells"), ("cells",))

@@ -28,37 +28,39 @@ class Pressure(Checked):
 
     @property
     def depends_on_load(self) -> bool:
-        """Whether the shape of the pressure, not only its scale, changes with the normal force."""
+        """True if the shape of the pressure, and not only its scale, changes with the normal force."""
         return False
 
     def relative(self, positions: np.ndarray, normal_force: np.ndarray | None = None) -> np.ndarray:
-        """Relative pressure at `positions` `[N, 2]` [m], at any scale [-].
+        """Return the relative pressure at `positions` `[N, 2]` [m], at any scale [-].
 
         Shape `[N]`; for laws that depend on the load `[..., N]` for `normal_force` `[...]`, all > 0 [N].
         """
         raise NotImplementedError
 
     def ever_loaded(self, positions: np.ndarray, between: tuple[float, float] | None = None) -> np.ndarray:
-        """Which of `positions` `[N, 2]` [m] can carry pressure at any load, or at any `between` two [N]; bool `[N]`."""
+        """Return which of `positions` `[N, 2]` [m] can carry pressure at any load, or at any `between` two [N]; bool
+        `[N]`."""
         return self.relative(positions) > 0.0
 
     def only(self, kept: np.ndarray) -> Pressure:
-        """The law for the cells of a patch that are `kept`, `[N]` of bool."""
+        """Return the law for the cells of a patch that are `kept`, `[N]` of bool."""
         return self
 
     def repeated(self, times: int) -> Pressure:
-        """The law for a patch whose cells are each divided into `times` new ones."""
+        """Return the law for a patch whose cells are each divided into `times` new ones."""
         return self
 
     def to_dict(self) -> dict[str, Any] | list[float]:
-        """The law as plain data: `{"law": name, parameter: value, ...}`, or a list with one pressure per cell."""
+        """Return the law as plain data: `{"law": name, parameter: value, ...}`, or a list with one pressure per
+        cell."""
         fields = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}  # pyright: ignore
         plain = {name: list(value) if isinstance(value, tuple) else value for name, value in fields.items()}
         return {"law": self.law, **{name: value for name, value in plain.items() if value is not None}}
 
     @staticmethod
     def from_dict(data: Mapping[str, Any]) -> Pressure:
-        """The law described by `{"law": name, parameter: value, ...}`.
+        """Return the law described by `{"law": name, parameter: value, ...}`.
 
         Raises InvalidValueError if this is not such a table, or the law does not exist.
         """
@@ -144,7 +146,7 @@ class SoftFinger(Pressure):
         return self.n != 0.0 or self.k is None
 
     def radius(self, normal_force: ArrayLike) -> np.ndarray:
-        """Contact radius `R = min(c f_N^n, radius_max)` [m] at `normal_force` `[...]` [N].
+        """Return the contact radius `R = min(c f_N^n, radius_max)` [m] at `normal_force` `[...]` [N].
 
         Raises InvalidValueError for a load below zero.
         """
@@ -156,7 +158,7 @@ class SoftFinger(Pressure):
         return radius if self.radius_max is None else np.minimum(radius, self.radius_max)
 
     def exponent(self, normal_force: ArrayLike) -> np.ndarray:
-        """Exponent `k` of the profile [-] at `normal_force` `[...]` [N].
+        """Return the exponent `k` of the profile [-] at `normal_force` `[...]` [N].
 
         Raises InvalidValueError for a load below zero.
         """
@@ -206,7 +208,8 @@ class PerCell(ByValue, Pressure):
         self._set(values=values)
 
     def relative(self, positions: np.ndarray, normal_force: np.ndarray | None = None) -> np.ndarray:
-        """Relative pressures of the cells, `[N]`. Raises InvalidValueError for another number of positions."""
+        """Return the relative pressures of the cells, `[N]`. Raises InvalidValueError for another number of
+        positions."""
         if len(self.values) != len(positions):
             raise InvalidValueError("pressure", f"have shape [{len(positions)}]", f"shape [{len(self.values)}]")
         return self.values
@@ -222,7 +225,7 @@ class PerCell(ByValue, Pressure):
 
 
 def as_law(pressure: Any, positions: np.ndarray) -> Pressure:
-    """The pressure law meant by `pressure`: None (uniform), a law, a function `p(x, y)`, or `[N]` numbers."""
+    """Return the pressure law meant by `pressure`: None (uniform), a law, a function `p(x, y)`, or `[N]` numbers."""
     if pressure is None:
         return Uniform()
     if isinstance(pressure, Pressure):
@@ -236,14 +239,14 @@ def as_law(pressure: Any, positions: np.ndarray) -> Pressure:
 
 
 def pressure_array(name: str, value: Any, shape: tuple[int | None, ...]) -> np.ndarray:
-    """Relative pressures as a new float array: a mask is one of zeros and ones, and any scale will do."""
+    """Return relative pressures as a new float array; a mask is taken as zeros and ones, and any scale will do."""
     if isinstance(value, np.ndarray) and value.dtype.kind == "b" and not isinstance(value, np.ma.MaskedArray):
         value = value.astype(float)
     return validation.array(name, value, shape, largest=np.inf)
 
 
 def evaluated(name: str, function: Callable[..., Any], points: list[list[float]]) -> list[Any]:
-    """Values of a function that a user gave as `name`, at each of the points."""
+    """Return the values of a function that a user gave as `name`, at each of the points."""
     try:
         return [function(*point) for point in points]
     except Exception as error:
@@ -252,7 +255,7 @@ def evaluated(name: str, function: Callable[..., Any], points: list[list[float]]
 
 
 def check_not_negative(name: str, values: np.ndarray) -> np.ndarray:
-    """`values`, or an error that shows the first below zero."""
+    """Return `values`, or raise an error that shows the first below zero."""
     return validation.non_negative_array(name, values, values.shape, largest=np.inf)
 
 

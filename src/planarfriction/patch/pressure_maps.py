@@ -56,8 +56,8 @@ class PressureMaps(ByValue, Pressure):
         return len(self.loads) > 1
 
     def relative(self, positions: np.ndarray, normal_force: np.ndarray | None = None) -> np.ndarray:
-        """Relative pressures of the cells at the loads, `[..., N]`. Raises InvalidValueError for another number of
-        positions, and for a load below zero."""
+        """Return the relative pressures of the cells at the loads, `[..., N]`. Raises InvalidValueError for another
+        number of positions, and for a load below zero."""
         if self.values.shape[1] != len(positions):
             raise InvalidValueError("pressure", f"have shape [L, {len(positions)}]", f"shape {list(self.values.shape)}")
         if not self.depends_on_load:
@@ -87,7 +87,7 @@ class PressureMaps(ByValue, Pressure):
 
 
 def read_maps(pressure: Any, loads: Any = None) -> tuple[Any, tuple[int, int], str | None]:
-    """Pressure law or numbers, `(rows, columns)` and the name of one map, or of several with `loads` [N].
+    """Return the pressure law or numbers, `(rows, columns)` and the name of one map, or of several with `loads` [N].
 
     A map is an array `[rows, columns]` or the path of a file; several are a stack or list of them, or a mapping from
     load to map.
@@ -120,7 +120,7 @@ def _what(pressure: Any) -> str:
 
 
 def _one_map(pressure: Any) -> tuple[np.ndarray, str | None]:
-    """Values `[rows, columns]` of an array or a file, and the name of the file."""
+    """Return the values `[rows, columns]` of an array or a file, and the name of the file."""
     named = isinstance(pressure, (str, Path))
     values = read_pressure_map(pressure) if named else pressure
     values = check_not_negative(_what(pressure), pressure_array(_what(pressure), values, (None, None)))

@@ -17,47 +17,48 @@ PUBLISHED_CELLS = 21
 
 
 def square(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
-    """Uniform square, `width` [m] wide."""
+    """Return a uniform square, `width` [m] wide."""
     return ContactPatch.rectangle(width, cells=cells, name="Square")
 
 
 def circle(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
-    """Uniform disc, as the published mask on a grid `width` [m] wide."""
+    """Return a uniform disc, as the published mask on a grid `width` [m] wide."""
     return ContactPatch.disc_published(width / 2, cells, name="Circle")
 
 
 def line(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
-    """Uniform line along y, `width` [m] long."""
+    """Return a uniform line along y, `width` [m] long."""
     return ContactPatch.line(width, cells, name="Line")
 
 
 def line_grad(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
-    """Line along y, `width` [m] long, with weights cells, ..., 2, 1 from the top."""
+    """Return a line along y, `width` [m] long, with weights cells, ..., 2, 1 from the top."""
     return ContactPatch.line(width, cells, profile=_steps(cells), name="LineGrad")
 
 
 def line_grad_x(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
-    """Line along x, `width` [m] long, with weights cells, ..., 2, 1 from the left."""
+    """Return a line along x, `width` [m] long, with weights cells, ..., 2, 1 from the left."""
     return ContactPatch.line(width, cells, direction="x", profile=_steps(cells), name="LineGradX")
 
 
 def non_convex_1(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
-    """Two square pads (3 x 3 of 21 x 21 cells) at the left and right ends of the middle rows."""
+    """Return two square pads (3 x 3 of 21 x 21 cells) at the left and right ends of the middle rows."""
     return _masked([(slice(9, 12), slice(0, 3)), (slice(9, 12), slice(18, 21))], cells, width, "NonConvex1")
 
 
 def non_convex_2(cells: int = PUBLISHED_CELLS, width: float = 0.02) -> ContactPatch:
-    """A lying T of two bars: rows 9..11 x columns 0..13, and rows 4..17 x columns 18..20 (of 21 x 21 cells)."""
+    """Return a lying T of two bars: rows 9..11 x columns 0..13, and rows 4..17 x columns 18..20 (of 21 x 21 cells)."""
     return _masked([(slice(9, 12), slice(0, 14)), (slice(4, 18), slice(18, 21))], cells, width, "NonConvex2")
 
 
 def _steps(cells: int) -> np.ndarray:
-    """cells, ..., 2, 1"""
+    """Return the weights cells, ..., 2, 1."""
     return np.arange(validation.count("cells", cells, at_most=MOST_CELLS), 0, -1)
 
 
 def _masked(blocks: list[tuple[slice, slice]], cells: int, width: float, name: str) -> ContactPatch:
-    """Uniform pressure on blocks of the published grid; a cell is loaded if its centre is in one of them."""
+    """Return a patch with uniform pressure on blocks of the published grid; a cell is loaded if its centre is in a
+    block."""
     cells, width = validation.count("cells", cells, at_most=MOST_CELLS), validation.positive("width", width)
     check_cells(cells**2)
     mask = np.zeros((PUBLISHED_CELLS, PUBLISHED_CELLS))

@@ -9,7 +9,7 @@ from planarfriction.patch.size import check_cells
 
 
 def refined(patch: ContactPatch, parts: int) -> ContactPatch:
-    """See `ContactPatch.refined`."""
+    """Implement `ContactPatch.refined`."""
     extent = patch.cell_extents()
     if parts == 1 or not extent.any():
         return patch
@@ -27,5 +27,5 @@ def refined(patch: ContactPatch, parts: int) -> ContactPatch:
 
 
 def _repeated(value: np.ndarray | None, size: int, times: int) -> np.ndarray | None:
-    """A metric or an asymmetry for the new cells: what each cell has for itself is repeated."""
+    """Return a metric or an asymmetry for the new cells: what each cell has for itself is repeated."""
     return value if value is None or value.ndim == size else np.repeat(value, times, axis=0)

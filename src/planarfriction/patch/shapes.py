@@ -20,7 +20,7 @@ SLIVER = 1e-12
 
 
 def columns_and_rows(cells: int | Sequence[int], width: float, height: float) -> tuple[int, int]:
-    """Number of columns and rows on a box of `width` x `height` [m].
+    """Return the number of columns and rows on a box of `width` x `height` [m].
 
     A pair is taken as it is; one number counts the cells along the longer side, and the shorter side gets as many as
     keep the cells closest to square.
@@ -34,7 +34,8 @@ def columns_and_rows(cells: int | Sequence[int], width: float, height: float) ->
 
 
 def circle(radius: float) -> np.ndarray:
-    """Vertices `[CIRCLE_SIDES, 2]` of the regular polygon with the area of the disc of `radius` [m] about the origin.
+    """Return the vertices `[CIRCLE_SIDES, 2]` of the regular polygon with the area of the disc of `radius` [m] about
+    the origin.
 
     Circumradius `R sqrt(a / sin a)`, `a = 2 pi / sides`. Sides, not corners, face the axes: the polygon then lies
     inside the square around the disc.
@@ -69,7 +70,8 @@ def clip(outline: Any, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _rows(grid: Grid) -> np.ndarray:
-    """One box for each row of `grid`, from the top, one cell wider than the grid on both sides, `[rows]` of shapely."""
+    """Return one box for each row of `grid`, from the top, one cell wider than the grid on both sides, `[rows]` of
+    shapely."""
     import shapely
 
     y = grid.centres()[:: grid.columns, 1]

@@ -1,4 +1,4 @@
-"""How many cells a patch may have, and how large patches usually are."""
+"""Limits of the number of cells of a patch, and a warning for patches of unusual size."""
 
 from __future__ import annotations
 

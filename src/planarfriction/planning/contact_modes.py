@@ -18,12 +18,12 @@ from planarfriction import validation
 from planarfriction.limit_surface import LimitSurface
 
 STICK, LEFT, RIGHT = "stick", "slide left", "slide right"
-"""What a pusher does that pushes; left and right as it looks."""
+"""Mode of a pusher that pushes; left and right are seen along its direction."""
 
 
 _BEYOND = 0.1
-"""How far beyond the friction cone a force is looked for that makes a pusher stick [rad], so that a step of an
-integrator may go beyond the end of the mode."""
+"""Angle beyond the friction cone [rad] at which a sticking force is still sought: a step may pass the end of the
+mode."""
 
 
 _EDGE = 1.0 - 1e-9
@@ -31,25 +31,25 @@ _EDGE = 1.0 - 1e-9
 
 
 class Place(NamedTuple):
-    """Where a slider is touched, in its own axes."""
+    """Place at which a slider is touched, in its own axes."""
 
     at: np.ndarray
     """`[2]` [m]"""
     normal: np.ndarray
     """Unit vector into the slider `[2]`."""
     half_width: float = 0.0
-    """Of a face that lies flush [m]; `at` is its middle."""
+    """Width of a face that lies flush [m]; `at` is its middle."""
 
 
 class Motion(NamedTuple):
-    """How a slider moves."""
+    """Motion of a slider."""
 
     twist: np.ndarray
     """Twist of the slider about its frame's origin, in its own axes `[3]`."""
     mode: str
     """`STICK`, `LEFT` or `RIGHT`."""
     slack: float
-    """How far the mode is from its end: an angle [rad], or a share of the face [-]."""
+    """Distance of the mode from its end: an angle [rad], or a share of the face [-]."""
     force: np.ndarray
     """Direction of the pusher's force `[2]`, in the slider's axes."""
     leans: int = 0
@@ -57,8 +57,8 @@ class Motion(NamedTuple):
 
 
 def motion_cone(surface: LimitSurface, at: ArrayLike, normal: ArrayLike, mu: float) -> np.ndarray:
-    """Edges of the motion cone `[2, 2]`: velocities of a point of the slider for the right and left edge of the
-    friction cone.
+    """Return the edges of the motion cone `[2, 2]`: velocities of a point of the slider for both edges of the friction
+    cone.
 
     If the velocity of the pusher is between the two, it sticks; otherwise it slides along the slider, which then moves
     as on the nearer edge. `at` `[2]` [m] is the point, `normal` `[2]` the direction into the slider, in the axes of the
@@ -77,7 +77,7 @@ def motion_cone(surface: LimitSurface, at: ArrayLike, normal: ArrayLike, mu: flo
 
 
 def motion_at(surface: LimitSurface, place: Place, mu: float, velocity: np.ndarray, held: str = "") -> Motion:
-    """How a slider moves that is touched at a place by a pusher with a `velocity` `(vx, vy, omega)` there.
+    """Compute the motion of a slider touched at a place by a pusher with a `velocity` `(vx, vy, omega)` there.
 
     All in the slider's axes; the pusher approaches, `velocity . normal > 0`. A mode that is `held` stays so beyond its
     end, where its slack is negative.
@@ -104,19 +104,19 @@ def motion_at(surface: LimitSurface, place: Place, mu: float, velocity: np.ndarr
 
 
 def _force(place: Place, angle: float) -> np.ndarray:
-    """Unit force at an angle to the left of the normal."""
+    """Return a unit force at an angle to the left of the normal."""
     (x, y), c, s = place.normal.tolist(), math.cos(angle), math.sin(angle)
     return np.array([c * x - s * y, s * x + c * y])
 
 
 def _angle(place: Place, vector: Any) -> float:
-    """Angle of a vector to the left of the normal [rad]."""
+    """Return the angle of a vector to the left of the normal [rad]."""
     (x, y), (a, b) = place.normal.tolist(), (float(vector[0]), float(vector[1]))
     return math.atan2(x * b - y * a, x * a + y * b)
 
 
 def pushed_by(surface: LimitSurface, place: Place, angle: float) -> tuple[np.ndarray, tuple[float, float]]:
-    """Twist of unit power under a force at an angle to the normal, and the velocity of the place."""
+    """Return the twist of unit power under a force at an angle to the normal, and the velocity of the place."""
     (nx, ny), (x, y), c, s = place.normal.tolist(), place.at.tolist(), math.cos(angle), math.sin(angle)
     fx, fy = c * nx - s * ny, s * nx + c * ny
     twist = surface.twist((-fx, -fy, y * fx - x * fy))
@@ -125,7 +125,7 @@ def pushed_by(surface: LimitSurface, place: Place, angle: float) -> tuple[np.nda
 
 
 def _stuck(surface: LimitSurface, place: Place, angle: float, wanted: float) -> tuple[np.ndarray, Any, Any]:
-    """Twist whose place has a velocity of the wanted angle, that velocity and the direction of the force."""
+    """Return the twist whose place has a velocity of the wanted angle, that velocity and the direction of the force."""
     from scipy.optimize import brentq
 
     off = lambda each: _angle(place, pushed_by(surface, place, each)[1]) - wanted  # noqa: E731
@@ -140,7 +140,7 @@ def _stuck(surface: LimitSurface, place: Place, angle: float, wanted: float) -> 
 
 
 def _flush(surface: LimitSurface, place: Place, mu: float, velocity: np.ndarray, held: str = "") -> Motion:
-    """How a slider moves under a face with the `velocity` `(vx, vy, omega)` at its middle.
+    """Compute the motion of a slider under a flush face with the `velocity` `(vx, vy, omega)` at its middle.
 
     The pressure of the face has a resultant that crosses it, at an angle within the friction cone.
     """
@@ -150,7 +150,7 @@ def _flush(surface: LimitSurface, place: Place, mu: float, velocity: np.ndarray,
     speed = math.hypot(velocity[0], velocity[1]) + abs(omega) * (h + math.hypot(x, y))
 
     def of(slip: float) -> tuple[np.ndarray, float, float, np.ndarray]:
-        """Twist, angle of the force, where it crosses the face as a share of the half width, force."""
+        """Return twist, angle of the force, its crossing of the face as a share of the half width, and force."""
         twist = stuck - slip * np.array([*tangent, 0.0])
         fx, fy, tau = -surface.wrench(twist)
         pressed, along = fx * nx + fy * ny, fx * tangent[0] + fy * tangent[1]
@@ -172,7 +172,8 @@ def _flush(surface: LimitSurface, place: Place, mu: float, velocity: np.ndarray,
 
 
 def _slip(angle_of: Any, wanted: float, speed: float) -> float:
-    """Speed at which the face slides along the slider, to the left, for a force at the wanted angle [m/s]."""
+    """Return the speed at which the face slides along the slider, to the left, for a force at the wanted angle
+    [m/s]."""
     from scipy.optimize import brentq
 
     # from far to the right to far to the left the force turns from one side of the normal to the other

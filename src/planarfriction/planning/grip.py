@@ -44,7 +44,7 @@ class GripPlan(ByValue):
     signal: Signal
     """Normal force of one of the identical contacts [N], linear between its knots, constant after the last."""
     report: GripReport
-    """What the plan achieves, with the scene's friction and with other values."""
+    """Result of the plan, with the scene's friction and with other values."""
     contact: str
     """Name of the contact that was planned."""
     frictions: tuple[Scene, ...] = field(default=(), compare=False)
@@ -162,7 +162,7 @@ class _Search:
         self._reached = 0.0
 
     def begin(self, kick: float, hold: float) -> float:
-        """How good the best of the profiles is that let the body go at one level, until the time that makes the goal.
+        """Return the cost of the best profile that releases the body at one level until the goal is reached.
 
         Minus what the search makes least; far less without such a profile.
         """
@@ -190,7 +190,7 @@ class _Search:
         return best
 
     def bent(self) -> Signal:
-        """The profile after the search, from that of the start."""
+        """Return the profile after a search that begins at that of the start."""
         from scipy.optimize import least_squares
 
         if not len(self._values):
@@ -275,7 +275,7 @@ def _contact_of(scene: Any, name: str | None) -> int:
 
 
 def _goal(goal: Any) -> tuple[float | None, np.ndarray]:
-    """Angle, None where the goal is a slide, and slide, zeros where it is an angle."""
+    """Return the angle of the goal, None for a slide, and the slide, zeros for an angle."""
     if not isinstance(goal, Mapping) or len(goal) != 1:
         raise InvalidValueError("goal", 'be {"angle": radians} or {"slide": (dx, dy)}', validation.quoted(goal))
     validation.keys("goal", goal, [], ["angle", "slide"])
@@ -289,7 +289,7 @@ def _goal(goal: Any) -> tuple[float | None, np.ndarray]:
 
 
 def _knots(scene: Scene, knots: Any) -> list[np.ndarray]:
-    """Times of the knots [s], of which the best are taken."""
+    """Return the times of the knots [s], of which the best are taken."""
     if isinstance(knots, (int, np.integer)) and not isinstance(knots, bool):
         count = validation.count("knots", knots, 4, MOST_KNOTS)
         return [np.linspace(0.0, share * scene.t_end, count) for share in SPANS]

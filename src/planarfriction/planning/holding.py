@@ -15,7 +15,8 @@ _STEP, _STEPS = 1.25, 120
 
 
 def holding_load(wrench: ArrayLike, patch: ContactPatch, mu: float, margin: float = 0.0) -> float:
-    """Smallest normal force [N] whose friction holds a load `wrench` `(fx, fy, tau)` [N, N, N m] on a contact.
+    """Return the smallest normal force [N] whose friction holds a load `wrench` `(fx, fy, tau)` [N, N, N m] on a
+    contact.
 
     The load acts on the body, about the origin of the contact frame. Friction can be anything inside the limit surface:
     `f_N = max_V (wrench . V) / (mu Phi(V))`, which is attained by the twist V normal to the surface. For a patch that
@@ -52,7 +53,7 @@ def holding_load(wrench: ArrayLike, patch: ContactPatch, mu: float, margin: floa
 
 
 def _needed(load: np.ndarray, patch: ContactPatch, mu: float, normal_force: float | None) -> float:
-    """Normal force that holds the load on the shape at `normal_force`."""
+    """Return the normal force that holds the load on the shape at `normal_force`."""
     kind: type[LimitSurface] = LimitSurfaceExact if patch.root is None or patch.root.ndim == 2 else LimitSurfaceCells
     surface = kind(patch, normal_force=normal_force)
     twist = surface.twist(-load)
@@ -60,6 +61,6 @@ def _needed(load: np.ndarray, patch: ContactPatch, mu: float, normal_force: floa
 
 
 def _strongest(patch: ContactPatch) -> float:
-    """Upper bound on friction over mu in any direction."""
+    """Return an upper bound on friction over mu in any direction."""
     metric = 1.0 if patch.root is None else float(np.linalg.norm(patch.root, ord=2, axis=(-2, -1)).max())
     return metric * (1.0 + float(np.hypot(*patch.asymmetries().T).max()))

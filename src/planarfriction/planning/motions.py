@@ -22,22 +22,22 @@ TIGHT = 1e-6
 """Relative tolerance of the motions that are planned with [-]."""
 
 ANGLE, SHIFT, SPEED, TURN = 3e-4, 3e-3, 1e-3, 1e-3
-"""What counts as one in the sum of squares: of the goal 0.03 % of an angle and 0.1 % of a slide; of the contact radius
-0.3 % of slide where the goal is an angle; 1 mm/s at the end; a turn of 1 mrad where the goal is a slide."""
+"""Units of the residuals in the sum of squares: of the goal 0.03 % of an angle and 0.1 % of a slide; of the contact
+radius 0.3 % of slide where the goal is an angle; 1 mm/s at the end; a turn of 1 mrad where the goal is a slide."""
 
 ROUGH = 0.08
-"""What a bend of the profile by the holding load counts [-]: it chooses among profiles that do the same."""
+"""Weight of a bend of the profile by the holding load [-]: it chooses among profiles that do the same."""
 
 
 class Outcome(NamedTuple):
-    """Where a motion ends."""
+    """End of a motion."""
 
     speed: np.ndarray
     """Velocity `(vx, vy, omega)` [m/s, m/s, rad/s]."""
     slide: np.ndarray
-    """How far the place under the grip has moved away from it `[2]`, world axes [m]."""
+    """Displacement of the place under the grip from it `[2]`, world axes [m]."""
     angle: float
-    """How far the body has turned [rad]."""
+    """Angle by which the body has turned [rad]."""
 
 
 class Aim(NamedTuple):
@@ -51,13 +51,13 @@ class Aim(NamedTuple):
     """Contact radius [m]."""
 
     def progress(self, outcome: Outcome) -> float:
-        """Share of the goal that is reached [-]."""
+        """Return the share of the goal that is reached [-]."""
         if self.angle is not None:
             return outcome.angle / self.angle
         return float(outcome.slide @ self.slide / (self.slide @ self.slide))
 
     def scales(self) -> np.ndarray:
-        """What counts as one of the speeds (3), the slide (2) and the angle."""
+        """Units of the speeds (3), the slide (2) and the angle, as `[6]`."""
         if self.angle is not None:
             slide, angle = SHIFT * self.radius, ANGLE * abs(self.angle)
         else:
@@ -65,7 +65,7 @@ class Aim(NamedTuple):
         return np.array([SPEED, SPEED, SPEED / self.radius, slide, slide, angle])
 
     def misses(self, outcome: Outcome) -> np.ndarray:
-        """Misses `[6]`, each over what counts as one."""
+        """Return the misses `[6]`, each over what counts as one."""
         off = np.concatenate([outcome.speed, outcome.slide - self.slide, [outcome.angle - (self.angle or 0.0)]])
         return off / self.scales()
 
@@ -86,13 +86,13 @@ class Grips:
         self.simulations = self.jacobians = 0
 
     def scene_of(self, profile: Signal, factor: float = 1.0) -> Scene:
-        """The scene with the profile in place."""
+        """Return the scene with the profile in place."""
         contacts = list(self._members[factor])
         contacts[self.index] = dataclasses.replace(contacts[self.index], normal_force=profile)
         return dataclasses.replace(self.scene, contacts=contacts)
 
     def outcomes(self, profile: Signal, factors: Sequence[float], rtol: float | None = TIGHT) -> list[Outcome]:
-        """Where the motion ends under each friction."""
+        """Return the end of the motion under each friction."""
         self.simulations += len(factors)
 
         def one(factor: float) -> Outcome:
@@ -103,7 +103,7 @@ class Grips:
         return _each(one, factors)
 
     def slopes(self, profile: Signal, factors: Sequence[float]) -> list[np.ndarray]:
-        """Derivatives of speeds, slide and angle by the knots `[6, K]` under each friction."""
+        """Return the derivatives of speeds, slide and angle by the knots `[6, K]` under each friction."""
         self.jacobians += len(factors)
 
         def one(factor: float) -> np.ndarray:
@@ -118,17 +118,17 @@ class Grips:
         return _each(one, factors)
 
     def _arm(self, pose: np.ndarray) -> np.ndarray:
-        """From the centre of mass to the place that was under the grip `[2]` [m]."""
+        """Return the vector from the centre of mass to the place that was under the grip `[2]` [m]."""
         return slide_of(self.scene, self.index, pose) + grip_position(self.scene, self.index) - pose[:2]
 
     def outcome(self, motion: np.ndarray) -> Outcome:
-        """What a motion at its end `[6]` means."""
+        """Return the outcome of a motion from its end `[6]`."""
         slide = slide_of(self.scene, self.index, motion[3:])
         return Outcome(motion[:3], slide, float(motion[5] - self.scene.body.angle))
 
 
 def _each(one: Any, factors: Sequence[float]) -> list[Any]:
-    """`one` of every factor, in threads: compiled runs let others run beside them."""
+    """Call `one` for every factor, in threads: compiled runs let others run beside them."""
     if len(factors) == 1:
         return [one(factors[0])]
     with ThreadPoolExecutor(min(len(factors), os.cpu_count() or 1)) as pool:
@@ -136,7 +136,7 @@ def _each(one: Any, factors: Sequence[float]) -> list[Any]:
 
 
 def with_friction(contact: Contact, factor: float) -> Contact:
-    """The contact with `factor` times the friction: mu_c and mu_s of its law."""
+    """Return the contact with `factor` times the friction: mu_c and mu_s of its law."""
     if factor == 1.0:
         return contact
     law = contact.model.law
@@ -150,7 +150,7 @@ def with_friction(contact: Contact, factor: float) -> Contact:
 
 
 def grip_position(scene: Scene, contact: int) -> np.ndarray:
-    """Where the contact frame's origin is in the world at first `[2]` [m]."""
+    """Return the initial position of the contact frame's origin in the world `[2]` [m]."""
     body, chosen = scene.body, scene.contacts[contact]
     if chosen.mounted_on == "world":
         return np.array(chosen.position)
@@ -160,7 +160,8 @@ def grip_position(scene: Scene, contact: int) -> np.ndarray:
 
 
 def slide_of(scene: Scene, contact: int, pose: np.ndarray) -> np.ndarray:
-    """How far the place that was under a contact has moved in the world `[..., 2]` [m], at poses `[..., 3]`."""
+    """Return the displacement in the world of the place that was under a contact `[..., 2]` [m], at poses
+    `[..., 3]`."""
     grip = grip_position(scene, contact)
     (dx, dy), turn = grip - scene.body.position, pose[..., 2] - scene.body.angle
     cos, sin = np.cos(turn), np.sin(turn)
@@ -168,7 +169,7 @@ def slide_of(scene: Scene, contact: int, pose: np.ndarray) -> np.ndarray:
 
 
 def load_on(scene: Scene, contact: int, angle: float, slide: Any, time: float) -> np.ndarray:
-    """What gravity and the applied force ask of one contact `[3]` [N, N, N m] once the body has moved.
+    """Return the load of gravity and applied force on one contact `[3]` [N, N, N m] once the body has moved.
 
     By `angle` [rad] about the grip and by `slide` `[2]` [m]; about the origin of the contact frame, in its axes, of one
     of the identical contacts.

@@ -25,7 +25,7 @@ PARTS = 3
 """Parts of a plan, each of constant force: turn, go on, turn."""
 
 PLACES = ((0.5,), (0.35, 0.65))
-"""Where an edge may be pushed, as shares of its length: the others where its middle leads nowhere."""
+"""Places at which an edge may be pushed, as shares of its length: the others are tried if its middle leads nowhere."""
 
 CHORDS = 40
 """Lines that the arc of the pusher in one part is made of."""
@@ -46,7 +46,7 @@ REACHED = 1e-6
 @described
 @dataclass(frozen=True)
 class PushReport:
-    """What a plan of a push achieves."""
+    """Result of a plan of a push."""
 
     goal: tuple[float, float, float]
     """Goal [m, m, rad]."""
@@ -63,7 +63,7 @@ class PushReport:
     used: float
     """Largest share of the friction cone's half angle that the plan uses [-]."""
     sticks: bool
-    """Whether the pusher sticks all the way."""
+    """True if the pusher sticks all the way."""
     wall_time: float
     """Computing time of the plan [s]."""
 
@@ -84,7 +84,7 @@ class PushPlan(ByValue):
     push: Push
     """The simulated push along this path."""
     report: PushReport
-    """What the plan achieves."""
+    """Result of the plan."""
 
     def __repr__(self) -> str:
         return str(self.report)
@@ -177,18 +177,18 @@ def _places(slider: Slider, edge: int, shares: Sequence[float]) -> list[np.ndarr
 
 
 def _off(done: Push, goal: np.ndarray) -> float:
-    """By how much a push misses [m]."""
+    """Return the distance by which a push misses [m]."""
     return float(np.abs((done.end - goal) * [1.0, 1.0, done.slider.size]).max())
 
 
 def _relative(start: np.ndarray, goal: np.ndarray) -> np.ndarray:
-    """The goal in the axes of the start."""
+    """Return the goal in the axes of the start."""
     c, s, (x, y, angle) = math.cos(start[2]), math.sin(start[2]), goal - start
     return np.array([c * x + s * y, c * y - s * x, angle])
 
 
 def _moved(pose: np.ndarray, twist: np.ndarray, way: float) -> np.ndarray:
-    """A pose after a twist of its own axes has been held: an arc."""
+    """Return a pose after a twist of its own axes has been held: an arc."""
     vx, vy, omega = twist.tolist()
     half, (x, y, angle) = 0.5 * way * omega, pose.tolist()
     chord = way * (math.sin(half) / half if abs(half) > 1e-12 else 1.0)
@@ -197,7 +197,7 @@ def _moved(pose: np.ndarray, twist: np.ndarray, way: float) -> np.ndarray:
 
 
 def _twist(slider: Slider, place: Place, angle: float) -> np.ndarray:
-    """Twist under a force at an angle to the normal, at unit speed of the place."""
+    """Return the twist under a force at an angle to the normal, at unit speed of the place."""
     twist, moved = pushed_by(slider.surface, place, angle)
     return twist / math.hypot(*moved)
 
@@ -205,7 +205,8 @@ def _twist(slider: Slider, place: Place, angle: float) -> np.ndarray:
 def _shortest(
     slider: Slider, place: Place, largest: float, goal: np.ndarray, known: np.ndarray | None = None
 ) -> tuple[float, np.ndarray]:
-    """Length of the shortest plan at a place, and its angles and lengths `[2 PARTS]`; infinite where none is found."""
+    """Return the length of the shortest plan at a place, and its angles and lengths `[2 PARTS]`; infinite where none is
+    found."""
     from scipy.interpolate import CubicSpline
     from scipy.optimize import least_squares, minimize
 
@@ -239,7 +240,7 @@ def _shortest(
 
 
 def _path(slider: Slider, place: Place, x: np.ndarray, start: np.ndarray) -> Signal:
-    """Path of the pusher at unit speed, as lines."""
+    """Return the path of the pusher at unit speed, as lines."""
     pose, now, times, at = start, 0.0, [], []
     for angle, way in zip(x[:PARTS], slider.size * x[PARTS:], strict=True):
         if way < 1e-9:

@@ -116,7 +116,7 @@ def push(
 
 
 def _follow(scenery: Scenery, start: np.ndarray, time: np.ndarray, rtol: float) -> tuple[np.ndarray, list[str], Any]:
-    """Poses, modes and places at given times, phase after phase."""
+    """Return poses, modes and places at given times, phase after phase."""
     from scipy.integrate import solve_ivp
 
     poses, modes, places = np.tile(start, (len(time), 1)), [FREE] * len(time), np.full((len(time), 2), np.nan)
@@ -179,7 +179,7 @@ def _follow(scenery: Scenery, start: np.ndarray, time: np.ndarray, rtol: float) 
 
 
 def _neighbour(slider: Slider, place: Place, mu: float, velocity: np.ndarray, held: str) -> str:
-    """The mode after one that has come to its end, where rounding still takes it for the old one."""
+    """Return the mode after one that has come to its end, where rounding still takes it for the old one."""
     if held != STICK:
         return STICK
     left, right = (motion_at(slider.surface, place, mu, velocity, mode).slack for mode in (LEFT, RIGHT))
@@ -212,7 +212,7 @@ class _Phase:
         return self._last[1]
 
     def rate(self, t: float, q: np.ndarray) -> np.ndarray:
-        """Velocity of the slider's frame in the world `[3]`."""
+        """Return the velocity of the slider's frame in the world `[3]`."""
         vx, vy, omega = self._motion(t, q)[0].twist
         c, s = np.cos(q[2]), np.sin(q[2])
         return np.array([c * vx - s * vy, s * vx + c * vy, omega])

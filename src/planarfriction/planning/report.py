@@ -1,4 +1,4 @@
-"""What a grip plan achieves, in numbers and as a table."""
+"""Report of a grip plan, in numbers and as a table."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from planarfriction.equality import ByValue
 
 @dataclass(frozen=True, eq=False, repr=False)
 class GripReport(ByValue):
-    """What a plan achieves with the scene's friction and with F other values, and how long it took."""
+    """Result of a plan with the scene's friction and with F other values, and the time that planning took."""
 
     goal: dict[str, Any]
     """The goal as given."""

@@ -1,4 +1,4 @@
-"""Where pusher and slider touch: an end of the pusher at an edge, a corner of the slider at the face, or all of it."""
+"""Contact of pusher and slider: an end of the pusher at an edge, a corner of the slider at the face, or all of it."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _FLUSH = 1e-4
 
 
 class Contact(NamedTuple):
-    """What touches: an end of the pusher at an edge, a corner at the face, or the face at an edge."""
+    """Feature that touches: an end of the pusher at an edge, a corner at the face, or the face at an edge."""
 
     kind: str
     edge: int
@@ -45,7 +45,7 @@ class Scenery:
         self._lengths = np.hypot(*edges.T)
 
     def pose(self, t: float) -> np.ndarray:
-        """Pose of the pusher `[3]`."""
+        """Return the pose of the pusher `[3]`."""
         i = self._piece(t)
         return self._poses[i] + (t - self._times[i]) * self._rates[i]
 
@@ -54,17 +54,17 @@ class Scenery:
         return min(max(i, 0), len(self._rates) - 1)
 
     def piece_end(self, t: float) -> float:
-        """Where the line ends that the pusher follows from a time on."""
+        """Return the time at which the line ends that the pusher follows from a time on."""
         return float(self._times[self._piece(t, forward=True) + 1])
 
     def end(self, i: int, t: float, q: np.ndarray) -> np.ndarray:
-        """An end of the pusher in the slider's axes `[2]`."""
+        """Return an end of the pusher in the slider's axes `[2]`."""
         x, y, angle = self.pose(t)
         (a, b), c, s = self._ends[i], math.cos(angle), math.sin(angle)
         return _inside(q, x + c * a - s * b, y + s * a + c * b)
 
     def corners(self, t: float, q: np.ndarray) -> np.ndarray:
-        """Corners of the slider in the pusher's axes `[M, 2]`."""
+        """Return the corners of the slider in the pusher's axes `[M, 2]`."""
         c, s = math.cos(q[2]), math.sin(q[2])
         world = self.slider.outline @ np.array([[c, s], [-s, c]]) + q[:2]
         x, y, angle = self.pose(t)
@@ -72,7 +72,7 @@ class Scenery:
         return (world - [x, y]) @ np.array([[c, -s], [s, c]])
 
     def features(self, t: float, q: np.ndarray) -> list[tuple[float, Contact]]:
-        """Everything that may touch, with its distance [m]."""
+        """Return everything that may touch, with its distance [m]."""
         found = []
         for i in range(len(self._ends)):
             gaps = self.slider.gaps(self.end(i, t, q))
@@ -87,19 +87,19 @@ class Scenery:
         return found
 
     def gap(self, t: float, q: np.ndarray) -> float:
-        """Distance of pusher and slider [m], negative where they overlap."""
+        """Return the distance of pusher and slider [m], negative where they overlap."""
         return min(each[0] for each in self.features(t, q))
 
     def closes(self, contact: Contact) -> bool:
-        """Whether something else may begin to touch."""
+        """Return True if something else may begin to touch."""
         return self.pusher.width > 0.0 and contact.kind != FACE
 
     def clear(self, contact: Contact, t: float, q: np.ndarray) -> float:
-        """Distance of all that does not touch yet [m]."""
+        """Return the distance of all that does not touch yet [m]."""
         return min(gap for gap, each in self.features(t, q) if not _same(contact, each, len(self._lengths))) + self.near
 
     def flush(self, contact: Contact, t: float, q: np.ndarray) -> Contact:
-        """The face at the edge that it has closed with."""
+        """Return the face at the edge that it has closed with."""
         c, s = math.cos(self.pose(t)[2] - q[2]), math.sin(self.pose(t)[2] - q[2])
         along = self.slider.inward @ [c, s]
         edge = int(along.argmax())
@@ -108,7 +108,7 @@ class Scenery:
         return Contact(FACE, edge)
 
     def within(self, contact: Contact, t: float, q: np.ndarray) -> float:
-        """How far what touches is from the end of its edge, or of the face [m]."""
+        """Return the distance of what touches from the end of its edge, or of the face [m]."""
         if contact.kind == CORNER:
             return 0.5 * self.pusher.width - abs(self.corners(t, q)[contact.edge][1])
         if contact.kind == END:
@@ -122,12 +122,12 @@ class Scenery:
         return float((point - self.slider.outline[edge]) @ self.slider.along[edge])
 
     def overlap(self, edge: int, t: float, q: np.ndarray) -> tuple[float, float]:
-        """Part of an edge that the face covers, from its left to its right end as it looks [m]."""
+        """Return the part of an edge that the face covers, from its left to its right end as it looks [m]."""
         right, left = (self.along(edge, self.end(i, t, q)) for i in range(2))
         return max(left, 0.0), min(right, self._lengths[edge])
 
     def rate(self, t: float, forward: bool = False) -> np.ndarray:
-        """Velocity of the pusher `[3]`."""
+        """Return the velocity of the pusher `[3]`."""
         return self._rates[self._piece(t, forward)]
 
 
@@ -138,7 +138,7 @@ def _inside(q: np.ndarray, x: float, y: float) -> np.ndarray:
 
 
 def _same(contact: Contact, other: Contact, edges: int) -> bool:
-    """Whether a feature is the one that touches: an end at any edge, a corner."""
+    """Return True if a feature is the one that touches: an end at any edge, or a corner."""
     return contact.kind == other.kind and (
         contact.end == other.end if contact.kind == END else contact.edge % edges == other.edge
     )
@@ -147,7 +147,8 @@ def _same(contact: Contact, other: Contact, edges: int) -> bool:
 def place_of(
     scenery: Scenery, contact: Contact, t: float, q: np.ndarray, forward: bool = False
 ) -> tuple[Place, np.ndarray]:
-    """Where the slider is touched, and the pusher's velocity there `(vx, vy, omega)`, in the slider's axes."""
+    """Return the place at which the slider is touched, and the pusher's velocity there `(vx, vy, omega)`, in its
+    axes."""
     slider, (x, y, angle), half = scenery.slider, scenery.pose(t), 0.0
     if contact.kind == END:
         at, normal = scenery.end(contact.end, t, q), slider.inward[contact.edge]
@@ -166,7 +167,7 @@ def place_of(
 
 
 def flush_after(scenery: Scenery, contact: Contact, t: float, q: np.ndarray, leans: int) -> Contact:
-    """What still touches when a face turns about its left end (1) or its right one (-1)."""
+    """Return what still touches when a face turns about its left end (1) or its right one (-1)."""
     edge, corners = contact.edge, len(scenery.slider.outline)
     right, left = (scenery.along(edge, scenery.end(i, t, q)) for i in range(2))
     if leans > 0:
@@ -176,7 +177,7 @@ def flush_after(scenery: Scenery, contact: Contact, t: float, q: np.ndarray, lea
 
 
 def touch_after(scenery: Scenery, t: float, q: np.ndarray) -> tuple[float, Contact] | None:
-    """When and where a pusher that does not touch a slider at rest begins to, or None."""
+    """Return time and place at which a pusher that does not touch a slider at rest begins to, or None."""
     from scipy.optimize import brentq
 
     times = scenery._times[scenery._times > t]

@@ -40,7 +40,7 @@ _MOST_STEPS = 60
 
 @kernel
 def _rounded(seen, weights, by_lean, a, b, rounding):
-    """Slope and Hessian of `sum w_i sqrt(|u_i|^2 + rounding^2)`, with what the asymmetry adds, at a place."""
+    """Return slope and Hessian of `sum w_i sqrt(|u_i|^2 + rounding^2)`, with the share of the asymmetry, at a place."""
     ga, gb, aa, ab, bb = by_lean[0], by_lean[1], 0.0, 0.0, 0.0
     for i in range(weights.shape[0]):
         ax, ay, bx, by = seen[2, i], seen[3, i], seen[4, i], seen[5, i]
@@ -82,7 +82,7 @@ def _descend(seen, weights, by_lean, a, b, rounding, balanced):
 
 @kernel
 def _unborne(seen, weights, a, b, ga, gb):
-    """What is left of a slope after the slowest cell, if it rests, has taken it; and the dissipation of the cells."""
+    """Return what is left of a slope after the slowest cell, if it rests, has taken its share; and the dissipation."""
     slowest, rests, power = math.inf, 0, 0.0
     for i in range(weights.shape[0]):
         ux, uy = seen[0, i] + a * seen[2, i] + b * seen[4, i], seen[1, i] + a * seen[3, i] + b * seen[5, i]
@@ -105,7 +105,7 @@ def _unborne(seen, weights, a, b, ga, gb):
 
 @jit
 def cell_twists(levers, weights, frame, wrenches, twists):
-    """Twists of wrenches `[M, 3]` into `twists [M, 3]`; returns as `limit_surface.loops.twists.table_twists`.
+    """Write twists of wrenches `[M, 3]` into `twists [M, 3]`; return as `limit_surface.loops.twists.table_twists`.
 
     `levers [2, 3, n]` are the C of the cells. The kinks are rounded off by a speed that shrinks to nothing, where plain
     Newton steps would stall on them. A cell that rests bears any force up to its friction: a wrench is reached if one

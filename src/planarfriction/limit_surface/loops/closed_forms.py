@@ -43,7 +43,7 @@ class Elements(NamedTuple):
     rules: np.ndarray
     """Gauss rules `[J, 3, K]` (xi, eta, weight)."""
     points: np.ndarray
-    """How many points each rule has, `[J]`."""
+    """Number of points of each rule, `[J]`."""
     reach: np.ndarray
     """The distance in radii from which on each rule is used, `[J]`."""
 
@@ -86,7 +86,7 @@ _AT_REST = 1e-14
 
 @kernel
 def _segment(ax, ay, bx, by):
-    """Height h of the origin over the line from a to b (> 0 to the left), and f, G, M of the segment.
+    """Compute the height h of the origin over the line from a to b (> 0 to the left), and f, G, M of the segment.
 
     `d = h n + t tau`: with `S = |a| + |b|` and length L, `int 1/|d| = log((S + L)/(S - L))`; differences between the
     two ends are written without cancellation.
@@ -122,7 +122,8 @@ def _segment(ax, ay, bx, by):
 
 @kernel
 def _to_twist(density, s, cx, cy, f, gx, gy, mxx, mxy, myy):
-    """Gradient (3) and second derivatives (xx, xy, xs, yy, ys, ss) with respect to the twist, from f, G and M."""
+    """Return gradient (3) and second derivatives (xx, xy, xs, yy, ys, ss) with respect to the twist, from f, G and
+    M."""
     signed = xp.where(s < 0.0, -density, density)
     per = density / abs(s)
     x, y = mxy * cx - mxx * cy, myy * cx - mxy * cy
@@ -134,7 +135,7 @@ def _to_twist(density, s, cx, cy, f, gx, gy, mxx, mxy, myy):
 
 @kernel
 def _near(corners, i, count, density, s, cx, cy):
-    """Closed form of element i: a segment, or a signed sum over the sides of a quad."""
+    """Return the closed form of element i: a segment, or a signed sum over the sides of a quad."""
     if count == SEGMENTS:
         _, f, gx, gy, mxx, mxy, myy = _segment(
             corners[i, 0, 0] - cx, corners[i, 0, 1] - cy, corners[i, 1, 0] - cx, corners[i, 1, 1] - cy
@@ -157,7 +158,7 @@ def _near(corners, i, count, density, s, cx, cy):
 
 @kernel
 def _far(block, tier, count, rules, points, x, y, s):
-    """Gauss rule `tier` on the first `count` elements of its block, `p = P + xi A + eta B + xi eta C`.
+    """Apply Gauss rule `tier` to the first `count` elements of its block, `p = P + xi A + eta B + xi eta C`.
 
     The elements run innermost, so that the loop vectorises.
     """
@@ -188,7 +189,7 @@ def _far(block, tier, count, rules, points, x, y, s):
 
 @kernel
 def _tier(reach, speed, size):
-    """Which Gauss rule serves an element; -1 for the closed form."""
+    """Return the index of the Gauss rule for an element; -1 for the closed form."""
     tier = -1
     while tier + 1 < reach.shape[0] and speed >= reach[tier + 1] * size:
         tier += 1
@@ -197,7 +198,7 @@ def _tier(reach, speed, size):
 
 @kernel
 def element_sum(elements, x, y, s, block, held, sums):
-    """Gradient and second derivatives of `Phi` at a unit twist into the row `sums` [9].
+    """Compute gradient and second derivatives of `Phi` at a unit twist into the row `sums` [9].
 
     `block` [J, 11, N] and `held` [J] are scratch.
     """
@@ -228,7 +229,7 @@ def element_sum(elements, x, y, s, block, held, sums):
 
 @jit
 def element_sums(elements, twist, sums):
-    """`element_sum` at unit twists `[M, 3]` into `sums [M, 9]`."""
+    """Compute `element_sum` at unit twists `[M, 3]` into `sums [M, 9]`."""
     block = np.empty((elements.points.shape[0], 11, elements.corners.shape[0]))
     held = np.empty(elements.points.shape[0], np.int64)
     for m in range(twist.shape[0]):
@@ -237,7 +238,7 @@ def element_sums(elements, twist, sums):
 
 @kernel
 def _elliptic(complement):
-    """Complete elliptic integrals `B = int cos^2/Delta`, `D = int sin^2/Delta` and `C = (D - B)/m`.
+    """Compute the complete elliptic integrals `B = int cos^2/Delta`, `D = int sin^2/Delta` and `C = (D - B)/m`.
 
     `Delta^2 = 1 - m sin^2`, `complement = 1 - m > 0`. By the arithmetic-geometric mean: `K = pi/(2 agm)`,
     `D = K (1/2 + m S)`, `B = K (1/2 - m S)`, `S = sum 2^(n-1) c_n^2/m^2`.
@@ -256,7 +257,7 @@ def _elliptic(complement):
 
 @kernel
 def _means(means, power):
-    """The next arithmetic and geometric mean, c_n, its square over m^2, and their sum weighted with `power`."""
+    """Return the next arithmetic and geometric mean, c_n, its square over m^2, and their sum weighted with `power`."""
     a, b, c, square, total = means
     mean = 0.5 * (a + b)
     ratio = c / (4.0 * mean)  # c_(n+1) = c_n^2/(4 a_(n+1)), and so is its square over m^2
@@ -266,7 +267,7 @@ def _means(means, power):
 
 @kernel
 def _axial(x, y, s, v, across, spin, along, twirl):
-    """Gradient and second derivatives of what depends on the slide speed v and the spin alone."""
+    """Return gradient and second derivatives of a function of the slide speed v and the spin alone."""
     per = 1.0 / v if v > 0.0 else 0.0
     ex, ey, more = x * per, y * per, along - across
     return (
@@ -277,7 +278,7 @@ def _axial(x, y, s, v, across, spin, along, twirl):
 
 @kernel
 def _ratio(v, q):
-    """The larger of two speeds, the smaller over it, and `1 - m` of `m = ratio^2`, never zero."""
+    """Return the larger of two speeds, the smaller over it, and `1 - m` of `m = ratio^2`, never zero."""
     large = xp.maximum(xp.maximum(v, q), _TINY)
     ratio = xp.minimum(v, q) / large
     return large, ratio, xp.maximum(abs(v - q) / large * (1.0 + ratio), 1e-32)
@@ -285,7 +286,7 @@ def _ratio(v, q):
 
 @kernel
 def disc_sum(discs, x, y, s):
-    """As `element_sum` for evenly loaded discs, in closed form (docs/physics.md, "Exact limit surfaces")."""
+    """Compute as `element_sum` for evenly loaded discs, in closed form (docs/physics.md, "Exact limit surfaces")."""
     v = math.sqrt(x * x + y * y)
     spin, along, across, twirl = 0.0, 0.0, 0.0, 0.0
     for k in range(discs.radii.shape[0]):
@@ -309,14 +310,14 @@ def disc_sum(discs, x, y, s):
 
 @jit
 def disc_sums(discs, twist, sums):
-    """`disc_sum` at unit twists `[M, 3]` into `sums [M, 9]`."""
+    """Compute `disc_sum` at unit twists `[M, 3]` into `sums [M, 9]`."""
     for m in range(twist.shape[0]):
         put_all(sums[m], disc_sum(discs, twist[m, 0], twist[m, 1], twist[m, 2]))
 
 
 @kernel
 def _rings(rings, start, end, s, v, sums):
-    """Adds the rings between two radii to `sums`: the load, then what `_axial` takes."""
+    """Add the rings between two radii to `sums`: the load, then the arguments of `_axial`."""
     load, spin, along, across, twirl = 0.0, 0.0, 0.0, 0.0, 0.0
     for n in range(rings.share.shape[0]):
         rho = start + (end - start) * rings.share[n]
@@ -343,7 +344,7 @@ def _rings(rings, start, end, s, v, sums):
 
 @kernel
 def ring_sum(rings, x, y, s, sums):
-    """As `element_sum` for rings.
+    """Compute as `element_sum` for rings.
 
     A ring whose rim runs at q and slides at v: `Phi = 2/pi (v + q) E(4 v q/(v + q)^2)`, in its derivatives with
     `k = min(v, q)/max(v, q)`: `2/pi E(k^2)` by the larger of v and q, `2/pi k B` by the smaller.
@@ -362,6 +363,6 @@ def ring_sum(rings, x, y, s, sums):
 
 @jit
 def ring_sums(rings, twist, sums):
-    """`ring_sum` at unit twists `[M, 3]` into `sums [M, 9]`."""
+    """Compute `ring_sum` at unit twists `[M, 3]` into `sums [M, 9]`."""
     for m in range(twist.shape[0]):
         ring_sum(rings, twist[m, 0], twist[m, 1], twist[m, 2], sums[m])

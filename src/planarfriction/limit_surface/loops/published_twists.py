@@ -16,12 +16,12 @@ _SAME_ANSWER = 1e-12
 """Angle [rad] between a stored wrench and the wanted one below which a direction answers: rounding of the quadratic."""
 
 _AT_EDGE = 1e-13
-"""Of h: an answer on the edge between two cells may lie this much outside of both, by rounding."""
+"""Excess by which an answer on the edge between two cells may lie outside of both, by rounding, as a share of h."""
 
 
 @kernel
 def _signs(data, row, start, first, second, across, sides):
-    """`h . first` and `h . second` of a row of nodes `[columns, 2]`, and on which sides of zero they can be."""
+    """Return `h . first` and `h . second` of a row of nodes `[columns, 2]`, and on which sides of zero they can be."""
     for j in range(across.shape[1]):
         p = start + 4 * j
         h = (data[p], data[p + 1], data[p + 2])
@@ -33,14 +33,15 @@ def _signs(data, row, start, first, second, across, sides):
 
 @kernel
 def _share(numerator, denominator):
-    """The quotient within [0, 1]; zero where there is none."""
+    """Return the quotient within [0, 1]; zero where there is none."""
     quotient = numerator / denominator if denominator != 0.0 else 0.0
     return xp.minimum(xp.maximum(quotient, 0.0), 1.0)
 
 
 @kernel
 def _answer(data, size, i, j, position, corners, target):
-    """The direction of table cell (i, j) at an azimuth that answers best, its dissipation, angle and `|h . target|`.
+    """Return the direction of table cell (i, j) at an azimuth that answers best, its dissipation, angle and
+    `|h . target|`.
 
     `corners` are `h . first` and `h . second` at the corners, the lower polar angle first.
     """
@@ -63,7 +64,8 @@ def _answer(data, size, i, j, position, corners, target):
 
 @kernel
 def _positions(corners):
-    """Where along the azimuth the two equations have a common root: `q2 b^2 + q1 b + q0 = 0`, or at the cell's edge."""
+    """Return the positions along the azimuth of common roots of both equations, `q2 b^2 + q1 b + q0 = 0`, or the
+    edge."""
     ax, ay, bx, by, cx, cy, dx, dy = corners
     b_x, b_y, a_x, a_y = bx - ax, by - ay, cx - ax, cy - ay
     t_x, t_y = dx - cx - b_x, dy - cy - b_y

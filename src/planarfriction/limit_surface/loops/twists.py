@@ -69,7 +69,7 @@ class _Exact(NamedTuple):
 
 @kernel
 def target_of(frame, wrench):
-    """The unit vector that h has to be parallel to; of no length for a wrench that is zero or not finite."""
+    """Return the unit vector that h has to be parallel to; a zero vector for a wrench that is zero or not finite."""
     largest = xp.maximum(xp.maximum(abs(wrench[0]), abs(wrench[1])), abs(wrench[2]))
     sound = xp.is_finite(wrench[0]) and xp.is_finite(wrench[1]) and xp.is_finite(wrench[2]) and largest > 0.0
     per = 1.0 / largest if sound else 0.0
@@ -84,7 +84,7 @@ def target_of(frame, wrench):
 
 @kernel
 def is_wrench(target):
-    """Whether `target_of` found one."""
+    """Return True if `target_of` found a target."""
     return target[0] != 0.0 or target[1] != 0.0 or target[2] != 0.0
 
 
@@ -98,7 +98,7 @@ def put_twist(frame, v, power, row):
 
 @kernel
 def plane(n):
-    """Two unit vectors that span the plane across a unit vector."""
+    """Return two unit vectors that span the plane across a unit vector."""
     sign = -1.0 if n[2] < 0.0 else 1.0
     a = -1.0 / (sign + n[2])
     b = n[0] * n[1] * a
@@ -107,7 +107,7 @@ def plane(n):
 
 @kernel
 def newton_move(ga, gb, aa, ab, bb):
-    """Newton's step; downhill also where the surface curves downwards, and long where it hardly curves."""
+    """Return Newton's step; downhill also where the surface curves downwards, and long where it hardly curves."""
     det, trace = aa * bb - ab * ab, aa + bb
     if trace > 0.0 and det > 1e-6 * trace * trace:
         return (ab * gb - bb * ga) / det, (ab * ga - aa * gb) / det
@@ -130,7 +130,7 @@ def newton_move(ga, gb, aa, ab, bb):
 
 @kernel
 def _table_at(table, lean, v, scratch):
-    """`h` and the second derivatives (xx, xy, xs, yy, ys, ss) of the dissipation of a stored potential."""
+    """Return `h` and the second derivatives (xx, xy, xs, yy, ys, ss) of the dissipation of a stored potential."""
     size = norm(v)
     per = 1.0 / size
     h = times(per, sliding(POTENTIAL, table.data, 0, table.size, v[0], v[1], v[2], size))
@@ -145,7 +145,7 @@ def _table_at(table, lean, v, scratch):
 
 @kernel
 def _exact_at(surface, lean, v, scratch):
-    """The same of an integrated surface."""
+    """Return `h` and the second derivatives of the dissipation of an integrated surface."""
     per = 1.0 / norm(v)
     n = times(per, v)
     if surface.rings.share.shape[0] > 0:
@@ -163,7 +163,7 @@ def _exact_at(surface, lean, v, scratch):
 
 @kernel
 def _across(a, second, b):
-    """`a' H b` of second derivatives."""
+    """Return `a' H b` of second derivatives."""
     return (
         a[0] * (second[0] * b[0] + second[1] * b[1] + second[2] * b[2])
         + a[1] * (second[1] * b[0] + second[3] * b[1] + second[4] * b[2])
@@ -173,7 +173,8 @@ def _across(a, second, b):
 
 @kernel
 def _least(evaluate, surface, lean, target, guess, balanced, scratch):
-    """Scaled twist of least dissipation in the plane of `target`, from a guess; that dissipation, and the angle left.
+    """Return the scaled twist of least dissipation in the plane of `target`, from a guess; that dissipation; the angle
+    left.
 
     A step is taken where the dissipation falls as it should; near the minimum, where that drowns in rounding, where the
     balance is better.
@@ -216,7 +217,7 @@ def _least(evaluate, surface, lean, target, guess, balanced, scratch):
 
 @kernel
 def _most(duals, row, target, mirror):
-    """The largest power of a row of duals, as an integer."""
+    """Return the largest power of a row of duals, as an integer."""
     x, y, s, most = target[0], target[1], target[2], 0
     for j in range(duals.shape[2]):
         power = x * duals[0, row, j] + y * duals[1, row, j] + s * duals[2, row, j]
@@ -226,7 +227,7 @@ def _most(duals, row, target, mirror):
 
 @kernel
 def _nearest(table, target):
-    """The stored direction of least dissipation per unit of power that `target` would have."""
+    """Return the stored direction of least dissipation per unit of power that `target` would have."""
     duals, mirror = table.duals, table.mirror
     most, row, best, column, sign = 0, 0, 0.0, 0, 1.0
     for i in range(duals.shape[1]):
@@ -246,7 +247,7 @@ def _nearest(table, target):
 
 @jit
 def table_twists(table, frame, wrenches, twists):
-    """Twists of wrenches `[M, 3]` into `twists [M, 3]`, of unit dissipation.
+    """Write twists of unit dissipation of wrenches `[M, 3]` into `twists [M, 3]`.
 
     Returns the largest angle [rad] between a wrench and that of its twist; `BAD_WRENCH` if there is none.
     """
@@ -264,7 +265,8 @@ def table_twists(table, frame, wrenches, twists):
 
 @jit
 def exact_twists(elements, discs, rings, table, frame, wrenches, twists):
-    """As `table_twists` for elements, or rings or discs if there are any, from the twist that their `table` has."""
+    """Find twists as `table_twists` for elements, or rings or discs if there are any, from the twist of their
+    `table`."""
     block = np.empty((elements.points.shape[0], 11, elements.corners.shape[0]))
     held, scratch, worst = np.empty(elements.points.shape[0], np.int64), np.empty(9), 0.0
     surface = _Exact(elements, discs, rings, block, held)
@@ -282,7 +284,7 @@ def exact_twists(elements, discs, rings, table, frame, wrenches, twists):
 
 @jit
 def ellipsoid_twists(frame, wrenches, twists):
-    """As `table_twists` for the ellipsoid, whose answer is known."""
+    """Find twists as `table_twists` for the ellipsoid, whose answer is known."""
     lean = (frame[18], frame[19], frame[20])
     for m in range(wrenches.shape[0]):
         target = target_of(frame, wrenches[m])
