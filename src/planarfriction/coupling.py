@@ -84,7 +84,7 @@ class CoupledStep(NamedTuple):
     """Largest difference between the twists and loads and those the wrenches cause, `[...]` [m/s]; loads count as the
     speed they could cause."""
     converged: np.ndarray
-    """Whether the residual is within the tolerance, bool `[...]`."""
+    """True where the residual is within the tolerance, bool `[...]`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,11 +116,12 @@ class CoupledPatches(ByValue):
         return (int(self._bounds[-1]),)
 
     def rest(self) -> np.ndarray:
-        """State of all patches at rest, with relaxed bristles."""
+        """Return the state of all patches at rest, with relaxed bristles."""
         return np.zeros(self.state_shape)
 
     def states(self, state: np.ndarray) -> list[np.ndarray]:
-        """Views of the state of each patch in `state` `[..., states]`, each in the shape that its model uses.
+        """Return the views of the state of each patch in `state` `[..., states]`, each in the shape that its model
+        uses.
 
         Raises InvalidValueError for a state of another shape.
         """
@@ -170,7 +171,7 @@ class CoupledPatches(ByValue):
     # ------------------------------------------------------------------ rows
 
     def _problems(self, arrays: dict[str, np.ndarray]) -> tuple[np.ndarray, tuple[int, ...]]:
-        """A row for each environment, with the inputs written, and the batch axes."""
+        """Return a row for each environment, with the inputs written, and the batch axes."""
         k, n = len(self.models), 3 * len(self.models)
         inner = {
             "state": self.state_shape, "dt": (), "twist": (k, 3), "normal_force": (k,), "wrench": (k, 3),
@@ -253,7 +254,8 @@ class CoupledPatches(ByValue):
         return step if len(problems) == 1 else CoupledStep(*map(np.ascontiguousarray, step))
 
     def _blank_problem(self) -> np.ndarray:
-        """The row of a problem without inputs, for compiled hosts; its patches follow no loads (`kernels.coupling`)."""
+        """Return the row of a problem without inputs, for compiled hosts; its patches follow no loads
+        (`kernels.coupling`)."""
         row, parts = np.zeros((1, self._packed.words)), self._parts
         row.view(np.int64)[:, parts["records"]], row[:, parts["shares"]] = self._packed.records, self._packed.shares
         row[:, parts["tolerance"]], row[:, parts["most"]] = TOLERANCE, ITERATIONS
@@ -262,7 +264,7 @@ class CoupledPatches(ByValue):
     # ------------------------------------------------------------------ what is packed once
 
     def __getstate__(self) -> dict[str, Any]:
-        """What a copy or another process gets: addresses hold in this process alone."""
+        """Return the fields for a copy or another process, without addresses, which hold in this process alone."""
         return {"models": self.models}
 
     @functools.cached_property
@@ -284,7 +286,7 @@ class _Packed(NamedTuple):
     row: np.ndarray
     """Their `Patches`."""
     parts: dict[str, slice]
-    """Of the row of a problem."""
+    """Slices of the row of a problem, by the names of its parts."""
     words: int
     """Length of that."""
     records: np.ndarray
@@ -294,7 +296,7 @@ class _Packed(NamedTuple):
     following: list[tuple[int, slice]]
     """Patches whose pieces follow their loads, and these pieces."""
     kept: list[Any]
-    """What is behind addresses."""
+    """Objects behind the addresses, which have to be kept alive."""
 
 
 def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _Packed:
@@ -331,7 +333,7 @@ def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _Packed:
 
 
 def _addresses(steps: PackedSteps) -> np.ndarray:
-    """Of the records, int `[R, P]`."""
+    """Return the addresses of the records, int `[R, P]`."""
     loads, parts, words = steps.records.shape
     return place_of(steps.records) + 8 * words * np.arange(loads * parts).reshape(loads, parts)
 

@@ -1,4 +1,4 @@
-"""What `help()` says of a record: its docstring, then each argument with its meaning, shape and unit.
+"""Text of `help()` for a record: its docstring, then each argument with its meaning, shape and unit.
 
 Those stand once, in the line below each field, where Python itself forgets them.
 """
@@ -15,17 +15,17 @@ from typing import Any, TypeVar
 _KindT = TypeVar("_KindT", bound=type)
 
 HEADING = "Arguments"
-"""What the list of arguments begins with."""
+"""Heading of the list of arguments."""
 
 
 def described(kind: _KindT) -> _KindT:
-    """Decorator of dataclasses and named tuples: `help()` shows their arguments too."""
+    """Decorate a dataclass or named tuple: `help()` shows its arguments too."""
     kind.__doc__ = _Description(kind.__doc__ or "")  # pyright: ignore[reportAttributeAccessIssue]
     return kind
 
 
 def field_docs(kind: type) -> dict[str, str]:
-    """What stands below each field of a class and of those that it is made from, in the source; none without one."""
+    """Return the docstring below each field of a class and of its bases, from the source; none without a source."""
     found = {}
     for each in reversed(kind.__mro__):
         try:

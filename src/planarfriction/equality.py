@@ -68,7 +68,7 @@ class ByValue(Checked):
 
 
 def by_parts(kind: _KindT) -> _KindT:
-    """Decorator for named tuples with arrays: they are compared by content and have a `repr` of one line."""
+    """Decorate a named tuple with arrays: it is compared by content and has a `repr` of one line."""
 
     def content_equal(self: Any, other: object) -> bool:
         return type(self) is type(other) and _same_items(self, other)
@@ -99,7 +99,7 @@ def short_repr(value: Any) -> str:
 
 
 def unusual(record: Any, but: tuple[str, ...] = ()) -> list[str]:
-    """Arguments of a dataclass that are not as by default, as `name=value`; those in `but` are left out."""
+    """Return the arguments of a dataclass that are not as by default, as `name=value`; those in `but` are left out."""
     return [
         f"{field.name}={short_repr(getattr(record, field.name))}"
         for field in dataclasses.fields(record)
@@ -143,7 +143,7 @@ def _compared(record: Any) -> list[str]:
 
 
 def _key(part: Any) -> Any:
-    """Something to hash that is the same for parts that are the same."""
+    """Return something to hash that is the same for parts that are the same."""
     if isinstance(part, np.ndarray):
         return part.shape, (part + 0.0).tobytes() if part.dtype.kind == "f" else part.tobytes()  # + 0.0: -0.0 is 0.0
     if isinstance(part, (tuple, list)):

@@ -18,7 +18,7 @@ _BRIEF.maxstring = _BRIEF.maxlong = _BRIEF.maxother = 2 * WIDTH
 
 
 def shown(value: Any) -> str:
-    """`value` for a message: on one line, cut to `WIDTH` characters; texts without quotes."""
+    """Return `value` for a message: on one line, cut to `WIDTH` characters; texts without quotes."""
     try:
         text = value if isinstance(value, str) and value.isprintable() else _BRIEF.repr(value)
     except Exception:  # what cannot be printed, such as integers of more than 4300 digits, is still named
@@ -28,7 +28,7 @@ def shown(value: Any) -> str:
 
 
 def one_line(message: str) -> str:
-    """`message` without what cannot be printed, and without its middle where it is longer than `LONGEST`."""
+    """Return `message` without what cannot be printed, and without its middle where it is longer than `LONGEST`."""
     if not message.isprintable():
         message = "".join(each if each.isprintable() else ascii(each)[1:-1] for each in message)
     return message if len(message) <= LONGEST else f"{message[: LONGEST // 2 - 5]} ... {message[-LONGEST // 2 :]}"

@@ -27,7 +27,7 @@ class Family(Mapping[str, Any]):
 
     def __init__(self, what: str, members: Mapping[str, tuple[str, str]]):
         self.what = what
-        """What a member is called in messages."""
+        """Word for a member in messages."""
         self._members = {name: Member(words, make) for name, (words, make) in members.items()}
 
     def __getitem__(self, name: str) -> Any:
@@ -50,15 +50,16 @@ class Family(Mapping[str, Any]):
         return name in self._members
 
     def words(self, name: str) -> str:
-        """Description of a member, in one line."""
+        """Return the description of a member, in one line."""
         return self._members[name].words
 
     def classes(self) -> str:
-        """Names of all classes or functions, for messages."""
+        """Return the names of all classes or functions, for messages."""
         return ", ".join(make.__name__ for make in self.values())
 
     def choose(self, name: str) -> Any:
-        """Class or function of the member `name`. Raises `InvalidValueError`, listing all names, if there is none."""
+        """Return the class or function of the member `name`. Raises `InvalidValueError`, listing all names, if there is
+        none."""
         from planarfriction import validation  # brings NumPy with it, which names alone do not need
 
         return self[validation.choice(self.what, name, self)]

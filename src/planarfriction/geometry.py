@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 
 def twist_at(twist: ArrayLike, offset: ArrayLike) -> np.ndarray:
-    """Twist at the point displaced by `offset` [m] from the reference point.
+    """Return the twist at the point displaced by `offset` [m] from the reference point.
 
     `vx' = vx - omega dy`, `vy' = vy + omega dx`, `omega' = omega`; shapes `[..., 3]` and `[..., 2]`.
     """
@@ -22,7 +22,7 @@ def twist_at(twist: ArrayLike, offset: ArrayLike) -> np.ndarray:
 
 
 def wrench_at(wrench: ArrayLike, offset: ArrayLike) -> np.ndarray:
-    """Wrench about the point displaced by `offset` [m] from the reference point.
+    """Return the wrench about the point displaced by `offset` [m] from the reference point.
 
     `tau' = tau - (dx fy - dy fx)`; the forces do not change. `wrench . twist` is the same at every point.
     """
@@ -32,7 +32,8 @@ def wrench_at(wrench: ArrayLike, offset: ArrayLike) -> np.ndarray:
 
 
 def transformed(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Products `matrix @ v` for each v in `vectors` `[..., 3]`, with the same rounding for one vector as for many.
+    """Return the products `matrix @ v` for each v in `vectors` `[..., 3]`, with the same rounding for one vector as for
+    many.
 
     Only products and sums of single numbers are rounded in the same way everywhere; the rounding of BLAS depends on the
     number of rows and on the processor.

@@ -23,13 +23,13 @@ MOST_TEXT = 256_000_000
 """Largest text file that is read [bytes]: a log of a million samples fits."""
 
 SEPARATORS = (";", ",", "\t")
-"""What may stand between two cells, the first that a file has."""
+"""Separators of cells; the first that a file has is taken."""
 
 _DECIMAL_COMMA = re.compile(r"[+-]?\d*,\d+([eE][+-]?\d+)?")
 
 
 def read_bytes(path: str | Path, what: str, most: int | None = None) -> bytes:
-    """Content of the file `path`; `what` says what was expected, as in "a scene file".
+    """Return the content of the file `path`; `what` says what was expected, as in "a scene file".
 
     Raises FileError in one line for a missing file, a folder, a device, a named pipe (nobody may ever write to it), and
     a file of more than `most` bytes. The pipes that a shell makes (`<(...)`, `/dev/stdin`) are read.
@@ -59,7 +59,7 @@ def read_bytes(path: str | Path, what: str, most: int | None = None) -> bytes:
 
 
 def read_text(path: str | Path, what: str) -> str:
-    """Text of the UTF-8 file `path`, as `read_bytes` reads it, of at most `MOST_TEXT` bytes."""
+    """Return the text of the UTF-8 file `path`, as `read_bytes` reads it, of at most `MOST_TEXT` bytes."""
     try:
         return read_bytes(path, what, MOST_TEXT).decode("utf-8-sig")
     except UnicodeDecodeError:
@@ -67,7 +67,7 @@ def read_text(path: str | Path, what: str) -> str:
 
 
 def read_rows(path: str | Path, what: str) -> Iterator[tuple[int, list[str]]]:
-    """Rows of a CSV file, each with the number of its line and its stripped cells.
+    """Return the rows of a CSV file, each with the number of its line and its stripped cells.
 
     Cells are separated by what stands in the first line: a semicolon, else a comma, else a tab; beside the first and
     the last of these, numbers may have a decimal comma. Empty lines and lines that start with # are left out; a quoted
@@ -92,7 +92,7 @@ def read_rows(path: str | Path, what: str) -> Iterator[tuple[int, list[str]]]:
 
 
 def _with_point(cell: str) -> str:
-    """A number with a decimal point where it has a decimal comma; anything else as it is."""
+    """Return a number with a decimal point where it has a decimal comma; anything else as it is."""
     return cell.replace(",", ".") if _DECIMAL_COMMA.fullmatch(cell) else cell
 
 
@@ -110,7 +110,8 @@ class Table:
                 raise FileError(f"{path}: line {line} has two columns {shown(repr(name))}")
 
     def numbers(self, names: Sequence[str]) -> np.ndarray:
-        """Columns `names`, finite, shape `[rows, len(names)]`; raises FileError with the line and the column."""
+        """Return the columns `names`, finite, shape `[rows, len(names)]`; raises FileError with the line and the
+        column."""
         for name in names:
             if not (isinstance(name, str) and name in self.names):
                 near = difflib.get_close_matches(name[:200], self.names, n=1) if isinstance(name, str) else []
@@ -128,7 +129,7 @@ class Table:
 
 
 def number(path: str | Path, line: int, place: str, cell: str) -> float:
-    """The finite number in a cell of a table; raises FileError that says the line and the place in it."""
+    """Return the finite number in a cell of a table; raises FileError that says the line and the place in it."""
     try:
         value = float(cell)
     except ValueError:

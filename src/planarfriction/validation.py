@@ -48,7 +48,8 @@ _OF_KIND = {
 
 
 def why_not_numeric(value: Any, depth: int = 0) -> str | None:
-    """What is wrong with `value` as a number or an array of numbers, as what follows "be a number"; None: nothing."""
+    """Return what is wrong with `value` as a number or an array of numbers, to follow "be a number"; None if nothing
+    is."""
     if type(value) in _PLAIN:
         return None
     if isinstance(value, (list, tuple)):
@@ -79,7 +80,7 @@ def why_not_numeric(value: Any, depth: int = 0) -> str | None:
 
 
 def _refusal_inside(values: Sequence[Any], depth: int) -> str | None:
-    """The first refusal of its items."""
+    """Return the first refusal of its items."""
     if depth == DEEPEST:
         return f" in lists at most {DEEPEST} deep"
     if _PLAIN.issuperset(map(type, values)):
@@ -88,7 +89,7 @@ def _refusal_inside(values: Sequence[Any], depth: int) -> str | None:
 
 
 def _unit(value: Any) -> Any:
-    """The unit that a quantity, a DataArray or a variable of a file states, or None."""
+    """Return the unit that a quantity, a DataArray or a variable of a file states, or None."""
     for name in ("units", "unit"):
         if (stated := getattr(value, name, None)) is not None and not callable(stated):
             return stated
@@ -97,7 +98,7 @@ def _unit(value: Any) -> Any:
 
 
 def _states_a_unit(value: Any) -> bool:
-    """Whether it states one that is not plain SI, given as text."""
+    """Return True if it states a unit that is not plain SI, given as text."""
     unit = _unit(value)
     if unit is None:
         return False
@@ -139,7 +140,7 @@ def number(name: str, value: Any) -> float:
 
 
 def _scalar(name: str, value: Any) -> float:
-    """`value` as a float, where it is one number of any kind."""
+    """Return `value` as a float, where it is one number of any kind."""
     reason = why_not_numeric(value)
     if reason is None and getattr(value, "ndim", isinstance(value, Sequence)) == 0:
         try:
@@ -152,7 +153,7 @@ def _scalar(name: str, value: Any) -> float:
 
 
 def number_in(name: str, value: str) -> float:
-    """The finite number that a text spells, as on a command line, or raise."""
+    """Return the finite number that a text spells, as on a command line, or raise."""
     try:
         result = float(value)
     except (TypeError, ValueError):
@@ -161,7 +162,7 @@ def number_in(name: str, value: str) -> float:
 
 
 def quoted(value: Any) -> Any:
-    """`value` for a message, texts in quotes: "0.02" is no number."""
+    """Return `value` for a message, with texts in quotes: "0.02" is no number."""
     return repr(value[:200]) if isinstance(value, str) else value
 
 
@@ -323,7 +324,7 @@ def keys(name: str, data: Any, required: Iterable[str], optional: Iterable[str] 
 
 
 def broadcast(**arrays: np.ndarray) -> tuple[int, ...]:
-    """The common shape of `arrays`, or raise an error that names them and their shapes."""
+    """Return the common shape of `arrays`, or raise an error that names them and their shapes."""
     try:
         return np.broadcast_shapes(*(each.shape for each in arrays.values()))
     except ValueError:

@@ -114,7 +114,7 @@ def _replace(target: Path, content: memoryview) -> None:
 
 
 def _part(target: Path) -> Path:
-    """A name beside `target` that no other process takes."""
+    """Return a name beside `target` that no other process takes."""
     return target.with_name(_part_name())
 
 

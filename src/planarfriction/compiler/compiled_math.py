@@ -50,37 +50,38 @@ def _float_to_bits(typingctx, x):
 
 @_inline
 def where(condition, a, b):
-    """`a` where the condition holds, else `b`."""
+    """Return `a` where the condition holds, else `b`."""
     return a if condition else b
 
 
 @_inline
 def in_range(x):
-    """A number, and not beyond the largest that is taken: products of three and their squares stay finite."""
+    """Return True for a number not beyond the largest that is taken: products of three and their squares stay
+    finite."""
     return abs(x) <= LARGEST
 
 
 @_inline
 def is_finite(x):
-    """Neither NaN nor infinite. (`math.isfinite` takes x - x, which reordering turns into 0.)"""
+    """Return True unless a number is NaN or infinite. (`math.isfinite` takes x - x, which reordering turns into 0.)"""
     return abs(x) <= 1.7976931348623157e308
 
 
 @_inline
 def minimum(a, b):
-    """The smaller of two numbers."""
+    """Return the smaller of two numbers."""
     return a if a < b else b
 
 
 @_inline
 def maximum(a, b):
-    """The larger of two numbers."""
+    """Return the larger of two numbers."""
     return a if a > b else b
 
 
 @_inline
 def in_order(x):
-    """An integer for a double, larger for larger ones: the largest of many integers is found in vector code.
+    """Return an integer for a double, larger for larger ones: the largest of many integers is found in vector code.
 
     Of negative numbers only that they are less than the others.
     """
@@ -89,7 +90,7 @@ def in_order(x):
 
 @_inline
 def exp(x):
-    """`e^x`, relative error below 6e-16, argument limited to +-708."""
+    """Return `e^x`, relative error below 6e-16, argument limited to +-708."""
     x = minimum(maximum(x, -_EXP_LARGEST), _EXP_LARGEST)
     k = math.floor(x * _LOG2_E + 0.5)
     r = (x - k * _LN2_HIGH) - k * _LN2_LOW
@@ -105,7 +106,7 @@ def exp(x):
 
 @_inline
 def expm1(x):
-    """`e^x - 1` for x <= 0, relative error below 1.5e-15."""
+    """Return `e^x - 1` for x <= 0, relative error below 1.5e-15."""
     near = maximum(x, -0.4)
     # the series, of which the last term is 1e-17 of the first
     tail = 1.0 / 479001600.0 + near * (1.0 / 6227020800.0)
@@ -119,7 +120,7 @@ def expm1(x):
 
 @_inline
 def log(x):
-    """Natural logarithm of a normal double x > 0, relative error below 1e-15; about -709 at x = 0."""
+    """Return the natural logarithm of a normal double x > 0, relative error below 1e-15; about -709 at x = 0."""
     bits = _float_to_bits(x)
     exponent = (bits >> 52) - 1023
     mantissa = _bits_to_float((bits & 0x000FFFFFFFFFFFFF) | 0x3FF0000000000000)
@@ -143,7 +144,7 @@ def log(x):
 
 @_inline
 def power(x, exponent):
-    """`x^exponent` for x >= 0 and exponent > 0; the square, the usual Stribeck exponent, is exact."""
+    """Return `x^exponent` for x >= 0 and exponent > 0; the square, the usual Stribeck exponent, is exact."""
     if exponent == 2.0:
         return x * x
     return where(x > 0.0, exp(exponent * log(x)), 0.0)
@@ -151,7 +152,7 @@ def power(x, exponent):
 
 @_inline
 def sin(x):
-    """Sine for |x| <= pi/2, absolute error below 4e-16."""
+    """Return the sine for |x| <= pi/2, absolute error below 4e-16."""
     q = x * x
     q2 = q * q
     q4 = q2 * q2
@@ -164,7 +165,7 @@ def sin(x):
 
 @_inline
 def cos(x):
-    """Cosine for |x| <= pi/2, absolute error below 4e-16."""
+    """Return the cosine for |x| <= pi/2, absolute error below 4e-16."""
     q = x * x
     q2 = q * q
     q4 = q2 * q2
@@ -176,7 +177,7 @@ def cos(x):
 
 @_inline
 def atan2(y, x):
-    """Angle of the vector (x, y) in (-pi, pi], absolute error below 1e-15; 0 for the zero vector."""
+    """Return the angle of the vector (x, y) in (-pi, pi], absolute error below 1e-15; 0 for the zero vector."""
     across, along = abs(y), abs(x)
     small, large = minimum(across, along), maximum(across, along)
     # beyond tan(pi/8) the angle is taken from the diagonal, which keeps the argument of the series below 0.4143

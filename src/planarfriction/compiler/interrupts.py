@@ -16,15 +16,15 @@ from numba.core import event
 
 
 class _Keyboard(event.Listener):
-    """Holds Ctrl-C back and hands it on between passes, where an exception does no more harm than a wrong type does."""
+    """Listener that holds Ctrl-C back and hands it on between passes, where an exception does no harm."""
 
     def __init__(self):
         self.hear: Callable[..., Any] | None = None
-        """Who is to hear of it."""
+        """Handler of the signal that is to hear of it."""
         self.pressed = False
 
     def hold(self, number: int, frame: Any) -> None:
-        """Stands in for the handler of the signal."""
+        """Record the signal, in place of its handler."""
         self.pressed = True
 
     def hand_on(self) -> None:
@@ -34,11 +34,11 @@ class _Keyboard(event.Listener):
             self.hear(signal.SIGINT, inspect.currentframe())
 
     def on_start(self, event: Any) -> None:
-        """Before each pass."""
+        """Hand Ctrl-C on before each pass."""
         self.hand_on()
 
     def on_end(self, event: Any) -> None:
-        """A pass may have ended with an error, which is not to be hidden."""
+        """Do nothing: a pass may have ended with an error, which is not to be hidden."""
 
 
 _keyboard = _Keyboard()
@@ -51,7 +51,7 @@ def _in_main_thread() -> bool:
 
 @contextlib.contextmanager
 def heard_between_passes() -> Iterator[None]:
-    """Within this block, Ctrl-C is heard before the next pass of Numba's compiler or at the end of the block."""
+    """Hear Ctrl-C within this block before the next pass of Numba's compiler, or at the end of the block."""
     hear = signal.getsignal(signal.SIGINT)
     if not _in_main_thread() or not callable(hear) or hear == _keyboard.hold:
         yield

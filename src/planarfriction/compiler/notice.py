@@ -14,13 +14,13 @@ _LINE = "planarfriction compiles its solver, once after installation (planarfric
 
 
 def watched() -> bool:
-    """Whether somebody is watching this process: at a terminal, or in a notebook."""
+    """Return True if somebody is watching this process: at a terminal, or in a notebook."""
     alone = multiprocessing.parent_process() is None
     return alone and ("ipykernel" in sys.modules or (sys.stderr is not None and sys.stderr.isatty()))
 
 
 class _Said(event.Listener):
-    """Says it when the first function is compiled; what is read from the cache needs no words."""
+    """Listener that says it when the first function is compiled; what is read from the cache needs no words."""
 
     done = False
 

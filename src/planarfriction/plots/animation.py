@@ -95,7 +95,7 @@ def animate_solution(
 
 
 def frame_times(sampled: np.ndarray, slow: float | None, fps: float) -> tuple[np.ndarray, str]:
-    """Times of the frames [s] of a solution with samples at `sampled` [s], and how fast they go by, in words."""
+    """Return the times of the frames [s] of a solution with samples at `sampled` [s], and their pace in words."""
     fps = validation.positive("fps", fps)
     if fps > FASTEST:
         raise InvalidValueError("fps", f"be at most {FASTEST:g}", fps)
@@ -117,13 +117,13 @@ def frame_times(sampled: np.ndarray, slow: float | None, fps: float) -> tuple[np
 
 
 def _usual_pace(frames: float) -> float:
-    """How many times slower than real time, where that takes so many `frames` [-]."""
+    """Return the ratio of playing time to real time of so many `frames` [-]."""
     if frames > USUAL_FRAMES:
         return 1.0 / _round_up(frames / USUAL_FRAMES)
     return _round_up(LEAST_FRAMES / frames) if 0.0 < frames < LEAST_FRAMES else 1.0
 
 
 def _round_up(value: float) -> float:
-    """The next of 1, 2, 5, 10, 20, ..."""
+    """Return the next of 1, 2, 5, 10, 20, ..."""
     power = 10.0 ** math.floor(math.log10(value))
     return next(each * power for each in (1.0, 2.0, 5.0, 10.0) if each * power >= value * (1.0 - 1e-12))

@@ -76,7 +76,7 @@ class Film:
         self.backgrounds: dict[tuple, Any] = {}
 
     def picture(self, frame: int) -> np.ndarray:
-        """A frame as red, green and blue `[height, width, 3]`, each a byte."""
+        """Return a frame as red, green and blue `[height, width, 3]`, each a byte."""
         self.show(frame)
         levels = tuple(each.level(frame) for each in self.panels if isinstance(each, SurfacePanel))
         if levels not in self.backgrounds:
@@ -153,7 +153,7 @@ class Film:
         )
 
     def _moved(self, frame: int) -> str:
-        """How far the body has come, in units that fit the whole motion."""
+        """Return the distance that the body has moved, in units that fit the whole motion."""
         way = self.track.poses - self.track.poses[0]
         parts = []
         for words, kind, column in (("moved by x", "length", 0), ("y", "length", 1), ("turned by", "angle", 2)):
@@ -163,7 +163,8 @@ class Film:
 
 
 def _places(contacts: int) -> tuple[tuple, list[tuple]]:
-    """Where the world is in a frame, and for each contact its cells, their colours (or None) and its limit surface."""
+    """Return the places of the world in a frame and, for each contact, its cells, their colours (or None) and its
+    surface."""
     if contacts == 1:
         world = (0.072, 0.145, 0.5, 0.745)
         return world, [((0.665, 0.6, 0.2, 0.355), (0.88, 0.6, 0.014, 0.355), (0.605, 0.03, 0.35, 0.48))]
@@ -184,7 +185,8 @@ def _put(artists: list[Any], pose: np.ndarray, axes: Any) -> None:
 
 
 def _views(solution: Solution, track: Track, follow: bool) -> np.ndarray:
-    """Limits of both axes for each frame `[F, 2, 2]` [mm]: of all that is drawn, or of a window that follows the body.
+    """Return the limits of both axes for each frame `[F, 2, 2]` [mm]: of all that is drawn, or of a window that follows
+    the body.
 
     A window follows where the motion is much longer than the body; it stays within the limits of the whole.
     """
@@ -213,13 +215,13 @@ def _views(solution: Solution, track: Track, follow: bool) -> np.ndarray:
 
 
 def _rim(points: np.ndarray) -> np.ndarray:
-    """The points that reach farthest in each of 16 directions: enough of them to see the limits of a drawing."""
+    """Return the points that reach farthest in each of 16 directions: enough of them to see the limits of a drawing."""
     angles = 2.0 * np.pi * np.arange(16) / 16
     return points[np.unique((points @ np.stack([np.cos(angles), np.sin(angles)])).argmax(axis=0))]
 
 
 def _filling(views: np.ndarray, ratio: float) -> np.ndarray:
-    """Views widened to axes of such a width over height, so that both axes have one scale."""
+    """Return the views widened to axes of such a width over height, so that both axes have one scale."""
     middle, (width, height) = views.mean(axis=-1), np.diff(views[0], axis=-1)[:, 0]
     sides = np.array([max(width, height * ratio), max(height, width / ratio)])
     return np.stack([middle - 0.5 * sides, middle + 0.5 * sides], -1)

@@ -75,14 +75,16 @@ def check_kind(path: Path) -> None:
 
 
 def _self_contained(page: bytes) -> bytes:
-    """The page of a player that starts by itself, with signs on its buttons in place of a font from the network."""
+    """Return the page of a player that starts by itself, with signs on its buttons in place of a font from the
+    network."""
     page = re.sub(rb"<link\b[^>]*>", b"", page)
     page = re.sub(rb"(\w+) = new Animation\([^;]*;", rb"\g<0> \1.play_animation();", page)
     return re.sub(rb'<i class="fa fa-([\w -]+)"></i>', lambda found: SIGNS.get(found[1].decode(), "?").encode(), page)
 
 
 def _palette(frame: Callable[[int], np.ndarray], count: int) -> Image.Image:
-    """256 colours for all frames: one choice keeps them from flickering, and what does not change costs little."""
+    """Return the 256 colours for all frames: one choice keeps them from flickering, and what does not change costs
+    little."""
     from PIL import Image
 
     chosen = np.unique(np.linspace(0, count - 1, PALETTE_FRAMES).round().astype(int))
@@ -102,7 +104,7 @@ def _palette(frame: Callable[[int], np.ndarray], count: int) -> Image.Image:
 
 
 def _colours(packed: np.ndarray) -> np.ndarray:
-    """Red, green and blue `[N, 3]`, each a byte, of colours in one number `[N]`."""
+    """Return the red, green and blue `[N, 3]`, each a byte, of colours in one number `[N]`."""
     return np.stack([packed >> 16, packed >> 8 & 255, packed & 255], -1).astype(np.uint8)
 
 
@@ -164,7 +166,7 @@ def _writing(path: Path, drawn: Path, figure: Any, fps: Any) -> Iterator[Any]:
 
 
 def _ffmpeg(path: Path) -> str:
-    """The program, of the system or of imageio-ffmpeg."""
+    """Return the program, of the system or of imageio-ffmpeg."""
     found = shutil.which("ffmpeg")
     if found is None:
         try:

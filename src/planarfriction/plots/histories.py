@@ -79,7 +79,7 @@ def draw_histories(figure: Any, solutions: Solution | Mapping[str, Solution]) ->
 
 
 def as_runs(solutions: Solution | Mapping[str, Solution]) -> dict[str, Solution]:
-    """The solutions by label; a single one is labelled with the name of its scene."""
+    """Return the solutions by label; a single one is labelled with the name of its scene."""
     from planarfriction.scenes import Solution
 
     if not isinstance(solutions, Mapping):
@@ -109,7 +109,7 @@ class _Line(NamedTuple):
 
 
 def _lines(runs: Mapping[str, xr.Dataset], get: Callable) -> list[_Line]:
-    """One line for each run, or for each contact of each run."""
+    """Draw one line for each run, or for each contact of each run."""
     lines = []
     for run, data in enumerate(runs.values()):
         values = np.asarray(get(data), dtype=float).reshape(data.sizes["time"], -1)
@@ -158,7 +158,7 @@ def _look(run: int, contact: int, colours: list[Any]) -> dict[str, Any]:
 
 
 def _legend(figure: Any, axes: Any, runs: dict[str, xr.Dataset]) -> None:
-    """One entry for each line of a contact panel, a row for each run; none where there is a single line."""
+    """Add one entry for each line of a contact panel, a row for each run; none where there is a single line."""
     lines = iter(axes.get_lines())
     table = [
         [(next(lines), label if data.sizes["contact"] == 1 else f"{label}, {name}") for name in data["contact"].values]

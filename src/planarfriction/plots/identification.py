@@ -58,7 +58,7 @@ def plot_identification(result: Identification) -> style.PlotFigure:
 
 
 def _places(result: Identification) -> list[np.ndarray]:
-    """Times of each log [s], shifted so that the logs follow each other with a gap."""
+    """Return the times of each log [s], shifted so that the logs follow each other with a gap."""
     total = sum(each["time"][-1] - each["time"][0] for each in result.histories)
     gap, at, places = 0.01 * total, 0.0, []
     for each in result.histories:
@@ -99,7 +99,7 @@ def _draw_channel(left: Any, right: Any, result: Identification, i: int, places:
 
 
 def _draw_speeds(axes: Any, result: Identification) -> None:
-    """Measured friction over load against the sliding speed, beside the fitted steady friction of pure sliding."""
+    """Draw measured friction over load against the sliding speed, beside the fitted steady friction of pure sliding."""
     speed = np.concatenate([each["speed"] for each in result.histories])
     coefficient = np.concatenate([each["coefficient"] for each in result.histories])
     usable = (speed > 0.0) & np.isfinite(coefficient)
@@ -118,7 +118,7 @@ def _draw_speeds(axes: Any, result: Identification) -> None:
 
 
 def _draw_correlations(axes: Any, result: Identification) -> None:
-    """Correlations of the residuals of each channel over the lag, with the band that those of noise stay in."""
+    """Draw the correlations of the residuals of each channel over the lag, with the band of those of noise."""
     values = result.residual_correlations()
     samples = sum(len(each["time"]) for each in result.histories)
     step = float(np.median(np.diff(result.histories[0]["time"])))
@@ -132,7 +132,7 @@ def _draw_correlations(axes: Any, result: Identification) -> None:
 
 
 def _draw_held_out(axes: Any, result: Identification, i: int) -> None:
-    """What fits predict of samples that they did not see, over what was measured; a good one keeps to the diagonal."""
+    """Draw predictions of samples that fits did not see over their measurements; a good fit keeps to the diagonal."""
     name, unit = result.channels[i]
     measured, held_out = (
         np.concatenate([each[key][:, i] for each in result.histories]) for key in ("measured", "held_out")

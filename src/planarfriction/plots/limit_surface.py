@@ -26,7 +26,8 @@ _LIGHT = np.array([0.35, -0.6, 0.72])
 
 
 def sample_limit_surface(surface: Any, polar: np.ndarray, azimuth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Twists around the direction sphere and their wrenches for mu f_N = 1, about the contact frame's origin.
+    """Return the twists around the direction sphere and their wrenches for mu f_N = 1, about the contact frame's
+    origin.
 
     The directions are the unit sphere of scaled twists at the centre of pressure,
     `(vx, vy, r omega) = (sin p cos a, sin p sin a, cos p)`; `polar` and `azimuth` [rad] broadcast to `[...]`, the
@@ -62,8 +63,8 @@ def plot_limit_surface(surface: Any, *, beside: Any = "ellipsoid") -> style.Plot
 
 
 def interactive_limit_surface(surface: Any, *, beside: Any = "ellipsoid") -> Any:
-    """The picture of `plot_limit_surface` as an interactive plotly figure, to rotate, zoom and read values with the
-    mouse.
+    """Return the picture of `plot_limit_surface` as an interactive plotly figure, to rotate, zoom and read values with
+    the mouse.
 
     `.show()` opens it in the browser, `.write_html(path)` writes it. The label at the pointer shows the friction wrench
     and the direction of sliding that belongs to it.
@@ -102,7 +103,7 @@ def interactive_limit_surface(surface: Any, *, beside: Any = "ellipsoid") -> Any
 
 
 def _with_names(surface: Any, beside: Any) -> list[tuple[Any, str]]:
-    """The surfaces to draw, with their titles."""
+    """Return the surfaces to draw, with their titles."""
     from planarfriction.limit_surface import LimitSurface, LimitSurfaceEllipsoid
 
     validation.instance("surface", surface, LimitSurface, "a limit surface")
@@ -116,7 +117,7 @@ def _with_names(surface: Any, beside: Any) -> list[tuple[Any, str]]:
 
 
 def even_mesh(surface: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Polar angles `[P, 1]` and azimuths `[1, A]` [rad] that lie close where the surface bends little.
+    """Return the polar angles `[P, 1]` and azimuths `[1, A]` [rad] that lie close where the surface bends little.
 
     There its points are far apart for a small turn of the twist, as where the body turns about a pad: facets of a mesh
     of even angles would show.
@@ -131,13 +132,14 @@ def even_mesh(surface: Any) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _evened(angles: np.ndarray, steps: np.ndarray) -> np.ndarray:
-    """As many angles, by half spread evenly along the `steps` between them and by half as they are."""
+    """Return as many angles, by half spread evenly along the `steps` between them and by half as they are."""
     way = np.concatenate([[0.0], np.cumsum(steps / steps.sum() + np.diff(angles) / (angles[-1] - angles[0]))])
     return np.interp(np.linspace(0.0, way[-1], len(angles)), way, angles)
 
 
 def scaled_samples(surface: Any, polar: np.ndarray, azimuth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Directions `(vx, vy, r omega)` and points `(fx, fy, tau/r)` of `sample_limit_surface` at the centre of pressure.
+    """Return the directions `(vx, vy, r omega)` and points `(fx, fy, tau/r)` of `sample_limit_surface` at the centre of
+    pressure.
 
     Both are pure numbers of shape `[..., 3]`; the directions have length 1.
     """

@@ -27,7 +27,7 @@ PAD_OPACITY = 0.35
 """Opacity of contact patches, so that those of a strobe show through each other."""
 
 TINY, SEEN = 25.0, 0.08
-"""Of a side of the view this many times longer than the body, which is then drawn as this share of it [-]."""
+"""Ratio of a side of the view to the body beyond which the body is drawn larger, and its share of the side then [-]."""
 
 UNSEEN = 0.01
 """Share of the size of the body by which it has to move for that to be seen [-]."""
@@ -69,7 +69,7 @@ class _Strobe(NamedTuple):
     path: np.ndarray
     """Poses at all samples `[T, 3]` [m, m, rad]."""
     larger: float
-    """How many times larger than it is the body is drawn [-]."""
+    """Factor by which the body is drawn larger than it is [-]."""
     limits: np.ndarray
     """Limits of both axes `[2, 2]` [mm]."""
 
@@ -111,7 +111,7 @@ def _draw(figure: Any, strobe: _Strobe) -> None:
 
 
 def _remark(strobe: _Strobe) -> str:
-    """What the drawing does not show: that the body is drawn larger, or how little it moves."""
+    """Return a remark on what the drawing does not show: that the body is drawn larger, or how little it moves."""
     if strobe.larger > 1.0:
         return f"body drawn {strobe.larger:g} times as large"
     way = strobe.path - strobe.path[0]
@@ -127,17 +127,17 @@ def _remark(strobe: _Strobe) -> str:
 
 
 def _reach(solution: Solution) -> float:
-    """Largest distance of the body's lines from its centre of mass [m]."""
+    """Return the largest distance of the body's lines from its centre of mass [m]."""
     return float(np.hypot(*np.concatenate(_body_lines(solution)).T).max()) or 1e-3
 
 
 def _poses(solution: Solution) -> np.ndarray:
-    """Pose (x, y, theta) of the body over time, `[T, 3]` [m, m, rad]."""
+    """Return the pose (x, y, theta) of the body over time, `[T, 3]` [m, m, rad]."""
     return np.stack([np.asarray(solution.data[name], dtype=float) for name in ("x", "y", "theta")], -1)
 
 
 def _placed(points: np.ndarray, pose: np.ndarray) -> np.ndarray:
-    """Points `[..., 2]` [m] of a frame at `pose` (x, y, angle), seen from the frame that the pose is in."""
+    """Return the points `[..., 2]` [m] of a frame at `pose` (x, y, angle), seen from the frame that the pose is in."""
     return pose[:2] + geometry.rotate(points, pose[2])
 
 
@@ -164,14 +164,14 @@ def _draw_shape(axes: Any, shape: np.ndarray, colour: Any) -> list[Artist]:
 
 
 def _driven(solution: Solution) -> list[Contact]:
-    """Contacts whose frame is carried by something that moves as prescribed."""
+    """Return the contacts whose frame is carried by something that moves as prescribed."""
     return [
         each for each in solution.scene.contacts if each.mounted_on == "world" and each.support_velocity is not None
     ]
 
 
 def _carried(contact: Contact, time: float) -> np.ndarray:
-    """Pose (x, y, angle) of the frame of a driven contact [m, m, rad]."""
+    """Return the pose (x, y, angle) of the frame of a driven contact [m, m, rad]."""
     from planarfriction.scenes.movers import displacement
 
     return np.array([*contact.position, contact.angle]) + displacement(contact.support_velocity, [time])[0]  # pyright: ignore
@@ -185,7 +185,7 @@ def _move(artists: list[Artist], axes: Any, pose: np.ndarray, larger: float = 1.
 
 
 def _body_lines(solution: Solution) -> list[np.ndarray]:
-    """What stands for the body, as lines `[M, 2]` [m] in its frame: the outline, or the rim of the patches on it.
+    """Return lines `[M, 2]` [m] that stand for the body, in its frame: the outline, or the rim of the patches on it.
 
     Where its turn would not show, on a round outline and without any, also a line along its x axis.
     """
@@ -203,7 +203,7 @@ def _body_lines(solution: Solution) -> list[np.ndarray]:
 
 
 def _rim(shapes: list[np.ndarray]) -> list[np.ndarray]:
-    """The closed line around all points of the shapes; none where they lie on one line."""
+    """Return the closed line around all points of the shapes; none where they lie on one line."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:
@@ -215,25 +215,26 @@ def _rim(shapes: list[np.ndarray]) -> list[np.ndarray]:
 
 
 def _pad_shape(contact: Contact) -> np.ndarray:
-    """Cells of a contact's patch as polygons `[N, 4, 2]`, or its points `[N, 2]` [m], in its frame."""
+    """Return the cells of a contact's patch as polygons `[N, 4, 2]`, or its points `[N, 2]` [m], in its frame."""
     patch = contact.model.patch
     return patch.positions if patch.grid is None else cell_boxes(patch, patch.grid)
 
 
 def _one_path(boxes: np.ndarray) -> Outline:
-    """All boxes `[N, 4, 2]` as one path, so that no seams show between neighbours."""
+    """Return all boxes `[N, 4, 2]` as one path, so that no seams show between neighbours."""
     closed = np.concatenate([boxes, boxes[:, :1]], axis=1)
     codes = [Outline.MOVETO, Outline.LINETO, Outline.LINETO, Outline.LINETO, Outline.CLOSEPOLY]
     return Outline(closed.reshape(-1, 2), np.tile(codes, len(boxes)))
 
 
 def _on_mount(contact: Contact) -> np.ndarray:
-    """The patch of a contact in the frame that it is mounted on (world or body) [m]."""
+    """Return the patch of a contact in the frame that it is mounted on (world or body) [m]."""
     return _placed(_pad_shape(contact), np.array([*contact.position, contact.angle], dtype=float))
 
 
 def _limits(solution: Solution, times: np.ndarray, poses: np.ndarray, larger: float) -> np.ndarray:
-    """Limits of both axes, `[2, 2]` [mm], that hold everything drawn at `times` and `poses`, the body `larger`."""
+    """Return the limits of both axes, `[2, 2]` [mm], that hold everything drawn at `times` and `poses`, the body
+    `larger`."""
     points = [_placed(larger * line, pose) for pose in poses for line in _body_lines(solution)]
     moving = _driven(solution)
     for contact in moving:

@@ -1,4 +1,4 @@
-"""What a notebook shows of a patch, a limit surface and a solution: a small picture and a few numbers beside it."""
+"""Notebook views of a patch, a limit surface and a solution: a small picture and a few numbers beside it."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _DIRECTIONS = 120
 
 
 def patch_html(patch: ContactPatch) -> str:
-    """A thumbnail of the pressure, cells, size, contact radius and centre of pressure of a patch."""
+    """Return a thumbnail of the pressure, cells, size, contact radius and centre of pressure of a patch."""
     load = _LOAD if patch.depends_on_load else None
     rows = {"cells": f"{patch.cells}", "size": _size(patch)}
     try:
@@ -42,7 +42,7 @@ def patch_html(patch: ContactPatch) -> str:
 
 
 def surface_html(surface: LimitSurface) -> str:
-    """A section of the limit surface through force along x and torque, its patch and its contact radius."""
+    """Return a section of the limit surface through force along x and torque, its patch and its contact radius."""
     rows = {"patch": f"{surface.patch.name!r} of {surface.patch.cells} cells"}
     figure = None
     try:
@@ -56,7 +56,7 @@ def surface_html(surface: LimitSurface) -> str:
 
 
 def solution_html(solution: Solution) -> str:
-    """The motion of the body, how the run ended, and what it took."""
+    """Return a drawing of the motion of the body, with the end and the cost of the run."""
     time = np.asarray(solution.histories["time"].values)
     x, y, theta = (float(np.asarray(solution.histories[name].values)[-1]) for name in ("x", "y", "theta"))
     cost = solution.statistics
@@ -125,7 +125,7 @@ def _point(point: Any) -> str:
 
 
 def _beside(figure: style.PlotFigure | None, title: str, rows: dict[str, str]) -> str:
-    """A picture and a table in one row of HTML, all of it in one piece: nothing is loaded from elsewhere."""
+    """Return a picture and a table in one row of HTML, all of it in one piece: nothing is loaded from elsewhere."""
     picture = ""
     if figure is not None:
         buffer = io.BytesIO()

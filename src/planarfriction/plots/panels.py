@@ -47,7 +47,7 @@ CELLS = ListedColormap([*_PALE, *[SLIP] * 26])
 
 
 def cell_polygons(patch: Any) -> np.ndarray:
-    """The cells of a patch `[N, M, 2]` [m] in its frame; points are drawn as little hexagons."""
+    """Return the cells of a patch `[N, M, 2]` [m] in its frame; points are drawn as little hexagons."""
     if patch.grid is not None:
         return cell_boxes(patch, patch.grid)
     extent = float(np.ptp(patch.positions, axis=0).max()) or 1e-2
@@ -57,7 +57,7 @@ def cell_polygons(patch: Any) -> np.ndarray:
 
 
 def cells_of(track: ContactTrack, *, edge: str) -> PolyCollection:
-    """The cells of a contact [mm], to be coloured frame by frame; `edge` is the colour of their edges."""
+    """Return the cells of a contact [mm], to be coloured frame by frame; `edge` is the colour of their edges."""
     boxes = list(1e3 * cell_polygons(track.contact.model.patch))
     cells = PolyCollection(boxes, edgecolor=edge, linewidth=0.3, antialiased=edge != "face")  # seams would show
     if track.slip is not None:
@@ -105,7 +105,7 @@ class CellPanel:
             artist.set_animated(True)
 
     def artists(self) -> list[Artist]:
-        """What changes from frame to frame."""
+        """Return the artists that change from frame to frame."""
         return [self.cells, self.centre, self.words]
 
     def show(self, frame: int) -> None:
@@ -157,11 +157,11 @@ class SurfacePanel:
             artist.set_clip_on(True)
 
     def artists(self) -> list[Artist]:
-        """What changes from frame to frame, on top of the surface."""
+        """Return the artists that change from frame to frame, on top of the surface."""
         return [self.shadow, self.tail, self.arm, self.head]
 
     def level(self, frame: int) -> Any:
-        """The load level of a frame: a key of `levels`."""
+        """Return the load level of a frame: a key of `levels`."""
         return _level(self.track, frame)
 
     def choose(self, level: Any) -> None:
@@ -179,7 +179,8 @@ class SurfacePanel:
         self.head.set_data_3d([fx], [fy], [tau])
 
     def _points(self) -> np.ndarray:
-        """Wrenches `(fx, fy, tau/r)` about the centre of pressure over `mu_c f_N`, `[F, 3]` [-]; zero without load."""
+        """Return the wrenches `(fx, fy, tau/r)` about the centre of pressure over `mu_c f_N`, `[F, 3]` [-]; zero
+        without load."""
         track, mu = self.track, float(self.track.contact.model.law.numbers.mu_c)
         points = np.zeros((len(track.loads), 3))
         for frame, load in enumerate(track.loads):
@@ -191,7 +192,7 @@ class SurfacePanel:
 
 
 def surface_at(patch: Any, load: float | None) -> Any:
-    """The exact limit surface of a patch at a load; a table of it where the cells differ in their friction."""
+    """Return the exact limit surface of a patch at a load; a table of it where the cells differ in their friction."""
     from planarfriction.limit_surface import LimitSurfaceExact, LimitSurfaceTable
 
     each_its_own = patch.root is not None and patch.root.ndim == 3
@@ -199,7 +200,7 @@ def surface_at(patch: Any, load: float | None) -> Any:
 
 
 def has_surface(track: ContactTrack) -> bool:
-    """Whether a limit surface can be drawn: one point has none, and a model of one's own may have other friction."""
+    """Return True if a limit surface can be drawn: not for one point, nor for a user's model with other friction."""
     if not isinstance(track.contact.model.law, FrictionLaw):
         return False
     try:
@@ -212,7 +213,8 @@ def has_surface(track: ContactTrack) -> bool:
 
 
 def _levels(track: ContactTrack) -> dict[Any, float | None]:
-    """Level -> load [N] at which its surface is drawn; None where the shape does not depend on the load."""
+    """Return the load [N] of each level at which its surface is drawn; None where the shape does not depend on the
+    load."""
     if not track.contact.model.patch.depends_on_load:
         return {None: None}
     found = sorted({_level(track, frame) for frame, load in enumerate(track.loads) if load > 0.0})
@@ -220,7 +222,8 @@ def _levels(track: ContactTrack) -> dict[Any, float | None]:
 
 
 def _level(track: ContactTrack, frame: int) -> Any:
-    """The level of the load of a frame; where it has none, that of the frame before it with one, or of the first."""
+    """Return the level of the load of a frame; where it has none, that of the frame before it with one, or of the
+    first."""
     if not track.contact.model.patch.depends_on_load:
         return None
     loaded = np.flatnonzero(track.loads > 0.0)
@@ -230,7 +233,7 @@ def _level(track: ContactTrack, frame: int) -> Any:
 
 
 def centre_mark(axes: Any) -> Any:
-    """The mark of a centre of rotation."""
+    """Return the mark of a centre of rotation."""
     look = {"marker": "o", "markersize": 8, "markerfacecolor": "none", "markeredgewidth": 1.8, "linestyle": "none"}
     return axes.plot([], [], color="#111111", zorder=8, label="centre of rotation", **look)[0]
 
@@ -245,5 +248,5 @@ def put_centre(mark: Any, twist: np.ndarray, at: np.ndarray, *, still: float) ->
 
 
 def still_speed(twists: np.ndarray) -> float:
-    """Speed [m/s] below which a body that has the twists `[F, 3]` stands."""
+    """Return the speed [m/s] below which a body that has the twists `[F, 3]` stands."""
     return STILL * float((np.hypot(*twists[:, :2].T) + ARM * np.abs(twists[:, 2])).max())

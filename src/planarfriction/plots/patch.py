@@ -62,7 +62,7 @@ def plot_patch(patch: ContactPatch, *, normal_force: float | None = None) -> sty
 
 
 def cell_boxes(patch: ContactPatch, grid: Grid) -> np.ndarray:
-    """Corners of the cells of a patch on a grid, `[N, 4, 2]` [m], contact frame.
+    """Return the corners of the cells of a patch on a grid, `[N, 4, 2]` [m], contact frame.
 
     A cell cut by the rim is drawn as a smaller box of the area and at the centroid of the part inside.
     """
@@ -72,7 +72,7 @@ def cell_boxes(patch: ContactPatch, grid: Grid) -> np.ndarray:
 
 
 def _height(patch: ContactPatch) -> float:
-    """Height of the figure [inch] that fits the proportions of the patch."""
+    """Return the height of the figure [inch] that fits the proportions of the patch."""
     if patch.grid is None:
         return 4.6
     ratio = patch.grid.rows * patch.grid.cell_height / (patch.grid.columns * patch.grid.cell_width)

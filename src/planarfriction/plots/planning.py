@@ -53,6 +53,6 @@ def plot_grip(plan: GripPlan) -> style.PlotFigure:
 
 
 def _slide(plan: GripPlan, solution: Solution) -> np.ndarray:
-    """Distance of the place that was under the grip from where it was `[T]` [m]."""
+    """Return the distance of the place that was under the grip from where it was `[T]` [m]."""
     pose = np.stack([np.asarray(solution.histories[name].values) for name in ("x", "y", "theta")], axis=-1)
     return np.hypot(*slide_of(plan.scene, solution.contact_index(plan.contact), pose).T)

@@ -1,4 +1,4 @@
-"""What all plots share: the figure class, the palette, and the units on the axes."""
+"""Parts that all plots share: the figure class, the palette, and the units on the axes."""
 
 from __future__ import annotations
 
@@ -76,13 +76,13 @@ class PlotFigure(Figure):
 
 
 def new_figure(width: float, height: float) -> PlotFigure:
-    """Empty figure of `width` x `height` inches with constrained layout, 120 dots per inch."""
+    """Return an empty figure of `width` x `height` inches with constrained layout, 120 dots per inch."""
     return PlotFigure(figsize=(width, height), layout="constrained", dpi=120)
 
 
 @dataclass(frozen=True)
 class Unit:
-    """How an SI quantity is shown: `shown = factor * value`, labelled `label`."""
+    """Unit in which an SI quantity is shown: `shown = factor * value`, labelled `label`."""
 
     factor: float
     label: str
@@ -117,7 +117,8 @@ _USUAL = {"length": "mm", "speed": "mm/s", "angle": "deg", "force": "N", "torque
 
 
 def unit_for(kind: str, *values) -> Unit:
-    """Unit in which the arrays `values` of one `kind` (length, speed, angle, force, torque, pressure) read well."""
+    """Return the unit in which the arrays `values` of one `kind` (length, speed, angle, force, torque, pressure) read
+    well."""
     largest = max((float(np.max(np.abs(value))) for value in values if np.size(value)), default=0.0)
     rows = _UNITS[kind]
     if largest == 0.0:
@@ -140,12 +141,12 @@ def show_lengths(axes: Any, largest: float) -> None:
 
 
 def wrapped(text: str, width: int) -> str:
-    """The text in lines of at most `width` letters; a word that is longer is cut."""
+    """Return the text in lines of at most `width` letters; a word that is longer is cut."""
     return "\n".join(textwrap.wrap(text, width)) or text
 
 
 def tidy(axes) -> None:
-    """Light grid below the data, no box around it."""
+    """Draw a light grid below the data, and no box around it."""
     axes.grid(True, color="0.88", linewidth=0.6)
     axes.set_axisbelow(True)
     axes.spines[["top", "right"]].set_visible(False)

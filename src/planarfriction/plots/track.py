@@ -1,4 +1,4 @@
-"""What a moving picture shows at its instants: poses, forces and slip of a solution, between its samples too."""
+"""Motion at the instants of a moving picture: poses, forces and slip of a solution, between its samples too."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class ContactTrack:
     loads: np.ndarray
     """Normal force of one of them `[F]` [N]."""
     slip: SlipField | None
-    """Which cells slip; None where the model has no bristles that are known."""
+    """Slip of the cells; None where the model has no bristles that are known."""
     _shapes: dict[int, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict, init=False, repr=False)
     """The shape of the frame that was asked for last: every part of a picture needs it."""
 
@@ -46,7 +46,8 @@ class ContactTrack:
         return self.contact.count * geometry.rotate(self.wrenches[:, :2], self.poses[:, 2])
 
     def shape(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
-        """Share of the load on each cell `[N]` [-], and centre of pressure `[2]` [m], at the load of a frame."""
+        """Return the share of the load on each cell `[N]` [-], and centre of pressure `[2]` [m], at the load of a
+        frame."""
         patch, load = self.contact.model.patch, float(self.loads[frame])
         key = frame if patch.depends_on_load else -1
         if key not in self._shapes:
@@ -72,7 +73,8 @@ class Track(NamedTuple):
 
 
 def track_of(solution: Solution, times: np.ndarray) -> Track:
-    """The solution at `times` `[F]` [s]: poses between samples without overshoot, all else along straight lines."""
+    """Return the solution at `times` `[F]` [s]: poses between samples without overshoot, all else along straight
+    lines."""
     sampled = np.asarray(solution.histories["time"].values, dtype=float)
     every = np.unique(np.linspace(0, len(sampled) - 1, min(len(sampled), MOST_STEPS)).round().astype(int))
     steps = np.unique(np.concatenate([sampled[every], times]))
@@ -93,7 +95,8 @@ def track_of(solution: Solution, times: np.ndarray) -> Track:
 
 
 def _first(solution: Solution) -> list[tuple[DistributedModel, np.ndarray] | None]:
-    """The distributed model of each contact, whatever its own, and how its bristles start; None without bristles."""
+    """Return the distributed model of each contact, whatever its own, and how its bristles start; None without
+    bristles."""
     from planarfriction.scenes.start import first_states
 
     scene = solution.scene
@@ -108,7 +111,8 @@ def _first(solution: Solution) -> list[tuple[DistributedModel, np.ndarray] | Non
 
 
 def contact_poses(contact: Contact, times: np.ndarray, poses: np.ndarray) -> np.ndarray:
-    """Poses of the frame of a contact `[T, 3]` [m, m, rad] at `times`, where the body has `poses` `[T, 3]`."""
+    """Return the poses of the frame of a contact `[T, 3]` [m, m, rad] at `times`, where the body has `poses`
+    `[T, 3]`."""
     fixed = np.array([*contact.position, contact.angle], dtype=float)
     if contact.mounted_on == "body":
         return poses + geometry.rotate(fixed, poses[:, 2])
@@ -116,7 +120,7 @@ def contact_poses(contact: Contact, times: np.ndarray, poses: np.ndarray) -> np.
 
 
 def _carried(contact: Contact, times: np.ndarray) -> np.ndarray:
-    """How far the world's side of a contact has moved as prescribed `[T, 3]` [m, m, rad]."""
+    """Return the prescribed displacement of the world's side of a contact `[T, 3]` [m, m, rad]."""
     from planarfriction.scenes.movers import displacement
 
     return (
@@ -125,7 +129,7 @@ def _carried(contact: Contact, times: np.ndarray) -> np.ndarray:
 
 
 def _ways(contact: Contact, times: np.ndarray, poses: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """How far the body moves on a contact from each instant to the next, in the frame of the contact `[T - 1, 3]`.
+    """Return the displacement of the body on a contact between instants, in the frame of the contact `[T - 1, 3]`.
 
     That of the material of the body at the origin of the frame, half-way: of second order in the turn of a step.
     """
@@ -151,7 +155,8 @@ def _values(solution: Solution, name: str, sampled: np.ndarray, times: np.ndarra
 
 
 def _without_kick(solution: Solution, contact: int) -> np.ndarray:
-    """Wrenches of a contact `[T, 3]`; a first one that dwarfs the others lasts microseconds, and gives way to the next.
+    """Return the wrenches of a contact `[T, 3]`; a first one that dwarfs the others lasts microseconds, and gives way
+    to the next.
 
     Bristles that start at rest under a moving body kick once (`sigma_1 v f_N`).
     """

@@ -37,13 +37,13 @@ CONTACT_KEYS = (
 
 
 def rectangle_outline(size: Sequence[float]) -> np.ndarray:
-    """Corners `[4, 2]` [m] of a rectangle of `size` (width, height) about the origin."""
+    """Return the corners `[4, 2]` [m] of a rectangle of `size` (width, height) about the origin."""
     half = [0.5 * validation.positive("size", side) for side in validation.vector("size", size, 2)]
     return np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]]) * half
 
 
 def rectangle_inertia(mass: float, size: Sequence[float]) -> float:
-    """Moment of inertia of a uniform rectangle about its centre, `m (w^2 + h^2) / 12` [kg m^2]."""
+    """Return the moment of inertia of a uniform rectangle about its centre, `m (w^2 + h^2) / 12` [kg m^2]."""
     width, height = (validation.positive("size", side) for side in validation.vector("size", size, 2))
     return validation.positive("mass", mass) / 12.0 * (width**2 + height**2)
 
@@ -89,7 +89,7 @@ def _contact_to_dict(contact: Contact, of_part: Callable[[Any], dict[str, Any]])
 
 
 def scene_from_dict(data: dict[str, Any], *, folder: str | Path | None = None, source: str = "scene") -> Scene:
-    """Scene of a table; `source` names it in errors, relative paths start from `folder`."""
+    """Make the scene of a table; `source` names it in errors, relative paths start from `folder`."""
     table = Section(data, "", source, validation.path("folder", folder) if folder is not None else None).only(
         SCENE_KEYS
     )
@@ -140,13 +140,13 @@ def _contacts(scene: Section) -> list[Contact]:
 
 
 def read_scene(path: str | Path) -> Scene:
-    """Scene of a `.toml` or `.json` file; errors are one line with the name of the file."""
+    """Read the scene of a `.toml` or `.json` file; errors are one line with the name of the file."""
     path = validation.path("path", path)
     return scene_from_dict(read_table(path), folder=path.parent, source=str(path))
 
 
 def read_table(path: Path) -> dict[str, Any]:
-    """Table of a `.toml` or `.json` file, as it is written."""
+    """Return the table of a `.toml` or `.json` file, as it is written."""
     kind = path.suffix.lower()
     if kind not in (".toml", ".json"):
         missing = "" if os.path.exists(path) else ", and there is no such file"
@@ -159,7 +159,7 @@ def read_table(path: Path) -> dict[str, Any]:
 
 
 def _table(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    """The table of a JSON object, in which each key stands once, as in TOML."""
+    """Return the table of a JSON object, in which each key stands once, as in TOML."""
     table: dict[str, Any] = {}
     for key, value in pairs:
         if key in table:

@@ -25,7 +25,7 @@ _MISSING = object()
 
 
 def model_to_dict(model: Any) -> dict[str, Any]:
-    """`{"model": ..., "patch": ..., "law": ...}` of a model, as numbers, texts, lists and tables."""
+    """Return `{"model": ..., "patch": ..., "law": ...}` of a model, as numbers, texts, lists and tables."""
     table = _described(MODELS, model)
     if "surface" in table:
         table["surface"] = _surface_to_dict(model.surface, model.patch)
@@ -40,7 +40,7 @@ def _surface_to_dict(surface: Any, patch: Any) -> dict[str, Any]:
 
 
 def model_from_dict(contact: Section) -> Any:
-    """Model of the table of a contact: `patch` and `law` are tables, `model` is a name or a table.
+    """Return the model of the table of a contact: `patch` and `law` are tables, `model` is a name or a table.
 
     The table of a model or of a law holds its `kind` and its parameters; `surface` is a name, or a table with `kind`,
     its parameters, and `patch` where that is not the model's.
@@ -52,12 +52,13 @@ def model_from_dict(contact: Section) -> Any:
 
 
 def law_from_dict(table: Section) -> Any:
-    """Law of a table with its `kind`, "lugre" if left out, and its parameters."""
+    """Return the law of a table with its `kind`, "lugre" if left out, and its parameters."""
     return _made(table, LAWS[table.choice("kind", LAWS, "lugre")], ())
 
 
 def patch_from_dict(table: Section) -> Any:
-    """Contact patch of a table: `shape` names what makes it, the other keys are its parameters; files are paths.
+    """Return the contact patch of a table: `shape` names what makes it, the other keys are its parameters; files are
+    paths.
 
     Every shape takes `metric` and `asymmetry` as `ContactPatch.with_friction_metric` does; `metric` may also be a table
     with the parameters of `friction_metric`: `along`, `across` and `angle` [rad], 0 if left out.
@@ -91,7 +92,8 @@ def _shape_from_dict(table: Section) -> Any:
 
 
 def pressure_from_dict(patch: Section) -> Any:
-    """Pressure law under the key `pressure` of a patch: "uniform", a table `{law, ...}`, or a list, one per cell."""
+    """Return the pressure law under the key `pressure` of a patch: "uniform", a table `{law, ...}`, or a list, one per
+    cell."""
     from planarfriction.patch import Pressure
 
     value = patch.get("pressure")
@@ -106,13 +108,13 @@ def pressure_from_dict(patch: Section) -> Any:
 
 
 def _parameters(make: Callable[..., Any]) -> dict[str, inspect.Parameter]:
-    """Parameters that are keys of the table of a member."""
+    """Return the parameters that are keys of the table of a member."""
     parameters = inspect.signature(make).parameters
     return {name: each for name, each in parameters.items() if name not in _GIVEN}
 
 
 def _described(family: Family, member: Any) -> dict[str, Any]:
-    """Kind and parameters of a member; a limit surface stays as it is."""
+    """Return the kind and parameters of a member; a limit surface stays as it is."""
     kind = family.name_of(member)
     if kind is None:
         rule = f"be one of {', '.join(family)}, or be registered, to be written to a file"
@@ -134,14 +136,15 @@ def _plain(member: Any, name: str) -> Any:
 
 
 def _member(family: Family, parent: Section, key: str, default: Any = None) -> tuple[Section, Callable[..., Any]]:
-    """Table of a member under `key`, where its name alone will do too, and what makes it."""
+    """Return the table of a member under `key`, where its name alone will do too, and what makes it."""
     value = parent.get(key) if default is None else parent.get(key, default)
     table = parent.section(key, {"kind": value} if isinstance(value, str) else value)
     return table, family[table.choice("kind", family)]
 
 
 def _made(table: Section, make: Callable[..., Any], given: tuple[Any, ...], *others: str) -> Any:
-    """The member that `table` describes, with the keys `others` beside its own; `given` begins with its patch."""
+    """Return the member that `table` describes, with the keys `others` beside its own; `given` begins with its
+    patch."""
     options = _arguments(table, make, "kind", *others)
     if "surface" in options:
         options["surface"] = _surface_from_dict(table, given[0])
@@ -156,7 +159,7 @@ def _surface_from_dict(parent: Section, patch: Any) -> Any:
 
 
 def _arguments(table: Section, make: Callable[..., Any], *others: str) -> dict[str, Any]:
-    """Values of a table for the parameters of `make`, checked to be neither unknown nor missing."""
+    """Return the values of a table for the parameters of `make`, checked to be neither unknown nor missing."""
     parameters = _parameters(make)
     table.only([*others, *parameters])
     for name, parameter in parameters.items():

@@ -1,4 +1,4 @@
-"""What moves under or with a contact: where prescribed velocities have carried it."""
+"""Motion of what is under or with a contact: displacements by prescribed velocities."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ from planarfriction.scenes.signal import Signal
 
 
 def displacement(velocity: Signal, times) -> np.ndarray:
-    """Integral `[T, k]` of a velocity `[k]` from 0 to `times` `[T]` [s], which are >= 0: exact, piece by piece."""
+    """Return the integral `[T, k]` of a velocity `[k]` from 0 to `times` `[T]` [s], which are >= 0: exact, piece by
+    piece."""
     times = np.asarray(times, dtype=float)
     breaks = np.unique(np.concatenate([[0.0], velocity.breaks, times]))
     breaks = breaks[breaks >= 0.0]

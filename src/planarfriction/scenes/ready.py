@@ -34,7 +34,7 @@ FINE: dict[str, Any] = {"rtol": 1e-6, "atol": 3e-6}
 
 
 def in_hand_load(load: Literal[1, 2], *, placement: Literal[1, 2] = 1, t_end: float = 2.0) -> Signal:
-    """Normal force of one finger in the published in-hand runs [N], held over every 0.01 s.
+    """Return the normal force of one finger in the published in-hand runs [N], held over every 0.01 s.
 
     Load 1 is a sine at 2 Hz, load 2 is constant with one drop. `placement` 1 is the centre of mass at (0.002, 0) m, 2
     at (0.025, 0) m.
@@ -63,7 +63,7 @@ def in_hand(
     size: Sequence[float] = (0.15, 0.08),
     t_end: float = 2.0,
 ) -> Scene:
-    """A plate held upright between finger pads that slips and turns under gravity as the grip varies.
+    """Make the scene of a plate held upright between finger pads that slips and turns under gravity as the grip varies.
 
     The pads are fixed at the origin of the world and do not turn; the `fingers` share one state, each pressing with the
     full `normal_force` [N] (a signal or a number; default: `in_hand_load(1)`). `centre_of_mass` [m] is where the
@@ -81,7 +81,7 @@ def in_hand(
 
 
 def drift_force(load: Literal["tangential", "normal"], *, t_end: float = 5.0) -> Signal:
-    """Applied wrench `(fx, fy, tau)` of the published drift runs [N, N, N m], held over every 0.01 s."""
+    """Return the applied wrench `(fx, fy, tau)` of the published drift runs [N, N, N m], held over every 0.01 s."""
     t = sample_times(t_end, SAMPLE_TIME)
     wave = np.sin(6.0 * np.pi * t)
     force = np.zeros((len(t), 3))
@@ -95,7 +95,8 @@ def drift_force(load: Literal["tangential", "normal"], *, t_end: float = 5.0) ->
 
 
 def drift(model: Any, *, load: Literal["tangential", "normal"] = "tangential", t_end: float = 5.0) -> Scene:
-    """A disc of 1 kg and radius 0.05 m on a table, pushed with less than friction can hold: does it creep?
+    """Make the scene of a disc of 1 kg and radius 0.05 m on a table, pushed with less than friction can hold: does it
+    creep?
 
     `load="tangential"`: the force oscillates, and from 2.8 s a torque does too; `load="normal"`: force and torque are
     constant and the normal force oscillates after 1 s. The contact is fixed to the world.
@@ -129,7 +130,8 @@ def free_slide(
     t_end: float = 5.0,
     save_every: float = 0.01,
 ) -> Scene:
-    """A body thrown onto a level table with the initial `twist` `(vx, vy, omega)`; ends when it has stopped.
+    """Make the scene of a body thrown onto a level table with the `twist` `(vx, vy, omega)`; it ends when it has
+    stopped.
 
     The patch is fixed to the body, its frame's origin at the centre of mass. `mass` [kg], `inertia` about the centre of
     mass [kg m^2] (default: that of a puck whose mass is spread like its contact pressure), initial `position` [m] and
@@ -148,7 +150,8 @@ def free_slide(
 
 
 def published_velocity(*, speed: float = 0.015, spin: float = 1.0) -> Signal:
-    """Twist `(vx, vy, omega)` of the published velocity-driven runs, held over every 0.01 s [m/s, m/s, rad/s].
+    """Return the twist `(vx, vy, omega)` of the published velocity-driven runs, held over every 0.01 s
+    [m/s, m/s, rad/s].
 
     `speed` [m/s] is the peak of vx (vy peaks at 0.4 of it), `spin` [rad/s] that of omega: spin up, slide along x while
     spinning, slide along y, spin down, stop.
@@ -173,7 +176,8 @@ def driven(
     at: Literal["origin", "centre_of_pressure"] = "centre_of_pressure",
     t_end: float = 5.0,
 ) -> Scene:
-    """A patch that is moved with a prescribed `twist` `(vx, vy, omega)` in its own axes, to record its wrench.
+    """Make the scene of a patch moved with a prescribed `twist` `(vx, vy, omega)` in its own axes, to record its
+    wrench.
 
     `twist` is a signal `[T, 3]` or a constant (default: `published_velocity()`), `normal_force` [N] a signal or a
     number. `at` is the point of the patch that has the velocity: the origin of the contact frame, or the centre of
@@ -203,7 +207,8 @@ def pushed(
     size: Sequence[float] = (0.15, 0.08),
     t_end: float = 2.0,
 ) -> Scene:
-    """A plate on a table that is pushed by a hand: two finger pads pinch it behind its centre and move as prescribed.
+    """Make the scene of a plate pushed along a table: two finger pads pinch it behind its centre and move as
+    prescribed.
 
     `model` is the friction of the patch on which the plate of `size` (width, height) [m] and `mass` [kg] stands, under
     its weight, with its frame at the centre of mass. The pads, with the model `pad` (default: the same), begin at

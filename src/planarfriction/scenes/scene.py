@@ -19,7 +19,7 @@ from planarfriction.families import MODELS
 from planarfriction.scenes.signal import Signal, as_signal, breaks_between, sample_count
 
 STARTS = ("rest", "equilibrium", "sliding")
-"""How bristles may start."""
+"""Ways in which bristles may start."""
 
 RTOL, ATOL = 1e-5, 2e-4
 """Default tolerances: with 0.5 to 1.5 times these, the published in-hand runs of all models end within 2e-6 m and
@@ -81,13 +81,14 @@ class Body(ByValue):
 
 
 def between(signal: Signal) -> str:
-    """The lowest and the highest value of a signal of plain numbers, in words; one number where it is constant."""
+    """Return the lowest and the highest value of a signal of plain numbers, in words; one number where it is
+    constant."""
     low, high = float(signal.values.min()), float(signal.values.max())
     return f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
 
 
 def checked_model(name: str, value: Any) -> Any:
-    """`value` if it is a friction model, or one that looks like it."""
+    """Return `value` if it is a friction model, or one that looks like it."""
     if isinstance(value, type) or not (hasattr(value, "patch") and hasattr(value, "law")):
         raise InvalidValueError(name, f"be a friction model ({MODELS.classes()})", value)
     return value
@@ -110,7 +111,7 @@ class Contact(ByValue):
     normal_force: Signal
     """Normal force [N], >= 0: a signal, or a number for a constant force."""
     mounted_on: Literal["world", "body"] = "world"
-    """What the contact frame is fixed to: "world" or "body"."""
+    """Part that the contact frame is fixed to: "world" or "body"."""
     position: tuple[float, float] = (0.0, 0.0)
     """Origin of the contact frame [m], in the world or, on the body, in its axes from its centre of mass."""
     angle: float = 0.0
@@ -274,7 +275,8 @@ class Scene(ByValue):
         return f"Scene({self.name!r}: {self.t_end:g} s, body of {body}{driven}; {contacts}{more})"
 
     def breaks(self, t_end: float | None = None) -> np.ndarray:
-        """Times [s] from 0 to `t_end` (default: the scene's) at which any signal jumps or bends, both ends included.
+        """Return the times [s] from 0 to `t_end` (default: the scene's) at which any signal jumps or bends, both ends
+        included.
 
         Breaks within rounding of each other (`SAME_TIME`) count as one.
 
@@ -287,14 +289,14 @@ class Scene(ByValue):
         return breaks_between(np.concatenate([signal.breaks for signal in signals]), t_end)
 
     def to_dict(self) -> dict[str, Any]:
-        """The scene as plain numbers, texts, lists and tables; `from_dict` restores it to the last bit."""
+        """Return the scene as plain numbers, texts, lists and tables; `from_dict` restores it to the last bit."""
         from planarfriction.scenes.files import scene_to_dict
 
         return scene_to_dict(self)
 
     @classmethod
     def from_dict(cls, data: dict[str, Any], folder: str | Path | None = None) -> Scene:
-        """Scene from a table as in scene files; relative paths in it start from `folder`.
+        """Make a scene from a table as in scene files; relative paths in it start from `folder`.
 
         Raises FileError in one line that names the table and the key.
         """
@@ -304,7 +306,8 @@ class Scene(ByValue):
 
     @classmethod
     def from_file(cls, path: str | Path) -> Scene:
-        """Scene from a TOML or JSON file. Raises FileError in one line that names the file, the table and the key."""
+        """Read a scene from a TOML or JSON file. Raises FileError in one line that names the file, the table and the
+        key."""
         from planarfriction.scenes.files import read_scene
 
         return read_scene(path)
@@ -316,9 +319,9 @@ class Scene(ByValue):
         write_scene(self, path)
 
     def to_json(self) -> str:
-        """The scene as one line of JSON, the same for equal scenes."""
+        """Return the scene as one line of JSON, the same for equal scenes."""
         return json.dumps(self.to_dict(), sort_keys=True, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
 
     def digest(self) -> str:
-        """SHA-256 of the content, in hexadecimal: equal scenes have equal digests."""
+        """Return the SHA-256 of the content, in hexadecimal: equal scenes have equal digests."""
         return hashlib.sha256(self.to_json().encode()).hexdigest()

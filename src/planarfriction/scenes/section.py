@@ -31,7 +31,7 @@ class Section:
         return key in self.data
 
     def error(self, message: str) -> FileError:
-        """The error for this table: `file: [table]: message`."""
+        """Return the error for this table: `file: [table]: message`."""
         table = f"[{self.where}]: " if self.where else ""
         return FileError(f"{self.source}: {table}{message}")
 
@@ -48,7 +48,7 @@ class Section:
         return self
 
     def get(self, key: str, default: Any = _REQUIRED) -> Any:
-        """Value under `key`; without a default the key must be there."""
+        """Return the value under `key`; without a default the key must be there."""
         if key not in self.data:
             if default is _REQUIRED:
                 self.fail(f"missing key {key!r}")
@@ -56,27 +56,27 @@ class Section:
         return self.data[key]
 
     def name_of(self, key: str) -> str:
-        """Dotted name of the table `key` below this one."""
+        """Return the dotted name of the table `key` below this one."""
         return f"{self.where}.{key}" if self.where else key
 
     def section(self, key: str, value: Any = _REQUIRED) -> Section:
-        """Table below this one; `value` stands in for a table that was written in a shorter form."""
+        """Return the table below this one; `value` stands in for a table that was written in a shorter form."""
         data = self.get(key) if value is _REQUIRED else value
         return Section(data, self.name_of(key), self.source, self.folder)
 
     def choice(self, key: str, valid: Iterable[str], default: Any = _REQUIRED) -> str:
-        """Value under `key` if it is one of `valid`, or raise an error that names the nearest valid one."""
+        """Return the value under `key` if it is one of `valid`, or raise an error that names the nearest valid one."""
         value, valid = self.get(key, default), list(valid)
         if not (isinstance(value, str) and value in valid):
             self.fail(f"{key} must be one of {', '.join(valid)}, got {_shown(value)}{_near(value, valid)}")
         return value
 
     def path(self, key: str) -> Path:
-        """Path under `key`, taken from the folder of the scene file."""
+        """Return the path under `key`, taken from the folder of the scene file."""
         return self._path(key, self.get(key))
 
     def paths(self, key: str) -> list[Path]:
-        """List of paths under `key`, taken from the folder of the scene file."""
+        """Return the list of paths under `key`, taken from the folder of the scene file."""
         value = self.get(key)
         if not isinstance(value, list):
             self.fail(f"{key} must be a list of paths, got {_shown(value)}")

@@ -27,7 +27,7 @@ MOST_SAMPLES = 10_000_000
 
 
 def breaks_between(times: np.ndarray, t_end: float) -> np.ndarray:
-    """0, the different `times` [s] in between, and `t_end`; those within rounding of each other count as one."""
+    """Return 0, the different `times` [s] in between, and `t_end`; those within rounding of each other count as one."""
     inner = np.unique(times)
     inner = inner[(inner > SAME_TIME) & (inner < t_end - SAME_TIME)]
     inner = inner[np.diff(inner, prepend=0.0) > SAME_TIME]
@@ -35,7 +35,8 @@ def breaks_between(times: np.ndarray, t_end: float) -> np.ndarray:
 
 
 def sample_count(span: float, step: float, name: str) -> int:
-    """Steps of `step` [s] that fit into `span` [s]; raises, before memory is asked for, where they are too many."""
+    """Return the number of steps of `step` [s] in `span` [s]; raise, before memory is asked for, if there are too
+    many."""
     count = span / step * (1.0 + 1e-12)  # so that the end itself is kept in spite of rounding
     if count > MOST_SAMPLES:
         rule = f"be at least {span / MOST_SAMPLES:.3g} s for {span:g} s (at most {MOST_SAMPLES} samples)"
@@ -44,7 +45,8 @@ def sample_count(span: float, step: float, name: str) -> int:
 
 
 def sample_times(t_end: float, dt: float = 0.01) -> np.ndarray:
-    """Times `i dt` [s] from 0 to the last one not after `t_end`, each computed as `i * dt` (nothing accumulates)."""
+    """Return the times `i dt` [s] from 0 to the last one not after `t_end`, each computed as `i * dt` (nothing
+    accumulates)."""
     t_end, dt = validation.non_negative("t_end", t_end), validation.positive("dt", dt)
     return np.arange(sample_count(t_end + 1e-9 * dt, dt, "dt") + 1) * dt  # 1e-9 keeps t_end itself despite rounding
 
@@ -64,7 +66,7 @@ class Signal(ByValue):
     values: np.ndarray
     """Sample values, shape `[T]` or `[T, k]`."""
     hold: Hold = "previous"
-    """What happens between the samples: "previous" or "linear"."""
+    """Course between the samples: "previous" or "linear"."""
 
     if TYPE_CHECKING:  # what is given may be more than what is kept
 
@@ -97,12 +99,12 @@ class Signal(ByValue):
 
     @classmethod
     def sampled(cls, times: ArrayLike, values: ArrayLike, hold: Hold = "previous") -> Signal:
-        """Signal from samples: `times` [s] of shape `[T]`, `values` of shape `[T]` or `[T, k]`."""
+        """Return a signal from samples: `times` [s] of shape `[T]`, `values` of shape `[T]` or `[T, k]`."""
         return cls(times, values, hold)
 
     @classmethod
     def constant(cls, value: ArrayLike) -> Signal:
-        """Signal that never changes; `value` is a number or a vector `[k]`.
+        """Return a signal that never changes; `value` is a number or a vector `[k]`.
 
         Raises InvalidValueError for anything else.
         """
@@ -115,7 +117,8 @@ class Signal(ByValue):
     def sine(
         cls, offset: float, amplitude: float, frequency: float, *, t_end: float, dt: float = 0.01, phase: float = 0.0
     ) -> Signal:
-        """`offset + amplitude sin(2 pi frequency t + phase)`, sampled every `dt` [s] up to `t_end` and held in between.
+        """Return the signal `offset + amplitude sin(2 pi frequency t + phase)`, sampled every `dt` [s] up to `t_end`
+        and held.
 
         `frequency` is in Hz, `phase` in rad.
 
@@ -130,8 +133,8 @@ class Signal(ByValue):
     def from_csv(
         cls, path: str | Path, *, time: str = "time", value: str | Sequence[str] = "value", hold: Hold = "previous"
     ) -> Signal:
-        """Signal from a CSV file with a header line: `time` is the name of the column of times, `value` one column or a
-        list.
+        """Return a signal from a CSV file with a header line: `time` is the name of the column of times, `value` one
+        column or a list.
 
         Lines that start with # are comments. Raises FileError for a missing file, a missing column or text among the
         numbers, and InvalidValueError as the constructor does.
@@ -148,7 +151,8 @@ class Signal(ByValue):
             raise InvalidValueError(f"{path}: {error.name}", error.rule, error.value) from None
 
     def held(self, dt: float) -> Signal:
-        """The same signal as seen by a digital controller: sampled every `dt` [s] from the first time on, and held.
+        """Return the same signal as seen by a digital controller: sampled every `dt` [s] from the first time on, and
+        held.
 
         Raises InvalidValueError for a `dt` that is not > 0, or that makes too many samples.
         """
@@ -156,11 +160,11 @@ class Signal(ByValue):
         return Signal(times, self(times))
 
     def __call__(self, t: ArrayLike) -> np.ndarray:
-        """Value at the times `t` [s] (any shape); at a jump the value that begins there."""
+        """Return the value at the times `t` [s] (any shape); at a jump the value that begins there."""
         return self._value(t, "right")
 
     def left(self, t: ArrayLike) -> np.ndarray:
-        """Value just before the times `t` [s] (any shape); at a jump, the value before the jump.
+        """Return the value just before the times `t` [s] (any shape); at a jump, the value before the jump.
 
         Raises InvalidValueError for times that are not finite.
         """
@@ -183,7 +187,7 @@ class Signal(ByValue):
         return self.times[(change != 0.0).reshape(len(self.times), -1).any(axis=1)]
 
     def pieces(self, breaks: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-        """Linear pieces of the signal between `breaks` `[S + 1]` [s]: values at their starts, and slopes.
+        """Return the linear pieces of the signal between `breaks` `[S + 1]` [s]: values at their starts, and slopes.
 
         On piece s the signal is `start[s] + slope[s] (t - breaks[s])`; both have shape `[S]` or `[S, k]`, and the slope
         of a held signal is exactly 0. Raises InvalidValueError if the signal breaks inside a piece.
@@ -214,12 +218,13 @@ class Signal(ByValue):
             raise InvalidValueError(name, "be >= 0", f"{value!r} at t = {self.times[i]:g} s")
 
     def to_dict(self) -> dict[str, Any]:
-        """The signal as plain numbers, lists and strings."""
+        """Return the signal as plain numbers, lists and strings."""
         return {"times": self.times.tolist(), "values": self.values.tolist(), "hold": self.hold}
 
     @classmethod
     def from_dict(cls, data: Any, folder: str | Path | None = None) -> Signal:
-        """Signal from a number, a list of numbers (constants) or a table as in scene files (see `read_signal`).
+        """Return a signal from a number, a list of numbers (constants) or a table as in scene files (see
+        `read_signal`).
 
         Raises FileError if the table is not a signal, InvalidValueError if `folder` is not a path.
         """
@@ -243,7 +248,7 @@ class Signal(ByValue):
         return np.concatenate([slopes, np.zeros_like(self.values[:1])])
 
     def _spread(self, array: np.ndarray) -> np.ndarray:
-        """`array` over time, ready to meet values `[..., k]`."""
+        """Return `array` over time, ready to meet values `[..., k]`."""
         return array[..., None] if self.values.ndim == 2 else array
 
     def _value(self, t, side: Literal["left", "right"]) -> np.ndarray:
@@ -257,7 +262,7 @@ class Signal(ByValue):
 
 
 def as_signal(name: str, value: Any, columns: int | None) -> Signal:
-    """`value` as a signal with `columns` columns (None: scalar); numbers and vectors become constants."""
+    """Return `value` as a signal with `columns` columns (None: scalar); numbers and vectors become constants."""
     wanted = f"have {columns} columns: be {columns} numbers, or a Signal of them"
     wanted = "be a number, or a Signal of numbers" if columns is None else wanted
     try:
@@ -273,7 +278,7 @@ def as_signal(name: str, value: Any, columns: int | None) -> Signal:
 
 
 def read_signal(parent: Section, key: str) -> Signal:
-    """Signal under `key` of a table: a number, a list of numbers (a constant vector) or one of three tables.
+    """Read the signal under `key` of a table: a number, a list of numbers (a constant vector) or one of three tables.
 
     `{times, values, hold, dt}`, `{csv, time, value, hold, dt}` with a path that starts from the scene file's folder, or
     `{sine = {offset, amplitude, frequency, t_end, dt, phase}}`. `dt` holds a signal over steps of `dt` (`Signal.held`).

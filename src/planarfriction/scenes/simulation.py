@@ -18,7 +18,7 @@ from planarfriction.scenes.solution import History, Solution
 from planarfriction.solvers import RODAS4, integrate
 
 BRISTLES = ("none", "all")
-"""What `simulate(..., bristles=)` records."""
+"""Choices of `simulate(..., bristles=)`."""
 
 MOST_NUMBERS = 10**9
 """Numbers of bristles that a run records at most: 8 GB."""

@@ -40,13 +40,13 @@ _META = ("scene", "statistics", "status", "message")
 _CHECKSUM = "planarfriction_checksum"
 
 _MARK = b"\0\0\0\x17" + _CHECKSUM.encode() + b"\0\0\0\0\x02\0\0\0\x47sha256:"
-"""What stands before the checksum in a NetCDF 3 file: its name, its type (text) and its length, with theirs."""
+"""Bytes before the checksum in a NetCDF 3 file: its name, its type (text) and its length, with theirs."""
 
 _DIGITS = 64
 """Length of the checksum after the mark."""
 
 _OTHERWISE = "xarray.load_dataset reads any NetCDF file as it is"
-"""What to do with a file that is not as it was saved."""
+"""Remedy for a file that is not as it was saved."""
 
 _LEFT_OUT = "scene_left_out"
 """Attribute that says why the scene is not in the data."""
@@ -76,7 +76,7 @@ class Solution:
     status: str
     """"success", "at rest", or the reason why the simulation ended early: "interrupted", "step too small"."""
     message: str
-    """What happened, in one sentence, with a remedy if the solver failed."""
+    """Message in one sentence, with a remedy if the solver failed."""
     scene: Scene
     """The scene that was simulated; None in a solution that was loaded from a file without it."""
 
@@ -115,7 +115,7 @@ class Solution:
         return xr.Dataset(dict(self.histories), attrs=_scene_attributes(self.scene))
 
     def contact_twist(self, contact: str | None = None) -> np.ndarray:
-        """Twist `[T, 3]` [m/s, m/s, rad/s] of the body relative to one contact, at the times of `data`.
+        """Return the twist `[T, 3]` [m/s, m/s, rad/s] of the body relative to one contact, at the times of `data`.
 
         `(vx, vy, omega)` at the origin of the contact frame, in its axes. `contact` is a name; None takes the only one.
 
@@ -145,7 +145,7 @@ class Solution:
         return np.stack([cos * ux + sin * uy, cos * uy - sin * ux, omega], axis=-1)
 
     def contact_index(self, contact: str | None = None) -> int:
-        """Index of a contact, given by its name, along the axis `contact`; None takes the only one.
+        """Return the index of a contact, given by its name, along the axis `contact`; None takes the only one.
 
         Raises InvalidValueError for a name that does not exist, and for None if there are several.
         """
@@ -229,7 +229,7 @@ class Solution:
 
 
 def scene_of(solution: Solution, what: str) -> Scene:
-    """The scene of a solution, which `what` needs; raises FileError where it was loaded without one."""
+    """Return the scene of a solution, which `what` needs; raises FileError where it was loaded without one."""
     if solution.scene is None:
         raise FileError(f"the file has no scene, which {what} needs: {solution.data.attrs[_LEFT_OUT]}")
     return solution.scene
@@ -260,20 +260,22 @@ def write_dataset(data: xr.Dataset, path: str | Path) -> Path:
 
 
 def _renamed(data: xr.Dataset, change: Callable[[str], str]) -> xr.Dataset:
-    """The same data under changed names: in a file, other letters than ASCII are "%CF%86", which SciPy can write."""
+    """Return the same data under changed names: in a file, other letters than ASCII are "%CF%86", which SciPy can
+    write."""
     names = {name: change(name) for name in {*data.variables, *data.dims} if isinstance(name, str)}
     return data.rename({name: new for name, new in names.items() if name != new})
 
 
 def _parted(content: bytes) -> tuple[memoryview, bytes, memoryview]:
-    """What stands before the checksum of a file, the checksum, and what stands after it; a ValueError without one."""
+    """Return what stands before the checksum of a file, the checksum, and what stands after it; a ValueError without
+    one."""
     begin = content.index(_MARK) + len(_MARK)
     view = memoryview(content)
     return view[:begin], bytes(view[begin : begin + _DIGITS]), view[begin + _DIGITS :]
 
 
 def _checksum(before: memoryview, after: memoryview) -> bytes:
-    """SHA-256 of all of a file but its checksum, in hexadecimal."""
+    """Return the SHA-256 of all of a file but its checksum, in hexadecimal."""
     digest = hashlib.sha256(before)
     digest.update(after)
     return digest.hexdigest().encode()

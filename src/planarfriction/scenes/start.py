@@ -20,7 +20,7 @@ _NEAR = 1e-3
 
 
 def first_states(scene: Any, shaped: np.ndarray) -> list[np.ndarray] | None:
-    """The first state of each contact `[*state_shape]`, or None for bristles at rest.
+    """Return the first state of each contact `[*state_shape]`, or None for bristles at rest.
 
     `shaped` `[C]` are the loads [N] whose shapes the contacts have at first.
     """
@@ -36,7 +36,8 @@ def first_states(scene: Any, shaped: np.ndarray) -> list[np.ndarray] | None:
 
 
 def first_slopes(scene: Any, shaped: np.ndarray, d_loads: np.ndarray, d_pull: np.ndarray) -> list[np.ndarray]:
-    """Changes of the first states `[K, *state_shape]` of an equilibrium, per contact, with K changes of what is held.
+    """Return the changes of the first states `[K, *state_shape]` of an equilibrium, per contact, with K changes of what
+    is held.
 
     `d_loads` `[K, C]` are those of the normal forces [N], `d_pull` `[K, 3]` those of the load on the body. Bristles
     follow the motion to which the body is pulled on, but for those bent as far as they can be, which only turn.
@@ -66,7 +67,7 @@ def first_slopes(scene: Any, shaped: np.ndarray, d_loads: np.ndarray, d_pull: np
 
 
 def contact_map(scene: Any, contact: Any) -> np.ndarray:
-    """`A` `[3, 3]` of `V = A u` at t = 0: the twist of a contact from the velocity of the body."""
+    """Return `A` `[3, 3]` of `V = A u` at t = 0: the twist of a contact from the velocity of the body."""
     body, (dx, dy), angle = scene.body, contact.position, contact.angle
     if scene.velocity is None and contact.mounted_on == "world":
         dx, dy = dx - body.position[0], dy - body.position[1]
@@ -88,7 +89,7 @@ def _sliding(scene: Any, shaped: np.ndarray) -> list[np.ndarray]:
 
 
 def _carried(body: Any, contact: Any) -> np.ndarray:
-    """Velocity `[3]` that the centre of mass would have at t = 0 on what the contact touches."""
+    """Return the velocity `[3]` that the centre of mass would have at t = 0 on what the contact touches."""
     if contact.support_velocity is None:
         return np.zeros(3)
     x, y = np.subtract(body.position, contact.position if contact.mounted_on == "world" else (0.0, 0.0))
@@ -103,21 +104,22 @@ class _Cells(NamedTuple):
     """The cells of all contacts."""
 
     levers: np.ndarray
-    """What a small motion of the body is to each, `[n, 2, 3]`."""
+    """Jacobian of the displacement of each cell by a small motion of the body, `[n, 2, 3]`."""
     stiffness: np.ndarray
     """`count f_N w_i sigma_0` `[n]` [N/m]."""
     largest: np.ndarray
     """Largest deflection `[n]` [m]."""
     middle: np.ndarray
-    """Where each bristle would be as far from its largest deflection in all directions `[n, 2]` [m]."""
+    """Deflection of each bristle that is as far from its largest in all directions `[n, 2]` [m]."""
 
     @classmethod
     def together(cls, each: Any) -> _Cells:
-        """Those of several contacts."""
+        """Join the cells of several contacts."""
         return cls(*(np.concatenate(parts) for parts in zip(*each, strict=True)))
 
     def bent(self, motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Deflections `[n, 2]` after a small motion of the body `[3]`, and their slopes `[n, 2, 2]` by the stretch."""
+        """Return the deflections `[n, 2]` after a small motion of the body `[3]`, and their slopes `[n, 2, 2]` by the
+        stretch."""
         way = self.levers @ motion - self.middle
         length = np.hypot(*way.T)
         over = length > self.largest
@@ -127,12 +129,13 @@ class _Cells(NamedTuple):
         return self.middle + share[:, None] * way, slope
 
     def load(self, deflections: np.ndarray) -> np.ndarray:
-        """What deflections `[n, 2]` hold of a load on the body `[3]`."""
+        """Return the load on the body `[3]` that deflections `[n, 2]` hold."""
         return np.einsum("n,nij,ni->j", self.stiffness, self.levers, deflections)
 
 
 def _equilibrium(scene: Any, loads: np.ndarray, shaped: np.ndarray) -> list[np.ndarray]:
-    """The bristles that the body bends when one small rigid motion brings it from rest to where they carry its load.
+    """Return the bristles that the body bends when one small rigid motion brings it from rest to where they carry its
+    load.
 
     None is bent further than it can be, and of all bristles that carry the load these store the least energy: with
     `zhat(d)` the nearest to `B_i d` that a bristle can be, the motion d makes `int sum k_i zhat_i dB_i d - P.d` least.
@@ -150,7 +153,7 @@ def _equilibrium(scene: Any, loads: np.ndarray, shaped: np.ndarray) -> list[np.n
 
 
 def _held_by(scene: Any, loads: np.ndarray, shaped: np.ndarray) -> tuple[list[_Cells], np.ndarray]:
-    """The cells of each contact, and the load on the body that they hold."""
+    """Return the cells of each contact, and the load on the body that they hold."""
     for contact in scene.contacts:
         if contact.model.law.numbers.creep_speed > 0.0:
             raise InvalidValueError("start", "be 'rest' or 'sliding' with a law that creeps", scene.start)
@@ -170,7 +173,7 @@ def _cells_of(scene: Any, contact: Any, load: float, shaped: float) -> _Cells:
 
 
 def _least_energy(cells: _Cells, pull: np.ndarray) -> np.ndarray:
-    """The motion `[3]` after which bristles carry a load `[3]`; raises where none does."""
+    """Return the motion `[3]` after which bristles carry a load `[3]`; raises where none does."""
     elastic = np.einsum("n,nia,nib->ab", cells.stiffness, cells.levers, cells.levers)
     scale = 1.0 / np.sqrt(np.where(np.diagonal(elastic) > 0.0, np.diagonal(elastic), 1.0))
     scaled = elastic * np.outer(scale, scale)
@@ -193,7 +196,7 @@ def _free(cells: _Cells, motion: np.ndarray) -> np.ndarray:
 
 @np.errstate(over="ignore", invalid="ignore")  # of loads that nothing holds
 def _bent_to_the_end(cells: _Cells, pull: np.ndarray, motion: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    """The motion of least energy where some bristles are bent as far as they can be."""
+    """Return the motion of least energy where some bristles are bent as far as they can be."""
     from scipy.optimize import minimize, root
 
     unit = np.abs(motion / scale).max()  # motions of the search are of order one
@@ -223,7 +226,8 @@ def _bent_to_the_end(cells: _Cells, pull: np.ndarray, motion: np.ndarray, scale:
 
 
 def _held(cells: _Cells, pull: np.ndarray, motion: np.ndarray) -> float | None:
-    """A bound below 1 on the share of the load that friction holds, from a motion that proves it; None without one."""
+    """Return a bound below 1 on the share of the load that friction holds, from a motion that proves it; None without
+    one."""
     way, power = cells.levers @ motion, float(pull @ motion)
     most = (cells.stiffness * (cells.largest * np.hypot(*way.T) + (cells.middle * way).sum(axis=1))).sum()
     return float(most / power) if 0.0 <= most < power else None

@@ -7,7 +7,7 @@ from typing import Any
 
 
 def to_toml(data: dict[str, Any]) -> str:
-    """TOML text of a table of numbers, texts, lists and tables; floats keep every bit.
+    """Return the TOML text of a table of numbers, texts, lists and tables; floats keep every bit.
 
     Lists of tables become `[[name]]`; None has no TOML form and must not occur.
     """

@@ -41,7 +41,8 @@ def pivot(
     start: Literal["rest", "equilibrium"] = "equilibrium",
     t_end: float = 1.0,
 ) -> Scene:
-    """A part held level by one end between finger pads: the grip loosens, the part swings down and is caught.
+    """Make the scene of a part held level by one end between finger pads: the grip loosens, it swings down and is
+    caught.
 
     The pads are at the origin of the world; the centre of mass of the plate of `size` (width, height) [m] and `mass`
     [kg] starts `arm` [m] beside them. Each of the `fingers` presses with the full `normal_force` [N], a signal or a
@@ -69,7 +70,7 @@ def foot(
     torque: Any = None,
     t_end: float = 2.0,
 ) -> Scene:
-    """A robot that stands on one foot turns about its heel and back about its forefoot: a sideways move without a step.
+    """Make the scene of a robot on one foot that turns about its heel and back about its forefoot: a sideways move.
 
     Heel (`model`) and `forefoot` (a model; the heel's by default) are fixed to the body, `length` [m] apart along x,
     with the centre of mass of `mass` [kg] and `inertia` about the vertical [kg m^2] midway. `share` of the weight is on
@@ -111,7 +112,7 @@ def curling(
     t_end: float = 60.0,
     save_every: float = 0.05,
 ) -> Scene:
-    """A curling stone released with the `twist` `(vx, vy, omega)`; ends when it has stopped.
+    """Make the scene of a curling stone released with the `twist` `(vx, vy, omega)`; it ends when it has stopped.
 
     The patch is fixed to the stone, with the origin of its frame at the centre of mass; on real stones it is a narrow
     ring. `mass` [kg], `inertia` about the vertical [kg m^2] (default: that of a cylinder of radius 0.14 m), `start` the
@@ -129,7 +130,7 @@ def curling(
 
 
 def _around(half: float, radius: float) -> np.ndarray:
-    """Outline `[M, 2]` [m] at the distance `radius` from the line between (-half, 0) and (half, 0)."""
+    """Return the outline `[M, 2]` [m] at the distance `radius` from the line between (-half, 0) and (half, 0)."""
     angle = 2.0 * np.pi * (np.arange(64) + 0.5) / 64
     x, y = radius * np.cos(angle), radius * np.sin(angle)
     return np.stack([x + np.copysign(half, x), y], axis=1)

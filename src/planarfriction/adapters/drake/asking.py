@@ -58,7 +58,8 @@ class Asking:
         self._touching, self._levers = [False] * k, np.ones(3 * k)
         self._levers[2::3] = [math.sqrt((model.patch.positions**2).sum(axis=1).mean()) for model in coupled.models]
         self._rows, self._moved = np.zeros((3 * k, size)), np.zeros((size, 3 * k))
-        """Jacobian of the twists `[3k, nv]`; velocities that wrenches cause without contact `[nv, 3k]`."""
+        """Return the Jacobian of the twists `[3k, nv]`, 1 for the contacts of each patch `[k, nefc]`, and 1 for patches
+        in contact."""
 
     def step(
         self,
@@ -69,7 +70,7 @@ class Asking:
         owed: np.ndarray,
         answers: np.ndarray,
     ) -> Asked:
-        """The step from where the shadow stands, under generalized forces `applied` and friction.
+        """Take a step from the state of the shadow, under generalized forces `applied` and friction.
 
         From `bristles`, the `wrench` of each patch in the last step, the generalized `force` that these were, the
         twists that bristles are `owed` (those that they saw in the last step were off by them), and its `answers`.
@@ -126,23 +127,23 @@ class Asking:
         return bool(new)
 
     def _answer_freely(self) -> None:
-        """As the bodies do without contact: no answer is larger, so that with this one each pass gets closer."""
+        """Answer as the bodies do without contact: no answer is larger, so that with this one each pass gets closer."""
         np.matmul(self._rows, self._moved, out=self._row.response)
         self._row.load_response.fill(0.0)
 
     def _answer_as_before(self, answers: np.ndarray) -> None:
-        """As in the last step, where the same patches touched in it."""
+        """Answer as in the last step if the same patches touched in it."""
         k = len(self._touching)
         if answers[:k].tolist() == self._touching:
             twists, loads = np.split(answers[k:], [9 * k * k])
             self._row.response[:], self._row.load_response[:] = twists.reshape(3 * k, -1), loads.reshape(k, -1)
 
     def _pressed(self, wrench: np.ndarray) -> np.ndarray:
-        """Of the patches that touch; zeros of the others."""
+        """Return values of the patches that touch, and zeros for the others."""
         return wrench if all(self._touching) else np.where(np.repeat(self._touching, 3), wrench, 0.0)
 
     def _speed(self, twist: np.ndarray, load: np.ndarray | None = None) -> float:
-        """Size of changes of twists, and of loads in the speed that they could cause [m/s]."""
+        """Return the size of changes of twists, and of loads in the speed that they could cause [m/s]."""
         speeds = self._levers * twist
         squares = speeds @ speeds
         if load is not None:

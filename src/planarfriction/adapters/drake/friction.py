@@ -33,7 +33,7 @@ class Report(NamedTuple):
     """Statistics of one step."""
 
     passes: int
-    """How many times the plant's step was evaluated."""
+    """Number of evaluations of the plant's step."""
     iterations: int
     """Newton iterations, summed over all passes."""
     residual: float
@@ -114,38 +114,39 @@ class Friction(LeafSystem):
     # ------------------------------------------------------------------ what a context holds
 
     def GetBristles(self, context: Any) -> list[np.ndarray]:
-        """Copies of the states of all patches from this system's context, each in the shape that its model uses."""
+        """Return the copies of the states of all patches from this system's context, each in the shape that its model
+        uses."""
         return self.coupled.states(self._read(context, "bristles").copy())
 
     def GetReport(self, context: Any) -> Report:
-        """Statistics of the last step, from this system's context."""
+        """Return the statistics of the last step, from this system's context."""
         passes, iterations, residual, misfit, converged = self._read(context, "report").tolist()
         return Report(int(passes), int(iterations), residual, misfit, converged > 0.0)
 
     def get_generalized_force_output_port(self) -> Any:
-        """Port to connect to the plant: friction plus the generalized forces that others apply `[nv]`."""
+        """Return the port to connect to the plant: friction plus the generalized forces that others apply `[nv]`."""
         return self.GetOutputPort("generalized_force")
 
     def get_wrenches_output_port(self) -> Any:
-        """Wrenches of the last step, patch by patch `[3k]` [N, N, N m]."""
+        """Return the wrenches of the last step, patch by patch `[3k]` [N, N, N m]."""
         return self.GetOutputPort("wrenches")
 
     def get_twists_output_port(self) -> Any:
-        """Twists at the end of the last step `[3k]` [m/s, m/s, rad/s]."""
+        """Return the twists at the end of the last step `[3k]` [m/s, m/s, rad/s]."""
         return self.GetOutputPort("twists")
 
     def get_loads_output_port(self) -> Any:
-        """Normal forces of the last step `[k]` [N]."""
+        """Return the normal forces of the last step `[k]` [N]."""
         return self.GetOutputPort("loads")
 
     def get_report_output_port(self) -> Any:
-        """The numbers of `Report` `[5]`."""
+        """Return the numbers of `Report` `[5]`."""
         return self.GetOutputPort("report")
 
     # ------------------------------------------------------------------ a step
 
     def _declare_inputs(self, plant: Any) -> None:
-        """The state of the plant, and all that drives the plant."""
+        """Declare the inputs: the state of the plant, and all that drives the plant."""
         self._state: Any = self.DeclareVectorInputPort("state", plant.num_multibody_states())
         self._inputs: dict[str, Any] = {}
         for i in range(plant.num_input_ports()):
@@ -159,7 +160,7 @@ class Friction(LeafSystem):
                 self._inputs[name] = self.DeclareVectorInputPort(name, port.size())
 
     def _driven(self, context: Any) -> dict[str, AbstractValue]:
-        """What drives the plant besides generalized forces."""
+        """Return the inputs that drive the plant besides generalized forces."""
         return {
             name: self.EvalAbstractInput(context, port.get_index())
             for name, port in self._inputs.items()
@@ -206,7 +207,7 @@ def _check(plant: Any, scene_graph: Any) -> None:
 
 
 def _sources(builder: Any, plant: Any) -> dict[str, Any]:
-    """Output ports that drive the plant, by the names of its inputs."""
+    """Return the output ports that drive the plant, by the names of its inputs."""
     sources = {}
     for (system, index), (source, output) in builder.connection_map().items():
         if system is plant:
@@ -219,7 +220,7 @@ def _sources(builder: Any, plant: Any) -> dict[str, Any]:
 
 
 def _reserve(builder: Any, plant: Any, sources: dict[str, Any]) -> None:
-    """Connect what drives nothing yet to nothing: what came later would not be seen here, so that Drake refuses it."""
+    """Connect free inputs to nothing: a later connection would not be seen here, so that Drake has to refuse it."""
     for i in range(plant.num_input_ports()):
         port = plant.get_input_port(i)
         name, nothing = port.get_name(), None

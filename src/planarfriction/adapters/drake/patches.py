@@ -1,4 +1,4 @@
-"""Which contacts get patch friction, and how a plant is prepared for it."""
+"""Choice of contacts with patch friction, and preparation of a plant for it."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ class Placed:
         own = int(bodies[1].index() == owner.index())
         self.other = bodies[1 - own].body_frame()
         self.pairs = {(a.get_value(), b.get_value()) for a, b in itertools.product(sides[own], sides[1 - own])}
-        """Of ids, the owner's first."""
+        """Pairs of ids of geometries, the owner's first."""
         self._check_friction(scene_graph.model_inspector(), sides)
 
     def _check_friction(self, inspector: Any, sides: list[list[GeometryId]]) -> None:
@@ -105,7 +105,7 @@ def checked(patches: Iterable[PatchContact]) -> list[PatchContact]:
 
 
 def found(plant: Any, scene_graph: Any, patches: Iterable[PatchContact]) -> list[Placed]:
-    """The patches in a plant; raises for the same pair of geometries twice."""
+    """Find the patches in a plant; raise for the same pair of geometries twice."""
     placed = [Placed(plant, scene_graph, patch) for patch in checked(patches)]
     if not placed:
         raise InvalidValueError("patches", "hold at least one", "none")
@@ -124,7 +124,7 @@ def _frame(plant: Any, name: str) -> Any:
 
 
 def _geometries(plant: Any, scene_graph: Any, name: str) -> list[GeometryId]:
-    """Collision geometries that a name stands for: one, or all of a body."""
+    """Return the collision geometries that a name stands for: one, or all of a body."""
     inspector = scene_graph.model_inspector()
     named = {
         f"{_body_of(plant, scene_graph, each).scoped_name().get_full()}::{inspector.GetName(each)}": each
@@ -151,7 +151,7 @@ def _one(what: str, kind: str, named: dict[str, Any], name: str) -> Any:
 
 
 def _ending(named: dict[str, Any], name: str) -> list[str]:
-    """Full names, with that of the model before, that a name may mean."""
+    """Return the full names, with that of the model before, that a name may mean."""
     return [full for full in named if full == name or full.endswith(f"::{name}")]
 
 

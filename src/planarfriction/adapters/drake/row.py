@@ -9,7 +9,7 @@ from planarfriction.kernels.coupling import solve_batch
 
 
 class Row:
-    """What `CoupledPatches.step` takes and returns, as views of one row of words."""
+    """Arguments and results of `CoupledPatches.step`, as views of one row of words."""
 
     def __init__(self, coupled: CoupledPatches, dt: float) -> None:
         packed, k = coupled._packed, len(coupled.models)

@@ -52,7 +52,7 @@ class Shadow:
         self._surfaces: list[tuple[int, int, float]] = []
 
     def begin(self, state: np.ndarray, driven: dict[str, Any]) -> None:
-        """Go where a step begins, with what drives the plant besides generalized forces."""
+        """Go to the begin of a step, with what drives the plant besides generalized forces."""
         self.plant.SetPositionsAndVelocities(self._begin, state)
         for name, value in driven.items():
             if name in self._driven:
@@ -61,7 +61,7 @@ class Shadow:
                 self._driven[name] = self.plant.GetInputPort(name).FixValue(self._begin, value)
 
     def step(self, force: np.ndarray) -> np.ndarray:
-        """Velocities at the end of a step with generalized forces `[nv]`."""
+        """Return the velocities at the end of a step with generalized forces `[nv]`."""
         self._force.GetMutableData().get_mutable_value().SetFromVector(force)
         if self._sampled:
             self.plant.CalcForcedUnrestrictedUpdate(self._begin, self._end.get_mutable_state())
@@ -70,7 +70,7 @@ class Shadow:
         return self.plant.GetVelocities(self._end)
 
     def pushes(self, *, first: bool) -> np.ndarray:
-        """Normal forces in the step taken last on the bodies that own the patches, in the world `[k, 3]`.
+        """Return the normal forces in the step taken last on the bodies that own the patches, in the world `[k, 3]`.
 
         Which contacts are the patches' depends on where the step begins alone: found in its `first`.
         """
@@ -85,7 +85,7 @@ class Shadow:
         return forces
 
     def rows(self, p: int, force: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Jacobian of the twist of a patch `[3, nv]`, in the axes of its frame, and the normal."""
+        """Return the Jacobian of the twist of a patch `[3, nv]`, in the axes of its frame, and the normal."""
         normal = force / math.sqrt(force @ force)
         frame, world, origin = self._frames[p], self.plant.world_frame(), np.zeros(3)
         x = frame.CalcRotationMatrixInWorld(self._begin).matrix()[:, 0]
@@ -101,7 +101,7 @@ class Shadow:
         return np.array([x @ spatial[3:], y @ spatial[3:], normal @ spatial[:3]]), normal
 
     def moved(self, jacobian: np.ndarray) -> np.ndarray:
-        """Velocities that wrenches cause in a step without contact `[nv, 3k]`: `dt (M + dt D)^-1 J'`."""
+        """Return the velocities that wrenches cause in a step without contact `[nv, 3k]`: `dt (M + dt D)^-1 J'`."""
         metric = self.plant.CalcMassMatrix(self._begin)
         metric.flat[:: len(metric) + 1] += self._damping
         _, found, _ = self._solve(metric, jacobian.T)
@@ -113,7 +113,7 @@ class Shadow:
         return self._results.Eval(self._end if self._sampled else self._begin)
 
     def _find(self, results: Any) -> None:
-        """Contacts of the patches, and their signs: 1 where the owner is Drake's second body."""
+        """Return the contacts of the patches, and their signs: 1 where the owner is Drake's second body."""
         self._points, self._surfaces = [], []
         for i in range(results.num_point_pair_contacts()):
             pair = results.point_pair_contact_info(i).point_pair()
@@ -127,7 +127,7 @@ class Shadow:
                 self._surfaces.append((i, *key))
 
     def _centre(self, p: int) -> np.ndarray:
-        """Of the contacts of a patch, by their forces."""
+        """Return the centre of the contacts of a patch, weighted by their forces."""
         results, places, weights = self._contacts(), [], []
         for i, owner, _ in self._points:
             if owner == p:
@@ -143,7 +143,7 @@ class Shadow:
 
 
 def _damping(plant: Any) -> np.ndarray:
-    """Of the joints, which a discrete plant takes implicitly `[nv]`."""
+    """Return the damping of the joints, which a discrete plant takes implicitly `[nv]`."""
     damping = np.zeros(plant.num_velocities())
     for index in plant.GetJointIndices():
         joint = plant.get_joint(index)

@@ -31,14 +31,14 @@ INTEGRATORS = {
 }
 
 PASSES = 4
-"""How many times a step is solved again because it has activated other constraints."""
+"""Number of new solutions of a step because it has activated other constraints."""
 
 SLACK = 1e-10
 """Speed [m/s] to which the active constraints have to hold."""
 
 
 class _Search(NamedTuple):
-    """What the search for the active constraints goes on from."""
+    """State from which the search for the active constraints continues."""
 
     active: responses.Active
     wrench: jax.Array
@@ -54,16 +54,16 @@ class _Search(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class _Fixed:
-    """What does not change with parameters: compared by identity, as one function is compiled for it."""
+    """Parts that do not change with parameters: compared by identity, as one function is compiled for them."""
 
     places: Places
     which: tuple[int, ...]
     """The model of each patch."""
     shapes: tuple[tuple[int, ...], ...]
-    """Of the states."""
+    """Shapes of the states."""
     radius: np.ndarray
     memory: Memory
-    """Where things are in `userdata`."""
+    """Places of the memory of the patches in `userdata`."""
     nuserdata: int
 
 
@@ -120,27 +120,28 @@ class Friction:
     # ------------------------------------------------------------------ what the data hold
 
     def states(self, d: Any) -> list[jax.Array]:
-        """State of each patch at the current time of the data."""
+        """Return the state of each patch at the current time of the data."""
         at, sizes = self._fixed.memory, [math.prod(shape) for shape in self._fixed.shapes]
         flat = self._now(d, at.new, at.state, sum(sizes))
         parts = jnp.split(flat, np.cumsum(sizes)[:-1], axis=-1)
         return [z.reshape(*z.shape[:-1], *shape) for z, shape in zip(parts, self._fixed.shapes, strict=True)]
 
     def wrenches(self, d: Any) -> jax.Array:
-        """Wrenches of the last step `[k, 3]` [N, N, N m] on the bodies of the sites, in the frames of the patches."""
+        """Return the wrenches of the last step `[k, 3]` [N, N, N m] on the bodies of the sites, in the frames of the
+        patches."""
         return self._each(d, self._fixed.memory.wrench, 3)
 
     def twists(self, d: Any) -> jax.Array:
-        """Twists at the end of the last step `[k, 3]` [m/s, m/s, rad/s] of the bodies of the sites relative to the
-        other bodies."""
+        """Return the twists at the end of the last step `[k, 3]` [m/s, m/s, rad/s] of the bodies of the sites relative
+        to the other bodies."""
         return self._each(d, self._fixed.memory.twist, 3)
 
     def loads(self, d: Any) -> jax.Array:
-        """Normal forces at the end of the last step `[k]` [N]."""
+        """Return the normal forces at the end of the last step `[k]` [N]."""
         return self._each(d, self._fixed.memory.load, 1)[..., 0]
 
     def report(self, d: Any) -> Report:
-        """Statistics of the last step."""
+        """Return the statistics of the last step."""
         at, u = self._fixed.memory, d.userdata
         converged = u[..., at.converged] > 0.0
         return Report(u[..., at.iterations], u[..., at.passes], u[..., at.residual], converged)
@@ -155,7 +156,7 @@ class Friction:
         return d.userdata[..., first : first + count * k].reshape(*d.userdata.shape[:-1], k, count)
 
     def _now(self, d: Any, after: int, before: int, count: int) -> jax.Array:
-        """Of the time of the data: of the end of the last step, or of its beginning; zeros at other times."""
+        """Return values at the time of the data: those of the end of the last step, or of its beginning, else zeros."""
         at, u = self._fixed.memory, d.userdata
         ends, begins = d.time == u[..., at.next], d.time == u[..., at.time]
         begun = jnp.where(begins[..., None], u[..., before : before + count], 0.0)
@@ -200,7 +201,7 @@ class Friction:
         return jax.tree.map(lambda after, before: after.astype(before.dtype), d, given)
 
     def _search(self, models, m, d, jacobian, rows, states, guess) -> _Search:
-        """Which constraints are active in the end, and the wrenches, without derivatives."""
+        """Find the constraints that are active in the end, and the wrenches, without derivatives."""
         applied, dt, radius = d.qfrc_applied, m.opt.timestep, jnp.asarray(self._fixed.radius)
 
         def unit(twist):
@@ -226,7 +227,7 @@ class Friction:
         return jax.lax.while_loop(unsettled, body, start)
 
     def _evaluate(self, models, states, twist, load, dt) -> tuple[list[jax.Array], jax.Array]:
-        """New states and wrenches of steps; patches of the same model side by side."""
+        """Return the new states and wrenches of steps; patches of the same model side by side."""
         new, wrenches = [jnp.empty(0)] * len(states), [jnp.empty(0)] * len(states)
         for number, model in enumerate(models):
             own = [p for p, i in enumerate(self._fixed.which) if i == number]
@@ -237,7 +238,7 @@ class Friction:
         return new, jnp.stack(wrenches)
 
     def _integrated(self, m, d, jacobian, wrench, answer: responses.Answer) -> Any:
-        """The data after the step; the forces of the user are theirs again."""
+        """Return the data after the step, with the forces of the user as they were."""
         applied = d.qfrc_applied
         d = mjx.fwd_acceleration(m, d.replace(qfrc_applied=applied + wrench @ jacobian))
         force = answer.forces(d, wrench)
@@ -246,7 +247,7 @@ class Friction:
         return responses.integrate(m, d).replace(qfrc_applied=applied)
 
     def _written(self, userdata: jax.Array, kept: dict[str, Any]) -> jax.Array:
-        """User data with what is kept for the next step, and for those who look."""
+        """Return the user data with the memory for the next step and the results for users."""
         for name, value in kept.items():
             flat = jnp.concatenate([jnp.ravel(each) for each in value]) if isinstance(value, list) else jnp.ravel(value)
             first = getattr(self._fixed.memory, name)
@@ -255,7 +256,7 @@ class Friction:
 
 
 def _moved(m: Any, d: Any) -> Any:
-    """All of `mjx.forward` up to the constraints' forces, which are without friction of ours."""
+    """Run `mjx.forward` up to the forces of the constraints, without patch friction."""
     d = mjx.sensor_pos(m, mjx.fwd_position(m, d))
     d = mjx.sensor_vel(m, mjx.fwd_velocity(m, d))
     return mjx.fwd_acceleration(m, mjx.fwd_actuation(m, d))

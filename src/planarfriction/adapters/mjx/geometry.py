@@ -25,17 +25,18 @@ class Places(NamedTuple):
     owner: Any
     support: Any
     at_site: Any
-    """Whether the origin is at the site."""
+    """True where the origin is at the site."""
 
 
 def places(placed: Sequence[Placed]) -> Places:
-    """Of patches found in a model."""
+    """Return the places of patches found in a model."""
     numbers = [(p.site, p.own, p.other, p.bodies[1], p.bodies[0], p.patch.centre == "site") for p in placed]
     return Places(*map(np.array, zip(*numbers, strict=True)))
 
 
 def geometry(m: Any, d: Any, where: Places) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """Jacobian of the twists `[3k, nv]`, rows of each patch's contacts `[k, nefc]`, 1 or 0, and who is in contact."""
+    """Return the Jacobian of the twists `[3k, nv]`, 1 for the contacts of each patch `[k, nefc]`, and 1 for patches in
+    contact."""
     contact = d._impl.contact
     single = jnp.asarray(contact.dim == 1) & (contact.dist < contact.includemargin)
     frames = contact.frame.reshape(-1, 3, 3)
@@ -64,6 +65,6 @@ def geometry(m: Any, d: Any, where: Places) -> tuple[jax.Array, jax.Array, jax.A
 
 
 def _unit(vector: jax.Array, given: jax.Array) -> jax.Array:
-    """Of length 1, where there is one."""
+    """Return a vector of length 1 in the same direction; zero for zero."""
     safe = jnp.where(given, vector, 1.0)
     return safe / jnp.sqrt(safe @ safe)

@@ -16,30 +16,30 @@ import jax.numpy as jnp
 from planarfriction.kernels.coupling import DOWNHILL, JOINT, ROUND, ROUNDING, SHORTENINGS
 
 _GUESS, _REST, _SEARCH = range(3)
-"""What a round evaluates: the twists that the guess causes, twists at rest, or a point along a Newton step."""
+"""Kinds of evaluation: the twists that the guess causes, twists at rest, or a point along a Newton step."""
 
 Unit = Callable[[jax.Array], jax.Array]
 """Wrenches of the models' steps per unit load `[k, 3]` of their twists `[k, 3]`."""
 
 
 class Host(NamedTuple):
-    """How twists and loads at the end of a step follow the wrenches w `[3k]` that act during it."""
+    """Response of twists and loads at the end of a step to the wrenches w `[3k]` that act during it."""
 
     twist: jax.Array
     """Without wrenches, `[3k]`."""
     load: jax.Array
-    """`[k]`"""
+    """Return the loads `[k]`."""
     response: jax.Array
     """A, `[3k, 3k]`."""
     load_response: jax.Array
     """B, `[k, 3k]`."""
 
     def twists(self, w: jax.Array) -> jax.Array:
-        """`[k, 3]`"""
+        """Return the twists `[k, 3]`."""
         return (self.twist + self.response @ w).reshape(-1, 3)
 
     def loads(self, w: jax.Array) -> jax.Array:
-        """`[k]`"""
+        """Return the loads `[k]`."""
         load = self.load + self.load_response @ w
         return jnp.where(load > 0.0, load, 0.0)
 
@@ -56,11 +56,11 @@ class Solved(NamedTuple):
 
 
 class _Round(NamedTuple):
-    """What one round of the loop leaves to the next."""
+    """State that one round of the loop leaves to the next."""
 
     phase: Any
     w: Any
-    """Where the next round evaluates, with its twists and loads."""
+    """Wrenches at which the next round evaluates, with their twists and loads."""
     twist: Any
     load: Any
     unit: Any
@@ -79,12 +79,13 @@ class _Round(NamedTuple):
     iterations: Any
     best: Any
     wrench: Any
-    """Of the models, where the misfit was best."""
+    """Wrench of the models where the misfit was least."""
     done: Any
 
 
 def solve(unit: Unit, host: Host, guess: jax.Array, radius: jax.Array, tolerance: float, most: int) -> Solved:
-    """The wrenches `w(V, N)` with the V and N that they cause; `guess` `[3k]`, `radius` of the patches `[k]` [m]."""
+    """Solve for the wrenches `w(V, N)` with the V and N that they cause; `guess` `[3k]`, `radius` of the patches `[k]`
+    [m]."""
     count, lever = len(host.load), jnp.ones((len(host.load), 3)).at[:, 2].set(radius)
     caused = host.response @ guess
     speeds = lever.ravel() * (abs(host.twist + caused) + abs(caused))
@@ -104,7 +105,7 @@ def solve(unit: Unit, host: Host, guess: jax.Array, radius: jax.Array, tolerance
         return jnp.where(jnp.isfinite(gap).all(), gap.max(), jnp.inf)
 
     def newton(w, twist, load, unit, slopes, held):
-        """The step, what it moves, and `A dW . s` at its start."""
+        """Return the step, what it moves, and `A dW . s` at its start."""
         lacks = host.load + host.load_response @ w - load
         follows = jnp.where(held | ((load == 0.0) & (lacks < 0.0)), 0.0, 1.0)
         own = load[:, None, None] * slopes
@@ -188,7 +189,7 @@ def solve(unit: Unit, host: Host, guess: jax.Array, radius: jax.Array, tolerance
 
 
 def fitting(unit: Unit, host: Host, found: jax.Array) -> jax.Array:
-    """The wrenches `found`, with the derivatives of `w(V, N) - W = 0` by all that is in `unit` and `host`."""
+    """Return the wrenches `found`, with the derivatives of `w(V, N) - W = 0` by all that is in `unit` and `host`."""
 
     def gap(w):
         return (host.loads(w)[:, None] * unit(host.twists(w))).ravel() - w
@@ -200,14 +201,15 @@ def fitting(unit: Unit, host: Host, found: jax.Array) -> jax.Array:
 
 
 def _without_rising(slopes: jax.Array, scale: jax.Array) -> jax.Array:
-    """Slopes `[k, 3, 3]` without the directions in which they rise; `scale` `[k, 3]` are twists of unit energy."""
+    """Return the slopes `[k, 3, 3]` without the directions in which they rise; `scale` `[k, 3]` are twists of unit
+    energy."""
     both = scale[:, :, None] * scale[:, None, :]
     rises, axes = jnp.linalg.eigh(0.5 * (slopes + slopes.mT) * both)
     return slopes - (axes * jnp.maximum(rises, 0.0)[:, None]) @ axes.mT / both
 
 
 def _solved(matrix: jax.Array, right: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """Solutions `[..., n]`, 0 where there are none, and signs of the determinants."""
+    """Return the solutions `[..., n]`, 0 where there are none, and signs of the determinants."""
     factors, pivots = jax.scipy.linalg.lu_factor(matrix)
     found = jax.scipy.linalg.lu_solve((factors, pivots), right[..., None])[..., 0]
     swaps = (pivots != jnp.arange(pivots.shape[-1])).sum(-1)

@@ -1,6 +1,6 @@
 # pyright: reportAttributeAccessIssue=false, reportPrivateImportUsage=false
 # (MJX keeps what its constraints are in `_impl`.)
-"""How MJX's step reacts to wrenches on patches, for a fixed set of active constraints.
+"""Response of MJX's step to wrenches on patches, for a fixed set of active constraints.
 
 As `planarfriction.adapters.mujoco.responses`, with the accelerations themselves: `H qacc = f + Jp' W + Jc' (D a + c)`
 over the rows in their quadratic range and those at their largest force c. It is what MJX's solver goes towards, exact,
@@ -19,7 +19,7 @@ from planarfriction.adapters.mjx.newton import Host
 
 
 class Active(NamedTuple):
-    """Which constraint rows are active."""
+    """Constraint rows that are active."""
 
     quadratic: jax.Array
     """Rows whose force follows the acceleration, bool `[nefc]`."""
@@ -41,27 +41,27 @@ class Answer(NamedTuple):
     host: Host
 
     def acceleration(self, w: jax.Array) -> jax.Array:
-        """`[nv]`"""
+        """Return the acceleration `[nv]`."""
         return self.free + self.moved @ w
 
     def forces(self, d: Any, w: jax.Array) -> jax.Array:
-        """Of constraints, `[nefc]`."""
+        """Return the forces of the constraints, `[nefc]`."""
         return self.limit - self.stiffness * _gap(d, self.acceleration(w))
 
 
 def active_rows(d: Any) -> Active:
-    """From the forces that MJX's solver has found."""
+    """Return the active rows by the forces that MJX's solver has found."""
     return _active(d, d._impl.efc_force > 0.0, d._impl.efc_force)
 
 
 def active_at(d: Any, acceleration: jax.Array) -> Active:
-    """At an acceleration."""
+    """Return the active rows at an acceleration."""
     gap = _gap(d, acceleration)
     return _active(d, gap < 0.0, -d._impl.efc_D * gap)
 
 
 def _active(d: Any, pressed: jax.Array, force: jax.Array) -> Active:
-    """Equalities always are, friction below its loss, all else where it is `pressed`."""
+    """Return the active rows: equalities always, friction below its loss, all others where they are `pressed`."""
     row = jnp.arange(len(force))
     loss = (row >= d._impl.ne) & (row < d._impl.ne + d._impl.nf)
     at_loss = loss & (abs(force) >= d._impl.efc_frictionloss)
@@ -70,14 +70,15 @@ def _active(d: Any, pressed: jax.Array, force: jax.Array) -> Active:
 
 
 def slack(d: Any, before: Active, after: Active, acceleration: jax.Array, dt: jax.Array) -> jax.Array:
-    """Largest speed [m/s] at which a row is on the wrong side of its range."""
+    """Return the largest speed [m/s] at which a row is on the wrong side of its range."""
     wrong = (before.quadratic != after.quadratic) | (before.pull != after.pull)
     loss = d._impl.efc_frictionloss / d._impl.efc_D
     return (jnp.where(wrong, abs(abs(_gap(d, acceleration)) - loss), 0.0) * dt).max(initial=0.0)
 
 
 def answer(m: Any, d: Any, jacobian: jax.Array, rows: jax.Array, active: Active) -> Answer:
-    """`jacobian` `[3k, nv]` of the patches' twists, `rows` `[k, nefc]` 1 where a row is one of their contacts.
+    """Return the response to wrenches from the Jacobian `[3k, nv]` of the twists; `rows` `[k, nefc]` are 1 for a
+    patch's contacts.
 
     `qfrc_smooth` in the data is without wrenches.
     """
@@ -101,17 +102,17 @@ def answer(m: Any, d: Any, jacobian: jax.Array, rows: jax.Array, active: Active)
 
 
 def integrate(m: Any, d: Any) -> Any:
-    """The integrator of the model, once the accelerations are there."""
+    """Run the integrator of the model on known accelerations."""
     return mjx.euler(m, d) if m.opt.integrator == mjx.IntegratorType.EULER else mjx.implicit(m, d)
 
 
 def _gained(m: Any, d: Any, inertia: jax.Array, acceleration: jax.Array) -> jax.Array:
-    """What the integrator makes of an acceleration: the velocity that it gains in a step, linear in it."""
+    """Return the velocity that the integrator gains in a step from an acceleration, which is linear in it."""
     force = inertia @ acceleration
     d = d.replace(qacc=acceleration, qfrc_smooth=force, qfrc_constraint=jnp.zeros_like(force))
     return integrate(m, d).qvel - d.qvel
 
 
 def _gap(d: Any, acceleration: jax.Array) -> jax.Array:
-    """Of rows, how far accelerations are above those at which they are without force."""
+    """Return the excess of the acceleration of each row over the one at which it has no force."""
     return d._impl.efc_J @ acceleration - d._impl.efc_aref

@@ -30,7 +30,8 @@ _FINE = 0.01
 
 
 def outlines(patch: ContactPatch) -> list[np.ndarray]:
-    """Rims of a patch, closed, `[M, 2]` [m] each: those that its cells were cut from, else those around its cells."""
+    """Return the rims of a patch, closed, `[M, 2]` [m] each: those that its cells were cut from, else those around its
+    cells."""
     import shapely
 
     if patch.outline is not None:
@@ -73,7 +74,7 @@ def draw_patch(
 
 
 def _size(patch: ContactPatch) -> float:
-    """Distance of the furthest cell from the origin [m]."""
+    """Return the distance of the furthest cell from the origin [m]."""
     return float(np.hypot(*patch.positions.T).max() + np.sqrt(patch.areas.max()))
 
 

@@ -36,7 +36,7 @@ class Report(NamedTuple):
     iterations: int
     """Newton iterations, summed over all passes; -1 if the state was not finite, and the step had no friction."""
     passes: int
-    """How many times the step was solved (again after other constraints became active); 0 without contact."""
+    """Number of solutions of the step (again after other constraints became active); 0 without contact."""
     residual: float
     """Residual of the step in contact space [m/s]."""
     converged: bool
@@ -89,28 +89,28 @@ class Friction:
         return d.userdata[first : first + count]
 
     def state(self, d: Any) -> np.ndarray:
-        """State of all patches at the current time of the data, as a view of `userdata`; `coupled.states` gives it its
-        shape."""
+        """Return the state of all patches at the current time of the data, as a view of `userdata`; `coupled.states`
+        gives it its shape."""
         at = self._memory
         stepped = d.time == d.userdata[at.next]
         return self._own(d, at.new if stepped else at.state, self.coupled.state_shape[0])
 
     def wrenches(self, d: Any) -> np.ndarray:
-        """Wrenches of the last step `[k, 3]` [N, N, N m] on the sites' bodies, in the patches' frames; a view of
-        `userdata`."""
+        """Return the wrenches of the last step `[k, 3]` [N, N, N m] on the sites' bodies, in the patches' frames; a
+        view of `userdata`."""
         return self._own(d, self._memory.wrench, 3 * len(self.patches)).reshape(-1, 3)
 
     def twists(self, d: Any) -> np.ndarray:
-        """Twists at the end of the last step `[k, 3]` [m/s, m/s, rad/s] of the bodies of the sites relative to the
-        other bodies."""
+        """Return the twists at the end of the last step `[k, 3]` [m/s, m/s, rad/s] of the bodies of the sites relative
+        to the other bodies."""
         return self._own(d, self._memory.twist, 3 * len(self.patches)).reshape(-1, 3)
 
     def loads(self, d: Any) -> np.ndarray:
-        """Normal forces at the end of the last step `[k]` [N]."""
+        """Return the normal forces at the end of the last step `[k]` [N]."""
         return self._own(d, self._memory.load, len(self.patches))
 
     def report(self, d: Any) -> Report:
-        """Statistics of the last step."""
+        """Return the statistics of the last step."""
         at, u = self._memory, d.userdata
         return Report(int(u[at.iterations]), int(u[at.passes]), float(u[at.residual]), bool(u[at.converged]))
 
@@ -170,7 +170,7 @@ class Friction:
 
     @functools.cached_property
     def _row(self) -> np.ndarray:
-        """What compiled steps know of the model."""
+        """Record of the model for compiled steps."""
         packed, k = self.coupled._packed, len(self.patches)
         problem = self.coupled._blank_problem()
         chosen = [
@@ -205,5 +205,5 @@ class Friction:
 
 @functools.cache
 def _callback() -> Any:
-    """The compiled control callback."""
+    """Return the compiled control callback."""
     return ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(loops.control_address())

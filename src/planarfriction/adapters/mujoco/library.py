@@ -1,7 +1,6 @@
 # pyright: reportAttributeAccessIssue=false
 # (MuJoCo describes few of its names to type checkers.)
-"""Where the installed version of MuJoCo stores things, for compiled steps, taken from its own description of its
-structs."""
+"""Layout of the structs of the installed version of MuJoCo, from its own description, for compiled steps."""
 
 from __future__ import annotations
 
@@ -39,7 +38,7 @@ def _described() -> dict[str, Any]:
 
 
 def _measure(kind: Any) -> tuple[int, int]:
-    """Size and alignment of a field."""
+    """Return the size and alignment of a field."""
     if hasattr(kind, "fields"):
         return _arranged(kind.fields)[1:]
     if hasattr(kind, "extents"):
@@ -54,7 +53,7 @@ def _measure(kind: Any) -> tuple[int, int]:
 
 
 def _arranged(fields: Any) -> _Struct:
-    """Offsets of fields as C compilers lay them out."""
+    """Return the offsets of fields as C compilers lay them out."""
     offsets, end, widest = {}, 0, 1
     for field in fields:
         size, align = _measure(field.type)
@@ -74,7 +73,7 @@ def _chosen(record: Any, offsets: dict[str, int], **others: int) -> Any:
 
 @functools.cache
 def layout() -> dict[str, Any]:
-    """The parts of a `Host` that belong to the library alone.
+    """Return the parts of a `Host` that belong to the library alone.
 
     Raises `FrictionError` for a version whose structs are not as it describes them.
     """

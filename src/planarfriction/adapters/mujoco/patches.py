@@ -1,6 +1,6 @@
 # pyright: reportAttributeAccessIssue=false
 # (MuJoCo describes few of its names to type checkers.)
-"""Which contacts get patch friction, and how a model is prepared for it."""
+"""Choice of contacts with patch friction, and preparation of a model for it."""
 
 from __future__ import annotations
 
@@ -50,12 +50,12 @@ class PatchContact(Checked):
 
 
 def words(patches: Sequence[PatchContact], nv: int) -> int:
-    """Numbers that patches keep in `userdata` (see `mujoco.loops.records.Memory`)."""
+    """Return the numbers that patches keep in `userdata` (see `mujoco.loops.records.Memory`)."""
     return memory(patches, nv, 0).converged + 1
 
 
 def memory(patches: Sequence[PatchContact], nv: int, first: int) -> Memory:
-    """Where in the user data, from word `first` on."""
+    """Return the places in the user data, from word `first` on."""
     states, k = sum(math.prod(patch.model.state_shape) for patch in patches), len(patches)
     sizes = [states, states, 3 * k, 3 * k, 3 * k, k, nv, nv, nv]
     sizes += [1] * (len(Memory._fields) - len(sizes))
@@ -124,7 +124,7 @@ class Placed:
             raise InvalidValueError("timestep", rule, m.opt.timestep)
 
     def contacts(self, d: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Its contacts that are in the solver, and the sign of their normals: 1 into the owner."""
+        """Return its contacts that are in the solver, and the sign of their normals: 1 into the owner."""
         pairs = d.contact.geom
         forward = (pairs[:, 0] == self.other) & (pairs[:, 1] == self.own)
         backward = (pairs[:, 0] == self.own) & (pairs[:, 1] == self.other)
@@ -132,7 +132,7 @@ class Placed:
         return chosen, np.where(forward[chosen], 1.0, -1.0)
 
     def frame(self, d: Any, chosen: np.ndarray, sign: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Origin [3], and axes [3, 3] as rows, of its frame in the world."""
+        """Return origin [3] and axes [3, 3], as rows, of its frame in the world."""
         normal = sign @ d.contact.frame[chosen, :3]
         normal /= np.linalg.norm(normal)
         x = d.site_xmat[self.site].reshape(3, 3)[:, 0]

@@ -46,7 +46,7 @@ def backward(a, n, x, columns):
 
 @kernel
 def multiply(a, n, x, columns, out):
-    """`out = a x`, a [n, n] with zeros, x and out [n, columns]."""
+    """Compute `out = a x`, a [n, n] with zeros, x and out [n, columns]."""
     for i in range(n):
         for c in range(columns):
             out[columns * i + c] = 0.0

@@ -1,4 +1,4 @@
-"""Where the patches of a MuJoCo model are in contact, and how their twists follow its velocities."""
+"""Places of patches in contact in a MuJoCo model, and the Jacobian of their twists."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ class Scratch(NamedTuple):
 
     problem: int
     jacobian: int
-    """Of the twists, [3k, nv]."""
+    """Jacobian of the twists, [3k, nv]."""
     inertia: int
     """[nv, nv]"""
     stiff: int
@@ -23,7 +23,7 @@ class Scratch(NamedTuple):
     answers: int
     """H^-1 J' and, last, the acceleration, [nv, 3k + 1]."""
     held: int
-    """What the integrator makes of these, [nv, 3k + 1]."""
+    """Velocities that the integrator gains from these answers, [nv, 3k + 1]."""
     moves: int
     """[3, nv]"""
     turns: int
@@ -76,7 +76,7 @@ def take(own, d, nefc):
 
 @kernel
 def _collect(own, d, s, nefc):
-    """Owners of constraints, and sums over the contacts of each patch."""
+    """Collect the owners of constraints, and sums over the contacts of each patch."""
     owners, counts, frames = integers(s.owners), integers(s.counts), doubles(s.frames)
     contacts, ncon = integers(d + own.data.contact)[0], integers32(d + own.data.ncon)[0]
     for r in range(nefc):
@@ -105,7 +105,7 @@ def _collect(own, d, s, nefc):
 
 @kernel
 def _across(x, y, z, nx, ny, nz):
-    """The part of a vector across the normal, and its square over that of the vector."""
+    """Return the part of a vector across the normal, and its square over that of the vector."""
     along = x * nx + y * ny + z * nz
     x, y, z = x - along * nx, y - along * ny, z - along * nz
     return x, y, z, x * x + y * y + z * z
@@ -117,7 +117,7 @@ ALONG = 1e-12
 
 @kernel
 def _axes(own, d, frame, site):
-    """The axes of a patch: x along that of its site, across the normal."""
+    """Return the axes of a patch: x along that of its site, across the normal."""
     nx, ny, nz = frame[0], frame[1], frame[2]
     length = math.sqrt(nx * nx + ny * ny + nz * nz)
     nx, ny, nz = nx / length, ny / length, nz / length
@@ -132,7 +132,7 @@ def _axes(own, d, frame, site):
 
 @kernel
 def _rows(own, m, d, s, p):
-    """The three rows of patch p in the Jacobian."""
+    """Write the three rows of patch p into the Jacobian."""
     nv, frame, site = own.nv, doubles(at(s.frames, 6 * p)), integers(own.sites)[p]
     (ax, ay, az), (bx, by, bz), (nx, ny, nz) = _axes(own, d, frame, site)
     centre, rows = at(s.frames, 6 * p + 3), doubles(at(s.jacobian, 3 * nv * p))

@@ -1,4 +1,4 @@
-"""What compiled steps know of MuJoCo: where its structs hold things, its functions, its constants.
+"""Records of MuJoCo for compiled steps: places in its structs, its functions, its constants.
 
 Offsets are in bytes and belong to the version that is installed (`adapters.mujoco.library` finds them).
 """
@@ -11,7 +11,7 @@ from planarfriction.compiler.memory import reader
 
 
 class ModelOffsets(NamedTuple):
-    """Of `mjModel`."""
+    """Offsets of `mjModel`."""
 
     nv: int
     nuserdata: int
@@ -22,7 +22,7 @@ class ModelOffsets(NamedTuple):
 
 
 class DataOffsets(NamedTuple):
-    """Of `mjData`."""
+    """Offsets of `mjData`."""
 
     time: int
     ncon: int
@@ -50,7 +50,7 @@ class DataOffsets(NamedTuple):
 
 
 class SlopeOffsets(NamedTuple):
-    """Of the sparsity of `qDeriv`, in the model or, in older versions, in the data."""
+    """Offsets of the sparsity of `qDeriv`, in the model or, in older versions, in the data."""
 
     in_model: int
     """1 or 0."""
@@ -60,10 +60,10 @@ class SlopeOffsets(NamedTuple):
 
 
 class ContactOffsets(NamedTuple):
-    """Of `mjContact`."""
+    """Offsets of `mjContact`."""
 
     size: int
-    """Of a contact."""
+    """Size of a contact."""
     pos: int
     frame: int
     H: int
@@ -91,7 +91,7 @@ class Functions(NamedTuple):
 
 
 class Constants(NamedTuple):
-    """Of its enumerations."""
+    """Values of MuJoCo's enumerations."""
 
     SATISFIED: int
     QUADRATIC: int
@@ -109,7 +109,7 @@ class Constants(NamedTuple):
 
 
 class Memory(NamedTuple):
-    """Where the user data hold what patches remember from step to step, in words."""
+    """Places in the user data of what patches remember from step to step, in words."""
 
     state: int
     """At `time`."""
@@ -118,7 +118,7 @@ class Memory(NamedTuple):
     guess: int
     """Wrenches at the beginning of the step, [3k]."""
     wrench: int
-    """Of the step, [3k]."""
+    """Wrenches of the step, [3k]."""
     twist: int
     """[3k]"""
     load: int
@@ -148,28 +148,28 @@ class Host(NamedTuple):
     """Patches k."""
     states: int
     words: int
-    """Of a problem in contact space."""
+    """Words of a problem in contact space."""
     problem: int
-    """Where one without inputs is."""
+    """Address of a problem without inputs."""
     patches: int
-    """Where the row of `coupling_rows.Patches` is."""
+    """Address of the row of `coupling_rows.Patches`."""
     solve: int
     """Address of `coupling.solve`."""
     plan: int
     """Address of `step.plan`."""
     sites: int
-    """Where the sites of the patches are, int [k]; so with what follows."""
+    """Address of the sites of the patches, int [k]; the following fields are addresses too."""
     own: int
     """Geoms on the bodies of the sites."""
     other: int
     own_bodies: int
     other_bodies: int
     at_contact: int
-    """Whether the origin is in the middle of the contacts."""
+    """Address of flags: 1 where the origin is in the middle of the contacts."""
     free_count: int
     """Free joints."""
     free_joints: int
-    """Where they are, int [free_count]."""
+    """Address of their first degrees of freedom, int [free_count]."""
     free_dofs: int
     """And where their degrees of freedom begin."""
     inertia: int

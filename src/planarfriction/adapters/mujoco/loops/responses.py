@@ -1,4 +1,4 @@
-"""How MuJoCo's step answers to wrenches on patches, while the set of active constraints holds.
+"""Response of MuJoCo's step to wrenches on patches, while the set of active constraints holds.
 
 `H = M + Jc' D Jc` over the constraint rows in their quadratic range, and `Jc' C Jc` over elliptic contacts that slide
 (C is the Hessian of their cone); `X = H^-1 J'`. The integrator goes on by `v + dt Mh^-1 M qacc` with its own metric Mh:
@@ -19,13 +19,13 @@ MISFIT = 3e-9
 
 @kernel
 def is_sparse(own, m):
-    """Whether Jacobians of constraints are."""
+    """Return True if the Jacobian of the constraints is sparse."""
     return call_c(own.functions.mj_isSparse, (m,)) & 0xFFFFFFFF != 0
 
 
 @kernel
 def row_of(own, d, sparse, r):
-    """Row r of the constraints' Jacobian: how many numbers, where they and their columns are."""
+    """Return row r of the constraints' Jacobian: the count of its numbers, and the addresses of numbers and columns."""
     if sparse:
         first = integers32(integers(d + own.data.efc_J_rowadr)[0])[r]
         count = integers32(integers(d + own.data.efc_J_rownnz)[0])[r]
@@ -35,13 +35,13 @@ def row_of(own, d, sparse, r):
 
 @kernel
 def column(columns, i):
-    """Column of number i of a row."""
+    """Return the column of number i of a row."""
     return integers32(columns)[i] if columns != 0 else i
 
 
 @kernel
 def row_times(own, d, sparse, r, x):
-    """Row r of the constraints' Jacobian, times a vector."""
+    """Return row r of the constraints' Jacobian times a vector."""
     count, numbers, columns = row_of(own, d, sparse, r)
     total = 0.0
     for i in range(count):
@@ -90,7 +90,7 @@ def _add_cones(own, d, sparse, h):
 
 @kernel
 def _stiff(own, m, d, s, sparse, nefc):
-    """M, and H."""
+    """Write M, and H."""
     if own.inertia >= 0:
         call_c(own.functions.mj_fullM, (m, s.inertia, integers(d + own.inertia)[0]))
     else:
@@ -110,7 +110,7 @@ def _stiff(own, m, d, s, sparse, nefc):
 
 @kernel
 def _has_metric(own, m):
-    """Whether the integrator has another metric than M."""
+    """Return True if the integrator has another metric than M."""
     integrator, damping = integers32(m + own.model.integrator)[0], doubles(integers(m + own.model.dof_damping)[0])
     if integrator != own.constants.EULER:
         return True
@@ -123,7 +123,7 @@ def _has_metric(own, m):
 
 @kernel
 def _free_metric(own, m, d, s, metric, dt):
-    """Newer versions turn free bodies by their whole derivatives, gyroscopic ones too."""
+    """Add the derivatives of free bodies, which newer versions turn by all of them, gyroscopic ones too."""
     for f in range(own.free_count):
         joint, first = integers(own.free_joints)[f], integers(own.free_dofs)[f]
         if call_c(own.functions.mjd_freeMhat, (m, d, joint, dt, s.block, 0)) & 0xFFFFFFFF != 0:
@@ -165,7 +165,7 @@ def _metric(own, m, d, s):
 
 @kernel
 def _loads(own, d, s, sparse, nefc):
-    """Loads, and their answers, into the problem."""
+    """Write loads and their responses into the problem."""
     host, row, k, columns = own.host, own.row, own.host.count, 3 * own.host.count + 1
     load, answers = doubles(at(s.problem, row.free_load)), doubles(at(s.problem, row.load_response))
     for p in range(k):
@@ -231,7 +231,8 @@ def respond(own, m, d, s, sparse, nefc):
 
 @kernel
 def leaves_range(own, m, d, s, sparse, nefc):
-    """Whether a constraint leaves its range through the acceleration `more`, so that what was solved does not hold."""
+    """Return True if the acceleration `more` takes a constraint out of its range, so that the solution does not
+    hold."""
     kinds, states = integers32(integers(d + own.data.efc_type)[0]), integers32(integers(d + own.data.efc_state)[0])
     inverse, more = doubles(integers(d + own.data.efc_R)[0]), doubles(s.more)
     loss, dt, e = doubles(integers(d + own.data.efc_frictionloss)[0]), doubles(m + own.model.timestep)[0], own.constants

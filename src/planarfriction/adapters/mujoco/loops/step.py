@@ -23,16 +23,16 @@ from planarfriction.kernels.coupling_rows import Offsets
 from planarfriction.kernels.coupling_rows import read as read_patches
 
 PASSES = 10
-"""How often a step is solved anew where other constraints have become active through it."""
+"""Largest number of solutions of a step, again after it has activated other constraints."""
 
 SHORTENINGS = 4
-"""How often the way to a solution is shortened that would go too far, which others prevent, before the next one."""
+"""Largest number of times that the displacement to a solution is shortened before the next solution is sought."""
 
 DOWNHILL = 0.5
-"""How far beyond the root along this way it may end, as a share of the slope at its start."""
+"""Excess beyond the root along the displacement that is accepted, as a share of the slope at its start."""
 
 INSTALLED, _installed = shared_word("planarfriction_mujoco")
-"""Where the `Host` is whose model the callback serves, 0 without one."""
+"""Address of the `Host` whose model the callback serves, 0 without one."""
 
 
 class _Own(NamedTuple):
@@ -110,7 +110,7 @@ def _accelerate(own, m, d):
 
 @kernel
 def _add(own, d, s, problem):
-    """The acceleration that the change of wrenches adds, and where the solver starts next."""
+    """Write the acceleration that the change of wrenches adds, and the start of the solver's next run."""
     host, n = own.host, 3 * own.host.count
     more, answers = doubles(s.more), doubles(s.answers)
     acceleration = doubles(integers(d + host.data.qacc)[0])
@@ -125,7 +125,8 @@ def _add(own, d, s, problem):
 
 @kernel
 def _slope(own, patches, s):
-    """`move . (w(V, N) - W)` at the twists, loads and wrenches of the host: positive before the root, then negative."""
+    """Return `move . (w(V, N) - W)` at the twists, loads and wrenches of the host: positive before the root, then
+    negative."""
     problem, row, n = doubles(s.problem), own.row, 3 * own.host.count
     _copy(doubles(at(s.problem, row.free_twist)), doubles(at(s.problem, row.twist)), n)
     _copy(doubles(at(s.problem, row.free_load)), doubles(at(s.problem, row.load)), own.host.count)
@@ -148,7 +149,7 @@ def _set_out(own, s):
 
 @kernel
 def _begin(own, s, far):
-    """The next guess: so far on this way."""
+    """Write the next guess: this share of the displacement."""
     for i in range(3 * own.host.count):
         begin, end = doubles(s.start)[i], doubles(s.goal)[i]
         guess = end if far == 1.0 else begin + far * (end - begin)
@@ -158,7 +159,7 @@ def _begin(own, s, far):
 
 @kernel
 def _solve(own, m, d, u, s, nefc):
-    """Wrenches that fit the step, into the problem and into the passive forces. Iterations, and passes."""
+    """Solve for wrenches that fit the step, into the problem and the passive forces; return iterations and passes."""
     host, row, sparse, patches = own.host, own.row, is_sparse(own.host, m), read_patches(own.host.patches)
     problem, n = doubles(s.problem), 3 * own.host.count
     iterations, passes, shortenings, first, far = 0.0, 0, 0, 0.0, 1.0
@@ -193,7 +194,7 @@ def _solve(own, m, d, u, s, nefc):
 
 @kernel
 def _forget(host, d, u):
-    """No patch is in contact."""
+    """Clear the memory: no patch is in contact."""
     memory, k = host.memory, host.count
     _clear(doubles(at(u, memory.new)), host.states)
     _clear(doubles(at(u, memory.wrench)), 3 * k)
@@ -207,7 +208,7 @@ def _forget(host, d, u):
 
 @kernel
 def _remember(own, u, s, iterations, passes):
-    """What the step has come to."""
+    """Store the result of the step in the user data."""
     host, row, memory, words = own.host, own.row, own.host.memory, doubles(u)
     problem, n, valid = doubles(s.problem), 3 * own.host.count, iterations >= 0.0
     _copy(doubles(at(s.problem, row.wrench)), doubles(at(u, memory.wrench)), n)
@@ -253,7 +254,7 @@ def plan(place_of_host, m, d):
 
 @callback
 def control(m, d):
-    """For `mjcb_control`: plan the steps of the installed model, and of its copies."""
+    """Plan, as `mjcb_control`, the steps of the installed model and of its copies."""
     place_of_host = _installed()
     if place_of_host == 0:
         return
@@ -265,17 +266,17 @@ def control(m, d):
 
 @jit
 def plan_step(host, m, d):
-    """`plan` from Python: the row of a `Host`, addresses of model and data."""
+    """Call `plan` from Python with the row of a `Host` and the addresses of model and data."""
     call(read(host).plan, (address(host, 0), m, d))
 
 
 def plan_address() -> int:
-    """Where `plan` is in this process."""
+    """Return the address of `plan` in this process."""
     return address_of(plan, "ppp")
 
 
 def control_address() -> int:
-    """Where C code calls `control`."""
+    """Return the address at which C code calls `control`."""
     return c_address_of(control, 2)
 
 
