@@ -106,23 +106,23 @@ def test_the_way_of_a_contact_is_that_of_its_twist(mounted_on, moves):
         vy=1.5 * arm * np.cos(turn),
         omega=1.5 + 0.0 * time,
     )
-    from planarfriction.plots.track import _ways, contact_poses
+    from planarfriction.plots.track import _displacements, contact_poses
 
     poses = np.stack([np.asarray(run.data[name]) for name in ("x", "y", "theta")], -1)
     for contact in run.scene.contacts:
-        ways = _ways(contact, time, poses, contact_poses(contact, time, poses))
+        displacements = _displacements(contact, time, poses, contact_poses(contact, time, poses))
         twists = run.contact_twist(contact.name)
-        assert ways / 0.01 == pytest.approx(0.5 * (twists[1:] + twists[:-1]), abs=1e-4)
+        assert displacements / 0.01 == pytest.approx(0.5 * (twists[1:] + twists[:-1]), abs=1e-4)
 
 
 # ---------------------------------------------------------------------- which cells slip
 
 
-def field(ways: np.ndarray, cells: int = 21):
+def field(displacements: np.ndarray, cells: int = 21):
     model = bristles_of(pf.ReducedModel(pf.ContactPatch.disc(0.01, cells), LAW))
-    times, loads = 0.01 * np.arange(len(ways) + 1), np.full(len(ways) + 1, 2.0)
+    times, loads = 0.01 * np.arange(len(displacements) + 1), np.full(len(displacements) + 1, 2.0)
     return model.patch, slip_field(
-        model, model.rest(), times, np.asarray(ways), loads, np.arange(len(times)), np.zeros(3)
+        model, model.rest(), times, np.asarray(displacements), loads, np.arange(len(times)), np.zeros(3)
     )
 
 
@@ -146,8 +146,8 @@ def test_a_patch_that_turns_slips_outside_and_sticks_inside():
 @pytest.mark.parametrize("speed", [0.0, 1e-2])
 def test_at_first_slips_what_moves(speed):
     model = bristles_of(pf.ReducedModel(pf.ContactPatch.disc(0.01, 5), LAW))
-    ways, twist = np.full((2, 3), [1e-3, 0.0, 0.0]), np.array([speed, 0.0, 0.0])
-    _, slips = slip_field(model, model.rest(), np.arange(3.0), ways, np.full(3, 2.0), np.arange(3), twist)
+    displacements, twist = np.full((2, 3), [1e-3, 0.0, 0.0]), np.array([speed, 0.0, 0.0])
+    _, slips = slip_field(model, model.rest(), np.arange(3.0), displacements, np.full(3, 2.0), np.arange(3), twist)
     assert slips[1:].all()
     assert slips[0].all() == (speed > 0.0)
 

@@ -187,11 +187,11 @@ def _relative(start: np.ndarray, goal: np.ndarray) -> np.ndarray:
     return np.array([c * x + s * y, c * y - s * x, angle])
 
 
-def _moved(pose: np.ndarray, twist: np.ndarray, way: float) -> np.ndarray:
+def _moved(pose: np.ndarray, twist: np.ndarray, distance: float) -> np.ndarray:
     """Return a pose after a twist of its own axes has been held: an arc."""
     vx, vy, omega = twist.tolist()
-    half, (x, y, angle) = 0.5 * way * omega, pose.tolist()
-    chord = way * (math.sin(half) / half if abs(half) > 1e-12 else 1.0)
+    half, (x, y, angle) = 0.5 * distance * omega, pose.tolist()
+    chord = distance * (math.sin(half) / half if abs(half) > 1e-12 else 1.0)
     c, s = chord * math.cos(angle + half), chord * math.sin(angle + half)
     return np.array([x + c * vx - s * vy, y + s * vx + c * vy, angle + 2.0 * half])
 
@@ -215,8 +215,8 @@ def _shortest(
 
     def miss(x: np.ndarray) -> np.ndarray:
         pose = np.zeros(3)
-        for twist, way in zip(twists(x[:PARTS]), x[PARTS:], strict=True):
-            pose = _moved(pose, twist, unit * way)
+        for twist, distance in zip(twists(x[:PARTS]), x[PARTS:], strict=True):
+            pose = _moved(pose, twist, unit * distance)
         return (pose - goal) / [unit, unit, 1.0]
 
     def length(x: np.ndarray) -> float:
@@ -242,15 +242,15 @@ def _shortest(
 def _path(slider: Slider, place: Place, x: np.ndarray, start: np.ndarray) -> Signal:
     """Return the path of the pusher at unit speed, as lines."""
     pose, now, times, at = start, 0.0, [], []
-    for angle, way in zip(x[:PARTS], slider.size * x[PARTS:], strict=True):
-        if way < 1e-9:
+    for angle, distance in zip(x[:PARTS], slider.size * x[PARTS:], strict=True):
+        if distance < 1e-9:
             continue
         twist = _twist(slider, place, angle)
         for share in np.linspace(0.0, 1.0, CHORDS + 1)[0 if not times else 1 :]:
-            here = _moved(pose, twist, share * way)
+            here = _moved(pose, twist, share * distance)
             c, s = math.cos(here[2]), math.sin(here[2])
             arm = np.array([c * place.at[0] - s * place.at[1], s * place.at[0] + c * place.at[1]])
             at.append(here[:2] + arm)
-            times.append(now + share * way)
-        pose, now = _moved(pose, twist, way), now + way
+            times.append(now + share * distance)
+        pose, now = _moved(pose, twist, distance), now + distance
     return Signal.sampled(times, at, "linear")

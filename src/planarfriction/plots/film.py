@@ -154,11 +154,11 @@ class Film:
 
     def _moved(self, frame: int) -> str:
         """Return the distance that the body has moved, in units that fit the whole motion."""
-        way = self.track.poses - self.track.poses[0]
+        moved = self.track.poses - self.track.poses[0]
         parts = []
         for words, kind, column in (("moved by x", "length", 0), ("y", "length", 1), ("turned by", "angle", 2)):
-            unit = style.unit_for(kind, way[:, column])
-            parts.append(f"{words} {round(unit.factor * way[frame, column], 2) + 0.0:.2f} {unit.label}")  # no -0.00
+            unit = style.unit_for(kind, moved[:, column])
+            parts.append(f"{words} {round(unit.factor * moved[frame, column], 2) + 0.0:.2f} {unit.label}")  # no -0.00
         return ", ".join(parts)
 
 

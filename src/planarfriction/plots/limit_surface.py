@@ -133,8 +133,8 @@ def even_mesh(surface: Any) -> tuple[np.ndarray, np.ndarray]:
 
 def _evened(angles: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """Return as many angles, by half spread evenly along the `steps` between them and by half as they are."""
-    way = np.concatenate([[0.0], np.cumsum(steps / steps.sum() + np.diff(angles) / (angles[-1] - angles[0]))])
-    return np.interp(np.linspace(0.0, way[-1], len(angles)), way, angles)
+    place = np.concatenate([[0.0], np.cumsum(steps / steps.sum() + np.diff(angles) / (angles[-1] - angles[0]))])
+    return np.interp(np.linspace(0.0, place[-1], len(angles)), place, angles)
 
 
 def scaled_samples(surface: Any, polar: np.ndarray, azimuth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -114,8 +114,8 @@ def _remark(strobe: _Strobe) -> str:
     """Return a remark on what the drawing does not show: that the body is drawn larger, or how little it moves."""
     if strobe.larger > 1.0:
         return f"body drawn {strobe.larger:g} times as large"
-    way = strobe.path - strobe.path[0]
-    length, angle = float(np.hypot(way[:, 0], way[:, 1]).max()), float(np.abs(way[:, 2]).max())
+    moved = strobe.path - strobe.path[0]
+    length, angle = float(np.hypot(moved[:, 0], moved[:, 1]).max()), float(np.abs(moved[:, 2]).max())
     if max(length, angle * _reach(strobe.solution)) > UNSEEN * _reach(strobe.solution):
         return ""
     if length == angle == 0.0:

@@ -92,9 +92,9 @@ def _pressure(patch: ContactPatch, weights: np.ndarray) -> style.PlotFigure:
 
 
 def _section(surface: LimitSurface) -> style.PlotFigure:
-    way = np.linspace(0.0, 2.0 * np.pi, _DIRECTIONS + 1)
+    angle = np.linspace(0.0, 2.0 * np.pi, _DIRECTIONS + 1)
     radius, centre = surface.contact_radius, surface.centre_of_pressure
-    about_centre = np.stack([np.cos(way), np.zeros_like(way), np.sin(way) / radius], -1)
+    about_centre = np.stack([np.cos(angle), np.zeros_like(angle), np.sin(angle) / radius], -1)
     wrenches = geometry.wrench_at(surface.wrench(geometry.twist_at(about_centre, -centre)), centre)
     figure = style.new_figure(1.5, 1.5)
     axes = figure.add_subplot()

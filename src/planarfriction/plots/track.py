@@ -88,7 +88,7 @@ def track_of(solution: Solution, times: np.ndarray) -> Track:
         at = contact_poses(contact, steps, poses)
         loads = _values(solution, "normal_force", sampled, steps, index)
         against = _between(times, sampled, solution.contact_twist(contact.name))
-        slip = first and slip_field(*first, steps, _ways(contact, steps, poses, at), loads, frames, against[0])
+        slip = first and slip_field(*first, steps, _displacements(contact, steps, poses, at), loads, frames, against[0])
         wrenches = _between(times, sampled, _without_kick(solution, index))
         contacts.append(ContactTrack(contact, index, at[frames], against, wrenches, loads[frames], slip))
     return Track(times, poses[frames], twists, contacts)
@@ -128,16 +128,16 @@ def _carried(contact: Contact, times: np.ndarray) -> np.ndarray:
     )
 
 
-def _ways(contact: Contact, times: np.ndarray, poses: np.ndarray, at: np.ndarray) -> np.ndarray:
+def _displacements(contact: Contact, times: np.ndarray, poses: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Return the displacement of the body on a contact between instants, in the frame of the contact `[T - 1, 3]`.
 
     That of the material of the body at the origin of the frame, half-way: of second order in the turn of a step.
     """
     body, middle = np.diff(poses, axis=0), 0.5 * (at[1:] + at[:-1])
-    ways = geometry.twist_at(body, middle[:, :2] - 0.5 * (poses[1:, :2] + poses[:-1, :2]))
+    moved = geometry.twist_at(body, middle[:, :2] - 0.5 * (poses[1:, :2] + poses[:-1, :2]))
     ground = np.diff(_carried(contact, times), axis=0)  # of a pad at its frame, of the ground at the world's origin
-    ways = ways - (geometry.twist_at(ground, middle[:, :2]) if contact.mounted_on == "body" else ground)
-    return geometry.rotate(ways, -middle[:, 2])
+    moved = moved - (geometry.twist_at(ground, middle[:, :2]) if contact.mounted_on == "body" else ground)
+    return geometry.rotate(moved, -middle[:, 2])
 
 
 def _poses(solution: Solution, sampled: np.ndarray, times: np.ndarray) -> np.ndarray:

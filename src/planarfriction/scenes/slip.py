@@ -65,11 +65,11 @@ def _events(solution: Solution, contact: Any) -> list[SlipEvent]:
     share = slip_fraction(contact.model, states, twists, loads)
     points = centres(contact.model.patch, loads)
     speed = np.hypot(twists[:, 0] - twists[:, 2] * points[:, 1], twists[:, 1] + twists[:, 2] * points[:, 0])
-    way, turn = _integral(time, speed), _integral(time, twists[:, 2])
+    distance, turn = _integral(time, speed), _integral(time, twists[:, 2])
     radius, least = reach(contact.model.patch), contact.model.law.largest_deflection
     events = []
     for onset, end in _stretches(time, share - SLIPS):
-        path, angle = (float(np.diff(np.interp([onset, end], time, each))[0]) for each in (way, turn))
+        path, angle = (float(np.diff(np.interp([onset, end], time, each))[0]) for each in (distance, turn))
         if path + radius * abs(angle) > least:  # less than bristles give way by is none
             events.append(SlipEvent(contact.name, onset, end, path, angle))
     return events
@@ -148,36 +148,36 @@ def slip_field(
     bristles: DistributedModel,
     state: np.ndarray,
     times: np.ndarray,
-    ways: np.ndarray,
+    displacements: np.ndarray,
     loads: np.ndarray,
     frames: np.ndarray,
     first: np.ndarray,
 ) -> SlipField:
     """Compute the slip field of a contact at `frames` (indices into `times`) from the bristles `state` `[2, N]` [m].
 
-    `ways` `[T - 1, 3]` [m, m, rad] are the displacements of the body on the contact from one of `times` `[T]` [s] to
-    the next, in the frame of the contact; `loads` are `[T]` [N]; `first` `[3]` is the first twist [m/s, m/s, rad/s]. A
+    `displacements` `[T - 1, 3]` [m, m, rad] are those of the body on the contact from one of `times` `[T]` [s] to the
+    next, in the frame of the contact; `loads` are `[T]` [N]; `first` `[3]` is the first twist [m/s, m/s, rad/s]. A
     cell displaced by `u` while its bristle goes from z_0 to z_1 slips by `u - (z_1 - z_0)`.
     """
     law, count, largest = bristles.law.numbers, len(bristles.patch.positions), bristles.law.largest_deflection
     levers, lean = bristles.patch.levers(), bristles.patch.asymmetries().T
     bent, slips = np.zeros((len(frames), count)), np.zeros((len(frames), count), dtype=bool)
-    way, slip, frame = np.zeros(count), np.zeros(count), 1
+    distance, slip, frame = np.zeros(count), np.zeros(count), 1
     bent[0] = _bent(state, levers @ first, lean, law)
-    for k, (step, dt) in enumerate(zip(ways, np.diff(times), strict=True)):
+    for k, (step, dt) in enumerate(zip(displacements, np.diff(times), strict=True)):
         if not dt > 0.0:
             continue
         before = state
         state, _ = bristles.step(state, step / dt, max(0.5 * (loads[k] + loads[k + 1]), 0.0), dt)
         moved = (levers @ step).T
         length = np.hypot(*moved)
-        way += length
+        distance += length
         slip += np.hypot(*(moved - (state - before)))
         if frame < len(frames) and k + 1 == frames[frame]:
             bent[frame] = _bent(state, moved.T / dt, lean, law)
-            slips[frame] = (slip > SLIPS * way) & (way > AT_REST * largest)
-            way[:], slip[:], frame = 0.0, 0.0, frame + 1
-    if len(frames) > 1:  # what moves at first has no way behind it, and does as right after it
+            slips[frame] = (slip > SLIPS * distance) & (distance > AT_REST * largest)
+            distance[:], slip[:], frame = 0.0, 0.0, frame + 1
+    if len(frames) > 1:  # at first no distance is known: as right after it
         span = times[frames[1]] - times[frames[0]]
         slips[0] = slips[1] & (np.hypot(*(levers @ first).T) * span > AT_REST * largest)
     return SlipField(bent, slips)

@@ -128,10 +128,10 @@ class Solution:
         (dx, dy), angle = chosen.position, chosen.angle + 0.0 * theta
         if chosen.support_velocity is not None:
             time = np.asarray(self.histories["time"].values)
-            moves, way = chosen.support_velocity.left(time).T, displacement(chosen.support_velocity, time).T
+            moves, shift = chosen.support_velocity.left(time).T, displacement(chosen.support_velocity, time).T
             to = np.zeros(2)
             if chosen.mounted_on == "world":
-                dx, dy, angle = dx + way[0], dy + way[1], angle + way[2]
+                dx, dy, angle = dx + shift[0], dy + shift[1], angle + shift[2]
                 to = dx, dy
             vx, vy = vx - moves[0] + moves[2] * (y - to[1]), vy - moves[1] - moves[2] * (x - to[0])
             omega = omega - moves[2]

@@ -120,13 +120,13 @@ class _Cells(NamedTuple):
     def bent(self, motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the deflections `[n, 2]` after a small motion of the body `[3]`, and their slopes `[n, 2, 2]` by the
         stretch."""
-        way = self.levers @ motion - self.middle
-        length = np.hypot(*way.T)
+        shift = self.levers @ motion - self.middle
+        length = np.hypot(*shift.T)
         over = length > self.largest
         share = np.where(over, self.largest, 1.0) / np.where(over, length, 1.0)
-        along = way / np.where(length > 0.0, length, 1.0)[:, None]
+        along = shift / np.where(length > 0.0, length, 1.0)[:, None]
         slope = share[:, None, None] * (np.eye(2) - over[:, None, None] * along[:, :, None] * along[:, None, :])
-        return self.middle + share[:, None] * way, slope
+        return self.middle + share[:, None] * shift, slope
 
     def load(self, deflections: np.ndarray) -> np.ndarray:
         """Return the load on the body `[3]` that deflections `[n, 2]` hold."""
@@ -203,9 +203,9 @@ def _bent_to_the_end(cells: _Cells, pull: np.ndarray, motion: np.ndarray, scale:
 
     def energy(x: np.ndarray) -> float:
         d = unit * scale * x
-        way = cells.levers @ d
-        out = way - cells.bent(d)[0]
-        stored = 0.5 * (cells.stiffness * (way**2 - out**2).sum(axis=1)).sum()
+        shift = cells.levers @ d
+        out = shift - cells.bent(d)[0]
+        stored = 0.5 * (cells.stiffness * (shift**2 - out**2).sum(axis=1)).sum()
         return (stored - pull @ d) / unit**2
 
     def slope(x: np.ndarray) -> np.ndarray:
@@ -228,6 +228,6 @@ def _bent_to_the_end(cells: _Cells, pull: np.ndarray, motion: np.ndarray, scale:
 def _held(cells: _Cells, pull: np.ndarray, motion: np.ndarray) -> float | None:
     """Return a bound below 1 on the share of the load that friction holds, from a motion that proves it; None without
     one."""
-    way, power = cells.levers @ motion, float(pull @ motion)
-    most = (cells.stiffness * (cells.largest * np.hypot(*way.T) + (cells.middle * way).sum(axis=1))).sum()
+    shift, power = cells.levers @ motion, float(pull @ motion)
+    most = (cells.stiffness * (cells.largest * np.hypot(*shift.T) + (cells.middle * shift).sum(axis=1))).sum()
     return float(most / power) if 0.0 <= most < power else None
