@@ -61,7 +61,7 @@ def callables(where: str) -> Iterator[Public]:
             yield Public(name, value, value.__doc__ or "")
             continue
         if dataclasses.is_dataclass(value):
-            own = [each for each in dataclasses.fields(value) if each.name in value.__dict__.get("__annotations__", {})]
+            own = [each for each in dataclasses.fields(value) if each.name in inspect.get_annotations(value)]
             checks = [each.metadata["check"][0] for each in own if "check" in each.metadata]
             yield from (Public(name, check, value.__doc__ or "", value) for check in checks)
         for attribute, member in vars(value).items():

@@ -96,7 +96,7 @@ class Friction:
         self._fixed = _Fixed(places(placed), which, shapes, radius, at, m.nuserdata)
 
     def replace(self, models: Sequence[FrictionPytree]) -> Self:
-        """The same patches with other models, which must be of the same kinds in the same order.
+        """Return the same patches with other models, which must be of the same kinds in the same order.
 
         Raises InvalidValueError for models of other kinds.
         """
@@ -285,7 +285,7 @@ def _refuse_precision(given: str) -> None:
 
 
 def _in_jax(model: models.FrictionModel) -> FrictionPytree:
-    """The model of JAX that a model of NumPy is."""
+    """Return the JAX form of a model of NumPy."""
     if model.depends_on_load:
         rule = "have a shape that does not change with the load: models of JAX keep theirs"
         raise InvalidValueError("model", rule, type(model).__name__)
