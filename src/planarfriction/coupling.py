@@ -272,7 +272,7 @@ class CoupledPatches(ByValue):
         return np.cumsum([0, *(math.prod(model.state_shape) for model in self.models)])
 
     @functools.cached_property
-    def _packed(self) -> _Packed:
+    def _packed(self) -> _PackedPatches:
         return _packed(self.models, self._bounds)
 
     @property
@@ -280,7 +280,7 @@ class CoupledPatches(ByValue):
         return self._packed.parts
 
 
-class _Packed(NamedTuple):
+class _PackedPatches(NamedTuple):
     """Patches as compiled code sees them."""
 
     row: np.ndarray
@@ -299,7 +299,7 @@ class _Packed(NamedTuple):
     """Objects behind the addresses, which have to be kept alive."""
 
 
-def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _Packed:
+def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _PackedPatches:
     counts = [model.compiled.parts for model in models]
     ends = np.cumsum([0, *counts]).tolist()
     pieces = [slice(*each) for each in itertools.pairwise(ends)]

@@ -220,7 +220,7 @@ def in_operations(patches):
     @jax.jit
     @jax.vmap
     def solve(states, twist, load, response, load_response, guess, dt):
-        host = newton.Host(twist - response @ guess, load - load_response @ guess, response, load_response)
+        host = newton.HostResponse(twist - response @ guess, load - load_response @ guess, response, load_response)
 
         def unit(twists):
             each = zip(models, states, twists, strict=True)
@@ -280,7 +280,7 @@ def test_derivatives_of_the_step_in_contact_space_are_differences():
         def unit(twists):
             return own.step(jnp.full((1, *own.rest().shape), 1e-7), twists, 1.0, 1e-3)[1]
 
-        return unit, newton.Host(twist, load, share * response, share * load_response)
+        return unit, newton.HostResponse(twist, load, share * response, share * load_response)
 
     @jax.jit
     @jax.value_and_grad

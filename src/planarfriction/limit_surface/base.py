@@ -18,7 +18,7 @@ from planarfriction.geometry import transformed
 from planarfriction.kernels import surfaces as kernels
 from planarfriction.limit_surface.cell_metrics import scaled_levers
 from planarfriction.limit_surface.least_dissipation import across, descend, table_of
-from planarfriction.limit_surface.loops.twists import Table, table_twists
+from planarfriction.limit_surface.loops.twists import StoredPotential, table_twists
 from planarfriction.patch import ContactPatch
 from planarfriction.patch.metric import refuse_anisotropy, refuse_cell_metrics, symmetric_root
 from planarfriction.pictures import picture
@@ -280,7 +280,7 @@ class LimitSurface(ByValue):
         return np.concatenate([-back.T.ravel(), back.ravel(), np.zeros(3) if self._lean is None else self._lean])
 
     @functools.cached_property
-    def _table(self) -> Table:
+    def _table(self) -> StoredPotential:
         """The stored surface, from which searches for twists start."""
         return table_of(self)
 

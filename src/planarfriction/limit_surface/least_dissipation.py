@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from planarfriction.kernels import surfaces
-from planarfriction.limit_surface.loops.twists import Table
+from planarfriction.limit_surface.loops.twists import StoredPotential
 
 if TYPE_CHECKING:
     from planarfriction.limit_surface.base import LimitSurface
@@ -22,7 +22,7 @@ _MOST_STEPS = 60
 """Newton steps; a few are usual from the table's answer."""
 
 
-def table_of(surface: LimitSurface) -> Table:
+def table_of(surface: LimitSurface) -> StoredPotential:
     """Return the stored potential of a surface, and its directions over their dissipation."""
     _, size, data = surface.numbers
     angle = 0.5 * np.pi / size * np.arange(4 * size)
@@ -36,7 +36,7 @@ def table_of(surface: LimitSurface) -> Table:
     surfaces.sliding_batch(surfaces.POTENTIAL, data, 0, size, flat, h)
     power = np.einsum("ni,ni->n", h if lean is None else h + lean, flat).reshape(units.shape[1:])
     duals = np.divide(units, power, out=np.zeros_like(units), where=power > 0.0)
-    return Table(data, size, duals, -1.0 if lean is None else 1.0)
+    return StoredPotential(data, size, duals, -1.0 if lean is None else 1.0)
 
 
 def descend(surface: LimitSurface, wrenches: np.ndarray, twists: np.ndarray) -> float:

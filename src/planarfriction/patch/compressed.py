@@ -94,7 +94,7 @@ def compressed(
     chosen = np.arange(0, len(weights), CHOSEN_EVERY)
     for index in [*chosen, *np.setdiff1d(np.arange(len(weights)), chosen)]:
         favoured = np.any(found > 0.0, axis=0)
-        problem = _Problem.of(patch.positions, weights[index], degree)
+        problem = _WeightProblem.of(patch.positions, weights[index], degree)
         refit = None if index in chosen else problem.refit(favoured)
         if refit is None:
             refit = problem.solution(most, favoured)
@@ -167,7 +167,7 @@ def _few(patch: ContactPatch, weights: np.ndarray, nodes: np.ndarray | None) -> 
 # ---------------------------------------------------------------------- one set of weights
 
 
-class _Problem(NamedTuple):
+class _WeightProblem(NamedTuple):
     """Constraints on the weights of a compressed patch, over the C cells that may be chosen (`cells`) out of N."""
 
     every: int
@@ -182,7 +182,7 @@ class _Problem(NamedTuple):
     surface_wanted: np.ndarray
 
     @classmethod
-    def of(cls, positions: np.ndarray, weights: np.ndarray, degree: int) -> _Problem:
+    def of(cls, positions: np.ndarray, weights: np.ndarray, degree: int) -> _WeightProblem:
         """Return the problem of compressing `weights` `[N]` at `positions` `[N, 2]`."""
         loaded = np.flatnonzero(weights > 0.0)
         scaled, twists = rows.scaled_positions(positions[loaded], weights[loaded]), rows.directions(DIRECTIONS)

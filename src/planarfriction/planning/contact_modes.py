@@ -30,8 +30,8 @@ _EDGE = 1.0 - 1e-9
 """Share of its half width from which on a face is pressed at its end, as far as rounding can say."""
 
 
-class Place(NamedTuple):
-    """Place at which a slider is touched, in its own axes."""
+class TouchPoint(NamedTuple):
+    """Point at which a slider is touched, in its own axes."""
 
     at: np.ndarray
     """`[2]` [m]"""
@@ -41,7 +41,7 @@ class Place(NamedTuple):
     """Width of a face that lies flush [m]; `at` is its middle."""
 
 
-class Motion(NamedTuple):
+class SliderMotion(NamedTuple):
     """Motion of a slider."""
 
     twist: np.ndarray
@@ -72,11 +72,13 @@ def motion_cone(surface: LimitSurface, at: ArrayLike, normal: ArrayLike, mu: flo
     at, normal = validation.vector("at", at, 2), validation.vector("normal", normal, 2)
     length = validation.positive("length of normal", float(np.hypot(*normal)))
     angle = math.atan(validation.non_negative("mu", mu))
-    found = [pushed_by(surface, Place(at, normal / length), each)[1] for each in (-angle, angle)]
+    found = [pushed_by(surface, TouchPoint(at, normal / length), each)[1] for each in (-angle, angle)]
     return np.array(found) / np.hypot(*np.transpose(found))[:, None]
 
 
-def motion_at(surface: LimitSurface, place: Place, mu: float, velocity: np.ndarray, held: str = "") -> Motion:
+def motion_at(
+    surface: LimitSurface, place: TouchPoint, mu: float, velocity: np.ndarray, held: str = ""
+) -> SliderMotion:
     """Compute the motion of a slider touched at a place by a pusher with a `velocity` `(vx, vy, omega)` there.
 
     All in the slider's axes; the pusher approaches, `velocity . normal > 0`. A mode that is `held` stays so beyond its
@@ -93,29 +95,29 @@ def motion_at(surface: LimitSurface, place: Place, mu: float, velocity: np.ndarr
     if mode == STICK:
         twist, moved, force = _stuck(surface, place, angle + _BEYOND, wanted)
         scale = math.hypot(velocity[0], velocity[1]) / math.hypot(moved[0], moved[1])
-        return Motion(scale * twist, mode, min(wanted - right, left - wanted), force)
+        return SliderMotion(scale * twist, mode, min(wanted - right, left - wanted), force)
     twist, moved = edges[mode == LEFT]
     scale, force = (
         (velocity[:2] @ place.normal) / (moved @ place.normal),
         _force(place, angle if mode == LEFT else -angle),
     )
     slack = math.inf if angle == 0.0 else wanted - left if mode == LEFT else right - wanted
-    return Motion(scale * twist, mode, slack, force)
+    return SliderMotion(scale * twist, mode, slack, force)
 
 
-def _force(place: Place, angle: float) -> np.ndarray:
+def _force(place: TouchPoint, angle: float) -> np.ndarray:
     """Return a unit force at an angle to the left of the normal."""
     (x, y), c, s = place.normal.tolist(), math.cos(angle), math.sin(angle)
     return np.array([c * x - s * y, s * x + c * y])
 
 
-def _angle(place: Place, vector: Any) -> float:
+def _angle(place: TouchPoint, vector: Any) -> float:
     """Return the angle of a vector to the left of the normal [rad]."""
     (x, y), (a, b) = place.normal.tolist(), (float(vector[0]), float(vector[1]))
     return math.atan2(x * b - y * a, x * a + y * b)
 
 
-def pushed_by(surface: LimitSurface, place: Place, angle: float) -> tuple[np.ndarray, tuple[float, float]]:
+def pushed_by(surface: LimitSurface, place: TouchPoint, angle: float) -> tuple[np.ndarray, tuple[float, float]]:
     """Return the twist of unit power under a force at an angle to the normal, and the velocity of the place."""
     (nx, ny), (x, y), c, s = place.normal.tolist(), place.at.tolist(), math.cos(angle), math.sin(angle)
     fx, fy = c * nx - s * ny, s * nx + c * ny
@@ -124,7 +126,7 @@ def pushed_by(surface: LimitSurface, place: Place, angle: float) -> tuple[np.nda
     return twist, (vx - omega * y, vy + omega * x)
 
 
-def _stuck(surface: LimitSurface, place: Place, angle: float, wanted: float) -> tuple[np.ndarray, Any, Any]:
+def _stuck(surface: LimitSurface, place: TouchPoint, angle: float, wanted: float) -> tuple[np.ndarray, Any, Any]:
     """Return the twist whose place has a velocity of the wanted angle, that velocity and the direction of the force."""
     from scipy.optimize import brentq
 
@@ -139,7 +141,7 @@ def _stuck(surface: LimitSurface, place: Place, angle: float, wanted: float) -> 
 # ---------------------------------------------------------------------- a face that lies flush
 
 
-def _flush(surface: LimitSurface, place: Place, mu: float, velocity: np.ndarray, held: str = "") -> Motion:
+def _flush(surface: LimitSurface, place: TouchPoint, mu: float, velocity: np.ndarray, held: str = "") -> SliderMotion:
     """Compute the motion of a slider under a flush face with the `velocity` `(vx, vy, omega)` at its middle.
 
     The pressure of the face has a resultant that crosses it, at an angle within the friction cone.
@@ -168,7 +170,7 @@ def _flush(surface: LimitSurface, place: Place, mu: float, velocity: np.ndarray,
         twist, _, share, force = of(slip)
         slack = math.inf if angle == 0.0 else slip / speed if mode == LEFT else -slip / speed
     leans = int(math.copysign(1.0, share)) if abs(share) > _EDGE else 0
-    return Motion(twist, mode, min(slack, 1.0 - abs(share)), force, leans)
+    return SliderMotion(twist, mode, min(slack, 1.0 - abs(share)), force, leans)
 
 
 def _slip(angle_of: Any, wanted: float, speed: float) -> float:

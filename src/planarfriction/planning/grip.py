@@ -130,7 +130,7 @@ def plan_grip(
     grips = Grips(scene, index, seen)
     wanted = Aim(angle, slide, radius)
     factors = shares if aim == "worst" else (1.0,)
-    searches = [_Search(grips, wanted, factors, times, (low, least, high), at_start) for times in spread]
+    searches = [_ProfileSearch(grips, wanted, factors, times, (low, least, high), at_start) for times in spread]
     kick, hold = KICK * law.mu_c / law.mu_s, min(high, max(2.0 * least, at_start))
     profile = max(searches, key=lambda each: each.begin(kick, hold)).bent()
     outcomes = grips.outcomes(profile, seen, rtol=None)
@@ -140,7 +140,7 @@ def plan_grip(
     return GripPlan(found[0], profile, report, chosen.name, found)
 
 
-class _Search:
+class _ProfileSearch:
     """The search for the values at some knots, between `low`, `least` for those that hold, and `high` [N]."""
 
     def __init__(

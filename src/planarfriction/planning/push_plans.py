@@ -16,7 +16,7 @@ from planarfriction.described import described
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError, SolverError
 from planarfriction.limit_surface import LimitSurfaceEllipsoid
-from planarfriction.planning.contact_modes import STICK, Place, pushed_by
+from planarfriction.planning.contact_modes import STICK, TouchPoint, pushed_by
 from planarfriction.planning.pushing import Push, push
 from planarfriction.planning.slider import Pusher, Slider
 from planarfriction.scenes import Signal
@@ -135,14 +135,14 @@ def plan_push(
     for shares in PLACES:
         for edge in chosen:
             for at in _places(slider, edge, shares):
-                length, x = _shortest(slider, Place(at, slider.inward[edge]), largest, aim)
+                length, x = _shortest(slider, TouchPoint(at, slider.inward[edge]), largest, aim)
                 found += [(length, x, edge, at)] if length < math.inf else []
         if found:
             break
     if not found:
         raise SolverError("no plan reaches the goal: try other edges, a smaller margin or a pose further ahead")
     length, x, edge, at = min(found, key=lambda each: each[0])
-    place = Place(at, slider.inward[edge])
+    place = TouchPoint(at, slider.inward[edge])
     path = _path(slider, place, x, start)
     done = push(slider, pusher, path, start=start)
     for _ in range(ROUNDS):
@@ -196,14 +196,14 @@ def _moved(pose: np.ndarray, twist: np.ndarray, distance: float) -> np.ndarray:
     return np.array([x + c * vx - s * vy, y + s * vx + c * vy, angle + 2.0 * half])
 
 
-def _twist(slider: Slider, place: Place, angle: float) -> np.ndarray:
+def _twist(slider: Slider, place: TouchPoint, angle: float) -> np.ndarray:
     """Return the twist under a force at an angle to the normal, at unit speed of the place."""
     twist, moved = pushed_by(slider.surface, place, angle)
     return twist / math.hypot(*moved)
 
 
 def _shortest(
-    slider: Slider, place: Place, largest: float, goal: np.ndarray, known: np.ndarray | None = None
+    slider: Slider, place: TouchPoint, largest: float, goal: np.ndarray, known: np.ndarray | None = None
 ) -> tuple[float, np.ndarray]:
     """Return the length of the shortest plan at a place, and its angles and lengths `[2 PARTS]`; infinite where none is
     found."""
@@ -239,7 +239,7 @@ def _shortest(
     return unit * best, found
 
 
-def _path(slider: Slider, place: Place, x: np.ndarray, start: np.ndarray) -> Signal:
+def _path(slider: Slider, place: TouchPoint, x: np.ndarray, start: np.ndarray) -> Signal:
     """Return the path of the pusher at unit speed, as lines."""
     pose, now, times, at = start, 0.0, [], []
     for angle, distance in zip(x[:PARTS], slider.size * x[PARTS:], strict=True):

@@ -12,9 +12,9 @@ from planarfriction import validation
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.pictures import picture
-from planarfriction.planning.contact_modes import LEFT, RIGHT, STICK, Place, motion_at
+from planarfriction.planning.contact_modes import LEFT, RIGHT, STICK, TouchPoint, motion_at
 from planarfriction.planning.slider import Pusher, Slider
-from planarfriction.planning.touch import Contact, Scenery, flush_after, place_of, touch_after
+from planarfriction.planning.touch import Scenery, Touch, flush_after, place_of, touch_after
 from planarfriction.scenes import Signal
 from planarfriction.scenes.signal import as_signal
 
@@ -124,7 +124,7 @@ def _follow(scenery: Scenery, start: np.ndarray, time: np.ndarray, rtol: float) 
     if scenery.gap(time[0], start) < -1e-6 * slider.size:
         raise InvalidValueError("path", "begin outside the slider", scenery.pose(time[0]).tolist())
     now, q, held = float(time[0]), start.copy(), ""
-    contact: Contact | None = None
+    contact: Touch | None = None
     restless = 0
     for _ in range(MOST_PHASES):
         if contact is None:
@@ -178,7 +178,7 @@ def _follow(scenery: Scenery, start: np.ndarray, time: np.ndarray, rtol: float) 
     raise InvalidValueError("path", f"change the contact of the pusher at most {MOST_PHASES} times", f"t = {now:g} s")
 
 
-def _neighbour(slider: Slider, place: Place, mu: float, velocity: np.ndarray, held: str) -> str:
+def _neighbour(slider: Slider, place: TouchPoint, mu: float, velocity: np.ndarray, held: str) -> str:
     """Return the mode after one that has come to its end, where rounding still takes it for the old one."""
     if held != STICK:
         return STICK
@@ -189,7 +189,7 @@ def _neighbour(slider: Slider, place: Place, mu: float, velocity: np.ndarray, he
 class _Phase:
     """A contact whose mode is held, and what ends it."""
 
-    def __init__(self, scenery: Scenery, contact: Contact, mode: str) -> None:
+    def __init__(self, scenery: Scenery, contact: Touch, mode: str) -> None:
         self._scenery, self._contact, self._mode = scenery, contact, mode
         kinds = {"mode": self._slack, "leaves": self._approach, "ends": self._range, "closes": self._clear}
         if not scenery.closes(contact):

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from planarfriction.errors import InvalidValueError
-from planarfriction.planning.contact_modes import Place
+from planarfriction.planning.contact_modes import TouchPoint
 from planarfriction.planning.slider import Pusher, Slider
 
 END, CORNER, FACE = "end", "corner", "face"
@@ -24,7 +24,7 @@ _FLUSH = 1e-4
 """Angle [rad] between a face and an edge that touch twice, beyond which they are not flush."""
 
 
-class Contact(NamedTuple):
+class Touch(NamedTuple):
     """Feature that touches: an end of the pusher at an edge, a corner at the face, or the face at an edge."""
 
     kind: str
@@ -71,43 +71,43 @@ class Scenery:
         c, s = math.cos(angle), math.sin(angle)
         return (world - [x, y]) @ np.array([[c, -s], [s, c]])
 
-    def features(self, t: float, q: np.ndarray) -> list[tuple[float, Contact]]:
+    def features(self, t: float, q: np.ndarray) -> list[tuple[float, Touch]]:
         """Return everything that may touch, with its distance [m]."""
         found = []
         for i in range(len(self._ends)):
             gaps = self.slider.gaps(self.end(i, t, q))
             edge = int(gaps.argmax())
-            found.append((float(gaps[edge]), Contact(END, edge, i)))
+            found.append((float(gaps[edge]), Touch(END, edge, i)))
         half = 0.5 * self.pusher.width
         if half > 0.0:
             # a corner behind the face's line by more than the face is wide is on its back
             for k, (ahead, aside) in enumerate(self.corners(t, q)):
                 if abs(aside) <= (1.0 + _NEAR) * half and ahead > -half:
-                    found.append((float(ahead), Contact(CORNER, k)))
+                    found.append((float(ahead), Touch(CORNER, k)))
         return found
 
     def gap(self, t: float, q: np.ndarray) -> float:
         """Return the distance of pusher and slider [m], negative where they overlap."""
         return min(each[0] for each in self.features(t, q))
 
-    def closes(self, contact: Contact) -> bool:
+    def closes(self, contact: Touch) -> bool:
         """Return True if something else may begin to touch."""
         return self.pusher.width > 0.0 and contact.kind != FACE
 
-    def clear(self, contact: Contact, t: float, q: np.ndarray) -> float:
+    def clear(self, contact: Touch, t: float, q: np.ndarray) -> float:
         """Return the distance of all that does not touch yet [m]."""
         return min(gap for gap, each in self.features(t, q) if not _same(contact, each, len(self._lengths))) + self.near
 
-    def flush(self, contact: Contact, t: float, q: np.ndarray) -> Contact:
+    def flush(self, contact: Touch, t: float, q: np.ndarray) -> Touch:
         """Return the face at the edge that it has closed with."""
         c, s = math.cos(self.pose(t)[2] - q[2]), math.sin(self.pose(t)[2] - q[2])
         along = self.slider.inward @ [c, s]
         edge = int(along.argmax())
         if math.acos(min(along[edge], 1.0)) > _FLUSH:
             raise InvalidValueError("path", "not wedge the slider between two points of the face", f"t = {t:g} s")
-        return Contact(FACE, edge)
+        return Touch(FACE, edge)
 
-    def within(self, contact: Contact, t: float, q: np.ndarray) -> float:
+    def within(self, contact: Touch, t: float, q: np.ndarray) -> float:
         """Return the distance of what touches from the end of its edge, or of the face [m]."""
         if contact.kind == CORNER:
             return 0.5 * self.pusher.width - abs(self.corners(t, q)[contact.edge][1])
@@ -137,7 +137,7 @@ def _inside(q: np.ndarray, x: float, y: float) -> np.ndarray:
     return np.array([c * dx + s * dy, c * dy - s * dx])
 
 
-def _same(contact: Contact, other: Contact, edges: int) -> bool:
+def _same(contact: Touch, other: Touch, edges: int) -> bool:
     """Return True if a feature is the one that touches: an end at any edge, or a corner."""
     return contact.kind == other.kind and (
         contact.end == other.end if contact.kind == END else contact.edge % edges == other.edge
@@ -145,8 +145,8 @@ def _same(contact: Contact, other: Contact, edges: int) -> bool:
 
 
 def place_of(
-    scenery: Scenery, contact: Contact, t: float, q: np.ndarray, forward: bool = False
-) -> tuple[Place, np.ndarray]:
+    scenery: Scenery, contact: Touch, t: float, q: np.ndarray, forward: bool = False
+) -> tuple[TouchPoint, np.ndarray]:
     """Return the place at which the slider is touched, and the pusher's velocity there `(vx, vy, omega)`, in its
     axes."""
     slider, (x, y, angle), half = scenery.slider, scenery.pose(t), 0.0
@@ -163,20 +163,20 @@ def place_of(
     c, s = math.cos(q[2]), math.sin(q[2])
     arm = at - _inside(q, x, y)
     velocity = np.array([c * vx + s * vy - omega * arm[1], c * vy - s * vx + omega * arm[0], omega])
-    return Place(at, normal, half), velocity
+    return TouchPoint(at, normal, half), velocity
 
 
-def flush_after(scenery: Scenery, contact: Contact, t: float, q: np.ndarray, leans: int) -> Contact:
+def flush_after(scenery: Scenery, contact: Touch, t: float, q: np.ndarray, leans: int) -> Touch:
     """Return what still touches when a face turns about its left end (1) or its right one (-1)."""
     edge, corners = contact.edge, len(scenery.slider.outline)
     right, left = (scenery.along(edge, scenery.end(i, t, q)) for i in range(2))
     if leans > 0:
-        return Contact(END, edge, 1) if left >= 0.0 else Contact(CORNER, edge)
+        return Touch(END, edge, 1) if left >= 0.0 else Touch(CORNER, edge)
     inside = right <= scenery.along(edge, scenery.slider.outline[(edge + 1) % corners])
-    return Contact(END, edge, 0) if inside else Contact(CORNER, (edge + 1) % corners)
+    return Touch(END, edge, 0) if inside else Touch(CORNER, (edge + 1) % corners)
 
 
-def touch_after(scenery: Scenery, t: float, q: np.ndarray) -> tuple[float, Contact] | None:
+def touch_after(scenery: Scenery, t: float, q: np.ndarray) -> tuple[float, Touch] | None:
     """Return time and place at which a pusher that does not touch a slider at rest begins to, or None."""
     from scipy.optimize import brentq
 

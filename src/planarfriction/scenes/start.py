@@ -44,7 +44,7 @@ def first_slopes(scene: Any, shaped: np.ndarray, d_loads: np.ndarray, d_pull: np
     """
     loads = np.array([float(contact.normal_force(0.0)) for contact in scene.contacts])
     each, pull = _held_by(scene, loads, np.where(loads > 0.0, shaped, 0.0))
-    cells = _Cells.together(each)
+    cells = _BristleField.together(each)
     bent, slope = cells.bent(_least_energy(cells, pull))
     ends = np.cumsum([len(one.stiffness) for one in each])[:-1]
     share = np.concatenate(
@@ -100,7 +100,7 @@ def _carried(body: Any, contact: Any) -> np.ndarray:
 # ---------------------------------------------------------------------- bristles that carry the load
 
 
-class _Cells(NamedTuple):
+class _BristleField(NamedTuple):
     """The cells of all contacts."""
 
     levers: np.ndarray
@@ -113,7 +113,7 @@ class _Cells(NamedTuple):
     """Deflection of each bristle that is as far from its largest in all directions `[n, 2]` [m]."""
 
     @classmethod
-    def together(cls, each: Any) -> _Cells:
+    def together(cls, each: Any) -> _BristleField:
         """Join the cells of several contacts."""
         return cls(*(np.concatenate(parts) for parts in zip(*each, strict=True)))
 
@@ -142,7 +142,7 @@ def _equilibrium(scene: Any, loads: np.ndarray, shaped: np.ndarray) -> list[np.n
     That is the rule by which contacts share what statics leaves open.
     """
     each, pull = _held_by(scene, loads, shaped)
-    cells = _Cells.together(each)
+    cells = _BristleField.together(each)
     bent = cells.bent(_least_energy(cells, pull))[0]
     ends = np.cumsum([len(one.stiffness) for one in each])[:-1]
     states = []
@@ -152,7 +152,7 @@ def _equilibrium(scene: Any, loads: np.ndarray, shaped: np.ndarray) -> list[np.n
     return states
 
 
-def _held_by(scene: Any, loads: np.ndarray, shaped: np.ndarray) -> tuple[list[_Cells], np.ndarray]:
+def _held_by(scene: Any, loads: np.ndarray, shaped: np.ndarray) -> tuple[list[_BristleField], np.ndarray]:
     """Return the cells of each contact, and the load on the body that they hold."""
     for contact in scene.contacts:
         if contact.model.law.numbers.creep_speed > 0.0:
@@ -162,17 +162,17 @@ def _held_by(scene: Any, loads: np.ndarray, shaped: np.ndarray) -> tuple[list[_C
     return [_cells_of(scene, *each) for each in zip(scene.contacts, loads, shaped, strict=True)], pull
 
 
-def _cells_of(scene: Any, contact: Any, load: float, shaped: float) -> _Cells:
+def _cells_of(scene: Any, contact: Any, load: float, shaped: float) -> _BristleField:
     model = contact.model
     patch, law = model.patch, model.law.numbers
     levers = patch.levers() @ contact_map(scene, contact)
     weights = patch.weights(shaped) if shaped > 0.0 else np.zeros(len(levers))
     largest = float(formulas.stribeck(np, np.zeros(()), law)) / law.sigma_0
     middle = largest * patch.asymmetries() if patch.asymmetric else np.zeros((len(levers), 2))
-    return _Cells(levers, contact.count * load * law.sigma_0 * weights, np.full(len(levers), largest), middle)
+    return _BristleField(levers, contact.count * load * law.sigma_0 * weights, np.full(len(levers), largest), middle)
 
 
-def _least_energy(cells: _Cells, pull: np.ndarray) -> np.ndarray:
+def _least_energy(cells: _BristleField, pull: np.ndarray) -> np.ndarray:
     """Return the motion `[3]` after which bristles carry a load `[3]`; raises where none does."""
     elastic = np.einsum("n,nia,nib->ab", cells.stiffness, cells.levers, cells.levers)
     scale = 1.0 / np.sqrt(np.where(np.diagonal(elastic) > 0.0, np.diagonal(elastic), 1.0))
@@ -190,12 +190,12 @@ def _least_energy(cells: _Cells, pull: np.ndarray) -> np.ndarray:
     return motion
 
 
-def _free(cells: _Cells, motion: np.ndarray) -> np.ndarray:
+def _free(cells: _BristleField, motion: np.ndarray) -> np.ndarray:
     return cells.middle + (cells.levers @ motion - cells.middle)
 
 
 @np.errstate(over="ignore", invalid="ignore")  # of loads that nothing holds
-def _bent_to_the_end(cells: _Cells, pull: np.ndarray, motion: np.ndarray, scale: np.ndarray) -> np.ndarray:
+def _bent_to_the_end(cells: _BristleField, pull: np.ndarray, motion: np.ndarray, scale: np.ndarray) -> np.ndarray:
     """Return the motion of least energy where some bristles are bent as far as they can be."""
     from scipy.optimize import minimize, root
 
@@ -225,7 +225,7 @@ def _bent_to_the_end(cells: _Cells, pull: np.ndarray, motion: np.ndarray, scale:
     return unit * scale * found.x
 
 
-def _held(cells: _Cells, pull: np.ndarray, motion: np.ndarray) -> float | None:
+def _held(cells: _BristleField, pull: np.ndarray, motion: np.ndarray) -> float | None:
     """Return a bound below 1 on the share of the load that friction holds, from a motion that proves it; None without
     one."""
     shift, power = cells.levers @ motion, float(pull @ motion)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from planarfriction.adapters.drake.row import Row
+from planarfriction.adapters.drake.row import CouplingRow
 from planarfriction.adapters.drake.shadow import Shadow
 from planarfriction.coupling import CoupledPatches
 
@@ -54,7 +54,7 @@ class Asking:
 
     def __init__(self, shadow: Shadow, coupled: CoupledPatches, size: int) -> None:
         k = len(coupled.models)
-        self._shadow, self._row, self._normals = shadow, Row(coupled, shadow.dt), np.zeros((k, 3))
+        self._shadow, self._row, self._normals = shadow, CouplingRow(coupled, shadow.dt), np.zeros((k, 3))
         self._touching, self._levers = [False] * k, np.ones(3 * k)
         self._levers[2::3] = [math.sqrt((model.patch.positions**2).sum(axis=1).mean()) for model in coupled.models]
         self._rows, self._moved = np.zeros((3 * k, size)), np.zeros((size, 3 * k))

@@ -8,7 +8,7 @@ from planarfriction.coupling import ITERATIONS, TOLERANCE, CoupledPatches, HostS
 from planarfriction.kernels.coupling import solve_batch
 
 
-class Row:
+class CouplingRow:
     """Arguments and results of `CoupledPatches.step`, as views of one row of words."""
 
     def __init__(self, coupled: CoupledPatches, dt: float) -> None:

@@ -16,7 +16,7 @@ from mujoco import mjx
 
 from planarfriction import models
 from planarfriction.adapters.mjx import newton, responses
-from planarfriction.adapters.mjx.geometry import Places, geometry, places
+from planarfriction.adapters.mjx.geometry import PatchPlaces, geometry, places
 from planarfriction.adapters.mujoco.friction import Report
 from planarfriction.adapters.mujoco.loops.records import Memory
 from planarfriction.adapters.mujoco.patches import PatchContact, Placed, check_once, memory, words
@@ -56,7 +56,7 @@ class _Search(NamedTuple):
 class _Fixed:
     """Parts that do not change with parameters: compared by identity, as one function is compiled for them."""
 
-    places: Places
+    places: PatchPlaces
     which: tuple[int, ...]
     """The model of each patch."""
     shapes: tuple[tuple[int, ...], ...]

@@ -15,7 +15,7 @@ from mujoco import mjx
 from planarfriction.adapters.mujoco.patches import Placed
 
 
-class Places(NamedTuple):
+class PatchPlaces(NamedTuple):
     """Numbers of the sites, geoms and bodies of k patches, `[k]` each."""
 
     site: Any
@@ -28,20 +28,20 @@ class Places(NamedTuple):
     """True where the origin is at the site."""
 
 
-def places(placed: Sequence[Placed]) -> Places:
+def places(placed: Sequence[Placed]) -> PatchPlaces:
     """Return the places of patches found in a model."""
     numbers = [(p.site, p.own, p.other, p.bodies[1], p.bodies[0], p.patch.centre == "site") for p in placed]
-    return Places(*map(np.array, zip(*numbers, strict=True)))
+    return PatchPlaces(*map(np.array, zip(*numbers, strict=True)))
 
 
-def geometry(m: Any, d: Any, where: Places) -> tuple[jax.Array, jax.Array, jax.Array]:
+def geometry(m: Any, d: Any, where: PatchPlaces) -> tuple[jax.Array, jax.Array, jax.Array]:
     """Return the Jacobian of the twists `[3k, nv]`, 1 for the contacts of each patch `[k, nefc]`, and 1 for patches in
     contact."""
     contact = d._impl.contact
     single = jnp.asarray(contact.dim == 1) & (contact.dist < contact.includemargin)
     frames = contact.frame.reshape(-1, 3, 3)
 
-    def one(place: Places):
+    def one(place: PatchPlaces):
         forward = (contact.geom[:, 0] == place.other) & (contact.geom[:, 1] == place.own)
         backward = (contact.geom[:, 0] == place.own) & (contact.geom[:, 1] == place.other)
         chosen = (forward | backward) & single

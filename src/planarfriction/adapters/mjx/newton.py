@@ -22,7 +22,7 @@ Unit = Callable[[jax.Array], jax.Array]
 """Wrenches of the models' steps per unit load `[k, 3]` of their twists `[k, 3]`."""
 
 
-class Host(NamedTuple):
+class HostResponse(NamedTuple):
     """Response of twists and loads at the end of a step to the wrenches w `[3k]` that act during it."""
 
     twist: jax.Array
@@ -83,7 +83,7 @@ class _Round(NamedTuple):
     done: Any
 
 
-def solve(unit: Unit, host: Host, guess: jax.Array, radius: jax.Array, tolerance: float, most: int) -> Solved:
+def solve(unit: Unit, host: HostResponse, guess: jax.Array, radius: jax.Array, tolerance: float, most: int) -> Solved:
     """Solve for the wrenches `w(V, N)` with the V and N that they cause; `guess` `[3k]`, `radius` of the patches `[k]`
     [m]."""
     count, lever = len(host.load), jnp.ones((len(host.load), 3)).at[:, 2].set(radius)
@@ -188,7 +188,7 @@ def solve(unit: Unit, host: Host, guess: jax.Array, radius: jax.Array, tolerance
     return Solved(end.wrench, end.iterations, end.best, end.best <= near)
 
 
-def fitting(unit: Unit, host: Host, found: jax.Array) -> jax.Array:
+def fitting(unit: Unit, host: HostResponse, found: jax.Array) -> jax.Array:
     """Return the wrenches `found`, with the derivatives of `w(V, N) - W = 0` by all that is in `unit` and `host`."""
 
     def gap(w):

@@ -15,7 +15,7 @@ import jax
 import jax.numpy as jnp
 from mujoco import mjx
 
-from planarfriction.adapters.mjx.newton import Host
+from planarfriction.adapters.mjx.newton import HostResponse
 
 
 class Active(NamedTuple):
@@ -27,7 +27,7 @@ class Active(NamedTuple):
     """Sign of the force of rows at their friction loss, else 0, `[nefc]`."""
 
 
-class Answer(NamedTuple):
+class WrenchResponse(NamedTuple):
     """Accelerations, forces of constraints, twists and loads as they follow from wrenches w `[3k]`."""
 
     free: jax.Array
@@ -38,7 +38,7 @@ class Answer(NamedTuple):
     """D of the quadratic rows, `[nefc]`."""
     limit: jax.Array
     """Force of the others, `[nefc]`."""
-    host: Host
+    host: HostResponse
 
     def acceleration(self, w: jax.Array) -> jax.Array:
         """Return the acceleration `[nv]`."""
@@ -76,7 +76,7 @@ def slack(d: Any, before: Active, after: Active, acceleration: jax.Array, dt: ja
     return (jnp.where(wrong, abs(abs(_gap(d, acceleration)) - loss), 0.0) * dt).max(initial=0.0)
 
 
-def answer(m: Any, d: Any, jacobian: jax.Array, rows: jax.Array, active: Active) -> Answer:
+def answer(m: Any, d: Any, jacobian: jax.Array, rows: jax.Array, active: Active) -> WrenchResponse:
     """Return the response to wrenches from the Jacobian `[3k, nv]` of the twists; `rows` `[k, nefc]` are 1 for a
     patch's contacts.
 
@@ -92,13 +92,13 @@ def answer(m: Any, d: Any, jacobian: jax.Array, rows: jax.Array, active: Active)
     free, moved = found[:, 0], found[:, 1:]
     gains = jax.vmap(lambda acceleration: _gained(m, d, inertia, acceleration), in_axes=1, out_axes=1)(found)
     weights = rows * stiffness
-    host = Host(
+    host = HostResponse(
         twist=jacobian @ (d.qvel + gains[:, 0]),
         load=-weights @ _gap(d, free),
         response=jacobian @ gains[:, 1:],
         load_response=-weights @ (constraints @ moved),
     )
-    return Answer(free, moved, stiffness, limit, host)
+    return WrenchResponse(free, moved, stiffness, limit, host)
 
 
 def integrate(m: Any, d: Any) -> Any:

@@ -43,7 +43,7 @@ _MOST_TRIALS = 400
 """Evaluations at which the search gives up; a handful are usual."""
 
 
-class Table(NamedTuple):
+class StoredPotential(NamedTuple):
     """A surface of kind `POTENTIAL`."""
 
     data: np.ndarray
