@@ -65,7 +65,7 @@ class Family(Mapping[str, Any]):
         return self[validation.choice(self.what, name, self)]
 
     def name_of(self, member: Any) -> str | None:
-        """Name of the class of `member`, or None if it is not a member. Loads nothing."""
+        """Return the name of the class of `member`, or None if it is not a member; load nothing."""
         kind = type(member)
         path = f"{kind.__module__.removeprefix('planarfriction.')}:{kind.__qualname__}"
         return next((name for name, each in self._members.items() if each.make in (kind, path)), None)

@@ -35,7 +35,7 @@ class _Said(event.Listener):
 
 @contextlib.contextmanager
 def said_when_compiling(silent: bool = False) -> Iterator[None]:
-    """Say so, once in a process, if something is compiled in here and somebody waits for it."""
+    """Tell the user, once in a process, if something is compiled in this block and somebody is watching."""
     if silent or _Said.done or not watched():
         yield
     else:

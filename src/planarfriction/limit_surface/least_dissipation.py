@@ -40,7 +40,7 @@ def table_of(surface: LimitSurface) -> StoredPotential:
 
 
 def descend(surface: LimitSurface, wrenches: np.ndarray, twists: np.ndarray) -> float:
-    """Improve twists `[M, 3]` of wrenches `[M, 3]`; return the largest angle [rad] that is left, in scaled
+    """Return the improve twists `[M, 3]` of wrenches `[M, 3]`; return the largest angle [rad] that is left, in scaled
     coordinates."""
     scaling, worst = surface._scaling, 0.0
     back = scaling[9:18].reshape(3, 3)

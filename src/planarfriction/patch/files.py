@@ -53,7 +53,7 @@ def read_pressure_map(path: str | Path) -> np.ndarray:
 
 
 def title(path: str | Path) -> str:
-    """Name of the patch of a map: that of its file, with ? for what cannot be printed."""
+    """Return the name of the patch of a map: that of its file, with ? for what cannot be printed."""
     return "".join(each if each.isprintable() else "?" for each in Path(path).stem).strip() or "map"
 
 

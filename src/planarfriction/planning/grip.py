@@ -255,7 +255,7 @@ class _Release:
 
 
 def _contact_of(scene: Any, name: str | None) -> int:
-    """Place of the contact whose grip is planned."""
+    """Return the index of the contact whose grip is planned."""
     validation.instance("scene", scene, Scene, "a Scene")
     if scene.velocity is not None:
         raise InvalidValueError("velocity", "be None for a body that a grip moves", scene.velocity)

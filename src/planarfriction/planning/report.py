@@ -73,7 +73,7 @@ class GripReport(ByValue):
 def report_of(
     aim: Any, frictions: Sequence[float], outcomes: Sequence[Any], grip: float, holding: float, cost: Any
 ) -> GripReport:
-    """Report of where a plan ends with each friction."""
+    """Return the report on the end of a plan with each friction."""
     end = dict(zip(frictions, outcomes, strict=True))
     turns = aim.angle is not None
     size = abs(aim.angle) if turns else float(np.hypot(*aim.slide))

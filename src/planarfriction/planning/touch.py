@@ -118,7 +118,7 @@ class Scenery:
         return high - low
 
     def along(self, edge: int, point: np.ndarray) -> float:
-        """Place of a point along an edge [m]."""
+        """Return the position of a point along an edge [m]."""
         return float((point - self.slider.outline[edge]) @ self.slider.along[edge])
 
     def overlap(self, edge: int, t: float, q: np.ndarray) -> tuple[float, float]:

@@ -93,7 +93,7 @@ class Film:
         return np.asarray(self.canvas.buffer_rgba())[..., :3].copy()
 
     def show(self, frame: int) -> None:
-        """Go to a frame."""
+        """Return the go to a frame."""
         track = self.track
         pose, (x, y) = track.poses[frame], self.views[frame]
         self.axes.set(xlim=x, ylim=y)

@@ -44,7 +44,7 @@ _CONTACT = (
 
 
 def plot_histories(solutions: Solution | Mapping[str, Solution]) -> style.PlotFigure:
-    """Plot position, angle, speed, forces, torque and normal force against time.
+    """Return the plot position, angle, speed, forces, torque and normal force against time.
 
     `solutions` is one solution or a mapping from label to solution; several are overlaid. Colours distinguish the runs,
     the same for a model in every figure, line styles their contacts; with more than 7 runs the colours go from the
@@ -143,7 +143,7 @@ def _draw_panel(
 
 
 def _colours(solutions: Sequence[Solution]) -> list[Any]:
-    """Colour of each run: that of its model where every run has another one, else one after the other."""
+    """Choose colours: one per model if all models differ, otherwise in order."""
     if len(solutions) > len(style.PALETTE):
         return list(style.TIME_COLOURS(np.linspace(0.0, 1.0, len(solutions))))
     own = [each.scene and style.model_colour(each.scene.contacts[0].model) for each in solutions]

@@ -109,7 +109,7 @@ class CellPanel:
         return [self.cells, self.centre, self.words]
 
     def show(self, frame: int) -> None:
-        """Go to a frame."""
+        """Return the go to a frame."""
         track = self.track
         colour_cells(self.cells, track, frame)
         put_centre(self.centre, track.twists[frame], np.zeros(2), still=still_speed(track.twists))
@@ -170,7 +170,7 @@ class SurfacePanel:
             surface.set_visible(each == level)
 
     def show(self, frame: int) -> None:
-        """Go to a frame."""
+        """Return the go to a frame."""
         fx, fy, tau = self.points[frame]
         tail = self.points[max(0, frame - TAIL) : frame + 1]
         self.shadow.set_data_3d([fx, fx], [fy, fy], [self.floor, self.floor])

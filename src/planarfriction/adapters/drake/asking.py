@@ -114,7 +114,7 @@ class Asking:
             each.fill(0.0)
 
     def _touch(self, pushes: np.ndarray) -> bool:
-        """Place patches that touch for the first time in this step; whether there are any."""
+        """Place patches that touch for the first time in this step; return True if there are any."""
         if all(self._touching):
             return False
         new = [p for p, touching in enumerate(self._touching) if not touching and pushes[p] @ pushes[p] > 0.0]
@@ -127,12 +127,13 @@ class Asking:
         return bool(new)
 
     def _answer_freely(self) -> None:
-        """Answer as the bodies do without contact: no answer is larger, so that with this one each pass gets closer."""
+        """Return the answer as the bodies do without contact: no answer is larger, so that with this one each pass gets
+        closer."""
         np.matmul(self._rows, self._moved, out=self._row.response)
         self._row.load_response.fill(0.0)
 
     def _answer_as_before(self, answers: np.ndarray) -> None:
-        """Answer as in the last step if the same patches touched in it."""
+        """Return the answer as in the last step if the same patches touched in it."""
         k = len(self._touching)
         if answers[:k].tolist() == self._touching:
             twists, loads = np.split(answers[k:], [9 * k * k])
@@ -152,7 +153,7 @@ class Asking:
         return math.sqrt(squares)
 
     def _learn(self, wrench: np.ndarray, twist: np.ndarray, load: np.ndarray) -> None:
-        """Correct the answers by changes that came out: of twists symmetrically, of rank one.
+        """Return the correct the answers by changes that came out: of twists symmetrically, of rank one.
 
         Contacts only stiffen: `A - A_true >= 0`. Where a correction takes more than A has, contacts came or went.
         """

@@ -146,7 +146,7 @@ class Friction(LeafSystem):
     # ------------------------------------------------------------------ a step
 
     def _declare_inputs(self, plant: Any) -> None:
-        """Declare the inputs: the state of the plant, and all that drives the plant."""
+        """Return the declare the inputs: the state of the plant, and all that drives the plant."""
         self._state: Any = self.DeclareVectorInputPort("state", plant.num_multibody_states())
         self._inputs: dict[str, Any] = {}
         for i in range(plant.num_input_ports()):
@@ -220,7 +220,8 @@ def _sources(builder: Any, plant: Any) -> dict[str, Any]:
 
 
 def _reserve(builder: Any, plant: Any, sources: dict[str, Any]) -> None:
-    """Connect free inputs to nothing: a later connection would not be seen here, so that Drake has to refuse it."""
+    """Return the connect free inputs to nothing: a later connection would not be seen here, so that Drake has to refuse
+    it."""
     for i in range(plant.num_input_ports()):
         port = plant.get_input_port(i)
         name, nothing = port.get_name(), None

@@ -112,7 +112,7 @@ class Friction:
 
     @classmethod
     def tree_unflatten(cls, fixed: _Fixed, leaves) -> Self:
-        """Rebuild the pytree (called by JAX)."""
+        """Return the rebuild the pytree (called by JAX)."""
         friction = object.__new__(cls)
         friction._fixed, (friction.models,) = fixed, leaves
         return friction
@@ -165,7 +165,8 @@ class Friction:
     # ------------------------------------------------------------------ a step
 
     def step(self, m: Any, d: Any) -> Any:
-        """Step with patch friction, instead of `mjx.step`: a pure function for `jit`, `vmap`, `lax.scan` and `grad`.
+        """Take a step with patch friction, instead of `mjx.step`: a pure function for `jit`, `vmap`, `lax.scan` and
+        `grad`.
 
         Raises InvalidValueError for a model of MJX in another implementation, and for data without its user data.
         """

@@ -115,7 +115,7 @@ class Friction:
         return Report(int(u[at.iterations]), int(u[at.passes]), float(u[at.residual]), bool(u[at.converged]))
 
     def reset(self, d: Any) -> None:
-        """Relax all bristles."""
+        """Return the relax all bristles."""
         at = self._memory
         d.userdata[at.state : at.converged + 1] = 0.0
 
@@ -139,7 +139,7 @@ class Friction:
     # ------------------------------------------------------------------ steps
 
     def step(self, d: Any) -> None:
-        """Step with patch friction, instead of `mj_step`.
+        """Take a step with patch friction, instead of `mj_step`.
 
         Raises `InvalidValueError` for a state that is not finite.
         """

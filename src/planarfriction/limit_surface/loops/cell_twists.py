@@ -59,7 +59,7 @@ def _rounded(seen, weights, by_lean, a, b, rounding):
 
 @kernel
 def _descend(seen, weights, by_lean, a, b, rounding, balanced):
-    """Place of the rounded minimum, from the place `(a, b)`, and the slope there."""
+    """Return the place of the rounded minimum, from the place `(a, b)`, and the slope there."""
     ga, gb, aa, ab, bb = _rounded(seen, weights, by_lean, a, b, rounding)
     for _ in range(_MOST_STEPS):
         if math.sqrt(ga * ga + gb * gb) <= balanced:
