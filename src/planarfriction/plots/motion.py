@@ -16,6 +16,7 @@ from matplotlib.transforms import Affine2D
 from planarfriction import geometry, validation
 from planarfriction.plots import style
 from planarfriction.plots.patch import cell_boxes
+from planarfriction.plots.track import contact_poses
 
 if TYPE_CHECKING:
     from planarfriction.scenes import Contact, Solution
@@ -97,7 +98,9 @@ def _draw(figure: Any, strobe: _Strobe) -> None:
         colour = style.TIME_COLOURS(scale(time))
         _move(_draw_mount(axes, solution, "body", colour), axes, pose, strobe.larger)
         for contact in _driven(solution):
-            _move(_draw_shape(axes, _pad_shape(contact), colour), axes, _carried(contact, float(time)))
+            _move(
+                _draw_shape(axes, _pad_shape(contact), colour), axes, contact_poses(contact, np.array([time]), pose)[0]
+            )
     _draw_mount(axes, solution, "world", style.PAD_COLOUR)
     _finish(axes, strobe.limits)
     axes.plot(*(1e3 * strobe.path[:, :2].T), color="0.3", linewidth=0.9, zorder=4)
@@ -170,13 +173,6 @@ def _driven(solution: Solution) -> list[Contact]:
     ]
 
 
-def _carried(contact: Contact, time: float) -> np.ndarray:
-    """Return the pose (x, y, angle) of the frame of a driven contact [m, m, rad]."""
-    from planarfriction.scenes.movers import displacement
-
-    return np.array([*contact.position, contact.angle]) + displacement(contact.support_velocity, [time])[0]  # pyright: ignore
-
-
 def _move(artists: list[Artist], axes: Any, pose: np.ndarray, larger: float = 1.0) -> None:
     """Put the frame of the artists at `pose` (x, y, angle) [m, m, rad] in the plane of the axes, `larger` times."""
     transform = Affine2D().scale(larger).rotate(pose[2]).translate(*(1e3 * pose[:2])) + axes.transData
@@ -239,7 +235,7 @@ def _limits(solution: Solution, times: np.ndarray, poses: np.ndarray, larger: fl
     moving = _driven(solution)
     for contact in moving:
         shape = _pad_shape(contact).reshape(-1, 2)
-        points += [_placed(shape, _carried(contact, time)) for time in times]
+        points += [_placed(shape, pose) for pose in contact_poses(contact, times, poses)]
     for contact in solution.scene.contacts:
         if contact in moving:
             continue

@@ -66,10 +66,8 @@ class Section:
 
     def choice(self, key: str, valid: Iterable[str], default: Any = _REQUIRED) -> str:
         """Return the value under `key` if it is one of `valid`, or raise an error that names the nearest valid one."""
-        value, valid = self.get(key, default), list(valid)
-        if not (isinstance(value, str) and value in valid):
-            self.fail(f"{key} must be one of {', '.join(valid)}, got {_shown(value)}{_near(value, valid)}")
-        return value
+        with self.located():
+            return validation.choice(key, self.get(key, default), valid)
 
     def path(self, key: str) -> Path:
         """Return the path under `key`, taken from the folder of the scene file."""
@@ -101,10 +99,6 @@ def _shown(value: Any) -> str:
     return shown(validation.quoted(value))
 
 
-def _near(value: Any, valid: Sequence[str]) -> str:
-    near = difflib.get_close_matches(value[:200], valid, n=1) if isinstance(value, str) else []
-    return f" (did you mean {near[0]!r}?)" if near else ""
-
-
-def _hint(value: Any, valid: Sequence[str]) -> str:
-    return _near(value, valid) or f" (valid: {', '.join(valid)})"
+def _hint(key: Any, valid: Sequence[str]) -> str:
+    near = difflib.get_close_matches(key[:200], valid, n=1) if isinstance(key, str) else []
+    return f" (did you mean {near[0]!r}?)" if near else f" (valid: {', '.join(valid)})"
