@@ -284,7 +284,7 @@ class _PackedPatches(NamedTuple):
     """Patches as compiled code sees them."""
 
     row: np.ndarray
-    """Their `Patches`."""
+    """Words of the `Patches` of compiled code."""
     parts: dict[str, slice]
     """Slices of the row of a problem, by the names of its parts."""
     words: int

@@ -23,7 +23,7 @@ form loses digits in proportion to the distance, 4e-15 of the wrench (1e-14 at 4
 by at most 1e-14 at their switches. Of the second derivatives: 1e-13 and 2e-12."""
 
 STORED_RULES = ((3.0, 6), (6.0, 4), (12.0, 3), (100.0, 2))
-"""The same for stored surfaces, whose nodes are many: 1e-7 of an element's wrench, 1e-8 of that of 441 cells."""
+"""Rules of stored surfaces, whose nodes are many: 1e-7 of an element's wrench, 1e-8 of that of 441 cells."""
 
 _CORNERS = (
     np.zeros((1, 2)),
@@ -132,7 +132,7 @@ class LimitSurfaceExact(LimitSurface):
 
     @functools.cached_property
     def numbers(self) -> SurfaceNumbers:
-        """Those of `LimitSurfaceTable`, with the mixed derivatives at its nodes."""
+        """Numbers of `LimitSurfaceTable`, with the mixed derivatives at its nodes."""
         from planarfriction.limit_surface.table import LimitSurfaceTable
 
         return LimitSurfaceTable(self.patch, self.segments, normal_force=self.normal_force).numbers

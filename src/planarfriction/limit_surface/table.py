@@ -48,7 +48,7 @@ class LimitSurfaceTable(CompiledLimitSurface):
 
     @functools.cached_property
     def numbers(self) -> SurfaceNumbers:
-        """At the nodes, the potential, its derivatives along both angles and the mixed one; and the force in a pure
+        """Numbers at the nodes: the potential, its derivatives along both angles and the mixed one; and the force in a pure
         spin."""
         if not self._one_metric:
             return SurfaceNumbers(self.kind, self.segments, potential_table(*self._scaled_levers, self.segments))

@@ -171,9 +171,9 @@ class _WeightProblem(NamedTuple):
     """Constraints on the weights of a compressed patch, over the C cells that may be chosen (`cells`) out of N."""
 
     every: int
-    """N."""
+    """Number of all cells, N."""
     cells: np.ndarray
-    """Their indices `[C]`."""
+    """Indices of the cells that may be chosen `[C]`."""
     moments: np.ndarray
     """Independent moments and spin wrench of one unit of weight on each cell, `[M, C]`."""
     moments_wanted: np.ndarray

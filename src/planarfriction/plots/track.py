@@ -26,7 +26,7 @@ class ContactTrack:
 
     contact: Contact
     index: int
-    """Its place among the contacts of the scene."""
+    """Index among the contacts of the scene."""
     poses: np.ndarray
     """Pose (x, y, angle) of its frame in the world `[F, 3]` [m, m, rad]."""
     twists: np.ndarray
@@ -68,7 +68,7 @@ class Track(NamedTuple):
     poses: np.ndarray
     """Pose (x, y, theta) of the body `[F, 3]` [m, m, rad]."""
     twists: np.ndarray
-    """Its twist (vx, vy, omega) there, world axes `[F, 3]` [m/s, m/s, rad/s]."""
+    """Twist (vx, vy, omega) there, world axes `[F, 3]` [m/s, m/s, rad/s]."""
     contacts: list[ContactTrack]
 
 

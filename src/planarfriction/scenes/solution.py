@@ -61,7 +61,7 @@ class History(NamedTuple):
     values: np.ndarray
     """Numbers (names, for `contact`)."""
     attrs: dict[str, str]
-    """Its unit in "units", what it is in "long_name"."""
+    """Attributes: the unit in "units", a description in "long_name"."""
 
 
 @described

@@ -48,7 +48,7 @@ class _Search(NamedTuple):
     passes: jax.Array
     residual: jax.Array
     converged: jax.Array
-    """In contact space."""
+    """True if the residual in contact space is within the tolerance."""
     slack: jax.Array
 
 

@@ -26,7 +26,7 @@ class HostResponse(NamedTuple):
     """Response of twists and loads at the end of a step to the wrenches w `[3k]` that act during it."""
 
     twist: jax.Array
-    """Without wrenches, `[3k]`."""
+    """Twists without wrenches, `[3k]`."""
     load: jax.Array
     """Return the loads `[k]`."""
     response: jax.Array
@@ -64,7 +64,7 @@ class _Round(NamedTuple):
     twist: Any
     load: Any
     unit: Any
-    """At the guess, with slopes and misfit."""
+    """Wrenches per unit load at the guess, with their slopes and the misfit."""
     slopes: Any
     misfit: Any
     start: Any

@@ -33,7 +33,7 @@ class WrenchResponse(NamedTuple):
     free: jax.Array
     """Acceleration without wrenches, `[nv]`."""
     moved: jax.Array
-    """By wrenches, `[nv, 3k]`."""
+    """Acceleration by wrenches, `[nv, 3k]`."""
     stiffness: jax.Array
     """D of the quadratic rows, `[nefc]`."""
     limit: jax.Array

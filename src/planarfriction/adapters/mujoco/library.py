@@ -140,7 +140,7 @@ def _check(parts: dict[str, Any]) -> None:
 
 
 _OTHERWISE = ("time", "ncon", "nefc", "contact", "efc_J_rownnz", "efc_J_rowadr", "efc_J_colind")
-"""Not to be checked as arrays; rows of Jacobians are described where these are sparse alone."""
+"""Fields that are not checked as arrays; rows of Jacobians are described where these are sparse alone."""
 
 
 def _word(owner: Any, offset: int) -> int:

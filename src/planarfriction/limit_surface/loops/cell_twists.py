@@ -17,7 +17,7 @@ _BALANCED = 1e-13
 """Slope of the dissipation at which a rounded minimum is found, per `mu f_N` [-]."""
 
 _ROUGH = 1e-3
-"""The same for the roundings before the last, which only lead there [-]."""
+"""Slope at which the minima of earlier, coarser roundings are found, per `mu f_N` [-]."""
 
 _PLACED = 1e-15
 """Rounding of a place in the plane [-]: a step so short is none."""

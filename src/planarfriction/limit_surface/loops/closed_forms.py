@@ -54,7 +54,7 @@ class Discs(NamedTuple):
     radii: np.ndarray
     """`[K]`."""
     loads: np.ndarray
-    """Their shares of the load, `[K]`."""
+    """Shares of the load of the discs, `[K]`."""
 
 
 class Rings(NamedTuple):
@@ -63,7 +63,7 @@ class Rings(NamedTuple):
     share: np.ndarray
     """Nodes of a rule on (0, 1), `[K]`."""
     weight: np.ndarray
-    """Their weights, `[K]`."""
+    """Weights of the nodes, `[K]`."""
     inner: float
     outer: float
     """Radii between which there is load."""

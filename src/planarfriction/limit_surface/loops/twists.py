@@ -22,13 +22,13 @@ from planarfriction.kernels.vectors import dot, norm, plus, put_all, times
 from planarfriction.limit_surface.loops import closed_forms
 
 BAD_WRENCH = -1.0
-"""In place of an angle: a wrench that is zero or not finite."""
+"""Value in place of an angle: a wrench that is zero or not finite."""
 
 _BALANCED = 1e-12
 """Angle [rad] at which a twist is found: what rounding leaves of the exact surfaces."""
 
 _ROUGH = 1e-6
-"""The same for a first guess [rad]."""
+"""Angle at which a first guess is good enough [rad]."""
 
 _GOOD = 1e-10
 """Angle [rad] below which a step that does not help ends the search: rounding has the rest."""
@@ -47,7 +47,7 @@ class StoredPotential(NamedTuple):
     """A surface of kind `POTENTIAL`."""
 
     data: np.ndarray
-    """Its numbers."""
+    """Numbers of the surface (see `kernels.surfaces`)."""
     size: int
     """Segments of a quadrant."""
     duals: np.ndarray

@@ -33,7 +33,7 @@ class Scratch(NamedTuple):
     start: int
     """Wrenches where a step in contact space begins, [3k]."""
     goal: int
-    """And where it ends, [3k]."""
+    """Wrenches where the step ends, [3k]."""
     move: int
     """Twists between, [3k]."""
     block: int

@@ -112,9 +112,9 @@ class Memory(NamedTuple):
     """Places in the user data of what patches remember from step to step, in words."""
 
     state: int
-    """At `time`."""
+    """State of all patches at `time`."""
     new: int
-    """At `next`."""
+    """State of all patches at `next`."""
     guess: int
     """Wrenches at the beginning of the step, [3k]."""
     wrench: int
@@ -128,11 +128,11 @@ class Memory(NamedTuple):
     passive: int
     """`qfrc_passive` without friction, [nv]."""
     total: int
-    """And with it, [nv]."""
+    """`qfrc_passive` with friction, [nv]."""
     time: int
-    """At the beginning of the step [s]."""
+    """Time at the beginning of the step [s]."""
     next: int
-    """At its end [s]."""
+    """Time at the end of the step [s]."""
     iterations: int
     passes: int
     residual: int
@@ -167,11 +167,11 @@ class Host(NamedTuple):
     at_contact: int
     """Address of flags: 1 where the origin is in the middle of the contacts."""
     free_count: int
-    """Free joints."""
+    """Number of free joints."""
     free_joints: int
-    """Address of their first degrees of freedom, int [free_count]."""
+    """Address of the indices of the free joints, int [free_count]."""
     free_dofs: int
-    """And where their degrees of freedom begin."""
+    """Address of the first degree of freedom of each free joint, int [free_count]."""
     inertia: int
     """Offset of the inertia that `mj_fullM` wants, -1 where it takes the data."""
     memory: Memory
