@@ -64,11 +64,11 @@ class _Round(NamedTuple):
     twist: Any
     load: Any
     unit: Any
-    """Wrenches per unit load at the guess, with their slopes and the misfit."""
+    """Friction per unit load at the guess, with its slopes and the misfit."""
     slopes: Any
     misfit: Any
     start: Any
-    """The Newton step on the way: whence, how far in all and in twists, `A dW . s` there, and the share tried."""
+    """Newton step that is being tried: start, change of wrenches and of twists, `A dW . s` at its start, share tried."""
     change: Any
     move: Any
     first: Any
