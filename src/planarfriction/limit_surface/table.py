@@ -48,7 +48,7 @@ class LimitSurfaceTable(CompiledLimitSurface):
 
     @functools.cached_property
     def numbers(self) -> SurfaceNumbers:
-        """Numbers at the nodes: the potential and its derivatives along both angles and mixed; then the force of a spin."""
+        """Numbers at the nodes: the potential and its derivatives along both angles and mixed; the force of a spin."""
         if not self._one_metric:
             return SurfaceNumbers(self.kind, self.segments, potential_table(*self._scaled_levers, self.segments))
         return SurfaceNumbers(self.kind, self.segments, _nodes(self._exact, self.segments))

@@ -125,7 +125,6 @@ def plan_grip(
         raise InvalidValueError("bounds", f"reach the {least:.3g} N that hold the body at the end", [low, high])
     radius = float(patch.contact_radius(at_start))
     shares = (1.0, 1.0 - friction, 1.0 + friction) if friction else (1.0,)
-    wanted = Aim(angle, slide, radius)
     seen = sorted({*shares, 0.99, 1.01})
     grips = Grips(scene, index, seen)
     wanted = Aim(angle, slide, radius)

@@ -68,7 +68,7 @@ class _Round(NamedTuple):
     slopes: Any
     misfit: Any
     start: Any
-    """Newton step that is being tried: start, change of wrenches and of twists, `A dW . s` at its start, share tried."""
+    """Newton step under trial: start, change of wrenches and of twists, `A dW . s` at its start, share tried."""
     change: Any
     move: Any
     first: Any
