@@ -58,8 +58,7 @@ class Asking:
         self._touching, self._levers = [False] * k, np.ones(3 * k)
         self._levers[2::3] = [math.sqrt((model.patch.positions**2).sum(axis=1).mean()) for model in coupled.models]
         self._rows, self._moved = np.zeros((3 * k, size)), np.zeros((size, 3 * k))
-        """Return the Jacobian of the twists `[3k, nv]`, 1 for the contacts of each patch `[k, nefc]`, and 1 for patches
-        in contact."""
+        """Jacobian of the twists `[3k, nv]`; velocities that wrenches cause without contact `[nv, 3k]`."""
 
     def step(
         self,

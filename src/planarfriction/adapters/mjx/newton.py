@@ -28,7 +28,7 @@ class HostResponse(NamedTuple):
     twist: jax.Array
     """Twists without wrenches, `[3k]`."""
     load: jax.Array
-    """Return the loads `[k]`."""
+    """Loads without wrenches, `[k]`."""
     response: jax.Array
     """A, `[3k, 3k]`."""
     load_response: jax.Array
@@ -83,33 +83,43 @@ class _Round(NamedTuple):
     done: Any
 
 
-def solve(unit: Unit, host: HostResponse, guess: jax.Array, radius: jax.Array, tolerance: float, most: int) -> Solved:
-    """Solve for the wrenches `w(V, N)` with the V and N that they cause; `guess` `[3k]`, `radius` of the patches `[k]`
-    [m]."""
-    count, lever = len(host.load), jnp.ones((len(host.load), 3)).at[:, 2].set(radius)
-    caused = host.response @ guess
-    speeds = lever.ravel() * (abs(host.twist + caused) + abs(caused))
-    near = jnp.maximum(tolerance, ROUNDING * speeds.max())
-    diagonal = jnp.diagonal(host.response).reshape(-1, 3)
-    scale = jnp.where(diagonal > 0.0, jnp.sqrt(abs(diagonal)), 1.0)
-    eye = jnp.broadcast_to(jnp.eye(3)[:, None], (3, count, 3))
+class _Search(NamedTuple):
+    """Search for the wrenches of one step."""
 
-    def evaluate(twist):
-        return jax.vmap(lambda along: jax.jvp(unit, (twist,), (along,)), out_axes=(None, -1))(eye)
+    unit: Unit
+    host: HostResponse
+    lever: jax.Array
+    """Factors `[k, 3]` that make speeds of twists: 1, 1 and the radius of the patch [m]."""
+    diagonal: jax.Array
+    """Diagonal of A, `[k, 3]`."""
+    scale: jax.Array
+    """Twists of unit energy, `[k, 3]`."""
+    near: jax.Array
+    """Misfit [m/s] at which wrenches fit."""
+    most: int
+    """Largest number of iterations."""
 
-    def misfit_of(twist, load, unit):
+    def evaluate(self, twist):
+        """Return the friction per unit load of twists `[k, 3]`, and its slopes `[k, 3, 3]`."""
+        eye = jnp.broadcast_to(jnp.eye(3)[:, None], (3, len(twist), 3))
+        return jax.vmap(lambda along: jax.jvp(self.unit, (twist,), (along,)), out_axes=(None, -1))(eye)
+
+    def misfit(self, twist, load, unit):
+        """Return the largest speed [m/s] by which twists and loads miss those that the friction `unit` causes."""
+        host = self.host
         w = (load[:, None] * unit).ravel()
-        gap = abs(host.twists(w) - twist) * lever
+        gap = abs(host.twists(w) - twist) * self.lever
         missing = abs(host.loads(w) - load)
-        gap = jnp.maximum(gap, diagonal * missing[:, None] * jnp.array([1.0, 1.0, 0.0]))
+        gap = jnp.maximum(gap, self.diagonal * missing[:, None] * jnp.array([1.0, 1.0, 0.0]))
         return jnp.where(jnp.isfinite(gap).all(), gap.max(), jnp.inf)
 
-    def newton(w, twist, load, unit, slopes, held):
-        """Return the step, what it moves, and `A dW . s` at its start."""
+    def newton(self, w, twist, load, unit, slopes, held):
+        """Return the step, the twists that it adds, and `A dW . s` at its start."""
+        host, count = self.host, len(load)
         lacks = host.load + host.load_response @ w - load
         follows = jnp.where(held | ((load == 0.0) & (lacks < 0.0)), 0.0, 1.0)
         own = load[:, None, None] * slopes
-        both = jnp.stack([own, _without_rising(own, scale)])
+        both = jnp.stack([own, _without_rising(own, self.scale)])
         caused = (
             both @ host.response.reshape(count, 3, -1)
             + (follows[:, None] * unit)[..., None] * (host.load_response[:, None])
@@ -125,27 +135,29 @@ def solve(unit: Unit, host: HostResponse, guess: jax.Array, radius: jax.Array, t
         change, move = jnp.where(plain, change[0], change[1]), jnp.where(plain, move[0], move[1])
         return change, move, (move * ((load[:, None] * unit).ravel() - w)).sum()
 
-    def body(c: _Round) -> _Round:
-        unit, slopes = evaluate(c.twist)
+    def next_round(self, c: _Round) -> _Round:
+        """Evaluate the models once: take a step if it leads far enough downhill, else try less of it."""
+        host = self.host
+        unit, slopes = self.evaluate(c.twist)
         searching = c.phase == _SEARCH
         here = (c.move * ((c.load[:, None] * unit).ravel() - c.w)).sum()
         far_enough = c.whole | (here >= -DOWNHILL * c.first) | ~(c.first > 0.0) | (c.tries == SHORTENINGS)
         accepted = ~searching | far_enough
         load = jnp.where(c.held, host.loads(c.w), c.load)
-        misfit = misfit_of(c.twist, load, unit)
+        misfit = self.misfit(c.twist, load, unit)
         # the better of the guess and of rest
         back = (c.phase == _REST) & (misfit > c.misfit)
         twist, misfit = jnp.where(back, host.twists(c.w), c.twist), jnp.where(back, c.misfit, misfit)
         unit, slopes = jnp.where(back, c.unit, unit), jnp.where(back, c.slopes, slopes)
-        to_rest = (c.phase == _GUESS) & (misfit > near)
+        to_rest = (c.phase == _GUESS) & (misfit > self.near)
         iterations = c.iterations + (searching & far_enough)
         better = accepted & (misfit < c.best)
         best = jnp.where(better, misfit, c.best)
         wrench = jnp.where(better, (load[:, None] * unit).ravel(), c.wrench)
-        done = accepted & ~to_rest & ((misfit <= near) | (iterations >= most) | (misfit == jnp.inf))
+        done = accepted & ~to_rest & ((misfit <= self.near) | (iterations >= self.most) | (misfit == jnp.inf))
         # a new step, or less of the last
         held = jnp.where(accepted, iterations % ROUND >= JOINT, c.held)
-        change, move, first = newton(c.w, twist, load, unit, slopes, held)
+        change, move, first = self.newton(c.w, twist, load, unit, slopes, held)
         change, move, first = (
             jnp.where(accepted, new, old)
             for new, old in zip((change, move, first), (c.change, c.move, c.first), strict=True)
@@ -176,6 +188,17 @@ def solve(unit: Unit, host: HostResponse, guess: jax.Array, radius: jax.Array, t
             done=done,
         )
 
+
+def solve(unit: Unit, host: HostResponse, guess: jax.Array, radius: jax.Array, tolerance: float, most: int) -> Solved:
+    """Solve for the wrenches `w(V, N)` with the V and N that they cause; `guess` `[3k]`, `radius` of the patches `[k]`
+    [m]."""
+    count, lever = len(host.load), jnp.ones((len(host.load), 3)).at[:, 2].set(radius)
+    caused = host.response @ guess
+    speeds = lever.ravel() * (abs(host.twist + caused) + abs(caused))
+    near = jnp.maximum(tolerance, ROUNDING * speeds.max())
+    diagonal = jnp.diagonal(host.response).reshape(-1, 3)
+    scale = jnp.where(diagonal > 0.0, jnp.sqrt(abs(diagonal)), 1.0)
+    search = _Search(unit, host, lever, diagonal, scale, near, most)
     none, zeros = jnp.zeros(3 * count), jnp.zeros((count, 3))
     first = _Round(
         phase=jnp.asarray(_GUESS), w=guess, twist=host.twists(guess), load=host.loads(guess),
@@ -184,7 +207,7 @@ def solve(unit: Unit, host: HostResponse, guess: jax.Array, radius: jax.Array, t
         whole=jnp.asarray(False), held=jnp.asarray(False), iterations=jnp.asarray(0),
         best=jnp.asarray(jnp.inf), wrench=none, done=jnp.asarray(False),
     )  # fmt: skip
-    end = jax.lax.while_loop(lambda c: ~c.done, body, first)
+    end = jax.lax.while_loop(lambda c: ~c.done, search.next_round, first)
     return Solved(end.wrench, end.iterations, end.best, end.best <= near)
 
 
