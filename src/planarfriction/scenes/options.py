@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -10,6 +9,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.described import described
+from planarfriction.equality import Checked, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.scenes.signal import SAME_TIME, sample_count
 
@@ -32,38 +32,33 @@ class Plan(NamedTuple):
 
 @described
 @dataclass(frozen=True)
-class SolverOptions:
+class SolverOptions(Checked):
     """Options of the simulation of a scene; None takes those of the scene, or of the function that gets them.
 
     Raises InvalidValueError for numbers that are not > 0.
     """
 
-    t_end: float | None = None
+    t_end: float | None = checked(validation.positive, default=None)
     """End [s], at most the scene's own."""
-    rtol: float | None = None
+    rtol: float | None = checked(validation.positive, default=None)
     """Relative tolerance [-], > 0."""
-    atol: float | None = None
+    atol: float | None = checked(validation.positive, default=None)
     """Tolerance as a share of the natural scales [-], > 0 (see `simulate`); it follows `rtol` by default."""
-    save_every: float | None = None
+    save_every: float | None = checked(validation.positive, default=None)
     """Recording interval [s]; the end is always recorded."""
-
-    def __post_init__(self) -> None:
-        for name, value in dataclasses.asdict(self).items():
-            if value is not None:
-                validation.positive(name, value)
 
     def plan(self, scene: Scene, rtol: float | None = None) -> Plan:
         """Return what the options say for a scene; with `rtol` given, both tolerances are that by default.
 
         Raises InvalidValueError for an end after the scene's own.
         """
-        end = scene.t_end if self.t_end is None else float(self.t_end)
+        end = scene.t_end if self.t_end is None else self.t_end
         if end > scene.t_end:
             raise InvalidValueError("t_end", f"be at most the scene's {scene.t_end:g} s", end)
         least, default = (scene.atol, scene.rtol) if rtol is None else (rtol, rtol)
-        relative = default if self.rtol is None else float(self.rtol)
-        absolute = least * (relative / default) if self.atol is None else float(self.atol)
-        every = scene.save_every if self.save_every is None else float(self.save_every)
+        relative = default if self.rtol is None else self.rtol
+        absolute = least * (relative / default) if self.atol is None else self.atol
+        every = scene.save_every if self.save_every is None else self.save_every
         return Plan(end, recording_times(end, every), relative, absolute)
 
 
