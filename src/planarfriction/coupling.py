@@ -329,7 +329,7 @@ def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _PackedPatch
         row=rows.offsets,
     )
     kept = [functions, owners, firsts, radius, *known.values()]
-    return _Packed(row_of(patches), rows.slices, rows.size, records, shares, following, kept)
+    return _PackedPatches(row_of(patches), rows.slices, rows.size, records, shares, following, kept)
 
 
 def _addresses(steps: PackedSteps) -> np.ndarray:

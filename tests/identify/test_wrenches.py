@@ -309,7 +309,7 @@ def test_bad_options_are_named(log, options, words):
 
 
 def test_options_are_a_record(log):
-    with pytest.raises(InvalidValueError, match="options must be a FitOptions record, got {'starts'"):
+    with pytest.raises(InvalidValueError, match=r"options must be a FitOptions record, got \{'starts'"):
         identify_lugre(log, PATCH, options={"starts": 1})
     assert FitOptions(noise=[1, 2, 3]) == FitOptions(noise=np.array([1.0, 2.0, 3.0]))
 

@@ -297,7 +297,7 @@ class Layout:
         self.size: int = ends[-1]
         """Words of the block."""
         self.offsets = offsets_of(record)(*ends[:-1])
-        """Where arrays begin (see `arrays_at`)."""
+        """Words at which the arrays begin (see `arrays_at`)."""
         self.slices = {name: slice(*each) for name, *each in zip(self._shapes, ends[:-1], ends[1:], strict=True)}
         """The numbers of each array in a block."""
 
