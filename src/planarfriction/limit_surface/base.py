@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import validation
-from planarfriction.equality import ByValue, by_parts, checked, unusual
+from planarfriction.equality import ByValue, by_parts, unusual
 from planarfriction.errors import FrictionError, InvalidValueError, SolverError
 from planarfriction.geometry import transformed
 from planarfriction.kernels import surfaces as kernels
@@ -77,7 +77,7 @@ class LimitSurface(ByValue):
 
     patch: ContactPatch
     """The patch that slides."""
-    normal_force: float | None = checked(validation.positive_load, default=None, kw_only=True)
+    normal_force: float | None = dataclasses.field(default=None, kw_only=True)
     """Load [N] for which the shape of the patch is taken; None if it does not depend on the load."""
 
     anisotropy: ClassVar[str] = "none"
@@ -90,7 +90,8 @@ class LimitSurface(ByValue):
         if self.anisotropy != "any":
             refuse = refuse_anisotropy if self.anisotropy == "none" else refuse_cell_metrics
             refuse(self.patch, f"{type(self).__name__} (LimitSurfaceTable takes any)")
-        super().__post_init__()
+        if self.normal_force is not None:
+            self._set(normal_force=validation.positive_load("normal_force", self.normal_force))
         if self.normal_force is not None or not self.patch.depends_on_load:
             _ = self.contact_radius  # refuses a patch of one point now rather than later
 

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import validation
-from planarfriction.equality import checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.geometry import transformed
 from planarfriction.limit_surface import quartic_fit
@@ -49,10 +48,11 @@ class LimitSurfaceQuartic(LimitSurface):
     coefficients: np.ndarray | None = dataclasses.field(default=None, kw_only=True)
     """Coefficients of the 15 monomials `quartic_fit.POWERS`, `[15]`; by default fitted to `surface`, for each load."""
 
-    segments: int = checked(validation.count, 2, MOST_SEGMENTS, default=20, kw_only=True)
+    segments: int = dataclasses.field(default=20, kw_only=True)
     """Segments per quadrant of the table for compiled code [-]."""
 
     def __post_init__(self) -> None:
+        self._set(segments=validation.count("segments", self.segments, 2, MOST_SEGMENTS))
         if self.surface is not None and not isinstance(self.surface, LimitSurface):
             raise InvalidValueError("surface", "be a limit surface", self.surface)
         super().__post_init__()

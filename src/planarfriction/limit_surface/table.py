@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.equality import checked
 from planarfriction.kernels import surfaces as kernels
 from planarfriction.limit_surface.base import MOST_SEGMENTS, SurfaceNumbers
 from planarfriction.limit_surface.cell_metrics import potential_table
@@ -28,11 +27,15 @@ class LimitSurfaceTable(CompiledLimitSurface):
     Raises InvalidValueError for an unsupported number of segments, and as every limit surface does.
     """
 
-    segments: int = checked(validation.count, 2, MOST_SEGMENTS, default=20)
+    segments: int = 20
     """Segments per quadrant [-]."""
 
     kind = kernels.POTENTIAL
     anisotropy = "any"
+
+    def __post_init__(self) -> None:
+        self._set(segments=validation.count("segments", self.segments, 2, MOST_SEGMENTS))
+        super().__post_init__()
 
     @functools.cached_property
     def _exact(self) -> LimitSurfaceExact:

@@ -28,10 +28,14 @@ class LimitSurfaceTablePublished(CompiledLimitSurface):
     Source: Waltersson and Karayiannidis 2024, section IV.
     """
 
-    segments: int = checked(validation.count, 2, MOST_SEGMENTS, default=20)
+    segments: int = 20
     """Segments per quadrant [-]."""
 
     kind = kernels.BILINEAR
+
+    def __post_init__(self) -> None:
+        self._set(segments=validation.count("segments", self.segments, 2, MOST_SEGMENTS))
+        super().__post_init__()
 
     def _grid(self) -> tuple[tuple[float, float, float, float], np.ndarray]:
         """Return the patch's grid about the centre of pressure, and new memory for the sums at its corners.
