@@ -125,7 +125,7 @@ def _output(times: np.ndarray, batches: SegmentBatches, bristles: str) -> Output
 
 
 def _histories(scene: Scene, batches: SegmentBatches, output: Output) -> dict[str, History]:
-    """What was recorded, by name, with units."""
+    """Return what was recorded, by name, with units."""
 
     def history(name: str, dims: tuple[str, ...], values: np.ndarray, unit: str) -> History:
         long_name = _LONG_NAMES[name]
