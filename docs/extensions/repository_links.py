@@ -14,7 +14,7 @@ LINKS = {
     r"(?:\.\./)?README\.md(?:#[\w-]+)?": "index.md#citation",
     r"(?:\.\./)?CONTRIBUTING\.md": "contributing.md",
     r"(?:\.\./)?CHANGELOG\.md": "changelog.md",
-    r"docs/([\w-]+\.md(?:#[\w-]+)?)": r"\1",
+    r"docs/((?:images/)?[\w-]+\.(?:md|png)(?:#[\w-]+)?)": r"\1",
 }
 """Link in a file of the repository -> link to the page."""
 
