@@ -244,7 +244,7 @@ def compare_with_compiled(seed: int, kinds, steps: int, bodies: int) -> None:
     patches = random_patches(generator, 2, kinds)
     radius = np.array([np.sqrt((model.patch.positions**2).sum(1).mean()) for model in patches.models])
     lever = np.stack([np.ones(2), np.ones(2), radius], 1)
-    step, both = in_operations(patches), 0
+    step, both, rounds = in_operations(patches), 0, 0
     for state, host, dt, theirs in random_run(generator, patches, random_bodies(generator, bodies, 2, 0.3), steps):
         ours, twist, load = step(state, host, dt)
         good = np.asarray(ours.converged) & theirs.converged
@@ -253,8 +253,10 @@ def compare_with_compiled(seed: int, kinds, steps: int, bodies: int) -> None:
         assert (abs(twist - theirs.twist) * lever)[good].max() < 1e-7
         causes = np.diagonal(host.twist_response, axis1=-2, axis2=-1)[:, ::3]
         assert (abs(load - theirs.normal_force) * causes)[good].max() < 1e-7
-        assert abs(np.asarray(ours.iterations) - theirs.iterations)[good].mean() < 0.5
+        rounds += abs(np.asarray(ours.iterations) - theirs.iterations)[good].sum()
     assert both >= 0.999 * steps * bodies
+    # of all steps: where friction falls with speed, a step has several ends, and a last bit chooses between them
+    assert rounds / both < 0.2
 
 
 def test_the_step_in_contact_space_is_the_compiled_one():

@@ -40,9 +40,9 @@ RECORDS = """
     Rollout RolloutVJP RolloutJacobian RolloutStates RolloutTangent RolloutJVP SceneGradient SceneSensitivities
     Identification Verdict MotionPlan GripPlan GripReport Push PushPlan PushReport Solution Progress
     SurfaceComparison ModelJacobians PackedModel StepJacobians Statistics Integration
-    LimitSurface FrictionLaw FrictionModel Pressure
+    LimitSurface FrictionLaw FrictionModel Pressure HostStep
 """
-"""Classes that the library makes itself, and bases of families: users do not call their constructors."""
+"""Classes that the library makes itself, bases of families, and `HostStep`, which is checked where it is used."""
 
 
 PROTOCOL = """

@@ -18,7 +18,7 @@ from __future__ import annotations
 from planarfriction import formulas
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
-from planarfriction.kernels.rules import per, rule
+from planarfriction.kernels.rules import ratio, rule
 from planarfriction.kernels.vectors import dot, norm, plus, times
 
 ROUNDING = 1.0 + 256.0 * 2.220446049250313e-16
@@ -44,7 +44,7 @@ rule(cap, "s", {0: "-{t} * per_capped({0}, {1})", 1: "per_capped({0}, {1})"}, pe
 @kernel
 def _along(z, size, u, per_h):
     """Compute the speed at which a bristle of norm `size` is being stretched; 0 for none."""
-    return per_h * dot(z, u) * per(size)
+    return per_h * ratio(dot(z, u), size)
 
 
 @kernel

@@ -21,8 +21,9 @@ from planarfriction.compiler import kernel
 from planarfriction.compiler.memory import Doubles, arrays_at, at, reader
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels.contacts import ROWS, functions_of, traction
-from planarfriction.kernels.derive import derive, per
+from planarfriction.kernels.derive import derive
 from planarfriction.kernels.law import grip, grip_slope, squared
+from planarfriction.kernels.rules import per, ratio
 from planarfriction.kernels.vectors import dot, norm, plus, put, put_all, three, times
 
 
@@ -121,7 +122,7 @@ def _decay(law, h, u):
     """Return the decay of a bristle."""
     speed, size = norm(u), norm(h)
     q = law.sigma_0 / formulas.stribeck(xp, speed, law)
-    return formulas.bristle_decay(xp, size * q, dot(h, u) * per(size), speed, q, law)
+    return formulas.bristle_decay(xp, size * q, ratio(dot(h, u), size), speed, q, law)
 
 
 _SLOPES = derive(_decay, ("h", "u"), ("h", "u"))

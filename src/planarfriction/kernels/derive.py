@@ -22,7 +22,7 @@ from typing import Any, NamedTuple
 
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
-from planarfriction.kernels.rules import NAMES, RULES, Rule, per
+from planarfriction.kernels.rules import NAMES, QUOTIENT, RULES, Rule
 
 
 class NotStraightError(TypeError):
@@ -193,8 +193,8 @@ class _Walk:
         return self._taken([target], atoms, RULES[type(node.op)])[0]
 
     def _quotient(self, above: str, below: str) -> str:
-        inverse = self._taken([self.emit(f"1.0 / {below}")], [below], RULES[per])[0]
-        return self._taken([self.emit(f"{above} * {inverse}")], [above, inverse], RULES[ast.Mult])[0]
+        inverse = self.emit(f"1.0 / {below}")
+        return self._taken([self.emit(f"{above} * {inverse}")], [above, below, inverse], QUOTIENT)[0]
 
     def _vector(self, items: list[str]) -> str:
         target = self.emit(f"({', '.join(items)},)")

@@ -19,7 +19,8 @@ from planarfriction.compiler.memory import Doubles, reader
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import moments
 from planarfriction.kernels.contacts import functions_of
-from planarfriction.kernels.derive import derive, per
+from planarfriction.kernels.derive import derive
+from planarfriction.kernels.rules import ratio
 from planarfriction.kernels.small_matrices import applied
 from planarfriction.kernels.surfaces import sliding, sliding_jacobian
 from planarfriction.kernels.vectors import applied_back, dot, norm, plus
@@ -113,9 +114,9 @@ def _raw(own, z):
 def _decay(law, z, u, twist):
     """Return the decay of the bristle at the scaled twist for which the limit surface gives u."""
     v, size = norm(twist), norm(z)
-    h = xp.where(norm(u) > 0.0, norm(u) * per(v), 1.0)
+    h = xp.where(norm(u) > 0.0, ratio(norm(u), v), 1.0)
     q = law.sigma_0 / formulas.stribeck(xp, v, law)
-    return formulas.bristle_decay(xp, size * q / h, dot(z, u) * per(size) / h, v, q, law)
+    return formulas.bristle_decay(xp, size * q / h, ratio(dot(z, u), size) / h, v, q, law)
 
 
 _SLOPES = derive(_decay, ("z", "u", "twist"), ("z", "u", "twist"))

@@ -22,9 +22,10 @@ from planarfriction.kernels.bind import bind
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.published_contact import Shape
 from planarfriction.kernels.rollouts import Cotangents, StepModel
-from planarfriction.kernels.rules import per
+from planarfriction.kernels.rules import ratio
+from planarfriction.kernels.steady import STILL
 from planarfriction.kernels.surfaces import sliding, sliding_jacobian
-from planarfriction.kernels.vectors import applied_back, norm, plus
+from planarfriction.kernels.vectors import applied_back, norm, plus, times
 
 NAMES = (*LawNumbers._fields, *Shape._fields)
 """Numbers of a contact, in the order of its row."""
@@ -66,6 +67,8 @@ def hold(contact, twist):
     """Return `HeldTwist` at a twist."""
     surface, scaled = contact.surface, scaled_twist(contact.shape, twist)
     v = norm(scaled)
+    moves = xp.where(v > STILL, 1.0, 0.0)
+    scaled, v = times(moves, scaled), moves * v
     u = sliding(surface[0], contact.data, surface[1], surface[2], scaled[0], scaled[1], scaled[2], v)
     return HeldTwist(scaled, twist[2], v, u)
 
@@ -83,7 +86,7 @@ def hold_slopes(contact, twist, work):
 def _step(law, shape, twist, omega, u, z, dt):
     """Return the new state and the wrench at V_S = `twist`, where the limit surface gives u."""
     r, v = shape.contact_radius, norm(twist)
-    h = xp.where(v > 0.0, norm(u) * per(v), 1.0)
+    h = xp.where(v > 0.0, ratio(norm(u), v), 1.0)
     scaled = z[0], z[1], z[2] / r
     new, k = bristle_step.step(law, scaled, u, v, 1.0 / h, law.sigma_0 / formulas.stribeck(xp, v, law), dt)
     rate = plus(u, -k, new)

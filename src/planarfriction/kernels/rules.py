@@ -44,6 +44,12 @@ def per(x):
 
 
 @kernel
+def ratio(x, y):
+    """Return `x/y` for y > 0; 0 at 0, and so are its slopes."""
+    return x * per(y)
+
+
+@kernel
 def _power_slope(x, exponent, raised):
     """Return the derivative of `x^exponent` by x; at 0 the right-hand limit for exponents >= 1."""
     return xp.where(x > 0.0, exponent * raised * per(x), xp.where(exponent == 1.0, 1.0, 0.0))
@@ -88,9 +94,11 @@ RULES: dict[Any, Rule] = {
     times: Rule("v", {}, {0: "dot({b}, {1})", 1: "times({0}, {b})"}),
     dot: Rule("s", {}, {0: "times({b}, {1})", 1: "times({b}, {0})"}),
     vectors.square: Rule("s", {}, {0: "times(2.0 * {b}, {0})"}),
-    vectors.norm: Rule("s", {"per": "per({t})"}, {0: "times({b} * {per}, {0})"}),
+    # times the unit vector: one over a norm of 1e-160 leaves no room for another factor
+    vectors.norm: Rule("s", {"per": "per({t})"}, {0: "times({b}, times({per}, {0}))"}),
     math.sqrt: Rule("s", {0: "0.5 * per({t})"}),
     per: Rule("s", {0: "-{t} * {t}"}),
+    ratio: Rule("s", {0: "per({1})", 1: "-{t} * per({1})"}),  # no square of `per`, which 1e-160 takes out of range
     xp.where: Rule("s", {1: "xp.where({0}, 1.0, 0.0)", 2: "xp.where({0}, 0.0, 1.0)"}),
     # of equal numbers the slope is that of the first
     xp.maximum: Rule("s", {0: "xp.where({0} >= {1}, 1.0, 0.0)", 1: "xp.where({0} >= {1}, 0.0, 1.0)"}),
@@ -104,6 +112,9 @@ RULES: dict[Any, Rule] = {
     formulas.slip_fraction: Rule("s", {1: "slip_slope({1}, {2})", 2: "slip_by_breakaway({1}, {2})"}),
 }
 """Rules by function or operator."""
+
+QUOTIENT = Rule("s", {0: "{2}", 1: "-{t} * {2}"})
+"""Rule of a quotient, whose third argument is one over the denominator."""
 
 
 def rule(function: Callable, results: str, slopes: dict, pulls: dict | None = None, **names: Any) -> None:
