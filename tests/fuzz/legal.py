@@ -129,8 +129,8 @@ def objects() -> dict[str, Any]:
 
 
 SPECIAL: dict[str, dict[str, Any]] = {
-    "planning.Slider": {"outline": SQUARE},
-    "planning.Slider.gaps": {"point": (0.0, 0.0)},
+    "Slider": {"outline": SQUARE},
+    "Slider.gaps": {"point": (0.0, 0.0)},
     "planning.motion_cone": {"at": (-0.01, 0.002), "normal": (1.0, 0.0)},
     "planning.push": {
         "slider": Fresh(lambda: objects()["Slider"]),
@@ -171,12 +171,12 @@ SPECIAL: dict[str, dict[str, Any]] = {
     "Scene.from_file": {"path": EXAMPLES / "drift.toml"},
     "Scene.to_file": {"path": "scene.toml"},
     "Solution.save": {"path": "solution.nc"},
-    "identify.Log.from_csv": {"path": EXAMPLES / "push.csv"},
+    "Log.from_csv": {"path": EXAMPLES / "push.csv"},
     "patch.read_pressure_map": {"path": EXAMPLES / "pad_pressure.csv"},
-    "identify.Log": {"twist": TWISTS, "wrench": TWISTS},
-    "identify.Log.from_motion": {"wrench": TWISTS},
+    "Log": {"twist": TWISTS, "wrench": TWISTS},
+    "Log.from_motion": {"wrench": TWISTS},
     "identify.SlidingBody": {"gravity": 9.81},
-    "identify.Slide": {"time": TIMES, "pose": TWISTS, "twist": None},
+    "Slide": {"time": TIMES, "pose": TWISTS, "twist": None},
     "identify.design_experiment": {
         "logs": (),
         "motions": Fresh(lambda: objects()["log"]),
