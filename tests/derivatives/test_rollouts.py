@@ -52,47 +52,7 @@ def drive(model, seed: int = 0, steps: int = T):
     return random.normal(size=3) * 4e-7 / scale, twists, loads
 
 
-def inputs_of(model, seed: int = 0):
-    state, twists, loads = drive(model, seed)
-    return {"state": state, "twist": twists, "normal_force": loads, "parameters": derivatives.parameters_of(model)}
-
-
-def units_of(model) -> dict:
-    """The natural size of each input."""
-    r = radius(model)
-    parameters = np.abs(derivatives.parameters_of(model)) + (np.arange(12) >= 10) * r
-    return {
-        "state": 1e-6 * np.array([1.0, 1.0, r]),
-        "twist": 3e-3 * np.array([1.0, 1.0, 1.0 / r]),
-        "normal_force": 1.0,
-        "parameters": parameters * (np.arange(12) != 7) + 0.1 * (np.arange(12) == 7),
-    }
-
-
-def rolled(model, inputs) -> derivatives.Rollout:
-    return derivatives.rollout(
-        model, inputs["state"], inputs["twist"], inputs["normal_force"], DT, parameters=inputs["parameters"]
-    )
-
-
 # ---------------------------------------------------------------------- the roll-out
-
-
-@every_surface
-@every_law
-def test_a_rollout_takes_the_steps_of_the_model(kind, law):
-    model = model_of(kind, law)
-    state, twists, loads = drive(model)
-    loads[5] = 0.0
-    end, wrenches = derivatives.rollout(model, state, twists, loads, DT)
-    on_the_way = derivatives.rollout_states(model, state, twists, loads, DT)
-    assert np.array_equal(on_the_way.wrenches, wrenches) and np.array_equal(on_the_way.state, end)
-    for t in range(T):
-        # The same code, inlined elsewhere: sums may be ordered differently.
-        assert on_the_way.states[t] == pytest.approx(state, rel=1e-12, abs=1e-20)
-        state, wrench = model.step(state, twists[t], loads[t], DT)
-        assert wrenches[t] == pytest.approx(wrench, rel=1e-12, abs=1e-14)
-    assert end == pytest.approx(state, rel=1e-12, abs=1e-20)
 
 
 def test_parameters_take_the_place_of_the_models_own():
@@ -192,34 +152,6 @@ def test_without_load_nothing_passes_but_the_load(kind):
 
 
 # ---------------------------------------------------------------------- against differences
-
-
-@every_surface
-@every_law
-def test_the_gradient_of_a_rollout_is_that_of_differences(kind, law):
-    model = model_of(kind, law)
-    inputs, units = inputs_of(model, seed=3), units_of(model)
-    random = np.random.default_rng(1)
-    bars = random.normal(size=(T, 3)) / (1.0, 1.0, radius(model)), random.normal(size=3) / units["state"]
-
-    def value(changed):
-        end, wrenches = rolled(model, changed)
-        return (bars[0] * wrenches).sum() + (bars[1] * end).sum()
-
-    gradient = derivatives.rollout_vjp(
-        model, inputs["state"], inputs["twist"], inputs["normal_force"], DT, *bars, parameters=inputs["parameters"]
-    )
-    for name, of in gradient._asdict().items():
-        scaled = of * units[name]
-        expected = np.empty_like(scaled)
-        for index in np.ndindex(scaled.shape):
-            step = np.zeros_like(scaled)
-            step[index] = 1e-6
-            low, high = ({**inputs, name: inputs[name] + sign * step * units[name]} for sign in (-1.0, 1.0))
-            expected[index] = (value(high) - value(low)) / 2e-6
-        # Differences lose 1e-16/1e-6 to rounding of a value near 10 and (1e-6)^2 to truncation, but 1e-5 or so of the
-        # largest slope where a bristle passes an end of its elasto-plastic range, whose curvature jumps.
-        assert scaled == pytest.approx(expected, rel=1e-5, abs=1e-7 * np.abs(scaled).max() + 1e-8), name
 
 
 sliding_or_stuck = {
@@ -332,125 +264,7 @@ def test_jacobians_of_a_batch_of_steps_are_those_of_each(kind):
             model.step_jacobians(**inputs)
 
 
-# ---------------------------------------------------------------------- backwards against forwards
-
-
-@every_surface
-@every_law
-def test_the_adjoint_is_the_transpose_of_the_sensitivities(kind, law):
-    model = model_of(kind, law)
-    state, twists, loads = drive(model, seed=5)
-    bar = np.random.default_rng(2).normal(size=(T, 3)) / (1.0, 1.0, radius(model))
-    _, wrenches, slopes = derivatives.rollout_jacobian(model, state, twists, loads, DT)
-    assert wrenches == pytest.approx(
-        derivatives.rollout(model, state, twists, loads, DT).wrenches, rel=1e-12, abs=1e-14
-    )
-    terms = np.einsum("ti,tip->tip", bar, slopes)
-    gradient = derivatives.rollout_vjp(model, state, twists, loads, DT, bar)
-    # Sums in another order.
-    assert (np.abs(gradient.parameters - terms.sum((0, 1))) <= 1e-12 * np.abs(terms).sum((0, 1))).all()
-    if law == "plain":
-        assert gradient.parameters[PARAMETERS.index("breakaway_ratio")] == 0.0
-
-
-@every_surface
-@every_law
-def test_the_adjoint_is_the_transpose_of_the_jacobians(kind, law):
-    """`<bar, J dx> = <J' bar, dx>` for changes of state, twists and loads, `J` step by step."""
-    model, random = model_of(kind, law), np.random.default_rng(4)
-    state, twists, loads = drive(model, seed=6)
-    units = units_of(model)
-    bar, end_bar = random.normal(size=(T, 3)) / (1.0, 1.0, radius(model)), random.normal(size=3) / units["state"]
-    change = random.normal(size=3) * units["state"]
-    turns, pushes = random.normal(size=(T, 3)) * units["twist"], random.normal(size=T)
-    gradient = derivatives.rollout_vjp(model, state, twists, loads, DT, bar, end_bar)
-    backwards = [
-        (gradient.state * change).sum(),
-        (gradient.twist * turns).sum(),
-        (gradient.normal_force * pushes).sum(),
-    ]
-    forwards = []
-    for before, twist, load, turn, push, w_bar in zip(
-        derivatives.rollout_states(model, state, twists, loads, DT).states,
-        twists,
-        loads,
-        turns,
-        pushes,
-        bar,
-        strict=True,
-    ):
-        j = model.step_jacobians(before, twist, load, DT)
-        forwards.append(w_bar @ (j.wrench_state @ change + j.wrench_twist @ turn + j.wrench_load * push))
-        change = j.state_state @ change + j.state_twist @ turn
-    forwards.append(end_bar @ change)
-    assert sum(backwards) == pytest.approx(sum(forwards), abs=1e-12 * np.abs(forwards).sum())
-
-
-def test_sensitivities_of_chosen_parameters():
-    model = model_of("published")
-    state, twists, loads = drive(model)
-    *_, slopes = derivatives.rollout_jacobian(model, state, twists, loads, DT)
-    *_, chosen = derivatives.rollout_jacobian(model, state, twists, loads, DT, ("v_s", "mu_c"))
-    assert np.array_equal(chosen, slopes[..., [PARAMETERS.index("v_s"), PARAMETERS.index("mu_c")]])
-
-
 # ---------------------------------------------------------------------- batches
-
-
-def test_a_batch_is_a_loop():
-    model, random = model_of("published"), np.random.default_rng(8)
-    states = np.stack([drive(model, seed)[0] for seed in range(3)])[:, None]  # [3, 1]
-    twists = np.stack([drive(model, seed)[1] for seed in range(2)])  # [2]
-    loads, dt = drive(model)[2], random.uniform(0.5e-4, 1e-4, T)
-    parameters = derivatives.parameters_of(model) * random.uniform(0.9, 1.0, (3, 1, 12))
-    bar, end_bar = random.normal(size=(3, 2, T, 3)), random.normal(size=(3, 2, 3))
-    ends, wrenches = derivatives.rollout(model, states, twists, loads, dt, parameters=parameters)
-    gradient = derivatives.rollout_vjp(model, states, twists, loads, dt, bar, end_bar, parameters=parameters)
-    slopes = derivatives.rollout_jacobian(
-        model, states, twists, loads, dt, PARAMETERS, parameters=parameters
-    ).d_wrenches
-    assert wrenches.shape == (3, 2, T, 3) and ends.shape == (3, 2, 3) and slopes.shape == (3, 2, T, 3, 12)
-    assert [g.shape for g in gradient] == [a.shape for a in (states, twists, loads, parameters)]
-    total = [np.zeros_like(g) for g in gradient]
-    for i, j in np.ndindex(3, 2):
-        one = states[i, 0], twists[j], loads, dt
-        single = derivatives.rollout(model, *one, parameters=parameters[i, 0])
-        # Contacts abreast go through vector code, which rounds differently.
-        assert wrenches[i, j] == pytest.approx(single.wrenches, rel=1e-12, abs=1e-14)
-        assert ends[i, j] == pytest.approx(single.state, rel=1e-12, abs=1e-20)
-        alone = derivatives.rollout_vjp(model, *one, bar[i, j], end_bar[i, j], parameters=parameters[i, 0])
-        for sum_of, where, g in zip(total, ((i, 0), j, ..., (i, 0)), alone, strict=True):
-            sum_of[where] += g
-        assert np.array_equal(
-            slopes[i, j],
-            derivatives.rollout_jacobian(model, *one, PARAMETERS, parameters=parameters[i, 0]).d_wrenches,
-        )
-    for got, wanted in zip(gradient, total, strict=True):
-        assert got == pytest.approx(wanted, rel=1e-11)  # sums in another order
-
-
-def test_kept_states_and_several_threads_change_nothing():
-    model = model_of("ellipsoid")
-    state, twists, loads = drive(model, steps=500)
-    scales = np.linspace(0.5, 1.0, 150)[:, None, None]  # 75,000 steps: enough for more than one thread
-    bar = np.ones((500, 3))
-    states = derivatives.rollout_states(model, state, scales * twists, loads, DT).states
-    kept = derivatives.rollout_vjp(model, state, scales * twists, loads, DT, bar, states=states)
-    again = derivatives.rollout_vjp(model, state, scales * twists, loads, DT, bar)
-    for first, second in zip(kept, again, strict=True):
-        assert np.array_equal(first, second)
-    last = derivatives.rollout_vjp(model, state, scales[-1] * twists, loads, DT, bar)
-    assert kept.twist[-1] == pytest.approx(last.twist, rel=1e-9, abs=1e-9 * np.abs(last.twist).max())  # rounding
-
-
-def test_one_load_for_all_steps_gets_the_sum():
-    model = model_of("ellipsoid")
-    state, twists, _ = drive(model)
-    whole = derivatives.rollout_vjp(model, state, twists, LOAD, DT, np.ones((T, 3)))
-    each = derivatives.rollout_vjp(model, state, twists, np.full(T, LOAD), DT, np.ones((T, 3)))
-    assert whole.normal_force.shape == () and float(whole.normal_force) == pytest.approx(
-        each.normal_force.sum(), rel=1e-13
-    )
 
 
 def test_one_load_for_each_contact_and_rest():

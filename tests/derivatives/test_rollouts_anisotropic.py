@@ -1,4 +1,4 @@
-"""Derivatives of roll-outs on patches whose friction depends on the direction, in NumPy, PyTorch and JAX."""
+"""Rollouts on patches whose friction depends on the direction: PyTorch and JAX have the derivatives of NumPy."""
 
 from __future__ import annotations
 
@@ -42,63 +42,6 @@ def drive(model, seed: int = 0):
 def bars(model, seed: int = 1):
     random = np.random.default_rng(seed)
     return random.normal(size=(T, 3)) * [1.0, 1.0, 150.0], random.normal(size=model.state_shape) * [1e6, 1e6, 1e8]
-
-
-@every_model
-def test_a_roll_out_takes_the_steps_of_the_model(kind, patch):
-    model = model_of(kind, patch)
-    state, twists, loads = drive(model)
-    end, wrenches = derivatives.rollout(model, state, twists, loads, DT)
-    for twist, load, wrench in zip(twists, loads, wrenches, strict=True):
-        state, wanted = model.step(state, twist, load, DT)
-        assert wrench == pytest.approx(wanted, rel=1e-11, abs=1e-13)  # sums in another order
-    assert end == pytest.approx(state, rel=1e-11, abs=1e-20)
-
-
-@every_model
-def test_the_gradient_is_that_of_differences(kind, patch):
-    model = model_of(kind, patch)
-    state, twists, loads = drive(model, 2)
-    bar, end_bar = bars(model)
-    parameters = derivatives.parameters_of(model)
-    inputs = {"state": state, "twist": twists, "normal_force": loads, "parameters": parameters}
-    gradient = derivatives.rollout_vjp(model, state, twists, loads, DT, bar, end_bar)
-    units = {
-        "state": np.array([1e-7, 1e-7, 1e-9]),
-        "twist": np.array([1e-3, 1e-3, 0.15]),
-        "normal_force": 1.0,
-        "parameters": np.where(parameters == 0.0, 1e-3, np.abs(parameters)),
-    }
-
-    def value(inputs):
-        parameters = inputs["parameters"]
-        run = derivatives.rollout(model, *(inputs[n] for n in list(inputs)[:3]), DT, parameters=parameters)
-        return (bar * run.wrenches).sum() + (end_bar * run.state).sum()
-
-    random = np.random.default_rng(5)
-    for name, found in gradient._asdict().items():
-        along = random.normal(size=found.shape) * units[name]
-        ends = [value({**inputs, name: inputs[name] + h * along}) for h in (1e-6, -1e-6)]
-        # rounding of numbers near 100 by 1e-16/1e-6, and jumps of the curvature at squares of the map
-        assert (found * along).sum() == pytest.approx((ends[0] - ends[1]) / 2e-6, rel=1e-5, abs=1e-5), name
-
-
-@every_model
-def test_forwards_is_the_transpose_of_backwards(kind, patch):
-    model, random = model_of(kind, patch), np.random.default_rng(3)
-    inputs, (bar, end_bar) = drive(model, 4), bars(model)
-    parameters = derivatives.parameters_of(model)
-    changes = [*drive(model, 7), parameters * random.normal(size=len(parameters))]
-    found = derivatives.rollout_jvp(model, *inputs, DT, derivatives.RolloutTangent(*changes))
-    gradient = derivatives.rollout_vjp(model, *inputs, DT, bar, end_bar)
-    forwards = [*(bar * found.wrenches_dot).ravel(), *(end_bar * found.state_dot).ravel()]
-    backwards = np.concatenate([(g * x).ravel() for g, x in zip(gradient, changes, strict=True)])
-    size = np.abs(forwards).sum() + np.abs(backwards).sum()
-    assert sum(forwards) == pytest.approx(backwards.sum(), abs=1e-11 * size)
-    slopes = derivatives.rollout_jacobian(model, *inputs, DT).d_wrenches
-    by_parameters = np.einsum("ti,tip->p", bar, slopes)
-    alone = derivatives.rollout_vjp(model, *inputs, DT, bar).parameters
-    assert (np.abs(by_parameters - alone) <= 1e-11 * np.abs(bar[..., None] * slopes).sum((0, 1))).all()
 
 
 @pytest.mark.torch

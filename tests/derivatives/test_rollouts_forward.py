@@ -15,8 +15,6 @@ PATCH = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
 LAW = pf.LuGre(mu_c=0.7, mu_s=1.2, gamma=1.5, elasto_plastic=pf.ElastoPlastic(0.6))
 DT, T = 1e-4, 14
 
-every_model = pytest.mark.parametrize("kind", ["reduced", "parts", "published"])
-
 
 @functools.cache
 def model_of(kind: str):
@@ -34,37 +32,6 @@ def drive(seed: int = 0, shape: tuple[int, ...] = (3,)):
     twists[5], loads[9] = 0.0, 0.0
     changes = [random.normal(size=shape) * [1e-7, 1e-7, 1e-9], random.normal(size=(T, 3)) * 1e-3 * sizes]
     return (state, twists, loads), [*changes, random.normal(size=T)]
-
-
-@every_model
-def test_forwards_is_the_transpose_of_backwards(kind):
-    """`<bar, J x> = <J' bar, x>` for changes x of all inputs."""
-    model, random = model_of(kind), np.random.default_rng(3)
-    inputs, changes = drive(1, model.state_shape)
-    parameters = derivatives.parameters_of(model)
-    changes.append(parameters * random.normal(size=len(parameters)))
-    bar = random.normal(size=(T, 3)) * [1.0, 1.0, 150.0]
-    end_bar = random.normal(size=model.state_shape) * [1e6, 1e6, 1e8]
-    found = derivatives.rollout_jvp(model, *inputs, DT, derivatives.RolloutTangent(*changes))
-    plain = derivatives.rollout(model, *inputs, DT)
-    assert found.wrenches == pytest.approx(plain.wrenches, rel=1e-11, abs=1e-13)  # sums in another order
-    assert found.state == pytest.approx(plain.state, rel=1e-11, abs=1e-20)
-    gradient = derivatives.rollout_vjp(model, *inputs, DT, bar, end_bar)
-    forwards = [*(bar * found.wrenches_dot).ravel(), *(end_bar * found.state_dot).ravel()]
-    backwards = [*np.concatenate([(g * x).ravel() for g, x in zip(gradient, changes, strict=True)])]
-    assert sum(forwards) == pytest.approx(sum(backwards), abs=1e-11 * np.abs(forwards + backwards).sum())
-
-
-@every_model
-def test_changes_of_parameters_are_the_sensitivities(kind):
-    model = model_of(kind)
-    inputs, _ = drive(2, model.state_shape)
-    by = derivatives.rollout_jacobian(model, *inputs, DT, ["mu_c", "sigma_1"]).d_wrenches
-    places = [derivatives.parameter_names(model).index(name) for name in ("mu_c", "sigma_1")]
-    directions = np.eye(len(derivatives.parameter_names(model)))[places]  # a batch of two
-    found = derivatives.rollout_jvp(model, *inputs, DT, derivatives.RolloutTangent(parameters=directions))
-    assert found.wrenches_dot.shape == (2, T, 3) and found.state_dot.shape == (2, *model.state_shape)
-    assert found.wrenches_dot == pytest.approx(np.moveaxis(by, -1, 0), rel=1e-11, abs=1e-13)
 
 
 def test_changes_broadcast_with_contacts():

@@ -49,56 +49,9 @@ def drive(model: pf.ReducedModel, seed: int = 0):
     return random.normal(size=model.state_shape) * 3e-7, np.cumsum(random.normal(size=(T, 3)), axis=0) * 3e-3 * SIZES
 
 
-def blended_loads(model: pf.ReducedModel) -> np.ndarray:
-    """A ramp over many rungs, where each load blends two of them in each part, as do those beside it."""
-    loads = [
-        load
-        for load in np.linspace(1.031, 3.063, 60)
-        if all(part.shape.blend > 0.0 for h in (-1e-5, 1e-5) for part in model.parts_at(load * (1.0 + h)))
-    ]
-    return np.array(loads)[np.linspace(0, len(loads) - 1, T).astype(int)]
-
-
 def bars_of(model: pf.ReducedModel, seed: int = 1):
     random = np.random.default_rng(seed)
     return random.normal(size=(T, 3)) * SIZES, random.normal(size=model.state_shape) * 1e6
-
-
-# ---------------------------------------------------------------------- the steps
-
-
-@every_model
-def test_a_roll_out_takes_the_steps_of_the_model(kind):
-    model = model_of(kind)
-    state, twists = drive(model)
-    loads = LOADS.copy()
-    loads[[3, 5]] = 0.0, 1.0  # a step without load, and a rung alone
-    found = derivatives.rollout_states(model, state, twists, loads, DT)
-    again = pf.rollout(model, state, twists, loads, DT)
-    for t in range(T):
-        assert found.states[t] == pytest.approx(state, rel=1e-11, abs=1e-20)
-        state, wrench = model.step(state, twists[t], loads[t], DT)
-        assert found.wrenches[t] == pytest.approx(wrench, rel=1e-11, abs=1e-13)  # rounded in another order
-    assert found.state == pytest.approx(state, rel=1e-11, abs=1e-20)
-    assert np.array_equal(again.wrenches, found.wrenches) and np.array_equal(again.state, found.state)
-
-
-def test_a_batch_is_a_loop():
-    model = model_of("parts")
-    states, twists = np.stack([drive(model, i)[0] for i in range(3)])[:, None], drive(model)[1]
-    loads = LOADS * np.array([[0.7], [1.0]])
-    bar, end_bar = bars_of(model)
-    inputs = derivatives.parameters_of(model) * np.array([0.9, 1.0])[:, None]
-    found = derivatives.rollout_vjp(model, states, twists, loads, DT, bar, end_bar, parameters=inputs)
-    assert [g.shape for g in found] == [np.shape(x) for x in (states, twists, loads, inputs)]
-    whole = [np.zeros_like(g) for g in found]
-    for i, j in np.ndindex(3, 2):
-        one = states[i, 0], twists, loads[j], DT
-        alone = derivatives.rollout_vjp(model, *one, bar, end_bar, parameters=inputs[j])
-        for total, at, g in zip(whole, ((i, 0), ..., j, j), alone, strict=True):
-            total[at] += g
-    for got, wanted in zip(found, whole, strict=True):
-        assert got == pytest.approx(wanted, rel=1e-11, abs=1e-12 * np.abs(wanted).max())
 
 
 # ---------------------------------------------------------------------- closed forms
@@ -147,31 +100,6 @@ def test_a_family_that_stays_as_it_is_has_the_gradient_of_a_fixed_patch(kind):
 # ---------------------------------------------------------------------- against differences
 
 
-@every_model
-def test_the_gradient_is_that_of_differences(kind):
-    model = model_of(kind)
-    (state, twists), loads = drive(model, 2), blended_loads(model)
-    parameters, bars = derivatives.parameters_of(model), bars_of(model)
-    inputs = {"state": state, "twist": twists, "normal_force": loads, "parameters": parameters}
-    units = {"state": 1e-7, "twist": 1e-3 * SIZES, "normal_force": 1.0, "parameters": np.maximum(parameters, 1e-3)}
-    gradient = derivatives.rollout_vjp(model, state, twists, loads, DT, *bars)
-
-    def value(name: str, change: np.ndarray) -> float:
-        of = {**inputs, name: inputs[name] + change * units[name]}
-        run = derivatives.rollout(model, *(of[n] for n in list(of)[:3]), DT, parameters=of["parameters"])
-        return float((bars[0] * run.wrenches).sum() + (bars[1] * run.state).sum())
-
-    for name, found in gradient._asdict().items():
-        scaled, expected = found * units[name], np.empty_like(found)
-        for index in np.ndindex(found.shape):
-            step = np.zeros_like(found)
-            step[index] = 1e-6
-            expected[index] = (value(name, step) - value(name, -step)) / 2e-6
-        # rounding of numbers near 100 by 1e-16/1e-6, and jumps of the curvature at squares of the map
-        allowed = 1e-6 * np.abs(scaled).max() + 1e-7
-        assert scaled == pytest.approx(expected, rel=1e-6, abs=allowed), name
-
-
 @pytest.mark.parametrize(("kind", "error"), [("elasto-plastic", 4e-3), ("parts", 1e-3)])
 def test_a_load_that_one_rung_serves_moves_on_along_the_blend(kind, error, monkeypatch):
     """The blend of the very same rungs, read where it is as good as the nearer rung alone."""
@@ -212,39 +140,6 @@ def test_steady_sliding_depends_on_the_load_as_in_the_distributed_model():
             error, moved = (np.abs(a - wanted) * SIZES for a in (tangent.wrenches_dot[0], held))
             # chords of the blend, and cells as areas in the one and points in the other
             assert error.max() < 0.05 * moved.max()
-
-
-# ---------------------------------------------------------------------- backwards against forwards
-
-
-@every_model
-def test_forwards_is_the_transpose_of_backwards(kind):
-    """`<bar, J x> = <J' bar, x>` for changes x of all inputs, also at rest, without load and on rungs."""
-    model, random = model_of(kind), np.random.default_rng(3)
-    state, twists = drive(model, 4)
-    loads = LOADS.copy()
-    loads[[2, 5, 6]] = 0.0, 1.0, 2.0 - 1e-9
-    twists[8] = 0.0
-    parameters, (bar, end_bar) = derivatives.parameters_of(model), bars_of(model)
-    changes = [*drive(model, 5), random.normal(size=T), parameters * random.normal(size=len(parameters))]
-    found = derivatives.rollout_jvp(model, state, twists, loads, DT, derivatives.RolloutTangent(*changes))
-    gradient = derivatives.rollout_vjp(model, state, twists, loads, DT, bar, end_bar)
-    forwards = [*(bar * found.wrenches_dot).ravel(), *(end_bar * found.state_dot).ravel()]
-    backwards = [*np.concatenate([(g * x).ravel() for g, x in zip(gradient, changes, strict=True)])]
-    assert sum(forwards) == pytest.approx(sum(backwards), abs=1e-11 * np.abs(forwards + backwards).sum())
-    plain = pf.rollout(model, state, twists, loads, DT)
-    assert found.wrenches == pytest.approx(plain.wrenches, rel=1e-11, abs=1e-13)
-
-
-@every_model
-def test_changes_of_parameters_are_the_sensitivities(kind):
-    model = model_of(kind)
-    state, twists = drive(model, 6)
-    by = derivatives.rollout_jacobian(model, state, twists, LOADS, DT)
-    directions = np.eye(len(derivatives.parameter_names(model)))
-    found = derivatives.rollout_jvp(model, state, twists, LOADS, DT, derivatives.RolloutTangent(parameters=directions))
-    assert found.wrenches_dot == pytest.approx(np.moveaxis(by.d_wrenches, -1, 0), rel=1e-10, abs=1e-12)
-    assert by.wrenches == pytest.approx(pf.rollout(model, state, twists, LOADS, DT).wrenches, rel=1e-11, abs=1e-13)
 
 
 # ---------------------------------------------------------------------- ends of the range
@@ -292,17 +187,6 @@ def test_a_contact_that_has_just_ceased_to_be_a_point_looks_ahead_alone():
     ends = [pf.rollout(model, None, twist, load * (1.0 + h), DT).wrenches[0, 2] for h in (1e-6, -1e-6)]
     # the radius bends by 1e-5 of itself over the step; rounding is 1e-16 over 1e-6
     assert float(found.normal_force) == pytest.approx((ends[0] - ends[1]) / (2e-6 * load), rel=1e-4)
-
-
-def test_no_steps_and_shared_loads():
-    model = model_of("plain")
-    nothing = derivatives.rollout_vjp(model, None, np.empty((0, 3)), 1.0, DT, np.empty((0, 3)), np.ones(3))
-    assert np.array_equal(nothing.state, np.ones(3)) and nothing.normal_force == 0.0
-    state, twists = drive(model)
-    bar = np.ones((T, 3))
-    whole = derivatives.rollout_vjp(model, state, twists, 1.3, DT, bar)
-    each = derivatives.rollout_vjp(model, state, twists, np.full(T, 1.3), DT, bar)
-    assert float(whole.normal_force) == pytest.approx(each.normal_force.sum(), rel=1e-12)
 
 
 def test_a_map_for_each_load_is_refused_in_one_line():

@@ -20,9 +20,6 @@ PATCH = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
 LOAD, DT, T = 2.0, 1e-4, 12
 NAMES = ("sigma_0", "sigma_1", "sigma_2", "mu_c", "mu_s", "v_s", "breakaway_ratio")
 
-SPEEDS = {"stick": 1e-6, "around": 3e-3, "slip": 1e-1}
-"""Largest change of the speed from step to step [m/s]; full deflection takes 1e-6 m, a step 1e-4 s."""
-
 every_law = pytest.mark.parametrize("law", LAWS)
 
 
@@ -50,22 +47,6 @@ def bars_of(model, seed: int = 1):
 
 
 # ---------------------------------------------------------------------- the roll-out
-
-
-@every_law
-def test_a_rollout_takes_the_steps_of_the_model(law):
-    model = model_of(law)
-    state, twists, loads = drive(model)
-    loads[5], twists[8] = 0.0, 0.0
-    end, wrenches = derivatives.rollout(model, state, twists, loads, DT)
-    on_the_way = derivatives.rollout_states(model, state, twists, loads, DT)
-    assert np.array_equal(on_the_way.wrenches, wrenches) and np.array_equal(on_the_way.state, end)
-    for t in range(T):
-        # The same code, inlined elsewhere: sums may be ordered differently.
-        assert on_the_way.states[t] == pytest.approx(state, rel=1e-11, abs=1e-20)
-        state, wrench = model.step(state, twists[t], loads[t], DT)
-        assert wrenches[t] == pytest.approx(wrench, rel=1e-11, abs=1e-13)
-    assert end == pytest.approx(state, rel=1e-11, abs=1e-20)
 
 
 def test_parameters_take_the_place_of_the_models_own():
@@ -194,13 +175,6 @@ def compare_with_differences(model, state, twists, loads, speed, parameters) -> 
         assert scaled == pytest.approx(expected, rel=1e-6, abs=allowed), name
 
 
-@every_law
-@pytest.mark.parametrize("regime", SPEEDS)
-def test_the_gradient_of_a_rollout_is_that_of_differences(law, regime):
-    model, speed = model_of(law), SPEEDS[regime]
-    compare_with_differences(model, *drive(model, 3, speed), speed, derivatives.parameters_of(model))
-
-
 def test_the_gradient_holds_where_the_floor_carries_the_steady_state():
     """Static friction far below dynamic friction, and slow: less dissipation than the floor allows."""
     model, parameters = model_of(), derivatives.parameters_of(model_of())
@@ -227,113 +201,6 @@ def test_the_slope_to_a_breakaway_at_once_is_that_of_its_right_side():
     expected = (4.0 * values[1] - 3.0 * values[0] - values[2]) / 2e-5
     assert slopes[..., 0] * [1.0, 1.0, 200.0] == pytest.approx(expected * [1.0, 1.0, 200.0], rel=1e-4, abs=1e-5)
     assert np.abs(slopes).max() > 0.1
-
-
-# ---------------------------------------------------------------------- backwards against forwards
-
-
-@every_law
-def test_the_adjoint_is_the_transpose_of_the_sensitivities(law):
-    model = model_of(law)
-    state, twists, loads = drive(model, seed=5)
-    twists[4] = 0.0
-    bar, _ = bars_of(model, 2)
-    _, wrenches, slopes = derivatives.rollout_jacobian(model, state, twists, loads, DT)
-    assert wrenches == pytest.approx(
-        derivatives.rollout(model, state, twists, loads, DT).wrenches, rel=1e-11, abs=1e-13
-    )
-    terms = np.einsum("ti,tip->tip", bar, slopes)
-    gradient = derivatives.rollout_vjp(model, state, twists, loads, DT, bar)
-    # Sums in another order.
-    assert (np.abs(gradient.parameters - terms.sum((0, 1))) <= 1e-11 * np.abs(terms).sum((0, 1))).all()
-    if law == "plain":
-        assert gradient.parameters[-1] == 0.0
-    *_, chosen = derivatives.rollout_jacobian(model, state, twists, loads, DT, ("v_s", "mu_c"))
-    assert np.array_equal(chosen, slopes[..., [5, 3]])
-
-
-@every_law
-@pytest.mark.parametrize("regime", SPEEDS)
-def test_the_adjoint_is_the_transpose_of_the_jacobians(law, regime):
-    """`<bar, J dx> = <J' bar, dx>` for changes of state, twists and loads, `J` step by step."""
-    model, random, speed = model_of(law), np.random.default_rng(4), SPEEDS[regime]
-    state, twists, loads = drive(model, 6, speed)
-    twists[4], loads[8] = 0.0, 0.0
-    bar, end_bar = bars_of(model, 7)
-    change = random.normal(size=3) * 1e-6
-    turns, pushes = random.normal(size=(T, 3)) * speed * scale_of(model), random.normal(size=T)
-    gradient = derivatives.rollout_vjp(model, state, twists, loads, DT, bar, end_bar)
-    backwards = [
-        (gradient.state * change).sum(),
-        (gradient.twist * turns).sum(),
-        (gradient.normal_force * pushes).sum(),
-    ]
-    forwards = []
-    for before, twist, load, turn, push, w_bar in zip(
-        derivatives.rollout_states(model, state, twists, loads, DT).states,
-        twists,
-        loads,
-        turns,
-        pushes,
-        bar,
-        strict=True,
-    ):
-        j = model.step_jacobians(before, twist, load, DT)
-        forwards.append(w_bar @ (j.wrench_state @ change + j.wrench_twist @ turn + j.wrench_load * push))
-        change = j.state_state @ change + j.state_twist @ turn
-    forwards.append(end_bar @ change)
-    assert sum(backwards) == pytest.approx(sum(forwards), abs=1e-11 * np.abs(forwards).sum())
-
-
-# ---------------------------------------------------------------------- batches
-
-
-def test_a_batch_is_a_loop():
-    model, random = model_of(), np.random.default_rng(8)
-    states = np.stack([drive(model, seed)[0] for seed in range(3)])[:, None]  # [3, 1]
-    twists = np.stack([drive(model, seed)[1] for seed in range(2)])  # [2]
-    loads, dt = drive(model)[2], random.uniform(0.5e-4, 1e-4, T)
-    parameters = derivatives.parameters_of(model) * random.uniform(0.9, 1.0, (3, 1, 7))
-    bar, end_bar = random.normal(size=(3, 2, T, 3)), random.normal(size=(3, 2, 3))
-    ends, wrenches = derivatives.rollout(model, states, twists, loads, dt, parameters=parameters)
-    gradient = derivatives.rollout_vjp(model, states, twists, loads, dt, bar, end_bar, parameters=parameters)
-    slopes = derivatives.rollout_jacobian(model, states, twists, loads, dt, NAMES, parameters=parameters).d_wrenches
-    assert wrenches.shape == (3, 2, T, 3) and ends.shape == (3, 2, 3) and slopes.shape == (3, 2, T, 3, 7)
-    assert [g.shape for g in gradient] == [a.shape for a in (states, twists, loads, parameters)]
-    total = [np.zeros_like(g) for g in gradient]
-    for i, j in np.ndindex(3, 2):
-        one = states[i, 0], twists[j], loads, dt
-        single = derivatives.rollout(model, *one, parameters=parameters[i, 0])
-        # abreast with others a contact is rounded in another order on some processors
-        for abreast, lone in ((wrenches[i, j], single.wrenches), (ends[i, j], single.state)):
-            np.testing.assert_allclose(abreast, lone, rtol=0.0, atol=1e-12 * np.abs(lone).max())
-        alone = derivatives.rollout_vjp(model, *one, bar[i, j], end_bar[i, j], parameters=parameters[i, 0])
-        for sum_of, where, g in zip(total, ((i, 0), j, ..., (i, 0)), alone, strict=True):
-            sum_of[where] += g
-        assert np.array_equal(
-            slopes[i, j], derivatives.rollout_jacobian(model, *one, NAMES, parameters=parameters[i, 0]).d_wrenches
-        )
-    for got, wanted in zip(gradient, total, strict=True):
-        assert got == pytest.approx(wanted, rel=1e-11)  # sums in another order
-
-
-def test_kept_states_several_threads_and_no_steps():
-    model = model_of()
-    state, twists, loads = drive(model, steps=500)
-    scales = np.linspace(0.5, 1.0, 150)[:, None, None]  # 75,000 steps: enough for more than one thread
-    bar = np.ones((500, 3))
-    states = derivatives.rollout_states(model, state, scales * twists, loads, DT).states
-    kept = derivatives.rollout_vjp(model, state, scales * twists, loads, DT, bar, states=states)
-    again = derivatives.rollout_vjp(model, state, scales * twists, loads, DT, bar)
-    for first, second in zip(kept, again, strict=True):
-        assert np.array_equal(first, second)
-    last = derivatives.rollout_vjp(model, state, scales[-1] * twists, loads, DT, bar)
-    # abreast with others it is summed in another order
-    np.testing.assert_allclose(kept.twist[-1], last.twist, rtol=1e-10, atol=1e-13 * np.abs(last.twist).max())
-    end, wrenches = derivatives.rollout(model, state, np.empty((0, 3)), LOAD, DT)
-    assert wrenches.shape == (0, 3) and np.array_equal(end, state)
-    nothing = derivatives.rollout_vjp(model, state, np.empty((0, 3)), LOAD, DT, np.empty((0, 3)), np.ones(3))
-    assert np.array_equal(nothing.state, np.ones(3)) and not nothing.parameters.any()
 
 
 # ---------------------------------------------------------------------- errors

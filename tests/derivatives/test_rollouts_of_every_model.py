@@ -1,0 +1,304 @@
+"""Rollouts of every model: they take the model's steps, and derivatives agree with differences and with each other."""
+
+from __future__ import annotations
+
+import functools
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+import planarfriction as pf
+from planarfriction import derivatives
+
+LAWS = {
+    "plain": pf.LuGre(mu_s=1.2),
+    "elasto-plastic": pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9)),
+    "wide": pf.LuGre(mu_c=0.7, mu_s=1.2, gamma=1.5, elasto_plastic=pf.ElastoPlastic(0.3)),
+}
+SURFACES = {
+    "cells": pf.LimitSurfaceCells,
+    "table": pf.LimitSurfaceTable,
+    "published": pf.LimitSurfaceTablePublished,
+    "ellipsoid": pf.LimitSurfaceEllipsoid,
+}
+SPEEDS = {"stick": 1e-6, "around": 3e-3, "slip": 1e-1}
+"""Largest change of the speed from step to step [m/s]; full deflection takes 1e-6 m, a step 1e-4 s."""
+
+PATCH = pf.ContactPatch.from_pressure([[0.0, 3.0, 1.0], [2.0, 5.0, 0.0]], 0.005)
+METRIC = pf.friction_metric(0.6, along=0.5, across=1.0)
+EACH = [pf.friction_metric(0.3 * i, 0.6, 1.1) for i in range(PATCH.cells)]
+LEANING = PATCH.with_friction_metric(METRIC, asymmetry=[0.2, -0.1])
+DIRECTED = {"metric": PATCH.with_friction_metric(METRIC), "metrics": PATCH.with_friction_metric(EACH), "lean": LEANING}
+
+X, Y = np.meshgrid(np.arange(-3, 4) * 1e-3, np.arange(3, -4, -1) * 1e-3)
+LIGHT = np.maximum(1.0 - ((X - 1e-3) ** 2 + Y**2) / 0.003**2, 0.0)
+HEAVY = np.sqrt(np.maximum(1.0 - (X**2 + (Y - 1e-3) ** 2) / 0.0045**2, 0.0))
+TIP = pf.ContactPatch.from_pressure({0.5: LIGHT, 4.0: HEAVY}, cell_size=1e-3)
+"""Grows, flattens and moves with the load; no cell gets its first load between the two maps."""
+
+LOAD, DT, T = 2.0, 1e-4, 12
+
+
+class Case(NamedTuple):
+    """A model with the motion that it is moved by."""
+
+    make: Callable[[], Any]
+    speed: float = SPEEDS["around"]
+    rounding: float = 1e-11
+    """Relative difference of equal sums in another order; tables of three bristles amplify it less than maps."""
+
+    @property
+    def model(self) -> Any:
+        return made(self.make)
+
+
+@functools.cache
+def made(make: Callable[[], Any]) -> Any:
+    return make()
+
+
+def published(surface: str, law: str) -> Case:
+    return Case(lambda: pf.ReducedModelPublished(PATCH, LAWS[law], surface=SURFACES[surface](PATCH)), rounding=1e-12)
+
+
+def reduced(patch: pf.ContactPatch, law: str, speed: str = "around", **options) -> Case:
+    return Case(lambda: pf.ReducedModel(patch, LAWS[law], **{"segments": 8, "speeds": 8, **options}), SPEEDS[speed])
+
+
+def soft(patch: pf.ContactPatch, law: str, parts: int = 1) -> Case:
+    return reduced(patch, law, parts=parts, speeds=6, load_error=3e-4)
+
+
+FIXED = {
+    **{f"published {surface}, {law}": published(surface, law) for surface in SURFACES for law in LAWS},
+    **{f"reduced, {law}, {speed}": reduced(PATCH, law, speed) for law in LAWS for speed in SPEEDS},
+    **{f"reduced, {name}": reduced(patch, "wide") for name, patch in DIRECTED.items()},
+    "parts": reduced(PATCH, "wide", parts=2),
+    "parts, metric": reduced(DIRECTED["metric"], "wide", parts=2),
+    "published table, metric": Case(
+        lambda: pf.ReducedModelPublished(DIRECTED["metric"], LAWS["wide"], pf.LimitSurfaceTable(DIRECTED["metric"]))
+    ),
+}
+SOFT = {
+    "soft, plain": soft(TIP, "plain"),
+    "soft, wide": soft(TIP, "wide"),
+    "soft parts": soft(TIP, "wide", 3),
+    "soft, metric": soft(TIP.with_friction_metric(METRIC), "wide"),
+    "soft parts, lean": soft(TIP.with_friction_metric(METRIC, asymmetry=[0.2, -0.1]), "wide", 2),
+}
+CASES = FIXED | SOFT
+
+every_case = pytest.mark.parametrize("name", CASES)
+
+
+def twist_sizes(model: Any) -> np.ndarray:
+    """Return the factors that turn speeds [m/s] into twists."""
+    return np.array([1.0, 1.0, 1.0 / model.patch.contact_radius(LOAD)])
+
+
+def state_sizes(model: Any) -> np.ndarray:
+    """Return the factors that turn deflections [m] into states."""
+    return 1.0 / twist_sizes(model) if isinstance(model, pf.ReducedModelPublished) else np.ones(3)
+
+
+def drive(case: Case, seed: int = 0, steps: int = T) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return a state, a random walk of twists that starts, slides, spins and turns back, and loads."""
+    random, model = np.random.default_rng(seed), case.model
+    state = random.normal(size=model.state_shape) * min(4e-7, 0.1 * case.speed) * state_sizes(model)
+    twists = np.cumsum(random.normal(size=(steps, 3)), axis=0) * case.speed * twist_sizes(model)
+    return state, twists, random.uniform(1.0, 3.0, steps)
+
+
+def interrupted(case: Case, seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return such a motion with a rest, a step without load, and loads on and beside rungs of a soft patch."""
+    state, twists, loads = drive(case, seed)
+    twists[8], loads[2], loads[5], loads[6] = 0.0, 0.0, 1.0, 2.0 - 1e-9
+    return state, twists, loads
+
+
+def blended_loads(model: pf.ReducedModel) -> np.ndarray:
+    """Return a ramp over many rungs, where each load blends two of them in each part, as do those beside it."""
+    loads = [
+        load
+        for load in np.linspace(1.031, 3.063, 60)
+        if all(part.shape.blend > 0.0 for h in (-1e-5, 1e-5) for part in model.parts_at(load * (1.0 + h)))
+    ]
+    return np.array(loads)[np.linspace(0, len(loads) - 1, T).astype(int)]
+
+
+def cotangents(model: Any, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """Return cotangents of wrenches and of the last state that weigh all of them alike."""
+    random = np.random.default_rng(seed)
+    wrenches = random.normal(size=(T, 3)) * twist_sizes(model)
+    return wrenches, random.normal(size=model.state_shape) * 1e6 / state_sizes(model)
+
+
+@every_case
+def test_a_rollout_takes_the_steps_of_the_model(name):
+    case = CASES[name]
+    model, (state, twists, loads) = case.model, interrupted(case)
+    found = derivatives.rollout_states(model, state, twists, loads, DT)
+    end, wrenches = derivatives.rollout(model, state, twists, loads, DT)
+    assert np.array_equal(found.wrenches, wrenches) and np.array_equal(found.state, end)
+    for t in range(T):
+        assert found.states[t] == pytest.approx(state, rel=case.rounding, abs=1e-20)
+        state, wrench = model.step(state, twists[t], loads[t], DT)
+        assert wrenches[t] == pytest.approx(wrench, rel=case.rounding, abs=0.01 * case.rounding)
+    assert end == pytest.approx(state, rel=case.rounding, abs=1e-20)
+
+
+@every_case
+def test_the_gradient_of_a_rollout_is_that_of_differences(name):
+    case = CASES[name]
+    model, (state, twists, loads) = case.model, drive(case, 3)
+    if name in SOFT:
+        loads = blended_loads(model)
+    parameters, bars = derivatives.parameters_of(model), cotangents(model)
+    lengths = np.where(np.arange(len(parameters)) >= 10, model.patch.contact_radius(LOAD), 1e-3)
+    inputs = {"state": state, "twist": twists, "normal_force": loads, "parameters": parameters}
+    units = {
+        "state": 1e-6 * state_sizes(model),
+        "twist": case.speed * twist_sizes(model),
+        "normal_force": 1.0,
+        "parameters": np.maximum(np.abs(parameters), lengths),
+    }
+    gradient = derivatives.rollout_vjp(model, state, twists, loads, DT, *bars)
+
+    def value(of: str, change: np.ndarray) -> float:
+        changed = {**inputs, of: inputs[of] + change * units[of]}
+        run = derivatives.rollout(model, *list(changed.values())[:3], DT, parameters=changed["parameters"])
+        return float((bars[0] * run.wrenches).sum() + (bars[1] * run.state).sum())
+
+    for of, found in gradient._asdict().items():
+        scaled, expected = found * units[of], np.empty_like(found)
+        for index in np.ndindex(found.shape):
+            step = np.zeros_like(found)
+            step[index] = 1e-6
+            expected[index] = (value(of, step) - value(of, -step)) / 2e-6
+        # Differences lose 1e-16/1e-6 to rounding of numbers near 100, and 1e-6 of the largest slope where the curvature
+        # jumps: at squares of the map, and at ends of the elasto-plastic range, which tables jump to at once.
+        jump = 1e-5 if name.startswith("published") else 1e-6
+        assert scaled == pytest.approx(expected, rel=jump, abs=1e-6 * np.abs(scaled).max() + 1e-7), of
+
+
+@every_case
+def test_forwards_is_the_transpose_of_backwards(name):
+    """`<bar, J x> = <J' bar, x>` for changes x of all inputs, also at rest, without load and on rungs."""
+    case, random = CASES[name], np.random.default_rng(3)
+    model, inputs, (bar, end_bar) = case.model, interrupted(case, 4), cotangents(case.model)
+    parameters = derivatives.parameters_of(model)
+    changes = [*drive(case, 5), parameters * random.normal(size=len(parameters))]
+    found = derivatives.rollout_jvp(model, *inputs, DT, derivatives.RolloutTangent(*changes))
+    plain = derivatives.rollout(model, *inputs, DT)
+    assert found.wrenches == pytest.approx(plain.wrenches, rel=case.rounding, abs=0.01 * case.rounding)
+    assert found.state == pytest.approx(plain.state, rel=case.rounding, abs=1e-20)
+    gradient = derivatives.rollout_vjp(model, *inputs, DT, bar, end_bar)
+    forwards = [*(bar * found.wrenches_dot).ravel(), *(end_bar * found.state_dot).ravel()]
+    backwards = [*np.concatenate([(g * x).ravel() for g, x in zip(gradient, changes, strict=True)])]
+    assert sum(forwards) == pytest.approx(sum(backwards), abs=case.rounding * np.abs(forwards + backwards).sum())
+
+
+@every_case
+def test_changes_of_parameters_are_the_jacobian(name):
+    case = CASES[name]
+    model, inputs, (bar, _) = case.model, interrupted(case, 6), cotangents(case.model, 2)
+    by = derivatives.rollout_jacobian(model, *inputs, DT)
+    assert by.wrenches == pytest.approx(derivatives.rollout(model, *inputs, DT).wrenches, rel=1e-11, abs=1e-13)
+    directions = np.eye(len(derivatives.parameter_names(model)))
+    found = derivatives.rollout_jvp(model, *inputs, DT, derivatives.RolloutTangent(parameters=directions))
+    for forwards, wanted in zip(found.wrenches_dot, np.moveaxis(by.d_wrenches, -1, 0), strict=True):
+        assert forwards == pytest.approx(wanted, rel=1e-10, abs=1e-12 * max(1.0, np.abs(wanted).max()))
+    assert found.state_dot.shape == (len(directions), *model.state_shape)
+    gradient, own = derivatives.rollout_vjp(model, *inputs, DT, bar).parameters, derivatives.parameters_of(model)
+    terms = own * bar[..., None] * by.d_wrenches
+    sizes = np.abs(terms).sum((0, 1))
+    assert (np.abs(own * gradient - terms.sum((0, 1))) <= case.rounding * sizes + 1e-13 * sizes.max()).all()
+    if "plain" in name:
+        assert gradient[derivatives.parameter_names(model).index("breakaway_ratio")] == 0.0
+    *_, chosen = derivatives.rollout_jacobian(model, *inputs, DT, ("v_s", "mu_c"))
+    assert np.array_equal(chosen, by.d_wrenches[..., [5, 3]])
+
+
+@pytest.mark.parametrize("name", [name for name in FIXED if "parts" not in name])
+def test_the_adjoint_is_the_transpose_of_the_jacobians(name):
+    """`<bar, J dx> = <J' bar, dx>` for changes of state, twists and loads, `J` step by step."""
+    case = CASES[name]
+    model, (state, twists, loads), (bar, end_bar) = case.model, interrupted(case, 6), cotangents(case.model, 7)
+    change, turns, pushes = drive(case, 8)
+    gradient = derivatives.rollout_vjp(model, state, twists, loads, DT, bar, end_bar)
+    changes = zip(gradient, (change, turns, pushes), strict=False)
+    backwards = [(slope * each).sum() for slope, each in changes]
+    states, forwards = derivatives.rollout_states(model, state, twists, loads, DT).states, []
+    for before, twist, load, turn, push, w_bar in zip(states, twists, loads, turns, pushes, bar, strict=True):
+        j = model.step_jacobians(before, twist, load, DT)
+        forwards.append(w_bar @ (j.wrench_state @ change + j.wrench_twist @ turn + j.wrench_load * push))
+        change = j.state_state @ change + j.state_twist @ turn
+    forwards.append(end_bar @ change)
+    assert sum(backwards) == pytest.approx(sum(forwards), abs=case.rounding * np.abs(forwards).sum())
+
+
+@pytest.mark.parametrize(
+    "name", ["published published, elasto-plastic", "reduced, elasto-plastic, around", "soft parts"]
+)
+def test_a_batch_is_a_loop(name):
+    case, random = CASES[name], np.random.default_rng(8)
+    model = case.model
+    states = np.stack([drive(case, seed)[0] for seed in range(3)])[:, None]  # [3, 1]
+    twists = np.stack([drive(case, seed)[1] for seed in range(2)])  # [2]
+    loads, dt, own = drive(case)[2], random.uniform(0.5e-4, 1e-4, T), derivatives.parameters_of(model)
+    parameters = own * random.uniform(0.9, 1.0, (3, 1, len(own)))
+    bar = random.normal(size=(3, 2, T, 3)) * twist_sizes(model)
+    end_bar = random.normal(size=(3, 2, *model.state_shape)) * 1e6 / state_sizes(model)
+    ends, wrenches = derivatives.rollout(model, states, twists, loads, dt, parameters=parameters)
+    gradient = derivatives.rollout_vjp(model, states, twists, loads, dt, bar, end_bar, parameters=parameters)
+    slopes = derivatives.rollout_jacobian(model, states, twists, loads, dt, parameters=parameters).d_wrenches
+    assert wrenches.shape == (3, 2, T, 3) and ends.shape == (3, 2, *model.state_shape)
+    assert slopes.shape == (3, 2, T, 3, len(own))
+    assert [g.shape for g in gradient] == [a.shape for a in (states, twists, loads, parameters)]
+    total = [np.zeros_like(g) for g in gradient]
+    for i, j in np.ndindex(3, 2):
+        one, numbers = (states[i, 0], twists[j], loads, dt), parameters[i, 0]
+        single = derivatives.rollout(model, *one, parameters=numbers)
+        # abreast with others a contact is rounded in another order on some processors
+        for abreast, lone in ((wrenches[i, j], single.wrenches), (ends[i, j], single.state)):
+            np.testing.assert_allclose(abreast, lone, rtol=0.0, atol=1e-12 * np.abs(lone).max())
+        alone = derivatives.rollout_vjp(model, *one, bar[i, j], end_bar[i, j], parameters=numbers)
+        for sum_of, where, g in zip(total, ((i, 0), j, ..., (i, 0)), alone, strict=True):
+            sum_of[where] += g
+        by = derivatives.rollout_jacobian(model, *one, parameters=numbers).d_wrenches
+        assert np.array_equal(slopes[i, j], by)
+    for got, wanted in zip(gradient, total, strict=True):  # sums in another order
+        assert got == pytest.approx(wanted, rel=1e-11, abs=1e-12 * np.abs(wanted).max())
+
+
+@pytest.mark.parametrize("name", ["published ellipsoid, elasto-plastic", "reduced, elasto-plastic, around"])
+def test_kept_states_and_several_threads_change_nothing(name):
+    case = CASES[name]
+    model, (state, twists, loads) = case.model, drive(case, steps=500)
+    scales = np.linspace(0.5, 1.0, 150)[:, None, None]  # 75,000 steps: enough for more than one thread
+    bar = np.ones((500, 3))
+    states = derivatives.rollout_states(model, state, scales * twists, loads, DT).states
+    kept = derivatives.rollout_vjp(model, state, scales * twists, loads, DT, bar, states=states)
+    again = derivatives.rollout_vjp(model, state, scales * twists, loads, DT, bar)
+    for first, second in zip(kept, again, strict=True):
+        assert np.array_equal(first, second)
+    last = derivatives.rollout_vjp(model, state, scales[-1] * twists, loads, DT, bar)
+    # abreast with others it is summed in another order
+    np.testing.assert_allclose(kept.twist[-1], last.twist, rtol=1e-9, atol=1e-12 * np.abs(last.twist).max())
+
+
+@pytest.mark.parametrize("name", ["published table, plain", "reduced, plain, around", "soft, plain"])
+def test_no_steps_and_one_load_for_all_steps(name):
+    case = CASES[name]
+    model, (state, twists, _) = case.model, drive(case)
+    end, wrenches = derivatives.rollout(model, state, np.empty((0, 3)), LOAD, DT)
+    assert wrenches.shape == (0, 3) and np.array_equal(end, state)
+    nothing = derivatives.rollout_vjp(model, state, np.empty((0, 3)), LOAD, DT, np.empty((0, 3)), np.ones(3))
+    assert np.array_equal(nothing.state, np.ones(3)) and not nothing.parameters.any() and nothing.normal_force == 0.0
+    whole, each = (
+        derivatives.rollout_vjp(model, state, twists, f, DT, np.ones((T, 3))) for f in (1.3, np.full(T, 1.3))
+    )
+    assert whole.normal_force.shape == ()
+    assert float(whole.normal_force) == pytest.approx(each.normal_force.sum(), rel=1e-12)
