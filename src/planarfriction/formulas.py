@@ -22,7 +22,7 @@ LARGEST = 1e50
 
 
 class LawNumbers(NamedTuple):
-    """What the formulas ask of a friction law, read by name: numbers, or arrays that broadcast with the bristles."""
+    """Numbers of a friction law that the formulas read by name: floats, or arrays that broadcast with the bristles."""
 
     sigma_0: Any
     """Bristle stiffness per unit normal load [1/m]."""
@@ -149,7 +149,7 @@ def cap(xp, deflection, largest):
 
 
 def stribeck_place(xp, speed, v_s, gamma, knee):
-    """Where a speed > 0 lies in a map of the Stribeck effect: `p/(p + knee)` in [0, 1) of `p = (v/v_s)^gamma` [-].
+    """Return the place of a speed > 0 in a map of the Stribeck effect: `p/(p + knee)`, `p = (v/v_s)^gamma` [-].
 
     Its derivative with respect to `log v` is `gamma t (1 - t)`. ("Reduced model")
     """

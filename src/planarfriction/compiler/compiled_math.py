@@ -34,7 +34,7 @@ _EXP_LARGEST = 708.0  # beyond it the result leaves the range of normal doubles
 
 @intrinsic
 def _bits_to_float(typingctx, bits):
-    """Return the reinterpret the 64 bits of an integer as a double."""
+    """Return the double that has the 64 bits of an integer."""
     return types.float64(types.int64), lambda context, builder, signature, args: builder.bitcast(
         args[0], ir.DoubleType()
     )
@@ -42,7 +42,7 @@ def _bits_to_float(typingctx, bits):
 
 @intrinsic
 def _float_to_bits(typingctx, x):
-    """Return the reinterpret the 64 bits of a double as an integer."""
+    """Return the integer that has the 64 bits of a double."""
     return types.int64(types.float64), lambda context, builder, signature, args: builder.bitcast(
         args[0], ir.IntType(64)
     )

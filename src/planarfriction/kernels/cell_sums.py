@@ -15,7 +15,8 @@ from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import jit, kernel
 
 DEPTH = 6
-"""How often a cell at the centre of rotation is halved: its last parts hold 1/4096 of its load (of a segment 1/64)."""
+"""Number of times that a cell at the centre of rotation is halved: its last parts hold 1/4096 of its load
+(those of a segment 1/64)."""
 
 NEAR = 1.5
 """Distance from the centre of rotation, in longer edges, below which a cell is cut; Gauss errs by 1e-4 of it there."""

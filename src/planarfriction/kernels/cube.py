@@ -41,12 +41,12 @@ class Spot(NamedTuple):
 
 
 class Square(NamedTuple):
-    """Where a direction lies among the nodes of a face."""
+    """Place of a direction among the nodes of a face."""
 
     at: float
     """The square's first node, counted from the first node of the map."""
     u: float
-    """How far it is to the next node along a, of [0, 1]."""
+    """Distance from the node along a, as a share [0, 1] of that to the next node."""
     v: float
     """The same along b."""
 

@@ -31,7 +31,7 @@ class CellJacobians(NamedTuple):
     """Derivatives of the steps of B contacts."""
 
     state_state: np.ndarray
-    """Of the new bristles by the old, cell by cell, [B, 2, 2, n]."""
+    """Derivatives of the new bristles by the old, cell by cell, [B, 2, 2, n]."""
     state_twist: np.ndarray
     """[B, 2, n, 3]"""
     wrench_state: np.ndarray

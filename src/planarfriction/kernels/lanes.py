@@ -37,12 +37,12 @@ NUMBERS = 20
 """Room for the numbers of a contact."""
 
 TWIST, OMEGA, LOAD, WRENCH, STATE, TWIST_BAR, LOAD_BAR, FIELDS = (SLOTS * n for n in (0, 3, 4, 5, 8, 11, 14, 15))
-"""Where fields of `w` begin: `scaled` twist, spin, load, wrench or its cotangent, state before a step; those of the
+"""Offsets of the fields of `w`: `scaled` twist, spin, load, wrench or its cotangent, state before a step; those of the
 model begin at `FIELDS`."""
 
 ROW, ROW_BAR, CARRY, SHARE, OWN = (LANES * n for n in (0, NUMBERS, 2 * NUMBERS, 2 * NUMBERS + 3, 2 * NUMBERS + 4))
-"""Where fields of `own` begin: numbers of the contact and their gradient, what one step hands to the next, share of the
-load; those of the model begin at `OWN`."""
+"""Offsets of the fields of `own`: numbers of the contact and their gradient, what one step hands to the next, share
+of the load; those of the model begin at `OWN`."""
 
 
 @kernel

@@ -56,7 +56,7 @@ class Contact(NamedTuple):
     law: tuple
     shape: tuple
     surface: tuple
-    """What the model knows of its limit surface or maps, three integers."""
+    """Kind, offset and size of the limit surface or maps, as the model reads them: three integers."""
     data: np.ndarray
     """Their numbers, flat."""
 
@@ -75,9 +75,9 @@ class Inputs(NamedTuple):
     dt: np.ndarray
     """[T]"""
     which: np.ndarray
-    """Which of the L loads a step has, int [B or 1, T]; one for all where the shape is fixed."""
+    """Index of the load of each step among the L loads, int [B or 1, T]; one for all where the shape is fixed."""
     shares: np.ndarray
-    """Of the load, [P, L]."""
+    """Shares of the load, [P, L]."""
     surface: np.ndarray
     """As in `Contact`, int [P, L, 3]."""
     shapes: np.ndarray
@@ -157,13 +157,13 @@ def step(shape_of, numbers_at, hold, taped_step, row, data, inputs, out):
 
 
 class PartAddresses(NamedTuple):
-    """Where compiled code finds a part of a contact: addresses of the model's `step`, and of its row and data."""
+    """Addresses of a part of a contact: of the model's `step`, of its row and of its data."""
 
     step: int
     row: int
     data: int
     share: float
-    """Of the load."""
+    """Share of the load."""
 
 
 _place = reader(PartAddresses)
@@ -200,7 +200,7 @@ def step_one(places, z, vx, vy, omega, load, dt, result):
 
 
 UNFIT = (TypeError, ValueError, NumbaError)
-"""What `step_one` answers other types with."""
+"""Exceptions that `step_one` raises for arguments of other types."""
 
 _COMPILING = threading.Lock()
 

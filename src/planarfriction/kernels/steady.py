@@ -26,7 +26,7 @@ from planarfriction.kernels import cube
 from planarfriction.kernels.vectors import applied_back, dot, plus, times
 
 QUARTIC = 8
-"""Where the coefficients of `<u^4>` begin."""
+"""Offset of the coefficients of `<u^4>`."""
 
 STILL = 1e-100
 """Scaled speed [m/s] up to which a patch is at rest: squares of what is slower leave the range of doubles."""
@@ -92,7 +92,7 @@ def head_of(data, start):
 
 
 class Readings(NamedTuple):
-    """What is read of both parts of a map, three components each, with their slopes by the place on a face and by t."""
+    """Both parts of a map at one place, three components each, with their slopes by the place on a face and by t."""
 
     flat: tuple
     flat_a: tuple
@@ -104,7 +104,7 @@ class Readings(NamedTuple):
 
 
 class MapSquares(NamedTuple):
-    """Where to read a map: both parts, of which each `at` counts all data, and t with what belongs to it."""
+    """Place at which a map is read: both parts, of which each `at` counts all data, and t with what belongs to it."""
 
     flat: cube.Square
     rest: cube.Square

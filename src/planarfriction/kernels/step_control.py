@@ -54,7 +54,7 @@ def length(pace, local, reach, remaining):
 
 @kernel
 def judged(pace, error, h, local):
-    """Return whether a step of derivatives is accepted, and the pace of the next.
+    """Return True if a step of derivatives is accepted, and the pace of the next.
 
     A step shorter than `SHORTEST` is accepted with any error: the Jacobian may jump within it.
     """
