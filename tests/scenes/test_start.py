@@ -184,3 +184,11 @@ def test_derivatives_to_what_moves_the_start_are_refused():
         pf.derivatives.scene_sensitivities(thrown, (), signals={"table.normal_force": knots})
     with pytest.raises(InvalidValueError, match="start must be 'rest' for the derivative with respect to vx"):
         pf.derivatives.scene_gradient(scene, lambda time, motion: 0.0 * motion, initial=["vx"])
+
+
+@pytest.mark.parametrize("load", [5e-324, 1e-310, 1e-300])
+def test_loads_too_small_to_divide_by_hold_nothing(load):
+    model = pf.ReducedModel(pf.ContactPatch.disc(0.01, cells=5), pf.LuGre())
+    scene = pf.scenes.pivot(model, normal_force=load, t_end=0.01)
+    with pytest.raises(InvalidValueError, match="start must be 'rest' or 'sliding' if the contacts do not hold"):
+        pf.simulate(scene)

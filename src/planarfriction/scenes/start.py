@@ -175,8 +175,9 @@ def _cells_of(scene: Any, contact: Any, load: float, shaped: float) -> _BristleF
 def _least_energy(cells: _BristleField, pull: np.ndarray) -> np.ndarray:
     """Return the motion `[3]` after which bristles carry a load `[3]`; raises where none does."""
     elastic = np.einsum("n,nia,nib->ab", cells.stiffness, cells.levers, cells.levers)
-    scale = 1.0 / np.sqrt(np.where(np.diagonal(elastic) > 0.0, np.diagonal(elastic), 1.0))
-    scaled = elastic * np.outer(scale, scale)
+    carries = np.diagonal(elastic) > np.finfo(float).tiny  # stiffness of smaller loads has too few digits to divide by
+    scale = 1.0 / np.sqrt(np.where(carries, np.diagonal(elastic), 1.0))
+    scaled = np.where(np.outer(carries, carries), elastic, 0.0) * np.outer(scale, scale)
     motion = scale * np.linalg.lstsq(scaled, scale * pull, rcond=1e-14)[0]
     if not np.array_equal(cells.bent(motion)[0], _free(cells, motion)):
         motion = _bent_to_the_end(cells, pull, motion, scale)
