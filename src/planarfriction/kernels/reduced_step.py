@@ -51,7 +51,7 @@ class SteadyTwist(NamedTuple):
 
 
 class SteadySlopes(NamedTuple):
-    """SteadySlopes of the steady state."""
+    """Derivatives of the steady state."""
 
     q_u: tuple
     """By u, row by row."""
@@ -66,7 +66,7 @@ class Quartic(NamedTuple):
     rows: tuple
     """Coefficients of `<u^4>` (see `steady.fourth_moments`)."""
     change: tuple
-    """SteadySlopes of the coefficients by the blend of two maps."""
+    """Derivatives of the coefficients by the blend of two maps."""
     blend: float
 
 
