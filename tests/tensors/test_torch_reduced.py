@@ -12,9 +12,9 @@ from planarfriction.tensors import reduced
 
 torch = pytest.importorskip("torch", reason="needs PyTorch: pip install 'planarfriction[torch]'")
 
+from planarfriction.tensors.reduced import PARAMETERS  # noqa: E402
 from planarfriction.torch import ReducedModel, rollout, tracking_loss  # noqa: E402
 from planarfriction.torch.namespace import xp  # noqa: E402
-from planarfriction.torch.reduced import PARAMETERS  # noqa: E402
 
 pytestmark = pytest.mark.torch
 

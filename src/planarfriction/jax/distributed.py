@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections import namedtuple
 from collections.abc import Mapping
-from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -14,21 +14,12 @@ from planarfriction.jax.base import FrictionPytree, record_of
 from planarfriction.laws import FrictionLaw
 from planarfriction.patch import ContactPatch
 from planarfriction.tensors import distributed
-from planarfriction.tensors.steps import Part
+from planarfriction.tensors.steps import LAW, Part
 
 
 @by_parts
-class LawParameters(NamedTuple):
+class LawParameters(namedtuple("LawParameters", LAW)):
     """Parameters of a friction law as scalars; names and units as in `LuGre`."""
-
-    sigma_0: jax.Array
-    sigma_1: jax.Array
-    sigma_2: jax.Array
-    mu_c: jax.Array
-    mu_s: jax.Array
-    v_s: jax.Array
-    gamma: jax.Array
-    breakaway_ratio: jax.Array
 
 
 class DistributedModel(FrictionPytree):

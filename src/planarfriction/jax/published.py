@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import functools
+from collections import namedtuple
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
 
-from planarfriction.derivatives.parameters import Packed, pack_surface
+from planarfriction.derivatives.parameters import PARAMETERS, Packed, pack_surface
 from planarfriction.equality import ByValue, by_parts
 from planarfriction.formulas import LawNumbers
 from planarfriction.jax.base import FrictionPytree, record_of
@@ -23,25 +23,11 @@ from planarfriction.tensors.steps import Part
 
 
 @by_parts
-class PublishedParameters(NamedTuple):
-    """Parameters of the published reduced model as scalars; names and units as in `LuGre` and `PublishedShape`."""
+class PublishedParameters(namedtuple("PublishedParameters", PARAMETERS)):
+    """Parameters of the published reduced model as scalars; names and units as in `LuGre` and `PublishedShape`.
 
-    sigma_0: jax.Array
-    sigma_1: jax.Array
-    sigma_2: jax.Array
-    mu_c: jax.Array
-    mu_s: jax.Array
-    v_s: jax.Array
-    gamma: jax.Array
-    breakaway_ratio: jax.Array
-    """Unused by plain bristles."""
-    contact_radius: jax.Array
-    """Contact radius r [m]."""
-    second_moment: jax.Array
-    """Second moment <rho^2> [m^2]."""
-    centre_x: jax.Array
-    """Centre of pressure [m]."""
-    centre_y: jax.Array
+    `contact_radius` r [m], `second_moment` <rho^2> [m^2], the centre of pressure `centre_x`, `centre_y` [m].
+    """
 
 
 @functools.partial(jax.tree_util.register_dataclass, data_fields=["data", "root"], meta_fields=["kind", "size"])

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import functools
+from collections import namedtuple
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -22,18 +22,9 @@ from planarfriction.tensors.steps import Part
 
 
 @by_parts
-class ReducedParameters(NamedTuple):
-    """Parameters of the law as scalars; names and units as in `LuGre`, without gamma, on which the stored map
-    depends."""
-
-    sigma_0: jax.Array
-    sigma_1: jax.Array
-    sigma_2: jax.Array
-    mu_c: jax.Array
-    mu_s: jax.Array
-    v_s: jax.Array
-    breakaway_ratio: jax.Array
-    """Unused by plain bristles."""
+class ReducedParameters(namedtuple("ReducedParameters", reduced.PARAMETERS)):
+    """Parameters of the law as scalars, without gamma, on which the stored map depends; names and units as in
+    `LuGre`."""
 
 
 @functools.partial(jax.tree_util.register_dataclass, data_fields=["share", "factor", "map"], meta_fields=["sizes"])

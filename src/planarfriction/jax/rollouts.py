@@ -11,7 +11,7 @@ from planarfriction.derivatives import Rollout
 from planarfriction.errors import InvalidValueError
 from planarfriction.jax import adjoint
 from planarfriction.jax.base import FrictionPytree
-from planarfriction.tensors import rollouts
+from planarfriction.tensors.inputs import rollout_inputs
 
 
 def rest(model: FrictionPytree) -> jax.Array:
@@ -61,7 +61,7 @@ def rollout(
     `jit`, parameters outside their range make the adjoint end in an error of JAX whose last line names them.
     """
     front = "planarfriction.jax"
-    state, twist, load, dt = rollouts.checked(model, FrictionPytree, front, state, twist, normal_force, dt, method)
+    state, twist, load, dt = rollout_inputs(model, FrictionPytree, front, state, twist, normal_force, dt, method)
     if parameters is not None:
         model = model.replace(parameters=type(model.parameters)(*parameters))
     inner = model.state_shape

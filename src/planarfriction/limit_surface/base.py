@@ -195,7 +195,7 @@ class LimitSurface(ByValue):
         """The surface for compiled code: a table of its potential, computed on first use."""
         from planarfriction.limit_surface.stored import stored_potential
 
-        data = stored_potential(lambda nodes: self.direction(nodes.reshape(-1, 3)).reshape(nodes.shape), self.segments)
+        data = stored_potential(lambda units: (self.direction(units), None), self.segments)
         return SurfaceNumbers(kernels.POTENTIAL, self.segments, data)
 
     # ------------------------------------------------------------------ the protocol
@@ -292,8 +292,9 @@ class LimitSurface(ByValue):
     def _direction(self, scaled: np.ndarray) -> np.ndarray:
         """Return `h` of scaled twists `[..., 3]`, with what the asymmetry adds; zero at rest."""
         flat = scaled.reshape(-1, 3)
-        moving, h = _norm(flat) > 0.0, np.zeros_like(flat)
-        h[moving] = self.direction(_unit(flat[moving]))
+        speed, h = _norm(flat), np.zeros_like(flat)
+        moving = speed > 0.0
+        h[moving] = self.direction(flat[moving] / speed[moving, None])
         if self._lean is not None:
             h[moving] += self._lean
         return h.reshape(scaled.shape)
@@ -302,15 +303,8 @@ class LimitSurface(ByValue):
         """Return `dh/dV_S` for scaled twists `[M, 3]`, shape `[M, 3, 3]`; zero at rest."""
         speed, slope = _norm(scaled), np.zeros((len(scaled), 3, 3))
         moving = speed > 0.0
-        slope[moving] = self.direction_slope(_unit(scaled[moving])) / speed[moving, None, None]
-        return slope
-
-    def _sliding_slope(self, scaled: np.ndarray) -> np.ndarray:
-        """Return `du/dV_S` of `u = h |V_S|` without asymmetry, for `[M, 3]`, shape `[M, 3, 3]`; at rest the
-        ellipsoid's."""
-        slope, moving = np.tile(np.eye(3), (len(scaled), 1, 1)), _norm(scaled) > 0.0
-        units = _unit(scaled[moving])
-        slope[moving] = self.direction_slope(units) + np.einsum("mi,mj->mij", self.direction(units), units)
+        per_speed = 1.0 / speed[moving, None]
+        slope[moving] = self.direction_slope(scaled[moving] * per_speed) * per_speed[:, None]
         return slope
 
     def _find_twists(self, wrenches: np.ndarray, found: np.ndarray) -> float:

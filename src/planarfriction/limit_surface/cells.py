@@ -32,11 +32,13 @@ class LimitSurfaceCells(CompiledLimitSurface):
         radius = self.contact_radius
         return SurfaceNumbers(self.kind, len(weights), np.concatenate([x / radius, y / radius, weights]))
 
-    def _sliding(self, scaled: np.ndarray) -> np.ndarray:
-        return super()._sliding(scaled) if self._one_metric else cell_sums(*self._scaled_levers, scaled)
+    def direction(self, units: np.ndarray) -> np.ndarray:
+        """Return `h` `[M, 3]` of unit scaled twists `[M, 3]`."""
+        return super().direction(units) if self._one_metric else cell_sums(*self._scaled_levers, units)
 
-    def _sliding_slope(self, scaled: np.ndarray) -> np.ndarray:
-        return super()._sliding_slope(scaled) if self._one_metric else cell_slopes(*self._scaled_levers, scaled)
+    def direction_slope(self, units: np.ndarray) -> np.ndarray:
+        """Return `dh/dV_S` `[M, 3, 3]` at unit scaled twists `[M, 3]`."""
+        return super().direction_slope(units) if self._one_metric else cell_slopes(*self._scaled_levers, units)
 
     @functools.cached_property
     def _cell_rows(self) -> tuple[np.ndarray, np.ndarray]:

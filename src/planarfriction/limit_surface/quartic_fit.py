@@ -23,32 +23,26 @@ for _row, _powers in enumerate(POWERS):
     ELLIPSOID[_row] = {4: 1.0, 2: 2.0}.get(_powers.max(), 0.0) if (_powers % 2 == 0).all() else 0.0
 
 
+_TENSORS = np.zeros((15, 3, 3, 3, 3))
+"""Symmetric tensors T of the monomials: `T x x x x`, gradients `4 T x x x`, second derivatives `12 T x x`."""
+for _index in itertools.product(range(3), repeat=4):
+    _TENSORS[(np.bincount(_index, minlength=3) == POWERS).all(axis=1), *_index] = 1.0
+_TENSORS /= _TENSORS.sum(axis=(1, 2, 3, 4), keepdims=True)
+
+
 def monomials(points: np.ndarray) -> np.ndarray:
     """Return the 15 monomials at points `[M, 3]`, shape `[M, 15]`."""
-    return np.prod(points[:, None, :] ** POWERS, axis=-1)
-
-
-@functools.cache
-def _differentiated(order: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return the factors `[15, 3, ...]` and powers `[15, 3, ..., 3]` of the monomials' derivatives of first or second
-    order."""
-    factors, powers = np.ones(15), POWERS.astype(float)
-    for _ in range(order):
-        factors = factors[..., None] * powers
-        powers = np.maximum(powers[..., None, :] - np.eye(3), 0.0)
-    return factors, powers
+    return np.einsum("mci,mi->mc", 0.25 * gradients(points), points)
 
 
 def gradients(points: np.ndarray) -> np.ndarray:
     """Return the gradients of the monomials, shape `[M, 15, 3]`."""
-    factors, powers = _differentiated(1)
-    return factors * np.prod(points[:, None, None, :] ** powers, axis=-1)
+    return np.einsum("mcij,mj->mci", hessians(points) / 3.0, points)
 
 
 def hessians(points: np.ndarray) -> np.ndarray:
     """Return the second derivatives of the monomials, shape `[M, 15, 3, 3]`."""
-    factors, powers = _differentiated(2)
-    return factors * np.prod(points[:, None, None, None, :] ** powers, axis=-1)
+    return 12.0 * np.einsum("cijkl,mk,ml->mcij", _TENSORS, points, points)
 
 
 @functools.cache
@@ -60,13 +54,10 @@ def _certificate_equations() -> tuple[np.ndarray, np.ndarray]:
     pairs = list(itertools.combinations_with_replacement(range(3), 2))
     row = {pair: number for number, pair in enumerate(itertools.product(pairs, pairs))}
     of_coefficients, of_matrix = np.zeros((36, 15)), np.zeros((36, 9, 9))
-    factors, powers = _differentiated(2)
-    for m, k, n in itertools.product(range(15), range(3), range(3)):
-        if factors[m, k, n] != 0.0:
-            i, j = np.repeat(range(3), powers[m, k, n].astype(int)).tolist()
-            of_coefficients[row[(i, j), (min(k, n), max(k, n))], m] += factors[m, k, n]
-    for i, k, j, n in itertools.product(range(3), repeat=4):  # (x_i z_k) (x_j z_n)
-        of_matrix[row[(min(i, j), max(i, j)), (min(k, n), max(k, n))], 3 * i + k, 3 * j + n] += 1.0
+    for i, j, k, n in itertools.product(range(3), repeat=4):  # (x_i z_k) (x_j z_n)
+        here = row[(min(i, j), max(i, j)), (min(k, n), max(k, n))]
+        of_coefficients[here] += 12.0 * _TENSORS[:, i, j, k, n]
+        of_matrix[here, 3 * i + k, 3 * j + n] += 1.0
     return of_coefficients, of_matrix.reshape(36, 81)
 
 

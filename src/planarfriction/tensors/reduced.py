@@ -17,9 +17,13 @@ from planarfriction.laws import FrictionLaw
 from planarfriction.models.map_sizes import MapSizes, maps_of, sizes_of
 from planarfriction.patch import ContactPatch
 from planarfriction.tensors.bristles import back_onto
+from planarfriction.tensors.steps import LAW
 
 AXIS = -1
 """Axis of the components of a state, its only axis."""
+
+PARAMETERS = tuple(name for name in LAW if name != "gamma")
+"""Physical parameters, in the order of their vector: the law but gamma, for which the map is made."""
 
 _SQUARES = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]
 _FOURTHS = [list(each) for each in zip(*((i, j) for i in range(3) for j in range(i, 6)), strict=True)]

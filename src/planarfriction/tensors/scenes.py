@@ -1,8 +1,8 @@
-"""The motion of a scene as a function of arrays over `xp`: its arguments, checked for both front ends."""
+"""The motion of a scene as one differentiable operation over `xp`."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 from planarfriction.derivatives.scene_function import SceneFunction
@@ -22,6 +22,43 @@ class SceneMotion(NamedTuple):
     """vx, vy, omega, x, y, theta of the body `[..., M, 6]`."""
     wrenches: Any
     """Wrench of one of the identical contacts `[..., M, C, 3]` [N, N, N m]."""
+
+
+def simulator(xp: Any, call: Callable[..., tuple[Any, Any]]) -> Callable[..., SceneMotion]:
+    """Return `simulate_scene` of a front end, whose `call(function, numbers)` returns motion and wrenches."""
+
+    def simulate_scene(
+        scene: Scene,
+        parameters: Mapping[str, Any] | None = None,
+        *,
+        signals: Mapping[str, tuple[Any, Any]] | None = None,
+        initial: Mapping[str, Any] | None = None,
+        t_end: float | None = None,
+        rtol: float = 1e-9,
+        atol: float | None = None,
+        save_every: float | None = None,
+    ) -> SceneMotion:
+        """Simulate a scene as a differentiable function of tensors of PyTorch or arrays of JAX.
+
+        `parameters` gives factors `[...]` (1 leaves the scene as it is) on mu, mass, inertia and load. `signals` gives
+        knots [s], concrete numbers, and values by the name of a signal, `(times [K], values [..., K])`, for `force` and
+        `velocity` `[..., K, 3]`, as in `derivatives.scene_sensitivities`. They replace the scene's own signal and are
+        interpolated in the same way. `initial` gives components `[...]` of the initial state: vx, vy, omega, x, y,
+        theta. Leading axes broadcast, and each set of numbers is a separate simulation on its own thread; `vmap` adds
+        an axis in front.
+
+        Gradients are those of `derivatives.scene_gradient` (in JAX they simulate once more), forward derivatives those
+        of `scene_sensitivities`. First derivatives only; computed in double precision on the CPU.
+
+        Raises `InvalidValueError` for names and numbers out of range, and `SolverError` if the solver fails; inside
+        `jax.jit` these end in an error of JAX whose last line names them.
+        """
+        options = {"t_end": t_end, "rtol": rtol, "atol": atol, "save_every": save_every}
+        function, numbers = scene_function(xp, scene, parameters, signals, initial, **options)
+        motion, wrenches = call(function, numbers)
+        return SceneMotion(xp.from_numpy(function.time, numbers), motion, wrenches)
+
+    return simulate_scene
 
 
 def scene_function(

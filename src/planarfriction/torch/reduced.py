@@ -17,11 +17,8 @@ from planarfriction.models.map_sizes import maps_of, sizes_of
 from planarfriction.models.reduced_map import slip_factor
 from planarfriction.patch import ContactPatch
 from planarfriction.tensors import reduced
-from planarfriction.tensors.steps import LAW, Part
+from planarfriction.tensors.steps import Part
 from planarfriction.torch.base import Compiled, FrictionModule
-
-PARAMETERS = tuple(name for name in LAW if name != "gamma")
-"""Physical parameters, in the order of their vector: the law but gamma, for which the map is made."""
 
 
 class ReducedModel(FrictionModule):
@@ -55,7 +52,7 @@ class ReducedModel(FrictionModule):
         parts: int | str = 1,
         segments: int = 24,
         speeds: int = 16,
-        trainable: Iterable[str] = PARAMETERS[:-1],
+        trainable: Iterable[str] = reduced.PARAMETERS[:-1],
         dtype: torch.dtype | None = None,
         device: torch.device | str | None = None,
     ):
@@ -74,7 +71,7 @@ class ReducedModel(FrictionModule):
         numbers = law.numbers._asdict()
         self.register_buffer("gamma", torch.tensor(numbers["gamma"], **kind))
         lever = float(slip_factor(patch, normal_force)[2, 2])
-        self._adopt({name: numbers[name] for name in PARAMETERS}, trainable, lever, **kind)
+        self._adopt({name: numbers[name] for name in reduced.PARAMETERS}, trainable, lever, **kind)
 
     def _load_from_state_dict(self, state_dict: dict[str, Any], prefix: str, *rest: Any) -> None:
         shares, maps = (state_dict.get(f"{prefix}{name}") for name in ("share", "map"))

@@ -7,7 +7,7 @@ from torch import Tensor
 
 from planarfriction.derivatives import Rollout
 from planarfriction.errors import InvalidValueError
-from planarfriction.tensors import rollouts
+from planarfriction.tensors.inputs import rollout_inputs
 from planarfriction.tensors.operations import RolloutOperation
 from planarfriction.torch import adjoint
 from planarfriction.torch.base import Compiled, FrictionModule
@@ -35,7 +35,7 @@ def rollout(
     Raises `InvalidValueError` as a step does (see `TensorModel`), and for a method that is not possible.
     """
     front = "planarfriction.torch"
-    inputs = rollouts.checked(model, FrictionModule, front, state, twist, normal_force, dt, method)
+    inputs = rollout_inputs(model, FrictionModule, front, state, twist, normal_force, dt, method)
     start, twist, load, step = inputs
     if step.ndim:
         raise InvalidValueError("dt", "be one number", f"shape {list(step.shape)}")
