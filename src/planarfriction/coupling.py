@@ -120,8 +120,7 @@ class CoupledPatches(ByValue):
         return np.zeros(self.state_shape)
 
     def states(self, state: np.ndarray) -> list[np.ndarray]:
-        """Return the views of the state of each patch in `state` `[..., states]`, each in the shape that its model
-        uses.
+        """Return views of the state of each patch in `state` `[..., states]`, each in the shape that its model uses.
 
         Raises InvalidValueError for a state of another shape.
         """
@@ -254,8 +253,7 @@ class CoupledPatches(ByValue):
         return step if len(problems) == 1 else CoupledStep(*map(np.ascontiguousarray, step))
 
     def _blank_problem(self) -> np.ndarray:
-        """Return the row of a problem without inputs, for compiled hosts; its patches follow no loads
-        (`kernels.coupling`)."""
+        """Return the row of a problem without inputs, for compiled hosts, with patches of fixed shape."""
         row, parts = np.zeros((1, self._packed.words)), self._parts
         row.view(np.int64)[:, parts["records"]], row[:, parts["shares"]] = self._packed.records, self._packed.shares
         row[:, parts["tolerance"]], row[:, parts["most"]] = TOLERANCE, ITERATIONS

@@ -58,8 +58,7 @@ class Family(Mapping[str, Any]):
         return ", ".join(make.__name__ for make in self.values())
 
     def choose(self, name: str) -> Any:
-        """Return the class or function of the member `name`. Raises `InvalidValueError`, listing all names, if there is
-        none."""
+        """Return the class or function of a member. Raises `InvalidValueError` with all names if there is none."""
         from planarfriction import validation  # brings NumPy with it, which names alone do not need
 
         return self[validation.choice(self.what, name, self)]

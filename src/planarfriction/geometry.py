@@ -32,8 +32,7 @@ def wrench_at(wrench: ArrayLike, offset: ArrayLike) -> np.ndarray:
 
 
 def transformed(matrix: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Return the products `matrix @ v` for each v in `vectors` `[..., 3]`, with the same rounding for one vector as for
-    many.
+    """Return `matrix @ v` for each v in `vectors` `[..., 3]`, rounded in the same way for one vector as for many.
 
     Only products and sums of single numbers are rounded in the same way everywhere; the rounding of BLAS depends on the
     number of rows and on the processor.

@@ -110,8 +110,7 @@ class Table:
                 raise FileError(f"{path}: line {line} has two columns {shown(repr(name))}")
 
     def numbers(self, names: Sequence[str]) -> np.ndarray:
-        """Return the columns `names`, finite, shape `[rows, len(names)]`; raises FileError with the line and the
-        column."""
+        """Return the columns `names`, finite, `[rows, len(names)]`; raises FileError with the line and the column."""
         for name in names:
             if not (isinstance(name, str) and name in self.names):
                 near = difflib.get_close_matches(name[:200], self.names, n=1) if isinstance(name, str) else []

@@ -48,8 +48,7 @@ _OF_KIND = {
 
 
 def why_not_numeric(value: Any, depth: int = 0) -> str | None:
-    """Return what is wrong with `value` as a number or an array of numbers, to follow "be a number"; None if nothing
-    is."""
+    """Return what is wrong with `value` as a number or an array of numbers ("be a number" + ...), or None."""
     if type(value) in _PLAIN:
         return None
     if isinstance(value, (list, tuple)):

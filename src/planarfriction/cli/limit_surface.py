@@ -84,8 +84,7 @@ def _directions() -> tuple[np.ndarray, np.ndarray]:
 
 
 def _distance_from_ellipsoid(surface: Any) -> float:
-    """Compute the largest distance between (fx, fy, tau/r) of the surface and of the ellipsoid at the same direction of
-    sliding."""
+    """Return the largest distance of (fx, fy, tau/r) from those of the ellipsoid at the same directions of sliding."""
     from planarfriction.limit_surface import LimitSurfaceEllipsoid
     from planarfriction.plots.limit_surface import scaled_samples
 

@@ -61,8 +61,7 @@ def write_solution(solution: Solution, folder: Path, label: str) -> list[Path]:
 
 
 def history_columns(solution: Solution) -> dict[str, np.ndarray]:
-    """Return the histories as columns [SI]: time, the body, then of each contact what `Log.from_csv` reads
-    (`name.vx`)."""
+    """Return the histories as columns [SI]: time, the body, then each contact's columns (`name.vx`) of a log."""
 
     def values(name: str) -> np.ndarray:
         return solution.histories[name].values

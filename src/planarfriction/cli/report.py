@@ -42,8 +42,7 @@ def comparison(solutions: Mapping[str, Solution]) -> list[list[str]]:
 
 
 def largest_differences(solution: Solution, reference: Solution) -> tuple[float, float]:
-    """Return the largest distance of the positions [m] and largest difference of the angles [rad] over the time both
-    cover."""
+    """Return the largest differences of position [m] and angle [rad] over the time that both solutions cover."""
     time, own = reference.histories["time"].values, solution.histories["time"].values
     time = time[time <= own[-1]]
     dx, dy, dtheta = (

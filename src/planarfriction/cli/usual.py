@@ -50,8 +50,7 @@ def _running_band() -> ContactPatch:
 
 
 def _ice() -> LuGre:
-    """Return the law of granite on pebbled ice; bristles of 0.1 um, without viscous friction, which is for speeds of
-    centimetres."""
+    """Return the law of granite on pebbled ice: bristles of 0.1 um, no viscous friction, which is for centimetres/s."""
     from planarfriction.laws import LuGre
 
     return LuGre(mu_c=0.01, sigma_0=1e5, sigma_1=10.0, sigma_2=0.0)

@@ -23,8 +23,7 @@ from planarfriction.tensors.steps import Part
 
 @by_parts
 class ReducedParameters(namedtuple("ReducedParameters", reduced.PARAMETERS)):
-    """Parameters of the law as scalars, without gamma, on which the stored map depends; names and units as in
-    `LuGre`."""
+    """Parameters of the law as scalars, as in `LuGre`, without gamma, on which the stored map depends."""
 
 
 @functools.partial(jax.tree_util.register_dataclass, data_fields=["share", "factor", "map"], meta_fields=["sizes"])

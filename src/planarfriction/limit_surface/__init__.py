@@ -1,5 +1,4 @@
-"""Limit surfaces: the friction wrench for every sliding twist, per unit `mu f_N`. They depend on shape, not on
-friction."""
+"""Limit surfaces: the friction wrench of every sliding twist per unit `mu f_N`, which the shape alone decides."""
 
 from planarfriction.families import SURFACES
 from planarfriction.limit_surface.base import LimitSurface

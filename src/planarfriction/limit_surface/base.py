@@ -107,8 +107,7 @@ class LimitSurface(ByValue):
         return picture("limit surface in a notebook", self)
 
     def at(self, normal_force: float) -> LimitSurface:
-        """Return the same kind of surface for the shape at another load; returns itself if the shape does not depend on
-        the load.
+        """Return the same kind of surface for the shape at another load; itself if the shape does not depend on it.
 
         Raises InvalidValueError for a load that is not > 0.
         """
@@ -137,8 +136,7 @@ class LimitSurface(ByValue):
         return float(self.patch.contact_radius(self.normal_force))
 
     def _loaded_cells(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the positions about the centre of pressure (see `lever_coordinates`) and weights of the cells that
-        carry load."""
+        """Return positions about the centre of pressure (see `lever_coordinates`) and weights of the loaded cells."""
         weights = self.patch.weights(self.normal_force)
         loaded = weights > 0.0
         offset = self.patch.positions - self.centre_of_pressure
@@ -226,8 +224,7 @@ class LimitSurface(ByValue):
         return -(frame.T @ self._direction_slope(flat) @ frame).reshape(*scaled.shape[:-1], 3, 3)
 
     def twist(self, wrench: ArrayLike) -> np.ndarray:
-        """Return the twist of unit dissipation normal to the surface where the ray of `wrench` meets it, shape
-        `[..., 3]`.
+        """Return the twist `[..., 3]` of unit dissipation normal to the surface where the ray of `wrench` meets it.
 
         `argmin Phi(V)` subject to `-W . V = 1`, scaled to `Phi(V) = 1`; the magnitude of `wrench` does not matter. The
         wrench of the returned twist is parallel to the given one within `CERTIFIED`. If the patch turns about a loaded
@@ -317,8 +314,7 @@ class LimitSurface(ByValue):
 
 
 def scaling(centre_of_pressure: np.ndarray, contact_radius: float) -> np.ndarray:
-    """Return `F` of `V_S = F V`: from the contact frame's origin to the centre of pressure, spin times the contact
-    radius."""
+    """Return `F` of `V_S = F V`: from the frame's origin to the centre of pressure, spin times the contact radius."""
     x, y = centre_of_pressure
     return np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, contact_radius]])
 

@@ -47,6 +47,5 @@ class LimitSurfaceCells(CompiledLimitSurface):
         return np.ascontiguousarray(np.moveaxis(levers, 0, -1)), weights
 
     def _find_twists(self, wrenches: np.ndarray, found: np.ndarray) -> float:
-        """Find twists; the minimum often lies on a kink, as a wrench inside a flat facet turns the body about a
-        cell."""
+        """Find twists; the minimum often lies on a kink: inside a flat facet the body turns about a cell."""
         return cell_twists(*self._cell_rows, self._scaling, wrenches, found)

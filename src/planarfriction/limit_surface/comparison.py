@@ -44,8 +44,7 @@ class SurfaceComparison:
     torque: Spread
     """Difference between their torques about the reference's centre of pressure, divided by its contact radius [-]."""
     radius: Spread
-    """Distance of the surface from the origin in the direction of a wrench, over that of the reference, less one
-    [-]."""
+    """Distance of the surface from the origin along a wrench, over that of the reference, less one [-]."""
     angle: Spread
     """Angle between the twists `(vx, vy, r omega)` of the same wrench [deg]."""
     samples: int

@@ -47,8 +47,7 @@ Rules = tuple[tuple[float, int], ...]
 
 
 class _Parts(Protocol):
-    """Domain that a surface is integrated over: gives sums `[M, 9]` at unit twists `[M, 3]`, in the unit of length
-    `unit` [m]."""
+    """Domain that a surface is integrated over: sums `[M, 9]` at unit twists `[M, 3]`, lengths in `unit` [m]."""
 
     def sums(self, twists: np.ndarray, unit: float, rules: Rules) -> np.ndarray: ...
 
@@ -199,8 +198,7 @@ class LimitSurfaceExact(LimitSurface):
         return float(self._parts.sums(np.array([[0.0, 0.0, 1.0]]), 1.0, EXACT_RULES)[0, 2])
 
     def sums(self, scaled: np.ndarray, rules: Rules = EXACT_RULES) -> tuple[np.ndarray, np.ndarray]:
-        """Return the gradient `[M, 3]` and second derivatives `[M, 3, 3]` of the dissipation, for scaled twists
-        `[M, 3]`."""
+        """Return gradient `[M, 3]` and second derivatives `[M, 3, 3]` of the dissipation at scaled twists `[M, 3]`."""
         speed = _norm(scaled)
         moving = speed > 0.0
         sums = np.zeros((len(scaled), 9))
@@ -211,8 +209,7 @@ class LimitSurfaceExact(LimitSurface):
         return sums[:, :3], slopes.reshape(-1, 3, 3)
 
     def direction(self, units: np.ndarray) -> np.ndarray:
-        """Return the negative friction `h` `[M, 3]` for unit scaled twists `[M, 3]`, in closed form where there is
-        one."""
+        """Return the negative friction `h` `[M, 3]` of unit scaled twists `[M, 3]`, in closed form if there is one."""
         return self.sums(units)[0]
 
     def direction_slope(self, units: np.ndarray) -> np.ndarray:
@@ -280,8 +277,7 @@ def _shape(corners: np.ndarray, weights: np.ndarray) -> np.ndarray:
 
 @functools.cache
 def _gauss_rules(count: int, rules: Rules) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the rules for elements of so many corners: nodes `[J, 3, K]` (xi, eta, weight), numbers and distances
-    `[J]`."""
+    """Return rules for elements of `count` corners: nodes `[J, 3, K]` (xi, eta, weight), numbers, distances `[J]`."""
     if count == kernels.POINTS:
         return np.array([[[0.0], [0.0], [1.0]]]), np.array([1]), np.zeros(1)
     nodes = np.zeros((len(rules), 3, max(side for _, side in rules) ** 2))
@@ -297,8 +293,7 @@ def _gauss_rules(count: int, rules: Rules) -> tuple[np.ndarray, np.ndarray, np.n
 
 @functools.cache
 def _double_exponential() -> tuple[np.ndarray, np.ndarray]:
-    """Return the nodes in (0, 1) and weights of the double-exponential rule: any singularity at the ends may be
-    integrated."""
+    """Return nodes in (0, 1) and weights of the double-exponential rule, for any singularity at the ends."""
     t = np.linspace(-_ENDS, _ENDS, _RADII)
     step = np.exp(-np.pi * np.abs(np.sinh(t)))
     share = np.where(t < 0.0, step, 1.0) / (1.0 + step)

@@ -40,8 +40,7 @@ def table_of(surface: LimitSurface) -> StoredPotential:
 
 
 def descend(surface: LimitSurface, wrenches: np.ndarray, twists: np.ndarray) -> float:
-    """Return the improve twists `[M, 3]` of wrenches `[M, 3]`; return the largest angle [rad] that is left, in scaled
-    coordinates."""
+    """Improve twists `[M, 3]` of wrenches `[M, 3]`; return the largest angle left in scaled coordinates [rad]."""
     scaling, worst = surface._scaling, 0.0
     back = scaling[9:18].reshape(3, 3)
     for wrench, twist in zip(wrenches, twists, strict=True):
@@ -54,8 +53,7 @@ def descend(surface: LimitSurface, wrenches: np.ndarray, twists: np.ndarray) -> 
 
 
 def _least(surface: LimitSurface, target: np.ndarray, guess: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return the scaled twist of unit dissipation whose `h` is parallel to the unit vector `target`, and the angle
-    [rad] left.
+    """Return the scaled twist of unit dissipation with `h` along the unit vector `target`, and the angle left [rad].
 
     As `limit_surface.loops.twists`: minimises the convex `Phi` over the plane `target . V = 1` by damped Newton steps.
     """

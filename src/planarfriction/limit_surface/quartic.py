@@ -180,8 +180,7 @@ class LimitSurfaceQuartic(LimitSurface):
         return x / self._value(x)[:, None] ** 0.25
 
     def direction_slope(self, units: np.ndarray) -> np.ndarray:
-        """Return `dh/dV_S`, from `x(V) = Phi^(1/3) h` and `dx/dV = (H''(x)/4)^-1`, Phi the dissipation of the unit
-        twist."""
+        """Return `dh/dV_S`, from `x(V) = Phi^(1/3) h` and `dx/dV = (H''(x)/4)^-1`, Phi that of the unit twist."""
         x = self._conjugate(units)
         root = self._value(x) ** 0.25  # Phi^(1/3)
         h = x / root[:, None]
@@ -190,8 +189,7 @@ class LimitSurfaceQuartic(LimitSurface):
 
 
 def _fitted(points: np.ndarray, twists: np.ndarray, velocity_weight: float) -> np.ndarray:
-    """Return the coefficients with `H = 1` at `points` `[M, 3]` and gradients, 4 times as long, along `twists`
-    `[M, 3]`."""
+    """Return the coefficients with `H = 1` at `points` `[M, 3]` and gradients of length 4 along `twists` `[M, 3]`."""
     units = twists / np.linalg.norm(twists, axis=1)[:, None]
     across = np.eye(3) - np.einsum("mi,mj->mij", units, units)
     parts = 0.25 * np.sqrt(velocity_weight) * np.einsum("mij,mcj->mic", across, quartic_fit.gradients(points))

@@ -14,8 +14,7 @@ POWERS = np.array([powers for powers in itertools.product(range(4, -1, -1), repe
 """Powers of `fx, fy, tau/r` in the 15 monomials, `[15, 3]`: x^4, x^3 y, x^3 z, x^2 y^2, ..."""
 
 MARGIN = 1e-4
-"""Least eigenvalue of the certificate: the Hessian is at least this times `|x|^2`, so that the surface has no facets
-and no corners (the unit sphere's is 4)."""
+"""Least eigenvalue of the certificate, `H'' >= 1e-4 |x|^2`: no facets, no corners (the unit sphere's is 4)."""
 
 ELLIPSOID = np.zeros(15)
 """Coefficients of `(x^2 + y^2 + z^2)^2`."""
@@ -87,8 +86,7 @@ def _exactly(matrix: np.ndarray, wanted: np.ndarray) -> np.ndarray:
 
 
 def least_squares(rows: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return the coefficients `[15]` of the convex quartic with the least `|rows c - values|`; rows `[M, 15]`, values
-    `[M]`.
+    """Return the coefficients `[15]` of the convex quartic of least `|rows c - values|`, `[M, 15]` and `[M]`.
 
     Without the constraint where that is convex anyway: then to rounding, otherwise to the solver's tolerance.
     """

@@ -62,6 +62,5 @@ class LimitSurfaceTablePublished(CompiledLimitSurface):
         return SurfaceNumbers(self.kind, self.segments, nodes.reshape(-1))
 
     def _find_twists(self, wrenches: np.ndarray, found: np.ndarray) -> float:
-        """Find twists; where several directions answer because the stored map folds, take the one of least
-        dissipation."""
+        """Find twists; of several directions that answer because the map folds, take that of least dissipation."""
         return published_twists(self.numbers.data, self.segments, self._scaling, wrenches, found)

@@ -103,8 +103,7 @@ def compressed(
 
 
 def surface_error(patch: ContactPatch, few: ContactPatch, normal_force: ArrayLike | None = None) -> float:
-    """Return the largest relative error of the dissipation of `few` compared with that of `patch`, over twists of all
-    directions [-].
+    """Return the largest relative error of the dissipation of `few` compared with that of `patch` [-].
 
     Twists are spread evenly over the sphere of `(vx, vy, omega r)` about the centre of pressure.
 
@@ -232,8 +231,7 @@ class _WeightProblem(NamedTuple):
         return result
 
     def _weights(self, kept: np.ndarray) -> np.ndarray | None:
-        """Return the weights of the cells `kept` that fit the surface best and have the moments; None where none have
-        them."""
+        """Return the weights of `kept` cells that have the moments and fit the surface best; None if none have them."""
         moments, surface = self.moments[:, kept], self.surface[:, kept]
         count, conditions = moments.shape[1], len(moments)
         if count < conditions:

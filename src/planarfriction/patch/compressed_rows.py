@@ -30,8 +30,7 @@ def scaled_positions(positions: np.ndarray, weights: np.ndarray) -> np.ndarray:
 
 
 def directions(count: int) -> np.ndarray:
-    """Return the directions of `(vx, vy, omega r)` spread evenly over half the sphere, on a Fibonacci spiral,
-    `[count, 3]`."""
+    """Return `(vx, vy, omega r)` spread evenly over half the sphere, on a Fibonacci spiral, `[count, 3]`."""
     step = np.arange(count) + 0.5
     z, turn = step / count, math.pi * (1.0 + math.sqrt(5.0)) * step
     level = np.sqrt(1.0 - z**2)

@@ -113,8 +113,7 @@ class ContactPatch(Moments):
     def disc_published(
         cls, radius: float = 0.01, cells: int = 21, *, pressure: Any = None, name: str = "disc_published"
     ) -> ContactPatch:
-        """Return the published disc mask: whole cells of a grid `2 radius` [m] wide, within `cells // 2` cells of the
-        centre.
+        """Return the published mask: cells of a grid `2 radius` [m] wide, within `cells // 2` cells of its centre.
 
         Distances are between cell centres and `cells` is odd, so the size of the mask depends on it: 317 of 21 x 21
         cells have the area of a disc with a radius of 10.05 cells, not 10.5. Use it for reproduction; `disc` is the
@@ -200,8 +199,7 @@ class ContactPatch(Moments):
     def polygon(
         cls, vertices: Any, cells: int | Sequence[int] = 21, *, pressure: Any = None, name: str = "polygon"
     ) -> ContactPatch:
-        """Return a polygon with `vertices` `[M, 2]` [m], convex or not, on a grid over its bounding box, cut along its
-        sides.
+        """Return a polygon with `vertices` `[M, 2]` [m], convex or not, on a grid over its box, cut along its sides.
 
         `cells` counts along the longer side of the bounding box, or is `(columns, rows)`. Raises InvalidValueError for
         vertices that outline no simple polygon.
@@ -232,8 +230,7 @@ class ContactPatch(Moments):
     def from_pressure(
         cls, pressure: Any, cell_size: float | Sequence[float], *, loads: Any = None, name: str | None = None
     ) -> ContactPatch:
-        """Return a patch from a measured pressure map: an array `[rows, columns]`, or the path of a CSV, NPY or grey
-        image file.
+        """Return a patch from a pressure map: an array `[rows, columns]`, or the path of a CSV, NPY or grey image file.
 
         **Row 0 is the top** (largest y), column 0 the left; the middle of the map is the origin. `cell_size` [m] is the
         side of a cell or `(width, height)`. Only ratios of the pressures matter. Cells without pressure are dropped.
@@ -274,8 +271,7 @@ class ContactPatch(Moments):
         return compressed(self, degree, cells=cells, error=error, loads=loads)
 
     def cell_extents(self) -> np.ndarray:
-        """Return the width and height over which the load of each cell is spread, `[N, 2]` [m]; a cut cell's are
-        smaller."""
+        """Return the width and height over which the load of each cell is spread `[N, 2]` [m], less for cut cells."""
         if self.cell_size is None:
             return np.zeros((self.cells, 2))
         width, height = self.cell_size
@@ -333,8 +329,7 @@ class ContactPatch(Moments):
         return picture("patch in a notebook", self)
 
     def _shares(self, relative: np.ndarray) -> np.ndarray:
-        """Return the weights `[..., N]` from relative pressures of the same shape, scaled first so that no sum can
-        overflow."""
+        """Return weights `[..., N]` from relative pressures of that shape, scaled first so that no sum can overflow."""
         peak = relative.max(-1, keepdims=True)
         if not (peak > 0.0).all():
             raise InvalidValueError("pressure", "be > 0 on at least one cell at every load", f"a peak of {peak.min()}")

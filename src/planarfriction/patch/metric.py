@@ -25,8 +25,7 @@ _PatchT = TypeVar("_PatchT", bound="Anisotropy")
 
 
 def friction_metric(angle: float, along: float, across: float) -> np.ndarray:
-    """Return the metric `[2, 2]` of a surface with a grain: `R diag(along^2, across^2) R'` with R the rotation by
-    `angle` [rad].
+    """Return the metric `[2, 2]` of a grain: `R diag(along^2, across^2) R'` with R the rotation by `angle` [rad].
 
     `along` and `across` are the friction coefficients along and across the grain relative to those of the law, > 0;
     `angle` is that of the grain from the contact frame's x axis. Oblique sliding in a direction `e` dissipates
@@ -63,8 +62,7 @@ class Anisotropy(ByValue):
         return with_outline(patch, self.outline)  # pyright: ignore
 
     def __getstate__(self) -> dict[str, Any]:
-        """Return the fields for a copy or another process in one step: another thread may be adding the metric
-        meanwhile."""
+        """Return the fields for a copy or a process in one step: another thread may be adding the metric meanwhile."""
         return dict(self.__dict__)
 
     @functools.cached_property
@@ -102,8 +100,7 @@ class Anisotropy(ByValue):
         return root[0] if root.ndim == 3 and (root == root[0]).all() else root
 
     def lever_coordinates(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return `(x', y')` `[..., N]` with `L (-y, x) = (-y', x')`: what a cell sees of a spin is that of a cell
-        there.
+        """Return `(x', y')` `[..., N]` with `L (-y, x) = (-y', x')`: a cell sees a spin as if it stood there.
 
         For a metric per cell the last axis of `x` and `y` runs over all cells of the patch.
         """
@@ -163,8 +160,7 @@ def _symmetric(matrix: np.ndarray) -> np.ndarray:
 
 
 def _positive_definite(metric: np.ndarray) -> np.ndarray:
-    """Return the metrics `[..., 2, 2]`, exactly symmetric, or raise an error that shows the first that cannot be
-    one."""
+    """Return the metrics `[..., 2, 2]`, exactly symmetric, or raise an error that shows the first bad one."""
     skew = np.abs(metric[..., 0, 1] - metric[..., 1, 0]) > _SAME * np.abs(metric).max(axis=(-1, -2))
     lowest = np.linalg.eigvalsh(_symmetric(metric))[..., 0]
     bad = skew | ~(lowest > 0.0)

@@ -36,8 +36,7 @@ class Moments(Anisotropy):
     @overload
     def contact_radius(self, normal_force: np.ndarray | Sequence[Any]) -> np.ndarray: ...
     def contact_radius(self, normal_force: Any = None) -> Any:
-        """Return the contact radius `r = sum(w |rho - CoP|)` [m]: a pure spin about the CoP has the friction torque
-        `mu f_N r`.
+        """Return the contact radius `r = sum(w |rho - CoP|)` [m]: a spin about the CoP has the torque `mu f_N r`.
 
         With a friction metric `sum(w |L J (rho - CoP)|)`, J a quarter turn; the second moment likewise.
         """
@@ -63,8 +62,7 @@ class Moments(Anisotropy):
         return np.where(self.weights(normal_force) > 0.0, self.areas, 0.0).sum(-1)
 
     def moments(self, degree: int, normal_force: ArrayLike | None = None, *, about: Any = None) -> np.ndarray:
-        """Return the polynomial moments of the pressure, `M[i, j] = sum(w (x - x0)^i (y - y0)^j)` for
-        `i + j <= degree`.
+        """Return the moments of the pressure `M[i, j] = sum(w (x - x0)^i (y - y0)^j)` for `i + j <= degree`.
 
         Shape `[..., degree + 1, degree + 1]` [m^(i + j)], zero where `i + j > degree`. `about` is the point (x0, y0)
         [m]: None for the centre of pressure (central moments), `(0, 0)` for the raw ones. Raises InvalidValueError for

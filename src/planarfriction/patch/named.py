@@ -12,8 +12,7 @@ from planarfriction.patch.contact_patch import ContactPatch
 def pressure_map(
     cell_size: Any, file: Any = None, files: Any = None, values: Any = None, loads: Any = None, name: str | None = None
 ) -> ContactPatch:
-    """Return the patch of one map (a file or its values, rows from the top) or of several with the loads they belong to
-    [N].
+    """Return the patch of one map (a file or its values, rows from the top), or of several with their loads [N].
 
     Raises `InvalidValueError` unless exactly one of `file`, `files` and `values` is given.
     """

@@ -49,8 +49,7 @@ class RoundOutline:
     """Outer radius [m]."""
 
     def rims(self) -> tuple[np.ndarray, list[np.ndarray]]:
-        """Return polygons of the areas of its outer circle and its hole, if any, `[shapes.CIRCLE_SIDES, 2]` [m]
-        each."""
+        """Return polygons with the areas of its outer circle and its hole, if any, `[CIRCLE_SIDES, 2]` [m] each."""
         return shapes.circle(self.outer), [shapes.circle(self.inner)] if self.inner > 0.0 else []
 
     def to_dict(self) -> dict[str, Any]:

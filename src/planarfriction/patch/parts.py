@@ -89,8 +89,7 @@ def automatic(positions: np.ndarray, weights: np.ndarray) -> int:
 
 
 def kurtosis(positions: np.ndarray, weights: np.ndarray) -> float:
-    """Return `<(rho' C^-1 rho)^2>`, rho from the centre of pressure and C the second moments `<rho rho'>`, in the
-    plane."""
+    """Return the kurtosis `<(rho' C^-1 rho)^2>`, rho from the centre of pressure, with `C = <rho rho'>`."""
     w = weights / weights.sum()
     x = positions - w @ positions
     moments = (w[:, None] * x).T @ x
@@ -145,8 +144,7 @@ def _far_side(x: np.ndarray, w: np.ndarray, outwards: np.ndarray) -> np.ndarray:
 
 
 def _passing(r: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return for each cell `[N, 2]` whether it lies ahead of a line that begins to turn, and its rank in the order in
-    which the line passes the cells."""
+    """Return True for cells ahead of a line that begins to turn `[N]`, and their ranks in the order of its passing."""
     angle = np.arctan2(r[:, 1], r[:, 0])
     lines = np.sort(angle % np.pi)
     gaps = np.diff(lines, append=lines[0] + np.pi)
@@ -177,8 +175,7 @@ def labels_of(patch: ContactPatch, parts: int | None) -> np.ndarray:
 
 
 def part_of(patch: ContactPatch, cells: np.ndarray) -> ContactPatch:
-    """Return the `cells` `[N]` (bool) of a patch as a patch, whose weights are their shares in what they carry
-    together.
+    """Return the `cells` `[N]` (bool) of a patch as a patch, whose weights are their shares in their own load.
 
     A normal force is that of the whole patch. Where it leaves these cells without load, they carry none of it evenly.
     """

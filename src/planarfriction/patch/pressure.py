@@ -39,8 +39,7 @@ class Pressure(Checked):
         raise NotImplementedError
 
     def ever_loaded(self, positions: np.ndarray, between: tuple[float, float] | None = None) -> np.ndarray:
-        """Return which of `positions` `[N, 2]` [m] can carry pressure at any load, or at any `between` two [N]; bool
-        `[N]`."""
+        """Return which of `positions` `[N, 2]` [m] can carry pressure at any load, or one `between` two [N], `[N]`."""
         return self.relative(positions) > 0.0
 
     def only(self, kept: np.ndarray) -> Pressure:
@@ -52,8 +51,7 @@ class Pressure(Checked):
         return self
 
     def to_dict(self) -> dict[str, Any] | list[float]:
-        """Return the law as plain data: `{"law": name, parameter: value, ...}`, or a list with one pressure per
-        cell."""
+        """Return the law as plain data: `{"law": name, parameter: value, ...}`, or a list of one pressure per cell."""
         fields = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}  # pyright: ignore
         plain = {name: list(value) if isinstance(value, tuple) else value for name, value in fields.items()}
         return {"law": self.law, **{name: value for name, value in plain.items() if value is not None}}
@@ -208,8 +206,7 @@ class PerCell(ByValue, Pressure):
         self._set(values=values)
 
     def relative(self, positions: np.ndarray, normal_force: np.ndarray | None = None) -> np.ndarray:
-        """Return the relative pressures of the cells, `[N]`. Raises InvalidValueError for another number of
-        positions."""
+        """Return the pressures of the cells, `[N]`. Raises InvalidValueError for another number of positions."""
         if len(self.values) != len(positions):
             raise InvalidValueError("pressure", f"have shape [{len(positions)}]", f"shape [{len(self.values)}]")
         return self.values

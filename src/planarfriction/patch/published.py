@@ -57,8 +57,7 @@ def _steps(cells: int) -> np.ndarray:
 
 
 def _masked(blocks: list[tuple[slice, slice]], cells: int, width: float, name: str) -> ContactPatch:
-    """Return a patch with uniform pressure on blocks of the published grid; a cell is loaded if its centre is in a
-    block."""
+    """Return a patch of even pressure on blocks of the published grid, of all cells whose centre is in a block."""
     cells, width = validation.count("cells", cells, at_most=MOST_CELLS), validation.positive("width", width)
     check_cells(cells**2)
     mask = np.zeros((PUBLISHED_CELLS, PUBLISHED_CELLS))

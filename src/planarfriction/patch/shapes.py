@@ -34,8 +34,7 @@ def columns_and_rows(cells: int | Sequence[int], width: float, height: float) ->
 
 
 def circle(radius: float) -> np.ndarray:
-    """Return the vertices `[CIRCLE_SIDES, 2]` of the regular polygon with the area of the disc of `radius` [m] about
-    the origin.
+    """Return the vertices `[CIRCLE_SIDES, 2]` of the regular polygon with the area of the disc of `radius` [m].
 
     Circumradius `R sqrt(a / sin a)`, `a = 2 pi / sides`. Sides, not corners, face the axes: the polygon then lies
     inside the square around the disc.
@@ -70,8 +69,7 @@ def clip(outline: Any, grid: Grid) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _rows(grid: Grid) -> np.ndarray:
-    """Return one box for each row of `grid`, from the top, one cell wider than the grid on both sides, `[rows]` of
-    shapely."""
+    """Return a box for each row of `grid`, from the top, a cell wider on both sides, `[rows]` of shapely."""
     import shapely
 
     y = grid.centres()[:: grid.columns, 1]

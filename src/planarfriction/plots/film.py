@@ -93,7 +93,7 @@ class Film:
         return np.asarray(self.canvas.buffer_rgba())[..., :3].copy()
 
     def show(self, frame: int) -> None:
-        """Return the go to a frame."""
+        """Show a frame."""
         track = self.track
         pose, (x, y) = track.poses[frame], self.views[frame]
         self.axes.set(xlim=x, ylim=y)
@@ -163,8 +163,7 @@ class Film:
 
 
 def _places(contacts: int) -> tuple[tuple, list[tuple]]:
-    """Return the places of the world in a frame and, for each contact, its cells, their colours (or None) and its
-    surface."""
+    """Return the places of the world and, for each contact, of its cells, their colours (or None) and its surface."""
     if contacts == 1:
         world = (0.072, 0.145, 0.5, 0.745)
         return world, [((0.665, 0.6, 0.2, 0.355), (0.88, 0.6, 0.014, 0.355), (0.605, 0.03, 0.35, 0.48))]
@@ -185,8 +184,7 @@ def _put(artists: list[Any], pose: np.ndarray, axes: Any) -> None:
 
 
 def _views(solution: Solution, track: Track, follow: bool) -> np.ndarray:
-    """Return the limits of both axes for each frame `[F, 2, 2]` [mm]: of all that is drawn, or of a window that follows
-    the body.
+    """Return the limits of both axes `[F, 2, 2]` [mm]: of all that is drawn, or of a window that follows the body.
 
     A window follows where the motion is much longer than the body; it stays within the limits of the whole.
     """

@@ -75,16 +75,14 @@ def check_kind(path: Path) -> None:
 
 
 def _self_contained(page: bytes) -> bytes:
-    """Return the page of a player that starts by itself, with signs on its buttons in place of a font from the
-    network."""
+    """Return the page of a player that starts by itself, with signs on its buttons and no font from the network."""
     page = re.sub(rb"<link\b[^>]*>", b"", page)
     page = re.sub(rb"(\w+) = new Animation\([^;]*;", rb"\g<0> \1.play_animation();", page)
     return re.sub(rb'<i class="fa fa-([\w -]+)"></i>', lambda found: SIGNS.get(found[1].decode(), "?").encode(), page)
 
 
 def _palette(frame: Callable[[int], np.ndarray], count: int) -> Image.Image:
-    """Return the 256 colours for all frames: one choice keeps them from flickering, and what does not change costs
-    little."""
+    """Return the 256 colours of all frames: with one choice they do not flicker, and what is still costs little."""
     from PIL import Image
 
     chosen = np.unique(np.linspace(0, count - 1, PALETTE_FRAMES).round().astype(int))

@@ -44,7 +44,7 @@ _CONTACT = (
 
 
 def plot_histories(solutions: Solution | Mapping[str, Solution]) -> style.PlotFigure:
-    """Return the plot position, angle, speed, forces, torque and normal force against time.
+    """Plot position, angle, speed, forces, torque and normal force against time.
 
     `solutions` is one solution or a mapping from label to solution; several are overlaid. Colours distinguish the runs,
     the same for a model in every figure, line styles their contacts; with more than 7 runs the colours go from the

@@ -26,8 +26,7 @@ _LIGHT = np.array([0.35, -0.6, 0.72])
 
 
 def sample_limit_surface(surface: Any, polar: np.ndarray, azimuth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the twists around the direction sphere and their wrenches for mu f_N = 1, about the contact frame's
-    origin.
+    """Return twists in the directions of a sphere and their wrenches for mu f_N = 1, about the contact frame's origin.
 
     The directions are the unit sphere of scaled twists at the centre of pressure,
     `(vx, vy, r omega) = (sin p cos a, sin p sin a, cos p)`; `polar` and `azimuth` [rad] broadcast to `[...]`, the
@@ -63,8 +62,7 @@ def plot_limit_surface(surface: Any, *, beside: Any = "ellipsoid") -> style.Plot
 
 
 def interactive_limit_surface(surface: Any, *, beside: Any = "ellipsoid") -> Any:
-    """Return the picture of `plot_limit_surface` as an interactive plotly figure, to rotate, zoom and read values with
-    the mouse.
+    """Return the picture of `plot_limit_surface` as a plotly figure, to rotate, zoom and read with the mouse.
 
     `.show()` opens it in the browser, `.write_html(path)` writes it. The label at the pointer shows the friction wrench
     and the direction of sliding that belongs to it.
@@ -138,8 +136,7 @@ def _evened(angles: np.ndarray, steps: np.ndarray) -> np.ndarray:
 
 
 def scaled_samples(surface: Any, polar: np.ndarray, azimuth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the directions `(vx, vy, r omega)` and points `(fx, fy, tau/r)` of `sample_limit_surface` at the centre of
-    pressure.
+    """Return directions `(vx, vy, r omega)` and points `(fx, fy, tau/r)` of a surface at the centre of pressure.
 
     Both are pure numbers of shape `[..., 3]`; the directions have length 1.
     """

@@ -38,8 +38,7 @@ ROUND, CORNERS = 0.02, 12
 
 
 def plot_motion(solution: Solution) -> style.PlotFigure:
-    """Draw the outline of the body at 12 instants, evenly spaced in time and coloured by time, with the contact
-    patches.
+    """Draw the outline of the body and the patches at 12 instants, evenly spaced in time and coloured by time.
 
     World axes, equal scales. Patches fixed to the world are drawn once; patches on the body, and pads that are driven,
     at each instant. A body without an outline is drawn as the rim of its patches, with a line from its centre of mass
@@ -229,8 +228,7 @@ def _on_mount(contact: Contact) -> np.ndarray:
 
 
 def _limits(solution: Solution, times: np.ndarray, poses: np.ndarray, larger: float) -> np.ndarray:
-    """Return the limits of both axes, `[2, 2]` [mm], that hold everything drawn at `times` and `poses`, the body
-    `larger`."""
+    """Return the limits of both axes, `[2, 2]` [mm], that hold all drawn at `times` and `poses`, the body `larger`."""
     points = [_placed(larger * line, pose) for pose in poses for line in _body_lines(solution)]
     moving = _driven(solution)
     for contact in moving:

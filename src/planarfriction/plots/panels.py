@@ -109,7 +109,7 @@ class CellPanel:
         return [self.cells, self.centre, self.words]
 
     def show(self, frame: int) -> None:
-        """Return the go to a frame."""
+        """Show a frame."""
         track = self.track
         colour_cells(self.cells, track, frame)
         put_centre(self.centre, track.twists[frame], np.zeros(2), still=still_speed(track.twists))
@@ -170,7 +170,7 @@ class SurfacePanel:
             surface.set_visible(each == level)
 
     def show(self, frame: int) -> None:
-        """Return the go to a frame."""
+        """Show a frame."""
         fx, fy, tau = self.points[frame]
         tail = self.points[max(0, frame - TAIL) : frame + 1]
         self.shadow.set_data_3d([fx, fx], [fy, fy], [self.floor, self.floor])
@@ -179,8 +179,7 @@ class SurfacePanel:
         self.head.set_data_3d([fx], [fy], [tau])
 
     def _points(self) -> np.ndarray:
-        """Return the wrenches `(fx, fy, tau/r)` about the centre of pressure over `mu_c f_N`, `[F, 3]` [-]; zero
-        without load."""
+        """Return the wrenches `(fx, fy, tau/r)` about the centre of pressure over `mu_c f_N` `[F, 3]` [-], or zeros."""
         track, mu = self.track, float(self.track.contact.model.law.numbers.mu_c)
         points = np.zeros((len(track.loads), 3))
         for frame, load in enumerate(track.loads):
@@ -213,8 +212,7 @@ def has_surface(track: ContactTrack) -> bool:
 
 
 def _levels(track: ContactTrack) -> dict[Any, float | None]:
-    """Return the load [N] of each level at which its surface is drawn; None where the shape does not depend on the
-    load."""
+    """Return the load [N] of each level at which its surface is drawn; None if the shape does not depend on it."""
     if not track.contact.model.patch.depends_on_load:
         return {None: None}
     found = sorted({_level(track, frame) for frame, load in enumerate(track.loads) if load > 0.0})
@@ -222,8 +220,7 @@ def _levels(track: ContactTrack) -> dict[Any, float | None]:
 
 
 def _level(track: ContactTrack, frame: int) -> Any:
-    """Return the level of the load of a frame; where it has none, that of the frame before it with one, or of the
-    first."""
+    """Return the level of the load of a frame; without load, that of the last one before with load, or of the first."""
     if not track.contact.model.patch.depends_on_load:
         return None
     loaded = np.flatnonzero(track.loads > 0.0)

@@ -117,8 +117,7 @@ _USUAL = {"length": "mm", "speed": "mm/s", "angle": "deg", "force": "N", "torque
 
 
 def unit_for(kind: str, *values) -> Unit:
-    """Return the unit in which the arrays `values` of one `kind` (length, speed, angle, force, torque, pressure) read
-    well."""
+    """Return the unit in which the arrays `values` of one `kind` of quantity, such as "length", read well."""
     largest = max((float(np.max(np.abs(value))) for value in values if np.size(value)), default=0.0)
     rows = _UNITS[kind]
     if largest == 0.0:

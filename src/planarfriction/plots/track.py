@@ -46,8 +46,7 @@ class ContactTrack:
         return self.contact.count * geometry.rotate(self.wrenches[:, :2], self.poses[:, 2])
 
     def shape(self, frame: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the share of the load on each cell `[N]` [-], and centre of pressure `[2]` [m], at the load of a
-        frame."""
+        """Return the share of the load on each cell `[N]` [-], and the centre of pressure `[2]` [m], at a frame."""
         patch, load = self.contact.model.patch, float(self.loads[frame])
         key = frame if patch.depends_on_load else -1
         if key not in self._shapes:
@@ -73,8 +72,7 @@ class Track(NamedTuple):
 
 
 def track_of(solution: Solution, times: np.ndarray) -> Track:
-    """Return the solution at `times` `[F]` [s]: poses between samples without overshoot, all else along straight
-    lines."""
+    """Return the solution at `times` `[F]` [s]: poses without overshoot, all else along straight lines."""
     sampled = np.asarray(solution.histories["time"].values, dtype=float)
     every = np.unique(np.linspace(0, len(sampled) - 1, min(len(sampled), MOST_STEPS)).round().astype(int))
     steps = np.unique(np.concatenate([sampled[every], times]))
@@ -95,8 +93,7 @@ def track_of(solution: Solution, times: np.ndarray) -> Track:
 
 
 def _first(solution: Solution) -> list[tuple[DistributedModel, np.ndarray] | None]:
-    """Return the distributed model of each contact, whatever its own, and how its bristles start; None without
-    bristles."""
+    """Return the distributed model of each contact and its first state; None for one without bristles."""
     from planarfriction.scenes.start import first_states
 
     scene = solution.scene
@@ -111,8 +108,7 @@ def _first(solution: Solution) -> list[tuple[DistributedModel, np.ndarray] | Non
 
 
 def contact_poses(contact: Contact, times: np.ndarray, poses: np.ndarray) -> np.ndarray:
-    """Return the poses of the frame of a contact `[T, 3]` [m, m, rad] at `times`, where the body has `poses`
-    `[T, 3]`."""
+    """Return the poses `[T, 3]` [m, m, rad] of a contact's frame at `times`, where the body has `poses` `[T, 3]`."""
     fixed = np.array([*contact.position, contact.angle], dtype=float)
     if contact.mounted_on == "body":
         return poses + geometry.rotate(fixed, poses[:, 2])
@@ -155,8 +151,7 @@ def _values(solution: Solution, name: str, sampled: np.ndarray, times: np.ndarra
 
 
 def _without_kick(solution: Solution, contact: int) -> np.ndarray:
-    """Return the wrenches of a contact `[T, 3]`; a first one that dwarfs the others lasts microseconds, and gives way
-    to the next.
+    """Return the wrenches of a contact `[T, 3]`; a first one that dwarfs the others gives way to the next.
 
     Bristles that start at rest under a moving body kick once (`sigma_1 v f_N`).
     """

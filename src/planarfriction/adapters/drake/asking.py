@@ -126,13 +126,12 @@ class Asking:
         return bool(new)
 
     def _answer_freely(self) -> None:
-        """Return the answer as the bodies do without contact: no answer is larger, so that with this one each pass gets
-        closer."""
+        """Take the response of the bodies without contact: none is larger, so that each pass gets closer."""
         np.matmul(self._rows, self._moved, out=self._row.response)
         self._row.load_response.fill(0.0)
 
     def _answer_as_before(self, answers: np.ndarray) -> None:
-        """Return the answer as in the last step if the same patches touched in it."""
+        """Take the response of the last step if the same patches touched in it."""
         k = len(self._touching)
         if answers[:k].tolist() == self._touching:
             twists, loads = np.split(answers[k:], [9 * k * k])
@@ -152,7 +151,7 @@ class Asking:
         return math.sqrt(squares)
 
     def _learn(self, wrench: np.ndarray, twist: np.ndarray, load: np.ndarray) -> None:
-        """Return the correct the answers by changes that came out: of twists symmetrically, of rank one.
+        """Correct the responses by changes that came out: of twists symmetrically, of rank one.
 
         Contacts only stiffen: `A - A_true >= 0`. Where a correction takes more than A has, contacts came or went.
         """

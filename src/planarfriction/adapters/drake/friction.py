@@ -114,8 +114,7 @@ class Friction(LeafSystem):
     # ------------------------------------------------------------------ what a context holds
 
     def GetBristles(self, context: Any) -> list[np.ndarray]:
-        """Return the copies of the states of all patches from this system's context, each in the shape that its model
-        uses."""
+        """Return copies of the states of all patches from this system's context, in the shapes of their models."""
         return self.coupled.states(self._read(context, "bristles").copy())
 
     def GetReport(self, context: Any) -> Report:
@@ -146,7 +145,7 @@ class Friction(LeafSystem):
     # ------------------------------------------------------------------ a step
 
     def _declare_inputs(self, plant: Any) -> None:
-        """Return the declare the inputs: the state of the plant, and all that drives the plant."""
+        """Declare the inputs: the state of the plant, and all that drives the plant."""
         self._state: Any = self.DeclareVectorInputPort("state", plant.num_multibody_states())
         self._inputs: dict[str, Any] = {}
         for i in range(plant.num_input_ports()):
@@ -220,8 +219,7 @@ def _sources(builder: Any, plant: Any) -> dict[str, Any]:
 
 
 def _reserve(builder: Any, plant: Any, sources: dict[str, Any]) -> None:
-    """Return the connect free inputs to nothing: a later connection would not be seen here, so that Drake has to refuse
-    it."""
+    """Connect free inputs to nothing, so that Drake refuses later connections, which would not be seen here."""
     for i in range(plant.num_input_ports()):
         port = plant.get_input_port(i)
         name, nothing = port.get_name(), None

@@ -37,8 +37,7 @@ class PatchContact(Checked):
     frame: str
     """Name of a frame on the body that owns the patch."""
     geometries: tuple[str, str]
-    """Names of the two collision geometries in contact, or of bodies; a body stands for all of its collision
-    geometries."""
+    """Names of the two collision geometries in contact, or of bodies, which stand for all their geometries."""
     centre: str = "frame"
     """Origin of the patch: that of the "frame", or the middle of Drake's points of "contact"."""
 

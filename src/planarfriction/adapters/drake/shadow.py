@@ -52,7 +52,7 @@ class Shadow:
         self._surfaces: list[tuple[int, int, float]] = []
 
     def begin(self, state: np.ndarray, driven: dict[str, Any]) -> None:
-        """Return the go to the begin of a step, with what drives the plant besides generalized forces."""
+        """Go to the beginning of a step, with what drives the plant besides generalized forces."""
         self.plant.SetPositionsAndVelocities(self._begin, state)
         for name, value in driven.items():
             if name in self._driven:

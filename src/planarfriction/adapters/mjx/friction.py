@@ -127,13 +127,11 @@ class Friction:
         return [z.reshape(*z.shape[:-1], *shape) for z, shape in zip(parts, self._fixed.shapes, strict=True)]
 
     def wrenches(self, d: Any) -> jax.Array:
-        """Return the wrenches of the last step `[k, 3]` [N, N, N m] on the bodies of the sites, in the frames of the
-        patches."""
+        """Return the wrenches of the last step on the sites' bodies, in the patches' frames `[k, 3]` [N, N, N m]."""
         return self._each(d, self._fixed.memory.wrench, 3)
 
     def twists(self, d: Any) -> jax.Array:
-        """Return the twists at the end of the last step `[k, 3]` [m/s, m/s, rad/s] of the bodies of the sites relative
-        to the other bodies."""
+        """Return the last twists `[k, 3]` [m/s, m/s, rad/s] of the sites' bodies relative to the others."""
         return self._each(d, self._fixed.memory.twist, 3)
 
     def loads(self, d: Any) -> jax.Array:

@@ -35,8 +35,7 @@ def places(placed: Sequence[Placed]) -> PatchPlaces:
 
 
 def geometry(m: Any, d: Any, where: PatchPlaces) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """Return the Jacobian of the twists `[3k, nv]`, 1 for the contacts of each patch `[k, nefc]`, and 1 for patches in
-    contact."""
+    """Return the Jacobian of the twists `[3k, nv]`; 1 for contacts of a patch `[k, nefc]`; 1 for patches in contact."""
     contact = d._impl.contact
     single = jnp.asarray(contact.dim == 1) & (contact.dist < contact.includemargin)
     frames = contact.frame.reshape(-1, 3, 3)

@@ -190,8 +190,7 @@ class _Search(NamedTuple):
 
 
 def solve(unit: Unit, host: HostResponse, guess: jax.Array, radius: jax.Array, tolerance: float, most: int) -> Solved:
-    """Solve for the wrenches `w(V, N)` with the V and N that they cause; `guess` `[3k]`, `radius` of the patches `[k]`
-    [m]."""
+    """Solve for the wrenches `w(V, N)` with the V and N that they cause; `guess` `[3k]`, `radius` `[k]` [m]."""
     count, lever = len(host.load), jnp.ones((len(host.load), 3)).at[:, 2].set(radius)
     caused = host.response @ guess
     speeds = lever.ravel() * (abs(host.twist + caused) + abs(caused))
@@ -224,8 +223,7 @@ def fitting(unit: Unit, host: HostResponse, found: jax.Array) -> jax.Array:
 
 
 def _without_rising(slopes: jax.Array, scale: jax.Array) -> jax.Array:
-    """Return the slopes `[k, 3, 3]` without the directions in which they rise; `scale` `[k, 3]` are twists of unit
-    energy."""
+    """Return the slopes `[k, 3, 3]` without rising directions; `scale` `[k, 3]` are twists of unit energy."""
     both = scale[:, :, None] * scale[:, None, :]
     rises, axes = jnp.linalg.eigh(0.5 * (slopes + slopes.mT) * both)
     return slopes - (axes * jnp.maximum(rises, 0.0)[:, None]) @ axes.mT / both

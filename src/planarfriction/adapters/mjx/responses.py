@@ -77,8 +77,7 @@ def slack(d: Any, before: Active, after: Active, acceleration: jax.Array, dt: ja
 
 
 def answer(m: Any, d: Any, jacobian: jax.Array, rows: jax.Array, active: Active) -> WrenchResponse:
-    """Return the response to wrenches from the Jacobian `[3k, nv]` of the twists; `rows` `[k, nefc]` are 1 for a
-    patch's contacts.
+    """Return the response to wrenches from the Jacobian `[3k, nv]` of the twists; `rows` `[k, nefc]` mark contacts.
 
     `qfrc_smooth` in the data is without wrenches.
     """

@@ -30,8 +30,7 @@ _FINE = 0.01
 
 
 def outlines(patch: ContactPatch) -> list[np.ndarray]:
-    """Return the rims of a patch, closed, `[M, 2]` [m] each: those that its cells were cut from, else those around its
-    cells."""
+    """Return the rims of a patch, closed, `[M, 2]` [m] each: of its outline, else those around its cells."""
     import shapely
 
     if patch.outline is not None:

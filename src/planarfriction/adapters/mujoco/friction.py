@@ -89,20 +89,17 @@ class Friction:
         return d.userdata[first : first + count]
 
     def state(self, d: Any) -> np.ndarray:
-        """Return the state of all patches at the current time of the data, as a view of `userdata`; `coupled.states`
-        gives it its shape."""
+        """Return the state of all patches now, as a view of `userdata`, which `coupled.states` gives its shape."""
         at = self._memory
         stepped = d.time == d.userdata[at.next]
         return self._own(d, at.new if stepped else at.state, self.coupled.state_shape[0])
 
     def wrenches(self, d: Any) -> np.ndarray:
-        """Return the wrenches of the last step `[k, 3]` [N, N, N m] on the sites' bodies, in the patches' frames; a
-        view of `userdata`."""
+        """Return the last wrenches `[k, 3]` [N, N, N m] on the sites' bodies, in the patches' frames; a view."""
         return self._own(d, self._memory.wrench, 3 * len(self.patches)).reshape(-1, 3)
 
     def twists(self, d: Any) -> np.ndarray:
-        """Return the twists at the end of the last step `[k, 3]` [m/s, m/s, rad/s] of the bodies of the sites relative
-        to the other bodies."""
+        """Return the last twists `[k, 3]` [m/s, m/s, rad/s] of the sites' bodies relative to the others."""
         return self._own(d, self._memory.twist, 3 * len(self.patches)).reshape(-1, 3)
 
     def loads(self, d: Any) -> np.ndarray:
@@ -115,7 +112,7 @@ class Friction:
         return Report(int(u[at.iterations]), int(u[at.passes]), float(u[at.residual]), bool(u[at.converged]))
 
     def reset(self, d: Any) -> None:
-        """Return the relax all bristles."""
+        """Relax all bristles."""
         at = self._memory
         d.userdata[at.state : at.converged + 1] = 0.0
 
