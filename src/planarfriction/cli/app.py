@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 from pathlib import Path
+from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
@@ -11,7 +12,7 @@ from click.shell_completion import CompletionItem
 from planarfriction import __version__
 from planarfriction.cli.commands import Commands
 from planarfriction.cli.identify_plan import FitOrPlan, complete_log
-from planarfriction.cli.options import FILE, complete_scene, patch_option
+from planarfriction.cli.options import FILE, complete_scene, patch_option, width_option
 from planarfriction.cli.sweep import sweep
 from planarfriction.families import MODELS, SCENES, SURFACES, Family
 
@@ -96,31 +97,16 @@ def app() -> None:
 @click.option("--out", type=FILE, help="Folder for the data (NetCDF, CSV) and the pictures.")
 @click.option("--plot", is_flag=True, help="Draw histories, motion and patch as PNG (in out/ by default).")
 @click.option("--animate", is_flag=True, help="Draw motion and slip as an animated GIF (in out/ by default).")
-def run(
-    scene: str,
-    model: tuple[str, ...],
-    parts: str | None,
-    patch: str | None,
-    cell_size: float | None,
-    t_end: float | None,
-    rtol: float | None,
-    settings: tuple[str, ...],
-    out: Path | None,
-    plot: bool,
-    animate: bool,
-) -> int:
+def run(scene: str, out: Path | None, plot: bool, animate: bool, **options: Any) -> int:
     """Simulate a scene (the help above is what users see)."""
     # Compiler, arrays and, where asked for, datasets and pictures load now, a million objects that all stay: not
     # looking for garbage among them saves up to a tenth of the run. `main` turns the collector on again.
     gc.disable()
     from planarfriction.cli import run as command
 
-    scenes = command.build_scenes(
-        scene, model, parts=parts, patch=patch, cell_size=cell_size, t_end=t_end, settings=command.one_each(settings)
-    )
     pictures = [name for name, wanted in (("plot", plot), ("animate", animate)) if wanted]
     folder = Path("out") if out is None and pictures else out
-    return command.run(scenes, rtol=rtol, t_end=t_end, folder=folder, pictures=pictures)
+    return command.run(scene, folder=folder, pictures=pictures, **options)
 
 
 @app.command(
@@ -141,30 +127,15 @@ def run(
 @patch_option("Default: Circle.")
 @click.option("--pressure", type=FILE, help="Pressure map (.csv, .npy, grey image); row 0 is the top.")
 @click.option("--cell-size", type=float, help="Side of a cell of the pressure map in m.")
-@click.option(
-    "--surface",
-    type=MemberOf(SURFACES),
-    default="exact",
-    show_default=True,
-    help="Kind of limit surface.",
-)
+@click.option("--surface", type=MemberOf(SURFACES), default="exact", show_default=True, help="Kind of limit surface.")
 @click.option("--out", type=FILE, help="Picture to write (.png, .pdf, .svg, or .html to rotate it with the mouse).")
 @click.option("--alone", is_flag=True, help="Draw the surface without the ellipsoid.")
 @click.option("--csv", type=FILE, help="Table of samples to write (.csv).")
-def limit_surface(
-    patch: str | None,
-    pressure: Path | None,
-    cell_size: float | None,
-    surface: str,
-    out: Path | None,
-    alone: bool,
-    csv: Path | None,
-) -> None:
+def limit_surface(patch: str | None, pressure: Path | None, cell_size: float | None, **options: Any) -> None:
     """Show a limit surface (the help above is what users see)."""
     from planarfriction.cli import limit_surface as command
 
-    chosen = command.choose_patch(patch, pressure, cell_size)
-    command.show(chosen, surface, picture=out, alone=alone, table=csv)
+    command.show(command.choose_patch(patch, pressure, cell_size), **options)
 
 
 @app.command(
@@ -189,7 +160,7 @@ def limit_surface(
 @click.argument("logs", metavar="LOG...", type=FILE, nargs=-1, required=True, shell_complete=complete_log)
 @patch_option("Default: Circle.")
 @click.option("--cell-size", type=float, help="Side of a cell of a pressure map in m.")
-@click.option("--width", type=float, help="Width in m of a patch given by name. Default: 0.02.")
+@width_option
 @click.option("--parameters", metavar="NAMES", help="What to estimate, separated by commas. Default: law and radius.")
 @click.option("--start", metavar="NAME=VALUE", multiple=True, help="Initial guess, or fixed value if not estimated.")
 @click.option("--normal-force", type=float, help="Normal force in N, if the logs have no such column.")
@@ -202,46 +173,12 @@ def limit_surface(
 @click.option("--starts", type=int, default=4, show_default=True, help="Number of starting points of the search.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Random seed of the starting points.")
 @click.option("--out", type=FILE, help="Folder for the estimates (JSON) and the residual plot (PNG).")
-def identify(
-    logs: tuple[Path, ...],
-    patch: str | None,
-    cell_size: float | None,
-    width: float | None,
-    parameters: str | None,
-    start: tuple[str, ...],
-    normal_force: float | None,
-    contact: str | None,
-    noise: str | None,
-    plain: bool,
-    steady: bool,
-    model: str,
-    nuisance: str | None,
-    starts: int,
-    seed: int,
-    out: Path | None,
-) -> int:
+def identify(logs: tuple[Path, ...], patch: str | None, cell_size: float | None, width: float, **options: Any) -> int:
     """Identify (the help above is what users see)."""
     from planarfriction.cli import identify as command
-    from planarfriction.cli.patches import WIDTH, find_patch
-    from planarfriction.laws import ElastoPlastic
+    from planarfriction.cli.patches import find_patch
 
-    chosen = find_patch(patch, cell_size=cell_size, width=WIDTH if width is None else width)
-    return command.identify(
-        logs,
-        chosen,
-        folder=out,
-        normal_force=normal_force,
-        contact=contact,
-        parameters=command.parse_names(parameters),
-        start=command.parse_start(start),
-        noise=command.parse_noise(noise),
-        elasto_plastic=None if plain else ElastoPlastic(),
-        begins="steady" if steady else "rest",
-        model=model,
-        nuisance=command.parse_nuisance(nuisance),
-        starts=starts,
-        seed=seed,
-    )
+    return command.identify(logs, find_patch(patch, cell_size=cell_size, width=width), **options)
 
 
 @app.command(
@@ -253,9 +190,14 @@ def identify(
 )
 def warm() -> None:
     """Warm up (the help above is what users see)."""
-    from planarfriction.cli import warm as command
+    from planarfriction.cli.console import print_table, work_progress
+    from planarfriction.warm import warm_up
 
-    command.warm()
+    with work_progress("compiling") as progress:
+        times = warm_up(progress=progress)
+    times["all"] = sum(times.values())
+    rows = [[words, f"{seconds:.2f}"] for words, seconds in times.items()]
+    print_table("Compiled or read from the cache", ["part", "time [s]"], rows)
 
 
 app.add_command(sweep)

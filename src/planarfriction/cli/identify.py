@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,6 @@ from planarfriction.errors import InvalidValueError
 from planarfriction.writing import make_folder, write_text
 
 if TYPE_CHECKING:
-    from planarfriction.identify import Identification
     from planarfriction.patch import ContactPatch
 
 
@@ -22,29 +21,45 @@ def identify(
     paths: Sequence[Path],
     patch: ContactPatch,
     *,
-    folder: Path | None,
+    out: Path | None,
     normal_force: float | None,
     contact: str | None,
-    parameters: Sequence[str],
-    start: Mapping[str, float],
+    parameters: str | None,
+    start: Sequence[str],
+    noise: str | None,
+    plain: bool,
+    steady: bool,
     model: str,
-    **options: Any,
+    nuisance: str | None,
+    **search: int,
 ) -> int:
-    """Estimate the parameters from the logs, print them, and write JSON and picture into `folder`."""
+    """Estimate the parameters from the logs, print them, and write JSON and picture into `out`; options as typed."""
     from planarfriction.identify import FitOptions, Log, identify_lugre
+    from planarfriction.laws import ElastoPlastic
 
-    if folder is not None:
-        make_folder(folder)
+    chosen: dict[str, Any] = {"parameters": parse_names(parameters), "start": parse_start(start), "model": model}
+    options = FitOptions(
+        noise=parse_noise(noise),
+        elasto_plastic=None if plain else ElastoPlastic(),
+        begins="steady" if steady else "rest",
+        nuisance=parse_nuisance(nuisance),
+        **search,
+    )
+    if out is not None:
+        make_folder(out)
     logs = [Log.from_csv(path, normal_force=normal_force, contact=contact) for path in paths]
     with work_progress("identifying") as progress:
-        chosen = {"parameters": parameters, "start": start, "model": model}
-        found = identify_lugre(logs, patch, **chosen, options=FitOptions(**options), progress=progress)
+        found = identify_lugre(logs, patch, **chosen, options=options, progress=progress)
     samples = sum(len(log.time) for log in logs)
     title = f"{', '.join(log.name for log in logs)}: {samples} samples, {patch.name}"
     print(title, "", found.table(), sep="\n")
     note(f"{found.starts[0]} of {found.starts[1]} starting points led to this minimum")
-    if folder is not None:
-        _write(found, folder, output.slug(logs[0].name))
+    if out is not None:
+        stem = output.slug(logs[0].name)
+        table, picture = out / f"{stem}-identification.json", out / f"{stem}-residuals.png"
+        write_text(table, json.dumps(found.to_dict(), indent=2) + "\n")
+        note(f"wrote {table}")
+        note(f"wrote {output.write_picture(found.plot(), picture)}")
     return 0
 
 
@@ -78,10 +93,3 @@ def parse_nuisance(text: str | None) -> tuple[str, ...]:
 def parse_noise(text: str | None) -> list[float] | None:
     """Parse the three numbers of `--noise`."""
     return None if text is None else [validation.number_in("--noise", part) for part in text.split(",")]
-
-
-def _write(found: Identification, folder: Path, stem: str) -> None:
-    table, picture = folder / f"{stem}-identification.json", folder / f"{stem}-residuals.png"
-    write_text(table, json.dumps(found.to_dict(), indent=2) + "\n")
-    note(f"wrote {table}")
-    note(f"wrote {output.write_picture(found.plot(), picture)}")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.shell_completion import CompletionItem
 
-from planarfriction.cli.options import FILE, patch_option
+from planarfriction.cli.options import FILE, patch_option, width_option
 
 if TYPE_CHECKING:
     from planarfriction.identify import Log
@@ -65,7 +65,7 @@ def complete_log(ctx: click.Context, parameter: object, incomplete: str) -> list
 @click.argument("logs", metavar="[LOG]...", type=FILE, nargs=-1)
 @patch_option("Default: Circle.", "patch_name")
 @click.option("--cell-size", type=float, help="Side of a cell of a pressure map in m.")
-@click.option("--width", type=float, help="Width in m of a patch given by name. Default: 0.02.")
+@width_option
 @click.option("--parameters", metavar="NAMES", help="What to estimate, separated by commas. Default: law and radius.")
 @click.option("--wanted", metavar="NAMES", help="Parameters whose information counts. Default: all.")
 @click.option("--start", metavar="NAME=VALUE", multiple=True, help="Guess of a parameter, or fixed value.")
@@ -82,33 +82,30 @@ def plan(
     logs: tuple[Path, ...],
     patch_name: str | None,
     cell_size: float | None,
-    width: float | None,
+    width: float,
     parameters: str | None,
     wanted: str | None,
     start: tuple[str, ...],
     normal_force: tuple[float, ...],
-    speed: float,
-    spin: float | None,
-    duration: float,
-    rate: float,
     noise: str | None,
     out: Path | None,
+    **motion: Any,
 ) -> int:
     """Plan (the help above is what users see)."""
     from planarfriction.cli import identify, output
     from planarfriction.cli.console import note
-    from planarfriction.cli.patches import WIDTH, find_patch
+    from planarfriction.cli.patches import find_patch
     from planarfriction.identify import Log, candidate_motions, design_experiment
     from planarfriction.identify.logs import columns_of
 
-    patch = find_patch(patch_name, cell_size=cell_size, width=WIDTH if width is None else width)
+    patch = find_patch(patch_name, cell_size=cell_size, width=width)
     names, values, spread = identify.parse_names(parameters), identify.parse_start(start), identify.parse_noise(noise)
     if out is not None:
         output.check_table(out)
     measured = [Log.from_csv(path, normal_force=normal_force[0] if normal_force else None) for path in logs]
     patch, law = _known(measured, patch, names, values, spread)
     loads = list(normal_force) or sorted({float(f"{log.normal_force.mean():.3g}") for log in measured}) or [1.0]
-    motions = candidate_motions(patch, law, normal_force=loads, speed=speed, spin=spin, duration=duration, rate=rate)
+    motions = candidate_motions(patch, law, normal_force=loads, **motion)
     found = design_experiment(
         patch,
         law,

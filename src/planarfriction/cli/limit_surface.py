@@ -33,44 +33,39 @@ def choose_patch(patch: str | None, pressure: Path | None, cell_size: float | No
     return find_patch(patch, cell_size=cell_size)
 
 
-def show(patch: ContactPatch, kind: str, *, picture: Path | None, alone: bool, table: Path | None) -> None:
+def show(patch: ContactPatch, *, surface: str, out: Path | None, alone: bool, csv: Path | None) -> None:
     """Print the numbers of a limit surface; write its picture (alone or beside the ellipsoid) and its samples."""
-    if picture is not None:
-        check_picture(picture, also=(HTML,))
+    if out is not None:
+        check_picture(out, also=(HTML,))
     elif alone:
         raise InvalidValueError("--alone", "be given together with --out", alone)
-    if table is not None:
-        check_table(table)
-    surface = SURFACES[kind](patch)
-    centre = np.round(1e3 * surface.centre_of_pressure, 9) + 0.0  # no -0 and no rounding errors of symmetric patches
+    if csv is not None:
+        check_table(csv)
+    shown = SURFACES[surface](patch)
+    centre = np.round(1e3 * shown.centre_of_pressure, 9) + 0.0  # no -0 and no rounding errors of symmetric patches
     rows = [
         ["loaded cells", f"{patch.cells}"],
         ["centre of pressure [mm]", f"{centre[0]:.6g}, {centre[1]:.6g}"],
-        ["contact radius r [mm]", f"{1e3 * surface.contact_radius:.8g}"],
+        ["contact radius r [mm]", f"{1e3 * shown.contact_radius:.8g}"],
         ["second moment <rho^2> [mm^2]", f"{1e6 * float(patch.second_moment()):.8g}"],
-        ["largest distance from the ellipsoid [-]", f"{_distance_from_ellipsoid(surface):.4f}"],
+        ["largest distance from the ellipsoid [-]", f"{_distance_from_ellipsoid(shown):.4f}"],
     ]
-    print_table(f"Limit surface of {patch.name} ({kind})", ["mu f_N = 1", "value"], rows)
-    if table is not None:
+    print_table(f"Limit surface of {patch.name} ({surface})", ["mu f_N = 1", "value"], rows)
+    if csv is not None:
         from planarfriction.plots.limit_surface import sample_limit_surface
 
-        twists, wrenches = sample_limit_surface(surface, *_directions())
-        write_csv(
-            table, dict(zip(("vx", "vy", "omega", "fx", "fy", "tau"), np.hstack([twists, wrenches]).T, strict=True))
-        )
-        note(f"wrote {table}")
-    if picture is not None:
-        _draw(surface, picture, None if alone else "ellipsoid")
+        columns = np.hstack(sample_limit_surface(shown, *_directions())).T
+        write_csv(csv, dict(zip(("vx", "vy", "omega", "fx", "fy", "tau"), columns, strict=True)))
+        note(f"wrote {csv}")
+    if out is not None:
+        from planarfriction import plots
 
-
-def _draw(surface: Any, picture: Path, beside: str | None) -> None:
-    from planarfriction import plots
-
-    if picture.suffix.lower() == HTML:  # with plotly's own code in it, so that it opens without a network
-        write_text(picture, plots.interactive_limit_surface(surface, beside=beside).to_html(include_plotlyjs=True))
-    else:
-        write_picture(plots.plot_limit_surface(surface, beside=beside), picture)
-    note(f"wrote {picture}")
+        beside = None if alone else "ellipsoid"
+        if out.suffix.lower() == HTML:  # with plotly's own code in it, so that it opens without a network
+            write_text(out, plots.interactive_limit_surface(shown, beside=beside).to_html(include_plotlyjs=True))
+        else:
+            write_picture(plots.plot_limit_surface(shown, beside=beside), out)
+        note(f"wrote {out}")
 
 
 def _directions() -> tuple[np.ndarray, np.ndarray]:

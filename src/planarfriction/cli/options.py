@@ -9,6 +9,7 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
+from planarfriction.cli.patches import WIDTH, patch_names
 from planarfriction.families import PUBLISHED_PATCHES, SCENES
 
 PATCH_HELP = (
@@ -38,8 +39,6 @@ def complete_scene(context: object, parameter: object, incomplete: str) -> list[
 
 def complete_patch(context: object, parameter: object, incomplete: str) -> list[CompletionItem]:
     """Return completions of a patch: names that begin with the typed text in any case, and files."""
-    from planarfriction.cli.patches import patch_names
-
     names = [CompletionItem(name) for name in patch_names() if name.lower().startswith(incomplete.lower())]
     return [*names, CompletionItem(incomplete, type="file")]
 
@@ -48,3 +47,8 @@ def patch_option(default: str, name: str = "patch") -> Callable[[Any], Any]:
     """Make the option `--patch`, given to a command as `name`; `default` says what is taken without it."""
     words = f"Contact patch: {PATCH_HELP} {default}"
     return click.option("--patch", name, metavar="PATCH", shell_complete=complete_patch, help=words)
+
+
+width_option = click.option(
+    "--width", type=float, default=WIDTH, help=f"Width in m of a patch given by name. Default: {WIDTH}."
+)

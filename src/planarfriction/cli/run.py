@@ -31,17 +31,10 @@ BOTH = ("distributed", "reduced")
 
 
 def build_scenes(
-    name: str,
-    models: Sequence[str],
-    *,
-    parts: str | None = None,
-    patch: str | None = None,
-    cell_size: float | None = None,
-    t_end: float | None = None,
-    settings: Mapping[str, Any] | None = None,
+    name: str, models: Sequence[str], *, settings: Mapping[str, Any] | None = None, **options: Any
 ) -> dict[str, Scene]:
     """Return the scenes to simulate, by the label of their model, with the values of `settings` by their paths."""
-    makers = scene_makers(name, models, parts=parts, patch=patch, cell_size=cell_size, t_end=t_end)
+    makers = scene_makers(name, models, **options)
     scenes = {kind: make(**(settings or {})) for kind, make in makers.items()}
     return {kind or _label(scene): scene for kind, scene in scenes.items()}
 
@@ -175,23 +168,27 @@ def _with_models(scene: Scene, kind: str, patch: ContactPatch | None, parts: int
 
 
 def run(
-    scenes: dict[str, Scene],
+    name: str,
     *,
+    model: Sequence[str],
+    settings: Sequence[str],
     rtol: float | None,
     t_end: float | None,
     folder: Path | None,
     pictures: Sequence[str],
+    **options: Any,
 ) -> int:
     """Simulate each scene, save as soon as it is done, print the comparison, draw; returns the exit code."""
-    options: dict[str, Any] = {} if t_end is None else {"t_end": t_end}
+    scenes = build_scenes(name, model, settings=one_each(settings), t_end=t_end, **options)
+    limits: dict[str, Any] = {} if t_end is None else {"t_end": t_end}
     if rtol is not None:
-        options["rtol"] = validation.positive("--rtol", rtol)
+        limits["rtol"] = validation.positive("--rtol", rtol)
     if folder is not None:
         make_folder(folder)
     solutions: dict[str, Solution] = {}
     try:
         for label, scene in scenes.items():
-            solutions[label] = _simulate(label, scene, options)
+            solutions[label] = _simulate(label, scene, limits)
             _save(solutions[label], folder, label)
     except SimulationInterrupted as stop:
         return _keep_part(stop.solution, solutions, label, folder)
@@ -242,7 +239,8 @@ def _draw(solutions: dict[str, Solution], folder: Path, pictures: Sequence[str])
             figures = {f"{name}-histories": plots.plot_histories(solutions)}
             figures |= {f"{name}-motion-{output.slug(each)}": plots.plot_motion(solutions[each]) for each in solutions}
             contact = first.scene.contacts[0]
-            figures[f"{name}-patch"] = plots.plot_patch(contact.model.patch, normal_force=_first_load(contact))
+            load = float(contact.normal_force(0.0))
+            figures[f"{name}-patch"] = plots.plot_patch(contact.model.patch, normal_force=load)
             for stem, figure in figures.items():
                 note(f"wrote {output.write_picture(figure, folder / f'{stem}.png')}")
     if "animate" in pictures:
@@ -252,7 +250,3 @@ def _draw(solutions: dict[str, Solution], folder: Path, pictures: Sequence[str])
             with simulation_progress(f"drawing {path.name}", end) as progress:
                 solution.animate(path, progress=progress)
             note(f"wrote {path}")
-
-
-def _first_load(contact: Any) -> float:
-    return float(contact.normal_force(0.0))

@@ -50,15 +50,7 @@ if TYPE_CHECKING:
 )
 @click.option("--out", type=FILE, default=Path("sweep"), show_default=True, help="Folder for the runs, or .zarr store.")
 def sweep(
-    scene: str,
-    settings: tuple[str, ...],
-    model: str | None,
-    parts: str | None,
-    patch: str | None,
-    cell_size: float | None,
-    t_end: float | None,
-    measure: str | None,
-    out: Path,
+    scene: str, settings: tuple[str, ...], model: str | None, measure: str | None, out: Path, **options: Any
 ) -> int:
     """Sweep (the help above is what users see)."""
     from planarfriction import sweeps, validation
@@ -74,7 +66,6 @@ def sweep(
     if model is not None:
         validation.choice("--model", model, MODELS)
     models = [model] if model is not None else ["reduced"] if scene in SCENES else []
-    options: dict[str, Any] = {"parts": parts, "patch": patch, "cell_size": cell_size, "t_end": t_end}
     make = next(iter(scene_makers(scene, models, **options).values()))
     try:  # a path that leads nowhere is wrong in all runs
         make(**{path: next(iter(each.values())) for path, each in values.items()})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,13 +13,23 @@ from numpy.typing import ArrayLike
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch import outline as outlines
-from planarfriction.patch import plain_data, shapes
+from planarfriction.patch import shapes
 from planarfriction.patch.grid import Grid
 from planarfriction.patch.moments import Moments
-from planarfriction.patch.pressure import Uniform, as_law, check_not_negative, check_pressure, evaluated, pressure_array
+from planarfriction.patch.pressure import (
+    Pressure,
+    Uniform,
+    as_law,
+    check_not_negative,
+    check_pressure,
+    evaluated,
+    pressure_array,
+)
 from planarfriction.patch.pressure_maps import read_maps
 from planarfriction.patch.size import MOST_CELLS, check_cells, warn_of_the_unit
 from planarfriction.pictures import picture
+
+_UNIT_BOX = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -146,9 +157,9 @@ class ContactPatch(Moments):
         width = validation.positive("width", width)
         height = width if height is None else validation.positive("height", height)
         grid = Grid.around_origin(width, height, *shapes.columns_and_rows(cells, width, height))
-        positions = grid.centres()
+        positions, corners = grid.centres(), _UNIT_BOX * (width, height)
         patch = cls(positions, np.full(len(positions), grid.cell_area), pressure, grid, name)
-        return outlines.with_outline(patch, outlines.box_outline(width, height))
+        return outlines.with_outline(patch, outlines.polygon_outline(corners))
 
     @classmethod
     def ring(
@@ -253,9 +264,21 @@ class ContactPatch(Moments):
         Pressure laws are evaluated at the new cells; numbers per cell are repeated. Cells cut by a rim are replaced by
         cells of the same area and centroid. Points remain points. Raises InvalidValueError for too many cells.
         """
-        from planarfriction.patch.refinement import refined
-
-        return refined(self, validation.count("parts", parts, at_most=MOST_CELLS))
+        parts, extent = validation.count("parts", parts, at_most=MOST_CELLS), self.cell_extents()
+        if parts == 1 or not extent.any():
+            return self
+        check_cells(self.cells * parts ** int(extent.any(axis=0).sum()))
+        fine = (np.arange(parts) - (parts - 1) / 2) / parts
+        inside = np.stack(np.meshgrid(*(fine if side else [0.0] for side in extent.max(axis=0))), -1).reshape(-1, 2)
+        times, (width, height) = len(inside), self.cell_size or (0.0, 0.0)
+        own = {"metric": (self.metric, 2), "asymmetry": (self.asymmetry, 1)}  # what each cell has is repeated
+        fields = {
+            name: value if value is None or value.ndim == axes else np.repeat(value, times, axis=0)
+            for name, (value, axes) in own.items()
+        }
+        positions, areas = self.positions[:, None] + inside * extent[:, None], np.repeat(self.areas / times, times)
+        size, pressure = (width / parts, height / parts), self.pressure.repeated(times)
+        return ContactPatch(positions.reshape(-1, 2), areas, pressure, None, self.name, size, **fields)
 
     def compressed(
         self, degree: int = 5, *, cells: int | None = None, error: float | None = None, loads: Any = None
@@ -338,7 +361,14 @@ class ContactPatch(Moments):
 
     def to_dict(self) -> dict[str, Any]:
         """Return the patch as numbers, strings and lists, ready for JSON; `from_dict` restores it to the last bit."""
-        return plain_data.to_dict(self)
+        parts = {
+            "shape": "cells", "name": self.name, "positions": self.positions, "areas": self.areas,
+            "pressure": self.pressure.to_dict(), "metric": self.metric, "asymmetry": self.asymmetry,
+            "outline": self.outline and self.outline.to_dict(), "cell_size": self.cell_size and list(self.cell_size),
+            "grid": self.grid and dataclasses.asdict(self.grid),
+        }  # fmt: skip
+        plain = {name: part.tolist() if isinstance(part, np.ndarray) else part for name, part in parts.items()}
+        return {name: part for name, part in plain.items() if part is not None}
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any]) -> ContactPatch:
@@ -346,4 +376,15 @@ class ContactPatch(Moments):
 
         Raises InvalidValueError for those, and for values that break a rule of the patch.
         """
-        return plain_data.from_dict(cls, data)
+        optional = ("shape", "name", "pressure", "grid", "cell_size", "metric", "asymmetry", "outline")
+        validation.keys("patch", data, required=("positions", "areas"), optional=optional)
+        validation.choice("patch shape", data.get("shape", "cells"), ("cells",))
+        pressure, grid = data.get("pressure"), data.get("grid")
+        if isinstance(pressure, Mapping):
+            pressure = Pressure.from_dict(pressure)
+        if grid is not None:
+            validation.keys("grid", grid, required=[entry.name for entry in dataclasses.fields(Grid)])
+            grid = Grid(**grid)
+        options = {key: data.get(key) for key in ("cell_size", "metric", "asymmetry")}
+        patch = cls(data["positions"], data["areas"], pressure, grid, data.get("name", "patch"), **options)
+        return outlines.with_outline(patch, outlines.outline_from_dict(data.get("outline")))

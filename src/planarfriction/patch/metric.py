@@ -123,11 +123,6 @@ class Anisotropy(ByValue):
             value.setflags(write=False)
             self._set(**{name: value})
 
-    def _anisotropy_to_dict(self) -> dict[str, list]:
-        """Return metric and asymmetry as plain data, without those that are None."""
-        both = {"metric": self.metric, "asymmetry": self.asymmetry}
-        return {name: value.tolist() for name, value in both.items() if value is not None}
-
 
 def symmetric_root(metric: np.ndarray) -> np.ndarray:
     """Return `L` with `L L = M`, symmetric and positive definite, for metrics `[..., 2, 2]`."""

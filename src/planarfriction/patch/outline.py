@@ -60,11 +60,6 @@ class RoundOutline:
 Outline = PolygonOutline | RoundOutline
 
 
-def outline_to_dict(outline: Outline | None) -> dict[str, Any]:
-    """Return the entry `outline` of a patch's plain data, none without an outline."""
-    return {} if outline is None else {"outline": outline.to_dict()}
-
-
 def outline_from_dict(data: Any) -> Outline | None:
     """Return the outline of `{"vertices": [[x, y], ...]}` or `{"radii": [inner, outer]}`; None of None."""
     if data is None:
@@ -86,11 +81,6 @@ def polygon_outline(vertices: Any) -> PolygonOutline:
         raise InvalidValueError("vertices", "hold at least 3 points", f"{len(vertices)}")
     vertices.setflags(write=False)
     return PolygonOutline(vertices)
-
-
-def box_outline(width: float, height: float) -> PolygonOutline:
-    """Return a rectangle of that size [m] about the origin."""
-    return polygon_outline(np.array([(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]) * (0.5 * width, 0.5 * height))
 
 
 def with_outline(patch: ContactPatch, outline: Outline | None) -> ContactPatch:
