@@ -100,8 +100,8 @@ def pointer(typingctx, array):
 
 @intrinsic
 def call_c(typingctx, address, arguments):
-    """Call the function of a C library at `address` with a tuple of integers and doubles; return its word."""
-    if any(not isinstance(given, (types.Integer, types.Float)) for given in arguments):
+    """Call the function of a C library at `address` with a tuple of integers, doubles and pointers; return its word."""
+    if any(not isinstance(given, (types.Integer, types.Float, types.CPointer)) for given in arguments):
         return None
     word = ir.IntType(64)
 
@@ -110,7 +110,9 @@ def call_c(typingctx, address, arguments):
         values = []
         for i, given in enumerate(signature.args[1]):
             wanted = types.float64 if isinstance(given, types.Float) else types.int64
-            values.append(context.cast(builder, builder.extract_value(packed, i), given, wanted))
+            value = builder.extract_value(packed, i)
+            pointer = isinstance(given, types.CPointer)
+            values.append(builder.ptrtoint(value, word) if pointer else context.cast(builder, value, given, wanted))
         kind = ir.FunctionType(word, [value.type for value in values])
         return builder.call(builder.inttoptr(target, kind.as_pointer()), values)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
-from typing import NamedTuple, Protocol
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -46,52 +46,54 @@ _THICK = 0.9
 Rules = tuple[tuple[float, int], ...]
 
 
-class _Parts(Protocol):
-    """Domain that a surface is integrated over: sums `[M, 9]` at unit twists `[M, 3]`, lengths in `unit` [m]."""
+class _Domain:
+    """Domain that a surface is integrated over."""
 
-    def sums(self, twists: np.ndarray, unit: float, rules: Rules) -> np.ndarray: ...
+    loop: ClassVar[Any]
+    """Compiled sums over the domain's record `[M, 9]`."""
 
-    def rows(self, unit: float) -> kernels.Elements | kernels.Discs | kernels.Rings: ...
+    def rows(self, unit: float, rules: Rules = EXACT_RULES) -> Any:
+        """Return the record of the domain for compiled loops, lengths in `unit` [m]."""
+        raise NotImplementedError
+
+    def sums(self, twists: np.ndarray, unit: float, rules: Rules) -> np.ndarray:
+        """Return the sums `[M, 9]` at unit twists `[M, 3]`, lengths in `unit` [m]."""
+        sums = np.empty((len(twists), 9))
+        type(self).loop(self.rows(unit, rules), twists, sums)
+        return sums
 
 
-class _Elements(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class _Elements(_Domain):
     """Points, segments or quads about the centre of pressure, the load of each spread evenly."""
 
     corners: np.ndarray
     """Corners `[N, 1, 2, or 4, 2]` [m]; a triangle has two corners in one place."""
     weights: np.ndarray
     """Share of the load of each, `[N]` [-]; negative for the triangles that a polygon subtracts."""
-
-    def sums(self, twists: np.ndarray, unit: float, rules: Rules) -> np.ndarray:
-        sums = np.empty((len(twists), 9))
-        kernels.element_sums(self.rows(unit, rules), twists, sums)
-        return sums
+    loop = kernels.element_sums
 
     def rows(self, unit: float, rules: Rules = EXACT_RULES) -> kernels.Elements:
-        """Return the record of the domain for compiled loops."""
         corners = self.corners / unit
         return kernels.Elements(corners, _shape(corners, self.weights), *_gauss_rules(corners.shape[1], rules))
 
 
-class _Discs(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class _Discs(_Domain):
     """Evenly loaded discs about the centre of pressure; a ring is one less another."""
 
     radii: np.ndarray
     """Radii `[K]` [m]."""
     loads: np.ndarray
     """Share of the load of each, `[K]` [-]."""
+    loop = kernels.disc_sums
 
-    def sums(self, twists: np.ndarray, unit: float, rules: Rules) -> np.ndarray:
-        sums = np.empty((len(twists), 9))
-        kernels.disc_sums(self.rows(unit), twists, sums)
-        return sums
-
-    def rows(self, unit: float) -> kernels.Discs:
-        """Return the record of the domain for compiled loops."""
+    def rows(self, unit: float, rules: Rules = EXACT_RULES) -> kernels.Discs:
         return kernels.Discs(self.radii / unit, self.loads)
 
 
-class _Rings(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class _Rings(_Domain):
     """A disc or ring about the centre of pressure under a pressure that depends on the radius alone."""
 
     inner: float
@@ -101,14 +103,9 @@ class _Rings(NamedTuple):
     """Radius at which the pressure ends [m]."""
     exponent: float
     """Exponent of its profile; `_EVEN` for an even pressure."""
+    loop = kernels.ring_sums
 
-    def sums(self, twists: np.ndarray, unit: float, rules: Rules) -> np.ndarray:
-        sums = np.empty((len(twists), 9))
-        kernels.ring_sums(self.rows(unit), twists, sums)
-        return sums
-
-    def rows(self, unit: float) -> kernels.Rings:
-        """Return the record of the domain for compiled loops."""
+    def rows(self, unit: float, rules: Rules = EXACT_RULES) -> kernels.Rings:
         radii = (self.inner / unit, min(self.outer, self.reach) / unit, self.reach / unit)
         return kernels.Rings(*_double_exponential(), *radii, self.exponent)
 
@@ -169,7 +166,7 @@ class LimitSurfaceExact(LimitSurface):
         return self.patch.outline.outer, _EVEN  # pyright: ignore[reportOptionalMemberAccess, reportAttributeAccessIssue]
 
     @functools.cached_property
-    def _parts(self) -> _Parts:
+    def _parts(self) -> _Domain:
         """Domain that the surface is integrated over."""
         outline, pressure = self._outline, self.patch.pressure
         self.patch.weights(self.normal_force)  # refuses a missing normal force

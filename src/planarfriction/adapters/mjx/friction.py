@@ -19,7 +19,7 @@ from planarfriction.adapters.mjx import newton, responses
 from planarfriction.adapters.mjx.geometry import PatchPlaces, geometry, places
 from planarfriction.adapters.mujoco.friction import Report
 from planarfriction.adapters.mujoco.loops.records import Memory
-from planarfriction.adapters.mujoco.patches import PatchContact, Placed, check_once, memory, words
+from planarfriction.adapters.mujoco.patches import PatchContact, Placed, check_once, memory
 from planarfriction.coupling import ITERATIONS, TOLERANCE
 from planarfriction.errors import InvalidValueError
 from planarfriction.jax import DistributedModel, ReducedModel, ReducedModelPublished
@@ -86,13 +86,10 @@ class Friction:
         _check(m, placed)
         known = list({id(patch.model): patch.model for patch in patches}.values())
         self.models: tuple[FrictionPytree, ...] = tuple(map(_in_jax, known))
-        needed = words(patches, m.nv)
-        if m.nuserdata < needed:
-            raise InvalidValueError("nuserdata", f"be at least {needed} (prepare adds them)", m.nuserdata)
+        at = memory(patches, m.nv, m.nuserdata)
         which = tuple(next(i for i, model in enumerate(known) if model is patch.model) for patch in patches)
         radius = np.array([np.sqrt((patch.model.patch.positions**2).sum(1).mean()) for patch in patches])
         shapes = tuple(self.models[i].state_shape for i in which)
-        at = memory(patches, m.nv, m.nuserdata - needed)
         self._fixed = _Fixed(places(placed), which, shapes, radius, at, m.nuserdata)
 
     def replace(self, models: Sequence[FrictionPytree]) -> Self:
@@ -112,7 +109,7 @@ class Friction:
 
     @classmethod
     def tree_unflatten(cls, fixed: _Fixed, leaves) -> Self:
-        """Return the rebuild the pytree (called by JAX)."""
+        """Rebuild the pytree (called by JAX)."""
         friction = object.__new__(cls)
         friction._fixed, (friction.models,) = fixed, leaves
         return friction
@@ -163,8 +160,7 @@ class Friction:
     # ------------------------------------------------------------------ a step
 
     def step(self, m: Any, d: Any) -> Any:
-        """Take a step with patch friction, instead of `mjx.step`: a pure function for `jit`, `vmap`, `lax.scan` and
-        `grad`.
+        """Take a step with patch friction, a pure function of JAX instead of `mjx.step`.
 
         Raises InvalidValueError for a model of MJX in another implementation, and for data without its user data.
         """
@@ -236,7 +232,7 @@ class Friction:
                 new[p], wrenches[p] = after[i], wrench[i]
         return new, jnp.stack(wrenches)
 
-    def _integrated(self, m, d, jacobian, wrench, answer: responses.Answer) -> Any:
+    def _integrated(self, m, d, jacobian, wrench, answer: responses.WrenchResponse) -> Any:
         """Return the data after the step, with the forces of the user as they were."""
         applied = d.qfrc_applied
         d = mjx.fwd_acceleration(m, d.replace(qfrc_applied=applied + wrench @ jacobian))

@@ -16,8 +16,8 @@ import numpy as np
 from planarfriction.adapters.mujoco.draw import draw_patch
 from planarfriction.adapters.mujoco.library import layout
 from planarfriction.adapters.mujoco.loops import step as loops
-from planarfriction.adapters.mujoco.loops.records import Host
-from planarfriction.adapters.mujoco.patches import PatchContact, Placed, check_once, memory, words
+from planarfriction.adapters.mujoco.loops.records import Host, scratch_layout
+from planarfriction.adapters.mujoco.patches import PatchContact, Placed, check_once, memory
 from planarfriction.compiler.memory import place_of, row_of
 from planarfriction.coupling import CoupledPatches
 from planarfriction.errors import FrictionError, InvalidValueError
@@ -63,10 +63,7 @@ class Friction:
                 rule = "have a shape that does not change with the load: compiled steps need fixed numbers"
                 raise InvalidValueError("model", rule, type(patch.model).__name__)
         self._check()
-        needed = words(patches, m.nv)
-        if m.nuserdata < needed:
-            raise InvalidValueError("nuserdata", f"be at least {needed} (prepare adds them)", m.nuserdata)
-        self._memory = memory(patches, m.nv, m.nuserdata - needed)
+        self._memory = memory(patches, m.nv, m.nuserdata)
 
     def _check(self) -> None:
         """Refuse options of the model that do not fit."""
@@ -169,7 +166,7 @@ class Friction:
     def _row(self) -> np.ndarray:
         """Record of the model for compiled steps."""
         packed, k = self.coupled._packed, len(self.patches)
-        problem = self.coupled._blank_problem()
+        problem, scratch = self.coupled._blank_problem(), scratch_layout(packed.words, k, self.m.nv)
         chosen = [
             (each.site, each.own, each.other, *reversed(each.bodies), each.patch.centre == "contact")
             for each in self.placed
@@ -186,6 +183,7 @@ class Friction:
                 count=k,
                 states=self.coupled.state_shape[0],
                 words=packed.words,
+                scratch_words=scratch.size,
                 problem=place_of(problem),
                 patches=place_of(packed.row),
                 solve=kernels.solve_address(),
@@ -194,6 +192,7 @@ class Friction:
                 free_joints=place_of(free),
                 free_dofs=place_of(free) + 8 * len(joints),
                 memory=self._memory,
+                scratch=scratch.offsets,
                 **dict(zip(names, (place_of(columns) + 8 * k * np.arange(6)).tolist(), strict=True)),
                 **layout(),
             )

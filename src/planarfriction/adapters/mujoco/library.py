@@ -7,7 +7,7 @@ from __future__ import annotations
 import ctypes
 import functools
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -15,19 +15,11 @@ import numpy as np
 from planarfriction.adapters.mujoco.loops import records
 from planarfriction.errors import FrictionError
 
-_SIZES = {"int": 4, "float": 4, "char": 1, "mjtByte": 1, "mjtBool": 1}
-_SIZES |= dict.fromkeys(("mjtNum", "double", "mjtSize", "size_t", "uint64_t", "uintptr_t"), 8)
+_NUMBERS = {"float": ctypes.c_float, "char": ctypes.c_char, "mjtByte": ctypes.c_ubyte, "mjtBool": ctypes.c_bool}
+_NUMBERS |= dict.fromkeys(("mjtNum", "double", "mjtSize", "size_t", "uint64_t", "uintptr_t"), ctypes.c_double)
+"""Types of C of the size of MuJoCo's; all others, such as enumerations, have that of `int`."""
 
 _FILES = ("libmujoco.so*", "libmujoco*.dylib", "mujoco.dll")
-
-_ENUMERATION = 4
-"""Bytes of all other values."""
-
-
-class _Struct(NamedTuple):
-    offsets: dict[str, int]
-    size: int
-    align: int
 
 
 @functools.cache
@@ -37,34 +29,22 @@ def _described() -> dict[str, Any]:
     return dict(STRUCTS)
 
 
-def _measure(kind: Any) -> tuple[int, int]:
-    """Return the size and alignment of a field."""
+def _type_of(kind: Any) -> Any:
+    """Return the type of C that a field, or a struct, is described as."""
     if hasattr(kind, "fields"):
-        return _arranged(kind.fields)[1:]
+        fields = [(field.name, _type_of(field.type)) for field in kind.fields]
+        return type("Struct", (ctypes.Structure,), {"_fields_": fields})
     if hasattr(kind, "extents"):
-        size, align = _measure(kind.inner_type)
-        return size * int(np.prod(kind.extents)), align
+        return _type_of(kind.inner_type) * int(np.prod(kind.extents))
     if hasattr(kind, "inner_type"):
-        return 8, 8
-    if kind.name in _described():
-        return _struct(kind.name)[1:]
-    size = _SIZES.get(kind.name, _ENUMERATION)
-    return size, size
+        return ctypes.c_void_p
+    return _type_of(_described()[kind.name]) if kind.name in _described() else _NUMBERS.get(kind.name, ctypes.c_int)
 
 
-def _arranged(fields: Any) -> _Struct:
-    """Return the offsets of fields as C compilers lay them out."""
-    offsets, end, widest = {}, 0, 1
-    for field in fields:
-        size, align = _measure(field.type)
-        offsets[field.name] = -(-end // align) * align
-        end, widest = offsets[field.name] + size, max(widest, align)
-    return _Struct(offsets, -(-end // widest) * widest, widest)
-
-
-@functools.cache
-def _struct(name: str) -> _Struct:
-    return _arranged(_described()[name].fields)
+def _offsets(name: str) -> dict[str, int]:
+    """Return the offsets of the fields of a struct, and its `size`."""
+    struct = _type_of(_described()[name])
+    return {field: getattr(struct, field).offset for field, _ in struct._fields_} | {"size": ctypes.sizeof(struct)}
 
 
 def _chosen(record: Any, offsets: dict[str, int], **others: int) -> Any:
@@ -77,17 +57,15 @@ def layout() -> dict[str, Any]:
 
     Raises `FrictionError` for a version whose structs are not as it describes them.
     """
-    model, data, contact, option = (_struct(name) for name in ("mjModel", "mjData", "mjContact", "mjOption"))
-    first = model.offsets["opt"]
-    options = {name: first + option.offsets[name] for name in ("timestep", "integrator", "disableflags")}
-    in_model = "D_rownnz" in model.offsets
-    slopes = (model if in_model else data).offsets
+    model, data, contact, option = (_offsets(name) for name in ("mjModel", "mjData", "mjContact", "mjOption"))
+    options = {name: model["opt"] + option[name] for name in ("timestep", "integrator", "disableflags")}
+    in_model = "D_rownnz" in model
     parts = {
-        "inertia": data.offsets.get("qM", -1),
-        "model": _chosen(records.ModelOffsets, model.offsets, **options),
-        "data": _chosen(records.DataOffsets, data.offsets),
-        "slopes": _chosen(records.SlopeOffsets, slopes, in_model=int(in_model)),
-        "contact": _chosen(records.ContactOffsets, contact.offsets, size=contact.size),
+        "inertia": data.get("qM", -1),
+        "model": _chosen(records.ModelOffsets, model, **options),
+        "data": _chosen(records.DataOffsets, data),
+        "slopes": _chosen(records.SlopeOffsets, model if in_model else data, in_model=int(in_model)),
+        "contact": _chosen(records.ContactOffsets, contact),
         "functions": _functions(),
         "constants": _constants(),
     }
@@ -95,7 +73,7 @@ def layout() -> dict[str, Any]:
     return parts
 
 
-def _functions() -> records.Functions:
+def _functions() -> Any:
     folder = Path(mujoco.__file__).parent
     path = next(each for name in _FILES for each in folder.glob(name))
     library, names = ctypes.CDLL(str(path)), records.Functions._fields
@@ -103,7 +81,7 @@ def _functions() -> records.Functions:
     return records.Functions(*((each and ctypes.cast(each, ctypes.c_void_p).value) or 0 for each in found))
 
 
-def _constants() -> records.Constants:
+def _constants() -> Any:
     state, kind, integrator = mujoco.mjtConstraintState, mujoco.mjtConstraint, mujoco.mjtIntegrator
     found = {
         **{name: getattr(state, f"mjCNSTRSTATE_{name}", None) for name in records.Constants._fields},

@@ -13,7 +13,8 @@ import mujoco
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.adapters.mujoco.loops.records import Memory
+from planarfriction.adapters.mujoco.loops.records import Memory, memory_layout
+from planarfriction.compiler.memory import Layout
 from planarfriction.equality import Checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.models import FrictionModel
@@ -49,17 +50,16 @@ class PatchContact(Checked):
         validation.choice("centre", self.centre, CENTRES)
 
 
-def words(patches: Sequence[PatchContact], nv: int) -> int:
-    """Return the numbers that patches keep in `userdata` (see `mujoco.loops.records.Memory`)."""
-    return memory(patches, nv, 0).converged + 1
+def memory(patches: Sequence[PatchContact], nv: int, nuserdata: int) -> Memory:
+    """Return the places of what patches remember in the user data, at their end; raise where there is no room."""
+    layout = _layout(patches, nv)
+    if nuserdata < layout.size:
+        raise InvalidValueError("nuserdata", f"be at least {layout.size} (prepare adds them)", nuserdata)
+    return Memory(*(nuserdata - layout.size + place for place in layout.offsets))
 
 
-def memory(patches: Sequence[PatchContact], nv: int, first: int) -> Memory:
-    """Return the places in the user data, from word `first` on."""
-    states, k = sum(math.prod(patch.model.state_shape) for patch in patches), len(patches)
-    sizes = [states, states, 3 * k, 3 * k, 3 * k, k, nv, nv, nv]
-    sizes += [1] * (len(Memory._fields) - len(sizes))
-    return Memory(*np.cumsum([first, *sizes[:-1]]).tolist())
+def _layout(patches: Sequence[PatchContact], nv: int) -> Layout:
+    return memory_layout(sum(math.prod(patch.model.state_shape) for patch in patches), len(patches), nv)
 
 
 def prepare(spec: Any, patches: Sequence[PatchContact]) -> None:
@@ -81,8 +81,7 @@ def prepare(spec: Any, patches: Sequence[PatchContact]) -> None:
             pair = spec.add_pair(geomname1=patch.geoms[0], geomname2=patch.geoms[1])
             pair.solref[:], pair.solimp[:], pair.margin, pair.gap = math.nan, math.nan, math.nan, math.nan
         pair.condim = 1
-    nv = spec.copy().compile().nv
-    spec.nuserdata = max(spec.nuserdata, 0) + words(patches, nv)
+    spec.nuserdata = max(spec.nuserdata, 0) + _layout(patches, spec.copy().compile().nv).size
 
 
 def check_once(patches: Sequence[PatchContact]) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from planarfriction.compiler import jit, kernel
 from planarfriction.kernels.vectors import dot, plus
-from planarfriction.limit_surface.loops.twists import BAD_WRENCH, is_wrench, newton_move, plane, put_twist, target_of
+from planarfriction.limit_surface.loops.twists import lean_of, newton_move, of_each, plane
 
 _BALANCED = 1e-13
 """Slope of the dissipation at which a rounded minimum is found, per `mu f_N` [-]."""
@@ -103,36 +103,32 @@ def _unborne(seen, weights, a, b, ga, gb):
     return left, power
 
 
+@kernel
+def _in_cells(surface, target):
+    levers, weights, lean, seen = surface
+    first, second = plane(target)
+    for i in range(weights.shape[0]):
+        for k in range(2):
+            c = (levers[k, 0, i], levers[k, 1, i], levers[k, 2, i])
+            seen[k, i], seen[2 + k, i], seen[4 + k, i] = dot(c, target), dot(c, first), dot(c, second)
+    by_lean = (dot(lean, first), dot(lean, second))
+    a, b, ga, gb, rounding = 0.0, 0.0, 0.0, 0.0, 1.0
+    while rounding > 2.0 * _LAST:
+        rounding *= 0.1
+        balanced = _ROUGH if rounding > 2.0 * _LAST else _BALANCED
+        a, b, ga, gb = _descend(seen, weights, by_lean, a, b, rounding, balanced)
+    left, power = _unborne(seen, weights, a, b, ga, gb)
+    v = plus(plus(target, a, first), b, second)
+    power += dot(lean, v)
+    return v, power, math.atan2(left, power)
+
+
 @jit
 def cell_twists(levers, weights, frame, wrenches, twists):
-    """Write twists of wrenches `[M, 3]` into `twists [M, 3]`; return as `limit_surface.loops.twists.table_twists`.
+    """Find twists with `of_each` for cells, whose C are `levers [2, 3, n]`.
 
-    `levers [2, 3, n]` are the C of the cells. The kinks are rounded off by a speed that shrinks to nothing, where plain
-    Newton steps would stall on them. A cell that rests bears any force up to its friction: a wrench is reached if one
-    such force makes up for what is missing.
+    The kinks are rounded off by a speed that shrinks to nothing, where plain Newton steps would stall on them. A cell
+    that rests bears any force up to its friction: a wrench is reached if one such force makes up for what is missing.
     """
-    seen = np.empty((6, weights.shape[0]))
-    worst = 0.0
-    for m in range(wrenches.shape[0]):
-        target = target_of(frame, wrenches[m])
-        if not is_wrench(target):
-            return BAD_WRENCH
-        first, second = plane(target)
-        for i in range(weights.shape[0]):
-            for k in range(2):
-                c = (levers[k, 0, i], levers[k, 1, i], levers[k, 2, i])
-                seen[k, i], seen[2 + k, i], seen[4 + k, i] = dot(c, target), dot(c, first), dot(c, second)
-        lean = (frame[18], frame[19], frame[20])
-        by_lean = (dot(lean, first), dot(lean, second))
-        a, b, ga, gb, rounding = 0.0, 0.0, 0.0, 0.0, 1.0
-        while rounding > 2.0 * _LAST:
-            rounding *= 0.1
-            balanced = _ROUGH if rounding > 2.0 * _LAST else _BALANCED
-            a, b, ga, gb = _descend(seen, weights, by_lean, a, b, rounding, balanced)
-        left, power = _unborne(seen, weights, a, b, ga, gb)
-        v = plus(plus(target, a, first), b, second)
-        power += dot(lean, v)
-        put_twist(frame, v, power, twists[m])
-        angle = math.atan2(left, power)
-        worst = angle if not angle <= worst else worst
-    return worst
+    surface = levers, weights, lean_of(frame), np.empty((6, weights.shape[0]))
+    return of_each(_in_cells, surface, frame, wrenches, twists)

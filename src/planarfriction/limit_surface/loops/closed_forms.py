@@ -38,8 +38,7 @@ class Elements(NamedTuple):
     corners: np.ndarray
     """Corners `[N, count, 2]`."""
     shape: np.ndarray
-    """`[N, 13]`: the coefficients P, A, B, C of `_far`, those of its Jacobian determinant times the weight per length
-    or area, the radius about P, and that weight itself."""
+    """Coefficients P, A, B, C of `_far`, of its Jacobian determinant times a weight, radius, weight, `[N, 13]`."""
     rules: np.ndarray
     """Gauss rules `[J, 3, K]` (xi, eta, weight)."""
     points: np.ndarray
@@ -122,8 +121,7 @@ def _segment(ax, ay, bx, by):
 
 @kernel
 def _to_twist(density, s, cx, cy, f, gx, gy, mxx, mxy, myy):
-    """Return gradient (3) and second derivatives (xx, xy, xs, yy, ys, ss) with respect to the twist, from f, G and
-    M."""
+    """Return the gradient (3) and second derivatives (xx, xy, xs, yy, ys, ss) by the twist, from f, G and M."""
     signed = xp.where(s < 0.0, -density, density)
     per = density / abs(s)
     x, y = mxy * cx - mxx * cy, myy * cx - mxy * cy

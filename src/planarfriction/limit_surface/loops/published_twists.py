@@ -10,7 +10,7 @@ from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import jit, kernel
 from planarfriction.kernels.surfaces import BILINEAR, sliding
 from planarfriction.kernels.vectors import dot, times
-from planarfriction.limit_surface.loops.twists import BAD_WRENCH, is_wrench, plane, put_twist, target_of
+from planarfriction.limit_surface.loops.twists import of_each, plane
 
 _SAME_ANSWER = 1e-12
 """Angle [rad] between a stored wrench and the wanted one below which a direction answers: rounding of the quadratic."""
@@ -40,8 +40,7 @@ def _share(numerator, denominator):
 
 @kernel
 def _answer(data, size, i, j, position, corners, target):
-    """Return the direction of table cell (i, j) at an azimuth that answers best, its dissipation, angle and
-    `|h . target|`.
+    """Return the direction in table cell (i, j) that answers best, its dissipation, angle and `|h . target|`.
 
     `corners` are `h . first` and `h . second` at the corners, the lower polar angle first.
     """
@@ -64,8 +63,7 @@ def _answer(data, size, i, j, position, corners, target):
 
 @kernel
 def _positions(corners):
-    """Return the positions along the azimuth of common roots of both equations, `q2 b^2 + q1 b + q0 = 0`, or the
-    edge."""
+    """Return the azimuths of common roots of both equations, `q2 b^2 + q1 b + q0 = 0`, or the edge."""
     ax, ay, bx, by, cx, cy, dx, dy = corners
     b_x, b_y, a_x, a_y = bx - ax, by - ay, cx - ax, cy - ay
     t_x, t_y = dx - cx - b_x, dy - cy - b_y
@@ -77,34 +75,35 @@ def _positions(corners):
     return _share(half, q2), _share(q0, half), 0.0
 
 
+@kernel
+def _in_table(surface, target):
+    """Return the answer of `of_each`; of several the one of least dissipation."""
+    data, size, across, sides = surface
+    columns = 4 * size + 1
+    first, second = plane(target)
+    best, angle, least, power = (0.0, 0.0, 1.0), math.inf, math.inf, 1.0
+    _signs(data, 0, 0, first, second, across, sides)
+    for i in range(size):
+        low, high = i % 2, (i + 1) % 2
+        _signs(data, high, 4 * (i + 1) * columns, first, second, across, sides)
+        for j in range(columns - 1):
+            if sides[low, j] & sides[low, j + 1] & sides[high, j] & sides[high, j + 1]:
+                continue  # between the corners one of the two has no zero
+            corners = (
+                across[low, j, 0], across[low, j, 1], across[low, j + 1, 0], across[low, j + 1, 1],
+                across[high, j, 0], across[high, j, 1], across[high, j + 1, 0], across[high, j + 1, 1],
+            )  # fmt: skip
+            for position in _positions(corners):
+                v, phi, miss, size_here = _answer(data, size, i, j, position, corners, target)
+                better = size_here < least if miss <= _SAME_ANSWER and angle <= _SAME_ANSWER else miss < angle
+                if better:
+                    best, angle, least, power = v, miss, size_here, phi
+    return best, power, angle
+
+
 @jit
 def published_twists(data, size, frame, wrenches, twists):
-    """Find twists as `table_twists` does, for a `BILINEAR` surface; of several answers take the least dissipation."""
+    """Find twists with `of_each` for a `BILINEAR` surface."""
     columns = 4 * size + 1
-    across, sides = np.empty((2, columns, 2)), np.empty((2, columns), np.int8)
-    worst = 0.0
-    for m in range(wrenches.shape[0]):
-        target = target_of(frame, wrenches[m])
-        if not is_wrench(target):
-            return BAD_WRENCH
-        first, second = plane(target)
-        best, angle, least, power = (0.0, 0.0, 1.0), math.inf, math.inf, 1.0
-        _signs(data, 0, 0, first, second, across, sides)
-        for i in range(size):
-            low, high = i % 2, (i + 1) % 2
-            _signs(data, high, 4 * (i + 1) * columns, first, second, across, sides)
-            for j in range(columns - 1):
-                if sides[low, j] & sides[low, j + 1] & sides[high, j] & sides[high, j + 1]:
-                    continue  # between the corners one of the two has no zero
-                corners = (
-                    across[low, j, 0], across[low, j, 1], across[low, j + 1, 0], across[low, j + 1, 1],
-                    across[high, j, 0], across[high, j, 1], across[high, j + 1, 0], across[high, j + 1, 1],
-                )  # fmt: skip
-                for position in _positions(corners):
-                    v, phi, miss, size_here = _answer(data, size, i, j, position, corners, target)
-                    better = size_here < least if miss <= _SAME_ANSWER and angle <= _SAME_ANSWER else miss < angle
-                    if better:
-                        best, angle, least, power = v, miss, size_here, phi
-        put_twist(frame, best, power, twists[m])
-        worst = angle if not angle <= worst else worst
-    return worst
+    surface = data, size, np.empty((2, columns, 2)), np.empty((2, columns), np.int8)
+    return of_each(_in_table, surface, frame, wrenches, twists)

@@ -83,12 +83,6 @@ def target_of(frame, wrench):
 
 
 @kernel
-def is_wrench(target):
-    """Return True if `target_of` found a target."""
-    return target[0] != 0.0 or target[1] != 0.0 or target[2] != 0.0
-
-
-@kernel
 def put_twist(frame, v, power, row):
     """Write the twist of the scaled twist v, which dissipates `power`, at unit dissipation."""
     x, y, s = times(1.0 / power, v)
@@ -173,8 +167,7 @@ def _across(a, second, b):
 
 @kernel
 def _least(evaluate, surface, lean, target, guess, balanced, scratch):
-    """Return the scaled twist of least dissipation in the plane of `target`, from a guess; that dissipation; the angle
-    left.
+    """Return the scaled twist of least dissipation in the plane of `target`, its dissipation, and the angle left.
 
     A step is taken where the dissipation falls as it should; near the minimum, where that drowns in rounding, where the
     balance is better.
@@ -245,54 +238,66 @@ def _nearest(table, target):
 # ---------------------------------------------------------------------- entry points
 
 
-@jit
-def table_twists(table, frame, wrenches, twists):
+@kernel
+def of_each(find, surface, frame, wrenches, twists):
     """Write twists of unit dissipation of wrenches `[M, 3]` into `twists [M, 3]`.
 
-    Returns the largest angle [rad] between a wrench and that of its twist; `BAD_WRENCH` if there is none.
+    `find(surface, target)` returns a scaled twist, its dissipation, and the angle [rad] between its wrench and the
+    target. Returns the largest of these angles; `BAD_WRENCH` for a wrench that is none.
     """
-    scratch, worst = np.empty(9), 0.0
-    lean = (frame[18], frame[19], frame[20])
+    worst = 0.0
     for m in range(wrenches.shape[0]):
         target = target_of(frame, wrenches[m])
-        if not is_wrench(target):
+        if target[0] == 0.0 and target[1] == 0.0 and target[2] == 0.0:
             return BAD_WRENCH
-        v, power, angle = _least(_table_at, table, lean, target, _nearest(table, target), _BALANCED, scratch)
+        v, power, angle = find(surface, target)
         put_twist(frame, v, power, twists[m])
         worst = angle if not angle <= worst else worst
     return worst
+
+
+@kernel
+def lean_of(frame):
+    """Return what an asymmetry adds to h."""
+    return frame[18], frame[19], frame[20]
+
+
+@kernel
+def _in_table(surface, target):
+    table, lean, scratch = surface
+    return _least(_table_at, table, lean, target, _nearest(table, target), _BALANCED, scratch)
+
+
+@jit
+def table_twists(table, frame, wrenches, twists):
+    """Find twists with `of_each` for a stored potential."""
+    return of_each(_in_table, (table, lean_of(frame), np.empty(9)), frame, wrenches, twists)
+
+
+@kernel
+def _in_exact(surface, target):
+    exact, table, lean, scratch = surface
+    guess, _, _ = _least(_table_at, table, lean, target, _nearest(table, target), _ROUGH, scratch)
+    return _least(_exact_at, exact, lean, target, guess, _BALANCED, scratch)
 
 
 @jit
 def exact_twists(elements, discs, rings, table, frame, wrenches, twists):
-    """Find twists as `table_twists` for elements, or rings or discs if there are any, from the twist of their
-    `table`."""
+    """Find twists with `of_each` for elements, or for rings or discs if there are any, from those of their `table`."""
     block = np.empty((elements.points.shape[0], 11, elements.corners.shape[0]))
-    held, scratch, worst = np.empty(elements.points.shape[0], np.int64), np.empty(9), 0.0
-    surface = _Exact(elements, discs, rings, block, held)
-    lean = (frame[18], frame[19], frame[20])
-    for m in range(wrenches.shape[0]):
-        target = target_of(frame, wrenches[m])
-        if not is_wrench(target):
-            return BAD_WRENCH
-        guess, _, _ = _least(_table_at, table, lean, target, _nearest(table, target), _ROUGH, scratch)
-        v, power, angle = _least(_exact_at, surface, lean, target, guess, _BALANCED, scratch)
-        put_twist(frame, v, power, twists[m])
-        worst = angle if not angle <= worst else worst
-    return worst
+    exact = _Exact(elements, discs, rings, block, np.empty(elements.points.shape[0], np.int64))
+    return of_each(_in_exact, (exact, table, lean_of(frame), np.empty(9)), frame, wrenches, twists)
+
+
+@kernel
+def _in_ellipsoid(lean, target):
+    # h = V/|V| + lean is parallel to the target: the target's line meets the shifted unit sphere
+    along = dot(target, lean)
+    v = plus(times(along + math.sqrt(along * along + 1.0 - dot(lean, lean)), target), -1.0, lean)
+    return v, norm(v) + dot(lean, v), 0.0
 
 
 @jit
 def ellipsoid_twists(frame, wrenches, twists):
-    """Find twists as `table_twists` for the ellipsoid, whose answer is known."""
-    lean = (frame[18], frame[19], frame[20])
-    for m in range(wrenches.shape[0]):
-        target = target_of(frame, wrenches[m])
-        if not is_wrench(target):
-            return BAD_WRENCH
-        # h = V/|V| + lean is parallel to the target: the target's line meets the shifted unit sphere
-        along = dot(target, lean)
-        reach = along + math.sqrt(along * along + 1.0 - dot(lean, lean))
-        v = plus(times(reach, target), -1.0, lean)
-        put_twist(frame, v, norm(v) + dot(lean, v), twists[m])
-    return 0.0
+    """Find twists with `of_each` for the ellipsoid, whose answer is known."""
+    return of_each(_in_ellipsoid, lean_of(frame), frame, wrenches, twists)

@@ -3,81 +3,28 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 from planarfriction.compiler import kernel
 from planarfriction.compiler.calls import call_c
-from planarfriction.compiler.memory import at, doubles, integers, integers32
-
-
-class Scratch(NamedTuple):
-    """Addresses of what a step works with."""
-
-    problem: int
-    jacobian: int
-    """Jacobian of the twists, [3k, nv]."""
-    inertia: int
-    """[nv, nv]"""
-    stiff: int
-    """H, and then the metric of the integrator, [nv, nv]."""
-    answers: int
-    """H^-1 J' and, last, the acceleration, [nv, 3k + 1]."""
-    held: int
-    """Velocities that the integrator gains from these answers, [nv, 3k + 1]."""
-    moves: int
-    """[3, nv]"""
-    turns: int
-    """[3, nv]"""
-    more: int
-    """Acceleration that the change of wrenches adds, [nv]."""
-    start: int
-    """Wrenches where a step in contact space begins, [3k]."""
-    goal: int
-    """Wrenches where the step ends, [3k]."""
-    move: int
-    """Twists between, [3k]."""
-    block: int
-    """[6, 6]"""
-    owners: int
-    """The patch of each constraint, -1 of others, int [nefc]."""
-    misses: int
-    """J qacc - aref, [nefc]."""
-    counts: int
-    """Contacts of each patch, int [k]."""
-    frames: int
-    """Sums over these: normals into the own body, and positions, [k, 6]."""
+from planarfriction.compiler.memory import arrays_at, at, doubles, integers, integers32
 
 
 @kernel
-def take(own, d, nefc):
+def take(host, d, nefc):
     """Take scratch from the data's own stack, until it is freed."""
-    k, nv, n = own.count, own.nv, 3 * own.count
-    total = own.words + nv * (n + 2 * nv + 2 * (n + 1) + 7) + 3 * n + 36 + 2 * nefc + 7 * k
-    problem = call_c(own.functions.mj_stackAllocNum, (d, total))
-    jacobian = at(problem, own.words)
-    inertia = at(jacobian, nv * n)
-    stiff = at(inertia, nv * nv)
-    answers = at(stiff, nv * nv)
-    held = at(answers, nv * (n + 1))
-    moves = at(held, nv * (n + 1))
-    turns = at(moves, 3 * nv)
-    more = at(turns, 3 * nv)
-    start = at(more, nv)
-    goal = at(start, n)
-    move = at(goal, n)
-    block = at(move, n)
-    owners = at(block, 36)
-    misses = at(owners, nefc)
-    counts = at(misses, nefc)
-    frames = at(counts, k)
-    first = problem, jacobian, inertia, stiff, answers, held, moves, turns, more
-    return Scratch(*first, start, goal, move, block, owners, misses, counts, frames)
+    return arrays_at(host.scratch, call_c(host.functions.mj_stackAllocNum, (d, host.scratch_words + 2 * nefc)))
+
+
+@kernel
+def owners_of(s, nefc):
+    """Return the patches of the constraints, behind the numbers of these in the scratch."""
+    return integers(at(s.misses, nefc))
 
 
 @kernel
 def _collect(own, d, s, nefc):
     """Collect the owners of constraints, and sums over the contacts of each patch."""
-    owners, counts, frames = integers(s.owners), integers(s.counts), doubles(s.frames)
+    owners, counts, frames = owners_of(s, nefc), s.counts, s.frames
     contacts, ncon = integers(d + own.data.contact)[0], integers32(d + own.data.ncon)[0]
     for r in range(nefc):
         owners[r] = -1
@@ -133,17 +80,17 @@ def _axes(own, d, frame, site):
 @kernel
 def _rows(own, m, d, s, p):
     """Write the three rows of patch p into the Jacobian."""
-    nv, frame, site = own.nv, doubles(at(s.frames, 6 * p)), integers(own.sites)[p]
+    nv, frame, site = own.nv, at(s.frames, 6 * p), integers(own.sites)[p]
     (ax, ay, az), (bx, by, bz), (nx, ny, nz) = _axes(own, d, frame, site)
-    centre, rows = at(s.frames, 6 * p + 3), doubles(at(s.jacobian, 3 * nv * p))
+    centre, rows = at(s.frames, 6 * p + 3), at(s.jacobian, 3 * nv * p)
     if integers(own.at_contact)[p] != 0:
         for i in range(3):
-            frame[3 + i] /= integers(s.counts)[p]
+            frame[3 + i] /= s.counts[p]
     else:
-        centre = at(integers(d + own.data.site_xpos)[0], 3 * site)
+        centre = at(doubles(integers(d + own.data.site_xpos)[0]), 3 * site)
     for i in range(3 * nv):
         rows[i] = 0.0
-    moves, turns = doubles(s.moves), doubles(s.turns)
+    moves, turns = s.moves, s.turns
     for side in range(2):
         body = integers(own.own_bodies)[p] if side == 0 else integers(own.other_bodies)[p]
         if body == 0:
@@ -163,10 +110,10 @@ def place(own, m, d, s, nefc):
     _collect(own, d, s, nefc)
     touching = 0
     for p in range(own.count):
-        if integers(s.counts)[p] > 0:
+        if s.counts[p] > 0:
             _rows(own, m, d, s, p)
             touching += 1
         else:
             for i in range(3 * own.nv):
-                doubles(s.jacobian)[3 * own.nv * p + i] = 0.0
+                s.jacobian[3 * own.nv * p + i] = 0.0
     return touching

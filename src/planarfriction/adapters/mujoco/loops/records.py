@@ -5,138 +5,139 @@ Offsets are in bytes and belong to the version that is installed (`adapters.mujo
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from planarfriction.compiler.memory import reader
-
-
-class ModelOffsets(NamedTuple):
-    """Offsets of `mjModel`."""
-
-    nv: int
-    nuserdata: int
-    timestep: int
-    integrator: int
-    disableflags: int
-    dof_damping: int
+from planarfriction.compiler.memory import Doubles, Integers, Layout, offsets_of, reader
 
 
-class DataOffsets(NamedTuple):
-    """Offsets of `mjData`."""
-
-    time: int
-    ncon: int
-    nefc: int
-    contact: int
-    efc_type: int
-    efc_J: int
-    efc_J_rownnz: int
-    efc_J_rowadr: int
-    efc_J_colind: int
-    efc_D: int
-    efc_R: int
-    efc_frictionloss: int
-    efc_aref: int
-    efc_state: int
-    efc_force: int
-    qvel: int
-    qacc: int
-    qacc_warmstart: int
-    qfrc_passive: int
-    qDeriv: int
-    userdata: int
-    site_xpos: int
-    site_xmat: int
+def _integers(name: str, fields: str) -> Any:
+    """Return a record of integers, named in a text."""
+    return NamedTuple(name, [(field, int) for field in fields.split()])
 
 
-class SlopeOffsets(NamedTuple):
-    """Offsets of the sparsity of `qDeriv`, in the model or, in older versions, in the data."""
+ModelOffsets = _integers("ModelOffsets", "nv nuserdata timestep integrator disableflags dof_damping")
+"""Offsets of `mjModel`."""
 
-    in_model: int
-    """1 or 0."""
-    D_rownnz: int
-    D_rowadr: int
-    D_colind: int
+DataOffsets = _integers(
+    "DataOffsets",
+    "time ncon nefc contact efc_type efc_J efc_J_rownnz efc_J_rowadr efc_J_colind efc_D efc_R efc_frictionloss "
+    "efc_aref efc_state efc_force qvel qacc qacc_warmstart qfrc_passive qDeriv userdata site_xpos site_xmat",
+)
+"""Offsets of `mjData`."""
 
+SlopeOffsets = _integers("SlopeOffsets", "in_model D_rownnz D_rowadr D_colind")
+"""Offsets of the sparsity of `qDeriv`, in the model (`in_model` is 1) or, in older versions, in the data (0)."""
 
-class ContactOffsets(NamedTuple):
-    """Offsets of `mjContact`."""
+ContactOffsets = _integers("ContactOffsets", "size pos frame H dim geom efc_address")
+"""Size of an `mjContact`, and its offsets."""
 
-    size: int
-    """Size of a contact."""
-    pos: int
-    frame: int
-    H: int
-    dim: int
-    geom: int
-    efc_address: int
+Functions = _integers(
+    "Functions",
+    "mj_markStack mj_freeStack mj_stackAllocNum mj_fwdActuation mj_fwdAcceleration mj_fwdConstraint "
+    "mj_constraintUpdate mj_fullM mj_jac mj_isSparse mjd_smooth_vel mjd_freeMhat",
+)
+"""Addresses of MuJoCo's functions; 0 for `mjd_freeMhat` in versions without it."""
 
-
-class Functions(NamedTuple):
-    """Addresses of MuJoCo's functions."""
-
-    mj_markStack: int
-    mj_freeStack: int
-    mj_stackAllocNum: int
-    mj_fwdActuation: int
-    mj_fwdAcceleration: int
-    mj_fwdConstraint: int
-    mj_constraintUpdate: int
-    mj_fullM: int
-    mj_jac: int
-    mj_isSparse: int
-    mjd_smooth_vel: int
-    mjd_freeMhat: int
-    """0 in versions without."""
+Constants = _integers(
+    "Constants",
+    "SATISFIED QUADRATIC LINEARNEG LINEARPOS CONE EQUALITY FRICTION_DOF FRICTION_TENDON ELLIPTIC EULER IMPLICIT "
+    "IMPLICITFAST NO_EULERDAMP",
+)
+"""Values of MuJoCo's enumerations."""
 
 
-class Constants(NamedTuple):
-    """Values of MuJoCo's enumerations."""
+class Remembered(NamedTuple):
+    """Numbers in the user data that patches remember from step to step."""
 
-    SATISFIED: int
-    QUADRATIC: int
-    LINEARNEG: int
-    LINEARPOS: int
-    CONE: int
-    EQUALITY: int
-    FRICTION_DOF: int
-    FRICTION_TENDON: int
-    ELLIPTIC: int
-    EULER: int
-    IMPLICIT: int
-    IMPLICITFAST: int
-    NO_EULERDAMP: int
-
-
-class Memory(NamedTuple):
-    """Places in the user data of what patches remember from step to step, in words."""
-
-    state: int
+    state: Doubles
     """State of all patches at `time`."""
-    new: int
+    new: Doubles
     """State of all patches at `next`."""
-    guess: int
+    guess: Doubles
     """Wrenches at the beginning of the step, [3k]."""
-    wrench: int
+    wrench: Doubles
     """Wrenches of the step, [3k]."""
-    twist: int
+    twist: Doubles
     """[3k]"""
-    load: int
+    load: Doubles
     """[k]"""
-    warmstart: int
+    warmstart: Doubles
     """`qacc_warmstart` at the beginning of the step, [nv]."""
-    passive: int
+    passive: Doubles
     """`qfrc_passive` without friction, [nv]."""
-    total: int
+    total: Doubles
     """`qfrc_passive` with friction, [nv]."""
-    time: int
-    """Time at the beginning of the step [s]."""
-    next: int
-    """Time at the end of the step [s]."""
-    iterations: int
-    passes: int
-    residual: int
-    converged: int
+    time: Doubles
+    """Time at the beginning of the step [s], [1]."""
+    next: Doubles
+    """Time at the end of the step [s], [1]."""
+    iterations: Doubles
+    """[1], as all that follows."""
+    passes: Doubles
+    residual: Doubles
+    converged: Doubles
+
+
+Memory = offsets_of(Remembered)
+"""Places in the user data, in words."""
+
+
+def memory_layout(states: int, k: int, nv: int) -> Layout:
+    """Return the layout of `Remembered` for k patches with so many states in all."""
+    shapes = dict.fromkeys(Remembered._fields, 1) | dict.fromkeys(("state", "new"), states) | {"load": k}
+    shapes |= dict.fromkeys(("guess", "wrench", "twist"), 3 * k)
+    return Layout(Remembered, **shapes | dict.fromkeys(("warmstart", "passive", "total"), nv))
+
+
+class Scratch(NamedTuple):
+    """Memory that a step works with."""
+
+    problem: Doubles
+    """Words of a `coupling_rows.Problem`."""
+    jacobian: Doubles
+    """Jacobian of the twists, [3k, nv]."""
+    inertia: Doubles
+    """[nv, nv]"""
+    stiff: Doubles
+    """H, and then the metric of the integrator, [nv, nv]."""
+    answers: Doubles
+    """H^-1 J' and, last, the acceleration, [nv, 3k + 1]."""
+    held: Doubles
+    """Velocities that the integrator gains from these answers, [nv, 3k + 1]."""
+    moves: Doubles
+    """[3, nv]"""
+    turns: Doubles
+    """[3, nv]"""
+    more: Doubles
+    """Acceleration that the change of wrenches adds, [nv]."""
+    start: Doubles
+    """Wrenches where a step in contact space begins, [3k]."""
+    goal: Doubles
+    """Wrenches where the step ends, [3k]."""
+    move: Doubles
+    """Twists between, [3k]."""
+    block: Doubles
+    """[6, 6]"""
+    counts: Integers
+    """Contacts of each patch, [k]."""
+    frames: Doubles
+    """Sums over these: normals into the own body, and positions, [k, 6]."""
+    misses: Doubles
+    """J qacc - aref, [nefc]; behind them `owners_of` finds the patch of each constraint, -1 of others."""
+
+
+Places = offsets_of(Scratch)
+"""Places of scratch in a block of words."""
+
+
+def scratch_layout(words: int, k: int, nv: int) -> Layout:
+    """Return the layout of `Scratch` without its rows for constraints, for k patches and problems of so many words."""
+    n = 3 * k
+    shapes = {"problem": words, "jacobian": n * nv, "more": nv, "block": 36, "counts": k, "frames": 6 * k, "misses": 0}
+    shapes |= dict.fromkeys(("inertia", "stiff"), nv * nv) | dict.fromkeys(("answers", "held"), nv * (n + 1))
+    return Layout(
+        Scratch, **shapes | dict.fromkeys(("moves", "turns"), 3 * nv) | dict.fromkeys(("start", "goal", "move"), n)
+    )
 
 
 class Host(NamedTuple):
@@ -149,6 +150,8 @@ class Host(NamedTuple):
     states: int
     words: int
     """Words of a problem in contact space."""
+    scratch_words: int
+    """Words of the scratch, without its rows for constraints."""
     problem: int
     """Address of a problem without inputs."""
     patches: int
@@ -175,6 +178,7 @@ class Host(NamedTuple):
     inertia: int
     """Offset of the inertia that `mj_fullM` wants, -1 where it takes the data."""
     memory: Memory
+    scratch: Places
     model: ModelOffsets
     data: DataOffsets
     slopes: SlopeOffsets

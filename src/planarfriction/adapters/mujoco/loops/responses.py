@@ -8,6 +8,7 @@ twists answer with `A = dt J Mh^-1 M X`, loads with `B = -sum D Jc X` over the r
 from __future__ import annotations
 
 from planarfriction.adapters.mujoco.loops.elimination import backward, eliminate, multiply
+from planarfriction.adapters.mujoco.loops.geometry import owners_of
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
 from planarfriction.compiler.calls import call_c
@@ -70,7 +71,7 @@ def _update(own, m, d, s, sparse, nefc):
     """
     acceleration, aref = doubles(integers(d + own.data.qacc)[0]), doubles(integers(d + own.data.efc_aref)[0])
     for r in range(nefc):
-        doubles(s.misses)[r] = row_times(own, d, sparse, r, acceleration) - aref[r]
+        s.misses[r] = row_times(own, d, sparse, r, acceleration) - aref[r]
     call_c(own.functions.mj_constraintUpdate, (m, d, s.misses, 0, 1))
 
 
@@ -95,7 +96,7 @@ def _stiff(own, m, d, s, sparse, nefc):
         call_c(own.functions.mj_fullM, (m, s.inertia, integers(d + own.inertia)[0]))
     else:
         call_c(own.functions.mj_fullM, (m, d, s.inertia))
-    h, inertia, cones = doubles(s.stiff), doubles(s.inertia), False
+    h, inertia, cones = s.stiff, s.inertia, False
     for i in range(own.nv * own.nv):
         h[i] = inertia[i]
     _update(own, m, d, s, sparse, nefc)
@@ -129,15 +130,15 @@ def _free_metric(own, m, d, s, metric, dt):
         if call_c(own.functions.mjd_freeMhat, (m, d, joint, dt, s.block, 0)) & 0xFFFFFFFF != 0:
             for i in range(6):
                 for j in range(6):
-                    metric[own.nv * (first + i) + first + j] = doubles(s.block)[6 * i + j]
+                    metric[own.nv * (first + i) + first + j] = s.block[6 * i + j]
 
 
 @kernel
 def _metric(own, m, d, s):
     """Write the metric of the integrator in the place of H."""
-    nv, metric, dt = own.nv, doubles(s.stiff), doubles(m + own.model.timestep)[0]
+    nv, metric, dt = own.nv, s.stiff, doubles(m + own.model.timestep)[0]
     for i in range(nv * nv):
-        metric[i] = doubles(s.inertia)[i]
+        metric[i] = s.inertia[i]
     integrator = integers32(m + own.model.integrator)[0]
     if integrator == own.constants.EULER:
         for i in range(nv):
@@ -164,10 +165,10 @@ def _metric(own, m, d, s):
 
 
 @kernel
-def _loads(own, d, s, sparse, nefc):
+def _loads(own, d, sparse, nefc):
     """Write loads and their responses into the problem."""
-    host, row, k, columns = own.host, own.row, own.host.count, 3 * own.host.count + 1
-    load, answers = doubles(at(s.problem, row.free_load)), doubles(at(s.problem, row.load_response))
+    host, s, k, columns = own.host, own.scratch, own.host.count, 3 * own.host.count + 1
+    load, answers, owners = own.problem.free_load, own.problem.load_response, owners_of(own.scratch, nefc)
     for p in range(k):
         load[p] = 0.0
         for i in range(3 * k):
@@ -175,7 +176,7 @@ def _loads(own, d, s, sparse, nefc):
     states, weights = integers32(integers(d + host.data.efc_state)[0]), doubles(integers(d + host.data.efc_D)[0])
     force = doubles(integers(d + host.data.efc_force)[0])
     for r in range(nefc):
-        p = integers(s.owners)[r]
+        p = owners[r]
         if p < 0:
             continue
         load[p] += force[r]
@@ -186,19 +187,19 @@ def _loads(own, d, s, sparse, nefc):
             factor, first = weights[r] * doubles(numbers)[i], columns * column(places, i)
             if factor != 0.0:
                 for c in range(3 * k):
-                    answers[3 * k * p + c] -= factor * doubles(s.answers)[first + c]
+                    answers[3 * k * p + c] -= factor * s.answers[first + c]
     for p in range(k):
         load[p] = xp.maximum(load[p], 0.0)
 
 
 @kernel
-def respond(own, m, d, s, sparse, nefc):
+def respond(own, m, d, sparse, nefc):
     """Write twists, loads and their responses, at the accelerations and forces in the data, into the problem."""
-    host, row = own.host, own.row
+    host, s = own.host, own.scratch
     nv, n, dt = host.nv, 3 * host.count, doubles(m + host.model.timestep)[0]
-    columns, jacobian, answers = n + 1, doubles(s.jacobian), doubles(s.answers)
+    columns, jacobian, answers = n + 1, s.jacobian, s.answers
     _stiff(host, m, d, s, sparse, nefc)
-    stiff = doubles(s.stiff)
+    stiff = s.stiff
     eliminate(stiff, nv)
     for i in range(nv):
         for c in range(n):
@@ -210,12 +211,12 @@ def respond(own, m, d, s, sparse, nefc):
         answers[columns * i + n] = acceleration[i]
     held = answers
     if _has_metric(host, m):
-        held = doubles(s.held)
-        multiply(doubles(s.inertia), nv, answers, columns, held)
+        held = s.held
+        multiply(s.inertia, nv, answers, columns, held)
         _metric(host, m, d, s)
         eliminate(stiff, nv)
         backward(stiff, nv, held, columns)
-    response, twist = doubles(at(s.problem, row.response)), doubles(at(s.problem, row.free_twist))
+    response, twist = own.problem.response, own.problem.free_twist
     for r in range(n):
         twist[r] = 0.0
         for c in range(n):
@@ -226,15 +227,14 @@ def respond(own, m, d, s, sparse, nefc):
                 twist[r] += factor * (velocity[i] + dt * held[columns * i + n])
                 for c in range(n):
                     response[n * r + c] += dt * factor * held[columns * i + c]
-    _loads(own, d, s, sparse, nefc)
+    _loads(own, d, sparse, nefc)
 
 
 @kernel
 def leaves_range(own, m, d, s, sparse, nefc):
-    """Return True if the acceleration `more` takes a constraint out of its range, so that the solution does not
-    hold."""
+    """Return True if the acceleration `more` takes a constraint out of its range: the solution does not hold."""
     kinds, states = integers32(integers(d + own.data.efc_type)[0]), integers32(integers(d + own.data.efc_state)[0])
-    inverse, more = doubles(integers(d + own.data.efc_R)[0]), doubles(s.more)
+    inverse, more = doubles(integers(d + own.data.efc_R)[0]), s.more
     loss, dt, e = doubles(integers(d + own.data.efc_frictionloss)[0]), doubles(m + own.model.timestep)[0], own.constants
     for r in range(nefc):
         change, kind, state = row_times(own, d, sparse, r, more), kinds[r], states[r]
@@ -244,7 +244,7 @@ def leaves_range(own, m, d, s, sparse, nefc):
             if dt * abs(change) > MISFIT:
                 return True
             continue
-        miss = doubles(s.misses)[r] + change
+        miss = s.misses[r] + change
         beyond, then = miss, e.QUADRATIC if miss < 0.0 else e.SATISFIED
         if kind == e.FRICTION_DOF or kind == e.FRICTION_TENDON:
             bound = inverse[r] * loss[r]

@@ -12,14 +12,14 @@ from typing import NamedTuple
 from numba import types
 
 from planarfriction.adapters.mujoco.loops.geometry import place, take
-from planarfriction.adapters.mujoco.loops.records import Host, read
+from planarfriction.adapters.mujoco.loops.records import Host, Remembered, Scratch, read
 from planarfriction.adapters.mujoco.loops.responses import is_sparse, leaves_range, respond
 from planarfriction.compiler import callback, entry, jit, kernel
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler.calls import address, address_of, c_address_of, call, call_c, shared_word
-from planarfriction.compiler.memory import arrays_at, at, doubles, integers, integers32
+from planarfriction.compiler.memory import arrays_at, doubles, integers, integers32
 from planarfriction.kernels.coupling import step_all
-from planarfriction.kernels.coupling_rows import Offsets
+from planarfriction.kernels.coupling_rows import Problem
 from planarfriction.kernels.coupling_rows import read as read_patches
 
 PASSES = 10
@@ -37,7 +37,9 @@ INSTALLED, _installed = shared_word("planarfriction_mujoco")
 
 class _Own(NamedTuple):
     host: Host
-    row: Offsets
+    problem: Problem
+    scratch: Scratch
+    kept: Remembered
 
 
 @kernel
@@ -53,202 +55,188 @@ def _clear(target, count):
 
 
 @kernel
-def _recall(own, d, u):
-    """Bring state, guess and start of the solver to the time of the data. Whether the step is planned anew."""
-    memory, n, now = own.memory, 3 * own.count, doubles(d + own.data.time)[0]
-    words, warmstart = doubles(u), doubles(integers(d + own.data.qacc_warmstart)[0])
-    started, again = False, now == words[memory.time] and now != words[memory.next]
-    for i in range(own.nv):
+def _recall(host, kept, d):
+    """Bring state, guess and start of the solver to the time of the data; return True if the step is planned anew."""
+    now, warmstart = doubles(d + host.data.time)[0], doubles(integers(d + host.data.qacc_warmstart)[0])
+    started, again = False, now == kept.time[0] and now != kept.next[0]
+    for i in range(host.nv):
         started = started or warmstart[i] != 0.0
     if again and started:
-        _copy(doubles(at(u, memory.warmstart)), warmstart, own.nv)
+        _copy(kept.warmstart, warmstart, host.nv)
         return again
-    if now == words[memory.next] and started:
-        _copy(doubles(at(u, memory.new)), doubles(at(u, memory.state)), own.states)
-        _copy(doubles(at(u, memory.wrench)), doubles(at(u, memory.guess)), n)
+    if now == kept.next[0] and started:
+        _copy(kept.new, kept.state, host.states)
+        _copy(kept.wrench, kept.guess, 3 * host.count)
     else:
         # other times than those of the last step, or a roll-out, which clears where the solver starts but not this
-        _clear(doubles(at(u, memory.state)), own.states)
-        _clear(doubles(at(u, memory.guess)), n)
-    _copy(warmstart, doubles(at(u, memory.warmstart)), own.nv)
-    words[memory.time] = now
+        _clear(kept.state, host.states)
+        _clear(kept.guess, 3 * host.count)
+    _copy(warmstart, kept.warmstart, host.nv)
+    kept.time[0] = now
     return again
 
 
 @kernel
-def _take_off(own, d, u, again):
+def _take_off(host, kept, d, again):
     """Keep the passive forces without friction: with it, they are still there where velocities were not updated."""
-    memory, passive = own.memory, doubles(integers(d + own.data.qfrc_passive)[0])
-    base, total = doubles(at(u, memory.passive)), doubles(at(u, memory.total))
-    same = again
-    for i in range(own.nv):
-        same = same and passive[i] == total[i]
+    passive, same = doubles(integers(d + host.data.qfrc_passive)[0]), again
+    for i in range(host.nv):
+        same = same and passive[i] == kept.total[i]
     if same:
-        _copy(base, passive, own.nv)
+        _copy(kept.passive, passive, host.nv)
     else:
-        _copy(passive, base, own.nv)
+        _copy(passive, kept.passive, host.nv)
 
 
 @kernel
-def _apply(own, d, u, s, w):
+def _apply(own, d, w):
     """Add wrenches to the passive forces."""
-    nv, memory, passive = own.nv, own.memory, doubles(integers(d + own.data.qfrc_passive)[0])
-    jacobian, total = doubles(s.jacobian), doubles(at(u, memory.total))
-    _copy(doubles(at(u, memory.passive)), passive, nv)
-    for r in range(3 * own.count):
+    nv, kept, passive = own.host.nv, own.kept, doubles(integers(d + own.host.data.qfrc_passive)[0])
+    _copy(kept.passive, passive, nv)
+    for r in range(3 * own.host.count):
         if w[r] != 0.0:
             for i in range(nv):
-                passive[i] += w[r] * jacobian[nv * r + i]
-    _copy(passive, total, nv)
+                passive[i] += w[r] * own.scratch.jacobian[nv * r + i]
+    _copy(passive, kept.total, nv)
 
 
 @kernel
-def _accelerate(own, m, d):
-    call_c(own.functions.mj_fwdAcceleration, (m, d))
-    call_c(own.functions.mj_fwdConstraint, (m, d))
+def _accelerate(host, m, d):
+    call_c(host.functions.mj_fwdAcceleration, (m, d))
+    call_c(host.functions.mj_fwdConstraint, (m, d))
 
 
 @kernel
-def _add(own, d, s, problem):
+def _add(own, d):
     """Write the acceleration that the change of wrenches adds, and the start of the solver's next run."""
-    host, n = own.host, 3 * own.host.count
-    more, answers = doubles(s.more), doubles(s.answers)
+    host, n, problem, more = own.host, 3 * own.host.count, own.problem, own.scratch.more
     acceleration = doubles(integers(d + host.data.qacc)[0])
     warmstart = doubles(integers(d + host.data.qacc_warmstart)[0])
     for i in range(host.nv):
         more[i] = 0.0
         for r in range(n):
-            change = problem[own.row.wrench + r] - problem[own.row.guess + r]
-            more[i] += answers[(n + 1) * i + r] * change
+            more[i] += own.scratch.answers[(n + 1) * i + r] * (problem.wrench[r] - problem.guess[r])
         warmstart[i] = acceleration[i] + more[i]
 
 
 @kernel
-def _slope(own, patches, s):
-    """Return `move . (w(V, N) - W)` at the twists, loads and wrenches of the host: positive before the root, then
-    negative."""
-    problem, row, n = doubles(s.problem), own.row, 3 * own.host.count
-    _copy(doubles(at(s.problem, row.free_twist)), doubles(at(s.problem, row.twist)), n)
-    _copy(doubles(at(s.problem, row.free_load)), doubles(at(s.problem, row.load)), own.host.count)
-    step_all(patches, arrays_at(patches.row, s.problem))
+def _slope(own, patches):
+    """Return `move . (w(V, N) - W)` at the host's twists, loads and wrenches: positive before the root only."""
+    problem, n = own.problem, 3 * own.host.count
+    _copy(problem.free_twist, problem.twist, n)
+    _copy(problem.free_load, problem.load, own.host.count)
+    step_all(patches, problem)
     total = 0.0
     for i in range(n):
-        gap = problem[row.load + i // 3] * problem[row.unit + i] - problem[row.guess + i]
-        total += doubles(s.move)[i] * gap
+        total += own.scratch.move[i] * (problem.load[i // 3] * problem.unit[i] - problem.guess[i])
     return total
 
 
 @kernel
-def _set_out(own, s):
+def _set_out(own):
     """Keep the way to the solution, and begin the next from there."""
-    problem, row = doubles(s.problem), own.row
+    problem, s = own.problem, own.scratch
     for i in range(3 * own.host.count):
-        doubles(s.start)[i], doubles(s.goal)[i] = problem[row.guess + i], problem[row.wrench + i]
-        doubles(s.move)[i] = problem[row.twist + i] - problem[row.free_twist + i]
+        s.start[i], s.goal[i] = problem.guess[i], problem.wrench[i]
+        s.move[i] = problem.twist[i] - problem.free_twist[i]
 
 
 @kernel
-def _begin(own, s, far):
+def _begin(own, far):
     """Write the next guess: this share of the displacement."""
     for i in range(3 * own.host.count):
-        begin, end = doubles(s.start)[i], doubles(s.goal)[i]
+        begin, end = own.scratch.start[i], own.scratch.goal[i]
         guess = end if far == 1.0 else begin + far * (end - begin)
-        doubles(s.problem)[own.row.guess + i] = guess
-        doubles(s.problem)[own.row.wrench + i] = guess
+        own.problem.guess[i] = guess
+        own.problem.wrench[i] = guess
 
 
 @kernel
-def _solve(own, m, d, u, s, nefc):
+def _solve(own, patches, m, d, nefc):
     """Solve for wrenches that fit the step, into the problem and the passive forces; return iterations and passes."""
-    host, row, sparse, patches = own.host, own.row, is_sparse(own.host, m), read_patches(own.host.patches)
-    problem, n = doubles(s.problem), 3 * own.host.count
+    host, problem, sparse = own.host, own.problem, is_sparse(own.host, m)
     iterations, passes, shortenings, first, far = 0.0, 0, 0, 0.0, 1.0
     while True:
-        respond(own, m, d, s, sparse, nefc)
+        respond(own, m, d, sparse, nefc)
         if passes > 0 and shortenings < SHORTENINGS:
-            here = _slope(own, patches, s)
+            here = _slope(own, patches)
             if here < -DOWNHILL * first:
                 far *= xp.minimum(xp.maximum(first / (first - here), 0.1), 0.7)
                 shortenings += 1
-                _begin(own, s, far)
-                _apply(host, d, u, s, doubles(at(s.problem, row.guess)))
+                _begin(own, far)
+                _apply(own, d, problem.guess)
                 _accelerate(host, m, d)
                 continue
-        call(host.solve, (host.patches, s.problem))
+        call(host.solve, (host.patches, own.scratch.problem))
         passes += 1
-        if problem[row.iterations] < 0.0:
-            _clear(doubles(at(s.problem, row.wrench)), n)
-            _apply(host, d, u, s, doubles(at(s.problem, row.wrench)))
-            return problem[row.iterations], passes
-        iterations += problem[row.iterations]
-        _add(own, d, s, problem)
-        _apply(host, d, u, s, doubles(at(s.problem, row.wrench)))
-        if passes >= PASSES or not leaves_range(host, m, d, s, sparse, nefc):
+        if problem.iterations[0] < 0.0:
+            _clear(problem.wrench, 3 * host.count)
+            _apply(own, d, problem.wrench)
+            return problem.iterations[0], passes
+        iterations += problem.iterations[0]
+        _add(own, d)
+        _apply(own, d, problem.wrench)
+        if passes >= PASSES or not leaves_range(host, m, d, own.scratch, sparse, nefc):
             break
-        _set_out(own, s)
-        first, shortenings, far = _slope(own, patches, s), 0, 1.0
-        _begin(own, s, far)
+        _set_out(own)
+        first, shortenings, far = _slope(own, patches), 0, 1.0
+        _begin(own, far)
         _accelerate(host, m, d)
     return iterations, passes
 
 
 @kernel
-def _forget(host, d, u):
+def _forget(host, kept, d):
     """Clear the memory: no patch is in contact."""
-    memory, k = host.memory, host.count
-    _clear(doubles(at(u, memory.new)), host.states)
-    _clear(doubles(at(u, memory.wrench)), 3 * k)
-    _clear(doubles(at(u, memory.twist)), 3 * k)
-    _clear(doubles(at(u, memory.load)), k)
-    passive = doubles(integers(d + host.data.qfrc_passive)[0])
-    _copy(passive, doubles(at(u, memory.total)), host.nv)
-    words = doubles(u)
-    words[memory.iterations], words[memory.passes], words[memory.residual], words[memory.converged] = 0.0, 0.0, 0.0, 1.0
+    _clear(kept.new, host.states)
+    _clear(kept.wrench, 3 * host.count)
+    _clear(kept.twist, 3 * host.count)
+    _clear(kept.load, host.count)
+    _copy(doubles(integers(d + host.data.qfrc_passive)[0]), kept.total, host.nv)
+    kept.iterations[0], kept.passes[0], kept.residual[0], kept.converged[0] = 0.0, 0.0, 0.0, 1.0
 
 
 @kernel
-def _remember(own, u, s, iterations, passes):
+def _remember(own, iterations, passes):
     """Store the result of the step in the user data."""
-    host, row, memory, words = own.host, own.row, own.host.memory, doubles(u)
-    problem, n, valid = doubles(s.problem), 3 * own.host.count, iterations >= 0.0
-    _copy(doubles(at(s.problem, row.wrench)), doubles(at(u, memory.wrench)), n)
+    host, kept, problem, valid = own.host, own.kept, own.problem, iterations >= 0.0
+    _copy(problem.wrench, kept.wrench, 3 * host.count)
     if valid:
-        _copy(doubles(at(s.problem, row.new)), doubles(at(u, memory.new)), host.states)
-        _copy(doubles(at(s.problem, row.twist)), doubles(at(u, memory.twist)), n)
-        _copy(doubles(at(s.problem, row.load)), doubles(at(u, memory.load)), host.count)
+        _copy(problem.new, kept.new, host.states)
+        _copy(problem.twist, kept.twist, 3 * host.count)
+        _copy(problem.load, kept.load, host.count)
     else:
-        _clear(doubles(at(u, memory.new)), host.states)
-    words[memory.iterations], words[memory.passes] = iterations, passes
-    words[memory.residual], words[memory.converged] = problem[row.residual], problem[row.converged] if valid else 0.0
+        _clear(kept.new, host.states)
+    kept.iterations[0], kept.passes[0] = iterations, passes
+    kept.residual[0], kept.converged[0] = problem.residual[0], problem.converged[0] if valid else 0.0
 
 
 @entry
 def plan(place_of_host, m, d):
     """Add friction to the passive forces of the data d, for the step from where they are."""
     host = read(place_of_host)
-    own = _Own(host, read_patches(host.patches).row)
-    u, nefc = integers(d + host.data.userdata)[0], integers32(d + host.data.nefc)[0]
-    again = _recall(host, d, u)
-    _take_off(host, d, u, again)
-    doubles(u)[host.memory.next] = doubles(d + host.data.time)[0] + doubles(m + host.model.timestep)[0]
+    patches, kept = read_patches(host.patches), arrays_at(host.memory, integers(d + host.data.userdata)[0])
+    nefc, dt = integers32(d + host.data.nefc)[0], doubles(m + host.model.timestep)[0]
+    _take_off(host, kept, d, _recall(host, kept, d))
+    kept.next[0] = doubles(d + host.data.time)[0] + dt
     call_c(host.functions.mj_markStack, (d,))
     s = take(host, d, nefc)
     if place(host, m, d, s, nefc) == 0:
-        _forget(host, d, u)
+        _forget(host, kept, d)
     else:
-        problem, n = doubles(s.problem), 3 * host.count
-        _copy(doubles(host.problem), problem, host.words)
-        problem[own.row.dt] = doubles(m + host.model.timestep)[0]
-        _copy(doubles(at(u, host.memory.state)), doubles(at(s.problem, own.row.state)), host.states)
-        guess = doubles(at(s.problem, own.row.guess))
-        for i in range(n):
-            guess[i] = doubles(u)[host.memory.guess + i] if integers(s.counts)[i // 3] > 0 else 0.0
-        _copy(guess, doubles(at(s.problem, own.row.wrench)), n)
-        _apply(host, d, u, s, guess)
+        problem = arrays_at(patches.row, s.problem)
+        own = _Own(host, problem, s, kept)
+        _copy(doubles(host.problem), s.problem, host.words)
+        problem.dt[0] = dt
+        _copy(kept.state, problem.state, host.states)
+        for i in range(3 * host.count):
+            problem.guess[i] = kept.guess[i] if s.counts[i // 3] > 0 else 0.0
+        _copy(problem.guess, problem.wrench, 3 * host.count)
+        _apply(own, d, problem.guess)
         call_c(host.functions.mj_fwdActuation, (m, d))
         _accelerate(host, m, d)
-        iterations, passes = _solve(own, m, d, u, s, nefc)
-        _remember(own, u, s, iterations, passes)
+        iterations, passes = _solve(own, patches, m, d, nefc)
+        _remember(own, iterations, passes)
     call_c(host.functions.mj_freeStack, (d,))
 
 
