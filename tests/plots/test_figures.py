@@ -588,6 +588,6 @@ def test_a_body_that_is_tiny_beside_its_path_is_drawn_larger_and_says_so():
 def test_the_turn_of_a_round_body_shows():
     angle = np.linspace(0.0, 2.0 * np.pi, 40)[:-1]
     scene = synthetic.scene(outline=0.05 * np.stack([np.cos(angle), np.sin(angle)], -1))
-    lines = motion._body_lines(synthetic.solution(scene))
+    lines = motion.body_lines(synthetic.solution(scene))
     assert len(lines) == 2 and lines[1] == pytest.approx(np.array([[0.0, 0.0], [0.05, 0.0]]))
-    assert len(motion._body_lines(synthetic.solution())) == 1
+    assert len(motion.body_lines(synthetic.solution())) == 1

@@ -31,7 +31,7 @@ def identify(
     steady: bool,
     model: str,
     nuisance: str | None,
-    **search: int,
+    **search: Any,
 ) -> int:
     """Estimate the parameters from the logs, print them, and write JSON and picture into `out`; options as typed."""
     from planarfriction.identify import FitOptions, Log, identify_lugre

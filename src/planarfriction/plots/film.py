@@ -10,11 +10,10 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch, Patch
 from matplotlib.patheffects import withStroke
-from matplotlib.transforms import Affine2D
 
 from planarfriction import geometry
 from planarfriction.plots import style
-from planarfriction.plots.motion import _body_lines, _placed
+from planarfriction.plots.motion import body_lines, move, placed
 from planarfriction.plots.panels import (
     SLIP,
     STICK,
@@ -97,13 +96,13 @@ class Film:
         track = self.track
         pose, (x, y) = track.poses[frame], self.views[frame]
         self.axes.set(xlim=x, ylim=y)
-        _put(self.body, pose, self.axes)
+        move(self.body, self.axes, pose)
         self.path.set_data(*(1e3 * track.poses[: frame + 1, :2].T))
         for each, cells, arrow in self.contacts:
             colour_cells(cells, each, frame)
-            _put([cells], each.poses[frame], self.axes)
+            move([cells], self.axes, each.poses[frame])
             _, centre = each.shape(frame)
-            start = 1e3 * _placed(centre, each.poses[frame])
+            start = 1e3 * placed(centre, each.poses[frame])
             arrow.set_positions(start, start + self.millimetres_per_newton * each.forces[frame])
         put_centre(self.centre, track.twists[frame], pose[:2], still=self.still)
         self.clock.set_text(f"t = {track.times[frame]:.{self.digits}f} s{self.pace}")
@@ -113,7 +112,7 @@ class Film:
 
     def _draw_body(self, solution: Solution) -> None:
         axes, track = self.axes, self.track
-        lines = [Line2D(*(1e3 * each.T), color="0.25", linewidth=1.5, zorder=5) for each in _body_lines(solution)]
+        lines = [Line2D(*(1e3 * each.T), color="0.25", linewidth=1.5, zorder=5) for each in body_lines(solution)]
         self.body = [axes.add_artist(each) for each in lines]
         (self.path,) = axes.plot([], [], color="0.45", linewidth=0.9, zorder=5)
         self.contacts = []
@@ -176,26 +175,19 @@ def _places(contacts: int) -> tuple[tuple, list[tuple]]:
     return (0.072, 0.145, 0.43, 0.745), places
 
 
-def _put(artists: list[Any], pose: np.ndarray, axes: Any) -> None:
-    """Put the frame of the artists at `pose` (x, y, angle) [m, m, rad] in the plane of the axes [mm]."""
-    transform = Affine2D().rotate(pose[2]).translate(*(1e3 * pose[:2])) + axes.transData
-    for artist in artists:
-        artist.set_transform(transform)
-
-
 def _views(solution: Solution, track: Track, follow: bool) -> np.ndarray:
     """Return the limits of both axes `[F, 2, 2]` [mm]: of all that is drawn, or of a window that follows the body.
 
     A window follows where the motion is much longer than the body; it stays within the limits of the whole.
     """
-    own = np.concatenate(_body_lines(solution))
+    own = np.concatenate(body_lines(solution))
     of_body, of_world = [own], []
     for each in track.contacts:
         points = _rim(cell_polygons(each.contact.model.patch).reshape(-1, 2))
         if each.contact.mounted_on == "body":
-            of_body.append(_placed(points, np.array([*each.contact.position, each.contact.angle])))
+            of_body.append(placed(points, np.array([*each.contact.position, each.contact.angle])))
         else:
-            of_world += [_placed(points, pose) for pose in np.unique(each.poses, axis=0)]
+            of_world += [placed(points, pose) for pose in np.unique(each.poses, axis=0)]
     carried = np.concatenate(of_body)
     radius = float(np.hypot(*carried.T).max()) or 1e-3
     turned = geometry.rotate(carried[None], track.poses[:, None, 2]) + track.poses[:, None, :2]

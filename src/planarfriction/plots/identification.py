@@ -72,17 +72,12 @@ def _draw_channel(left: Any, right: Any, result: Identification, i: int, places:
     name, unit = result.channels[i]
     shown = style.unit_for(KINDS[unit], *(np.nan_to_num(each["measured"][:, i]) for each in result.histories))
     for number, (each, time) in enumerate(zip(result.histories, places, strict=True)):
-        label = number == 0
-        left.plot(
-            time, shown.factor * each["measured"][:, i], color="0.6", linewidth=2.2, label="measured" if label else None
-        )
-        left.plot(
-            time,
-            shown.factor * each["predicted"][:, i],
-            color=style.PALETTE[0],
-            linewidth=0.9,
-            label="fitted" if label else None,
-        )
+        for key, words, colour, width in (
+            ("measured", "measured", "0.6", 2.2),
+            ("predicted", "fitted", style.PALETTE[0], 0.9),
+        ):
+            label = words if number == 0 else None
+            left.plot(time, shown.factor * each[key][:, i], color=colour, linewidth=width, label=label)
         off = (each["measured"][:, i] - each["predicted"][:, i]) / result.noise[i]
         every = max(1, len(time) // MOST_POINTS)
         right.plot(time[::every], off[::every], ".", color=style.PALETTE[0], markersize=1.5)

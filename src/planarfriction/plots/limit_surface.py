@@ -50,12 +50,10 @@ def plot_limit_surface(surface: Any, *, beside: Any = "ellipsoid") -> style.Plot
 
     Raises InvalidValueError unless both are limit surfaces.
     """
-    shown = _with_names(surface, beside)
-    scaled = [scaled_samples(each, *even_mesh(each)) for each, _ in shown]
-    limit = 1.05 * max(float(np.abs(mesh).max()) for _, mesh in scaled)
-    figure = style.new_figure(4.4 * len(shown), 4.3)
-    for column, ((directions, mesh), (_, name)) in enumerate(zip(scaled, shown, strict=True)):
-        axes = figure.add_subplot(1, len(shown), column + 1, projection="3d")
+    names, scaled, limit = _sampled(surface, beside)
+    figure = style.new_figure(4.4 * len(names), 4.3)
+    for column, (name, (directions, mesh)) in enumerate(zip(names, scaled, strict=True)):
+        axes = figure.add_subplot(1, len(names), column + 1, projection="3d")
         draw_surface(axes, mesh, directions, limit)
         axes.set_title(name, fontsize="medium")
     return figure
@@ -69,17 +67,13 @@ def interactive_limit_surface(surface: Any, *, beside: Any = "ellipsoid") -> Any
 
     Raises MissingExtraError without plotly, the extra `[plotly]`, and InvalidValueError unless both are limit surfaces.
     """
-    shown = _with_names(surface, beside)
+    names, scaled, limit = _sampled(surface, beside)
     try:
         from plotly import graph_objects as go
         from plotly.subplots import make_subplots
     except ImportError:
         raise MissingExtraError("plotly", "plotly") from None
-    figure = make_subplots(
-        cols=len(shown), specs=[[{"type": "scene"}] * len(shown)], subplot_titles=[name for _, name in shown]
-    )
-    scaled = [scaled_samples(each, *even_mesh(each)) for each, _ in shown]
-    limit = 1.05 * max(float(np.abs(mesh).max()) for _, mesh in scaled)
+    figure = make_subplots(cols=len(names), specs=[[{"type": "scene"}] * len(names)], subplot_titles=names)
     for column, (directions, mesh) in enumerate(scaled):
         drawn = go.Surface(
             **dict(zip("xyz", np.moveaxis(mesh, -1, 0), strict=True)),
@@ -100,18 +94,19 @@ def interactive_limit_surface(surface: Any, *, beside: Any = "ellipsoid") -> Any
     return figure
 
 
-def _with_names(surface: Any, beside: Any) -> list[tuple[Any, str]]:
-    """Return the surfaces to draw, with their titles."""
+def _sampled(surface: Any, beside: Any) -> tuple[list[str], list[tuple[np.ndarray, np.ndarray]], float]:
+    """Return titles and `scaled_samples` of the surfaces to draw, and the limit of the axes."""
     from planarfriction.limit_surface import LimitSurface, LimitSurfaceEllipsoid
 
     validation.instance("surface", surface, LimitSurface, "a limit surface")
-    shown = [(surface, f"{surface.patch.name}: {_kind(surface)}")]
-    if beside is None:
-        return shown
-    if isinstance(beside, str) and beside == "ellipsoid":
-        beside = LimitSurfaceEllipsoid(surface.patch, normal_force=surface.normal_force)
-    validation.instance("beside", beside, LimitSurface, 'a limit surface, "ellipsoid" or None')
-    return [*shown, (beside, _kind(beside))]
+    shown = {f"{surface.patch.name}: {_kind(surface)}": surface}
+    if beside is not None:
+        if isinstance(beside, str) and beside == "ellipsoid":
+            beside = LimitSurfaceEllipsoid(surface.patch, normal_force=surface.normal_force)
+        validation.instance("beside", beside, LimitSurface, 'a limit surface, "ellipsoid" or None')
+        shown[_kind(beside)] = beside
+    scaled = [scaled_samples(each, *even_mesh(each)) for each in shown.values()]
+    return [*shown], scaled, 1.05 * max(float(np.abs(mesh).max()) for _, mesh in scaled)
 
 
 def even_mesh(surface: Any) -> tuple[np.ndarray, np.ndarray]:

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from matplotlib.artist import Artist
-from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 from matplotlib.lines import Line2D
 from matplotlib.patches import PathPatch
@@ -16,7 +15,7 @@ from matplotlib.transforms import Affine2D
 from planarfriction import geometry, validation
 from planarfriction.plots import style
 from planarfriction.plots.patch import cell_boxes
-from planarfriction.plots.track import contact_poses
+from planarfriction.plots.track import body_poses, contact_poses
 
 if TYPE_CHECKING:
     from planarfriction.scenes import Contact, Solution
@@ -78,7 +77,7 @@ def _strobe(solution: Solution) -> _Strobe:
     from planarfriction.scenes import Solution
 
     validation.instance("solution", solution, Solution, "a Solution")
-    time, poses = np.asarray(solution.data["time"], dtype=float), _poses(solution)
+    time, poses = np.asarray(solution.data["time"], dtype=float), body_poses(solution)
     chosen = np.unique(np.linspace(0, len(time) - 1, min(INSTANTS, len(time))).round().astype(int))
     limits = _limits(solution, time[chosen], poses[chosen], 1.0)
     side, size = 1e-3 * float(np.diff(limits, axis=-1).max()), 2.0 * _reach(solution)
@@ -91,25 +90,31 @@ def _strobe(solution: Solution) -> _Strobe:
 
 def _draw(figure: Any, strobe: _Strobe) -> None:
     solution, times = strobe.solution, strobe.times
-    axes = figure.subplots()
+    axes, pads = figure.subplots(), [each for each in solution.scene.contacts if each.mounted_on == "world"]
     scale = Normalize(times[0], times[-1] if times[-1] > times[0] else times[0] + 1.0)
     for time, pose in zip(times, strobe.poses, strict=True):
         colour = style.TIME_COLOURS(scale(time))
-        _move(_draw_mount(axes, solution, "body", colour), axes, pose, strobe.larger)
-        for contact in _driven(solution):
-            _move(
-                _draw_shape(axes, _pad_shape(contact), colour), axes, contact_poses(contact, np.array([time]), pose)[0]
-            )
-    _draw_mount(axes, solution, "world", style.PAD_COLOUR)
-    _finish(axes, strobe.limits)
+        shapes = [_on_mount(each) for each in solution.scene.contacts if each.mounted_on == "body"]
+        lines = [Line2D(*(1e3 * line.T), color=colour, linewidth=1.3, zorder=3) for line in body_lines(solution)]
+        move([_draw_shape(axes, each, colour) for each in shapes], axes, pose, strobe.larger)
+        move([axes.add_artist(line) for line in lines], axes, pose, strobe.larger)
+        for contact in (each for each in pads if each.support_velocity is not None):
+            at = contact_poses(contact, np.array([time]), pose)[0]
+            move([_draw_shape(axes, _pad_shape(contact), colour)], axes, at)
+    for contact in (each for each in pads if each.support_velocity is None):
+        _draw_shape(axes, _on_mount(contact), style.PAD_COLOUR)
+    style.show_lengths(axes, 1e-3 * float(np.abs(strobe.limits).max()))
+    axes.locator_params(nbins=7)
+    axes.update_datalim(strobe.limits.T)
+    axes.margins(0.0)
+    axes.set_aspect("equal", adjustable="datalim")  # narrow motions fill the panel too
+    style.tidy(axes)
     axes.plot(*(1e3 * strobe.path[:, :2].T), color="0.3", linewidth=0.9, zorder=4)
     dots = {"s": 14, "edgecolor": "white", "linewidth": 0.5, "zorder": 5}
     axes.scatter(*(1e3 * strobe.poses[:, :2].T), color=style.TIME_COLOURS(scale(times)), **dots)
     axes.set_title(_remark(strobe), fontsize="small", loc="left")
     if times[-1] > times[0]:
-        clock = style.unit_for("time", times)
-        shown = Normalize(clock.factor * times[0], clock.factor * times[-1])
-        figure.colorbar(ScalarMappable(shown, style.TIME_COLOURS), ax=axes, label=f"time [{clock.label}]", aspect=30)
+        style.show_times(axes, times)
 
 
 def _remark(strobe: _Strobe) -> str:
@@ -130,56 +135,33 @@ def _remark(strobe: _Strobe) -> str:
 
 def _reach(solution: Solution) -> float:
     """Return the largest distance of the body's lines from its centre of mass [m]."""
-    return float(np.hypot(*np.concatenate(_body_lines(solution)).T).max()) or 1e-3
+    return float(np.hypot(*np.concatenate(body_lines(solution)).T).max()) or 1e-3
 
 
-def _poses(solution: Solution) -> np.ndarray:
-    """Return the pose (x, y, theta) of the body over time, `[T, 3]` [m, m, rad]."""
-    return np.stack([np.asarray(solution.data[name], dtype=float) for name in ("x", "y", "theta")], -1)
-
-
-def _placed(points: np.ndarray, pose: np.ndarray) -> np.ndarray:
+def placed(points: np.ndarray, pose: np.ndarray) -> np.ndarray:
     """Return the points `[..., 2]` [m] of a frame at `pose` (x, y, angle), seen from the frame that the pose is in."""
     return pose[:2] + geometry.rotate(points, pose[2])
 
 
-def _draw_mount(axes: Any, solution: Solution, mounted_on: str, colour: Any) -> list[Artist]:
-    """Draw what belongs to the body or stands in the world, its frame on that of the axes [mm]; returns the artists."""
-    moving = _driven(solution)
-    here = [each for each in solution.scene.contacts if each.mounted_on == mounted_on and each not in moving]
-    artists = [artist for contact in here for artist in _draw_shape(axes, _on_mount(contact), colour)]
-    if mounted_on == "body":
-        lines = [Line2D(*(1e3 * line.T), color=colour, linewidth=1.3, zorder=3) for line in _body_lines(solution)]
-        artists += [axes.add_artist(line) for line in lines]
-    return artists
-
-
-def _draw_shape(axes: Any, shape: np.ndarray, colour: Any) -> list[Artist]:
-    """Draw boxes `[N, 4, 2]` or points `[N, 2]` [m] in the frame of the axes [mm]; returns the artists."""
+def _draw_shape(axes: Any, shape: np.ndarray, colour: Any) -> Artist:
+    """Draw boxes `[N, 4, 2]` or points `[N, 2]` [m] in the frame of the axes [mm]; return the artist."""
     shape = 1e3 * shape
     if shape.ndim == 3:
-        drawn: Artist = PathPatch(_one_path(shape), facecolor=colour, edgecolor="none", alpha=PAD_OPACITY, zorder=2)
-    else:
-        look = {"marker": "o", "markersize": 4.5, "markeredgewidth": 0.0, "linestyle": "none"}
-        drawn = Line2D(*shape.T, **look, color=colour, alpha=0.8, zorder=2)
-    return [axes.add_artist(drawn)]
+        return axes.add_artist(
+            PathPatch(_one_path(shape), facecolor=colour, edgecolor="none", alpha=PAD_OPACITY, zorder=2)
+        )
+    look = {"marker": "o", "markersize": 4.5, "markeredgewidth": 0.0, "linestyle": "none"}
+    return axes.add_artist(Line2D(*shape.T, **look, color=colour, alpha=0.8, zorder=2))
 
 
-def _driven(solution: Solution) -> list[Contact]:
-    """Return the contacts whose frame is carried by something that moves as prescribed."""
-    return [
-        each for each in solution.scene.contacts if each.mounted_on == "world" and each.support_velocity is not None
-    ]
-
-
-def _move(artists: list[Artist], axes: Any, pose: np.ndarray, larger: float = 1.0) -> None:
+def move(artists: list[Artist], axes: Any, pose: np.ndarray, larger: float = 1.0) -> None:
     """Put the frame of the artists at `pose` (x, y, angle) [m, m, rad] in the plane of the axes, `larger` times."""
     transform = Affine2D().scale(larger).rotate(pose[2]).translate(*(1e3 * pose[:2])) + axes.transData
     for artist in artists:
         artist.set_transform(transform)
 
 
-def _body_lines(solution: Solution) -> list[np.ndarray]:
+def body_lines(solution: Solution) -> list[np.ndarray]:
     """Return lines `[M, 2]` [m] that stand for the body, in its frame: the outline, or the rim of the patches on it.
 
     Where its turn would not show, on a round outline and without any, also a line along its x axis.
@@ -191,9 +173,8 @@ def _body_lines(solution: Solution) -> list[np.ndarray]:
         round_one = len(outline) >= CORNERS and np.ptp(radii) <= ROUND * radii.max()
         arm = [np.array([(0.0, 0.0), (radii.max(), 0.0)])] if round_one else []
         return [np.concatenate([outline, outline[:1]]), *arm]
-    contacts = [each for each in solution.scene.contacts if each not in _driven(solution)]
-    arm = max(float(np.abs(_pad_shape(contact).reshape(-1, 2)).max()) for contact in solution.scene.contacts)
-    on_body = [_on_mount(each).reshape(-1, 2) for each in contacts if each.mounted_on == "body"]
+    arm = max(float(np.abs(_pad_shape(contact)).max()) for contact in solution.scene.contacts)
+    on_body = [_on_mount(each).reshape(-1, 2) for each in solution.scene.contacts if each.mounted_on == "body"]
     return [*_rim(on_body), np.array([(0.0, 0.0), (arm, 0.0)])]
 
 
@@ -224,31 +205,19 @@ def _one_path(boxes: np.ndarray) -> Outline:
 
 def _on_mount(contact: Contact) -> np.ndarray:
     """Return the patch of a contact in the frame that it is mounted on (world or body) [m]."""
-    return _placed(_pad_shape(contact), np.array([*contact.position, contact.angle], dtype=float))
+    return placed(_pad_shape(contact), np.array([*contact.position, contact.angle], dtype=float))
 
 
 def _limits(solution: Solution, times: np.ndarray, poses: np.ndarray, larger: float) -> np.ndarray:
     """Return the limits of both axes, `[2, 2]` [mm], that hold all drawn at `times` and `poses`, the body `larger`."""
-    points = [_placed(larger * line, pose) for pose in poses for line in _body_lines(solution)]
-    moving = _driven(solution)
-    for contact in moving:
-        shape = _pad_shape(contact).reshape(-1, 2)
-        points += [_placed(shape, pose) for pose in contact_poses(contact, times, poses)]
+    points = [placed(larger * line, pose) for pose in poses for line in body_lines(solution)]
     for contact in solution.scene.contacts:
-        if contact in moving:
-            continue
-        shape = _on_mount(contact).reshape(-1, 2)
-        points += [shape] if contact.mounted_on == "world" else [_placed(larger * shape, pose) for pose in poses]
+        if contact.mounted_on == "body":
+            points += [placed(larger * _on_mount(contact).reshape(-1, 2), pose) for pose in poses]
+        else:
+            shape = _pad_shape(contact).reshape(-1, 2)
+            points += [placed(shape, pose) for pose in contact_poses(contact, times, poses)]
     everything = 1e3 * np.concatenate(points)
     low, high = everything.min(axis=0), everything.max(axis=0)
     margin = 0.04 * float((high - low).max())
     return np.stack([low - margin, high + margin], -1)
-
-
-def _finish(axes: Any, limits: np.ndarray) -> None:
-    style.show_lengths(axes, 1e-3 * float(np.abs(limits).max()))
-    axes.locator_params(nbins=7)
-    axes.update_datalim(limits.T)
-    axes.margins(0.0)
-    axes.set_aspect("equal", adjustable="datalim")  # narrow motions fill the panel too
-    style.tidy(axes)

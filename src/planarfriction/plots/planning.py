@@ -8,6 +8,7 @@ import numpy as np
 
 from planarfriction.planning.motions import slide_of
 from planarfriction.plots import style
+from planarfriction.plots.track import body_poses
 from planarfriction.scenes import Solution, simulate
 
 if TYPE_CHECKING:
@@ -54,5 +55,4 @@ def plot_grip(plan: GripPlan) -> style.PlotFigure:
 
 def _slide(plan: GripPlan, solution: Solution) -> np.ndarray:
     """Return the distance of the place that was under the grip from where it was `[T]` [m]."""
-    pose = np.stack([np.asarray(solution.histories[name].values) for name in ("x", "y", "theta")], axis=-1)
-    return np.hypot(*slide_of(plan.scene, solution.contact_index(plan.contact), pose).T)
+    return np.hypot(*slide_of(plan.scene, solution.contact_index(plan.contact), body_poses(solution)).T)

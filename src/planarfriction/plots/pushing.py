@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.cm import ScalarMappable
 from matplotlib.colors import Normalize
 
 from planarfriction import geometry
 from planarfriction.plots import style
-from planarfriction.plots.style import TIME_COLOURS
 
 if TYPE_CHECKING:
     from planarfriction.planning import Push
@@ -36,7 +34,7 @@ def draw_push(axes: Any, push: Push) -> None:
     closed = np.concatenate([push.slider.outline, push.slider.outline[:1]])
     for k in chosen:
         corners = push.pose[k, :2] + geometry.rotate(closed, push.pose[k, 2])
-        axes.plot(*(1e3 * corners.T), color=TIME_COLOURS(scale(push.time[k])), linewidth=1.3, zorder=3)
+        axes.plot(*(1e3 * corners.T), color=style.TIME_COLOURS(scale(push.time[k])), linewidth=1.3, zorder=3)
         if push.pusher.width > 0.0:
             face = push.pusher_pose[k, :2] + geometry.rotate(push.pusher.ends, push.pusher_pose[k, 2])
             axes.plot(*(1e3 * face.T), color="0.3", linewidth=2.0, zorder=4)
@@ -46,10 +44,7 @@ def draw_push(axes: Any, push: Push) -> None:
         if here.any():
             dots = {"s": 9, "zorder": 5, "color": "0.75" if mode == "free" else style.PALETTE[i]}
             axes.scatter(*(1e3 * push.pusher_pose[here, :2].T), label=f"pusher: {mode}", **dots)
-    clock = style.unit_for("time", push.time)
-    shown = Normalize(clock.factor * push.time[0], clock.factor * push.time[-1])
-    bar = axes.figure.colorbar(ScalarMappable(shown, TIME_COLOURS), ax=axes, aspect=30)
-    bar.set_label(f"time [{clock.label}]")
+    style.show_times(axes, push.time)
     style.show_lengths(axes, float(np.abs(push.pose[:, :2]).max()))
     axes.set_aspect("equal", adjustable="datalim")
     axes.legend(fontsize="small")

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib import colormaps
-from matplotlib.colors import ListedColormap
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import ListedColormap, Normalize
 from matplotlib.figure import Figure
 
 from planarfriction.families import MODELS
@@ -137,6 +138,13 @@ def show_lengths(axes: Any, largest: float) -> None:
     for name, axis in (("x", axes.xaxis), ("y", axes.yaxis)):
         axis.set_label_text(f"{name} [{unit.label}]")
         axis.set_major_formatter(lambda value, _: f"{1e-3 * unit.factor * value:.10g}".replace("-", "\N{MINUS SIGN}"))
+
+
+def show_times(axes: Any, times: Any) -> None:
+    """Add the colour bar of `TIME_COLOURS` from the first to the last of `times` [s]."""
+    clock = unit_for("time", times)
+    shown = ScalarMappable(Normalize(clock.factor * times[0], clock.factor * times[-1]), TIME_COLOURS)
+    axes.figure.colorbar(shown, ax=axes, label=f"time [{clock.label}]", aspect=30)
 
 
 def wrapped(text: str, width: int) -> str:

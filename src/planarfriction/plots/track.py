@@ -136,10 +136,15 @@ def _displacements(contact: Contact, times: np.ndarray, poses: np.ndarray, at: n
     return geometry.rotate(moved, -middle[:, 2])
 
 
+def body_poses(solution: Solution) -> np.ndarray:
+    """Return the pose (x, y, theta) of the body at all samples, `[T, 3]` [m, m, rad]."""
+    return np.stack([np.asarray(solution.histories[name].values, dtype=float) for name in ("x", "y", "theta")], -1)
+
+
 def _poses(solution: Solution, sampled: np.ndarray, times: np.ndarray) -> np.ndarray:
     from scipy.interpolate import PchipInterpolator
 
-    poses = np.stack([np.asarray(solution.histories[name].values, dtype=float) for name in ("x", "y", "theta")], -1)
+    poses = body_poses(solution)
     if len(sampled) == 1:
         return np.broadcast_to(poses, (len(times), 3))
     return PchipInterpolator(sampled, poses, axis=0)(np.clip(times, sampled[0], sampled[-1]))

@@ -24,7 +24,7 @@ class SceneMotion(NamedTuple):
     """Wrench of one of the identical contacts `[..., M, C, 3]` [N, N, N m]."""
 
 
-def simulator(xp: Any, call: Callable[..., tuple[Any, Any]]) -> Callable[..., SceneMotion]:
+def simulator(xp: Any, call: Callable[..., Sequence[Any]]) -> Callable[..., SceneMotion]:
     """Return `simulate_scene` of a front end, whose `call(function, numbers)` returns motion and wrenches."""
 
     def simulate_scene(

@@ -18,7 +18,6 @@ from planarfriction import models
 from planarfriction.adapters.mjx import newton, responses
 from planarfriction.adapters.mjx.geometry import PatchPlaces, geometry, places
 from planarfriction.adapters.mujoco.friction import Report
-from planarfriction.adapters.mujoco.loops.records import Memory
 from planarfriction.adapters.mujoco.patches import PatchContact, Placed, check_once, memory
 from planarfriction.coupling import ITERATIONS, TOLERANCE
 from planarfriction.errors import InvalidValueError
@@ -62,7 +61,7 @@ class _Fixed:
     shapes: tuple[tuple[int, ...], ...]
     """Shapes of the states."""
     radius: np.ndarray
-    memory: Memory
+    memory: Any
     """Places of the memory of the patches in `userdata`."""
     nuserdata: int
 

@@ -50,7 +50,7 @@ class PatchContact(Checked):
         validation.choice("centre", self.centre, CENTRES)
 
 
-def memory(patches: Sequence[PatchContact], nv: int, nuserdata: int) -> Memory:
+def memory(patches: Sequence[PatchContact], nv: int, nuserdata: int) -> Any:
     """Return the places of what patches remember in the user data, at their end; raise where there is no room."""
     layout = _layout(patches, nv)
     if nuserdata < layout.size:
