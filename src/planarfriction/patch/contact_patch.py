@@ -177,13 +177,7 @@ class ContactPatch(Moments):
 
     @classmethod
     def line(
-        cls,
-        length: float,
-        cells: int = 21,
-        *,
-        direction: str = "y",
-        profile: Any = None,
-        name: str = "line",
+        cls, length: float, cells: int = 21, *, direction: str = "y", profile: Any = None, name: str = "line"
     ) -> ContactPatch:
         """Return a line of `length` [m] along `direction` ("y" or "x") through the origin, one cell wide.
 

@@ -118,13 +118,7 @@ def _lines(runs: Mapping[str, xr.Dataset], get: Callable) -> list[_Line]:
 
 
 def _draw_panel(
-    axes: Any,
-    title: str,
-    kind: str,
-    lines: list[_Line],
-    alike: list[np.ndarray],
-    clock: style.Unit,
-    colours: list[Any],
+    axes: Any, title: str, kind: str, lines: list[_Line], alike: list[np.ndarray], clock: style.Unit, colours: list[Any]
 ) -> None:
     """Draw one panel; `alike` are the values of all panels of its kind in this column, which share their unit."""
     unit = style.unit_for(kind, *alike)

@@ -171,11 +171,7 @@ def simulate(model: ReducedPlanarLuGre, v_profile: Tensor, f_n: Tensor | float, 
 
 
 def tracking_loss(
-    model: ReducedPlanarLuGre,
-    v_profile: Tensor,
-    reference: Tensor,
-    f_n: Tensor | float,
-    dt: Tensor | float = 1e-4,
+    model: ReducedPlanarLuGre, v_profile: Tensor, reference: Tensor, f_n: Tensor | float, dt: Tensor | float = 1e-4
 ) -> Tensor:
     """Return the mean squared error of `simulate` against wrenches `[T, 3]`, relative to the load.
 

@@ -11,12 +11,7 @@ import numpy as np
 from pydrake.common.value import AbstractValue  # pyright: ignore[reportMissingModuleSource]
 from pydrake.geometry import SceneGraph
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.systems.framework import (
-    DiagramBuilder,
-    LeafSystem,
-    PortDataType,
-    ValueProducer,
-)
+from pydrake.systems.framework import DiagramBuilder, LeafSystem, PortDataType, ValueProducer
 from pydrake.systems.primitives import ConstantValueSource, ConstantVectorSource
 
 from planarfriction import validation
