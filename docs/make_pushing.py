@@ -9,7 +9,7 @@ import numpy as np
 
 import planarfriction as pf
 from planarfriction.plots import style
-from planarfriction.plots.pushing import draw_push
+from planarfriction.plots.planning import draw_push
 from planarfriction_studies.measured import replayed_pushes
 from planarfriction_studies.measured.scores import drawings, interval, mean
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copyreg
 import pickle
 import reprlib
 from typing import Any
@@ -40,7 +41,7 @@ class _Travels:
     def __reduce__(self) -> tuple[Any, ...]:
         # By default an error is restored from its message alone, which these constructors do not take.
         kept = {name: value if _can_travel(value) else None for name, value in self.__dict__.items()}
-        return _restored, (type(self), self.args, kept)  # pyright: ignore[reportAttributeAccessIssue]
+        return copyreg.__newobj__, (type(self), *self.args), kept  # pyright: ignore[reportAttributeAccessIssue]
 
 
 def _can_travel(value: Any) -> bool:
@@ -49,12 +50,6 @@ def _can_travel(value: Any) -> bool:
     except Exception:  # a lambda, an open file: its own pickling may fail with anything
         return False
     return True
-
-
-def _restored(kind: type[BaseException], arguments: tuple[Any, ...], attributes: dict[str, Any]) -> BaseException:
-    error = kind.__new__(kind, *arguments)
-    error.__dict__.update(attributes)
-    return error
 
 
 class FrictionError(_Travels, Exception):

@@ -9,12 +9,12 @@ PICTURES = {
     "patch": "patch:plot_patch",
     "patch in a notebook": "notebook:patch_html",
     "limit surface in a notebook": "notebook:surface_html",
-    "solution": "solution:plot_solution",
+    "solution": "motion:plot_solution",
     "solution in a notebook": "notebook:solution_html",
     "animation": "animation:animate_solution",
     "identification": "identification:plot_identification",
     "grip": "planning:plot_grip",
-    "push": "pushing:plot_push",
+    "push": "planning:plot_push",
 }
 """Functions that draw a record, by the name of the picture: `module:function` within `planarfriction.plots`."""
 

@@ -7,19 +7,19 @@ import functools
 import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from planarfriction import validation
 from planarfriction.cli import INTERRUPTED, output
 from planarfriction.cli.console import note, print_table, simulation_progress
-from planarfriction.cli.patches import find_patch
+from planarfriction.cli.patches import WIDTH, find_patch
 from planarfriction.cli.report import comparison
-from planarfriction.cli.usual import published_law, usual
 from planarfriction.errors import InvalidValueError, SimulationInterrupted, SolverError
 from planarfriction.families import MODELS, SCENES
 from planarfriction.writing import make_folder
 
 if TYPE_CHECKING:
+    from planarfriction.laws import LuGre
     from planarfriction.patch import ContactPatch
     from planarfriction.scenes import Scene, Solution
 
@@ -28,6 +28,54 @@ SLIDE_SAMPLING = 1e-3
 
 BOTH = ("distributed", "reduced")
 """Models that "both" stands for."""
+
+
+class Usual(NamedTuple):
+    """Patch and law of a ready scene."""
+
+    width: float = WIDTH
+    """Width of a patch given by its name [m]."""
+    patch: Callable[[], ContactPatch] | None = None
+    """Makes the patch; None for a disc."""
+    law: Callable[[], LuGre] | None = None
+    """Makes the law; None for the published one."""
+
+
+def published_law() -> LuGre:
+    """Return the law of the published experiments."""
+    from planarfriction.laws import ElastoPlastic, LuGre
+
+    return LuGre(mu_s=1.2, elasto_plastic=ElastoPlastic(0.9))
+
+
+def _fingertip() -> ContactPatch:
+    """Make a soft finger on a disc that it fills at 8 N: Hertz contact, of radius 6 mm at 1 N."""
+    from planarfriction.patch import ContactPatch, SoftFinger
+
+    return ContactPatch.disc(0.012, pressure=SoftFinger(c=0.006, n=1 / 3, k=2.0, radius_max=0.012))
+
+
+def _running_band() -> ContactPatch:
+    """Make the ring that a curling stone stands on, 6 mm wide and 123 mm across."""
+    from planarfriction.patch import ContactPatch
+
+    return ContactPatch.ring(0.0585, 0.0645)
+
+
+def _ice() -> LuGre:
+    """Return the law of granite on pebbled ice: bristles of 0.1 um, no viscous friction, which is for centimetres/s."""
+    from planarfriction.laws import LuGre
+
+    return LuGre(mu_c=0.01, sigma_0=1e5, sigma_1=10.0, sigma_2=0.0)
+
+
+_USUAL = {
+    "drift": Usual(width=0.05),  # as published
+    "pivot": Usual(width=0.024, patch=_fingertip),
+    "foot": Usual(width=0.06),
+    "curling": Usual(width=0.13, patch=_running_band, law=_ice),
+}
+"""Patches and laws of ready scenes that have not those of most."""
 
 
 def build_scenes(
@@ -55,7 +103,7 @@ def scene_makers(
     if Path(name).suffix.lower() in (".toml", ".json"):
         return _makers_from_file(name, kinds, _parts(parts), patch, cell_size)
     validation.choice("scene", name, [*SCENES, "a scene file (.toml, .json)"])
-    of_scene = usual(name)
+    of_scene = _USUAL.get(name, Usual())
     if patch is None and cell_size is None and of_scene.patch is not None:
         contact_patch = of_scene.patch()
     else:

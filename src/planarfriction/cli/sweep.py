@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from planarfriction.cli.options import FILE, complete_scene, patch_option
+from planarfriction.cli.options import FILE, complete_scene, load_function, patch_option
 from planarfriction.families import SCENES
 
 if TYPE_CHECKING:
@@ -56,7 +56,6 @@ def sweep(
     from planarfriction import sweeps, validation
     from planarfriction.cli import INTERRUPTED
     from planarfriction.cli.console import count_progress, note
-    from planarfriction.cli.own_function import load_function
     from planarfriction.cli.run import scene_makers
     from planarfriction.errors import FrictionError, SweepInterrupted
     from planarfriction.families import MODELS

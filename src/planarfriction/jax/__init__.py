@@ -16,8 +16,7 @@ from planarfriction.derivatives import Rollout
 from planarfriction.jax.distributed import DistributedModel, LawParameters
 from planarfriction.jax.published import PublishedParameters, ReducedModelPublished, Surface
 from planarfriction.jax.reduced import ReducedModel, ReducedParameters
-from planarfriction.jax.rollouts import rate, rest, rollout, step, wrench
-from planarfriction.jax.scene import simulate_scene
+from planarfriction.jax.rollouts import rate, rest, rollout, simulate_scene, step, wrench
 from planarfriction.tensors.scenes import SceneMotion
 
 __all__ = [

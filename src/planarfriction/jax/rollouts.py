@@ -11,7 +11,10 @@ from planarfriction.derivatives import Rollout
 from planarfriction.errors import InvalidValueError
 from planarfriction.jax import adjoint
 from planarfriction.jax.base import FrictionPytree
+from planarfriction.jax.callbacks import HostScene
+from planarfriction.jax.namespace import xp
 from planarfriction.tensors.inputs import rollout_inputs
+from planarfriction.tensors.scenes import simulator
 
 
 def rest(model: FrictionPytree) -> jax.Array:
@@ -74,3 +77,6 @@ def rollout(
     if method == "adjoint" or (method is None and known and jax.default_backend() == "cpu"):
         return Rollout(*adjoint.rollout(model, state, twist, load, dt, strict=method == "adjoint"))
     return Rollout(*model.rollout(state, twist, load, dt))
+
+
+simulate_scene = simulator(xp, lambda function, numbers: adjoint.call(HostScene(function), (), numbers))

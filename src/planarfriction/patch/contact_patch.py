@@ -14,7 +14,7 @@ from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.patch import outline as outlines
 from planarfriction.patch import shapes
-from planarfriction.patch.grid import Grid
+from planarfriction.patch.grid import MOST_CELLS, Grid, check_cells, warn_of_the_unit
 from planarfriction.patch.moments import Moments
 from planarfriction.patch.pressure import (
     Pressure,
@@ -26,7 +26,6 @@ from planarfriction.patch.pressure import (
     pressure_array,
 )
 from planarfriction.patch.pressure_maps import read_maps
-from planarfriction.patch.size import MOST_CELLS, check_cells, warn_of_the_unit
 from planarfriction.pictures import picture
 
 _UNIT_BOX = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])

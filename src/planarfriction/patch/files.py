@@ -12,7 +12,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import FileError, FrictionError, shown
-from planarfriction.patch.size import MOST_CELLS
+from planarfriction.patch.grid import MOST_CELLS
 from planarfriction.reading import number, read_bytes, read_rows
 
 IMAGE_SUFFIXES = (".png", ".tif", ".tiff", ".bmp", ".pgm", ".jpg", ".jpeg")

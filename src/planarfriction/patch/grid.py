@@ -1,7 +1,8 @@
-"""The regular grid from which the cells of a patch are cut."""
+"""The regular grid from which the cells of a patch are cut; limits of the number and the size of cells."""
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +12,26 @@ from planarfriction import validation
 from planarfriction.described import described
 from planarfriction.equality import Checked, checked
 from planarfriction.errors import InvalidValueError
-from planarfriction.patch.size import MOST_CELLS, check_cells
+
+MOST_CELLS = 1_100_000
+"""Cells of a patch, and boxes of its grid, that are taken: some 1050 x 1050, half a gigabyte while shapes are cut."""
+
+LEAST_WIDTH, MOST_WIDTH = 1e-5, 1.0
+"""Widths of a patch [m] outside of which its maker is asked whether they are in metres."""
+
+
+def check_cells(count: int) -> None:
+    """Raise, before memory is asked for, where a patch would have more than `MOST_CELLS`."""
+    if count > MOST_CELLS:
+        raise InvalidValueError("cells", f"be at most {MOST_CELLS} in all", count)
+
+
+def warn_of_the_unit(name: str, positions: np.ndarray, cell_size: tuple[float, float] | None) -> None:
+    """Warn where a patch is so large or so small that millimetres may have been given for metres."""
+    width = max(float(np.ptp(x)) + side for x, side in zip(positions.T, cell_size or (0.0, 0.0), strict=True))
+    if not LEAST_WIDTH <= width <= MOST_WIDTH and width > 0.0:  # 0: a point
+        than = f"larger than {MOST_WIDTH:g}" if width > MOST_WIDTH else f"smaller than {LEAST_WIDTH:g}"
+        warnings.warn(f"patch {name!r} is {width:.3g} m wide, {than} m: are its lengths in metres?", stacklevel=4)
 
 
 @described

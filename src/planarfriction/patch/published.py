@@ -10,7 +10,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.patch.contact_patch import ContactPatch
-from planarfriction.patch.size import MOST_CELLS, check_cells
+from planarfriction.patch.grid import MOST_CELLS, check_cells
 
 PUBLISHED_CELLS = 21
 """Rows and columns of the grid that the published masks are written on."""

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.patch.grid import Grid
-from planarfriction.patch.size import MOST_CELLS
+from planarfriction.patch.grid import MOST_CELLS, Grid
 
 CIRCLE_SIDES = 4096
 """Sides of the polygon that stands for a circle: at equal area, its moments are those of the circle to 1e-12."""

@@ -8,9 +8,8 @@ label. Animations are written to files.
 from planarfriction.plots.animation import animate_solution
 from planarfriction.plots.histories import plot_histories
 from planarfriction.plots.limit_surface import interactive_limit_surface, plot_limit_surface
-from planarfriction.plots.motion import plot_motion
+from planarfriction.plots.motion import plot_motion, plot_solution
 from planarfriction.plots.patch import plot_patch
-from planarfriction.plots.solution import plot_solution
 
 __all__ = [
     "animate_solution",

@@ -14,6 +14,7 @@ from matplotlib.transforms import Affine2D
 
 from planarfriction import geometry, validation
 from planarfriction.plots import style
+from planarfriction.plots.histories import draw_histories
 from planarfriction.plots.patch import cell_boxes
 from planarfriction.plots.track import body_poses, contact_poses
 
@@ -51,6 +52,20 @@ def plot_motion(solution: Solution) -> style.PlotFigure:
     figure = style.new_figure(6.4, float(np.clip(1.0 + 4.6 * height / width, 2.6, 5.6)))
     _draw(figure, strobe)
     figure.draw_without_rendering()  # the aspect sets the ticks, which the layout has to know
+    return figure
+
+
+def plot_solution(solution: Solution) -> style.PlotFigure:
+    """Draw the motion of the body (left) and the time histories of body and contacts (right).
+
+    Raises InvalidValueError for what is not a solution of a scene.
+    """
+    figure = style.new_figure(14.0, 6.8)
+    parts: Any = figure.subfigures(1, 2, width_ratios=(1.0, 1.45))
+    motion, histories = parts
+    draw_motion(motion, solution)
+    draw_histories(histories, solution)
+    figure.suptitle(f"{solution.scene.name}", fontsize="large")
     return figure
 
 

@@ -16,8 +16,7 @@ from planarfriction.torch.distributed import DistributedModel
 from planarfriction.torch.published import ReducedModelPublished
 from planarfriction.torch.reduced import ReducedModel
 from planarfriction.torch.reduced_planar import ReducedPlanarLuGre
-from planarfriction.torch.rollout import rollout, tracking_loss
-from planarfriction.torch.scene import simulate_scene
+from planarfriction.torch.rollout import rollout, simulate_scene, tracking_loss
 
 __all__ = [
     "DistributedModel",

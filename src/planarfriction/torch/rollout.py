@@ -8,9 +8,11 @@ from torch import Tensor
 from planarfriction.derivatives import Rollout
 from planarfriction.errors import InvalidValueError
 from planarfriction.tensors.inputs import rollout_inputs
-from planarfriction.tensors.operations import RolloutOperation
+from planarfriction.tensors.operations import RolloutOperation, SceneOperation
+from planarfriction.tensors.scenes import simulator
 from planarfriction.torch import adjoint
 from planarfriction.torch.base import Compiled, FrictionModule
+from planarfriction.torch.namespace import xp
 
 
 def rollout(
@@ -91,3 +93,6 @@ def tracking_loss(
     error = torch.where(loaded, (run.wrenches - measured) / (torch.where(loaded, load, 1.0) * lever), 0.0)
     count = loaded.expand(torch.broadcast_shapes(loaded.shape, (*error.shape[:-1], 1))).sum()
     return (error * error).sum() / count.clamp(min=1)
+
+
+simulate_scene = simulator(xp, lambda function, numbers: adjoint.call(SceneOperation(function, {}), (), numbers))

@@ -10,7 +10,7 @@ from typing import Any
 from planarfriction import validation
 from planarfriction.cli import INTERRUPTED, output
 from planarfriction.cli.console import note, print_table, work_progress
-from planarfriction.cli.own_function import load_function
+from planarfriction.cli.options import load_function
 from planarfriction.errors import InvalidValueError
 from planarfriction.writing import make_folder, write_text
 

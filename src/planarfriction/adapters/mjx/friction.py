@@ -16,7 +16,6 @@ from mujoco import mjx
 
 from planarfriction import models
 from planarfriction.adapters.mjx import newton, responses
-from planarfriction.adapters.mjx.geometry import PatchPlaces, geometry, places
 from planarfriction.adapters.mujoco.friction import Report
 from planarfriction.adapters.mujoco.patches import PatchContact, Placed, check_once, memory
 from planarfriction.coupling import ITERATIONS, TOLERANCE
@@ -55,7 +54,7 @@ class _Search(NamedTuple):
 class _Fixed:
     """Parts that do not change with parameters: compared by identity, as one function is compiled for them."""
 
-    places: PatchPlaces
+    places: responses.PatchPlaces
     which: tuple[int, ...]
     """The model of each patch."""
     shapes: tuple[tuple[int, ...], ...]
@@ -89,7 +88,7 @@ class Friction:
         which = tuple(next(i for i, model in enumerate(known) if model is patch.model) for patch in patches)
         radius = np.array([np.sqrt((patch.model.patch.positions**2).sum(1).mean()) for patch in patches])
         shapes = tuple(self.models[i].state_shape for i in which)
-        self._fixed = _Fixed(places(placed), which, shapes, radius, at, m.nuserdata)
+        self._fixed = _Fixed(responses.places(placed), which, shapes, radius, at, m.nuserdata)
 
     def replace(self, models: Sequence[FrictionPytree]) -> Self:
         """Return the same patches with other models, which must be of the same kinds in the same order.
@@ -175,7 +174,7 @@ class Friction:
         given, dt, at = d, m.opt.timestep, self._fixed.memory
         states, guess = self.states(d), self._now(d, at.wrench, at.guess, 3 * len(self._fixed.which))
         d = _moved(m, d)
-        jacobian, rows, touching = geometry(m, d, self._fixed.places)
+        jacobian, rows, touching = responses.geometry(m, d, self._fixed.places)
         guess = jnp.where(jnp.repeat(touching, 3), guess, 0.0)
         found = self._search(*jax.lax.stop_gradient((self.models, m, d, jacobian, rows, states, guess)))
         answer = responses.answer(m, d, jacobian, rows, found.active)
