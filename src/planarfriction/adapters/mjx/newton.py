@@ -167,26 +167,12 @@ class _Search(NamedTuple):
         start = jnp.where(accepted, c.w, c.start)
         w = jnp.where(to_rest, c.w, start + far * change)
         return _Round(
-            phase=jnp.where(to_rest, _REST, _SEARCH),
-            w=w,
-            twist=jnp.where(to_rest, 0.0, host.twists(w)),
-            load=jnp.where(to_rest | held, load, host.loads(w)),
-            unit=unit,
-            slopes=slopes,
-            misfit=misfit,
-            start=start,
-            change=change,
-            move=move,
-            first=first,
-            far=far,
-            tries=jnp.where(accepted, 0, c.tries + 1),
-            whole=jnp.where(accepted, c.phase == _REST, c.whole) & ~back,
-            held=held & ~to_rest,
-            iterations=iterations,
-            best=best,
-            wrench=wrench,
-            done=done,
-        )
+            phase=jnp.where(to_rest, _REST, _SEARCH), w=w, twist=jnp.where(to_rest, 0.0, host.twists(w)),
+            load=jnp.where(to_rest | held, load, host.loads(w)), unit=unit, slopes=slopes, misfit=misfit,
+            start=start, change=change, move=move, first=first, far=far, tries=jnp.where(accepted, 0, c.tries + 1),
+            whole=jnp.where(accepted, c.phase == _REST, c.whole) & ~back, held=held & ~to_rest,
+            iterations=iterations, best=best, wrench=wrench, done=done,
+        )  # fmt: skip
 
 
 def solve(unit: Unit, host: HostResponse, guess: jax.Array, radius: jax.Array, tolerance: float, most: int) -> Solved:
