@@ -7,7 +7,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction import derivatives
-from planarfriction.derivatives.parameters import pack_shape
+from planarfriction.derivatives.parameters import pack_parts
 from planarfriction.kernels.lanes import LANES, SLOTS
 from planarfriction.patch import PUBLISHED_PATCHES
 
@@ -103,7 +103,7 @@ def test_parts_abreast_are_the_sum_of_models_of_one_part():
     ours = derivatives.rollout_states(model, None, twist, loads, dt)
     total = np.zeros_like(twist)
     for k, part in enumerate(model.parts_at(None)):
-        packed = pack_shape(model.law.numbers, part.shape)
+        packed = pack_parts(model.law.numbers, [(1.0, part.shape)])
         one = derivatives.rollout_states(packed, None, twist, loads, dt)
         close(ours.states[..., k, :], one.states)
         total += part.share * one.wrenches

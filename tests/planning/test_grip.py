@@ -106,15 +106,14 @@ def test_the_worst_friction_misses_by_less_where_that_is_the_aim():
     assert np.hypot(*worst.slide) < 4e-3
 
 
-def test_slopes_of_outcomes_are_differences():
+def test_slopes_of_ends_are_differences():
     """Central differences over 1e-3 N, right to 1e-3 of the largest; speed, slide and angle of a plate that moves."""
     scene = dataclasses.replace(plate(), t_end=0.2)
     grips, times = Grips(scene, 0, [1.0]), np.array([0.0, 0.08, 0.15])
     values = np.array([2.0, 2.8, 3.5])
 
     def vector(change) -> np.ndarray:
-        (end,) = grips.outcomes(pf.Signal(times, values + change, "linear"), [1.0], rtol=1e-9)
-        return np.concatenate([end.speed, end.slide, [end.angle]])
+        return grips.ends(pf.Signal(times, values + change, "linear"), [1.0], rtol=1e-9)[0]
 
     (slopes,) = grips.slopes(pf.Signal(times, values, "linear"), [1.0])
     step = 1e-3 * np.eye(3)
@@ -124,7 +123,7 @@ def test_slopes_of_outcomes_are_differences():
 
 def test_misses_count_what_was_wanted():
     aim = Aim(None, np.array([3e-3, 4e-3]), 0.005)
-    (end,) = Grips(plate(), 0, [1.0]).outcomes(pf.Signal.constant(50.0), [1.0])
+    (end,) = Grips(plate(), 0, [1.0]).ends(pf.Signal.constant(50.0), [1.0])
     assert aim.progress(end) == pytest.approx(0.0, abs=1e-3)
     assert aim.misses(end)[3:5] == pytest.approx([-600.0, -800.0], abs=1.0)
 

@@ -9,11 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.compiled.shapes_by_load import ShapesByLoad, places_of
+from planarfriction.compiled.shapes_by_load import ShapesByLoad
 from planarfriction.compiler import threads
 from planarfriction.derivatives.parameters import Packed, pack
 from planarfriction.errors import InvalidValueError
-from planarfriction.kernels.law import LAW
 from planarfriction.kernels.rollouts import Inputs
 
 _WORTH_A_THREAD = 20_000
@@ -27,9 +26,9 @@ LIGHTEST = 1e-9
 class RolloutInputs(NamedTuple):
     """Checked inputs; B contacts in all, one row where all contacts share an input."""
 
-    parts: tuple[Packed, ...]
-    rows: list[np.ndarray]
-    """Numbers of law and shape of each part, `[B or 1, N]`."""
+    model: Packed
+    rows: np.ndarray
+    """Numbers of law and shape of each part, `[P, B or 1, N]`."""
     state: np.ndarray
     """States before the first step `[P, B, 3]`."""
     twist: np.ndarray
@@ -43,7 +42,7 @@ class RolloutInputs(NamedTuple):
     def shaped(self, values: np.ndarray, *inner: int) -> np.ndarray:
         """Return values of parts `[P, B, *inner, 3]` as `[*batch, *inner, P, 3]`; without P for one part."""
         each = values[0] if len(values) == 1 else np.moveaxis(values, 0, -2)
-        return each.reshape(*self.batch, *inner, *self.inner)
+        return each.reshape(*self.batch, *inner, *self.model.inner)
 
     def of_all(self, values: np.ndarray) -> np.ndarray:
         """Return values of each contact `[B, ...]` as `[*batch, ...]`."""
@@ -51,35 +50,17 @@ class RolloutInputs(NamedTuple):
 
     def compiled(self, slopes: bool = False) -> Inputs:
         """Return all parts as compiled loops take them, with the `slopes` of their shapes by the load."""
-        rows, at_loads = np.array(self.rows), self.parts[0].at_loads
-        if at_loads is None:
-            which, shapes = np.zeros((1, len(self.dt)), dtype=int), _fixed(self.parts)
-        else:
+        shapes, which = self.model.shapes, np.zeros((1, len(self.dt)), dtype=int)
+        if not isinstance(shapes, ShapesByLoad):
             loads, which = np.unique(self.normal_force, return_inverse=True)
             which = which.reshape(self.normal_force.shape)
             if (loads[:1] == 0.0).any():  # any shape does for a step without load, but for its slope
                 loads[0] = loads[1] if len(loads) > 1 and not slopes else LIGHTEST
-            shapes = at_loads(loads if len(loads) else np.array([LIGHTEST]), slopes)
+            shapes = shapes(loads if len(loads) else np.array([LIGHTEST]), slopes)
         return Inputs(
-            rows, shapes.data, self.twist, self.normal_force, self.dt, which,
+            self.rows, shapes.data, self.twist, self.normal_force, self.dt, which,
             shapes.shares, shapes.surface, shapes.shapes, shapes.by_load,
         )  # fmt: skip
-
-    @property
-    def inner(self) -> tuple[int, ...]:
-        """Shape of the state of one contact."""
-        return inner_of(self.parts)
-
-
-def _fixed(parts: tuple[Packed, ...]) -> ShapesByLoad:
-    """Return parts of a fixed shape, whose rows hold its numbers."""
-    data = [part.data for part in parts]
-    begin, first = (np.zeros(1, dtype=int), data[0]) if len(data) == 1 else places_of(data)
-    surface = np.array([part.surface for part in parts])[:, None]
-    surface[:, 0, :2] += begin[:, None]
-    count, numbers = len(parts), parts[0].rows.shape[-1] - LAW
-    shares = np.array([[part.share] for part in parts])
-    return ShapesByLoad(shares, surface, np.zeros((count, 1, numbers)), np.zeros((count, 1, numbers + 1)), first)
 
 
 def sequences(twist: Any, normal_force: Any, dt: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -101,8 +82,8 @@ def checked(
     model: Any, state: Any, twist: Any, normal_force: Any, dt: Any, parameters: Any, more: Sequence[tuple] = ()
 ) -> RolloutInputs:
     """Check the inputs of a roll-out; `more` are batch axes of other arrays that belong to it."""
-    parts = pack(model, parameters)
-    inner = inner_of(parts)
+    packed = pack(model, parameters)
+    inner, parts = packed.inner, len(packed.rows)
     state = np.zeros(inner) if state is None else validation.numbers("state", state)
     if state.shape[-len(inner) :] != inner:
         wanted = ", ".join(map(str, inner))
@@ -114,26 +95,21 @@ def checked(
     for name, value in {"normal_force": load, "dt": dt}.items():
         if value.min(initial=0.0) < 0.0:
             raise InvalidValueError(name, "be >= 0", float(value.min()))
-    axes = state.shape[: -len(inner)], twist.shape[:-2], load.shape[:-1], parts[0].rows.shape[:-1], *more
+    axes = state.shape[: -len(inner)], twist.shape[:-2], load.shape[:-1], packed.rows.shape[1:-1], *more
     try:
         batch = np.broadcast_shapes(*axes)
     except ValueError:
         raise InvalidValueError("batch axes", "broadcast", f"shapes {', '.join(str(list(a)) for a in axes)}") from None
     count = int(np.prod(batch))
     return RolloutInputs(
-        parts,
-        [rows_of("parameters", part.rows, part.rows.shape[-1:], batch) for part in parts],
-        by_part(np.broadcast_to(state, (*batch, *inner)).reshape(count, *inner), len(parts)),
-        parts[0].turned(rows_of("twist", twist, (steps, 3), batch)),
+        packed,
+        np.array([rows_of("parameters", rows, rows.shape[-1:], batch) for rows in packed.rows]),
+        by_part(np.broadcast_to(state, (*batch, *inner)).reshape(count, *inner), parts),
+        packed.turned(rows_of("twist", twist, (steps, 3), batch)),
         rows_of("normal_force", load, (steps,), batch),
         np.require(dt, float, ["C", "W", "A"]),
         batch,
     )
-
-
-def inner_of(parts: tuple[Packed, ...]) -> tuple[int, ...]:
-    """Return the shape of the state of one contact."""
-    return (3,) if len(parts) == 1 else (len(parts), 3)
 
 
 def by_part(values: np.ndarray, parts: int) -> np.ndarray:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.compiled.shapes_by_load import ShapesByLoad
+from planarfriction.compiled.shapes_by_load import ShapesByLoad, places_of
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LawNumbers
 from planarfriction.geometry import transformed
 from planarfriction.kernels import published_rollout, published_step, reduced_loads, reduced_rollout, reduced_step
+from planarfriction.kernels.law import LAW
 from planarfriction.models import ReducedModel, ReducedModelPublished
 from planarfriction.models.map_sizes import MapSizes, maps_of
 from planarfriction.models.published_shapes import PublishedShape, axes_of
@@ -70,21 +71,20 @@ REDUCED_BY_LOAD = _family_of(_OF_LAW, reduced_step.NAMES, reduced_loads, reduced
 
 
 class Packed(NamedTuple):
-    """A part of a reduced model as compiled loops see it; most models have one."""
+    """A reduced model of P parts as compiled loops see it; most models have one."""
 
+    family: Family
     rows: np.ndarray
-    """Numbers of law and shape `[..., N]`, batch axes as those of the parameters."""
-    surface: np.ndarray
-    """Kind, start and size of the limit surface, int [3]; where the maps of a shape begin."""
-    data: np.ndarray
-    """Numbers of the limit surface or of the map, flat."""
-    family: Family = PUBLISHED
-    share: float = 1.0
-    """Share of the load [-]."""
+    """Numbers of law and shape of each part `[P, ..., N]`, batch axes as those of the parameters."""
+    shapes: ShapesByLoad | Callable[[np.ndarray, bool], ShapesByLoad]
+    """Shapes of the parts; a function of loads where they follow the load (see `CompiledThreeStates.at_loads`)."""
     axes: np.ndarray | None = None
     """Symmetric `[3, 3]`, or None: twists go in through it, wrenches come out."""
-    at_loads: Callable[[np.ndarray, bool], ShapesByLoad] | None = None
-    """All parts at given loads, of a model whose shape depends on the load (see `CompiledThreeStates.at_loads`)."""
+
+    @property
+    def inner(self) -> tuple[int, ...]:
+        """Shape of the state of one contact."""
+        return (3,) if len(self.rows) == 1 else (len(self.rows), 3)
 
     def turned(self, vectors: np.ndarray) -> np.ndarray:
         """Turn twists into the axes of the compiled loops, or wrenches out of them, `[..., 3]`."""
@@ -107,29 +107,25 @@ def parameters_of(model: Any) -> np.ndarray:
 
     Raises InvalidValueError for a model that has no roll-outs.
     """
-    packed = pack(model)[0]
-    return packed.rows[packed.family.columns]
+    packed = pack(model)
+    return packed.rows[0, packed.family.columns]
 
 
-def pack(model: Any, parameters: Any = None) -> tuple[Packed, ...]:
-    """Return the parts of a model as compiled loops see them, with `parameters` `[..., P]` if given, else its own.
+def pack(model: Any, parameters: Any = None) -> Packed:
+    """Return a model as compiled loops see it, with `parameters` `[..., P]` if given, else its own.
 
     A friction coefficient `mu_s` below `mu_c`, which a law refuses, is let through: the formulas are smooth there.
     A model that is packed already, as the tensor front ends hold them, is taken as it is.
     """
-    if isinstance(model, Packed):
-        model = (model,)
-    packed = model if isinstance(model, tuple) else _packed(model)
+    packed = model if isinstance(model, Packed) else _packed(model)
     if parameters is None:
         return packed
-    values = _checked(parameters, packed[0].family.names)
-    return tuple(_with(part, values) for part in packed)
-
-
-def _with(packed: Packed, values: np.ndarray) -> Packed:
-    row = np.broadcast_to(packed.rows, (*values.shape[:-1], packed.rows.shape[-1])).copy()
-    row[..., packed.family.columns] = values
-    return packed._replace(rows=row)
+    values = _checked(parameters, packed.family.names)
+    parts, count = packed.rows.shape
+    own = packed.rows.reshape(parts, *(1,) * (values.ndim - 1), count)
+    rows = np.broadcast_to(own, (parts, *values.shape[:-1], count)).copy()
+    rows[..., packed.family.columns] = values
+    return packed._replace(rows=rows)
 
 
 def _family(model: Any) -> Family:
@@ -161,52 +157,64 @@ def _refusal(model: ReducedModel | ReducedModelPublished) -> tuple[str, str, Any
     )
 
 
-def _packed(model: Any) -> tuple[Packed, ...]:
+def _packed(model: Any) -> Packed:
     _family(model)
     refusal = _refusal(model)
     if refusal is not None:
         raise InvalidValueError(*refusal)
     law = model.law.numbers
     if not model.depends_on_load:
-        return tuple(pack_shape(law, shape)._replace(share=share) for share, shape in model.parts_at(1.0))
-    row = np.array([*law, *np.zeros(len(reduced_step.NAMES) - len(law))])
-    part = Packed(
-        row, np.zeros(3, dtype=int), np.zeros(0, dtype=np.float32), REDUCED_BY_LOAD, at_loads=model.compiled.at_loads
-    )
-    return (part,) * model.parts
+        return pack_parts(law, model.parts_at(1.0))
+    row = [*law, *np.zeros(len(reduced_step.NAMES) - len(law))]
+    return Packed(REDUCED_BY_LOAD, np.array([row] * model.parts), model.compiled.at_loads)
 
 
-def pack_shape(law: LawNumbers, shape: ReducedShape | PublishedShape) -> Packed:
-    """Return a law and the shape of a patch at one load as compiled loops see them."""
-    row = np.array([*law, *shape.numbers])
-    if isinstance(shape, ReducedShape):
-        return Packed(row, np.zeros(3, dtype=int), shape.data, REDUCED)
-    numbers = shape.surface.numbers
-    axes = None if (shape.root == np.eye(2)).all() else axes_of(shape.root)
-    return Packed(row, np.array([numbers.kind, 0, numbers.size]), numbers.data, PUBLISHED, axes=axes)
+def pack_parts(law: LawNumbers, parts: Iterable[tuple[float, ReducedShape | PublishedShape]]) -> Packed:
+    """Return a law and the parts of a patch at one load, each a share of the load with its shape."""
+    shares, shapes = zip(*parts, strict=True)
+    rows = np.array([[*law, *shape.numbers] for shape in shapes])
+    if isinstance(shapes[0], ReducedShape):
+        return _fixed(REDUCED, rows, shares, [(0, 0, 0)] * len(shapes), [shape.data for shape in shapes])
+    surface, root = shapes[0].surface.numbers, shapes[0].root
+    axes = None if (root == np.eye(2)).all() else axes_of(root)
+    return _fixed(PUBLISHED, rows, shares, [(surface.kind, 0, surface.size)], [surface.data], axes)
+
+
+def _fixed(
+    family: Family,
+    rows: np.ndarray,
+    shares: Any,
+    surface: Sequence[tuple],
+    data: Sequence[np.ndarray],
+    axes: Any = None,
+) -> Packed:
+    """Return parts of fixed shapes, by the integers of their `surface` (see `ShapesByLoad`) and its numbers."""
+    begin, first = (np.zeros(1, dtype=int), data[0]) if len(data) == 1 else places_of(data)
+    places = np.array(surface)[:, None] + begin[:, None, None] * np.array([1, 1, 0])
+    parts, numbers = len(rows), rows.shape[1] - LAW
+    zeros = np.zeros((parts, 1, numbers)), np.zeros((parts, 1, numbers + 1))
+    return Packed(family, rows, ShapesByLoad(np.array(shares, dtype=float)[:, None], places, *zeros, first), axes)
 
 
 def pack_maps(
     elasto_plastic: bool, sizes: Sequence[MapSizes], shares: np.ndarray, factors: np.ndarray, data: np.ndarray
-) -> tuple[Packed, ...]:
+) -> Packed:
     """Return a `ReducedModel` by its parts, for roll-outs at given parameters, which take the place of those here.
 
     `shares` `[P]` of the load, F `[P, 3, 3]`, and the maps one behind the other.
     """
-    law, data = _any_law(elasto_plastic), np.ascontiguousarray(data, dtype=np.float32)
-    shapes = (ReducedShape(factor, each) for factor, each in zip(factors, maps_of(data, sizes), strict=True))
-    return tuple(
-        pack_shape(law, shape)._replace(share=float(share)) for share, shape in zip(shares, shapes, strict=True)
-    )
+    maps = maps_of(np.ascontiguousarray(data, dtype=np.float32), sizes)
+    shapes = (ReducedShape(factor, each) for factor, each in zip(factors, maps, strict=True))
+    return pack_parts(_any_law(elasto_plastic), zip(map(float, shares), shapes, strict=True))
 
 
 def pack_surface(
     elasto_plastic: bool, kind: int, size: int, data: np.ndarray, root: np.ndarray | None = None
-) -> tuple[Packed]:
+) -> Packed:
     """Return a `ReducedModelPublished` by its limit surface, for roll-outs at given parameters of law and shape."""
-    row = np.array([*_any_law(elasto_plastic), *np.zeros(len(published_step.NAMES) - len(LawNumbers._fields))])
-    data = np.ascontiguousarray(data, dtype=float)
-    return (Packed(row, np.array([kind, 0, size]), data, PUBLISHED, axes=None if root is None else axes_of(root)),)
+    row = [*_any_law(elasto_plastic), *np.zeros(len(published_step.NAMES) - LAW)]
+    data, axes = np.ascontiguousarray(data, dtype=float), None if root is None else axes_of(root)
+    return _fixed(PUBLISHED, np.array([row]), [1.0], [(kind, 0, size)], [data], axes)
 
 
 def _any_law(elasto_plastic: bool) -> LawNumbers:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -61,6 +62,7 @@ class MotionPath:
     def __init__(self, scene: Scene, inputs: SceneInputs, options: SolverOptions | None) -> None:
         options = SolverOptions() if options is None else options
         plan = validation.instance("options", options, SolverOptions, "SolverOptions").plan(scene, RTOL)
+        self.scene, self.inputs = scene, inputs
         self.batches = SegmentBatches(scene, plan.end, times=plan.times, sensitivities=True, marks=inputs.marks)
         for contact, model in zip(scene.contacts, self.batches.models, strict=True):
             if None in model.functions:
@@ -101,20 +103,17 @@ class MotionPath:
         return self._output.time[: self.reached]
 
     @property
-    def motion(self) -> np.ndarray:
-        """Recorded motion of the body `[M, 6]`."""
-        return self._output.body[: self.reached]
+    def recorded(self) -> tuple[np.ndarray, np.ndarray]:
+        """Motion of the body `[M, 6]` and wrenches of the contacts `[M, C, 3]` at these instants."""
+        return self._output.body[: self.reached], self._output.wrench[: self.reached]
 
     @property
-    def wrenches(self) -> np.ndarray:
-        """Recorded wrenches of the contacts `[M, C, 3]`."""
-        return self._output.wrench[: self.reached]
+    def head(self) -> tuple[Any, ...]:
+        """First fields of a `SceneDerivatives` of this motion."""
+        return self.inputs.names, self.inputs.columns, self.time, *self.recorded
 
 
 def pieces_of(path: Path) -> list[tuple[int, int]]:
     """Return the first and the last node on each piece between two breaks that a part of a path crosses."""
-    if not len(path.piece):
-        return []
-    starts = np.append(0, np.flatnonzero(np.diff(path.piece)) + 1)
-    ends = np.append(starts[1:], len(path.piece)) - 1
-    return list(zip(starts.tolist(), ends.tolist(), strict=True))
+    nodes = np.split(np.arange(len(path.piece)), np.flatnonzero(np.diff(path.piece)) + 1)
+    return [(int(each[0]), int(each[-1])) for each in nodes if len(each)]

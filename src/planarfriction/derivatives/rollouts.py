@@ -8,16 +8,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.derivatives.inputs import (
-    RolloutInputs,
-    by_part,
-    checked,
-    inner_of,
-    rows_of,
-    sequences,
-    share,
-    sum_to,
-)
+from planarfriction.derivatives.inputs import RolloutInputs, by_part, checked, rows_of, sequences, share, sum_to
 from planarfriction.derivatives.parameters import Packed, is_compiled, pack
 from planarfriction.equality import by_parts
 from planarfriction.errors import InvalidValueError
@@ -119,7 +110,7 @@ def rollout(
     Raises `InvalidValueError` for wrong shapes, for numbers out of range, and for `parameters` if the model cannot take
     them.
     """
-    if not isinstance(model, FrictionModel | Packed | tuple):
+    if not isinstance(model, FrictionModel | Packed):
         raise InvalidValueError("model", f"be a friction model ({MODELS.classes()})", type(model).__name__)
     if parameters is None and isinstance(model, FrictionModel) and not is_compiled(model):
         return _stepped(model, state, twist, normal_force, dt)
@@ -166,20 +157,20 @@ def rollout_vjp(
     Raises `InvalidValueError` as `rollout` does, and for a model that has no compiled roll-out.
     """
     inputs = checked(model, state, twist, normal_force, dt, parameters)
-    count, steps, inner, turned = inputs.state.shape[1], len(inputs.dt), inputs.inner, inputs.parts[0].turned
+    (parts, count), steps, packed = inputs.state.shape[:2], len(inputs.dt), inputs.model
+    inner, family, turned = packed.inner, packed.family, packed.turned
     cotangents = turned(rows_of("wrenches_bar", wrenches_bar, (steps, 3), inputs.batch))
     if states is None:
         on_the_way = _roll(inputs, steps)[2]
     else:
-        on_the_way = by_part(rows_of("states", states, (steps, *inner), inputs.batch), len(inputs.parts))
+        on_the_way = by_part(rows_of("states", states, (steps, *inner), inputs.batch), parts)
     z_bar = np.zeros_like(inputs.state)
     if state_bar is not None:
-        z_bar[:] = by_part(rows_of("state_bar", state_bar, inner, inputs.batch), len(inputs.parts))
-    rows_bar = np.zeros((len(inputs.parts), count, inputs.rows[0].shape[-1]))
-    bars = Bars(z_bar, np.zeros((count, steps, 3)), np.zeros((count, steps)), rows_bar)
-    compiled, family = inputs.compiled(slopes=True), inputs.parts[0].family
+        z_bar[:] = by_part(rows_of("state_bar", state_bar, inner, inputs.batch), parts)
+    rows_bar = np.zeros((parts, count, inputs.rows.shape[-1]))
+    bars, compiled = Bars(z_bar, np.zeros((count, steps, 3)), np.zeros((count, steps)), rows_bar), inputs.compiled(True)
     share(compiled, count, lambda *span: family.gradient(compiled, on_the_way, cotangents, span, bars))
-    given = parameters if parameters is not None else inputs.parts[0].rows[..., family.columns]
+    given = parameters if parameters is not None else packed.rows[0][..., family.columns]
     start = np.empty(inner) if state is None else state
     return RolloutVJP(
         sum_to(np.shape(start), inputs.shaped(z_bar)),
@@ -208,14 +199,13 @@ def rollout_jacobian(
     that are not parameters of the law.
     """
     inputs = checked(model, state, twist, normal_force, dt, parameters)
-    family, count, steps = inputs.parts[0].family, inputs.state.shape[1], len(inputs.dt)
+    family, turned, count, steps = inputs.model.family, inputs.model.turned, inputs.state.shape[1], len(inputs.dt)
     known = family.names
     chosen = [known.index(name) for name in (known if names is None else validation.choices("names", names, known))]
     columns = family.columns[np.array(chosen, dtype=int)]
     end, compiled = inputs.state.copy(), inputs.compiled()
     wrenches, slopes = np.zeros((count, steps, 3)), np.zeros((count, steps, 3, len(columns)))
     share(compiled, count, lambda *span: family.sensitivities(compiled, span, end, columns, wrenches, slopes))
-    turned = inputs.parts[0].turned
     slopes = np.swapaxes(turned(np.swapaxes(inputs.of_all(slopes), -1, -2)), -1, -2)
     return RolloutJacobian(inputs.shaped(end), turned(inputs.of_all(wrenches)), slopes)
 
@@ -236,22 +226,25 @@ def rollout_jvp(
 
     Raises `InvalidValueError` as `rollout_vjp` does.
     """
-    parts = pack(model, parameters)
-    family, each = parts[0].family, inner_of(parts)
+    packed = pack(model, parameters)
+    family, turned = packed.family, packed.turned
     steps = validation.numbers("twist", twist).shape[-2:-1]
     tangent = RolloutTangent() if tangent is None else tangent
     validation.instance("tangent", tangent, RolloutTangent, "a RolloutTangent")
-    names, inner = [f"tangent.{name}" for name in tangent._fields], (each, (*steps, 3), steps, (len(family.names),))
+    names, inner = (
+        [f"tangent.{name}" for name in tangent._fields],
+        (packed.inner, (*steps, 3), steps, (len(family.names),)),
+    )
     changes = [validation.finite_numbers(name, value) for name, value in zip(names, tangent, strict=True)]
     more = [value.shape[: max(value.ndim - len(shape), 0)] for value, shape in zip(changes, inner, strict=True)]
-    inputs = checked(parts, state, twist, normal_force, dt, None, more)
+    inputs = checked(packed, state, twist, normal_force, dt, None, more)
     given = zip(names, changes, inner, strict=True)
     z, twists, loads, values = (rows_of(*each, inputs.batch) for each in given)
-    numbers = np.zeros((len(values), inputs.rows[0].shape[-1]))
+    numbers = np.zeros((len(values), inputs.rows.shape[-1]))
     numbers[:, family.columns] = values
     end, count = inputs.state.copy(), inputs.state.shape[1]
-    moved, turned = np.zeros_like(end), parts[0].turned
-    moved[:] = by_part(z, len(parts))
+    moved = np.zeros_like(end)
+    moved[:] = by_part(z, len(end))
     changed, compiled = Bars(moved, turned(twists), loads, numbers), inputs.compiled(slopes=bool(loads.any()))
     both = [np.zeros((count, *steps, 3)) for _ in range(2)]
     share(compiled, count, lambda *span: family.tangent(compiled, span, end, changed, *both))
@@ -266,9 +259,9 @@ def _roll(inputs: RolloutInputs, kept: int) -> tuple[np.ndarray, np.ndarray, np.
     """
     end, count = inputs.state.copy(), inputs.state.shape[1]
     states, wrenches = np.empty((len(end), count, kept, 3)), np.zeros((count, len(inputs.dt), 3))
-    compiled, family = inputs.compiled(), inputs.parts[0].family
+    compiled, family = inputs.compiled(), inputs.model.family
     share(compiled, count, lambda *span: family.rollout(compiled, span, end, wrenches, states))
-    return end, inputs.of_all(inputs.parts[0].turned(wrenches)), states
+    return end, inputs.of_all(inputs.model.turned(wrenches)), states
 
 
 def _stepped(model: Any, state: Any, twist: Any, normal_force: Any, dt: Any) -> Rollout[np.ndarray]:

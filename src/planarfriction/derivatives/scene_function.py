@@ -3,22 +3,20 @@
 from __future__ import annotations
 
 import dataclasses
-import functools
-import os
-from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.compiler import threads
 from planarfriction.derivatives.path import RTOL
 from planarfriction.derivatives.scene_gradient import KeptMotion
 from planarfriction.derivatives.scene_inputs import SCENE_PARAMETERS, STATES, SceneInputs
 from planarfriction.derivatives.scene_sensitivities import scene_sensitivities
 from planarfriction.errors import InvalidValueError
 from planarfriction.scenes.options import SolverOptions
-from planarfriction.scenes.scene import Contact, Scene
+from planarfriction.scenes.scene import Contact, Scene, with_friction
 from planarfriction.scenes.signal import Signal
 
 FACTORS = tuple(name for name in SCENE_PARAMETERS if name != "r")
@@ -64,9 +62,10 @@ class SceneFunction:
             done = self._motion_at(row)
             if kept is not None:
                 kept[row.tobytes()] = done
-            return self._filled(done.motion), self._filled(done.wrenches)
+            motion, wrenches = done.recorded
+            return self._filled(motion), self._filled(wrenches)
 
-        return self._stacked(_in_threads(one, list(values)))
+        return self._stacked(threads.each(one, list(values)))
 
     def pull(self, values, of_motion, of_wrenches, kept: dict[bytes, KeptMotion] | None = None) -> np.ndarray:
         """Return derivatives `[B, P]` of costs from those by motion and wrenches, shaped as these."""
@@ -80,7 +79,7 @@ class SceneFunction:
                 bars = (self._folded(bar[b], len(done.time)) for bar in (of_motion, of_wrenches))
                 gradient[b] = done.gradient(*bars) * self._per_factor(row)
 
-        _in_threads(some, range(len(different)))
+        threads.each(some, range(len(different)))
         return gradient
 
     def push(self, values: np.ndarray, changes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -93,7 +92,7 @@ class SceneFunction:
             change = change * self._per_factor(row)
             return self._filled(found.d_motion @ change), self._filled(found.d_wrenches @ change)
 
-        return self._stacked(_in_threads(one, list(zip(values, changes, strict=True))))
+        return self._stacked(threads.each(one, list(zip(values, changes, strict=True))))
 
     def _inputs(self, scene: Scene) -> SceneInputs:
         return SceneInputs(scene, self._parameters, self._knots, self._initial)
@@ -159,38 +158,17 @@ class SceneFunction:
         return dataclasses.replace(scene, body=body, contacts=contacts, **changed)
 
     def _contact(self, contact: Contact, signals: dict[str, np.ndarray], factors: dict[str, float]) -> Contact:
-        name, load, model = f"{contact.name}.normal_force", contact.normal_force, contact.model
+        name, load, mu = f"{contact.name}.normal_force", contact.normal_force, factors.get("mu", 1.0)
         if name in signals:
             load = self._signal(name, load, signals[name])
         if "load" in factors:
             load = dataclasses.replace(load, values=factors["load"] * load.values)
-        if factors.get("mu", 1.0) != 1.0:
-            model = dataclasses.replace(model, law=_with_friction(model.law, factors["mu"]))
-        return dataclasses.replace(contact, model=model, normal_force=load)
+        changed, numbers = with_friction(contact, mu), contact.model.law.numbers
+        wanted = numbers._replace(mu_c=mu * numbers.mu_c, mu_s=mu * numbers.mu_s)
+        if not np.allclose(changed.model.law.numbers, wanted, rtol=1e-12, atol=0.0):
+            rule = f"not contain mu: {type(contact.model.law).__name__} has other friction coefficients too"
+            raise InvalidValueError("parameters", rule, "mu")
+        return dataclasses.replace(changed, normal_force=load)
 
     def _signal(self, name: str, old: Signal | None, values: np.ndarray) -> Signal:
         return Signal(self._knots[name], values, "linear" if old is None else old.hold)
-
-
-def _with_friction(law: Any, factor: float) -> Any:
-    """Return the law with `factor` times the friction."""
-    names = [field.name for field in dataclasses.fields(law) if field.name in ("mu_c", "mu_s")]
-    more = dataclasses.replace(law, **{name: factor * getattr(law, name) for name in names})
-    wanted = law.numbers._replace(mu_c=factor * law.numbers.mu_c, mu_s=factor * law.numbers.mu_s)
-    if not np.allclose(more.numbers, wanted, rtol=1e-12, atol=0.0):
-        rule = f"not contain mu: {type(law).__name__} has other friction coefficients too"
-        raise InvalidValueError("parameters", rule, "mu")
-    return more
-
-
-def _in_threads(work: Callable[[Any], Any], items: Sequence[Any]) -> list[Any]:
-    """Apply `work` to each of the items in threads; its compiled loops hold no lock."""
-    if len(items) <= 1:
-        return [work(item) for item in items]
-    with ThreadPoolExecutor(min(len(items), _processors())) as pool:
-        return list(pool.map(work, items))
-
-
-@functools.cache
-def _processors() -> int:
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

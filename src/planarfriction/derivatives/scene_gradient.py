@@ -65,10 +65,9 @@ def scene_gradient(
         np.zeros_like(values)
         if function is None
         else validation.array(f"{name} of the cost", function(motion.time, values), values.shape)
-        for (name, function), values in zip(functions.items(), (motion.motion, motion.wrenches), strict=True)
+        for (name, function), values in zip(functions.items(), motion.recorded, strict=True)
     ]
-    of = motion.inputs
-    return SceneGradient(of.names, of.columns, motion.time, motion.motion, motion.wrenches, motion.gradient(*bars))
+    return SceneGradient(*motion.head, motion.gradient(*bars))
 
 
 class KeptMotion(MotionPath):
@@ -76,39 +75,34 @@ class KeptMotion(MotionPath):
 
     def __init__(self, scene: Scene, inputs: SceneInputs, options: SolverOptions | None) -> None:
         super().__init__(scene, inputs, options)
-        self._scene, self.inputs = scene, inputs
         steps = self.steps(_MOST_NODES)
         self._parts = [(system, Path(*(each.copy() for each in path))) for system, path in steps]
 
     def gradient(self, of_motion: np.ndarray, of_wrenches: np.ndarray) -> np.ndarray:
         """Return the gradient `[P]` of a cost from its derivatives by motion `[M, 6]` and wrenches `[M, C, 3]`."""
-        grip = max(np.abs(contact.normal_force.values).max() for contact in self._scene.contacts)
-        wrench = grip * np.array([1.0, 1.0, self.scale[-3] / self.scale[-1]])
-        level = np.abs(np.append(of_motion * self.scale[-6:], of_wrenches * wrench)).max(initial=0.0) or 1.0
-        return _Adjoint(self, of_motion, of_wrenches, level).back(self._parts)
+        return _Adjoint(self, of_motion, of_wrenches).back(self._parts)
 
 
 class _Adjoint:
     """The adjoint of a motion on its way back, and the gain of the cost by then."""
 
-    def __init__(self, motion: KeptMotion, of_motion: np.ndarray, of_wrenches: np.ndarray, level: float) -> None:
+    def __init__(self, motion: KeptMotion, of_motion: np.ndarray, of_wrenches: np.ndarray) -> None:
         self._bars, self._wrench_bars, self._time = of_motion, of_wrenches, motion.time
         self._inputs, self._accuracy = motion.inputs, motion.accuracy
-        self._initial = motion.inputs.start(motion.batches)
+        self._initial, scale = motion.inputs.start(motion.batches), motion.scale
         count, n = self._initial.shape
         self._state, self._gain, self._moments = np.zeros(n), np.zeros(count), np.zeros((self._inputs.inputs, 2))
-        self._atol = self._accuracy * level / motion.scale
+        grip = max(np.abs(contact.normal_force.values).max() for contact in motion.scene.contacts)
+        of_forces = of_wrenches * grip * np.array([1.0, 1.0, scale[-3] / scale[-1]])
+        level = np.abs(np.append(of_motion * scale[-6:], of_forces)).max(initial=0.0) or 1.0
+        self._atol = self._accuracy * level / scale
         self._space, self._known = workspace_for(1, self._inputs.inputs, n), 0.0
         self._next = len(self._time) - 1
         """Number of the instant whose cotangents come next."""
 
     def back(self, parts: list[tuple[System, Path]]) -> np.ndarray:
         """Return the gradient `[P]`, from the path of the motion."""
-        entered = None
         for system, path in reversed(parts):
-            if system is not entered:
-                self._inputs.enter(system)
-                entered = system
             for first, last in reversed(pieces_of(path)):
                 if last > first:
                     self._piece(system, path, first, last)
@@ -121,7 +115,7 @@ class _Adjoint:
         if since == end - begin:
             tangent.forget(system.address, piece, self._state[None, :])
             self._known = 0.0
-        drives, place = self._inputs.at(piece, end), (system, path, first, last)
+        drives, place = self._inputs.at(system, piece), (system, path, first, last)
         self._moments[:] = 0.0
         while (m := self._next) >= 0 and (self._time[m] > begin + reach or self._time[m] == begin == 0.0 == reach):
             here = min(float(self._time[m]) - begin, since)

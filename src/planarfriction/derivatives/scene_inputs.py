@@ -115,7 +115,9 @@ class SceneInputs:
         self.inputs = len(inputs)
         """Number of different inputs behind the numbers."""
         self._scale = np.ones(len(numbers))
+        self._system: System | None = None
         self._hats: list[tuple[np.ndarray, np.ndarray]] = []
+        """Pieces of the signals' changes between the breaks of the system."""
 
     @property
     def marks(self) -> np.ndarray:
@@ -166,13 +168,12 @@ class SceneInputs:
 
     # ------------------------------------------------------------------ along the motion
 
-    def enter(self, system: System) -> None:
-        """Take the pieces of the system that comes next."""
-        self._hats = [knots.hats.pieces(system.motion.breaks) for knots in self._knots]
-
-    def at(self, piece: int, end: float) -> Drives:
-        """Return the numbers that affect a piece of the system, which ends at `end` [s]."""
-        count, drives = int(np.searchsorted(self._begin, end - SAME_TIME)), self._drives
+    def at(self, system: System, piece: int) -> Drives:
+        """Return the numbers that affect a piece of the system."""
+        breaks, drives = system.motion.breaks, self._drives
+        if system is not self._system:
+            self._system, self._hats = system, [knots.hats.pieces(breaks) for knots in self._knots]
+        count = int(np.searchsorted(self._begin, breaks[piece + 1] - SAME_TIME))
         for (start, slope), (column, knot) in zip(self._hats, self._sources, strict=True):
             drives.weight[column, 0] = self._scale[column] * start[piece, knot]
             drives.weight[column, 1] = self._scale[column] * slope[piece, knot]

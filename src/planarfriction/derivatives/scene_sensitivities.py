@@ -60,44 +60,37 @@ def scene_sensitivities(
 
     Raises `InvalidValueError` for unknown names or numbers out of range, and `SolverError` if the solver fails.
     """
-    inputs = SceneInputs(scene, parameters, signals, initial)
-    motion = MotionPath(scene, inputs, options)
-    tangents = _Tangents(motion, inputs)
+    motion = MotionPath(scene, SceneInputs(scene, parameters, signals, initial), options)
+    tangents = _Tangents(motion)
     for system, path in motion.steps():
         tangents.carry(system, path)
         del system, path  # the next batch of segments is packed when this one is gone
-    d_motion, d_wrenches = (inputs.in_order(values[: motion.reached]) for values in tangents.recorded)
-    return SceneSensitivities(
-        inputs.names, inputs.columns, motion.time, motion.motion, motion.wrenches, d_motion, d_wrenches
-    )
+    slopes = (motion.inputs.in_order(values[: motion.reached]) for values in tangents.recorded)
+    return SceneSensitivities(*motion.head, *slopes)
 
 
 class _Tangents:
     """Derivatives of a motion `[P, n]`, carried along its steps, and those that are recorded."""
 
-    def __init__(self, motion: MotionPath, inputs: SceneInputs) -> None:
-        self._motion, self._inputs = motion, inputs
-        self._slopes = inputs.start(motion.batches)
+    def __init__(self, motion: MotionPath) -> None:
+        self._motion, self._inputs = motion, motion.inputs
+        self._slopes, inputs = motion.inputs.start(motion.batches), motion.inputs.inputs
         (count, n), instants, contacts = self._slopes.shape, motion.instants, len(motion.batches.models)
-        self._space, self._atol = workspace_for(count, inputs.inputs, n), motion.accuracy * motion.scale
+        self._space, self._atol = workspace_for(count, inputs, n), motion.accuracy * motion.scale
         self._state, self._scratch, self._wrench = np.empty(n), np.empty((2, n)), np.empty((contacts, 3))
         self.recorded = np.zeros((instants, 6, count)), np.zeros((instants, contacts, 3, count))
         """Derivatives of motion and wrenches at the instants."""
         self._next = 0
         """Number of the instant to be recorded next."""
-        self._entered: System | None = None
 
     def carry(self, system: System, path: Path) -> None:
         """Go along a part of the path, and record the instants that the motion has recorded on it."""
-        if system is not self._entered:
-            self._inputs.enter(system)
-            self._entered = system
         breaks, instants = system.motion.breaks, self._motion.time
         for first, last in pieces_of(path):
             piece, since, reach = int(path.piece[first]), float(path.since[first]), float(path.since[last])
             begin, length = breaks[piece], breaks[piece + 1] - breaks[piece]
             time = breaks[piece + 1] if reach == length else begin + reach
-            drives = self._inputs.at(piece, float(breaks[piece + 1]))
+            drives = self._inputs.at(system, piece)
             if since == 0.0:
                 self._inputs.begin(drives, self._slopes)
             while self._next < len(instants) and instants[self._next] <= time:

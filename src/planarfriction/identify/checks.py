@@ -9,22 +9,18 @@ from dataclasses import dataclass
 import numpy as np
 
 from planarfriction.errors import InvalidValueError
+from planarfriction.geometry import rotate
 from planarfriction.identify.logs import Log
 from planarfriction.identify.result import Identification
 from planarfriction.identify.verdicts import Verdict
 from planarfriction.patch import ContactPatch
 
-FAST = 0.2
-"""Share of the usual largest speed from which a sample counts as sliding: bristles that load or turn are slower."""
+FAST, STRONG = 0.2, 0.2
+"""Shares of the usual largest speed and wrench from which a sample counts as sliding under load: bristles that load or
+turn are slower, and less than that is noise."""
 
-STRONG = 0.2
-"""Share of the usual largest wrench below which a sample is noise, or that of a contact without load."""
-
-LEAST = 20
-"""Least number of sliding samples that a check needs."""
-
-MOST = 120
-"""Most sliding samples of a check, evenly chosen."""
+LEAST, MOST = 20, 120
+"""Least number of sliding samples that a check needs, and most that it takes, evenly chosen."""
 
 MOST_CELLS = 500
 """Number of cells of a patch above which a check uses a compressed one."""
@@ -32,17 +28,12 @@ MOST_CELLS = 500
 AGAINST = 0.7
 """Largest share of the work with which friction may drive the motion: bristles give some work back."""
 
-MISREAD = 5.0
-"""Median angle between the wrench and that of sliding friction [deg] from which a log may have been misread."""
+MISREAD, BETTER = 5.0, 0.4
+"""Median angle between the wrench and that of sliding friction [deg] from which a log may have been misread, and share
+to which another reading must lower it to be named: no reading lowers noise."""
 
-BETTER = 0.4
-"""Share to which another reading of the log must lower that angle to be named: no reading lowers noise."""
-
-NEAR = np.geomspace(1.0 / 3.0, 3.0, 9)
-"""Factors on the size of the patch that count as the same patch: its size is estimated."""
-
-FAR = np.concatenate([np.geomspace(1e-4, 0.25, 28), np.geomspace(4.0, 1e4, 28)])
-"""Factors on the size of the patch that make it another one."""
+NEAR, FAR = np.geomspace(1.0 / 3.0, 3.0, 9), np.concatenate([np.geomspace(1e-4, 0.25, 28), np.geomspace(4.0, 1e4, 28)])
+"""Factors on the size of the patch, which is estimated, that count as the same patch, and as another one."""
 
 LEVERS = {
     1e-3: "the patch in mm",
@@ -51,31 +42,23 @@ LEVERS = {
     32.0: "vx and vy in mm/s, or tau in N mm",
     1e3: "all lengths in mm but those of the patch",
 }
-"""Factors on the contact radius that a unit explains; it shows as the root of `tau v/(f omega)`."""
-
 SAME_LEVER = 2.0
-"""Factor within which a contact radius counts as one of `LEVERS`."""
+"""Factors on the contact radius that a unit explains, and how near they have to be; a factor shows as the root of
+`tau v/(f omega)`."""
 
 HIGH = 4.0
 """Friction over load above which one of both has another unit or another scale."""
 
-TRAVEL = 0.1
-"""Displacement between two samples, as a share of the contact radius, that is long for slow sampling."""
-
-SLOW = 0.2
-"""Time between two samples [s] that is long for a log of friction."""
-
-SPEEDY = 10.0
-"""Speed [m/s] that is more likely one in mm/s."""
+TRAVEL, SLOW, SPEEDY = 0.1, 0.2, 10.0
+"""Displacement between two samples, as a share of the contact radius, and time [s] that are long for slow sampling;
+speed [m/s] that is more likely one in mm/s."""
 
 ALIKE = 0.05
 """Share within which loads count as one."""
 
-LEAST_MOUNTED = np.radians(20.0)
-"""Angle between the axes of force and motion [rad] that no anisotropy and no calibration explains."""
-
-LEAST_TURN = 0.5
-"""Turn of the contact [rad] below which axes of the world and of the contact are the same."""
+LEAST_MOUNTED, LEAST_TURN = np.radians(20.0), 0.5
+"""Angle between the axes of force and motion [rad] that no anisotropy and no calibration explains; turn of the contact
+[rad] below which axes of the world and of the contact are the same."""
 
 
 @dataclass(frozen=True)
@@ -100,8 +83,7 @@ def check_logs(logs: Sequence[Log], patch: ContactPatch, names: Sequence[str] = 
 
     Raises InvalidValueError, one line, for what no fit can make sense of.
     """
-    findings = [finding for log in logs for finding in check_log(log, patch)]
-    findings += check_loads(logs, names)
+    findings = [*(finding for log in logs for finding in check_log(log, patch)), *check_loads(logs, names)]
     for finding in findings:
         if finding.refuses:
             raise InvalidValueError(finding.name, finding.rule, finding.found)
@@ -114,9 +96,8 @@ def with_findings(result: Identification, logs: Sequence[Log], findings: Sequenc
     estimates, least = result.estimates, {name: low for name, (low, _) in result.intervals().items()}
     # where sigma_1 may be 0, or nobody knows it, its corner may lie anywhere
     if "sigma_0" in estimates and least.get("sigma_1", 0.0) > 0.0:
-        sampled = [check_sampling(log, estimates["sigma_0"], estimates["sigma_1"]) for log in logs]
-        found += [finding for finding in sampled if finding is not None]
-    verdicts = [Verdict("fit", False, str(finding)) for finding in found]
+        found += [check_sampling(log, estimates["sigma_0"], estimates["sigma_1"]) for log in logs]
+    verdicts = [Verdict("fit", False, str(finding)) for finding in found if finding is not None]
     return dataclasses.replace(result, verdicts=(*result.verdicts, *verdicts))
 
 
@@ -239,20 +220,13 @@ def _readings(sliding: Sliding) -> Iterator[tuple[str, np.ndarray, np.ndarray]]:
     ):
         yield words, twist, wrench * signs
     if np.ptp(turned) > LEAST_TURN:
-        yield "if the twist is in world axes", _rotated(twist, -turned), wrench
-        yield "if the wrench is in world axes", twist, _rotated(wrench, -turned)
+        yield "if the twist is in world axes", rotate(twist, -turned), wrench
+        yield "if the wrench is in world axes", twist, rotate(wrench, -turned)
     for scale in NEAR[::4]:
         expected, measured = (each[:, 0] + 1j * each[:, 1] for each in (sliding.friction(twist, scale), wrench))
         angle = float(np.angle((expected * measured.conj()).sum()))
         if abs(angle) > LEAST_MOUNTED:
-            yield f"with fx and fy turned by {np.degrees(angle):.0f} deg", twist, _rotated(wrench, angle)
-
-
-def _rotated(vectors: np.ndarray, angle: float | np.ndarray) -> np.ndarray:
-    """Rotate planar vectors with a third component, `[S, 3]`, by an angle."""
-    cos, sin = np.cos(angle), np.sin(angle)
-    x, y, z = vectors.T
-    return np.stack([cos * x - sin * y, sin * x + cos * y, z], -1)
+            yield f"with fx and fy turned by {np.degrees(angle):.0f} deg", twist, rotate(wrench, angle)
 
 
 # ---------------------------------------------------------------------- times, speeds, loads
@@ -265,11 +239,8 @@ def check_times(log: Log, size: float) -> Finding | None:
     seen = f"{1e3 * moved:.3g} mm between samples {log.interval:.3g} s apart, contact radius {1e3 * size:.3g} mm"
     if log.interval >= SLOW and moved > TRAVEL * size:
         return Finding(f"t of {log.name}", "be in s", f"{seen}: is it in ms?")
-    if speed > SPEEDY or moved > size:
-        return Finding(
-            f"twist of {log.name}", "be in m/s and rad/s", f"{seen}: are vx and vy in mm/s, or omega in deg/s?"
-        )
-    return None
+    text = f"{seen}: are vx and vy in mm/s, or omega in deg/s?"
+    return Finding(f"twist of {log.name}", "be in m/s and rad/s", text) if speed > SPEEDY or moved > size else None
 
 
 def check_friction(log: Log, size: float) -> Finding | None:
@@ -277,9 +248,8 @@ def check_friction(log: Log, size: float) -> Finding | None:
     loaded = log.normal_force > 0.0
     if not loaded.any():
         return None
-    force = np.linalg.norm(log.wrench[loaded, :2], axis=1) / log.normal_force[loaded]
-    torque = np.abs(log.wrench[loaded, 2]) / (size * log.normal_force[loaded])
-    force, torque = float(np.quantile(force, 0.9)), float(np.quantile(torque, 0.9))
+    each = np.linalg.norm(log.wrench[loaded, :2], axis=1), np.abs(log.wrench[loaded, 2]) / size
+    force, torque = (float(np.quantile(part / log.normal_force[loaded], 0.9)) for part in each)
     if force > HIGH:
         text = f"friction of {force:.3g} times the load: is normal_force in kg or kN?"
         return Finding(f"normal_force of {log.name}", "be in N", text)
@@ -295,10 +265,9 @@ def check_unloaded(log: Log, size: float) -> Finding | None:
     bare = log.normal_force == 0.0
     if bare.sum() < LEAST or not np.median(force[bare]) > STRONG * np.quantile(force, 0.95):
         return None
+    rule = f"be > 0 where there is friction (it is 0 in {bare.sum()} samples)"
     text = f"friction of {np.median(force[bare]):.3g} N there: does the load cell have an offset?"
-    return Finding(
-        f"normal_force of {log.name}", f"be > 0 where there is friction (it is 0 in {bare.sum()} samples)", text
-    )
+    return Finding(f"normal_force of {log.name}", rule, text)
 
 
 def check_loads(logs: Sequence[Log], names: Sequence[str]) -> list[Finding]:
@@ -307,19 +276,19 @@ def check_loads(logs: Sequence[Log], names: Sequence[str]) -> list[Finding]:
     loads = np.array([_load(log) for log in logs])
     if not wanted or loads.max() > (1.0 + ALIKE) * loads.min():
         return []
-    which = ", ".join(wanted)
-    return [Finding("normal_force", f"differ between logs to determine {which}", f"{loads.mean():.4g} N throughout")]
+    rule = f"differ between logs to determine {', '.join(wanted)}"
+    return [Finding("normal_force", rule, f"{loads.mean():.4g} N throughout")]
 
 
 def check_sampling(log: Log, sigma_0: float, sigma_1: float) -> Finding | None:
     """Check that samples reach the corner `sigma_0/(2 pi sigma_1)` above which the damping of bristles shows."""
-    if not sigma_0 > 0.0 or not sigma_1 > 0.0:
+    if not (sigma_0 > 0.0 and sigma_1 > 0.0):
         return None
     corner, rate = sigma_0 / (2.0 * np.pi * sigma_1), 1.0 / log.interval
     if rate >= 2.0 * corner:
         return None
-    rule = f"be taken at {2.0 * corner:.3g} Hz or more to determine sigma_1"
-    rule += f" (corner frequency sigma_0/(2 pi sigma_1): {corner:.3g} Hz)"
+    why = f"to determine sigma_1 (corner frequency sigma_0/(2 pi sigma_1): {corner:.3g} Hz)"
+    rule = f"be taken at {2.0 * corner:.3g} Hz or more {why}"
     return Finding(f"samples of {log.name}", rule, f"{rate:.3g} Hz")
 
 

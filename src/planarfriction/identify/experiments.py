@@ -39,18 +39,12 @@ NOISE = 0.01
 REFINE = 4
 """Steps between two samples."""
 
-KNOWN = 0.5
-"""Standard error over the value above which a parameter counts as unknown."""
+KNOWN, FAINT = 0.5, 1e-14
+"""Standard error over the value above which a parameter counts as unknown, and share of the largest information below
+which rounding decides."""
 
-
-FAINT = 1e-14
-"""Share of the largest information below which rounding decides."""
-
-SAMPLES = 100, 100_000
-"""Fewest samples that show a motion, and most samples of a plan."""
-
-LOADS = 20
-"""Most loads of a plan."""
+SAMPLES, LOADS = (100, 100_000), 20
+"""Fewest samples that show a motion, and most samples and most loads of a plan."""
 
 SINES = (2.3, 1.7, 3.1)
 """Frequencies of vx, vy and omega [Hz]: no two periods meet again soon."""
@@ -58,14 +52,9 @@ SINES = (2.3, 1.7, 3.1)
 SLOWEST = 1e-3
 """Speed at the begin of a slide over its largest speed."""
 
-STROKE = 3.0
-"""Amplitude of reversals over the displacement at which bristles break away, `mu_s/sigma_0`."""
-
-SLOW = 1.0
-"""Frequency of slow reversals [Hz]."""
-
-PER_PERIOD = 25.0
-"""Samples of a period of the quickest reversals."""
+STROKE, SLOW, PER_PERIOD = 3.0, 1.0, 25.0
+"""Amplitude of reversals over the displacement at which bristles break away, `mu_s/sigma_0`; frequency of the slow ones
+[Hz], and samples of a period of the quickest."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -167,7 +156,10 @@ def design_experiment(
     validation.instance("law", law, LuGre, "a LuGre law")
     if "breakaway_ratio" in names and law.elasto_plastic is None:
         raise InvalidValueError("parameters", "contain breakaway_ratio only for elasto-plastic bristles", names)
-    groups, before = check_groups(nuisance), () if isinstance(logs, (list, tuple)) and not logs else as_logs(logs)
+    groups, before = (
+        check_groups("nuisance", nuisance),
+        () if isinstance(logs, (list, tuple)) and not logs else as_logs(logs),
+    )
     chosen = names if wanted is None else known.check_names(wanted, names)
     if motions is None:
         loads = sorted({float(f"{np.median(log.normal_force):.3g}") for log in before}) or [1.0]
@@ -184,23 +176,13 @@ def design_experiment(
 
 def _ranked(information: _Information, so_far: np.ndarray, motions: Sequence[Log], pick: Sequence[int]) -> MotionPlan:
     """Rank motions by the information on the picked parameters that they add to that so far, `[F + S, F + S]`."""
-    start, expected, gains, errors = information.covariance(so_far), [], [], []
-    for each in motions:
-        shown = information.expected(each)
-        expected.append(shown)
-        added = information.of_logs((information.measured(shown),), information.groups)
-        after = information.covariance(so_far + added)
-        gains.append(_entropy(start, pick) - _entropy(after, pick))
-        errors.append(information.errors(after))
-    order = np.argsort(-np.array(gains), kind="stable")
-    return MotionPlan(
-        information.names,
-        information.values,
-        tuple(expected[i] for i in order),
-        np.array(gains)[order],
-        information.errors(start),
-        np.array(errors)[order],
-    )
+    start, expected = information.covariance(so_far), [information.expected(each) for each in motions]
+    added = [information.of_logs((information.measured(each),), information.groups) for each in expected]
+    after = [information.covariance(so_far + each) for each in added]
+    gains = np.array([_entropy(start, pick) - _entropy(each, pick) for each in after])
+    errors, order = np.array([information.errors(each) for each in after]), np.argsort(-gains, kind="stable")
+    ranked = tuple(expected[i] for i in order), gains[order], information.errors(start), errors[order]
+    return MotionPlan(information.names, information.values, *ranked)
 
 
 def current_estimate(found: Identification, patch: ContactPatch, law: LuGre) -> tuple[ContactPatch, LuGre]:
@@ -213,14 +195,12 @@ def current_estimate(found: Identification, patch: ContactPatch, law: LuGre) -> 
     validation.instance("found", found, Identification, "an Identification")
     validation.instance("law", law, LuGre, "a LuGre law")
     good = [name for name, value in found.estimates.items() if found.errors[name] < KNOWN * abs(value)]
-    fields: dict[str, Any] = {
-        name: found.estimates[name] for name in good if name in known.LAW and name != "breakaway_ratio"
-    }
+    fields: dict[str, Any] = {"elasto_plastic": found.law.elasto_plastic} if "breakaway_ratio" in good else {}
     for name, (low, high) in found.intervals().items():
-        if name not in (*good, "breakaway_ratio") and name in known.LAW and not low <= getattr(law, name) <= high:
+        if name in good and name in known.LAW and name != "breakaway_ratio":
+            fields[name] = found.estimates[name]
+        elif name in known.LAW and name != "breakaway_ratio" and not low <= getattr(law, name) <= high:
             fields[name] = 0.5 * (low + high)
-    if "breakaway_ratio" in good:
-        fields["elasto_plastic"] = found.law.elasto_plastic
     fields["mu_s"] = max(fields.get("mu_s", law.mu_s), fields.get("mu_c", law.mu_c))
     shape = {*known.SHAPE, *known.SOFT_FINGER} & set(found.names)
     moved = bool(shape) and shape <= {*good, "centre_x", "centre_y"}
@@ -246,12 +226,9 @@ class _Information:
 
     def prior(self) -> np.ndarray:
         """Return the information `[F + S, F + S]` a priori: a factor of 20 either way, and the rig's widths."""
-        width = np.full(len(self.names), PRIOR)
-        for i, name in enumerate(self.names):
-            if name in ("gamma", "mu_s"):
-                width[i] = SHAPE_PRIOR
-            elif name in ("centre_x", "centre_y"):
-                width[i] = float(self._probe.fixed_patch.contact_radius()) / self._scale[i]
+        centre = float(self._probe.fixed_patch.contact_radius()) / self._scale
+        width = np.where(np.isin(self.names, ("centre_x", "centre_y")), centre, PRIOR)
+        width[np.isin(self.names, ("gamma", "mu_s"))] = SHAPE_PRIOR
         shared = sum(column.log is None for column in self._probe.rig.columns)
         return np.diag(np.concatenate([width**-2.0, np.ones(shared)]))
 
@@ -298,7 +275,7 @@ def _entropy(covariance: np.ndarray, pick: Sequence[int]) -> float:
 def _noise(given: Any, logs: Sequence[Log], motions: Sequence[Log], patch: ContactPatch, law: LuGre) -> np.ndarray:
     """Return the noise `[3]` of the wrenches: as given, that of the logs, or a share of friction."""
     if given is not None:
-        return check_noise(given)
+        return check_noise("noise", given)
     if logs:
         return first_noise(logs)
     load = max(float(motion.normal_force.max()) for motion in motions)

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from planarfriction import validation
 from planarfriction.equality import ByValue
 from planarfriction.errors import FileError, InvalidValueError, shown
+from planarfriction.geometry import rotate
 from planarfriction.reading import Table
 from planarfriction.scenes import Solution
 
@@ -22,10 +23,10 @@ LEAST_SAMPLES = 10
 
 EVEN = 1e-3
 """Largest distance of a sample from an even grid of times, as a share of the sampling time: time stamps are rounded."""
+
 LEVER = 1e-9
 """Torque over force [m] up to which the torque is rounding: no contact and no offset is as small as a nanometre."""
 
-TIME = ("t",)
 TWIST = ("vx", "vy", "omega")
 MOTION = ("x", "y", "theta")
 WRENCH = ("fx", "fy", "tau")
@@ -47,16 +48,12 @@ UNITS = {
 
 _HEADING = re.compile(r"(?P<name>[^\[(]*?)\s*(?:[\[(](?P<unit>[^\])]*)[\])])?")
 
-TURN = 2.0 * np.pi
+TURN, QUARTER = 2.0 * np.pi, 0.5 * np.pi
+"""One turn, and largest step of an angle, or change of its step, between two samples that shows the turns [rad]."""
 
-QUARTER = 0.25 * TURN
-"""Largest step of an angle, or change of its step, between two samples for which turns can be counted [rad]."""
-
-ROUNDED = 1e-3
-"""Excess of the range of a wrapped angle over one turn that is put down to rounding [turns]."""
-
-NEIGHBOURS = 3
-"""Number of steps on either side with which a step is compared."""
+ROUNDED, NEIGHBOURS = 1e-3, 3
+"""Excess of the range of a wrapped angle over one turn that is put down to rounding [turns], and number of steps on
+either side with which a step is compared."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,25 +93,14 @@ class Log(ByValue):
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        time = validation.array("time", self.time, (None,))
-        samples = len(time)
-        if samples < LEAST_SAMPLES:
-            raise InvalidValueError(f"time of {self.name}", f"hold at least {LEAST_SAMPLES} samples", f"{samples}")
-        if not (np.diff(time) > 0.0).all():
-            row = int(np.argmax(np.diff(time) <= 0.0)) + 1
-            raise InvalidValueError(f"time of {self.name}", "increase", f"{time[row]:g} after {time[row - 1]:g} s")
+        time = increasing(self.time, f"time of {self.name}", LEAST_SAMPLES)
+        twist, wrench = (validation.array(name, getattr(self, name), (len(time), 3)) for name in ("twist", "wrench"))
         load = validation.numbers("normal_force", self.normal_force)
-        values = {
-            "time": time,
-            "twist": validation.array("twist", self.twist, (samples, 3)),
-            "wrench": validation.array("wrench", self.wrench, (samples, 3)),
-            "normal_force": validation.non_negative_array(
-                "normal_force", np.broadcast_to(load, samples) if load.ndim == 0 else load, (samples,)
-            ),
-        }
-        for name, value in values.items():
+        load = np.broadcast_to(load, len(time)) if load.ndim == 0 else load
+        load = validation.non_negative_array("normal_force", load, (len(time),))
+        self._set(time=time, twist=twist, wrench=wrench, normal_force=load)
+        for value in (time, twist, wrench, load):
             value.setflags(write=False)
-            object.__setattr__(self, name, value)
 
     @property
     def channels(self) -> np.ndarray:
@@ -153,7 +139,8 @@ class Log(ByValue):
 
         Raises InvalidValueError for such jumps, wrong shapes and times that do not grow.
         """
-        time, motion = _checked_motion(time, motion)
+        time = increasing(time)
+        motion = validation.array("motion", motion, (len(time), 3))
         motion[:, 2], turns = unwrapped(time, motion[:, 2], f"theta of {name}")
         return cls(time, differentiated(time, motion, window=window), wrench, normal_force, name, turns)
 
@@ -199,10 +186,9 @@ class Log(ByValue):
         if not isinstance(solution, Solution):
             raise InvalidValueError("solution", "be a Solution", type(solution).__name__)
         twist, index = solution.contact_twist(contact), solution.contact_index(contact)
-        columns = {name: np.asarray(solution.histories[name].values) for name in ("time", *WRENCH, "normal_force")}
-        wrench = np.stack([columns[name][:, index] for name in WRENCH], -1)
+        time, *wrench, load = (np.asarray(solution.histories[name].values) for name in ("time", *WRENCH, *LOAD))
         name = f"{solution.scene.name}, {solution.scene.contacts[index].name}"
-        return cls(columns["time"], twist, wrench, columns["normal_force"][:, index], name)
+        return cls(time, twist, np.stack(wrench, -1)[:, index], load[:, index], name)
 
 
 def as_logs(log: Log | Sequence[Log]) -> tuple[Log, ...]:
@@ -221,7 +207,8 @@ def differentiated(time: ArrayLike, motion: ArrayLike, *, window: int = 7) -> np
 
     Raises InvalidValueError for times that do not increase and for other jumps of theta.
     """
-    time, motion = _checked_motion(time, motion)
+    time = increasing(time)
+    motion = validation.array("motion", motion, (len(time), 3))
     motion[:, 2], _ = unwrapped(time, motion[:, 2])
     window = validation.count("window", window, at_least=3)
     if len(time) < window:
@@ -233,19 +220,19 @@ def differentiated(time: ArrayLike, motion: ArrayLike, *, window: int = 7) -> np
         scale = np.abs(since).max()
         powers = np.vander(since / scale, 3, increasing=True)
         slopes[i] = np.linalg.lstsq(powers, motion[first : first + window], rcond=None)[0][1] / scale
-    cos, sin = np.cos(motion[:, 2]), np.sin(motion[:, 2])
-    return np.stack(
-        [cos * slopes[:, 0] + sin * slopes[:, 1], cos * slopes[:, 1] - sin * slopes[:, 0], slopes[:, 2]], -1
-    )
+    return rotate(slopes, -motion[:, 2])
 
 
-def _checked_motion(time, motion) -> tuple[np.ndarray, np.ndarray]:
-    """Return increasing times `[T]` and a copy of the poses `[T, 3]`, or raise InvalidValueError."""
-    time = validation.array("time", time, (None,))
-    if not (np.diff(time) > 0.0).all():
-        row = int(np.argmax(np.diff(time) <= 0.0)) + 1
-        raise InvalidValueError("time", "increase", f"{time[row]:g} after {time[row - 1]:g} s")
-    return time, validation.array("motion", motion, (len(time), 3))
+def increasing(time: ArrayLike, name: str = "time", at_least: int = 0) -> np.ndarray:
+    """Return increasing times `[T]`, `at_least` as many, or raise InvalidValueError."""
+    result = validation.array("time", time, (None,))
+    if len(result) < at_least:
+        raise InvalidValueError(name, f"hold at least {at_least} samples", f"{len(result)}")
+    steps = np.diff(result)
+    if not (steps > 0.0).all():
+        row = int(np.argmax(steps <= 0.0)) + 1
+        raise InvalidValueError(name, "increase", f"{result[row]:g} after {result[row - 1]:g} s")
+    return result
 
 
 def columns_of(log: Log) -> Mapping[str, np.ndarray]:
@@ -267,31 +254,23 @@ def unwrapped(time: np.ndarray, angle: np.ndarray, name: str = "theta") -> tuple
     """
     if len(angle) < 2:
         return angle, 0
-    steps = np.diff(angle)
-    turns = np.round(steps / TURN)
+    measured = np.diff(angle)
+    turns = np.round(measured / TURN)
     wrapped = bool(turns.any()) and np.ptp(angle) <= (1.0 + ROUNDED) * TURN
-    if wrapped:
-        steps = steps - TURN * turns
-    else:
-        turns = np.zeros_like(turns)
-    jump = np.abs(steps - _usual(steps)) > QUARTER
-    if jump.any():
-        raise _refusal(time, np.diff(angle), jump, name, "only jump by whole turns")
-    fast = np.abs(steps) > QUARTER
-    if wrapped and fast.any():
-        raise _refusal(time, steps, fast, name, "turn by less than a quarter turn between samples, or be unwrapped")
-    return angle - TURN * np.concatenate([[0.0], np.cumsum(turns)]), int(np.count_nonzero(turns))
-
-
-def _usual(steps: np.ndarray) -> np.ndarray:
-    """Compute the median of each step and its neighbours, `[T - 1]`."""
+    turns = turns if wrapped else np.zeros_like(turns)
+    steps = measured - TURN * turns
     padded = np.pad(steps, NEIGHBOURS, mode="reflect" if len(steps) > NEIGHBOURS else "edge")
-    return np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * NEIGHBOURS + 1), axis=1)
-
-
-def _refusal(time: np.ndarray, steps: np.ndarray, where: np.ndarray, name: str, rule: str) -> InvalidValueError:
-    i = int(np.argmax(where))
-    return InvalidValueError(f"{name} [rad]", rule, f"a step of {steps[i]:.3g} at t = {time[i + 1]:g} s")
+    usual = np.median(np.lib.stride_tricks.sliding_window_view(padded, 2 * NEIGHBOURS + 1), axis=1)
+    jump, fast = np.abs(steps - usual) > QUARTER, wrapped & (np.abs(steps) > QUARTER)
+    for where, shown_steps, rule in (
+        (jump, measured, "only jump by whole turns"),
+        (fast, steps, "turn by less than a quarter turn between samples, or be unwrapped"),
+    ):
+        if where.any():
+            i = int(np.argmax(where))
+            found = f"a step of {shown_steps[i]:.3g} at t = {time[i + 1]:g} s"
+            raise InvalidValueError(f"{name} [rad]", rule, found)
+    return angle - TURN * np.concatenate([[0.0], np.cumsum(turns)]), int(np.count_nonzero(turns))
 
 
 # ---------------------------------------------------------------------- columns of a file
@@ -364,4 +343,4 @@ def _motion(named: dict[str, str], prefix: str) -> Sequence[str]:
 def _missing(named: dict[str, str], prefix: str, with_load: bool) -> list[str]:
     wanted = (*_motion(named, prefix), *WRENCH, *(LOAD if with_load else ()))
     lacking = [name for name in wanted if prefix + name not in named]
-    return [*([] if "t" in named or f"{prefix}t" in named else TIME), *lacking]
+    return [*([] if "t" in named or f"{prefix}t" in named else ["t"]), *lacking]

@@ -41,11 +41,9 @@ DRY = LuGre(mu_c=0.3, mu_s=0.3, v_s=1e-3, sigma_0=1e6, sigma_1=20.0, sigma_2=0.0
 
 CHANNELS = (("x", "m"), ("y", "m"), ("theta", "rad"))
 
-FIRST_NOISE = 1e-3
-"""Noise of the positions in the first fit [m]; that of the angles is this over the contact radius."""
-
-LEAST_NOISE = 1e-9
-"""Least noise of a channel [m, rad]."""
+FIRST_NOISE, LEAST_NOISE = 1e-3, 1e-9
+"""Noise of the positions in the first fit [m] (that of the angles is this over the contact radius), and least noise of
+a channel [m, rad]."""
 
 CHANGE = 0.01
 """Step of difference quotients as a share of a parameter (at least of its start).
@@ -166,11 +164,9 @@ class SlideProblem(Problem):
 
     @property
     def numbers(self) -> int:
-        """Number of measured numbers."""
         return sum(self.sizes())
 
     def sizes(self) -> list[int]:
-        """Return the number of residuals of each slide."""
         return [slide.pose.size for slide in self.slides]
 
     def start_values(self) -> np.ndarray:
@@ -180,7 +176,7 @@ class SlideProblem(Problem):
 
     def fitted_law(self, values: np.ndarray) -> LuGre:
         """Return the law with values `[F]`; `mu_s` equals `mu_c` if only the latter is estimated."""
-        given = dict(zip(self.names, values.tolist(), strict=True))
+        given = self.by_name(values)
         if "mu_c" in given:
             given.setdefault("mu_s", given["mu_c"])
         return fitted_law(self.law, given)
@@ -198,7 +194,6 @@ class SlideProblem(Problem):
         return [slide_poses(model, self.body, slide.time, s[:3], s[3:]) for slide, s in both]
 
     def even_sigma(self, noise: np.ndarray) -> list[np.ndarray]:
-        """Return the same noise for all samples, `[T, 3]` of each slide."""
         rows = np.broadcast_to(noise, (len(self.slides), 3))
         return [np.broadcast_to(row, slide.pose.shape) for row, slide in zip(rows, self.slides, strict=True)]
 

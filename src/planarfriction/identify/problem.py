@@ -11,6 +11,7 @@ import numpy as np
 from planarfriction import validation
 from planarfriction.derivatives import PARAMETERS, parameters_of
 from planarfriction.described import described
+from planarfriction.equality import Checked, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify import parameters as known
 from planarfriction.identify.logs import Log
@@ -22,8 +23,6 @@ from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
 from planarfriction.limit_surface.base import scaling
 from planarfriction.patch import ContactPatch, SoftFinger
-
-BEGINS = ("rest", "steady")
 
 COARSE = 0.2
 """Largest error of an estimate from the size of the steps, as a share of its standard error."""
@@ -38,43 +37,49 @@ CONSTANT = 0.1
 """Share by which the load of a log may stray from its mean if the patch changes with the load."""
 
 
+def check_noise(name: str, noise: Any) -> np.ndarray:
+    """Return the noise `[3]`, all of it > 0, or raise InvalidValueError."""
+    values = validation.vector(name, noise, 3)
+    if not (values > 0.0).all():
+        raise InvalidValueError(name, "be > 0", values.tolist())
+    return values
+
+
+def _noise(name: str, noise: Any) -> tuple[float, ...]:
+    return tuple(check_noise(name, noise).tolist())
+
+
+def _surface(name: str, value: Any) -> type[LimitSurface]:
+    if not (isinstance(value, type) and issubclass(value, LimitSurface)):
+        raise InvalidValueError(name, "be a class of limit surfaces", value)
+    return value
+
+
 @described
 @dataclass(frozen=True)
-class FitOptions:
+class FitOptions(Checked):
     """Options of `identify_lugre` that few fits change.
 
     Raises InvalidValueError for an option that breaks its rule.
     """
 
-    nuisance: Sequence[str] = GROUPS
+    nuisance: Sequence[str] = checked(check_groups, default=GROUPS)
     """Disturbances that the rig may add: "delay" between motion and wrench, "bias" (zeros of the wrench and their
     drift), "load" (scale and drift of the load cell), "twist" (noise of the twist). All by default."""
-    noise: Sequence[float] | None = None
+    noise: Sequence[float] | None = checked(_noise, default=None)
     """Standard deviation of the measured fx, fy [N] and tau [N m]; None estimates each from its jitter."""
-    begins: str = "rest"
+    begins: str = checked(validation.choice, ("rest", "steady"), default="rest")
     """Bristles at the begin of every log: relaxed ("rest"), or as in steady sliding at the first twist ("steady")."""
-    refine: int | None = None
+    refine: int | None = checked(validation.count, default=None)
     """Steps between two samples; None doubles them until no estimate changes by more than a fifth of its error."""
-    starts: int = 4
+    starts: int = checked(validation.count, default=4)
     """Number of starting points."""
-    seed: int = 0
+    seed: int = checked(validation.count, 0, default=0)
     """Random seed that scatters the starting points."""
     elasto_plastic: ElastoPlastic | float | None = ElastoPlastic(0.9)  # noqa: RUF009 (frozen)
     """Kind of bristles, unless a whole law is given as start."""
-    surface: type[LimitSurface] = LimitSurfaceTablePublished
+    surface: type[LimitSurface] = checked(_surface, default=LimitSurfaceTablePublished)
     """Class of the limit surface of the model "reduced-published"."""
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "nuisance", check_groups(self.nuisance))
-        if self.noise is not None:
-            object.__setattr__(self, "noise", tuple(check_noise(self.noise).tolist()))
-        validation.choice("begins", self.begins, BEGINS)
-        if self.refine is not None:
-            validation.count("refine", self.refine)
-        validation.count("starts", self.starts)
-        validation.count("seed", self.seed, 0)
-        if not (isinstance(self.surface, type) and issubclass(self.surface, LimitSurface)):
-            raise InvalidValueError("surface", "be a class of limit surfaces", self.surface)
 
 
 class Problem:
@@ -133,6 +138,10 @@ class Problem:
 
         return evaluate
 
+    def by_name(self, values: np.ndarray) -> dict[str, float]:
+        """Return the values of the contact by name."""
+        return dict(zip(self.names, values.tolist(), strict=False))
+
     def by_log(self, rows: np.ndarray) -> Iterator[np.ndarray]:
         """Yield the rows `[T, 3, C]` of each log or slide among flat ones `[M, C]`."""
         at = 0
@@ -155,13 +164,11 @@ class LogProblem(Problem):
     ) -> None:
         self.logs, self.patch, self.names, self.law = logs, patch, names, law
         self.options, self.model = options, model
-        _check_finger(patch, [name for name in names if name in known.SOFT_FINGER])
         loads = [mean_load(log) for log in logs]
-        _check_wrenches(logs)
+        _check(logs, loads, patch, [name for name in names if name in known.SOFT_FINGER])
         self.reference_load = float(np.median(loads))
         self.fixed_patch = patch
         if patch.depends_on_load:
-            _check_constant(logs, loads)
             density = patch.weights(self.reference_load) / patch.areas
             self.fixed_patch = ContactPatch(patch.positions, patch.areas, density, patch.grid, patch.name)
         self.maps = self._maps(loads)
@@ -203,15 +210,12 @@ class LogProblem(Problem):
 
     @property
     def numbers(self) -> int:
-        """Number of measured numbers."""
         return sum(int(log.channels.sum()) * len(log.time) for log in self.logs)
 
     def coordinates(self, start: np.ndarray) -> Coordinates:
-        """Return the optimiser's coordinates for a search from values `[F]`, with those of the rig."""
         return Coordinates(self.names, start, self.law.mu_c, self.rig.widths, self.rig.limits)
 
     def sizes(self) -> list[int]:
-        """Return the number of residuals of each log."""
         return [3 * len(log.time[used]) for log, used in zip(self.logs, self.used, strict=True)]
 
     def refine_steps(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> bool:
@@ -262,14 +266,10 @@ class LogProblem(Problem):
         return result
 
     def linearised(self, values: np.ndarray, sigma: Sequence[np.ndarray]) -> tuple[np.ndarray, np.ndarray]:
-        """Compute the residuals over `sigma`, `[M]`, and their derivatives `[M, F + K]` with respect to the values."""
-        residuals, slopes = [], []
-        both = zip(self._derived(values), self.logs, self.used, sigma, strict=True)
-        for (shown, derivatives), log, used, each in both:
-            seen = (log.channels / each)[used]
-            residuals.append(((shown - log.wrench)[used] * seen).ravel())
-            slopes.append((derivatives[used] * seen[:, :, None]).reshape(-1, derivatives.shape[-1]))
-        return np.concatenate(residuals), np.concatenate(slopes)
+        shown, slopes = zip(*self._derived(values), strict=True)
+        both = zip(slopes, self.logs, self.used, sigma, strict=True)
+        rows = [(slope * (log.channels / each)[..., None])[used] for slope, log, used, each in both]
+        return self._scaled(shown, sigma), np.concatenate([each.reshape(-1, each.shape[-1]) for each in rows])
 
     def _derived(self, values: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """Compute shown wrenches `[T, 3]` and their derivatives `[T, 3, F + K]`; the last ones are remembered."""
@@ -300,7 +300,6 @@ class LogProblem(Problem):
         )
 
     def even_sigma(self, noise: np.ndarray) -> list[np.ndarray]:
-        """Return the same noise for all samples, `[T, 3]` of each log."""
         return [np.broadcast_to(noise, log.wrench.shape) for log in self.logs]
 
     def estimate_noise(self, values: np.ndarray, noise: np.ndarray) -> tuple[np.ndarray, list[np.ndarray]]:
@@ -346,6 +345,16 @@ class LogProblem(Problem):
             result.append(self._scaled(change, sigma))
         return np.array(result)
 
+    def coefficients(self, values: np.ndarray) -> list[np.ndarray]:
+        """Compute friction over load [-], `[T]` of each log; NaN without load."""
+        contact, _ = self.split(values)
+        radii = [each.vector(contact)[RADIUS] for each in self.maps]
+        sizes = [np.linalg.norm(log.wrench / [1.0, 1.0, r], axis=1) for log, r in zip(self.logs, radii, strict=True)]
+        return [
+            size / np.where(log.normal_force > 0.0, log.normal_force, np.nan)
+            for size, log in zip(sizes, self.logs, strict=True)
+        ]
+
     def sliding(self, values: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """Compute the sliding speed `|V_S|` and its part from spin [m/s], `[T]` each, of each log."""
         contact, _ = self.split(values)
@@ -358,14 +367,6 @@ class LogProblem(Problem):
         return result
 
 
-def check_noise(noise: Any) -> np.ndarray:
-    """Return the noise `[3]`, all of it > 0, or raise InvalidValueError."""
-    values = validation.vector("noise", noise, 3)
-    if not (values > 0.0).all():
-        raise InvalidValueError("noise", "be > 0", values.tolist())
-    return values
-
-
 def mean_load(log: Log) -> float:
     """Return the mean of the loads > 0 of a log [N], or raise InvalidValueError."""
     loaded = log.normal_force[log.normal_force > 0.0]
@@ -374,24 +375,18 @@ def mean_load(log: Log) -> float:
     return float(loaded.mean())
 
 
-def _check_finger(patch: ContactPatch, names: Sequence[str]) -> None:
+def _check(logs: Sequence[Log], loads: Sequence[float], patch: ContactPatch, names: Sequence[str]) -> None:
+    """Check that a fit can take the logs and their mean loads on a patch, and estimate `names` of a soft finger."""
     if names and not isinstance(patch.pressure, SoftFinger):
         raise InvalidValueError("patch", f"have a SoftFinger pressure to estimate {', '.join(names)}", patch.name)
     for name in ("k", "k_per_newton"):
         if name in names and getattr(patch.pressure, name) is None:
             raise InvalidValueError("parameters", f"contain {name} only if the SoftFinger has it", name)
-
-
-def _check_wrenches(logs: Sequence[Log]) -> None:
     for log in logs:
         if not log.wrench.any():
             raise InvalidValueError(f"wrench of {log.name}", "not be 0 throughout", "0 in every sample")
-
-
-def _check_constant(logs: Sequence[Log], loads: Sequence[float]) -> None:
     for log, load in zip(logs, loads, strict=True):
-        if np.abs(log.normal_force / load - 1.0).max() > CONSTANT:
+        if patch.depends_on_load and np.abs(log.normal_force / load - 1.0).max() > CONSTANT:
             rule = "stay within 10 % of its mean if the patch changes with the load (make one log for each load)"
-            raise InvalidValueError(
-                f"normal_force of {log.name}", rule, f"{log.normal_force.min():g} .. {log.normal_force.max():g} N"
-            )
+            found = f"{log.normal_force.min():g} .. {log.normal_force.max():g} N"
+            raise InvalidValueError(f"normal_force of {log.name}", rule, found)

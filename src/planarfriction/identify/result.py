@@ -110,34 +110,26 @@ class Identification(ByValue):
 
     def rows(self) -> list[list[str]]:
         """Return a row of text for each parameter: name, estimate, standard error, 95 % interval, unit, verdict."""
-        rows = []
-        intervals = self.intervals()
+        rows, intervals = [], self.intervals()
         for name, value, error in zip(self.names, self.values, self.standard_errors, strict=True):
             low, high = intervals[name]
-            identifiable = self.identifiable(name)
-            remark = "; ".join(each.reason for each in self.verdicts if each.parameter == name)
-            rows.append(
-                [
-                    name,
-                    f"{value:.5g}",
-                    f"{error:.2g}" if np.isfinite(error) and error < 1e3 * max(abs(value), 1e-12) else "unknown",
-                    f"{low:.4g} .. {high:.4g}" if identifiable else "",
-                    ALL[name].unit,
-                    remark if identifiable else f"not identifiable, {remark}",
-                ]
-            )
+            known = np.isfinite(error) and error < 1e3 * max(abs(value), 1e-12)
+            shown, remark = f"{low:.4g} .. {high:.4g}", self._remark(name)
+            shown, remark = (shown, remark) if self.identifiable(name) else ("", f"not identifiable, {remark}")
+            rows.append([name, f"{value:.5g}", f"{error:.2g}" if known else "unknown", shown, ALL[name].unit, remark])
         return rows
+
+    def _remark(self, name: str) -> str:
+        return "; ".join(each.reason for each in self.verdicts if each.parameter == name)
 
     def table(self) -> str:
         """Return the summary and a table in 80 columns: estimates, 95 % intervals, cautions, and the rig."""
         lines, remarks, intervals = [], [], self.intervals()
         for name, value in zip(self.names, self.values, strict=True):
-            identifiable = self.identifiable(name)
             low, high = intervals[name]
-            shown = f"{low:.4g} .. {high:.4g}" if identifiable else "not identifiable"
+            shown = f"{low:.4g} .. {high:.4g}" if self.identifiable(name) else "not identifiable"
             lines.append(f"{name:<16}{value:>11.5g}   {shown:<26}{ALL[name].unit}".rstrip())
-            reasons = "; ".join(each.reason for each in self.verdicts if each.parameter == name)
-            if reasons:
+            if reasons := self._remark(name):
                 remarks.append(textwrap.fill(f"{name}: {reasons}", WIDTH, subsequent_indent="  "))
         heading = f"{'parameter':<16}{'estimate':>11}   {'95 % interval':<26}unit"
         rig = [
@@ -167,15 +159,13 @@ class Identification(ByValue):
         def plain(value: float) -> float | None:
             return float(value) if np.isfinite(value) else None
 
+        def estimate(value: float, error: float, interval: tuple[float, float], unit: str) -> dict[str, Any]:
+            edges = [plain(edge) for edge in interval]
+            return {"estimate": float(value), "standard_error": plain(error), "interval_95": edges, "unit": unit}
+
         intervals = self.intervals()
         parameters = {
-            name: {
-                "estimate": float(value),
-                "standard_error": plain(error),
-                "interval_95": [plain(edge) for edge in intervals[name]],
-                "unit": ALL[name].unit,
-                "identifiable": self.identifiable(name),
-            }
+            name: {**estimate(value, error, intervals[name], ALL[name].unit), "identifiable": self.identifiable(name)}
             for name, value, error in zip(self.names, self.values, self.standard_errors, strict=True)
         }
         return {
@@ -184,14 +174,7 @@ class Identification(ByValue):
             "verdicts": [str(each) for each in self.verdicts],
             "noise": {name: plain(value) for (name, _), value in zip(self.channels, self.noise, strict=True)},
             "rig": [
-                {
-                    "name": each.name,
-                    "log": each.log,
-                    "estimate": each.value,
-                    "standard_error": plain(each.error),
-                    "interval_95": [plain(edge) for edge in each.interval],
-                    "unit": each.unit,
-                }
+                {"name": each.name, "log": each.log, **estimate(each.value, each.error, each.interval, each.unit)}
                 for each in self.rig
             ],
             "model": self.chosen,

@@ -25,26 +25,20 @@ CHANNELS = (("fx", "N"), ("fy", "N"), ("tau", "N m"))
 DELAY, LONGEST = 0.01, 0.05
 """Standard deviation of the delay a priori, and the longest delay that is tried [s]."""
 
-BIAS, ZERO_DRIFT = 0.1, 0.05
-"""Standard deviations of the zeros and of their drift a priori, as shares of the largest value of the channel."""
+BIAS, ZERO_DRIFT, LEAST_FORCE = 0.1, 0.05, 1e-3
+"""Standard deviations of the zeros and of their drift a priori, as shares of the largest value of the channel, and
+least value that a force channel counts as, also if it stays at 0, as a share of the largest force."""
 
-LEAST_FORCE = 1e-3
-"""Least value that a force channel counts as, also if it stays at 0, as a share of the largest force."""
-
-DRIFT = (0.05, 0.02, 0.02)
-"""Standard deviations of the drift of the load cell by degree [-]; the first is half of the change over the log."""
-
-SCALE = 0.005
-"""Standard deviation of the scale of a calibrated load cell [-]."""
+SCALE, DRIFT = 0.005, (0.05, 0.02, 0.02)
+"""Standard deviations of the scale of a calibrated load cell [-], and of its drift by degree [-]; the first of these is
+half of the change over the log."""
 
 EDGE = 1.5
 """Half the range of a load cell's drift over the standard deviation of its scale: it is unknown when it was right."""
 
-ORDER = 3
-"""Order of the differences that give the noise: motions at a tenth of the sampling rate leave 2 % of themselves."""
-
-SIZE = float(np.sqrt(20.0))
-"""Standard deviation of third differences of unit noise: 1 + 9 + 9 + 1 under the root."""
+ORDER, SIZE = 3, float(np.sqrt(20.0))
+"""Order of the differences that give the noise (motions at a tenth of the sampling rate leave 2 % of themselves), and
+standard deviation of these differences of unit noise: 1 + 9 + 9 + 1 under the root."""
 
 MEDIAN = 1.4826
 """Standard deviation of a normal distribution over its median absolute value."""
@@ -55,11 +49,8 @@ CLIP, CLIP_VARIANCE, CLIPPED = 3.0, 0.9733, 5
 LEAST_NOISE = 1e-3
 """Least noise of a sensor, as a share of the largest force or torque."""
 
-QUIET = 1e-3
-"""Noise of a twist, as a share of its root mean square, below which it is not smoothed."""
-
-LEAST_TO_SMOOTH = 50
-"""Least number of samples of a twist that is smoothed."""
+QUIET, LEAST_TO_SMOOTH = 1e-3, 50
+"""Noise of a twist, as a share of its root mean square, and number of samples, below which it is not smoothed."""
 
 SMOOTHNESS = 10.0 ** np.arange(0.0, 10.0, 0.25)
 """Weights of the third differences among which a smooth twist is chosen."""
@@ -91,6 +82,10 @@ class _Column:
     log: int | None
     width: float
     """Standard deviation a priori [unit]."""
+    degree: int = 0
+    """Degree of the Legendre polynomial over the log."""
+    channel: int | None = None
+    """Channel to which it adds; None for the factor of all."""
 
 
 class Rig:
@@ -98,23 +93,31 @@ class Rig:
 
     def __init__(self, logs: Sequence[Log], groups: Sequence[str]):
         self.logs, self.groups = logs, tuple(groups)
-        columns = []
-        if "delay" in groups:
-            columns.append(_Column("delay", "s", None, DELAY))
-        if "load" in groups:
-            columns.append(_Column("load_scale", "-", None, SCALE))
+        columns = [_Column("delay", "s", None, DELAY)] if "delay" in groups else []
+        columns += [_Column("load_scale", "-", None, SCALE)] if "load" in groups else []
         for i, log in enumerate(logs):
             largest = np.abs(log.wrench).max(axis=0)
             largest[:2] = np.maximum(largest[:2], LEAST_FORCE * largest[:2].max())
             for k, (channel, unit) in enumerate(CHANNELS):
                 if "bias" in groups and log.channels[k]:
-                    columns.append(_Column(f"bias_{channel}", unit, i, BIAS * largest[k]))
-                    columns.append(_Column(f"zero_drift_{channel}", unit, i, ZERO_DRIFT * largest[k]))
-            if "load" in groups:
-                names = ["load_drift", *(f"load_drift_{k}" for k in range(2, len(DRIFT) + 1))]
-                columns += [_Column(name, "-", i, width) for name, width in zip(names, DRIFT, strict=True)]
+                    columns.append(_Column(f"bias_{channel}", unit, i, BIAS * largest[k], 0, k))
+                    columns.append(_Column(f"zero_drift_{channel}", unit, i, ZERO_DRIFT * largest[k], 1, k))
+            for k, width in enumerate(DRIFT if "load" in groups else (), start=1):
+                columns.append(_Column("load_drift" if k == 1 else f"load_drift_{k}", "-", i, width, k))
         self.columns = tuple(columns)
         self.widths = np.array([each.width for each in columns])
+        self._effects = [self._effects_on(i) for i in range(len(logs))]
+
+    def _effects_on(self, i: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the derivatives `[T, K]` of the factor on the wrench of log i, and those `[T, 3, K]` of its zeros."""
+        time = self.logs[i].time
+        shapes = np.polynomial.legendre.legvander(2.0 * (time - time[0]) / (time[-1] - time[0]) - 1.0, len(DRIFT))
+        factor, zeros = np.zeros((len(time), len(self.columns))), np.zeros((len(time), 3, len(self.columns)))
+        for j, column in enumerate(self.columns):
+            if column.log in (None, i) and column.name != "delay":
+                changed = factor[:, j] if column.channel is None else zeros[:, column.channel, j]
+                changed[:] = shapes[:, column.degree]
+        return factor, zeros
 
     @property
     def limits(self) -> np.ndarray:
@@ -132,45 +135,25 @@ class Rig:
 
         `later` is the derivative of the wrench with respect to the delay.
         """
-        u = self._course(i)
-        slopes, factor, added = np.zeros((*wrench.shape, len(self.columns))), np.ones(len(u)), np.zeros(wrench.shape)
-        shapes = self._shapes(u)
-        for j, column in enumerate(self.columns):
-            if column.log not in (None, i) or column.name == "delay":
-                continue
-            if column.name in shapes:
-                factor = factor + values[j] * shapes[column.name]
-                slopes[:, :, j] = shapes[column.name][:, None] * wrench
-            else:
-                k = [channel for channel, _ in CHANNELS].index(column.name.rsplit("_", 1)[1])
-                slopes[:, k, j] = u if column.name.startswith("zero") else 1.0
-                added[:, k] += values[j] * slopes[:, k, j]
+        by_factor, by_zeros = self._effects[i]
+        factor, slopes = 1.0 + by_factor @ values, by_factor[:, None] * wrench[:, :, None] + by_zeros
         if "delay" in self.groups:
             slopes[:, :, 0] = factor[:, None] * later
-        return factor[:, None] * wrench + added, factor, slopes
+        return factor[:, None] * wrench + by_zeros @ values, factor, slopes
 
-    def range_of_drift(self, values: np.ndarray) -> float:
-        """Compute half of the largest change of the load cell's factor over a log [-]."""
-        most = 0.0
-        for i in range(len(self.logs)):
-            shapes = self._shapes(self._course(i))
-            here = [(v, c) for v, c in zip(values, self.columns, strict=True) if c.log == i and c.name in shapes]
-            if here:
-                most = max(most, 0.5 * float(np.ptp(sum(v * shapes[c.name] for v, c in here))))
-        return most
+    @property
+    def _scale(self) -> np.ndarray:
+        """Mask `[K]` of the load cell's scale."""
+        return np.array([each.name == "load_scale" for each in self.columns], dtype=bool)
 
     def with_drift(self, values: np.ndarray) -> np.ndarray:
-        """Return the widths `[K]`, that of the load cell's scale grown by the cell's drift."""
-        widths = self.widths.copy()
-        for j, column in enumerate(self.columns):
-            if column.name == "load_scale":
-                widths[j] = np.hypot(SCALE, self.range_of_drift(values) / EDGE)
-        return widths
+        """Return the widths `[K]`, that of the load cell's scale grown by the cell's drift, half its largest range."""
+        drift = max(0.5 * float(np.ptp(by_factor @ values)) for by_factor, _ in self._effects)
+        return np.where(self._scale, np.hypot(SCALE, drift / EDGE), self.widths)
 
     def strain(self, values: np.ndarray) -> float:
         """Compute the scale of the load cell over its width: friction does not show this scale."""
-        at = [j for j, column in enumerate(self.columns) if column.name == "load_scale"]
-        return float(np.abs(values / self.with_drift(values))[at].max(initial=0.0))
+        return float(np.abs(values / self.with_drift(values))[self._scale].max(initial=0.0))
 
     def found(self, values: np.ndarray, errors: np.ndarray) -> tuple[Nuisance, ...]:
         """Return the estimates `[K]` with their standard errors `[K]` as records."""
@@ -180,24 +163,10 @@ class Rig:
             for c, v, e in zip(self.columns, values, errors, strict=True)
         )
 
-    def _course(self, i: int) -> np.ndarray:
-        time = self.logs[i].time
-        return 2.0 * (time - time[0]) / (time[-1] - time[0]) - 1.0
 
-    @staticmethod
-    def _shapes(u: np.ndarray) -> dict[str, np.ndarray]:
-        """Return the shapes of the load cell's factor over a log, `[T]` each, by name."""
-        return {
-            "load_scale": np.ones_like(u),
-            "load_drift": u,
-            "load_drift_2": 0.5 * (3.0 * u**2 - 1.0),
-            "load_drift_3": 0.5 * (5.0 * u**3 - 3.0 * u),
-        }
-
-
-def check_groups(nuisance: Any) -> tuple[str, ...]:
+def check_groups(name: str, nuisance: Any) -> tuple[str, ...]:
     """Return the names of disturbances as a tuple, each one of `GROUPS`, or raise InvalidValueError."""
-    return tuple(dict.fromkeys(validation.choices("nuisance", nuisance, GROUPS)))
+    return tuple(dict.fromkeys(validation.choices(name, nuisance, GROUPS)))
 
 
 # ---------------------------------------------------------------------- noise of the sensors

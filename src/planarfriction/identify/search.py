@@ -10,27 +10,20 @@ import numpy as np
 
 from planarfriction.identify.parameters import ALL, Coordinates
 from planarfriction.identify.problem import LogProblem, Problem
-from planarfriction.identify.simulators import RADIUS
 from planarfriction.laws import LuGre
 
 ROUGH, FINE = 0.1, 1e-3
 """Changes of the cost (half a sum of squares) below which a search ends, for rough starts and in the end: 0.001 is a
 change of an estimate by 0.04 standard errors."""
 
-ROUNDS = 6
-"""Most rounds of noise and finer steps."""
-
-STEADY = 0.02
-"""Largest change of the noise, as a share, from round to round for which it is settled."""
+ROUNDS, STEADY = 6, 0.02
+"""Most rounds of noise and finer steps, and largest change of the noise, as a share, for which it is settled."""
 
 NEAR = 4.0
 """Mean square of the residuals over that of the noise up to which a rough fit is near the data: steps are coarse."""
 
-SAME_COST = 1e-3
-"""Largest difference of costs, as a share, between starts that found the same minimum."""
-
-MOST_EVALUATIONS = 100
-"""Most evaluations of one start."""
+MOST_EVALUATIONS, SAME_COST = 100, 1e-3
+"""Most evaluations of one start, and largest difference of costs, as a share, of starts that found one minimum."""
 
 SPEEDS, STIFFNESSES = 6, 7
 """Size of the grid of Stribeck speeds and stiffnesses from which a search starts."""
@@ -196,21 +189,14 @@ def _grid(problem: LogProblem, given: dict[str, float]) -> list[np.ndarray]:
         for sigma_0 in _stiffnesses(problem, speeds, mu_c) if "sigma_0" in wanted else [problem.law.sigma_0]:
             guess = {"mu_c": mu_c, "mu_s": mu_s, "v_s": v_s, "gamma": 1.5, "sigma_0": sigma_0}
             guess |= {"sigma_1": 0.3 * sigma_0 * interval, "sigma_2": 0.02 * mu_c / max(np.max(speeds[0]), 1e-9)}
-            values = [
-                guess[name] if name in wanted and name in guess else base[i] for i, name in enumerate(problem.names)
-            ]
-            results.append(np.array(values))
+            picked = {name: guess[name] for name in wanted if name in guess}
+            results.append(np.array([*(problem.by_name(base) | picked).values()]))
     return results
 
 
 def _friction(problem: LogProblem, speeds: list[np.ndarray]) -> tuple[float, float]:
     """Estimate the friction coefficients of fast sliding and of the largest friction."""
-    coefficients = []
-    for log, each in zip(problem.logs, problem.maps, strict=True):
-        radius = each.vector(problem.start_values())[RADIUS]
-        force = np.linalg.norm(log.wrench / [1.0, 1.0, radius], axis=1)
-        coefficients.append(force / np.where(log.normal_force > 0.0, log.normal_force, np.nan))
-    coefficient, speed = np.concatenate(coefficients), np.concatenate(speeds)
+    coefficient, speed = np.concatenate(problem.coefficients(problem.start_values())), np.concatenate(speeds)
     usable = np.isfinite(coefficient)
     coefficient, speed = coefficient[usable], speed[usable]
     fast = coefficient[speed >= np.quantile(speed, 0.7)]

@@ -55,9 +55,6 @@ class Simulator:
     own_radius = False
     """True if the contact radius is a number of its own, not that of the cells; the patch may then change with load."""
 
-    def __init__(self, patch: ContactPatch, law: LuGre, surface: type[LimitSurface] = LimitSurfaceTablePublished):
-        """Prepare the simulation of a patch of fixed shape."""
-
     @classmethod
     def model(cls, patch: ContactPatch, law: LuGre, surface: type[LimitSurface]) -> Any:
         """Make the friction model of a patch and a law."""
@@ -131,6 +128,10 @@ class ScaledSimulator(Simulator):
     def _inner(self, twists, loads, dt, vector) -> np.ndarray:
         raise NotImplementedError
 
+    def sensitivities(self, twists, loads, dt, vector, names):
+        base = self.wrenches(twists, loads, dt, vector)
+        return base, self._differences(twists, loads, dt, vector, names, base)
+
     def _differences(self, twists, loads, dt, vector, names, base):
         """Compute difference quotients of the wrenches, on all processors."""
         slopes = np.empty((*base.shape, len(names)))
@@ -156,10 +157,6 @@ class DistributedSimulator(ScaledSimulator):
         super().__init__(patch, law)
         x, y = (np.ascontiguousarray(column) for column in self.patch.positions.T)
         self._cells = distributed_step.Cells(x, y, np.ascontiguousarray(np.atleast_2d(self.patch.weights())))
-
-    def sensitivities(self, twists, loads, dt, vector, names):
-        base = self.wrenches(twists, loads, dt, vector)
-        return base, self._differences(twists, loads, dt, vector, names, base)
 
     def work(self, parameters):
         return 0.03 * len(self.patch.positions) * (parameters + 1)
@@ -190,8 +187,7 @@ class ReducedSimulator(ScaledSimulator):
         if gamma not in self._models:
             if len(self._models) > 3:
                 self._models.pop(next(iter(self._models)))
-            law = dataclasses.replace(self._law, gamma=gamma)
-            self._models[gamma] = ReducedModel(self.patch, law, **MAP)
+            self._models[gamma] = ReducedModel(self.patch, dataclasses.replace(self._law, gamma=gamma), **MAP)
         return self._models[gamma]
 
     def _inner(self, twists, loads, dt, vector):
@@ -202,17 +198,14 @@ class ReducedSimulator(ScaledSimulator):
         base = self.wrenches(twists, loads, dt, vector)
         known = [name for name in names if name in LAW_NAMES and name != "gamma"]
         rest = [name for name in names if name not in known]
+        model, numbers = self._model(float(vector[GAMMA])), np.delete(vector[:8], GAMMA)
+
+        def of_law(inner):
+            return rollout_jacobian(model, None, inner, loads, dt, known, parameters=numbers).d_wrenches
+
         slopes = np.empty((*base.shape, len(names)))
-        if known:
-            model, numbers = self._model(float(vector[GAMMA])), np.delete(vector[:8], GAMMA)
-
-            def of_law(inner):
-                return rollout_jacobian(model, None, inner, loads, dt, known, parameters=numbers).d_wrenches
-
-            slopes[..., [names.index(name) for name in known]] = self._placed(vector, twists, of_law)
-        if rest:
-            differences = self._differences(twists, loads, dt, vector, rest, base)
-            slopes[..., [names.index(name) for name in rest]] = differences
+        slopes[..., [names.index(name) for name in known]] = self._placed(vector, twists, of_law)
+        slopes[..., [names.index(n) for n in rest]] = self._differences(twists, loads, dt, vector, rest, base)
         return base, slopes
 
     def work(self, parameters):

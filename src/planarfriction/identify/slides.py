@@ -12,10 +12,12 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation
+from planarfriction.derivatives.scene_inputs import STATES
 from planarfriction.described import described
-from planarfriction.equality import ByValue
+from planarfriction.equality import ByValue, Checked, checked
 from planarfriction.errors import InvalidValueError
-from planarfriction.identify.logs import unwrapped
+from planarfriction.identify.logs import increasing, unwrapped
+from planarfriction.identify.problem import check_noise
 from planarfriction.identify.verdicts import Verdict
 from planarfriction.scenes import simulate
 from planarfriction.scenes.ready import free_slide
@@ -62,18 +64,13 @@ class Slide(ByValue):
     """Number of whole-turn jumps that were removed from the angle."""
 
     def __post_init__(self) -> None:
-        time = validation.array("time", self.time, (None,))
-        if len(time) < 5:
-            raise InvalidValueError(f"time of {self.name}", "hold at least 5 samples", f"{len(time)}")
-        if not (np.diff(time) > 0.0).all():
-            raise InvalidValueError(f"time of {self.name}", "increase", "a time that does not")
+        time = increasing(self.time, f"time of {self.name}", 5)
         pose = validation.array("pose", self.pose, (len(time), 3))
         pose[:, 2], turns = unwrapped(time, pose[:, 2], f"theta of {self.name}")
         twist = parabola(time, pose) if self.twist is None else validation.vector("twist", self.twist, 3)
-        for name, value in {"time": time - time[0], "pose": pose, "twist": twist}.items():
+        self._set(time=time - time[0], pose=pose, twist=twist, turns=turns)
+        for value in (self.time, self.pose, twist):
             value.setflags(write=False)
-            object.__setattr__(self, name, value)
-        object.__setattr__(self, "turns", turns)
 
     def first(self, samples: int) -> Slide:
         """Return the first samples of the slide, at least five.
@@ -86,22 +83,18 @@ class Slide(ByValue):
 
 @described
 @dataclass(frozen=True)
-class SlidingBody:
+class SlidingBody(Checked):
     """Body that slides: its mass and inertia, and gravity.
 
     Raises InvalidValueError for a mass, an inertia or a load that is not > 0.
     """
 
-    mass: float
+    mass: float = checked(validation.positive)
     """Mass [kg]; in a slide under the body's own weight only `inertia/mass` matters."""
-    inertia: float
+    inertia: float = checked(validation.positive)
     """Moment of inertia about the vertical through the centre of mass [kg m^2]."""
-    gravity: float = 9.81
+    gravity: float = checked(validation.positive, default=9.81)
     """Acceleration of gravity [m/s^2]."""
-
-    def __post_init__(self) -> None:
-        for name in ("mass", "inertia", "gravity"):
-            object.__setattr__(self, name, validation.positive(name, getattr(self, name)))
 
 
 def parabola(time: np.ndarray, pose: np.ndarray, samples: int = 8) -> np.ndarray:
@@ -115,36 +108,17 @@ def slide_poses(model: Any, body: SlidingBody, time: np.ndarray, pose: Any, twis
 
     A body that stopped stays where it is.
     """
+    from scipy.interpolate import CubicHermiteSpline
+
     length = float(time[-1] - time[0])
     every = max(length / max(len(time) - 1, 1), 1e-3)
-    scene = free_slide(
-        model,
-        mass=body.mass,
-        inertia=body.inertia,
-        twist=twist,
-        position=tuple(pose[:2]),
-        angle=float(pose[2]),
-        normal_force=body.mass * body.gravity,
-        t_end=length,
-    )
+    start = {"position": tuple(pose[:2]), "angle": float(pose[2]), "twist": twist}
+    load = body.mass * body.gravity
+    scene = free_slide(model, mass=body.mass, inertia=body.inertia, normal_force=load, t_end=length, **start)
     data = simulate(scene, save_every=every, **TOLERANCES).histories
     saved = data["time"].values
-    since = np.minimum(time - time[0], saved[-1])
-    left = np.clip(np.searchsorted(saved, since, side="right") - 1, 0, len(saved) - 2)
-    step = saved[left + 1] - saved[left]
-    share = (since - saved[left]) / step
-    columns = []
-    for place, speed in (("x", "vx"), ("y", "vy"), ("theta", "omega")):
-        p, v = data[place].values, data[speed].values
-        columns.append(_hermite(share, step, p[left], p[left + 1], v[left], v[left + 1]))
-    return np.stack(columns, -1)
-
-
-def _hermite(share, step, p0, p1, v0, v1):
-    """Evaluate the cubic through two positions with two speeds, at `share` of the step between them."""
-    rest = 1.0 - share
-    value = (1.0 + 2.0 * share) * rest**2 * p0 + share**2 * (3.0 - 2.0 * share) * p1
-    return value + step * share * rest * (rest * v0 - share * v1)
+    poses, twists = (np.stack([data[name].values for name in names], -1) for names in (STATES[3:], STATES[:3]))
+    return CubicHermiteSpline(saved, poses, twists)(np.minimum(time - time[0], saved[-1]))
 
 
 def start_slopes(model: Any, body: SlidingBody, slide: Slide, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -172,17 +146,13 @@ def fit_start(
     Raises InvalidValueError for a `noise` that is not > 0.
     """
     _check(body, slide)
-    noise = validation.vector("noise", noise, 3)
-    if not (noise > 0.0).all():
-        raise InvalidValueError("noise", "be > 0", noise.tolist())
     part = slide if samples is None else slide.first(samples)
-    return improve_start(model, body, part, start_of(slide), noise, 3)
+    return improve_start(model, body, part, start_of(slide), check_noise("noise", noise), 3)
 
 
 def _check(body: Any, slide: Any) -> None:
-    for name, value, kind in (("body", body, SlidingBody), ("slide", slide, Slide)):
-        if not isinstance(value, kind):
-            raise InvalidValueError(name, f"be a {kind.__name__}", value)
+    validation.instance("body", body, SlidingBody, "a SlidingBody")
+    validation.instance("slide", slide, Slide, "a Slide")
 
 
 def start_of(slide: Slide) -> np.ndarray:

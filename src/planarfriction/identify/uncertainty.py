@@ -25,20 +25,15 @@ scale of the load cell."""
 BLOCKS, FOLDS = 20, 5
 """Number of blocks that each log is cut into, every fifth of which is held out in turn."""
 
-LONGEST = 0.1
-"""Longest lag over which residuals may be correlated, as a share of the log."""
-
-DRAWS = 24
-"""Number of errors of the twists that are drawn."""
+LONGEST, DRAWS = 0.1, 24
+"""Longest lag over which residuals may be correlated, as a share of the log; number of drawn errors of the twists."""
 
 ALLOWANCE = 1.1
 """Factor on all standard errors for what linear ones leave out: curvature, steps, and the error of the noise itself."""
 
-HUGE = 1e200
-"""Variance that stands for an infinite one during a change of coordinates."""
-
-RIDGE = 1e-10
-"""Share of the largest curvature that holds parameters on which no sample depends."""
+HUGE, RIDGE = 1e200, 1e-10
+"""Variance that stands for an infinite one during a change of coordinates, and share of the largest curvature that
+holds parameters on which no sample depends."""
 
 
 @dataclass(frozen=True)
@@ -81,17 +76,15 @@ def uncertainty(fit: Fit) -> Uncertainty:
     pull = _pull(fit)
     # A value that rests on zero is as uncertain as its neighbours let it be; other bounds are no estimates.
     low = fit.coordinates.bounds()[0] == 0.0
-    free = ~fit.at_bound
-    free |= low & (fit.values <= 1e-9 + fit.coordinates.scale * 1e-9)
+    free = ~fit.at_bound | (low & (fit.values <= 1e-9 + fit.coordinates.scale * 1e-9))
     reduced_chi2, neighbours = _left(fit, residual)
-    measured = sum(
-        int(log.channels.sum()) * len(log.time[used]) for log, used in zip(problem.logs, problem.used, strict=True)
-    )
-    plain = _covariance(fit, np.concatenate([jacobian, pull]), free) * max(reduced_chi2, 1.0)
-    widths = _over_time(fit, residual, jacobian, pull, neighbours, free)
-    factor = np.sqrt(np.maximum(widths / np.diag(plain), 1.0))
+    used = zip(problem.logs, problem.used, strict=True)
+    measured = sum(int(log.channels.sum()) * len(log.time[rows]) for log, rows in used)
+    inverse = _covariance(fit, np.concatenate([jacobian, pull]), free)
+    plain, bread = inverse * max(reduced_chi2, 1.0), np.where(np.isfinite(inverse), inverse, 0.0)
+    factor = np.sqrt(np.maximum(_over_time(fit, residual, jacobian, pull, neighbours, bread) / np.diag(plain), 1.0))
     factor = np.where(np.isfinite(factor), factor, 1.0)
-    whole = plain * np.outer(factor, factor) + _of_twists(fit, jacobian, pull, free)
+    whole = plain * np.outer(factor, factor) + _of_twists(fit, jacobian, bread)
     return Uncertainty(
         whole * ALLOWANCE**2,
         jacobian,
@@ -140,25 +133,21 @@ def _covariance(fit: Fit, rows: np.ndarray, free: np.ndarray) -> np.ndarray:
 
 def _left(fit: Fit, residual: np.ndarray) -> tuple[float, float]:
     """Compute the mean square of the scaled residuals, and their correlation one sample apart."""
-    squares = products = pairs = 0.0
-    samples = 0
+    sums = np.zeros(4)
     for rows, log in zip(fit.problem.by_log(residual[:, None]), fit.problem.logs, strict=True):
         each = rows[:, log.channels, 0]
-        samples += each.size
-        squares += float((each**2).sum())
-        products += float((each[1:] * each[:-1]).sum())
-        pairs += 0.5 * float((each[1:] ** 2 + each[:-1] ** 2).sum())
+        now, before = each[1:], each[:-1]
+        sums += each.size, (each**2).sum(), (now * before).sum(), 0.5 * (now**2 + before**2).sum()
+    samples, squares, products, pairs = sums.tolist()
     return squares / max(samples, 1), products / pairs if pairs > 0.0 else 0.0
 
 
-def _over_time(fit: Fit, residual, jacobian, pull, neighbours: float, free: np.ndarray) -> np.ndarray:
+def _over_time(fit: Fit, residual, jacobian, pull, neighbours: float, bread: np.ndarray) -> np.ndarray:
     """Compute variances `[F + K]` with the covariance that the votes `J' r` of the samples have over time.
 
     Weights fall linearly with the lag; the longest is three times the memory of the residuals, `(1 + c)/(1 - c)`
     samples of their correlation c, and at least the cube root of the number of samples.
     """
-    bread = _covariance(fit, np.concatenate([jacobian, pull]), free)
-    bread = np.where(np.isfinite(bread), bread, 0.0)
     filling = pull.T @ pull
     for votes in fit.problem.by_log(jacobian * residual[:, None]):
         vote = votes.sum(axis=1)
@@ -173,13 +162,12 @@ def _over_time(fit: Fit, residual, jacobian, pull, neighbours: float, free: np.n
     return np.maximum(np.einsum("ij,jk,ik->i", bread, filling, bread), 0.0)
 
 
-def _of_twists(fit: Fit, jacobian: np.ndarray, pull: np.ndarray, free: np.ndarray) -> np.ndarray:
+def _of_twists(fit: Fit, jacobian: np.ndarray, bread: np.ndarray) -> np.ndarray:
     """Compute the covariance of the values from drawn errors of the twists."""
     moved = fit.problem.twist_residuals(fit.values, fit.sigma, DRAWS)
     if moved is None:
         return np.zeros((len(fit.values),) * 2)
-    bread = _covariance(fit, np.concatenate([jacobian, pull]), free)
-    shifts = moved @ jacobian @ np.where(np.isfinite(bread), bread, 0.0)
+    shifts = moved @ jacobian @ bread
     return shifts.T @ shifts / len(shifts)
 
 

@@ -19,14 +19,12 @@ from planarfriction.identify.uncertainty import Uncertainty
 TWO_SIDED = 1.96
 """Standard errors on either side of the estimate that hold 95 % of a normal distribution."""
 
-VAGUE = 0.3
-"""Standard error, as a share of the estimate, above which a parameter that must be > 0 counts as unknown."""
+VAGUE, WELL = 0.3, 0.02
+"""Standard errors, as shares of the estimate, above which a parameter that must be > 0 counts as unknown, and below
+which it does not matter what an estimate is correlated with."""
 
 TOGETHER = 0.98
 """Correlation above which two parameters cannot be separated."""
-
-WELL = 0.02
-"""Standard error, as a share of the estimate, below which it does not matter what an estimate is correlated with."""
 
 UNSEEN = 1.0
 """Change of a sample, over the noise, that the whole size of a parameter must make in order to be seen."""
@@ -34,17 +32,13 @@ UNSEEN = 1.0
 OF_TORQUE = ("contact_radius", "centre_x", "centre_y", *SOFT_FINGER)
 """Parameters that change the force only if the contact spins while it slides."""
 
-GAP = 3.0
-"""Ratio of sliding speeds without a sample between them that counts as a gap."""
+GAP, NARROW = 3.0, 10.0
+"""Ratio of sliding speeds without a sample between them that counts as a gap, and ratio of the fastest to the slowest
+sliding (but for 2 % at either end) below which no Stribeck curve shows."""
 
-NARROW = 10.0
-"""Ratio of the fastest to the slowest sliding (but for 2 % at either end) below which no Stribeck curve shows."""
-
-NO_SPIN = 0.02
-"""Share of the sliding speed that comes from spin below which there is none."""
-
-ONE_LOAD = 1.05
-"""Ratio of the largest and the smallest load below which there is one load only."""
+NO_SPIN, ONE_LOAD = 0.02, 1.05
+"""Share of the sliding speed that comes from spin below which there is none, and ratio of the largest and the smallest
+load below which there is one load only."""
 
 SLIPPED = 12.0
 """Growth of the cost (half the sum of squares) without slip below which the data hold none: 5 standard errors."""
@@ -123,13 +117,7 @@ class Candidate:
         problem: Any = self.fit.problem
         u = self.uncertainty
         error = float(np.std(u.held_out) / np.sqrt(max(len(u.held_out) - 1, 1)))
-        estimates = dict(zip(problem.names, self.fit.values.tolist(), strict=False))
-        return ModelScore(problem.model, u.score, error, u.reduced_chi2, u.rejected, estimates)
-
-
-def best_of(candidates: Sequence[Candidate]) -> Candidate:
-    """Return the candidate that predicts held-out parts best."""
-    return min(candidates, key=lambda each: each.uncertainty.score)
+        return ModelScore(problem.model, u.score, error, u.reduced_chi2, u.rejected, problem.by_name(self.fit.values))
 
 
 def dependence(name: str, interval: tuple[float, float], chosen: ModelScore, others: Sequence[ModelScore]) -> str:
@@ -192,9 +180,7 @@ def judge(
     verdicts = [Verdict("fit", not u.rejected, _on_fit(u, chosen))]
     if len(scores) > 1:
         others = sorted((each for each in scores if each.model != chosen.model), key=lambda each: each.held_out)
-        rest = ", ".join(
-            f"{each.model} {each.held_out:.3g} ({each.held_out - chosen.held_out:+.2g})" for each in others
-        )
+        rest = ", ".join(f"{o.model} {o.held_out:.3g} ({o.held_out - chosen.held_out:+.2g})" for o in others)
         text = f"{chosen.model} predicts held-out parts best, to {chosen.held_out:.3g} times the noise; {rest}"
         verdicts.append(Verdict("fit", True, text))
     if skipped:
@@ -207,10 +193,8 @@ def judge(
         verdict = judge_parameter(evidence, i)
         if verdict is None or verdict.identifiable:
             low, high = interval(name, evidence.values[i], evidence.errors[i])
-            if u.rejected:
-                text = f"{chosen.model} does not explain the data, so this value has no meaning"
-                verdict = Verdict(name, False, text)
-            elif reason := dependence(name, (low, high), chosen, scores):
+            meaningless = f"{chosen.model} does not explain the data, so this value has no meaning"
+            if reason := meaningless if u.rejected else dependence(name, (low, high), chosen, scores):
                 verdict = Verdict(name, False, reason)
         if verdict is not None:
             verdicts.append(verdict)
@@ -222,17 +206,14 @@ def _on_fit(u: Uncertainty, chosen: ModelScore) -> str:
     size = np.sqrt(u.reduced_chi2)
     if not u.rejected:
         return f"{chosen.model} explains the data: its residuals are {size:.2f} times the noise of the sensors"
+    text = f"it fits only with a load cell that is off by {u.strain:.0f} times the usual error"
     if u.reduced_chi2 > u.limit:
-        text = f"{chosen.model} is rejected: its residuals are {size:.2f} times the noise of the sensors, and "
+        text = f"its residuals are {size:.2f} times the noise of the sensors, and "
         text += f"chance explains at most {np.sqrt(u.limit):.2f}"
-    else:
-        usual = f"off by {u.strain:.0f} times the usual error"
-        text = f"{chosen.model} is rejected: it fits only with a load cell that is {usual}"
     if u.neighbours > CORRELATED:
         text += f", and neighbouring residuals are correlated ({u.neighbours:.2f})"
-    return (
-        f"{text}; the patch, the kind of bristles or the measurement is wrong, and the intervals are only a rough guide"
-    )
+    cause = "the patch, the kind of bristles or the measurement is wrong"
+    return f"{chosen.model} is rejected: {text}; {cause}, and the intervals are only a rough guide"
 
 
 def judge_parameter(evidence: Evidence, i: int) -> Verdict | None:
@@ -240,9 +221,8 @@ def judge_parameter(evidence: Evidence, i: int) -> Verdict | None:
     name, value, error = evidence.names[i], float(evidence.values[i]), float(evidence.errors[i])
     kind = ALL[name]
     if name in ("mu_c", "mu_s", "v_s", "gamma") and evidence.without_slip < SLIPPED:
-        return Verdict(
-            name, False, f"the contact never slips, friction reaches {evidence.largest_coefficient:.2g} of the load"
-        )
+        text = f"the contact never slips, friction reaches {evidence.largest_coefficient:.2g} of the load"
+        return Verdict(name, False, text)
     rests_on_zero = kind.low == 0.0 and value <= 1e-6 and not kind.logarithmic
     if evidence.at_bound[i] and not rests_on_zero:
         return _on_bound(evidence, i)
@@ -250,14 +230,11 @@ def judge_parameter(evidence: Evidence, i: int) -> Verdict | None:
     seen = np.abs(evidence.jacobian[:, i]).max() * size
     if name in ("v_s", "gamma") and (reason := _no_stribeck(evidence)):
         return Verdict(name, False, reason)
-    if kind.logarithmic and not error < VAGUE * size:
-        return Verdict(name, False, _why(evidence, i, seen))
-    if not kind.logarithmic and not np.isfinite(error):
+    if not (error < VAGUE * size if kind.logarithmic else np.isfinite(error)):
         return Verdict(name, False, _why(evidence, i, seen))
     if kind.low == 0.0 and value < TWO_SIDED * error:
-        return Verdict(
-            name, True, f"cannot be distinguished from 0, at most {value + TWO_SIDED * error:.3g} {kind.unit}"
-        )
+        most = f"{value + TWO_SIDED * error:.3g} {kind.unit}"
+        return Verdict(name, True, f"cannot be distinguished from 0, at most {most}")
     if (partner := _partner(evidence, i)) is not None:
         other, correlation = partner
         if not evidence.torque and not {name, other}.isdisjoint(OF_TORQUE):

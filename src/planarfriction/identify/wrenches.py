@@ -18,10 +18,10 @@ from planarfriction.identify.parameters import fitted_law, scaled_patch
 from planarfriction.identify.problem import FitOptions, LogProblem, mean_load
 from planarfriction.identify.result import Identification
 from planarfriction.identify.rig import CHANNELS, Nuisance, first_noise
-from planarfriction.identify.search import Report, guess_starts, multistart, refine, warm_start
+from planarfriction.identify.search import guess_starts, multistart, refine, warm_start
 from planarfriction.identify.simulators import SIMULATORS
 from planarfriction.identify.uncertainty import correlations, uncertainty
-from planarfriction.identify.verdicts import Candidate, Evidence, best_of, judge, verdicts_on_turns
+from planarfriction.identify.verdicts import Candidate, Evidence, judge, verdicts_on_turns
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.models import ReducedModelPublished
 from planarfriction.patch import ContactPatch
@@ -87,13 +87,12 @@ def identify_lugre(
     validation.instance("options", options, FitOptions, "a FitOptions record")
     law, given = _start_law(start, options.elasto_plastic)
     findings = check_logs(logs, patch, names)
-    report = (lambda text: None) if progress is None else progress
     noise = first_noise(logs) if options.noise is None else np.array(options.noise)
     # The quickest model leads: it finds where the others begin.
     guesses, candidates, skipped, lead = [], [], [], None
     for name in dict.fromkeys((next(iter(SIMULATORS)), *models)):
         problem = LogProblem(logs, patch, names, law, options, name)
-        tell = _named_report(report, name)
+        tell = lambda text, name=name: progress and progress(f"{name}: {text}")  # noqa: E731
         if lead is None:
             tell("looking for starts")
             guesses = guess_starts(problem, given, starts=options.starts, seed=options.seed, noise=noise)
@@ -108,13 +107,9 @@ def identify_lugre(
             candidates.append(Candidate(fit, uncertainty(fit)))
         lead = fit if lead is None else lead
     assert lead is not None
-    found = _identification(best_of(candidates), candidates, skipped, lead.starts)
+    best = min(candidates, key=lambda each: each.uncertainty.score)
+    found = _identification(best, candidates, skipped, lead.starts)
     return with_findings(found, logs, findings)
-
-
-def _named_report(report: Report, name: str) -> Report:
-    """Return a report whose lines begin with the name of the model."""
-    return lambda text: report(f"{name}: {text}")
 
 
 def _models_to_fit(model: str, patch: ContactPatch, names: Sequence[str]) -> tuple[str, ...]:
@@ -170,7 +165,7 @@ def _identification(
     errors = np.sqrt(np.diag(u.covariance))
     histories = _histories(best)
     evidence = _evidence(best, errors[:count], histories)
-    law = fitted_law(problem.law, dict(zip(problem.names, values.tolist(), strict=True)))
+    law = fitted_law(problem.law, problem.by_name(values))
     return Identification(
         names=problem.names,
         values=values,
@@ -220,14 +215,12 @@ def _histories(best: Candidate) -> list[dict[str, Any]]:
     fit = best.fit
     problem: Any = fit.problem
     values, _ = problem.split(fit.values)
-    shown, sliding = problem.shown(fit.values), problem.sliding(values)
+    shown, sliding, coefficients = problem.shown(fit.values), problem.sliding(values), problem.coefficients(values)
     unseen = problem.by_log(best.uncertainty.unseen[:, None])
     histories = []
     for i, (log, used, sigma, rows) in enumerate(zip(problem.logs, problem.used, fit.sigma, unseen, strict=True)):
         held_out = np.full_like(log.wrench, np.nan)
         held_out[used] = log.wrench[used] + rows[:, :, 0] * np.where(log.channels, sigma[used], np.nan)
-        radius = problem.maps[i].vector(values)[PARAMETERS.index("contact_radius")]
-        force = np.linalg.norm(log.wrench / [1.0, 1.0, radius], axis=1)
         histories.append(
             {
                 "name": log.name,
@@ -236,7 +229,7 @@ def _histories(best: Candidate) -> list[dict[str, Any]]:
                 "predicted": shown[i],
                 "held_out": held_out,
                 "speed": sliding[i][0],
-                "coefficient": force / np.where(log.normal_force > 0.0, log.normal_force, np.nan),
+                "coefficient": coefficients[i],
             }
         )
     return histories
@@ -257,7 +250,7 @@ def _noise_of_twists(problem: LogProblem) -> list[Nuisance]:
 
 def _fitted_model(problem: LogProblem, values: np.ndarray, law: LuGre) -> Any:
     """Make the fitted model, with the patch scaled about its centre of pressure or fitted soft-finger constants."""
-    given = dict(zip(problem.names, values.tolist(), strict=True))
+    given = problem.by_name(values)
     patch, surface = problem.fixed_patch, problem.options.surface
     finger = {name: given[name] for name in known.SOFT_FINGER if name in given}
     if finger:

@@ -66,7 +66,7 @@ class ReducedModelPublished(FrictionPytree):
         self.parameters = record_of(PublishedParameters, published.values_of(law, shape))
         self.surface = Surface(kind, size, jnp.asarray(data), None if patch.root is None else jnp.asarray(shape.root))
 
-    def compiled(self) -> tuple[Packed]:
+    def compiled(self) -> Packed:
         """Return the model as compiled rollouts take it."""
         s = self.surface
         return pack_surface(self.elasto_plastic, s.kind, s.size, s.data, s.root)  # pyright: ignore[reportArgumentType]

@@ -76,7 +76,7 @@ class ReducedModel(FrictionPytree):
         """Shape of the state of one contact, `(3,)`, of P parts `(P, 3)`."""
         return (3,) if len(self.shape.sizes) == 1 else (len(self.shape.sizes), 3)
 
-    def compiled(self) -> tuple[Packed, ...]:
+    def compiled(self) -> Packed:
         """Return the model as compiled rollouts take it."""
         s = self.shape
         return pack_maps(self.elasto_plastic, s.sizes, s.share, s.factor, s.map)  # pyright: ignore[reportArgumentType]

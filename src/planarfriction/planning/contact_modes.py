@@ -20,11 +20,9 @@ from planarfriction.limit_surface import LimitSurface
 STICK, LEFT, RIGHT = "stick", "slide left", "slide right"
 """Mode of a pusher that pushes; left and right are seen along its direction."""
 
-
 _BEYOND = 0.1
 """Angle beyond the friction cone [rad] at which a sticking force is still sought: a step may pass the end of the
 mode."""
-
 
 _EDGE = 1.0 - 1e-9
 """Share of its half width from which on a face is pressed at its end, as far as rounding can say."""
@@ -97,10 +95,8 @@ def motion_at(
         scale = math.hypot(velocity[0], velocity[1]) / math.hypot(moved[0], moved[1])
         return SliderMotion(scale * twist, mode, min(wanted - right, left - wanted), force)
     twist, moved = edges[mode == LEFT]
-    scale, force = (
-        (velocity[:2] @ place.normal) / (moved @ place.normal),
-        _force(place, angle if mode == LEFT else -angle),
-    )
+    scale = (velocity[:2] @ place.normal) / (moved @ place.normal)
+    force = _force(place, angle if mode == LEFT else -angle)
     slack = math.inf if angle == 0.0 else wanted - left if mode == LEFT else right - wanted
     return SliderMotion(scale * twist, mode, slack, force)
 

@@ -132,9 +132,9 @@ def plan_grip(
     searches = [_ProfileSearch(grips, wanted, factors, times, (low, least, high), at_start) for times in spread]
     kick, hold = KICK * law.mu_c / law.mu_s, min(high, max(2.0 * least, at_start))
     profile = max(searches, key=lambda each: each.begin(kick, hold)).bent()
-    outcomes = grips.outcomes(profile, seen, rtol=None)
+    ends = grips.ends(profile, seen, rtol=None)
     cost = grips.simulations, grips.jacobians, time.perf_counter() - begin
-    report = report_of(wanted, seen, outcomes, float(profile.values[-1]), at_end, cost)
+    report = report_of(wanted, seen, ends, float(profile.values[-1]), at_end, cost)
     found = tuple(grips.scene_of(profile, factor) for factor in shares)
     return GripPlan(found[0], profile, report, chosen.name, found)
 
@@ -167,21 +167,26 @@ class _ProfileSearch:
         """
         from scipy.optimize import brentq
 
-        found = []
+        found, times = [], self._times
+        rise = float(np.diff(times).max())
         for level in LEVELS:
-            low = np.array([min(level, kick), level]) * self._holding
-            low = low if self._first is None else np.append(self._first, low)
-            profile = _Release(self._times, low, hold)
+            first = np.array([min(level, kick), level]) * self._holding
+            first = first if self._first is None else np.append(self._first, first)
+            low = np.interp(times, times[0] + rise * np.arange(len(first)), first)
 
-            def missing(until: float, profile: _Release = profile) -> float:
-                (outcome,) = self._grips.outcomes(self._signal(self._inside(profile(until))), [1.0])
-                return self._aim.progress(outcome) - 1.0
+            def released(until: float, low: np.ndarray = low) -> np.ndarray:
+                """Return the values of a profile that stays `low` until some time, and then holds."""
+                return self._inside(low + (hold - low) * np.interp(times, [until, until + rise], [0.0, 1.0]))
 
-            most = missing(profile.latest)
+            def missing(until: float, released: Any = released) -> float:
+                (end,) = self._grips.ends(self._signal(released(until)), [1.0])
+                return self._aim.progress(end) - 1.0
+
+            earliest, latest = float(times[0]) - rise, float(times[-1]) - rise
+            most = missing(latest)
             self._reached = max(self._reached, most + 1.0)
             if most > 0.0:
-                until = float(brentq(missing, profile.earliest, profile.latest, xtol=1e-4))  # pyright: ignore
-                values = self._inside(profile(until))
+                values = released(float(brentq(missing, earliest, latest, xtol=1e-4)))  # pyright: ignore
                 found.append((-0.5 * float((self._residuals(values) ** 2).sum()), values))
         if not found:
             return -np.inf
@@ -208,7 +213,7 @@ class _ProfileSearch:
                 max_nfev=tries,
             )
             values = found.x
-            misses = np.array([self._far(each) for each in self._grips.outcomes(self._signal(values), self._factors)])
+            misses = np.linalg.norm(self._misses(values), axis=1)
             if misses.max() < least:
                 best, least = values, misses.max()
             self._weights = self._weights * misses / (self._weights @ misses) if misses.any() else self._weights
@@ -217,37 +222,21 @@ class _ProfileSearch:
     def _signal(self, values: np.ndarray) -> Signal:
         return Signal.sampled(self._times, values, "linear")
 
-    def _far(self, outcome: Any) -> float:
-        return float(np.linalg.norm(self._aim.misses(outcome)))
+    def _misses(self, values: np.ndarray) -> np.ndarray:
+        """Return the misses `[F, 6]` with each friction."""
+        return self._aim.misses(np.array(self._grips.ends(self._signal(values), self._factors)))
 
     def _inside(self, values: np.ndarray) -> np.ndarray:
         inside = 1e-2 * np.minimum(self._highest - self._low, 1e-4 * self._high)
         return np.clip(values, self._low + inside, self._highest - inside)
 
     def _residuals(self, values: np.ndarray) -> np.ndarray:
-        outcomes = self._grips.outcomes(self._signal(values), self._factors)
-        misses = [w**0.5 * self._aim.misses(each) for w, each in zip(self._weights, outcomes, strict=True)]
-        return np.concatenate([*misses, self._bend @ values])
+        misses = self._weights[:, None] ** 0.5 * self._misses(values)
+        return np.concatenate([misses.ravel(), self._bend @ values])
 
     def _slopes(self, values: np.ndarray) -> np.ndarray:
-        per = 1.0 / self._aim.scales()[:, None]
-        slopes = self._grips.slopes(self._signal(values), self._factors)
-        rows = [w**0.5 * per * each for w, each in zip(self._weights, slopes, strict=True)]
-        return np.concatenate([*rows, self._bend])
-
-
-class _Release:
-    """A profile that begins with the values `low`, goes on at the last of them until some time, and then holds."""
-
-    def __init__(self, times: np.ndarray, low: np.ndarray, hold: float) -> None:
-        self._times, self._hold = times, hold
-        self._rise = float(np.diff(times).max())
-        self._low = np.interp(times, times[0] + self._rise * np.arange(len(low)), low)
-        self.earliest, self.latest = float(times[0]) - self._rise, float(times[-1]) - self._rise
-
-    def __call__(self, until: float) -> np.ndarray:
-        share = np.interp(self._times, [until, until + self._rise], [0.0, 1.0])
-        return self._low + (self._hold - self._low) * share
+        slopes = np.array(self._grips.slopes(self._signal(values), self._factors)) / self._aim.scales()[:, None]
+        return np.concatenate([*self._weights[:, None, None] ** 0.5 * slopes, self._bend])
 
 
 # ---------------------------------------------------------------------- what was asked for
@@ -256,18 +245,16 @@ class _Release:
 def _contact_of(scene: Any, name: str | None) -> int:
     """Return the index of the contact whose grip is planned."""
     validation.instance("scene", scene, Scene, "a Scene")
-    if scene.velocity is not None:
-        raise InvalidValueError("velocity", "be None for a body that a grip moves", scene.velocity)
     if scene.start == "sliding":
         raise InvalidValueError("start", "be 'rest' or 'equilibrium' for a grip plan", scene.start)
-    if scene.stop_speed is not None:
-        raise InvalidValueError("stop_speed", "be None for a plan, which has to hold until the end", scene.stop_speed)
-    for each in scene.contacts:
-        if each.support_velocity is not None:
-            raise InvalidValueError(
-                f"support_velocity of contact {each.name!r}", "be None for a grip plan", each.support_velocity
-            )
     names = [each.name for each in scene.contacts]
+    for what, given, purpose in (
+        ("velocity", scene.velocity, "a body that a grip moves"),
+        ("stop_speed", scene.stop_speed, "a plan, which has to hold until the end"),
+        *((f"support_velocity of contact {c.name!r}", c.support_velocity, "a grip plan") for c in scene.contacts),
+    ):
+        if given is not None:
+            raise InvalidValueError(what, f"be None for {purpose}", given)
     if name is None and len(names) > 1:
         raise InvalidValueError("contact", f"be given if there are several ({', '.join(names)})", name)
     return 0 if name is None else names.index(validation.choice("contact", name, names))

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
-import os
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from planarfriction.compiler import threads
 from planarfriction.derivatives import scene_sensitivities
+from planarfriction.derivatives.scene_inputs import STATES
 from planarfriction.errors import InvalidValueError
-from planarfriction.scenes import Contact, Scene, Signal, SolverOptions, simulate
+from planarfriction.geometry import rotate
+from planarfriction.scenes import Scene, Signal, SolverOptions, simulate
+from planarfriction.scenes.scene import with_friction
 from planarfriction.scenes.start import contact_map
-
-MOTION = ("vx", "vy", "omega", "x", "y", "theta")
-"""Velocity and pose at the end, in this order."""
 
 TIGHT = 1e-6
 """Relative tolerance of the motions that are planned with [-]."""
@@ -29,19 +28,11 @@ ROUGH = 0.08
 """Weight of a bend of the profile by the holding load [-]: it chooses among profiles that do the same."""
 
 
-class Outcome(NamedTuple):
-    """End of a motion."""
-
-    speed: np.ndarray
-    """Velocity `(vx, vy, omega)` [m/s, m/s, rad/s]."""
-    slide: np.ndarray
-    """Displacement of the place under the grip from it `[2]`, world axes [m]."""
-    angle: float
-    """Angle by which the body has turned [rad]."""
-
-
 class Aim(NamedTuple):
-    """A goal as a vector of misses."""
+    """A goal, and how far ends of motions miss it.
+
+    An end is `[6]`: velocity `(vx, vy, omega)`, slide of the place under the grip (2), angle of the turn, [SI].
+    """
 
     angle: float | None
     """Angle to turn by [rad], without slide; None where the goal is a slide."""
@@ -50,11 +41,14 @@ class Aim(NamedTuple):
     radius: float
     """Contact radius [m]."""
 
-    def progress(self, outcome: Outcome) -> float:
+    @property
+    def end(self) -> np.ndarray:
+        """Wanted end `[6]`."""
+        return np.array([0.0, 0.0, 0.0, *self.slide, self.angle or 0.0])
+
+    def progress(self, end: np.ndarray) -> float:
         """Return the share of the goal that is reached [-]."""
-        if self.angle is not None:
-            return outcome.angle / self.angle
-        return float(outcome.slide @ self.slide / (self.slide @ self.slide))
+        return float(end @ self.end / (self.end @ self.end))
 
     def scales(self) -> np.ndarray:
         """Units of the speeds (3), the slide (2) and the angle, as `[6]`."""
@@ -64,10 +58,9 @@ class Aim(NamedTuple):
             slide, angle = 1e-3 * float(np.hypot(*self.slide)), TURN
         return np.array([SPEED, SPEED, SPEED / self.radius, slide, slide, angle])
 
-    def misses(self, outcome: Outcome) -> np.ndarray:
+    def misses(self, end: np.ndarray) -> np.ndarray:
         """Return the misses `[6]`, each over what counts as one."""
-        off = np.concatenate([outcome.speed, outcome.slide - self.slide, [outcome.angle - (self.angle or 0.0)]])
-        return off / self.scales()
+        return (end - self.end) / self.scales()
 
 
 class Grips:
@@ -79,6 +72,10 @@ class Grips:
     def __init__(self, scene: Scene, contact: int, factors: Sequence[float]) -> None:
         self.scene, self.index = scene, contact
         self.name = f"{scene.contacts[contact].name}.normal_force"
+        for law in (each.model.law for each in scene.contacts):
+            if not (hasattr(law, "mu_c") or hasattr(law, "mu_s")):
+                rule = "have mu_c and mu_s to plan with uncertain friction"
+                raise InvalidValueError("law", rule, type(law).__name__)
         self._members = {factor: [with_friction(each, factor) for each in scene.contacts] for factor in factors}
         held = scene.start == "equilibrium"
         self.first = float(scene.contacts[contact].normal_force(0.0)) if held else None
@@ -91,62 +88,32 @@ class Grips:
         contacts[self.index] = dataclasses.replace(contacts[self.index], normal_force=profile)
         return dataclasses.replace(self.scene, contacts=contacts)
 
-    def outcomes(self, profile: Signal, factors: Sequence[float], rtol: float | None = TIGHT) -> list[Outcome]:
-        """Return the end of the motion under each friction."""
+    def ends(self, profile: Signal, factors: Sequence[float], rtol: float | None = TIGHT) -> list[np.ndarray]:
+        """Return the end `[6]` of the motion under each friction."""
         self.simulations += len(factors)
 
-        def one(factor: float) -> Outcome:
+        def one(factor: float) -> np.ndarray:
             scene = self.scene_of(profile, factor)
             histories = simulate(scene, rtol=rtol, save_every=scene.t_end).histories
-            return self.outcome(np.array([float(np.asarray(histories[name].values)[-1]) for name in MOTION]))
+            last = np.array([float(np.asarray(histories[name].values)[-1]) for name in STATES])
+            return np.array([*last[:3], *slide_of(scene, self.index, last[3:]), last[5] - scene.body.angle])
 
-        return _each(one, factors)
+        return threads.each(one, factors)
 
     def slopes(self, profile: Signal, factors: Sequence[float]) -> list[np.ndarray]:
-        """Return the derivatives of speeds, slide and angle by the knots `[6, K]` under each friction."""
+        """Return the derivatives of the end by the knots `[6, K]` under each friction."""
         self.jacobians += len(factors)
 
         def one(factor: float) -> np.ndarray:
             scene, knots = self.scene_of(profile, factor), {self.name: profile.times}
             options = SolverOptions(rtol=TIGHT, save_every=scene.t_end)
             found = scene_sensitivities(scene, (), signals=knots, options=options)
-            slopes = found.d_motion[-1].copy()
-            x, y = self._arm(found.motion[-1, 3:])
+            slopes, pose = found.d_motion[-1].copy(), found.motion[-1, 3:]
+            x, y = slide_of(scene, self.index, pose) + grip_position(scene, self.index) - pose[:2]
             slopes[3:5] += np.outer([-y, x], slopes[5])
             return slopes
 
-        return _each(one, factors)
-
-    def _arm(self, pose: np.ndarray) -> np.ndarray:
-        """Return the vector from the centre of mass to the place that was under the grip `[2]` [m]."""
-        return slide_of(self.scene, self.index, pose) + grip_position(self.scene, self.index) - pose[:2]
-
-    def outcome(self, motion: np.ndarray) -> Outcome:
-        """Return the outcome of a motion from its end `[6]`."""
-        slide = slide_of(self.scene, self.index, motion[3:])
-        return Outcome(motion[:3], slide, float(motion[5] - self.scene.body.angle))
-
-
-def _each(one: Any, factors: Sequence[float]) -> list[Any]:
-    """Call `one` for every factor, in threads: compiled runs let others run beside them."""
-    if len(factors) == 1:
-        return [one(factors[0])]
-    with ThreadPoolExecutor(min(len(factors), os.cpu_count() or 1)) as pool:
-        return list(pool.map(one, factors))
-
-
-def with_friction(contact: Contact, factor: float) -> Contact:
-    """Return the contact with `factor` times the friction: mu_c and mu_s of its law."""
-    if factor == 1.0:
-        return contact
-    law = contact.model.law
-    scaled = {name: factor * getattr(law, name) for name in ("mu_c", "mu_s") if hasattr(law, name)}
-    if not scaled:
-        rule = "have mu_c and mu_s to plan with uncertain friction"
-        raise InvalidValueError("law", rule, type(law).__name__)
-    law, model = dataclasses.replace(law, **scaled), contact.model
-    changed = model.with_law(law) if hasattr(model, "with_law") else dataclasses.replace(model, law=law)
-    return dataclasses.replace(contact, model=changed)
+        return threads.each(one, factors)
 
 
 def grip_position(scene: Scene, contact: int) -> np.ndarray:
@@ -154,18 +121,14 @@ def grip_position(scene: Scene, contact: int) -> np.ndarray:
     body, chosen = scene.body, scene.contacts[contact]
     if chosen.mounted_on == "world":
         return np.array(chosen.position)
-    cos, sin = np.cos(body.angle), np.sin(body.angle)
-    x, y = chosen.position
-    return body.position + np.array([cos * x - sin * y, sin * x + cos * y])
+    return body.position + rotate(chosen.position, body.angle)
 
 
 def slide_of(scene: Scene, contact: int, pose: np.ndarray) -> np.ndarray:
     """Return the displacement in the world of the place that was under a contact `[..., 2]` [m], at poses
     `[..., 3]`."""
     grip = grip_position(scene, contact)
-    (dx, dy), turn = grip - scene.body.position, pose[..., 2] - scene.body.angle
-    cos, sin = np.cos(turn), np.sin(turn)
-    return pose[..., :2] + np.stack([cos * dx - sin * dy, sin * dx + cos * dy], axis=-1) - grip
+    return pose[..., :2] + rotate(grip - scene.body.position, pose[..., 2] - scene.body.angle) - grip
 
 
 def load_on(scene: Scene, contact: int, angle: float, slide: Any, time: float) -> np.ndarray:
@@ -174,11 +137,8 @@ def load_on(scene: Scene, contact: int, angle: float, slide: Any, time: float) -
     By `angle` [rad] about the grip and by `slide` `[2]` [m]; about the origin of the contact frame, in its axes, of one
     of the identical contacts.
     """
-    body, chosen = scene.body, scene.contacts[contact]
-    grip = grip_position(scene, contact)
-    arm = np.array(body.position) - grip
-    cos, sin = np.cos(angle), np.sin(angle)
-    at = grip + slide + np.array([cos * arm[0] - sin * arm[1], sin * arm[0] + cos * arm[1]])
+    body, chosen, grip = scene.body, scene.contacts[contact], grip_position(scene, contact)
+    at = grip + slide + rotate(body.position - grip, angle)
     moved = dataclasses.replace(body, position=at, angle=body.angle + angle, velocity=(0.0, 0.0, 0.0))
     applied = np.zeros(3) if scene.force is None else scene.force(time)
     pull = applied + body.mass * np.array([*body.gravity, 0.0])

@@ -15,6 +15,7 @@ from planarfriction import validation
 from planarfriction.described import described
 from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError, SolverError
+from planarfriction.geometry import rotate
 from planarfriction.limit_surface import LimitSurfaceEllipsoid
 from planarfriction.planning.contact_modes import STICK, TouchPoint, pushed_by
 from planarfriction.planning.pushing import Push, push
@@ -30,11 +31,9 @@ PLACES = ((0.5,), (0.35, 0.65))
 CHORDS = 40
 """Lines that the arc of the pusher in one part is made of."""
 
-NODES = 65
-"""Forces whose twists are joined by a spline for the search: what that leaves is aimed beside, as what lines leave."""
-
-ROUNDS = 2
-"""Times that a plan aims beside the goal by what its lines have missed."""
+NODES, ROUNDS = 65, 2
+"""Forces whose twists are joined by a spline for the search, and times that a plan aims beside the goal by what the
+spline and its lines have missed."""
 
 _TURNS = ((-0.7, 0.0, 0.7), (0.7, 0.0, -0.7), (0.7, 0.0, 0.7), (-0.7, 0.0, -0.7))
 """Forces that a search begins with, as shares of the angle that they may have."""
@@ -134,7 +133,8 @@ def plan_push(
     aim, found = _relative(start, goal), []
     for shares in PLACES:
         for edge in chosen:
-            for at in _places(slider, edge, shares):
+            corner, end = slider.outline[edge], slider.outline[(edge + 1) % count]
+            for at in (corner + share * (end - corner) for share in shares):
                 length, x = _shortest(slider, TouchPoint(at, slider.inward[edge]), largest, aim)
                 found += [(length, x, edge, at)] if length < math.inf else []
         if found:
@@ -151,13 +151,10 @@ def plan_push(
         if length == math.inf:
             break
         tried = _path(slider, place, x, start)
-        path, done = min(
-            (path, done), (tried, push(slider, pusher, tried, start=start)), key=lambda e: _off(e[1], goal)
-        )
-    other = Slider(
-        LimitSurfaceEllipsoid(slider.surface.patch, normal_force=slider.surface.normal_force), slider.outline
-    )
-    rest = push(other, pusher, path, start=start)
+        both = (path, done), (tried, push(slider, pusher, tried, start=start))
+        path, done = min(both, key=lambda e: _off(e[1], goal))
+    ellipsoid = LimitSurfaceEllipsoid(slider.surface.patch, normal_force=slider.surface.normal_force)
+    rest = push(Slider(ellipsoid, slider.outline), pusher, path, start=start)
     report = PushReport(
         _triple(goal), _triple(done.end), _triple(rest.end), edge, (float(at[0]), float(at[1])), length,
         float(np.abs(x[:PARTS]).max() / math.atan(pusher.mu)), bool((done.mode[1:] == STICK).all()),
@@ -171,11 +168,6 @@ def _triple(values: np.ndarray) -> tuple[float, float, float]:
     return x, y, angle
 
 
-def _places(slider: Slider, edge: int, shares: Sequence[float]) -> list[np.ndarray]:
-    ends = slider.outline[[edge, (edge + 1) % len(slider.outline)]]
-    return [ends[0] + share * (ends[1] - ends[0]) for share in shares]
-
-
 def _off(done: Push, goal: np.ndarray) -> float:
     """Return the distance by which a push misses [m]."""
     return float(np.abs((done.end - goal) * [1.0, 1.0, done.slider.size]).max())
@@ -183,8 +175,7 @@ def _off(done: Push, goal: np.ndarray) -> float:
 
 def _relative(start: np.ndarray, goal: np.ndarray) -> np.ndarray:
     """Return the goal in the axes of the start."""
-    c, s, (x, y, angle) = math.cos(start[2]), math.sin(start[2]), goal - start
-    return np.array([c * x + s * y, c * y - s * x, angle])
+    return rotate(goal - start, -start[2])
 
 
 def _moved(pose: np.ndarray, twist: np.ndarray, distance: float) -> np.ndarray:
@@ -248,9 +239,7 @@ def _path(slider: Slider, place: TouchPoint, x: np.ndarray, start: np.ndarray) -
         twist = _twist(slider, place, angle)
         for share in np.linspace(0.0, 1.0, CHORDS + 1)[0 if not times else 1 :]:
             here = _moved(pose, twist, share * distance)
-            c, s = math.cos(here[2]), math.sin(here[2])
-            arm = np.array([c * place.at[0] - s * place.at[1], s * place.at[0] + c * place.at[1]])
-            at.append(here[:2] + arm)
+            at.append(here[:2] + rotate(place.at, here[2]))
             times.append(now + share * distance)
         pose, now = _moved(pose, twist, distance), now + distance
     return Signal.sampled(times, at, "linear")

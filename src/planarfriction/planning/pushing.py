@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,15 +22,12 @@ from planarfriction.scenes.signal import as_signal
 FREE = "free"
 """The mode of a pusher that does not touch, or that goes away."""
 
-MOST_SAMPLES = 100_000
-"""Instants that are recorded at most."""
+MOST_SAMPLES, MOST_PHASES = 100_000, 2_000
+"""Largest numbers of instants that are recorded, and of changes of mode that are followed."""
 
 RESTLESS, STILL = 4, 1e-6
 """Changes of mode in a row, each within a share of the whole time, after which events no longer separate the modes: on
 a facet of a limit surface a push may stay at the edge of its motion cone."""
-
-MOST_PHASES = 2_000
-"""Changes of mode in a push that are followed."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -149,11 +147,9 @@ def _follow(scenery: Scenery, start: np.ndarray, time: np.ndarray, rtol: float) 
             contact = flush_after(scenery, contact, now, q, first.leans)
             continue
         mode = "" if restless >= RESTLESS and not place.half_width else mode
-        phase = _Phase(scenery, contact, mode)
-        span, atol = (now, end), rtol * np.array([slider.size, slider.size, 1.0])
-        run = solve_ivp(
-            phase.rate, span, q, rtol=rtol, atol=atol, events=phase.events, dense_output=True, first_step=end - now
-        )
+        rate, ends = _phase(scenery, contact, mode)
+        options = {"rtol": rtol, "atol": rtol * np.array([slider.size, slider.size, 1.0]), "first_step": end - now}
+        run = solve_ivp(rate, (now, end), q, events=list(ends.values()), dense_output=True, **options)
         here = (time > now) & (time <= run.t[-1]) | (time == now)
         if here.any():
             poses[here] = run.sol(time[here]).T
@@ -168,7 +164,7 @@ def _follow(scenery: Scenery, start: np.ndarray, time: np.ndarray, rtol: float) 
             if now >= time[-1]:
                 return poses, modes, places
             continue
-        what = phase.names[next(i for i, each in enumerate(run.t_events) if len(each))]
+        what = next(name for name, each in zip(ends, run.t_events, strict=True) if len(each))
         if what == "mode":
             held = mode
         elif what == "closes":
@@ -186,46 +182,27 @@ def _neighbour(slider: Slider, place: TouchPoint, mu: float, velocity: np.ndarra
     return LEFT if left > right else RIGHT
 
 
-class _Phase:
-    """A contact whose mode is held, and what ends it."""
+def _phase(scenery: Scenery, contact: Touch, mode: str) -> tuple[Any, dict[str, Any]]:
+    """Return the rate of a slider whose contact keeps its mode, and by name the functions whose fall to 0 ends it."""
 
-    def __init__(self, scenery: Scenery, contact: Touch, mode: str) -> None:
-        self._scenery, self._contact, self._mode = scenery, contact, mode
-        kinds = {"mode": self._slack, "leaves": self._approach, "ends": self._range, "closes": self._clear}
-        if not scenery.closes(contact):
-            del kinds["closes"]
-        if not mode:
-            del kinds["mode"]
-        self.names, self.events = list(kinds), []
-        for function in kinds.values():
-            event = lambda t, q, f=function: f(t, q)  # noqa: E731
-            event.terminal, event.direction = True, -1
-            self.events.append(event)
-        self._last: Any = None
+    @functools.lru_cache(maxsize=1)
+    def motion(t: float, *q: float) -> tuple[Any, Any, np.ndarray]:
+        place, velocity = place_of(scenery, contact, t, np.array(q))
+        return motion_at(scenery.slider.surface, place, scenery.pusher.mu, velocity, mode), place, velocity
 
-    def _motion(self, t: float, q: np.ndarray) -> tuple[Any, Any, np.ndarray]:
-        key = (t, *q)
-        if self._last is None or self._last[0] != key:
-            place, velocity = place_of(self._scenery, self._contact, t, q)
-            found = motion_at(self._scenery.slider.surface, place, self._scenery.pusher.mu, velocity, self._mode)
-            self._last = key, (found, place, velocity)
-        return self._last[1]
-
-    def rate(self, t: float, q: np.ndarray) -> np.ndarray:
-        """Return the velocity of the slider's frame in the world `[3]`."""
-        vx, vy, omega = self._motion(t, q)[0].twist
+    def rate(t: float, q: np.ndarray) -> np.ndarray:
+        vx, vy, omega = motion(t, *q)[0].twist
         c, s = np.cos(q[2]), np.sin(q[2])
         return np.array([c * vx - s * vy, s * vx + c * vy, omega])
 
-    def _slack(self, t: float, q: np.ndarray) -> float:
-        return self._motion(t, q)[0].slack
-
-    def _approach(self, t: float, q: np.ndarray) -> float:
-        _, place, velocity = self._motion(t, q)
+    def approach(t: float, q: np.ndarray) -> float:
+        _, place, velocity = motion(t, *q)
         return velocity[:2] @ place.normal
 
-    def _range(self, t: float, q: np.ndarray) -> float:
-        return self._scenery.within(self._contact, t, q)
-
-    def _clear(self, t: float, q: np.ndarray) -> float:
-        return self._scenery.clear(self._contact, t, q)
+    ends: dict[str, Any] = {"mode": lambda t, q: motion(t, *q)[0].slack} if mode else {}
+    ends |= {"leaves": approach, "ends": functools.partial(scenery.within, contact)}
+    if scenery.closes(contact):
+        ends["closes"] = functools.partial(scenery.clear, contact)
+    for event in ends.values():
+        event.terminal, event.direction = True, -1
+    return rate, ends

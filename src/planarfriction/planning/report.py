@@ -71,23 +71,12 @@ class GripReport(ByValue):
 
 
 def report_of(
-    aim: Any, frictions: Sequence[float], outcomes: Sequence[Any], grip: float, holding: float, cost: Any
+    aim: Any, frictions: Sequence[float], ends: Sequence[np.ndarray], grip: float, holding: float, cost: Any
 ) -> GripReport:
-    """Return the report on the end of a plan with each friction."""
-    end = dict(zip(frictions, outcomes, strict=True))
-    turns = aim.angle is not None
-    size = abs(aim.angle) if turns else float(np.hypot(*aim.slide))
-    moved = abs(aim.progress(end[1.01]) - aim.progress(end[0.99])) / 2.0 * size
-    return GripReport(
-        {"angle": aim.angle} if turns else {"slide": tuple(aim.slide.tolist())},
-        end[1.0].angle,
-        end[1.0].slide,
-        float(np.linalg.norm(end[1.0].speed * [1.0, 1.0, aim.radius])),
-        grip,
-        holding,
-        np.array(frictions),
-        np.array([each.angle for each in outcomes]),
-        np.array([each.slide for each in outcomes]),
-        moved,
-        *cost,
-    )
+    """Return the report on the ends `[6]` of a plan, one for each friction (see `motions.Aim`)."""
+    less, end, more = (ends[frictions.index(each)] for each in (0.99, 1.0, 1.01))
+    goal = {"slide": tuple(aim.slide.tolist())} if aim.angle is None else {"angle": aim.angle}
+    per_percent = abs(aim.progress(more) - aim.progress(less)) / 2.0 * float(np.linalg.norm(aim.end))
+    speed, every = float(np.linalg.norm(end[:3] * [1.0, 1.0, aim.radius])), np.array(ends)
+    of_nominal = goal, float(end[5]), end[3:5], speed, grip, holding
+    return GripReport(*of_nominal, np.array(frictions), every[:, 5], every[:, 3:5], per_percent, *cost)

@@ -132,6 +132,7 @@ class Scenery:
 
 
 def _inside(q: np.ndarray, x: float, y: float) -> np.ndarray:
+    """Return a point of the world in the axes of a slider with the pose q."""
     c, s = math.cos(q[2]), math.sin(q[2])
     dx, dy = x - q[0], y - q[1]
     return np.array([c * dx + s * dy, c * dy - s * dx])

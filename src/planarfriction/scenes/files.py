@@ -48,44 +48,34 @@ def rectangle_inertia(mass: float, size: Sequence[float]) -> float:
     return validation.positive("mass", mass) / 12.0 * (width**2 + height**2)
 
 
-def _part_to_dict(part: Any) -> dict[str, Any]:
+def part_to_dict(part: Any) -> dict[str, Any]:
     """Return a signal or the entries of a model as numbers, texts, lists and tables."""
     return part.to_dict() if isinstance(part, Signal) else model_to_dict(part)
 
 
-def scene_to_dict(scene: Scene, of_part: Callable[[Any], dict[str, Any]] = _part_to_dict) -> dict[str, Any]:
+def scene_to_dict(scene: Scene, of_part: Callable[[Any], dict[str, Any]] = part_to_dict) -> dict[str, Any]:
     """Return the scene as numbers, texts, lists and tables, without parts that it does not have.
 
     `of_part` makes the tables of signals and the entries of a contact's model.
     """
-    body = scene.body
-    data: dict[str, Any] = {key: getattr(scene, key) for key in ("name", "t_end", "save_every", "rtol", "atol")}
-    if scene.stop_speed is not None:
-        data["stop_speed"] = scene.stop_speed
-    if scene.start != "rest":
-        data["start"] = scene.start
-    data["body"] = {"mass": body.mass, "inertia": body.inertia, "position": list(body.position), "angle": body.angle}
-    data["body"] |= {"velocity": list(body.velocity), "gravity": list(body.gravity)}
-    if body.outline is not None:
-        data["body"]["outline"] = body.outline.tolist()
-    for name in ("force", "velocity"):
-        if getattr(scene, name) is not None:
-            data[name] = of_part(getattr(scene, name))
-    data["contact"] = [_contact_to_dict(contact, of_part) for contact in scene.contacts]
+
+    def table(record: Any, *keys: str) -> dict[str, Any]:
+        """Return the values of a record that are not None."""
+        found = {key: getattr(record, key) for key in keys}
+        return {key: _plain(value, of_part) for key, value in found.items() if value is not None}
+
+    start = ("start",) if scene.start != "rest" else ()
+    data = table(scene, "name", "t_end", "save_every", "rtol", "atol", "stop_speed", *start)
+    data["body"] = table(scene.body, *BODY_KEYS[:-1])
+    data |= table(scene, "force", "velocity")
+    data["contact"] = [{**table(each, *CONTACT_KEYS[:7]), **of_part(each.model)} for each in scene.contacts]
     return data
 
 
-def _contact_to_dict(contact: Contact, of_part: Callable[[Any], dict[str, Any]]) -> dict[str, Any]:
-    return {
-        "name": contact.name,
-        "mounted_on": contact.mounted_on,
-        "position": list(contact.position),
-        "angle": contact.angle,
-        "count": contact.count,
-        "normal_force": of_part(contact.normal_force),
-        **({} if contact.support_velocity is None else {"support_velocity": of_part(contact.support_velocity)}),
-        **of_part(contact.model),
-    }
+def _plain(value: Any, of_part: Callable[[Any], dict[str, Any]]) -> Any:
+    if isinstance(value, Signal):
+        return of_part(value)
+    return value.tolist() if isinstance(value, np.ndarray) else list(value) if isinstance(value, tuple) else value
 
 
 def scene_from_dict(data: dict[str, Any], *, folder: str | Path | None = None, source: str = "scene") -> Scene:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import hashlib
 import json
 from collections.abc import Sequence
@@ -162,6 +163,17 @@ class Contact(ByValue):
         moved = "" if self.support_velocity is None else ", which moves"
         load = between(self.normal_force)
         return f"Contact({self.name!r}: {count}{self.model!r} on the {self.mounted_on}{moved}, {load} N)"
+
+
+def with_friction(contact: Contact, factor: float) -> Contact:
+    """Return the contact with `factor` times the friction coefficients mu_c and mu_s that its law has."""
+    law, model = contact.model.law, contact.model
+    scaled = {name: factor * getattr(law, name) for name in ("mu_c", "mu_s") if hasattr(law, name)}
+    if factor == 1.0 or not scaled:
+        return contact
+    law = dataclasses.replace(law, **scaled)
+    changed = model.with_law(law) if hasattr(model, "with_law") else dataclasses.replace(model, law=law)
+    return dataclasses.replace(contact, model=changed)
 
 
 def _body(name: str, value: Any) -> Body:

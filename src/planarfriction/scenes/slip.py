@@ -56,6 +56,8 @@ def slip_events(solution: Solution) -> tuple[SlipEvent, ...]:
 
 
 def _events(solution: Solution, contact: Any) -> list[SlipEvent]:
+    from scipy.integrate import cumulative_trapezoid
+
     recorded = solution.histories.get(f"bristles_{contact.name}")
     if recorded is None:
         raise InvalidValueError("bristles", "be recorded for slip events: simulate(scene, bristles='all')", "none")
@@ -65,7 +67,7 @@ def _events(solution: Solution, contact: Any) -> list[SlipEvent]:
     share = slip_fraction(contact.model, states, twists, loads)
     points = centres(contact.model.patch, loads)
     speed = np.hypot(twists[:, 0] - twists[:, 2] * points[:, 1], twists[:, 1] + twists[:, 2] * points[:, 0])
-    distance, turn = _integral(time, speed), _integral(time, twists[:, 2])
+    distance, turn = (cumulative_trapezoid(each, time, initial=0.0) for each in (speed, twists[:, 2]))
     radius, least = reach(contact.model.patch), contact.model.law.largest_deflection
     events = []
     for onset, end in _stretches(time, share - SLIPS):
@@ -120,10 +122,6 @@ def centres(patch: Any, loads: np.ndarray) -> np.ndarray:
 def reach(patch: Any) -> float:
     """Return the largest distance of a cell from the middle of the patch [m]."""
     return float(np.hypot(*(patch.positions - patch.positions.mean(axis=0)).T).max())
-
-
-def _integral(time: np.ndarray, values: np.ndarray) -> np.ndarray:
-    return np.concatenate([[0.0], np.cumsum(0.5 * np.diff(time) * (values[1:] + values[:-1]))])
 
 
 def _stretches(time: np.ndarray, above: np.ndarray) -> list[tuple[float, float]]:

@@ -20,6 +20,7 @@ from planarfriction import validation
 from planarfriction.described import described
 from planarfriction.equality import by_parts
 from planarfriction.errors import FileError, FrictionError, InvalidValueError
+from planarfriction.geometry import rotate, twist_at
 from planarfriction.pictures import picture
 from planarfriction.reading import read_bytes
 from planarfriction.scenes.movers import displacement
@@ -122,27 +123,22 @@ class Solution:
         Raises InvalidValueError for a contact that does not exist, FileError for a solution without its scene.
         """
         chosen = scene_of(self, "a twist").contacts[self.contact_index(contact)]
-        x, y, theta, vx, vy, omega = (
-            np.asarray(self.histories[name].values) for name in ("x", "y", "theta", "vx", "vy", "omega")
+        x, y, theta, *twists, time = (
+            np.asarray(self.histories[name].values) for name in ("x", "y", "theta", "vx", "vy", "omega", "time")
         )
-        (dx, dy), angle = chosen.position, chosen.angle + 0.0 * theta
+        centre, twist, at, angle = np.stack([x, y], -1), np.stack(twists, -1), np.array(chosen.position), chosen.angle
         if chosen.support_velocity is not None:
-            time = np.asarray(self.histories["time"].values)
-            moves, shift = chosen.support_velocity.left(time).T, displacement(chosen.support_velocity, time).T
-            to = np.zeros(2)
+            moves, to = chosen.support_velocity.left(time), np.zeros(2)
             if chosen.mounted_on == "world":
-                dx, dy, angle = dx + shift[0], dy + shift[1], angle + shift[2]
-                to = dx, dy
-            vx, vy = vx - moves[0] + moves[2] * (y - to[1]), vy - moves[1] - moves[2] * (x - to[0])
-            omega = omega - moves[2]
+                shift = displacement(chosen.support_velocity, time)
+                at, angle = at + shift[:, :2], angle + shift[:, 2]
+                to = at
+            twist = twist - twist_at(moves, centre - to)
         if self.scene.velocity is None and chosen.mounted_on == "world":
-            dx, dy = dx - x, dy - y
+            at = at - centre
         elif self.scene.velocity is None:
-            cos, sin = np.cos(theta), np.sin(theta)
-            dx, dy, angle = cos * dx - sin * dy, sin * dx + cos * dy, angle + theta
-        ux, uy = vx - omega * dy, vy + omega * dx
-        cos, sin = np.cos(angle), np.sin(angle)
-        return np.stack([cos * ux + sin * uy, cos * uy - sin * ux, omega], axis=-1)
+            at, angle = rotate(at, theta), angle + theta
+        return rotate(twist_at(twist, at), -angle)
 
     def contact_index(self, contact: str | None = None) -> int:
         """Return the index of a contact, given by its name, along the axis `contact`; None takes the only one.
@@ -253,8 +249,8 @@ def write_dataset(data: xr.Dataset, path: str | Path) -> Path:
                 content = bytes(data.assign_attrs({_CHECKSUM: "sha256:" + _DIGITS * "0"}).to_netcdf(engine="scipy"))
         except (TypeError, RecursionError) as error:  # of what someone added to the data
             raise FileError(f"{path}: cannot be written: {_one_line(error)}") from None
-        before, _, after = _parted(content)
-        for part in (before, _checksum(before, after), after):
+        before, _, after, checksum = _parted(content)
+        for part in (before, checksum, after):
             file.write(part)
     return Path(path)
 
@@ -266,19 +262,16 @@ def _renamed(data: xr.Dataset, change: Callable[[str], str]) -> xr.Dataset:
     return data.rename({name: new for name, new in names.items() if name != new})
 
 
-def _parted(content: bytes) -> tuple[memoryview, bytes, memoryview]:
-    """Return what stands before the checksum of a file, the checksum, and what stands after it; a ValueError without
-    one."""
-    begin = content.index(_MARK) + len(_MARK)
-    view = memoryview(content)
-    return view[:begin], bytes(view[begin : begin + _DIGITS]), view[begin + _DIGITS :]
+def _parted(content: bytes) -> tuple[memoryview, bytes, memoryview, bytes]:
+    """Return the bytes before the checksum of a file, the checksum, the bytes after it, and the checksum of both parts.
 
-
-def _checksum(before: memoryview, after: memoryview) -> bytes:
-    """Return the SHA-256 of all of a file but its checksum, in hexadecimal."""
+    It is the SHA-256 in hexadecimal; raises ValueError for a file without one.
+    """
+    begin, view = content.index(_MARK) + len(_MARK), memoryview(content)
+    before, after = view[:begin], view[begin + _DIGITS :]
     digest = hashlib.sha256(before)
     digest.update(after)
-    return digest.hexdigest().encode()
+    return before, bytes(view[begin : begin + _DIGITS]), after, digest.hexdigest().encode()
 
 
 def _read(path: str | Path) -> Solution:
@@ -290,10 +283,10 @@ def _read(path: str | Path) -> Solution:
     if not content.startswith(b"CDF"):
         raise FileError(f"{path}: not {what} (not a NetCDF 3 file)")
     try:
-        before, checksum, after = _parted(content)
+        _, written, _, checksum = _parted(content)
     except ValueError:
         raise FileError(f"{path}: not {what}: it has no checksum ({_OTHERWISE})") from None
-    if checksum != _checksum(before, after):
+    if written != checksum:
         raise FileError(f"{path}: damaged, or changed by another program: its checksum differs ({_OTHERWISE})")
     try:
         with _quiet():

@@ -43,26 +43,23 @@ def first_slopes(scene: Any, shaped: np.ndarray, d_loads: np.ndarray, d_pull: np
     follow the motion to which the body is pulled on, but for those bent as far as they can be, which only turn.
     """
     loads = np.array([float(contact.normal_force(0.0)) for contact in scene.contacts])
-    each, pull = _held_by(scene, loads, np.where(loads > 0.0, shaped, 0.0))
-    cells = _BristleField.together(each)
+    cells, sizes, pull = _held_by(scene, loads, np.where(loads > 0.0, shaped, 0.0))
     bent, slope = cells.bent(_least_energy(cells, pull))
-    ends = np.cumsum([len(one.stiffness) for one in each])[:-1]
-    share = np.concatenate(
-        [
-            np.tile(d[:, None], len(one.stiffness)) / (load or 1.0)
-            for d, load, one in zip(d_loads.T, loads, each, strict=True)
-        ],
-        axis=1,
-    )
+    share = np.repeat(d_loads / np.where(loads == 0.0, 1.0, loads), sizes, axis=1)
     held = np.einsum("kn,n,nij,ni->kj", share, cells.stiffness, cells.levers, bent)
     stiff = np.einsum("n,nia,nij,njb->ab", cells.stiffness, cells.levers, slope, cells.levers)
     motions = np.linalg.lstsq(stiff, (d_pull - held).T, rcond=None)[0]
-    changes = np.split(np.einsum("nij,njb,bk->kni", slope, cells.levers, motions), ends, axis=1)
+    return _states(scene, shaped, np.einsum("nij,njb,bk->kni", slope, cells.levers, motions), sizes)
+
+
+def _states(scene: Any, shaped: np.ndarray, deflections: np.ndarray, sizes: list[int]) -> list[np.ndarray]:
+    """Return the states `[K, *state_shape]` of each contact with deflections `[K, n, 2]` of the cells of all."""
     found = []
-    for contact, change, load in zip(scene.contacts, changes, shaped, strict=True):
+    parts = np.split(deflections, np.cumsum(sizes)[:-1], axis=1)
+    for contact, part, load in zip(scene.contacts, parts, shaped, strict=True):
         model = contact.model
-        states = [model.state_of(row.T, load) if load > 0.0 else model.rest() for row in change]
-        found.append(np.array(states).reshape(len(change), *model.state_shape))
+        states = [model.state_of(row.T, load) if load > 0.0 else model.rest() for row in part]
+        found.append(np.array(states).reshape(len(part), *model.state_shape))
     return found
 
 
@@ -112,11 +109,6 @@ class _BristleField(NamedTuple):
     middle: np.ndarray
     """Deflection of each bristle that is as far from its largest in all directions `[n, 2]` [m]."""
 
-    @classmethod
-    def together(cls, each: Any) -> _BristleField:
-        """Join the cells of several contacts."""
-        return cls(*(np.concatenate(parts) for parts in zip(*each, strict=True)))
-
     def bent(self, motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the deflections `[n, 2]` after a small motion of the body `[3]`, and their slopes `[n, 2, 2]` by the
         stretch."""
@@ -141,25 +133,21 @@ def _equilibrium(scene: Any, loads: np.ndarray, shaped: np.ndarray) -> list[np.n
     `zhat(d)` the nearest to `B_i d` that a bristle can be, the motion d makes `int sum k_i zhat_i dB_i d - P.d` least.
     That is the rule by which contacts share what statics leaves open.
     """
-    each, pull = _held_by(scene, loads, shaped)
-    cells = _BristleField.together(each)
+    cells, sizes, pull = _held_by(scene, loads, shaped)
     bent = cells.bent(_least_energy(cells, pull))[0]
-    ends = np.cumsum([len(one.stiffness) for one in each])[:-1]
-    states = []
-    for contact, part, load in zip(scene.contacts, np.split(bent, ends), shaped, strict=True):
-        model = contact.model
-        states.append(model.state_of(part.T, load) if load > 0.0 else model.rest())
-    return states
+    return [states[0] for states in _states(scene, shaped, bent[None], sizes)]
 
 
-def _held_by(scene: Any, loads: np.ndarray, shaped: np.ndarray) -> tuple[list[_BristleField], np.ndarray]:
-    """Return the cells of each contact, and the load on the body that they hold."""
+def _held_by(scene: Any, loads: np.ndarray, shaped: np.ndarray) -> tuple[_BristleField, list[int], np.ndarray]:
+    """Return the cells of all contacts, the number of each contact's, and the load on the body that they hold."""
     for contact in scene.contacts:
         if contact.model.law.numbers.creep_speed > 0.0:
             raise InvalidValueError("start", "be 'rest' or 'sliding' with a law that creeps", scene.start)
     applied = np.zeros(3) if scene.force is None else scene.force(0.0)
     pull = applied + scene.body.mass * np.array([*scene.body.gravity, 0.0])
-    return [_cells_of(scene, *each) for each in zip(scene.contacts, loads, shaped, strict=True)], pull
+    each = [_cells_of(scene, *each) for each in zip(scene.contacts, loads, shaped, strict=True)]
+    whole = _BristleField(*(np.concatenate(parts) for parts in zip(*each, strict=True)))
+    return whole, [len(one.stiffness) for one in each], pull
 
 
 def _cells_of(scene: Any, contact: Any, load: float, shaped: float) -> _BristleField:

@@ -6,7 +6,7 @@ import contextlib
 import os
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -39,27 +39,16 @@ Index = tuple[int, ...]
 """Place of a run in the grid."""
 
 
-class Outcome(NamedTuple):
-    """End of a run, without its results."""
-
-    run: str
-    """Key of the run."""
-    status: str
-    """Status of its `Solution`, or "failed"."""
-    failure: str
-    """Reason of a failure in one line, or nothing."""
-
-
 class Bookkeeper:
     """Outcomes and results of the runs of a sweep; this one keeps them in memory, others also on disk."""
 
     def __init__(self, grid: Grid, timed: bool) -> None:
         self.grid, self.timed = grid, timed
-        self.outcomes: dict[Index, Outcome] = {}
+        self.runs: dict[Index, tuple[str, Record]] = {}
+        """Keys and records of the runs that have been done."""
         self.found = self.new = self.failed = self.damaged = 0
         self.first_failure = ""
         self._ends: set[tuple[float, float]] = set()
-        self._records: dict[Index, Record] = {}
 
     def look_up(self, index: Index, key: str, scene: Scene) -> bool:
         """Return True if the run with this key was done before, and take it over."""
@@ -67,7 +56,7 @@ class Bookkeeper:
         record = self._find(index, key)
         if record is not None:
             self.found += 1
-            self._note(index, key, record)
+            self.runs[index] = key, record
         return record is not None
 
     def add(self, index: Index, key: str, record: Record, scene: Scene | None) -> None:
@@ -77,7 +66,7 @@ class Bookkeeper:
         if record.status == FAILED:
             self.failed += 1
             self.first_failure = self.first_failure or f"{self.grid.words(index)}: {record.reason}"
-        self._note(index, key, record)
+        self.runs[index] = key, record
 
     def close(self) -> None:
         """Close what is open on disk."""
@@ -105,34 +94,25 @@ class Bookkeeper:
         """Write the record of a run; returns it as it counts."""
         return record
 
-    def _note(self, index: Index, key: str, record: Record) -> None:
-        self.outcomes[index] = Outcome(key, record.status, record.reason)
-        self._records[index] = record
-
     # ------------------------------------------------------------------ arrays
 
     def _outcome_arrays(self) -> dict[str, np.ndarray]:
         """Return the outcomes as arrays of texts over the grid."""
-        arrays = {name: np.full(self.grid.shape, "", dtype=object) for name in ("run", "status", "failure")}
-        arrays["status"][...] = MISSING
-        for index, outcome in self.outcomes.items():
-            for name, text in outcome._asdict().items():
-                arrays[name][index] = text
-        return {name: values.astype(str) for name, values in arrays.items()}
+        run, status, failure = (np.full(self.grid.shape, text, dtype=object) for text in ("", MISSING, ""))
+        for index, (key, record) in self.runs.items():
+            run[index], status[index], failure[index] = key, record.status, record.reason
+        return {"run": run.astype(str), "status": status.astype(str), "failure": failure.astype(str)}
 
     def _results(self) -> dict[str, Any]:
         """Return the variables of all runs over the grid; a run that differs from the first one has failed."""
-        done = {index: each for index, each in self._records.items() if each.variables}
+        done = {index: each for index, (_, each) in self.runs.items() if each.variables}
         if not done:
             return {}
-        first = done[min(done)].variables
-        time = None
-        if self.timed:
-            time = instants(self._ends)
-            first = on_instants(done[min(done)], time)
+        time = instants(self._ends) if self.timed else None
+        first = done[min(done)].variables if time is None else on_instants(done[min(done)], time)
         check_names(self.grid, first)
         axes = [name for name, each in first.items() if each.dims == (name,)]
-        arrays = {name: self._empty(each, done) for name, each in first.items() if name not in axes}
+        arrays = {name: self._empty(each, len(done)) for name, each in first.items() if name not in axes}
         for index in sorted(done):
             found = done[index].variables if time is None else on_instants(done[index], time)
             self._place(index, found, first, arrays)
@@ -142,8 +122,8 @@ class Bookkeeper:
         }
         return variables | {name: first[name] for name in axes}
 
-    def _empty(self, example: History, done: Mapping[Index, Record]) -> np.ndarray:
-        """Return an array for all runs whose entries say that they are missing."""
+    def _empty(self, example: History, done: int) -> np.ndarray:
+        """Return an array for all runs, of which some are `done`, whose entries say that they are missing."""
         values = np.asarray(example.values)
         shape = (*self.grid.shape, *values.shape)
         if self.grid.size * values.size > MOST_NUMBERS:
@@ -151,8 +131,7 @@ class Bookkeeper:
             raise InvalidValueError("values", rule, f"{self.grid.size} runs of {values.size}")
         if values.dtype.kind == "U":
             return np.full(shape, "", dtype=object)
-        complete = len(done) == self.grid.size
-        kind = values.dtype if complete or values.dtype.kind in "fc" else np.dtype(float)
+        kind = values.dtype if done == self.grid.size or values.dtype.kind in "fc" else np.dtype(float)
         return np.full(shape, np.nan if kind.kind in "fc" else 0, kind)
 
     def _place(
@@ -163,15 +142,16 @@ class Bookkeeper:
         arrays: dict[str, np.ndarray],
     ) -> None:
         """Write the variables of a run into the arrays, or note that it failed."""
+        key, record = self.runs[index]
         if differing := difference(found, first):
-            self.outcomes[index] = self.outcomes[index]._replace(status=FAILED, failure=differing)
+            self.runs[index] = key, record._replace(status=FAILED, reason=differing)
             return
         for name, array in list(arrays.items()):
             values = np.asarray(found[name].values)
             if array.dtype.kind != "O" and not np.can_cast(values.dtype, array.dtype, "same_kind"):
                 arrays[name] = array = array.astype(np.result_type(array, values))
             array[index] = values
-        self._records[index] = self._records[index]._replace(variables={})  # they are in the arrays now
+        self.runs[index] = key, record._replace(variables={})  # they are in the arrays now
 
 
 class FolderBookkeeper(Bookkeeper):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import pickle
 import queue
 import threading
@@ -20,6 +19,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from planarfriction import validation
+from planarfriction.compiler import threads
 from planarfriction.described import described
 from planarfriction.errors import InvalidValueError, SweepError, SweepInterrupted
 from planarfriction.scenes import Scene
@@ -37,11 +37,9 @@ if TYPE_CHECKING:
 _BETWEEN = 0.5
 """Time between two reports of progress [s]."""
 
-_AHEAD = 4
-"""Number of runs that wait for each worker of an executor, so that none is idle and little memory is used."""
-
-_WORKERS = 64
-"""Number of workers of an executor that does not tell it."""
+_AHEAD, _WORKERS = 4, 64
+"""Number of runs that wait for each worker of an executor, so that none is idle and little memory is used, and number
+of workers of an executor that does not tell it."""
 
 _ENDED = "the executor ended ({}): finished runs are kept, sweep again to continue"
 
@@ -77,17 +75,8 @@ def _duration(seconds: float) -> str:
     return f"{minutes:.0f} min" if minutes < 90.0 else f"{minutes / 60.0:.1f} h"
 
 
-def processors() -> int:
-    """Return the number of processors that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-class _Job(NamedTuple):
-    """Run that has been handed out."""
-
-    index: Index
-    key: str
-    scene: Scene
+_Job = tuple[Index, str, Scene]
+"""Run that has been handed out: its place in the grid, its key, its scene."""
 
 
 def sweep(
@@ -145,10 +134,9 @@ def sweep(
     for name in OWN:
         if name in grid.labels:
             raise InvalidValueError("name of a swept quantity", f"not be one of {', '.join(OWN)}", name)
-    if not (measure is None or callable(measure)):
-        raise InvalidValueError("measure", "be a function of a Solution, or None", measure)
-    if not (progress is None or callable(progress)):
-        raise InvalidValueError("progress", "be a function of a Progress, or None", progress)
+    for name, given, of in (("measure", measure, "Solution"), ("progress", progress, "Progress")):
+        if not (given is None or callable(given)):
+            raise InvalidValueError(name, f"be a function of a {of}, or None", given)
     if executor is not None and not isinstance(executor, Executor):
         raise InvalidValueError("executor", "be a concurrent.futures.Executor, or None", executor)
     if isinstance(executor, ProcessPoolExecutor):
@@ -240,10 +228,10 @@ class Sweeping:
         if executor is not None:
             self._go(executor, _AHEAD * (getattr(executor, "_max_workers", None) or _WORKERS), None)
             return
-        threads = processors()
-        with ThreadPoolExecutor(threads, "sweep") as own:
+        workers = threads.processors()
+        with ThreadPoolExecutor(workers, "sweep") as own:
             try:
-                self._go(own, _AHEAD * threads, self._stopped.is_set)
+                self._go(own, _AHEAD * workers, self._stopped.is_set)
             except BaseException:
                 self._stopped.set()
                 raise
@@ -254,7 +242,7 @@ class Sweeping:
         try:
             for job in self._jobs():
                 try:
-                    future = executor.submit(run, job.scene, self._measure, stopped)
+                    future = executor.submit(run, job[2], self._measure, stopped)
                 except RuntimeError as error:  # broken, or shut down
                     raise SweepError(_ENDED.format(reason_of(error))) from None
                 pending[future] = job
@@ -286,7 +274,7 @@ class Sweeping:
             if self._book.look_up(index, key, scene):
                 self._tell()
             else:
-                yield _Job(index, key, scene)
+                yield index, key, scene
 
     def _collect(self, done: queue.SimpleQueue[Future], pending: dict[Future, _Job]) -> None:
         """Take the runs that are done, at least one, or report after a while that none is."""
@@ -301,9 +289,9 @@ class Sweeping:
 
     def _take(self, done: list[Future], pending: dict[Future, _Job]) -> None:
         for future in done:
-            job = pending.pop(future)
             # `exception` returns the worker's error, so that a KeyboardInterrupt raised here is this process's own.
             error = CancelledError() if future.cancelled() else future.exception()
+            index, key, scene = pending.pop(future)
             if isinstance(error, (BrokenExecutor, CancelledError)):
                 self._ended = _ENDED.format(reason_of(error))
                 continue
@@ -311,7 +299,7 @@ class Sweeping:
                 continue
             # any other error means that the executor lost the run, or could not send it
             record = future.result() if error is None else Record(FAILED, reason_of(error), {})
-            self._book.add(job.index, job.key, record, job.scene)
+            self._book.add(index, key, record, scene)
         if self._ended:
             raise SweepError(self._ended)
 

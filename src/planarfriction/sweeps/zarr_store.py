@@ -12,7 +12,7 @@ import numpy as np
 
 from planarfriction.errors import FileError, MissingExtraError
 from planarfriction.scenes.solution import History
-from planarfriction.sweeps.bookkeeping import OWN, Bookkeeper, Index, Outcome, check_names, difference, on_instants
+from planarfriction.sweeps.bookkeeping import OWN, Bookkeeper, Index, check_names, difference, on_instants
 from planarfriction.sweeps.quantities import Grid
 from planarfriction.sweeps.records import FAILED, Record, failure, reason_of
 from planarfriction.writing import make_folder, put
@@ -43,8 +43,8 @@ class ZarrBookkeeper(Bookkeeper):
         make_folder(path.parent)
         self._layout: dict[str, History] | None = None
         self._arrays: dict[str, Any] = {}
-        self._listed: dict[Index, Outcome] = {}
-        """Outcomes in the journal."""
+        self._listed: dict[Index, tuple[str, Record]] = {}
+        """Keys and records, without variables, in the journal."""
         try:
             self._group: Any = zarr.open_group(path, mode="a", zarr_format=3)
             self._begin()
@@ -78,19 +78,17 @@ class ZarrBookkeeper(Bookkeeper):
         if self._group["run"].shape != self.grid.shape:
             raise FileError(f"{self.path}: holds a sweep over other quantities: name another path")
         self._read_journal()
-        variables = {name: self._group[name] for name in names if name not in (*self.grid.labels, *OWN)}
-        if variables:
-            self._arrays = variables
-            swept = len(self.grid.shape)
-            self._layout = {}
-            for name, array in variables.items():
-                dims = tuple(array.metadata.dimension_names)
-                own = dims if dims == (name,) else dims[swept:]
-                values = array[...] if dims == (name,) else np.empty(array.shape[swept:], array.dtype)
-                self._layout[name] = History(own, values, {})
-            time = self._layout.get("time")
-            if self._time is not None and time is not None and not np.array_equal(time.values, self._time):
+        swept = len(self.grid.shape)
+        for name in names:
+            if name in (*self.grid.labels, *OWN):
+                continue
+            self._arrays[name] = array = self._group[name]
+            dims = tuple(array.metadata.dimension_names)
+            axis = dims == (name,)
+            values = array[...] if axis else np.empty(array.shape[swept:], array.dtype)
+            if self._time is not None and name == "time" and axis and not np.array_equal(values, self._time):
                 raise FileError(f"{self.path}: holds a sweep with other instants: name another path")
+            self._layout = {**(self._layout or {}), name: History(dims if axis else dims[swept:], values, {})}
 
     def _write(self, name: str, dims: tuple[str, ...], values: np.ndarray, attrs: Mapping[str, str]) -> None:
         """Make an array in one chunk, or fill an existing one."""
@@ -135,10 +133,8 @@ class ZarrBookkeeper(Bookkeeper):
 
     def _find(self, index: Index, key: str) -> Record | None:
         """Return the record of a run that is in the store, without its variables, or None."""
-        listed = self._listed.get(index)
-        if listed is None or listed.run != key or listed.status == FAILED:
-            return None
-        return Record(listed.status, "", {})
+        run, record = self._listed.get(index, ("", None))
+        return None if run != key or record is None or record.status == FAILED else record
 
     def _store(self, index: Index, key: str, record: Record, scene: Scene | None) -> Record:
         """Write the chunks of a run, then the line that makes them count; returns the record as it counts."""
@@ -161,10 +157,7 @@ class ZarrBookkeeper(Bookkeeper):
             put(str(folder / f"{key}.json"), failure(record.reason, scene).encode())
         line = json.dumps([index, key, record.status, record.reason])
         self._journal.write(f"{line}\n".encode())
-        return record
-
-    def _note(self, index: Index, key: str, record: Record) -> None:
-        self.outcomes[index] = Outcome(key, record.status, record.reason)
+        return record._replace(variables={})
 
     def _read_journal(self) -> None:
         """Read the last outcome of each run; a line that a kill has cut counts as no line."""
@@ -174,8 +167,8 @@ class ZarrBookkeeper(Bookkeeper):
             return
         for line in lines:
             try:
-                index, *outcome = json.loads(line)
-                self._listed[tuple(index)] = Outcome(*outcome)
+                index, key, *outcome = json.loads(line)
+                self._listed[tuple(index)] = key, Record(*outcome, {})
             except (ValueError, TypeError):
                 continue
 
@@ -188,7 +181,7 @@ class ZarrBookkeeper(Bookkeeper):
         """Write the outcomes of all runs, and open the store: variables are read on demand."""
         import xarray as xr
 
-        self.outcomes = {**self._listed, **self.outcomes}  # an interrupted sweep does not reach all of the journal
+        self.runs = {**self._listed, **self.runs}  # an interrupted sweep does not reach all of the journal
         for name, values in self._outcome_arrays().items():
             self._write(name, tuple(self.grid.labels), values, {})
         return xr.open_zarr(self.path, chunks=None, consolidated=False)

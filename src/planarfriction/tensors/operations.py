@@ -23,7 +23,7 @@ Arrays = Sequence[Any]
 class RolloutOperation(NamedTuple):
     """Last state and wrenches of a rollout, of state, twist, load and parameters; `held` is `dt` and the buffers."""
 
-    pack: Callable[..., tuple[Packed, ...]]
+    pack: Callable[..., Packed]
     """Function that makes the parts of the model from the buffers."""
     axes: int
     """Axes of the state of a contact."""

@@ -25,7 +25,7 @@ TRAINABLE = LAW[:-1]
 class Compiled(NamedTuple):
     """A model as compiled rollouts take it."""
 
-    pack: Callable[..., tuple[Packed, ...]]
+    pack: Callable[..., Packed]
     """Function that makes the parts of the model from the `buffers` as NumPy arrays."""
     buffers: tuple[Tensor, ...]
     """The model's own numbers of the patch."""

@@ -21,8 +21,8 @@ def _compiled_loop(model: ReducedModel | ReducedModelPublished, twists: np.ndarr
     from planarfriction.derivatives.inputs import checked
 
     inputs = checked(model, None, twists, 1.0, 1e-4, None)
-    compiled, family = inputs.compiled(), inputs.parts[0].family
-    wrench, states = np.empty((1, *twists.shape)), np.empty((len(inputs.parts), 1, 0, 3))
+    compiled, family = inputs.compiled(), inputs.model.family
+    wrench, states = np.empty((1, *twists.shape)), np.empty((len(inputs.rows), 1, 0, 3))
     return median(lambda: family.rollout(compiled, (0, 1), inputs.state.copy(), wrench, states), 9)
 
 

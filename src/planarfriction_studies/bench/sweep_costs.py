@@ -9,9 +9,9 @@ import time
 import numpy as np
 
 from planarfriction import sweeps
+from planarfriction.compiler.threads import processors
 from planarfriction.models import ReducedModel
 from planarfriction.scenes import Scene, Signal, Solution, in_hand, in_hand_load, simulate
-from planarfriction.sweeps.running import processors
 from planarfriction_studies.bench.measurement import Measurement, line, once
 from planarfriction_studies.bench.workloads import disc, law
 
