@@ -32,6 +32,9 @@ Integers = Annotated[np.ndarray, types.int64]
 _WORD = 8
 """Bytes of a word."""
 
+_DTYPES = frozenset(map(np.dtype, (np.float32, np.float64, np.int64)))
+"""Types of the numbers of arrays in records."""
+
 # ---------------------------------------------------------------------- records as rows of words
 
 
@@ -56,8 +59,8 @@ def addresses_in(*records: Any) -> list[str]:
 
 def place_of(array: np.ndarray) -> int:
     """Return the address of the first number of a contiguous array, which the caller keeps alive."""
-    assert array.dtype in (np.float32, np.float64, np.int64) and array.flags.c_contiguous
-    return array.ctypes.data
+    assert array.dtype in _DTYPES and array.flags.c_contiguous
+    return array.__array_interface__["data"][0]
 
 
 def places_of(rows: np.ndarray) -> np.ndarray:
@@ -65,6 +68,7 @@ def places_of(rows: np.ndarray) -> np.ndarray:
     return place_of(rows) + rows.strides[0] * np.arange(len(rows))
 
 
+@functools.cache
 def size_of(record: Any) -> int:
     """Return the number of words of a record."""
     return sum(size_of(kind) if hasattr(kind, "_fields") else 1 for _, kind in _fields(record))
@@ -80,19 +84,32 @@ def row_of(record: Any) -> np.ndarray:
     return row
 
 
+@functools.cache
+def _plan(record: Any) -> tuple[tuple[str, int, bool, np.dtype | None], ...]:
+    """Return the name of each field, the words of a record in it or 0, whether it is an integer, and its dtype."""
+    return tuple(
+        (
+            name,
+            size_of(kind) if hasattr(kind, "_fields") else 0,
+            _is_integer(kind),
+            None if _number_of(kind) is None else np.dtype(str(_number_of(kind))),
+        )
+        for name, kind in _fields(record)
+    )
+
+
 def _write(row: np.ndarray, record: Any) -> None:
-    at = 0
-    for name, kind in _fields(type(record)):
+    at, integers = 0, row.view(np.int64)
+    for name, words, integer, dtype in _plan(type(record)):
         value = getattr(record, name)
-        if hasattr(kind, "_fields"):
-            count = size_of(kind)
-            _write(row[at : at + count], value)
-            at += count
+        if words:
+            _write(row[at : at + words], value)
+            at += words
             continue
         if isinstance(value, np.ndarray):
-            assert str(value.dtype) == str(_number_of(kind)), (name, value.dtype)
+            assert value.dtype == dtype, (name, value.dtype)
             value = place_of(value) if value.size else 0
-        (row.view(np.int64) if _is_integer(kind) else row)[at] = value
+        (integers if integer else row)[at] = value
         at += 1
 
 
