@@ -122,8 +122,7 @@ def design_experiment(
 ) -> MotionPlan:
     """Rank motions by the information that they are expected to add to that of the logs so far.
 
-    Wrenches and derivatives are those of `ReducedModelPublished`; the information is Lindley's gain for normal errors
-    (see the module).
+    Wrenches and derivatives are those of `ReducedModelPublished`; the information is Lindley's gain (see the module).
 
     Parameters
     ----------
@@ -142,8 +141,7 @@ def design_experiment(
         Standard deviation of the measured fx, fy [N] and tau [N m]; None takes that of `logs`, or 1 % of the largest
         friction.
     nuisance
-        Disturbances that the rig may add, as in `identify_lugre`; future motions are assumed to have no noise on the
-        twist.
+        Disturbances that the rig may add, as in `identify_lugre`; twists of future motions count as free of noise.
 
     Raises
     ------

@@ -130,8 +130,7 @@ class Log(ByValue):
         window: int = 7,
         name: str = "log",
     ) -> Log:
-        """Make a log from measured poses instead of twists: `motion` is x, y, theta `[T, 3]` of the contact frame [m,
-        rad].
+        """Make a log from poses instead of twists: `motion` is x, y, theta `[T, 3]` of the contact frame [m, m, rad].
 
         The pose is that of the contact frame in the world, the wrench is in the axes of the contact frame; the twist is
         obtained with `differentiated` and rotated into these axes. Jumps of theta by a whole turn, as from a tracker
@@ -202,8 +201,7 @@ def as_logs(log: Log | Sequence[Log]) -> tuple[Log, ...]:
 def differentiated(time: ArrayLike, motion: ArrayLike, *, window: int = 7) -> np.ndarray:
     """Compute the twist `[T, 3]` of a frame, in its axes, from poses x, y, theta `[T, 3]` [m, m, rad] over time [s].
 
-    The twist is the slope of a parabola through `window` neighbouring samples (fewer at the ends). Jumps of theta by
-    whole turns are removed first.
+    The twist is the slope of a parabola through `window` samples. Jumps of theta by whole turns are removed first.
 
     Raises InvalidValueError for times that do not increase and for other jumps of theta.
     """

@@ -42,8 +42,7 @@ DRY = LuGre(mu_c=0.3, mu_s=0.3, v_s=1e-3, sigma_0=1e6, sigma_1=20.0, sigma_2=0.0
 CHANNELS = (("x", "m"), ("y", "m"), ("theta", "rad"))
 
 FIRST_NOISE, LEAST_NOISE = 1e-3, 1e-9
-"""Noise of the positions in the first fit [m] (that of the angles is this over the contact radius), and least noise of
-a channel [m, rad]."""
+"""Noise of positions in the first fit [m] (of angles over the contact radius), least noise of a channel [m, rad]."""
 
 CHANGE = 0.01
 """Step of difference quotients as a share of a parameter (at least of its start).

@@ -44,8 +44,7 @@ class Identification(ByValue):
     histories: tuple[Mapping[str, Any], ...] = field(repr=False)
     """History of each log or slide: "name", "time" `[T]`, "measured" (NaN for what was not) and "predicted" `[T, C]`.
     For logs with wrenches also "held_out" `[T, C]`, as fits predict it that saw neither the sample nor its block (NaN
-    at a start from rest), "speed" `[T]` [m/s], the sliding speed `|V_S|`, and "coefficient" `[T]` [-], friction by
-    load."""
+    at a start from rest), "speed" `|V_S|` `[T]` [m/s], and "coefficient" `[T]` [-], friction by load."""
     law: LuGre
     """The fitted law; parameters that were not estimated are as given."""
     model: Any = field(repr=False)

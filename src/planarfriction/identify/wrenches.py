@@ -50,8 +50,7 @@ def identify_lugre(
     """Estimate parameters of a LuGre contact from logs of twist and wrench, and find which model explains them.
 
     Bounded nonlinear least squares for the wrenches of a fixed-step rollout; residuals are divided by the noise, and
-    parameters that must be > 0 are fitted as logarithms. Disturbances of the rig (delay, zeros, drift) are estimated
-    too.
+    parameters that must be > 0 are fitted as logarithms. Disturbances of the rig (delay, zeros, drift) are fitted too.
 
     Parameters
     ----------

@@ -21,8 +21,7 @@ STICK, LEFT, RIGHT = "stick", "slide left", "slide right"
 """Mode of a pusher that pushes; left and right are seen along its direction."""
 
 _BEYOND = 0.1
-"""Angle beyond the friction cone [rad] at which a sticking force is still sought: a step may pass the end of the
-mode."""
+"""Angle beyond the friction cone [rad] at which a sticking force is still sought: steps may pass the end of a mode."""
 
 _EDGE = 1.0 - 1e-9
 """Share of its half width from which on a face is pressed at its end, as far as rounding can say."""
@@ -55,8 +54,7 @@ class SliderMotion(NamedTuple):
 
 
 def motion_cone(surface: LimitSurface, at: ArrayLike, normal: ArrayLike, mu: float) -> np.ndarray:
-    """Return the edges of the motion cone `[2, 2]`: velocities of a point of the slider for both edges of the friction
-    cone.
+    """Return the edges of the motion cone `[2, 2]`: velocities of a point for both edges of the friction cone.
 
     If the velocity of the pusher is between the two, it sticks; otherwise it slides along the slider, which then moves
     as on the nearer edge. `at` `[2]` [m] is the point, `normal` `[2]` the direction into the slider, in the axes of the
@@ -170,8 +168,7 @@ def _flush(surface: LimitSurface, place: TouchPoint, mu: float, velocity: np.nda
 
 
 def _slip(angle_of: Any, wanted: float, speed: float) -> float:
-    """Return the speed at which the face slides along the slider, to the left, for a force at the wanted angle
-    [m/s]."""
+    """Return the speed at which a face slides along the slider, to the left, for a force at an angle [m/s]."""
     from scipy.optimize import brentq
 
     # from far to the right to far to the left the force turns from one side of the normal to the other

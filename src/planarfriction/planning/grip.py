@@ -19,8 +19,7 @@ from planarfriction.planning.report import GripReport, report_of
 from planarfriction.scenes import Scene, Signal
 
 LEVELS = (0.93, 0.85, 0.7, 0.5, 0.25, 0.02)
-"""Grips to start from, as shares of the load that holds a sliding body: all below what holds it, where nothing would
-follow a change of the grip."""
+"""Grips to start from, as shares of the load that holds a sliding body: above it nothing follows from a change."""
 
 KICK = 0.7
 """Share of the load that holds a body at rest with which the grip begins: bristles at rest give way at once."""
@@ -54,8 +53,7 @@ class GripPlan(ByValue):
         return str(self.report)
 
     def plot(self) -> Any:
-        """Draw the profile and the motion, with the scene's friction and with other values; returns a matplotlib
-        Figure."""
+        """Draw the profile and the motion with each friction; returns a matplotlib Figure."""
         return picture("grip", self)
 
 

@@ -15,8 +15,7 @@ _STEP, _STEPS = 1.25, 120
 
 
 def holding_load(wrench: ArrayLike, patch: ContactPatch, mu: float, margin: float = 0.0) -> float:
-    """Return the smallest normal force [N] whose friction holds a load `wrench` `(fx, fy, tau)` [N, N, N m] on a
-    contact.
+    """Return the smallest normal force [N] of a contact that holds a load `wrench` `(fx, fy, tau)` [N, N, N m].
 
     The load acts on the body, about the origin of the contact frame. Friction can be anything inside the limit surface:
     `f_N = max_V (wrench . V) / (mu Phi(V))`, which is attained by the twist V normal to the surface. For a patch that

@@ -125,8 +125,7 @@ def grip_position(scene: Scene, contact: int) -> np.ndarray:
 
 
 def slide_of(scene: Scene, contact: int, pose: np.ndarray) -> np.ndarray:
-    """Return the displacement in the world of the place that was under a contact `[..., 2]` [m], at poses
-    `[..., 3]`."""
+    """Return the displacement `[..., 2]` [m] of the place that was under a contact, at poses `[..., 3]`."""
     grip = grip_position(scene, contact)
     return pose[..., :2] + rotate(grip - scene.body.position, pose[..., 2] - scene.body.angle) - grip
 

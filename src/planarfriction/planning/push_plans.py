@@ -112,7 +112,7 @@ def plan_push(
 
     `start` is the first pose, `edges` the edges that may be pushed (all by default).
 
-    Raises `InvalidValueError` for arguments out of range and a pusher without friction or with a face, `SolverError` if
+    Raises `InvalidValueError` for arguments out of range and pushers other than a point with friction, `SolverError` if
     no plan is found.
 
     Source: Lynch and Mason 1996.
@@ -196,8 +196,7 @@ def _twist(slider: Slider, place: TouchPoint, angle: float) -> np.ndarray:
 def _shortest(
     slider: Slider, place: TouchPoint, largest: float, goal: np.ndarray, known: np.ndarray | None = None
 ) -> tuple[float, np.ndarray]:
-    """Return the length of the shortest plan at a place, and its angles and lengths `[2 PARTS]`; infinite where none is
-    found."""
+    """Return the length of the shortest plan at a place, infinite without one, and angles and lengths `[2 PARTS]`."""
     from scipy.interpolate import CubicSpline
     from scipy.optimize import least_squares, minimize
 

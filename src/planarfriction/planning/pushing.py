@@ -73,8 +73,7 @@ def push(
     samples: int = 101,
     rtol: float = 1e-7,
 ) -> Push:
-    """Predict the motion of a slider that is pushed slowly: friction balances the pusher at every instant, without
-    inertia.
+    """Predict the motion of a slider that is pushed slowly: friction balances the pusher, without inertia.
 
     The twist is normal to the limit surface where the pusher's wrench meets it. The pusher sticks while its velocity is
     inside the motion cone, and slides along the slider otherwise. A face that lies flush sticks or slides too, or turns

@@ -68,8 +68,7 @@ class Slider(ByValue):
         return float(np.hypot(*self.outline.T).max())
 
     def gaps(self, point: np.ndarray) -> np.ndarray:
-        """Return the distances of a point `[2]` from the lines of all edges `[M]` [m], > 0 outside; it is outside if
-        any is > 0.
+        """Return the distances of a point `[2]` from the lines of all edges `[M]` [m]; one that is outside has any > 0.
 
         Raises `InvalidValueError` unless it is a point.
         """

@@ -148,8 +148,7 @@ def _same(contact: Touch, other: Touch, edges: int) -> bool:
 def place_of(
     scenery: Scenery, contact: Touch, t: float, q: np.ndarray, forward: bool = False
 ) -> tuple[TouchPoint, np.ndarray]:
-    """Return the place at which the slider is touched, and the pusher's velocity there `(vx, vy, omega)`, in its
-    axes."""
+    """Return the place at which a slider is touched, and the velocity of the pusher there, `[3]`, in its axes."""
     slider, (x, y, angle), half = scenery.slider, scenery.pose(t), 0.0
     if contact.kind == END:
         at, normal = scenery.end(contact.end, t, q), slider.inward[contact.edge]

@@ -57,8 +57,7 @@ def law_from_dict(table: Section) -> Any:
 
 
 def patch_from_dict(table: Section) -> Any:
-    """Return the contact patch of a table: `shape` names what makes it, the other keys are its parameters; files are
-    paths.
+    """Return the patch of a table: `shape` names what makes it, the other keys are its parameters; files are paths.
 
     Every shape takes `metric` and `asymmetry` as `ContactPatch.with_friction_metric` does; `metric` may also be a table
     with the parameters of `friction_metric`: `along`, `across` and `angle` [rad], 0 if left out.
@@ -92,8 +91,7 @@ def _shape_from_dict(table: Section) -> Any:
 
 
 def pressure_from_dict(patch: Section) -> Any:
-    """Return the pressure law under the key `pressure` of a patch: "uniform", a table `{law, ...}`, or a list, one per
-    cell."""
+    """Return the pressure law under `pressure` of a patch: "uniform", a table `{law, ...}`, or a list, one per cell."""
     from planarfriction.patch import Pressure
 
     value = patch.get("pressure")
@@ -143,8 +141,7 @@ def _member(family: Family, parent: Section, key: str, default: Any = None) -> t
 
 
 def _made(table: Section, make: Callable[..., Any], given: tuple[Any, ...], *others: str) -> Any:
-    """Return the member that `table` describes, with the keys `others` beside its own; `given` begins with its
-    patch."""
+    """Return the member of a table, with the keys `others` beside its own; `given` begins with its patch."""
     options = _arguments(table, make, "kind", *others)
     if "surface" in options:
         options["surface"] = _surface_from_dict(table, given[0])

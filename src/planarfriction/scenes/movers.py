@@ -8,8 +8,7 @@ from planarfriction.scenes.signal import Signal
 
 
 def displacement(velocity: Signal, times) -> np.ndarray:
-    """Return the integral `[T, k]` of a velocity `[k]` from 0 to `times` `[T]` [s], which are >= 0: exact, piece by
-    piece."""
+    """Return the exact integral `[T, k]` of a velocity `[k]` from 0 to `times` `[T]` [s], which are >= 0."""
     times = np.asarray(times, dtype=float)
     breaks = np.unique(np.concatenate([[0.0], velocity.breaks, times]))
     breaks = breaks[breaks >= 0.0]

@@ -21,8 +21,7 @@ SHAPE_INTERVAL = 1e-3
 """Longest time [s] that a patch keeps its shape while the load it depends on changes; held loads need no limit."""
 
 BATCH = 4096
-"""Segments between breaks that are packed at a time; fewer where their shapes take more room (see
-`compiled.packed.MAX_PACK_BYTES`)."""
+"""Segments that are packed at a time; fewer where their shapes take more than `compiled.packed.MAX_PACK_BYTES`."""
 
 MOST_PIECES = 10**12
 """Segments of a motion, each of which the solver has to stop at."""

@@ -95,8 +95,7 @@ def drift_force(load: Literal["tangential", "normal"], *, t_end: float = 5.0) ->
 
 
 def drift(model: Any, *, load: Literal["tangential", "normal"] = "tangential", t_end: float = 5.0) -> Scene:
-    """Make the scene of a disc of 1 kg and radius 0.05 m on a table, pushed with less than friction can hold: does it
-    creep?
+    """Make the scene of a disc on a table, 1 kg, radius 0.05 m, pushed with less than friction can hold: does it creep?
 
     `load="tangential"`: the force oscillates, and from 2.8 s a torque does too; `load="normal"`: force and torque are
     constant and the normal force oscillates after 1 s. The contact is fixed to the world.
@@ -130,8 +129,7 @@ def free_slide(
     t_end: float = 5.0,
     save_every: float = 0.01,
 ) -> Scene:
-    """Make the scene of a body thrown onto a level table with the `twist` `(vx, vy, omega)`; it ends when it has
-    stopped.
+    """Make the scene of a body thrown onto a level table with a `twist` `(vx, vy, omega)`; it ends when that stops.
 
     The patch is fixed to the body, its frame's origin at the centre of mass. `mass` [kg], `inertia` about the centre of
     mass [kg m^2] (default: that of a puck whose mass is spread like its contact pressure), initial `position` [m] and
@@ -150,8 +148,7 @@ def free_slide(
 
 
 def published_velocity(*, speed: float = 0.015, spin: float = 1.0) -> Signal:
-    """Return the twist `(vx, vy, omega)` of the published velocity-driven runs, held over every 0.01 s
-    [m/s, m/s, rad/s].
+    """Return the twist `(vx, vy, omega)` [m/s, m/s, rad/s] of the published driven runs, held over every 0.01 s.
 
     `speed` [m/s] is the peak of vx (vy peaks at 0.4 of it), `spin` [rad/s] that of omega: spin up, slide along x while
     spinning, slide along y, spin down, stop.
@@ -176,8 +173,7 @@ def driven(
     at: Literal["origin", "centre_of_pressure"] = "centre_of_pressure",
     t_end: float = 5.0,
 ) -> Scene:
-    """Make the scene of a patch moved with a prescribed `twist` `(vx, vy, omega)` in its own axes, to record its
-    wrench.
+    """Make the scene of a patch moved with a `twist` `(vx, vy, omega)` in its own axes, to record its wrench.
 
     `twist` is a signal `[T, 3]` or a constant (default: `published_velocity()`), `normal_force` [N] a signal or a
     number. `at` is the point of the patch that has the velocity: the origin of the contact frame, or the centre of
@@ -207,8 +203,7 @@ def pushed(
     size: Sequence[float] = (0.15, 0.08),
     t_end: float = 2.0,
 ) -> Scene:
-    """Make the scene of a plate pushed along a table: two finger pads pinch it behind its centre and move as
-    prescribed.
+    """Make the scene of a plate on a table, pushed by two finger pads that pinch it and move as prescribed.
 
     `model` is the friction of the patch on which the plate of `size` (width, height) [m] and `mass` [kg] stands, under
     its weight, with its frame at the centre of mass. The pads, with the model `pad` (default: the same), begin at

@@ -82,8 +82,7 @@ class Body(ByValue):
 
 
 def between(signal: Signal) -> str:
-    """Return the lowest and the highest value of a signal of plain numbers, in words; one number where it is
-    constant."""
+    """Return the lowest and the highest value of a scalar signal in words; one number where it is constant."""
     low, high = float(signal.values.min()), float(signal.values.max())
     return f"{low:.4g}" if low == high else f"{low:.4g} to {high:.4g}"
 
@@ -100,8 +99,7 @@ class Contact(ByValue):
     """A contact between body and world: a friction model, its position, and its normal force.
 
     Contacts fixed to the world (fingers) keep their frame while the body moves past them; contacts fixed to the body (a
-    box on a table) move with it. In both cases the world's side may move as well: a pad that is driven, a belt that
-    runs.
+    box on a table) move with it. In both cases the world's side may move as well: a driven pad, a running belt.
 
     Raises InvalidValueError unless `model` is a friction model, for a load below zero, and for other parameters that
     break their rule.
@@ -287,8 +285,7 @@ class Scene(ByValue):
         return f"Scene({self.name!r}: {self.t_end:g} s, body of {body}{driven}; {contacts}{more})"
 
     def breaks(self, t_end: float | None = None) -> np.ndarray:
-        """Return the times [s] from 0 to `t_end` (default: the scene's) at which any signal jumps or bends, both ends
-        included.
+        """Return 0, the times [s] at which any signal jumps or bends, and `t_end` (default: the scene's).
 
         Breaks within rounding of each other (`SAME_TIME`) count as one.
 
@@ -318,8 +315,7 @@ class Scene(ByValue):
 
     @classmethod
     def from_file(cls, path: str | Path) -> Scene:
-        """Read a scene from a TOML or JSON file. Raises FileError in one line that names the file, the table and the
-        key."""
+        """Read a TOML or JSON file. Raises FileError in one line that names the file, the table and the key."""
         from planarfriction.scenes.files import read_scene
 
         return read_scene(path)

@@ -35,8 +35,7 @@ def breaks_between(times: np.ndarray, t_end: float) -> np.ndarray:
 
 
 def sample_count(span: float, step: float, name: str) -> int:
-    """Return the number of steps of `step` [s] in `span` [s]; raise, before memory is asked for, if there are too
-    many."""
+    """Return the number of steps of `step` [s] in `span` [s]; raise if they would need too much memory."""
     count = span / step * (1.0 + 1e-12)  # so that the end itself is kept in spite of rounding
     if count > MOST_SAMPLES:
         rule = f"be at least {span / MOST_SAMPLES:.3g} s for {span:g} s (at most {MOST_SAMPLES} samples)"
@@ -45,8 +44,7 @@ def sample_count(span: float, step: float, name: str) -> int:
 
 
 def sample_times(t_end: float, dt: float = 0.01) -> np.ndarray:
-    """Return the times `i dt` [s] from 0 to the last one not after `t_end`, each computed as `i * dt` (nothing
-    accumulates)."""
+    """Return the times `i * dt` [s] from 0 to the last one not after `t_end`; no rounding accumulates."""
     t_end, dt = validation.non_negative("t_end", t_end), validation.positive("dt", dt)
     return np.arange(sample_count(t_end + 1e-9 * dt, dt, "dt") + 1) * dt  # 1e-9 keeps t_end itself despite rounding
 
@@ -117,8 +115,7 @@ class Signal(ByValue):
     def sine(
         cls, offset: float, amplitude: float, frequency: float, *, t_end: float, dt: float = 0.01, phase: float = 0.0
     ) -> Signal:
-        """Return the signal `offset + amplitude sin(2 pi frequency t + phase)`, sampled every `dt` [s] up to `t_end`
-        and held.
+        """Return the signal `offset + amplitude sin(2 pi frequency t + phase)`, held over every `dt` [s] up to `t_end`.
 
         `frequency` is in Hz, `phase` in rad.
 
@@ -133,8 +130,7 @@ class Signal(ByValue):
     def from_csv(
         cls, path: str | Path, *, time: str = "time", value: str | Sequence[str] = "value", hold: Hold = "previous"
     ) -> Signal:
-        """Return a signal from a CSV file with a header line: `time` is the name of the column of times, `value` one
-        column or a list.
+        """Return a signal from a CSV file with a header: `time` names the column of times, `value` one or several.
 
         Lines that start with # are comments. Raises FileError for a missing file, a missing column or text among the
         numbers, and InvalidValueError as the constructor does.
@@ -151,8 +147,7 @@ class Signal(ByValue):
             raise InvalidValueError(f"{path}: {error.name}", error.rule, error.value) from None
 
     def held(self, dt: float) -> Signal:
-        """Return the same signal as seen by a digital controller: sampled every `dt` [s] from the first time on, and
-        held.
+        """Return the signal as a digital controller sees it: sampled every `dt` [s] from the first time on, and held.
 
         Raises InvalidValueError for a `dt` that is not > 0, or that makes too many samples.
         """
@@ -177,8 +172,7 @@ class Signal(ByValue):
 
     @property
     def breaks(self) -> np.ndarray:
-        """Times [s] at which the value jumps or the slope changes, increasing; samples that change nothing are left
-        out."""
+        """Increasing times [s] at which the value jumps or the slope changes; samples that change nothing are none."""
         if self.hold == "previous":
             change = np.diff(self.values, axis=0, prepend=self.values[:1])
         else:
@@ -223,8 +217,7 @@ class Signal(ByValue):
 
     @classmethod
     def from_dict(cls, data: Any, folder: str | Path | None = None) -> Signal:
-        """Return a signal from a number, a list of numbers (constants) or a table as in scene files (see
-        `read_signal`).
+        """Return a signal from a number, a list of numbers (constants) or a table as in scene files.
 
         Raises FileError if the table is not a signal, InvalidValueError if `folder` is not a path.
         """

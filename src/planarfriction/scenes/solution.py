@@ -185,8 +185,7 @@ class Solution:
         dpi: float = 100.0,
         progress: Callable[[float], None] | None = None,
     ) -> Path:
-        """Write an animation to `path` (`.gif`, `.mp4`, `.html`): the body, the slip of the cells, the wrench in its
-        limit surface.
+        """Write an animation to `path` (`.gif`, `.mp4`, `.html`): body, slip of the cells, wrench in its limit surface.
 
         `slow` is how many times slower than real time it runs (by default chosen to give 75 to 300 frames), `fps` the
         frames per second, `follow` whether the view follows a body that moves far; see `plots.animate_solution`.
@@ -256,8 +255,7 @@ def write_dataset(data: xr.Dataset, path: str | Path) -> Path:
 
 
 def _renamed(data: xr.Dataset, change: Callable[[str], str]) -> xr.Dataset:
-    """Return the same data under changed names: in a file, other letters than ASCII are "%CF%86", which SciPy can
-    write."""
+    """Return the data under changed names: in a file, other letters than ASCII are "%CF%86", as SciPy needs."""
     names = {name: change(name) for name in {*data.variables, *data.dims} if isinstance(name, str)}
     return data.rename({name: new for name, new in names.items() if name != new})
 

@@ -36,8 +36,7 @@ def first_states(scene: Any, shaped: np.ndarray) -> list[np.ndarray] | None:
 
 
 def first_slopes(scene: Any, shaped: np.ndarray, d_loads: np.ndarray, d_pull: np.ndarray) -> list[np.ndarray]:
-    """Return the changes of the first states `[K, *state_shape]` of an equilibrium, per contact, with K changes of what
-    is held.
+    """Return the changes of the first states `[K, *state_shape]` of an equilibrium, per contact, by K changes of loads.
 
     `d_loads` `[K, C]` are those of the normal forces [N], `d_pull` `[K, 3]` those of the load on the body. Bristles
     follow the motion to which the body is pulled on, but for those bent as far as they can be, which only turn.
@@ -110,8 +109,7 @@ class _BristleField(NamedTuple):
     """Deflection of each bristle that is as far from its largest in all directions `[n, 2]` [m]."""
 
     def bent(self, motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the deflections `[n, 2]` after a small motion of the body `[3]`, and their slopes `[n, 2, 2]` by the
-        stretch."""
+        """Return the deflections `[n, 2]` after a small motion of the body, and slopes `[n, 2, 2]` by the stretch."""
         shift = self.levers @ motion - self.middle
         length = np.hypot(*shift.T)
         over = length > self.largest
@@ -126,8 +124,7 @@ class _BristleField(NamedTuple):
 
 
 def _equilibrium(scene: Any, loads: np.ndarray, shaped: np.ndarray) -> list[np.ndarray]:
-    """Return the bristles that the body bends when one small rigid motion brings it from rest to where they carry its
-    load.
+    """Return the bristles that one small rigid motion bends, from rest to where they carry the load of the body.
 
     None is bent further than it can be, and of all bristles that carry the load these store the least energy: with
     `zhat(d)` the nearest to `B_i d` that a bristle can be, the motion d makes `int sum k_i zhat_i dB_i d - P.d` least.
@@ -215,8 +212,7 @@ def _bent_to_the_end(cells: _BristleField, pull: np.ndarray, motion: np.ndarray,
 
 
 def _held(cells: _BristleField, pull: np.ndarray, motion: np.ndarray) -> float | None:
-    """Return a bound below 1 on the share of the load that friction holds, from a motion that proves it; None without
-    one."""
+    """Return a bound below 1 on the share of the load that friction holds, if a motion proves it, or None."""
     shift, power = cells.levers @ motion, float(pull @ motion)
     most = (cells.stiffness * (cells.largest * np.hypot(*shift.T) + (cells.middle * shift).sum(axis=1))).sum()
     return float(most / power) if 0.0 <= most < power else None

@@ -41,8 +41,7 @@ def pivot(
     start: Literal["rest", "equilibrium"] = "equilibrium",
     t_end: float = 1.0,
 ) -> Scene:
-    """Make the scene of a part held level by one end between finger pads: the grip loosens, it swings down and is
-    caught.
+    """Make the scene of a part held level by one end between finger pads, which loosen, let it swing, and catch it.
 
     The pads are at the origin of the world; the centre of mass of the plate of `size` (width, height) [m] and `mass`
     [kg] starts `arm` [m] beside them. Each of the `fingers` presses with the full `normal_force` [N], a signal or a
