@@ -30,11 +30,7 @@ class Slider(ByValue):
 
     if TYPE_CHECKING:  # what is given may be more than what is kept
 
-        def __init__(
-            self,
-            surface: LimitSurface,
-            outline: ArrayLike,
-        ) -> None: ...
+        def __init__(self, surface: LimitSurface, outline: ArrayLike) -> None: ...
 
     def __post_init__(self) -> None:
         validation.instance("surface", self.surface, LimitSurface, "a limit surface")

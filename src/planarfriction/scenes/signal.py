@@ -68,12 +68,7 @@ class Signal(ByValue):
 
     if TYPE_CHECKING:  # what is given may be more than what is kept
 
-        def __init__(
-            self,
-            times: ArrayLike,
-            values: ArrayLike,
-            hold: Hold = "previous",
-        ) -> None: ...
+        def __init__(self, times: ArrayLike, values: ArrayLike, hold: Hold = "previous") -> None: ...
 
     def __post_init__(self) -> None:
         times = validation.array("times", self.times, (None,))

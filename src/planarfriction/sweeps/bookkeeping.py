@@ -135,11 +135,7 @@ class Bookkeeper:
         return np.full(shape, np.nan if kind.kind in "fc" else 0, kind)
 
     def _place(
-        self,
-        index: Index,
-        found: Mapping[str, History],
-        first: Mapping[str, History],
-        arrays: dict[str, np.ndarray],
+        self, index: Index, found: Mapping[str, History], first: Mapping[str, History], arrays: dict[str, np.ndarray]
     ) -> None:
         """Write the variables of a run into the arrays, or note that it failed."""
         key, record = self.runs[index]

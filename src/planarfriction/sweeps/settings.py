@@ -37,11 +37,7 @@ class Settable:
     """Scene as a table whose values can be set: each call makes the scene of some values."""
 
     def __init__(
-        self,
-        table: Mapping[str, Any],
-        source: str = "scene",
-        folder: Path | None = None,
-        others: Sequence[str] = (),
+        self, table: Mapping[str, Any], source: str = "scene", folder: Path | None = None, others: Sequence[str] = ()
     ) -> None:
         self._table, self._source, self._folder, self._others = table, source, folder, others
 
