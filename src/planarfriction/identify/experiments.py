@@ -25,7 +25,7 @@ from planarfriction.equality import ByValue
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify import parameters as known
 from planarfriction.identify.logs import Log, as_logs
-from planarfriction.identify.parameters import ALL, PRIOR, SHAPE_PRIOR, Coordinates
+from planarfriction.identify.parameters import ALL, PRIOR, SHAPE_PRIOR, Coordinates, fitted_law
 from planarfriction.identify.problem import FitOptions, LogProblem, check_noise
 from planarfriction.identify.result import WIDTH, Identification
 from planarfriction.identify.rig import GROUPS, check_groups, first_noise
@@ -148,16 +148,13 @@ def design_experiment(
     InvalidValueError
         A parameter breaks its rule, or a motion does not move.
     """
-    names = known.check_names(parameters)
+    names, groups = known.check_names(parameters), check_groups("nuisance", nuisance)
     validation.instance("patch", patch, ContactPatch, "a ContactPatch")
     refuse_anisotropy(patch, "design_experiment")
     validation.instance("law", law, LuGre, "a LuGre law")
     if "breakaway_ratio" in names and law.elasto_plastic is None:
         raise InvalidValueError("parameters", "contain breakaway_ratio only for elasto-plastic bristles", names)
-    groups, before = (
-        check_groups("nuisance", nuisance),
-        () if isinstance(logs, (list, tuple)) and not logs else as_logs(logs),
-    )
+    before = () if isinstance(logs, (list, tuple)) and not logs else as_logs(logs)
     chosen = names if wanted is None else known.check_names(wanted, names)
     if motions is None:
         loads = sorted({float(f"{np.median(log.normal_force):.3g}") for log in before}) or [1.0]
@@ -193,16 +190,13 @@ def current_estimate(found: Identification, patch: ContactPatch, law: LuGre) -> 
     validation.instance("found", found, Identification, "an Identification")
     validation.instance("law", law, LuGre, "a LuGre law")
     good = [name for name, value in found.estimates.items() if found.errors[name] < KNOWN * abs(value)]
-    fields: dict[str, Any] = {"elasto_plastic": found.law.elasto_plastic} if "breakaway_ratio" in good else {}
+    given = {name: found.estimates[name] for name in good}
     for name, (low, high) in found.intervals().items():
-        if name in good and name in known.LAW and name != "breakaway_ratio":
-            fields[name] = found.estimates[name]
-        elif name in known.LAW and name != "breakaway_ratio" and not low <= getattr(law, name) <= high:
-            fields[name] = 0.5 * (low + high)
-    fields["mu_s"] = max(fields.get("mu_s", law.mu_s), fields.get("mu_c", law.mu_c))
+        if name in known.LAW and name not in (*good, "breakaway_ratio") and not low <= getattr(law, name) <= high:
+            given[name] = 0.5 * (low + high)
     shape = {*known.SHAPE, *known.SOFT_FINGER} & set(found.names)
     moved = bool(shape) and shape <= {*good, "centre_x", "centre_y"}
-    return (found.model.patch if moved else patch), dataclasses.replace(law, **fields)
+    return (found.model.patch if moved else patch), fitted_law(law, given)
 
 
 class _Information:

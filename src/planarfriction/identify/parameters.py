@@ -66,11 +66,11 @@ ALL = {**LAW, **SHAPE, **SOFT_FINGER}
 USUAL = ("mu_c", "mu_s", "v_s", "gamma", "sigma_0", "sigma_1", "sigma_2", "contact_radius")
 """Parameters that `identify_lugre` estimates by default."""
 
-PRIOR = 3.0
-"""Standard deviation of logarithms a priori: a factor of 20."""
+RADIUS, SECOND_MOMENT = PARAMETERS.index("contact_radius"), PARAMETERS.index("second_moment")
+"""Places of the numbers of the shape in the vector of a model."""
 
-SHAPE_PRIOR = 1.0
-"""Standard deviation a priori of the logarithm of the Stribeck exponent, and of `mu_s/mu_c - 1`."""
+PRIOR, SHAPE_PRIOR = 3.0, 1.0
+"""Standard deviations a priori of logarithms (a factor of 20), of that of the Stribeck exponent, and `mu_s/mu_c - 1`."""
 
 
 def check_names(names: Sequence[str], known: Collection[str] = tuple(ALL)) -> tuple[str, ...]:
@@ -196,9 +196,8 @@ class VectorMap:
     """Map from values to the vector of the model at one load: the law directly, the shape through its constants."""
 
     def __init__(self, names: Sequence[str], base: np.ndarray, patch: Any, normal_force: float):
-        self.names, self.base = tuple(names), np.array(base, dtype=float)
-        self.load = normal_force
-        self._ratio = self._get(base, "second_moment") / self._get(base, "contact_radius") ** 2
+        self.names, self.base, self.load = tuple(names), np.array(base, dtype=float), normal_force
+        self._ratio = float(base[SECOND_MOMENT] / base[RADIUS] ** 2)
         self._finger = patch.pressure if any(name in SOFT_FINGER for name in names) else None
 
     def vector(self, values: np.ndarray) -> np.ndarray:
@@ -211,26 +210,19 @@ class VectorMap:
 
     def _evaluate(self, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         vector, slopes = self.base.copy(), np.zeros((len(PARAMETERS), len(self.names)))
-        radius, second = PARAMETERS.index("contact_radius"), PARAMETERS.index("second_moment")
         for i, name in enumerate(self.names):
-            if name in SOFT_FINGER:
-                continue
-            row = PARAMETERS.index(name)
-            vector[row], slopes[row, i] = values[i], 1.0
+            if name in PARAMETERS:
+                row = PARAMETERS.index(name)
+                vector[row], slopes[row, i] = values[i], 1.0
             if name == "contact_radius":
-                vector[second], slopes[second, i] = self._ratio * values[i] ** 2, 2.0 * self._ratio * values[i]
+                vector[SECOND_MOMENT] = self._ratio * values[i] ** 2
+                slopes[SECOND_MOMENT, i] = 2.0 * self._ratio * values[i]
         if self._finger is not None:
-            given = dict(zip(self.names, values, strict=True))
-            moments = soft_finger_moments(self._finger, self.load, given)
-            (vector[radius], of_radius), (vector[second], of_second) = moments
-            for i, name in enumerate(self.names):
-                slopes[radius, i] += of_radius.get(name, 0.0)
-                slopes[second, i] += of_second.get(name, 0.0)
+            moments = soft_finger_moments(self._finger, self.load, dict(zip(self.names, values, strict=True)))
+            for row, (moment, by) in zip((RADIUS, SECOND_MOMENT), moments, strict=True):
+                vector[row] = moment
+                slopes[row] += [by.get(name, 0.0) for name in self.names]
         return vector, slopes
-
-    @staticmethod
-    def _get(vector: np.ndarray, name: str) -> float:
-        return float(vector[PARAMETERS.index(name)])
 
 
 def soft_finger_moments(finger: Any, normal_force: float, given: dict[str, Any]):

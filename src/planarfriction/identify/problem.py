@@ -15,9 +15,9 @@ from planarfriction.equality import Checked, checked
 from planarfriction.errors import InvalidValueError
 from planarfriction.identify import parameters as known
 from planarfriction.identify.logs import Log
-from planarfriction.identify.parameters import Coordinates, VectorMap
+from planarfriction.identify.parameters import RADIUS, Coordinates, VectorMap
 from planarfriction.identify.rig import GROUPS, Rig, as_measured, check_groups, smoothed, wrench_noise
-from planarfriction.identify.simulators import RADIUS, SIMULATORS, Prediction
+from planarfriction.identify.simulators import SIMULATORS, Prediction
 from planarfriction.identify.uncertainty import covariance
 from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
@@ -350,10 +350,8 @@ class LogProblem(Problem):
         contact, _ = self.split(values)
         radii = [each.vector(contact)[RADIUS] for each in self.maps]
         sizes = [np.linalg.norm(log.wrench / [1.0, 1.0, r], axis=1) for log, r in zip(self.logs, radii, strict=True)]
-        return [
-            size / np.where(log.normal_force > 0.0, log.normal_force, np.nan)
-            for size, log in zip(sizes, self.logs, strict=True)
-        ]
+        loads = [np.where(log.normal_force > 0.0, log.normal_force, np.nan) for log in self.logs]
+        return [size / load for size, load in zip(sizes, loads, strict=True)]
 
     def sliding(self, values: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
         """Compute the sliding speed `|V_S|` and its part from spin [m/s], `[T]` each, of each log."""

@@ -12,6 +12,7 @@ from planarfriction.compiler import threads
 from planarfriction.derivatives import PARAMETERS, rollout, rollout_jacobian
 from planarfriction.formulas import LawNumbers
 from planarfriction.identify.logs import Log
+from planarfriction.identify.parameters import RADIUS
 from planarfriction.kernels import distributed_step
 from planarfriction.laws import LuGre
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
@@ -38,9 +39,7 @@ MOST_STEPS = 2_000_000
 
 LAW_NAMES = PARAMETERS[:8]
 
-RADIUS, CENTRE = PARAMETERS.index("contact_radius"), [PARAMETERS.index("centre_x"), PARAMETERS.index("centre_y")]
-
-GAMMA = PARAMETERS.index("gamma")
+CENTRE, GAMMA = [PARAMETERS.index("centre_x"), PARAMETERS.index("centre_y")], PARAMETERS.index("gamma")
 
 
 class Simulator:

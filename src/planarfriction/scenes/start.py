@@ -164,7 +164,7 @@ def _least_energy(cells: _BristleField, pull: np.ndarray) -> np.ndarray:
     scale = 1.0 / np.sqrt(np.where(carries, np.diagonal(elastic), 1.0))
     scaled = np.where(np.outer(carries, carries), elastic, 0.0) * np.outer(scale, scale)
     motion = scale * np.linalg.lstsq(scaled, scale * pull, rcond=1e-14)[0]
-    if not np.array_equal(cells.bent(motion)[0], _free(cells, motion)):
+    if not np.array_equal(cells.bent(motion)[0], cells.middle + (cells.levers @ motion - cells.middle)):
         motion = _bent_to_the_end(cells, pull, motion, scale)
     bent = cells.bent(motion)[0]
     size = max(np.abs(scale * pull).max(), np.finfo(float).tiny)
@@ -174,10 +174,6 @@ def _least_energy(cells: _BristleField, pull: np.ndarray) -> np.ndarray:
         rule = f"be 'rest' or 'sliding' if the contacts do not hold the body{friction}"
         raise InvalidValueError("start", rule, "equilibrium")
     return motion
-
-
-def _free(cells: _BristleField, motion: np.ndarray) -> np.ndarray:
-    return cells.middle + (cells.levers @ motion - cells.middle)
 
 
 @np.errstate(over="ignore", invalid="ignore")  # of loads that nothing holds
