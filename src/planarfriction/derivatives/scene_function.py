@@ -10,8 +10,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.compiler import threads
-from planarfriction.derivatives.path import RTOL
-from planarfriction.derivatives.scene_gradient import KeptMotion
+from planarfriction.derivatives.path import RTOL, KeptMotion
 from planarfriction.derivatives.scene_inputs import SCENE_PARAMETERS, STATES, SceneInputs
 from planarfriction.derivatives.scene_sensitivities import scene_sensitivities
 from planarfriction.errors import InvalidValueError

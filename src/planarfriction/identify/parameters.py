@@ -70,7 +70,7 @@ RADIUS, SECOND_MOMENT = PARAMETERS.index("contact_radius"), PARAMETERS.index("se
 """Places of the numbers of the shape in the vector of a model."""
 
 PRIOR, SHAPE_PRIOR = 3.0, 1.0
-"""Standard deviations a priori of logarithms (a factor of 20), of that of the Stribeck exponent, and `mu_s/mu_c - 1`."""
+"""Standard deviations a priori of logarithms (a factor of 20), of that of the Stribeck exponent and `mu_s/mu_c - 1`."""
 
 
 def check_names(names: Sequence[str], known: Collection[str] = tuple(ALL)) -> tuple[str, ...]:
