@@ -92,9 +92,6 @@ class MotionPlan(ByValue):
         first = textwrap.fill(f"Next motion to measure: {self.best.name}.", WIDTH)
         return "\n\n".join([first, "\n".join(lines), "\n".join(after)])
 
-    def __str__(self) -> str:
-        return self.table()
-
     def __repr__(self) -> str:
         return self.table()
 

@@ -143,9 +143,6 @@ class Identification(ByValue):
         ]
         return "\n\n".join(block for block in blocks if block and block != "Disturbances of the rig:")
 
-    def __str__(self) -> str:
-        return self.table()
-
     def __repr__(self) -> str:
         return self.table()
 

@@ -106,9 +106,8 @@ class Rig:
                 columns.append(_Column("load_drift" if k == 1 else f"load_drift_{k}", "-", i, width, k))
         self.columns = tuple(columns)
         self.widths = np.array([each.width for each in columns])
-        self._effects = [self._effects_on(i) for i in range(len(logs))]
 
-    def _effects_on(self, i: int) -> tuple[np.ndarray, np.ndarray]:
+    def _effects(self, i: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the derivatives `[T, K]` of the factor on the wrench of log i, and those `[T, 3, K]` of its zeros."""
         time = self.logs[i].time
         shapes = np.polynomial.legendre.legvander(2.0 * (time - time[0]) / (time[-1] - time[0]) - 1.0, len(DRIFT))
@@ -135,7 +134,7 @@ class Rig:
 
         `later` is the derivative of the wrench with respect to the delay.
         """
-        by_factor, by_zeros = self._effects[i]
+        by_factor, by_zeros = self._effects(i)
         factor, slopes = 1.0 + by_factor @ values, by_factor[:, None] * wrench[:, :, None] + by_zeros
         if "delay" in self.groups:
             slopes[:, :, 0] = factor[:, None] * later
@@ -148,7 +147,7 @@ class Rig:
 
     def with_drift(self, values: np.ndarray) -> np.ndarray:
         """Return the widths `[K]`, that of the load cell's scale grown by the cell's drift, half its largest range."""
-        drift = max(0.5 * float(np.ptp(by_factor @ values)) for by_factor, _ in self._effects)
+        drift = max(0.5 * float(np.ptp(self._effects(i)[0] @ values)) for i in range(len(self.logs)))
         return np.where(self._scale, np.hypot(SCALE, drift / EDGE), self.widths)
 
     def strain(self, values: np.ndarray) -> float:
