@@ -12,9 +12,8 @@ from scipy.optimize import fsolve
 import planarfriction as pf
 from planarfriction.compiler import jit
 from planarfriction.compiler.calls import address_of, call
-from planarfriction.compiler.memory import place_of
 from planarfriction.coupling import CoupledPatches, CoupledStep, HostStep
-from planarfriction.kernels.step_slopes import NUMBERS, WORDS
+from planarfriction.kernels.steps import SLOPES, WORDS
 from planarfriction.patch import friction_metric
 from tests.support.coupling_problems import random_bodies, random_patches, random_run
 
@@ -53,17 +52,17 @@ def _called(function, record, z, v, dt, new, out):
 @pytest.mark.parametrize("name", MODELS)
 def test_compiled_steps_and_their_slopes_are_those_of_the_model(name):
     model, generator = MODELS[name], np.random.default_rng(1)
-    steps, function = model.compiled.packed_steps([None]), address_of(model.compiled.step_function, WORDS)
+    steps, function = model.compiled.packed_parts([None]), address_of(model.compiled.functions.slopes, WORDS)
     for _ in range(40):
         twist = generator.normal(size=3) * [1.0, 1.0, 100.0] * 10.0 ** generator.uniform(-5.0, -1.0)
         dt = 10.0 ** generator.uniform(-5.0, -2.0)
         small = [1.0, 1.0, 0.01] if isinstance(model, pf.ReducedModelPublished) else 1.0
         state = generator.uniform(-0.7, 0.7, model.state_shape) * model.law.largest_deflection * small
         new, wrench, slopes = np.zeros(state.size), np.zeros(3), np.zeros((3, 3))
-        pieces, given = steps.records.shape[1], state.reshape(-1).copy()
+        pieces, given = steps.addresses.shape[1], state.reshape(-1).copy()
         for own, part in enumerate(np.split(np.arange(state.size), pieces)):
-            out, moved = np.empty(NUMBERS), np.empty(len(part))
-            _called(function, place_of(steps.records[0, own]), given[part], twist, dt, moved, out)
+            out, moved = np.empty(SLOPES), np.empty(len(part))
+            _called(function, steps.addresses[0, own], given[part], twist, dt, moved, out)
             new[part] = moved
             wrench += steps.shares[0, own] * out[:3]
             slopes += steps.shares[0, own] * out[3:].reshape(3, 3)

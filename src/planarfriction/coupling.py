@@ -19,16 +19,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from planarfriction import validation
-from planarfriction.compiled.packed import PackedSteps
+from planarfriction.compiled.packed import PackedParts
 from planarfriction.compiler.calls import address_of
-from planarfriction.compiler.memory import place_of, row_of
+from planarfriction.compiler.memory import row_of
 from planarfriction.compiler.threads import share
 from planarfriction.equality import ByValue, by_parts
 from planarfriction.errors import InvalidValueError
 from planarfriction.formulas import LARGEST
 from planarfriction.kernels import coupling as kernels
 from planarfriction.kernels.coupling_rows import Patches, layout
-from planarfriction.kernels.step_slopes import WORDS
+from planarfriction.kernels.steps import WORDS
 from planarfriction.models import FrictionModel
 
 TOLERANCE = 1e-9
@@ -230,7 +230,7 @@ class CoupledPatches(ByValue):
         share(len(problems), most, lambda first, last: kernels.solve_batch(row, problems, first, last))
         return problems[:, self._parts["iterations"].start].astype(int)
 
-    def _write_following(self, problems: np.ndarray, loads: np.ndarray) -> list[PackedSteps]:
+    def _write_following(self, problems: np.ndarray, loads: np.ndarray) -> list[PackedParts]:
         """Write the pieces of patches whose shapes follow their loads `[E, k]`; returns what has to be kept."""
         records, shares = problems.view(np.int64)[:, self._parts["records"]], problems[:, self._parts["shares"]]
         kept = []
@@ -238,8 +238,8 @@ class CoupledPatches(ByValue):
             chosen = np.flatnonzero((loads[:, p] > 0.0) & (loads[:, p] <= LARGEST))
             records[:, pieces] = 0
             if chosen.size:
-                steps = self.models[p].compiled.packed_steps(loads[chosen, p])
-                records[chosen, pieces], shares[chosen, pieces] = _addresses(steps), steps.shares
+                steps = self.models[p].compiled.packed_parts(loads[chosen, p])
+                records[chosen, pieces], shares[chosen, pieces] = steps.addresses, steps.shares
                 kept.append(steps)
         return kept
 
@@ -304,14 +304,14 @@ def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _PackedPatch
     functions, owners, firsts = np.zeros((3, ends[-1]), np.int64)
     records, shares, known, following = np.zeros(ends[-1], np.int64), np.zeros(ends[-1]), {}, []
     for p, (model, own) in enumerate(zip(models, pieces, strict=True)):
-        functions[own], owners[own] = address_of(model.compiled.step_function, WORDS), p
+        functions[own], owners[own] = address_of(model.compiled.functions.slopes, WORDS), p
         firsts[own] = np.linspace(bounds[p], bounds[p + 1], counts[p], endpoint=False)
         if model.depends_on_load:
             following.append((p, own))
             continue
-        steps = known.setdefault(id(model), None) or model.compiled.packed_steps([None])
+        steps = known.setdefault(id(model), None) or model.compiled.packed_parts([None])
         known[id(model)] = steps
-        records[own], shares[own] = _addresses(steps)[0], steps.shares[0]
+        records[own], shares[own] = steps.addresses[0], steps.shares[0]
     # all cells, whatever load they carry: a lever arm that does not follow the load
     radius = np.array([np.sqrt((model.patch.positions**2).sum(1).mean()) for model in models])
     rows = layout(len(models), ends[-1], int(bounds[-1]))
@@ -328,12 +328,6 @@ def _packed(models: Sequence[FrictionModel], bounds: np.ndarray) -> _PackedPatch
     )
     kept = [functions, owners, firsts, radius, *known.values()]
     return _PackedPatches(row_of(patches), rows.slices, rows.size, records, shares, following, kept)
-
-
-def _addresses(steps: PackedSteps) -> np.ndarray:
-    """Return the addresses of the records, int `[R, P]`."""
-    loads, parts, words = steps.records.shape
-    return place_of(steps.records) + 8 * words * np.arange(loads * parts).reshape(loads, parts)
 
 
 def _refuse(arrays: dict[str, np.ndarray]) -> None:

@@ -11,7 +11,7 @@ import pytest
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import bristle_step, distributed_step, published_step, reduced_step
 from planarfriction.kernels.derive import derive
-from planarfriction.kernels.published_contact import Shape
+from planarfriction.kernels.published_contact import PublishedPatch
 from planarfriction.kernels.reduced_step import Quartic
 from tests.support.referee import exact, misfit
 
@@ -79,7 +79,7 @@ def test_what_rounding_lifts_over_the_cap_counts_as_not_capped(over):
 
 @laws
 def test_derivatives_of_the_published_step(law):
-    shape = Shape(1e-3, 2e-3, 0.01, 1e-4)
+    shape = PublishedPatch(1e-3, 2e-3, 0.01, 1e-4)
 
     def draw(rng):
         v, u, z = 10.0 ** rng.uniform(-5.0, 0.0), rng.uniform(-1.0, 1.0, 3), rng.normal(size=3)

@@ -1,14 +1,28 @@
-"""Interface of the machine form of a friction model."""
+"""Machine form of a friction model: steps, rates, and what compiled loops of others need of it.
+
+The fast doors of a step pass plain numbers and arrays of them directly to compiled code, where every check in Python
+would take longer than the step. The compiled function checks what it is given and says no to the rest.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import functools
+import itertools
+import math
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction.compiled.packed import PackedModel, PackedSteps
+from planarfriction.compiled.packed import PackedModel, PackedParts
+from planarfriction.compiled.rates import rates
 from planarfriction.equality import by_parts
+from planarfriction.kernels.steps import UNFIT, StepFunctions, jacobians, ready, step_many, step_one
+
+_ARRAY, _FLOAT, _EMPTY, _MAKE = np.ndarray, np.dtype(float), np.empty, np.array
+_TRUTH = frozenset((bool, np.bool_))
+_PLAIN = frozenset((float, int, np.float64))
+_REFUSED = (*UNFIT, OverflowError)
 
 
 @by_parts
@@ -40,41 +54,175 @@ class CompiledModel:
     those that are not plain and in order; then the checks of the model decide.
     """
 
-    step_function: Any
-    """Compiled function of `kernels.step_slopes` for one part."""
-    parts: int = 1
-    """Number of parts of `packed_steps`, with as many states each."""
+    def __init__(
+        self, functions: StepFunctions, state_shape: tuple[int, ...], square_shape: tuple[int, ...], parts: int = 1
+    ) -> None:
+        self.functions, self.state_shape, self.parts = functions, state_shape, parts
+        self._size, self._square, self._flat = math.prod(state_shape), math.prod(square_shape), len(state_shape) == 1
+        """Number of states, and numbers of d new state / d state, whose shape is `square_shape`."""
+        n = self._size
+        self._new, self._wrench, self._room, self._table = slice(n), slice(n, n + 3), n + 9, None
+        shapes = square_shape, (*state_shape, 3), (3, *state_shape), (3, 3), (3,)
+        ends = [0, *itertools.accumulate(map(math.prod, shapes))]
+        self._derivatives = [
+            (slice(*span), shape) for span, shape in zip(itertools.pairwise(ends), shapes, strict=True)
+        ]
+        """Places and shapes of `StepJacobians` in what `kernels.steps.jacobians` writes for a contact."""
+        self._per_contact, self._scratch = ends[-1], (7 * n + self._square) // parts + 12
+
+    # ------------------------------------------------------------------ at given loads
+
+    @functools.cached_property
+    def fixed(self) -> PackedParts | None:
+        """The model at any load; None if that changes its shape."""
+        raise NotImplementedError
+
+    def at_each_load(self, load: np.ndarray) -> Iterator[tuple[Any, PackedParts]]:
+        """Yield rows of the flat batch, and the model at the load of each of them or at the one load of all of them.
+
+        Rows without load may be left out; their results are zero.
+        """
+        raise NotImplementedError
+
+    def step_table(self, contact: PackedParts) -> np.ndarray:
+        """Return the words of `kernels.steps.Parts` for steps; they hold as long as `contact` lives."""
+        return contact.table(self.functions.step, self._square // self.parts)
+
+    def _jacobian_table(self, contact: PackedParts) -> np.ndarray:
+        return contact.table(self.functions.jacobian, self._square // self.parts)
+
+    def _opened(self) -> np.ndarray | None:
+        """Return the table of `step_one`, and keep it; None if there is no such door."""
+        ready(step_one)
+        self._table = None if self.fixed is None else self.step_table(self.fixed)
+        return self._table
+
+    @functools.cached_property
+    def _many(self) -> np.ndarray | None:
+        ready(step_many)
+        return None if self.fixed is None else self.step_table(self.fixed)
+
+    @functools.cached_property
+    def _slopes(self) -> np.ndarray | None:
+        ready(jacobians)
+        return None if self.fixed is None else self._jacobian_table(self.fixed)
+
+    # ------------------------------------------------------------------ fast doors
 
     def step_one(self, state: Any, twist: Any, normal_force: Any, dt: Any) -> tuple[np.ndarray, np.ndarray] | None:
-        """Step one contact, or return None."""
+        """Step one contact, or return None; the compiled step checks its numbers, but takes True for 1.0."""
+        kind = type(twist)
+        if kind is tuple or kind is list:
+            held = twist
+        elif kind is _ARRAY and twist.ndim == 1 and twist.dtype is _FLOAT:
+            held = twist.tolist()
+        else:
+            return None
+        if type(state) is not _ARRAY or ((table := self._table) is None and (table := self._opened()) is None):
+            return None
+        try:
+            vx, vy, omega = held
+            if (
+                bool is type(vx)
+                or bool is type(vy)
+                or bool is type(omega)
+                or type(normal_force) in _TRUTH
+                or bool is type(dt)
+            ):
+                return None
+            result = _EMPTY(self._room)
+            if self._flat:
+                if step_one(table, state, vx, vy, omega, normal_force, dt, result):
+                    return result[self._new], result[self._wrench]
+            elif state.shape == (shape := self.state_shape):
+                if step_one(table, state.ravel(), vx, vy, omega, normal_force, dt, result):
+                    return result[self._new].reshape(shape), result[self._wrench]
+        except UNFIT:  # not plain numbers, or a batch
+            pass
+        return None
 
     def step_batch(self, state: Any, twist: Any, normal_force: Any, dt: Any) -> tuple[np.ndarray, np.ndarray] | None:
-        """Step contacts along one axis, or return None."""
+        """Step contacts along one axis, or return None; loads and steps are one number, or one for each contact."""
+        if type(state) is not _ARRAY or type(twist) is not _ARRAY or (table := self._many) is None:
+            return None
+        if twist.ndim != 2 or state.shape != (count := len(twist), *self.state_shape):
+            return None
+        try:
+            if type(normal_force) is not _ARRAY:
+                if type(normal_force) not in _PLAIN:
+                    return None
+                normal_force = _MAKE((normal_force,), float)
+            if type(dt) is not _ARRAY:
+                if type(dt) not in _PLAIN:
+                    return None
+                dt = _MAKE((dt,), float)
+            rows = state if state.ndim == 2 else state.reshape(count, self._size)
+            new, wrench = _EMPTY((count, self._size)), _EMPTY((count, 3))
+            if not step_many(table, rows, twist, normal_force, dt, new, wrench, _EMPTY(3)):
+                return None
+        except _REFUSED:
+            return None
+        return new if state.ndim == 2 else new.reshape(state.shape), wrench
 
     def jacobians_one(self, state: Any, twist: Any, normal_force: Any, dt: Any) -> StepJacobians | None:
         """Differentiate a step of one contact, or return None."""
+        if type(twist) is _ARRAY and twist.ndim == 1:
+            twist = twist.tolist()
+        if type(state) is not _ARRAY or state.shape != self.state_shape:
+            return None
+        if type(twist) not in (tuple, list) or len(twist) != 3 or (table := self._slopes) is None:
+            return None
+        given = *twist, normal_force, dt
+        if not _PLAIN.issuperset(map(type, given)):
+            return None
+        result = _EMPTY(self._per_contact + self._scratch)
+        try:
+            if not jacobians(table, state if state.ndim == 1 else state.ravel(), _MAKE(given, float), result):
+                return None
+        except _REFUSED:
+            return None
+        return StepJacobians(*[result[place].reshape(shape) for place, shape in self._derivatives])
+
+    # ------------------------------------------------------------------ batches, load by load
 
     def evaluate(self, state: np.ndarray, twist: np.ndarray, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the rates of the states, and wrenches per unit load `[..., 3]`."""
-        raise NotImplementedError
+        z, v = state.reshape(-1, self._size), twist.reshape(-1, 3)
+        rate, unit = np.zeros(z.shape), np.zeros(v.shape)
+        for rows, contact in self.at_each_load(load):
+            rate[rows], unit[rows] = rates(contact.joined, z[rows], v[rows])
+        return rate.reshape(state.shape), unit.reshape(twist.shape)
 
     def step(
         self, state: np.ndarray, twist: np.ndarray, load: np.ndarray, dt: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return new states and wrenches `[..., 3]`."""
-        raise NotImplementedError
+        z, v, f, h = state.reshape(-1, self._size), twist.reshape(-1, 3), load.reshape(-1), dt.reshape(-1)
+        new, wrench = np.zeros(z.shape), np.zeros(v.shape)
+        for rows, contact in self.at_each_load(load):
+            end, pull = np.empty_like(z[rows]), np.empty_like(v[rows])
+            table = self.step_table(contact)
+            ready(step_many)(table, z[rows], v[rows], f[rows], h[rows], end, pull, np.empty(3))
+            new[rows], wrench[rows] = end, pull
+        return new.reshape(state.shape), wrench.reshape(twist.shape)
 
     def step_jacobians(self, state: np.ndarray, twist: np.ndarray, load: np.ndarray, dt: np.ndarray) -> StepJacobians:
         """Differentiate steps."""
-        raise NotImplementedError
+        given = np.concatenate([twist, load[..., None], dt[..., None]], axis=-1).reshape(load.size, 5)
+        z, found = state.reshape(-1, self._size), np.zeros((load.size, self._per_contact))
+        for rows, contact in self.at_each_load(load):
+            held = given[rows]
+            result = np.empty(len(held) * self._per_contact + self._scratch)
+            ready(jacobians)(self._jacobian_table(contact), z[rows].ravel(), held.ravel(), result)
+            found[rows] = result[: -self._scratch].reshape(len(held), self._per_contact)
+        return StepJacobians(*(found[:, place].reshape(*load.shape, *shape) for place, shape in self._derivatives))
+
+    # ------------------------------------------------------------------ for the loops of others
 
     def packed(self, loads: Sequence[float | None], between: tuple[float, float] | None = None) -> PackedModel:
         """Pack the model for the solver (see `FrictionModel.packed`)."""
         raise NotImplementedError
 
-    def packed_steps(self, loads: Sequence[float | None]) -> PackedSteps:
-        """Pack the model at `loads` > 0 [N], with all of its states, for `coupling`.
-
-        `[None]` stands for any load if the patch ignores it.
-        """
+    def packed_parts(self, loads: Sequence[float | None]) -> PackedParts:
+        """Pack the model at `loads` > 0 [N], with all of its states; `[None]` stands for any load if it ignores it."""
         raise NotImplementedError

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
-from planarfriction.compiled import anisotropic_steps, packed
-from planarfriction.compiled.base import CompiledModel, StepJacobians
-from planarfriction.compiled.packed import PackedModel, PackedSteps
-from planarfriction.compiled.rates import linearised, rates
+from planarfriction.compiled import packed
+from planarfriction.compiled.base import CompiledModel
+from planarfriction.compiled.packed import PackedModel, PackedParts
+from planarfriction.compiled.rates import linearised
 from planarfriction.compiler.memory import places_of, rows_of
 from planarfriction.kernels import cells as contacts
-from planarfriction.kernels import distributed_step as kernels
-from planarfriction.kernels import step_slopes
+from planarfriction.kernels import distributed_step as steps
 
 
 class CompiledDistributed(CompiledModel):
@@ -23,41 +22,31 @@ class CompiledDistributed(CompiledModel):
 
     def __init__(self, law: Any, patch: Any) -> None:
         self.law, self.patch = law, patch
-        self.step_function = step_slopes.anisotropic if patch.anisotropic else step_slopes.distributed
+        kinds = (contacts.ISOTROPIC, steps.ISOTROPIC), (contacts.TURNED, steps.TURNED)
+        self._contact, functions = kinds[patch.anisotropic]
+        if patch.asymmetric:
+            self._contact, functions = contacts.ASYMMETRIC, steps.ASYMMETRIC
+        cells = len(patch.positions)
+        super().__init__(functions, (2, cells), (2, 2, cells))
 
-    def evaluate(self, state: np.ndarray, twist: np.ndarray, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    # ------------------------------------------------------------------ at given loads
+
+    @functools.cached_property
+    def fixed(self) -> PackedParts | None:
         """See `CompiledModel`."""
-        rate, wrench = rates(self._all_cells(load), state.reshape(load.size, *state.shape[-2:]), twist.reshape(-1, 3))
-        return rate.reshape(state.shape), wrench.reshape(twist.shape)
+        return None if self.patch.depends_on_load else self.packed_parts([None])
+
+    def at_each_load(self, load: np.ndarray) -> Iterator[tuple[Any, PackedParts]]:
+        """See `CompiledModel`; all rows at once, each with its own weights."""
+        weights = None if self.fixed else self.patch.weights(load.reshape(-1))
+        yield slice(None), self.fixed or _alone(self._packed(weights))
 
     def linearisation(self, state: np.ndarray, twist: np.ndarray, load: np.ndarray) -> np.ndarray:
         """Return linearisations cell by cell `[..., L, N]` (see `kernels.cells.LinearCells`)."""
+        ((_, contact),) = self.at_each_load(load)
         cells = state.shape[-1]
-        lin = linearised(self._all_cells(load), state.reshape(load.size, 2 * cells), twist.reshape(-1, 3))
+        lin = linearised(contact.joined, state.reshape(load.size, 2 * cells), twist.reshape(-1, 3))
         return lin.reshape(*load.shape, lin.shape[-1] // cells, cells)
-
-    def step(
-        self, state: np.ndarray, twist: np.ndarray, load: np.ndarray, dt: np.ndarray
-    ) -> tuple[np.ndarray, np.ndarray]:
-        """See `CompiledModel`."""
-        if self.patch.anisotropic:
-            return anisotropic_steps.step(self, state, twist, load, dt)
-        flat, moved = state.reshape(load.size, 2 * state.shape[-1]), twist.reshape(-1, 3)
-        new, wrench = np.empty_like(flat), np.empty(moved.shape)
-        cells = self._cells(load)
-        kernels.step_batch(self.law.numbers, flat, moved, cells, load.reshape(-1), dt.reshape(-1), new, wrench)
-        return new.reshape(state.shape), wrench.reshape(twist.shape)
-
-    def step_jacobians(self, state: np.ndarray, twist: np.ndarray, load: np.ndarray, dt: np.ndarray) -> StepJacobians:
-        """See `CompiledModel`."""
-        if self.patch.anisotropic:
-            return anisotropic_steps.step_jacobians(self, state, twist, load, dt)
-        cells = state.shape[-1]
-        shapes = (2, 2, cells), (2, cells, 3), (3, 2, cells), (3, 3), (3,)
-        results = kernels.CellJacobians(*(np.zeros((load.size, *shape)) for shape in shapes))
-        flat, moved = state.reshape(load.size, 2, cells), twist.reshape(-1, 3)
-        kernels.jacobians(self.law.numbers, flat, moved, self._cells(load), load.reshape(-1), dt.reshape(-1), results)
-        return StepJacobians(*(part.reshape(*load.shape, *part.shape[1:]) for part in results))
 
     # ------------------------------------------------------------------ for the loops of others
 
@@ -71,25 +60,19 @@ class CompiledDistributed(CompiledModel):
         most = max(int(packed.MAX_PACK_BYTES / (8.0 * chosen.sum())), 1)
         return self._packed(np.array([self.patch.weights(load)[chosen] for load in loads[:most]]), chosen)
 
-    def packed_steps(self, loads: Sequence[float | None]) -> PackedSteps:
+    def packed_parts(self, loads: Sequence[float | None]) -> PackedParts:
         """See `CompiledModel`."""
-        found = self._packed(np.array([self.patch.weights(load) for load in loads]))
-        return PackedSteps(found.records[:, None], np.ones((len(loads), 1)), found.keepalive)
+        return _alone(self._packed(np.array([self.patch.weights(load) for load in loads])))
 
     def _packed(self, weights: np.ndarray, chosen: np.ndarray | None = None) -> PackedModel:
         """Pack the chosen cells, or all, with R rows of their weights `[R, n]`."""
         if chosen is None:
             chosen = np.ones(weights.shape[1], bool)
         weights, positions = np.ascontiguousarray(weights), self.patch.positions[chosen]
-        count, law = len(positions), self.law.numbers
-        if self.patch.anisotropic:
-            numbers = anisotropic_steps.cell_numbers(self.patch, chosen)
-            functions = contacts.ASYMMETRIC if self.patch.asymmetric else contacts.TURNED
-        else:
-            numbers, functions = np.ascontiguousarray(positions.T), contacts.ISOTROPIC
+        count, law, numbers = len(positions), self.law.numbers, self._numbers(chosen)
         record = contacts.CellsContact(law, count, numbers, weights)
         return PackedModel(
-            functions,
+            self._contact,
             rows_of(record, len(weights), weights=places_of(weights)),
             2 * count,
             (contacts.LEANING if self.patch.asymmetric else contacts.STRAIGHT) * count,
@@ -99,30 +82,18 @@ class CompiledDistributed(CompiledModel):
             chosen,
         )
 
-    # ------------------------------------------------------------------ cells
-
-    def _all_cells(self, load: np.ndarray) -> PackedModel:
-        return self._packed(self._cells(load).weights)
-
-    def _cells(self, load: np.ndarray) -> kernels.Cells:
-        """Return the cells with one row of weights, or one for each load."""
-        weights = self.patch.weights(load.reshape(-1)) if self.patch.depends_on_load else self.patch.weights()
-        return kernels.Cells(*self._xy, np.ascontiguousarray(np.atleast_2d(weights)))
-
-    @functools.cached_property
-    def _xy(self) -> tuple[np.ndarray, np.ndarray]:
-        return np.ascontiguousarray(self.patch.positions[:, 0]), np.ascontiguousarray(self.patch.positions[:, 1])
+    def _numbers(self, chosen: np.ndarray) -> np.ndarray:
+        """Return the numbers of the chosen cells as `kernels.cells` reads them, `[2, n]` or `[7, n]`."""
+        if not self.patch.anisotropic:
+            return np.ascontiguousarray(self.patch.positions[chosen].T)
+        levers, asymmetry = self.patch.levers()[chosen], self.patch.asymmetries()[chosen]
+        return np.array([*(levers[:, i, j] for i, j in ((0, 0), (0, 1), (1, 1), (0, 2), (1, 2))), *asymmetry.T])
 
     @functools.cached_property
     def lever(self) -> np.ndarray:
         """P `[3, 2, N]`: the velocity of a cell (`u_i`) is `P' V`, the wrench of a force on it `P f`."""
-        if self.patch.anisotropic:
-            return np.ascontiguousarray(self.patch.levers().T)
-        x, y = self._xy
-        one, zero = np.ones_like(x), np.zeros_like(x)
-        return np.array([[one, zero], [zero, one], [-y, x]])
+        return np.ascontiguousarray(self.patch.levers().T)
 
-    @functools.cached_property
-    def asymmetry(self) -> np.ndarray | None:
-        """Asymmetries `a_i` `[2, N]`, or None."""
-        return np.ascontiguousarray(self.patch.asymmetries().T) if self.patch.asymmetric else None
+
+def _alone(part: PackedModel) -> PackedParts:
+    return PackedParts([part], np.ones((len(part.records), 1)))

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from planarfriction.compiled.packed import PackedModel
-from planarfriction.compiled.parts import Frame, Kind
+from planarfriction.compiled.three_states import Kind
 from planarfriction.compiler.memory import place_of, rows_of
-from planarfriction.kernels import published_contact, published_step, step_slopes
+from planarfriction.kernels import published_contact, published_step
 from planarfriction.kernels.moments import LINEAR
-from planarfriction.kernels.published_contact import PublishedContact, Root, Shape
+from planarfriction.kernels.published_contact import PublishedContact, PublishedPatch, Root
 
 _VELOCITY_SCALE = 0.01
 """Natural scale of the velocity, as a share of v_s [-].
@@ -27,7 +27,7 @@ def records(law: Any, shapes: Sequence[Any], radius: float) -> PackedModel:
     data = [np.ascontiguousarray(shape.surface.numbers.data, dtype=float) for shape in shapes]
     root = shapes[0].root
     record = PublishedContact(
-        law.numbers, Shape(*shapes[0].numbers), Root(root[0, 0], root[0, 1], root[1, 1]), 0, 0, data[0]
+        law.numbers, PublishedPatch(*shapes[0].numbers), Root(root[0, 0], root[0, 1], root[1, 1]), 0, 0, data[0]
     )
     rows = rows_of(
         record,
@@ -42,22 +42,5 @@ def records(law: Any, shapes: Sequence[Any], radius: float) -> PackedModel:
     return PackedModel(functions, rows, 3, size, scale, radius, tuple(data), velocity_scale=_VELOCITY_SCALE)
 
 
-def surface_of(shape: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return kind, start and size of the limit surface of a `PublishedShape`, int `[3]`, and its numbers."""
-    kind, size, data = shape.surface.numbers
-    return np.array([kind, 0, size]), data
-
-
-def framed(shape: Any) -> tuple[Any, Frame | None]:
-    """Return the shape that steps, and its frame: the axes of a friction metric, or those of a point at itself.
-
-    A point slides as a patch of any size does that does not spin.
-    """
-    if shape.contact_radius == 0.0:
-        slider = shape._replace(centre_of_pressure=np.zeros(2), contact_radius=1.0, second_moment=0.0)
-        return slider, Frame(np.diag([1.0, 1.0, 0.0]) @ shape.lever, False)
-    return shape, None if (shape.root == np.eye(2)).all() else Frame(shape.axes, True)
-
-
-PUBLISHED = Kind(published_step, step_slopes.published, step_slopes.published_jacobian, records, surface_of, framed)
+PUBLISHED = Kind(published_step.STEPS, records)
 """Kind of `ReducedModelPublished`."""

@@ -1,4 +1,4 @@
-"""Records of `ReducedModel`, and its shapes at many loads as compiled roll-outs read them."""
+"""Records of `ReducedModel`."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from planarfriction.compiled.packed import PackedModel
-from planarfriction.compiled.parts import Kind
+from planarfriction.compiled.three_states import Kind
 from planarfriction.compiler.memory import place_of, rows_of
-from planarfriction.kernels import reduced_contact, reduced_step, step_slopes
+from planarfriction.kernels import reduced_contact, reduced_step
 from planarfriction.kernels.moments import LINEAR
-from planarfriction.kernels.reduced_contact import ReducedContact, Shape
+from planarfriction.kernels.reduced_contact import ReducedContact, ReducedPatch
 
 
 def records(law: Any, shapes: Sequence[Any], radius: float) -> PackedModel:
@@ -23,23 +23,12 @@ def records(law: Any, shapes: Sequence[Any], radius: float) -> PackedModel:
     other = np.array([at[id(shape.data if shape.other is None else shape.other)] for shape in shapes])
     factors = np.array([shape.factor for shape in shapes])[:, *np.triu_indices(3)]
     numbers = np.column_stack([factors, [shape.blend for shape in shapes]])
-    record = ReducedContact(law.numbers, Shape(*numbers[0]), shapes[0].data, 0)
+    record = ReducedContact(law.numbers, ReducedPatch(*numbers[0]), shapes[0].data, 0)
     keepalive = tuple(maps.values())
     rows = rows_of(record, len(shapes), shape=numbers, data=data, other=(other - data) // keepalive[0].itemsize)
     scale = np.full(3, law.largest_deflection)
     return PackedModel(reduced_contact.FUNCTIONS, rows, 3, LINEAR.size, scale, radius, keepalive)
 
 
-def maps_of(shape: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return where the two maps of a `ReducedShape` begin, int `[3]`, in the array at the lower address.
-
-    Compiled loops reach both maps from the one that lies first in memory: they take no negative numbers.
-    """
-    if shape.other is None:
-        return np.zeros(3, dtype=int), shape.data
-    apart = (place_of(shape.other) - place_of(shape.data)) // shape.data.itemsize
-    return np.array([max(-apart, 0), max(apart, 0), 0]), shape.data if apart > 0 else shape.other
-
-
-REDUCED = Kind(reduced_step, step_slopes.reduced, step_slopes.reduced_jacobian, records, maps_of)
+REDUCED = Kind(reduced_step.STEPS, records)
 """Kind of `ReducedModel`."""

@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction.compiled.parts import Part
 from planarfriction.compiler.memory import place_of
+from planarfriction.equality import by_parts
+
+
+@by_parts
+class Part(NamedTuple):
+    """A part of a contact at one load."""
+
+    share: float
+    """Share of the load that the part carries [-]."""
+    shape: Any
+    """Shape of its patch, in the form of its model (`ReducedShape` or `PublishedShape`)."""
 
 
 class ShapesByLoad(NamedTuple):

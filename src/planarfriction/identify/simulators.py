@@ -9,11 +9,15 @@ from typing import Any
 import numpy as np
 
 from planarfriction.compiler import threads
+from planarfriction.compiler.calls import address_of
+from planarfriction.compiler.memory import Packed, place_of, row_of
 from planarfriction.derivatives import PARAMETERS, rollout, rollout_jacobian
 from planarfriction.formulas import LawNumbers
 from planarfriction.identify.logs import Log
 from planarfriction.identify.parameters import RADIUS
-from planarfriction.kernels import distributed_step
+from planarfriction.kernels.cells import CellsContact
+from planarfriction.kernels.distributed_step import ISOTROPIC
+from planarfriction.kernels.steps import WORDS, Parts, step_sequence
 from planarfriction.laws import LuGre
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceTablePublished
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
@@ -154,8 +158,7 @@ class DistributedSimulator(ScaledSimulator):
 
     def __init__(self, patch, law, surface=LimitSurfaceTablePublished):
         super().__init__(patch, law)
-        x, y = (np.ascontiguousarray(column) for column in self.patch.positions.T)
-        self._cells = distributed_step.Cells(x, y, np.ascontiguousarray(np.atleast_2d(self.patch.weights())))
+        self._cells, self._weights = np.ascontiguousarray(self.patch.positions.T), self.patch.weights()
 
     def work(self, parameters):
         return 0.03 * len(self.patch.positions) * (parameters + 1)
@@ -163,13 +166,12 @@ class DistributedSimulator(ScaledSimulator):
     def _inner(self, twists, loads, dt, vector):
         plastic = float(self._law.elasto_plastic is not None)
         law = LawNumbers._make([*vector[:7].tolist(), plastic, float(vector[7]), 0.0])
-        wrenches = np.zeros((len(twists), 3))
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], loads > 0.0, [0]]).astype(int)))
-        for first, last in edges.reshape(-1, 2):  # without load the bristles are forgotten
-            z = np.zeros(2 * len(self.patch.positions))
-            part = wrenches[first:last]
-            distributed_step.step_sequence(law, z, twists[first:last], self._cells, 1.0, dt, np.empty_like(z), part)
-        return wrenches * loads[:, None]
+        wrenches, count = np.zeros((len(twists), 3)), len(self._weights)
+        record = row_of(CellsContact(law, count, self._cells, self._weights))
+        step = address_of(ISOTROPIC.step, WORDS)
+        parts = Packed(Parts(step, 1, 2 * count, 0, 1, np.array([place_of(record)]), np.ones(1)))
+        step_sequence(parts.words, np.zeros(2 * count), twists, loads, dt, wrenches, np.empty(2 * count + 3))
+        return wrenches
 
 
 class ReducedSimulator(ScaledSimulator):

@@ -346,8 +346,10 @@ def _around_by_map(cell, p):
     return dot(a, pa), dot(a, pb), dot(a, pc), dot(b, pa), dot(b, pb), dot(b, pc), dot(c, pa), dot(c, pb), dot(c, pc)
 
 
-ISOTROPIC = functions_of("isotropic", TEMPLATES, lever=Lever(_place, _seen, _wrench, _around, False))
-TURNED = functions_of("turned", TEMPLATES, lever=Lever(_map, _seen_by_map, _wrench_by_map, _around_by_map, False))
-ASYMMETRIC = functions_of(
-    "asymmetric", TEMPLATES, lever=Lever(_map, _seen_by_map, _wrench_by_map, _around_by_map, True)
-)
+POSITIONS = Lever(_place, _seen, _wrench, _around, False)
+LEVERS = Lever(_map, _seen_by_map, _wrench_by_map, _around_by_map, False)
+LEANING_LEVERS = LEVERS._replace(leans=True)
+
+ISOTROPIC = functions_of("isotropic", TEMPLATES, lever=POSITIONS)
+TURNED = functions_of("turned", TEMPLATES, lever=LEVERS)
+ASYMMETRIC = functions_of("asymmetric", TEMPLATES, lever=LEANING_LEVERS)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from planarfriction.compiler.memory import Doubles, Integers, Layout, offsets_of, reader
-from planarfriction.kernels.step_slopes import NUMBERS
+from planarfriction.kernels.steps import SLOPES
 
 
 class Problem(NamedTuple):
@@ -74,7 +74,7 @@ class Problem(NamedTuple):
     matrix: Doubles
     """Matrix of the Newton step, [3k, 3k]."""
     step: Doubles
-    """Result of a piece's step (see `step_slopes`)."""
+    """Result of a piece's step (see `steps.StepFunctions`)."""
     turned: Doubles
     """Scratch of `leave_out_rising`, [2, 9]."""
 
@@ -94,7 +94,7 @@ def layout(patches: int, pieces: int, states: int) -> Layout:
     shapes |= dict.fromkeys(("free_load", "load", "load_0", "best_load"), k)
     shapes |= dict.fromkeys(("state", "new"), states) | dict.fromkeys(("records", "shares"), pieces)
     shapes |= dict.fromkeys(("unit_slopes", "slopes"), 9 * k) | dict.fromkeys(("response", "matrix"), n * n)
-    return Layout(Problem, **shapes | {"load_response": k * n, "step": NUMBERS, "turned": 18})
+    return Layout(Problem, **shapes | {"load_response": k * n, "step": SLOPES, "turned": 18})
 
 
 class Patches(NamedTuple):
@@ -109,7 +109,7 @@ class Patches(NamedTuple):
     solve: int
     """Address of `coupling.solve`."""
     functions: Integers
-    """Addresses of the pieces' functions (see `step_slopes`), [pieces]."""
+    """Addresses of the pieces' functions (see `steps.StepFunctions`), [pieces]."""
     owners: Integers
     """Patches of the pieces, [pieces]."""
     firsts: Integers

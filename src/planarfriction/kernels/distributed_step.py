@@ -1,45 +1,24 @@
-"""The step of the distributed model and its derivatives, cell by cell, per unit normal load.
+"""The step of the distributed model and its derivatives, cell by cell (see `steps.StepFunctions`).
 
-Twists and wrenches are about the contact frame's origin; see `bristle_step` for the step of a bristle and
-docs/physics.md, "Distributed model".
+A cell sees the velocity `u = B V` of its lever B (see `cells.Lever`). Where friction depends on the direction a bristle
+may decay towards `c = a g(|u|)/sigma_0`, which the twist holds: `z - c` steps as the bristle of a cell without c does,
+and the traction is that of one less `sigma_0 c`. See `bristle_step` for the step of a bristle and docs/physics.md,
+"Distributed model".
 """
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
-import numpy as np
-
-from planarfriction.compiler import jit, kernel
-from planarfriction.kernels import bristle_step
+from planarfriction import formulas
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import kernel
+from planarfriction.compiler.memory import at
+from planarfriction.kernels import bristle_step, cells
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.law import grip, squared
-from planarfriction.kernels.vectors import norm, plus, times
-
-
-class Cells(NamedTuple):
-    """The n cells of a patch."""
-
-    x: np.ndarray
-    """Positions [m], [n]."""
-    y: np.ndarray
-    weights: np.ndarray
-    """Shares of the load, one row for all contacts of a batch or one for each, [B or 1, n]."""
-
-
-class CellJacobians(NamedTuple):
-    """Derivatives of the steps of B contacts."""
-
-    state_state: np.ndarray
-    """Derivatives of the new bristles by the old, cell by cell, [B, 2, 2, n]."""
-    state_twist: np.ndarray
-    """[B, 2, n, 3]"""
-    wrench_state: np.ndarray
-    """[B, 3, 2, n]"""
-    wrench_twist: np.ndarray
-    """[B, 3, 3]"""
-    wrench_load: np.ndarray
-    """[B, 3]"""
+from planarfriction.kernels.steps import SLOPES, step_functions
+from planarfriction.kernels.vectors import norm, plus, put, put_all, three, times
 
 
 @kernel
@@ -56,66 +35,17 @@ def cell(law, z, u, dt):
     return new, _traction(law, new, k, u)
 
 
+@kernel
+def leaning_cell(law, a, z, u, dt):
+    """Return the new bristle and the traction of a cell whose bristle decays towards `a g/sigma_0`."""
+    c = times(formulas.stribeck(xp, norm(u), law) / law.sigma_0, a)
+    new, traction = cell(law, plus(z, -1.0, c), u, dt)
+    return plus(new, 1.0, c), plus(traction, -law.sigma_0, c)
+
+
 _CELL = derive(cell, ("z", "u"), ("z", "u"))
-_forth, _back = _CELL.forth, _CELL.back
-
-
-@kernel
-def _step(law, z, twist, x, y, w, dt, out):
-    n = x.shape[0]
-    zx, zy, ox, oy = z[:n], z[n:], out[:n], out[n:]
-    vx, vy, omega = twist
-    fx, fy, tau = 0.0, 0.0, 0.0
-    for i in range(n):  # apart: in one loop the vectors do not fit into the processor's registers
-        u = vx - omega * y[i], vy + omega * x[i]
-        speed = norm(u)
-        ox[i] = bristle_step.predict(law, (zx[i], zy[i]), u, speed, 1.0, grip(law, speed), dt)[1]
-    for i in range(n):
-        u, bristle = (vx - omega * y[i], vy + omega * x[i]), (zx[i], zy[i])
-        speed = norm(u)
-        q = grip(law, speed)
-        new, k = bristle_step.finish(law, bristle, u, speed, 1.0, q, dt, norm(bristle) * q, ox[i])
-        ox[i], oy[i] = new
-        tx, ty = times(w[i], _traction(law, new, k, u))
-        fx += tx
-        fy += ty
-        tau += x[i] * ty - y[i] * tx
-    return fx, fy, tau
-
-
-@kernel
-def step(law, z, twist, x, y, w, dt, out):
-    """Advance the bristles by `dt` at a held twist (see `formulas.relaxation`) and return the wrench at the end."""
-    if law.gamma == 2.0:
-        return _step(squared(law), z, twist, x, y, w, dt, out)
-    return _step(law, z, twist, x, y, w, dt, out)
-
-
-@jit
-def step_batch(law, z, twist, cells, load, dt, out, wrench):
-    """Take a `step` of each contact: `z`, `out` [B, 2n], `twist`, `wrench` [B, 3], `load`, `dt` [B].
-
-    Without load the bristles are forgotten.
-    """
-    for b in range(z.shape[0]):
-        w, held = cells.weights[min(b, cells.weights.shape[0] - 1)], (twist[b, 0], twist[b, 1], twist[b, 2])
-        fx, fy, tau = step(law, z[b], held, cells.x, cells.y, w, dt[b], out[b])
-        wrench[b, 0], wrench[b, 1], wrench[b, 2] = load[b] * fx, load[b] * fy, load[b] * tau
-        if load[b] == 0.0:
-            out[b] = 0.0
-            wrench[b] = 0.0
-
-
-@jit
-def step_sequence(law, z, twist, cells, load, dt, out, wrench):
-    """Take a `step` at each twist [T, 3] of one contact, `z` in place (`out`: scratch), `wrench` [T, 3]."""
-    n = z.shape[0]
-    for t in range(twist.shape[0]):
-        held = twist[t, 0], twist[t, 1], twist[t, 2]
-        fx, fy, tau = step(law, z, held, cells.x, cells.y, cells.weights[0], dt, out)
-        wrench[t, 0], wrench[t, 1], wrench[t, 2] = load * fx, load * fy, load * tau
-        for i in range(n):
-            z[i] = out[i]
+_LEANING = derive(leaning_cell, ("z", "u"), ("a", "z", "u"))
+_forth, _back, _forth_leaning, _back_leaning = _CELL.forth, _CELL.back, _LEANING.forth, _LEANING.back
 
 
 class CellSlopes(NamedTuple):
@@ -131,49 +61,103 @@ class CellSlopes(NamedTuple):
 
 
 @kernel
-def cell_slopes(law, z, u, dt):
-    """Return `CellSlopes` of a step from the bristle z at the velocity u."""
-    (new, traction), tape = _forth(law, z, u, dt)
-    none, x, y = (0.0, 0.0), (1.0, 0.0), (0.0, 1.0)
-    (new_zx, new_ux), (new_zy, new_uy) = _back(tape, (x, none)), _back(tape, (y, none))
-    (zx, ux), (zy, uy) = _back(tape, (none, x)), _back(tape, (none, y))
+def _pulled(back, results, tape):
+    (new, traction), none, x, y = results, (0.0, 0.0), (1.0, 0.0), (0.0, 1.0)
+    (new_zx, new_ux), (new_zy, new_uy) = back(tape, (x, none)), back(tape, (y, none))
+    (zx, ux), (zy, uy) = back(tape, (none, x)), back(tape, (none, y))
     return CellSlopes(new, traction, (*new_zx, *new_zy), (*new_ux, *new_uy), (*zx, *zy), (*ux, *uy))
 
 
 @kernel
-def by_twist(by_x, by_y, x, y):
-    """Return derivatives by the twist from those by the velocity of a cell at (x, y)."""
-    return by_x, by_y, x * by_y - y * by_x
+def _lean(own, i):
+    return own.cells[5 * own.count + i], own.cells[6 * own.count + i]
 
 
-@jit
-def jacobians(law, z, twist, cells, load, dt, out):
-    """Write `CellJacobians` of steps to `out`, which comes in as zeros.
+@kernel
+def _cell_slopes(lever, law, own, i, z, u, dt):
+    """Return `CellSlopes` of cell i."""
+    if lever.leans:
+        results, tape = _forth_leaning(law, _lean(own, i), z, u, dt)
+        return _pulled(_back_leaning, results, tape)
+    found, path = _forth(law, z, u, dt)
+    return _pulled(_back, found, path)
 
-    `z` [B, 2, n], `twist` [B, 3], `load`, `dt` [B].
-    """
-    for b in range(z.shape[0]):
-        weights = cells.weights[min(b, cells.weights.shape[0] - 1)]
-        for m in range(weights.shape[0]):
-            px, py = cells.x[m], cells.y[m]
-            u = twist[b, 0] - twist[b, 2] * py, twist[b, 1] + twist[b, 2] * px
-            cell = cell_slopes(law, (z[b, 0, m], z[b, 1, m]), u, dt[b])
-            fx, fy = times(weights[m], cell.traction)
-            out.wrench_load[b, 0] += fx
-            out.wrench_load[b, 1] += fy
-            out.wrench_load[b, 2] += px * fy - py * fx
-            if load[b] == 0.0:
-                continue
-            for i in range(2):
-                for j in range(2):
-                    out.state_state[b, i, j, m] = cell.new_z[2 * i + j]
-                slopes = out.state_twist[b, i, m]
-                slopes[0], slopes[1], slopes[2] = by_twist(cell.new_u[2 * i], cell.new_u[2 * i + 1], px, py)
-            by_z, by_u = times(load[b] * weights[m], cell.traction_z), times(load[b] * weights[m], cell.traction_u)
-            for i in range(3):  # the wrench is the traction times (1, 0), (0, 1) and the lever
-                x, y = (1.0, 0.0) if i == 0 else ((0.0, 1.0) if i == 1 else (-py, px))
-                out.wrench_state[b, i, 0, m] = x * by_z[0] + y * by_z[2]
-                out.wrench_state[b, i, 1, m] = x * by_z[1] + y * by_z[3]
-                vx, vy, omega = by_twist(x * by_u[0] + y * by_u[2], x * by_u[1] + y * by_u[3], px, py)
-                slopes = out.wrench_twist[b, i]
-                slopes[0], slopes[1], slopes[2] = slopes[0] + vx, slopes[1] + vy, slopes[2] + omega
+
+@kernel
+def _step(lever, law, own, z, twist, dt, new, out):
+    n, total = own.count, (0.0, 0.0, 0.0)
+    if lever.leans:
+        for i in range(n):
+            one = lever.of(own, i)
+            moved, traction = leaning_cell(law, _lean(own, i), (z[i], z[n + i]), lever.seen(one, twist), dt)
+            new[i], new[n + i] = moved
+            total = plus(total, own.weights[i], lever.wrench(one, traction))
+        put(out, total)
+        return
+    for i in range(n):  # apart: in one loop the vectors do not fit into the processor's registers
+        u = lever.seen(lever.of(own, i), twist)
+        speed = norm(u)
+        new[i] = bristle_step.predict(law, (z[i], z[n + i]), u, speed, 1.0, grip(law, speed), dt)[1]
+    for i in range(n):
+        one, bristle = lever.of(own, i), (z[i], z[n + i])
+        u = lever.seen(one, twist)
+        speed = norm(u)
+        q = grip(law, speed)
+        moved, k = bristle_step.finish(law, bristle, u, speed, 1.0, q, dt, norm(bristle) * q, new[i])
+        new[i], new[n + i] = moved
+        total = plus(total, own.weights[i], lever.wrench(one, _traction(law, moved, k, u)))
+    put(out, total)
+
+
+@kernel
+def step(lever, contact, z, v, dt, new, out):
+    """Advance the bristles by `dt` at a held twist (see `formulas.relaxation`), and write the wrench at the end."""
+    own = cells.read(contact)
+    if own.law.gamma == 2.0:
+        _step(lever, squared(own.law), own, z, three(v), dt, new, out)
+    else:
+        _step(lever, own.law, own, z, three(v), dt, new, out)
+
+
+@kernel
+def _slopes(lever, whole, law, own, z, twist, dt, new, out):
+    n, total, by_twist = own.count, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    for i in range(n):
+        one = lever.of(own, i)
+        found = _cell_slopes(lever, law, own, i, (z[i], z[n + i]), lever.seen(one, twist), dt)
+        new[i], new[n + i] = found.new
+        total = plus(total, own.weights[i], lever.wrench(one, found.traction))
+        by_twist = plus(by_twist, own.weights[i], lever.around(one, found.traction_u))
+        if whole:
+            _put_cell(lever, one, own.weights[i], found, i, n, at(out, SLOPES))
+    put(out, total)
+    put_all(at(out, 3), by_twist)
+
+
+@kernel
+def _put_cell(lever, one, weight, found, i, n, out):
+    """Write the derivatives of cell i to its places in d new/dV [2, n, 3], dW/dz [3, 2, n] and d new/dz [2, 2, n]."""
+    (xx, xy, yx, yy), (ux, uy, vx, vy) = times(weight, found.traction_z), found.new_u
+    put(at(out, 3 * i), lever.wrench(one, (ux, uy)))
+    put(at(out, 3 * (n + i)), lever.wrench(one, (vx, vy)))
+    by_x, by_y = lever.wrench(one, (xx, yx)), lever.wrench(one, (xy, yy))
+    for m in range(3):
+        out[(6 + 2 * m) * n + i], out[(7 + 2 * m) * n + i] = by_x[m], by_y[m]
+    for m in range(4):
+        out[(12 + m) * n + i] = found.new_z[m]
+
+
+@kernel
+def slopes(lever, whole, contact, z, v, dt, new, out):
+    """Step with the slopes of the wrench, or with all derivatives."""
+    own = cells.read(contact)
+    if own.law.gamma == 2.0 and not (whole or lever.leans):
+        _slopes(lever, whole, squared(own.law), own, z, three(v), dt, new, out)
+    else:
+        _slopes(lever, whole, own.law, own, z, three(v), dt, new, out)
+
+
+TEMPLATES = step, slopes
+ISOTROPIC = step_functions("isotropic", TEMPLATES, lever=cells.POSITIONS)
+TURNED = step_functions("turned", TEMPLATES, lever=cells.LEVERS)
+ASYMMETRIC = step_functions("asymmetric", TEMPLATES, lever=cells.LEANING_LEVERS)

@@ -26,7 +26,7 @@ from planarfriction.kernels.surfaces import sliding, sliding_jacobian
 from planarfriction.kernels.vectors import applied_back, dot, norm, plus
 
 
-class Shape(NamedTuple):
+class PublishedPatch(NamedTuple):
     """A patch about its centre of pressure, in the axes of its friction metric."""
 
     centre_x: float
@@ -48,7 +48,7 @@ class PublishedContact(NamedTuple):
     """A contact of the published reduced model."""
 
     law: LawNumbers
-    shape: Shape
+    shape: PublishedPatch
     root: Root
     kind: int
     """Kind of the limit surface (see `kernels.surfaces`)."""
@@ -68,7 +68,7 @@ def per_radius(radius):
 
 
 @kernel
-def _through(root, x, y):
+def through(root, x, y):
     """Return a velocity in the axes of the metric, or a force out of them: times the symmetric root."""
     return root.xx * x + root.xy * y, root.xy * x + root.yy * y
 
@@ -81,7 +81,7 @@ def _read(contact):
 @kernel
 def _seen(own, v):
     """Return `V_S` of a twist."""
-    (x, y), shape = _through(own.root, v[0], v[1]), own.shape
+    (x, y), shape = through(own.root, v[0], v[1]), own.shape
     return x - v[2] * shape.centre_y, y + v[2] * shape.centre_x, shape.contact_radius * v[2]
 
 
@@ -89,7 +89,7 @@ def _seen(own, v):
 def _wrench(own, t):
     """Return the wrench about the origin of a scaled one about the centre of pressure."""
     shape = own.shape
-    x, y = _through(own.root, t[0], t[1])
+    x, y = through(own.root, t[0], t[1])
     return x, y, shape.contact_radius * t[2] + shape.centre_x * t[1] - shape.centre_y * t[0]
 
 

@@ -8,9 +8,9 @@ from planarfriction.kernels import lanes
 from planarfriction.kernels.bind import bind
 from planarfriction.kernels.lanes import FIELDS, LANES, OMEGA, OWN, ROW, SLOTS, TWIST, LaneModel, put_slot, slot
 from planarfriction.kernels.law import LAW, LawNumbers
-from planarfriction.kernels.published_contact import Shape
+from planarfriction.kernels.moment_steps import Contact
+from planarfriction.kernels.published_contact import PublishedPatch
 from planarfriction.kernels.published_step import NAMES, HeldTwist, pull_back, scaled_twist, taped_step
-from planarfriction.kernels.rollouts import Contact
 from planarfriction.kernels.surfaces import (
     BILINEAR,
     bilinear_blend,
@@ -143,7 +143,7 @@ def _begin(own, c, surface, data):
 @kernel
 def _contact(own, c):
     row = gathered(own, ROW + c, LANES, _NUMBERS)
-    return Contact(LawNumbers(*row[:LAW]), Shape(*row[LAW:]), 0, 0)
+    return Contact(LawNumbers(*row[:LAW]), PublishedPatch(*row[LAW:]), 0, 0)
 
 
 @kernel

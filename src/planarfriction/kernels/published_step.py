@@ -8,29 +8,28 @@ Derivatives are those that `derive` writes, of the limit surface `du/dV_S`; its 
 
 from __future__ import annotations
 
-import functools
 from typing import NamedTuple
 
 from planarfriction import formulas
 from planarfriction.compiler import compiled_math as xp
-from planarfriction.compiler import entry, jit, kernel
-from planarfriction.compiler.calls import address_of
-from planarfriction.compiler.memory import doubles, reader
+from planarfriction.compiler import jit, kernel
+from planarfriction.compiler.memory import reader
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import bristle_step, rollouts
+from planarfriction.kernels import bristle_step, moment_steps, published_contact, rollouts
 from planarfriction.kernels.bind import bind
 from planarfriction.kernels.derive import derive
-from planarfriction.kernels.published_contact import Shape
-from planarfriction.kernels.rollouts import Cotangents, StepModel
+from planarfriction.kernels.moment_steps import Contact, Cotangents, Framed, StepModel
+from planarfriction.kernels.published_contact import PublishedPatch, through
 from planarfriction.kernels.rules import ratio
 from planarfriction.kernels.steady import STILL
+from planarfriction.kernels.steps import step_functions
 from planarfriction.kernels.surfaces import sliding, sliding_jacobian
 from planarfriction.kernels.vectors import applied_back, norm, plus, times
 
-NAMES = (*LawNumbers._fields, *Shape._fields)
+NAMES = (*LawNumbers._fields, *PublishedPatch._fields)
 """Numbers of a contact, in the order of its row."""
 
-shape_of = reader(Shape)
+shape_of = reader(PublishedPatch)
 
 
 class HeldTwist(NamedTuple):
@@ -100,7 +99,14 @@ def _step(law, shape, twist, omega, u, z, dt):
 
 
 _BY_LAW = "sigma_0", "sigma_1", "sigma_2", "mu_c", "mu_s", "v_s", "gamma", "breakaway_ratio"
-_BY = "z", "u", "twist", "omega", *(f"law.{name}" for name in _BY_LAW), *(f"shape.{name}" for name in Shape._fields)
+_BY = (
+    "z",
+    "u",
+    "twist",
+    "omega",
+    *(f"law.{name}" for name in _BY_LAW),
+    *(f"shape.{name}" for name in PublishedPatch._fields),
+)
 DERIVATIVE = derive(_step, _BY, ("z", "u", "twist"))
 _forth, _back = DERIVATIVE.forth, DERIVATIVE.back
 
@@ -119,7 +125,7 @@ def pull_back(contact, step, slopes, new, wrench):
     bars = _back(step.tape, (new, wrench))
     z, u, twist, turn = bars[:4]
     x, y, s = plus(twist, 1.0, applied_back(slopes, u))
-    by_shape = Shape(*bars[12:])
+    by_shape = PublishedPatch(*bars[12:])
     return Cotangents(
         z,
         (x, y, turn + shape.contact_radius * s + shape.centre_x * y - shape.centre_y * x),
@@ -131,15 +137,39 @@ def pull_back(contact, step, slopes, new, wrench):
 # ---------------------------------------------------------------------- bound to this model
 
 
-MODEL = StepModel(shape_of, doubles, hold, hold_slopes, taped_step, pull_back)
-step = bind(rollouts.step, MODEL, "published_step", entry)
-
-
-@functools.cache
-def step_address() -> int:
-    """Return the address of `step` in this process."""
-    return address_of(step, "pppp")
-
-
+MODEL = StepModel(shape_of, hold, hold_slopes, taped_step, pull_back)
 sensitivities = bind(rollouts.sensitivities, MODEL, "published_sensitivities", jit)
 tangent = bind(rollouts.tangent, MODEL, "published_tangent", jit)
+
+
+@kernel
+def _spins(own):
+    return xp.where(own.shape.contact_radius > 0.0, 1.0, 0.0)
+
+
+@kernel
+def _read(contact):
+    """Return the record of a contact, and the contact about its centre of pressure, in the axes of its metric.
+
+    A point slides as a patch of any size does that does not spin.
+    """
+    own = published_contact.read(contact)
+    spins = _spins(own)
+    shape = PublishedPatch(0.0, 0.0, own.shape.contact_radius + 1.0 - spins, spins * own.shape.second_moment)
+    return own, Contact(own.law, shape, (own.kind, 0, own.size), own.data)
+
+
+@kernel
+def _seen(own, v):
+    x, y = through(own.root, v[0], v[1])
+    return x - own.shape.centre_y * v[2], y + own.shape.centre_x * v[2], _spins(own) * v[2]
+
+
+@kernel
+def _wrench(own, w):
+    x, y = through(own.root, w[0], w[1])
+    return x, y, own.shape.centre_x * w[1] - own.shape.centre_y * w[0] + _spins(own) * w[2]
+
+
+_FRAME = Framed(_read, _seen, _wrench, _spins)
+STEPS = step_functions("published", moment_steps.TEMPLATES, frame=_FRAME, **MODEL._asdict())

@@ -21,7 +21,7 @@ from planarfriction.kernels.steady import STILL, evenness, fourth_moments, scale
 from planarfriction.kernels.vectors import applied_back, dot, norm, plus, put_all, times
 
 
-class Shape(NamedTuple):
+class ReducedPatch(NamedTuple):
     """A patch: F, upper triangular, and the share of the other map in its steady sliding."""
 
     f_00: float
@@ -37,7 +37,7 @@ class ReducedContact(NamedTuple):
     """A contact of the reduced model."""
 
     law: LawNumbers
-    shape: Shape
+    shape: ReducedPatch
     data: Floats
     """Map of steady sliding (see `kernels.steady`)."""
     other: int

@@ -10,22 +10,18 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from planarfriction.compiler import jit, kernel
-from planarfriction.compiler.memory import floats
 from planarfriction.kernels import reduced_step, rollouts
 from planarfriction.kernels.bind import bind
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.reduced import to_origin
-from planarfriction.kernels.reduced_contact import Shape
+from planarfriction.kernels.reduced_contact import ReducedPatch
 from planarfriction.kernels.reduced_step import (
     Quartic,
     ReducedStep,
     SteadyTwist,
     cotangents,
-    hold,
-    shape_of,
     through_steady,
 )
-from planarfriction.kernels.rollouts import StepModel
 from planarfriction.kernels.steady import FAR, STILL, blended, fourth_change, fourth_moments, scaled_twist
 from planarfriction.kernels.vectors import dot, norm
 
@@ -75,7 +71,7 @@ def pull_back(contact, step, slopes, new, wrench):
     known, blend = through_steady(contact, step, slopes.held, bars[:7]), bars[7]
     (vx, vy, omega), (wx, wy, wt), (gx, gy, gs) = slopes.twist, wrench, step.traction
     ux, uy, us = known[1]
-    by_shape = Shape(
+    by_shape = ReducedPatch(
         ux * vx + gx * wx, ux * vy + gx * wy, ux * omega + gx * wt,
         uy * vy + gy * wy, uy * omega + gy * wt, us * omega + gs * wt,
         blend + dot(slopes.q_blend, known[2]),
@@ -85,7 +81,7 @@ def pull_back(contact, step, slopes, new, wrench):
 
 # ---------------------------------------------------------------------- bound to this model
 
-_MODEL = StepModel(shape_of, floats, hold, hold_slopes, taped_step, pull_back)
+_MODEL = reduced_step.MODEL._replace(hold_slopes=hold_slopes, taped_step=taped_step, pull_back=pull_back)
 rollout = bind(rollouts.rollout, _MODEL, "reduced_rollout", jit)
 gradient = bind(rollouts.gradient, _MODEL, "reduced_gradient", jit)
 sensitivities = bind(rollouts.sensitivities, _MODEL, "reduced_sensitivities", jit)

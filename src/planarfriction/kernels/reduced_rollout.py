@@ -27,10 +27,10 @@ from planarfriction.kernels.lanes import (
     slot,
 )
 from planarfriction.kernels.law import LAW, LawNumbers
+from planarfriction.kernels.moment_steps import Contact
 from planarfriction.kernels.reduced import to_origin
-from planarfriction.kernels.reduced_contact import Shape
+from planarfriction.kernels.reduced_contact import ReducedPatch
 from planarfriction.kernels.reduced_step import NAMES, Quartic, SteadySlopes, SteadyTwist, advance, pull_back, step_of
-from planarfriction.kernels.rollouts import Contact
 from planarfriction.kernels.steady import (
     FAR,
     QUARTIC,
@@ -68,7 +68,7 @@ _HEAD, _START, _FOURTH, _EVEN, _SIZE, _OWN = (
 @kernel
 def _contact(own, c):
     row = gathered(own, ROW + c, LANES, _NUMBERS)
-    return Contact(LawNumbers(*row[:LAW]), Shape(*row[LAW:]), 0, 0)
+    return Contact(LawNumbers(*row[:LAW]), ReducedPatch(*row[LAW:]), 0, 0)
 
 
 @kernel

@@ -14,31 +14,29 @@ the shape (see `reduced_loads` where it moves).
 
 from __future__ import annotations
 
-import functools
 import math
 from typing import NamedTuple
 
 from planarfriction import formulas
 from planarfriction.compiler import compiled_math as xp
-from planarfriction.compiler import entry, kernel
-from planarfriction.compiler.calls import address_of
-from planarfriction.compiler.memory import floats, reader
+from planarfriction.compiler import kernel
+from planarfriction.compiler.memory import reader
 from planarfriction.formulas import LawNumbers
-from planarfriction.kernels import rollouts, steady
-from planarfriction.kernels.bind import bind
+from planarfriction.kernels import moment_steps, reduced_contact, steady
 from planarfriction.kernels.bristle_step import cap
 from planarfriction.kernels.derive import derive
+from planarfriction.kernels.moment_steps import Contact, Cotangents, Framed, StepModel
 from planarfriction.kernels.reduced import closure, to_origin
-from planarfriction.kernels.reduced_contact import Shape
-from planarfriction.kernels.rollouts import Cotangents, StepModel
+from planarfriction.kernels.reduced_contact import ReducedPatch
 from planarfriction.kernels.rules import rule
 from planarfriction.kernels.steady import FAR, STILL, fourth_moments, scaled_twist, sliding
+from planarfriction.kernels.steps import step_functions
 from planarfriction.kernels.vectors import applied_back, dot, norm, plus, square, times
 
-NAMES = (*LawNumbers._fields, *Shape._fields)
+NAMES = (*LawNumbers._fields, *ReducedPatch._fields)
 """Numbers of a contact, in the order of its row."""
 
-shape_of = reader(Shape)
+shape_of = reader(ReducedPatch)
 
 
 class SteadyTwist(NamedTuple):
@@ -226,17 +224,28 @@ def pull_back(contact, step, slopes, new, wrench):
     """Return `Cotangents` from those of the new state and of the wrench, where the shape is held."""
     bars = _back(step.tape, (new, scaled_twist(contact.shape, *wrench)))
     bars = through_steady(contact, step, slopes, bars)
-    return cotangents(contact, slopes, bars, Shape(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+    return cotangents(contact, slopes, bars, ReducedPatch(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
 
 
 # ---------------------------------------------------------------------- bound to this model
 
 
-MODEL = StepModel(shape_of, floats, hold, hold_slopes, taped_step, pull_back)
-step = bind(rollouts.step, MODEL, "reduced_step", entry)
+@kernel
+def _read(contact):
+    own = reduced_contact.read(contact)
+    return own, Contact(own.law, own.shape, (0, own.other, 0), own.data)
 
 
-@functools.cache
-def step_address() -> int:
-    """Return the address of `step` in this process."""
-    return address_of(step, "pppp")
+@kernel
+def _as_it_is(own, vector):
+    return vector
+
+
+@kernel
+def _spins(own):
+    return 1.0
+
+
+MODEL = StepModel(shape_of, hold, hold_slopes, taped_step, pull_back)
+_FRAME = Framed(_read, _as_it_is, _as_it_is, _spins)
+STEPS = step_functions("reduced", moment_steps.TEMPLATES, frame=_FRAME, **MODEL._asdict())

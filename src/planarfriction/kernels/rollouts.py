@@ -1,14 +1,7 @@
-"""Steps and roll-outs of a reduced model, their discrete adjoint and their derivatives, one contact after another.
+"""Roll-outs of a reduced model, their discrete adjoint and their derivatives, one contact after another.
 
 Each is written once for all models of three states; `bind` makes it an entry point of a model, whose functions
-are compiled into it: with a contact `c`, a twist V, a state z and a step dt,
-
-- `shape_of(row)`: the shape, from the numbers behind those of the law;
-- `hold(c, V)`: what a step holds that does not depend on z;
-- `hold_slopes(c, V, work)`: that, and its slopes;
-- `taped_step(c, held, z, dt)`: the step, with `new` state and `wrench` per unit load;
-- `pull_back(c, step, slopes, new, wrench)`: `Cotangents` of z, V and the contact's numbers from those of the new state
-  and of the wrench.
+(`moment_steps.StepModel`) are compiled into it.
 
 Where the shape follows the load, each step has that of its load, which moves the wrench through the numbers of the
 shape and the share of the part, too.
@@ -19,46 +12,17 @@ smallest load would have.
 
 from __future__ import annotations
 
-import functools
-import threading
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numba import types
-from numba.core.errors import NumbaError
 
-from planarfriction.compiler import compiled_math as xp
-from planarfriction.compiler import jit, kernel, template
-from planarfriction.compiler.calls import address, call
-from planarfriction.compiler.memory import at, doubles, reader, size_of
+from planarfriction.compiler import kernel, template
 from planarfriction.kernels.law import LAW, law_of
+from planarfriction.kernels.moment_steps import Contact
 from planarfriction.kernels.vectors import accumulate, dot, plus, put, three, times
 
 SCRATCH = 9
 """Numbers that `hold_slopes` may write to."""
-
-
-class StepModel(NamedTuple):
-    """Functions of a model of three states, to which `bind` binds the loops."""
-
-    shape_of: Any
-    numbers_at: Any
-    """Address of the numbers of a limit surface or map, as doubles or in single precision."""
-    hold: Any
-    hold_slopes: Any
-    taped_step: Any
-    pull_back: Any
-
-
-class Contact(NamedTuple):
-    """A contact as the functions of a model see it."""
-
-    law: tuple
-    shape: tuple
-    surface: tuple
-    """Kind, offset and size of the limit surface or maps, as the model reads them: three integers."""
-    data: np.ndarray
-    """Their numbers, flat."""
 
 
 class Inputs(NamedTuple):
@@ -99,15 +63,6 @@ class Bars(NamedTuple):
     """[P, B, N], comes in as zeros; changes are those of all parts, [B or 1, N]."""
 
 
-class Cotangents(NamedTuple):
-    """Cotangents of all inputs of a step."""
-
-    state: tuple
-    twist: tuple
-    law: tuple
-    shape: tuple
-
-
 @kernel
 def _part(shape_of, inputs, row, p, at):
     """Return the part p as it is at one of the loads."""
@@ -130,92 +85,6 @@ def row_of(values, b):
 def _weighed(wrench, load):
     """Return the wrench of a load; zero without, whatever it is per unit load."""
     return times(load, wrench) if load != 0.0 else (0.0, 0.0, 0.0)
-
-
-# ---------------------------------------------------------------------- steps
-
-
-# A step is called by its address: compiled into the code of one contact and into that of a batch, it would round
-# differently in each.
-
-
-@kernel
-def step(shape_of, numbers_at, hold, taped_step, row, data, inputs, out):
-    """Step one contact: `inputs` are its z, twist, load and dt [8], `out` the new state and the wrench [6].
-
-    All are addresses; `numbers_at(data)` are the numbers of the surface. Behind law and shape the row holds the three
-    of `Contact.surface`.
-    """
-    shape = shape_of(at(row, LAW))
-    last, given, out = doubles(at(row, LAW + len(shape))), doubles(inputs), doubles(out)
-    contact = Contact(law_of(row), shape, (int(last[0]), int(last[1]), int(last[2])), numbers_at(data))
-    z, twist, load = (given[0], given[1], given[2]), (given[3], given[4], given[5]), given[6]
-    result = taped_step(contact, hold(contact, twist), z, given[7])
-    new, wrench = result.new if load != 0.0 else (0.0, 0.0, 0.0), _weighed(result.wrench, load)
-    out[0], out[1], out[2] = new
-    out[3], out[4], out[5] = wrench
-
-
-class PartAddresses(NamedTuple):
-    """Addresses of a part of a contact: of the model's `step`, of its row and of its data."""
-
-    step: int
-    row: int
-    data: int
-    share: float
-    """Share of the load."""
-
-
-_place = reader(PartAddresses)
-_WORDS = size_of(PartAddresses)
-
-
-@jit
-def step_one(places, z, vx, vy, omega, load, dt, result):
-    """Step one contact of P parts at the `places`, a row of words for each, flat; return False for invalid inputs.
-
-    `z` [3 P]. New state and wrench go into the first of `result` [3 P + 11]: each part writes its wrench where the next
-    one's state comes. Called from Python: every argument costs a quarter of a microsecond on the way in.
-    """
-    valid = xp.in_range(vx) and xp.in_range(vy) and xp.in_range(omega) and xp.in_range(load) and xp.in_range(dt)
-    valid = valid and load > 0.0 and dt >= 0.0
-    count = places.shape[0] // _WORDS
-    z, out, inputs = doubles(address(z, 0)), address(result, 0), address(result, 3 * count + 3)
-    given = doubles(inputs)
-    given[3], given[4], given[5], given[6], given[7] = vx, vy, omega, load, dt
-    fx, fy, tau = 0.0, 0.0, 0.0
-    for k in range(count):
-        part = _place(address(places, k * _WORDS))
-        x, y, s = z[3 * k], z[3 * k + 1], z[3 * k + 2]
-        if not (valid and xp.in_range(x) and xp.in_range(y) and xp.in_range(s)):
-            return False
-        given[0], given[1], given[2] = x, y, s
-        call(part.step, (part.row, part.data, inputs, out))
-        w = doubles(at(out, 3))
-        fx, fy, tau = fx + part.share * w[0], fy + part.share * w[1], tau + part.share * w[2]
-        out = at(out, 3)
-    last = doubles(out)
-    last[0], last[1], last[2] = fx, fy, tau
-    return True
-
-
-UNFIT = (TypeError, ValueError, NumbaError)
-"""Exceptions that `step_one` raises for arguments of other types."""
-
-_COMPILING = threading.Lock()
-
-
-@functools.cache
-def compile_step_one() -> None:
-    """Compile `step_one` for plain numbers and arrays, and for nothing else.
-
-    Of other types it then says so at once, for free, where it would be compiled anew in the middle of a step.
-    """
-    number, vector = types.float64, types.float64[::1]
-    with _COMPILING:
-        if not step_one.signatures:
-            step_one.compile((vector, vector, *(number,) * 5, vector))
-            step_one.disable_compile()
 
 
 # ---------------------------------------------------------------------- roll-outs

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from planarfriction import validation
-from planarfriction.compiled.parts import Part
 from planarfriction.compiled.remembered import Remembered
+from planarfriction.compiled.shapes_by_load import Part
 from planarfriction.models.load_family import LoadFamily
 from planarfriction.models.reduced_map import ReducedShape, reduced_shape, slip_factor
 from planarfriction.patch import ContactPatch

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from planarfriction.compiled.parts import Part
 from planarfriction.compiled.remembered import Remembered
+from planarfriction.compiled.shapes_by_load import Part
 from planarfriction.equality import by_parts
 from planarfriction.kernels.moments import slopes_in
 from planarfriction.kernels.surfaces import ELLIPSOID

@@ -8,8 +8,8 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from planarfriction.compiled.parts import Kind, Part
-from planarfriction.compiled.three_states import CompiledThreeStates, Shapes
+from planarfriction.compiled.shapes_by_load import Part
+from planarfriction.compiled.three_states import CompiledThreeStates, Kind, Shapes
 from planarfriction.laws import FrictionLaw
 from planarfriction.models.base import FrictionModel, ModelJacobians
 
@@ -59,9 +59,9 @@ class ThreeStateModel(FrictionModel):
         z, v, f = state.reshape(count, 3 * parts), twist.reshape(count, 3), load.reshape(count)
         rate_state, rate_twist = np.zeros((count, parts, 3, 3)), np.zeros((count, parts, 3, 3))
         wrench_state, wrench_twist = np.zeros((count, 3, parts, 3)), np.zeros((count, 3, 3))
-        for rows, contact in self.compiled.at_each_load(load):
-            lin, weight = self.compiled.linearisation(contact, z[rows], v[rows]), -f[rows][:, None, None]
-            for k, (share, shape) in enumerate(contact.parts):
+        for rows, loaded in self.compiled.parts_at_each_load(load):
+            lin, weight = self.compiled.linearisation(loaded, z[rows], v[rows]), -f[rows][:, None, None]
+            for k, (share, shape) in enumerate(loaded):
                 lever, (by_z, by_v) = shape.lever, shape.rate_slopes(lin[:, k])
                 rate_state[rows, k], rate_twist[rows, k] = by_z, by_v
                 pull = law.sigma_0 * np.eye(3) + law.sigma_1 * by_z

@@ -36,15 +36,12 @@ def published_loop(full: bool) -> Measurement:
 
 def distributed_loop(full: bool) -> Measurement:
     """Measure a step of the distributed model, in a compiled loop."""
-    from planarfriction.kernels import distributed_step as kernels
+    from planarfriction.kernels.steps import step_sequence
 
     model, twists = DistributedModel(disc(), law()), mixed_twists(1000)
-    x, y = (np.ascontiguousarray(column) for column in model.patch.positions.T)
-    cells = kernels.Cells(x, y, model.patch.weights()[None])
-    z = model.rest().reshape(-1)
-    scratch, wrench = np.empty_like(z), np.empty_like(twists)
-    arguments = cells, 1.0, 1e-4, scratch, wrench
-    loop = median(lambda: kernels.step_sequence(model.law.numbers, z, twists, *arguments), 9)
+    z, table = model.rest().reshape(-1), model.compiled.step_table(model.compiled.fixed)
+    arguments = np.ones(len(twists)), 1e-4, np.empty_like(twists), np.empty(z.size + 3)
+    loop = median(lambda: step_sequence(table, z, twists, *arguments), 9)
     call = _python_step(model, 100)
     return line(loop / len(twists) * 1e6, "us", "one Python call of the same step", call * 1e6)
 

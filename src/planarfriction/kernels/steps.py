@@ -1,0 +1,234 @@
+"""Steps of contacts as Python calls them: one contact, a batch, a sequence, and their derivatives.
+
+A contact is one or several parts that see the same twist and share the load; all of them step by the same function,
+one of the `StepFunctions` of a model. It is called by its address: compiled into the code of one contact and into that
+of a batch, a step would round differently in each.
+
+The entry points check what they are given and return False where that is not in order; of types that they were not
+compiled for they say so for free (`UNFIT`). Without load a contact forgets its state.
+"""
+
+from __future__ import annotations
+
+import functools
+import threading
+from collections import namedtuple
+from typing import Any, NamedTuple
+
+from numba import types
+from numba.core.errors import NumbaError
+
+from planarfriction.compiler import compiled_math as xp
+from planarfriction.compiler import entry, jit, kernel
+from planarfriction.compiler.calls import call, pointer
+from planarfriction.compiler.memory import Doubles, Integers, at, reader
+from planarfriction.kernels.bind import bind
+from planarfriction.kernels.vectors import plus, put, three, times
+
+WORDS = "pddfdd"
+"""Arguments of `StepFunctions` (see `calls.address_of`)."""
+
+SLOPES = 12
+"""Numbers that `StepFunctions.slopes` writes."""
+
+
+class StepFunctions(NamedTuple):
+    """Compiled steps of one part of a contact with S states.
+
+    Their arguments are `(contact, z, V, dt, new, out)`: the address of the part's record (with which the solver calls
+    its `contacts.ModelFunctions`), a number `dt`, and pointers to doubles. They write the new state to `new` and to
+    `out`, per unit load, the wrench W at the end of the step [3] and what follows.
+    """
+
+    step: Any
+    slopes: Any
+    """dW/dV [3, 3] as well."""
+    jacobian: Any
+    """dW/dV, d new/dV [S, 3], dW/dz [3, S] and d new/dz as well."""
+
+
+def step_functions(name: str, templates: tuple, **model: Any) -> StepFunctions:
+    """Return the steps of a model, entry points `<name>_step`, ...: templates that are bound to its arguments.
+
+    Those of slopes and of the Jacobian are one template, whose argument `whole` tells them apart.
+    """
+    step, slopes = templates
+    record = namedtuple("Own", [*model, "whole"])
+    one, whole = (record(**model, whole=each) for each in (False, True))
+    return StepFunctions(
+        bind(step, one, f"{name}_step", entry),
+        bind(slopes, one, f"{name}_slopes", entry),
+        bind(slopes, whole, f"{name}_jacobian", entry),
+    )
+
+
+class Parts(NamedTuple):
+    """Parts of a contact at R loads, and the function that they are given to."""
+
+    function: int
+    """Address of one of the `StepFunctions`."""
+    count: int
+    """Number P of parts."""
+    states: int
+    """Number S of states of a part."""
+    square: int
+    """Numbers of d new/dz of a part."""
+    loads: int
+    """Number R of loads: one for each contact of a batch, or 1."""
+    records: Integers
+    """Addresses of the records, [R, P]."""
+    shares: Doubles
+    """Shares of the load, [R, P]."""
+
+
+_read = reader(Parts)
+
+
+@kernel
+def _in_order(row, n):
+    valid = True
+    for i in range(n):
+        valid = valid and xp.in_range(row[i])
+    return valid
+
+
+@kernel
+def _positive(load, dt):
+    return xp.in_range(load) and xp.in_range(dt) and load >= 0.0 and dt >= 0.0
+
+
+@kernel
+def _step(own, b, z, twist, load, dt, new, wrench, unit):
+    """Step contact b; `unit` [3] is scratch."""
+    total = (0.0, 0.0, 0.0)
+    for k in range(own.count):
+        first, i = k * own.states, (b if own.loads > 1 else 0) * own.count + k
+        call(own.function, (own.records[i], at(z, first), twist, dt, at(new, first), unit))
+        total = plus(total, own.shares[i], three(unit))
+    if load > 0.0:
+        put(wrench, times(load, total))
+    else:
+        put(wrench, (0.0, 0.0, 0.0))
+        for i in range(own.count * own.states):
+            new[i] = 0.0
+
+
+@jit
+def step_one(parts, z, vx, vy, omega, load, dt, result):
+    """Step one contact; `parts` are the words of `Parts`, `z` [P S].
+
+    New state and wrench go into the first of `result` [P S + 9], whose last six are scratch. Called from Python: every
+    argument costs a quarter of a microsecond on the way in.
+    """
+    own, out = _read(parts), pointer(result)
+    n = own.count * own.states
+    valid = z.shape[0] == n and xp.in_range(vx) and xp.in_range(vy) and xp.in_range(omega) and _positive(load, dt)
+    if not (valid and _in_order(z, n)):
+        return False
+    wrench, twist = at(out, n), at(out, n + 3)
+    put(twist, (vx, vy, omega))
+    _step(own, 0, pointer(z), twist, load, dt, out, wrench, at(out, n + 6))
+    return True
+
+
+@jit
+def step_many(parts, z, twist, load, dt, new, wrench, scratch):
+    """Step B contacts: `z`, `new` [B, P S], `twist`, `wrench` [B, 3], `load`, `dt` [B or 1]; `scratch` [3]."""
+    own, (count, n) = _read(parts), z.shape
+    loads, steps = load.shape[0], dt.shape[0]
+    valid = n == own.count * own.states and twist.shape[0] == count and twist.shape[1] == 3
+    valid = valid and (loads == 1 or loads == count) and (steps == 1 or steps == count)
+    for b in range(count if valid else 0):
+        valid = valid and _positive(load[b if loads > 1 else 0], dt[b if steps > 1 else 0])
+        valid = valid and _in_order(z[b], n) and _in_order(twist[b], 3)
+    if not valid:
+        return False
+    states, twists, ends, wrenches = pointer(z), pointer(twist), pointer(new), pointer(wrench)
+    for b in range(count):
+        here, held = load[b if loads > 1 else 0], dt[b if steps > 1 else 0]
+        into = at(ends, n * b), at(wrenches, 3 * b)
+        _step(own, b, at(states, n * b), at(twists, 3 * b), here, held, *into, pointer(scratch))
+    return True
+
+
+@jit
+def step_sequence(parts, z, twist, load, dt, wrench, scratch):
+    """Step one contact at each twist [T, 3] and load [T], `z` [P S] in place; `wrench` [T, 3], `scratch` [P S + 3]."""
+    own, n, here, there = _read(parts), z.shape[0], pointer(z), pointer(scratch)
+    unit = at(there, n)
+    for t in range(twist.shape[0]):
+        _step(own, 0, here, at(pointer(twist), 3 * t), load[t], dt, there, at(pointer(wrench), 3 * t), unit)
+        here, there = there, here
+    for i in range(n):
+        z[i] = here[i]
+
+
+@kernel
+def _jacobians(own, b, z, given, out, new):
+    """Write the derivatives of a step of contact b to `out`; `new` [S] and all behind it are scratch."""
+    count, s, load, dt = own.count, own.states, given[3], given[4]
+    n, found, loaded = count * s, at(new, s), 1.0 if load > 0.0 else 0.0
+    by_twist, of_wrench = at(out, count * own.square), at(out, count * own.square + 3 * n)
+    wrench_twist = at(of_wrench, 3 * n)
+    for i in range(12):
+        wrench_twist[i] = 0.0
+    for k in range(count):
+        i = (b if own.loads > 1 else 0) * count + k
+        share = own.shares[i]
+        call(own.function, (own.records[i], at(z, k * s), given, dt, new, found))
+        for m in range(3):
+            wrench_twist[9 + m] += share * found[m]
+        for m in range(9):
+            wrench_twist[m] += share * load * found[3 + m]
+        for m in range(3 * s):
+            by_twist[3 * s * k + m] = loaded * found[SLOPES + m]
+        for m in range(3):
+            for p in range(s):
+                of_wrench[n * m + s * k + p] = share * load * found[SLOPES + s * (3 + m) + p]
+        for m in range(own.square):
+            out[own.square * k + m] = loaded * found[SLOPES + 6 * s + m]
+
+
+@jit
+def jacobians(parts, z, given, result):
+    """Write derivatives of steps of B contacts: `z` [B P S]; `given` [B 5]: twist, load and dt; all arrays are flat.
+
+    Into `result` go, for one contact after the other: new state by state [P, square] and by twist [P, S, 3], wrench by
+    state [3, P, S], by twist [3, 3] and by load [3]. Behind all of them lies scratch for one part.
+    """
+    own, states, inputs, out = _read(parts), pointer(z), pointer(given), pointer(result)
+    n, count = own.count * own.states, given.shape[0] // 5
+    if z.shape[0] != count * n or not (_in_order(z, z.shape[0]) and _in_order(given, given.shape[0])):
+        return False
+    for b in range(count):
+        if not (given[5 * b + 3] >= 0.0 and given[5 * b + 4] >= 0.0):
+            return False
+    size = own.count * own.square + 6 * n + 12
+    for b in range(count):
+        _jacobians(own, b, at(states, n * b), at(inputs, 5 * b), at(out, size * b), at(out, size * count))
+    return True
+
+
+UNFIT = (TypeError, ValueError, NumbaError)
+"""Exceptions that the entry points raise for arguments of other types."""
+
+_NUMBER, _VECTOR, _ROWS = types.float64, types.float64[::1], types.float64[:, ::1]
+_SIGNATURES: dict[Any, tuple] = {
+    step_one: (_VECTOR, _VECTOR, *(_NUMBER,) * 5, _VECTOR),
+    step_many: (_VECTOR, _ROWS, _ROWS, _VECTOR, _VECTOR, _ROWS, _ROWS, _VECTOR),
+    jacobians: (_VECTOR, _VECTOR, _VECTOR, _VECTOR),
+}
+_COMPILING = threading.Lock()
+
+
+@functools.cache
+def ready(function: Any) -> Any:
+    """Compile an entry point for plain numbers and arrays, and for nothing else; return it.
+
+    Of other types it then says so at once, for free, where it would be compiled anew in the middle of a step.
+    """
+    with _COMPILING:
+        if not function.signatures:
+            function.compile(_SIGNATURES[function])
+            function.disable_compile()
+    return function
