@@ -134,9 +134,10 @@ class CompiledModel:
             if self._flat:
                 if step_one(table, state, vx, vy, omega, normal_force, dt, result):
                     return result[self._new], result[self._wrench]
-            elif state.shape == (shape := self.state_shape):
-                if step_one(table, state.ravel(), vx, vy, omega, normal_force, dt, result):
-                    return result[self._new].reshape(shape), result[self._wrench]
+            elif state.shape == self.state_shape and step_one(
+                table, state.ravel(), vx, vy, omega, normal_force, dt, result
+            ):
+                return result[self._new].reshape(state.shape), result[self._wrench]
         except UNFIT:  # not plain numbers, or a batch
             pass
         return None

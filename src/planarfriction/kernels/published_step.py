@@ -154,8 +154,8 @@ def _read(contact):
     A point slides as a patch of any size does that does not spin.
     """
     own = published_contact.read(contact)
-    spins = _spins(own)
-    shape = PublishedPatch(0.0, 0.0, own.shape.contact_radius + 1.0 - spins, spins * own.shape.second_moment)
+    spins, radius = _spins(own), own.shape.contact_radius
+    shape = PublishedPatch(0.0, 0.0, xp.where(spins > 0.0, radius, 1.0), spins * own.shape.second_moment)
     return own, Contact(own.law, shape, (own.kind, 0, own.size), own.data)
 
 
