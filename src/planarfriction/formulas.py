@@ -88,17 +88,6 @@ def bristle_decay(xp, deflection, along, speed, grip, law):
     return xp.where(law.elasto_plastic > 0.0, 0.5 * alpha * (speed + along), speed + law.creep_speed) * grip
 
 
-def bristle_decay_partials(xp, deflection, along, speed, grip, law):
-    """`k` and its partial derivatives with respect to `deflection`, `along` and `speed` (to `grip`: k/grip)."""
-    alpha = slip_fraction(xp, deflection, law.breakaway_ratio)
-    slope = slip_fraction_slope(xp, deflection, law.breakaway_ratio)
-    stretch = 0.5 * (speed + along) * grip
-    half = 0.5 * alpha * grip
-    elastic = law.elasto_plastic > 0.0
-    k = xp.where(elastic, alpha * stretch, (speed + law.creep_speed) * grip)
-    return k, xp.where(elastic, slope * stretch, 0.0), xp.where(elastic, half, 0.0), xp.where(elastic, half, grip)
-
-
 def traction(z, zdot, velocity, law):
     """Friction per unit normal load on the moving body, `-(sigma_0 z + sigma_1 zdot + sigma_2 v)` ("Bristles")."""
     return -(law.sigma_0 * z + law.sigma_1 * zdot + law.sigma_2 * velocity)
@@ -178,21 +167,6 @@ def slip_share(xp, deflection, cosine, even, law):
     return xp.where(law.elasto_plastic > 0.0, 0.5 * alpha * (1.0 + cosine), 1.0)
 
 
-def slip_share_partials(xp, deflection, cosine, even, law):
-    """`slip_share` and its partial derivatives by `deflection`, `cosine` and the breakaway `s_ba even`."""
-    breakaway = law.breakaway_ratio * even
-    alpha = slip_fraction(xp, deflection, breakaway)
-    half = 0.5 * (1.0 + cosine)
-    elastic = law.elasto_plastic > 0.0
-    slope = xp.where(elastic, slip_fraction_slope(xp, deflection, breakaway) * half, 0.0)
-    return (
-        xp.where(elastic, alpha * half, 1.0),
-        slope,
-        xp.where(elastic, 0.5 * alpha, 0.0),
-        bristle_decay_by_breakaway(xp, slope, deflection, breakaway),
-    )
-
-
 def floored(xp, value, least):
     """`value` where it is at least `2 least`, and from there smoothly to `least`: `least (1 + (value/2 least)^2)`.
 
@@ -216,29 +190,9 @@ def floored_by_least(xp, value, least):
 # ---------------------------------------------------------------------- derivatives of a step (docs/differentiable.md)
 
 
-def stribeck_partials(xp, speed, law):
-    """`g` and its partial derivatives with respect to `speed` (as `stribeck_slope`), `mu_c`, `mu_s`, `v_s`, `gamma`."""
-    ratio = speed * (1.0 / law.v_s)
-    raised = xp.power(ratio, law.gamma)
-    share = xp.exp(-raised)
-    by_raised = -(law.mu_s - law.mu_c) * share
-    safe = xp.where(ratio > 0.0, ratio, 1.0)
-    steepness = xp.where(ratio > 0.0, raised / safe, xp.where(law.gamma == 1.0, 1.0, 0.0))
-    by_speed = by_raised * law.gamma * (1.0 / law.v_s) * steepness
-    return law.mu_c - by_raised, by_speed, 1.0 - share, share, -by_speed * ratio, by_raised * raised * xp.log(safe)
-
-
 def bristle_decay_by_breakaway(xp, k_deflection, deflection, breakaway_ratio):
     """Derivative of `k` with respect to the breakaway ratio, from that with respect to the deflection."""
     return -k_deflection * xp.maximum(1.0 - deflection, 0.0) * (1.0 / (1.0 - breakaway_ratio))
-
-
-def mean_decay_partials(start, end, dt):
-    """Partial derivatives of `mean_decay` with respect to `start` and `end`."""
-    x = 0.5 * (start + end) * dt
-    share = 1.0 / (2.0 + x + x * x)
-    lead = 0.5 * dt * (start - end) * share * share * (1.0 + 2.0 * x)
-    return share - lead, 1.0 - share - lead
 
 
 def relaxation_slope(xp, decay_dt, remaining, mean):

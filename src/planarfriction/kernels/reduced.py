@@ -12,9 +12,15 @@ shape begins and, if `blend > 0`, that of the other shape which has this share i
 
 from __future__ import annotations
 
+import math
+from typing import NamedTuple
+
 from planarfriction import formulas
 from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
+from planarfriction.kernels import steady
+from planarfriction.kernels.rules import rule
+from planarfriction.kernels.vectors import dot, plus, square, times
 
 
 @kernel
@@ -33,9 +39,30 @@ def closure(law, deflection, share, even):
     return formulas.slip_share(xp, deflection, cosine, even, law)
 
 
+class Quartic(NamedTuple):
+    """Fourth moments of a shape."""
+
+    rows: tuple
+    """Coefficients of `<u^4>` (see `steady.fourth_moments`)."""
+    change: tuple
+    """Derivatives of the coefficients by the blend of two maps."""
+    blend: float
+
+
 @kernel
-def closure_partials(law, deflection, share, even):
-    """Return `beta` and its partial derivatives with respect to `deflection`, `share` and the breakaway `s_ba even`."""
-    per = xp.where(deflection > 0.0, 1.0 / xp.where(deflection > 0.0, deflection, 1.0), 0.0)
-    beta, by_deflection, by_cosine, by_breakaway = formulas.slip_share_partials(xp, deflection, share * per, even, law)
-    return beta, by_deflection - by_cosine * share * per * per, by_cosine * per, by_breakaway
+def evenness(law, rows, change, blend, z):
+    """Return `steady.evenness`, of coefficients `rows` that change with the blend, and its slope by z."""
+    return steady.evenness(law, rows, z)
+
+
+rule(evenness, "sv", {(0, 3): "{t0} * uneven({0}, {1}, {2}, {4})", (0, 4): "{t1}"}, uneven=steady.uneven)
+
+
+@kernel
+def rate(law, quartic, z, u, q):
+    """Return `z'` at the scaled twist u that moves, whose steady state is q."""
+    per_q2, power = 1.0 / square(q), dot(u, q)
+    decay, share = square(u) / xp.where(power > 0.0, power, 1.0), dot(z, q) * per_q2
+    even, _ = evenness(law, quartic.rows, quartic.change, quartic.blend, z)
+    beta = closure(law, math.sqrt(square(z) * per_q2), share, even)
+    return plus(u, -beta, plus(times(decay, z), share, plus(u, -decay, q)))

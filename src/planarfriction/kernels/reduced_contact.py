@@ -5,20 +5,19 @@ In scaled coordinates `V_G = F V`, with `g = -(sigma_0 z + sigma_1 z' + sigma_2 
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 from numba import types
 
-from planarfriction.compiler import compiled_math as xp
 from planarfriction.compiler import kernel
-from planarfriction.compiler.memory import Floats, reader
+from planarfriction.compiler.memory import Floats, at, reader
 from planarfriction.formulas import LawNumbers
 from planarfriction.kernels import moments
 from planarfriction.kernels.contacts import functions_of
-from planarfriction.kernels.reduced import closure, closure_partials, to_origin
-from planarfriction.kernels.steady import STILL, evenness, fourth_moments, scaled_twist, steady, steady_slopes
-from planarfriction.kernels.vectors import applied_back, dot, norm, plus, put_all, times
+from planarfriction.kernels.derive import derive
+from planarfriction.kernels.reduced import Quartic, rate, to_origin
+from planarfriction.kernels.steady import STILL, fourth_moments, scaled_twist, steady
+from planarfriction.kernels.vectors import applied_back, norm, plus, put, put_all
 
 
 class ReducedPatch(NamedTuple):
@@ -73,21 +72,22 @@ def _as_it_is(own, z):
 
 
 @kernel
-def _evenness(own, z):
-    return evenness(own.law, fourth_moments(own.shape, _maps(own), own.data), z)
+def _quartic(own):
+    rows = fourth_moments(own.shape, _maps(own), own.data)
+    return Quartic(rows, rows, 0.0)
 
 
 @kernel
 def _rate(own, z, u):
-    """Return `V_G - beta (lambda z + s m)`; at rest zero."""
-    v, rate = norm(u), (0.0, 0.0, 0.0)
+    """Return the rate of the state; at rest zero."""
+    v, found = norm(u), (0.0, 0.0, 0.0)
     if v > STILL:
-        q = steady(own.law, own.shape, _maps(own), own.data, u, v).q
-        power, per_q2 = dot(u, q), 1.0 / dot(q, q)
-        decay, share = v * v / xp.where(power > 0.0, power, 1.0), dot(z, q) * per_q2
-        beta = closure(own.law, math.sqrt(dot(z, z) * per_q2), share, _evenness(own, z)[0])
-        rate = plus(u, -beta, plus(times(decay, z), share, plus(u, -decay, q)))
-    return rate
+        found = rate(own.law, _quartic(own), z, u, steady(own.law, own.shape, _maps(own), own.data, u, v).q)
+    return found
+
+
+_SLOPES = derive(rate, ("z", "u", "q"), ("z", "u", "q"))
+_forth, _back = _SLOPES.forth, _SLOPES.back
 
 
 @kernel
@@ -103,28 +103,13 @@ def _slopes(own, z, u, m):
 
 @kernel
 def _slopes_at(own, z, u, v, m):
-    j = m.scratch
-    q = steady_slopes(own.law, own.shape, _maps(own), own.data, u[0], u[1], u[2], v, j)
-    even, even_z = _evenness(own, z)
-    per_power, per_q2 = 1.0 / dot(u, q), 1.0 / dot(q, q)
-    decay, share, deflection = v * v * per_power, dot(z, q) * per_q2, math.sqrt(dot(z, z) * per_q2)
-    per_deflection = 1.0 / deflection if deflection > 0.0 else 0.0
-    beta, by_deflection, by_share, by_breakaway = closure_partials(own.law, deflection, share, even)
-    across = plus(u, -decay, q)
-    g = plus(times(decay, z), share, across)
-    # slopes of beta, lambda and s, by z and by V_G
-    beta_z = times(per_q2, plus(times(by_deflection * per_deflection, z), by_share, q))
-    beta_z = plus(beta_z, own.law.breakaway_ratio * by_breakaway, even_z)
-    q_u = times(per_q2, applied_back(j, q))
-    decay_u = times(per_power, plus(times(2.0, u), -decay, plus(q, 1.0, applied_back(j, u))))
-    share_u = plus(times(per_q2, applied_back(j, z)), -2.0 * share, q_u)
-    beta_u = plus(times(by_share, share_u), -by_deflection * deflection, q_u)
+    found = steady(own.law, own.shape, _maps(own), own.data, u, v)
+    _, tape = _forth(own.law, _quartic(own), z, u, found.q)
     for i in range(3):
-        for k in range(3):
-            same = 1.0 if i == k else 0.0
-            g_k = (z[i] - share * q[i]) * decay_u[k] + across[i] * share_u[k] + share * (same - decay * j[3 * i + k])
-            m.by_z[3 * i + k] = -beta * (decay * same + across[i] * q[k] * per_q2) - g[i] * beta_z[k]
-            m.by_u[3 * i + k] = same - g[i] * beta_u[k] - beta * g_k
+        unit = (1.0 if i == 0 else 0.0), (1.0 if i == 1 else 0.0), (1.0 if i == 2 else 0.0)
+        by_z, by_u, by_q = _back(tape, (unit,))
+        put(at(m.by_z, 3 * i), by_z)
+        put(at(m.by_u, 3 * i), plus(by_u, 1.0, applied_back(found.by_u, by_q)))
 
 
 _MODEL = moments.ThreeStates(_read, _seen, _wrench, _seen, _as_it_is, _as_it_is, 0.0, _rate, _slopes)

@@ -13,10 +13,9 @@ from planarfriction.compiler import jit, kernel
 from planarfriction.kernels import reduced_step, rollouts
 from planarfriction.kernels.bind import bind
 from planarfriction.kernels.derive import derive
-from planarfriction.kernels.reduced import to_origin
+from planarfriction.kernels.reduced import Quartic, to_origin
 from planarfriction.kernels.reduced_contact import ReducedPatch
 from planarfriction.kernels.reduced_step import (
-    Quartic,
     ReducedStep,
     SteadyTwist,
     cotangents,

@@ -28,9 +28,9 @@ from planarfriction.kernels.lanes import (
 )
 from planarfriction.kernels.law import LAW, LawNumbers
 from planarfriction.kernels.moment_steps import Contact
-from planarfriction.kernels.reduced import to_origin
+from planarfriction.kernels.reduced import Quartic, to_origin
 from planarfriction.kernels.reduced_contact import ReducedPatch
-from planarfriction.kernels.reduced_step import NAMES, Quartic, SteadySlopes, SteadyTwist, advance, pull_back, step_of
+from planarfriction.kernels.reduced_step import NAMES, SteadySlopes, SteadyTwist, advance, pull_back, step_of
 from planarfriction.kernels.steady import (
     FAR,
     QUARTIC,

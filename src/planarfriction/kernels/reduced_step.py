@@ -26,7 +26,7 @@ from planarfriction.kernels import moment_steps, reduced_contact, steady
 from planarfriction.kernels.bristle_step import cap
 from planarfriction.kernels.derive import derive
 from planarfriction.kernels.moment_steps import Contact, Cotangents, Framed, StepModel
-from planarfriction.kernels.reduced import closure, to_origin
+from planarfriction.kernels.reduced import Quartic, closure, evenness, to_origin
 from planarfriction.kernels.reduced_contact import ReducedPatch
 from planarfriction.kernels.rules import rule
 from planarfriction.kernels.steady import FAR, STILL, fourth_moments, scaled_twist, sliding
@@ -56,16 +56,6 @@ class SteadySlopes(NamedTuple):
     q_mu_c: tuple
     q_mu_s: tuple
     q_v_s: tuple
-
-
-class Quartic(NamedTuple):
-    """Fourth moments of a shape."""
-
-    rows: tuple
-    """Coefficients of `<u^4>` (see `steady.fourth_moments`)."""
-    change: tuple
-    """Derivatives of the coefficients by the blend of two maps."""
-    blend: float
 
 
 class ReducedStep(NamedTuple):
@@ -104,17 +94,6 @@ def hold_slopes(contact, twist, work):
 
 
 # ---------------------------------------------------------------------- the step
-
-
-@kernel
-def evenness(law, rows, change, blend, z):
-    """Return `steady.evenness`, of coefficients `rows` that change with the blend, and its slope by z."""
-    return steady.evenness(law, rows, z)
-
-
-rule(
-    evenness, "sv", {(0, 3): "{t0} * uneven({0}, {1}, {2}, {4})", (0, 4): "{t1}"}, uneven=steady.uneven
-)  # fmt: skip
 
 
 @kernel

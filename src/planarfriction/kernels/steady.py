@@ -234,15 +234,6 @@ def blended(law, shape, surface, data, u, v):
 
 
 @kernel
-def steady_slopes(law, shape, surface, data, x, y, s, v, j):
-    """Write `dz_ss/dV_G` [s] to `j` [9], row by row, and return `z_ss`."""
-    found = steady(law, shape, surface, data, (x, y, s), v)
-    for i in range(9):
-        j[i] = found.by_u[i]
-    return found.q
-
-
-@kernel
 def _fourth(data, k):
     """Return the coefficients of `<u^4>`, row by row."""
     return (
