@@ -12,10 +12,10 @@ import pytest
 from planarfriction.limit_surface import LimitSurfaceCells, LimitSurfaceExact
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction_studies.experiments import EXPERIMENTS
-from planarfriction_studies.experiments.beyond import grooves, in_hand, ladder, plateaus
+from planarfriction_studies.experiments.beyond import contacts, ladder
 from planarfriction_studies.experiments.beyond import run as beyond
 from planarfriction_studies.experiments.beyond import surfaces as beyond_surfaces
-from planarfriction_studies.experiments.beyond.ladder_figure import FAMILIES
+from planarfriction_studies.experiments.beyond.figures import FAMILIES
 from planarfriction_studies.experiments.experiment import Work
 from planarfriction_studies.experiments.in_hand.runs import Case
 from planarfriction_studies.experiments.runs import IN_WORDS
@@ -30,8 +30,8 @@ def result():
 
 
 def test_a_drift_without_a_grain_is_straight_down(monkeypatch):
-    monkeypatch.setitem(grooves.GRAIN, "along", 1.0)
-    assert abs(grooves.closed_drift(np.radians(40.0))) < 1e-6
+    monkeypatch.setitem(contacts.GRAIN, "along", 1.0)
+    assert abs(contacts.closed_drift(np.radians(40.0))) < 1e-6
 
 
 def test_the_staircase_of_a_line_has_steps_of_two_cells(result):
@@ -103,13 +103,13 @@ def test_plateaus(result):
     expected = angles["closed form"] * moment / radius**2
     assert angles["published reduced"] == pytest.approx(expected, rel=0.03)
     swapped = angles | {"ReducedModel": angles["published reduced"]}
-    assert [row.holds for row in plateaus.comparisons(swapped)] == [False, False]
+    assert [row.holds for row in contacts.plateau_comparisons(swapped)] == [False, False]
 
 
 def test_a_drift_a_tenth_of_a_degree_off_would_be_noticed(result):
     found = result.numbers["grooves"]
     wrong = found | {"distributed": [angle + np.radians(0.1) for angle in found["distributed"]]}
-    rows = grooves.comparisons(wrong)
+    rows = contacts.grooves_comparisons(wrong)
     assert [row.quantity for row in rows if not row.holds] == ["drift on grooves, distributed, all slopes"]
 
 
@@ -126,7 +126,7 @@ def test_in_hand_ends_are_those_of_two_simulations(result):
     assert 0.0 < ends["reduced"] < ends["published"]
     rows = ladder.in_hand_rows((case,))
     assert {row.model: row.errors["end"] for row in rows}["reduced"] == pytest.approx(ends["reduced"], rel=1e-9)
-    assert ends[in_hand.SHIFT] == pytest.approx(in_hand.friction_shift(case), rel=1e-9)
+    assert ends[ladder.SHIFT] == pytest.approx(ladder.friction_shift(case), rel=1e-9)
 
 
 def test_every_published_in_hand_run_is_there():
@@ -134,20 +134,20 @@ def test_every_published_in_hand_run_is_there():
         *((shape, 1) for shape in beyond.SHAPES),
         ("Circle", 2),
     }
-    assert all(len(in_hand.cases_of(shape)) % 2 == 0 for shape in beyond.SHAPES)
+    assert all(len(ladder.cases_of(shape)) % 2 == 0 for shape in beyond.SHAPES)
 
 
 def test_few_cells_are_a_rung_between_three_bristles_and_the_grid(result):
     ends = result.numbers["in hand"][f"{IN_WORDS['NonConvex2']}, load 1"]
     assert ends["degree 5"] < 0.1 * min(ends["reduced"], ends["published"])
     # 45 cells are off by less than 0.1 % of friction would do, three bristles by more, but less than 2 % would
-    assert ends["degree 5"] < ends[in_hand.SHIFT] < ends["reduced"] < 20.0 * ends[in_hand.SHIFT]
+    assert ends["degree 5"] < ends[ladder.SHIFT] < ends["reduced"] < 20.0 * ends[ladder.SHIFT]
 
 
 def test_score_counts_by_load():
     ends = {"a, load 1": {"reduced": 2.0, "published": 1.0}, "a, load 2": {"reduced": 1.0, "published": 4.0}}
-    assert in_hand.score(ends, 1)["nearer"] == 0
-    assert in_hand.score(ends, 2) == {"runs": 1, "nearer": 1, "ratios": {"a, load 2": 0.25}}
+    assert ladder.score(ends, 1)["nearer"] == 0
+    assert ladder.score(ends, 2) == {"runs": 1, "nearer": 1, "ratios": {"a, load 2": 0.25}}
 
 
 def test_references_are_finer_than_the_grids():

@@ -15,10 +15,9 @@ from planarfriction_studies.experiments.in_hand.runs import (
     Case,
     compare_with_converged,
     compare_with_published,
-    simulated,
     with_friction,
 )
-from planarfriction_studies.experiments.runs import LAW
+from planarfriction_studies.experiments.runs import LAW, simulated
 
 
 @pytest.fixture(scope="module")
@@ -72,13 +71,13 @@ def test_a_held_plate_does_not_move():
     moved = []
     for factor in (1.02, 0.97):
         contact = dataclasses.replace(scene.contacts[0], normal_force=factor * load)
-        found = simulated(dataclasses.replace(scene, contacts=[contact], t_end=0.5))()
+        found = simulated(dataclasses.replace(scene, contacts=[contact], t_end=0.5))
         moved.append(abs(found["y"][-1]))
     assert moved[0] < 1e-5 and moved[1] > 1e-4
 
 
 def test_a_percent_of_friction_breaks_the_comparisons():
-    found = simulated(Case("Circle", 2).scene("r", with_friction(0.01)))()
+    found = simulated(Case("Circle", 2).scene("r", with_friction(0.01)))
     rows = compare_with_published(found, "in_hand/Circle/r2", "") + compare_with_converged(
         found, "in_hand/Circle/r2", ""
     )

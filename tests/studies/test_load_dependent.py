@@ -7,8 +7,8 @@ import pytest
 
 from planarfriction_studies.experiments import facts
 from planarfriction_studies.experiments.experiment import Result, Work
-from planarfriction_studies.experiments.in_hand.runs import compare_with_converged, simulated
-from planarfriction_studies.experiments.load_dependent.models import (
+from planarfriction_studies.experiments.in_hand.runs import compare_with_converged
+from planarfriction_studies.experiments.load_dependent.run import (
     DISTRIBUTED,
     KEPT,
     KEPT_LARGEST,
@@ -19,10 +19,11 @@ from planarfriction_studies.experiments.load_dependent.models import (
     finger,
     profile_moment,
     round_moments,
+    run,
     soft_patch,
     soft_scene,
 )
-from planarfriction_studies.experiments.load_dependent.run import run
+from planarfriction_studies.experiments.runs import simulated
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +65,7 @@ def test_what_follows_the_load_decides_how_close_it_comes(result):
 
 
 def test_a_table_that_does_not_follow_breaks_the_comparison():
-    found = simulated(soft_scene(1, KEPT))()
+    found = simulated(soft_scene(1, KEPT))
     rows = compare_with_converged(found, "load_dependent/r1", "", default=True)
     assert not any(row.holds for row in rows)
 

@@ -11,8 +11,8 @@ import planarfriction as pf
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction_studies.experiments.beyond import ladder
 from planarfriction_studies.experiments.beyond import shapes as new_shapes
-from planarfriction_studies.experiments.in_hand.runs import FRICTION_CHANGE, Case, columns, end_distance, with_friction
-from planarfriction_studies.experiments.runs import LAW
+from planarfriction_studies.experiments.in_hand.runs import FRICTION_CHANGE, Case, end_distance, with_friction
+from planarfriction_studies.experiments.runs import LAW, simulated
 
 ROUND = ("Circle", "Square")
 
@@ -33,7 +33,7 @@ def end(case: Case, kind: str, parts: int | str = 1, friction: float = 0.0) -> d
         "published": lambda: pf.ReducedModelPublished(patch, law),
         "reduced": lambda: pf.ReducedModel(patch, law, parts=parts),
     }[kind]()
-    return columns(pf.simulate(ladder.scenes_of(case.shape)[case.words](model), **ladder.CLOSE))
+    return simulated(ladder.scenes_of(case.shape)[case.words](model), **ladder.CLOSE)
 
 
 def miss(case: Case, kind: str, parts: int | str = 1) -> float:
@@ -78,7 +78,7 @@ def test_the_largest_error_on_three_feet_is_that_of_feet_without_parts():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("shape", list(new_shapes.shapes()))
+@pytest.mark.parametrize("shape", list(new_shapes.SHAPES))
 def test_the_largest_errors_on_new_shapes_are_below_the_published_models(shape):
     # no tolerance: parts shall have no excuse beside a model of three states; the nearest is the Gaussian, 0.98
     ratios = new_shapes.ratios(new_shapes.largest_errors(shape))["auto"]

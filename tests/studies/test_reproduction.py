@@ -30,7 +30,7 @@ from planarfriction_studies.experiments.experiment import (
 from planarfriction_studies.experiments.markup import name_to_html, to_html
 from planarfriction_studies.experiments.report import write_report
 from planarfriction_studies.experiments.reproduction import Reproduction
-from planarfriction_studies.experiments.wording import environment, fill, fmt, number, power, short, span
+from planarfriction_studies.experiments.wording import environment, fmt, number, power, report, short, span
 
 
 class Made:
@@ -275,7 +275,7 @@ def test_every_experiment_has_a_template_that_is_complete():
         assert [f"## {part}\n" in source for part in ("verdict", "asked", "found")] == [True] * 3, name
         assert "aimed" not in source and "promise" not in source
     with pytest.raises(UndefinedError):
-        fill("drift")
+        report("drift", {}, {})
 
 
 # ---------------------------------------------------------------------- comparisons and facts
@@ -296,7 +296,7 @@ def test_a_curve_is_compared_at_the_vertices_of_the_figure_only():
 def test_a_converged_solution_is_compared_at_all_its_times():
     reference = facts.converged("in_hand/Circle/d1")
     row = compare_converged(
-        "y", reference["time"], reference["y"] + 1e-4, "in_hand/Circle/d1/y", unit="m", allowance=1e-6, cause=""
+        "y", reference["time"], reference["y"] + 1e-4, "in_hand/Circle/d1/y", allowance=1e-6, cause=""
     )
     assert row.difference == pytest.approx(1e-4) and not row.holds and row.samples == 200
 

@@ -20,20 +20,23 @@ STEPS, ROUNDS = 100, 5
 
 
 def discs(full: bool) -> Measurement:
-    """Measure a step of one of `ENVIRONMENTS` that `vmap` steps at once, with patch friction and with MJX's own in
-    turns.
+    """Measure a step of one of `ENVIRONMENTS` that `vmap` steps at once, with patch friction and with MJX's own.
 
-    Both in double precision. Raises `MissingExtraError` without MJX.
+    In turns, both in double precision. Raises `MissingExtraError` without MJX.
     """
-    adapter = _adapter()
+    from planarfriction.adapters import mjx as adapter  # before anything else: its error names the missing extra
+
+    # isort: split
     import jax
     from mujoco import mjx
 
     before = jax.config.jax_enable_x64
     jax.config.update("jax_enable_x64", True)
     try:
-        m, prepared, friction = _ours(adapter)
-        runs = _rolled(friction.step, m, prepared), _rolled(mjx.step, *disc(1.0, 10.0).native(Native()))
+        scene = disc(1.0, 10.0)
+        text = scene.text(Native(cone="pyramidal", impratio=1.0, condim=1), 2e-3, "Euler")
+        m, prepared, friction = scene.with_patches(adapter, text)
+        runs = _rolled(friction.step, m, prepared), _rolled(mjx.step, *scene.native(Native()))
         times = np.array([[once(run) for run in runs] for _ in range(ROUNDS)]) / (STEPS * ENVIRONMENTS)
     finally:
         jax.config.update("jax_enable_x64", before)
@@ -42,25 +45,6 @@ def discs(full: bool) -> Measurement:
         f"MJX's own friction, condim 4, elliptic, impratio 10 (patch friction costs {value / theirs:.2g} times as much)"
     )
     return line(value, "us per step", words, theirs)
-
-
-def _adapter() -> Any:
-    """Import the adapter, before anything else: its error names the missing extra."""
-    from planarfriction.adapters import mjx
-
-    return mjx
-
-
-def _ours(adapter: Any) -> tuple[Any, Any, Any]:
-    import mujoco
-
-    scene = disc(1.0, 10.0)
-    patches = [adapter.PatchContact(scene.model, site=site, geoms=geoms) for site, geoms in scene.patches]
-    native = Native(cone="pyramidal", impratio=1.0, condim=1, solref=0.02)
-    spec = mujoco.MjSpec.from_string(scene.text(native, 2e-3, "Euler"))
-    adapter.prepare(spec, patches)
-    m = spec.compile()
-    return m, mujoco.MjData(m), adapter.Friction(m, patches)
 
 
 def _rolled(step: Callable[..., Any], m: Any, d: Any) -> Callable[[], None]:

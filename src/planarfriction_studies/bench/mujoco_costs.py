@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import contextlib
+import dataclasses
 import time
 from collections.abc import Callable
 from typing import Any
@@ -37,16 +39,18 @@ def rollout(full: bool) -> Measurement:
 
 def _beside_own(make: Callable[..., MujocoScene], *arguments: int, rolled: bool = False) -> Measurement:
     """Measure a scene with patches and with MuJoCo's own friction. Raises `MissingExtraError` without MuJoCo."""
-    from planarfriction.adapters.mujoco import Friction  # noqa: F401  (says how to install MuJoCo)
+    scene = dataclasses.replace(make(*arguments), weightless=False, time=0.0)
+    m, d, friction = scene.ours()  # says how to install MuJoCo
+    import mujoco
 
-    scene = make(*arguments)
-    m, d, friction = scene.ours()
-    own, held = _settled(scene, m, d, lambda: friction.step(d)), _native(scene)
-    if rolled:
-        with friction.install():
-            value, theirs = _in_turns(_rollouts(scene, m, own), _rollouts(scene, *held))
-    else:
-        value, theirs = _in_turns(_steps(scene, m, own, friction.step), _steps(scene, *held))
+    own = m, d, friction.step
+    model, data = scene.native(Native())
+    native = model, data, lambda data: mujoco.mj_step(model, data)
+    for m, d, step in (own, native):
+        scene.run(m, d, lambda d=d, step=step: step(d))
+    measure = _rollouts if rolled else _steps
+    with friction.install() if rolled else contextlib.nullcontext():
+        value, theirs = _in_turns(*(measure(scene, *each) for each in (own, native)))
     words = f"MuJoCo's own, condim 4, elliptic, impratio 10 (patch friction costs {value / theirs:.2f} times as much)"
     return line(value * 1e6, "us per step", words, theirs * 1e6)
 
@@ -59,28 +63,13 @@ def _in_turns(*actions: Callable[[], float]) -> tuple[float, float]:
     return float(one), float(other)
 
 
-def _settled(scene: MujocoScene, m: Any, d: Any, step: Callable[[], None]) -> Any:
-    d.ctrl[:] = scene.control(0.0)
-    for _ in range(round(scene.settle / m.opt.timestep)):
-        step()
-    return d
-
-
-def _native(scene: MujocoScene) -> tuple[Any, Any]:
-    import mujoco
-
-    m, d = scene.native(Native())
-    return m, _settled(scene, m, d, lambda: mujoco.mj_step(m, d))
-
-
-def _steps(scene: MujocoScene, m: Any, d: Any, step: Callable[[Any], None] | None = None) -> Callable[[], float]:
+def _steps(scene: MujocoScene, m: Any, d: Any, step: Callable[[Any], None]) -> Callable[[], float]:
     """Return seconds per step, always of the same steps."""
     import mujoco
 
     saved = np.zeros(mujoco.mj_stateSize(m, mujoco.mjtState.mjSTATE_INTEGRATION))
     mujoco.mj_getState(m, d, saved, mujoco.mjtState.mjSTATE_INTEGRATION)
     controls = [scene.control(i * m.opt.timestep) for i in range(STEPS)]
-    step = step or (lambda d: mujoco.mj_step(m, d))
 
     def action() -> float:
         mujoco.mj_setState(m, d, saved, mujoco.mjtState.mjSTATE_INTEGRATION)
@@ -93,7 +82,7 @@ def _steps(scene: MujocoScene, m: Any, d: Any, step: Callable[[Any], None] | Non
     return action
 
 
-def _rollouts(scene: MujocoScene, m: Any, d: Any) -> Callable[[], float]:
+def _rollouts(scene: MujocoScene, m: Any, d: Any, _: Any) -> Callable[[], float]:
     """Return seconds per step of one environment, of `ENVIRONMENTS` on `THREADS`."""
     import mujoco
     from mujoco import rollout

@@ -38,32 +38,43 @@ class Native(NamedTuple):
 
 @dataclass(frozen=True)
 class MujocoScene:
-    """A scene: its model as text, where its patches are, and what drives it."""
+    """A scene: its bodies, where its patches are, and what drives it."""
 
-    text: Callable[[Native, float, str], str]
-    """MJCF for settings of contacts, a time step and an integrator."""
+    body: str
+    """Elements of its MJCF."""
+    mu: float
+    torsion: float
+    """mu times the lever arm of MuJoCo's own friction against spin [m]."""
     patches: tuple[tuple[str, tuple[str, str]], ...]
     """Site and pair of geoms of each patch."""
     model: FrictionModel
     """Friction of each."""
     control: Callable[[float], Sequence[float]]
     """Controls of the actuators at a time [s]."""
-    time: float
+    time: float = 5.0
     """Duration [s]."""
-    settle: float = 0.0
+    settle: float = 0.6
     """Time [s] before it, with the controls of time 0."""
-    weightless: bool = False
+    weightless: bool = True
     """True if gravity begins after the settling time."""
     start: tuple[float, ...] | None = None
     """Velocities then; None as they are."""
     solref: float = 0.02
     """Time constant of contacts [s]."""
 
+    def text(self, settings: Native, dt: float, integrator: str) -> str:
+        """Return MJCF for settings of contacts, a time step [s] and an integrator."""
+        solref = self.solref if settings.solref is None else settings.solref
+        options = f'cone="{settings.cone}" impratio="{settings.impratio}" noslip_iterations="{settings.noslip}"'
+        contact = f'condim="{settings.condim}" friction="{self.mu} {self.torsion} 0" solref="{solref} 1"'
+        return f"""<mujoco><option timestep="{dt}" integrator="{integrator}" {options}/>
+        <default><geom {contact}/></default>{self.body}</mujoco>"""
+
     def native(self, settings: Native, dt: float = 2e-3, integrator: str = "Euler") -> tuple[Any, Any]:
         """Return the model and data with MuJoCo's own friction."""
         import mujoco
 
-        m = mujoco.MjModel.from_xml_string(self._text(settings, dt, integrator))
+        m = mujoco.MjModel.from_xml_string(self.text(settings, dt, integrator))
         return m, mujoco.MjData(m)
 
     def ours(
@@ -74,23 +85,36 @@ class MujocoScene:
         model: FrictionModel | None = None,
     ) -> tuple[Any, Any, Any]:
         """Return the model, data, and the friction of its patches; `model` in place of the scene's own."""
+        from planarfriction.adapters import mujoco as adapter
+
+        settings = Native(condim=1, impratio=1.0, solref=solref)
+        return self.with_patches(adapter, self.text(settings, dt, integrator), model)
+
+    def with_patches(self, adapter: Any, text: str, model: FrictionModel | None = None) -> tuple[Any, Any, Any]:
+        """Return the model of an MJCF text, data, and the friction of the scene's patches by an adapter."""
         import mujoco
 
-        from planarfriction.adapters.mujoco import Friction, PatchContact, prepare
-
-        patches = [PatchContact(model or self.model, site=site, geoms=geoms) for site, geoms in self.patches]
-        spec = mujoco.MjSpec.from_string(self._text(Native(condim=1, impratio=1.0, solref=solref), dt, integrator))
-        prepare(spec, patches)
+        patches = [adapter.PatchContact(model or self.model, site=site, geoms=geoms) for site, geoms in self.patches]
+        spec = mujoco.MjSpec.from_string(text)
+        adapter.prepare(spec, patches)
         m = spec.compile()
-        return m, mujoco.MjData(m), Friction(m, patches)
+        return m, mujoco.MjData(m), adapter.Friction(m, patches)
 
-    def _text(self, settings: Native, dt: float, integrator: str) -> str:
-        solref = self.solref if settings.solref is None else settings.solref
-        return self.text(settings._replace(solref=solref), dt, integrator)
+    def begin(
+        self, way: Native | None, dt: float = 2e-3, integrator: str = "Euler", model: FrictionModel | None = None
+    ) -> tuple[Any, Any, Callable[[], None]]:
+        """Return MuJoCo's model and data, and a function that makes a step: with its own friction, for None with
+        patches."""
+        import mujoco
+
+        if way is None:
+            m, d, friction = self.ours(dt, integrator, model=model)
+            return m, d, lambda: friction.step(d)
+        m, d = self.native(way, dt, integrator)
+        return m, d, lambda: mujoco.mj_step(m, d)
 
     def run(self, m: Any, d: Any, step: Callable[[], None]) -> np.ndarray:
-        """Run the scene and return positions `[steps + 1, nq]` after it has settled; `step` is `mj_step` or replaces
-        it."""
+        """Run the scene and return positions `[steps + 1, nq]` after it has settled; `step` makes a step."""
         gravity, dt = m.opt.gravity.copy(), float(m.opt.timestep)
         if self.weightless:
             m.opt.gravity[:] = 0.0
@@ -110,18 +134,24 @@ class MujocoScene:
         return np.array(path)
 
 
-def _document(settings: Native, dt: float, integrator: str, torsion: float, body: str, mu: float) -> str:
-    """Return a whole model; `torsion` is mu times the lever arm of friction against spin [m]."""
-    options = f'cone="{settings.cone}" impratio="{settings.impratio}" noslip_iterations="{settings.noslip}"'
-    contact = f'condim="{settings.condim}" friction="{mu} {torsion} 0" solref="{settings.solref} 1"'
-    return f"""<mujoco><option timestep="{dt}" integrator="{integrator}" {options}/>
-    <default><geom {contact}/></default>{body}</mujoco>"""
+def _law(mu: float, sigma_0: float, sigma_1: float = 0.0) -> LuGre:
+    return LuGre(mu_c=mu, mu_s=mu, sigma_0=sigma_0, sigma_1=sigma_1, sigma_2=0.0, elasto_plastic=0.9)
 
 
 def _pad(radius: float, mu: float, sigma_0: float) -> ReducedModel:
-    law = LuGre(mu_c=mu, mu_s=mu, sigma_0=sigma_0, sigma_1=math.sqrt(sigma_0) * 0.8, sigma_2=0.0, elasto_plastic=0.9)
-    return ReducedModel(ContactPatch.disc(radius=radius, cells=21), law)
+    return ReducedModel(ContactPatch.disc(radius=radius, cells=21), _law(mu, sigma_0, math.sqrt(sigma_0) * 0.8))
 
+
+def _pads(place: str, geom: str, joint: str = "") -> str:
+    """Return a left and a right pad on slides towards each other; `place` is theirs, less the sign of x."""
+    return "".join(
+        f"""<body pos="{place.format(sign)}"><joint name="{side}" type="slide" axis="{axis} 0 0" {joint}/>
+        <geom name="pad {side}" {geom} contype="1" conaffinity="0"/></body>"""
+        for side, sign, axis in (("left", "-", 1), ("right", "", -1))
+    )
+
+
+_MOTORS = '<motor joint="left"/><motor joint="right"/>'
 
 _SHAPES = {
     "sphere": (0.01, 'type="sphere" size="0.01"'),
@@ -136,62 +166,38 @@ _BLOCK = """<geom name="block" type="box" size="0.01 0.04 0.06" mass="0.2" conty
 _HELD = ("left", ("pad left", "block")), ("right", ("pad right", "block"))
 
 
-def grip(pad: str = "box", *, squeeze: float = 3.0, beside: float = 4e-3) -> MujocoScene:
-    """Build a block of 0.2 kg between two pads that press with `squeeze` [N], held `beside` its centre of mass [m]."""
+def grip(pad: str = "box") -> MujocoScene:
+    """Build a block of 0.2 kg between two pads that press with 3 N, held 4 mm beside its centre of mass."""
     depth, geom = _SHAPES[pad]
-    pads = "".join(
-        f"""<body pos="{sign * (0.01 + depth)} {beside} 0.5"><joint name="{side}" type="slide" axis="{-sign} 0 0"/>
-        <geom name="pad {side}" {geom} mass="0.05" contype="1" conaffinity="0"/></body>"""
-        for side, sign in (("left", -1), ("right", 1))
-    )
+    pads = _pads(f"{{}}{0.01 + depth} 0.004 0.5", f'{geom} mass="0.05"')
     # one point where a cylinder touches: several jump about from step to step, and the block rocks by 1e-4 degrees
     body = f"""<option><flag multiccd="disable"/></option>
-    <worldbody><body name="block" pos="0 0 0.5"><freejoint/>{_BLOCK.format(beside)}</body>{pads}</worldbody>
-    <actuator><motor joint="left"/><motor joint="right"/></actuator>"""
-    return MujocoScene(
-        lambda settings, dt, integrator: _document(settings, dt, integrator, 2e-2 / 3.0, body, 1.0),
-        _HELD,
-        _pad(0.01, 1.0, 1e6),
-        lambda t: (squeeze, squeeze),
-        time=5.0,
-        settle=0.6,
-        weightless=True,
-    )
+    <worldbody><body name="block" pos="0 0 0.5"><freejoint/>{_BLOCK.format(0.004)}</body>{pads}</worldbody>
+    <actuator>{_MOTORS}</actuator>"""
+    return MujocoScene(body, 1.0, 2e-2 / 3.0, _HELD, _pad(0.01, 1.0, 1e6), lambda t: (3.0, 3.0))
 
 
 SHAKEN = 3.0
 """Time for which the gripper is shaken [s]."""
 
 
-def shaken(pad: str = "box", *, squeeze: float = 6.0) -> MujocoScene:
-    """Build the block of `grip` in a gripper that is moved up and down, and turned, for 3 s, and then held for 2 s."""
-    depth, geom = _SHAPES[pad]
-    fingers = "".join(
-        f"""<body pos="{sign * (0.01 + depth)} 0 0">
-        <joint name="{side}" type="slide" axis="{-sign} 0 0" damping="20"/>
-        <geom name="pad {side}" {geom} mass="0.05" contype="1" conaffinity="0"/></body>"""
-        for side, sign in (("left", -1), ("right", 1))
-    )
+def shaken() -> MujocoScene:
+    """Build the block of `grip`, pressed with 6 N, in a gripper that is moved up and down, and turned, for 3 s, and
+    then held for 2 s."""
+    depth, geom = _SHAPES["box"]
+    fingers = _pads(f"{{}}{0.01 + depth} 0 0", f'{geom} mass="0.05"', 'damping="20"')
     body = f"""<worldbody><body name="arm" pos="0 0 0.5"><joint name="lift" type="slide" axis="0 0 1" damping="20"/>
     <joint name="turn" axis="1 0 0" damping="1"/><inertial pos="0 0 0.1" mass="1" diaginertia="0.01 0.01 0.01"/>
     {fingers}</body><body name="block" pos="0 0 0.5"><freejoint/>{_BLOCK.format(0.0)}</body></worldbody>
-    <actuator><motor joint="left"/><motor joint="right"/><position joint="lift" kp="5000" dampratio="1"/>
+    <actuator>{_MOTORS}<position joint="lift" kp="5000" dampratio="1"/>
     <position joint="turn" kp="200" dampratio="1"/></actuator>"""
 
     def control(t: float) -> tuple[float, ...]:
         fades = 1.0 if t < SHAKEN else math.exp(-5.0 * (t - SHAKEN))
         lift, turn = 0.02 * math.sin(4.0 * math.pi * t), 0.1 * math.sin(2.6 * math.pi * t)
-        return squeeze, squeeze, fades * lift, fades * turn
+        return 6.0, 6.0, fades * lift, fades * turn
 
-    return MujocoScene(
-        lambda settings, dt, integrator: _document(settings, dt, integrator, 2e-2 / 3.0, body, 1.0),
-        _HELD,
-        _pad(0.01, 1.0, 1e6),
-        control,
-        time=5.0,
-        settle=0.6,
-        weightless=True,
-    )
+    return MujocoScene(body, 1.0, 2e-2 / 3.0, _HELD, _pad(0.01, 1.0, 1e6), control)
 
 
 def in_the_hand(d: Any) -> np.ndarray:
@@ -204,40 +210,38 @@ def disc(
     speed: float,
     spin: float,
     *,
-    radius: float = 0.1,
-    mu: float = 0.3,
     joint: Literal["plane", "free"] = "plane",
     touch: Literal["face", "point"] = "face",
 ) -> MujocoScene:
-    """Build a disc of 0.2 kg that starts with `speed` [m/s] and `spin` [rad/s] on the floor.
+    """Build a disc of 0.2 kg and radius 0.1 m that starts with `speed` [m/s] and `spin` [rad/s] on the floor, mu 0.3.
 
     `coulomb_disc.stop` says where it comes to rest. It moves on joints of its plane, or freely, which MuJoCo's own
     friction does better with; it touches with its face, or in a point with the torsion of a disc that only spins,
     `2/3 mu R`.
     """
-    i = 0.5 * 0.2 * radius**2
+    i = 0.5 * 0.2 * 0.1**2
     plane = """<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 1 0"/><joint type="slide" axis="0 0 1"/>
     <joint type="hinge" axis="0 0 1"/>"""
-    geom = {"face": f'type="cylinder" size="{radius} 0.002"', "point": 'type="sphere" size="0.002"'}[touch]
+    geom = {"face": 'type="cylinder" size="0.1 0.002"', "point": 'type="sphere" size="0.002"'}[touch]
     body = f"""<worldbody><geom name="floor" type="plane" size="9 9 .1"/><body name="disc" pos="0 0 0.002">
     {plane if joint == "plane" else "<freejoint/>"}
     <inertial pos="0 0 0" mass="0.2" diaginertia="{i / 2} {i / 2} {i}"/>
     <geom name="disc" {geom} mass="0"/><site name="disc" pos="0 0 -0.002"/></body>
     </worldbody>"""
-    law = LuGre(mu_c=mu, mu_s=mu, sigma_0=1e5, sigma_1=0.0, sigma_2=0.0, elasto_plastic=0.9)
-    torsion = 2.0 / 3.0 * mu * radius if touch == "point" else 0.0
     return MujocoScene(
-        lambda settings, dt, integrator: _document(settings, dt, integrator, torsion, body, mu),
+        body,
+        0.3,
+        2.0 / 3.0 * 0.3 * 0.1 if touch == "point" else 0.0,
         (("disc", ("floor", "disc")),),
-        ReducedModel(ContactPatch.disc(radius=radius, cells=31), law),
+        ReducedModel(ContactPatch.disc(radius=0.1, cells=31), _law(0.3, 1e5)),
         lambda t: (),
         time=1.2,
-        settle=0.6,
+        weightless=False,
         start=(speed, 0.0, 0.0, spin) if joint == "plane" else (speed, 0.0, 0.0, 0.0, 0.0, spin),
     )
 
 
-def plate(load: Literal[1, 2] = 1, *, model: FrictionModel | None = None) -> MujocoScene:
+def plate(load: Literal[1, 2] = 1) -> MujocoScene:
     """Build the published in-hand run: a plate held upright between two pads slips and turns as the grip varies.
 
     Its plane is that of x and y, gravity is along -y; positions are x (less 2 mm), y, z, the angle, and that of the
@@ -254,18 +258,11 @@ def plate(load: Literal[1, 2] = 1, *, model: FrictionModel | None = None) -> Muj
     <geom name="upper" type="sphere" size="0.01" mass="0.01" contype="1" conaffinity="0"/>
     <site name="upper" pos="0 0 -0.01"/></body></worldbody>
     <actuator><motor joint="press"/></actuator>"""
-    force = in_hand_load(load)
+    force, pads = in_hand_load(load), (("lower", ("lower", "plate")), ("upper", ("upper", "plate")))
     own = ReducedModel(ContactPatch.disc(radius=0.01, cells=21), LuGre(mu_s=1.2, elasto_plastic=0.9))
-    return MujocoScene(
-        lambda settings, dt, integrator: _document(settings, dt, integrator, 2e-2 / 3.0, body, 1.0),
-        (("lower", ("lower", "plate")), ("upper", ("upper", "plate"))),
-        own if model is None else model,
-        lambda t: (float(force(t)),),
-        time=2.0,
-        settle=0.6,
-        weightless=True,
-        solref=0.004,  # the pads press with what the motor gives
-    )
+    control = lambda t: (float(force(t)),)  # noqa: E731
+    # solref: the pads press with what the motor gives
+    return MujocoScene(body, 1.0, 2e-2 / 3.0, pads, own, control, time=2.0, solref=0.004)
 
 
 def tray(blocks: int = 2) -> MujocoScene:
@@ -283,14 +280,10 @@ def tray(blocks: int = 2) -> MujocoScene:
     <geom name="tray" type="box" size="0.25 0.15 0.005" mass="1" contype="1" conaffinity="0"/></body>
     {carried}</worldbody>
     <actuator><position joint="x" kp="5000" dampratio="1"/><position joint="y" kp="5000" dampratio="1"/></actuator>"""
-    return MujocoScene(
-        lambda settings, dt, integrator: _document(settings, dt, integrator, 0.006, body, 0.4),
-        tuple((f"block {i}", ("tray", f"block {i}")) for i in range(blocks)),
-        _pad(0.02, 0.4, 1e5),
-        lambda t: (0.02 * math.sin(6.0 * math.pi * t), 0.02 * math.sin(4.6 * math.pi * t)),
-        time=2.0,
-        settle=0.4,
-    )
+    patches = tuple((f"block {i}", ("tray", f"block {i}")) for i in range(blocks))
+    control = lambda t: (0.02 * math.sin(6.0 * math.pi * t), 0.02 * math.sin(4.6 * math.pi * t))  # noqa: E731
+    model = _pad(0.02, 0.4, 1e5)
+    return MujocoScene(body, 0.4, 0.006, patches, model, control, time=2.0, settle=0.4, weightless=False)
 
 
 def capsule() -> MujocoScene:
@@ -298,25 +291,13 @@ def capsule() -> MujocoScene:
 
     Source: MuJoCo issue 3328.
     """
-    pads = "".join(
-        f"""<body pos="{sign * 0.014} 0 0.2"><joint name="{side}" type="slide" axis="{-sign} 0 0" damping="20"/>
-        <geom name="pad {side}" type="box" size="0.01 0.02 0.02" mass="0.1" contype="1" conaffinity="0"/></body>"""
-        for side, sign in (("left", -1), ("right", 1))
-    )
+    pads = _pads("{}0.014 0 0.2", 'type="box" size="0.01 0.02 0.02" mass="0.1"', 'damping="20"')
     body = f"""<worldbody>{pads}<body name="capsule" pos="0 0 0.2" euler="90 0 0"><freejoint/>
     <geom name="capsule" type="capsule" size="0.004 0.02" mass="0.045" contype="0" conaffinity="1"/>
     <site name="left" pos="-0.004 0 0" zaxis="1 0 0"/><site name="right" pos="0.004 0 0" zaxis="-1 0 0"/></body>
     </worldbody>
     <actuator><position joint="left" kp="2000"/><position joint="right" kp="2000"/></actuator>"""
     # the sites' x axes lie along the capsule
-    law = LuGre(mu_c=0.7, mu_s=0.7, sigma_0=1e6, sigma_1=800.0, sigma_2=0.0, elasto_plastic=0.9)
-    line = ContactPatch.rectangle(0.04, 5e-4, cells=21)
-    return MujocoScene(
-        lambda settings, dt, integrator: _document(settings, dt, integrator, 0.005, body, 0.7),
-        (("left", ("pad left", "capsule")), ("right", ("pad right", "capsule"))),
-        ReducedModel(line, law),
-        lambda t: (6e-3, 6e-3),
-        time=5.0,
-        settle=1.0,
-        weightless=True,
-    )
+    line = ReducedModel(ContactPatch.rectangle(0.04, 5e-4, cells=21), _law(0.7, 1e6, 800.0))
+    patches = (("left", ("pad left", "capsule")), ("right", ("pad right", "capsule")))
+    return MujocoScene(body, 0.7, 0.005, patches, line, lambda t: (6e-3, 6e-3), settle=1.0)

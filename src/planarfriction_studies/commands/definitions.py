@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from planarfriction.cli.options import FILE
+
+if TYPE_CHECKING:
+    from planarfriction_studies.experiments.reproduction import Reproduction
+
+
+# ---------------------------------------------------------------------- bench
 
 
 @click.command(
@@ -22,13 +30,29 @@ from planarfriction.cli.options import FILE
 )
 @click.option("--only", metavar="NAME", multiple=True, help="Only this benchmark; may be repeated.")
 @click.option("--full", is_flag=True, help="Include the baselines that take minutes.")
-@click.option("--json", is_flag=True, help="Print a JSON list and nothing else on stdout.")
-def bench(only: tuple[str, ...], full: bool, json: bool) -> None:
+@click.option("--json", "as_json", is_flag=True, help="Print a JSON list and nothing else on stdout.")
+def bench(only: tuple[str, ...], full: bool, as_json: bool) -> None:
     """Measure (the help above is what users see)."""
-    from planarfriction_studies.commands import bench as command
+    import dataclasses
+    import json
 
-    show = command.show_json if json else command.show_table
-    show(command.measure(only, full=full))
+    from planarfriction.cli.console import print_table, work_progress
+    from planarfriction_studies import bench as benchmarks
+
+    with work_progress("measuring") as progress:
+        lines = benchmarks.run(only or None, full=full, progress=progress)
+    if as_json:
+        print(json.dumps([dataclasses.asdict(line) for line in lines], indent=2))
+        return
+    shown = lambda value: "" if value is None else f"{value:.4g}"  # noqa: E731
+    rows = [
+        [each.name, shown(each.value), each.unit, each.baseline, shown(each.baseline_value), shown(each.ratio)]
+        for each in lines
+    ]
+    print_table("Benchmarks", ["name", "value", "unit", "baseline", "of the baseline", "ratio"], rows)
+
+
+# ---------------------------------------------------------------------- measured
 
 
 @click.command(
@@ -51,7 +75,7 @@ def bench(only: tuple[str, ...], full: bool, json: bool) -> None:
 @click.option("--own", metavar="FILE.py:NAME", multiple=True, help="A model of your own; may be repeated.")
 @click.option("--list", "list_only", is_flag=True, help="List models and tasks.")
 @click.option("--tables", type=FILE, help="Folder with the measured tables. Default: those of the package.")
-@click.option("--out", type=FILE, help="Folder for JSON and pictures.")
+@click.option("--out", "folder", type=FILE, help="Folder for JSON and pictures.")
 @click.option("--seed", type=int, default=0, show_default=True, help="Random seed of the bootstrap.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else on stdout.")
 def measured(
@@ -60,17 +84,95 @@ def measured(
     own: tuple[str, ...],
     list_only: bool,
     tables: Path | None,
-    out: Path | None,
+    folder: Path | None,
     seed: int,
     as_json: bool,
 ) -> int:
-    """Compare on measured data (the help above is what users see)."""
-    from planarfriction_studies.commands import measured as command
+    """Compare on measured data (the help above is what users see). An interrupt keeps the models that are done."""
+    from planarfriction import validation
+    from planarfriction.cli import INTERRUPTED
+    from planarfriction.cli.console import note, print_table, work_progress
+    from planarfriction.writing import make_folder
+    from planarfriction_studies.measured import TASKS, Benchmark
+    from planarfriction_studies.measured.library import LIBRARY
 
     if list_only:
-        command.show_list()
+        rows = [[name, each.words, "" if each.installed else f"[{each.extra}]"] for name, each in LIBRARY.items()]
+        print_table("Models", ["name", "description", "needs"], rows)
+        print_table("Tasks", ["name", "description"], [[task.name, task.title] for task in TASKS.values()])
         return 0
-    return command.measured(tasks, only, own, tables=tables, folder=out, seed=seed, as_json=as_json)
+    validation.count("--seed", seed, 0)
+    models, left_out = _models(only, own)
+    if folder is not None:
+        make_folder(folder)
+    benchmark = Benchmark(models, tasks or tuple(TASKS), tables, seed)
+    benchmark.left_out += left_out
+    code = 0
+    try:
+        with work_progress("measured") as progress:
+            benchmark.run(progress)
+    except KeyboardInterrupt:
+        done = sum(map(len, benchmark.results.values()))
+        note(f"interrupted: {done} of {len(models) * len(benchmark.tasks)} results are finished")
+        code = INTERRUPTED
+    _show(benchmark, as_json, folder if benchmark.results else None)
+    return code
+
+
+def _models(only: Sequence[str], own: Sequence[str]) -> tuple[dict[str, Any], list[str]]:
+    """Return the models that are asked for, and what is left out."""
+    from planarfriction import validation
+    from planarfriction.cli.options import load_function
+    from planarfriction.errors import InvalidValueError
+    from planarfriction_studies.measured.library import LIBRARY, library
+
+    left_out: list[str] = []
+    models = {}
+    if only or not own:
+        chosen = [validation.choice("--only", name, LIBRARY) for name in only] or list(LIBRARY)
+        there = library(left_out)
+        models = {name: there[name] for name in chosen if name in there}
+    for entry in own:
+        name, model = load_function("--own", entry)
+        if name in models or name in LIBRARY:
+            raise InvalidValueError("--own", "have a name that differs from those of the library's models", name)
+        models[name] = model
+    return models, left_out
+
+
+def _show(benchmark: Any, as_json: bool, folder: Path | None) -> None:
+    """Print the tables, or JSON; write JSON and pictures to a folder."""
+    import json
+
+    from planarfriction.cli import output
+    from planarfriction.cli.console import note, print_table
+    from planarfriction.writing import write_text
+    from planarfriction_studies.measured import figures, report
+    from planarfriction_studies.measured.tasks import TASKS
+
+    if as_json:
+        print(json.dumps(report.to_dict(benchmark), indent=1))
+    for name, results in {} if as_json else benchmark.results.items():
+        counts = [each.cases for each in next(iter(results.values())).scores.values()]
+        tests = f"{counts[0]} tosses" if name == "slides" else f"{sum(counts)} tests"
+        print_table(f"{TASKS[name].title} ({tests})", *report.table(benchmark, name))
+        for model, result in results.items():
+            if result.fitted:
+                for key, value in result.checked.items():
+                    note(f"{model}: {key} {value:.3g}")
+                note(f"{model}, fitted: {', '.join(f'{key} {value:.4g}' for key, value in result.fitted.items())}")
+    for text in () if as_json else benchmark.left_out:
+        note(f"left out: {text}")
+    if folder is not None:
+        path = folder / "measured.json"
+        write_text(path, json.dumps(report.to_dict(benchmark), indent=1) + "\n")
+        note(f"wrote {path}")
+        for name in benchmark.results:
+            picture = output.write_picture(figures.draw(benchmark, name), folder / f"measured-{name}.png")
+            note(f"wrote {picture}")
+
+
+# ---------------------------------------------------------------------- reproduce, simulators
 
 
 @click.command(
@@ -97,12 +199,34 @@ def measured(
 @click.option("--again", is_flag=True, help="Repeat finished experiments.")
 def reproduce(only: tuple[str, ...], list_only: bool, out: Path, quick: bool, full: bool, again: bool) -> int:
     """Reproduce the paper (the help above is what users see)."""
-    from planarfriction_studies.commands import reproduce as command
+    from planarfriction.cli.console import note, print_table
+    from planarfriction.errors import InvalidValueError
+    from planarfriction.writing import make_folder
+    from planarfriction_studies.experiments import EXPERIMENTS, find_experiment
 
     if list_only:
-        command.show_list()
+        width = max(map(len, EXPERIMENTS))
+        for each in EXPERIMENTS.values():
+            print(f"{each.name:{width}}  {each.title}")
         return 0
-    return command.reproduce(only, out, quick=quick, full=full, again=again)
+    if quick and full:
+        raise InvalidValueError("--quick", "not be given together with --full", "both")
+    chosen = [find_experiment(name).name for name in only] or list(EXPERIMENTS)
+    from planarfriction_studies.experiments.report import write_report
+    from planarfriction_studies.experiments.reproduction import Reproduction
+    from planarfriction_studies.experiments.wording import number
+
+    reproduction = Reproduction(make_folder(out), quick, full)
+    code = _carry_out(reproduction, chosen, again=again)
+    if records := reproduction.records():
+        rows = []
+        for record in records:
+            missed = sum(not row["holds"] for row in record["comparisons"])
+            rows.append([record["name"], f"{len(record['comparisons'])}", f"{missed}", number(record["seconds"])])
+        print_table("Reproduced", ["experiment", "compared", "out of tolerance", "time [s]"], rows)
+        note(f"wrote {write_report(reproduction)}")
+        note(f"wrote {reproduction.write_numbers()}")
+    return code
 
 
 @click.command(
@@ -126,6 +250,42 @@ def reproduce(only: tuple[str, ...], list_only: bool, out: Path, quick: bool, fu
 @click.option("--again", is_flag=True, help="Repeat finished experiments.")
 def simulators(out: Path, quick: bool, again: bool) -> int:
     """Compare (the help above is what users see)."""
-    from planarfriction_studies.commands import simulators as command
+    from planarfriction.cli.console import note, print_table
+    from planarfriction.writing import make_folder
+    from planarfriction_studies.experiments import COMPARISONS
+    from planarfriction_studies.experiments.reproduction import Reproduction
 
-    return command.compare(out, quick=quick, again=again)
+    reproduction = Reproduction(make_folder(out), quick, experiments=COMPARISONS)
+    code = _carry_out(reproduction, list(COMPARISONS), again=again)
+    for record in reproduction.records():
+        for table in record["tables"]:
+            print_table(table["title"], table["headings"], table["rows"])
+        for finding in record["findings"]:
+            print(finding)
+        for picture in record["pictures"]:
+            note(f"wrote {reproduction.folder / record['name'] / picture['name']}.png")
+        note(f"wrote {reproduction.write_numbers()}")
+    return code
+
+
+def _carry_out(reproduction: Reproduction, chosen: Sequence[str], *, again: bool) -> int:
+    """Carry out the experiments `chosen`, with progress and a line for each; returns the exit code."""
+    from planarfriction.cli import INTERRUPTED, OUT_OF_TOLERANCE
+    from planarfriction.cli.console import note, work_progress
+
+    code = 0
+    try:
+        for index, name in enumerate(chosen, 1):
+            earlier = reproduction.kept(name) is not None and not again
+            with work_progress(f"{index} of {len(chosen)}, {name}") as progress:
+                (record,) = reproduction.run([name], again=again, progress=progress)
+            missed = [row["quantity"] for row in record["comparisons"] if not row["holds"]]
+            code = OUT_OF_TOLERANCE if missed else code
+            when = "kept from an earlier run" if earlier else f"{record['seconds']:.1f} s"
+            note(f"{name}: {len(record['comparisons'])} compared, {len(missed)} out of tolerance ({when})")
+            for quantity in missed:
+                note(f"  out of tolerance: {quantity}")
+    except KeyboardInterrupt:
+        note(f"stopped in {name}: the same command continues from there")
+        code = INTERRUPTED
+    return code

@@ -5,12 +5,13 @@ from __future__ import annotations
 import functools
 import hashlib
 import itertools
+import operator
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, TypeVar
 from zipfile import BadZipFile
 
 import numpy as np
@@ -24,9 +25,18 @@ if TYPE_CHECKING:
 THREADS = 2
 """Pieces computed at once by `Work.pieces`."""
 
+TWIST = {"vx": "m/s", "vy": "m/s", "omega": "rad/s"}
+POSE = {"x": "m", "y": "m", "theta": "rad"}
+WRENCH = {"fx": "N", "fy": "N", "tau": "N m"}
+"""Columns of runs and of curves, and their units."""
+
+UNITS = TWIST | POSE | WRENCH | {"normal_force": "N"}
+
 Arrays = dict[str, np.ndarray]
 
 Key = TypeVar("Key")
+
+Item = TypeVar("Item")
 
 Reference = Literal["published", "converged", "closed form"]
 
@@ -74,37 +84,60 @@ def compare_curve(
     error (or, where the figure's solver error is unknown, an estimate that `cause` explains).
     """
     curve = facts.published_curve(name)
-    inside = curve.time <= time[-1] + 1e-9  # a run may be shorter than the figure
-    difference = np.abs(_at(curve.time[inside], time, values) - curve.values[inside])
     tolerance = (curve.deviation or 0.0) + curve.reading + allowance
-    return Comparison(
-        quantity,
-        "published",
-        float(difference.max()),
-        tolerance,
-        curve.unit,
-        int(inside.sum()),
-        cause,
-        span=float(np.ptp(curve.values)),
-        paper=curve.deviation,
-    )
+    ours, theirs = (time, values), (curve.time, curve.values)
+    return _compare_at("published", quantity, ours, theirs, tolerance, curve.unit, cause, curve.deviation)
 
 
 def compare_converged(
-    quantity: str, time: np.ndarray, values: np.ndarray, name: str, unit: str, allowance: float, cause: str
+    quantity: str, time: np.ndarray, values: np.ndarray, name: str, allowance: float, cause: str
 ) -> Comparison:
-    """Compare our curve with the column `name` of a converged solution, such as `in_hand/Circle/d1/x`, at all its
-    times."""
+    """Compare our curve with the column `name` of a converged solution, `in_hand/Circle/d1/x`, at all its times."""
     solution, _, column = name.rpartition("/")
     reference = facts.converged(solution)
-    inside = reference["time"] <= time[-1] + 1e-9
-    expected = reference[column][inside]
-    difference = np.abs(_at(reference["time"][inside], time, values) - expected)
-    span = float(np.ptp(reference[column]))
-    tolerance = allowance + facts.CONVERGED_SHARE * span
-    return Comparison(
-        quantity, "converged", float(difference.max()), tolerance, unit, int(inside.sum()), cause, span=span
-    )
+    ours, theirs = (time, values), (reference["time"], reference[column])
+    tolerance = allowance + facts.CONVERGED_SHARE * float(np.ptp(reference[column]))
+    return _compare_at("converged", quantity, ours, theirs, tolerance, UNITS[column], cause)
+
+
+Curve = tuple[np.ndarray, np.ndarray]
+"""Times and values."""
+
+
+def _compare_at(
+    reference: Reference, quantity: str, ours: Curve, theirs: Curve, tolerance: float, unit: str, cause: str,
+    paper: float | None = None,
+) -> Comparison:  # fmt: skip
+    """Compare our curve with another at the times of that; each must be recorded, for between samples lie jumps."""
+    (time, values), (wanted, expected) = ours, theirs
+    inside = wanted <= time[-1] + 1e-9  # a run may be shorter than the figure
+    index = np.clip(np.searchsorted(time, wanted[inside] - 1e-7), 0, len(time) - 1)
+    assert np.abs(time[index] - wanted[inside]).max() < 1e-6, "the reference has times that were not recorded"
+    difference = float(np.abs(values[index] - expected[inside]).max())
+    span, samples = float(np.ptp(expected)), int(inside.sum())
+    return Comparison(quantity, reference, difference, tolerance, unit, samples, cause, span=span, paper=paper)
+
+
+def compare_columns(
+    compare: Callable[..., Comparison],
+    before: str,
+    run: Mapping[str, np.ndarray],
+    solution: str,
+    allowance: Mapping[str, float] | float,
+    cause: str,
+    columns: Iterable[str] = (*POSE, *WRENCH),
+) -> list[Comparison]:
+    """Compare columns of a run with those of a published curve or of a converged solution.
+
+    `compare` is `compare_curve` or `compare_converged`; `before` stands before the names of the columns. Columns whose
+    unit has no `allowance` are left out.
+    """
+    allowances = dict.fromkeys(UNITS.values(), allowance) if isinstance(allowance, float) else allowance
+    return [
+        compare(f"{before}{name}", run["time"], run[name], f"{solution}/{name}", allowances[UNITS[name]], cause)
+        for name in columns
+        if UNITS[name] in allowances
+    ]
 
 
 def compare(
@@ -118,21 +151,10 @@ def compare(
 
 def compare_all(reference: Reference, rows: Iterable[tuple[str, Any, Any, float, str, str]]) -> list[Comparison]:
     """Compare rows of quantity, ours, theirs, tolerance, unit and cause."""
-    return [
-        compare(quantity, ours, theirs, reference, within, unit, cause)
-        for quantity, ours, theirs, within, unit, cause in rows
-    ]
+    return [compare(words, ours, theirs, reference, *rest) for words, ours, theirs, *rest in rows]
 
 
-def _at(wanted: np.ndarray, time: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return the recorded values at `wanted` times; each must be a recorded time, for between samples lie jumps."""
-    index = np.clip(np.searchsorted(time, wanted - 1e-7), 0, len(time) - 1)
-    assert np.abs(time[index] - wanted).max() < 1e-6, "the reference has times that were not recorded"
-    return values[index]
-
-
-@dataclass(frozen=True)
-class Picture:
+class Picture(NamedTuple):
     """A figure of the report."""
 
     name: str
@@ -153,9 +175,6 @@ class Table:
     note: str = ""
 
 
-Item = TypeVar("Item")
-
-
 def table(
     title: str,
     items: Mapping[str, Item],
@@ -168,25 +187,47 @@ def table(
     return Table(title, [first, *columns], rows, note)
 
 
+def entry(*keys: Any, scale: float = 1.0, digits: int | None = None) -> Callable[[Any], float]:
+    """Return a column of a table: the number below `keys` of an item, times `scale`, rounded to `digits`."""
+
+    def cell(item: Any) -> float:
+        value = scale * functools.reduce(operator.getitem, keys, item)
+        return value if digits is None else float(f"{value:.{digits}g}")
+
+    return cell
+
+
+def columns_of(time: np.ndarray, values: np.ndarray, names: Iterable[str]) -> Arrays:
+    """Return `time` and the columns of `values` `[T, N]` by name, as a run."""
+    return {"time": time} | dict(zip(names, values.T, strict=True))
+
+
 def dataset(
     runs: Mapping[tuple[str, ...], Mapping[str, np.ndarray]],
-    units: Mapping[str, str],
+    columns: Iterable[str],
     dims: Sequence[str],
     along: tuple[str, np.ndarray, str],
+    alone: Mapping[str, tuple[np.ndarray, str]] | None = None,
 ) -> xr.Dataset:
-    """Return columns of runs by their labels, one for each of `dims`, over `along`: its name, values and unit."""
+    """Return columns of runs by their labels, one for each of `dims`, over `along`: its name, values and unit.
+
+    `columns` are names in `UNITS`, or names with their units; `alone` are values and units that are the same in all
+    runs.
+    """
     import xarray as xr
 
     labels = [list(dict.fromkeys(each)) for each in zip(*runs, strict=True)]
     shape = [*map(len, labels), -1]
     name, values, unit = along
-    columns: dict[str, Any] = {
+    units = columns if isinstance(columns, Mapping) else {column: UNITS[column] for column in columns}
+    variables: dict[str, Any] = {
         column: ((*dims, name), np.array([runs[key][column] for key in itertools.product(*labels)]).reshape(shape),
                  {"units": unit})
         for column, unit in units.items()
     }  # fmt: skip
+    variables |= {each: (name, values, {"units": unit}) for each, (values, unit) in (alone or {}).items()}
     coordinates = dict(zip(dims, labels, strict=True))
-    return xr.Dataset(columns, coordinates | {name: (name, values, {"units": unit})})
+    return xr.Dataset(variables, coordinates | {name: (name, values, {"units": unit})})
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,20 @@ from __future__ import annotations
 
 from typing import Any
 
-from planarfriction.plots.style import DISTRIBUTED, ELLIPSOID, EXACT, MOMENTS, OTHER, PARTS, PUBLISHED, PlotFigure
+import numpy as np
+
+from planarfriction.plots.style import (
+    DISTRIBUTED,
+    ELLIPSOID,
+    EXACT,
+    MOMENTS,
+    OTHER,
+    PARTS,
+    PUBLISHED,
+    PlotFigure,
+    new_figure,
+    tidy,
+)
 from planarfriction_studies.experiments import facts
 
 __all__ = ["DISTRIBUTED", "ELLIPSOID", "EXACT", "MOMENTS", "PARTS", "QUARTIC", "REDUCED"]
@@ -26,6 +39,18 @@ def vertices(
     part = shown if isinstance(shown, slice) else (curve.time >= shown[0]) & (curve.time <= shown[1])
     look = {"ms": 3.0, "mfc": "white", "mec": colour, "mew": 0.7, "zorder": 3} | look
     axes.plot(curve.time[part], factor * curve.values[part], ls="", marker=marker, **look)
+
+
+def box_panels(names: list[str], height: float) -> tuple[PlotFigure, Any]:
+    """Return a figure of two panels, one above the other, with a place for the boxes of each name."""
+    figure = new_figure(9.6, height)
+    panels: Any = figure.subplots(2, 1, sharex=True)
+    for axes in panels:
+        tidy(axes)
+        axes.grid(False, axis="x")
+    panels[1].set_xticks(range(len(names)), names)
+    figure.align_ylabels(panels)
+    return figure, panels
 
 
 def box(axes: Any, at: float, numbers: Any, colour: str, width: float, filled: bool = True) -> None:
@@ -59,6 +84,17 @@ def line_key(label: str, **look: Any) -> Any:
 
     return Line2D([], [], label=label, **look)
 
+
+AXES = {
+    "normal_force": ("normal force [N]", 1.0),
+    "x": ("$x$ [mm]", 1e3),
+    "y": ("$y$ [mm]", 1e3),
+    "theta": ("$\\theta$ [deg]", 180.0 / np.pi),
+    "fx": ("$f_x$ [N]", 1.0),
+    "fy": ("$f_y$ [N]", 1.0),
+    "tau": ("$\\tau$ [N mm]", 1e3),
+}
+"""Column of a run -> its label on an axis, shown units per SI unit."""
 
 MAXIMUM = {"label": "maximum", "ls": "", "marker": "x", "ms": 5, "mew": 1.4, "color": "0.3"}
 """Legend of the crosses."""

@@ -106,6 +106,12 @@ class Reproduction:
         shutil.rmtree(pieces, ignore_errors=True)
         return record
 
+    def write_numbers(self) -> Path:
+        """Write `numbers.json` from all results kept in the folder; returns its path."""
+        path = self.folder / "numbers.json"
+        write_text(path, json.dumps(self.numbers(), indent=1, allow_nan=False))
+        return path
+
     def numbers(self) -> Record:
         """Return every number of the kept results, with what they were measured on."""
         keys = ("title", "seconds", "numbers", "comparisons")

@@ -1,5 +1,4 @@
-"""Code that the experiments share: the published parameters, the models by their letters in the paper, sampled
-results."""
+"""Published parameters, models by their letters in the paper, and runs as arrays, which the experiments share."""
 
 from __future__ import annotations
 
@@ -13,7 +12,8 @@ from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.limit_surface import LimitSurfaceEllipsoid, LimitSurfaceTablePublished
 from planarfriction.models import DistributedModel, ReducedModelPublished
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
-from planarfriction.scenes import Solution
+from planarfriction.scenes import Scene, simulate
+from planarfriction_studies.experiments.experiment import POSE, TWIST, WRENCH, Arrays
 
 LAW = LuGre(mu_s=1.2, elasto_plastic=ElastoPlastic(0.9))
 """The published friction parameters with elasto-plastic bristles."""
@@ -60,13 +60,13 @@ def published_model(kind: Kind, shape: str | ContactPatch, law: LuGre = LAW, *, 
     return ReducedModelPublished(patch, law, surface=PublishedEllipsoid(patch))
 
 
-def columns(solution: Solution) -> dict[str, np.ndarray]:
-    """Return time, motion and the wrench of the first contact about the contact frame's origin, as arrays [SI]."""
-    values = {name: history.values for name, history in solution.histories.items()}
-    body = {name: values[name] for name in ("time", "x", "y", "theta", "vx", "vy", "omega")}
-    return body | {name: values[name][:, 0] for name in ("fx", "fy", "tau", "normal_force")}
+def simulated(scene: Scene, **options: Any) -> Arrays:
+    """Simulate a scene; returns time, motion and the wrench of the first contact about its frame's origin [SI]."""
+    values = {name: history.values for name, history in simulate(scene, **options).histories.items()}
+    body = {name: values[name] for name in ("time", *POSE, *TWIST)}
+    return body | {name: values[name][:, 0] for name in (*WRENCH, "normal_force")}
 
 
-def at_centre_of_pressure(run: dict[str, np.ndarray], patch: ContactPatch) -> np.ndarray:
+def at_centre_of_pressure(run: Arrays, patch: ContactPatch) -> np.ndarray:
     """Return the friction wrench `[T, 3]` of a run about the centre of pressure of the patch."""
-    return wrench_at(np.stack([run[name] for name in ("fx", "fy", "tau")], axis=-1), patch.centre_of_pressure())
+    return wrench_at(np.stack([run[name] for name in WRENCH], axis=-1), patch.centre_of_pressure())

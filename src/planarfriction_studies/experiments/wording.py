@@ -9,7 +9,6 @@ from __future__ import annotations
 import functools
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from planarfriction_studies.experiments.experiment import Picture, Result
@@ -18,31 +17,29 @@ if TYPE_CHECKING:
     import jinja2
 
 
-@dataclass(frozen=True)
-class Words:
-    """The parts of a filled template."""
+def report(
+    home: str,
+    figures: Mapping[str, Any],
+    numbers: Mapping[str, Any],
+    values: Mapping[str, Any] | None = None,
+    **rest: Any,
+) -> Result:
+    """Return a result with the words of the template `findings.md.j2` in the folder `home`.
 
-    parts: Mapping[str, str]
-    """Heading -> Markdown."""
-
-    def result(self, figures: Mapping[str, Any], **rest: Any) -> Result:
-        """Return the result with these words and `figures` by name; `rest` are its other fields."""
-        pictures = [Picture(name, self.parts[f"figure {name}"], figure) for name, figure in figures.items()]
-        found = self.parts["found"].split("\n\n")
-        return Result(found, pictures, asked=self.parts["asked"], verdict=self.parts["verdict"], **rest)
-
-
-def fill(home: str, **numbers: Any) -> Words:
-    """Fill the template `findings.md.j2` of the experiment in the folder `home` with the numbers of a run."""
-    return Words(_parts(environment().get_template(f"{home}/findings.md.j2").render(**numbers)))
-
-
-def _parts(text: str) -> dict[str, str]:
+    The template names `numbers` of the run, each by itself too, and further `values`; `figures` are by name, and
+    `rest` are other fields of the result.
+    """
+    text = (
+        environment().get_template(f"{home}/findings.md.j2").render({**numbers, "numbers": numbers, **(values or {})})
+    )
     _, *pieces = re.split(r"^## (.+)\n", text, flags=re.M)
-    return {
+    parts = {
         heading.strip(): re.sub(r"\n{3,}", "\n\n", body.strip())
         for heading, body in zip(pieces[::2], pieces[1::2], strict=True)
     }
+    pictures = [Picture(name, parts[f"figure {name}"], figure) for name, figure in figures.items()]
+    found = parts["found"].split("\n\n")
+    return Result(found, pictures, numbers=numbers, asked=parts["asked"], verdict=parts["verdict"], **rest)
 
 
 @functools.cache

@@ -12,7 +12,7 @@ import numpy as np
 
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
-from planarfriction_studies.measured.library import LIBRARY
+from planarfriction_studies.measured.library import library
 from planarfriction_studies.measured.questions import Case
 from planarfriction_studies.measured.scores import Measure, drawings, interval
 from planarfriction_studies.measured.tasks import TASKS, Task
@@ -119,14 +119,6 @@ class Benchmark:
                     scores, tuple(answers), errors, values, checked, seconds, regions
                 )
         return self.results
-
-
-def library(left_out: list[str] | None = None) -> dict[str, Any]:
-    """Return the library's models that are installed, by name; what is missing is added to `left_out`."""
-    for name, entry in LIBRARY.items():
-        if not entry.installed and left_out is not None:
-            left_out.append(f"{name}: needs {entry.needs}, pip install 'planarfriction[{entry.extra}]'")
-    return {name: entry.make() for name, entry in LIBRARY.items() if entry.installed}
 
 
 def _answers(model: Any, name: str, cases: Sequence[Case], say: Callable[[str], None]) -> list[np.ndarray]:

@@ -45,3 +45,11 @@ LIBRARY = {
     ),
 }
 """Models by name, from the simplest on."""
+
+
+def library(left_out: list[str] | None = None) -> dict[str, Any]:
+    """Return the library's models that are installed, by name; what is missing is added to `left_out`."""
+    for name, entry in LIBRARY.items():
+        if not entry.installed and left_out is not None:
+            left_out.append(f"{name}: needs {entry.needs}, pip install 'planarfriction[{entry.extra}]'")
+    return {name: entry.make() for name, entry in LIBRARY.items() if entry.installed}

@@ -1,34 +1,33 @@
-"""Figures beyond the paper: errors of surfaces, the staircase, errors of models, grooves."""
+"""Figures beyond the paper: errors of surfaces, the staircase, errors of models over their costs, grooves."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from planarfriction.plots.style import PlotFigure, new_figure, tidy
 from planarfriction_studies.experiments import looks
-from planarfriction_studies.experiments.beyond import grooves as grooved
-from planarfriction_studies.experiments.beyond.driven import MODELS, Errors
+from planarfriction_studies.experiments.beyond import contacts
+from planarfriction_studies.experiments.beyond.ladder import MOVED, Row, shape_of
 from planarfriction_studies.experiments.beyond.surfaces import KINDS
 from planarfriction_studies.experiments.experiment import Arrays
 from planarfriction_studies.experiments.runs import IN_WORDS
 from planarfriction_studies.experiments.velocity_driven import boxes
+from planarfriction_studies.experiments.wording import span
 
 COLOURS = dict(
     zip(KINDS, (looks.REDUCED, looks.MOMENTS, looks.DISTRIBUTED, looks.QUARTIC, looks.ELLIPSOID), strict=True)
 )
 
-MODEL_COLOURS = dict(zip(MODELS, (looks.REDUCED, looks.MOMENTS, looks.PARTS, looks.DISTRIBUTED), strict=True))
+MODEL_COLOURS = dict(zip(MOVED, (looks.REDUCED, looks.MOMENTS, looks.PARTS, looks.DISTRIBUTED), strict=True))
 
 
 def surface_errors(errors: dict[str, Arrays]) -> PlotFigure:
     """Draw errors of force [N] and torque [N mm] of each kind of surface from the exact one."""
-    figure = new_figure(9.6, 6.8)
-    panels: Any = figure.subplots(2, 1, sharex=True)
-    for axes, (quantity, factor, label) in zip(
-        panels, (("force", 1.0, "error of the force [N]"), ("torque", 1e3, "error of the torque [N mm]")), strict=True
-    ):
+    figure, panels = looks.box_panels([IN_WORDS[shape].replace(", ", ",\n") for shape in errors], 6.8)
+    rows = (("force", 1.0, "error of the force [N]"), ("torque", 1e3, "error of the torque [N mm]"))
+    for axes, (quantity, factor, label) in zip(panels, rows, strict=True):
         for place, each in enumerate(errors.values()):
             kinds = [kind for kind in KINDS if f"{kind}/{quantity}" in each]
             for i, kind in enumerate(kinds):
@@ -36,13 +35,8 @@ def surface_errors(errors: dict[str, Arrays]) -> PlotFigure:
                 numbers = np.percentile(factor * each[f"{kind}/{quantity}"], [5, 25, 50, 75, 95, 100])
                 looks.box(axes, at, numbers, COLOURS[kind], 0.12)
         axes.set(yscale="log", ylabel=label)
-        tidy(axes)
-        axes.grid(False, axis="x")
-    panels[1].set_xticks(range(len(errors)), [IN_WORDS[shape].replace(", ", ",\n") for shape in errors])
-    figure.align_ylabels(panels)
-    shown = [kind for kind in KINDS if any(f"{kind}/force" in each for each in errors.values())]
-    key = looks.box_key({kind: COLOURS[kind] for kind in shown})
-    looks.legend(figure, [*key, looks.line_key(**looks.MAXIMUM)], 6, fontsize="small")
+    shown = {kind: COLOURS[kind] for kind in KINDS if any(f"{kind}/force" in each for each in errors.values())}
+    looks.legend(figure, [*looks.box_key(shown), looks.line_key(**looks.MAXIMUM)], 6, fontsize="small")
     return figure
 
 
@@ -52,14 +46,13 @@ def staircase(stairs: Arrays) -> PlotFigure:
     panels: Any = figure.subplots(2, 2, sharex=True)
     place = 1e3 * stairs["place"]
     for row, shape in zip(panels, ("Line", "Circle"), strict=True):
-        for axes, ending, factor, label in (
-            (row[0], "", 1e3, "torque [N mm]"),
-            (row[1], ", force", 1.0, "force [N]"),
+        for axes, ending, factor, label, from_exact in (
+            (row[0], "", 1e3, "torque [N mm]", "torque, from the exact one [N µm]"),
+            (row[1], ", force", 1.0, "force [N]", "force, from the exact one [mN]"),
         ):
             cells, exact = factor * stairs[f"{shape}/sum{ending}"], factor * stairs[f"{shape}/exact{ending}"]
             if shape == "Circle":  # steps of a few thousandths do not show beside the curve itself
-                cells, exact, label = 1e3 * (cells - exact), 0.0 * exact, f"{label[:5].strip()} - exact"
-                label = "torque, from the exact one [N µm]" if not ending else "force, from the exact one [mN]"
+                cells, exact, label = 1e3 * (cells - exact), 0.0 * exact, from_exact
             axes.plot(place, cells, color=looks.DISTRIBUTED, lw=1.1, label="sum over the 21 x 21 grid's cells")
             axes.plot(place, exact, color=looks.EXACT, lw=1.3, label="exact")
             axes.set(ylabel=label, xlim=(0.0, place[-1]))
@@ -72,23 +65,18 @@ def staircase(stairs: Arrays) -> PlotFigure:
     return figure
 
 
-def driven_boxes(errors: Errors) -> PlotFigure:
+def driven_boxes(errors: dict[str, dict[str, dict[str, float]]]) -> PlotFigure:
     """Draw errors of force [mN] and torque [N mm] of the models, from the finer grid."""
-    figure = new_figure(9.6, 7.0)
-    panels: Any = figure.subplots(2, 1, sharex=True)
-    rows = (("", 1e3, "error of the force [mN]", 1e-2), ("torque ", 1e3, "error of the torque [N mm]", 1e-4))
-    for axes, (before, factor, label, linear) in zip(panels, rows, strict=True):
+    figure, panels = looks.box_panels([IN_WORDS[shape] for shape in errors], 7.0)
+    rows = (("", "error of the force [mN]", 1e-2), ("torque ", "error of the torque [N mm]", 1e-4))
+    for axes, (before, label, linear) in zip(panels, rows, strict=True):
         axes.set_yscale("symlog", linthresh=linear, linscale=0.4)
         for place, each in enumerate(errors.values()):
             for offset, (model, colour) in zip((-0.3, -0.1, 0.1, 0.3), MODEL_COLOURS.items(), strict=True):
-                values = [factor * each[model][before + name] for name in boxes.COLUMNS]
+                values = [1e3 * each[model][before + name] for name in boxes.COLUMNS]
                 looks.box(axes, place + offset, values, colour, 0.16)
         axes.set(ylabel=label, ylim=(0.0, None))
-        tidy(axes)
-        axes.grid(False, axis="x")
-    panels[1].set_xticks(range(len(errors)), [IN_WORDS[shape] for shape in errors])
-    figure.align_ylabels(panels)
-    key = looks.box_key({MODELS[model]: colour for model, colour in MODEL_COLOURS.items()})
+    key = looks.box_key({MOVED[model]: colour for model, colour in MODEL_COLOURS.items()})
     looks.legend(figure, [*key, looks.line_key(**looks.MAXIMUM)], 5, fontsize="small")
     return figure
 
@@ -99,16 +87,98 @@ def grooves(numbers: dict[str, Any]) -> PlotFigure:
     axes: Any = figure.subplots()
     slopes = np.array(numbers["slope"])
     fine = np.linspace(slopes[0], slopes[-1], 100)
-    axes.plot(
-        np.degrees(fine), np.degrees([grooved.closed_drift(s) for s in fine]), color=looks.EXACT, label="closed form"
-    )
-    for kind, marker, colour in zip(
-        grooved.MODELS, "ox+", (looks.DISTRIBUTED, looks.MOMENTS, looks.REDUCED), strict=True
-    ):
-        axes.plot(
-            np.degrees(slopes), np.degrees(numbers[kind]), marker, color=colour, label=kind, fillstyle="none", ms=7
-        )
+    closed = np.degrees([contacts.closed_drift(slope) for slope in fine])
+    axes.plot(np.degrees(fine), closed, color=looks.EXACT, label="closed form")
+    colours = (looks.DISTRIBUTED, looks.MOMENTS, looks.REDUCED)
+    for kind, marker, colour in zip(contacts.GROOVED_MODELS, "ox+", colours, strict=True):
+        look = {"color": colour, "label": kind, "fillstyle": "none", "ms": 7}
+        axes.plot(np.degrees(slopes), np.degrees(numbers[kind]), marker, **look)
     axes.set(xlabel="slope [deg]", ylabel="drift from the fall line [deg]", ylim=(0.0, None))
     axes.legend(frameon=False)
     tidy(axes)
     return figure
+
+
+# ---------------------------------------------------------------------- error against cost
+
+
+class Family(NamedTuple):
+    """Models of the ladder that are one line."""
+
+    words: str
+    rungs: dict[str, str]
+    """Model -> what stands beside its marker."""
+    colour: str
+    marker: str
+    place: tuple[int, int] = (5, 4)
+    """Offset of the words from the marker [points]."""
+
+
+FAMILIES = (
+    Family("published reduced model", {"published": ""}, looks.REDUCED, "^"),
+    Family("ReducedModel, its parts", {"reduced": "1", **{f"{n} parts": f"{n}" for n in (4, 6, 16)}}, looks.MOMENTS,
+           "o", (4, -11)),
+    Family("distributed, its cells", {"degree 3": "28", "degree 5": "45", "full": "all"}, looks.DISTRIBUTED, "D"),
+)  # fmt: skip
+
+COLUMNS = (
+    ("driven, ", "third quartile", "moved with a given velocity", "error of the force, third quartile [mN]"),
+    ("load 2", "end", "in hand, load 2 (slips at once)", "distance of the end [mm]"),
+    ("load 1", "end", "in hand, load 1 (barely slips)", "distance of the end [mm]"),
+)
+"""Columns: part of the name of their cases, the error that is shown, its title, and its axis [thousandths]."""
+
+FLOOR = 1e-4
+"""Smallest error that is drawn [mN, mm]."""
+
+TICKS = (0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10)
+
+
+def draw_ladder(rows: list[Row]) -> PlotFigure:
+    """Draw the error over the time of a run: patches of many cells above, of few below; velocity-driven and in hand."""
+    from matplotlib.ticker import FixedLocator, NullLocator
+
+    many = {shape_of(row.case) for row in rows if row.model == "degree 5"}
+    groups = [group for few in (False, True) if (group := [row for row in rows if (shape_of(row.case) in many) ^ few])]
+    figure = new_figure(10.5, 0.7 + 3.1 * len(groups))
+    panels: Any = figure.subplots(len(groups), len(COLUMNS), sharex="row", squeeze=False)
+    for line, group in zip(panels, groups, strict=True):
+        cells = [row.states // 2 for row in group if row.model == "full"]
+        for axes, (case, quantity, title, label) in zip(line, COLUMNS, strict=True):
+            for family in FAMILIES:
+                _draw_family(axes, family, [row for row in group if case in row.case], quantity)
+            axes.set(xscale="log", yscale="log", ylabel=label)
+            axes.yaxis.label.set_fontsize("small")
+            axes.set_title(f"{title},\npatches of {span(cells, 'd')} cells", fontsize="medium", loc="left")
+            axes.margins(x=0.12, y=0.1)
+            axes.xaxis.set_major_locator(FixedLocator(TICKS))
+            axes.xaxis.set_major_formatter("{x:g}")
+            axes.xaxis.set_minor_locator(NullLocator())
+            tidy(axes)
+    for axes in panels[-1]:
+        axes.set_xlabel("time of a run / that of the whole grid")
+    figure.align_ylabels(panels)
+    look = {"ls": "-", "lw": 1.4, "ms": 6.5, "mec": "white"}
+    key = [looks.line_key(each.words, marker=each.marker, color=each.colour, **look) for each in FAMILIES]
+    looks.legend(figure, key, len(FAMILIES), fontsize="small")
+    return figure
+
+
+def _draw_family(axes: Any, family: Family, rows: list[Row], quantity: str) -> None:
+    """Draw medians joined by a line, bars from the smallest to the largest, the reference, without errors, dotted."""
+    medians = []
+    for model, words in family.rungs.items():
+        found = [row for row in rows if row.model == model]
+        if not found:
+            continue
+        cost = float(np.median([row.time for row in found]))
+        errors = np.maximum([1e3 * row.errors[quantity] for row in found], FLOOR)
+        if model == "full" and quantity == "end":
+            axes.axvline(cost, color=family.colour, lw=1.0, ls=":")
+            continue
+        middle = float(np.median(errors))
+        axes.vlines(cost, errors.min(), errors.max(), color=family.colour, lw=1.6, alpha=0.35)
+        axes.annotate(words, (cost, middle), family.place, textcoords="offset points", fontsize=8, color=family.colour)
+        medians.append((cost, middle))
+    if medians:
+        axes.plot(*np.transpose(medians), "-", marker=family.marker, ms=6.5, mec="white", lw=1.4, color=family.colour)

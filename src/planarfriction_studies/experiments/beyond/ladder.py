@@ -1,21 +1,30 @@
-"""Error against cost between 3 bristle states and 882: reduced models, their parts, few cells, the whole grid."""
+"""Errors and costs of models with 3 to 882 bristle states, in hand and moved with a given velocity."""
 
 from __future__ import annotations
 
 import functools
+import time
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from planarfriction.derivatives import rollout
 from planarfriction.limit_surface import LimitSurfaceEllipsoid, LimitSurfaceTable
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
 from planarfriction.scenes import Scene, simulate
-from planarfriction.scenes.ready import driven, in_hand, in_hand_load
-from planarfriction_studies.experiments.in_hand.runs import CENTRES_OF_MASS, Case, distance
-from planarfriction_studies.experiments.runs import IN_WORDS, LAW, SIX_SHAPES, at_centre_of_pressure, columns
+from planarfriction.scenes.ready import FINE, driven, in_hand, in_hand_load
+from planarfriction_studies.experiments.experiment import Arrays
+from planarfriction_studies.experiments.in_hand.runs import (
+    CENTRES_OF_MASS,
+    FRICTION_CHANGE,
+    Case,
+    distance,
+    end_distance,
+    with_friction,
+)
+from planarfriction_studies.experiments.runs import IN_WORDS, LAW, SIX_SHAPES, at_centre_of_pressure, simulated
 from planarfriction_studies.experiments.velocity_driven import boxes
 
 DEGREES = (3, 5)
@@ -45,8 +54,43 @@ REPEATS, LONG, SHORT = 3, 0.05, 0.02
 """A run is timed once and, if it takes less than LONG [s], so many times more; a short one before does not count."""
 
 
-@dataclass(frozen=True)
-class Row:
+MOVED = {
+    "published": "published reduced",
+    "reduced": "ReducedModel",
+    AUTO: 'ReducedModel, parts="auto"',
+    "full": "distributed, 21 x 21",
+}
+"""Model of the ladder -> its name in the report."""
+
+STATISTICS = ("median", "third quartile", "maximum")
+"""Statistics of the errors over a run, of force and of torque."""
+
+TIMED_PARTS = (1, 4, 6)
+"""Parts whose steps are timed."""
+
+ROUNDS, STEPS = 9, 10_000
+
+SPIN, SPIN_STEPS, SPIN_STEP = 0.02, 400, 1e-8
+"""Speed of the spin from rest [rad/s], its steps, and how far each goes at the contact radius [m]: 1e-6 m are full
+deflection."""
+
+ENDS = {
+    "published": "published reduced",
+    "reduced": "ReducedModel",
+    "4 parts": "ReducedModel, 4 parts",
+    AUTO: 'ReducedModel, parts="auto"',
+}
+"""Model of the ladder -> its name in the report."""
+
+SHIFT = "friction"
+"""Column of the numbers that holds the shift of the end by friction."""
+
+SHIFTS = 1e-5, 1e-3
+"""A run is measured in units of friction if 0.1 % of it moves the end by so much [m]: less says nothing, and more is
+the difference between holding and slipping."""
+
+
+class Row(NamedTuple):
     """One model in one run."""
 
     case: str
@@ -71,8 +115,7 @@ def shape_of(case: str) -> str:
 
 @functools.lru_cache(maxsize=8)
 def models(shape: str) -> dict[str, Any]:
-    """Return the models of a published patch by name, each number of cells once; kept, for fitting few cells takes
-    seconds.
+    """Return the models of a published patch by name, each number of cells once; kept: fitting cells takes seconds.
 
     `AUTO` is one of the others by another name, where its number of parts is among `PARTS`.
     """
@@ -119,7 +162,7 @@ def in_hand_rows(cases: tuple[Case, ...] = CASES) -> list[Row]:
     rows = []
     for case in cases:
         scene = scenes_of(case.shape)[case.words]
-        run = functools.cache(lambda model, scene=scene: columns(simulate(scene(model), **CLOSE)))
+        run = functools.cache(lambda model, scene=scene: simulated(scene(model), **CLOSE))
         whole = run(models(case.shape)["full"])
         for name, model in models(case.shape).items():
             apart = distance(run(model), whole)
@@ -129,8 +172,7 @@ def in_hand_rows(cases: tuple[Case, ...] = CASES) -> list[Row]:
 
 
 def reference(patch: ContactPatch) -> ContactPatch:
-    """Return the patch with each cell cut along its sides into an odd number of parts, as many as `REFERENCE_CELLS`
-    allow."""
+    """Return the patch with each cell cut into an odd number of parts a side, as many as `REFERENCE_CELLS` allow."""
     sides = int((patch.cell_extents() > 0.0).any(axis=0).sum())
     most = (REFERENCE_CELLS / patch.cells) ** (1.0 / sides)
     return patch.refined(int(np.clip((int(most) - 1) // 2 * 2 + 1, LEAST_PARTS, MOST_PARTS)))
@@ -141,17 +183,13 @@ def driven_rows(shapes: tuple[str, ...] = SIX_SHAPES) -> list[Row]:
     rows = []
     for shape in shapes:
         patch = PUBLISHED_PATCHES[shape]()
-        fine = columns(simulate(driven(DistributedModel(reference(patch), LAW))))
+        fine = simulated(driven(DistributedModel(reference(patch), LAW)))
         wanted = at_centre_of_pressure(fine, patch)
-        run = functools.cache(lambda model: columns(simulate(driven(model))))
+        run = functools.cache(lambda model: simulated(driven(model)))
         for name, model in models(shape).items():
             miss = (at_centre_of_pressure(run(model), patch) - wanted)[1:]
-            named = {"": np.hypot(miss[:, 0], miss[:, 1]), "torque ": np.abs(miss[:, 2])}
-            errors = {
-                before + statistic: value
-                for before, values in named.items()
-                for statistic, value in boxes.statistics(values).items()
-            }
+            torque = boxes.statistics(np.abs(miss[:, 2]))
+            errors = boxes.statistics(np.hypot(miss[:, 0], miss[:, 1])) | {f"torque {k}": v for k, v in torque.items()}
             rows.append(Row(f"driven, {shape}", name, int(np.prod(model.state_shape)), errors))
     return rows
 
@@ -171,3 +209,108 @@ def _time(scene: Scene) -> float:
     simulate(scene, t_end=SHORT)
     first = simulate(scene).statistics.wall_time
     return min([first, *(simulate(scene).statistics.wall_time for _ in range(REPEATS * (first < LONG)))])
+
+
+# ---------------------------------------------------------------------- moved with a given velocity
+
+
+def driven_errors(rows: list[Row]) -> dict[str, dict[str, dict[str, float]]]:
+    """Return the errors of the velocity-driven runs by shape, model and statistic."""
+    result: dict[str, dict[str, dict[str, float]]] = {}
+    for row in rows:
+        before, _, shape = row.case.partition(", ")
+        if before == "driven":
+            result.setdefault(shape, {})[row.model] = row.errors
+    return result
+
+
+def ratios(
+    errors: dict[str, dict[str, dict[str, float]]], model: str = "reduced", over: str = "published"
+) -> dict[str, dict[str, float]]:
+    """Return the error of a model of the ladder over that of another, by shape and statistic, force and torque."""
+    names = [f"{before}{name}" for before in ("", "torque ") for name in STATISTICS]
+    return {shape: {name: each[model][name] / each[over][name] for name in names} for shape, each in errors.items()}
+
+
+def step_costs(shape: str = "Circle") -> dict[str, Any]:
+    """Return times of a step in a compiled loop [s] by reduced model, one of each round in which all take part."""
+    patch = PUBLISHED_PATCHES[shape]()
+    directions = np.random.default_rng(7).normal(size=(STEPS, 3)) * [1.0, 1.0, 150.0]
+    twists = directions * 10.0 ** np.random.default_rng(8).uniform(-4.0, -1.5, size=(STEPS, 1))
+    models: dict[str, Any] = {"published": ReducedModelPublished(patch, LAW)}
+    models |= {name_of_parts(count): ReducedModel(patch, LAW, parts=count) for count in TIMED_PARTS}
+    times = {name: np.empty(ROUNDS) for name in models}
+    for turn in range(-1, ROUNDS):  # the first compiles
+        for name, model in models.items():
+            begin = time.process_time()
+            rollout(model, model.rest(), twists, 1.0, 1e-4)
+            if turn >= 0:
+                times[name][turn] = (time.process_time() - begin) / STEPS
+    return times
+
+
+def step_numbers(times: Arrays) -> dict[str, dict[str, list[float]]]:
+    """Return medians and quartiles of the time of a step [s], and of its ratio to the published model's in a round."""
+    return {
+        name: {"time": median_and_quartiles(each), "ratio": median_and_quartiles(each / times["published"])}
+        for name, each in times.items()
+    }
+
+
+def median_and_quartiles(values: Any) -> list[float]:
+    """Return the median, first and third quartile."""
+    return np.percentile(values, [50.0, 25.0, 75.0]).tolist()
+
+
+def spin_up(shape: str) -> dict[str, float]:
+    """Return the largest error of the torque [N m] of a spin from rest, from the patch's own cells, by model."""
+    patch = PUBLISHED_PATCHES[shape]()
+    models: dict[str, Any] = {"published": ReducedModelPublished(patch, LAW)}
+    models |= {name_of_parts(parts): ReducedModel(patch, LAW, parts=parts) for parts in (1, AUTO)}
+    dt = SPIN_STEP / (SPIN * patch.contact_radius())
+    wanted = _spun(DistributedModel(patch, LAW), dt)
+    return {name: float(np.abs(_spun(model, dt) - wanted).max()) for name, model in models.items()}
+
+
+def _spun(model: Any, dt: float) -> np.ndarray:
+    """Return the torque [N m] of a spin from rest, step by step."""
+    state, torques = model.rest(), np.empty(SPIN_STEPS)
+    for i in range(SPIN_STEPS):
+        state, wrench = model.step(state, (0.0, 0.0, SPIN), 1.0, dt)
+        torques[i] = wrench[2]
+    return torques
+
+
+# ---------------------------------------------------------------------- in hand
+
+
+def depends_on_friction(each: dict[str, float]) -> bool:
+    """Return True if the distances of a run are measured in units of friction."""
+    return SHIFTS[0] < each[SHIFT] < SHIFTS[1]
+
+
+def cases_of(shape: str) -> tuple[Case, ...]:
+    """Return the in-hand runs of a shape."""
+    return tuple(case for case in CASES if case.shape == shape)
+
+
+def friction_shift(case: Case) -> float:
+    """Return the mean distance [m] by which 0.1 % more and less friction move the end of the distributed model."""
+    base = simulated(case.scene("d"), **FINE)
+    changed = (simulated(case.scene("d", with_friction(s * FRICTION_CHANGE)), **FINE) for s in (1.0, -1.0))
+    return 0.5 * sum(end_distance(run, base) for run in changed)
+
+
+def end_distances(rows: list[Row], shifts: dict[str, float]) -> dict[str, dict[str, float]]:
+    """Return by case the distance of the end [m] from the distributed model's by model, and the shift by friction."""
+    result: dict[str, dict[str, float]] = {}
+    for row in rows:
+        if "end" in row.errors and row.model != "full":
+            result.setdefault(row.case, {SHIFT: shifts[row.case]})[row.model] = row.errors["end"]
+    return result
+
+
+def score(ends: dict[str, dict[str, float]], load: int, model: str = "reduced") -> dict[str, Any]:
+    """Count the runs under a load in which a model ends nearer than the published one, and compute the ratios."""
+    ratios = {case: each[model] / each["published"] for case, each in ends.items() if case.endswith(f"load {load}")}
+    return {"runs": len(ratios), "nearer": sum(ratio < 1.0 for ratio in ratios.values()), "ratios": ratios}

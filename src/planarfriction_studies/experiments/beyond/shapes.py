@@ -10,13 +10,12 @@ import numpy as np
 
 from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPublished
 from planarfriction.patch import ContactPatch
-from planarfriction.scenes import simulate
 from planarfriction.scenes.ready import driven
 from planarfriction.scenes.signal import Signal
 from planarfriction_studies.experiments import experiment
 from planarfriction_studies.experiments.beyond.ladder import AUTO, name_of_parts
 from planarfriction_studies.experiments.experiment import Table
-from planarfriction_studies.experiments.runs import LAW, at_centre_of_pressure, columns
+from planarfriction_studies.experiments.runs import LAW, at_centre_of_pressure, simulated
 
 PARTS = (1, 4, AUTO)
 """Numbers of parts of `ReducedModel`."""
@@ -49,16 +48,6 @@ FINER = 3
 QUANTITIES = {"force": "N", "torque": "N m"}
 
 
-def shapes() -> dict[str, Callable[[], ContactPatch]]:
-    """Return patches by name: not convex, in separate places, and pressed unevenly."""
-    return {"L": _corner, "annulus sector": _sector, "three feet": _feet, "Gaussian off centre": _gaussian}
-
-
-def _corner() -> ContactPatch:
-    outline = [(0.0, 0.0), (0.02, 0.0), (0.02, 0.006), (0.006, 0.006), (0.006, 0.02), (0.0, 0.02)]
-    return ContactPatch.polygon(outline, 21, name="L")
-
-
 def _sector() -> ContactPatch:
     angle = np.linspace(0.0, 1.9, 25)
     outer, inner = (radius * np.column_stack([np.cos(angle), np.sin(angle)]) for radius in (0.012, 0.006))
@@ -78,6 +67,17 @@ def _gaussian() -> ContactPatch:
     return ContactPatch.rectangle(0.02, pressure=pressure, name="Gaussian off centre")
 
 
+_CORNER = [(0.0, 0.0), (0.02, 0.0), (0.02, 0.006), (0.006, 0.006), (0.006, 0.02), (0.0, 0.02)]
+
+SHAPES: dict[str, Callable[[], ContactPatch]] = {
+    "L": lambda: ContactPatch.polygon(_CORNER, 21, name="L"),
+    "annulus sector": _sector,
+    "three feet": _feet,
+    "Gaussian off centre": _gaussian,
+}
+"""Patches by name: not convex, in separate places, and pressed unevenly."""
+
+
 def twist(seed: int) -> Signal:
     """Return a smooth random twist that starts from rest: half waves of random size and phase, at a random speed."""
     rng = np.random.default_rng([seed, 17])
@@ -90,12 +90,11 @@ def twist(seed: int) -> Signal:
 
 
 def largest_errors(shape: str, seeds: tuple[int, ...] = SEEDS) -> dict[str, np.ndarray]:
-    """Return the largest error of the force [N] and of the torque [N m] about the centre of pressure by model,
-    `[twists, 2]`.
+    """Return the largest errors `[twists, 2]` of force [N] and torque [N m] about the centre of pressure by model.
 
     The reference is the distributed model with its cells cut finely; points stay as they are.
     """
-    patch = shapes()[shape]()
+    patch = SHAPES[shape]()
     fine = patch.refined(FINER) if (patch.cell_extents() > 0.0).any() else patch
     models: dict[str, Any] = {"published": ReducedModelPublished(patch, LAW)}
     models |= {name_of_parts(parts): ReducedModel(patch, LAW, parts=parts) for parts in PARTS}
@@ -112,13 +111,11 @@ def largest_errors(shape: str, seeds: tuple[int, ...] = SEEDS) -> dict[str, np.n
 
 
 def _wrench(model: Any, twist: Signal) -> np.ndarray:
-    scene = driven(model, twist=twist, t_end=T_END)
-    return at_centre_of_pressure(columns(simulate(scene, save_every=EVERY)), model.patch)
+    return at_centre_of_pressure(simulated(driven(model, twist=twist, t_end=T_END), save_every=EVERY), model.patch)
 
 
 def ratios(errors: dict[str, np.ndarray]) -> dict[str, dict[str, list[float]]]:
-    """Return the largest errors of `ReducedModel` over the published model's, by model and quantity, one for each
-    twist."""
+    """Return the largest errors of `ReducedModel` over the published model's, by model and quantity, of each twist."""
     return {
         name: {quantity: (errors[name] / errors["published"])[:, i].tolist() for i, quantity in enumerate(QUANTITIES)}
         for name in errors

@@ -64,8 +64,7 @@ def random_twists(surface: LimitSurface, count: int) -> np.ndarray:
 
 
 def difference(surface: LimitSurface, exact: LimitSurface, twists: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the force [N] and torque [N m] at the exact centre of pressure between two surfaces, same twists, mu f_N =
-    1 N."""
+    """Return force [N] and torque [N m] at the exact centre of pressure between two surfaces, mu f_N = 1 N."""
     miss = geometry.wrench_at(surface.wrench(twists) - exact.wrench(twists), exact.centre_of_pressure)
     return np.hypot(miss[:, 0], miss[:, 1]), np.abs(miss[:, 2])
 
@@ -80,25 +79,21 @@ def surface_errors(shape: str, count: int) -> dict[str, Any]:
         if name != "quartic" or (has_quartic() and shape in QUARTIC_SHAPES):
             result[f"{name}/force"], result[f"{name}/torque"] = difference(kind(patch), exact, twists)
     if shape in CHECKED:
-        result["finer sum/force"], result["finer sum/torque"] = difference(
-            LimitSurfaceCells(patch.refined(PARTS)), exact, twists
-        )
+        finer = LimitSurfaceCells(patch.refined(PARTS))
+        result["finer sum/force"], result["finer sum/torque"] = difference(finer, exact, twists)
     return result
 
 
 def staircase(cells: int = 21) -> dict[str, Any]:
-    """Return the torque of unit spins [N m] of disc and line, mu f_N = 1 N, over the centre of rotation on the x or y
-    axis [m].
+    """Return the torque [N m] and force [N] of unit spins of disc and line over their centre of rotation, mu f_N = 1 N.
 
     The centre of rotation moves along the x axis of the disc, and along the line; torque about the centre of pressure.
     """
     place = np.linspace(0.0, 0.5 * WIDTH, STAIRS)
     zero, one = np.zeros_like(place), np.ones_like(place)
     result = {"place": place}
-    for shape, twists in (
-        ("Circle", np.stack([zero, -place, one], axis=1)),
-        ("Line", np.stack([place, zero, one], axis=1)),
-    ):
+    for shape, columns in (("Circle", [zero, -place, one]), ("Line", [place, zero, one])):
+        twists = np.stack(columns, axis=1)
         patch = PUBLISHED_PATCHES[shape](cells, WIDTH)
         for name, surface in (("sum", LimitSurfaceCells(patch)), ("exact", LimitSurfaceExact(patch))):
             result[f"{shape}/{name}"] = -surface.wrench(twists)[:, 2]
@@ -117,25 +112,18 @@ def jumps(stairs: Arrays) -> dict[str, float]:
 
 def comparisons(errors: dict[str, Arrays], stairs: Arrays) -> list[Comparison]:
     """Compare the exact surface with closed forms, sums over ever finer cells, and the errors of the table."""
+    rows = compare_all("closed form", _closed_forms(stairs))
     finer = f"sum over cells cut in {PARTS} along each side, mean distance to the exact surface"
     cause = "A sum converges at least in proportion to the size of its cells; the tolerance is 1.6 times that."
-    sums = [
-        Comparison(
-            f"{IN_WORDS.get(shape, shape)}: {finer}",
-            "converged",
-            float(each["finer sum/force"].mean()),
-            1.6 / PARTS * float(each["sum over cells/force"].mean()),
-            "N",
-            len(each["finer sum/force"]),
-            cause,
-        )
-        for shape, each in errors.items()
-        if "finer sum/force" in each
-    ]
-    return [*_closed_forms(stairs), *sums]
+    for shape, each in errors.items():
+        if "finer sum/force" in each:
+            fine, cells = each["finer sum/force"], each["sum over cells/force"]
+            words, within = f"{IN_WORDS[shape]}: {finer}", 1.6 / PARTS * float(cells.mean())
+            rows.append(Comparison(words, "converged", float(fine.mean()), within, "N", len(fine), cause))
+    return rows
 
 
-def _closed_forms(stairs: Arrays) -> list[Comparison]:
+def _closed_forms(stairs: Arrays) -> list[tuple[str, Any, Any, float, str, str]]:
     place, half = stairs["place"], 0.5 * WIDTH
     rounding = "A closed form beside another one: rounding."
     square = LimitSurfaceExact(ContactPatch.rectangle(WIDTH)).contact_radius
@@ -144,12 +132,9 @@ def _closed_forms(stairs: Arrays) -> list[Comparison]:
     torque = (half**2 - place**2) / (2.0 * half)
     words, line = "exact, line: {} over the centre of rotation", "Line/exact"
     exact = WIDTH * (np.sqrt(2.0) + np.arcsinh(1.0)) / 6.0, 2.0 * half / 3.0
-    return compare_all(
-        "closed form",
-        (
-            ("exact, contact radius of a square", square, exact[0], 1e-15, "m", rounding),
-            ("exact, contact radius of a disc", disc, exact[1], 1e-14, "m", rounding),
-            (words.format("torque"), stairs[line], torque, 1e-14, "N m", rounding),
-            (words.format("force"), stairs[f"{line}, force"], place / half, 1e-12, "N", rounding),
-        ),
-    )
+    return [
+        ("exact, contact radius of a square", square, exact[0], 1e-15, "m", rounding),
+        ("exact, contact radius of a disc", disc, exact[1], 1e-14, "m", rounding),
+        (words.format("torque"), stairs[line], torque, 1e-14, "N m", rounding),
+        (words.format("force"), stairs[f"{line}, force"], place / half, 1e-12, "N", rounding),
+    ]

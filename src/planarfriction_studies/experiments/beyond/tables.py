@@ -7,11 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction_studies.experiments.beyond.driven import MODELS, STATISTICS
-from planarfriction_studies.experiments.beyond.in_hand import ENDS, SHIFT
-from planarfriction_studies.experiments.beyond.ladder import AUTO, Row, shape_of
+from planarfriction_studies.experiments.beyond.ladder import AUTO, ENDS, MOVED, SHIFT, STATISTICS, Row, shape_of
 from planarfriction_studies.experiments.beyond.surfaces import KINDS
-from planarfriction_studies.experiments.experiment import Table, table
+from planarfriction_studies.experiments.experiment import Table, entry, table
 from planarfriction_studies.experiments.runs import IN_WORDS, SIX_SHAPES
 from planarfriction_studies.experiments.wording import fmt
 
@@ -23,9 +21,7 @@ MODEL_WORDS = {
     "published, smooth": "published reduced, LimitSurfaceTable",
     "published, ellipsoid": "published reduced, ellipsoid",
     "reduced": "ReducedModel",
-    "4 parts": "ReducedModel, 4 parts",
-    "6 parts": "ReducedModel, 6 parts",
-    "16 parts": "ReducedModel, 16 parts",
+    **{f"{count} parts": f"ReducedModel, {count} parts" for count in (4, 6, 16)},
     "auto": 'ReducedModel, parts="auto"',
     "degree 3": "distributed, 28 compressed cells",
     "degree 5": "distributed, 45 compressed cells",
@@ -57,7 +53,7 @@ def tables(rows: list[Row], numbers: Numbers) -> tuple[Table, ...]:
             {
                 f"{IN_WORDS[shape]}, {words}": each[model]
                 for shape, each in numbers["driven"].items()
-                for model, words in MODELS.items()
+                for model, words in MOVED.items()
             },
             {
                 f"{before}{name} [{unit}]": _scaled(f"{before}{name}")
@@ -75,13 +71,15 @@ def tables(rows: list[Row], numbers: Numbers) -> tuple[Table, ...]:
             | {"auto / published": lambda each: shown(each[AUTO] / each["published"])},
             "run",
         ),
-        _combinations(rows, "third quartile", "driven", 1e3, "error of the force, third quartile [mN]"),
-        _combinations(rows, "end", "load 2", 1e3, "in hand, load 2: end from the distributed model [mm]"),
-        _combinations(rows, "end", "load 1", 1e3, "in hand, load 1: end from the distributed model [mm]"),
+        _combinations(rows, "third quartile", "driven", "error of the force, third quartile [mN]"),
+        *(
+            _combinations(rows, "end", load, f"in hand, {load}: end from the distributed model [mm]")
+            for load in ("load 2", "load 1")
+        ),
         table(
             "Spin-up from rest: largest error of the torque [N mm]",
             _by_shape(spins),
-            {MODELS[model]: _scaled(model) for model in next(iter(spins.values()))},
+            {MOVED[model]: _scaled(model) for model in next(iter(spins.values()))},
             "patch",
             "A spin at 0.02 rad/s from rest, in steps of a hundredth of a deflection, from the same cells.",
         ),
@@ -99,7 +97,7 @@ def tables(rows: list[Row], numbers: Numbers) -> tuple[Table, ...]:
             "Angle of the disc under a torque that friction holds",
             angles,
             {
-                "angle [µrad]": lambda angle: 1e6 * angle,
+                "angle [µrad]": entry(scale=1e6),
                 "off": lambda angle: f"{fmt(100.0 * (angle / angles['closed form'] - 1.0), '+.3f')} %",
             },
             "model",
@@ -125,9 +123,8 @@ def _ratios(ratios: dict[str, dict[str, float]], title: str) -> Table:
     return table(title, _by_shape(ratios), {name: lambda each, name=name: shown(each[name]) for name in names}, "patch")
 
 
-def _combinations(rows: list[Row], quantity: str, run: str, factor: float, title: str) -> Table:
-    """Return the table of every model on the six shapes: one statistic of one kind of run, and the costs of the
-    runs."""
+def _combinations(rows: list[Row], quantity: str, run: str, title: str) -> Table:
+    """Return a table of every model on the six shapes: one statistic of one kind of run, and the costs of the runs."""
     chosen = [row for row in rows if run in row.case and quantity in row.errors and "far" not in row.case]
     shapes = [shape for shape in SIX_SHAPES if any(shape_of(row.case) == IN_WORDS[shape] for row in chosen)]
     result = []
@@ -135,7 +132,7 @@ def _combinations(rows: list[Row], quantity: str, run: str, factor: float, title
         own = [row for row in chosen if row.model == model]
         by_shape = {shape_of(row.case): row for row in own}
         values = (by_shape.get(IN_WORDS[shape]) for shape in shapes)
-        cells = ["as full" if row is None else shown(factor * row.errors[quantity]) for row in values]
+        cells = ["as full" if row is None else shown(1e3 * row.errors[quantity]) for row in values]
         costs, states = [row.time for row in own], [row.states for row in own]
         result.append((MODEL_WORDS[model], _span(states, str), _span(costs, shown), *cells))
     words = [IN_WORDS[shape] for shape in shapes]

@@ -15,7 +15,7 @@ from planarfriction.models import DistributedModel, ReducedModelPublished
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
 from planarfriction.scenes import Body, Contact, Scene, Signal, published_velocity, simulate
 from planarfriction.scenes.ready import FINE
-from planarfriction_studies.experiments.experiment import Work
+from planarfriction_studies.experiments.experiment import WRENCH, Work
 
 Family = str
 """Name of a figure's curves: one of `FAMILIES`."""
@@ -119,27 +119,26 @@ def scene(contacts: Sequence[Contact]) -> Scene:
 
 
 def wrenches(family: Family, count: int, case: Case, every: float) -> dict[str, np.ndarray]:
-    """Return the friction wrench about the patch's own centre of pressure at multiples of `every` [s], `wrench` [T,
-    3]."""
+    """Return `wrench` `[T, 3]` about the patch's own centre of pressure at multiples of `every` [s]."""
     here = contact(family, count, case)
     tolerances = FINE if family == "cells_distributed" else REDUCED_TOLERANCES
     histories = simulate(scene([here]), save_every=every, **tolerances).histories
-    about_origin = np.stack([histories[name].values[:, 0] for name in ("fx", "fy", "tau")], axis=-1)
+    about_origin = np.stack([histories[name].values[:, 0] for name in WRENCH], axis=-1)
     return {"wrench": wrench_at(about_origin, here.model.patch.centre_of_pressure())}
 
 
 def solve(cases: Sequence[Case], counts: Sequence[int], work: Work) -> dict[Case, Errors]:
     """Return errors of every case, with the structured solver: the bases first, then everything else, two at a time."""
-    keys = {case: {family: (*base_of(family), interval(case, family, work)) for family in FAMILIES} for case in cases}
-    wanted = {
-        (case, *key): partial(wrenches, key[0], key[1], case, key[2]) for case in cases for key in keys[case].values()
+    keys = {
+        (case, family): (case, *base_of(family), interval(case, family, work)) for case in cases for family in FAMILIES
     }
+    wanted = {key: partial(wrenches, key[1], key[2], key[0], key[3]) for key in keys.values()}
     bases = work.pieces(wanted, lambda key: _label(*key[:3]))
 
     def errors(case: Case, family: Family, count: int) -> dict[str, np.ndarray]:
-        key = keys[case][family]
-        wrench = wrenches(family, count, case, key[2])["wrench"]
-        return {"errors": relative_errors(wrench, bases[case, *key]["wrench"])}
+        key = keys[case, family]
+        wrench = wrenches(family, count, case, key[3])["wrench"]
+        return {"errors": relative_errors(wrench, bases[key]["wrench"])}
 
     runs = [(case, family, count) for family in FAMILIES for count in reversed(counts) for case in cases]
     found = work.pieces({run: partial(errors, *run) for run in runs}, lambda run: _label(*run))
@@ -154,8 +153,7 @@ def _label(case: Case, family: Family, count: int) -> str:
 
 
 def solve_by_euler(cases: Sequence[Case], counts: Sequence[int], work: Work) -> Mapping[Case, Errors]:
-    """Compute the errors of every case with the published explicit Euler steps, all grids and tables of a case in one
-    go."""
+    """Compute the errors of every case with the published explicit Euler steps, all its grids and tables in one go."""
     labels = {case: f"convergence, {case[0]} {case[1]}, explicit Euler" for case in cases}
     return work.pieces({case: partial(_euler, case, counts, labels[case], work) for case in cases}, labels.__getitem__)
 
@@ -181,8 +179,7 @@ def _euler(case: Case, counts: Sequence[int], label: str, work: Work) -> dict[st
 
 
 def _euler_part(contacts: Sequence[Contact], part: int, state: np.ndarray | None) -> dict[str, np.ndarray]:
-    """Return one of `_EULER_PARTS` equal parts: wrenches `[T, contacts, 3]` before the step at each sample, and the
-    state."""
+    """Return one of `_EULER_PARTS` equal parts: wrenches `[T, contacts, 3]` before each sample, and the state."""
     from planarfriction.kernels.body import right_hand_side
     from planarfriction.scenes.packing import pack
 

@@ -10,22 +10,12 @@ import numpy as np
 from planarfriction.plots.style import PlotFigure
 from planarfriction.scenes.ready import FINE, GRAVITY
 from planarfriction.scenes.scene import ATOL, RTOL
-from planarfriction_studies.experiments import facts, looks
-from planarfriction_studies.experiments.experiment import (
-    Arrays,
-    Comparison,
-    Result,
-    Table,
-    Work,
-    compare,
-    compare_curve,
-    dataset,
-    table,
-)
+from planarfriction_studies.experiments import experiment, facts, looks
+from planarfriction_studies.experiments.experiment import POSE, UNITS, Arrays, Comparison, Result, Work, entry
 from planarfriction_studies.experiments.in_hand import figures, runs
 from planarfriction_studies.experiments.in_hand.runs import FRICTION_CHANGE, LESS, MORE, TIGHT, Case
-from planarfriction_studies.experiments.runs import NAMES, Kind
-from planarfriction_studies.experiments.wording import fill
+from planarfriction_studies.experiments.runs import NAMES, Kind, simulated
+from planarfriction_studies.experiments.wording import report
 
 LOADS: tuple[Literal[1, 2], ...] = (1, 2)
 
@@ -51,15 +41,19 @@ def run(work: Work) -> Result:
     """Carry out the experiment."""
     cases = CASES[:2] if work.quick else CASES
     found = _simulate_all(work, cases)
-    shifts = {case: _shifts(case, found) for case in cases}
-    numbers = {case.words: _numbers(case, found, shifts[case]) for case in cases}
+    numbers = {case.words: _numbers(case, found) for case in cases}
     accuracy = _accuracy(cases, found)
-    return fill("in_hand", **_template_values(cases, found, numbers, accuracy)).result(
-        _figures(cases, found, shifts),
+    groups = {f"{case.shape}_placement_{case.placement}": case for case in cases if case.load == 1}
+    kept = {"cases": numbers, "accuracy": accuracy, "tolerances": {"report": TIGHT, "friction and grid": FINE}}
+    words = {stem: {"words": case.group, "published": case.has_references} for stem, case in groups.items()}
+    return report(
+        "in_hand",
+        _figures(cases, found, numbers, groups),
+        kept,
+        _template_values(cases, found, numbers, accuracy) | {"groups": words},
         comparisons=_comparisons(cases, found),
-        numbers={"cases": numbers, "accuracy": accuracy, "tolerances": {"report": TIGHT, "friction and grid": FINE}},
         tables=(_end_table(numbers), _shift_table(numbers), _accuracy_table(accuracy)),
-        data={_stem(case): _dataset(_group(case, cases), found) for case in cases if case.load == 1},
+        data={stem: _dataset(_group(case, cases), found) for stem, case in groups.items()},
     )
 
 
@@ -71,7 +65,7 @@ def _group(case: Case, cases: tuple[Case, ...]) -> list[Case]:
 def _dataset(group: list[Case], found: Runs) -> Any:
     columns = {(NAMES[kind], f"load {each.load}"): found[each, kind] for kind in KINDS for each in group}
     time = found[group[0], "d"]["time"]
-    return dataset(columns, runs.STORED, ("model", "load"), ("time", time, "s"))
+    return experiment.dataset(columns, runs.STORED, ("model", "load"), ("time", time, "s"))
 
 
 def _simulate_all(work: Work, cases: tuple[Case, ...]) -> Runs:
@@ -79,32 +73,28 @@ def _simulate_all(work: Work, cases: tuple[Case, ...]) -> Runs:
     computes = {}
     for case in cases:
         for kind in KINDS:
-            computes[case, kind] = runs.simulated(case.scene(kind), **TIGHT)
-            computes[case, f"{kind}, defaults"] = runs.simulated(case.scene(kind))
+            computes[case, kind] = partial(simulated, case.scene(kind), **TIGHT)
+            computes[case, f"{kind}, defaults"] = partial(simulated, case.scene(kind))
         for words, sign in ((MORE, 1), (LESS, -1)):
             law = runs.with_friction(sign * FRICTION_CHANGE)
-            computes[case, words] = runs.simulated(case.scene("d", law), **FINE)
+            computes[case, words] = partial(simulated, case.scene("d", law), **FINE)
         if case.shape == "Square":
-            computes[case, FINER_GRID] = runs.simulated(case.scene("d", cells=FINER), **FINE)
+            computes[case, FINER_GRID] = partial(simulated, case.scene("d", cells=FINER), **FINE)
     return work.pieces(computes, lambda key: f"in-hand, {key[0].words}, {key[1]}")
 
 
-def _shifts(case: Case, found: Runs) -> dict[str, float]:
-    """Return the distance by which each change moves the end of the distributed model's run [m]."""
-    base = found[case, "d"]
-    there = {words: found[case, name] for words, name in CHANGES.items() if (case, name) in found}
-    return {words: runs.end_distance(run, base) for words, run in there.items()}
-
-
-def _numbers(case: Case, found: Runs, shifts: dict[str, float]) -> dict[str, Any]:
+def _numbers(case: Case, found: Runs) -> dict[str, Any]:
     distributed, reduced = found[case, "d"], found[case, "r"]
-    friction = 0.5 * (shifts[MORE] + shifts[LESS])
+    changed = {words: found[case, name] for words, name in CHANGES.items() if (case, name) in found}
+    shifts = {words: runs.end_distance(run, distributed) for words, run in changed.items()}
     return {
         "end": {NAMES[kind]: runs.end(found[case, kind]) for kind in KINDS},
         "shift of the end [m]": shifts,
         "largest distance between the models [m]": float(runs.distance(reduced, distributed).max()),
         "angle between the models at the end [rad]": float(reduced["theta"][-1] - distributed["theta"][-1]),
-        "distance between the models as friction": FRICTION_CHANGE * shifts[REDUCED] / friction,
+        "distance between the models as friction": (
+            FRICTION_CHANGE * shifts[REDUCED] / (0.5 * (shifts[MORE] + shifts[LESS]))
+        ),
         "default tolerances, reduced [m]": runs.end_distance(found[case, "r, defaults"], reduced),
         "smallest load [N]": float(distributed["normal_force"].min()),
         "load that holds the start [N]": case.holding_load(float(distributed["x"][0])),
@@ -116,12 +106,11 @@ def _accuracy(cases: tuple[Case, ...], found: Runs) -> dict[str, dict[str, dict[
     """Return the largest distance from the converged solution by run: ours at two tolerances, and the published
     curve's."""
     result = {}
-    for case in cases:
-        for kind in KINDS if case.has_references else ():
+    for case in (case for case in cases if case.has_references):
+        for kind in KINDS:
             key = case.key(kind)
-            ours = runs.errors(found[case, kind], key)
+            ours, defaults = (runs.errors(found[case, kind + ending], key) for ending in ("", ", defaults"))
             figure = {name: float(facts.published_curve(f"{key}/{name}").deviation or 0.0) for name in ours}
-            defaults = runs.errors(found[case, f"{kind}, defaults"], key)
             result[f"{case.words}, {NAMES[kind]}"] = {"report": ours, "default": defaults, "published": figure}
     return result
 
@@ -130,26 +119,23 @@ def _comparisons(cases: tuple[Case, ...], found: Runs) -> list[Comparison]:
     rows = [_compare_load(case, found) for case in cases if case.has_references and case.shape == "Circle"]
     for case in cases:
         for kind in KINDS:
-            words = f"{case.words}, {NAMES[kind]}"
+            run, words = found[case, kind], f"{case.words}, {NAMES[kind]}"
             if case.has_references:
-                rows += runs.compare_with_published(found[case, kind], case.key(kind), words)
-                rows += runs.compare_with_converged(found[case, kind], case.key(kind), words)
-                rows += runs.compare_with_converged(
-                    found[case, f"{kind}, defaults"], case.key(kind), words, default=True
-                )
+                rows += runs.compare_with_published(run, case.key(kind), words)
+                rows += runs.compare_with_converged(run, case.key(kind), words)
+                defaults = found[case, f"{kind}, defaults"]
+                rows += runs.compare_with_converged(defaults, case.key(kind), words, default=True)
             if case.load == 2:
-                rows += _compare_rest(case, found[case, kind], words)
+                rows += _compare_rest(case, run, words)
     return rows
 
 
 def _compare_load(case: Case, found: Runs) -> Comparison:
-    """Compare the published load with ours at its own labels: each value holds until the next sample, where it is
-    recorded."""
-    run = found[case, "d"]
-    return compare_curve(
-        f"load {case.load}", run["time"][:-1], run["normal_force"][1:], f"in_hand/load/{case.load}", allowance=1e-8,
-        cause="The same samples: what is left is the error of reading the figure, known to a third or so.",
-    )  # fmt: skip
+    """Compare the published load with ours at its own labels: a value holds until the next sample, which records it."""
+    run, words = found[case, "d"], f"load {case.load}"
+    cause = "The same samples: what is left is the error of reading the figure, known to a third or so."
+    curve = f"in_hand/load/{case.load}"
+    return experiment.compare_curve(words, run["time"][:-1], run["normal_force"][1:], curve, 1e-8, cause)
 
 
 def _compare_rest(case: Case, run: Arrays, words: str) -> list[Comparison]:
@@ -157,22 +143,16 @@ def _compare_rest(case: Case, run: Arrays, words: str) -> list[Comparison]:
     weight."""
     scene = case.scene("d")
     weight = scene.body.mass * GRAVITY / scene.contacts[0].count
-    closed = {"fx": (0.0, "N"), "fy": (weight, "N"), "tau": (weight * float(run["x"][-1]), "N m")}
+    closed = {"fx": (0.0, 1e-9), "fy": (weight, 1e-9), "tau": (weight * float(run["x"][-1]), 1e-11)}
     cause = "Each finger carries half the weight: what is left is rounding, and the bristles' last settling."
-    return [
-        compare(f"{words}, at rest, {name}", run[name][-1], value, "closed form", tolerance, unit, cause)
-        for (name, (value, unit)), tolerance in zip(closed.items(), (1e-9, 1e-9, 1e-11), strict=True)
-    ]
+    rows = ((f"{words}, at rest, {name}", run[name][-1], *each, UNITS[name], cause) for name, each in closed.items())
+    return experiment.compare_all("closed form", rows)
 
 
 def _template_values(
     cases: tuple[Case, ...], found: Runs, numbers: dict[str, dict[str, Any]], accuracy: dict[str, Any]
 ) -> dict[str, Any]:
     """Return the values that the template names."""
-    worst = {
-        who: {name: max(row[who][name] for row in accuracy.values()) for name in ("y", "theta", "fy")}
-        for who in ("report", "default", "published")
-    }
     shifts = {case: each["shift of the end [m]"] for case, each in numbers.items()}
     apart = sorted((each[REDUCED], case) for case, each in shifts.items())
     friction = {case: max(each[MORE], each[LESS]) for case, each in shifts.items()}
@@ -180,9 +160,10 @@ def _template_values(
     more, less = shifts[touchiest][MORE], shifts[touchiest][LESS]
     loads = numbers[touchiest]
     return {
-        "ours": worst["report"],
-        "theirs": worst["published"],
-        "default": worst["default"],
+        "worst": {
+            who: {name: max(row[who][name] for row in accuracy.values()) for name in ("y", "theta", "fy")}
+            for who in ("report", "default", "published")
+        },
         "nearest": apart[0][::-1],
         "farthest": apart[-1][::-1],
         "solver": max(each[DEFAULTS] for each in shifts.values()),
@@ -191,30 +172,19 @@ def _template_values(
         "one_sided": {"more": more, "less": less} if max(more, less) > 1.5 * min(more, less) else None,
         "shares": [each["distance between the models as friction"] for each in numbers.values()],
         "change": FRICTION_CHANGE,
-        "first_case": cases[0].words,
-        "first": numbers[cases[0].words],
         "margin": abs(loads["load that holds the end [N]"] / loads["smallest load [N]"] - 1.0),
         "where": _where_forces_differ(cases, found),
         "starts": runs.CENTRES_OF_MASS,
-        "tight": TIGHT,
-        "rtol": RTOL,
-        "atol": ATOL,
+        "default_tolerances": (RTOL, ATOL),
         "far": any(case.placement == 2 for case in cases),
-        "groups": {
-            _stem(case): {"words": case.group, "published": case.has_references} for case in cases if case.load == 1
-        },
     }
-
-
-def _stem(case: Case) -> str:
-    return f"{case.shape}_placement_{case.placement}"
 
 
 def _where_forces_differ(cases: tuple[Case, ...], found: Runs) -> dict[str, Any]:
     """Return the run and the time [s] at which fy at the default tolerances is farthest from the converged one."""
     every = []
-    for case in cases:
-        for kind in KINDS if case.has_references else ():
+    for case in (case for case in cases if case.has_references):
+        for kind in KINDS:
             run, reference = found[case, f"{kind}, defaults"], facts.converged(case.key(kind))
             difference = np.abs(run["fy"][1:] - reference["fy"])
             at = int(difference.argmax())
@@ -223,12 +193,19 @@ def _where_forces_differ(cases: tuple[Case, ...], found: Runs) -> dict[str, Any]
     return {"words": case, "time": time}
 
 
-def _figures(cases: tuple[Case, ...], found: Runs, shifts: dict[Case, dict[str, float]]) -> dict[str, PlotFigure]:
-    shown = [case for case in cases if case.shape == "Circle" and case.load == 1]
+def _figures(
+    cases: tuple[Case, ...], found: Runs, numbers: dict[str, Any], groups: dict[str, Case]
+) -> dict[str, PlotFigure]:
+    """Return the motion and forces of each shape and placement under both loads, and the distances of the models."""
+    shown = [case for case in groups.values() if case.shape == "Circle"]
     result = {"motion": figures.strobes({case.words: (case.scene("d"), found[case, "d"]) for case in shown})}
-    for case in cases:
-        if case.load == 1:
-            result |= _histories(case, _group(case, cases), found)
+    for stem, case in groups.items():
+        group = {f"load {each.load}": each for each in _group(case, cases)}
+        panels = {load: {NAMES[kind]: found[each, kind] for kind in KINDS} for load, each in group.items()}
+        keys = {load: {NAMES[kind]: each.key(kind) for kind in KINDS} for load, each in group.items()}
+        published = keys if case.has_references else None
+        for what, names in (("motion", ("normal_force", "x", "y", "theta")), ("forces", ("fx", "fy", "tau"))):
+            result[f"{stem}_{what}"] = figures.histories(panels, names, published=published)
     lines = {
         f"load {load}": {
             case.group: (found[case, "d"]["time"], runs.distance(found[case, "r"], found[case, "d"]))
@@ -237,64 +214,48 @@ def _figures(cases: tuple[Case, ...], found: Runs, shifts: dict[Case, dict[str, 
         }
         for load in LOADS
     }
-    result["distance"] = figures.distances(lines, "reduced from distributed [mm]")
-    result["what_moves_the_end"] = figures.end_shifts(
-        {case.words: shifts[case] for case in cases},
-        {REDUCED: looks.REDUCED, DEFAULTS: looks.OTHERS[0], FINER_GRID: looks.OTHERS[2]},
-        "shift of the end [mm]",
-    )
-    return result
-
-
-def _histories(case: Case, group: list[Case], found: Runs) -> dict[str, PlotFigure]:
-    """Return the motion and forces of one shape and placement under both loads."""
-    panels = {f"load {each.load}": {NAMES[kind]: found[each, kind] for kind in KINDS} for each in group}
-    published = {
-        f"load {each.load}": {NAMES[kind]: each.key(kind) for kind in KINDS} for each in group if each.has_references
-    }
-    columns = {"motion": ("normal_force", "x", "y", "theta"), "forces": ("fx", "fy", "tau")}
-    return {
-        f"{_stem(case)}_{what}": figures.histories(panels, names, published=published)
-        for what, names in columns.items()
+    shifts = {case: each["shift of the end [m]"] for case, each in numbers.items()}
+    colours = {REDUCED: looks.REDUCED, DEFAULTS: looks.OTHERS[0], FINER_GRID: looks.OTHERS[2]}
+    return result | {
+        "distance": figures.distances(lines, "reduced from distributed [mm]"),
+        "what_moves_the_end": figures.end_shifts(shifts, colours, "shift of the end [mm]"),
     }
 
 
-def _end_table(numbers: dict[str, dict[str, Any]]) -> Table:
-    ends = {
-        f"{label.replace('$', '')}, {kind}": lambda each, kind=kind, name=name, factor=factor: (
-            factor * each["end"][kind][name]
-        )
-        for kind in (NAMES[kind] for kind in KINDS)
-        for name, (label, factor) in figures.AXES.items()
-        if name in ("x", "y", "theta")
-    }
-    columns = ends | {
-        "distance at the end [mm]": lambda each: 1e3 * each["shift of the end [m]"][REDUCED],
-        "largest [mm]": lambda each: 1e3 * each["largest distance between the models [m]"],
+def _end_table(numbers: dict[str, dict[str, Any]]) -> experiment.Table:
+    axes = {name: looks.AXES[name] for name in POSE}
+    columns = {
+        f"{label.replace('$', '')}, {NAMES[kind]}": entry("end", NAMES[kind], name, scale=factor)
+        for kind in KINDS
+        for name, (label, factor) in axes.items()
+    } | {
+        "distance at the end [mm]": entry("shift of the end [m]", REDUCED, scale=1e3),
+        "largest [mm]": entry("largest distance between the models [m]", scale=1e3),
         "angle [deg]": lambda each: float(np.degrees(each["angle between the models at the end [rad]"])),
     }
-    return table("Where the plate is after 2 s, and how far the models are apart", numbers, columns, "case")
+    title = "Where the plate is after 2 s, and how far the models are apart"
+    return experiment.table(title, numbers, columns, "case")
 
 
-def _shift_table(numbers: dict[str, dict[str, Any]]) -> Table:
+def _shift_table(numbers: dict[str, dict[str, Any]]) -> experiment.Table:
     def shift(each: dict[str, Any], cause: str) -> float | str:
         shifts = each["shift of the end [m]"]
         return 1e3 * shifts[cause] if cause in shifts else ""
 
     loads = ("load that holds the start [N]", "load that holds the end [N]", "smallest load [N]")
-    columns = {f"{cause} [mm]": partial(shift, cause=cause) for cause in CHANGES} | {
-        "default tolerances, reduced [mm]": lambda each: 1e3 * each["default tolerances, reduced [m]"],
-        "models apart, as friction [%]": lambda each: 1e2 * each["distance between the models as friction"],
+    columns: dict[str, Any] = {f"{cause} [mm]": partial(shift, cause=cause) for cause in CHANGES} | {
+        "default tolerances, reduced [mm]": entry("default tolerances, reduced [m]", scale=1e3),
+        "models apart, as friction [%]": entry("distance between the models as friction", scale=1e2),
     }
-    columns |= {name: lambda each, name=name: each[name] for name in loads}
     note = (
         "Shifts of the distributed model's end, unless said otherwise. A plate is held by the load that puts its "
         "weight on the limit surface of the cells, with $\\mu_s$."
     )
-    return table("What moves the end", numbers, columns, "case", note)
+    columns |= {name: entry(name) for name in loads}
+    return experiment.table("What moves the end", numbers, columns, "case", note)
 
 
-def _accuracy_table(accuracy: dict[str, dict[str, dict[str, float]]]) -> Table:
+def _accuracy_table(accuracy: dict[str, dict[str, dict[str, float]]]) -> experiment.Table:
     whose = {"default": "default tolerances", "report": "tolerances of this report", "published": "published curve"}
     units = {"position [µm]": (1e6, ("x", "y")), "θ [µrad]": (1e6, ("theta",)), "force [mN]": (1e3, ("fx", "fy"))}
     columns = {
@@ -302,6 +263,5 @@ def _accuracy_table(accuracy: dict[str, dict[str, dict[str, float]]]) -> Table:
         for who, words in whose.items()
         for unit, (factor, names) in units.items()
     }
-    return table(
-        "Largest distance from the converged solution of the same model, one coordinate", accuracy, columns, "run"
-    )
+    title = "Largest distance from the converged solution of the same model, one coordinate"
+    return experiment.table(title, accuracy, columns, "run")

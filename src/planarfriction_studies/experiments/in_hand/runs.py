@@ -1,9 +1,8 @@
-"""Code that the in-hand experiments share: cases, scenes, runs as arrays, distances between runs, comparisons."""
+"""Cases, scenes, distances between runs and comparisons, which the in-hand experiments share."""
 
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -13,10 +12,18 @@ from planarfriction import scenes
 from planarfriction.laws import LuGre
 from planarfriction.limit_surface import LimitSurfaceCells
 from planarfriction.patch import PUBLISHED_PATCHES
-from planarfriction.scenes import Scene, simulate
+from planarfriction.scenes import Scene
 from planarfriction.scenes.ready import GRAVITY
-from planarfriction_studies.experiments.experiment import Arrays, Comparison, compare_converged, compare_curve
-from planarfriction_studies.experiments.runs import IN_WORDS, LAW, Kind, columns, published_model
+from planarfriction_studies.experiments.experiment import (
+    POSE,
+    WRENCH,
+    Arrays,
+    Comparison,
+    compare_columns,
+    compare_converged,
+    compare_curve,
+)
+from planarfriction_studies.experiments.runs import IN_WORDS, LAW, Kind, published_model
 
 TIGHT: dict[str, Any] = {"rtol": 1e-8, "atol": 3e-8}
 """Tolerances of all runs that are drawn or compared, unless said otherwise."""
@@ -33,18 +40,15 @@ FRICTION_CHANGE = 1e-3
 
 MORE, LESS = f"{FRICTION_CHANGE:.1%} more friction", f"{FRICTION_CHANGE:.1%} less friction"
 
-COLUMNS = {"x": "m", "y": "m", "theta": "rad", "fx": "N", "fy": "N", "tau": "N m"}
-"""Compared columns of a run and their units."""
-
-STORED = COLUMNS | {"normal_force": "N"}
-"""Columns that are kept."""
-
 OF_THE_FIGURE = (
     "The figure was made with LSODA at a relative tolerance of $10^{-6}$; the difference is the error of that run, as "
     "its distance from the converged solution shows. The sample labelled $t$ is the state at $t$ + 0.01 s."
 )
 OF_BOTH = "What two solvers leave at tight tolerances, and the single precision in which the converged one is kept."
 OF_DEFAULTS = "Our own error at the default tolerances."
+
+STORED = (*POSE, *WRENCH, "normal_force")
+"""Columns that are kept."""
 
 CENTRES_OF_MASS = {1: (0.002, 0.0), 2: (0.025, 0.0)}
 """Placement -> where the centre of mass starts, the pads being at the origin [m]; 2 is called far."""
@@ -96,11 +100,6 @@ class Case:
         return abs(float(wrench @ twist)) / LAW.mu_s
 
 
-def simulated(scene: Scene, **tolerances: Any) -> Callable[[], Arrays]:
-    """Return the columns of the run of a scene, a piece of work."""
-    return lambda: columns(simulate(scene, **tolerances))
-
-
 def with_friction(share: float) -> LuGre:
     """Return the published law with both friction coefficients times `1 + share`."""
     return dataclasses.replace(LAW, mu_c=LAW.mu_c * (1.0 + share), mu_s=LAW.mu_s * (1.0 + share))
@@ -118,33 +117,23 @@ def end_distance(run: Arrays, other: Arrays) -> float:
 
 def end(run: Arrays) -> dict[str, float]:
     """Return the end position [m, m, rad]."""
-    return {name: float(run[name][-1]) for name in ("x", "y", "theta")}
+    return {name: float(run[name][-1]) for name in POSE}
 
 
 def errors(run: Arrays, key: str) -> dict[str, float]:
     """Return the largest distance from the converged solution `key` by column."""
-    return {row.quantity: row.difference for row in _converged(run, key, "", ALLOWANCE, OF_BOTH)}
+    rows = compare_columns(compare_converged, "", run, key, ALLOWANCE, OF_BOTH)
+    return {row.quantity: row.difference for row in rows}
 
 
 def compare_with_converged(run: Arrays, key: str, words: str, *, default: bool = False) -> list[Comparison]:
     """Compare a run with the converged solution `key`; of a run at default tolerances its motion only."""
     if default:
-        return _converged(run, key, f"{words}, default tolerances, ", DEFAULT_ALLOWANCE, OF_DEFAULTS)
-    return _converged(run, key, f"{words}, ", ALLOWANCE, OF_BOTH)
+        words = f"{words}, default tolerances, "
+        return compare_columns(compare_converged, words, run, key, DEFAULT_ALLOWANCE, OF_DEFAULTS)
+    return compare_columns(compare_converged, f"{words}, ", run, key, ALLOWANCE, OF_BOTH)
 
 
 def compare_with_published(run: Arrays, key: str, words: str) -> list[Comparison]:
     """Compare a run with the published curves `key`."""
-    return [
-        compare_curve(f"{words}, {name}", run["time"], run[name], f"{key}/{name}", ALLOWANCE[unit], OF_THE_FIGURE)
-        for name, unit in COLUMNS.items()
-    ]
-
-
-def _converged(run: Arrays, key: str, before: str, allowance: dict[str, float], cause: str) -> list[Comparison]:
-    """Compare the columns whose units have an allowance."""
-    return [
-        compare_converged(f"{before}{name}", run["time"], run[name], f"{key}/{name}", unit, allowance[unit], cause)
-        for name, unit in COLUMNS.items()
-        if unit in allowance
-    ]
+    return compare_columns(compare_curve, f"{words}, ", run, key, ALLOWANCE, OF_THE_FIGURE)

@@ -39,12 +39,8 @@ def overview(surfaces: Mapping[str, LimitSurfaceCells], *, coarse: bool = False)
         axes.set_proj_type("ortho")  # the outline of a sphere is then a great circle
         axes.set_box_aspect((1.0, 1.0, 1.0), zoom=0.84)
         axes.tick_params(labelsize="x-small", pad=0)
-        axes.set(
-            xlabel="$f_x$ [-]",
-            ylabel="$f_y$ [-]",
-            zlabel="$\\tau/r$ [-]",
-            **{f"{name}ticks": [-1, 0, 1] for name in "xyz"},
-        )
+        ticks: Any = {f"{name}ticks": [-1, 0, 1] for name in "xyz"}
+        axes.set(xlabel="$f_x$ [-]", ylabel="$f_y$ [-]", zlabel="$\\tau/r$ [-]", **ticks)
         axes.zaxis.labelpad = -6
         _circles(axes)
         axes.set_title(IN_WORDS[name], fontsize="medium", y=0.95)
@@ -56,13 +52,8 @@ def _circles(axes: Any) -> None:
     elevation, azimuth = np.radians([axes.elev, axes.azim])
     towards = np.array([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)])
     around = np.linspace(0.0, 2.0 * np.pi, 181)
-    level = np.zeros_like(around)
-    rings = [
-        np.stack([np.cos(around), np.sin(around), level]),
-        np.stack([np.cos(around), level, np.sin(around)]),
-        np.stack([level, np.cos(around), np.sin(around)]),
-    ]
-    for ring in rings:
+    for axis in (2, 1, 0):
+        ring = np.insert([np.cos(around), np.sin(around)], axis, 0.0, axis=0)
         near = np.where(towards @ ring > 0.0, ring, np.nan)
         axes.plot(*near, color=BESIDE, lw=0.9, zorder=10)
     right = np.array([-np.sin(azimuth), np.cos(azimuth), 0.0])
@@ -101,8 +92,7 @@ def _section(axes: Any, surface: LimitSurfaceCells, column: int, count: int = MA
 
 
 def _points_of(surface: Any, column: int, count: int, *, closed: bool = True) -> np.ndarray:
-    """Return the force along axis `column` and torque over r, `[2, count]`, of twists at equal angles around the
-    section."""
+    """Return force along axis `column` and torque over r, `[2, count]`, of twists at equal angles around a section."""
     angle = np.linspace(0.0, 2.0 * np.pi, count, endpoint=closed)
     azimuth = np.where(angle <= np.pi, 0.0, np.pi) + 0.5 * np.pi * column
     points = scaled_samples(surface, np.where(angle <= np.pi, angle, 2.0 * np.pi - angle), azimuth)[1]
@@ -113,13 +103,14 @@ def gradient_line(surface: LimitSurfaceCells, numbers: dict[str, Any]) -> PlotFi
     """Draw the line and its load, the force over the centre of rotation, and the section with the two spins marked."""
     figure = new_figure(10.0, 4.6)
     load, force, section = figure.subplots(1, 3, width_ratios=(0.55, 1.0, 1.25))
+    sides = surface, LimitSurfaceEllipsoid(surface.patch)
     centres = (
         ("about the centre of pressure", numbers["cells"]["centre of pressure"], looks.OTHERS[1], "D"),
         ("about the middle of the load", numbers["cells"]["middle cell"], looks.OTHERS[2], "o"),
     )
     _load_panel(load, numbers, centres)
-    _force_panel(force, surface, numbers, centres)
-    _spin_panel(section, surface, numbers, centres)
+    _force_panel(force, sides, numbers, centres)
+    _spin_panel(section, sides, numbers, centres)
     looks.legend(figure, section, 3, fontsize="small")
     return figure
 
@@ -135,40 +126,37 @@ def _load_panel(axes: Any, numbers: dict[str, Any], centres: Any) -> None:
     tidy(axes)
 
 
-def _force_panel(axes: Any, surface: LimitSurfaceCells, numbers: dict[str, Any], centres: Any) -> None:
+def _force_panel(axes: Any, sides: Any, numbers: dict[str, Any], centres: Any) -> None:
+    """Draw fx of unit spins about the points (0, y)."""
     half = 0.5 * numbers["cell"] * len(numbers["loads"])
     y = np.linspace(-1.25 * half, 1.25 * half, 2001)
     continuous = 1.0 - 2.0 * np.clip((y + half) / (2.0 * half), 0.0, 1.0) ** 2
-    axes.plot(_force_of(surface, y), 1e3 * y, color=SUM, lw=1.4)
-    axes.plot(_force_of(LimitSurfaceEllipsoid(surface.patch), y), 1e3 * y, color=BESIDE, lw=1.4)
+    for each, colour in zip(sides, (SUM, BESIDE), strict=True):
+        axes.plot(_spins(each, y)[:, 0], 1e3 * y, color=colour, lw=1.4)
     axes.plot(continuous, 1e3 * y, color=looks.EXACT, lw=1.0, ls=LINE_STYLES[1])
     for _, at, colour, marker in centres:
         axes.axhline(1e3 * at, color=colour, lw=0.8)
-        for each in (surface, LimitSurfaceEllipsoid(surface.patch)):
-            axes.plot(_force_of(each, np.array([at])), [1e3 * at], marker=marker, ms=5, color=colour, ls="")
+        for each in sides:
+            axes.plot(_spins(each, np.array([at]))[:, 0], [1e3 * at], marker=marker, ms=5, color=colour, ls="")
     axes.set(xlabel="$f_x$ [N]", ylabel="centre of rotation, y [mm]", ylim=(-10.5, 10.5), xlim=(-1.05, 1.05))
     tidy(axes)
 
 
-def _force_of(surface: Any, y: np.ndarray) -> np.ndarray:
-    """Return fx of unit spins about the points (0, y)."""
+def _spins(surface: Any, y: np.ndarray) -> np.ndarray:
+    """Return wrenches `[N, 3]` at the centre of pressure of unit spins about the points (0, y)."""
     zero = np.zeros_like(y)
-    return surface.wrench(np.stack([y, zero, zero + 1.0], -1))[:, 0]
+    return geometry.wrench_at(surface.wrench(np.stack([y, zero, zero + 1.0], -1)), surface.centre_of_pressure)
 
 
-def _spin_panel(axes: Any, surface: LimitSurfaceCells, numbers: dict[str, Any], centres: Any) -> None:
+def _spin_panel(axes: Any, sides: Any, numbers: dict[str, Any], centres: Any) -> None:
     """Draw the upper half of the section, turned to positive torque: what balances the friction of a negative spin."""
-    ellipsoid = LimitSurfaceEllipsoid(surface.patch)
-    for each, colour, name in ((surface, SUM, "sum over the cells"), (ellipsoid, BESIDE, "ellipsoid")):
+    for each, colour, name in zip(sides, (SUM, BESIDE), ("sum over the cells", "ellipsoid"), strict=True):
         axes.plot(*_points_of(each, 0, 2881), color=colour, lw=1.4, label=name)
     axes.plot([], [], color=looks.EXACT, lw=1.0, ls=LINE_STYLES[1], label="continuous pressure")
     for name, y, colour, marker in centres:
-        points = []
-        for each in (surface, ellipsoid):
-            wrench = geometry.wrench_at(each.wrench([y, 0.0, 1.0]), each.centre_of_pressure)
-            points.append((wrench[0], wrench[2] / each.contact_radius))
-        axes.plot(*np.array(points).T, color=colour, lw=0.9, marker=marker, ms=5.5, label=f"spin {name}")
-    torque = numbers["cells"]["torque"] / surface.contact_radius
+        points = [_spins(each, np.array([y]))[0] / [1.0, 1.0, each.contact_radius] for each in sides]
+        axes.plot(*np.array(points)[:, [0, 2]].T, color=colour, lw=0.9, marker=marker, ms=5.5, label=f"spin {name}")
+    torque = numbers["cells"]["torque"] / sides[0].contact_radius
     axes.plot([0.0], [-torque], marker="*", ms=10, ls="", color=looks.EXACT, label="torque without force", zorder=1)
     axes.set(xlabel="$f_x$ [-]", ylabel="$\\tau/r$ [-]", xlim=(-0.32, 0.32), ylim=(-1.01, -0.86))
     tidy(axes)

@@ -11,7 +11,7 @@ import numpy as np
 from planarfriction.limit_surface import LimitSurfaceTablePublished
 from planarfriction.patch import ContactPatch
 from planarfriction_studies.experiments import facts
-from planarfriction_studies.experiments.experiment import Comparison, compare, compare_all
+from planarfriction_studies.experiments.experiment import Comparison, compare_all
 from planarfriction_studies.experiments.runs import IN_WORDS
 
 WIDTH, CELLS = 0.02, 21
@@ -19,12 +19,15 @@ WIDTH, CELLS = 0.02, 21
 
 Numbers = dict[str, Any]
 
+_LENGTH = (6e-12, "m", "Printed to $10^{-11}$ m: rounding.")
+_PLACE = (6e-10, "m", "Printed to $10^{-9}$ m: rounding.")
+
 LAST_DIGIT = {
     "loaded cells": (0.0, "1", "A count."),
-    "centre of pressure x [m]": (6e-10, "m", "Printed to $10^{-9}$ m: rounding."),
-    "centre of pressure y [m]": (6e-10, "m", "Printed to $10^{-9}$ m: rounding."),
-    "contact radius, plain sum [m]": (6e-12, "m", "Printed to $10^{-11}$ m: rounding."),
-    "contact radius, as published [m]": (6e-12, "m", "Printed to $10^{-11}$ m: rounding."),
+    "centre of pressure x [m]": _PLACE,
+    "centre of pressure y [m]": _PLACE,
+    "contact radius, plain sum [m]": _LENGTH,
+    "contact radius, as published [m]": _LENGTH,
     "second moment [m^2]": (6e-12, "m^2", "Printed to $10^{-11}$ m²: rounding."),
 }
 """Column of the table of patches -> half a unit of its last digit and a little, unit, cause."""
@@ -49,13 +52,11 @@ def patch_numbers(patches: Mapping[str, ContactPatch]) -> dict[str, Numbers]:
 
 def patch_comparisons(ours: Mapping[str, Numbers]) -> list[Comparison]:
     """Compare each column of the table of patches over all its rows."""
-    published = facts.published_table("patches")
-    rows = []
-    for column, (tolerance, unit, cause) in LAST_DIGIT.items():
+    published, rows = facts.published_table("patches"), []
+    for column, rest in LAST_DIGIT.items():
         found, expected = (np.array([each[name][column] for name in published]) for each in (ours, published))
-        quantity = f"table of patches, {column.partition(' [')[0]}"
-        rows.append(compare(quantity, found, expected, "published", tolerance, unit, cause))
-    return rows
+        rows.append((f"table of patches, {column.partition(' [')[0]}", found, expected, *rest))
+    return compare_all("published", rows)
 
 
 def disc_numbers(mask: ContactPatch) -> Numbers:
@@ -63,10 +64,11 @@ def disc_numbers(mask: ContactPatch) -> Numbers:
     disc = ContactPatch.disc(0.5 * WIDTH, CELLS)
     grid = mask.grid
     assert grid is not None, "the mask is cut from a grid"
+    radius = math.sqrt(float(mask.area()) / math.pi)
     return {
         "cell": grid.cell_width,
-        "equal-area radius": math.sqrt(float(mask.area()) / math.pi),
-        "equal-area radius in cells": math.sqrt(float(mask.area()) / math.pi) / grid.cell_width,
+        "equal-area radius": radius,
+        "equal-area radius in cells": radius / grid.cell_width,
         "half width in cells": 0.5 * grid.columns,
         "radius": 0.5 * WIDTH,
         "contact radius on the grid": float(disc.contact_radius()),
@@ -90,46 +92,41 @@ LUMPED = (
 
 def _disc_rows(numbers: Numbers) -> list[_Row]:
     """Return `r = 2 R/3` and `<rho^2> = R^2/2`: of the mask with the radius of equal area, of a disc cut by its rim."""
-    disc, mask = numbers["disc"], numbers["patches"]["Circle"]
+    disc, mask, rows = numbers["disc"], numbers["patches"]["Circle"], []
     cell = disc["cell"]
-    lost = cell**2 / 6.0
     ragged = "Its cells stand in whole rows: the rim is ragged, and each cell's load stands at its middle."
     lumped = "Each cell's load stands at its middle: a cell's own second moment, $c^2/6$ for the width $c$, is missing."
     grid = disc["contact radius on the grid"], disc["second moment on the grid"]
-    rows: list[_Row] = []
     for name, radius, (first, second), causes in (
-        ("mask of 317 cells", disc["equal-area radius"], _moments(mask), (ragged, ragged)),
+        ("mask of 317 cells", disc["equal-area radius"], (mask[_RADIUS], mask[_MOMENT]), (ragged, ragged)),
         ("disc cut by its rim", disc["radius"], grid, (LUMPED, lumped)),
     ):
         rows.append((f"contact radius, {name}", first, 2.0 * radius / 3.0, cell**2 / (12.0 * first), "m", causes[0]))
-        rows.append((f"second moment, {name}", second, 0.5 * radius**2, lost, "m^2", causes[1]))
+        rows.append((f"second moment, {name}", second, 0.5 * radius**2, cell**2 / 6.0, "m^2", causes[1]))
     return rows
 
 
-def _moments(row: Numbers) -> tuple[float, float]:
-    return row["contact radius, plain sum [m]"], row["second moment [m^2]"]
+_RADIUS, _MOMENT = "contact radius, plain sum [m]", "second moment [m^2]"
 
 
 def _grid_rows(patches: Mapping[str, Numbers]) -> list[_Row]:
     """Return the second moments of regular grids, exactly; contact radii of the square and the rod, whose cells lack a
     little."""
     cell = WIDTH / CELLS
-    square = WIDTH * (math.sqrt(2.0) + math.asinh(1.0)) / 6.0
     exact = "Sums of squares of whole numbers: rounding."
-    second = {
+    seconds = {
         "Square": (CELLS**2 - 1) * cell**2 / 6.0,
         "Line": (CELLS**2 - 1) * cell**2 / 12.0,
         "LineGrad": (CELLS - 1) * (CELLS + 2) * cell**2 / 18.0,
     }
+    radii = {"Square": WIDTH * (math.sqrt(2.0) + math.asinh(1.0)) / 6.0, "Line": 0.25 * WIDTH}
     rows: list[_Row] = [
-        (f"second moment, {IN_WORDS[name]}", _moments(patches[name])[1], value, 1e-17, "m^2", exact)
-        for name, value in second.items()
+        (f"second moment, {IN_WORDS[name]}", patches[name][_MOMENT], value, 1e-17, "m^2", exact)
+        for name, value in seconds.items()
     ]
-    for name, value in (("Square", square), ("Line", 0.25 * WIDTH)):
-        found = _moments(patches[name])[0]
-        rows.append(
-            (f"contact radius, {IN_WORDS[name]}, without cells", found, value, cell**2 / (12.0 * found), "m", LUMPED)
-        )
+    for name, value in radii.items():
+        found, words = patches[name][_RADIUS], f"contact radius, {IN_WORDS[name]}, without cells"
+        rows.append((words, found, value, cell**2 / (12.0 * found), "m", LUMPED))
     return rows
 
 
@@ -140,12 +137,8 @@ def _line_rows(numbers: Numbers) -> list[_Row]:
     cause = "Centre of rotation just beyond the last cell: the force is 1 and the torque 0, of what the search finds."
     for name in ("Line", "LineGrad"):
         row = numbers["patches"][name]
-        middle, radius = row["centre of pressure y [m]"], row["contact radius, plain sum [m]"]
-        end = 0.5 * (CELLS - 1) * cell - middle  # the nearer one, at the heavy end
-        expected = math.sqrt(2.0 - 2.0 * end / math.hypot(end, radius))
-        words, found = (
-            f"ellipsoid, largest distance of corresponding points, {IN_WORDS[name]}",
-            numbers["ellipsoid"][name],
-        )
-        rows.append((words, found["points, max"], expected, 1e-5, "1", cause))
+        end = 0.5 * (CELLS - 1) * cell - row["centre of pressure y [m]"]  # the nearer one, at the heavy end
+        expected = math.sqrt(2.0 - 2.0 * end / math.hypot(end, row[_RADIUS]))
+        words = f"ellipsoid, largest distance of corresponding points, {IN_WORDS[name]}"
+        rows.append((words, numbers["ellipsoid"][name]["points, max"], expected, 1e-5, "1", cause))
     return rows

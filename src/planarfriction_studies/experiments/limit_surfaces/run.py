@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -19,21 +20,11 @@ from planarfriction.limit_surface import (
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
 from planarfriction.plots.limit_surface import sample_limit_surface, scaled_samples
 from planarfriction_studies.experiments import facts
-from planarfriction_studies.experiments.experiment import Result, Table, Work, table
-from planarfriction_studies.experiments.limit_surfaces import figures
-from planarfriction_studies.experiments.limit_surfaces.gradient import gradient_comparisons, gradient_numbers
-from planarfriction_studies.experiments.limit_surfaces.patches import (
-    LAST_DIGIT,
-    disc_numbers,
-    patch_comparisons,
-    patch_numbers,
-    shape_comparisons,
-)
+from planarfriction_studies.experiments.experiment import WRENCH, Result, Table, Work, entry, table
+from planarfriction_studies.experiments.limit_surfaces import figures, gradient
+from planarfriction_studies.experiments.limit_surfaces import patches as shapes
 from planarfriction_studies.experiments.runs import IN_WORDS, SIX_SHAPES
-from planarfriction_studies.experiments.wording import fill, span
-
-if TYPE_CHECKING:
-    import xarray as xr
+from planarfriction_studies.experiments.wording import report, span
 
 DIRECTIONS = (200, 400)
 """Polar angles and azimuths at which the errors are measured; a table's 20 segments fall between them."""
@@ -47,8 +38,6 @@ STORED = {"published": LimitSurfaceTablePublished, "smooth": LimitSurfaceTable, 
 
 Numbers = dict[str, Any]
 
-UNITS = {"fx": "N", "fy": "N", "tau": "N m"}
-
 COARSER = 2
 """The tables are measured at so many times fewer angles, and never at a node: an exact surface costs more."""
 
@@ -58,40 +47,40 @@ def run(work: Work) -> Result:
     patches = {name: make() for name, make in PUBLISHED_PATCHES.items()}
     surfaces = {name: LimitSurfaceCells(patches[name]) for name in SIX_SHAPES}
     count = (DIRECTIONS[0] // 4, DIRECTIONS[1] // 4) if work.quick else DIRECTIONS
-    measured = {name: _measured(surface, count) for name, surface in surfaces.items()}
-    errors = work.pieces(measured, lambda name: f"{name}, {count[0]} polar angles")
-    gradient = gradient_numbers()
+    computes = {name: partial(_errors, surface, count) for name, surface in surfaces.items()}
+    errors = work.pieces(computes, lambda name: f"{name}, {count[0]} polar angles")
     numbers = {
-        "patches": patch_numbers(patches),
-        "disc": disc_numbers(patches["Circle"]),
+        "patches": shapes.patch_numbers(patches),
+        "disc": shapes.disc_numbers(patches["Circle"]),
         "ellipsoid": {name: each["ellipsoid"] for name, each in errors.items()},
         "tables": {name: {key: each[key] for key in STORED} for name, each in errors.items()},
-        "gradient": gradient,
+        "gradient": gradient.gradient_numbers(),
     }
-    return fill("limit_surfaces", **_template_values(numbers)).result(
+    return report(
+        "limit_surfaces",
         {
             "surfaces": figures.overview(surfaces, coarse=work.quick),
             "correspondence": figures.correspondence(surfaces),
-            "gradient_line": figures.gradient_line(surfaces["LineGrad"], gradient),
+            "gradient_line": figures.gradient_line(surfaces["LineGrad"], numbers["gradient"]),
         },
+        numbers,
+        _template_values(numbers),
         comparisons=[
-            *patch_comparisons(numbers["patches"]),
-            *shape_comparisons(numbers),
-            *gradient_comparisons(gradient),
+            *shapes.patch_comparisons(numbers["patches"]),
+            *shapes.shape_comparisons(numbers),
+            *gradient.gradient_comparisons(numbers["gradient"]),
         ],
-        numbers=numbers,
         tables=(_patches(numbers["patches"]), _ellipsoid(numbers["ellipsoid"]), _stored(numbers["tables"])),
         data={"surfaces": _dataset(surfaces)},
     )
 
 
-def _measured(surface: LimitSurfaceCells, count: tuple[int, int]) -> Callable[[], dict[str, Any]]:
-    return lambda: {"ellipsoid": ellipsoid_errors(surface, count), **table_errors(surface.patch, count)}
+def _errors(surface: LimitSurfaceCells, count: tuple[int, int]) -> dict[str, Any]:
+    return {"ellipsoid": ellipsoid_errors(surface, count), **table_errors(surface.patch, count)}
 
 
 def _mesh(count: tuple[int, int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the polar angles and azimuths of the middles of equal boxes on the direction sphere, and their shares of
-    its area."""
+    """Return polar angles and azimuths of the middles of equal boxes on the sphere, and their shares of its area."""
     polar = np.pi * (np.arange(count[0])[:, None] + 0.5) / count[0]
     azimuth = 2.0 * np.pi * (np.arange(count[1])[None, :] + 0.5) / count[1]
     share = np.broadcast_to(np.sin(polar), count) / (np.sin(polar).sum() * count[1])
@@ -105,20 +94,16 @@ def ellipsoid_errors(surface: LimitSurface, count: tuple[int, int]) -> dict[str,
     `||h| - 1|`; the distance of corresponding points is `|h - V_S/|V_S||`. Both for mu f_N = 1, means over all
     directions of the twist.
     """
-    ellipsoid = LimitSurfaceEllipsoid(surface.patch)
+    sides = surface, LimitSurfaceEllipsoid(surface.patch)
 
-    def between(polar: np.ndarray, azimuth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        return scaled_samples(surface, polar, azimuth)[1], scaled_samples(ellipsoid, polar, azimuth)[1]
+    def of_surfaces(*direction: np.ndarray) -> np.ndarray:
+        return np.abs(np.linalg.norm(scaled_samples(surface, *direction)[1], axis=-1) - 1.0)
 
-    def of_surfaces(polar: np.ndarray, azimuth: np.ndarray) -> np.ndarray:
-        return np.abs(np.linalg.norm(between(polar, azimuth)[0], axis=-1) - 1.0)
-
-    def of_points(polar: np.ndarray, azimuth: np.ndarray) -> np.ndarray:
-        exact, beside = between(polar, azimuth)
-        return np.linalg.norm(exact - beside, axis=-1)
+    def of_points(*direction: np.ndarray) -> np.ndarray:
+        return np.linalg.norm(np.subtract(*(scaled_samples(side, *direction)[1] for side in sides)), axis=-1)
 
     polar, azimuth, share = _mesh(count)
-    exact, beside = between(polar, azimuth)
+    exact, beside = (scaled_samples(side, polar, azimuth)[1] for side in sides)
     apart = exact - beside
     cosine = (exact * beside).sum(-1) / np.linalg.norm(exact, axis=-1)
     result = {
@@ -135,8 +120,7 @@ def ellipsoid_errors(surface: LimitSurface, count: tuple[int, int]) -> dict[str,
 
 
 def _largest(distance: Callable[..., np.ndarray], polar: float, azimuth: float, width: float) -> float:
-    """Return the largest distance in the neighbourhood of a direction: where the centre of rotation meets a cell it is
-    a jump."""
+    """Return the largest distance near a direction: where the centre of rotation meets a cell it is a jump."""
     largest = float(distance(np.array([[polar]]), np.array([[azimuth]]))[0, 0])
     for _ in range(REFINEMENTS):
         offsets = width * np.linspace(-1.0, 1.0, 9)
@@ -149,8 +133,7 @@ def _largest(distance: Callable[..., np.ndarray], polar: float, azimuth: float, 
 
 
 def table_errors(patch: ContactPatch, count: tuple[int, int]) -> dict[str, dict[str, float]]:
-    """Return the error of the tables of 20 segments, and of the sum over the cells, from the exact surface of the
-    patch.
+    """Return the error of the tables of 20 segments and of the sum over the cells, from the exact surface of a patch.
 
     In the wrench at the centre of pressure for mu f_N = 1 N, over directions of the twist.
     """
@@ -169,20 +152,19 @@ def table_errors(patch: ContactPatch, count: tuple[int, int]) -> dict[str, dict[
     return result
 
 
-def _dataset(surfaces: dict[str, LimitSurfaceCells]) -> xr.Dataset:
+def _dataset(surfaces: dict[str, LimitSurfaceCells]) -> Any:
     """Return the limit surfaces for mu f_N = 1 N about the centres of pressure, over the direction of the scaled
     twist."""
     import xarray as xr
 
     polar, azimuth = np.linspace(0.0, np.pi, 61), np.linspace(0.0, 2.0 * np.pi, 121)
-    scales = ([1.0, 1.0, each.contact_radius] for each in surfaces.values())
-    points = [
-        scaled_samples(each, polar[:, None], azimuth[None, :])[1] * r
-        for each, r in zip(surfaces.values(), scales, strict=True)
-    ]
+    points = np.array([
+        scaled_samples(each, polar[:, None], azimuth[None, :])[1] * [1.0, 1.0, each.contact_radius]
+        for each in surfaces.values()
+    ])  # fmt: skip
     columns: dict[str, Any] = {
-        name: (("shape", "polar", "azimuth"), np.array(points)[..., i], {"units": unit})
-        for i, (name, unit) in enumerate(UNITS.items())
+        name: (("shape", "polar", "azimuth"), points[..., i], {"units": unit})
+        for i, (name, unit) in enumerate(WRENCH.items())
     }
     angles = {name: (name, values, {"units": "rad"}) for name, values in (("polar", polar), ("azimuth", azimuth))}
     return xr.Dataset(columns, {"shape": list(surfaces), **angles})
@@ -193,7 +175,7 @@ def _dataset(surfaces: dict[str, LimitSurfaceCells]) -> xr.Dataset:
 
 def _template_values(numbers: Numbers) -> dict[str, Any]:
     """Return the values that the template names."""
-    errors, stored, gradient, disc = (numbers[name] for name in ("ellipsoid", "tables", "gradient", "disc"))
+    errors, stored, disc = (numbers[name] for name in ("ellipsoid", "tables", "disc"))
     ratio = {name: each["points, mean"] / each["surfaces, mean"] for name, each in errors.items()}
     least, most = (choose(ratio, key=ratio.__getitem__) for choose in (min, max))
     worst = max(errors, key=lambda name: errors[name]["points, max"])
@@ -204,17 +186,10 @@ def _template_values(numbers: Numbers) -> dict[str, Any]:
         return span([each[kind][quantity] / each["smooth"][quantity] for each in stored.values()], ".0f")
 
     return {
-        "surfaces": [each["surfaces, mean"] for each in errors.values()],
-        "points": [each["points, mean"] for each in errors.values()],
         "least": {"shape": IN_WORDS[least], "ratio": ratio[least]},
         "most": {"shape": IN_WORDS[most], "ratio": ratio[most]},
         "worst": {"shape": IN_WORDS[worst], **errors[worst]},
-        "cells": gradient["cells"],
-        "ideal": gradient["continuous"],
-        "ellipsoid": gradient["ellipsoid"],
         "mask": mask,
-        "disc": disc,
-        "radius": mask["contact radius, plain sum [m]"],
         "lost": {
             "radius": 1.0 - 1.5 * mask["contact radius, plain sum [m]"] / radius,
             "second": 1.0 - 2.0 * mask["second moment [m^2]"] / radius**2,
@@ -228,20 +203,14 @@ def _template_values(numbers: Numbers) -> dict[str, Any]:
 def _patches(ours: dict[str, Numbers]) -> Table:
     """Return the table of our patches, with the largest difference from the published row in its last column."""
     published = facts.published_table("patches")
-    headings = (
-        "loaded cells",
-        "CoP x [mm]",
-        "CoP y [mm]",
-        "r, plain sum [mm]",
-        "r, as published [mm]",
-        "second moment [mm^2]",
-    )
+    headings = ("loaded cells", "CoP x [mm]", "CoP y [mm]", "r, plain sum [mm]", "r, as published [mm]",
+                "second moment [mm^2]")  # fmt: skip
     factors = {"1": 1, "m": 1e3, "m^2": 1e6}
     columns: dict[str, Any] = {
         heading: lambda row, column=column, factor=factors[unit]: round(factor * row[column], 9) + 0.0
-        for heading, (column, (_, unit, _)) in zip(headings, LAST_DIGIT.items(), strict=True)
+        for heading, (column, (_, unit, _)) in zip(headings, shapes.LAST_DIGIT.items(), strict=True)
     }
-    lengths = [column for column in LAST_DIGIT if column.endswith("[m]")]
+    lengths = [column for column in shapes.LAST_DIGIT if column.endswith("[m]")]
     miss = {name: max(abs(row[column] - published[name][column]) for column in lengths) for name, row in ours.items()}
     rows = {IN_WORDS[name]: row | {"miss": miss[name]} for name, row in ours.items()}
     columns["farthest from the paper [mm]"] = lambda row: 1e3 * row["miss"]
@@ -251,24 +220,18 @@ def _patches(ours: dict[str, Numbers]) -> Table:
 
 def _ellipsoid(errors: dict[str, Numbers]) -> Table:
     names = ("surfaces, mean", "surfaces, max", "points, mean", "points, max", "angle, max [deg]", "force, max [N]")
-    columns = {name: lambda each, name=name: each[name] for name in names}
-    columns |= {"torque, max [N mm]": lambda each: 1e3 * each["torque, max [N m]"]}
-    return table(
-        "Distance of the ellipsoid from the sum over the cells",
-        {IN_WORDS[name]: each for name, each in errors.items()},
-        columns,
-        "patch",
-        "In $(f_x, f_y, \\tau/r)$ for $\\mu f_N = 1$. Surfaces: nearest points. Points: those of the same twist.",
-    )
+    columns = {name: entry(name) for name in names} | {"torque, max [N mm]": entry("torque, max [N m]", scale=1e3)}
+    note = "In $(f_x, f_y, \\tau/r)$ for $\\mu f_N = 1$. Surfaces: nearest points. Points: those of the same twist."
+    rows = {IN_WORDS[name]: each for name, each in errors.items()}
+    return table("Distance of the ellipsoid from the sum over the cells", rows, columns, "patch", note)
 
 
 def _stored(errors: dict[str, Numbers]) -> Table:
     rows = {f"{IN_WORDS[name]}, {kind}": error for name, each in errors.items() for kind, error in each.items()}
     columns = {
-        "force, max [N]": lambda error: error["force, max [N]"],
-        "force, mean [N]": lambda error: error["force, mean [N]"],
-        "torque, max [N mm]": lambda error: 1e3 * error["torque, max [N m]"],
-        "torque, mean [N mm]": lambda error: 1e3 * error["torque, mean [N m]"],
+        f"{quantity}, {statistic} [{shown}]": entry(f"{quantity}, {statistic} [{unit}]", scale=scale)
+        for quantity, shown, unit, scale in (("force", "N", "N", 1.0), ("torque", "N mm", "N m", 1e3))
+        for statistic in ("max", "mean")
     }
     title = "Error of tables of 20 segments, and of the sum, from the exact surface, mu f_N = 1 N"
     return table(title, rows, columns, "patch, surface")

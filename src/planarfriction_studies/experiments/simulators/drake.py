@@ -6,10 +6,10 @@ import importlib.util
 from functools import partial
 from typing import Any
 
-from planarfriction_studies.bench import coulomb_disc, drake_scenes, mujoco_scenes
+from planarfriction_studies.bench import drake_scenes, mujoco_scenes
 from planarfriction_studies.bench.drake_scenes import Way
 from planarfriction_studies.experiments.experiment import Work
-from planarfriction_studies.experiments.simulators.runs import measured
+from planarfriction_studies.experiments.simulators.runs import measured, stop_errors
 
 CONTACTS = ("point", "hydroelastic")
 
@@ -26,13 +26,6 @@ def installed() -> bool:
     return importlib.util.find_spec("pydrake") is not None
 
 
-def version() -> str:
-    """Return the version of Drake."""
-    from importlib import metadata
-
-    return metadata.version("drake")
-
-
 def run(work: Work) -> dict[str, Any]:
     """Measure all cases in Drake; return the numbers by kind, case and way."""
     ways = {**OWN, **PATCHES}
@@ -41,14 +34,13 @@ def run(work: Work) -> dict[str, Any]:
     duration, size = (0.6, {"steps": 20, "rounds": 2}) if work.quick else (3.0, {"steps": 100, "rounds": 30})
     plain = {name: way for name, way in ways.items() if name.startswith(("lagged", "patches"))}
     times = work.piece("Drake, cost", lambda: drake_scenes.cost(plain, **size))
-    starts = mujoco_scenes.STARTS[: 1 if work.quick else None]
     creeps = {
         f"{1e3 * dt:g} ms": {name: partial(drake_scenes.creep, way, dt, duration) for name, way in ways.items()}
         for dt in TIME_STEPS
     }
     discs = {
         f"{start[0]:g} m/s, {start[1]:g} rad/s": {name: partial(_disc, way, start) for name, way in ways.items()}
-        for start in starts
+        for start in mujoco_scenes.STARTS[: 1 if work.quick else None]
     }
     return {
         "creep": measured(work, "Drake, incline", creeps),
@@ -62,9 +54,4 @@ def run(work: Work) -> dict[str, Any]:
 
 
 def _disc(way: Way, start: tuple[float, float]) -> dict[str, float]:
-    """Compute the relative errors of distance and angle, less the stepper's own `v dt/2`."""
-    stop, (distance, angle) = coulomb_disc.stop(*start), drake_scenes.slide(way, start)
-    return {
-        "distance": (distance + 1e-3 * start[0]) / stop.distance - 1.0,
-        "angle": (angle + 1e-3 * start[1]) / stop.angle - 1.0,
-    }
+    return stop_errors(start, *drake_scenes.slide(way, start))

@@ -1,6 +1,6 @@
 """The runs of the comparison of simulators: scenes with MuJoCo's own friction at several settings, and with patches.
 
-Each function returns plain numbers; what they are named after is in `simulators`.
+Each function returns plain numbers.
 """
 
 from __future__ import annotations
@@ -32,7 +32,9 @@ against slip besides; and with stiffer contacts besides, which hold best while t
 FRICTIONLESS = Native(condim=1)
 
 PATCHES = "patches"
-"""Our friction, listed among the settings."""
+"""Name of our friction among the settings."""
+
+WAYS: dict[str, Way] = {**NATIVE, PATCHES: None}
 
 KINDS: dict[str, type | None] = {"patches, reduced": None, "patches, distributed": DistributedModel}
 """Models of the patches; None: the reduced one of the scene."""
@@ -42,8 +44,8 @@ DT = 2e-3
 DROPPED = 0.05
 """A block that has sunk by this [m] is no longer held."""
 
-Way = Native | str
-"""Settings of MuJoCo's own friction, or `PATCHES`."""
+Way = Native | None
+"""Settings of MuJoCo's own friction, or None for patches."""
 
 _disc, _plate = functools.cache(mujoco_scenes.disc), functools.cache(mujoco_scenes.plate)
 _stop = functools.cache(coulomb_disc.stop)
@@ -57,23 +59,9 @@ def measured(work: Work, what: str, jobs: Mapping[str, Mapping[str, Callable[[],
     }
 
 
-def begin(
-    scene: MujocoScene, way: Way, dt: float = DT, integrator: str = "Euler", model: FrictionModel | None = None
-) -> tuple[Any, Any, Callable[[], None]]:
-    """Return MuJoCo's model and data, and a function that makes a step."""
-    import mujoco
-
-    if isinstance(way, Native):
-        m, d = scene.native(way, dt, integrator)
-        return m, d, lambda: mujoco.mj_step(m, d)  # pyright: ignore[reportAttributeAccessIssue]
-    m, d, friction = scene.ours(dt, integrator, model=model)
-    return m, d, lambda: friction.step(d)
-
-
 def held(scene: MujocoScene, way: Way, dt: float = DT, body: int = 0) -> dict[str, float]:
-    """Compute the speeds at which a held object creeps and turns in the second half; `body`: index of its pose in
-    qpos."""
-    m, d, step = begin(scene, way, dt)
+    """Compute the speeds at which a held object, with pose `body` of qpos, creeps and turns in the second half."""
+    m, d, step = scene.begin(way, dt)
     path = scene.run(m, d, step)[:, body : body + 7]
     places, turns = path[:, :3], 2.0 * path[:, 4:]  # half-angles about the axes of the world: it starts upright
     half, seconds = len(path) // 2, 0.5 * scene.time
@@ -88,7 +76,7 @@ def held(scene: MujocoScene, way: Way, dt: float = DT, body: int = 0) -> dict[st
 
 def shaken(way: Way, integrator: str, scene: MujocoScene) -> dict[str, float]:
     """Compute the range of positions of the block in the hand while the hand is shaken [m]."""
-    m, d, step = begin(scene, way, integrator=integrator)
+    m, d, step = scene.begin(way, integrator=integrator)
     places = []
 
     def recorded() -> None:
@@ -103,43 +91,42 @@ def shaken(way: Way, integrator: str, scene: MujocoScene) -> dict[str, float]:
 def disc(
     way: Way, start: tuple[float, float], touch: Literal["face", "point"] = "face", kind: type | None = None
 ) -> dict[str, float]:
-    """Return the relative errors of distance and angle against the exact Coulomb disc, less the stepper's own `v
-    dt/2`."""
-    speed, spin = start
-    scene = _disc(speed, spin, joint="free", touch=touch)
-    model = None if kind is None else kind(scene.model.patch, scene.model.law)
-    m, d, step = begin(scene, way, model=model)
+    """Return relative errors of distance and angle against the exact Coulomb disc, less the stepper's own `v dt/2`."""
+    scene = _disc(*start, joint="free", touch=touch)
+    m, d, step = scene.begin(way, model=_other(scene, kind))
     path = scene.run(m, d, step)
-    stop, angle = _stop(speed, spin), np.unwrap(2.0 * np.arctan2(path[:, 6], path[:, 3]))
-    distance = float(np.hypot(*(path[-1, :2] - path[0, :2]))) + 0.5 * DT * speed
+    angle = np.unwrap(2.0 * np.arctan2(path[:, 6], path[:, 3]))
+    return stop_errors(start, float(np.hypot(*(path[-1, :2] - path[0, :2]))), float(angle[-1] - angle[0]))
+
+
+def stop_errors(start: tuple[float, float], distance: float, angle: float) -> dict[str, float]:
+    """Return relative errors of where a disc stopped [m, rad], less the `v dt/2` of a stepper of `DT`."""
+    stop = _stop(*start)
     return {
-        "distance": distance / stop.distance - 1.0,
-        "angle": float(angle[-1] - angle[0] + 0.5 * DT * spin) / stop.angle - 1.0,
+        "distance": (distance + 0.5 * DT * start[0]) / stop.distance - 1.0,
+        "angle": (angle + 0.5 * DT * start[1]) / stop.angle - 1.0,
     }
 
 
 def in_hand(way: Way, load: Literal[1, 2], kind: type | None = None) -> dict[str, float]:
     """Compute the end of the plate of the published run, less the converged end of the distributed model."""
-    scene = _plate(load)
-    model = None if kind is None else kind(scene.model.patch, scene.model.law)
-    m, d, step = begin(scene, way, model=model)
+    scene, reference = _plate(load), facts.converged(f"in_hand/Circle/d{load}")
+    m, d, step = scene.begin(way, model=_other(scene, kind))
     x, y, _, theta, _ = scene.run(m, d, step)[-1]
-    reference = facts.converged(f"in_hand/Circle/d{load}")
-    return {
-        "x": x + 2e-3 - reference["x"][-1],
-        "y": y - reference["y"][-1],
-        "theta": theta - reference["theta"][-1],
-    }
+    end = {"x": x + 2e-3, "y": y, "theta": theta}
+    return {name: value - reference[name][-1] for name, value in end.items()}
+
+
+def _other(scene: MujocoScene, kind: type | None) -> FrictionModel | None:
+    """Return a model of another kind with the patch and the law of the scene's own; None for its own."""
+    return None if kind is None else kind(scene.model.patch, scene.model.law)
 
 
 def cost(scene: MujocoScene, ways: Mapping[str, Way], *, steps: int, rounds: int) -> dict[str, dict[str, float]]:
-    """Measure the seconds of a step by name: the least of `rounds`, in turns, of `steps` from where the scene has
-    settled."""
-    runs = {}
-    for name, way in ways.items():
-        m, d, step = begin(dataclasses.replace(scene, time=0.0), way)
+    """Measure the seconds of a step by name: the least of `rounds`, in turns, of `steps` of a settled scene."""
+    runs = {name: scene.begin(way) for name, way in ways.items()}
+    for m, d, step in runs.values():
         dataclasses.replace(scene, time=0.0).run(m, d, step)
-        runs[name] = (m, d, step)
     least = dict.fromkeys(runs, np.inf)
     for i in range(rounds):
         for name, (m, d, step) in runs.items():

@@ -3,41 +3,25 @@
 from __future__ import annotations
 
 import dataclasses
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from planarfriction.kernels import spin_sums
 from planarfriction.limit_surface import LimitSurfaceCells
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
+from planarfriction.plots.style import LINE_STYLES, PlotFigure, new_figure, tidy
 from planarfriction.scenes.ready import published_velocity
 from planarfriction.scenes.signal import sample_times
-from planarfriction_studies.experiments import facts
-from planarfriction_studies.experiments.experiment import (
-    Arrays,
-    Comparison,
-    Reference,
-    Result,
-    Table,
-    Work,
-    compare,
-    compare_curve,
-    dataset,
-    table,
-)
-from planarfriction_studies.experiments.staircase.figures import overview, zoom
-from planarfriction_studies.experiments.wording import fill
-
-if TYPE_CHECKING:
-    import xarray as xr
+from planarfriction_studies.experiments import experiment, facts, looks
+from planarfriction_studies.experiments.experiment import TWIST, WRENCH, Arrays, Comparison, Reference, Result, Work
+from planarfriction_studies.experiments.wording import report
 
 WIDTH = 0.02
 """Length of the line [m]."""
 
 SAMPLE_TIME = 1e-4
 """Time between the samples of the published curves [s]."""
-
-COMPONENTS = (("fx", "N"), ("fy", "N"), ("tau", "N m"))
 
 SLIDE_RAMP = (0.8, 1.4, 0.015)
 """Start and end [s] of the ramp of vx, and the speed that it reaches [m/s]; the spin is 1 rad/s meanwhile."""
@@ -47,6 +31,13 @@ ALLOWANCE = {"N": 1e-9, "N m": 1e-12}
 
 STEP = 0.02
 """Change of fx between neighbouring samples that counts as a step of the plain sum [N]: half a cell is 0.024 N."""
+
+LINES = {
+    "plain": ("plain sum", "-", 1.3, looks.DISTRIBUTED),
+    "bilinear": ("bilinear smoothing", "-", 1.3, looks.REDUCED),
+    "rod": ("rod, exact", LINE_STYLES[1], 1.1, looks.EXACT),
+}
+"""Wrenches that are compared -> words, style, width and colour of their lines."""
 
 
 def rod_wrench(twist: np.ndarray, half_length: float) -> np.ndarray:
@@ -71,8 +62,8 @@ def rod_wrench(twist: np.ndarray, half_length: float) -> np.ndarray:
 
 
 def smoothed_wrench(twist: np.ndarray, patch: ContactPatch) -> np.ndarray:
-    """Return the sliding wrench `[T, 3]` [1, 1, m] with the published bilinear smoothing; the patch is centred on the
-    origin.
+    """Return the sliding wrench `[T, 3]` [1, 1, m] with the published bilinear smoothing; the patch has its centre at
+    the origin.
 
     Source: Waltersson and Karayiannidis 2024, section IV.
     """
@@ -95,31 +86,36 @@ def run(work: Work) -> Result:
     time = sample_times(5.0, SAMPLE_TIME)
     profile = dataclasses.replace(published_velocity(), hold="linear")
     twist = profile(time)
-    patch = PUBLISHED_PATCHES["Line"](width=WIDTH)
-    found = work.piece("line, 21 cells", lambda: _wrenches(twist, patch))
-    steps = _steps(time, found["plain"][:, 0])
-    shifts = _label_shifts(profile, patch)
     cells = (11, 21) if work.quick else (11, 21, 41, 81)
-    errors = {count: _errors(work, twist, count) for count in cells}
+    every = {
+        count: work.piece(f"line, {count} cells", lambda count=count: _wrenches(twist, _line(count))) for count in cells
+    }
+    found, errors = every[21], {count: _errors(twist, each) for count, each in every.items()}
+    steps = _steps(time, found["plain"][:, 0])
     numbers = _numbers(time, found, steps) | {
-        "miss_if_labels_mean_the_state": shifts,
+        "miss_if_labels_mean_the_state": _label_shifts(profile),
         "error_against_the_rod": {str(count): error for count, error in errors.items()},
     }
-    return fill("staircase", **_template_values(numbers)).result(
-        {"staircase": overview(time, found), "staircase_zoom": zoom(time, found, numbers["edge"])},
-        comparisons=_comparisons(time, twist, found, steps, patch),
-        numbers=numbers,
+    wrenches = {(name,): experiment.columns_of(time[::5], wrench[::5], WRENCH) for name, wrench in found.items()}
+    speeds = {name: (values, unit) for (name, unit), values in zip(TWIST.items(), twist[::5].T, strict=True)}
+    return report(
+        "staircase",
+        {"staircase": _overview(time, found), "staircase_zoom": _zoom(time, found, numbers["edge"])},
+        numbers,
+        _orders(errors),
+        comparisons=_comparisons(time, twist, found, steps),
         tables=(_error_table(errors),),
-        data={"line": _dataset(time, twist, found)},
+        data={"line": experiment.dataset(wrenches, WRENCH, ("surface",), ("time", time[::5], "s"), speeds)},
     )
 
 
+def _line(cells: int = 21) -> ContactPatch:
+    return PUBLISHED_PATCHES["Line"](cells=cells, width=WIDTH)
+
+
 def _wrenches(twist: np.ndarray, patch: ContactPatch) -> Arrays:
-    return {
-        "plain": LimitSurfaceCells(patch).wrench(twist),
-        "bilinear": smoothed_wrench(twist, patch),
-        "rod": rod_wrench(twist, 0.5 * WIDTH),
-    }
+    plain = LimitSurfaceCells(patch).wrench(twist)
+    return {"plain": plain, "bilinear": smoothed_wrench(twist, patch), "rod": rod_wrench(twist, 0.5 * WIDTH)}
 
 
 def _steps(time: np.ndarray, fx: np.ndarray) -> Arrays:
@@ -130,34 +126,26 @@ def _steps(time: np.ndarray, fx: np.ndarray) -> Arrays:
 
 
 def _published_steps() -> tuple[np.ndarray, float]:
-    """Return the last published vertex before each step of plain fx, and the time to the next one [s], the same at
-    every step."""
+    """Return the last published vertex before each step of plain fx, and the time to the next one [s], always the
+    same."""
     curve = facts.published_curve("staircase/plain/fx")
     before = np.flatnonzero(np.abs(np.diff(curve.values)) > STEP)
     return curve.time[before], float(np.diff(curve.time)[before].max())
 
 
-def _label_shifts(profile: Any, patch: ContactPatch) -> dict[str, float]:
+def _label_shifts(profile: Any) -> dict[str, float]:
     """Compute the errors of plain fx and fy [N] at the published vertices if labels mean the sample before or after."""
-    surface = LimitSurfaceCells(patch)
+    surface, curves = LimitSurfaceCells(_line()), [facts.published_curve(f"staircase/plain/{name}") for name in WRENCH]
     result = {}
     for words, shift in (("before", -SAMPLE_TIME), ("at", 0.0), ("after", SAMPLE_TIME)):
-        misses = []
-        for column, name in enumerate(("fx", "fy")):
-            curve = facts.published_curve(f"staircase/plain/{name}")
-            ours = surface.wrench(profile(np.maximum(curve.time + shift, 0.0)))[:, column]
-            misses.append(float(np.abs(ours - curve.values).max()))
-        result[words] = max(misses)
+        ours = [surface.wrench(profile(np.maximum(curve.time + shift, 0.0))) for curve in curves]
+        result[words] = max(float(np.abs(ours[i][:, i] - curves[i].values).max()) for i in (0, 1))
     return result
 
 
-def _errors(work: Work, twist: np.ndarray, count: int) -> dict[str, list[float]]:
-    """Return the largest and mean distance from the rod, tangential [N] and torque [N m], of both sums over `count`
-    cells."""
-    patch = PUBLISHED_PATCHES["Line"](cells=count, width=WIDTH)
-    found = work.piece(f"line, {count} cells", lambda: _wrenches(twist, patch))
-    moving = np.abs(twist).max(axis=1) > 0.0
-    result = {}
+def _errors(twist: np.ndarray, found: Arrays) -> dict[str, list[float]]:
+    """Return the largest and mean distance from the rod, tangential [N] and torque [N m], of both sums."""
+    moving, result = np.abs(twist).max(axis=1) > 0.0, {}
     for name in ("plain", "bilinear"):
         miss = (found[name] - found["rod"])[moving]
         force, torque = np.hypot(miss[:, 0], miss[:, 1]), np.abs(miss[:, 2])
@@ -165,28 +153,19 @@ def _errors(work: Work, twist: np.ndarray, count: int) -> dict[str, list[float]]
     return result
 
 
-def _crossings(patch: ContactPatch) -> np.ndarray:
-    """Compute the times [s] at which the centre of rotation, y = vx/omega, meets centres of cells on the ramp of vx."""
-    start, end, speed = SLIDE_RAMP
-    y = np.sort(patch.positions[:, 1])
-    return start + (end - start) * y[y > -1e-9] / speed
-
-
 def _numbers(time: np.ndarray, found: Arrays, steps: Arrays) -> dict[str, Any]:
     spin = int(np.searchsorted(time, 0.7))  # any time of pure spin
-    radius = {name: float(-found[name][spin, 2]) for name in ("plain", "bilinear", "rod")}
     smoothed = found["bilinear"]
-    up = np.flatnonzero((time > 0.9) & (time < 1.4))
-    down = np.flatnonzero((time > 3.4) & (time < 4.0))
-    high, low = (_largest_jump(time, smoothed[:, column], part) for column, part in ((0, up), (1, down)))
+    high = _largest_jump(time, smoothed[:, 0], np.flatnonzero((time > 0.9) & (time < 1.4)))
+    low = _largest_jump(time, smoothed[:, 1], np.flatnonzero((time > 3.4) & (time < 4.0)))
     inside = (time > SLIDE_RAMP[0] + 1e-3) & (time < high["time"] - 1e-3)
     return {
         "sample_time": SAMPLE_TIME,
         "published_vertices_around_a_step": _published_steps()[1],
-        "radius": radius,
+        "radius": {name: float(-found[name][spin, 2]) for name in LINES},
         "steps": {
             "count": len(steps["time"]),
-            "on the way up": int((steps["time"] < 1.4).sum()),
+            "on the way up": int((steps["time"] < SLIDE_RAMP[1]).sum()),
             "first": float(steps["height"][0]),
             "largest": float(steps["height"].max()),
             "last samples before": steps["time"].tolist(),
@@ -204,20 +183,17 @@ def _largest_jump(time: np.ndarray, values: np.ndarray, part: np.ndarray) -> dic
     return {"time": float(time[part[at]]), "jump": float(change[at])}
 
 
-def _comparisons(
-    time: np.ndarray, twist: np.ndarray, found: Arrays, steps: Arrays, patch: ContactPatch
-) -> list[Comparison]:
+def _comparisons(time: np.ndarray, twist: np.ndarray, found: Arrays, steps: Arrays) -> list[Comparison]:
     rows = []
-    same = "The same sum at the same samples: what is left is the error of reading the figure."
-    for name, words in (("plain", "plain sum"), ("bilinear", "bilinear smoothing")):
-        for (component, unit), values in zip(COMPONENTS, found[name].T, strict=True):
-            quantity, curve = f"steady state of the line, {words}, {component}", f"staircase/{name}/{component}"
-            rows.append(compare_curve(quantity, time, values, curve, ALLOWANCE[unit], same))
-    same = "The same profile, at each sample's own time: what is left is the error of reading the figure."
-    for component, values in zip(("vx", "vy", "omega"), twist.T, strict=True):
-        quantity, curve = f"velocity profile, {component}", f"convergence/velocity/{component}"
-        rows.append(compare_curve(quantity, time, values, curve, 1e-12, same))
-    return [*rows, *_plateaus(time, found), *_step_comparisons(steps, patch)]
+    for name in ("plain", "bilinear"):
+        ours, words = experiment.columns_of(time, found[name], WRENCH), f"steady state of the line, {LINES[name][0]}, "
+        cause = "The same sum at the same samples: what is left is the error of reading the figure."
+        curve = f"staircase/{name}"
+        rows += experiment.compare_columns(experiment.compare_curve, words, ours, curve, ALLOWANCE, cause, WRENCH)
+    ours, curve = experiment.columns_of(time, twist, TWIST), "convergence/velocity"
+    cause = "The same profile, at each sample's own time: what is left is the error of reading the figure."
+    rows += experiment.compare_columns(experiment.compare_curve, "velocity profile, ", ours, curve, 1e-12, cause, TWIST)
+    return [*rows, *_plateaus(time, found), *_step_comparisons(steps)]
 
 
 def _plateaus(time: np.ndarray, found: Arrays) -> list[Comparison]:
@@ -234,28 +210,31 @@ def _plateaus(time: np.ndarray, found: Arrays) -> list[Comparison]:
         ("rod", 0.25 * WIDTH, "closed form", 1e-15, "A rod of half-length $a$ has $r = a/2$: rounding."),
     )
     return [
-        compare(f"torque of a pure spin, {name}", found[name][spin, 2], -radius, reference, within, "N m", cause)
-        for name, radius, reference, within, cause in rows
+        experiment.compare(f"torque of a pure spin, {name}", found[name][spin, 2], -radius, of, within, "N m", cause)
+        for name, radius, of, within, cause in rows
     ]
 
 
-def _step_comparisons(steps: Arrays, patch: ContactPatch) -> list[Comparison]:
+def _step_comparisons(steps: Arrays) -> list[Comparison]:
     """Compare the times and heights of the steps of plain fx."""
-    theirs, _ = _published_steps()
-    upward = steps["time"] < SLIDE_RAMP[1]
+    patch, (start, end, speed) = _line(), SLIDE_RAMP
+    upward = steps["time"] < end
+    y = np.sort(patch.positions[:, 1])
+    crossings = start + (end - start) * y[y > -1e-9] / speed  # the centre of rotation is at y = vx/omega
     # first and last the centre of rotation leaves and meets the middle cell
     heights = np.where(np.isin(np.arange(len(steps["height"])), [0, len(steps["height"]) - 1]), 1.0, 2.0) / patch.cells
     return [
-        compare(
-            "last sample before each step of plain fx", steps["time"], theirs, "published", 0.5 * SAMPLE_TIME, "s",
+        experiment.compare(
+            "last sample before each step of plain fx", steps["time"], _published_steps()[0], "published",
+            0.5 * SAMPLE_TIME, "s",
             "The same samples on both sides of every step: the labels of this figure are the times of the state.",
         ),
-        compare(
+        experiment.compare(
             "steps of plain fx while vx grows, from when the centre of rotation meets a cell to the last sample before",
-            steps["time"][upward], _crossings(patch), "closed form", SAMPLE_TIME, "s",
+            steps["time"][upward], crossings, "closed form", SAMPLE_TIME, "s",
             "A step shows at the first sample after the centre of rotation has met a cell: less than the sample time.",
         ),
-        compare(
+        experiment.compare(
             "height of the steps of plain fx", steps["height"], heights, "closed form", ALLOWANCE["N"], "N",
             "A cell that the centre of rotation passes turns round and changes fx by twice its load; the middle "
             "one, which adds nothing while the centre of rotation stands on it, by once.",
@@ -263,47 +242,66 @@ def _step_comparisons(steps: Arrays, patch: ContactPatch) -> list[Comparison]:
     ]  # fmt: skip
 
 
-def _dataset(time: np.ndarray, twist: np.ndarray, found: Arrays) -> xr.Dataset:
-    wrenches = {(name,): dict(zip(dict(COMPONENTS), wrench[::5].T, strict=True)) for name, wrench in found.items()}
-    result = dataset(wrenches, dict(COMPONENTS), ("surface",), ("time", time[::5], "s"))
-    speeds = zip(("vx", "vy", "omega"), ("m/s", "m/s", "rad/s"), twist[::5].T, strict=True)
-    return result.assign({name: ("time", values, {"units": unit}) for name, unit, values in speeds})
-
-
-def _template_values(numbers: dict[str, Any]) -> dict[str, Any]:
-    """Return the values that the template names."""
-    radius, by_cells = numbers["radius"], numbers["error_against_the_rod"]
-    few, *_, many = by_cells
-    sums = ("plain", "bilinear")
-    return {
-        "sample_time": numbers["sample_time"],
-        "thinned": numbers["published_vertices_around_a_step"],
-        "steps": numbers["steps"],
-        "edge": numbers["edge"],
-        "shifts": numbers["miss_if_labels_mean_the_state"],
-        "kink": numbers["kink_of_tau"],
-        "radius": radius,
-        "lost": {name: 1.0 - radius[name] / radius["rod"] for name in sums},
-        "by_cells": by_cells,
-        "few": few,
-        "many": many,
-        "order": {name: _orders(by_cells, name) for name in sums},
+def _orders(errors: dict[int, dict[str, list[float]]]) -> dict[str, Any]:
+    """Return the fewest and most cells, and powers of their number with which the largest and mean error in force
+    fall."""
+    few, *_, many = errors
+    ratio = {
+        name: np.log(np.array(errors[few][name]) / errors[many][name]) / np.log(few / many) for name in errors[few]
     }
+    return {"few": few, "many": many, "order": {name: values[:2].tolist() for name, values in ratio.items()}}
 
 
-def _orders(by_cells: dict[str, dict[str, list[float]]], name: str) -> list[float]:
-    """Return powers of the number of cells with which the largest and the mean error in force fall [-]."""
-    few, *_, many = by_cells
-    ratio = np.log(np.array(by_cells[few][name]) / by_cells[many][name]) / np.log(int(few) / int(many))
-    return ratio[:2].tolist()
-
-
-def _error_table(errors: dict[int, dict[str, list[float]]]) -> Table:
+def _error_table(errors: dict[int, dict[str, list[float]]]) -> experiment.Table:
     """Return the largest and mean errors of both sums against the rod, by the number of cells."""
     rows = {f"{count}, {name}": values for count, error in errors.items() for name, values in error.items()}
-    headings = ("force, max [N]", "force, mean [N]", "torque, max [N mm]", "torque, mean [N mm]")
-    columns = {
-        heading: lambda values, i=i, factor=factor: factor * values[i]
-        for i, (heading, factor) in enumerate(zip(headings, (1.0, 1.0, 1e3, 1e3), strict=True))
-    }
-    return table("Distance from the exact rod along the profile", rows, columns, "cells, sum")
+    headings = {"force, max [N]": 1.0, "force, mean [N]": 1.0, "torque, max [N mm]": 1e3, "torque, mean [N mm]": 1e3}
+    columns = {heading: experiment.entry(i, scale=scale) for i, (heading, scale) in enumerate(headings.items())}
+    return experiment.table("Distance from the exact rod along the profile", rows, columns, "cells, sum")
+
+
+# ---------------------------------------------------------------------- figures
+
+
+def _overview(time: np.ndarray, found: Arrays) -> PlotFigure:
+    """Draw the force [N] and torque [N mm] over the whole profile."""
+    figure = new_figure(9.0, 7.2)
+    panels = figure.subplots(3, 1, sharex=True)
+    for axes, name in zip(panels, WRENCH, strict=True):
+        _draw(axes, time, found, name, (0.0, 5.0), size=3.0)
+    panels[-1].set_xlabel("time [s]")
+    looks.legend(figure, panels[0], 5)
+    return figure
+
+
+def _zoom(time: np.ndarray, found: Arrays, edge: dict[str, dict[str, float]]) -> PlotFigure:
+    """Draw the first steps of fx and of the torque; where the smoothing ends, at the times that `edge` holds."""
+    figure = new_figure(9.6, 6.4)
+    panels = figure.subplots(2, 2)
+    high, low = edge["high"]["time"], edge["low"]["time"]
+    parts = (
+        ("fx", (0.79, 0.97), "first steps, force"),
+        ("tau", (0.79, 0.97), "first steps, torque"),
+        ("fx", (high - 0.045, high + 0.03), "centre of rotation leaves at the high edge"),
+        ("fy", (low - 0.06, low + 0.04), "centre of rotation leaves at the low edge"),
+    )
+    for axes, (name, limits, title) in zip(panels.flat, parts, strict=True):
+        _draw(axes, time, found, name, limits)
+        axes.set(title=title, xlabel="time [s]")
+        axes.title.set_fontsize("medium")
+    looks.legend(figure, panels[0, 0], 5)
+    return figure
+
+
+def _draw(
+    axes: Any, time: np.ndarray, found: Arrays, column: str, limits: tuple[float, float], size: float = 4.0
+) -> None:
+    label, factor = looks.AXES[column]
+    part, index = (time >= limits[0]) & (time <= limits[1]), list(WRENCH).index(column)
+    for name, (words, line, width, colour) in LINES.items():
+        axes.plot(time[part], factor * found[name][part, index], ls=line, lw=width, color=colour, label=words)
+    for name, marker in (("plain", "o"), ("bilinear", "s")):
+        look = {"ms": size, "mew": 0.9, "label": f"published, {name}"}
+        looks.vertices(axes, f"staircase/{name}/{column}", factor, LINES[name][-1], limits, marker, **look)
+    axes.set(ylabel=label, xlim=limits)
+    tidy(axes)

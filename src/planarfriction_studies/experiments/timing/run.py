@@ -4,22 +4,29 @@ from __future__ import annotations
 
 import os
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from functools import partial
 from importlib import metadata
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from planarfriction.plots.style import PlotFigure, new_figure, tidy
 from planarfriction_studies.experiments import facts, looks
-from planarfriction_studies.experiments.experiment import Arrays, Comparison, Result, Table, Work, compare, table
+from planarfriction_studies.experiments.experiment import (
+    UNITS,
+    Arrays,
+    Comparison,
+    Result,
+    Table,
+    Work,
+    compare_all,
+    entry,
+    table,
+)
 from planarfriction_studies.experiments.timing import runs
 from planarfriction_studies.experiments.timing.runs import BREAKAWAY, CIRCLE, QUICK_WINDOW, ROWS, Problem
-from planarfriction_studies.experiments.wording import fill, power, short
-
-if TYPE_CHECKING:
-    import xarray as xr
+from planarfriction_studies.experiments.wording import power, report, short
 
 KINDS = ("distributed", "reduced")
 
@@ -48,27 +55,41 @@ Points = dict[str, list[dict[str, float]]]
 """Solver -> its runs: tolerance, error [m], median and quartiles of the time [s], evaluations, repeats."""
 
 
+Times = Mapping[str, Mapping[str, Arrays]]
+"""Row of the published table -> kind of model -> times [s]."""
+
+
 def run(work: Work) -> Result:
     """Carry out the experiment."""
-    table = {row: {kind: runs.whole_runs(row, kind, work) for kind in KINDS} for row in ROWS}
+    times = {row: {kind: runs.whole_runs(row, kind, work) for kind in KINDS} for row in ROWS}
     baselines = _baselines(work)
     problems = runs.problems(work)
     references = {problem: runs.reference(problem, work) for problem in problems}
     solved = {problem: runs.work_precision(problem, work) for problem in problems}
     points = {problem: _points(solved[problem], references[problem]) for problem in problems}
-    comparisons = [c for p in problems for c in _agreements(p, solved[p], references[p])]
-    comparisons += [c for p in problems for c in _against_converged(p, references[p])]
-    machine = _machine()
-    return fill("timing", **_template_values(table, baselines, points, comparisons, machine)).result(
+    agreements = [c for p in problems for c in _agreements(p, solved[p], references[p])]
+    rows = {row: _row_numbers(times[row], baselines.get(row, {})) for row in ROWS}
+    cost = {kind: each["solver"] / each["trials"] for kind, each in times[CIRCLE].items()}
+    numbers = {
+        "machine": _machine(),
+        "table": rows,
+        "work_precision": {problem.name: points[problem] for problem in problems},
+        "step_ratio": _ratio(*(cost[kind] for kind in KINDS)),
+    }
+    return report(
+        "timing",
         {"timing_work_precision": _figure(points)},
-        comparisons=comparisons,
-        numbers={
-            "machine": machine,
-            "table": {row: _row_numbers(table[row], baselines.get(row, {})) for row in ROWS},
-            "work_precision": {problem.name: points[problem] for problem in problems},
-            "step_ratio": _step_ratio(table),
+        numbers,
+        {
+            "rebuilding": _ratio(*(times[row]["reduced"]["time"] for row in ("k = 2 f_N", "k = 2"))),
+            "published": facts.published_table("timing"),
+            "circle": CIRCLE,
+            "published_step": PUBLISHED_STEP_RATIO,
+            "precision": [_precision(problem, each) for problem, each in points.items()],
+            "agreed": max(each.difference for each in agreements if each.unit == "m"),
         },
-        tables=[_published_table(table, baselines), *(_points_table(problem, points[problem]) for problem in problems)],
+        comparisons=agreements + [c for p in problems for c in _against_converged(p, references[p])],
+        tables=[_published_table(rows), *(_points_table(problem, points[problem]) for problem in problems)],
         data={f"work_precision_{problem.kind}": _dataset(points[problem]) for problem in problems},
     )
 
@@ -116,12 +137,6 @@ def _row_numbers(row: Mapping[str, Arrays], baselines: Mapping[str, Arrays]) -> 
     return numbers | {f"{kind}, LSODA [s]": _spread(each["lsoda"]) for kind, each in baselines.items()}
 
 
-def _step_ratio(table: Mapping[str, Mapping[str, Arrays]]) -> dict[str, float]:
-    """Return the cost of one step of the distributed model over one of the reduced model."""
-    cost = {kind: run["solver"] / run["trials"] for kind, run in table[CIRCLE].items()}
-    return _ratio(cost["distributed"], cost["reduced"])
-
-
 def _spread(times: np.ndarray) -> dict[str, float]:
     """Return the median and quartiles by name."""
     return dict(zip(("middle", "least", "most"), map(float, times), strict=True))
@@ -145,58 +160,33 @@ def _agreements(
             continue
         tight = min(tolerances)
         poses = solved[solver, tight]["poses"]
-        cause = (
-            f"What a relative tolerance of {power(tight)} leaves in {solver}; ours was run at {power(runs.REFERENCE)}."
-        )
-        differences = (runs.position_error(poses, reference), "m"), (runs.angle_error(poses, reference), "rad")
-        for (difference, unit), tolerance in zip(differences, AGREEMENT[problem.kind], strict=True):
-            what = f"{problem.name}: {'position' if unit == 'm' else 'angle'}, RODAS4 beside {solver}"
-            found.append(Comparison(what, "converged", difference, tolerance, unit, len(poses), cause))
+        left = f"What a relative tolerance of {power(tight)} leaves in {solver}"
+        cause = f"{left}; ours was run at {power(runs.REFERENCE)}."
+        position, angle = AGREEMENT[problem.kind]
+        for what, difference, tolerance, unit in (
+            ("position", runs.position_error(poses, reference), position, "m"),
+            ("angle", runs.angle_error(poses, reference), angle, "rad"),
+        ):
+            words = f"{problem.name}: {what}, RODAS4 beside {solver}"
+            found.append(Comparison(words, "converged", difference, tolerance, unit, len(poses), cause))
     return found
 
 
 def _against_converged(problem: Problem, reference: np.ndarray) -> list[Comparison]:
     """Compare our reference with the converged solution, at the times they share."""
-    solution = facts.converged(CONVERGED[problem.kind])
-    times = problem.window.ends
+    solution, times = facts.converged(CONVERGED[problem.kind]), problem.window.ends
     index = np.abs(solution["time"][:, None] - times).argmin(axis=0)
     shared = np.abs(solution["time"][index] - times) < 1e-9
-    found = []
     cause = "Two solutions of the same equations at tight tolerances, by different methods."
+    rows = []
     for i, (name, allowance) in enumerate(CONVERGED_ALLOWANCE.items()):
         values, words = solution[name], f"{problem.name}: {name} of the reference"
         tolerance = allowance + facts.CONVERGED_SHARE * float(np.ptp(values))
-        unit = "rad" if name == "theta" else "m"
-        found.append(compare(words, reference[shared, i], values[index[shared]], "converged", tolerance, unit, cause))
-    return found
+        rows.append((words, reference[shared, i], values[index[shared]], tolerance, UNITS[name], cause))
+    return compare_all("converged", rows)
 
 
 # ---------------------------------------------------------------------- words, figure, tables
-
-
-def _template_values(
-    table: Mapping[str, Mapping[str, Arrays]],
-    baselines: Mapping[str, Mapping[str, Arrays]],
-    points: Mapping[Problem, Points],
-    comparisons: Sequence[Comparison],
-    machine: Mapping[str, Any],
-) -> dict[str, Any]:
-    """Return the values that the template names."""
-    published = facts.published_table("timing")
-    return {
-        "ours": {kind: _spread(table[CIRCLE][kind]["time"]) for kind in KINDS},
-        "between": _ratio(*(table[CIRCLE][kind]["time"] for kind in KINDS)),
-        "beside": {kind: _ratio(each["lsoda"], each["ours"]) for kind, each in baselines[CIRCLE].items()},
-        "step": _step_ratio(table),
-        "rebuilding": _ratio(*(table[row]["reduced"]["time"] for row in ("k = 2 f_N", "k = 2"))),
-        "solver": {row: float(kinds["reduced"]["solver"][0]) for row, kinds in table.items()},
-        "published": published[CIRCLE],
-        "published_step": PUBLISHED_STEP_RATIO,
-        "published_rebuilding": published["k = 2 f_N"]["reduced [s]"] / published["k = 2"]["reduced [s]"],
-        "precision": [_precision(problem, each) for problem, each in points.items()],
-        "machine": machine,
-        "agreed": max(c.difference for c in comparisons if c.unit == "m" and "beside" in c.quantity),
-    }
 
 
 def _precision(problem: Problem, points: Points) -> dict[str, Any]:
@@ -232,17 +222,14 @@ def _figure(points: Mapping[Problem, Points]) -> PlotFigure:
     return figure
 
 
-def _published_table(times: Mapping[str, Mapping[str, Arrays]], baselines: Mapping[str, Mapping[str, Arrays]]) -> Table:
-    published = facts.published_table("timing")
-    rows = {row: (_row_numbers(times[row], baselines.get(row, {})), theirs) for row, theirs in published.items()}
-
+def _published_table(rows: Mapping[str, Mapping[str, Any]]) -> Table:
     def ours(row: Any, name: str) -> str:
         return _shown(row[0][name]) if name in row[0] else "not run"
 
-    columns = {f"{kind} [s]": partial(ours, name=f"{kind} [s]") for kind in KINDS}
+    columns: dict[str, Any] = {f"{kind} [s]": partial(ours, name=f"{kind} [s]") for kind in KINDS}
     columns |= {"factor": partial(ours, name="ratio")}
-    columns |= {f"{kind}, published [s]": lambda row, kind=kind: row[1][f"{kind} [s]"] for kind in KINDS}
-    columns |= {"factor, published": lambda row: row[1]["ratio"]}
+    columns |= {f"{kind}, published [s]": entry(1, f"{kind} [s]") for kind in KINDS}
+    columns |= {"factor, published": entry(1, "ratio")}
     columns |= {f"{kind}, LSODA here over ours": partial(ours, name=f"{kind}, LSODA over ours") for kind in KINDS}
     note = (
         "Ours: all of `simulate`, default tolerances, median, in brackets quartiles. "
@@ -251,7 +238,10 @@ def _published_table(times: Mapping[str, Mapping[str, Arrays]], baselines: Mappi
         f"quick look takes {QUICK_WINDOW[0]:g} to {QUICK_WINDOW[1]:g} s), without the tables. $k = 2$: the table is "
         "kept and $r$ follows the load; $k = 2 f_N$: all is rebuilt every 0.01 s."
     )
-    return table("In-hand run of 2 s", rows, columns, "contact", note)
+    published = facts.published_table("timing")
+    return table(
+        "In-hand run of 2 s", {row: (rows[row], published[row]) for row in published}, columns, "contact", note
+    )
 
 
 def _points_table(problem: Problem, points: Points) -> Table:
@@ -275,7 +265,7 @@ def _shown(times: Mapping[str, float]) -> str:
     return middle if least == most else f"{middle} ({least} to {most})"
 
 
-def _dataset(points: Points) -> xr.Dataset:
+def _dataset(points: Points) -> Any:
     """Return the error and time over the runs, one after the other."""
     import xarray as xr
 

@@ -14,7 +14,7 @@ from planarfriction.scenes import Scene, in_hand, simulate
 from planarfriction.solvers import RODAS3, RODAS4
 from planarfriction_studies.bench.baselines import LSODA, Poses, Window
 from planarfriction_studies.experiments.experiment import Arrays, Work
-from planarfriction_studies.experiments.load_dependent.models import DISTRIBUTED, REBUILT, RESCALED, soft_scene
+from planarfriction_studies.experiments.load_dependent.run import DISTRIBUTED, REBUILT, RESCALED, soft_scene
 from planarfriction_studies.experiments.runs import published_model
 
 ATOL_PER_RTOL = 30.0
@@ -37,19 +37,17 @@ QUICK_WINDOW = (0.36, 0.37)
 STRUCTURED = {"RODAS3": RODAS3, "RODAS4": RODAS4}
 """Our methods by name."""
 
-ROWS: dict[str, dict[str, Callable[[], Scene]]] = {
-    "disc, shape independent of the load": {
-        "distributed": lambda: in_hand(published_model("d", "Circle")),
-        "reduced": lambda: in_hand(published_model("r", "Circle")),
-    },
-    "k = 2": {
-        "distributed": lambda: soft_scene(1, DISTRIBUTED),
-        "reduced": lambda: soft_scene(1, RESCALED),
-    },
-    "k = 2 f_N": {
-        "distributed": lambda: soft_scene(2, DISTRIBUTED),
-        "reduced": lambda: soft_scene(2, REBUILT),
-    },
+
+def _scenes(distributed: Callable[[], Scene], reduced: Callable[[], Scene]) -> dict[str, Callable[[], Scene]]:
+    return {"distributed": distributed, "reduced": reduced}
+
+
+ROWS = {
+    "disc, shape independent of the load": _scenes(
+        lambda: in_hand(published_model("d", "Circle")), lambda: in_hand(published_model("r", "Circle"))
+    ),
+    "k = 2": _scenes(lambda: soft_scene(1, DISTRIBUTED), lambda: soft_scene(1, RESCALED)),
+    "k = 2 f_N": _scenes(lambda: soft_scene(2, DISTRIBUTED), lambda: soft_scene(2, REBUILT)),
 }
 """Rows of the published table, and what makes their scenes: with models that have computed nothing yet."""
 
@@ -61,18 +59,22 @@ CIRCLE = next(iter(ROWS))
 class Problem:
     """Problem that solvers are compared on."""
 
-    name: str
     kind: str
     """"distributed" or "reduced"."""
-    begin: float
-    end: float
+    span: tuple[float, float]
+    """Begin and end [s]."""
     tolerances: dict[str, tuple[float, ...]]
     """Solver -> relative tolerances."""
+
+    @property
+    def name(self) -> str:
+        """Model and span in words."""
+        return f"{self.kind}, {self.span[0]:g} to {self.span[1]:g} s"
 
     @functools.cached_property
     def window(self) -> Window:
         """The scene between the two times."""
-        return Window.of(ROWS[CIRCLE][self.kind](), self.begin, self.end)
+        return Window.of(ROWS[CIRCLE][self.kind](), *self.span)
 
 
 def problems(work: Work) -> list[Problem]:
@@ -81,17 +83,13 @@ def problems(work: Work) -> list[Problem]:
     if work.quick:
         tolerances = {"RODAS4": (1e-6,), "LSODA": (1e-6,)}
         with_radau = {**tolerances, "Radau": (1e-6,)}
-        return [_problem("reduced", *QUICK_WINDOW, with_radau), _problem("distributed", *QUICK_WINDOW, tolerances)]
+        return [Problem("reduced", QUICK_WINDOW, with_radau), Problem("distributed", QUICK_WINDOW, tolerances)]
     several = dict.fromkeys(STRUCTURED, (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)) | {"LSODA": (1e-4, 1e-6, 1e-8)}
     reduced, distributed = ((1e-4, 1e-6, 1e-8),) * 2 if work.full else ((1e-4, 1e-6), ())
     return [
-        _problem("reduced", 0.0, 2.0, {**several, "Radau": reduced}),
-        _problem("distributed", *BREAKAWAY, several | ({"Radau": distributed} if distributed else {})),
+        Problem("reduced", (0.0, 2.0), {**several, "Radau": reduced}),
+        Problem("distributed", BREAKAWAY, several | ({"Radau": distributed} if distributed else {})),
     ]
-
-
-def _problem(kind: str, begin: float, end: float, tolerances: dict[str, tuple[float, ...]]) -> Problem:
-    return Problem(f"{kind}, {begin:g} to {end:g} s", kind, begin, end, tolerances)
 
 
 def solve(problem: Problem, solver: str, tolerance: float) -> Poses:
@@ -136,12 +134,9 @@ def _spread(times: Sequence[float]) -> list[float]:
 
 
 def whole_runs(row: str, kind: str, work: Work) -> Arrays:
-    """Time all of `simulate` at default tolerances, tables included: `time`, `solver` [s] (median, quartiles),
-    `trials`."""
-    return work.piece(
-        f"timing, {row}, {kind}, whole run",
-        functools.partial(_whole_runs, ROWS[row][kind], 1 if work.quick else MOST_REPEATS),
-    )
+    """Time `simulate` at default tolerances, tables included: `time`, `solver` [s] (median, quartiles), `trials`."""
+    compute = functools.partial(_whole_runs, ROWS[row][kind], 1 if work.quick else MOST_REPEATS)
+    return work.piece(f"timing, {row}, {kind}, whole run", compute)
 
 
 def _whole_runs(scene: Callable[[], Scene], repeats: int) -> dict[str, Any]:
@@ -158,8 +153,7 @@ def _whole_runs(scene: Callable[[], Scene], repeats: int) -> dict[str, Any]:
 
 
 def beside_lsoda(row: str, kind: str, begin: float, end: float, work: Work) -> Arrays:
-    """Time LSODA as published, and ours at default tolerances, over a window: `lsoda` and `ours` [s] (median,
-    quartiles)."""
+    """Time `lsoda` as published and `ours` at default tolerances over a window [s] (median, quartiles)."""
     label = f"timing, {row}, {kind}, LSODA as published, {begin:g} to {end:g} s"
     return work.piece(label, functools.partial(_beside_lsoda, ROWS[row][kind], begin, end))
 
@@ -183,6 +177,5 @@ def angle_error(poses: np.ndarray, reference: np.ndarray) -> float:
 
 
 def cheapest(points: Sequence[tuple[float, list[float]]], error: float) -> list[float] | None:
-    """Return the shortest of the times (median first) among the points (error, times) at least as good as `error`;
-    None: none."""
+    """Return the shortest times (median first) among points (error, times) at least as good as `error`, or None."""
     return min((times for found, times in points if found <= error), default=None)

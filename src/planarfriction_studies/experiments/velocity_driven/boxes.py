@@ -32,10 +32,6 @@ COLUMNS: tuple[str, ...] = ("whisker low", "first quartile", "median", "third qu
 
 PUBLISHED_SHAPES = ("Circle", "Square", "Line", "NonConvex1")
 
-Reference = Literal["published", "converged"]
-
-_REFERENCES: tuple[Reference, ...] = ("published", "converged")
-
 WIDTH = 0.02
 """Width of the patches [m]."""
 
@@ -84,82 +80,65 @@ def slack(values: np.ndarray, samples: int = WRONG_SAMPLES) -> dict[str, float]:
     return result
 
 
-def guard_effect(shape: str) -> dict[str, float]:
-    """Compute the friction that the guard adds to that of a steady slide [N] and spin [N m] at 1 N: `sigma_0
-    GUARD/2`."""
-    force = 0.5 * runs.LAW.sigma_0 * GUARD
-    return {"N": force, "N m": force * _contact_radius(shape)}
-
-
 @functools.cache
-def _contact_radius(shape: str) -> float:
-    return LimitSurfaceTablePublished(PUBLISHED_PATCHES[shape](width=WIDTH)).contact_radius
+def guard_effect(shape: str) -> dict[str, float]:
+    """Compute the friction that the guard adds to a steady slide [N] and spin [N m] at 1 N: `sigma_0 GUARD/2`."""
+    force = 0.5 * runs.LAW.sigma_0 * GUARD
+    return {"N": force, "N m": force * LimitSurfaceTablePublished(PUBLISHED_PATCHES[shape](width=WIDTH)).contact_radius}
 
 
-def spin_up_error() -> float:
-    """Return the error of the figures' solver in the spin-up, where all reduced models of the disc are the same [N
-    m]."""
-    return facts.published_curve("driven/Circle/r/tau").deviation or 0.0
-
-
-def solver_error() -> dict[str, float]:
-    """Return the error of the figures' solver elsewhere: that of the distributed model of the disc in fx [N] and tau [N
-    m]."""
-    curves = {"N": "driven/Circle/d/fx", "N m": "driven/Circle/d/tau"}
-    return {unit: facts.published_curve(name).deviation or 0.0 for unit, name in curves.items()}
+def solver_error(curve: str) -> float:
+    """Return the error of the figures' solver in a curve of the disc, as `d/fx`; that of `r/tau` is in the spin-up."""
+    return facts.published_curve(f"driven/Circle/{curve}").deviation or 0.0
 
 
 def comparisons(every: dict[str, Errors]) -> list[Comparison]:
-    """Compare every published and every converged number of the box plots with ours."""
-    return [
-        row
-        for shape, each in every.items()
-        if shape in PUBLISHED_SHAPES
-        for quantity, models in each.items()
-        for model, values in models.items()
-        for reference in _REFERENCES
-        for row in _box_comparisons(reference, shape, quantity, model, values)
-    ]
-
-
-def _box_comparisons(
-    reference: Reference, shape: str, quantity: str, model: str, values: np.ndarray
-) -> list[Comparison]:
-    """Compare one box with its reference; the published plots hide the maximum."""
-    ours, freedom = statistics(values), slack(values)
+    """Compare every published and every converged number of the box plots with ours; the published ones hide the
+    maximum."""
     rows = []
-    for column, theirs in reference_box(reference, shape, quantity, model).items():
-        words = f"error of the {WORDS[quantity]}, {runs.IN_WORDS[shape]}, {model}, {column}"
-        within = _tolerance(reference, shape, quantity, model, column, freedom[column])
-        cause = _CAUSES[reference, model]
-        rows.append(compare(words, ours[column], theirs, reference, within, UNITS[quantity], cause))
+    for shape, each in every.items():
+        for quantity, models in each.items() if shape in PUBLISHED_SHAPES else ():
+            for model, values in models.items():
+                ours, freedom = statistics(values), slack(values)
+                for (reference, of), cause in _CAUSES.items():
+                    for column, theirs in (
+                        reference_box(reference, shape, quantity, model).items() if of == model else ()
+                    ):
+                        words = f"error of the {WORDS[quantity]}, {runs.IN_WORDS[shape]}, {model}, {column}"
+                        within = _tolerance(reference, shape, quantity, model, column, freedom[column])
+                        unit = UNITS[quantity]
+                        rows.append(compare(words, ours[column], theirs, reference, within, unit, cause))
     return rows
 
 
-def reference_box(reference: Reference, shape: str, quantity: str, model: str) -> dict[str, float]:
+def reference_box(
+    reference: Literal["published", "converged"], shape: str, quantity: str, model: str
+) -> dict[str, float]:
     """Return a published or converged box, by `COLUMNS`; without the maximum where it is published."""
     if reference == "published":
         return facts.published_table("box")[f"{quantity}/{shape}/{model}"]
     return dict(zip(COLUMNS, facts.converged(f"box/{quantity}/{shape}")[model].tolist(), strict=True))
 
 
-def _tolerance(reference: Reference, shape: str, quantity: str, model: str, column: str, slack: float) -> float:
+def _tolerance(
+    reference: Literal["published", "converged"], shape: str, quantity: str, model: str, column: str, slack: float
+) -> float:
     unit = UNITS[quantity]
     if model == "corrected" and reference == "converged":
         return OWN[unit]
-    tolerance = OWN[unit] + solver_error()[unit]
+    tolerance = OWN[unit] + solver_error({"ft": "d/fx", "tau": "d/tau"}[quantity])
     if model == "ellipsoid":
         tolerance += guard_effect(shape)[unit]
     if column == "maximum":  # one sample, of the spin-up or not, and not its neighbour
-        return tolerance + (spin_up_error() if quantity == "tau" else 0.0)
+        return tolerance + (solver_error("r/tau") if quantity == "tau" else 0.0)
     return tolerance + slack
 
 
-_CAUSES = {
-    ("converged", "corrected"): "The same statistics of the same equations, solved twice: what is left is the error "
-    "of both solvers.",
+_CAUSES: dict[tuple[Literal["published", "converged"], str], str] = {
     ("published", "corrected"): "The figure's solver misses the first samples of the spin-up and the changes of "
     "velocity by more than the rest, so that a quartile or whisker may come from a neighbouring sample.",
+    ("converged", "corrected"): "The same statistics of the same equations, solved twice: what is left is the error "
+    "of both solvers.",
     ("published", "ellipsoid"): "The program behind the published ellipsoid adds $10^{-10}$ m to $|z|$ where it takes "
     r"an angle ($5 \times 10^{-5}$ more friction), and its solver misses two samples of the spin-up, so that a "
     "quartile may come from a neighbouring one.",
@@ -170,21 +149,18 @@ _CAUSES = {
 
 
 def convention_misses(every: dict[str, Errors]) -> dict[str, float]:
-    """Return the largest distance [N] of the table model's force quartiles from the converged ones, by convention of
+    """Return the largest distance [N] of the table model's force quartiles from the converged ones, by the way of
     sampling."""
-    conventions = {
+    conventions: dict[str, Callable[[np.ndarray], dict[str, float]]] = {
         "500 samples, linear": statistics,
         "501 samples, linear": lambda values: statistics(np.append(values, 0.0)),
         "500 samples, nearest": lambda values: statistics(values, "nearest"),
         "500 samples, Weibull": lambda values: statistics(values, "weibull"),
     }
-    return {words: _convention_miss(every, box) for words, box in conventions.items()}
-
-
-def _convention_miss(every: dict[str, Errors], box: Callable[[np.ndarray], dict[str, float]]) -> float:
-    misses = [0.0]
-    for shape in (shape for shape in every if shape in PUBLISHED_SHAPES):
-        found = box(every[shape]["ft"]["corrected"])
+    misses = dict.fromkeys(conventions, 0.0)
+    for shape in every.keys() & PUBLISHED_SHAPES:
         theirs = reference_box("converged", shape, "ft", "corrected")
-        misses += [abs(found[column] - theirs[column]) for column in COLUMNS[1:4]]
-    return float(max(misses))
+        for words, box in conventions.items():
+            found = box(every[shape]["ft"]["corrected"])
+            misses[words] = max(misses[words], *(abs(found[column] - theirs[column]) for column in COLUMNS[1:4]))
+    return misses

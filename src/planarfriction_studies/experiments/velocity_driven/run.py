@@ -3,41 +3,24 @@
 from __future__ import annotations
 
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from planarfriction.patch import PUBLISHED_PATCHES
-from planarfriction.plots.style import PlotFigure
-from planarfriction.scenes import simulate
+from planarfriction.plots.style import LINE_STYLES, PlotFigure, new_figure, tidy
 from planarfriction.scenes.ready import driven, published_velocity
 from planarfriction.scenes.signal import sample_times
-from planarfriction_studies.experiments import facts, runs
-from planarfriction_studies.experiments.experiment import (
-    Arrays,
-    Comparison,
-    Result,
-    Table,
-    Work,
-    compare,
-    compare_converged,
-    compare_curve,
-    dataset,
-    table,
-)
-from planarfriction_studies.experiments.velocity_driven import boxes, figures
-from planarfriction_studies.experiments.wording import fill
-
-if TYPE_CHECKING:
-    import xarray as xr
+from planarfriction_studies.experiments import experiment, facts, looks, runs
+from planarfriction_studies.experiments.experiment import TWIST, WRENCH, Arrays, Comparison, Result, Work, entry
+from planarfriction_studies.experiments.velocity_driven import boxes
+from planarfriction_studies.experiments.wording import report
 
 QUICK_SHAPES = ("Circle", "NonConvex1")
 """Shapes whose curves are published."""
 
 RTOL, ATOL = 1e-8, 3e-8
 """Tolerances that leave errors below `boxes.OWN`, so that what is seen are those of the references."""
-
-COMPONENTS = (("fx", "N"), ("fy", "N"), ("tau", "N m"))
 
 SPIN_UP = 0.055
 """End of the time in which the figures' solver misses the torque of reduced models by more than it does later [s]."""
@@ -57,13 +40,16 @@ PUBLISHED = {
 CONVERGED = ("Circle", "Square", "Line", "NonConvex1")
 """Shapes with converged solutions, distributed and reduced."""
 
+MODELS = {"corrected": "table", "ellipsoid": "ellipsoid"}
+"""Name in the box plots -> words."""
+
 
 def drive(shape: str) -> Arrays:
     """Simulate a patch: time [s], and the wrench `[T, 3]` [N, N, N m] about the centre of pressure with each model."""
     patch = PUBLISHED_PATCHES[shape](width=boxes.WIDTH)
     result = {}
     for kind in ("d", "r", "e"):
-        columns = runs.columns(simulate(driven(runs.published_model(kind, patch)), rtol=RTOL, atol=ATOL))
+        columns = runs.simulated(driven(runs.published_model(kind, patch)), rtol=RTOL, atol=ATOL)
         result |= {"time": columns["time"], kind: runs.at_centre_of_pressure(columns, patch)}
     return result
 
@@ -75,51 +61,52 @@ def run(work: Work) -> Result:
     found = work.pieces(computes, lambda shape: f"driven, {runs.IN_WORDS[shape]}")
     errors = {shape: boxes.errors(wrenches) for shape, wrenches in found.items()}
     numbers = _numbers(found, errors)
-    velocity = published_velocity()
-    return fill("velocity_driven", **_template_values(numbers)).result(
+    return report(
+        "velocity_driven",
         _figures(found, errors),
+        numbers,
+        _template_values(numbers),
         comparisons=[
             *_curve_comparisons(found),
-            *_velocity_comparisons(velocity),
+            *_velocity_comparisons(),
             _guard_comparison(found["Circle"]),
             *boxes.comparisons(errors),
         ],
-        numbers=numbers,
         tables=(_error_table(numbers),),
-        data={"wrenches": _dataset(found, velocity)},
+        data={"wrenches": _dataset(found)},
     )
-
-
-def _figures(found: dict[str, Arrays], errors: dict[str, boxes.Errors]) -> dict[str, PlotFigure]:
-    result = {"velocity_profile": figures.profile(found["Circle"])}
-    for shape, kind in (("Circle", "r"), ("Circle", "e"), ("NonConvex1", "r")):
-        result[f"driven_{shape.lower()}_{kind}"] = figures.pair(shape, kind, found[shape])
-    others = {shape: found[shape] for shape in found if shape not in QUICK_SHAPES}
-    if others:
-        result["driven_other_shapes"] = figures.page(others)
-    return result | {"driven_errors": figures.box_plots(errors)}
 
 
 # ------------------------------------------------------------------ comparisons
 
+_GUARDED = (
+    "The program behind the published ellipsoid adds $10^{-10}$ m to $|z|$ where it takes the angle between bristle "
+    r"and velocity, which raises friction by $5 \times 10^{-5}$; the rest is its solver, as in the figures of the "
+    "other models."
+)
+
 
 def _curve_comparisons(found: dict[str, Arrays]) -> list[Comparison]:
+    solver = (
+        "The figure's solver (relative tolerance $10^{-6}$, absolute $10^{-8}$ m, when a bristle bends by $10^{-6}$ "
+        "m): it is as far from the converged solution where the velocity changes."
+    )
+    twice = "The same equations, solved twice: what is left is the error of both solvers."
     rows = []
     for shape, wrenches in found.items():
         for kind, model in runs.NAMES.items():
-            for column, (component, unit) in enumerate(COMPONENTS):
-                ours = wrenches["time"], wrenches[kind][:, column]
-                quantity = f"{runs.IN_WORDS[shape]}, {model}"
+            for (component, unit), values in zip(WRENCH.items(), wrenches[kind].T, strict=True):
+                ours, quantity = (wrenches["time"], values), f"{runs.IN_WORDS[shape]}, {model}"
                 for ending in PUBLISHED.get((shape, kind), ()):
-                    name = f"driven/{shape}/{kind}{ending}/{component}"
-                    words = f"{quantity}{ending}, {component}"
+                    name, words = f"driven/{shape}/{kind}{ending}/{component}", f"{quantity}{ending}, {component}"
                     if kind == "e":
                         rows += _ellipsoid_comparisons(words, *ours, name, shape, unit)
-                    else:
-                        rows.append(compare_curve(words, *ours, name, boxes.OWN[unit] + _rounded(name), _SOLVER))
+                    else:  # known errors are kept to three digits
+                        allowance = boxes.OWN[unit] + 5e-3 * (facts.published_curve(name).deviation or 0.0)
+                        rows.append(experiment.compare_curve(words, *ours, name, allowance, solver))
                 if kind in "dr" and shape in CONVERGED:
                     name, words = f"driven/{shape}/{kind}/{component}", f"{quantity}, {component}"
-                    rows.append(compare_converged(words, *ours, name, unit, boxes.OWN[unit], _TWICE))
+                    rows.append(experiment.compare_converged(words, *ours, name, boxes.OWN[unit], twice))
     return rows
 
 
@@ -128,63 +115,43 @@ def _ellipsoid_comparisons(
 ) -> list[Comparison]:
     """Compare a curve of the ellipsoid, whose own solver error is not known; of the torque, the spin-up apart."""
     guard = boxes.OWN[unit] + boxes.guard_effect(shape)[unit]
-    table_model = facts.published_curve(name.replace("/e/", "/r/")).deviation or 0.0
+    allowance = guard + (facts.published_curve(name.replace("/e/", "/r/")).deviation or 0.0)
     if unit == "N":
-        return [compare_curve(quantity, time, values, name, guard + table_model, _GUARDED)]
+        return [experiment.compare_curve(quantity, time, values, name, allowance, _GUARDED)]
+    spin_up = (
+        "The figure's solver misses the first samples of the spin-up, by as much as in the figure of the table model, "
+        "which is the same there: with its tolerances and the guard of $10^{-10}$ m put in, the curve is met to "
+        "$10^{-9}$ N m."
+    )
     early, curve = time < SPIN_UP, facts.published_curve(name)
     late = curve.time > SPIN_UP
-    ours = values[np.rint(curve.time[late] / 0.01).astype(int)]
-    tolerance = guard + boxes.solver_error()[unit] + curve.reading
+    ours, theirs = values[np.rint(curve.time[late] / 0.01).astype(int)], curve.values[late]
+    words, within = f"{quantity}, after it", guard + boxes.solver_error("d/tau") + curve.reading
+    first = f"{quantity}, spin-up", time[early], values[early], name, allowance, spin_up
     return [
-        compare_curve(f"{quantity}, spin-up", time[early], values[early], name, guard + table_model, _SPIN_UP),
-        compare(f"{quantity}, after it", ours, curve.values[late], "published", tolerance, unit, _GUARDED),
+        experiment.compare_curve(*first),
+        experiment.compare(words, ours, theirs, "published", within, unit, _GUARDED),
     ]
 
 
-def _rounded(name: str) -> float:
-    """Return the rounding error of a figure's known error, which is kept to three digits."""
-    return 5e-3 * (facts.published_curve(name).deviation or 0.0)
-
-
-_TWICE = "The same equations, solved twice: what is left is the error of both solvers."
-_SOLVER = (
-    "The figure's solver (relative tolerance $10^{-6}$, absolute $10^{-8}$ m, when a bristle bends by $10^{-6}$ m): it "
-    "is as far from the converged solution where the velocity changes."
-)
-_GUARDED = (
-    "The program behind the published ellipsoid adds $10^{-10}$ m to $|z|$ where it takes the angle between bristle "
-    r"and velocity, which raises friction by $5 \times 10^{-5}$; the rest is its solver, as in the figures of the "
-    "other models."
-)
-_SPIN_UP = (
-    "The figure's solver misses the first samples of the spin-up, by as much as in the figure of the table model, "
-    "which is the same there: with its tolerances and the guard of $10^{-10}$ m put in, the curve is met to "
-    "$10^{-9}$ N m."
-)
-
-
-def _velocity_comparisons(velocity: Any) -> list[Comparison]:
+def _velocity_comparisons() -> list[Comparison]:
     time = sample_times(5.0)
+    ours = experiment.columns_of(time, published_velocity()(time), TWIST)
     cause = "The same profile, labelled with its own time: what is left is the error of reading the figure."
-    return [
-        compare_curve(f"velocity profile, {name}", time, values, f"driven/velocity/{name}", 1e-12, cause)
-        for name, values in zip(("vx", "vy", "omega"), velocity(time).T, strict=True)
-    ]
+    compare = experiment.compare_curve
+    return experiment.compare_columns(compare, "velocity profile, ", ours, "driven/velocity", 1e-12, cause, TWIST)
 
 
 def _guard_comparison(disc: Arrays) -> Comparison:
     """Compare the published ellipsoid's surplus of friction in steady pure slide with what the guard explains."""
-    return compare(
-        "disc, surplus of the published ellipsoid's friction in a steady slide",
-        _guard_surplus(disc),
-        boxes.guard_effect("Circle")["N"],
-        "closed form",
-        boxes.OWN["N"],
-        "N",
+    words = "disc, surplus of the published ellipsoid's friction in a steady slide"
+    cause = (
         r"With $|z| + \epsilon$ in the angle, $\epsilon = 10^{-10}$ m, $\beta$ is $(1 + |z|/(|z| + \epsilon))/2$ "
         r"in a steady slide, so the bristles bend by $\epsilon/2$ further: what is left is of second order in "
-        "that length.",
+        "that length."
     )
+    explained = boxes.guard_effect("Circle")["N"]
+    return experiment.compare(words, _guard_surplus(disc), explained, "closed form", boxes.OWN["N"], "N", cause)
 
 
 def _guard_surplus(disc: Arrays) -> float:
@@ -194,7 +161,7 @@ def _guard_surplus(disc: Arrays) -> float:
     return float(ours - curve.values[steady])
 
 
-# ------------------------------------------------------------------ numbers and data
+# ------------------------------------------------------------------ numbers, table and data
 
 
 def _numbers(found: dict[str, Arrays], errors: dict[str, boxes.Errors]) -> dict[str, Any]:
@@ -210,7 +177,7 @@ def _numbers(found: dict[str, Arrays], errors: dict[str, boxes.Errors]) -> dict[
         "samples": boxes.SAMPLES,
         "solver": {"rtol": RTOL, "atol": ATOL},
         "guard": {"length": boxes.GUARD, "surplus": _guard_surplus(found["Circle"])},
-        "spin_up_error_of_the_figures": boxes.spin_up_error(),
+        "spin_up_error_of_the_figures": boxes.solver_error("r/tau"),
         "misses_of_other_conventions": boxes.convention_misses(errors),
     }
 
@@ -226,8 +193,8 @@ def _statistics(shape: str, errors: np.ndarray) -> dict[str, Any]:
 
 
 def _centre_of_rotation(shape: str, sample: int) -> dict[str, float] | None:
-    """Return the distances of the centre of rotation from the centre of pressure and from the nearest loaded cell [m]
-    at a sample; None in a slide."""
+    """Return the distances of the centre of rotation from the centre of pressure and the nearest loaded cell [m]; None
+    in a slide."""
     vx, vy, omega = published_velocity().left(0.01 * sample - 0.005)
     if omega == 0.0:
         return None
@@ -238,69 +205,157 @@ def _centre_of_rotation(shape: str, sample: int) -> dict[str, float] | None:
     return {"from the centre of pressure": float(np.hypot(*centre)), "from the nearest cell": float(nearest)}
 
 
-def _dataset(found: dict[str, Arrays], velocity: Any) -> xr.Dataset:
-    time = next(iter(found.values()))["time"]
-    wrenches = {
-        (shape, name): dict(zip(dict(COMPONENTS), each[kind].T, strict=True))
-        for shape, each in found.items()
-        for kind, name in runs.NAMES.items()
-    }
-    result = dataset(wrenches, dict(COMPONENTS), ("shape", "model"), ("time", time, "s"))
-    before = velocity.left(time).T  # a sampled wrench belongs to the velocity of the step just ended
-    speeds = zip(("vx", "vy", "omega"), ("m/s", "m/s", "rad/s"), before, strict=True)
-    return result.assign({name: ("time", values, {"units": unit}) for name, unit, values in speeds})
-
-
-# ------------------------------------------------------------------ words and table
-
-
 def _template_values(numbers: dict[str, Any]) -> dict[str, Any]:
     """Return the values that the template names."""
     errors = numbers["errors"]
-    quartiles: list[dict[str, Any]] = [
-        {"shape": runs.IN_WORDS[shape]}
-        | {name: each["ft"][model]["third quartile"] for name, model in (("table", "corrected"), ("ellipsoid",) * 2)}
-        for shape, each in errors.items()
-    ]
     tables = {shape: each["ft"]["corrected"] for shape, each in errors.items()}
     worst = max(tables, key=lambda shape: tables[shape]["maximum"] / tables[shape]["whisker high"])
-    convention, *others = numbers["misses_of_other_conventions"].values()
-    above = (
-        box["samples above the whisker"]
-        for quantities in errors.values()
-        for models in quantities.values()
-        for box in models.values()
-    )
+    quartiles = {
+        runs.IN_WORDS[shape]: [each["ft"][model]["third quartile"] for model in MODELS]
+        for shape, each in errors.items()
+    }
+    boxes_of_all = [box for each in errors.values() for models in each.values() for box in models.values()]
     return {
-        "shapes": [each["shape"] for each in quartiles],
         "quartiles": quartiles,
-        "factors": [each["ellipsoid"] / each["table"] for each in quartiles],
-        "worst": {
-            "shape": runs.IN_WORDS[worst],
-            "box": tables[worst],
-            "centre": tables[worst]["centre of rotation at maximum"],
-        },
-        "most": max(above),
-        "samples": numbers["samples"],
-        "convention": convention,
-        "others": others,
-        "guard": numbers["guard"],
-        "spin_up": numbers["spin_up_error_of_the_figures"],
+        "factors": [ellipsoid / table for table, ellipsoid in quartiles.values()],
+        "worst": tables[worst] | {"shape": runs.IN_WORDS[worst]},
+        "most": max(box["samples above the whisker"] for box in boxes_of_all),
     }
 
 
-def _error_table(numbers: dict[str, Any]) -> Table:
+def _error_table(numbers: dict[str, Any]) -> experiment.Table:
     """Return errors of both reduced models against the distributed one."""
     rows = {
-        f"{runs.IN_WORDS[shape]}, {figures.BOX_WORDS[model]}": {name: each[model] for name, each in quantities.items()}
+        f"{runs.IN_WORDS[shape]}, {words}": {name: each[model] for name, each in quantities.items()}
         for shape, quantities in numbers["errors"].items()
-        for model in boxes.MODELS
+        for model, words in MODELS.items()
     }
     columns = {
-        f"{words}, {column} [{unit}]": lambda each, quantity=quantity, column=column: float(
-            f"{1e3 * each[quantity][column]:.4g}"
-        )
+        f"{words}, {column} [{unit}]": entry(quantity, column, scale=1e3, digits=4)
         for quantity, words, unit in (("ft", "force", "mN"), ("tau", "torque", "N mm"))
         for column in ("median", "third quartile", "whisker high", "maximum")
     }
-    return table("Errors against the distributed model, at 1 N", rows, columns, "shape, model")
+    return experiment.table("Errors against the distributed model, at 1 N", rows, columns, "shape, model")
+
+
+def _dataset(found: dict[str, Arrays]) -> Any:
+    time = next(iter(found.values()))["time"]
+    wrenches = {
+        (shape, name): experiment.columns_of(time, each[kind], WRENCH)
+        for shape, each in found.items()
+        for kind, name in runs.NAMES.items()
+    }
+    before = published_velocity().left(time).T  # a sampled wrench belongs to the velocity of the step just ended
+    speeds = {name: (values, unit) for (name, unit), values in zip(TWIST.items(), before, strict=True)}
+    return experiment.dataset(wrenches, WRENCH, ("shape", "model"), ("time", time, "s"), speeds)
+
+
+# ------------------------------------------------------------------ figures
+
+LOOKS = {"d": ("-", 2.6, 0.45, "o"), "r": (LINE_STYLES[1], 1.3, 1.0, "s"), "e": (LINE_STYLES[2], 1.5, 1.0, "^")}
+"""Letter of a model -> line style, width, opacity, marker: the distributed model broad and pale below the others."""
+
+SPEEDS = (("vx", "$v_x$ [mm/s]", 1e3), ("vy", "$v_y$ [mm/s]", 1e3), ("omega", "$\\omega$ [rad/s]", 1.0))
+
+
+def _figures(found: dict[str, Arrays], errors: dict[str, boxes.Errors]) -> dict[str, PlotFigure]:
+    result = {"velocity_profile": _profile(found["Circle"])}
+    for shape, kind in (("Circle", "r"), ("Circle", "e"), ("NonConvex1", "r")):
+        result[f"driven_{shape.lower()}_{kind}"] = _pair(shape, kind, found[shape])
+    others = {shape: found[shape] for shape in found if shape not in QUICK_SHAPES}
+    if others:
+        result["driven_other_shapes"] = _page(others)
+    return result | {"driven_errors": _box_plots(errors)}
+
+
+def _profile(disc: Arrays) -> PlotFigure:
+    """Draw the velocity profile [mm/s, rad/s], and the wrench of the distributed model of the disc [N, N mm]."""
+    figure = new_figure(9.6, 4.6)
+    above, below = figure.subplots(2, 3, sharex=True)
+    time = np.arange(0.0, 5.0, 0.001)
+    for axes, (name, label, factor), values in zip(above, SPEEDS, published_velocity()(time).T, strict=True):
+        axes.plot(time, factor * values, color="0.15", lw=1.4)
+        looks.vertices(axes, f"driven/velocity/{name}", factor, "0.15")
+        axes.set_ylabel(label)
+        tidy(axes)
+    for axes, name, values in zip(below, WRENCH, disc["d"].T, strict=True):
+        label, factor = looks.AXES[name]
+        axes.plot(disc["time"], factor * values, color=looks.DISTRIBUTED, lw=1.4)
+        looks.vertices(axes, f"driven/Circle/d, alone/{name}", factor, looks.DISTRIBUTED)
+        axes.set(xlabel="time [s]", ylabel=label, xlim=(0.0, 5.0))
+        tidy(axes)
+    return figure
+
+
+def _pair(shape: str, kind: str, wrenches: Arrays) -> PlotFigure:
+    """Draw forces [N] and torque [N mm] of one reduced model on top of those of the distributed one, as published."""
+    figure = new_figure(9.6, 3.4)
+    panels = figure.subplots(1, 3)
+    _draw(panels, wrenches, ("d", kind))
+    endings = {"d": ", beside the ellipsoid" if kind == "e" else "", kind: ""}
+    for axes, name in zip(panels, WRENCH, strict=True):
+        for model, ending in endings.items():
+            curve, marker = f"driven/{shape}/{model}{ending}/{name}", LOOKS[model][-1]
+            looks.vertices(axes, curve, looks.AXES[name][1], looks.OF_MODEL[model], marker=marker)
+        axes.set_xlabel("time [s]")
+    marks = {"ls": "", "ms": 4, "mfc": "white"}
+    published = [
+        looks.line_key(f"{runs.NAMES[each]}, published", marker=LOOKS[each][-1], mec=looks.OF_MODEL[each], **marks)
+        for each in endings
+    ]
+    looks.legend(figure, _key(("d", kind)) + published, 4, fontsize=9)
+    return figure
+
+
+def _page(found: dict[str, Arrays]) -> PlotFigure:
+    """Draw forces [N] and torque [N mm] of several shapes, a row for each, with all three models."""
+    figure = new_figure(9.6, 2.1 * len(found) + 0.7)
+    panels = figure.subplots(len(found), 3, sharex=True, squeeze=False)
+    for row, (shape, wrenches) in zip(panels, found.items(), strict=True):
+        row[0].set_title(runs.IN_WORDS[shape], fontsize="medium", loc="left")
+        _draw(row, wrenches, ("d", "r", "e"))
+    for axes in panels[-1]:
+        axes.set_xlabel("time [s]")
+    figure.align_ylabels(panels)
+    looks.legend(figure, _key(("d", "r", "e")), 3, fontsize=9)
+    return figure
+
+
+def _draw(row: Any, wrenches: Arrays, kinds: tuple[str, ...]) -> None:
+    """Draw forces and torque of some models in a row of three panels."""
+    for column, (axes, name) in enumerate(zip(row, WRENCH, strict=True)):
+        label, factor = looks.AXES[name]
+        for kind in kinds:
+            axes.plot(wrenches["time"], factor * wrenches[kind][:, column], **_look(kind))
+        axes.set(xlim=(0.0, 5.0), ylabel=label)
+        tidy(axes)
+
+
+def _look(kind: str) -> dict[str, Any]:
+    style, width, opacity, _ = LOOKS[kind]
+    return {"ls": style, "lw": width, "alpha": opacity, "color": looks.OF_MODEL[kind]}
+
+
+def _key(kinds: tuple[str, ...]) -> list[Any]:
+    return [looks.line_key(runs.NAMES[kind], **_look(kind)) for kind in kinds]
+
+
+def _box_plots(every: dict[str, boxes.Errors]) -> PlotFigure:
+    """Draw errors of force [N] and torque [N mm] of all shapes, ours filled, the published boxes open beside them."""
+    colours, table = {"corrected": looks.REDUCED, "ellipsoid": looks.ELLIPSOID}, facts.published_table("box")
+    figure, panels = looks.box_panels([runs.IN_WORDS[shape] for shape in every], 7.4)
+    rows = (("ft", "error of the force [N]", 1.0, 1e-5), ("tau", "error of the torque [N mm]", 1e3, 1e-4))
+    for axes, (quantity, label, factor, linear) in zip(panels, rows, strict=True):
+        axes.set_yscale("symlog", linthresh=linear, linscale=0.5)
+        for place, (shape, each) in enumerate(every.items()):
+            for offset, (model, values) in zip((-0.28, 0.12), each[quantity].items(), strict=True):
+                ours = factor * np.array(list(boxes.statistics(values).values()))
+                looks.box(axes, place + offset, ours, colours[model], 0.14)
+                if published := table.get(f"{quantity}/{shape}/{model}"):
+                    theirs = [factor * published[name] for name in boxes.COLUMNS[:5]]
+                    looks.box(axes, place + offset + 0.16, theirs, colours[model], 0.14, filled=False)
+        axes.set(ylim=(0.0, None), ylabel=label)
+    named = {MODELS[model]: colour for model, colour in colours.items()}
+    published = looks.box_key(named, ", published", filled=False)
+    looks.legend(figure, [*looks.box_key(named), *published, looks.line_key(**looks.MAXIMUM)], 5)
+    return figure
