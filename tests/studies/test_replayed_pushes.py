@@ -7,7 +7,7 @@ import pytest
 
 import planarfriction as pf
 from planarfriction.planning import Pusher, Slider, push
-from planarfriction_studies.bench import plans
+from planarfriction_studies.bench import workflows
 from planarfriction_studies.measured import replayed_pushes
 from tests.support.repository import script
 
@@ -35,10 +35,10 @@ def test_a_push_is_that_of_least_power_in_small_steps():
     # Peshkin and Sanderson 1989: a pusher that sticks moves the object with the least power
     surface = pf.LimitSurfaceExact(pf.ContactPatch.rectangle(0.09))
     slider = Slider(surface, 0.045 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1]]))
-    path = pf.Signal.sampled([0.0, 1.0], [plans.BEGIN, plans.END], "linear")
+    path = pf.Signal.sampled([0.0, 1.0], [workflows.BEGIN, workflows.END], "linear")
     end = push(slider, Pusher(20.0), path, samples=2).end
     # Euler steps of half a millimetre: 1e-4 m, 3e-3 rad
-    np.testing.assert_allclose(plans.least_power(surface), end, rtol=0.0, atol=4e-3)
+    np.testing.assert_allclose(workflows.least_power(surface), end, rtol=0.0, atol=4e-3)
 
 
 def test_the_example_reaches_its_pose():

@@ -119,10 +119,4 @@ def _pieces(packed: PackedScene, kept: slice) -> PackedScene:
 def _output(packed: PackedScene, times: np.ndarray, *, bristles: bool) -> Output:
     count, contacts = len(times), len(packed.models)
     states = (count, len(packed.state) - 6) if bristles else (0, 0)
-    return Output(
-        times.copy(),
-        np.empty((count, 6)),
-        np.empty((count, contacts, 3)),
-        np.empty((count, contacts)),
-        np.empty(states),
-    )
+    return Output(times.copy(), *map(np.empty, ((count, 6), (count, contacts, 3), (count, contacts), states)))

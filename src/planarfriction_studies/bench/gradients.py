@@ -9,11 +9,18 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction.derivatives import scene_gradient, scene_sensitivities
+from planarfriction import derivatives
 from planarfriction.models import ReducedModel, ReducedModelPublished
 from planarfriction.scenes import Scene, Signal, SolverOptions, in_hand, simulate
-from planarfriction_studies.bench.measurement import Measurement, line, median
-from planarfriction_studies.bench.workloads import AGAINST_PUBLISHED, disc, law, mixed_twists
+from planarfriction_studies.bench.measurement import (
+    AGAINST_PUBLISHED,
+    Measurement,
+    disc,
+    law,
+    line,
+    median,
+    mixed_twists,
+)
 
 STEPS = 2000
 """Steps of the single roll-out."""
@@ -37,10 +44,7 @@ def reduced(full: bool) -> Measurement:
 
 
 def _value_and_gradient(model: ReducedModel | ReducedModelPublished, shape: tuple[int, ...], repeats: int) -> float:
-    """Measure the time [s] of half the squared wrenches of roll-outs with their gradient to all inputs; steps are the
-    last axis."""
-    from planarfriction import derivatives
-
+    """Measure half the squared wrenches of roll-outs with their gradient to all inputs [s]; steps are the last axis."""
     inputs = model.rest(), *_inputs(shape)
 
     def value_and_gradient() -> None:
@@ -52,8 +56,6 @@ def _value_and_gradient(model: ReducedModel | ReducedModelPublished, shape: tupl
 
 def _alone(model: ReducedModel | ReducedModelPublished, shape: tuple[int, ...], repeats: int) -> float:
     """Measure the time of the roll-outs alone [s]."""
-    from planarfriction import derivatives
-
     inputs = model.rest(), *_inputs(shape)
     return median(lambda: derivatives.rollout(model, *inputs), repeats)
 
@@ -64,10 +66,7 @@ def _inputs(shape: tuple[int, ...]) -> tuple[np.ndarray, np.ndarray, float]:
 
 
 def published(full: bool) -> Measurement:
-    """Measure half the squared wrenches of a roll-out, with their gradient to all parameters, twists, loads and the
-    state."""
-    from planarfriction import derivatives
-
+    """Measure half the squared wrenches of a roll-out, with their gradient to parameters, twists, loads and state."""
     model = ReducedModelPublished(disc(), law())
     value = _value_and_gradient(model, (STEPS,), 15)
     try:
@@ -96,20 +95,21 @@ def _eager_gradient(model: ReducedModelPublished, full: bool) -> float:
 
 
 def published_batch(full: bool) -> Measurement:
+    """Measure a thousand roll-outs with their gradient beside the roll-outs alone."""
     both, once = _batch(ReducedModelPublished(disc(), law()))
     words = "the roll-out alone (the ratio is the share of its speed)"
     return line(both, "million contact-steps/s", words, once, both / once)
 
 
 def reduced_batch(full: bool) -> Measurement:
+    """Measure a thousand roll-outs with their gradient, as `gradient.published.batch`."""
     (both, once), (theirs, alone) = (_batch(model(disc(), law())) for model in (ReducedModel, ReducedModelPublished))
     words = f"{AGAINST_PUBLISHED} (the roll-outs alone: {once:.3g} and {alone:.3g})"
     return line(both, "million contact-steps/s", words, theirs, both / theirs)
 
 
 def _batch(model: ReducedModel | ReducedModelPublished) -> tuple[float, float]:
-    """Return the millions of contact-steps per second of a thousand roll-outs with their gradient, and of the roll-outs
-    alone."""
+    """Return millions of contact-steps per second of a thousand roll-outs with their gradient, and of these alone."""
     shape = 1000, 1000
     steps = 1e-6 * math.prod(shape)
     return steps / _value_and_gradient(model, shape, 5), steps / _alone(model, shape, 5)
@@ -119,23 +119,22 @@ def scene_to_friction(full: bool) -> Measurement:
     """Measure derivatives of the motion of a scene to the friction."""
     return _beside_simulation(
         in_hand(ReducedModel(disc(), law()), t_end=0.5),
-        lambda scene: scene_sensitivities(scene, ("mu",), options=OPTIONS),
+        lambda scene: derivatives.scene_sensitivities(scene, ("mu",), options=OPTIONS),
     )
 
 
 def scene_to_knots(full: bool) -> Measurement:
     """Measure derivatives of the motion of a scene to twenty knots of the grip."""
     return _beside_simulation(
-        _gripped(), lambda scene: scene_sensitivities(scene, (), signals=SIGNALS, options=OPTIONS)
+        _gripped(), lambda scene: derivatives.scene_sensitivities(scene, (), signals=SIGNALS, options=OPTIONS)
     )
 
 
 def cost_to_knots(full: bool) -> Measurement:
     """Measure derivatives of one cost to twenty knots of the grip."""
-    return _beside_simulation(
-        _gripped(),
-        lambda scene: scene_gradient(scene, lambda _, motion: np.ones_like(motion), signals=SIGNALS, options=OPTIONS),
-    )
+    everything = lambda _, motion: np.ones_like(motion)  # noqa: E731
+    gradient = lambda scene: derivatives.scene_gradient(scene, everything, signals=SIGNALS, options=OPTIONS)  # noqa: E731
+    return _beside_simulation(_gripped(), gradient)
 
 
 def _gripped() -> Scene:

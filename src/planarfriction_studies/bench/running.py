@@ -12,18 +12,7 @@ from functools import partial
 from planarfriction import validation
 from planarfriction.errors import MissingExtraError
 from planarfriction.limit_surface import LimitSurfaceExact, LimitSurfaceTable
-from planarfriction_studies.bench import (
-    drake_costs,
-    gradients,
-    identified_log,
-    mjx_costs,
-    mujoco_costs,
-    plans,
-    steps,
-    surfaces,
-    sweep_costs,
-    whole_runs,
-)
+from planarfriction_studies.bench import gradients, simulator_costs, steps, whole_runs, workflows
 from planarfriction_studies.bench.measurement import Measurement
 
 BENCHMARKS: dict[str, Callable[[bool], Measurement]] = {
@@ -34,11 +23,11 @@ BENCHMARKS: dict[str, Callable[[bool], Measurement]] = {
     "in_hand.published.load_dependent": whole_runs.load_dependent,
     "in_hand.reduced": whole_runs.reduced,
     "in_hand.reduced.load_family": whole_runs.load_family,
-    "table.build": surfaces.table_build,
-    "twist.table.call": partial(surfaces.twist, kind=LimitSurfaceTable),
-    "twist.table.batch": partial(surfaces.twist, kind=LimitSurfaceTable, count=1000),
-    "twist.exact.call": partial(surfaces.twist, kind=LimitSurfaceExact),
-    "twist.exact.batch": partial(surfaces.twist, kind=LimitSurfaceExact, count=1000),
+    "table.build": steps.table_build,
+    "twist.table.call": partial(steps.twist, kind=LimitSurfaceTable),
+    "twist.table.batch": partial(steps.twist, kind=LimitSurfaceTable, count=1000),
+    "twist.exact.call": partial(steps.twist, kind=LimitSurfaceExact),
+    "twist.exact.batch": partial(steps.twist, kind=LimitSurfaceExact, count=1000),
     "step.published.loop": steps.published_loop,
     "step.distributed.loop": steps.distributed_loop,
     "step.published.call": steps.published_call,
@@ -49,14 +38,14 @@ BENCHMARKS: dict[str, Callable[[bool], Measurement]] = {
     "step.reduced.four": steps.reduced_four,
     "coupled.four_feet.call": steps.coupled,
     "coupled.four_feet.batch": partial(steps.coupled, environments=1000),
-    "mujoco.tray.1": partial(mujoco_costs.tray, blocks=1),
-    "mujoco.tray.2": partial(mujoco_costs.tray, blocks=2),
-    "mujoco.tray.8": partial(mujoco_costs.tray, blocks=8),
-    "mujoco.grip": mujoco_costs.grip,
-    "mujoco.rollout": mujoco_costs.rollout,
-    "mjx.discs": mjx_costs.discs,
-    "drake.disc.point": partial(drake_costs.disc, contact="point"),
-    "drake.disc.hydroelastic": partial(drake_costs.disc, contact="hydroelastic"),
+    "mujoco.tray.1": partial(simulator_costs.mujoco_tray, blocks=1),
+    "mujoco.tray.2": partial(simulator_costs.mujoco_tray, blocks=2),
+    "mujoco.tray.8": partial(simulator_costs.mujoco_tray, blocks=8),
+    "mujoco.grip": simulator_costs.mujoco_grip,
+    "mujoco.rollout": simulator_costs.mujoco_rollout,
+    "mjx.discs": simulator_costs.mjx_discs,
+    "drake.disc.point": partial(simulator_costs.drake_disc, contact="point"),
+    "drake.disc.hydroelastic": partial(simulator_costs.drake_disc, contact="hydroelastic"),
     "gradient.published": gradients.published,
     "gradient.published.batch": gradients.published_batch,
     "gradient.reduced": gradients.reduced,
@@ -64,11 +53,11 @@ BENCHMARKS: dict[str, Callable[[bool], Measurement]] = {
     "sensitivities.reduced": gradients.scene_to_friction,
     "sensitivities.knots": gradients.scene_to_knots,
     "sensitivities.gradient": gradients.cost_to_knots,
-    "planning.grip": plans.grip,
-    "planning.push": plans.push,
-    "identify.log": identified_log.identification,
-    "identify.log.distributed": partial(identified_log.identification, model="distributed"),
-    "sweep": sweep_costs.sweep,
+    "planning.grip": workflows.plan_grip,
+    "planning.push": workflows.plan_push,
+    "identify.log": workflows.identification,
+    "identify.log.distributed": partial(workflows.identification, model="distributed"),
+    "sweep": workflows.sweep,
     "import": whole_runs.importing,
 }
 """Benchmarks by name: functions of whether the baselines that take minutes run in full, too."""

@@ -14,8 +14,7 @@ from planarfriction.patch import ContactPatch, SoftFinger
 from planarfriction.scenes import Scene, Solution, in_hand, in_hand_load, simulate
 from planarfriction.scenes.ready import IN_HAND_LOADS
 from planarfriction_studies.bench.baselines import lsoda_time
-from planarfriction_studies.bench.measurement import Measurement, line, median, once
-from planarfriction_studies.bench.workloads import disc, law
+from planarfriction_studies.bench.measurement import Measurement, disc, law, line, median, once
 
 WINDOW = 0.1
 """Part of the in-hand run [s] that the general solver is given where the whole run would take it minutes."""
@@ -67,9 +66,8 @@ def reduced(full: bool) -> Measurement:
 
 def _soft() -> ContactPatch:
     """Return the published soft finger whose profile follows the load."""
-    width = 0.02
-    finger = SoftFinger(c=6.0 * width / 21, n=1.0 / 3.0, k_per_newton=2.0, radius_max=0.5 * width)
-    return ContactPatch.rectangle(width, cells=21, pressure=finger)
+    finger = SoftFinger(c=6.0 * 0.02 / 21, n=1.0 / 3.0, k_per_newton=2.0, radius_max=0.01)
+    return ContactPatch.rectangle(0.02, cells=21, pressure=finger)
 
 
 def load_family(full: bool) -> Measurement:

@@ -40,13 +40,13 @@ def bench(only: tuple[str, ...], full: bool, as_json: bool) -> None:
     from planarfriction_studies import bench as benchmarks
 
     with work_progress("measuring") as progress:
-        lines = benchmarks.run(only or None, full=full, progress=progress)
+        lines = benchmarks.run(list(only) or None, full=full, progress=progress)
     if as_json:
         print(json.dumps([dataclasses.asdict(line) for line in lines], indent=2))
         return
     shown = lambda value: "" if value is None else f"{value:.4g}"  # noqa: E731
     rows = [
-        [each.name, shown(each.value), each.unit, each.baseline, shown(each.baseline_value), shown(each.ratio)]
+        [each.name, shown(each.value), each.unit, each.baseline or "", shown(each.baseline_value), shown(each.ratio)]
         for each in lines
     ]
     print_table("Benchmarks", ["name", "value", "unit", "baseline", "of the baseline", "ratio"], rows)

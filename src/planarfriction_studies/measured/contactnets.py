@@ -20,7 +20,7 @@ import numpy as np
 
 from planarfriction.limit_surface import LimitSurfaceExact
 from planarfriction.patch import ContactPatch
-from planarfriction_studies.measured import fitting, slide_integrator
+from planarfriction_studies.measured import slide_integrator
 from planarfriction_studies.measured.models import quick
 from planarfriction_studies.measured.questions import FIRST_POSES, BatchModel, Case, SlideQuestion
 
@@ -73,26 +73,21 @@ def friction(patch: ContactPatch, mu_0: float, mu_1: float, share: float) -> sli
 class SpeedModel(BatchModel):
     """The limit surface of the patch, friction that grows with the speed, and a fitted contact radius; slides only."""
 
+    tasks = ("slides",)
+
     mu_0: float = 0.2
     mu_1: float = 0.05
     """Growth of the friction coefficient per speed [s/m]."""
     share: float = 1.2
     """Contact radius over that of the patch [-]."""
 
-    def answer_all(self, questions: Sequence[Any]) -> list[np.ndarray]:
-        """Return poses of slides."""
-        if questions[0].task != "slides":
-            raise NotImplementedError
-        return slide_integrator.slides(friction(questions[0].patch, self.mu_0, self.mu_1, self.share), questions)
+    def _answers(self, questions: Sequence[Any]) -> list[np.ndarray]:
+        return slide_integrator.slides(friction(questions[0].patch, *dataclasses.astuple(self)), questions)
 
-    def fit(self, cases: Sequence[Case]) -> SpeedModel:
-        """Fit the three numbers to the training slides."""
+    def _fitted(self, cases: Sequence[Case]) -> SpeedModel:
         patch = cases[0].question.patch
-        if cases[0].question.task != "slides":
-            raise NotImplementedError
         predict = lambda values, asked: slide_integrator.slides(friction(patch, *values), asked)  # noqa: E731
-        found = fitting.fit_slides(predict, [self.mu_0, self.mu_1, self.share], cases, patch.contact_radius())
-        return SpeedModel(*found.tolist())
+        return SpeedModel(*slide_integrator.fit_slides(predict, dataclasses.astuple(self), cases).tolist())
 
     def fitted_values(self) -> dict[str, float]:
         """Return the fitted numbers by name."""
@@ -120,16 +115,15 @@ class Linear(NamedTuple):
 class TossModel(BatchModel):
     """`SpeedModel` with friction, radius and centre of pressure of each toss, from its first poses; slides only."""
 
+    tasks = ("slides",)
+
     common: SpeedModel = SpeedModel()
     spreads: tuple[float, ...] = (*BEGIN, 0.0, 0.0)
     """Spreads as in `BEGIN`, then the means of a and b."""
     reach: tuple[float, float] = (1.0, 1.0)
     """Sizes of the regions of the end, in covariances: of the place, of the angle."""
 
-    def answer_all(self, questions: Sequence[Any]) -> list[np.ndarray]:
-        """Return poses of slides."""
-        if questions[0].task != "slides":
-            raise NotImplementedError
+    def _answers(self, questions: Sequence[Any]) -> list[np.ndarray]:
         linear = self.linear(questions)
         found = linear.start + estimate(np.array(self.spreads), linear, questions)[0]
         poses = slide_integrator.integrate(
@@ -137,11 +131,9 @@ class TossModel(BatchModel):
         )
         return [poses[i, : len(each.time)] for i, each in enumerate(questions)]
 
-    def fit(self, cases: Sequence[Case]) -> TossModel:
+    def _fitted(self, cases: Sequence[Case]) -> TossModel:
         """Fit common friction, spreads between tosses and regions of the end to the training slides."""
-        if cases[0].question.task != "slides":
-            raise NotImplementedError
-        model = dataclasses.replace(self, common=self.common.fit(cases))
+        model = dataclasses.replace(self, common=self.common._fitted(cases))
         linear = model.linear([case.question for case in cases])
         full = model._with_spreads(linear, cases)
         # regions are sized on tosses that spreads were not fitted to, their errors over those that they were fitted to
@@ -229,14 +221,13 @@ class TossModel(BatchModel):
         law, ways = self._friction(questions), _ways(questions)
         begun = slide_integrator.starts(law, questions, _radius(questions))
         start = np.concatenate([begun, np.zeros((len(begun), 3))], axis=1)
-        moved = [start, *(start + change * row for change, row in zip(CHANGES, np.eye(9)[3:], strict=True))]
         time = max((each.time for each in questions), key=len)
-        states = np.concatenate([_state(each, ways) for each in moved])
-        poses = slide_integrator.integrate(law, states, time, _radius(questions)).reshape(7, len(start), len(time), 3)
-        slopes = np.zeros((*poses.shape[1:], 9))
-        slopes[..., [0, 1, 2], [0, 1, 2]] = 1.0
-        slopes[..., 3:] = np.moveaxis((poses[1:] - poses[0]) / CHANGES[:, None, None, None], 0, -1)
-        return Linear(start, poses[0], slopes, time)
+
+        def poses_of(starts: np.ndarray) -> np.ndarray:
+            states = _state(starts, np.tile(ways, (len(starts) // len(ways), 1)))
+            return slide_integrator.integrate(law, states, time, _radius(questions))
+
+        return Linear(start, *slide_integrator.linearised(poses_of, start, CHANGES), time)
 
     def _friction(self, questions: Sequence[SlideQuestion]) -> slide_integrator.Friction:
         return friction(questions[0].patch, *dataclasses.astuple(self.common))
@@ -261,8 +252,7 @@ def _state(start: np.ndarray, ways: np.ndarray) -> np.ndarray:
 
 
 def estimate(spreads: np.ndarray, linear: Linear, questions: Sequence[SlideQuestion]) -> tuple[np.ndarray, np.ndarray]:
-    """Return changes `[K, 9]` of starts and own numbers that the first poses ask for, and their covariances `[K, 9,
-    9]`."""
+    """Return changes `[K, 9]` of starts and own numbers by the first poses, and their covariances `[K, 9, 9]`."""
     time, count = linear.time[:FIRST_POSES], len(questions)
     weights = np.zeros((FIRST_POSES, 3, FIRST_POSES, 3))
     for i, (begin, on) in enumerate((spreads[:2], spreads[:2], spreads[2:4])):
@@ -289,8 +279,7 @@ def pushed(time: np.ndarray, begin: float, on: float, seen: float) -> np.ndarray
 
 
 def _squares(spreads: np.ndarray, linear: Linear, cases: Sequence[Case]) -> np.ndarray:
-    """Return the mean squares of the errors in place and angle along the way and at the end, `[4]`, of the linear
-    slides."""
+    """Return mean squares `[4]` of the linear slides' errors in place and angle, along the way and at the end."""
     changes, _ = estimate(spreads, linear, [case.question for case in cases])
     poses = linear.poses + np.einsum("ktci,ki->ktc", linear.slopes, changes)
     total = np.zeros(4)

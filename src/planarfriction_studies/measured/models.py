@@ -8,6 +8,7 @@ A model is any callable that takes a question and returns an answer (see `questi
 from __future__ import annotations
 
 import dataclasses
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -19,37 +20,45 @@ from planarfriction.laws import ElastoPlastic, LuGre
 from planarfriction.limit_surface import LimitSurface, LimitSurfaceExact, LimitSurfaceQuartic
 from planarfriction.limit_surface.base import scaling
 from planarfriction.patch import ContactPatch
-from planarfriction_studies.measured import fitting, slide_integrator
-from planarfriction_studies.measured.questions import BatchModel, Case, Question, SlideQuestion
+from planarfriction_studies.measured.questions import BatchModel, Case, SlideQuestion
+from planarfriction_studies.measured.slide_integrator import MU, TURNS, fit_slides, parabolas, slides
 
 
-@dataclass(frozen=True)
-class SurfaceModel(BatchModel):
-    """A limit surface of the given patch, friction normal to it; on slides times a fitted friction coefficient."""
+@functools.lru_cache(maxsize=64)
+def made(make: Callable[..., Any], patch: ContactPatch, *arguments: Any) -> Any:
+    """Return what `make` makes of a patch, once: a surface, or a model with a law."""
+    return make(patch, *arguments)
 
-    surface: Callable[[ContactPatch], LimitSurface]
-    mu: float = fitting.MU
 
-    def answer_all(self, questions: Sequence[Any]) -> list[np.ndarray]:
-        """Return answers to questions of one task."""
-        made = surfaces(self.surface, questions)
-        if questions[0].task == "slides":
-            wrench = quick(made[0])
-            return slide_integrator.slides(lambda twist, _: self.mu * wrench(twist), questions)
-        return [_direction(surface, question) for surface, question in zip(made, questions, strict=True)]
+class SlideFit(BatchModel):
+    """Base of models whose friction coefficient `mu` is fitted to the training slides; directions need none."""
 
-    def fit(self, cases: Sequence[Case]) -> SurfaceModel:
-        """Fit the friction coefficient to the training slides; directions need none."""
+    mu: float
+
+    def _fitted(self, cases: Sequence[Case]) -> BatchModel:
         if cases[0].question.task != "slides":
             return self
-        (made,), radius = surfaces(self.surface, [cases[0].question]), cases[0].question.patch.contact_radius()
-        wrench = quick(made)
-        predict = lambda values, asked: slide_integrator.slides(lambda twist, _: values[0] * wrench(twist), asked)  # noqa: E731
-        return dataclasses.replace(self, mu=float(fitting.fit_slides(predict, [fitting.MU], cases, radius)[0]))
+        model: Any = self
+        predict = lambda values, asked: dataclasses.replace(model, mu=float(values[0])).answer_all(asked)  # noqa: E731
+        return dataclasses.replace(model, mu=float(fit_slides(predict, [MU], cases)[0]))
 
     def fitted_values(self) -> dict[str, float]:
         """Return the numbers fitted to slides, by name."""
         return {"mu": self.mu}
+
+
+@dataclass(frozen=True)
+class SurfaceModel(SlideFit):
+    """A limit surface of the given patch, friction normal to it; on slides times a fitted friction coefficient."""
+
+    surface: Callable[[ContactPatch], LimitSurface]
+    mu: float = MU
+
+    def _answers(self, questions: Sequence[Any]) -> list[np.ndarray]:
+        if questions[0].task == "slides":
+            wrench = quick(made(self.surface, questions[0].patch))
+            return slides(lambda twist, _: self.mu * wrench(twist), questions)
+        return [_direction(made(self.surface, question.patch), question) for question in questions]
 
 
 def quick(surface: LimitSurface) -> Callable[[np.ndarray], np.ndarray]:
@@ -66,18 +75,14 @@ def quick(surface: LimitSurface) -> Callable[[np.ndarray], np.ndarray]:
     return wrench
 
 
-def surfaces(make: Callable[[ContactPatch], LimitSurface], questions: Sequence[Any]) -> list[LimitSurface]:
-    """Return a surface for each question, one for each different patch."""
-    made: dict[int, LimitSurface] = {}
-    for question in questions:
-        if id(question.patch) not in made:
-            made[id(question.patch)] = make(question.patch)
-    return [made[id(question.patch)] for question in questions]
+def _given(question: Any) -> np.ndarray:
+    """Return the wrenches or twists that a question about pushes gives."""
+    return question.wrenches if question.task == "pushes" else question.given
 
 
 def _direction(surface: LimitSurface, question: Any) -> np.ndarray:
     """Return twists of wrenches of a pusher, or the other way round; zero where nothing is given."""
-    given = question.wrenches if question.task == "pushes" else question.given
+    given = _given(question)
     backwards = question.task == "pushes" or question.wanted == "twists"
     moved, answer = np.abs(given).max(axis=1) > 0.0, np.zeros_like(given)
     answer[moved] = surface.twist(-given[moved]) if backwards else -surface.wrench(given[moved])
@@ -85,7 +90,7 @@ def _direction(surface: LimitSurface, question: Any) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class UncoupledModel(BatchModel):
+class UncoupledModel(SlideFit):
     """Force against the velocity and torque against the spin, each at its full value as if the other were not there.
 
     The torque has a lever: that of the patch in pure spin, or a fitted one. A wrench then moves the object along its
@@ -95,38 +100,31 @@ class UncoupledModel(BatchModel):
     fitted_lever: bool
     share: float = 1.0
     """The lever over the contact radius of the patch, which is the lever of a pure spin [-]."""
-    mu: float = fitting.MU
+    mu: float = MU
 
-    def answer_all(self, questions: Sequence[Any]) -> list[np.ndarray]:
-        """Return answers to questions of one task."""
+    def _answers(self, questions: Sequence[Any]) -> list[np.ndarray]:
         if questions[0].task == "slides":
             lever = self._lever(questions[0])
-            return slide_integrator.slides(lambda twist, _: self.mu * uncoupled(twist, lever), questions)
+            return slides(lambda twist, _: self.mu * uncoupled(twist, lever), questions)
         return [self._direction(question, self._lever(question)) for question in questions]
 
-    def fit(self, cases: Sequence[Case]) -> UncoupledModel:
+    def _fitted(self, cases: Sequence[Case]) -> BatchModel:
         """Fit friction coefficient and lever to the training cases."""
         from planarfriction_studies.measured.tasks import TASKS
 
-        question = cases[0].question
-        if question.task == "slides":
-            radius, begin = question.patch.contact_radius(), [self.mu, self.share][: 1 + self.fitted_lever]
-
-            def predict(values: np.ndarray, asked: Sequence[Any]) -> list[np.ndarray]:
-                lever = radius * (values[1] if self.fitted_lever else self.share)
-                return slide_integrator.slides(lambda twist, _: values[0] * uncoupled(twist, lever), asked)
-
-            found = fitting.fit_slides(predict, begin, cases, radius)
-            return dataclasses.replace(self, mu=float(found[0]), share=float([*found, self.share][1]))
         if not self.fitted_lever:
-            return self
-        task = TASKS[question.task]
+            return super()._fitted(cases)
+        task = TASKS[cases[0].question.task]
+        if task.name == "slides":
+            changed = lambda values: dataclasses.replace(self, mu=float(values[0]), share=float(values[1]))  # noqa: E731
+            predict = lambda values, asked: changed(values).answer_all(asked)  # noqa: E731
+            return changed(fit_slides(predict, [self.mu, self.share], cases))
 
         def misfit(share: float) -> float:
             tried = dataclasses.replace(self, share=share)
             return float(np.mean(np.concatenate([task.errors(case, tried(case.question)) for case in cases])))
 
-        return dataclasses.replace(self, share=fitting.fit_angles(misfit, 0.2, 5.0))
+        return dataclasses.replace(self, share=_least(misfit, 0.2, 5.0))
 
     def fitted_values(self) -> dict[str, float]:
         """Return the fitted numbers by name."""
@@ -137,11 +135,19 @@ class UncoupledModel(BatchModel):
 
     def _direction(self, question: Any, lever: float) -> np.ndarray:
         """Return directions of twists or wrenches about the centre of mass."""
-        given = question.wrenches if question.task == "pushes" else question.given
+        given = _given(question)
         if question.task == "series" and question.wanted == "wrenches":
             return -uncoupled(given, lever)
         turns = np.abs(given[:, 2]) / lever > np.hypot(given[:, 0], given[:, 1])
         return np.where(turns[:, None], given * [0.0, 0.0, 1.0], given * [1.0, 1.0, 0.0])
+
+
+def _least(errors: Callable[[float], float], low: float, high: float) -> float:
+    """Return the number between `low` and `high` with the least error, by a search over 24 of them and a finer one."""
+    tried = np.geomspace(low, high, 24)
+    best = tried[np.argmin([errors(value) for value in tried])]
+    fine = best * np.geomspace(low / high, high / low, 25) ** (1.0 / 23.0)
+    return float(fine[np.argmin([errors(value) for value in fine])])
 
 
 def uncoupled(twist: np.ndarray, lever: float) -> np.ndarray:
@@ -152,34 +158,30 @@ def uncoupled(twist: np.ndarray, lever: float) -> np.ndarray:
 
 
 @dataclass(frozen=True)
-class PushedQuartic:
+class PushedQuartic(BatchModel):
     """A convex quartic for each layout, fitted to its training pushes: friction learned without knowing the feet."""
+
+    tasks = ("pushes", "series")
 
     made: Mapping[str, LimitSurface] = dataclasses.field(default_factory=dict)
 
-    def __call__(self, question: Question) -> np.ndarray:
-        """Return the answer to one question; slides have no pushes to learn from."""
-        if question.task == "slides":
-            raise NotImplementedError
-        return _direction(self.made[_layout(question)], question)
+    def _answers(self, questions: Sequence[Any]) -> list[np.ndarray]:
+        return [_direction(self.made[_layout(question)], question) for question in questions]
 
-    def fit(self, cases: Sequence[Case]) -> PushedQuartic:
+    def _fitted(self, cases: Sequence[Case]) -> PushedQuartic:
         """Fit a quartic to each layout of the training pushes, all of one size: that of the median limit force."""
-        if cases[0].question.task == "slides":
-            raise NotImplementedError
         pairs: dict[str, list[tuple[Any, np.ndarray, np.ndarray]]] = {}
         for case in cases:
             question = case.question
             if question.task == "pushes" or question.wanted == "twists":
-                given = question.wrenches if question.task == "pushes" else question.given
-                pair = (question.patch, given[case.scored], case.answer[case.scored])
+                pair = (question.patch, _given(question)[case.scored], case.answer[case.scored])
                 pairs.setdefault(_layout(question), []).append(pair)
-        made = {}
+        quartics = {}
         for layout, parts in pairs.items():
             patch, wrenches, twists = parts[0][0], *(np.concatenate([part[i] for part in parts]) for i in (1, 2))
             power = np.einsum("mi,mi->m", wrenches, twists) / LimitSurfaceExact(patch).dissipation(twists)
-            made[layout] = LimitSurfaceQuartic.fit(-wrenches / np.median(power), twists, patch=patch)
-        return PushedQuartic(made)
+            quartics[layout] = LimitSurfaceQuartic.fit(-wrenches / np.median(power), twists, patch=patch)
+        return PushedQuartic(quartics)
 
 
 def _layout(question: Any) -> str:
@@ -195,7 +197,7 @@ def stiff(mu: float) -> LuGre:
 
 
 @dataclass(frozen=True)
-class BristleModel(BatchModel):
+class BristleModel(SlideFit):
     """One of the library's friction models with stiff bristles, simulated as it stands.
 
     A push in time is followed from rest with its measured twist. A twist of a wrench is searched among those whose
@@ -203,39 +205,21 @@ class BristleModel(BatchModel):
     """
 
     build: Callable[[ContactPatch, LuGre], Any]
-    mu: float = fitting.MU
+    mu: float = MU
 
-    def answer_all(self, questions: Sequence[Any]) -> list[np.ndarray]:
-        """Return answers to questions of one task."""
+    def _answers(self, questions: Sequence[Any]) -> list[np.ndarray]:
         from planarfriction_studies.measured.steady import follow, twists_of
 
-        models: dict[int, Any] = {}
+        answers, law = [], stiff(self.mu)
         for question in questions:
-            if id(question.patch) not in models:
-                models[id(question.patch)] = self.build(question.patch, stiff(self.mu))
-        answers = []
-        for question in questions:
-            model = models[id(question.patch)]
+            model = made(self.build, question.patch, law)
             if question.task == "slides":
                 answers.append(_slide(model, question))
             elif question.task == "series" and question.wanted == "wrenches":
                 answers.append(-follow(model, question.time, question.given, question.normal_force))
             else:
-                given = question.wrenches if question.task == "pushes" else question.given
-                answers.append(twists_of(model, -given))
+                answers.append(twists_of(model, -_given(question)))
         return answers
-
-    def fit(self, cases: Sequence[Case]) -> BristleModel:
-        """Fit the friction coefficient to the training slides; directions need none."""
-        if cases[0].question.task != "slides":
-            return self
-        radius = cases[0].question.patch.contact_radius()
-        predict = lambda values, asked: dataclasses.replace(self, mu=float(values[0])).answer_all(asked)  # noqa: E731
-        return dataclasses.replace(self, mu=float(fitting.fit_slides(predict, [fitting.MU], cases, radius)[0]))
-
-    def fitted_values(self) -> dict[str, float]:
-        """Return the fitted numbers by name."""
-        return {"mu": self.mu}
 
 
 def _slide(model: Any, question: SlideQuestion) -> np.ndarray:
@@ -245,8 +229,8 @@ def _slide(model: Any, question: SlideQuestion) -> np.ndarray:
 
     body = SlidingBody(question.mass, question.inertia)
     first = len(question.first)
-    begun = slide_integrator.parabolas([question])[0]
+    begun = parabolas([question])[0]
     part = Slide(question.time[:first], question.first, begun[3:])
     noise = np.array([1.0, 1.0, 1.0 / np.sqrt(question.inertia / question.mass)])
-    begun = improve_start(model, body, part, begun, noise, slide_integrator.TURNS - 1)
+    begun = improve_start(model, body, part, begun, noise, TURNS - 1)
     return slide_poses(model, body, question.time, begun[:3], begun[3:])

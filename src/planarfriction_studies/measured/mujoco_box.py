@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-import dataclasses
+import functools
 import importlib
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from planarfriction_studies.measured import fitting, slide_integrator
-from planarfriction_studies.measured.questions import FIRST_POSES, Case, SlideQuestion
+from planarfriction_studies.measured.models import SlideFit
+from planarfriction_studies.measured.questions import FIRST_POSES, SlideQuestion
+from planarfriction_studies.measured.slide_integrator import MU, improved, parabolas
 
 STEP = 2e-3
 """Time step, MuJoCo's default [s]."""
@@ -40,54 +41,27 @@ def _mujoco() -> Any:
 
 
 @dataclass(frozen=True)
-class MujocoBox:
+class MujocoBox(SlideFit):
     """A box on a plane in MuJoCo: contacts at its corners, elliptic cones, condim 3; slides only."""
 
-    mu: float = fitting.MU
-    _made: dict[float, Any] = field(default_factory=dict, repr=False, compare=False)
+    tasks = ("slides",)
 
-    def __call__(self, question: SlideQuestion) -> np.ndarray:
-        """Return poses of one slide."""
-        if question.task != "slides":
-            raise NotImplementedError
-        begun = self._start(question)
-        return self._poses(question, begun, question.time)
+    mu: float = MU
 
-    def answer_all(self, questions: Sequence[Any]) -> list[np.ndarray]:
-        """Return poses of all slides."""
-        return [self(question) for question in questions]
-
-    def fit(self, cases: Sequence[Case]) -> MujocoBox:
-        """Fit the friction coefficient to the training slides."""
-        if cases[0].question.task != "slides":
-            return self
-        radius = cases[0].question.patch.contact_radius()
-        predict = lambda values, asked: dataclasses.replace(self, mu=float(values[0]), _made={}).answer_all(asked)  # noqa: E731
-        return dataclasses.replace(
-            self, mu=float(fitting.fit_slides(predict, [fitting.MU], cases, radius)[0]), _made={}
-        )
-
-    def fitted_values(self) -> dict[str, float]:
-        """Return the fitted numbers by name."""
-        return {"mu": self.mu}
+    def _answers(self, questions: Sequence[Any]) -> list[np.ndarray]:
+        return [self._poses(question, self._start(question), question.time) for question in questions]
 
     def _start(self, question: SlideQuestion) -> np.ndarray:
-        """Improve the start by one Gauss-Newton step from a parabola through the first poses, as for the other
-        models."""
-        begun, time = slide_integrator.parabolas([question])[0], question.time[:FIRST_POSES]
-        weights = np.array([1.0, 1.0, np.sqrt(question.inertia / question.mass)])
-        poses = self._poses(question, begun, time)
-        slopes = np.zeros((FIRST_POSES, 3, 6))
-        slopes[:, [0, 1, 2], [0, 1, 2]] = 1.0
-        for i, change in enumerate(slide_integrator.CHANGES):
-            moved = begun + change * np.eye(6)[3 + i]
-            slopes[:, :, 3 + i] = (self._poses(question, moved, time) - poses) / change
-        rows, off = (slopes * weights[:, None]).reshape(-1, 6), ((question.first - poses) * weights).ravel()
-        return begun + np.linalg.lstsq(rows, off, rcond=None)[0]
+        """Improve the start by one Gauss-Newton step from a parabola through the first poses, as for other models."""
+        time = question.time[:FIRST_POSES]
+        poses_of = lambda starts: np.array([self._poses(question, each, time) for each in starts])  # noqa: E731
+        begun, first = parabolas([question]), question.first[None]
+        return improved(poses_of, begun, first, question.inertia / question.mass)[0]
 
     def _poses(self, question: SlideQuestion, start: np.ndarray, time: np.ndarray) -> np.ndarray:
         mujoco = _mujoco()
-        model, data, rest = self._box(question)
+        half = 0.5 * float(np.sqrt(question.patch.areas.sum()))
+        model, data, rest = _box(self.mu, half, question.height, question.mass, question.inertia)
         mujoco.mj_resetData(model, data)
         data.qpos[:] = rest
         data.qpos[:2] = start[:2]
@@ -105,17 +79,14 @@ class MujocoBox:
         at = STEP * np.arange(steps + 1)
         return np.stack([np.interp(time, at, column) for column in rows.T], axis=1)
 
-    def _box(self, question: SlideQuestion) -> tuple[Any, Any, np.ndarray]:
-        """Return the model, data, and the place of the box when it stands on the table."""
-        if self.mu not in self._made:
-            mujoco = _mujoco()
-            half = 0.5 * float(np.sqrt(question.patch.areas.sum()))
-            scene = SCENE.format(
-                step=STEP, mu=self.mu, height=question.height, half=half, mass=question.mass, inertia=question.inertia
-            )
-            model = mujoco.MjModel.from_xml_string(scene)
-            data = mujoco.MjData(model)
-            for _ in range(int(SETTLED / STEP)):
-                mujoco.mj_step(model, data)
-            self._made[self.mu] = model, data, data.qpos.copy()
-        return self._made[self.mu]
+
+@functools.lru_cache(maxsize=8)
+def _box(mu: float, half: float, height: float, mass: float, inertia: float) -> tuple[Any, Any, np.ndarray]:
+    """Return the model, data, and the place of the box when it stands on the table."""
+    mujoco = _mujoco()
+    scene = SCENE.format(step=STEP, mu=mu, height=height, half=half, mass=mass, inertia=inertia)
+    model = mujoco.MjModel.from_xml_string(scene)
+    data = mujoco.MjData(model)
+    for _ in range(int(SETTLED / STEP)):
+        mujoco.mj_step(model, data)
+    return model, data, data.qpos.copy()

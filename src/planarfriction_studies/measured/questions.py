@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple
 
 import numpy as np
 
@@ -96,7 +96,9 @@ class Case(NamedTuple):
 
 
 class BatchModel:
-    """Base of models that answer many questions at once."""
+    """Base of models that answer many questions at once; raises `NotImplementedError` for tasks that are not theirs."""
+
+    tasks: ClassVar[tuple[str, ...]] = ("slides", "pushes", "series")
 
     def __call__(self, question: Question) -> np.ndarray:
         """Return the answer to one question."""
@@ -104,4 +106,18 @@ class BatchModel:
 
     def answer_all(self, questions: Sequence[Any]) -> list[np.ndarray]:
         """Return the answers to questions of one task."""
+        if questions[0].task not in self.tasks:
+            raise NotImplementedError
+        return self._answers(questions)
+
+    def fit(self, cases: Sequence[Case]) -> BatchModel:
+        """Return the model fitted to the training cases of one task."""
+        if cases[0].question.task not in self.tasks:
+            raise NotImplementedError
+        return self._fitted(cases)
+
+    def _answers(self, questions: Sequence[Any]) -> list[np.ndarray]:
         raise NotImplementedError
+
+    def _fitted(self, cases: Sequence[Case]) -> BatchModel:
+        return self

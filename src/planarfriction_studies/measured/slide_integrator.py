@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from planarfriction.scenes.ready import GRAVITY
-from planarfriction_studies.measured.questions import FIRST_POSES, SlideQuestion
+from planarfriction_studies.measured.questions import FIRST_POSES, Case, SlideQuestion
 
 STEP = 3.4e-3
 """Step [s], half a sample: ends move by less than 0.01 mm and 0.01 deg where it is halved."""
@@ -21,6 +21,12 @@ CHANGES = np.array([2e-3, 2e-3, 2e-2])
 
 TURNS = 2
 """Gauss-Newton steps from the velocity of a parabola to that of the model: a third moves it by less than 1e-5 m/s."""
+
+MU = 0.22
+"""Initial guess of the friction coefficient of a slide [-]."""
+
+DIFFERENCE = 0.02
+"""Share of a fitted number over which its derivative is taken."""
 
 Friction = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """Friction wrenches `[K, 3]` over the weight [1, 1, m] of twists `[K, 3]`, both in the axes of the bodies.
@@ -90,24 +96,43 @@ def parabolas(questions: Sequence[SlideQuestion]) -> np.ndarray:
     return np.array(found)
 
 
-def starts(friction: Friction, questions: Sequence[SlideQuestion], radius_squared: float) -> np.ndarray:
-    """Return starts `[K, 6]` with which the slides go through their first poses best: least squares over pose and
-    twist.
+def linearised(
+    poses_of: Callable[[np.ndarray], np.ndarray], starts: np.ndarray, changes: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return poses `[K, T, 3]` of `starts` `[K, N]` and their derivatives `[K, T, 3, N]` to the starts.
+
+    Differences over `changes` of all columns but the pose, which moves the whole path; `poses_of` is called once, with
+    all starts.
+    """
+    size = starts.shape[1]
+    moved = (starts + change * row for change, row in zip(changes, np.eye(size)[3:], strict=True))
+    found = poses_of(np.concatenate([starts, *moved]))
+    poses = found.reshape(size - 2, len(starts), *found.shape[1:])
+    slopes = np.zeros((*poses.shape[1:], size))
+    slopes[..., [0, 1, 2], [0, 1, 2]] = 1.0
+    slopes[..., 3:] = np.moveaxis((poses[1:] - poses[0]) / changes[:, None, None, None], 0, -1)
+    return poses[0], slopes
+
+
+def improved(poses_of: Callable[[np.ndarray], np.ndarray], found: np.ndarray, first: np.ndarray, radius_squared: float):
+    """Return starts `[K, 6]` one Gauss-Newton step nearer to those that go through the `first` poses `[K, T, 3]` best.
 
     An angle counts as its way at the radius of gyration.
     """
-    found, count = parabolas(questions), len(questions)
-    weights, spread = np.array([1.0, 1.0, np.sqrt(radius_squared)]), np.eye(6)[3:] * CHANGES[:, None]
-    first, time = np.array([each.first for each in questions]), questions[0].time[:FIRST_POSES]
+    weights = np.array([1.0, 1.0, np.sqrt(radius_squared)])
+    poses, slopes = linearised(poses_of, found, CHANGES)
+    rows, off = slopes * weights[:, None], (first - poses) * weights
+    normal = np.einsum("ktci,ktcj->kij", rows, rows)
+    return found + np.linalg.solve(normal, np.einsum("ktci,ktc->ki", rows, off)[..., None])[..., 0]
+
+
+def starts(friction: Friction, questions: Sequence[SlideQuestion], radius_squared: float) -> np.ndarray:
+    """Return starts `[K, 6]` with which the slides go through their first poses best: least squares over pose and
+    twist."""
+    found, first = parabolas(questions), np.array([each.first for each in questions])
+    time = questions[0].time[:FIRST_POSES]
     for _ in range(TURNS):
-        tried = np.concatenate([found, *(found + change for change in spread)])
-        poses = integrate(friction, tried, time, radius_squared).reshape(4, count, FIRST_POSES, 3)
-        slopes = np.zeros((count, FIRST_POSES, 3, 6))
-        slopes[..., [0, 1, 2], [0, 1, 2]] = 1.0
-        slopes[..., 3:] = np.moveaxis((poses[1:] - poses[0]) / CHANGES[:, None, None, None], 0, -1)
-        rows, off = slopes * weights[:, None], (first - poses[0]) * weights
-        normal = np.einsum("ktci,ktcj->kij", rows, rows)
-        found = found + np.linalg.solve(normal, np.einsum("ktci,ktc->ki", rows, off)[..., None])[..., 0]
+        found = improved(lambda each: integrate(friction, each, time, radius_squared), found, first, radius_squared)
     return found
 
 
@@ -122,3 +147,23 @@ def slides(friction: Friction, questions: Sequence[SlideQuestion]) -> list[np.nd
     longest = max((each.time for each in questions), key=len)
     poses = integrate(friction, begun, longest, radius_squared)
     return [poses[i, : len(each.time)] for i, each in enumerate(questions)]
+
+
+Slides = Callable[[np.ndarray, Sequence[SlideQuestion]], list[np.ndarray]]
+"""Poses `[T, 3]` of slides for given numbers."""
+
+
+def fit_slides(predict: Slides, begin: Sequence[float], cases: Sequence[Case]) -> np.ndarray:
+    """Return numbers with the least mean square of the errors of the end: position, and yaw at the contact radius."""
+    from scipy.optimize import least_squares
+
+    questions, ends = [case.question for case in cases], np.array([case.answer[-1] for case in cases])
+    scale, length = np.asarray(begin, dtype=float), questions[0].patch.contact_radius()
+
+    def off(shares: np.ndarray) -> np.ndarray:
+        found = np.array([poses[-1] for poses in predict(shares * scale, questions)])
+        return ((found - ends) * [1.0, 1.0, length]).ravel()
+
+    # sharing 1e-3 of a number is a tenth of its standard error; the path of a slide is nearly linear in 1/mu
+    found = least_squares(off, np.ones(len(scale)), diff_step=DIFFERENCE, xtol=1e-3, ftol=1e-4, bounds=(0.2, 5.0))
+    return found.x * scale

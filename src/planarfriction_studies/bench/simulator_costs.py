@@ -1,0 +1,197 @@
+# pyright: reportAttributeAccessIssue=false
+# (MuJoCo and JAX describe few of their names to type checkers.)
+"""Costs of patch friction in MuJoCo, MJX and Drake, beside the simulators' own friction in turns."""
+
+from __future__ import annotations
+
+import contextlib
+import dataclasses
+import statistics
+import time
+from collections.abc import Callable
+from typing import Any, Literal
+
+import numpy as np
+
+from planarfriction_studies.bench import mujoco_scenes
+from planarfriction_studies.bench.drake_scenes import DISC, Way
+from planarfriction_studies.bench.measurement import Measurement, line, once
+from planarfriction_studies.bench.mujoco_scenes import MujocoScene, Native
+
+ROUNDS, STEPS = 15, 300
+"""Rounds in turns, and steps of each, in MuJoCo."""
+
+ENVIRONMENTS, THREADS = 16, 2
+"""Environments of roll-outs in MuJoCo and in MJX, and threads."""
+
+
+def mujoco_tray(full: bool, blocks: int) -> Measurement:
+    """Measure a step of a tray with so many blocks."""
+    return _beside_own(mujoco_scenes.tray, blocks)
+
+
+def mujoco_grip(full: bool) -> Measurement:
+    """Measure a step of a grip at rest."""
+    return _beside_own(mujoco_scenes.grip)
+
+
+def mujoco_rollout(full: bool) -> Measurement:
+    """Measure a step of a tray of two blocks, in roll-outs on threads."""
+    return _beside_own(mujoco_scenes.tray, 2, rolled=True)
+
+
+def _beside_own(make: Callable[..., MujocoScene], *arguments: int, rolled: bool = False) -> Measurement:
+    """Measure a scene with patches and with MuJoCo's own friction. Raises `MissingExtraError` without MuJoCo."""
+    scene = dataclasses.replace(make(*arguments), weightless=False, time=0.0)
+    m, d, friction = scene.ours()  # says how to install MuJoCo
+    import mujoco
+
+    own = m, d, friction.step
+    model, data = scene.native(Native())
+    native = model, data, lambda data: mujoco.mj_step(model, data)
+    for m, d, step in (own, native):
+        scene.run(m, d, lambda d=d, step=step: step(d))
+    measure = _rollouts if rolled else _steps
+    with friction.install() if rolled else contextlib.nullcontext():
+        value, theirs = _in_turns(*(measure(scene, *each) for each in (own, native)))
+    words = f"MuJoCo's own, condim 4, elliptic, impratio 10 (patch friction costs {value / theirs:.2f} times as much)"
+    return line(value * 1e6, "us per step", words, theirs * 1e6)
+
+
+def _in_turns(*actions: Callable[[], float]) -> tuple[float, float]:
+    """Return the median of each action's results, over rounds in which they take turns."""
+    for action in actions:
+        action()
+    one, other = np.median([[action() for action in actions] for _ in range(ROUNDS)], axis=0)
+    return float(one), float(other)
+
+
+def _steps(scene: MujocoScene, m: Any, d: Any, step: Callable[[Any], None]) -> Callable[[], float]:
+    """Return seconds per step, always of the same steps."""
+    import mujoco
+
+    saved = np.zeros(mujoco.mj_stateSize(m, mujoco.mjtState.mjSTATE_INTEGRATION))
+    mujoco.mj_getState(m, d, saved, mujoco.mjtState.mjSTATE_INTEGRATION)
+    controls = [scene.control(i * m.opt.timestep) for i in range(STEPS)]
+
+    def action() -> float:
+        mujoco.mj_setState(m, d, saved, mujoco.mjtState.mjSTATE_INTEGRATION)
+        begin = time.perf_counter()
+        for control in controls:
+            d.ctrl[:] = control
+            step(d)
+        return (time.perf_counter() - begin) / STEPS
+
+    return action
+
+
+def _rollouts(scene: MujocoScene, m: Any, d: Any, _: Any) -> Callable[[], float]:
+    """Return seconds per step of one environment, of `ENVIRONMENTS` on `THREADS`."""
+    import mujoco
+    from mujoco import rollout
+
+    full = mujoco.mjtState.mjSTATE_FULLPHYSICS
+    start = np.zeros(mujoco.mj_stateSize(m, full))
+    mujoco.mj_getState(m, d, start, full)
+    starts, data = np.tile(start, (ENVIRONMENTS, 1)), [mujoco.MjData(m) for _ in range(THREADS)]
+    controls = np.array([scene.control(i * m.opt.timestep) for i in range(STEPS)])
+    controls = np.tile(controls, (ENVIRONMENTS, 1, 1))
+
+    def action() -> float:
+        begin = time.perf_counter()
+        rollout.rollout(m, data, starts, controls)
+        return (time.perf_counter() - begin) / (ENVIRONMENTS * STEPS)
+
+    return action
+
+
+MJX_STEPS, MJX_ROUNDS = 100, 5
+"""Steps of a timed roll-out (0.2 s, in which all discs slide), and rounds in which both ways take turns."""
+
+
+def mjx_discs(full: bool) -> Measurement:
+    """Measure a step of one of `ENVIRONMENTS` that `vmap` steps at once, with patch friction and with MJX's own.
+
+    In turns, both in double precision. Raises `MissingExtraError` without MJX.
+    """
+    from planarfriction.adapters import mjx as adapter  # before anything else: its error names the missing extra
+
+    # isort: split
+    import jax
+    from mujoco import mjx
+
+    before = jax.config.jax_enable_x64
+    jax.config.update("jax_enable_x64", True)
+    try:
+        scene = mujoco_scenes.disc(1.0, 10.0)
+        text = scene.text(Native(cone="pyramidal", impratio=1.0, condim=1), 2e-3, "Euler")
+        m, prepared, friction = scene.with_patches(adapter, text)
+        runs = _rolled(friction.step, m, prepared), _rolled(mjx.step, *scene.native(Native()))
+        times = np.array([[once(run) for run in runs] for _ in range(MJX_ROUNDS)]) / (MJX_STEPS * ENVIRONMENTS)
+    finally:
+        jax.config.update("jax_enable_x64", before)
+    value, theirs = (statistics.median(column) * 1e6 for column in times.T)
+    words = (
+        f"MJX's own friction, condim 4, elliptic, impratio 10 (patch friction costs {value / theirs:.2g} times as much)"
+    )
+    return line(value, "us per step", words, theirs)
+
+
+def _rolled(step: Callable[..., Any], m: Any, d: Any) -> Callable[[], None]:
+    """Return a compiled roll-out of discs with different starts, whose contact has settled."""
+    import jax
+    import jax.numpy as jnp
+    import mujoco
+    from mujoco import mjx
+
+    for _ in range(300):
+        mujoco.mj_step(m, d)
+    mx, data = mjx.put_model(m), mjx.put_data(m, d)
+    speeds, spins = jnp.linspace(0.8, 1.2, ENVIRONMENTS), jnp.linspace(20.0, 5.0, ENVIRONMENTS)
+
+    @jax.jit
+    def roll(mx, speeds, spins):
+        def one(speed, spin):
+            start = data.replace(qvel=jnp.array([speed, 0.0, 0.0, spin]))
+
+            def next_step(d, _):
+                # in double precision MJX makes long integers of some that came in short
+                return jax.tree.map(lambda after, given: after.astype(given.dtype), step(mx, d), d), None
+
+            return jax.lax.scan(next_step, start, None, length=MJX_STEPS)[0].qpos
+
+        return jax.vmap(one)(speeds, spins)
+
+    def run() -> None:
+        roll(mx, speeds, spins).block_until_ready()
+
+    run()
+    return run
+
+
+DRAKE_DT, DRAKE_STEPS, DRAKE_ROUNDS = 2e-3, 100, 9
+"""Time step [s], steps that are timed at once, and how often, in turns."""
+
+
+def drake_disc(full: bool, contact: Literal["point", "hydroelastic"]) -> Measurement:
+    """Measure patch friction and Drake's own in turns. Raises `MissingExtraError` without Drake."""
+    import planarfriction.adapters.drake  # noqa: F401  (says how to install Drake)
+
+    runs = [_thrown(Way(contact, patch=patch)) for patch in (True, False)]
+    times = np.array([[once(run) for run in runs] for _ in range(DRAKE_ROUNDS)]) / DRAKE_STEPS
+    value, plain = (statistics.median(column) * 1e6 for column in times.T)
+    words = f"the plant with Drake's own friction (patch friction costs {value / plain:.1f} times as much)"
+    return line(value, "us per step", words, plain)
+
+
+def _thrown(way: Way) -> Callable[[], None]:
+    """Return a function that throws the disc at 1 m/s and 10 rad/s and runs it for a number of steps."""
+    simulator, plant, context = DISC.build(way, DRAKE_DT)
+    simulator.AdvanceTo(100.5 * DRAKE_DT)
+
+    def run() -> None:
+        plant.SetVelocities(context, np.array([0.0, 0.0, 10.0, 1.0, 0.0, 0.0]))
+        simulator.AdvanceTo(simulator.get_context().get_time() + DRAKE_STEPS * DRAKE_DT)
+
+    run()
+    return run
