@@ -49,8 +49,7 @@ def answer(state: State) -> Answer:
 
 
 def steady_wrench(state: State) -> np.ndarray:
-    """Return the wrench `[3]` of steady sliding, `-f_N sum(w_i F(|v_i|) B_i' v_i/|v_i|)` with the friction F of the
-    law."""
+    """Return the wrench `[3]` of steady sliding, `-f_N sum(w_i F(|v_i|) B_i' v_i/|v_i|)` with the law's friction F."""
     patch = state.drawing.patch
     x, y = patch.positions.T
     vx, vy, _ = geometry.twist_at(np.array(state.twist), patch.positions).T

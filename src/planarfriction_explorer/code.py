@@ -19,27 +19,21 @@ T_END = 1.0
 
 def python(state: State) -> str:
     """Return a script that prints the wrench of limit surface and ellipsoid, then that of the law in a simulation."""
-    lines = ["import planarfriction as pf"]
     law, imported = _law(state.law)
-    return "\n".join(
-        [
-            *lines,
-            *imported,
-            "",
-            f"patch = {_patch(state.drawing)}",
-            f"law = {law}",
-            f"twist, normal_force = {state.twist!r}, {state.normal_force!r}",
-            "",
-            "for surface in (pf.LimitSurfaceExact(patch), pf.LimitSurfaceEllipsoid(patch)):",
-            "    print(law.numbers.mu_c * normal_force * surface.wrench(twist))",
-            "",
-            "model = pf.DistributedModel(patch, law)",
-            f'scene = pf.scenes.driven(model, twist=twist, normal_force=normal_force, at="origin", t_end={T_END})',
-            "data = pf.simulate(scene).data",
-            'print(*(data[name].values[-1, 0] for name in ("fx", "fy", "tau")))',
-            "",
-        ]
-    )
+    return f"""import planarfriction as pf
+{imported}
+patch = {_patch(state.drawing)}
+law = {law}
+twist, normal_force = {state.twist!r}, {state.normal_force!r}
+
+for surface in (pf.LimitSurfaceExact(patch), pf.LimitSurfaceEllipsoid(patch)):
+    print(law.numbers.mu_c * normal_force * surface.wrench(twist))
+
+model = pf.DistributedModel(patch, law)
+scene = pf.scenes.driven(model, twist=twist, normal_force=normal_force, at="origin", t_end={T_END})
+data = pf.simulate(scene).data
+print(*(data[name].values[-1, 0] for name in ("fx", "fy", "tau")))
+"""
 
 
 def toml(state: State) -> str:
@@ -73,8 +67,8 @@ def _patch(drawing: Drawing) -> str:
     return f"pf.ContactPatch.from_pressure([\n{rows}], cell_size={drawing.cell_size!r})"
 
 
-def _law(law: Any) -> tuple[str, list[str]]:
-    """Return a law with the parameters that are not the defaults, and the lines that import it."""
+def _law(law: Any) -> tuple[str, str]:
+    """Return a law with the parameters that are not the defaults, and the line that imports it."""
     kind = type(law)
     given = []
     for each in dataclasses.fields(law):
@@ -83,7 +77,7 @@ def _law(law: Any) -> tuple[str, list[str]]:
             plain = value.breakaway_ratio if isinstance(value, ElastoPlastic) else value
             given.append(f"{each.name}={plain!r}")
     own = getattr(planarfriction, kind.__name__, None) is not kind
-    imported = [f"from {kind.__module__} import {kind.__name__}"] if own else []
+    imported = f"from {kind.__module__} import {kind.__name__}\n" if own else ""
     return f"{'' if own else 'pf.'}{kind.__name__}({', '.join(given)})", imported
 
 

@@ -52,8 +52,7 @@ def _model(name: str, drawing: Drawing, law: Any) -> Any:
 
 
 def motion(state: State) -> Signal:
-    """Return the twist of the state, reached in a quarter of the run, turned round in the next half: stick, slip,
-    reversal."""
+    """Return the twist of the state, reached in a quarter of the run and reversed after half: stick, slip, reversal."""
     times = T_END * np.array([0.0, 0.25, 0.5, 0.75, 1.0])
     return Signal.sampled(times, np.outer([0.0, 1.0, 1.0, -1.0, -1.0], state.twist), "linear")
 

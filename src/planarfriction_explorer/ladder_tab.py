@@ -35,9 +35,7 @@ class LadderTab:
         self._live = Live(failed=self._say)
         self.status = pn.pane.HTML("")
         self.table = pn.pane.HTML("", styles=looks.grows(340))
-        self._source = ColumnDataSource(
-            {"seconds": [], "error": [], "name": [], "colour": [], "align": [], "offset": []}
-        )
+        self._source = ColumnDataSource({key: [] for key in ("seconds", "error", "name", "colour", "align", "offset")})
         self.layout = pn.Column(
             pn.pane.HTML(_WORDS, sizing_mode="stretch_width"),
             self.status,

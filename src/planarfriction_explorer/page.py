@@ -15,9 +15,8 @@ from planarfriction_explorer.answers import Answer, answer
 from planarfriction_explorer.controls import OWN, Controls
 from planarfriction_explorer.drawing import Drawing
 from planarfriction_explorer.ladder_tab import LadderTab
+from planarfriction_explorer.live import Paced
 from planarfriction_explorer.map_view import MapView
-from planarfriction_explorer.numbers import numbers
-from planarfriction_explorer.pacing import Paced
 from planarfriction_explorer.scene_tab import SceneTab
 from planarfriction_explorer.state import State
 
@@ -148,8 +147,7 @@ class Page:
     # ------------------------------------------------------------------ showing
 
     def _try(self, act: Callable[[], Any]) -> None:
-        """Carry out a wish of the user, or say in one line why not; all that changes goes to the browser in one
-        message."""
+        """Carry out a wish of the user, or say in one line why not; the browser gets all changes in one message."""
         with pn.io.unlocked():
             try:
                 self.message.visible = False
@@ -183,7 +181,7 @@ class Page:
             self.map.move(self.state, self.answer)
         self.slow.ask()
         self._follow_ladder()
-        self.numbers.object = numbers(self.state, found, time.perf_counter() - begin)
+        self.numbers.object = pictures.numbers_table(self.state, found, time.perf_counter() - begin)
 
     def _show_slow(self) -> None:
         """Show the picture in 3-D and the code, which need not follow a drag."""

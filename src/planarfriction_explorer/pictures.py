@@ -1,4 +1,4 @@
-"""Pictures of a state as plain arrays and tables: lengths in mm, limit surfaces without units."""
+"""Pictures of a state as plain arrays and tables, and its numbers as HTML: lengths in mm, surfaces without units."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from planarfriction import geometry
 from planarfriction.limit_surface import LimitSurfaceCells, LimitSurfaceTable
 from planarfriction.plots.limit_surface import scaled_samples
 from planarfriction.plots.style import DISTRIBUTED, ELLIPSOID, EXACT
+from planarfriction_explorer import looks
 from planarfriction_explorer.answers import Answer
 from planarfriction_explorer.drawing import Drawing
 from planarfriction_explorer.state import State
@@ -54,8 +55,7 @@ def slip_arrows(state: State) -> dict[str, list[float]]:
 
 
 def wrench_arrows(state: State, answer: Answer | None) -> dict[str, Any]:
-    """Return forces of law, surface and ellipsoid as arrows from the centre of pressure [mm], one on top of the
-    other."""
+    """Return forces of law, surface and ellipsoid as arrows from the centre of pressure [mm], one over the other."""
     if answer is None:
         return {**_arrows(np.zeros((0, 2)), np.zeros((0, 2))), "colour": [], "width": []}
     start = np.tile(state.drawing.surface.centre_of_pressure, (3, 1))
@@ -160,3 +160,35 @@ def _layout() -> dict[str, Any]:
         "uirevision": "kept",  # the view that was turned to stays
         "autosize": True,
     }
+
+
+_ROWS = {
+    "friction": "Friction, steady sliding",
+    "surface": "Limit surface, μ<sub>c</sub> f<sub>N</sub>",
+    "ellipsoid": "Ellipsoid",
+}
+
+
+def numbers_table(state: State, found: Answer, seconds: float) -> str:
+    """Return the table of the wrenches, centre of rotation, power, and the error of the ellipsoid."""
+    rows = "".join(
+        f"<tr><td style='color:{COLOURS[name]}'><b>{text}</b></td>"
+        + "".join(f"<td>{value:.4f}</td>" for value in _shown(found, name))
+        + "</tr>"
+        for name, text in _ROWS.items()
+    )
+    (force, angle), centre = state.drawing.largest_errors, state.centre_of_rotation
+    where = "none, no spin" if centre is None else f"({1e3 * centre[0]:.2f}, {1e3 * centre[1]:.2f}) mm"
+    return (
+        f"{looks.TABLE}<div id='answer'><table><tr><th></th><th>fx [N]</th><th>fy [N]</th><th>τ [N mm]</th></tr>{rows}"
+        f"</table><p>Centre of rotation: {where}. Dissipated power: {1e3 * found.power:.4g} mW.</p>"
+        f"<p>The ellipsoid is off by {found.force_error:.3f} of μ<sub>c</sub> f<sub>N</sub> in the wrench and by "
+        f"{found.angle_error:.1f}° in the twist here; over all directions by up to {max(force, found.force_error):.3f} "
+        f"and {max(angle, found.angle_error):.1f}°.</p><p><small>Answered in {1e3 * seconds:.1f} ms</small></p></div>"
+    )
+
+
+def _shown(found: Answer, name: str) -> list[float]:
+    """Return a wrench in N and N mm, without -0."""
+    fx, fy, tau = getattr(found, name)
+    return [round(each, 4) + 0.0 for each in (fx, fy, 1e3 * tau)]

@@ -27,21 +27,16 @@ def serve(port: int = 0, *, browser: bool = True, ready: Callable[[str], None] |
     `FrictionError` where it is taken.
     """
     server = open_server(port)
+    from planarfriction_explorer.page import Page
+
     with said_when_compiling():
-        _rehearse()
+        Page()  # one that nobody sees, so that what has to be compiled is so before the first visitor comes
     server.start()
     if browser:
         server.io_loop.add_callback(server.show, "/")
     if ready is not None:
         ready(f"http://localhost:{server.port}")
     server.run_until_shutdown()
-
-
-def _rehearse() -> None:
-    """Make a page that nobody sees, so that what has to be compiled is so before the first visitor comes."""
-    from planarfriction_explorer.page import Page
-
-    Page()
 
 
 def open_server(port: int) -> Any:

@@ -42,8 +42,7 @@ class State:
         return self.changed(twist=(vx, vy, self.twist[2]))
 
     def turning_about(self, x: float, y: float) -> State:
-        """Return the state with the centre of rotation (x, y) [m] at the same spin; one of 1 rad/s where there was
-        none."""
+        """Return the state with the centre of rotation (x, y) [m] at the same spin, or at 1 rad/s without one."""
         omega = self.twist[2] or 1.0
         return self.changed(twist=(omega * y, -omega * x, omega))
 

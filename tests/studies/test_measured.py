@@ -69,9 +69,9 @@ def test_the_tables_come_with_a_notice_of_each():
 
 def test_splits_keep_copies_and_pushes_together(cases):
     for name, task in TASKS.items():
-        sides = [{c.group for c in cases[name] if task.is_training(c) is side} for side in (True, False)]
+        sides = [{c.group for c in cases[name] if c.is_training is side} for side in (True, False)]
         assert sides[0] and sides[1] and not sides[0] & sides[1]
-    assert sum(TASKS["slides"].is_training(case) for case in cases["slides"]) == 143
+    assert sum(case.is_training for case in cases["slides"]) == 143
     assert len(cases["slides"]) == 284
     assert [len(case.answer) for case in cases["pushes"]] == [25] * 20
 
@@ -175,7 +175,7 @@ def test_mujocos_box_slides_as_far_as_coulomb_says(cases):
 @pytest.mark.skipif(importlib.util.find_spec("cvxpy") is None, reason="cvxpy is not installed")
 def test_a_quartic_learns_from_pushes(cases):
     every = [case for case in cases["pushes"] if case.question.layout == "hard_patch"]
-    training, test = [[c for c in every if TASKS["pushes"].is_training(c) is side] for side in (True, False)]
+    training, test = [[c for c in every if c.is_training is side] for side in (True, False)]
     learned = models.PushedQuartic().fit(training)
     angle = TASKS["pushes"].errors(test[0], learned(test[0].question)).mean()
     assert angle < 8.0  # the uniform face is 10 deg off

@@ -28,8 +28,7 @@ class Stop(NamedTuple):
 
 
 def wrench(ratio: float) -> tuple[float, float]:
-    """Return the force over `mu N` and torque over `mu N R` of a disc, against its motion; `ratio` is speed over rim
-    speed."""
+    """Return force over `mu N` and torque over `mu N R` against the motion of a disc; `ratio`: speed over rim speed."""
     from scipy.special import ellipe, ellipkm1
 
     if ratio < 1e-9:

@@ -37,8 +37,7 @@ def line(value: float, unit: str, baseline: str, baseline_value: float, ratio: f
 
 
 def median(action: Callable[[], Any], repeats: int, inner: int = 1) -> float:
-    """Measure the median time of `action` [s] over `repeats` rounds of `inner` calls, after one call that does not
-    count."""
+    """Measure the median time of `action` [s] over `repeats` rounds of `inner` calls, after one more call."""
     action()
     times = []
     for _ in range(repeats):

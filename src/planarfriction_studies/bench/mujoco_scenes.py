@@ -103,8 +103,7 @@ class MujocoScene:
     def begin(
         self, way: Native | None, dt: float = 2e-3, integrator: str = "Euler", model: FrictionModel | None = None
     ) -> tuple[Any, Any, Callable[[], None]]:
-        """Return MuJoCo's model and data, and a function that makes a step: with its own friction, for None with
-        patches."""
+        """Return model, data and a function that makes a step: with MuJoCo's own friction, for None with patches."""
         import mujoco
 
         if way is None:
@@ -182,8 +181,7 @@ SHAKEN = 3.0
 
 
 def shaken() -> MujocoScene:
-    """Build the block of `grip`, pressed with 6 N, in a gripper that is moved up and down, and turned, for 3 s, and
-    then held for 2 s."""
+    """Build the block of `grip`, pressed with 6 N, in a gripper that goes up and down and turns for 3 s, then rests."""
     depth, geom = _SHAPES["box"]
     fingers = _pads(f"{{}}{0.01 + depth} 0 0", f'{geom} mass="0.05"', 'damping="20"')
     body = f"""<worldbody><body name="arm" pos="0 0 0.5"><joint name="lift" type="slide" axis="0 0 1" damping="20"/>
@@ -266,8 +264,7 @@ def plate(load: Literal[1, 2] = 1) -> MujocoScene:
 
 
 def tray(blocks: int = 2) -> MujocoScene:
-    """Build a tray shaken to and fro with `blocks` of 0.1 kg on it, which slip and turn; it comes first in the
-    positions."""
+    """Build a tray shaken to and fro, first in the positions, with `blocks` of 0.1 kg on it, which slip and turn."""
     places = [(0.1 * (i % 4 - 1.5), 0.1 * (i // 4 - 0.5)) for i in range(blocks)]
     carried = "".join(
         f"""<body name="block {i}" pos="{x} {y} 0.025"><freejoint/>

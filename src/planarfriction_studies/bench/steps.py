@@ -109,8 +109,7 @@ def coupled(full: bool, environments: int = 1) -> Measurement:
 
 
 def _four_feet(model: ReducedModel, environments: int, dt: float = 1e-3) -> Callable[[], CoupledStep]:
-    """Return an implicit step of boxes of 0.2 kg with random velocities, one for each environment, from bristles at
-    rest."""
+    """Return an implicit step of boxes of 0.2 kg with random velocities, one per environment, from bristles at rest."""
     rows = np.concatenate([[[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]] for x, y in FEET])
     response, patches = dt * rows @ np.diag([5.0, 5.0, 5e3]) @ rows.T, CoupledPatches([model] * 4)
     velocity = np.random.default_rng(7).normal(size=(environments, 3)) * [0.05, 0.05, 0.5]
@@ -158,8 +157,7 @@ def scipy_twist(surface: LimitSurface, wrench: np.ndarray) -> np.ndarray:
 
 
 def numpy_table(patch: ContactPatch, segments: int = 20) -> np.ndarray:
-    """Return the smoothed nodes of the published table as one would write them: four sums over the cells at every
-    node."""
+    """Return the smoothed nodes of the published table as one would write them: four sums over the cells at each."""
     grid, radius, weights = patch.grid, patch.contact_radius(), patch.weights()
     assert grid is not None
     x, y = (patch.positions - patch.centre_of_pressure()).T

@@ -71,8 +71,7 @@ def _soft() -> ContactPatch:
 
 
 def load_family(full: bool) -> Measurement:
-    """Measure a run with maps of a load family beside one with a fixed map, in turns, so that noise disturbs both
-    alike."""
+    """Measure a run with maps of a load family beside one with a fixed map, in turns: noise disturbs both alike."""
     soft = _soft()
     fixed = ContactPatch(soft.positions, soft.areas, soft.weights(IN_HAND_LOADS[1, 1][0]), soft.grid)
     family, rebuilt = ReducedModel(soft, law()), ReducedModel(soft, law(), load_error=0.0)

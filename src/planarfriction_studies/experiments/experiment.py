@@ -267,8 +267,7 @@ class Work:
     progress: Callable[[str], None] | None = None
 
     def piece(self, label: str, compute: Callable[[], Mapping[str, Any]]) -> dict[str, Any]:
-        """Return the result of `compute`, numbers and arrays in nested dictionaries, from the kept file if there is
-        one."""
+        """Return what `compute` does, nested dictionaries of numbers and arrays, from the kept file if there is one."""
         if self.progress is not None:
             self.progress(label)
         path = None if self.folder is None else self.folder / f"{_slug(label)}.npz"
@@ -313,8 +312,7 @@ def _nested(arrays: Arrays) -> dict[str, Any]:
 
 
 def _slug(label: str) -> str:
-    """Return the label as a file name; its digest tells labels apart that differ only in what a file name cannot
-    hold."""
+    """Return the label as a file name; its digest tells labels apart that differ in what a file name cannot hold."""
     return re.sub(r"[^\w.]+", "-", label).strip("-") + "-" + hashlib.sha256(label.encode()).hexdigest()[:8]
 
 

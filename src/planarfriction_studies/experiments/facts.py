@@ -41,8 +41,7 @@ class PublishedCurve:
 
 
 def published_curve(name: str) -> PublishedCurve:
-    """Return a published curve, such as `in_hand/Circle/d1/x`; its times are those of the state, not the (late)
-    labels."""
+    """Return a published curve, `in_hand/Circle/d1/x`; its times are those of the state, not the (late) labels."""
     curves = _published()["curves"]
     entry = curves[validation.choice("curve", name, curves)]
     time = np.array(entry["at"]) + entry["late"]
@@ -58,8 +57,7 @@ def published_table(name: str) -> dict[str, dict[str, float]]:
 
 
 def converged(name: str) -> dict[str, np.ndarray]:
-    """Return a converged solution, such as `in_hand/Circle/d1`: `time` [s] and the columns x, y, theta, fx, fy, tau it
-    has."""
+    """Return a converged solution, `in_hand/Circle/d1`: `time` [s], and its columns of x, y, theta, fx, fy, tau."""
     columns = {key.rpartition("/")[2]: values for key, values in _converged().items() if key.startswith(f"{name}/")}
     if not columns:
         validation.choice("solution", name, sorted({key.rpartition("/")[0] for key in _converged()}))

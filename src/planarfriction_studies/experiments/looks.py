@@ -54,8 +54,7 @@ def box_panels(names: list[str], height: float) -> tuple[PlotFigure, Any]:
 
 
 def box(axes: Any, at: float, numbers: Any, colour: str, width: float, filled: bool = True) -> None:
-    """Draw a box of low whisker, first quartile, median, third quartile, high whisker; where a sixth is, a cross at
-    it."""
+    """Draw a box of low whisker, first quartile, median, third quartile, high whisker; a sixth number is a cross."""
     low, first, median, third, high, *most = numbers
     line = {"color": colour, "linewidth": 1.1}
     axes.bxp(

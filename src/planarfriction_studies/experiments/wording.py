@@ -44,8 +44,7 @@ def report(
 
 @functools.cache
 def environment() -> jinja2.Environment:
-    """Return the environment of the templates of experiments and report, with filters for numbers; an unknown name is
-    an error."""
+    """Return the environment of all templates, with filters for numbers; an unknown name is an error."""
     import jinja2
 
     made = jinja2.Environment(

@@ -83,14 +83,14 @@ class Benchmark:
                 raise InvalidValueError(f"model {name}", "be a function of a question", model)
         self.cases = {name: TASKS[name].read(self.folder) for name in self.tasks}
         for name, cases in self.cases.items():
-            if len({TASKS[name].is_training(case) for case in cases}) != 2:
+            if len({case.is_training for case in cases}) != 2:
                 raise InvalidValueError(
                     f"table of {name}", "contain cases to fit and cases to test", f"{len(cases)} cases"
                 )
 
     def test(self, task: str) -> list[Case]:
         """Return the cases that are scored."""
-        return [case for case in self.cases[task] if not TASKS[task].is_training(case)]
+        return [case for case in self.cases[task] if not case.is_training]
 
     def run(self, progress: Callable[[str], None] | None = None) -> dict[str, dict[str, Result]]:
         """Fit and score every model on every task; returns `results`.
@@ -100,7 +100,7 @@ class Benchmark:
         say = (lambda text: None) if progress is None else progress
         for name in self.tasks:
             task, test = TASKS[name], self.test(name)
-            training = [case for case in self.cases[name] if task.is_training(case)]
+            training = [case for case in self.cases[name] if case.is_training]
             for called, model in (self.models or {}).items():
                 say(f"{name}: {called}, fit")
                 begun = time.perf_counter()
@@ -141,9 +141,7 @@ def score(task: Task, cases: Sequence[Case], errors: Sequence[np.ndarray], seed:
         values, groups = rows_of(task, measure, cases, errors)
         if not len(values):
             continue
-        drawn = drawings(groups, seed)
-        drawn = drawn[drawn.sum(axis=1) > 0.0]
-        low, high = interval(measure.total(values, drawn))
+        low, high = interval(measure.total(values, drawings(groups, seed)))
         found[measure.key] = Score(float(measure.total(values)), low, high, len(set(groups)))
     return found
 

@@ -16,13 +16,7 @@ from planarfriction_studies.measured.tasks import TASKS
 DRAWN = ("uncoupled", "ellipsoid", "exact surface", "toss by toss")
 """Models of an example, where they took part, besides those of the user."""
 
-
-COLOURS = {
-    "uncoupled": style.OTHER,
-    "ellipsoid": style.ELLIPSOID,
-    "exact surface": style.EXACT,
-    "toss by toss": style.PARTS,
-}
+COLOURS = dict(zip(DRAWN, (style.OTHER, style.ELLIPSOID, style.EXACT, style.PARTS), strict=True))
 """Model -> its colour; the others take what is left, one after the other."""
 
 
@@ -93,10 +87,9 @@ def _draw_slides(part: Any, benchmark: Benchmark, count: int = 3) -> None:
         way.plot(*_shift(case.answer, first), color=style.MEASURED, linewidth=3.0, label="measured")
         turn.plot(time, np.degrees(case.answer[:, 2] - first[2]), color=style.MEASURED, linewidth=3.0)
         for name, result in chosen.items():
-            colour = colours[name]
-            poses = result.answers[index]
-            way.plot(*_shift(poses, first), color=colour, linewidth=1.2, label=name)
+            colour, poses = colours[name], result.answers[index]
             turned = np.degrees(poses[:, 2] - first[2])
+            way.plot(*_shift(poses, first), color=colour, linewidth=1.2, label=name)
             turn.plot(time, turned, color=colour, linewidth=1.2)
             if result.regions is not None:
                 edge = 1e3 * (poses[-1, :2] - first[:2] + ellipse(result.regions[index]))
@@ -107,19 +100,18 @@ def _draw_slides(part: Any, benchmark: Benchmark, count: int = 3) -> None:
         way.set_adjustable("datalim")
         turn.set(xlabel="time [s]", ylabel="turned [deg]")
         way.set_title(case.name, fontsize="small", loc="left")
+    _finish(part, every, 6)
+
+
+def _finish(part: Any, every: Any, columns: int) -> None:
+    """Tidy all axes of a part, with small letters, and put the legend of the first below it."""
     for axes in every:
         style.tidy(axes)
-        _small(axes)
-    part.legend(
-        *every[0].get_legend_handles_labels(), loc="outside lower center", ncols=6, frameon=False, fontsize="small"
-    )
-
-
-def _small(axes: Any) -> None:
-    """Set smaller letters on the axes."""
-    axes.tick_params(labelsize="small")
-    axes.xaxis.label.set_fontsize("small")
-    axes.yaxis.label.set_fontsize("small")
+        axes.tick_params(labelsize="small")
+        axes.xaxis.label.set_fontsize("small")
+        axes.yaxis.label.set_fontsize("small")
+    look = {"loc": "outside lower center", "ncols": columns, "frameon": False, "fontsize": "small"}
+    part.legend(*every[0].get_legend_handles_labels(), **look)
 
 
 def ellipse(region: np.ndarray) -> np.ndarray:
@@ -163,9 +155,7 @@ def _draw_centres(part: Any, benchmark: Benchmark) -> None:
     limit = 1.6e3 * np.abs(corners).max()
     axes.set(xlim=(-limit, limit), ylim=(-limit, limit), aspect="equal", xlabel="x [mm]", ylabel="y [mm]")
     axes.set_title(f"centres of rotation, {case.question.layout}", fontsize="small", loc="left")
-    part.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3, frameon=False, fontsize="small")
-    style.tidy(axes)
-    _small(axes)
+    _finish(part, [axes], 3)
 
 
 def centres(twists: np.ndarray) -> np.ndarray:
@@ -180,8 +170,7 @@ def _draw_series(part: Any, benchmark: Benchmark) -> None:
     from planarfriction_studies.measured.push_series import LENGTH
 
     test = benchmark.test("series")
-    wrenches = [i for i, case in enumerate(test) if case.question.wanted == "wrenches"]
-    number = max(wrenches, key=lambda i: len(test[i].scored))
+    number = max(range(len(test)), key=lambda i: len(test[i].scored) * (test[i].question.wanted == "wrenches"))
     case, axes = test[number], part.subplots(2, 1, sharex=True)
     time, rows = case.question.time[case.scored], case.scored
     chosen = _chosen(benchmark, "series")
@@ -189,20 +178,12 @@ def _draw_series(part: Any, benchmark: Benchmark) -> None:
     for name, answer in {"measured": case.answer, **{n: r.answers[number] for n, r in chosen.items()}}.items():
         fx, fy, tau = answer[rows].T
         way = np.unwrap(np.arctan2(fy, fx))
-        way -= (
-            2.0
-            * np.pi
-            * np.round((np.median(way) - np.median(np.arctan2(*case.answer[rows, 1::-1].T))) / (2.0 * np.pi))
-        )
+        turns = np.median(way) - np.median(np.arctan2(*case.answer[rows, 1::-1].T))
+        way -= 2.0 * np.pi * np.round(turns / (2.0 * np.pi))
         colour, width = colours[name], 3.0 if name == "measured" else 1.2
         axes[0].plot(time, np.degrees(way), color=colour, linewidth=width, label=name)
         axes[1].plot(time, np.degrees(np.arctan2(tau / LENGTH, np.hypot(fx, fy))), color=colour, linewidth=width)
     axes[0].set(ylabel="direction of force [deg]")
     axes[1].set(xlabel="time [s]", ylabel="torque against force [deg]")
     axes[0].set_title(case.name.removesuffix(", wrenches"), fontsize="small", loc="left")
-    part.legend(
-        *axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, frameon=False, fontsize="small"
-    )
-    for each in axes:
-        style.tidy(each)
-        _small(each)
+    _finish(part, axes, 2)

@@ -62,8 +62,7 @@ class SurfaceModel(SlideFit):
 
 
 def quick(surface: LimitSurface) -> Callable[[np.ndarray], np.ndarray]:
-    """Return a function that computes `surface.wrench` of twists `[K, 3]` from the numbers that compiled loops take:
-    errors of 1e-5 at most."""
+    """Return a function that computes `surface.wrench` of twists `[K, 3]` in compiled loops, within 1e-5."""
     numbers, frame = surface.numbers, scaling(surface.centre_of_pressure, surface.contact_radius)
 
     def wrench(twist: np.ndarray) -> np.ndarray:

@@ -85,11 +85,6 @@ def smooth(time: np.ndarray, values: np.ndarray) -> np.ndarray:
     return weights @ values / weights.sum(axis=1, keepdims=True)
 
 
-def is_training(case: Case) -> bool:
-    """Return True for cases to fit to: the pushes whose number is a multiple of 4; the others are predicted."""
-    return int(case.group) % 4 == 0
-
-
 def errors(case: Case, answer: np.ndarray) -> np.ndarray:
     """Return the angle of each scored row [deg], `[S, 1]`."""
     length = LENGTH if case.question.wanted == "twists" else 1.0 / LENGTH

@@ -64,11 +64,6 @@ def read(folder: Path | None = None) -> list[Case]:
     return cases
 
 
-def is_training(case: Case) -> bool:
-    """Return True for cases to fit to: the pushes with an even number; the odd ones are predicted."""
-    return case.group == "0"
-
-
 def errors(case: Case, answer: np.ndarray) -> np.ndarray:
     """Return the angle of each push [deg], `[M, 1]`."""
     return angles(answer, case.answer, LENGTH)[:, None]

@@ -87,12 +87,16 @@ class Case(NamedTuple):
     name: str
     """Name of the slide, layout or push."""
     group: str
-    """Cases of one group are not independent: they stay on one side of the split, and the bootstrap draws them as a
-    unit."""
+    """Group of cases that are not independent: they stay on one side of the split, and are drawn as a unit."""
     scored: np.ndarray
     """Rows of the answer that are scored, or all."""
     board: str = ""
     """The board it slid on, or the kind of contact."""
+
+    @property
+    def is_training(self) -> bool:
+        """True for cases to fit to, whose group is a multiple of 4; the others are predicted."""
+        return int(self.group) % 4 == 0
 
 
 class BatchModel:

@@ -68,8 +68,7 @@ class ReplayedPush(NamedTuple):
 
 
 def single_pushes(folder: Path | None = None) -> list[ReplayedPush]:
-    """Read the 250 single pushes with an odd number; those with an even one give the offset of the places from the
-    edges."""
+    """Read the 250 single pushes with an odd number; the others give the offset of the places from the edges."""
     places = ["px0_m", "py0_m", "px1_m", "py1_m"]
     table = read_table("pushes", ["push", "dx_m", "dy_m", "dtheta_rad", *places], ["config"], folder=folder)
     cases = {case.question.layout: (case.question.patch, case.board) for case in pushes.read(folder)}

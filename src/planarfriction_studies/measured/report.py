@@ -42,7 +42,6 @@ def differences(benchmark: Benchmark, task: str, reference: str) -> dict[str, di
         if not len(base):
             continue
         drawn = drawings(groups, benchmark.seed)
-        drawn = drawn[drawn.sum(axis=1) > 0.0]
         of_base, base_drawn = measure.total(base), measure.total(base, drawn)
         for name, result in results.items():
             if name != reference:

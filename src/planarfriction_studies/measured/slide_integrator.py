@@ -127,8 +127,7 @@ def improved(poses_of: Callable[[np.ndarray], np.ndarray], found: np.ndarray, fi
 
 
 def starts(friction: Friction, questions: Sequence[SlideQuestion], radius_squared: float) -> np.ndarray:
-    """Return starts `[K, 6]` with which the slides go through their first poses best: least squares over pose and
-    twist."""
+    """Return starts `[K, 6]` with which slides go through their first poses best: least squares over pose and twist."""
     found, first = parabolas(questions), np.array([each.first for each in questions])
     time = questions[0].time[:FIRST_POSES]
     for _ in range(TURNS):

@@ -34,7 +34,7 @@ def face() -> ContactPatch:
 
 
 def read(folder: Path | None = None) -> list[Case]:
-    """Read all slides; cases with one `group` are turned copies of one toss."""
+    """Read all slides; cases with one `group` are turned copies of one toss, whose unique_id it is."""
     pose = ["x_m", "y_m", "yaw_rad"]
     table = read_table("slides", ["toss", "unique_id", "t_s", *pose], folder=folder)
     cases = []
@@ -48,11 +48,6 @@ def read(folder: Path | None = None) -> list[Case]:
         group = int(rows["unique_id"].iloc[0])
         cases.append(Case(question, poses, f"toss {number:g}", f"{group}", np.arange(len(time)), "table"))
     return cases
-
-
-def is_training(case: Case) -> bool:
-    """Return True for cases to fit to: the tosses whose unique_id is a multiple of 4; the others are predicted."""
-    return int(case.group) % 4 == 0
 
 
 def errors(case: Case, answer: np.ndarray) -> np.ndarray:

@@ -27,8 +27,7 @@ def follow(model: Any, time: np.ndarray, twists: np.ndarray, load: float) -> np.
 
 
 def steady(model: Any, twists: np.ndarray, length: float) -> np.ndarray:
-    """Return directions `(fx, fy, tau/length)` of the friction of steady motions along twists `[K, 3]` of unit
-    speed."""
+    """Return directions `(fx, fy, tau/length)` of the friction of steady motions along unit twists `[K, 3]`."""
     state, wrenches = np.zeros((len(twists), *model.rest().shape)), np.zeros_like(twists)
     for _ in range(SEGMENTS):
         state, wrenches = model.step(state, twists, 1.0, WAY / SEGMENTS)

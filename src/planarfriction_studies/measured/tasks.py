@@ -21,15 +21,13 @@ class Task(NamedTuple):
     title: str
     read: Callable[[Path | None], list[Case]]
     """All cases, from the tables of the package or of a folder."""
-    is_training: Callable[[Case], bool]
-    """Function that returns True for cases to fit to: the split is fixed, by number."""
     errors: Callable[[Case, np.ndarray], np.ndarray]
     """Errors `[rows, columns]` of an answer to a case."""
     measures: tuple[Measure, ...]
 
 
 def _task(name: str, title: str, module: ModuleType) -> Task:
-    return Task(name, title, module.read, module.is_training, module.errors, module.MEASURES)
+    return Task(name, title, module.read, module.errors, module.MEASURES)
 
 
 TASKS = {

@@ -98,8 +98,7 @@ def _slopes(counts: Sequence[int], errors: np.ndarray) -> dict[str, float]:
 
 
 def radius_errors(counts: Sequence[int]) -> dict[str, np.ndarray]:
-    """Return the relative errors of the contact radius of a disc: of its `mask` from the base's, of a `cut` disc from 2
-    R/3."""
+    """Return relative errors of a disc's contact radius: of its `mask` from the base's, of a `cut` disc from 2 R/3."""
     masks = np.array([float(runs.patch("Circle", count).contact_radius()) for count in (*counts, runs.BASE_CELLS)])
     cut = np.array([float(ContactPatch.disc(RADIUS, count).contact_radius()) for count in counts])
     return {"mask": masks[:-1] / masks[-1] - 1.0, "cut": cut * 1.5 / RADIUS - 1.0}
@@ -170,8 +169,7 @@ def _against_figure(
 
 
 def _on_cell(counts: Sequence[int], errors: Mapping[Case, Errors]) -> dict[str, Any] | None:
-    """Return the grids of the line whose centre of pressure is the middle of a cell, and their errors over the
-    trend."""
+    """Return grids of the line with the centre of pressure in the middle of a cell, and their errors over the trend."""
     force, all_counts, through = errors["LineGrad", "p0"]["cells_distributed"][:, 0], np.array(counts), []
     for count in counts:
         line = runs.patch("LineGrad", count)
@@ -250,8 +248,7 @@ def _figures(
 
 
 def _errors_over_counts(family: Family, counts: Sequence[int], errors: Mapping[Case, Errors]) -> PlotFigure:
-    """Draw relative errors of force and torque of one family, all shapes and parameters; of the first with the
-    profile."""
+    """Draw relative errors of force and torque of one family, all shapes and parameters; the first with the profile."""
     with_profile = family == runs.FAMILIES[0]
     figure = new_figure(10.0 if with_profile else 9.6, 4.2)
     panels = figure.subplots(1, 3 if with_profile else 2)

@@ -103,8 +103,7 @@ def _numbers(case: Case, found: Runs) -> dict[str, Any]:
 
 
 def _accuracy(cases: tuple[Case, ...], found: Runs) -> dict[str, dict[str, dict[str, float]]]:
-    """Return the largest distance from the converged solution by run: ours at two tolerances, and the published
-    curve's."""
+    """Return the largest distance from the converged solution by run: ours at two tolerances, and the published one."""
     result = {}
     for case in (case for case in cases if case.has_references):
         for kind in KINDS:
@@ -139,8 +138,7 @@ def _compare_load(case: Case, found: Runs) -> Comparison:
 
 
 def _compare_rest(case: Case, run: Arrays, words: str) -> list[Comparison]:
-    """Compare the wrench of one finger on the plate at rest, at the end of load 2: it carries its share of the
-    weight."""
+    """Compare the wrench of one finger on the plate at rest, at the end of load 2: it carries half the weight."""
     scene = case.scene("d")
     weight = scene.body.mass * GRAVITY / scene.contacts[0].count
     closed = {"fx": (0.0, 1e-9), "fy": (weight, 1e-9), "tau": (weight * float(run["x"][-1]), 1e-11)}

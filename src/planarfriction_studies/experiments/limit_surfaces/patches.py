@@ -110,8 +110,7 @@ _RADIUS, _MOMENT = "contact radius, plain sum [m]", "second moment [m^2]"
 
 
 def _grid_rows(patches: Mapping[str, Numbers]) -> list[_Row]:
-    """Return the second moments of regular grids, exactly; contact radii of the square and the rod, whose cells lack a
-    little."""
+    """Return second moments of regular grids, exactly; contact radii of square and rod, whose cells lack a little."""
     cell = WIDTH / CELLS
     exact = "Sums of squares of whole numbers: rounding."
     seconds = {
@@ -131,8 +130,7 @@ def _grid_rows(patches: Mapping[str, Numbers]) -> list[_Row]:
 
 
 def _line_rows(numbers: Numbers) -> list[_Row]:
-    """Return the largest distance of corresponding points: the whole line slides one way, the ellipsoid still sees a
-    spin."""
+    """Return the largest distance of corresponding points: a whole line slides, the ellipsoid still sees a spin."""
     cell, rows = WIDTH / CELLS, []
     cause = "Centre of rotation just beyond the last cell: the force is 1 and the torque 0, of what the search finds."
     for name in ("Line", "LineGrad"):

@@ -30,8 +30,7 @@ DIRECTIONS = (200, 400)
 """Polar angles and azimuths at which the errors are measured; a table's 20 segments fall between them."""
 
 REFINEMENTS, REFINED = 30, 0.5
-"""Number of further searches of the neighbourhood of a largest distance, and the share of its width that each
-covers."""
+"""Number of further searches near a largest distance, and the share of its width that each covers."""
 
 STORED = {"published": LimitSurfaceTablePublished, "smooth": LimitSurfaceTable, "sum over cells": LimitSurfaceCells}
 """Surfaces that are compared with the exact surface."""
@@ -153,8 +152,7 @@ def table_errors(patch: ContactPatch, count: tuple[int, int]) -> dict[str, dict[
 
 
 def _dataset(surfaces: dict[str, LimitSurfaceCells]) -> Any:
-    """Return the limit surfaces for mu f_N = 1 N about the centres of pressure, over the direction of the scaled
-    twist."""
+    """Return limit surfaces for mu f_N = 1 N about the centres of pressure, over the direction of the scaled twist."""
     import xarray as xr
 
     polar, azimuth = np.linspace(0.0, np.pi, 61), np.linspace(0.0, 2.0 * np.pi, 121)

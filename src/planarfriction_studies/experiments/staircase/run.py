@@ -126,8 +126,7 @@ def _steps(time: np.ndarray, fx: np.ndarray) -> Arrays:
 
 
 def _published_steps() -> tuple[np.ndarray, float]:
-    """Return the last published vertex before each step of plain fx, and the time to the next one [s], always the
-    same."""
+    """Return the last published vertex before each step of plain fx, and the time to the next one [s]."""
     curve = facts.published_curve("staircase/plain/fx")
     before = np.flatnonzero(np.abs(np.diff(curve.values)) > STEP)
     return curve.time[before], float(np.diff(curve.time)[before].max())
@@ -243,8 +242,7 @@ def _step_comparisons(steps: Arrays) -> list[Comparison]:
 
 
 def _orders(errors: dict[int, dict[str, list[float]]]) -> dict[str, Any]:
-    """Return the fewest and most cells, and powers of their number with which the largest and mean error in force
-    fall."""
+    """Return the fewest and most cells, and powers of their number with which largest and mean error in force fall."""
     few, *_, many = errors
     ratio = {
         name: np.log(np.array(errors[few][name]) / errors[many][name]) / np.log(few / many) for name in errors[few]

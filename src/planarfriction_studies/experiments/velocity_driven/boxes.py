@@ -68,8 +68,7 @@ def statistics(values: np.ndarray, method: str = "linear") -> dict[str, float]:
 
 
 def slack(values: np.ndarray, samples: int = WRONG_SAMPLES) -> dict[str, float]:
-    """Compute the largest move of each statistic if that many samples are wrong: to its neighbours in the sorted
-    errors."""
+    """Compute the largest move of each statistic if `samples` are wrong: to its neighbours in the sorted errors."""
     ordered, box = np.sort(values), statistics(values)
     rank = np.arange(len(ordered))
     result = {}
@@ -93,8 +92,7 @@ def solver_error(curve: str) -> float:
 
 
 def comparisons(every: dict[str, Errors]) -> list[Comparison]:
-    """Compare every published and every converged number of the box plots with ours; the published ones hide the
-    maximum."""
+    """Compare every number of the box plots with the published one, where there is one, and the converged one."""
     rows = []
     for shape, each in every.items():
         for quantity, models in each.items() if shape in PUBLISHED_SHAPES else ():
@@ -149,8 +147,7 @@ _CAUSES: dict[tuple[Literal["published", "converged"], str], str] = {
 
 
 def convention_misses(every: dict[str, Errors]) -> dict[str, float]:
-    """Return the largest distance [N] of the table model's force quartiles from the converged ones, by the way of
-    sampling."""
+    """Return the largest distance [N] of the table model's force quartiles from the converged ones, by convention."""
     conventions: dict[str, Callable[[np.ndarray], dict[str, float]]] = {
         "500 samples, linear": statistics,
         "501 samples, linear": lambda values: statistics(np.append(values, 0.0)),

@@ -193,8 +193,7 @@ def _statistics(shape: str, errors: np.ndarray) -> dict[str, Any]:
 
 
 def _centre_of_rotation(shape: str, sample: int) -> dict[str, float] | None:
-    """Return the distances of the centre of rotation from the centre of pressure and the nearest loaded cell [m]; None
-    in a slide."""
+    """Return distances [m] of the centre of rotation, if any, from the centre of pressure and the nearest cell."""
     vx, vy, omega = published_velocity().left(0.01 * sample - 0.005)
     if omega == 0.0:
         return None
