@@ -50,7 +50,7 @@ class PublishedEllipsoid(LimitSurfaceEllipsoid):
 
 
 def published_model(kind: Kind, shape: str | ContactPatch, law: LuGre = LAW, *, width: float = 0.02) -> Any:
-    """Return the distributed model ("d") of a patch, the published reduced one ("r"), or that on the ellipsoid ("e")."""
+    """Return the distributed model ("d"), the published reduced one ("r"), or that on the ellipsoid ("e")."""
     patch = PUBLISHED_PATCHES[shape](width=width) if isinstance(shape, str) else shape
     if kind == "d":
         return DistributedModel(patch, law)
