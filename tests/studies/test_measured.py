@@ -23,7 +23,6 @@ from planarfriction_studies.measured import (
     push_series,
     pushes,
     slide_integrator,
-    steady,
 )
 from planarfriction_studies.measured.figures import draw, ellipse
 from planarfriction_studies.measured.mujoco_box import MujocoBox
@@ -68,7 +67,7 @@ def test_the_tables_come_with_a_notice_of_each():
 
 
 def test_splits_keep_copies_and_pushes_together(cases):
-    for name, task in TASKS.items():
+    for name in TASKS:
         sides = [{c.group for c in cases[name] if c.is_training is side} for side in (True, False)]
         assert sides[0] and sides[1] and not sides[0] & sides[1]
     assert sum(case.is_training for case in cases["slides"]) == 143
@@ -147,7 +146,7 @@ def test_bristles_follow_a_push_to_the_wrench_of_their_surface():
     patch, time = push_series.feet(), np.linspace(0.0, 3.0, 181)
     twists = np.tile([3e-3, 1e-3, 0.05], (181, 1))
     model = pf.DistributedModel(patch, models.stiff(0.5))
-    wrenches = steady.follow(model, time, twists, 1.3)
+    wrenches = models.follow(model, time, twists, 1.3)
     surface = pf.LimitSurfaceCells(patch).wrench(twists[0])
     assert not wrenches[0].any()  # from rest
     assert wrenches[-1] / np.linalg.norm(wrenches[-1]) == pytest.approx(surface / np.linalg.norm(surface), abs=1e-4)

@@ -27,8 +27,7 @@ from planarfriction_studies.experiments.experiment import (
     dataset,
     table,
 )
-from planarfriction_studies.experiments.markup import name_to_html, to_html
-from planarfriction_studies.experiments.report import write_report
+from planarfriction_studies.experiments.report import name_to_html, to_html, write_report
 from planarfriction_studies.experiments.reproduction import Reproduction
 from planarfriction_studies.experiments.wording import environment, fmt, number, power, report, short, span
 

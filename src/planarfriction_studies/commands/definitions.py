@@ -147,15 +147,16 @@ def _show(benchmark: Any, as_json: bool, folder: Path | None) -> None:
     from planarfriction.cli import output
     from planarfriction.cli.console import note, print_table
     from planarfriction.writing import write_text
-    from planarfriction_studies.measured import figures, report
+    from planarfriction_studies.measured.benchmark import table, to_dict
+    from planarfriction_studies.measured.figures import draw
     from planarfriction_studies.measured.tasks import TASKS
 
     if as_json:
-        print(json.dumps(report.to_dict(benchmark), indent=1))
+        print(json.dumps(to_dict(benchmark), indent=1))
     for name, results in {} if as_json else benchmark.results.items():
         counts = [each.cases for each in next(iter(results.values())).scores.values()]
         tests = f"{counts[0]} tosses" if name == "slides" else f"{sum(counts)} tests"
-        print_table(f"{TASKS[name].title} ({tests})", *report.table(benchmark, name))
+        print_table(f"{TASKS[name].title} ({tests})", *table(benchmark, name))
         for model, result in results.items():
             if result.fitted:
                 for key, value in result.checked.items():
@@ -165,10 +166,10 @@ def _show(benchmark: Any, as_json: bool, folder: Path | None) -> None:
         note(f"left out: {text}")
     if folder is not None:
         path = folder / "measured.json"
-        write_text(path, json.dumps(report.to_dict(benchmark), indent=1) + "\n")
+        write_text(path, json.dumps(to_dict(benchmark), indent=1) + "\n")
         note(f"wrote {path}")
         for name in benchmark.results:
-            picture = output.write_picture(figures.draw(benchmark, name), folder / f"measured-{name}.png")
+            picture = output.write_picture(draw(benchmark, name), folder / f"measured-{name}.png")
             note(f"wrote {picture}")
 
 

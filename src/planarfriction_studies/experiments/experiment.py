@@ -119,7 +119,7 @@ def _compare_at(
 
 
 def compare_columns(
-    compare: Callable[..., Comparison],
+    reference: Literal["published", "converged"],
     before: str,
     run: Mapping[str, np.ndarray],
     solution: str,
@@ -129,9 +129,9 @@ def compare_columns(
 ) -> list[Comparison]:
     """Compare columns of a run with those of a published curve or of a converged solution.
 
-    `compare` is `compare_curve` or `compare_converged`; `before` stands before the names of the columns. Columns whose
-    unit has no `allowance` are left out.
+    `before` stands before the names of the columns. Columns whose unit has no `allowance` are left out.
     """
+    compare = compare_curve if reference == "published" else compare_converged
     allowances = dict.fromkeys(UNITS.values(), allowance) if isinstance(allowance, float) else allowance
     return [
         compare(f"{before}{name}", run["time"], run[name], f"{solution}/{name}", allowances[UNITS[name]], cause)
@@ -195,6 +195,11 @@ def entry(*keys: Any, scale: float = 1.0, digits: int | None = None) -> Callable
         return value if digits is None else float(f"{value:.{digits}g}")
 
     return cell
+
+
+def median_and_quartiles(values: Any) -> list[float]:
+    """Return the median, first and third quartile."""
+    return np.percentile(values, [50.0, 25.0, 75.0]).tolist()
 
 
 def columns_of(time: np.ndarray, values: np.ndarray, names: Iterable[str]) -> Arrays:

@@ -6,23 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from planarfriction.plots.style import (
-    DISTRIBUTED,
-    ELLIPSOID,
-    EXACT,
-    MOMENTS,
-    OTHER,
-    PARTS,
-    PUBLISHED,
-    PlotFigure,
-    new_figure,
-    tidy,
-)
+from planarfriction.plots import style
+from planarfriction.plots.style import DISTRIBUTED, ELLIPSOID, EXACT, MOMENTS, PARTS, PlotFigure
 from planarfriction_studies.experiments import facts
 
 __all__ = ["DISTRIBUTED", "ELLIPSOID", "EXACT", "MOMENTS", "PARTS", "QUARTIC", "REDUCED"]
 
-REDUCED, QUARTIC = PUBLISHED, OTHER
+REDUCED, QUARTIC = style.PUBLISHED, style.OTHER
 
 OTHERS = ("#332288", "#882255", "#999933", "0.45")
 """Colours of what is no model: shapes, solvers, components, loads, causes."""
@@ -43,10 +33,10 @@ def vertices(
 
 def box_panels(names: list[str], height: float) -> tuple[PlotFigure, Any]:
     """Return a figure of two panels, one above the other, with a place for the boxes of each name."""
-    figure = new_figure(9.6, height)
+    figure = style.new_figure(9.6, height)
     panels: Any = figure.subplots(2, 1, sharex=True)
     for axes in panels:
-        tidy(axes)
+        style.tidy(axes)
         axes.grid(False, axis="x")
     panels[1].set_xticks(range(len(names)), names)
     figure.align_ylabels(panels)

@@ -15,15 +15,9 @@ from planarfriction.models import DistributedModel, ReducedModel, ReducedModelPu
 from planarfriction.patch import PUBLISHED_PATCHES, ContactPatch
 from planarfriction.scenes import Scene, simulate
 from planarfriction.scenes.ready import FINE, driven, in_hand, in_hand_load
-from planarfriction_studies.experiments.experiment import Arrays
-from planarfriction_studies.experiments.in_hand.runs import (
-    CENTRES_OF_MASS,
-    FRICTION_CHANGE,
-    Case,
-    distance,
-    end_distance,
-    with_friction,
-)
+from planarfriction_studies.experiments.experiment import Arrays, median_and_quartiles
+from planarfriction_studies.experiments.in_hand import runs
+from planarfriction_studies.experiments.in_hand.runs import FRICTION_CHANGE, Case
 from planarfriction_studies.experiments.runs import IN_WORDS, LAW, SIX_SHAPES, at_centre_of_pressure, simulated
 from planarfriction_studies.experiments.velocity_driven import boxes
 
@@ -152,7 +146,7 @@ def scenes_of(shape: str) -> dict[str, Callable[[Any], Scene]]:
             result[case.words] = functools.partial(
                 in_hand,
                 normal_force=in_hand_load(case.load, placement=case.placement),
-                centre_of_mass=CENTRES_OF_MASS[case.placement],
+                centre_of_mass=runs.CENTRES_OF_MASS[case.placement],
             )
     return result | ({f"driven, {shape}": driven} if shape in SIX_SHAPES else {})
 
@@ -165,7 +159,7 @@ def in_hand_rows(cases: tuple[Case, ...] = CASES) -> list[Row]:
         run = functools.cache(lambda model, scene=scene: simulated(scene(model), **CLOSE))
         whole = run(models(case.shape)["full"])
         for name, model in models(case.shape).items():
-            apart = distance(run(model), whole)
+            apart = runs.distance(run(model), whole)
             errors = {"position": float(apart.max()), "end": float(apart[-1])}
             rows.append(Row(case.words, name, int(np.prod(model.state_shape)), errors))
     return rows
@@ -257,11 +251,6 @@ def step_numbers(times: Arrays) -> dict[str, dict[str, list[float]]]:
     }
 
 
-def median_and_quartiles(values: Any) -> list[float]:
-    """Return the median, first and third quartile."""
-    return np.percentile(values, [50.0, 25.0, 75.0]).tolist()
-
-
 def spin_up(shape: str) -> dict[str, float]:
     """Return the largest error of the torque [N m] of a spin from rest, from the patch's own cells, by model."""
     patch = PUBLISHED_PATCHES[shape]()
@@ -297,8 +286,8 @@ def cases_of(shape: str) -> tuple[Case, ...]:
 def friction_shift(case: Case) -> float:
     """Return the mean distance [m] by which 0.1 % more and less friction move the end of the distributed model."""
     base = simulated(case.scene("d"), **FINE)
-    changed = (simulated(case.scene("d", with_friction(s * FRICTION_CHANGE)), **FINE) for s in (1.0, -1.0))
-    return 0.5 * sum(end_distance(run, base) for run in changed)
+    changed = (simulated(case.scene("d", runs.with_friction(s * FRICTION_CHANGE)), **FINE) for s in (1.0, -1.0))
+    return 0.5 * sum(runs.end_distance(run, base) for run in changed)
 
 
 def end_distances(rows: list[Row], shifts: dict[str, float]) -> dict[str, dict[str, float]]:

@@ -11,7 +11,7 @@ import numpy as np
 from planarfriction_studies.experiments import looks
 from planarfriction_studies.experiments.beyond import contacts, figures, ladder, surfaces, tables
 from planarfriction_studies.experiments.beyond import shapes as new_shapes
-from planarfriction_studies.experiments.experiment import Result, Work
+from planarfriction_studies.experiments.experiment import Result, Work, median_and_quartiles
 from planarfriction_studies.experiments.in_hand.figures import end_shifts
 from planarfriction_studies.experiments.runs import IN_WORDS, SIX_SHAPES
 from planarfriction_studies.experiments.wording import report
@@ -138,7 +138,7 @@ def _numbers(rows: list[ladder.Row], shifts: dict[str, float], errors: Numbers) 
         "run costs": {name: float(np.median([row.time for row in rows if row.model == name])) for name in models},
         # median and quartiles of the same over that of the published model in the same run
         "run ratios": {
-            name: ladder.median_and_quartiles([row.time / published[row.case] for row in rows if row.model == name])
+            name: median_and_quartiles([row.time / published[row.case] for row in rows if row.model == name])
             for name in models
         },
     }

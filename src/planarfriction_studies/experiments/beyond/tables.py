@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Iterable
 from typing import Any
-
-import numpy as np
 
 from planarfriction_studies.experiments.beyond.ladder import AUTO, ENDS, MOVED, SHIFT, STATISTICS, Row, shape_of
 from planarfriction_studies.experiments.beyond.surfaces import KINDS
 from planarfriction_studies.experiments.experiment import Table, entry, table
 from planarfriction_studies.experiments.runs import IN_WORDS, SIX_SHAPES
-from planarfriction_studies.experiments.wording import fmt
+from planarfriction_studies.experiments.wording import fmt, short
 
 Numbers = dict[str, Any]
 
@@ -29,10 +28,7 @@ MODEL_WORDS = {
 """Model of the ladder -> model and surface, in words."""
 
 
-def shown(value: float) -> str:
-    """Write a number with two digits, without an exponent where it is easily read so."""
-    rounded = float(f"{value:.2g}")
-    return np.format_float_positional(rounded, trim="-") if 1e-4 <= abs(rounded) < 1e5 else f"{rounded:.2g}"
+shown = functools.partial(short, digits=2)
 
 
 def tables(rows: list[Row], numbers: Numbers) -> tuple[Table, ...]:

@@ -13,24 +13,8 @@ from planarfriction.plots.style import LINE_STYLES, PlotFigure, new_figure, tidy
 from planarfriction.scenes import Signal
 from planarfriction.scenes.ready import GRAVITY, drift, drift_force
 from planarfriction.scenes.signal import sample_times
-from planarfriction_studies.experiments import facts, looks, runs
-from planarfriction_studies.experiments.experiment import (
-    POSE,
-    WRENCH,
-    Arrays,
-    Comparison,
-    Result,
-    Table,
-    Work,
-    columns_of,
-    compare,
-    compare_columns,
-    compare_converged,
-    compare_curve,
-    dataset,
-    entry,
-    table,
-)
+from planarfriction_studies.experiments import experiment, facts, looks, runs
+from planarfriction_studies.experiments.experiment import POSE, WRENCH, Arrays, Comparison, Result, Work, compare, entry
 from planarfriction_studies.experiments.runs import NAMES
 from planarfriction_studies.experiments.wording import report
 
@@ -186,11 +170,11 @@ def _implied_width() -> float:
     return WIDTH * float(np.sqrt(moment / _patch_numbers()["second moment"]))
 
 
-def _creep_table(creep: dict[str, Any]) -> Table:
+def _creep_table(creep: dict[str, Any]) -> experiment.Table:
     """Return the drift per period of the load, by what oscillates."""
     moved = {f"{what}; {WORDS[model]}": each for what, models in creep.items() for model, each in models.items()}
     columns = {"x [nm]": entry("x", scale=1e9, digits=4), "theta [µrad]": entry("theta", scale=1e6, digits=4)}
-    return table("Drift per period of 1/3 s", moved, columns, "what oscillates; model")
+    return experiment.table("Drift per period of 1/3 s", moved, columns, "what oscillates; model")
 
 
 def _dataset(load: Load, found: Runs) -> Any:
@@ -200,7 +184,7 @@ def _dataset(load: Load, found: Runs) -> Any:
     alone = {f"applied_{name}": (values, unit) for (name, unit), values in applied} | {
         "normal_force": (normal_force, "N")
     }
-    return dataset(labelled, POSE, ("model", "bristles"), ("time", time, "s"), alone)
+    return experiment.dataset(labelled, POSE, ("model", "bristles"), ("time", time, "s"), alone)
 
 
 # ---------------------------------------------------------------------- comparisons
@@ -211,9 +195,9 @@ _SPRING, _LEFT = r"$x = F/(\sigma_0 f_N)$", "what is left is our solver's error.
 
 def _profile_comparisons() -> list[Comparison]:
     time = sample_times(5.0)
-    applied = columns_of(time, drift_force("tangential")(time), WRENCH)
+    applied = experiment.columns_of(time, drift_force("tangential")(time), WRENCH)
     cause = "The same load, labelled with its own time: what is left is the error of reading the figure."
-    return compare_columns(compare_curve, "applied ", applied, "drift/applied", 1e-12, cause, WRENCH)
+    return experiment.compare_columns("published", "applied ", applied, "drift/applied", 1e-12, cause, WRENCH)
 
 
 def _motion_comparisons(found: Runs, share: float) -> list[Comparison]:
@@ -235,7 +219,7 @@ def _motion_comparisons(found: Runs, share: float) -> list[Comparison]:
             words, reference = f"tangential load, {WORDS[model]}, {name}", f"drift/{model}/{name}"
             far = float(np.abs(run["x"]).max() * np.abs(run["theta"]).max())
             allowance = far if name == "y" else share * float(np.ptp(run[name]))
-            for compared, cause in ((compare_curve, solver), (compare_converged, _TWICE)):
+            for compared, cause in ((experiment.compare_curve, solver), (experiment.compare_converged, _TWICE)):
                 cause = sideways if name == "y" else cause
                 rows.append(compared(words, run["time"], run[name], reference, allowance, cause))
     return rows + paths

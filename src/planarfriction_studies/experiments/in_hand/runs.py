@@ -14,15 +14,8 @@ from planarfriction.limit_surface import LimitSurfaceCells
 from planarfriction.patch import PUBLISHED_PATCHES
 from planarfriction.scenes import Scene
 from planarfriction.scenes.ready import GRAVITY
-from planarfriction_studies.experiments.experiment import (
-    POSE,
-    WRENCH,
-    Arrays,
-    Comparison,
-    compare_columns,
-    compare_converged,
-    compare_curve,
-)
+from planarfriction_studies.experiments import experiment
+from planarfriction_studies.experiments.experiment import POSE, WRENCH, Arrays, Comparison
 from planarfriction_studies.experiments.runs import IN_WORDS, LAW, Kind, published_model
 
 TIGHT: dict[str, Any] = {"rtol": 1e-8, "atol": 3e-8}
@@ -122,7 +115,7 @@ def end(run: Arrays) -> dict[str, float]:
 
 def errors(run: Arrays, key: str) -> dict[str, float]:
     """Return the largest distance from the converged solution `key` by column."""
-    rows = compare_columns(compare_converged, "", run, key, ALLOWANCE, OF_BOTH)
+    rows = experiment.compare_columns("converged", "", run, key, ALLOWANCE, OF_BOTH)
     return {row.quantity: row.difference for row in rows}
 
 
@@ -130,10 +123,10 @@ def compare_with_converged(run: Arrays, key: str, words: str, *, default: bool =
     """Compare a run with the converged solution `key`; of a run at default tolerances its motion only."""
     if default:
         words = f"{words}, default tolerances, "
-        return compare_columns(compare_converged, words, run, key, DEFAULT_ALLOWANCE, OF_DEFAULTS)
-    return compare_columns(compare_converged, f"{words}, ", run, key, ALLOWANCE, OF_BOTH)
+        return experiment.compare_columns("converged", words, run, key, DEFAULT_ALLOWANCE, OF_DEFAULTS)
+    return experiment.compare_columns("converged", f"{words}, ", run, key, ALLOWANCE, OF_BOTH)
 
 
 def compare_with_published(run: Arrays, key: str, words: str) -> list[Comparison]:
     """Compare a run with the published curves `key`."""
-    return compare_columns(compare_curve, f"{words}, ", run, key, ALLOWANCE, OF_THE_FIGURE)
+    return experiment.compare_columns("published", f"{words}, ", run, key, ALLOWANCE, OF_THE_FIGURE)

@@ -188,10 +188,10 @@ def _comparisons(time: np.ndarray, twist: np.ndarray, found: Arrays, steps: Arra
         ours, words = experiment.columns_of(time, found[name], WRENCH), f"steady state of the line, {LINES[name][0]}, "
         cause = "The same sum at the same samples: what is left is the error of reading the figure."
         curve = f"staircase/{name}"
-        rows += experiment.compare_columns(experiment.compare_curve, words, ours, curve, ALLOWANCE, cause, WRENCH)
+        rows += experiment.compare_columns("published", words, ours, curve, ALLOWANCE, cause, WRENCH)
     ours, curve = experiment.columns_of(time, twist, TWIST), "convergence/velocity"
     cause = "The same profile, at each sample's own time: what is left is the error of reading the figure."
-    rows += experiment.compare_columns(experiment.compare_curve, "velocity profile, ", ours, curve, 1e-12, cause, TWIST)
+    rows += experiment.compare_columns("published", "velocity profile, ", ours, curve, 1e-12, cause, TWIST)
     return [*rows, *_plateaus(time, found), *_step_comparisons(steps)]
 
 

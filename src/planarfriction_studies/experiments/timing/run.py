@@ -12,18 +12,8 @@ from typing import Any
 import numpy as np
 
 from planarfriction.plots.style import PlotFigure, new_figure, tidy
-from planarfriction_studies.experiments import facts, looks
-from planarfriction_studies.experiments.experiment import (
-    UNITS,
-    Arrays,
-    Comparison,
-    Result,
-    Table,
-    Work,
-    compare_all,
-    entry,
-    table,
-)
+from planarfriction_studies.experiments import experiment, facts, looks
+from planarfriction_studies.experiments.experiment import UNITS, Arrays, Comparison, Result, Table, Work, entry
 from planarfriction_studies.experiments.timing import runs
 from planarfriction_studies.experiments.timing.runs import BREAKAWAY, CIRCLE, QUICK_WINDOW, ROWS, Problem
 from planarfriction_studies.experiments.wording import power, report, short
@@ -183,7 +173,7 @@ def _against_converged(problem: Problem, reference: np.ndarray) -> list[Comparis
         values, words = solution[name], f"{problem.name}: {name} of the reference"
         tolerance = allowance + facts.CONVERGED_SHARE * float(np.ptp(values))
         rows.append((words, reference[shared, i], values[index[shared]], tolerance, UNITS[name], cause))
-    return compare_all("converged", rows)
+    return experiment.compare_all("converged", rows)
 
 
 # ---------------------------------------------------------------------- words, figure, tables
@@ -239,7 +229,7 @@ def _published_table(rows: Mapping[str, Mapping[str, Any]]) -> Table:
         "kept and $r$ follows the load; $k = 2 f_N$: all is rebuilt every 0.01 s."
     )
     published = facts.published_table("timing")
-    return table(
+    return experiment.table(
         "In-hand run of 2 s", {row: (rows[row], published[row]) for row in published}, columns, "contact", note
     )
 
@@ -256,7 +246,9 @@ def _points_table(problem: Problem, points: Points) -> Table:
         f"{problem.window.states} states. Absolute tolerance: {runs.ATOL_PER_RTOL:g} times the relative one, as a "
         "share of the natural scales. Median of the runs; what takes over a second runs once."
     )
-    return table(f"Work against precision, {problem.name}", rows, columns, "solver, relative tolerance", note)
+    return experiment.table(
+        f"Work against precision, {problem.name}", rows, columns, "solver, relative tolerance", note
+    )
 
 
 def _shown(times: Mapping[str, float]) -> str:

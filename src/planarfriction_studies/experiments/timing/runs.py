@@ -13,7 +13,7 @@ import numpy as np
 from planarfriction.scenes import Scene, in_hand, simulate
 from planarfriction.solvers import RODAS3, RODAS4
 from planarfriction_studies.bench.baselines import LSODA, Poses, Window
-from planarfriction_studies.experiments.experiment import Arrays, Work
+from planarfriction_studies.experiments.experiment import Arrays, Work, median_and_quartiles
 from planarfriction_studies.experiments.load_dependent.run import DISTRIBUTED, REBUILT, RESCALED, soft_scene
 from planarfriction_studies.experiments.runs import published_model
 
@@ -123,11 +123,12 @@ def _repeated(action: Callable[[], Poses], repeats: int) -> dict[str, Any]:
     times = [poses.wall_time]
     while sum(times) < ENOUGH and len(times) < repeats:
         times.append(action().wall_time)
-    return {"time": _spread(times), "poses": poses.poses, "evaluations": poses.evaluations, "repeats": len(times)}
-
-
-def _spread(times: Sequence[float]) -> list[float]:
-    return np.percentile(times, [50.0, 25.0, 75.0]).tolist()
+    return {
+        "time": median_and_quartiles(times),
+        "poses": poses.poses,
+        "evaluations": poses.evaluations,
+        "repeats": len(times),
+    }
 
 
 # ---------------------------------------------------------------------- the table
@@ -149,7 +150,7 @@ def _whole_runs(scene: Callable[[], Scene], repeats: int) -> dict[str, Any]:
         totals.append(time.perf_counter() - begin - run.compile_time)
         solver.append(run.wall_time)
         trials = run.steps + run.rejections
-    return {"time": _spread(totals), "solver": _spread(solver), "trials": trials}
+    return {"time": median_and_quartiles(totals), "solver": median_and_quartiles(solver), "trials": trials}
 
 
 def beside_lsoda(row: str, kind: str, begin: float, end: float, work: Work) -> Arrays:
@@ -163,7 +164,7 @@ def _beside_lsoda(scene: Callable[[], Scene], begin: float, end: float) -> dict[
     window = Window.of(fresh, begin, end)
     ours = [window.ours(rtol=fresh.rtol, atol=fresh.atol)[0].wall_time for _ in range(MOST_REPEATS)]
     lsoda = _repeated(lambda: window.general(**LSODA), MOST_REPEATS)["time"]
-    return {"lsoda": lsoda, "ours": _spread(ours)}
+    return {"lsoda": lsoda, "ours": median_and_quartiles(ours)}
 
 
 def position_error(poses: np.ndarray, reference: np.ndarray) -> float:
