@@ -1,7 +1,7 @@
 """Texts about an experiment: a template beside its code, filled with the numbers of a run.
 
 A template is Markdown with formulas between dollar signs. Its parts begin with `## verdict`, `## asked`, `## found` and
-`## figure NAME` for each figure.
+`## figures`, which lists a caption in one line for each figure, `- NAME: CAPTION`.
 """
 
 from __future__ import annotations
@@ -37,7 +37,8 @@ def report(
         heading.strip(): re.sub(r"\n{3,}", "\n\n", body.strip())
         for heading, body in zip(pieces[::2], pieces[1::2], strict=True)
     }
-    pictures = [Picture(name, parts[f"figure {name}"], figure) for name, figure in figures.items()]
+    captions = dict(line.removeprefix("- ").split(": ", 1) for line in parts["figures"].splitlines() if line)
+    pictures = [Picture(name, captions[name], figure) for name, figure in figures.items()]
     found = parts["found"].split("\n\n")
     return Result(found, pictures, numbers=numbers, asked=parts["asked"], verdict=parts["verdict"], **rest)
 
