@@ -13,7 +13,6 @@ from planarfriction_studies.experiments.experiment import Work
 pytest.importorskip("mujoco", reason="needs MuJoCo: pip install 'planarfriction[mujoco]'")
 
 from planarfriction_studies.bench import mujoco_scenes
-from planarfriction_studies.experiments.simulators import drake as simulators_drake
 from planarfriction_studies.experiments.simulators import run as simulators
 from planarfriction_studies.experiments.simulators import runs as simulators_runs
 from planarfriction_studies.experiments.simulators.runs import NATIVE, PATCHES
@@ -47,7 +46,7 @@ def test_its_tables_are_those_of_the_page(quick):
         pytest.skip("no docs beside these tests")
     titles = [table["title"] for table in quick[2]["tables"]]
     shown = [line[12:-4] for line in page.read_text().splitlines() if line.startswith("<!-- table: ")]
-    assert titles == [title for title in shown if simulators_drake.installed() or not title.startswith("Drake")]
+    assert titles == [title for title in shown if simulators_runs.has_drake() or not title.startswith("Drake")]
     for table in quick[2]["tables"]:
         assert all(len(row) == len(table["headings"]) for row in table["rows"])
 
@@ -80,7 +79,7 @@ def test_discs_with_patches_stop_where_theory_says(kind):
 
 
 def test_drakes_own_friction_creeps_and_patches_do_not(quick):
-    if not simulators_drake.installed():
+    if not simulators_runs.has_drake():
         pytest.skip("needs Drake: pip install 'planarfriction[drake]'")
     for ways in quick[2]["numbers"]["drake"]["creep"].values():
         assert abs(ways["patches, point"]["creep"]) < 1e-9 < 1e-5 < ways["lagged, point"]["creep"]

@@ -9,8 +9,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-GRAVITY = 9.81
-"""[m/s^2]"""
+from planarfriction.scenes.ready import GRAVITY
 
 _STOPPED = 1e-5
 """Speed at the rim [m/s] below which the rest of the way does not count: `v^2 / (2 mu g)` is below 1e-10 m."""

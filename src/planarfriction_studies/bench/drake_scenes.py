@@ -18,8 +18,7 @@ import numpy as np
 from planarfriction.laws import LuGre
 from planarfriction.models import FrictionModel, ReducedModel
 from planarfriction.patch import ContactPatch
-
-GRAVITY = 9.81
+from planarfriction.scenes.ready import GRAVITY
 
 
 class Way(NamedTuple):

@@ -42,11 +42,8 @@ LOOSE = 1.5
 STEPS = 25
 """Steps of the fit of the spreads: more change the errors by less than 0.01 mm and 0.01 deg."""
 
-FOLDS = 4
-"""Parts of the training tosses, each left out once to size the regions of the end."""
-
-INSIDE = 0.95
-"""Share of ends that a region is to hold."""
+FOLDS, INSIDE = 4, 0.95
+"""Parts of the training tosses, each left out once to size the regions of the end, and the share that they hold."""
 
 
 def friction(patch: ContactPatch, mu_0: float, mu_1: float, share: float) -> slide_integrator.Friction:

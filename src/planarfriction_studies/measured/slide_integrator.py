@@ -22,11 +22,8 @@ CHANGES = np.array([2e-3, 2e-3, 2e-2])
 TURNS = 2
 """Gauss-Newton steps from the velocity of a parabola to that of the model: a third moves it by less than 1e-5 m/s."""
 
-MU = 0.22
-"""Initial guess of the friction coefficient of a slide [-]."""
-
-DIFFERENCE = 0.02
-"""Share of a fitted number over which its derivative is taken."""
+MU, DIFFERENCE = 0.22, 0.02
+"""Initial guess of the friction coefficient of a slide [-], and share of a number over which a fit differentiates."""
 
 Friction = Callable[[np.ndarray, np.ndarray], np.ndarray]
 """Friction wrenches `[K, 3]` over the weight [1, 1, m] of twists `[K, 3]`, both in the axes of the bodies.

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from types import ModuleType
 from typing import NamedTuple
 
 import numpy as np
@@ -26,13 +25,12 @@ class Task(NamedTuple):
     measures: tuple[Measure, ...]
 
 
-def _task(name: str, title: str, module: ModuleType) -> Task:
-    return Task(name, title, module.read, module.errors, module.MEASURES)
-
-
 TASKS = {
-    "slides": _task("slides", "Free slides of a cube: path and end from the first 8 poses", slides),
-    "pushes": _task("pushes", "Slow pushes on known feet: angle to the measured twist", pushes),
-    "series": _task("series", "Pushes over time: angles to the measured twist and wrench", push_series),
+    name: Task(name, title, module.read, module.errors, module.MEASURES)
+    for name, title, module in (
+        ("slides", "Free slides of a cube: path and end from the first 8 poses", slides),
+        ("pushes", "Slow pushes on known feet: angle to the measured twist", pushes),
+        ("series", "Pushes over time: angles to the measured twist and wrench", push_series),
+    )
 }
 """Task by name."""

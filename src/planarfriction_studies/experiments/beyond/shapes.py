@@ -17,26 +17,17 @@ from planarfriction_studies.experiments.beyond.ladder import AUTO, name_of_parts
 from planarfriction_studies.experiments.experiment import Table
 from planarfriction_studies.experiments.runs import LAW, at_centre_of_pressure, simulated
 
-PARTS = (1, 4, AUTO)
-"""Numbers of parts of `ReducedModel`."""
+PARTS, SEEDS = (1, 4, AUTO), tuple(range(10))
+"""Numbers of parts of `ReducedModel`, and seeds of the twists."""
 
-SEEDS = tuple(range(10))
-"""Seeds of the twists."""
-
-T_END, DT = 2.0, 5e-3
-"""End of a twist, and the time between its samples [s]; it is linear in between."""
-
-WAVES = 5
-"""Half waves of a twist over its time, at most."""
+T_END, DT, WAVES = 2.0, 5e-3, 5
+"""End of a twist and time between its samples [s], linear in between, and its half waves over that time, at most."""
 
 SLOWEST, FASTEST = -3.3, -1.7
 """Powers of ten between which the speed of a twist is drawn [m/s]: from half of v_s to twenty times it."""
 
-ARM = 6.5e-3
-"""Speed over angular speed of a twist, as large as the patches [m]."""
-
-START = 0.2
-"""Time over which a twist grows from zero [s]."""
+ARM, START = 6.5e-3, 0.2
+"""Speed over angular speed of a twist, as large as the patches [m], and the time over which it grows from zero [s]."""
 
 EVERY = 1e-3
 """Time between samples of the errors [s]: a patch breaks away within a few milliseconds, and samples 10 ms apart miss

@@ -39,11 +39,8 @@ KINDS: dict[str, type[LimitSurface]] = {
 QUARTIC_SHAPES = ("Circle", "NonConvex1")
 """Shapes with a quartic: a fit takes seconds."""
 
-CHECKED = ("Circle", "Square", "NonConvex1", "NonConvex2")
-"""Grids whose sum over cells is checked to come closer with smaller cells."""
-
-PARTS = 5
-"""Parts along each side into which the cells of that check are cut."""
+CHECKED, PARTS = ("Circle", "Square", "NonConvex1", "NonConvex2"), 5
+"""Grids whose sum over cells is checked to come closer with smaller cells, and parts of a side that they are cut into."""
 
 STAIRS = 1501
 """Centres of rotation in the figure of the staircase."""

@@ -38,20 +38,14 @@ COUNTS = tuple(range(5, 36, 2))
 BASE_CELLS, BASE_SEGMENTS, SEGMENT_CELLS = 101, 100, 21
 """Cells of the base of the first two families, segments of the base of the third, and the third's grid."""
 
-PUBLISHED_INTERVAL = 1e-4
-"""Time between the samples that the published errors are means over [s]."""
-
-COARSE_INTERVAL = 5e-4
-"""The same where 50 000 samples of 10 000 cells would cost more than the run [s]; a multiple of the published one."""
+PUBLISHED_INTERVAL, COARSE_INTERVAL = 1e-4, 5e-4
+"""Time [s] between samples that published errors are means over; and ours where so many cost more than the run."""
 
 REDUCED_TOLERANCES: dict[str, Any] = {"rtol": 1e-8, "atol": 3e-8}
 """Tolerances of the reduced model: the error of a fine table is 3e-4 of the force, and a percent of that is wanted."""
 
-T_END = 5.0
-EULER_STEP = 1e-5
-"""Step of the published explicit Euler method [s]."""
-
-_EULER_PARTS = 10
+T_END, EULER_STEP, _EULER_PARTS = 5.0, 1e-5, 10
+"""End of the runs, step of the published explicit Euler method [s], and parts in which it is run."""
 
 _NOTHING = 1e-150
 """A bristle deflection [m] that is none: what decays further has a denormal square, which takes 100 times longer."""

@@ -24,11 +24,8 @@ from planarfriction_studies.experiments.in_hand.runs import FRICTION_CHANGE, LES
 from planarfriction_studies.experiments.runs import LAW, simulated
 from planarfriction_studies.experiments.wording import report
 
-WIDTH = 0.02
-"""Width of the grid [m]."""
-
-CELLS = 21
-"""Rows and columns of the published grid."""
+WIDTH, CELLS = 0.02, 21
+"""Width of the grid [m], and its rows and columns as published."""
 
 RADIUS_AT_1_N = 6.0 * WIDTH / CELLS
 """Contact radius at 1 N [m]: six cells; it grows with the cube root of the load up to half the width."""

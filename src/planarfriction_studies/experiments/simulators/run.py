@@ -18,7 +18,6 @@ from planarfriction.plots.style import PlotFigure, new_figure, tidy
 from planarfriction_studies.bench import mujoco_scenes
 from planarfriction_studies.experiments import looks
 from planarfriction_studies.experiments.experiment import Comparison, Result, Table, Work, compare, table
-from planarfriction_studies.experiments.simulators import drake as simulators_drake
 from planarfriction_studies.experiments.simulators import runs
 from planarfriction_studies.experiments.simulators.runs import NATIVE, PATCHES, WAYS
 from planarfriction_studies.experiments.wording import length, readable, report
@@ -62,8 +61,8 @@ def run(work: Work) -> Result:
         "cost": _cost(work),
     }
     packages = ["mujoco"]
-    if simulators_drake.installed():
-        found["drake"] = simulators_drake.run(work)
+    if runs.has_drake():
+        found["drake"] = runs.in_drake(work)
         packages.append("drake")
     return report(
         "simulators",

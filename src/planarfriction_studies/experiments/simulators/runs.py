@@ -7,14 +7,17 @@ from __future__ import annotations
 
 import dataclasses
 import functools
+import importlib.util
 import time
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any, Literal
 
 import numpy as np
 
 from planarfriction.models import DistributedModel, FrictionModel
-from planarfriction_studies.bench import coulomb_disc, mujoco_scenes
+from planarfriction_studies.bench import coulomb_disc, drake_scenes, mujoco_scenes
+from planarfriction_studies.bench.drake_scenes import Way as DrakeWay
 from planarfriction_studies.bench.mujoco_scenes import MujocoScene, Native
 from planarfriction_studies.experiments import facts
 from planarfriction_studies.experiments.experiment import Work
@@ -137,3 +140,53 @@ def cost(scene: MujocoScene, ways: Mapping[str, Way], *, steps: int, rounds: int
                 step()
             least[name] = min(least[name], (time.process_time() - start) / steps)
     return {name: {"seconds": value} for name, value in least.items()}
+
+
+# ---------------------------------------------------------------------- Drake
+
+CONTACTS = ("point", "hydroelastic")
+
+DRAKE_OWN = {
+    f"{name}, {contact}": DrakeWay(contact, name) for name in ("sap", "similar", "lagged") for contact in CONTACTS
+}
+"""Drake's own friction."""
+
+DRAKE_PATCHES = {f"patches, {contact}": DrakeWay(contact, patch=True) for contact in CONTACTS}
+
+DRAKE_STEPS = (2e-3, 1e-2)
+
+
+def has_drake() -> bool:
+    """Return True if Drake is installed."""
+    return importlib.util.find_spec("pydrake") is not None
+
+
+def in_drake(work: Work) -> dict[str, Any]:
+    """Measure all cases in Drake; return the numbers by kind, case and way."""
+    ways = {**DRAKE_OWN, **DRAKE_PATCHES}
+    if work.quick:
+        ways = {name: ways[name] for name in ("lagged, point", "patches, point")}
+    duration, size = (0.6, {"steps": 20, "rounds": 2}) if work.quick else (3.0, {"steps": 100, "rounds": 30})
+    plain = {name: way for name, way in ways.items() if name.startswith(("lagged", "patches"))}
+    times = work.piece("Drake, cost", lambda: drake_scenes.cost(plain, **size))
+    creeps = {
+        f"{1e3 * dt:g} ms": {name: partial(drake_scenes.creep, way, dt, duration) for name, way in ways.items()}
+        for dt in DRAKE_STEPS
+    }
+    discs = {
+        f"{start[0]:g} m/s, {start[1]:g} rad/s": {name: partial(_drake_disc, way, start) for name, way in ways.items()}
+        for start in mujoco_scenes.STARTS[: 1 if work.quick else None]
+    }
+    return {
+        "creep": measured(work, "Drake, incline", creeps),
+        "disc": measured(work, "Drake, disc", discs),
+        "cost": {
+            f"{contact} contact": {kind: {"seconds": times[f"{kind}, {contact}"]} for kind in ("lagged", "patches")}
+            for contact in CONTACTS
+            if f"lagged, {contact}" in plain
+        },
+    }
+
+
+def _drake_disc(way: DrakeWay, start: tuple[float, float]) -> dict[str, float]:
+    return stop_errors(start, *drake_scenes.slide(way, start))

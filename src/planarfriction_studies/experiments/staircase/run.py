@@ -17,11 +17,8 @@ from planarfriction_studies.experiments import experiment, facts, looks
 from planarfriction_studies.experiments.experiment import TWIST, WRENCH, Arrays, Comparison, Reference, Result, Work
 from planarfriction_studies.experiments.wording import report
 
-WIDTH = 0.02
-"""Length of the line [m]."""
-
-SAMPLE_TIME = 1e-4
-"""Time between the samples of the published curves [s]."""
+WIDTH, SAMPLE_TIME = 0.02, 1e-4
+"""Length of the line [m], and the time between the samples of the published curves [s]."""
 
 SLIDE_RAMP = (0.8, 1.4, 0.015)
 """Start and end [s] of the ramp of vx, and the speed that it reaches [m/s]; the spin is 1 rad/s meanwhile."""

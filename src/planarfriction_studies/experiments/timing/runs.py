@@ -23,16 +23,11 @@ ATOL_PER_RTOL = 30.0
 REFERENCE = 1e-10
 """Relative tolerance of the solution that errors are measured from."""
 
-ENOUGH = 1.0
-"""Runs are repeated until this time [s] is spent: what takes longer runs once."""
+ENOUGH, MOST_REPEATS = 1.0, 9
+"""Runs are repeated until this time [s] is spent, so that what takes longer runs once, and at most so often."""
 
-MOST_REPEATS = 9
-
-BREAKAWAY = (0.36, 0.38)
-"""Window [s] in which the plate breaks away: a general solver takes too long for all of the distributed run."""
-
-QUICK_WINDOW = (0.36, 0.37)
-"""Window of a quick look [s]."""
+BREAKAWAY, QUICK_WINDOW = (0.36, 0.38), (0.36, 0.37)
+"""Window [s] in which the plate breaks away, for general solvers of the distributed model, and that of a quick look."""
 
 STRUCTURED = {"RODAS3": RODAS3, "RODAS4": RODAS4}
 """Our methods by name."""
