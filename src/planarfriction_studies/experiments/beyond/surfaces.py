@@ -40,7 +40,7 @@ QUARTIC_SHAPES = ("Circle", "NonConvex1")
 """Shapes with a quartic: a fit takes seconds."""
 
 CHECKED, PARTS = ("Circle", "Square", "NonConvex1", "NonConvex2"), 5
-"""Grids whose sum over cells is checked to come closer with smaller cells, and parts of a side that they are cut into."""
+"""Grids whose sum over cells is checked to come closer with smaller cells, and parts of a side they are cut into."""
 
 STAIRS = 1501
 """Centres of rotation in the figure of the staircase."""
