@@ -50,7 +50,7 @@ def file(tmp_path, monkeypatch) -> str:
 
 
 def test_values_of_a_file_are_changed_before_it_is_read(file):
-    make = Settable.of(file)
+    make = Settable(file)
     plain, heavy = make(), make(**{"body.mass": 0.4})
     assert heavy.body.mass == 0.4 and heavy.body.inertia == 2.0 * plain.body.inertia  # by its size
     changed = make(
@@ -74,7 +74,7 @@ def test_values_of_a_file_are_changed_before_it_is_read(file):
 
 def test_values_of_a_scene_are_changed_too(file):
     scene = pf.Scene.from_file(file)
-    make = Settable.of(scene)
+    make = Settable(scene)
     assert make() == scene
     changed = make(**{"fingers.law.mu_c": 0.5, "body.mass": 0.4, "fingers.model.segments": 6})
     assert changed.body.inertia == scene.body.inertia and changed.contacts[0].model.segments == 6
@@ -83,13 +83,13 @@ def test_values_of_a_scene_are_changed_too(file):
 
 def test_a_model_that_is_only_named_gets_keys(file):
     Path(file).write_text(SCENE.format(model='"reduced"'))
-    assert Settable.of(file)(**{"fingers.model.parts": 2}).contacts[0].model.parts == 2
+    assert Settable(file)(**{"fingers.model.parts": 2}).contacts[0].model.parts == 2
 
 
 def test_contacts_are_called_what_they_are_called_in_results():
     model = pf.DistributedModel(pf.ContactPatch.disc(0.01, 5), pf.LuGre())
     contacts = [pf.Contact(model, 1.0, name="left"), pf.Contact(model, 1.0, name="v1.5")]
-    make = Settable.of(pf.Scene(pf.Body(1.0, 1.0), contacts, 0.1))
+    make = Settable(pf.Scene(pf.Body(1.0, 1.0), contacts, 0.1))
     assert make(**{"v1.5.law.mu_c": 0.5}).contacts[1].model.law.mu_c == 0.5
     assert make(**{"left.count": 3}).contacts[0].count == 3
     table = make(**{"left.count": 3}).to_dict()
@@ -123,7 +123,7 @@ def test_contacts_are_called_what_they_are_called_in_results():
 )
 def test_paths_that_lead_nowhere_say_what_there_is(file, path, value, words):
     with pytest.raises(pf.FrictionError) as caught:
-        Settable.of(file)(**{path: value})
+        Settable(file)(**{path: value})
     assert words in str(caught.value)
     with pytest.raises(pf.FrictionError):  # before any run
         pf.sweep(file, {path: [value]})
@@ -206,7 +206,7 @@ def test_the_command_sweeps_and_goes_on(file, capsys):
         assert data.y.dims == ("body.mass", "fingers.law.mu_c", "time")
         there = data.sel({"body.mass": 0.2, "fingers.law.mu_c": 0.8})
         values = {"body.mass": 0.2, "fingers.law.mu_c": 0.8}
-        np.testing.assert_array_equal(there.y, pf.simulate(Settable.of(file)(**values)).data.y)
+        np.testing.assert_array_equal(there.y, pf.simulate(Settable(file)(**values)).data.y)
     assert main(arguments) == 0
     again = capsys.readouterr()
     assert again.out == first.out and "6 of 6 runs (6 found)" in again.err

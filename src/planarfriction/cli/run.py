@@ -125,7 +125,7 @@ def _ready(make: Callable[..., Scene], model: Any, options: dict[str, Any], **va
     own = [name for name in inspect.signature(make).parameters if name != "model"]
     scene = make(model, **options | {name: value for name, value in values.items() if name in own})
     rest = {path: value for path, value in values.items() if path not in own}
-    return Settable.of(scene, own)(**rest) if rest else scene
+    return Settable(scene, own)(**rest) if rest else scene
 
 
 def one_each(settings: Sequence[str]) -> dict[str, Any]:
@@ -172,7 +172,7 @@ def _makers_from_file(
 ) -> dict[str, Callable[..., Scene]]:
     from planarfriction.sweeps.settings import Settable
 
-    make = Settable.of(path)
+    make = Settable(path)
     if patch is None and cell_size is not None:
         raise InvalidValueError("--cell-size", "be given only if --patch is a pressure map", cell_size)
     contact_patch = None if patch is None else find_patch(patch, cell_size=cell_size)

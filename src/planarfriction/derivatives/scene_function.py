@@ -140,14 +140,8 @@ class SceneFunction:
         scene, body = self._scene, self._scene.body
         now = zip(STATES, (*body.velocity, *body.position, body.angle), strict=True)
         state = [start.get(name, value) for name, value in now]
-        body = dataclasses.replace(
-            body,
-            mass=body.mass * factors.get("mass", 1.0),
-            inertia=body.inertia * factors.get("inertia", 1.0),
-            velocity=tuple(state[:3]),
-            position=tuple(state[3:5]),
-            angle=state[5],
-        )
+        scaled = {name: getattr(body, name) * factors.get(name, 1.0) for name in ("mass", "inertia")}
+        body = dataclasses.replace(body, velocity=state[:3], position=state[3:5], angle=state[5], **scaled)
         changed: dict[str, Any] = {
             name: self._signal(name, getattr(scene, name), values)
             for name, values in signals.items()

@@ -220,17 +220,9 @@ def _histories(best: Candidate) -> list[dict[str, Any]]:
     for i, (log, used, sigma, rows) in enumerate(zip(problem.logs, problem.used, fit.sigma, unseen, strict=True)):
         held_out = np.full_like(log.wrench, np.nan)
         held_out[used] = log.wrench[used] + rows[:, :, 0] * np.where(log.channels, sigma[used], np.nan)
-        histories.append(
-            {
-                "name": log.name,
-                "time": log.time,
-                "measured": np.where(log.channels, log.wrench, np.nan),
-                "predicted": shown[i],
-                "held_out": held_out,
-                "speed": sliding[i][0],
-                "coefficient": coefficients[i],
-            }
-        )
+        measured, more = np.where(log.channels, log.wrench, np.nan), {"speed": sliding[i][0], "held_out": held_out}
+        each = {"name": log.name, "time": log.time, "measured": measured, "predicted": shown[i]}
+        histories.append({**each, **more, "coefficient": coefficients[i]})
     return histories
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from typing import Any, Literal
 
@@ -184,8 +185,8 @@ def driven(
     validation.choice("at", at, ("origin", "centre_of_pressure"))
     contact = Contact(model, normal_force, mounted_on="body", name="patch")
     if at == "centre_of_pressure":
-        x, y = np.asarray(model.patch.centre_of_pressure(float(contact.normal_force(0.0)))).tolist()
-        contact = Contact(model, normal_force, mounted_on="body", position=(-x, -y), name="patch")
+        centre = np.asarray(model.patch.centre_of_pressure(float(contact.normal_force(0.0))))
+        contact = dataclasses.replace(contact, position=-centre)
     body = Body(1.0, 1.0, gravity=(0.0, 0.0))  # moved as prescribed: mass and inertia play no part
     velocity = published_velocity() if twist is None else twist
     return Scene(body, [contact], t_end, velocity=velocity, **FINE, name="driven")
@@ -222,12 +223,6 @@ def pushed(
     body = Body(mass, rectangle_inertia(mass, size), gravity=(0.0, 0.0), outline=rectangle_outline(size))
     weight: Any = GRAVITY * body.mass
     table = Contact(model, weight, mounted_on="body", name="table")
-    pads = Contact(
-        model if pad is None else pad,
-        normal_force,
-        position=position,
-        count=fingers,
-        name="fingers",
-        support_velocity=velocity,
-    )
-    return Scene(body, [table, pads], t_end, name="pushed")
+    pad = model if pad is None else pad
+    moved: dict[str, Any] = {"position": position, "count": fingers, "support_velocity": velocity}
+    return Scene(body, [table, Contact(pad, normal_force, name="fingers", **moved)], t_end, name="pushed")

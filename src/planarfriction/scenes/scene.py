@@ -148,11 +148,9 @@ class Contact(ByValue):
         load.check_non_negative(f"normal_force {of_contact}")
         self._set(normal_force=load)
         validation.choice(f"mounted_on {of_contact}", self.mounted_on, ("world", "body"))
-        self._set(
-            position=_floats(f"position {of_contact}", self.position, 2),
-            angle=validation.number(f"angle {of_contact}", self.angle),
-            count=validation.count(f"count {of_contact}", self.count, at_most=MOST_CONTACTS),
-        )
+        position, angle = _floats(f"position {of_contact}", self.position, 2), f"angle {of_contact}"
+        count = validation.count(f"count {of_contact}", self.count, at_most=MOST_CONTACTS)
+        self._set(position=position, angle=validation.number(angle, self.angle), count=count)
         if self.support_velocity is not None:
             self._set(support_velocity=as_signal(f"support_velocity {of_contact}", self.support_velocity, 3))
 

@@ -115,13 +115,8 @@ def _output(times: np.ndarray, batches: SegmentBatches, bristles: str) -> Output
     if bristles == "all" and count * states > MOST_NUMBERS:
         shown = f"{count} samples of {states} numbers"
         raise InvalidValueError("bristles", f"be 'none' above {MOST_NUMBERS} numbers (raise save_every)", shown)
-    return Output(
-        times,
-        np.empty((count, 6)),
-        np.empty((count, contacts, 3)),
-        np.empty((count, contacts)),
-        np.empty((count, states) if bristles == "all" else (0, 0)),
-    )
+    recorded = np.empty((count, states) if bristles == "all" else (0, 0))
+    return Output(times, np.empty((count, 6)), np.empty((count, contacts, 3)), np.empty((count, contacts)), recorded)
 
 
 def _histories(scene: Scene, batches: SegmentBatches, output: Output) -> dict[str, History]:

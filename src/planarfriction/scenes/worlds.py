@@ -85,19 +85,13 @@ def foot(
     turning = Signal.sampled(*TURNS) if torque is None else as_signal("torque", torque, None)
     wrench = Signal.sampled(turning.times, turning.values[:, None] * [0.0, 0.0, 1.0], turning.hold)
     body = Body(mass, inertia, gravity=(0.0, 0.0), outline=_around(half, 0.5 * SOLE_WIDTH))
-    contacts = [
-        Contact(
-            patch,
-            Signal.sampled(ahead.times, GRAVITY * body.mass * part, ahead.hold),
-            mounted_on="body",
-            position=(x, 0.0),
-            name=name,
-        )
-        for name, patch, part, x in (
-            ("heel", model, 1.0 - ahead.values, -half),
-            ("forefoot", model if forefoot is None else forefoot, ahead.values, half),
-        )
-    ]
+    contacts = []
+    for name, patch, part, x in (
+        ("heel", model, 1.0 - ahead.values, -half),
+        ("forefoot", model if forefoot is None else forefoot, ahead.values, half),
+    ):
+        load = Signal(ahead.times, GRAVITY * body.mass * part, ahead.hold)
+        contacts.append(Contact(patch, load, mounted_on="body", position=(x, 0.0), name=name))
     return Scene(body, contacts, t_end, force=wrench, name="foot")
 
 

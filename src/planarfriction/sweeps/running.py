@@ -177,7 +177,7 @@ def _maker(make_scene: Any, grid: Grid) -> Callable[..., Scene]:
         return check_takes(make_scene, list(grid.values))
     if not isinstance(make_scene, (Scene, str, Path)):
         raise InvalidValueError("make_scene", "be a function that returns a Scene, a Scene, or a path", make_scene)
-    make = Settable.of(make_scene)
+    make = Settable(make_scene)
     make.check(grid.values)
     return make
 

@@ -36,24 +36,18 @@ _FAMILIES: dict[str, tuple[Family, str]] = {
 class Settable:
     """Scene as a table whose values can be set: each call makes the scene of some values."""
 
-    def __init__(
-        self, table: Mapping[str, Any], source: str = "scene", folder: Path | None = None, others: Sequence[str] = ()
-    ) -> None:
-        self._table, self._source, self._folder, self._others = table, source, folder, others
-
-    @classmethod
-    def of(cls, scene: Scene | str | Path, others: Sequence[str] = ()) -> Settable:
+    def __init__(self, scene: Scene | str | Path | Mapping[str, Any], others: Sequence[str] = ()) -> None:
         """Read the table of a scene, or of a scene file; `others` are names that messages list too.
 
         Raises FileError for a file that holds no table.
         """
-        if isinstance(scene, Scene):
-            return cls(scene.to_dict(), others=others)
-        path = validation.path("scene", scene)
-        table = read_table(path)
-        if not isinstance(table, dict):
-            scene_from_dict(table, source=str(path))  # says what is wrong
-        return cls(table, str(path), path.parent)
+        self._source, self._folder, self._others = "scene", None, others
+        self._table: Any = scene.to_dict() if isinstance(scene, Scene) else scene
+        if not isinstance(self._table, Mapping):
+            path = validation.path("scene", scene)
+            self._table, self._source, self._folder = read_table(path), str(path), path.parent
+            if not isinstance(self._table, dict):
+                scene_from_dict(self._table, source=self._source)  # says what is wrong
 
     def __call__(self, **values: Any) -> Scene:
         """Make the scene with values by their paths. Raises InvalidValueError for a path that leads nowhere."""
