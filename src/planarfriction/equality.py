@@ -63,6 +63,10 @@ class ByValue(Checked):
             return NotImplemented
         return self is other or all(equal(getattr(self, name), getattr(other, name)) for name in _compared(self))
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the fields for a copy or another process in one step: another thread may be adding one meanwhile."""
+        return dict(self.__dict__)
+
     def __hash__(self) -> int:
         return hash((type(self), *(_key(getattr(self, name)) for name in _compared(self))))
 

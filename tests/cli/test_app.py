@@ -387,7 +387,14 @@ def test_every_surface_can_be_asked_for(capsys, surface):
     assert distance == 0.0 if surface == "ellipsoid" else 0.05 < distance < 0.5
 
 
-def test_limit_surface_of_a_measured_map_is_drawn(tmp_path):
+@pytest.fixture
+def coarse(monkeypatch):
+    """Draw limit surfaces with few facets: nothing here depends on their number."""
+    for name in ("POLAR_SEGMENTS", "AZIMUTH_SEGMENTS"):
+        monkeypatch.setattr(f"planarfriction.plots.limit_surface.{name}", 12)
+
+
+def test_limit_surface_of_a_measured_map_is_drawn(coarse, tmp_path):
     (tmp_path / "pad.csv").write_text("1,1,1\n0,2,0\n", encoding="utf-8")
     picture = tmp_path / "surface.png"
     given = ["--pressure", str(tmp_path / "pad.csv"), "--cell-size", "0.001", "--out", str(picture)]
@@ -395,7 +402,7 @@ def test_limit_surface_of_a_measured_map_is_drawn(tmp_path):
     assert picture.read_bytes().startswith(b"\x89PNG")
 
 
-def test_limit_surface_is_the_exact_one_alone_or_to_be_turned(capsys, tmp_path):
+def test_limit_surface_is_the_exact_one_alone_or_to_be_turned(coarse, capsys, tmp_path):
     pytest.importorskip("plotly")
     alone, both, page = (tmp_path / name for name in ("alone.png", "both.png", "both.html"))
     assert main(["limit-surface", "--out", str(alone), "--alone"]) == 0

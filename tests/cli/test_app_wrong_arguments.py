@@ -216,6 +216,8 @@ FULL = """
 import resource, sys, warnings
 from planarfriction.cli import main
 import planarfriction.plots  # fonts are looked for, and remembered, before the disk is full
+from planarfriction.plots import animation, limit_surface
+animation.LEAST_FRAMES, limit_surface.POLAR_SEGMENTS, limit_surface.AZIMUTH_SEGMENTS = 5, 12, 12  # drawn in no time
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), resource.RLIM_INFINITY))
 sys.exit(main(sys.argv[2:]))
 """

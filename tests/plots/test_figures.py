@@ -427,6 +427,7 @@ def test_without_a_screen_show_says_what_to_do():
 def test_pyplot_is_left_alone():
     code = (
         "import sys, planarfriction as pf\nfrom planarfriction import plots\n"
+        "from planarfriction.plots import limit_surface\nlimit_surface.POLAR_SEGMENTS = 12\n"
         "patch = pf.ContactPatch.rectangle(0.02, cells=3)\nplots.plot_patch(patch)\n"
         "plots.plot_limit_surface(pf.LimitSurfaceEllipsoid(patch))\n"
         "assert 'matplotlib.pyplot' not in sys.modules"

@@ -95,10 +95,6 @@ class LimitSurface(ByValue):
         if self.normal_force is not None or not self.patch.depends_on_load:
             _ = self.contact_radius  # refuses a patch of one point now rather than later
 
-    def __getstate__(self) -> dict[str, Any]:
-        """Return the fields for a copy or another process in one step: another thread may be adding one meanwhile."""
-        return dict(self.__dict__)
-
     def __repr__(self) -> str:
         parts = [f"{self.patch.name!r} of {self.patch.cells} cells", *unusual(self, but=("patch",))]
         return f"{type(self).__name__}({', '.join(parts)})"

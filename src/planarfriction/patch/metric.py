@@ -61,10 +61,6 @@ class Anisotropy(ByValue):
         patch = dataclasses.replace(self, metric=metric, asymmetry=asymmetry)  # pyright: ignore
         return with_outline(patch, self.outline)  # pyright: ignore
 
-    def __getstate__(self) -> dict[str, Any]:
-        """Return the fields for a copy or a process in one step: another thread may be adding the metric meanwhile."""
-        return dict(self.__dict__)
-
     @functools.cached_property
     def anisotropic(self) -> bool:
         """True if friction depends on the direction; metrics of ones and asymmetries of zero do not make it so."""
