@@ -7,12 +7,13 @@ contact, which is never too stiff; each evaluation of the plant's step corrects 
 from __future__ import annotations
 
 import math
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import numpy as np
 
 from planarfriction.adapters.drake.shadow import Shadow
-from planarfriction.coupling import ITERATIONS, TOLERANCE, CoupledPatches, HostStep
+from planarfriction.coupling import CoupledPatches, HostStep
 from planarfriction.kernels.coupling import solve_batch
 
 PASSES = 12
@@ -167,34 +168,25 @@ class Asking:
                 response[:] = corrected
 
 
-class CouplingRow:
-    """Arguments and results of `CoupledPatches.step` as views of one row, solved in place: a step has little time."""
+class CouplingRow(SimpleNamespace):
+    """Arrays of a `kernels.coupling_rows.Problem`, solved in place: a step of Drake has no time for more."""
 
     def __init__(self, coupled: CoupledPatches, dt: float) -> None:
-        packed, k = coupled._packed, len(coupled.models)
-        self._coupled, self._dt, self._packed, n = coupled, dt, packed, 3 * k
-        self._words = np.zeros((1, packed.words))
-        part = {name: self._words[0, place] for name, place in packed.parts.items()}
-        part["dt"][:], part["tolerance"][:], part["most"][:] = dt, TOLERANCE, ITERATIONS
-        self._words.view(np.int64)[:, packed.parts["records"]] = packed.records
-        part["shares"][:] = packed.shares
-        self.state, self.guess, self.free_twist, self.free_load = (
-            part[name] for name in ("state", "guess", "free_twist", "free_load")
-        )
-        self.response, self.load_response = part["response"].reshape(n, n), part["load_response"].reshape(k, n)
-        self.new, self.wrench, self.twist, self.load = (part[name] for name in ("new", "wrench", "twist", "load"))
-        self._iterations, self.residual, self.converged = (
-            part[name] for name in ("iterations", "residual", "converged")
-        )
+        words, k = coupled._blank_problem(), len(coupled.models)
+        super().__init__(**{name: words[0, place] for name, place in coupled._packed.parts.items()})
+        self.response, self.load_response = self.response.reshape(3 * k, 3 * k), self.load_response.reshape(k, 3 * k)
+        self.dt[:] = dt
+        self._coupled, self._words = coupled, words
 
     def solve(self) -> int:
         """Fill in `new, wrench, twist, load, residual, converged`; the iterations taken."""
         self.wrench[:] = self.guess
-        if self._packed.following:
+        packed = self._coupled._packed
+        if packed.following:
             count = int(self._coupled._solve(self._words)[0])
         else:
-            solve_batch(self._packed.row, self._words, 0, 1)
-            count = int(self._iterations[0])
+            solve_batch(packed.row, self._words, 0, 1)
+            count = int(self.iterations[0])
         if count < 0:
             self._refuse()
         return count
@@ -204,4 +196,4 @@ class CouplingRow:
         k = len(self.free_load)
         twist, guess = self.free_twist.reshape(k, 3), self.guess.reshape(k, 3)
         host = HostStep(twist, self.free_load, guess, self.response, self.load_response)
-        self._coupled.step(self.state, host, self._dt)
+        self._coupled.step(self.state, host, self.dt[0])

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
 from planarfriction.compiler import kernel
 from planarfriction.compiler.calls import call_c
 from planarfriction.compiler.memory import arrays_at, at, doubles, integers, integers32
+from planarfriction.kernels.vectors import dot, norm, plus, square, three, times
 
 
 @kernel
@@ -50,14 +49,6 @@ def _collect(own, d, s, nefc):
                 owners[row] = p
 
 
-@kernel
-def _across(x, y, z, nx, ny, nz):
-    """Return the part of a vector across the normal, and its square over that of the vector."""
-    along = x * nx + y * ny + z * nz
-    x, y, z = x - along * nx, y - along * ny, z - along * nz
-    return x, y, z, x * x + y * y + z * z
-
-
 ALONG = 1e-12
 """Square of the sine of the angle between a site's x axis and the normal below which its y axis takes its place."""
 
@@ -65,23 +56,20 @@ ALONG = 1e-12
 @kernel
 def _axes(own, d, frame, site):
     """Return the axes of a patch: x along that of its site, across the normal."""
-    nx, ny, nz = frame[0], frame[1], frame[2]
-    length = math.sqrt(nx * nx + ny * ny + nz * nz)
-    nx, ny, nz = nx / length, ny / length, nz / length
+    n = times(1.0 / norm(three(frame)), three(frame))
     turned = doubles(at(integers(d + own.data.site_xmat)[0], 9 * site))
-    x, y, z, square = _across(turned[0], turned[3], turned[6], nx, ny, nz)
-    if square < ALONG:
-        x, y, z, square = _across(turned[1], turned[4], turned[7], nx, ny, nz)
-    length = math.sqrt(square)
-    x, y, z = x / length, y / length, z / length
-    return (x, y, z), (ny * z - nz * y, nz * x - nx * z, nx * y - ny * x), (nx, ny, nz)
+    x, y = (turned[0], turned[3], turned[6]), (turned[1], turned[4], turned[7])
+    x = plus(x, -dot(x, n), n)
+    x = plus(y, -dot(y, n), n) if square(x) < ALONG else x
+    x = times(1.0 / norm(x), x)
+    return x, (n[1] * x[2] - n[2] * x[1], n[2] * x[0] - n[0] * x[2], n[0] * x[1] - n[1] * x[0]), n
 
 
 @kernel
 def _rows(own, m, d, s, p):
     """Write the three rows of patch p into the Jacobian."""
     nv, frame, site = own.nv, at(s.frames, 6 * p), integers(own.sites)[p]
-    (ax, ay, az), (bx, by, bz), (nx, ny, nz) = _axes(own, d, frame, site)
+    x, y, normal = _axes(own, d, frame, site)
     centre, rows = at(s.frames, 6 * p + 3), at(s.jacobian, 3 * nv * p)
     if integers(own.at_contact)[p] != 0:
         for i in range(3):
@@ -98,10 +86,10 @@ def _rows(own, m, d, s, p):
         sign = 1.0 if side == 0 else -1.0
         call_c(own.functions.mj_jac, (m, d, s.moves, s.turns, centre, body))
         for i in range(nv):
-            x, y, z = sign * moves[i], sign * moves[nv + i], sign * moves[2 * nv + i]
-            rows[i] += ax * x + ay * y + az * z
-            rows[nv + i] += bx * x + by * y + bz * z
-            rows[2 * nv + i] += sign * (nx * turns[i] + ny * turns[nv + i] + nz * turns[2 * nv + i])
+            move = moves[i], moves[nv + i], moves[2 * nv + i]
+            rows[i] += sign * dot(x, move)
+            rows[nv + i] += sign * dot(y, move)
+            rows[2 * nv + i] += sign * dot(normal, (turns[i], turns[nv + i], turns[2 * nv + i]))
 
 
 @kernel
