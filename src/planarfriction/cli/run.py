@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+import planarfriction as pf
 from planarfriction import validation
 from planarfriction.cli import INTERRUPTED, output
 from planarfriction.cli.console import note, print_table, simulation_progress
@@ -37,43 +38,24 @@ class Usual(NamedTuple):
     """Width of a patch given by its name [m]."""
     patch: Callable[[], ContactPatch] | None = None
     """Makes the patch; None for a disc."""
-    law: Callable[[], LuGre] | None = None
-    """Makes the law; None for the published one."""
-
-
-def published_law() -> LuGre:
-    """Return the law of the published experiments."""
-    from planarfriction.laws import ElastoPlastic, LuGre
-
-    return LuGre(mu_s=1.2, elasto_plastic=ElastoPlastic(0.9))
-
-
-def _fingertip() -> ContactPatch:
-    """Make a soft finger on a disc that it fills at 8 N: Hertz contact, of radius 6 mm at 1 N."""
-    from planarfriction.patch import ContactPatch, SoftFinger
-
-    return ContactPatch.disc(0.012, pressure=SoftFinger(c=0.006, n=1 / 3, k=2.0, radius_max=0.012))
-
-
-def _running_band() -> ContactPatch:
-    """Make the ring that a curling stone stands on, 6 mm wide and 123 mm across."""
-    from planarfriction.patch import ContactPatch
-
-    return ContactPatch.ring(0.0585, 0.0645)
-
-
-def _ice() -> LuGre:
-    """Return the law of granite on pebbled ice: bristles of 0.1 um, no viscous friction, which is for centimetres/s."""
-    from planarfriction.laws import LuGre
-
-    return LuGre(mu_c=0.01, sigma_0=1e5, sigma_1=10.0, sigma_2=0.0)
+    law: Callable[[], LuGre] = lambda: pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
+    """Makes the law; that of the published experiments."""
 
 
 _USUAL = {
     "drift": Usual(width=0.05),  # as published
-    "pivot": Usual(width=0.024, patch=_fingertip),
+    # a soft finger on a disc that it fills at 8 N: Hertz contact, of radius 6 mm at 1 N
+    "pivot": Usual(
+        width=0.024,
+        patch=lambda: pf.ContactPatch.disc(0.012, pressure=pf.SoftFinger(c=0.006, n=1 / 3, k=2.0, radius_max=0.012)),
+    ),
     "foot": Usual(width=0.06),
-    "curling": Usual(width=0.13, patch=_running_band, law=_ice),
+    # the ring that a curling stone stands on; granite on pebbled ice: bristles of 0.1 um, no viscous friction at cm/s
+    "curling": Usual(
+        width=0.13,
+        patch=lambda: pf.ContactPatch.ring(0.0585, 0.0645),
+        law=lambda: pf.LuGre(mu_c=0.01, sigma_0=1e5, sigma_1=10.0, sigma_2=0.0),
+    ),
 }
 """Patches and laws of ready scenes that have not those of most."""
 
@@ -108,7 +90,7 @@ def scene_makers(
         contact_patch = of_scene.patch()
     else:
         contact_patch = find_patch(patch, cell_size=cell_size, width=of_scene.width)
-    law = (of_scene.law or published_law)()
+    law = of_scene.law()
     kinds = kinds or (list(BOTH) if name == "in-hand" else ["distributed"])
     _check_parts(parts, [MODELS[kind] for kind in kinds])
     options: dict[str, Any] = {} if t_end is None else {"t_end": t_end}

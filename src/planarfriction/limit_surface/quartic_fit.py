@@ -74,15 +74,9 @@ def certificate(coefficients: np.ndarray) -> np.ndarray:
         cp.Maximize(least), [of_matrix @ cp.vec(matrix, order="C") == wanted, matrix - least * np.eye(9) >> 0]
     )
     _solve(problem)
-    return scale * _exactly(matrix.value, wanted)
-
-
-def _exactly(matrix: np.ndarray, wanted: np.ndarray) -> np.ndarray:
-    """Return the nearest symmetric matrix that fulfils the equations to rounding."""
-    _, of_matrix = _certificate_equations()
-    matrix = 0.5 * (matrix + matrix.T)
-    missing = wanted - of_matrix @ matrix.reshape(81)
-    return matrix + np.linalg.lstsq(of_matrix, missing, rcond=None)[0].reshape(9, 9)
+    found = 0.5 * (matrix.value + matrix.value.T)  # pyright: ignore[reportOptionalMemberAccess, reportOptionalOperand]
+    missing = wanted - of_matrix @ found.reshape(81)
+    return scale * (found + np.linalg.lstsq(of_matrix, missing, rcond=None)[0].reshape(9, 9))
 
 
 def least_squares(rows: np.ndarray, values: np.ndarray) -> np.ndarray:

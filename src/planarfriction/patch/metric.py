@@ -107,14 +107,18 @@ class Anisotropy(ByValue):
 
     def _check_anisotropy(self, kept: np.ndarray) -> None:
         """Check both fields against the cells given, and drop those of cells that are not `kept` `[n]`."""
-        for name, size in (("metric", 2), ("asymmetry", 1)):
+        for name, axes in (("metric", 2), ("asymmetry", 1)):
             value = getattr(self, name)
             if value is None:
                 continue
             value = validation.numbers(name, value)
-            per_cell = value.ndim == size + 1
-            value = validation.array(name, value, (len(kept),) * per_cell + (2,) * size)
-            value = (_positive_definite if name == "metric" else _less_than_one)(value)
+            per_cell = value.ndim == axes + 1
+            value = validation.array(name, value, (len(kept),) * per_cell + (2,) * axes)
+            if name == "metric":
+                value = _positive_definite(value)
+            elif not ((size := np.hypot(value[..., 0], value[..., 1])) < 1.0).all():
+                rule = "be shorter than 1 (friction must oppose sliding)"
+                raise InvalidValueError("asymmetry", rule, float(size.max()))
             value = value[kept] if per_cell else value
             value.setflags(write=False)
             self._set(**{name: value})
@@ -158,10 +162,3 @@ def _positive_definite(metric: np.ndarray) -> np.ndarray:
     if bad.any():
         raise InvalidValueError("metric", "be symmetric and positive definite", metric[bad][0].tolist())
     return _symmetric(metric)
-
-
-def _less_than_one(asymmetry: np.ndarray) -> np.ndarray:
-    size = np.hypot(asymmetry[..., 0], asymmetry[..., 1])
-    if not (size < 1.0).all():
-        raise InvalidValueError("asymmetry", "be shorter than 1 (friction must oppose sliding)", float(size.max()))
-    return asymmetry

@@ -82,8 +82,12 @@ def automatic(positions: np.ndarray, weights: np.ndarray) -> int:
     count = len(positions)
     if count < MANY:
         return min(count, FEW)
-    left = [moment_left(positions, weights, split(positions, weights, parts)) for parts in (FEW, MANY)]
-    if left[1] <= WORTH * left[0]:
+    left = {}
+    for parts in (FEW, MANY):
+        labels = split(positions, weights, parts)
+        cells = [labels == label for label in range(labels.max() + 1)]
+        left[parts] = sum(second_moment(positions[part], weights[part]) for part in cells)
+    if left[MANY] <= WORTH * left[FEW]:
         return MANY
     return MOST if count >= MOST and kurtosis(positions, weights) > PEAKED else FEW
 
@@ -96,12 +100,6 @@ def kurtosis(positions: np.ndarray, weights: np.ndarray) -> float:
     if np.linalg.det(moments) <= ON_LINE**2 * moments.trace() ** 2:
         return 0.0  # all on one line
     return float(w @ np.einsum("ni,ij,nj->n", x, np.linalg.inv(moments), x) ** 2)
-
-
-def moment_left(positions: np.ndarray, weights: np.ndarray, labels: np.ndarray) -> float:
-    """Compute the second moment that is left within parts: the sum of their own, about their own centres."""
-    parts = (labels == label for label in range(labels.max() + 1))
-    return sum(second_moment(positions[part], weights[part]) for part in parts)
 
 
 def second_moment(positions: np.ndarray, weights: np.ndarray) -> float:

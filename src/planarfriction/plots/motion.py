@@ -161,10 +161,11 @@ def placed(points: np.ndarray, pose: np.ndarray) -> np.ndarray:
 def _draw_shape(axes: Any, shape: np.ndarray, colour: Any) -> Artist:
     """Draw boxes `[N, 4, 2]` or points `[N, 2]` [m] in the frame of the axes [mm]; return the artist."""
     shape = 1e3 * shape
-    if shape.ndim == 3:
-        return axes.add_artist(
-            PathPatch(_one_path(shape), facecolor=colour, edgecolor="none", alpha=PAD_OPACITY, zorder=2)
-        )
+    if shape.ndim == 3:  # all boxes are one path, so that no seams show between neighbours
+        closed = np.concatenate([shape, shape[:, :1]], axis=1)
+        codes = [Outline.MOVETO, Outline.LINETO, Outline.LINETO, Outline.LINETO, Outline.CLOSEPOLY]
+        path = Outline(closed.reshape(-1, 2), np.tile(codes, len(shape)))
+        return axes.add_artist(PathPatch(path, facecolor=colour, edgecolor="none", alpha=PAD_OPACITY, zorder=2))
     look = {"marker": "o", "markersize": 4.5, "markeredgewidth": 0.0, "linestyle": "none"}
     return axes.add_artist(Line2D(*shape.T, **look, color=colour, alpha=0.8, zorder=2))
 
@@ -209,13 +210,6 @@ def _pad_shape(contact: Contact) -> np.ndarray:
     """Return the cells of a contact's patch as polygons `[N, 4, 2]`, or its points `[N, 2]` [m], in its frame."""
     patch = contact.model.patch
     return patch.positions if patch.grid is None else cell_boxes(patch, patch.grid)
-
-
-def _one_path(boxes: np.ndarray) -> Outline:
-    """Return all boxes `[N, 4, 2]` as one path, so that no seams show between neighbours."""
-    closed = np.concatenate([boxes, boxes[:, :1]], axis=1)
-    codes = [Outline.MOVETO, Outline.LINETO, Outline.LINETO, Outline.LINETO, Outline.CLOSEPOLY]
-    return Outline(closed.reshape(-1, 2), np.tile(codes, len(boxes)))
 
 
 def _on_mount(contact: Contact) -> np.ndarray:

@@ -110,7 +110,8 @@ def _check(parts: dict[str, Any]) -> None:
     right &= all(ctypes.c_int.from_address(owner._address + offset).value == count for owner, offset, count in counts)
     arrays = [(m, model.dof_damping, m.dof_damping), (d, data.contact, d.contact.dist)]
     arrays += [(d, getattr(data, name), getattr(d, name)) for name in data._fields if name not in _OTHERWISE]
-    right &= all(_word(owner, offset) == array.ctypes.data for owner, offset, array in arrays)
+    for owner, offset, array in arrays:
+        right &= ctypes.c_uint64.from_address(owner._address + offset).value == array.ctypes.data
     for name in contact._fields[1:]:
         right &= getattr(d.contact, name).ctypes.data - d.contact.dist.ctypes.data == getattr(contact, name)
     if not right:
@@ -119,7 +120,3 @@ def _check(parts: dict[str, Any]) -> None:
 
 _OTHERWISE = ("time", "ncon", "nefc", "contact", "efc_J_rownnz", "efc_J_rowadr", "efc_J_colind")
 """Fields that are not checked as arrays; rows of Jacobians are described where these are sparse alone."""
-
-
-def _word(owner: Any, offset: int) -> int:
-    return ctypes.c_uint64.from_address(owner._address + offset).value
