@@ -5,21 +5,19 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import planarfriction as pf
 from planarfriction import validation
 from planarfriction.cli import output
 from planarfriction.cli.console import note, work_progress
 from planarfriction.errors import InvalidValueError
 from planarfriction.writing import make_folder, write_text
 
-if TYPE_CHECKING:
-    from planarfriction.patch import ContactPatch
-
 
 def identify(
     paths: Sequence[Path],
-    patch: ContactPatch,
+    patch: pf.ContactPatch,
     *,
     out: Path | None,
     normal_force: float | None,

@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
 
+import planarfriction as pf
 from planarfriction.cli.options import FILE, patch_option, width_option
-
-if TYPE_CHECKING:
-    from planarfriction.identify import Log
-    from planarfriction.laws import LuGre
-    from planarfriction.patch import ContactPatch
-
 
 NAME = "plan"
 
@@ -95,14 +90,14 @@ def plan(
     from planarfriction.cli import identify, output
     from planarfriction.cli.console import note
     from planarfriction.cli.patches import find_patch
-    from planarfriction.identify import Log, candidate_motions, design_experiment
+    from planarfriction.identify import candidate_motions, design_experiment
     from planarfriction.identify.logs import columns_of
 
     patch = find_patch(patch_name, cell_size=cell_size, width=width)
     names, values, spread = identify.parse_names(parameters), identify.parse_start(start), identify.parse_noise(noise)
     if out is not None:
         output.check_table(out)
-    measured = [Log.from_csv(path, normal_force=normal_force[0] if normal_force else None) for path in logs]
+    measured = [pf.Log.from_csv(path, normal_force=normal_force[0] if normal_force else None) for path in logs]
     patch, law = _known(measured, patch, names, values, spread)
     loads = list(normal_force) or sorted({float(f"{log.normal_force.mean():.3g}") for log in measured}) or [1.0]
     motions = candidate_motions(patch, law, normal_force=loads, **motion)
@@ -123,8 +118,12 @@ def plan(
 
 
 def _known(
-    logs: list[Log], patch: ContactPatch, names: tuple[str, ...], start: dict[str, float], noise: list[float] | None
-) -> tuple[ContactPatch, LuGre]:
+    logs: list[pf.Log],
+    patch: pf.ContactPatch,
+    names: tuple[str, ...],
+    start: dict[str, float],
+    noise: list[float] | None,
+) -> tuple[pf.ContactPatch, pf.LuGre]:
     """Find patch and law as the logs show them, or as guessed where there are none."""
     from planarfriction.cli.console import note, work_progress
     from planarfriction.identify import FitOptions, current_estimate, identify_lugre

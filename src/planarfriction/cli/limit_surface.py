@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+import planarfriction as pf
 from planarfriction.cli.console import note, print_table
 from planarfriction.cli.output import check_picture, check_table, write_csv, write_picture
 from planarfriction.cli.patches import find_patch, pressure_map
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import SURFACES
 from planarfriction.writing import write_text
-
-if TYPE_CHECKING:
-    from planarfriction.patch import ContactPatch
 
 HTML = ".html"
 """A picture to be turned with the mouse."""
@@ -24,7 +22,7 @@ POLAR_SAMPLES, AZIMUTH_SAMPLES = 37, 72
 """Samples of the direction sphere in the CSV: every five degrees."""
 
 
-def choose_patch(patch: str | None, pressure: Path | None, cell_size: float | None) -> ContactPatch:
+def choose_patch(patch: str | None, pressure: Path | None, cell_size: float | None) -> pf.ContactPatch:
     """Return the patch of `--patch` or of `--pressure`, of which at most one is given; Circle without either."""
     if patch is not None and pressure is not None:
         raise InvalidValueError("--patch", "not be given together with --pressure", patch)
@@ -33,7 +31,7 @@ def choose_patch(patch: str | None, pressure: Path | None, cell_size: float | No
     return find_patch(patch, cell_size=cell_size)
 
 
-def show(patch: ContactPatch, *, surface: str, out: Path | None, alone: bool, csv: Path | None) -> None:
+def show(patch: pf.ContactPatch, *, surface: str, out: Path | None, alone: bool, csv: Path | None) -> None:
     """Print the numbers of a limit surface; write its picture (alone or beside the ellipsoid) and its samples."""
     if out is not None:
         check_picture(out, also=(HTML,))
@@ -80,9 +78,8 @@ def _directions() -> tuple[np.ndarray, np.ndarray]:
 
 def _distance_from_ellipsoid(surface: Any) -> float:
     """Return the largest distance of (fx, fy, tau/r) from those of the ellipsoid at the same directions of sliding."""
-    from planarfriction.limit_surface import LimitSurfaceEllipsoid
     from planarfriction.plots.limit_surface import scaled_samples
 
-    ellipsoid = LimitSurfaceEllipsoid(surface.patch, normal_force=surface.normal_force)
+    ellipsoid = pf.LimitSurfaceEllipsoid(surface.patch, normal_force=surface.normal_force)
     points, others = (scaled_samples(each, *_directions())[1] for each in (surface, ellipsoid))
     return float(np.linalg.norm(points - others, axis=1).max())

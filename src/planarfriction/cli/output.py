@@ -5,15 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+import planarfriction as pf
 from planarfriction.errors import FileError
 from planarfriction.writing import check_writable, replacing, write_text
-
-if TYPE_CHECKING:
-    from planarfriction.scenes import Solution
 
 PICTURES = (".png", ".pdf", ".svg")
 """Kinds of pictures."""
@@ -51,7 +49,7 @@ def write_picture(figure: Any, path: Path) -> Path:
     return path
 
 
-def write_solution(solution: Solution, folder: Path, label: str) -> list[Path]:
+def write_solution(solution: pf.Solution, folder: Path, label: str) -> list[Path]:
     """Write a solution as NetCDF, which `planarfriction.Solution.load` reads, and as CSV; return both paths."""
     stem = f"{slug(solution.scene.name)}-{slug(label)}"
     stored, table = folder / f"{stem}.nc", folder / f"{stem}.csv"
@@ -60,7 +58,7 @@ def write_solution(solution: Solution, folder: Path, label: str) -> list[Path]:
     return [stored, table]
 
 
-def history_columns(solution: Solution) -> dict[str, np.ndarray]:
+def history_columns(solution: pf.Solution) -> dict[str, np.ndarray]:
     """Return the histories as columns [SI]: time, the body, then each contact's columns (`name.vx`) of a log."""
 
     def values(name: str) -> np.ndarray:

@@ -7,14 +7,11 @@ import inspect
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
+import planarfriction as pf
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.families import PUBLISHED_PATCHES, SHAPES
-
-if TYPE_CHECKING:
-    from planarfriction.patch import ContactPatch
 
 WIDTH = 0.02
 """Width of named patches [m], that of the published experiments."""
@@ -26,7 +23,7 @@ _PER_WIDTH = {"width": 1.0, "length": 1.0, "radius": 0.5}
 """First parameters of shapes that a width decides, and how large they are for a width of 1."""
 
 
-def find_patch(text: str | None, *, cell_size: float | None, width: float = WIDTH) -> ContactPatch:
+def find_patch(text: str | None, *, cell_size: float | None, width: float = WIDTH) -> pf.ContactPatch:
     """Return the patch called `text` (case does not matter), `width` [m] wide, or the pressure map in the file `text`.
 
     Circle for None, not for an empty text.
@@ -57,7 +54,7 @@ def patch_names() -> list[str]:
     return [*PUBLISHED_PATCHES, *(name for name in _shapes(WIDTH) if name.title() not in PUBLISHED_PATCHES)]
 
 
-def _shapes(width: float) -> dict[str, Callable[[], ContactPatch]]:
+def _shapes(width: float) -> dict[str, Callable[[], pf.ContactPatch]]:
     """Return the shapes that their width alone describes, by name."""
     makers = {}
     for name, make in SHAPES.items():
@@ -69,10 +66,9 @@ def _shapes(width: float) -> dict[str, Callable[[], ContactPatch]]:
     return makers
 
 
-def pressure_map(path: str | Path, cell_size: float | None) -> ContactPatch:
+def pressure_map(path: str | Path, cell_size: float | None) -> pf.ContactPatch:
     """Return the patch of a pressure map file with cells of `cell_size` [m]."""
-    from planarfriction.patch import ContactPatch
 
     if cell_size is None:
         raise InvalidValueError("--cell-size", f"be given for the pressure map {path}", "none")
-    return ContactPatch.from_pressure(path, cell_size)
+    return pf.ContactPatch.from_pressure(path, cell_size)

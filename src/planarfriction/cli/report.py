@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from planarfriction.scenes import Solution
+import planarfriction as pf
 
 FINISHED = "success"
 """Status of a simulation that ran until its last time."""
 
 
-def comparison(solutions: Mapping[str, Solution]) -> list[list[str]]:
+def comparison(solutions: Mapping[str, pf.Solution]) -> list[list[str]]:
     """Return rows of text for a table with one column for each solution; differences are those from the first."""
     every = list(solutions.values())
     rows = [
@@ -41,7 +39,7 @@ def comparison(solutions: Mapping[str, Solution]) -> list[list[str]]:
     return rows
 
 
-def largest_differences(solution: Solution, reference: Solution) -> tuple[float, float]:
+def largest_differences(solution: pf.Solution, reference: pf.Solution) -> tuple[float, float]:
     """Return the largest differences of position [m] and angle [rad] over the time that both solutions cover."""
     time, own = reference.histories["time"].values, solution.histories["time"].values
     time = time[time <= own[-1]]
@@ -52,10 +50,10 @@ def largest_differences(solution: Solution, reference: Solution) -> tuple[float,
     return float(np.hypot(dx, dy).max()), float(np.abs(dtheta).max())
 
 
-def _last(solution: Solution, name: str) -> float:
+def _last(solution: pf.Solution, name: str) -> float:
     return float(solution.histories[name].values[-1])
 
 
-def _speed(solution: Solution) -> str:
+def _speed(solution: pf.Solution) -> str:
     wall = solution.statistics.wall_time
     return f"{_last(solution, 'time') / wall:.3g}" if wall > 0.0 else ""

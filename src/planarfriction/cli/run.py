@@ -7,7 +7,7 @@ import functools
 import inspect
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import planarfriction as pf
 from planarfriction import validation
@@ -18,11 +18,6 @@ from planarfriction.cli.report import comparison
 from planarfriction.errors import InvalidValueError, SimulationInterrupted, SolverError
 from planarfriction.families import MODELS, SCENES
 from planarfriction.writing import make_folder
-
-if TYPE_CHECKING:
-    from planarfriction.laws import LuGre
-    from planarfriction.patch import ContactPatch
-    from planarfriction.scenes import Scene, Solution
 
 SLIDE_SAMPLING = 1e-3
 """Time between samples of the free slide [s], which lasts a tenth of a second."""
@@ -36,9 +31,9 @@ class Usual(NamedTuple):
 
     width: float = WIDTH
     """Width of a patch given by its name [m]."""
-    patch: Callable[[], ContactPatch] | None = None
+    patch: Callable[[], pf.ContactPatch] | None = None
     """Makes the patch; None for a disc."""
-    law: Callable[[], LuGre] = lambda: pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
+    law: Callable[[], pf.LuGre] = lambda: pf.LuGre(mu_s=1.2, elasto_plastic=pf.ElastoPlastic(0.9))
     """Makes the law; that of the published experiments."""
 
 
@@ -62,7 +57,7 @@ _USUAL = {
 
 def build_scenes(
     name: str, models: Sequence[str], *, settings: Mapping[str, Any] | None = None, **options: Any
-) -> dict[str, Scene]:
+) -> dict[str, pf.Scene]:
     """Return the scenes to simulate, by the label of their model, with the values of `settings` by their paths."""
     makers = scene_makers(name, models, **options)
     scenes = {kind: make(**(settings or {})) for kind, make in makers.items()}
@@ -77,7 +72,7 @@ def scene_makers(
     patch: str | None = None,
     cell_size: float | None = None,
     t_end: float | None = None,
-) -> dict[str, Callable[..., Scene]]:
+) -> dict[str, Callable[..., pf.Scene]]:
     """Return functions that make the scenes of some values, by the kind of their model; "" for the file's own."""
     if t_end is not None:
         validation.positive("--t-end", t_end)
@@ -100,7 +95,7 @@ def scene_makers(
     return {kind: functools.partial(_ready, SCENES[name], model, options) for kind, model in made.items()}
 
 
-def _ready(make: Callable[..., Scene], model: Any, options: dict[str, Any], **values: Any) -> Scene:
+def _ready(make: Callable[..., pf.Scene], model: Any, options: dict[str, Any], **values: Any) -> pf.Scene:
     """Make a ready scene: values that its function takes, such as `mass`, go there, the others to what it returns."""
     from planarfriction.sweeps.settings import Settable
 
@@ -144,14 +139,14 @@ def _check_parts(parts: Any, makes: Iterable[Any]) -> None:
         raise InvalidValueError("--parts", f"be given only for a model that has parts ({kinds})", parts)
 
 
-def _make(make: Any, patch: ContactPatch, law: Any, parts: int | str | None) -> Any:
+def _make(make: Any, patch: pf.ContactPatch, law: Any, parts: int | str | None) -> Any:
     """Make a model of a class, in `parts` where it has some."""
     return make(patch, law, **({"parts": parts} if parts is not None and _in_parts(make) else {}))
 
 
 def _makers_from_file(
     path: str, kinds: Sequence[str], parts: int | str | None, patch: str | None, cell_size: float | None
-) -> dict[str, Callable[..., Scene]]:
+) -> dict[str, Callable[..., pf.Scene]]:
     from planarfriction.sweeps.settings import Settable
 
     make = Settable(path)
@@ -163,19 +158,19 @@ def _makers_from_file(
     if kinds:
         _check_parts(parts, [MODELS[kind] for kind in kinds])
 
-    def changed(kind: str) -> Callable[..., Scene]:
+    def changed(kind: str) -> Callable[..., pf.Scene]:
         return lambda **values: _with_models(make(**values), kind, contact_patch, parts)
 
     return {kind: changed(kind) for kind in kinds or [""]}
 
 
-def _label(scene: Scene) -> str:
+def _label(scene: pf.Scene) -> str:
     """Return the kind of model that all contacts of a scene have, or "mixed"."""
     kinds = {MODELS.name_of(contact.model) for contact in scene.contacts}
     return (kinds.pop() if len(kinds) == 1 else None) or "mixed"
 
 
-def _with_models(scene: Scene, kind: str, patch: ContactPatch | None, parts: int | str | None) -> Scene:
+def _with_models(scene: pf.Scene, kind: str, patch: pf.ContactPatch | None, parts: int | str | None) -> pf.Scene:
     """Return the scene with models of one kind on its own patches or on `patch`, laws as they are.
 
     The kind is "" for that of the scene, "mixed" for each as it is. In `parts` where they have some, by default in as
@@ -215,7 +210,7 @@ def run(
         limits["rtol"] = validation.positive("--rtol", rtol)
     if folder is not None:
         make_folder(folder)
-    solutions: dict[str, Solution] = {}
+    solutions: dict[str, pf.Solution] = {}
     try:
         for label, scene in scenes.items():
             solutions[label] = _simulate(label, scene, limits)
@@ -232,14 +227,14 @@ def run(
     return 0
 
 
-def _simulate(label: str, scene: Scene, options: dict[str, Any]) -> Solution:
+def _simulate(label: str, scene: pf.Scene, options: dict[str, Any]) -> pf.Solution:
     from planarfriction.scenes import simulate
 
     with simulation_progress(label, options.get("t_end", scene.t_end)) as progress:
         return simulate(scene, progress=progress, **options)
 
 
-def _keep_part(part: Solution, solutions: dict[str, Solution], label: str, folder: Path | None) -> int:
+def _keep_part(part: pf.Solution, solutions: dict[str, pf.Solution], label: str, folder: Path | None) -> int:
     note(f"stopped at t = {part.histories['time'].values[-1]:g} s of the {label} run")
     solutions[label] = part
     _save(part, folder, label)
@@ -247,18 +242,18 @@ def _keep_part(part: Solution, solutions: dict[str, Solution], label: str, folde
     return INTERRUPTED
 
 
-def _save(solution: Solution, folder: Path | None, label: str) -> None:
+def _save(solution: pf.Solution, folder: Path | None, label: str) -> None:
     if folder is not None:
         for path in output.write_solution(solution, folder, label):
             note(f"wrote {path}")
 
 
-def _print(solutions: dict[str, Solution]) -> None:
+def _print(solutions: dict[str, pf.Solution]) -> None:
     name = next(iter(solutions.values())).scene.name
     print_table(name, ["", *solutions], comparison(solutions))
 
 
-def _draw(solutions: dict[str, Solution], folder: Path, pictures: Sequence[str]) -> None:
+def _draw(solutions: dict[str, pf.Solution], folder: Path, pictures: Sequence[str]) -> None:
     """Draw the histories of all runs, the motion of each, and the patch; animate each."""
     from planarfriction import plots
 

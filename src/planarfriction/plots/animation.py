@@ -5,19 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+import planarfriction as pf
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError
 from planarfriction.plots.film import Film
 from planarfriction.plots.film_files import check_kind, write_frames
 from planarfriction.plots.track import track_of
 from planarfriction.writing import replacing
-
-if TYPE_CHECKING:
-    from planarfriction.scenes import Solution
 
 LEAST_FRAMES, USUAL_FRAMES, MOST_FRAMES = 75, 300, 3000
 """Frames that a picture has at least, and at most, where nothing is asked for; most that it can have."""
@@ -27,7 +24,7 @@ FASTEST = 50.0
 
 
 def animate_solution(
-    solution: Solution,
+    solution: pf.Solution,
     path: str | Path,
     *,
     slow: float | None = None,
@@ -70,9 +67,9 @@ def animate_solution(
     InvalidValueError
         A parameter breaks its rule.
     """
-    from planarfriction.scenes.solution import Solution, scene_of
+    from planarfriction.scenes.solution import scene_of
 
-    scene_of(validation.instance("solution", solution, Solution, "a Solution"), "the animation")
+    scene_of(validation.instance("solution", solution, pf.Solution, "a Solution"), "the animation")
     path = validation.path("path", path)
     check_kind(path)
     times, pace = frame_times(np.asarray(solution.histories["time"].values, dtype=float), slow, fps)

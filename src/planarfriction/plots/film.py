@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -11,6 +11,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch, Patch
 from matplotlib.patheffects import withStroke
 
+import planarfriction as pf
 from planarfriction import geometry
 from planarfriction.plots import style
 from planarfriction.plots.motion import body_lines, move, placed
@@ -29,9 +30,6 @@ from planarfriction.plots.panels import (
 )
 from planarfriction.plots.track import Track
 
-if TYPE_CHECKING:
-    from planarfriction.scenes import Solution
-
 WIDTH, HEIGHT = 9.6, 5.4
 """Size of a frame [inch]."""
 
@@ -48,7 +46,7 @@ ARROW = 0.3
 class Film:
     """The frames of a track."""
 
-    def __init__(self, solution: Solution, track: Track, *, follow: bool, pace: str, dpi: float):
+    def __init__(self, solution: pf.Solution, track: Track, *, follow: bool, pace: str, dpi: float):
         self.track, self.pace = track, pace
         self.figure = style.PlotFigure(figsize=(WIDTH, HEIGHT), dpi=dpi, facecolor="white")
         self.canvas = FigureCanvasAgg(self.figure)
@@ -110,7 +108,7 @@ class Film:
         for panel in self.panels:
             panel.show(frame)
 
-    def _draw_body(self, solution: Solution) -> None:
+    def _draw_body(self, solution: pf.Solution) -> None:
         axes, track = self.axes, self.track
         lines = [Line2D(*(1e3 * each.T), color="0.25", linewidth=1.5, zorder=5) for each in body_lines(solution)]
         self.body = [axes.add_artist(each) for each in lines]
@@ -175,7 +173,7 @@ def _places(contacts: int) -> tuple[tuple, list[tuple]]:
     return (0.072, 0.145, 0.43, 0.745), places
 
 
-def _views(solution: Solution, track: Track, follow: bool) -> np.ndarray:
+def _views(solution: pf.Solution, track: Track, follow: bool) -> np.ndarray:
     """Return the limits of both axes `[F, 2, 2]` [mm]: of all that is drawn, or of a window that follows the body.
 
     A window follows where the motion is much longer than the body; it stays within the limits of the whole.

@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+import planarfriction as pf
 from planarfriction import validation
 from planarfriction.errors import InvalidValueError, shown
 from planarfriction.plots import style
 
 if TYPE_CHECKING:
     import xarray as xr
-
-    from planarfriction.scenes import Solution
 
 LEAST_SPAN = 0.02
 """Least height of a panel, as a share of the largest value of its kind: what is nearly nothing looks like it."""
@@ -43,7 +42,7 @@ _CONTACT = (
 )
 
 
-def plot_histories(solutions: Solution | Mapping[str, Solution]) -> style.PlotFigure:
+def plot_histories(solutions: pf.Solution | Mapping[str, pf.Solution]) -> style.PlotFigure:
     """Plot position, angle, speed, forces, torque and normal force against time.
 
     `solutions` is one solution or a mapping from label to solution; several are overlaid. Colours distinguish the runs,
@@ -58,7 +57,7 @@ def plot_histories(solutions: Solution | Mapping[str, Solution]) -> style.PlotFi
     return figure
 
 
-def draw_histories(figure: Any, solutions: Solution | Mapping[str, Solution]) -> None:
+def draw_histories(figure: Any, solutions: pf.Solution | Mapping[str, pf.Solution]) -> None:
     """Draw the eight panels of `plot_histories` into a figure or subfigure."""
     known = as_runs(solutions)
     runs = {label: each.data for label, each in known.items()}
@@ -78,15 +77,14 @@ def draw_histories(figure: Any, solutions: Solution | Mapping[str, Solution]) ->
     _legend(figure, panels[0, 1], runs)
 
 
-def as_runs(solutions: Solution | Mapping[str, Solution]) -> dict[str, Solution]:
+def as_runs(solutions: pf.Solution | Mapping[str, pf.Solution]) -> dict[str, pf.Solution]:
     """Return the solutions by label; a single one is labelled with the name of its scene."""
-    from planarfriction.scenes import Solution
 
     if not isinstance(solutions, Mapping):
-        solution = validation.instance("solutions", solutions, Solution, "a Solution or a table of them by name")
+        solution = validation.instance("solutions", solutions, pf.Solution, "a Solution or a table of them by name")
         return {str(solution.scene.name): solution}
     for name, each in solutions.items():
-        validation.instance("solutions", each, Solution, f"Solutions, under {shown(name)!r} too")
+        validation.instance("solutions", each, pf.Solution, f"Solutions, under {shown(name)!r} too")
     if not solutions:
         raise InvalidValueError("solutions", "hold at least one Solution", solutions)
     return {str(name): each for name, each in solutions.items()}
@@ -136,7 +134,7 @@ def _draw_panel(
     style.tidy(axes)
 
 
-def _colours(solutions: Sequence[Solution]) -> list[Any]:
+def _colours(solutions: Sequence[pf.Solution]) -> list[Any]:
     """Choose colours: one per model if all models differ, otherwise in order."""
     if len(solutions) > len(style.PALETTE):
         return list(style.TIME_COLOURS(np.linspace(0.0, 1.0, len(solutions))))

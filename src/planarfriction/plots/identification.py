@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+import planarfriction as pf
 from planarfriction import formulas
 from planarfriction.plots import style
-
-if TYPE_CHECKING:
-    from planarfriction.identify import Identification
 
 KINDS = {"N": "force", "N m": "torque", "m": "length", "rad": "angle"}
 """Unit of a channel -> kind of quantity."""
@@ -22,7 +20,7 @@ MOST_POINTS = 4000
 """Samples that are drawn; of more, evenly chosen ones."""
 
 
-def plot_identification(result: Identification) -> style.PlotFigure:
+def plot_identification(result: pf.identify.Identification) -> style.PlotFigure:
     """Draw each measured channel with its fit (left) and the residual over the noise (right), logs one after another.
 
     Residuals of a good fit fill the band of two spreads of the noise and show no pattern; triangles at the rim stand
@@ -57,7 +55,7 @@ def plot_identification(result: Identification) -> style.PlotFigure:
     return figure
 
 
-def _places(result: Identification) -> list[np.ndarray]:
+def _places(result: pf.identify.Identification) -> list[np.ndarray]:
     """Return the times of each log [s], shifted so that the logs follow each other with a gap."""
     total = sum(each["time"][-1] - each["time"][0] for each in result.histories)
     gap, at, places = 0.01 * total, 0.0, []
@@ -68,7 +66,7 @@ def _places(result: Identification) -> list[np.ndarray]:
     return places
 
 
-def _draw_channel(left: Any, right: Any, result: Identification, i: int, places: list[np.ndarray]) -> None:
+def _draw_channel(left: Any, right: Any, result: pf.identify.Identification, i: int, places: list[np.ndarray]) -> None:
     name, unit = result.channels[i]
     shown = style.unit_for(KINDS[unit], *(np.nan_to_num(each["measured"][:, i]) for each in result.histories))
     for number, (each, time) in enumerate(zip(result.histories, places, strict=True)):
@@ -93,7 +91,7 @@ def _draw_channel(left: Any, right: Any, result: Identification, i: int, places:
     right.set_ylim(-MOST_NOISE, MOST_NOISE)
 
 
-def _draw_speeds(axes: Any, result: Identification) -> None:
+def _draw_speeds(axes: Any, result: pf.identify.Identification) -> None:
     """Draw measured friction over load against the sliding speed, beside the fitted steady friction of pure sliding."""
     speed = np.concatenate([each["speed"] for each in result.histories])
     coefficient = np.concatenate([each["coefficient"] for each in result.histories])
@@ -112,7 +110,7 @@ def _draw_speeds(axes: Any, result: Identification) -> None:
     style.tidy(axes)
 
 
-def _draw_correlations(axes: Any, result: Identification) -> None:
+def _draw_correlations(axes: Any, result: pf.identify.Identification) -> None:
     """Draw the correlations of the residuals of each channel over the lag, with the band of those of noise."""
     values = result.residual_correlations()
     samples = sum(len(each["time"]) for each in result.histories)
@@ -126,7 +124,7 @@ def _draw_correlations(axes: Any, result: Identification) -> None:
     style.tidy(axes)
 
 
-def _draw_held_out(axes: Any, result: Identification, i: int) -> None:
+def _draw_held_out(axes: Any, result: pf.identify.Identification, i: int) -> None:
     """Draw predictions of samples that fits did not see over their measurements; a good fit keeps to the diagonal."""
     name, unit = result.channels[i]
     measured, held_out = (

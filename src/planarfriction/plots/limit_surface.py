@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib import colormaps
 
+import planarfriction as pf
 from planarfriction import geometry, validation
 from planarfriction.errors import MissingExtraError
 from planarfriction.families import SURFACES
@@ -96,14 +97,13 @@ def interactive_limit_surface(surface: Any, *, beside: Any = "ellipsoid") -> Any
 
 def _sampled(surface: Any, beside: Any) -> tuple[list[str], list[tuple[np.ndarray, np.ndarray]], float]:
     """Return titles and `scaled_samples` of the surfaces to draw, and the limit of the axes."""
-    from planarfriction.limit_surface import LimitSurface, LimitSurfaceEllipsoid
 
-    validation.instance("surface", surface, LimitSurface, "a limit surface")
+    validation.instance("surface", surface, pf.limit_surface.LimitSurface, "a limit surface")
     shown = {f"{surface.patch.name}: {_kind(surface)}": surface}
     if beside is not None:
         if isinstance(beside, str) and beside == "ellipsoid":
-            beside = LimitSurfaceEllipsoid(surface.patch, normal_force=surface.normal_force)
-        validation.instance("beside", beside, LimitSurface, 'a limit surface, "ellipsoid" or None')
+            beside = pf.LimitSurfaceEllipsoid(surface.patch, normal_force=surface.normal_force)
+        validation.instance("beside", beside, pf.limit_surface.LimitSurface, 'a limit surface, "ellipsoid" or None')
         shown[_kind(beside)] = beside
     scaled = [scaled_samples(each, *even_mesh(each)) for each in shown.values()]
     return [*shown], scaled, 1.05 * max(float(np.abs(mesh).max()) for _, mesh in scaled)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -12,14 +12,12 @@ from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
 from matplotlib.transforms import Affine2D
 
+import planarfriction as pf
 from planarfriction import geometry, validation
 from planarfriction.plots import style
 from planarfriction.plots.histories import draw_histories
 from planarfriction.plots.patch import cell_boxes
 from planarfriction.plots.track import body_poses, contact_poses
-
-if TYPE_CHECKING:
-    from planarfriction.scenes import Contact, Solution
 
 INSTANTS = 12
 """Number of outlines in a strobe."""
@@ -37,7 +35,7 @@ ROUND, CORNERS = 0.02, 12
 """Share by which the radii of a round outline differ at most [-]; corners that it has at least."""
 
 
-def plot_motion(solution: Solution) -> style.PlotFigure:
+def plot_motion(solution: pf.Solution) -> style.PlotFigure:
     """Draw the outline of the body and the patches at 12 instants, evenly spaced in time and coloured by time.
 
     World axes, equal scales. Patches fixed to the world are drawn once; patches on the body, and pads that are driven,
@@ -55,7 +53,7 @@ def plot_motion(solution: Solution) -> style.PlotFigure:
     return figure
 
 
-def plot_solution(solution: Solution) -> style.PlotFigure:
+def plot_solution(solution: pf.Solution) -> style.PlotFigure:
     """Draw the motion of the body (left) and the time histories of body and contacts (right).
 
     Raises InvalidValueError for what is not a solution of a scene.
@@ -69,13 +67,13 @@ def plot_solution(solution: Solution) -> style.PlotFigure:
     return figure
 
 
-def draw_motion(figure: Any, solution: Solution) -> None:
+def draw_motion(figure: Any, solution: pf.Solution) -> None:
     """Draw `plot_motion` into a figure or subfigure."""
     _draw(figure, _strobe(solution))
 
 
 class _Strobe(NamedTuple):
-    solution: Solution
+    solution: pf.Solution
     times: np.ndarray
     """Instants that are drawn [s]."""
     poses: np.ndarray
@@ -88,10 +86,9 @@ class _Strobe(NamedTuple):
     """Limits of both axes `[2, 2]` [mm]."""
 
 
-def _strobe(solution: Solution) -> _Strobe:
-    from planarfriction.scenes import Solution
+def _strobe(solution: pf.Solution) -> _Strobe:
 
-    validation.instance("solution", solution, Solution, "a Solution")
+    validation.instance("solution", solution, pf.Solution, "a Solution")
     time, poses = np.asarray(solution.data["time"], dtype=float), body_poses(solution)
     chosen = np.unique(np.linspace(0, len(time) - 1, min(INSTANTS, len(time))).round().astype(int))
     limits = _limits(solution, time[chosen], poses[chosen], 1.0)
@@ -148,7 +145,7 @@ def _remark(strobe: _Strobe) -> str:
     )
 
 
-def _reach(solution: Solution) -> float:
+def _reach(solution: pf.Solution) -> float:
     """Return the largest distance of the body's lines from its centre of mass [m]."""
     return float(np.hypot(*np.concatenate(body_lines(solution)).T).max()) or 1e-3
 
@@ -177,7 +174,7 @@ def move(artists: list[Artist], axes: Any, pose: np.ndarray, larger: float = 1.0
         artist.set_transform(transform)
 
 
-def body_lines(solution: Solution) -> list[np.ndarray]:
+def body_lines(solution: pf.Solution) -> list[np.ndarray]:
     """Return lines `[M, 2]` [m] that stand for the body, in its frame: the outline, or the rim of the patches on it.
 
     Where its turn would not show, on a round outline and without any, also a line along its x axis.
@@ -206,18 +203,18 @@ def _rim(shapes: list[np.ndarray]) -> list[np.ndarray]:
     return [np.concatenate([corners, corners[:1]])]
 
 
-def _pad_shape(contact: Contact) -> np.ndarray:
+def _pad_shape(contact: pf.Contact) -> np.ndarray:
     """Return the cells of a contact's patch as polygons `[N, 4, 2]`, or its points `[N, 2]` [m], in its frame."""
     patch = contact.model.patch
     return patch.positions if patch.grid is None else cell_boxes(patch, patch.grid)
 
 
-def _on_mount(contact: Contact) -> np.ndarray:
+def _on_mount(contact: pf.Contact) -> np.ndarray:
     """Return the patch of a contact in the frame that it is mounted on (world or body) [m]."""
     return placed(_pad_shape(contact), np.array([*contact.position, contact.angle], dtype=float))
 
 
-def _limits(solution: Solution, times: np.ndarray, poses: np.ndarray, larger: float) -> np.ndarray:
+def _limits(solution: pf.Solution, times: np.ndarray, poses: np.ndarray, larger: float) -> np.ndarray:
     """Return the limits of both axes, `[2, 2]` [mm], that hold all drawn at `times` and `poses`, the body `larger`."""
     points = [placed(larger * line, pose) for pose in poses for line in body_lines(solution)]
     for contact in solution.scene.contacts:

@@ -5,19 +5,15 @@ from __future__ import annotations
 import base64
 import html
 import io
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+import planarfriction as pf
 from planarfriction import geometry
 from planarfriction.errors import FrictionError
 from planarfriction.plots import style
 from planarfriction.plots.motion import draw_motion
-
-if TYPE_CHECKING:
-    from planarfriction.limit_surface import LimitSurface
-    from planarfriction.patch import ContactPatch
-    from planarfriction.scenes import Solution
 
 _LOAD = 1.0
 """Load [N] at which a patch is shown whose shape depends on it."""
@@ -26,7 +22,7 @@ _DIRECTIONS = 120
 """Twists whose wrenches make the section of a limit surface."""
 
 
-def patch_html(patch: ContactPatch) -> str:
+def patch_html(patch: pf.ContactPatch) -> str:
     """Return a thumbnail of the pressure, cells, size, contact radius and centre of pressure of a patch."""
     load = _LOAD if patch.depends_on_load else None
     rows = {"cells": f"{patch.cells}", "size": _size(patch)}
@@ -41,7 +37,7 @@ def patch_html(patch: ContactPatch) -> str:
     return _beside(figure, f"ContactPatch {patch.name!r}", rows)
 
 
-def surface_html(surface: LimitSurface) -> str:
+def surface_html(surface: pf.limit_surface.LimitSurface) -> str:
     """Return a section of the limit surface through force along x and torque, its patch and its contact radius."""
     rows = {"patch": f"{surface.patch.name!r} of {surface.patch.cells} cells"}
     figure = None
@@ -55,7 +51,7 @@ def surface_html(surface: LimitSurface) -> str:
     return _beside(figure, type(surface).__name__, rows)
 
 
-def solution_html(solution: Solution) -> str:
+def solution_html(solution: pf.Solution) -> str:
     """Return a drawing of the motion of the body, with the end and the cost of the run."""
     time = np.asarray(solution.histories["time"].values)
     x, y, theta = (float(np.asarray(solution.histories[name].values)[-1]) for name in ("x", "y", "theta"))
@@ -74,7 +70,7 @@ def solution_html(solution: Solution) -> str:
     return _beside(figure, title, rows)
 
 
-def _pressure(patch: ContactPatch, weights: np.ndarray) -> style.PlotFigure:
+def _pressure(patch: pf.ContactPatch, weights: np.ndarray) -> style.PlotFigure:
     figure = style.new_figure(1.5, 1.5)
     axes = figure.add_subplot()
     if patch.grid is None:
@@ -91,7 +87,7 @@ def _pressure(patch: ContactPatch, weights: np.ndarray) -> style.PlotFigure:
     return figure
 
 
-def _section(surface: LimitSurface) -> style.PlotFigure:
+def _section(surface: pf.limit_surface.LimitSurface) -> style.PlotFigure:
     angle = np.linspace(0.0, 2.0 * np.pi, _DIRECTIONS + 1)
     radius, centre = surface.contact_radius, surface.centre_of_pressure
     about_centre = np.stack([np.cos(angle), np.zeros_like(angle), np.sin(angle) / radius], -1)
@@ -106,7 +102,7 @@ def _section(surface: LimitSurface) -> style.PlotFigure:
     return figure
 
 
-def _size(patch: ContactPatch) -> str:
+def _size(patch: pf.ContactPatch) -> str:
     if patch.grid is None or patch.cell_size is None or min(patch.cell_size) == 0.0:  # points, lines
         width, height = np.ptp(patch.positions, axis=0) + (0.0 if patch.cell_size is None else patch.cell_size)
     else:

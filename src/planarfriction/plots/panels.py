@@ -12,6 +12,7 @@ from matplotlib.cm import ScalarMappable
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import LinearSegmentedColormap, ListedColormap, Normalize
 
+import planarfriction as pf
 from planarfriction import geometry
 from planarfriction.errors import FrictionError
 from planarfriction.laws import FrictionLaw
@@ -192,10 +193,9 @@ class SurfacePanel:
 
 def surface_at(patch: Any, load: float | None) -> Any:
     """Return the exact limit surface of a patch at a load; a table of it where the cells differ in their friction."""
-    from planarfriction.limit_surface import LimitSurfaceExact, LimitSurfaceTable
 
     each_its_own = patch.root is not None and patch.root.ndim == 3
-    return (LimitSurfaceTable if each_its_own else LimitSurfaceExact)(patch, normal_force=load)
+    return (pf.LimitSurfaceTable if each_its_own else pf.LimitSurfaceExact)(patch, normal_force=load)
 
 
 def has_surface(track: ContactTrack) -> bool:

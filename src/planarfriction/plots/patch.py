@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.collections import PolyCollection
 from matplotlib.ticker import MaxNLocator
 
+import planarfriction as pf
 from planarfriction import validation
 from planarfriction.plots import style
-
-if TYPE_CHECKING:
-    from planarfriction.patch import ContactPatch, Grid
 
 MOST_EDGES = 5000
 """Cells whose edges are drawn: those of more would hide them."""
@@ -23,7 +21,7 @@ NARROWEST = 0.3
 _CORNERS = np.array([(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)])
 
 
-def plot_patch(patch: ContactPatch, *, normal_force: float | None = None) -> style.PlotFigure:
+def plot_patch(patch: pf.ContactPatch, *, normal_force: float | None = None) -> style.PlotFigure:
     """Draw the pressure on a patch, and its centre of pressure.
 
     Cells of a grid are drawn with their true area at their true centroid and coloured by their pressure `w f_N / a`; a
@@ -33,9 +31,8 @@ def plot_patch(patch: ContactPatch, *, normal_force: float | None = None) -> sty
     Raises InvalidValueError unless `patch` is a patch, for a load below zero, and for a missing load if the shape
     depends on it.
     """
-    from planarfriction.patch import ContactPatch
 
-    validation.instance("patch", patch, ContactPatch, "a ContactPatch")
+    validation.instance("patch", patch, pf.ContactPatch, "a ContactPatch")
     load = 1.0 if normal_force is None else validation.non_negative("normal_force", normal_force)
     weights = patch.weights(normal_force)
     centre = 1e3 * patch.centre_of_pressure(normal_force)
@@ -61,7 +58,7 @@ def plot_patch(patch: ContactPatch, *, normal_force: float | None = None) -> sty
     return figure
 
 
-def cell_boxes(patch: ContactPatch, grid: Grid) -> np.ndarray:
+def cell_boxes(patch: pf.ContactPatch, grid: pf.Grid) -> np.ndarray:
     """Return the corners of the cells of a patch on a grid, `[N, 4, 2]` [m], contact frame.
 
     A cell cut by the rim is drawn as a smaller box of the area and at the centroid of the part inside.
@@ -71,7 +68,7 @@ def cell_boxes(patch: ContactPatch, grid: Grid) -> np.ndarray:
     return patch.positions[:, None, :] + scale[:, None, None] * box
 
 
-def _height(patch: ContactPatch) -> float:
+def _height(patch: pf.ContactPatch) -> float:
     """Return the height of the figure [inch] that fits the proportions of the patch."""
     if patch.grid is None:
         return 4.6
@@ -79,7 +76,7 @@ def _height(patch: ContactPatch) -> float:
     return float(np.clip(1.2 + 3.4 * ratio, 2.6, 5.6))
 
 
-def _draw_cells(axes, patch: ContactPatch, grid: Grid, pressure: np.ndarray, normal_force: float | None):
+def _draw_cells(axes, patch: pf.ContactPatch, grid: pf.Grid, pressure: np.ndarray, normal_force: float | None):
     unit = style.unit_for("pressure", pressure)
     edges: Any = {"edgecolor": "white", "linewidth": 0.25} if len(pressure) < MOST_EDGES else {"edgecolor": "face"}
     cells = PolyCollection(list(1e3 * cell_boxes(patch, grid)), cmap=style.PRESSURE_MAP, **edges)
@@ -93,7 +90,7 @@ def _draw_cells(axes, patch: ContactPatch, grid: Grid, pressure: np.ndarray, nor
     return cells, f"pressure [{unit.label}]" if normal_force is not None else f"pressure per load [{unit.label}/N]"
 
 
-def _draw_points(axes, patch: ContactPatch, force: np.ndarray, normal_force: float | None):
+def _draw_points(axes, patch: pf.ContactPatch, force: np.ndarray, normal_force: float | None):
     share = force / force.max() if force.any() else np.zeros_like(force)
     unit = style.unit_for("force", force) if normal_force is not None else style.Unit(1.0, "-")
     points = axes.scatter(
@@ -110,7 +107,7 @@ def _draw_points(axes, patch: ContactPatch, force: np.ndarray, normal_force: flo
     return points, f"{name} [{unit.label}]"
 
 
-def _title(patch: ContactPatch, weights: np.ndarray, normal_force: float | None) -> str:
+def _title(patch: pf.ContactPatch, weights: np.ndarray, normal_force: float | None) -> str:
     loaded = int((weights > 0.0).sum())
     radius = style.unit_for("length", patch.contact_radius(normal_force))
     what = ("point" if patch.grid is None else "cell") + "s" * (loaded != 1)

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.colors import Normalize
 
+import planarfriction as pf
 from planarfriction import geometry
 from planarfriction.planning.motions import slide_of
 from planarfriction.plots import style
 from planarfriction.plots.track import body_poses
 from planarfriction.scenes import Solution, simulate
-
-if TYPE_CHECKING:
-    from planarfriction.planning import GripPlan, Push
-
 
 INSTANTS = 8
 """Outlines that are drawn."""
@@ -23,7 +20,7 @@ INSTANTS = 8
 MODES = ("stick", "slide left", "slide right", "free")
 
 
-def plot_grip(plan: GripPlan) -> style.PlotFigure:
+def plot_grip(plan: pf.planning.GripPlan) -> style.PlotFigure:
     """Draw the grip, the turn and the slide over time: solid as the scene is, dashed with other frictions."""
     figure = style.new_figure(7.2, 6.4)
     grip, turn, slide = figure.subplots(3, 1, sharex=True)
@@ -61,12 +58,12 @@ def plot_grip(plan: GripPlan) -> style.PlotFigure:
     return figure
 
 
-def _slide(plan: GripPlan, solution: Solution) -> np.ndarray:
+def _slide(plan: pf.planning.GripPlan, solution: Solution) -> np.ndarray:
     """Return the distance of the place that was under the grip from where it was `[T]` [m]."""
     return np.hypot(*slide_of(plan.scene, solution.contact_index(plan.contact), body_poses(solution)).T)
 
 
-def plot_push(push: Push) -> style.PlotFigure:
+def plot_push(push: pf.planning.Push) -> style.PlotFigure:
     """Draw the outline of the slider at 8 instants, coloured by time, and the path of the pusher by what it does."""
     figure = style.new_figure(6.4, 4.8)
     draw_push(figure.subplots(), push)
@@ -74,7 +71,7 @@ def plot_push(push: Push) -> style.PlotFigure:
     return figure
 
 
-def draw_push(axes: Any, push: Push) -> None:
+def draw_push(axes: Any, push: pf.planning.Push) -> None:
     """Draw `plot_push` into axes."""
     scale = Normalize(push.time[0], push.time[-1])
     chosen = np.unique(np.linspace(0, len(push.time) - 1, INSTANTS).round().astype(int))

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+import planarfriction as pf
 from planarfriction import geometry
 from planarfriction.plots.histories import KICK
 from planarfriction.scenes.slip import SlipField, bristles_of, slip_field
-
-if TYPE_CHECKING:
-    from planarfriction.models import DistributedModel
-    from planarfriction.scenes import Contact, Solution
 
 MOST_STEPS = 5000
 """Most steps in which bristles follow a motion; of more samples, evenly chosen ones."""
@@ -24,7 +21,7 @@ MOST_STEPS = 5000
 class ContactTrack:
     """A contact at F frames."""
 
-    contact: Contact
+    contact: pf.Contact
     index: int
     """Index among the contacts of the scene."""
     poses: np.ndarray
@@ -71,7 +68,7 @@ class Track(NamedTuple):
     contacts: list[ContactTrack]
 
 
-def track_of(solution: Solution, times: np.ndarray) -> Track:
+def track_of(solution: pf.Solution, times: np.ndarray) -> Track:
     """Return the solution at `times` `[F]` [s]: poses without overshoot, all else along straight lines."""
     sampled = np.asarray(solution.histories["time"].values, dtype=float)
     every = np.unique(np.linspace(0, len(sampled) - 1, min(len(sampled), MOST_STEPS)).round().astype(int))
@@ -92,7 +89,7 @@ def track_of(solution: Solution, times: np.ndarray) -> Track:
     return Track(times, poses[frames], twists, contacts)
 
 
-def _first(solution: Solution) -> list[tuple[DistributedModel, np.ndarray] | None]:
+def _first(solution: pf.Solution) -> list[tuple[pf.DistributedModel, np.ndarray] | None]:
     """Return the distributed model of each contact and its first state; None for one without bristles."""
     from planarfriction.scenes.start import first_states
 
@@ -107,7 +104,7 @@ def _first(solution: Solution) -> list[tuple[DistributedModel, np.ndarray] | Non
     return list(zip(known, states or [], strict=True))
 
 
-def contact_poses(contact: Contact, times: np.ndarray, poses: np.ndarray) -> np.ndarray:
+def contact_poses(contact: pf.Contact, times: np.ndarray, poses: np.ndarray) -> np.ndarray:
     """Return the poses `[T, 3]` [m, m, rad] of a contact's frame at `times`, where the body has `poses` `[T, 3]`."""
     fixed = np.array([*contact.position, contact.angle], dtype=float)
     if contact.mounted_on == "body":
@@ -115,7 +112,7 @@ def contact_poses(contact: Contact, times: np.ndarray, poses: np.ndarray) -> np.
     return fixed + _carried(contact, times)
 
 
-def _carried(contact: Contact, times: np.ndarray) -> np.ndarray:
+def _carried(contact: pf.Contact, times: np.ndarray) -> np.ndarray:
     """Return the prescribed displacement of the world's side of a contact `[T, 3]` [m, m, rad]."""
     from planarfriction.scenes.movers import displacement
 
@@ -124,7 +121,7 @@ def _carried(contact: Contact, times: np.ndarray) -> np.ndarray:
     )
 
 
-def _displacements(contact: Contact, times: np.ndarray, poses: np.ndarray, at: np.ndarray) -> np.ndarray:
+def _displacements(contact: pf.Contact, times: np.ndarray, poses: np.ndarray, at: np.ndarray) -> np.ndarray:
     """Return the displacement of the body on a contact between instants, in the frame of the contact `[T - 1, 3]`.
 
     That of the material of the body at the origin of the frame, half-way: of second order in the turn of a step.
@@ -136,12 +133,12 @@ def _displacements(contact: Contact, times: np.ndarray, poses: np.ndarray, at: n
     return geometry.rotate(moved, -middle[:, 2])
 
 
-def body_poses(solution: Solution) -> np.ndarray:
+def body_poses(solution: pf.Solution) -> np.ndarray:
     """Return the pose (x, y, theta) of the body at all samples, `[T, 3]` [m, m, rad]."""
     return np.stack([np.asarray(solution.histories[name].values, dtype=float) for name in ("x", "y", "theta")], -1)
 
 
-def _poses(solution: Solution, sampled: np.ndarray, times: np.ndarray) -> np.ndarray:
+def _poses(solution: pf.Solution, sampled: np.ndarray, times: np.ndarray) -> np.ndarray:
     from scipy.interpolate import PchipInterpolator
 
     poses = body_poses(solution)
@@ -150,12 +147,12 @@ def _poses(solution: Solution, sampled: np.ndarray, times: np.ndarray) -> np.nda
     return PchipInterpolator(sampled, poses, axis=0)(np.clip(times, sampled[0], sampled[-1]))
 
 
-def _values(solution: Solution, name: str, sampled: np.ndarray, times: np.ndarray, contact: Any = None) -> np.ndarray:
-    values = np.asarray(solution.histories[name].values, dtype=float)
+def _values(run: pf.Solution, name: str, sampled: np.ndarray, times: np.ndarray, contact: Any = None) -> np.ndarray:
+    values = np.asarray(run.histories[name].values, dtype=float)
     return np.interp(times, sampled, values if contact is None else values[:, contact])
 
 
-def _without_kick(solution: Solution, contact: int) -> np.ndarray:
+def _without_kick(solution: pf.Solution, contact: int) -> np.ndarray:
     """Return the wrenches of a contact `[T, 3]`; a first one that dwarfs the others gives way to the next.
 
     Bristles that start at rest under a moving body kick once (`sigma_1 v f_N`).
